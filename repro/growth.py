@@ -1,0 +1,245 @@
+"""Growth mechanics (2.3, 3.4): the aggregate as an incompressible neo-Hookean body that grows.
+
+Plane strain, from the configuration of t = 0: F = d phi / d X, J = det F, tr C = F : F + 1. Stationary in phi and P is
+
+    Pi = integral of mu/2 (J^(-2/3) tr C - 3) + P (J - theta) dV - 1/2 sum_tau integral of h^2/(12 mu_tau) |grad P|^2 dv
+
+(14)-(17), (21)-(24) and (27), hence J = theta. Signs are [E5]'s: the stabilisation makes the pressure block negative.
+[E6]: h, grad and dv are those of the last known shape, and the modulus is the incremental one there,
+mu_tau = mu_L theta^(-2/3); in reference quantities the stabilisation so grows as J^(5/3). It is kept fixed while an
+equilibrium is sought. Without tractions mu_L scales P and nothing else: it is 1 in here.
+
+With A = mu J^(-2/3) and H = F^-T (dJ = J H : dF), first Piola-Kirchhoff stress and tangent are
+
+    S = A (F - tr C / 3 H) + P J H
+    dS = A (dF - 2/3 (H : dF) F - 2/3 (F : dF) H + 2/9 tr C (H : dF) H + tr C / 3 H dF^T H) + P J ((H : dF) H - H dF^T H)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from repro import linear
+from repro.mesh import gradients, triangle_areas
+
+#: Newton stops at this residual against the size of its terms; steps of a line search; sub-steps of a continuation.
+NEWTON, MOST_ITERATIONS, HALVINGS = 1e-11, 25, 8
+CONTINUATION = (1, 8, 64)
+
+
+class GrowthError(RuntimeError):
+    """No equilibrium was found; says why, and what to try."""
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """The aggregate's own mesh in its reference configuration.
+
+    reference: (n, 2) um; triangles: (t, 3); held: (n, 2) True where a coordinate is prescribed.
+    """
+
+    reference: np.ndarray
+    triangles: np.ndarray
+    held: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """position: (n, 2) um; pressure: (n,) P / mu_L; iterations of Newton's method, all sub-steps together."""
+
+    position: np.ndarray
+    pressure: np.ndarray
+    iterations: int
+
+
+def deformation(position: np.ndarray, triangles: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+    """(t, 2, 2) F[i, K] = d x_i / d X_K, from reference gradients (t, 3, 2) of the nodal functions."""
+    return np.einsum("tai,tak->tik", position[triangles], slopes)
+
+
+def inverse_transpose(F: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """H = F^-T and J of plane deformations (..., 2, 2)."""
+    J = F[..., 0, 0] * F[..., 1, 1] - F[..., 0, 1] * F[..., 1, 0]
+    H = np.empty_like(F)
+    H[..., 0, 0], H[..., 1, 1], H[..., 0, 1], H[..., 1, 0] = F[..., 1, 1], F[..., 0, 0], -F[..., 1, 0], -F[..., 0, 1]
+    return H / J[..., None, None], J
+
+
+def energy(F: np.ndarray) -> np.ndarray:
+    """mu/2 (J^(-2/3) tr C - 3) for mu = 1 (17), of F (..., 2, 2)."""
+    J = np.linalg.det(F)
+    return 0.5 * (J ** (-2 / 3) * (np.sum(F**2, axis=(-2, -1)) + 1) - 3)
+
+
+def piola(F: np.ndarray, P: np.ndarray) -> np.ndarray:
+    """First Piola-Kirchhoff stress (..., 2, 2) over mu_L, at pressure P (...) over mu_L: derivative of (21) by F."""
+    H, J = inverse_transpose(F)
+    trace = np.sum(F**2, axis=(-2, -1)) + 1
+    A, PJ = J ** (-2 / 3), P * J
+    return A[..., None, None] * F + (PJ - A * trace / 3)[..., None, None] * H
+
+
+def tangent(F: np.ndarray, P: np.ndarray) -> np.ndarray:
+    """d piola / d F, (..., i, K, j, L), over mu_L."""
+    H, J = inverse_transpose(F)
+    trace = np.sum(F**2, axis=(-2, -1)) + 1
+    A, PJ = J ** (-2 / 3), P * J
+    FH, HF = np.einsum("...ik,...jl->...ikjl", F, H), np.einsum("...ik,...jl->...ikjl", H, F)
+    HH, swap = np.einsum("...ik,...jl->...ikjl", H, H), np.einsum("...il,...jk->...ikjl", H, H)
+    identity = np.einsum("ij,kl->ikjl", np.eye(2), np.eye(2))
+
+    def times(scalar, tensor):
+        return scalar[..., None, None, None, None] * tensor
+
+    return (times(A, identity - 2 / 3 * (FH + HF)) + times(2 / 9 * A * trace + PJ, HH)
+            + times(A * trace / 3 - PJ, swap))
+
+
+def cauchy(F: np.ndarray, P: np.ndarray) -> np.ndarray:
+    """Cauchy stress (..., 3): sigma_xx, sigma_yy, sigma_xy over mu_L, plane strain: J^-1 S F^T."""
+    J = np.linalg.det(F)
+    sigma = np.einsum("...ik,...jk->...ij", piola(F, P), F) / J[..., None, None]
+    return np.stack([sigma[..., 0, 0], sigma[..., 1, 1], sigma[..., 0, 1]], axis=-1)
+
+
+def stabilisation(position: np.ndarray, triangles: np.ndarray, theta: np.ndarray) -> np.ndarray:
+    """(t, 3, 3) matrices of sum_tau h^2 / (12 theta^(-2/3)) (grad p, grad q) on the shape ``position`` [E6]."""
+    slopes, areas = gradients(position, triangles), triangle_areas(position, triangles)
+    corner = position[triangles]
+    sides = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2)
+    h = np.prod(sides, axis=1) / (2 * areas)
+    weight = areas * h**2 / 12 * theta ** (2 / 3)
+    return weight[:, None, None] * np.einsum("tai,tbi->tab", slopes, slopes)
+
+
+class System:
+    """Residual and tangent of Pi for one body; theta and prescribed coordinates vary, the sparsity does not."""
+
+    def __init__(self, body: Body, stabilising: np.ndarray):
+        self.body = body
+        self.slopes = gradients(body.reference, body.triangles)
+        self.areas = triangle_areas(body.reference, body.triangles)
+        self.stabilising = stabilising
+        count, t = len(body.reference), body.triangles
+        self.unknowns = np.concatenate([2 * t, 2 * t + 1, 2 * count + t], axis=1)
+        self.free = np.flatnonzero(np.concatenate([~body.held.ravel(), np.ones(count, bool)]))
+        self.order = self._order(count)
+
+    def _order(self, count: int) -> np.ndarray:
+        place = np.empty(count)
+        place[linear.node_order(count, self.body.triangles)] = np.arange(count)
+        rank = np.concatenate([np.repeat(place, 2), place + 0.5])
+        return np.argsort(rank[self.free], kind="stable")
+
+    def residual(self, position: np.ndarray, pressure: np.ndarray, theta: np.ndarray):
+        """Residual (3n,) [x and y of each node, then P] and the size of its terms. FloatingPointError never: det F <= 0
+        is for the caller to exclude."""
+        t, n = self.body.triangles, len(position)
+        F = deformation(position, t, self.slopes)
+        P = pressure[t]
+        S = piola(F, P.mean(axis=1))
+        force = self.areas[:, None, None] * np.einsum("tik,tak->tia", S, self.slopes)
+        terms = self.areas[:, None, None] * np.einsum("tik,tak->tia", *map(np.abs, (F, self.slopes)))
+        terms = terms * np.linalg.det(F)[:, None, None] ** (-2 / 3)
+        gap = (self.areas * (np.linalg.det(F) - theta))[:, None] / 3 - np.einsum("tab,tb->ta", self.stabilising, P)
+        local = np.concatenate([force[:, 0], force[:, 1], gap], axis=1)
+        scale = np.concatenate([terms[:, 0], terms[:, 1],
+                                np.broadcast_to((self.areas * theta)[:, None] / 3, P.shape)], axis=1)
+        total, size = (np.bincount(self.unknowns.ravel(), part.ravel(), 3 * n) for part in (local, scale))
+        return total, size
+
+    def tangent(self, position: np.ndarray, pressure: np.ndarray) -> sp.csc_matrix:
+        """Symmetric tangent of the residual, (3n, 3n)."""
+        t, n = self.body.triangles, len(position)
+        F = deformation(position, t, self.slopes)
+        moduli = tangent(F, pressure[t].mean(axis=1))
+        K = self.areas[:, None, None, None, None] * np.einsum("tikjl,tak,tbl->tiajb", moduli, self.slopes, self.slopes)
+        H, J = inverse_transpose(F)
+        B = (self.areas * J)[:, None, None] * np.einsum("tik,tak->tia", H, self.slopes) / 3
+        local = np.zeros((len(t), 9, 9))
+        local[:, :6, :6] = K.reshape(len(t), 6, 6)
+        local[:, :6, 6:] = B.reshape(len(t), 6, 1)
+        local[:, 6:, :6] = B.reshape(len(t), 1, 6)
+        local[:, 6:, 6:] = -self.stabilising
+        rows, columns = np.repeat(self.unknowns, 9, axis=1), np.tile(self.unknowns, (1, 9))
+        return sp.csc_matrix((local.ravel(), (rows.ravel(), columns.ravel())), shape=(3 * n, 3 * n))
+
+    def admissible(self, position: np.ndarray) -> bool:
+        """Is det F > 0 everywhere?"""
+        return bool(triangle_areas(position, self.body.triangles).min() > 0)
+
+
+def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: np.ndarray,
+                prescribed: np.ndarray) -> Equilibrium:
+    """Equilibrium under the expansion theta (t,) since the reference, from a start.
+
+    position: (n, 2) um, the last shape, with det F > 0; pressure: (n,) P / mu_L there; prescribed: (n, 2) um, the
+    coordinates to reach where ``body.held``. Newton's method with a line search that rejects det F <= 0; where it
+    fails, theta and the prescribed coordinates go from where they are to their targets in geometric sub-steps.
+    Raises GrowthError where that fails too.
+    """
+    start = triangle_areas(position, body.triangles) / triangle_areas(body.reference, body.triangles)
+    if start.min() <= 0 or theta.min() <= 0:
+        raise GrowthError("growth starts from a triangle that is turned over or from theta <= 0; "
+                          "try a shorter growth.time_step")
+    system = System(body, stabilisation(position, body.triangles, start))
+    failure = ""
+    for steps in CONTINUATION:
+        try:
+            return _continued(system, start, theta, position, pressure, prescribed, steps)
+        except (GrowthError, linear.LinearError) as error:
+            failure = str(error)
+    raise GrowthError(f"{failure}; try a shorter growth.time_step or a larger numerics.refinement")
+
+
+def _continued(system, start, theta, position, pressure, prescribed, steps: int) -> Equilibrium:
+    """Newton's method at theta = start (theta / start)^s for s = 1 / steps ... 1."""
+    first, iterations = position, 0
+    for part in np.arange(1, steps + 1) / steps:
+        target = np.where(system.body.held, first + part * (prescribed - first), position)
+        position, pressure, used = _newton(system, start * (theta / start) ** part, position, pressure, target)
+        iterations += used
+    return Equilibrium(position, pressure, iterations)
+
+
+def _newton(system: System, theta, position, pressure, target):
+    """Solve at one theta; the first step carries the prescribed coordinates to their target."""
+    lag = np.where(system.body.held, target - position, 0.0)
+    residual, size = system.residual(position, pressure, theta)
+    for iteration in range(MOST_ITERATIONS):
+        defect = float(np.max(np.abs(residual[system.free]) / np.maximum(size[system.free], np.finfo(float).tiny)))
+        if defect <= NEWTON and not lag.any():
+            return position, pressure, iteration
+        step = _newton_step(system, position, pressure, residual, lag)
+        position, pressure, taken, residual, size = _line_search(system, theta, position, pressure, step, residual, lag)
+        lag = (1 - taken) * lag
+    raise GrowthError(f"Newton's method for the growth stands at a defect of {defect:.2g} "
+                      f"after {MOST_ITERATIONS} iterations")
+
+
+def _newton_step(system: System, position, pressure, residual, lag) -> np.ndarray:
+    """(3n,) full Newton step that moves held coordinates by ``lag``."""
+    matrix = system.tangent(position, pressure)
+    step = np.concatenate([lag.ravel(), np.zeros(len(pressure))])
+    right = -(residual + matrix @ step)[system.free]
+    step[system.free] = linear.solve(matrix[system.free][:, system.free], right, system.order)
+    return step
+
+
+def _line_search(system, theta, position, pressure, step, residual, lag):
+    """The longest of the steps 1, 1/2, ... with det F > 0 that does not raise the residual fourfold."""
+    n = len(pressure)
+    move, push = step[: 2 * n].reshape(n, 2), step[2 * n:]
+    before = np.linalg.norm(residual[system.free])
+    for length in 0.5 ** np.arange(HALVINGS):
+        trial = position + length * move
+        if not system.admissible(trial):
+            continue
+        found, size = system.residual(trial, pressure + length * push, theta)
+        if lag.any() or np.linalg.norm(found[system.free]) < 4 * before:
+            return trial, pressure + length * push, length, found, size
+    raise GrowthError(f"no step of Newton's method keeps det F > 0 and the residual in bounds "
+                      f"(shortest tried {0.5 ** (HALVINGS - 1):.2g})")

@@ -1,0 +1,269 @@
+"""Triangulation of the meshed part of the pore (3.1): one mesh of triangles for fluid and biomass.
+
+Boundary, interface and contact nodes are placed by :mod:`repro.geometry`; Mmg (through mmgpy) fills the inside from a
+constrained Delaunay triangulation (shapely) and keeps every edge that it was given.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import shapely
+from mmgpy import MmgMesh2D
+from scipy.spatial import cKDTree
+from skfem import MeshTri
+
+from repro import geometry
+from repro.geometry import Outline
+
+#: Remesh when more than POOR_ALLOWED triangles have a quality under POOR (3.5).
+POOR, POOR_ALLOWED = 0.6, 6
+#: Sizes of the first of two meshing passes over the wanted ones, and Mmg's own limit on the ratio of adjacent edges.
+FIRST_PASS, HGRAD = 2.0, 1.5
+
+
+class MeshError(RuntimeError):
+    """A mesh cannot be made, or has turned inside out; says where."""
+
+
+@dataclass(frozen=True, eq=False)
+class PoreMesh:
+    """Triangles of fluid and biomass over ``ends`` x [0, width].
+
+    points: (N, 2) um; triangles: (T, 3) nodes, counterclockwise; biomass: (T,) True in the aggregate;
+    loop: (M,) nodes of the aggregate's boundary, counterclockwise, empty in a clean channel.
+    """
+
+    points: np.ndarray
+    triangles: np.ndarray
+    biomass: np.ndarray
+    loop: np.ndarray
+    width: float
+    ends: tuple[float, float]
+
+    @cached_property
+    def edges(self) -> np.ndarray:
+        """(T, 3, 2) um: edge i of a triangle is opposite its node i."""
+        corner = self.points[self.triangles]
+        return np.roll(corner, -2, axis=1) - np.roll(corner, -1, axis=1)
+
+    @cached_property
+    def areas(self) -> np.ndarray:
+        """(T,) signed areas, um2."""
+        return triangle_areas(self.points, self.triangles)
+
+    @cached_property
+    def quality(self) -> np.ndarray:
+        """(T,) 4 sqrt(3) |tau| / sum h_i^2: one for an equilateral triangle (3.5)."""
+        return 4 * np.sqrt(3) * self.areas / np.sum(self.edges**2, axis=(1, 2))
+
+    @cached_property
+    def circumdiameter(self) -> np.ndarray:
+        """(T,) h_tau, the diameter of the circumscribed circle (3.4), um."""
+        return np.prod(np.linalg.norm(self.edges, axis=2), axis=1) / (2 * np.abs(self.areas))
+
+    @cached_property
+    def gradients(self) -> np.ndarray:
+        """(T, 3, 2) gradients of the three nodal functions on each triangle, 1/um."""
+        return gradients(self.points, self.triangles)
+
+    @cached_property
+    def fem(self) -> MeshTri:
+        """The same mesh for scikit-fem."""
+        return MeshTri(self.points.T.copy(), self.triangles.T.copy())
+
+    @cached_property
+    def body(self) -> np.ndarray:
+        """Nodes of the aggregate, its boundary included, ascending."""
+        return np.unique(self.triangles[self.biomass])
+
+    @cached_property
+    def fluid(self) -> np.ndarray:
+        """Nodes of the fluid, the interface included, ascending."""
+        return np.unique(self.triangles[~self.biomass])
+
+    @cached_property
+    def inlet(self) -> np.ndarray:
+        """Nodes of the inlet from the lower wall up."""
+        return self._line(0, self.ends[0])
+
+    @cached_property
+    def outlet(self) -> np.ndarray:
+        """Nodes of the outlet from the lower wall up."""
+        return self._line(0, self.ends[1])
+
+    @cached_property
+    def walls(self) -> np.ndarray:
+        """Nodes of both walls."""
+        return np.flatnonzero((self.points[:, 1] == 0) | (self.points[:, 1] == self.width))
+
+    def _line(self, axis: int, level: float) -> np.ndarray:
+        nodes = np.flatnonzero(self.points[:, axis] == level)
+        return nodes[np.argsort(self.points[nodes, 1 - axis])]
+
+    def lumped(self, where: np.ndarray | None = None) -> np.ndarray:
+        """(N,) sum of |tau| / 3 over the triangles ``where`` around each node, um2."""
+        chosen = slice(None) if where is None else where
+        weight = np.repeat(self.areas[chosen] / 3, 3)
+        return np.bincount(self.triangles[chosen].ravel(), weight, len(self.points))
+
+    def moved(self, points: np.ndarray) -> PoreMesh:
+        """The same triangles with their nodes at ``points`` (N, 2)."""
+        return replace(self, points=points)
+
+    def acceptable(self) -> bool:
+        """Does the mesh pass the paper's criterion (3.5), with no triangle turned over?"""
+        return bool(self.areas.min() > 0 and np.count_nonzero(self.quality < POOR) <= POOR_ALLOWED)
+
+
+def triangle_areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """(T,) signed areas of triangles with corners points (N, 2)."""
+    a, b, c = (points[triangles[:, i]] for i in range(3))
+    return 0.5 * ((b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0]))
+
+
+def gradients(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """(T, 3, 2) gradients of the linear nodal functions."""
+    corner = points[triangles]
+    edge = np.roll(corner, -2, axis=1) - np.roll(corner, -1, axis=1)
+    double = 2 * triangle_areas(points, triangles)[:, None]
+    return np.stack([-edge[:, :, 1] / double, edge[:, :, 0] / double], axis=2)
+
+
+def generate(outline: Outline | None, ends: tuple[float, float], width: float, refinement: float, film: float):
+    """A new mesh around the aggregate, and the outline with the nodes that the mesh has on it.
+
+    outline: None for a clean channel; ends: x of inlet and outlet (um); film: thinnest film to resolve (um).
+    Returns (PoreMesh, Outline | None). Raises MeshError where the outline crosses itself or the channel's ends.
+    """
+    largest = width / geometry.ACROSS_PORE / refinement
+    if outline is None:
+        sources, sizes = np.empty((0, 2)), np.empty(0)
+    else:
+        _check_outline(outline, ends, width)
+        sizes = geometry.interface_sizes(outline, width, refinement, film)
+        outline = geometry.refine_outline(outline, sizes, largest)
+        free = outline.wall == geometry.FREE
+        sources = outline.points[free]
+        sizes = geometry.interface_sizes(outline, width, refinement, film)[free]
+    points, polygons = _boundaries(outline, ends, width, sources, sizes, largest)
+    mesh = _fill(points, polygons, lambda where: geometry.graded_size(where, sources, sizes, largest), ends, width)
+    return (mesh if outline is None else _with_loop(mesh, outline)), outline
+
+
+def _check_outline(outline: Outline, ends: tuple[float, float], width: float) -> None:
+    polygon = shapely.Polygon(outline.points)
+    if not polygon.is_valid:
+        raise MeshError(f"the outline of the aggregate crosses itself: {shapely.is_valid_reason(polygon)}; "
+                        "try a shorter growth.time_step")
+    inside = ends[0] < outline.upstream and outline.downstream < ends[1]
+    if not inside or outline.points[:, 1].min() < 0 or outline.points[:, 1].max() > width:
+        raise MeshError(f"the aggregate, x from {outline.upstream:.4g} to {outline.downstream:.4g} um, "
+                        f"leaves the meshed part, x from {ends[0]:.4g} to {ends[1]:.4g} um")
+
+
+def _boundaries(outline, ends, width, sources, sizes, largest):
+    """All prescribed points (K, 2) and the polygons [(indices, is biomass)] that they bound."""
+    def line(start, end):
+        return geometry.graded_line(start, end, sources, sizes, largest)
+
+    left, right = ends
+    corners = [(left, 0.0), (right, 0.0), (right, width), (left, width)]
+    if outline is None:
+        rim = np.vstack([line(a, b)[:-1] for a, b in zip(corners, corners[1:] + corners[:1])])
+        return rim, [(np.arange(len(rim)), False)]
+    bottom, top = (np.flatnonzero(outline.wall == w) for w in (geometry.BOTTOM, geometry.TOP))
+    x = outline.points[:, 0]
+    west, east = bottom[np.argmin(x[bottom])], bottom[np.argmax(x[bottom])]
+    store = _PointStore(outline.points)
+    if len(top) == 0:
+        start = store.add(line(corners[0], outline.points[west])[:-1])
+        around = store.add(np.vstack([line(a, b)[:-1] for a, b in zip(corners[1:], corners[2:] + corners[:1])]))
+        end = store.add(line(outline.points[east], corners[1])[1:-1])
+        fluid = np.concatenate([start, _backwards(west, east, len(x)), end, around])
+        polygons = [(fluid, False)]
+    else:
+        north_west, north_east = top[np.argmin(x[top])], top[np.argmax(x[top])]
+        polygons = []
+        first = store.add(line(corners[0], outline.points[west])[:-1])
+        close = store.add(np.vstack([line(outline.points[north_west], corners[3])[1:-1],
+                                     line(corners[3], corners[0])[:-1]]))
+        polygons.append((np.concatenate([first, _backwards(west, north_west, len(x)), close]), False))
+        out = store.add(np.vstack([line(outline.points[east], corners[1])[1:-1], line(corners[1], corners[2])[:-1],
+                                   line(corners[2], outline.points[north_east])[:-1]]))
+        polygons.append((np.concatenate([_backwards(north_east, east, len(x)), out]), False))
+    return store.points, polygons + [(np.arange(len(x)), True)]
+
+
+class _PointStore:
+    """A growing list of points; ``add`` returns the indices of what it adds."""
+
+    def __init__(self, points: np.ndarray):
+        self.points = points
+
+    def add(self, points: np.ndarray) -> np.ndarray:
+        first = len(self.points)
+        self.points = np.vstack([self.points, points])
+        return np.arange(first, len(self.points))
+
+
+def _backwards(first: int, last: int, count: int) -> np.ndarray:
+    """Loop indices from first to last, both included, walking clockwise."""
+    return (first - np.arange((first - last) % count + 1)) % count
+
+
+def _fill(points, polygons, size_at, ends, width) -> PoreMesh:
+    """Triangles inside the polygons, of the size that ``size_at(points)`` wants (um).
+
+    The first pass knows the wanted size at the prescribed points alone, the second one at every point of the first.
+    """
+    triangles = [_constrained_delaunay(points, nodes) for nodes, _ in polygons]
+    region = np.repeat([1 + biomass for _, biomass in polygons], [len(t) for t in triangles])
+    rim = np.vstack([np.column_stack([nodes, np.roll(nodes, -1)]) for nodes, _ in polygons])
+    rim = np.unique(np.sort(rim, axis=1), axis=0)
+    coarse, found = _mmg(points, np.vstack(triangles), region, rim, points, FIRST_PASS * size_at(points))
+    fine, found = _mmg(*coarse, found[rim], points, size_at(coarse[0]))
+    return PoreMesh(fine[0], fine[1], fine[2] == 2, found, width, ends)
+
+
+def _mmg(points, triangles, region, rim, prescribed, sizes):
+    """One pass of Mmg that keeps the rim: (points, triangles, region), and where the prescribed points went."""
+    mmg = MmgMesh2D()
+    mmg.set_mesh_size(vertices=len(points), triangles=len(triangles), quadrilaterals=0, edges=len(rim))
+    mmg.set_vertices(points)
+    mmg.set_triangles(triangles.astype(np.int32), region.astype(np.int64))
+    mmg.set_edges(rim.astype(np.int32))
+    mmg.set_required_edges(np.arange(len(rim), dtype=np.int32))
+    mmg.set_required_vertices(np.unique(rim).astype(np.int32))
+    mmg["metric"] = sizes[:, None]
+    mmg.remesh(verbose=-1, hgrad=HGRAD, nosurf=True)
+    points, (triangles, region) = mmg.get_vertices(), mmg.get_triangles_with_refs()
+    found = _find(points, prescribed)
+    points[found] = prescribed
+    return (points, triangles.astype(np.int64), region), found
+
+
+def _constrained_delaunay(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """(K, 3) counterclockwise triangles between the given nodes of one polygon."""
+    pieces = shapely.constrained_delaunay_triangles(shapely.Polygon(points[nodes]))
+    corners = shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3]
+    distance, local = cKDTree(points[nodes]).query(corners.reshape(-1, 2))
+    triangles = nodes[local].reshape(-1, 3)
+    turned = triangle_areas(points, triangles) < 0
+    triangles[turned] = triangles[turned][:, ::-1]
+    return triangles
+
+
+def _find(new_points: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Indices in the new mesh of the prescribed points. Raises MeshError where one of them has moved."""
+    distance, found = cKDTree(new_points).query(points)
+    if distance.max() > 1e-9 * np.ptp(points[:, 0]) or len(np.unique(found)) < len(points):
+        raise MeshError(f"the mesher moved a boundary node by {distance.max():.3g} um")
+    return found
+
+
+def _with_loop(mesh: PoreMesh, outline: Outline) -> PoreMesh:
+    """The outline's points come first among the prescribed ones."""
+    return replace(mesh, loop=mesh.loop[: len(outline.points)])

@@ -1,0 +1,99 @@
+"""The state of a pore at an instant, and what is solved in its geometry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from repro import flow, geometry, mesh, transport
+from repro.geometry import Outline
+from repro.mesh import PoreMesh
+
+#: The thinnest film to resolve where no [growth] says when it closes (Table 1), um.
+MINIMUM_FILM = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Pore:
+    """Geometry and biomass at one time.
+
+    time: h; wall: (M,) contact of each node of ``mesh.loop``; fixed: (M,) its x is held; active, inert: X_A, X_I (N,)
+    mg/L, zero outside the aggregate; origin: (N, 2) um, where the material at a node was at t = 0 (meaningful in the
+    aggregate); theta: (t,) expansion since t = 0 of each biomass triangle; pressure: (N,) P / mu_L;
+    concentrations: the last known ones, None before the first.
+    """
+
+    time: float
+    mesh: PoreMesh
+    wall: np.ndarray
+    fixed: np.ndarray
+    active: np.ndarray
+    inert: np.ndarray
+    origin: np.ndarray
+    theta: np.ndarray
+    pressure: np.ndarray
+    concentrations: transport.Concentrations | None = None
+
+    @property
+    def outline(self) -> Outline | None:
+        """Boundary of the aggregate, None in a clean channel."""
+        loop = self.mesh.loop
+        if len(loop) == 0:
+            return None
+        return Outline(self.mesh.points[loop], self.wall, self.fixed, self.origin[loop])
+
+    @property
+    def contact(self) -> bool:
+        """Does the aggregate touch the opposite wall?"""
+        return bool((self.wall == geometry.TOP).any())
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """Flow and substrates in the geometry of a pore; None where the scene does not model them."""
+
+    flow: flow.Flow | None
+    problem: transport.Problem | None
+    concentrations: transport.Concentrations | None
+
+
+def film(scene) -> float:
+    """Thickness (um) at which a film closes, and the least that the mesh resolves."""
+    return scene.growth.minimum_film if scene.growth else MINIMUM_FILM
+
+
+def seeded(scene) -> Pore:
+    """The pore at t = 0: X_A = X_m in a half-disc (Table 1), or a clean channel."""
+    numerics, width = scene.numerics, scene.pore.width
+    outline = geometry.seed(scene.aggregate.radius, numerics.refinement) if scene.aggregate else None
+    ends = geometry.meshed_extent(outline, width, scene.pore.length, numerics.extent == "full")
+    grid, outline = mesh.generate(outline, ends, width, numerics.refinement, film(scene))
+    count = len(grid.points)
+    density = scene.kinetics.maximum_density if scene.kinetics else 0.0
+    active = np.zeros(count)
+    active[grid.body] = density
+    wall, fixed = (outline.wall, outline.fixed) if outline else (np.empty(0, int), np.empty(0, bool))
+    return Pore(0.0, grid, wall, fixed, active, np.zeros(count), grid.points.copy(),
+                np.ones(np.count_nonzero(grid.biomass)), np.zeros(count))
+
+
+def solve(scene, pore: Pore) -> Solved:
+    """Flow, then substrates, in the geometry of the pore: what the scene's sections ask for."""
+    carried = solve_flow(scene, pore) if scene.flow else None
+    if scene.substrates is None:
+        return Solved(carried, None, None)
+    problem = transport.problem(pore.mesh, carried, scene.substrates, scene.kinetics, scene.numerics.inlet)
+    if scene.numerics.transport == "gear":
+        from repro import gear
+        return Solved(carried, problem, gear.settle(problem, pore.active, pore.concentrations))
+    return Solved(carried, problem, transport.steady(problem, pore.active, pore.concentrations))
+
+
+def solve_flow(scene, pore: Pore) -> flow.Flow:
+    """Stokes flow under the scene's head or mean velocity."""
+    numerics, drive = scene.numerics, scene.flow
+    unit = flow.unit_flow(pore.mesh, drive.viscosity_ratio, interface=numerics.interface,
+                          stabilisation=numerics.flow_stabilisation)
+    return flow.scaled(unit, pore.mesh, scene.pore.length, drive.kinematic_viscosity / drive.gravity, head=drive.head,
+                       mean_velocity=drive.mean_velocity)
