@@ -288,7 +288,11 @@ def _too_coarse(scene, outline: geometry.Outline) -> bool:
 
 
 def remesh(scene, now: Pore, expanded: Pore, solved: Solved) -> Pore:
-    """A new mesh around the aggregate with the extent of 3.1; fields, and places at t = 0, are carried over."""
+    """A new mesh around the aggregate with the extent of 3.1; fields, and places at t = 0, are carried over.
+
+    theta restarts as J times the density over X_m: the expansion that brings each triangle's density back to X_m, so
+    that the error of the constraint is worked off at the next update and does not accumulate [E7].
+    """
     outline, numerics = expanded.outline, scene.numerics
     ends = geometry.meshed_extent(outline, scene.pore.width, scene.pore.length, numerics.extent == "full")
     grid, outline = mesh.generate(outline, ends, scene.pore.width, numerics.refinement, pore.film(scene))
@@ -296,7 +300,7 @@ def remesh(scene, now: Pore, expanded: Pore, solved: Solved) -> Pore:
     body = expanded.mesh.points[expanded.mesh.body]
     carried = _carried(numerics.transfer, body, triangles, expanded, grid)
     carried["origin"][grid.loop] = outline.origin
-    theta = _expansion(grid, carried["origin"])
+    theta = _expansion(grid, carried["origin"]) * _density(scene, grid, carried)
     return replace(expanded, mesh=grid, wall=outline.wall, fixed=outline.fixed, theta=theta,
                    concentrations=_carried_substrates(scene, now, grid, solved), **carried)
 
@@ -320,13 +324,19 @@ def _carried(transfer: str, body, triangles, expanded: Pore, grid: mesh.PoreMesh
 
 
 def _expansion(grid: mesh.PoreMesh, origin: np.ndarray) -> np.ndarray:
-    """theta (t,) of each biomass triangle: its area over the area it had at t = 0 (3.5)."""
+    """J (t,) of each biomass triangle: its area over the area it had at t = 0 (3.5)."""
     reference = mesh.triangle_areas(origin, grid.triangles[grid.biomass])
     if reference.min() <= 0:
         worst = grid.points[grid.triangles[grid.biomass][np.argmin(reference)]].mean(axis=0)
         raise mesh.MeshError(f"after a remesh the places at t = 0 fold near x = {worst[0]:.4g}, y = {worst[1]:.4g} um; "
                              "try a larger numerics.refinement")
     return grid.areas[grid.biomass] / reference
+
+
+def _density(scene, grid: mesh.PoreMesh, carried) -> np.ndarray:
+    """(t,) mean of (X_A + X_I) / X_m over the nodes of each biomass triangle."""
+    total = (carried["active"] + carried["inert"]) / scene.kinetics.maximum_density
+    return total[grid.triangles[grid.biomass]].mean(axis=1)
 
 
 def _carried_substrates(scene, now: Pore, grid: mesh.PoreMesh, solved: Solved) -> Concentrations:

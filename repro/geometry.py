@@ -194,20 +194,17 @@ def graded_line(start, end, sources: np.ndarray, sizes: np.ndarray, largest: flo
 def closing_nodes(outline: Outline, width: float, film: float, angle: float) -> np.ndarray:
     """(M,) wall that each node must join next: FREE where none (2.3.3).
 
-    A film of fluid thinner than ``film`` to the opposite wall closes, and so does a wedge of fluid beside a contact
-    surface whose angle is under ``angle``: beside contact the wedge is measured by the chord from the contact line,
-    over the length film / tan(angle) after which the wedge is a film. The film rule holds for an aggregate that has
-    not reached the opposite wall yet; nodes between closing ones close too, so that no fluid is trapped.
+    A layer of fluid thinner than ``film`` to the opposite wall closes, and so does a wedge of fluid beside a contact
+    surface whose angle is under ``angle``. Beside contact both say: the gap must not be less than the smaller of film
+    and tan(angle) times the distance from the contact line. Nodes between closing ones close too: no fluid is trapped.
     """
     joins = np.full(len(outline.points), FREE)
-    reach = film / np.tan(angle)
-    for wall, level in ((BOTTOM, 0.0), (TOP, width)):
-        gap = np.abs(level - outline.points[:, 1])
-        touching = outline.wall == wall
-        if wall == TOP and not touching.any():
+    for wall, gap in ((BOTTOM, outline.points[:, 1]), (TOP, width - outline.points[:, 1])):
+        lines = _contact_lines(outline, wall)
+        if wall == TOP and not lines:
             joins[(outline.wall == FREE) & (gap < film)] = TOP
-        for line, step in _contact_lines(outline, wall):
-            joins[_closing_wedge(outline, gap, line, step, np.tan(angle), reach)] = wall
+        for line, step in lines:
+            joins[_closing_run(outline, gap, line, step, film, np.tan(angle))] = wall
     return joins
 
 
@@ -218,12 +215,12 @@ def _contact_lines(outline: Outline, wall: int) -> list[tuple[int, int]]:
     return ends + [(int(i), -1) for i in np.flatnonzero(on & ~np.roll(on, 1))]
 
 
-def _closing_wedge(outline, gap, line: int, step: int, slope: float, reach: float) -> np.ndarray:
-    """Free nodes from a contact line outwards up to the last one within ``reach`` whose chord is too flat."""
+def _closing_run(outline: Outline, gap: np.ndarray, line: int, step: int, film: float, slope: float) -> np.ndarray:
+    """Free nodes from a contact line outwards, up to the last one with too little fluid between it and the wall."""
     count = len(gap)
     walk = (line + step * np.arange(1, count)) % count
     free = np.cumprod(outline.wall[walk] == FREE).astype(bool)
-    along = np.abs(outline.points[walk, 0] - outline.points[line, 0])
-    flat = free & (along <= reach) & (gap[walk] < slope * along)
-    flat &= np.cumprod(~free | (along <= reach)).astype(bool)
-    return walk[: np.flatnonzero(flat)[-1] + 1] if flat.any() else walk[:0]
+    x = outline.points[:, 0]
+    along = np.sign(x[line] - x[line - step]) * (x[walk] - x[line])
+    thin = free & ((gap[walk] < 0) | (gap[walk] < np.minimum(film, slope * along)))
+    return walk[: np.flatnonzero(thin)[-1] + 1] if thin.any() else walk[:0]

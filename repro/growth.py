@@ -25,8 +25,10 @@ import scipy.sparse as sp
 from repro import linear
 from repro.mesh import gradients, triangle_areas
 
-#: Newton stops at this residual against the size of its terms; steps of a line search; sub-steps of a continuation.
-NEWTON, MOST_ITERATIONS, HALVINGS = 1e-11, 25, 8
+#: Newton stops at this residual against the size of its terms, or at the second where round-off keeps it from falling.
+NEWTON, ROUND_OFF, MOST_ITERATIONS = 1e-11, 1e-8, 25
+#: Halvings in a line search; sub-steps of a continuation.
+HALVINGS = 8
 CONTINUATION = (1, 8, 64)
 
 
@@ -209,15 +211,21 @@ def _newton(system: System, theta, position, pressure, target):
     """Solve at one theta; the first step carries the prescribed coordinates to their target."""
     lag = np.where(system.body.held, target - position, 0.0)
     residual, size = system.residual(position, pressure, theta)
+    defect = np.inf
     for iteration in range(MOST_ITERATIONS):
-        defect = float(np.max(np.abs(residual[system.free]) / np.maximum(size[system.free], np.finfo(float).tiny)))
-        if defect <= NEWTON and not lag.any():
+        last, defect = defect, _relative(residual[system.free], size[system.free])
+        if not lag.any() and (defect <= NEWTON or 0.1 * last < defect <= ROUND_OFF):
             return position, pressure, iteration
         step = _newton_step(system, position, pressure, residual, lag)
         position, pressure, taken, residual, size = _line_search(system, theta, position, pressure, step, residual, lag)
         lag = (1 - taken) * lag
     raise GrowthError(f"Newton's method for the growth stands at a defect of {defect:.2g} "
                       f"after {MOST_ITERATIONS} iterations")
+
+
+def _relative(residual: np.ndarray, size: np.ndarray) -> float:
+    """Largest residual against the size of its row's terms."""
+    return float(np.max(np.abs(residual) / np.maximum(size, np.finfo(float).tiny)))
 
 
 def _newton_step(system: System, position, pressure, residual, lag) -> np.ndarray:

@@ -1,19 +1,21 @@
-"""What one value of a scene may be, and its number in the units of the package.
+"""What the values and tables of a scene may be, and their numbers in the units of the package.
 
-Inside the package a length and a head are in um, a time in h, a concentration in mg/L, a modulus in MPa and an angle in rad,
-and what is made of them likewise (a velocity in um/h). A scene's values are converted here and nowhere else: exactly, and rounded
-once, so that "1164 min" and "19.4 h" are the same number.
+Inside the package a length and a head are in um, a time in h, a concentration in mg/L, a modulus in MPa, an angle in
+rad, and what is made of them likewise (a velocity in um/h). A scene's values are converted here and nowhere else:
+exactly, and rounded once, so that "1164 min" and "19.4 h" are the same number.
 
-A kind of value has `read` (what TOML gave -> what the model uses; ValueError or OverflowError when it is not accepted), its inverse
-`write`, and `wanted`, the sentence that says what is accepted.
+A kind of value has `read` (what TOML gave -> what the model uses; ValueError or OverflowError when it is not accepted),
+its inverse `write`, and `wanted`, the words that say what is accepted. A table of a scene is a dataclass, whose fields
+carry their kind, or the dataclass of their section, in their metadata.
 """
+import difflib
 import json
 import math
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import MISSING, Field, dataclass, field, fields
 from fractions import Fraction
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 NOUNS = {
@@ -27,7 +29,7 @@ NOUNS = {
     "MPa": "a pressure or modulus",
     "rad": "an angle",
 }
-ANGLES = ("deg", "degree", "degrees", "rad", "radian", "radians")  # to pint any dimensionless unit, "ppm" say, is an angle
+ANGLES = ("deg", "degree", "degrees", "rad", "radian", "radians")  # to pint "ppm" is an angle too
 LONGEST = 80  # characters of a value with its unit
 _FACTOR = r"[A-Za-z\u00b5\u03bc]+(?:(?:\^|\*\*)-?[1-9])?"
 _UNIT = rf"(?:1? ?/ ?)?{_FACTOR}(?:(?: ?[*/] ?| ){_FACTOR})*"
@@ -122,13 +124,115 @@ class Times:
         return [self.each.write(time) for time in value]
 
 
+def quantity(text: str, unit: str, accepts: Range = POSITIVE, **default) -> Field:
+    """A value with a unit: `text` is its default, or only an example where another default is given."""
+    default = default or {"default_factory": partial(to_internal, text, unit)}
+    return field(metadata={"kind": Quantity(unit, text, accepts)}, **default)
+
+
+def required(example: str, unit: str, accepts: Range = POSITIVE) -> Field:
+    """A value with a unit that has no default."""
+    return field(metadata={"kind": Quantity(unit, example, accepts)})
+
+
+def number(default: float, accepts: Range = POSITIVE) -> Field:
+    """A plain number."""
+    return field(default=default, metadata={"kind": Number(default, accepts)})
+
+
+def choice(*words: str) -> Field:
+    """One of the words, the first by default."""
+    return field(default=words[0], metadata={"kind": Choice(words)})
+
+
+def times() -> Field:
+    """A list of times, or None."""
+    return field(default=None, metadata={"kind": Times()})
+
+
+def section(kind: type, **default) -> Field:
+    """A table, whose keys are those of the dataclass `kind`."""
+    default = default or {"default_factory": kind}
+    return field(metadata={"section": kind}, **default)
+
+
+class SceneError(ValueError):
+    """A scene that cannot be run; its message is one line naming file, key, value and what is accepted."""
+
+    def __init__(self, message: str):
+        super().__init__("".join(letter if letter.isprintable() else " " for letter in message))
+
+
+@dataclass(frozen=True)
+class Place:
+    """A key of a file, to be named in a message."""
+
+    file: str
+    key: str = ""
+
+    def below(self, key: str) -> "Place":
+        key = key if len(key) <= 60 else key[:57] + "..."
+        return Place(self.file, f"{self.key}.{key}" if self.key else key)
+
+    def refuse(self, value: object, wanted: str) -> SceneError:
+        stated = f"{self.key} is missing" if value is MISSING else f"{self.key} = {shown(value)}"
+        return SceneError(f"{self.file}: {stated}: {wanted}")
+
+
+def read_table(kind: type, table: object, place: Place, **given):
+    """The dataclass `kind` that a TOML table describes, with `given` for what is no key; SceneError if not accepted."""
+    entries = _entries(kind)
+    if not isinstance(table, dict):
+        raise place.refuse(table, f"a table [{place.key}] is needed, with the keys {', '.join(entries)}")
+    for key in table:
+        if key not in entries:
+            raise place.below(key).refuse(table[key], _instead(key, list(entries), place.key))
+    for key, entry in entries.items():
+        if key not in table and entry.default is MISSING and entry.default_factory is MISSING:
+            raise place.below(key).refuse(MISSING, entry.metadata["kind"].wanted)
+    return kind(**given, **{key: _read_entry(entries[key], table[key], place.below(key)) for key in table})
+
+
+def _read_entry(entry: Field, value: object, place: Place):
+    if "section" in entry.metadata:
+        return read_table(entry.metadata["section"], value, place)
+    kind = entry.metadata["kind"]
+    try:
+        return kind.read(value)
+    except (ValueError, OverflowError):
+        raise place.refuse(value, kind.wanted) from None
+
+
+def write_table(part) -> dict:
+    """The TOML table of a dataclass, with units; what is None is left out."""
+    entries, table = _entries(type(part)), {}
+    for key, entry in entries.items():
+        value = getattr(part, key)
+        if value is not None:
+            table[key] = entry.metadata["kind"].write(value) if "kind" in entry.metadata else write_table(value)
+    return table
+
+
+def _entries(kind: type) -> dict[str, Field]:
+    """The keys of a section."""
+    return {entry.name: entry for entry in fields(kind) if entry.metadata}
+
+
+def _instead(key: str, keys: list[str], table: str) -> str:
+    near = difflib.get_close_matches(key[:60], keys, n=1)
+    hint = f" (did you mean {near[0]}?)" if near else ""
+    return f"there is no such key; {f'[{table}]' if table else 'a scene'} takes {', '.join(keys)}{hint}"
+
+
 def to_internal(value: object, unit: str) -> float:
-    """The number in the internal `unit` that a text such as "50 um" stands for; ValueError or OverflowError if it is none."""
+    """The number in the internal `unit` of a text such as "50 um"; ValueError or OverflowError if it is none."""
     match = _QUANTITY.fullmatch(value) if isinstance(value, str) and len(value) <= LONGEST else None
     if match is None:
         raise ValueError("not a number with a unit")
-    number, given = match.groups()
-    return float(Fraction(float(number)) * _conversion(given, unit))
+    digits, factor = match[1], _conversion(match[2], unit)
+    if not math.isfinite(float(digits)):
+        raise OverflowError("too large")
+    return float(Fraction(digits) * factor) if float(digits) else 0.0
 
 
 def shown(value: object, longest: int = 60) -> str:
@@ -143,7 +247,7 @@ def shown(value: object, longest: int = 60) -> str:
 def _within(accepts: Range, value: float) -> float:
     if not (math.isfinite(value) and accepts.holds(value)):
         raise ValueError(f"not {accepts.words}")
-    return value
+    return value + 0.0  # no negative zero
 
 
 @cache

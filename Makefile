@@ -1,0 +1,50 @@
+# `make` alone lists the targets. Everything runs in .venv, which is made from requirements.lock when it is not there.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin/python
+STAMP := $(VENV)/.installed
+PIP := $(BIN) -m pip install -q --disable-pip-version-check
+
+export MPLBACKEND := Agg
+# The linear algebra is sparse: threads inside the dense kernels only cost time.
+export OMP_NUM_THREADS ?= 1
+export OPENBLAS_NUM_THREADS ?= 1
+
+.DEFAULT_GOAL := help
+.PHONY: help env figures claims verify test bench clean
+
+help:
+	@sed -n 's/^\([a-z]*\):.*## \(.*\)/\1|\2/p' Makefile | awk -F'|' '{ printf "  make %-9s %s\n", $$1, $$2 }'
+
+env: $(STAMP) ## make .venv from requirements.lock, with this package in it (PYTHON=... chooses the interpreter)
+
+figures: $(STAMP) ## run the paper's simulations and draw its figures into paper_figures/out
+	@$(BIN) -m paper_figures
+
+claims: $(STAMP) ## judge every claim of the paper by a computed number
+	@$(BIN) -m verification.claims
+
+verify: $(STAMP) ## run the verification cases against references that do not use repro
+	@$(BIN) -m verification
+
+test: $(STAMP) ## run the tests
+	@$(BIN) -m pytest
+
+bench: $(STAMP) ## print where the time goes
+	@$(BIN) -m verification.bench
+
+clean: ## remove .venv and everything generated; nothing that is committed
+	@rm -rf $(VENV) paper_figures/out paper_figures/cache build dist *.egg-info .pytest_cache .ruff_cache .hypothesis
+	@find . -name .git -prune -o -type d -name __pycache__ -prune -exec rm -rf {} +
+
+# The stamp is the last thing written: an install that was interrupted, or failed, leaves none and is done again from nothing.
+$(STAMP): requirements.lock pyproject.toml
+	@rm -f $@
+	@command -v "$(PYTHON)" >/dev/null || { echo "error: there is no '$(PYTHON)'; name a Python 3.11 or newer: make PYTHON=/path/to/python3 ..." >&2; exit 1; }
+	@"$(PYTHON)" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "error: Python 3.11 or newer is needed, '$(PYTHON)' is $$("$(PYTHON)" -V 2>&1); name another: make PYTHON=/path/to/python3 ..." >&2; exit 1; }
+	@"$(PYTHON)" -c 'import venv, ensurepip' 2>/dev/null || { echo "error: '$(PYTHON)' lacks the standard modules venv or ensurepip (Debian and Ubuntu ship them as python3-venv); install them or name another: make PYTHON=/path/to/python3 ..." >&2; exit 1; }
+	@echo "Making $(VENV) with $$("$(PYTHON)" -V 2>&1) from requirements.lock; this takes about a minute."
+	@"$(PYTHON)" -m venv --clear $(VENV)
+	@$(PIP) --require-hashes --only-binary :all: -r requirements.lock
+	@$(PIP) --no-deps --no-build-isolation -e .
+	@touch $@
