@@ -8,11 +8,13 @@ or, by the paper's criteria (3.1, 3.5), is made anew.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from repro import geometry, growth, kinetics, mesh, mesh_motion, pore, reprojection, transport
+from repro.errors import GrowthError, MeshError, SimulationError, StageError
 from repro.pore import Pore, Solved
 from repro.transport import Concentrations
 
@@ -72,21 +74,24 @@ def schedule(scene) -> tuple[list[float], set[float]]:
 def simulate(scene) -> Iterator[Instant]:
     """Run a scene; yields an Instant at t = 0 and at each reported time.
 
-    Raises the errors of the stages, with the simulated time added; ends early, after a last Instant, by raising
-    PoreEnd where the aggregate reaches an end of the pore.
+    Raises SimulationError where a stage fails; ends early, after a last Instant, by raising PoreEnd where the aggregate
+    reaches an end of the pore.
     """
     times, reported = schedule(scene)
-    now = pore.seeded(scene)
-    solved = pore.solve(scene, now)
+    with _stopping(0.0):
+        now = pore.seeded(scene)
+        solved = pore.solve(scene, now)
+    now = replace(now, concentrations=solved.concentrations)
     yield Instant(now, solved, None, (), 0, _newton_counts(solved))
     ledgers, remeshes, counts = [], 0, {}
     for time in times[1:]:
-        done = step(scene, now, solved, time - now.time)
-        now, before = replace(done.pore, time=time), done.before
+        with _stopping(now.time):
+            done = step(scene, now, solved, time - now.time)
+            now, before = replace(done.pore, time=time), done.before
+            solved = pore.solve(scene, now)
+        now = replace(now, concentrations=solved.concentrations)
         ledgers.append(done.ledger)
         remeshes += done.remeshed
-        solved = pore.solve(scene, now)
-        now = replace(now, concentrations=solved.concentrations)
         counts = _added(counts, {"growth": done.iterations}, _newton_counts(solved))
         over = _at_pore_end(scene, now)
         if time in reported or over:
@@ -94,6 +99,19 @@ def simulate(scene) -> Iterator[Instant]:
             ledgers, remeshes, counts = [], 0, {}
         if over:
             raise PoreEnd(over)
+
+
+@contextmanager
+def _stopping(time: float):
+    """Floating-point errors stop the run; a stage's failure is told with the simulated time of its step."""
+    try:
+        with np.errstate(all="raise", under="ignore"):
+            yield
+    except StageError as error:
+        raise SimulationError(f"stopped in the step from t = {time:g} h, in {error.stage}: {error}") from error
+    except FloatingPointError as error:
+        raise SimulationError(f"stopped in the step from t = {time:g} h by a floating-point error ({error}); "
+                              "try a shorter growth.time_step or a larger numerics.refinement") from error
 
 
 def _newton_counts(solved: Solved) -> dict[str, int]:
@@ -198,7 +216,7 @@ def expand(scene, grown: Pore, theta: np.ndarray):
         if not joins.any():
             return (start, push), wall, _with_new_surface(outline), iterations
         wall = np.where(joins != geometry.FREE, joins, wall)
-    raise growth.GrowthError(f"the contact surfaces still change after {CONTACT_ROUNDS} rounds; "
+    raise GrowthError(f"the contact surfaces still change after {CONTACT_ROUNDS} rounds; "
                              "try a shorter growth.time_step")
 
 
@@ -328,7 +346,7 @@ def _expansion(grid: mesh.PoreMesh, origin: np.ndarray) -> np.ndarray:
     reference = mesh.triangle_areas(origin, grid.triangles[grid.biomass])
     if reference.min() <= 0:
         worst = grid.points[grid.triangles[grid.biomass][np.argmin(reference)]].mean(axis=0)
-        raise mesh.MeshError(f"after a remesh the places at t = 0 fold near x = {worst[0]:.4g}, y = {worst[1]:.4g} um; "
+        raise MeshError(f"after a remesh the places at t = 0 fold near x = {worst[0]:.4g}, y = {worst[1]:.4g} um; "
                              "try a larger numerics.refinement")
     return grid.areas[grid.biomass] / reference
 

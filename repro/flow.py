@@ -22,6 +22,7 @@ from skfem import Basis, BilinearForm, ElementTriP1, ElementTriP2
 
 from repro import linear
 from repro.mesh import PoreMesh
+from repro.timing import timed
 
 #: Elements of velocity and pressure for each order.
 ELEMENTS = {1: (ElementTriP1, ElementTriP1), 2: (ElementTriP2, ElementTriP1)}
@@ -79,6 +80,7 @@ def poiseuille_loss(length: float, width: float) -> float:
     return 12 * length / width**2
 
 
+@timed("flow")
 def unit_flow(mesh: PoreMesh, viscosity_ratio: float, *, interface: str = "laplacian", stabilisation: float = 100.0,
               order: int = 1) -> UnitFlow:
     """Stokes flow of mean velocity one through the meshed part, (1)-(5).

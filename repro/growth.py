@@ -23,17 +23,15 @@ import numpy as np
 import scipy.sparse as sp
 
 from repro import linear
+from repro.errors import GrowthError, LinearError
 from repro.mesh import gradients, triangle_areas
+from repro.timing import timed
 
 #: Newton stops at this residual against the size of its terms, or at the second where round-off keeps it from falling.
 NEWTON, ROUND_OFF, MOST_ITERATIONS = 1e-11, 1e-8, 25
 #: Halvings in a line search; sub-steps of a continuation.
 HALVINGS = 8
 CONTINUATION = (1, 8, 64)
-
-
-class GrowthError(RuntimeError):
-    """No equilibrium was found; says why, and what to try."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,10 +99,20 @@ def tangent(F: np.ndarray, P: np.ndarray) -> np.ndarray:
 
 
 def cauchy(F: np.ndarray, P: np.ndarray) -> np.ndarray:
-    """Cauchy stress (..., 3): sigma_xx, sigma_yy, sigma_xy over mu_L, plane strain: J^-1 S F^T."""
+    """Cauchy stress over mu_L in plane strain: (..., 4) sigma_xx, sigma_yy, sigma_zz, sigma_xy.
+
+    J^-1 S F^T in the plane; across it, where F33 = 1, J^(-5/3) (1 - tr C / 3) + P.
+    """
     J = np.linalg.det(F)
     sigma = np.einsum("...ik,...jk->...ij", piola(F, P), F) / J[..., None, None]
-    return np.stack([sigma[..., 0, 0], sigma[..., 1, 1], sigma[..., 0, 1]], axis=-1)
+    across = J ** (-5 / 3) * (1 - (np.sum(F**2, axis=(-2, -1)) + 1) / 3) + P
+    return np.stack([sigma[..., 0, 0], sigma[..., 1, 1], across, sigma[..., 0, 1]], axis=-1)
+
+
+def largest_principal(stress: np.ndarray) -> np.ndarray:
+    """(...) largest principal value of stresses (..., 4) as :func:`cauchy` gives them."""
+    xx, yy, zz, xy = np.moveaxis(stress, -1, 0)
+    return np.maximum(0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy), zz)
 
 
 def stabilisation(position: np.ndarray, triangles: np.ndarray, theta: np.ndarray) -> np.ndarray:
@@ -174,6 +182,7 @@ class System:
         return bool(triangle_areas(position, self.body.triangles).min() > 0)
 
 
+@timed("growth")
 def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: np.ndarray,
                 prescribed: np.ndarray) -> Equilibrium:
     """Equilibrium under the expansion theta (t,) since the reference, from a start.
@@ -192,7 +201,7 @@ def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: n
     for steps in CONTINUATION:
         try:
             return _continued(system, start, theta, position, pressure, prescribed, steps)
-        except (GrowthError, linear.LinearError) as error:
+        except (GrowthError, LinearError) as error:
             failure = str(error)
     raise GrowthError(f"{failure}; try a shorter growth.time_step or a larger numerics.refinement")
 

@@ -12,12 +12,11 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
+from repro.errors import LinearError
+from repro.timing import timed
+
 #: Largest accepted componentwise backward error, max |A x - b|_i / (|A| |x| + |b|)_i, and where refinement starts.
 RESIDUAL, REFINE = 1e-10, 1e-14
-
-
-class LinearError(RuntimeError):
-    """A linear system is singular or too ill-conditioned; says how large its residual is."""
 
 
 def node_order(count: int, elements: np.ndarray) -> np.ndarray:
@@ -81,6 +80,7 @@ class Solver:
         raise LinearError(f"a linear system of {len(right)} unknowns {found}; try a finer numerics.refinement")
 
 
+@timed("factorise and solve")
 def solve(matrix, right: np.ndarray, order: np.ndarray | None = None) -> np.ndarray:
     """Solve one system once."""
     return Solver(matrix, order).solve(right)

@@ -16,16 +16,14 @@ from scipy.spatial import cKDTree
 from skfem import MeshTri
 
 from repro import geometry
+from repro.errors import MeshError
 from repro.geometry import Outline
+from repro.timing import timed
 
 #: Remesh when more than POOR_ALLOWED triangles have a quality under POOR (3.5).
 POOR, POOR_ALLOWED = 0.6, 6
 #: Sizes of the first of two meshing passes over the wanted ones, and Mmg's own limit on the ratio of adjacent edges.
 FIRST_PASS, HGRAD = 2.0, 1.5
-
-
-class MeshError(RuntimeError):
-    """A mesh cannot be made, or has turned inside out; says where."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +130,7 @@ def gradients(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return np.stack([-edge[:, :, 1] / double, edge[:, :, 0] / double], axis=2)
 
 
+@timed("meshing")
 def generate(outline: Outline | None, ends: tuple[float, float], width: float, refinement: float, film: float):
     """A new mesh around the aggregate, and the outline with the nodes that the mesh has on it.
 

@@ -17,6 +17,7 @@ from skfem import Basis, BilinearForm, ElementTriP1, MeshTri
 from repro import linear
 from repro.flow import divergence, gradient_product
 from repro.mesh import PoreMesh
+from repro.timing import timed
 
 
 @BilinearForm
@@ -25,6 +26,7 @@ def product(u, q, w):
     return u * q
 
 
+@timed("mesh motion")
 def move(mesh: PoreMesh, body: np.ndarray, compressibility: float, stabilisation: float) -> np.ndarray:
     """(N, 2) um: nodes of the whole mesh after the aggregate's nodes have moved.
 

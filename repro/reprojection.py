@@ -16,14 +16,12 @@ import scipy.sparse as sp
 import shapely
 
 from repro import linear
+from repro.errors import TransferError
 from repro.mesh import triangle_areas
+from repro.timing import timed
 
 #: The common pieces of two meshes must cover both to this relative accuracy.
 COVER = 1e-9
-
-
-class TransferError(RuntimeError):
-    """Two meshes do not cover the same polygon, or a point lies in neither; says where and by how much."""
 
 
 def reproject(field: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
@@ -50,6 +48,7 @@ def barycentric(points: np.ndarray, corners: np.ndarray, where: np.ndarray) -> n
     return np.stack([cross(b - where, c - where), cross(c - where, a - where), cross(a - where, b - where)], -1) / double[..., None]
 
 
+@timed("transfer")
 def interpolate(points: np.ndarray, triangles: np.ndarray, fields: np.ndarray, where: np.ndarray) -> np.ndarray:
     """Linear interpolation of nodal fields (N, m) at points (K, 2), the paper's transfer; bounded by the nodal values
     (a point outside takes the value of the nearest point of the mesh)."""
@@ -73,6 +72,7 @@ def supermesh(points, triangles, new_points, new_triangles) -> tuple[np.ndarray,
     return corners, old_index[keep][piece[fan]], new_index[keep][piece[fan]]
 
 
+@timed("transfer")
 def project(points, triangles, fields, new_points, new_triangles) -> np.ndarray:
     """Galerkin projection of nodal fields (N, m) onto the nodes of another mesh of the same polygon: (K, m).
 

@@ -20,17 +20,15 @@ from skfem import Basis, BilinearForm, ElementTriP1
 
 from repro import kinetics as law
 from repro import linear
+from repro.errors import TransportError
 from repro.flow import Flow, gradient_product
 from repro.mesh import PoreMesh
+from repro.timing import timed
 
 #: Newton stops when the residual is this small against the largest term of its row's balance.
 NEWTON, MOST_ITERATIONS = 1e-13, 60
 #: Concentrations below zero by less than this part of the supply are round-off, anything more is a failure.
 ROUND_OFF = 1e-9
-
-
-class TransportError(RuntimeError):
-    """The substrates cannot be solved for; says where, and what to try."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +77,7 @@ def advection(u, v, w):
     return (w["x_speed"] * u.grad[0] + w["y_speed"] * u.grad[1]) * v
 
 
+@timed("transport")
 def problem(mesh: PoreMesh, flow: Flow | None, substrates, kinetics, inlet: str = "local") -> Problem:
     """Assemble both substrates' linear parts for one geometry and flow (None: pure diffusion).
 
@@ -133,6 +132,7 @@ def supplied_everywhere(problem: Problem) -> Concentrations:
     return Concentrations(problem.acceptor.supply * ones, problem.donor.supply * ones)
 
 
+@timed("transport")
 def steady(problem: Problem, active: np.ndarray | None, guess: Concentrations | None = None) -> Concentrations:
     """Steady concentrations: Newton's method on both substrates at once.
 

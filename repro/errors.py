@@ -1,0 +1,41 @@
+"""Numerical failures: each names its stage; :func:`repro.coupling.simulate` adds the simulated time."""
+
+
+class StageError(RuntimeError):
+    """A stage has no trustworthy result; the message says where, why, and what to try."""
+
+    stage = "a stage"
+
+
+class MeshError(StageError):
+    """A mesh cannot be made, or has turned inside out."""
+
+    stage = "meshing"
+
+
+class LinearError(StageError):
+    """A linear system is singular or too ill-conditioned."""
+
+    stage = "a linear system"
+
+
+class TransportError(StageError):
+    """The substrates cannot be solved for."""
+
+    stage = "transport"
+
+
+class GrowthError(StageError):
+    """No equilibrium of the aggregate was found."""
+
+    stage = "growth"
+
+
+class TransferError(StageError):
+    """Fields cannot be carried from one mesh to the other."""
+
+    stage = "transfer between meshes"
+
+
+class SimulationError(RuntimeError):
+    """A run has stopped: at what simulated time, in which stage, why, and what to try."""

@@ -1,0 +1,96 @@
+"""Run a scene into a folder: rows and fields as they come, tables and provenance at the end, whatever the end is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from time import perf_counter
+
+from repro import results, timing
+from repro.coupling import Instant, PoreEnd, simulate
+from repro.errors import SimulationError
+from repro.scene import Scene
+
+#: Everything that a run writes; a folder that holds anything else is not written to.
+OWN = ("timeseries.csv", "ledger.csv", "fields.pvd", "before_expansion.pvd", "run.json", "fields")
+
+
+class OutputError(RuntimeError):
+    """The output folder cannot be used; says which and why."""
+
+
+class Recorder:
+    """Collects a run's rows and writes its files to ``folder``."""
+
+    def __init__(self, scene: Scene, folder: Path):
+        self.scene, self.folder = scene, folder
+        self.rows, self.ledgers, self.index, self.before = [], [], [], []
+        self.remeshes, self.iterations = 0, {}
+
+    def add(self, instant: Instant) -> None:
+        """Take one instant: its row, its ledgers and its fields."""
+        found = results.row(self.scene, instant)
+        self.rows.append([found[name] for name in results.COLUMNS])
+        self.ledgers += [results.ledger_row(ledger) for ledger in instant.ledgers]
+        self.remeshes += instant.remeshes
+        for stage, count in instant.iterations.items():
+            self.iterations[stage] = self.iterations.get(stage, 0) + count
+        self._write_fields(self.index, "fields", instant.pore, instant.solved)
+        if instant.before and self.scene.output.times:
+            self._write_fields(self.before, "before_expansion", *instant.before)
+
+    def _write_fields(self, index: list, kind: str, pore, solved) -> None:
+        name = f"fields/{kind}_{len(index):04d}.vtu"
+        results.write_fields(self.folder / name, results.fields(self.scene, pore, solved))
+        index.append((pore.time, name))
+
+    def finish(self, status: str, seconds: float) -> None:
+        """Write tables, indices and provenance."""
+        results.write_table(self.folder / "timeseries.csv", results.COLUMNS, self.rows)
+        results.write_index(self.folder / "fields.pvd", self.index)
+        if self.ledgers:
+            results.write_table(self.folder / "ledger.csv", results.LEDGER_COLUMNS, self.ledgers)
+        if self.before:
+            results.write_index(self.folder / "before_expansion.pvd", self.before)
+        results.write_json(self.folder / "run.json", {
+            **results.provenance(self.scene), "status": status, "rows": len(self.rows), "wall_time_s": seconds,
+            "wall_time_by_stage_s": dict(timing.seconds), "newton_iterations": self.iterations,
+            "remeshes": self.remeshes})
+
+
+def prepare(folder: Path) -> None:
+    """Make the folder, empty of an earlier run. Raises OutputError where it holds anything else or cannot be written."""
+    try:
+        strange = sorted(p.name for p in folder.iterdir() if p.name not in OWN) if folder.exists() else []
+        if strange:
+            raise OutputError(f"--out {folder}: it holds {strange[0]!r}, which is not of a run; "
+                              "a new or empty folder, or one of an earlier run, is accepted")
+        (folder / "fields").mkdir(parents=True, exist_ok=True)
+        for old in (*folder.glob("fields/*.vtu"), *(folder / name for name in OWN if name != "fields")):
+            old.unlink(missing_ok=True)
+    except OSError as error:
+        raise OutputError(f"--out {folder}: {error.strerror or error}; a folder that can be written is needed") from error
+
+
+def run(scene: Scene, folder: Path, progress: Callable[[float], None] = lambda time: None) -> str:
+    """Run a scene into a folder; ``progress`` is told each simulated time (h). Returns how the run ended.
+
+    Raises OutputError where the folder cannot be used, SimulationError where a stage fails: what was computed until
+    then is written all the same, and ``run.json`` says why it ends.
+    """
+    prepare(folder)
+    timing.reset()
+    recorder, start, status = Recorder(scene, folder), perf_counter(), "interrupted"
+    try:
+        for instant in simulate(scene):
+            recorder.add(instant)
+            progress(instant.pore.time)
+        status = "completed"
+    except PoreEnd as end:
+        status = str(end)
+    except SimulationError as error:
+        status = f"failed: {error}"
+        raise
+    finally:
+        recorder.finish(status, perf_counter() - start)
+    return status
