@@ -206,7 +206,7 @@ def expand(scene, grown: Pore, theta: np.ndarray):
     start, push = grown.mesh.points[nodes], grown.pressure[nodes]
     wall, fixed, iterations = grown.wall.copy(), _fixed_points(scene, grown), 0
     for _ in range(CONTACT_ROUNDS):
-        body = growth.Body(reference, triangles, _held(len(nodes), rim, wall, fixed))
+        body = growth.Body(reference, triangles, _held(len(nodes), rim, wall, fixed), grown.mesh.topology)
         prescribed = _prescribed(start, rim, wall, scene.pore.width)
         found = growth.equilibrium(body, target, start, push, prescribed)
         start, push, iterations = found.position, found.pressure, iterations + found.iterations

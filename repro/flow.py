@@ -17,10 +17,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from skfem import Basis, BilinearForm, ElementTriP1, ElementTriP2
 
-from repro import linear
+from repro.assembly import each, local, saddle_blocks, saddle_system, two_components
 from repro.mesh import PoreMesh
 from repro.timing import timed
 
@@ -65,14 +64,41 @@ def stiffness(u, v, w):
 
 @BilinearForm
 def gradient_product(u, v, w):
-    """(k grad u, grad v)."""
-    return w["k"] * (u.grad[0] * v.grad[0] + u.grad[1] * v.grad[1])
+    """(grad u, grad v)."""
+    return u.grad[0] * v.grad[0] + u.grad[1] * v.grad[1]
 
 
 @BilinearForm
 def divergence(u, q, w):
     """(q, u_,i)."""
     return u.grad[w["i"]] * q
+
+
+@dataclass(frozen=True, eq=False)
+class Forms:
+    """Element matrices of one geometry, coefficients of the triangles left out: laplace (T, a, a) (grad u, grad v),
+    divergence (T, b, 2a) (q, div u), pressure_laplace (T, b, b); and their bases."""
+
+    basis: Basis
+    pressure_basis: Basis
+    laplace: np.ndarray
+    divergence: np.ndarray
+    pressure_laplace: np.ndarray
+
+
+def forms(mesh: PoreMesh, order: int = 1) -> Forms:
+    """The forms of a mesh, worked out once for the present places of its nodes."""
+    return mesh.here(("forms", order), lambda: _forms(mesh, order))
+
+
+def _forms(mesh: PoreMesh, order: int) -> Forms:
+    velocity, pressure = (element() for element in ELEMENTS[order])
+    basis = Basis(mesh.fem, velocity, intorder=2 * order - 1)
+    basis_p = basis.with_element(pressure)
+    laplace = local(gradient_product, basis)
+    lower = laplace if order == 1 else local(gradient_product, basis_p)
+    b = np.concatenate([local(divergence, basis, basis_p, i=i) for i in (0, 1)], axis=2)
+    return Forms(basis, basis_p, laplace, b, lower)
 
 
 def poiseuille_loss(length: float, width: float) -> float:
@@ -88,53 +114,43 @@ def unit_flow(mesh: PoreMesh, viscosity_ratio: float, *, interface: str = "lapla
     interface: "laplacian" or "traction" [E2]; stabilisation: c of tau = h^2 / (c nu_r) (order 1 only).
     Raises linear.LinearError where the system cannot be solved.
     """
-    velocity_element, pressure_element = (element() for element in ELEMENTS[order])
-    basis = Basis(mesh.fem, velocity_element, intorder=2 * order)
-    basis_p = basis.with_element(pressure_element)
+    found = forms(mesh, order)
     viscosity = np.where(mesh.biomass, viscosity_ratio, 1.0)
     tau = mesh.circumdiameter**2 / (stabilisation * viscosity) if order == 1 else np.zeros(len(viscosity))
-    k = np.broadcast_to(viscosity[:, None], basis.dx.shape)
-    blocks = _viscous_blocks(basis, k, interface)
-    b_x, b_y = (divergence.assemble(basis, basis_p, i=i) for i in (0, 1))
-    c = gradient_product.assemble(basis_p, k=np.broadcast_to(tau[:, None], basis.dx.shape))
-    system = sp.bmat([[blocks[0][0], blocks[0][1], -b_x.T], [blocks[1][0], blocks[1][1], -b_y.T], [-b_x, -b_y, -c]])
-    solution = _solve_with_boundaries(system.tocsr(), mesh, basis, interface)
-    n = basis.N
+    elements = saddle_blocks(_viscous(found, viscosity, interface), found.divergence, each(tau, found.pressure_laplace))
+    solution = _solve_with_boundaries(elements, mesh, found, interface)
+    n = found.basis.N
     velocity, pressure = solution[: 2 * n].reshape(2, n).T, solution[2 * n:]
     slope = np.einsum("tai,ta->ti", mesh.gradients, pressure[mesh.triangles])
     return UnitFlow(velocity, pressure, tau[:, None] * slope, _loss(mesh, pressure))
 
 
-def _viscous_blocks(basis, k, interface: str):
-    """2 x 2 blocks of a(u, v): [component of v][component of u]."""
-    laplace = gradient_product.assemble(basis, k=k)
+def _viscous(found: Forms, viscosity: np.ndarray, interface: str) -> np.ndarray:
+    """(T, 2a, 2a) element matrices of a(u, v): test functions of x, then y, by trial functions alike."""
+    laplace = each(viscosity, found.laplace)
     if interface == "laplacian":
-        return [[laplace, None], [None, laplace]]
-    mixed = [[stiffness.assemble(basis, k=k, i=row, j=column) for column in (0, 1)] for row in (0, 1)]
-    return [[laplace + mixed[0][0], mixed[0][1]], [mixed[1][0], laplace + mixed[1][1]]]
+        return two_components(laplace)
+    k = np.broadcast_to(viscosity[:, None], found.basis.dx.shape)
+    # nu u_j,i v_i,j: row i is the component of v, column j that of u
+    xx, xy, yx, yy = (local(stiffness, found.basis, k=k, i=i, j=j) for i, j in ((0, 0), (0, 1), (1, 0), (1, 1)))
+    return np.block([[laplace + xx, xy], [yx, laplace + yy]])
 
 
-def _solve_with_boundaries(system, mesh: PoreMesh, basis, interface: str) -> np.ndarray:
+def _solve_with_boundaries(elements, mesh: PoreMesh, found: Forms, interface: str) -> np.ndarray:
     """Solve with u = 0 on the walls, the parabola at the inlet, and u_y = 0 at the outlet in the traction form [E10]."""
-    where = basis.doflocs
-    wall = (where[1] == 0) | (where[1] == mesh.width)
-    inlet, outlet = where[0] == mesh.ends[0], where[0] == mesh.ends[1]
-    vertical = wall | inlet | (outlet if interface == "traction" else False)
-    held = np.concatenate([wall | inlet, vertical, np.zeros(len(mesh.points), bool)])
-    value = np.zeros(system.shape[0])
-    value[: basis.N][inlet] = inlet_profile(mesh, where[1][inlet])
-    free = np.flatnonzero(~held)
-    order = _elimination_order(mesh, basis, free, system.shape[0])
-    value[free] = linear.solve(system[free][:, free], -(system[free] @ value), order)
-    return value
+    where = found.basis.doflocs
 
+    def make():
+        wall = (where[1] == 0) | (where[1] == mesh.width)
+        inlet, outlet = where[0] == mesh.ends[0], where[0] == mesh.ends[1]
+        held = np.column_stack([wall | inlet, wall | inlet | (outlet if interface == "traction" else False)])
+        return saddle_system(found.basis.element_dofs.T, found.pressure_basis.element_dofs.T, held)
 
-def _elimination_order(mesh: PoreMesh, basis, free: np.ndarray, count: int) -> np.ndarray:
-    """Free unknowns sorted by the place of their node in the mesh's elimination order."""
-    place = np.empty(basis.N, int)
-    place[linear.node_order(basis.N, basis.element_dofs.T)] = np.arange(basis.N)
-    rank = np.concatenate([place, place, place[: len(mesh.points)] + 0.5])
-    return np.argsort(rank[free], kind="stable")
+    system = mesh.once(("flow", interface, found.basis.Nbfun), make)
+    value = np.zeros(len(system.held))
+    inlet = np.flatnonzero(where[0] == mesh.ends[0])
+    value[inlet] = inlet_profile(mesh, where[1][inlet])
+    return system.solve(elements, np.zeros(len(value)), value)
 
 
 def inlet_profile(mesh: PoreMesh, heights: np.ndarray) -> np.ndarray:

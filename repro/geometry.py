@@ -171,7 +171,7 @@ def _resample(outline: Outline, keep: np.ndarray, t: np.ndarray) -> tuple[np.nda
     low = np.minimum(t.astype(int), len(keep) - 2)
     part = (t - low)[:, None]
     first, second = keep[low], keep[low + 1]
-    mix = [(1 - part) * a[first] + part * a[second] for a in (outline.points, outline.origin)]
+    mix = [a[first] + part * (a[second] - a[first]) for a in (outline.points, outline.origin)]
     on_node = part[:, 0] == 0
     same = outline.wall[first] == outline.wall[second]
     wall = np.where(on_node | same, outline.wall[first], FREE)

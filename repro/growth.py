@@ -17,12 +17,11 @@ With A = mu J^(-2/3) and H = F^-T (dJ = J H : dF), first Piola-Kirchhoff stress 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
-import scipy.sparse as sp
 
-from repro import linear
+from repro.assembly import ElementSystem, saddle_blocks, saddle_system
 from repro.errors import GrowthError, LinearError
 from repro.mesh import gradients, triangle_areas
 from repro.timing import timed
@@ -38,12 +37,22 @@ CONTINUATION = (1, 8, 64)
 class Body:
     """The aggregate's own mesh in its reference configuration.
 
-    reference: (n, 2) um; triangles: (t, 3); held: (n, 2) True where a coordinate is prescribed.
+    reference: (n, 2) um; triangles: (t, 3); held: (n, 2) True where a coordinate is prescribed; topology: what has been
+    worked out from connections and held coordinates.
     """
 
     reference: np.ndarray
     triangles: np.ndarray
     held: np.ndarray
+    topology: dict = field(default_factory=dict, repr=False)
+
+    @property
+    def sparse(self) -> ElementSystem:
+        """The sparse system of positions and pressure."""
+        key = ("growth", self.held.tobytes())
+        if key not in self.topology:
+            self.topology[key] = saddle_system(self.triangles, self.triangles, self.held)
+        return self.topology[key]
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,20 +142,11 @@ class System:
         self.slopes = gradients(body.reference, body.triangles)
         self.areas = triangle_areas(body.reference, body.triangles)
         self.stabilising = stabilising
-        count, t = len(body.reference), body.triangles
-        self.unknowns = np.concatenate([2 * t, 2 * t + 1, 2 * count + t], axis=1)
-        self.free = np.flatnonzero(np.concatenate([~body.held.ravel(), np.ones(count, bool)]))
-        self.order = self._order(count)
-
-    def _order(self, count: int) -> np.ndarray:
-        place = np.empty(count)
-        place[linear.node_order(count, self.body.triangles)] = np.arange(count)
-        rank = np.concatenate([np.repeat(place, 2), place + 0.5])
-        return np.argsort(rank[self.free], kind="stable")
+        self.sparse = body.sparse
+        self.unknowns, self.free = self.sparse.unknowns, ~self.sparse.held
 
     def residual(self, position: np.ndarray, pressure: np.ndarray, theta: np.ndarray):
-        """Residual (3n,) [x and y of each node, then P] and the size of its terms. FloatingPointError never: det F <= 0
-        is for the caller to exclude."""
+        """Residual (3n,) [x of all nodes, y, then P] and the size of its terms; det F <= 0 is for the caller to exclude."""
         t, n = self.body.triangles, len(position)
         F = deformation(position, t, self.slopes)
         P = pressure[t]
@@ -161,21 +161,15 @@ class System:
         total, size = (np.bincount(self.unknowns.ravel(), part.ravel(), 3 * n) for part in (local, scale))
         return total, size
 
-    def tangent(self, position: np.ndarray, pressure: np.ndarray) -> sp.csc_matrix:
-        """Symmetric tangent of the residual, (3n, 3n)."""
-        t, n = self.body.triangles, len(position)
+    def tangent(self, position: np.ndarray, pressure: np.ndarray) -> np.ndarray:
+        """(t, 9, 9) symmetric element matrices of the residual's derivative."""
+        t = self.body.triangles
         F = deformation(position, t, self.slopes)
         moduli = tangent(F, pressure[t].mean(axis=1))
         K = self.areas[:, None, None, None, None] * np.einsum("tikjl,tak,tbl->tiajb", moduli, self.slopes, self.slopes)
         H, J = inverse_transpose(F)
         B = (self.areas * J)[:, None, None] * np.einsum("tik,tak->tia", H, self.slopes) / 3
-        local = np.zeros((len(t), 9, 9))
-        local[:, :6, :6] = K.reshape(len(t), 6, 6)
-        local[:, :6, 6:] = B.reshape(len(t), 6, 1)
-        local[:, 6:, :6] = B.reshape(len(t), 1, 6)
-        local[:, 6:, 6:] = -self.stabilising
-        rows, columns = np.repeat(self.unknowns, 9, axis=1), np.tile(self.unknowns, (1, 9))
-        return sp.csc_matrix((local.ravel(), (rows.ravel(), columns.ravel())), shape=(3 * n, 3 * n))
+        return saddle_blocks(K.reshape(len(t), 6, 6), -np.repeat(B.reshape(len(t), 1, 6), 3, axis=1), self.stabilising)
 
     def admissible(self, position: np.ndarray) -> bool:
         """Is det F > 0 everywhere?"""
@@ -239,17 +233,14 @@ def _relative(residual: np.ndarray, size: np.ndarray) -> float:
 
 def _newton_step(system: System, position, pressure, residual, lag) -> np.ndarray:
     """(3n,) full Newton step that moves held coordinates by ``lag``."""
-    matrix = system.tangent(position, pressure)
-    step = np.concatenate([lag.ravel(), np.zeros(len(pressure))])
-    right = -(residual + matrix @ step)[system.free]
-    step[system.free] = linear.solve(matrix[system.free][:, system.free], right, system.order)
-    return step
+    prescribed = np.concatenate([lag[:, 0], lag[:, 1], np.zeros(len(pressure))])
+    return system.sparse.solve(system.tangent(position, pressure), -residual, prescribed)
 
 
 def _line_search(system, theta, position, pressure, step, residual, lag):
     """The longest of the steps 1, 1/2, ... with det F > 0 that does not raise the residual fourfold."""
     n = len(pressure)
-    move, push = step[: 2 * n].reshape(n, 2), step[2 * n:]
+    move, push = step[: 2 * n].reshape(2, n).T, step[2 * n:]
     before = np.linalg.norm(residual[system.free])
     for length in 0.5 ** np.arange(HALVINGS):
         trial = position + length * move

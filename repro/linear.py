@@ -1,7 +1,7 @@
 """Sparse linear systems: order the nodes once per topology, factor without pivoting, check the residual.
 
-Orders and factors with SuperLU: a minimum-degree ordering of the graph of *nodes*, applied to all unknowns of a node
-together, in symmetric mode with pivots on the diagonal. That is two to five times faster than SciPy's default, and safe
+Orders and factors with SuperLU: a minimum-degree ordering of the graph of *nodes*, in which the callers number all
+unknowns of a node together, in symmetric mode with pivots on the diagonal. That is two to five times faster than SciPy's default, and safe
 as long as pressure blocks are negative definite; the residual is checked, refined once, and where that is not enough
 the system is factored again with partial pivoting.
 """
@@ -33,29 +33,22 @@ def node_order(count: int, elements: np.ndarray) -> np.ndarray:
 class Solver:
     """Solves A x = b for one matrix (n, n) and any number of right-hand sides.
 
-    order: (n,) unknowns in elimination order, None for SuperLU's own choice. Raises LinearError where the residual
-    cannot be brought under RESIDUAL.
+    The unknowns are taken in the order in which they come. Raises LinearError where the residual cannot be brought
+    under RESIDUAL.
     """
 
-    def __init__(self, matrix, order: np.ndarray | None = None):
+    def __init__(self, matrix):
         self.matrix = sp.csc_matrix(matrix)
-        self.order = np.arange(self.matrix.shape[0]) if order is None else order
         self.magnitude = abs(self.matrix)
-        self.factor = self._factor("NATURAL" if order is not None else "MMD_AT_PLUS_A", 0.0, True)
+        self.factor = self._factor("NATURAL", 0.0, True)
         self.pivoted = False
 
     def _factor(self, column_order: str, threshold: float, symmetric: bool):
-        permuted = self.matrix[self.order][:, self.order]
         try:
-            return splu(permuted, permc_spec=column_order, diag_pivot_thresh=threshold,
+            return splu(self.matrix, permc_spec=column_order, diag_pivot_thresh=threshold,
                         options={"SymmetricMode": symmetric})
         except RuntimeError:
             return None
-
-    def _apply(self, right: np.ndarray) -> np.ndarray:
-        solution = np.empty_like(right)
-        solution[self.order] = self.factor.solve(right[self.order])
-        return solution
 
     def _defect(self, solution: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, float]:
         residual = right - self.matrix @ solution
@@ -69,10 +62,10 @@ class Solver:
                 self.factor, self.pivoted = self._factor("COLAMD", 1.0, False), True
             if self.factor is None:
                 continue
-            solution = self._apply(right)
+            solution = self.factor.solve(right)
             residual, defect = self._defect(solution, right)
             if defect > REFINE:
-                solution = solution + self._apply(residual)
+                solution = solution + self.factor.solve(residual)
                 residual, defect = self._defect(solution, right)
             if defect <= RESIDUAL:
                 return solution
@@ -82,5 +75,9 @@ class Solver:
 
 @timed("factorise and solve")
 def solve(matrix, right: np.ndarray, order: np.ndarray | None = None) -> np.ndarray:
-    """Solve one system once."""
-    return Solver(matrix, order).solve(right)
+    """Solve one system once; ``order`` (n,), where given, is the unknowns' elimination order."""
+    if order is None:
+        return Solver(matrix).solve(right)
+    solution = np.empty_like(right)
+    solution[order] = Solver(sp.csc_matrix(matrix)[order][:, order]).solve(right[order])
+    return solution

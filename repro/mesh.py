@@ -6,7 +6,8 @@ constrained Delaunay triangulation (shapely) and keeps every edge that it was gi
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -31,7 +32,8 @@ class PoreMesh:
     """Triangles of fluid and biomass over ``ends`` x [0, width].
 
     points: (N, 2) um; triangles: (T, 3) nodes, counterclockwise; biomass: (T,) True in the aggregate;
-    loop: (M,) nodes of the aggregate's boundary, counterclockwise, empty in a clean channel.
+    loop: (M,) nodes of the aggregate's boundary, counterclockwise, empty in a clean channel; topology: what has been
+    worked out from the connections alone, kept while the mesh moves; placed: what has been with the nodes where they are.
     """
 
     points: np.ndarray
@@ -40,6 +42,8 @@ class PoreMesh:
     loop: np.ndarray
     width: float
     ends: tuple[float, float]
+    topology: dict = field(default_factory=dict, repr=False)
+    placed: dict = field(default_factory=dict, repr=False, init=False)
 
     @cached_property
     def edges(self) -> np.ndarray:
@@ -72,30 +76,42 @@ class PoreMesh:
         """The same mesh for scikit-fem."""
         return MeshTri(self.points.T.copy(), self.triangles.T.copy())
 
-    @cached_property
+    def once(self, key: Hashable, make: Callable):
+        """``make()``, worked out once for these connections."""
+        if key not in self.topology:
+            self.topology[key] = make()
+        return self.topology[key]
+
+    def here(self, key: Hashable, make: Callable):
+        """``make()``, worked out once for these places of the nodes."""
+        if key not in self.placed:
+            self.placed[key] = make()
+        return self.placed[key]
+
+    @property
     def body(self) -> np.ndarray:
         """Nodes of the aggregate, its boundary included, ascending."""
-        return np.unique(self.triangles[self.biomass])
+        return self.once("body", lambda: np.unique(self.triangles[self.biomass]))
 
-    @cached_property
+    @property
     def fluid(self) -> np.ndarray:
         """Nodes of the fluid, the interface included, ascending."""
-        return np.unique(self.triangles[~self.biomass])
+        return self.once("fluid", lambda: np.unique(self.triangles[~self.biomass]))
 
-    @cached_property
+    @property
     def inlet(self) -> np.ndarray:
         """Nodes of the inlet from the lower wall up."""
-        return self._line(0, self.ends[0])
+        return self.once("inlet", lambda: self._line(0, self.ends[0]))
 
-    @cached_property
+    @property
     def outlet(self) -> np.ndarray:
         """Nodes of the outlet from the lower wall up."""
-        return self._line(0, self.ends[1])
+        return self.once("outlet", lambda: self._line(0, self.ends[1]))
 
-    @cached_property
+    @property
     def walls(self) -> np.ndarray:
         """Nodes of both walls."""
-        return np.flatnonzero((self.points[:, 1] == 0) | (self.points[:, 1] == self.width))
+        return self.once("walls", lambda: np.flatnonzero((self.points[:, 1] == 0) | (self.points[:, 1] == self.width)))
 
     def _line(self, axis: int, level: float) -> np.ndarray:
         nodes = np.flatnonzero(self.points[:, axis] == level)
@@ -108,7 +124,7 @@ class PoreMesh:
         return np.bincount(self.triangles[chosen].ravel(), weight, len(self.points))
 
     def moved(self, points: np.ndarray) -> PoreMesh:
-        """The same triangles with their nodes at ``points`` (N, 2)."""
+        """The same triangles with their nodes at ``points`` (N, 2), nodes of walls and ends still on their lines."""
         return replace(self, points=points)
 
     def acceptable(self) -> bool:

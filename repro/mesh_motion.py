@@ -11,19 +11,11 @@ slide along their line. gamma is not printed [E13]: 1 by default.
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
-from skfem import Basis, BilinearForm, ElementTriP1, MeshTri
 
-from repro import linear
-from repro.flow import divergence, gradient_product
+from repro.assembly import each, mass, saddle_blocks, saddle_system, two_components
+from repro.flow import forms
 from repro.mesh import PoreMesh
 from repro.timing import timed
-
-
-@BilinearForm
-def product(u, q, w):
-    """(u, q)."""
-    return u * q
 
 
 @timed("mesh motion")
@@ -42,26 +34,22 @@ def move(mesh: PoreMesh, body: np.ndarray, compressibility: float, stabilisation
 
 
 def _fluid_displacement(mesh: PoreMesh, known: np.ndarray, gamma: float, c: float) -> np.ndarray:
-    """(f, 2) displacement of ``mesh.fluid``; ``known`` (N, 2) holds the aggregate's."""
-    fluid, count = mesh.fluid, len(mesh.fluid)
-    local = np.full(len(mesh.points), -1)
-    local[fluid] = np.arange(count)
-    triangles = local[mesh.triangles[~mesh.biomass]]
-    basis = Basis(MeshTri(mesh.points[fluid].T.copy(), triangles.T.copy()), ElementTriP1(), intorder=2)
-    tau = np.broadcast_to((mesh.circumdiameter[~mesh.biomass] ** 2 / c)[:, None], basis.dx.shape)
-    laplace = gradient_product.assemble(basis, k=np.ones(basis.dx.shape))
-    lower = gradient_product.assemble(basis, k=tau) + gamma * product.assemble(basis)
-    b_x, b_y = (divergence.assemble(basis, i=i) for i in (0, 1))
-    system = sp.bmat([[laplace, None, -b_x.T], [None, laplace, -b_y.T], [-b_x, -b_y, -lower]], format="csr")
-    held = _held(mesh)[fluid]
-    value = np.concatenate([known[fluid, 0], known[fluid, 1], np.zeros(count)])
-    free = np.flatnonzero(~np.concatenate([held[:, 0], held[:, 1], np.zeros(count, bool)]))
-    place = np.empty(count)
-    place[linear.node_order(count, triangles)] = np.arange(count)
-    order = np.argsort(np.concatenate([place, place, place + 0.5])[free], kind="stable")
-    value[free] = 0.0
-    value[free] = linear.solve(system[free][:, free], -(system[free] @ value), order)
-    return value[: 2 * count].reshape(2, count).T
+    """(f, 2) displacement of ``mesh.fluid``; ``known`` (N, 2) holds the aggregate's, and zero elsewhere."""
+    fluid, there, found = mesh.fluid, ~mesh.biomass, forms(mesh)
+    tau = mesh.circumdiameter[there] ** 2 / c
+    laplace = found.laplace[there]
+    lower = each(tau, laplace) + gamma * mass(mesh.areas[there])
+    elements = saddle_blocks(two_components(laplace), found.divergence[there], lower)
+    system = mesh.once("mesh motion", lambda: _system(mesh, found.basis.element_dofs.T[there]))
+    value = np.concatenate([known[fluid, 0], known[fluid, 1], np.zeros(len(fluid))])
+    return system.solve(elements, np.zeros(len(value)), value)[: 2 * len(fluid)].reshape(2, -1).T
+
+
+def _system(mesh: PoreMesh, triangles: np.ndarray):
+    """The pseudo-Stokes system of the fluid's triangles (F, 3), its unknowns in the numbering of ``mesh.fluid``."""
+    number = np.full(len(mesh.points), -1)
+    number[mesh.fluid] = np.arange(len(mesh.fluid))
+    return saddle_system(number[triangles], number[triangles], _held(mesh)[mesh.fluid])
 
 
 def _held(mesh: PoreMesh) -> np.ndarray:

@@ -12,10 +12,10 @@ which keeps the total, constants and linear fields to round-off as long as both 
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
 import shapely
 
 from repro import linear
+from repro.assembly import ElementSystem, mass
 from repro.errors import TransferError
 from repro.mesh import triangle_areas
 from repro.timing import timed
@@ -91,12 +91,14 @@ def project(points, triangles, fields, new_points, new_triangles) -> np.ndarray:
     load = np.einsum("p,pqa,pqm->pam", area / 3, new_weight, values)
     right = np.zeros((len(new_points), fields.shape[1]))
     np.add.at(right, new_triangles[new], load)
-    mass = linear.Solver(_mass(new_points, new_triangles))
-    return np.column_stack([mass.solve(column) for column in right.T])
+    return _solve_mass(new_points, new_triangles, right)
 
 
-def _mass(points: np.ndarray, triangles: np.ndarray) -> sp.csr_matrix:
-    """Mass matrix (K, K) of linear nodal functions; every node must belong to a triangle."""
-    local = triangle_areas(points, triangles)[:, None, None] * (np.ones((3, 3)) + np.eye(3)) / 12
-    rows, columns = np.repeat(triangles, 3, axis=1), np.tile(triangles, (1, 3))
-    return sp.csr_matrix((local.ravel(), (rows.ravel(), columns.ravel())), shape=(len(points),) * 2)
+def _solve_mass(points: np.ndarray, triangles: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Solve with the mass matrix of the linear nodal functions for each column of (K, m); every node has a triangle."""
+    rank = np.argsort(linear.node_order(len(points), triangles))
+    system = ElementSystem(triangles, rank, np.zeros(len(points), bool))
+    solver, solution = linear.Solver(system.matrix(mass(triangle_areas(points, triangles)))), np.empty_like(right)
+    for column, load in enumerate(right.T):
+        solution[system.order, column] = solver.solve(load[system.order])
+    return solution

@@ -20,8 +20,9 @@ from skfem import Basis, BilinearForm, ElementTriP1
 
 from repro import kinetics as law
 from repro import linear
+from repro.assembly import ElementSystem, each, local
 from repro.errors import TransportError
-from repro.flow import Flow, gradient_product
+from repro.flow import Flow, forms
 from repro.mesh import PoreMesh
 from repro.timing import timed
 
@@ -35,11 +36,13 @@ ROUND_OFF = 1e-9
 class Operator:
     """Linear part of one substrate in one geometry: matrix @ C - source is what must balance the uptake.
 
-    matrix: (N, N) um2/h; source: (N,) um2 mg/L/h; held: nodes where C = supply; outflow: (N,) um2/h weights of the flux
-    through the outlet; inflow: the same for the inlet; supplied: flux supplied by the inlet, um2 mg/L/h.
+    matrix: (N, N) um2/h, symmetric in its sparsity; magnitude: its absolute values; source: (N,) um2 mg/L/h; held: nodes
+    where C = supply; inflow, outflow: (N,) um2/h weights of the flux through inlet and outlet; supplied: the flux
+    supplied by the inlet, um2 mg/L/h; supply: mg/L.
     """
 
-    matrix: sp.csr_matrix
+    matrix: sp.csc_matrix
+    magnitude: sp.csc_matrix
     source: np.ndarray
     held: np.ndarray
     inflow: np.ndarray
@@ -50,7 +53,8 @@ class Operator:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Both substrates in one geometry: their operators, body (N,) um2 lumped biomass area, total (N,) lumped area."""
+    """Both substrates in one geometry: their operators, body (N,) um2 lumped biomass area, total (N,) lumped area;
+    nodes: (N,) in elimination order; newton: the sparsity of both substrates' Newton matrix."""
 
     mesh: PoreMesh
     acceptor: Operator
@@ -59,7 +63,13 @@ class Problem:
     total: np.ndarray
     substrates: object
     kinetics: object
-    order: np.ndarray
+    nodes: np.ndarray
+    newton: PairPattern
+
+    @property
+    def both(self) -> tuple[Operator, Operator]:
+        """Acceptor and donor."""
+        return self.acceptor, self.donor
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,37 +94,38 @@ def problem(mesh: PoreMesh, flow: Flow | None, substrates, kinetics, inlet: str 
     substrates, kinetics: of a scene (kinetics None without biomass); inlet: "local" or "mean", u_x or u_ave in (11).
     """
     basis = Basis(mesh.fem, ElementTriP1(), intorder=2)
-    carried = None if flow is None else _advection(basis, mesh, flow)
-    operators = [_operator(basis, mesh, flow, carried, s, inlet, substrates.boundary)
+    dofs, count = basis.element_dofs.T, len(mesh.points)
+    scalar = mesh.once("scalar", lambda: ElementSystem(dofs, np.arange(count), np.zeros(count, bool)))
+    carried = 0.0 if flow is None else _advection(basis, mesh, flow)
+    operators = [_operator(mesh, flow, carried, scalar, s, inlet, substrates.boundary)
                  for s in (substrates.acceptor, substrates.donor)]
-    count = len(mesh.points)
-    nodes = linear.node_order(count, mesh.triangles)
-    order = np.column_stack([nodes, count + nodes]).ravel()
-    return Problem(mesh, *operators, mesh.lumped(mesh.biomass), mesh.lumped(), substrates, kinetics, order)
+    nodes = mesh.once("node order", lambda: linear.node_order(count, dofs))
+    newton = mesh.once("newton", lambda: PairPattern(scalar.indices, scalar.indptr, mesh.body, nodes))
+    return Problem(mesh, *operators, mesh.lumped(mesh.biomass), mesh.lumped(), substrates, kinetics, nodes, newton)
 
 
-def _advection(basis, mesh: PoreMesh, flow: Flow):
-    """(w . grad C, v) with w = u - tau grad p, linear on each triangle."""
+def _advection(basis, mesh: PoreMesh, flow: Flow) -> np.ndarray:
+    """(w . grad C, v) with w = u - tau grad p, linear on each triangle: (T, 3, 3)."""
     corner = flow.velocity[: len(mesh.points)]
     speed = [basis.interpolate(corner[:, i]) - flow.correction[:, i][:, None] for i in (0, 1)]
-    return advection.assemble(basis, x_speed=speed[0], y_speed=speed[1])
+    return local(advection, basis, x_speed=speed[0], y_speed=speed[1])
 
 
-def _operator(basis, mesh: PoreMesh, flow: Flow | None, carried, substrate, inlet: str, boundary: str) -> Operator:
+def _operator(mesh: PoreMesh, flow: Flow | None, carried, scalar, substrate, inlet: str, boundary: str) -> Operator:
     """Diffusion, advection and the conditions at both ends for one substrate."""
     diffusivity = np.where(mesh.biomass, substrate.diffusivity_in_aggregate, substrate.diffusivity)
-    matrix = gradient_product.assemble(basis, k=np.broadcast_to(diffusivity[:, None], basis.dx.shape))
-    nothing, none_held = np.zeros(len(mesh.points)), np.empty(0, int)
-    if flow is None:
-        held = np.concatenate([mesh.inlet, mesh.outlet]) if boundary == "open" else none_held
-        return Operator(matrix, nothing, held, nothing, nothing, 0.0, substrate.supply)
-    inflow, outflow = (_edge_flux(mesh, nodes, flow.velocity[nodes, 0]) for nodes in (mesh.inlet, mesh.outlet))
-    robin = inflow
-    if inlet == "mean":
-        robin = _edge_flux(mesh, mesh.inlet, np.full(len(mesh.inlet), flow.mean_velocity))
-    supplied = flow.mean_velocity * mesh.width * substrate.supply
-    return Operator((matrix + carried + sp.diags_array(robin)).tocsr(), robin * substrate.supply, none_held, inflow,
-                    outflow, supplied, substrate.supply)
+    spread = each(diffusivity, forms(mesh).laplace)
+    nothing, held, supplied = np.zeros(len(mesh.points)), np.empty(0, int), 0.0
+    inflow = outflow = robin = nothing
+    if flow is not None:
+        inflow, outflow = (_edge_flux(mesh, nodes, flow.velocity[nodes, 0]) for nodes in (mesh.inlet, mesh.outlet))
+        mean = np.full(len(mesh.inlet), flow.mean_velocity)
+        robin = inflow if inlet == "local" else _edge_flux(mesh, mesh.inlet, mean)
+        supplied = flow.mean_velocity * mesh.width * substrate.supply
+    elif boundary == "open":
+        held = np.concatenate([mesh.inlet, mesh.outlet])
+    matrix = (scalar.matrix(spread + carried) + sp.diags_array(robin)).tocsc()
+    return Operator(matrix, abs(matrix), robin * substrate.supply, held, inflow, outflow, supplied, substrate.supply)
 
 
 def _edge_flux(mesh: PoreMesh, nodes: np.ndarray, speed: np.ndarray) -> np.ndarray:
@@ -140,43 +151,32 @@ def steady(problem: Problem, active: np.ndarray | None, guess: Concentrations | 
     Raises TransportError where Newton does not converge or a concentration is negative.
     """
     start = supplied_everywhere(problem) if guess is None else guess
-    state = np.concatenate([start.acceptor, start.donor])
+    state = np.stack([start.acceptor, start.donor])
     weight = np.zeros(len(problem.mesh.points)) if active is None else problem.body * active
-    system = _linear_system(problem)
-    residual, size, jacobian = _balance(problem, system, weight, state)
+    residual, size, slopes = _balance(problem, weight, state)
     for iteration in range(MOST_ITERATIONS):
         defect = _relative(residual, size)
         if defect <= NEWTON:
-            return _checked(problem, system, weight, state, iteration)
-        state, residual, size, jacobian = _advance(problem, system, weight, state, residual, jacobian)
+            return _checked(problem, weight, state, iteration)
+        state, residual, size, slopes = _advance(problem, weight, state, residual, slopes)
     raise TransportError(f"Newton's method for the substrates stands at a defect of {defect:.2g} after "
                          f"{MOST_ITERATIONS} iterations; try a larger numerics.refinement")
 
 
-def _linear_system(problem: Problem):
-    """Block matrix (2N, 2N), right-hand side and held unknowns of both substrates; held rows are the identity."""
-    count = len(problem.mesh.points)
-    held = np.concatenate([problem.acceptor.held, count + problem.donor.held])
-    free = np.ones(2 * count)
-    free[held] = 0.0
-    matrix = sp.block_diag([problem.acceptor.matrix, problem.donor.matrix], format="csr")
-    matrix = sp.diags_array(free) @ matrix + sp.diags_array(1 - free)
-    right = np.concatenate([problem.acceptor.source, problem.donor.source])
-    supply = np.repeat([problem.acceptor.supply, problem.donor.supply], count)
-    return matrix.tocsr(), np.where(free > 0, right, supply), free, abs(matrix).tocsr()
-
-
-def _balance(problem: Problem, system, weight: np.ndarray, state: np.ndarray):
-    """Residual (2N,), the size of the terms in each row, and the Jacobian of both balances."""
-    matrix, right, free, magnitude = system
-    half = len(weight)
-    sink, block = np.zeros(2 * half), sp.csr_matrix(matrix.shape)
+def _balance(problem: Problem, weight: np.ndarray, state: np.ndarray):
+    """Residual (2, N), the size of the terms in each row, and the uptake's derivatives [[AA, AD], [DA, DD]] (N,)."""
+    nothing = np.zeros(len(weight))
+    uptake, slopes = (nothing, nothing), ((nothing, nothing), (nothing, nothing))
     if problem.kinetics is not None:
-        q_a, q_d, slopes = law.uptake(state[:half], state[half:], problem.substrates, problem.kinetics)
-        sink = free * np.concatenate([weight * q_a, weight * q_d])
-        diagonals = [[sp.diags_array(weight * entry) for entry in row] for row in slopes]
-        block = sp.diags_array(free) @ sp.block_array(diagonals)
-    return matrix @ state - right + sink, magnitude @ np.abs(state) + right + np.abs(sink), (matrix + block).tocsr()
+        *uptake, slopes = law.uptake(*state, problem.substrates, problem.kinetics)
+    residual, size = np.empty_like(state), np.empty_like(state)
+    for k, operator in enumerate(problem.both):
+        sink = weight * uptake[k]
+        residual[k] = operator.matrix @ state[k] - operator.source + sink
+        size[k] = operator.magnitude @ np.abs(state[k]) + operator.source + np.abs(sink)
+        residual[k, operator.held] = state[k, operator.held] - operator.supply
+        size[k, operator.held] = operator.supply
+    return residual, size, slopes
 
 
 def _relative(residual: np.ndarray, size: np.ndarray) -> float:
@@ -184,41 +184,82 @@ def _relative(residual: np.ndarray, size: np.ndarray) -> float:
     return float(np.max(np.abs(residual)[size > 0] / size[size > 0], initial=0.0))
 
 
-def _advance(problem, system, weight, state, residual, jacobian):
+def _advance(problem: Problem, weight, state, residual, slopes):
     """A Newton step where it keeps both substrates positive and lowers the residual; else a sweep, which is positive."""
-    trial = state + linear.solve(jacobian, -residual, problem.order)
-    found = _balance(problem, system, weight, trial)
+    trial = state + _solve(problem, [[weight * entry for entry in row] for row in slopes], -residual)
+    found = _balance(problem, weight, trial)
     if trial.min() < 0 or np.linalg.norm(found[0]) > np.linalg.norm(residual):
-        trial = _sweep(problem, system, weight, np.maximum(state, 0.0))
-        found = _balance(problem, system, weight, trial)
+        trial = _sweep(problem, weight, np.maximum(state, 0.0))
+        found = _balance(problem, weight, trial)
     return trial, *found
 
 
-def _checked(problem, system, weight, state, iterations: int) -> Concentrations:
+def _solve(problem: Problem, blocks, right: np.ndarray) -> np.ndarray:
+    """(2, N) solution with the operators' matrices plus diagonal blocks [[AA, AD], [DA, DD]] (N,)."""
+    matrix = problem.newton.matrix(*problem.both, blocks)
+    solution = np.empty_like(right)
+    found = linear.solve(matrix, right[:, problem.nodes].T.ravel())
+    solution[:, problem.nodes] = found.reshape(-1, 2).T
+    return solution
+
+
+class PairPattern:
+    """Sparsity of the Newton matrix of both substrates, acceptor and donor of a node side by side, nodes in elimination
+    order; the substrates are coupled at the aggregate's nodes alone.
+
+    indices, indptr: of an operator's (N, N) matrix by columns; body: coupled nodes; nodes: (N,) in elimination order.
+    """
+
+    def __init__(self, indices: np.ndarray, indptr: np.ndarray, body: np.ndarray, nodes: np.ndarray):
+        self.body, self.count = body, 2 * len(nodes)
+        place = np.empty(len(nodes), int)
+        place[nodes] = 2 * np.arange(len(nodes))
+        rows, columns = place[indices], place[np.repeat(np.arange(len(nodes)), np.diff(indptr))]
+        pairs = [(rows, columns), (rows + 1, columns + 1), (place[body], place[body] + 1), (place[body] + 1, place[body])]
+        keys = np.concatenate([column * self.count + row for row, column in pairs])
+        by_column = np.argsort(keys)
+        slot = np.empty(len(keys), int)
+        slot[by_column] = np.arange(len(keys))
+        self.slots = np.split(slot, np.cumsum([len(row) for row, _ in pairs])[:-1])
+        self.indices = (keys[by_column] % self.count).astype(np.int32)
+        self.indptr = np.searchsorted(keys[by_column], self.count * np.arange(self.count + 1)).astype(np.int32)
+        self.diagonals = [np.searchsorted(keys[by_column], (place + k) * (self.count + 1)) for k in (0, 1)]
+
+    def matrix(self, acceptor: Operator, donor: Operator, blocks) -> sp.csc_matrix:
+        """(2N, 2N) operators' matrices plus diagonal blocks; the rows of held nodes are the identity's."""
+        data = np.zeros(len(self.indices))
+        data[self.slots[0]], data[self.slots[1]] = acceptor.matrix.data, donor.matrix.data
+        for k, operator in enumerate((acceptor, donor)):
+            data[self.diagonals[k]] += blocks[k][k]
+            data[self.slots[2 + k]] = blocks[k][1 - k][self.body]
+            rows = self.indices[self.diagonals[k][operator.held]]
+            data[np.isin(self.indices, rows)] = 0.0
+            data[self.diagonals[k][operator.held]] = 1.0
+        return sp.csc_matrix((data, self.indices, self.indptr), shape=(self.count, self.count))
+
+
+def _checked(problem: Problem, weight, state, iterations: int) -> Concentrations:
     """The solution, positive: round-off below zero is removed by one sweep with the sink written as C times a
     coefficient, which keeps a non-negative right-hand side's solution non-negative."""
-    half = len(weight)
-    supply = np.repeat([problem.acceptor.supply, problem.donor.supply], half)
-    if (state < 0).any() and (state >= -ROUND_OFF * np.maximum(supply, supply.max())).all():
-        state = _sweep(problem, system, weight, np.maximum(state, 0.0))
-    if (state < 0).any():
-        worst = int(np.argmin(state))
-        where = problem.mesh.points[worst % half]
-        name = "acceptor" if worst < half else "donor"
-        raise TransportError(f"the {name} is negative, {state[worst]:.3g} mg/L at x = {where[0]:.4g}, y = {where[1]:.4g} um; "
-                             "the mesh is too coarse there: try a larger numerics.refinement")
-    return Concentrations(state[:half], state[half:], iterations)
+    if state.min() < 0 and state.min() >= -ROUND_OFF * max(operator.supply for operator in problem.both):
+        state = _sweep(problem, weight, np.maximum(state, 0.0))
+    if state.min() < 0:
+        which, worst = np.unravel_index(np.argmin(state), state.shape)
+        x, y = problem.mesh.points[worst]
+        raise TransportError(f"the {('acceptor', 'donor')[which]} is negative, {state[which, worst]:.3g} mg/L at "
+                             f"x = {x:.4g}, y = {y:.4g} um; the mesh is too coarse there: try a larger numerics.refinement")
+    return Concentrations(state[0], state[1], iterations)
 
 
-def _sweep(problem, system, weight, state):
-    """Solve (matrix + weight q(C) / C) C_new = right, with the uptake's coefficients frozen at the state."""
-    matrix, right, free, _ = system
-    half = len(weight)
-    q_a, q_d, slopes = law.uptake(state[:half], state[half:], problem.substrates, problem.kinetics)
-    tiny = np.finfo(float).tiny
-    per = np.concatenate([np.where(state[:half] > tiny, q_a / np.maximum(state[:half], tiny), slopes[0][0]),
-                          np.where(state[half:] > tiny, q_d / np.maximum(state[half:], tiny), slopes[1][1])])
-    return linear.solve(matrix + sp.diags_array(free * np.tile(weight, 2) * per), right, problem.order)
+def _sweep(problem: Problem, weight, state) -> np.ndarray:
+    """Solve (matrix + weight q(C) / C) C_new = source, with the uptake's coefficients frozen at the state."""
+    *uptake, slopes = law.uptake(*state, problem.substrates, problem.kinetics)
+    tiny, zero, right = np.finfo(float).tiny, np.zeros(len(weight)), np.empty_like(state)
+    per = [np.where(c > tiny, q / np.maximum(c, tiny), slopes[k][k]) for k, (c, q) in enumerate(zip(state, uptake))]
+    for k, operator in enumerate(problem.both):
+        right[k] = operator.source
+        right[k, operator.held] = operator.supply
+    return _solve(problem, [[weight * per[0], zero], [zero, weight * per[1]]], right)
 
 
 @dataclass(frozen=True)
@@ -240,7 +281,7 @@ def fluxes(problem: Problem, active: np.ndarray | None, state: Concentrations) -
         q = law.uptake(state.acceptor, state.donor, problem.substrates, problem.kinetics)[:2]
     weight = 0.0 if active is None else problem.body * active
     return tuple(_fluxes(problem.mesh, operator, field, float(np.sum(weight * rate)))
-                 for operator, field, rate in ((problem.acceptor, state.acceptor, q[0]), (problem.donor, state.donor, q[1])))
+                 for operator, field, rate in zip(problem.both, (state.acceptor, state.donor), q))
 
 
 def _fluxes(mesh: PoreMesh, operator: Operator, field: np.ndarray, consumed: float) -> Fluxes:
