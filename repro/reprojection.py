@@ -60,19 +60,42 @@ def interpolate(points: np.ndarray, triangles: np.ndarray, fields: np.ndarray, w
 
 def supermesh(points, triangles, new_points, new_triangles) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Common pieces of two meshes: (p, 3, 2) corners of triangles, and the old and new triangle (p,) each lies in."""
-    old, new = shapely.polygons(points[triangles]), shapely.polygons(new_points[new_triangles])
-    new_index, old_index = shapely.STRtree(old).query(new, predicate="intersects")
-    pieces = shapely.intersection(old[old_index], new[new_index])
-    keep = shapely.get_type_id(pieces) == shapely.GeometryType.POLYGON
-    rings, piece = shapely.get_coordinates(pieces[keep], return_index=True)
-    first = np.searchsorted(piece, np.arange(np.count_nonzero(keep)))
-    fan = np.flatnonzero((np.arange(len(rings)) - first[piece] >= 1) & (np.append(piece[1:], -1) == piece))
-    fan = fan[np.append(piece[2:], [-1, -1])[fan] == piece[fan]]
-    corners = np.stack([rings[first[piece[fan]]], rings[fan], rings[fan + 1]], axis=1)
-    return corners, old_index[keep][piece[fan]], new_index[keep][piece[fan]]
+    boxes = shapely.STRtree(shapely.polygons(points[triangles]))
+    new, old = boxes.query(shapely.polygons(new_points[new_triangles]))
+    pieces = clip(points[triangles[old]], new_points[new_triangles[new]])
+    fans = np.stack([np.repeat(pieces[:, :1], pieces.shape[1] - 2, axis=1), pieces[:, 1:-1], pieces[:, 2:]], axis=2)
+    edge = fans[:, :, 1:] - fans[:, :, :1]
+    pair, fan = np.nonzero(edge[..., 0, 0] * edge[..., 1, 1] != edge[..., 0, 1] * edge[..., 1, 0])
+    return fans[pair, fan], old[pair], new[pair]
 
 
-@timed("transfer")
+def clip(polygons: np.ndarray, windows: np.ndarray) -> np.ndarray:
+    """Convex polygons (p, k, 2) cut to counterclockwise triangles (p, 3, 2), pair by pair: (p, k + 3, 2).
+
+    Sutherland and Hodgman's algorithm: each side of the window in turn keeps what is to its left. Polygons with fewer
+    corners repeat one of them, empty ones are a single point.
+    """
+    for side in range(3):
+        start, along = windows[:, side, None], windows[:, (side + 1) % 3, None] - windows[:, side, None]
+        depth = along[..., 0] * (polygons[..., 1] - start[..., 1]) - along[..., 1] * (polygons[..., 0] - start[..., 0])
+        after, depth_after = np.roll(polygons, -1, axis=1), np.roll(depth, -1, axis=1)
+        crosses = (depth < 0) != (depth_after < 0)
+        part = np.where(crosses, depth, 0.0) / np.where(crosses, depth - depth_after, 1.0)
+        crossing = polygons + part[..., None] * (after - polygons)
+        both = np.stack([polygons, crossing], axis=2).reshape(len(polygons), -1, 2)
+        kept = np.stack([depth >= 0, crosses], axis=2).reshape(len(polygons), -1)
+        polygons = _packed(both, kept, polygons.shape[1] + 1)
+    return polygons
+
+
+def _packed(points: np.ndarray, kept: np.ndarray, room: int) -> np.ndarray:
+    """The kept points (p, k, 2) moved to the front, in order, and the first of them repeated behind: (p, room, 2)."""
+    front = np.argsort(~kept, axis=1, kind="stable")[:, :room]
+    count = kept.sum(axis=1)[:, None]
+    chosen = np.where(np.arange(room) < count, front, front[:, :1])
+    return np.take_along_axis(points, chosen[..., None], axis=1)
+
+
 def project(points, triangles, fields, new_points, new_triangles) -> np.ndarray:
     """Galerkin projection of nodal fields (N, m) onto the nodes of another mesh of the same polygon: (K, m).
 
