@@ -6,6 +6,8 @@ elimination order and the place of every element entry in the sparse matrix stay
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 import scipy.sparse as sp
 
@@ -43,29 +45,42 @@ class ElementSystem:
     """
 
     def __init__(self, unknowns: np.ndarray, rank: np.ndarray, held: np.ndarray):
-        self.unknowns, self.held = unknowns, held
-        free = np.flatnonzero(~held)
-        self.order = free[np.argsort(rank[free], kind="stable")]
-        place = np.full(len(held), -1)
-        place[self.order] = np.arange(len(free))
+        self.unknowns = unknowns
+        self._ranked = np.argsort(rank, kind="stable")
+        place = np.empty(len(rank), int)
+        place[self._ranked] = np.arange(len(rank))
         rows, columns = (place[part] for part in _pairs(unknowns))
-        self.kept = (rows >= 0) & (columns >= 0)
-        self.count = len(free)
-        keys, self.slot = np.unique(columns[self.kept] * self.count + rows[self.kept], return_inverse=True)
-        self.indices = (keys % self.count).astype(np.int32)
-        self.indptr = np.searchsorted(keys, self.count * np.arange(self.count + 1)).astype(np.int32)
+        keys, self._slot = np.unique(columns * len(rank) + rows, return_inverse=True)
+        self._columns, self._rows = np.divmod(keys, len(rank))
+        self._hold(held)
+
+    def holding(self, held: np.ndarray) -> ElementSystem:
+        """The same elements with other unknowns (n,) prescribed."""
+        other = copy(self)
+        other._hold(held)
+        return other
+
+    def _hold(self, held: np.ndarray) -> None:
+        free = ~held[self._ranked]
+        place = np.cumsum(free) - 1
+        self.held, self.order, self.count = held, self._ranked[free], int(free.sum())
+        kept = free[self._rows] & free[self._columns]
+        self._kept = np.flatnonzero(kept)
+        self.indices = place[self._rows[kept]].astype(np.int32)
+        self.indptr = np.searchsorted(place[self._columns[kept]], np.arange(self.count + 1)).astype(np.int32)
 
     def matrix(self, elements: np.ndarray) -> sp.csc_matrix:
         """K between the free unknowns, in elimination order, from element matrices (T, k, k)."""
-        data = np.bincount(self.slot, elements.ravel()[self.kept], len(self.indices))
+        data = np.bincount(self._slot, elements.ravel(), len(self._rows))[self._kept]
         return sp.csc_matrix((data, self.indices, self.indptr), shape=(self.count, self.count))
 
     def solve(self, elements: np.ndarray, right: np.ndarray, value: np.ndarray) -> np.ndarray:
         """x (n,) with the prescribed unknowns as in ``value`` (n,), for element matrices (T, k, k) and b (n,)."""
         known = np.where(self.held, value, 0.0)
-        moved = np.einsum("tij,tj->ti", elements, known[self.unknowns])
-        rest = right - np.bincount(self.unknowns.ravel(), moved.ravel(), len(value))
-        known[self.order] = linear.solve(self.matrix(elements), rest[self.order])
+        if known.any():
+            moved = (elements @ known[self.unknowns][:, :, None])[:, :, 0]
+            right = right - np.bincount(self.unknowns.ravel(), moved.ravel(), len(value))
+        known[self.order] = linear.solve(self.matrix(elements), right[self.order])
         return known
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from repro import geometry, growth, kinetics, mesh, mesh_motion, pore, reprojection, transport
+from repro import gear, geometry, growth, kinetics, mesh, mesh_motion, pore, reprojection, transport
 from repro.errors import GrowthError, MeshError, SimulationError, StageError
 from repro.pore import Pore, Solved
 from repro.transport import Concentrations
@@ -151,10 +151,10 @@ def step(scene, now: Pore, solved: Solved, duration: float) -> Step:
     theta = now.theta * (1 + _increase(now, grown) / scene.kinetics.maximum_density)
     shape, wall, fixed, iterations = expand(scene, grown, theta)
     expanded = _reprojected(grown, shape, theta, wall, fixed)
+    solved = replace(solved, concentrations=end)
     after, remeshed = new_mesh(scene, now, expanded, solved)
     ledger = Ledger(now.time, now.time + duration, *flows, _mass(now), made, _mass(after))
-    return Step(after, (replace(grown, time=now.time + duration), replace(solved, concentrations=end)), ledger, remeshed,
-                iterations)
+    return Step(after, (replace(grown, time=now.time + duration), solved), ledger, remeshed, iterations)
 
 
 def _mass(now: Pore) -> float:
@@ -168,7 +168,6 @@ def make_biomass(scene, now: Pore, solved: Solved, duration: float):
     steady concentrations over the grown biomass. Gear: the transient of the paper.
     """
     if scene.numerics.transport == "gear":
-        from repro import gear
         return gear.make_biomass(scene, now, solved, duration)
     first = _rates(scene, solved.concentrations)
     guess = kinetics.grow(now.active, now.inert, *first, duration)

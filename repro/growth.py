@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from repro.assembly import ElementSystem, saddle_blocks, saddle_system
+from repro.assembly import ElementSystem, each, saddle_blocks, saddle_system
 from repro.errors import GrowthError, LinearError
 from repro.mesh import gradients, triangle_areas
 from repro.timing import timed
@@ -49,10 +49,11 @@ class Body:
     @property
     def sparse(self) -> ElementSystem:
         """The sparse system of positions and pressure."""
-        key = ("growth", self.held.tobytes())
-        if key not in self.topology:
-            self.topology[key] = saddle_system(self.triangles, self.triangles, self.held)
-        return self.topology[key]
+        if "growth" not in self.topology:
+            self.topology["growth"] = saddle_system(self.triangles, self.triangles, self.held)
+        held = np.concatenate([self.held[:, 0], self.held[:, 1], np.zeros(len(self.held), bool)])
+        found = self.topology["growth"]
+        return found if np.array_equal(found.held, held) else found.holding(held)
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,6 +135,13 @@ def stabilisation(position: np.ndarray, triangles: np.ndarray, theta: np.ndarray
     return weight[:, None, None] * np.einsum("tai,tbi->tab", slopes, slopes)
 
 
+def _strains(slopes: np.ndarray) -> np.ndarray:
+    """(t, 4, 6) dF [xX, xY, yX, yY] of unit displacements [x of the three nodes, then y]."""
+    found = np.zeros((len(slopes), 4, 6))
+    found[:, :2, :3] = found[:, 2:, 3:] = np.swapaxes(slopes, 1, 2)
+    return found
+
+
 class System:
     """Residual and tangent of Pi for one body; theta and prescribed coordinates vary, the sparsity does not."""
 
@@ -141,6 +149,7 @@ class System:
         self.body = body
         self.slopes = gradients(body.reference, body.triangles)
         self.areas = triangle_areas(body.reference, body.triangles)
+        self.strains = _strains(self.slopes)
         self.stabilising = stabilising
         self.sparse = body.sparse
         self.unknowns, self.free = self.sparse.unknowns, ~self.sparse.held
@@ -166,10 +175,10 @@ class System:
         t = self.body.triangles
         F = deformation(position, t, self.slopes)
         moduli = tangent(F, pressure[t].mean(axis=1))
-        K = self.areas[:, None, None, None, None] * np.einsum("tikjl,tak,tbl->tiajb", moduli, self.slopes, self.slopes)
+        K = np.swapaxes(self.strains, 1, 2) @ each(self.areas, moduli.reshape(-1, 4, 4)) @ self.strains
         H, J = inverse_transpose(F)
         B = (self.areas * J)[:, None, None] * np.einsum("tik,tak->tia", H, self.slopes) / 3
-        return saddle_blocks(K.reshape(len(t), 6, 6), -np.repeat(B.reshape(len(t), 1, 6), 3, axis=1), self.stabilising)
+        return saddle_blocks(K, -np.repeat(B.reshape(len(t), 1, 6), 3, axis=1), self.stabilising)
 
     def admissible(self, position: np.ndarray) -> bool:
         """Is det F > 0 everywhere?"""

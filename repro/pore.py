@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from repro import flow, geometry, mesh, transport
+from repro import flow, gear, geometry, mesh, transport
 from repro.geometry import Outline
 from repro.mesh import PoreMesh
 
@@ -85,7 +85,6 @@ def solve(scene, pore: Pore) -> Solved:
         return Solved(carried, None, None)
     problem = transport.problem(pore.mesh, carried, scene.substrates, scene.kinetics, scene.numerics.inlet)
     if scene.numerics.transport == "gear":
-        from repro import gear
         return Solved(carried, problem, gear.settle(problem, pore.active, pore.concentrations))
     return Solved(carried, problem, transport.steady(problem, pore.active, pore.concentrations))
 
