@@ -229,8 +229,8 @@ def _newton(system: System, theta, position, pressure, target):
         if not lag.any() and (defect <= NEWTON or 0.1 * last < defect <= ROUND_OFF):
             return position, pressure, iteration
         step = _newton_step(system, position, pressure, residual, lag)
-        position, pressure, taken, residual, size = _line_search(system, theta, position, pressure, step, residual, lag)
-        lag = (1 - taken) * lag
+        position, pressure, residual, size = _line_search(system, theta, position, pressure, step, residual, lag)
+        lag = np.where(system.body.held, target - position, 0.0)
     raise GrowthError(f"Newton's method for the growth stands at a defect of {defect:.2g} "
                       f"after {MOST_ITERATIONS} iterations")
 
@@ -257,6 +257,6 @@ def _line_search(system, theta, position, pressure, step, residual, lag):
             continue
         found, size = system.residual(trial, pressure + length * push, theta)
         if lag.any() or np.linalg.norm(found[system.free]) < 4 * before:
-            return trial, pressure + length * push, length, found, size
+            return trial, pressure + length * push, found, size
     raise GrowthError(f"no step of Newton's method keeps det F > 0 and the residual in bounds "
                       f"(shortest tried {0.5 ** (HALVINGS - 1):.2g})")

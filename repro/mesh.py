@@ -165,7 +165,8 @@ def generate(outline: Outline | None, ends: tuple[float, float], width: float, r
         sizes = geometry.interface_sizes(outline, width, refinement, film)[free]
     points, polygons = _boundaries(outline, ends, width, sources, sizes, largest)
     mesh = _fill(points, polygons, lambda where: geometry.graded_size(where, sources, sizes, largest), ends, width)
-    return (mesh if outline is None else _with_loop(mesh, outline)), outline
+    loop = mesh.loop[: 0 if outline is None else len(outline.points)]  # its points come first among the prescribed ones
+    return replace(mesh, loop=loop), outline
 
 
 def _check_outline(outline: Outline, ends: tuple[float, float], width: float) -> None:
@@ -277,8 +278,3 @@ def _find(new_points: np.ndarray, points: np.ndarray) -> np.ndarray:
     if distance.max() > 1e-9 * np.ptp(points[:, 0]) or len(np.unique(found)) < len(points):
         raise MeshError(f"the mesher moved a boundary node by {distance.max():.3g} um")
     return found
-
-
-def _with_loop(mesh: PoreMesh, outline: Outline) -> PoreMesh:
-    """The outline's points come first among the prescribed ones."""
-    return replace(mesh, loop=mesh.loop[: len(outline.points)])

@@ -42,7 +42,9 @@ def row(scene: Scene, instant: Instant) -> dict[str, float | None]:
     found = dict.fromkeys(COLUMNS)
     found.update(time_h=pore.time, meshed_length_um=pore.mesh.ends[1] - pore.mesh.ends[0], nodes=len(pore.mesh.points),
                  remeshed=int(instant.remeshes > 0), contact=int(pore.contact))
-    found.update(_flow_columns(instant), **_substrate_columns(instant), **_aggregate_columns(scene, instant))
+    for columns in (_flow_columns(instant), _substrate_columns(instant), _transient_columns(scene, instant),
+                    _aggregate_columns(scene, instant)):
+        found.update(columns)
     return found
 
 
@@ -63,9 +65,25 @@ def _substrate_columns(instant: Instant) -> dict[str, float]:
         found[f"{name}_min_mg_per_L"] = float(field.min())
         found[f"inlet_{name}_mg_per_L"] = flux.inlet
         found[f"effluent_{name}_mg_per_L"] = flux.effluent
-        turnover = max(abs(flux.supplied), flux.consumed)
-        found[f"{name}_balance"] = (flux.supplied - flux.out - flux.consumed) / turnover if turnover else 0.0
+        found[f"{name}_balance"] = _defect(flux.supplied, flux.out, flux.consumed)
     return found
+
+
+def _transient_columns(scene: Scene, instant: Instant) -> dict[str, float]:
+    """The substrate balances of the transient scheme: the worst of the steps since the last row, storage included."""
+    if scene.numerics.transport != "gear" or instant.solved.concentrations is None:
+        return {}
+    steps = [_defect(ledger.supplied[k], ledger.out[k] + ledger.stored[k], ledger.consumed[k])
+             for k in (0, 1) for ledger in instant.ledgers]
+    half = len(steps) // 2
+    return {"acceptor_balance": max(steps[:half], key=abs, default=0.0),
+            "donor_balance": max(steps[half:], key=abs, default=0.0)}
+
+
+def _defect(supplied: float, out: float, consumed: float) -> float:
+    """(in - out - consumed) over the larger of what comes in and what is consumed."""
+    turnover = max(abs(supplied), consumed)
+    return (supplied - out - consumed) / turnover if turnover else 0.0
 
 
 def _aggregate_columns(scene: Scene, instant: Instant) -> dict[str, float]:

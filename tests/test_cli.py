@@ -1,0 +1,127 @@
+"""The command line: what it writes, and what it refuses."""
+
+import csv
+import json
+import math
+from xml.etree import ElementTree
+
+import meshio
+import numpy as np
+import pytest
+
+from repro import growth, results
+from repro.cli import main
+from repro.running import OutputError, prepare
+
+
+def run(tmp_path, scene, *sets, status=0):
+    out = tmp_path / "run"
+    arguments = ["run", scene, "--out", str(out)]
+    for entry in sets:
+        arguments += ["--set", entry]
+    assert main(arguments) == status
+    return out
+
+
+def rows(out):
+    with (out / "timeseries.csv").open() as file:
+        return list(csv.DictReader(file))
+
+
+def test_flow_only_is_one_row_without_substrates(tmp_path):
+    """Mutant: assembling transport without [substrates]."""
+    out = run(tmp_path, "flow_only")
+    (row,) = rows(out)
+    assert list(row) == results.COLUMNS
+    assert float(row["time_h"]) == 0 and math.isclose(float(row["mean_velocity_m_per_d"]), 2.9, rel_tol=1e-12)
+    assert all(row[name] == "" for name in results.COLUMNS if "acceptor" in name or "donor" in name)
+    assert row["biomass_balance"] == row["inert_fraction"] == ""
+
+
+def test_conductivity_velocity_and_head_are_consistent(tmp_path):
+    """K = u L / head loss (2.1). Mutant: the head loss of the meshed part alone."""
+    (row,) = rows(run(tmp_path, "flow_only"))
+    speed, loss = float(row["mean_velocity_m_per_d"]), float(row["head_loss_cm"]) / 100
+    assert math.isclose(float(row["conductivity_m_per_d"]), speed * 600e-6 / loss, rel_tol=1e-12)
+
+
+def test_rows_and_fields_at_output_times(tmp_path):
+    """Mutants: steps that do not land on output times; a field file that is not the row's."""
+    out = run(tmp_path, "base", 'growth.end="0.5 h"', 'output.times=["0.3 h", "0.5 h"]')
+    assert [float(row["time_h"]) for row in rows(out)] == [0, 0.3, 0.5]
+    sets = ElementTree.parse(out / "fields.pvd").getroot().iter("DataSet")
+    entries = {float(s.get("timestep")): s.get("file") for s in sets}
+    assert list(entries) == [0, 0.3, 0.5]
+    found = meshio.read(out / entries[0.5])
+    assert math.isclose(float(rows(out)[-1]["acceptor_min_mg_per_L"]), found.point_data["acceptor_mg_per_L"].min())
+    assert found.points[:, 1].max() == 50
+    inside = found.cell_data["region"][0] == 1
+    assert np.ptp(found.cell_data["theta"][0][~inside]) == 0 and found.cell_data["theta"][0][inside].min() > 1.1
+    for name in ("velocity_m_per_d", "head_cm", "donor_mg_per_L", "active_biomass", "inert_biomass", "displacement_um",
+                 "position_t0_um", "pressure_MPa"):
+        assert np.isfinite(found.point_data[name]).all()
+    for name in ("J", "stress_xx_MPa", "stress_yy_MPa", "stress_xy_MPa", "largest_principal_stress_MPa"):
+        assert np.isfinite(found.cell_data[name][0]).all()
+
+
+def test_ledger_closes_and_adds_up(tmp_path):
+    """Each step's biomass follows the last one's, and in = out + consumed. Mutant: a ledger that skips a step."""
+    out = run(tmp_path, "base", 'growth.end="1 h"', 'output.times=["1 h"]')
+    with (out / "ledger.csv").open() as file:
+        ledger = [{key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
+    assert len(ledger) == 5
+    for row in ledger:
+        for name in ("acceptor", "donor"):
+            parts = [row[f"{name}_{part}_pg_per_m"] for part in ("supplied", "out", "consumed", "stored")]
+            assert abs(parts[0] - sum(parts[1:])) < 1e-8 * parts[0]
+        assert math.isclose(row["biomass_before_pg_per_m"] + row["biomass_made_pg_per_m"], row["biomass_after_pg_per_m"],
+                            rel_tol=1e-10)
+    for first, second in zip(ledger, ledger[1:]):
+        assert first["biomass_after_pg_per_m"] == second["biomass_before_pg_per_m"]
+        assert first["end_h"] == second["start_h"]
+
+
+def test_provenance(tmp_path):
+    """Mutant: a run.json that forgets overrides."""
+    told = json.loads((run(tmp_path, "flow_only", "flow.viscosity_ratio=500") / "run.json").read_text())
+    assert told["status"] == "completed" and told["tables"]["flow"]["viscosity_ratio"] == 500
+    assert told["versions"]["scikit-fem"] and told["wall_time_by_stage_s"]["flow"] > 0 and told["remeshes"] == 0
+
+
+@pytest.mark.parametrize("entry", ['pore.width="50 s"', "aggregate.radius=80 um", "pore.widht=5 um", "growth.end=soon",
+                                   'flow.mean_velocity="1 m/day"', "numerics.preset=best"])
+def test_wrong_input_is_refused_before_anything_is_written(tmp_path, capsys, entry):
+    out = run(tmp_path, "base", entry, status=2)
+    message = capsys.readouterr().err
+    assert entry.split("=")[0].split(".")[1] in message and message.count("\n") == 1 and not out.exists()
+
+
+def test_a_folder_with_other_files_is_left_alone(tmp_path, capsys):
+    """Mutant: clearing whatever is in the output folder."""
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "thesis.tex").write_text("years of work")
+    run(tmp_path, "flow_only", status=2)
+    assert "thesis.tex" in capsys.readouterr().err
+    assert [path.name for path in (tmp_path / "run").iterdir()] == ["thesis.tex"]
+
+
+def test_a_file_in_the_way_is_refused(tmp_path):
+    (tmp_path / "run").write_text("not a folder")
+    with pytest.raises(OutputError, match="folder"):
+        prepare(tmp_path / "run")
+
+
+def test_a_second_run_replaces_the_first(tmp_path):
+    """Mutant: fields of an earlier run left beside the new ones."""
+    run(tmp_path, "base", 'growth.end="0.4 h"')
+    out = run(tmp_path, "flow_only")
+    assert len(list((out / "fields").iterdir())) == 1 and not (out / "ledger.csv").exists()
+
+
+def test_a_failure_says_when_and_where_and_keeps_what_was_done(tmp_path, capsys, monkeypatch):
+    """One iteration is not enough for Newton's method. Mutant: accepting what has not converged."""
+    monkeypatch.setattr(growth, "MOST_ITERATIONS", 1)
+    out = run(tmp_path, "base", 'growth.end="1 h"', status=1)
+    message = capsys.readouterr().err
+    assert "t = 0 h, in growth" in message and "try" in message and message.count("\n") == 1
+    assert len(rows(out)) == 1 and json.loads((out / "run.json").read_text())["status"].startswith("failed")
