@@ -43,7 +43,7 @@ LONGER, SHORTER, SAFETY = 2.0, 0.2, 0.8
 FIRST, SHORTEST = 45 / 3600, 1e-6 / 3600
 #: Settled: a step of LONG (h) changes no concentration by more than this part of the supply; largest change accepted
 #: on the way there, factors by which the step rises and falls on that way, and most steps.
-SETTLED, SETTLING, LONG, FASTER, MOST_STEPS = 1e-9, 0.3, 24.0, 10.0, 1000
+SETTLED, SETTLING, LONG, FASTER, MOST_STEPS = 1e-9, 0.3, 1e6, 100.0, 1000
 
 
 @dataclass(frozen=True, eq=False)

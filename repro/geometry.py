@@ -167,7 +167,9 @@ def _spread(outline: Outline, keep: np.ndarray, sizes: np.ndarray, largest: floa
 
 
 def _resample(outline: Outline, keep: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Points, wall, fixed and origin at parameters t along the nodes ``keep`` (linear between them)."""
+    """Points, wall, fixed and origin at parameters t along the nodes ``keep``: places linear between them, origins too
+    or, between nodes of the seed's arc, on that arc: a straight edge of today's outline was round at t = 0, and what
+    the material remembers makes it round again at the next update."""
     low = np.minimum(t.astype(int), len(keep) - 2)
     part = (t - low)[:, None]
     first, second = keep[low], keep[low + 1]
@@ -175,7 +177,14 @@ def _resample(outline: Outline, keep: np.ndarray, t: np.ndarray) -> tuple[np.nda
     on_node = part[:, 0] == 0
     same = outline.wall[first] == outline.wall[second]
     wall = np.where(on_node | same, outline.wall[first], FREE)
-    return mix[0], wall, on_node & outline.fixed[first], mix[1]
+    return mix[0], wall, on_node & outline.fixed[first], _on_arc(mix[1], outline.origin[first], outline.origin[second])
+
+
+def _on_arc(places: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Places (K, 2) between two points each, moved to their arc around the origin where both are as far from it."""
+    radius, now = np.hypot(*first.T), np.hypot(*places.T)
+    arc = np.isclose(radius, np.hypot(*second.T), rtol=1e-9, atol=0) & (places[:, 1] > 0)
+    return places * np.where(arc, radius / np.where(arc, now, 1.0), 1.0)[:, None]
 
 
 def graded_line(start, end, sources: np.ndarray, sizes: np.ndarray, largest: float) -> np.ndarray:
