@@ -1,1 +1,9 @@
-"""The figures of the paper, one module each, drawn from cached runs."""
+"""The figures of the paper, one module each, drawn from cached runs.
+
+`python -m paper_figures` leaves all of them and a page about them in `paper_figures/out`. Each module named in
+`FIGURES` has TITLE, RUNS (the requests of `paper_figures.runs` that it reads), CLAIMS (ids), and two functions that
+take the folder of each of those runs, or compute them: `draw() -> Figure` and `caption() -> str`.
+"""
+
+#: In the order of the paper; the last one is an addition.
+FIGURES = ("figure_2", "figure_3", "figure_4", "figure_5", "plate_1", "plate_2", "figure_6", "time_series")

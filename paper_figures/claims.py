@@ -1,0 +1,27 @@
+"""The paper's claims that a figure bears on, in a few words; `make claims` judges them by computed numbers."""
+
+STATEMENTS = {
+    "C01": "Base starts at a mean velocity of 2.9 m/d",
+    "C02": "Base has slowed to 1.5 m/d by 19.4 h",
+    "C03": "effluents of Base at 19.4 h: 4.19 K_s acceptor, 6.13 K_s donor",
+    "C04": "about 60 % of the acceptor that enters is used up by then",
+    "C05": "about 7 K_s at the inlet of the meshed part",
+    "C06": "inert biomass stays under 0.5 % of the aggregate",
+    "C07": "the first meshed part is 110 µm long",
+    "C08": "the meshed part is 210 µm long at 19.4 h",
+    "C09": "the biomass doubles in about 3 h",
+    "C10": "growth is fastest upgradient, slowest on the wall downgradient of the centre",
+    "C11": "the asymmetry is a few percent while the aggregate is fully penetrated",
+    "C12": "once the pore is spanned, growth is upgradient only",
+    "C16": "conductivity falls sharply when the aggregate spans the pore",
+    "C17": "permeability can fall by the viscosity ratio, 2000, at most",
+    "C19": "meshing a part of the pore around the aggregate is enough",
+    "C20": "an exponential profile describes the part upstream that is not meshed",
+    "C24": "the moving mesh loses quality slowly",
+    "C25": "the aggregate may expand by up to 2000",
+    "C29": "the aggregate is squeezed between the walls as it grows",
+    "C30": "the acceptor is never used up",
+    "C31": "the shape stays a half-disc until growth is limited or the aggregate squeezed",
+    "C33": "Base is fully penetrated by its substrates",
+    "C35": "fluid flows around the aggregate, and through it once it spans the pore",
+}

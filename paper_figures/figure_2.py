@@ -1,0 +1,117 @@
+"""Figure 2: the pore, its domains and boundaries, drawn with the model's own geometry."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from paper_figures import runs, style
+from repro import Scene, geometry
+from repro.geometry import Outline
+
+TITLE = "Figure 2. The pore, its domains and boundaries"
+RUNS = ()
+CLAIMS = ("C29", "C31")
+
+#: The schematic aggregate is this thick, over the pore's width; real ones grow from the seed to all of it.
+THICKNESS = 0.6
+
+
+@style.styled
+def draw() -> Figure:
+    """The pore to scale, the aggregate closer, and how a thin layer of fluid closes."""
+    scene = runs.BASE.load()
+    made = style.figure(4.1)
+    panels = made.subplot_mosaic([["pore", "pore"], ["domains", "closing"]], height_ratios=[1, 2.4],
+                                 width_ratios=[1.45, 1])
+    outline = geometry.seed(THICKNESS * scene.pore.width, 3.0)
+    _pore(panels["pore"], scene, outline)
+    _domains(panels["domains"], scene, outline)
+    _closing(panels["closing"], scene)
+    style.number_panels(*panels.values())
+    return made
+
+
+def _pore(axes: Axes, scene: Scene, outline: Outline) -> None:
+    """The whole pore."""
+    width, end = scene.pore.width, scene.pore.length / 2
+    style.channel(axes, (-end, end), width, 4)
+    style.fluid(axes, (-end, end), width)
+    style.aggregate(axes, outline.points)
+    axes.set(title="the pore to scale", ylim=(-4, 2 * width), xlim=(-1.1 * end, 1.1 * end))
+    axes.set_axis_off()
+    for x, name, side in ((-end, r"$\Gamma_\mathrm{in}$", "right"), (end, r"$\Gamma_\mathrm{out}$", "left")):
+        axes.plot([x, x], [0, width], color=style.BLUE, linewidth=1.6)
+        axes.text(x + np.sign(x) * 5, width / 2, name, ha=side, va="center")
+    inflow(axes, (-end, end), width, 0.1 * end)
+    style.dimension(axes, (-end, 1.4 * width), (end, 1.4 * width), f"$L_\\mathrm{{pore}}$ = {2 * end:g} µm")
+    style.dimension(axes, (0.5 * end, 0), (0.5 * end, width), f"$W_\\mathrm{{pore}}$ = {width:g} µm")
+
+
+def inflow(axes: Axes, ends: tuple[float, float], width: float, length: float) -> None:
+    """Arrows of the parabolic velocity at the inlet, the longest one `length` um."""
+    for y in np.linspace(0, width, 7)[1:-1]:
+        tip = ends[0] + 4 * length * y * (width - y) / width**2
+        axes.annotate("", (tip, y), (ends[0], y), arrowprops={"arrowstyle": "-|>", "color": style.BLUE, "shrinkA": 0,
+                                                              "shrinkB": 0, "mutation_scale": 5, "linewidth": 0.7})
+
+
+def _domains(axes: Axes, scene: Scene, outline: Outline) -> None:
+    """Domains and boundaries around the aggregate, with the point that stays in place."""
+    width, reach = scene.pore.width, 1.5 * outline.thickness
+    style.channel(axes, (-reach, reach), width, 2)
+    style.fluid(axes, (-reach, reach), width)
+    style.aggregate(axes, outline.points)
+    axes.plot(*outline.points[outline.wall == geometry.BOTTOM].T, color=style.RED, linewidth=2.4, clip_on=False)
+    axes.plot(*outline.points[outline.fixed].T, "o", color=style.BLACK, markersize=4, clip_on=False, zorder=5)
+    axes.set_title("domains and boundaries")
+    radius = outline.thickness
+    style.dimension(axes, (0, 0.02 * radius), (0, radius), r"$R_\mathrm{aggregate}$")
+    for x, y, text in ((-0.45, 0.42, r"$\Omega_B$"), (-1.1, 1.2, r"$\Omega_F$"), (1.05, 0.72, r"$\Gamma_{B-F}$"),
+                       (1.2, 1.5, r"$\Gamma_w$"), (1.2, 0.1, r"$\Gamma_w$"), (0.55, 0.12, r"$\Gamma_{B-w}$"),
+                       (-0.35, 0.12, "fixed point")):
+        axes.text(x * radius, y * radius, text, ha="center", va="center")
+
+
+def _closing(axes: Axes, scene: Scene) -> None:
+    """An aggregate on the opposite wall: the nodes that `closing_nodes` joins to it, and the least gap allowed."""
+    width, film, angle = scene.pore.width, scene.growth.minimum_film, scene.growth.minimum_contact_angle
+    outline = flattened(width)
+    joins = geometry.closing_nodes(outline, width, film, angle) == geometry.TOP
+    line = outline.points[outline.wall == geometry.TOP, 0].max()
+    steps = np.array([0, film / np.tan(angle), 3 * film / np.tan(angle)])
+    low, high = (line - 3, line + 17), (width - 9.5, width + 2.5)
+    style.plane(axes, low, high)
+    axes.axhspan(width, high[1], color=style.WALL, linewidth=0)
+    style.fluid(axes, low, width)
+    style.aggregate(axes, outline.points)
+    axes.plot(line + steps, width - np.minimum(film, np.tan(angle) * steps), "--", color=style.BLUE)
+    right = joins & (outline.points[:, 0] > 0)
+    axes.plot(*outline.points[right].T, "o", color=style.RED, markersize=3.5)
+    axes.plot(line, width, "o", color=style.BLACK, markersize=4)
+    axes.set_title("contact with the other wall")
+    axes.text(line - 2.5, width - 3, "these nodes join the wall", color=style.RED, va="center")
+    axes.text(line - 2.5, width - 6.5, f"least gap: {film:g} µm,\n{np.degrees(angle):.1f}° at the contact", va="center",
+              color=style.BLUE)
+
+
+def flattened(width: float) -> Outline:
+    """A half-disc a little thicker than the pore is wide, cut off by the opposite wall."""
+    whole = geometry.seed(1.02 * width, 4.0)
+    beyond = whole.points[:, 1] >= width
+    points = np.column_stack([whole.points[:, 0], np.minimum(whole.points[:, 1], width)])
+    return Outline(points, np.where(beyond, geometry.TOP, whole.wall), whole.fixed, points)
+
+
+def caption() -> str:
+    """What is seen, with the model's dimensions."""
+    scene = runs.BASE.load()
+    film, angle = scene.growth.minimum_film, np.degrees(scene.growth.minimum_contact_angle)
+    return (f"Drawn by the code that the model uses. (a) A pore {scene.pore.length:g} µm long and "
+            f"{scene.pore.width:g} µm wide (Base) with an aggregate on its lower wall; water enters on the left with a "
+            "parabolic velocity. (b) Fluid Ω_F and biomass Ω_B, their interface Γ_B-F, the walls Γ_w, and the contact "
+            "surface Γ_B-w (red), on which the aggregate slides; its middle, the origin, stays in place. The half-disc "
+            f"shown is {THICKNESS * scene.pore.width:g} µm thick, the seed of the runs {scene.aggregate.radius:g} µm. "
+            f"(c) On the opposite wall: fluid thinner than {film:g} µm, or than a wedge of {angle:.1f}° beside the "
+            "contact (dashed), closes; the nodes in red join the wall next.")

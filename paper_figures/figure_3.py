@@ -1,0 +1,87 @@
+"""Figure 3: what is meshed of the pore and the conditions on each boundary, drawn with the model's own geometry."""
+
+from __future__ import annotations
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from paper_figures import runs, style
+from paper_figures.figure_2 import THICKNESS, inflow
+from repro import Scene, geometry
+from repro.geometry import Outline
+
+TITLE = "Figure 3. Conditions at the ends of the pore and of its meshed part"
+RUNS = ()
+CLAIMS = ("C07", "C08", "C19", "C20")
+
+Ends = tuple[float, float]
+
+
+@style.styled
+def draw() -> Figure:
+    """The pore with its meshed part, and that part closer."""
+    scene = runs.BASE.load()
+    outline = geometry.seed(THICKNESS * scene.pore.width, 3.0)
+    ends = geometry.meshed_extent(outline, scene.pore.width, scene.pore.length)
+    made = style.figure(4.0)
+    whole, part = made.subplots(2, 1, height_ratios=[1, 2.6])
+    _whole(whole, scene, outline, ends)
+    _part(part, scene, outline, ends)
+    style.number_panels(whole, part)
+    return made
+
+
+def _whole(axes: Axes, scene: Scene, outline: Outline, ends: Ends) -> None:
+    """The whole pore: what is known in closed form outside the meshed part."""
+    width, end = scene.pore.width, scene.pore.length / 2
+    style.channel(axes, (-end, end), width, 4)
+    style.aggregate(axes, outline.points, zorder=2)
+    axes.add_patch(Rectangle((ends[0], 0), ends[1] - ends[0], width, facecolor=style.FLUID, edgecolor=style.BLUE,
+                             linewidth=1.2, zorder=1))
+    inflow(axes, (-end, end), width, 0.1 * end)
+    upstream = r"$C_\mathrm{supply} - C \propto e^{\,u_\mathrm{ave} x / D}$  (26)"
+    for x, text in (((ends[0] - end) / 2 + 0.04 * end, upstream), ((ends[1] + end) / 2, "$C$ constant  (12)")):
+        axes.text(x, width / 2, text + "\nPoiseuille flow", ha="center", va="center")
+    axes.set(title="the pore to scale; its meshed part in blue", yticks=[0, width])
+
+
+def _part(axes: Axes, scene: Scene, outline: Outline, ends: Ends) -> None:
+    """The meshed part with the conditions on its boundaries."""
+    width = scene.pore.width
+    style.channel(axes, ends, width, 2)
+    style.fluid(axes, ends, width)
+    style.aggregate(axes, outline.points)
+    axes.plot(*outline.points[outline.wall == geometry.BOTTOM].T, color=style.RED, linewidth=2.4, clip_on=False)
+    inflow(axes, ends, width, 0.12 * ends[1])
+    axes.set(title="the meshed part and its conditions", ylim=(-0.24 * width, 1.24 * width), yticks=[0, width])
+    for side, start in ((0, outline.upstream), (1, outline.downstream)):
+        style.dimension(axes, (start, 0.12 * width), (ends[side], 0.12 * width), f"{abs(ends[side] - start):g} µm")
+    _conditions(axes, ends, width, outline.thickness)
+
+
+def _conditions(axes: Axes, ends: Ends, width: float, radius: float) -> None:
+    """The text on each boundary."""
+    inlet = "inlet: $u_x$ parabolic, $u_y = 0$\n$u_x C - D\\,\\partial C/\\partial x = u_x C_\\mathrm{supply}$  (11)"
+    outlet = "outlet: $\\partial u/\\partial x = 0$, mean $\\varphi = 0$\n$\\partial C/\\partial x = 0$  (12)"
+    axes.text(0.84 * ends[0], 0.83 * width, inlet, ha="left", va="center")
+    axes.text(0.98 * ends[1], 0.83 * width, outlet, ha="right", va="center")
+    axes.text(0, 1.1 * width, "walls: $u = 0$, $\\partial C/\\partial y = 0$  (13)", ha="center", va="bottom")
+    axes.text(0, 0.55 * radius, "biomass:\n$J = \\theta$  (24)", ha="center", va="center")
+    axes.text(0, -0.1 * width, "contact with the wall: slides without friction, never leaves it, its middle stays",
+              ha="center", va="top", color=style.RED)
+    axes.text(0, 0.66 * width, "interface: no forces on the biomass", ha="center", va="center", color=style.RIM)
+
+
+def caption() -> str:
+    """What is seen, with the extents that the model chooses."""
+    scene = runs.BASE.load()
+    width, length = scene.pore.width, scene.pore.length
+    grown = geometry.meshed_extent(geometry.seed(THICKNESS * width), width, length)
+    seed = geometry.meshed_extent(geometry.seed(scene.aggregate.radius), width, length)
+    return (f"Drawn by the code that the model uses. (a) Of the pore's {length:g} µm only the part around the "
+            "aggregate is meshed: outside it the flow is that between two plates, substrate upstream follows (26) and "
+            "does not change downstream. (b) The conditions on the boundaries of that part; inlet and outlet take over "
+            "those of the pore. A new mesh reaches ten times the aggregate's thickness or 1.5 pore widths from it, "
+            f"whichever is less: {grown[1] - grown[0]:g} µm in all around the half-disc shown, {THICKNESS * width:g} "
+            f"µm thick, and {seed[1] - seed[0]:g} µm around the seed.")

@@ -1,0 +1,136 @@
+"""What a run has left, read back: fields of one time, time series, and the last step. Lengths in um, times in h."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from xml.etree import ElementTree
+
+import meshio
+import numpy as np
+from matplotlib.tri import Triangulation
+
+from repro.reprojection import interpolate
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Fields of one time: points (N, 2), triangles (T, 3), biomass (T,) True in the aggregate; nodes, cells by name."""
+
+    time: float
+    points: np.ndarray
+    triangles: np.ndarray
+    biomass: np.ndarray
+    nodes: dict[str, np.ndarray]
+    cells: dict[str, np.ndarray]
+
+    @cached_property
+    def whole(self) -> Triangulation:
+        """Fluid and aggregate for matplotlib."""
+        return Triangulation(*self.points.T, self.triangles)
+
+    @cached_property
+    def aggregate(self) -> Triangulation:
+        """The aggregate alone for matplotlib, in the same numbering of nodes."""
+        return Triangulation(*self.points.T, self.triangles[self.biomass])
+
+    @cached_property
+    def body(self) -> np.ndarray:
+        """Nodes of the aggregate, its boundary included."""
+        return np.unique(self.triangles[self.biomass])
+
+    @cached_property
+    def rim(self) -> np.ndarray:
+        """(M, 2) boundary of the aggregate, counterclockwise."""
+        return self.points[loop(self.triangles[self.biomass])]
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """x of inlet and outlet of the meshed part."""
+        return float(self.points[:, 0].min()), float(self.points[:, 0].max())
+
+    @property
+    def width(self) -> float:
+        """Distance between the walls."""
+        return float(self.points[:, 1].max())
+
+    def at(self, name: str, where: np.ndarray) -> np.ndarray:
+        """A nodal vector field, its first two components (K, 2), at points (K, 2) of the mesh."""
+        return interpolate(self.points, self.triangles, self.nodes[name][:, :2], where)
+
+    def carried(self, name: str, end: int) -> float:
+        """Flow-weighted mean of a nodal field over the inlet (end 0) or the outlet (1), both linear between nodes."""
+        nodes = np.flatnonzero(self.points[:, 0] == self.ends[end])
+        nodes = nodes[np.argsort(self.points[nodes, 1])]
+        u, field = self.nodes["velocity_m_per_d"][nodes, 0], self.nodes[name][nodes]
+        step = np.diff(self.points[nodes, 1])
+        products = (2 * u[1:] * field[1:] + 2 * u[:-1] * field[:-1] + u[1:] * field[:-1] + u[:-1] * field[1:]) / 6
+        return float(step @ products / (step @ (u[1:] + u[:-1]) / 2))
+
+
+def loop(triangles: np.ndarray) -> np.ndarray:
+    """Nodes along the boundary of one simply connected patch of counterclockwise triangles (T, 3)."""
+    edges = [(int(t[i]), int(t[(i + 1) % 3])) for t in triangles for i in range(3)]
+    inner = set(edges)
+    after = {a: b for a, b in edges if (b, a) not in inner}
+    found = [min(after)]
+    while after[found[-1]] != found[0]:
+        found.append(after[found[-1]])
+    return np.array(found)
+
+
+def times(folder: Path, kind: str = "fields") -> list[tuple[float, Path]]:
+    """(time, file) of the fields of a run; kind: "fields", or "before_expansion" (grown, not yet expanded)."""
+    root = ElementTree.parse(folder / f"{kind}.pvd").getroot()
+    return [(float(entry.get("timestep")), folder / entry.get("file")) for entry in root.iter("DataSet")]
+
+
+def read(time: float, path: Path) -> State:
+    """One file of fields."""
+    content = meshio.read(path)
+    cells = {name: values[0] for name, values in content.cell_data.items()}
+    return State(time, content.points[:, :2], content.cells_dict["triangle"], cells["region"] > 0.5,
+                 dict(content.point_data), cells)
+
+
+def first(folder: Path) -> State:
+    """The fields at t = 0."""
+    return read(*times(folder)[0])
+
+
+def last(folder: Path, kind: str = "fields") -> State:
+    """The fields at the end of a run."""
+    return read(*times(folder, kind)[-1])
+
+
+def every(folder: Path, hours: float) -> list[State]:
+    """The fields at the multiples of some hours, t = 0 first."""
+    return [read(time, path) for time, path in times(folder) if abs(time / hours - round(time / hours)) < 1e-9]
+
+
+def series(folder: Path) -> dict[str, np.ndarray]:
+    """Columns of `timeseries.csv`, not-a-number where a field is empty."""
+    return _columns(folder / "timeseries.csv")
+
+
+def row(folder: Path, time: float) -> dict[str, float]:
+    """The row of `timeseries.csv` at a time. Raises LookupError where there is none."""
+    table = series(folder)
+    found = np.flatnonzero(np.abs(table["time_h"] - time) < 1e-6)
+    if len(found) == 0:
+        raise LookupError(f"{folder}: timeseries.csv has no row at t = {time:g} h")
+    return {name: float(column[found[0]]) for name, column in table.items()}
+
+
+def last_step(folder: Path) -> tuple[float, float]:
+    """Start and end of the last shape update: the geometry before it was shaped at the start."""
+    table = _columns(folder / "ledger.csv")
+    return float(table["start_h"][-1]), float(table["end_h"][-1])
+
+
+def _columns(path: Path) -> dict[str, np.ndarray]:
+    with path.open(newline="", encoding="utf-8") as lines:
+        rows = list(csv.DictReader(lines))
+    return {name: np.array([float(r[name] or "nan") for r in rows]) for name in rows[0]}

@@ -1,0 +1,105 @@
+"""How the figures look: sizes of a printed page, one font, colours that the colour-blind can tell apart, units."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patches import Polygon, Rectangle
+
+#: Width of the journal's page, in.
+PAGE = 6.9
+RESOLUTION = 250
+LAYOUT_PASSES = 2
+
+#: Okabe and Ito's colours by what they stand for.
+BLUE, ORANGE, GREEN, RED, SKY, PURPLE, BLACK = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7",
+                                                "#000000")
+FLUID, BIOMASS, RIM, WALL, FAINT = "#E6F1F9", "#F3D08B", "#7A4A00", "#555555", "#9A9A9A"
+MAP = "viridis"
+
+X_LABEL, Y_LABEL = "x (µm)", "y (µm)"
+
+RULES = {
+    "font.family": "DejaVu Sans", "font.size": 8, "axes.titlesize": 8, "axes.labelsize": 8, "legend.fontsize": 7.5,
+    "xtick.labelsize": 7.5, "ytick.labelsize": 7.5, "axes.linewidth": 0.6, "lines.linewidth": 1.3,
+    "xtick.major.width": 0.6, "ytick.major.width": 0.6, "axes.titlelocation": "left", "legend.frameon": False,
+    "mathtext.fontset": "dejavusans", "pdf.fonttype": 42, "savefig.dpi": RESOLUTION, "figure.dpi": 100,
+}
+
+
+def styled(draw: Callable) -> Callable:
+    """Draw, or save, by these rules and leave matplotlib's own settings as they were."""
+    @wraps(draw)
+    def within(*arguments, **keywords):
+        with matplotlib.rc_context(RULES):
+            return draw(*arguments, **keywords)
+    return within
+
+
+def figure(height: float, width: float = PAGE) -> Figure:
+    """An empty figure (in) whose parts are laid out not to overlap."""
+    made = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(made)
+    return made
+
+
+def lay_out(made: Figure) -> None:
+    """Place the parts for good; one pass does not yet see what equal axes leave free."""
+    for _ in range(LAYOUT_PASSES):
+        made.get_layout_engine().execute(made)
+    made.set_layout_engine("none")
+
+
+@styled
+def save(made: Figure, folder: Path, name: str) -> None:
+    """Write `name`.pdf and `name`.png, the same bytes each time; laid out once for both."""
+    folder.mkdir(parents=True, exist_ok=True)
+    lay_out(made)
+    made.savefig(folder / f"{name}.pdf", metadata={"CreationDate": None})
+    made.savefig(folder / f"{name}.png", metadata={"Software": None})
+
+
+def plane(axes: Axes, x: tuple[float, float], y: tuple[float, float]) -> None:
+    """Equal axes in um."""
+    axes.set(xlim=x, ylim=y, aspect="equal", xlabel=X_LABEL, ylabel=Y_LABEL)
+
+
+def channel(axes: Axes, ends: tuple[float, float], width: float, margin: float) -> None:
+    """The plane of a channel with its two walls, drawn `margin` um thick."""
+    plane(axes, ends, (-margin, width + margin))
+    for low in (-margin, width):
+        axes.add_patch(Rectangle((ends[0], low), ends[1] - ends[0], margin, facecolor=WALL, linewidth=0))
+
+
+def fluid(axes: Axes, ends: tuple[float, float], width: float) -> None:
+    """Fluid from wall to wall."""
+    axes.add_patch(Rectangle((ends[0], 0), ends[1] - ends[0], width, facecolor=FLUID, linewidth=0, zorder=0))
+
+
+def aggregate(axes: Axes, points: np.ndarray, filled: bool = True, **look) -> None:
+    """The outline of an aggregate (M, 2), filled with its colour or not."""
+    chosen = {"edgecolor": RIM, "linewidth": 1.2, "facecolor": BIOMASS if filled else "none", **look}
+    axes.add_patch(Polygon(points, closed=True, **chosen))
+
+
+def number_panels(*panels: Axes) -> None:
+    """(a), (b), ... before the titles."""
+    for letter, axes in zip("abcdefgh", panels):
+        axes.set_title(f"({letter}) {axes.get_title(loc='left')}".rstrip(), loc="left")
+
+
+def dimension(axes: Axes, start: tuple[float, float], end: tuple[float, float], text: str) -> None:
+    """A double arrow with its length said: above a horizontal one, to the right of a vertical one."""
+    axes.annotate("", end, start, arrowprops={"arrowstyle": "<|-|>", "color": BLACK, "shrinkA": 0, "shrinkB": 0,
+                                              "mutation_scale": 6, "linewidth": 0.7})
+    upright = start[0] == end[0]
+    middle = (0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1]))
+    axes.annotate(text, middle, (3, 0) if upright else (0, 2), textcoords="offset points",
+                  ha="left" if upright else "center", va="center" if upright else "bottom")

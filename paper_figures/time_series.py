@@ -1,0 +1,66 @@
+"""Both runs against time: conductivity, velocity, effluents and size. Not in the paper."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from paper_figures import runs, states, style
+
+TITLE = "Addition. Both runs against time"
+RUNS = (runs.BASE, runs.WIDE)
+CLAIMS = ("C01", "C02", "C03", "C04", "C09", "C16", "C17", "C30")
+
+NAMES, COLOURS = ("Base", "Wide"), (style.BLUE, style.RED)
+
+#: Column, title, unit, and whether its scale is logarithmic, of each panel.
+CURVES = (("conductivity_m_per_d", "hydraulic conductivity of the pore", "m/d", True),
+          ("mean_velocity_m_per_d", "mean velocity", "m/d", False),
+          ("effluent_{}_mg_per_L", "effluent concentrations", "mg/L", False),
+          ("aggregate_area_um2", "area of the aggregate", "µm²", True))
+
+
+@style.styled
+def draw(base: Path | None = None, wide: Path | None = None) -> Figure:
+    """Four panels over one axis of time, a colour a run."""
+    tables = [states.series(folder) for folder in (base or runs.base_run(), wide or runs.wide_run())]
+    made = style.figure(4.6)
+    panels = made.subplots(2, 2, sharex=True).ravel()
+    for axes, (column, title, unit, log) in zip(panels, CURVES):
+        for table, colour in reversed(list(zip(tables, COLOURS))):
+            axes.plot(table["time_h"], table[column.format("acceptor")], color=colour)
+            if "{}" in column:
+                axes.plot(table["time_h"], table[column.format("donor")], color=colour, linestyle="--")
+        axes.set(title=title, ylabel=unit, yscale="log" if log else "linear")
+        if not log:
+            axes.set_ylim(0)
+        for time in _contact_times(tables):
+            axes.axvline(time, color=style.FAINT, linewidth=0.8, linestyle=":")
+        axes.grid(alpha=0.25, linewidth=0.4)
+    for axes in panels[2:]:
+        axes.set(xlabel="time (h)", xlim=(0, None))
+    panels[0].legend(handles=[Line2D([], [], color=c, label=n) for n, c in zip(NAMES, COLOURS)], loc="lower left")
+    panels[2].legend(handles=[Line2D([], [], color=style.BLACK, linestyle=line, label=name) for name, line in
+                              (("acceptor", "-"), ("donor", "--"))], loc="upper right")
+    style.number_panels(*panels)
+    return made
+
+
+def _contact_times(tables: list[dict[str, np.ndarray]]) -> list[float]:
+    """When each run touches the opposite wall, of those that do."""
+    return [float(t["time_h"][np.argmax(t["contact"] > 0)]) for t in tables if (t["contact"] > 0).any()]
+
+
+def caption(base: Path | None = None, wide: Path | None = None) -> str:
+    """What is seen, with first and last values."""
+    tables = [states.series(folder) for folder in (base or runs.base_run(), wide or runs.wide_run())]
+    falls = [t["conductivity_m_per_d"][0] / t["conductivity_m_per_d"][-1] for t in tables]
+    contact = " and ".join(f"{time:g} h" for time in _contact_times(tables))
+    dotted = f" The dotted line marks contact with the opposite wall in Wide, at {contact}." if contact else ""
+    return (f"Base (blue, constant head, to {tables[0]['time_h'][-1]:g} h) and Wide (red, constant mean velocity, to "
+            f"{tables[1]['time_h'][-1]:g} h). (a) Hydraulic conductivity of the whole pore, which falls by a factor of "
+            f"{falls[0]:.3g} in Base and {falls[1]:.3g} in Wide; (b) mean velocity; (c) flow-weighted concentrations "
+            f"of acceptor (full) and donor (dashed) at the outlet; (d) area of the aggregate.{dotted}")

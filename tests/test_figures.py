@@ -1,0 +1,188 @@
+"""The paper's figures: they draw what a run holds, say its numbers, and the page about them is complete."""
+import dataclasses
+import shlex
+from importlib import import_module
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+import paper_figures
+from paper_figures import __main__ as figures
+from paper_figures import claims, overview, page, runs, states, style
+from repro import cli, geometry, load_scene, run
+from repro.scene import scene_hash
+
+MODULES = {name: import_module(f"paper_figures.{name}") for name in paper_figures.FIGURES}
+SHORT = {"base": ['growth.end="0.6 h"', 'output.times=["0.4 h", "0.6 h"]'], "wide": ['growth.end="0.4 h"'],
+         "initial_mesh": []}
+figure_2, figure_3, figure_4, figure_5, figure_6, plate_2 = (
+    MODULES[name] for name in ("figure_2", "figure_3", "figure_4", "figure_5", "figure_6", "plate_2"))
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory):
+    """{scene: folder of a short run}."""
+    folders = {name: tmp_path_factory.mktemp("runs") / name for name in SHORT}
+    for name, folder in folders.items():
+        run(load_scene(name, SHORT[name]), folder)
+    return folders
+
+
+@pytest.fixture
+def quick(short, monkeypatch, tmp_path):
+    """`python -m paper_figures` on the short runs, in coarse pictures, into a temporary folder."""
+    monkeypatch.setattr(runs, "folders", lambda requests: [short[request.scene] for request in requests])
+    monkeypatch.setattr(figures, "OUT", tmp_path / "out")
+    monkeypatch.setattr(figure_6, "EVERY", 0.2)
+    monkeypatch.setattr(style, "save", _coarse)
+    return tmp_path / "out"
+
+
+def _coarse(made, folder, name):
+    """A small PNG in place of what is printed."""
+    folder.mkdir(exist_ok=True)
+    made.savefig(folder / f"{name}.png", dpi=40)
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_a_figure_says_what_it_is(name):
+    module = MODULES[name]
+    kind, _, number = name.partition("_")
+    assert module.TITLE.startswith(f"{kind.title()} {number}. " if kind in ("figure", "plate") else "Addition. ")
+    assert module.CLAIMS and set(module.CLAIMS) <= set(claims.STATEMENTS)
+    assert callable(module.draw) and callable(module.caption)
+
+
+def test_every_figure_of_the_folder_is_drawn():
+    there = {path.stem for pattern in ("figure_*.py", "plate_*.py") for path in figures.OUT.parent.glob(pattern)}
+    assert there == set(paper_figures.FIGURES) - {"time_series"}
+
+
+@pytest.mark.parametrize("request_", [runs.BASE, runs.WIDE, runs.INITIAL_MESH], ids=lambda request: request.scene)
+def test_the_command_told_is_the_run_that_is_drawn(request_):
+    chosen = cli._parser().parse_args(shlex.split(request_.command())[1:])
+    assert scene_hash(load_scene(chosen.scene, chosen.set)) == scene_hash(request_.load())
+
+
+def test_everything_is_drawn_and_told(quick, capsys):
+    figures.main()
+    told = capsys.readouterr().out.splitlines()
+    assert [line.partition(":")[0] for line in told[1:-1]] == list(MODULES)
+    assert {p.name for p in quick.iterdir()} == {f"{n}.png" for n in MODULES} | {"index.html"}
+    root = ElementTree.fromstring((quick / "index.html").read_text(encoding="utf-8"))
+    assert [image.get("src") for image in root.iter("img")] == [f"{name}.png" for name in MODULES]
+    text = " ".join(root.itertext())
+    assert all(module.TITLE in text for module in MODULES.values())
+    assert all(request.command() in text for module in MODULES.values() for request in module.RUNS)
+    assert "Figure 1" in text and "base: completed" in text
+    assert all(element.get(key, "").partition(":")[0] not in ("http", "https") for element in root.iter()
+               for key in ("src", "href"))
+
+
+def test_a_picture_is_the_same_bytes_each_time(short, tmp_path):
+    for folder in (tmp_path / "one", tmp_path / "two"):
+        style.save(figure_4.draw(short["initial_mesh"]), folder, "figure_4")
+    for name in ("figure_4.pdf", "figure_4.png"):
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
+    assert b"CreationDate" not in (tmp_path / "one" / "figure_4.pdf").read_bytes()
+
+
+def test_the_page_escapes_text():
+    hostile = "1 < 2 & \"3\" > '0' <script>"
+    entry = page.Entry("figure_9", hostile, hostile, (hostile,), ("C01",))
+    root = ElementTree.fromstring(page.page([entry], [hostile]))
+    section = root.find("body/section")
+    assert section.get("id") == "figure_9" and section.find("h2").text == hostile
+    assert section.find("pre").text == hostile and section.find("p").text.startswith(hostile)
+    assert root.find(".//script") is None
+
+
+def test_the_schematics_follow_the_model(monkeypatch):
+    assert "210 µm in all" in figure_3.caption() and "110 µm around the seed" in figure_3.caption()
+    monkeypatch.setattr(geometry, "meshed_extent", lambda outline, width, length: (-61.0, 62.0))
+    assert "123 µm in all" in figure_3.caption()
+    texts = {text.get_text() for axes in figure_3.draw().axes for text in axes.texts}
+    assert {"31 µm", "32 µm"} <= texts
+    assert "16.7°" in figure_2.caption()
+
+
+def test_the_flattened_aggregate_closes_beside_its_contact():
+    outline = figure_2.flattened(50.0)
+    joins = geometry.closing_nodes(outline, 50.0, 2.0, np.radians(16.7)) == geometry.TOP
+    assert outline.points[:, 1].max() == 50
+    gaps = 50 - outline.points[joins, 1]
+    assert 0 < np.count_nonzero(joins) and gaps.max() < 2 and (outline.wall[joins] == geometry.FREE).all()
+
+
+def test_figure_4_shows_every_triangle(short):
+    state = states.first(short["initial_mesh"])
+    lines = figure_4.draw(short["initial_mesh"]).axes[0].lines
+    drawn = np.concatenate([np.column_stack(line.get_data()) for line in lines])
+    assert {tuple(p) for p in state.points} <= {tuple(p) for p in drawn if np.isfinite(p).all()}
+    assert f"{len(state.triangles)} triangles" in figure_4.caption(short["initial_mesh"])
+
+
+def test_a_state_agrees_with_the_time_series(short):
+    state, row = states.last(short["base"]), states.row(short["base"], 0.6)
+    assert geometry.polygon_area(state.rim) == pytest.approx(row["aggregate_area_um2"], rel=1e-12)
+    assert np.ptp(state.ends) == pytest.approx(row["meshed_length_um"], rel=1e-12)
+    for name in ("acceptor", "donor"):
+        for end, place in enumerate(("inlet", "effluent")):
+            assert state.carried(f"{name}_mg_per_L", end) == pytest.approx(row[f"{place}_{name}_mg_per_L"], rel=2e-4)
+
+
+def test_a_missing_time_is_told(short):
+    with pytest.raises(LookupError, match="0.5 h"):
+        states.row(short["base"], 0.5)
+
+
+def test_the_captions_read_the_run(short, tmp_path):
+    folder = tmp_path / "changed"
+    folder.mkdir()
+    for path in short["base"].iterdir():
+        (folder / path.name).symlink_to(path)
+    velocity = repr(states.row(short["base"], 0.6)["mean_velocity_m_per_d"])
+    table = (folder / "timeseries.csv").read_text(encoding="utf-8")
+    (folder / "timeseries.csv").unlink()
+    (folder / "timeseries.csv").write_text(table.replace(velocity, "9.87"), encoding="utf-8")
+    assert "9.87 m/d" in figure_5.caption(folder) and "9.87 m/d" not in figure_5.caption(short["base"])
+
+
+def test_most_of_the_flow_goes_around_the_aggregate(short):
+    state = states.last(short["base"], "before_expansion")
+    assert 0 < figure_5.share_through(state) < 1e-3
+
+
+def test_streamlines_part_the_flow(short):
+    x, y, share = overview.stream(states.first(short["base"]))
+    assert (share[0] == 0).all() and (share[-1] == 1).all()
+    parabola = 3 * (y / 50) ** 2 - 2 * (y / 50) ** 3
+    assert np.abs(share[:, 0] - parabola).max() < 5e-3
+
+
+def test_displacements_survive_a_new_mesh(short):
+    before, after = states.last(short["base"], "before_expansion"), states.last(short["base"])
+    assert plate_2.same_mesh(before, after)
+    order = np.random.default_rng(1).permutation(len(after.points))
+    place = np.argsort(order)
+    remade = dataclasses.replace(after, points=after.points[order], triangles=place[after.triangles],
+                                 nodes={name: values[order] for name, values in after.nodes.items()})
+    assert not plate_2.same_mesh(before, remade)
+    nodes, moved = plate_2.displaced(before, remade)
+    assert (nodes == before.body).all() and np.abs(moved - after.points[nodes]).max() < 1e-9
+    assert np.abs(moved - before.points[nodes]).max() > 0.01
+
+
+def test_the_upstream_share_of_new_area(short, monkeypatch):
+    monkeypatch.setattr(figure_6, "EVERY", 0.2)
+    assert figure_6.upstream_share(short["wide"]) == pytest.approx(0.5, abs=0.01)
+
+
+def test_the_picture_of_the_readme(short, monkeypatch):
+    monkeypatch.setattr(figure_6, "EVERY", 0.2)
+    assert len(overview.draw(short["base"], short["wide"]).axes) == 4
+    content = Path(overview.TARGET).read_bytes()
+    assert content[:8] == b"\x89PNG\r\n\x1a\n" and len(content) < 200_000
+    assert abs(int.from_bytes(content[16:20], "big") - overview.PIXELS_WIDE) <= 1
