@@ -56,7 +56,8 @@ def cached_run(scene: Scene, folder: Path) -> Path:
 def cached_runs(scenes: Iterable[Scene], folder: Path) -> list[Path]:
     """The results folders of several scenes, the missing ones computed side by side, a process a core."""
     scenes = list(scenes)
-    missing = list({run_folder(s, folder): s for s in scenes if not (run_folder(s, folder) / "run.json").exists()}.values())
+    wanted = {run_folder(scene, folder): scene for scene in scenes}
+    missing = [scene for target, scene in wanted.items() if not (target / "run.json").exists()]
     if len(missing) > 1:
         with ProcessPoolExecutor(max_workers=os.cpu_count()) as pool:
             list(pool.map(cached_run, missing, [folder] * len(missing)))

@@ -1,6 +1,6 @@
 """Flow (2.1, 3.2): steady Stokes flow with a viscosity jump between fluid and biomass.
 
-(1) ``(nu/g) lap u - grad phi = 0`` and (2) ``div u = 0``, with nu = nu_water in the fluid, lambda nu_water in the biomass;
+(1) ``(nu/g) lap u - grad phi = 0`` and (2) ``div u = 0``, with nu = nu_water in the fluid, lambda nu_water in biomass;
 (3) parabolic profile at the inlet; (4) ``du/dx = 0`` and mean head zero at the outlet; (5) u = 0 on the walls. In the
 weak form, with the velocity scaled to mean 1 um/h and p = phi g / nu_water,
 
@@ -137,7 +137,7 @@ def _viscous(found: Forms, viscosity: np.ndarray, interface: str) -> np.ndarray:
 
 
 def _solve_with_boundaries(elements, mesh: PoreMesh, found: Forms, interface: str) -> np.ndarray:
-    """Solve with u = 0 on the walls, the parabola at the inlet, and u_y = 0 at the outlet in the traction form [E10]."""
+    """Solve with u = 0 on the walls, the parabola at the inlet, u_y = 0 at the outlet in the traction form [E10]."""
     where = found.basis.doflocs
 
     def make():
@@ -168,8 +168,12 @@ def inlet_profile(mesh: PoreMesh, heights: np.ndarray) -> np.ndarray:
 
 def _loss(mesh: PoreMesh, pressure: np.ndarray) -> float:
     """Mean pressure at the inlet less the mean at the outlet (6)."""
-    ends = [np.trapezoid(pressure[nodes], mesh.points[nodes, 1]) / mesh.width for nodes in (mesh.inlet, mesh.outlet)]
-    return float(ends[0] - ends[1])
+    return mean_over(mesh, mesh.inlet, pressure) - mean_over(mesh, mesh.outlet, pressure)
+
+
+def mean_over(mesh: PoreMesh, nodes: np.ndarray, field: np.ndarray) -> float:
+    """Mean of a nodal field over the inlet or the outlet."""
+    return float(np.trapezoid(field[nodes], mesh.points[nodes, 1]) / mesh.width)
 
 
 def scaled(unit: UnitFlow, mesh: PoreMesh, length: float, viscosity: float, *, head: float | None,
@@ -181,6 +185,6 @@ def scaled(unit: UnitFlow, mesh: PoreMesh, length: float, viscosity: float, *, h
     whole = unit.loss + poiseuille_loss(length - (mesh.ends[1] - mesh.ends[0]), mesh.width)
     speed = head / (viscosity * whole) if mean_velocity is None else mean_velocity
     scale = viscosity * speed
-    head_field = scale * (unit.pressure - np.trapezoid(unit.pressure[mesh.outlet], mesh.points[mesh.outlet, 1]) / mesh.width)
+    head_field = scale * (unit.pressure - mean_over(mesh, mesh.outlet, unit.pressure))
     return Flow(speed, speed * unit.velocity, head_field, speed * unit.correction, scale * unit.loss, scale * whole,
                 length / (viscosity * whole))

@@ -1,23 +1,22 @@
 """The paper's transient scheme (3.3): substrates and biomass by a predictor-corrector modified Gear method.
 
-Every quantity y of (7)-(10), dy/dt = f, advances by the second-order Gear (BDF2) formula of variable step. With r the
-ratio of a step h to the one before it,
+Every quantity y of (7)-(10), dy/dt = f, advances by Gear's second-order formula (BDF2). With r the ratio of a step h
+to the one before it (r = 0, backward Euler, in the first step),
 
     predictor   y* = y + r dy                        dy the last increment
     corrector   dy_new = carry dy + weight h f_new   carry = r^2 / (1 + 2 r), weight = (1 + r) / (1 + 2 r)
 
-and r = 0, that is backward Euler, in the first step. For C_A and C_D the corrector is one linear system each (7), (8):
+For C_A and C_D, (7) and (8), the corrector is one linear system each,
 
     M (C - C_n - carry dC_n) / (weight h) + L C - b + m X_A (q(C*) + q'(C*) (C - C*)) = 0
 
-with M the lumped area, L and b of :mod:`repro.transport`, m the lumped area of biomass, X_A predicted. The uptake q is
-linearised in the species' own concentration; the acceptor sees the predicted donor, the donor the corrected acceptor.
-(9) advances ln X_A and (10) X_I, with the rates at the corrected concentrations: both stay positive. The fluxes are
-integrated by the same formula as the concentrations that they change, so that supplied - out - consumed = stored
-holds to the round-off of the linear solutions. Where the corrector gives a negative concentration, the step is taken
-with backward Euler and the sink C q(C*) / C*, which keeps C >= 0.
+with M the lumped area, L and b of :mod:`repro.transport`, m the lumped area of biomass and X_A predicted. The uptake q
+is linearised in the substrate's own concentration; the acceptor sees the predicted donor, the donor the corrected
+acceptor. (9) advances ln X_A and (10) X_I at the corrected concentrations: both stay positive. Fluxes are integrated by
+the formula of the concentrations that they change, so that supplied - out - consumed = stored to round-off. Where the
+corrector gives a negative concentration, the step is backward Euler's with the sink C q(C*) / C*, which keeps C >= 0.
 
-Steps are controlled by |C - C*| within the aggregate (3.3.2), relative to the largest concentration of the species.
+Steps are controlled by |C - C*| within the aggregate (3.3.2), relative to the substrate's largest concentration.
 """
 
 from __future__ import annotations
@@ -33,23 +32,23 @@ from repro.errors import TransportError
 from repro.timing import timed
 from repro.transport import Concentrations, Operator, Problem, supplied_everywhere
 
-#: Largest accepted |C - C*| in the aggregate over the supply. Errors measured against steps by 3e-6, after 12 min of
-#: settled pores (base, aggregates of 5 to 40 um; wide at 40 h) and of closed pores filled with the supply: at 1e-2
-#: up to 8e-4 of the biomass made, at 1e-3 up to 2.7e-4 of anything, so that 0.1 % is kept with a margin of four.
+#: Largest accepted |C - C*| in the aggregate over the supply. Measured against a tolerance of 3e-6, 12 min from settled
+#: pores (base; a seed of 40 um; wide at 40 h) and from closed ones filled with the supply (seeds of 5 and 40 um), the
+#: largest error in concentrations, biomass made or uptake is 2e-2 at 1e-1, 9e-4 at 1e-2, 3.1e-4 at 1e-3: 0.1 % is kept.
 TOLERANCE = 1e-3
-#: Bounds on the ratio of successive steps, and the part of the step that would just be accepted.
+#: Bounds on the ratio of successive steps, and the part taken of the step that would just be accepted.
 LONGER, SHORTER, SAFETY = 2.0, 0.2, 0.8
-#: The first step, which is of first order, is at most 45 s; a step under 1e-6 s is an error (h).
+#: Longest first step, which is of first order: 45 s keep its error under 2e-4 (720 s: 2e-2). A step under 1e-6 s fails.
 FIRST, SHORTEST = 45 / 3600, 1e-6 / 3600
-#: Settled: a step of LONG (h) changes no concentration by more than this part of the supply; largest change accepted
-#: on the way there, factors by which the step rises and falls on that way, and most steps.
-SETTLED, SETTLING, LONG, FASTER, MOST_STEPS = 1e-9, 0.3, 1e6, 100.0, 1000
+#: Settled: the change over the supply that further steps of LONG (h) would sum up to. On the way there: the largest
+#: change in a step, the factor by which steps rise and fall, and most steps.
+SETTLED, LONG, SETTLING, FASTER, MOST_STEPS = 1e-9, 1e6, 0.3, 10.0, 1000
 
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """A time level: state (4, N) of C_A, C_D (mg/L), the rise of ln X_A since the start and X_I (mg/L); flows (2, 3), of
-    each substrate supplied, out and consumed since the start (um2 mg/L); their increments in the last step; its size (h)."""
+    """State (4, N): C_A, C_D (mg/L), rise of ln X_A since the start, X_I (mg/L); flows (2, 3): each substrate supplied,
+    out and consumed since the start (um2 mg/L); their increments in the last step, and its size (h)."""
 
     state: np.ndarray
     flows: np.ndarray
@@ -72,8 +71,8 @@ class Advance:
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """One substrate's operator, nodes in elimination order: ``matrix`` with empty rows where it is held, the places of
-    its diagonal in ``matrix.data``, and those held rows."""
+    """One substrate's operator, nodes in elimination order: ``matrix`` with zero rows where C is held, the places of
+    its diagonal in ``matrix.data``, and those rows as they were."""
 
     matrix: sp.csc_matrix
     diagonal: np.ndarray
@@ -86,8 +85,8 @@ class Row:
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """What the scheme needs, nodes in elimination order: the substrates' rows; X_A (N,) at the start; watched (N,) nodes
-    of the step control; scale (2, 1) mg/L; living: are F3 and F4 integrated; simultaneous: see :func:`advance`."""
+    """What the scheme needs, nodes in elimination order: watched (N,) nodes of the step control; scale (2, 1) of the
+    concentrations; living: are F3 and F4 integrated; simultaneous: see :func:`advance`."""
 
     problem: Problem
     rows: tuple[Row, Row]
@@ -104,23 +103,24 @@ class System:
 def settle(problem: Problem, active: np.ndarray | None, guess: Concentrations | None) -> Concentrations:
     """Profiles consistent with the biomass after a shape update: the scheme with F3 = F4 = 0 until nothing changes.
 
-    The way there does not matter (3.3.2): backward Euler in steps up to LONG, in each of which no concentration changes
-    by more than SETTLING. Where nothing can enter or leave the pore there is no steady profile: returns the guess unchanged
-    (C_supply everywhere for None). Raises TransportError where the profiles do not come to rest.
+    The way there does not matter (3.3.2): backward Euler in steps that rise to LONG as fast as SETTLING permits. Where
+    nothing can enter or leave the pore no profile is steady: returns the guess unchanged (None: C_supply everywhere).
+    Raises TransportError where the profiles do not come to rest.
     """
     start = supplied_everywhere(problem) if guess is None else guess
     if not any(operator.inflow.any() or len(operator.held) for operator in problem.both):
         return start
     nothing = np.zeros(len(problem.body))
     system, now = _started(problem, nothing if active is None else active, nothing, start, living=False)
-    system, step = replace(system, watched=np.ones(len(nothing), bool)), LONG
+    system = replace(system, watched=np.ones(len(nothing), bool))
+    step, last = LONG, np.inf
     for count in range(1, MOST_STEPS + 1):
         new, change = _accepted(system, now, step, SETTLING, "while the profiles settle", 1 / FASTER)
-        if change <= SETTLED and new.step >= LONG:
+        if new.step >= LONG and change <= SETTLED * (1 - change / last):
             return Concentrations(*_restored(system, new)[:2], count)
-        now, step = _level(new.state), min(FASTER * new.step, LONG)
-    raise TransportError(f"the profiles still change by {change:.2g} of the supply after {MOST_STEPS} steps; "
-                         "try a larger numerics.refinement")
+        now, step, last = _level(new.state), min(FASTER * new.step, LONG), change
+    raise TransportError(f"the profiles still change by {change:.2g} of the supply a step after {MOST_STEPS} steps; "
+                         'try numerics.transport = "quasi_steady"')
 
 
 @timed("transport")
@@ -138,7 +138,7 @@ def advance(problem: Problem, active: np.ndarray, inert: np.ndarray, start: Conc
         step = left / np.ceil(left / step - 1e-9)
         when = f"{duration - left:.6g} h after the start"
         now, size = _accepted(system, now, step, np.inf if fixed_step else tolerance, when, SHORTER)
-        steps.append(now.step)
+        steps.append(float(now.step))
         left -= now.step
         step = fixed_step or now.step * min(LONGER, _factor(tolerance, size))
     stored = (now.state[:2] - before) @ system.total
@@ -157,11 +157,9 @@ def _started(problem: Problem, active, inert, start: Concentrations, living=True
     """The system and its first time level."""
     order, state = problem.nodes, np.stack([start.acceptor, start.donor, np.zeros_like(active), inert])
     largest = np.maximum([operator.supply for operator in problem.both], state[:2].max(axis=1))
-    scale = np.where(largest > 0, largest, 1.0)[:, None]
-    body = problem.body[order]
-    watched = body > 0 if body.any() else body == 0
+    scale, body = np.where(largest > 0, largest, 1.0)[:, None], problem.body[order]
     rows = tuple(_row(operator, order) for operator in problem.both)
-    system = System(problem, rows, body, problem.total[order], active[order], watched, scale, living, simultaneous)
+    system = System(problem, rows, body, problem.total[order], active[order], body > 0, scale, living, simultaneous)
     return system, _level(state[:, order])
 
 
@@ -178,14 +176,11 @@ def _restored(system: System, level: Level) -> np.ndarray:
 
 
 def _row(operator: Operator, order: np.ndarray) -> Row:
-    held = np.zeros(len(order), bool)
-    held[operator.held] = True
-    held = held[order]
+    held = np.isin(order, operator.held)
     matrix = sp.csc_matrix(operator.matrix[order][:, order])
     held_rows = sp.csr_matrix(matrix)[held]
     matrix.data[held[matrix.indices]] = 0.0
-    columns = np.repeat(np.arange(len(order)), np.diff(matrix.indptr))
-    diagonal = np.flatnonzero(matrix.indices == columns)
+    diagonal = np.flatnonzero(matrix.indices == np.repeat(np.arange(len(order)), np.diff(matrix.indptr)))
     return Row(matrix, diagonal, held, held_rows, operator.source[order], operator, operator.outflow[order])
 
 
@@ -209,10 +204,11 @@ def _factor(tolerance: float, size: float) -> float:
 
 
 def _too_short(system: System, new: Level, difference: np.ndarray, when: str) -> TransportError:
-    wrong = new.state[:2] if new.state[:2].min() < 0 else -difference
-    species, node = np.unravel_index(np.argmin(wrong), wrong.shape)
+    negative = new.state[:2].min() < 0
+    wrong = new.state[:2] if negative else -difference * system.watched
+    species, node = divmod(int(np.argmin(wrong)), len(system.body))
     x, y = system.problem.mesh.points[system.problem.nodes[node]]
-    why = "becomes negative" if new.state[:2].min() < 0 else "does not follow its prediction"
+    why = "becomes negative" if negative else "does not follow its prediction"
     return TransportError(f"the {('acceptor', 'donor')[species]} {why} at x = {x:.4g}, y = {y:.4g} um {when}, even in "
                           f"steps of {3600 * SHORTEST:g} s; try a larger numerics.refinement")
 

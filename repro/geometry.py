@@ -106,14 +106,30 @@ def extent_too_short(outline: Outline, ends: tuple[float, float], width: float, 
 def interface_sizes(outline: Outline, width: float, refinement: float, thinnest: float) -> np.ndarray:
     """(M,) wanted element size (um) at each node of the outline.
 
-    A tenth of the aggregate's thickness, a fourteenth of the pore's width, and, as long as the opposite wall is not
-    touched, a tenth of the film of fluid there (films thinner than ``thinnest`` count as that: they close).
+    A tenth of the aggregate's thickness, a fourteenth of the pore's width, and for free nodes that of :func:`film_sizes`.
     """
-    size = np.full(len(outline.points), min(outline.thickness / ACROSS_AGGREGATE, width / ACROSS_PORE))
-    if not (outline.wall == TOP).any():
-        film = np.maximum(width - outline.points[:, 1], thinnest)
-        size = np.where(outline.wall == FREE, np.minimum(size, film / ACROSS_FILM), size)
-    return size / refinement
+    size = np.full(len(outline.points), min(outline.thickness / ACROSS_AGGREGATE, width / ACROSS_PORE) / refinement)
+    return np.where(outline.wall == FREE, np.minimum(size, film_sizes(outline, width, refinement, thinnest)), size)
+
+
+def film_sizes(outline: Outline, width: float, refinement: float, thinnest: float) -> np.ndarray:
+    """(M,) wanted element size (um) in the fluid between each node and the opposite wall, while that is not touched.
+
+    A tenth of its thickness; films thinner than ``thinnest`` count as that: they close.
+    """
+    if (outline.wall == TOP).any():
+        return np.full(len(outline.points), np.inf)
+    return np.maximum(width - outline.points[:, 1], thinnest) / ACROSS_FILM / refinement
+
+
+def size_sources(outline: Outline, width: float, refinement: float, thinnest: float) -> tuple[np.ndarray, np.ndarray]:
+    """Where element sizes are prescribed, (K, 2) um, and how large (K,) um: at the interface nodes and, across the fluid,
+    on the opposite wall, so that a film has elements of one size."""
+    free = outline.wall == FREE
+    near, film = (find(outline, width, refinement, thinnest)[free] for find in (interface_sizes, film_sizes))
+    across = np.column_stack([outline.points[free, 0], np.full(len(near), width)])
+    there = np.isfinite(film)
+    return np.vstack([outline.points[free], across[there]]), np.concatenate([near, film[there]])
 
 
 def graded_size(where: np.ndarray, sources: np.ndarray, sizes: np.ndarray, largest: float) -> np.ndarray:
@@ -231,5 +247,7 @@ def _closing_run(outline: Outline, gap: np.ndarray, line: int, step: int, film: 
     free = np.cumprod(outline.wall[walk] == FREE).astype(bool)
     x = outline.points[:, 0]
     along = np.sign(x[line] - x[line - step]) * (x[walk] - x[line])
-    thin = free & ((gap[walk] < 0) | (gap[walk] < np.minimum(film, slope * along)))
+    other = walk[np.count_nonzero(free)]  # where the free nodes end: on the same wall, the nearer line takes a node
+    nearer = (outline.wall[other] != outline.wall[line]) | (np.abs(x[walk] - x[line]) <= np.abs(x[walk] - x[other]))
+    thin = free & ((nearer & (gap[walk] < 0)) | (gap[walk] < np.minimum(film, slope * along)))
     return walk[: np.flatnonzero(thin)[-1] + 1] if thin.any() else walk[:0]

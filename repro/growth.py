@@ -12,7 +12,8 @@ equilibrium is sought. Without tractions mu_L scales P and nothing else: it is 1
 With A = mu J^(-2/3) and H = F^-T (dJ = J H : dF), first Piola-Kirchhoff stress and tangent are
 
     S = A (F - tr C / 3 H) + P J H
-    dS = A (dF - 2/3 (H : dF) F - 2/3 (F : dF) H + 2/9 tr C (H : dF) H + tr C / 3 H dF^T H) + P J ((H : dF) H - H dF^T H)
+    dS = A (dF - 2/3 (H : dF) F - 2/3 (F : dF) H + 2/9 tr C (H : dF) H + tr C / 3 H dF^T H)
+         + P J ((H : dF) H - H dF^T H)
 """
 
 from __future__ import annotations
@@ -155,7 +156,7 @@ class System:
         self.unknowns, self.free = self.sparse.unknowns, ~self.sparse.held
 
     def residual(self, position: np.ndarray, pressure: np.ndarray, theta: np.ndarray):
-        """Residual (3n,) [x of all nodes, y, then P] and the size of its terms; det F <= 0 is for the caller to exclude."""
+        """Residual (3n,) [x of all nodes, y, then P] and the size of its terms; the caller excludes det F <= 0."""
         t, n = self.body.triangles, len(position)
         F = deformation(position, t, self.slopes)
         P = pressure[t]

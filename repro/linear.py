@@ -1,9 +1,9 @@
 """Sparse linear systems: order the nodes once per topology, factor without pivoting, check the residual.
 
 Orders and factors with SuperLU: a minimum-degree ordering of the graph of *nodes*, in which the callers number all
-unknowns of a node together, in symmetric mode with pivots on the diagonal. That is two to five times faster than SciPy's default, and safe
-as long as pressure blocks are negative definite; the residual is checked, refined once, and where that is not enough
-the system is factored again with partial pivoting.
+unknowns of a node together, in symmetric mode with pivots on the diagonal. That is two to five times faster than
+SciPy's default, and safe as long as pressure blocks are negative definite; the residual is checked, refined once, and
+where that is not enough the system is factored again with partial pivoting.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ def node_order(count: int, elements: np.ndarray) -> np.ndarray:
     columns = np.tile(elements, (1, elements.shape[1])).ravel()
     graph = sp.csc_array((np.ones(len(elements) * pairs), (rows, columns)), shape=(count, count))
     graph = graph + sp.diags_array(graph.sum(axis=0) + 1.0)
-    factor = splu(sp.csc_matrix(graph), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    symmetric = {"SymmetricMode": True}
+    factor = splu(sp.csc_matrix(graph), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=symmetric)
     return np.argsort(factor.perm_c)
 
 
@@ -74,10 +75,6 @@ class Solver:
 
 
 @timed("factorise and solve")
-def solve(matrix, right: np.ndarray, order: np.ndarray | None = None) -> np.ndarray:
-    """Solve one system once; ``order`` (n,), where given, is the unknowns' elimination order."""
-    if order is None:
-        return Solver(matrix).solve(right)
-    solution = np.empty_like(right)
-    solution[order] = Solver(sp.csc_matrix(matrix)[order][:, order]).solve(right[order])
-    return solution
+def solve(matrix, right: np.ndarray) -> np.ndarray:
+    """Solve one system once."""
+    return Solver(matrix).solve(right)

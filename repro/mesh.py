@@ -33,7 +33,7 @@ class PoreMesh:
 
     points: (N, 2) um; triangles: (T, 3) nodes, counterclockwise; biomass: (T,) True in the aggregate;
     loop: (M,) nodes of the aggregate's boundary, counterclockwise, empty in a clean channel; topology: what has been
-    worked out from the connections alone, kept while the mesh moves; placed: what has been with the nodes where they are.
+    worked out from the connections alone, kept while the mesh moves; placed: what holds for its nodes where they are.
     """
 
     points: np.ndarray
@@ -92,6 +92,16 @@ class PoreMesh:
     def body(self) -> np.ndarray:
         """Nodes of the aggregate, its boundary included, ascending."""
         return self.once("body", lambda: np.unique(self.triangles[self.biomass]))
+
+    @property
+    def body_loop(self) -> np.ndarray:
+        """(M,) ``loop`` in the numbering of ``body``."""
+        return np.searchsorted(self.body, self.loop)
+
+    @property
+    def body_triangles(self) -> np.ndarray:
+        """(t, 3) biomass triangles in the numbering of ``body``."""
+        return self.once("body triangles", lambda: np.searchsorted(self.body, self.triangles[self.biomass]))
 
     @property
     def fluid(self) -> np.ndarray:
@@ -160,9 +170,7 @@ def generate(outline: Outline | None, ends: tuple[float, float], width: float, r
         _check_outline(outline, ends, width)
         sizes = geometry.interface_sizes(outline, width, refinement, film)
         outline = geometry.refine_outline(outline, sizes, largest)
-        free = outline.wall == geometry.FREE
-        sources = outline.points[free]
-        sizes = geometry.interface_sizes(outline, width, refinement, film)[free]
+        sources, sizes = geometry.size_sources(outline, width, refinement, film)
     points, polygons = _boundaries(outline, ends, width, sources, sizes, largest)
     mesh = _fill(points, polygons, lambda where: geometry.graded_size(where, sources, sizes, largest), ends, width)
     loop = mesh.loop[: 0 if outline is None else len(outline.points)]  # its points come first among the prescribed ones

@@ -2,7 +2,7 @@
 
 The displacement d of the fluid's nodes solves a pseudo-Stokes problem that may be compressed, (35):
 
-    (grad d, grad v) - (P, div v) = 0,        (q, div d) - gamma (P, q) + sum_tau (tau grad P, grad q) = 0
+    (grad d, grad v) - (P, div v) = 0,        (q, div d) + gamma (P, q) + sum_tau (tau grad P, grad q) = 0
 
 with the flow's stabilisation tau = h^2 / c. Interface nodes move with the biomass; nodes of walls, inlet and outlet
 slide along their line. gamma is not printed [E13]: 1 by default.

@@ -45,7 +45,8 @@ def barycentric(points: np.ndarray, corners: np.ndarray, where: np.ndarray) -> n
         return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
 
     double = cross(b - a, c - a)
-    return np.stack([cross(b - where, c - where), cross(c - where, a - where), cross(a - where, b - where)], -1) / double[..., None]
+    a, b, c = (corner - where for corner in (a, b, c))
+    return np.stack([cross(b, c), cross(c, a), cross(a, b)], -1) / double[..., None]
 
 
 @timed("transfer")
@@ -106,7 +107,8 @@ def project(points, triangles, fields, new_points, new_triangles) -> np.ndarray:
     area = 0.5 * np.abs(edge[:, 0, 0] * edge[:, 1, 1] - edge[:, 0, 1] * edge[:, 1, 0])
     areas = [triangle_areas(p, t).sum() for p, t in ((points, triangles), (new_points, new_triangles))]
     if max(abs(area.sum() / a - 1) for a in areas) > COVER:
-        raise TransferError(f"old mesh {areas[0]:.12g} um2, new mesh {areas[1]:.12g} um2, in common {area.sum():.12g} um2")
+        raise TransferError(f"the old mesh covers {areas[0]:.12g} um2, the new one {areas[1]:.12g} um2, "
+                            f"their common pieces {area.sum():.12g} um2; try a shorter growth.time_step")
     middles = 0.5 * (corners + np.roll(corners, -1, axis=1))
     old_weight = barycentric(points, np.repeat(triangles[old][:, None], 3, 1), middles)
     new_weight = barycentric(new_points, np.repeat(new_triangles[new][:, None], 3, 1), middles)

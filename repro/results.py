@@ -122,7 +122,8 @@ def fields(scene: Scene, pore, solved) -> meshio.Mesh:
         points["velocity_m_per_d"] = _three(M_PER_D * solved.flow.velocity[: len(grid.points)])
         points["head_cm"] = CM * solved.flow.head
     if solved.concentrations:
-        points["acceptor_mg_per_L"], points["donor_mg_per_L"] = solved.concentrations.acceptor, solved.concentrations.donor
+        points["acceptor_mg_per_L"] = solved.concentrations.acceptor
+        points["donor_mg_per_L"] = solved.concentrations.donor
     if scene.kinetics:
         points["active_biomass"] = pore.active / scene.kinetics.maximum_density
         points["inert_biomass"] = pore.inert / scene.kinetics.maximum_density

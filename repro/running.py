@@ -59,7 +59,7 @@ class Recorder:
 
 
 def prepare(folder: Path) -> None:
-    """Make the folder, empty of an earlier run. Raises OutputError where it holds anything else or cannot be written."""
+    """Make the folder, empty of an earlier run. Raises OutputError where it holds anything else or can't be made."""
     try:
         strange = sorted(p.name for p in folder.iterdir() if p.name not in OWN) if folder.exists() else []
         if strange:
@@ -69,7 +69,8 @@ def prepare(folder: Path) -> None:
         for old in (*folder.glob("fields/*.vtu"), *(folder / name for name in OWN if name != "fields")):
             old.unlink(missing_ok=True)
     except OSError as error:
-        raise OutputError(f"--out {folder}: {error.strerror or error}; a folder that can be written is needed") from error
+        why = error.strerror or error
+        raise OutputError(f"--out {folder}: {why}; a folder that can be written is needed") from error
 
 
 def run(scene: Scene, folder: Path, progress: Callable[[float], None] = lambda time: None) -> str:

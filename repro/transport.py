@@ -7,7 +7,7 @@ so that the substrate taken up and the biomass made are the same sums. For one s
 
 where w = u - tau grad p is the divergence-free velocity of :mod:`repro.flow`. Summed over i, the second term is the net
 flux of u C through the ends, so the balance closes to round-off: supply in = out + consumed. Without flow the supply is
-held at both ends, or nothing passes them ("closed"). With the inlet's u_x replaced by u_ave, (11) reads as printed [E4].
+held at both ends, or nothing passes them ("closed"). With u_ave for the inlet's u_x, (11) reads as printed [E4].
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from repro import kinetics as law
 from repro import linear
 from repro.assembly import ElementSystem, each, local
 from repro.errors import TransportError
-from repro.flow import Flow, forms
+from repro.flow import Flow, forms, mean_over
 from repro.mesh import PoreMesh
 from repro.timing import timed
 
@@ -36,8 +36,8 @@ ROUND_OFF = 1e-9
 class Operator:
     """Linear part of one substrate in one geometry: matrix @ C - source is what must balance the uptake.
 
-    matrix: (N, N) um2/h, symmetric in its sparsity; magnitude: its absolute values; source: (N,) um2 mg/L/h; held: nodes
-    where C = supply; inflow, outflow: (N,) um2/h weights of the flux through inlet and outlet; supplied: the flux
+    matrix: (N, N) um2/h, symmetric in its sparsity; magnitude: its absolute values; source: (N,) um2 mg/L/h; held:
+    nodes where C = supply; inflow, outflow: (N,) um2/h weights of the flux through inlet and outlet; supplied: the flux
     supplied by the inlet, um2 mg/L/h; supply: mg/L.
     """
 
@@ -185,7 +185,7 @@ def _relative(residual: np.ndarray, size: np.ndarray) -> float:
 
 
 def _advance(problem: Problem, weight, state, residual, slopes):
-    """A Newton step where it keeps both substrates positive and lowers the residual; else a sweep, which is positive."""
+    """A Newton step where it keeps both substrates positive and lowers the residual; else a positive sweep."""
     trial = state + _solve(problem, [[weight * entry for entry in row] for row in slopes], -residual)
     found = _balance(problem, weight, trial)
     if trial.min() < 0 or np.linalg.norm(found[0]) > np.linalg.norm(residual):
@@ -215,7 +215,8 @@ class PairPattern:
         place = np.empty(len(nodes), int)
         place[nodes] = 2 * np.arange(len(nodes))
         rows, columns = place[indices], place[np.repeat(np.arange(len(nodes)), np.diff(indptr))]
-        pairs = [(rows, columns), (rows + 1, columns + 1), (place[body], place[body] + 1), (place[body] + 1, place[body])]
+        coupled = place[body]
+        pairs = [(rows, columns), (rows + 1, columns + 1), (coupled, coupled + 1), (coupled + 1, coupled)]
         keys = np.concatenate([column * self.count + row for row, column in pairs])
         by_column = np.argsort(keys)
         slot = np.empty(len(keys), int)
@@ -247,7 +248,8 @@ def _checked(problem: Problem, weight, state, iterations: int) -> Concentrations
         which, worst = np.unravel_index(np.argmin(state), state.shape)
         x, y = problem.mesh.points[worst]
         raise TransportError(f"the {('acceptor', 'donor')[which]} is negative, {state[which, worst]:.3g} mg/L at "
-                             f"x = {x:.4g}, y = {y:.4g} um; the mesh is too coarse there: try a larger numerics.refinement")
+                             f"x = {x:.4g}, y = {y:.4g} um; the mesh is too coarse there: "
+                             "try a larger numerics.refinement")
     return Concentrations(state[0], state[1], iterations)
 
 
@@ -288,10 +290,6 @@ def _fluxes(mesh: PoreMesh, operator: Operator, field: np.ndarray, consumed: flo
     supplied = operator.supplied
     if len(operator.held):
         supplied = float(np.sum((operator.matrix @ field - operator.source)[operator.held]))
-    ends = [float(weight @ field / weight.sum()) if weight.any() else _mean(mesh, nodes, field)
+    ends = [float(weight @ field / weight.sum()) if weight.any() else mean_over(mesh, nodes, field)
             for weight, nodes in ((operator.inflow, mesh.inlet), (operator.outflow, mesh.outlet))]
     return Fluxes(supplied, float(operator.outflow @ field), consumed, *ends)
-
-
-def _mean(mesh: PoreMesh, nodes: np.ndarray, field: np.ndarray) -> float:
-    return float(np.trapezoid(field[nodes], mesh.points[nodes, 1]) / mesh.width)

@@ -1,0 +1,245 @@
+"""C22, C25, C37: the mechanics of growth against closed forms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from unittest.mock import patch
+
+import numpy as np
+from scipy.linalg import eigh
+from skfem import MeshTri
+
+from reference import neo_hookean
+from repro import geometry, growth, mesh
+from repro.errors import StageError
+from repro.growth import Body
+from verification.claims import Finding, at_least, at_most, between, claim, near
+from verification.claims.restored import bodies
+from verification.claims.runs import WIDE, series
+
+RADIUS = 5.0
+
+
+def half_disc(refinement: float) -> Body:
+    """A seed alone, in a mesh of the package's own generator: meshes of different refinement share nothing."""
+    grid, _ = mesh.generate(geometry.seed(RADIUS, refinement), (-2 * RADIUS, 2 * RADIUS), 50.0, refinement, 2.0)
+    local = np.full(len(grid.points), -1)
+    local[grid.body] = np.arange(len(grid.body))
+    return sliding(grid.points[grid.body], local[grid.triangles[grid.biomass]])
+
+
+def regular_half_disc(parts: int) -> Body:
+    """A seed in a regular grid of 2 n by n squares, each cut in two, mapped onto the half-disc."""
+    grid = MeshTri.init_tensor(np.linspace(-1, 1, 2 * parts + 1), np.linspace(0, 1, parts + 1))
+    x, y = grid.p
+    points = RADIUS * np.column_stack([x * np.sqrt(1 - y**2 / 2), y * np.sqrt(1 - x**2 / 2)])
+    triangles = grid.t.T.copy()
+    turned = mesh.triangle_areas(points, triangles) < 0
+    triangles[turned] = triangles[turned][:, ::-1]
+    return sliding(points, triangles)
+
+
+def sliding(points: np.ndarray, triangles: np.ndarray) -> Body:
+    """The body that slides on the wall y = 0 with its middle fixed (2.3.3)."""
+    on_wall = np.abs(points[:, 1]) < 1e-9 * RADIUS
+    middle = on_wall & (np.abs(points[:, 0]) < 1e-9 * RADIUS)
+    return Body(points, triangles, np.column_stack([middle, on_wall]))
+
+
+def radial_theta(body: Body, inner: float, more: float) -> np.ndarray:
+    """(t,) theta = inner + more (R / R_0)^2 at the triangles' middles."""
+    return inner + more * np.sum(body.reference[body.triangles].mean(axis=1) ** 2, axis=1) / RADIUS**2
+
+
+def areas(body: Body) -> np.ndarray:
+    """(t,) areas of a body's triangles at t = 0, um2."""
+    return mesh.triangle_areas(body.reference, body.triangles)
+
+
+# C22: theta = INNER + MORE (R / R_0)^2 on meshes of the package's own, by refinement, and on regular ones, by parts.
+INNER, MORE = 1.5, 1.0
+OWN, REGULAR = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8), (4, 8, 12)
+
+
+@claim("C22", "3.4", "P1-P1 with the stabilisation is stable and convergent; without it, it is not",
+       "python -m verification.claims C22")
+def stabilised() -> Finding:
+    """Growth of a half-disc by theta(R) against the closed form: orders of outline and pressure; stability numbers.
+
+    Orders are slopes of a least-squares line over the package's own unrelated meshes, h = (area / nodes)^(1/2). The
+    stability number is the least eigenvalue of B K^-1 B^T + C against the pressure's mass, on regular meshes: how much
+    the scheme sees of the pressure that it sees least. Without the stabilisation C = 0; with the sign of (27), -C.
+    """
+    own, regular = [half_disc(refinement) for refinement in OWN], [regular_half_disc(parts) for parts in REGULAR]
+    outline, pressure = (order(own, errors) for errors in zip(*(growth_errors(body, 1.0) for body in own)))
+    with_, without, printed = ([stability(body, factor) for body in regular] for factor in (1.0, 0.0, -1.0))
+    checks = (at_least("order of the outline", "convergent", outline, 1.7, "2 in theory; 1.7 for unrelated meshes"),
+              at_least("order of the pressure", "convergent", pressure, 1.0, "1 in theory, in the mean square"),
+              at_least("stability number, finest over coarsest mesh", "stable", with_[-1] / with_[0], 0.8,
+                       "independent of h; a fifth for the coarsest mesh"),
+              at_most("stability number without stabilisation, largest", "it is not", max(without), 1e-10,
+                      "zero: a pressure that nothing sees; round-off"),
+              at_most("stability number with the sign of (27), largest", "as printed", max(printed), 0.0,
+                      "negative: stationary, but no saddle point [E5]"))
+    return Finding(checks, note=_told(own, regular, (with_, without, printed)))
+
+
+def _told(own, regular, numbers) -> str:
+    with_, without, printed = (listed(values) for values in numbers)
+    irregular = ", ".join(f"{100 * growth_errors(body, 0.0)[1]:.2g} % instead of "
+                          f"{100 * growth_errors(body, 1.0)[1]:.2g} %"
+                          for body in own[2:4])
+    return (f"Stability numbers on regular meshes of {', '.join(str(len(body.reference)) for body in regular)} nodes: "
+            f"with it {with_}, without {without}, with the sign of (27) {printed}. Growth on the second: without it "
+            f"{attempt(regular[1], 0.0)}; with that sign {attempt(regular[1], -1.0)}. The package's unstructured "
+            f"meshes hide it: stability numbers {listed(stability(body, 0.0) for body in own[:3])} without it, errors "
+            f"of the pressure of {irregular}.")
+
+
+def listed(values) -> str:
+    """Numbers in words."""
+    return ", ".join(f"{value:.2g}" for value in values)
+
+
+def attempt(body: Body, factor: float) -> str:
+    """What growth comes to with the stabilisation times a factor, in words."""
+    try:
+        return f"the pressure is off by {100 * growth_errors(body, factor)[1]:.2g} %"
+    except StageError as error:
+        return f"Newton's method fails ({str(error).partition(';')[0]})"
+
+
+def order(family: list[Body], errors) -> float:
+    """Slope of log error against log h."""
+    h = [np.sqrt(areas(body).sum() / len(body.reference)) for body in family]
+    return float(np.polyfit(np.log(h), np.log(errors), 1)[0])
+
+
+def growth_errors(body: Body, factor: float) -> tuple[float, float]:
+    """Mean-square errors, relative, of the outline's radius and of the pressure, the stabilisation times a factor."""
+    original, nothing = growth.stabilisation, np.zeros(len(body.reference))
+    with patch.object(growth, "stabilisation", lambda *shape: factor * original(*shape)):
+        found = growth.equilibrium(body, radial_theta(body, INNER, MORE), body.reference, nothing, body.reference)
+    R = np.minimum(np.hypot(*body.reference.T), RADIUS)
+    rim = R > (1 - 1e-9) * RADIUS
+    radius, pressure = (exact(R, INNER, MORE, RADIUS) for exact in (neo_hookean.cylinder_radius,
+                                                                    neo_hookean.cylinder_pressure))
+    weight = np.bincount(body.triangles.ravel(), np.repeat(areas(body) / 3, 3))
+    outline = np.hypot(*found.position[rim].T) / radius[rim] - 1
+    return (float(np.sqrt(np.mean(outline**2))),
+            float(np.sqrt(weight @ (found.pressure - pressure) ** 2 / (weight @ pressure**2))))
+
+
+def stability(body: Body, factor: float) -> float:
+    """Least eigenvalue of B K^-1 B^T + factor C against the pressure's mass matrix, at t = 0 (dense)."""
+    t, n, area = body.triangles, len(body.reference), areas(body)
+    slopes = mesh.gradients(body.reference, t)
+    moduli = growth.tangent(np.tile(np.eye(2), (len(t), 1, 1)), np.zeros(len(t)))
+    K = np.einsum("t,tikjl,tak,tbl->taibj", area, moduli, slopes, slopes).reshape(len(t), 6, 6)
+    B = np.repeat((area[:, None, None] * slopes / 3).reshape(len(t), 1, 6), 3, axis=1)
+    C = factor * growth.stabilisation(body.reference, t, np.ones(len(t)))
+    M = area[:, None, None] * (np.ones((3, 3)) + np.eye(3)) / 12
+    places, free = np.stack([2 * t, 2 * t + 1], axis=2).reshape(len(t), 6), ~body.held.ravel()
+    stiffness = dense(K, places, places, 2 * n, 2 * n)[free][:, free]
+    divergence = dense(B, t, places, n, 2 * n)[:, free]
+    schur = divergence @ np.linalg.solve(stiffness, divergence.T) + dense(C, t, t, n, n)
+    return float(eigh(0.5 * (schur + schur.T), dense(M, t, t, n, n), eigvals_only=True, subset_by_index=[0, 0])[0])
+
+
+def dense(elements: np.ndarray, rows: np.ndarray, columns: np.ndarray, height: int, width: int) -> np.ndarray:
+    """Sum of element matrices (t, a, b)."""
+    whole = np.zeros((height, width))
+    np.add.at(whole, (rows[:, :, None], columns[:, None, :]), elements)
+    return whole
+
+
+# C25: the expansion, and the updates in which it is reached.
+TOTAL, STEPS = 2000.0, 165
+
+
+@claim("C25", "2.3.1", "expansion by up to 2000, after a couple of days, can be handled",
+       "python -m verification.claims C25", (WIDE,))
+def expansion() -> Finding:
+    """theta from 1 to 2000 from the configuration of t = 0, in 165 updates of 4.7 %: uniform, and larger at the rim.
+
+    The second has theta = t^0.9 in the middle and t at the rim, quadratic in R between. Against closed forms; and what
+    theta comes to in wide, and when.
+    """
+    uniform, radial = expanded(1.0), expanded(0.9)
+    inner, more = TOTAL**0.9, TOTAL - TOTAL**0.9
+    rim = float(neo_hookean.cylinder_radius(RADIUS, inner, more, RADIUS))
+    largest = np.array([found.cell("theta").max() for found in bodies(WIDE)])
+    reached = series(*WIDE)["time_h"][largest >= TOTAL]
+    checks = (at_most("uniform: error of the area", "handled", abs(uniform.area / TOTAL - 1), 1e-9,
+                      "exact: J = theta (24)"),
+              near("uniform: radius (um)", "handled", uniform.radius, RADIUS * np.sqrt(TOTAL), relative=0.001,
+                   why="exact: R_0 theta^(1/2); 0.1 %, the paper's own accuracy"),
+              near("theta(R): radius (um)", "handled", radial.radius, rim, relative=0.01,
+                   why="closed form; 1 %, what refining a mesh may change (issue 2)"),
+              at_least("wide: largest expansion", "up to 2000", largest.max(), TOTAL, "as stated"),
+              between("wide: time at which it is 2000 (h)", "a couple of days", min(reached, default=np.inf), 24, 72,
+                      "one to three days"))
+    last, area = bodies(WIDE)[-1], series(*WIDE)["aggregate_area_um2"]
+    exact = (neo_hookean.free_growth_pressure(TOTAL),
+             neo_hookean.cylinder_pressure(np.zeros(1), inner, more, RADIUS)[0])
+    note = (f"{STEPS} updates, no remesh; pressure in the middle over mu_L: "
+            + ", ".join(f"{name} {found.pressure:.6f} (exact {value:.6f}), {found.iterations} Newton iterations" for
+                        name, found, value in zip(("uniform", "theta(R)"), (uniform, radial), exact))
+            + f" [E6]. Wide at its end: theta from {last.cell('theta').min():.0f} to {largest[-1]:.0f}, area "
+            f"{area[-1] / area[0]:.0f} times the seed's; there the grown body is remeshed.")
+    return Finding(checks, note=note)
+
+
+@dataclass(frozen=True)
+class Expanded:
+    """A half-disc after all updates: radius (mean over the rim, um), area over the seed's, P / mu_L in the middle,
+    Newton iterations of all updates."""
+
+    radius: float
+    area: float
+    pressure: float
+    iterations: int
+
+
+@cache
+def expanded(exponent: float) -> Expanded:
+    """theta = t^exponent in the middle and t at the rim, t from 1 to 2000 in equal factors, always from t = 0."""
+    body, iterations = half_disc(1.4), 0
+    position, pressure = body.reference, np.zeros(len(body.reference))
+    for t in TOTAL ** (np.arange(1, STEPS + 1) / STEPS):
+        theta = radial_theta(body, t**exponent, t - t**exponent)
+        found = growth.equilibrium(body, theta, position, pressure, body.reference)
+        position, pressure, iterations = found.position, found.pressure, iterations + found.iterations
+    R = np.hypot(*body.reference.T)
+    area = mesh.triangle_areas(position, body.triangles).sum() / areas(body).sum()
+    return Expanded(float(np.hypot(*position[R > (1 - 1e-9) * RADIUS].T).mean()), area, float(pressure[np.argmin(R)]),
+                    iterations)
+
+
+# C37: sizes of the displacement's gradient.
+STRAINS = np.array([1e-2, 1e-3, 1e-4, 1e-5])
+
+
+@claim("C37", "2.3.1", "neo-Hookean elasticity reduces to the linear one at small strain",
+       "python -m verification.claims C37")
+def small_strain() -> Finding:
+    """Cauchy stress of F = I + e G against 2 mu_L dev(strain) + P, G random with rotations, e from 1e-2 to 1e-5."""
+    generator = np.random.default_rng(2001)
+    G, P = generator.uniform(-1, 1, (200, 2, 2)), generator.uniform(-1, 1, 200)
+    errors = np.array([nonlinear_part(e * G, e * P) for e in STRAINS])
+    slope = np.polyfit(np.log(STRAINS), np.log(errors), 1)[0]
+    checks = (near("order at which the relative difference falls with strain", "reduces to", slope, 1.0, absolute=0.02,
+                   why="exact 1: the first neglected term is quadratic"),
+              at_most("relative difference at gradients of 1e-4", "reduces to", errors[2], 1e-3,
+                      "ten times the gradient"))
+    return Finding(checks, note=f"Largest relative differences at gradients of {listed(STRAINS)}: {listed(errors)}.")
+
+
+def nonlinear_part(slope: np.ndarray, P: np.ndarray) -> float:
+    """Largest difference of the stresses from linear elasticity over the largest linear stress, for mu_L = 1."""
+    strain = 0.5 * (slope + np.swapaxes(slope, 1, 2))
+    mean = np.trace(strain, axis1=1, axis2=2) / 3
+    across = np.stack([strain[:, 0, 0] - mean, strain[:, 1, 1] - mean, -mean], axis=1)
+    linear = np.column_stack([2 * across + P[:, None], 2 * strain[:, 0, 1]])
+    return float(np.abs(growth.cauchy(np.eye(2) + slope, P) - linear).max() / np.abs(linear).max())
