@@ -124,12 +124,20 @@ def film_sizes(outline: Outline, width: float, refinement: float, thinnest: floa
 
 def size_sources(outline: Outline, width: float, refinement: float, thinnest: float) -> tuple[np.ndarray, np.ndarray]:
     """Where element sizes are prescribed, (K, 2) um, and how large (K,) um: at the interface nodes and, across the fluid,
-    on the opposite wall, so that a film has elements of one size."""
+    on the opposite wall, so that a film has elements of one size. Interface edges that are shorter than wanted (they are
+    never merged) are matched by what is around them."""
     free = outline.wall == FREE
     near, film = (find(outline, width, refinement, thinnest)[free] for find in (interface_sizes, film_sizes))
+    near = np.minimum(near, SPLIT * _longest_edge(outline)[free])
     across = np.column_stack([outline.points[free, 0], np.full(len(near), width)])
     there = np.isfinite(film)
     return np.vstack([outline.points[free], across[there]]), np.concatenate([near, film[there]])
+
+
+def _longest_edge(outline: Outline) -> np.ndarray:
+    """(M,) length (um) of the longer of the two edges at each node."""
+    edge = np.linalg.norm(np.roll(outline.points, -1, axis=0) - outline.points, axis=1)
+    return np.maximum(edge, np.roll(edge, 1))
 
 
 def graded_size(where: np.ndarray, sources: np.ndarray, sizes: np.ndarray, largest: float) -> np.ndarray:

@@ -55,7 +55,7 @@ def upstream_profile() -> Finding:
                    at_most(f"{name}: largest range within a section (% of the supply)", "isolines perpendicular",
                            bend.max(), FEW, "a few percent")]
         parts.append(f"{name} {bend[0]:.2g} % 1 W from the aggregate, {bend[-1]:.2g} % at the pore's inlet")
-    return Finding(tuple(checks), note="Range within a section: " + "; ".join(parts) + ". At the inlet (11) with the local "
+    return Finding(tuple(checks), note="Range within a section: " + "; ".join(parts) + ". There (11) with the local "
                    "u_x bends the isolines [E4].")
 
 

@@ -1,0 +1,113 @@
+"""The paper's ambiguities and misprints, our reading, and what each costs: `python -m verification.errata`.
+
+Each erratum is a function that computes the numbers of its own text; the text stands above it, in the decorator, with a
+{name} for each number. The program computes them all and rewrites ``reference/ERRATA.md``, so that prose and numbers
+cannot part. Runs of scenes are the cached ones of figures and claims; what a scene cannot say (a wrong sign, an
+explicit increment) is put together from the stages of `repro`. ``tests/test_errata.py`` computes the quick ones again.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Callable
+from dataclasses import dataclass
+from inspect import cleandoc
+
+from verification.claims.runs import BASE, LAST, at
+
+PLOTTED, END = 19.2, 19.4  # h; the geometry that the paper plots [E12], and the end of base
+SUPPLY = 10.0
+
+
+def changed(change: str) -> tuple[str, ...]:
+    """Base with one change, of which the rows of t = 0 and of the last two shapes are kept."""
+    return (*BASE, change, LAST)
+
+
+SHORT_F = changed("kinetics.acceptor_to_donor_ratio=1.5138")
+NO_D_C = changed("kinetics.decay_oxygen_demand=1.0")
+MEAN_INLET = changed('numerics.inlet="mean"')
+LINEAR = changed('numerics.transfer="linear"')
+TRACTION = changed('numerics.interface="traction"')
+HALF_STEP = changed('growth.time_step="6 min"')
+CHOSEN = {"flow_stabilisation": (25, 50, 200, 400), "mesh_compressibility": (0.1, 10), "refinement": (0.7, 1.4)}
+SENSITIVITY = {(key, value): changed(f"numerics.{key}={value}") for key, values in CHOSEN.items() for value in values}
+
+
+@dataclass(frozen=True)
+class Erratum:
+    """An entry: its text, the function that computes the numbers in ``consequence``, the runs that it reads, and
+    whether it takes less than about two seconds and no run. An empty part is left out."""
+
+    id: str
+    title: str
+    printed: str
+    reading: str
+    consequence: str
+    function: Callable[[], dict[str, str]]
+    scenes: tuple[tuple[str, ...], ...]
+    quick: bool
+
+    def markdown(self) -> str:
+        """The entry, its numbers computed now."""
+        parts = {"Printed": self.printed, "Our reading": self.reading,
+                 "Consequence": cleandoc(self.consequence).format(**self.function())}
+        told = [f"**{name}.** {cleandoc(text)}" for name, text in parts.items() if text]
+        return filled("\n\n".join([f"## {self.id}. {self.title}", *told]))
+
+
+ERRATA: dict[str, Erratum] = {}
+
+
+def erratum(id: str, title: str, *, consequence: str, printed: str = "", reading: str = "", scenes=(),
+            quick: bool = False):
+    """Register the decorated function () -> {name: number as text} as the measurement of an erratum."""
+    def register(function: Callable[[], dict[str, str]]) -> Callable[[], dict[str, str]]:
+        ERRATA[id] = Erratum(id, title, printed, reading, consequence, function, tuple(scenes), quick)
+        return function
+    return register
+
+
+def filled(text: str) -> str:
+    """Markdown with its paragraphs, but not its tables, broken into lines of 120."""
+    lines = textwrap.TextWrapper(120, break_on_hyphens=False, break_long_words=False)
+    blocks = text.split("\n\n")
+    return "\n\n".join(block if block.startswith("|") else lines.fill(block) for block in blocks) + "\n"
+
+
+def table(head: list[str], rows: list[list]) -> str:
+    """A Markdown table."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines)
+
+
+def percent(ratio: float, digits: int = 2) -> str:
+    """The deviation of a ratio from one, in percent with a sign."""
+    deviation = round(100 * (ratio - 1), digits)
+    return f"{deviation:+.{digits}f} %" if deviation else f"{0:.{digits}f} %"
+
+
+def small(value: float) -> str:
+    """A defect with one digit; round-off is called that, since its digits differ between machines."""
+    return f"{value:.0e}" if abs(value) > 1e-12 else "round-off"
+
+
+STATE_HEAD = ["", "mean velocity, m/d", "acceptor effluent", "donor effluent"]
+
+
+def state(run: tuple[str, ...], time: float = PLOTTED) -> tuple[float, float, float]:
+    """Mean velocity (m/d), acceptor and donor effluents (K_s) of a run at a time (h)."""
+    row = at(run, time)
+    return tuple(row[key] for key in ("mean_velocity_m_per_d", "effluent_acceptor_mg_per_L", "effluent_donor_mg_per_L"))
+
+
+def state_row(name: str, run: tuple[str, ...]) -> list[str]:
+    """A row of a table: velocity and effluents of a run at 19.2 h, with their deviations from base."""
+    if run == BASE:
+        return [name, *(f"{value:.3f}" for value in state(run))]
+    return [name, *(f"{value:.3f} ({percent(value / ours)})" for value, ours in zip(state(run), state(BASE)))]
+
+
+def consumed_ratio(acceptor: float, donor: float) -> float:
+    """Acceptor over donor consumed, from effluents (K_s)."""
+    return (SUPPLY - acceptor) / (SUPPLY - donor)

@@ -1,0 +1,72 @@
+"""Rewrite ``reference/ERRATA.md``: `python -m verification.errata`, or print some entries: `... E5 E11`."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import pkgutil
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+import numpy as np
+
+import verification.errata as package
+from repro.results import write_text
+from verification.claims.runs import compute
+from verification.errata import ERRATA, filled
+
+REPORT = Path(__file__).parents[2] / "reference" / "ERRATA.md"
+
+INTRODUCTION = """\
+# Errata: what the paper leaves open or prints wrongly, and what it costs
+
+Dupin, Kitanidis & McCarty (2001), paper 2001WR000306; numbers in brackets are its equations. For each point: what is
+printed, how we read it and why, and the measured consequence. Every number in a consequence is computed, and this file
+is written, by `python -m verification.errata`.
+
+"base" is the run of section 4, "wide" that of Figure 6, both with the default settings, and deviations are from these.
+"At 19.2 h" means in the geometry shaped then (E12). Concentrations are in K_s = 1 mg/L. The mesh error of base is about
+half a percent (E13): a smaller difference between two runs is of the order of what another mesh would do."""
+
+
+def load() -> list[str]:
+    """Import every module of this package, which registers its errata; their ids in order."""
+    for module in pkgutil.iter_modules(package.__path__):
+        if module.name != "__main__":
+            importlib.import_module(f"{package.__name__}.{module.name}")
+    return sorted(ERRATA, key=lambda id: int(id[1:]))
+
+
+def entry(id: str) -> str:
+    """One entry; floating-point errors raise."""
+    load()
+    with np.errstate(all="raise", under="ignore"):
+        return ERRATA[id].markdown()
+
+
+def entries(ids: list[str]) -> list[str]:
+    """Several entries; missing runs are computed first, all side by side."""
+    compute(dict.fromkeys(run for id in ids for run in ERRATA[id].scenes))
+    with ProcessPoolExecutor(max_workers=os.cpu_count()) as pool:
+        return list(pool.map(entry, ids))
+
+
+def main(arguments: list[str]) -> int:
+    """Entry point; returns the exit status."""
+    known = load()
+    unknown = [id for id in arguments if id not in known]
+    if unknown:
+        print(f"errata: there is no {', '.join(unknown)}; {', '.join(known)} are accepted", file=sys.stderr)
+        return 2
+    text = "\n".join(entries(arguments or known))
+    if arguments:
+        print(text)
+    else:
+        write_text(REPORT, filled(INTRODUCTION) + "\n" + text)
+        print(f"{len(known)} entries written to {REPORT.parent.name}/{REPORT.name}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,254 @@
+"""E5, E6, E11, E17: the growing body, against closed forms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.spatial import Delaunay
+
+from reference import neo_hookean
+from repro import assembly, growth
+from repro.errors import GrowthError
+from repro.mesh import triangle_areas
+from verification.errata import erratum, small, table
+
+#: Elements across the radius.
+RINGS = (7, 10, 14)
+
+
+@dataclass(frozen=True, eq=False)
+class Cylinder:
+    """A half-disc of radius 1 with theta = inner + more R^2, and its exact growth (reference/neo_hookean.py).
+
+    body; theta (t,) at the triangles' middles; position (n, 2), pressure (n,): exact.
+    """
+
+    body: growth.Body
+    theta: np.ndarray
+    position: np.ndarray
+    pressure: np.ndarray
+
+    @property
+    def expansion(self) -> np.ndarray:
+        """(t,) J of the triangles with their corners at the exact places."""
+        before, after = (triangle_areas(p, self.body.triangles) for p in (self.body.reference, self.position))
+        return after / before
+
+    def pressure_error(self, pressure: np.ndarray) -> float:
+        """Relative L2 error over the grown body."""
+        weight = assembly.mass(triangle_areas(self.position, self.body.triangles))
+        error, exact = (p[self.body.triangles] for p in (pressure - self.pressure, self.pressure))
+        squares = [np.einsum("ta,tab,tb", p, weight, p) for p in (error, exact)]
+        return float(np.sqrt(squares[0] / squares[1]))
+
+    def place_error(self, position: np.ndarray) -> float:
+        """Largest error of a place over the radius."""
+        return float(np.linalg.norm(position - self.position, axis=1).max() / self.position[:, 0].max())
+
+
+@cache
+def half_disc_body(rings: int) -> growth.Body:
+    """A half-disc of radius 1 on its frictionless wall, its middle fixed: rings of nodes, shaken (seed 2001)."""
+    at = [(k / rings, angle) for k in range(rings + 1) for angle in np.linspace(0, np.pi, 3 * k + 1)]
+    R, angle = np.array(at).T
+    flat, rim = (angle == 0) | (angle == np.pi), R == 1
+    points = R[:, None] * np.column_stack([np.cos(angle), np.where(flat, 0.0, np.sin(angle))])
+    shake = np.random.default_rng(2001).uniform(-0.2, 0.2, points.shape) / rings
+    points += np.where((flat | rim)[:, None], 0.0, shake)
+    triangles = Delaunay(points).simplices.astype(np.int64)
+    areas = triangle_areas(points, triangles)
+    triangles[areas < 0] = triangles[areas < 0][:, ::-1]
+    return growth.Body(points, triangles[np.abs(areas) > 1e-9], np.column_stack([R == 0, flat]))
+
+
+def cylinder(rings: int, inner: float, more: float) -> Cylinder:
+    """The growing half-cylinder."""
+    body, law = half_disc_body(rings), (inner, more, 1.0)
+    middle = np.linalg.norm(body.reference[body.triangles].mean(axis=1), axis=1)
+    R = np.maximum(np.linalg.norm(body.reference, axis=1), 1e-9)
+    stretch = neo_hookean.cylinder_radius(R, *law) / R
+    return Cylinder(body, inner + more * middle**2, stretch[:, None] * body.reference,
+                    neo_hookean.cylinder_pressure(R, *law))
+
+
+@erratum(
+    "E5", "the sign of the stabilisation in (27)",
+    printed="""(21) and (27) add P (J - theta), (22) subtracts it; (27) then adds + 1/2 sum h^2 / (12 mu_L)
+        |grad P|^2.""",
+    reading="""The sign of P (J - theta) only says which sign P has: with plus, P is the mean stress, "the
+        opposite of the hydrostatic pressure" of the text before (21). The stabilisation must be **subtracted**:
+        Pi is a saddle point, a minimum in phi and a maximum in P, and a positive term in P works against that
+        maximum.""",
+    consequence="""
+        The first Newton step of a half-cylinder with theta = 1 + 1e-4 (3/4 + R^2 / 2) on three meshes: how many
+        eigenvalues of its matrix are negative (a saddle point has one for each pressure), its condition, and
+        the relative L2 error of the pressure.
+
+        {table}
+
+        With the printed sign most pressures sit on the wrong side: as the stabilisation is raised from nothing
+        to what is printed, the matrix becomes singular once for each of them. It need not be singular at the
+        end, and a solver may well return an answer; but that answer is noise, which no refinement cures. With
+        no term at all the pressure of this smooth case comes out too, if less well, from a matrix whose
+        condition is hundreds of times worse.""",
+    quick=True)
+def stabilisation_sign() -> dict[str, str]:
+    """Inertia, condition and error with the stabilisation subtracted, left out, and added."""
+    rows = [[name, *first_step(cylinder(rings, 1 + 0.75e-4, 0.5e-4), sign)]
+            for name, sign in (("subtracted (ours)", 1.0), ("none", 0.0), ("added (printed)", -1.0))
+            for rings in RINGS]
+    return {"table": table(["stabilisation", "pressures", "negative eigenvalues", "condition", "error of P"], rows)}
+
+
+def first_step(case: Cylinder, sign: float) -> list[str]:
+    """Pressures, negative eigenvalues, condition, and error of P after one Newton step from the reference."""
+    body, count = case.body, len(case.pressure)
+    stabilising = sign * growth.stabilisation(body.reference, body.triangles, np.ones(len(case.theta)))
+    system, rest = growth.System(body, stabilising), np.zeros(count)
+    tangent = system.tangent(body.reference, rest)
+    values = np.linalg.eigvalsh(system.sparse.matrix(tangent).toarray())
+    residual = system.residual(body.reference, rest, case.theta)[0]
+    step = system.sparse.solve(tangent, -residual, np.zeros(3 * count))
+    condition, error = np.abs(values).max() / np.abs(values).min(), case.pressure_error(step[2 * count:])
+    return [str(count), str(np.count_nonzero(values < 0)), f"{condition:.0e}", f"{100 * error:.2g} %"]
+
+
+@erratum(
+    "E6", "the configuration of the stabilisation in (27)",
+    printed="""The stabilisation in (27) is an integral over the elements in dv, the letter of the present volume in
+        (30), beside integrals over Omega_B0 in dV. Which shape h_tau and grad P belong to is not said; mu_L is the
+        modulus at t = 0.""",
+    reading="""h, grad and dv of the present shape, and mu_L theta^(-2/3) for mu_L: the modulus that
+        an increment of the deformation feels there, as A = mu_L J^(-2/3) multiplies the deviatoric stress. In
+        quantities of t = 0 this is J^(5/3) times h^2 / (12 mu_L), so that the stabilised problem is the same
+        whether the body has grown little or much.""",
+    consequence="""
+        Half-cylinder grown by theta = m (3/4 + R^2 / 2), equilibrium against the closed form, on three meshes
+        ({nodes} nodes): relative L2 error of the pressure, then its largest nodal error over the largest
+        pressure.
+
+        {table}
+
+        The term of t = 0 fades to {fade_36} and {fade_2000} of the matched one, and what remains at theta =
+        2000 is the pressure without stabilisation. Ours has the same error at both. Places are right to
+        {places} of the radius on all meshes in all cases: the choice matters for stresses alone.""",
+    quick=True)
+def stabilisation_scale() -> dict[str, str]:
+    """Errors of pressure and places at theta = 36 and 2000 for four stabilisations."""
+    kinds = {"none": nothing, "at t = 0: h_0^2 / (12 mu_L)": at_start, "present shape, mu_L": present,
+             "present shape, mu_L theta^(-2/3) (ours)": matched}
+    rows, places = [], 0.0
+    for mean in (36, 2000):
+        cases = [cylinder(rings, 0.75 * mean, 0.5 * mean) for rings in RINGS]
+        for name, kind in kinds.items():
+            found = [equilibrium_errors(case, kind(case)) for case in cases]
+            rows.append([f"{mean}", name, *(f"{100 * p:.1f} %, {100 * most:.0f} %" for p, most, _ in found)])
+            places = max(places, *(x for _, _, x in found))
+    nodes = ", ".join(str(len(half_disc_body(rings).reference)) for rings in RINGS)
+    head = ["m", "stabilisation", *(f"element size R / {rings}" for rings in RINGS)]
+    fades = {f"fade_{mean}": f"1 / {mean ** (5 / 3):.3g}" for mean in (36, 2000)}
+    return {"table": table(head, rows), "nodes": nodes, "places": f"{100 * places:.1f} %", **fades}
+
+
+def nothing(case: Cylinder) -> np.ndarray:
+    """No stabilisation."""
+    return np.zeros((len(case.theta), 3, 3))
+
+
+def at_start(case: Cylinder) -> np.ndarray:
+    """All of it in the configuration of t = 0."""
+    return growth.stabilisation(case.body.reference, case.body.triangles, np.ones(len(case.theta)))
+
+
+def present(case: Cylinder) -> np.ndarray:
+    """The present shape, the modulus of t = 0."""
+    return growth.stabilisation(case.position, case.body.triangles, np.ones(len(case.theta)))
+
+
+def matched(case: Cylinder) -> np.ndarray:
+    """The present shape and modulus."""
+    return growth.stabilisation(case.position, case.body.triangles, case.expansion)
+
+
+def equilibrium_errors(case: Cylinder, stabilising: np.ndarray) -> tuple[float, float, float]:
+    """Errors of the equilibrium next to the exact one: of the pressure in L2, at its worst node, of the places.
+
+    Raises GrowthError where none is found.
+    """
+    system, count = growth.System(case.body, stabilising), len(case.pressure)
+    position, pressure, still = case.position, case.pressure, np.zeros(3 * count)
+    for _ in range(20):
+        residual, size = system.residual(position, pressure, case.theta)
+        if np.max(np.abs(residual[system.free]) / size[system.free]) < 1e-10:
+            worst = np.abs(pressure - case.pressure).max() / np.abs(case.pressure).max()
+            return case.pressure_error(pressure), worst, case.place_error(position)
+        step = system.sparse.solve(system.tangent(position, pressure), -residual, still)
+        position, pressure = position + step[:2 * count].reshape(2, -1).T, pressure + step[2 * count:]
+    raise GrowthError("no equilibrium near the exact one")
+
+
+@erratum(
+    "E11", "uniform growth is not free of stress",
+    printed="""(14)-(17) split C by J^(2/3), "as the material is inherently three-dimensional", while the strain
+        is plane (F33 = 1).""",
+    reading="""As printed. Growth then acts as heating does: the body would like to expand along the third axis
+        too, and cannot. F = sqrt(theta) I has no in-plane shear, but sigma = 0 in the plane needs P = -mu_L
+        theta^(-5/3) (theta - 1) / 3, and across it the stress is compressive. A multiplicative split F = F_e
+        F_g with in-plane F_g would have no stress at all.""",
+    consequence="""
+        A half-disc that grows uniformly from t = 0, in steps of a factor of 1.5 at most:
+
+        {table}
+
+        The pressure that is computed is exact. It scales with mu_L and moves nothing; it matters where stresses
+        are read. It is largest at theta = 2.5, {kilopascal} kPa with Table 1's mu_L = 0.01 MPa, and fades as
+        the body grows.""",
+    quick=True)
+def uniform_growth() -> dict[str, str]:
+    """Pressure, out-of-plane stress and radius of a half-disc grown by theta, against the closed form."""
+    rows, body = [], half_disc_body(10)
+    position, pressure, reached = body.reference, np.zeros(len(body.reference)), 1.0
+    for theta in (2.0, 36.0, 2000.0):
+        for part in np.geomspace(reached, theta, int(np.ceil(np.log(theta / reached) / np.log(1.5))) + 1)[1:]:
+            found = growth.equilibrium(body, np.full(len(body.triangles), part), position, pressure, position)
+            position, pressure, reached = found.position, found.pressure, part
+        exact = neo_hookean.free_growth_pressure(theta)
+        across = neo_hookean.cauchy(np.sqrt(theta) * np.eye(2), exact)[0, 0] + theta ** (-5 / 3) * (1 - theta)
+        errors = np.abs(pressure / exact - 1).max(), np.linalg.norm(position, axis=1).max() / np.sqrt(theta) - 1
+        rows.append([f"{theta:g}", f"{exact:.5f}", f"{across:.5f}", *map(small, errors)])
+    head = ["theta", "P / mu_L", "stress across the plane / mu_L", "largest error of P", "error of the radius"]
+    return {"table": table(head, rows), "kilopascal": f"{10 * neo_hookean.free_growth_pressure(2.5):.2f}"}
+
+
+@erratum(
+    "E17", "the penalty (19) softens as the aggregate grows",
+    printed="(19): U = kappa/2 (J / theta - 1)^2 with a constant kappa, of which (21) is said to be the limit.",
+    reading="""The multiplier of (21), as is all of the scheme. In (19) the counterpart of P is kappa (J / theta
+        - 1) / theta: at a given pressure the volume is wrong by P theta / kappa, so that kappa would have to
+        grow with theta for the same accuracy.""",
+    consequence="""
+        J / theta - 1 of a body that grows uniformly and freely under (19):
+
+        {table}
+
+        For large kappa it is -mu_L theta^(1/3) / (3 kappa): the error grows although the pressure falls (E11),
+        and where kappa is small the body does not grow at all (no J between theta / 2 and theta).""",
+    quick=True)
+def penalty() -> dict[str, str]:
+    """Volume error of uniform free growth under (19), from dPsi/dJ = 0."""
+    rows = []
+    for ratio in (10.0, 100.0, 1e4):
+        rows.append([f"{ratio:g}", *(volume_error(theta, ratio) for theta in (2.0, 36.0, 2000.0))])
+    return {"table": table(["kappa / mu_L", "theta = 2", "theta = 36", "theta = 2000"], rows)}
+
+
+def volume_error(theta: float, ratio: float) -> str:
+    """J / theta - 1 at equilibrium of uniform plane growth under (17) and (19), for kappa / mu_L, J over theta / 2."""
+    def slope(J):
+        return ratio * (J / theta - 1) / theta - neo_hookean.free_growth_pressure(J)
+    if slope(theta / 2) > 0:
+        return "no such J"
+    return f"{100 * (brentq(slope, theta / 2, theta, xtol=1e-14, rtol=1e-14) / theta - 1):.2g} %"
