@@ -26,9 +26,24 @@ def test_no_number_is_missing(report):
     assert re.findall(r"\{\w*\}|\bnan\b|\binf\b", report) == []
 
 
+def section(text, id):
+    """One entry of the report, from its title to the next one's."""
+    return text[text.index(f"## {id}. "):].split("\n## ")[0]
+
+
+def words_and_numbers(text):
+    """The text without its numbers and table rules, and the numbers; line ends do not count."""
+    number = r"(?<![A-Za-z\d_.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
+    return re.sub(number, "#", " ".join(text.split())), [float(found) for found in re.findall(number, text)]
+
+
 @pytest.mark.parametrize("id", QUICK)
 def test_a_quick_entry_prints_the_same_numbers(report, id):
-    assert ERRATA[id].markdown() in report
+    """To 5 % or a last digit: another processor rounds otherwise, and the mesher may then choose another triangle."""
+    words, numbers = words_and_numbers(section(report, id))
+    again, found = words_and_numbers(section(ERRATA[id].markdown(), id))
+    assert again == words
+    assert found == pytest.approx(numbers, rel=0.05, abs=0.02)
 
 
 @pytest.mark.parametrize("id", [id for id in IDS if id not in QUICK])
