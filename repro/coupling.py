@@ -18,6 +18,10 @@ from repro.errors import SimulationError, StageError
 from repro.pore import Pore, Solved
 from repro.transport import Concentrations
 
+#: A step of the grid this close (h) to a reported time is that time.
+SAME_TIME = 1e-9
+
+
 @dataclass(frozen=True)
 class Ledger:
     """Mass balance of one step, per depth (um2 mg/L = 1e-12 g/m): both substrates, then the biomass."""
@@ -57,14 +61,11 @@ def schedule(scene) -> tuple[list[float], set[float]]:
     """Times (h) at which steps end, and those of them that are reported; t = 0 first."""
     if scene.growth is None:
         return [0.0], {0.0}
-    end, step = scene.growth.end, scene.growth.time_step
+    end, step, wanted = scene.growth.end, scene.growth.time_step, scene.output.times
     grid = [round(k * step, 9) for k in range(int(np.ceil(round(end / step, 9))))]
-    wanted = scene.output.times
-    reported = {0.0, *(grid if wanted is None else (round(t, 9) for t in wanted))}
-    if wanted is None:
-        reported.add(round(end, 9))
-    times = sorted({0.0, round(end, 9), *grid, *reported})
-    return times, reported
+    reported = {0.0, *(wanted or (*grid, end))}
+    between = [time for time in grid if min(abs(time - other) for other in (*reported, end)) > SAME_TIME]
+    return sorted({*between, *reported, end}), reported
 
 
 def simulate(scene) -> Iterator[Instant]:
@@ -79,22 +80,27 @@ def simulate(scene) -> Iterator[Instant]:
         solved = pore.solve(scene, now)
     now = replace(now, concentrations=solved.concentrations)
     yield Instant(now, solved, None, (), 0, _newton_counts(solved))
-    ledgers, remeshes, counts = [], 0, {}
+    before, ledgers, remeshes, counts = None, [], 0, {}
     for time in times[1:]:
-        with _stopping(now.time):
-            done = step(scene, now, solved, time - now.time)
-            now, before = replace(done.pore, time=time), done.before
-            solved = pore.solve(scene, now)
+        try:
+            with _stopping(now.time):
+                done = step(scene, now, solved, time - now.time)
+                now, before = replace(done.pore, time=time), done.before
+                solved = pore.solve(scene, now)
+        except PoreEnd:
+            if ledgers:  # steps that are not reported yet
+                yield Instant(now, solved, before, tuple(ledgers), remeshes, counts)
+            raise
         now = replace(now, concentrations=solved.concentrations)
         ledgers.append(done.ledger)
         remeshes += done.remeshed
-        counts = _added(counts, {"growth": done.iterations}, _newton_counts(solved))
-        over = _at_pore_end(scene, now)
+        counts = _added(counts, {"growth": done.iterations}, _newton_counts(before[1]), _newton_counts(solved))
+        over = _pore_end(scene, now, 1.0)
         if time in reported or over:
             yield Instant(now, solved, before, tuple(ledgers), remeshes, counts)
             ledgers, remeshes, counts = [], 0, {}
         if over:
-            raise PoreEnd(over)
+            raise PoreEnd(f"{over} at t = {now.time:g} h")
 
 
 @contextmanager
@@ -119,13 +125,13 @@ def _added(*counts: dict[str, int]) -> dict[str, int]:
     return {key: sum(count.get(key, 0) for count in counts) for key in sorted(keys)}
 
 
-def _at_pore_end(scene, now: Pore) -> str:
-    """Why the run is over, empty while it is not."""
+def _pore_end(scene, now: Pore, elements: float) -> str:
+    """Which end of the pore the aggregate has reached, to so many elements of the fluid; empty while it has not."""
     outline, end = now.outline, scene.pore.length / 2
-    near = scene.pore.width / geometry.ACROSS_PORE
+    near = elements * scene.pore.width / geometry.ACROSS_PORE
     if outline.upstream < near - end or outline.downstream > end - near:
         side = "upstream" if outline.upstream < near - end else "downstream"
-        return f"the aggregate reaches the pore's {side} end at t = {now.time:g} h"
+        return f"the aggregate reaches the pore's {side} end"
     return ""
 
 
@@ -146,6 +152,8 @@ def step(scene, now: Pore, solved: Solved, duration: float) -> Step:
     made = float(np.sum(solved.problem.body * (grown.active + grown.inert - now.active - now.inert)))
     theta = now.theta * (1 + _increase(now, grown) / scene.kinetics.maximum_density)
     expanded, iterations = shape.expand(scene, grown, theta)
+    if leaves := _pore_end(scene, expanded, 0.1):
+        raise PoreEnd(f"{leaves} in the step from t = {now.time:g} h")
     solved = replace(solved, concentrations=end)
     after, remeshed = remeshing.new_mesh(scene, now, expanded, solved)
     ledger = Ledger(now.time, now.time + duration, *flows, _mass(now), made, _mass(after))

@@ -141,16 +141,21 @@ def _solve_with_boundaries(elements, mesh: PoreMesh, found: Forms, interface: st
     where = found.basis.doflocs
 
     def make():
-        wall = (where[1] == 0) | (where[1] == mesh.width)
-        inlet, outlet = where[0] == mesh.ends[0], where[0] == mesh.ends[1]
+        wall = _on(mesh, where[1], 0.0) | _on(mesh, where[1], mesh.width)
+        inlet, outlet = (_on(mesh, where[0], end) for end in mesh.ends)
         held = np.column_stack([wall | inlet, wall | inlet | (outlet if interface == "traction" else False)])
         return saddle_system(found.basis.element_dofs.T, found.pressure_basis.element_dofs.T, held)
 
     system = mesh.once(("flow", interface, found.basis.Nbfun), make)
     value = np.zeros(len(system.held))
-    inlet = np.flatnonzero(where[0] == mesh.ends[0])
+    inlet = np.flatnonzero(_on(mesh, where[0], mesh.ends[0]))
     value[inlet] = inlet_profile(mesh, where[1][inlet])
     return system.solve(elements, np.zeros(len(value)), value)
+
+
+def _on(mesh: PoreMesh, places: np.ndarray, level: float) -> np.ndarray:
+    """Are coordinates on a wall or an end? scikit-fem's places of the unknowns are the mesh's up to round-off."""
+    return np.abs(places - level) < 1e-9 * mesh.width
 
 
 def inlet_profile(mesh: PoreMesh, heights: np.ndarray) -> np.ndarray:

@@ -106,7 +106,7 @@ def extent_too_short(outline: Outline, ends: tuple[float, float], width: float, 
 def interface_sizes(outline: Outline, width: float, refinement: float, thinnest: float) -> np.ndarray:
     """(M,) wanted element size (um) at each node of the outline.
 
-    A tenth of the aggregate's thickness, a fourteenth of the pore's width, and for free nodes that of :func:`film_sizes`.
+    A tenth of the aggregate's thickness, a fourteenth of the pore's width, and for free nodes the film's size.
     """
     size = np.full(len(outline.points), min(outline.thickness / ACROSS_AGGREGATE, width / ACROSS_PORE) / refinement)
     return np.where(outline.wall == FREE, np.minimum(size, film_sizes(outline, width, refinement, thinnest)), size)
@@ -123,9 +123,11 @@ def film_sizes(outline: Outline, width: float, refinement: float, thinnest: floa
 
 
 def size_sources(outline: Outline, width: float, refinement: float, thinnest: float) -> tuple[np.ndarray, np.ndarray]:
-    """Where element sizes are prescribed, (K, 2) um, and how large (K,) um: at the interface nodes and, across the fluid,
-    on the opposite wall, so that a film has elements of one size. Interface edges that are shorter than wanted (they are
-    never merged) are matched by what is around them."""
+    """Where element sizes are prescribed, (K, 2) um, and how large, (K,) um.
+
+    At the interface nodes and, across the fluid, on the opposite wall, so that a film has elements of one size.
+    Interface edges that are shorter than wanted (they are never merged) are matched by what is around them.
+    """
     free = outline.wall == FREE
     near, film = (find(outline, width, refinement, thinnest)[free] for find in (interface_sizes, film_sizes))
     near = np.minimum(near, SPLIT * _longest_edge(outline)[free])

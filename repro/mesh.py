@@ -6,7 +6,10 @@ constrained Delaunay triangulation (shapely) and keeps every edge that it was gi
 
 from __future__ import annotations
 
+import signal
+import threading
 from collections.abc import Callable, Hashable
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -262,11 +265,24 @@ def _mmg(points, triangles, region, rim, prescribed, sizes):
     mmg.set_required_edges(np.arange(len(rim), dtype=np.int32))
     mmg.set_required_vertices(np.unique(rim).astype(np.int32))
     mmg["metric"] = sizes[:, None]
-    mmg.remesh(verbose=-1, hgrad=HGRAD, nosurf=True)
+    with _signals_kept():
+        mmg.remesh(verbose=-1, hgrad=HGRAD, nosurf=True)
     points, (triangles, region) = mmg.get_vertices(), mmg.get_triangles_with_refs()
     found = _find(points, prescribed)
     points[found] = prescribed
     return (points, triangles.astype(np.int64), region), found
+
+
+@contextmanager
+def _signals_kept():
+    """Mmg resets what the process does on Ctrl-C and on termination; put it back."""
+    kept = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        if threading.current_thread() is threading.main_thread():
+            for number, handler in kept.items():
+                signal.signal(number, handler)
 
 
 def _constrained_delaunay(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:

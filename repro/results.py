@@ -73,17 +73,20 @@ def _transient_columns(scene: Scene, instant: Instant) -> dict[str, float]:
     """The substrate balances of the transient scheme: the worst of the steps since the last row, storage included."""
     if scene.numerics.transport != "gear" or instant.solved.concentrations is None:
         return {}
-    steps = [_defect(ledger.supplied[k], ledger.out[k] + ledger.stored[k], ledger.consumed[k])
-             for k in (0, 1) for ledger in instant.ledgers]
-    half = len(steps) // 2
-    return {"acceptor_balance": max(steps[:half], key=abs, default=0.0),
-            "donor_balance": max(steps[half:], key=abs, default=0.0)}
+    problem, found = instant.solved.problem, {}
+    for k, name in enumerate(("acceptor", "donor")):
+        room = problem.both[k].supply * problem.total.sum()
+        steps = [_defect(ledger.supplied[k], ledger.out[k] + ledger.stored[k], ledger.consumed[k], room)
+                 for ledger in instant.ledgers]
+        found[f"{name}_balance"] = max(steps, key=abs, default=0.0)
+    return found
 
 
-def _defect(supplied: float, out: float, consumed: float) -> float:
-    """(in - out - consumed) over the larger of what comes in and what is consumed."""
-    turnover = max(abs(supplied), consumed)
-    return (supplied - out - consumed) / turnover if turnover else 0.0
+def _defect(supplied: float, out: float, consumed: float, room: float = 0.0) -> float:
+    """(in - out - consumed) over the largest of what comes in, what is consumed, and, in the transient, what the meshed
+    part holds at the concentration of the supply."""
+    scale = max(abs(supplied), consumed, room)
+    return (supplied - out - consumed) / scale if scale else 0.0
 
 
 def _aggregate_columns(scene: Scene, instant: Instant) -> dict[str, float]:
@@ -114,7 +117,8 @@ def ledger_row(ledger: Ledger) -> list[float]:
 def fields(scene: Scene, pore, solved) -> meshio.Mesh:
     """The fields of an instant for meshio: places in um, one value a node or a triangle, named with their units.
 
-    In the fluid there is no biomass, stress or pressure P (zero), theta and J are 1, and places have not moved.
+    In the fluid there is no biomass, stress or pressure P (zero), theta and J are 1, and places have not moved. Stress
+    and P are those of the strain since t = 0: a scene whose new biomass is born stress-free has none to tell.
     """
     grid = pore.mesh
     points, cells = {}, {"region": grid.biomass.astype(float)}
@@ -138,13 +142,14 @@ def _add_mechanics(scene: Scene, pore, points: dict, cells: dict) -> None:
     body = np.isin(np.arange(len(grid.points)), grid.body)
     origin = np.where(body[:, None], pore.origin, grid.points)
     points["displacement_um"], points["position_t0_um"] = _three(grid.points - origin), _three(origin)
-    points["pressure_MPa"] = modulus * pore.pressure
     triangles = grid.triangles[grid.biomass]
     F = growth.deformation(grid.points, triangles, mesh.gradients(origin, triangles))
-    stress = modulus * growth.cauchy(F, pore.pressure[triangles].mean(axis=1))
-    names = ("stress_xx_MPa", "stress_yy_MPa", "stress_zz_MPa", "stress_xy_MPa")
-    values = dict(zip(names, stress.T), theta=pore.theta, J=np.linalg.det(F))
-    values["largest_principal_stress_MPa"] = growth.largest_principal(stress)
+    values = {"theta": pore.theta, "J": np.linalg.det(F)}
+    if scene.growth.new_biomass == "stressed":
+        points["pressure_MPa"] = modulus * pore.pressure
+        stress = modulus * growth.cauchy(F, pore.pressure[triangles].mean(axis=1))
+        names = ("stress_xx_MPa", "stress_yy_MPa", "stress_zz_MPa", "stress_xy_MPa")
+        values |= dict(zip(names, stress.T), largest_principal_stress_MPa=growth.largest_principal(stress))
     for name, value in values.items():
         cells[name] = np.full(len(grid.triangles), 1.0 if name in ("theta", "J") else 0.0)
         cells[name][grid.biomass] = value

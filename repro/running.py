@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
+from contextlib import contextmanager
 from pathlib import Path
 from time import perf_counter
 
@@ -11,8 +13,9 @@ from repro.coupling import Instant, PoreEnd, simulate
 from repro.errors import SimulationError
 from repro.scene import Scene
 
-#: Everything that a run writes; a folder that holds anything else is not written to.
-OWN = ("timeseries.csv", "ledger.csv", "fields.pvd", "before_expansion.pvd", "run.json", "fields")
+#: Everything that a run writes, beside its fields; a folder that holds anything else is not written to.
+OWN = ("timeseries.csv", "ledger.csv", "fields.pvd", "before_expansion.pvd", "run.json")
+FIELDS = re.compile(r"(?:\.part-)?(?:fields|before_expansion)_\d{4,}\.vtu")
 
 
 class OutputError(RuntimeError):
@@ -60,14 +63,29 @@ class Recorder:
 
 def prepare(folder: Path) -> None:
     """Make the folder, empty of an earlier run. Raises OutputError where it holds anything else or can't be made."""
-    try:
-        strange = sorted(p.name for p in folder.iterdir() if p.name not in OWN) if folder.exists() else []
+    with _usable(folder):
+        strange = _strange(folder) if folder.exists() else []
         if strange:
             raise OutputError(f"--out {folder}: it holds {strange[0]!r}, which is not of a run; "
                               "a new or empty folder, or one of an earlier run, is accepted")
         (folder / "fields").mkdir(parents=True, exist_ok=True)
-        for old in (*folder.glob("fields/*.vtu"), *(folder / name for name in OWN if name != "fields")):
+        for old in (*(folder / "fields").iterdir(), *(folder / name for name in OWN)):
             old.unlink(missing_ok=True)
+
+
+def _strange(folder: Path) -> list[str]:
+    """What no run has written there: tables count as a run's beside a run.json only, fields by their names."""
+    told = OWN if (folder / "run.json").exists() else ()
+    found = [path.name for path in folder.iterdir() if path.name not in (*told, "fields")]
+    inside = sorted((folder / "fields").iterdir()) if (folder / "fields").is_dir() else []
+    return sorted(found) + [f"fields/{path.name}" for path in inside if not FIELDS.fullmatch(path.name)]
+
+
+@contextmanager
+def _usable(folder: Path):
+    """Tell any trouble with the folder as one of the output's."""
+    try:
+        yield
     except OSError as error:
         why = error.strerror or error
         raise OutputError(f"--out {folder}: {why}; a folder that can be written is needed") from error
@@ -81,17 +99,29 @@ def run(scene: Scene, folder: Path, progress: Callable[[float], None] = lambda t
     """
     prepare(folder)
     timing.reset()
-    recorder, start, status = Recorder(scene, folder), perf_counter(), "interrupted"
+    recorder, start, status = Recorder(scene, folder), perf_counter(), "failed"
+    with _usable(folder):
+        try:
+            status = _simulated(scene, recorder, progress)
+        except SimulationError as error:
+            status = f"failed: {error}"
+            raise
+        except KeyboardInterrupt:
+            status = "interrupted"
+            raise
+        finally:
+            recorder.finish(status, perf_counter() - start)
+    return status
+
+
+def _simulated(scene: Scene, recorder: Recorder, progress: Callable[[float], None]) -> str:
+    """Record every instant of a run; how it ended."""
     try:
         for instant in simulate(scene):
             recorder.add(instant)
             progress(instant.pore.time)
-        status = "completed"
     except PoreEnd as end:
-        status = str(end)
-    except SimulationError as error:
-        status = f"failed: {error}"
-        raise
-    finally:
-        recorder.finish(status, perf_counter() - start)
-    return status
+        return str(end)
+    except MemoryError as error:
+        raise SimulationError(f"out of memory ({error}); try a smaller numerics.refinement") from error
+    return "completed"

@@ -20,6 +20,7 @@ from repro.units import (
     FRACTION,
     NON_NEGATIVE,
     POSITIVE_FRACTION,
+    UP_TO_20,
     Place,
     SceneError,
     choice,
@@ -34,6 +35,7 @@ from repro.units import (
 )
 
 _UNSTEADY = ', or numerics.transport = "gear": nothing is supplied, so that no state is steady'
+MOST_STEPS = 100_000  # shape updates of a run
 Rules = Iterator[tuple[bool, str, str]]  # (is it broken, the key to name, what is accepted)
 
 
@@ -135,7 +137,7 @@ class Numerics:
     interface: str = choice("laplacian", "traction")  # [E2]
     inlet: str = choice("local", "mean")  # u_x(y) or u_ave in (11) [E4]
     fixed_point: str = choice("kept", "rechosen")  # of a contact surface, 2.3.3
-    refinement: float = number(1.0)  # element sizes are divided by it
+    refinement: float = number(1.0, UP_TO_20)  # element sizes are divided by it
     flow_stabilisation: float = number(100.0)  # 3.2: tau = h^2 / (flow_stabilisation nu) [E13]
     mesh_compressibility: float = number(1.0)  # gamma of (35) [E13]
 
@@ -222,6 +224,8 @@ def _rules(scene: Scene) -> Rules:
 def _seed_rules(radius: float, pore: Pore) -> Rules:
     wanted = f"less than pore.width ({pore.width:g} um) and half of pore.length ({pore.length:g} um) is needed"
     yield radius >= pore.width or 2 * radius >= pore.length, "aggregate.radius", wanted
+    wanted = f"a thousandth of pore.width ({pore.width:g} um) or more is needed"
+    yield radius < pore.width / 1000, "aggregate.radius", wanted
 
 
 def _flow_rules(scene: Scene, head: float | None, velocity: float | None) -> Rules:
@@ -243,6 +247,9 @@ def _growth_rules(scene: Scene) -> Rules:
     alone, wanted = not (scene.substrates and scene.aggregate), "[aggregate] and [substrates] are needed with it"
     yield alone and scene.kinetics is not None, "kinetics", wanted
     yield alone and scene.growth is not None, "growth", wanted
+    if scene.growth:
+        wanted = f"growth.end ({scene.growth.end:g} h) over {MOST_STEPS} or more is needed"
+        yield scene.growth.end > MOST_STEPS * scene.growth.time_step, "growth.time_step", wanted
     film, width = scene.growth.minimum_film if scene.growth else 0.0, scene.pore.width
     yield film >= width, "growth.minimum_film", f"less than pore.width ({width:g} um) is needed"
 

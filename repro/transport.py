@@ -7,7 +7,8 @@ so that the substrate taken up and the biomass made are the same sums. For one s
 
 where w = u - tau grad p is the divergence-free velocity of :mod:`repro.flow`. Summed over i, the second term is the net
 flux of u C through the ends, so the balance closes to round-off: supply in = out + consumed. Without flow the supply is
-held at both ends, or nothing passes them ("closed"). With u_ave for the inlet's u_x, (11) reads as printed [E4].
+held at both ends, or nothing passes them ("closed"). With u_ave for the inlet's u_x, (11) reads as printed [E4], and
+what is supplied, u_ave W C_supply, is not quite what enters.
 """
 
 from __future__ import annotations

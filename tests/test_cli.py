@@ -3,6 +3,10 @@
 import csv
 import json
 import math
+import signal
+import subprocess
+import sys
+import time
 from xml.etree import ElementTree
 
 import meshio
@@ -74,8 +78,8 @@ def test_ledger_closes_and_adds_up(tmp_path):
         for name in ("acceptor", "donor"):
             parts = [row[f"{name}_{part}_pg_per_m"] for part in ("supplied", "out", "consumed", "stored")]
             assert abs(parts[0] - sum(parts[1:])) < 1e-8 * parts[0]
-        assert math.isclose(row["biomass_before_pg_per_m"] + row["biomass_made_pg_per_m"], row["biomass_after_pg_per_m"],
-                            rel_tol=1e-10)
+        before, made, after = (row[f"biomass_{part}_pg_per_m"] for part in ("before", "made", "after"))
+        assert math.isclose(before + made, after, rel_tol=1e-10)
     for first, second in zip(ledger, ledger[1:]):
         assert first["biomass_after_pg_per_m"] == second["biomass_before_pg_per_m"]
         assert first["end_h"] == second["start_h"]
@@ -103,6 +107,46 @@ def test_a_folder_with_other_files_is_left_alone(tmp_path, capsys):
     run(tmp_path, "flow_only", status=2)
     assert "thesis.tex" in capsys.readouterr().err
     assert [path.name for path in (tmp_path / "run").iterdir()] == ["thesis.tex"]
+
+
+def test_only_a_runs_own_fields_are_replaced(tmp_path, capsys):
+    """Mutant: clearing every .vtu of the folder."""
+    out = run(tmp_path, "flow_only")
+    (out / "fields" / "mine.vtu").write_text("precious")
+    run(tmp_path, "flow_only", status=2)
+    assert "mine.vtu" in capsys.readouterr().err and (out / "fields" / "mine.vtu").read_text() == "precious"
+
+
+def test_tables_of_somebody_elses_are_left_alone(tmp_path):
+    """A timeseries.csv without a run.json is not a run's. Mutant: taking the name for the proof."""
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "timeseries.csv").write_text("mine")
+    run(tmp_path, "flow_only", status=2)
+    assert (tmp_path / "run" / "timeseries.csv").read_text() == "mine"
+
+
+def test_the_pores_end_ends_a_run_well(tmp_path, capsys):
+    """In one long step the aggregate outgrows a short pore: that is an end, not a failure, and nothing is lost."""
+    out = run(tmp_path, "wide", 'aggregate.radius="40 um"', 'pore.length="90 um"', 'growth.time_step="2 h"',
+              'growth.end="4 h"', 'output.times=["4 h"]')
+    assert "reaches the pore's" in capsys.readouterr().out
+    assert "reaches the pore's" in json.loads((out / "run.json").read_text())["status"] and len(rows(out)) == 1
+
+
+def test_interrupting_a_run_keeps_what_was_computed(tmp_path):
+    """Ctrl-C in the midst of a run, after meshing: status 130, rows and run.json written. Mutant: Mmg's signal handlers
+    left in place."""
+    out = tmp_path / "run"
+    code = ("import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
+            "from repro.cli import main; sys.exit(main(sys.argv[1:]))")
+    process = subprocess.Popen([sys.executable, "-c", code, "run", "base", "--out", str(out)], stderr=subprocess.PIPE)
+    deadline = time.monotonic() + 60
+    while not (out / "fields" / "fields_0002.vtu").exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    message = process.communicate(timeout=60)[1].decode()
+    assert process.returncode == 130 and "interrupted" in message and "Traceback" not in message
+    assert len(rows(out)) >= 3 and json.loads((out / "run.json").read_text())["status"] == "interrupted"
 
 
 def test_a_file_in_the_way_is_refused(tmp_path):

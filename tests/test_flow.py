@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from skfem import Basis, ElementTriP2, MeshTri
 
 from reference import layered_channel, poiseuille
-from repro import flow, geometry
+from repro import flow, geometry, mesh
 from repro.mesh import PoreMesh
 from repro.reprojection import interpolate
 from tests.strategies import LENGTH, attached_aggregates, fitted_order, meshed, plug, relabelled, reversed_mesh
@@ -237,3 +237,14 @@ def test_nothing_slips_and_the_inlet_is_the_scaled_parabola():
     assert np.trapezoid(u, y) == pytest.approx(WIDTH, rel=1e-13)
     ratio = u[1:-1] / poiseuille.velocity(y[1:-1], WIDTH)
     assert ratio == pytest.approx(np.full(len(ratio), ratio[0]), rel=1e-12)
+
+
+@pytest.mark.parametrize("left", [-1 / 3 * 100, -47.123456789012345, -0.1 * 487])
+def test_every_inlet_node_takes_part_wherever_the_ends_are(left):
+    """The discrete influx is u_ave W to round-off at ends that are no round numbers. Mutant: nodes found on the ends by
+    equality with scikit-fem's places, which round-off moves off them."""
+    outline = geometry.seed(1.0)
+    grid, _ = mesh.generate(outline, (left, 0.7 - left / 7), 7.123456, 1.0, 2.0)
+    found = flow.unit_flow(grid, 2000.0)
+    for nodes in (grid.inlet, grid.outlet):
+        assert np.trapezoid(found.velocity[nodes, 0], grid.points[nodes, 1]) == pytest.approx(grid.width, rel=1e-10)

@@ -436,6 +436,14 @@ def test_what_is_long_is_shortened():
     assert len(refusal("base", "x" * 10_000)) < 200
 
 
+def test_what_would_never_end_is_refused():
+    """Mutants: no bound on the number of shape updates, on the size of the seed, on the refinement."""
+    for entry, key in (("growth.time_step=1e-9 h", "growth.time_step"), ("aggregate.radius=1e-6 um", "aggregate.radius"),
+                       ("numerics.refinement=1e9", "numerics.refinement")):
+        with pytest.raises(SceneError, match=key):
+            load_scene("base", [entry])
+
+
 # ---------------------------------------------------------------- round trip and hash
 
 
@@ -447,11 +455,12 @@ def test_round_trip_of_every_packaged_scene(everything):
 @given(st.floats(1e-300, 1e300), st.floats(0, math.pi / 2, exclude_min=True, exclude_max=True), st.floats(0, 1e300))
 def test_round_trip_is_exact(size, angle, velocity):
     tables = {
-        "pore": {"width": "1e301 um", "length": "1e302 um"},
+        "pore": {"width": f"{10 * size!r} um", "length": f"{100 * size!r} um"},
         "aggregate": {"radius": f"{size!r} um"},
         "flow": {"mean_velocity": f"{velocity!r} um/h", "viscosity_ratio": size},
         "substrates": {"donor": {"diffusivity": f"{size!r} um^2/h", "supply": f"{velocity!r} mg/L"}},
-        "growth": {"end": f"{velocity!r} h", "minimum_contact_angle": f"{angle!r} rad"},
+        "growth": {"end": f"{velocity!r} h", "minimum_contact_angle": f"{angle!r} rad",
+                   "time_step": f"{max(velocity, 1e-300)!r} h", "minimum_film": f"{size!r} um"},
         "numerics": {"transport": "gear"},
         "output": {"times": [f"{velocity!r} h"]},
     }

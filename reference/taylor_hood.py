@@ -1,0 +1,171 @@
+"""Stokes flow with a viscosity jump by scikit-fem: Taylor-Hood elements on curved triangles, meshes of its own.
+
+    (nu grad u, grad v) - (p, div v) = 0,   (q, div u) = 0         "laplacian" [E2]
+    (2 nu e(u), e(v)) - (p, div v) = 0,     e = sym grad           "traction", with u_y = 0 at the outlet [E10]
+
+nu = 1 in the fluid and lambda in the biomass, u = the parabola of mean one at the inlet, 0 on the walls. Quadratic
+velocity and linear pressure need no stabilisation: the pressure at the ends is a pressure. Meshes are rings around a
+half-disc, edges of the arc bent onto it, refined towards the two corners where fluid, biomass and wall meet.
+"""
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import Delaunay
+from skfem import (
+    Basis,
+    BilinearForm,
+    ElementTriP1,
+    ElementTriP2,
+    ElementVector,
+    FacetBasis,
+    Functional,
+    MeshTri,
+    MeshTri2,
+    asm,
+    bmat,
+    condense,
+    solve,
+)
+from skfem.helpers import ddot, div, grad, sym_grad
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """A curved mesh of ends x [0, width] and which triangles are biomass."""
+
+    mesh: MeshTri2
+    biomass: np.ndarray
+    width: float
+    ends: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Stokes:
+    """Solution of mean velocity one: loss of p over the mesh; velocity (K, 2) at the corners of triangles (K, 2), and
+    the area around each of them (K,), a weight for norms."""
+
+    loss: float
+    points: np.ndarray
+    velocity: np.ndarray
+    areas: np.ndarray
+
+
+def half_disc(width, ends, radius, refinements, corner=6):
+    """A half-disc of ``radius`` on the lower wall, around x = 0; its coarsest mesh refined ``refinements`` times, and
+    ``corner`` times more near (+-radius, 0)."""
+    points = np.unique(np.round(np.vstack([_rings(width, radius), _box(width, ends, radius)]), 9), axis=0)
+    mesh = MeshTri(points.T.copy(), Delaunay(points).simplices.T.copy())
+    for _ in range(refinements):
+        mesh = _snapped(mesh.refined(), radius)
+    for _ in range(corner):
+        near = [np.flatnonzero((mesh.p[:, mesh.t] == np.array([[[x]], [[0.0]]])).all(axis=0).any(axis=0))
+                for x in (-radius, radius)]
+        mesh = _snapped(mesh.refined(np.concatenate(near)), radius)
+    return Channel(_curved(mesh, radius), _inside(mesh, radius), width, ends)
+
+
+def plug(width, ends, half_length, parts):
+    """Biomass over the full width for |x| < half_length; ``parts`` elements across."""
+    lines = [ends[0], -half_length, half_length, ends[1]]
+    pieces = [np.linspace(a, b, round((b - a) / width * parts) + 1) for a, b in zip(lines, lines[1:])]
+    x = np.unique(np.concatenate(pieces))
+    mesh = MeshTri.init_tensor(x, np.linspace(0.0, width, parts + 1))
+    middle = mesh.p[0, mesh.t].mean(axis=0)
+    return Channel(MeshTri2.from_mesh(mesh), np.abs(middle) < half_length, width, ends)
+
+
+def _rings(width, radius):
+    """Rings around the origin, closer than the wall where it can be."""
+    radii = radius * np.array([0.4, 0.7, 1.0, 1.35, 1.8, 2.5, 3.5, 5.0, 7.0])
+    angle = np.linspace(0.0, np.pi, 11)
+    rings = [r * np.column_stack([np.cos(angle), np.sin(angle)]) for r in radii if r < 0.8 * width or r == radius]
+    points = np.vstack([[[0.0, 0.0]], *rings])
+    return points[points[:, 1] < width - 0.15 * radius]
+
+
+def _box(width, ends, radius):
+    """Nodes of the channel beyond the rings, and of its rim."""
+    reach = radius * max(r for r in (1.0, 1.35, 1.8, 2.5, 3.5, 5.0, 7.0) if r == 1 or r * radius < 0.8 * width)
+    step = width / 6
+    x, y = np.meshgrid(np.linspace(*ends, round((ends[1] - ends[0]) / step) + 1), np.linspace(0.0, width, 7))
+    points = np.column_stack([x.ravel(), y.ravel()])
+    return points[(np.hypot(*points.T) > reach + 0.5 * step) | (points[:, 1] == width)]
+
+
+def _interface(mesh, radius):
+    """Facets between biomass and fluid."""
+    inner = np.flatnonzero(mesh.f2t[1] >= 0)
+    inside = _inside(mesh, radius)
+    return inner[inside[mesh.f2t[0, inner]] != inside[mesh.f2t[1, inner]]]
+
+
+def _inside(mesh, radius):
+    return np.hypot(*mesh.p[:, mesh.t].mean(axis=1)) < radius
+
+
+def _snapped(mesh, radius):
+    """The nodes of the interface put on the arc."""
+    p, nodes = mesh.p.copy(), np.unique(mesh.facets[:, _interface(mesh, radius)])
+    on_wall = p[1] == 0
+    p[:, nodes] *= radius / np.hypot(*p[:, nodes])
+    p[1, on_wall] = 0.0
+    return MeshTri(p, mesh.t)
+
+
+def _curved(mesh, radius):
+    """Quadratic triangles, the middles of the interface's edges on the arc."""
+    basis = Basis(mesh, ElementTriP2())
+    middles = basis.facet_dofs[0, _interface(mesh, radius)]
+    where = basis.doflocs.copy()
+    where[:, middles] *= radius / np.hypot(*where[:, middles])
+    return MeshTri2(where, mesh.t)
+
+
+def stokes(channel, ratio, interface="laplacian"):
+    """Solve; returns :class:`Stokes`."""
+    basis = Basis(channel.mesh, ElementVector(ElementTriP2()), intorder=5)
+    lower = basis.with_element(ElementTriP1())
+    viscosity = np.where(channel.biomass, float(ratio), 1.0)[:, None] * np.ones(basis.dx.shape[1])
+    A, B = asm(_viscous(interface), basis, nu=viscosity), asm(_divergence, basis, lower)
+    K = bmat([[A, -B.T], [-B, None]], "csr")
+    value, held = _boundary(basis, channel, interface)
+    x = np.concatenate([value, np.zeros(lower.N)])
+    solution = solve(*condense(K, np.zeros(len(x)), x=x, D=held))
+    velocity, pressure = np.split(solution, [basis.N])
+    loss = _end_mean(channel, lower, pressure, 0) - _end_mean(channel, lower, pressure, 1)
+    corners = basis.nodal_dofs[:, : channel.mesh.t.max() + 1]
+    share = np.repeat(basis.dx.sum(axis=1)[None] / 3, 3, axis=0)
+    areas = np.bincount(channel.mesh.t[:3].ravel(), share.ravel(), corners.shape[1])
+    return Stokes(loss, basis.doflocs[:, corners[0]].T, velocity[corners].T, areas)
+
+
+def _viscous(interface):
+    if interface == "laplacian":
+        return BilinearForm(lambda u, v, w: w["nu"] * ddot(grad(u), grad(v)))
+    return BilinearForm(lambda u, v, w: 2 * w["nu"] * ddot(sym_grad(u), sym_grad(v)))
+
+
+@BilinearForm
+def _divergence(u, q, w):
+    return div(u) * q
+
+
+def _boundary(basis, channel, interface):
+    """Prescribed values, and the numbers of the prescribed unknowns."""
+    x, y = basis.doflocs
+    component = np.zeros(basis.N, int)
+    component[np.concatenate([basis.nodal_dofs[1], basis.facet_dofs[1]])] = 1
+    near = 1e-9 * channel.width
+    wall = (y < near) | (y > channel.width - near)
+    inlet, outlet = x < channel.ends[0] + near, x > channel.ends[1] - near
+    value = np.where(inlet & (component == 0), 6 * y / channel.width * (1 - y / channel.width), 0.0)
+    held = wall | inlet | (outlet & (component == 1) if interface == "traction" else False)
+    return value, np.flatnonzero(held)
+
+
+def _end_mean(channel, basis, pressure, end):
+    """Mean pressure over the inlet (0) or the outlet (1)."""
+    near = 1e-9 * channel.width
+    facets = channel.mesh.facets_satisfying(lambda x: np.abs(x[0] - channel.ends[end]) < near, boundaries_only=True)
+    side = FacetBasis(channel.mesh, ElementTriP1(), facets=facets, intorder=3)
+    return float(asm(Functional(lambda w: w["p"]), side, p=side.interpolate(pressure))) / channel.width

@@ -1,0 +1,172 @@
+"""The verification can fail: verdicts follow from numbers, orders are judged on both sides, references are their own."""
+import math
+
+import numpy as np
+import pytest
+
+from reference import channel_bvp, channel_fipy, taylor_hood
+from verification import __main__ as driver
+from verification import case, meshes, norms, report
+from verification.case import Check, Outcome, Result, at_least, at_most, between
+from verification.convergence import Study, study
+
+SIZES = 0.5 ** np.arange(4)
+
+
+def result(*checks, studies=(), error=""):
+    return Result("flow-plug", Outcome(checks, studies), error, 1.0)
+
+
+@pytest.mark.parametrize("check, holds", [
+    (at_most("x", 0.9, 1.0, ""), True), (at_most("x", 1.1, 1.0, ""), False), (at_most("x", -0.1, 1.0, ""), False),
+    (at_least("x", 2.0, 1.0, ""), True), (at_least("x", 0.5, 1.0, ""), False),
+    (between("x", 1.5, 1.0, 2.0, ""), True), (between("x", 2.5, 1.0, 2.0, ""), False),
+    (Check("x", math.nan, 0.0, 1.0, ""), False), (at_most("x", math.inf, 1.0, ""), False),
+])
+def test_a_number_holds_in_its_range_alone(check, holds):
+    """Mutant: `not (value > high)`, which not-a-number passes; one side unchecked."""
+    assert check.holds is holds
+
+
+def test_a_case_passes_only_if_it_measures_something_and_all_of_it_holds():
+    """Mutant: any for all; an empty outcome, or one stopped by an error, that passes."""
+    good, bad = at_most("good", 0.5, 1.0, ""), at_most("bad", 2.0, 1.0, "")
+    assert result(good).verdict == case.PASSES
+    for short in (result(good, bad), result(), result(good, error="ValueError"), result(studies=(_of_order(3.0),))):
+        assert short.verdict == case.FALLS_SHORT
+
+
+def _of_order(order, ceiling=math.inf):
+    return study("error", SIZES, SIZES**order, 2, "", ceiling=ceiling)
+
+
+@pytest.mark.parametrize("order, holds", [(2.0, True), (2.4, True), (1.6, True), (1.0, False), (3.0, False), (0.0, False)])
+def test_a_wrong_order_is_caught_on_both_sides(order, holds):
+    """Mutant: `orders >= low` alone; the mean of the orders for each of them."""
+    assert _of_order(order).holds is holds
+
+
+def test_one_bad_pair_is_enough():
+    errors = SIZES**2 * [1, 1, 4, 1]
+    assert not study("error", SIZES, errors, 2, "").holds
+
+
+@pytest.mark.parametrize("errors", [[1, 0.25, 0.0625, math.nan], [1, 0.25, 0.0625, 0.0], [1, 1, 1, 1]])
+def test_errors_that_are_no_errors_fail(errors):
+    assert not study("error", SIZES, errors, 2, "").holds
+
+
+def test_the_last_error_must_be_small_enough():
+    assert _of_order(2.0, ceiling=0.02).holds and not _of_order(2.0, ceiling=0.01).holds
+
+
+@pytest.mark.parametrize("sizes", [[1, 0.5, 0.25], [1, 0.5, 0.25, 0.25], [0.25, 0.5, 1, 2]])
+def test_a_study_takes_four_falling_sizes(sizes):
+    with pytest.raises(ValueError, match="4 or more falling sizes"):
+        Study("error", np.array(sizes, float), np.array(sizes, float) ** 2, 1.5, 2.5, "")
+
+
+@pytest.mark.parametrize("value, quantum, text", [
+    (1.23456e-3, 5e-5, "0.00123"), (3e-16, 5e-11, "under 1e-11"), (2.0004, 0.01, "2"), (41.27, 0.5, "41.3"),
+    (math.nan, 0.1, "nan"),
+])
+def test_numbers_are_told_to_their_tolerance(value, quantum, text):
+    """Mutant: all digits, so that REPORT.md changes with every run."""
+    assert case.rounded(value, quantum) == text
+
+
+def test_an_error_in_a_case_is_a_failure_with_its_reason():
+    chosen = case.Case("x", "flow", "c", "exact", "n", "m", lambda: 1 / 0)
+    found = case.run(chosen)
+    assert not found.holds and "ZeroDivisionError" in found.error
+
+
+def test_floating_point_warnings_are_errors_in_a_case():
+    chosen = case.Case("x", "flow", "c", "exact", "n", "m", lambda: Outcome((at_most("q", np.zeros(1) / 0, 1, ""),)))
+    assert "FloatingPointError" in case.run(chosen).error
+
+
+def test_every_stage_has_cases_and_each_says_what_must_break_it():
+    driver.load()
+    assert {c.stage for c in case.CASES.values()} == set(case.STAGES)
+    assert all(c.claim and c.norm and c.mutant and c.kind in case.KINDS for c in case.CASES.values())
+
+
+def test_a_case_is_registered_once():
+    driver.load()
+    with pytest.raises(ValueError, match="flow-plug"):
+        case.case("flow-plug", claim="c", kind="exact", norm="n", mutant="m")(lambda: Outcome())
+
+
+def test_selection_by_stage_and_by_id():
+    driver.load()
+    assert driver.selected([], []) == [c.id for s in case.STAGES for c in case.CASES.values() if c.stage == s]
+    assert driver.selected(["growth"], ["flow-plug"])[0] == "flow-plug"
+    assert all(case.CASES[i].stage == "growth" for i in driver.selected(["growth"], []))
+    with pytest.raises(SystemExit, match="no case"):
+        driver.selected([], ["nonsense"])
+
+
+@pytest.mark.parametrize("id", ["growth-stress", "growth-homogeneous", "reprojection-supermesh", "mesh_motion-plug"])
+def test_a_quick_case_runs_and_passes(id):
+    driver.load()
+    found = case.run(case.CASES[id])
+    assert found.holds, report.table([found])
+
+
+def test_a_mutant_is_caught(monkeypatch):
+    """J^(1/3) in the stress: the closed form sees it."""
+    from repro import growth
+    driver.load()
+    monkeypatch.setattr(growth, "cauchy", lambda F, P: _wrong_cauchy(F, P, growth.piola(F, P)))
+    assert not case.run(case.CASES["growth-stress"]).holds
+
+
+def _wrong_cauchy(F, P, S):
+    J = np.linalg.det(F) ** 0.5
+    sigma = np.einsum("...ik,...jk->...ij", S, F) / J[..., None, None]
+    return np.stack([sigma[..., 0, 0], sigma[..., 1, 1], P, sigma[..., 0, 1]], axis=-1)
+
+
+def test_the_exit_status_is_the_verdict(monkeypatch, capsys):
+    """Mutant: exit 0 whatever fails; exit 0 of a run without cases."""
+    driver.load()
+    for checks, status in (((at_most("q", 0.5, 1.0, ""),), 0), ((at_most("q", 2.0, 1.0, ""),), 1)):
+        monkeypatch.setattr(driver, "run_all", lambda ids, jobs, found=checks: [result(*found)])
+        assert driver.main(["flow"]) == status
+    monkeypatch.setattr(driver, "run_all", lambda ids, jobs: [])
+    assert driver.main(["flow"]) == 1
+    assert "0 of 1 cases pass" in capsys.readouterr().out
+
+
+def test_the_report_says_what_fell_short_and_holds_no_time():
+    driver.load()
+    found = [result(at_most("quantity A", 2.0, 1.0, "theory"))]
+    assert "quantity A: 2; expected at most 1 (theory)" in report.table(found)
+    text = report.markdown(found)
+    assert "FALLS SHORT" in text and "| quantity A | 2 | at most 1 | theory | NO |" in text
+    assert "seconds" not in text and "1.0 s" not in text
+
+
+def test_random_meshes_cover_their_rectangle_and_follow_their_lines():
+    grid = meshes.channel((-10.0, 20.0), 8.0, 1.1, lambda x, y: (x > 0) & (y < 3), across=(0.0,), along=(3.0,), seed=3)
+    assert grid.areas.min() > 0 and grid.areas.sum() == pytest.approx(240.0, rel=1e-13)
+    assert grid.areas[grid.biomass].sum() == pytest.approx(60.0, rel=1e-13)
+    assert norms.l2_error(grid.points, grid.triangles, grid.points[:, 0], lambda x, y: x) < 1e-14
+    assert norms.sample(grid.points, grid.triangles, grid.points, np.array([[1.5, 2.5]])) == pytest.approx(
+        np.array([[1.5, 2.5]]))
+
+
+def test_taylor_hood_holds_poiseuille_and_the_plug_exactly():
+    found = taylor_hood.stokes(taylor_hood.plug(5.0, (-10.0, 10.0), 4.0, 3), 100.0)
+    assert found.loss == pytest.approx(12 / 25 * (12 + 100 * 8), rel=1e-10)
+
+
+def test_finite_volumes_and_collocation_agree_and_conserve():
+    rates = {"k": 0.4, "F": 1.5, "decay": 0.006, "K_A": 1.0, "K_D": 1.0}
+    given = (1e5, (10.0, 10.0), (1e7, 4e6), (8e6, 3e6), 3e4, rates, 40.0)
+    fine = channel_fipy.Channel(120, (-40.0, 80.0), *given)
+    ours, theirs = fine.steady(), channel_bvp.strip(fine.x, *given)
+    assert np.abs(ours - theirs).max() < 1e-3
+    taken = 3e4 * channel_bvp.uptake(*ours, rates)[0][fine.density > 0].sum()
+    assert taken == pytest.approx(1e5 * (10 - ours[0, -1]), rel=1e-8)

@@ -1,0 +1,41 @@
+"""Norms of the error of fields that are linear on triangles, and what they are on a line."""
+
+from __future__ import annotations
+
+import numpy as np
+from skfem import Basis, ElementTriP1, MeshTri
+from skfem.quadrature import get_quadrature_tri
+
+from repro.mesh import PoreMesh
+
+WEIGHTS = get_quadrature_tri(6)
+
+
+def quadrature(points: np.ndarray, triangles: np.ndarray):
+    """Points (t, q, 2), weights (t, q) and nodal functions (q, 3) of a rule of degree six."""
+    (s, t), weight = WEIGHTS
+    shape = np.column_stack([1 - s - t, s, t])
+    corner = points[triangles]
+    a, b = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    double = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+    return np.einsum("qa,tai->tqi", shape, corner), double[:, None] * weight, shape
+
+
+def l2_error(points, triangles, values, exact) -> float:
+    """L2 norm of a nodal field (N,) or (N, m) less exact(x, y), over that of exact(x, y)."""
+    where, weight, shape = quadrature(points, triangles)
+    truth = exact(where[..., 0], where[..., 1])
+    found = np.einsum("qa,ta...->tq...", shape, np.asarray(values)[triangles])
+    weight = weight.reshape(weight.shape + (1,) * (truth.ndim - 2))
+    return float(np.sqrt(np.sum(weight * (found - truth) ** 2) / np.sum(weight * truth**2)))
+
+
+def sample(points, triangles, values, where) -> np.ndarray:
+    """A nodal field (N,) or (N, m) at points (K, 2) of the mesh, by scikit-fem's search for the triangle of each."""
+    weights = Basis(MeshTri(points.T.copy(), triangles.T.copy()), ElementTriP1()).probes(where.T)
+    return weights @ np.asarray(values)
+
+
+def mean_size(mesh: PoreMesh) -> float:
+    """Side of the square of mean triangle area twice over: the spacing of a lattice of as many nodes, um."""
+    return float(np.sqrt(2 * mesh.areas.mean()))
