@@ -78,7 +78,7 @@ def study(quantity: str, sizes, errors, order: float, origin: str, *, ceiling: f
                  ceiling)
 
 
-def refine(measure: Callable[[float], dict[str, float]], sizes) -> dict[str, np.ndarray]:
-    """Errors of each field on each size: ``measure(size)`` gives {field: error}."""
-    rows = [measure(size) for size in sizes]
+def refine(measure: Callable[..., dict[str, float]], sizes, *given) -> dict[str, np.ndarray]:
+    """Errors of each field on each size: ``measure(size, *given)`` gives {field: error}."""
+    rows = [measure(size, *given) for size in sizes]
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}

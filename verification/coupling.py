@@ -125,7 +125,7 @@ def _solved(*changes: str) -> dict[str, float]:
 
 @case("coupling-special-cases", kind="property", norm="relative difference, or largest difference over the size",
       claim="lambda = 1 is an empty channel; without growth the pore is fixed; mu_L does not matter without tractions",
-      mutant="lambda applied to the fluid; a stale theta; mu_L multiplying the constraint")
+      mutant="a jump at the interface that is not in the viscosity, in tau for instance; theta grown by a clock")
 def special_cases() -> Outcome:
     grid, _ = mesh.generate(geometry.seed(20.0), (-75.0, 75.0), 50.0, 1.0, 2.0)
     bare = mesh.PoreMesh(grid.points, grid.triangles, np.zeros_like(grid.biomass), np.empty(0, int), grid.width,

@@ -174,7 +174,7 @@ def _cylinder_errors(refinement: float, top: float) -> dict[str, float]:
 def half_cylinder() -> Outcome:
     studies, profiles = [], []
     for top in (36.0, 2000.0):
-        errors = refine(lambda refinement: _cylinder_errors(refinement, top), REFINEMENTS)
+        errors = refine(_cylinder_errors, REFINEMENTS, top)
         for name, order, ceiling in (("outline", 2, 2e-3), ("position", 2, 2e-3), ("pressure", 1.5, 5e-2)):
             why = SECOND if order == 2 else "stabilised linear pressure: between first and second order"
             studies.append(study(f"{name}, theta to {top:g}", errors["size"], errors[name], order, why,

@@ -85,7 +85,7 @@ def chain() -> Outcome:
             p, t = q, s
         drift[name] = abs(_integral(p, t, field[:, 0]) / start - 1)
     return Outcome((at_most("projection", drift["projection"], 1e-11, "issue 3"),
-                    at_least("interpolation, for comparison", drift["interpolation"], 1e-5,
+                    at_least("interpolation, for comparison", drift["interpolation"], 1e-3,
                              "not conserving: the case would see it")))
 
 
@@ -103,6 +103,6 @@ def mass() -> Outcome:
     inside = before > 0
     kept = np.abs(found * moved.lumped(grid.biomass) - field * before)[inside].max() / (field * before).max()
     scaled = reprojection.reproject(field, before, stretched.lumped(grid.biomass))
-    return Outcome((at_most("mass of a node", kept, 1e-14, ROUND_OFF),
-                    at_most("all areas times 1.69", np.abs(scaled * 1.69 - field).max(), 1e-13, ROUND_OFF),
+    return Outcome((at_most("mass of a node", kept, 1e-13, ROUND_OFF),
+                    at_most("all areas times 1.69", np.abs(scaled * 1.69 - field).max(), 1e-12, ROUND_OFF),
                     at_most("outside the biomass", np.abs(found[~inside]).max(), 0.0, "(34): biomass nodes only")))
