@@ -16,7 +16,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 help:
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/\1|\2/p' Makefile | awk -F'|' '{ printf "  make %-9s %s\n", $$1, $$2 }'
 
-env: $(STAMP) ## make .venv from requirements.lock, with this package in it (PYTHON=... chooses the interpreter)
+env: $(STAMP) ## make .venv from requirements.lock, with this package in it (PYTHON=python3.12 ...)
 
 figures: $(STAMP) ## run the paper's simulations and draw its figures into paper_figures/out
 	@$(BIN) -m paper_figures

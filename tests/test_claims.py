@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from verification import claims
-from verification.claims import CHANGED, CONTRADICTED, EXPECTED, REPRODUCED, ClaimError, Finding
+from verification.claims import CHANGED, CONTRADICTED, EXPECTED, REPRODUCED, ClaimError, Finding, independence, report
 from verification.claims import __main__ as driver
-from verification.claims import independence, report
 from verification.claims.mass_balance import Bookkeeping
 
 GOOD = claims.near("speed (m/d)", "2.9", 2.91, 2.9, relative=0.01, why="1 %")

@@ -438,9 +438,8 @@ def test_what_is_long_is_shortened():
 
 def test_what_would_never_end_is_refused():
     """Mutants: no bound on the number of shape updates, on the size of the seed, on the refinement."""
-    for entry, key in (("growth.time_step=1e-9 h", "growth.time_step"), ("aggregate.radius=1e-6 um", "aggregate.radius"),
-                       ("numerics.refinement=1e9", "numerics.refinement")):
-        with pytest.raises(SceneError, match=key):
+    for entry in ("growth.time_step=1e-9 h", "aggregate.radius=1e-6 um", "numerics.refinement=1e9"):
+        with pytest.raises(SceneError, match=entry.split("=")[0]):
             load_scene("base", [entry])
 
 

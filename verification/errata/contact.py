@@ -25,6 +25,6 @@ def fixed_point() -> dict[str, str]:
     for run, time in ((BASE, PLOTTED), (WIDE, 45.0)):
         kept, rechosen = at(run, time), at(AGAIN[run], time)
         rows.append([f"{run[0]}, {time:g} h, kept (ours)", *(f"{kept[key]:.4g}" for key in COLUMNS)])
-        rows.append([f"{run[0]}, {time:g} h, rechosen", *(f"{rechosen[key]:.4g} ({percent(rechosen[key] / kept[key], 1)})"
-                                                        for key in COLUMNS)])
+        moved = (f"{rechosen[key]:.4g} ({percent(rechosen[key] / kept[key], 1)})" for key in COLUMNS)
+        rows.append([f"{run[0]}, {time:g} h, rechosen", *moved])
     return {"table": table(["", *COLUMNS.values()], rows)}
