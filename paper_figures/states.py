@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 from matplotlib.tri import Triangulation
 
 from repro.reprojection import interpolate
+from repro.results import read_table
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +112,7 @@ def every(folder: Path, hours: float) -> list[State]:
 
 def series(folder: Path) -> dict[str, np.ndarray]:
     """Columns of `timeseries.csv`, not-a-number where a field is empty."""
-    return _columns(folder / "timeseries.csv")
+    return read_table(folder / "timeseries.csv")
 
 
 def row(folder: Path, time: float) -> dict[str, float]:
@@ -126,11 +126,5 @@ def row(folder: Path, time: float) -> dict[str, float]:
 
 def last_step(folder: Path) -> tuple[float, float]:
     """Start and end of the last shape update: the geometry before it was shaped at the start."""
-    table = _columns(folder / "ledger.csv")
+    table = read_table(folder / "ledger.csv")
     return float(table["start_h"][-1]), float(table["end_h"][-1])
-
-
-def _columns(path: Path) -> dict[str, np.ndarray]:
-    with path.open(newline="", encoding="utf-8") as lines:
-        rows = list(csv.DictReader(lines))
-    return {name: np.array([float(r[name] or "nan") for r in rows]) for name in rows[0]}

@@ -19,8 +19,7 @@ RESOLUTION = 250
 LAYOUT_PASSES = 2
 
 #: Okabe and Ito's colours by what they stand for.
-BLUE, ORANGE, GREEN, RED, SKY, PURPLE, BLACK = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7",
-                                                "#000000")
+BLUE, RED, SKY, BLACK = "#0072B2", "#D55E00", "#56B4E9", "#000000"
 FLUID, BIOMASS, RIM, WALL, FAINT = "#E6F1F9", "#F3D08B", "#7A4A00", "#555555", "#9A9A9A"
 MAP = "viridis"
 

@@ -54,6 +54,10 @@ class Outline:
         """Area of the polygon (um2)."""
         return polygon_area(self.points)
 
+    def edge_lengths(self) -> np.ndarray:
+        """(M,) length (um) of the edge from node i to node i + 1."""
+        return np.linalg.norm(np.roll(self.points, -1, axis=0) - self.points, axis=1)
+
     def interface_edges(self) -> np.ndarray:
         """(M,) True where the edge from node i to node i + 1 borders the fluid: its ends are not on one same wall."""
         after = np.roll(self.wall, -1)
@@ -130,16 +134,11 @@ def size_sources(outline: Outline, width: float, refinement: float, thinnest: fl
     """
     free = outline.wall == FREE
     near, film = (find(outline, width, refinement, thinnest)[free] for find in (interface_sizes, film_sizes))
-    near = np.minimum(near, SPLIT * _longest_edge(outline)[free])
+    edge = outline.edge_lengths()
+    near = np.minimum(near, SPLIT * np.maximum(edge, np.roll(edge, 1))[free])
     across = np.column_stack([outline.points[free, 0], np.full(len(near), width)])
     there = np.isfinite(film)
     return np.vstack([outline.points[free], across[there]]), np.concatenate([near, film[there]])
-
-
-def _longest_edge(outline: Outline) -> np.ndarray:
-    """(M,) length (um) of the longer of the two edges at each node."""
-    edge = np.linalg.norm(np.roll(outline.points, -1, axis=0) - outline.points, axis=1)
-    return np.maximum(edge, np.roll(edge, 1))
 
 
 def graded_size(where: np.ndarray, sources: np.ndarray, sizes: np.ndarray, largest: float) -> np.ndarray:

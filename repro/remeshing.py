@@ -32,9 +32,8 @@ def new_mesh(scene, now: Pore, expanded: Pore, solved: Solved) -> tuple[Pore, bo
 def _too_coarse(scene, outline: geometry.Outline) -> bool:
     """Is an interface edge twice longer than a new mesh would have it?"""
     sizes = geometry.interface_sizes(outline, scene.pore.width, scene.numerics.refinement, pore.film(scene))
-    edge = np.linalg.norm(np.roll(outline.points, -1, axis=0) - outline.points, axis=1)
     wanted = 0.5 * (sizes + np.roll(sizes, -1))
-    return bool((outline.interface_edges() & (edge > 2 * geometry.SPLIT * wanted)).any())
+    return bool((outline.interface_edges() & (outline.edge_lengths() > 2 * geometry.SPLIT * wanted)).any())
 
 
 def remesh(scene, now: Pore, expanded: Pore, solved: Solved) -> Pore:
@@ -77,7 +76,7 @@ def _expansion(grid: mesh.PoreMesh, origin: np.ndarray) -> np.ndarray:
     if reference.min() <= 0:
         worst = grid.points[grid.triangles[grid.biomass][np.argmin(reference)]].mean(axis=0)
         raise MeshError(f"after a remesh the places at t = 0 fold near x = {worst[0]:.4g}, y = {worst[1]:.4g} um; "
-                             "try a larger numerics.refinement")
+                        "try a larger numerics.refinement")
     return grid.areas[grid.biomass] / reference
 
 

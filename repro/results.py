@@ -200,6 +200,13 @@ def write_table(path: Path, columns: list[str], rows: list[list]) -> None:
     write_text(path, text.getvalue())
 
 
+def read_table(path: Path) -> dict[str, np.ndarray]:
+    """The columns of a CSV table that a run has written; an empty field is not-a-number."""
+    with path.open(encoding="utf-8", newline="") as lines:
+        rows = list(csv.DictReader(lines))
+    return {name: np.array([float(row[name] or "nan") for row in rows]) for name in rows[0]}
+
+
 def provenance(scene: Scene) -> dict:
     """The scene as read, its hash, and the versions that its numbers come from."""
     return {"scene": scene.name, "hash": scene_hash(scene), "tables": scene_tables(scene),

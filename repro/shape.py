@@ -38,7 +38,7 @@ def expand(scene, grown: Pore, theta: np.ndarray) -> tuple[Pore, int]:
             return _reprojected(grown, start, push, theta, wall, _with_new_surface(outline)), iterations
         wall = np.where(joins != geometry.FREE, joins, wall)
     raise GrowthError(f"the contact surfaces still change after {CONTACT_ROUNDS} rounds; "
-                             "try a shorter growth.time_step")
+                      "try a shorter growth.time_step")
 
 
 def _held(count: int, rim: np.ndarray, wall: np.ndarray, fixed: np.ndarray) -> np.ndarray:

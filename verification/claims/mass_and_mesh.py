@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from repro import coupling, mesh, remeshing, reprojection, shape
+from repro.results import read_table
 from verification.claims import Finding, at_least, at_most, claim
 from verification.claims.restored import bodies, solved_pore
-from verification.claims.runs import BASE, WIDE, columns, folder, scene, series
+from verification.claims.runs import BASE, WIDE, folder, scene, series
 
 INSTANTS = (0.0, 5.0, 10.0, 15.0, 19.2)
 
@@ -18,7 +19,7 @@ INSTANTS = (0.0, 5.0, 10.0, 15.0, 19.2)
        "python -m verification.claims C23", (BASE,))
 def reprojection_conserves() -> Finding:
     """(34) in five updates of base: the mass of every node before and after; the total over every update of the run."""
-    book, rows = columns(folder(*BASE) / "ledger.csv"), series(*BASE)
+    book, rows = read_table(folder(*BASE) / "ledger.csv"), series(*BASE)
     before, made, after = (book[f"biomass_{part}_pg_per_m"] for part in ("before", "made", "after"))
     checks = (at_most("mass of a node: largest relative change", "conserved", max(map(node_defect, INSTANTS)), 1e-12,
                       "(33) is exact; round-off"),

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from repro.results import read_table
 from verification.claims import Finding, at_least, at_most, between, claim, near
-from verification.claims.runs import BASE, LAST, PLATES, at, columns, fields_at, folder, scene, series
+from verification.claims.runs import BASE, LAST, PLATES, at, fields_at, folder, scene, series
 from verification.claims.states import full_biomass, half_disc, saved_mesh, solution
 
 PAPER_CORRECTION = 1.016
@@ -66,7 +67,7 @@ def bookkeeping(run) -> Bookkeeping:
     The ledger holds the mean of the outflows at both ends of a step, so that the one at its end, before the expansion,
     follows from the one at its beginning.
     """
-    steps, rows, said = columns(folder(*run) / "ledger.csv"), series(*run), scene(*run)
+    steps, rows, said = read_table(folder(*run) / "ledger.csv"), series(*run), scene(*run)
     supply = np.array([[said.substrates.acceptor.supply], [said.substrates.donor.supply]])
     volume = steps["acceptor_supplied_pg_per_m"] / supply[0]
     out, consumed = (np.array([steps[f"{name}_{part}_pg_per_m"] for name in SUBSTRATES])

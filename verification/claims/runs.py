@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from functools import cache
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from paper_figures import runs as figures
 from repro.cache import cached_runs
+from repro.results import read_table
 from repro.scene import Scene, load_scene
 
 #: Runs of figures and claims, by scene and source.
@@ -40,17 +40,10 @@ def folder(*run: str) -> Path:
     return compute([run])[0]
 
 
-def columns(path: Path) -> dict[str, np.ndarray]:
-    """The columns of a CSV table; an empty field is not-a-number."""
-    with open(path, encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
-    return {name: np.array([float(row[name] or "nan") for row in rows]) for name in rows[0]}
-
-
 @cache
 def series(*run: str) -> dict[str, np.ndarray]:
     """Columns of a run's ``timeseries.csv``."""
-    return columns(folder(*run) / "timeseries.csv")
+    return read_table(folder(*run) / "timeseries.csv")
 
 
 def row_number(run: tuple[str, ...], time: float) -> int:

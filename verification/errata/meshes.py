@@ -6,7 +6,8 @@ import numpy as np
 
 from repro import geometry, mesh, mesh_motion, reprojection
 from repro.mesh import triangle_areas
-from verification.claims.runs import BASE, columns, folder, scene
+from repro.results import read_table
+from verification.claims.runs import BASE, folder, scene
 from verification.claims.states import half_disc
 from verification.errata import LINEAR, erratum, percent, small, table
 
@@ -42,7 +43,7 @@ def transfers() -> dict[str, str]:
 
 def biomass_defects(run) -> np.ndarray:
     """Relative defect of the biomass in each step of a run."""
-    steps = columns(folder(*run) / "ledger.csv")
+    steps = read_table(folder(*run) / "ledger.csv")
     before, made, after = (steps[f"biomass_{part}_pg_per_m"] for part in ("before", "made", "after"))
     return (after - before - made) / after
 
