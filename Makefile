@@ -11,10 +11,10 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help env figures claims verify test bench clean
+.PHONY: help env figures claims verify verify-fast mutants test test-thorough bench clean
 
 help:
-	@sed -n 's/^\([a-z]*\):.*## \(.*\)/\1|\2/p' Makefile | awk -F'|' '{ printf "  make %-9s %s\n", $$1, $$2 }'
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1|\2/p' Makefile | awk -F'|' '{ printf "  make %-13s %s\n", $$1, $$2 }'
 
 env: $(STAMP) ## make .venv from requirements.lock, with this package in it (PYTHON=python3.12 ...)
 
@@ -27,8 +27,17 @@ claims: $(STAMP) ## judge every claim of the paper by a computed number
 verify: $(STAMP) ## run the verification cases against references that do not use repro
 	@$(BIN) -m verification
 
+verify-fast: $(STAMP) ## the quick ones of these cases, which make test runs too
+	@$(BIN) -m verification --fast
+
+mutants: $(STAMP) ## run wrong changes of the code against the cases, each of which must be caught
+	@$(BIN) -m verification.mutants
+
 test: $(STAMP) ## run the tests
 	@$(BIN) -m pytest
+
+test-thorough: $(STAMP) ## run the tests with many more random examples
+	@HYPOTHESIS_PROFILE=thorough $(BIN) -m pytest
 
 bench: $(STAMP) ## print where the time goes
 	@$(BIN) -m verification.bench

@@ -1,6 +1,6 @@
 """Run the verification: ``python -m verification [STAGE ...]``. Exit status 1 if any case falls short.
 
-A whole run writes ``verification/report``; a run of some stages prints its table only.
+A whole run writes ``verification/report``; a run of some stages, or a fast one, prints its table only.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from verification import case, report
 def main(arguments: list[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     chosen = _parser().parse_args(arguments)
-    results = run_all(selected(chosen.stages, chosen.case), chosen.jobs)
+    results = run_all(selected(chosen.stages, chosen.case, chosen.fast), chosen.jobs)
     print(report.table(results))
-    if not (chosen.stages or chosen.case):
+    if not (chosen.stages or chosen.case or chosen.fast):
         print(f"report: {report.write(results)}")
     return 0 if results and all(result.holds for result in results) else 1
 
@@ -29,18 +29,19 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("stages", nargs="*", metavar="STAGE", choices=[*case.STAGES, []], default=[],
                         help=f"{', '.join(case.STAGES)}; all by default")
     parser.add_argument("--case", action="append", default=[], metavar="ID", help="this case alone; may be repeated")
+    parser.add_argument("--fast", action="store_true", help="without the cases that are marked as slow")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes; one a core by default")
     return parser
 
 
-def selected(stages, ids) -> list[str]:
+def selected(stages, ids, fast: bool = False) -> list[str]:
     """Ids of the cases of some stages, or of some ids, in the order of the stages; all where both are empty."""
     load()
     unknown = [i for i in ids if i not in case.CASES]
     if unknown:
         sys.exit(f"no case {unknown[0]!r}; there are {', '.join(case.CASES)}")
     wanted = stages or (case.STAGES if not ids else ())
-    return [c.id for c in case.CASES.values() if c.stage in wanted or c.id in ids]
+    return [c.id for c in case.CASES.values() if (c.stage in wanted and not (fast and c.slow)) or c.id in ids]
 
 
 def load() -> None:

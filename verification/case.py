@@ -107,15 +107,17 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Case:
-    """id: "flow-poiseuille"; claim: one sentence; norm: what is measured and how; mutant: the change of code that must
-    make the case fail; function: () -> Outcome."""
+    """id: "flow-poiseuille"; claim: one sentence; norm: what is measured and how; mutants: ids of changes of code (see
+    :mod:`verification.mutants`), each of which must make the case fall short; slow: left out by ``make verify-fast``;
+    function: () -> Outcome."""
 
     id: str
     stage: str
     claim: str
     kind: str
     norm: str
-    mutant: str
+    mutants: tuple[str, ...]
+    slow: bool
     function: Callable[[], Outcome]
 
 
@@ -142,13 +144,12 @@ class Result:
 CASES: dict[str, Case] = {}
 
 
-def case(id: str, *, claim: str, kind: str, norm: str, mutant: str):
-    """Register the decorated function () -> Outcome; the stage is the name of its module."""
+def case(id: str, *, claim: str, kind: str, norm: str, mutants: tuple[str, ...], slow: bool = False):
+    """Register the decorated function () -> Outcome; the stage is the package of its module."""
     def register(function: Callable[[], Outcome]) -> Callable[[], Outcome]:
-        stage = function.__module__.rpartition(".")[2]
-        if id in CASES or kind not in KINDS or not all((claim, norm, mutant)):
-            raise ValueError(f"{id}: registered twice, of an unknown kind, or without claim, norm or mutant")
-        CASES[id] = Case(id, stage, claim, kind, norm, mutant, function)
+        if id in CASES or kind not in KINDS or not all((claim, norm, mutants)):
+            raise ValueError(f"{id}: registered twice, of an unknown kind, or without claim, norm or mutants")
+        CASES[id] = Case(id, function.__module__.split(".")[1], claim, kind, norm, mutants, slow, function)
         return function
     return register
 

@@ -14,8 +14,9 @@ import numpy as np
 from verification.case import rounded
 
 FEWEST = 4
-#: Half width of the band around an expected order: errors on unrelated meshes scatter by a tenth or two.
-BAND = 0.5
+#: Half width of the band around an expected order: errors on unrelated meshes scatter by a tenth or two, which between
+#: neighbours whose sizes differ by a factor of 2 is an order of 0.2 or 0.3.
+BAND = 0.3
 
 
 @dataclass(frozen=True, eq=False)

@@ -53,7 +53,7 @@ def _pair(name: str) -> tuple[float, float]:
 @case("transport-robin-channel", kind="exact", norm="L2 of C over the mesh; relative error of C at the outlet",
       claim="First-order uptake in a slab under plug flow follows its closed form, (26) upstream included, at Peclet "
             "0.1, 1, 10",
-      mutant="D of the fluid in the biomass; advection dropped; the inlet's C held at the supply instead of (11)")
+      mutants=("fluid-diffusivity", "no-advection"))
 def robin() -> Outcome:
     studies, checks, profiles = [], [], []
     for peclet in (0.1, 1.0, 10.0):
@@ -114,8 +114,7 @@ PECLETS, DENSITIES = (0.1, 1.0, 5.0), (3e3, 3e4, 3e5)
       claim="Dual Monod uptake under plug flow is FiPy's and solve_bvp's at Peclet 0.1, 1, 5 times Thiele numbers "
             "0.6, 1.9, 6, "
             "from barely touched to starved",
-      mutant="F1 and F2 swapped; d_f d_b for d_c f_d b (E3); the reaction not lumped but with the fluid's area; u_ave "
-             "and D swapped")
+      mutants=("decay-demand", "ratio-on-the-donor-only", "reaction-in-the-fluid"))
 def monod() -> Outcome:
     studies, checks, profiles = [], [], []
     for peclet in PECLETS:
@@ -161,7 +160,7 @@ def _monod_profile(name, x, ours, fipy, exact) -> Profile:
 
 @case("transport-transient", kind="cross-code", norm="root mean square over the profile, over the supply",
       claim="The modified Gear scheme is of second order in time, and its transient is FiPy's",
-      mutant="carry r^2/(1+r) for r^2/(1+2r); backward Euler throughout; storage of the biomass area only")
+      mutants=("carry-of-bdf2", "backward-euler"))
 def transient() -> Outcome:
     end, size, density, speed = 2e-4, 1.25, 3e5, SCENE.substrates.acceptor.diffusivity / SLAB
     law = replace(SCENE.kinetics, yield_coefficient=1e-12, decay_coefficient=0.0)
@@ -190,7 +189,7 @@ BOX, RADIUS, DENSITY, DAYS = 24.0, 8.0, 1e6, 120.0
 
 @case("transport-half-disc", kind="cross-code", norm="largest difference over the field, over the supply",
       claim="Diffusion into a half-disc without flow is py-pde's",
-      mutant="body area of the fluid's triangles in the reaction; supply held at the walls; D halved")
+      mutants=("reaction-in-the-fluid",))
 def half_disc() -> Outcome:
     spread = (8e6, 4e6)
     substrates = replace(SCENE.substrates,
@@ -215,7 +214,7 @@ def half_disc() -> Outcome:
 
 @case("transport-balance", kind="property", norm="supplied - out - consumed over supplied",
       claim="Supply in = out + consumed to round-off, flow or none, local or mean inlet",
-      mutant="advection with u instead of w (trap 4); boundary fluxes from interpolated gradients")
+      mutants=("carried-by-u",))
 def balance() -> Outcome:
     checks = []
     for name, changes in (("base", ()), ("R = 40 um", ('aggregate.radius="40 um"',)),
@@ -238,7 +237,7 @@ def balance() -> Outcome:
       norm="largest relative difference of C_A, C_D, X_A, X_I after five days",
       claim="In a closed, well-mixed pore (7)-(10) are four ordinary equations: the same as solve_ivp's; so is X at "
             "constant C",
-      mutant="b (1 - f_d) for b f_d in F4; growth from the predicted C; Y left out of F3; storage in the fluid alone")
+      mutants=("inert-fraction", "yield-dropped"))
 def well_mixed() -> Outcome:
     steps = np.array([2.0, 1.0, 0.5, 0.25])
     return Outcome((at_most("X at constant C, 12 min steps", _constant_supply(), 1e-8,

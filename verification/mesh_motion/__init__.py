@@ -18,7 +18,7 @@ GAMMA, STABILISATION = 1.0, 100.0
 @case("mesh_motion-plug", kind="exact",
       norm="largest difference of displacement over the plug's, for gamma = 0.01, 1, 100",
       claim="A plug that slides and stretches along the pore stretches the fluid linearly on both sides",
-      mutant="interface nodes left behind; wall nodes held in x")
+      mutants=("walls-held",))
 def plug() -> Outcome:
     grid = meshes.channel((-60.0, 60.0), 30.0, 3.0, lambda x, y: np.abs(x) < 20, across=(-20.0, 20.0), seed=1)
     x = grid.points[:, 0]
@@ -38,7 +38,7 @@ def _moved(grid, points, gamma):
 @case("mesh_motion-half-disc", kind="cross-code", norm="L2 of the difference in displacement",
       claim="The fluid around a half-disc that grows by 5 % is displaced as Taylor-Hood elements displace it, for "
             "three gamma",
-      mutant="the sign of gamma; gamma times the gradient of P; div of twice the displacement")
+      mutants=("gamma-sign",))
 def half_disc() -> Outcome:
     studies = []
     for gamma in (0.1, GAMMA, 10.0):
@@ -67,7 +67,7 @@ def _against_taylor_hood(refinement: float, gamma: float) -> dict[str, float]:
       norm="least quality and area of the moved triangles; distance from their line",
       claim="An aggregate that doubles its area in steps of 2 % leaves no triangle turned over, and boundary nodes on "
             "their lines",
-      mutant="fluid nodes left in place (a stale mesh); gamma -> the displacement of the biomass applied to the wall")
+      mutants=("stale-fluid",))
 def growth() -> Outcome:
     checks = []
     for radius, factor in ((5.0, 2.0), (20.0, 2.0), (35.0, 1.3)):

@@ -30,7 +30,7 @@ def _channel_velocity(x, y):
 
 @case("flow-poiseuille", kind="exact", norm="L2 of u over the mesh; relative error of the head loss",
       claim="In a clean channel the flow is plane Poiseuille's",
-      mutant="the sign of the stabilisation turned over in saddle_blocks (trap 2)")
+      mutants=("saddle-sign",))
 def poiseuille_channel() -> Outcome:
     errors = refine(_clean, REFINEMENTS)
     studies = (study("velocity", errors["size"], errors["velocity"], 2, SECOND, ceiling=1e-3),
@@ -54,7 +54,7 @@ DRAWS = 3
 @case("flow-layers", kind="exact", norm="middle of a long layer, root mean square over three random meshes a size: "
       "L2 of u, of u within the layer (relative to that), and relative error of the pressure gradient",
       claim="Along a layer of biomass the flow is that of two viscous layers, for lambda = 1, 2000 and 1e8",
-      mutant="tau from water's viscosity (trap 3); lambda on the fluid; the arithmetic mean viscosity at the interface")
+      mutants=("tau-of-water",))
 def layers() -> Outcome:
     studies, profiles = [], []
     for ratio in (1.0, LAMBDA, 1e8):
@@ -120,7 +120,7 @@ def _plugged(size: float):
 
 @case("flow-plug", kind="exact", norm="L2 of u over the mesh; relative error of the head loss",
       claim="Through a plug the Laplacian form keeps Poiseuille's profile and loses lambda times its head there",
-      mutant="interface = traction as the default (E2); tau from water's viscosity (trap 3)")
+      mutants=("tau-of-water",))
 def plug() -> Outcome:
     errors = refine(_plug_errors, PLUG_SIZES)
     return Outcome(studies=(study("velocity", PLUG_SIZES, errors["velocity"], 2, SECOND, ceiling=1e-3),
@@ -138,8 +138,7 @@ def _plug_errors(size: float) -> dict[str, float]:
 
 @case("flow-sections", kind="property", norm="largest relative error of the flux through 25 sections",
       claim="The same flux passes every section of a pore, plugged or not: to round-off for w = u - tau grad p",
-      mutant="tau from water's viscosity (trap 3: 98 % of the flux vanishes in the plug); w = u + tau grad p "
-             "(trap 4); inlet profile not scaled to its flux")
+      mutants=("tau-of-water", "carried-by-u-plus", "inlet-not-scaled"))
 def sections() -> Outcome:
     half_disc, _ = mesh.generate(geometry.seed(40.0), ENDS, WIDTH, 1.0, 2.0)
     checks = []
@@ -179,7 +178,7 @@ def _against_taylor_hood(refinement: float, radius: float, ratio: float, interfa
 
 @case("flow-half-disc", kind="cross-code", norm="L2 of the difference in u, and relative difference of the head loss",
       claim="Around a half-disc in the paper's pore velocity and head loss are Taylor-Hood's, in both forms of [E2]",
-      mutant="lambda = 1000; the off-diagonal term nu u_j,i v_i,j transposed in the traction form; a stale mesh")
+      mutants=("traction-transposed",))
 def half_disc() -> Outcome:
     studies = []
     for radius, ratio, interface, order, why in ((5.0, LAMBDA, "laplacian", 2, SECOND),
@@ -195,7 +194,7 @@ def half_disc() -> Outcome:
 
 @case("flow-half-disc-quadratic", kind="cross-code", norm="relative difference of the head loss",
       claim="The same forms with quadratic velocities give Taylor-Hood's head loss to 0.1 %",
-      mutant="stabilisation left on for order 2; quadrature of the linear elements for order 2")
+      mutants=("quadratic-stabilised",))
 def half_disc_quadratic() -> Outcome:
     def measure(refinement):
         grid, _ = mesh.generate(geometry.seed(25.0, refinement), ENDS, WIDTH, refinement, 2.0)
@@ -209,7 +208,7 @@ def half_disc_quadratic() -> Outcome:
 
 @case("flow-energy", kind="property", norm="relative difference",
       claim="The work of the inlet is what viscosity and stabilisation dissipate, and the flow is linear in its drive",
-      mutant="a sign of one block in saddle_blocks; scaled() not scaling the correction")
+      mutants=("correction-not-scaled",))
 def energy() -> Outcome:
     grid, _ = mesh.generate(geometry.seed(25.0), ENDS, WIDTH, 1.0, 2.0)
     unit = flow.unit_flow(grid, LAMBDA)

@@ -36,7 +36,7 @@ def _numbers(instant) -> dict[str, float]:
 @case("coupling-uniform-growth", kind="exact",
       norm="relative error of the area; largest deviation of the outline from a half-disc",
       claim="Where diffusion holds the supply everywhere the aggregate stays a half-disc of exactly exp-growing mass",
-      mutant="theta times (1 + dt F3) at frozen rates (trap 9); J^(1/3); X_I left out of (29); (34) left out")
+      mutants=("growth-three-percent-low", "euler-biomass"))
 def uniform_growth() -> Outcome:
     scene = _without_flow(_base("6 h"))
     quick = {name: replace(getattr(scene.substrates, name), diffusivity=1e13, diffusivity_in_aggregate=1e13)
@@ -74,7 +74,7 @@ STEPS = (0.8, 0.4, 0.2, 0.1, 0.05)
       norm="difference between a run and that with half the step, relative; base from a seed "
       "of 25 um, 3.2 h, no remesh",
       claim="The loop is of first order in the shape update: the geometry is frozen within a step, the rates are not",
-      mutant="one Euler increment a step (trap 9); concentrations of the step before last; flow not solved anew")
+      mutants=("rates-at-the-start",))
 def time_step() -> Outcome:
     runs = [_last(_base("3.2 h", 'aggregate.radius="25 um"', f'growth.time_step="{step} h"')) for step in STEPS]
     numbers, studies = [_numbers(run) for run in runs], []
@@ -90,7 +90,7 @@ def time_step() -> Outcome:
 @case("coupling-quasi-steady", kind="property", norm="relative difference at 1 h",
       claim="The paper's transient scheme and quasi-steady substrates make the same aggregate: storage over reaction "
             "is 2e-4",
-      mutant="the transient started from the supply at each shape update; F3 integrated twice")
+      mutants=("rates-two-percent-low",))
 def quasi_steady() -> Outcome:
     ours, theirs = (_numbers(_last(_base("1 h", f'numerics.transport="{name}"'))) for name in ("quasi_steady", "gear"))
     return Outcome(tuple(at_most(name, abs(ours[name] / theirs[name] - 1), 1e-3,
@@ -100,8 +100,7 @@ def quasi_steady() -> Outcome:
 
 @case("coupling-extent", kind="property", norm="relative difference at t = 0, refinement 2",
       claim="The central mesh with (6) and (26) beyond it is worth the whole pore",
-      mutant="no Poiseuille loss outside the mesh; the whole pore's length added; C_supply at the meshed inlet "
-             "instead of (11)")
+      mutants=("extent-not-subtracted",))
 def extent() -> Outcome:
     checks = []
     for radius in ("5 um", "25 um"):
@@ -125,7 +124,7 @@ def _solved(*changes: str) -> dict[str, float]:
 
 @case("coupling-special-cases", kind="property", norm="relative difference, or largest difference over the size",
       claim="lambda = 1 is an empty channel; without growth the pore is fixed; mu_L does not matter without tractions",
-      mutant="a jump at the interface that is not in the viscosity, in tau for instance; theta grown by a clock")
+      mutants=("tau-jumps",))
 def special_cases() -> Outcome:
     grid, _ = mesh.generate(geometry.seed(20.0), (-75.0, 75.0), 50.0, 1.0, 2.0)
     bare = mesh.PoreMesh(grid.points, grid.triangles, np.zeros_like(grid.biomass), np.empty(0, int), grid.width,
@@ -143,7 +142,7 @@ def special_cases() -> Outcome:
 @case("coupling-units", kind="property", norm="relative difference at 2 h",
       claim="A pore eight times larger or smaller, with transport to match, grows alike to the last bits: nothing has "
             "a scale of its own",
-      mutant="a length written as a number (a tolerance, a film, an element size); um for cm in the velocity")
+      mutants=("length-scale",))
 def units() -> Outcome:
     scene, checks = _base("2 h"), []
     speed = next(simulate(scene)).solved.flow.mean_velocity
@@ -172,7 +171,7 @@ def _scaled(scene, factor: float, speed: float):
 @case("coupling-mirror", kind="property",
       norm="difference of the tips' distances from the origin, and of C_A left and right, relative",
       claim="Without flow an aggregate grows alike to both sides",
-      mutant="advection left on; the fixed point beside the middle; one end held, the other closed")
+      mutants=("one-end-held", "fixed-beside-the-middle"))
 def mirror() -> Outcome:
     last = _last(_without_flow(_base("8 h")))
     outline, grid = last.pore.outline, last.pore.mesh

@@ -34,7 +34,7 @@ def _steep(x, y):
       norm="relative difference of areas; largest difference of linear fields over their size",
       claim="The common pieces of two meshes cover both; linear fields pass from one to the other; any integral is "
             "kept",
-      mutant="clip against two sides of a triangle; pieces counted twice; the mass matrix lumped in the projection")
+      mutants=("clip-two-sides",))
 def supermesh() -> Outcome:
     (p, t), (q, s) = _grid(2.0, 1), _grid(1.3, 2)
     corners, _, _ = reprojection.supermesh(p, t, q, s)
@@ -52,8 +52,7 @@ def supermesh() -> Outcome:
 @case("reprojection-order", kind="manufactured",
       norm="L2 of a smooth field, interpolated on one mesh and projected to another",
       claim="The projection loses nothing of the accuracy of linear elements",
-      mutant="weights of the new mesh used for the old one; fields taken at the corners of pieces, not at their "
-             "middles")
+      mutants=("corners-for-middles",))
 def order() -> Outcome:
     def smooth(x, y):
         return 2 + np.sin(0.3 * x) * np.cos(0.2 * y)
@@ -70,7 +69,7 @@ def order() -> Outcome:
 
 @case("reprojection-chain", kind="property", norm="relative drift of the integral of a steep field over 40 remeshes",
       claim="Forty remeshes of a steep field conserve its mass to round-off; linear interpolation does not (trap 5)",
-      mutant="linear instead of conserving transfer")
+      mutants=("linear-transfer",))
 def chain() -> Outcome:
     grids = [_grid(1.6, 1), _grid(1.6, 2), _grid(1.9, 3)]
     drift = {}
@@ -91,7 +90,7 @@ def chain() -> Outcome:
 
 @case("reprojection-mass", kind="property", norm="largest relative difference",
       claim="(34) keeps the mass of every node, and constants where all areas scale alike",
-      mutant="S'/S for S/S'; the fluid's triangles counted at an interface node")
+      mutants=("inverse-ratio",))
 def mass() -> Outcome:
     grid = meshes.channel((-20.0, 20.0), WIDTH, 2.0, lambda x, y: y < 10, along=(10.0,), seed=6)
     random = np.random.default_rng(7)
