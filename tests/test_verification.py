@@ -41,8 +41,7 @@ def _of_order(order, ceiling=math.inf):
 
 
 @pytest.mark.parametrize("order, holds", [(2.0, True), (2.2, True), (1.8, True), (1.0, False), (3.0, False),
-                                          (1.6, False), (2.4, False),
-                                          (0.0, False)])
+                                          (1.6, False), (2.4, False), (0.0, False)])
 def test_a_wrong_order_is_caught_on_both_sides(order, holds):
     """Mutant: `orders >= low` alone; the mean of the orders for each of them."""
     assert _of_order(order).holds is holds
@@ -84,7 +83,8 @@ def test_an_error_in_a_case_is_a_failure_with_its_reason():
 
 
 def test_floating_point_warnings_are_errors_in_a_case():
-    chosen = case.Case("x", "flow", "c", "exact", "n", ("m",), False, lambda: Outcome((at_most("q", np.zeros(1) / 0, 1, ""),)))
+    chosen = case.Case("x", "flow", "c", "exact", "n", ("m",), False,
+                       lambda: Outcome((at_most("q", np.zeros(1) / 0, 1, ""),)))
     assert "FloatingPointError" in case.run(chosen).error
 
 

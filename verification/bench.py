@@ -39,7 +39,7 @@ def timed_run(scene) -> Timed:
     """Simulate a scene without writing anything."""
     timing.reset()
     marks = [perf_counter()]
-    for instant in coupling.simulate(scene):
+    for instant in coupling.simulate(scene):  # noqa: B007
         marks.append(perf_counter())
     steps = np.diff(marks)[1:]
     return Timed(marks[-1] - marks[0], median(steps), dict(timing.seconds), len(steps), len(instant.pore.mesh.points),

@@ -113,9 +113,9 @@ def hunt(mutant: Mutant) -> Hunt:
     named, others = plan(mutant)
     with TemporaryDirectory(prefix="mutant-") as folder:
         copy(mutant, Path(folder))
-        trials = [_trial(Path(folder), case) for case in named]
+        trials = [trial(Path(folder), case) for case in named]
         while others and not any(trial.caught for trial in trials):
-            trials.append(_trial(Path(folder), others.pop(0)))
+            trials.append(trial(Path(folder), others.pop(0)))
     return Hunt(mutant.id, tuple(trials))
 
 
@@ -127,7 +127,7 @@ def copy(mutant: Mutant, folder: Path) -> None:
     (folder / mutant.file).write_text(text, encoding="utf-8")
 
 
-def _trial(folder: Path, case: str) -> Trial:
+def trial(folder: Path, case: str) -> Trial:
     """Run one case in the copy, in a process of its own."""
     command = [sys.executable, "-c", f"from verification import mutants; mutants.examine({case!r})"]
     try:
