@@ -23,8 +23,9 @@ Ten lines of use:
         print(pore.time, 24e-6 * flow.mean_velocity, pore.outline.thickness)
 """
 
-from repro.coupling import PoreEnd, simulate
+from repro.coupling import PoreEnd
 from repro.running import run
 from repro.scene import Scene, load_scene
+from repro.simulation import simulate
 
 __all__ = ["PoreEnd", "Scene", "load_scene", "run", "simulate"]

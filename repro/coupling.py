@@ -75,15 +75,15 @@ def simulate(scene) -> Iterator[Instant]:
     reaches an end of the pore.
     """
     times, reported = schedule(scene)
-    with _stopping(0.0):
+    with stopping(0.0):
         now = pore.seeded(scene)
         solved = pore.solve(scene, now)
     now = replace(now, concentrations=solved.concentrations)
-    yield Instant(now, solved, None, (), 0, _newton_counts(solved))
+    yield Instant(now, solved, None, (), 0, newton_counts(solved))
     before, ledgers, remeshes, counts = None, [], 0, {}
     for time in times[1:]:
         try:
-            with _stopping(now.time):
+            with stopping(now.time):
                 done = step(scene, now, solved, time - now.time)
                 now, before = replace(done.pore, time=time), done.before
                 solved = pore.solve(scene, now)
@@ -94,8 +94,8 @@ def simulate(scene) -> Iterator[Instant]:
         now = replace(now, concentrations=solved.concentrations)
         ledgers.append(done.ledger)
         remeshes += done.remeshed
-        counts = _added(counts, {"growth": done.iterations}, _newton_counts(before[1]), _newton_counts(solved))
-        over = _pore_end(scene, now, 1.0)
+        counts = added(counts, {"growth": done.iterations}, newton_counts(before[1]), newton_counts(solved))
+        over = pore_end(scene, now, 1.0)
         if time in reported or over:
             yield Instant(now, solved, before, tuple(ledgers), remeshes, counts)
             ledgers, remeshes, counts = [], 0, {}
@@ -104,7 +104,7 @@ def simulate(scene) -> Iterator[Instant]:
 
 
 @contextmanager
-def _stopping(time: float):
+def stopping(time: float):
     """Floating-point errors stop the run; a stage's failure is told with the simulated time of its step."""
     try:
         with np.errstate(all="raise", under="ignore"):
@@ -116,16 +116,16 @@ def _stopping(time: float):
                               "try a shorter growth.time_step or a larger numerics.refinement") from error
 
 
-def _newton_counts(solved: Solved) -> dict[str, int]:
+def newton_counts(solved: Solved) -> dict[str, int]:
     return {"transport": solved.concentrations.iterations if solved.concentrations else 0}
 
 
-def _added(*counts: dict[str, int]) -> dict[str, int]:
+def added(*counts: dict[str, int]) -> dict[str, int]:
     keys = {key for count in counts for key in count}
     return {key: sum(count.get(key, 0) for count in counts) for key in sorted(keys)}
 
 
-def _pore_end(scene, now: Pore, elements: float) -> str:
+def pore_end(scene, now: Pore, elements: float) -> str:
     """Which end of the pore the aggregate has reached, to so many elements of the fluid; empty while it has not."""
     outline, end = now.outline, scene.pore.length / 2
     near = elements * scene.pore.width / geometry.ACROSS_PORE
@@ -146,21 +146,32 @@ class Step:
     iterations: int
 
 
+@dataclass(frozen=True, eq=False)
+class Attempt:
+    """A step of the midpoint rule that may be taken: what it makes; the mean change of the rates over its first half,
+    1/h; and, where it first makes contact with the opposite wall, the least distance (um) to that before and after the
+    step, and the film's least thickness."""
+
+    step: Step
+    change: float
+    gaps: tuple[float, float, float] | None
+
+
 def step(scene, now: Pore, solved: Solved, duration: float) -> Step:
     """One step (h): biomass, shape, mesh."""
     grown, end, flows = make_biomass(scene, now, solved, duration)
     made = float(np.sum(solved.problem.body * (grown.active + grown.inert - now.active - now.inert)))
-    theta = now.theta * (1 + _increase(now, grown) / scene.kinetics.maximum_density)
-    expanded, iterations = shape.expand(scene, grown, theta)
-    if leaves := _pore_end(scene, expanded, 0.1):
+    theta = now.theta * (1 + increase(now, grown) / scene.kinetics.maximum_density)
+    expanded, iterations, _ = shape.expand(scene, grown, theta)
+    if leaves := pore_end(scene, expanded, 0.1):
         raise PoreEnd(f"{leaves} in the step from t = {now.time:g} h")
     solved = replace(solved, concentrations=end)
     after, remeshed = remeshing.new_mesh(scene, now, expanded, solved)
-    ledger = Ledger(now.time, now.time + duration, *flows, _mass(now), made, _mass(after))
+    ledger = Ledger(now.time, now.time + duration, *flows, mass_of(now), made, mass_of(after))
     return Step(after, (replace(grown, time=now.time + duration), solved), ledger, remeshed, iterations)
 
 
-def _mass(now: Pore) -> float:
+def mass_of(now: Pore) -> float:
     return float(np.sum(now.mesh.lumped(now.mesh.biomass) * (now.active + now.inert)))
 
 
@@ -172,10 +183,10 @@ def make_biomass(scene, now: Pore, solved: Solved, duration: float):
     """
     if scene.numerics.transport == "gear":
         return gear.make_biomass(scene, now, solved, duration)
-    first = _rates(scene, solved.concentrations)
+    first = rates_of(scene, solved.concentrations)
     guess = kinetics.grow(now.active, now.inert, *first, duration)
     end = transport.steady(solved.problem, guess[0], solved.concentrations)
-    mean = [(a + b) / 2 for a, b in zip(first, _rates(scene, end))]
+    mean = [(a + b) / 2 for a, b in zip(first, rates_of(scene, end))]
     active, inert = kinetics.grow(now.active, now.inert, *mean, duration)
     pairs = zip(transport.fluxes(solved.problem, now.active, solved.concentrations),
                 transport.fluxes(solved.problem, guess[0], end))
@@ -185,12 +196,13 @@ def make_biomass(scene, now: Pore, solved: Solved, duration: float):
     return replace(now, active=active, inert=inert), end, flows
 
 
-def _rates(scene, state: Concentrations):
+def rates_of(scene, state: Concentrations):
+    """F3 / X_A and F4 / X_A (N,), 1/h."""
     return (kinetics.growth_rate(state.acceptor, state.donor, scene.substrates, scene.kinetics),
             kinetics.inert_rate(state.acceptor, scene.substrates, scene.kinetics))
 
 
-def _increase(now: Pore, grown: Pore) -> np.ndarray:
+def increase(now: Pore, grown: Pore) -> np.ndarray:
     """(29): mean over the nodes of each biomass triangle of the increase of X_A + X_I (mg/L)."""
     more = grown.active + grown.inert - now.active - now.inert
     return more[now.mesh.triangles[now.mesh.biomass]].mean(axis=1)

@@ -156,15 +156,15 @@ def refine_outline(outline: Outline, sizes: np.ndarray, largest: float) -> Outli
     straight, so their nodes are placed anew, but for their ends and the fixed points.
     """
     pieces = []
-    for first, last in _runs(outline):
+    for first, last in runs(outline):
         keep = np.arange(first, last + 1) % len(outline.points)
         on_wall = outline.wall[keep[0]] != FREE and outline.wall[keep[0]] == outline.wall[keep[-1]]
-        t = _spread(outline, keep, sizes, largest) if on_wall else _split(outline, keep, sizes)
+        t = _spread(outline, keep, sizes, largest) if on_wall else split_parameters(outline, keep, sizes)
         pieces.append(_resample(outline, keep, t[:-1]))
     return Outline(*(np.concatenate(columns) for columns in zip(*pieces)))
 
 
-def _runs(outline: Outline) -> list[tuple[int, int]]:
+def runs(outline: Outline) -> list[tuple[int, int]]:
     """Pieces (first, last) of the loop: single interface edges, and stretches of wall between ends or fixed points."""
     count = len(outline.points)
     free_edge = outline.interface_edges()
@@ -173,7 +173,7 @@ def _runs(outline: Outline) -> list[tuple[int, int]]:
     return list(zip(starts, np.append(starts[1:], starts[0] + count)))
 
 
-def _split(outline: Outline, keep: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+def split_parameters(outline: Outline, keep: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     """Parameters 0..1 along one interface edge."""
     length = np.linalg.norm(outline.points[keep[1]] - outline.points[keep[0]])
     wanted = 0.5 * (sizes[keep[0]] + sizes[keep[1]])

@@ -171,8 +171,8 @@ class System:
         total, size = (np.bincount(self.unknowns.ravel(), part.ravel(), 3 * n) for part in (local, scale))
         return total, size
 
-    def tangent(self, position: np.ndarray, pressure: np.ndarray) -> np.ndarray:
-        """(t, 9, 9) symmetric element matrices of the residual's derivative."""
+    def tangent(self, position: np.ndarray, pressure: np.ndarray, theta: np.ndarray | None = None) -> np.ndarray:
+        """(t, 9, 9) symmetric element matrices of the residual's derivative, which theta does not enter."""
         t = self.body.triangles
         F = deformation(position, t, self.slopes)
         moduli = tangent(F, pressure[t].mean(axis=1))
@@ -197,14 +197,26 @@ def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: n
     Raises GrowthError where that fails too.
     """
     start = triangle_areas(position, body.triangles) / triangle_areas(body.reference, body.triangles)
+    refuse_turned_over(start, theta)
+    return reach(System(body, stabilisation(position, body.triangles, start)), start, theta, position, pressure,
+                 prescribed)
+
+
+def refuse_turned_over(start: np.ndarray, theta: np.ndarray) -> None:
+    """Raises GrowthError where J at the start or theta is not positive."""
     if start.min() <= 0 or theta.min() <= 0:
         raise GrowthError("growth starts from a triangle that is turned over or from theta <= 0; "
                           "try a shorter growth.time_step")
-    system = System(body, stabilisation(position, body.triangles, start))
+
+
+def reach(system, start: np.ndarray, theta: np.ndarray, position: np.ndarray, pressure: np.ndarray,
+          prescribed: np.ndarray, parts: int = 1) -> Equilibrium:
+    """Equilibrium of a system under theta, from J = ``start`` (shaped alike), in ``parts`` or, where that fails, more;
+    see :func:`equilibrium`."""
     failure = ""
     for steps in CONTINUATION:
         try:
-            return _continued(system, start, theta, position, pressure, prescribed, steps)
+            return _continued(system, start, theta, position, pressure, prescribed, parts * steps)
         except (GrowthError, LinearError) as error:
             failure = str(error)
     raise GrowthError(f"{failure}; try a shorter growth.time_step or a larger numerics.refinement")
@@ -229,7 +241,7 @@ def _newton(system: System, theta, position, pressure, target):
         last, defect = defect, _relative(residual[system.free], size[system.free])
         if not lag.any() and (defect <= NEWTON or 0.1 * last < defect <= ROUND_OFF):
             return position, pressure, iteration
-        step = _newton_step(system, position, pressure, residual, lag)
+        step = _newton_step(system, theta, position, pressure, residual, lag)
         position, pressure, residual, size = _line_search(system, theta, position, pressure, step, residual, lag)
         lag = np.where(system.body.held, target - position, 0.0)
     raise GrowthError(f"Newton's method for the growth stands at a defect of {defect:.2g} "
@@ -241,15 +253,15 @@ def _relative(residual: np.ndarray, size: np.ndarray) -> float:
     return float(np.max(np.abs(residual) / np.maximum(size, np.finfo(float).tiny)))
 
 
-def _newton_step(system: System, position, pressure, residual, lag) -> np.ndarray:
+def _newton_step(system: System, theta, position, pressure, residual, lag) -> np.ndarray:
     """(3n,) full Newton step that moves held coordinates by ``lag``."""
     prescribed = np.concatenate([lag[:, 0], lag[:, 1], np.zeros(len(pressure))])
-    return system.sparse.solve(system.tangent(position, pressure), -residual, prescribed)
+    return system.sparse.solve(system.tangent(position, pressure, theta), -residual, prescribed)
 
 
 def _line_search(system, theta, position, pressure, step, residual, lag):
     """The longest of the steps 1, 1/2, ... with det F > 0 that does not raise the residual fourfold."""
-    n = len(pressure)
+    n = len(position)
     move, push = step[: 2 * n].reshape(2, n).T, step[2 * n:]
     before = np.linalg.norm(residual[system.free])
     for length in 0.5 ** np.arange(HALVINGS):

@@ -166,21 +166,27 @@ def generate(outline: Outline | None, ends: tuple[float, float], width: float, r
     outline: None for a clean channel; ends: x of inlet and outlet (um); film: thinnest film to resolve (um).
     Returns (PoreMesh, Outline | None). Raises MeshError where the outline crosses itself or the channel's ends.
     """
-    largest = width / geometry.ACROSS_PORE / refinement
-    if outline is None:
-        sources, sizes = np.empty((0, 2)), np.empty(0)
-    else:
-        _check_outline(outline, ends, width)
+    if outline is not None:
+        check_outline(outline, ends, width)
         sizes = geometry.interface_sizes(outline, width, refinement, film)
-        outline = geometry.refine_outline(outline, sizes, largest)
+        outline = geometry.refine_outline(outline, sizes, width / geometry.ACROSS_PORE / refinement)
+    return around(outline, ends, width, refinement, film), outline
+
+
+def around(outline: Outline | None, ends: tuple[float, float], width: float, refinement: float, film: float) -> PoreMesh:
+    """A new mesh around an outline whose nodes stay as they are; arguments as those of :func:`generate`."""
+    largest = width / geometry.ACROSS_PORE / refinement
+    sources, sizes = np.empty((0, 2)), np.empty(0)
+    if outline is not None:
         sources, sizes = geometry.size_sources(outline, width, refinement, film)
     points, polygons = _boundaries(outline, ends, width, sources, sizes, largest)
     mesh = _fill(points, polygons, lambda where: geometry.graded_size(where, sources, sizes, largest), ends, width)
     loop = mesh.loop[: 0 if outline is None else len(outline.points)]  # its points come first among the prescribed ones
-    return replace(mesh, loop=loop), outline
+    return replace(mesh, loop=loop)
 
 
-def _check_outline(outline: Outline, ends: tuple[float, float], width: float) -> None:
+def check_outline(outline: Outline, ends: tuple[float, float], width: float) -> None:
+    """Raises MeshError where an outline crosses itself or leaves the meshed part."""
     polygon = shapely.Polygon(outline.points)
     if not polygon.is_valid:
         raise MeshError(f"the outline of the aggregate crosses itself: {shapely.is_valid_reason(polygon)}; "

@@ -48,14 +48,22 @@ class Pore:
         """Does the aggregate touch the opposite wall?"""
         return bool((self.wall == geometry.TOP).any())
 
+    def composition(self, maximum_density: float) -> tuple[float, float, float]:
+        """Share of X_I in the biomass, and the least and the largest (X_A + X_I) / X_m."""
+        weight, total = self.mesh.lumped(self.mesh.biomass), self.active + self.inert
+        density = total[self.mesh.body] / maximum_density
+        return float(weight @ self.inert / (weight @ total)), float(density.min()), float(density.max())
+
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """Flow and substrates in the geometry of a pore; None where the scene does not model them."""
+    """Flow and substrates in the geometry of a pore, and the ledgers of acceptor and donor; None where the scene does not
+    model them."""
 
     flow: flow.Flow | None
     problem: transport.Problem | None
     concentrations: transport.Concentrations | None
+    fluxes: tuple[transport.Fluxes, transport.Fluxes] | None = None
 
 
 def film(scene) -> float:
@@ -84,9 +92,9 @@ def solve(scene, pore: Pore) -> Solved:
     if scene.substrates is None:
         return Solved(carried, None, None)
     problem = transport.problem(pore.mesh, carried, scene.substrates, scene.kinetics, scene.numerics.inlet)
-    if scene.numerics.transport == "gear":
-        return Solved(carried, problem, gear.settle(problem, pore.active, pore.concentrations))
-    return Solved(carried, problem, transport.steady(problem, pore.active, pore.concentrations))
+    find = gear.settle if scene.numerics.transport == "gear" else transport.steady
+    state = find(problem, pore.active, pore.concentrations)
+    return Solved(carried, problem, state, transport.fluxes(problem, pore.active, state))
 
 
 def solve_flow(scene, pore: Pore) -> flow.Flow:

@@ -18,8 +18,10 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 
-from repro import growth, mesh, transport
+from repro import growth, mesh
 from repro.coupling import Instant, Ledger
+from repro.curved import results as curved
+from repro.curved.mesh import CurvedMesh
 from repro.scene import Scene, scene_hash, scene_tables
 
 M_PER_D, CM = 24e-6, 1e-4  # of um/h, of um
@@ -60,8 +62,7 @@ def _substrate_columns(instant: Instant) -> dict[str, float]:
     state, found = instant.solved.concentrations, {}
     if state is None:
         return found
-    both = transport.fluxes(instant.solved.problem, instant.pore.active, state)
-    for name, field, flux in zip(("acceptor", "donor"), (state.acceptor, state.donor), both):
+    for name, field, flux in zip(("acceptor", "donor"), (state.acceptor, state.donor), instant.solved.fluxes):
         found[f"{name}_min_mg_per_L"] = float(field.min())
         found[f"inlet_{name}_mg_per_L"] = flux.inlet
         found[f"effluent_{name}_mg_per_L"] = flux.effluent
@@ -97,10 +98,8 @@ def _aggregate_columns(scene: Scene, instant: Instant) -> dict[str, float]:
     found = {"aggregate_area_um2": outline.area, "thickness_um": outline.thickness, "upstream_um": outline.upstream,
              "downstream_um": outline.downstream}
     if scene.kinetics:
-        weight, body = pore.mesh.lumped(pore.mesh.biomass), pore.mesh.body
-        density = (pore.active + pore.inert)[body] / scene.kinetics.maximum_density
-        found.update(inert_fraction=float(weight @ pore.inert / (weight @ (pore.active + pore.inert))),
-                     biomass_density_min=float(density.min()), biomass_density_max=float(density.max()))
+        names = ("inert_fraction", "biomass_density_min", "biomass_density_max")
+        found.update(zip(names, pore.composition(scene.kinetics.maximum_density)))
     if scene.growth:
         defects = [(a.biomass_after - a.biomass_before - a.biomass_made) / a.biomass_after for a in instant.ledgers]
         found["biomass_balance"] = max(defects, key=abs, default=0.0)
@@ -121,6 +120,8 @@ def fields(scene: Scene, pore, solved) -> meshio.Mesh:
     and P are those of the strain since t = 0: a scene whose new biomass is born stress-free has none to tell.
     """
     grid = pore.mesh
+    if isinstance(grid, CurvedMesh):
+        return curved.fields(scene, pore, solved)
     points, cells = {}, {"region": grid.biomass.astype(float)}
     if solved.flow:
         points["velocity_m_per_d"] = _three(M_PER_D * solved.flow.velocity[: len(grid.points)])

@@ -9,9 +9,10 @@ from pathlib import Path
 from time import perf_counter
 
 from repro import results, timing
-from repro.coupling import Instant, PoreEnd, simulate
+from repro.coupling import Instant, PoreEnd
 from repro.errors import SimulationError
 from repro.scene import Scene
+from repro.simulation import simulate
 
 #: Everything that a run writes, beside its fields; a folder that holds anything else is not written to.
 OWN = ("timeseries.csv", "ledger.csv", "fields.pvd", "before_expansion.pvd", "run.json")

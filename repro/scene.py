@@ -20,6 +20,7 @@ from repro.units import (
     FRACTION,
     NON_NEGATIVE,
     POSITIVE_FRACTION,
+    UP_TO_1,
     UP_TO_20,
     Place,
     SceneError,
@@ -130,7 +131,10 @@ class Growth:
 class Numerics:
     """Section 3: how it is solved. [En] are the ambiguities of `reference/ERRATA.md`."""
 
-    preset: str = choice("paper")
+    preset: str = choice("paper", "fast", "accurate")  # defaults of what follows: see PRESETS
+    elements: str = choice("linear", "quadratic")  # 3.2-3.4, or Taylor-Hood on curved triangles
+    time: str = choice("updates", "midpoint")  # every growth.time_step, or as numerics.tolerance allows
+    tolerance: float = number(0.01, UP_TO_1)  # of a midpoint step: change of the growth rate, times the step
     transport: str = choice("quasi_steady", "gear")  # 3.3
     transfer: str = choice("conserving", "linear")  # of X_A and X_I at a remesh [E8]
     extent: str = choice("central", "full")  # 3.1

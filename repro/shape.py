@@ -14,8 +14,9 @@ from repro.pore import Pore
 CONTACT_ROUNDS = 60
 
 
-def expand(scene, grown: Pore, theta: np.ndarray) -> tuple[Pore, int]:
-    """The aggregate in its new shape under theta (t,), X_A and X_I reprojected by (34), and Newton's iterations.
+def expand(scene, grown: Pore, theta: np.ndarray) -> tuple[Pore, int, float]:
+    """The aggregate in its new shape under theta (t,), X_A and X_I reprojected by (34); Newton's iterations; and the
+    least distance (um) to the opposite wall before films closed.
 
     After each equilibrium, films and wedges that are too thin close, and the equilibrium is sought again until none is.
     The fluid's nodes stay where they were. Raises GrowthError where no equilibrium is found or contact does not rest.
@@ -25,23 +26,24 @@ def expand(scene, grown: Pore, theta: np.ndarray) -> tuple[Pore, int]:
     if scene.growth.new_biomass == "stress_free":
         reference, target = grown.mesh.points[nodes], theta / grown.theta
     start, push = grown.mesh.points[nodes], grown.pressure[nodes]
-    wall, fixed, iterations = grown.wall.copy(), _fixed_points(scene, grown), 0
+    wall, fixed, iterations, gaps = grown.wall.copy(), _fixed_points(scene, grown), 0, []
     for _ in range(CONTACT_ROUNDS):
-        body = growth.Body(reference, triangles, _held(len(nodes), rim, wall, fixed), grown.mesh.topology)
+        body = growth.Body(reference, triangles, held_at(len(nodes), rim, wall, fixed), grown.mesh.topology)
         prescribed = _prescribed(start, rim, wall, scene.pore.width)
         found = growth.equilibrium(body, target, start, push, prescribed)
         start, push, iterations = found.position, found.pressure, iterations + found.iterations
         outline = geometry.Outline(start[rim], wall, fixed, grown.origin[grown.mesh.loop])
+        gaps.append(scene.pore.width - outline.thickness)
         joins = geometry.closing_nodes(outline, scene.pore.width, scene.growth.minimum_film,
                                        scene.growth.minimum_contact_angle)
         if not joins.any():
-            return _reprojected(grown, start, push, theta, wall, _with_new_surface(outline)), iterations
+            return _reprojected(grown, start, push, theta, wall, _with_new_surface(outline)), iterations, gaps[0]
         wall = np.where(joins != geometry.FREE, joins, wall)
     raise GrowthError(f"the contact surfaces still change after {CONTACT_ROUNDS} rounds; "
                       "try a shorter growth.time_step")
 
 
-def _held(count: int, rim: np.ndarray, wall: np.ndarray, fixed: np.ndarray) -> np.ndarray:
+def held_at(count: int, rim: np.ndarray, wall: np.ndarray, fixed: np.ndarray) -> np.ndarray:
     """(n, 2): x is held at fixed points, y on the walls (2.3.3)."""
     held = np.zeros((count, 2), bool)
     held[rim[fixed], 0] = True
@@ -63,7 +65,7 @@ def _fixed_points(scene, grown: Pore) -> np.ndarray:
         return grown.fixed
     fixed = np.zeros(len(grown.wall), bool)
     for wall in (geometry.BOTTOM, geometry.TOP):
-        fixed |= _middle(grown.outline, wall)
+        fixed |= middle_of(grown.outline, wall)
     return fixed
 
 
@@ -71,11 +73,11 @@ def _with_new_surface(outline: geometry.Outline) -> np.ndarray:
     """Fixed points (M,), with the middle of the upper contact surface when that has just formed."""
     top = outline.wall == geometry.TOP
     if top.any() and not outline.fixed[top].any():
-        return outline.fixed | _middle(outline, geometry.TOP)
+        return outline.fixed | middle_of(outline, geometry.TOP)
     return outline.fixed
 
 
-def _middle(outline: geometry.Outline, wall: int) -> np.ndarray:
+def middle_of(outline: geometry.Outline, wall: int) -> np.ndarray:
     """(M,) True at the node nearest to the middle of the contact surface with a wall."""
     on, x = outline.wall == wall, outline.points[:, 0]
     chosen = np.zeros(len(on), bool)

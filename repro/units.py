@@ -47,6 +47,7 @@ POSITIVE = Range("greater than zero", lambda value: value > 0)
 NON_NEGATIVE = Range("zero or more", lambda value: value >= 0)
 FRACTION = Range("from 0 to 1", lambda value: 0 <= value <= 1)
 POSITIVE_FRACTION = Range("greater than 0, at most 1", lambda value: 0 < value <= 1)
+UP_TO_1 = Range("greater than zero, at most 1", lambda value: 0 < value <= 1)
 UP_TO_20 = Range("greater than zero, at most 20", lambda value: 0 < value <= 20)
 ACUTE = Range("between 0 and 90 deg", lambda value: 0 < value < math.pi / 2)
 

@@ -1,0 +1,188 @@
+"""One step of the coupling on curved triangles: second order in space and in time; as :mod:`repro.coupling`.
+
+The midpoint rule: half a step with the rates of its start gives the shape half way; the rates of flow and substrates
+there carry (9)-(10), exactly integrated at constant rates, over the whole step; the aggregate finds its equilibrium
+under theta = (M_A + M_I) / X_m, the mesh moves or is made anew.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from repro import geometry, kinetics, mesh_motion
+from repro.coupling import Attempt, Ledger, PoreEnd, Step, pore_end, rates_of
+from repro.curved import elements, growth, outline, pore, transfer
+from repro.curved.outline import Arcs
+from repro.curved.pore import Pore, seeded, solve
+from repro.errors import GrowthError
+from repro.midpoint import first_contact
+from repro.pore import Solved
+from repro.shape import CONTACT_ROUNDS, held_at, middle_of
+from repro.transport import Concentrations
+
+__all__ = ["attempt", "seeded", "solve"]
+
+
+@dataclass(frozen=True, eq=False)
+class Midpoint:
+    """What half a step has found: flow and substrates half way, and the rates F3 / X_A, F4 / X_A (N,) 1/h at the nodes
+    of the mesh at the start; change: mean over the aggregate of |rate half way - rate at the start|, 1/h."""
+
+    solved: Solved
+    rates: tuple[np.ndarray, np.ndarray]
+    change: float
+
+
+def midpoint(scene, now: Pore, solved: Solved, duration: float) -> Midpoint:
+    """Solve for flow and substrates in the shape that half of ``duration`` (h) makes with the rates of its start.
+
+    Where the moved mesh is not acceptable a new one is made, and the rates are carried back to the material's nodes.
+    """
+    first = rates_of(scene, solved.concentrations)
+    half, _, _ = expand(scene, grown(now, first, duration / 2))
+    there, remeshed = new_mesh(scene, now, half, solved.concentrations)
+    found = solve(scene, there)
+    rates = rates_of(scene, found.concentrations)
+    if remeshed:
+        rates = _carried_back(there, half, rates)
+    weight = elements.weights(now.mesh.points, now.mesh)
+    apart = np.abs(rates[0] + rates[1] - first[0] - first[1])
+    return Midpoint(found, rates, float(weight @ apart / weight.sum()))
+
+
+def _carried_back(there: Pore, half: Pore, rates):
+    """Rates at the nodes of a new mesh, interpolated to the aggregate's nodes of the mesh before."""
+    nodes, grid = half.mesh.body, there.mesh
+    found = np.zeros((len(half.mesh.points), 2))
+    found[nodes] = transfer.interpolate(grid.points, grid.cells[grid.biomass], np.column_stack(rates),
+                                        half.mesh.points[nodes])
+    return tuple(found.T)
+
+
+def grown(now: Pore, rates, duration: float) -> Pore:
+    """(9)-(10) over a step (h) at constant rates F3 / X_A and F4 / X_A (N,), 1/h."""
+    active, inert = kinetics.grow(now.active, now.inert, *rates, duration)
+    return replace(now, active=active, inert=inert)
+
+
+def attempt(scene, now: Pore, solved: Solved, duration: float) -> Attempt:
+    """A step of ``duration`` (h). Raises StageError where it cannot be made."""
+    half = midpoint(scene, now, solved, duration)
+    after = grown(now, half.rates, duration)
+    expanded, iterations, gap = expand(scene, after)
+    if leaves := pore_end(scene, expanded, 0.1):
+        raise PoreEnd(f"{leaves} in the step from t = {now.time:g} h")
+    guess = half.solved.concentrations
+    guess = guess if len(guess.acceptor) == len(now.mesh.points) else solved.concentrations
+    new, remeshed = new_mesh(scene, now, expanded, guess)
+    flows = [tuple(duration * getattr(flux, key) for flux in half.solved.fluxes) for key in
+             ("supplied", "out", "consumed")]
+    masses = [scene.kinetics.maximum_density * value for value in
+              (now.mesh.area(), after.mass() - now.mass(), new.mesh.area())]
+    ledger = Ledger(now.time, now.time + duration, *flows, (0.0, 0.0), *masses)
+    return Attempt(Step(new, (now, solved), ledger, remeshed, iterations), half.change,
+                   first_contact(scene, now, expanded, gap))
+
+
+def expand(scene, now: Pore) -> tuple[Pore, int, float]:
+    """The aggregate in equilibrium under its theta, films closed (2.3.3); Newton's iterations; and the least distance
+    (um) to the opposite wall before films closed. The fluid's nodes stay where they were. Raises GrowthError where no equilibrium is found or contact does not rest."""
+    grid = now.mesh
+    nodes, rim = grid.body, grid.body_loop
+    corners = int(np.searchsorted(nodes, grid.corners))
+    start, push, theta = grid.points[nodes], now.pressure[nodes[:corners]], (now.active + now.inert)[nodes]
+    wall, fixed, iterations, gaps = now.wall.copy(), now.fixed, 0, []
+    for _ in range(CONTACT_ROUNDS):
+        body = growth.of(now, held_at(len(nodes), rim, wall, fixed))
+        target = start.copy()
+        for side, height in ((geometry.BOTTOM, 0.0), (geometry.TOP, scene.pore.width)):
+            target[rim[wall == side], 1] = height
+        found = growth.equilibrium(body, theta, start, push, target)
+        start, push, iterations = found.position, found.pressure, iterations + found.iterations
+        shape = Arcs(start[rim], wall, fixed, now.origin[grid.loop])
+        gaps.append(scene.pore.width - shape.thickness)
+        joins = outline.closing(shape, scene.pore.width, scene.growth.minimum_film, scene.growth.minimum_contact_angle)
+        if not joins.any():
+            break
+        wall = np.where(joins != geometry.FREE, joins, wall)
+    else:
+        raise GrowthError(f"the contact surfaces still change after {CONTACT_ROUNDS} rounds; "
+                          "try a shorter growth.time_step")
+    points, pressure = grid.points.copy(), now.pressure.copy()
+    points[nodes], pressure[nodes[:corners]] = start, push
+    top = wall == geometry.TOP
+    if top.any() and not fixed[top].any():
+        fixed = fixed | _corner_near(shape, middle_of(shape, geometry.TOP))
+    return replace(now, mesh=grid.moved(points), wall=wall, fixed=fixed, pressure=pressure), iterations, gaps[0]
+
+
+def _corner_near(shape: Arcs, chosen: np.ndarray) -> np.ndarray:
+    """The chosen node, or the corner before it where it is a middle."""
+    index = int(np.flatnonzero(chosen)[0])
+    found = np.zeros(len(chosen), bool)
+    found[index - index % 2] = True
+    return found
+
+
+def new_mesh(scene, now: Pore, expanded: Pore, state: Concentrations) -> tuple[Pore, bool]:
+    """The mesh moved with the aggregate, or a new one where the paper's criteria (3.1, 3.5) ask for it."""
+    shape, width = expanded.outline, scene.pore.width
+    stale = geometry.extent_too_short(shape, now.mesh.ends, width, scene.pore.length) or (
+        expanded.wall != now.wall).any() or _too_coarse(scene, outline.corners(shape))
+    if not stale:
+        moved = follow(scene, now, expanded)
+        if moved.acceptable():
+            return replace(expanded, mesh=moved, concentrations=state), False
+    return remesh(scene, now, expanded, state), True
+
+
+def _too_coarse(scene, polygon: geometry.Outline) -> bool:
+    sizes = geometry.interface_sizes(polygon, scene.pore.width, scene.numerics.refinement, pore.film(scene))
+    wanted = 0.5 * (sizes + np.roll(sizes, -1))
+    return bool((polygon.interface_edges() & (polygon.edge_lengths() > 2 * geometry.SPLIT * wanted)).any())
+
+
+def follow(scene, now: Pore, expanded: Pore):
+    """The mesh with its corners moved as in :mod:`repro.mesh_motion`, its fluid edges straight but at the interface."""
+    grid, straight = now.mesh, now.mesh.straight
+    corners = mesh_motion.move(straight, expanded.mesh.points[straight.body], scene.numerics.mesh_compressibility,
+                               scene.numerics.flow_stabilisation)
+    points = np.empty_like(grid.points)
+    points[: grid.corners] = corners
+    points[grid.cells[:, 3:]] = 0.5 * (corners[grid.cells[:, :3]] + corners[grid.cells[:, [1, 2, 0]]])
+    points[grid.body] = expanded.mesh.points[grid.body]
+    return grid.moved(points)
+
+
+def remesh(scene, now: Pore, expanded: Pore, state: Concentrations) -> Pore:
+    """A new mesh around the aggregate, which is its own reference: the expansion restarts at one, so that its mass is X_m
+    times its area; places at t = 0 and the share of X_I in the biomass are carried over."""
+    grid, shape = pore.generate(scene, expanded.outline)
+    old, count, nodes = expanded.mesh, len(grid.points), grid.body
+    total = expanded.active + expanded.inert
+    share = np.divide(expanded.inert, total, where=total > 0, out=np.zeros(len(total)))
+    carried = transfer.interpolate(old.points, old.cells[old.biomass], np.column_stack([expanded.origin, share]),
+                                   grid.points[nodes])
+    origin, inert, active = grid.points.copy(), np.zeros(count), np.zeros(count)
+    origin[nodes], inert[nodes] = carried[:, :2], np.clip(carried[:, 2], 0.0, 1.0)
+    origin[grid.loop] = shape.origin
+    active[nodes] = 1 - inert[nodes]
+    pressure = np.zeros(grid.corners)
+    inside = nodes[nodes < grid.corners]
+    pressure[inside] = transfer.interpolate_linear(old, expanded.pressure, grid.points[inside])
+    return replace(expanded, mesh=grid, wall=shape.wall, fixed=shape.fixed, origin=transfer.unfolded(grid, origin),
+                   reference=grid.points, active=active, inert=inert, pressure=pressure,
+                   concentrations=_carried_substrates(scene, now, grid, state))
+
+
+def _carried_substrates(scene, now: Pore, grid, state: Concentrations) -> Concentrations:
+    """C_A and C_D on a new mesh, a first guess: interpolated, the supply beyond the old ends."""
+    old = now.mesh
+    found = np.tile([s.supply for s in (scene.substrates.acceptor, scene.substrates.donor)], (len(grid.points), 1))
+    x = grid.points[:, 0]
+    within = (x >= old.ends[0]) & (x <= old.ends[1])
+    fields = np.column_stack([state.acceptor, state.donor])
+    found[within] = transfer.interpolate(old.points, old.cells, fields, grid.points[within])
+    return Concentrations(*np.maximum(found, 0.0).T)

@@ -1,0 +1,105 @@
+"""Quadratic triangles (isoparametric): nodal functions, quadrature, and gradients where the nodes are.
+
+With s, t on the unit triangle and L = (1 - s - t, s, t): the corner functions are L_i (2 L_i - 1), those of the middles
+4 L_0 L_1, 4 L_1 L_2, 4 L_2 L_0. Places are x(s, t) = sum_a x_a N_a(s, t), gradients grad N = N_,st (x_,st)^-1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from skfem.quadrature import get_quadrature_tri
+
+#: Degree of the quadrature: products of two quadratic functions and a coefficient that is nearly linear.
+DEGREE = 6
+#: The six nodes on the unit triangle.
+NODES = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0], [0.5, 0.5], [0, 0.5]], float)
+
+
+def linear_functions(where: np.ndarray) -> np.ndarray:
+    """(q, 3) at points (q, 2) of the unit triangle."""
+    s, t = where.T
+    return np.column_stack([1 - s - t, s, t])
+
+
+def functions(where: np.ndarray) -> np.ndarray:
+    """(q, 6) quadratic nodal functions at points (q, 2) of the unit triangle."""
+    L = linear_functions(where)
+    return np.concatenate([L * (2 * L - 1), 4 * L * np.roll(L, -1, axis=1)], axis=1)
+
+
+#: Derivatives of L by s and t.
+SLOPES = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
+
+
+def derivatives(where: np.ndarray) -> np.ndarray:
+    """(q, 6, 2) derivatives of the quadratic functions by s and t."""
+    L = linear_functions(where)[..., None]
+    after = np.roll(L, -1, axis=1)
+    return np.concatenate([(4 * L - 1) * SLOPES, 4 * (L * np.roll(SLOPES, -1, axis=0) + after * SLOPES)], axis=1)
+
+
+def _rule(degree: int):
+    where, weight = get_quadrature_tri(degree)
+    return where.T, weight
+
+
+POINTS, WEIGHTS = _rule(DEGREE)
+AT_NODES = derivatives(NODES)
+QUADRATIC, LINEAR, DERIVATIVES = functions(POINTS), linear_functions(POINTS), derivatives(POINTS)
+
+
+def jacobian(nodes: np.ndarray, slopes: np.ndarray = DERIVATIVES) -> np.ndarray:
+    """(T, q, 2, 2) d x_i / d (s, t)_k of triangles with nodes (T, 6, 2)."""
+    return np.einsum("tai,qak->tqik", nodes, slopes, optimize=True)
+
+
+def determinant(matrix: np.ndarray) -> np.ndarray:
+    """(...) of (..., 2, 2)."""
+    return matrix[..., 0, 0] * matrix[..., 1, 1] - matrix[..., 0, 1] * matrix[..., 1, 0]
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """dx: (T, q) um2, weights of the integral; grad: (T, q, 6, 2), linear: (T, q, 3, 2) gradients, 1/um."""
+
+    dx: np.ndarray
+    grad: np.ndarray
+    linear: np.ndarray
+
+
+def places(nodes: np.ndarray, slopes: np.ndarray = DERIVATIVES) -> Places:
+    """Weights and gradients for triangles with nodes (T, 6, 2) um, none of them turned over; where the derivatives
+    ``slopes`` (q, 6, 2) are taken, in the points of the quadrature by default."""
+    J = jacobian(nodes, slopes)
+    det = determinant(J)
+    inverse = np.empty_like(J)
+    inverse[..., 0, 0], inverse[..., 1, 1] = J[..., 1, 1], J[..., 0, 0]
+    inverse[..., 0, 1], inverse[..., 1, 0] = -J[..., 0, 1], -J[..., 1, 0]
+    inverse /= det[..., None, None]
+    weight = WEIGHTS if len(slopes) == len(WEIGHTS) else np.full(len(slopes), 0.5 / len(slopes))
+    return Places(det * weight, np.matmul(slopes[None], inverse), np.matmul(SLOPES[None, None], inverse))
+
+
+def stiffness(coefficient: np.ndarray, at: Places) -> np.ndarray:
+    """(T, 6, 6) of (k grad u, grad v), k: (T,) or (T, q)."""
+    k = coefficient if coefficient.ndim == 2 else coefficient[:, None]
+    weighted = (k * at.dx)[..., None, None] * at.grad
+    return np.einsum("tqai,tqbi->tab", weighted, at.grad, optimize=True)
+
+
+def mass(coefficient: np.ndarray) -> np.ndarray:
+    """(T, 6, 6) of (c u, v) with c dx (T, q)."""
+    return np.einsum("tq,qa,qb->tab", coefficient, QUADRATIC, QUADRATIC, optimize=True)
+
+
+def load(coefficient: np.ndarray) -> np.ndarray:
+    """(T, 6) of (c, v) with c dx (T, q)."""
+    return coefficient @ QUADRATIC
+
+
+def weights(points: np.ndarray, mesh) -> np.ndarray:
+    """(N,) integrals of the nodal functions over the biomass triangles of a mesh with its nodes at ``points``."""
+    cells = mesh.cells[mesh.biomass]
+    return np.bincount(cells.ravel(), load(places(points[cells]).dx).ravel(), len(points))

@@ -1,0 +1,162 @@
+"""The aggregate's boundary as a chain of parabolic arcs: nodes are corners and middles in turn.
+
+Arc k of the 2 M nodes has the nodes 2 k, 2 k + 1, 2 k + 2. New nodes are placed on the
+arcs themselves, so that a split changes neither shape nor area.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from repro import geometry
+from repro.geometry import FREE, Outline, polygon_area
+
+
+def shape(t: np.ndarray) -> np.ndarray:
+    """(..., 3) the quadratic functions of corner, middle, corner at t in [0, 1]."""
+    return np.stack([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)], axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class Arcs(Outline):
+    """An outline of parabolic arcs: its extremes and its area are those of the arcs, not of the polygon of its nodes."""
+
+    @property
+    def upstream(self) -> float:
+        """Smallest x (um)."""
+        return self._extremes[0]
+
+    @property
+    def downstream(self) -> float:
+        """Largest x (um)."""
+        return self._extremes[1]
+
+    @property
+    def thickness(self) -> float:
+        """Largest y (um)."""
+        return self._extremes[2]
+
+    @property
+    def area(self) -> float:
+        """Area inside (um2): the polygon of the corners, and two thirds of chord times height for each arc."""
+        a, m, b = np.moveaxis(arcs(self.points), 1, 0)
+        chord, bow = b - a, m - 0.5 * (a + b)
+        return polygon_area(self.points[::2]) + float(2 / 3 * np.sum(bow[:, 0] * chord[:, 1] - bow[:, 1] * chord[:, 0]))
+
+    @cached_property
+    def _extremes(self) -> tuple[float, float, float]:
+        nodes = arcs(self.points)
+        slope = -3 * nodes[:, 0] + 4 * nodes[:, 1] - nodes[:, 2]
+        bend = 4 * (nodes[:, 0] - 2 * nodes[:, 1] + nodes[:, 2])
+        flat = np.abs(bend) <= 1e-12 * np.ptp(self.points)
+        t = np.clip(np.where(flat, 0.0, -slope / np.where(flat, 1.0, bend)), 0.0, 1.0)
+        peak = np.einsum("mka,mak->mk", np.stack([shape(t[:, 0]), shape(t[:, 1])], axis=1), nodes)
+        x, y = (np.concatenate([peak[:, k], self.points[:, k]]) for k in (0, 1))
+        return float(x.min()), float(x.max()), float(y.max())
+
+
+def seed(radius: float, refinement: float) -> Arcs:
+    """Half-disc of a radius (um) on the lower wall: middles on the arc too; its centre is fixed."""
+    edges = max(6, 2 * int(np.ceil(np.pi / 2 * geometry.ACROSS_AGGREGATE * refinement)))
+    angle = np.linspace(0.0, np.pi, 2 * edges + 1)
+    arc = radius * np.column_stack([np.cos(angle), np.sin(angle)])
+    arc[[0, -1], 1] = 0.0
+    half = 2 * max(2, int(np.ceil(geometry.ACROSS_AGGREGATE * refinement)))
+    base = np.linspace(-radius, radius, 2 * half + 1)
+    base[half] = 0.0
+    points = np.vstack([np.column_stack([base, 0.0 * base]), arc[1:-1]])
+    wall = np.where(np.arange(len(points)) < len(base), geometry.BOTTOM, FREE)
+    return Arcs(points, wall, np.arange(len(points)) == half, points.copy())
+
+
+def corners(outline: Outline) -> Outline:
+    """The polygon of the corners alone."""
+    return Outline(*(part[::2] for part in (outline.points, outline.wall, outline.fixed, outline.origin)))
+
+
+def arcs(values: np.ndarray) -> np.ndarray:
+    """(M, 3, ...) nodes of each arc from values (2 M, ...) at all nodes."""
+    return np.stack([values[::2], values[1::2], np.roll(values, -2, axis=0)[::2]], axis=1)
+
+
+def split(outline: Outline, width: float, refinement: float, film: float) -> Arcs:
+    """The same curve with corners spaced as :func:`repro.geometry.interface_sizes` wants them, and their middles.
+
+    Arcs at the fluid are split into equal parts of their parameter, and never merged; straight contact surfaces get
+    new nodes, but for their ends and the fixed points.
+    """
+    polygon = corners(outline)
+    sizes = geometry.interface_sizes(polygon, width, refinement, film)
+    largest, count = width / geometry.ACROSS_PORE / refinement, len(polygon.points)
+    pieces = []
+    for first, last in geometry.runs(polygon):
+        keep = np.arange(first, last + 1) % count
+        if outline.wall[2 * keep[0] + 1] != FREE:
+            t = np.concatenate([[0.0], _on_the_wall(outline, polygon, keep, sizes, largest)])
+        else:
+            parts = len(geometry.split_parameters(polygon, keep, sizes)) - 1
+            t = np.linspace(0.0, 1.0, 2 * parts + 1)
+        pieces.append(_placed(outline, keep, t[:-1]))
+    return Arcs(*(np.concatenate(columns) for columns in zip(*pieces)))
+
+
+def halved(outline: Outline, which: np.ndarray) -> Arcs:
+    """The same curve with some of its arcs, ``which`` (M,), cut at their middles."""
+    pieces = []
+    for arc in range(len(which)):
+        keep = np.array([arc, (arc + 1) % len(which)])
+        t = np.linspace(0.0, 1.0, 5 if which[arc] else 3)[:-1]
+        pieces.append(_placed(outline, keep, t))
+    return Arcs(*(np.concatenate(columns) for columns in zip(*pieces)))
+
+
+def _on_the_wall(outline: Outline, polygon: Outline, keep: np.ndarray, sizes, largest: float) -> np.ndarray:
+    """Parameters (arc number + t), the first left out, of corners and middles along a stretch of wall."""
+    free = polygon.wall == FREE
+    ends = polygon.points[keep[[0, -1]]]
+    x = geometry.graded_line(*ends, polygon.points[free], sizes[free], largest)[:, 0]
+    x = np.insert(x, np.arange(1, len(x)), 0.5 * (x[1:] + x[:-1]))
+    sign = np.sign(x[-1] - x[0])
+    arc = np.clip(np.searchsorted(sign * polygon.points[keep, 0], sign * x, side="right") - 1, 0, len(keep) - 2)
+    nodes = arcs(outline.points)[keep[arc], :, 0]
+    t = (x - nodes[:, 0]) / (nodes[:, 2] - nodes[:, 0])
+    slope, bend = -3 * nodes[:, 0] + 4 * nodes[:, 1] - nodes[:, 2], 4 * (nodes[:, 0] - 2 * nodes[:, 1] + nodes[:, 2])
+    for _ in range(6):
+        t = t - (np.einsum("ka,ka->k", shape(t), nodes) - x) / (slope + bend * t)
+    t = np.clip(t, 0.0, 1.0)
+    t[0], t[-1] = 0.0, 1.0
+    return (arc + t)[1:]
+
+
+def _placed(outline: Outline, keep: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Points, wall, fixed and origin at parameters t (arc number + t) along the arcs that start at ``keep``."""
+    low = np.minimum(t.astype(int), len(keep) - 2)
+    weight, arc = shape(t - low), keep[low]
+    points, origin = (np.einsum("ka,kai->ki", weight, arcs(part)[arc]) for part in (outline.points, outline.origin))
+    wall = np.where(t == 0, outline.wall[2 * keep[0]], arcs(outline.wall)[arc, 1])
+    points[wall != FREE, 1] = outline.points[2 * keep[0], 1] if (wall != FREE).any() else 0.0
+    origin[t == 0], points[t == 0] = outline.origin[2 * keep[0]], outline.points[2 * keep[0]]
+    return points, wall, (t == 0) & outline.fixed[2 * keep[0]], origin
+
+
+def closing(outline: Outline, width: float, film: float, angle: float) -> np.ndarray:
+    """(2 M,) wall that each node must join next, FREE where none (2.3.3).
+
+    A middle joins with both corners of its arc, never alone: an arc that touches the wall only in between would cross
+    it. A middle that is too near brings the nearer of its corners.
+    """
+    joins = geometry.closing_nodes(outline, width, film, angle)
+    gap = np.minimum(outline.points[:, 1], width - outline.points[:, 1])
+    for middle in np.flatnonzero(joins[1::2] != FREE) * 2 + 1:
+        ends = np.array([middle - 1, (middle + 1) % len(joins)])
+        ends = ends[outline.wall[ends] == FREE]
+        if len(ends):
+            joins[ends[np.argmin(gap[ends])]] = joins[middle]
+    joins[1::2] = FREE
+    wall = np.where(joins != FREE, joins, outline.wall)
+    both = wall[::2] == np.roll(wall, -2)[::2]
+    joins[1::2] = np.where(both & (outline.wall[1::2] == FREE), wall[::2], FREE)
+    return joins

@@ -1,0 +1,126 @@
+"""The state of a pore on a curved mesh, and what is solved in its geometry; as :mod:`repro.pore`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from repro import geometry
+from repro import mesh as linear_mesh
+from repro.curved import elements, flow, outline, transport
+from repro.curved.mesh import CurvedMesh, curved, unlocked
+from repro.curved.outline import Arcs
+from repro.pore import Solved, film
+from repro.transport import Concentrations
+
+#: Rounds in which arcs that bend too much for the triangles beside them are halved.
+HALVINGS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Pore:
+    """Geometry and biomass at one time.
+
+    time: h; wall, fixed: (2 M,) of each node of ``mesh.loop``; origin: (N, 2) um, places of the material at t = 0;
+    reference: (N, 2) um, places when the mesh was made; active, inert: (N,) mass of X_A and X_I per area of the reference
+    over X_m: their sum is the expansion since then, and X_A = X_m active / (active + inert); zero outside the aggregate;
+    pressure: (corners,) P / mu_L; concentrations: the last known ones.
+    """
+
+    time: float
+    mesh: CurvedMesh
+    wall: np.ndarray
+    fixed: np.ndarray
+    active: np.ndarray
+    inert: np.ndarray
+    origin: np.ndarray
+    reference: np.ndarray
+    pressure: np.ndarray
+    concentrations: Concentrations | None = None
+
+    @property
+    def outline(self) -> Arcs | None:
+        """Boundary of the aggregate, corners and middles in turn; None in a clean channel."""
+        loop = self.mesh.loop
+        if len(loop) == 0:
+            return None
+        return Arcs(self.mesh.points[loop], self.wall, self.fixed, self.origin[loop])
+
+    @property
+    def contact(self) -> bool:
+        """Does the aggregate touch the opposite wall?"""
+        return bool((self.wall == geometry.TOP).any())
+
+    def mass(self) -> float:
+        """(X_A + X_I) / X_m integrated over the aggregate, um2."""
+        return float(self._weight() @ (self.active + self.inert))
+
+    def _weight(self) -> np.ndarray:
+        """(N,) integrals of the nodal functions over the aggregate as it was when the mesh was made, um2."""
+        return self.mesh.once("reference weights", lambda: elements.weights(self.reference, self.mesh))
+
+    def composition(self, maximum_density: float) -> tuple[float, float, float]:
+        """Share of X_I in the biomass, and the least and the largest (X_A + X_I) / X_m, which the constraint J = theta
+        keeps near one."""
+        cells = self.mesh.cells[self.mesh.biomass]
+        expansion = (self.active + self.inert)[cells] @ elements.QUADRATIC.T
+        before = elements.places(self.reference[cells]).dx
+        density = expansion * before / self.mesh.places.dx[self.mesh.biomass]
+        share = float(self._weight() @ self.inert) / self.mass()
+        return share, float(density.min()), float(density.max())
+
+
+def seeded(scene) -> Pore:
+    """The pore at t = 0."""
+    numerics = scene.numerics
+    start = outline.seed(scene.aggregate.radius, numerics.refinement) if scene.aggregate else None
+    grid, start = generate(scene, start)
+    count = len(grid.points)
+    active = np.zeros(count)
+    active[grid.body] = 1.0 if scene.kinetics else 0.0
+    wall, fixed = (start.wall, start.fixed) if start else (np.empty(0, int), np.empty(0, bool))
+    return Pore(0.0, grid, wall, fixed, active, np.zeros(count), grid.points,
+                grid.points, np.zeros(grid.corners))
+
+
+def generate(scene, around: Arcs | None) -> tuple[CurvedMesh, Arcs | None]:
+    """A new curved mesh around an aggregate (None: a clean channel), and the outline with the nodes that it has there.
+
+    Raises MeshError where the outline crosses itself or the channel's ends, or where a curved triangle is turned over.
+    """
+    width, numerics = scene.pore.width, scene.numerics
+    ends = geometry.meshed_extent(around, width, scene.pore.length,
+                                  numerics.extent == "full")
+    if around is None:
+        straight = linear_mesh.around(None, ends, width, numerics.refinement, film(scene))
+        return curved(straight, np.empty((0, 2))), None
+    for _ in range(HALVINGS):
+        around = outline.split(around, width, numerics.refinement, film(scene))
+        polygon = outline.corners(around)
+        linear_mesh.check_outline(polygon, ends, width)
+        straight = unlocked(linear_mesh.around(polygon, ends, width, numerics.refinement, film(scene)))
+        grid = curved(straight, around.points[1::2])
+        strained = grid.strained_arcs()
+        if not strained.any():
+            break
+        around = outline.halved(around, strained)
+    return grid.checked(), around
+
+
+def active_biomass(scene, now: Pore) -> np.ndarray:
+    """(N,) X_A, mg/L."""
+    theta = now.active + now.inert
+    there = theta > 0
+    return scene.kinetics.maximum_density * np.where(there, now.active / np.where(there, theta, 1.0), 0.0)
+
+
+def solve(scene, now: Pore) -> Solved:
+    """Flow, then substrates, in the geometry of the pore: what the scene's sections ask for."""
+    carried = flow.solve(now.mesh, scene.flow, scene.pore.length) if scene.flow else None
+    if scene.substrates is None:
+        return Solved(carried, None, None)
+    found = transport.problem(now.mesh, carried, scene.substrates, scene.kinetics)
+    active = active_biomass(scene, now) if scene.kinetics else None
+    state = transport.steady(found, active, now.concentrations)
+    return Solved(carried, found, state, transport.fluxes(found, active, state))

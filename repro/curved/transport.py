@@ -1,0 +1,252 @@
+"""Substrates (2.2) with quadratic concentrations, in the form that conserves; as :mod:`repro.transport`.
+
+    (D grad C, grad N_i) - (C u, grad N_i) + <u_x C, N_i>_outlet + (q(C) X_A, N_i)_biomass = <u_x C_supply, N_i>_inlet
+
+The sum over i is the balance: supply in = out + consumed, to round-off. (11) is the natural condition of the inlet.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from skfem.quadrature import get_quadrature_line
+
+from repro import kinetics as law
+from repro.assembly import ElementSystem
+from repro.curved import elements
+from repro.curved.mesh import CurvedMesh
+from repro.errors import TransportError
+from repro.flow import Flow
+from repro.linear import node_order
+from repro.timing import timed
+from repro.transport import Concentrations, Fluxes
+
+NEWTON, MOST_ITERATIONS = 1e-12, 40
+#: A concentration below zero by more than this part of the supply is not resolved.
+UNRESOLVED = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Both substrates in one geometry: element matrices (T, 6, 6), sources (N,), and weights (N,) of u_x at both ends."""
+
+    mesh: CurvedMesh
+    matrices: tuple[np.ndarray, np.ndarray]
+    sources: tuple[np.ndarray, np.ndarray]
+    inflow: np.ndarray
+    outflow: np.ndarray
+    speed: float
+    substrates: object
+    kinetics: object
+    system: ElementSystem
+
+    @property
+    def both(self):
+        """Acceptor and donor, as the scene describes them."""
+        return self.substrates.acceptor, self.substrates.donor
+
+
+@timed("transport")
+def problem(mesh: CurvedMesh, flow: Flow | None, substrates, kinetics) -> Problem:
+    """Assemble the linear parts for one geometry and flow (None: pure diffusion, the supply held at both ends)."""
+    at, count = mesh.places, len(mesh.points)
+    carried, inflow, outflow, speed = 0.0, np.zeros(count), np.zeros(count), 0.0
+    if flow is not None:
+        speed = flow.mean_velocity
+        u = np.einsum("qa,tai->tqi", elements.QUADRATIC, flow.velocity[mesh.cells], optimize=True)
+        along = at.dx[..., None] * np.einsum("tqai,tqi->tqa", at.grad, u, optimize=True)
+        carried = -np.einsum("tqa,qb->tab", along, elements.QUADRATIC, optimize=True)
+        inflow = _end_loads(mesh, mesh.inlet, flow.velocity[:, 0])
+        ends, blocks = _end_matrix(mesh, mesh.outlet, flow.velocity[:, 0])
+        carried[ends[0]] += blocks
+        outflow = _end_loads(mesh, mesh.outlet, flow.velocity[:, 0])
+    kinds = (substrates.acceptor, substrates.donor)
+    spread = [np.where(mesh.biomass, s.diffusivity_in_aggregate, s.diffusivity) for s in kinds]
+    matrices = tuple(elements.stiffness(d, at) + carried for d in spread)
+    system = mesh.once(("transport", flow is None), lambda: _system(mesh, flow is None))
+    return Problem(mesh, matrices, tuple(s.supply * inflow for s in kinds), inflow, outflow, speed, substrates, kinetics,
+                   system)
+
+
+def _system(mesh: CurvedMesh, held_ends: bool) -> ElementSystem:
+    """Acceptor and donor of a node side by side, nodes in elimination order."""
+    count = len(mesh.points)
+    place = np.empty(count)
+    place[node_order(count, mesh.cells)] = np.arange(count)
+    held = np.zeros(count, bool)
+    held[np.concatenate([mesh.inlet, mesh.outlet])] = held_ends
+    return ElementSystem(np.concatenate([mesh.cells, count + mesh.cells], axis=1),
+                         np.concatenate([place, place + 0.5]), np.tile(held, 2))
+
+
+def _line_rule():
+    where, weight = get_quadrature_line(6)
+    s = where[0]
+    return weight, np.column_stack([(1 - s) * (1 - 2 * s), 4 * s * (1 - s), s * (2 * s - 1)])
+
+
+LINE_WEIGHTS, LINE = _line_rule()
+
+
+def _end_edges(mesh: CurvedMesh, line: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(E, 3) nodes of the edges of an end, corner, middle, corner; and their lengths (E,)."""
+    nodes = np.column_stack([line[:-2:2], line[1:-1:2], line[2::2]])
+    return nodes, mesh.points[nodes[:, 2], 1] - mesh.points[nodes[:, 0], 1]
+
+
+def _end_loads(mesh: CurvedMesh, line: np.ndarray, speed: np.ndarray) -> np.ndarray:
+    """(N,) integrals of u_x N_i over an end, um2/h."""
+    nodes, length = _end_edges(mesh, line)
+    u = speed[nodes] @ LINE.T
+    found = np.zeros(len(mesh.points))
+    np.add.at(found, nodes, length[:, None] * ((u * LINE_WEIGHTS) @ LINE))
+    return found
+
+
+def _end_matrix(mesh: CurvedMesh, line: np.ndarray, speed: np.ndarray):
+    """Integrals of u_x N_i N_j over an end as ((elements,), blocks (E, 6, 6)) of the triangles that have its edges."""
+    nodes, length = _end_edges(mesh, line)
+    u = speed[nodes] @ LINE.T
+    local = length[:, None, None] * np.einsum("eq,q,qa,qb->eab", u, LINE_WEIGHTS, LINE, LINE, optimize=True)
+    owner = _owners(mesh, nodes[:, 1])
+    blocks = np.zeros((len(nodes), 6, 6))
+    where = np.argmax(mesh.cells[owner][:, :, None] == nodes[:, None, :], axis=1)
+    each = np.arange(len(nodes))
+    blocks[each[:, None, None], where[:, :, None], where[:, None, :]] = local
+    return (owner,), blocks
+
+
+def _owners(mesh: CurvedMesh, middles: np.ndarray) -> np.ndarray:
+    """The triangle of each boundary edge, by its middle node."""
+    return np.array([np.flatnonzero((mesh.cells[:, 3:] == m).any(axis=1))[0] for m in middles])
+
+
+@timed("transport")
+def steady(problem: Problem, active: np.ndarray | None, guess: Concentrations | None = None) -> Concentrations:
+    """Steady concentrations by Newton's method on both substrates at once.
+
+    active: X_A (N,) mg/L, None without biomass. Raises TransportError where Newton does not converge, or where a
+    concentration falls below zero by more than UNRESOLVED of the supply: the mesh is too coarse for its front.
+    """
+    count = len(problem.mesh.points)
+    supply = np.repeat([s.supply for s in problem.both], count)
+    state = supply.copy() if guess is None else np.concatenate([guess.acceptor, guess.donor])
+    state[problem.system.held] = supply[problem.system.held]
+    residual, size, tangent = _balance(problem, active, state)
+    for iteration in range(MOST_ITERATIONS):
+        defect = _relative(problem, residual, size)
+        if defect <= NEWTON:
+            return _checked(problem, state, iteration)
+        state, residual, size, tangent = _advance(problem, active, state, residual, tangent)
+    raise TransportError(f"Newton's method for the substrates stands at a defect of {defect:.2g} after "
+                         f"{MOST_ITERATIONS} iterations; try a larger numerics.refinement")
+
+
+def _relative(problem: Problem, residual, size) -> float:
+    """Largest residual of a free node against the size of its row's terms."""
+    free = ~problem.system.held
+    return float(np.max(np.abs(residual[free]) / np.maximum(size[free], np.finfo(float).tiny)))
+
+
+def _advance(problem: Problem, active, state, residual, tangent):
+    """A Newton step where it lowers the residual and nothing is negative; else a sweep with the uptake's coefficients
+    q(C) / C frozen, which keeps what is positive so, as far as quadratic functions can."""
+    trial = state + problem.system.solve(tangent, -residual, np.zeros(len(state)))
+    found = _balance(problem, active, trial)
+    free = ~problem.system.held
+    worse = np.linalg.norm(found[0][free]) > np.linalg.norm(residual[free])
+    if worse or trial.min() < -UNRESOLVED * max(s.supply for s in problem.both):
+        trial = _sweep(problem, active, np.maximum(state, 0.0))
+        found = _balance(problem, active, trial)
+    return trial, *found
+
+
+def _sweep(problem: Problem, active, state) -> np.ndarray:
+    """Solve (matrix + X_A q(C) / C) C_new = source, with q(C) / C at the state."""
+    matrices = np.zeros((len(problem.mesh.cells), 12, 12))
+    for k, matrix in enumerate(problem.matrices):
+        matrices[:, 6 * k: 6 * k + 6, 6 * k: 6 * k + 6] = matrix
+    weight, values, (q_a, q_d, slopes) = _uptake_at_points(problem, active, state)
+    tiny, biomass = np.finfo(float).tiny, np.flatnonzero(problem.mesh.biomass)
+    for k, rate in enumerate((q_a, q_d)):
+        per = np.where(values[k] > tiny, rate / np.maximum(values[k], tiny), slopes[k][k])
+        matrices[biomass, 6 * k: 6 * k + 6, 6 * k: 6 * k + 6] += elements.mass(weight * per)
+    return problem.system.solve(matrices, np.concatenate(problem.sources), state)
+
+
+def _balance(problem: Problem, active, state):
+    """Residual (2N,), size of its terms (2N,), and element matrices (T, 12, 12) of its derivative."""
+    mesh, count = problem.mesh, len(problem.mesh.points)
+    tangent = np.zeros((len(mesh.cells), 12, 12))
+    local, scale = np.zeros((len(mesh.cells), 12)), np.zeros((len(mesh.cells), 12))
+    for k, matrix in enumerate(problem.matrices):
+        rows = slice(6 * k, 6 * k + 6)
+        tangent[:, rows, rows] = matrix
+        values = state[k * count + mesh.cells]
+        local[:, rows] = np.einsum("tab,tb->ta", matrix, values)
+        scale[:, rows] = np.einsum("tab,tb->ta", np.abs(matrix), np.abs(values))
+    if problem.kinetics is not None and active is not None:
+        _add_uptake(problem, active, state, local, scale, tangent)
+    source = np.concatenate(problem.sources)
+    total, size = (np.bincount(problem.system.unknowns.ravel(), part.ravel(), 2 * count) for part in (local, scale))
+    return total - source, size + np.abs(source), tangent
+
+
+def _uptake_at_points(problem: Problem, active, state):
+    """X_A dx (t, q) on the biomass, C_A and C_D (t, q) there, and the uptake with its derivatives."""
+    mesh, count = problem.mesh, len(problem.mesh.points)
+    cells = mesh.cells[mesh.biomass]
+    acceptor, donor, density = (values[cells] @ elements.QUADRATIC.T
+                                for values in (state[:count], state[count:], active))
+    rates = law.uptake(acceptor, donor, problem.substrates, problem.kinetics)
+    return density * mesh.places.dx[mesh.biomass], (acceptor, donor), rates
+
+
+def _add_uptake(problem: Problem, active, state, local, scale, tangent) -> None:
+    """Add (q X_A, N_i) and its derivatives to the element arrays."""
+    weight, _, (q_a, q_d, slopes) = _uptake_at_points(problem, active, state)
+    biomass = np.flatnonzero(problem.mesh.biomass)
+    for k, rate in enumerate((q_a, q_d)):
+        rows = slice(6 * k, 6 * k + 6)
+        local[biomass, rows] += elements.load(weight * rate)
+        scale[biomass, rows] += np.abs(weight * rate) @ np.abs(elements.QUADRATIC)
+        for m in (0, 1):
+            tangent[biomass, rows, 6 * m: 6 * m + 6] += elements.mass(weight * slopes[k][m])
+
+
+def _checked(problem: Problem, state, iterations: int) -> Concentrations:
+    count = len(problem.mesh.points)
+    for k, substrate in enumerate(problem.both):
+        values = state[k * count: (k + 1) * count]
+        if values.min() < -UNRESOLVED * max(s.supply for s in problem.both):
+            x, y = problem.mesh.points[np.argmin(values)]
+            raise TransportError(f"the {('acceptor', 'donor')[k]} is negative, {values.min():.3g} mg/L at x = {x:.4g}, "
+                                 f"y = {y:.4g} um; the mesh is too coarse there: try a larger numerics.refinement")
+    return Concentrations(state[:count], state[count:], iterations)
+
+
+def fluxes(problem: Problem, active: np.ndarray | None, state: Concentrations) -> tuple[Fluxes, Fluxes]:
+    """Ledger of the acceptor and of the donor in one geometry."""
+    both = np.concatenate([state.acceptor, state.donor])
+    consumed = (0.0, 0.0)
+    if problem.kinetics is not None and active is not None:
+        weight, _, (*rates, _) = _uptake_at_points(problem, active, both)
+        consumed = tuple(float(np.sum(weight * rate)) for rate in rates)
+    return tuple(_fluxes(problem, k, field, consumed[k]) for k, field in enumerate((state.acceptor, state.donor)))
+
+
+def _fluxes(problem: Problem, k: int, field: np.ndarray, consumed: float) -> Fluxes:
+    mesh = problem.mesh
+    if problem.speed:
+        ends = [float(w @ field / w.sum()) for w in (problem.inflow, problem.outflow)]
+        return Fluxes(float(problem.sources[k].sum()), float(problem.outflow @ field), consumed, *ends)
+    flux = np.bincount(mesh.cells.ravel(), np.einsum("tab,tb->ta", problem.matrices[k], field[mesh.cells]).ravel(),
+                       len(field))
+    ends = [_mean(mesh, line, field) for line in (mesh.inlet, mesh.outlet)]
+    return Fluxes(float(flux[np.concatenate([mesh.inlet, mesh.outlet])].sum()), 0.0, consumed, *ends)
+
+
+def _mean(mesh: CurvedMesh, line: np.ndarray, field: np.ndarray) -> float:
+    weight = _end_loads(mesh, line, np.ones(len(field)))
+    return float(weight @ field / weight.sum())

@@ -1,0 +1,133 @@
+"""Steps of the length that the growth asks for (``numerics.time = "midpoint"``): second order in time.
+
+The midpoint rule carries (9)-(10) over a step with the rates of the shape half way. Euler's rule would take those of
+the start: the mean over the aggregate of their difference, times the step, is what ``numerics.tolerance`` bounds; the
+error of the midpoint rule is of higher order, and what a tolerance makes of it is measured in ``make bench``. A step
+ends at each reported time, and when the aggregate first comes as near to the opposite wall as a film may be thin (2.3.3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from repro import midpoint
+from repro.coupling import SAME_TIME, Attempt, Instant, PoreEnd, Step, added, newton_counts, pore_end, stopping
+from repro.curved import coupling as curved
+from repro.errors import StageError
+
+#: A step that fails or errs too much is tried again, shorter, until it is this part of growth.time_step.
+SHORTEST = 1e-3
+#: Limits of the ratio of consecutive steps, and what is kept of the length that the estimate allows.
+FASTER, SLOWER, SAFETY = 2.0, 0.2, 0.9
+#: An estimate up to so many tolerances is accepted.
+EXCESS = 1.5
+#: Contact is met when the film is no thinner than this part of what it may be.
+LANDED = 0.98
+
+
+def simulate(scene) -> Iterator[Instant]:
+    """As :func:`repro.coupling.simulate`; without ``output.times`` every step is reported."""
+    scheme = curved if scene.numerics.elements == "quadratic" else midpoint
+    with stopping(0.0):
+        now = scheme.seeded(scene)
+        solved = scheme.solve(scene, now)
+    now = replace(now, concentrations=solved.concentrations)
+    yield Instant(now, solved, None, (), 0, newton_counts(solved))
+    if scene.growth is None or scene.growth.end == 0:
+        return
+    length, pending = scene.growth.time_step, _Pending()
+    for time in _targets(scene):
+        while time - now.time > SAME_TIME:
+            with stopping(now.time):
+                taken, solved, length = _advance(scheme, scene, now, solved, time, length)
+            now = replace(taken.pore, concentrations=solved.concentrations)
+            pending.add(taken, solved)
+            over = pore_end(scene, now, 1.0)
+            if over or scene.output.times is None or time - now.time <= SAME_TIME and time in scene.output.times:
+                yield pending.instant(now, solved)
+            if over:
+                raise PoreEnd(f"{over} at t = {now.time:g} h")
+
+
+class _Pending:
+    """What has happened since the last Instant."""
+
+    def __init__(self):
+        self.ledgers, self.remeshes, self.counts = [], 0, {}
+
+    def add(self, taken: Step, solved) -> None:
+        """Count a step and what is solved after it."""
+        self.ledgers.append(taken.ledger)
+        self.remeshes += taken.remeshed
+        self.counts = added(self.counts, {"growth": taken.iterations}, newton_counts(solved))
+
+    def instant(self, now, solved) -> Instant:
+        """An Instant with it; counting starts anew."""
+        found = Instant(now, solved, None, tuple(self.ledgers), self.remeshes, self.counts)
+        self.__init__()
+        return found
+
+
+def _targets(scene) -> list[float]:
+    """Times (h) at which a step must end."""
+    return sorted({time for time in scene.output.times or () if time > 0} | {scene.growth.end})
+
+
+def _advance(scheme, scene, now, solved, time: float, length: float):
+    """The first step that is good enough, what is solved after it, and the length (h) to try next."""
+    tolerance, shortest = scene.numerics.tolerance, SHORTEST * scene.growth.time_step
+    while True:
+        duration = _fitted(length, time - now.time)
+        try:
+            found = scheme.attempt(scene, now, solved, duration)
+            factor = _factor(found.change * duration, tolerance)
+            if duration <= shortest or _good(found, factor):
+                taken = _ending_at(found.step, now.time + duration, time)
+                return taken, scheme.solve(scene, taken.pore), _next(length, duration, factor)
+            length = duration * (_to_contact(found.gaps) if _overshoots(found) else factor)
+        except (StageError, FloatingPointError):
+            if duration <= shortest:
+                raise
+            length = duration / 2
+
+
+def _fitted(length: float, left: float) -> float:
+    """A step of about ``length`` that leaves no crumb of the time that is left."""
+    if length >= left * (1 - 1e-9):
+        return left
+    return min(length, left / 2) if 2 * length > left else length
+
+
+def _factor(estimate: float, tolerance: float) -> float:
+    """By what to multiply the step, from its estimate."""
+    if estimate <= 0:
+        return FASTER
+    return min(FASTER, max(SLOWER, SAFETY * (tolerance / estimate) ** 0.5))
+
+
+def _good(found: Attempt, factor: float) -> bool:
+    return factor >= SAFETY / EXCESS**0.5 and not _overshoots(found)
+
+
+def _next(length: float, duration: float, factor: float) -> float:
+    """A step that was cut short to end at a reported time says nothing against the length before."""
+    return max(length, duration * factor) if duration < length and factor > 1 else duration * factor
+
+
+def _overshoots(found: Attempt) -> bool:
+    """Does the step end with a film much thinner than it may be, when contact is first made?"""
+    return found.gaps is not None and found.gaps[1] < LANDED * found.gaps[2]
+
+
+def _to_contact(gaps: tuple[float, float, float]) -> float:
+    """The part of the step after which the film, thinning at a constant rate, is just too thin."""
+    before, after, film = gaps
+    aim = 0.5 * (1 + LANDED) * film
+    return min(0.95, max(0.02, (before - aim) / (before - after)))
+
+
+def _ending_at(taken: Step, end: float, time: float) -> Step:
+    """The step with the time of its end, the reported one where they are the same."""
+    exact = time if abs(time - end) <= SAME_TIME else end
+    return replace(taken, pore=replace(taken.pore, time=exact))
