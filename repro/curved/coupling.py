@@ -28,11 +28,13 @@ __all__ = ["attempt", "seeded", "solve"]
 @dataclass(frozen=True, eq=False)
 class Midpoint:
     """What half a step has found: flow and substrates half way, and the rates F3 / X_A, F4 / X_A (N,) 1/h at the nodes
-    of the mesh at the start; change: mean over the aggregate of |rate half way - rate at the start|, 1/h."""
+    of the mesh at the start; change: mean over the aggregate of |rate half way - rate at the start|, 1/h; shape: half way,
+    with the fluid's nodes where they were."""
 
     solved: Solved
     rates: tuple[np.ndarray, np.ndarray]
     change: float
+    shape: Pore
 
 
 def midpoint(scene, now: Pore, solved: Solved, duration: float) -> Midpoint:
@@ -41,7 +43,7 @@ def midpoint(scene, now: Pore, solved: Solved, duration: float) -> Midpoint:
     Where the moved mesh is not acceptable a new one is made, and the rates are carried back to the material's nodes.
     """
     first = rates_of(scene, solved.concentrations)
-    half, _, _ = expand(scene, grown(now, first, duration / 2))
+    half, _, _ = expand(scene, _scaled(now, grown(now, first, duration / 2)))
     there, remeshed = new_mesh(scene, now, half, solved.concentrations)
     found = solve(scene, there)
     rates = rates_of(scene, found.concentrations)
@@ -49,7 +51,7 @@ def midpoint(scene, now: Pore, solved: Solved, duration: float) -> Midpoint:
         rates = _carried_back(there, half, rates)
     weight = elements.weights(now.mesh.points, now.mesh)
     apart = np.abs(rates[0] + rates[1] - first[0] - first[1])
-    return Midpoint(found, rates, float(weight @ apart / weight.sum()))
+    return Midpoint(found, rates, float(weight @ apart / weight.sum()), half)
 
 
 def _carried_back(there: Pore, half: Pore, rates):
@@ -71,7 +73,7 @@ def attempt(scene, now: Pore, solved: Solved, duration: float) -> Attempt:
     """A step of ``duration`` (h). Raises StageError where it cannot be made."""
     half = midpoint(scene, now, solved, duration)
     after = grown(now, half.rates, duration)
-    expanded, iterations, gap = expand(scene, after)
+    expanded, iterations, gap = expand(scene, _ahead(now, half.shape, after))
     if leaves := pore_end(scene, expanded, 0.1):
         raise PoreEnd(f"{leaves} in the step from t = {now.time:g} h")
     guess = half.solved.concentrations
@@ -86,9 +88,38 @@ def attempt(scene, now: Pore, solved: Solved, duration: float) -> Attempt:
                    first_contact(scene, now, expanded, gap))
 
 
+def _scaled(now: Pore, after: Pore) -> Pore:
+    """A first guess of the shape: all lengths grow alike, while the aggregate is free."""
+    if now.contact:
+        return after
+    factor = np.sqrt(after.mass() / now.mass())
+    return _placed(after, now.mesh.points * factor)
+
+
+def _ahead(now: Pore, half: Pore, after: Pore) -> Pore:
+    """A first guess of the shape: as much again as half the step has made, while contact stays as it is."""
+    if (half.wall != now.wall).any():
+        return after
+    push = 2 * half.pressure - now.pressure
+    return _placed(replace(after, pressure=push), 2 * half.mesh.points - now.mesh.points)
+
+
+def _placed(after: Pore, points: np.ndarray) -> Pore:
+    """The pore with its aggregate's nodes at guessed places, unless they turn a triangle over."""
+    body = after.mesh.body
+    guess = after.mesh.points.copy()
+    guess[body] = points[body]
+    there = elements.jacobian(guess[after.mesh.cells[after.mesh.biomass]])
+    return replace(after, mesh=after.mesh.moved(guess)) if elements.determinant(there).min() > 0 else after
+
+
 def expand(scene, now: Pore) -> tuple[Pore, int, float]:
     """The aggregate in equilibrium under its theta, films closed (2.3.3); Newton's iterations; and the least distance
-    (um) to the opposite wall before films closed. The fluid's nodes stay where they were. Raises GrowthError where no equilibrium is found or contact does not rest."""
+    (um) to the opposite wall before films closed.
+
+    It starts from the places and the pressure of ``now``; the fluid's nodes stay where they were. Raises GrowthError
+    where no equilibrium is found or contact does not rest.
+    """
     grid = now.mesh
     nodes, rim = grid.body, grid.body_loop
     corners = int(np.searchsorted(nodes, grid.corners))

@@ -52,7 +52,7 @@ QUADRATIC, LINEAR, DERIVATIVES = functions(POINTS), linear_functions(POINTS), de
 
 def jacobian(nodes: np.ndarray, slopes: np.ndarray = DERIVATIVES) -> np.ndarray:
     """(T, q, 2, 2) d x_i / d (s, t)_k of triangles with nodes (T, 6, 2)."""
-    return np.einsum("tai,qak->tqik", nodes, slopes, optimize=True)
+    return np.swapaxes(nodes, 1, 2)[:, None] @ slopes[None]
 
 
 def determinant(matrix: np.ndarray) -> np.ndarray:
@@ -79,24 +79,33 @@ def places(nodes: np.ndarray, slopes: np.ndarray = DERIVATIVES) -> Places:
     inverse[..., 0, 1], inverse[..., 1, 0] = -J[..., 0, 1], -J[..., 1, 0]
     inverse /= det[..., None, None]
     weight = WEIGHTS if len(slopes) == len(WEIGHTS) else np.full(len(slopes), 0.5 / len(slopes))
-    return Places(det * weight, np.matmul(slopes[None], inverse), np.matmul(SLOPES[None, None], inverse))
+    return Places(det * weight, slopes[None] @ inverse, SLOPES[None, None] @ inverse)
+
+
+#: Products of two nodal functions in the points of the quadrature, (q, 36).
+PRODUCTS = (QUADRATIC[:, :, None] * QUADRATIC[:, None, :]).reshape(len(WEIGHTS), 36)
 
 
 def stiffness(coefficient: np.ndarray, at: Places) -> np.ndarray:
-    """(T, 6, 6) of (k grad u, grad v), k: (T,) or (T, q)."""
-    k = coefficient if coefficient.ndim == 2 else coefficient[:, None]
-    weighted = (k * at.dx)[..., None, None] * at.grad
-    return np.einsum("tqai,tqbi->tab", weighted, at.grad, optimize=True)
+    """(T, 6, 6) of (k grad u, grad v), k: (T,)."""
+    slopes = np.swapaxes(at.grad, 2, 3).reshape(len(at.dx), -1, 6)
+    weight = np.repeat(coefficient[:, None] * at.dx, 2, axis=1)
+    return np.swapaxes(slopes, 1, 2) @ (weight[:, :, None] * slopes)
 
 
 def mass(coefficient: np.ndarray) -> np.ndarray:
     """(T, 6, 6) of (c u, v) with c dx (T, q)."""
-    return np.einsum("tq,qa,qb->tab", coefficient, QUADRATIC, QUADRATIC, optimize=True)
+    return (coefficient @ PRODUCTS).reshape(-1, 6, 6)
 
 
 def load(coefficient: np.ndarray) -> np.ndarray:
     """(T, 6) of (c, v) with c dx (T, q)."""
     return coefficient @ QUADRATIC
+
+
+def at_points(values: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """(T, q) a nodal field (N,) in the points of the quadrature."""
+    return values[cells] @ QUADRATIC.T
 
 
 def weights(points: np.ndarray, mesh) -> np.ndarray:

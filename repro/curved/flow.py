@@ -30,10 +30,10 @@ def solve(mesh: CurvedMesh, drive, length: float) -> Flow:
 def unit_flow(mesh: CurvedMesh, viscosity_ratio: float) -> tuple[np.ndarray, np.ndarray, float]:
     """Velocity (N, 2), pressure (corners,) 1/um, and loss over the meshed part, 1/um, at mean velocity one (1)-(6)."""
     at, viscosity = mesh.places, np.where(mesh.biomass, viscosity_ratio, 1.0)
-    divergence = np.einsum("tq,qp,tqai->tpia", at.dx, elements.LINEAR, at.grad, optimize=True)
-    lower = np.zeros((len(mesh.cells), 3, 3))
-    blocks = saddle_blocks(two_components(elements.stiffness(viscosity, at)),
-                           divergence.reshape(len(mesh.cells), 3, 12), lower)
+    slopes = np.swapaxes(at.grad, 2, 3).reshape(*at.dx.shape, 12)  # of u_x by x for its six nodes, then of u_y by y
+    divergence = elements.LINEAR.T @ (at.dx[:, :, None] * slopes)
+    blocks = saddle_blocks(two_components(elements.stiffness(viscosity, at)), divergence,
+                           np.zeros((len(mesh.cells), 3, 3)))
     system = mesh.once("flow", lambda: _system(mesh))
     count = len(mesh.points)
     value = np.zeros(len(system.held))

@@ -85,7 +85,7 @@ class System:
 
     def deformation(self, position: np.ndarray) -> np.ndarray:
         """(t, q, 2, 2) F[i, K] = d x_i / d X_K."""
-        return np.matmul(np.swapaxes(position[self.body.cells], 1, 2)[:, None], self.at.grad)
+        return np.swapaxes(position[self.body.cells], 1, 2)[:, None] @ self.at.grad
 
     def _strain_and_pressure(self, position, pressure, theta):
         """F (t, q, 2, 2), and P with its stabilisation (t, q)."""
@@ -97,9 +97,10 @@ class System:
         """Residual [x of all nodes, y, then P of the corners] and the size of its terms; theta: (t, q)."""
         F, P = self._strain_and_pressure(position, pressure, theta)
         J, dx = elements.determinant(F), self.at.dx
-        force = np.einsum("tqik,tqak->tia", dx[..., None, None] * piola(F, P), self.at.grad, optimize=True)
+        slopes = np.swapaxes(self.at.grad, 2, 3)
+        force = ((dx[..., None, None] * piola(F, P)) @ slopes).sum(axis=1)
         weight = (dx * J ** (-2 / 3))[..., None, None]
-        terms = np.einsum("tqik,tqak->tia", weight * np.abs(F), np.abs(self.at.grad), optimize=True)
+        terms = ((weight * np.abs(F)) @ np.abs(slopes)).sum(axis=1)
         gap, scale = (dx * (J - theta)) @ elements.LINEAR, (dx * theta) @ elements.LINEAR
         n = 2 * len(position) + self.body.corners
         return tuple(np.bincount(self.unknowns.ravel(), np.concatenate([a[:, 0], a[:, 1], b], axis=1).ravel(), n)
@@ -115,9 +116,10 @@ class System:
         JH = (J[..., None, None] * H).reshape(count, points, 4)
         stiff = (GAMMA * theta ** (-5 / 3))[..., None, None] * JH[..., :, None] * JH[..., None, :]
         moduli = self.at.dx[..., None, None] * (tangent(F, P).reshape(count, points, 4, 4) + stiff)
-        K = np.einsum("tqca,tqcb->tab", unit, np.matmul(moduli, unit), optimize=True)
-        slope = np.einsum("tqik,tqak->tqia", (self.at.dx * J)[..., None, None] * H, self.at.grad, optimize=True)
-        B = np.einsum("tqia,qp->tpia", slope, elements.LINEAR, optimize=True).reshape(count, 3, 12)
+        stacked = unit.reshape(count, -1, 12)
+        K = np.swapaxes(stacked, 1, 2) @ (moduli @ unit).reshape(count, -1, 12)
+        slope = ((self.at.dx * J)[..., None, None] * H) @ np.swapaxes(self.at.grad, 2, 3)
+        B = elements.LINEAR.T @ slope.reshape(count, points, 12)
         return saddle_blocks(K, -B, np.zeros((count, 3, 3)))
 
     def admissible(self, position: np.ndarray) -> bool:
@@ -131,7 +133,7 @@ def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: n
     """Equilibrium under theta (n,) nodal since the reference; other arguments as :func:`repro.growth.equilibrium`'s."""
     system = System(body)
     start = elements.determinant(system.deformation(position))
-    target = theta[body.cells] @ elements.QUADRATIC.T * body.expanded
+    target = elements.at_points(theta, body.cells) * body.expanded
     refuse_turned_over(start, target)
     parts = int(np.ceil(np.abs(np.log(target / start)).max() / np.log(FACTOR)))
     return reach(system, start, target, position, pressure, prescribed, max(1, parts))

@@ -64,7 +64,7 @@ class Pore:
         """Share of X_I in the biomass, and the least and the largest (X_A + X_I) / X_m, which the constraint J = theta
         keeps near one."""
         cells = self.mesh.cells[self.mesh.biomass]
-        expansion = (self.active + self.inert)[cells] @ elements.QUADRATIC.T
+        expansion = elements.at_points(self.active + self.inert, cells)
         before = elements.places(self.reference[cells]).dx
         density = expansion * before / self.mesh.places.dx[self.mesh.biomass]
         share = float(self._weight() @ self.inert) / self.mass()

@@ -39,13 +39,15 @@ def _inverted(nodes: np.ndarray, where: np.ndarray) -> np.ndarray:
     """(K, 2) on the unit triangle for places (K, 2) in triangles (K, 6, 2); far outside where it does not converge."""
     local = np.full((len(where), 2), 1 / 3)
     for _ in range(NEWTON_STEPS):
-        apart = np.einsum("ka,kai->ki", elements.functions(local), nodes) - where
-        J = np.einsum("kai,kaj->kij", nodes, elements.derivatives(local))
+        apart = (elements.functions(local)[:, None] @ nodes)[:, 0] - where
+        J = np.swapaxes(nodes, 1, 2) @ elements.derivatives(local)
         det = elements.determinant(J)
         det = np.where(np.abs(det) > 1e-12 * np.abs(det).max(), det, np.inf)
         step = np.stack([J[:, 1, 1] * apart[:, 0] - J[:, 0, 1] * apart[:, 1],
                          J[:, 0, 0] * apart[:, 1] - J[:, 1, 0] * apart[:, 0]], axis=1) / det[:, None]
         local = np.clip(local - step, -2.0, 3.0)
+        if np.abs(step).max() < 1e-12:
+            break
     apart = np.einsum("ka,kai->ki", elements.functions(local), nodes) - where
     lost = np.hypot(*apart.T) > 1e-6 * np.ptp(nodes, axis=(1, 2))
     return np.where(lost[:, None], 99.0, local)

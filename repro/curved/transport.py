@@ -54,9 +54,9 @@ def problem(mesh: CurvedMesh, flow: Flow | None, substrates, kinetics) -> Proble
     carried, inflow, outflow, speed = 0.0, np.zeros(count), np.zeros(count), 0.0
     if flow is not None:
         speed = flow.mean_velocity
-        u = np.einsum("qa,tai->tqi", elements.QUADRATIC, flow.velocity[mesh.cells], optimize=True)
-        along = at.dx[..., None] * np.einsum("tqai,tqi->tqa", at.grad, u, optimize=True)
-        carried = -np.einsum("tqa,qb->tab", along, elements.QUADRATIC, optimize=True)
+        u = elements.QUADRATIC @ flow.velocity[mesh.cells]
+        along = (at.grad @ u[..., None])[..., 0] * at.dx[..., None]
+        carried = -np.swapaxes(along, 1, 2) @ elements.QUADRATIC
         inflow = _end_loads(mesh, mesh.inlet, flow.velocity[:, 0])
         ends, blocks = _end_matrix(mesh, mesh.outlet, flow.velocity[:, 0])
         carried[ends[0]] += blocks
@@ -184,8 +184,8 @@ def _balance(problem: Problem, active, state):
         rows = slice(6 * k, 6 * k + 6)
         tangent[:, rows, rows] = matrix
         values = state[k * count + mesh.cells]
-        local[:, rows] = np.einsum("tab,tb->ta", matrix, values)
-        scale[:, rows] = np.einsum("tab,tb->ta", np.abs(matrix), np.abs(values))
+        local[:, rows] = (matrix @ values[..., None])[..., 0]
+        scale[:, rows] = (np.abs(matrix) @ np.abs(values)[..., None])[..., 0]
     if problem.kinetics is not None and active is not None:
         _add_uptake(problem, active, state, local, scale, tangent)
     source = np.concatenate(problem.sources)
@@ -197,7 +197,7 @@ def _uptake_at_points(problem: Problem, active, state):
     """X_A dx (t, q) on the biomass, C_A and C_D (t, q) there, and the uptake with its derivatives."""
     mesh, count = problem.mesh, len(problem.mesh.points)
     cells = mesh.cells[mesh.biomass]
-    acceptor, donor, density = (values[cells] @ elements.QUADRATIC.T
+    acceptor, donor, density = (elements.at_points(values, cells)
                                 for values in (state[:count], state[count:], active))
     rates = law.uptake(acceptor, donor, problem.substrates, problem.kinetics)
     return density * mesh.places.dx[mesh.biomass], (acceptor, donor), rates
