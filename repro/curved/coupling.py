@@ -170,7 +170,7 @@ def new_mesh(scene, now: Pore, expanded: Pore, state: Concentrations) -> tuple[P
 
 
 def _too_coarse(scene, polygon: geometry.Outline) -> bool:
-    sizes = geometry.interface_sizes(polygon, scene.pore.width, scene.numerics.refinement, pore.film(scene))
+    sizes = geometry.interface_sizes(polygon, scene.pore.width, pore.resolution(scene), pore.film(scene))
     wanted = 0.5 * (sizes + np.roll(sizes, -1))
     return bool((polygon.interface_edges() & (polygon.edge_lengths() > 2 * geometry.SPLIT * wanted)).any())
 

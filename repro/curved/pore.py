@@ -11,9 +11,16 @@ from repro import mesh as linear_mesh
 from repro.curved import elements, flow, outline, transport
 from repro.curved.mesh import CurvedMesh, curved, unlocked
 from repro.curved.outline import Arcs
+from repro.errors import TransportError
+from repro.flow import poiseuille_loss
 from repro.pore import Solved, film
 from repro.transport import Concentrations
 
+#: Elements are made no larger than this asks for: the concentration boundary layer is W Pe^(-1/3) thick (Leveque), and
+#: with four elements across the pore and this factor an overshoot upstream of an aggregate stays under 1 %.
+BOUNDARY_LAYER = 0.15
+#: Under this Peclet number u W / D the inlet supplies nothing that could be told from round-off.
+SLOWEST = 1e-9
 #: Rounds in which arcs that bend too much for the triangles beside them are halved.
 HALVINGS = 6
 
@@ -71,10 +78,32 @@ class Pore:
         return share, float(density.min()), float(density.max())
 
 
+def resolution(scene) -> float:
+    """What element sizes are divided by: ``numerics.refinement``, or more where boundary layers ask for it.
+
+    The speed is the scene's mean velocity, or that of the clean channel under its head.
+    """
+    if scene.flow is None or scene.substrates is None:
+        return scene.numerics.refinement
+    return max(scene.numerics.refinement, BOUNDARY_LAYER * _peclet(scene, _fastest(scene)) ** (1 / 3))
+
+
+def _fastest(scene) -> float:
+    drive = scene.flow
+    if drive.head is None:
+        return drive.mean_velocity
+    return drive.head * drive.gravity / drive.kinematic_viscosity / poiseuille_loss(scene.pore.length, scene.pore.width)
+
+
+def _peclet(scene, speed: float) -> float:
+    """u W / D with the smaller diffusivity."""
+    kinds = (scene.substrates.acceptor, scene.substrates.donor)
+    return speed * scene.pore.width / min(min(s.diffusivity, s.diffusivity_in_aggregate) for s in kinds)
+
+
 def seeded(scene) -> Pore:
     """The pore at t = 0."""
-    numerics = scene.numerics
-    start = outline.seed(scene.aggregate.radius, numerics.refinement) if scene.aggregate else None
+    start = outline.seed(scene.aggregate.radius, resolution(scene)) if scene.aggregate else None
     grid, start = generate(scene, start)
     count = len(grid.points)
     active = np.zeros(count)
@@ -89,17 +118,17 @@ def generate(scene, around: Arcs | None) -> tuple[CurvedMesh, Arcs | None]:
 
     Raises MeshError where the outline crosses itself or the channel's ends, or where a curved triangle is turned over.
     """
-    width, numerics = scene.pore.width, scene.numerics
+    width, size = scene.pore.width, resolution(scene)
     ends = geometry.meshed_extent(around, width, scene.pore.length,
-                                  numerics.extent == "full")
+                                  scene.numerics.extent == "full")
     if around is None:
-        straight = linear_mesh.around(None, ends, width, numerics.refinement, film(scene))
+        straight = linear_mesh.around(None, ends, width, size, film(scene))
         return curved(straight, np.empty((0, 2))), None
     for _ in range(HALVINGS):
-        around = outline.split(around, width, numerics.refinement, film(scene))
+        around = outline.split(around, width, size, film(scene))
         polygon = outline.corners(around)
         linear_mesh.check_outline(polygon, ends, width)
-        straight = unlocked(linear_mesh.around(polygon, ends, width, numerics.refinement, film(scene)))
+        straight = unlocked(linear_mesh.around(polygon, ends, width, size, film(scene)))
         grid = curved(straight, around.points[1::2])
         strained = grid.strained_arcs()
         if not strained.any():
@@ -120,6 +149,9 @@ def solve(scene, now: Pore) -> Solved:
     carried = flow.solve(now.mesh, scene.flow, scene.pore.length) if scene.flow else None
     if scene.substrates is None:
         return Solved(carried, None, None)
+    if carried and _peclet(scene, carried.mean_velocity) < SLOWEST:
+        raise TransportError(f"the Peclet number u W / D is {_peclet(scene, carried.mean_velocity):.2g}, under "
+                             f"{SLOWEST:g}: nothing is supplied through the inlet; leave [flow] out for pure diffusion")
     found = transport.problem(now.mesh, carried, scene.substrates, scene.kinetics)
     active = active_biomass(scene, now) if scene.kinetics else None
     state = transport.steady(found, active, now.concentrations)

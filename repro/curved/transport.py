@@ -25,6 +25,8 @@ from repro.transport import Concentrations, Fluxes
 NEWTON, MOST_ITERATIONS = 1e-12, 40
 #: A concentration below zero by more than this part of the supply is not resolved.
 UNRESOLVED = 1e-4
+#: Neither is one above its supply by more than this part of it.
+OVERSHOOT = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,8 +170,9 @@ def _sweep(problem: Problem, active, state) -> np.ndarray:
     for k, matrix in enumerate(problem.matrices):
         matrices[:, 6 * k: 6 * k + 6, 6 * k: 6 * k + 6] = matrix
     weight, values, (q_a, q_d, slopes) = _uptake_at_points(problem, active, state)
-    tiny, biomass = np.finfo(float).tiny, np.flatnonzero(problem.mesh.biomass)
-    for k, rate in enumerate((q_a, q_d)):
+    biomass = np.flatnonzero(problem.mesh.biomass)
+    for k, (rate, substrate) in enumerate(zip((q_a, q_d), problem.both)):
+        tiny = 1e-9 * substrate.half_saturation
         per = np.where(values[k] > tiny, rate / np.maximum(values[k], tiny), slopes[k][k])
         matrices[biomass, 6 * k: 6 * k + 6, 6 * k: 6 * k + 6] += elements.mass(weight * per)
     return problem.system.solve(matrices, np.concatenate(problem.sources), state)
@@ -216,13 +219,17 @@ def _add_uptake(problem: Problem, active, state, local, scale, tangent) -> None:
 
 
 def _checked(problem: Problem, state, iterations: int) -> Concentrations:
+    """The solution, if it stays between zero and the supply as well as it has to."""
     count = len(problem.mesh.points)
-    for k, substrate in enumerate(problem.both):
-        values = state[k * count: (k + 1) * count]
-        if values.min() < -UNRESOLVED * max(s.supply for s in problem.both):
-            x, y = problem.mesh.points[np.argmin(values)]
-            raise TransportError(f"the {('acceptor', 'donor')[k]} is negative, {values.min():.3g} mg/L at x = {x:.4g}, "
-                                 f"y = {y:.4g} um; the mesh is too coarse there: try a larger numerics.refinement")
+    for name, values, substrate in zip(("acceptor", "donor"), (state[:count], state[count:]), problem.both):
+        least = -UNRESOLVED * max(s.supply for s in problem.both)
+        for beyond, where in ((values.min() < least, values.argmin()),
+                              (values.max() > (1 + OVERSHOOT) * substrate.supply, values.argmax())):
+            if beyond:
+                x, y = problem.mesh.points[where]
+                raise TransportError(f"the {name} is {values[where]:.3g} mg/L at x = {x:.4g}, y = {y:.4g} um, outside of "
+                                     f"0 to {substrate.supply:g}; the mesh is too coarse there: "
+                                     "try a larger numerics.refinement")
     return Concentrations(state[:count], state[count:], iterations)
 
 
