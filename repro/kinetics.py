@@ -38,6 +38,19 @@ def uptake(acceptor, donor, substrates, kinetics):
     return m_a * per_acceptor, k * other_a * m_d, jacobian
 
 
+def paired_uptake(acceptor, donor, substrates, kinetics):
+    """As :func:`uptake`, but with one rate r = k m_A m_D for both substrates below zero too, where quadratic functions
+    may go by a little: what is taken up of one stays in proportion to the other. r is zero where both are negative.
+    """
+    m_a, d_a = monod(acceptor, substrates.acceptor.half_saturation)
+    m_d, d_d = monod(donor, substrates.donor.half_saturation)
+    demand = kinetics.acceptor_to_donor_ratio
+    decay = kinetics.decay_oxygen_demand * kinetics.degradable_fraction * kinetics.decay_coefficient
+    k = np.where((m_a < 0) & (m_d < 0), 0.0, kinetics.maximum_utilization_rate)
+    rate, by_a, by_d = k * m_a * m_d, k * d_a * m_d, k * m_a * d_d
+    return demand * rate + decay * m_a, rate, ((demand * by_a + decay * d_a, demand * by_d), (by_a, by_d))
+
+
 def growth_rate(acceptor, donor, substrates, kinetics):
     """F3 / X_A (1/h), net growth of active biomass (9)."""
     m_a, _ = monod(acceptor, substrates.acceptor.half_saturation)

@@ -173,7 +173,7 @@ def generate(outline: Outline | None, ends: tuple[float, float], width: float, r
     return around(outline, ends, width, refinement, film), outline
 
 
-def around(outline: Outline | None, ends: tuple[float, float], width: float, refinement: float, film: float) -> PoreMesh:
+def around(outline: Outline | None, ends, width: float, refinement: float, film: float) -> PoreMesh:
     """A new mesh around an outline whose nodes stay as they are; arguments as those of :func:`generate`."""
     largest = width / geometry.ACROSS_PORE / refinement
     sources, sizes = np.empty((0, 2)), np.empty(0)

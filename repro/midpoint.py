@@ -34,8 +34,8 @@ def attempt(scene, now: Pore, solved: Solved, duration: float) -> Attempt:
 
 
 def half_way(scene, now: Pore, solved: Solved, first, duration: float):
-    """What is solved in the shape that half the step makes with the rates of its start, and the rates there at the nodes
-    of the present mesh: where a new mesh had to be made they are carried back to the material's nodes."""
+    """What is solved in the shape that half the step makes with the rates of its start, and the rates there at the
+    nodes of the present mesh: where a new mesh had to be made they are carried back to the material's nodes."""
     moved, _, _ = _expanded(scene, now, _grown(now, first, duration / 2))
     there, remeshed = remeshing.new_mesh(scene, now, moved, solved)
     found = solve(scene, there)

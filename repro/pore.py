@@ -57,8 +57,8 @@ class Pore:
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """Flow and substrates in the geometry of a pore, and the ledgers of acceptor and donor; None where the scene does not
-    model them."""
+    """Flow and substrates in the geometry of a pore, and the ledgers of acceptor and donor; None where the scene does
+    not model them."""
 
     flow: flow.Flow | None
     problem: transport.Problem | None

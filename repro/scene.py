@@ -283,7 +283,7 @@ def _numerics_rules(scene: Scene) -> Rules:
     numerics = scene.numerics
     if numerics.elements == "quadratic":
         for key, only in QUADRATIC.items():
-            wanted = f'"{only}" is needed with numerics.elements = "quadratic"; "linear" or preset = "paper" has the others'
+            wanted = f'"{only}" is needed with numerics.elements = "quadratic"; preset = "paper" has the others'
             yield getattr(numerics, key) != only, f"numerics.{key}", wanted
         stress_free = scene.growth is not None and scene.growth.new_biomass == "stress_free"
         yield stress_free, "growth.new_biomass", '"stressed" is needed with numerics.elements = "quadratic"'

@@ -3,7 +3,7 @@
 The midpoint rule carries (9)-(10) over a step with the rates of the shape half way. Euler's rule would take those of
 the start: the mean over the aggregate of their difference, times the step, is what ``numerics.tolerance`` bounds; the
 error of the midpoint rule is of higher order, and what a tolerance makes of it is measured in ``make bench``. A step
-ends at each reported time, and when the aggregate first comes as near to the opposite wall as a film may be thin (2.3.3).
+ends at each reported time, and when the film between the aggregate and the opposite wall is first too thin (2.3.3).
 """
 
 from __future__ import annotations

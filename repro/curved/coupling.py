@@ -27,9 +27,12 @@ __all__ = ["attempt", "seeded", "solve"]
 
 @dataclass(frozen=True, eq=False)
 class Midpoint:
-    """What half a step has found: flow and substrates half way, and the rates F3 / X_A, F4 / X_A (N,) 1/h at the nodes
-    of the mesh at the start; change: mean over the aggregate of |rate half way - rate at the start|, 1/h; shape: half way,
-    with the fluid's nodes where they were."""
+    """What half a step has found.
+
+    solved: flow and substrates half way; rates: F3 / X_A and F4 / X_A (N,) 1/h there, at the nodes of the mesh at the
+    start; change: mean over the aggregate of |rate half way - rate at the start|, 1/h; shape: the aggregate half way,
+    with the fluid's nodes where they were.
+    """
 
     solved: Solved
     rates: tuple[np.ndarray, np.ndarray]
@@ -188,8 +191,8 @@ def follow(scene, now: Pore, expanded: Pore):
 
 
 def remesh(scene, now: Pore, expanded: Pore, state: Concentrations) -> Pore:
-    """A new mesh around the aggregate, which is its own reference: the expansion restarts at one, so that its mass is X_m
-    times its area; places at t = 0 and the share of X_I in the biomass are carried over."""
+    """A new mesh around the aggregate, which is its own reference: the expansion restarts at one, so that its mass is
+    X_m times its area; places at t = 0 and the share of X_I in the biomass are carried over."""
     grid, shape = pore.generate(scene, expanded.outline)
     old, count, nodes = expanded.mesh, len(grid.points), grid.body
     total = expanded.active + expanded.inert

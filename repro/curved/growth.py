@@ -4,9 +4,9 @@ Pi without the stabilisation, which a stable pair does not need: the residual is
 
     (S(F, P), grad v) = 0,        (q, J - theta) = 0    for every linear q
 
-with P + gamma theta^(-5/3) (J - theta) for P in S. The last term (grad-div stabilisation) vanishes where J = theta. It is
-needed: at a given shape the energy of plane expansion is J^(1/3) + J^(-2/3) / 2, which is concave, and what the linear
-pressure leaves free of J would grow from nothing.
+with P + gamma theta^(-5/3) (J - theta) for P in S. The last term (grad-div stabilisation) vanishes where J = theta. It
+is needed: at a given shape the energy of plane expansion is J^(1/3) + J^(-2/3) / 2, which is concave, and what the
+linear pressure leaves free of J would grow from nothing.
 
 integrated over the curved triangles of t = 0. theta = J_r e: the exact J of the reference, the shape in which the mesh
 was made, where it is integrated, times the expansion e since then, a quadratic nodal field that starts at one.
@@ -32,8 +32,11 @@ FACTOR = 1.2
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """origin, reference: (n, 2) um at t = 0 and when the mesh was made, corners first; cells: (t, 6); corners: how many;
-    held: (n, 2) True where a coordinate is prescribed; topology: what is worked out once for this mesh."""
+    """The aggregate's own mesh.
+
+    origin, reference: (n, 2) um at t = 0 and when the mesh was made, corners first; cells: (t, 6); corners: how many;
+    held: (n, 2) True where a coordinate is prescribed; topology: what is worked out once for this mesh.
+    """
 
     origin: np.ndarray
     reference: np.ndarray

@@ -136,8 +136,8 @@ def curved(straight: PoreMesh, middles: np.ndarray | None) -> CurvedMesh:
 def unlocked(straight: PoreMesh) -> PoreMesh:
     """The same nodes without triangles that have two edges on the boundary of their region, fluid or biomass.
 
-    Linear pressures on such a corner leave quadratic displacements too little freedom (the Taylor-Hood pair asks for
-    at least one inner edge's worth); the corner's inner edge is exchanged for the other diagonal where that is possible.
+    Linear pressures on such a corner leave quadratic displacements too little freedom; the corner's inner edge is
+    exchanged for the other diagonal where that is possible.
     """
     triangles = straight.triangles.copy()
     for corner in _cornered(triangles, straight.biomass):

@@ -22,7 +22,7 @@ def shape(t: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Arcs(Outline):
-    """An outline of parabolic arcs: its extremes and its area are those of the arcs, not of the polygon of its nodes."""
+    """An outline of parabolic arcs: extremes and area are those of the arcs, not of the polygon of its nodes."""
 
     @property
     def upstream(self) -> float:

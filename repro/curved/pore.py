@@ -30,9 +30,9 @@ class Pore:
     """Geometry and biomass at one time.
 
     time: h; wall, fixed: (2 M,) of each node of ``mesh.loop``; origin: (N, 2) um, places of the material at t = 0;
-    reference: (N, 2) um, places when the mesh was made; active, inert: (N,) mass of X_A and X_I per area of the reference
-    over X_m: their sum is the expansion since then, and X_A = X_m active / (active + inert); zero outside the aggregate;
-    pressure: (corners,) P / mu_L; concentrations: the last known ones.
+    reference: (N, 2) um, places when the mesh was made; active, inert: (N,) mass of X_A and X_I per area of the
+    reference over X_m: their sum is the expansion since then, and X_A = X_m active / (active + inert); zero outside the
+    aggregate; pressure: (corners,) P / mu_L; concentrations: the last known ones.
     """
 
     time: float

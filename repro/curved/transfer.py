@@ -67,10 +67,10 @@ def _inside(local: np.ndarray) -> np.ndarray:
 
 
 def unfolded(mesh, origin: np.ndarray) -> np.ndarray:
-    """Places at t = 0 (N, 2) that no triangle of the aggregate turns over: where the interpolated ones would, middles go
-    half way between their corners. Raises TransferError where that is not enough."""
+    """Places at t = 0 (N, 2) that no triangle of the aggregate turns over: where the interpolated ones would, middles
+    go half way between their corners. Raises TransferError where that is not enough."""
     cells = mesh.cells[mesh.biomass]
-    for attempt in range(3):
+    for _ in range(3):
         det = elements.determinant(elements.jacobian(origin[cells], CHECKED))
         bad = cells[det.min(axis=1) <= FOLD * det.max(axis=1)]
         if len(bad) == 0:

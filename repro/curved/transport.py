@@ -7,7 +7,7 @@ The sum over i is the balance: supply in = out + consumed, to round-off. (11) is
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from skfem.quadrature import get_quadrature_line
@@ -31,7 +31,10 @@ OVERSHOOT = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Both substrates in one geometry: element matrices (T, 6, 6), sources (N,), and weights (N,) of u_x at both ends."""
+    """Both substrates in one geometry.
+
+    matrices: (T, 6, 6) um2/h; sources: (N,) um2 mg/L/h; inflow, outflow: (N,) um2/h, integrals of u_x N_i over the ends.
+    """
 
     mesh: CurvedMesh
     matrices: tuple[np.ndarray, np.ndarray]
@@ -67,8 +70,8 @@ def problem(mesh: CurvedMesh, flow: Flow | None, substrates, kinetics) -> Proble
     spread = [np.where(mesh.biomass, s.diffusivity_in_aggregate, s.diffusivity) for s in kinds]
     matrices = tuple(elements.stiffness(d, at) + carried for d in spread)
     system = mesh.once(("transport", flow is None), lambda: _system(mesh, flow is None))
-    return Problem(mesh, matrices, tuple(s.supply * inflow for s in kinds), inflow, outflow, speed, substrates, kinetics,
-                   system)
+    sources = tuple(s.supply * inflow for s in kinds)
+    return Problem(mesh, matrices, sources, inflow, outflow, speed, substrates, kinetics, system)
 
 
 def _system(mesh: CurvedMesh, held_ends: bool) -> ElementSystem:
@@ -128,18 +131,39 @@ def _owners(mesh: CurvedMesh, middles: np.ndarray) -> np.ndarray:
 def steady(problem: Problem, active: np.ndarray | None, guess: Concentrations | None = None) -> Concentrations:
     """Steady concentrations by Newton's method on both substrates at once.
 
-    active: X_A (N,) mg/L, None without biomass. Raises TransportError where Newton does not converge, or where a
-    concentration falls below zero by more than UNRESOLVED of the supply: the mesh is too coarse for its front.
+    active: X_A (N,) mg/L, None without biomass. Where Newton does not converge, half saturations come down from the
+    supply to what they are, a tenth at a time. Raises TransportError where that fails too, or where a concentration is
+    outside of zero to the supply by more than UNRESOLVED and OVERSHOOT say: the mesh is too coarse for its front.
     """
     count = len(problem.mesh.points)
     supply = np.repeat([s.supply for s in problem.both], count)
     state = supply.copy() if guess is None else np.concatenate([guess.acceptor, guess.donor])
     state[problem.system.held] = supply[problem.system.held]
+    try:
+        return _checked(problem, *_newton(problem, active, state))
+    except TransportError:
+        return _checked(problem, *_eased(problem, active, supply))
+
+
+def _eased(problem: Problem, active, state):
+    """Newton's method with half saturations that fall from the supply to what they are."""
+    least = min(s.half_saturation / max(s.supply, s.half_saturation) for s in problem.both)
+    total = 0
+    for factor in 10.0 ** np.arange(np.ceil(-np.log10(least)), -1, -1):
+        both = {name: replace(s, half_saturation=max(s.half_saturation, min(factor * s.half_saturation, s.supply)))
+                for name, s in zip(("acceptor", "donor"), problem.both)}
+        state, iterations = _newton(replace(problem, substrates=replace(problem.substrates, **both)), active, state)
+        total += iterations
+    return state, total
+
+
+def _newton(problem: Problem, active, state):
+    """(2N,) solution and Newton's iterations."""
     residual, size, tangent = _balance(problem, active, state)
     for iteration in range(MOST_ITERATIONS):
         defect = _relative(problem, residual, size)
         if defect <= NEWTON:
-            return _checked(problem, state, iteration)
+            return state, iteration
         state, residual, size, tangent = _advance(problem, active, state, residual, tangent)
     raise TransportError(f"Newton's method for the substrates stands at a defect of {defect:.2g} after "
                          f"{MOST_ITERATIONS} iterations; try a larger numerics.refinement")
@@ -202,7 +226,7 @@ def _uptake_at_points(problem: Problem, active, state):
     cells = mesh.cells[mesh.biomass]
     acceptor, donor, density = (elements.at_points(values, cells)
                                 for values in (state[:count], state[count:], active))
-    rates = law.uptake(acceptor, donor, problem.substrates, problem.kinetics)
+    rates = law.paired_uptake(acceptor, donor, problem.substrates, problem.kinetics)
     return density * mesh.places.dx[mesh.biomass], (acceptor, donor), rates
 
 
@@ -227,8 +251,8 @@ def _checked(problem: Problem, state, iterations: int) -> Concentrations:
                               (values.max() > (1 + OVERSHOOT) * substrate.supply, values.argmax())):
             if beyond:
                 x, y = problem.mesh.points[where]
-                raise TransportError(f"the {name} is {values[where]:.3g} mg/L at x = {x:.4g}, y = {y:.4g} um, outside of "
-                                     f"0 to {substrate.supply:g}; the mesh is too coarse there: "
+                raise TransportError(f"the {name} is {values[where]:.3g} mg/L at x = {x:.4g}, y = {y:.4g} um, outside "
+                                     f"of 0 to {substrate.supply:g}; the mesh is too coarse there: "
                                      "try a larger numerics.refinement")
     return Concentrations(state[:count], state[count:], iterations)
 
