@@ -33,7 +33,7 @@ OVERSHOOT = 0.02
 class Problem:
     """Both substrates in one geometry.
 
-    matrices: (T, 6, 6) um2/h; sources: (N,) um2 mg/L/h; inflow, outflow: (N,) um2/h, integrals of u_x N_i over the ends.
+    matrices: (T, 6, 6) um2/h; sources: (N,) um2 mg/L/h; inflow, outflow: (N,) um2/h, integrals of u_x N_i over an end.
     """
 
     mesh: CurvedMesh
