@@ -131,7 +131,7 @@ class Growth:
 class Numerics:
     """Section 3: how it is solved. [En] are the ambiguities of `reference/ERRATA.md`."""
 
-    preset: str = choice("fast", "accurate", "paper")  # the defaults of what follows: see PRESETS
+    preset: str = choice("paper", "fast", "accurate")  # the defaults of what follows: see PRESETS
     elements: str = choice("linear", "quadratic")  # 3.2-3.4, or Taylor-Hood on curved triangles
     time: str = choice("updates", "midpoint")  # every growth.time_step, or as numerics.tolerance allows
     tolerance: float = number(0.01, UP_TO_1)  # of a midpoint step: change of the growth rate, times the step
@@ -205,9 +205,9 @@ def parse_scene(tables: dict, name: str, file: str) -> Scene:
 
 
 def _with_preset(tables: dict) -> dict:
-    """The tables with the defaults of the preset that they name, "fast" where they name none."""
+    """The tables with the defaults of the preset that they name, the paper's where they name none."""
     given = tables.get("numerics", {})
-    named = given.get("preset", "fast") if isinstance(given, dict) else None
+    named = given.get("preset", "paper") if isinstance(given, dict) else None
     if not isinstance(named, str) or named not in PRESETS:
         return tables  # what is wrong is told when it is read
     return {**tables, "numerics": {"preset": named, **PRESETS[named], **given}}
