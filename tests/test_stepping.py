@@ -1,0 +1,206 @@
+"""Steps of the midpoint rule: where they end, which are taken, what they conserve, and their order."""
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from repro import geometry, midpoint, simulation, stepping
+from repro.coupling import Attempt, PoreEnd
+from repro.curved import coupling as curved
+from repro.errors import GrowthError, SimulationError
+from repro.scene import load_scene
+from tests.strategies import scene
+
+FAST = 'numerics.preset="fast"'
+
+
+def base(*changes):
+    return load_scene("base", (FAST, 'aggregate.radius="25 um"', *changes))
+
+
+def run(made):
+    """All instants of a scene."""
+    return list(simulation.simulate(made))
+
+
+def near_contact():
+    """An aggregate 0.1 um short of the film that closes."""
+    return scene("17.9 um", "20 um", velocity="2.9 m/day", growth={"end": "0.6 h"}, numerics={"preset": "fast"})
+
+
+@pytest.fixture
+def attempts(monkeypatch):
+    """(duration, Attempt) of everything that is tried on curved triangles."""
+    tried, attempt = [], curved.attempt
+
+    def told(made, now, solved, duration):
+        found = attempt(made, now, solved, duration)
+        tried.append((duration, found))
+        return found
+
+    monkeypatch.setattr(curved, "attempt", told)
+    return tried
+
+
+@pytest.mark.parametrize("preset", ["fast", "paper"])
+def test_steps_end_at_the_reported_times_to_the_last_bit(preset):
+    """Rows are t = 0 and the times asked for, and nothing else; the ledgers of all steps are in them. Mutants: times
+    that are sums of steps (0.37000000000000005), the end reported too, ledgers of the last step alone."""
+    made = base('growth.end="0.9 h"', 'output.times=["0.37 h", "0.5 h", "0.8 h"]', f'numerics.preset="{preset}"',
+                'numerics.time="midpoint"', "numerics.tolerance=0.0001", "numerics.refinement=0.3")
+    found = run(made)
+    assert [instant.pore.time for instant in found] == [0.0, 0.37, 0.5, 0.8]
+    rows = [row for instant in found for row in instant.ledgers]
+    assert len(rows) > 4 and rows[0].start == 0.0 and rows[-1].end == pytest.approx(0.8)
+    assert all(two.start == pytest.approx(one.end, abs=1e-12) for one, two in zip(rows, rows[1:]))
+
+
+def test_without_times_every_step_is_a_row():
+    """And the last one is at the end. Mutant: only targets reported."""
+    found = run(base('growth.end="0.5 h"', "numerics.tolerance=0.0001"))
+    assert found[-1].pore.time == 0.5 and len(found) > 3
+    assert [len(instant.ledgers) for instant in found] == [0] + [1] * (len(found) - 1)
+
+
+@given(st.floats(1e-3, 1e3), st.floats(1e-6, 1e3))
+def test_a_step_leaves_no_crumb(length, left):
+    """What remains is nothing, or at least half a step. Mutant: min(length, left)."""
+    step = stepping._fitted(length, left)
+    assert 0 < step <= max(left, 0) and step <= length * (1 + 2e-9)
+    assert step == left or left - step >= step * (1 - 1e-9)
+
+
+def test_a_step_ends_when_the_film_is_first_too_thin(attempts):
+    """The film is within 2 % of what it may be, and no thicker, when contact is first made; a longer step was tried
+    and not taken. Mutants: LANDED = 0, the aim beyond the film."""
+    made = near_contact()
+    found = run(made)
+    first = next(instant for instant in found if instant.pore.contact)
+    (gaps,) = [a.gaps for _, a in attempts if a.gaps and a.step.pore.mesh is first.pore.mesh]
+    film = made.growth.minimum_film
+    assert 0.98 * film <= gaps[1] < film < gaps[0]
+    assert any(a.gaps and a.gaps[1] < 0.98 * film for _, a in attempts), "else nothing is tested"
+    assert first.pore.outline.thickness == made.pore.width
+
+
+@pytest.mark.parametrize("tolerance", [0.002, 0.0005])
+def test_the_change_of_the_rates_in_a_step_is_bounded(attempts, tolerance):
+    """At most EXCESS tolerances in each step that is taken, at least half of one in the largest, and steps grow at
+    most twofold. Mutants: the root of the ratio left out (chatter), tolerance / 10, FASTER = 5."""
+    found = run(base('growth.end="2 h"', f"numerics.tolerance={tolerance}"))
+    taken = np.diff([instant.pore.time for instant in found])
+    meshes = {id(instant.pore.mesh) for instant in found}
+    estimates = [a.change * duration for duration, a in attempts if id(a.step.pore.mesh) in meshes]
+    assert len(estimates) == len(taken) and max(estimates) <= stepping.EXCESS * tolerance * (1 + 1e-9)
+    assert max(estimates) > tolerance / 2
+    assert (taken[1:] <= stepping.FASTER * taken[:-1] * (1 + 1e-9)).all()
+
+
+def test_a_step_that_fails_is_halved_until_it_is_done():
+    """0.2 h fails down to 0.02 h: 0.1, 0.05, 0.025 h are tried in turn. Mutants: length / 4, a failure that is told at
+    once."""
+    tried, made = [], base()
+
+    def attempt(_, now, solved, duration):
+        tried.append(duration)
+        if duration > 0.02:
+            raise GrowthError("too long")
+        return Attempt(stepping.Step(near, None, None, False, 0), 1e-9, None)
+
+    near = curved.seeded(made)
+    scheme = SimpleNamespace(attempt=attempt, solve=lambda *_: "solved")
+    taken, solved, length = stepping._advance(scheme, made, near, None, 5.0, 0.2)
+    assert tried == [0.2, 0.1, 0.05, 0.025, 0.0125]
+    assert taken.pore.time == 0.0125 and solved == "solved" and length == 0.025
+
+
+@pytest.mark.parametrize("error, told", [(GrowthError("no way"), "in growth: no way"),
+                                         (FloatingPointError("overflow"), "floating-point error .overflow.")])
+def test_what_fails_at_the_shortest_step_stops_the_run(monkeypatch, error, told):
+    """With the time of the step; not before growth.time_step / 1000 has failed. Mutants: an endless loop, an error
+    without time, SHORTEST = 0.1."""
+    tried, attempt = [], curved.attempt
+
+    def fails_later(made, now, solved, duration):
+        if now.time == 0:
+            return attempt(made, now, solved, duration)
+        tried.append(duration)
+        raise error
+
+    monkeypatch.setattr(curved, "attempt", fails_later)
+    with pytest.raises(SimulationError, match=rf"stopped in the step from t = 0.2 h.*{told}"):
+        run(base('growth.end="1 h"', 'growth.time_step="0.2 h"'))
+    assert 1e-4 < tried[-1] <= 2e-4 and len(tried) < 15
+
+
+def test_a_step_that_errs_too_much_is_not_taken():
+    """An estimate of 16 tolerances: the step is tried again at 0.9 / 4 of its length, where it is 16 times smaller.
+    Mutants: the estimate linear in the length, every step taken."""
+    made, tried = base(), []
+    now = curved.seeded(made)
+
+    def attempt(_, __, ___, duration):
+        tried.append(duration)
+        return Attempt(stepping.Step(now, None, None, False, 0), 16 * 0.01 / 0.2**2 * duration, None)
+
+    scheme = SimpleNamespace(attempt=attempt, solve=lambda *_: None)
+    _, _, length = stepping._advance(scheme, made, now, None, 100.0, 0.2)
+    assert tried == pytest.approx([0.2, 0.9 / 4 * 0.2])
+    assert length == pytest.approx(0.9 / 0.9 * tried[-1])
+
+
+def test_ledgers_close(attempts):
+    """Biomass to 1e-10 and both substrates to 1e-8 in every step, remeshes and contact included; each step starts from
+    what the last one left. Mutants: mass lost by (34) or at a remesh, flows of the step's start."""
+    found = run(near_contact())
+    rows = [row for instant in found for row in instant.ledgers]
+    assert sum(instant.remeshes for instant in found) > 1
+    for row in rows:
+        assert abs(row.biomass_before + row.biomass_made - row.biomass_after) < 1e-10 * row.biomass_after
+        for supplied, out, consumed in zip(row.supplied, row.out, row.consumed):
+            assert abs(supplied - out - consumed) <= 1e-8 * supplied
+    for one, two in zip(rows, rows[1:]):
+        assert two.biomass_before == pytest.approx(one.biomass_after, rel=1e-12)
+
+
+def test_a_run_is_the_same_every_time():
+    """To the last bit. Mutant: an order that depends on addresses, random numbers without a seed."""
+    one, two = (run(base('growth.end="1 h"')) for _ in range(2))
+    assert [i.pore.time for i in one] == [i.pore.time for i in two]
+    assert all((a.pore.mesh.points == b.pore.mesh.points).all() for a, b in zip(one, two))
+
+
+@pytest.mark.parametrize("scheme, preset", [(curved, "fast"), (midpoint, "paper")])
+def test_the_midpoint_rule_is_of_second_order(scheme, preset):
+    """Halving uniform steps quarters the change of the area and of the upstream tip, on one mesh. Mutant: the rates of
+    the step's start, half a step of a whole one's length."""
+    made = load_scene("base", (f'numerics.preset="{preset}"', "numerics.refinement=0.4", 'aggregate.radius="25 um"'))
+    found = np.array([_after(scheme, made, steps) for steps in (1, 2, 4)])
+    ratio = np.diff(found, axis=0)
+    assert (np.abs(np.log2(ratio[0] / ratio[1]) - 2) < 0.25).all()
+
+
+def _after(scheme, made, steps):
+    """Area and upstream tip after 2 h in equal steps."""
+    now, solved = scheme.seeded(made), None
+    for _ in range(steps):
+        solved = scheme.solve(made, now)
+        now = replace(now, concentrations=solved.concentrations)
+        step = scheme.attempt(made, now, solved, 2.0 / steps).step
+        assert not step.remeshed
+        now = step.pore
+    return now.outline.area, now.outline.upstream
+
+
+def test_a_run_ends_where_the_aggregate_reaches_an_end_of_the_pore():
+    """The last instant is reported, then PoreEnd. Mutant: the end of the pore not looked at."""
+    made = base('pore.length="90 um"', 'growth.end="19 h"')
+    found = []
+    with pytest.raises(PoreEnd, match="reaches the pore's upstream end"):
+        for instant in simulation.simulate(made):
+            found.append(instant)
+    near = made.pore.width / geometry.ACROSS_PORE
+    assert 0.1 * near - 45 <= found[-1].pore.outline.upstream < near - 45 <= found[-2].pore.outline.upstream

@@ -1,0 +1,130 @@
+"""Whole runs on curved triangles with the midpoint rule: closed forms, order in time, presets, the paper's limit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from repro import geometry, midpoint
+from repro.coupling import simulate as paper_run
+from repro.curved import coupling as curved
+from repro.scene import load_scene
+from repro.simulation import simulate
+from verification.case import Outcome, at_least, at_most, case
+from verification.convergence import study
+
+
+def _base(*changes: str):
+    return load_scene("base", changes)
+
+
+def _numbers(instant) -> dict[str, float]:
+    """What a run comes to: area (um2), upstream tip (um), conductivity (um/h), effluents (mg/L)."""
+    outline, solved = instant.pore.outline, instant.solved
+    return {"area": outline.area, "upstream tip": outline.upstream, "conductivity": solved.flow.conductivity,
+            "acceptor leaving": solved.fluxes[0].effluent, "donor leaving": solved.fluxes[1].effluent}
+
+
+def _mass_after(scene, time: float) -> float:
+    """(X_A + X_I) over that at the start, (9)-(10) at the supply, by hand."""
+    law, both = scene.kinetics, scene.substrates
+    m_a, m_d = (s.supply / (s.supply + s.half_saturation) for s in (both.acceptor, both.donor))
+    rise = m_a * (law.maximum_utilization_rate * law.yield_coefficient * m_d - law.decay_coefficient)
+    left = m_a * law.decay_coefficient * (1 - law.degradable_fraction)
+    return float(np.exp(rise * time) + left / rise * np.expm1(rise * time))
+
+
+@case("coupling-curved-uniform-growth", kind="exact",
+      norm="relative error of area and mass; largest deviation of the outline from a half-disc",
+      claim="Where diffusion holds the supply everywhere, curved triangles keep a half-disc of exactly exp-growing "
+            "mass through remeshes, in few long steps",
+      mutants=("curved-expansion-forgotten", "curved-mass-lost", "curved-half-of-the-half"))
+def uniform_growth() -> Outcome:
+    scene = _base('numerics.preset="fast"', 'growth.end="9 h"', 'output.times=["9 h"]')
+    quick = {name: replace(getattr(scene.substrates, name), diffusivity=1e13, diffusivity_in_aggregate=1e13)
+             for name in ("acceptor", "donor")}
+    scene = replace(scene, flow=None, substrates=replace(scene.substrates, **quick))
+    first, last = simulate(scene)
+    wanted = first.pore.outline.area * _mass_after(scene, 9.0)
+    outline = last.pore.outline
+    free = outline.wall == geometry.FREE
+    radius = np.hypot(*outline.points[free].T) / np.sqrt(2 * wanted / np.pi)
+    return Outcome((at_most("mass", abs(last.pore.mass() / wanted - 1), 1e-6, "C to 1e-7 of the supply"),
+                    at_most("area", abs(outline.area / wanted - 1), 1e-6, "J = theta"),
+                    at_most("outline", np.abs(radius - 1).max(), 1e-4, "arcs that are parabolas: (edge / R)^4 / 100"),
+                    at_least("steps' remeshes", last.remeshes, 1.0, "else less is tested")))
+
+
+STEPS = (1, 2, 4, 8, 16)
+
+
+@cache
+def _uniform(scheme, scene, steps: int) -> np.ndarray:
+    """Area and upstream tip after 2 h in equal steps, on one mesh."""
+    now, solved = scheme.seeded(scene), None
+    for _ in range(steps):
+        solved = scheme.solve(scene, now)
+        now = replace(now, concentrations=solved.concentrations)
+        step = scheme.attempt(scene, now, solved, 2.0 / steps).step
+        if step.remeshed:
+            raise RuntimeError("a new mesh: the error in space would not be common")
+        now = step.pore
+    return np.array([now.outline.area, now.outline.upstream, scheme.solve(scene, now).flow.conductivity])
+
+
+@case("coupling-midpoint-order", kind="property",
+      norm="relative difference between a run and that with half the step; base from a seed of 25 um, 2 h, no remesh",
+      claim="The midpoint rule is of second order in time, on curved triangles as on the paper's",
+      mutants=("curved-rates-of-the-start", "midpoint-rates-of-the-start"))
+def order_in_time() -> Outcome:
+    studies = []
+    for name, scheme, preset in (("curved", curved, "fast"), ("linear", midpoint, "paper")):
+        scene = _base(f'numerics.preset="{preset}"', 'numerics.refinement=0.5', 'aggregate.radius="25 um"')
+        values = np.array([_uniform(scheme, scene, steps) for steps in STEPS])
+        apart = np.abs(np.diff(values, axis=0) / values[-1])
+        for k, quantity in enumerate(("area", "upstream tip")):
+            studies.append(study(f"{quantity}, {name}", 2 / np.array(STEPS[:-1]), apart[:, k], 2, "midpoint rule",
+                                 ceiling=2e-5, band=0.15))
+    return Outcome(studies=tuple(studies))
+
+
+@case("coupling-midpoint-limit", kind="property", slow=True,
+      norm="relative difference at 3.2 h from a seed of 25 um, base",
+      claim="With short steps the paper's shape updates and the midpoint rule come to the same, on the same triangles",
+      mutants=("midpoint-rates-of-the-start",))
+def limit() -> Outcome:
+    def last(run, *changes):
+        *_, found = run(_base('aggregate.radius="25 um"', 'growth.end="3.2 h"', 'output.times=["3.2 h"]',
+                              "numerics.refinement=0.6", *changes))
+        return np.array([found.pore.outline.area, found.pore.outline.upstream])
+
+    steps = (0.8, 0.4, 0.2, 0.1)
+    middle = last(simulate, 'numerics.time="midpoint"', "numerics.tolerance=0.00003")
+    apart = np.array([np.abs(last(paper_run, f'growth.time_step="{step} h"') / middle - 1) for step in steps])
+    return Outcome(studies=tuple(study(name, steps, apart[:, k], 1, "shape updates: first order", ceiling=2e-3)
+                                 for k, name in enumerate(("area", "upstream tip"))))
+
+
+TIMES = (8.0, 14.0, 19.4)
+
+
+@cache
+def _run(*changes: str) -> list[dict[str, float]]:
+    times = ", ".join(f'"{time} h"' for time in TIMES)
+    return [_numbers(found) for found in simulate(_base(*changes, f"output.times=[{times}]"))]
+
+
+@case("coupling-curved-presets", kind="property", slow=True,
+      norm="largest relative difference at 0, 8, 14 and 19.4 h to refinement 0.9, tolerance 0.0003",
+      claim="The whole base run is within 1 % with preset fast, and within 0.1 % with preset accurate",
+      mutants=("curved-rates-of-the-start",))
+def presets() -> Outcome:
+    far, checks = _run('numerics.preset="accurate"', "numerics.refinement=0.9", "numerics.tolerance=0.0003"), []
+    for preset, bound in (("fast", 1e-2), ("accurate", 1e-3)):
+        rows = _run(f'numerics.preset="{preset}"')
+        for name in far[0]:
+            apart = max(abs(ours[name] / there[name] - 1) for ours, there in zip(rows, far))
+            checks.append(at_most(f"{name}, {preset}", apart, bound, "what the preset is for"))
+    return Outcome(tuple(checks))

@@ -1,0 +1,23 @@
+"""Wrong changes to the midpoint rule and to runs on curved triangles that cases of this stage must catch."""
+
+from verification.mutants import Mutant
+
+COUPLING = "repro/curved/coupling.py"
+CURVED = (
+    Mutant("curved-rates-of-the-start", COUPLING,
+           says="A whole step is made with the rates of its start: Euler's rule.",
+           old="after = grown(now, half.rates, duration)",
+           new="after = grown(now, rates_of(scene, solved.concentrations), duration)"),
+    Mutant("midpoint-rates-of-the-start", "repro/midpoint.py",
+           says="With linear elements a whole step is made with the rates of its start: Euler's rule.",
+           old="grown = _grown(now, rates, duration)",
+           new="grown = _grown(now, first, duration)"),
+    Mutant("curved-mass-lost", COUPLING,
+           says="A remesh loses one percent of the active biomass.",
+           old="active[nodes] = 1 - inert[nodes]",
+           new="active[nodes] = 0.99 - inert[nodes]"),
+    Mutant("curved-half-of-the-half", COUPLING,
+           says="Biomass grows for half of the step only.",
+           old="after = grown(now, half.rates, duration)",
+           new="after = grown(now, half.rates, duration / 2)"),
+)

@@ -1,0 +1,31 @@
+"""Wrong changes to the growth on curved triangles that cases of this stage must catch."""
+
+from verification.mutants import Mutant
+
+GROWTH = "repro/curved/growth.py"
+CURVED = (
+    Mutant("curved-grad-div-dropped", GROWTH,
+           says="Nothing holds what the linear pressure leaves free of J, and growth has wrinkled equilibria.",
+           old="GAMMA = 1.0",
+           new="GAMMA = 0.0"),
+    Mutant("curved-tangent-without-grad-div", GROWTH,
+           says="The tangent leaves out the derivative of the grad-div term, so that it is none of the residual.",
+           old="(tangent(F, P).reshape(count, points, 4, 4) + stiff)",
+           new="(tangent(F, P).reshape(count, points, 4, 4) + 0 * stiff)"),
+    Mutant("curved-constraint-sign", GROWTH,
+           says="The pressure's forces in the tangent have the wrong sign.",
+           old="saddle_blocks(K, -B,",
+           new="saddle_blocks(K, B,"),
+    Mutant("curved-expansion-forgotten", GROWTH,
+           says="After a remesh growth starts from one again: the expansion of the reference is left out.",
+           old="elements.at_points(theta, body.cells) * body.expanded",
+           new="elements.at_points(theta, body.cells)"),
+    Mutant("curved-theta-power", GROWTH,
+           says="The constraint asks for J = sqrt(theta).",
+           old="(dx * (J - theta)) @ elements.LINEAR",
+           new="(dx * (J - theta ** 0.5)) @ elements.LINEAR"),
+    Mutant("curved-stress-transposed", GROWTH,
+           says="The first Piola-Kirchhoff stress is transposed: the force does not turn with the body.",
+           old="piola(F, P)) @ slopes",
+           new="np.swapaxes(piola(F, P), 2, 3)) @ slopes"),
+)

@@ -1,0 +1,27 @@
+"""Wrong changes to the substrates on curved triangles that cases of this stage must catch."""
+
+from verification.mutants import Mutant
+
+TRANSPORT = "repro/curved/transport.py"
+CURVED = (
+    Mutant("curved-outlet-forgotten", TRANSPORT,
+           says="What flows out through the outlet is left out of the weak form.",
+           old="carried[ends[0]] += blocks",
+           new="carried[ends[0]] += 0 * blocks"),
+    Mutant("curved-fluid-diffusivity", TRANSPORT,
+           says="Substrates diffuse in the biomass as in water.",
+           old="np.where(mesh.biomass, s.diffusivity_in_aggregate, s.diffusivity)",
+           new="np.where(mesh.biomass, s.diffusivity, s.diffusivity)"),
+    Mutant("paired-without-decay", "repro/kinetics.py",
+           says="Decay takes up no acceptor.",
+           old="return demand * rate + decay * m_a, rate,",
+           new="return demand * rate, rate,"),
+    Mutant("curved-unpaired", TRANSPORT,
+           says="Below zero each substrate is taken up on its own, so that the two are not in proportion.",
+           old="rates = law.paired_uptake(",
+           new="rates = law.uptake("),
+    Mutant("curved-layers-ignored", "repro/curved/pore.py",
+           says="Elements are not made smaller for concentration boundary layers.",
+           old="BOUNDARY_LAYER = 0.15",
+           new="BOUNDARY_LAYER = 0.0"),
+)
