@@ -103,19 +103,25 @@ class Section:
 
     def steady(self, active, start=None):
         """(2, n) concentrations at rest; active: X_A of the aggregate's cells (K,); start: a first iterate."""
-        weight, rates = np.zeros(len(self.lengths)), self.pore.rates
+        weight = np.zeros(len(self.lengths))
         weight[self.inside] = (self.lengths * self.heights)[self.inside] * active
         fields = np.repeat(self.pore.supply, len(weight)).reshape(2, -1) if start is None else start
         for _ in range(MOST):
-            sinks = weight * np.stack(uptake(*fields, rates))
-            defect = (self.source - sinks).ravel() - self.transport @ fields.ravel()
-            size = (self.source + np.abs(sinks)).ravel() + abs(self.transport) @ np.abs(fields.ravel())
+            defect, size = self._defect(weight, fields)
             if (np.abs(defect) <= RESTS * size).all():
                 return fields
-            blocks = [[sp.diags_array(weight * slope) for slope in row] for row in _slopes(fields, rates)]
-            step = spsolve(sp.csc_array(self.transport + sp.block_array(blocks)), defect)
-            fields = fields + step.reshape(2, -1)
+            blocks = [[sp.diags_array(weight * slope) for slope in row] for row in _slopes(fields, self.pore.rates)]
+            step = spsolve(sp.csc_array(self.transport + sp.block_array(blocks)), defect).reshape(2, -1)
+            while np.abs(self._defect(weight, fields + step)[0]).sum() > np.abs(defect).sum() and step.any():
+                step = step / 2
+            fields = fields + step
         raise RuntimeError(f"the finite volumes do not come to rest: {(np.abs(defect) / size).max():.2g} are left")
+
+    def _defect(self, weight, fields):
+        """What the cells still lack of rest, and the size of its terms."""
+        sinks = weight * np.stack(uptake(*fields, self.pore.rates))
+        size = (self.source + np.abs(sinks)).ravel() + abs(self.transport) @ np.abs(fields.ravel())
+        return (self.source - sinks).ravel() - self.transport @ fields.ravel(), size
 
 
 def _matrix(term, mesh):

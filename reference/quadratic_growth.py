@@ -39,8 +39,9 @@ from skfem import (
 )
 from skfem.helpers import ddot, det, grad
 
-#: Newton stops at a step this small against the size of the body, and is given up after that many.
-SMALL, MOST = 1e-10, 30
+#: Newton stops at a step this small against the size of the body, and is given up after that many, or after that many
+#: halvings of one.
+SMALL, MOST, HALVINGS = 1e-10, 30, 10
 #: kappa over mu theta^(-5/3); theta is raised by this factor at a time.
 STIFFENING, FACTOR = 3.0, 1.6
 #: Newton's steps for a point's local coordinates; a bent edge is nearly straight, so that they converge at once.
@@ -140,7 +141,7 @@ def grow(mesh, theta, top, mu=1.0, contact=None, start=None):
     """Equilibrium under the expansion theta(x, y), at most ``top``, since t = 0; returns :class:`Grown`.
 
     From ``start``, the solution on another mesh, or else from t = 0 with theta raised by FACTOR at most at a time.
-    Raises RuntimeError where Newton's method does not converge.
+    Raises RuntimeError where Newton's method finds no equilibrium.
     """
     basis = Basis(mesh, ElementVector(ElementTriP2()), intorder=5)
     lower, final = basis.with_element(ElementTriP1()), theta(*basis.global_coordinates())
@@ -180,7 +181,7 @@ def _held(basis, contact, initial):
 
 
 def _newton(basis, lower, theta, mu, held, value, place, pressure):
-    """(place, pressure) of the equilibrium with what is held at ``value``; steps are halved while they turn J over."""
+    """(place, pressure) of the equilibrium with what is held at ``value``."""
     for _ in range(MOST):
         lag = np.zeros(basis.N + lower.N)
         lag[held] = (value - place)[held]
@@ -188,12 +189,19 @@ def _newton(basis, lower, theta, mu, held, value, place, pressure):
         K, B = asm(_stiffness, basis, **state), asm(_coupling, basis, lower, **state)
         right = -np.concatenate([asm(_force, basis, **state), asm(_gap, lower, **state)])
         step = solve(*condense(bmat([[K, B.T], [B, None]], "csc"), right, x=lag, D=held))
-        while det(grad(basis.interpolate(place + step[: basis.N]))).min() <= 0:
-            step = step / 2
+        step = step * _length(basis, place, step[: basis.N])
         place, pressure = place + step[: basis.N], pressure + step[basis.N:]
         if np.abs(step[: basis.N]).max() < SMALL * np.ptp(place):
             return place, pressure
     raise RuntimeError(f"Newton's method still steps by {np.abs(step[: basis.N]).max():.2g} after {MOST} iterations")
+
+
+def _length(basis, place, move):
+    """The longest of 1, 1/2, ... of a move that keeps J > 0."""
+    for length in 0.5 ** np.arange(HALVINGS):
+        if det(grad(basis.interpolate(place + length * move))).min() > 0:
+            return length
+    raise RuntimeError(f"no step of Newton's method keeps J > 0 (shortest tried {length:.2g})")
 
 
 def _state(basis, lower, theta, mu, place, pressure):

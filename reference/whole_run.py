@@ -22,7 +22,8 @@ from reference.whole_run_pore import ORDER, Flow, Section
 M_PER_D = 24e-6
 #: The numbers of a moment: m/d, m/d, um2, um, um, um, mg/L, mg/L.
 NAMES = ("velocity", "conductivity", "area", "thickness", "upstream", "downstream", "acceptor", "donor")
-#: Orders in space and in time by which :func:`converged` extrapolates; the first is the least one observed.
+#: Orders in space and in time by which :func:`converged` extrapolates: the least one observed on 8 to 16 rings, and
+#: the method's.
 SPACE, TIME = 3, 4
 
 
@@ -167,7 +168,8 @@ class Converged:
 
 def converged(pore, times, rings=(8, 12), steps=(8, 16)):
     """:class:`Converged` from three runs: a coarse one, one with more rings, one with more steps. The errors in space
-    and in time add up, to first order; each is extrapolated."""
+    and in time add up, to first order; each is extrapolated. Base is so known to 2e-5 at 19.2 and 19.4 h, relative,
+    its effluents over the supply."""
     coarse, fine, many = (numbers(pore, *size, times) for size in zip((rings[0], rings[1], rings[0]),
                                                                      (steps[0], steps[0], steps[1])))
     space = (fine - coarse) / ((rings[1] / rings[0]) ** SPACE - 1)

@@ -59,7 +59,7 @@ def dissipation(grid, ratio, interface="laplacian"):
 @given(meshes(), ratios, forms)
 def test_the_flow_is_dissipative(grid, ratio, interface):
     """The work done at the inlet is what viscosity and stabilisation use up, and no other node does any. Mutant: the
-    stabilisation's sign, the divergence with another sign in one of the two equations, a wall that slips."""
+    stabilisation's sign, the divergence with another sign in one of the two equations."""
     (u, p), loss = solved(grid, ratio, interface)
     form = form_of(grid, ratio, interface)
     used = form((u, p), (u, -p))
@@ -91,7 +91,7 @@ def test_the_flow_is_reversible(grid, ratio):
     round, but for what the ends' unlike conditions make of the mesh's error: half a width away from them 2 % of u_ave,
     and 1 % of the loss (measured on 110 to 670 nodes: 1.3 and 0.7 %).
 
-    Mutant: an advection term, an unsymmetric block, an inlet condition on u_y at one of the walls alone.
+    Mutant: an unsymmetric block, a term that carries momentum along.
     """
     one, there = solved(grid, ratio)
     (u, p), back = solved(reversed_mesh(grid), ratio)
@@ -110,7 +110,8 @@ def test_an_obstacle_never_raises_the_conductivity(grid, ratio, interface, part,
     same to 1 % (measured: 0.3 %) and 0.1 % of the loss (0.04 %, by single triangles in the middle, where nothing is
     sheared), for the error that the ends make in the one hardly sees the obstacle.
 
-    Mutant: lambda in the fluid, 1 / lambda in the biomass, a stabilisation that rises with the viscosity.
+    Mutant: lambda in the fluid, 1 / lambda in the biomass, a stabilisation that rises with the viscosity, nodes
+    for lengths in the mean over the inlet.
     """
     x = grid.points[grid.triangles, 0]
     far = (x.min(axis=1) > grid.ends[0] + 0.75 * grid.width) & (x.max(axis=1) < grid.ends[1] - 0.75 * grid.width)
@@ -136,7 +137,7 @@ def test_thicker_biomass_costs_more(grid, ratio, factor, interface):
 @share(0.4)
 @given(meshes(), ratios, forms)
 def test_upside_down_everything_is_upside_down(grid, ratio, interface):
-    """Bit by bit or nearly. Mutant: one of the walls slips, x and y blocks exchanged, a head weighed by y."""
+    """Bit by bit or nearly. Mutant: one of the walls slips, a head weighed by y."""
     (u, p), loss = solved(grid, ratio, interface)
     (v, q), other = solved(upside_down(grid), ratio, interface)
     assert v * [1, -1] == pytest.approx(u, abs=1e-10) and q == pytest.approx(p, abs=1e-10 * np.abs(p).max())
@@ -161,7 +162,7 @@ def test_the_unit_of_length_and_the_origin_do_not_matter(grid, ratio, interface,
 @given(scenes(drives=("head", "mean_velocity")), between(1e-3, 1e3))
 def test_the_flow_is_linear(made, factor):
     """Times the drive is times everything but the conductivity; of a mean velocity, the head that it needs gives it
-    back. Mutant: the head over the meshed part, the unmeshed length twice, a term in u^2."""
+    back. Mutant: the unmeshed length twice, a term in u^2, a head that is not zero at the outlet."""
     now = pore.seeded(made)
 
     def driven(**drive):

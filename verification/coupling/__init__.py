@@ -5,6 +5,7 @@ from verification.coupling import (  # noqa: F401
     averaged_base,
     averaged_mixing,
     averaged_thin,
+    averaged_uptake,
     conservation,
     contact,
     exponential,

@@ -53,7 +53,7 @@ STEPS = (0.8, 0.4, 0.2, 0.1)
 
 
 @case("coupling-yield", kind="property",
-      norm="biomass made over the yield of the substrates, less 1; base from 20 um to 3.2 h, steps of 0.8 to 0.1 h",
+      norm="biomass made over the yield of the substrates, less 1; base from 20 um to 1.6 h, steps of 0.8 to 0.1 h",
       claim="The biomass made is Y times the donor consumed, less f_d of what decays, which the acceptor's demand "
             "beyond F times the donor tells: the ledgers agree to second order in the step",
       mutants=("euler-biomass", "rates-at-the-start", "rates-two-percent-low", "decay-leaves-all"))
@@ -66,7 +66,7 @@ def yields() -> Outcome:
 
 
 def _scene(step: float) -> Scene:
-    return runs.base("3.2 h", 'aggregate.radius="20 um"', f'growth.time_step="{step} h"')
+    return runs.base("1.6 h", 'aggregate.radius="20 um"', f'growth.time_step="{step} h"')
 
 
 def _yield_defect(step: float) -> float:

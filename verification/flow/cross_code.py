@@ -5,9 +5,11 @@ fall at our orders. Two singularities limit them. The pressure jumps at the inte
 pressure beside it, which is that of the biomass while it is stiff. At the three-phase corner the biomass is held by the
 wall and pushed by the water. In the traction form its pressure is like r^-0.41 there (cos(z pi / 2) = z, stress like
 r^(z - 1)), which would allow order 0.59; in the Laplacian form it is bounded; tests of the reference measure both. So
-the jump is the harder limit. Its share in the velocity and in the loss is of first order, and divided by lambda. In the
-loss it has the other sign than the errors of second order and of the ends (:mod:`verification.flow.closed_forms`); there
-is no order where they meet, only a size.
+the jump is the harder limit. Its share in the velocity and in the head loss is of first order, and seen at lambda = 10
+alone: a stiff body takes it all.
+
+The head loss has an error of first order besides, of both ends (see :mod:`verification.flow.closed_forms`). It is that
+of the clean channel on the same mesh, so that the excess over that loss is free of it.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ from functools import cache
 
 import numpy as np
 
-from reference import taylor_hood
+from reference import poiseuille, taylor_hood
 from repro import flow, geometry, mesh
 from repro.mesh import PoreMesh
 from verification import norms
@@ -37,7 +39,7 @@ SECOND = "linear elements: second order in L2"
 JUMP = "1/2: the pressure jumps at the interface, a continuous one cannot"
 INSIDE = "2 inside, 3/2 by the layers of one element at both ends, 1 in the end"
 ENDS_FIRST = "first order: the stabilisation's own condition dp/dn = 0 at both ends spoils one layer of elements"
-MEETING = "0.1 %; errors of first and second order meet here with opposite signs"
+EXCESS = "second order: what the ends spoil is in both losses"
 
 
 @case("flow-half-disc", kind="cross-code", norm=NORM, slow=True,
@@ -47,8 +49,7 @@ def half_disc() -> Outcome:
     seed, grown = (_series(radius, RATIO, "laplacian") for radius in (5.0, 25.0))
     studies = (*_studies(seed, "R = 5 um"), *_studies(grown, "R = 25 um"),
                study("head loss, R = 5 um", seed["size"], seed["loss"], 1, ENDS_FIRST, ceiling=4e-3))
-    return Outcome((at_most("head loss, R = 25 um", grown["loss"][-1], 1e-3, MEETING),), studies,
-                   _profiles(25.0, RATIO, "laplacian"))
+    return Outcome((), studies, _profiles(25.0, RATIO, "laplacian"))
 
 
 @case("flow-film", kind="cross-code", norm=NORM, slow=True,
@@ -56,11 +57,9 @@ def half_disc() -> Outcome:
       mutants=("viscosity-swapped",))
 def film() -> Outcome:
     errors = _series(41.0, RATIO, "laplacian", FILM_REFINEMENTS, FILM_DRAWS)
-    thick = "from 2 (linear elements) to 1: the film's pressure is large, and so is the jump's share"
-    studies = (Study("velocity", errors["size"], errors["velocity"], 1.2, 2.2, thick, 1e-3),
-               Study("pressure in the fluid", errors["size"], errors["fluid"], 0.8, 1.6, thick, 1e-3),
-               study("pressure in the biomass", errors["size"], errors["biomass"], 0.5, JUMP, ceiling=0.05),
-               Study("head loss", errors["size"], errors["loss"], 0.7, 1.6, thick, 1e-3))
+    studies = (*(study(name, errors["film"], errors[key], 2, "second order in the elements of the film", ceiling=1.1e-3)
+                 for name, key in (("velocity", "velocity"), ("pressure in the fluid", "fluid"), ("head loss", "loss"))),
+               study("pressure in the biomass", errors["size"], errors["biomass"], 0.5, JUMP, ceiling=0.05))
     return Outcome((), studies, _profiles(41.0, RATIO, "laplacian"))
 
 
@@ -72,8 +71,8 @@ def half_disc_traction() -> Outcome:
     studies = (*_studies(stiff, "lambda = 2000"),
                study("velocity, lambda = 10", soft["size"], soft["velocity"], 2, SECOND, ceiling=7e-4),
                study("pressure in the biomass, lambda = 10", soft["size"], soft["biomass"], 0.5, JUMP, ceiling=0.1))
-    checks = (at_most("head loss, lambda = 2000", stiff["loss"][-1], 1e-3, MEETING),
-              at_most("head loss, lambda = 10", soft["loss"][-1], 3e-3, "the jump's share, of first order"),
+    checks = (at_most("excess of the head loss, lambda = 10", soft["excess"][-1], 1e-3,
+                      "the jump's share, first order and negative, meets the rest, second order and positive"),
               at_most("pressure in the fluid, lambda = 10", soft["fluid"][-1], 3e-3,
                       "the jump's share: biomass that gives way leaves half of it to the fluid, order 1/2 in the end"))
     return Outcome(checks, studies, _profiles(25.0, 10.0, "traction"))
@@ -113,7 +112,8 @@ def _studies(errors: dict[str, np.ndarray], where: str) -> tuple[Study, ...]:
     size = errors["size"]
     return (study(f"velocity, {where}", size, errors["velocity"], 2, SECOND, ceiling=8e-4),
             Study(f"pressure in the fluid, {where}", size, errors["fluid"], 1.2, 2.2, INSIDE, 1e-3),
-            study(f"pressure in the biomass, {where}", size, errors["biomass"], 0.5, JUMP, ceiling=0.2))
+            study(f"pressure in the biomass, {where}", size, errors["biomass"], 0.5, JUMP, ceiling=0.2),
+            study(f"excess of the head loss, {where}", size, errors["excess"], 2, EXCESS, ceiling=1e-3))
 
 
 @cache
@@ -129,13 +129,26 @@ def _grid(radius: float, refinement: float) -> PoreMesh:
 def _apart(radius: float, ratio: float, interface: str, level: int, refinement: float) -> dict[str, float]:
     """Differences of our flow from Taylor-Hood's at the middles of its edges, weighed by their areas."""
     grid, theirs = _grid(radius, refinement), _trusted(radius, ratio, interface, level)
-    found = flow.unit_flow(grid, ratio, interface=interface)
-    apart = {"size": norms.mean_size(grid), "loss": abs(found.loss / theirs.loss - 1),
+    found, clean = (flow.unit_flow(grid, each, interface=interface) for each in (ratio, 1.0))
+    ends = clean.loss - poiseuille.head_loss(ENDS[1] - ENDS[0], WIDTH, 1.0, 1.0)
+    apart = {"size": norms.mean_size(grid), "film": _film_size(grid), "loss": abs(found.loss / theirs.loss - 1),
+             "excess": abs((found.loss - ends) / theirs.loss - 1),
              "velocity": _relative(sampled(grid, found.velocity, theirs.points), theirs.velocity, theirs.areas)}
     for part in theirs.pressures:
         apart["biomass" if part.biomass else "fluid"] = _relative(
             sampled(grid, found.pressure, part.points)[:, None], part.values[:, None], part.areas)
     return apart
+
+
+def _film_size(grid: PoreMesh) -> float:
+    """Size of the fluid's elements in the film, within 15 um of its narrowest place, um: triangles weighed by area.
+
+    :mod:`repro.geometry` lets elements grow by GRADATION from the walls of a film, whatever the refinement; in its middle
+    they are halved only once the largest size is reached, and the mean over the mesh tells nothing of them.
+    """
+    x, y = grid.points[grid.triangles].mean(axis=1).T
+    chosen = grid.areas[~grid.biomass & (np.abs(x) < 15) & (y > 0.7 * WIDTH)]
+    return float(np.sqrt(2 * np.sum(chosen**2) / np.sum(chosen)))
 
 
 def _relative(ours, theirs, areas) -> float:
@@ -144,8 +157,9 @@ def _relative(ours, theirs, areas) -> float:
 
 
 def _profiles(radius: float, ratio: float, interface: str) -> tuple[Profile, ...]:
-    """u_x on the line x = 0, and the fluid's pressure along the upper wall, on the second level."""
-    grid, theirs = _grid(radius, REFINEMENTS[1]), _trusted(radius, ratio, interface, 1)
+    """u_x on the line x = 0, and the fluid's pressure along the upper wall: ours on the second level, the finest of
+    theirs."""
+    grid, theirs = _grid(radius, REFINEMENTS[1]), _trusted(radius, ratio, interface, LEVELS[-1])
     found = flow.unit_flow(grid, ratio, interface=interface)
     fluid = next(part for part in theirs.pressures if not part.biomass)
     across, along = np.abs(theirs.points[:, 0]) < 1e-6, fluid.points[:, 1] > WIDTH * (1 - 1e-9)

@@ -121,7 +121,7 @@ def _study(found: dict, field: str, ceiling: float) -> Study:
 
 
 def _profiles(name: str) -> tuple[Profile, ...]:
-    """Outline and pressure on it, of ours on the third level and of the reference on the last."""
+    """Outline, pressure on it and across the body, of ours on the third level and of the reference on the last."""
     (body, rim, found), exact = ours(name, 2), trusted(name, len(RINGS) - 1)
     angle = np.arctan2(*body.reference[rim].T[::-1])
     rim, turn = rim[np.argsort(angle)], np.linspace(0, np.pi, 200)
@@ -129,7 +129,12 @@ def _profiles(name: str) -> tuple[Profile, ...]:
     outline = (("ours", "ours", *found.position[rim].T), ("quadratic elements", "reference", *place.T))
     on_it = (("ours", "ours", np.degrees(np.sort(angle)), found.pressure[rim]),
              ("quadratic elements", "reference", np.degrees(turn), pressure / MODULUS))
+    x = bodies.RADIUS * np.linspace(-0.95, 0.95, 100)
+    line = np.column_stack([x, np.full(len(x), bodies.RADIUS / 4)])
+    across = (("ours", "ours", x, norms.sample(body.reference, body.triangles, found.pressure, line)),
+              ("quadratic elements", "reference", x, exact.at(*line.T)[1] / MODULUS))
     return (Profile(f"outline, {name}", "x (um)", "y (um)", outline),
+            Profile(f"pressure at Y = R_0 / 4, {name}", "X (um)", "P / mu_L", across),
             Profile(f"pressure on the arc, {name}", "angle at t = 0 (degrees)", "P / mu_L", on_it))
 
 

@@ -38,7 +38,7 @@ DECAY_ALONE = replace(SCENE.kinetics, maximum_utilization_rate=0.0)
 @case("transport-robin-channel", kind="exact", norm="L2 of C over the mesh, relative; several meshes a size",
       claim="First-order uptake in a slab under plug flow follows its closed form, (26) upstream included, at Peclet "
             "0.1, 1, 10, wherever the inlet is put",
-      mutants=("fluid-diffusivity", "no-advection", "no-inlet-flux", "weights-of-the-ends"))
+      mutants=("fluid-diffusivity", "half-of-the-advection", "no-inlet-flux", "weights-of-the-ends"))
 def robin() -> Outcome:
     studies = [study(f"C, Pe = {peclet:g}", SIZES, _robin(peclet, CROSSED), 2, SECOND, ceiling=ceiling)
                for peclet, ceiling in ((0.1, 2e-4), (1.0, 2e-4), (10.0, 5e-5))]
