@@ -35,7 +35,7 @@ def test_walls_inlet_and_outlet_keep_their_lines_and_the_body_its_place(grid, gr
     """On any mesh, under any linear motion of the aggregate by up to 5 % (a step makes 4 %): to the last bit; triangles
     stay upright, and their areas add up to the pore's.
 
-    Mutant: inlet nodes free across their line, body nodes solved for, wall nodes that leave their wall.
+    Mutant: inlet nodes free across their line, wall nodes that leave their wall.
     """
     body = grown(grid, growth)
     points = move(grid, body)

@@ -64,7 +64,7 @@ def foreign_units() -> Outcome:
 @case("coupling-mirror", kind="property",
       norm="difference of the tips' distances from the origin, and of C_A left and right, relative",
       claim="Without flow an aggregate grows alike to both sides",
-      mutants=("one-end-held", "fixed-beside-the-middle"))
+      mutants=("one-supply-held", "fixed-beside-the-middle"))
 def mirror() -> Outcome:
     last = runs.last(runs.without_flow(runs.base("8 h")))
     outline, grid = last.pore.outline, last.pore.mesh
