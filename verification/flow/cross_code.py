@@ -143,8 +143,8 @@ def _apart(radius: float, ratio: float, interface: str, level: int, refinement: 
 def _film_size(grid: PoreMesh) -> float:
     """Size of the fluid's elements in the film, within 15 um of its narrowest place, um: triangles weighed by area.
 
-    :mod:`repro.geometry` lets elements grow by GRADATION from the walls of a film, whatever the refinement; in its middle
-    they are halved only once the largest size is reached, and the mean over the mesh tells nothing of them.
+    :mod:`repro.geometry` lets elements grow by GRADATION from the walls of a film, whatever the refinement; in its
+    middle they are halved only once the largest size is reached, and the mean over the mesh tells nothing of them.
     """
     x, y = grid.points[grid.triangles].mean(axis=1).T
     chosen = grid.areas[~grid.biomass & (np.abs(x) < 15) & (y > 0.7 * WIDTH)]
