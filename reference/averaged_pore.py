@@ -36,7 +36,7 @@ from reference import layered_channel
 from reference.channel_bvp import uptake
 
 RESTS, MOST, NUDGE = 1e-13, 50, 1e-6
-#: Parts of a step of Newton's method that are tried; the whole one where none lowers the defect, which then is round-off.
+#: Parts of a step of Newton's method that are tried; the whole one where none lowers the defect: it is round-off then.
 PARTS = 0.5 ** np.arange(10)
 
 
