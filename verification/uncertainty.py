@@ -15,12 +15,11 @@ gets the fit's standard deviation s and the number's own distance from it on top
 Reasonable is an order from half an order under the lowest formal one (for a lowest of one that is 0.5, Eca &
 Hoekstra's bound) to half an order over the highest, of a law about which values scatter (s) less than they differ, on
 average, from one size to the next: on unrelated meshes an order scatters by some tenths. An order over the lowest
-formal one is made use of where the values rule that one out (an F test at 5 %, which takes four), and never over the
-highest; else the law is fitted with the lowest. Without that, where the values of a first-order law scatter by a tenth
-of the error, the observed order is as often near two, and the bar covers three errors in four, not nineteen in twenty.
-In the second case q is the lowest formal order, and the range of all values, as in Eca & Hoekstra's estimator for data
-that do not converge monotonically, covers oscillation and noise. The factors are Roache's, for three and more sizes
-and for two.
+formal one is not made use of, the law is fitted with that one: where the values of a first-order law scatter by a
+tenth of the error, their observed order is as often near two, and a bar with it covers three errors in four, not
+nineteen in twenty. In the second case q is the lowest formal order, and the range of all values, as in Eca &
+Hoekstra's estimator for data that do not converge monotonically, covers oscillation and noise. The factors are
+Roache's, for three and more sizes and for two.
 
     P. J. Roache, J. Fluids Eng. 116 (1994) 405; Verification and Validation in Computational Science and Engineering,
     Hermosa, 1998. I. B. Celik et al., J. Fluids Eng. 130 (2008) 078001. L. Eca, M. Hoekstra, J. Comput. Phys. 262
@@ -34,7 +33,6 @@ from math import inf, nan
 
 import numpy as np
 from scipy.optimize import minimize_scalar
-from scipy.stats import f as f_distribution
 
 #: How far an order may be from a formal one.
 BAND = 0.5
@@ -85,7 +83,7 @@ def estimate(sizes, values, formal: tuple[float, float]) -> Estimate:
         return Estimate(0.0, nan, 0.0)
     order, (lowest, highest) = observed_order(h, f), formal
     if lowest - BAND <= order <= highest + BAND:
-        used = supported_order(h, f, order, formal)
+        used = min(order, lowest)
         slope, apart = fit(h, f, used)
         if (scatter := deviation(apart)) < np.ptp(f) / (len(f) - 1):
             return Estimate(float(OBSERVED * abs(slope) * h[0] ** used + scatter + abs(apart[0])), order, OBSERVED)
@@ -102,17 +100,6 @@ def observed_order(h: np.ndarray, f: np.ndarray) -> float:
         return nan
     return float(minimize_scalar(misfit, bounds=(SOUGHT[best - 1], SOUGHT[best + 1]), method="bounded",
                                  options={"xatol": 1e-10}).x)
-
-
-def supported_order(h: np.ndarray, f: np.ndarray, order: float, formal: tuple[float, float]) -> float:
-    """The order to use where one is observed: over the lowest formal one only if the values rule that one out."""
-    lowest, highest = formal
-    free = len(h) - FEWEST
-    if order <= lowest or free == 0:
-        return min(order, lowest)
-    best, plain = (float(np.sum(fit(h, f, p)[1] ** 2)) for p in (order, lowest))
-    ruled_out = plain - best > f_distribution.ppf(0.95, 1, free) * best / free
-    return min(order, highest) if ruled_out else lowest
 
 
 def fit(h: np.ndarray, f: np.ndarray, order: float) -> tuple[float, np.ndarray]:
