@@ -110,8 +110,8 @@ def plan(mutant: Mutant) -> tuple[list[str], list[str]]:
 
 
 def hunt(mutant: Mutant, every: bool = False) -> Hunt:
-    """Run the mutant against the cases that name it, then against all others, to the first catch; ``every``: against all
-    that name it."""
+    """Run the mutant against the cases that name it, then against all others, to the first catch; ``every``: against
+    all that name it."""
     named, others = plan(mutant)
     trials = []
     with TemporaryDirectory(prefix="mutant-") as folder:
