@@ -7,7 +7,8 @@ source in the first cell. The uptake is added cell by cell, and the equations
     V dC/dt = b - M C - V X q(C_A, C_D)
 
 are solved by scipy: FiPy's own solvers stop at a residual of 1e-5 unless told otherwise, which leaves 2e-4 of what is
-taken up unaccounted for on every grid, and its sweeps take minutes.
+taken up unaccounted for on every grid, and its sweeps take minutes. In time they are integrated twice: without an error
+of their own, by scipy, and by backward Euler, which is FiPy's TransientTerm and of first order.
 """
 import numpy as np
 import scipy.sparse as sp
@@ -15,19 +16,24 @@ from fipy import CellVariable, CentralDifferenceConvectionTerm, DiffusionTerm, G
 from scipy.integrate import solve_ivp
 from scipy.sparse.linalg import spsolve
 
-from reference.channel_bvp import uptake
+from reference.monod import sink, slopes
 
-RESTS, MOST, NUDGE = 1e-10, 100, 1e-6
+RESTS, MOST = 1e-10, 100
 
 
 class Channel:
-    """Equal cells over ends, of which 0 < x < length are biomass of density X; supply, diffusivity, in_strip: pairs."""
+    """Equal cells over ends, of which 0 < x < length are biomass of density X; supply, diffusivity, in_strip: pairs,
+    acceptor first. Raises ValueError where no face lies on an end of the strip."""
 
     def __init__(self, cells, ends, velocity, supply, diffusivity, in_strip, density, rates, length):
         self.mesh = Grid1D(nx=cells, dx=(ends[1] - ends[0]) / cells) + (ends[0],)
         self.x = np.array(self.mesh.cellCenters.value[0])
         self.volume = (ends[1] - ends[0]) / cells
+        faces = (np.array([0.0, length]) - ends[0]) / self.volume
+        if not np.allclose(faces, np.round(faces)):
+            raise ValueError("the strip's ends must lie on faces")
         self.density = np.where((self.x > 0) & (self.x < length), density, 0.0)
+        self.load = self.volume * self.density
         self.rates, self.supply = rates, np.array(supply, float)
         spreads = [np.where(self.density > 0, *pair) for pair in zip(in_strip, diffusivity)]
         pairs = [self._transport(velocity, s, spread) for s, spread in zip(supply, spreads)]
@@ -48,34 +54,46 @@ class Channel:
         return matrix, source
 
     def _rise(self, fields):
-        """V dC/dt (2 cells,) of C_A and then C_D."""
-        sinks = self.volume * self.density * np.stack(uptake(*fields.reshape(2, -1), self.rates))
-        return np.concatenate(self.sources) - self.transport @ fields - sinks.ravel()
+        """V dC/dt (2n,) of all C_A and then all C_D."""
+        return np.concatenate(self.sources) - self.transport @ fields - sink(fields, self.load, self.rates)
 
     def _slopes(self, fields):
-        """Its derivative: the uptake's, cell by cell, by central differences."""
-        both = fields.reshape(2, -1)
-        shifts = NUDGE * np.eye(2)[:, :, None]
-        columns = [(np.stack(uptake(*(both + d), self.rates)) - np.stack(uptake(*(both - d), self.rates))) / (2 * NUDGE)
-                   for d in shifts]
-        blocks = [[sp.diags_array(self.volume * self.density * columns[s][k]) for s in (0, 1)] for k in (0, 1)]
-        return sp.csc_array(-self.transport - sp.block_array(blocks))
+        """Its derivative."""
+        return sp.csc_array(-self.transport - slopes(fields, self.load, self.rates))
 
     def steady(self):
-        """(C_A, C_D) at the cells' centres ``x``, at rest: Newton's method with halved steps."""
-        fields = np.repeat(self.supply, len(self.x))
+        """(C_A, C_D) (2, n) at the cells' centres ``x``, at rest. Raises RuntimeError where Newton's method fails."""
+        return self._solved(self._rise, self._slopes, np.repeat(self.supply, len(self.x))).reshape(2, -1)
+
+    def _solved(self, defect, derivative, fields):
+        """The zero of ``defect``, by Newton's method with halved steps."""
         for _ in range(MOST):
-            rise = self._rise(fields)
+            rise = defect(fields)
             if np.abs(rise).max() < RESTS * self.sources[0][0]:
-                return fields.reshape(2, -1)
-            step, length = spsolve(self._slopes(fields), -rise), 1.0
-            while np.linalg.norm(self._rise(fields + length * step)) > np.linalg.norm(rise) and length > 1e-3:
+                return fields
+            step, length = spsolve(derivative(fields), -rise), 1.0
+            while np.linalg.norm(defect(fields + length * step)) > np.linalg.norm(rise) and length > 1e-3:
                 length /= 2
             fields = fields + length * step
         raise RuntimeError(f"the finite volumes do not come to rest: {np.abs(rise).max():.2g}")
 
-    def transient(self, end):
-        """(C_A, C_D) after a time, from the supply everywhere."""
-        found = solve_ivp(lambda t, y: self._rise(y) / self.volume, (0.0, end), np.repeat(self.supply, len(self.x)),
-                          jac=lambda t, y: self._slopes(y) / self.volume, method="BDF", rtol=1e-8, atol=1e-8)
-        return found.y[:, -1].reshape(2, -1)
+    def transient(self, times):
+        """(times, 2, n): C_A and C_D at each of the times, from the supply everywhere; exact in time to 1e-8."""
+        found = solve_ivp(lambda t, y: self._rise(y) / self.volume, (0.0, times[-1]),
+                          np.repeat(self.supply, len(self.x)), jac=lambda t, y: self._slopes(y) / self.volume,
+                          method="BDF", t_eval=times, rtol=1e-8, atol=1e-8)
+        return found.y.T.reshape(len(times), 2, -1)
+
+    def backward_euler(self, times, steps):
+        """(times, 2, n) by FiPy's scheme, V (C - C_old) / dt = rise, each interval in so many equal steps."""
+        fields, states = np.repeat(self.supply, len(self.x)), []
+        for interval in np.diff([0.0, *times]):
+            for _ in range(steps):
+                fields = self._stepped(fields, self.volume * steps / interval)
+            states.append(fields.reshape(2, -1))
+        return np.array(states)
+
+    def _stepped(self, old, storage):
+        """One step of backward Euler, V / dt = storage."""
+        return self._solved(lambda new: self._rise(new) - storage * (new - old),
+                            lambda new: self._slopes(new) - storage * sp.eye_array(len(new), format="csc"), old)

@@ -2,52 +2,100 @@
 
     D lap C = X q(C_A, C_D),   C = supply at x = -a and x = a,   no flux through y = 0 and y = W
 
-on a Cartesian grid that the biomass's boundary cuts: a cell takes up as much as the part of it that is biomass. D is
-the same in fluid and biomass, so that py-pde's Laplacian applies. The fixed point C = (D lap)^-1 X q(C) is found by a
-Newton-Krylov method whose preconditioner is py-pde's Poisson solver itself; nothing is compiled.
+on a Cartesian grid of square cells, each of which takes up as much as the part of it that is biomass. D is the same in
+fluid and biomass, so that py-pde's Laplacian applies. That is L C + g, and its matrix is read off by applying it to
+nothing and to five patterns, in each of which no two cells are neighbours of the same one; Newton's method solves for
+both substrates with it. Nothing is compiled.
+
+Where the biomass's sides follow the cells the scheme is of second order. A curved side cuts them: by the part of each
+cell the amount taken up stays right, and its place is wrong by a part of a cell, now to one side, now to the other.
 """
 import numpy as np
-from pde import CartesianGrid
-from pde.backends.registry import get_backend
-from scipy.optimize import newton_krylov
+import scipy.sparse as sp
+from pde import CartesianGrid, ScalarField
+from scipy.sparse.linalg import splu
 
-from reference.channel_bvp import uptake
+from reference.monod import sink, slopes
 
-PARTS = 8
-
-
-def half_disc(cells, half_length, width, radius, diffusivity, supply, density, rates):
-    """(points (n, 2), C (2, n)) at the cells' centres; ``cells`` across the width; diffusivity, supply: pairs."""
-    grid = CartesianGrid([[-half_length, half_length], [0.0, width]], [round(2 * half_length / width * cells), cells])
-    points = np.moveaxis(np.array(grid.cell_coords), -1, 0).reshape(2, -1)
-    sink = density * _share(points, width / cells, radius)
-    solvers = [_poisson(grid, s) for s in supply]
-    supply, shape = np.array(supply, float)[:, None], grid.shape
-
-    def carried(fields):
-        rates_now = uptake(*fields, rates)
-        return np.stack([solve((sink * q / d).reshape(shape)) for solve, q, d in zip(solvers, rates_now, diffusivity)])
-
-    found = newton_krylov(lambda part: part - carried(supply * part) / supply, np.ones((2, points.shape[1])),
-                          f_tol=1e-9)
-    return points.T, supply * found
+RESTS, MOST = 1e-11, 60
+#: How SuperLU factors: the diagonal dominates, and pivots would spoil the ordering.
+NO_PIVOTS = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
+#: No two of the five cells of the stencil have the same x + 2 y modulo five.
+PATTERNS = 5
 
 
-def _share(points, cell, radius):
-    """Part of each cell within the disc around the origin."""
-    offsets = (np.arange(PARTS) + 0.5) / PARTS - 0.5
-    within = [np.hypot(points[0] + a * cell, points[1] + b * cell) < radius for a in offsets for b in offsets]
-    return np.mean(within, axis=0)
+class Box:
+    """``cells`` across the width of [-a, a] x [0, W]; points (n, 2): their centres.
+
+    part: (n,) -> function (points (n, 2), cell's side) -> the part of each cell that is biomass.
+    """
+
+    def __init__(self, cells, half_length, width, part):
+        count = 2 * half_length * cells / width
+        if round(count) != count:
+            raise ValueError("the length must be a whole number of cells")
+        self.grid = CartesianGrid([[-half_length, half_length], [0.0, width]], [round(count), cells])
+        self.points = np.array(self.grid.cell_coords).reshape(-1, 2)
+        self.part = part(self.points, width / cells)
+
+    def _laplacian(self, supply):
+        """(L, g) of py-pde's Laplacian L C + g with C = supply at both ends."""
+        ends = {"x": {"value": float(supply)}, "y": {"derivative": 0.0}}
+
+        def applied(field):
+            return ScalarField(self.grid, field.reshape(self.grid.shape)).laplace(ends, backend="scipy").data.ravel()
+
+        x, y = np.divmod(np.arange(len(self.points)), self.grid.shape[1])
+        colour = (x + 2 * y) % PATTERNS
+        constant = applied(np.zeros(len(colour)))
+        answers = np.stack([applied((colour == c).astype(float)) - constant for c in range(PATTERNS)])
+        return self._collected(answers, colour), constant
+
+    def _collected(self, answers, colour):
+        """The matrix, from what the cells of each colour do to themselves and to their four neighbours."""
+        index = np.arange(len(colour)).reshape(self.grid.shape)
+        pairs = [(index, index), (index[1:], index[:-1]), (index[:-1], index[1:]), (index[:, 1:], index[:, :-1]),
+                 (index[:, :-1], index[:, 1:])]
+        rows, columns = (np.concatenate([pair[k].ravel() for pair in pairs]) for k in (0, 1))
+        return sp.csc_array((answers[colour[columns], rows], (rows, columns)), shape=(len(colour),) * 2)
+
+    def steady(self, diffusivity, supply, density, rates):
+        """C (2, n) at the cells' centres; diffusivity, supply: pairs, acceptor first; density: X; rates: as
+        :mod:`reference.monod` takes them. Raises RuntimeError where Newton's method fails."""
+        pairs = [self._laplacian(s) for s in supply]
+        matrix = sp.block_diag([d * pair[0] for d, pair in zip(diffusivity, pairs)], "csc")
+        constant = np.concatenate([d * pair[1] for d, pair in zip(diffusivity, pairs)])
+        load = density * self.part
+
+        def rise(fields):
+            return matrix @ fields + constant - sink(fields, load, rates)
+
+        start = np.repeat(np.array(supply, float), len(self.points))
+        return _newton(rise, lambda fields: matrix - slopes(fields, load, rates), start, np.abs(constant).max())
 
 
-def _poisson(grid, supply):
-    """f -> C with lap C = f and the boundary conditions, by py-pde."""
-    bcs = grid.get_boundary_conditions([[{"value": supply}] * 2, [{"derivative": 0.0}] * 2])
-    solver = get_backend("scipy").get_operator_info(grid, "poisson_solver").factory(bcs=bcs)
+def _newton(rise, derivative, fields, scale):
+    """The zero of ``rise``, with halved steps; ``scale`` is the size of its terms."""
+    for _ in range(MOST):
+        now = rise(fields)
+        if np.abs(now).max() < RESTS * scale:
+            return fields.reshape(2, -1)
+        step, length = splu(derivative(fields), **NO_PIVOTS).solve(-now), 1.0
+        while np.linalg.norm(rise(fields + length * step)) > np.linalg.norm(now) and length > 1e-3:
+            length /= 2
+        fields = fields + length * step
+    raise RuntimeError(f"the finite differences do not come to rest: {np.abs(now).max():.2g}")
 
-    def solve(right):
-        out = np.empty(grid.shape)
-        solver(right, out)
-        return out.ravel()
 
-    return solve
+def half_disc(radius, parts=16):
+    """The part of each cell within a disc around the origin, by ``parts`` x ``parts`` points."""
+    def part(points, cell):
+        offsets = cell * ((np.arange(parts) + 0.5) / parts - 0.5)
+        return np.mean([np.hypot(points[:, 0] + a, points[:, 1] + b) < radius for a in offsets for b in offsets],
+                       axis=0)
+    return part
+
+
+def block(half, height):
+    """|x| < half, y < height: both must be whole numbers of cells."""
+    return lambda points, cell: ((np.abs(points[:, 0]) < half) & (points[:, 1] < height)).astype(float)

@@ -7,6 +7,9 @@
 **Free uniform growth.** F = sqrt(theta) I, sigma = 0: P = -theta^(-5/3) (theta - (2 theta + 1)/3)
 = -theta^(-5/3) (theta - 1) / 3. Uniform growth has no in-plane shear, but a pressure, since x3 cannot expand [E11].
 
+**Growth confined to one direction.** F = diag(1, theta) between fixed sides, sigma_yy = 0 on the free end:
+P = -theta^(-5/3) (theta^2 - (theta^2 + 2)/3) = -2 theta^(-5/3) (theta^2 - 1) / 3.
+
 **Growing half-cylinder.** theta = theta(R) in a half-disc that slides on its flat side, which is the upper half of a
 disc that grows radially: r = r(R), F = diag(r', r/R, 1), J = r' r / R = theta, hence
 
@@ -35,12 +38,17 @@ def free_growth_pressure(theta):
     return -(theta ** (-5 / 3)) * (theta - 1) / 3
 
 
+def confined_growth_pressure(theta):
+    """P of a body that grows uniformly by theta in one direction alone."""
+    return -2 * theta ** (-5 / 3) * (theta**2 - 1) / 3
+
+
 def cylinder_radius(R, inner, more, outer):
     """r(R) for theta = inner + more (R / outer)^2."""
     return R * np.sqrt(inner + more * R**2 / (2 * outer**2))
 
 
-def cylinder_pressure(R, inner, more, outer, points=200):
+def cylinder_pressure(R, inner, more, outer, points=50):
     """P(R), R (n,), for theta = inner + more (R / outer)^2; outer is R_0."""
     s, weight = np.polynomial.legendre.leggauss(points)
     half = 0.5 * (outer - np.asarray(R, float))[:, None]

@@ -5,9 +5,9 @@
 
 nu = 1 in the fluid and lambda in the biomass, u = the parabola of mean one at the inlet, 0 on the walls. Quadratic
 velocity and linear pressure need no stabilisation, and the pressure may jump at the interface, as it does: a continuous
-one leaves the head loss with an error of first order (6e-4 for a half-disc, lambda = 10,
-                                                       600 triangles). Meshes are rings around a
-half-disc, edges of the arc bent onto it, refined towards the two corners where fluid, biomass and wall meet.
+one leaves the head loss with an error of first order (6e-4 for a half-disc, lambda = 10, 600 triangles). Meshes are
+rings around a half-disc, edges of the arc bent onto it, refined towards the two corners where fluid, biomass and wall
+meet, and once more in the film between a thick half-disc and the upper wall.
 """
 from dataclasses import dataclass
 
@@ -31,6 +31,9 @@ from skfem import (
 )
 from skfem.helpers import ddot, div, grad, sym_grad
 
+#: Thickest aggregate, over the width, around which the rings fit; a mesh for a thicker one is stretched.
+THICKEST = 0.8
+
 
 @dataclass(frozen=True, eq=False)
 class Channel:
@@ -43,21 +46,37 @@ class Channel:
 
 
 @dataclass(frozen=True, eq=False)
+class Pressure:
+    """Pressure (K,) of one region at the middles of its triangles' edges, points (K, 2), with their weights (K,)."""
+
+    biomass: bool
+    points: np.ndarray
+    values: np.ndarray
+    areas: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class Stokes:
-    """Solution of mean velocity one: loss of p over the mesh; velocity (K, 2) at the corners of triangles (K, 2), and
-    the area around each of them (K,), a weight for norms."""
+    """Solution of mean velocity one: loss of p over the mesh; velocity (K, 2) at the middles of edges, points (K, 2),
+    and their weights (K,), a third of the triangles' areas: exact for integrals of quadratic functions; the pressure of
+    each region, which jumps at the interface."""
 
     loss: float
     points: np.ndarray
     velocity: np.ndarray
     areas: np.ndarray
+    pressures: tuple[Pressure, ...]
 
 
 def half_disc(width, ends, radius, refinements, corner=6):
     """A half-disc of ``radius`` on the lower wall, around x = 0; its coarsest mesh refined ``refinements`` times, and
     ``corner`` times more near (+-radius, 0)."""
-    points = np.unique(np.round(np.vstack([_rings(width, radius), _box(width, ends, radius)]), 9), axis=0)
+    sketched = min(radius, THICKEST * width)
+    points = np.unique(np.round(np.vstack([_rings(width, sketched), _box(width, ends, sketched)]), 9), axis=0)
     mesh = MeshTri(points.T.copy(), Delaunay(points).simplices.T.copy())
+    if radius > sketched:
+        mesh = MeshTri(_stretched(points, width, ends, sketched, radius).T.copy(), mesh.t)
+        mesh = _snapped(mesh.refined(_film(mesh, radius)), radius)
     for _ in range(refinements):
         mesh = _snapped(mesh.refined(), radius)
     for _ in range(corner):
@@ -93,6 +112,22 @@ def _box(width, ends, radius):
     x, y = np.meshgrid(np.linspace(*ends, round((ends[1] - ends[0]) / step) + 1), np.linspace(0.0, width, 7))
     points = np.column_stack([x.ravel(), y.ravel()])
     return points[(np.hypot(*points.T) > reach + 0.5 * step) | (points[:, 1] == width)]
+
+
+def _stretched(points, width, ends, first, radius):
+    """Points moved along their rays from the origin, the arc from radius ``first`` to ``radius``, the rim kept."""
+    (x, y), tiny = points.T, 1e-9 * width
+    r = np.maximum(np.hypot(x, y), tiny)
+    side = np.where(x > 0, ends[1], -ends[0])
+    rim = r * np.minimum(width / np.maximum(y, tiny), side / np.maximum(np.abs(x), tiny))
+    beyond = radius + (r - first) * (rim - radius) / (rim - first)
+    return points * (np.where(r > first, beyond, r * radius / first) / r)[:, None]
+
+
+def _film(mesh, radius):
+    """Triangles between the upper part of the half-disc and the wall, and a layer inside."""
+    x, y = mesh.p[:, mesh.t].mean(axis=1)
+    return np.flatnonzero((np.abs(x) < 0.75 * radius) & (np.hypot(x, y) > 0.8 * radius))
 
 
 def _interface(mesh, radius):
@@ -134,12 +169,28 @@ def stokes(channel, ratio, interface="laplacian"):
     value, held = _boundary(basis, channel, interface)
     x = np.concatenate([value, np.zeros(B.shape[0])])
     solution = solve(*condense(bmat([[A, -B.T], [-B, None]], "csr"), np.zeros(len(x)), x=x, D=held))
-    loss, first = 0.0, basis.N
-    for _, lower, used in regions:
-        pressure = np.zeros(lower.N)
-        pressure[used], first = solution[first:first + len(used)], first + len(used)
-        loss += _end_mean(channel, pressure, lower, 0) - _end_mean(channel, pressure, lower, 1)
-    return _at_corners(channel, basis, solution[: basis.N], loss)
+    parts = np.split(solution[basis.N:], np.cumsum([len(used) for *_, used in regions])[:-1])
+    pressures = tuple(_pressure(channel, region, part) for region, part in zip(regions, parts))
+    loss = sum(_loss(channel, lower, used, part) for (_, lower, used), part in zip(regions, parts))
+    middles = basis.facet_dofs[:2]
+    return Stokes(loss, basis.doflocs[:, middles[0]].T, solution[middles].T, _weights(channel, basis), pressures)
+
+
+def _pressure(channel, region, values):
+    """:class:`Pressure` of a region from its unknowns."""
+    velocity, lower, used = region
+    pressure, weights = np.zeros(lower.N), _weights(channel, velocity)
+    pressure[used], inside = values, weights > 0
+    middles = pressure[channel.mesh.facets[:, inside]].mean(axis=0)
+    return Pressure(bool(channel.biomass[velocity.tind[0]]), velocity.doflocs[:, velocity.facet_dofs[0, inside]].T,
+                    middles, weights[inside])
+
+
+def _loss(channel, lower, used, values):
+    """What a region adds to the mean pressure at the inlet less that at the outlet."""
+    pressure = np.zeros(lower.N)
+    pressure[used] = values
+    return _end_mean(channel, pressure, lower, 0) - _end_mean(channel, pressure, lower, 1)
 
 
 def _region(channel, where):
@@ -149,34 +200,11 @@ def _region(channel, where):
     return velocity, lower, np.unique(lower.element_dofs)
 
 
-def follow(channel, gamma):
-    """Displacement of the fluid whose biomass moves by (x, y), as :class:`Stokes` (its loss is 0): the pseudo-Stokes
-    problem (35), (grad d, grad v) - (P, div v) = 0, (q, div d) + gamma (P, q) = 0 over the fluid; d_y = 0 on the walls,
-    d_x = 0 at the ends."""
-    basis = Basis(channel.mesh, ElementVector(ElementTriP2()), elements=np.flatnonzero(~channel.biomass), intorder=5)
-    lower = basis.with_element(ElementTriP1())
-    A, B = asm(_viscous("laplacian"), basis, nu=1.0), asm(_divergence, basis, lower)
-    M = asm(BilinearForm(lambda p, q, w: p * q), lower)
-    component, (x, y) = _component(basis), basis.doflocs
-    near, solid = 1e-9 * channel.width, np.zeros(basis.N, bool)
-    solid[np.unique(basis.dofs.element_dofs[:, channel.biomass])] = True
-    wall = (y < near) | (y > channel.width - near)
-    end = (x < channel.ends[0] + near) | (x > channel.ends[1] - near)
-    held = np.concatenate([solid | np.where(component == 1, wall, end), np.zeros(lower.N, bool)])
-    held[basis.N:][np.setdiff1d(np.arange(lower.N), np.unique(lower.element_dofs))] = True
-    value = np.concatenate([np.where(solid, np.where(component == 1, y, x), 0.0), np.zeros(lower.N)])
-    K = bmat([[A, -B.T], [-B, -gamma * M]], "csr")
-    found = solve(*condense(K, np.zeros(len(value)), x=value, D=np.flatnonzero(held)))
-    return _at_corners(channel, basis, found[: basis.N], 0.0)
-
-
-def _at_corners(channel, basis, field, loss):
-    """:class:`Stokes` of a field's values at the corners of triangles."""
-    corners = basis.nodal_dofs[:, : channel.mesh.t.max() + 1]
+def _weights(channel, basis):
+    """A third of the areas of a basis's triangles on both sides of each edge."""
+    mesh, elements = channel.mesh, slice(None) if basis.tind is None else basis.tind
     share = np.repeat(basis.dx.sum(axis=1)[None] / 3, 3, axis=0)
-    triangles = channel.mesh.t[:3] if basis.tind is None else channel.mesh.t[:3, basis.tind]
-    areas = np.bincount(triangles.ravel(), share.ravel(), corners.shape[1])
-    return Stokes(loss, basis.doflocs[:, corners[0]].T, field[corners].T, areas)
+    return np.bincount(mesh.t2f[:, elements].ravel(), share.ravel(), mesh.nfacets)
 
 
 def _component(basis):

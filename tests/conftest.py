@@ -4,11 +4,12 @@ import os
 import matplotlib
 import numpy
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 matplotlib.use("Agg")
-settings.register_profile("ci", deadline=None, derandomize=True, max_examples=20)
-settings.register_profile("thorough", deadline=None, max_examples=500)
+SLOW_MACHINES_MAY = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
+settings.register_profile("ci", derandomize=True, max_examples=20, **SLOW_MACHINES_MAY)
+settings.register_profile("thorough", print_blob=True, max_examples=500, **SLOW_MACHINES_MAY)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 
 

@@ -1,5 +1,8 @@
 """Shapes and scenes that tests share: hypothesis strategies named after what they are, and a few fixed examples."""
+import math
+
 import numpy as np
+from hypothesis import settings
 from hypothesis import strategies as st
 
 from repro import geometry, growth, mesh
@@ -7,15 +10,30 @@ from repro.geometry import BOTTOM, FREE, TOP, Outline
 from repro.scene import parse_scene
 
 LENGTH = 600.0
+VISCOSITY, DIFFUSIVITY = 2.84e-5, 1e8 / 24  # nu_water / g in um h; 1 cm2/d in um2/h
 
 widths = st.floats(10.0, 200.0)
+standard = st.just(50.0)  # the width of section 4
 lengths = st.floats(300.0, 1000.0)
 refinements = st.floats(0.4, 2.0)
-concentrations = st.floats(0.0, 100.0)
+angles = st.floats(-math.pi, math.pi)
+
+
+def share(part):
+    """Settings of a property that costs more than most: this part of the profile's examples."""
+    return settings(max_examples=math.ceil(part * settings.default.max_examples))
+
+
+def between(least, most):
+    """Numbers of any magnitude from least to most, both greater than zero."""
+    return st.floats(math.log(least), math.log(most)).map(math.exp)
+
+
+concentrations = st.sampled_from([0.0, 1.0, 10.0]) | between(1e-9, 1e-2) | st.floats(0.0, 100.0)  # mg/L
 
 
 @st.composite
-def attached_aggregates(draw, width=st.just(50.0), thinnest=0.05, thickest=0.9, uneven=0.45):
+def attached_aggregates(draw, width=standard, thinnest=0.05, thickest=0.9, uneven=0.45):
     """(Outline, width): an aggregate on the lower wall, star-shaped about the origin, that leaves a film above it."""
     width = draw(width)
     shares = draw(st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3))
@@ -32,6 +50,108 @@ def _on_the_wall(radius, angle):
     points = np.vstack([np.column_stack([base, np.zeros(11)]), arc[1:-1]])
     wall = np.where(np.arange(len(points)) < 11, BOTTOM, FREE)
     return Outline(points, wall, np.arange(len(points)) == 5, points.copy())
+
+
+@st.composite
+def outlines(draw, width=standard):
+    """(Outline, width): an aggregate on the lower wall, or one that reaches from wall to wall, anywhere in the pore."""
+    width = draw(width)
+    left, right, lean = (draw(st.floats(*bounds)) * width for bounds in ((-1.0, -0.1), (0.1, 1.0), (-0.4, 0.4)))
+    across = st.just(plug(width, left, right, lean))
+    found = draw(across | attached_aggregates(st.just(width)).map(lambda pair: pair[0]))
+    room = max(0.0, 0.49 * LENGTH - np.abs(found.points[:, 0]).max())
+    points = found.points + [draw(st.floats(-1.0, 1.0)) * room, 0.0]
+    return Outline(points, found.wall, found.fixed, points), width
+
+
+@st.composite
+def meshes(draw, width=standard, finest=0.6, clean=True):
+    """PoreMesh, coarse: around an aggregate on the wall, around a plug, or, where ``clean``, of a channel without."""
+    kinds = [attached_aggregates(width), outlines(width)] + [st.tuples(st.none(), width)] * clean
+    outline, width = draw(st.one_of(kinds))
+    return meshed(outline, width, draw(st.floats(0.35, finest)), film=0.1 * width)[0]
+
+
+@st.composite
+def remesh_chains(draw, longest=4, finest=0.9):
+    """[(points, triangles)] of one aggregate: unrelated meshes, each around the outline that the last one left."""
+    outline, width = draw(attached_aggregates(thinnest=0.2) | outlines())
+    chain = []
+    for refinement in draw(st.lists(st.floats(0.35, finest), min_size=2, max_size=longest)):
+        grid, outline = meshed(outline, width, refinement)
+        chain.append((grid.points[grid.body], grid.body_triangles))
+    return chain
+
+
+def rotation(angle):
+    """(2, 2) turn by an angle."""
+    return np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+
+
+@st.composite
+def admissible_F(draw):
+    """(2, 2) deformation with det F > 0: turned, stretched by up to 3 one way and as much less the other, turned again,
+    and grown in area by a factor from 1/4 to 3600."""
+    stretch = draw(st.floats(1.0, 3.0))
+    plane = rotation(draw(angles)) @ np.diag([stretch, 1 / stretch]) @ rotation(draw(angles))
+    return draw(between(0.5, 60.0)) * plane
+
+
+@st.composite
+def scenes(draw, drives=("none", "head", "mean_velocity"), peclet=3.0, thiele=30.0, steps=2):
+    """A small scene of any kind: narrow or wide, a seed or nearly a plug, fed, starved or with nothing at all, driven
+    by a head, by a velocity or not; it grows for a step or up to ``steps``.
+
+    peclet: the largest u_ave W / D of a clean pore and the slower substrate; the paper's are 0.6 and 1.4, and at 3 no
+    element of these meshes (the largest have W / 6) sees more than u h / D = 1. thiele: the largest
+    (k X_m R^2 / (D_D K_sD))^1/2, D in the aggregate; the paper's seed has 0.3, one of 42 um 2.5.
+    """
+    width, step = draw(between(10.0, 150.0)), draw(st.floats(3.0, 20.0))
+    length, radius = width * draw(st.floats(4.0, 12.0)), width * draw(st.floats(0.05, 0.95))
+    slowest, rate = draw(between(0.1, 1.0)), draw(between(0.5, 15.0))
+    donor = draw(substrates(slowest))
+    spread, half = number(donor["diffusivity_in_aggregate"]), number(donor["half_saturation"])
+    density = draw(between(0.1, thiele)) ** 2 * spread * half / (rate * (radius * 1e-4) ** 2)
+    tables = {
+        "pore": {"width": f"{width!r} um", "length": f"{length!r} um"},
+        "aggregate": {"radius": f"{radius!r} um"},
+        "substrates": {"acceptor": draw(substrates(slowest)), "donor": donor},
+        "kinetics": {"maximum_utilization_rate": f"{rate!r} 1/day",
+                     "decay_coefficient": f"{draw(between(0.01, 1.0))!r} 1/day",
+                     "degradable_fraction": draw(st.floats(0.0, 1.0)),
+                     "maximum_density": f"{density!r} mg/L"},
+        "growth": {"end": f"{step * draw(st.integers(1, steps))!r} min", "time_step": f"{step!r} min"},
+        "numerics": {"refinement": draw(st.floats(0.4, 0.7)),
+                     "transfer": draw(st.sampled_from(["conserving", "linear"]))},
+    }
+    drive, speed = draw(st.sampled_from(drives)), draw(between(0.01, 1.0)) * peclet * slowest * DIFFUSIVITY / width
+    if drive != "none":
+        value = speed if drive == "mean_velocity" else 12 * VISCOSITY * length * speed / width**2
+        tables["flow"] = {drive: f"{value!r} {'um' if drive == 'head' else 'um/h'}",
+                          "viscosity_ratio": draw(between(1.0, 1e4))}
+    return parse_scene(tables, "drawn", "drawn")
+
+
+@st.composite
+def substrates(draw, slowest):
+    """The table of a substrate: supply, K_s, D in water (``slowest`` cm2/d or more) and in the aggregate."""
+    water = slowest * draw(st.floats(1.0, 5.0))
+    return {"supply": f"{draw(st.just(0.0) | between(1e-3, 50.0))!r} mg/L",
+            "half_saturation": f"{draw(between(0.05, 20.0))!r} mg/L", "diffusivity": f"{water!r} cm^2/day",
+            "diffusivity_in_aggregate": f"{water * draw(st.floats(0.1, 1.0))!r} cm^2/day"}
+
+
+def constants(made):
+    """The arguments of ``oracles.rates`` that a scene says (1/h, mg/L, mg/mg)."""
+    k, s = made.kinetics, made.substrates
+    return {"half_a": s.acceptor.half_saturation, "half_d": s.donor.half_saturation, "k": k.maximum_utilization_rate,
+            "Y": k.yield_coefficient, "b": k.decay_coefficient, "f_d": k.degradable_fraction,
+            "d_c": k.decay_oxygen_demand, "F": k.acceptor_to_donor_ratio}
+
+
+def number(text):
+    """That of a text such as "50 um"."""
+    return float(text.split()[0])
 
 
 def plug(width, left, right, lean=0.0):
@@ -67,6 +187,12 @@ def reversed_mesh(grid):
     """The image of a mesh in x -> -x."""
     return mesh.PoreMesh(grid.points * [-1, 1], grid.triangles[:, ::-1], grid.biomass, grid.loop[::-1], grid.width,
                          (-grid.ends[1], -grid.ends[0]))
+
+
+def upside_down(grid):
+    """The image of a mesh in y -> W - y."""
+    return mesh.PoreMesh(grid.points * [1, -1] + [0, grid.width], grid.triangles[:, ::-1], grid.biomass,
+                         grid.loop[::-1], grid.width, grid.ends)
 
 
 def body_of(grid, outline):

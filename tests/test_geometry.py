@@ -4,9 +4,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from repro import geometry
+from repro import coupling, geometry, remeshing
 from repro.geometry import BOTTOM, FREE, TOP, Outline
-from tests.strategies import attached_aggregates, lengths, mirrored, plug, refinements, widths
+from tests import oracles
+from tests.strategies import (
+    attached_aggregates,
+    lengths,
+    mirrored,
+    outlines,
+    plug,
+    refinements,
+    scenes,
+    share,
+    widths,
+)
 
 FILM, ANGLE = 2.0, np.radians(16.7)
 
@@ -85,32 +96,45 @@ def test_refining_leaves_contact_nodes_exactly_on_their_wall(width, lean):
     assert fine.fixed.sum() == 2 and (fine.wall == FREE).sum() > 0
 
 
-@given(attached_aggregates(width=widths), lengths)
+@given(outlines(width=widths), lengths)
 def test_the_meshed_extent_follows_section_3_1(drawn, length):
-    """On each side min(10 R, 1.5 W) of fluid, or all that the pore has. Mutant: 10 R alone, max for min, one end's
-    cap."""
+    """On each side min(10 R, 1.5 W) of fluid, or all that the pore has, for any aggregate anywhere in it. Mutant: 10 R
+    alone, max for min, one end's cap, the thickness of the other side, the length in place of its half."""
     outline, width = drawn
-    left, right = geometry.meshed_extent(outline, width, length)
-    reach = min(10 * outline.points[:, 1].max(), 1.5 * width)
-    for gap, there_is in ((outline.points[:, 0].min() - left, outline.points[:, 0].min() + length / 2),
-                          (right - outline.points[:, 0].max(), length / 2 - outline.points[:, 0].max())):
-        assert gap == pytest.approx(min(reach, there_is), rel=1e-12)
+    found = geometry.meshed_extent(outline, width, length)
+    assert found == pytest.approx(oracles.extent(outline.points, width, length), rel=1e-12)
+    assert -length / 2 <= found[0] and found[1] <= length / 2
     assert geometry.meshed_extent(outline, width, length, whole=True) == (-length / 2, length / 2)
 
 
-@given(attached_aggregates(width=widths), lengths, st.floats(0.0, 1.0), st.booleans())
-def test_the_mesh_is_extended_once_the_aggregate_is_too_close_to_its_end(drawn, length, share, right):
-    """Too short under min(7 R, 1.3 W), and never where the pore has no more to mesh. Mutant: only one end looked at."""
+@given(outlines(width=widths), lengths, st.floats(0.0, 1.2), st.booleans())
+def test_the_mesh_is_extended_once_the_aggregate_is_too_close_to_its_end(drawn, length, part, right):
+    """Too short under min(7 R, 1.3 W), never as it was made, and never where the pore has no more to mesh. Mutant: only
+    one end looked at, 1.5 W for 1.3 W, the pore's end taken for too short."""
     outline, width = drawn
-    fresh = geometry.meshed_extent(outline, width, length)
-    assert not geometry.extent_too_short(outline, fresh, width, length)
-    reach = min(10 * outline.thickness, 1.5 * width)
-    closer = (fresh[0], outline.downstream + share * reach) if right else (outline.upstream - share * reach, fresh[1])
-    ended = closer[right] >= length / 2 if right else closer[0] <= -length / 2
-    wanted = share * reach < min(7 * outline.thickness, 1.3 * width) and not ended
-    if abs(share * reach / min(7 * outline.thickness, 1.3 * width) - 1) > 1e-9:
-        assert geometry.extent_too_short(outline, closer, width, length) == wanted
+    ends = list(geometry.meshed_extent(outline, width, length))
+    assert not geometry.extent_too_short(outline, tuple(ends), width, length)
+    least = min(7 * outline.thickness, 1.3 * width)
+    ends[right] = outline.downstream + part * least if right else outline.upstream - part * least
+    more = ends[right] < length / 2 if right else ends[right] > -length / 2
+    if abs(part - 1) > 1e-9:
+        assert geometry.extent_too_short(outline, tuple(ends), width, length) == (part < 1 and more)
     assert not geometry.extent_too_short(outline, (-length / 2, length / 2), width, length)
+
+
+@share(0.4)
+@given(scenes())
+def test_the_mesh_of_a_run_has_the_extent_of_section_3_1(made):
+    """Whenever a mesh is made; and later, however it has moved, never under min(7 R, 1.3 W) where there is pore left.
+    Mutant: a remesh that keeps the old ends, the aggregate's ends of t = 0."""
+    width, length = made.pore.width, made.pore.length
+    for instant in coupling.simulate(made):
+        now, reach = instant.pore, min(7 * instant.pore.outline.thickness, 1.3 * width)
+        assert now.outline.upstream - now.mesh.ends[0] >= reach or now.mesh.ends[0] == -length / 2
+        assert now.mesh.ends[1] - now.outline.downstream >= reach or now.mesh.ends[1] == length / 2
+        again = remeshing.remesh(made, now, now, instant.solved).mesh
+        assert again.ends == pytest.approx(oracles.extent(now.outline.points, width, length), rel=1e-12)
+        assert (again.points[:, 0].min(), again.points[:, 0].max()) == again.ends
 
 
 def test_the_extents_of_the_paper():

@@ -6,33 +6,51 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from repro import kinetics
-from tests.strategies import concentrations, scene
+from tests import oracles
+from tests.strategies import between, concentrations, constants, scene, scenes
 
 SCENE = scene(head="1e-3 cm")
 DAY = 24.0
 SATURATIONS = (1.0, 0.3, 20.0)
+LAWS = scenes(drives=("none",))  # any constants
 
 
-def rates(acceptor, donor):
-    """(F1, F2, F3, F4) / X_A of Table 1 in 1/d, as (7)-(10) print them, with d_c f_d b [E3] and F = 1.52 [E1]."""
-    m_a, m_d = acceptor / (acceptor + 1.0), donor / (donor + 1.0)
-    k, Y, b, f_d, d_c, F = 9.3, 0.61, 0.12, 0.8, 1.42, 1.52
-    return (-m_a * (k * F * m_d + d_c * f_d * b), -k * m_a * m_d, m_a * (k * Y * m_d - b), m_a * b * (1 - f_d))
+def uptake(acceptor, donor, made=SCENE):
+    return kinetics.uptake(np.asarray(acceptor, float), np.asarray(donor, float), made.substrates, made.kinetics)
 
 
-def uptake(acceptor, donor):
-    return kinetics.uptake(np.asarray(acceptor, float), np.asarray(donor, float), SCENE.substrates, SCENE.kinetics)
+def growth_rate(acceptor, donor, made):
+    return kinetics.growth_rate(acceptor, donor, made.substrates, made.kinetics)
 
 
-@given(concentrations, concentrations)
-def test_the_rates_are_those_of_the_paper(acceptor, donor):
-    """Mutant: d_f d_b for d_c f_d b, b without m_A, f_d for 1 - f_d, the yield in F2."""
-    F1, F2, F3, F4 = (rate / DAY for rate in rates(acceptor, donor))
-    q_a, q_d, _ = uptake(acceptor, donor)
+def inert_rate(acceptor, made):
+    return kinetics.inert_rate(acceptor, made.substrates, made.kinetics)
+
+
+def saturations(made):
+    return np.array([made.substrates.acceptor.half_saturation, made.substrates.donor.half_saturation])
+
+
+@given(LAWS, concentrations, concentrations)
+def test_the_rates_are_those_of_the_paper(made, acceptor, donor):
+    """Mutant: d_f d_b for d_c f_d b, b without m_A, f_d for 1 - f_d, the yield in F2, K_sA for K_sD."""
+    F1, F2, F3, F4 = oracles.rates(acceptor, donor, **constants(made))
+    q_a, q_d, _ = uptake(acceptor, donor, made)
     assert (-q_a, -q_d) == pytest.approx((F1, F2), rel=1e-13, abs=1e-300)
-    growth = kinetics.growth_rate(acceptor, donor, SCENE.substrates, SCENE.kinetics)
-    assert growth == pytest.approx(F3, rel=1e-12, abs=1e-17)
-    assert kinetics.inert_rate(acceptor, SCENE.substrates, SCENE.kinetics) == pytest.approx(F4, rel=1e-13, abs=1e-300)
+    assert growth_rate(acceptor, donor, made) == pytest.approx(F3, rel=1e-12, abs=1e-17)
+    assert inert_rate(acceptor, made) == pytest.approx(F4, rel=1e-13, abs=1e-17)
+
+
+@given(LAWS, concentrations, concentrations)
+def test_the_oxygen_demand_of_the_donor_is_spent_or_kept(made, acceptor, donor):
+    """|F1| + d_c (F3 + F4) = (F + Y d_c) |F2| at all concentrations: what decay takes is what the biomass loses.
+    Mutant: d_f d_b for d_c f_d b [E3], f_d for 1 - f_d, decay without m_A in one of the three."""
+    k = made.kinetics
+    q_a, q_d, _ = uptake(acceptor, donor, made)
+    kept = k.decay_oxygen_demand * (growth_rate(acceptor, donor, made) + inert_rate(acceptor, made))
+    demand = k.acceptor_to_donor_ratio + k.yield_coefficient * k.decay_oxygen_demand
+    terms = demand * q_d + k.decay_oxygen_demand * k.decay_coefficient * acceptor / (acceptor + saturations(made)[0])
+    assert q_a + kept == pytest.approx(demand * q_d, rel=1e-14, abs=1e-14 * terms)
 
 
 def test_the_numbers_of_section_4():
@@ -54,15 +72,20 @@ def test_monod_is_bounded_and_half_at_its_constant(half, concentration):
     assert slope == pytest.approx((1 - m) ** 2 / half, rel=1e-12)
 
 
-def test_the_jacobian_is_the_derivative():
-    """Central differences, step 1e-5: error under 1e-8 of the rates. Mutant: rows and columns swapped, K for K^2."""
-    rng = np.random.default_rng(1)
-    c_a, c_d = rng.uniform(0.01, 20.0, (2, 200))
-    h, slopes = 1e-5, uptake(c_a, c_d)[2]
-    for substrate, (up, down) in enumerate(((uptake(c_a + h, c_d), uptake(c_a - h, c_d)),
-                                            (uptake(c_a, c_d + h), uptake(c_a, c_d - h)))):
-        for sink in (0, 1):
-            assert slopes[sink][substrate] == pytest.approx((up[sink] - down[sink]) / (2 * h), abs=1e-8)
+@given(LAWS, between(0.01, 100.0), between(0.01, 100.0))
+def test_the_jacobian_is_the_derivative(made, acceptor, donor):
+    """Of F1, F2 and, with Y, F3, by central differences of order 4 in C / (C + K), good to about 1e-12 of the rates.
+    Mutant: rows and columns swapped, K for K^2, F left out of dF1/dC_D, K_sA for K_sD."""
+    half = saturations(made)
+    place = half * [acceptor, donor]
+    scale = half + place
+    slopes = np.array(uptake(*place, made)[2]) * scale
+    found = oracles.derivative(lambda c: np.array(uptake(*(c * scale), made)[:2]), place / scale, 1e-3)
+    assert slopes == pytest.approx(found, abs=1e-10 * np.abs(slopes).max())
+    k, m_slope = made.kinetics, half * [1.0, 0.0] / scale
+    growth = k.yield_coefficient * slopes[1] - k.decay_coefficient * m_slope
+    found = oracles.derivative(lambda c: growth_rate(*(c * scale), made), place / scale, 1e-3)
+    assert growth == pytest.approx(found, abs=1e-10 * np.abs(slopes).max())
 
 
 @given(st.floats(-100.0, 100.0), st.floats(-100.0, 100.0), st.floats(0.001, 50.0))
@@ -75,13 +98,24 @@ def test_each_sink_rises_with_its_own_substrate_below_zero_too(acceptor, donor, 
     assert slopes[0][0] > 0 and slopes[1][1] >= 0 and slopes[0][1] * acceptor >= 0 and slopes[1][0] * donor >= 0
 
 
-@given(concentrations, concentrations, st.floats(0.001, 50.0))
-def test_more_of_either_substrate_takes_up_more(acceptor, donor, more):
-    """And never faster than k and k F + d_c f_d b allow. Mutant: m_A left out of F2."""
-    q_a, q_d, _ = uptake(acceptor, donor)
-    richer_a, richer_d = uptake(acceptor + more, donor), uptake(acceptor, donor + more)
-    assert richer_a[0] > q_a and richer_d[0] >= q_a and richer_a[1] >= q_d and richer_d[1] >= q_d
-    assert 0 <= q_d <= 9.3 / DAY and 0 <= q_a <= (9.3 * 1.52 + 1.42 * 0.8 * 0.12) / DAY
+@given(LAWS, concentrations, concentrations, between(1e-3, 50.0))
+def test_more_of_either_substrate_takes_up_more(made, acceptor, donor, more):
+    """|F1| and |F2| rise with both substrates, strictly while there is the other one, and never past k F + d_c f_d b
+    and k; F3 rises with the donor, from -b at the least to k Y at the most. Mutant: m_A left out of F2, b times
+    m_D in F3, C / K in place of C / (C + K)."""
+    k = made.kinetics
+    q_a, q_d, _ = uptake(acceptor, donor, made)
+    by_a, by_d = uptake(acceptor + more, donor, made), uptake(acceptor, donor + more, made)
+    assert by_a[0] > q_a or max(donor, k.degradable_fraction) < 1e-3
+    assert by_d[0] > q_a and by_d[1] > q_d or acceptor < 1e-3
+    assert by_a[1] > q_d or donor < 1e-3
+    assert by_a[0] >= q_a and by_a[1] >= q_d and by_d[0] >= q_a and by_d[1] >= q_d
+    most = k.maximum_utilization_rate
+    decay = k.decay_oxygen_demand * k.degradable_fraction * k.decay_coefficient
+    assert 0 <= q_d <= most and 0 <= q_a <= most * k.acceptor_to_donor_ratio + decay
+    growth = growth_rate(acceptor, donor, made)
+    assert growth_rate(acceptor, donor + more, made) > growth or acceptor < 1e-3
+    assert -k.decay_coefficient <= growth <= most * k.yield_coefficient
 
 
 @pytest.mark.parametrize("growth, remains", [(0.19, 0.001), (-0.005, 0.001), (0.0, 0.001), (1e-14, 0.001), (-3.0, 0.2)])
@@ -102,3 +136,12 @@ def test_decay_alone_leaves_the_inert_share():
     remains = kinetics.inert_rate(1e6, SCENE.substrates, SCENE.kinetics)
     active, inert = kinetics.grow(1.0, 0.0, growth, remains, 1e5)
     assert active < 1e-200 and inert == pytest.approx(0.2, rel=1e-13)
+
+
+@given(st.floats(-3.0, 3.0), st.floats(0.0, 1.0), between(1e-3, 2.0), between(1e-3, 2.0))
+def test_two_steps_at_the_same_rates_are_one(growth, remains, first, second):
+    """And X_A stays positive, X_I never falls. Mutant: 1 + growth step for its exponential, X_I from the first X_A."""
+    after = kinetics.grow(1.0, 0.5, growth, remains, first)
+    both = kinetics.grow(*after, growth, remains, second)
+    assert both == pytest.approx(kinetics.grow(1.0, 0.5, growth, remains, first + second), rel=1e-12)
+    assert both[0] > 0 and both[1] >= after[1] >= 0.5

@@ -1,8 +1,9 @@
 """Can the verification fail? Small wrong changes to ``repro/``, each of which a case must catch: ``make mutants``.
 
 A mutant is a change of exact text; it is applied to a copy of the code, never to the code itself. Every case names
-mutants, and must fall short with each of them; a mutant that no case names, or that none of those catches, is run
-against all cases, the quick ones first, until one catches it. A mutant that survives is a missing test.
+mutants, and must fall short with each of them. A mutant is run against the cases that name it and then against all
+others, the quick ones first, until one catches it: a mutant that survives is a missing test. With ``--every`` it is run
+against all cases that name it, whichever catches it first.
 
 A case catches by a number out of its range, or by an error of ``repro.errors`` (a guard of the code that stops it).
 Whatever else stops a case, an ``AttributeError`` for instance, shows a broken mutant and catches nothing. No case knows
@@ -102,20 +103,24 @@ def mutated(mutant: Mutant, root: Path = ROOT) -> str:
 
 
 def plan(mutant: Mutant) -> tuple[list[str], list[str]]:
-    """(cases that name the mutant, all others, the quick ones first)."""
-    named = [case.id for case in CASES.values() if mutant.id in case.mutants]
-    others = sorted((case for case in CASES.values() if case.id not in named), key=lambda case: case.slow)
-    return named, [case.id for case in others]
+    """(cases that name the mutant, all others), the quick ones first."""
+    quick_first = sorted(CASES.values(), key=lambda case: case.slow)
+    named = [case.id for case in quick_first if mutant.id in case.mutants]
+    return named, [case.id for case in quick_first if case.id not in named]
 
 
-def hunt(mutant: Mutant) -> Hunt:
-    """Run the mutant against the cases that name it; if none catches it against all others, to the first catch."""
+def hunt(mutant: Mutant, every: bool = False) -> Hunt:
+    """Run the mutant against the cases that name it, then against all others, to the first catch; ``every``: against
+    all that name it."""
     named, others = plan(mutant)
+    trials = []
     with TemporaryDirectory(prefix="mutant-") as folder:
         copy(mutant, Path(folder))
-        trials = [trial(Path(folder), case) for case in named]
-        while others and not any(trial.caught for trial in trials):
-            trials.append(trial(Path(folder), others.pop(0)))
+        for case in named + others:
+            caught = any(trial.caught for trial in trials)
+            if caught and not (every and case in named):
+                break
+            trials.append(trial(Path(folder), case))
     return Hunt(mutant.id, tuple(trials))
 
 
@@ -163,7 +168,7 @@ def judged(result: Result) -> tuple[bool, str]:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Entry point; 0 if every mutant is caught and every case falls short with the mutants that it names."""
+    """Entry point; 0 if every mutant is caught, and no case that was run passes with a mutant that it names."""
     from verification.__main__ import load as load_cases
     load_cases()
     chosen = _parser().parse_args(arguments)
@@ -171,7 +176,7 @@ def main(arguments: list[str] | None = None) -> int:
     if unknown:
         print(f"mutants: there is no {', '.join(unknown)}; there are {', '.join(everything())}", file=sys.stderr)
         return 2
-    hunts = hunt_all(chosen.ids or everything(), chosen.jobs)
+    hunts = hunt_all(chosen.ids or everything(), chosen.jobs, chosen.every)
     if not chosen.ids:
         record(hunts)
     return 0 if judge(hunts) else 1
@@ -180,15 +185,16 @@ def main(arguments: list[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m verification.mutants", description=__doc__.splitlines()[0])
     parser.add_argument("ids", nargs="*", metavar="MUTANT", help="all by default")
+    parser.add_argument("--every", action="store_true", help="against every case that names it, not to the first catch")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes; one a core by default")
     return parser
 
 
-def hunt_all(ids: Iterable[str], jobs: int) -> list[Hunt]:
+def hunt_all(ids: Iterable[str], jobs: int, every: bool = False) -> list[Hunt]:
     """Hunts in the order of ``ids``, several side by side; a line or more each as it ends."""
     known, hunts = everything(), []
     with ThreadPoolExecutor(jobs) as pool:
-        for found in pool.map(hunt, [known[id] for id in ids]):
+        for found in pool.map(lambda id: hunt(known[id], every), ids):
             hunts.append(found)
             print("\n".join(_lines(found)), flush=True)
     return hunts

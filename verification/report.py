@@ -19,7 +19,7 @@ INTRODUCTION = (
     "Each case compares the implementation with a closed form, with a manufactured solution, with an independent code, "
     "or with what must be conserved. Verdicts follow from the numbers; orders are judged two-sidedly, between "
     "neighbours of a series of unrelated meshes. Each case names changes of the code (mutants) with which it must fall "
-    "short, and is run against them by `make mutants`.")
+    "short; `make mutants` runs each of these until a case catches it.")
 
 
 def table(results: list[Result]) -> str:

@@ -7,17 +7,16 @@ status is 0 when every claim has a verdict, whatever it is, and base is independ
 from __future__ import annotations
 
 import argparse
-import importlib
-import pkgutil
 import sys
 import traceback
 from pathlib import Path
 
 import numpy as np
 
-import verification.claims as package
 from repro.results import write_json, write_text
-from verification.claims import CLAIMS, EXPECTED, independence, report, runs
+from verification.claims import CLAIMS, EXPECTED, ClaimError, evaluate, independence, report, runs, written
+from verification.claims.bars import Numbers, barred
+from verification.claims.levels import Level
 from verification.claims.report import Independence, Row
 
 OUT = Path(__file__).parent / "out"
@@ -26,7 +25,7 @@ NO_VERDICT = "no verdict"
 
 def main(arguments: list[str] | None = None) -> int:
     """Entry point; returns the exit status."""
-    register_all()
+    evaluate.register_all()
     parser = argparse.ArgumentParser(prog="python -m verification.claims", description="Judge the paper's claims.")
     parser.add_argument("ids", nargs="*", metavar="ID", help="claims to judge, such as C07; all of them by default")
     chosen = parser.parse_args(arguments).ids
@@ -38,20 +37,14 @@ def main(arguments: list[str] | None = None) -> int:
     return judge(tuple(chosen) or EXPECTED, whole=not chosen)
 
 
-def register_all() -> None:
-    """Import every module of this package: each registers its claims."""
-    for module in pkgutil.iter_modules(package.__path__):
-        if module.name != "__main__":
-            importlib.import_module(f"{package.__name__}.{module.name}")
-
-
 def judge(ids: tuple[str, ...], whole: bool) -> int:
     """Judge claims and print them; with ``whole`` the independence of base too, and write the report."""
     np.seterr(all="raise", under="ignore")
-    prepare(ids, whole)
+    others = prepare([id for id in ids if id in CLAIMS], whole)
     rows = []
+    print(report.legend())
     for id in ids:
-        rows.append(judged(id))
+        rows.append(judged(id, others.get(id, {})))
         print(report.terminal(rows[-1]), flush=True)
     section = independent() if whole else None
     if section:
@@ -59,8 +52,8 @@ def judge(ids: tuple[str, ...], whole: bool) -> int:
     print(report.summary(rows))
     if whole:
         OUT.mkdir(exist_ok=True)
-        write_text(OUT / "claims.md", report.markdown(rows, section))
-        write_json(OUT / "claims.json", report.as_json(rows, section))
+        write_text(OUT / "claims.md", written.markdown(rows, section))
+        write_json(OUT / "claims.json", written.as_json(rows, section))
         print(f"written: {OUT / 'claims.md'} and claims.json")
     return status(rows, section, whole)
 
@@ -72,25 +65,34 @@ def status(rows: list[Row], section: Independence | None, whole: bool) -> int:
     return 0 if settled and independent_ else 1
 
 
-def prepare(ids: tuple[str, ...], whole: bool) -> None:
-    """Compute the runs that the claims ask for, side by side, the longest first."""
-    wanted = [run for id in ids if id in CLAIMS for run in CLAIMS[id].scenes] + list(independence.RUNS if whole else ())
-    distinct = sorted(dict.fromkeys(wanted), key=lambda run: (run[0] != "wide", run != independence.STRICT))
-    print(f"claims: {len(distinct)} runs are computed, or taken from {runs.CACHE.name}/", file=sys.stderr, flush=True)
+def prepare(ids: list[str], whole: bool) -> dict[str, dict[Level, Numbers | str]]:
+    """Compute the runs that the claims ask for, then the claims' numbers at all levels but the default."""
+    wanted = evaluate.scenes(ids) + [runs.scene(*run) for run in (independence.RUNS if whole else ())]
+    told(f"{len(set(map(runs.target, wanted)))} runs are computed, or taken from {runs.CACHE.name}/")
     try:
-        runs.compute(distinct)
+        evaluate.compute(wanted)
     except Exception as error:
-        print(f"claims: a run failed, what needs it will say so: {type(error).__name__}: {error}", file=sys.stderr)
+        told(f"a run failed, what needs it will say so: {type(error).__name__}: {error}")
+    told("the claims' numbers are computed with other meshes and time steps")
+    return evaluate.elsewhere(ids)
 
 
-def judged(id: str) -> Row:
+def told(text: str) -> None:
+    """Say how far it is."""
+    print(f"claims: {text}", file=sys.stderr, flush=True)
+
+
+def judged(id: str, others: dict[Level, Numbers | str]) -> Row:
     """The row of one claim; whatever goes wrong is in it, and on the screen."""
     if id not in CLAIMS:
         return Row(id, None, None, NO_VERDICT, "no module computes it")
     claim, finding = CLAIMS[id], None
     try:
-        finding = claim.function()
-        return Row(id, claim, finding, finding.verdict)
+        finding = claim.function().told()
+        if errors := [found for found in others.values() if isinstance(found, str)]:
+            raise ClaimError("; ".join(errors))
+        finding = barred(claim, finding, others)
+        return Row(id, claim, finding, finding.verdict, others=others)
     except Exception as error:
         traceback.print_exc()
         return Row(id, claim, finding, NO_VERDICT, f"{type(error).__name__}: {error}")

@@ -6,8 +6,9 @@ import numpy as np
 import shapely
 
 from verification.claims import Finding, at_least, at_most, between, claim
-from verification.claims.mass_balance import FEW, FEW_WORDS
-from verification.claims.runs import BASE, PLATES, WIDE, at, before_expansion, fields_at, scene, series
+from verification.claims.accuracy import FEW, FEW_WORDS
+from verification.claims.levels import WIDE_SIZES
+from verification.claims.runs import BASE, PLATES, WIDE, at, before_expansion, fields_at, nearest, scene, series
 from verification.claims.states import growth_rate, saved_mesh
 
 END = 19.4
@@ -22,14 +23,14 @@ def grown_not_expanded():
 @claim("C10", "4, Plate 1", "fastest growth on the upgradient side, slowest on the wall between centre and "
        "downgradient side", "python -m verification.claims C10", (PLATES,))
 def extremes() -> Finding:
-    """Places of the largest and the smallest growth rate over the aggregate's nodes."""
+    """Places of the largest and the smallest growth rate over the aggregate's nodes; x = 0 is the seed's centre."""
     grid, rate = grown_not_expanded()
     body = grid.body
     fast, slow = body[np.argmax(rate[body])], body[np.argmin(rate[body])]
     (x_fast, y_fast), (x_slow, y_slow) = grid.points[fast], grid.points[slow]
     first, last = (f(grid.points[body, 0]) for f in (min, max))
-    checks = (between("x of the fastest growth (um)", "upgradient side", x_fast, first, 0.0, "the words"),
-              between("x of the slowest growth (um)", "centre to downgradient side", x_slow, 0.0, last, "the words"),
+    checks = (at_most("x of the fastest growth (um)", "upgradient side", x_fast, 0.0, "the words"),
+              at_least("x of the slowest growth (um)", "centre to downgradient side", x_slow, 0.0, "the words"),
               between("y of the slowest growth (um)", "on the wall", y_slow, 0.0, 0.0, "the words"))
     note = (f"The aggregate reaches from {first:.1f} to {last:.1f} um; the rate is largest, {rate[fast]:.4f} 1/h, at "
             f"({x_fast:.1f}, {y_fast:.1f}), and smallest, {rate[slow]:.4f} 1/h, at ({x_slow:.1f}, {y_slow:.1f}).")
@@ -79,12 +80,12 @@ def _expansion(grid, theta: np.ndarray, half: np.ndarray) -> float:
 
 
 @claim("C12", "4, Fig 6", "after the pore is spanned, growth is strongly asymmetric, on the upgradient side only",
-       "python -m verification.claims C12", (WIDE,))
+       "python -m verification.claims C12", (WIDE,), sizes=WIDE_SIZES)
 def upgradient_only() -> Finding:
     """Share of the new area, and of the biomass made, upgradient of the seed's centre, at the end of `wide`."""
     rows = series(*WIDE)
     end, contact = float(rows["time_h"][-1]), float(rows["time_h"][rows["contact"] == 1][0])
-    late, since = (_upgradient_share(first, end) for first in (end - 5, contact))
+    late, since = (_upgradient_share(first, end) for first in (nearest(WIDE, end - 5), contact))
     saved = fields_at(WIDE, end)
     up, down = _made(_wide_mesh(end), growth_rate(scene(*WIDE), saved))
     bound = "95 %, set beforehand"

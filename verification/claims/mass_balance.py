@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from repro.results import read_table
-from verification.claims import Finding, at_least, at_most, between, claim, near
+from verification.claims import Finding, at_least, at_most, between, claim, near, without_limit
+from verification.claims.accuracy import FEW, FEW_WORDS
+from verification.claims.levels import ALONE
 from verification.claims.runs import BASE, LAST, PLATES, at, fields_at, folder, scene, series
 from verification.claims.states import full_biomass, half_disc, saved_mesh, solution
 
 PAPER_CORRECTION = 1.016
-#: "A few percent", here and in other claims.
-FEW, FEW_WORDS = 0.05, "a few percent: up to five"
 SUBSTRATES, RATIOS = ("acceptor", "donor"), ("dM_X/dM_CA", "dM_X/dM_CD", "dM_CA/dM_CD")
 PLOTTED = 19.2
 
@@ -28,6 +28,9 @@ def supplied(value: str) -> tuple[str, ...]:
     return tuple(f'substrates.{name}.supply="{value}"' for name in SUBSTRATES)
 
 
+#: Why other steps are no measure of these numbers, or of others.
+BOOKED = "the update of 12 min is the paper's, and what this balance makes of it is asked"
+STILL = "nothing moves in it"
 #: A coarser mesh, with the constant of (27) in the stabilisation of the flow: what the paper may have had [E13].
 ROUGH = ("numerics.refinement=0.7", "numerics.flow_stabilisation=12")
 #: Base with twice the supply.
@@ -78,7 +81,7 @@ def bookkeeping(run) -> Bookkeeping:
 
 
 @claim("C13", "4", "mass balance from effluents within a few percent; 1.6 % on the effluents brings all ratios within "
-       "1 %", "python -m verification.claims C13", (BASE,))
+       "1 %", "python -m verification.claims C13", (BASE,), steps=ALONE, fixed=BOOKED)
 def papers_bookkeeping() -> Finding:
     """The correction that the paper's bookkeeping needs in each step of base, and its ratios with its own of 1.6 %."""
     book = bookkeeping(BASE)
@@ -147,8 +150,9 @@ def refined_balance() -> Finding:
     radii = {"t = 0": scene(*BASE).aggregate.radius, "19.2 h": at(BASE, PLOTTED)["thickness_um"]}
     scenes = [scene("base", f"numerics.refinement={fineness}") for fineness in (0.5, 1.0, 2.0)]
     lost = {when: np.array([carried_by_u(said, radius) for said in scenes]) for when, radius in radii.items()}
-    checks = tuple(at_least(f"fall of the {name} defect per halving, {when} (times)", "improves",
-                            np.min(row[:-1] / row[1:]), 2, "first order at least: halved with the mesh size")
+    checks = tuple(without_limit(at_least(f"fall of the {name} defect per halving, {when} (times)", "improves",
+                                          np.min(row[:-1] / row[1:]), 2,
+                                          "first order at least: halved with the mesh size"))
                    for when, rows in lost.items() for name, row in zip(SUBSTRATES, rows.T))
     closed = max(np.abs(series(*BASE)[f"{name}_balance"]).max() for name in SUBSTRATES)
     change = (f"advected with u, as the paper writes it; the default advects with w = u - tau grad p and closes to "
@@ -159,11 +163,11 @@ def refined_balance() -> Finding:
 
 
 @claim("C34", "4", "at early times C_supply - C_effluent is comparable to its numerical error",
-       "python -m verification.claims C34")
+       "python -m verification.claims C34", steps=ALONE, fixed=STILL)
 def early_drop() -> Finding:
     """Error of the effluents around the seed over C_supply - C_effluent: the paper's own 1.6 %, and ours.
 
-    Ours is against the limit of meshes of sizes 1 and 1/2 (second order).
+    Ours is against the limit of meshes of sizes 1 and 1/2 (second order), and belongs to its mesh.
     """
     said, fine = scene("base"), scene("base", "numerics.refinement=2")
     radius = said.aggregate.radius
@@ -174,6 +178,7 @@ def early_drop() -> Finding:
     checks = [between(f"{whose} of the {name} effluent over its drop, t = 0", "comparable", value, 1 / 3, 3,
                       "comparable: within a factor of three")
               for whose, error in errors.items() for name, value in zip(SUBSTRATES, error / drop)]
+    checks[2:] = map(without_limit, checks[2:])
     lost = 100 * carried_by_u(scene("base", *ROUGH), radius) * exact / drop
     reason = (f"1.6 % of the effluents does exceed their drop around the seed, {drop[0]:.3f} and {drop[1]:.3f} K_s; "
               f"but our error falls with the uptake, and so does what advection by u loses: with tau = h^2 / (12 nu) "
@@ -182,24 +187,29 @@ def early_drop() -> Finding:
 
 
 @claim("C15", "4", "a higher influent concentration leaves the amounts consumed about the same",
-       "python -m verification.claims C15", (BASE, PLATES, RICH))
+       "python -m verification.claims C15", (BASE, PLATES), words=(RICH,))
 def richer_supply() -> Finding:
     """Consumption of both substrates at 20 K_s over that at 10 K_s, in the shape that the paper plots."""
-    poor, rich, richest = (_plotted_fluxes(changes) for changes in ((), supplied("20 mg/L"), supplied("40 mg/L")))
+    poor, rich = (_plotted_fluxes(changes) for changes in ((), supplied("20 mg/L")))
     amounts = [b.consumed / a.consumed for a, b in zip(poor, rich)]
     shares = [more * a.supplied / b.supplied for more, a, b in zip(amounts, poor, rich)]
     checks = [near(f"{name} consumed at 20 K_s over 10 K_s", "about the same", more, 1, absolute=FEW, why=FEW_WORDS)
               for name, more in zip(SUBSTRATES, amounts)]
     checks += [at_most(f"share of the {name} consumed, 20 K_s over 10 K_s", "smaller", less, 1, "the words")
                for name, less in zip(SUBSTRATES, shares)]
-    row, more = at(BASE, PLOTTED), at(RICH, PLOTTED)
+    row = at(BASE, PLOTTED)
     m_a, m_d = (row[f"{name}_min_mg_per_L"] / (1 + row[f"{name}_min_mg_per_L"]) for name in SUBSTRATES)
     reason = (f"base is not in the zero-order range at 19.2 h: m_A = {m_a:.2f} and m_D = {m_d:.2f} at its lowest "
               f"concentrations, so that uptake there stands at {100 * m_a * m_d:.0f} % of its most and can rise")
-    larger = more["aggregate_area_um2"] / row["aggregate_area_um2"]
-    note = (f"From 20 to 40 K_s: {100 * (richest[0].consumed / rich[0].consumed - 1):+.1f} % for the acceptor. With "
-            f"20 K_s from t = 0 the aggregate of 19.2 h is {larger:.2f} times as large, having grown faster all along.")
-    return Finding(tuple(checks), reason=reason, note=note)
+    return Finding(tuple(checks), reason=reason, note=_richer)
+
+
+def _richer() -> str:
+    """What more supply does besides, in words."""
+    rich, richest = (_plotted_fluxes(supplied(value))[0].consumed for value in ("20 mg/L", "40 mg/L"))
+    larger = at(RICH, PLOTTED)["aggregate_area_um2"] / at(BASE, PLOTTED)["aggregate_area_um2"]
+    return (f"From 20 to 40 K_s: {100 * (richest / rich - 1):+.1f} % for the acceptor. With 20 K_s from t = 0 the "
+            f"aggregate of 19.2 h is {larger:.2f} times as large, having grown faster all along.")
 
 
 def _plotted_fluxes(changes: tuple[str, ...]):

@@ -9,6 +9,7 @@ import numpy as np
 from repro import geometry, mesh
 from repro.pore import film
 from verification.claims import Finding, at_least, at_most, claim, near
+from verification.claims.levels import ALONE, WIDE_SIZES
 from verification.claims.runs import WIDE, scene, series
 from verification.claims.states import flow_in, half_disc
 
@@ -22,7 +23,7 @@ def clean(said) -> float:
 
 
 @claim("C16", "4, 2.1", "conductivity falls sharply when the aggregate spans the pore",
-       "python -m verification.claims C16", (WIDE,))
+       "python -m verification.claims C16", (WIDE,), sizes=WIDE_SIZES)
 def spanning() -> Finding:
     """Conductivity of `wide` through contact, of half-discs up to a 2 um film, and of a plug of length 2 W."""
     rows = series(*WIDE)
@@ -73,7 +74,7 @@ def plug(said, length: float) -> tuple[float, float]:
 
 
 @claim("C17", "2.1", "lambda = 2000 allows a permeability reduction of up to 2000 (pore filled over its length)",
-       "python -m verification.claims C17")
+       "python -m verification.claims C17", steps=ALONE, fixed="nothing moves in it")
 def filled() -> Finding:
     """Clean over filled conductivity, biomass in every triangle of the whole pore, at the default mesh."""
     said = scene("flow_only")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 
@@ -13,17 +12,16 @@ from repro.reprojection import interpolate
 from repro.scene import Scene
 from repro.transport import Concentrations
 from verification.claims import Finding, at_most, claim, near
+from verification.claims.accuracy import FEW, FEW_WORDS, TRANSPORT, TRANSPORT_WORDS
+from verification.claims.levels import cached
 from verification.claims.restored import remeshed, solved_pore
 from verification.claims.runs import BASE, scene
 
 PLOTTED = 19.2
-#: The paper's own measures of accuracy: of its transport (3.3.2), and "a few percent" (4), in percent.
-TRANSPORT, FEW = 0.1, 5.0
-ACCURATE = "0.1 %, the paper's accuracy of transport"
 PARTS = 64
 
 
-@cache
+@cached
 def whole_pore(*changes: str) -> tuple[Scene, Pore, Solved]:
     """The aggregate of base at 19.2 h in a mesh of the whole pore, at the same mean velocity, solved.
 
@@ -51,9 +49,9 @@ def upstream_profile() -> Finding:
         law = law_26(x, across[0].mean(), solved.flow.mean_velocity / substrate.diffusivity)
         bend = np.ptp(across, axis=1)
         checks += [at_most(f"{name}: error of (26) for the mean of a section (% of the supply)", "describes it",
-                           np.abs(across.mean(axis=1) - law).max(), TRANSPORT, ACCURATE),
+                           np.abs(across.mean(axis=1) - law).max(), 100 * TRANSPORT, TRANSPORT_WORDS),
                    at_most(f"{name}: largest range within a section (% of the supply)", "isolines perpendicular",
-                           bend.max(), FEW, "a few percent")]
+                           bend.max(), 100 * FEW, FEW_WORDS)]
         parts.append(f"{name} {bend[0]:.2g} % 1 W from the aggregate, {bend[-1]:.2g} % at the pore's inlet")
     return Finding(tuple(checks), note="Range within a section: " + "; ".join(parts) + ". There (11) with the local "
                    "u_x bends the isolines [E4].")
@@ -88,9 +86,9 @@ def downgradient_end() -> Finding:
     rate = said.flow.mean_velocity / said.substrates.acceptor.diffusivity
     decay = np.log(effects[1] / effects[2]) / (0.5 * (LENGTHS[2] - LENGTHS[1])) / rate
     checks = (at_most("uptake, (12) put at the end of the meshed part: change (%)", "not affected",
-                      apart(uptake(*central), uptake(*full)), TRANSPORT, ACCURATE),
-              at_most("uptake, any value held at the end of 600 um: change (%)", "not affected", effects[0], FEW,
-                      "a few percent"),
+                      apart(uptake(*central), uptake(*full)), 100 * TRANSPORT, TRANSPORT_WORDS),
+              at_most("uptake, any value held at the end of 600 um: change (%)", "not affected", effects[0],
+                      100 * FEW, FEW_WORDS),
               near("its decay with the pore's length, over u_ave / D_A", "if long enough", decay, 1.0, relative=0.05,
                    why="(25): exp(-u x / D) upstream; 5 %, since the donor's part fades sooner"))
     told = ", ".join(f"{effect:.2g} % at {length:g} um" for effect, length in zip(effects, LENGTHS))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cache
 
 import meshio
 import numpy as np
@@ -13,6 +12,7 @@ from repro.mesh import PoreMesh
 from repro.pore import Pore, Solved, solve
 from repro.scene import Scene
 from repro.transport import Concentrations
+from verification.claims.levels import cached
 from verification.claims.runs import fields, row_number, scene, series
 from verification.claims.states import saved_mesh
 
@@ -81,7 +81,7 @@ def pore(run: tuple[str, ...], time: float) -> Pore:
                 found.node("pressure_MPa") / modulus, state)
 
 
-@cache
+@cached
 def solved_pore(run: tuple[str, ...], time: float) -> tuple[Pore, Solved]:
     """The pore of a run at a time (h) and what is solved in it."""
     now = pore(run, time)
@@ -111,7 +111,7 @@ def equivalent(stresses: np.ndarray) -> np.ndarray:
     return np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3 * xy**2)
 
 
-@cache
+@cached
 def bodies(run: tuple[str, ...]) -> tuple[Body, ...]:
     """The aggregate in every row of a run."""
     return tuple(read_body(fields(run, k), scene(*run).pore.width) for k in range(len(series(*run)["time_h"])))

@@ -1,0 +1,225 @@
+"""A pore averaged over its cross-sections: flow, substrates and growth in one dimension, by FiPy and scipy.
+
+An aggregate of height h(x) lies on the lower wall of the channel 0 < y < W, -L/2 < x < L/2. What follows is the limit
+of an aggregate that is long against W and takes up little over its height; the next terms are as the squares of its
+slope and of its transverse Thiele number h sqrt(X q / (D C)).
+
+*Flow* is fully developed in each section, between two layers (:mod:`reference.layered_channel`): with the mean velocity
+u of the open channel, the flux u W is the same everywhere and the loss is the integral of G(h) dx (lubrication).
+
+*Substrates* are constant over a section. With the flux u W C, steady,
+
+    (u W C)' = ((D (W - h) + D_B h) C')' - X h q(C_A, C_D),   u W C - D W C' = u W C_s at -L/2,   C' = 0 at L/2
+
+in FiPy's finite volumes, as in :mod:`reference.channel_fipy` (FiPy's outlet passes nothing unless the gradient is
+constrained there); the uptake is added cell by cell and the whole solved by Newton's method.
+
+*Growth.* a and i are X_A and X_I in the material of a cell, over X_m and per volume at t = 0: a' = a r_A(C),
+i' = a r_I(C), (9)-(10); its area grows by theta = a + i. A thin strip that slides on its wall bears no stress,
+sigma_xx = sigma_yy = 0, so that both its stretches are sqrt(theta), cell by cell, and x = 0 stays. An aggregate that
+keeps its shape, as a half-disc nearly does, stretches by the root of the mean theta, its biomass spread evenly.
+
+Units: any that agree. Pairs are of the acceptor and the donor.
+"""
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import scipy.sparse as sp
+from fipy import CellVariable, CentralDifferenceConvectionTerm, DiffusionTerm, Grid1D
+from scipy.integrate import solve_ivp
+from scipy.optimize import root
+from scipy.sparse.linalg import spsolve
+
+from reference import layered_channel
+from reference.channel_bvp import uptake
+
+RESTS, MOST, NUDGE = 1e-13, 50, 1e-6
+#: Parts of a step of Newton's method that are tried; the whole one where none lowers the defect: it is round-off then.
+PARTS = 0.5 ** np.arange(10)
+
+
+@dataclass(frozen=True)
+class Pore:
+    """width, length: W, L; ratio: lambda; supply, diffusivity, in_biomass: pairs; density: X_m; rates: dict of k, F,
+    decay = d_c f_d b, K_A, K_D, Y, b, remains = b (1 - f_d); speed: mean velocity from (loss of the whole pore per mean
+    velocity, without nu/g; half the length of the aggregate)."""
+
+    width: float
+    length: float
+    ratio: float
+    supply: tuple[float, float]
+    diffusivity: tuple[float, float]
+    in_biomass: tuple[float, float]
+    density: float
+    rates: dict[str, float]
+    speed: Callable[[float, float], float]
+
+
+@dataclass(frozen=True)
+class Moment:
+    """The pore at one time: x (n,) middles of the cells, fields (2, n) C_A and C_D; velocity; area of the aggregate and
+    x of its ends."""
+
+    time: float
+    x: np.ndarray
+    fields: np.ndarray
+    velocity: float
+    area: float
+    ends: tuple[float, float]
+
+
+def half_ellipse(half_length, thickness, cells):
+    """(lengths (n,), heights (n,)) of equal cells of a half-ellipse around x = 0, mean heights: the area is exact."""
+    s = np.linspace(-1.0, 1.0, cells + 1)
+    below = 0.5 * (s * np.sqrt(1 - s**2) + np.arcsin(s))
+    return half_length * np.diff(s), thickness * np.diff(below) / np.diff(s)
+
+
+class Section:
+    """One geometry: an aggregate of cells ``lengths`` and ``heights`` (n,) from x = left on, and ``fluid`` equal cells
+    before and behind it."""
+
+    def __init__(self, pore, left, lengths, heights, fluid):
+        self.pore, self.inside = pore, slice(fluid, fluid + len(lengths))
+        self.ends = left, left + lengths.sum()
+        before, behind = (np.full(fluid, (pore.length / 2 + gap) / fluid) for gap in (left, -self.ends[1]))
+        self.lengths = np.concatenate([before, lengths, behind])
+        self.heights = np.concatenate([np.zeros(fluid), heights, np.zeros(fluid)])
+        loss = float(self.lengths @ layered_channel.gradient(pore.width, self.heights, pore.ratio))
+        self.velocity = pore.speed(loss, (self.ends[1] - self.ends[0]) / 2)
+        self.mesh = Grid1D(dx=self.lengths)
+        self.x = np.array(self.mesh.cellCenters.value[0]) - pore.length / 2
+        carried = self.velocity * pore.width * _unit_flux(len(self.lengths))
+        spreads = [self._spread(*pair) for pair in zip(pore.diffusivity, pore.in_biomass)]
+        self.transport = sp.block_diag([carried + spread for spread in spreads], "csr")
+        self.source = np.zeros((2, len(self.lengths)))
+        self.source[:, 0] = self.velocity * pore.width * np.array(pore.supply)
+
+    def _spread(self, water, biomass):
+        """FiPy's matrix of diffusion."""
+        section = water * (self.pore.width - self.heights) + biomass * self.heights
+        coefficient = CellVariable(mesh=self.mesh, value=section).harmonicFaceValue
+        return _matrix(-DiffusionTerm(coeff=coefficient), self.mesh)
+
+    def steady(self, active, start=None):
+        """(2, n) concentrations at rest; active: X_A of the aggregate's cells (K,); start: a first iterate."""
+        weight = np.zeros(len(self.lengths))
+        weight[self.inside] = (self.lengths * self.heights)[self.inside] * active
+        fields = np.repeat(self.pore.supply, len(weight)).reshape(2, -1) if start is None else start
+        for _ in range(MOST):
+            defect, size = self._defect(weight, fields)
+            if (np.abs(defect) <= RESTS * size).all():
+                return fields
+            blocks = [[sp.diags_array(weight * slope) for slope in row] for row in _slopes(fields, self.pore.rates)]
+            step = spsolve(sp.csc_array(self.transport + sp.block_array(blocks)), defect).reshape(2, -1)
+            fields = fields + step * next((part for part in PARTS if self._falls(weight, fields, part * step)), 1.0)
+        raise RuntimeError(f"the finite volumes do not come to rest: {(np.abs(defect) / size).max():.2g} are left")
+
+    def _falls(self, weight, fields, step):
+        return np.abs(self._defect(weight, fields + step)[0]).sum() < np.abs(self._defect(weight, fields)[0]).sum()
+
+    def _defect(self, weight, fields):
+        """What the cells still lack of rest, and the size of its terms."""
+        sinks = weight * np.stack(uptake(*fields, self.pore.rates))
+        size = (self.source + np.abs(sinks)).ravel() + abs(self.transport) @ np.abs(fields.ravel())
+        return (self.source - sinks).ravel() - self.transport @ fields.ravel(), size
+
+
+def _matrix(term, mesh):
+    """FiPy's matrix of a term, the gradient at the outlet being zero."""
+    field = CellVariable(mesh=mesh, value=1.0)
+    field.faceGrad.constrain([0.0], where=mesh.facesRight)
+    term.cacheMatrix()
+    term.justResidualVector(var=field)
+    return sp.csr_matrix(term.matrix.matrix)
+
+
+@cache
+def _unit_flux(cells):
+    """FiPy's matrix of advection by a flux of one; central differences know nothing of the cells' lengths."""
+    return _matrix(CentralDifferenceConvectionTerm(coeff=(1.0,)), Grid1D(nx=cells, dx=1.0))
+
+
+def _slopes(fields, rates):
+    """(2, 2, ...) derivatives of (q_A, q_D), the rows, by (C_A, C_D), fields (2, ...), by central differences."""
+    shifts = NUDGE * np.eye(2).reshape(2, 2, *[1] * (fields.ndim - 1))
+    columns = [np.stack(uptake(*(fields + d), rates)) - np.stack(uptake(*(fields - d), rates)) for d in shifts]
+    return np.stack(columns, axis=1) / (2 * NUDGE)
+
+
+class Averaged:
+    """The run of a seed, cells ``lengths`` and ``heights`` (n,); fluid: cells on each side of it; keeps_shape: is it no
+    strip?"""
+
+    def __init__(self, pore, lengths, heights, fluid, keeps_shape):
+        self.pore, self.lengths, self.heights, self.fluid = pore, lengths, heights, fluid
+        self.areas, self.keeps_shape, self.fields = lengths * heights, keeps_shape, None
+
+    def seed(self):
+        """The moment at t = 0."""
+        return self._moment(0.0, self._start())
+
+    def run(self, times, accuracy=1e-6):
+        """The moments at ``times``, ascending, the last of them after t = 0."""
+        found = solve_ivp(self._rise, (0.0, times[-1]), self._start(), method="DOP853", t_eval=times,
+                          rtol=accuracy, atol=accuracy)
+        return [self._moment(time, state) for time, state in zip(found.t, found.y.T)]
+
+    def _start(self):
+        return np.concatenate([np.ones_like(self.areas), np.zeros_like(self.areas)])
+
+    def _alike(self, values):
+        """Of each cell; or the mean over the aggregate, if it keeps its shape."""
+        return np.full_like(values, self.areas @ values / self.areas.sum()) if self.keeps_shape else values
+
+    def _solved(self, state):
+        """The section, with the concentrations kept in ``fields``, and theta."""
+        active, inert = state.reshape(2, -1)
+        theta = active + inert
+        lengths, heights = np.sqrt(theta) * self.lengths, np.sqrt(theta) * self.heights
+        section = Section(self.pore, -lengths[: len(lengths) // 2].sum(), lengths, heights, self.fluid)
+        self.fields = section.steady(self.pore.density * active / theta, self.fields)
+        return section, theta
+
+    def _rise(self, _, state):
+        section, _ = self._solved(state)
+        rates, active = self.pore.rates, state[: len(self.areas)]
+        m_a, m_d = (c[section.inside] / (c[section.inside] + rates[key]) for c, key in zip(self.fields, ("K_A", "K_D")))
+        growth, remains = m_a * (rates["k"] * rates["Y"] * m_d - rates["b"]), m_a * rates["remains"]
+        return np.concatenate([self._alike(active * growth), self._alike(active * remains)])
+
+    def _moment(self, time, state):
+        section, theta = self._solved(state)
+        return Moment(time, section.x, self.fields, section.velocity, float(self.areas @ theta), section.ends)
+
+
+def constriction(radius, width, modes=80, points=400):
+    """K: what a half-disc that takes up evenly lacks, in the mean over it, against its section's means.
+
+    Green's function of -lap in the strip, less that of the mean over the section, is the sum over n >= 1 of
+    cos(n pi y/W) cos(n pi y'/W) exp(-n pi |x - x'|/W) / (n pi); K A is its integral over the half-disc, twice, and for
+    an uptake X q in biomass of the fluid's diffusivity the lack is K X q / D.
+    """
+    s, weight = np.polynomial.legendre.leggauss(points)
+    x, height = radius * np.sin(np.pi / 2 * s), radius * np.cos(np.pi / 2 * s)
+    apart, total = np.abs(x[:, None] - x), 0.0
+    for k in np.arange(1, modes + 1) * np.pi / width:
+        column = np.pi / 2 * weight * height * np.sin(k * height) / k
+        total += column @ np.exp(-k * apart) @ column / (k * width)
+    return total / (np.pi / 2 * radius**2)
+
+
+def excess(pore, radius, velocity):
+    """(2,) what the effluents of a half-disc exceed those of its averaged pore by, in first order in 1 / D.
+
+    Mixed to c, both models have u W (C_s - c) = X A q(c). The uptake of the true pore is that at c - K X q / D; the
+    balance, linear around c, gives (u W + X A q') excess = X A q' (K X q / D).
+    """
+    supply, uptaken = np.array(pore.supply), pore.density * np.pi / 2 * radius**2
+    carried = velocity * pore.width
+    mixed = root(lambda c: carried * (supply - c) - uptaken * np.array(uptake(*c, pore.rates)), supply, tol=1e-13).x
+    lack = constriction(radius, pore.width) * pore.density * np.array(uptake(*mixed, pore.rates)) / pore.diffusivity
+    slopes = uptaken * _slopes(mixed, pore.rates)
+    return np.linalg.solve(carried * np.eye(2) + slopes, slopes @ lack)

@@ -1,0 +1,92 @@
+"""Mesh motion (35) without its pressure, by quadratic elements on curved triangles, on meshes of its own.
+
+The second equation of (35), gamma P = -div d, put into the first leaves the displacement d alone:
+
+    (grad d, grad v) + 1/gamma (div d, div v) = 0   for all v,
+
+which needs no stabilisation. d is given on the aggregate; d_y = 0 on the walls and d_x = 0 at inlet and outlet, the
+other component free. This is Navier's equation with (lambda + mu) / mu = 1/gamma: Kolosov's kappa is 1 + 2 gamma.
+
+**Corners.** At inlet and outlet, and where the aggregate meets the wall at a right angle, mirror images in the lines on
+which the displacement slides continue it smoothly. Where the fluid has another angle w at the wall, the mirror image
+makes a wedge of angle 2 w held on both sides; its displacements r^z, even along the wall, are those of
+
+    sin(2 w z) = z / kappa sin(2 w),
+
+by u = kappa A s^z - z A s conj(s)^(z-1) - B conj(s)^z = 0 on s = r exp(i w), A and B real (Muskhelishvili).
+
+**Meshes.** The fluid around an arc that stands on the lower wall is a grid of lines from the arc to the other sides of
+the channel, parts x parts to each of the three, its squares halved, middles of edges on the same map.
+"""
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+from skfem import Basis, BilinearForm, ElementTriP2, ElementVector, MeshTri, MeshTri2, condense, solve
+from skfem.helpers import ddot, div, grad
+
+#: Powers by which the grid is drawn towards the aggregate, and towards the two points where it meets the wall.
+TOWARDS_ARC, TOWARDS_WALL = 2.0, 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Displacement (K, 2) at the quadrature points (K, 2) of the fluid, and their weights (K,); displacement (m, 2) at
+    nodes (m, 2) of the straight line from the arc to the channel's upper right corner."""
+
+    points: np.ndarray
+    displacement: np.ndarray
+    weights: np.ndarray
+    line: np.ndarray
+    on_line: np.ndarray
+
+
+def follow(radius, angle, width, end, parts, gamma, motion):
+    """:class:`Motion` of the fluid of -end < x < end, 0 < y < width around an arc of ``radius`` that meets the lower
+    wall at the contact ``angle`` (radians; pi/2: a half-disc), when the arc moves by motion(x, y), (2, n)."""
+    mesh, line = _mesh(radius, angle, width, end, parts)
+    basis = Basis(mesh, ElementVector(ElementTriP2()), intorder=5)
+    A = BilinearForm(lambda u, v, w: ddot(grad(u), grad(v)) + div(u) * div(v) / gamma).assemble(basis)
+    held, value = _boundary(basis, radius, angle, width, end, motion)
+    found = solve(*condense(A, x=value, D=held))
+    points, field = (np.asarray(f).reshape(2, -1).T for f in (basis.global_coordinates(), basis.interpolate(found)))
+    nodes = basis.nodal_dofs[:, line]
+    return Motion(points, field, basis.dx.ravel(), basis.doflocs[:, nodes[0]].T, found[nodes].T)
+
+
+def exponent(fluid_angle, gamma):
+    """z of the displacement r^z at a wall that the fluid meets at an angle (radians) between pi/2 and pi: 1/2 to 1."""
+    opening, kappa = 2 * fluid_angle, 1 + 2 * gamma
+    return brentq(lambda z: np.sin(opening * z) - z / kappa * np.sin(opening), np.pi / opening, 1 - 1e-9)
+
+
+def _mesh(radius, angle, width, end, parts):
+    """The strip 0 < t < 3, 0 < s < 1 in graded squares, halved, mapped by :func:`_placed`; middles of edges too.
+
+    And the nodes at t = 1."""
+    side = np.linspace(0, 1, parts + 1)
+    along = np.concatenate([side**TOWARDS_WALL, 1 + side[1:-1], 3 - side[::-1] ** TOWARDS_WALL])
+    flat = MeshTri.init_tensor(along, side**TOWARDS_ARC)
+    where = _placed(*Basis(flat, ElementTriP2()).doflocs, radius, angle, width, end)
+    return MeshTri2(where, flat.t), np.flatnonzero(flat.p[0] == 1)
+
+
+def _placed(t, s, radius, angle, width, end):
+    """(2, n) places: s = 0 on the arc, s = 1 on the channel's sides, of which t from 0 to 1 is the right one, from 1 to
+    2 the upper, from 2 to 3 the left one, and linear in s between."""
+    turn = np.pi / 2 + angle * np.interp(t, [0, 1, 2, 3], [-1, -0.5, 0.5, 1])
+    arc = radius * np.array([np.cos(turn), np.sin(turn) - np.cos(angle)])
+    arc[1, (t == 0) | (t == 3)] = 0.0
+    rim = np.array([np.interp(t, [1, 2], [end, -end]), np.interp(t, [0, 1, 2, 3], [0, width, width, 0])])
+    return (1 - s) * arc + s * rim
+
+
+def _boundary(basis, radius, angle, width, end, motion):
+    """Numbers of the prescribed unknowns, and all values (zero elsewhere)."""
+    (x, y), component, near = basis.doflocs, np.arange(basis.N) * 0, 1e-9 * width
+    component[np.concatenate([basis.nodal_dofs[1], basis.facet_dofs[1]])] = 1
+    arc = np.abs(np.hypot(x, y + radius * np.cos(angle)) - radius) < near
+    wall, ends = (y < near) | (y > width - near), np.abs(x) > end - near
+    held = arc | np.where(component == 1, wall, ends)
+    value = np.where(arc, np.choose(component, motion(x, y)), 0.0)
+    return np.flatnonzero(held), value

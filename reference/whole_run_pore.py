@@ -1,0 +1,169 @@
+"""Flow and substrates around the aggregate of a whole run: Taylor-Hood elements and quadratic concentrations.
+
+Flow (1)-(5) of mean velocity one, in the Laplacian form [E2], nu = 1 in the fluid and lambda in the aggregate,
+
+    (nu grad u, grad v) - (p, div v) = 0,    (q, div u) = 0
+
+with quadratic velocity, and linear pressures of their own on each side of the interface, where p jumps. Substrates
+(7)-(13), quasi-steady, with quadratic concentrations, u_x in (11) being the local one [E4]:
+
+    (D grad C, grad v) + (u . grad C, v) + <u_x (C - C_supply), v>_inlet + (X_A q, v)_aggregate = 0
+
+div u = 0 holds in the mean only, so that supplied = out + consumed does not hold exactly: what is missing measures the
+error. q is that of :mod:`reference.monod`. Lengths in um, times in h, concentrations in mg/L.
+"""
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import splu
+from skfem import (
+    Basis,
+    BilinearForm,
+    ElementTriP1,
+    ElementTriP2,
+    FacetBasis,
+    Functional,
+    LinearForm,
+    asm,
+    bmat,
+    condense,
+    solve,
+)
+from skfem.helpers import dot, grad
+
+from reference.monod import NUDGE, uptake
+
+#: Newton stops at this change of C over the supply, and is given up after that many steps.
+SMALL, MOST = 1e-10, 30
+#: Orders of quadrature on triangles and on the ends.
+ORDER, END_ORDER = 6, 6
+
+
+@dataclass(frozen=True, eq=False)
+class Flow:
+    """Mean velocity one: velocity (2, K) at the quadratic nodes; loss of p over the mesh, 1/um (6)."""
+
+    velocity: np.ndarray
+    loss: float
+
+
+class Section:
+    """One geometry: the :class:`~reference.whole_run_grid.Grid` with nodes at ``places`` (2, K) in a channel."""
+
+    def __init__(self, grid, places, width, ends):
+        mesh, self.width = grid.mesh(places), width
+        self.whole = Basis(mesh, ElementTriP2(), intorder=ORDER)
+        self.body, self.fluid = (Basis(mesh, ElementTriP2(), elements=np.flatnonzero(where), intorder=ORDER)
+                                 for where in (grid.body, ~grid.body))
+        self.spread = [asm(_stiffness, basis) for basis in (self.fluid, self.body)]
+        (x, y), near = self.whole.doflocs, 1e-9 * width
+        facets = mesh.boundary_facets()
+        self.ends = [FacetBasis(mesh, ElementTriP2(), intorder=END_ORDER,
+                                facets=facets[(np.abs(x[mesh.facets[:, facets]] - end) < near).all(axis=0)])
+                     for end in ends]
+        self.parabola = 6 * y / width * (1 - y / width)
+        self.inlet = x < ends[0] + near
+        self.held = self.inlet | (y < near) | (y > width - near)
+
+    def flow(self, ratio):
+        """:class:`Flow` at a viscosity ratio."""
+        viscous, n = self.spread[0] + ratio * self.spread[1], self.whole.N
+        blocks = [_divergence(basis) for basis in (self.fluid, self.body)]
+        B = sp.vstack([block for block, _ in blocks])
+        x = np.concatenate([np.where(self.inlet, self.parabola, 0.0), np.zeros(n + B.shape[0])])
+        matrix = bmat([[sp.block_diag([viscous, viscous]), -B.T], [-B, None]], "csc")
+        found = solve(*condense(matrix, np.zeros(len(x)), x=x, D=np.flatnonzero(np.tile(self.held, 2))))
+        pressure, used = np.zeros(n), blocks[0][1]
+        pressure[used] = found[2 * n: 2 * n + len(used)]
+        return Flow(found[: 2 * n].reshape(2, n), self._loss(pressure))
+
+    def _loss(self, pressure):
+        """Mean of p over the inlet less that over the outlet, both in the fluid (6)."""
+        sides = [end.with_element(ElementTriP1()) for end in self.ends]
+        inlet, outlet = (asm(_integral, side, value=side.interpolate(pressure[: side.N])) for side in sides)
+        return float(inlet - outlet) / self.width
+
+    def operators(self, pore, speed, flow):
+        """[(matrix, source)] of the two substrates without uptake, at the mean velocity ``speed`` (um/h)."""
+        ux, uy = (self.whole.interpolate(speed * u) for u in flow.velocity)
+        inlet = self.ends[0]
+        entering = asm(_mass, inlet, value=inlet.interpolate(speed * self.parabola))
+        carried, source = asm(_advection, self.whole, ux=ux, uy=uy) + entering, entering @ np.ones(self.whole.N)
+        return [(carried + water * self.spread[0] + biomass * self.spread[1], supply * source)
+                for water, biomass, supply in zip(pore.diffusivity, pore.in_biomass, pore.supply)]
+
+    def steady(self, operators, active, rates, fields):
+        """C_A and C_D (2, K), where X_A is ``active`` (t, Q) at the aggregate's points of quadrature, from a start.
+
+        Raises RuntimeError where Newton's method does not converge or a concentration is negative.
+        """
+        for _ in range(MOST):
+            step = self._step(operators, active, rates, fields)
+            fields = fields + step
+            if np.abs(step).max() < SMALL * np.abs(fields).max():
+                break
+        else:
+            raise RuntimeError(f"the substrates still change by {np.abs(step).max():.2g} mg/L after {MOST} iterations")
+        if fields.min() < 0:
+            raise RuntimeError(f"a concentration is negative: {fields.min():.2g} mg/L")
+        return fields
+
+    def _step(self, operators, active, rates, fields):
+        """Newton's step (2, K) of both substrates; slopes of the uptake by central differences."""
+        here, nudges = self.inside(fields), NUDGE * np.eye(2)[:, :, None, None]
+        residual = [matrix @ field - source + asm(_load, self.body, value=active * rate)
+                    for (matrix, source), field, rate in zip(operators, fields, uptake(*here, rates))]
+        columns = [(np.array(uptake(*(here + d), rates)) - np.array(uptake(*(here - d), rates))) / (2 * NUDGE)
+                   for d in nudges]
+        blocks = [[asm(_mass, self.body, value=active * column[k]) for column in columns] for k in (0, 1)]
+        for k, (matrix, _) in enumerate(operators):
+            blocks[k][k] = blocks[k][k] + matrix
+        return -splu(sp.block_array(blocks, format="csc")).solve(np.concatenate(residual)).reshape(2, -1)
+
+    def inside(self, fields):
+        """(2, t, Q) fields (2, K) at the aggregate's points of quadrature."""
+        return np.array([self.body.interpolate(field) for field in fields])
+
+    def effluents(self, flow, fields):
+        """(2,) flow-weighted means over the outlet, mg/L."""
+        end = self.ends[1]
+        speed = end.interpolate(flow.velocity[0])
+        return np.array([asm(_integral, end, value=speed * end.interpolate(field)) for field in fields]) / self.width
+
+
+def _divergence(basis):
+    """(q, div u) in the triangles of a basis, for all u but the linear q of these triangles alone; and these q."""
+    lower = basis.with_element(ElementTriP1())
+    used = np.unique(lower.element_dofs)
+    return sp.hstack([asm(_slope, basis, lower, axis=axis)[used] for axis in (0, 1)]), used
+
+
+@BilinearForm
+def _stiffness(u, v, w):
+    return dot(grad(u), grad(v))
+
+
+@BilinearForm
+def _slope(u, q, w):
+    return grad(u)[w["axis"]] * q
+
+
+@BilinearForm
+def _advection(u, v, w):
+    return (w["ux"] * grad(u)[0] + w["uy"] * grad(u)[1]) * v
+
+
+@BilinearForm
+def _mass(u, v, w):
+    return w["value"] * u * v
+
+
+@LinearForm
+def _load(v, w):
+    return w["value"] * v
+
+
+@Functional
+def _integral(w):
+    return w["value"]

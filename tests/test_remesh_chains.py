@@ -1,0 +1,158 @@
+"""Chains of remeshes (3.5, [E8]): what both transfers keep on any aggregate, meshed anew again and again."""
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from repro import pore, remeshing, reprojection
+from tests import oracles
+from tests.strategies import angles, remesh_chains, rotation, scenes, share
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+def rough(points, seed):
+    """(N, 1) field without any smoothness, between 0 and 1."""
+    return np.random.default_rng(seed).uniform(0.0, 1.0, (len(points), 1))
+
+
+def smooth(points):
+    """(N, 2): one, and a linear field."""
+    return np.column_stack([np.ones(len(points)), 2.0 + 0.3 * points[:, 0] - 0.7 * points[:, 1]])
+
+
+def projected(old, field, new):
+    return reprojection.project(*old, field, *new)
+
+
+def interpolated(old, field, new):
+    return reprojection.interpolate(*old, field, new[0])
+
+
+def along(chain, field, transfer):
+    """The field on every mesh of the chain, carried from each to the next."""
+    fields = [field]
+    for old, new in pairwise(chain):
+        fields.append(transfer(old, fields[-1], new))
+    return fields
+
+
+def square(body, field):
+    """Integral of the square of a linear field: sum of |tau| / 12 (a^2 + b^2 + c^2 + (a + b + c)^2)."""
+    corners = field[body[1], 0]
+    areas = [oracles.area(body[0][t]) for t in body[1]]
+    return np.sum(areas * (np.sum(corners**2, axis=1) + np.sum(corners, axis=1) ** 2)) / 12
+
+
+@share(0.1)
+@given(remesh_chains(finest=0.5, longest=2), seeds)
+def test_the_projection_is_the_one_integrated_piece_by_piece(chain, seed):
+    """Against shapely's pieces and a dense mass matrix. Mutant: one quadrature point a piece, the lumped mass matrix,
+    pieces of five corners and more cut short, old and new weights exchanged."""
+    field = rough(chain[0][0], seed)
+    found = projected(chain[0], field, chain[1])
+    assert found[:, 0] == pytest.approx(oracles.projected(chain[0], field[:, 0], chain[1]), abs=1e-9)
+
+
+@share(0.4)
+@given(remesh_chains(), seeds)
+def test_a_chain_of_projections_conserves_mass(chain, seed):
+    """To 1e-11, from every mesh to the next (measured: 2e-15). Mutant: interpolation, the middle of a piece
+    counted as its corner, pieces under 0.01 um2 left out."""
+    fields = along(chain, rough(chain[0][0], seed), projected)
+    masses = [oracles.mass(*body, field[:, 0]) for body, field in zip(chain, fields)]
+    assert masses == pytest.approx([masses[0]] * len(chain), rel=1e-11)
+
+
+@share(0.4)
+@given(remesh_chains())
+def test_a_chain_keeps_constant_and_linear_fields(chain):
+    """To round-off, with either transfer. Mutant: the nearest node's value, the lumped mass matrix, weights of a
+    neighbouring triangle."""
+    for transfer in (projected, interpolated):
+        for body, field in zip(chain, along(chain, smooth(chain[0][0]), transfer)):
+            exact = smooth(body[0])
+            assert np.abs(field - exact).max() < 1e-11 * np.abs(exact).max()
+
+
+@share(0.4)
+@given(remesh_chains(), seeds)
+def test_interpolation_stays_within_bounds_and_the_projection_in_energy(chain, seed):
+    """What each promises: no nodal value beyond those of the last mesh; no larger integral of the square. Mutant:
+    weights that add up to more than one, a projection that overshoots by 2 %."""
+    start = rough(chain[0][0], seed)
+    for last, field in pairwise(along(chain, start, interpolated)):
+        assert last.min() <= field.min() and field.max() <= last.max()
+    squares = [square(body, field) for body, field in zip(chain, along(chain, start, projected))]
+    assert all(after <= before * (1 + 1e-12) for before, after in pairwise(squares))
+
+
+@share(0.4)
+@given(remesh_chains(longest=2), seeds)
+def test_what_is_carried_to_its_own_mesh_stays(chain, seed):
+    """And so does what has been carried once. Mutant: the lumped mass matrix, a shifted weight, any smoothing."""
+    start = rough(chain[0][0], seed)
+    for transfer in (projected, interpolated):
+        assert transfer(chain[0], start, chain[0]) == pytest.approx(start, abs=1e-11)
+        once = transfer(chain[0], start, chain[1])
+        assert transfer(chain[1], once, chain[1]) == pytest.approx(once, abs=1e-11)
+
+
+@share(0.4)
+@given(remesh_chains(longest=3), seeds, angles, st.floats(-1e3, 1e3), st.floats(-1e3, 1e3))
+def test_a_chain_does_not_see_how_it_is_turned_and_where_it_lies(chain, seed, angle, x, y):
+    """Nor how its nodes are numbered. Mutant: an absolute tolerance in um, x and y unlike in the clipping, a node's
+    number taken for its triangle's."""
+    start = rough(chain[0][0], seed)
+    turned = [(points @ rotation(angle).T + [x, y], triangles) for points, triangles in chain]
+    shuffled, old = zip(*(numbered(body, np.random.default_rng(seed + k)) for k, body in enumerate(chain)))
+    for transfer in (projected, interpolated):
+        there, other = along(turned, start, transfer), along(shuffled, start[old[0]], transfer)
+        for here, moved, renamed, number in zip(along(chain, start, transfer), there, other, old):
+            assert moved == pytest.approx(here, abs=1e-9)
+            assert renamed == pytest.approx(here[number], abs=1e-9)
+
+
+def numbered(body, rng):
+    """The same triangles in another order, with other numbers for their nodes: ((points, triangles), old numbers)."""
+    points, triangles = body
+    old = rng.permutation(len(points))
+    new = np.argsort(old)
+    return (points[old], new[rng.permutation(triangles)]), old
+
+
+@share(0.4)
+@given(scenes(steps=1), seeds, st.lists(st.floats(0.4, 0.9), min_size=2, max_size=4))
+def test_a_pore_that_is_meshed_again_and_again_keeps_its_biomass(made, seed, refinements):
+    """The pore's own remesh, X_A uneven and X_I even: X_A's total to 1e-11 by the conserving transfer, its bounds by
+    the paper's, X_I by both; the outline's area, and substrates between nothing and the supply. Mutant: the transfers
+    exchanged, X_I in X_A's place, biomass on nodes of the fluid."""
+    now = pore.seeded(made)
+    solved, body = pore.solve(made, now), now.mesh.body
+    now.active[body] = np.random.default_rng(seed).uniform(0.5, 1.5, len(body)) * made.kinetics.maximum_density
+    now.inert[body] = 7.0
+    for refinement in refinements:
+        finer = replace(made, numerics=replace(made.numerics, refinement=refinement))
+        then = remeshing.remesh(finer, now, now, solved)
+        assert then.outline.area == pytest.approx(now.outline.area, rel=1e-12)
+        if made.numerics.transfer == "conserving":
+            assert total(then, then.active) == pytest.approx(total(now, now.active), rel=1e-11)
+        else:
+            bounds, inside = now.active[now.mesh.body], then.active[then.mesh.body]
+            assert bounds.min() <= inside.min() and inside.max() <= bounds.max()
+        assert then.inert[then.mesh.body] == pytest.approx(np.full(len(then.mesh.body), 7.0), rel=1e-10)
+        assert not np.delete(then.active + then.inert, then.mesh.body).any()
+        check_substrates(made, then.concentrations)
+        now, solved = then, replace(solved, concentrations=then.concentrations)
+
+
+def total(now, field):
+    return oracles.mass(now.mesh.points, now.mesh.triangles[now.mesh.biomass], field)
+
+
+def check_substrates(made, state):
+    for field, substrate in ((state.acceptor, made.substrates.acceptor), (state.donor, made.substrates.donor)):
+        assert field.min() >= 0 and field.max() <= substrate.supply * (1 + 1e-12)

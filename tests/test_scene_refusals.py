@@ -1,0 +1,233 @@
+"""Scenes that are not accepted: one clear line that names file, key, value and what is accepted."""
+from pathlib import Path
+
+import pytest
+
+from repro.scene import SceneError, load_scene, parse_scene, scene_tables
+from tests.test_scene import refusal, written
+
+LENGTH = 'a length is needed, such as "100 um" (greater than zero)'
+
+
+@pytest.mark.parametrize("override, said", [
+    # unknown keys and sections
+    ('pore.widht="50 um"', 'pore.widht = "50 um": there is no such key; [pore] takes width, length (did you mean'),
+    ("substrates.oxygen.supply=1 mg/L", "[substrates] takes acceptor, donor, boundary"),
+    ("substrates.donor.suply=1 mg/L", "(did you mean supply?)"),
+    ("por.width=50 um", "(did you mean pore?)"),
+    ("name=x", "a scene takes pore, aggregate, flow, substrates, kinetics, growth, numerics, output"),
+    # wrong dimension, no unit, no number
+    ('pore.width="50 s"', f'base: pore.width = "50 s": {LENGTH}'),
+    ("pore.width=50", f"base: pore.width = 50: {LENGTH}"),
+    ("pore.width=50.0", LENGTH),
+    ("pore.width=true", f"pore.width = true: {LENGTH}"),
+    ("pore.width=nan", LENGTH),
+    ("pore.width=nan um", LENGTH),
+    ("pore.width=inf um", LENGTH),
+    ("pore.width=", f'pore.width = "": {LENGTH}'),
+    ("pore.width=um", LENGTH),
+    ("pore.width=50 furlongsies", LENGTH),
+    ("pore.width=50 um^9^9^9^9", LENGTH),
+    ("pore.width=50 um*(1+1)", LENGTH),
+    ("pore.width=__import__('os') um", LENGTH),
+    ("pore.width=50 um_", LENGTH),
+    ("pore.width=1e400 um", LENGTH),
+    ("pore.width=1e308 m", LENGTH),
+    ("pore.width=1e-400 um", LENGTH),
+    ("pore.width=1e999999999999 um", LENGTH),
+    ("pore.width=1e-999999999999 um", LENGTH),
+    (f"pore.width={'9' * 100_000} um", LENGTH),
+    (f"pore.width=5 {'u' * 100_000}", LENGTH),
+    ("pore.width=12:30:00", LENGTH),
+    ('pore.width=["50 um"]', f'pore.width = ["50 um"]: {LENGTH}'),
+    ('growth.end="soon"', 'growth.end = "soon": a time is needed, such as "19.4 h" (zero or more)'),
+    ("growth.end=5 um", "a time is needed"),
+    ("growth.minimum_contact_angle=3 ppm", "an angle is needed"),
+    ("growth.shear_modulus=1 N", "a pressure or modulus is needed"),
+    ("flow.head=10 Pa", "a length is needed"),
+    ("flow.kinematic_viscosity=1 Pa s", "kinematic viscosity is needed"),
+    ("flow.gravity=9.81 m/s", "an acceleration is needed"),
+    ("substrates.donor.supply=1 mol/L", "a concentration or density is needed"),
+    ("kinetics.decay_coefficient=0.1", "a rate is needed"),
+    ("flow.viscosity_ratio=5 um", 'flow.viscosity_ratio = "5 um": a plain number is needed, such as 2000'),
+    ('flow.viscosity_ratio="500"', "a plain number is needed"),
+    ("flow.viscosity_ratio=nan", "a plain number is needed"),
+    ("flow.viscosity_ratio=inf", "a plain number is needed"),
+    ("flow.viscosity_ratio=true", "a plain number is needed"),
+    (f"flow.viscosity_ratio=1{'0' * 400}", "a plain number is needed"),
+    (f"flow.viscosity_ratio=0x{'f' * 9000}", "a plain number is needed"),
+    # a table for a value and the reverse
+    ("pore.width={}", LENGTH),
+    ("pore.width.value=5 um", "pore.width"),
+    ("pore=5", "pore = 5: a table [pore] is needed, with the keys width, length"),
+    ("substrates.acceptor=5 mg/L", "a table [substrates.acceptor] is needed"),
+    ("pore=[{}]", "a table [pore] is needed"),
+    # ranges
+    ('pore.width="-50 um"', LENGTH),
+    ('pore.length="0 um"', "pore.length"),
+    ("aggregate.radius=0 um", "greater than zero"),
+    ("flow.head=0 um", "greater than zero"),
+    ("flow.viscosity_ratio=-1", "greater than zero"),
+    ("flow.viscosity_ratio=0", "greater than zero"),
+    ("flow.kinematic_viscosity=0 cm^2/s", "greater than zero"),
+    ("flow.gravity=-9.81 m/s^2", "greater than zero"),
+    ("flow.density=0 g/L", "greater than zero"),
+    ("substrates.acceptor.supply=-1 mg/L", "zero or more"),
+    ("substrates.acceptor.half_saturation=0 mg/L", "greater than zero"),
+    ("substrates.donor.diffusivity=0 cm^2/day", "greater than zero"),
+    ("substrates.donor.diffusivity_in_aggregate=-1 cm^2/day", "greater than zero"),
+    ("kinetics.maximum_utilization_rate=-1 1/day", "zero or more"),
+    ("kinetics.decay_coefficient=-1 1/day", "zero or more"),
+    ("kinetics.yield_coefficient=0", "greater than 0, at most 1"),
+    ("kinetics.yield_coefficient=1.01", "greater than 0, at most 1"),
+    ("kinetics.degradable_fraction=-0.1", "from 0 to 1"),
+    ("kinetics.degradable_fraction=1.1", "from 0 to 1"),
+    ("kinetics.decay_oxygen_demand=0", "greater than zero"),
+    ("kinetics.acceptor_to_donor_ratio=0", "greater than zero"),
+    ("kinetics.maximum_density=0 mg/L", "greater than zero"),
+    ("growth.end=-1 h", "zero or more"),
+    ("growth.time_step=0 h", "greater than zero"),
+    ("growth.shear_modulus=0 MPa", "greater than zero"),
+    ("growth.minimum_film=0 um", "greater than zero"),
+    ("growth.minimum_contact_angle=0 deg", "between 0 and 90 deg"),
+    ("growth.minimum_contact_angle=90 deg", "between 0 and 90 deg"),
+    ("numerics.refinement=0", "greater than zero"),
+    ("numerics.flow_stabilisation=0", "greater than zero"),
+    ("numerics.mesh_compressibility=-1", "greater than zero"),
+    # words
+    ("numerics.preset=best", 'numerics.preset = "best": "paper" is needed'),
+    ("numerics.transport=bdf", '"quasi_steady" or "gear" is needed'),
+    ("numerics.transfer=exact", '"conserving" or "linear" is needed'),
+    ("numerics.extent=half", '"central" or "full" is needed'),
+    ("numerics.interface=none", '"laplacian" or "traction" is needed'),
+    ("numerics.inlet=none", '"local" or "mean" is needed'),
+    ("numerics.fixed_point=none", '"kept" or "rechosen" is needed'),
+    ("numerics.transport=1", "numerics.transport = 1"),
+    ("substrates.boundary=shut", '"open" or "closed" is needed'),
+    ("growth.new_biomass=none", '"stressed" or "stress_free" is needed'),
+    # several keys
+    ('aggregate.radius="80 um"', 'aggregate.radius = "80 um": less than pore.width (50 um)'),
+    ("aggregate.radius=50 um", "aggregate.radius"),
+    ("pore.length=10 um", 'aggregate.radius = "5 um": less than pore.width (50 um) and half of pore.length (10 um)'),
+    ('flow.mean_velocity="1 m/day"', 'flow.mean_velocity = "1 m/day": flow.head (10.0 um) is given too'),
+    ("substrates.boundary=closed", 'substrates.boundary = "closed": "open" is needed with [flow]'),
+    ("growth.minimum_film=50 um", "growth.minimum_film"),
+    ("pore.width=1.5 um", "aggregate.radius"),
+    # times
+    ("output.times=5 h", "a list of times is needed"),
+    ("output.times=[]", "a list of times is needed"),
+    ("output.times=[5 h, 6 h]", "a list of times is needed"),
+    ("output.times=[5]", "a list of times is needed"),
+    ('output.times=["5 um"]', "a list of times is needed"),
+    ('output.times=["-1 h", "1 h"]', "a list of times is needed"),
+    ('output.times=[["1 h"]]', "a list of times is needed"),
+    ('output.times=["1 h", "19.5 h"]', "none after 19.4 h is accepted: growth.end is 19.4 h"),
+])
+def test_refused(override, said):
+    message = refusal("base", override)
+    assert message.startswith("base: ") and said in message
+    assert override.split("=")[0].removesuffix(".value").split(".")[-1] in message  # the key that was set
+
+
+@pytest.mark.parametrize("source, overrides, said", [
+    ("wide", ["flow.mean_velocity=0 m/day"], 'flow.mean_velocity = "0 m/day": greater than zero is needed, or num'),
+    ("wide", ["flow.mean_velocity=-1 m/day"], "a velocity is needed"),
+    ("wide", ["flow.head=1 cm"], 'flow.mean_velocity = "2.9 m/day": flow.head (10000.0 um) is given too'),
+    ("initial_mesh", ["flow.viscosity_ratio=5"], "flow.head is missing: it or flow.mean_velocity is needed"),
+    ("initial_mesh", ["substrates.boundary=closed"], '"open" is needed, or numerics.transport = "gear"'),
+    ("flow_only", ["growth.end=1 h"], "growth = "),
+    ("flow_only", ["substrates={}", "growth.time_step=1 h"], 'growth.end is missing: a time is needed'),
+    ("flow_only", ['output.times=["1 h"]'], "none after 0 h is accepted: there is no [growth]"),
+])
+def test_refused_by_what_else_the_scene_says(source, overrides, said):
+    message = refusal(source, *overrides)
+    assert message.startswith(f"{source}: ") and said in message
+
+
+def test_growth_needs_an_aggregate():
+    with pytest.raises(SceneError, match=r"mine.toml: growth = .*: \[aggregate\] and \[substrates\] are needed"):
+        parse_scene({"substrates": {}, "growth": {"end": "1 h"}}, "mine", "mine.toml")
+
+
+def test_a_default_that_does_not_fit_is_shown():
+    with pytest.raises(SceneError, match=r'mine.toml: aggregate.radius = "5.0 um": less than pore.width \(4 um\)'):
+        parse_scene({"pore": {"width": "4 um"}, "aggregate": {}}, "mine", "mine.toml")
+
+
+@pytest.mark.parametrize("source, overrides", [
+    ("base", ["growth.end=0 h"]),
+    ("base", ["growth.end=0 h", 'output.times=["0 h"]']),
+    ("base", ['output.times=["19.4 h", "1164 min"]']),
+    ("flow_only", ['output.times=["0 h"]']),
+    ("base", ["substrates.acceptor.supply=0 mg/L", "substrates.donor.supply=-0 mg/L"]),
+    ("base", ["kinetics.decay_coefficient=0 1/day", "kinetics.maximum_utilization_rate=0 1/day"]),
+    ("base", ["kinetics.degradable_fraction=0", "kinetics.yield_coefficient=1"]),
+    ("base", ["aggregate.radius=49.9 um"]),
+    ("wide", ["flow.mean_velocity=0 m/day", "numerics.transport=gear"]),
+    ("flow_only", ["flow.mean_velocity=0 m/day"]),
+    ("initial_mesh", ["substrates.boundary=closed", "numerics.transport=gear"]),
+    ("initial_mesh", ["substrates={}"]),
+])
+def test_the_edge_of_what_is_accepted(source, overrides):
+    scene = load_scene(source, overrides)
+    assert parse_scene(scene_tables(scene), scene.name, "again") == scene
+
+
+# ---------------------------------------------------------------- files
+
+
+def test_a_missing_file_is_answered_with_the_packaged_names():
+    said = "neither a file nor a packaged scene (base, flow_only, initial_mesh, wide)"
+    assert refusal("no_such_scene.toml") == f"no_such_scene.toml: {said}"
+    for source in ("", "base\0", "x" * 200 + "/\n", "BASE"):
+        assert said in refusal(source)
+
+
+def test_a_directory_is_refused(tmp_path):
+    assert "a directory, not a packaged scene" in refusal(tmp_path)
+
+
+def test_a_file_that_cannot_be_read_is_refused(tmp_path, monkeypatch):
+    path = written(tmp_path, "[pore]")
+
+    def denied(self):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "read_bytes", denied)
+    assert "mine.toml: cannot be read (Permission denied)" in refusal(str(path))
+
+
+def test_not_toml_gives_the_parsers_line(tmp_path):
+    message = refusal(written(tmp_path, '[pore]\nwidth = 50 um\n'))
+    assert "mine.toml: not TOML: " in message and "line 2" in message
+
+
+@pytest.mark.parametrize("text", ["a = " + "[" * 100_000, "a = " + "9" * 5000, "[pore]\n[pore]", "a = 1\na = 2"])
+def test_hostile_toml_is_refused(tmp_path, text):
+    assert "not TOML: " in refusal(written(tmp_path, text))
+
+
+def test_keys_nested_by_the_thousand_are_refused(tmp_path):
+    assert "there is no such key" in refusal(written(tmp_path, ".".join("a" * 5000) + " = 1"))
+
+
+def test_not_utf_8_is_refused(tmp_path):
+    assert "not UTF-8 text (at byte 3)" in refusal(written(tmp_path, "# µ", "latin-1"))
+
+
+def test_control_characters_do_not_break_the_line(tmp_path):
+    assert "there is no such key" in refusal(written(tmp_path, '[pore]\n"wid\\nth\\u001b[31m" = "5\\n um"'))
+    assert "\\n" in refusal(written(tmp_path, '[pore]\nwidth = "5\\n um"'))
+
+
+def test_what_is_long_is_shortened():
+    assert len(refusal("base", f"pore.width={'x' * 10_000}")) < 200
+    assert len(refusal("base", f"pore.{'x' * 10_000}=1")) < 200
+    assert len(refusal("base", "x" * 10_000)) < 200
+
+
+def test_what_would_never_end_is_refused():
+    """Mutants: no bound on the number of shape updates, on the size of the seed, on the refinement."""
+    for entry in ("growth.time_step=1e-9 h", "aggregate.radius=1e-6 um", "numerics.refinement=1e9"):
+        with pytest.raises(SceneError, match=entry.split("=")[0]):
+            load_scene("base", [entry])

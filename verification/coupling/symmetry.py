@@ -1,0 +1,126 @@
+"""What must not matter at all: units, left and right, and, where the theory is reversible, the flow's direction."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from unittest import mock
+
+import numpy as np
+
+from repro import geometry, pore, transport
+from repro.coupling import simulate
+from repro.scene import load_scene
+from verification import norms
+from verification.case import Outcome, Profile, at_least, at_most, case
+from verification.coupling import runs
+
+
+@case("coupling-units", kind="property", norm="relative difference at 2 h",
+      claim="A pore eight times larger or smaller, with transport to match, grows alike to the last bits: nothing has "
+            "a scale of its own",
+      mutants=("length-scale",))
+def units() -> Outcome:
+    scene, checks = runs.base("2 h"), []
+    speed = next(simulate(scene)).solved.flow.mean_velocity
+    own = runs.numbers(runs.last(_scaled(scene, 1.0, speed)))
+    for factor in (8.0, 0.125):
+        other = runs.numbers(runs.last(_scaled(scene, factor, speed)))
+        for name, power in (("area", 2), ("upstream tip", 1), ("conductivity", 2)):
+            checks.append(at_most(f"{name}, lengths times {factor:g}",
+                                  abs(other[name] / own[name] / factor**power - 1), 1e-14,
+                                  "powers of two are exact: even the mesher does the same"))
+    return Outcome(tuple(checks))
+
+
+def _scaled(scene, factor: float, speed: float):
+    """The scene with lengths times a factor, diffusivities times its square, times as they are."""
+    scene = runs.with_diffusivities(runs.at_velocity(scene, factor * speed),
+                                    lambda water, biomass: (factor**2 * water, factor**2 * biomass))
+    return replace(scene, pore=replace(scene.pore, width=factor * scene.pore.width, length=factor * scene.pore.length),
+                   aggregate=replace(scene.aggregate, radius=factor * scene.aggregate.radius),
+                   growth=replace(scene.growth, minimum_film=factor * scene.growth.minimum_film))
+
+
+#: Base to 1 h in other units.
+FOREIGN = ('pore.width="0.05 mm"', 'pore.length="0.06 cm"', 'aggregate.radius="5e-6 m"', 'flow.head="1e-5 m"',
+           'substrates.acceptor.supply="10 g/m^3"', 'substrates.donor.supply="0.01 g/L"',
+           'substrates.acceptor.diffusivity="232 mm^2/day"', 'flow.gravity="981 cm/s^2"',
+           'flow.kinematic_viscosity="1.003e-6 m^2/s"', 'kinetics.maximum_density="30 g/L"',
+           'growth.time_step="720 s"', 'growth.shear_modulus="10 kPa"')
+
+
+@case("coupling-foreign-units", kind="property", norm="largest difference of any node's place (um), and of C, at 1 h",
+      claim="A scene written in other units is the same scene, bit for bit",
+      mutants=("rounded-twice",))
+def foreign_units() -> Outcome:
+    ours, theirs = (runs.last(load_scene("base", (f'growth.end="{end}"', f'output.times=["{end}"]', *changes)))
+                    for end, changes in (("1 h", ()), ("60 min", FOREIGN)))
+    apart = np.abs(ours.pore.mesh.points - theirs.pore.mesh.points).max()
+    fields = np.abs(ours.solved.concentrations.acceptor - theirs.solved.concentrations.acceptor).max()
+    return Outcome((at_most("places", apart, 0.0, "the same numbers after reading"),
+                    at_most("C_A", fields, 0.0, "the same numbers after reading")))
+
+
+@case("coupling-mirror", kind="property",
+      norm="difference of the tips' distances from the origin, and of C_A left and right, relative",
+      claim="Without flow an aggregate grows alike to both sides",
+      mutants=("one-supply-held", "fixed-beside-the-middle"))
+def mirror() -> Outcome:
+    last = runs.last(runs.without_flow(runs.base("8 h")))
+    outline, grid = last.pore.outline, last.pore.mesh
+    tips = abs(outline.downstream + outline.upstream) / outline.downstream
+    x = np.linspace(1.0, 70.0, 70)
+    sides = [norms.sample(grid.points, grid.triangles, last.solved.concentrations.acceptor,
+                          np.column_stack([s * x, 0.3 + 0 * x]))
+             for s in (-1, 1)]
+    profile = Profile("C_A along the lower wall, 8 h", "|x| (um)", "C_A (mg/L)",
+                      (("upstream", "ours", x, sides[0]), ("downstream", "reference", x, sides[1])))
+    return Outcome((at_most("tips", tips, 3e-6, "unsymmetric mesh: the error of C_A, of which growth feels a tenth"),
+                    at_most("C_A", np.abs(sides[0] - sides[1]).max() / 10.0, 1e-4,
+                            "unsymmetric mesh: error in space"),
+                    at_least("it has grown (area over the seed's)", outline.area / 39.27, 2.0,
+                             "else nothing is tested")), (), (profile,))
+
+
+@case("coupling-reversed", kind="property",
+      norm="relative difference between a lopsided aggregate and its mirror image, refinement 2, t = 0",
+      claim="Flow from the other side meets the same resistance (Stokes flow is reversible) and, where uptake is of "
+            "first order, loses as much of its substrate (reciprocity of (7), (11) and (12))",
+      mutants=("inlet-held",))
+def reversed_flow() -> Outcome:
+    ours, theirs = (_lopsided(sign) for sign in (1.0, -1.0))
+    apart = {name: abs(ours[name] / theirs[name] - 1) for name in ours}
+    return Outcome((at_most("conductivity", apart["conductivity"], 3e-4, ERROR),
+                    at_most("effluent", apart["effluent"], 3e-4, ERROR),
+                    at_least("C at the inlet, which no theorem makes equal", apart["inlet"], 3e-3,
+                             "else the aggregate is not lopsided")))
+
+
+ERROR = "error in space: 9e-4, 2e-4, 6e-5 at refinement 1, 1.4, 2"
+LARGE = 1e9
+
+
+def _lopsided(sign: float) -> dict[str, float]:
+    """Conductivity, and C at the outlet and the inlet, with q_D = 0.5/h C_D / (1 mg/L) and no other uptake."""
+    scene = load_scene("base", ("numerics.refinement=2.0",))
+    both = replace(scene.substrates, acceptor=replace(scene.substrates.acceptor, half_saturation=1 / LARGE),
+                   donor=replace(scene.substrates.donor, half_saturation=LARGE))
+    law = replace(scene.kinetics, maximum_utilization_rate=0.5 * LARGE, decay_coefficient=0.0,
+                  acceptor_to_donor_ratio=1e-12)
+    scene = replace(scene, substrates=both, kinetics=law)
+    with mock.patch.object(geometry, "seed", lambda *_: _outline(sign)):
+        now = pore.seeded(scene)
+    solved = pore.solve(scene, now)
+    donor = transport.fluxes(solved.problem, now.active, solved.concentrations)[1]
+    return {"conductivity": solved.flow.conductivity, "effluent": donor.effluent, "inlet": donor.inlet}
+
+
+def _outline(sign: float) -> geometry.Outline:
+    """24 um (1 + 0.35 cos a - 0.15 cos 2a), or its image in x -> -x for sign = -1."""
+    angle = np.linspace(0.0, np.pi, 81)
+    radius = 24.0 * (1 + 0.35 * sign * np.cos(angle) - 0.15 * np.cos(2 * angle))
+    arc = radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    base = np.column_stack([np.linspace(arc[-1, 0], arc[0, 0], 21), np.zeros(21)])
+    points = np.vstack([base, arc[1:-1]])
+    wall = np.where(np.arange(len(points)) < len(base), geometry.BOTTOM, geometry.FREE)
+    return geometry.Outline(points, wall, np.arange(len(points)) == 10, points.copy())

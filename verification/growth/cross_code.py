@@ -1,0 +1,185 @@
+"""Growth against quadratic elements of scikit-fem (reference/quadratic_growth.py): whole fields, both codes refined.
+
+Neither of the uneven cases has a closed form. The reference is solved with mu_L = 0.01 MPa, ours knows no mu_L: without
+traction it must drop out of the places and scale the pressure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from reference import quadratic_growth
+from reference.quadratic_growth import Contact
+from repro import growth
+from verification import norms
+from verification.case import Check, Outcome, Profile, at_most, case
+from verification.convergence import Study, refine, study
+from verification.growth import bodies, cylinder
+
+#: Ours, by refinement; the reference on each level, by rings. 90 and 135 degrees have a node on all of them.
+REFINEMENTS, RINGS = (0.75, 1.35, 2.4, 4.05), (4, 7, 12, 20)
+MODULUS, FRONT, CONTRAST = 0.01, 36.0, 10.0
+#: The upper wall (um), and how often the reference is refined towards the ends of the contact.
+CONTACT, TOWARDS = Contact(np.pi / 2, 3 * np.pi / 4, 65.0), 3
+PLACE = "the lower of the two orders: linear elements, second order (quadratic ones: third)"
+PRESSURE = ("the lower of the two orders: between 2, linear elements, and 3/2, a layer at the rim where the "
+            "stabilisation wants dP/dn = 0 (the reference: second)")
+SINGULAR = "no order: the stress is singular, if weakly, like r^(-1/2) at the ends of the contact; under 1 %"
+
+
+@dataclass(frozen=True)
+class Problem:
+    """theta(X, Y), its largest value, and the contact with an upper wall, if any."""
+
+    theta: Callable
+    top: float
+    contact: Contact | None
+
+
+def _uneven(x, y):
+    """theta: 36 at the front, x = -R_0, a tenth of it at the rear, and above half as much again as on the wall."""
+    along = CONTRAST ** (-0.5 * (x / bodies.RADIUS + 1))
+    return FRONT * along * (1 + 0.5 * (y / bodies.RADIUS) ** 2)
+
+
+PROBLEMS = {"half-cylinder": Problem(cylinder.theta(2000.0), 2000.0, None), "uneven": Problem(_uneven, FRONT, None),
+            "between walls": Problem(_uneven, FRONT, CONTACT)}
+
+
+@cache
+def trusted(name: str, level: int) -> quadratic_growth.Grown:
+    """The reference on one level, from that of the level before."""
+    problem, radius = PROBLEMS[name], bodies.RADIUS
+    ends = (problem.contact.first, problem.contact.last) if problem.contact else ()
+    mesh = quadratic_growth.half_disc(radius, RINGS[level], ends, TOWARDS if ends else 0)
+    start = trusted(name, level - 1) if level else None
+    return quadratic_growth.grow(mesh, problem.theta, problem.top, MODULUS, problem.contact, start)
+
+
+@cache
+def ours(name: str, level: int):
+    """(body, nodes of the arc, equilibrium) of ours."""
+    problem, (body, rim) = PROBLEMS[name], bodies.half_disc(REFINEMENTS[level])
+    target, held = body.reference.copy(), body.held.copy()
+    if problem.contact:
+        angle = np.arctan2(*body.reference[rim].T[::-1])
+        on = rim[(angle > problem.contact.first - 1e-9) & (angle < problem.contact.last + 1e-9)]
+        held[on, 1], target[on, 1] = True, problem.contact.height
+    body = growth.Body(body.reference, body.triangles, held)
+    theta = problem.theta(*bodies.middles(body).T)
+    return body, rim, bodies.grown(body, theta, lambda part: body.reference + part * (target - body.reference))
+
+
+def gaps(level: int, name: str) -> dict[str, float]:
+    """Size of our elements, and the relative L2 difference of the two codes on a level, over the body at t = 0; of the
+    pressure also away from the ends of the contact."""
+    (body, _, found), exact = ours(name, level), trusted(name, level)
+    X, t = body.reference, body.triangles
+
+    def pressure(x, y):
+        return exact.at(x, y)[1] / MODULUS
+
+    away = t[_distance(bodies.middles(body)) > 0.2 * bodies.RADIUS]
+    return {"size": bodies.size(body), "place": norms.l2_error(X, t, found.position, lambda x, y: exact.at(x, y)[0]),
+            "pressure": norms.l2_error(X, t, found.pressure, pressure),
+            "pressure away": norms.l2_error(X, away, found.pressure, pressure)}
+
+
+def _distance(points: np.ndarray) -> np.ndarray:
+    """From the ends of the contact, at t = 0."""
+    ends = bodies.RADIUS * np.exp(1j * np.array([CONTACT.first, CONTACT.last]))
+    return np.abs(points @ [1, 1j] - ends[:, None]).min(axis=0)
+
+
+def _relative(values: np.ndarray, exact: np.ndarray, weight: np.ndarray) -> float:
+    return float(np.sqrt(np.sum(weight * (values - exact) ** 2) / np.sum(weight * exact**2)))
+
+
+def _settled(name: str, difference: float) -> Check:
+    """Is the reference so fine that the difference is ours?"""
+    where, weight = _points()
+    before, last = (trusted(name, level).at(*where)[0] for level in (len(RINGS) - 2, len(RINGS) - 1))
+    return at_most("last change of the reference's places, over the last difference to ours",
+                   _relative(before, last, weight[..., None]) / difference, 0.3,
+                   "the reference must be the finer one; it changes by less with every level")
+
+
+def _points():
+    """X, Y (2, t, q) at the points of quadrature of a mesh of ours, and their weights (t, q)."""
+    body, _ = bodies.half_disc(REFINEMENTS[2])
+    where, weight, _ = norms.quadrature(body.reference, body.triangles)
+    return np.moveaxis(where, -1, 0), weight
+
+
+def _study(found: dict, field: str, ceiling: float) -> Study:
+    order, why = (2, PLACE) if field == "place" else (1.75, PRESSURE)
+    return study(field, found["size"], found[field], order, why, ceiling=ceiling)
+
+
+def _profiles(name: str) -> tuple[Profile, ...]:
+    """Outline, pressure on it and across the body, of ours on the third level and of the reference on the last."""
+    (body, rim, found), exact = ours(name, 2), trusted(name, len(RINGS) - 1)
+    angle = np.arctan2(*body.reference[rim].T[::-1])
+    rim, turn = rim[np.argsort(angle)], np.linspace(0, np.pi, 200)
+    place, pressure = exact.at(bodies.RADIUS * np.cos(turn), bodies.RADIUS * np.sin(turn))
+    outline = (("ours", "ours", *found.position[rim].T), ("quadratic elements", "reference", *place.T))
+    on_it = (("ours", "ours", np.degrees(np.sort(angle)), found.pressure[rim]),
+             ("quadratic elements", "reference", np.degrees(turn), pressure / MODULUS))
+    x = bodies.RADIUS * np.linspace(-0.95, 0.95, 100)
+    line = np.column_stack([x, np.full(len(x), bodies.RADIUS / 4)])
+    across = (("ours", "ours", x, norms.sample(body.reference, body.triangles, found.pressure, line)),
+              ("quadratic elements", "reference", x, exact.at(*line.T)[1] / MODULUS))
+    return (Profile(f"outline, {name}", "x (um)", "y (um)", outline),
+            Profile(f"pressure at Y = R_0 / 4, {name}", "X (um)", "P / mu_L", across),
+            Profile(f"pressure on the arc, {name}", "angle at t = 0 (degrees)", "P / mu_L", on_it))
+
+
+NORM = "L2 over the body at t = 0 of the difference to the reference on the same level, relative: places; pressure"
+
+
+@case("growth-quadratic-cylinder", kind="cross-code", norm=f"{NORM}; the same of the reference to the closed form",
+      claim="The half-cylinder grown to theta = 2000 agrees with quadratic elements, which have their orders 3 and 2 "
+            "against the closed form",
+      mutants=("stabilisation-power", "stabilisation-of-rest"), slow=True)
+def quadratic_cylinder() -> Outcome:
+    levels = range(len(RINGS))
+    found, own = refine(gaps, levels, "half-cylinder"), refine(_own, levels)
+    studies = (_study(found, "place", 6e-4), _study(found, "pressure", 6e-3),
+               study("places of the reference", own["size"], own["place"], 3, "quadratic elements", ceiling=5e-6),
+               study("pressure of the reference", own["size"], own["pressure"], 2, "linear elements", ceiling=1.2e-3))
+    return Outcome((_settled("half-cylinder", found["place"][-1]),), studies, _profiles("half-cylinder"))
+
+
+def _own(level: int) -> dict[str, float]:
+    """Size of the reference's elements, and its errors to the closed form."""
+    where, weight = _points()
+    place, pressure = trusted("half-cylinder", level).at(*where)
+    exact, level_of = cylinder.exact_place(2000.0)(*where), cylinder.exact_pressure(2000.0)(*where)
+    return {"size": bodies.RADIUS / RINGS[level], "place": _relative(place, exact, weight[..., None]),
+            "pressure": _relative(pressure / MODULUS, level_of, weight)}
+
+
+@case("growth-uneven", kind="cross-code", norm=NORM,
+      claim="A half-disc that grows ten times as much at the front as at the rear, and more above than on the wall, "
+            "agrees with quadratic elements, whatever mu_L is",
+      mutants=("theta-power", "third-power", "stabilisation-sign"))
+def uneven() -> Outcome:
+    found = refine(gaps, range(len(RINGS)), "uneven")
+    studies = (_study(found, "place", 6e-4), _study(found, "pressure", 6e-3))
+    return Outcome((_settled("uneven", found["place"][-1]),), studies, _profiles("uneven"))
+
+
+@case("growth-between-walls", kind="cross-code",
+      norm=f"{NORM}, also further than a fifth of the radius from the ends of the contact",
+      claim="The same half-disc, its arc held at the upper wall on which it slides, agrees with quadratic elements",
+      mutants=("held-short", "theta-power"), slow=True)
+def between_walls() -> Outcome:
+    found = refine(gaps, range(len(RINGS)), "between walls")
+    studies = (_study(found, "place", 1e-3), _study(found, "pressure away", 6e-3))
+    checks = (_settled("between walls", found["place"][-1]),
+              at_most("pressure, with the ends of the contact", found["pressure"][-1], 1e-2, SINGULAR))
+    return Outcome(checks, studies, _profiles("between walls"))

@@ -1,0 +1,127 @@
+"""The law itself (14)-(24): stress against its closed form, derivatives against differences, the stabilisation (27)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from reference import neo_hookean
+from repro import growth
+from verification.case import Outcome, at_most, case
+from verification.convergence import study
+from verification.growth import bodies
+
+ROUND_OFF, STEPS = "round-off", 0.1 * 0.5 ** np.arange(4)
+TAYLOR, CENTRAL = "Taylor's theorem: second order", "central differences: second order"
+
+
+def admissible(count: int = 200) -> tuple[np.ndarray, np.ndarray]:
+    """Random F (count, 2, 2) with shears to 3 and det F from 0.5 to 2000, and random pressures."""
+    random = np.random.default_rng(1)
+    F = np.eye(2) + 0.3 * random.standard_normal((count, 2, 2))
+    F[np.linalg.det(F) < 0.2] = np.eye(2)
+    shear = np.tile(np.eye(2), (count, 1, 1))
+    shear[:, 0, 1] = random.uniform(-3, 3, count)
+    scale = np.sqrt(10 ** random.uniform(-0.3, 3.3, count) / np.linalg.det(F))
+    return scale[:, None, None] * F @ shear, random.standard_normal(count)
+
+
+def _turns(count: int) -> np.ndarray:
+    """Rotations (count, 2, 2)."""
+    c, s = np.cos(np.linspace(0, 6, count)), np.sin(np.linspace(0, 6, count))
+    return np.moveaxis(np.array([[c, -s], [s, c]]), -1, 0)
+
+
+@case("growth-stress", kind="exact", norm="largest difference over the largest stress, 200 random F with shears to 3 "
+      "and J to 2000",
+      claim="The Cauchy stress of any homogeneous F and P is the closed form; it turns with the body (objectivity), "
+            "does not see a turn before the deformation (isotropy), and is symmetric",
+      mutants=("third-power", "thickness-forgotten", "stress-across", "untransposed"))
+def stress() -> Outcome:
+    F, P = admissible()
+    exact = np.array([neo_hookean.cauchy(f, p) for f, p in zip(F, P)])
+    xx, yy, zz, xy = growth.cauchy(F, P).T
+    ours = np.moveaxis(np.array([[xx, xy, 0 * xx], [xy, yy, 0 * xx], [0 * xx, 0 * xx, zz]]), -1, 0)
+    S, Q = growth.piola(F, P), _turns(len(F))
+    full = S @ np.swapaxes(F, 1, 2) / np.linalg.det(F)[:, None, None]
+    size, first = np.abs(exact).max(axis=(1, 2)), np.abs(S).max(axis=(1, 2))
+    numbers = {"stress": np.abs(ours - exact).max(axis=(1, 2)) / size,
+               "symmetry": np.abs(full[:, 0, 1] - full[:, 1, 0]) / size,
+               "objectivity": np.abs(growth.piola(Q @ F, P) - Q @ S).max(axis=(1, 2)) / first,
+               "isotropy": np.abs(growth.piola(F @ Q, P) - S @ Q).max(axis=(1, 2)) / first}
+    return Outcome(tuple(at_most(name, value.max(), 1e-11, ROUND_OFF) for name, value in numbers.items()))
+
+
+def _near_one():
+    """Twenty F of det F = 1 with pressures, and directions to go from there."""
+    F, P = admissible(20)
+    F = F / np.sqrt(np.linalg.det(F))[:, None, None]
+    return F, P, np.random.default_rng(2).standard_normal(F.shape) * 0.1
+
+
+def _potential(F, P):
+    return growth.energy(F) + P * (np.linalg.det(F) - 1.3)
+
+
+def _along(F, P, G):
+    """Slope of the stress along G by the tangent."""
+    return np.einsum("nikjl,njl->nik", growth.tangent(F, P), G)
+
+
+@case("growth-differences", kind="property", norm="largest difference to central differences, by the step",
+      claim="Stress is the derivative of the energy, the tangent that of the stress, and the element tangent that of "
+            "the residual: by finite differences",
+      mutants=("third-power", "tangent-coefficient", "one-corner-pressure"))
+def differences() -> Outcome:
+    F, P, G = _near_one()
+    stress, slope = np.sum(growth.piola(F, P) * G, axis=(1, 2)), _along(F, P, G)
+    linear, residual = _body_slope()
+    errors = {"energy": [np.abs((_potential(F + s * G, P) - _potential(F - s * G, P)) / (2 * s) - stress).max()
+                         for s in STEPS],
+              "stress": [np.abs((growth.piola(F + s * G, P) - growth.piola(F - s * G, P)) / (2 * s) - slope).max()
+                         for s in STEPS],
+              "residual": [np.abs((residual(s) - residual(-s)) / (2 * s) - linear).max() for s in STEPS]}
+    return Outcome(studies=tuple(study(name, STEPS, found, 2, CENTRAL) for name, found in errors.items()))
+
+
+@case("growth-taylor", kind="property", norm="remainder of a first-order Taylor expansion over the size of the step",
+      claim="Stress is the derivative of the energy, the tangent that of the stress, and the element tangent that of "
+            "the residual: by Taylor remainders",
+      mutants=("tangent-coefficient", "one-corner-pressure"))
+def taylor() -> Outcome:
+    F, P, G = _near_one()
+    stress, slope = np.sum(growth.piola(F, P) * G, axis=(1, 2)), _along(F, P, G)
+    linear, residual = _body_slope()
+    errors = {"energy": [np.abs(_potential(F + s * G, P) - _potential(F, P) - s * stress).max() for s in STEPS],
+              "stress": [np.abs(growth.piola(F + s * G, P) - growth.piola(F, P) - s * slope).max() for s in STEPS],
+              "residual": [np.abs(residual(s) - residual(0.0) - s * linear).max() for s in STEPS]}
+    return Outcome(studies=tuple(study(name, STEPS, found, 2, TAYLOR) for name, found in errors.items()))
+
+
+def _body_slope():
+    """The discrete residual of a sheared half-disc in a random direction: its slope, and itself after a step."""
+    body, _ = bodies.half_disc(0.6)
+    theta, random = np.full(len(body.triangles), 1.2), np.random.default_rng(3)
+    position = body.reference @ np.array([[1.1, 0.1], [0.2, 1.2]])
+    pressure = random.standard_normal(len(position))
+    system = growth.System(body, growth.stabilisation(position, body.triangles, theta))
+    move, push = 0.3 * random.standard_normal(position.shape), random.standard_normal(len(position))
+    direction = np.concatenate([move[:, 0], move[:, 1], push])
+    slopes = np.einsum("tij,tj->ti", system.tangent(position, pressure), direction[system.unknowns])
+    linear = np.bincount(system.unknowns.ravel(), slopes.ravel(), len(direction))
+    return linear, lambda s: system.residual(position + s * move, pressure + s * push, theta)[0]
+
+
+@case("growth-stabilisation", kind="exact", norm="largest relative difference over the triangles of a random mesh",
+      claim="On a pressure of constant gradient g the stabilisation of a triangle is |tau| h^2 theta^(2/3) / 12 |g|^2, "
+            "h the diameter of the circle through its corners [E6]",
+      mutants=("stabilisation-power", "stabilisation-too-weak", "circumradius"))
+def stabilisation() -> Outcome:
+    points, triangles, _ = bodies.rectangle(1.3, seed=6)
+    theta, g = np.random.default_rng(7).uniform(1, 2000, len(triangles)), np.array([0.3, -0.7])
+    a, b, c = (points[triangles[:, i]] for i in range(3))
+    edges = np.stack([b - a, c - a], axis=1)
+    centre = np.linalg.solve(2 * edges, np.sum(edges**2, axis=2)[..., None])[..., 0]
+    exact = np.linalg.det(edges) / 2 * 4 * np.sum(centre**2, axis=1) * theta ** (2 / 3) / 12 * (g @ g)
+    pressure = (points @ g)[triangles]
+    found = np.einsum("ta,tab,tb->t", pressure, growth.stabilisation(points, triangles, theta), pressure)
+    return Outcome((at_most("stabilisation", np.abs(found / exact - 1).max(), 1e-11, ROUND_OFF),))

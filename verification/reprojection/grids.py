@@ -1,0 +1,79 @@
+"""Pairs of meshes of one rectangle, related to each other in every way that a transfer may meet, and norms on them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.spatial import Delaunay
+from skfem import MeshTri
+
+from repro.mesh import triangle_areas
+from verification import meshes, norms
+
+ENDS, WIDTH = (0.0, 40.0), 25.0
+AREA = (ENDS[1] - ENDS[0]) * WIDTH
+#: Distances (um) by which nodes are set aside, and at which others lie from the rim: slivers of that width.
+ASIDE, SLIVER = (1e-14, 1e-9, 1e-4), 1e-6
+Grid = tuple[np.ndarray, np.ndarray]
+
+
+def grid(size: float, seed: int) -> Grid:
+    """Points and triangles of a random mesh."""
+    return meshes.rectangle(ENDS, WIDTH, size, seed=seed)
+
+
+def pairs() -> Iterator[tuple[str, Grid, Grid]]:
+    """(how the two are related, old mesh, new mesh)."""
+    first, other = grid(5.0, 1), grid(4.0, 2)
+    yield "unrelated", first, other
+    yield "the same, in another order", first, (first[0], np.roll(first[1], 1, axis=1)[::-1])
+    yield "every triangle cut in four", first, cut_in_four(first)
+    yield "four triangles made one", cut_in_four(first), first
+    for distance in ASIDE:
+        yield f"nodes {distance:g} um aside", first, aside(first, distance)
+    yield "slivers on slivers", slivers(3), slivers(4)
+
+
+def upright(points: np.ndarray, triangles: np.ndarray) -> Grid:
+    """The same triangles, counterclockwise; those without area left out."""
+    area = triangle_areas(points, triangles)
+    turned = np.where(area[:, None] < 0, triangles[:, ::-1], triangles)
+    return points, turned[area != 0]
+
+
+def cut_in_four(coarse: Grid) -> Grid:
+    """All nodes and edges are shared."""
+    fine = MeshTri(coarse[0].T.copy(), coarse[1].T.copy()).refined()
+    return upright(fine.p.T.copy(), fine.t.T.copy())
+
+
+def aside(old: Grid, distance: float) -> Grid:
+    """Inner nodes moved by no more than ``distance``: all edges cross at grazing angles."""
+    points = old[0].copy()
+    inner = (points > 0).all(axis=1) & (points < [ENDS[1], WIDTH]).all(axis=1)
+    points[inner] += np.random.default_rng(5).uniform(-distance, distance, (inner.sum(), 2))
+    return points, old[1]
+
+
+def slivers(seed: int) -> Grid:
+    """Delaunay triangles of random nodes, some of them next to the rim."""
+    random = np.random.default_rng(seed)
+    inner = random.uniform([1.0, 1.0], [ENDS[1] - 1, WIDTH - 1], (60, 2))
+    inner[:6, 1], inner[6:12, 0] = SLIVER, ENDS[1] - SLIVER
+    corners = np.array([[x, y] for x in ENDS for y in (0.0, WIDTH)])
+    points = np.vstack([corners, inner])
+    return upright(points, Delaunay(points).simplices)
+
+
+def integral(mesh: Grid, field: np.ndarray, weight=lambda x, y: 1 + 0 * x) -> float:
+    """Integral of a nodal field (N,) times weight(x, y), exact where the weight is a polynomial of degree five."""
+    where, area, shape = norms.quadrature(*mesh)
+    values = np.einsum("qa,ta->tq", shape, field[mesh[1]])
+    return float(np.sum(area * values * weight(where[..., 0], where[..., 1])))
+
+
+def square(mesh: Grid, field: np.ndarray) -> float:
+    """Integral of the square of a nodal field (N,)."""
+    _, area, shape = norms.quadrature(*mesh)
+    return float(np.sum(area * np.einsum("qa,ta->tq", shape, field[mesh[1]]) ** 2))
