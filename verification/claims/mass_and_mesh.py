@@ -43,7 +43,7 @@ def node_defect(time: float) -> float:
     made, _, _ = coupling.make_biomass(said, now, solved, said.growth.time_step)
     more = (made.active + made.inert - now.active - now.inert)[now.mesh.triangles[now.mesh.biomass]].mean(axis=1)
     theta = now.theta * (1 + more / said.kinetics.maximum_density)
-    expanded, _ = shape.expand(said, made, theta)
+    expanded, *_ = shape.expand(said, made, theta)
     before, after = (grid.lumped(grid.biomass) for grid in (now.mesh, expanded.mesh))
     masses = [(before * field, after * reprojection.reproject(field, before, after))
               for field in (made.active, made.inert)]

@@ -8,6 +8,7 @@ from verification.coupling import (  # noqa: F401
     averaged_uptake,
     conservation,
     contact,
+    curved,
     exponential,
     schemes,
     special_cases,

@@ -1,15 +1,16 @@
 """Wrong changes to `repro/` that cases of this stage must catch."""
 
+from verification.coupling.curved_mutants import CURVED
 from verification.mutants import Mutant
 
 MUTANTS = (
     Mutant("growth-three-percent-low", "repro/coupling.py",
            says="theta takes 97 % of the increase of (29)",
-           old="now.theta * (1 + _increase",
-           new="now.theta * (1 + 0.97 * _increase"),
+           old="now.theta * (1 + increase",
+           new="now.theta * (1 + 0.97 * increase"),
     Mutant("rates-at-the-start", "repro/coupling.py",
            says="biomass grows a whole step at the rates of the step's start",
-           old="mean = [(a + b) / 2 for a, b in zip(first, _rates(scene, end))]",
+           old="mean = [(a + b) / 2 for a, b in zip(first, rates_of(scene, end))]",
            new="mean = first"),
     Mutant("euler-biomass", "repro/coupling.py",
            says="one Euler increment a step for the integrated growth (trap 9)",
@@ -113,4 +114,5 @@ MUTANTS = (
            says="the pressure over mu_L is taken for one in MPa where an equilibrium starts",
            old="start, push = grown.mesh.points[nodes], grown.pressure[nodes]",
            new="start, push = grown.mesh.points[nodes], grown.pressure[nodes] / scene.growth.shear_modulus"),
+    *CURVED,
 )

@@ -180,5 +180,5 @@ def explicit_step(said, now, solved, hours: float):
     remains = now.active * hours * kinetics.inert_rate(state.acceptor, said.substrates, said.kinetics)
     grown = replace(now, active=now.active + gain, inert=now.inert + remains)
     share = (gain + remains)[now.mesh.triangles[now.mesh.biomass]].mean(axis=1) / said.kinetics.maximum_density
-    expanded, _ = shape.expand(said, grown, now.theta * (1 + share))
+    expanded, *_ = shape.expand(said, grown, now.theta * (1 + share))
     return remeshing.new_mesh(said, now, expanded, solved)[0]

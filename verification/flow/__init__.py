@@ -1,3 +1,3 @@
 """Flow (2.1, 3.2): closed forms, manufactured flow, Taylor-Hood elements, and what holds of any viscous flow."""
 
-from verification.flow import closed_forms, cross_code, inclusion, layers, manufactured, properties, rise  # noqa: F401
+from verification.flow import closed_forms, cross_code, curved, inclusion, layers, manufactured, properties, rise  # noqa: F401

@@ -1,5 +1,6 @@
 """Wrong changes to `repro/` that cases of this stage must catch."""
 
+from verification.flow.curved_mutants import CURVED
 from verification.mutants import Mutant
 
 MUTANTS = (
@@ -59,4 +60,5 @@ MUTANTS = (
            says="Quadratic elements, which are stable, are stabilised too.",
            old="if order == 1 else np.zeros(len(viscosity))",
            new="if order < 3 else np.zeros(len(viscosity))"),
+    *CURVED,
 )

@@ -1,5 +1,6 @@
 """Wrong changes to `repro/` that cases of this stage must catch."""
 
+from verification.growth.curved_mutants import CURVED
 from verification.mutants import Mutant
 
 MUTANTS = (
@@ -63,4 +64,5 @@ MUTANTS = (
            says="the stabilisation keeps its diagonal only, and so resists a constant pressure",
            old="return weight[:, None, None] * np.einsum",
            new="return np.eye(3) * weight[:, None, None] * np.einsum"),
+    *CURVED,
 )

@@ -5,6 +5,7 @@ Where a reference has one dimension, the pore is a narrow channel, meshed at ran
 
 from verification.transport import (
     closed_forms,
+    curved,
     manufactured,
     monod_channel,
     properties,
@@ -13,4 +14,5 @@ from verification.transport import (
     well_mixed,
 )
 
-__all__ = ["closed_forms", "manufactured", "monod_channel", "properties", "still_water", "transients", "well_mixed"]
+__all__ = ["closed_forms", "curved", "manufactured", "monod_channel", "properties", "still_water", "transients",
+           "well_mixed"]

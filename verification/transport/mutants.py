@@ -1,6 +1,7 @@
 """Wrong changes to `repro/` that cases of this stage must catch."""
 
 from verification.mutants import Mutant
+from verification.transport.curved_mutants import CURVED
 
 MUTANTS = (
     Mutant("fluid-diffusivity", "repro/transport.py",
@@ -95,4 +96,5 @@ MUTANTS = (
            says="inert remains come from the active biomass at the start of the call",
            old="system.active * np.exp(now.state[2] + rise[2]) * remains",
            new="system.active * remains"),
+    *CURVED,
 )
