@@ -234,7 +234,7 @@ def closing_nodes(outline: Outline, width: float, film: float, angle: float) -> 
     """
     joins = np.full(len(outline.points), FREE)
     for wall, gap in ((BOTTOM, outline.points[:, 1]), (TOP, width - outline.points[:, 1])):
-        lines = _contact_lines(outline, wall)
+        lines = contact_lines(outline, wall)
         if wall == TOP and not lines:
             joins[(outline.wall == FREE) & (gap < film)] = TOP
         for line, step in lines:
@@ -242,7 +242,7 @@ def closing_nodes(outline: Outline, width: float, film: float, angle: float) -> 
     return joins
 
 
-def _contact_lines(outline: Outline, wall: int) -> list[tuple[int, int]]:
+def contact_lines(outline: Outline, wall: int) -> list[tuple[int, int]]:
     """(node, direction) of each end of a contact surface: the next node in that direction is not on the wall."""
     on = outline.wall == wall
     ends = [(int(i), 1) for i in np.flatnonzero(on & ~np.roll(on, -1))]

@@ -146,8 +146,11 @@ def _strains(slopes: np.ndarray) -> np.ndarray:
 class System:
     """Residual and tangent of Pi for one body; theta and prescribed coordinates vary, the sparsity does not."""
 
-    def __init__(self, body: Body, stabilising: np.ndarray):
+    def __init__(self, body: Body, stabilising: np.ndarray, forces: np.ndarray | None = None):
+        """forces: (n, 2) um, nodal forces over mu_L that do not depend on the shape (the t0 of (20)); none by default.
+        """
         self.body = body
+        self.pull = None if forces is None else np.concatenate([forces[:, 0], forces[:, 1], np.zeros(len(forces))])
         self.slopes = gradients(body.reference, body.triangles)
         self.areas = triangle_areas(body.reference, body.triangles)
         self.strains = _strains(self.slopes)
@@ -169,7 +172,9 @@ class System:
         scale = np.concatenate([terms[:, 0], terms[:, 1],
                                 np.broadcast_to((self.areas * theta)[:, None] / 3, P.shape)], axis=1)
         total, size = (np.bincount(self.unknowns.ravel(), part.ravel(), 3 * n) for part in (local, scale))
-        return total, size
+        if self.pull is None:
+            return total, size
+        return total - self.pull, size + np.abs(self.pull)
 
     def tangent(self, position: np.ndarray, pressure: np.ndarray, theta: np.ndarray | None = None) -> np.ndarray:
         """(t, 9, 9) symmetric element matrices of the residual's derivative, which theta does not enter."""
@@ -188,18 +193,18 @@ class System:
 
 @timed("growth")
 def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: np.ndarray,
-                prescribed: np.ndarray) -> Equilibrium:
+                prescribed: np.ndarray, forces: np.ndarray | None = None) -> Equilibrium:
     """Equilibrium under the expansion theta (t,) since the reference, from a start.
 
     position: (n, 2) um, the last shape, with det F > 0; pressure: (n,) P / mu_L there; prescribed: (n, 2) um, the
-    coordinates to reach where ``body.held``. Newton's method with a line search that rejects det F <= 0; where it
-    fails, theta and the prescribed coordinates go from where they are to their targets in geometric sub-steps.
-    Raises GrowthError where that fails too.
+    coordinates to reach where ``body.held``; forces: (n, 2) um, nodal forces over mu_L, none by default. Newton's
+    method with a line search that rejects det F <= 0; where it fails, theta and the prescribed coordinates go from
+    where they are to their targets in geometric sub-steps. Raises GrowthError where that fails too.
     """
     start = triangle_areas(position, body.triangles) / triangle_areas(body.reference, body.triangles)
     refuse_turned_over(start, theta)
-    return reach(System(body, stabilisation(position, body.triangles, start)), start, theta, position, pressure,
-                 prescribed)
+    system = System(body, stabilisation(position, body.triangles, start), forces)
+    return reach(system, start, theta, position, pressure, prescribed)
 
 
 def refuse_turned_over(start: np.ndarray, theta: np.ndarray) -> None:

@@ -22,15 +22,23 @@ def monod(concentration, half_saturation: float):
     return concentration / bounded, half_saturation / bounded**2
 
 
+def _both(acceptor, donor, substrates):
+    """:func:`monod` of the acceptor and of the donor."""
+    return monod(acceptor, substrates.acceptor.half_saturation), monod(donor, substrates.donor.half_saturation)
+
+
+def decay_demand(kinetics) -> float:
+    """d_c f_d b (1/h): the acceptor that decay takes up per active biomass at m_A = 1 [E3]."""
+    return kinetics.decay_oxygen_demand * kinetics.degradable_fraction * kinetics.decay_coefficient
+
+
 def uptake(acceptor, donor, substrates, kinetics):
     """Uptake per active biomass (1/h): -F1/X_A, -F2/X_A and their derivatives (1/h per mg/L).
 
     acceptor, donor: C_A and C_D (mg/L). Returns (q_A, q_D, ((dq_A/dC_A, dq_A/dC_D), (dq_D/dC_A, dq_D/dC_D))).
     """
-    m_a, d_a = monod(acceptor, substrates.acceptor.half_saturation)
-    m_d, d_d = monod(donor, substrates.donor.half_saturation)
-    k, demand = kinetics.maximum_utilization_rate, kinetics.acceptor_to_donor_ratio
-    decay = kinetics.decay_oxygen_demand * kinetics.degradable_fraction * kinetics.decay_coefficient
+    (m_a, d_a), (m_d, d_d) = _both(acceptor, donor, substrates)
+    k, demand, decay = kinetics.maximum_utilization_rate, kinetics.acceptor_to_donor_ratio, decay_demand(kinetics)
     other_a, slope_a = np.maximum(m_a, 0.0), np.where(acceptor > 0, d_a, 0.0)
     other_d, slope_d = np.maximum(m_d, 0.0), np.where(donor > 0, d_d, 0.0)
     per_acceptor = k * demand * other_d + decay
@@ -42,10 +50,8 @@ def paired_uptake(acceptor, donor, substrates, kinetics):
     """As :func:`uptake`, but with one rate r = k m_A m_D for both substrates below zero too, where quadratic functions
     may go by a little: what is taken up of one stays in proportion to the other. r is zero where both are negative.
     """
-    m_a, d_a = monod(acceptor, substrates.acceptor.half_saturation)
-    m_d, d_d = monod(donor, substrates.donor.half_saturation)
-    demand = kinetics.acceptor_to_donor_ratio
-    decay = kinetics.decay_oxygen_demand * kinetics.degradable_fraction * kinetics.decay_coefficient
+    (m_a, d_a), (m_d, d_d) = _both(acceptor, donor, substrates)
+    demand, decay = kinetics.acceptor_to_donor_ratio, decay_demand(kinetics)
     k = np.where((m_a < 0) & (m_d < 0), 0.0, kinetics.maximum_utilization_rate)
     rate, by_a, by_d = k * m_a * m_d, k * d_a * m_d, k * m_a * d_d
     return demand * rate + decay * m_a, rate, ((demand * by_a + decay * d_a, demand * by_d), (by_a, by_d))
@@ -53,8 +59,7 @@ def paired_uptake(acceptor, donor, substrates, kinetics):
 
 def growth_rate(acceptor, donor, substrates, kinetics):
     """F3 / X_A (1/h), net growth of active biomass (9)."""
-    m_a, _ = monod(acceptor, substrates.acceptor.half_saturation)
-    m_d, _ = monod(donor, substrates.donor.half_saturation)
+    (m_a, _), (m_d, _) = _both(acceptor, donor, substrates)
     return m_a * (kinetics.maximum_utilization_rate * kinetics.yield_coefficient * m_d - kinetics.decay_coefficient)
 
 

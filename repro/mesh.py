@@ -76,8 +76,8 @@ class PoreMesh:
 
     @cached_property
     def fem(self) -> MeshTri:
-        """The same mesh for scikit-fem."""
-        return MeshTri(self.points.T.copy(), self.triangles.T.copy())
+        """The same mesh for scikit-fem, the nodes of each triangle in the same order."""
+        return MeshTri(self.points.T.copy(), self.triangles.T.copy(), sort_t=False)
 
     def once(self, key: Hashable, make: Callable):
         """``make()``, worked out once for these connections."""

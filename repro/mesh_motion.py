@@ -40,7 +40,7 @@ def _fluid_displacement(mesh: PoreMesh, known: np.ndarray, gamma: float, c: floa
     laplace = found.laplace[there]
     lower = each(tau, laplace) + gamma * mass(mesh.areas[there])
     elements = saddle_blocks(two_components(laplace), found.divergence[there], lower)
-    system = mesh.once("mesh motion", lambda: _system(mesh, found.basis.element_dofs.T[there]))
+    system = mesh.once("mesh motion", lambda: _system(mesh, mesh.triangles[there]))
     value = np.concatenate([known[fluid, 0], known[fluid, 1], np.zeros(len(fluid))])
     return system.solve(elements, np.zeros(len(value)), value)[: 2 * len(fluid)].reshape(2, -1).T
 

@@ -7,11 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from repro import flow, gear, geometry, mesh, transport
+from repro.errors import TransportError
 from repro.geometry import Outline
 from repro.mesh import PoreMesh
 
 #: The thinnest film to resolve where no [growth] says when it closes (Table 1), um.
 MINIMUM_FILM = 2.0
+#: Under this Peclet number u W / D the inlet supplies nothing that could be told from round-off.
+SLOWEST = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,15 +95,31 @@ def solve(scene, pore: Pore) -> Solved:
     if scene.substrates is None:
         return Solved(carried, None, None)
     problem = transport.problem(pore.mesh, carried, scene.substrates, scene.kinetics, scene.numerics.inlet)
-    find = gear.settle if scene.numerics.transport == "gear" else transport.steady
+    find = gear.settle
+    if scene.numerics.transport != "gear":
+        refuse_no_supply(scene, carried)
+        find = transport.steady
     state = find(problem, pore.active, pore.concentrations)
     return Solved(carried, problem, state, transport.fluxes(problem, pore.active, state))
+
+
+def peclet(scene, speed: float) -> float:
+    """u W / D with the smaller diffusivity, for a mean velocity (um/h)."""
+    kinds = (scene.substrates.acceptor, scene.substrates.donor)
+    return speed * scene.pore.width / min(min(s.diffusivity, s.diffusivity_in_aggregate) for s in kinds)
+
+
+def refuse_no_supply(scene, carried: flow.Flow | None) -> None:
+    """Raises TransportError where the flow is too slow to supply anything: no state would be steady."""
+    if carried and peclet(scene, carried.mean_velocity) < SLOWEST:
+        raise TransportError(f"the Peclet number u W / D is {peclet(scene, carried.mean_velocity):.2g}, under "
+                             f"{SLOWEST:g}: nothing is supplied through the inlet; leave [flow] out for pure diffusion")
 
 
 def solve_flow(scene, pore: Pore) -> flow.Flow:
     """Stokes flow under the scene's head or mean velocity."""
     numerics, drive = scene.numerics, scene.flow
     unit = flow.unit_flow(pore.mesh, drive.viscosity_ratio, interface=numerics.interface,
-                          stabilisation=numerics.flow_stabilisation)
+                          stabilisation=numerics.flow_stabilisation, element=numerics.flow_element)
     return flow.scaled(unit, pore.mesh, scene.pore.length, drive.kinematic_viscosity / drive.gravity, head=drive.head,
                        mean_velocity=drive.mean_velocity)

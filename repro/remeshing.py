@@ -18,15 +18,28 @@ def new_mesh(scene, now: Pore, expanded: Pore, solved: Solved) -> tuple[Pore, bo
     New where the paper says so: the extent is too short (3.1), or the moved mesh would not be acceptable (3.5); and
     where a moved mesh cannot do: contact has changed, or interface edges are twice too long for the narrowest film.
     """
+    moved = followed(scene, now, expanded)
+    if moved is not None:
+        return replace(expanded, mesh=moved, concentrations=solved.concentrations), False
+    return remesh(scene, now, expanded, solved), True
+
+
+def followed(scene, now: Pore, expanded: Pore) -> mesh.PoreMesh | None:
+    """The mesh moved with the aggregate, None where a new one is due."""
     outline, width = expanded.outline, scene.pore.width
     stale = (geometry.extent_too_short(outline, now.mesh.ends, width, scene.pore.length)
              or (expanded.wall != now.wall).any() or _too_coarse(scene, outline))
-    if not stale:
-        moved = now.mesh.moved(mesh_motion.move(now.mesh, expanded.mesh.points[now.mesh.body],
-                                                scene.numerics.mesh_compressibility, scene.numerics.flow_stabilisation))
-        if moved.acceptable():
-            return replace(expanded, mesh=moved, concentrations=solved.concentrations), False
-    return remesh(scene, now, expanded, solved), True
+    if stale:
+        return None
+    moved = now.mesh.moved(mesh_motion.move(now.mesh, expanded.mesh.points[now.mesh.body],
+                                            scene.numerics.mesh_compressibility, scene.numerics.flow_stabilisation))
+    return moved if moved.acceptable() else None
+
+
+def anew(scene, outline: geometry.Outline) -> tuple[mesh.PoreMesh, geometry.Outline]:
+    """A new mesh around the aggregate with the extent of 3.1, and the outline with the nodes that it has on it."""
+    ends = geometry.meshed_extent(outline, scene.pore.width, scene.pore.length, scene.numerics.extent == "full")
+    return mesh.generate(outline, ends, scene.pore.width, scene.numerics.refinement, pore.film(scene))
 
 
 def _too_coarse(scene, outline: geometry.Outline) -> bool:
@@ -42,10 +55,8 @@ def remesh(scene, now: Pore, expanded: Pore, solved: Solved) -> Pore:
     theta restarts as J times the density over X_m: the expansion that brings each triangle's density back to X_m, so
     that the error of the constraint is worked off at the next update and does not accumulate [E7].
     """
-    outline, numerics = expanded.outline, scene.numerics
-    ends = geometry.meshed_extent(outline, scene.pore.width, scene.pore.length, numerics.extent == "full")
-    grid, outline = mesh.generate(outline, ends, scene.pore.width, numerics.refinement, pore.film(scene))
-    carried = _carried(numerics.transfer, expanded, grid)
+    grid, outline = anew(scene, expanded.outline)
+    carried = _carried(scene.numerics.transfer, expanded, grid)
     carried["origin"][grid.loop] = outline.origin
     theta = _expansion(grid, carried["origin"]) * _density(scene, grid, carried)
     return replace(expanded, mesh=grid, wall=outline.wall, fixed=outline.fixed, theta=theta,
@@ -60,6 +71,8 @@ def _carried(transfer: str, expanded: Pore, grid: mesh.PoreMesh) -> dict[str, np
     others = np.column_stack([expanded.origin, expanded.pressure])[old]
     if transfer == "conserving":
         masses = reprojection.project(body, triangles, biomass, new, new_triangles)
+    elif transfer == "bounded":
+        masses = reprojection.project_bounded(body, triangles, biomass, new, new_triangles)
     else:
         masses = reprojection.interpolate(body, triangles, biomass, new)
     others = reprojection.interpolate(body, triangles, others, new)

@@ -124,6 +124,7 @@ class Growth:
     shear_modulus: float = quantity("0.01 MPa", "MPa")  # mu_L, MPa
     minimum_contact_angle: float = quantity("16.7 deg", "rad", ACUTE)  # rad
     minimum_film: float = quantity("2 um", "um")  # distance to the opposite wall at which contact is made, um
+    fluid_forces: str = choice("neglected", "included")  # the fluid's traction in (20) and (22), see 2.3.3
     new_biomass: str = choice("stressed", "stress_free")  # total strain since t = 0 (2.3), or section 5's alternative
 
 
@@ -131,30 +132,31 @@ class Growth:
 class Numerics:
     """Section 3: how it is solved. [En] are the ambiguities of `reference/ERRATA.md`."""
 
-    preset: str = choice("paper", "fast", "accurate")  # the defaults of what follows: see PRESETS
+    preset: str = choice("fast", "accurate", "paper")  # the defaults of what follows: see PRESETS
     elements: str = choice("linear", "quadratic")  # 3.2-3.4, or Taylor-Hood on curved triangles
     time: str = choice("updates", "midpoint")  # every growth.time_step, or as numerics.tolerance allows
     tolerance: float = number(0.01, UP_TO_1)  # of a midpoint step: change of the growth rate, times the step
     transport: str = choice("quasi_steady", "gear")  # 3.3
-    transfer: str = choice("conserving", "linear")  # of X_A and X_I at a remesh [E8]
+    transfer: str = choice("conserving", "linear", "bounded")  # of X_A and X_I at a remesh [E8]
     extent: str = choice("central", "full")  # 3.1
     interface: str = choice("laplacian", "traction")  # [E2]
     inlet: str = choice("local", "mean")  # u_x(y) or u_ave in (11) [E4]
     fixed_point: str = choice("kept", "rechosen")  # of a contact surface, 2.3.3
     refinement: float = number(1.0, UP_TO_20)  # element sizes are divided by it
+    flow_element: str = choice("stabilised", "bubble")  # 3.2, or linear velocities with a bubble (MINI)
     flow_stabilisation: float = number(100.0)  # 3.2: tau = h^2 / (flow_stabilisation nu) [E13]
     mesh_compressibility: float = number(1.0)  # gamma of (35) [E13]
 
 
-#: What each preset changes of the defaults above: the paper's own scheme, about 1 %, about 0.1 % (see `make bench`).
+#: What each preset changes of the defaults above: about 1 %, about 0.1 % (see `make bench`), the paper's own scheme.
 PRESETS = {
-    "paper": {},
     "fast": {"elements": "quadratic", "time": "midpoint", "refinement": 0.25, "tolerance": 0.01},
     "accurate": {"elements": "quadratic", "time": "midpoint", "refinement": 0.45, "tolerance": 0.001},
+    "paper": {},
 }
 #: What quadratic elements have one way of, and what that is.
 QUADRATIC = {"time": "midpoint", "transport": "quasi_steady", "transfer": "conserving", "interface": "laplacian",
-             "inlet": "local", "fixed_point": "kept"}
+             "inlet": "local", "fixed_point": "kept", "flow_element": "stabilised"}
 
 
 @dataclass(frozen=True)
@@ -205,9 +207,9 @@ def parse_scene(tables: dict, name: str, file: str) -> Scene:
 
 
 def _with_preset(tables: dict) -> dict:
-    """The tables with the defaults of the preset that they name, the paper's where they name none."""
+    """The tables with the defaults of the preset that they name, "fast" where they name none."""
     given = tables.get("numerics", {})
-    named = given.get("preset", "paper") if isinstance(given, dict) else None
+    named = given.get("preset", "fast") if isinstance(given, dict) else None
     if not isinstance(named, str) or named not in PRESETS:
         return tables  # what is wrong is told when it is read
     return {**tables, "numerics": {"preset": named, **PRESETS[named], **given}}
@@ -275,8 +277,19 @@ def _growth_rules(scene: Scene) -> Rules:
     if scene.growth:
         wanted = f"growth.end ({scene.growth.end:g} h) over {MOST_STEPS} or more is needed"
         yield scene.growth.end > MOST_STEPS * scene.growth.time_step, "growth.time_step", wanted
+    if scene.growth and scene.growth.fluid_forces == "included":
+        yield from _force_rules(scene)
     film, width = scene.growth.minimum_film if scene.growth else 0.0, scene.pore.width
     yield film >= width, "growth.minimum_film", f"less than pore.width ({width:g} um) is needed"
+
+
+def _force_rules(scene: Scene) -> Rules:
+    wanted = '"neglected" is needed without [flow]'
+    yield scene.flow is None, "growth.fluid_forces", wanted
+    wanted = '"neglected" is needed with numerics.elements = "quadratic"; preset = "paper" has the other'
+    yield scene.numerics.elements == "quadratic", "growth.fluid_forces", wanted
+    wanted = '"neglected" is needed with growth.new_biomass = "stress_free", which would yield at every update'
+    yield scene.growth.new_biomass == "stress_free", "growth.fluid_forces", wanted
 
 
 def _numerics_rules(scene: Scene) -> Rules:

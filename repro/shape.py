@@ -6,20 +6,41 @@ from dataclasses import replace
 
 import numpy as np
 
-from repro import geometry, growth, reprojection
+from repro import geometry, growth, reprojection, traction
 from repro.errors import GrowthError
 from repro.pore import Pore
 
 #: Rounds in which closing films may change the contact surfaces within one step.
 CONTACT_ROUNDS = 60
+#: Rounds of shape and fluid forces, and the largest move of a node in the last of them over the aggregate's thickness.
+FORCE_ROUNDS, FORCE_REST = 12, 1e-8
 
 
 def expand(scene, grown: Pore, theta: np.ndarray) -> tuple[Pore, int, float]:
     """The aggregate in its new shape under theta (t,), X_A and X_I reprojected by (34); Newton's iterations; and the
     least distance (um) to the opposite wall before films closed.
 
+    With fluid forces, shape and flow are sought in turn until both agree. The fluid's nodes stay where they were.
+    Raises GrowthError where no equilibrium is found, contact does not rest, or shape and flow do not agree.
+    """
+    if scene.growth.fluid_forces == "neglected":
+        return _at_rest(scene, grown, theta, None)
+    forces, last, iterations = traction.forces(scene, grown, grown), grown, 0
+    for _ in range(FORCE_ROUNDS):
+        found, used, gap = _at_rest(scene, grown, theta, forces)
+        moved, iterations = np.abs(found.mesh.points - last.mesh.points).max(), iterations + used
+        if moved <= FORCE_REST * found.outline.thickness:
+            return found, iterations, gap
+        forces, last = traction.forces(scene, grown, found), found
+    raise GrowthError(f"the fluid's forces and the shape do not agree after {FORCE_ROUNDS} rounds, a node still moves "
+                      f"by {moved:.2g} um: the aggregate is too soft for this flow; try a shorter growth.time_step, a "
+                      'larger growth.shear_modulus, or growth.fluid_forces = "neglected"')
+
+
+def _at_rest(scene, grown: Pore, theta: np.ndarray, forces: np.ndarray | None) -> tuple[Pore, int, float]:
+    """The new shape under nodal forces (n, 2) um, over mu_L, that stay as they are (None: none).
+
     After each equilibrium, films and wedges that are too thin close, and the equilibrium is sought again until none is.
-    The fluid's nodes stay where they were. Raises GrowthError where no equilibrium is found or contact does not rest.
     """
     nodes, rim, triangles = grown.mesh.body, grown.mesh.body_loop, grown.mesh.body_triangles
     reference, target = grown.origin[nodes], theta
@@ -30,7 +51,7 @@ def expand(scene, grown: Pore, theta: np.ndarray) -> tuple[Pore, int, float]:
     for _ in range(CONTACT_ROUNDS):
         body = growth.Body(reference, triangles, held_at(len(nodes), rim, wall, fixed), grown.mesh.topology)
         prescribed = _prescribed(start, rim, wall, scene.pore.width)
-        found = growth.equilibrium(body, target, start, push, prescribed)
+        found = growth.equilibrium(body, target, start, push, prescribed, forces)
         start, push, iterations = found.position, found.pressure, iterations + found.iterations
         outline = geometry.Outline(start[rim], wall, fixed, grown.origin[grown.mesh.loop])
         gaps.append(scene.pore.width - outline.thickness)

@@ -23,7 +23,7 @@ FASTER, SLOWER, SAFETY = 2.0, 0.2, 0.9
 #: An estimate up to so many tolerances is accepted.
 EXCESS = 1.5
 #: Contact is met when the film is no thinner than this part of what it may be.
-LANDED = 0.98
+LANDED = 0.995
 
 
 def simulate(scene) -> Iterator[Instant]:

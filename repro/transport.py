@@ -17,11 +17,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from skfem import Basis, BilinearForm, ElementTriP1
 
 from repro import kinetics as law
 from repro import linear
-from repro.assembly import ElementSystem, each, local
+from repro.assembly import ElementSystem, each, mass
 from repro.errors import TransportError
 from repro.flow import Flow, forms, mean_over
 from repro.mesh import PoreMesh
@@ -82,22 +81,15 @@ class Concentrations:
     iterations: int = 0
 
 
-@BilinearForm
-def advection(u, v, w):
-    """(w . grad C, v)."""
-    return (w["x_speed"] * u.grad[0] + w["y_speed"] * u.grad[1]) * v
-
-
 @timed("transport")
 def problem(mesh: PoreMesh, flow: Flow | None, substrates, kinetics, inlet: str = "local") -> Problem:
     """Assemble both substrates' linear parts for one geometry and flow (None: pure diffusion).
 
     substrates, kinetics: of a scene (kinetics None without biomass); inlet: "local" or "mean", u_x or u_ave in (11).
     """
-    basis = Basis(mesh.fem, ElementTriP1(), intorder=2)
-    dofs, count = basis.element_dofs.T, len(mesh.points)
+    dofs, count = mesh.triangles, len(mesh.points)
     scalar = mesh.once("scalar", lambda: ElementSystem(dofs, np.arange(count), np.zeros(count, bool)))
-    carried = 0.0 if flow is None else _advection(basis, mesh, flow)
+    carried = 0.0 if flow is None else advection(mesh, flow)
     operators = [_operator(mesh, flow, carried, scalar, s, inlet, substrates.boundary)
                  for s in (substrates.acceptor, substrates.donor)]
     nodes = mesh.once("node order", lambda: linear.node_order(count, dofs))
@@ -105,11 +97,10 @@ def problem(mesh: PoreMesh, flow: Flow | None, substrates, kinetics, inlet: str 
     return Problem(mesh, *operators, mesh.lumped(mesh.biomass), mesh.lumped(), substrates, kinetics, nodes, newton)
 
 
-def _advection(basis, mesh: PoreMesh, flow: Flow) -> np.ndarray:
-    """(w . grad C, v) with w = u - tau grad p, linear on each triangle: (T, 3, 3)."""
-    corner = flow.velocity[: len(mesh.points)]
-    speed = [basis.interpolate(corner[:, i]) - flow.correction[:, i][:, None] for i in (0, 1)]
-    return local(advection, basis, x_speed=speed[0], y_speed=speed[1])
+def advection(mesh: PoreMesh, flow: Flow) -> np.ndarray:
+    """(T, 3, 3) of (w . grad C, v) with w = u - tau grad p, linear on each triangle: the mass matrix times w . grad."""
+    w = flow.velocity[mesh.triangles] - flow.correction[:, None, :]
+    return mass(mesh.areas) @ (w @ np.swapaxes(mesh.gradients, 1, 2))
 
 
 def _operator(mesh: PoreMesh, flow: Flow | None, carried, scalar, substrate, inlet: str, boundary: str) -> Operator:

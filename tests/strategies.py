@@ -121,7 +121,7 @@ def scenes(draw, drives=("none", "head", "mean_velocity"), peclet=3.0, thiele=30
                      "degradable_fraction": draw(st.floats(0.0, 1.0)),
                      "maximum_density": f"{density!r} mg/L"},
         "growth": {"end": f"{step * draw(st.integers(1, steps))!r} min", "time_step": f"{step!r} min"},
-        "numerics": {"refinement": draw(st.floats(0.4, 0.7)),
+        "numerics": {"preset": "paper", "refinement": draw(st.floats(0.4, 0.7)),
                      "transfer": draw(st.sampled_from(["conserving", "linear"]))},
     }
     drive, speed = draw(st.sampled_from(drives)), draw(between(0.01, 1.0)) * peclet * slowest * DIFFUSIVITY / width
@@ -231,4 +231,5 @@ def scene(radius="5 um", width="50 um", acceptor="10 mg/L", donor="10 mg/L", vel
         tables["flow"] = {"mean_velocity": velocity} if velocity else {"head": head}
     if growth:
         tables["growth"] = growth
+    tables["numerics"] = {"preset": "paper", **tables.get("numerics", {})}
     return parse_scene(tables, "test", "test.toml")

@@ -67,13 +67,6 @@ def test_the_divergence_is_that_of_scikit_fem(grid, theirs, axis):
     assert same(ours, local(form, theirs, theirs.with_element(ElementTriP1())))
 
 
-def test_gradients_of_the_linear_functions(grid, theirs):
-    """Mutant: gradients of quadratic ones returned twice."""
-    basis = theirs.with_element(ElementTriP1())
-    for a in range(3):
-        assert same(np.moveaxis(grid.places.linear[:, :, a], 2, 0), basis.basis[a][0].grad)
-
-
 @pytest.mark.parametrize("power", range(elements.DEGREE + 1))
 def test_the_quadrature_is_exact_to_its_degree(power):
     """Integral of s^a t^b over the unit triangle: a! b! / (a + b + 2)!. Mutant: DEGREE of the rule one less."""

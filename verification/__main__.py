@@ -41,7 +41,8 @@ def selected(stages, ids, fast: bool = False) -> list[str]:
     if unknown:
         sys.exit(f"no case {unknown[0]!r}; there are {', '.join(case.CASES)}")
     wanted = stages or (case.STAGES if not ids else ())
-    return [c.id for c in case.CASES.values() if (c.stage in wanted and not (fast and c.slow)) or c.id in ids]
+    ordered = sorted(case.CASES.values(), key=lambda c: case.STAGES.index(c.stage))
+    return [c.id for c in ordered if (c.stage in wanted and not (fast and c.slow)) or c.id in ids]
 
 
 def load() -> None:

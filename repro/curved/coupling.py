@@ -192,7 +192,7 @@ def follow(scene, now: Pore, expanded: Pore):
 
 def remesh(scene, now: Pore, expanded: Pore, state: Concentrations) -> Pore:
     """A new mesh around the aggregate, which is its own reference: the expansion restarts at one, so that its mass is
-    X_m times its area; places at t = 0 and the share of X_I in the biomass are carried over."""
+    X_m times its area; places at t = 0 and the share of X_I in the biomass are carried over, its mass conserved."""
     grid, shape = pore.generate(scene, expanded.outline)
     old, count, nodes = expanded.mesh, len(grid.points), grid.body
     total = expanded.active + expanded.inert
@@ -201,6 +201,7 @@ def remesh(scene, now: Pore, expanded: Pore, state: Concentrations) -> Pore:
                                    grid.points[nodes])
     origin, inert, active = grid.points.copy(), np.zeros(count), np.zeros(count)
     origin[nodes], inert[nodes] = carried[:, :2], np.clip(carried[:, 2], 0.0, 1.0)
+    inert = _conserved(inert, elements.weights(grid.points, grid), expanded.inert_mass())
     origin[grid.loop] = shape.origin
     active[nodes] = 1 - inert[nodes]
     pressure = np.zeros(grid.corners)
@@ -209,6 +210,14 @@ def remesh(scene, now: Pore, expanded: Pore, state: Concentrations) -> Pore:
     return replace(expanded, mesh=grid, wall=shape.wall, fixed=shape.fixed, origin=transfer.unfolded(grid, origin),
                    reference=grid.points, active=active, inert=inert, pressure=pressure,
                    concentrations=_carried_substrates(scene, now, grid, state))
+
+
+def _conserved(share: np.ndarray, weight: np.ndarray, wanted: float) -> np.ndarray:
+    """Shares (N,) with the integral ``wanted``: share (1 - share) is added as often as that takes, so that they stay
+    between zero and one."""
+    room = float(weight @ (share * (1 - share)))
+    lacking = wanted - float(weight @ share)
+    return share + lacking / room * share * (1 - share) if abs(lacking) < room else share
 
 
 def _carried_substrates(scene, now: Pore, grid, state: Concentrations) -> Concentrations:

@@ -52,7 +52,9 @@ QUADRATIC, LINEAR, DERIVATIVES = functions(POINTS), linear_functions(POINTS), de
 
 def jacobian(nodes: np.ndarray, slopes: np.ndarray = DERIVATIVES) -> np.ndarray:
     """(T, q, 2, 2) d x_i / d (s, t)_k of triangles with nodes (T, 6, 2)."""
-    return np.swapaxes(nodes, 1, 2)[:, None] @ slopes[None]
+    q = len(slopes)
+    flat = np.swapaxes(nodes, 1, 2).reshape(-1, 6) @ np.swapaxes(slopes, 0, 1).reshape(6, 2 * q)
+    return np.swapaxes(flat.reshape(-1, 2, q, 2), 1, 2)
 
 
 def determinant(matrix: np.ndarray) -> np.ndarray:
@@ -62,11 +64,10 @@ def determinant(matrix: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """dx: (T, q) um2, weights of the integral; grad: (T, q, 6, 2), linear: (T, q, 3, 2) gradients, 1/um."""
+    """dx: (T, q) um2, weights of the integral; grad: (T, q, 6, 2) gradients of the nodal functions, 1/um."""
 
     dx: np.ndarray
     grad: np.ndarray
-    linear: np.ndarray
 
 
 def places(nodes: np.ndarray, slopes: np.ndarray = DERIVATIVES) -> Places:
@@ -74,12 +75,21 @@ def places(nodes: np.ndarray, slopes: np.ndarray = DERIVATIVES) -> Places:
     ``slopes`` (q, 6, 2) are taken, in the points of the quadrature by default."""
     J = jacobian(nodes, slopes)
     det = determinant(J)
-    inverse = np.empty_like(J)
-    inverse[..., 0, 0], inverse[..., 1, 1] = J[..., 1, 1], J[..., 0, 0]
-    inverse[..., 0, 1], inverse[..., 1, 0] = -J[..., 0, 1], -J[..., 1, 0]
-    inverse /= det[..., None, None]
     weight = WEIGHTS if len(slopes) == len(WEIGHTS) else np.full(len(slopes), 0.5 / len(slopes))
-    return Places(det * weight, slopes[None] @ inverse, SLOPES[None, None] @ inverse)
+    scaled = J / det[..., None, None]
+    return Places(det * weight, _turned(slopes, scaled))
+
+
+def _turned(slopes: np.ndarray, J: np.ndarray) -> np.ndarray:
+    """(T, q, 6, 2) derivatives by x and y from those by s and t (q, 6, 2), with J / det J (T, q, 2, 2).
+
+    In memory x and y come before the functions, as the products of matrices want them.
+    """
+    by_s, by_t = slopes[..., 0], slopes[..., 1]
+    found = np.empty((len(J), len(slopes), 2, 6))
+    found[:, :, 0] = by_s * J[..., 1, 1, None] - by_t * J[..., 1, 0, None]
+    found[:, :, 1] = by_t * J[..., 0, 0, None] - by_s * J[..., 0, 1, None]
+    return np.swapaxes(found, 2, 3)
 
 
 #: Products of two nodal functions in the points of the quadrature, (q, 36).

@@ -40,6 +40,11 @@ class Arcs(Outline):
         return self._extremes[2]
 
     @property
+    def highest(self) -> float:
+        """x of the largest y (um)."""
+        return self._extremes[3]
+
+    @property
     def area(self) -> float:
         """Area inside (um2): the polygon of the corners, and two thirds of chord times height for each arc."""
         a, m, b = np.moveaxis(arcs(self.points), 1, 0)
@@ -47,15 +52,15 @@ class Arcs(Outline):
         return polygon_area(self.points[::2]) + float(2 / 3 * np.sum(bow[:, 0] * chord[:, 1] - bow[:, 1] * chord[:, 0]))
 
     @cached_property
-    def _extremes(self) -> tuple[float, float, float]:
+    def _extremes(self) -> tuple[float, float, float, float]:
         nodes = arcs(self.points)
         slope = -3 * nodes[:, 0] + 4 * nodes[:, 1] - nodes[:, 2]
         bend = 4 * (nodes[:, 0] - 2 * nodes[:, 1] + nodes[:, 2])
         flat = np.abs(bend) <= 1e-12 * np.ptp(self.points)
         t = np.clip(np.where(flat, 0.0, -slope / np.where(flat, 1.0, bend)), 0.0, 1.0)
-        peak = np.einsum("mka,mak->mk", np.stack([shape(t[:, 0]), shape(t[:, 1])], axis=1), nodes)
-        x, y = (np.concatenate([peak[:, k], self.points[:, k]]) for k in (0, 1))
-        return float(x.min()), float(x.max()), float(y.max())
+        peak = np.einsum("mka,mai->mki", np.stack([shape(t[:, 0]), shape(t[:, 1])], axis=1), nodes)
+        x, y = np.concatenate([peak[:, 0], peak[:, 1], self.points]).T
+        return float(x.min()), float(x.max()), float(y.max()), float(x[y.argmax()])
 
 
 def seed(radius: float, refinement: float) -> Arcs:
@@ -142,13 +147,36 @@ def _placed(outline: Outline, keep: np.ndarray, t: np.ndarray) -> tuple[np.ndarr
     return points, wall, (t == 0) & outline.fixed[2 * keep[0]], origin
 
 
-def closing(outline: Outline, width: float, film: float, angle: float) -> np.ndarray:
+def closing(outline: Arcs, width: float, film: float, angle: float) -> np.ndarray:
     """(2 M,) wall that each node must join next, FREE where none (2.3.3).
 
-    A middle joins with both corners of its arc, never alone: an arc that touches the wall only in between would cross
-    it. A middle that is too near brings the nearer of its corners.
+    Contact with the opposite wall begins over the film's least thickness to both sides of the highest place, as the
+    paper's nodes make it: a single point could not hold the aggregate, whatever is enforced there. From then on each
+    contact line that must advance does so by one arc: what joins pulls its neighbours along, and where it ends must not
+    depend on how many are taken at once. A middle joins with both corners of its arc, never alone.
     """
     joins = geometry.closing_nodes(outline, width, film, angle)
+    if (outline.wall == geometry.TOP).any() or not (joins == geometry.TOP).any():
+        joins = _next_arcs(outline, joins)
+    else:
+        x, y = outline.points.T
+        joins[(np.abs(x - outline.highest) <= film) & (width - y < 2 * film)] = geometry.TOP
+    return _with_middles(outline, joins, width)
+
+
+def _next_arcs(outline: Arcs, joins: np.ndarray) -> np.ndarray:
+    """Of the nodes that must join, the first arc beside each contact line."""
+    first = np.full(len(joins), FREE)
+    for wall in (geometry.BOTTOM, geometry.TOP):
+        for line, step in geometry.contact_lines(outline, wall):
+            beside = (line + step * np.arange(1, 3)) % len(joins)
+            if joins[beside[0]] == wall:
+                first[beside] = np.where(outline.wall[beside] == FREE, wall, FREE)
+    return first
+
+
+def _with_middles(outline: Arcs, joins: np.ndarray, width: float) -> np.ndarray:
+    """Middles join where both corners of their arc are on the wall; one that is too near brings its nearer corner."""
     gap = np.minimum(outline.points[:, 1], width - outline.points[:, 1])
     for middle in np.flatnonzero(joins[1::2] != FREE) * 2 + 1:
         ends = np.array([middle - 1, (middle + 1) % len(joins)])

@@ -11,16 +11,13 @@ from repro import mesh as linear_mesh
 from repro.curved import elements, flow, outline, transport
 from repro.curved.mesh import CurvedMesh, curved, unlocked
 from repro.curved.outline import Arcs
-from repro.errors import TransportError
 from repro.flow import poiseuille_loss
-from repro.pore import Solved, film
+from repro.pore import Solved, film, peclet, refuse_no_supply
 from repro.transport import Concentrations
 
 #: Elements are made no larger than this asks for: the concentration boundary layer is W Pe^(-1/3) thick (Leveque), and
 #: with four elements across the pore and this factor an overshoot upstream of an aggregate stays under 1 %.
 BOUNDARY_LAYER = 0.15
-#: Under this Peclet number u W / D the inlet supplies nothing that could be told from round-off.
-SLOWEST = 1e-9
 #: Rounds in which arcs that bend too much for the triangles beside them are halved.
 HALVINGS = 6
 
@@ -63,6 +60,10 @@ class Pore:
         """(X_A + X_I) / X_m integrated over the aggregate, um2."""
         return float(self._weight() @ (self.active + self.inert))
 
+    def inert_mass(self) -> float:
+        """X_I / X_m integrated over the aggregate, um2."""
+        return float(self._weight() @ self.inert)
+
     def _weight(self) -> np.ndarray:
         """(N,) integrals of the nodal functions over the aggregate as it was when the mesh was made, um2."""
         return self.mesh.once("reference weights", lambda: elements.weights(self.reference, self.mesh))
@@ -74,8 +75,7 @@ class Pore:
         expansion = elements.at_points(self.active + self.inert, cells)
         before = elements.places(self.reference[cells]).dx
         density = expansion * before / self.mesh.places.dx[self.mesh.biomass]
-        share = float(self._weight() @ self.inert) / self.mass()
-        return share, float(density.min()), float(density.max())
+        return self.inert_mass() / self.mass(), float(density.min()), float(density.max())
 
 
 def resolution(scene) -> float:
@@ -85,7 +85,7 @@ def resolution(scene) -> float:
     """
     if scene.flow is None or scene.substrates is None:
         return scene.numerics.refinement
-    return max(scene.numerics.refinement, BOUNDARY_LAYER * _peclet(scene, _fastest(scene)) ** (1 / 3))
+    return max(scene.numerics.refinement, BOUNDARY_LAYER * peclet(scene, _fastest(scene)) ** (1 / 3))
 
 
 def _fastest(scene) -> float:
@@ -93,12 +93,6 @@ def _fastest(scene) -> float:
     if drive.head is None:
         return drive.mean_velocity
     return drive.head * drive.gravity / drive.kinematic_viscosity / poiseuille_loss(scene.pore.length, scene.pore.width)
-
-
-def _peclet(scene, speed: float) -> float:
-    """u W / D with the smaller diffusivity."""
-    kinds = (scene.substrates.acceptor, scene.substrates.donor)
-    return speed * scene.pore.width / min(min(s.diffusivity, s.diffusivity_in_aggregate) for s in kinds)
 
 
 def seeded(scene) -> Pore:
@@ -149,9 +143,7 @@ def solve(scene, now: Pore) -> Solved:
     carried = flow.solve(now.mesh, scene.flow, scene.pore.length) if scene.flow else None
     if scene.substrates is None:
         return Solved(carried, None, None)
-    if carried and _peclet(scene, carried.mean_velocity) < SLOWEST:
-        raise TransportError(f"the Peclet number u W / D is {_peclet(scene, carried.mean_velocity):.2g}, under "
-                             f"{SLOWEST:g}: nothing is supplied through the inlet; leave [flow] out for pure diffusion")
+    refuse_no_supply(scene, carried)
     found = transport.problem(now.mesh, carried, scene.substrates, scene.kinetics)
     active = active_biomass(scene, now) if scene.kinetics else None
     state = transport.steady(found, active, now.concentrations)

@@ -107,7 +107,7 @@ def free_outlet(grid: PoreMesh) -> tuple[np.ndarray, float]:
     found, count = flow.forms(grid), len(grid.points)
     held = np.zeros((count, 2), bool)
     held[grid.walls] = held[grid.inlet] = True
-    dofs = found.basis.element_dofs.T
+    dofs = found.cells
     lower = assembly.each(grid.circumdiameter**2 / 100.0, found.pressure_laplace)
     elements = assembly.saddle_blocks(symmetric_viscous(found), found.divergence, lower)
     value = np.zeros(3 * count)

@@ -81,7 +81,7 @@ def _rim(found: flow.Forms) -> np.ndarray:
 def _system(found: flow.Forms) -> ElementSystem:
     """All velocities of the rim and the first pressure prescribed."""
     rim = _rim(found)
-    system = saddle_system(found.basis.element_dofs.T, found.pressure_basis.element_dofs.T,
+    system = saddle_system(found.cells, found.mesh.triangles,
                            np.column_stack([rim, rim]))
     held = system.held.copy()
     held[2 * len(rim)] = True
@@ -91,7 +91,7 @@ def _system(found: flow.Forms) -> ElementSystem:
 def _without_flux(grid: PoreMesh, found: flow.Forms, velocity: np.ndarray) -> np.ndarray:
     """The rim's velocity (n, 2) less the part c (x, y), in the fluid, of what the interpolated values would pump in: a
     discrete incompressible flow can have none. c is of the order of the interpolation's error."""
-    dofs, rim = found.basis.element_dofs.T, _rim(found)
+    dofs, rim = found.cells, _rim(found)
 
     def flux(field):
         return np.einsum("tbi,ti->", found.divergence, np.concatenate([field[dofs, 0], field[dofs, 1]], axis=1))

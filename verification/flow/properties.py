@@ -71,7 +71,7 @@ def energy() -> Outcome:
 def _power(grid: PoreMesh, unit: flow.UnitFlow) -> tuple[float, float]:
     """Work of the inlet's forces on the unit flow, and a(u, u) + (tau grad p, grad p)."""
     found = flow.forms(grid)
-    dofs, viscosity = found.basis.element_dofs.T, np.where(grid.biomass, RATIO, 1.0)
+    dofs, viscosity = found.cells, np.where(grid.biomass, RATIO, 1.0)
     local = np.concatenate([unit.velocity[dofs, 0], unit.velocity[dofs, 1], unit.pressure[dofs]], axis=1)
     upper = np.einsum("tab,tbi,tai,t->", found.laplace, unit.velocity[dofs], unit.velocity[dofs], viscosity)
     blocks = saddle_blocks(flow._viscous(found, viscosity, "laplacian"), found.divergence,

@@ -1,0 +1,75 @@
+"""Time jobs side by side: each round runs all of them once, so that whatever else the machine does hits all alike."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from math import isfinite
+from statistics import median
+from time import perf_counter, process_time
+
+#: A job that takes longer than this (s) is its own warm-up, and is run a third as often.
+LONG = 4.0
+
+
+@dataclass
+class Timed:
+    """What a job took, run by run, and what it returned last: a dictionary with its "error" and whatever else."""
+
+    seconds: list[float] = field(default_factory=list)
+    cpu: list[float] = field(default_factory=list)
+    found: dict = field(default_factory=dict)
+    reason: str = ""
+
+    def run(self, job: Callable[[], dict]) -> None:
+        """Once more; a job that fails says why, and is not run again."""
+        gc.collect()
+        wall, spent = perf_counter(), process_time()
+        try:
+            found = job()
+        except Exception as error:
+            self.reason = f"{type(error).__name__}: {error}"
+            return
+        wall, spent = perf_counter() - wall, process_time() - spent
+        self.found = found() if callable(found) else found
+        apart = self.found.get("apart_seconds", 0.0)
+        self.seconds.append(wall - apart)
+        self.cpu.append(spent - apart)
+        if not isfinite(self.found.get("error", 0.0)):
+            self.reason = "its error is not a number"
+
+
+Jobs = Mapping[tuple[str, str], Callable[[], dict]]
+
+
+def measured(jobs: Jobs, repeats: int) -> list[dict]:
+    """Lines of a part from jobs {(method, label): job}, in the order in which methods first come.
+
+    A job returns {"error": ..., ...}, or a function that returns it and is not timed; "apart_seconds" of it are taken
+    off the time. The first run of a short one only warms up.
+    """
+    times = {key: Timed() for key in jobs}
+    for key, job in jobs.items():
+        times[key].run(job)
+    long = {key for key, timed in times.items() if timed.seconds and timed.seconds[0] > LONG}
+    for key in times.keys() - long:
+        times[key].seconds.clear()
+        times[key].cpu.clear()
+    for turn in range(repeats):
+        for key, job in jobs.items():
+            if not times[key].reason and (key not in long or 0 < turn < repeats / 3):
+                times[key].run(job)
+    return _lines(times)
+
+
+def _lines(times: Mapping[tuple[str, str], Timed]) -> list[dict]:
+    lines: dict[str, dict] = {}
+    for (method, label), timed in times.items():
+        line = lines.setdefault(method, {"method": method, "points": [], "failed": []})
+        if timed.reason:
+            line["failed"].append({"label": label, "reason": timed.reason})
+        else:
+            line["points"].append({"label": label, "seconds": median(timed.seconds), "cpu": median(timed.cpu),
+                                   "repeats": len(timed.seconds), **timed.found})
+    return list(lines.values())

@@ -1,0 +1,159 @@
+"""Diffusion and dual Monod uptake as a user of other packages would solve it: FiPy, py-pde, and plain scikit-fem.
+
+    -D lap C + u dC/dx + X q(C_A, C_D) = 0       for both substrates, X in the biomass alone, D the same everywhere
+
+with u = 0 and the supply held at both ends, or with (11)-(12) there. FiPy takes both equations coupled, the uptake
+linearised as its manual advises (Newton's method) and a direct solver. py-pde integrates in time to rest, compiled by
+numba, by Euler's explicit steps (its adaptive Runge-Kutta took longer); and, as one who knows it well would
+do, its Laplacian's matrix is read off for Newton's method (:mod:`reference.diffusion_reaction_pypde`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+from fipy import CellVariable, CentralDifferenceConvectionTerm, DiffusionTerm, Grid1D, Grid2D, ImplicitSourceTerm
+from fipy import LinearLUSolver as DirectSolver
+from pde import PDE, CallbackTracker, CartesianGrid, Controller, EulerSolver, FieldCollection, ScalarField
+
+from reference.monod import uptake
+
+#: Newton's method of FiPy stops at this change over the supply.
+REST, MOST = 1e-8, 40
+#: py-pde runs for so many diffusion times L^2 / D of the domain, after which exp(-pi^2 TIMES) is left of the start, in
+#: steps of this part of h^2 / D and dimension, of which a half is stable; watched in so many parts.
+TIMES, STABLE, PARTS = 1.5, 0.4, 100
+NUDGE = 1e-6
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Biomass of density X (mg/L) where ``inside(x, y)``; supply, diffusivity: pairs; speed: u (um/h); rates: as
+    :mod:`reference.monod` takes them; ends, width: um, width None in one dimension."""
+
+    ends: tuple[float, float]
+    width: float | None
+    inside: object
+    density: float
+    supply: tuple[float, float]
+    diffusivity: tuple[float, float]
+    rates: dict
+    speed: float = 0.0
+
+    def cells(self, across: int) -> tuple[int, ...]:
+        """Cells along (and across) with ``across`` to the width, or to the length in one dimension."""
+        if self.width is None:
+            return (across,)
+        return round((self.ends[1] - self.ends[0]) / self.width * across), across
+
+    def amounts(self, fields, load) -> np.ndarray:
+        """(2,) what is taken up, um2 mg/L/h (um mg/L/h in one dimension), with load = X times the cells' areas."""
+        return np.array([np.sum(load * q) for q in uptake(*fields, self.rates)])
+
+
+def fipy(problem: Problem, across: int) -> tuple[np.ndarray, np.ndarray]:
+    """Uptake (2,), and C (2,) in the last cell."""
+    mesh = _fipy_mesh(problem, across)
+    x = mesh.cellCenters.value
+    where = problem.inside(*x) if len(x) == 2 else problem.inside(x[0])
+    X = CellVariable(mesh=mesh, value=np.where(where, problem.density, 0.0))
+    both = [CellVariable(mesh=mesh, value=s) for s in problem.supply]
+    constants = [CellVariable(mesh=mesh) for _ in both]
+    slopes = [[CellVariable(mesh=mesh) for _ in both] for _ in both]
+    equation = None
+    for k, field in enumerate(both):
+        one = DiffusionTerm(coeff=problem.diffusivity[k], var=field) == X * constants[k]
+        for other, slope in zip(both, slopes[k]):
+            one = one + ImplicitSourceTerm(coeff=-X * slope, var=other)
+        one = one + _fipy_ends(problem, mesh, field, k)
+        equation = one if equation is None else equation & one
+    for _ in range(MOST):
+        before = np.array([field.value for field in both])
+        _linearise(problem, before, constants, slopes)
+        equation.sweep(solver=DirectSolver())
+        if np.abs(np.array([field.value for field in both]) - before).max() < REST * max(problem.supply):
+            break
+    fields = np.array([field.value for field in both])
+    return problem.amounts(fields, X.value * mesh.cellVolumes), fields[:, -1]
+
+
+def _fipy_mesh(problem: Problem, across: int):
+    count, length = problem.cells(across), problem.ends[1] - problem.ends[0]
+    if problem.width is None:
+        return Grid1D(nx=count[0], dx=length / count[0]) + (problem.ends[0],)
+    return Grid2D(nx=count[0], ny=count[1], dx=length / count[0], dy=problem.width / count[1]) + (
+        (problem.ends[0],), (0.0,))
+
+
+def _fipy_ends(problem: Problem, mesh, field, k: int):
+    """The supply at both ends; or advection, its inflow u (C_supply - C) a source in the first cell, and no gradient at
+    the outlet, without which FiPy's outlet passes nothing."""
+    if not problem.speed:
+        field.constrain(problem.supply[k], mesh.facesLeft | mesh.facesRight)
+        return 0.0
+    field.faceGrad.constrain([0.0], where=mesh.facesRight)
+    first = CellVariable(mesh=mesh, value=0.0)
+    first[0] = problem.speed / mesh.dx
+    return first * problem.supply[k] - CentralDifferenceConvectionTerm(coeff=(problem.speed,), var=field)
+
+
+def _linearise(problem: Problem, now, constants, slopes) -> None:
+    """q = constant + sum of slopes times C at the present C; slopes by central differences."""
+    rate = np.array(uptake(*now, problem.rates))
+    columns = [(np.array(uptake(*(now + d), problem.rates)) - np.array(uptake(*(now - d), problem.rates))) / (2 * NUDGE)
+               for d in NUDGE * np.eye(2)[:, :, None]]
+    for k in (0, 1):
+        constants[k].setValue(rate[k] - sum(column[k] * c for column, c in zip(columns, now)))
+        for j in (0, 1):
+            slopes[k][j].setValue(columns[j][k])
+
+
+def py_pde(problem: Problem, across: int) -> tuple[np.ndarray, np.ndarray, float]:
+    """Uptake (2,), C (2,) in the last cell, and the seconds before the run's first hundredth is over, less those of
+    another hundredth: numba compiles in them."""
+    grid = _pde_grid(problem, across)
+    where = problem.inside(*np.moveaxis(grid.cell_coords, -1, 0))
+    X = ScalarField(grid, np.where(where, problem.density, 0.0))
+    ends = {f"{name}:*": _pde_ends(problem, k) for k, name in enumerate("AD")}
+    equation = PDE(_pde_rules(problem), consts={"X": X}, bc_ops=ends)
+    state = FieldCollection([ScalarField(grid, s, label=name) for s, name in zip(problem.supply, "AD")])
+    time = TIMES * (problem.ends[1] - problem.ends[0]) ** 2 / min(problem.diffusivity)
+    dt = STABLE * min(grid.discretization) ** 2 / max(problem.diffusivity) / grid.num_axes
+    marks = [perf_counter()]
+    watch = CallbackTracker(lambda state, t: marks.append(perf_counter()), interrupts=time / PARTS)
+    found = Controller(EulerSolver(equation, backend="numba"), t_range=time, tracker=watch).run(state, dt=dt)
+    fields = np.array([part.data.ravel() for part in found])
+    load = X.data.ravel() * np.prod(grid.discretization)
+    return problem.amounts(fields, load), fields[:, -1], _compiled(marks)
+
+
+def _compiled(marks: list[float]) -> float:
+    """Seconds to the second mark of a callback (the first is at t = 0), less a mean interval of the others."""
+    return marks[2] - marks[0] - (marks[-1] - marks[2]) / (len(marks) - 3)
+
+
+def _pde_grid(problem: Problem, across: int) -> CartesianGrid:
+    box = [list(problem.ends)] if problem.width is None else [list(problem.ends), [0.0, problem.width]]
+    return CartesianGrid(box, list(problem.cells(across)))
+
+
+def _pde_rules(problem: Problem) -> dict[str, str]:
+    """The equations as py-pde reads them."""
+    r = problem.rates
+    m_a, m_d = f"A / (A + {r['K_A']})", f"D / (D + {r['K_D']})"
+    sinks = (f"X * {m_a} * ({r['k'] * r['F']} * {m_d} + {r['decay']})", f"X * {r['k']} * {m_a} * {m_d}")
+    carried = [f" - {problem.speed} * d_dx({name})" if problem.speed else "" for name in "AD"]
+    return {name: f"{d} * laplace({name}){carry} - {sink}"
+            for name, d, carry, sink in zip("AD", problem.diffusivity, carried, sinks)}
+
+
+def _pde_ends(problem: Problem, k: int) -> dict:
+    supply, spread = problem.supply[k], problem.diffusivity[k]
+    if not problem.speed:
+        ends = {"x": {"value": supply}}
+    else:
+        share = problem.speed / spread
+        ends = {"x-": {"type": "mixed", "value": share, "const": share * supply}, "x+": {"derivative": 0.0}}
+    return ends if problem.width is None else {**ends, "y": {"derivative": 0.0}}

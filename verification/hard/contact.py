@@ -1,0 +1,231 @@
+"""Hard cases of contact: the film's end with remeshing forced, the least angle, a seed as wide as the pore, its ends."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from functools import partial
+from unittest import mock
+
+import numpy as np
+
+from reference import poiseuille
+from repro import flow, geometry, mesh, remeshing, stepping
+from repro.curved import coupling as curved_coupling
+from repro.curved import flow as curved_flow
+from repro.curved import outline as curved_outline
+from repro.curved import pore as curved_pore
+from repro.curved.outline import Arcs
+from repro.geometry import FREE, TOP, Outline
+from repro.results import M_PER_D
+from verification.case import Check, at_least, at_most, between
+from verification.hard import common
+from verification.hard.common import DRIVE, EFFLUENTS, FIXED, SHAPE, TOLERANCE, HardCase, Run
+
+FILM = ('pore.width="20 um"', 'aggregate.radius="17.6 um"', 'growth.end="1 h"')
+
+
+@contextmanager
+def remeshing_always():
+    """Every step ends with a new mesh."""
+    def linear(scene, now, expanded, solved):
+        return remeshing.remesh(scene, now, expanded, solved), True
+
+    def quadratic(scene, now, expanded, state):
+        return curved_coupling.remesh(scene, now, expanded, state), True
+
+    with mock.patch.object(remeshing, "new_mesh", linear), mock.patch.object(curved_coupling, "new_mesh", quadratic):
+        yield
+
+
+@contextmanager
+def landings(preset: str, found: list):
+    """Collects the films (um) of accepted steps that make contact: before them, after them, and the least that stays."""
+    advance = stepping._advance
+
+    def watched(scheme, scene, now, solved, time, length):
+        seen = []
+
+        def attempt(*given):
+            seen.append(scheme.attempt(*given))
+            return seen[-1]
+
+        watched_scheme = mock.Mock(attempt=attempt, solve=scheme.solve)
+        done = advance(watched_scheme, scene, now, solved, time, length)
+        found.extend([seen[-1].gaps] if seen[-1].gaps else [])
+        return done
+
+    with mock.patch.object(stepping, "_advance", watched):
+        yield
+
+
+def film_closes(preset: str, forced: bool) -> list:
+    """From a film of 2.4 um through contact; forced: every step remeshes, also those just before and after it."""
+    landed = []
+    with landings(preset, landed):
+        if forced:
+            with remeshing_always():
+                found = common.run("wide", preset, *FILM)
+        else:
+            found = common.run("wide", preset, *FILM)
+    fine = common.reference("wide", *FILM, 'output.times=["1 h"]')
+    checks = [found, *contact_rests(found), *common.close(found, fine, preset, "aggregate_area_um2", *EFFLUENTS),
+              *_edge_wide(found, fine, preset)]
+    if preset != "paper":
+        thinnest = min((gaps[1] / gaps[2] for gaps in landed), default=0.0)
+        checks.append(between("film when it closes over the least that stays", thinnest, stepping.LANDED, 1.0,
+                              "a step ends where the film is first too thin: stepping.LANDED"))
+    return checks
+
+
+def _edge_wide(found: Run, fine: Run, preset: str) -> list[Check]:
+    """Nodes join a wall one by one: each end of the contact surface is known to an edge of the interface, h.
+
+    The surface's length c is then known to 2 h. Of the loss of head, that of L K_clean / K um of clean channel, lambda
+    dc is changed by dc; and a film closed over one h more adds h film to both sides of a plug W high."""
+    width, ratio = found.scene.pore.width, found.scene.flow.viscosity_ratio
+    film = found.scene.growth.minimum_film
+    edge = film / geometry.ACROSS_FILM / found.scene.numerics.refinement
+    drive = found.scene.flow
+    clean = poiseuille.conductivity(width, drive.kinematic_viscosity / drive.gravity) * M_PER_D
+    loss = found.scene.pore.length * clean / fine.last[DRIVE[0]]
+    ours, theirs = (_contact_length(run) for run in (found, fine))
+    bounds = {DRIVE[0]: 2 * edge * ratio / loss, **{tip: edge * film / width / abs(fine.last[tip]) for tip in SHAPE[2:]}}
+    return [at_most("length of the contact surface against a finer run, um", abs(ours - theirs), 2 * edge,
+                    "an edge of the interface at each end"),
+            *(check for name, more in bounds.items() for check in common.close(
+                found, fine, preset, name, allowed=TOLERANCE[preset] + more))]
+
+
+def _contact_length(found: Run) -> float:
+    """Of the last instant's surface on the upper wall, um."""
+    shape = found.instants[-1].pore.outline
+    return float(np.ptp(shape.points[shape.wall == TOP, 0])) if (shape.wall == TOP).any() else 0.0
+
+
+def contact_rests(found: Run) -> list[Check]:
+    """What holds at every instant of a run through contact."""
+    width, film, open_nodes, crossed = found.scene.pore.width, found.scene.growth.minimum_film, 0, 0
+    before = [width - i.pore.outline.thickness for i in found.instants if not i.pore.contact]
+    for instant in found.instants:
+        shape = instant.pore.outline
+        closing = curved_outline.closing if isinstance(shape, Arcs) else geometry.closing_nodes
+        open_nodes += int(np.count_nonzero(closing(shape, width, film, found.scene.growth.minimum_contact_angle)))
+        crossed += int(shape.points[:, 1].max() > width or shape.points[:, 1].min() < 0)
+    return [at_most("nodes whose film or wedge should have closed", open_nodes, 0, "contact rests after every step (2.3.3)"),
+            at_most("instants with nodes beyond a wall", crossed, 0, "the walls hold"),
+            at_least("instants in contact", sum(i.pore.contact for i in found.instants), 1, "else less is tested"),
+            at_least("thinnest film left open, um", min(before, default=film), film, "2.3.3: it closes")]
+
+
+CONTACT = HardCase(
+    7, "contact", "Film of 2 um and contact, with remeshing forced just before and after",
+    "The same shape and flow with and without forced remeshes, no film under 2 um left, the area that of the biomass",
+    "A film that is passed over in one step, overlaps the wall, or a remesh that moves the contact",
+    {"as it comes": partial(film_closes, forced=False), "remeshed at every step": partial(film_closes, forced=True)})
+
+
+LEAST = 16.7
+
+
+def wedge(angle: float) -> tuple[np.ndarray, ...]:
+    """Points, wall, fixed of a plug 20 um high, whose sides leave the upper wall at an angle (degrees) in the fluid."""
+    height, half, side = 20.0, 30.0, np.linspace(0, 1, 13)[1:-1]
+    reach = height / np.tan(np.deg2rad(angle))
+    bottom, top = np.linspace(-half - reach, half + reach, 17), np.linspace(half, -half, 9)
+    right = np.column_stack([half + reach * (1 - side), height * side])
+    points = np.vstack([np.column_stack([bottom, 0 * bottom]), right, np.column_stack([top, 0 * top + height]),
+                        right[::-1] * [-1, 1]])
+    wall = np.repeat([geometry.BOTTOM, FREE, TOP, FREE], [len(bottom), len(side), len(top), len(side)])
+    fixed = np.isin(np.arange(len(points)), [8, len(bottom) + len(side) + 4])
+    return points, wall, fixed, points.copy()
+
+
+def least_angle(preset: str) -> list:
+    """The stage alone: which nodes join the wall a tenth of a degree under and over the least angle."""
+    kind, closing = (Outline, geometry.closing_nodes) if preset == "paper" else (Arcs, curved_outline.closing)
+    under, over = (closing(kind(*wedge(angle)), 20.0, 2.0, np.deg2rad(LEAST)) for angle in (LEAST - 0.1, LEAST + 0.1))
+    x = wedge(LEAST)[0][:, 0]
+    return [at_least("nodes a side that join, a tenth of a degree under", min(
+                (under[x > 0] != FREE).sum(), (under[x < 0] != FREE).sum()), 1, "2.3.3: the wedge closes"),
+            at_most("nodes that join, a tenth of a degree over", (over != FREE).sum(), 0, "2.3.3: it stays")]
+
+
+def in_a_wedge(preset: str) -> list:
+    """The stage alone: a mesh around a plug with sides at the least angle, and the flow through it."""
+    made = common.scene("wide", preset, 'pore.width="20 um"')
+    losses = [_loss(preset, made), _loss("accurate", common.scene("wide", "accurate", 'pore.width="20 um"',
+                                                                  "numerics.refinement=1"))]
+    return [at_most("head loss against a finer mesh", abs(losses[0] / losses[1] - 1), 3 * TOLERANCE[preset],
+                    "that of velocity, times three: the loss is lambda h^-3")]
+
+
+def _loss(preset: str, made) -> float:
+    """Loss over the meshed part, 1/um."""
+    if preset != "paper":
+        grid, _ = curved_pore.generate(made, Arcs(*wedge(LEAST)))
+        return curved_flow.unit_flow(grid, made.flow.viscosity_ratio)[2]
+    shape = Outline(*wedge(LEAST))
+    ends = geometry.meshed_extent(shape, 20.0, made.pore.length)
+    grid, _ = mesh.generate(shape, ends, 20.0, made.numerics.refinement, 2.0)
+    return flow.unit_flow(grid, made.flow.viscosity_ratio).loss
+
+
+def wedges_close(preset: str) -> list:
+    """From contact on until wedges beside it close one after the other."""
+    found = common.run("wide", preset, 'pore.width="20 um"', 'aggregate.radius="17.9 um"', 'growth.end="4 h"')
+    lengths = [np.ptp(i.pore.outline.points[i.pore.wall == TOP, 0]) for i in found.instants if i.pore.contact]
+    return [found, *contact_rests(found),
+            at_least("length of the contact surface at the end, over that at first", lengths[-1] / lengths[0], 1.5,
+                     "nodes never leave; else less is tested"),
+            at_most("um by which it ever shrinks", max(0.0, -np.diff(lengths).min(initial=0.0)), 0.5,
+                    "nodes keep the wall; between fixed nodes the surface may slide")]
+
+
+ANGLE = HardCase(
+    8, "least-angle", "Contact at the least angle",
+    "Wedges under 16.7 degrees close and others stay; meshes and flow in a wedge of 16.7 degrees as on a finer mesh",
+    "Slivers of fluid, triangles turned over at the contact line, or contact that comes and goes",
+    {"which nodes join": least_angle, "flow beside a wedge": in_a_wedge, "wedges that close": wedges_close})
+
+
+def tight(preset: str, radius: float, end: str) -> list:
+    """Base with a seed nearly as wide as its pore of 50 um."""
+    changes = (f'aggregate.radius="{radius} um"', f'growth.end="{end}"', f'output.times=["{end}"]')
+    found = common.run("base", preset, *changes)
+    frozen, fine = (run("base", *more, *FIXED, f'aggregate.radius="{radius} um"') for run, more in (
+        (common.run, (preset,)), (common.reference, ())))
+    clean = poiseuille.conductivity(50.0, found.scene.flow.kinematic_viscosity / found.scene.flow.gravity) * M_PER_D
+    return [found, frozen, *common.close(frozen, fine, preset, *DRIVE, *EFFLUENTS),
+            between("conductivity over that of the clean pore", found.last[DRIVE[0]] / clean, 1e-5,
+                    frozen.last[DRIVE[0]] / clean, "falls as the aggregate grows, and lambda is 2000")]
+
+
+TIGHT = HardCase(
+    15, "tight", "Pore nearly as wide as the seed",
+    "Conductivity and effluents of a finer run, falling as the aggregate grows",
+    "A film without elements across it, or one that was under 2 um from the start and never closes",
+    {"45 of 50 um": partial(tight, radius=45, end="2 h"), "49 of 50 um": partial(tight, radius=49, end="0.4 h")},
+    refusable=("45 of 50 um", "49 of 50 um"))
+
+
+def to_the_end(preset: str) -> list:
+    """A pore that is 90 um long, 30 um wide: the aggregate grows to its upstream end."""
+    changes = ('pore.width="30 um"', 'pore.length="90 um"', 'aggregate.radius="25 um"', 'growth.end="60 h"')
+    found = common.run("wide", preset, *changes)
+    ends = np.array([i.pore.mesh.ends for i in found.instants])
+    tips = np.array([[line["upstream_um"], line["downstream_um"]] for line in found.rows])
+    beyond = max(0.0, (-45 - tips[:, 0]).max(), (tips[:, 1] - 45).max())
+    return [found, at_most("runs that did not say that the pore's end is reached", not found.ended, 0, "PoreEnd"),
+            at_most("um of mesh or aggregate beyond the pore", max(beyond, np.abs(ends).max() - 45), 0, "3.1: capped"),
+            at_most("um of pore left without mesh", 45 - np.abs(ends[-1]).min(), 0, "1.5 W is past both ends"),
+            at_most("um between the aggregate and the end, at the end", 45 - np.abs(tips[-1]).max(), 30 / 14,
+                    "an element of W / 14")]
+
+
+END = HardCase(
+    16, "pore-end", "Aggregate at the pore's end",
+    "A mesh capped at the pore's ends, balances to the last step, and a run that ends by saying which end was reached",
+    "An aggregate that grows out of the pore, or a mesh squeezed to nothing between it and the end",
+    {"wide, short": to_the_end})
+
+CASES = (CONTACT, ANGLE, TIGHT, END)
