@@ -142,6 +142,8 @@ class Numerics:
     interface: str = choice("laplacian", "traction")  # [E2]
     inlet: str = choice("local", "mean")  # u_x(y) or u_ave in (11) [E4]
     fixed_point: str = choice("kept", "rechosen")  # of a contact surface, 2.3.3
+    solver: str = choice("superlu", "pardiso")  # of linear systems; the second needs the package pypardiso
+    ordering: str = choice("degree", "metis")  # of nodes before SuperLU; the second needs the package pymetis
     refinement: float = number(1.0, UP_TO_20)  # element sizes are divided by it
     flow_element: str = choice("stabilised", "bubble")  # 3.2, or linear velocities with a bubble (MINI)
     flow_stabilisation: float = number(100.0)  # 3.2: tau = h^2 / (flow_stabilisation nu) [E13]

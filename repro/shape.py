@@ -25,13 +25,15 @@ def expand(scene, grown: Pore, theta: np.ndarray) -> tuple[Pore, int, float]:
     """
     if scene.growth.fluid_forces == "neglected":
         return _at_rest(scene, grown, theta, None)
-    forces, last, iterations = traction.forces(scene, grown, grown), grown, 0
-    for _ in range(FORCE_ROUNDS):
-        found, used, gap = _at_rest(scene, grown, theta, forces)
+    around, last, iterations = traction.surroundings(scene, grown, grown), grown, 0
+    for count in range(FORCE_ROUNDS):
+        found, used, gap = _at_rest(scene, grown, theta, traction.forces(scene, around, last))
         moved, iterations = np.abs(found.mesh.points - last.mesh.points).max(), iterations + used
         if moved <= FORCE_REST * found.outline.thickness:
             return found, iterations, gap
-        forces, last = traction.forces(scene, grown, found), found
+        if count == 0 or (found.wall != last.wall).any():
+            around = traction.surroundings(scene, grown, found)
+        last = found
     raise GrowthError(f"the fluid's forces and the shape do not agree after {FORCE_ROUNDS} rounds, a node still moves "
                       f"by {moved:.2g} um: the aggregate is too soft for this flow; try a shorter growth.time_step, a "
                       'larger growth.shear_modulus, or growth.fluid_forces = "neglected"')

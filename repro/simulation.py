@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from repro import coupling, stepping
+from repro import coupling, linear, stepping
 from repro.coupling import Instant
 
 
@@ -14,4 +14,5 @@ def simulate(scene) -> Iterator[Instant]:
     Raises SimulationError where a stage fails, and PoreEnd, after a last Instant, where the aggregate reaches an end of
     the pore.
     """
+    linear.use(scene.numerics.solver, scene.numerics.ordering)
     return (stepping if scene.numerics.time == "midpoint" else coupling).simulate(scene)

@@ -76,7 +76,7 @@ def _targets(scene) -> list[float]:
 
 def _advance(scheme, scene, now, solved, time: float, length: float):
     """The first step that is good enough, what is solved after it, and the length (h) to try next."""
-    tolerance, shortest = scene.numerics.tolerance, SHORTEST * scene.growth.time_step
+    tolerance, shortest, asked = scene.numerics.tolerance, SHORTEST * scene.growth.time_step, length
     while True:
         duration = _fitted(length, time - now.time)
         try:
@@ -84,9 +84,10 @@ def _advance(scheme, scene, now, solved, time: float, length: float):
             factor = _factor(found.change * duration, tolerance)
             if duration <= shortest or _good(found, factor):
                 taken = _ending_at(found.step, now.time + duration, time)
-                return taken, scheme.solve(scene, taken.pore), _next(length, duration, factor)
+                following = asked if found.gaps else _next(length, duration, factor)  # contact alone made it short
+                return taken, scheme.solve(scene, taken.pore), following
             length = duration * (_to_contact(found.gaps) if _overshoots(found) else factor)
-        except (StageError, FloatingPointError):
+        except (PoreEnd, StageError, FloatingPointError):
             if duration <= shortest:
                 raise
             length = duration / 2

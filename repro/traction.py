@@ -15,37 +15,63 @@ that touches walls and fluid alone.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from repro import geometry, pore, remeshing
+from repro import mesh_motion, pore, remeshing, reprojection
+from repro.errors import GrowthError
 from repro.flow import Flow
 from repro.mesh import PoreMesh
 from repro.pore import Pore
 
 #: rho g in MPa/um, for rho in mg/L and g in um/h^2.
 MPA_PER_UM = 1e-3 * 1e-6 / 3600**2 * 1e-12
+#: A shape this near to that of the mesh around it, over W, needs no other.
+ROUND_OFF = 1e-14
 
 
-def forces(scene, before: Pore, shaped: Pore) -> np.ndarray:
-    """(n, 2) um: nodal forces over mu_L on ``shaped.mesh.body`` by the flow around that shape.
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """The mesh in which the flow around a shape is solved. It may be another than the aggregate's own.
 
-    before: a pore of the same topology with a good mesh; the fluid's nodes of ``shaped`` need not have followed.
+    grid: the mesh; nodes: (k, a) numbers in ``mesh.body`` of the aggregate's own mesh, and share: (k, a) their weights:
+    a node of ``grid.body`` is the mean of their places, and what pushes it pushes them in these shares.
     """
+
+    grid: PoreMesh
+    nodes: np.ndarray
+    share: np.ndarray
+
+
+def surroundings(scene, before: Pore, shaped: Pore) -> Surroundings:
+    """The mesh that has followed the aggregate from a pore with a good mesh, or a new one where that is due."""
     grid = before.mesh if shaped is before else remeshing.followed(scene, before, shaped)
-    new = grid is None
-    if new:
-        grid, _ = remeshing.anew(scene, shaped.outline)
-    found = pore.solve_flow(scene, replace(shaped, mesh=grid))
+    if grid is not None:
+        own = np.arange(len(grid.body))[:, None]
+        return Surroundings(grid, own, np.ones(own.shape))
+    grid, _ = remeshing.anew(scene, shaped.outline)
+    body = shaped.mesh.body
+    found, share = reprojection.locate(shaped.mesh.points[body], shaped.mesh.body_triangles, grid.points[grid.body])
+    return Surroundings(grid, shaped.mesh.body_triangles[found], share)
+
+
+def forces(scene, around: Surroundings, shaped: Pore) -> np.ndarray:
+    """(n, 2) um: nodal forces over mu_L on ``shaped.mesh.body`` by the flow around that shape."""
+    grid, own = around.grid, shaped.mesh.points[shaped.mesh.body]
+    places = np.einsum("ka,kai->ki", around.share, own[around.nodes])
+    if np.abs(places - grid.points[grid.body]).max() > ROUND_OFF * grid.width:
+        numerics = scene.numerics
+        grid = grid.moved(mesh_motion.move(grid, places, numerics.mesh_compressibility, numerics.flow_stabilisation))
+    if grid.areas.min() <= 0:
+        raise GrowthError("the fluid's forces move the aggregate so far that the mesh around it turns over; "
+                          'try a shorter growth.time_step, or growth.fluid_forces = "neglected"')
     drive = scene.flow
-    scale = MPA_PER_UM * drive.density * drive.gravity / scene.growth.shear_modulus
-    on = scale * nodal(grid, found, drive.kinematic_viscosity / drive.gravity, scene.numerics.interface)
-    if not new:
-        return on[shaped.mesh.body]
-    loaded = np.zeros((len(shaped.mesh.body), 2))
-    loaded[shaped.mesh.body_loop] = _shared_out(shaped.outline, grid.points[grid.loop], on[grid.loop])
-    return loaded
+    found = pore.solve_flow(scene, replace(shaped, mesh=grid))
+    on = nodal(grid, found, drive.kinematic_viscosity / drive.gravity, scene.numerics.interface)[grid.body]
+    total = np.zeros_like(own)
+    np.add.at(total, around.nodes, around.share[..., None] * on[:, None])
+    return MPA_PER_UM * drive.density * drive.gravity / scene.growth.shear_modulus * total
 
 
 def nodal(grid: PoreMesh, found: Flow, viscosity: float, interface: str) -> np.ndarray:
@@ -61,19 +87,3 @@ def nodal(grid: PoreMesh, found: Flow, viscosity: float, interface: str) -> np.n
     stress = viscosity * grad - found.head[nodes].mean(axis=1)[:, None, None] * np.eye(2)
     local = -grid.areas[wet][:, None, None] * np.einsum("tik,tak->tai", stress, slopes)
     return np.column_stack([np.bincount(nodes.ravel(), local[..., i].ravel(), len(grid.points)) for i in (0, 1)])
-
-
-def _shared_out(outline: geometry.Outline, places: np.ndarray, on: np.ndarray) -> np.ndarray:
-    """(M, 2) forces at the outline's nodes that stand for forces ``on`` (K, 2) at places (K, 2) along its interface:
-    each is shared between the ends of its edge so that force and moment stay."""
-    first = np.flatnonzero(outline.interface_edges())
-    last = (first + 1) % len(outline.points)
-    start, along = outline.points[first], outline.points[last] - outline.points[first]
-    part = np.einsum("kei,ei->ke", places[:, None] - start, along) / np.sum(along**2, axis=1)
-    part = np.clip(part, 0.0, 1.0)
-    nearest = np.hypot(*np.moveaxis(start + part[..., None] * along - places[:, None], 2, 0)).argmin(axis=1)
-    part = part[np.arange(len(places)), nearest][:, None]
-    found = np.zeros_like(outline.points)
-    np.add.at(found, first[nearest], (1 - part) * on)
-    np.add.at(found, last[nearest], part * on)
-    return found

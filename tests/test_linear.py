@@ -83,3 +83,39 @@ def test_a_node_order_is_a_permutation_that_saves_fill():
 def fill(matrix):
     return sp.linalg.splu(sp.csc_matrix(matrix), permc_spec="NATURAL", diag_pivot_thresh=0.0,
                           options={"SymmetricMode": True}).nnz
+
+
+@pytest.fixture
+def default():
+    """What is chosen for other tests afterwards."""
+    yield
+    linear.use("superlu", "degree")
+
+
+@pytest.mark.parametrize("solver, ordering, package", [("pardiso", "degree", "pypardiso"),
+                                                       ("superlu", "metis", "pymetis")])
+def test_optional_packages_give_the_same_or_are_named(solver, ordering, package, default):
+    """The same solution by both, to round-off; one clear error where the package is not there. Mutants: METIS' inverse
+    permutation in place of the order, a missing package passed over in silence."""
+    try:
+        __import__(package)
+    except ImportError:
+        with pytest.raises(LinearError, match=f"package {package} is not installed"):
+            linear.use(solver, ordering)
+        return
+    grid = meshed(None, 50.0, 0.6)[0]
+    elements, right = grid.triangles, np.ones(60)
+    matrix = saddle(40, 3)
+    expected, plain = linear.solve(matrix, right), linear.node_order(len(grid.points), elements)
+    linear.use(solver, ordering)
+    assert linear.solve(matrix, right) == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    fill = [_fill(grid, order) for order in (plain, linear.node_order(len(grid.points), elements))]
+    assert fill[1] <= 1.3 * fill[0]
+
+
+def _fill(grid, order):
+    """Entries of the factor of the mesh's Laplacian, its nodes in this order."""
+    rows, columns = np.repeat(grid.triangles, 3, axis=1).ravel(), np.tile(grid.triangles, (1, 3)).ravel()
+    graph = sp.csc_array((np.ones(len(rows)), (rows, columns)), shape=2 * (len(grid.points),))
+    matrix = sp.csc_matrix((graph + sp.diags_array(graph.sum(axis=0) + 1.0))[order][:, order])
+    return sp.linalg.splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True}).nnz

@@ -72,4 +72,4 @@ def _fipy(truth, cells: int) -> dict:
 
 def _stepped(truth, cells: int) -> dict:
     _, found, compiled = users.py_pde(problem(), cells)
-    return {"error": pores.largest(found, truth, _supply()), "apart_seconds": compiled}
+    return {"error": pores.largest(found, truth, _supply()), **compiled}

@@ -33,9 +33,8 @@ class Timed:
             return
         wall, spent = perf_counter() - wall, process_time() - spent
         self.found = found() if callable(found) else found
-        apart = self.found.get("apart_seconds", 0.0)
-        self.seconds.append(wall - apart)
-        self.cpu.append(spent - apart)
+        self.seconds.append(wall - self.found.get("apart_seconds", 0.0))
+        self.cpu.append(spent - self.found.get("apart_cpu", 0.0))
         if not isfinite(self.found.get("error", 0.0)):
             self.reason = "its error is not a number"
 
@@ -46,8 +45,8 @@ Jobs = Mapping[tuple[str, str], Callable[[], dict]]
 def measured(jobs: Jobs, repeats: int) -> list[dict]:
     """Lines of a part from jobs {(method, label): job}, in the order in which methods first come.
 
-    A job returns {"error": ..., ...}, or a function that returns it and is not timed; "apart_seconds" of it are taken
-    off the time. The first run of a short one only warms up.
+    A job returns {"error": ..., ...}, or a function that returns it and is not timed; "apart_seconds" and
+    "apart_cpu" of it are taken off. The first run of a short one only warms up.
     """
     times = {key: Timed() for key in jobs}
     for key, job in jobs.items():

@@ -64,7 +64,7 @@ def _nu(scene) -> float:
 
 
 def _order_2(truth: float, refinement: float) -> dict:
-    now = pore.seeded(pores.scene(refinement=refinement))
+    now = pore.seeded(pores.scene(preset="paper", refinement=refinement))
     return _judged(truth, flow.unit_flow(now.mesh, pores.RATIO, order=2).loss + pores.outside_loss(), now.mesh)
 
 

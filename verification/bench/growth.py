@@ -60,14 +60,13 @@ def _apart(found: np.ndarray, rim: np.ndarray) -> float:
 
 
 @cache
-def _seeded(scheme, refinement: float, elements: str):
-    time = "midpoint" if elements == "quadratic" else "updates"
-    now = scheme.seeded(pores.scene(elements=elements, time=time, refinement=refinement))
+def _seeded(scheme, refinement: float, preset: str):
+    now = scheme.seeded(pores.scene(preset=preset, refinement=refinement))
     return now, held_at(len(now.mesh.body), now.mesh.body_loop, now.wall, now.fixed)
 
 
 def _linear(refinement: float):
-    now, held = _seeded(pore, refinement, "linear")
+    now, held = _seeded(pore, refinement, "paper")
     scale = RADIUS / pores.RADIUS
     points, triangles = now.mesh.points[now.mesh.body] * scale, now.mesh.body_triangles
     body = growth.Body(points, triangles, held)
@@ -77,7 +76,7 @@ def _linear(refinement: float):
 
 
 def _curved(refinement: float):
-    now, held = _seeded(curved_pore, refinement, "quadratic")
+    now, held = _seeded(curved_pore, refinement, "accurate")
     points, corners = now.mesh.points[now.mesh.body] * RADIUS / pores.RADIUS, _corners(now)
     body = curved_growth.Body(points, points, now.mesh.body_cells, corners, held)
     start = exact(points, BEFORE)

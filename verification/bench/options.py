@@ -16,7 +16,7 @@ def known(key: str) -> bool:
 
 def flow_elements() -> list[tuple[str, dict]]:
     """(name, [numerics] keys) of the flow elements on straight triangles."""
-    found = [(PAPER, {})]
+    found = [(PAPER, {"preset": "paper"})]
     if known("flow_element"):
-        found.append(("linear with a bubble", {"flow_element": "bubble"}))
+        found.append(("linear with a bubble", {"preset": "paper", "flow_element": "bubble"}))
     return found

@@ -141,7 +141,7 @@ def _defects(factor: float) -> tuple[float, float]:
     stabilising = growth.stabilisation(now.mesh.points[nodes], triangles, np.ones(len(triangles)))
     defects = []
     for around in (found, now):
-        forces = traction.forces(said, now, around)
+        forces = traction.forces(said, traction.surroundings(said, now, around), around)
         system = loaded.Loaded(body, stabilising, forces)
         residual, size = system.residual(found.mesh.points[nodes], found.pressure[nodes], theta)
         defects.append(growth._relative(residual[system.free], size[system.free]))
@@ -160,7 +160,8 @@ def remeshed() -> Outcome:
     on = nodal(fine, replace(found, mesh=grid))[0]
     scale = traction.MPA_PER_UM * fine.flow.density * fine.flow.gravity / fine.growth.shear_modulus
     new = _sums(grid.points[grid.loop], scale * on[grid.loop])
-    places, both = found.mesh.points[now.mesh.body], [traction.forces(scene, now, found) for scene in (fine, coarse)]
+    places = found.mesh.points[now.mesh.body]
+    both = [traction.forces(scene, traction.surroundings(scene, now, found), found) for scene in (fine, coarse)]
     ours, followed = (_sums(places, forces) for forces in both)
     return Outcome((at_most("new mesh, nodes of the outline", np.abs(ours / new - 1).max(), 1e-9, runs.ROUND_OFF),
                     at_most("new mesh, mesh that followed, x", abs(ours[0] / followed[0] - 1), 0.02,

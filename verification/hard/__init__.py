@@ -1,2 +1,2 @@
-from verification.hard import substrates, flow, contact
-CASES = (*substrates.CASES, *flow.CASES, *contact.CASES)
+from verification.hard import substrates, flow, contact, growth, runs
+CASES = (*substrates.CASES, *flow.CASES, *contact.CASES, *growth.CASES, *runs.CASES)

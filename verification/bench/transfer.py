@@ -1,0 +1,102 @@
+"""A field with a front, carried through twenty unrelated meshes of one rectangle: its error, and the drift of its total.
+
+Meshes and what is worked out once for them are made beforehand; a time is of all twenty transfers.
+"""
+
+from __future__ import annotations
+
+from functools import cache, partial
+
+import numpy as np
+
+from repro import reprojection
+from repro.curved import elements, transfer
+from repro.curved.mesh import curved
+from verification import meshes, norms
+from verification.bench import options
+from verification.bench.clock import measured
+
+REPEATS = 3
+#: um; the front's place along x and its width.
+ENDS, WIDTH, FRONT, STEEP = (0.0, 40.0), 25.0, 20.0, 3.0
+REMESHES, SIZES, QUADRATIC = 20, (4.0, 2.8, 2.0, 1.4, 1.0), (8.0, 5.6, 4.0, 2.8, 2.0)
+
+
+def run(quick: bool) -> dict:
+    """The part."""
+    count, sizes, quadratic = (3, (4.0, 2.8), (5.6,)) if quick else (REMESHES, SIZES, QUADRATIC)
+    ways = {"conserving projection": reprojection.project, "bounded conserving projection": reprojection.project_bounded,
+            f"linear interpolation, {options.PAPER}": None}
+    jobs = {(name, f"{size:g} um"): partial(_linear, size, count, way) for name, way in ways.items() for size in sizes}
+    jobs |= {("quadratic interpolation (fast, accurate)", f"{size:g} um"): partial(_quadratic, size, count)
+             for size in quadratic}
+    repeats = 1 if quick else REPEATS
+    return {"title": f"Transfer: a front through {count} remeshes", "repeats": repeats,
+            "error": "L2 of the field in the end, relative; drift: of its total, relative",
+            "reference": "the field itself", "lines": measured(jobs, repeats)}
+
+
+def exact(x, y):
+    """From 1 to 2 across a slanted front."""
+    return 1.5 + 0.5 * np.tanh((x + 0.3 * y - FRONT) / STEEP)
+
+
+@cache
+def _meshed(size: float, which: int):
+    return meshes.rectangle(ENDS, WIDTH, size, seed=which)
+
+
+@cache
+def _curved(size: float, which: int):
+    straight = meshes.channel(ENDS, WIDTH, size, lambda x, y: x < np.inf, seed=which)
+    return curved(straight, None)
+
+
+@cache
+def _total() -> float:
+    """Integral of the field, by Gauss's quadrature."""
+    node, weight = np.polynomial.legendre.leggauss(60)
+    x, y = 0.5 * ENDS[1] * (1 + node), 0.5 * WIDTH * (1 + node)
+    return float(weight @ exact(x[:, None], y) @ weight) * 0.25 * ENDS[1] * WIDTH
+
+
+def _linear(size: float, count: int, project):
+    old = _meshed(size, 0)
+    field = exact(*old[0].T)[:, None]
+    start = _integral(*old, field)
+    for which in range(1, count + 1):
+        new = _meshed(size, which)
+        field = (project(*old, field, *new) if project else reprojection.interpolate(*old, field, new[0]))
+        old = new
+    return lambda: {"error": norms.l2_error(*old, field[:, 0], exact), "nodes": len(old[0]),
+                    "drift": abs(_integral(*old, field) - start) / _total(),
+                    "beyond": float(max(1.0 - field.min(), field.max() - 2.0, 0.0))}
+
+
+def _integral(points, triangles, field) -> float:
+    _, weight, shape = norms.quadrature(points, triangles)
+    return float(np.sum(weight * (field[triangles, 0] @ shape.T)))
+
+
+def _quadratic(size: float, count: int):
+    old = _curved(size, 0)
+    field = exact(*old.points.T)[:, None]
+    start = _weighed(old, field)
+    for which in range(1, count + 1):
+        new = _curved(size, which)
+        field = transfer.interpolate(old.points, old.cells, field, new.points)
+        old = new
+    return lambda: {"error": _apart(old, field), "nodes": len(old.points),
+                    "drift": abs(_weighed(old, field) - start) / _total(),
+                    "beyond": float(max(1.0 - field.min(), field.max() - 2.0, 0.0))}
+
+
+def _weighed(mesh, field) -> float:
+    return float(np.sum(mesh.places.dx * elements.at_points(field[:, 0], mesh.cells)))
+
+
+def _apart(mesh, field) -> float:
+    """L2 of a quadratic field less the exact one, relative."""
+    truth = exact(*(elements.at_points(mesh.points[:, k], mesh.cells) for k in (0, 1)))
+    gap = elements.at_points(field[:, 0], mesh.cells) - truth
+    return float(np.sqrt(np.sum(mesh.places.dx * gap**2) / np.sum(mesh.places.dx * truth**2)))
