@@ -37,6 +37,7 @@ from repro.units import (
 
 _UNSTEADY = ', or numerics.transport = "gear": nothing is supplied, so that no state is steady'
 MOST_STEPS = 100_000  # shape updates of a run
+SHORTEST_STEP = 1e-6  # h: times are told apart to 1e-9 h
 Rules = Iterator[tuple[bool, str, str]]  # (is it broken, the key to name, what is accepted)
 
 
@@ -278,6 +279,7 @@ def _growth_rules(scene: Scene) -> Rules:
     yield alone and scene.growth is not None, "growth", wanted
     if scene.growth:
         wanted = f"growth.end ({scene.growth.end:g} h) over {MOST_STEPS} or more is needed"
+        yield scene.growth.time_step < SHORTEST_STEP, "growth.time_step", f"{SHORTEST_STEP:g} h or more is needed"
         yield scene.growth.end > MOST_STEPS * scene.growth.time_step, "growth.time_step", wanted
     if scene.growth and scene.growth.fluid_forces == "included":
         yield from _force_rules(scene)

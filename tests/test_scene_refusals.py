@@ -87,6 +87,7 @@ LENGTH = 'a length is needed, such as "100 um" (greater than zero)'
     ("kinetics.maximum_density=0 mg/L", "greater than zero"),
     ("growth.end=-1 h", "zero or more"),
     ("growth.time_step=0 h", "greater than zero"),
+    ("growth.time_step=9e-7 h", "1e-06 h or more is needed"),
     ("growth.shear_modulus=0 MPa", "greater than zero"),
     ("growth.minimum_film=0 um", "greater than zero"),
     ("growth.minimum_contact_angle=0 deg", "between 0 and 90 deg"),
@@ -97,7 +98,7 @@ LENGTH = 'a length is needed, such as "100 um" (greater than zero)'
     # words
     ("numerics.preset=best", 'numerics.preset = "best": "fast" or "accurate" or "paper" is needed'),
     ("numerics.transport=bdf", '"quasi_steady" or "gear" is needed'),
-    ("numerics.transfer=exact", '"conserving" or "linear" is needed'),
+    ("numerics.transfer=exact", '"conserving" or "linear" or "bounded" is needed'),
     ("numerics.extent=half", '"central" or "full" is needed'),
     ("numerics.interface=none", '"laplacian" or "traction" is needed'),
     ("numerics.inlet=none", '"local" or "mean" is needed'),

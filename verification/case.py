@@ -16,7 +16,7 @@ from time import perf_counter
 import numpy as np
 
 KINDS = ("exact", "manufactured", "cross-code", "property")
-STAGES = ("flow", "transport", "growth", "reprojection", "mesh_motion", "coupling")
+STAGES = ("flow", "transport", "growth", "reprojection", "mesh_motion", "coupling", "hard")
 PASSES, FALLS_SHORT = "passes", "FALLS SHORT"
 
 

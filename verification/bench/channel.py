@@ -35,8 +35,8 @@ def run(quick: bool) -> dict:
     return {"title": "Uptake in plug flow through a strip, one-dimensional; grid, assembly and solution",
             "error": "effluents over the supply, the larger error", "repeats": repeats, "lines": lines,
             "apart": compile_times(lines), "reference_change": change,
-            "reference": f"scipy's solve_bvp, tolerance 1e-9: {truth[0]:.9f} and {truth[1]:.9f} mg/L; from 1e-7 on they "
-                         f"change by {change:.1e} of the supply"}
+            "reference": f"scipy's solve_bvp, tolerance 1e-9: {truth[0]:.9f} and {truth[1]:.9f} mg/L; from 1e-7 on "
+                         f"they change by {change:.1e} of the supply"}
 
 
 @cache

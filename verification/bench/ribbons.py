@@ -26,8 +26,8 @@ def scene():
 def straight(ends, width: float, cells: tuple[int, int], inside) -> PoreMesh:
     """cells (along, across) halved; ``inside(x, y)`` of the triangles' middles is biomass.
 
-    Inner nodes are moved by JITTER of a cell: between exactly right triangles the coupling along the hypotenuse is zero,
-    which the sparsity of the linear elements' Newton matrix does not allow for in still water.
+    Inner nodes are moved by JITTER of a cell: between exactly right triangles the coupling along the hypotenuse is
+    zero, which the sparsity of the linear elements' Newton matrix does not allow for in still water.
     """
     x, y = np.meshgrid(np.linspace(*ends, cells[0] + 1), np.linspace(0.0, width, cells[1] + 1), indexing="ij")
     number = np.arange(x.size).reshape(x.shape)
@@ -47,8 +47,8 @@ def solved(given, grid: PoreMesh, order: int, speed: float = 0.0):
     stage = transport if order == 1 else curved_transport
     mesh = grid if order == 1 else curved_mesh.curved(grid, None)
     count = len(mesh.points)
-    flow = Flow(speed, np.tile([speed, 0.0], (count, 1)), np.zeros(len(grid.points)), np.zeros((len(grid.triangles), 2)),
-                0.0, 0.0, 1.0) if speed else None
+    flow = Flow(speed, np.tile([speed, 0.0], (count, 1)), np.zeros(len(grid.points)),
+                np.zeros((len(grid.triangles), 2)), 0.0, 0.0, 1.0) if speed else None
     problem = stage.problem(mesh, flow, given.substrates, given.kinetics)
     active = np.zeros(count)
     active[mesh.body] = DENSITY

@@ -1,4 +1,4 @@
-"""A field with a front, carried through twenty unrelated meshes of one rectangle: its error, and the drift of its total.
+"""A field with a front, carried through twenty unrelated meshes of one rectangle: its error, and its total's drift.
 
 Meshes and what is worked out once for them are made beforehand; a time is of all twenty transfers.
 """
@@ -25,7 +25,8 @@ REMESHES, SIZES, QUADRATIC = 20, (4.0, 2.8, 2.0, 1.4, 1.0), (8.0, 5.6, 4.0, 2.8,
 def run(quick: bool) -> dict:
     """The part."""
     count, sizes, quadratic = (3, (4.0, 2.8), (5.6,)) if quick else (REMESHES, SIZES, QUADRATIC)
-    ways = {"conserving projection": reprojection.project, "bounded conserving projection": reprojection.project_bounded,
+    ways = {"conserving projection": reprojection.project,
+            "bounded conserving projection": reprojection.project_bounded,
             f"linear interpolation, {options.PAPER}": None}
     jobs = {(name, f"{size:g} um"): partial(_linear, size, count, way) for name, way in ways.items() for size in sizes}
     jobs |= {("quadratic interpolation (fast, accurate)", f"{size:g} um"): partial(_quadratic, size, count)

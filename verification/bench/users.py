@@ -14,8 +14,15 @@ from dataclasses import dataclass
 from time import perf_counter, process_time
 
 import numpy as np
-from fipy import CellVariable, CentralDifferenceConvectionTerm, DiffusionTerm, Grid1D, Grid2D, ImplicitSourceTerm
-from fipy import LinearLUSolver
+from fipy import (
+    CellVariable,
+    CentralDifferenceConvectionTerm,
+    DiffusionTerm,
+    Grid1D,
+    Grid2D,
+    ImplicitSourceTerm,
+    LinearLUSolver,
+)
 from pde import PDE, CallbackTracker, CartesianGrid, Controller, EulerSolver, FieldCollection, ScalarField
 
 from reference.monod import uptake
@@ -112,8 +119,8 @@ def _linearise(problem: Problem, now, constants, slopes) -> None:
 
 
 def py_pde(problem: Problem, across: int) -> tuple[np.ndarray, np.ndarray, dict]:
-    """Uptake (2,), C (2,) in the last cell, and the seconds (wall, processor) before the run's first hundredth is over, less those of
-    another hundredth: numba compiles in them."""
+    """Uptake (2,), C (2,) in the last cell, and the seconds (wall, processor) before the run's first hundredth is over,
+    less those of another hundredth: numba compiles in them."""
     grid = _pde_grid(problem, across)
     where = problem.inside(*np.moveaxis(grid.cell_coords, -1, 0))
     X = ScalarField(grid, np.where(where, problem.density, 0.0))

@@ -40,7 +40,7 @@ MUTANTS = (
     Mutant("stale-flow", "repro/pore.py",
            says="flow is solved once for each mesh, and not anew when the mesh has moved",
            old="unit = flow.unit_flow(pore.mesh, drive.viscosity_ratio, interface=numerics.interface,\n"
-               "                          stabilisation=numerics.flow_stabilisation)",
+               "                          stabilisation=numerics.flow_stabilisation, element=numerics.flow_element)",
            new="unit = pore.mesh.once('stale', lambda: flow.unit_flow(pore.mesh, drive.viscosity_ratio))"),
     Mutant("head-on-the-mesh-alone", "repro/pore.py",
            says="the head is spent on the meshed part alone",

@@ -57,7 +57,8 @@ class HardCase:
     """One of the twenty-two: ``parts`` name -> function of the preset, which returns Checks and Runs.
 
     refusable: names of the parts that may be refused with ``fast`` and ``accurate``, and with ``paper`` all may;
-    explained: why a part is wrong with the paper's scheme, where it is.
+    explained: why a part is wrong with the paper's scheme, where it is; mutants: ids of wrong changes that it catches;
+    slow: left out by ``make verify-fast``.
     """
 
     number: int
@@ -68,6 +69,13 @@ class HardCase:
     parts: dict[str, Callable[[str], list]]
     refusable: tuple[str, ...] = ()
     explained: dict[str, str] = field(default_factory=dict)
+    mutants: tuple[str, ...] = ()
+    slow: bool = True
+
+    @property
+    def full_id(self) -> str:
+        """That of its verification case."""
+        return f"hard-{self.number:02d}-{self.id}"
 
 
 def scene(name: str, preset: str, *changes: str) -> Scene:

@@ -125,7 +125,8 @@ CONTACT = HardCase(
     7, "contact", "Film of 2 um and contact, with remeshing forced just before and after",
     "The same shape and flow with and without forced remeshes, no film under 2 um left, the area that of the biomass",
     "A film that is passed over in one step, overlaps the wall, or a remesh that moves the contact",
-    {"as it comes": partial(film_closes, forced=False), "remeshed at every step": partial(film_closes, forced=True)})
+    {"as it comes": partial(film_closes, forced=False), "remeshed at every step": partial(film_closes, forced=True)},
+    mutants=("hard-contact-passed-over",))
 
 
 LEAST = 16.7
@@ -189,7 +190,8 @@ ANGLE = HardCase(
     8, "least-angle", "Contact at the least angle",
     "Wedges under 16.7 degrees close and others stay; meshes and flow in a wedge of 16.7 degrees as on a finer mesh",
     "Slivers of fluid, triangles turned over at the contact line, or contact that comes and goes",
-    {"which nodes join": least_angle, "flow beside a wedge": in_a_wedge, "wedges that close": wedges_close})
+    {"which nodes join": least_angle, "flow beside a wedge": in_a_wedge, "wedges that close": wedges_close},
+    mutants=("hard-half-the-angle", "no-wedge-closes"))
 
 
 def tight(preset: str, radius: float, end: str) -> list:
@@ -209,7 +211,8 @@ TIGHT = HardCase(
     "Conductivity and effluents of a finer run, falling as the aggregate grows",
     "A film without elements across it, or one that was under 2 um from the start and never closes",
     {"45 of 50 um": partial(tight, radius=45, end="2 h"), "49 of 50 um": partial(tight, radius=49, end="0.4 h")},
-    refusable=("45 of 50 um", "49 of 50 um"))
+    refusable=("45 of 50 um", "49 of 50 um"),
+    mutants=("hard-film-without-elements",))
 
 
 def to_the_end(preset: str) -> list:
@@ -230,6 +233,7 @@ END = HardCase(
     16, "pore-end", "Aggregate at the pore's end",
     "A mesh capped at the pore's ends, balances to the last step, and a run that ends by saying which end was reached",
     "An aggregate that grows out of the pore, or a mesh squeezed to nothing between it and the end",
-    {"wide, short": to_the_end})
+    {"wide, short": to_the_end},
+    mutants=("hard-extent-uncapped",))
 
 CASES = (CONTACT, ANGLE, TIGHT, END)

@@ -71,7 +71,8 @@ FAST = HardCase(
     "Oscillations of C above the supply or under zero where the cell Peclet number is over one",
     {**{f"velocity x {factor}": partial(fast_flow, factor=factor) for factor in (1, 10, 100, 1000)},
      "velocity x 100, growing": partial(fast_growth, factor=100)},
-    refusable=("velocity x 1000",))
+    refusable=("velocity x 1000",),
+    mutants=("curved-layers-ignored",))
 
 
 def no_flow(preset: str) -> list:
@@ -121,7 +122,8 @@ STILL = HardCase(
     "A singular system that is solved all the same; concentrations above the supply",
     {"velocity 0": no_flow, "without [flow]": still, "1e-4 m/d": trickle("1e-4", 1e-8), "1e-6 m/d": trickle("1e-6", 1e-6),
      "1e-12 m/d": trickle("1e-12", 1.0)},
-    refusable=("velocity 0", "1e-4 m/d", "1e-6 m/d", "1e-12 m/d"))
+    refusable=("velocity 0", "1e-4 m/d", "1e-6 m/d", "1e-12 m/d"),
+    mutants=("hard-decay-unlimited",))
 
 
 def viscous(preset: str, ratio: float) -> list:
@@ -206,6 +208,7 @@ VISCOUS = HardCase(
     "Poiseuille's conductivity at one, that of a rigid body at 1e9, the whole flux through every section of a plug",
     "A plug that leaks between its ends while inlet and outlet agree",
     {**{f"lambda = {ratio:g}": partial(viscous, ratio=ratio) for ratio in (1.0, 2000.0, 1e9)}, "rigid": rigid,
-     **{f"plug, W / {WIDTH / size:.2g}": partial(plugged, size=size) for size in LEAK}})
+     **{f"plug, W / {WIDTH / size:.2g}": partial(plugged, size=size) for size in LEAK}},
+    mutants=("hard-tau-of-water",))
 
 CASES = (FAST, STILL, VISCOUS)

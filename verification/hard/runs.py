@@ -11,7 +11,7 @@ import numpy as np
 from repro.scene import Scene, parse_scene
 from verification.case import at_most
 from verification.hard import common
-from verification.hard.common import HardCase
+from verification.hard.common import TOLERANCE, HardCase
 
 #: Powers of length and time in the unit of each key that has one.
 POWERS = {
@@ -48,21 +48,26 @@ def units(preset: str, length: float, time: float) -> list:
     """Base from 15 um for 1.2 h, in other units."""
     made = common.scene("base", preset, 'aggregate.radius="15 um"', 'growth.end="1.2 h"', 'output.times=["1.2 h"]')
     plain, other = common.ran(made), common.ran(scaled(made, length, time))
+    exact = np.log2(length) % 1 == 0
+    bound, origin = (1e-9, "dimensions; round-off") if exact else (
+        TOLERANCE[preset], "round-off makes another mesh; " + common.PROMISED[preset])
     checks = []
     for column, (along, during) in (*COLUMNS.items(), *((name, (0, 0)) for name in SAME)):
         unit = length**along * time**during
         checks.append(at_most(f"{column}, relative difference", abs(other.last[column] / unit / plain.last[column] - 1),
-                              1e-6, "dimensions; round-off through Newton's tolerance and the same mesh"))
+                              bound, origin))
     return [plain, other, *checks]
 
 
+SCALES = {"lengths x 1e6": (1e6, 1.0), "lengths x 2^20": (2.0**20, 1.0), "lengths / 2^10": (2.0**-10, 1.0),
+          "times x 1e-6": (1.0, 1e-6), "times x 1e6": (1.0, 1e6), "times x 1e-9": (1.0, 1e-9)}
 UNITS = HardCase(
     17, "units", "Extreme units: lengths times 1e6, times times 1e-6",
     "The same numbers times their unit",
     "A length or a time that is written into the code: a tolerance, a smallest step, a size",
-    {"lengths x 1e6": partial(units, length=1e6, time=1.0), "times x 1e-6": partial(units, length=1.0, time=1e-6),
-     "lengths x 1e-3": partial(units, length=1e-3, time=1.0), "times x 1e6": partial(units, length=1.0, time=1e6)},
-    refusable=("lengths x 1e6", "times x 1e-6", "lengths x 1e-3", "times x 1e6"))
+    {told: partial(units, length=length, time=time) for told, (length, time) in SCALES.items()},
+    refusable=tuple(SCALES),
+    mutants=("hard-absolute-time", "length-scale"))
 
 #: What is drawn: key of the scene, its unit, and its physical range; all but the radius by its logarithm.
 RANGES = {
@@ -104,6 +109,7 @@ RANDOM = HardCase(
     "Balances, bounds and area by biomass in every run, or a refusal that says what to change",
     "A run that ends with a number that is none, or with mass made or lost",
     {f"draw {seed}": partial(at_random, seed=seed) for seed in DRAWS},
-    refusable=tuple(f"draw {seed}" for seed in DRAWS))
+    refusable=tuple(f"draw {seed}" for seed in DRAWS),
+    mutants=("curved-mass-lost", "reprojection-left-out"))
 
 CASES = (UNITS, RANDOM)

@@ -61,7 +61,8 @@ STARVED = HardCase(
     {"0.35 m/d, R = 27 um": starved(*disc(27, SLOW, 'pore.width="50 um"')),
      "0.35 m/d, R = 42 um": starved(*disc(42, SLOW, 'pore.width="50 um"')),
      "supply 0.15 mg/L": starved(*disc(40, *supply(0.15, 0.15))),
-     "supply 0.02 K_s": starved(*disc(40, *supply(0.02, 0.02)))})
+     "supply 0.02 K_s": starved(*disc(40, *supply(0.02, 0.02)))},
+    mutants=("hard-negative-root",))
 
 
 def exhausted(preset: str, scarce: str) -> list:
@@ -98,7 +99,8 @@ EXHAUSTED = HardCase(
     2, "exhausted", "One substrate exhausted, the other in excess",
     "Uptake in the ratio of (7) and (8), and no change of what leaves when the excess is a thousandfold",
     "Uptake of what is not there, or a substrate in excess that is clipped or overshoots",
-    {f"{scarce} exhausted": partial(exhausted, scarce=scarce) for scarce in BOTH})
+    {f"{scarce} exhausted": partial(exhausted, scarce=scarce) for scarce in BOTH},
+    mutants=("hard-decay-unlimited",))
 
 
 def front(radius: float, *more: str):
@@ -149,7 +151,8 @@ ZERO_ORDER = HardCase(
     3, "zero-order", "Half saturations of a millionth of the supply: fronts of zero order",
     "The closed form of zero-order uptake in a slab, and the effluents of a finer run around half-discs",
     "Newton's method that cycles at the front, or concentrations under zero behind it",
-    {"slab": slab_front, "R = 60 um": front(60), "R = 80 um": front(80), "0.35 m/d, R = 40 um": front(40, SLOW)})
+    {"slab": slab_front, "R = 60 um": front(60), "R = 80 um": front(80), "0.35 m/d, R = 40 um": front(40, SLOW)},
+    mutants=("hard-front-smoothed", "hard-newton-unshortened"))
 
 
 def saturated(preset: str) -> list:
@@ -181,6 +184,7 @@ SATURATED = HardCase(
     21, "saturated", "Supply of 1000 K_s",
     "Growth between the exponentials at the least concentration and at the supply, 0.3 % apart in their rates",
     "A balance that no longer closes, as uptake is a small part of what passes", {"base": saturated},
-    refusable=("base",))
+    refusable=("base",),
+    mutants=("decay-leaves-all",))
 
 CASES = (STARVED, EXHAUSTED, ZERO_ORDER, SATURATED)

@@ -172,6 +172,36 @@ def _monod_profile(name: str, peclet: float, density: float) -> Profile:
     return Profile(name, "x (um)", "C (mg/L)", tuple(curves))
 
 
+@case("transport-curved-front", kind="property", slow=True,
+      norm="consumed acceptor over F times consumed donor, less one; difference of effluents over the larger supply, to "
+           "a mesh of refinement 1.3",
+      claim="Behind a front where the donor is used up, to half saturations of a millionth of the supply, both are taken "
+            "up in their proportion, and what leaves is within the presets' accuracy",
+      mutants=("curved-unpaired",))
+def front() -> Outcome:
+    checks = []
+    for half in ("1e-2 mg/L", "1e-3 mg/L", "1e-5 mg/L"):
+        far = _front(half, 1.3)
+        for preset, refinement, bound in (("fast", 0.25, 1e-2), ("accurate", 0.45, 1e-3)):
+            found = _front(half, refinement)
+            ratio = found[0].consumed / found[1].consumed / SCENE.kinetics.acceptor_to_donor_ratio
+            checks.append(at_most(f"proportion, {preset}, K_s = {half}", abs(ratio - 1), 1e-9,
+                                  "one rate for both: exact but for where Newton's method stops"))
+            apart = max(abs(a.effluent - b.effluent) for a, b in zip(found, far)) / _pair("supply")[0]
+            checks.append(at_most(f"effluents, {preset}, K_s = {half}", apart, bound, "what the preset is for"))
+    return Outcome(tuple(checks))
+
+
+def _front(half: str, refinement: float):
+    """Ledgers of a thick half-disc that the donor, 1 mg/L, does not pass; without decay."""
+    both = {"acceptor": {"half_saturation": half}, "donor": {"supply": "1 mg/L", "half_saturation": half}}
+    tables = {"pore": {"width": "100 um"}, "aggregate": {"radius": "60 um"}, "flow": {"mean_velocity": "0.29 m/day"},
+              "substrates": both, "kinetics": {"decay_coefficient": "0 1/day"},
+              "numerics": {"preset": "fast", "refinement": refinement}}
+    scene = parse_scene(tables, "front", "front.toml")
+    return pore.solve(scene, pore.seeded(scene)).fluxes
+
+
 FAR, WITHIN = 2.5, "0.1 %, what preset accurate is for"
 
 

@@ -1,0 +1,74 @@
+"""Measure all choices, print the table, write ``verification/report/audit.json``."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+
+from verification.audit import measure, special
+from verification.audit.choices import CHOICES, Choice
+from verification.bench.record import machine
+
+RECORD = Path(__file__).parents[1] / "report" / "audit.json"
+METHOD = (f"base, preset paper, to {measure.END:g} h in steps of {60 * measure.STEP:g} min (steps in time: 12 min); "
+          "effect: difference of two whole runs, relative, effluents over the supply; one_state: both choices in the "
+          "default's last state on the same mesh, with the shape of one step more; resolved: changes by more than two "
+          f"meshes do; cost_ratio: processor time, median of {measure.REPEATS} runs in turn (mesh, theta after a "
+          "remesh, symmetry: one run each)")
+
+
+def main() -> int:
+    """Entry point."""
+    noise = special.meshes()
+    rows = [noise, *map(named, CHOICES), special.midpoint(), special.drift(), *special.symmetry()]
+    rows = [{**row, "resolved": resolved(row["effect"], noise["effect"])} for row in rows]
+    write({"machine": machine(), "method": METHOD, "rows": rows})
+    print("\n".join(table(rows)))
+    return 0
+
+
+def named(choice: Choice) -> dict:
+    """The row of a choice that a scene can name."""
+    said, other = measure.scene(), measure.scene(*choice.changes)
+    default, found, ratio = measure.in_turn((lambda: measure.run(said), lambda: measure.run(other)))
+    effects = measure.effect(said, *(measure.quantities(each.pore, each.solved) for each in (default, found)))
+    state = measure.one_state(said, other, default) if choice.state else {}
+    print(f"{choice.choice}: {choice.alternative}", file=sys.stderr, flush=True)
+    return {"choice": choice.choice, "default": choice.default, "alternative": choice.alternative, "cost_ratio": ratio,
+            "effect": effects, "one_state": state, "largest": measure.largest(effects), "note": choice.note}
+
+
+def resolved(effects: dict[str, float], noise: dict[str, float]) -> list[str]:
+    """Names of the quantities that change by more than two meshes do."""
+    return [name for name, value in effects.items() if abs(value) > abs(noise[name])]
+
+
+def write(record: dict, file: Path = RECORD) -> None:
+    """Write the record whole or not at all; not-a-number is refused."""
+    text = json.dumps(record, indent=1, allow_nan=False) + "\n"
+    file.parent.mkdir(parents=True, exist_ok=True)
+    beside = file.with_name(f".{file.name}.part")
+    beside.write_text(text, encoding="utf-8")
+    os.replace(beside, file)
+
+
+def table(rows: list[dict]) -> list[str]:
+    """Lines: a choice each, its cost, its largest effects over the runs and in one state, and that on the velocity."""
+    lines = [f"{'choice':<26} {'default':<22} {'alternative':<26} {'cost':>5}  {'velocity':>9} {'area':>9}  "
+             f"{'largest':<28} {'in one state':<28}"]
+    for row in rows:
+        lines.append(f"{row['choice']:<26} {row['default']:<22} {row['alternative']:<26} {row['cost_ratio']:5.2f}  "
+                     f"{row['effect']['velocity']:+9.1e} {row['effect']['area']:+9.1e}  {_told(row['effect']):<28} "
+                     f"{_told(row['one_state']):<28}".rstrip())
+    return lines
+
+
+def _told(effects: dict[str, float]) -> str:
+    name = measure.largest(effects)
+    return f"{effects[name]:+.1e} {name}" if name else "-"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,49 @@
+"""``python -m verification.bench [--quick] [PART ...]``: measure, record, draw and judge; all parts by default.
+
+--quick runs small versions and writes nothing.
+"""
+
+from __future__ import annotations
+
+import argparse
+from importlib import import_module
+from time import perf_counter
+
+from verification.bench import drawn, record, tables, verdicts
+
+PARTS = ("flow", "transport", "box", "channel", "growth", "transfer", "base", "size", "scenes", "memory")
+
+
+def main(arguments: list[str] | None = None) -> dict:
+    """Run the parts; the record as it is then."""
+    parser = argparse.ArgumentParser(prog="python -m verification.bench", description=__doc__.split("\n\n")[0])
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}; all by default")
+    parser.add_argument("--quick", action="store_true", help="small versions, nothing is written")
+    given = parser.parse_args(arguments)
+    if strange := set(given.parts) - set(PARTS):
+        parser.error(f"{', '.join(sorted(strange))}: parts are {', '.join(PARTS)}")
+    return measure(given.parts or PARTS, given.quick)
+
+
+def measure(names, quick: bool) -> dict:
+    """Run parts one after the other; each is recorded as soon as it is there."""
+    found = record.empty() if quick else record.load()
+    imports = None if quick else record.import_seconds()
+    print(tables.machine({**record.machine(), "import_seconds": imports or {}}))
+    for name in names:
+        start = perf_counter()
+        part = import_module(f"verification.bench.{name}").run(quick)
+        part["took_seconds"] = perf_counter() - start
+        found = record.merged(found, {name: part}, {name: part.get("repeats", 1)}, imports)
+        found["verdicts"] = verdicts.judged(found)
+        print(tables.part(name, part), flush=True)
+        if not quick:
+            record.save(found)
+    if not quick:
+        drawn.draw(found["parts"], record.FOLDER)
+    print(tables.verdicts(found["verdicts"]))
+    return found
+
+
+if __name__ == "__main__":
+    main()
