@@ -39,8 +39,10 @@ test: $(STAMP) ## run the tests
 test-thorough: $(STAMP) ## run the tests with many more random examples
 	@HYPOTHESIS_PROFILE=thorough $(BIN) -m pytest
 
-bench: $(STAMP) ## print where the time goes
+bench: $(STAMP) ## time against error, cost against size, and what each assumption costs and changes
 	@$(BIN) -m verification.bench
+	@$(BIN) -m verification.audit
+	@$(BIN) -m verification.speed
 
 clean: ## remove .venv and everything generated; nothing that is committed
 	@rm -rf $(VENV) paper_figures/out paper_figures/cache build dist *.egg-info .pytest_cache .ruff_cache .hypothesis

@@ -70,6 +70,14 @@ def test_methods_take_turns_and_the_first_run_only_warms_up():
         ("a", 0.1, 3), ("b", 0.2, 3)]
 
 
+@pytest.mark.parametrize("long, runs", [(0.0, 2), (1e9, 6)])
+def test_long_jobs_run_a_third_as_often_and_their_first_run_counts(monkeypatch, long, runs):
+    monkeypatch.setattr(clock, "SHORT", 0.0)
+    monkeypatch.setattr(clock, "LONG", long)
+    lines, order = jobs_told({("a", "1"): lambda: {"error": 0.1}}, 6)
+    assert len(order) == lines[0]["points"][0]["repeats"] == runs
+
+
 def test_what_fails_is_listed_and_not_run_again():
     lines, order = jobs_told({("a", "1"): lambda: 1 / 0, ("a", "2"): lambda: {"error": nan},
                               ("a", "3"): lambda: {"error": 0.5}}, 2)

@@ -29,7 +29,8 @@ def write(results: list[Result], folder: Path) -> Path:
     return folder / "index.html"
 
 
-def _page(title: str, *parts: str) -> str:
+def page(title: str, *parts: str) -> str:
+    """A whole page."""
     return (f"<!doctype html><html lang='en'><meta charset='utf-8'><title>{_safe(title)}</title><style>{STYLE}</style>"
             f"<body><h1>{_safe(title)}</h1>{''.join(parts)}</body></html>\n")
 
@@ -38,37 +39,37 @@ def _index(results: list[Result]) -> str:
     stages = report.by_stage(results)
     links = " · ".join(f"<a href='{stage}.html'>{_safe(report.TITLES[stage])}</a> ({len(chosen)})"
                        for stage, chosen in stages)
-    head = _row("th", "case", "claim", "kind", "measured", "expected", "verdict", "must fall short with", "seconds")
+    links += " · <a href='speed.html'>Speed against error, hard cases, assumptions</a>"
+    head = row("th", "case", "claim", "kind", "measured", "expected", "verdict", "must fall short with", "seconds")
     rows = "".join(_index_row(result) for result in results)
-    return _page("Verification", f"<p>{_safe(report.INTRODUCTION)}<p><b>{report.summary(results)}</b><p>{links}",
+    return page("Verification", f"<p>{_safe(report.INTRODUCTION)}<p><b>{report.summary(results)}</b><p>{links}",
                  f"<table>{head}{rows}</table>", _mutants(), f"<h2>Environment</h2><p>{environment()}")
 
 
 def _index_row(result: Result) -> str:
     case = CASES[result.id]
     measured, expected = map(_safe, report.headline(result))
-    return _row("td", f"<a href='{case.stage}.html#{case.id}'>{case.id}</a>", _safe(case.claim), case.kind, measured,
+    return row("td", f"<a href='{case.stage}.html#{case.id}'>{case.id}</a>", _safe(case.claim), case.kind, measured,
                 expected, result.verdict, _safe(", ".join(case.mutants)), f"{result.seconds:.1f}", holds=result.holds)
 
 
 def _mutants() -> str:
-    rows = report.mutant_rows()
-    body = "".join(_row("td", *map(_safe, row), holds=row[-1] != "not caught") for row in rows)
-    head = _row("th", "mutant", "stage", "what is wrong with it", "caught by")
+    body = "".join(row("td", *map(_safe, one), holds=one[-1] != "not caught") for one in report.mutant_rows())
+    head = row("th", "mutant", "stage", "what is wrong with it", "caught by")
     return f"<h2>Mutants</h2><p>{_safe(report.mutant_state())}<table>{head}{body}</table>"
 
 
 def _stage(stage: str, results: list[Result]) -> str:
     back = f"<p><a href='index.html'>All cases</a>. {report.summary(results)}"
     contents = "".join(f"<li><a href='#{r.id}'>{r.id}</a>: {_safe(CASES[r.id].claim)}" for r in results)
-    return _page(report.TITLES[stage], back, f"<ul>{contents}</ul>", *map(_article, results),
+    return page(report.TITLES[stage], back, f"<ul>{contents}</ul>", *map(_article, results),
                  f"<h2>Environment</h2><p>{environment()}")
 
 
 def _article(result: Result) -> str:
     case = CASES[result.id]
-    head = _row("th", "quantity", "measured", "expected", "origin")
-    rows = "".join(_row("td", _safe(p.quantity), p.measured, p.expected, _safe(p.origin), holds=p.holds)
+    head = row("th", "quantity", "measured", "expected", "origin")
+    rows = "".join(row("td", _safe(p.quantity), p.measured, p.expected, _safe(p.origin), holds=p.holds)
                    for p in result.outcome.measured)
     images = "".join(f"<img src='pictures/{name}' alt='{name}'>" for name in pictures.names(result))
     error = f"<pre>{_safe(result.error)}</pre>" if result.error else ""
@@ -77,7 +78,7 @@ def _article(result: Result) -> str:
             f"{_safe(', '.join(case.mutants))}.{error}<table>{head}{rows}</table>{images}")
 
 
-def _row(kind: str, *cells: str, holds: bool = True) -> str:
+def row(kind: str, *cells: str, holds: bool = True) -> str:
     """A row of a table, its cells HTML already; red where something does not hold."""
     return f"<tr class='{'yes' if holds else 'no'}'>" + "".join(f"<{kind}>{cell}" for cell in cells)
 

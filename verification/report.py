@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from verification import mutants, pages
+from verification import mutants, pages, speed
 from verification.case import CASES, STAGES, Result
 
 FOLDER = Path(__file__).parent / "report"
 TITLES = {"flow": "Flow (2.1, 3.2)", "transport": "Substrates (2.2, 3.3)", "growth": "Growth mechanics (2.3, 3.4)",
           "reprojection": "Reprojection and transfer (3.4, 3.5)", "mesh_motion": "Mesh motion (3.5)",
-          "coupling": "Coupling"}
+          "coupling": "Coupling", "hard": "Hard cases"}
 INTRODUCTION = (
     "Each case compares the implementation with a closed form, with a manufactured solution, with an independent code, "
     "or with what must be conserved. Verdicts follow from the numbers; orders are judged two-sidedly, between "
@@ -43,6 +43,7 @@ def write(results: list[Result]) -> Path:
     """Write the report of a whole run; returns the path of its first page."""
     FOLDER.mkdir(exist_ok=True)
     (FOLDER / "REPORT.md").write_text(markdown(results), encoding="utf-8")
+    speed.write_page(FOLDER)
     return pages.write(results, FOLDER)
 
 

@@ -13,9 +13,10 @@ from verification.bench.record import machine
 
 RECORD = Path(__file__).parents[1] / "report" / "audit.json"
 METHOD = (f"base, preset paper, to {measure.END:g} h in steps of {60 * measure.STEP:g} min (steps in time: 12 min); "
-          "effect: difference of two whole runs, relative, effluents over the supply; one_state: both choices in the "
-          "default's last state on the same mesh, with the shape of one step more; resolved: changes by more than two "
-          f"meshes do; cost_ratio: processor time, median of {measure.REPEATS} runs in turn (mesh, theta after a "
+          "effect: difference of two whole runs, relative, effluents over the supply, flow and substrates of both last "
+          "shapes on the default's mesh (extent: each on its own); one_state: both choices in the default's last "
+          "state, with the shape of one step more; resolved: changes by more than twice what meshes of the same "
+          f"fineness do; cost_ratio: processor time, median of {measure.REPEATS} runs in turn (mesh, theta after a "
           "remesh, symmetry: one run each)")
 
 
@@ -23,7 +24,7 @@ def main() -> int:
     """Entry point."""
     noise = special.meshes()
     rows = [noise, *map(named, CHOICES), special.midpoint(), special.drift(), *special.symmetry()]
-    rows = [{**row, "resolved": resolved(row["effect"], noise["effect"])} for row in rows]
+    rows = [{**row, "resolved": resolved(row["effect"], noise[row.pop("noise", "effect")])} for row in rows]
     write({"machine": machine(), "method": METHOD, "rows": rows})
     print("\n".join(table(rows)))
     return 0
@@ -33,16 +34,17 @@ def named(choice: Choice) -> dict:
     """The row of a choice that a scene can name."""
     said, other = measure.scene(), measure.scene(*choice.changes)
     default, found, ratio = measure.in_turn((lambda: measure.run(said), lambda: measure.run(other)))
-    effects = measure.effect(said, *(measure.quantities(each.pore, each.solved) for each in (default, found)))
+    compare = measure.whole_run if choice.meshes else measure.two_meshes
+    effects = compare(other, default, found)
     state = measure.one_state(said, other, default) if choice.state else {}
     print(f"{choice.choice}: {choice.alternative}", file=sys.stderr, flush=True)
-    return {"choice": choice.choice, "default": choice.default, "alternative": choice.alternative, "cost_ratio": ratio,
-            "effect": effects, "one_state": state, "largest": measure.largest(effects), "note": choice.note}
+    row = special.row(choice.choice, choice.default, choice.alternative, ratio, effects, choice.note)
+    return {**row, "one_state": state, "noise": "effect" if choice.meshes else "two_meshes"}
 
 
 def resolved(effects: dict[str, float], noise: dict[str, float]) -> list[str]:
-    """Names of the quantities that change by more than two meshes do."""
-    return [name for name, value in effects.items() if abs(value) > abs(noise[name])]
+    """Names of the quantities that change by more than twice what meshes of the same fineness make of them."""
+    return [name for name, value in effects.items() if abs(value) > 2 * abs(noise[name])]
 
 
 def write(record: dict, file: Path = RECORD) -> None:

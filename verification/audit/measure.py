@@ -8,9 +8,11 @@ from statistics import median
 from time import process_time
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
-from repro import coupling, pore, shape
+from repro import coupling, mesh_motion, pore, shape
 from repro.errors import StageError
+from repro.geometry import Outline
 from repro.pore import Pore, Solved
 from repro.scene import Scene, load_scene
 from repro.simulation import simulate
@@ -70,6 +72,37 @@ def effect(said: Scene, default: dict[str, float], other: dict[str, float]) -> d
     return {name: float((other[name] - value) / supply.get(name, value)) for name, value in default.items()}
 
 
+def whole_run(changed: Scene, default: Run, other: Run) -> dict[str, float]:
+    """The effect of two whole runs, flow and substrates of the other's shape solved on the default's mesh, so that it
+    does not tell how two meshes differ."""
+    there = reshaped(default.pore, other.pore.outline)
+    found = {**quantities(other.pore, other.solved), **_flow_quantities(pore.solve(changed, there))}
+    return effect(changed, quantities(default.pore, default.solved), found)
+
+
+def two_meshes(changed: Scene, default: Run, other: Run) -> dict[str, float]:
+    """The effect of two whole runs as they are, each on its own mesh."""
+    return effect(changed, *(quantities(each.pore, each.solved) for each in (default, other)))
+
+
+def reshaped(now: Pore, outline: Outline) -> Pore:
+    """The pore with its aggregate brought to another outline ray by ray, the fluid's nodes following (both star-shaped
+    about the origin, on the lower wall alone)."""
+    places = now.mesh.points[now.mesh.body]
+    angle = np.arctan2(places[:, 1], places[:, 0])
+    factor = _radius(outline)(angle) / _radius(now.outline)(angle)
+    return replace(now, mesh=now.mesh.moved(mesh_motion.move(now.mesh, places * factor[:, None], 1.0, 100.0)))
+
+
+def _radius(outline: Outline) -> CubicSpline:
+    """Distance of the interface from the origin over the angle from downstream, smooth between its nodes."""
+    edges = outline.interface_edges()
+    x, y = outline.points[edges | np.roll(edges, 1)].T
+    angle = np.arctan2(y, x)
+    order = np.argsort(angle)
+    return CubicSpline(angle[order], np.hypot(x, y)[order])
+
+
 def one_state(said: Scene, changed: Scene, found: Run) -> dict[str, float]:
     """The effect in one state: flow and substrates solved in it, and the shape of the next step, by either scene."""
     rows = []
@@ -92,20 +125,20 @@ def largest(effects: dict[str, float]) -> str:
     return max(effects, key=lambda name: abs(effects[name]), default="")
 
 
-def advance(said: Scene, now: Pore, step: Callable, end: float = END) -> tuple[Run, np.ndarray, np.ndarray]:
-    """March from a pore by ``step(said, now, solved, hours)`` -> pore; the run, and of each step the velocity (um/h)
-    and the largest |(X_A + X_I) / X_m - 1|."""
+def advance(said: Scene, now: Pore, step: Callable, end: float = END) -> tuple[Run, dict[str, np.ndarray]]:
+    """March from a pore by ``step(said, now, solved, hours)`` -> pore; the run, and of each step the velocity (um/h),
+    the drift, largest |(X_A + X_I) / X_m - 1|, and the lean, middle between the tips over half their distance."""
     start, solved, rows = process_time(), pore.solve(said, now), []
     try:
         for _ in range(round(end / STEP)):
             now = step(said, _with(now, solved), solved, STEP)
             solved = pore.solve(said, now)
             least, most = now.composition(said.kinetics.maximum_density)[1:]
-            rows.append((solved.flow.mean_velocity, max(1 - least, most - 1)))
+            tips = now.outline.upstream, now.outline.downstream
+            rows.append((solved.flow.mean_velocity, max(1 - least, most - 1), sum(tips) / (tips[1] - tips[0])))
     except StageError as error:
         raise RuntimeError(f"the audit's run fails after {len(rows)} steps") from error
-    velocity, drift = np.array(rows).T
-    return Run(process_time() - start, now, solved), velocity, drift
+    return Run(process_time() - start, now, solved), dict(zip(("velocity", "drift", "lean"), np.array(rows).T))
 
 
 def _with(now: Pore, solved: Solved) -> Pore:

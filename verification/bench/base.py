@@ -25,7 +25,7 @@ FAST, ACCURATE = "preset fast", "preset accurate"
 PRESET_PAPER = "preset paper: linear elements, updates"
 #: Refinement and time step (min) of the paper's scheme; refinement and tolerance of the midpoint rule's.
 PAPER = ((0.25, 60), (0.35, 48), (0.5, 48), (0.5, 24), (0.7, 96), (0.7, 48), (0.7, 24), (1.0, 48), (1.0, 24), (1.0, 12),
-         (1.4, 24), (1.4, 12), (1.4, 6))
+         (1.4, 24), (1.4, 12), (1.4, 6), (2.0, 3))
 MIDPOINT = ((0.35, 0.03), (0.5, 0.03), (0.7, 0.01), (1.0, 0.01), (1.4, 0.003), (2.0, 0.002))
 QUADRATIC = ((0.15, 0.03), (0.2, 0.02), (0.25, 0.01), (0.3, 0.005), (0.45, 0.002), (0.45, 0.001), (0.6, 0.0005),
              (0.8, 0.0002))

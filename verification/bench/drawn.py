@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import nan
 from pathlib import Path
 
 from verification import pictures  # noqa: F401  chooses the backend
@@ -59,8 +60,9 @@ def _sizes(pyplot, part: dict):
         for name in (*size.STAGES, size.FLOOR):
             values = [p["stages"].get(name, 0.0) for p in line["points"]]
             if any(values):
-                axis.loglog(nodes, [v or float("nan") for v in values], "--" if name == size.FLOOR else "-", label=name)
-        axes[-1].loglog(nodes, [p["memory_MB"] for p in line["points"]], "-o", ms=4, label=line["method"])
+                axis.loglog(nodes, [v or nan for v in values], "--" if name == size.FLOOR else "-", label=name)
+        more = [p for p in line["points"] if p["memory_MB"] > 0]
+        axes[-1].loglog([p["nodes"] for p in more], [p["memory_MB"] for p in more], "-o", ms=4, label=line["method"])
         axis.set_title(line["method"], fontsize=9)
         axis.set_ylabel("seconds a growth step", fontsize=8)
     axes[-1].set_title("memory above the start's", fontsize=9)

@@ -50,7 +50,7 @@ def reading(points: Iterable[Mapping], error: float) -> Reading | None:
 
     Between two points of the envelope: on the straight line between their logarithms. An error above the largest
     takes the fastest point. Below the least error: on from the last point with the fitted slope of the envelope, which
-    needs two points and must fall.
+    needs two points and must fall. Where overheads make its coarse end flatter, that is too little time, not too much.
     """
     kept = envelope(points)
     if not kept:

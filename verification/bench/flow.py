@@ -11,7 +11,7 @@ from repro.curved import pore as curved_pore
 from verification.bench import options, pores
 from verification.bench.clock import measured
 
-REPEATS = 5
+REPEATS = 3
 #: Rings of the reference, the last one being it.
 RINGS = (16, 24)
 LINEAR, QUADRATIC = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8), (0.15, 0.25, 0.45, 0.7, 1.0, 1.6)

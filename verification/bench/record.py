@@ -13,9 +13,13 @@
                       ...}},                                           what is a part's own
      "verdicts": [{"claim": ..., "measured": ..., "wanted": ..., "holds": true, false or null (not measured)}]}
 
-Parts of another kind have their own keys beside title and lines: size has "fits" {method: {stage: exponent}},
-scenes "rows" [{"scene", "method", "seconds", "cpu", "stages": {stage: s}, ...}], memory "rows" [{"method", "steps",
-"slope", "bound", ...}]. A part that was not run again keeps what it had. Not-a-number is never written.
+What a part has of its own: points of flow, transport, growth and transfer "nodes", those of transfer "drift" (of the
+total) and "beyond" (the field's bounds), those of base "nodes", "errors" (of the eight numbers, the larger of both
+times) and "stages" {stage: s}; base "wide" [{"preset", "seconds", "cpu", "steps", "end"}] and, kept from one benchmark
+to the next, "reference_values" [time][number]; size, whose points have no error, "stages", "ratio" (to the floor) and
+"memory_MB" of each, and "fits" {method: {stage: exponent}}; scenes "rows" [{"scene", "method", "seconds", "cpu",
+"stages": {stage: s}, ...}] and "steps" [{"method", "seconds", "hours"}]; memory "rows" [{"method", "steps", "slope",
+"bound", ...}]. A part that was not run again keeps what it had. Not-a-number is never written.
 """
 
 from __future__ import annotations

@@ -11,6 +11,7 @@ import resource
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 from statistics import median
 from time import perf_counter, process_time
 
@@ -25,9 +26,9 @@ QUICK = {300: 1, 600: 1}
 METHODS = {"preset paper": "paper", "order 2, midpoint (accurate)": "accurate"}
 STAGES = ("flow", "transport", "growth", "mesh motion", "meshing", "transfer")
 FLOOR = "factorise and solve"
-RADIUS, STEP, LIMIT = 20.0, 0.2, 150.0
-#: Refinements of the first two guesses of a size, nodes growing as their squares or a little less.
-FIRST = {"paper": 1.0, "accurate": 0.5}
+RADIUS, STEP, LIMIT = 20.0, 0.2, 240.0
+#: The first guess of the refinement for so many nodes: c nodes^p, fitted to a few of them.
+FIRST = {"paper": (0.0265, 0.526), "accurate": (0.0109, 0.544)}
 
 
 def run(quick: bool) -> dict:
@@ -74,12 +75,13 @@ def scene(preset: str, refinement: float):
 
 def sized(preset: str, nodes: int):
     """(scene, pore) of about so many nodes."""
-    scheme, refinement = _scheme(preset), FIRST[preset]
-    for _ in range(4):
+    scheme, (factor, power) = _scheme(preset), FIRST[preset]
+    refinement = factor * nodes**power
+    for _ in range(3):
         given = scene(preset, refinement)
         now = scheme.seeded(given)
         count = len(now.mesh.points)
-        if abs(count / nodes - 1) < 0.05:
+        if abs(count / nodes - 1) < 0.1:
             break
         refinement *= (nodes / count) ** 0.5
     return given, now
@@ -91,7 +93,7 @@ def _scheme(preset: str):
 
 def measure(preset: str, nodes: int, steps: int) -> dict:
     """Seconds of a step and of its stages, their floor, and memory."""
-    before = _peak()
+    before = _resident()
     given, now = sized(preset, nodes)
     scheme = _scheme(preset)
     solved = scheme.solve(given, now)
@@ -118,6 +120,14 @@ def measure(preset: str, nodes: int, steps: int) -> dict:
 def _peak() -> float:
     """Peak of the resident memory of this process so far, MB."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
+def _resident() -> float:
+    """Resident memory now, MB, as Linux tells it; else its peak so far."""
+    try:
+        return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1]) * resource.getpagesize() / 2**20
+    except OSError:
+        return _peak()
 
 
 if __name__ == "__main__":

@@ -30,9 +30,10 @@ from reference.monod import uptake
 #: Newton's method of FiPy stops at this change over the supply; its direct solver refines to this residual (its own
 #: default, 1e-5, leaves an error of 1e-3 on fine grids).
 REST, MOST, EXACT = 1e-8, 40, 1e-14
-#: py-pde runs for so many diffusion times L^2 / D of the domain, after which exp(-pi^2 TIMES) is left of the start, in
-#: steps of this part of h^2 / D and dimension, of which a half is stable; watched in so many parts.
-TIMES, STABLE, PARTS = 1.5, 0.4, 100
+#: py-pde runs for so many diffusion times L^2 / D of the domain, held at both ends or with an outlet, after which less
+#: than exp(-pi^2 TIMES) or exp(-pi^2 TIMES_OPEN / 4) is left of the start, in steps of this part of h^2 / D and
+#: dimension, of which a half is stable; watched in so many parts.
+TIMES, TIMES_OPEN, STABLE, PARTS = 1.5, 6.0, 0.4, 100
 NUDGE = 1e-6
 
 
@@ -127,7 +128,8 @@ def py_pde(problem: Problem, across: int) -> tuple[np.ndarray, np.ndarray, dict]
     ends = {f"{name}:*": _pde_ends(problem, k) for k, name in enumerate("AD")}
     equation = PDE(_pde_rules(problem), consts={"X": X}, bc_ops=ends)
     state = FieldCollection([ScalarField(grid, s, label=name) for s, name in zip(problem.supply, "AD")])
-    time = TIMES * (problem.ends[1] - problem.ends[0]) ** 2 / min(problem.diffusivity)
+    times = TIMES_OPEN if problem.speed else TIMES
+    time = times * (problem.ends[1] - problem.ends[0]) ** 2 / min(problem.diffusivity)
     dt = STABLE * min(grid.discretization) ** 2 / max(problem.diffusivity) / grid.num_axes
     marks = [_now()]
     watch = CallbackTracker(lambda state, t: marks.append(_now()), interrupts=time / PARTS)

@@ -13,4 +13,6 @@ from verification.coupling import (  # noqa: F401
     schemes,
     special_cases,
     symmetry,
+    traction,
+    traction_shapes,
 )

@@ -131,8 +131,8 @@ def _listed(preset: str) -> np.ndarray:
 
 
 @case("coupling-presets", kind="cross-code", slow=True,
-      norm="largest difference at 19.2 and 19.4 h to an independent solver, extrapolated in space and time: relative, of "
-           "effluents over the supply",
+      norm="largest difference at 19.2 and 19.4 h to an independent solver, extrapolated in space and time: relative, "
+           "of effluents over the supply",
       claim="Each of the eight numbers of base is within 1 % with preset fast, and within 0.1 % with preset accurate",
       mutants=("curved-rates-of-the-start", "curved-fluid-diffusivity", "paired-without-decay"))
 def presets() -> Outcome:

@@ -1,6 +1,7 @@
 """Wrong changes to `repro/` that cases of this stage must catch."""
 
 from verification.coupling.curved_mutants import CURVED
+from verification.coupling.traction_mutants import TRACTION
 from verification.mutants import Mutant
 
 MUTANTS = (
@@ -115,4 +116,5 @@ MUTANTS = (
            old="start, push = grown.mesh.points[nodes], grown.pressure[nodes]",
            new="start, push = grown.mesh.points[nodes], grown.pressure[nodes] / scene.growth.shear_modulus"),
     *CURVED,
+    *TRACTION,
 )

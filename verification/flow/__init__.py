@@ -1,3 +1,13 @@
 """Flow (2.1, 3.2): closed forms, manufactured flow, Taylor-Hood elements, and what holds of any viscous flow."""
 
-from verification.flow import closed_forms, cross_code, curved, inclusion, layers, manufactured, properties, rise  # noqa: F401
+from verification.flow import (  # noqa: F401
+    bubble,
+    closed_forms,
+    cross_code,
+    curved,
+    inclusion,
+    layers,
+    manufactured,
+    properties,
+    rise,
+)

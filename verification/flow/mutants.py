@@ -1,5 +1,6 @@
 """Wrong changes to `repro/` that cases of this stage must catch."""
 
+from verification.flow.bubble_mutants import BUBBLE
 from verification.flow.curved_mutants import CURVED
 from verification.mutants import Mutant
 
@@ -61,4 +62,5 @@ MUTANTS = (
            old="if order == 1 else np.zeros(len(viscosity))",
            new="if order < 3 else np.zeros(len(viscosity))"),
     *CURVED,
+    *BUBBLE,
 )

@@ -147,15 +147,14 @@ class Verdicts(Outcome):
 
 
 def outcome(cells: Iterable[Cell]) -> Verdicts:
-    """All own checks of the parts that were not refused; what must hold in every run, folded into one number a preset;
-    and how many parts have a verdict that they may not have."""
+    """All own checks of the parts that are right; what must hold in every run, folded into one number a preset; and how
+    many parts have a verdict that they may not have."""
     cells, checks = tuple(cells), []
     for cell in cells:
-        for part in cell.parts:
-            if part.verdict != REFUSED and accepted(cell.case, cell.preset, part):
-                checks += [Check(f"{cell.preset}, {part.name}: {c.quantity}", c.value, c.low, c.high, c.origin)
-                           for c in part.checks]
-        always = [used(check) for part in cell.parts for check in part.always]
+        right = [part for part in cell.parts if part.verdict == RIGHT]
+        checks += [Check(f"{cell.preset}, {part.name}: {c.quantity}", c.value, c.low, c.high, c.origin)
+                   for part in right for c in part.checks]
+        always = [used(check) for part in right for check in part.always]
         checks.append(at_most(f"{cell.preset}: of what must hold in every run, largest part of a tolerance",
                               max(always, default=0.0), 1.0, "balances, bounds of C, density, area, finite numbers"))
         told = f": {cell.message[:300]}" if cell.unaccepted else ""

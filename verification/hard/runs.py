@@ -1,17 +1,23 @@
-"""Hard cases of whole runs: units that make every number huge or tiny, and parameters drawn at random."""
+"""Hard cases of runs: tiny and large seeds, huge and tiny units, 1e5 nodes, parameters drawn at random."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
-from repro.scene import Scene, parse_scene
-from verification.case import at_most
+from repro import coupling
+from repro.coupling import Instant
+from repro.curved import coupling as curved_coupling
+from repro.results import row
+from repro.scene import Scene, parse_scene, scene_tables
+from verification.case import at_least, at_most
 from verification.hard import common
-from verification.hard.common import TOLERANCE, HardCase
+from verification.hard.common import DRIVE, EFFLUENTS, SHAPE, TOLERANCE, HardCase, Run
+from verification.hard.contact import CLOSING
+from verification.hard.substrates import exponential
 
 #: Powers of length and time in the unit of each key that has one.
 POWERS = {
@@ -38,16 +44,18 @@ def scaled(section, length: float, time: float):
             changes[key.name] = scaled(value, length, time)
         elif key.name == "times" and value:
             changes[key.name] = tuple(time * t for t in value)
-        elif key.name in POWERS and value is not None and not (key.name == "length" and not isinstance(value, float)):
+        elif key.name in POWERS and value is not None:
             along, during = POWERS[key.name]
             changes[key.name] = value * length**along * time**during
     return replace(section, **changes)
 
 
 def units(preset: str, length: float, time: float) -> list:
-    """Base from 15 um for 1.2 h, in other units."""
-    made = common.scene("base", preset, 'aggregate.radius="15 um"', 'growth.end="1.2 h"', 'output.times=["1.2 h"]')
-    plain, other = common.ran(made), common.ran(scaled(made, length, time))
+    """Base from 15 um for 2.4 h, in other units."""
+    made = common.scene("base", preset, 'aggregate.radius="15 um"', 'growth.end="2.4 h"', 'growth.time_step="1.2 h"',
+                        'output.times=["2.4 h"]')
+    there = parse_scene(scene_tables(scaled(made, length, time)), "scaled", "scaled")
+    plain, other = common.ran(made), common.ran(there)
     exact = np.log2(length) % 1 == 0
     bound, origin = (1e-9, "dimensions; round-off") if exact else (
         TOLERANCE[preset], "round-off makes another mesh; " + common.PROMISED[preset])
@@ -67,14 +75,15 @@ UNITS = HardCase(
     "A length or a time that is written into the code: a tolerance, a smallest step, a size",
     {told: partial(units, length=length, time=time) for told, (length, time) in SCALES.items()},
     refusable=tuple(SCALES),
-    mutants=("hard-absolute-time", "length-scale"))
+    mutants=("length-scale",))
 
 #: What is drawn: key of the scene, its unit, and its physical range; all but the radius by its logarithm.
 RANGES = {
     "pore.width": ("um", 20.0, 200.0), "aggregate.radius": ("of the width", 0.04, 0.8),
     "flow.mean_velocity": ("m/day", 0.03, 30.0), "flow.viscosity_ratio": ("", 1.0, 1e5),
     "substrates.acceptor.supply": ("mg/L", 0.1, 50.0), "substrates.donor.supply": ("mg/L", 0.1, 50.0),
-    "substrates.acceptor.half_saturation": ("mg/L", 0.05, 10.0), "substrates.donor.half_saturation": ("mg/L", 0.05, 10.0),
+    "substrates.acceptor.half_saturation": ("mg/L", 0.05, 10.0),
+    "substrates.donor.half_saturation": ("mg/L", 0.05, 10.0),
     "kinetics.maximum_utilization_rate": ("1/day", 0.5, 12.0), "kinetics.decay_coefficient": ("1/day", 0.02, 0.5),
     "kinetics.maximum_density": ("mg/L", 5e3, 1e5), "growth.minimum_contact_angle": ("deg", 5.0, 45.0),
     "growth.end": ("h", 0.4, 3.0),
@@ -100,7 +109,12 @@ def drawn(shares: Mapping[str, float], preset: str) -> Scene:
 def at_random(preset: str, seed: int) -> list:
     """One draw."""
     random = np.random.default_rng(seed)
-    return [common.ran(drawn({key: random.uniform() for key in RANGES}, preset))]
+    return [run_drawn({key: random.uniform() for key in RANGES}, preset)]
+
+
+def run_drawn(shares: Mapping[str, float], preset: str) -> Run:
+    """Run the scene of :func:`drawn`."""
+    return common.ran(drawn(shares, preset), density=CLOSING)
 
 
 DRAWS = range(10)
@@ -110,6 +124,65 @@ RANDOM = HardCase(
     "A run that ends with a number that is none, or with mass made or lost",
     {f"draw {seed}": partial(at_random, seed=seed) for seed in DRAWS},
     refusable=tuple(f"draw {seed}" for seed in DRAWS),
-    mutants=("curved-mass-lost", "reprojection-left-out"))
+    mutants=("reprojection-left-out",))
 
-CASES = (UNITS, RANDOM)
+def seeded(preset: str, name: str, radius: float, end: str) -> list:
+    """Growth from a seed between the exponentials at its least concentrations and at the supply."""
+    changes = (f'aggregate.radius="{radius} um"', f'growth.end="{end}"', f'output.times=["{end}"]')
+    found, fine = common.run(name, preset, *changes), common.reference(name, *changes)
+    return [found, *exponential(found), *common.close(found, fine, preset, *SHAPE, *DRIVE)]
+
+
+SEEDS = HardCase(
+    14, "seeds", "Seeds of 0.5 and 20 um",
+    "Growth between the exponentials at the least concentrations and at the supply, and a finer run's shape",
+    "Elements of a seed that is 1/200 of the pore, or a seed that is starved at once",
+    {"0.5 um in 100 um": partial(seeded, name="wide", radius=0.5, end="8 h"),
+     "20 um in 50 um": partial(seeded, name="base", radius=20.0, end="4 h")},
+    mutants=("curved-half-of-the-half",))
+
+#: Refinement with which base has 1e5 nodes.
+HUGE = {"linear": 11.4, "quadratic": 5.7}
+
+
+@cache
+def _huge(kind: str):
+    """(first Run, Step) of base from 15 um with 1e5 nodes; fast and accurate differ in the step's tolerance alone."""
+    preset = "paper" if kind == "linear" else "accurate"
+    return _first_step(preset, f"numerics.refinement={HUGE[kind]}")
+
+
+def _first_step(preset: str, *changes: str):
+    """What is solved in the seed of 15 um as a Run, and one step of 6 min from it."""
+    made = common.scene("base", preset, 'aggregate.radius="15 um"', *changes)
+    now, solved = common.seeded(preset, made)
+    step = coupling.step(made, now, solved, 0.1) if preset == "paper" else curved_coupling.attempt(
+        made, now, solved, 0.1).step
+    start = Instant(now, solved, None, (), 0, {})
+    return Run(made, [start], [row(made, start)]), step
+
+
+def huge(preset: str) -> list:
+    """One step of 6 min with 1e5 nodes, against the preset's own mesh."""
+    (fine, far), (own, near) = _huge("linear" if preset == "paper" else "quadratic"), _first_step(preset)
+    missing = far.ledger.biomass_after - far.ledger.biomass_before - far.ledger.biomass_made
+    taken = [abs(1 - (far.ledger.out[k] + far.ledger.consumed[k]) / far.ledger.supplied[k]) for k in (0, 1)]
+    shapes = [(step.pore.outline.area, step.pore.outline.thickness, step.pore.outline.upstream) for step in (near, far)]
+    apart = np.abs(np.array(shapes[0]) / shapes[1] - 1)
+    return [fine, own, at_least("nodes", fine.last["nodes"], 1e5, "else less is tested"),
+            at_most("in - out - consumed over the step, over in", max(taken), common.BALANCE, common.NEWTON),
+            at_most("biomass after - before - made, over after", abs(missing) / far.ledger.biomass_after,
+                    common.BALANCE, common.MEAN),
+            *common.close(own, fine, preset, *DRIVE, *EFFLUENTS),
+            *(at_most(f"{name} after the step, own mesh", value, TOLERANCE[preset], common.PROMISED[preset])
+              for name, value in zip(("area", "thickness", "upstream tip"), apart))]
+
+
+LARGE = HardCase(
+    20, "large", "1e5 nodes in one step",
+    "The shape and flow that the preset's own mesh gives to its tolerance, balances closed",
+    "A system too large to be solved, or solved badly: residuals grow with the condition",
+    {"base, 15 um": huge},
+    mutants=("hard-keys-overflow",))
+
+CASES = (SEEDS, UNITS, LARGE, RANDOM)

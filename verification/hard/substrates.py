@@ -62,7 +62,7 @@ STARVED = HardCase(
      "0.35 m/d, R = 42 um": starved(*disc(42, SLOW, 'pore.width="50 um"')),
      "supply 0.15 mg/L": starved(*disc(40, *supply(0.15, 0.15))),
      "supply 0.02 K_s": starved(*disc(40, *supply(0.02, 0.02)))},
-    mutants=("hard-negative-root",))
+    mutants=("hard-newton-too-soon",))
 
 
 def exhausted(preset: str, scarce: str) -> list:
@@ -70,7 +70,8 @@ def exhausted(preset: str, scarce: str) -> list:
     changes = disc(80, SLOW)
     given = {name: 10.0 if name == scarce else 1000.0 for name in BOTH}
     found = common.run("wide", preset, *changes, *supply(*given.values()))
-    more = common.run("wide", preset, *changes, *supply(*(1e6 if value == 1000.0 else value for value in given.values())))
+    plenty = [1e6 if value == 1000.0 else value for value in given.values()]
+    more = common.run("wide", preset, *changes, *supply(*plenty))
     column = f"effluent_{scarce}_mg_per_L"
     return [found, *_stoichiometry(found),
             at_most(f"least {scarce} over its supply", found.last[f"{scarce}_min_mg_per_L"] / 10, 0.02,
@@ -87,7 +88,8 @@ def _stoichiometry(found: Run) -> list[Check]:
     decay = law.decay_oxygen_demand * law.degradable_fraction * law.decay_coefficient * law.maximum_density
     decay *= found.last["aggregate_area_um2"]
     C = found.instants[-1].solved.concentrations.acceptor
-    m = np.array([max(C.min(), 0.0), C.max()]) / (np.array([max(C.min(), 0.0), C.max()]) + both.acceptor.half_saturation)
+    ends = np.array([max(C.min(), 0.0), C.max()])
+    m = ends / (ends + both.acceptor.half_saturation)
     low, high = (acceptor - decay * m[::-1]) / (law.acceptor_to_donor_ratio * donor)
     return [between("acceptor taken up for decay, over what m_A = 1 would take",
                     (acceptor - law.acceptor_to_donor_ratio * donor) / decay, m[0] * (1 - 1e-9), m[1] * (1 + 1e-9),
@@ -108,7 +110,7 @@ def front(radius: float, *more: str):
     def part(preset: str) -> list:
         changes = disc(radius, *(f'substrates.{name}.half_saturation="1e-5 mg/L"' for name in BOTH), *more)
         found = common.run("wide", preset, *changes)
-        fine = common.reference("wide", *changes)
+        fine = common.reference("wide", *changes, refinement=0.8)
         return [found, *common.close(found, fine, preset, *EFFLUENTS)]
     return part
 
@@ -184,7 +186,6 @@ SATURATED = HardCase(
     21, "saturated", "Supply of 1000 K_s",
     "Growth between the exponentials at the least concentration and at the supply, 0.3 % apart in their rates",
     "A balance that no longer closes, as uptake is a small part of what passes", {"base": saturated},
-    refusable=("base",),
     mutants=("decay-leaves-all",))
 
 CASES = (STARVED, EXHAUSTED, ZERO_ORDER, SATURATED)

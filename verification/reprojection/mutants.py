@@ -1,6 +1,7 @@
 """Wrong changes to `repro/` that cases of this stage must catch."""
 
 from verification.mutants import Mutant
+from verification.reprojection.bounded_mutants import BOUNDED
 
 MUTANTS = (
     Mutant("linear-transfer", "repro/reprojection.py",
@@ -75,4 +76,5 @@ MUTANTS = (
            says="Beyond the old inlet the donor spreads with the acceptor's diffusivity.",
            old="(x[before] - old.ends[0]) / substrate.diffusivity)",
            new="(x[before] - old.ends[0]) / scene.substrates.acceptor.diffusivity)"),
+    *BOUNDED,
 )

@@ -173,10 +173,10 @@ def _monod_profile(name: str, peclet: float, density: float) -> Profile:
 
 
 @case("transport-curved-front", kind="property", slow=True,
-      norm="consumed acceptor over F times consumed donor, less one; difference of effluents over the larger supply, to "
-           "a mesh of refinement 1.3",
-      claim="Behind a front where the donor is used up, to half saturations of a millionth of the supply, both are taken "
-            "up in their proportion, and what leaves is within the presets' accuracy",
+      norm="consumed acceptor over F times consumed donor, less one; difference of effluents over the larger supply, "
+           "to a mesh of refinement 1.3",
+      claim="Behind a front where the donor is used up, to half saturations of a millionth of the supply, both are "
+            "taken up in their proportion, and what leaves is within the presets' accuracy",
       mutants=("curved-unpaired",))
 def front() -> Outcome:
     checks = []

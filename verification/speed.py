@@ -1,0 +1,212 @@
+"""Speed against error, told: a section of the README and a page of the report, both from what was measured.
+
+``python -m verification.speed`` writes them from ``bench.json`` (`make bench`), ``audit.json`` (`make bench`) and
+``hard_cases.json`` (`make verify`) in ``verification/report``. The README's section stands between two marks and is
+never edited by hand; a test holds it to the records.
+"""
+
+from __future__ import annotations
+
+import html
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from verification import pages
+from verification.bench import base
+from verification.bench.record import line
+
+FOLDER = Path(__file__).parent / "report"
+README = Path(__file__).parents[1] / "README.md"
+BEGIN, END = "<!-- speed: begin (python -m verification.speed) -->", "<!-- speed: end -->"
+QUANTITIES = ("velocity", "conductivity", "area", "thickness", "upstream", "downstream", "acceptor out", "donor out")
+PAPER_AS_IT_IS = "refinement 1, 12 min"
+
+
+@dataclass(frozen=True)
+class Block:
+    """A piece of either: a heading, a paragraph, a picture (file and what it shows), or a table (head and rows)."""
+
+    kind: str
+    text: str = ""
+    rows: tuple[tuple[str, ...], ...] = ()
+    detail: bool = False
+
+
+def records() -> dict[str, dict]:
+    """What was measured, by name; empty where nothing was."""
+    found = {}
+    for name in ("bench", "audit", "hard_cases"):
+        file = FOLDER / f"{name}.json"
+        found[name] = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+    return found
+
+
+def blocks(found: dict[str, dict]) -> Iterator[Block]:
+    """All that is told; ``detail``: on the page alone."""
+    yield from _bench(found["bench"])
+    yield from _hard(found["hard_cases"])
+    yield from _audit(found["audit"])
+
+
+def _bench(record: dict) -> Iterator[Block]:
+    if not record.get("parts"):
+        return
+    about = record["machine"]
+    yield Block("text", f"Measured by `make bench` on {about['cores']} cores of {about['processor']}, one thread, "
+                        f"Python {about['python']}; importing the packages is not counted. Times of another machine "
+                        "differ, ratios less.")
+    part = record["parts"].get("base")
+    if part:
+        yield Block("picture", "bench_base.svg: error against time of the whole base run")
+        yield Block("text", f"The presets on base. Error: {part['error']}. Reference: {part['reference']}.")
+        yield Block("table", rows=(("preset", "time (s)", "faster than paper", "largest error", *QUANTITIES),
+                                   *_presets(part)))
+    yield Block("table", rows=(("claim", "wanted", "measured", ""), *(
+        (one["claim"], one["wanted"], one["measured"], _word(one["holds"])) for one in record["verdicts"])))
+    for name, other in record["parts"].items():
+        if other.get("lines") and name != "base":
+            yield Block("heading", f"{name}: {other['title']}", detail=True)
+            yield Block("text", other.get("reference", ""), detail=True)
+            yield Block("picture", f"bench_{name}.svg: {other['title']}", detail=True)
+            yield Block("table", rows=(("method", "", "seconds", "error"), *_points(other)), detail=True)
+
+
+def _presets(part: dict) -> Iterator[tuple[str, ...]]:
+    slow = next(p for p in line(part, base.PRESET_PAPER)["points"] if p["label"] == PAPER_AS_IT_IS)
+    for name, point in (("paper", slow), *((name.split()[1], line(part, name)["points"][0])
+                                           for name in (base.FAST, base.ACCURATE))):
+        yield (name, f"{point['seconds']:.2f}", f"{slow['seconds'] / point['seconds']:.1f} times",
+               _percent(point["error"]), *map(_percent, point["errors"]))
+
+
+def _points(part: dict) -> Iterator[tuple[str, ...]]:
+    for one in part["lines"]:
+        for point in one["points"]:
+            yield one["method"], point["label"], f"{point['seconds']:.3g}", f"{point.get('error', float('nan')):.1e}"
+        for failed in one["failed"]:
+            yield one["method"], failed["label"], "failed", failed["reason"]
+
+
+def _hard(record: dict) -> Iterator[Block]:
+    if not record:
+        return
+    presets = ("paper", "fast", "accurate")
+    yield Block("heading", "Hard cases")
+    yield Block("text", "Right: the exact value, bound or conserved quantity of the case is met, and so are the "
+                        "balances; refused: an error says which bound was met; wrong: anything else. `make verify` "
+                        "runs them all; `python -m verification.hard_cases` shows the numbers.")
+    yield Block("table", rows=(("", "case", "right is", *presets), *(
+        (str(case["number"]), case["title"], case["right_is"], *(_cell(case, preset) for preset in presets))
+        for case in record["cases"])))
+    notes = tuple((str(case["number"]), preset, cell["message"]) for case in record["cases"]
+                  for preset, cell in case["cells"].items() if cell["message"])
+    yield Block("table", rows=(("case", "preset", "why it is not right"), *notes), detail=True)
+    checks = tuple((str(case["number"]), preset, check["part"], check["quantity"], check["measured"], check["expected"],
+                    check["origin"]) for case in record["cases"] for preset, cell in case["cells"].items()
+                   for check in cell["checks"])
+    yield Block("table", rows=(("case", "preset", "part", "quantity", "measured", "expected", "origin"), *checks),
+                detail=True)
+
+
+def _cell(case: dict, preset: str) -> str:
+    cell = case["cells"].get(preset)
+    return cell["verdict"] if cell else ""
+
+
+def _audit(record: dict) -> Iterator[Block]:
+    if not record:
+        return
+    yield Block("heading", "What the paper's choices cost and change")
+    yield Block("text", f"{record['method']}.")
+    head = ("choice", "default", "alternative", "cost", "velocity", "area", "acceptor out", "largest change",
+            "in one state", "note")
+    yield Block("table", rows=(head, *map(_choice, record["rows"])))
+
+
+def _choice(row: dict) -> tuple[str, ...]:
+    effect = row["effect"]
+    return (row["choice"], row["default"], row["alternative"], f"{row['cost_ratio']:.2f}",
+            *(_change(effect.get(name)) for name in ("velocity", "area", "acceptor leaving")), _largest(effect),
+            _largest(row.get("one_state", {})), row["note"])
+
+
+def _largest(effect: dict[str, float]) -> str:
+    name = max(effect, key=lambda name: abs(effect[name]), default="")
+    return f"{_change(effect[name])} ({name})" if name else ""
+
+
+def _change(value: float | None) -> str:
+    return "" if value is None else f"{100 * value:+.2g} %"
+
+
+def _percent(value: float) -> str:
+    return f"{100 * value:.2g} %"
+
+
+def _word(holds: bool | None) -> str:
+    return {True: "holds", False: "does not hold", None: "not measured"}[holds]
+
+
+def markdown(found: list[Block]) -> str:
+    """The README's section."""
+    return "\n\n".join(_markdown(block) for block in found if not block.detail)
+
+
+def _markdown(block: Block) -> str:
+    if block.kind == "heading":
+        return f"### {block.text}"
+    if block.kind == "picture":
+        name, _, shown = block.text.partition(": ")
+        return f"![{shown}](verification/report/{name})"
+    if block.kind == "text":
+        return block.text
+    head, *rows = block.rows
+    return "\n".join(["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |"
+                      for row in (head, ("---",) * len(head), *rows)])
+
+
+def page(found: list[Block]) -> str:
+    """The page of the report."""
+    return pages.page("Speed against error, hard cases, assumptions",
+                      "<p><a href='index.html'>All cases</a>", *map(_html, found))
+
+
+def _html(block: Block) -> str:
+    if block.kind == "heading":
+        return f"<h2>{html.escape(block.text)}</h2>"
+    if block.kind == "picture":
+        name, _, shown = block.text.partition(": ")
+        return f"<img src='{html.escape(name)}' alt='{html.escape(shown)}'>"
+    if block.kind == "text":
+        return f"<p>{html.escape(block.text)}"
+    head, *rows = block.rows
+    body = "".join(pages.row("td", *map(html.escape, row), holds="wrong" not in row and "does not hold" not in row)
+                   for row in rows)
+    return f"<table>{pages.row('th', *map(html.escape, head))}{body}</table>"
+
+
+def in_readme(text: str, section: str) -> str:
+    """The README with the section between its marks."""
+    before, _, rest = text.partition(BEGIN)
+    _, _, after = rest.partition(END)
+    return f"{before}{BEGIN}\n\n{section}\n\n{END}{after}"
+
+
+def main() -> None:
+    """Write both."""
+    found = list(blocks(records()))
+    write_page(FOLDER)
+    README.write_text(in_readme(README.read_text(encoding="utf-8"), markdown(found)), encoding="utf-8")
+
+
+def write_page(folder: Path) -> Path:
+    """Write the page into a folder; its path."""
+    file = folder / "speed.html"
+    file.write_text(page(list(blocks(records()))), encoding="utf-8")
+    return file
+
+
+if __name__ == "__main__":
+    main()
