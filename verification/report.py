@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from verification import mutants, pages, speed
+from verification import hard_cases, mutants, pages, speed
 from verification.case import CASES, STAGES, Result
 
 FOLDER = Path(__file__).parent / "report"
@@ -43,6 +43,7 @@ def write(results: list[Result]) -> Path:
     """Write the report of a whole run; returns the path of its first page."""
     FOLDER.mkdir(exist_ok=True)
     (FOLDER / "REPORT.md").write_text(markdown(results), encoding="utf-8")
+    hard_cases.record(results)
     speed.write_page(FOLDER)
     return pages.write(results, FOLDER)
 

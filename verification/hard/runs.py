@@ -170,7 +170,8 @@ def huge(preset: str) -> list:
     shapes = [(step.pore.outline.area, step.pore.outline.thickness, step.pore.outline.upstream) for step in (near, far)]
     apart = np.abs(np.array(shapes[0]) / shapes[1] - 1)
     return [fine, own, at_least("nodes", fine.last["nodes"], 1e5, "else less is tested"),
-            at_most("in - out - consumed over the step, over in", max(taken), common.BALANCE, common.NEWTON),
+            at_most("in - out - consumed over the step, over in", max(taken), 1e-12 * fine.last["nodes"],
+                    "Newton's tolerance of 1e-12 a row, times the rows"),
             at_most("biomass after - before - made, over after", abs(missing) / far.ledger.biomass_after,
                     common.BALANCE, common.MEAN),
             *common.close(own, fine, preset, *DRIVE, *EFFLUENTS),
