@@ -116,7 +116,8 @@ def _operator(mesh: PoreMesh, flow: Flow | None, carried, scalar, substrate, inl
         supplied = flow.mean_velocity * mesh.width * substrate.supply
     elif boundary == "open":
         held = np.concatenate([mesh.inlet, mesh.outlet])
-    matrix = (scalar.matrix(spread + carried) + sp.diags_array(robin)).tocsc()
+    matrix = scalar.matrix(spread + carried)
+    matrix.setdiag(matrix.diagonal() + robin)  # in its place: a sum would drop entries that happen to be zero
     return Operator(matrix, abs(matrix), robin * substrate.supply, held, inflow, outflow, supplied, substrate.supply)
 
 

@@ -10,6 +10,7 @@ from reference import robin_channel
 from repro import kinetics, pore, transport
 from repro.flow import Flow
 from tests.strategies import between, fitted_order, meshed, plug, scene, scenes, share
+from verification.bench import ribbons
 
 VELOCITY = 2.9e6 / 24  # um/h
 
@@ -199,3 +200,12 @@ def test_uptake_is_stoichiometric():
     donor_m = [c / (c + 1) for c in (found.concentrations.donor[now.mesh.body].min(), 10.0)]
     assert 1.52 + extra / donor_m[1] <= acceptor.consumed / donor.consumed <= 1.52 + extra / donor_m[0]
     assert found.problem.body.sum() == pytest.approx(now.outline.area, rel=1e-12)
+
+
+def test_couplings_that_are_exactly_zero_keep_their_place():
+    """Between right triangles nothing diffuses along the hypotenuse: without flow those entries are zero. The steady
+    state without biomass is the supply. Mutant: matrices added so that such entries are dropped."""
+    grid = ribbons.straight((0.0, 40.0), 20.0, (8, 4), lambda x, y: (x > 10) & (x < 20))
+    problem = transport.problem(grid, None, scene().substrates, scene().kinetics)
+    found = transport.steady(problem, np.zeros(len(grid.points)))
+    assert found.acceptor == pytest.approx(10.0, rel=1e-12)

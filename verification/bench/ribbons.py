@@ -13,7 +13,6 @@ from repro.scene import parse_scene
 
 #: um2/h of acceptor and donor, in fluid and biomass alike; mg/L.
 DIFFUSIVITY, DENSITY = (8e6, 4e6), 3e4
-JITTER = 1e-3
 
 
 def scene():
@@ -24,21 +23,13 @@ def scene():
 
 
 def straight(ends, width: float, cells: tuple[int, int], inside) -> PoreMesh:
-    """cells (along, across) halved; ``inside(x, y)`` of the triangles' middles is biomass.
-
-    Inner nodes are moved by JITTER of a cell: between exactly right triangles the coupling along the hypotenuse is
-    zero, which the sparsity of the linear elements' Newton matrix does not allow for in still water.
-    """
+    """cells (along, across) halved; ``inside(x, y)`` of the triangles' middles is biomass."""
     x, y = np.meshgrid(np.linspace(*ends, cells[0] + 1), np.linspace(0.0, width, cells[1] + 1), indexing="ij")
     number = np.arange(x.size).reshape(x.shape)
     a, b, c, d = (part.ravel() for part in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
     triangles = np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
     points = np.column_stack([x.ravel(), y.ravel()])
     biomass = inside(*points[triangles].mean(axis=1).T)
-    rim = np.isin(np.arange(len(points)), triangles[biomass]) & np.isin(np.arange(len(points)), triangles[~biomass])
-    inner = np.flatnonzero(~rim & (points[:, 0] > ends[0]) & (points[:, 0] < ends[1]) & (points[:, 1] > 0)
-                           & (points[:, 1] < width))
-    points[inner] += np.random.default_rng(1).uniform(-JITTER, JITTER, (len(inner), 2)) * width / cells[1]
     return PoreMesh(points, triangles, biomass, np.empty(0, int), width, ends)
 
 
