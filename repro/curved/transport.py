@@ -135,9 +135,9 @@ def steady(problem: Problem, active: np.ndarray | None, guess: Concentrations | 
     """Steady concentrations by Newton's method on both substrates at once.
 
     active: X_A (N,) mg/L, None without biomass. Where it does not converge, as behind a sharp front, it starts again
-    from the supply with shorter steps, and half saturations come down from the supply to what they are, a tenth at a time.
-    Raises TransportError where that fails too, or where a concentration is outside of zero to the supply by more than
-    UNRESOLVED and OVERSHOOT say: the mesh is too coarse for its front.
+    from the supply with shorter steps, and half saturations come down from the supply to what they are, a tenth at a
+    time. Raises TransportError where that fails too, or where a concentration is outside of zero to the supply by more
+    than UNRESOLVED and OVERSHOOT say: the mesh is too coarse for its front.
     """
     count = len(problem.mesh.points)
     supply = np.repeat([s.supply for s in problem.both], count)
