@@ -45,7 +45,7 @@ def _base(part: dict) -> Iterator[dict]:
         else:
             yield verdict(claim, f"at most {100 * error:g} %", f"{100 * point['error']:.2g} %", point["error"] <= error)
         yield _faster(name, paper, point, error, f"{100 * error:g} %", least, aim)
-        if point is not None:
+        if point is not None and point["error"] > 0:
             yield _faster(name, paper, point, point["error"], "the error that the preset has", least, aim)
     point = next(iter((line(part, base.ACCURATE) or {}).get("points", [])), None)
     claim, wanted = f"base: {base.ACCURATE} takes about {ACCURATE_RUN:g} s", f"at most {ACCURATE_RUN:g} s"
