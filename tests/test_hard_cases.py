@@ -1,4 +1,5 @@
 """Hard cases: a cell is right, refused or wrong for the right reason, and a few of the real ones are right."""
+import pickle
 import json
 import math
 import os
@@ -187,3 +188,8 @@ def test_every_hard_case_is_a_verification_case():
     from verification import case
     assert {one.full_id for one in hard_cases.CASES} == {id for id, c in case.CASES.items() if c.stage == "hard"}
     assert "presets" in registered.NORM
+
+
+def test_every_case_goes_from_process_to_process():
+    """`make verify` runs them side by side. Mutant: a case that is pickled with its functions."""
+    assert [pickle.loads(pickle.dumps(case)) for case in hard_cases.CASES] == list(hard_cases.CASES)

@@ -53,6 +53,8 @@ def channels() -> Outcome:
 
 
 RADIUS, REFINEMENTS = 20.0, (0.3, 0.6, 1.2, 2.4)
+#: Where the velocity's order is judged: on coarser meshes what is smooth, of third order, still counts (orders of 1.5).
+FINE = (0.85, 1.3, 2.0, 3.0)
 
 
 @cache
@@ -88,10 +90,10 @@ def _errors(refinement: float, ratio: float) -> dict[str, float]:
             "pressure of its own on either side: to first order for lambda = 10, under 0.1 % for lambda = 2000",
       mutants=("curved-viscosity-swapped", "curved-straight-divergence"))
 def half_disc() -> Outcome:
-    errors = refine(_errors, REFINEMENTS, 10.0)
+    errors, fine = (refine(_errors, series, 10.0) for series in (REFINEMENTS, FINE))
     why = "the pressure jumps at the interface [E2], ours is continuous: 1/2 in energy, which is twice that in the loss"
     studies = (study("loss, lambda = 10", errors["size"], errors["loss"], 1, why, ceiling=5e-4),
-               study("velocity, lambda = 10", errors["size"], errors["velocity"], 1.1, why + ", and in L2 by duality",
+               study("velocity, lambda = 10", fine["size"], fine["velocity"], 1, why + ", and in L2 by duality",
                      ceiling=5e-4))
     near = [_errors(refinement, 2000.0) for refinement in REFINEMENTS]
     told = "0.1 %, as between codes; biomass all but stands still, and its pressure hardly matters"

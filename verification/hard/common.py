@@ -77,6 +77,17 @@ class HardCase:
         """That of its verification case."""
         return f"hard-{self.number:02d}-{self.id}"
 
+    def __reduce__(self):
+        """From process to process a case goes by its number: its parts may be functions within functions."""
+        return numbered, (self.number,)
+
+
+def numbered(number: int) -> HardCase:
+    """The case of a number."""
+    from verification.hard import CASES  # which imports this module
+
+    return next(case for case in CASES if case.number == number)
+
 
 def scene(name: str, preset: str, *changes: str) -> Scene:
     """A packaged scene with a preset and other changes (KEY=VALUE)."""
