@@ -111,7 +111,8 @@ def verdict_of(parts, words):
 @pytest.mark.parametrize("fast, holds", [((0.39, 0.008), True), ((0.41, 0.008), False), ((0.1, 0.011), False)])
 def test_faster_at_one_percent(fast, holds):
     """2 s over the preset's: five times, and only if it delivers the error."""
-    found = verdict_of({"base": base_part(fast=fast)}, "fast is faster than the paper's scheme at its own best speed for 1 %")
+    parts = {"base": base_part(fast=fast)}
+    found = verdict_of(parts, "fast is faster than the paper's scheme at its own best speed for 1 %")
     assert found["holds"] is holds and f"{2 / fast[0]:.1f} times" in found["measured"]
 
 

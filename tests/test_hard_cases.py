@@ -1,8 +1,8 @@
 """Hard cases: a cell is right, refused or wrong for the right reason, and a few of the real ones are right."""
-import pickle
 import json
 import math
 import os
+import pickle
 from itertools import count
 
 import numpy as np
