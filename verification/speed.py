@@ -67,10 +67,10 @@ def _bench(record: dict) -> Iterator[Block]:
         (one["claim"], one["wanted"], one["measured"], _word(one["holds"])) for one in record["verdicts"])))
     for name, other in record["parts"].items():
         if other.get("lines") and name != "base":
-            yield Block("heading", f"{name}: {other['title']}", detail=True)
+            yield Block("heading", other["title"], detail=True)
             yield Block("text", other.get("reference", ""), detail=True)
             yield Block("picture", f"bench_{name}.svg: {other['title']}", detail=True)
-            yield Block("table", rows=(("method", "", "seconds", "error"), *_points(other)), detail=True)
+            yield Block("table", rows=(("method", "", "seconds", "error, or what a step costs"), *_points(other)), detail=True)
 
 
 def _presets(part: dict) -> Iterator[tuple[str, ...]]:
@@ -84,7 +84,9 @@ def _presets(part: dict) -> Iterator[tuple[str, ...]]:
 def _points(part: dict) -> Iterator[tuple[str, ...]]:
     for one in part["lines"]:
         for point in one["points"]:
-            yield one["method"], point["label"], f"{point['seconds']:.3g}", f"{point.get('error', float('nan')):.1e}"
+            told = f"{point['error']:.1e}" if "error" in point else (
+                f"{point['ratio']:.2f} times its linear systems, {point['memory_MB']:.0f} MB")
+            yield one["method"], point["label"], f"{point['seconds']:.3g}", told
         for failed in one["failed"]:
             yield one["method"], failed["label"], "failed", failed["reason"]
 
