@@ -70,7 +70,8 @@ def _bench(record: dict) -> Iterator[Block]:
             yield Block("heading", other["title"], detail=True)
             yield Block("text", other.get("reference", ""), detail=True)
             yield Block("picture", f"bench_{name}.svg: {other['title']}", detail=True)
-            yield Block("table", rows=(("method", "", "seconds", "error, or what a step costs"), *_points(other)), detail=True)
+            head = ("method", "", "seconds", "error, or what a step costs")
+            yield Block("table", rows=(head, *_points(other)), detail=True)
 
 
 def _presets(part: dict) -> Iterator[tuple[str, ...]]:
