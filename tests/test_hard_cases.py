@@ -1,8 +1,8 @@
 """Hard cases: a cell is right, refused or wrong for the right reason, and a few of the real ones are right."""
+import copy
 import json
 import math
 import os
-import pickle
 from itertools import count
 
 import numpy as np
@@ -191,5 +191,6 @@ def test_every_hard_case_is_a_verification_case():
 
 
 def test_every_case_goes_from_process_to_process():
-    """`make verify` runs them side by side. Mutant: a case that is pickled with its functions."""
-    assert [pickle.loads(pickle.dumps(case)) for case in hard_cases.CASES] == list(hard_cases.CASES)
+    """`make verify` runs them side by side: what is sent is the number, and copying goes the same way. Mutant: a case
+    that is sent with its functions."""
+    assert all(copy.copy(case) is case for case in hard_cases.CASES)
