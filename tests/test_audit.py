@@ -98,11 +98,11 @@ def test_an_uneven_seed_is_one_percent_off():
 def test_the_record_is_written_whole_and_the_table_names_every_row(tmp_path):
     row = {"choice": "extent", "default": "central", "alternative": "full", "cost_ratio": 2.5, "largest": "velocity",
            "effect": {"velocity": -0.01, "area": 0.001}, "one_state": {}, "note": ""}
-    audit.write({"machine": {}, "rows": [row]}, tmp_path / "report" / "audit.json")
+    audit.save({"machine": {}, "rows": [row]}, tmp_path / "report" / "audit.json")
     assert json.loads((tmp_path / "report" / "audit.json").read_text())["rows"] == [row]
     head, line = audit.table([row])
     assert "extent" in line and "2.50" in line and "-1.0e-02 velocity" in line and "cost" in head
     assert audit.resolved(row["effect"], {"velocity": 0.0049, "area": -0.0006}) == ["velocity"]
     with pytest.raises(ValueError):
-        audit.write({"rows": [float("nan")]}, tmp_path / "audit.json")
+        audit.save({"rows": [float("nan")]}, tmp_path / "audit.json")
     assert not (tmp_path / "audit.json").exists()

@@ -8,12 +8,12 @@ written to ``verification/report/hard_cases.json`` too. Exit status 1 if a cell 
 from __future__ import annotations
 
 import argparse
-import json
 import platform
 import sys
 from collections.abc import Iterable
 from pathlib import Path
 
+from verification.bench.record import save
 from verification.hard import CASES
 from verification.hard.common import PRESETS
 from verification.hard.judge import Cell, Verdicts, run_cell
@@ -49,8 +49,7 @@ def record(results: Iterable) -> None:
 
 def write(cells: Iterable[Cell]) -> None:
     """Write the matrix for the report."""
-    RECORD.parent.mkdir(exist_ok=True)
-    RECORD.write_text(json.dumps(as_json(cells), indent=1) + "\n", encoding="utf-8")
+    save(as_json(cells), RECORD)
 
 
 def machine() -> str:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
-import os
 import sys
 from pathlib import Path
 
 from verification.audit import measure, special
 from verification.audit.choices import CHOICES, Choice
-from verification.bench.record import machine
+from verification.bench.record import machine, save
 
 RECORD = Path(__file__).parents[1] / "report" / "audit.json"
 METHOD = (f"base, preset paper, to {measure.END:g} h in steps of {60 * measure.STEP:g} min (steps in time: 12 min); "
@@ -25,7 +23,7 @@ def main() -> int:
     noise = special.meshes()
     rows = [noise, *map(named, CHOICES), special.midpoint(), special.drift(), *special.symmetry()]
     rows = [{**row, "resolved": resolved(row["effect"], noise[row.pop("noise", "effect")])} for row in rows]
-    write({"machine": machine(), "method": METHOD, "rows": rows})
+    save({"machine": machine(), "method": METHOD, "rows": rows}, RECORD)
     print("\n".join(table(rows)))
     return 0
 
@@ -45,15 +43,6 @@ def named(choice: Choice) -> dict:
 def resolved(effects: dict[str, float], noise: dict[str, float]) -> list[str]:
     """Names of the quantities that change by more than twice what meshes of the same fineness make of them."""
     return [name for name, value in effects.items() if abs(value) > 2 * abs(noise[name])]
-
-
-def write(record: dict, file: Path = RECORD) -> None:
-    """Write the record whole or not at all; not-a-number is refused."""
-    text = json.dumps(record, indent=1, allow_nan=False) + "\n"
-    file.parent.mkdir(parents=True, exist_ok=True)
-    beside = file.with_name(f".{file.name}.part")
-    beside.write_text(text, encoding="utf-8")
-    os.replace(beside, file)
 
 
 def table(rows: list[dict]) -> list[str]:

@@ -56,7 +56,7 @@ def load(file: Path = FILE) -> dict:
 
 
 def save(record: dict, file: Path = FILE) -> None:
-    """Write it whole or not at all."""
+    """Write a record whole or not at all; ValueError where it holds not-a-number."""
     file.parent.mkdir(parents=True, exist_ok=True)
     beside = file.with_name(f".{file.name}.part")
     beside.write_text(json.dumps(record, indent=1, allow_nan=False) + "\n", encoding="utf-8")

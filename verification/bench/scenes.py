@@ -15,6 +15,7 @@ from repro import timing
 from repro.scene import parse_scene
 from repro.simulation import simulate
 from verification.bench.clock import measured
+from verification.bench.size import STAGES
 
 REPEATS = 9
 SUBSTRATES = {"substrates": {}}
@@ -24,7 +25,6 @@ FLOW = {"flow": {"head": "1e-3 cm"}}
 SCENES = {"whole": ({**FLOW, **SUBSTRATES, **GROWTH}, {"flow", "transport"}),
           "frozen shape": ({**FLOW, **SUBSTRATES}, {"flow", "transport"}),
           "flow only": (FLOW, {"flow"}), "transport only": (SUBSTRATES, {"transport"})}
-STAGES = ("flow", "transport", "growth", "mesh motion", "meshing", "transfer")
 PRESETS = ("paper", "fast", "accurate")
 STEPS = 3
 
