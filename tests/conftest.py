@@ -20,3 +20,11 @@ def pytest_runtest_setup():
     A hook and not an autouse fixture: it also covers fixtures of a wider scope, which are set up before any function's.
     """
     numpy.seterr(all="raise", under="ignore")
+
+
+def pytest_collection_modifyitems(items):
+    """What is marked thorough runs in make test-thorough alone."""
+    if os.environ.get("HYPOTHESIS_PROFILE") != "thorough":
+        for item in items:
+            if item.get_closest_marker("thorough"):
+                item.add_marker(pytest.mark.skip(reason="for make test-thorough"))
