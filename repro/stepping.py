@@ -15,13 +15,10 @@ from repro import midpoint
 from repro.coupling import SAME_TIME, Attempt, Instant, PoreEnd, Step, added, newton_counts, pore_end, stopping
 from repro.curved import coupling as curved
 from repro.errors import StageError
+from repro.pace import Pace, acceptable, allowed, fitted, following
 
 #: A step that fails or errs too much is tried again, shorter, until it is this part of growth.time_step.
 SHORTEST = 1e-3
-#: Limits of the ratio of consecutive steps, and what is kept of the length that the estimate allows.
-FASTER, SLOWER, SAFETY = 2.0, 0.2, 0.9
-#: An estimate up to so many tolerances is accepted.
-EXCESS = 1.5
 #: Contact is met when the film is no thinner than this part of what it may be.
 LANDED = 0.995
 
@@ -36,11 +33,11 @@ def simulate(scene) -> Iterator[Instant]:
     yield Instant(now, solved, None, (), 0, newton_counts(solved))
     if scene.growth is None or scene.growth.end == 0:
         return
-    length, pending = scene.growth.time_step, _Pending()
+    pace, pending = Pace(scene.growth.time_step), _Pending()
     for time in _targets(scene):
         while time - now.time > SAME_TIME:
             with stopping(now.time):
-                taken, solved, length = _advance(scheme, scene, now, solved, time, length)
+                taken, solved, pace = _advance(scheme, scene, now, solved, time, pace)
             now = replace(taken.pore, concentrations=solved.concentrations)
             pending.add(taken, solved)
             over = pore_end(scene, now, 1.0)
@@ -74,46 +71,24 @@ def _targets(scene) -> list[float]:
     return sorted({time for time in scene.output.times or () if time > 0} | {scene.growth.end})
 
 
-def _advance(scheme, scene, now, solved, time: float, length: float):
-    """The first step that is good enough, what is solved after it, and the length (h) to try next."""
-    tolerance, shortest, asked = scene.numerics.tolerance, SHORTEST * scene.growth.time_step, length
+def _advance(scheme, scene, now, solved, time: float, asked: Pace):
+    """The first step that is good enough, what is solved after it, and the pace of the next."""
+    tolerance, shortest, length = scene.numerics.tolerance, SHORTEST * scene.growth.time_step, asked.length
     while True:
-        duration = _fitted(length, time - now.time)
+        duration = fitted(length, time - now.time)
         try:
             found = scheme.attempt(scene, now, solved, duration)
-            factor = _factor(found.change * duration, tolerance)
-            if duration <= shortest or _good(found, factor):
+            estimate = found.change * duration
+            if duration <= shortest or acceptable(estimate, tolerance) and not _overshoots(found):
                 taken = _ending_at(found.step, now.time + duration, time)
-                following = asked if found.gaps else _next(length, duration, factor)  # contact alone made it short
-                return taken, scheme.solve(scene, taken.pore), following
-            length = duration * (_to_contact(found.gaps) if _overshoots(found) else factor)
+                contact_alone = found.gaps is not None  # made it short
+                after = asked if contact_alone else following(replace(asked, length=length), duration, estimate, tolerance)
+                return taken, scheme.solve(scene, taken.pore), after
+            length = duration * (_to_contact(found.gaps) if _overshoots(found) else allowed(estimate, tolerance))
         except (PoreEnd, StageError, FloatingPointError):
             if duration <= shortest:
                 raise
             length = duration / 2
-
-
-def _fitted(length: float, left: float) -> float:
-    """A step of about ``length`` that leaves no crumb of the time that is left."""
-    if length >= left * (1 - 1e-9):
-        return left
-    return min(length, left / 2) if 2 * length > left else length
-
-
-def _factor(estimate: float, tolerance: float) -> float:
-    """By what to multiply the step, from its estimate."""
-    if estimate <= 0:
-        return FASTER
-    return min(FASTER, max(SLOWER, SAFETY * (tolerance / estimate) ** 0.5))
-
-
-def _good(found: Attempt, factor: float) -> bool:
-    return factor >= SAFETY / EXCESS**0.5 and not _overshoots(found)
-
-
-def _next(length: float, duration: float, factor: float) -> float:
-    """A step that was cut short to end at a reported time says nothing against the length before."""
-    return max(length, duration * factor) if duration < length and factor > 1 else duration * factor
 
 
 def _overshoots(found: Attempt) -> bool:

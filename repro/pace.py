@@ -1,0 +1,55 @@
+"""How long a step of the midpoint rule is: what its estimate allows, foreseen from the step before (``repro.stepping``).
+
+The estimate of a step of length h is c h^2, so that the tolerance allows h (tolerance / estimate)^(1/2). The closer the
+aggregate comes to the opposite wall the faster c grows, by about the same factor from step to step: that factor is taken
+off the next step too (Gustafsson's controller, as in Hairer and Wanner, Solving Ordinary Differential Equations II,
+IV.8), so that few steps are tried in vain.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+#: Limits of the ratio of consecutive steps, and what is kept of the length that the estimate allows.
+FASTER, SLOWER, SAFETY = 5.0, 0.2, 0.9
+#: An estimate up to so many tolerances is accepted.
+EXCESS = 1.5
+
+
+@dataclass(frozen=True)
+class Pace:
+    """length: h to try next; duration, estimate: of the last step that was taken, h and 1 (zero: there is none)."""
+
+    length: float
+    duration: float = 0.0
+    estimate: float = 0.0
+
+
+def fitted(length: float, left: float) -> float:
+    """A step of about ``length`` that leaves no crumb of the time that is left: up to (EXCESS)^(1/2) longer where it
+    can be the last."""
+    if EXCESS**0.5 * length >= left:
+        return left
+    return min(length, left / 2) if 2 * length > left else length
+
+
+def allowed(estimate: float, tolerance: float, most: float = FASTER) -> float:
+    """By what to multiply the step, from its estimate."""
+    if estimate <= 0:
+        return most
+    return min(most, max(SLOWER, SAFETY * (tolerance / estimate) ** 0.5))
+
+
+def acceptable(estimate: float, tolerance: float) -> bool:
+    """May a step with this estimate be taken?"""
+    return estimate <= EXCESS * tolerance
+
+
+def following(pace: Pace, duration: float, estimate: float, tolerance: float) -> Pace:
+    """After a step that was taken."""
+    cap = max(FASTER, pace.length / duration)  # a step cut short, to end at a reported time, may be followed by a long one
+    factor = allowed(estimate, tolerance, cap)
+    if pace.estimate > 0 and estimate > 0:
+        growth = (estimate / pace.estimate) ** 0.5 * pace.duration / duration
+        factor = min(factor, max(SLOWER, allowed(estimate, tolerance, 1e9) / growth))
+    return Pace(duration * factor, duration, estimate)
