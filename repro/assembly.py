@@ -68,11 +68,15 @@ class ElementSystem:
         self._kept = np.flatnonzero(kept)
         self.indices = place[self._rows[kept]].astype(np.int32)
         self.indptr = np.searchsorted(place[self._columns[kept]], np.arange(self.count + 1)).astype(np.int32)
+        self._pattern = sp.csc_matrix((np.zeros(len(self.indices)), self.indices, self.indptr),
+                                      shape=(self.count, self.count))
+        self._pattern.has_canonical_format = True  # what is filled in is not looked through again
 
     def matrix(self, elements: np.ndarray) -> sp.csc_matrix:
         """K between the free unknowns, in elimination order, from element matrices (T, k, k)."""
-        data = np.bincount(self._slot, elements.ravel(), len(self._rows))[self._kept]
-        return sp.csc_matrix((data, self.indices, self.indptr), shape=(self.count, self.count))
+        found = copy(self._pattern)
+        found.data = np.bincount(self._slot, elements.ravel(), len(self._rows))[self._kept]
+        return found
 
     def solve(self, elements: np.ndarray, right: np.ndarray, value: np.ndarray) -> np.ndarray:
         """x (n,) with the prescribed unknowns as in ``value`` (n,), for element matrices (T, k, k) and b (n,)."""
@@ -100,16 +104,18 @@ def saddle_blocks(upper, divergence, lower) -> np.ndarray:
     return elements
 
 
-def saddle_system(velocity: np.ndarray, pressure: np.ndarray, held: np.ndarray) -> ElementSystem:
+def saddle_system(velocity: np.ndarray, pressure: np.ndarray, held: np.ndarray,
+                  order: np.ndarray | None = None) -> ElementSystem:
     """The system of two components on the same nodes and a pressure on other ones, pressures after their node.
 
     velocity: (T, a) nodes of each component; pressure: (T, b) nodes among the first ones of the velocity's;
-    held: (n, 2) prescribed components. Unknowns are numbered x, then y, then pressure.
+    held: (n, 2) prescribed components; order: (n,) nodes in elimination order, if known. Unknowns are numbered x, then
+    y, then pressure.
     """
     count = len(held)
     pressures = pressure.max() + 1
     place = np.empty(count)
-    place[linear.node_order(count, velocity)] = np.arange(count)
+    place[linear.node_order(count, velocity) if order is None else order] = np.arange(count)
     rank = np.concatenate([place, place, place[:pressures] + 0.5])
     unknowns = np.concatenate([velocity, count + velocity, 2 * count + pressure], axis=1)
     return ElementSystem(unknowns, rank, np.concatenate([held[:, 0], held[:, 1], np.zeros(pressures, bool)]))

@@ -11,6 +11,7 @@ package pymetis), PARDISO factors (`numerics.solver`, package pypardiso).
 
 from __future__ import annotations
 
+from copy import copy
 from importlib import import_module
 
 import numpy as np
@@ -95,8 +96,9 @@ class Solver:
     """
 
     def __init__(self, matrix):
-        self.matrix = sp.csc_matrix(matrix)
-        self.magnitude = abs(self.matrix)
+        self.matrix = matrix if isinstance(matrix, sp.csc_matrix) else sp.csc_matrix(matrix)
+        self.magnitude = copy(self.matrix)
+        self.magnitude.data = np.abs(self.matrix.data)
         fast = _chosen["solver"] == "pardiso"
         self.factor = _Pardiso(self.matrix) if fast else self._factor("NATURAL", 0.0, True)
         self.pivoted = False

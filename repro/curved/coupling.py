@@ -197,16 +197,16 @@ def remesh(scene, now: Pore, expanded: Pore, state: Concentrations) -> Pore:
     old, count, nodes = expanded.mesh, len(grid.points), grid.body
     total = expanded.active + expanded.inert
     share = np.divide(expanded.inert, total, where=total > 0, out=np.zeros(len(total)))
-    carried = transfer.interpolate(old.points, old.cells[old.biomass], np.column_stack([expanded.origin, share]),
-                                   grid.points[nodes])
+    at = transfer.located(old.points, old.cells[old.biomass], grid.points[nodes])
+    carried = at.quadratic(np.column_stack([expanded.origin, share]))
     origin, inert, active = grid.points.copy(), np.zeros(count), np.zeros(count)
     origin[nodes], inert[nodes] = carried[:, :2], np.clip(carried[:, 2], 0.0, 1.0)
     inert = _conserved(inert, elements.weights(grid.points, grid), expanded.inert_mass())
     origin[grid.loop] = shape.origin
     active[nodes] = 1 - inert[nodes]
     pressure = np.zeros(grid.corners)
-    inside = nodes[nodes < grid.corners]
-    pressure[inside] = transfer.interpolate_linear(old, expanded.pressure, grid.points[inside])
+    inside = nodes < grid.corners
+    pressure[nodes[inside]] = at.linear(expanded.pressure)[inside]
     return replace(expanded, mesh=grid, wall=shape.wall, fixed=shape.fixed, origin=transfer.unfolded(grid, origin),
                    reference=grid.points, active=active, inert=inert, pressure=pressure,
                    concentrations=_carried_substrates(scene, now, grid, state))

@@ -48,4 +48,4 @@ def unit_flow(mesh: CurvedMesh, viscosity_ratio: float) -> tuple[np.ndarray, np.
 def _system(mesh: CurvedMesh):
     held = np.zeros((len(mesh.points), 2), bool)
     held[np.concatenate([mesh.walls, mesh.inlet])] = True
-    return saddle_system(mesh.cells, mesh.cells[:, :3], held)
+    return saddle_system(mesh.cells, mesh.cells[:, :3], held, mesh.order)

@@ -10,6 +10,7 @@ import numpy as np
 
 from repro.curved import elements
 from repro.errors import MeshError
+from repro.linear import node_order
 from repro.mesh import PoreMesh, triangle_areas
 
 
@@ -62,6 +63,11 @@ class CurvedMesh:
     def body_loop(self) -> np.ndarray:
         """``loop`` in the numbering of ``body``."""
         return np.searchsorted(self.body, self.loop)
+
+    @property
+    def order(self) -> np.ndarray:
+        """Nodes in elimination order."""
+        return self.once("order", lambda: node_order(len(self.points), self.cells))
 
     @property
     def inlet(self) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -43,7 +44,7 @@ class Pore:
     pressure: np.ndarray
     concentrations: Concentrations | None = None
 
-    @property
+    @cached_property
     def outline(self) -> Arcs | None:
         """Boundary of the aggregate, corners and middles in turn; None in a clean channel."""
         loop = self.mesh.loop

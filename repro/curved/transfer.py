@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import shapely
 
@@ -53,11 +55,31 @@ def _inverted(nodes: np.ndarray, where: np.ndarray) -> np.ndarray:
     return np.where(lost[:, None], 99.0, local)
 
 
-def interpolate(points: np.ndarray, cells: np.ndarray, fields: np.ndarray, where: np.ndarray) -> np.ndarray:
-    """(K, m) quadratic fields (N, m) at places (K, 2); a place outside by a little takes what the nearest triangle's
-    functions say at its edge."""
+@dataclass(frozen=True, eq=False)
+class Located:
+    """Places in old triangles. nodes: (K, 6) of the triangle of each; local: (K, 2) on the unit triangle."""
+
+    nodes: np.ndarray
+    local: np.ndarray
+
+    def quadratic(self, fields: np.ndarray) -> np.ndarray:
+        """(K, m) of fields (N, m) at all nodes."""
+        return np.einsum("ka,kam->km", elements.functions(self.local), fields[self.nodes])
+
+    def linear(self, field: np.ndarray) -> np.ndarray:
+        """(K,) of a field (corners,)."""
+        return np.einsum("ka,ka->k", elements.linear_functions(self.local), field[self.nodes[:, :3]])
+
+
+def located(points: np.ndarray, cells: np.ndarray, where: np.ndarray) -> Located:
+    """Places (K, 2) in triangles (T, 6); one outside by a little is moved to the edge of the nearest."""
     cell, local = locate(points[cells], where)
-    return np.einsum("ka,kam->km", elements.functions(_inside(local)), fields[cells[cell]])
+    return Located(cells[cell], _inside(local))
+
+
+def interpolate(points: np.ndarray, cells: np.ndarray, fields: np.ndarray, where: np.ndarray) -> np.ndarray:
+    """(K, m) quadratic fields (N, m) at places (K, 2)."""
+    return located(points, cells, where).quadratic(fields)
 
 
 def _inside(local: np.ndarray) -> np.ndarray:
@@ -82,10 +104,3 @@ def unfolded(mesh, origin: np.ndarray) -> np.ndarray:
         raise TransferError(f"after a remesh the places at t = 0 fold near x = {x:.4g}, y = {y:.4g} um; "
                             "try a larger numerics.refinement")
     return origin
-
-
-def interpolate_linear(mesh, field: np.ndarray, where: np.ndarray) -> np.ndarray:
-    """(K,) a field (corners,) that is linear on the aggregate's triangles, at places (K, 2)."""
-    cells = mesh.cells[mesh.biomass]
-    cell, local = locate(mesh.points[cells], where)
-    return np.einsum("ka,ka->k", elements.linear_functions(_inside(local)), field[cells[cell][:, :3]])

@@ -18,7 +18,6 @@ from repro.curved import elements
 from repro.curved.mesh import CurvedMesh
 from repro.errors import TransportError
 from repro.flow import Flow
-from repro.linear import node_order
 from repro.timing import timed
 from repro.transport import Concentrations, Fluxes
 
@@ -81,7 +80,7 @@ def _system(mesh: CurvedMesh, held_ends: bool) -> ElementSystem:
     """Acceptor and donor of a node side by side, nodes in elimination order."""
     count = len(mesh.points)
     place = np.empty(count)
-    place[node_order(count, mesh.cells)] = np.arange(count)
+    place[mesh.order] = np.arange(count)
     held = np.zeros(count, bool)
     held[np.concatenate([mesh.inlet, mesh.outlet])] = held_ends
     return ElementSystem(np.concatenate([mesh.cells, count + mesh.cells], axis=1),
@@ -117,7 +116,7 @@ def _end_matrix(mesh: CurvedMesh, line: np.ndarray, speed: np.ndarray):
     nodes, length = _end_edges(mesh, line)
     u = speed[nodes] @ LINE.T
     local = length[:, None, None] * np.einsum("eq,q,qa,qb->eab", u, LINE_WEIGHTS, LINE, LINE, optimize=True)
-    owner = _owners(mesh, nodes[:, 1])
+    owner = mesh.once("outlet triangles", lambda: _owners(mesh, nodes[:, 1]))
     blocks = np.zeros((len(nodes), 6, 6))
     where = np.argmax(mesh.cells[owner][:, :, None] == nodes[:, None, :], axis=1)
     each = np.arange(len(nodes))
