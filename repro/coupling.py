@@ -148,11 +148,11 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """A step of the midpoint rule that may be taken: what it makes; the mean change of the rates over its first half,
-    1/h; and, where it first makes contact with the opposite wall, the least distance (um) to that before and after the
-    step, and the film's least thickness."""
+    """A step of the midpoint rule that may be taken: what it makes, None where the rates change more than is allowed;
+    their mean change over its first half, 1/h; and, where it first makes contact with the opposite wall, the least
+    distance (um) to that before and after the step, and the film's least thickness."""
 
-    step: Step
+    step: Step | None
     change: float
     gaps: tuple[float, float, float] | None
 

@@ -13,10 +13,15 @@ from repro.pore import Pore, Solved, seeded, solve
 __all__ = ["attempt", "seeded", "solve"]
 
 
-def attempt(scene, now: Pore, solved: Solved, duration: float) -> Attempt:
-    """A step of ``duration`` (h). Raises StageError where it cannot be made."""
+def attempt(scene, now: Pore, solved: Solved, duration: float, most: float = np.inf) -> Attempt:
+    """A step of ``duration`` (h), if the rates change by no more than ``most`` (1/h) over its first half. Raises
+    StageError where it cannot be made."""
     first = rates_of(scene, solved.concentrations)
     half, rates = half_way(scene, now, solved, first, duration)
+    weight = now.mesh.lumped(now.mesh.biomass)
+    change = float(weight @ np.abs(rates[0] + rates[1] - first[0] - first[1]) / weight.sum())
+    if change > most:
+        return Attempt(None, change, None)
     grown = _grown(now, rates, duration)
     expanded, iterations, gap = _expanded(scene, now, grown)
     if leaves := pore_end(scene, expanded, 0.1):
@@ -24,12 +29,10 @@ def attempt(scene, now: Pore, solved: Solved, duration: float) -> Attempt:
     same = len(half.concentrations.acceptor) == len(now.mesh.points)
     carried = half if same else solved
     after, remeshed = remeshing.new_mesh(scene, now, expanded, replace(carried, flow=solved.flow))
-    made = float(np.sum(now.mesh.lumped(now.mesh.biomass) * (grown.active + grown.inert - now.active - now.inert)))
+    made = float(np.sum(weight * (grown.active + grown.inert - now.active - now.inert)))
     flows = [tuple(duration * getattr(flux, key) for flux in half.fluxes) for key in ("supplied", "out", "consumed")]
     ledger = Ledger(now.time, now.time + duration, *flows, (0.0, 0.0), mass_of(now), made, mass_of(after))
-    weight = now.mesh.lumped(now.mesh.biomass)
-    change = weight @ np.abs(rates[0] + rates[1] - first[0] - first[1]) / weight.sum()
-    return Attempt(Step(after, (now, solved), ledger, remeshed, iterations), float(change),
+    return Attempt(Step(after, (now, solved), ledger, remeshed, iterations), change,
                    first_contact(scene, now, expanded, gap))
 
 

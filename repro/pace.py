@@ -40,11 +40,6 @@ def allowed(estimate: float, tolerance: float, most: float = FASTER) -> float:
     return min(most, max(SLOWER, SAFETY * (tolerance / estimate) ** 0.5))
 
 
-def acceptable(estimate: float, tolerance: float) -> bool:
-    """May a step with this estimate be taken?"""
-    return estimate <= EXCESS * tolerance
-
-
 def following(pace: Pace, duration: float, estimate: float, tolerance: float) -> Pace:
     """After a step that was taken."""
     cap = max(FASTER, pace.length / duration)  # a step cut short, to end at a reported time, may be followed by a long one

@@ -11,14 +11,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+import numpy as np
+
 from repro import midpoint
 from repro.coupling import SAME_TIME, Attempt, Instant, PoreEnd, Step, added, newton_counts, pore_end, stopping
 from repro.curved import coupling as curved
 from repro.errors import StageError
-from repro.pace import Pace, acceptable, allowed, fitted, following
+from repro.pace import EXCESS, Pace, allowed, fitted, following
 
-#: A step that fails or errs too much is tried again, shorter, until it is this part of growth.time_step.
-SHORTEST = 1e-3
+#: The first step that is tried, in parts of growth.time_step; one that fails or errs too much is tried again, shorter,
+#: until it is SHORTEST parts.
+FIRST, SHORTEST = 8.0, 1e-3
 #: Contact is met when the film is no thinner than this part of what it may be.
 LANDED = 0.995
 
@@ -33,7 +36,7 @@ def simulate(scene) -> Iterator[Instant]:
     yield Instant(now, solved, None, (), 0, newton_counts(solved))
     if scene.growth is None or scene.growth.end == 0:
         return
-    pace, pending = Pace(scene.growth.time_step), _Pending()
+    pace, pending = Pace(FIRST * scene.growth.time_step), _Pending()
     for time in _targets(scene):
         while time - now.time > SAME_TIME:
             with stopping(now.time):
@@ -76,15 +79,16 @@ def _advance(scheme, scene, now, solved, time: float, asked: Pace):
     tolerance, shortest, length = scene.numerics.tolerance, SHORTEST * scene.growth.time_step, asked.length
     while True:
         duration = fitted(length, time - now.time)
+        most = np.inf if duration <= shortest else EXCESS * tolerance / duration
         try:
-            found = scheme.attempt(scene, now, solved, duration)
+            found = scheme.attempt(scene, now, solved, duration, most)
             estimate = found.change * duration
-            if duration <= shortest or acceptable(estimate, tolerance) and not _overshoots(found):
+            if found.step and (duration <= shortest or not _overshoots(found)):
                 taken = _ending_at(found.step, now.time + duration, time)
-                contact_alone = found.gaps is not None  # made it short
-                after = asked if contact_alone else following(replace(asked, length=length), duration, estimate, tolerance)
-                return taken, scheme.solve(scene, taken.pore), after
-            length = duration * (_to_contact(found.gaps) if _overshoots(found) else allowed(estimate, tolerance))
+                contact = found.gaps is not None  # that alone made the step short
+                pace = asked if contact else following(replace(asked, length=length), duration, estimate, tolerance)
+                return taken, scheme.solve(scene, taken.pore), pace
+            length = duration * (_to_contact(found.gaps) if found.step else allowed(estimate, tolerance))
         except (PoreEnd, StageError, FloatingPointError):
             if duration <= shortest:
                 raise

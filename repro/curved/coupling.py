@@ -72,9 +72,12 @@ def grown(now: Pore, rates, duration: float) -> Pore:
     return replace(now, active=active, inert=inert)
 
 
-def attempt(scene, now: Pore, solved: Solved, duration: float) -> Attempt:
-    """A step of ``duration`` (h). Raises StageError where it cannot be made."""
+def attempt(scene, now: Pore, solved: Solved, duration: float, most: float = np.inf) -> Attempt:
+    """A step of ``duration`` (h), if the rates change by no more than ``most`` (1/h) over its first half. Raises
+    StageError where it cannot be made."""
     half = midpoint(scene, now, solved, duration)
+    if half.change > most:
+        return Attempt(None, half.change, None)
     after = grown(now, half.rates, duration)
     expanded, iterations, gap = expand(scene, _ahead(now, half.shape, after))
     if leaves := pore_end(scene, expanded, 0.1):
