@@ -7,6 +7,7 @@ elimination order and the place of every element entry in the sparse matrix stay
 from __future__ import annotations
 
 from copy import copy
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -78,13 +79,31 @@ class ElementSystem:
         found.data = np.bincount(self._slot, elements.ravel(), len(self._rows))[self._kept]
         return found
 
+    def factored(self, elements: np.ndarray) -> Factored:
+        """K from element matrices (T, k, k), factorised."""
+        return Factored(self, elements, linear.factorised(self.matrix(elements)))
+
     def solve(self, elements: np.ndarray, right: np.ndarray, value: np.ndarray) -> np.ndarray:
         """x (n,) with the prescribed unknowns as in ``value`` (n,), for element matrices (T, k, k) and b (n,)."""
-        known = np.where(self.held, value, 0.0)
+        return self.factored(elements).solve(right, value)
+
+
+@dataclass(frozen=True, eq=False)
+class Factored:
+    """K of a system, from element matrices (T, k, k), with its factors."""
+
+    system: ElementSystem
+    elements: np.ndarray
+    solver: linear.Solver
+
+    def solve(self, right: np.ndarray, value: np.ndarray) -> np.ndarray:
+        """x (n,) of K x = b (n,) with the prescribed unknowns as in ``value`` (n,)."""
+        unknowns, order = self.system.unknowns, self.system.order
+        known = np.where(self.system.held, value, 0.0)
         if known.any():
-            moved = (elements @ known[self.unknowns][:, :, None])[:, :, 0]
-            right = right - np.bincount(self.unknowns.ravel(), moved.ravel(), len(value))
-        known[self.order] = linear.solve(self.matrix(elements), right[self.order])
+            moved = (self.elements @ known[unknowns][:, :, None])[:, :, 0]
+            right = right - np.bincount(unknowns.ravel(), moved.ravel(), len(value))
+        known[order] = self.solver.solve(right[order])
         return known
 
 

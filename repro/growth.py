@@ -25,6 +25,7 @@ import numpy as np
 from repro.assembly import ElementSystem, each, saddle_blocks, saddle_system
 from repro.errors import GrowthError, LinearError
 from repro.mesh import gradients, triangle_areas
+from repro.newton import Jacobian
 from repro.timing import timed
 
 #: Newton stops at this residual against the size of its terms, or at the second where round-off keeps it from falling.
@@ -39,13 +40,14 @@ class Body:
     """The aggregate's own mesh in its reference configuration.
 
     reference: (n, 2) um; triangles: (t, 3); held: (n, 2) True where a coordinate is prescribed; topology: what has been
-    worked out from connections and held coordinates.
+    worked out from connections and held coordinates; reused: does Newton's method use its derivative again?
     """
 
     reference: np.ndarray
     triangles: np.ndarray
     held: np.ndarray
     topology: dict = field(default_factory=dict, repr=False)
+    reused: bool = False
 
     @property
     def sparse(self) -> ElementSystem:
@@ -240,13 +242,17 @@ def _continued(system, start, theta, position, pressure, prescribed, steps: int)
 def _newton(system: System, theta, position, pressure, target):
     """Solve at one theta; the first step carries the prescribed coordinates to their target."""
     lag = np.where(system.body.held, target - position, 0.0)
+    jacobian = Jacobian(system.body.reused)
     residual, size = system.residual(position, pressure, theta)
     defect = np.inf
     for iteration in range(MOST_ITERATIONS):
         last, defect = defect, _relative(residual[system.free], size[system.free])
         if not lag.any() and (defect <= NEWTON or 0.1 * last < defect <= ROUND_OFF):
             return position, pressure, iteration
-        step = _newton_step(system, theta, position, pressure, residual, lag)
+        move = np.concatenate([lag[:, 0], lag[:, 1], np.zeros(len(pressure))])
+        if jacobian.stale(defect):
+            jacobian.factors = system.sparse.factored(system.tangent(position, pressure, theta))
+        step = jacobian.factors.solve(-residual, move)
         position, pressure, residual, size = _line_search(system, theta, position, pressure, step, residual, lag)
         lag = np.where(system.body.held, target - position, 0.0)
     raise GrowthError(f"Newton's method for the growth stands at a defect of {defect:.2g} "
@@ -256,12 +262,6 @@ def _newton(system: System, theta, position, pressure, target):
 def _relative(residual: np.ndarray, size: np.ndarray) -> float:
     """Largest residual against the size of its row's terms."""
     return float(np.max(np.abs(residual) / np.maximum(size, np.finfo(float).tiny)))
-
-
-def _newton_step(system: System, theta, position, pressure, residual, lag) -> np.ndarray:
-    """(3n,) full Newton step that moves held coordinates by ``lag``."""
-    prescribed = np.concatenate([lag[:, 0], lag[:, 1], np.zeros(len(pressure))])
-    return system.sparse.solve(system.tangent(position, pressure, theta), -residual, prescribed)
 
 
 def _line_search(system, theta, position, pressure, step, residual, lag):

@@ -1,19 +1,22 @@
-"""How long a step of the midpoint rule is: what its estimate allows, foreseen from the step before (``repro.stepping``).
+"""How long a step of the midpoint rule is: what its estimate allows, foreseen from the step before.
 
 The estimate of a step of length h is c h^2, so that the tolerance allows h (tolerance / estimate)^(1/2). The closer the
-aggregate comes to the opposite wall the faster c grows, by about the same factor from step to step: that factor is taken
-off the next step too (Gustafsson's controller, as in Hairer and Wanner, Solving Ordinary Differential Equations II,
-IV.8), so that few steps are tried in vain.
+aggregate comes to the opposite wall the faster c grows, by about the same factor from step to step: that factor is
+taken off the next step too (Gustafsson's controller: Hairer and Wanner, Solving Ordinary Differential Equations II,
+section IV.8), so that few steps are tried in vain.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 #: Limits of the ratio of consecutive steps, and what is kept of the length that the estimate allows.
 FASTER, SLOWER, SAFETY = 5.0, 0.2, 0.9
-#: An estimate up to so many tolerances is accepted.
+#: An estimate up to so many tolerances is accepted; and so much longer than it should be a step may be.
 EXCESS = 1.5
+STRETCH = EXCESS**0.5
 
 
 @dataclass(frozen=True)
@@ -25,10 +28,10 @@ class Pace:
     estimate: float = 0.0
 
 
-def fitted(length: float, left: float) -> float:
-    """A step of about ``length`` that leaves no crumb of the time that is left: up to (EXCESS)^(1/2) longer where it
-    can be the last."""
-    if EXCESS**0.5 * length >= left:
+def fitted(length: float, left: float, stretch: float = 1.0) -> float:
+    """A step of about ``length`` that leaves no crumb of the time that is left; up to ``stretch`` times as long where
+    that makes it the last."""
+    if stretch * length >= left * (1 - 1e-9):
         return left
     return min(length, left / 2) if 2 * length > left else length
 
@@ -41,10 +44,11 @@ def allowed(estimate: float, tolerance: float, most: float = FASTER) -> float:
 
 
 def following(pace: Pace, duration: float, estimate: float, tolerance: float) -> Pace:
-    """After a step that was taken."""
-    cap = max(FASTER, pace.length / duration)  # a step cut short, to end at a reported time, may be followed by a long one
-    factor = allowed(estimate, tolerance, cap)
+    """After a step that was taken: longer by FASTER at most, or as long as what was asked for and cut short to end at a
+    reported time."""
+    most = max(FASTER, pace.length / duration)
+    factor = allowed(estimate, tolerance, most)
     if pace.estimate > 0 and estimate > 0:
-        growth = (estimate / pace.estimate) ** 0.5 * pace.duration / duration
-        factor = min(factor, max(SLOWER, allowed(estimate, tolerance, 1e9) / growth))
+        rise = max(1.0, (estimate / pace.estimate) ** 0.5 * pace.duration / duration)
+        factor = min(factor, max(SLOWER, allowed(estimate, tolerance, np.inf) / rise))
     return Pace(duration * factor, duration, estimate)

@@ -94,7 +94,8 @@ def solve(scene, pore: Pore) -> Solved:
     carried = solve_flow(scene, pore) if scene.flow else None
     if scene.substrates is None:
         return Solved(carried, None, None)
-    problem = transport.problem(pore.mesh, carried, scene.substrates, scene.kinetics, scene.numerics.inlet)
+    problem = transport.problem(pore.mesh, carried, scene.substrates, scene.kinetics, scene.numerics.inlet,
+                                scene.numerics.jacobian == "reused")
     find = gear.settle
     if scene.numerics.transport != "gear":
         refuse_no_supply(scene, carried)

@@ -146,6 +146,7 @@ class Numerics:
     solver: str = choice("superlu", "pardiso")  # of linear systems; the second needs the package pypardiso
     ordering: str = choice("degree", "metis")  # of nodes before SuperLU; the second needs the package pymetis
     refinement: float = number(1.0, UP_TO_20)  # element sizes are divided by it
+    jacobian: str = choice("fresh", "reused")  # of Newton's methods: in every step, or while it does enough
     flow_element: str = choice("stabilised", "bubble")  # 3.2, or linear velocities with a bubble (MINI)
     flow_stabilisation: float = number(100.0)  # 3.2: tau = h^2 / (flow_stabilisation nu) [E13]
     mesh_compressibility: float = number(1.0)  # gamma of (35) [E13]
@@ -153,8 +154,9 @@ class Numerics:
 
 #: What each preset changes of the defaults above: about 1 %, about 0.1 % (see `make bench`), the paper's own scheme.
 PRESETS = {
-    "fast": {"elements": "quadratic", "time": "midpoint", "refinement": 0.25, "tolerance": 0.01},
-    "accurate": {"elements": "quadratic", "time": "midpoint", "refinement": 0.45, "tolerance": 0.001},
+    "fast": {"elements": "quadratic", "time": "midpoint", "refinement": 0.2, "tolerance": 0.01, "jacobian": "reused"},
+    "accurate": {"elements": "quadratic", "time": "midpoint", "refinement": 0.45, "tolerance": 0.001,
+                 "jacobian": "reused"},
     "paper": {},
 }
 #: What quadratic elements have one way of, and what that is.

@@ -51,7 +51,8 @@ def _at_rest(scene, grown: Pore, theta: np.ndarray, forces: np.ndarray | None) -
     start, push = grown.mesh.points[nodes], grown.pressure[nodes]
     wall, fixed, iterations, gaps = grown.wall.copy(), _fixed_points(scene, grown), 0, []
     for _ in range(CONTACT_ROUNDS):
-        body = growth.Body(reference, triangles, held_at(len(nodes), rim, wall, fixed), grown.mesh.topology)
+        body = growth.Body(reference, triangles, held_at(len(nodes), rim, wall, fixed), grown.mesh.topology,
+                           scene.numerics.jacobian == "reused")
         prescribed = _prescribed(start, rim, wall, scene.pore.width)
         found = growth.equilibrium(body, target, start, push, prescribed, forces)
         start, push, iterations = found.position, found.pressure, iterations + found.iterations

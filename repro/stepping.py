@@ -17,7 +17,7 @@ from repro import midpoint
 from repro.coupling import SAME_TIME, Attempt, Instant, PoreEnd, Step, added, newton_counts, pore_end, stopping
 from repro.curved import coupling as curved
 from repro.errors import StageError
-from repro.pace import EXCESS, Pace, allowed, fitted, following
+from repro.pace import EXCESS, STRETCH, Pace, allowed, fitted, following
 
 #: The first step that is tried, in parts of growth.time_step; one that fails or errs too much is tried again, shorter,
 #: until it is SHORTEST parts.
@@ -77,8 +77,8 @@ def _targets(scene) -> list[float]:
 def _advance(scheme, scene, now, solved, time: float, asked: Pace):
     """The first step that is good enough, what is solved after it, and the pace of the next."""
     tolerance, shortest, length = scene.numerics.tolerance, SHORTEST * scene.growth.time_step, asked.length
+    duration = fitted(length, time - now.time, STRETCH)
     while True:
-        duration = fitted(length, time - now.time)
         most = np.inf if duration <= shortest else EXCESS * tolerance / duration
         try:
             found = scheme.attempt(scene, now, solved, duration, most)
@@ -93,6 +93,7 @@ def _advance(scheme, scene, now, solved, time: float, asked: Pace):
             if duration <= shortest:
                 raise
             length = duration / 2
+        duration = fitted(length, time - now.time)
 
 
 def _overshoots(found: Attempt) -> bool:

@@ -24,6 +24,7 @@ from repro.assembly import ElementSystem, each, mass
 from repro.errors import TransportError
 from repro.flow import Flow, forms, mean_over
 from repro.mesh import PoreMesh
+from repro.newton import Jacobian
 from repro.timing import timed
 
 #: Newton stops when the residual is this small against the largest term of its row's balance.
@@ -54,7 +55,8 @@ class Operator:
 @dataclass(frozen=True, eq=False)
 class Problem:
     """Both substrates in one geometry: their operators, body (N,) um2 lumped biomass area, total (N,) lumped area;
-    nodes: (N,) in elimination order; newton: the sparsity of both substrates' Newton matrix."""
+    nodes: (N,) in elimination order; newton: the sparsity of both substrates' Newton matrix; reused: does Newton's
+    method use its derivative again?"""
 
     mesh: PoreMesh
     acceptor: Operator
@@ -65,6 +67,7 @@ class Problem:
     kinetics: object
     nodes: np.ndarray
     newton: PairPattern
+    reused: bool
 
     @property
     def both(self) -> tuple[Operator, Operator]:
@@ -82,10 +85,12 @@ class Concentrations:
 
 
 @timed("transport")
-def problem(mesh: PoreMesh, flow: Flow | None, substrates, kinetics, inlet: str = "local") -> Problem:
+def problem(mesh: PoreMesh, flow: Flow | None, substrates, kinetics, inlet: str = "local",
+            reused: bool = False) -> Problem:
     """Assemble both substrates' linear parts for one geometry and flow (None: pure diffusion).
 
-    substrates, kinetics: of a scene (kinetics None without biomass); inlet: "local" or "mean", u_x or u_ave in (11).
+    substrates, kinetics: of a scene (kinetics None without biomass); inlet: "local" or "mean", u_x or u_ave in (11);
+    reused: as :class:`Problem`'s.
     """
     dofs, count = mesh.triangles, len(mesh.points)
     scalar = mesh.once("scalar", lambda: ElementSystem(dofs, np.arange(count), np.zeros(count, bool)))
@@ -94,7 +99,8 @@ def problem(mesh: PoreMesh, flow: Flow | None, substrates, kinetics, inlet: str 
                  for s in (substrates.acceptor, substrates.donor)]
     nodes = mesh.once("node order", lambda: linear.node_order(count, dofs))
     newton = mesh.once("newton", lambda: PairPattern(scalar.indices, scalar.indptr, mesh.body, nodes))
-    return Problem(mesh, *operators, mesh.lumped(mesh.biomass), mesh.lumped(), substrates, kinetics, nodes, newton)
+    return Problem(mesh, *operators, mesh.lumped(mesh.biomass), mesh.lumped(), substrates, kinetics, nodes, newton,
+                   reused)
 
 
 def advection(mesh: PoreMesh, flow: Flow) -> np.ndarray:
@@ -146,12 +152,16 @@ def steady(problem: Problem, active: np.ndarray | None, guess: Concentrations | 
     start = supplied_everywhere(problem) if guess is None else guess
     state = np.stack([start.acceptor, start.donor])
     weight = np.zeros(len(problem.mesh.points)) if active is None else problem.body * active
+    jacobian = Jacobian(problem.reused)
     residual, size, slopes = _balance(problem, weight, state)
     for iteration in range(MOST_ITERATIONS):
         defect = _relative(residual, size)
         if defect <= NEWTON:
             return _checked(problem, weight, state, iteration)
-        state, residual, size, slopes = _advance(problem, weight, state, residual, slopes)
+        if jacobian.stale(defect):
+            blocks = [[weight * entry for entry in row] for row in slopes]
+            jacobian.factors = linear.factorised(problem.newton.matrix(*problem.both, blocks))
+        state, residual, size, slopes = _advance(problem, weight, state, residual, jacobian.factors)
     raise TransportError(f"Newton's method for the substrates stands at a defect of {defect:.2g} after "
                          f"{MOST_ITERATIONS} iterations; try a larger numerics.refinement")
 
@@ -177,9 +187,9 @@ def _relative(residual: np.ndarray, size: np.ndarray) -> float:
     return float(np.max(np.abs(residual)[size > 0] / size[size > 0], initial=0.0))
 
 
-def _advance(problem: Problem, weight, state, residual, slopes):
+def _advance(problem: Problem, weight, state, residual, factors):
     """A Newton step where it keeps both substrates positive and lowers the residual; else a positive sweep."""
-    trial = state + _solve(problem, [[weight * entry for entry in row] for row in slopes], -residual)
+    trial = state + _solve(problem, factors, -residual)
     found = _balance(problem, weight, trial)
     if trial.min() < 0 or np.linalg.norm(found[0]) > np.linalg.norm(residual):
         trial = _sweep(problem, weight, np.maximum(state, 0.0))
@@ -187,11 +197,10 @@ def _advance(problem: Problem, weight, state, residual, slopes):
     return trial, *found
 
 
-def _solve(problem: Problem, blocks, right: np.ndarray) -> np.ndarray:
-    """(2, N) solution with the operators' matrices plus diagonal blocks [[AA, AD], [DA, DD]] (N,)."""
-    matrix = problem.newton.matrix(*problem.both, blocks)
+def _solve(problem: Problem, factors: linear.Solver, right: np.ndarray) -> np.ndarray:
+    """(2, N) solution with a matrix of both substrates, factorised."""
     solution = np.empty_like(right)
-    found = linear.solve(matrix, right[:, problem.nodes].T.ravel())
+    found = factors.solve(right[:, problem.nodes].T.ravel())
     solution[:, problem.nodes] = found.reshape(-1, 2).T
     return solution
 
@@ -254,7 +263,8 @@ def _sweep(problem: Problem, weight, state) -> np.ndarray:
     for k, operator in enumerate(problem.both):
         right[k] = operator.source
         right[k, operator.held] = operator.supply
-    return _solve(problem, [[weight * per[0], zero], [zero, weight * per[1]]], right)
+    blocks = [[weight * per[0], zero], [zero, weight * per[1]]]
+    return _solve(problem, linear.factorised(problem.newton.matrix(*problem.both, blocks)), right)
 
 
 @dataclass(frozen=True)

@@ -136,7 +136,8 @@ def test_quadratic_fields_are_carried_exactly(bent):
     fields = np.column_stack([x * x - x * y + 3, y * y + 2 * x - 1])
     exact = np.column_stack([where[:, 0] ** 2 - where.prod(axis=1) + 3, where[:, 1] ** 2 + 2 * where[:, 0] - 1])
     assert np.allclose(transfer.interpolate(straight.points, straight.cells, fields, where), exact, atol=1e-8)
-    linear = transfer.interpolate_linear(straight, (2 * x - y)[:straight.corners], where)
+    at = transfer.located(straight.points, straight.cells[straight.biomass], where)
+    linear = at.linear((2 * x - y)[:straight.corners])
     assert np.allclose(linear, 2 * where[:, 0] - where[:, 1], atol=1e-9)
 
 

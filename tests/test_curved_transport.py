@@ -142,7 +142,8 @@ def test_the_tangent_is_the_derivative_of_the_balance(held):
     active, random = pore.active_biomass(made, now), np.random.default_rng(1)
     state = 1 + 8 * random.random(2 * len(now.mesh.points))
     move = random.standard_normal(len(state))
-    start, _, tangent = transport._balance(found.problem, active, state)
+    start, _ = transport._balance(found.problem, active, state)
+    tangent = transport._tangent(found.problem, active, state)
     unknowns = found.problem.system.unknowns
     linear = np.bincount(unknowns.ravel(), np.einsum("tij,tj->ti", tangent, move[unknowns]).ravel())
     left = [np.abs(transport._balance(found.problem, active, state + s * move)[0] - start - s * linear).max()

@@ -132,7 +132,7 @@ def expand(scene, now: Pore) -> tuple[Pore, int, float]:
     start, push, theta = grid.points[nodes], now.pressure[nodes[:corners]], (now.active + now.inert)[nodes]
     wall, fixed, iterations, gaps = now.wall.copy(), now.fixed, 0, []
     for _ in range(CONTACT_ROUNDS):
-        body = growth.of(now, held_at(len(nodes), rim, wall, fixed))
+        body = growth.of(now, held_at(len(nodes), rim, wall, fixed), scene.numerics.jacobian == "reused")
         target = start.copy()
         for side, height in ((geometry.BOTTOM, 0.0), (geometry.TOP, scene.pore.width)):
             target[rim[wall == side], 1] = height

@@ -35,7 +35,8 @@ class Body:
     """The aggregate's own mesh.
 
     origin, reference: (n, 2) um at t = 0 and when the mesh was made, corners first; cells: (t, 6); corners: how many;
-    held: (n, 2) True where a coordinate is prescribed; topology: what is worked out once for this mesh.
+    held: (n, 2) True where a coordinate is prescribed; topology: what is worked out once for this mesh; reused: does
+    Newton's method use its derivative again?
     """
 
     origin: np.ndarray
@@ -44,6 +45,7 @@ class Body:
     corners: int
     held: np.ndarray
     topology: dict = field(default_factory=dict, repr=False)
+    reused: bool = False
 
     @property
     def sparse(self) -> ElementSystem:
@@ -53,7 +55,6 @@ class Body:
         held = np.concatenate([self.held[:, 0], self.held[:, 1], np.zeros(self.corners, bool)])
         found = self.topology["growth"]
         return found if np.array_equal(found.held, held) else found.holding(held)
-
 
     @property
     def places(self) -> elements.Places:
@@ -70,12 +71,12 @@ class Body:
         return self.topology["expanded"]
 
 
-def of(pore, held: np.ndarray | None = None) -> Body:
-    """The aggregate of a pore; held: (n, 2), nothing by default."""
+def of(pore, held: np.ndarray | None = None, reused: bool = False) -> Body:
+    """The aggregate of a pore; held: (n, 2), nothing by default; reused: as :class:`Body`'s."""
     grid, nodes = pore.mesh, pore.mesh.body
     held = np.zeros((len(nodes), 2), bool) if held is None else held
     return Body(pore.origin[nodes], pore.reference[nodes], grid.body_cells, int(np.searchsorted(nodes, grid.corners)),
-                held, grid.once("growth", dict))
+                held, grid.once("growth", dict), reused)
 
 
 class System:

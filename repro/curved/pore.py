@@ -145,7 +145,7 @@ def solve(scene, now: Pore) -> Solved:
     if scene.substrates is None:
         return Solved(carried, None, None)
     refuse_no_supply(scene, carried)
-    found = transport.problem(now.mesh, carried, scene.substrates, scene.kinetics)
+    found = transport.problem(now.mesh, carried, scene.substrates, scene.kinetics, scene.numerics.jacobian == "reused")
     active = active_biomass(scene, now) if scene.kinetics else None
     state = transport.steady(found, active, now.concentrations)
     return Solved(carried, found, state, transport.fluxes(found, active, state))

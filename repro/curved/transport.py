@@ -18,10 +18,12 @@ from repro.curved import elements
 from repro.curved.mesh import CurvedMesh
 from repro.errors import TransportError
 from repro.flow import Flow
+from repro.newton import Jacobian
 from repro.timing import timed
 from repro.transport import Concentrations, Fluxes
 
-NEWTON, MOST_ITERATIONS = 1e-12, 60
+#: Newton stops at this residual against the size of its terms, or at the second where round-off keeps it from falling.
+NEWTON, ROUND_OFF, MOST_ITERATIONS = 1e-13, 1e-12, 60
 #: Parts of a step of Newton's method that are tried, and by how much of them the residual must fall.
 LENGTHS, FALL = 0.5 ** np.arange(8), 1e-4
 #: A concentration below zero by more than this part of the larger supply is not resolved. Where a substrate is used up
@@ -35,7 +37,8 @@ OVERSHOOT = 0.02
 class Problem:
     """Both substrates in one geometry.
 
-    matrices: (T, 6, 6) um2/h; sources: (N,) um2 mg/L/h; inflow, outflow: (N,) um2/h, integrals of u_x N_i over an end.
+    matrices: (T, 6, 6) um2/h; sources: (N,) um2 mg/L/h; inflow, outflow: (N,) um2/h, integrals of u_x N_i over an end;
+    reused: does Newton's method use its derivative again?
     """
 
     mesh: CurvedMesh
@@ -47,6 +50,7 @@ class Problem:
     substrates: object
     kinetics: object
     system: ElementSystem
+    reused: bool
 
     @property
     def both(self):
@@ -55,7 +59,7 @@ class Problem:
 
 
 @timed("transport")
-def problem(mesh: CurvedMesh, flow: Flow | None, substrates, kinetics) -> Problem:
+def problem(mesh: CurvedMesh, flow: Flow | None, substrates, kinetics, reused: bool = False) -> Problem:
     """Assemble the linear parts for one geometry and flow (None: pure diffusion, the supply held at both ends)."""
     at, count = mesh.places, len(mesh.points)
     carried, inflow, outflow, speed = 0.0, np.zeros(count), np.zeros(count), 0.0
@@ -73,7 +77,7 @@ def problem(mesh: CurvedMesh, flow: Flow | None, substrates, kinetics) -> Proble
     matrices = tuple(elements.stiffness(d, at) + carried for d in spread)
     system = mesh.once(("transport", flow is None), lambda: _system(mesh, flow is None))
     sources = tuple(s.supply * inflow for s in kinds)
-    return Problem(mesh, matrices, sources, inflow, outflow, speed, substrates, kinetics, system)
+    return Problem(mesh, matrices, sources, inflow, outflow, speed, substrates, kinetics, system, reused)
 
 
 def _system(mesh: CurvedMesh, held_ends: bool) -> ElementSystem:
@@ -164,13 +168,16 @@ def _eased(problem: Problem, active, state):
 
 def _newton(problem: Problem, active, state, advance):
     """(2N,) solution and Newton's iterations."""
-    residual, size, tangent = _balance(problem, active, state)
+    jacobian, defect, nothing = Jacobian(problem.reused), np.inf, np.zeros(len(state))
+    residual, size = _balance(problem, active, state)
     for iteration in range(MOST_ITERATIONS):
-        defect = _relative(problem, residual, size)
-        if defect <= NEWTON:
+        last, defect = defect, _relative(problem, residual, size)
+        if defect <= NEWTON or 0.1 * last < defect <= ROUND_OFF:
             return state, iteration
-        step = problem.system.solve(tangent, -residual, np.zeros(len(state)))
-        state, residual, size, tangent = advance(problem, active, state, residual, step)
+        if jacobian.stale(defect):
+            jacobian.factors = problem.system.factored(_tangent(problem, active, state))
+        step = jacobian.factors.solve(-residual, nothing)
+        state, residual, size = advance(problem, active, state, residual, step)
     raise TransportError(f"Newton's method for the substrates stands at a defect of {defect:.2g} after "
                          f"{MOST_ITERATIONS} iterations; try a larger numerics.refinement")
 
@@ -209,9 +216,7 @@ def _shortened(problem: Problem, active, state, residual, step):
 
 def _sweep(problem: Problem, active, state) -> np.ndarray:
     """Solve (matrix + X_A q(C) / C) C_new = source, with q(C) / C at the state."""
-    matrices = np.zeros((len(problem.mesh.cells), 12, 12))
-    for k, matrix in enumerate(problem.matrices):
-        matrices[:, 6 * k: 6 * k + 6, 6 * k: 6 * k + 6] = matrix
+    matrices = _linear_part(problem)
     weight, values, (q_a, q_d, slopes) = _uptake_at_points(problem, active, state)
     biomass = np.flatnonzero(problem.mesh.biomass)
     for k, (rate, substrate) in enumerate(zip((q_a, q_d), problem.both)):
@@ -222,21 +227,19 @@ def _sweep(problem: Problem, active, state) -> np.ndarray:
 
 
 def _balance(problem: Problem, active, state):
-    """Residual (2N,), size of its terms (2N,), and element matrices (T, 12, 12) of its derivative."""
+    """Residual (2N,) and size of its terms (2N,)."""
     mesh, count = problem.mesh, len(problem.mesh.points)
-    tangent = np.zeros((len(mesh.cells), 12, 12))
     local, scale = np.zeros((len(mesh.cells), 12)), np.zeros((len(mesh.cells), 12))
     for k, matrix in enumerate(problem.matrices):
         rows = slice(6 * k, 6 * k + 6)
-        tangent[:, rows, rows] = matrix
         values = state[k * count + mesh.cells]
         local[:, rows] = (matrix @ values[..., None])[..., 0]
         scale[:, rows] = (np.abs(matrix) @ np.abs(values)[..., None])[..., 0]
     if problem.kinetics is not None and active is not None:
-        _add_uptake(problem, active, state, local, scale, tangent)
+        _add_uptake(problem, active, state, local, scale)
     source = np.concatenate(problem.sources)
     total, size = (np.bincount(problem.system.unknowns.ravel(), part.ravel(), 2 * count) for part in (local, scale))
-    return total - source, size + np.abs(source), tangent
+    return total - source, size + np.abs(source)
 
 
 def _uptake_at_points(problem: Problem, active, state):
@@ -249,16 +252,33 @@ def _uptake_at_points(problem: Problem, active, state):
     return density * mesh.places.dx[mesh.biomass], (acceptor, donor), rates
 
 
-def _add_uptake(problem: Problem, active, state, local, scale, tangent) -> None:
-    """Add (q X_A, N_i) and its derivatives to the element arrays."""
-    weight, _, (q_a, q_d, slopes) = _uptake_at_points(problem, active, state)
+def _add_uptake(problem: Problem, active, state, local, scale) -> None:
+    """Add (q X_A, N_i) to the element arrays."""
+    weight, _, (q_a, q_d, _) = _uptake_at_points(problem, active, state)
     biomass = np.flatnonzero(problem.mesh.biomass)
     for k, rate in enumerate((q_a, q_d)):
         rows = slice(6 * k, 6 * k + 6)
         local[biomass, rows] += elements.load(weight * rate)
         scale[biomass, rows] += np.abs(weight * rate) @ np.abs(elements.QUADRATIC)
-        for m in (0, 1):
-            tangent[biomass, rows, 6 * m: 6 * m + 6] += elements.mass(weight * slopes[k][m])
+
+
+def _linear_part(problem: Problem) -> np.ndarray:
+    """(T, 12, 12) element matrices of diffusion, advection and the ends."""
+    found = np.zeros((len(problem.mesh.cells), 12, 12))
+    for k, matrix in enumerate(problem.matrices):
+        found[:, 6 * k: 6 * k + 6, 6 * k: 6 * k + 6] = matrix
+    return found
+
+
+def _tangent(problem: Problem, active, state) -> np.ndarray:
+    """(T, 12, 12) element matrices of the residual's derivative."""
+    found = _linear_part(problem)
+    if problem.kinetics is not None and active is not None:
+        weight, _, (_, _, slopes) = _uptake_at_points(problem, active, state)
+        biomass = np.flatnonzero(problem.mesh.biomass)
+        for k, m in np.ndindex(2, 2):
+            found[biomass, 6 * k: 6 * k + 6, 6 * m: 6 * m + 6] += elements.mass(weight * slopes[k][m])
+    return found
 
 
 def _checked(problem: Problem, state, iterations: int) -> Concentrations:

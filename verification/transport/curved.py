@@ -55,7 +55,7 @@ def _steady(problem, active) -> Concentrations:
     terms, which at Peclet 0.1 and little uptake may be 1e-7 of the supply, more than the mesh does."""
     state, count = transport.steady(problem, active), len(problem.mesh.points)
     both = np.concatenate([state.acceptor, state.donor])
-    residual, _, tangent = transport._balance(problem, active, both)
+    tangent, residual = transport._tangent(problem, active, both), transport._balance(problem, active, both)[0]
     both = both + problem.system.solve(tangent, -residual, np.zeros(2 * count))
     return Concentrations(both[:count], both[count:], state.iterations + 1)
 
