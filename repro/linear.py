@@ -115,7 +115,7 @@ class Solver:
     def _defect(self, solution: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, float]:
         residual = right - self.matrix @ solution
         scale = self.magnitude @ np.abs(solution) + np.abs(right)
-        return residual, float(np.max(np.abs(residual)[scale > 0] / scale[scale > 0], initial=0.0))
+        return residual, float(np.max(np.abs(residual) / np.maximum(scale, np.finfo(float).tiny), initial=0.0))
 
     @timed(FLOOR)
     def solve(self, right: np.ndarray) -> np.ndarray:

@@ -154,7 +154,7 @@ class Numerics:
 
 #: What each preset changes of the defaults above: about 1 %, about 0.1 % (see `make bench`), the paper's own scheme.
 PRESETS = {
-    "fast": {"elements": "quadratic", "time": "midpoint", "refinement": 0.2, "tolerance": 0.01, "jacobian": "reused"},
+    "fast": {"elements": "quadratic", "time": "midpoint", "refinement": 0.2, "tolerance": 0.0075, "jacobian": "reused"},
     "accurate": {"elements": "quadratic", "time": "midpoint", "refinement": 0.45, "tolerance": 0.001,
                  "jacobian": "reused"},
     "paper": {},

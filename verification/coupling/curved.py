@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from unittest import mock
 
 import numpy as np
 
 from reference import whole_run
-from repro import geometry, midpoint
+from repro import geometry, linear, midpoint
 from repro.coupling import simulate as paper_run
 from repro.curved import coupling as curved
 from repro.scene import load_scene
@@ -142,3 +143,28 @@ def presets() -> Outcome:
         checks += [at_most(f"{name}, {preset}", apart, bound, "what the preset is for")
                    for name, apart in zip(whole_run.NAMES, _apart(_listed(preset), theirs))]
     return Outcome(tuple(checks))
+
+
+@case("coupling-jacobian-reused", kind="property",
+      norm="relative difference of the area, the tips and the conductivity at 2 h; factorisations over those of fresh "
+           "derivatives; base from a seed of 25 um",
+      claim="Newton's methods that use a derivative again come to the same with fewer factorisations",
+      mutants=("newton-never-reused",))
+def reused() -> Outcome:
+    checks = []
+    for elements, preset in (("quadratic", "fast"), ("linear", "paper")):
+        (fresh, made), (again, fewer) = (_factorisations(preset, kind) for kind in ("fresh", "reused"))
+        checks += [at_most(f"difference, {elements}", np.abs(again / fresh - 1).max(), 1e-8,
+                           "Newton's tolerances, 1e-10 and less, times the steps"),
+                   at_most(f"factorisations, {elements}", fewer / made, 0.8, "one in three of Newton's is saved")]
+    return Outcome(tuple(checks))
+
+
+def _factorisations(preset: str, kind: str) -> tuple[np.ndarray, int]:
+    """Area, tips and conductivity at 2 h, and how many matrices were factorised on the way."""
+    scene = _base(f'numerics.preset="{preset}"', f'numerics.jacobian="{kind}"', 'aggregate.radius="25 um"',
+                  'growth.end="2 h"', 'growth.time_step="1 h"')
+    with mock.patch.object(linear, "factorised", wraps=linear.factorised) as factorised:
+        *_, last = simulate(scene)
+    shape, flow = last.pore.outline, last.solved.flow
+    return np.array([shape.area, shape.upstream, shape.downstream, flow.conductivity]), factorised.call_count

@@ -20,4 +20,8 @@ CURVED = (
            says="Biomass grows for half of the step only.",
            old="after = grown(now, half.rates, duration)",
            new="after = grown(now, half.rates, duration / 2)"),
+    Mutant("newton-never-reused", "repro/newton.py",
+           says="Every step of Newton's method factorises its derivative anew, whatever the scene says.",
+           old="not self.reused or defect > ENOUGH * last",
+           new="defect >= 0"),
 )
