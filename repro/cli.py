@@ -7,12 +7,11 @@ or a folder cannot be used, 130 or 143 when interrupted or terminated.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 
 from repro.commands import COMMANDS
 from repro.errors import Interrupted, OutputError, SimulationError
-from repro.progress import printable
+from repro.progress import in_json, printable
 from repro.scene import SceneError
 
 
@@ -34,7 +33,7 @@ def main(arguments: list[str] | None = None) -> int:
 def _fail(chosen, message, status: int) -> int:
     """Tell what went wrong, as an object too where machines listen."""
     if getattr(chosen, "json", False):
-        print(json.dumps({"event": "error", "exit_status": status, "message": str(message)}), flush=True)
+        in_json({"event": "error", "exit_status": status, "message": str(message)})
     print(f"repro: {printable(str(message))}", file=sys.stderr)
     return status
 

@@ -1,4 +1,4 @@
-"""Signals that ask a run to stop: the first one is noted, a second one ends the process at once."""
+"""Signals that ask a run to stop: the first one is noted, one that comes later ends the process at once."""
 
 from __future__ import annotations
 
@@ -7,8 +7,11 @@ import signal
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from time import monotonic
 
 ASKED = (signal.SIGINT, signal.SIGTERM)
+#: Seconds in which a signal is the first one come twice: timeout(1) and shells send it to the process and to its group.
+SAME = 1.0
 
 
 @contextmanager
@@ -19,11 +22,14 @@ def noted() -> Iterator[Callable[[], int]]:
     (Mmg) keeps them from being seen. Signals that are ignored stay so. For the main thread alone.
     """
     came: list[int] = []
+    when = [0.0]
 
     def note(number: int, frame=None) -> None:
-        if came:
+        if came and monotonic() > when[0] + SAME:
             os._exit(128 + number)
-        came.append(number)
+        if not came:
+            when[0] = monotonic()
+            came.append(number)
 
     kept = {number: signal.getsignal(number) for number in ASKED}
     wanted = [number for number in ASKED if kept[number] != signal.SIG_IGN]

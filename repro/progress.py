@@ -6,6 +6,7 @@ Each is a context that yields what :class:`repro.running.Watch` calls ``tell``. 
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
@@ -30,8 +31,11 @@ def printable(text: str) -> str:
 
 
 def in_json(event: dict) -> None:
-    """A line of JSON on standard output; warnings on standard error too."""
-    print(json.dumps(event), flush=True)
+    """A line of JSON on standard output, while anybody reads it; warnings on standard error too."""
+    try:
+        print(json.dumps(event), flush=True)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     only_warnings(event)
 
 
@@ -70,7 +74,7 @@ def _begin_and_end(event: dict, aside: Callable[[str], None]) -> None:
 def on_a_terminal() -> Iterator[Tell]:
     """A bar with simulated time, steps, remeshes, contact, and the time that is left."""
     form = "{desc} {percentage:3.0f}%|{bar}| {n:.1f} of {total:.1f} h [{elapsed} < {remaining}{postfix}]"
-    with tqdm(total=1.0, bar_format=form, dynamic_ncols=True, leave=True) as bar:
+    with tqdm(total=1.0, bar_format=form, dynamic_ncols=True, delay=1e-3) as bar:
         def tell(event: dict) -> None:
             if event["event"] == "start":
                 bar.set_description_str(printable(event["scene"]), refresh=False)
@@ -88,5 +92,5 @@ def on_a_terminal() -> Iterator[Tell]:
 
 def _counts(event: dict) -> str:
     """Steps, remeshes and contact in words."""
-    remeshes = f", {event['remeshes']} remeshes" if event["remeshes"] else ""
+    remeshes = f", remeshes {event['remeshes']}" if event["remeshes"] else ""
     return f"step {event['step']}{remeshes}{', contact' if event['contact'] else ''}"

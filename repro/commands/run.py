@@ -16,7 +16,7 @@ STATUS = """exit status:
        what to change
   2    wrong input, or the folder cannot be used: not a run's, not writable, disk full, in use by another run
   130  interrupted (SIGINT, Ctrl-C); 143 terminated (SIGTERM): the step in hand is finished, results and checkpoint are
-       written, and --resume goes on from there; a second signal stops at once"""
+       written, and --resume goes on from there; a second signal, after a second or more, stops at once"""
 
 
 def add(commands) -> None:
