@@ -90,6 +90,12 @@ def _entry(entry) -> tuple[str, np.dtype, tuple[int, ...], Literal["C", "F"]]:
     return entry[0], np.dtype(entry[1]), tuple(entry[2]), entry[3]
 
 
+def synced(path: Path) -> None:
+    """Have the system put a file on the disk."""
+    with path.open("rb+") as file:
+        os.fsync(file.fileno())
+
+
 def write(folder: Path, content: bytes) -> None:
     """Make this the newest checkpoint of a folder and the newest before the previous one; OSError where it cannot."""
     newest, beside = folder / NEWEST, folder / f".{NEWEST}.part"

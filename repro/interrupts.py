@@ -31,7 +31,7 @@ def noted() -> Iterator[Callable[[], int]]:
             when[0] = monotonic()
             came.append(number)
 
-    kept = {number: signal.getsignal(number) for number in ASKED}
+    kept = {number: signal.getsignal(number) or signal.SIG_DFL for number in ASKED}
     wanted = [number for number in ASKED if kept[number] != signal.SIG_IGN]
     for number in wanted:
         signal.signal(number, note)

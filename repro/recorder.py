@@ -31,6 +31,7 @@ class Recorder:
         self.remeshes = 0
         self.iterations: dict[str, int] = {}
         self.resumes: list[dict] = []
+        self.unsynced: list[str] = []  # fields that the system may still lose with the power
         self.begun, self.spent, self.stages = perf_counter(), 0.0, dict[str, float]()
 
     @property
@@ -76,6 +77,7 @@ class Recorder:
         with writing(self.folder / name):
             results.write_fields(self.folder / name, results.fields(self.scene, pore, solved))
         index.append([pore.time, name])
+        self.unsynced.append(name)
 
     def save(self, status: str) -> None:
         """Write checkpoint, tables, indices and provenance as they are now."""
@@ -115,6 +117,10 @@ class Recorder:
         return self.spent + perf_counter() - self.begun, dict(sorted(stages.items()))
 
     def _write_checkpoint(self, state: State) -> None:
+        for name in self.unsynced:
+            with writing(self.folder / name):
+                checkpoint.synced(self.folder / name)
+        self.unsynced = []
         plain, arrays = stored.packed(self.scene, state)
         seconds, stages = self._times()
         record = {"rows": self.rows, "ledgers": self.ledgers, "index": self.index, "before": self.before,

@@ -290,11 +290,11 @@ def test_killed_again_and_again(tmp_path, whole):
     """Each time a little further, until it is done. Mutant: counts that are lost or doubled at the second resume."""
     out, draw, status = tmp_path / "run", random.Random(7), None
     arguments = [*LONG, "--out", out]
-    for _ in range(40):
+    for _ in range(20):
         process = started(*arguments, "--checkpoint", "0.1")
         wait_for((out / ".lock").exists, process)
         with suppress(TimeoutExpired):
-            status = process.wait(draw.uniform(0.1, 1.5))
+            status = process.wait(draw.uniform(0.5, 2.5))
         process.kill()
         process.communicate()
         if status is not None:
