@@ -1,7 +1,7 @@
 """Command line: ``repro COMMAND ...``; each command is a module of :mod:`repro.commands`.
 
-Exit status: 0 when the command has done what it is for, 1 when a stage failed, 2 when something in the input is wrong,
-130 when interrupted.
+Exit status: 0 when the command has done what it is for, 1 when a stage failed, 2 when something in the input is wrong
+or a folder cannot be used, 130 or 143 when interrupted or terminated.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ import argparse
 import sys
 
 from repro.commands import COMMANDS
-from repro.errors import SimulationError
-from repro.running import OutputError
+from repro.errors import Interrupted, OutputError, SimulationError
+from repro.progress import in_json, printable
 from repro.scene import SceneError
 
 
@@ -21,15 +21,20 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         return chosen.call(chosen)
     except (SceneError, OutputError) as error:
-        return _fail(error, 2)
+        return _fail(chosen, error, 2)
     except SimulationError as error:
-        return _fail(error, 1)
+        return _fail(chosen, error, 1)
+    except Interrupted as error:
+        return _fail(chosen, error, 128 + error.signal)
     except KeyboardInterrupt:
-        return _fail("interrupted; what was computed is written", 130)
+        return _fail(chosen, "interrupted; what was computed is written", 130)
 
 
-def _fail(message, status: int) -> int:
-    print(f"repro: {message}", file=sys.stderr)
+def _fail(chosen, message, status: int) -> int:
+    """Tell what went wrong, as an object too where machines listen."""
+    if getattr(chosen, "json", False):
+        in_json({"event": "error", "exit_status": status, "message": str(message)})
+    print(f"repro: {printable(str(message))}", file=sys.stderr)
     return status
 
 

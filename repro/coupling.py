@@ -8,53 +8,28 @@ or, by the paper's criteria (3.1, 3.5), is made anew.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from repro import gear, geometry, kinetics, pore, remeshing, shape, transport
-from repro.errors import SimulationError, StageError
+from repro import gear, kinetics, loop, pore, remeshing, shape, transport
+from repro.loop import SAME_TIME, Instant, Ledger, PoreEnd, Scheme, State, Step, laid_out, pore_end
+from repro.pace import Pace
 from repro.pore import Pore, Solved
 from repro.transport import Concentrations
 
-#: A step of the grid this close (h) to a reported time is that time.
-SAME_TIME = 1e-9
-
-
-@dataclass(frozen=True)
-class Ledger:
-    """Mass balance of one step, per depth (um2 mg/L = 1e-12 g/m): both substrates, then the biomass."""
-
-    start: float
-    end: float
-    supplied: tuple[float, float]
-    out: tuple[float, float]
-    consumed: tuple[float, float]
-    stored: tuple[float, float]
-    biomass_before: float
-    biomass_made: float
-    biomass_after: float
+__all__ = ["Attempt", "Instant", "Ledger", "PoreEnd", "Step", "increase", "mass_of", "pore_end", "rates_of", "simulate"]
 
 
 @dataclass(frozen=True, eq=False)
-class Instant:
-    """The pore at ``pore.time`` with what is solved in its geometry, and how it came there.
+class Attempt:
+    """A step of the midpoint rule that may be taken: what it makes, None where the rates change more than is allowed;
+    their mean change over its first half, 1/h; and, where it first makes contact with the opposite wall, the least
+    distance (um) to that before and after the step, and the film's least thickness."""
 
-    before: the pore and its solution at the end of the last step, grown but not yet expanded (Plate 1), None at t = 0;
-    ledgers, remeshes, iterations: of the steps since the last instant.
-    """
-
-    pore: Pore
-    solved: Solved
-    before: tuple[Pore, Solved] | None
-    ledgers: tuple[Ledger, ...]
-    remeshes: int
-    iterations: dict[str, int]
-
-
-class PoreEnd(Exception):
-    """The aggregate has reached an end of the pore: the run is over."""
+    step: Step | None
+    change: float
+    gaps: tuple[float, float, float] | None
 
 
 def schedule(scene) -> tuple[list[float], set[float]]:
@@ -68,93 +43,25 @@ def schedule(scene) -> tuple[list[float], set[float]]:
     return sorted({*between, *reported, end}), reported
 
 
+def steps(scene, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
+    """:func:`repro.loop.steps` of the paper's scheme."""
+    return loop.steps(scene, Scheme(pore.seeded, pore.solve, lambda scene: schedule(scene)[0], _advance), state)
+
+
 def simulate(scene) -> Iterator[Instant]:
     """Run a scene; yields an Instant at t = 0 and at each reported time.
 
     Raises SimulationError where a stage fails; ends early, after a last Instant, by raising PoreEnd where the aggregate
     reaches an end of the pore.
     """
-    times, reported = schedule(scene)
-    with stopping(0.0):
-        now = pore.seeded(scene)
-        solved = pore.solve(scene, now)
-    now = replace(now, concentrations=solved.concentrations)
-    yield Instant(now, solved, None, (), 0, newton_counts(solved))
-    before, ledgers, remeshes, counts = None, [], 0, {}
-    for time in times[1:]:
-        try:
-            with stopping(now.time):
-                done = step(scene, now, solved, time - now.time)
-                now, before = replace(done.pore, time=time), done.before
-                solved = pore.solve(scene, now)
-        except PoreEnd:
-            if ledgers:  # steps that are not reported yet
-                yield Instant(now, solved, before, tuple(ledgers), remeshes, counts)
-            raise
-        now = replace(now, concentrations=solved.concentrations)
-        ledgers.append(done.ledger)
-        remeshes += done.remeshed
-        counts = added(counts, {"growth": done.iterations}, newton_counts(before[1]), newton_counts(solved))
-        over = pore_end(scene, now, 1.0)
-        if time in reported or over:
-            yield Instant(now, solved, before, tuple(ledgers), remeshes, counts)
-            ledgers, remeshes, counts = [], 0, {}
-        if over:
-            raise PoreEnd(f"{over} at t = {now.time:g} h")
+    return (instant for _, instant in steps(scene) if instant)
 
 
-@contextmanager
-def stopping(time: float):
-    """Floating-point errors stop the run; a stage's failure is told with the simulated time of its step."""
-    try:
-        with np.errstate(all="raise", under="ignore"):
-            yield
-    except StageError as error:
-        raise SimulationError(f"stopped in the step from t = {time:g} h, in {error.stage}: {error}") from error
-    except FloatingPointError as error:
-        raise SimulationError(f"stopped in the step from t = {time:g} h by a floating-point error ({error}); "
-                              "try a shorter growth.time_step or a larger numerics.refinement") from error
-
-
-def newton_counts(solved: Solved) -> dict[str, int]:
-    return {"transport": solved.concentrations.iterations if solved.concentrations else 0}
-
-
-def added(*counts: dict[str, int]) -> dict[str, int]:
-    keys = {key for count in counts for key in count}
-    return {key: sum(count.get(key, 0) for count in counts) for key in sorted(keys)}
-
-
-def pore_end(scene, now: Pore, elements: float) -> str:
-    """Which end of the pore the aggregate has reached, to so many elements of the fluid; empty while it has not."""
-    outline, end = now.outline, scene.pore.length / 2
-    near = elements * scene.pore.width / geometry.ACROSS_PORE
-    if outline.upstream < near - end or outline.downstream > end - near:
-        side = "upstream" if outline.upstream < near - end else "downstream"
-        return f"the aggregate reaches the pore's {side} end"
-    return ""
-
-
-@dataclass(frozen=True, eq=False)
-class Step:
-    """What one step made: the new pore, the pore and its solution before it expanded, the ledger, and counts."""
-
-    pore: Pore
-    before: tuple[Pore, Solved]
-    ledger: Ledger
-    remeshed: bool
-    iterations: int
-
-
-@dataclass(frozen=True, eq=False)
-class Attempt:
-    """A step of the midpoint rule that may be taken: what it makes, None where the rates change more than is allowed;
-    their mean change over its first half, 1/h; and, where it first makes contact with the opposite wall, the least
-    distance (um) to that before and after the step, and the film's least thickness."""
-
-    step: Step | None
-    change: float
-    gaps: tuple[float, float, float] | None
+def _advance(scene, now: Pore, solved: Solved, time: float, pace: Pace) -> tuple[Step, Solved, Pace]:
+    """One step to the time ``time`` (h)."""
+    done = step(scene, now, solved, time - now.time)
+    after = laid_out(replace(done.pore, time=time))
+    return replace(done, pore=after), pore.solve(scene, after), pace
 
 
 def step(scene, now: Pore, solved: Solved, duration: float) -> Step:

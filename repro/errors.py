@@ -39,3 +39,19 @@ class TransferError(StageError):
 
 class SimulationError(RuntimeError):
     """A run has stopped: at what simulated time, in which stage, why, and what to try."""
+
+
+class OutputError(RuntimeError):
+    """A folder or a file of the results cannot be used; says which and why."""
+
+
+class CheckpointError(ValueError):
+    """A checkpoint that cannot be gone on from; says why."""
+
+
+class Interrupted(Exception):
+    """A run was asked to stop by a signal, and has written what it goes on from."""
+
+    def __init__(self, message: str, signal: int):
+        super().__init__(message)
+        self.signal = signal

@@ -5,14 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from repro import coupling, linear, stepping
-from repro.coupling import Instant
+from repro.loop import Instant, State
 
 
-def simulate(scene) -> Iterator[Instant]:
+def simulate(scene, state: State | None = None) -> Iterator[Instant]:
     """Yields an Instant at t = 0 and at each reported time: at ``output.times``, or after every step.
 
-    Raises SimulationError where a stage fails, and PoreEnd, after a last Instant, where the aggregate reaches an end of
-    the pore.
+    state: one of :func:`steps`, after which to go on. Raises SimulationError where a stage fails, and PoreEnd, after a
+    last Instant, where the aggregate reaches an end of the pore.
     """
+    return (instant for _, instant in steps(scene, state) if instant)
+
+
+def steps(scene, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
+    """Every step, t = 0 first: the state from which a run goes on bit for bit, and the Instant where one is due."""
     linear.use(scene.numerics.solver, scene.numerics.ordering)
-    return (stepping if scene.numerics.time == "midpoint" else coupling).simulate(scene)
+    return (stepping if scene.numerics.time == "midpoint" else coupling).steps(scene, state)

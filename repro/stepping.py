@@ -13,11 +13,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from repro import midpoint
-from repro.coupling import SAME_TIME, Attempt, Instant, PoreEnd, Step, added, newton_counts, pore_end, stopping
+from repro import loop, midpoint
+from repro.coupling import Attempt
 from repro.curved import coupling as curved
 from repro.errors import StageError
+from repro.loop import SAME_TIME, Instant, PoreEnd, Scheme, State, Step, laid_out
 from repro.pace import EXCESS, STRETCH, Pace, allowed, fitted, following
+from repro.pore import Solved
 
 #: The first step that is tried, in parts of growth.time_step; one that fails or errs too much is tried again, shorter,
 #: until it is SHORTEST parts.
@@ -26,47 +28,15 @@ FIRST, SHORTEST = 8.0, 1e-3
 LANDED = 0.995
 
 
-def simulate(scene) -> Iterator[Instant]:
-    """As :func:`repro.coupling.simulate`; without ``output.times`` every step is reported."""
+def steps(scene, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
+    """:func:`repro.loop.steps` of the midpoint rule; without ``output.times`` every step is reported."""
     scheme = curved if scene.numerics.elements == "quadratic" else midpoint
-    with stopping(0.0):
-        now = scheme.seeded(scene)
-        solved = scheme.solve(scene, now)
-    now = replace(now, concentrations=solved.concentrations)
-    yield Instant(now, solved, None, (), 0, newton_counts(solved))
-    if scene.growth is None or scene.growth.end == 0:
-        return
-    pace, pending = Pace(FIRST * scene.growth.time_step), _Pending()
-    for time in _targets(scene):
-        while time - now.time > SAME_TIME:
-            with stopping(now.time):
-                taken, solved, pace = _advance(scheme, scene, now, solved, time, pace)
-            now = replace(taken.pore, concentrations=solved.concentrations)
-            pending.add(taken, solved)
-            over = pore_end(scene, now, 1.0)
-            if over or scene.output.times is None or time - now.time <= SAME_TIME and time in scene.output.times:
-                yield pending.instant(now, solved)
-            if over:
-                raise PoreEnd(f"{over} at t = {now.time:g} h")
 
+    def advance(*now) -> tuple[Step, Solved, Pace]:
+        taken, solved, pace = _advance(scheme, *now)
+        return replace(taken, before=None), solved, pace
 
-class _Pending:
-    """What has happened since the last Instant."""
-
-    def __init__(self):
-        self.ledgers, self.remeshes, self.counts = [], 0, {}
-
-    def add(self, taken: Step, solved) -> None:
-        """Count a step and what is solved after it."""
-        self.ledgers.append(taken.ledger)
-        self.remeshes += taken.remeshed
-        self.counts = added(self.counts, {"growth": taken.iterations}, newton_counts(solved))
-
-    def instant(self, now, solved) -> Instant:
-        """An Instant with it; counting starts anew."""
-        found = Instant(now, solved, None, tuple(self.ledgers), self.remeshes, self.counts)
-        self.__init__()
-        return found
+    return loop.steps(scene, Scheme(scheme.seeded, scheme.solve, _targets, advance, FIRST), state)
 
 
 def _targets(scene) -> list[float]:
@@ -111,4 +81,4 @@ def _to_contact(gaps: tuple[float, float, float]) -> float:
 def _ending_at(taken: Step, end: float, time: float) -> Step:
     """The step with the time of its end, the reported one where they are the same."""
     exact = time if abs(time - end) <= SAME_TIME else end
-    return replace(taken, pore=replace(taken.pore, time=exact))
+    return replace(taken, pore=laid_out(replace(taken.pore, time=exact)))

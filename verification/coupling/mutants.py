@@ -33,11 +33,10 @@ MUTANTS = (
            says="every triangle grows by the mean increase of the whole aggregate",
            old="return more[now.mesh.triangles[now.mesh.biomass]].mean(axis=1)",
            new="return np.full(len(now.theta), more[now.mesh.body].mean())"),
-    Mutant("geometry-of-the-step-before", "repro/coupling.py",
+    Mutant("geometry-of-the-step-before", "repro/loop.py",
            says="an instant holds the shape of the update before its own",
-           old="yield Instant(now, solved, before, tuple(ledgers), remeshes, counts)\n            ledgers, remeshes",
-           new="yield Instant(before[0], solved, before, tuple(ledgers), remeshes, counts)\n"
-               "            ledgers, remeshes"),
+           old="yield reported(state), instant(state, now, solved, taken.before)",
+           new="yield reported(state), instant(state, taken.before[0], solved, taken.before)"),
     Mutant("stale-flow", "repro/pore.py",
            says="flow is solved once for each mesh, and not anew when the mesh has moved",
            old="unit = flow.unit_flow(pore.mesh, drive.viscosity_ratio, interface=numerics.interface,\n"

@@ -1,0 +1,52 @@
+"""`repro` as a process of its own, and what is in the folder of a run."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+#: A scene of a second or so, with remeshes, and one of several seconds.
+SHORT = ("base", "--set", 'numerics.preset="fast"')
+LONG = ("base", "--set", 'growth.end="4 h"')
+
+
+def started(*arguments, threads="1", **options) -> subprocess.Popen:
+    """`repro run ARGUMENTS`, going; signals as in a shell of one's own."""
+    code = ("import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
+            "from repro.cli import main; sys.exit(main(sys.argv[1:]))")
+    names = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), threads)
+    given = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, **options}
+    return subprocess.Popen([sys.executable, "-c", code, "run", *map(str, arguments)], env={**os.environ, **names}, **given)
+
+
+def shell(*arguments, **options) -> tuple[int, str, str]:
+    """Exit status, standard output and standard error of `repro run ARGUMENTS`."""
+    process = started(*arguments, **options)
+    out, err = process.communicate(timeout=120)
+    return process.returncode, out, err
+
+
+def wait_for(there, process: subprocess.Popen) -> None:
+    """Until something is there, or the process has ended."""
+    while not there() and process.poll() is None:
+        time.sleep(0.01)
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    """Every file of a folder but run.json, by its name there."""
+    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*"))
+            if path.is_file() and path.name != "run.json"}
+
+
+def told(folder: Path) -> dict:
+    """What run.json says."""
+    return json.loads((folder / "run.json").read_text(encoding="utf-8"))
+
+
+def lasting(folder: Path) -> dict:
+    """What run.json says but for times and counts of resumes."""
+    return {key: value for key, value in told(folder).items() if not key.startswith("wall_time") and key != "resumes"}

@@ -1,0 +1,268 @@
+"""Checkpoints: what is written is read, and whatever else is read is refused."""
+
+import copy
+import json
+import math
+import os
+import tracemalloc
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from repro import checkpoint, stored
+from repro.checkpoint import NEWEST, PREVIOUS, decoded, encoded
+from repro.errors import CheckpointError
+from repro.loop import State
+from repro.recorder import Recorder
+from repro.running import Watch, run
+from repro.scene import load_scene
+from repro.simulation import steps
+
+THOROUGH = os.environ.get("HYPOTHESIS_PROFILE") == "thorough"
+EXAMPLES = settings(max_examples=1000 if THOROUGH else 20)  # twice: 2000 malformed checkpoints
+TIMES = ('growth.end="0.6 h"', 'output.times=["0.2 h", "0.6 h"]')
+PRESETS = {"paper": TIMES, "fast": ('numerics.preset="fast"', "numerics.tolerance=0.002", *TIMES)}
+
+
+@pytest.fixture(scope="module", params=PRESETS)
+def kept(request, tmp_path_factory):
+    """Scene, folder and bytes of a checkpoint with steps that are reported and one that is not."""
+    scene, folder = load_scene("base", PRESETS[request.param]), tmp_path_factory.mktemp("kept") / "run"
+    found = []
+
+    def keep(event):
+        if event["event"] == "checkpoint":
+            found.append((folder / NEWEST).read_bytes())
+
+    run(scene, folder, watch=Watch(tell=keep, interval=0.0))
+    told = [decoded(content)[0] for content in found]
+    both = [k for k, plain in enumerate(told) if plain["state"]["ledgers"] and plain["record"]["ledgers"]]
+    return scene, folder, found[both[0]]
+
+
+def restored(kept, content, path):
+    """A recorder that goes on from these bytes."""
+    scene, folder, _ = kept
+    path.write_bytes(content)
+    recorder = Recorder(scene, folder)
+    recorder.restore(path)
+    return recorder
+
+
+def test_what_is_written_is_read(kept, tmp_path):
+    """To the last bit, layout and type included. Mutants: a field left out, columns for rows, ints for floats."""
+    scene, _, content = kept
+    state = restored(kept, content, tmp_path / "x").state
+    plain, arrays = stored.packed(scene, state)
+    assert encoded({**decoded(content)[0], "state": plain}, arrays) == content
+    assert plain["ledgers"] and plain["pace"][0] > 0 and isinstance(state.ledgers[0].supplied, tuple)
+
+
+def test_every_array_of_a_state_is_kept(kept):
+    """Mutant: a new field of a pore or a mesh that nobody stores."""
+    scene, _, content = kept
+    plain, arrays = decoded(content)
+    state = stored.unpacked(scene, plain["state"], arrays)
+    for data in (state.pore, state.pore.mesh):
+        fields = {name for name, kind in type(data).__annotations__.items() if "ndarray" in kind}
+        assert fields and fields <= arrays.keys()
+
+
+def test_layout_and_type_of_arrays_are_kept():
+    arrays = {"a": np.arange(6.0).reshape(2, 3), "b": np.asfortranarray(np.arange(6).reshape(2, 3)), "c": np.zeros(0),
+              "d": np.array([True, False]), "e": np.arange(3, dtype=np.int32), "f": np.array([-0.0, 5e-324])}
+    _, found = decoded(encoded({}, arrays))
+    for name, array in arrays.items():
+        assert found[name].tobytes() == array.tobytes() and found[name].dtype == array.dtype
+        assert found[name].flags.c_contiguous == array.flags.c_contiguous and found[name].flags.writeable
+
+
+def test_the_one_before_is_kept(tmp_path):
+    """Mutants: one file alone, a part left behind."""
+    for content in (b"one", b"two", b"three"):
+        checkpoint.write(tmp_path, content)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {NEWEST: b"three", PREVIOUS: b"two"}
+
+
+def refused(kept, content, path):
+    with pytest.raises(CheckpointError) as error:
+        restored(kept, content, path)
+    assert str(error.value) and "\n" not in str(error.value)
+
+
+@EXAMPLES
+@given(st.data())
+def test_altered_and_truncated_checkpoints_are_refused(kept, tmp_path_factory, data):
+    """Bytes changed, cut out, put in, cut off or replaced at random places: told by the checksum. Mutants: a checksum of
+    the arrays alone, or of the header alone."""
+    content, path = kept[2], tmp_path_factory.getbasetemp() / "altered"
+    at = data.draw(st.integers(0, len(content) - 1))
+    length = data.draw(st.integers(0, 40))
+    new = data.draw(st.one_of(st.just(content[:at]), st.binary(max_size=40).map(
+        lambda some: content[:at] + some + content[at + length:]), st.binary(max_size=200)))
+    if new != content:
+        refused(kept, new, path)
+
+
+JUNK = st.one_of(st.none(), st.booleans(), st.integers(), st.just(10**400), st.floats(allow_nan=False, allow_infinity=False),
+                 st.text(max_size=3), st.lists(st.integers(0, 3), max_size=4), st.just({}), st.just([[]]))
+NEVER = (math.nan, math.inf, -math.inf)
+
+
+def places(value, path=()):
+    """Every place in what JSON says, but for the wall times and the names of stages."""
+    yield path
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, inner in items:
+        if key not in ("seconds", "stages", "resumes"):
+            yield from places(inner, (*path, key))
+
+
+def at(value, path):
+    for key in path:
+        value = value[key]
+    return value
+
+
+@EXAMPLES
+@given(st.data())
+def test_signed_nonsense_is_refused_or_harmless(kept, tmp_path_factory, data):
+    """A value of another kind, an array of another kind or shape, indices that are no nodes, numbers that are none, all
+    under a right checksum: refused, or a state of the same shape as a run's. Nothing but a CheckpointError is raised.
+    Mutants: any of the checks left out."""
+    path = tmp_path_factory.getbasetemp() / "nonsense"
+    plain, arrays = copy.deepcopy(decoded(kept[2])[0]), dict(decoded(kept[2])[1])
+    data.draw(st.sampled_from([spoil_plain, spoil_array, spoil_numbers, spoil_indices]))(data, plain, arrays)
+    try:
+        recorder = restored(kept, encoded(plain, arrays), path)
+    except CheckpointError as error:
+        assert str(error) and "\n" not in str(error)
+        return
+    assert isinstance(recorder.state, State) and np.isfinite(recorder.state.pore.mesh.points).all()
+
+
+def spoil_plain(data, plain, arrays):
+    path = data.draw(st.sampled_from([path for path in places(plain) if path]))
+    at(plain, path[:-1])[path[-1]] = data.draw(JUNK)
+
+
+def spoil_array(data, plain, arrays):
+    name = data.draw(st.sampled_from(sorted(arrays)))
+    change = data.draw(st.sampled_from([
+        lambda a: a[:-1], lambda a: a.astype(float), lambda a: a.astype(np.int64), lambda a: a.astype(bool),
+        lambda a: np.zeros((0, *a.shape[1:]), a.dtype), lambda a: np.column_stack([a, a]), lambda a: None]))
+    with np.errstate(all="ignore"):
+        new = change(arrays.pop(name))
+    if new is not None:
+        arrays[name] = np.ascontiguousarray(new)
+
+
+def spoil_numbers(data, plain, arrays):
+    name = data.draw(st.sampled_from([name for name in arrays if arrays[name].dtype.kind == "f"]))
+    arrays[name] = spoilt(data, arrays[name], data.draw(st.sampled_from([*NEVER, 1e300, -1e300])))
+
+
+def spoil_indices(data, plain, arrays):
+    name = data.draw(st.sampled_from([name for name in arrays if arrays[name].dtype.kind == "i"]))
+    arrays[name] = spoilt(data, arrays[name], data.draw(st.integers(-(2**63), 2**63 - 1)))
+
+
+def spoilt(data, array, value):
+    array = array.copy(order="K")
+    array.flat[data.draw(st.integers(0, array.size - 1))] = value
+    return array
+
+
+def test_numbers_that_are_none_and_indices_that_are_no_nodes_are_refused(kept, tmp_path):
+    """In every array. Mutant: one array that is not looked at."""
+    plain, arrays = decoded(kept[2])
+    for name, array in arrays.items():
+        for value in {"f": NEVER, "i": (-1, len(arrays["points"]), 2**40), "b": ()}[array.dtype.kind]:
+            changed = array.copy(order="K")
+            changed.flat[-1] = value
+            refused(kept, encoded(plain, {**arrays, name: changed}), tmp_path / "x")
+
+
+@pytest.mark.parametrize("key, value", [
+    ("time_h", 1e9), ("time_h", -1.0), ("time_h", 0), ("pace", "1"), ("pace", [1.0, 1.0]), ("pace", [-0.1, 0.0, 0.0]), ("remeshes", -1),
+    ("ends_um", [1.0, -1.0]), ("ends_um", [-1e9, 1e9]), ("scene", "0" * 16), ("guess", 1.5), ("iterations", {"a": None}),
+    ("ledgers", [[0.0]]), ("ledgers", None)])
+def test_what_makes_no_sense_is_refused(kept, tmp_path, key, value):
+    plain, arrays = copy.deepcopy(decoded(kept[2])[0]), decoded(kept[2])[1]
+    plain["state"][key] = value
+    refused(kept, encoded(plain, arrays), tmp_path / "x")
+
+
+@pytest.mark.parametrize("change", [
+    lambda record: record["rows"].pop(), lambda record: record["index"].pop(), lambda record: record["ledgers"].append([0]),
+    lambda record: record["index"][0].__setitem__(1, "../../../etc/passwd"), lambda record: record.pop("remeshes"),
+    lambda record: record["rows"][0].pop(), lambda record: record["rows"][0].__setitem__(0, "0"),
+    lambda record: record.update(seconds=-1.0), lambda record: record.update(stages=[]),
+    lambda record: record["ledgers"].clear(), lambda record: record.update(rows=[], index=[]),
+    lambda record: record.update(iterations=[])])
+def test_rows_that_are_not_those_of_the_state_are_refused(kept, tmp_path, change):
+    """Mutants: names of files taken from a checkpoint, rows of another length or of another time."""
+    plain, arrays = copy.deepcopy(decoded(kept[2])[0]), decoded(kept[2])[1]
+    change(plain["record"])
+    refused(kept, encoded(plain, arrays), tmp_path / "x")
+
+
+def signed(header: bytes, data: bytes = b"") -> bytes:
+    """A checkpoint with this header under a right checksum."""
+    from hashlib import sha256
+    body = header + b"\n" + data
+    return checkpoint.MAGIC + sha256(body).hexdigest().encode() + b"\n" + body
+
+
+@pytest.mark.parametrize("arrays", [
+    [["points", "<f8", [2**39, 2**39], "C"]], [["points", "<f8", [2**62], "C"]], [["points", "|O", [1], "C"]],
+    [["points", "<f8", [-1], "C"]], [["points", "<f8", [True], "C"]], [["points", "<f8", [], "C"]], [["points"]], [1],
+    [["points", "<f8", [1], "K"]], [[1, "<f8", [1], "C"]], [["points", ["<f8"], [1], "C"]], {}, None,
+    [["points", "<f8", [0], "C"], ["points", "<f8", [0], "C"]], [["a", "|b1", [8], "C"]], [["a", "<f8", [1, 1, 1], "C"]]])
+def test_arrays_that_cannot_be_are_refused_without_memory(arrays):
+    """A header that promises terabytes takes none. Mutant: room made before it is looked at."""
+    content = signed(json.dumps({"plain": {}, "arrays": arrays}).encode(), b"\x02" * 8)
+    tracemalloc.start()
+    with pytest.raises(CheckpointError):
+        decoded(content)
+    assert tracemalloc.get_traced_memory()[1] < 2**20
+    tracemalloc.stop()
+
+
+@pytest.mark.parametrize("header", [b"", b"{", b"[]", b"\xff\xfe", b'{"plain": NaN, "arrays": []}', b"[" * 100_000,
+                                    b'{"plain": [], "arrays": []}', b'{"plain": {}}', b"9" * 5000])
+def test_headers_that_cannot_be_are_refused(header):
+    with pytest.raises(CheckpointError):
+        decoded(signed(header))
+
+
+@example(b"")
+@example(checkpoint.MAGIC)
+@example(b"\n")
+@given(st.binary(max_size=300))
+def test_other_files_are_refused(content):
+    with pytest.raises(CheckpointError, match="does not begin as|checksum"):
+        decoded(content)
+
+
+def test_a_checkpoint_of_another_scene_is_refused(kept, tmp_path):
+    other = load_scene("base", ("flow.viscosity_ratio=3",))
+    (tmp_path / "x").write_bytes(kept[2])
+    with pytest.raises(CheckpointError, match="another scene"):
+        Recorder(other, kept[1]).restore(tmp_path / "x")
+
+
+def test_what_cannot_be_read_is_refused(kept, tmp_path):
+    with pytest.raises(CheckpointError, match="cannot be read"):
+        Recorder(kept[0], kept[1]).restore(tmp_path)
+
+
+def test_states_of_clean_channels_are_kept():
+    """No aggregate, no substrates. Mutant: empty arrays refused."""
+    for preset in ("paper", "fast"):
+        scene = load_scene("flow_only", (f'numerics.preset="{preset}"',))
+        ((state, _),) = steps(scene)
+        plain, arrays = stored.packed(scene, state)
+        assert stored.packed(scene, stored.unpacked(scene, plain, arrays))[0] == plain

@@ -1,0 +1,199 @@
+"""The folder of a run: one run at a time, nothing half-written, nothing outside it."""
+
+import errno
+import os
+import shutil
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from repro import checkpoint, results
+from repro.checkpoint import NEWEST
+from repro.cli import main
+from repro.errors import OutputError
+from repro.folder import LOCK, OWN, PARTS, held, prepare
+from repro.running import Watch, resume, run
+from repro.scene import load_scene, parse_scene, scene_tables
+from tests.shell import SHORT, files, shell, started, told, wait_for
+
+LINUX = pytest.mark.skipif(sys.platform != "linux", reason="for Linux alone")
+FAST = ('numerics.preset="fast"', 'growth.end="3 h"')
+
+
+def may_mount() -> bool:
+    """Can a file system be mounted in a name space of one's own?"""
+    return bool(shutil.which("unshare")) and subprocess.run(
+        ["unshare", "-rm", "sh", "-c", "mount -t tmpfs tmpfs /tmp"], capture_output=True).returncode == 0
+
+
+def test_two_runs_in_one_folder(tmp_path):
+    """The second one is refused, whatever it is, and the first goes on; the lock goes with the run. Mutant: a lock
+    that is looked at and not taken."""
+    scene = load_scene("flow_only")
+
+    def again(event):
+        if event["event"] == "step":
+            for other in (lambda: run(scene, tmp_path / "run"), lambda: resume(tmp_path / "run")):
+                with pytest.raises(OutputError, match="another run is writing there"):
+                    other()
+
+    assert run(scene, tmp_path / "run", watch=Watch(tell=again)) == "completed"
+    assert not (tmp_path / "run" / LOCK).exists()
+    assert run(scene, tmp_path / "run") == "completed"
+
+
+def test_a_killed_run_leaves_no_lock_that_counts(tmp_path, capsys):
+    """While it runs another process is refused with status 2; after SIGKILL the lock's file is there and says nothing.
+    Mutant: a lock that is a file's being there."""
+    out = tmp_path / "run"
+    process = started("base", "--out", out, "--checkpoint", "0")
+    wait_for((out / NEWEST).exists, process)
+    assert main(["run", "--resume", str(out)]) == 2 and main(["run", "flow_only", "--out", str(out)]) == 2
+    assert capsys.readouterr().err.count("another run is writing there") == 2
+    process.kill()
+    process.communicate()
+    assert process.returncode == -signal.SIGKILL and (out / LOCK).exists()
+    assert main(["run", "flow_only", "--out", str(out)]) == 0
+    assert told(out)["scene"] == "flow_only" and not (out / NEWEST).exists() and not (out / LOCK).exists()
+
+
+def test_a_lock_that_was_removed_is_none(tmp_path):
+    """Who locks a file that is no longer the folder's tries again. Mutant: two holders of two files."""
+    with held(tmp_path):
+        os.unlink(tmp_path / LOCK)
+        with held(tmp_path):
+            with pytest.raises(OutputError), held(tmp_path):
+                pass
+
+
+@pytest.mark.parametrize("name", [*OWN, *PARTS, LOCK])
+def test_what_a_run_may_leave_is_a_runs(tmp_path, name):
+    """Beside a run.json. Mutants: a killed run's folder that no run accepts, a file of an earlier run that stays."""
+    (tmp_path / "run.json").write_text("{}")
+    (tmp_path / name).write_text("x")
+    run(load_scene("flow_only"), tmp_path)
+    assert set(files(tmp_path)) == {"timeseries.csv", "fields.pvd", "fields/fields_0000.vtu"}
+
+
+def test_what_a_killed_run_was_writing_is_removed(tmp_path):
+    """Mutant: parts that stay beside the results."""
+    scene = load_scene("base", FAST)
+    with pytest.raises(ZeroDivisionError):
+        run(scene, tmp_path / "run", lambda time: 1 / (time < 0.5))
+    for part in (f".{NEWEST}.part", ".timeseries.csv.part", "fields/.part-fields_0001.vtu"):
+        (tmp_path / "run" / part).write_text("half")
+    assert resume(tmp_path / "run") == "completed"
+    run(scene, tmp_path / "whole")
+    assert files(tmp_path / "run") == files(tmp_path / "whole")
+
+
+@LINUX
+def test_a_folder_that_cannot_be_made_is_refused(capsys):
+    """Not even root may make one there. Mutant: a traceback."""
+    assert main(["run", "flow_only", "--out", "/proc/1/nowhere"]) == 2
+    assert "/proc/1/nowhere" in (message := capsys.readouterr().err) and message.count("\n") == 1
+
+
+@pytest.mark.thorough
+@pytest.mark.skipif(not may_mount(), reason="nothing can be mounted here")
+def test_a_read_only_folder_is_refused_at_the_start(tmp_path):
+    """A folder of its own and one of an earlier run. Mutants: a run that fails at its first row."""
+    for out, arguments in ((tmp_path, "flow_only --out"), (tmp_path, "--resume")):
+        (tmp_path / "run.json").write_text('{"status": "running"}')
+        command = (f"mount --bind {out} {out} && mount -o remount,ro,bind {out} && "
+                   f"{sys.executable} -m repro run {arguments} {out}")
+        found = subprocess.run(["unshare", "-rm", "sh", "-c", command], capture_output=True, text=True)
+        assert found.returncode == 2 and "Read-only file system" in found.stderr and found.stderr.count("\n") == 1
+        assert not (tmp_path / "fields").exists()
+
+
+def full(*_):
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+@pytest.mark.parametrize("module, name, file", [(results, "write_fields", "fields/fields_0003.vtu"),
+                                                (results, "write_table", "timeseries.csv"),
+                                                (results.os, "replace", "fields/fields_0003.vtu"),
+                                                (checkpoint.os, "fsync", NEWEST)])
+def test_no_space_is_told_with_the_file_and_nothing_is_lost(tmp_path, monkeypatch, module, name, file):
+    """The run stops, says which file, leaves none half-written, and goes on when there is room. Mutants: an error that
+    names no file, a part left behind, a checkpoint that is overwritten and not replaced."""
+    scene, out, works = load_scene("base", FAST), tmp_path / "run", getattr(module, name)
+
+    def fill(event):
+        if event["event"] == "checkpoint" and event["time_h"] > 0.5:
+            monkeypatch.setattr(module, name, full)
+
+    with pytest.raises(OutputError, match=f"{file}: No space left on device; .* go on with --resume"):
+        run(scene, out, watch=Watch(tell=fill, interval=0.0))
+    assert not [path for path in out.rglob("*") if "part" in path.name] and not (out / LOCK).exists()
+    monkeypatch.setattr(module, name, works)
+    assert resume(out) == "completed" and told(out)["resumes"][0]["time_h"] > 0.5
+    run(scene, tmp_path / "whole")
+    assert files(out) == files(tmp_path / "whole")
+
+
+@LINUX
+def test_a_file_that_may_not_grow_ends_a_run_with_status_2(tmp_path):
+    """In a process whose files may be 20 kB long: the fields are longer. Mutants: the signal of that kills, a file cut
+    short that looks whole."""
+    import resource
+    limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))  # noqa: E731
+    status, _, message = shell(*SHORT, "--out", tmp_path / "run", preexec_fn=limit)
+    assert status == 2 and "fields_0000.vtu: File too large" in message and message.count("\n") == 1
+    assert not [name for name in files(tmp_path / "run") if "vtu" in name or "part" in name]
+    assert shell("--resume", tmp_path / "run")[0] == 0
+
+
+@pytest.mark.thorough
+@pytest.mark.skipif(not may_mount(), reason="nothing can be mounted here")
+def test_a_full_disk(tmp_path):
+    """A file system with room for half of a run runs full, the run ends with status 2 and a word on the file; with more room it goes on
+    to the bits of the whole run. Mutant: a checkpoint that is written over the last good one."""
+    assert shell(*SHORT, "--set", 'growth.end="12 h"', "--set", "numerics.tolerance=0.002", "--out",
+                 tmp_path / "whole")[0] == 0
+    disk, room = tmp_path / "disk", sum(map(len, files(tmp_path / "whole").values())) // 2
+    disk.mkdir()
+    command = f"""mount -t tmpfs -o size={room} tmpfs {disk}
+        {sys.executable} -m repro run base --set 'numerics.preset="fast"' --set 'growth.end="12 h"' \\
+            --set numerics.tolerance=0.002 --checkpoint 0 --quiet --out {disk}/run
+        echo status $? >&2; ls -A {disk}/run {disk}/run/fields | grep part; mount -o remount,size=50m {disk}
+        {sys.executable} -m repro run --resume {disk}/run --quiet; cp -r {disk}/run {tmp_path}/run"""
+    found = subprocess.run(["unshare", "-rm", "sh", "-c", command], capture_output=True, text=True, timeout=120)
+    assert "No space left on device" in found.stderr and "status 2" in found.stderr and "part" not in found.stdout
+    assert told(tmp_path / "run")["resumes"][0]["time_h"] > 0, found.stderr
+    assert files(tmp_path / "run") == files(tmp_path / "whole")
+
+
+@pytest.mark.parametrize("name", ["../../outside", "/etc/cron.d/x", "a\nb", "\x1b[2J\x1b]0;owned\x07", "..", "<script>",
+                                  "x" * 300, "con", "%s{0}"])
+def test_no_name_of_a_scene_is_a_path(tmp_path, capsys, monkeypatch, name):
+    """Whatever a scene is called, its run writes into its folder, and says so on a line. Mutants: files called after
+    the scene, control characters sent to a terminal."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "inside").mkdir()
+    scene = parse_scene(scene_tables(load_scene("flow_only")), name, "scene.toml")
+    monkeypatch.setattr("repro.commands.run.load_scene", lambda *_: scene)
+    assert main(["run", "x", "--out", "inside/run"]) == 0
+    out = capsys.readouterr().out
+    assert out.count("\n") == 1 and out.strip("\n").isprintable() and told(tmp_path / "inside" / "run")["scene"] == name
+    assert {str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file()} == {
+        f"inside/run/{file}" for file in ("run.json", "timeseries.csv", "fields.pvd", "fields/fields_0000.vtu")}
+
+
+def test_no_key_of_a_scene_takes_a_path():
+    """Mutant: a key that names a file to read or write: texts are choices among a few words."""
+    def texts(tables):
+        for value in tables.values():
+            yield from texts(value) if isinstance(value, dict) else [value] if isinstance(value, str) else []
+    found = [text for scene in ("base", "wide", "flow_only") for text in texts(scene_tables(load_scene(scene)))]
+    assert found and not [text for text in found if "/" in text.split(" ")[0] or "." in text and not text[0].isdigit()]
+
+
+def test_prepare_is_told_of_trouble(tmp_path):
+    (tmp_path / "run").write_text("not a folder")
+    for refuse in (prepare, lambda folder: held(folder).__enter__()):
+        with pytest.raises(OutputError, match="a folder that can be written is needed"):
+            refuse(tmp_path / "run")

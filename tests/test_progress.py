@@ -1,0 +1,151 @@
+"""What a run says: to a person on a terminal, elsewhere, to machines, and when it is to be quiet."""
+
+import fcntl
+import json
+import os
+import pty
+import re
+import signal
+import struct
+import termios
+import threading
+import time
+
+import pytest
+
+from repro import growth
+from repro.cli import main
+from repro.interrupts import SAME, noted
+from tests.shell import started, told, wait_for
+
+CONTACT = ["base", "--set", 'numerics.preset="fast"', "--set", 'aggregate.radius="17.98 um"', "--set",
+           'pore.width="20 um"', "--set", 'growth.end="0.6 h"']
+
+
+def test_json_is_an_object_a_line_and_nothing_else(tmp_path, capsys):
+    """Start, every step, remeshes, contact, checkpoints, end. Mutants: text between, an event that is left out, counts
+    of the last step alone."""
+    assert main(["run", *CONTACT, "--out", str(tmp_path / "run"), "--json", "--checkpoint", "0"]) == 0
+    out, err = capsys.readouterr()
+    events = [json.loads(line) for line in out.splitlines()]
+    names = [event["event"] for event in events]
+    assert names[0] == "start" and names[-1] == "end" and err == "" and names.count("contact") == 1
+    steps = [event for event in events if event["event"] == "step"]
+    assert [event["step"] for event in steps] == list(range(len(steps))) and steps[-1]["time_h"] == 0.6
+    assert names.count("remesh") == steps[-1]["remeshes"] == told(tmp_path / "run")["remeshes"] > 0
+    assert names.count("checkpoint") == len(steps) and steps[-1]["contact"] and not steps[0]["contact"]
+    assert events[-1]["status"] == "completed" and events[-1]["folder"] == str(tmp_path / "run")
+
+
+@pytest.mark.parametrize("arguments, status", [(["base", "--set", "pore.width=5 s"], 2), (["base"], 1)])
+def test_errors_are_objects_too(tmp_path, capsys, monkeypatch, arguments, status):
+    """With the exit status and the message that people get. Mutant: standard output without a word on the failure."""
+    monkeypatch.setattr(growth, "MOST_ITERATIONS", 1)
+    assert main(["run", *arguments, "--out", str(tmp_path / "run"), "--json"]) == status
+    out, err = capsys.readouterr()
+    last = json.loads(out.splitlines()[-1])
+    assert last["event"] == "error" and last["exit_status"] == status and err == f"repro: {last['message']}\n"
+
+
+def test_quiet_says_nothing_but_errors(tmp_path, capsys):
+    assert main(["run", "flow_only", "--out", str(tmp_path / "run"), "--quiet"]) == 0
+    assert capsys.readouterr() == ("", "")
+    assert main(["run", "nowhere", "--out", str(tmp_path / "run"), "--quiet"]) == 2
+    assert "nowhere" in capsys.readouterr().err
+
+
+def test_without_a_terminal_a_line_each_tenth(tmp_path, capsys):
+    """And the end on standard output. Mutant: a bar in a log."""
+    assert main(["run", "base", "--out", str(tmp_path / "run"), "--set", 'growth.end="0.6 h"']) == 0
+    out, err = capsys.readouterr()
+    assert err.splitlines() == [f"{time} of 0.6 h simulated" for time in ("0.2", "0.4", "0.6")]
+    assert out == f"base: completed; results in {tmp_path / 'run'}\n"
+
+
+def test_on_a_terminal_a_bar(tmp_path):
+    """Simulated time, steps, remeshes, contact and the time that is left. Mutants: a bar that counts rows, lines."""
+    here, there = pty.openpty()
+    fcntl.ioctl(there, termios.TIOCSWINSZ, struct.pack("HHHH", 40, 120, 0, 0))
+    process = started(*CONTACT, "--out", tmp_path / "run", stdout=there, stderr=there, text=False)
+    os.close(there)
+    seen = b""
+    try:
+        while some := os.read(here, 4096):
+            seen += some
+    except OSError:  # the other end is closed
+        pass
+    os.close(here)
+    process.wait()
+    bars = seen.decode().split("\r")
+    last = [bar for bar in bars if "100%" in bar][-1]
+    assert re.search(r"base 100%\|.*\| 0\.6 of 0\.6 h \[\d\d:\d\d < \d\d:\d\d, step \d+, remeshes \d, contact\]", last)
+    assert "simulated" not in seen.decode() and seen.decode().count("completed") == 1
+
+
+@pytest.mark.parametrize("arguments", [[], ["base"], ["--out", "x"], ["base", "--resume", "x"], ["--checkpoint", "-1"],
+                                       ["--resume", "x", "--set", "a=1"], ["base", "--out", "x", "--checkpoint", "soon"]])
+def test_arguments_that_do_not_go_together_are_refused(capsys, arguments):
+    with pytest.raises(SystemExit) as refused:
+        main(["run", *arguments])
+    assert refused.value.code == 2 and "usage: repro run" in capsys.readouterr().err
+
+
+def test_the_exit_statuses_are_told(capsys):
+    with pytest.raises(SystemExit):
+        main(["run", "--help"])
+    assert re.findall(r"^  (\d+) ", capsys.readouterr().out, re.M) == ["0", "1", "2", "130"]
+
+
+def test_signals_are_noted_and_everything_is_as_before():
+    """Handlers, mask and threads. Mutants: a handler left behind, a thread that takes the signals of later."""
+    before = signal.getsignal(signal.SIGTERM), signal.pthread_sigmask(signal.SIG_BLOCK, ()), threading.active_count()
+    with noted() as came:
+        assert came() == 0
+        for number in (signal.SIGTERM, signal.SIGINT):  # the second one at once: the same request
+            os.kill(os.getpid(), number)
+            deadline = time.monotonic() + 10
+            while not came() and time.monotonic() < deadline:
+                time.sleep(0.001)
+        assert came() == signal.SIGTERM
+    assert before == (signal.getsignal(signal.SIGTERM), signal.pthread_sigmask(signal.SIG_BLOCK, ()),
+                      threading.active_count())
+
+
+def test_ignored_signals_stay_ignored():
+    """As under nohup. Mutant: a signal that the shell has turned off stops the run."""
+    kept = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with noted() as came:
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.05)
+            assert came() == 0
+    finally:
+        signal.signal(signal.SIGINT, kept)
+
+
+@pytest.mark.thorough
+def test_a_second_signal_stops_at_once(tmp_path):
+    """Though a step lasts for minutes. Mutants: a second signal that waits for the step, a handler that only runs when
+    compiled code returns."""
+    process = started("base", "--set", "numerics.refinement=8", "--out", tmp_path / "run")
+    wait_for((tmp_path / "run" / "run.json").exists, process)
+    time.sleep(1.0)
+    process.send_signal(signal.SIGTERM)
+    time.sleep(SAME + 0.2)
+    assert process.poll() is None, "else the step was too short for a test"
+    start = time.monotonic()
+    process.send_signal(signal.SIGTERM)
+    process.communicate(timeout=60)
+    assert process.returncode == 128 + signal.SIGTERM and time.monotonic() - start < 2
+    assert told(tmp_path / "run")["status"] == "running"
+
+
+def test_nobody_listens(tmp_path):
+    """What reads the JSON goes away: the run goes on to its end. Mutant: a run that dies of a broken pipe."""
+    process = started("base", "--set", 'numerics.preset="fast"', "--out", tmp_path / "run", "--json")
+    process.stdout.close()
+    assert process.wait(60) == 0 and process.stderr.read() == ""
+    process.stderr.close()
+    assert told(tmp_path / "run")["status"] == "completed"
+
+

@@ -1,0 +1,320 @@
+"""Runs that are interrupted, killed or have failed go on as if nothing had happened, to the last bit."""
+
+import random
+import signal
+from contextlib import suppress
+from subprocess import TimeoutExpired
+
+import pytest
+
+from repro import growth, loop, results
+from repro.checkpoint import NEWEST, PREVIOUS
+from repro.cli import main
+from repro.coupling import PoreEnd
+from repro.errors import Interrupted, OutputError, SimulationError
+from repro.running import Watch, resume, run
+from repro.scene import load_scene
+from repro.simulation import simulate, steps
+from tests.shell import LONG, SHORT, files, lasting, shell, started, told, wait_for
+
+CONTACT = ('aggregate.radius="17.98 um"', 'pore.width="20 um"', 'growth.end="0.6 h"')
+SCENES = {
+    "paper, unreported steps": ('growth.end="1 h"', 'output.times=["0.3 h", "1 h"]'),
+    "fast": ('numerics.preset="fast"', 'growth.end="3 h"'),
+    "fast, unreported steps, contact": ('numerics.preset="fast"', "numerics.tolerance=0.001", *CONTACT,
+                                        'output.times=["0.6 h"]'),
+    "gear": ('numerics.transport="gear"', 'growth.end="0.4 h"'),
+}
+MORE = {
+    "paper": ('growth.end="6 h"',),
+    "accurate": ('numerics.preset="accurate"', 'growth.end="4 h"'),
+    "contact": CONTACT,
+    "stress-free": ('growth.new_biomass="stress_free"', *CONTACT),
+    "linear midpoint": ('numerics.time="midpoint"', 'numerics.transfer="linear"', *CONTACT),
+    "forces": ('growth.fluid_forces="included"', 'growth.end="0.6 h"'),
+    "rechosen": ('numerics.fixed_point="rechosen"', *CONTACT),
+}
+
+
+def every(count):
+    """Says stop at each so-manieth step."""
+    calls = 0
+
+    def stop():
+        nonlocal calls
+        calls += 1
+        return signal.SIGTERM if calls % count == 0 else 0
+    return stop
+
+
+def in_parts(scene, folder, count):
+    """Run a scene with a stop at each so-manieth step; how often it was gone on with."""
+    watch, resumes = Watch(stop=every(count)), 0
+    try:
+        run(scene, folder, watch=watch)
+    except Interrupted:
+        while True:
+            resumes += 1
+            try:
+                resume(folder, watch=watch)
+                break
+            except Interrupted:
+                pass
+    return resumes
+
+
+@pytest.mark.parametrize("name", [*SCENES, *(pytest.param(name, marks=pytest.mark.thorough) for name in MORE)])
+def test_a_run_stopped_after_every_step_is_the_whole_run(tmp_path, name):
+    """Tables, fields, indices, status and counts, and no warning. Mutants: a state after its substrates are solved, the
+    length of the next step or the ledgers of unreported steps forgotten, arrays of another layout, dtype or order."""
+    scene = load_scene("base", {**SCENES, **MORE}[name])
+    run(scene, tmp_path / "whole")
+    resumes = in_parts(scene, tmp_path / "parts", 1)
+    assert resumes == len(told(tmp_path / "parts")["resumes"]) >= 3
+    assert files(tmp_path / "parts") == files(tmp_path / "whole")
+    assert lasting(tmp_path / "parts") == lasting(tmp_path / "whole")
+    assert not {NEWEST, PREVIOUS, ".lock"} & files(tmp_path / "parts").keys()
+
+
+def test_simulate_goes_on_from_any_state():
+    """The same instants as those of the whole run after it. Mutant: the instant of the state given once more."""
+    scene = load_scene("base", SCENES["fast"])
+    whole = list(steps(scene))
+    for k in (0, 2, len(whole) - 1):
+        found, expected = list(simulate(scene, whole[k][0])), [instant for _, instant in whole[k + 1:] if instant]
+        assert [i.pore.time for i in found] == [i.pore.time for i in expected]
+        assert [results.row(scene, i) for i in found] == [results.row(scene, i) for i in expected]
+
+
+def test_states_have_no_strided_arrays():
+    """Sums over strided views may differ in the last bit from those over what a checkpoint gives back. Mutant:
+    laid_out(pore) = pore."""
+    for state, _ in steps(load_scene("base", CONTACT)):
+        for data in (state.pore, state.pore.mesh, state.pore.concentrations):
+            arrays = [value for value in vars(data or object).values() if hasattr(value, "flags")]
+            assert all(array.flags.forc for array in arrays)
+
+
+def test_a_strided_array_is_copied():
+    scene = load_scene("base", ('growth.end="0 h"',))
+    ((state, instant),) = steps(scene)
+    pairs = instant.pore.origin.repeat(2, axis=1)
+    found = loop.laid_out(instant.pore.__class__(**{**vars(instant.pore), "origin": pairs[:, ::2]}))
+    assert found.origin.flags.c_contiguous and (found.origin == instant.pore.origin).all()
+    assert loop.laid_out(instant.pore).mesh is instant.pore.mesh
+
+
+def test_the_end_of_the_pore_is_an_end_after_a_resume_too(tmp_path):
+    """A run stopped just when it was over does not grow on. Mutant: the end looked at after steps alone."""
+    scene = load_scene("wide", ('numerics.preset="fast"', 'aggregate.radius="40 um"', 'pore.length="100 um"',
+                                'growth.end="9 h"'))
+    with pytest.raises(PoreEnd):
+        found = []
+        for state, _ in steps(scene):
+            found.append(state)
+    with pytest.raises(PoreEnd):
+        next(steps(scene, found[-1]))
+    assert "reaches the pore's" in run(scene, tmp_path / "whole")
+    in_parts(scene, tmp_path / "parts", len(found))
+    assert lasting(tmp_path / "parts") == lasting(tmp_path / "whole")
+
+
+def test_a_run_that_is_over_is_left_alone(tmp_path, capsys):
+    """Exit 0, says so, changes nothing. Mutant: run again."""
+    assert main(["run", "flow_only", "--out", str(tmp_path / "run")]) == 0
+    before = {path: path.stat().st_mtime_ns for path in (tmp_path / "run").rglob("*.*")}
+    assert main(["run", "--resume", str(tmp_path / "run")]) == 0
+    assert "completed, before this: nothing to do" in capsys.readouterr().out
+    assert {path: path.stat().st_mtime_ns for path in (tmp_path / "run").rglob("*.*")} == before
+
+
+@pytest.mark.parametrize("content", [None, "{", "[]", "null", '{"scene": "x"}', "[" * 100_000,
+                                     '{"scene": "x", "hash": "0", "tables": {}, "status": "running"}',
+                                     '{"scene": "x", "hash": "0", "tables": {"pore": 3}, "status": "running"}'])
+def test_a_folder_without_a_run_is_refused(tmp_path, capsys, content):
+    """With status 2 and one line, and nothing is written. Mutants: a traceback, a run from nothing."""
+    if content is not None:
+        (tmp_path / "run.json").write_text(content)
+    assert main(["run", "--resume", str(tmp_path)]) == 2
+    assert "run.json" in (message := capsys.readouterr().err) and message.count("\n") == 1
+    assert files(tmp_path) == {}
+
+
+def stopped(folder, *sets, after=3):
+    """A run of `base` that was stopped after so many steps; its scene."""
+    scene = load_scene("base", ('numerics.preset="fast"', 'growth.end="3 h"', *sets))
+    with pytest.raises(Interrupted):
+        run(scene, folder, watch=Watch(stop=every(after), interval=0.0))
+    return scene
+
+
+def test_an_altered_checkpoint_is_refused_and_the_one_before_is_used(tmp_path, capsys):
+    """And the result is the same. Mutants: the newest taken as it is, a start from nothing, the good one overwritten by
+    the bad one when the next is written."""
+    scene = stopped(tmp_path / "run")
+    newest = tmp_path / "run" / NEWEST
+    good = newest.read_bytes()
+    newest.write_bytes(good[:-1] + bytes([good[-1] ^ 1]))
+    assert main(["run", "--resume", str(tmp_path / "run"), "--quiet"]) == 0
+    message = capsys.readouterr().err
+    assert f"{NEWEST}: refused: its checksum is wrong" in message and "t = 0" not in message
+    run(scene, tmp_path / "whole")
+    assert files(tmp_path / "run") == files(tmp_path / "whole")
+    assert told(tmp_path / "run")["resumes"][0]["time_h"] > 0
+
+
+def test_without_a_good_checkpoint_a_run_starts_again_and_says_so(tmp_path, capsys):
+    """Mutant: a resume that gives up, or is silent."""
+    scene = stopped(tmp_path / "run")
+    for name in (NEWEST, PREVIOUS):
+        path = tmp_path / "run" / name
+        path.write_bytes(path.read_bytes()[:1000])
+    assert main(["run", "--resume", str(tmp_path / "run"), "--quiet"]) == 0
+    message = capsys.readouterr().err
+    assert message.count("refused: its checksum is wrong") == 2 and "starts again from t = 0" in message
+    run(scene, tmp_path / "whole")
+    assert files(tmp_path / "run") == files(tmp_path / "whole")
+
+
+def test_a_checkpoint_without_its_fields_is_refused(tmp_path):
+    """Mutant: an index of fields that are not there."""
+    stopped(tmp_path / "run")
+    (tmp_path / "run" / "fields" / "fields_0001.vtu").unlink()
+    with pytest.warns(UserWarning) as warned:
+        resume(tmp_path / "run")
+    assert [str(w.message).split(": ")[-1].startswith("its rows or fields") for w in warned] == [True, True, False]
+
+
+def test_a_change_of_versions_is_told_and_recorded(tmp_path, monkeypatch):
+    """Mutant: a promise of equal bits that nobody can keep."""
+    stopped(tmp_path / "run")
+    known = results.version
+    monkeypatch.setattr(results, "version", lambda name: "0.0" if name == "scipy" else known(name))
+    with pytest.warns(UserWarning, match="versions.scipy .* now 0.0.; .* to the last bit"):
+        resume(tmp_path / "run")
+    (once,) = told(tmp_path / "run")["resumes"]
+    assert once["changed"]["versions.scipy"][1] == "0.0" and len(once["changed"]) == 1
+
+
+def test_the_machine_is_recorded_and_threads_are_no_change(tmp_path, monkeypatch, recwarn):
+    stopped(tmp_path / "run")
+    found = told(tmp_path / "run")["conditions"]
+    assert found["machine"] and found["blas"] and len(found["source"]) == 8 and found["threads"] != {"OMP_NUM_THREADS": "7"}
+    monkeypatch.setenv("OMP_NUM_THREADS", "7")
+    resume(tmp_path / "run")
+    assert told(tmp_path / "run")["conditions"]["threads"]["OMP_NUM_THREADS"] == "7" and not recwarn.list
+
+
+def test_a_failure_says_where_the_last_good_state_is(tmp_path, monkeypatch):
+    """Time, stage, why, what to change, and a state from which the run goes on when the cause is gone. Mutants: no
+    checkpoint at a failure, the state of the step that fails."""
+    scene, most = load_scene("base", ('growth.end="0.8 h"',)), growth.MOST_ITERATIONS
+
+    def fail_late(event):
+        if event["event"] == "step" and event["time_h"] >= 0.4:
+            monkeypatch.setattr(growth, "MOST_ITERATIONS", 1)
+
+    with pytest.raises(SimulationError) as failed:
+        run(scene, tmp_path / "run", watch=Watch(tell=fail_late))
+    message = str(failed.value)
+    for part in ("step from t = 0.4 h", "in growth", "try ", f"the last good state, t = 0.4 h, is in {tmp_path}",
+                 "fields/fields_0002.vtu"):
+        assert part in message
+    assert told(tmp_path / "run")["status"] == f"failed: {message}"
+    monkeypatch.setattr(growth, "MOST_ITERATIONS", most)
+    assert resume(tmp_path / "run") == "completed"
+    run(scene, tmp_path / "whole")
+    assert files(tmp_path / "run") == files(tmp_path / "whole")
+
+
+def test_results_reach_the_disk_while_a_run_goes_on(tmp_path):
+    """Tables and run.json at every checkpoint. Mutants: tables at the end alone, a status that is not of the moment."""
+    seen = []
+
+    def look(event):
+        if event["event"] == "checkpoint":
+            rows = (tmp_path / "run" / "timeseries.csv").read_text().count("\n") - 1
+            seen.append((told(tmp_path / "run")["status"], rows, len(list((tmp_path / "run" / "fields").iterdir()))))
+
+    scene = load_scene("base", ('numerics.preset="fast"', 'growth.end="3 h"'))
+    run(scene, tmp_path / "run", watch=Watch(tell=look, interval=0.0))
+    assert seen == [("running", count, count) for count in range(1, len(seen) + 1)] and len(seen) > 4
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.thorough)])
+def test_signals_end_a_run_that_goes_on_later(tmp_path, number):
+    """Status 128 + number, one line, results so far; then to the end with the bits of the whole run. Mutants: Mmg's
+    handlers, a signal that is lost, one that cuts a step."""
+    process = started("base", "--set", 'growth.end="1.6 h"', "--out", tmp_path / "run")
+    wait_for((tmp_path / "run" / "fields" / "fields_0002.vtu").exists, process)
+    process.send_signal(number)
+    message = process.communicate(timeout=60)[1]
+    assert process.returncode == 128 + number and message.endswith("goes on from there\n")
+    assert "Traceback" not in message and told(tmp_path / "run")["status"] == "interrupted"
+    assert len((tmp_path / "run" / "timeseries.csv").read_text().splitlines()) > 3
+    assert resume(tmp_path / "run") == "completed"
+    run(load_scene("base", ('growth.end="1.6 h"',)), tmp_path / "whole")
+    assert files(tmp_path / "run") == files(tmp_path / "whole")
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The results of LONG, uninterrupted."""
+    folder = tmp_path_factory.mktemp("whole") / "run"
+    assert shell(*LONG, "--out", folder)[0] == 0
+    return folder
+
+
+@pytest.mark.thorough
+def test_killed_at_twenty_moments(tmp_path, whole):
+    """SIGKILL at seeded random moments of a run with checkpoints every 0.2 s, from its start to its end, then resumed:
+    the bits of the whole run, each time. Mutants: a checkpoint that is not whole, rows of after it kept."""
+    seconds, draw, gone_on = told(whole)["wall_time_s"], random.Random(5), 0
+    for k in range(20):
+        out = tmp_path / str(k)
+        process = started(*LONG, "--out", out, "--checkpoint", "0.2")
+        wait_for((out / "run.json").exists, process)
+        with suppress(TimeoutExpired):
+            process.wait(draw.uniform(0, seconds))
+        process.kill()
+        process.communicate()
+        gone_on += (out / NEWEST).exists()
+        status, _, message = shell("--resume", out)
+        assert status == 0, message
+        assert files(out) == files(whole) and lasting(out) == lasting(whole)
+    assert gone_on >= 10, "else little is tested"
+
+
+@pytest.mark.thorough
+def test_killed_again_and_again(tmp_path, whole):
+    """Each time a little further, until it is done. Mutant: counts that are lost or doubled at the second resume."""
+    out, draw, status = tmp_path / "run", random.Random(7), None
+    arguments = [*LONG, "--out", out]
+    for _ in range(20):
+        process = started(*arguments, "--checkpoint", "0.1")
+        wait_for((out / ".lock").exists, process)
+        with suppress(TimeoutExpired):
+            status = process.wait(draw.uniform(0.5, 2.5))
+        process.kill()
+        process.communicate()
+        if status is not None:
+            break
+        arguments = ["--resume", out]
+    assert status == 0 and len(told(out)["resumes"]) > 1
+    assert files(out) == files(whole) and lasting(out) == lasting(whole)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("scene", [SHORT, LONG])
+def test_one_thread_or_two(tmp_path, scene):
+    """The same bits. Mutant: a sum whose order depends on the threads."""
+    for threads in ("1", "2"):
+        assert shell(*scene, "--out", tmp_path / threads, threads=threads)[0] == 0
+    assert files(tmp_path / "1") == files(tmp_path / "2")
+    assert told(tmp_path / "2")["conditions"]["threads"]["OMP_NUM_THREADS"] == "2"
+
+
+def test_nothing_but_a_folder_is_needed(tmp_path):
+    with pytest.raises(OutputError, match="there is no run.json"):
+        resume(tmp_path / "nowhere")
+    assert not (tmp_path / "nowhere").exists()
