@@ -8,14 +8,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from time import perf_counter
 
-from repro import results, timing
+from repro import netcdf, report, results, timing
 from repro.coupling import Instant, PoreEnd
 from repro.errors import SimulationError
 from repro.scene import Scene
 from repro.simulation import simulate
 
 #: Everything that a run writes, beside its fields; a folder that holds anything else is not written to.
-OWN = ("timeseries.csv", "ledger.csv", "fields.pvd", "before_expansion.pvd", "run.json")
+OWN = ("timeseries.csv", "timeseries.nc", "ledger.csv", "fields.pvd", "before_expansion.pvd", "run.json", "report.html")
 FIELDS = re.compile(r"(?:\.part-)?(?:fields|before_expansion)_\d{4,}\.vtu")
 
 
@@ -60,6 +60,9 @@ class Recorder:
             **results.provenance(self.scene), "status": status, "rows": len(self.rows), "wall_time_s": seconds,
             "wall_time_by_stage_s": dict(timing.seconds), "newton_iterations": self.iterations,
             "remeshes": self.remeshes})
+        if self.scene.output.timeseries == "netcdf":
+            netcdf.write(self.folder / "timeseries.nc", self.scene, self.rows)
+        report.write(self.folder)
 
 
 def prepare(folder: Path) -> None:
