@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -16,13 +17,13 @@ from repro import names, results
 from repro.scene import Scene
 
 CONVENTIONS = "CF-1.11"
+PACKAGE = "xarray"  # optional: a scene that asks for it is refused where it is not installed
 TIME = "time_h"
 
 
 def write(path: Path, scene: Scene, rows: list[list]) -> None:
     """Write ``rows`` (of ``results.COLUMNS``), whole or not at all; what is not modelled is not-a-number."""
-    import xarray
-
+    xarray = import_module(PACKAGE)
     table = np.array([[np.nan if value is None else value for value in line] for line in rows], dtype=float)
     columns = dict(zip(results.COLUMNS, table.reshape(len(rows), len(results.COLUMNS)).T))
     variables = {name: (TIME, column, _attributes(name)) for name, column in columns.items() if name != TIME}

@@ -19,7 +19,7 @@ PATIENCE = 60.0  # s for an answer
 
 
 class Browser:
-    """One page: ``show`` a file, ``run`` scripts in it, press keys, take pictures; ``requests`` are what it asked for."""
+    """One page: ``show`` a file, ``run`` scripts in it, press keys, take pictures; ``requests``: what it asked for."""
 
     def __enter__(self):
         self.home = tempfile.mkdtemp()
@@ -30,7 +30,7 @@ class Browser:
         self.process = subprocess.Popen([*command, "about:blank"], pass_fds=(theirs, ours), stderr=subprocess.DEVNULL)
         os.close(theirs)
         os.close(ours)
-        self.pending, self.count, self.session, self.requests, self.events = b"", 0, None, [], []
+        self.pending, self.count, self.session, self.requests = b"", 0, None, []
         target = self.call("Target.createTarget", url="about:blank")["targetId"]
         self.session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         for domain in ("Page", "Network", "Runtime"):
@@ -57,14 +57,13 @@ class Browser:
                 return found["result"]
 
     def _next(self) -> dict:
-        """The next message; events are noted."""
+        """The next message; requests are noted."""
         end = time.monotonic() + PATIENCE
         while b"\0" not in self.pending:
             assert select.select([self.back], [], [], max(0.0, end - time.monotonic()))[0], "the browser is silent"
             self.pending += os.read(self.back, 1 << 20)
         text, _, self.pending = self.pending.partition(b"\0")
         found = json.loads(text)
-        self.events.append(found)
         if found.get("method") == "Network.requestWillBeSent":
             self.requests.append(found["params"]["request"]["url"])
         return found

@@ -10,9 +10,10 @@ from repro.running import OutputError
 
 def add(commands) -> None:
     """The parser of this command."""
-    command = commands.add_parser("compare", help="lay runs over each other in one page", description="Make a page with "
-                                  "the charts of several runs, what differs in their scenes, and their last values.")
-    command.add_argument("runs", metavar="RUN", type=Path, nargs="+", help="folder of a run; the first is the reference")
+    command = commands.add_parser("compare", help="lay runs over each other in one page", description="Make a page "
+                                  "with the charts of several runs, what differs in their scenes, and last values.")
+    command.add_argument("runs", metavar="RUN", type=Path, nargs="+",
+                         help="folder of a run; the first is what the others are compared with")
     command.add_argument("--out", metavar="FILE.html", type=Path, required=True, help="the page to write")
     command.set_defaults(call=call)
 

@@ -2,15 +2,17 @@
 "use strict";
 const charts = [...document.querySelectorAll("figure[data-chart]")].map(figure => {
   const told = JSON.parse(figure.dataset.chart), [low, high, start, end] = told.axis;
-  return { figure, told, drawing: figure.querySelector(":scope > svg"), output: figure.querySelector("output"),
-    now: figure.querySelector(".now"), place: time => start + (time - low) / (high - low) * (end - start),
+  const within = selector => figure.querySelector(`:scope > ${selector}`);
+  return { told, drawing: within("svg"), output: within("output"), now: within("svg .now"),
+    place: time => start + (time - low) / (high - low) * (end - start),
     time: place => low + (place - start) / (end - start) * (high - low) };
 });
 
 function rounded(value) {
   if (value === null || !isFinite(value)) return "none";
   const size = Math.abs(value);
-  return value === 0 ? "0" : size < 1e-3 || size >= 1e6 ? Number(value.toPrecision(4)).toExponential() : String(Number(value.toPrecision(5)));
+  if (value !== 0 && (size < 1e-3 || size >= 1e6)) return Number(value.toPrecision(4)).toExponential();
+  return String(Number(value.toPrecision(5)));
 }
 
 function nearest(times, time) {
@@ -26,9 +28,13 @@ function mark(chart, time) {
   chart.now.setAttribute("visibility", seen ? "visible" : "hidden");
 }
 
-function tell(chart, event) {
+function timeUnder(chart, event) {
   const box = chart.drawing.getBoundingClientRect();
-  const time = chart.time((event.clientX - box.left) / box.width * chart.drawing.viewBox.baseVal.width);
+  return chart.time((event.clientX - box.left) / box.width * chart.drawing.viewBox.baseVal.width);
+}
+
+function tell(chart, event) {
+  const time = timeUnder(chart, event);
   const lines = chart.told.lines.filter(line => line.t.length && line.y.some(y => y !== null));
   const found = lines.map(line => [line, nearest(line.t, time)]);
   const at = found.reduce((best, [line, k]) => Math.abs(line.t[k] - time) < Math.abs(best - time) ? line.t[k] : best,
@@ -50,9 +56,7 @@ for (const chart of charts) {
     if (present === null) chart.now.setAttribute("visibility", "hidden"); else mark(chart, present);
   });
   chart.drawing.addEventListener("click", event => {
-    const box = chart.drawing.getBoundingClientRect();
-    const time = chart.time((event.clientX - box.left) / box.width * chart.drawing.viewBox.baseVal.width);
-    document.dispatchEvent(new CustomEvent("timechosen", { detail: time }));
+    document.dispatchEvent(new CustomEvent("timechosen", { detail: timeUnder(chart, event) }));
   });
 }
 document.documentElement.dataset.charts = charts.length;

@@ -3,6 +3,7 @@
 const data = JSON.parse(document.getElementById("fields").textContent);
 const part = Object.fromEntries(["picture", "field", "frame", "now", "probe", "lines", "outline", "whole", "fixed",
   "play"].map(id => [id, document.getElementById(id)]));
+
 function rangeOf(field, frame) {
   const pairs = (part.fixed.checked ? data.frames : [frame]).map(each => each.values[field.name])
     .filter(pair => pair && pair[2]);
@@ -25,31 +26,33 @@ function draw() {
   const frame = data.frames[part.frame.value], field = data.fields.find(each => each.name === part.field.value);
   const mesh = meshOf(data.meshes[frame.mesh]), points = pointsOf(frame, data.box), [low, high] = rangeOf(field, frame);
   const values = valuesOf(frame, field, mesh, field.at === "node" ? points.length / 2 : mesh.body.length);
-  const ratio = Math.min(3, window.devicePixelRatio || 1), wide = Math.max(120, part.picture.clientWidth), box = boxOf(points);
-  const edge = { left: 40, right: 12, top: 8, bottom: 98 }, scale = (wide - edge.left - edge.right) / (box[1] - box[0]);
-  const tall = Math.max(1, scale * (box[3] - box[2]));
-  part.picture.width = Math.round(wide * ratio);
-  part.picture.height = Math.round((tall + edge.top + edge.bottom) * ratio);
+  const ratio = Math.min(3, window.devicePixelRatio || 1), wide = Math.max(120, part.picture.clientWidth);
+  const edge = { left: 40, right: 12, top: 8, bottom: 98 }, box = boxOf(points), across = wide - edge.left - edge.right;
+  const scale = across / (box[1] - box[0]), tall = Math.max(1, scale * (box[3] - box[2]));
   const place = (x, y) => [edge.left + (x - box[0]) * scale, edge.top + tall - (y - box[2]) * scale];
-  const pen = part.picture.getContext("2d");
-  const size = [Math.round((wide - edge.left - edge.right) * ratio), Math.round(tall * ratio)];
+  const size = [Math.round(across * ratio), Math.round(tall * ratio)];
   const pixels = new Float64Array(points.length), places = new Float64Array(points.length);
   for (let k = 0; k < points.length; k += 2) {
     [places[k], places[k + 1]] = place(points[k], points[k + 1]);
     pixels[k] = (places[k] - edge.left) * ratio; pixels[k + 1] = (places[k + 1] - edge.top) * ratio;
   }
-  const all = filled(mesh, pixels, values, field.at === "node", ...size);
+  part.picture.width = Math.round(wide * ratio);
+  part.picture.height = Math.round((tall + edge.top + edge.bottom) * ratio);
+  const pen = part.picture.getContext("2d"), all = filled(mesh, pixels, values, field.at === "node", ...size);
   pen.putImageData(image(all, low, high, ...size), Math.round(edge.left * ratio), Math.round(edge.top * ratio));
   pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-  const style = getComputedStyle(document.documentElement), ink = name => style.getPropertyValue(name).trim();
-  if (part.lines.checked) trace(pen, mesh.edges, places, "rgba(128,128,128,.55)", 0.7);
-  if (part.outline.checked) { trace(pen, mesh.rim, places, "#ffffff", 3); trace(pen, mesh.rim, places, "#000000", 1.2); }
   pen.font = "12px system-ui, sans-serif";
-  axes(pen, box, place, tall, edge, ink);
-  bar(pen, field, low, high, edge.left, edge.top + tall + 52, Math.min(420, wide - edge.left - edge.right), ink);
+  if (part.lines.checked) trace(pen, mesh.edges, places, "rgba(128,128,128,.55)", 0.7);
+  if (part.outline.checked)
+    for (const [colour, width] of [["#ffffff", 3], ["#000000", 1.2]]) trace(pen, mesh.rim, places, colour, width);
+  axes(pen, box, place, tall);
+  bar(pen, field, low, high, edge.left, edge.top + tall + 52, Math.min(420, across));
   shown = { all, size, ratio, edge, scale, tall, box, field };
   told(frame, field, low, high);
 }
+
+// A colour of the page.
+function ink(name) { return getComputedStyle(document.documentElement).getPropertyValue(name).trim(); }
 
 function image(all, low, high, width, height) {
   const found = new ImageData(width, height), colours = new Uint32Array(found.data.buffer);
@@ -82,7 +85,7 @@ function roundTicks(low, high, parts) {
   return found;
 }
 
-function axes(pen, box, place, tall, edge, ink) {
+function axes(pen, box, place, tall) {
   const [left, bottom] = place(box[0], box[2]), [right, top] = place(box[1], box[3]);
   pen.strokeStyle = ink("--faint"); pen.fillStyle = ink("--text"); pen.lineWidth = 1;
   pen.strokeRect(left, top, right - left, bottom - top);
@@ -101,7 +104,7 @@ function axes(pen, box, place, tall, edge, ink) {
   pen.textAlign = "center"; pen.fillText("y (um)", 0, 0); pen.restore();
 }
 
-function bar(pen, field, low, high, left, top, width, ink) {
+function bar(pen, field, low, high, left, top, width) {
   const name = field.label + (field.unit ? ` (${field.unit})` : "");
   pen.fillStyle = ink("--text"); pen.textAlign = "left"; pen.textBaseline = "top";
   if (!(high > low)) return void pen.fillText(`${name}: ${rounded(low)} everywhere`, left, top);
@@ -128,7 +131,8 @@ function told(frame, field, low, high) {
   part.frame.setAttribute("aria-valuetext", text);
   const range = `${rounded(low)} to ${rounded(high)} ${field.unit}`;
   part.picture.setAttribute("aria-label", `${field.label}, ${range}, at ${text}`);
-  const hashed = (sum, value) => isNaN(value) ? sum : (sum * 31 + Math.round(1e6 * value)) % 1000000007;
+  const share = value => high > low ? (value - low) / (high - low) : 0;
+  const hashed = (sum, value) => isNaN(value) ? sum : (sum * 31 + Math.round(1e6 * share(value))) % 1000000007;
   Object.assign(part.picture.dataset, { frame: part.frame.value, field: field.name, low, high,
     seen: shown.all.reduce(hashed, 7),
     filled: shown.all.reduce((sum, value) => sum + !isNaN(value), 0) / shown.all.length });

@@ -98,7 +98,8 @@ def overlaid(runs: Sequence[Run], labels: Sequence[str]) -> list[Chart]:
 
 def _line(label: str, name: str, known: dict) -> Line:
     """The line of a quantity; one without points where it is not known, so that colours stay those of the runs."""
-    return Line(label, *known.get(name, (np.array([]), np.array([]))), dots=name == "remeshed_nodes")
+    times, values = known.get(name, (np.array([]), np.array([])))
+    return Line(label, times, values, dots=name == "remeshed_nodes")
 
 
 def contact(run: Run) -> list[float]:

@@ -25,8 +25,8 @@ PHYSICS = {
 TOLD = {"scene", "hash", "tables", "versions", "status", "rows", "wall_time_s", "wall_time_by_stage_s",
         "newton_iterations", "remeshes", "warnings"}
 
-NESTED = ("Each bar is the time within that stage, calls within calls counted in both: what is spent on factorising and "
-          "solving is also in the stage that asked for it, so that the bars do not add up to the whole.")
+NESTED = ("Each bar is the time within that stage, calls within calls counted in both: what is spent on factorising "
+          "and solving is also in the stage that asked for it, so that the bars do not add up to the whole.")
 #: The numerics that the head of the page tells, and what must be modelled for them to matter.
 NUMERICS = {"preset": None, "elements": None, "refinement": None, "transport": "substrates", "time": "growth",
             "transfer": "growth"}
@@ -64,9 +64,10 @@ def _head(run: Run) -> str:
     there = [words for name, words in PHYSICS.items() if name in _tables(run)]
     end = f" to t = {run.times[-1]:g} h, {len(run.times)} rows" if len(run.times) > 1 else ""
     warnings = "".join(f"<li>{html.escape(str(one))}</li>" for one in _list(record.get("warnings")))
+    warnings = f'<ul aria-label="warnings">{warnings}</ul>' if warnings else ""
     return (f"<header><h1>{html.escape(str(record.get('scene')))}</h1>"
             f'<p class="status{stopped}">{html.escape(status[0].upper() + status[1:])}{end}</p>'
-            f"<p>{html.escape(_sentence(there))} {html.escape(_numerics(run))}</p>{f'<ul>{warnings}</ul>' if warnings else ''}</header>\n")
+            f"<p>{html.escape(_sentence(there))} {html.escape(_numerics(run))}</p>{warnings}</header>\n")
 
 
 def _tables(run: Run) -> dict:
@@ -144,12 +145,12 @@ def _modelled(run: Run) -> str:
 
 
 def _cost(run: Run) -> str:
-    record, total = run.record, run.record.get("wall_time_s")
+    record, total = run.record, _positive(run.record.get("wall_time_s"))
     counts = [(f"Newton iterations, {name}", value)
               for name, value in page.flat(_table(record.get("newton_iterations"))).items() if value]
     counts += [("meshes made anew", record["remeshes"])] if "growth" in _tables(run) and "remeshes" in record else []
-    whole = f"<p>{total:.3g} s in all, without this page.</p>" if _is_number(total) else ""
-    bars = _bars(_table(record.get("wall_time_by_stage_s")), total) if _is_number(total) else ""
+    whole = f"<p>{total:.3g} s in all, without this page.</p>" if total else ""
+    bars = _bars(_table(record.get("wall_time_by_stage_s")), total) if total else ""
     return page.section("Cost", whole, bars, page.table("", [], counts))
 
 
@@ -157,13 +158,14 @@ def _table(value: object) -> dict:
     return value if isinstance(value, dict) else {}
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and 0 < value < 1e30
+def _positive(value: object) -> float:
+    """The value where it is a number of seconds that can be drawn, else zero."""
+    return float(value) if isinstance(value, int | float) and 0 < value < 1e30 else 0.0
 
 
 def _bars(stages: dict, total: float) -> str:
     """Seconds by stage, the longest first, as parts of the whole; nothing where no stage has taken any time."""
-    known = sorted(((name, value) for name, value in stages.items() if _is_number(value)), key=lambda each: -each[1])
+    known = sorted(((name, value) for name, value in stages.items() if _positive(value)), key=lambda each: -each[1])
     rows = "".join(_bar(22 * k, name, value, 150 * min(1.0, value / total)) for k, (name, value) in enumerate(known))
     return (f'<svg class="bars" viewBox="0 0 340 {22 * len(known) + 4}" role="img" aria-label="seconds by stage">{rows}'
             f'</svg><p class="note">{NESTED}</p>') if known else ""

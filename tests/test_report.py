@@ -1,0 +1,418 @@
+"""The pages of runs: what they say, that they need nothing else, and that nothing told by others is markup."""
+
+import base64
+import hashlib
+import html
+import json
+import re
+import shutil
+from html.parser import HTMLParser
+
+import meshio
+import numpy as np
+import pytest
+
+from repro import names, report, results
+from repro.cli import main
+from repro.report import charts, comparison, fields, page, quantities
+from repro.report.reading import NoRun, read
+
+VOID = {"meta", "input", "br", "link", "img", "hr"}
+FAST = 'numerics.preset="fast"'
+HOSTILE = "<script>pwned=1<!--\"'&<img src=x onerror=pwned=1>.toml"
+
+
+class Page(HTMLParser):
+    """Parses strictly: every tag is closed in its turn. `outside` are addresses; `texts` what a reader sees."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.outside, self.tags, self.texts, self.scripts = [], [], [], [], []
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append((tag, dict(attributes)))
+        self.outside += [value for name, value in attributes if name in ("src", "href", "action", "xlink:href", "data")]
+        assert not [name for name, _ in attributes if name.startswith("on") or name == "style"]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attributes):
+        self.tags.append((tag, dict(attributes)))
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.texts.append(data)
+        if self.open and self.open[-1] in ("script", "style"):
+            self.scripts.append((self.open[-1], self.tags[-1][1], data))
+
+    def attribute(self, tag, name):
+        return [given[name] for each, given in self.tags if each == tag and name in given]
+
+
+def run(tmp_path, scene, *sets, status=0):
+    out = tmp_path / "run"
+    assert main(["run", str(scene), "--out", str(out), *(part for one in sets for part in ("--set", one))]) == status
+    return out
+
+
+def text_of(out):
+    return (out / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def fast(tmp_path_factory):
+    return run(tmp_path_factory.mktemp("fast"), "base", FAST, 'growth.end="3 h"')
+
+
+@pytest.fixture(scope="module")
+def paper(tmp_path_factory):
+    return run(tmp_path_factory.mktemp("paper"), "base", 'growth.end="1 h"')
+
+
+@pytest.fixture(scope="module")
+def flow_only(tmp_path_factory):
+    return run(tmp_path_factory.mktemp("flow"), "flow_only")
+
+
+def test_every_run_has_a_page_that_needs_nothing_else(fast, paper, flow_only):
+    """Mutants: an image or style sheet from elsewhere, an unclosed tag, a style that the policy stops."""
+    for out in (fast, paper, flow_only):
+        text = text_of(out)
+        found = Page(text)
+        assert found.outside == [] and "@import" not in text and "url(" not in text and "://" not in text
+        (policy,) = found.attribute("meta", "content")[:1]
+        assert policy.startswith("default-src 'none'; ") and "unsafe" not in policy
+        for kind, given, content in found.scripts:
+            digest = base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()
+            assert given.get("type") == "application/json" or f"{kind}-src" in policy and f"'sha256-{digest}'" in policy
+        assert {"style", "script"} == {kind for kind, _, _ in found.scripts}
+
+
+def test_charts_of_a_whole_run(fast):
+    """Mutant: a chart that is forgotten."""
+    text = text_of(fast)
+    titles = re.findall("<figcaption>(.*?)<", text)
+    assert titles == [kind.title for kind in quantities.KINDS]
+    assert "Head loss" in titles and "Defects of the balances" in titles
+    for word in ("factorise and solve", "Newton iterations, transport", "scene hash", "numpy", "kinematic_viscosity"):
+        assert word in text
+
+
+def test_what_is_not_modelled_is_left_out(flow_only, fast):
+    """Mutants: empty charts, fields of zeros, a slider for one time."""
+    text, packed = text_of(flow_only), stored(flow_only)
+    assert "Not modelled: substrates, kinetics, growth." in text and "acceptor" not in text.split("<script>")[0]
+    assert [field["name"] for field in packed["fields"]] == ["velocity_m_per_d", "head_cm", "region"]
+    assert "<figure" not in text and '<div class="time" hidden>' in text
+    assert "Not modelled" not in text_of(fast) and '<div class="time">' in text_of(fast)
+
+
+def stored(out):
+    """What the page gives its script."""
+    return json.loads(re.search('<script type="application/json" id="fields">(.*?)</script>', text_of(out))[1])
+
+
+def numbers(text, kind):
+    return np.frombuffer(base64.b64decode(text), kind)
+
+
+@pytest.mark.parametrize("name", ["fast", "paper"])
+def test_fields_of_the_page_are_those_of_the_files(request, name):
+    """Each array to half a step of its 65534, with the mesh's own nodes. Mutants: the wrong frame's mesh, values of all
+    nodes where those of the aggregate are told, a range over all times."""
+    out = request.getfixturevalue(name)
+    packed, entries = stored(out), fields.index(out)
+    assert packed["of"] == len(entries) == len(packed["frames"])
+    box = np.array(packed["box"]).reshape(2, 2)
+    for frame, (time, path) in zip(packed["frames"], entries):
+        grid, mesh = meshio.vtu.read(path), packed["meshes"][frame["mesh"]]
+        cells = grid.cells[0].data
+        assert frame["time"] == time and mesh["per"] == cells.shape[1] == {"fast": 6, "paper": 3}[name]
+        assert (numbers(mesh["cells"], "<u4").reshape(cells.shape) == cells).all()
+        region = numbers(mesh["body"], "<u1") == 1
+        assert (region == grid.cell_data["region"][0]).all() and region.any() and not region.all()
+        points = box[:, 0] + numbers(frame["points"], "<u2").reshape(-1, 2) / 65534 * (box[:, 1] - box[:, 0])
+        assert np.abs(points - grid.points[:, :2]).max() <= 0.51 / 65534 * (box[:, 1] - box[:, 0]).max()
+        nodes = np.unique(cells[region])
+        for field in packed["fields"]:
+            low, high, text = frame["values"][field["name"]]
+            node = field["at"] == "node"
+            value = grid.point_data[field["name"]] if node else grid.cell_data[field["name"]][0]
+            value = np.linalg.norm(value, axis=1) if value.ndim == 2 else value
+            value = value[nodes if node else region] if field["body"] else value
+            told = low + numbers(text, "<u2") / 65534 * (high - low)
+            assert (low, high) == (value.min(), value.max())
+            assert np.abs(told - value).max() <= 0.51 / 65534 * (high - low)
+
+
+def test_a_value_that_is_not_finite_has_none(tmp_path):
+    low, high, text = fields._levels(np.array([1.0, np.nan, 3.0, np.inf]))
+    assert (low, high) == (1.0, 3.0) and numbers(text, "<u2").tolist() == [0, 65535, 65534, 65535]
+
+
+def test_many_frames_are_thinned_and_the_page_says_so(paper, tmp_path, monkeypatch):
+    """The first and the last are always shown. Mutants: the last dropped, a count that is not told."""
+    monkeypatch.setattr(fields, "MOST_FRAMES", 3)
+    copy = shutil.copytree(paper, tmp_path / "run")
+    report.write(copy)
+    assert [frame["time"] for frame in stored(copy)["frames"]] == [0, 0.4, 1.0]
+    assert "3 of 6 times shown" in text_of(copy) and "all 6 times shown" in text_of(paper)
+    monkeypatch.setattr(fields, "MOST_BYTES", 1)
+    report.write(copy)
+    assert [frame["time"] for frame in stored(copy)["frames"]] == [0, 1.0]
+
+
+def test_fields_are_read_from_the_runs_own_files_alone(paper, tmp_path):
+    """Mutant: any file that the index names is opened."""
+    copy = shutil.copytree(paper, tmp_path / "run")
+    (tmp_path / "fields").mkdir()
+    shutil.copy(copy / "fields/fields_0000.vtu", tmp_path / "fields/fields_0000.vtu")
+    results.write_index(copy / "fields.pvd", [(0.0, "../fields/fields_0000.vtu"), (1.0, "fields/fields_0001.vtu"),
+                                              (2.0, str(tmp_path / "fields/fields_0000.vtu"))])
+    assert [time for time, _ in fields.index(copy)] == [1.0]
+
+
+def hostile(out):
+    """A run whose files say what nobody should believe."""
+    record = json.loads((out / "run.json").read_text())
+    record |= {"scene": HOSTILE, "status": "failed: </script><script>pwned=1</script>", "extra": {HOSTILE: [HOSTILE]}}
+    record["tables"][HOSTILE] = {HOSTILE: HOSTILE}
+    record["versions"][HOSTILE] = record["warnings"] = HOSTILE
+    record["wall_time_by_stage_s"][HOSTILE] = 0.1
+    record["newton_iterations"][HOSTILE] = HOSTILE
+    results.write_json(out / "run.json", record)
+    lines = (out / "timeseries.csv").read_text().splitlines()
+    columns = [lines[0] + ',"' + HOSTILE.replace('"', '""') + '"', *(line + ",1" for line in lines[1:])]
+    results.write_text(out / "timeseries.csv", "\n".join(columns) + "\n")
+    return out
+
+
+def test_nothing_told_by_others_is_markup(fast, tmp_path):
+    """Names, status, keys, values, columns and folders. Mutants: any one of them put in as it is."""
+    copy = hostile(shutil.copytree(fast, tmp_path / "<b onclick=pwned=1>"))
+    report.write(copy)
+    report.compare([copy, fast], tmp_path / "both.html")
+    for text in (text_of(copy), (tmp_path / "both.html").read_text()):
+        found = Page(text)
+        assert {tag for tag, _ in found.tags} <= {tag for tag, _ in Page(text_of(fast)).tags} | {"ul", "li", "b"}
+        assert "<script>pwned" not in text and "<img" not in text and "<b onclick" not in text
+        assert any(HOSTILE in one for one in found.texts)
+        assert len(found.scripts) <= 6
+
+
+def test_a_scene_with_a_hostile_name_runs_to_its_page(tmp_path):
+    (tmp_path / HOSTILE).write_text('[pore]\nwidth = "50 um"\n')
+    text, name = text_of(run(tmp_path, tmp_path / HOSTILE)), HOSTILE.removesuffix(".toml")
+    assert Page(text).texts.count(name) == 1 and f"<title>{html.escape(name)}: a pore</title>" in text
+
+
+def test_data_cannot_end_its_block():
+    text = page.data("x", {"a": "</script><!--<script>"})
+    assert text.count("<") == 2 and json.loads(Page(text).scripts[0][2]) == {"a": "</script><!--<script>"}
+
+
+def drawn(chart):
+    """Points (n, 2) of the first polyline, in the drawing's units."""
+    text = re.search('<polyline class="line0" points="([^"]*)"', charts.svg(chart).split("</figcaption>")[1])[1]
+    return np.array([[float(one) for one in pair.split(",")] for pair in text.split()])
+
+
+def chart(values, times=None, **more):
+    times = np.arange(len(values), dtype=float) if times is None else np.asarray(times, float)
+    return charts.Chart("title", "axis", [charts.Line("one", times, np.asarray(values, float), **more)])
+
+
+def test_a_line_is_where_its_numbers_and_the_ticks_say():
+    """Places between two labelled ticks are linear in the value. Mutants: y upside down, ticks of another scale."""
+    values, times = np.array([2.0, 5.0, 3.5, 9.0]), np.array([0.0, 1.0, 4.0, 10.0])
+    made = chart(values, times)
+    ticks = re.findall('<text class="y" x="[^"]*" y="([^"]*)">([^<]*)<', charts.svg(made))
+    heights, told = np.array([float(y) - 3.5 for y, _ in ticks]), np.array([float(text) for _, text in ticks])
+    assert len(told) >= 3 and told.min() <= values.min() and told.max() >= values.max() - np.diff(told)[0]
+    order = np.argsort(told)
+    assert np.allclose(drawn(made)[:, 1], np.interp(values, told[order], heights[order]), atol=0.2)
+    across = drawn(made)[:, 0]
+    assert np.allclose((across - across[0]) / (across[-1] - across[0]), times / 10, atol=1e-3)
+
+
+def test_a_wide_range_is_logarithmic():
+    made = chart([1.0, 10.0, 100.0, 1000.0])
+    assert np.allclose(np.diff(drawn(made)[:, 1]), np.diff(drawn(made)[:, 1])[0], atol=0.11)
+    assert "axis (log scale)" in charts.svg(made) and "log scale" not in charts.svg(chart([0.0, 10.0, 1000.0]))
+
+
+def test_gaps_constants_and_single_points():
+    """Mutants: a line across a gap; no drawing of a constant; a NaN in the drawing."""
+    text = charts.svg(chart([1.0, 2.0, np.nan, 3.0, 4.0, np.nan, 5.0]))
+    assert text.count("<polyline") == 2 and text.count("<circle") == 1 and "nan" not in text
+    for constant in (0.0, 2.9, -3.0, 1e-30, 1e30):
+        flat = drawn(chart([constant] * 3))
+        assert np.ptp(flat[:, 1]) == 0 and charts.TOP <= flat[0, 1] <= charts.HEIGHT - charts.BOTTOM
+
+
+def test_many_points_are_thinned_with_both_ends():
+    line = charts.Line("x", np.arange(5000.0), np.arange(5000.0) ** 2)
+    thin = charts.thinned(line)
+    assert len(thin.times) == charts.MOST_POINTS and thin.times[[0, -1]].tolist() == [0, 4999]
+    assert (thin.values == thin.times**2).all()
+
+
+def test_the_same_run_makes_the_same_page(fast):
+    """Mutants: a date in the page, an order that hangs on hashes."""
+    before = text_of(fast)
+    report.write(fast)
+    assert text_of(fast) == before
+
+
+def test_ledger_rates_add_up(paper):
+    """Rate times step is the ledger's own sum. Mutants: a rate over the step before, one step left out."""
+    found, book = quantities.series(read(paper)), results.read_table(paper / "ledger.csv")
+    for part in ("supplied", "out", "consumed"):
+        times, rates = found[f"acceptor_{part}"]
+        assert np.allclose(times, (book["start_h"] + book["end_h"]) / 2)
+        total = np.sum(rates * (book["end_h"] - book["start_h"])) * 1e6
+        assert total == pytest.approx(book[f"acceptor_{part}_pg_per_m"].sum(), rel=1e-12)
+    assert found["biomass_made"][1][-1] == pytest.approx(1e-6 * book["biomass_made_pg_per_m"].sum(), rel=1e-12)
+    assert "acceptor_stored" not in found
+
+
+def test_contact_is_marked(tmp_path):
+    """Mutant: the last time of contact instead of the first."""
+    out = run(tmp_path, "wide", FAST, 'pore.width="20 um"', 'aggregate.radius="17.9 um"', 'growth.end="1 h"')
+    series = results.read_table(out / "timeseries.csv")
+    first = series["time_h"][series["contact"] == 1][0]
+    assert quantities.contact(read(out)) == [first] and 0 < first < series["time_h"][-1]
+    assert f"contact with the opposite wall, t = {first:.6g} h" in text_of(out) and 'class="mark"' in text_of(out)
+
+
+def test_a_run_that_stops_has_its_page(tmp_path, monkeypatch, capsys):
+    """Before its first row too. Mutants: a page only at a good end; the status left out."""
+    from repro import running
+    from repro.errors import SimulationError
+
+    def stops(scene):
+        raise SimulationError("stopped in the step from t = 0 h, in <growth>: no")
+        yield
+
+    monkeypatch.setattr(running, "simulate", stops)
+    text = text_of(run(tmp_path, "base", status=1))
+    assert "Failed: stopped in the step from t = 0 h, in &lt;growth&gt;: no" in text and "no row" in text
+    Page(text)
+
+
+def test_every_name_has_its_unit_or_is_a_pure_number(fast, paper):
+    """Names of columns, ledgers and arrays. Mutant: an array whose name says nothing of its unit."""
+    arrays = [meshio.vtu.read(fields.index(out)[-1][1]) for out in (fast, paper)]
+    told = {name for grid in arrays for name in (*grid.point_data, *grid.cell_data)}
+    assert {"velocity_m_per_d", "stress_xy_MPa", "theta"} <= told
+    for name in told | set(results.COLUMNS) | set(results.LEDGER_COLUMNS):
+        assert bool(names.unit(name)) != (name in names.PURE), name
+        assert name in results.LEDGER_COLUMNS or names.words(name) != name or name in names.PURE, name
+    assert (names.unit("mean_velocity_m_per_d"), names.unit("thickness_um")) == ("m/day", "um")
+    assert (names.udunits("donor_min_mg_per_L"), names.udunits("aggregate_area_um2")) == ("mg L-1", "um2")
+
+
+# Comparison
+
+
+@pytest.fixture
+def two(fast, paper, tmp_path):
+    target = tmp_path / "both.html"
+    assert main(["compare", str(fast), str(paper), "--out", str(target)]) == 0
+    return target.read_text(encoding="utf-8")
+
+
+def test_a_comparison_has_a_line_a_run(two, fast, paper):
+    """Mutants: the second run drawn with the first's numbers; a run left out of a chart."""
+    figures = [json.loads(html.unescape(text)) for text in re.findall('data-chart="([^"]*)"', two)]
+    titles = re.findall("<figcaption>(.*?)<", two)
+    quiet = {"acceptor_stored", "donor_stored", "remeshed_nodes"}  # nothing is stored, no mesh made anew
+    known = [name for kind in quantities.KINDS for name, _ in kind.lines if name not in quiet]
+    assert len(figures) == len(titles) == len(known)
+    conductivity = figures[titles.index("Conductivity")]["lines"]
+    for line, out in zip(conductivity, (fast, paper)):
+        series = results.read_table(out / "timeseries.csv")
+        assert np.allclose(line["t"], series["time_h"], rtol=1e-5)
+        assert np.allclose(line["y"], series["conductivity_m_per_d"], rtol=1e-5)
+    assert Page(two).outside == []
+
+
+def test_differences_of_scenes_are_told_key_by_key(fast, paper, flow_only):
+    """Mutants: equal keys told; keys of one run alone left out."""
+    found = dict((key, values) for key, *values in comparison.differences([read(fast), read(paper)]))
+    assert found == {"growth.end": ["3 h", "1 h"], "numerics.preset": ["fast", "paper"],
+                     "numerics.elements": ["quadratic", "linear"], "numerics.time": ["midpoint", "updates"],
+                     "numerics.refinement": ["0.25", "1"]}
+    found = dict((key, values) for key, *values in comparison.differences([read(paper), read(flow_only)]))
+    assert found["growth.end"] == ["1 h", "-"] and found["flow.mean_velocity"] == ["-", "120833 um/h"]
+    assert comparison.differences([read(fast), read(fast)]) == []
+
+
+def test_values_at_the_common_last_time(fast, paper, flow_only, two):
+    """Linear between rows, relative to the first. Mutants: each run's own last row; differences to the last run."""
+    runs = [read(fast), read(paper)]
+    assert comparison.common_time(runs) == 1.0
+    found = comparison.values(runs, 1.0)["aggregate_area_um2"]
+    series = results.read_table(fast / "timeseries.csv")
+    after = np.flatnonzero(series["time_h"] >= 1)[0]
+    (t0, t1), (a0, a1) = series["time_h"][after - 1: after + 1], series["aggregate_area_um2"][after - 1: after + 1]
+    assert found[0] == pytest.approx(a0 + (a1 - a0) * (1 - t0) / (t1 - t0), rel=1e-12)
+    assert found[1] == results.read_table(paper / "timeseries.csv")["aggregate_area_um2"][-1]
+    assert f"{100 * (found[1] - found[0]) / found[0]:+.3g} %" in two
+    assert comparison.values([read(paper), read(flow_only)], 0.0)["donor_min_mg_per_L"][1] is None
+
+
+def test_runs_of_the_same_folder_name_are_told_by_their_paths(fast, paper):
+    assert comparison.short([fast, paper]) == [str(fast), str(paper)]
+    assert comparison.short([fast, fast.parent]) == ["run", fast.parent.name]
+
+
+def refused(capsys, *arguments):
+    assert main(["compare", *map(str, arguments)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    return line
+
+
+def test_what_cannot_be_compared_is_refused(fast, tmp_path, capsys):
+    """In one line that says which folder and why, and nothing is written. Mutant: a traceback."""
+    out = tmp_path / "out.html"
+    assert f"{tmp_path}: it holds no run: run.json is missing" in refused(capsys, fast, tmp_path, "--out", out)
+    assert "run.json is missing" in refused(capsys, fast, tmp_path / "none", "--out", out)
+    assert "two runs or more" in refused(capsys, fast, "--out", out)
+    assert "ends in .html" in refused(capsys, fast, fast, "--out", tmp_path / "out.csv")
+    assert "is the folder of a run" in refused(capsys, fast, fast, "--out", fast / "other.html")
+    assert "No such file" in refused(capsys, fast, fast, "--out", tmp_path / "none" / "out.html")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name, content", [
+    ("run.json", "[]"), ("run.json", "{"), ("run.json", "[" * 100_000), ("run.json", b"\xff\xfe"),
+    ("timeseries.csv", "a,b\n1,2\n"), ("timeseries.csv", "time_h\nsoon\n"), ("timeseries.csv", "time_h\nnan\n"),
+    ("timeseries.csv", ""), ("ledger.csv", "start_h\n1\n"),
+])
+def test_a_broken_run_is_refused_by_the_name_of_its_file(fast, tmp_path, capsys, name, content):
+    copy = shutil.copytree(fast, tmp_path / "run")
+    (copy / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+    line = refused(capsys, fast, copy, "--out", tmp_path / "out.html")
+    assert str(copy) in line and name in line and not (tmp_path / "out.html").exists()
+
+
+def test_a_folder_without_a_run_has_no_page(tmp_path):
+    with pytest.raises(NoRun, match="run.json is missing"):
+        report.write(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("content", ["", "<VTKFile", '<VTKFile type="UnstructuredGrid"/>'])
+def test_broken_fields_are_an_error_and_no_page(paper, tmp_path, content):
+    copy = shutil.copytree(paper, tmp_path / "run")
+    (copy / "fields/fields_0005.vtu").write_text(content)
+    (copy / "report.html").unlink()
+    with pytest.raises(ValueError, match="fields cannot be read"):
+        report.write(copy)
+    assert not (copy / "report.html").exists()
