@@ -26,7 +26,7 @@ class Browser:
         theirs, self.out = os.pipe()
         self.back, ours = os.pipe()
         wired = 'exec 3<&"$0" 4>&"$1"; shift; exec "$@"'  # the browser reads from 3 and writes to 4
-        command = ["bash", "-c", wired, str(theirs), str(ours), CHROMIUM, *OPTIONS, f"--user-data-dir={self.home}"]
+        command = ["bash", "-c", wired, str(theirs), str(ours), str(CHROMIUM), *OPTIONS, f"--user-data-dir={self.home}"]
         self.process = subprocess.Popen([*command, "about:blank"], pass_fds=(theirs, ours), stderr=subprocess.DEVNULL)
         os.close(theirs)
         os.close(ours)

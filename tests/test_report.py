@@ -27,7 +27,8 @@ class Page(HTMLParser):
 
     def __init__(self, text):
         super().__init__()
-        self.open, self.outside, self.tags, self.texts, self.scripts = [], [], [], [], []
+        self.open: list[str] = []
+        self.outside, self.tags, self.texts, self.scripts = [], [], [], []
         self.feed(text)
         self.close()
         assert self.open == []
@@ -112,9 +113,16 @@ def test_what_is_not_modelled_is_left_out(flow_only, fast):
     assert "Not modelled" not in text_of(fast) and '<div class="time">' in text_of(fast)
 
 
+def first(pattern, text):
+    """What the pattern's group is where it is first found."""
+    found = re.search(pattern, text)
+    assert found, pattern
+    return found[1]
+
+
 def stored(out):
     """What the page gives its script."""
-    return json.loads(re.search('<script type="application/json" id="fields">(.*?)</script>', text_of(out))[1])
+    return json.loads(first('<script type="application/json" id="fields">(.*?)</script>', text_of(out)))
 
 
 def numbers(text, kind):
@@ -218,7 +226,7 @@ def test_data_cannot_end_its_block():
 
 def drawn(chart):
     """Points (n, 2) of the first polyline, in the drawing's units."""
-    text = re.search('<polyline class="line0" points="([^"]*)"', charts.svg(chart).split("</figcaption>")[1])[1]
+    text = first('<polyline class="line0" points="([^"]*)"', charts.svg(chart).split("</figcaption>")[1])
     return np.array([[float(one) for one in pair.split(",")] for pair in text.split()])
 
 
@@ -285,9 +293,9 @@ def test_contact_is_marked(tmp_path):
     """Mutant: the last time of contact instead of the first."""
     out = run(tmp_path, "wide", FAST, 'pore.width="20 um"', 'aggregate.radius="17.9 um"', 'growth.end="1 h"')
     series = results.read_table(out / "timeseries.csv")
-    first = series["time_h"][series["contact"] == 1][0]
-    assert quantities.contact(read(out)) == [first] and 0 < first < series["time_h"][-1]
-    assert f"contact with the opposite wall, t = {first:.6g} h" in text_of(out) and 'class="mark"' in text_of(out)
+    touching = series["time_h"][series["contact"] == 1][0]
+    assert quantities.contact(read(out)) == [touching] and 0 < touching < series["time_h"][-1]
+    assert f"contact with the opposite wall, t = {touching:.6g} h" in text_of(out) and 'class="mark"' in text_of(out)
 
 
 def test_a_run_that_stops_has_its_page(tmp_path, monkeypatch, capsys):
@@ -363,7 +371,8 @@ def test_values_at_the_common_last_time(fast, paper, flow_only, two):
     (t0, t1), (a0, a1) = series["time_h"][after - 1: after + 1], series["aggregate_area_um2"][after - 1: after + 1]
     assert found[0] == pytest.approx(a0 + (a1 - a0) * (1 - t0) / (t1 - t0), rel=1e-12)
     assert found[1] == results.read_table(paper / "timeseries.csv")["aggregate_area_um2"][-1]
-    assert f"{100 * (found[1] - found[0]) / found[0]:+.3g} %" in two
+    mine, other = (float(value or 0) for value in found)
+    assert f"{100 * (other - mine) / mine:+.3g} %" in two
     assert comparison.values([read(paper), read(flow_only)], 0.0)["donor_min_mg_per_L"][1] is None
 
 

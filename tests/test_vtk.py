@@ -35,7 +35,7 @@ def entries(folder):
     """{time: path} of the index."""
     root = ElementTree.parse(folder / "fields.pvd").getroot()
     assert (root.tag, root.get("type")) == ("VTKFile", "Collection")
-    return {float(one.get("timestep")): folder / one.get("file") for one in root.iter("DataSet")}
+    return {float(one.get("timestep", "nan")): folder / one.get("file", "") for one in root.iter("DataSet")}
 
 
 def by_vtk(path):
