@@ -243,6 +243,7 @@ def test_a_line_is_where_its_numbers_and_the_ticks_say():
     heights, told = np.array([float(y) - 3.5 for y, _ in ticks]), np.array([float(text) for _, text in ticks])
     assert len(told) >= 3 and told.min() <= values.min() and told.max() >= values.max() - np.diff(told)[0]
     order = np.argsort(told)
+    assert (np.diff(heights[order]) < 0).all()  # a drawing's y grows downwards
     assert np.allclose(drawn(made)[:, 1], np.interp(values, told[order], heights[order]), atol=0.2)
     across = drawn(made)[:, 0]
     assert np.allclose((across - across[0]) / (across[-1] - across[0]), times / 10, atol=1e-3)

@@ -103,7 +103,8 @@ def test_middle_nodes_are_where_vtk_expects_them(made):
 
 
 def test_names_tell_units(made):
-    """Vectors have three components, as VTK wants them. Mutant: stress in Pa under a name that says MPa."""
+    """Vectors have three components, as VTK wants them; numbers are what their names say. Mutants: a concentration in
+    g/L, J of another power, a head in um."""
     folder, _, computed = made
     grid = by_vtk(entries(folder)[1.0])
     found = arrays(grid.GetPointData())
@@ -112,5 +113,8 @@ def test_names_tell_units(made):
         "velocity_m_per_d": 3, "displacement_um": 3, "position_t0_um": 3}
     table = results.read_table(folder / "timeseries.csv")
     assert found["acceptor_mg_per_L"].min() == table["acceptor_min_mg_per_L"][-1]
+    cells = arrays(grid.GetCellData())
+    body = cells["region"] == 1
+    assert np.allclose(cells["J"][body], cells["theta"][body], rtol=0.1) and cells["theta"][body].min() > 1.15
     length, loss = np.ptp(computed.points[:, 0]), np.ptp(found["head_cm"])
     assert loss < table["head_loss_cm"][-1] and loss > 0.5 * table["head_loss_cm"][-1] * length / 600

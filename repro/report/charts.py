@@ -14,7 +14,7 @@ from html import escape
 import numpy as np
 
 WIDTH, HEIGHT = 360, 224
-LEFT, RIGHT, TOP, BOTTOM = 60, 10, 8, 38
+LEFT, RIGHT, TOP, BOTTOM = 72, 10, 8, 38
 COLOURS = 8
 #: A positive quantity that spans more than this factor is drawn on a logarithmic scale.
 LOG_FROM = 30.0

@@ -21,14 +21,22 @@ function boxOf(points) {
   return [x0, x1, y0, y1];
 }
 
+// Pixels a um: as wide as there is room, but neither taller than a window shows nor thinner than one can see.
+function scaleOf(box, room) {
+  const tallest = Math.max(200, 0.65 * window.innerHeight), least = 60;
+  const scale = Math.min(room / (box[1] - box[0]), tallest / (box[3] - box[2]));
+  return Math.max(scale, least / (box[3] - box[2]));
+}
+
 let shown = null; // what the probe reads
 function draw() {
   const frame = data.frames[part.frame.value], field = data.fields.find(each => each.name === part.field.value);
   const mesh = meshOf(data.meshes[frame.mesh]), points = pointsOf(frame, data.box), [low, high] = rangeOf(field, frame);
   const values = valuesOf(frame, field, mesh, field.at === "node" ? points.length / 2 : mesh.body.length);
-  const ratio = Math.min(3, window.devicePixelRatio || 1), wide = Math.max(120, part.picture.clientWidth);
-  const edge = { left: 40, right: 12, top: 8, bottom: 98 }, box = boxOf(points), across = wide - edge.left - edge.right;
-  const scale = across / (box[1] - box[0]), tall = Math.max(1, scale * (box[3] - box[2]));
+  const ratio = Math.min(3, window.devicePixelRatio || 1), edge = { left: 40, right: 12, top: 8, bottom: 98 };
+  const box = boxOf(points), room = Math.max(120, part.picture.parentElement.clientWidth) - edge.left - edge.right;
+  const scale = scaleOf(box, room), across = scale * (box[1] - box[0]), tall = scale * (box[3] - box[2]);
+  const wide = Math.max(across, room) + edge.left + edge.right;
   const place = (x, y) => [edge.left + (x - box[0]) * scale, edge.top + tall - (y - box[2]) * scale];
   const size = [Math.round(across * ratio), Math.round(tall * ratio)];
   const pixels = new Float64Array(points.length), places = new Float64Array(points.length);
@@ -38,6 +46,7 @@ function draw() {
   }
   part.picture.width = Math.round(wide * ratio);
   part.picture.height = Math.round((tall + edge.top + edge.bottom) * ratio);
+  part.picture.style.width = `${wide}px`;
   const pen = part.picture.getContext("2d"), all = filled(mesh, pixels, values, field.at === "node", ...size);
   pen.putImageData(image(all, low, high, ...size), Math.round(edge.left * ratio), Math.round(edge.top * ratio));
   pen.setTransform(ratio, 0, 0, ratio, 0, 0);
@@ -46,7 +55,8 @@ function draw() {
   if (part.outline.checked)
     for (const [colour, width] of [["#ffffff", 3], ["#000000", 1.2]]) trace(pen, mesh.rim, places, colour, width);
   axes(pen, box, place, tall);
-  bar(pen, field, low, high, edge.left, edge.top + tall + 52, Math.min(420, across));
+  const long = Math.min(420, room);
+  bar(pen, field, low, high, edge.left + Math.max(0, across - long) / 2, edge.top + tall + 52, long);
   shown = { all, size, ratio, edge, scale, tall, box, field };
   told(frame, field, low, high);
 }
@@ -177,6 +187,10 @@ document.addEventListener("timechosen", event => {
 });
 window.addEventListener("hashchange", chosen);
 window.addEventListener("resize", draw);
+window.addEventListener("load", () => { // the middle, where the aggregate is
+  const around = part.picture.parentElement;
+  around.scrollLeft = (around.scrollWidth - around.clientWidth) / 2;
+});
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
 chosen();
 document.documentElement.dataset.fields = data.fields.length;

@@ -38,7 +38,7 @@ CONTROLS = """<div class="controls"><label>Field <select id="field"></select></l
 <label{several}><input type="checkbox" id="whole" checked> one frame for all times</label></div>
 <div class="time"{several}><button type="button" id="play">Play</button>
 <input type="range" id="frame" min="0" value="0" step="1" aria-label="time"><output id="now"></output></div>
-<canvas id="picture" role="img"></canvas><output id="probe">&nbsp;</output>"""
+<div class="scroll"><canvas id="picture" role="img"></canvas></div><output id="probe">&nbsp;</output>"""
 
 
 def build(run: Run) -> str:
@@ -62,11 +62,11 @@ def _head(run: Run) -> str:
     status, record = str(run.record.get("status") or "status unknown"), run.record
     stopped = "" if status == "completed" else " stopped"
     there = [words for name, words in PHYSICS.items() if name in _tables(run)]
-    end = f" to t = {run.times[-1]:g} h, {len(run.times)} rows" if len(run.times) > 1 else ""
+    rows = f'<p class="note">{len(run.times)} rows, to t = {run.times[-1]:g} h.</p>' if len(run.times) > 1 else ""
     warnings = "".join(f"<li>{html.escape(str(one))}</li>" for one in _list(record.get("warnings")))
     warnings = f'<ul aria-label="warnings">{warnings}</ul>' if warnings else ""
     return (f"<header><h1>{html.escape(str(record.get('scene')))}</h1>"
-            f'<p class="status{stopped}">{html.escape(status[0].upper() + status[1:])}{end}</p>'
+            f'<p class="status{stopped}">{html.escape(status[0].upper() + status[1:])}</p>{rows}'
             f"<p>{html.escape(_sentence(there))} {html.escape(_numerics(run))}</p>{warnings}</header>\n")
 
 
