@@ -12,7 +12,7 @@ from repro import results
 from repro.cli import main
 from repro.report import fields
 from tests import browser
-from tests.test_report import FAST, hostile, run, stored
+from tests.pages import FAST, hostile, run, stored
 
 pytestmark = [pytest.mark.thorough,
               pytest.mark.skipif(browser.CHROMIUM is None, reason="there is no Chromium here to look at pages with")]

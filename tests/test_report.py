@@ -6,63 +6,15 @@ import html
 import json
 import re
 import shutil
-from html.parser import HTMLParser
 
 import meshio
 import numpy as np
 import pytest
 
 from repro import names, report, results
-from repro.cli import main
-from repro.report import charts, comparison, fields, page, quantities
+from repro.report import fields, page, quantities
 from repro.report.reading import NoRun, read
-
-VOID = {"meta", "input", "br", "link", "img", "hr"}
-FAST = 'numerics.preset="fast"'
-HOSTILE = "<script>pwned=1<!--\"'&<img src=x onerror=pwned=1>.toml"
-
-
-class Page(HTMLParser):
-    """Parses strictly: every tag is closed in its turn. `outside` are addresses; `texts` what a reader sees."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.open: list[str] = []
-        self.outside, self.tags, self.texts, self.scripts = [], [], [], []
-        self.feed(text)
-        self.close()
-        assert self.open == []
-
-    def handle_starttag(self, tag, attributes):
-        self.tags.append((tag, dict(attributes)))
-        self.outside += [value for name, value in attributes if name in ("src", "href", "action", "xlink:href", "data")]
-        assert not [name for name, _ in attributes if name.startswith("on") or name == "style"]
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_startendtag(self, tag, attributes):
-        self.tags.append((tag, dict(attributes)))
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        self.texts.append(data)
-        if self.open and self.open[-1] in ("script", "style"):
-            self.scripts.append((self.open[-1], self.tags[-1][1], data))
-
-    def attribute(self, tag, name):
-        return [given[name] for each, given in self.tags if each == tag and name in given]
-
-
-def run(tmp_path, scene, *sets, status=0):
-    out = tmp_path / "run"
-    assert main(["run", str(scene), "--out", str(out), *(part for one in sets for part in ("--set", one))]) == status
-    return out
-
-
-def text_of(out):
-    return (out / "report.html").read_text(encoding="utf-8")
+from tests.pages import FAST, HOSTILE, Page, hostile, numbers, run, stored, text_of
 
 
 @pytest.fixture(scope="module")
@@ -111,22 +63,6 @@ def test_what_is_not_modelled_is_left_out(flow_only, fast):
     assert [field["name"] for field in packed["fields"]] == ["velocity_m_per_d", "head_cm", "region"]
     assert "<figure" not in text and '<div class="time" hidden>' in text
     assert "Not modelled" not in text_of(fast) and '<div class="time">' in text_of(fast)
-
-
-def first(pattern, text):
-    """What the pattern's group is where it is first found."""
-    found = re.search(pattern, text)
-    assert found, pattern
-    return found[1]
-
-
-def stored(out):
-    """What the page gives its script."""
-    return json.loads(first('<script type="application/json" id="fields">(.*?)</script>', text_of(out)))
-
-
-def numbers(text, kind):
-    return np.frombuffer(base64.b64decode(text), kind)
 
 
 @pytest.mark.parametrize("name", ["fast", "paper"])
@@ -185,21 +121,6 @@ def test_fields_are_read_from_the_runs_own_files_alone(paper, tmp_path):
     assert [time for time, _ in fields.index(copy)] == [1.0]
 
 
-def hostile(out):
-    """A run whose files say what nobody should believe."""
-    record = json.loads((out / "run.json").read_text())
-    record |= {"scene": HOSTILE, "status": "failed: </script><script>pwned=1</script>", "extra": {HOSTILE: [HOSTILE]}}
-    record["tables"][HOSTILE] = {HOSTILE: HOSTILE}
-    record["versions"][HOSTILE] = record["warnings"] = HOSTILE
-    record["wall_time_by_stage_s"][HOSTILE] = 0.1
-    record["newton_iterations"][HOSTILE] = HOSTILE
-    results.write_json(out / "run.json", record)
-    lines = (out / "timeseries.csv").read_text().splitlines()
-    columns = [lines[0] + ',"' + HOSTILE.replace('"', '""') + '"', *(line + ",1" for line in lines[1:])]
-    results.write_text(out / "timeseries.csv", "\n".join(columns) + "\n")
-    return out
-
-
 def test_nothing_told_by_others_is_markup(fast, tmp_path):
     """Names, status, keys, values, columns and folders. Mutants: any one of them put in as it is."""
     copy = hostile(shutil.copytree(fast, tmp_path / "<b onclick=pwned=1>"))
@@ -222,53 +143,6 @@ def test_a_scene_with_a_hostile_name_runs_to_its_page(tmp_path):
 def test_data_cannot_end_its_block():
     text = page.data("x", {"a": "</script><!--<script>"})
     assert text.count("<") == 2 and json.loads(Page(text).scripts[0][2]) == {"a": "</script><!--<script>"}
-
-
-def drawn(chart):
-    """Points (n, 2) of the first polyline, in the drawing's units."""
-    text = first('<polyline class="line0" points="([^"]*)"', charts.svg(chart).split("</figcaption>")[1])
-    return np.array([[float(one) for one in pair.split(",")] for pair in text.split()])
-
-
-def chart(values, times=None, **more):
-    times = np.arange(len(values), dtype=float) if times is None else np.asarray(times, float)
-    return charts.Chart("title", "axis", [charts.Line("one", times, np.asarray(values, float), **more)])
-
-
-def test_a_line_is_where_its_numbers_and_the_ticks_say():
-    """Places between two labelled ticks are linear in the value. Mutants: y upside down, ticks of another scale."""
-    values, times = np.array([2.0, 5.0, 3.5, 9.0]), np.array([0.0, 1.0, 4.0, 10.0])
-    made = chart(values, times)
-    ticks = re.findall('<text class="y" x="[^"]*" y="([^"]*)">([^<]*)<', charts.svg(made))
-    heights, told = np.array([float(y) - 3.5 for y, _ in ticks]), np.array([float(text) for _, text in ticks])
-    assert len(told) >= 3 and told.min() <= values.min() and told.max() >= values.max() - np.diff(told)[0]
-    order = np.argsort(told)
-    assert (np.diff(heights[order]) < 0).all()  # a drawing's y grows downwards
-    assert np.allclose(drawn(made)[:, 1], np.interp(values, told[order], heights[order]), atol=0.2)
-    across = drawn(made)[:, 0]
-    assert np.allclose((across - across[0]) / (across[-1] - across[0]), times / 10, atol=1e-3)
-
-
-def test_a_wide_range_is_logarithmic():
-    made = chart([1.0, 10.0, 100.0, 1000.0])
-    assert np.allclose(np.diff(drawn(made)[:, 1]), np.diff(drawn(made)[:, 1])[0], atol=0.11)
-    assert "axis (log scale)" in charts.svg(made) and "log scale" not in charts.svg(chart([0.0, 10.0, 1000.0]))
-
-
-def test_gaps_constants_and_single_points():
-    """Mutants: a line across a gap; no drawing of a constant; a NaN in the drawing."""
-    text = charts.svg(chart([1.0, 2.0, np.nan, 3.0, 4.0, np.nan, 5.0]))
-    assert text.count("<polyline") == 2 and text.count("<circle") == 1 and "nan" not in text
-    for constant in (0.0, 2.9, -3.0, 1e-30, 1e30):
-        flat = drawn(chart([constant] * 3))
-        assert np.ptp(flat[:, 1]) == 0 and charts.TOP <= flat[0, 1] <= charts.HEIGHT - charts.BOTTOM
-
-
-def test_many_points_are_thinned_with_both_ends():
-    line = charts.Line("x", np.arange(5000.0), np.arange(5000.0) ** 2)
-    thin = charts.thinned(line)
-    assert len(thin.times) == charts.MOST_POINTS and thin.times[[0, -1]].tolist() == [0, 4999]
-    assert (thin.values == thin.times**2).all()
 
 
 def test_the_same_run_makes_the_same_page(fast):
@@ -324,92 +198,6 @@ def test_every_name_has_its_unit_or_is_a_pure_number(fast, paper):
         assert name in results.LEDGER_COLUMNS or names.words(name) != name or name in names.PURE, name
     assert (names.unit("mean_velocity_m_per_d"), names.unit("thickness_um")) == ("m/day", "um")
     assert (names.udunits("donor_min_mg_per_L"), names.udunits("aggregate_area_um2")) == ("mg L-1", "um2")
-
-
-# Comparison
-
-
-@pytest.fixture
-def two(fast, paper, tmp_path):
-    target = tmp_path / "both.html"
-    assert main(["compare", str(fast), str(paper), "--out", str(target)]) == 0
-    return target.read_text(encoding="utf-8")
-
-
-def test_a_comparison_has_a_line_a_run(two, fast, paper):
-    """Mutants: the second run drawn with the first's numbers; a run left out of a chart."""
-    figures = [json.loads(html.unescape(text)) for text in re.findall('data-chart="([^"]*)"', two)]
-    titles = re.findall("<figcaption>(.*?)<", two)
-    quiet = {"acceptor_stored", "donor_stored", "remeshed_nodes"}  # nothing is stored, no mesh made anew
-    known = [name for kind in quantities.KINDS for name, _ in kind.lines if name not in quiet]
-    assert len(figures) == len(titles) == len(known)
-    conductivity = figures[titles.index("Conductivity")]["lines"]
-    for line, out in zip(conductivity, (fast, paper)):
-        series = results.read_table(out / "timeseries.csv")
-        assert np.allclose(line["t"], series["time_h"], rtol=1e-5)
-        assert np.allclose(line["y"], series["conductivity_m_per_d"], rtol=1e-5)
-    assert Page(two).outside == []
-
-
-def test_differences_of_scenes_are_told_key_by_key(fast, paper, flow_only):
-    """Mutants: equal keys told; keys of one run alone left out."""
-    found = dict((key, values) for key, *values in comparison.differences([read(fast), read(paper)]))
-    assert found == {"growth.end": ["3 h", "1 h"], "numerics.preset": ["fast", "paper"],
-                     "numerics.elements": ["quadratic", "linear"], "numerics.time": ["midpoint", "updates"],
-                     "numerics.refinement": ["0.25", "1"]}
-    found = dict((key, values) for key, *values in comparison.differences([read(paper), read(flow_only)]))
-    assert found["growth.end"] == ["1 h", "-"] and found["flow.mean_velocity"] == ["-", "120833 um/h"]
-    assert comparison.differences([read(fast), read(fast)]) == []
-
-
-def test_values_at_the_common_last_time(fast, paper, flow_only, two):
-    """Linear between rows, relative to the first. Mutants: each run's own last row; differences to the last run."""
-    runs = [read(fast), read(paper)]
-    assert comparison.common_time(runs) == 1.0
-    found = comparison.values(runs, 1.0)["aggregate_area_um2"]
-    series = results.read_table(fast / "timeseries.csv")
-    after = np.flatnonzero(series["time_h"] >= 1)[0]
-    (t0, t1), (a0, a1) = series["time_h"][after - 1: after + 1], series["aggregate_area_um2"][after - 1: after + 1]
-    assert found[0] == pytest.approx(a0 + (a1 - a0) * (1 - t0) / (t1 - t0), rel=1e-12)
-    assert found[1] == results.read_table(paper / "timeseries.csv")["aggregate_area_um2"][-1]
-    mine, other = (float(value or 0) for value in found)
-    assert f"{100 * (other - mine) / mine:+.3g} %" in two
-    assert comparison.values([read(paper), read(flow_only)], 0.0)["donor_min_mg_per_L"][1] is None
-
-
-def test_runs_of_the_same_folder_name_are_told_by_their_paths(fast, paper):
-    assert comparison.short([fast, paper]) == [str(fast), str(paper)]
-    assert comparison.short([fast, fast.parent]) == ["run", fast.parent.name]
-
-
-def refused(capsys, *arguments):
-    assert main(["compare", *map(str, arguments)]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    return line
-
-
-def test_what_cannot_be_compared_is_refused(fast, tmp_path, capsys):
-    """In one line that says which folder and why, and nothing is written. Mutant: a traceback."""
-    out = tmp_path / "out.html"
-    assert f"{tmp_path}: it holds no run: run.json is missing" in refused(capsys, fast, tmp_path, "--out", out)
-    assert "run.json is missing" in refused(capsys, fast, tmp_path / "none", "--out", out)
-    assert "two runs or more" in refused(capsys, fast, "--out", out)
-    assert "ends in .html" in refused(capsys, fast, fast, "--out", tmp_path / "out.csv")
-    assert "is the folder of a run" in refused(capsys, fast, fast, "--out", fast / "other.html")
-    assert "No such file" in refused(capsys, fast, fast, "--out", tmp_path / "none" / "out.html")
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("name, content", [
-    ("run.json", "[]"), ("run.json", "{"), ("run.json", "[" * 100_000), ("run.json", b"\xff\xfe"),
-    ("timeseries.csv", "a,b\n1,2\n"), ("timeseries.csv", "time_h\nsoon\n"), ("timeseries.csv", "time_h\nnan\n"),
-    ("timeseries.csv", ""), ("ledger.csv", "start_h\n1\n"),
-])
-def test_a_broken_run_is_refused_by_the_name_of_its_file(fast, tmp_path, capsys, name, content):
-    copy = shutil.copytree(fast, tmp_path / "run")
-    (copy / name).write_bytes(content if isinstance(content, bytes) else content.encode())
-    line = refused(capsys, fast, copy, "--out", tmp_path / "out.html")
-    assert str(copy) in line and name in line and not (tmp_path / "out.html").exists()
 
 
 def test_a_folder_without_a_run_has_no_page(tmp_path):
