@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from time import perf_counter
 
-from repro import checkpoint, results, stored, timing
+from repro import checkpoint, netcdf, report, results, stored, timing
 from repro.errors import CheckpointError, Interrupted
 from repro.folder import writing
 from repro.loop import Instant, State, added
@@ -102,6 +102,10 @@ class Recorder:
     def finish(self, status: str) -> None:
         """Write everything at the end of a run; a run that is over has nothing to go on from."""
         self.save(status)
+        if self.scene.output.timeseries == "netcdf":
+            self._write("timeseries.nc", netcdf.write, self.scene, self.rows)
+        with writing(self.folder / "report.html"):
+            report.write(self.folder)
         if not status.startswith(UNDONE):
             for name in (checkpoint.NEWEST, checkpoint.PREVIOUS, checkpoint.REFUSED):
                 (self.folder / name).unlink(missing_ok=True)

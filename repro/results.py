@@ -204,8 +204,9 @@ def write_table(path: Path, columns: list[str], rows: list[list]) -> None:
 def read_table(path: Path) -> dict[str, np.ndarray]:
     """The columns of a CSV table that a run has written; an empty field is not-a-number."""
     with path.open(encoding="utf-8", newline="") as lines:
-        rows = list(csv.DictReader(lines))
-    return {name: np.array([float(row[name] or "nan") for row in rows]) for name in rows[0]}
+        reader = csv.DictReader(lines)
+        rows, columns = list(reader), reader.fieldnames or ()
+    return {name: np.array([float(row[name] or "nan") for row in rows]) for name in columns}
 
 
 def provenance(scene: Scene) -> dict:

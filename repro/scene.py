@@ -13,6 +13,7 @@ import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import MISSING, dataclass
 from importlib import resources
+from importlib.util import find_spec
 from pathlib import Path
 
 from repro.units import (
@@ -166,9 +167,11 @@ QUADRATIC = {"time": "midpoint", "transport": "quasi_steady", "transfer": "conse
 
 @dataclass(frozen=True)
 class Output:
-    """Times (h) of the rows and fields wanted, ascending; None: every shape update."""
+    """Times (h) of the rows and fields wanted, ascending; None: every shape update. `timeseries`: the table is always
+    written as timeseries.csv; "netcdf" writes timeseries.nc besides, which needs the package xarray."""
 
     times: tuple[float, ...] | None = times()
+    timeseries: str = choice("csv", "netcdf")
 
 
 @dataclass(frozen=True)
@@ -314,6 +317,8 @@ def _output_rules(scene: Scene) -> Rules:
     end = scene.growth.end if scene.growth else 0.0
     wanted = f"growth.end is {end:g} h" if scene.growth else "there is no [growth]"
     yield max(scene.output.times or (0.0,)) > end, "output.times", f"none after {end:g} h is accepted: {wanted}"
+    missing = scene.output.timeseries == "netcdf" and find_spec("xarray") is None
+    yield missing, "output.timeseries", '"csv" is needed, or the package xarray: pip install xarray'
 
 
 def _steady(scene: Scene) -> bool:

@@ -73,6 +73,7 @@ TABLE_1 = {  # worked out by hand: 1 m = 1e6 um, 1 cm2 = 1e8 um2, 1 day = 24 h, 
     "numerics.refinement": 0.25,
     "numerics.flow_stabilisation": 100.0,
     "numerics.mesh_compressibility": 1.0,
+    "output.timeseries": "csv",
 }
 GIVEN = {"name", "growth.end", "flow.head", "flow.mean_velocity", "output.times"}
 

@@ -1,0 +1,104 @@
+"""The page that lays runs over each other, and tells in what they differ."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+
+import numpy as np
+
+from repro import names
+from repro.report import charts, page, quantities
+from repro.report.reading import Run
+
+#: Columns without a value between rows, and defects, which are round-off.
+NOT_COMPARED = {"time_h", "nodes", "acceptor_balance", "donor_balance", "biomass_balance", *names.YES_NO}
+
+
+def build(runs: Sequence[Run]) -> str:
+    """The page's text; the first run is what the others are compared with."""
+    labels = short([run.folder for run in runs])
+    figures = "".join(map(charts.svg, quantities.overlaid(runs, labels)))
+    body = (_head(runs, labels) + _scenes(runs, labels) + _values(runs, labels)
+            + page.section("Over time", f'<div class="charts">{figures}</div>' if figures else ""))
+    return page.page("Runs compared", body, ["charts.js"])
+
+
+def short(folders: Sequence[Path]) -> list[str]:
+    """The folders' own names, or their whole paths where two of these are the same."""
+    found = [folder.resolve().name for folder in folders]
+    return found if len(set(found)) == len(found) else [str(folder) for folder in folders]
+
+
+def _head(runs: Sequence[Run], labels: Sequence[str]) -> str:
+    rows = "".join(f"<li>{charts.swatch(k)}<b>{escape(label)}</b>: {escape(_told(run))}; {escape(str(run.folder))}</li>"
+                   for k, (run, label) in enumerate(zip(runs, labels)))
+    return f'<header><h1>{len(runs)} runs compared</h1><ul class="runs">{rows}</ul></header>\n'
+
+
+def _told(run: Run) -> str:
+    last = f" to t = {run.times[-1]:.6g} h" if len(run.times) else ", no row"
+    return f"{run.record.get('scene')}, {run.record.get('status', 'status unknown')}{last}"
+
+
+def differences(runs: Sequence[Run]) -> list[tuple[str, ...]]:
+    """(key, value in each run) of the scenes' keys that are not the same in all; "-" where a run has none."""
+    scenes = [page.flat(run.record.get("tables", {})) for run in runs]
+    keys = dict.fromkeys(key for scene in scenes for key in scene)
+    return [(key, *(page.shown(scene[key]) if key in scene else "-" for scene in scenes))
+            for key in keys if any(scene.get(key) != scenes[0].get(key) for scene in scenes)]
+
+
+def _scenes(runs: Sequence[Run], labels: Sequence[str]) -> str:
+    found = page.table("", ["key", *labels], differences(runs))
+    return page.section("What differs in the scenes", found or "<p>Nothing: the scenes are the same.</p>")
+
+
+def common_time(runs: Sequence[Run]) -> float | None:
+    """The last time (h) that every run with rows has reached; None without any."""
+    return min((float(run.times[-1]) for run in runs if len(run.times)), default=None)
+
+
+def values(runs: Sequence[Run], time: float) -> dict[str, list[float | None]]:
+    """Each column's value in each run at a time (h), linear between rows; None where it is not known then."""
+    columns = dict.fromkeys(name for run in runs for name in run.series if name not in NOT_COMPARED)
+    return {name: [_at(run, name, time) for run in runs] for name in columns}
+
+
+def _at(run: Run, name: str, time: float) -> float | None:
+    if name not in run.series or not len(run.times) or time < run.times[0]:
+        return None
+    value = float(np.interp(time, run.times, run.series[name]))
+    return value if np.isfinite(value) else None
+
+
+def _values(runs: Sequence[Run], labels: Sequence[str]) -> str:
+    time = common_time(runs)
+    if time is None:
+        return ""
+    head = ["", labels[0], *(text for label in labels[1:] for text in (label, "difference"))]
+    rows = [(names.with_unit(name), *_row(found)) for name, found in values(runs, time).items()
+            if any(value is not None for value in found)]
+    note = (f'<p class="note">At t = {time:.6g} h, the last time that every run has reached, linear between rows. '
+            "Differences are relative to the first run.</p>")
+    return page.section("Values at the common last time", note, page.table("", head, rows))
+
+
+def _row(found: Sequence[float | None]) -> list[str]:
+    """The first run's value, then each other's with its difference."""
+    first, *others = found
+    texts = [_text(first)]
+    for value in others:
+        texts += [_text(value), _text_difference(first, value)]
+    return texts
+
+
+def _text(value: float | None) -> str:
+    return "-" if value is None else charts.number(value)
+
+
+def _text_difference(first: float | None, value: float | None) -> str:
+    if first is None or value is None or (first == 0 and value != 0):
+        return "-"
+    return "0" if value == first else f"{100 * (value - first) / abs(first):+.3g} %"

@@ -1,0 +1,91 @@
+"""A page that is one file: style and scripts within it, nothing from elsewhere, everything told by others escaped."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from collections.abc import Iterable, Sequence
+from html import escape
+from importlib import resources
+
+
+def page(title: str, body: str, scripts: Sequence[str]) -> str:
+    """A whole page with the package's scripts of these names; what the browser runs is known by its hash."""
+    style = _content("page.css")
+    code = [_content(name) for name in ("errors.js", *scripts)]
+    policy = (f"default-src 'none'; style-src {_hash(style)}; script-src {' '.join(map(_hash, code))}; "
+              "base-uri 'none'; form-action 'none'")
+    run = "".join(f"<script>{text}</script>\n" for text in code)
+    return (f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+            f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
+            f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+            f"<title>{escape(title)}</title>\n<style>{style}</style>\n</head>\n<body>\n"
+            f'<pre id="errors" class="errors" hidden></pre>\n{body}\n{run}</body>\n</html>\n')
+
+
+def _content(name: str) -> str:
+    return resources.files("repro.report").joinpath(name).read_text(encoding="utf-8")
+
+
+def _hash(text: str) -> str:
+    """The source expression of a policy that lets this text through."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode('ascii')}'"
+
+
+def data(name: str, content: dict) -> str:
+    """A block of data for a script; nothing in it can end the block."""
+    text = json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    return f'<script type="application/json" id="{name}">{text}</script>'
+
+
+def section(title: str, *parts: str) -> str:
+    """A part of the page with its heading; nothing where there is nothing to show."""
+    return f"<section><h2>{escape(title)}</h2>{''.join(parts)}</section>\n" if any(parts) else ""
+
+
+def table(caption: str, head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """A table; every column after the first holds values. Nothing without rows."""
+    rows = list(rows)
+    if not rows:
+        return ""
+    heads = "".join(f'<th scope="col"{_value(k)}>{escape(text)}</th>' for k, text in enumerate(head))
+    body = "".join("<tr>" + "".join(f"<td{_value(k)}>{escape(str(text))}</td>" for k, text in enumerate(row)) + "</tr>"
+                   for row in rows)
+    top = f"<thead><tr>{heads}</tr></thead>" if head else ""
+    title = f"<caption>{escape(caption)}</caption>" if caption else ""
+    return f'<div class="scroll"><table>{title}{top}<tbody>{body}</tbody></table></div>'
+
+
+def _value(column: int) -> str:
+    return ' class="value"' if column else ""
+
+
+def flat(tables: object, key: str = "") -> dict[str, object]:
+    """Nested tables as {"numerics.time": value}; lists as they are."""
+    if not isinstance(tables, dict):
+        return {key: tables}
+    found: dict[str, object] = {}
+    for name, value in tables.items():
+        found |= flat(value, f"{key}.{name}" if key else str(name))
+    return found
+
+
+def shown(value: object) -> str:
+    """A value of a record as text: numbers to six digits, with their units as they are."""
+    if isinstance(value, bool) or value is None:
+        return {True: "yes", False: "no", None: "none"}[value]
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, list):
+        return ", ".join(map(shown, value)) or "none"
+    number, _, unit = str(value).partition(" ")
+    return f"{_six(number)} {unit}" if unit and isinstance(value, str) and _six(number) else str(value)
+
+
+def _six(text: str) -> str:
+    """A number in a text to six digits; empty where it is none."""
+    try:
+        return f"{float(text):.6g}"
+    except ValueError:
+        return ""

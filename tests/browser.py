@@ -1,0 +1,104 @@
+"""A headless Chromium, driven over its debugging pipe with the standard library alone."""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import select
+import shutil
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+OPTIONS = """--headless --no-sandbox --disable-gpu --disable-background-networking --disable-sync --no-first-run
+--disable-component-update --disable-default-apps --remote-debugging-pipe""".split()
+PATIENCE = 60.0  # s for an answer
+
+
+class Browser:
+    """One page: ``show`` a file, ``run`` scripts in it, press keys, take pictures; ``requests``: what it asked for."""
+
+    def __enter__(self):
+        self.home = tempfile.mkdtemp()
+        theirs, self.out = os.pipe()
+        self.back, ours = os.pipe()
+        wired = 'exec 3<&"$0" 4>&"$1"; shift; exec "$@"'  # the browser reads from 3 and writes to 4
+        command = ["bash", "-c", wired, str(theirs), str(ours), str(CHROMIUM), *OPTIONS, f"--user-data-dir={self.home}"]
+        self.process = subprocess.Popen([*command, "about:blank"], pass_fds=(theirs, ours), stderr=subprocess.DEVNULL)
+        os.close(theirs)
+        os.close(ours)
+        self.pending, self.count, self.session, self.requests = b"", 0, None, []
+        target = self.call("Target.createTarget", url="about:blank")["targetId"]
+        self.session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        for domain in ("Page", "Network", "Runtime"):
+            self.call(f"{domain}.enable")
+        return self
+
+    def __exit__(self, *error):
+        self.process.terminate()
+        self.process.wait(PATIENCE)
+        os.close(self.out)
+        os.close(self.back)
+        shutil.rmtree(self.home, ignore_errors=True)
+
+    def call(self, method: str, **parameters) -> dict:
+        """One command of the protocol, and its result."""
+        self.count += 1
+        message = {"id": self.count, "method": method, "params": parameters}
+        message |= {"sessionId": self.session} if self.session else {}
+        os.write(self.out, json.dumps(message).encode() + b"\0")
+        while True:
+            found = self._next()
+            if found.get("id") == self.count:
+                assert "error" not in found, found
+                return found["result"]
+
+    def _next(self) -> dict:
+        """The next message; requests are noted."""
+        end = time.monotonic() + PATIENCE
+        while b"\0" not in self.pending:
+            assert select.select([self.back], [], [], max(0.0, end - time.monotonic()))[0], "the browser is silent"
+            self.pending += os.read(self.back, 1 << 20)
+        text, _, self.pending = self.pending.partition(b"\0")
+        found = json.loads(text)
+        if found.get("method") == "Network.requestWillBeSent":
+            self.requests.append(found["params"]["request"]["url"])
+        return found
+
+    def show(self, path: Path, fragment: str = "", width: int = 1200, height: int = 900, dark: bool = False) -> None:
+        """Open a file in a window of this size, and wait until it is loaded."""
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1,
+                  mobile=width < 500)
+        scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
+        self.call("Emulation.setEmulatedMedia", features=[scheme])
+        self.call("Page.navigate", url="about:blank")
+        self.requests.clear()
+        self.call("Page.navigate", url=path.resolve().as_uri() + fragment)
+        end = time.monotonic() + PATIENCE
+        while self.run("document.readyState === 'complete' && location.protocol === 'file:'") is not True:
+            assert time.monotonic() < end, "the page does not load"
+            time.sleep(0.05)
+
+    def run(self, script: str):
+        """The value of a JavaScript expression in the page."""
+        found = self.call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
+        assert "exceptionDetails" not in found, found["exceptionDetails"]
+        return found["result"].get("value")
+
+    def press(self, key: str) -> None:
+        """A key, pressed and released, as ArrowLeft."""
+        codes = {"ArrowLeft": 37, "ArrowRight": 39, "Home": 36, "End": 35}
+        for kind in ("rawKeyDown", "keyUp"):
+            self.call("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=codes[key])
+
+    def point(self, x: float, y: float, kind: str = "mouseMoved") -> None:
+        """The pointer at a place of the window (CSS pixels)."""
+        self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="none")
+
+    def picture(self, path: Path) -> None:
+        """A PNG of the whole page."""
+        content = self.call("Page.captureScreenshot", captureBeyondViewport=True)["data"]
+        path.write_bytes(base64.b64decode(content))

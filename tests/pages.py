@@ -1,0 +1,89 @@
+"""Runs into folders, and their pages as a strict parser sees them."""
+
+import base64
+import json
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+
+from repro import results
+from repro.cli import main
+
+VOID = {"meta", "input", "br", "link", "img", "hr"}
+FAST = 'numerics.preset="fast"'
+HOSTILE = "<script>pwned=1<!--\"'&<img src=x onerror=pwned=1>.toml"
+
+
+class Page(HTMLParser):
+    """Parses strictly: every tag is closed in its turn. `outside` are addresses; `texts` what a reader sees."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open: list[str] = []
+        self.outside, self.tags, self.texts, self.scripts = [], [], [], []
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append((tag, dict(attributes)))
+        self.outside += [value for name, value in attributes if name in ("src", "href", "action", "xlink:href", "data")]
+        assert not [name for name, _ in attributes if name.startswith("on") or name == "style"]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attributes):
+        self.tags.append((tag, dict(attributes)))
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.texts.append(data)
+        if self.open and self.open[-1] in ("script", "style"):
+            self.scripts.append((self.open[-1], self.tags[-1][1], data))
+
+    def attribute(self, tag, name):
+        return [given[name] for each, given in self.tags if each == tag and name in given]
+
+
+def run(tmp_path, scene, *sets, status=0):
+    out = tmp_path / "run"
+    assert main(["run", str(scene), "--out", str(out), *(part for one in sets for part in ("--set", one))]) == status
+    return out
+
+
+def text_of(out):
+    return (out / "report.html").read_text(encoding="utf-8")
+
+
+def first(pattern, text):
+    """What the pattern's group is where it is first found."""
+    found = re.search(pattern, text)
+    assert found, pattern
+    return found[1]
+
+
+def stored(out):
+    """What the page gives its script."""
+    return json.loads(first('<script type="application/json" id="fields">(.*?)</script>', text_of(out)))
+
+
+def numbers(text, kind):
+    return np.frombuffer(base64.b64decode(text), kind)
+
+
+def hostile(out):
+    """A run whose files say what nobody should believe."""
+    record = json.loads((out / "run.json").read_text())
+    record |= {"scene": HOSTILE, "status": "failed: </script><script>pwned=1</script>", "extra": {HOSTILE: [HOSTILE]}}
+    record["tables"][HOSTILE] = {HOSTILE: HOSTILE}
+    record["versions"][HOSTILE] = record["warnings"] = HOSTILE
+    record["wall_time_by_stage_s"][HOSTILE] = 0.1
+    record["newton_iterations"][HOSTILE] = HOSTILE
+    results.write_json(out / "run.json", record)
+    lines = (out / "timeseries.csv").read_text().splitlines()
+    columns = [lines[0] + ',"' + HOSTILE.replace('"', '""') + '"', *(line + ",1" for line in lines[1:])]
+    results.write_text(out / "timeseries.csv", "\n".join(columns) + "\n")
+    return out

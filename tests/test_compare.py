@@ -1,0 +1,113 @@
+"""Runs laid over each other: what is drawn, what is told to differ, and what is refused."""
+
+import html
+import json
+import re
+import shutil
+
+import numpy as np
+import pytest
+
+from repro import results
+from repro.cli import main
+from repro.report import comparison, quantities
+from repro.report.reading import read
+from tests.pages import FAST, Page, run
+
+
+@pytest.fixture(scope="module")
+def fast(tmp_path_factory):
+    return run(tmp_path_factory.mktemp("fast"), "base", FAST, 'growth.end="3 h"')
+
+
+@pytest.fixture(scope="module")
+def paper(tmp_path_factory):
+    return run(tmp_path_factory.mktemp("paper"), "base", 'growth.end="1 h"')
+
+
+@pytest.fixture(scope="module")
+def flow_only(tmp_path_factory):
+    return run(tmp_path_factory.mktemp("flow"), "flow_only")
+
+
+@pytest.fixture
+def two(fast, paper, tmp_path):
+    target = tmp_path / "both.html"
+    assert main(["compare", str(fast), str(paper), "--out", str(target)]) == 0
+    return target.read_text(encoding="utf-8")
+
+
+def test_a_comparison_has_a_line_a_run(two, fast, paper):
+    """Mutants: the second run drawn with the first's numbers; a run left out of a chart."""
+    figures = [json.loads(html.unescape(text)) for text in re.findall('data-chart="([^"]*)"', two)]
+    titles = re.findall("<figcaption>(.*?)<", two)
+    quiet = {"acceptor_stored", "donor_stored", "remeshed_nodes"}  # nothing is stored, no mesh made anew
+    known = [name for kind in quantities.KINDS for name, _ in kind.lines if name not in quiet]
+    assert len(figures) == len(titles) == len(known)
+    conductivity = figures[titles.index("Conductivity")]["lines"]
+    for line, out in zip(conductivity, (fast, paper)):
+        series = results.read_table(out / "timeseries.csv")
+        assert np.allclose(line["t"], series["time_h"], rtol=1e-5)
+        assert np.allclose(line["y"], series["conductivity_m_per_d"], rtol=1e-5)
+    assert Page(two).outside == []
+
+
+def test_differences_of_scenes_are_told_key_by_key(fast, paper, flow_only):
+    """Mutants: equal keys told; keys of one run alone left out."""
+    found = dict((key, values) for key, *values in comparison.differences([read(fast), read(paper)]))
+    assert found == {"growth.end": ["3 h", "1 h"], "numerics.preset": ["fast", "paper"],
+                     "numerics.elements": ["quadratic", "linear"], "numerics.time": ["midpoint", "updates"],
+                     "numerics.refinement": ["0.25", "1"]}
+    found = dict((key, values) for key, *values in comparison.differences([read(paper), read(flow_only)]))
+    assert found["growth.end"] == ["1 h", "-"] and found["flow.mean_velocity"] == ["-", "120833 um/h"]
+    assert comparison.differences([read(fast), read(fast)]) == []
+
+
+def test_values_at_the_common_last_time(fast, paper, flow_only, two):
+    """Linear between rows, relative to the first. Mutants: each run's own last row; differences to the last run."""
+    runs = [read(fast), read(paper)]
+    assert comparison.common_time(runs) == 1.0
+    found = comparison.values(runs, 1.0)["aggregate_area_um2"]
+    series = results.read_table(fast / "timeseries.csv")
+    after = np.flatnonzero(series["time_h"] >= 1)[0]
+    (t0, t1), (a0, a1) = series["time_h"][after - 1: after + 1], series["aggregate_area_um2"][after - 1: after + 1]
+    assert found[0] == pytest.approx(a0 + (a1 - a0) * (1 - t0) / (t1 - t0), rel=1e-12)
+    assert found[1] == results.read_table(paper / "timeseries.csv")["aggregate_area_um2"][-1]
+    mine, other = (float(value or 0) for value in found)
+    assert f"{100 * (other - mine) / mine:+.3g} %" in two
+    assert comparison.values([read(paper), read(flow_only)], 0.0)["donor_min_mg_per_L"][1] is None
+
+
+def test_runs_of_the_same_folder_name_are_told_by_their_paths(fast, paper):
+    assert comparison.short([fast, paper]) == [str(fast), str(paper)]
+    assert comparison.short([fast, fast.parent]) == ["run", fast.parent.name]
+
+
+def refused(capsys, *arguments):
+    assert main(["compare", *map(str, arguments)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    return line
+
+
+def test_what_cannot_be_compared_is_refused(fast, tmp_path, capsys):
+    """In one line that says which folder and why, and nothing is written. Mutant: a traceback."""
+    out = tmp_path / "out.html"
+    assert f"{tmp_path}: it holds no run: run.json is missing" in refused(capsys, fast, tmp_path, "--out", out)
+    assert "run.json is missing" in refused(capsys, fast, tmp_path / "none", "--out", out)
+    assert "two runs or more" in refused(capsys, fast, "--out", out)
+    assert "ends in .html" in refused(capsys, fast, fast, "--out", tmp_path / "out.csv")
+    assert "is the folder of a run" in refused(capsys, fast, fast, "--out", fast / "other.html")
+    assert "No such file" in refused(capsys, fast, fast, "--out", tmp_path / "none" / "out.html")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name, content", [
+    ("run.json", "[]"), ("run.json", "{"), ("run.json", "[" * 100_000), ("run.json", b"\xff\xfe"),
+    ("timeseries.csv", "a,b\n1,2\n"), ("timeseries.csv", "time_h\nsoon\n"), ("timeseries.csv", "time_h\nnan\n"),
+    ("timeseries.csv", ""), ("ledger.csv", "start_h\n1\n"),
+])
+def test_a_broken_run_is_refused_by_the_name_of_its_file(fast, tmp_path, capsys, name, content):
+    copy = shutil.copytree(fast, tmp_path / "run")
+    (copy / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+    line = refused(capsys, fast, copy, "--out", tmp_path / "out.html")
+    assert str(copy) in line and name in line and not (tmp_path / "out.html").exists()

@@ -1,0 +1,99 @@
+"""The time series as NetCDF: equal to the CSV table, with CF's conventions, whole or not at all."""
+import json
+
+import numpy as np
+import pytest
+import xarray
+
+from repro import names, netcdf, results, scene
+from repro.cli import main
+from repro.scene import load_scene, scene_hash, scene_tables
+
+SETS = ['numerics.preset="fast"', 'growth.end="1 h"', 'output.timeseries="netcdf"']
+UNITS = {"m d-1", "mg L-1", "um2", "um", "cm", "h", "1"}
+
+
+def run(out, scene, *sets, status=0):
+    assert main(["run", str(scene), "--out", str(out), *(part for one in sets for part in ("--set", one))]) == status
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    out = tmp_path_factory.mktemp("netcdf") / "run"
+    run(out, "base", *SETS)
+    return out
+
+
+def content(out):
+    with xarray.open_dataset(out / "timeseries.nc", engine="scipy") as found:
+        return found.load()
+
+
+def test_it_is_the_table(made):
+    """Every column to the last bit. Mutants: 32 bits; a column under another's name."""
+    found, table = content(made), results.read_table(made / "timeseries.csv")
+    assert set(found.variables) == set(table) == set(results.COLUMNS) and len(table["time_h"]) > 2
+    for name, column in table.items():
+        assert found[name].dims == ("time_h",) and found[name].dtype == np.float64
+        assert np.array_equal(found[name].to_numpy(), column, equal_nan=True), name
+
+
+def test_it_says_what_it_is(made):
+    """Mutants: units as in the names, a time that hangs on a date, the hash of another scene."""
+    found, loaded = content(made), load_scene("base", SETS)
+    assert found.attrs["Conventions"] == "CF-1.11" and found.attrs["scene"] == "base" and found.attrs["title"]
+    assert found.attrs["scene_hash"] == scene_hash(loaded)
+    assert json.loads(found.attrs["scene_tables"]) == scene_tables(loaded)
+    assert json.loads(found.attrs["versions"])["numpy"] == np.__version__
+    assert {variable.attrs["units"] for variable in found.variables.values()} == UNITS
+    assert all(variable.attrs["long_name"] for variable in found.variables.values())
+    assert found.mean_velocity_m_per_d.attrs == {"long_name": "mean velocity", "units": "m d-1"}
+    assert found.time_h.attrs["units"] == "h" and "time_h" in found.coords
+
+
+def test_what_is_not_modelled_is_not_a_number(tmp_path):
+    run(tmp_path / "run", "flow_only", SETS[-1])
+    found = content(tmp_path / "run")
+    assert np.isnan(found.effluent_acceptor_mg_per_L).all() and found.mean_velocity_m_per_d[0] == pytest.approx(2.9)
+
+
+def test_units_are_those_of_the_names():
+    assert {name: names.udunits(name) for name in ("conductivity_m_per_d", "head_loss_cm", "aggregate_area_um2",
+                                                   "thickness_um", "nodes", "acceptor_supplied_pg_per_m")} == {
+        "conductivity_m_per_d": "m d-1", "head_loss_cm": "cm", "aggregate_area_um2": "um2", "thickness_um": "um",
+        "nodes": "1", "acceptor_supplied_pg_per_m": "pg m-1"}
+
+
+def test_a_table_alone_is_the_default(tmp_path):
+    run(tmp_path / "run", "flow_only")
+    assert not (tmp_path / "run/timeseries.nc").exists() and (tmp_path / "run/timeseries.csv").exists()
+
+
+def test_a_run_without_rows_has_an_empty_table(tmp_path):
+    netcdf.write(tmp_path / "timeseries.nc", load_scene("base"), [])
+    assert content(tmp_path).sizes["time_h"] == 0
+
+
+def test_it_is_whole_or_not_there(tmp_path, monkeypatch):
+    """The earlier file stays, nothing else does. Mutant: written in its place."""
+    target = tmp_path / "timeseries.nc"
+    target.write_text("earlier")
+
+    def full(self, path, **options):
+        path.write_bytes(b"CDF")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(xarray.Dataset, "to_netcdf", full)
+    with pytest.raises(OSError, match="No space"):
+        netcdf.write(target, load_scene("base"), [])
+    assert target.read_text() == "earlier" and list(tmp_path.iterdir()) == [target]
+
+
+def test_without_xarray_it_is_refused_before_the_run(tmp_path, monkeypatch, capsys):
+    """Mutant: an error at the end of the run."""
+    monkeypatch.setattr(scene, "find_spec", lambda name: None)
+    run(tmp_path / "run", "base", *SETS, status=2)
+    (line,) = capsys.readouterr().err.splitlines()
+    assert 'output.timeseries = "netcdf"' in line and "pip install xarray" in line
+    assert list(tmp_path.iterdir()) == []
+    run(tmp_path / "run", "flow_only")

@@ -1,0 +1,216 @@
+"""The pages of runs: what they say, that they need nothing else, and that nothing told by others is markup."""
+
+import base64
+import hashlib
+import html
+import json
+import re
+import shutil
+
+import meshio
+import numpy as np
+import pytest
+
+from repro import names, report, results
+from repro.report import fields, page, quantities
+from repro.report.reading import NoRun, read
+from tests.pages import FAST, HOSTILE, Page, hostile, numbers, run, stored, text_of
+
+
+@pytest.fixture(scope="module")
+def fast(tmp_path_factory):
+    return run(tmp_path_factory.mktemp("fast"), "base", FAST, 'growth.end="3 h"')
+
+
+@pytest.fixture(scope="module")
+def paper(tmp_path_factory):
+    return run(tmp_path_factory.mktemp("paper"), "base", 'growth.end="1 h"')
+
+
+@pytest.fixture(scope="module")
+def flow_only(tmp_path_factory):
+    return run(tmp_path_factory.mktemp("flow"), "flow_only")
+
+
+def test_every_run_has_a_page_that_needs_nothing_else(fast, paper, flow_only):
+    """Mutants: an image or style sheet from elsewhere, an unclosed tag, a style that the policy stops."""
+    for out in (fast, paper, flow_only):
+        text = text_of(out)
+        found = Page(text)
+        assert found.outside == [] and "@import" not in text and "url(" not in text and "://" not in text
+        (policy,) = found.attribute("meta", "content")[:1]
+        assert policy.startswith("default-src 'none'; ") and "unsafe" not in policy
+        for kind, given, content in found.scripts:
+            digest = base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()
+            assert given.get("type") == "application/json" or f"{kind}-src" in policy and f"'sha256-{digest}'" in policy
+        assert {"style", "script"} == {kind for kind, _, _ in found.scripts}
+
+
+def test_charts_of_a_whole_run(fast):
+    """Mutant: a chart that is forgotten."""
+    text = text_of(fast)
+    titles = re.findall("<figcaption>(.*?)<", text)
+    assert titles == [kind.title for kind in quantities.KINDS]
+    assert "Head loss" in titles and "Defects of the balances" in titles
+    for word in ("factorise and solve", "Newton iterations, transport", "scene hash", "numpy", "kinematic_viscosity"):
+        assert word in text
+
+
+def test_what_is_not_modelled_is_left_out(flow_only, fast):
+    """Mutants: empty charts, fields of zeros, a slider for one time."""
+    text, packed = text_of(flow_only), stored(flow_only)
+    assert "Not modelled: substrates, kinetics, growth." in text and "acceptor" not in text.split("<script>")[0]
+    assert [field["name"] for field in packed["fields"]] == ["velocity_m_per_d", "head_cm", "region"]
+    assert "<figure" not in text and '<div class="time" hidden>' in text
+    assert "Not modelled" not in text_of(fast) and '<div class="time">' in text_of(fast)
+
+
+@pytest.mark.parametrize("name", ["fast", "paper"])
+def test_fields_of_the_page_are_those_of_the_files(request, name):
+    """Each array to half a step of its 65534, with the mesh's own nodes. Mutants: the wrong frame's mesh, values of all
+    nodes where those of the aggregate are told, a range over all times."""
+    out = request.getfixturevalue(name)
+    packed, entries = stored(out), fields.index(out)
+    assert packed["of"] == len(entries) == len(packed["frames"])
+    box = np.array(packed["box"]).reshape(2, 2)
+    for frame, (time, path) in zip(packed["frames"], entries):
+        grid, mesh = meshio.vtu.read(path), packed["meshes"][frame["mesh"]]
+        cells = grid.cells[0].data
+        assert frame["time"] == time and mesh["per"] == cells.shape[1] == {"fast": 6, "paper": 3}[name]
+        assert (numbers(mesh["cells"], "<u4").reshape(cells.shape) == cells).all()
+        region = numbers(mesh["body"], "<u1") == 1
+        assert (region == grid.cell_data["region"][0]).all() and region.any() and not region.all()
+        points = box[:, 0] + numbers(frame["points"], "<u2").reshape(-1, 2) / 65534 * (box[:, 1] - box[:, 0])
+        assert np.abs(points - grid.points[:, :2]).max() <= 0.51 / 65534 * (box[:, 1] - box[:, 0]).max()
+        nodes = np.unique(cells[region])
+        for field in packed["fields"]:
+            low, high, text = frame["values"][field["name"]]
+            node = field["at"] == "node"
+            value = grid.point_data[field["name"]] if node else grid.cell_data[field["name"]][0]
+            value = np.linalg.norm(value, axis=1) if value.ndim == 2 else value
+            value = value[nodes if node else region] if field["body"] else value
+            told = low + numbers(text, "<u2") / 65534 * (high - low)
+            assert (low, high) == (value.min(), value.max())
+            assert np.abs(told - value).max() <= 0.51 / 65534 * (high - low)
+
+
+def test_a_value_that_is_not_finite_has_none(tmp_path):
+    low, high, text = fields._levels(np.array([1.0, np.nan, 3.0, np.inf]))
+    assert (low, high) == (1.0, 3.0) and numbers(text, "<u2").tolist() == [0, 65535, 65534, 65535]
+
+
+def test_many_frames_are_thinned_and_the_page_says_so(paper, tmp_path, monkeypatch):
+    """The first and the last are always shown. Mutants: the last dropped, a count that is not told."""
+    monkeypatch.setattr(fields, "MOST_FRAMES", 3)
+    copy = shutil.copytree(paper, tmp_path / "run")
+    report.write(copy)
+    assert [frame["time"] for frame in stored(copy)["frames"]] == [0, 0.4, 1.0]
+    assert "3 of 6 times shown" in text_of(copy) and "all 6 times shown" in text_of(paper)
+    monkeypatch.setattr(fields, "MOST_BYTES", 1)
+    report.write(copy)
+    assert [frame["time"] for frame in stored(copy)["frames"]] == [0, 1.0]
+
+
+def test_fields_are_read_from_the_runs_own_files_alone(paper, tmp_path):
+    """Mutant: any file that the index names is opened."""
+    copy = shutil.copytree(paper, tmp_path / "run")
+    (tmp_path / "fields").mkdir()
+    shutil.copy(copy / "fields/fields_0000.vtu", tmp_path / "fields/fields_0000.vtu")
+    results.write_index(copy / "fields.pvd", [(0.0, "../fields/fields_0000.vtu"), (1.0, "fields/fields_0001.vtu"),
+                                              (2.0, str(tmp_path / "fields/fields_0000.vtu"))])
+    assert [time for time, _ in fields.index(copy)] == [1.0]
+
+
+def test_nothing_told_by_others_is_markup(fast, tmp_path):
+    """Names, status, keys, values, columns and folders. Mutants: any one of them put in as it is."""
+    copy = hostile(shutil.copytree(fast, tmp_path / "<b onclick=pwned=1>"))
+    report.write(copy)
+    report.compare([copy, fast], tmp_path / "both.html")
+    for text in (text_of(copy), (tmp_path / "both.html").read_text()):
+        found = Page(text)
+        assert {tag for tag, _ in found.tags} <= {tag for tag, _ in Page(text_of(fast)).tags} | {"ul", "li", "b"}
+        assert "<script>pwned" not in text and "<img" not in text and "<b onclick" not in text
+        assert any(HOSTILE in one for one in found.texts)
+        assert len(found.scripts) <= 6
+
+
+def test_a_scene_with_a_hostile_name_runs_to_its_page(tmp_path):
+    (tmp_path / HOSTILE).write_text('[pore]\nwidth = "50 um"\n')
+    text, name = text_of(run(tmp_path, tmp_path / HOSTILE)), HOSTILE.removesuffix(".toml")
+    assert Page(text).texts.count(name) == 1 and f"<title>{html.escape(name)}: a pore</title>" in text
+
+
+def test_data_cannot_end_its_block():
+    text = page.data("x", {"a": "</script><!--<script>"})
+    assert text.count("<") == 2 and json.loads(Page(text).scripts[0][2]) == {"a": "</script><!--<script>"}
+
+
+def test_the_same_run_makes_the_same_page(fast):
+    """Mutants: a date in the page, an order that hangs on hashes."""
+    before = text_of(fast)
+    report.write(fast)
+    assert text_of(fast) == before
+
+
+def test_ledger_rates_add_up(paper):
+    """Rate times step is the ledger's own sum. Mutants: a rate over the step before, one step left out."""
+    found, book = quantities.series(read(paper)), results.read_table(paper / "ledger.csv")
+    for part in ("supplied", "out", "consumed"):
+        times, rates = found[f"acceptor_{part}"]
+        assert np.allclose(times, (book["start_h"] + book["end_h"]) / 2)
+        total = np.sum(rates * (book["end_h"] - book["start_h"])) * 1e6
+        assert total == pytest.approx(book[f"acceptor_{part}_pg_per_m"].sum(), rel=1e-12)
+    assert found["biomass_made"][1][-1] == pytest.approx(1e-6 * book["biomass_made_pg_per_m"].sum(), rel=1e-12)
+    assert "acceptor_stored" not in found
+
+
+def test_contact_is_marked(tmp_path):
+    """Mutant: the last time of contact instead of the first."""
+    out = run(tmp_path, "wide", FAST, 'pore.width="20 um"', 'aggregate.radius="17.9 um"', 'growth.end="1 h"')
+    series = results.read_table(out / "timeseries.csv")
+    touching = series["time_h"][series["contact"] == 1][0]
+    assert quantities.contact(read(out)) == [touching] and 0 < touching < series["time_h"][-1]
+    assert f"contact with the opposite wall, t = {touching:.6g} h" in text_of(out) and 'class="mark"' in text_of(out)
+
+
+def test_a_run_that_stops_has_its_page(tmp_path, monkeypatch, capsys):
+    """Before its first row too. Mutants: a page only at a good end; the status left out."""
+    from repro import running
+    from repro.errors import SimulationError
+
+    def stops(scene):
+        raise SimulationError("stopped in the step from t = 0 h, in <growth>: no")
+        yield
+
+    monkeypatch.setattr(running, "simulate", stops)
+    text = text_of(run(tmp_path, "base", status=1))
+    assert "Failed: stopped in the step from t = 0 h, in &lt;growth&gt;: no" in text and "no row" in text
+    Page(text)
+
+
+def test_every_name_has_its_unit_or_is_a_pure_number(fast, paper):
+    """Names of columns, ledgers and arrays. Mutant: an array whose name says nothing of its unit."""
+    arrays = [meshio.vtu.read(fields.index(out)[-1][1]) for out in (fast, paper)]
+    told = {name for grid in arrays for name in (*grid.point_data, *grid.cell_data)}
+    assert {"velocity_m_per_d", "stress_xy_MPa", "theta"} <= told
+    for name in told | set(results.COLUMNS) | set(results.LEDGER_COLUMNS):
+        assert bool(names.unit(name)) != (name in names.PURE), name
+        assert name in results.LEDGER_COLUMNS or names.words(name) != name or name in names.PURE, name
+    assert (names.unit("mean_velocity_m_per_d"), names.unit("thickness_um")) == ("m/day", "um")
+    assert (names.udunits("donor_min_mg_per_L"), names.udunits("aggregate_area_um2")) == ("mg L-1", "um2")
+
+
+def test_a_folder_without_a_run_has_no_page(tmp_path):
+    with pytest.raises(NoRun, match="run.json is missing"):
+        report.write(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("content", ["", "<VTKFile", '<VTKFile type="UnstructuredGrid"/>'])
+def test_broken_fields_are_an_error_and_no_page(paper, tmp_path, content):
+    copy = shutil.copytree(paper, tmp_path / "run")
+    (copy / "fields/fields_0005.vtu").write_text(content)
+    (copy / "report.html").unlink()
+    with pytest.raises(ValueError, match="fields cannot be read"):
+        report.write(copy)
+    assert not (copy / "report.html").exists()
