@@ -20,7 +20,8 @@ def started(*arguments, threads="1", **options) -> subprocess.Popen:
             "from repro.cli import main; sys.exit(main(sys.argv[1:]))")
     names = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), threads)
     given = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, **options}
-    return subprocess.Popen([sys.executable, "-c", code, "run", *map(str, arguments)], env={**os.environ, **names}, **given)
+    command = [sys.executable, "-c", code, "run", *map(str, arguments)]
+    return subprocess.Popen(command, env={**os.environ, **names}, **given)
 
 
 def shell(*arguments, **options) -> tuple[int, str, str]:

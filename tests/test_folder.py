@@ -150,11 +150,12 @@ def test_a_file_that_may_not_grow_ends_a_run_with_status_2(tmp_path):
 @pytest.mark.thorough
 @pytest.mark.skipif(not may_mount(), reason="nothing can be mounted here")
 def test_a_full_disk(tmp_path):
-    """A file system with room for half of a run runs full, the run ends with status 2 and a word on the file; with more room it goes on
-    to the bits of the whole run. Mutant: a checkpoint that is written over the last good one."""
+    """A file system too small for a run and its checkpoints runs full, the run ends with status 2 and a word on the
+    file; with more room it goes on to the bits of the whole run. Mutant: a checkpoint written over the last good one.
+    """
     assert shell(*SHORT, "--set", 'growth.end="12 h"', "--set", "numerics.tolerance=0.002", "--out",
                  tmp_path / "whole")[0] == 0
-    disk, room = tmp_path / "disk", sum(map(len, files(tmp_path / "whole").values())) // 2
+    disk, room = tmp_path / "disk", sum(map(len, files(tmp_path / "whole").values())) * 3 // 4
     disk.mkdir()
     command = f"""mount -t tmpfs -o size={room} tmpfs {disk}
         {sys.executable} -m repro run base --set 'numerics.preset="fast"' --set 'growth.end="12 h"' \\
