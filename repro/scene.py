@@ -42,7 +42,7 @@ class Pore:
     """The channel `0 <= y <= width` (um)."""
 
     width: float = quantity("100 um", "um", about="W_pore, from wall to wall",
-                            source="Table 1: typically 100 um; section 4 has 50 um")
+                            source="Table 1 (typically 100 um; 50 um in section 4)")
     length: float = quantity("600 um", "um", about="L_pore, from end to end", source="Table 1")
 
 
@@ -63,8 +63,10 @@ class Flow:
                                            about="u_ave, mean over the width; either this or head")
     viscosity_ratio: float = number(2.0e3, source="2.1, Table 1",
                                     about="lambda, viscosity of the aggregate over that of water")
-    kinematic_viscosity: float = quantity("0.01003 cm^2/s", "um^2/h", about="nu_water", source="(1), Table 1")
-    gravity: float = quantity("9.81 m/s^2", "um/h^2", about="g", source="(1), Table 1")
+    kinematic_viscosity: float = quantity("0.01003 cm^2/s", "um^2/h", about="nu of water",
+                                          source="(1), Table 1")
+    gravity: float = quantity("9.81 m/s^2", "um/h^2", about="g, the acceleration of gravity",
+                              source="(1), Table 1")
     density: float = quantity("998 mg/cm^3", "mg/L", source="Table 1 [E19]",
                               about="rho of water; only growth.fluid_forces needs it")
 
@@ -73,7 +75,7 @@ class Flow:
 class Substrate:
     """A substrate of section 2.2: supply (10 K_s in section 4), K_s (mg/L), D in water and in biomass (um^2/h)."""
 
-    supply: float = quantity("10 mg/L", "mg/L", NON_NEGATIVE, source="(11), section 4: 10 K_s",
+    supply: float = quantity("10 mg/L", "mg/L", NON_NEGATIVE, source="(11), section 4 (10 K_s)",
                              about="C_supply of the water that comes in, and of all water at t = 0")
     half_saturation: float = quantity("1.0 mg/L", "mg/L", about="K_s of Monod's law", source="(7)-(10), Table 1")
     diffusivity: float = required("2.32 cm^2/day", "um^2/h", about="D in water", source="(7)-(8), Table 1")
@@ -87,7 +89,7 @@ class Acceptor(Substrate):
 
     diffusivity: float = quantity("2.32 cm^2/day", "um^2/h", about="D_A in water", source="(7), Table 1")
     diffusivity_in_aggregate: float = quantity("1.85 cm^2/day", "um^2/h", about="D_A in the aggregate",
-                                               source="2.2, Table 1: 80 % of that in water")
+                                               source="2.2 (80 % of that in water), Table 1")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,7 +98,7 @@ class Donor(Substrate):
 
     diffusivity: float = quantity("1.01 cm^2/day", "um^2/h", about="D_D in water", source="(8), Table 1")
     diffusivity_in_aggregate: float = quantity("0.81 cm^2/day", "um^2/h", about="D_D in the aggregate",
-                                               source="2.2, Table 1: 80 % of that in water")
+                                               source="2.2 (80 % of that in water), Table 1")
 
 
 @dataclass(frozen=True)
@@ -124,7 +126,7 @@ class Kinetics:
     decay_oxygen_demand: float = number(1.42, about="d_c, mg of acceptor per mg of biomass that degrades",
                                         source="(7) [E3], Table 1")
     acceptor_to_donor_ratio: float = number(1.52, about="F, mg of acceptor per mg of donor",
-                                            source="(7), Table 1, as printed; its COD - Y d_c is 1.5138 [E1]")
+                                            source="(7), Table 1 as printed, where COD - Y d_c is 1.5138 [E1]")
     maximum_density: float = quantity("30000 mg/L", "mg/L", about="X_m, mass of biomass per volume of aggregate",
                                       source="(28), Table 1")
 
