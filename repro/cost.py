@@ -95,9 +95,9 @@ def steps(scene) -> tuple[int, int]:
     contact, end = numbers.at_end(scene).contact, scene.growth.end
     free = end if contact is None else min(contact, end)
     longest = longest_step(scene)
-    touching = math.ceil((end - free) / longest - 1e-9)
-    stops = len(scene.output.times or ())
-    return max(_count(min(scene.growth.time_step, longest), longest, free), stops - touching), touching
+    total = max(_count(min(scene.growth.time_step, longest), longest, end), len(scene.output.times or ()))
+    touching = min(total, math.ceil((end - free) / longest - 1e-9))
+    return total - touching, touching
 
 
 def longest_step(scene) -> float:

@@ -197,7 +197,7 @@ PRESETS: dict[str, dict[str, str | float]] = {
 class Output:
     """Times (h) of the rows and fields wanted, ascending; None: every shape update."""
 
-    times: tuple[float, ...] | None = times(source="Figures 4-6, plates 1-2 show a few times",
+    times: tuple[float, ...] | None = times(source="Figures 4-6",
                                             about="Times of the rows and fields wanted; left out: every step")
 
 

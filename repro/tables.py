@@ -48,8 +48,8 @@ class Results(Mapping[str, np.ndarray]):
 
     @property
     def units(self) -> dict[str, str]:
-        """The unit of each column; "1" for a plain number."""
-        return {name: unit(name) for name in self.columns}
+        """The unit of each column and field; "1" for a plain number."""
+        return {name: unit(name) for name in (*self.columns, *self._fields[0])}
 
     @property
     def time(self) -> np.ndarray:
@@ -71,7 +71,7 @@ class Results(Mapping[str, np.ndarray]):
         """A table for notebooks: the first and the last rows."""
         rows = list(range(len(self.time)))
         rows = rows if len(rows) <= 2 * SHOWN else [*rows[:SHOWN], *rows[-SHOWN:]]
-        head = _html_row("th", [f"{name} ({unit})" for name, unit in self.units.items()])
+        head = _html_row("th", [f"{name} ({unit(name)})" for name in self])
         body = "".join(_html_row("td", [f"{column[row]:.5g}" for column in self.values()]) for row in rows)
         caption = f"{self.name}: {len(self.time)} rows; {self.status}"
         return f"<table><caption>{escape(caption)}</caption><thead>{head}</thead><tbody>{body}</tbody></table>"
