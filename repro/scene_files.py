@@ -8,7 +8,8 @@ from pathlib import Path
 from repro.reading import Place, did_you_mean, elsewhere, shown
 from repro.units import SceneError, nearest
 
-QUOTES = 'a value with a unit stands in quotes, such as width = "50 um"'
+LONGEST_LINE = 80  # characters of a line of a file in a message
+BARE = re.compile(r"=\s*[-+.\d][-+.\deE]*\s*[A-Za-z\u00b5\u03bc]")  # a value with a unit, without quotes
 
 
 def packaged_scenes() -> tuple[str, ...]:
@@ -54,13 +55,14 @@ def read_tables(file: str) -> dict:
 
 
 def _line_of(text: str, message: str) -> str:
-    """The line that the parser's message speaks of, the last one where it says that the text ends too early."""
+    """The line that the parser's message speaks of, if it does of one."""
     lines = text.replace("\r\n", "\n").split("\n")
     found = re.search(r"\(at line (\d+)", message)
     if found is None:
         return ""
     line = lines[int(found[1]) - 1].strip()
-    return f": {shown(line)[1:-1]}; {QUOTES}"
+    hint = '; a value with a unit stands in quotes, such as width = "50 um"' if BARE.search(line) else ""
+    return f": {line if len(line) <= LONGEST_LINE else line[:LONGEST_LINE - 3] + '...'}{hint}"
 
 
 def override(tables: dict, entry: str, file: str, known: tuple[str, ...]) -> None:

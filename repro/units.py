@@ -221,9 +221,10 @@ def to_internal(value: object, unit: str) -> float:
 
 
 def nearest(word: str, words: Iterable[str]) -> str:
-    """The one of the words that may have been meant; "" where none is near."""
-    folded = {other.casefold(): other for other in words}
-    found = difflib.get_close_matches(word[:60].casefold(), list(folded), n=1)
+    """The one of the words that may have been meant: near in its letters, or with it as a part; "" where there is none.
+    """
+    folded, word = {other.casefold(): other for other in words}, word[:60].casefold()
+    found = difflib.get_close_matches(word, list(folded), n=1) or [other for other in folded if word in other.split("_")]
     return folded[found[0]] if found else ""
 
 
