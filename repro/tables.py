@@ -15,7 +15,7 @@ from repro.simulation import simulate
 
 #: How names end, and what they are then in.
 UNITS = {"_m_per_d": "m/d", "_mg_per_L": "mg/L", "_um2": "um2", "_um": "um", "_cm": "cm", "_h": "h", "_MPa": "MPa"}
-#: Rows of a notebook's table at either end.
+#: Times of a notebook's table at either end.
 SHOWN = 5
 
 
@@ -68,17 +68,18 @@ class Results(Mapping[str, np.ndarray]):
         return f"<Results of {self.name}: {len(self.time)} rows, {len(self)} columns, {self.status}>"
 
     def _repr_html_(self) -> str:
-        """A table for notebooks: the first and the last rows."""
-        rows = list(range(len(self.time)))
-        rows = rows if len(rows) <= 2 * SHOWN else [*rows[:SHOWN], *rows[-SHOWN:]]
-        head = _html_row("th", [f"{name} ({unit(name)})" for name in self])
-        body = "".join(_html_row("td", [f"{column[row]:.5g}" for column in self.values()]) for row in rows)
-        caption = f"{self.name}: {len(self.time)} rows; {self.status}"
-        return f"<table><caption>{escape(caption)}</caption><thead>{head}</thead><tbody>{body}</tbody></table>"
+        """A table for notebooks: a line a column, the first and the last times side by side."""
+        shown = list(range(len(self.time)))
+        shown = shown if len(shown) <= 2 * SHOWN else [*shown[:SHOWN], *shown[-SHOWN:]]
+        lines = [_html_row([f"{name} ({unit(name)})", *(f"{column[row]:.4g}" for row in shown)])
+                 for name, column in self.items()]
+        caption = escape(f"{self.name}: {len(self.time)} rows, {len(shown)} shown; {self.status}")
+        return f"<table><caption>{caption}</caption>{''.join(lines)}</table>"
 
 
-def _html_row(tag: str, values: list[str]) -> str:
-    return "<tr>" + "".join(f"<{tag}>{escape(value)}</{tag}>" for value in values) + "</tr>"
+def _html_row(values: list[str]) -> str:
+    head, *rest = map(escape, values)
+    return f"<tr><th>{head}</th>" + "".join(f"<td>{value}</td>" for value in rest) + "</tr>"
 
 
 def solve(scene: Scene) -> Results:

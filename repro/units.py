@@ -224,7 +224,8 @@ def nearest(word: str, words: Iterable[str]) -> str:
     """The one of the words that may have been meant: near in its letters, or with it as a part; "" where there is none.
     """
     folded, word = {other.casefold(): other for other in words}, word[:60].casefold()
-    found = difflib.get_close_matches(word, list(folded), n=1) or [other for other in folded if word in other.split("_")]
+    parts = [other for other in folded if word in other.split("_")]
+    found = difflib.get_close_matches(word, list(folded), n=1) or parts
     return folded[found[0]] if found else ""
 
 

@@ -86,8 +86,9 @@ def test_the_table_of_a_notebook_escapes_and_is_short(found):
     rows = [dict.fromkeys(results.COLUMNS) | {"time_h": float(k)} for k in range(40)]
     html = Results("<script>alert(1)</script>&", rows, [{}] * 40, "<b>")._repr_html_()
     assert "<script" not in html and "&lt;script&gt;" in html and "<b>" not in html
-    assert html.count("<tr>") == 1 + 2 * SHOWN and "<td>39</td>" in html and "<td>20</td>" not in html
-    assert found._repr_html_().count("<tr>") == 1 + len(found.time)
+    assert html.count("<td>") == 2 * SHOWN and "<td>39</td>" in html and "<td>20</td>" not in html
+    assert found._repr_html_().count("<td>") == len(found) * len(found.time)
+    assert "<th>conductivity_m_per_d (m/d)</th>" in found._repr_html_()
     assert repr(found) == f"<Results of base: {len(found.time)} rows, 24 columns, completed>"
 
 

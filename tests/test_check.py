@@ -122,7 +122,7 @@ FEW = ("substrates.acceptor.half_saturation=2e-3 mg/L", "substrates.donor.half_s
                             "growth.end=1e-3 h"),
      ("base", *QUIET, "kinetics.maximum_density=30 mg/L", "kinetics.maximum_utilization_rate=3400 1/day",
       "growth.time_step=1e-4 h", "growth.end=1e-3 h")),
-    # the head's pressure over mu_L: 0.01 at 0.0979 Pa / 9.79 Pa, all of it lost over the aggregate once it is in contact
+    # the head's pressure over mu_L: 0.01 at 0.0979 Pa / 9.79 Pa, all of it lost over the aggregate in contact
     ("growth.fluid_forces", ("base", *QUIET, "growth.end=24 h", "growth.shear_modulus=9.9 Pa"),
      ("base", *QUIET, "growth.end=24 h", "growth.shear_modulus=9.6 Pa")),
     ("growth.fluid_forces", ("base", *QUIET, "growth.end=24 h", "growth.shear_modulus=4 Pa",

@@ -3,6 +3,7 @@
 2000 of them in the thorough profile: a quarter of it a kind.
 """
 
+import io
 import json
 import math
 import os
@@ -10,7 +11,7 @@ import string
 import subprocess
 import sys
 import tomllib
-from pathlib import Path
+from contextlib import redirect_stderr, redirect_stdout
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -19,34 +20,37 @@ from hypothesis import strategies as st
 from repro.cli import main
 from repro.scene import KEYS, SceneError, load_scene, packaged_scenes, parse_scene, scene_tables
 from repro.scene_text import scene_text
+from tests.blocks import ROOT
 
 EACH = 500 if os.environ.get("HYPOTHESIS_PROFILE") == "thorough" else 25
 FUZZ = settings(max_examples=EACH, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture])
 TEXTS = {name: scene_text(name) for name in packaged_scenes()}
+PIECES = [b"", b"\n", b"[", b"]", b'"', b"= ", b"\xff", b"\x00", b"[" * 3000, b"a." * 3000 + b"b = 1\n"]
 LEAVES = sorted(key for key in KEYS if "." in key)
 
 controls = st.text(st.characters(max_codepoint=0x20) | st.sampled_from("\x7f\x85\u2028\u202e\ufeff\x9b[31m\"'\\#=.,"))
 huge = st.sampled_from([10**400, -(10**400), 1e308, -1e308, 5e-324, math.inf, -math.inf, math.nan, 2**63, -0.0])
-units = st.sampled_from(["um", "h", "1/day", "m/day", "mg/L", "MPa", "deg", "K", "um^9", "furlong", "", "%", "um um um"])
+units = st.sampled_from(["um", "h", "1/day", "m/day", "mg/L", "MPa", "deg", "K", "um^9", "ell", "", "%", "um um um"])
 quantities = st.builds(lambda number, unit: f"{number} {unit}", huge | st.floats() | st.integers(), units)
 long = st.builds(lambda letter, count: letter * count, st.sampled_from(["9", "a", "\u00b5", "[", "-", "1e9"]),
                  st.integers(80, 20_000))
-plain = st.none() | st.booleans() | st.integers() | st.floats() | huge | st.text(max_size=40) | controls | quantities | long
+texts = st.text(max_size=40) | controls | quantities | long
+plain = st.none() | st.booleans() | st.integers() | st.floats() | huge | texts
 values = st.recursive(plain, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(
     st.text(max_size=9) | st.sampled_from(LEAVES), inner, max_size=3), max_leaves=8)
 
 
-def one_line(message: str, file: str) -> None:
+def check_line(message: str, file: str) -> None:
     """Is a refusal one printable line of bearable length that names the file?"""
     assert message.startswith(f"{file}: ") and message.isprintable() and len(message) < 700, message
 
 
-def judged(load, file: str) -> None:
+def check_judged(load, file: str) -> None:
     """It loads, to a scene that is read back from what it writes, or raises SceneError."""
     try:
         made = load()
     except SceneError as error:
-        one_line(str(error), file)
+        check_line(str(error), file)
     else:
         assert parse_scene(scene_tables(made), made.name, "again") == made
 
@@ -63,9 +67,8 @@ def garbled(draw):
     for _ in range(draw(st.integers(1, 4))):
         start = draw(st.integers(0, len(text)))
         end = draw(st.integers(start, min(len(text), start + 400)))
-        text = text[:start] + draw(st.binary(max_size=20) | controls.map(str.encode)
-                                   | st.sampled_from([b"", b"\n", b"[", b"]", b'"', b"= ", b"\xff", b"\x00", text[start:end] * 2,
-                                                      b"[" * 3000, b"a." * 3000 + b"b = 1\n"])) + text[end:]
+        fixed = st.sampled_from([*PIECES, text[start:end] * 2])
+        text = text[:start] + draw(st.binary(max_size=20) | controls.map(str.encode) | fixed) + text[end:]
     return draw(st.just(text) | st.binary(max_size=200))
 
 
@@ -74,8 +77,8 @@ def misshapen(draw):
     """The tables of a scene in which a few keys, known ones or not, hold what they should not."""
     tables = tomllib.loads(TEXTS[draw(st.sampled_from(sorted(TEXTS)))])
     for _ in range(draw(st.integers(1, 3))):
-        path = draw(st.sampled_from([*KEYS, *LEAVES]) | st.text(string.ascii_letters + "._ \n\u00e9", min_size=1)).split(".")
-        table = tables
+        key = draw(st.sampled_from([*KEYS, *LEAVES]) | st.text(string.ascii_letters + "._ \n\u00e9", min_size=1))
+        table, path = tables, key.split(".")
         for part in path[:-1]:
             table = table.setdefault(part, {}) if isinstance(table.get(part, {}), dict) else {}
         table[path[-1]] = draw(values)
@@ -88,7 +91,7 @@ def test_a_file_of_any_bytes(folder, content):
     """Mutants: an error of the TOML parser, of UTF-8 or of the stack let through; a line with what it quotes."""
     file = folder / "mine.toml"
     file.write_bytes(content)
-    judged(lambda: load_scene(file), str(file))
+    check_judged(lambda: load_scene(file), str(file))
 
 
 @FUZZ
@@ -96,7 +99,7 @@ def test_a_file_of_any_bytes(folder, content):
 def test_tables_of_any_shape(tables):
     """Wrong types, keys, units, nesting, magnitudes. Mutants: a hint that fails on what it is to help with; a range
     that lets infinity or not-a-number through."""
-    judged(lambda: parse_scene(tables, "mine", "mine.toml"), "mine.toml")
+    check_judged(lambda: parse_scene(tables, "mine", "mine.toml"), "mine.toml")
 
 
 @FUZZ
@@ -107,7 +110,7 @@ def test_tables_of_any_shape(tables):
                 min_size=1, max_size=3))
 def test_any_set(entries):
     """Mutant: a key below a value; a value that is text of a table."""
-    judged(lambda: load_scene("base", entries), "base")
+    check_judged(lambda: load_scene("base", entries), "base")
 
 
 def shown(value: object) -> str:
@@ -134,9 +137,6 @@ def test_the_command_line_refuses_in_one_line_and_writes_nothing(folder, content
 
 def refused(arguments: list[str]) -> str:
     """What the command line says on stderr; it says nothing else, and exits with 2."""
-    import io
-    from contextlib import redirect_stderr, redirect_stdout
-
     out, err = io.StringIO(), io.StringIO()
     with redirect_stdout(out), redirect_stderr(err):
         assert main(arguments) == 2
@@ -144,11 +144,11 @@ def refused(arguments: list[str]) -> str:
     return err.getvalue()
 
 
-@pytest.mark.parametrize("content", [b"\xff\xfe", b"[pore]\nwidth = 50 um\n", b"pore = 3\n", b'[pore]\nwidth = "\\u001b[2J"\n'])
+@pytest.mark.parametrize("content", [b"\xff\xfe", b"[pore]\nwidth = 50 um\n", b'[pore]\nwidth = "\\u001b[2J\\u00b5"\n'])
 def test_a_process_of_its_own_says_the_same(tmp_path, content):
     """With the bytes of its stderr: one line, printable in ASCII where the terminal knows no more."""
     (tmp_path / "mine.toml").write_bytes(content)
-    environment = {**os.environ, "PYTHONIOENCODING": "ascii:backslashreplace", "PYTHONPATH": str(Path(__file__).parents[1])}
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii:backslashreplace", "PYTHONPATH": str(ROOT)}
     done = subprocess.run([sys.executable, "-m", "repro", "run", "mine.toml", "--out", "out"], cwd=tmp_path,
                           capture_output=True, env=environment, check=False)
     assert done.returncode == 2 and done.stdout == b"" and done.stderr.startswith(b"repro: mine.toml: ")
