@@ -3,29 +3,67 @@
 Where the paper is in the code:
 
     section                   equations   module
-    2    coupling                         repro.coupling, repro.pore
-    2    geometry, 2.3.3, 3.1             repro.geometry, repro.mesh
+    2    coupling                         repro.coupling, repro.pore; repro.simulation chooses the scheme
+         steps by their error             repro.stepping, repro.midpoint (second order in time; not in the paper)
+    2    geometry, 2.3.3, 3.1             repro.geometry, repro.mesh, repro.shape
     2.1  flow, 3.2            (1)-(6)     repro.flow
     2.2  kinetics             (7)-(10)    repro.kinetics
     2.2  substrates, 3.3      (7)-(13)    repro.transport (quasi-steady), repro.gear (the paper's transient scheme)
     2.3  growth, 3.4          (14)-(29)   repro.growth
+    2.3.2 fluid forces        (20), (22)  repro.traction
     3.4  reprojection         (30)-(34)   repro.reprojection
-    3.5  mesh motion          (35)        repro.mesh_motion
+    3.5  mesh motion          (35)        repro.mesh_motion, repro.remeshing
     Table 1                               repro.scene, repro.scenes
+    all of it on quadratic curved triangles: repro.curved, with modules of the same names
 
-Ten lines of use:
+and what is around it:
 
-    from repro import load_scene, simulate
+    scenes                                repro.scene (keys, defaults, sources), repro.units, repro.reading,
+                                          repro.rules, repro.scene_files, repro.scene_text (repro scene)
+    what a run will be                    repro.check, of repro.modelled, repro.numbers, repro.simplifications,
+                                          repro.cost (repro check)
+    runs and results                      repro.running, repro.results, repro.tables (NumPy arrays), repro.timing
+    linear algebra                        repro.assembly, repro.linear, repro.cache
+    command line                          repro.cli, repro.commands
+
+Ten lines of use; ``repro/tutorial.md`` has more:
+
+    from repro import load_scene, simulate, solve
 
     scene = load_scene("base", ['growth.end="5 h"'])
-    for instant in simulate(scene):
+    found = solve(scene)                                    # rows of timeseries.csv, as NumPy arrays
+    print(found["conductivity_m_per_d"], found.units["conductivity_m_per_d"], found.fields(5.0).keys())
+
+    for instant in simulate(scene):                         # or step by step, with all that is known
         pore, flow = instant.pore, instant.solved.flow      # um, h, mg/L: see the docstrings
         print(pore.time, 24e-6 * flow.mean_velocity, pore.outline.thickness)
 """
 
-from repro.coupling import PoreEnd
-from repro.running import run
-from repro.scene import Scene, load_scene
-from repro.simulation import simulate
+from __future__ import annotations
 
-__all__ = ["PoreEnd", "Scene", "load_scene", "run", "simulate"]
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from repro.coupling import PoreEnd
+    from repro.errors import SimulationError
+    from repro.running import run
+    from repro.scene import Scene, load_scene
+    from repro.simulation import simulate
+    from repro.tables import Results, solve
+    from repro.units import SceneError
+else:
+    #: The module of each public name, imported when it is first asked for: the solver takes half a second.
+    _MODULES = {"PoreEnd": "coupling", "Results": "tables", "Scene": "scene", "SceneError": "units",
+                "SimulationError": "errors", "load_scene": "scene", "run": "running", "simulate": "simulation",
+                "solve": "tables"}
+
+    def __getattr__(name: str):
+        if name not in _MODULES:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        return getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)
+
+    def __dir__() -> list[str]:
+        return sorted({*globals(), *__all__})
+
+__all__ = ["PoreEnd", "Results", "Scene", "SceneError", "SimulationError", "load_scene", "run", "simulate", "solve"]

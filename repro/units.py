@@ -5,15 +5,16 @@ rad, and what is made of them likewise (a velocity in um/h). A scene's values ar
 exactly, and rounded once, so that "1164 min" and "19.4 h" are the same number.
 
 A kind of value has `read` (what TOML gave -> what the model uses; ValueError or OverflowError when it is not accepted),
-its inverse `write`, and `wanted`, the words that say what is accepted. A table of a scene is a dataclass, whose fields
-carry their kind, or the dataclass of their section, in their metadata.
+its inverse `write`, `accepted` and `wanted`, the words that say what is accepted, and `near`, what may have been meant
+by a value that is not ("" where there is no telling). A table of a scene is a dataclass, whose fields carry their kind,
+or the dataclass of their section, in their metadata, with what they are about and their source in the paper.
 """
 import difflib
 import json
 import math
 import re
-from collections.abc import Callable
-from dataclasses import MISSING, Field, dataclass, field, fields
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cache, partial
 from typing import NamedTuple
@@ -31,9 +32,10 @@ NOUNS = {
 }
 ANGLES = ("deg", "degree", "degrees", "rad", "radian", "radians")  # to pint "ppm" is an angle too
 LONGEST = 80  # characters of a value with its unit
+_DIGITS = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _FACTOR = r"[A-Za-z\u00b5\u03bc]+(?:(?:\^|\*\*)-?[1-9])?"
 _UNIT = rf"(?:1? ?/ ?)?{_FACTOR}(?:(?: ?[*/] ?| ){_FACTOR})*"
-_QUANTITY = re.compile(rf"([+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?) *({_UNIT})")
+_QUANTITY = re.compile(rf"({_DIGITS}) *({_UNIT})")
 
 
 class Range(NamedTuple):
@@ -61,8 +63,20 @@ class Quantity:
     accepts: Range = POSITIVE
 
     @property
+    def accepted(self) -> str:
+        return f"{NOUNS[self.unit]}, {self.accepts.words}"
+
+    @property
     def wanted(self) -> str:
         return f'{NOUNS[self.unit]} is needed, such as "{self.example}" ({self.accepts.words})'
+
+    def near(self, value: object) -> str:
+        """A plain number with the unit of the example."""
+        endless = isinstance(value, int) and abs(value) >= 10**LONGEST
+        if isinstance(value, bool) or endless or not isinstance(value, int | float | str):
+            return ""
+        meant = f"{value} {self.example.split(' ', 1)[1]}"
+        return f'"{meant}"' if _takes(self, meant) else ""
 
     def read(self, value: object) -> float:
         return _within(self.accepts, to_internal(value, self.unit))
@@ -79,8 +93,17 @@ class Number:
     accepts: Range = POSITIVE
 
     @property
+    def accepted(self) -> str:
+        return f"a plain number, {self.accepts.words}"
+
+    @property
     def wanted(self) -> str:
         return f"a plain number is needed, such as {self.example:g} ({self.accepts.words})"
+
+    def near(self, value: object) -> str:
+        """The number that a text begins with."""
+        match = re.match(_DIGITS, value) if isinstance(value, str) and len(value) <= LONGEST else None
+        return match[0] if match and _takes(self, float(match[0])) else ""
 
     def read(self, value: object) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
@@ -98,8 +121,16 @@ class Choice:
     words: tuple[str, ...]
 
     @property
+    def accepted(self) -> str:
+        return " or ".join(f'"{word}"' for word in self.words)
+
+    @property
     def wanted(self) -> str:
-        return " or ".join(f'"{word}"' for word in self.words) + " is needed"
+        return f"{self.accepted} is needed"
+
+    def near(self, value: object) -> str:
+        word = nearest(value, self.words) if isinstance(value, str) else ""
+        return f'"{word}"' if word else ""
 
     def read(self, value: object) -> str:
         if value not in self.words:
@@ -115,6 +146,8 @@ class Times:
     """A list of one or more times (h), in any order; read in ascending order, each once."""
 
     each = Quantity("h", "5 h", NON_NEGATIVE)
+    example = ["5 h", "18 h"]
+    accepted = "a list of one or more times, each zero or more"
     wanted = 'a list of times is needed, such as ["5 h", "18 h"] (each zero or more)'
 
     def read(self, value: object) -> tuple[float, ...]:
@@ -125,37 +158,48 @@ class Times:
     def write(self, value: tuple[float, ...]) -> list[str]:
         return [self.each.write(time) for time in value]
 
+    def near(self, value: object) -> str:
+        """A single time, in a list."""
+        return f"[{json.dumps(value)}]" if isinstance(value, str) and _takes(self.each, value) else ""
 
-def quantity(text: str, unit: str, accepts: Range = POSITIVE, **default) -> Field:
+
+Kind = Quantity | Number | Choice | Times
+
+
+def quantity(text: str, unit: str, accepts: Range = POSITIVE, *, about: str, source: str, **default):
     """A value with a unit: `text` is its default, or only an example where another default is given."""
     default = default or {"default_factory": partial(to_internal, text, unit)}
-    return field(metadata={"kind": Quantity(unit, text, accepts)}, **default)
+    return _told(Quantity(unit, text, accepts), about, source, **default)
 
 
-def required(example: str, unit: str, accepts: Range = POSITIVE) -> Field:
+def required(example: str, unit: str, accepts: Range = POSITIVE, *, about: str, source: str):
     """A value with a unit that has no default."""
-    return field(metadata={"kind": Quantity(unit, example, accepts)})
+    return _told(Quantity(unit, example, accepts), about, source)
 
 
-def number(default: float, accepts: Range = POSITIVE) -> Field:
+def number(default: float, accepts: Range = POSITIVE, *, about: str, source: str):
     """A plain number."""
-    return field(default=default, metadata={"kind": Number(default, accepts)})
+    return _told(Number(default, accepts), about, source, default=default)
 
 
-def choice(*words: str) -> Field:
+def choice(*words: str, about: str, source: str):
     """One of the words, the first by default."""
-    return field(default=words[0], metadata={"kind": Choice(words)})
+    return _told(Choice(words), about, source, default=words[0])
 
 
-def times() -> Field:
+def times(*, about: str, source: str):
     """A list of times, or None."""
-    return field(default=None, metadata={"kind": Times()})
+    return _told(Times(), about, source, default=None)
 
 
-def section(kind: type, **default) -> Field:
+def _told(kind: Kind, about: str, source: str, **default):
+    return field(metadata={"kind": kind, "about": about, "source": source}, **default)
+
+
+def section(kind: type, *, about: str, source: str, **default):
     """A table, whose keys are those of the dataclass `kind`."""
     default = default or {"default_factory": kind}
-    return field(metadata={"section": kind}, **default)
+    return field(metadata={"section": kind, "about": about, "source": source}, **default)
 
 
 class SceneError(ValueError):
@@ -163,67 +207,6 @@ class SceneError(ValueError):
 
     def __init__(self, message: str):
         super().__init__("".join(letter if letter.isprintable() else " " for letter in message))
-
-
-@dataclass(frozen=True)
-class Place:
-    """A key of a file, to be named in a message."""
-
-    file: str
-    key: str = ""
-
-    def below(self, key: str) -> "Place":
-        key = key if len(key) <= 60 else key[:57] + "..."
-        return Place(self.file, f"{self.key}.{key}" if self.key else key)
-
-    def refuse(self, value: object, wanted: str) -> SceneError:
-        stated = f"{self.key} is missing" if value is MISSING else f"{self.key} = {shown(value)}"
-        return SceneError(f"{self.file}: {stated}: {wanted}")
-
-
-def read_table(kind: type, table: object, place: Place, **given):
-    """The dataclass `kind` that a TOML table describes, with `given` for what is no key; SceneError if not accepted."""
-    entries = _entries(kind)
-    if not isinstance(table, dict):
-        raise place.refuse(table, f"a table [{place.key}] is needed, with the keys {', '.join(entries)}")
-    for key in table:
-        if key not in entries:
-            raise place.below(key).refuse(table[key], _instead(key, list(entries), place.key))
-    for key, entry in entries.items():
-        if key not in table and entry.default is MISSING and entry.default_factory is MISSING:
-            raise place.below(key).refuse(MISSING, entry.metadata["kind"].wanted)
-    return kind(**given, **{key: _read_entry(entries[key], table[key], place.below(key)) for key in table})
-
-
-def _read_entry(entry: Field, value: object, place: Place):
-    if "section" in entry.metadata:
-        return read_table(entry.metadata["section"], value, place)
-    kind = entry.metadata["kind"]
-    try:
-        return kind.read(value)
-    except (ValueError, OverflowError):
-        raise place.refuse(value, kind.wanted) from None
-
-
-def write_table(part) -> dict:
-    """The TOML table of a dataclass, with units; what is None is left out."""
-    entries, table = _entries(type(part)), {}
-    for key, entry in entries.items():
-        value = getattr(part, key)
-        if value is not None:
-            table[key] = entry.metadata["kind"].write(value) if "kind" in entry.metadata else write_table(value)
-    return table
-
-
-def _entries(kind: type) -> dict[str, Field]:
-    """The keys of a section."""
-    return {entry.name: entry for entry in fields(kind) if entry.metadata}
-
-
-def _instead(key: str, keys: list[str], table: str) -> str:
-    near = difflib.get_close_matches(key[:60], keys, n=1)
-    hint = f" (did you mean {near[0]}?)" if near else ""
-    return f"there is no such key; {f'[{table}]' if table else 'a scene'} takes {', '.join(keys)}{hint}"
 
 
 def to_internal(value: object, unit: str) -> float:
@@ -237,13 +220,21 @@ def to_internal(value: object, unit: str) -> float:
     return float(Fraction(digits) * factor) if float(digits) else 0.0
 
 
-def shown(value: object, longest: int = 60) -> str:
-    """A value as a message quotes it: as TOML would write it, shortened."""
+def nearest(word: str, words: Iterable[str]) -> str:
+    """The one of the words that may have been meant: near in its letters, or with it as a part; "" where there is none.
+    """
+    folded, word = {other.casefold(): other for other in words}, word[:60].casefold()
+    parts = [other for other in folded if word in other.split("_")]
+    found = difflib.get_close_matches(word, list(folded), n=1) or parts
+    return folded[found[0]] if found else ""
+
+
+def _takes(kind: "Quantity | Number", value: object) -> bool:
     try:
-        text = json.dumps(value, ensure_ascii=False, default=str)
-    except (ValueError, RecursionError):  # an integer of thousands of digits, tables nested by the thousand
-        text = type(value).__name__
-    return text if len(text) <= longest else text[: longest - 3] + "..."
+        kind.read(value)
+    except (ValueError, OverflowError):
+        return False
+    return True
 
 
 def _within(accepts: Range, value: float) -> float:

@@ -1,33 +1,55 @@
-"""What the README shows works as it stands."""
+"""What the README shows works as it stands: every block of commands, of TOML and of Python."""
 
 import re
 import tomllib
-from pathlib import Path
 
 from repro.scene import load_scene, parse_scene
+from tests.blocks import ROOT, blocks, execute, is_repro, is_target
 
-README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
-
-
-def block(language: str) -> str:
-    return re.search(rf"```{language}\n(.*?)```", README, re.DOTALL)[1]
+PAGE = ROOT / "README.md"
+BLOCKS = blocks(PAGE)
 
 
-def test_the_python_example_runs(capsys):
-    exec(compile(block("python"), "README.md", "exec"), {})
-    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
-    assert [float(line[0]) for line in lines] == [0.0, 0.2, 0.4]
-    assert float(lines[0][2]) == 5.0 < float(lines[-1][2])
+def of(language: str) -> list[str]:
+    return [block.text for block in BLOCKS if block.language == language]
+
+
+def test_every_block_is_of_a_kind_that_is_executed():
+    """Mutant: a block that no test looks at."""
+    assert {block.language for block in BLOCKS} <= {"", "console", "sh", "python", "toml"}
+    assert all(is_repro(words) or is_target(words) for block in BLOCKS for words in block.commands)
+
+
+def test_the_commands_run(tmp_path, capsys, monkeypatch):
+    """In the order of the page, in one folder. Mutants: an option that is gone; a scene that is refused."""
+    monkeypatch.chdir(tmp_path)
+    commands = [words for block in BLOCKS for words in block.commands if is_repro(words)]
+    assert {"run", "scene", "check"} <= {words[1] for words in commands}
+    for words in commands:
+        assert execute(words, capsys)[0] == 0, words
+    assert {path.name for path in (tmp_path / "runs").iterdir()} >= {"base", "mine"}
+
+
+def test_the_python_examples_run(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    printed = []
+    for text in of("python"):
+        exec(compile(text, str(PAGE), "exec"), {})
+        printed.append(capsys.readouterr().out.splitlines())
+    (arrays, instants) = printed
+    assert arrays[0].split()[1] == "m/d" and 160 < float(arrays[0].split()[0]) < 175 and arrays[1] == "(783,)"
+    lines = [[float(value) for value in line.split()] for line in instants]
+    assert [line[0] for line in lines] == [0.0, 0.2, 0.4]
+    assert lines[0][2] == 5.0 < lines[-1][2]
 
 
 def test_the_scene_example_is_base():
     """Mutant: an example that drifts from the packaged scene or names a key that is gone."""
-    scene = parse_scene(tomllib.loads(block("toml")), "base", "README.md")
-    assert scene == load_scene("base")
+    (text,) = of("toml")
+    assert parse_scene(tomllib.loads(text), "base", "README.md") == load_scene("base")
 
 
 def test_the_commands_are_targets_of_the_makefile():
-    makefile = (Path(__file__).parents[1] / "Makefile").read_text(encoding="utf-8")
-    commands = set(re.findall(r"`make (\w+)`", README))
+    commands = set(re.findall(r"`make ([\w-]+)`", PAGE.read_text(encoding="utf-8")))
     assert {"figures", "test", "claims", "verify", "bench"} <= commands
-    assert all(re.search(rf"^{command}:", makefile, re.MULTILINE) for command in commands)
+    assert all(is_target(["make", command]) for command in commands)

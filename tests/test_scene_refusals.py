@@ -232,3 +232,50 @@ def test_what_would_never_end_is_refused():
     for entry in ("growth.time_step=1e-9 h", "aggregate.radius=1e-6 um", "numerics.refinement=1e9"):
         with pytest.raises(SceneError, match=entry.split("=")[0]):
             load_scene("base", [entry])
+
+
+# ---------------------------------------------------------------- what may have been meant
+
+
+@pytest.mark.parametrize("override, meant", [
+    ("pore.width=50", '"50 um"'),
+    ("pore.width=\"50\"", '"50 um"'),
+    ("growth.end=19.4", '"19.4 h"'),
+    ('flow.viscosity_ratio="500 um"', "500"),
+    ("output.times=5 h", '["5 h"]'),
+    ("numerics.transport=geer", '"gear"'),
+    ("numerics.preset=Paper", '"paper"'),
+    ("kinetics.yield=0.5", "yield_coefficient"),
+    ("pore.radius=5 um", "aggregate.radius"),
+    ("radius=5 um", "aggregate.radius"),
+    ("acceptor.supply=5 mg/L", "substrates.acceptor"),
+    ("substrates.supply=5 mg/L", "substrates.acceptor.supply or substrates.donor.supply"),
+    ("PORE.width=5 um", "pore"),
+    ("pore.widht", "pore.width"),
+    ("pore.width.value=5 um", "pore.width"),
+])
+def test_what_may_have_been_meant(override, meant):
+    """Mutants: no hint; one from the section alone; one that would be refused too."""
+    assert refusal("base", override).endswith(f"(did you mean {meant}?)")
+
+
+@pytest.mark.parametrize("override", ["pore.width=-50", "pore.width=true", "pore.width={}", "numerics.preset=7",
+                                      "pore.xyzzy=5 um", f"pore.width=0x{'f' * 9000}", "growth.minimum_contact_angle=90"])
+def test_nothing_is_guessed_where_nothing_is_near(override):
+    assert "did you mean" not in refusal("base", override)
+
+
+@pytest.mark.parametrize("text, said", [
+    ("[pore]\nwidth = 50 um\n", 'line 2, column 12): width = 50 um; a value with a unit stands in quotes'),
+    ('[pore]\nwidth = "50 um\n', 'line 2, column 15): width = "50 um'),
+    ('[pore]\r\n\r\n[pore]\r\n', "line 3, column 6): [pore]"),
+    ("a = 1\nb = " + "x" * 500, "line 2, column 5): b = xxx"),
+])
+def test_not_toml_shows_the_line(tmp_path, text, said):
+    """Mutants: the line before; a hint of quotes for a line that has them."""
+    message = refusal(written(tmp_path, text))
+    assert said in message and ("stands in quotes" in message) == ("stands in quotes" in said)
+
+
+def test_a_scene_that_is_nearly_packaged():
+    assert refusal("wid").endswith("(did you mean wide?)")

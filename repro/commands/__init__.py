@@ -4,6 +4,6 @@ Each has ``add(commands)``, which adds its parser with ``set_defaults(call=...)`
 arguments and returns the exit status.
 """
 
-from repro.commands import compare, run
+from repro.commands import check, compare, run, scene
 
-COMMANDS = (run, compare)
+COMMANDS = (run, scene, check, compare)

@@ -1,0 +1,143 @@
+"""`repro scene`: every key with its default, unit, range and source; what is written is the scene that was read."""
+
+import re
+import tomllib
+
+import pytest
+from hypothesis import given
+
+from repro.cli import main
+from repro.reading import entries
+from repro.scene import KEYS, OURS, PRESETS, Scene, load_scene, packaged_scenes, parse_scene, scene_tables
+from repro.scene_text import scene_text
+from repro.units import quantity
+from tests.strategies import scenes
+
+#: Keys that exclude another one that is set: they stay commented out.
+OTHER_DRIVE = {"head": "mean_velocity", "mean_velocity": "head"}
+SOURCE = re.compile(r"Table 1|[Ss]ection \d|\(\d+\)|\b[23]\.\d|[Ff]igures? \d")
+
+
+def fields(kind, above=""):
+    """(dotted key, field) of every key and section."""
+    for key, entry in entries(kind).items():
+        yield above + key, entry
+        if "section" in entry.metadata:
+            yield from fields(entry.metadata["section"], f"{above}{key}.")
+
+
+def parsed(text, name):
+    return parse_scene(tomllib.loads(text), name, "again")
+
+
+def uncommented(text, but=()):
+    """The text with every key and section active."""
+    def active(line):
+        key = line[1:].partition(" ")[0]
+        return line[1:] if re.match(r"#[\[a-z]", line) and key not in but else line
+    return "\n".join(map(active, text.splitlines()))
+
+
+@pytest.mark.parametrize("name", packaged_scenes())
+def test_what_is_printed_is_the_scene_and_nothing_else(name, capsys):
+    """Mutants: a default written for what the scene says; a word on stdout that is no TOML."""
+    assert main(["scene", name]) == 0
+    printed = capsys.readouterr()
+    assert parsed(printed.out, name) == load_scene(name) and printed.err == "" and printed.out.isascii()
+
+
+@pytest.mark.parametrize("name", packaged_scenes())
+def test_defaults_that_are_made_active_change_nothing(name):
+    """Each line alone, in the sections that the scene has. Mutant: a default that is not the one shown; linear
+    elements shown for a preset that has others."""
+    for overrides in ((), *([f"numerics.preset={preset}"] for preset in PRESETS)):
+        made, text, inside = load_scene(name, overrides), scene_text(name, overrides), True
+        lines = text.splitlines()
+        for number, line in enumerate(lines):
+            inside = line.startswith("[") if re.match(r"#?\[", line) else inside
+            key = line[1:].partition(" ")[0]
+            if inside and re.match("#[a-z]", line) and key not in (*OTHER_DRIVE, "times"):
+                assert parsed("\n".join([*lines[:number], line[1:], *lines[number + 1:]]), name) == made, line
+
+
+@pytest.mark.parametrize("name", packaged_scenes())
+def test_every_key_may_be_made_active_at_once(name):
+    """Mutants: an example that is not accepted, a key in the table of another section."""
+    drive = load_scene(name).flow
+    excluded = "head" if drive and drive.head is None else "mean_velocity"
+    made = parsed(uncommented(scene_text(name), but={excluded}), name)
+    assert made.growth is not None and made.output.times == (5.0, 18.0)
+    assert {section for section in ("aggregate", "flow", "substrates", "kinetics") if getattr(made, section)} == {
+        "aggregate", "flow", "substrates", "kinetics"}
+
+
+@pytest.mark.parametrize("name", packaged_scenes())
+def test_every_key_is_there_with_what_it_takes_and_its_source(name):
+    """Mutants: a key left out, or its comment; a section that a scene leaves out forgotten."""
+    text = scene_text(name)
+    tables, found = re.split(r"^#?\[(.*)\]$", text, flags=re.M)[1:], set()
+    for section, body in zip(tables[::2], tables[1::2]):
+        found |= {section, *(f"{section}.{key}" for key in re.findall(r"^#?([a-z_]+) = ", body, re.M))}
+    assert found == set(KEYS)
+    flat = re.sub(r"\n# ", " ", text)
+    for key, entry in fields(Scene):
+        assert entry.metadata["about"] in flat and entry.metadata["source"] in flat, key
+        if "kind" in entry.metadata:
+            assert entry.metadata["kind"].accepted in flat, key
+
+
+def test_every_key_says_what_it_is_about_and_where_the_paper_has_it():
+    """Mutants: a key without its text, or with one that cites nothing."""
+    for key, entry in fields(Scene):
+        source = entry.metadata["source"]
+        assert len(entry.metadata["about"]) > 4 and (source == OURS or SOURCE.search(source)), key
+    with pytest.raises(TypeError, match="about"):
+        quantity("5 um", "um")
+
+
+def test_a_file_of_ones_own_keeps_its_words(tmp_path, capsys):
+    """Mutant: values written anew in the package's units; --set forgotten."""
+    path = tmp_path / "mine.toml"
+    path.write_text('# mine\n[pore]\nwidth = "0.08 mm"\n[aggregate]\n[flow]\nmean_velocity = "1 m/day"\n')
+    assert main(["scene", str(path), "--set", "flow.viscosity_ratio=500"]) == 0
+    text = capsys.readouterr().out
+    assert 'width = "0.08 mm"' in text and "\nviscosity_ratio = 500\n" in text and '#length = "600 um"' in text
+    assert parsed(text, "mine") == load_scene(path, ["flow.viscosity_ratio=500"])
+
+
+def test_presets_tell_their_defaults():
+    text = scene_text("base", ["numerics.preset=accurate"])
+    assert '#elements = "quadratic"' in text and "#refinement = 0.45" in text
+    assert "0.25 (fast), 0.45 (accurate), 1.0 (paper)" in text
+
+
+def test_the_name_of_a_file_adds_no_key(tmp_path):
+    """Mutant: a file's name written as it stands, line breaks and all."""
+    path = tmp_path / 'mine\n[growth]\nend = "1 h"\u00e9.toml'
+    path.write_text("[pore]\n")
+    text = scene_text(str(path))
+    assert parsed(text, path.stem) == load_scene(path) and text.isascii()
+
+
+@given(scenes())
+def test_any_scene_is_written_as_it_is(made):
+    """Mutant: numbers shortened."""
+    from repro import scene_text as module
+    tables = scene_tables(made)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "load_tables", lambda source, overrides: tables)
+        assert parsed(scene_text("drawn"), "drawn") == made
+
+
+def test_alone_it_lists_the_packaged_scenes(capsys):
+    assert main(["scene"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == list(packaged_scenes())
+    assert "Figure 6: a wider pore" in lines[-1]
+
+
+def test_no_such_scene(capsys):
+    assert main(["scene", "bass"]) == 2
+    said = capsys.readouterr()
+    assert said.out == "" and said.err.count("\n") == 1
+    assert "bass: neither a file nor a packaged scene (base, " in said.err and "(did you mean base?)" in said.err
