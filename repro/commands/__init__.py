@@ -4,6 +4,6 @@ Each has ``add(commands)``, which adds its parser with ``set_defaults(call=...)`
 arguments and returns the exit status.
 """
 
-from repro.commands import run
+from repro.commands import run, sweep
 
-COMMANDS = (run,)
+COMMANDS = (run, sweep)
