@@ -32,7 +32,7 @@ def each(points: list[Point], folder: Path, address: str) -> Iterator[tuple[Poin
         _check(client, folder, address)
         futures = {_submit(client, point, folder): point for point in points}
         try:
-            for future in distributed.as_completed(futures):
+            for future in distributed.as_completed(futures, loop=client.loop):
                 yield futures[future], _ended(future)
         finally:
             client.cancel(list(futures))

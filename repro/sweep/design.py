@@ -117,10 +117,11 @@ def _list(text: str, key: str, rest: str) -> Factor:
 
 
 def levels(factor: Factor) -> list[float | str]:
-    """The values that a grid takes of a factor."""
+    """The values that a grid takes of a factor; those between the ends of a range have 12 digits."""
     if factor.spacing == "list":
         return list(factor.values)
-    return (np.geomspace if factor.spacing == "log" else np.linspace)(*factor.values, factor.count).tolist()
+    first, *between, last = (np.geomspace if factor.spacing == "log" else np.linspace)(*factor.values, factor.count)
+    return [float(first), *(float(f"{value:.12g}") for value in between), float(last)]
 
 
 def grid(factors: list[Factor]) -> list[tuple]:

@@ -36,7 +36,7 @@ svg { display: block; width: 100%%; max-width: 34rem; height: auto; } svg text {
 .key svg { display: inline-block; width: 1.6rem; height: .7rem; margin-right: .35rem; }
 .wide { overflow-x: auto; } table { border-collapse: collapse; font-size: .9rem; font-variant-numeric: tabular-nums; }
 th, td { text-align: right; padding: .25rem .6rem; border-bottom: 1px solid var(--line); overflow-wrap: normal; }
-th { vertical-align: bottom; } td.text, th.text { text-align: left; min-width: 9rem; }
+th { vertical-align: bottom; } td.text, th.text { text-align: left; } a { color: inherit; }
 """ % tuple(" ".join(f"--level{i}: {colour};" for i, colour in enumerate(colours)) for colours in (LIGHT, DARK))
 LOOK += "".join(f".level{i} {{ stroke: var(--level{i}); }} .dot.level{i} {{ fill: var(--level{i}); }}\n"
                 for i in range(picture.LEVELS))
@@ -61,7 +61,7 @@ def page(sweep: Sweep, told: list[Told], clogged: float) -> str:
 <p>{done} of {len(told)} runs have come to their end. Varied:</p><ul>{varied}</ul>
 <p class="note">Biomass is the aggregate's area over the pore's. Conductivity is relative to that of the run's start. A
 pore counts as clogged where that has fallen to {clogged:g}; contact is the first row in which the aggregate touches the
-opposite wall.</p>
+opposite wall. Between the rows of a run what is shown is interpolated: <code>output.times</code> asks for more rows.</p>
 {_conductivity(sweep, told)}
 {_clogging(sweep, told, clogged)}
 <h2>Runs</h2>{_table(sweep, told)}
@@ -117,9 +117,8 @@ def _conductivity(sweep: Sweep, told: list[Told]) -> str:
     head = "<h2>Conductivity against biomass</h2>"
     if not shown:
         return f'{head}<p class="note">No run has both a flow and an aggregate.</p>'
-    x = picture.around("biomass: aggregate area / pore area", _all(one.biomass for one in shown), False, zero=True)
-    relative = _all(one.relative for one in shown)
-    y = picture.around("conductivity / initial conductivity", relative, max(relative) > WIDE * min(relative), zero=True)
+    x = _axis("biomass: aggregate area / pore area", np.concatenate([one.biomass for one in shown]))
+    y = _axis("conductivity / initial conductivity", np.concatenate([one.relative for one in shown]))
     figures = []
     for which, factor in enumerate(sweep.factors):
         marks = [picture.line([at(x, y, pair) for pair in zip(one.biomass, one.relative)],
@@ -129,13 +128,14 @@ def _conductivity(sweep: Sweep, told: list[Told]) -> str:
     return f'{head}<div class="pictures">{"".join(figures)}</div>'
 
 
-def _all(parts) -> list[float]:
-    return np.concatenate(list(parts)).tolist()
+def _axis(name: str, values) -> Axis:
+    """An axis for positive values: from zero, or logarithmic where they go far."""
+    return picture.around(name, values, max(values) > WIDE * min(values), zero=True)
 
 
 def _clogging(sweep: Sweep, told: list[Told], clogged: float) -> str:
     """Clogging time against each key that is varied, coloured by another one."""
-    shown = [one for one in told if one.done and np.isfinite(one.relative).any() and one.times[-1] > 0]
+    shown = [one for one in told if _time(one) > 0 and (one.done or one.numbers["clogging_time_h"])]
     head = "<h2>Clogging time</h2>"
     if not shown:
         return f'{head}<p class="note">No run has both a flow and a length in time.</p>'
@@ -147,18 +147,20 @@ def _clogging(sweep: Sweep, told: list[Told], clogged: float) -> str:
 def _times(sweep: Sweep, shown: list[Told], which: int, clogged: float) -> str:
     factor, other = sweep.factors[which], (which + 1) % len(sweep.factors)
     x = picture.around(_axis_label(factor), [_number(factor, one.point.values[which]) for one in shown], _log(factor))
-    times = [_time(one) for one in shown]
-    log = max(times) > WIDE * min(times)
-    y = picture.around(f"time to {clogged:g} of the conductivity (h)", times, log, zero=True)
-    marks = []
-    for one, time in zip(shown, times):
+    y = _axis(f"time to {clogged:g} of the conductivity (h)", [_time(one) for one in shown])
+    lines, marks, alike = [], [], {}
+    for one in sorted(shown, key=lambda one: _number(factor, one.point.values[which])):
         reached = one.numbers["clogging_time_h"] is not None
-        place = at(x, y, (_number(factor, one.point.values[which]), time))
-        said = f"{_said(sweep, one)}: {'' if reached else 'after '}{time:.4g} h"
+        place = at(x, y, (_number(factor, one.point.values[which]), _time(one)))
         level = _level(sweep.factors[other], one.point.values[other])
+        said = f"{_said(sweep, one)}: {'' if reached else 'after '}{_time(one):.4g} h"
         marks.append((picture.dot if reached else picture.later)(place, level, said))
+        rest = one.point.values[:which] + one.point.values[which + 1:]
+        alike.setdefault(rest, (level, []))[1].extend([place] if reached else [])
+    if len(sweep.factors) > 1:
+        lines = [picture.line(places, level, "") for level, places in alike.values() if len(places) > 1]
     key = _key(sweep.factors[other], shown, other) if other != which else ""
-    return picture.plot(x, y, f"Clogging time against {factor.key}", marks) + key
+    return picture.plot(x, y, f"Clogging time against {factor.key}", lines + marks) + key
 
 
 def _axis_label(factor: Factor) -> str:
@@ -168,6 +170,9 @@ def _axis_label(factor: Factor) -> str:
 
 
 def _time(one: Told) -> float:
+    """When a pore has clogged, or how long it has been simulated (h); zero where there is no flow to clog."""
+    if not np.isfinite(one.relative).any():
+        return 0.0
     reached = one.numbers["clogging_time_h"]
     return float(one.times[-1]) if reached is None else reached
 
@@ -176,7 +181,9 @@ def _table(sweep: Sweep, told: list[Told]) -> str:
     names = ["run", *(factor.key for factor in sweep.factors), *(name for _, name in SHOWN)]
     head = "".join(f"<th>{escape(name)}</th>" for name in names) + '<th class="text">status</th>'
     rows = "".join(_row(sweep, one) for one in told)
-    return f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
+    failures = "".join(f'<li class="bad">run {one.point.index}: {escape(one.status)}</li>' for one in told if not one.done)
+    return (f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
+            f"<ul>{failures}</ul>")
 
 
 def _row(sweep: Sweep, one: Told) -> str:
@@ -185,4 +192,5 @@ def _row(sweep: Sweep, one: Told) -> str:
                (math.nan if one.numbers[key] is None else one.numbers[key] for key, _ in SHOWN)]
     cells = "".join(f"<td>{escape(text)}</td>" for text in (*values, *numbers))
     link = f'<td><a href="runs/{escape(one.point.name)}/">{one.point.index}</a></td>'
-    return f'<tr>{link}{cells}<td class="text{"" if one.done else " bad"}">{escape(one.status)}</td></tr>'
+    status = escape(one.status if one.done else one.status.partition(":")[0])
+    return f'<tr>{link}{cells}<td class="text{"" if one.done else " bad"}">{status}</td></tr>'

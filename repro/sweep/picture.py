@@ -32,7 +32,7 @@ class Axis:
         """Round values between the ends."""
         if self.log:
             decades = range(math.floor(math.log10(self.low)), math.ceil(math.log10(self.high)) + 1)
-            steps = (1, 2, 5) if len(decades) < 4 else (1,)
+            steps = (1, 2, 5) if self.high < 1000 * self.low else (1,)
             found = [step * 10.0**decade for decade in decades for step in steps]
             found = [value for value in found if 0.999 * self.low <= value <= 1.001 * self.high]
             return found if len(found) > 1 else [self.low, self.high]

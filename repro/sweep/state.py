@@ -53,6 +53,7 @@ def opened(sweep: Sweep):
     with lock:
         _hold(lock, sweep.folder)
         with usable(sweep.folder):
+            _check(sweep.folder, _as_json(sweep))  # again: another may have begun here meanwhile
             write_json(sweep.folder / "sweep.json", _as_json(sweep))
         yield
         _clean(sweep)
