@@ -8,20 +8,20 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from queue import Empty, SimpleQueue
 
-from repro.scene import scene_tables
 from repro.sweep import task
 from repro.sweep.design import Point
-from repro.sweep.pool import ONE_THREAD
+from repro.sweep.server import Server, ask
 from repro.sweep.state import SweepError
 
 PATIENCE = 10  # s that the scheduler may take to answer
+#: The servers of a worker that no run is at work in.
+_idle: SimpleQueue[Server] = SimpleQueue()
 
 
 def each(points: list[Point], folder: Path, address: str) -> Iterator[tuple[Point, str]]:
@@ -83,24 +83,25 @@ def look(path: str) -> tuple[str, bool]:
 
 
 def _submit(client, point: Point, folder: Path):
-    key = f"repro-sweep-{point.name}-{uuid.uuid4().hex}"  # two sweeps may have the same run
-    return client.submit(attempt, scene_tables(point.scene), point.scene.name, point.name, str(folder), task.code(),
-                         key=key, pure=False)
+    token = uuid.uuid4().hex  # two sweeps may have the same run
+    asked = ask(point.scene, folder / point.name, folder / f".part-{point.name}")
+    return client.submit(attempt, asked, task.code(), key=f"repro-sweep-{point.name}-{token}", pure=False)
 
 
-def attempt(tables: dict, name: str, place: str, folder: str, wanted: str) -> str:
-    """On a worker: make a run in a process of its own; how it ended."""
+def attempt(asked: str, wanted: str) -> str:
+    """On a worker: make a run in a process of its own, and a folder that no other attempt has; how it ended."""
     if task.code() != wanted:
         return f"failed: a worker that joined has version {task.code()} of this package, {wanted} is needed"
-    beside = f".part-{place}-{uuid.uuid4().hex}"
-    told = {"tables": tables, "name": name, "folder": os.path.join(folder, place),
-            "beside": os.path.join(folder, beside)}
-    with subprocess.Popen([sys.executable, "-m", "repro.sweep.task"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                          env=os.environ | ONE_THREAD, text=True) as process:
-        process.stdin.write(json.dumps(told) + "\n")
-        process.stdin.flush()  # and kept open: the process ends with whoever holds it
-        lines = process.stdout.read().splitlines()
-    return lines[-1] if lines else f"failed: its process ended with status {process.returncode}"
+    told = json.loads(asked)
+    told["beside"] += f"-{uuid.uuid4().hex}"
+    try:
+        server = _idle.get_nowait()
+    except Empty:
+        server = Server()
+    try:
+        return server.make(json.dumps(told))
+    finally:
+        _idle.put(server)
 
 
 def _ended(future) -> str:

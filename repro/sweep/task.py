@@ -1,24 +1,18 @@
-"""One run of a sweep: made beside its place and moved there at its end, so that none is half there or there twice.
-
-``python -m repro.sweep.task`` makes one in a process of its own, told by a line of JSON; it ends when its input does.
-"""
+"""One run of a sweep: made beside its place and moved there at its end, so that none is half there or there twice."""
 
 from __future__ import annotations
 
 import json
 import os
 import shutil
-import sys
-import threading
 import traceback
-from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 
 from repro.cache import source_hash
 from repro.errors import SimulationError
 from repro.running import OutputError, run
-from repro.scene import Scene, parse_scene
+from repro.scene import Scene
 
 #: What the status of a run begins with that is to be made again.
 UNFINISHED = ("failed", "interrupted")
@@ -75,20 +69,3 @@ def _place(beside: Path, folder: Path) -> None:
         if not finished(folder):
             raise
         shutil.rmtree(beside, ignore_errors=True)
-
-
-def end_after(wait: Callable) -> None:
-    """End this process once `wait` returns: no run outlives whoever asked for it."""
-    threading.Thread(target=lambda: (wait(), os._exit(1)), daemon=True).start()
-
-
-def main() -> None:
-    """Make the run that the first line of the input describes; the last line of the output says how it ended."""
-    told = json.loads(sys.stdin.readline())
-    end_after(lambda: os.read(sys.stdin.fileno(), 1))
-    scene = parse_scene(told["tables"], told["name"], told["name"])
-    print(make(scene, Path(told["folder"]), Path(told["beside"])), flush=True)
-
-
-if __name__ == "__main__":
-    main()
