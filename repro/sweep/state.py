@@ -49,7 +49,7 @@ def opened(sweep: Sweep):
     with usable(sweep.folder):
         _check(sweep.folder, _as_json(sweep))
         sweep.runs.mkdir(parents=True, exist_ok=True)
-        lock = (sweep.folder / ".lock").open("w")
+        lock = (sweep.folder / ".lock").open("a")
     with lock:
         _hold(lock, sweep.folder)
         with usable(sweep.folder):

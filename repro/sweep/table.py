@@ -46,18 +46,24 @@ def tell(sweep: Sweep, ended: dict[int, str], clogged: float) -> list[Told]:
 
 
 def _told(point: Point, folder: Path, otherwise: str, clogged: float) -> Told:
-    status = task.status(folder)
-    if status is None or not (folder / "timeseries.csv").exists():
+    status, found = task.status(folder), _series(folder)
+    if status is None or found is None:
         empty = np.zeros(0)
         return Told(point, status or otherwise, empty, empty, empty, dict.fromkeys(COLUMNS))
-    found, pore = results.read_table(folder / "timeseries.csv"), point.scene.pore
-    conductivity = found["conductivity_m_per_d"]
+    pore, conductivity, times = point.scene.pore, found["conductivity_m_per_d"], found["time_h"]
     relative, biomass = conductivity / conductivity[0], found["aggregate_area_um2"] / (pore.width * pore.length)
     wall = json.loads((folder / "run.json").read_text(encoding="utf-8"))["wall_time_s"]
-    numbers = {"end_h": found["time_h"][-1], "wall_time_s": wall, **clogging(found["time_h"], relative, biomass, clogged),
-               **_contact(found["time_h"], relative, biomass, found["contact"] > 0)}
-    return Told(point, status, found["time_h"], relative, biomass,
-                {name: _or_none(numbers.get(name)) for name in COLUMNS})
+    numbers = {"end_h": times[-1], "wall_time_s": wall, **clogging(times, relative, biomass, clogged),
+               **_contact(times, relative, biomass, found["contact"] > 0)}
+    return Told(point, status, times, relative, biomass, {name: _or_none(numbers.get(name)) for name in COLUMNS})
+
+
+def _series(folder: Path) -> dict[str, np.ndarray] | None:
+    """The time series of a run, None where it has no row."""
+    path = folder / "timeseries.csv"
+    if not path.exists() or path.read_text(encoding="utf-8").count("\n") < 2:
+        return None
+    return results.read_table(path)
 
 
 def _or_none(value: float | None) -> float | None:
