@@ -77,8 +77,9 @@ def test_a_run_of_a_sweep_is_that_run(finished, tmp_path):
     """Bit by bit what `repro run` makes. Mutant: a scene changed on its way to the other process."""
     tables = json.loads((finished / "runs.csv").with_name("sweep.json").read_text())["points"][2]
     scene = tmp_path / "one.toml"
-    head = '[pore]\nwidth = "50 um"\nlength = "600 um"\n[aggregate]\nradius = "5 um"\n[flow]\nmean_velocity = "5.8 m/day"\n'
-    scene.write_text(head + '[substrates.acceptor]\nsupply = "10 mg/L"\n[substrates.donor]\nsupply = "10 mg/L"\n'
+    head = '[pore]\nwidth = "50 um"\nlength = "600 um"\n[aggregate]\nradius = "5 um"\n'
+    scene.write_text(head + '[flow]\nmean_velocity = "5.8 m/day"\n'
+                     '[substrates.acceptor]\nsupply = "10 mg/L"\n[substrates.donor]\nsupply = "10 mg/L"\n'
                      '[growth]\nend = "0.4 h"\n[numerics]\npreset = "fast"\n')
     assert main(["run", str(scene), "--out", str(tmp_path / "run")]) == 0
     ours, alone = finished / tables["folder"], tmp_path / "run"
@@ -165,8 +166,8 @@ def test_the_page_needs_no_network_and_escapes_what_it_tells(finished):
 
 @pytest.mark.parametrize("part", [0.5, 0.1, 0.013])
 def test_clogging_time_of_an_exponential_fall_is_exact(part):
-    """K / K_0 = exp(-t / 3), with biomass t / 10: whatever the rows, t = -3 ln part. Mutants: the row's time; a straight
-    line between rows; conductivity over that of another row."""
+    """K / K_0 = exp(-t / 3), with biomass t / 10: whatever the rows, t = -3 ln part. Mutants: the row's time; a
+    straight line between rows; conductivity over that of another row."""
     times = np.array([0.0, 0.7, 2.0, 5.0, 9.0, 20.0])
     found = table.clogging(times, np.exp(-times / 3), times / 10, part)
     assert math.isclose(found["clogging_time_h"], -3 * math.log(part), rel_tol=1e-12)
@@ -198,10 +199,12 @@ def test_biomass_and_contact_are_read_from_the_rows(finished, tmp_path):
 def test_a_killed_run_is_one_runs_failure(tmp_path):
     """The process that is killed is not the one that answers. Mutant: the run made in the server itself."""
     code = ("import os, signal, sys; from repro.sweep import server, task\n"
-            "task.make = lambda scene, *rest: os.kill(os.getpid(), signal.SIGKILL) if scene.name == 'base' else 'well'\n"
+            "kill = lambda: os.kill(os.getpid(), signal.SIGKILL)\n"
+            "task.make = lambda scene, *rest: kill() if scene.name == 'base' else 'well'\n"
             "server.main()")
     killed = "failed: the process of the run was killed by SIGKILL"
-    with subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as one:
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    with subprocess.Popen([sys.executable, "-c", code], **pipes) as one:
         for name, said in (("base", killed), ("flow_only", "well"), ("base", killed)):
             one.stdin.write(ask(load_scene(name), tmp_path / "run", tmp_path / "part") + "\n")
             one.stdin.flush()
@@ -217,7 +220,8 @@ def test_a_scene_comes_to_the_other_process_bit_by_bit(name, sets):
 
 def test_a_server_that_has_died_is_started_again(tmp_path):
     """Mutant: every later run failing with it."""
-    one, asked = Server(), ask(load_scene("initial_mesh", ["numerics.preset=fast"]), tmp_path / "run", tmp_path / "part")
+    scene, one = load_scene("initial_mesh", ["numerics.preset=fast"]), Server()
+    asked = ask(scene, tmp_path / "run", tmp_path / "part")
     try:
         assert one.make(asked) == "completed"
         one.process.kill()

@@ -38,7 +38,8 @@ def free_port():
 
 def begin(folder, name, *arguments):
     with (folder / f"{name}.log").open("w") as log:
-        return subprocess.Popen([sys.executable, "-m", *arguments, "--no-dashboard"], cwd=folder, stdout=log, stderr=log)
+        command = [sys.executable, "-m", *arguments, "--no-dashboard"]
+        return subprocess.Popen(command, cwd=folder, stdout=log, stderr=log)
 
 
 def until(told, seconds=60):

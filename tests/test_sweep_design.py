@@ -14,8 +14,10 @@ SPACINGS = st.sampled_from(["linear", "log"])
 
 
 def test_a_range_has_its_unit_spacing_and_count():
-    assert parse("flow.mean_velocity=0.3:30 m/day:log:8") == Factor("flow.mean_velocity", "m/day", (0.3, 30.0), "log", 8)
-    assert parse(" flow.viscosity_ratio = 1e3 : 2e3 : linear") == Factor("flow.viscosity_ratio", "", (1e3, 2e3), "linear")
+    found = parse("flow.mean_velocity=0.3:30 m/day:log:8")
+    assert found == Factor("flow.mean_velocity", "m/day", (0.3, 30.0), "log", 8)
+    found = parse(" flow.viscosity_ratio = 1e3 : 2e3 : linear")
+    assert found == Factor("flow.viscosity_ratio", "", (1e3, 2e3), "linear")
 
 
 def test_a_list_has_numbers_in_one_unit_or_words():

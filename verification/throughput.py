@@ -51,7 +51,7 @@ def bare(count: int) -> float:
 
 
 def loop(count: int) -> None:
-    """Print this process's rate, the mean of all its runs, the first (which loads what is loaded when used) left out."""
+    """Print this process's rate, the mean of all its runs but the first, which loads what is loaded when used."""
     with TemporaryDirectory() as folder:
         single(1, Path(folder))
         start = perf_counter()

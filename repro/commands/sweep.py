@@ -15,8 +15,8 @@ from repro.sweep.state import Sweep, opened, usable
 
 #: Exit status where some runs have failed.
 SOME_FAILED = 3
-EPILOG = """Two forms of --vary: a range KEY=a:b UNIT:linear|log:N, and a list KEY=VALUE, VALUE, ...; several make a grid.
-With --samples a range is KEY=a:b UNIT:linear|log, and a Latin hypercube is drawn. Varying flow.head replaces
+EPILOG = """Two forms of --vary: a range KEY=a:b UNIT:linear|log:N, and a list KEY=VALUE, VALUE, ...; several make a
+grid. With --samples a range is KEY=a:b UNIT:linear|log, and a Latin hypercube is drawn. Varying flow.head replaces
 flow.mean_velocity, and the other way round. The same command goes on with a sweep that was cut off: it makes what is
 missing, and what has failed, again. On a cluster DIR must be on a file system that all workers share.
 Exit status: 0 every run has come to its end, 3 some have failed, 2 wrong input, 130 interrupted."""
@@ -28,7 +28,7 @@ def add(commands) -> None:
                                   description="Run a scene many times with keys varied, on all cores.")
     add_scene(command)
     command.add_argument("--vary", metavar="KEY=...", action="append", required=True,
-                         help='such as "flow.mean_velocity=0.3:30 m/day:log:8" or "pore.width=50 um, 60 um"; repeatable')
+                         help='"flow.mean_velocity=0.3:30 m/day:log:8" or "pore.width=50 um, 60 um"; may be repeated')
     command.add_argument("--samples", metavar="N", type=int, help="a Latin hypercube of N runs instead of a grid")
     command.add_argument("--seed", metavar="S", type=_whole, default=0, help="of the Latin hypercube (0)")
     command.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for runs, table and page")
@@ -60,7 +60,8 @@ def _part(text: str) -> float:
 
 def call(chosen) -> int:
     """Make the sweep that was chosen."""
-    sweep, ended = _wanted(chosen), {}
+    sweep = _wanted(chosen)
+    ended: dict[int, str] = {}
     with opened(sweep):
         try:
             _make(sweep, chosen, ended)

@@ -11,6 +11,7 @@ import os
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 from queue import Empty, SimpleQueue
 
@@ -19,6 +20,7 @@ from repro.sweep.design import Point
 from repro.sweep.server import Server, ask
 from repro.sweep.state import SweepError
 
+PACKAGE = "distributed"
 PATIENCE = 10  # s that the scheduler may take to answer
 #: The servers of a worker that no run is at work in.
 _idle: SimpleQueue[Server] = SimpleQueue()
@@ -40,11 +42,10 @@ def each(points: list[Point], folder: Path, address: str) -> Iterator[tuple[Poin
 
 def _package(address: str):
     try:
-        import distributed
+        return import_module(PACKAGE)
     except ImportError:
-        raise SweepError(f"--scheduler {address}: the package distributed is not installed; "
+        raise SweepError(f"--scheduler {address}: the package {PACKAGE} is not installed; "
                          "pip install 'dupin2001-repro[dask]'") from None
-    return distributed
 
 
 @contextmanager
@@ -70,8 +71,8 @@ def _check(client, folder: Path, address: str) -> None:
         raise SweepError(f"--scheduler {address}: a worker lacks this package ({error})") from None
     for worker, (theirs, shared) in found.items():
         if theirs != task.code():
-            raise SweepError(f"--scheduler {address}: the worker {worker} has version {theirs} of this package, this is "
-                             f"{task.code()}; the same is needed")
+            raise SweepError(f"--scheduler {address}: the worker {worker} has version {theirs} of this package, this "
+                             f"is {task.code()}; the same is needed")
         if not shared:
             raise SweepError(f"--scheduler {address}: the worker {worker} does not see {folder}; a folder on a file "
                              "system that all share is needed")

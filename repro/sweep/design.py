@@ -13,6 +13,7 @@ from collections import Counter
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -23,9 +24,9 @@ from repro.units import shown
 MOST_POINTS = 10_000
 #: Of each pair one is given: varying it replaces the other.
 PAIRS = {"flow.head": "flow.mean_velocity", "flow.mean_velocity": "flow.head"}
-WANTED = ('KEY=a:b UNIT:linear|log:N or KEY=VALUE, VALUE, ... is needed, such as "flow.mean_velocity=0.3:30 m/day:log:8" '
-          'or "pore.width=50 um, 60 um"')
-_NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*)", re.S)
+WANTED = ('KEY=a:b UNIT:linear|log:N or KEY=VALUE, VALUE, ... is needed, such as '
+          '"flow.mean_velocity=0.3:30 m/day:log:8" or "pore.width=50 um, 60 um"')
+_NUMBER = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*(.*)", re.S)
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ class Factor:
 
     key: str
     unit: str
-    values: tuple[float | str, ...]
+    values: tuple[Any, ...]  # all floats, or all str
     spacing: str = "list"  # or "linear", "log"
     count: int | None = None  # of a range in a grid
 
@@ -88,40 +89,46 @@ def _refused(text: str, wanted: str) -> SceneError:
 
 def _range(text: str, key: str, rest: str) -> Factor:
     low, high, spacing, count = (*(part.strip() for part in rest.split(":", 3)), "", "", "")[:4]
-    ends = [_NUMBER.fullmatch(end) for end in (low, high)]
-    if None in ends or ends[0][2] or spacing not in ("linear", "log") or not re.fullmatch(r"[0-9]{0,9}", count):
+    (start, other), (end, unit) = _number(low), _number(high)
+    if not (start and end) or other or spacing not in ("linear", "log") or not re.fullmatch("[0-9]{0,9}", count):
         raise _refused(text, WANTED)
-    first, last = (float(end[1]) for end in ends)
+    first, last = float(start), float(end)
     if not first < last < math.inf:
         raise _refused(text, "the lower end first, then a higher one, is needed")
     if spacing == "log" and first <= 0:
         raise _refused(text, "ends greater than zero are needed with log")
     if count and int(count) < 2:
         raise _refused(text, "two values or more are needed; one value is a list")
-    return Factor(key, ends[1][2], (first, last), spacing, int(count) if count else None)
+    return Factor(key, unit, (first, last), spacing, int(count) if count else None)
 
 
 def _list(text: str, key: str, rest: str) -> Factor:
     items = [item.strip() for item in rest.split(",")]
     items = [item[1:-1] if len(item) > 1 and item[0] == item[-1] == '"' else item for item in items]
-    numbers = [_NUMBER.fullmatch(item) for item in items]
-    units = {number[2] if number else None for number in numbers}
-    if "" in items or len(units) > 1:
+    numbers = [_number(item) for item in items]
+    if "" in items or len({(bool(digits), unit) for digits, unit in numbers}) > 1:
         raise _refused(text, "values in one and the same unit, or words, are needed")
-    if numbers[0] is None:
+    if not numbers[0][0]:
         return Factor(key, "", tuple(items))
-    values = tuple(float(number[1]) for number in numbers)
+    values = tuple(float(digits) for digits, _ in numbers)
     if not all(map(math.isfinite, values)):
         raise _refused(text, "finite numbers are needed")
-    return Factor(key, units.pop(), values)
+    return Factor(key, numbers[0][1], values)
+
+
+def _number(text: str) -> tuple[str, str]:
+    """The digits and the unit of a text, both empty where it is no number."""
+    match = _NUMBER.fullmatch(text)
+    return (match[1], match[2]) if match else ("", "")
 
 
 def levels(factor: Factor) -> list[float | str]:
     """The values that a grid takes of a factor; those between the ends of a range have 12 digits."""
     if factor.spacing == "list":
         return list(factor.values)
-    first, *between, last = (np.geomspace if factor.spacing == "log" else np.linspace)(*factor.values, factor.count)
-    return [float(first), *(float(f"{value:.12g}") for value in between), float(last)]
+    low, high = factor.values
+    found = (np.geomspace if factor.spacing == "log" else np.linspace)(low, high, factor.count or 2).tolist()
+    return [low, *(float(f"{value:.12g}") for value in found[1:-1]), high]
 
 
 def grid(factors: list[Factor]) -> list[tuple]:
@@ -160,7 +167,8 @@ def points(source: str, sets: list[str], factors: list[Factor], combinations: li
     """The runs of a sweep, each checked. Raises SceneError, naming the run, where one is not accepted or is another's
     twin, and where a key is given twice."""
     _check_keys(sets, [factor.key for factor in factors])
-    found, first = [], {}
+    found: list[Point] = []
+    first: dict[str, int] = {}
     for index, values in enumerate(combinations, 1):
         said = label(factors, values)
         point = Point(index, values, _scene(source, sets, factors, values, f"run {index} ({said})"))
@@ -179,8 +187,8 @@ def _check_keys(sets: list[str], varied: list[str]) -> None:
         if other in varied:
             raise SceneError(f"--vary {key}: it and {other} exclude each other; one of them is accepted")
         if any(entry.partition("=")[0].strip() in (key, other) for entry in sets):
-            raise SceneError(f"--set of {key}{f' or {other}' if other else ''}: it is not accepted beside --vary {key}, "
-                             "which replaces it")
+            raise SceneError(f"--set of {key}{f' or {other}' if other else ''}: it is not accepted beside --vary "
+                             f"{key}, which replaces it")
 
 
 def _scene(source: str, sets: list[str], factors: list[Factor], values: tuple, said: str) -> Scene:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from html import escape
 
 import numpy as np
@@ -19,17 +18,19 @@ WIDE = 20
 #: Viridis, dark to light on a light page and without its darkest part on a dark one: told apart by the colour-blind.
 LIGHT = ("#440154", "#46327e", "#365c8d", "#277f8e", "#1fa187", "#4ab36b", "#86a51a")
 DARK = ("#8d7fe0", "#6f93dd", "#4fa5d0", "#35b7ae", "#5ac883", "#a5d84a", "#fde725")
+COLOURS = [" ".join(f"--level{i}: {colour};" for i, colour in enumerate(colours)) for colours in (LIGHT, DARK)]
 LOOK = """
-:root { color-scheme: light dark; --ink: #1c1c1c; --soft: #5a5a5a; --line: #d9d9d6; --page: #fff; --bad: #a5330d; %s }
+:root { color-scheme: light dark; --ink: #1c1c1c; --soft: #5a5a5a; --line: #d9d9d6; --page: #fff; --bad: #a5330d;
+        LIGHT }
 @media (prefers-color-scheme: dark) {
-  :root { --ink: #ececea; --soft: #a9a9a6; --line: #3a3c40; --page: #15171a; --bad: #ff9b73; %s } }
+  :root { --ink: #ececea; --soft: #a9a9a6; --line: #3a3c40; --page: #15171a; --bad: #ff9b73; DARK } }
 body { max-width: 66rem; margin: 0 auto; padding: 1.5rem 1rem 3rem; color: var(--ink); background: var(--page);
        font: 1rem/1.5 system-ui, sans-serif; overflow-wrap: anywhere; }
 h1 { font-size: 1.5rem; line-height: 1.25; } h2 { font-size: 1.1rem; margin: 2rem 0 .5rem; }
 .note { color: var(--soft); } .bad { color: var(--bad); }
-.pictures { display: grid; gap: 1.5rem; grid-template-columns: repeat(auto-fit, minmax(min(100%%, 25rem), 1fr)); }
+.pictures { display: grid; gap: 1.5rem; grid-template-columns: repeat(auto-fit, minmax(min(100%, 25rem), 1fr)); }
 figure { margin: 0; } figcaption { color: var(--soft); font-size: .9rem; }
-svg { display: block; width: 100%%; max-width: 34rem; height: auto; } svg text { fill: var(--ink); font-size: 13px; }
+svg { display: block; width: 100%; max-width: 34rem; height: auto; } svg text { fill: var(--ink); font-size: 13px; }
 .frame { fill: none; stroke: var(--soft); } .grid { stroke: var(--line); }
 .line { fill: none; stroke-width: 2; } .later { fill: none; stroke-width: 1.8; } .dot { stroke: var(--page); }
 .key { display: flex; flex-wrap: wrap; gap: .2rem 1rem; padding: 0; list-style: none; font-size: .9rem; }
@@ -37,7 +38,7 @@ svg { display: block; width: 100%%; max-width: 34rem; height: auto; } svg text {
 .wide { overflow-x: auto; } table { border-collapse: collapse; font-size: .9rem; font-variant-numeric: tabular-nums; }
 th, td { text-align: right; padding: .25rem .6rem; border-bottom: 1px solid var(--line); overflow-wrap: normal; }
 th { vertical-align: bottom; } td.text, th.text { text-align: left; } a { color: inherit; }
-""" % tuple(" ".join(f"--level{i}: {colour};" for i, colour in enumerate(colours)) for colours in (LIGHT, DARK))
+""".replace("LIGHT", COLOURS[0]).replace("DARK", COLOURS[1])
 LOOK += "".join(f".level{i} {{ stroke: var(--level{i}); }} .dot.level{i} {{ fill: var(--level{i}); }}\n"
                 for i in range(picture.LEVELS))
 SHOWN = (("end_h", "end (h)"), ("clogging_time_h", "clogged (h)"), ("clogging_biomass", "biomass then"),
@@ -61,7 +62,7 @@ def page(sweep: Sweep, told: list[Told], clogged: float) -> str:
 <p>{done} of {len(told)} runs have come to their end. Varied:</p><ul>{varied}</ul>
 <p class="note">Biomass is the aggregate's area over the pore's. Conductivity is relative to that of the run's start. A
 pore counts as clogged where that has fallen to {clogged:g}; contact is the first row in which the aggregate touches the
-opposite wall. Between the rows of a run what is shown is interpolated: <code>output.times</code> asks for more rows.</p>
+opposite wall. Between the rows of a run what is shown is interpolated: <code>output.times</code> makes more.</p>
 {_conductivity(sweep, told)}
 {_clogging(sweep, told, clogged)}
 <h2>Runs</h2>{_table(sweep, told)}
@@ -73,19 +74,20 @@ def _described(factor: Factor) -> str:
     if factor.spacing == "list":
         return f"{factor.key}: {', '.join(map(factor.short, factor.values))}"
     count = f", {factor.count} values" if factor.count else ""
-    return f"{factor.key}: {factor.short(factor.values[0])} to {factor.short(factor.values[1])}, {factor.spacing}{count}"
+    first, last = map(factor.short, factor.values)
+    return f"{factor.key}: {first} to {last}, {factor.spacing}{count}"
 
 
 def _log(factor: Factor) -> bool:
     """Is it shown on a logarithmic scale?"""
-    values = factor.values if factor.numeric else (1.0,)
-    wide = factor.spacing == "list" and min(values) > 0 and max(values) > WIDE * min(values)
+    numbers = [_number(factor, value) for value in factor.values] if factor.numeric else [1.0]
+    wide = factor.spacing == "list" and min(numbers) > 0 and max(numbers) > WIDE * min(numbers)
     return factor.spacing == "log" or wide
 
 
 def _number(factor: Factor, value: float | str) -> float:
     """Words are numbered in their order."""
-    return value if factor.numeric else float(factor.values.index(value))
+    return float(factor.values.index(value)) if isinstance(value, str) else value
 
 
 def _level(factor: Factor, value: float | str) -> int:
@@ -102,8 +104,9 @@ def _key(factor: Factor, told: list[Told], which: int) -> str:
     values = sorted({one.point.values[which] for one in told}, key=lambda value: _number(factor, value))
     if len(values) > 2 * picture.LEVELS:
         values = [values[round(i * (len(values) - 1) / (picture.LEVELS - 1))] for i in range(picture.LEVELS)]
-    entries = "".join(f'<li><svg viewBox="0 0 24 10" aria-hidden="true"><line class="line level{_level(factor, value)}" '
-                      f'x1="0" x2="24" y1="5" y2="5"/></svg>{escape(factor.short(value))}</li>' for value in values)
+    entries = "".join(f'<li><svg viewBox="0 0 24 10" aria-hidden="true"><line x1="0" x2="24" y1="5" y2="5" '
+                      f'class="line level{_level(factor, value)}"/></svg>{escape(factor.short(value))}</li>'
+                      for value in values)
     return f'<ul class="key"><li>{escape(factor.key)}</li>{entries}</ul>'
 
 
@@ -148,7 +151,9 @@ def _times(sweep: Sweep, shown: list[Told], which: int, clogged: float) -> str:
     factor, other = sweep.factors[which], (which + 1) % len(sweep.factors)
     x = picture.around(_axis_label(factor), [_number(factor, one.point.values[which]) for one in shown], _log(factor))
     y = _axis(f"time to {clogged:g} of the conductivity (h)", [_time(one) for one in shown])
-    lines, marks, alike = [], [], {}
+    lines: list[str] = []
+    marks: list[str] = []
+    alike: dict[tuple, tuple[int, list]] = {}
     for one in sorted(shown, key=lambda one: _number(factor, one.point.values[which])):
         reached = one.numbers["clogging_time_h"] is not None
         place = at(x, y, (_number(factor, one.point.values[which]), _time(one)))
@@ -181,15 +186,15 @@ def _table(sweep: Sweep, told: list[Told]) -> str:
     names = ["run", *(factor.key for factor in sweep.factors), *(name for _, name in SHOWN)]
     head = "".join(f"<th>{escape(name)}</th>" for name in names) + '<th class="text">status</th>'
     rows = "".join(_row(sweep, one) for one in told)
-    failures = "".join(f'<li class="bad">run {one.point.index}: {escape(one.status)}</li>' for one in told if not one.done)
+    failures = "".join(f'<li class="bad">run {one.point.index}: {escape(one.status)}</li>'
+                       for one in told if not one.done)
     return (f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
             f"<ul>{failures}</ul>")
 
 
 def _row(sweep: Sweep, one: Told) -> str:
     values = [factor.short(value) for factor, value in zip(sweep.factors, one.point.values)]
-    numbers = ["" if math.isnan(value) else f"{value:.4g}" for value in
-               (math.nan if one.numbers[key] is None else one.numbers[key] for key, _ in SHOWN)]
+    numbers = ["" if value is None else f"{value:.4g}" for value in (one.numbers[key] for key, _ in SHOWN)]
     cells = "".join(f"<td>{escape(text)}</td>" for text in (*values, *numbers))
     link = f'<td><a href="runs/{escape(one.point.name)}/">{one.point.index}</a></td>'
     status = escape(one.status if one.done else one.status.partition(":")[0])

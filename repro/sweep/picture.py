@@ -71,7 +71,8 @@ def line(places: Sequence[tuple[float, float]], level: int, said: str) -> str:
 
 def dot(place: tuple[float, float], level: int, said: str) -> str:
     """A dot."""
-    return f'<circle class="dot level{level}" cx="{place[0]}" cy="{place[1]}" r="5"><title>{escape(said)}</title></circle>'
+    x, y = place
+    return f'<circle class="dot level{level}" cx="{x}" cy="{y}" r="5"><title>{escape(said)}</title></circle>'
 
 
 def later(place: tuple[float, float], level: int, said: str) -> str:

@@ -1,4 +1,4 @@
-"""Runs side by side on this machine, each in a process of its own: what kills one is that run's failure, and no other's."""
+"""Runs side by side on this machine, each in a process of its own: what kills one is the failure of no other."""
 
 from __future__ import annotations
 

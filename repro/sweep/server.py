@@ -18,6 +18,7 @@ import threading
 from contextlib import suppress
 from dataclasses import asdict, fields
 from pathlib import Path
+from typing import Any
 
 from repro.scene import Scene
 from repro.sweep import task
@@ -25,7 +26,8 @@ from repro.sweep import task
 #: For these processes: one thread each; and glibc keeps the memory that a run frees for its next step, where asking the
 #: system for it again and again, a page at a time, takes a short run 5 % of its time.
 ENVIRONMENT = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1",
-               "MALLOC_MMAP_THRESHOLD_": str(2**30), "MALLOC_TRIM_THRESHOLD_": str(2**30), "MALLOC_TOP_PAD_": str(2**26)}
+               "MALLOC_MMAP_THRESHOLD_": "1073741824", "MALLOC_TRIM_THRESHOLD_": "1073741824",
+               "MALLOC_TOP_PAD_": "67108864"}
 PATIENCE = 10  # s that a run may take to stop
 
 
@@ -33,7 +35,8 @@ class Server:
     """Such a process as seen from outside: started when it is first needed, and anew where it has died."""
 
     def __init__(self):
-        self.process, self.closed = None, False
+        self.process: Any = None
+        self.closed = False
 
     def make(self, asked: str) -> str:
         """Have a run made that :func:`ask` describes; how it ended."""
@@ -80,7 +83,7 @@ def _asked(line: str) -> tuple[Scene, Path, Path]:
     return _built(Scene, told["scene"]), Path(told["folder"]), Path(told["beside"])
 
 
-def _built(kind: type, values: dict):
+def _built(kind: Any, values: dict):
     """The dataclass that `asdict` has taken apart."""
     parts = {entry.name: entry.metadata.get("section") for entry in fields(kind)}
     return kind(**{name: _built(parts[name], value) if isinstance(value, dict) else

@@ -65,7 +65,8 @@ def usable(folder: Path):
     try:
         yield
     except OSError as error:
-        raise SweepError(f"--out {folder}: {error.strerror or error}; a folder that can be written is needed") from error
+        why = error.strerror or error
+        raise SweepError(f"--out {folder}: {why}; a folder that can be written is needed") from error
 
 
 def _as_json(sweep: Sweep) -> dict:
@@ -80,8 +81,8 @@ def _check(folder: Path, wanted: dict) -> None:
     if folder.is_dir() and not (folder / "sweep.json").exists():
         strange = sorted({path.name for path in folder.iterdir()} - {"runs", ".lock"})
         if strange:
-            raise SweepError(f"--out {folder}: it holds {strange[0]!r}, which is not of a sweep; a new or empty folder, "
-                             "or one of the same sweep, is accepted")
+            raise SweepError(f"--out {folder}: it holds {strange[0]!r}, which is not of a sweep; a new or empty "
+                             "folder, or one of the same sweep, is accepted")
     elif folder.exists():
         _compare(folder, _read(folder), wanted)
 

@@ -93,8 +93,9 @@ def write(sweep: Sweep, told: list[Told]) -> None:
     """Write ``table.csv`` and ``runs.csv``."""
     varied = [factor.column for factor in sweep.factors]
     results.write_table(sweep.folder / "table.csv", ["run", *varied, *results.COLUMNS], list(_rows(sweep, told)))
-    results.write_table(sweep.folder / "runs.csv", ["run", *varied, "status", *COLUMNS, "folder"], [
-        [one.point.index, *one.point.values, one.status, *one.numbers.values(), f"runs/{one.point.name}"] for one in told])
+    runs = [[one.point.index, *one.point.values, one.status, *one.numbers.values(), f"runs/{one.point.name}"]
+            for one in told]
+    results.write_table(sweep.folder / "runs.csv", ["run", *varied, "status", *COLUMNS, "folder"], runs)
 
 
 def _rows(sweep: Sweep, told: list[Told]) -> Iterator[list]:
