@@ -149,7 +149,7 @@ def _clogging(sweep: Sweep, told: list[Told], clogged: float) -> str:
 
 def _times(sweep: Sweep, shown: list[Told], which: int, clogged: float) -> str:
     factor, other = sweep.factors[which], (which + 1) % len(sweep.factors)
-    x = picture.around(_axis_label(factor), [_number(factor, one.point.values[which]) for one in shown], _log(factor))
+    x = _across(factor, [_number(factor, one.point.values[which]) for one in shown])
     y = _axis(f"time to {clogged:g} of the conductivity (h)", [_time(one) for one in shown])
     lines: list[str] = []
     marks: list[str] = []
@@ -168,10 +168,11 @@ def _times(sweep: Sweep, shown: list[Told], which: int, clogged: float) -> str:
     return picture.plot(x, y, f"Clogging time against {factor.key}", lines + marks) + key
 
 
-def _axis_label(factor: Factor) -> str:
-    if factor.numeric:
-        return f"{factor.key} ({factor.unit})" if factor.unit else factor.key
-    return f"{factor.key}: " + ", ".join(f"{i} {word}" for i, word in enumerate(factor.values))
+def _across(factor: Factor, numbers: list[float]) -> Axis:
+    """The axis of a key that is varied."""
+    if not factor.numeric:
+        return Axis(factor.key, -0.5, len(factor.values) - 0.5, words=factor.values)
+    return picture.around(f"{factor.key} ({factor.unit})" if factor.unit else factor.key, numbers, _log(factor))
 
 
 def _time(one: Told) -> float:

@@ -15,12 +15,13 @@ LEFT, RIGHT, TOP, BOTTOM = 62, 12, 14, 48
 
 @dataclass(frozen=True)
 class Axis:
-    """A label and the ends of what is shown, on a linear or logarithmic scale."""
+    """A label and the ends of what is shown, on a linear or logarithmic scale; `words` stand at 0, 1, 2, ..."""
 
     label: str
     low: float
     high: float
     log: bool = False
+    words: tuple[str, ...] = ()
 
     def part(self, value: float) -> float:
         """Where a value is, from 0 to 1."""
@@ -29,7 +30,9 @@ class Axis:
         return (value - self.low) / (self.high - self.low)
 
     def ticks(self) -> list[float]:
-        """Round values between the ends."""
+        """Round values between the ends, or the places of the words."""
+        if self.words:
+            return [float(place) for place in range(len(self.words))]
         if self.log:
             decades = range(math.floor(math.log10(self.low)), math.ceil(math.log10(self.high)) + 1)
             steps = (1, 2, 5) if self.high < 1000 * self.low else (1,)
@@ -39,6 +42,11 @@ class Axis:
         step = _round_step((self.high - self.low) / 5)
         first = math.ceil(self.low / step - 1e-9)
         return [k * step for k in range(first, math.floor(self.high / step + 1e-9) + 1)]
+
+
+    def said(self, value: float) -> str:
+        """What stands at a tick."""
+        return escape(self.words[int(value)]) if self.words else f"{value:.4g}"
 
 
 def _round_step(least: float) -> float:
@@ -89,11 +97,11 @@ def plot(x: Axis, y: Axis, said: str, marks: Sequence[str]) -> str:
     for value in x.ticks():
         place = at(x, y, (value, y.low))[0]
         parts.append(f'<line class="grid" x1="{place}" x2="{place}" y1="{TOP}" y2="{floor}"/>'
-                     f'<text x="{place}" y="{floor + 17}" text-anchor="middle">{value:.4g}</text>')
+                     f'<text x="{place}" y="{floor + 17}" text-anchor="middle">{x.said(value)}</text>')
     for value in y.ticks():
         place = at(x, y, (x.low, value))[1]
         parts.append(f'<line class="grid" x1="{LEFT}" x2="{right}" y1="{place}" y2="{place}"/>'
-                     f'<text x="{LEFT - 6}" y="{place + 4}" text-anchor="end">{value:.4g}</text>')
+                     f'<text x="{LEFT - 6}" y="{place + 4}" text-anchor="end">{y.said(value)}</text>')
     middle = (TOP + floor) / 2
     parts += [f'<text x="{(LEFT + right) / 2}" y="{HEIGHT - 8}" text-anchor="middle">{escape(x.label)}</text>',
               f'<text transform="translate(15 {middle}) rotate(-90)" text-anchor="middle">{escape(y.label)}</text>']
