@@ -93,7 +93,8 @@ def test_the_same_command_makes_what_is_missing_and_nothing_else(copied, capsys)
     before = [(place / "run.json").stat().st_mtime_ns for place in places]
     table_before = (copied / "table.csv").read_bytes()
     shutil.rmtree(places[0])
-    (copied / "runs" / f".part-{places[0].name}").mkdir()  # left by a sweep that was killed
+    for left in (f".part-{places[0].name}", f".part-{places[2].name}-attempt"):  # of a sweep that was killed
+        (copied / "runs" / left).mkdir()
     assert sweep(copied, *VARY, *SHORT) == 3
     after = [(place / "run.json").stat().st_mtime_ns for place in places]
     assert after[0] > before[0] and after[1] > before[1] and after[2] == before[2]
