@@ -4,6 +4,6 @@ Each has ``add(commands)``, which adds its parser with ``set_defaults(call=...)`
 arguments and returns the exit status.
 """
 
-from repro.commands import check, compare, run, scene
+from repro.commands import check, compare, run, scene, sweep
 
-COMMANDS = (run, scene, check, compare)
+COMMANDS = (run, scene, check, compare, sweep)

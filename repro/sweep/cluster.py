@@ -1,0 +1,113 @@
+"""Runs on a Dask cluster, into a folder that its workers share: each in a process of its own, beside its worker.
+
+A run whose worker dies goes to another one. Each attempt writes into a folder of its own, and the first that ends moves
+it to its place, so that no run is lost, and none is there twice.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
+from queue import Empty, SimpleQueue
+
+from repro.sweep import task
+from repro.sweep.design import Point
+from repro.sweep.server import Server, ask
+from repro.sweep.state import SweepError
+
+PACKAGE = "distributed"
+PATIENCE = 10  # s that the scheduler may take to answer
+#: The servers of a worker that no run is at work in.
+_idle: SimpleQueue[Server] = SimpleQueue()
+
+
+def each(points: list[Point], folder: Path, address: str) -> Iterator[tuple[Point, str]]:
+    """Make the runs into `folder`; yields each with how it ended, as they end. Raises SweepError where there is no such
+    cluster, or its workers have another version of this package or do not share the folder."""
+    distributed, folder = _package(address), folder.resolve()
+    with _client(distributed, address) as client:
+        _check(client, folder, address)
+        futures = {_submit(client, point, folder): point for point in points}
+        try:
+            for future in distributed.as_completed(futures, loop=client.loop):
+                yield futures[future], _ended(future)
+        finally:
+            client.cancel(list(futures))
+
+
+def _package(address: str):
+    try:
+        return import_module(PACKAGE)
+    except ImportError:
+        raise SweepError(f"--scheduler {address}: the package {PACKAGE} is not installed; "
+                         "pip install 'dupin2001-repro[dask]'") from None
+
+
+@contextmanager
+def _client(distributed, address: str):
+    try:
+        client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
+        raise SweepError(f"--scheduler {address}: no Dask scheduler answers there ({type(error).__name__}); an address "
+                         "such as tcp://host:8786 is needed") from None
+    with client:
+        yield client
+
+
+def _check(client, folder: Path, address: str) -> None:
+    """Are there workers, with this version of the package, that see the folder?"""
+    try:
+        client.wait_for_workers(1, timeout=PATIENCE)
+    except TimeoutError:
+        raise SweepError(f"--scheduler {address}: it has no workers") from None
+    try:
+        found = client.run(look, str(folder.parent / "sweep.json"))
+    except ImportError as error:
+        raise SweepError(f"--scheduler {address}: a worker lacks this package ({error})") from None
+    for worker, (theirs, shared) in found.items():
+        if theirs != task.code():
+            raise SweepError(f"--scheduler {address}: the worker {worker} has version {theirs} of this package, this "
+                             f"is {task.code()}; the same is needed")
+        if not shared:
+            raise SweepError(f"--scheduler {address}: the worker {worker} does not see {folder}; a folder on a file "
+                             "system that all share is needed")
+
+
+def look(path: str) -> tuple[str, bool]:
+    """On a worker: which code it has, and whether it sees a file."""
+    return task.code(), os.path.exists(path)
+
+
+def _submit(client, point: Point, folder: Path):
+    token = uuid.uuid4().hex  # two sweeps may have the same run
+    asked = ask(point.scene, folder / point.name, folder / f".part-{point.name}")
+    return client.submit(attempt, asked, task.code(), key=f"repro-sweep-{point.name}-{token}", pure=False)
+
+
+def attempt(asked: str, wanted: str) -> str:
+    """On a worker: make a run in a process of its own, and a folder that no other attempt has; how it ended."""
+    if task.code() != wanted:
+        return f"failed: a worker that joined has version {task.code()} of this package, {wanted} is needed"
+    told = json.loads(asked)
+    told["beside"] += f"-{uuid.uuid4().hex}"
+    try:
+        server = _idle.get_nowait()
+    except Empty:
+        server = Server()
+    try:
+        return server.make(json.dumps(told))
+    finally:
+        _idle.put(server)
+
+
+def _ended(future) -> str:
+    """How a run ended, or what became of the attempts."""
+    try:
+        return future.result()
+    except Exception as error:  # whatever happened on a worker is that run's failure
+        return f"failed: {type(error).__name__}: {' '.join(str(error).split())}"

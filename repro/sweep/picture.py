@@ -1,0 +1,109 @@
+"""Lines and dots on labelled axes as inline SVG, its colours those of the page that it is put into."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+
+#: Colours of a page in which pictures are, by class: from the first value to the last.
+LEVELS = 7
+WIDTH, HEIGHT = 460, 330
+LEFT, RIGHT, TOP, BOTTOM = 62, 12, 14, 48
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A label and the ends of what is shown, on a linear or logarithmic scale; `words` stand at 0, 1, 2, ..."""
+
+    label: str
+    low: float
+    high: float
+    log: bool = False
+    words: tuple[str, ...] = ()
+
+    def part(self, value: float) -> float:
+        """Where a value is, from 0 to 1."""
+        if self.log:
+            return math.log(value / self.low) / math.log(self.high / self.low)
+        return (value - self.low) / (self.high - self.low)
+
+    def ticks(self) -> list[float]:
+        """Round values between the ends, or the places of the words."""
+        if self.words:
+            return [float(place) for place in range(len(self.words))]
+        if self.log:
+            decades = range(math.floor(math.log10(self.low)), math.ceil(math.log10(self.high)) + 1)
+            steps = (1, 2, 5) if self.high < 1000 * self.low else (1,)
+            found = [step * 10.0**decade for decade in decades for step in steps]
+            found = [value for value in found if 0.999 * self.low <= value <= 1.001 * self.high]
+            return found if len(found) > 1 else [self.low, self.high]
+        step = _round_step((self.high - self.low) / 5)
+        first = math.ceil(self.low / step - 1e-9)
+        return [k * step for k in range(first, math.floor(self.high / step + 1e-9) + 1)]
+
+
+    def said(self, value: float) -> str:
+        """What stands at a tick."""
+        return escape(self.words[int(value)]) if self.words else f"{value:.4g}"
+
+
+def _round_step(least: float) -> float:
+    """The next of 1, 2, 5, 10, 20, ..."""
+    power = 10.0 ** math.floor(math.log10(least))
+    return next(step * power for step in (1, 2, 5, 10) if step * power >= 0.999 * least)
+
+
+def around(label: str, values: Sequence[float], log: bool, zero: bool = False) -> Axis:
+    """An axis on which all of the values are, with a margin; from zero on where that is asked for."""
+    low, high = min(values), max(values)
+    if log:
+        margin = (high / low) ** 0.06 if high > low else 2.0
+        return Axis(label, low / margin, high * margin, True)
+    margin = 0.06 * (high - low) or 0.5 * abs(high) or 1.0
+    return Axis(label, 0.0 if zero else low - margin, high + margin)
+
+
+def at(x: Axis, y: Axis, point: tuple[float, float]) -> tuple[float, float]:
+    """The place of a point in the picture."""
+    across, up = x.part(point[0]), y.part(point[1])
+    return (round(LEFT + across * (WIDTH - LEFT - RIGHT), 1), round(HEIGHT - BOTTOM - up * (HEIGHT - TOP - BOTTOM), 1))
+
+
+def line(places: Sequence[tuple[float, float]], level: int, said: str) -> str:
+    """A line through places of the picture; `said` is shown where the pointer is."""
+    path = " ".join(f"{x},{y}" for x, y in places)
+    return f'<polyline class="line level{level}" points="{path}"><title>{escape(said)}</title></polyline>'
+
+
+def dot(place: tuple[float, float], level: int, said: str) -> str:
+    """A dot."""
+    x, y = place
+    return f'<circle class="dot level{level}" cx="{x}" cy="{y}" r="5"><title>{escape(said)}</title></circle>'
+
+
+def later(place: tuple[float, float], level: int, said: str) -> str:
+    """A hollow triangle that points up: the value is larger than where it stands."""
+    x, y = place
+    return (f'<polygon class="later level{level}" points="{x - 6},{y + 5} {x + 6},{y + 5} {x},{y - 6}">'
+            f"<title>{escape(said)}</title></polygon>")
+
+
+def plot(x: Axis, y: Axis, said: str, marks: Sequence[str]) -> str:
+    """The whole picture; `said` is what it shows, for who cannot see it."""
+    right, floor = WIDTH - RIGHT, HEIGHT - BOTTOM
+    parts = [f'<rect class="frame" x="{LEFT}" y="{TOP}" width="{right - LEFT}" height="{floor - TOP}"/>']
+    for value in x.ticks():
+        place = at(x, y, (value, y.low))[0]
+        parts.append(f'<line class="grid" x1="{place}" x2="{place}" y1="{TOP}" y2="{floor}"/>'
+                     f'<text x="{place}" y="{floor + 17}" text-anchor="middle">{x.said(value)}</text>')
+    for value in y.ticks():
+        place = at(x, y, (x.low, value))[1]
+        parts.append(f'<line class="grid" x1="{LEFT}" x2="{right}" y1="{place}" y2="{place}"/>'
+                     f'<text x="{LEFT - 6}" y="{place + 4}" text-anchor="end">{y.said(value)}</text>')
+    middle = (TOP + floor) / 2
+    parts += [f'<text x="{(LEFT + right) / 2}" y="{HEIGHT - 8}" text-anchor="middle">{escape(x.label)}</text>',
+              f'<text transform="translate(15 {middle}) rotate(-90)" text-anchor="middle">{escape(y.label)}</text>']
+    return (f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{escape(said)}">'
+            f'{"".join(parts)}{"".join(marks)}</svg>')

@@ -1,0 +1,44 @@
+"""Runs side by side on this machine, each in a process of its own: what kills one is the failure of no other."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from pathlib import Path
+from queue import SimpleQueue
+
+from repro.sweep.design import Point
+from repro.sweep.server import Server, ask
+
+
+def cores() -> int:
+    """The cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def each(points: list[Point], folder: Path, workers: int) -> Iterator[tuple[Point, str]]:
+    """Make the runs into `folder`, `workers` at a time; yields each with how it ended, as they end."""
+    servers = [Server() for _ in range(min(workers, len(points)))]
+    idle: SimpleQueue[Server] = SimpleQueue()
+    for server in servers:
+        idle.put(server)
+    threads = ThreadPoolExecutor(len(servers))
+    try:
+        futures = {threads.submit(_made, idle, point, folder): point for point in points}
+        for future in as_completed(futures):
+            yield futures[future], future.result()
+    finally:
+        threads.shutdown(wait=False, cancel_futures=True)
+        for server in servers:
+            server.close()
+        threads.shutdown()
+
+
+def _made(idle: SimpleQueue[Server], point: Point, folder: Path) -> str:
+    """Have the run made by a server that is idle."""
+    server = idle.get()
+    try:
+        return server.make(ask(point.scene, folder / point.name, folder / f".part-{point.name}"))
+    finally:
+        idle.put(server)

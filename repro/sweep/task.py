@@ -1,0 +1,71 @@
+"""One run of a sweep: made beside its place and moved there at its end, so that none is half there or there twice."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import traceback
+from importlib.metadata import version
+from pathlib import Path
+
+from repro.cache import source_hash
+from repro.errors import SimulationError
+from repro.running import OutputError, run
+from repro.scene import Scene
+
+#: What the status of a run begins with that is to be made again.
+UNFINISHED = ("failed", "interrupted")
+
+
+def code() -> str:
+    """What the numbers of a run come from: this package's version and source."""
+    return f"{version('dupin2001-repro')}-{source_hash()}"
+
+
+def status(folder: Path) -> str | None:
+    """How the run in a folder has ended, None where there is none."""
+    try:
+        told = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+        return str(told["status"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def finished(folder: Path) -> bool:
+    """Has the run in a folder come to its end?"""
+    told = status(folder)
+    return told is not None and not told.startswith(UNFINISHED)
+
+
+def make(scene: Scene, folder: Path, beside: Path) -> str:
+    """Run a scene in `beside`, then move it to `folder`; how it ended, in one line, whatever the trouble is."""
+    shutil.rmtree(beside, ignore_errors=True)
+    try:
+        ended = _made(scene, beside)
+        _place(beside, folder)
+    except OSError as error:
+        return f"failed: {folder}: {error.strerror or error}"
+    return ended
+
+
+def _made(scene: Scene, beside: Path) -> str:
+    try:
+        return run(scene, beside)
+    except (SimulationError, OutputError) as error:
+        return f"failed: {error}"
+    except Exception as error:  # a bug is one run's failure, and told whole
+        traceback.print_exc()
+        return f"failed: {type(error).__name__}: {error}"
+
+
+def _place(beside: Path, folder: Path) -> None:
+    """Move a run to its place, unless another has finished it meanwhile; one that failed gives way."""
+    if not finished(folder):
+        shutil.rmtree(folder, ignore_errors=True)
+    try:
+        os.rename(beside, folder)
+    except OSError:
+        if not finished(folder):
+            raise
+        shutil.rmtree(beside, ignore_errors=True)

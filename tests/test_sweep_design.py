@@ -1,0 +1,148 @@
+"""The points of a sweep: ranges, lists, grids, Latin hypercubes, and what is refused."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from repro.scene import SceneError, scene_tables
+from repro.sweep.design import MOST_POINTS, Factor, grid, latin, levels, parse, points
+
+RANGES = st.tuples(st.floats(1e-6, 1e6), st.floats(1.001, 1e6)).map(lambda pair: (pair[0], pair[0] * pair[1]))
+SPACINGS = st.sampled_from(["linear", "log"])
+
+
+def test_a_range_has_its_unit_spacing_and_count():
+    found = parse("flow.mean_velocity=0.3:30 m/day:log:8")
+    assert found == Factor("flow.mean_velocity", "m/day", (0.3, 30.0), "log", 8)
+    found = parse(" flow.viscosity_ratio = 1e3 : 2e3 : linear")
+    assert found == Factor("flow.viscosity_ratio", "", (1e3, 2e3), "linear")
+
+
+def test_a_list_has_numbers_in_one_unit_or_words():
+    assert parse("pore.width=50 um, 60um") == Factor("pore.width", "um", (50.0, 60.0))
+    assert parse("flow.viscosity_ratio=100,2.5e3") == Factor("flow.viscosity_ratio", "", (100.0, 2500.0))
+    assert parse('numerics.preset="fast", paper') == Factor("numerics.preset", "", ("fast", "paper"))
+
+
+@pytest.mark.parametrize("text", [
+    "pore.width", "=5 um", "pore.width=", "pore.width=50 um,", "pore.width=50 um, 60 mm", "pore.width=50 um, wide",
+    "pore.width=1:2 um", "pore.width=1:2 um:cubic:3", "pore.width=1 um:2 um:log:3", "pore.width=2:1 um:linear:3",
+    "pore.width=1:1 um:linear:3", "pore.width=0:2 um:log:3", "pore.width=1:2 um:log:1", "pore.width=1:2 um:log:x",
+    "pore.width=1:2 um:log:3:4", "pore.width=1:1e999 um:log:3", "pore.width=1e999 um, 2 um", "pore.width=a:b um:log:3",
+    "pore.width=1:2 um:log:\N{ARABIC-INDIC DIGIT THREE}",
+])
+def test_what_is_neither_is_refused_in_one_line(text):
+    with pytest.raises(SceneError) as refused:
+        parse(text)
+    message = str(refused.value)
+    assert message.startswith("--vary ") and "needed" in message and "\n" not in message and text[:10] in message
+
+
+@given(RANGES, SPACINGS, st.integers(2, 50))
+def test_levels_go_evenly_from_end_to_end(ends, spacing, count):
+    """Mutants: an end left out; equal steps where the range is logarithmic."""
+    found = levels(Factor("pore.width", "um", ends, spacing, count))
+    assert len(found) == count and (found[0], found[-1]) == ends
+    scale = [math.log(value) for value in found] if spacing == "log" else found
+    step = (scale[-1] - scale[0]) / (count - 1)
+    for k, value in enumerate(scale):
+        assert math.isclose(value, scale[0] + k * step, rel_tol=1e-9, abs_tol=1e-9 * (abs(scale[0]) + abs(scale[-1])))
+
+
+def test_a_value_between_the_ends_reads_well():
+    assert levels(parse("flow.mean_velocity=0.3:30 m/day:log:3")) == [0.3, 3.0, 30.0]
+
+
+def test_a_grid_is_every_combination():
+    factors = [parse("pore.width=50 um, 60 um"), parse("flow.mean_velocity=1:3 m/day:linear:3")]
+    assert grid(factors) == [(w, u) for w in (50.0, 60.0) for u in (1.0, 2.0, 3.0)]
+
+
+def test_a_grid_needs_counts_and_has_a_largest_size():
+    with pytest.raises(SceneError, match="pore.width: how many values is needed"):
+        grid([parse("pore.width=1:2 um:log")])
+    with pytest.raises(SceneError, match=f"at most {MOST_POINTS} runs"):
+        grid([parse("pore.width=1:2 um:log:101"), parse("flow.viscosity_ratio=1:2:log:100")])
+
+
+@given(st.lists(st.tuples(RANGES, SPACINGS), min_size=1, max_size=4), st.integers(1, 60), st.integers(0, 2**32))
+def test_each_stratum_of_each_range_has_one_value(ranges, samples, seed):
+    """Mutants: independent random numbers; strata of the values where the range is logarithmic."""
+    factors = [Factor(f"key{k}", "um", ends, spacing) for k, (ends, spacing) in enumerate(ranges)]
+    for factor, drawn in zip(factors, zip(*latin(factors, samples, seed))):
+        low, high = factor.values
+        parts = [math.log(v / low) / math.log(high / low) if factor.spacing == "log" else (v - low) / (high - low)
+                 for v in drawn]
+        low_strata, high_strata = ([int(samples * part + nudge) for part in parts] for nudge in (-1e-6, 1e-6))
+        assert all(low <= v <= high for v in drawn)
+        # A value within round-off of a border is counted on the side that leaves each stratum one.
+        certain = sorted(a for a, b in zip(low_strata, high_strata) if a == b)
+        assert len(set(certain)) == len(certain)
+        if len(certain) == samples:
+            assert certain == list(range(samples))
+
+
+@given(st.integers(1, 12), st.integers(1, 5), st.integers(0, 1000))
+def test_a_list_is_drawn_evenly(words, times, seed):
+    """Mutant: each value drawn by itself."""
+    factor = Factor("numerics.preset", "", tuple(f"word{k}" for k in range(words)))
+    drawn = [values[0] for values in latin([factor], words * times, seed)]
+    assert {word: drawn.count(word) for word in factor.values} == dict.fromkeys(factor.values, times)
+
+
+def test_a_seed_is_a_design():
+    factors = [parse("pore.width=40:60 um:linear"), parse("flow.mean_velocity=1:3 m/day:log")]
+    assert latin(factors, 5, 1) == latin(factors, 5, 1) != latin(factors, 5, 2)
+
+
+@pytest.mark.parametrize("text, samples, said", [("pore.width=1:2 um:log:3", 5, "leave :3 out"),
+                                                 ("pore.width=1:2 um:log", 0, "--samples 0"),
+                                                 ("pore.width=1:2 um:log", MOST_POINTS + 1, "--samples 10001")])
+def test_what_a_hypercube_cannot_be_is_refused(text, samples, said):
+    with pytest.raises(SceneError, match=said):
+        latin([parse(text)], samples, 0)
+
+
+def test_a_column_tells_its_unit():
+    found = [parse(f"key={text}").column for text in ("1 m/day", "1 1/day", "1 cm^2/s", "1", "fast", "1 mg / L")]
+    assert found == ["key_m_per_day", "key_1_per_day", "key_cm2_per_s", "key", "key", "key_mg_per_L"]
+
+
+def made(*varied, sets=(), source="base"):
+    factors = [parse(text) for text in varied]
+    return points(source, list(sets), factors, grid(factors))
+
+
+def test_varying_one_of_the_pair_replaces_the_other_and_keeps_the_rest():
+    """base has a head. Mutant: the whole section replaced."""
+    (point,) = made("flow.mean_velocity=2 m/day", sets=["flow.viscosity_ratio=7"])
+    told = scene_tables(point.scene)["flow"]
+    assert "head" not in told and told["viscosity_ratio"] == 7
+    assert point.scene.flow.mean_velocity == pytest.approx(2e6 / 24, rel=1e-15)
+    (point,) = made("flow.head=1 um", source="wide")
+    assert point.scene.flow.mean_velocity is None and point.scene.flow.head == 1
+
+
+def test_a_varied_preset_brings_its_defaults():
+    """Mutant: varying a scene whose defaults are spelt out already."""
+    fast, paper = made("numerics.preset=fast, paper")
+    assert (fast.scene.numerics.elements, paper.scene.numerics.elements) == ("quadratic", "linear")
+    assert fast.name[:5] == "0001-" and paper.name[:5] == "0002-" and len({fast.name[5:], paper.name[5:]}) == 2
+
+
+@pytest.mark.parametrize("varied, sets, said", [
+    (["pore.width=50 um, 4 um"], [], "run 2 .pore.width = 4 um.: base: aggregate.radius"),
+    (["pore.widht=50 um"], [], "did you mean width"),
+    (["pore.width=50 s"], [], 'run 1 .pore.width = 50 s.: base: pore.width = "50.0 s": a length is needed'),
+    (["numerics.preset=fast, best"], [], "run 2 .*preset"),
+    (["pore.width=50 um, 50.0 um"], [], "run 2 .*same scene as run 1"),
+    (["pore.width=50 um", "pore.width=60 um"], [], "one --vary"),
+    (["flow.head=1 um", "flow.mean_velocity=1 m/day"], [], "exclude each other"),
+    (["flow.head=1 um"], ['flow.head="2 um"'], "--set of flow.head"),
+    (["flow.head=1 um"], ['flow.mean_velocity="2 m/day"'], "--set of flow.head or flow.mean_velocity"),
+])
+def test_a_run_that_cannot_be_is_refused_before_any_is_made(varied, sets, said):
+    with pytest.raises(SceneError, match=said):
+        made(*varied, sets=sets)
