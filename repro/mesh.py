@@ -257,7 +257,7 @@ def _fill(points, polygons, size_at, ends, width) -> PoreMesh:
     rim = np.vstack([np.column_stack([nodes, np.roll(nodes, -1)]) for nodes, _ in polygons])
     rim = np.unique(np.sort(rim, axis=1), axis=0)
     coarse, found = _mmg(points, np.vstack(triangles), region, rim, points, FIRST_PASS * size_at(points))
-    fine, found = _mmg(*coarse, found[rim], points, size_at(coarse[0]))
+    fine, found = _mmg(coarse[0], coarse[1], coarse[2], found[rim], points, size_at(coarse[0]))
     return PoreMesh(fine[0], fine[1], fine[2] == 2, found, width, ends)
 
 

@@ -25,8 +25,10 @@ def attempt(scene, now: Pore, solved: Solved, duration: float) -> Attempt:
     carried = half if same else solved
     after, remeshed = remeshing.new_mesh(scene, now, expanded, replace(carried, flow=solved.flow))
     made = float(np.sum(now.mesh.lumped(now.mesh.biomass) * (grown.active + grown.inert - now.active - now.inert)))
-    flows = [tuple(duration * getattr(flux, key) for flux in half.fluxes) for key in ("supplied", "out", "consumed")]
-    ledger = Ledger(now.time, now.time + duration, *flows, (0.0, 0.0), mass_of(now), made, mass_of(after))
+    flows = {key: tuple(duration * getattr(flux, key) for flux in half.fluxes)
+             for key in ("supplied", "out", "consumed")}
+    ledger = Ledger(now.time, now.time + duration, **flows, stored=(0.0, 0.0), biomass_before=mass_of(now),
+                    biomass_made=made, biomass_after=mass_of(after))
     weight = now.mesh.lumped(now.mesh.biomass)
     change = weight @ np.abs(rates[0] + rates[1] - first[0] - first[1]) / weight.sum()
     return Attempt(Step(after, (now, solved), ledger, remeshed, iterations), float(change),
@@ -49,7 +51,7 @@ def half_way(scene, now: Pore, solved: Solved, first, duration: float):
 
 
 def _grown(now: Pore, rates, duration: float) -> Pore:
-    active, inert = kinetics.grow(now.active, now.inert, *rates, duration)
+    active, inert = kinetics.grow(now.active, now.inert, rates[0], rates[1], duration)
     return replace(now, active=active, inert=inert)
 
 
