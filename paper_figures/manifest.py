@@ -110,7 +110,7 @@ def differences(ours: dict, theirs: dict) -> list[str]:
 
 def _data(manifest: dict) -> dict[str, str]:
     """Hash of everything that has one, by a name that says where it is; of pictures, that they are there."""
-    found = {}
+    found: dict[str, str] = {}
     for name, run in manifest["runs"].items():
         found |= {f"{name}/{file}": digest for file, digest in run["files"].items()} | {f"{name} (scene)": run["scene"]}
     for name, figure in manifest["figures"].items():
