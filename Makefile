@@ -38,10 +38,10 @@ mutants: $(STAMP) ## run wrong changes of the code against the cases, each of wh
 	@$(BIN) -m verification.mutants
 
 test: $(STAMP) ## run the tests, a process a core
-	@$(BIN) -m pytest -n auto
+	@$(BIN) -m pytest -n logical --dist worksteal
 
 test-thorough: $(STAMP) ## the same with many more random examples, and what takes long
-	@HYPOTHESIS_PROFILE=thorough $(BIN) -m pytest -n auto
+	@HYPOTHESIS_PROFILE=thorough $(BIN) -m pytest -n logical --dist worksteal
 
 lint: $(STAMP) ## style and types: ruff and mypy
 	@$(BIN) -m ruff check .
