@@ -11,18 +11,22 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help env figures claims verify verify-fast mutants test test-thorough bench clean
+.PHONY: help env figures check-manifest claims verify verify-fast mutants test test-thorough lint bench clean
 
 help:
-	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1|\2/p' Makefile | awk -F'|' '{ printf "  make %-13s %s\n", $$1, $$2 }'
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1|\2/p' Makefile | awk -F'|' '{ printf "  make %-14s %s\n", $$1, $$2 }'
 
 env: $(STAMP) ## make .venv from requirements.lock, with this package in it (PYTHON=python3.12 ...)
 
 figures: $(STAMP) ## run the paper's simulations and draw its figures into paper_figures/out
 	@$(BIN) -m paper_figures
 
-claims: $(STAMP) ## judge every claim of the paper by a computed number
+check-manifest: $(STAMP) ## compare the data of what make figures has made with what is committed
+	@$(BIN) -m paper_figures.manifest
+
+claims: $(STAMP) ## judge every claim of the paper by a computed number, and write the replication note
 	@$(BIN) -m verification.claims
+	@$(BIN) -m paper_figures.replication
 
 verify: $(STAMP) ## run the verification cases against references that do not use repro
 	@$(BIN) -m verification
@@ -33,19 +37,24 @@ verify-fast: $(STAMP) ## the quick ones of these cases, which make test runs too
 mutants: $(STAMP) ## run wrong changes of the code against the cases, each of which must be caught
 	@$(BIN) -m verification.mutants
 
-test: $(STAMP) ## run the tests
-	@$(BIN) -m pytest
+test: $(STAMP) ## run the tests, a process a core
+	@$(BIN) -m pytest -n logical --dist worksteal
 
-test-thorough: $(STAMP) ## run the tests with many more random examples
-	@HYPOTHESIS_PROFILE=thorough $(BIN) -m pytest
+test-thorough: $(STAMP) ## the same with many more random examples, and what takes long
+	@HYPOTHESIS_PROFILE=thorough $(BIN) -m pytest -n logical --dist worksteal
+
+lint: $(STAMP) ## style and types: ruff and mypy
+	@$(BIN) -m ruff check .
+	@$(BIN) -m mypy
 
 bench: $(STAMP) ## time against error, cost against size, and what each assumption costs and changes
 	@$(BIN) -m verification.bench
 	@$(BIN) -m verification.audit
 	@$(BIN) -m verification.speed
+	@$(BIN) -m paper_figures.replication
 
 clean: ## remove .venv and everything generated; nothing that is committed
-	@rm -rf $(VENV) paper_figures/out paper_figures/cache build dist *.egg-info .pytest_cache .ruff_cache .hypothesis
+	@rm -rf $(VENV) paper_figures/out paper_figures/cache build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis
 	@find . -name .git -prune -o -type d -name __pycache__ -prune -exec rm -rf {} +
 
 # The stamp is the last thing written: an install that was interrupted, or failed, leaves none and is done again from nothing.

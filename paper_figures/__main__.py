@@ -6,8 +6,9 @@ from importlib import import_module
 from pathlib import Path
 from time import perf_counter
 
-from paper_figures import FIGURES, page, runs, style
+from paper_figures import FIGURES, manifest, page, runs, style
 from repro.cache import provenance
+from repro.results import write_json
 
 OUT = Path(__file__).parent / "out"
 
@@ -17,9 +18,14 @@ def main() -> None:
     modules = {name: import_module(f"paper_figures.{name}") for name in FIGURES}
     requests = list(dict.fromkeys(request for module in modules.values() for request in module.RUNS))
     found = _computed(requests)
-    entries = [_drawn(name, module, found) for name, module in modules.items()]
+    told = {name: _drawn(name, module, found) for name, module in modules.items()}
+    entries = [entry for entry, _ in told.values()]
     page.write(entries, [f"{request.scene}: {provenance(folder)['status']}" for request, folder in found.items()], OUT)
-    print(f"{OUT / 'index.html'}: all of them with captions", flush=True)
+    write_json(OUT / manifest.NAME, {
+        "environment": manifest.environment(),
+        "runs": {request.scene: manifest.of_run(request, folder) for request, folder in found.items()},
+        "figures": {name: figure for name, (_, figure) in told.items()}})
+    print(f"{OUT / 'index.html'}: all of them with captions; {manifest.NAME}: hashes of their data", flush=True)
 
 
 def _computed(requests: list[runs.Request]) -> dict[runs.Request, Path]:
@@ -31,13 +37,16 @@ def _computed(requests: list[runs.Request]) -> dict[runs.Request, Path]:
     return found
 
 
-def _drawn(name: str, module, found: dict[runs.Request, Path]) -> page.Entry:
-    """Draw one figure and say what the page tells about it."""
-    folders = [found[request] for request in module.RUNS]
-    style.save(module.draw(*folders), OUT, name)
+def _drawn(name: str, module, found: dict[runs.Request, Path]) -> tuple[page.Entry, dict]:
+    """Draw one figure; what the page and what the manifest tell about it."""
+    start, folders = perf_counter(), [found[request] for request in module.RUNS]
+    made, caption = module.draw(*folders), module.caption(*folders)
+    data = manifest.figure_hash(made, caption)
+    style.save(made, OUT, name)
     print(f"{name}: {module.TITLE}", flush=True)
-    return page.Entry(name, module.TITLE, module.caption(*folders), tuple(r.command() for r in module.RUNS),
-                      module.CLAIMS)
+    commands = tuple(request.command() for request in module.RUNS)
+    return (page.Entry(name, module.TITLE, caption, commands, module.CLAIMS),
+            manifest.of_figure(module, data, perf_counter() - start, OUT.glob(f"{name}.*")))
 
 
 if __name__ == "__main__":

@@ -117,7 +117,8 @@ def settle(problem: Problem, active: np.ndarray | None, guess: Concentrations | 
     for count in range(1, MOST_STEPS + 1):
         new, change = _accepted(system, now, step, SETTLING, "while the profiles settle", 1 / FASTER)
         if new.step >= LONG and change <= SETTLED * (1 - change / last):
-            return Concentrations(*_restored(system, new)[:2], count)
+            acceptor, donor = _restored(system, new)[:2]
+            return Concentrations(acceptor, donor, count)
         now, step, last = _level(new.state), min(FASTER * new.step, LONG), change
     raise TransportError(f"the profiles still change by {change:.2g} of the supply a step after {MOST_STEPS} steps; "
                          'try numerics.transport = "quasi_steady"')
@@ -144,7 +145,8 @@ def advance(problem: Problem, active: np.ndarray, inert: np.ndarray, start: Conc
     stored = (now.state[:2] - before) @ system.total
     _, _, growth, remains = fields = _restored(system, now)
     flows = tuple((float(a), float(d)) for a, d in (*now.flows.T, stored))
-    return Advance(active * np.exp(growth), remains, Concentrations(*fields[:2], len(steps)), flows, tuple(steps))
+    end = Concentrations(fields[0], fields[1], len(steps))
+    return Advance(active * np.exp(growth), remains, end, flows, tuple(steps))
 
 
 def make_biomass(scene, now, solved, duration: float):
@@ -158,8 +160,9 @@ def _started(problem: Problem, active, inert, start: Concentrations, living=True
     order, state = problem.nodes, np.stack([start.acceptor, start.donor, np.zeros_like(active), inert])
     largest = np.maximum([operator.supply for operator in problem.both], state[:2].max(axis=1))
     scale, body = np.where(largest > 0, largest, 1.0)[:, None], problem.body[order]
-    rows = tuple(_row(operator, order) for operator in problem.both)
-    system = System(problem, rows, body, problem.total[order], active[order], body > 0, scale, living, simultaneous)
+    acceptor, donor = (_row(operator, order) for operator in problem.both)
+    system = System(problem, (acceptor, donor), body, problem.total[order], active[order], body > 0, scale, living,
+                    simultaneous)
     return system, _level(state[:, order])
 
 
@@ -238,14 +241,14 @@ def _rates(system: System, fields: np.ndarray):
     if not system.living:
         return 0.0, 0.0
     substrates, kinetics = system.problem.substrates, system.problem.kinetics
-    return law.growth_rate(*fields, substrates, kinetics), law.inert_rate(fields[0], substrates, kinetics)
+    return law.growth_rate(fields[0], fields[1], substrates, kinetics), law.inert_rate(fields[0], substrates, kinetics)
 
 
 def _sink(system: System, active: np.ndarray, fields: np.ndarray, s: int, positive: bool):
     """Slope and offset (N,) of the uptake of substrate s, slope C + offset (um2 mg/L/h), linearised at the fields."""
     if system.problem.kinetics is None:
         return np.zeros_like(active), np.zeros_like(active)
-    *uptake, slopes = law.uptake(*fields, system.problem.substrates, system.problem.kinetics)
+    *uptake, slopes = law.uptake(fields[0], fields[1], system.problem.substrates, system.problem.kinetics)
     load, slope, own = system.body * active, slopes[s][s], fields[s]
     if positive:
         tiny = np.finfo(float).tiny

@@ -30,8 +30,10 @@ def attempt(scene, now: Pore, solved: Solved, duration: float, most: float = np.
     carried = half if same else solved
     after, remeshed = remeshing.new_mesh(scene, now, expanded, replace(carried, flow=solved.flow))
     made = float(np.sum(weight * (grown.active + grown.inert - now.active - now.inert)))
-    flows = [tuple(duration * getattr(flux, key) for flux in half.fluxes) for key in ("supplied", "out", "consumed")]
-    ledger = Ledger(now.time, now.time + duration, *flows, (0.0, 0.0), mass_of(now), made, mass_of(after))
+    flows = {key: tuple(duration * getattr(flux, key) for flux in half.fluxes)
+             for key in ("supplied", "out", "consumed")}
+    ledger = Ledger(now.time, now.time + duration, **flows, stored=(0.0, 0.0), biomass_before=mass_of(now),
+                    biomass_made=made, biomass_after=mass_of(after))
     return Attempt(Step(after, (now, solved), ledger, remeshed, iterations), change,
                    first_contact(scene, now, expanded, gap))
 
@@ -52,7 +54,7 @@ def half_way(scene, now: Pore, solved: Solved, first, duration: float):
 
 
 def _grown(now: Pore, rates, duration: float) -> Pore:
-    active, inert = kinetics.grow(now.active, now.inert, *rates, duration)
+    active, inert = kinetics.grow(now.active, now.inert, rates[0], rates[1], duration)
     return replace(now, active=active, inert=inert)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -63,7 +64,7 @@ def remesh(scene, now: Pore, expanded: Pore, solved: Solved) -> Pore:
                    concentrations=_carried_substrates(scene, now, grid, solved), **carried)
 
 
-def _carried(transfer: str, expanded: Pore, grid: mesh.PoreMesh) -> dict[str, np.ndarray]:
+def _carried(transfer: str, expanded: Pore, grid: mesh.PoreMesh) -> dict[str, Any]:
     """X_A and X_I by the chosen transfer; places at t = 0 and pressure by linear interpolation."""
     old, triangles = expanded.mesh.body, expanded.mesh.body_triangles
     body, new, new_triangles = expanded.mesh.points[old], grid.points[grid.body], grid.body_triangles

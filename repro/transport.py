@@ -95,12 +95,12 @@ def problem(mesh: PoreMesh, flow: Flow | None, substrates, kinetics, inlet: str 
     dofs, count = mesh.triangles, len(mesh.points)
     scalar = mesh.once("scalar", lambda: ElementSystem(dofs, np.arange(count), np.zeros(count, bool)))
     carried = 0.0 if flow is None else advection(mesh, flow)
-    operators = [_operator(mesh, flow, carried, scalar, s, inlet, substrates.boundary)
-                 for s in (substrates.acceptor, substrates.donor)]
+    acceptor, donor = [_operator(mesh, flow, carried, scalar, s, inlet, substrates.boundary)
+                       for s in (substrates.acceptor, substrates.donor)]
     nodes = mesh.once("node order", lambda: linear.node_order(count, dofs))
     newton = mesh.once("newton", lambda: PairPattern(scalar.indices, scalar.indptr, mesh.body, nodes))
-    return Problem(mesh, *operators, mesh.lumped(mesh.biomass), mesh.lumped(), substrates, kinetics, nodes, newton,
-                   reused)
+    return Problem(mesh, acceptor, donor, mesh.lumped(mesh.biomass), mesh.lumped(), substrates, kinetics, nodes,
+                   newton, reused)
 
 
 def advection(mesh: PoreMesh, flow: Flow) -> np.ndarray:
@@ -171,7 +171,7 @@ def _balance(problem: Problem, weight: np.ndarray, state: np.ndarray):
     nothing = np.zeros(len(weight))
     uptake, slopes = (nothing, nothing), ((nothing, nothing), (nothing, nothing))
     if problem.kinetics is not None:
-        *uptake, slopes = law.uptake(*state, problem.substrates, problem.kinetics)
+        *uptake, slopes = law.uptake(state[0], state[1], problem.substrates, problem.kinetics)
     residual, size = np.empty_like(state), np.empty_like(state)
     for k, operator in enumerate(problem.both):
         sink = weight * uptake[k]
@@ -257,7 +257,7 @@ def _checked(problem: Problem, weight, state, iterations: int) -> Concentrations
 
 def _sweep(problem: Problem, weight, state) -> np.ndarray:
     """Solve (matrix + weight q(C) / C) C_new = source, with the uptake's coefficients frozen at the state."""
-    *uptake, slopes = law.uptake(*state, problem.substrates, problem.kinetics)
+    *uptake, slopes = law.uptake(state[0], state[1], problem.substrates, problem.kinetics)
     tiny, zero, right = np.finfo(float).tiny, np.zeros(len(weight)), np.empty_like(state)
     per = [np.where(c > tiny, q / np.maximum(c, tiny), slopes[k][k]) for k, (c, q) in enumerate(zip(state, uptake))]
     for k, operator in enumerate(problem.both):
@@ -285,8 +285,9 @@ def fluxes(problem: Problem, active: np.ndarray | None, state: Concentrations) -
     if problem.kinetics is not None and active is not None:
         q = law.uptake(state.acceptor, state.donor, problem.substrates, problem.kinetics)[:2]
     weight = 0.0 if active is None else problem.body * active
-    return tuple(_fluxes(problem.mesh, operator, field, float(np.sum(weight * rate)))
-                 for operator, field, rate in zip(problem.both, (state.acceptor, state.donor), q))
+    acceptor, donor = (_fluxes(problem.mesh, operator, field, float(np.sum(weight * rate)))
+                       for operator, field, rate in zip(problem.both, (state.acceptor, state.donor), q))
+    return acceptor, donor
 
 
 def _fluxes(mesh: PoreMesh, operator: Operator, field: np.ndarray, consumed: float) -> Fluxes:

@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, settings
 matplotlib.use("Agg")
 SLOW_MACHINES_MAY = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
 settings.register_profile("ci", derandomize=True, max_examples=20, **SLOW_MACHINES_MAY)
-settings.register_profile("thorough", print_blob=True, max_examples=500, **SLOW_MACHINES_MAY)
+settings.register_profile("thorough", print_blob=True, max_examples=200, **SLOW_MACHINES_MAY)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 
 

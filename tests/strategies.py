@@ -103,21 +103,23 @@ def scenes(draw, drives=("none", "head", "mean_velocity"), peclet=3.0, thiele=30
     by a head, by a velocity or not; it grows for a step or up to ``steps``.
 
     peclet: the largest u_ave W / D of a clean pore and the slower substrate; the paper's are 0.6 and 1.4, and at 3 no
-    element of these meshes (the largest have W / 6) sees more than u h / D = 1. thiele: the largest
-    (k X_m R^2 / (D_D K_sD))^1/2, D in the aggregate; the paper's seed has 0.3, one of 42 um 2.5.
+    element of these meshes (the largest have W / 6) sees more than u h / D = 1. thiele: the largest Thiele number of
+    either, (k X_m R^2 / (D_D K_sD))^1/2 and ((F k + d_c b) X_m R^2 / (D_A K_sA))^1/2, D in the aggregate; the paper's
+    seed has 0.3, one of 42 um 2.5. Beyond 30 these meshes are too coarse, and a run says so.
     """
     width, step = draw(between(10.0, 150.0)), draw(st.floats(3.0, 20.0))
     length, radius = width * draw(st.floats(4.0, 12.0)), width * draw(st.floats(0.05, 0.95))
-    slowest, rate = draw(between(0.1, 1.0)), draw(between(0.5, 15.0))
-    donor = draw(substrates(slowest))
-    spread, half = number(donor["diffusivity_in_aggregate"]), number(donor["half_saturation"])
-    density = draw(between(0.1, thiele)) ** 2 * spread * half / (rate * (radius * 1e-4) ** 2)
+    slowest, rate, decay = draw(between(0.1, 1.0)), draw(between(0.5, 15.0)), draw(between(0.01, 1.0))
+    both = draw(substrates(slowest)), draw(substrates(slowest))
+    slower = min(number(one["diffusivity_in_aggregate"]) * number(one["half_saturation"]) / fastest
+                 for one, fastest in zip(both, (1.52 * rate + 1.42 * decay, rate)))
+    density = draw(between(0.1, thiele)) ** 2 * slower / (radius * 1e-4) ** 2
     tables = {
         "pore": {"width": f"{width!r} um", "length": f"{length!r} um"},
         "aggregate": {"radius": f"{radius!r} um"},
-        "substrates": {"acceptor": draw(substrates(slowest)), "donor": donor},
+        "substrates": dict(zip(("acceptor", "donor"), both)),
         "kinetics": {"maximum_utilization_rate": f"{rate!r} 1/day",
-                     "decay_coefficient": f"{draw(between(0.01, 1.0))!r} 1/day",
+                     "decay_coefficient": f"{decay!r} 1/day",
                      "degradable_fraction": draw(st.floats(0.0, 1.0)),
                      "maximum_density": f"{density!r} mg/L"},
         "growth": {"end": f"{step * draw(st.integers(1, steps))!r} min", "time_step": f"{step!r} min"},

@@ -4,12 +4,14 @@ import pathlib
 import re
 import sys
 import tomllib
+from functools import cache
 from importlib.metadata import packages_distributions
 
 import pytest
 
 ROOT = pathlib.Path(__file__).parents[1]
 FOLDERS = ("repro", "reference", "verification", "paper_figures", "tests")
+PROVIDED = cache(packages_distributions)
 FORBIDDEN = {
     "repro": {"reference", "verification", "paper_figures", "tests", "pickle"},
     "reference": {"repro", "pickle"},
@@ -60,7 +62,7 @@ def name_of(requirement):
 def distributions(names):
     """Distributions that provide third-party import names; an unknown one stands for itself."""
     outside = names - set(sys.stdlib_module_names) - set(FOLDERS)
-    provided = packages_distributions()
+    provided = PROVIDED()
     return {normal(d) for name in outside for d in provided.get(name, [name])}
 
 

@@ -70,7 +70,7 @@ def test_everything_is_drawn_and_told(quick, capsys):
     figures.main()
     told = capsys.readouterr().out.splitlines()
     assert [line.partition(":")[0] for line in told[1:-1]] == list(MODULES)
-    assert {p.name for p in quick.iterdir()} == {f"{n}.png" for n in MODULES} | {"index.html"}
+    assert {p.name for p in quick.iterdir()} == {f"{n}.png" for n in MODULES} | {"index.html", "manifest.json"}
     root = ElementTree.fromstring((quick / "index.html").read_text(encoding="utf-8"))
     assert [image.get("src") for image in root.iter("img")] == [f"{name}.png" for name in MODULES]
     text = " ".join(root.itertext())

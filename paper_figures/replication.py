@@ -1,0 +1,208 @@
+"""The replication note, `replication.md`: `replication_template.md` with the numbers that the runs have left.
+
+`python -m paper_figures.replication` takes what `make claims` has left (where it has, into `replication.json`, which is
+committed), the records of `make verify` and `make bench`, the errata and the citation, and fills in the template's
+`{{...}}`. A number is named by its claim and what is counted, `{{C01 | mean velocity at t = 0 (m/d) | .2f}}`, or "off"
+for its difference from the printed one; `{{C15 | contradicted}}` says C15 and is refused where that is not the verdict.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import textwrap
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+
+from paper_figures import FIGURES, manifest
+from paper_figures.claims import STATEMENTS
+from repro.results import write_json, write_text
+from verification import speed
+from verification.bench import base
+from verification.bench.record import line
+
+HERE = Path(__file__).parent
+ROOT = HERE.parent
+NOTE, TEMPLATE, RECORD = (HERE / name for name in ("replication.md", "replication_template.md", "replication.json"))
+CLAIMS = ROOT / "verification" / "claims" / "out" / "claims.json"
+REPORT = ROOT / "verification" / "report"
+FIELD = re.compile(r"\{\{(.+?)\}\}")
+WIDTH = 120
+CONTRADICTED, CHANGED, REPRODUCED = "contradicted", "reproduced with a stated change", "reproduced"
+OF_A_CLAIM = ("id", "verdict", "where", "claim", "change", "reason")
+OF_A_CHECK = ("quantity", "paper", "ours", "deviation", "bar_low", "bar_high", "outcome", "against_paper")
+
+
+def record(claims: dict) -> dict:
+    """What the note keeps of the claims' report, with the environment that it was made in."""
+    kept = [{**{key: claim[key] for key in OF_A_CLAIM},
+             "checks": [{key: check[key] for key in OF_A_CHECK} for check in claim["checks"]]}
+            for claim in claims["claims"]]
+    return {"environment": manifest.environment(), "claims": kept}
+
+
+def fields(told: dict) -> dict[str, Callable[[], str]]:
+    """What each name of the template without a claim stands for."""
+    claims = told["claims"]
+    return {**_about(), **_verdicts(claims), **_bench(), **_errata(),
+            "verify": _verified, "audit.defaults": _of_defaults,
+            "list.reproduced": lambda: "\n".join(map(_reproduced, _with(claims, REPRODUCED))),
+            "list.changed": lambda: "\n".join(map(_changed, _with(claims, CHANGED))),
+            "list.contradicted": lambda: "\n".join(map(_contradicted, _with(claims, CONTRADICTED))),
+            "table.values": lambda: "\n".join(map(_value, _printed(claims))),
+            "table.figures": lambda: "\n".join(map(_figure, FIGURES)),
+            "environment": lambda: _environment(told["environment"])}
+
+
+def _about() -> dict[str, Callable[[], str]]:
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8").partition("references:")[0]
+
+    def value(key: str) -> str:
+        return re.search(rf"^{key}: (.+)$", citation, re.M)[1].strip('"')
+    return {"authors": lambda: ", ".join(re.findall(r"^  - name: (.+)$", citation, re.M)),
+            "version": lambda: value("version"), "licence": lambda: value("license")}
+
+
+def _with(claims: list[dict], verdict: str) -> list[dict]:
+    """Claims of a verdict; a bar that reaches over a bound leaves a claim among the reproduced ones."""
+    return [claim for claim in claims if claim["verdict"].partition(", but")[0] == verdict]
+
+
+def _verdicts(claims: list[dict]) -> dict[str, Callable[[], str]]:
+    against = [check["against_paper"] for _, check in _printed(claims)]
+    return {"claims.total": lambda: str(len(claims)), "paper.total": lambda: str(len(against)),
+            "claims.reproduced": lambda: str(len(_with(claims, REPRODUCED))),
+            "claims.over": lambda: str(sum(", but" in claim["verdict"] for claim in claims)),
+            "claims.changed": lambda: str(len(_with(claims, CHANGED))),
+            "claims.contradicted": lambda: str(len(_with(claims, CONTRADICTED))),
+            "paper.bar": lambda: str(against.count("inside our bar")),
+            "paper.few": lambda: str(against.count("inside a few percent")),
+            "paper.neither": lambda: str(against.count("neither"))}
+
+
+def _printed(claims: list[dict]) -> list[tuple[dict, dict]]:
+    """(claim, check) of every number that the paper prints a value of."""
+    return [(claim, check) for claim in claims for check in claim["checks"] if check["against_paper"]]
+
+
+def _value(pair: tuple[dict, dict]) -> str:
+    claim, check = pair
+    over = ", its bar reaches over the tolerance" if check["outcome"] == "bar reaches over" else ""
+    return (f"| {claim['id']} | {check['quantity']} | {check['paper']} | {check['ours']:.4g} | "
+            f"{check['bar_low']:.4g} to {check['bar_high']:.4g} | {check['against_paper']}{over} |")
+
+
+def _reproduced(claim: dict) -> str:
+    check, over = claim["checks"][0], "; a bar reaches over a bound" if ", but" in claim["verdict"] else ""
+    return (f"- **{claim['id']}** ({claim['where']}): {claim['claim']}. Here: {check['quantity']}, "
+            f"{check['ours']:.4g}{over}.")
+
+
+def _changed(claim: dict) -> str:
+    return f"- **{claim['id']}** ({claim['where']}): {claim['claim']}. *Changed:* {claim['change'].rstrip('.')}."
+
+
+def _contradicted(claim: dict) -> str:
+    return f"- **{claim['id']}** ({claim['where']}): {claim['claim']}. *Why not:* {claim['reason'].rstrip('.')}."
+
+
+def _figure(name: str) -> str:
+    """A row of the table of figures; what is no claim of the paper's is its caption's to say."""
+    module = import_module(f"paper_figures.{name}")
+    kind, _, title = module.TITLE.partition(". ")
+    what = "; ".join(f"{STATEMENTS[claim]} ({claim})" for claim in module.CLAIMS)
+    printed = "not in the paper" if kind == "Addition" else kind
+    return f"| {printed}: {title} | `out/{name}.pdf` | {what} |"
+
+
+def _kept(name: str) -> dict:
+    return json.loads((REPORT / name).read_text(encoding="utf-8"))
+
+
+def _verified() -> str:
+    """How many cases pass, as the report says it."""
+    report = (REPORT / "REPORT.md").read_text(encoding="utf-8")
+    return re.search(r"^\d+ of \d+ cases pass; \d+ numbers judged", report, re.M)[0]
+
+
+def _of_defaults() -> str:
+    """The largest change (%) that the defaults which are not the paper's make over the base run."""
+    ours = (("transport in time", "transient (Gear)"), ("transfer at a remesh", "linear"))
+    changes = [abs(value) for row in _kept("audit.json")["rows"] if (row["choice"], row["alternative"]) in ours
+               for value in row["effect"].values()]
+    return f"{100 * max(changes):.1g}"
+
+
+def _bench() -> dict[str, Callable[[], str]]:
+    bench = _kept("bench.json")
+    failed = [one for one in bench["verdicts"] if one["holds"] is not True]
+    part = bench["parts"]["base"]
+    fast = line(part, base.FAST)["points"][0]
+    slow = next(point for point in line(part, base.PRESET_PAPER)["points"] if point["label"] == speed.PAPER_AS_IT_IS)
+    return {"bench.processor": lambda: f"one core ({bench['machine']['processor']})",
+            "bench.paper": lambda: f"{slow['seconds']:.1f}", "bench.fast": lambda: f"{fast['seconds']:.1f}",
+            "bench.error": lambda: f"{100 * fast['error']:.1f}", "bench.total": lambda: str(len(bench["verdicts"])),
+            "bench.failed": lambda: str(len(failed)), "bench.verb": lambda: "does" if len(failed) == 1 else "do",
+            "list.bench": lambda: "\n".join(f"- {one['claim']}: wanted {one['wanted']}, measured {one['measured']}."
+                                            for one in failed)}
+
+
+def _errata() -> dict[str, Callable[[], str]]:
+    found = re.findall(r"^## (E\d+)\. (.+)$", (ROOT / "reference" / "ERRATA.md").read_text(encoding="utf-8"), re.M)
+    return {"errata.count": lambda: str(len(found)),
+            "list.errata": lambda: "\n".join(f"- **{key}**: {title}." for key, title in found)}
+
+
+def _environment(about: dict[str, str]) -> str:
+    names = ("numpy", "scipy", "scikit-fem", "mmgpy", "shapely")
+    return (f"Python {about['python']}, {', '.join(f'{name} {about[name]}' for name in names)}, {about['blas']} on "
+            f"{about['system']} ({about['processor']})")
+
+
+def filled(template: str, told: dict) -> str:
+    """The note. Raises LookupError for a name, a claim or a quantity that there is not, or another verdict."""
+    simple, claims = fields(told), {claim["id"]: claim for claim in told["claims"]}
+
+    def value(found: re.Match) -> str:
+        parts = [part.strip() for part in found[1].split("|")]
+        if len(parts) > 1:
+            return _of_claim(claims, *parts)
+        return simple[parts[0]]()
+    return "\n\n".join(map(_wrapped, FIELD.sub(value, template).split("\n\n")))
+
+
+def _wrapped(block: str) -> str:
+    """A paragraph, or each point of a list, in lines of WIDTH; headings, tables and the rest as they are."""
+    if re.match(r"[#|!<]", block):
+        return block
+    points = re.split(r"\n(?=- |\d+\. )", block.strip("\n"))
+    end = "\n" if block.endswith("\n") else ""
+    return "\n".join(textwrap.fill(" ".join(point.split()), WIDTH, break_long_words=False, break_on_hyphens=False,
+                                   subsequent_indent=" " * (re.match(r"(- |\d+\. )?", point).end()))
+                     for point in points) + end
+
+
+def _of_claim(claims: dict[str, dict], id: str, what: str, form: str = "") -> str:
+    claim = claims[id]
+    if not form:
+        if claim["verdict"].partition(", but")[0] != what:
+            raise LookupError(f"{id} is {claim['verdict']}, not {what}")
+        return id
+    check = {check["quantity"]: check for check in claim["checks"]}[what]
+    if form == "off":
+        return f"{100 * abs(check['ours'] / float(check['paper']) - 1):.2g} %"
+    return format(check["ours"], form)
+
+
+def main() -> None:
+    """Write the record, where `make claims` has left one, and the note."""
+    if CLAIMS.exists():
+        write_json(RECORD, record(json.loads(CLAIMS.read_text(encoding="utf-8"))))
+    told = json.loads(RECORD.read_text(encoding="utf-8"))
+    write_text(NOTE, filled(TEMPLATE.read_text(encoding="utf-8"), told))
+    print(f"{NOTE}: written")
+
+
+if __name__ == "__main__":
+    main()

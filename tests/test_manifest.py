@@ -1,0 +1,144 @@
+"""The manifest of `make figures`: hashes follow the data and nothing else, and a difference is told with its reason."""
+import copy
+import json
+
+import meshio
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import paper_figures
+from paper_figures import manifest, runs
+from repro import load_scene, run
+from repro.scene import scene_hash
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A run of 0.1 s."""
+    made = tmp_path_factory.mktemp("runs") / "initial_mesh"
+    run(load_scene("initial_mesh"), made)
+    return made
+
+
+@pytest.fixture
+def told(folder):
+    """A manifest of that run and a made-up figure."""
+    figure = {"title": "T", "runs": ["initial_mesh"], "data": "f" * 64, "wall_time_s": 1.0, "pictures": {"f.pdf": 9}}
+    return {"environment": {"numpy": "1", "source": "a"}, "figures": {"figure_9": figure},
+            "runs": {"initial_mesh": manifest.of_run(runs.INITIAL_MESH, folder)}}
+
+
+def drawn(x, label="h", many=()):
+    """A figure of a line and of points."""
+    made = Figure()
+    axes = made.subplots()
+    axes.plot([0.0, x], [0.0, 1.0])
+    axes.scatter([0.0, 1.0], [0.0, *many] if many else [0.0, 1.0])
+    axes.set(xlabel=label, xlim=(0, 5), ylim=(0, 5))
+    return made
+
+
+def test_every_file_with_data_is_listed(folder, told):
+    """Mutants: fields left out, run.json with its times of day hashed."""
+    there = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()} - {"run.json"}
+    assert set(told["runs"]["initial_mesh"]["files"]) == there and "fields/fields_0000.vtu" in there
+
+
+def test_a_run_again_has_the_same_hashes(folder, told, tmp_path):
+    """Mutant: a time of day, a path or an order of files in the hash."""
+    run(load_scene("initial_mesh"), tmp_path / "again")
+    assert manifest.of_run(runs.INITIAL_MESH, tmp_path / "again")["files"] == told["runs"]["initial_mesh"]["files"]
+
+
+@pytest.mark.parametrize("packed, factor, same", [(None, 1.0, True), ("zlib", 1.0 + 1e-15, False)])
+def test_fields_are_hashed_as_arrays(folder, tmp_path, packed, factor, same):
+    """Unpacked it is the same data; with the last bit of one place changed it is not. Mutants: the file's bytes, points
+    left out."""
+    content = meshio.read(folder / "fields" / "fields_0000.vtu")
+    content.points[np.argmax(content.points[:, 0])] *= factor
+    content.write(tmp_path / "copy.vtu", file_format="vtu", compression=packed)
+    assert (manifest.file_hash(tmp_path / "copy.vtu") == manifest.file_hash(
+        folder / "fields" / "fields_0000.vtu")) is same
+
+
+def test_one_value_of_a_cell_changes_the_hash(folder, tmp_path):
+    """Mutant: cell data left out."""
+    content = meshio.read(folder / "fields" / "fields_0000.vtu")
+    content.cell_data["region"][0][0] += 1e-12
+    content.write(tmp_path / "copy.vtu", file_format="vtu")
+    assert manifest.file_hash(tmp_path / "copy.vtu") != manifest.file_hash(folder / "fields" / "fields_0000.vtu")
+
+
+def test_a_figure_is_hashed_by_what_it_draws_and_says():
+    """Mutants: collections, labels or the caption left out; a hash that no drawing has twice."""
+    first = manifest.figure_hash(drawn(1.0), "c")
+    assert first == manifest.figure_hash(drawn(1.0), "c")
+    others = [manifest.figure_hash(made, caption) for made, caption in (
+        (drawn(1.0 + 1e-15), "c"), (drawn(1.0, label="s"), "c"), (drawn(1.0), "d"), (drawn(1.0, many=(2.0,)), "c"))]
+    assert len({first, *others}) == 5
+
+
+def test_an_altered_file_is_told_as_altered(told):
+    """By name; no environment is blamed. Mutants: only the committed copy compared; a missing file passed."""
+    now = copy.deepcopy(told)
+    now["runs"]["initial_mesh"]["files"]["timeseries.csv"] = "0" * 64
+    del now["runs"]["initial_mesh"]["files"]["fields.pvd"]
+    lines = manifest.check(now, told, told)
+    assert len(lines) == 2 and all(line.startswith("altered since make figures wrote it") for line in lines)
+    assert "timeseries.csv: 000000000000... instead of" in lines[1] and "fields.pvd: missing" in lines[0]
+
+
+@pytest.mark.parametrize("numpy, reason", [("2", "the environment differs: numpy: 2 instead of 1"),
+                                           ("1", "is not explained by it")])
+def test_another_computation_is_told_with_its_reason(told, numpy, reason):
+    """And how far apart the results are. Mutants: versions not compared; a difference passed since versions differ."""
+    other = copy.deepcopy(told)
+    other["environment"]["numpy"] = numpy
+    other["runs"]["initial_mesh"]["files"]["timeseries.csv"] = "0" * 64
+    other["runs"]["initial_mesh"]["last_row"]["thickness_um"] *= 1.01
+    text = "\n".join(manifest.check(other, other, told))
+    assert "not the committed data: initial_mesh/timeseries.csv" in text and reason in text
+    assert "at most 1.0e-02 apart, relative (thickness_um)" in text
+
+
+def test_times_sizes_and_versions_alone_are_no_difference(told):
+    """Mutant: whole entries compared."""
+    other = copy.deepcopy(told)
+    other["environment"]["numpy"], other["figures"]["figure_9"]["pictures"]["f.pdf"] = "2", 10
+    other["figures"]["figure_9"]["wall_time_s"] = other["runs"]["initial_mesh"]["wall_time_s"] = 99.0
+    assert manifest.check(other, other, told) == []
+
+
+@pytest.mark.parametrize("change, status", [(lambda m: m, 0), (lambda m: m["figures"]["figure_9"].update(data="0"), 1),
+                                            (lambda m: m["figures"]["figure_9"]["pictures"].clear(), 1)])
+def test_the_exit_status_follows(told, tmp_path, monkeypatch, capsys, change, status):
+    """Mutants: 0 whatever is found; a picture that is gone passed."""
+    now = copy.deepcopy(told)
+    change(now)
+    for name, folder in (("OUT", tmp_path), ("COMMITTED", tmp_path / "committed.json")):
+        monkeypatch.setattr(manifest, name, folder)
+    monkeypatch.setattr(manifest, "present", lambda: now)
+    for path in (tmp_path / manifest.NAME, manifest.COMMITTED):
+        path.write_text(json.dumps(told), encoding="utf-8")
+    assert manifest.main() == status
+    assert ("as committed" in capsys.readouterr().out) is (status == 0)
+
+
+def test_without_figures_the_check_says_what_to_do(tmp_path, monkeypatch, capsys):
+    """Mutant: a check that computes the runs, or passes on nothing."""
+    monkeypatch.setattr(runs, "CACHE", tmp_path)
+    with pytest.raises(FileNotFoundError, match="make figures"):
+        manifest.present()
+    monkeypatch.setattr(manifest, "OUT", tmp_path)
+    assert manifest.main() == 1 and str(tmp_path) in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_committed_manifest_is_of_the_present_figures():
+    """Mutants: a figure or a scene that changed since."""
+    kept = json.loads(manifest.COMMITTED.read_text(encoding="utf-8"))
+    assert list(kept["figures"]) == list(paper_figures.FIGURES)
+    assert {name: run["scene"] for name, run in kept["runs"].items()} == {
+        request.scene: scene_hash(request.load()) for request in (runs.INITIAL_MESH, runs.BASE, runs.WIDE)}
+    assert {"python", "numpy", "scipy", "mmgpy", "blas", "processor"} <= set(kept["environment"])
