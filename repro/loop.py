@@ -103,7 +103,8 @@ def steps(scene, scheme: Scheme, state: State | None = None) -> Iterator[tuple[S
     """
     first = state is None
     with stopping(state.pore.time if state else 0.0):
-        state = state or State(laid_out(scheme.seeded(scene)), Pace(scheme.first * scene.growth.time_step if scene.growth else 0.0))
+        first_step = scheme.first * scene.growth.time_step if scene.growth else 0.0
+        state = state or State(laid_out(scheme.seeded(scene)), Pace(first_step))
         solved = scheme.solve(scene, state.pore)
     now = replace(state.pore, concentrations=solved.concentrations)
     if first:

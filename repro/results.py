@@ -59,7 +59,8 @@ def _flow_columns(instant: Instant) -> dict[str, float]:
 
 
 def _substrate_columns(instant: Instant) -> dict[str, float]:
-    state, found = instant.solved.concentrations, {}
+    state = instant.solved.concentrations
+    found: dict[str, float] = {}
     if state is None:
         return found
     for name, field, flux in zip(("acceptor", "donor"), (state.acceptor, state.donor), instant.solved.fluxes):

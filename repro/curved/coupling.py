@@ -68,7 +68,7 @@ def _carried_back(there: Pore, half: Pore, rates):
 
 def grown(now: Pore, rates, duration: float) -> Pore:
     """(9)-(10) over a step (h) at constant rates F3 / X_A and F4 / X_A (N,), 1/h."""
-    active, inert = kinetics.grow(now.active, now.inert, *rates, duration)
+    active, inert = kinetics.grow(now.active, now.inert, rates[0], rates[1], duration)
     return replace(now, active=active, inert=inert)
 
 
@@ -85,11 +85,12 @@ def attempt(scene, now: Pore, solved: Solved, duration: float, most: float = np.
     guess = half.solved.concentrations
     guess = guess if len(guess.acceptor) == len(now.mesh.points) else solved.concentrations
     new, remeshed = new_mesh(scene, now, expanded, guess)
-    flows = [tuple(duration * getattr(flux, key) for flux in half.solved.fluxes) for key in
-             ("supplied", "out", "consumed")]
-    masses = [scene.kinetics.maximum_density * value for value in
-              (now.mesh.area(), after.mass() - now.mass(), new.mesh.area())]
-    ledger = Ledger(now.time, now.time + duration, *flows, (0.0, 0.0), *masses)
+    flows = {key: tuple(duration * getattr(flux, key) for flux in half.solved.fluxes)
+             for key in ("supplied", "out", "consumed")}
+    density = scene.kinetics.maximum_density
+    ledger = Ledger(now.time, now.time + duration, **flows, stored=(0.0, 0.0),
+                    biomass_before=density * now.mesh.area(), biomass_made=density * (after.mass() - now.mass()),
+                    biomass_after=density * new.mesh.area())
     return Attempt(Step(new, (now, solved), ledger, remeshed, iterations), half.change,
                    first_contact(scene, now, expanded, gap))
 

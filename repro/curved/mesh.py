@@ -170,8 +170,8 @@ def _flip(points: np.ndarray, triangles: np.ndarray, biomass: np.ndarray, corner
     if inner < 0:
         return
     c, a, b = np.roll(triangles[corner], -inner)
-    beside = np.flatnonzero((triangles == a).any(axis=1) & (triangles == c).any(axis=1) & (biomass == biomass[corner]))
-    beside = int(beside[beside != corner][0])
+    sharing = np.flatnonzero((triangles == a).any(axis=1) & (triangles == c).any(axis=1) & (biomass == biomass[corner]))
+    beside = int(sharing[sharing != corner][0])
     d = int(triangles[beside][(triangles[beside] != a) & (triangles[beside] != c)][0])
     pair = np.array([[a, b, d], [b, c, d]])
     if triangle_areas(points, pair).min() > 0:

@@ -122,7 +122,7 @@ def _on_the_wall(outline: Outline, polygon: Outline, keep: np.ndarray, sizes, la
     """Parameters (arc number + t), the first left out, of corners and middles along a stretch of wall."""
     free = polygon.wall == FREE
     ends = polygon.points[keep[[0, -1]]]
-    x = geometry.graded_line(*ends, polygon.points[free], sizes[free], largest)[:, 0]
+    x = geometry.graded_line(ends[0], ends[1], polygon.points[free], sizes[free], largest)[:, 0]
     x = np.insert(x, np.arange(1, len(x)), 0.5 * (x[1:] + x[:-1]))
     sign = np.sign(x[-1] - x[0])
     arc = np.clip(np.searchsorted(sign * polygon.points[keep, 0], sign * x, side="right") - 1, 0, len(keep) - 2)

@@ -8,6 +8,7 @@ The sum over i is the balance: supply in = out + consumed, to round-off. (11) is
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from skfem.quadrature import get_quadrature_line
@@ -42,13 +43,13 @@ class Problem:
     """
 
     mesh: CurvedMesh
-    matrices: tuple[np.ndarray, np.ndarray]
-    sources: tuple[np.ndarray, np.ndarray]
+    matrices: tuple[np.ndarray, ...]
+    sources: tuple[np.ndarray, ...]
     inflow: np.ndarray
     outflow: np.ndarray
     speed: float
-    substrates: object
-    kinetics: object
+    substrates: Any
+    kinetics: Any
     system: ElementSystem
     reused: bool
 
@@ -299,11 +300,11 @@ def _checked(problem: Problem, state, iterations: int) -> Concentrations:
 def fluxes(problem: Problem, active: np.ndarray | None, state: Concentrations) -> tuple[Fluxes, Fluxes]:
     """Ledger of the acceptor and of the donor in one geometry."""
     both = np.concatenate([state.acceptor, state.donor])
-    consumed = (0.0, 0.0)
+    consumed: tuple[float, ...] = (0.0, 0.0)
     if problem.kinetics is not None and active is not None:
         weight, _, (*rates, _) = _uptake_at_points(problem, active, both)
         consumed = tuple(float(np.sum(weight * rate)) for rate in rates)
-    return tuple(_fluxes(problem, k, field, consumed[k]) for k, field in enumerate((state.acceptor, state.donor)))
+    return (_fluxes(problem, 0, state.acceptor, consumed[0]), _fluxes(problem, 1, state.donor, consumed[1]))
 
 
 def _fluxes(problem: Problem, k: int, field: np.ndarray, consumed: float) -> Fluxes:

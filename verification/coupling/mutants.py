@@ -15,7 +15,7 @@ MUTANTS = (
            new="mean = first"),
     Mutant("euler-biomass", "repro/coupling.py",
            says="one Euler increment a step for the integrated growth (trap 9)",
-           old="active, inert = kinetics.grow(now.active, now.inert, *mean, duration)",
+           old="active, inert = kinetics.grow(now.active, now.inert, mean[0], mean[1], duration)",
            new="active, inert = now.active * (1 + mean[0] * duration), now.inert + now.active * mean[1] * duration"),
     Mutant("rates-two-percent-low", "repro/coupling.py",
            says="the mean rates of a step are 2 % low",
