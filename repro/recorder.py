@@ -166,9 +166,11 @@ def _check(folder: Path, state: State, record: dict) -> None:
     right = right and _files(folder, record["index"], "fields") and _files(folder, record["before"], "before_expansion")
     if not right or [row[0] for row in record["rows"]] != [time for time, _ in record["index"]]:
         raise CheckpointError("its rows or fields are not those of a run")
-    done = [row[1] for row in record["ledgers"]] + [ledger.end for ledger in state.ledgers]
-    if not record["rows"] or abs((done or [0.0])[-1] - state.pore.time) > 1e-6 or (
-            not state.ledgers and record["rows"][-1][0] != state.pore.time):
+    spans = [row[:2] for row in record["ledgers"]] + [[ledger.start, ledger.end] for ledger in state.ledgers]
+    ends = [0.0, *(end for _, end in spans)]
+    starts = [*(start for start, _ in spans), state.pore.time]
+    if None in ends + starts or any(abs(end - start) > 1e-6 for end, start in zip(ends, starts)) or (
+            not record["rows"] or not state.ledgers and record["rows"][-1][0] != state.pore.time):
         raise CheckpointError("its rows do not end where its state is")
 
 

@@ -23,7 +23,7 @@ from repro.simulation import steps
 THOROUGH = os.environ.get("HYPOTHESIS_PROFILE") == "thorough"
 EXAMPLES = settings(max_examples=500 if THOROUGH else 20)  # by two tests and two presets: 2000 malformed checkpoints
 TIMES = ('growth.end="0.6 h"', 'output.times=["0.2 h", "0.6 h"]')
-PRESETS = {"paper": TIMES, "fast": ('numerics.preset="fast"', "numerics.tolerance=0.002", *TIMES)}
+PRESETS = {"paper": TIMES, "fast": ('numerics.preset="fast"', 'growth.end="3 h"', 'output.times=["0.2 h", "3 h"]')}
 
 
 @pytest.fixture(scope="module", params=PRESETS)
