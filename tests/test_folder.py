@@ -116,7 +116,8 @@ def full(*_):
 @pytest.mark.parametrize("module, name, file", [(results, "write_fields", "fields/fields_0003.vtu"),
                                                 (results, "write_table", "timeseries.csv"),
                                                 (results.os, "replace", "fields/fields_0003.vtu"),
-                                                (checkpoint.os, "fsync", NEWEST)])
+                                                (checkpoint.os, "fsync", "fields/fields_0003.vtu"),
+                                                (checkpoint, "write", NEWEST)])
 def test_no_space_is_told_with_the_file_and_nothing_is_lost(tmp_path, monkeypatch, module, name, file):
     """The run stops, says which file, leaves none half-written, and goes on when there is room. Mutants: an error that
     names no file, a part left behind, a checkpoint that is overwritten and not replaced."""
