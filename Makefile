@@ -49,6 +49,7 @@ lint: $(STAMP) ## style and types: ruff and mypy
 
 bench: $(STAMP) ## time against error, cost against size, and what each assumption costs and changes
 	@$(BIN) -m verification.bench
+	@$(BIN) -m verification.throughput
 	@$(BIN) -m verification.audit
 	@$(BIN) -m verification.speed
 	@$(BIN) -m paper_figures.replication

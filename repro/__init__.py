@@ -22,9 +22,14 @@ and what is around it:
                                           repro.rules, repro.scene_files, repro.scene_text (repro scene)
     what a run will be                    repro.check, of repro.modelled, repro.numbers, repro.simplifications,
                                           repro.cost (repro check)
-    runs and results                      repro.running, repro.results, repro.tables (NumPy arrays), repro.timing
-    linear algebra                        repro.assembly, repro.linear, repro.cache
-    command line                          repro.cli, repro.commands
+    one loop of steps, and their length   repro.loop, repro.pace
+    runs and results                      repro.running, repro.recorder, repro.results, repro.names, repro.netcdf,
+                                          repro.tables (NumPy arrays), repro.timing, repro.machine
+    runs that lose nothing                repro.checkpoint, repro.stored, repro.folder, repro.interrupts
+    pages that show and compare runs      repro.report
+    many pores                            repro.sweep
+    linear algebra                        repro.assembly, repro.linear, repro.newton, repro.cache
+    command line                          repro.cli, repro.commands, repro.progress
 
 Ten lines of use; ``repro/tutorial.md`` has more:
 
@@ -47,7 +52,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from repro.coupling import PoreEnd
     from repro.errors import SimulationError
-    from repro.running import run
+    from repro.running import resume, run
     from repro.scene import Scene, load_scene
     from repro.simulation import simulate
     from repro.tables import Results, solve
@@ -55,8 +60,8 @@ if TYPE_CHECKING:
 else:
     #: The module of each public name, imported when it is first asked for: the solver takes half a second.
     _MODULES = {"PoreEnd": "coupling", "Results": "tables", "Scene": "scene", "SceneError": "units",
-                "SimulationError": "errors", "load_scene": "scene", "run": "running", "simulate": "simulation",
-                "solve": "tables"}
+                "SimulationError": "errors", "load_scene": "scene", "resume": "running", "run": "running",
+                "simulate": "simulation", "solve": "tables"}
 
     def __getattr__(name: str):
         if name not in _MODULES:
@@ -66,4 +71,5 @@ else:
     def __dir__() -> list[str]:
         return sorted({*globals(), *__all__})
 
-__all__ = ["PoreEnd", "Results", "Scene", "SceneError", "SimulationError", "load_scene", "run", "simulate", "solve"]
+__all__ = ["PoreEnd", "Results", "Scene", "SceneError", "SimulationError", "load_scene", "resume", "run", "simulate",
+           "solve"]

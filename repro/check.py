@@ -8,9 +8,9 @@ from dataclasses import asdict, dataclass
 
 from repro import cost, linear, pore
 from repro.cost import Cost
-from repro.coupling import stopping
 from repro.curved import pore as curved
 from repro.errors import SimulationError
+from repro.loop import stopping
 from repro.modelled import modelled
 from repro.numbers import Number, numbers
 from repro.scene import Scene

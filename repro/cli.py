@@ -1,7 +1,7 @@
 """Command line: ``repro COMMAND ...``; each command is a module of :mod:`repro.commands`.
 
 Exit status: 0 when the command has done what it is for, 1 when a stage failed, 2 when something in the input is wrong
-or a folder cannot be used, 130 or 143 when interrupted or terminated.
+or a folder cannot be used, 3 when some runs of a sweep have failed, 130 or 143 when interrupted or terminated.
 """
 
 from __future__ import annotations

@@ -74,7 +74,8 @@ def step(scene, now: Pore, solved: Solved, duration: float) -> Step:
         raise PoreEnd(f"{leaves} in the step from t = {now.time:g} h")
     solved = replace(solved, concentrations=end)
     after, remeshed = remeshing.new_mesh(scene, now, expanded, solved)
-    ledger = Ledger(now.time, now.time + duration, *flows, mass_of(now), made, mass_of(after))
+    supplied, out, consumed, stored = flows
+    ledger = Ledger(now.time, now.time + duration, supplied, out, consumed, stored, mass_of(now), made, mass_of(after))
     return Step(after, (replace(grown, time=now.time + duration), solved), ledger, remeshed, iterations)
 
 
@@ -91,10 +92,10 @@ def make_biomass(scene, now: Pore, solved: Solved, duration: float):
     if scene.numerics.transport == "gear":
         return gear.make_biomass(scene, now, solved, duration)
     first = rates_of(scene, solved.concentrations)
-    guess = kinetics.grow(now.active, now.inert, *first, duration)
+    guess = kinetics.grow(now.active, now.inert, first[0], first[1], duration)
     end = transport.steady(solved.problem, guess[0], solved.concentrations)
     mean = [(a + b) / 2 for a, b in zip(first, rates_of(scene, end))]
-    active, inert = kinetics.grow(now.active, now.inert, *mean, duration)
+    active, inert = kinetics.grow(now.active, now.inert, mean[0], mean[1], duration)
     pairs = zip(transport.fluxes(solved.problem, now.active, solved.concentrations),
                 transport.fluxes(solved.problem, guess[0], end))
     means = [[duration * (getattr(a, key) + getattr(b, key)) / 2 for key in ("supplied", "out", "consumed")]

@@ -256,17 +256,13 @@ def _fill(points, polygons, size_at, ends, width) -> PoreMesh:
     region = np.repeat([1 + biomass for _, biomass in polygons], [len(t) for t in triangles])
     rim = np.vstack([np.column_stack([nodes, np.roll(nodes, -1)]) for nodes, _ in polygons])
     rim = np.unique(np.sort(rim, axis=1), axis=0)
-    mmg = _for_mmg(points, np.vstack(triangles), region, rim)
-    _pass(mmg, FIRST_PASS * size_at(points))
-    _pass(mmg, size_at(mmg.get_vertices()))
-    fine, (corners, region) = mmg.get_vertices(), mmg.get_triangles_with_refs()
-    found = _find(fine, points)
-    fine[found] = points
-    return PoreMesh(fine, corners.astype(np.int64), region == 2, found, width, ends)
+    coarse, found = _mmg(points, np.vstack(triangles), region, rim, points, FIRST_PASS * size_at(points))
+    fine, found = _mmg(coarse[0], coarse[1], coarse[2], found[rim], points, size_at(coarse[0]))
+    return PoreMesh(fine[0], fine[1], fine[2] == 2, found, width, ends)
 
 
-def _for_mmg(points, triangles, region, rim) -> MmgMesh2D:
-    """A mesh for Mmg, which is to keep its rim."""
+def _mmg(points, triangles, region, rim, prescribed, sizes):
+    """One pass of Mmg that keeps the rim: (points, triangles, region), and where the prescribed points went."""
     mmg = MmgMesh2D()
     mmg.set_mesh_size(vertices=len(points), triangles=len(triangles), quadrilaterals=0, edges=len(rim))
     mmg.set_vertices(points)
@@ -274,14 +270,13 @@ def _for_mmg(points, triangles, region, rim) -> MmgMesh2D:
     mmg.set_edges(rim.astype(np.int32))
     mmg.set_required_edges(np.arange(len(rim), dtype=np.int32))
     mmg.set_required_vertices(np.unique(rim).astype(np.int32))
-    return mmg
-
-
-def _pass(mmg: MmgMesh2D, sizes: np.ndarray) -> None:
-    """Remesh to the sizes (um) wanted at the vertices."""
     mmg["metric"] = sizes[:, None]
     with _signals_kept():
         mmg.remesh(verbose=-1, hgrad=HGRAD, nosurf=True)
+    points, (triangles, region) = mmg.get_vertices(), mmg.get_triangles_with_refs()
+    found = _find(points, prescribed)
+    points[found] = prescribed
+    return (points, triangles.astype(np.int64), region), found
 
 
 @contextmanager

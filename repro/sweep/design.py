@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from repro import scene as scenes
-from repro.scene import Scene, SceneError, scene_hash
-from repro.units import shown
+from repro.reading import shown
+from repro.scene import KEYS, Scene, SceneError, parse_scene, scene_hash
+from repro.scene_files import override, read_tables
 
 MOST_POINTS = 10_000
 #: Of each pair one is given: varying it replaces the other.
@@ -192,16 +192,16 @@ def _check_keys(sets: list[str], varied: list[str]) -> None:
 
 
 def _scene(source: str, sets: list[str], factors: list[Factor], values: tuple, said: str) -> Scene:
-    tables = scenes._tables(source)
+    tables = read_tables(source)
     for entry in sets:
-        scenes._override(tables, entry, source)
+        override(tables, entry, source, KEYS)
     for factor, value in zip(factors, values):
         section, _, key = PAIRS.get(factor.key, "").partition(".")
         if isinstance(tables.get(section), dict):
             tables[section].pop(key, None)
-        scenes._override(tables, f"{factor.key}={factor.text(value)}", source)
+        override(tables, f"{factor.key}={factor.text(value)}", source, KEYS)
     try:
-        return scenes.parse_scene(tables, Path(source).stem, source)
+        return parse_scene(tables, Path(source).stem, source)
     except SceneError as error:
         raise SceneError(f"{said}: {error}") from None
 

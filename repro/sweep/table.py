@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from repro import results
+from repro.recorder import UNDONE
 from repro.sweep import task
 from repro.sweep.design import Point
 from repro.sweep.state import Sweep
@@ -37,7 +38,7 @@ class Told:
     @property
     def done(self) -> bool:
         """Has it come to its end?"""
-        return not self.status.startswith((*task.UNFINISHED, "not run"))
+        return not self.status.startswith((*UNDONE, "not run"))
 
 
 def tell(sweep: Sweep, ended: dict[int, str], clogged: float) -> list[Told]:

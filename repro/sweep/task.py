@@ -10,12 +10,11 @@ from importlib.metadata import version
 from pathlib import Path
 
 from repro.cache import source_hash
+from repro.checkpoint import NEWEST, PREVIOUS
 from repro.errors import SimulationError
-from repro.running import OutputError, run
-from repro.scene import Scene
-
-#: What the status of a run begins with that is to be made again.
-UNFINISHED = ("failed", "interrupted")
+from repro.recorder import UNDONE
+from repro.running import OutputError, resume, run
+from repro.scene import Scene, scene_hash
 
 
 def code() -> str:
@@ -35,12 +34,14 @@ def status(folder: Path) -> str | None:
 def finished(folder: Path) -> bool:
     """Has the run in a folder come to its end?"""
     told = status(folder)
-    return told is not None and not told.startswith(UNFINISHED)
+    return told is not None and not told.startswith(UNDONE)
 
 
 def make(scene: Scene, folder: Path, beside: Path) -> str:
-    """Run a scene in `beside`, then move it to `folder`; how it ended, in one line, whatever the trouble is."""
-    shutil.rmtree(beside, ignore_errors=True)
+    """Run a scene in `beside`, or go on with it there, then move it to `folder`; how it ended, in one line, whatever
+    the trouble is."""
+    if not _begun(scene, beside):
+        shutil.rmtree(beside, ignore_errors=True)
     try:
         ended = _made(scene, beside)
         _place(beside, folder)
@@ -49,9 +50,18 @@ def make(scene: Scene, folder: Path, beside: Path) -> str:
     return ended
 
 
+def _begun(scene: Scene, beside: Path) -> bool:
+    """Is there a state of this scene's run to go on from?"""
+    try:
+        told = json.loads((beside / "run.json").read_text(encoding="utf-8"))
+        return told["hash"] == scene_hash(scene) and any((beside / name).is_file() for name in (NEWEST, PREVIOUS))
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
+
+
 def _made(scene: Scene, beside: Path) -> str:
     try:
-        return run(scene, beside)
+        return resume(beside) if beside.exists() else run(scene, beside)
     except (SimulationError, OutputError) as error:
         return f"failed: {error}"
     except Exception as error:  # a bug is one run's failure, and told whole
