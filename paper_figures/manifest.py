@@ -32,7 +32,7 @@ OUT = Path(__file__).parent / "out"
 COMMITTED = Path(__file__).parent / "manifest.json"
 NAME = "manifest.json"
 #: Of a run's files, those without data: they hold times of day, or index the others.
-NOT_DATA = ("run.json",)
+NOT_DATA = ("run.json", "report.html")
 
 
 def environment() -> dict[str, str]:

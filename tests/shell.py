@@ -38,9 +38,9 @@ def wait_for(there, process: subprocess.Popen) -> None:
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    """Every file of a folder but run.json, by its name there."""
+    """Every file of a folder by its name there, but those that tell times: run.json and the page."""
     return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*"))
-            if path.is_file() and path.name != "run.json"}
+            if path.is_file() and path.name not in ("run.json", "report.html")}
 
 
 def told(folder: Path) -> dict:

@@ -57,7 +57,8 @@ def test_differences_of_scenes_are_told_key_by_key(fast, paper, flow_only):
     found = dict((key, values) for key, *values in comparison.differences([read(fast), read(paper)]))
     assert found == {"growth.end": ["3 h", "1 h"], "numerics.preset": ["fast", "paper"],
                      "numerics.elements": ["quadratic", "linear"], "numerics.time": ["midpoint", "updates"],
-                     "numerics.refinement": ["0.25", "1"]}
+                     "numerics.refinement": ["0.2", "1"], "numerics.tolerance": ["0.0075", "0.01"],
+                     "numerics.jacobian": ["reused", "fresh"]}
     found = dict((key, values) for key, *values in comparison.differences([read(paper), read(flow_only)]))
     assert found["growth.end"] == ["1 h", "-"] and found["flow.mean_velocity"] == ["-", "120833 um/h"]
     assert comparison.differences([read(fast), read(fast)]) == []

@@ -113,10 +113,10 @@ def full(*_):
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
-@pytest.mark.parametrize("module, name, file", [(results, "write_fields", "fields/fields_0003.vtu"),
+@pytest.mark.parametrize("module, name, file", [(results, "write_fields", "fields/fields_0002.vtu"),
                                                 (results, "write_table", "timeseries.csv"),
-                                                (results.os, "replace", "fields/fields_0003.vtu"),
-                                                (checkpoint.os, "fsync", "fields/fields_0003.vtu"),
+                                                (results.os, "replace", "fields/fields_0002.vtu"),
+                                                (checkpoint.os, "fsync", "fields/fields_0002.vtu"),
                                                 (checkpoint, "write", NEWEST)])
 def test_no_space_is_told_with_the_file_and_nothing_is_lost(tmp_path, monkeypatch, module, name, file):
     """The run stops, says which file, leaves none half-written, and goes on when there is room. Mutants: an error that
@@ -182,7 +182,8 @@ def test_no_name_of_a_scene_is_a_path(tmp_path, capsys, monkeypatch, name):
     out = capsys.readouterr().out
     assert out.count("\n") == 1 and out.strip("\n").isprintable() and told(tmp_path / "inside" / "run")["scene"] == name
     assert {str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file()} == {
-        f"inside/run/{file}" for file in ("run.json", "timeseries.csv", "fields.pvd", "fields/fields_0000.vtu")}
+        f"inside/run/{file}" for file in ("run.json", "timeseries.csv", "fields.pvd", "fields/fields_0000.vtu",
+                                        "report.html")}
 
 
 def test_no_key_of_a_scene_takes_a_path():

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 import xarray
 
-from repro import names, netcdf, results, scene
+from repro import names, netcdf, results, rules
 from repro.cli import main
 from repro.scene import load_scene, scene_hash, scene_tables
 
-SETS = ['numerics.preset="fast"', 'growth.end="1 h"', 'output.timeseries="netcdf"']
+SETS = ['numerics.preset="fast"', 'growth.end="1 h"', 'growth.time_step="1 min"', 'output.timeseries="netcdf"']
 UNITS = {"m d-1", "mg L-1", "um2", "um", "cm", "h", "1"}
 
 
@@ -91,7 +91,7 @@ def test_it_is_whole_or_not_there(tmp_path, monkeypatch):
 
 def test_without_xarray_it_is_refused_before_the_run(tmp_path, monkeypatch, capsys):
     """Mutant: an error at the end of the run."""
-    monkeypatch.setattr(scene, "find_spec", lambda name: None)
+    monkeypatch.setattr(rules, "find_spec", lambda name: None)
     run(tmp_path / "run", "base", *SETS, status=2)
     (line,) = capsys.readouterr().err.splitlines()
     assert 'output.timeseries = "netcdf"' in line and "pip install xarray" in line

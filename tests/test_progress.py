@@ -19,7 +19,7 @@ from repro.interrupts import SAME, noted
 from tests.shell import started, told, wait_for
 
 CONTACT = ["base", "--set", 'numerics.preset="fast"', "--set", 'aggregate.radius="17.98 um"', "--set",
-           'pore.width="20 um"', "--set", 'growth.end="0.6 h"']
+           'pore.width="20 um"', "--set", 'growth.end="0.6 h"', "--set", "numerics.tolerance=0.0001"]
 
 
 def test_json_is_an_object_a_line_and_nothing_else(tmp_path, capsys):

@@ -178,11 +178,11 @@ def test_a_run_that_stops_has_its_page(tmp_path, monkeypatch, capsys):
     from repro import running
     from repro.errors import SimulationError
 
-    def stops(scene):
+    def stops(scene, state=None):
         raise SimulationError("stopped in the step from t = 0 h, in <growth>: no")
         yield
 
-    monkeypatch.setattr(running, "simulate", stops)
+    monkeypatch.setattr(running, "steps", stops)
     text = text_of(run(tmp_path, "base", status=1))
     assert "Failed: stopped in the step from t = 0 h, in &lt;growth&gt;: no" in text and "no row" in text
     Page(text)

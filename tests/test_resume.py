@@ -20,8 +20,8 @@ from tests.shell import LONG, SHORT, files, lasting, shell, started, told, wait_
 CONTACT = ('aggregate.radius="17.98 um"', 'pore.width="20 um"', 'growth.end="0.6 h"')
 SCENES = {
     "paper, unreported steps": ('growth.end="1 h"', 'output.times=["0.3 h", "1 h"]'),
-    "fast": ('numerics.preset="fast"', 'growth.end="3 h"'),
-    "fast, unreported steps, contact": ('numerics.preset="fast"', "numerics.tolerance=0.001", *CONTACT,
+    "fast": ('numerics.preset="fast"', "numerics.tolerance=0.0005", 'aggregate.radius="25 um"', 'growth.end="3 h"'),
+    "fast, unreported steps, contact": ('numerics.preset="fast"', "numerics.tolerance=0.0001", *CONTACT,
                                         'output.times=["0.6 h"]'),
     "gear": ('numerics.transport="gear"', 'growth.end="0.4 h"'),
 }
@@ -237,7 +237,7 @@ def test_results_reach_the_disk_while_a_run_goes_on(tmp_path):
             rows = (tmp_path / "run" / "timeseries.csv").read_text().count("\n") - 1
             seen.append((told(tmp_path / "run")["status"], rows, len(list((tmp_path / "run" / "fields").iterdir()))))
 
-    scene = load_scene("base", ('numerics.preset="fast"', 'growth.end="3 h"'))
+    scene = load_scene("base", SCENES["fast"])
     run(scene, tmp_path / "run", watch=Watch(tell=look, interval=0.0))
     assert seen == [("running", count, count) for count in range(1, len(seen) + 1)] and len(seen) > 4
 
