@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from pathlib import Path
 
@@ -60,14 +61,22 @@ def _part(text: str) -> float:
 
 def call(chosen) -> int:
     """Make the sweep that was chosen."""
-    sweep = _wanted(chosen)
     ended: dict[int, str] = {}
-    with opened(sweep):
-        try:
-            _make(sweep, chosen, ended)
-        finally:
-            told = _told(sweep, ended, chosen.clogged)
+    with _ready(chosen) as each:
+        sweep = _wanted(chosen)
+        with opened(sweep):
+            try:
+                _make(sweep, chosen.quiet, each, ended)
+            finally:
+                told = _told(sweep, ended, chosen.clogged)
     return _report(sweep, told)
+
+
+def _ready(chosen) -> AbstractContextManager[pool.Each]:
+    """What makes the runs: processes here, which load what they need while the sweep is looked at, or a cluster."""
+    if chosen.scheduler:
+        return nullcontext(partial(cluster.each, address=chosen.scheduler))
+    return pool.ready(chosen.workers or pool.cores())
 
 
 def _told(sweep: Sweep, ended: dict[int, str], clogged: float) -> list[table.Told]:
@@ -86,18 +95,15 @@ def _wanted(chosen) -> Sweep:
     return Sweep(chosen.out, chosen.scene, factors, design.points(chosen.scene, chosen.set, factors, found))
 
 
-def _make(sweep: Sweep, chosen, ended: dict[int, str]) -> None:
+def _make(sweep: Sweep, quiet: bool, each: pool.Each, ended: dict[int, str]) -> None:
     """Make what is missing; `ended` gets how each run ended, by number."""
-    missing = sweep.missing()
-    each = partial(cluster.each, address=chosen.scheduler) if chosen.scheduler else partial(
-        pool.each, workers=chosen.workers or pool.cores())
-    total = len(sweep.points)
-    silent = chosen.quiet or not sys.stderr.isatty()
+    missing, total = sweep.missing(), len(sweep.points)
+    silent = quiet or not sys.stderr.isatty()
     with tqdm(total=total, initial=total - len(missing), desc=sweep.source, unit="run", disable=silent) as bar:
         for point, status in each(missing, sweep.runs) if missing else ():
             ended[point.index] = status
             bar.update()
-            if not chosen.quiet and silent:
+            if not quiet and silent:
                 print(f"{total - len(missing) + len(ended)} of {total}: run {point.index}, "
                       f"{design.label(sweep.factors, point.values)}: {status}", file=sys.stderr, flush=True)
 

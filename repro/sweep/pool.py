@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from queue import SimpleQueue
 
 from repro.sweep.design import Point
 from repro.sweep.server import Server, ask
+
+Each = Callable[[list[Point], Path], Iterator[tuple[Point, str]]]
 
 
 def cores() -> int:
@@ -17,9 +21,19 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def each(points: list[Point], folder: Path, workers: int) -> Iterator[tuple[Point, str]]:
-    """Make the runs into `folder`, `workers` at a time; yields each with how it ended, as they end."""
-    servers = [Server() for _ in range(min(workers, len(points)))]
+@contextmanager
+def ready(workers: int) -> Iterator[Each]:
+    """What makes runs, `workers` at a time; its processes start at once, and end with the block."""
+    servers = [Server() for _ in range(workers)]
+    try:
+        yield partial(each, servers=servers)
+    finally:
+        for server in servers:
+            server.close()
+
+
+def each(points: list[Point], folder: Path, servers: list[Server]) -> Iterator[tuple[Point, str]]:
+    """Make the runs into `folder`, one at a time in each server; yields each with how it ended, as they end."""
     idle: SimpleQueue[Server] = SimpleQueue()
     for server in servers:
         idle.put(server)

@@ -32,21 +32,17 @@ PATIENCE = 10  # s that a run may take to stop
 
 
 class Server:
-    """Such a process as seen from outside: started when it is first needed, and anew where it has died."""
+    """Such a process as seen from outside: started at once, and anew where it has died."""
 
     def __init__(self):
-        self.process: Any = None
-        self.closed = False
+        self.closed = self.asked = False
+        self.process: Any = _process()
 
     def make(self, asked: str) -> str:
         """Have a run made that :func:`ask` describes; how it ended."""
         if self.closed:
             return "interrupted"
-        if self.process is None:
-            self.process = subprocess.Popen(
-                [sys.executable, "-m", __name__], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-                env=os.environ | ENVIRONMENT, start_new_session=True)  # Ctrl-C is for whoever asks
-        answer = ""
+        self.process, self.asked, answer = self.process or _process(), True, ""
         with suppress(BrokenPipeError):
             self.process.stdin.write(asked + "\n")
             self.process.stdin.flush()
@@ -56,6 +52,8 @@ class Server:
     def close(self) -> None:
         """End the process, and the run at work in it."""
         self.closed = True
+        if self.process and not self.asked:
+            self.process.kill()
         if self.process:
             self._end()
 
@@ -71,6 +69,11 @@ class Server:
         code = process.wait()
         process.stdout.close()
         return code
+
+
+def _process() -> subprocess.Popen:
+    return subprocess.Popen([sys.executable, "-m", __name__], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+                            env=os.environ | ENVIRONMENT, start_new_session=True)  # Ctrl-C is for whoever asks
 
 
 def ask(scene: Scene, folder: Path, beside: Path) -> str:
