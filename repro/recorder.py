@@ -15,6 +15,7 @@ from repro.stored import counted, counts, in_range
 
 #: How a run can have ended without being done; any other status is that of a run that is over.
 UNDONE = ("running", "interrupted", "failed")
+CHECKPOINTS = (checkpoint.NEWEST, checkpoint.PREVIOUS, checkpoint.REFUSED)
 RECORD = {"rows", "ledgers", "index", "before", "remeshes", "iterations", "seconds", "stages", "resumes"}
 
 
@@ -100,15 +101,11 @@ class Recorder:
             "remeshes": self.remeshes, "resumes": self.resumes})
 
     def finish(self, status: str) -> None:
-        """Write everything at the end of a run; a run that is over has nothing to go on from."""
-        self.save(status)
+        """Write everything at the end of a run."""
         if self.scene.output.timeseries == "netcdf":
             self._write("timeseries.nc", netcdf.write, self.scene, self.rows)
-        with writing(self.folder / "report.html"):
-            report.write(self.folder)
-        if not status.startswith(UNDONE):
-            for name in (checkpoint.NEWEST, checkpoint.PREVIOUS, checkpoint.REFUSED):
-                (self.folder / name).unlink(missing_ok=True)
+        self.save(status)
+        settle(self.folder, not status.startswith(UNDONE))
 
     def _write(self, name: str, write, *content) -> None:
         with writing(self.folder / name):
@@ -188,6 +185,14 @@ def _files(folder: Path, index, kind: str) -> bool:
         isinstance(entry, list) and len(entry) == 2 and in_range(entry[0], 0.0, float("inf")) and
         entry[1] == f"fields/{kind}_{number:04d}.vtu" and (folder / entry[1]).is_file()
         for number, entry in enumerate(index))
+
+
+def settle(folder: Path, over: bool) -> None:
+    """The last things of a run's end: its page, and no checkpoint where it is over and has nothing to go on from."""
+    with writing(folder / "report.html"):
+        report.write(folder)
+    for name in CHECKPOINTS if over else ():
+        (folder / name).unlink(missing_ok=True)
 
 
 def interrupted(recorder: Recorder, number: int) -> Interrupted:

@@ -15,7 +15,7 @@ from repro.errors import CheckpointError, Interrupted, OutputError, SimulationEr
 from repro.folder import clear, held, prepare, tidy, usable
 from repro.loop import PoreEnd
 from repro.machine import conditions, differences
-from repro.recorder import UNDONE, Recorder, interrupted
+from repro.recorder import CHECKPOINTS, UNDONE, Recorder, interrupted, settle
 from repro.scene import Scene, parse_scene, scene_hash
 from repro.simulation import steps
 
@@ -68,6 +68,8 @@ def resume(folder: Path, progress: Callable[[float], None] = lambda time: None, 
     with held(folder):
         told, scene = _told(folder / "run.json")
         if not told["status"].startswith(UNDONE):
+            if any((folder / name).exists() for name in CHECKPOINTS):  # it was killed at its very end
+                settle(folder, over=True)
             watch.tell({"event": "end", "scene": scene.name, "status": told["status"], "folder": str(folder),
                         "changed": False})
             return told["status"]

@@ -143,11 +143,11 @@ def test_a_run_that_stops_before_its_first_row(window, tmp_path, monkeypatch):
     from repro import running
     from repro.errors import SimulationError
 
-    def stops(scene):
+    def stops(scene, state=None):
         raise SimulationError("no")
         yield
 
-    monkeypatch.setattr(running, "simulate", stops)
+    monkeypatch.setattr(running, "steps", stops)
     assert show(window, run(tmp_path, "base", status=1)) == {}
 
 

@@ -27,6 +27,7 @@ from shutil import copytree, ignore_patterns
 from tempfile import TemporaryDirectory
 
 from verification.case import CASES, STAGES, Result
+from verification.reach import reached
 
 ROOT = Path(__file__).parents[1]
 RECORD = Path(__file__).parent / "report" / "mutants.json"
@@ -232,10 +233,11 @@ def recorded() -> tuple[dict[str, list[list[str]]], bool]:
 
 
 def code() -> str:
-    """16 hexadecimal digits that stand for the code, the references and the cases."""
+    """16 hexadecimal digits that stand for the cases, the references, and what they reach of the code."""
     digest = hashlib.sha256()
-    folders = [ROOT / "repro", ROOT / "reference", *(ROOT / "verification" / stage for stage in STAGES)]
-    for path in sorted(path for folder in folders for path in folder.rglob("*.py")):
+    cases = [ROOT / "reference", *(ROOT / "verification" / stage for stage in STAGES)]
+    known = (ROOT / "repro", *cases)
+    for path in sorted(path for path in reached(cases) if any(folder in path.parents for folder in known)):
         digest.update(path.relative_to(ROOT).as_posix().encode() + path.read_bytes())
     return digest.hexdigest()[:16]
 

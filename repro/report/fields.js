@@ -8,7 +8,8 @@ function rangeOf(field, frame) {
   const pairs = (part.fixed.checked ? data.frames : [frame]).map(each => each.values[field.name])
     .filter(pair => pair && pair[2]);
   const low = Math.min(...pairs.map(pair => pair[0])), high = Math.max(...pairs.map(pair => pair[1]));
-  return isFinite(low) ? [low, high] : [0, 0];
+  if (!isFinite(low)) return [0, 0];
+  return high - low > 1e-9 * Math.max(Math.abs(low), Math.abs(high)) ? [low, high] : [low, low];  // round-off is none
 }
 
 function boxOf(points) {
