@@ -42,7 +42,7 @@ def check(scene: Scene, file: str) -> Checked:
     try:
         with stopping(0.0):
             linear.use(scene.numerics.solver, scene.numerics.ordering)
-            grid = (curved if scene.numerics.elements == "quadratic" else pore).seeded(scene).mesh
+            grid = (curved if scene.numerics.curved else pore).seeded(scene).mesh
         trial = cost.tried(scene, len(grid.points))
         flow = trial.first.solved.flow
         found = numbers(scene, flow.mean_velocity if flow else None)

@@ -15,7 +15,7 @@ FREE, BOTTOM, TOP = 0, 1, 2
 
 #: Elements across half a pore's width and across the aggregate's thickness, and across the narrowest film.
 ACROSS_PORE, ACROSS_AGGREGATE, ACROSS_FILM = 14.0, 10.0, 10.0
-#: Growth of the element size with the distance from where it is prescribed.
+#: Growth of the element size with the distance from where it is prescribed; zero: one size everywhere.
 GRADATION = 0.25
 #: An interface edge is split when it is this much longer than the wanted size.
 SPLIT = 1.4
@@ -141,15 +141,17 @@ def size_sources(outline: Outline, width: float, refinement: float, thinnest: fl
     return np.vstack([outline.points[free], across[there]]), np.concatenate([near, film[there]])
 
 
-def graded_size(where: np.ndarray, sources: np.ndarray, sizes: np.ndarray, largest: float) -> np.ndarray:
-    """Wanted element size (um) at points (K, 2): grows with slope GRADATION from the sources (M, 2), up to largest."""
+def graded_size(where: np.ndarray, sources: np.ndarray, sizes: np.ndarray, largest: float,
+                gradation: float = GRADATION) -> np.ndarray:
+    """Wanted element size (um) at points (K, 2): grows with slope ``gradation`` from the sources (M, 2), up to
+    largest."""
     if len(sources) == 0:
         return np.full(len(where), largest)
     distance = np.hypot(where[:, None, 0] - sources[None, :, 0], where[:, None, 1] - sources[None, :, 1])
-    return np.minimum(largest, (sizes + GRADATION * distance).min(axis=1))
+    return np.minimum(largest, (sizes + gradation * distance).min(axis=1))
 
 
-def refine_outline(outline: Outline, sizes: np.ndarray, largest: float) -> Outline:
+def refine_outline(outline: Outline, sizes: np.ndarray, largest: float, gradation: float = GRADATION) -> Outline:
     """The same polygon with nodes spaced for a new mesh.
 
     Interface edges are split into equal parts, which keeps the area exactly, and never merged. Contact surfaces are
@@ -159,7 +161,7 @@ def refine_outline(outline: Outline, sizes: np.ndarray, largest: float) -> Outli
     for first, last in runs(outline):
         keep = np.arange(first, last + 1) % len(outline.points)
         on_wall = outline.wall[keep[0]] != FREE and outline.wall[keep[0]] == outline.wall[keep[-1]]
-        t = _spread(outline, keep, sizes, largest) if on_wall else split_parameters(outline, keep, sizes)
+        t = _spread(outline, keep, sizes, largest, gradation) if on_wall else split_parameters(outline, keep, sizes)
         pieces.append(_resample(outline, keep, t[:-1]))
     return Outline(*(np.concatenate(columns) for columns in zip(*pieces)))
 
@@ -180,10 +182,11 @@ def split_parameters(outline: Outline, keep: np.ndarray, sizes: np.ndarray) -> n
     return np.linspace(0.0, 1.0, max(1, int(np.ceil(length / (SPLIT * wanted)))) + 1)
 
 
-def _spread(outline: Outline, keep: np.ndarray, sizes: np.ndarray, largest: float) -> np.ndarray:
+def _spread(outline: Outline, keep: np.ndarray, sizes: np.ndarray, largest: float, gradation: float) -> np.ndarray:
     """Parameters 0..len - 1 along a stretch of wall, graded from the interface nodes."""
     free = outline.wall == FREE
-    line = graded_line(outline.points[keep[0]], outline.points[keep[-1]], outline.points[free], sizes[free], largest)
+    line = graded_line(outline.points[keep[0]], outline.points[keep[-1]], outline.points[free], sizes[free], largest,
+                       gradation)
     x = outline.points[keep, 0]
     sign = np.sign(x[-1] - x[0])
     t = np.interp(sign * line[:, 0], sign * x, np.arange(len(keep)))
@@ -212,12 +215,13 @@ def _on_arc(places: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.nda
     return places * np.where(arc, radius / np.where(arc, now, 1.0), 1.0)[:, None]
 
 
-def graded_line(start, end, sources: np.ndarray, sizes: np.ndarray, largest: float) -> np.ndarray:
+def graded_line(start, end, sources: np.ndarray, sizes: np.ndarray, largest: float,
+                gradation: float = GRADATION) -> np.ndarray:
     """(K, 2) nodes from start to end, spaced as :func:`graded_size` asks; both ends included."""
     start, end = np.asarray(start, float), np.asarray(end, float)
     length = np.linalg.norm(end - start)
     s = np.linspace(0.0, 1.0, 401)
-    density = length / graded_size(start + s[:, None] * (end - start), sources, sizes, largest)
+    density = length / graded_size(start + s[:, None] * (end - start), sources, sizes, largest, gradation)
     count = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(s))])
     parts = max(1, int(np.ceil(count[-1] - 0.3)))
     t = np.interp(np.linspace(0.0, count[-1], parts + 1), count, s)

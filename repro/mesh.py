@@ -160,27 +160,31 @@ def gradients(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 @timed("meshing")
-def generate(outline: Outline | None, ends: tuple[float, float], width: float, refinement: float, film: float):
+def generate(outline: Outline | None, ends: tuple[float, float], width: float, refinement: float, film: float,
+             gradation: float = geometry.GRADATION):
     """A new mesh around the aggregate, and the outline with the nodes that the mesh has on it.
 
-    outline: None for a clean channel; ends: x of inlet and outlet (um); film: thinnest film to resolve (um).
+    outline: None for a clean channel; ends: x of inlet and outlet (um); film: thinnest film to resolve (um);
+    gradation: growth of element sizes with the distance from the aggregate.
     Returns (PoreMesh, Outline | None). Raises MeshError where the outline crosses itself or the channel's ends.
     """
     if outline is not None:
         check_outline(outline, ends, width)
         sizes = geometry.interface_sizes(outline, width, refinement, film)
-        outline = geometry.refine_outline(outline, sizes, width / geometry.ACROSS_PORE / refinement)
-    return around(outline, ends, width, refinement, film), outline
+        outline = geometry.refine_outline(outline, sizes, width / geometry.ACROSS_PORE / refinement, gradation)
+    return around(outline, ends, width, refinement, film, gradation), outline
 
 
-def around(outline: Outline | None, ends, width: float, refinement: float, film: float) -> PoreMesh:
+def around(outline: Outline | None, ends, width: float, refinement: float, film: float,
+           gradation: float = geometry.GRADATION) -> PoreMesh:
     """A new mesh around an outline whose nodes stay as they are; arguments as those of :func:`generate`."""
     largest = width / geometry.ACROSS_PORE / refinement
     sources, sizes = np.empty((0, 2)), np.empty(0)
     if outline is not None:
         sources, sizes = geometry.size_sources(outline, width, refinement, film)
-    points, polygons = _boundaries(outline, ends, width, sources, sizes, largest)
-    mesh = _fill(points, polygons, lambda where: geometry.graded_size(where, sources, sizes, largest), ends, width)
+    wanted = sources, sizes, largest, gradation
+    points, polygons = _boundaries(outline, ends, width, wanted)
+    mesh = _fill(points, polygons, lambda where: geometry.graded_size(where, *wanted), ends, width)
     loop = mesh.loop[: 0 if outline is None else len(outline.points)]  # its points come first among the prescribed ones
     return replace(mesh, loop=loop)
 
@@ -197,10 +201,10 @@ def check_outline(outline: Outline, ends: tuple[float, float], width: float) -> 
                         f"leaves the meshed part, x from {ends[0]:.4g} to {ends[1]:.4g} um")
 
 
-def _boundaries(outline, ends, width, sources, sizes, largest):
+def _boundaries(outline, ends, width, wanted):
     """All prescribed points (K, 2) and the polygons [(indices, is biomass)] that they bound."""
     def line(start, end):
-        return geometry.graded_line(start, end, sources, sizes, largest)
+        return geometry.graded_line(start, end, *wanted)
 
     left, right = ends
     corners = [(left, 0.0), (right, 0.0), (right, width), (left, width)]

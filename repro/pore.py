@@ -79,7 +79,7 @@ def seeded(scene) -> Pore:
     numerics, width = scene.numerics, scene.pore.width
     outline = geometry.seed(scene.aggregate.radius, numerics.refinement) if scene.aggregate else None
     ends = geometry.meshed_extent(outline, width, scene.pore.length, numerics.extent == "full")
-    grid, outline = mesh.generate(outline, ends, width, numerics.refinement, film(scene))
+    grid, outline = mesh.generate(outline, ends, width, numerics.refinement, film(scene), numerics.gradation)
     count = len(grid.points)
     density = scene.kinetics.maximum_density if scene.kinetics else 0.0
     active = np.zeros(count)

@@ -40,7 +40,8 @@ def followed(scene, now: Pore, expanded: Pore) -> mesh.PoreMesh | None:
 def anew(scene, outline: geometry.Outline) -> tuple[mesh.PoreMesh, geometry.Outline]:
     """A new mesh around the aggregate with the extent of 3.1, and the outline with the nodes that it has on it."""
     ends = geometry.meshed_extent(outline, scene.pore.width, scene.pore.length, scene.numerics.extent == "full")
-    return mesh.generate(outline, ends, scene.pore.width, scene.numerics.refinement, pore.film(scene))
+    return mesh.generate(outline, ends, scene.pore.width, scene.numerics.refinement, pore.film(scene),
+                         scene.numerics.gradation)
 
 
 def _too_coarse(scene, outline: geometry.Outline) -> bool:

@@ -156,8 +156,8 @@ class Numerics:
 
     preset: str = choice("fast", "accurate", "paper", source="Section 3 is \"paper\"",
                          about="Defaults of this section: errors of about 1 %, of about 0.1 %, the paper's own scheme")
-    elements: str = choice("linear", "quadratic", source="3.2-3.4 have linear ones",
-                           about="Linear triangles, or quadratic curved ones (Taylor-Hood)")
+    elements: str = choice("linear", "quadratic", "cubic", source="3.2-3.4 have linear ones",
+                           about="Linear triangles, or curved ones: all quadratic, or velocity and substrates cubic")
     time: str = choice("updates", "midpoint", source="Section 2, 3.3 have updates",
                        about="Every growth.time_step, or second-order steps as long as tolerance allows")
     tolerance: float = number(0.01, UP_TO_1, source=OURS,
@@ -178,6 +178,8 @@ class Numerics:
     ordering: str = choice("degree", "metis", source=OURS,
                            about="Of nodes before SuperLU; the second needs the package pymetis")
     refinement: float = number(1.0, UP_TO_20, source="3.1 [E13]", about="Element sizes are divided by it")
+    gradation: float = number(0.25, FRACTION, source="3.1 [E13]",
+                              about="Growth of element sizes with distance from the aggregate; 0: one size everywhere")
     jacobian: str = choice("fresh", "reused", source=OURS,
                            about="Newton's derivative: of every iterate, or one while it does enough")
     flow_element: str = choice("stabilised", "bubble", source="3.2",
@@ -185,6 +187,16 @@ class Numerics:
     flow_stabilisation: float = number(100.0, source="3.2 [E13]",
                                        about="c of tau = h^2 / (c nu), with which linear elements are stabilised")
     mesh_compressibility: float = number(1.0, about="gamma of the mesh motion", source="(35) [E13], [E15]")
+
+    @property
+    def order(self) -> int:
+        """Degree of velocity and concentrations on a triangle."""
+        return {"linear": 1, "quadratic": 2, "cubic": 3}[self.elements]
+
+    @property
+    def curved(self) -> bool:
+        """Are triangles those of :mod:`repro.curved`?"""
+        return self.order > 1
 
 
 #: What each preset changes of the defaults above: about 1 %, about 0.1 % (see `make bench`), the paper's own scheme.

@@ -83,7 +83,7 @@ def _forces(scene, found: list[Number]) -> Iterator[Warned]:
 def _fronts(scene) -> Iterator[Warned]:
     numerics, thickness = scene.numerics, numbers.at_end(scene).thickness
     size = min(thickness / geometry.ACROSS_AGGREGATE, scene.pore.width / geometry.ACROSS_PORE) / numerics.refinement
-    nodes = size / 2 if numerics.elements == "quadratic" else size
+    nodes = size / numerics.order
     for name, s, rate in numbers.uptakes(scene):
         layer = math.sqrt(s.diffusivity_in_aggregate * s.half_saturation / rate) if rate and s.supply else math.inf
         if layer < min(nodes, thickness):
@@ -95,8 +95,7 @@ def _fronts(scene) -> Iterator[Warned]:
 
 def _seed_film(scene) -> Iterator[Warned]:
     gap, numerics = scene.pore.width - scene.aggregate.radius, scene.numerics
-    nodes = geometry.ACROSS_FILM * numerics.refinement * min(1.0, gap / film(scene))
-    nodes *= 2 if numerics.elements == "quadratic" else 1
+    nodes = geometry.ACROSS_FILM * numerics.refinement * min(1.0, gap / film(scene)) * numerics.order
     if nodes < ACROSS_FILM:
         yield Warned("aggregate.radius", f"the film over the seed is {gap:.2g} um thin and resolved by {nodes:.2g} "
                      f"distances between nodes, under {ACROSS_FILM:g}: its flow is a matter of the mesh; films are "

@@ -30,7 +30,7 @@ LANDED = 0.995
 
 def steps(scene, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
     """:func:`repro.loop.steps` of the midpoint rule; without ``output.times`` every step is reported."""
-    scheme = curved if scene.numerics.elements == "quadratic" else midpoint
+    scheme = curved if scene.numerics.curved else midpoint
 
     def advance(*now) -> tuple[Step, Solved, Pace]:
         taken, solved, pace = _advance(scheme, *now)

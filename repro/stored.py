@@ -53,7 +53,7 @@ def unpacked(scene, plain: dict, arrays: dict[str, np.ndarray]) -> State:
     _refuse(not (counted(plain["remeshes"]) and counts(plain["iterations"])), "its counts")
     _refuse(plain["guess"] is not None and not counted(plain["guess"]), "its counts")
     _check(scene, plain, arrays)
-    pore = (_curved if scene.numerics.elements == "quadratic" else _linear)(scene, plain, arrays)
+    pore = (_curved if scene.numerics.curved else _linear)(scene, plain, arrays)
     _refuse_turned_over(pore)
     return State(pore, _pace(plain["pace"]), _ledgers(plain["ledgers"]), plain["remeshes"], plain["iterations"])
 
@@ -101,7 +101,7 @@ def _ledger(row) -> Ledger:
 
 def _check(scene, plain: dict, arrays: dict[str, np.ndarray]) -> None:
     """Kinds and shapes of all arrays, finite numbers, indices that are nodes."""
-    wanted = CURVED if scene.numerics.elements == "quadratic" else LINEAR
+    wanted = CURVED if scene.numerics.curved else LINEAR
     if plain["guess"] is not None:
         wanted = {**wanted, **GUESS}
     _refuse(arrays.keys() != wanted.keys(), "its list of arrays")

@@ -1,5 +1,6 @@
 """Hostile numerics for every test: floating-point errors raise, figures need no screen, examples are repeatable."""
 import os
+import signal
 
 import matplotlib
 import numpy
@@ -10,6 +11,7 @@ matplotlib.use("Agg")
 SLOW_MACHINES_MAY = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
 settings.register_profile("ci", derandomize=True, max_examples=20, **SLOW_MACHINES_MAY)
 settings.register_profile("thorough", print_blob=True, max_examples=200, **SLOW_MACHINES_MAY)
+signal.signal(signal.SIGINT, signal.default_int_handler)  # in the background it is ignored, by children too
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 
 

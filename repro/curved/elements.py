@@ -65,7 +65,7 @@ def determinant(matrix: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """dx: (T, q) um2, weights of the integral; grad: (T, q, 6, 2) gradients of the nodal functions, 1/um."""
+    """dx: (T, q) um2, weights of the integral; grad: (T, q, k, 2) gradients of k nodal functions, 1/um."""
 
     dx: np.ndarray
     grad: np.ndarray
@@ -78,35 +78,26 @@ def places(nodes: np.ndarray, slopes: np.ndarray = DERIVATIVES) -> Places:
     det = determinant(J)
     weight = WEIGHTS if len(slopes) == len(WEIGHTS) else np.full(len(slopes), 0.5 / len(slopes))
     scaled = J / det[..., None, None]
-    return Places(det * weight, _turned(slopes, scaled))
+    return Places(det * weight, turned(slopes, scaled))
 
 
-def _turned(slopes: np.ndarray, J: np.ndarray) -> np.ndarray:
-    """(T, q, 6, 2) derivatives by x and y from those by s and t (q, 6, 2), with J / det J (T, q, 2, 2).
+def turned(slopes: np.ndarray, J: np.ndarray) -> np.ndarray:
+    """(T, q, k, 2) derivatives by x and y from those by s and t (q, k, 2), with J / det J (T, q, 2, 2).
 
     In memory x and y come before the functions, as the products of matrices want them.
     """
     by_s, by_t = slopes[..., 0], slopes[..., 1]
-    found = np.empty((len(J), len(slopes), 2, 6))
+    found = np.empty((len(J), len(slopes), 2, slopes.shape[1]))
     found[:, :, 0] = by_s * J[..., 1, 1, None] - by_t * J[..., 1, 0, None]
     found[:, :, 1] = by_t * J[..., 0, 0, None] - by_s * J[..., 0, 1, None]
     return np.swapaxes(found, 2, 3)
 
 
-#: Products of two nodal functions in the points of the quadrature, (q, 36).
-PRODUCTS = (QUADRATIC[:, :, None] * QUADRATIC[:, None, :]).reshape(len(WEIGHTS), 36)
-
-
 def stiffness(coefficient: np.ndarray, at: Places) -> np.ndarray:
-    """(T, 6, 6) of (k grad u, grad v), k: (T,)."""
-    slopes = np.swapaxes(at.grad, 2, 3).reshape(len(at.dx), -1, 6)
+    """(T, k, k) of (c grad u, grad v), c: (T,)."""
+    slopes = np.swapaxes(at.grad, 2, 3).reshape(len(at.dx), -1, at.grad.shape[2])
     weight = np.repeat(coefficient[:, None] * at.dx, 2, axis=1)
     return np.swapaxes(slopes, 1, 2) @ (weight[:, :, None] * slopes)
-
-
-def mass(coefficient: np.ndarray) -> np.ndarray:
-    """(T, 6, 6) of (c u, v) with c dx (T, q)."""
-    return (coefficient @ PRODUCTS).reshape(-1, 6, 6)
 
 
 def load(coefficient: np.ndarray) -> np.ndarray:

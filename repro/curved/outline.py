@@ -87,7 +87,8 @@ def arcs(values: np.ndarray) -> np.ndarray:
     return np.stack([values[::2], values[1::2], np.roll(values, -2, axis=0)[::2]], axis=1)
 
 
-def split(outline: Outline, width: float, refinement: float, film: float) -> Arcs:
+def split(outline: Outline, width: float, refinement: float, film: float,
+          gradation: float = geometry.GRADATION) -> Arcs:
     """The same curve with corners spaced as :func:`repro.geometry.interface_sizes` wants them, and their middles.
 
     Arcs at the fluid are split into equal parts of their parameter, and never merged; straight contact surfaces get
@@ -100,7 +101,7 @@ def split(outline: Outline, width: float, refinement: float, film: float) -> Arc
     for first, last in geometry.runs(polygon):
         keep = np.arange(first, last + 1) % count
         if outline.wall[2 * keep[0] + 1] != FREE:
-            t = np.concatenate([[0.0], _on_the_wall(outline, polygon, keep, sizes, largest)])
+            t = np.concatenate([[0.0], _on_the_wall(outline, polygon, keep, sizes, largest, gradation)])
         else:
             parts = len(geometry.split_parameters(polygon, keep, sizes)) - 1
             t = np.linspace(0.0, 1.0, 2 * parts + 1)
@@ -118,11 +119,12 @@ def halved(outline: Outline, which: np.ndarray) -> Arcs:
     return Arcs(*(np.concatenate(columns) for columns in zip(*pieces)))
 
 
-def _on_the_wall(outline: Outline, polygon: Outline, keep: np.ndarray, sizes, largest: float) -> np.ndarray:
+def _on_the_wall(outline: Outline, polygon: Outline, keep: np.ndarray, sizes, largest: float,
+                 gradation: float) -> np.ndarray:
     """Parameters (arc number + t), the first left out, of corners and middles along a stretch of wall."""
     free = polygon.wall == FREE
     ends = polygon.points[keep[[0, -1]]]
-    x = geometry.graded_line(ends[0], ends[1], polygon.points[free], sizes[free], largest)[:, 0]
+    x = geometry.graded_line(ends[0], ends[1], polygon.points[free], sizes[free], largest, gradation)[:, 0]
     x = np.insert(x, np.arange(1, len(x)), 0.5 * (x[1:] + x[:-1]))
     sign = np.sign(x[-1] - x[0])
     arc = np.clip(np.searchsorted(sign * polygon.points[keep, 0], sign * x, side="right") - 1, 0, len(keep) - 2)

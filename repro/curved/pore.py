@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from repro import geometry
 from repro import mesh as linear_mesh
 from repro.curved import elements, flow, outline, transport
+from repro.curved.fields import space
 from repro.curved.mesh import CurvedMesh, curved, unlocked
 from repro.curved.outline import Arcs
 from repro.flow import poiseuille_loss
@@ -113,17 +115,18 @@ def generate(scene, around: Arcs | None) -> tuple[CurvedMesh, Arcs | None]:
 
     Raises MeshError where the outline crosses itself or the channel's ends, or where a curved triangle is turned over.
     """
-    width, size = scene.pore.width, resolution(scene)
+    width = scene.pore.width
+    sizes = width, resolution(scene), film(scene), scene.numerics.gradation
     ends = geometry.meshed_extent(around, width, scene.pore.length,
                                   scene.numerics.extent == "full")
     if around is None:
-        straight = linear_mesh.around(None, ends, width, size, film(scene))
+        straight = linear_mesh.around(None, ends, *sizes)
         return curved(straight, np.empty((0, 2))), None
     for _ in range(HALVINGS):
-        around = outline.split(around, width, size, film(scene))
+        around = outline.split(around, *sizes)
         polygon = outline.corners(around)
         linear_mesh.check_outline(polygon, ends, width)
-        straight = unlocked(linear_mesh.around(polygon, ends, width, size, film(scene)))
+        straight = unlocked(linear_mesh.around(polygon, ends, *sizes))
         grid = curved(straight, around.points[1::2])
         strained = grid.strained_arcs()
         if not strained.any():
@@ -140,12 +143,22 @@ def active_biomass(scene, now: Pore) -> np.ndarray:
 
 
 def solve(scene, now: Pore) -> Solved:
-    """Flow, then substrates, in the geometry of the pore: what the scene's sections ask for."""
-    carried = flow.solve(now.mesh, scene.flow, scene.pore.length) if scene.flow else None
+    """Flow, then substrates, in the geometry of the pore: what the scene's sections ask for; at the mesh's nodes, of
+    whatever order they are found with."""
+    order = scene.numerics.order
+    here = space(now.mesh, order)
+    carried = flow.solve(now.mesh, scene.flow, scene.pore.length, order) if scene.flow else None
+    shown = replace(carried, velocity=here.to_mesh(carried.velocity)) if carried else None
     if scene.substrates is None:
-        return Solved(carried, None, None)
+        return Solved(shown, None, None)
     refuse_no_supply(scene, carried)
-    found = transport.problem(now.mesh, carried, scene.substrates, scene.kinetics, scene.numerics.jacobian == "reused")
+    found = transport.problem(now.mesh, carried, scene.substrates, scene.kinetics, scene.numerics.jacobian == "reused",
+                              order)
     active = active_biomass(scene, now) if scene.kinetics else None
-    state = transport.steady(found, active, now.concentrations)
-    return Solved(carried, found, state, transport.fluxes(found, active, state))
+    state = transport.steady(found, active, _at(here.of_mesh, now.concentrations))
+    return Solved(shown, found, _at(here.to_mesh, state), transport.fluxes(found, active, state))
+
+
+def _at(nodes: Callable[[np.ndarray], np.ndarray], state: Concentrations | None) -> Concentrations | None:
+    """Concentrations at other nodes."""
+    return state and replace(state, acceptor=nodes(state.acceptor), donor=nodes(state.donor))

@@ -1,4 +1,4 @@
-"""Substrates (2.2) with quadratic concentrations, in the form that conserves; as :mod:`repro.transport`.
+"""Substrates (2.2) with quadratic or cubic concentrations, in the form that conserves; as :mod:`repro.transport`.
 
     (D grad C, grad N_i) - (C u, grad N_i) + <u_x C, N_i>_outlet + (q(C) X_A, N_i)_biomass = <u_x C_supply, N_i>_inlet
 
@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from skfem.quadrature import get_quadrature_line
 
 from repro import kinetics as law
 from repro.assembly import ElementSystem
 from repro.curved import elements
+from repro.curved.fields import Space, space
 from repro.curved.mesh import CurvedMesh
 from repro.errors import TransportError
 from repro.flow import Flow
@@ -36,13 +36,13 @@ OVERSHOOT = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Both substrates in one geometry.
+    """Both substrates in one geometry, with n nodes in all and k a triangle.
 
-    matrices: (T, 6, 6) um2/h; sources: (N,) um2 mg/L/h; inflow, outflow: (N,) um2/h, integrals of u_x N_i over an end;
+    matrices: (T, k, k) um2/h; sources: (n,) um2 mg/L/h; inflow, outflow: (n,) um2/h, integrals of u_x N_i over an end;
     reused: does Newton's method use its derivative again?
     """
 
-    mesh: CurvedMesh
+    space: Space
     matrices: tuple[np.ndarray, ...]
     sources: tuple[np.ndarray, ...]
     inflow: np.ndarray
@@ -54,96 +54,97 @@ class Problem:
     reused: bool
 
     @property
+    def mesh(self) -> CurvedMesh:
+        """Of the space."""
+        return self.space.mesh
+
+    @property
     def both(self):
         """Acceptor and donor, as the scene describes them."""
         return self.substrates.acceptor, self.substrates.donor
 
 
 @timed("transport")
-def problem(mesh: CurvedMesh, flow: Flow | None, substrates, kinetics, reused: bool = False) -> Problem:
-    """Assemble the linear parts for one geometry and flow (None: pure diffusion, the supply held at both ends)."""
-    at, count = mesh.places, len(mesh.points)
+def problem(mesh: CurvedMesh, flow: Flow | None, substrates, kinetics, reused: bool = False, order: int = 2) -> Problem:
+    """Assemble the linear parts for one geometry and flow of the same order (None: pure diffusion, the supply held at
+    both ends)."""
+    here = space(mesh, order)
+    at, count, values = here.at, here.count, here.of.values
     carried, inflow, outflow, speed = 0.0, np.zeros(count), np.zeros(count), 0.0
     if flow is not None:
         speed = flow.mean_velocity
-        u = elements.QUADRATIC @ flow.velocity[mesh.cells]
+        u = values @ flow.velocity[here.cells]
         along = (at.grad[..., 0] * u[..., :1] + at.grad[..., 1] * u[..., 1:]) * at.dx[..., None]
-        carried = -np.swapaxes(along, 1, 2) @ elements.QUADRATIC
-        inflow = _end_loads(mesh, mesh.inlet, flow.velocity[:, 0])
-        ends, blocks = _end_matrix(mesh, mesh.outlet, flow.velocity[:, 0])
-        carried[ends[0]] += blocks
-        outflow = _end_loads(mesh, mesh.outlet, flow.velocity[:, 0])
+        carried = -np.swapaxes(along, 1, 2) @ values
+        inflow = _end_loads(here, here.inlet, flow.velocity[:, 0])
+        owner, blocks = _outlet_matrix(here, flow.velocity[:, 0])
+        carried[owner] += blocks
+        outflow = _end_loads(here, here.outlet, flow.velocity[:, 0])
     kinds = (substrates.acceptor, substrates.donor)
     spread = [np.where(mesh.biomass, s.diffusivity_in_aggregate, s.diffusivity) for s in kinds]
     matrices = tuple(elements.stiffness(d, at) + carried for d in spread)
-    system = mesh.once(("transport", flow is None), lambda: _system(mesh, flow is None))
+    system = mesh.once(("transport", order, flow is None), lambda: _system(here, flow is None))
     sources = tuple(s.supply * inflow for s in kinds)
-    return Problem(mesh, matrices, sources, inflow, outflow, speed, substrates, kinetics, system, reused)
+    return Problem(here, matrices, sources, inflow, outflow, speed, substrates, kinetics, system, reused)
 
 
-def _system(mesh: CurvedMesh, held_ends: bool) -> ElementSystem:
+def _system(here: Space, held_ends: bool) -> ElementSystem:
     """Acceptor and donor of a node side by side, nodes in elimination order."""
-    count = len(mesh.points)
-    place = np.empty(count)
-    place[mesh.order] = np.arange(count)
-    held = np.zeros(count, bool)
-    held[np.concatenate([mesh.inlet, mesh.outlet])] = held_ends
-    return ElementSystem(np.concatenate([mesh.cells, count + mesh.cells], axis=1),
+    place = np.empty(here.count)
+    place[here.order] = np.arange(here.count)
+    held = np.zeros(here.count, bool)
+    held[_both_ends(here)] = held_ends
+    return ElementSystem(np.concatenate([here.cells, here.count + here.cells], axis=1),
                          np.concatenate([place, place + 0.5]), np.tile(held, 2))
 
 
-def _line_rule():
-    where, weight = get_quadrature_line(6)
-    s = where[0]
-    return weight, np.column_stack([(1 - s) * (1 - 2 * s), 4 * s * (1 - s), s * (2 * s - 1)])
+def _both_ends(here: Space) -> np.ndarray:
+    """Nodes of the inlet and of the outlet."""
+    return np.concatenate([here.end_nodes(here.inlet), here.end_nodes(here.outlet)])
 
 
-LINE_WEIGHTS, LINE = _line_rule()
+def _lengths(here: Space, edges: np.ndarray) -> np.ndarray:
+    """(E,) of the edges of an end, um."""
+    return here.mesh.points[edges[:, -1], 1] - here.mesh.points[edges[:, 0], 1]
 
 
-def _end_edges(mesh: CurvedMesh, line: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(E, 3) nodes of the edges of an end, corner, middle, corner; and their lengths (E,)."""
-    nodes = np.column_stack([line[:-2:2], line[1:-1:2], line[2::2]])
-    return nodes, mesh.points[nodes[:, 2], 1] - mesh.points[nodes[:, 0], 1]
-
-
-def _end_loads(mesh: CurvedMesh, line: np.ndarray, speed: np.ndarray) -> np.ndarray:
-    """(N,) integrals of u_x N_i over an end, um2/h."""
-    nodes, length = _end_edges(mesh, line)
-    u = speed[nodes] @ LINE.T
-    found = np.zeros(len(mesh.points))
-    np.add.at(found, nodes, length[:, None] * ((u * LINE_WEIGHTS) @ LINE))
+def _end_loads(here: Space, edges: np.ndarray, speed: np.ndarray) -> np.ndarray:
+    """(n,) integrals of u_x N_i over an end, um2/h."""
+    u = speed[edges] @ here.of.along.T
+    found = np.zeros(here.count)
+    np.add.at(found, edges, _lengths(here, edges)[:, None] * ((u * here.of.line_weights) @ here.of.along))
     return found
 
 
-def _end_matrix(mesh: CurvedMesh, line: np.ndarray, speed: np.ndarray):
-    """Integrals of u_x N_i N_j over an end as ((elements,), blocks (E, 6, 6)) of the triangles that have its edges."""
-    nodes, length = _end_edges(mesh, line)
-    u = speed[nodes] @ LINE.T
-    local = length[:, None, None] * np.einsum("eq,q,qa,qb->eab", u, LINE_WEIGHTS, LINE, LINE, optimize=True)
-    owner = mesh.once("outlet triangles", lambda: _owners(mesh, nodes[:, 1]))
-    blocks = np.zeros((len(nodes), 6, 6))
-    where = np.argmax(mesh.cells[owner][:, :, None] == nodes[:, None, :], axis=1)
-    each = np.arange(len(nodes))
+def _outlet_matrix(here: Space, speed: np.ndarray):
+    """Integrals of u_x N_i N_j over the outlet: (E,) triangles that have its edges, and a block (E, k, k) for each."""
+    edges, along = here.outlet, here.of.along
+    u = speed[edges] @ along.T
+    local = _lengths(here, edges)[:, None, None] * np.einsum("eq,q,qa,qb->eab", u, here.of.line_weights, along, along,
+                                                             optimize=True)
+    owner = here.mesh.once("outlet triangles", lambda: _owners(here.mesh))
+    blocks = np.zeros((len(edges), *here.cells.shape[1:] * 2))
+    where = np.argmax(here.cells[owner][:, :, None] == edges[:, None, :], axis=1)
+    each = np.arange(len(edges))
     blocks[each[:, None, None], where[:, :, None], where[:, None, :]] = local
-    return (owner,), blocks
+    return owner, blocks
 
 
-def _owners(mesh: CurvedMesh, middles: np.ndarray) -> np.ndarray:
-    """The triangle of each boundary edge, by its middle node."""
-    return np.array([np.flatnonzero((mesh.cells[:, 3:] == m).any(axis=1))[0] for m in middles])
+def _owners(mesh: CurvedMesh) -> np.ndarray:
+    """The triangle of each of the outlet's edges, by its middle node."""
+    return np.array([np.flatnonzero((mesh.cells[:, 3:] == m).any(axis=1))[0] for m in mesh.outlet[1::2]])
 
 
 @timed("transport")
 def steady(problem: Problem, active: np.ndarray | None, guess: Concentrations | None = None) -> Concentrations:
     """Steady concentrations by Newton's method on both substrates at once.
 
-    active: X_A (N,) mg/L, None without biomass. Where it does not converge, as behind a sharp front, it starts again
+    active: X_A (N,) mg/L at the mesh's nodes, None without biomass; guess: at the problem's. Where it does not converge, as behind a sharp front, it starts again
     from the supply with shorter steps, and half saturations come down from the supply to what they are, a tenth at a
     time. Raises TransportError where that fails too, or where a concentration is outside of zero to the supply by more
     than UNRESOLVED and OVERSHOOT say: the mesh is too coarse for its front.
     """
-    count = len(problem.mesh.points)
+    count = problem.space.count
     supply = np.repeat([s.supply for s in problem.both], count)
     state = supply.copy() if guess is None else np.concatenate([guess.acceptor, guess.donor])
     state[problem.system.held] = supply[problem.system.held]
@@ -168,7 +169,7 @@ def _eased(problem: Problem, active, state):
 
 
 def _newton(problem: Problem, active, state, advance):
-    """(2N,) solution and Newton's iterations."""
+    """(2n,) solution and Newton's iterations."""
     jacobian, defect, nothing = Jacobian(problem.reused), np.inf, np.zeros(len(state))
     residual, size = _balance(problem, active, state)
     for iteration in range(MOST_ITERATIONS):
@@ -223,17 +224,24 @@ def _sweep(problem: Problem, active, state) -> np.ndarray:
     for k, (rate, substrate) in enumerate(zip((q_a, q_d), problem.both)):
         tiny = 1e-9 * substrate.half_saturation
         per = np.where(values[k] > tiny, rate / np.maximum(values[k], tiny), slopes[k][k])
-        matrices[biomass, 6 * k: 6 * k + 6, 6 * k: 6 * k + 6] += elements.mass(weight * per)
+        matrices[biomass, _rows(problem, k), _rows(problem, k)] += problem.space.mass(weight * per)
     return problem.system.solve(matrices, np.concatenate(problem.sources), state)
 
 
+def _rows(problem: Problem, k: int) -> slice:
+    """Of one substrate in the element matrices."""
+    width = problem.space.cells.shape[1]
+    return slice(width * k, width * k + width)
+
+
 def _balance(problem: Problem, active, state):
-    """Residual (2N,) and size of its terms (2N,)."""
-    mesh, count = problem.mesh, len(problem.mesh.points)
-    local, scale = np.zeros((len(mesh.cells), 12)), np.zeros((len(mesh.cells), 12))
+    """Residual (2n,) and size of its terms (2n,)."""
+    cells, count = problem.space.cells, problem.space.count
+    local = np.zeros((len(cells), 2 * cells.shape[1]))
+    scale = np.zeros_like(local)
     for k, matrix in enumerate(problem.matrices):
-        rows = slice(6 * k, 6 * k + 6)
-        values = state[k * count + mesh.cells]
+        rows = _rows(problem, k)
+        values = state[k * count + cells]
         local[:, rows] = (matrix @ values[..., None])[..., 0]
         scale[:, rows] = (np.abs(matrix) @ np.abs(values)[..., None])[..., 0]
     if problem.kinetics is not None and active is not None:
@@ -245,12 +253,11 @@ def _balance(problem: Problem, active, state):
 
 def _uptake_at_points(problem: Problem, active, state):
     """X_A dx (t, q) on the biomass, C_A and C_D (t, q) there, and the uptake with its derivatives."""
-    mesh, count = problem.mesh, len(problem.mesh.points)
-    cells = mesh.cells[mesh.biomass]
-    acceptor, donor, density = (elements.at_points(values, cells)
-                                for values in (state[:count], state[count:], active))
+    here, biomass = problem.space, problem.mesh.biomass
+    acceptor, donor = (here.at_points(values, here.cells[biomass]) for values in np.split(state, 2))
+    density = active[problem.mesh.cells[biomass]] @ here.of.shape.T
     rates = law.paired_uptake(acceptor, donor, problem.substrates, problem.kinetics)
-    return density * mesh.places.dx[mesh.biomass], (acceptor, donor), rates
+    return density * here.at.dx[biomass], (acceptor, donor), rates
 
 
 def _add_uptake(problem: Problem, active, state, local, scale) -> None:
@@ -258,39 +265,40 @@ def _add_uptake(problem: Problem, active, state, local, scale) -> None:
     weight, _, (q_a, q_d, _) = _uptake_at_points(problem, active, state)
     biomass = np.flatnonzero(problem.mesh.biomass)
     for k, rate in enumerate((q_a, q_d)):
-        rows = slice(6 * k, 6 * k + 6)
-        local[biomass, rows] += elements.load(weight * rate)
-        scale[biomass, rows] += np.abs(weight * rate) @ np.abs(elements.QUADRATIC)
+        rows = _rows(problem, k)
+        local[biomass, rows] += problem.space.load(weight * rate)
+        scale[biomass, rows] += np.abs(weight * rate) @ np.abs(problem.space.of.values)
 
 
 def _linear_part(problem: Problem) -> np.ndarray:
-    """(T, 12, 12) element matrices of diffusion, advection and the ends."""
-    found = np.zeros((len(problem.mesh.cells), 12, 12))
+    """(T, 2k, 2k) element matrices of diffusion, advection and the ends."""
+    cells, width = problem.space.cells.shape
+    found = np.zeros((cells, 2 * width, 2 * width))
     for k, matrix in enumerate(problem.matrices):
-        found[:, 6 * k: 6 * k + 6, 6 * k: 6 * k + 6] = matrix
+        found[:, _rows(problem, k), _rows(problem, k)] = matrix
     return found
 
 
 def _tangent(problem: Problem, active, state) -> np.ndarray:
-    """(T, 12, 12) element matrices of the residual's derivative."""
+    """(T, 2k, 2k) element matrices of the residual's derivative."""
     found = _linear_part(problem)
     if problem.kinetics is not None and active is not None:
         weight, _, (_, _, slopes) = _uptake_at_points(problem, active, state)
         biomass = np.flatnonzero(problem.mesh.biomass)
         for k, m in np.ndindex(2, 2):
-            found[biomass, 6 * k: 6 * k + 6, 6 * m: 6 * m + 6] += elements.mass(weight * slopes[k][m])
+            found[biomass, _rows(problem, k), _rows(problem, m)] += problem.space.mass(weight * slopes[k][m])
     return found
 
 
 def _checked(problem: Problem, state, iterations: int) -> Concentrations:
     """The solution, if it stays between zero and the supply as well as it has to."""
-    count = len(problem.mesh.points)
+    count = problem.space.count
     for name, values, substrate in zip(("acceptor", "donor"), (state[:count], state[count:]), problem.both):
         least = -UNRESOLVED * max(s.supply for s in problem.both)
         for beyond, where in ((values.min() < least, values.argmin()),
                               (values.max() > (1 + OVERSHOOT) * substrate.supply, values.argmax())):
             if beyond:
-                x, y = problem.mesh.points[where]
+                x, y = problem.space.points[where]
                 raise TransportError(f"the {name} is {values[where]:.3g} mg/L at x = {x:.4g}, y = {y:.4g} um, outside "
                                      f"of 0 to {substrate.supply:g}; the mesh is too coarse there: "
                                      "try a larger numerics.refinement")
@@ -308,16 +316,16 @@ def fluxes(problem: Problem, active: np.ndarray | None, state: Concentrations) -
 
 
 def _fluxes(problem: Problem, k: int, field: np.ndarray, consumed: float) -> Fluxes:
-    mesh = problem.mesh
+    here = problem.space
     if problem.speed:
         ends = [float(w @ field / w.sum()) for w in (problem.inflow, problem.outflow)]
         return Fluxes(float(problem.sources[k].sum()), float(problem.outflow @ field), consumed, *ends)
-    flux = np.bincount(mesh.cells.ravel(), np.einsum("tab,tb->ta", problem.matrices[k], field[mesh.cells]).ravel(),
+    flux = np.bincount(here.cells.ravel(), np.einsum("tab,tb->ta", problem.matrices[k], field[here.cells]).ravel(),
                        len(field))
-    ends = [_mean(mesh, line, field) for line in (mesh.inlet, mesh.outlet)]
-    return Fluxes(float(flux[np.concatenate([mesh.inlet, mesh.outlet])].sum()), 0.0, consumed, *ends)
+    ends = [_mean(here, edges, field) for edges in (here.inlet, here.outlet)]
+    return Fluxes(float(flux[_both_ends(here)].sum()), 0.0, consumed, *ends)
 
 
-def _mean(mesh: CurvedMesh, line: np.ndarray, field: np.ndarray) -> float:
-    weight = _end_loads(mesh, line, np.ones(len(field)))
+def _mean(here: Space, edges: np.ndarray, field: np.ndarray) -> float:
+    weight = _end_loads(here, edges, np.ones(len(field)))
     return float(weight @ field / weight.sum())

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from functools import partial
 from time import perf_counter, process_time
-from unittest import mock
 
 import numpy as np
 
 from reference import whole_run
-from repro import geometry, timing
+from repro import timing
 from repro.results import row
 from repro.scene import load_scene
 from repro.simulation import simulate
@@ -32,6 +31,7 @@ CHANGED = ((0.7, 24), (1.0, 48), (1.0, 12))
 MIDPOINT = ((0.35, 0.03), (0.5, 0.03), (0.7, 0.01), (1.0, 0.01), (1.4, 0.003), (2.0, 0.002))
 QUADRATIC = ((0.15, 0.02), (0.15, 0.01), (0.2, 0.01), (0.3, 0.005), (0.45, 0.002), (0.45, 0.001), (0.6, 0.0005),
              (0.8, 0.0002))
+CUBIC = ((0.1, 0.01), (0.2, 0.0075), (0.3, 0.005), (0.45, 0.001))
 #: Rings and steps to 19.2 h of scikit-fem's run.
 SKFEM = ((3, 4), (4, 4), (4, 8), (6, 8))
 
@@ -74,8 +74,12 @@ def jobs(truth: np.ndarray, times, quick: bool) -> dict:
     found |= {("order 2, midpoint, fresh derivatives", f"refinement {r:g}, tolerance {t:g}"): partial(
         simulated, truth, times, "numerics.preset=accurate", f"numerics.refinement={r}", f"numerics.tolerance={t}",
         "numerics.jacobian=fresh") for r, t in QUADRATIC[1:6:2][:cut]}
+    found |= {("order 3, midpoint", f"refinement {r:g}, tolerance {t:g}"): partial(
+        simulated, truth, times, "numerics.preset=accurate", f"numerics.refinement={r}", f"numerics.tolerance={t}",
+        "numerics.elements=cubic") for r, t in CUBIC[:cut]}
     found |= {("order 2, midpoint, one element size everywhere", f"refinement {r:g}, tolerance {t:g}"): partial(
-        _ungraded, truth, times, "numerics.preset=accurate", f"numerics.refinement={r}", f"numerics.tolerance={t}")
+        simulated, truth, times, "numerics.preset=accurate", f"numerics.refinement={r}", f"numerics.tolerance={t}",
+        "numerics.gradation=0")
         for r, t in QUADRATIC[1:4][:cut]}
     found |= {(name, "as it is"): partial(simulated, truth, times, f"numerics.preset={name.split()[1]}")
               for name in (FAST, ACCURATE)}
@@ -92,12 +96,6 @@ def simulated(truth, times, *overrides: str):
     rows = rows_of(load_scene("base", [*overrides, f'growth.end="{times[-1]} h"', f"output.times=[{shown}]"]))
     return {"error": error(values(rows), truth), "nodes": rows[-1]["nodes"], "stages": dict(timing.seconds),
             "errors": [float(e) for e in apart(values(rows), truth).max(axis=0)]}
-
-
-def _ungraded(*given):
-    """The same where no element is larger than the smallest one that the aggregate and its film ask for."""
-    with mock.patch.object(geometry, "GRADATION", 0.0):
-        return simulated(*given)
 
 
 def rows_of(scene) -> list[dict]:

@@ -31,6 +31,7 @@ def run(quick: bool) -> dict:
     given, repeats = ribbons.scene(), 1 if quick else REPEATS
     jobs = {(options.PAPER, f"{n} cells"): partial(_ours, truth, given, n, 1) for n in linear}
     jobs |= {("order 2 (fast, accurate)", f"{n} cells"): partial(_ours, truth, given, n, 2) for n in quadratic}
+    jobs |= {("order 3", f"{n} cells"): partial(_ours, truth, given, n, 3) for n in quadratic}
     jobs |= {("scikit-fem: quadratic elements", f"{n} cells"): partial(_skfem, truth, n) for n in skfem}
     jobs |= {("fipy", f"{n} cells"): partial(_fipy, truth, n) for n in cells}
     jobs |= {("py-pde's Laplacian, Newton by scipy", f"{n} cells"): partial(_newton, truth, n) for n in cells}

@@ -28,6 +28,7 @@ def run(quick: bool) -> dict:
     coarse, truth = reference(1e-7), reference(1e-9)
     jobs = {(options.PAPER, f"{n} cells"): partial(_ours, truth, given, n, 1) for n in linear}
     jobs |= {("order 2 (fast, accurate)", f"{n} cells"): partial(_ours, truth, given, n, 2) for n in quadratic}
+    jobs |= {("order 3", f"{n} cells"): partial(_ours, truth, given, n, 3) for n in quadratic}
     jobs |= {("fipy", f"{n} cells"): partial(_fipy, truth, n) for n in cells}
     lines = measured(jobs, repeats)
     lines += measured({("py-pde, compiled", f"{n} cells"): partial(_stepped, truth, n) for n in stepped}, 1)

@@ -30,7 +30,8 @@ def run(quick: bool) -> dict:
     for r in linear[: len(linear) - 2]:
         jobs["order 2 on straight triangles", f"refinement {r:g}"] = partial(_order_2, truth, r)
     for r in quadratic:
-        jobs["order 2 on curved triangles (fast, accurate)", f"refinement {r:g}"] = partial(_curved, truth, r)
+        jobs["order 2 on curved triangles (fast, accurate)", f"refinement {r:g}"] = partial(_curved, truth, r, 2)
+        jobs["order 3 on curved triangles", f"refinement {r:g}"] = partial(_curved, truth, r, 3)
     for k in skfem:
         jobs["scikit-fem: Taylor-Hood, two pressures", f"{k} refinements"] = partial(_taylor_hood, truth, k)
     for n in sections:
@@ -68,9 +69,9 @@ def _order_2(truth: float, refinement: float) -> dict:
     return _judged(truth, flow.unit_flow(now.mesh, pores.RATIO, order=2).loss + pores.outside_loss(), now.mesh)
 
 
-def _curved(truth: float, refinement: float) -> dict:
+def _curved(truth: float, refinement: float, order: int) -> dict:
     now = curved_pore.seeded(pores.scene(preset="accurate", refinement=refinement))
-    return _judged(truth, curved_flow.unit_flow(now.mesh, pores.RATIO)[2] + pores.outside_loss(), now.mesh)
+    return _judged(truth, curved_flow.unit_flow(now.mesh, pores.RATIO, order)[2] + pores.outside_loss(), now.mesh)
 
 
 def _taylor_hood(truth: float, refinements: int) -> dict:

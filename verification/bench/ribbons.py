@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from repro import transport
+from repro.curved import fields
 from repro.curved import mesh as curved_mesh
 from repro.curved import transport as curved_transport
 from repro.flow import Flow
@@ -34,13 +35,15 @@ def straight(ends, width: float, cells: tuple[int, int], inside) -> PoreMesh:
 
 
 def solved(given, grid: PoreMesh, order: int, speed: float = 0.0):
-    """(acceptor's, donor's) fluxes by linear (order 1) or quadratic elements, in plug flow (um/h) or at rest."""
+    """(acceptor's, donor's) fluxes by linear (order 1), quadratic or cubic elements, in plug flow (um/h) or at rest."""
     stage = transport if order == 1 else curved_transport
     mesh = grid if order == 1 else curved_mesh.curved(grid, None)
     count = len(mesh.points)
-    flow = Flow(speed, np.tile([speed, 0.0], (count, 1)), np.zeros(len(grid.points)),
+    nodes = count if order == 1 else fields.space(mesh, order).count
+    flow = Flow(speed, np.tile([speed, 0.0], (nodes, 1)), np.zeros(len(grid.points)),
                 np.zeros((len(grid.triangles), 2)), 0.0, 0.0, 1.0) if speed else None
-    problem = stage.problem(mesh, flow, given.substrates, given.kinetics)
+    more = {} if order == 1 else {"order": order}
+    problem = stage.problem(mesh, flow, given.substrates, given.kinetics, **more)
     active = np.zeros(count)
     active[mesh.body] = DENSITY
     return stage.fluxes(problem, active, stage.steady(problem, active))

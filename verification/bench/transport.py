@@ -31,8 +31,8 @@ def run(quick: bool) -> dict:
     jobs = {}
     for name, element in options.flow_elements():
         jobs |= {(name, f"refinement {r:g}"): _linear(truth, r, element) for r in linear}
-    jobs |= {("order 2 on curved triangles (fast, accurate)", f"refinement {r:g}"): _curved(truth, r)
-             for r in quadratic}
+    for order, name in ((2, "order 2 on curved triangles (fast, accurate)"), (3, "order 3 on curved triangles")):
+        jobs |= {(name, f"refinement {r:g}"): _curved(truth, r, order) for r in quadratic}
     jobs |= {("scikit-fem: quadratic elements", f"{n} rings"): partial(_section, truth, *prepared(n)) for n in sections}
     repeats, change = 1 if quick else REPEATS, pores.largest(coarse, truth, supply())
     return {"title": "Transport: dual Monod uptake around a half-disc of 40 um in a pore of 50 um, 2.9 m/d; assembly "
@@ -78,15 +78,16 @@ def _linear(truth, refinement: float, element: dict):
     return partial(_solved, truth, scene, now, now.active, pore.solve_flow(scene, now), transport)
 
 
-def _curved(truth, refinement: float):
+def _curved(truth, refinement: float, order: int):
     scene = pores.scene(preset="accurate", refinement=refinement)
     now = curved_pore.seeded(scene)
-    found = curved_flow.solve(now.mesh, scene.flow, scene.pore.length)
-    return partial(_solved, truth, scene, now, curved_pore.active_biomass(scene, now), found, curved_transport)
+    found = curved_flow.solve(now.mesh, scene.flow, scene.pore.length, order)
+    return partial(_solved, truth, scene, now, curved_pore.active_biomass(scene, now), found, curved_transport,
+                   order=order)
 
 
-def _solved(truth, scene, now, active, flow, stage) -> dict:
+def _solved(truth, scene, now, active, flow, stage, **order) -> dict:
     now.mesh.topology.clear()  # orderings and sparsity too are worked out anew
-    problem = stage.problem(now.mesh, flow, scene.substrates, scene.kinetics)
+    problem = stage.problem(now.mesh, flow, scene.substrates, scene.kinetics, **order)
     found = stage.fluxes(problem, active, stage.steady(problem, active))
     return {"error": pores.largest([flux.effluent for flux in found], truth, supply()), "nodes": len(now.mesh.points)}

@@ -19,12 +19,12 @@ ROUND_OFF = "round-off: the elements hold a parabola and a linear head"
 
 
 @cache
-def _plug():
+def plug():
     """A channel with biomass from wall to wall for |x| < 20."""
     return curved(meshes.channel(ENDS, WIDTH, 8.0, lambda x, y: np.abs(x) < 20, across=(-20.0, 20.0), seed=3), None)
 
 
-def _drive(ratio: float):
+def drive(ratio: float):
     """A mean velocity, as a scene gives it."""
     return parse_scene({"flow": {"mean_velocity": "2.9 m/day", "viscosity_ratio": ratio}}, "drive", "drive.toml").flow
 
@@ -35,13 +35,13 @@ def _drive(ratio: float):
             "node and the loss (6) of each part, on any mesh; the work of the inlet is that loss",
       mutants=("curved-viscosity-swapped", "curved-loss-per-width", "curved-inlet-parabola", "curved-whole-pore-twice"))
 def channels() -> Outcome:
-    grid, checks = _plug(), []
+    grid, checks = plug(), []
     for ratio in (1.0, 2000.0):
-        drive = _drive(ratio)
-        found = flow.solve(grid, drive, LENGTH)
-        u = poiseuille.velocity(grid.points[:, 1], WIDTH, drive.mean_velocity)
-        nu, part = drive.kinematic_viscosity / drive.gravity, ENDS[1] - ENDS[0]
-        lost = [poiseuille.head_loss(a, WIDTH, drive.mean_velocity, nu) for a in (part - 40, 40 * ratio, LENGTH - part)]
+        given = drive(ratio)
+        found = flow.solve(grid, given, LENGTH)
+        u = poiseuille.velocity(grid.points[:, 1], WIDTH, given.mean_velocity)
+        nu, part = given.kinematic_viscosity / given.gravity, ENDS[1] - ENDS[0]
+        lost = [poiseuille.head_loss(a, WIDTH, given.mean_velocity, nu) for a in (part - 40, 40 * ratio, LENGTH - part)]
         ends = found.head[grid.inlet[::2]].mean() - found.head[grid.outlet[::2]].mean()
         told = f"lambda = {ratio:g}"
         checks += [at_most(f"u_x, {told}", np.abs(found.velocity[:, 0] - u).max() / u.max(), 1e-10, ROUND_OFF),

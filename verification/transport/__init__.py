@@ -5,6 +5,7 @@ Where a reference has one dimension, the pore is a narrow channel, meshed at ran
 
 from verification.transport import (
     closed_forms,
+    cubic,
     curved,
     manufactured,
     monod_channel,
@@ -14,5 +15,5 @@ from verification.transport import (
     well_mixed,
 )
 
-__all__ = ["closed_forms", "curved", "manufactured", "monod_channel", "properties", "still_water", "transients",
+__all__ = ["closed_forms", "cubic", "curved", "manufactured", "monod_channel", "properties", "still_water", "transients",
            "well_mixed"]

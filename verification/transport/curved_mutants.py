@@ -6,8 +6,8 @@ TRANSPORT = "repro/curved/transport.py"
 CURVED = (
     Mutant("curved-outlet-forgotten", TRANSPORT,
            says="What flows out through the outlet is left out of the weak form.",
-           old="carried[ends[0]] += blocks",
-           new="carried[ends[0]] += 0 * blocks"),
+           old="carried[owner] += blocks",
+           new="carried[owner] += 0 * blocks"),
     Mutant("curved-fluid-diffusivity", TRANSPORT,
            says="Substrates diffuse in the biomass as in water.",
            old="np.where(mesh.biomass, s.diffusivity_in_aggregate, s.diffusivity)",
@@ -24,4 +24,12 @@ CURVED = (
            says="Elements are not made smaller for concentration boundary layers.",
            old="BOUNDARY_LAYER = 0.15",
            new="BOUNDARY_LAYER = 0.0"),
+    Mutant("cubic-outlet-order", "repro/curved/fields.py",
+           says="The two inner nodes of an edge at an end are exchanged.",
+           old="np.column_stack([a, *thirds(a, middle, b), b])",
+           new="np.column_stack([a, *thirds(b, middle, a), b])"),
+    Mutant("cubic-quadratic-uptake", TRANSPORT,
+           says="The biomass is taken where the concentrations' first six functions have it.",
+           old="density = active[problem.mesh.cells[biomass]] @ here.of.shape.T",
+           new="density = active[problem.mesh.cells[biomass]] @ here.of.values[:, :6].T"),
 )
