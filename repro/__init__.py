@@ -14,7 +14,8 @@ Where the paper is in the code:
     3.4  reprojection         (30)-(34)   repro.reprojection
     3.5  mesh motion          (35)        repro.mesh_motion, repro.remeshing
     Table 1                               repro.scene, repro.scenes
-    all of it on quadratic curved triangles: repro.curved, with modules of the same names
+    all of it on curved triangles         repro.curved, with modules of the same names; repro.curved.fields has the
+                                          order of velocity and substrates: quadratic or cubic
 
 and what is around it:
 

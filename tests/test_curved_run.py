@@ -10,7 +10,7 @@ from repro.curved import coupling, elements
 from repro.curved import growth as mechanics
 from repro.curved import results as curved_results
 from repro.kinetics import growth_rate, inert_rate
-from repro.rules import QUADRATIC
+from repro.rules import CURVED
 from repro.scene import PRESETS, Numerics, load_scene, parse_scene, scene_tables
 from repro.units import SceneError
 from tests.strategies import scene
@@ -165,9 +165,9 @@ def test_a_written_scene_is_read_as_the_same(preset):
 @pytest.mark.parametrize("key, other", [("time", "updates"), ("transport", "gear"), ("transfer", "linear"),
                                         ("interface", "traction"), ("inlet", "mean"), ("fixed_point", "rechosen")])
 def test_what_curved_triangles_cannot_do_is_refused(key, other):
-    """By the key's name, with what there is. Mutant: a row of QUADRATIC left out (it would run as if not written)."""
-    assert key in QUADRATIC
-    with pytest.raises(SceneError, match=rf'numerics.{key}.*"{QUADRATIC[key]}" is needed with numerics.elements'):
+    """By the key's name, with what there is. Mutant: a row of CURVED left out (it would run as if not written)."""
+    assert key in CURVED
+    with pytest.raises(SceneError, match=rf'numerics.{key}.*"{CURVED[key]}" is needed with numerics.elements'):
         numerics(preset="fast", **{key: other})
 
 

@@ -28,6 +28,7 @@ SCENES = {
 MORE = {
     "paper": ('growth.end="6 h"',),
     "accurate": ('numerics.preset="accurate"', 'growth.end="4 h"'),
+    "cubic": ('numerics.preset="fast"', 'numerics.elements="cubic"', "numerics.tolerance=0.0005", 'growth.end="4 h"'),
     "contact": CONTACT,
     "stress-free": ('growth.new_biomass="stress_free"', *CONTACT),
     "linear midpoint": ('numerics.time="midpoint"', "numerics.tolerance=0.0001", 'numerics.transfer="linear"',

@@ -22,7 +22,7 @@ DEGREES = {2: (elements.DEGREE, 6), 3: (8, 9)}
 
 
 def cubic_functions(where: np.ndarray) -> np.ndarray:
-    """(q, 10) at points (q, 2) of the unit triangle: corners, then both nodes of the edges 01, 12, 20, then the centre."""
+    """(q, 10) at points (q, 2) of the unit triangle: corners, both nodes of the edges 01, 12, 20, centre."""
     L = elements.linear_functions(where)
     M = L[:, elements.NEXT]
     edges = 4.5 * L * M

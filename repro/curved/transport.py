@@ -139,10 +139,11 @@ def _owners(mesh: CurvedMesh) -> np.ndarray:
 def steady(problem: Problem, active: np.ndarray | None, guess: Concentrations | None = None) -> Concentrations:
     """Steady concentrations by Newton's method on both substrates at once.
 
-    active: X_A (N,) mg/L at the mesh's nodes, None without biomass; guess: at the problem's. Where it does not converge, as behind a sharp front, it starts again
-    from the supply with shorter steps, and half saturations come down from the supply to what they are, a tenth at a
-    time. Raises TransportError where that fails too, or where a concentration is outside of zero to the supply by more
-    than UNRESOLVED and OVERSHOOT say: the mesh is too coarse for its front.
+    active: X_A (N,) mg/L at the mesh's nodes, None without biomass; guess: at the problem's. Where it does not
+    converge, as behind a sharp front, it starts again from the supply with shorter steps, and half saturations come
+    down from the supply to what they are, a tenth at a time. Raises TransportError where that fails too, or where a
+    concentration is outside of zero to the supply by more than UNRESOLVED and OVERSHOOT say: the mesh is too coarse
+    for its front.
     """
     count = problem.space.count
     supply = np.repeat([s.supply for s in problem.both], count)

@@ -33,13 +33,16 @@ EXPECTED = {2: (3, 2, 3e-5, 1e-3), 3: (4, 3, 1e-6, 1e-4)}
 def manufactured() -> Outcome:
     studies = []
     for order, (u, p, least_u, least_p) in EXPECTED.items():
-        errors = refine(lambda level: grids.root_mean_square(
-            lambda draw: _errors(level, draw, order), DRAWS[level]), range(len(SIZES)))
+        errors = refine(_mean, range(len(SIZES)), order)
         studies += [study(f"velocity, order {order}", SIZES, errors["velocity"], u, "one more than the elements",
                           ceiling=least_u),
                     Study(f"pressure, order {order}", np.array(SIZES), errors["pressure"], p - 0.3, p + 1.3,
                           "that of the velocity's gradient; one more while the velocity's error rules", least_p)]
     return Outcome(studies=tuple(studies))
+
+
+def _mean(level: int, order: int) -> dict[str, float]:
+    return grids.root_mean_square(lambda draw: _errors(level, draw, order), DRAWS[level])
 
 
 def _turned(points: np.ndarray) -> np.ndarray:

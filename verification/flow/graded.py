@@ -7,6 +7,7 @@ from repro.curved import pore
 from repro.scene import parse_scene
 from verification.case import Outcome, at_most, case
 
+
 @case("flow-graded", kind="property",
       norm="relative difference of the loss; nodes over those of graded sizes; largest over least edge",
       claim="With one element size everywhere the loss of a half-disc is that of sizes which grow with the distance "
@@ -24,7 +25,7 @@ def graded() -> Outcome:
 
 def _half_disc(preset: str, gradation: float) -> tuple[float, int]:
     """Loss of the pore and nodes of its mesh."""
-    tables = {"pore": {"width": f"50 um"}, "aggregate": {"radius": "10 um"},
+    tables = {"pore": {"width": "50 um"}, "aggregate": {"radius": "10 um"},
               "flow": {"mean_velocity": "2.9 m/day"}, "numerics": {"preset": preset, "gradation": gradation}}
     scene = parse_scene(tables, "half disc", "half_disc.toml")
     stage = pore if preset == "accurate" else linear_pore

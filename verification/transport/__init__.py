@@ -15,5 +15,5 @@ from verification.transport import (
     well_mixed,
 )
 
-__all__ = ["closed_forms", "cubic", "curved", "manufactured", "monod_channel", "properties", "still_water", "transients",
-           "well_mixed"]
+__all__ = ["closed_forms", "cubic", "curved", "manufactured", "monod_channel", "properties", "still_water",
+           "transients", "well_mixed"]
