@@ -74,11 +74,11 @@ def measure(preset: str, count: int) -> float:
         rate = swept(preset, count, Path(folder))
         after = single(preset, 5, Path(folder))
         control = bare(preset, max(count // cores(), 1))
-    one = (before + after) / 2
+    one = cores() * (before + after) / 2
     print(f"{preset}, {cores()} cores; single {before:.3f} and {after:.3f} runs/s (before, after); sweep of {count} "
-          f"{rate:.3f}; bare processes {control:.3f}; sweep {rate / (cores() * one):.3f}, bare {control / (cores() * one):.3f} "
-          f"times cores times single; sweep over bare {rate / control:.3f}", flush=True)
-    return rate / (cores() * one)
+          f"{rate:.3f}; bare processes {control:.3f}; sweep {rate / one:.3f}, bare {control / one:.3f} times cores "
+          f"times single; sweep over bare {rate / control:.3f}", flush=True)
+    return rate / one
 
 
 def main(arguments: list[str] | None = None) -> int:
