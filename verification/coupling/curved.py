@@ -147,7 +147,7 @@ def presets() -> Outcome:
 
 @case("coupling-cubic", kind="cross-code", slow=True, norm="as coupling-presets",
       claim="With cubic velocities and concentrations each of the eight numbers of base is within 0.1 % too",
-      mutants=("cubic-shown-elsewhere",))
+      mutants=("cubic-shown-less",))
 def cubic() -> Outcome:
     apart = _apart(_listed("accurate", 'numerics.elements="cubic"'), _reference()[0])
     return Outcome(tuple(at_most(name, value, 1e-3, "what the preset is for")

@@ -24,8 +24,8 @@ CURVED = (
            says="Every step of Newton's method factorises its derivative anew, whatever the scene says.",
            old="not self.reused or defect > ENOUGH * last",
            new="defect >= 0"),
-    Mutant("cubic-shown-elsewhere", "repro/curved/fields.py",
-           says="The biomass sees cubic concentrations of places a third nearer to a triangle's first corner.",
+    Mutant("cubic-shown-less", "repro/curved/fields.py",
+           says="The biomass sees one percent less of cubic concentrations than there is.",
            old="DOWN, UP = cubic_functions(elements.NODES)",
-           new="DOWN, UP = cubic_functions(elements.NODES * 2 / 3)"),
+           new="DOWN, UP = 0.99 * cubic_functions(elements.NODES)"),
 )
