@@ -10,6 +10,7 @@ from verification.bench import size
 from verification.bench.envelope import envelope
 
 MARKS = "os^vDP*X<>hd"
+COLORS = (*(f"C{k}" for k in range(10)), "black", "navy", "darkgreen", "darkred")
 
 
 def draw(parts: dict, folder: Path) -> list[Path]:
@@ -36,7 +37,7 @@ def _precision(pyplot, part: dict):
         if not points:
             axis.plot([], [], " ", label=label)
             continue
-        color, mark = f"C{k % 10}", MARKS[k % len(MARKS)]
+        color, mark = COLORS[k % len(COLORS)], MARKS[k % len(MARKS)]
         axis.loglog([p["seconds"] for p in points], [p["error"] for p in points], mark, ms=4, color=color, alpha=0.6)
         best = envelope(points)
         axis.loglog([p["seconds"] for p in best], [p["error"] for p in best], f"-{mark}", ms=4, color=color,
