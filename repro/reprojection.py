@@ -80,10 +80,12 @@ def supermesh(points, triangles, new_points, new_triangles) -> tuple[np.ndarray,
 
 
 def clip(polygons: np.ndarray, windows: np.ndarray) -> np.ndarray:
-    """Convex polygons (p, k, 2) cut to counterclockwise triangles (p, 3, 2), pair by pair: (p, k + 3, 2).
+    """Convex polygons (p, k, 2) cut to counterclockwise triangles (p, 3, 2), pair by pair: (p, m, 2) of as many corners
+    as the largest has, three at least.
 
     Sutherland and Hodgman's algorithm: each side of the window in turn keeps what is to its left. Polygons with fewer
-    corners repeat one of them, empty ones are a single point.
+    corners repeat one of them, empty ones are a single point. m is k + 3 at most but where round-off has corners on a
+    line of the window change sides more than twice.
     """
     for side in range(3):
         start, along = windows[:, side, None], windows[:, (side + 1) % 3, None] - windows[:, side, None]
@@ -94,14 +96,15 @@ def clip(polygons: np.ndarray, windows: np.ndarray) -> np.ndarray:
         crossing = polygons + part[..., None] * (after - polygons)
         both = np.stack([polygons, crossing], axis=2).reshape(len(polygons), -1, 2)
         kept = np.stack([depth >= 0, crosses], axis=2).reshape(len(polygons), -1)
-        polygons = _packed(both, kept, polygons.shape[1] + 1)
+        polygons = _packed(both, kept)
     return polygons
 
 
-def _packed(points: np.ndarray, kept: np.ndarray, room: int) -> np.ndarray:
+def _packed(points: np.ndarray, kept: np.ndarray) -> np.ndarray:
     """The kept points (p, k, 2) moved to the front, in order, and the first of them repeated behind: (p, room, 2)."""
-    front = np.argsort(~kept, axis=1, kind="stable")[:, :room]
     count = kept.sum(axis=1)[:, None]
+    room = max(3, int(count.max(initial=0)))
+    front = np.argsort(~kept, axis=1, kind="stable")[:, :room]
     chosen = np.where(np.arange(room) < count, front, front[:, :1])
     return np.take_along_axis(points, chosen[..., None], axis=1)
 

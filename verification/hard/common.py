@@ -13,6 +13,7 @@ from repro.coupling import Instant, PoreEnd
 from repro.curved import coupling as curved_coupling
 from repro.curved import pore as curved_pore
 from repro.curved import transport as curved_transport
+from repro.pore import peclet
 from repro.results import row
 from repro.scene import Scene, load_scene
 from repro.simulation import simulate
@@ -27,7 +28,7 @@ PROMISED = {"paper": "linear triangles: 1 to 4 % in the head loss",
 #: Bounds of concentrations over the supply that the stages document (UNRESOLVED, OVERSHOOT).
 LOWEST, HIGHEST = -1e-4, 1.02
 BALANCE = 1e-9
-NEWTON = "Newton's tolerance of 1e-12 a row, times the rows, a thousand at least"
+NEWTON = "Newton's tolerance of 1e-12 a row, times the rows, a thousand at least, over Peclet's number where under one"
 FIXED = ('growth.end="0 h"',)
 
 
@@ -187,10 +188,16 @@ def _balances(found: Run) -> list[Check]:
         return []
     most, origin = found.balance, "the flux is as much smaller than what diffuses"
     if found.balance == BALANCE:
-        most, origin = max(BALANCE, 1e-12 * found.last["nodes"]), NEWTON
+        most, origin = max(BALANCE, 1e-12 * found.last["nodes"] / _slow(found)), NEWTON
     missing = {name: max(abs(line[f"{name}_balance"]) for line in found.rows) for name in ("acceptor", "donor")}
     return [at_most(f"{name} in - out - consumed, over the larger", value, most, origin)
             for name, value in missing.items()]
+
+
+def _slow(found: Run) -> float:
+    """What flows over what diffuses, u W / D, one at most: Newton's tolerance is of the larger."""
+    speed = found.last.get("mean_velocity_m_per_d", 0.0) / 24e-6
+    return min(1.0, peclet(found.scene, speed)) if speed else 1.0
 
 
 def _bounds(found: Run) -> list[Check]:
