@@ -196,7 +196,7 @@ def _balances(found: Run) -> list[Check]:
 
 def _slow(found: Run) -> float:
     """What flows over what diffuses, u W / D, one at most: Newton's tolerance is of the larger."""
-    speed = found.last.get("mean_velocity_m_per_d", 0.0) / 24e-6
+    speed = (found.last.get("mean_velocity_m_per_d") or 0.0) / 24e-6
     return min(1.0, peclet(found.scene, speed)) if speed else 1.0
 
 
