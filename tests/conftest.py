@@ -7,12 +7,32 @@ import numpy
 import pytest
 from hypothesis import HealthCheck, settings
 
+from tests import pages
+
 matplotlib.use("Agg")
 SLOW_MACHINES_MAY = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
 settings.register_profile("ci", derandomize=True, max_examples=20, **SLOW_MACHINES_MAY)
 settings.register_profile("thorough", print_blob=True, max_examples=200, **SLOW_MACHINES_MAY)
 signal.signal(signal.SIGINT, signal.default_int_handler)  # in the background it is ignored, by children too
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
+
+
+@pytest.fixture(scope="module")
+def fast(tmp_path_factory):
+    """The folder of a run of base in preset fast, for pages."""
+    return pages.run(tmp_path_factory.mktemp("fast"), "base", pages.FAST, 'growth.end="3 h"')
+
+
+@pytest.fixture(scope="module")
+def paper(tmp_path_factory):
+    """The same of the paper's scheme."""
+    return pages.run(tmp_path_factory.mktemp("paper"), "base", 'growth.end="1 h"')
+
+
+@pytest.fixture(scope="module")
+def flow_only(tmp_path_factory):
+    """The same of flow without an aggregate's growth."""
+    return pages.run(tmp_path_factory.mktemp("flow"), "flow_only")
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -12,22 +12,7 @@ from repro import results
 from repro.cli import main
 from repro.report import comparison, quantities
 from repro.report.reading import read
-from tests.pages import FAST, Page, run
-
-
-@pytest.fixture(scope="module")
-def fast(tmp_path_factory):
-    return run(tmp_path_factory.mktemp("fast"), "base", FAST, 'growth.end="3 h"')
-
-
-@pytest.fixture(scope="module")
-def paper(tmp_path_factory):
-    return run(tmp_path_factory.mktemp("paper"), "base", 'growth.end="1 h"')
-
-
-@pytest.fixture(scope="module")
-def flow_only(tmp_path_factory):
-    return run(tmp_path_factory.mktemp("flow"), "flow_only")
+from tests.pages import Page
 
 
 @pytest.fixture

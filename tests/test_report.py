@@ -17,21 +17,6 @@ from repro.report.reading import NoRun, read
 from tests.pages import FAST, HOSTILE, Page, hostile, numbers, run, stored, text_of
 
 
-@pytest.fixture(scope="module")
-def fast(tmp_path_factory):
-    return run(tmp_path_factory.mktemp("fast"), "base", FAST, 'growth.end="3 h"')
-
-
-@pytest.fixture(scope="module")
-def paper(tmp_path_factory):
-    return run(tmp_path_factory.mktemp("paper"), "base", 'growth.end="1 h"')
-
-
-@pytest.fixture(scope="module")
-def flow_only(tmp_path_factory):
-    return run(tmp_path_factory.mktemp("flow"), "flow_only")
-
-
 def test_every_run_has_a_page_that_needs_nothing_else(fast, paper, flow_only):
     """Mutants: an image or style sheet from elsewhere, an unclosed tag, a style that the policy stops."""
     for out in (fast, paper, flow_only):
