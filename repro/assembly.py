@@ -6,13 +6,19 @@ elimination order and the place of every element entry in the sparse matrix stay
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
 
 from repro import linear
+
+
+#: Of one kind of element, or of several.
+Parts: TypeAlias = np.ndarray | tuple[np.ndarray, ...]
 
 
 def local(form, trial, test=None, **parameters) -> np.ndarray:
@@ -34,18 +40,21 @@ def mass(areas: np.ndarray) -> np.ndarray:
 
 def two_components(elements: np.ndarray) -> np.ndarray:
     """(T, 2a, 2a): the same element matrices (T, a, a) for x and for y."""
-    zero = np.zeros_like(elements)
-    return np.block([[elements, zero], [zero, elements]])
+    a = elements.shape[1]
+    found = np.zeros((len(elements), 2 * a, 2 * a))
+    found[:, :a, :a] = found[:, a:, a:] = elements
+    return found
 
 
 class ElementSystem:
     """K x = b with some unknowns prescribed, K summed from element matrices.
 
-    unknowns: (T, k) numbers of each element's unknowns; rank: (n,) sorting key of the unknowns in elimination order;
-    held: (n,) True where the unknown is prescribed.
+    unknowns: (T, k) numbers of each element's unknowns, or several of these, one for each kind of element; rank: (n,)
+    sorting key of the unknowns in elimination order; held: (n,) True where the unknown is prescribed. Wherever element
+    matrices (T, k, k) are asked for, they are as many as the kinds.
     """
 
-    def __init__(self, unknowns: np.ndarray, rank: np.ndarray, held: np.ndarray):
+    def __init__(self, unknowns: Parts, rank: np.ndarray, held: np.ndarray):
         self.unknowns = unknowns
         self._ranked = np.argsort(rank, kind="stable")
         place = np.empty(len(rank), int)
@@ -73,44 +82,59 @@ class ElementSystem:
                                       shape=(self.count, self.count))
         self._pattern.has_canonical_format = True  # what is filled in is not looked through again
 
-    def matrix(self, elements: np.ndarray) -> sp.csc_matrix:
-        """K between the free unknowns, in elimination order, from element matrices (T, k, k)."""
+    def matrix(self, elements: Parts) -> sp.csc_matrix:
+        """K between the free unknowns, in elimination order."""
         found = copy(self._pattern)
-        found.data = np.bincount(self._slot, elements.ravel(), len(self._rows))[self._kept]
+        found.data = np.bincount(self._slot, _flat(_several(elements)), len(self._rows))[self._kept]
         return found
 
-    def factored(self, elements: np.ndarray) -> Factored:
-        """K from element matrices (T, k, k), factorised."""
+    def product(self, elements: Parts, x: np.ndarray) -> np.ndarray:
+        """(n,) K x for all unknowns x (n,)."""
+        kinds = _several(self.unknowns)
+        parts = [K @ x[unknowns][:, :, None] for K, unknowns in zip(_several(elements), kinds, strict=True)]
+        return np.bincount(_flat(kinds), _flat(parts), len(x))
+
+    def factored(self, elements: Parts) -> Factored:
+        """K, factorised."""
         return Factored(self, elements, linear.factorised(self.matrix(elements)))
 
-    def solve(self, elements: np.ndarray, right: np.ndarray, value: np.ndarray) -> np.ndarray:
-        """x (n,) with the prescribed unknowns as in ``value`` (n,), for element matrices (T, k, k) and b (n,)."""
+    def solve(self, elements: Parts, right: np.ndarray, value: np.ndarray) -> np.ndarray:
+        """x (n,) of K x = b (n,) with the prescribed unknowns as in ``value`` (n,)."""
         return self.factored(elements).solve(right, value)
 
 
 @dataclass(frozen=True, eq=False)
 class Factored:
-    """K of a system, from element matrices (T, k, k), with its factors."""
+    """K of a system, from its element matrices, with its factors."""
 
     system: ElementSystem
-    elements: np.ndarray
+    elements: Parts
     solver: linear.Solver
 
     def solve(self, right: np.ndarray, value: np.ndarray) -> np.ndarray:
         """x (n,) of K x = b (n,) with the prescribed unknowns as in ``value`` (n,)."""
-        unknowns, order = self.system.unknowns, self.system.order
-        known = np.where(self.system.held, value, 0.0)
+        order, known = self.system.order, np.where(self.system.held, value, 0.0)
         if known.any():
-            moved = (self.elements @ known[unknowns][:, :, None])[:, :, 0]
-            right = right - np.bincount(unknowns.ravel(), moved.ravel(), len(value))
+            right = right - self.system.product(self.elements, known)
         known[order] = self.solver.solve(right[order])
         return known
 
 
-def _pairs(unknowns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _several(parts: Parts) -> tuple[np.ndarray, ...]:
+    """Of each kind of element."""
+    return parts if isinstance(parts, tuple) else (parts,)
+
+
+def _flat(parts: Sequence[np.ndarray]) -> np.ndarray:
+    """One after the other, flattened."""
+    return parts[0].ravel() if len(parts) == 1 else np.concatenate([part.ravel() for part in parts])
+
+
+def _pairs(unknowns: Parts) -> tuple[np.ndarray, np.ndarray]:
     """Row and column unknown of every entry of element matrices (T, k, k), flattened."""
-    k = unknowns.shape[1]
-    return np.repeat(unknowns, k, axis=1).ravel(), np.tile(unknowns, (1, k)).ravel()
+    kinds = _several(unknowns)
+    return (_flat([np.repeat(kind, kind.shape[1], axis=1) for kind in kinds]),
+            _flat([np.tile(kind, (1, kind.shape[1])) for kind in kinds]))
 
 
 def saddle_blocks(upper, divergence, lower) -> np.ndarray:

@@ -52,7 +52,7 @@ def test_matrices_are_those_of_scikit_fem(grid, theirs):
     """Stiffness, mass with a coefficient that varies, load and areas, on curved triangles. Mutants: the inverse of the
     Jacobian transposed, the middles in the order 12, 20, 01, weights without the determinant."""
     at = grid.places
-    assert same(elements.stiffness(np.ones(len(grid.cells)), at), local(stiffness, theirs))
+    assert same(elements.stiffness(at), local(stiffness, theirs))
     x = elements.at_points(grid.points[:, 0], grid.cells)
     assert same(space(grid, 2).mass(x * at.dx), local(mass, theirs))
     load = LinearForm(lambda v, w: v).coo_data(theirs).data.reshape(6, -1).T
@@ -64,7 +64,7 @@ def test_matrices_are_those_of_scikit_fem(grid, theirs):
 def test_the_divergence_is_that_of_scikit_fem(grid, theirs, axis):
     """(q, u_,i) for linear q and quadratic u. Mutant: SLOPES of the wrong function."""
     form = BilinearForm(lambda u, q, w: u.grad[axis] * q)
-    ours = elements.LINEAR.T @ (grid.places.dx[:, :, None] * grid.places.grad[..., axis])
+    ours = elements.LINEAR.T @ (grid.places.dx[:, :, None] * grid.places.slopes[:, :, axis])
     assert same(ours, local(form, theirs, theirs.with_element(ElementTriP1())))
 
 
@@ -96,8 +96,8 @@ def test_nodal_functions():
 def test_places_elsewhere_than_in_the_quadrature(grid):
     """With the derivatives at the nodes, gradients of x and y are the unit vectors there. Mutant: slopes of the
     quadrature's points used all the same."""
-    at = elements.places(grid.points[grid.cells], elements.AT_NODES)
-    unit = np.swapaxes(at.grad, 2, 3) @ grid.points[grid.cells][:, None]
+    at = elements.places(grid.points[grid.cells], elements.AT_NODES, elements.AT_NODES, np.ones(6))
+    unit = at.slopes @ grid.points[grid.cells][:, None]
     assert at.dx.shape == (len(grid.cells), 6) and np.allclose(unit, np.eye(2), atol=1e-12)
 
 

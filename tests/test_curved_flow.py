@@ -2,6 +2,7 @@
 import numpy as np
 import pytest
 
+from repro.assembly import each
 from repro.curved import elements, flow, pore
 from repro.flow import poiseuille_loss
 from tests.strategies import scene
@@ -28,7 +29,7 @@ def test_water_is_conserved_in_every_linear_mean():
     """(q, div u) = 0 for each corner's function. Mutant: the divergence of one component."""
     _, grid = around()
     velocity, _, _ = flow.unit_flow(grid, 2000.0)
-    div = np.einsum("tqai,tai->tq", grid.places.grad, velocity[grid.cells])
+    div = np.einsum("tqia,tai->tq", grid.places.slopes, velocity[grid.cells])
     local = (grid.places.dx * div) @ elements.LINEAR
     total = np.bincount(grid.cells[:, :3].ravel(), local.ravel())
     size = np.bincount(grid.cells[:, :3].ravel(), ((grid.places.dx * np.abs(div)) @ elements.LINEAR).ravel())
@@ -41,8 +42,7 @@ def test_the_loss_is_the_work_of_the_inlet(ratio):
     pressure of the inlet, work over the flux twice."""
     _, grid = around()
     velocity, _, loss = flow.unit_flow(grid, ratio)
-    viscosity = np.where(grid.biomass, ratio, 1.0)
-    K = elements.stiffness(viscosity, grid.places)
+    K = each(np.where(grid.biomass, ratio, 1.0), elements.stiffness(grid.places))
     work = sum(np.einsum("ta,tab,tb->", u, K, u) for u in (velocity[grid.cells, k] for k in (0, 1)))
     assert loss * 50.0 == pytest.approx(work, rel=1e-9)
     assert loss >= poiseuille_loss(grid.ends[1] - grid.ends[0], 50.0) * (1 - 1e-9)

@@ -139,14 +139,12 @@ def test_the_tangent_is_the_derivative_of_the_balance(held):
     that is not the derivative, slopes of the two substrates exchanged."""
     made = thick(None if held else "2.9 m/day")
     now, found = solved(made)
-    active, random = pore.active_biomass(made, now), np.random.default_rng(1)
+    weight, random = transport.sinks(found.problem, pore.active_biomass(made, now)), np.random.default_rng(1)
     state = 1 + 8 * random.random(2 * len(now.mesh.points))
     move = random.standard_normal(len(state))
-    start, _ = transport._balance(found.problem, active, state)
-    tangent = transport._tangent(found.problem, active, state)
-    unknowns = found.problem.system.unknowns
-    linear = np.bincount(unknowns.ravel(), np.einsum("tij,tj->ti", tangent, move[unknowns]).ravel())
-    left = [np.abs(transport._balance(found.problem, active, state + s * move)[0] - start - s * linear).max()
+    start, _ = transport.balance(found.problem, weight, state)
+    linear = found.problem.system.product(transport.tangent(found.problem, weight, state), move)
+    left = [np.abs(transport.balance(found.problem, weight, state + s * move)[0] - start - s * linear).max()
             for s in (0.02, 0.01, 0.005)]
     assert all(3.6 < a / b < 4.4 for a, b in zip(left, left[1:]))
 

@@ -65,39 +65,38 @@ def determinant(matrix: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """dx: (T, q) um2, weights of the integral; grad: (T, q, k, 2) gradients of k nodal functions, 1/um."""
+    """dx: (T, q) um2, weights of the integral; slopes: (T, q, 2, k) derivatives of k nodal functions by x and by y,
+    1/um."""
 
     dx: np.ndarray
-    grad: np.ndarray
+    slopes: np.ndarray
+
+    @property
+    def rows(self) -> np.ndarray:
+        """(T, 2 q, k) the same slopes, one row for each point and direction."""
+        return self.slopes.reshape(len(self.dx), -1, self.slopes.shape[3])
 
 
-def places(nodes: np.ndarray, slopes: np.ndarray = DERIVATIVES) -> Places:
-    """Weights and gradients for triangles with nodes (T, 6, 2) um, none of them turned over; where the derivatives
-    ``slopes`` (q, 6, 2) are taken, in the points of the quadrature by default."""
-    J = jacobian(nodes, slopes)
-    det = determinant(J)
-    weight = WEIGHTS if len(slopes) == len(WEIGHTS) else np.full(len(slopes), 0.5 / len(slopes))
-    scaled = J / det[..., None, None]
-    return Places(det * weight, turned(slopes, scaled))
+def places(nodes: np.ndarray, bends: np.ndarray = DERIVATIVES, slopes: np.ndarray = DERIVATIVES,
+           weights: np.ndarray = WEIGHTS) -> Places:
+    """Weights and slopes on triangles with nodes (T, 6, 2) um, none of them turned over.
 
-
-def turned(slopes: np.ndarray, J: np.ndarray) -> np.ndarray:
-    """(T, q, k, 2) derivatives by x and y from those by s and t (q, k, 2), with J / det J (T, q, 2, 2).
-
-    In memory x and y come before the functions, as the products of matrices want them.
+    bends: (q, 6, 2) derivatives of the places' functions by s and t, slopes: (q, k, 2) of the fields', weights: (q,) of
+    the points where they are taken; by default quadratic both, in the quadrature.
     """
+    J = jacobian(nodes, bends)
+    det = determinant(J)
+    scaled = J / det[..., None, None]
     by_s, by_t = slopes[..., 0], slopes[..., 1]
-    found = np.empty((len(J), len(slopes), 2, slopes.shape[1]))
-    found[:, :, 0] = by_s * J[..., 1, 1, None] - by_t * J[..., 1, 0, None]
-    found[:, :, 1] = by_t * J[..., 0, 0, None] - by_s * J[..., 0, 1, None]
-    return np.swapaxes(found, 2, 3)
+    found = np.empty((*det.shape, 2, slopes.shape[1]))
+    found[:, :, 0] = by_s * scaled[..., 1, 1, None] - by_t * scaled[..., 1, 0, None]
+    found[:, :, 1] = by_t * scaled[..., 0, 0, None] - by_s * scaled[..., 0, 1, None]
+    return Places(det * weights, found)
 
 
-def stiffness(coefficient: np.ndarray, at: Places) -> np.ndarray:
-    """(T, k, k) of (c grad u, grad v), c: (T,)."""
-    slopes = np.swapaxes(at.grad, 2, 3).reshape(len(at.dx), -1, at.grad.shape[2])
-    weight = np.repeat(coefficient[:, None] * at.dx, 2, axis=1)
-    return np.swapaxes(slopes, 1, 2) @ (weight[:, :, None] * slopes)
+def stiffness(at: Places) -> np.ndarray:
+    """(T, k, k) of (grad u, grad v)."""
+    return np.swapaxes(at.rows, 1, 2) @ (np.repeat(at.dx, 2, axis=1)[:, :, None] * at.rows)
 
 
 def load(coefficient: np.ndarray) -> np.ndarray:

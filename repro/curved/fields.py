@@ -115,14 +115,23 @@ class Space:
         """(T, h) nodes of the head."""
         return self.mesh.cells if self.cubic else self.mesh.cells[:, :3]
 
-    @cached_property
+    @property
     def at(self) -> elements.Places:
-        """Weights and gradients on every triangle."""
+        """Weights and slopes on every triangle."""
         if not self.cubic:
             return self.mesh.places
-        J = elements.jacobian(self.mesh.points[self.mesh.cells], self.of.bends)
-        det = elements.determinant(J)
-        return elements.Places(det * self.of.weights, elements.turned(self.of.slopes, J / det[..., None, None]))
+        rule = self.of.bends, self.of.slopes, self.of.weights
+        return self.mesh.here("cubic places", lambda: elements.places(self.mesh.points[self.mesh.cells], *rule))
+
+    @property
+    def stiffness(self) -> np.ndarray:
+        """(T, k, k) of (grad u, grad v)."""
+        return self.mesh.here(("stiffness", self.cubic), lambda: elements.stiffness(self.at))
+
+    @property
+    def biomass_cells(self) -> np.ndarray:
+        """(t, k) nodes of the biomass triangles."""
+        return self.mesh.once(("biomass cells", self.cubic), lambda: self.cells[self.mesh.biomass])
 
     @cached_property
     def points(self) -> np.ndarray:
@@ -146,16 +155,16 @@ class Space:
         return found
 
     def at_points(self, values: np.ndarray, cells: np.ndarray) -> np.ndarray:
-        """(t, q) a field (count,) in the points of the quadrature of triangles with nodes (t, k)."""
-        return values[cells] @ self.of.values.T
+        """(..., t, q) fields (..., count) in the points of the quadrature of triangles with nodes (t, k)."""
+        return values[..., cells] @ self.of.values.T
 
     def mass(self, coefficient: np.ndarray) -> np.ndarray:
-        """(t, k, k) of (c u, v) with c dx (t, q)."""
+        """(..., t, k, k) of (c u, v) with c dx (..., t, q)."""
         k = self.cells.shape[1]
-        return (coefficient @ self.of.products).reshape(-1, k, k)
+        return (coefficient @ self.of.products).reshape(*coefficient.shape[:-1], k, k)
 
     def load(self, coefficient: np.ndarray) -> np.ndarray:
-        """(t, k) of (c, v) with c dx (t, q)."""
+        """(..., t, k) of (c, v) with c dx (..., t, q)."""
         return coefficient @ self.of.values
 
     def end_nodes(self, edges: np.ndarray) -> np.ndarray:

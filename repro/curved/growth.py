@@ -86,25 +86,33 @@ class System:
         self.body, self.sparse = body, body.sparse
         self.at = body.places
         self.unknowns, self.free = self.sparse.unknowns, ~self.sparse.held
+        self._last = None, None, None
 
-    def deformation(self, position: np.ndarray) -> np.ndarray:
-        """(t, q, 2, 2) F[i, K] = d x_i / d X_K."""
-        return np.swapaxes(position[self.body.cells], 1, 2)[:, None] @ self.at.grad
+    def deformed(self, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """F[i, K] = d x_i / d X_K (t, q, 2, 2) and J (t, q), kept until another position is asked for."""
+        if self._last[0] is not position:
+            slopes = self.at.rows @ position[self.body.cells]
+            F = np.ascontiguousarray(np.swapaxes(slopes.reshape(*self.at.dx.shape, 2, 2), 2, 3))
+            self._last = position, F, elements.determinant(F)
+        return self._last[1:]
 
-    def _strain_and_pressure(self, position, pressure, theta):
-        """F (t, q, 2, 2), and P with its stabilisation (t, q)."""
-        F = self.deformation(position)
-        gap = elements.determinant(F) - theta
-        return F, pressure[self.body.cells[:, :3]] @ elements.LINEAR.T + GAMMA * theta ** (-5 / 3) * gap
+    def _strained(self, position, pressure, theta):
+        """F (t, q, 2, 2), J, and P with its stabilisation (t, q)."""
+        F, J = self.deformed(position)
+        linear = pressure[self.body.cells[:, :3]] @ elements.LINEAR.T
+        return F, J, linear + GAMMA * theta ** (-5 / 3) * (J - theta)
+
+    def _forces(self, stress: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+        """(t, 2, 6) of the integral of stress (t, q, 2, 2) : grad v, slopes (t, 2 q, 6) being those of v."""
+        weighted = self.at.dx[..., None, None] * stress
+        return np.moveaxis(weighted, 2, 1).reshape(len(stress), 2, -1) @ slopes
 
     def residual(self, position: np.ndarray, pressure: np.ndarray, theta: np.ndarray):
         """Residual [x of all nodes, y, then P of the corners] and the size of its terms; theta: (t, q)."""
-        F, P = self._strain_and_pressure(position, pressure, theta)
-        J, dx = elements.determinant(F), self.at.dx
-        slopes = np.swapaxes(self.at.grad, 2, 3)
-        force = ((dx[..., None, None] * piola(F, P)) @ slopes).sum(axis=1)
-        weight = (dx * J ** (-2 / 3))[..., None, None]
-        terms = ((weight * np.abs(F)) @ np.abs(slopes)).sum(axis=1)
+        F, J, P = self._strained(position, pressure, theta)
+        dx, slopes = self.at.dx, self.at.rows
+        force = self._forces(piola(F, P), slopes)
+        terms = self._forces(J[..., None, None] ** (-2 / 3) * np.abs(F), np.abs(slopes))
         gap, scale = (dx * (J - theta)) @ elements.LINEAR, (dx * theta) @ elements.LINEAR
         n = 2 * len(position) + self.body.corners
         return tuple(np.bincount(self.unknowns.ravel(), np.concatenate([a[:, 0], a[:, 1], b], axis=1).ravel(), n)
@@ -112,23 +120,23 @@ class System:
 
     def tangent(self, position: np.ndarray, pressure: np.ndarray, theta: np.ndarray) -> np.ndarray:
         """(t, 15, 15) symmetric element matrices of the residual's derivative."""
-        F, P = self._strain_and_pressure(position, pressure, theta)
+        F, _, P = self._strained(position, pressure, theta)
         count, points = F.shape[:2]
         unit = np.zeros((count, points, 4, 12))
-        unit[:, :, :2, :6] = unit[:, :, 2:, 6:] = np.swapaxes(self.at.grad, 2, 3)
+        unit[:, :, :2, :6] = unit[:, :, 2:, 6:] = self.at.slopes
         H, J = inverse_transpose(F)
         JH = (J[..., None, None] * H).reshape(count, points, 4)
         stiff = (GAMMA * theta ** (-5 / 3))[..., None, None] * JH[..., :, None] * JH[..., None, :]
         moduli = self.at.dx[..., None, None] * (tangent(F, P).reshape(count, points, 4, 4) + stiff)
         stacked = unit.reshape(count, -1, 12)
         K = np.swapaxes(stacked, 1, 2) @ (moduli @ unit).reshape(count, -1, 12)
-        slope = ((self.at.dx * J)[..., None, None] * H) @ np.swapaxes(self.at.grad, 2, 3)
+        slope = ((self.at.dx * J)[..., None, None] * H) @ self.at.slopes
         B = elements.LINEAR.T @ slope.reshape(count, points, 12)
         return saddle_blocks(K, -B, np.zeros((count, 3, 3)))
 
     def admissible(self, position: np.ndarray) -> bool:
         """Is det F > 0 wherever it is integrated?"""
-        return bool(elements.determinant(self.deformation(position)).min() > 0)
+        return bool(self.deformed(position)[1].min() > 0)
 
 
 @timed("growth")
@@ -136,7 +144,7 @@ def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: n
                 prescribed: np.ndarray) -> Equilibrium:
     """Equilibrium under theta (n,) nodal since the reference; other arguments as :func:`repro.growth.equilibrium`'s."""
     system = System(body)
-    start = elements.determinant(system.deformation(position))
+    _, start = system.deformed(position)
     target = elements.at_points(theta, body.cells) * body.expanded
     refuse_turned_over(start, target)
     parts = int(np.ceil(np.abs(np.log(target / start)).max() / np.log(FACTOR)))

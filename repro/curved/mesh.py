@@ -30,10 +30,11 @@ class CurvedMesh:
     width: float
     ends: tuple[float, float]
     topology: dict = field(default_factory=dict, repr=False)
+    placed: dict = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def places(self) -> elements.Places:
-        """Weights and gradients on every triangle."""
+        """Weights and slopes on every triangle."""
         return elements.places(self.points[self.cells])
 
     @cached_property
@@ -48,6 +49,12 @@ class CurvedMesh:
         if key not in self.topology:
             self.topology[key] = make()
         return self.topology[key]
+
+    def here(self, key: Hashable, make: Callable):
+        """``make()``, worked out once for these places of the nodes."""
+        if key not in self.placed:
+            self.placed[key] = make()
+        return self.placed[key]
 
     @property
     def body(self) -> np.ndarray:

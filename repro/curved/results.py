@@ -48,7 +48,7 @@ def _add_mechanics(scene, pore, points: dict, cells: dict) -> None:
     points["displacement_um"], points["position_t0_um"] = _three(grid.points - origin), _three(origin)
     points["pressure_MPa"] = modulus * _at_all_nodes(grid, pore.pressure)
     system = mechanics.System(mechanics.of(pore))
-    F = system.deformation(grid.points[grid.body])
+    F, _ = system.deformed(grid.points[grid.body])
     P = pore.pressure[grid.cells[grid.biomass][:, :3]] @ elements.LINEAR.T
     stress = modulus * growth.cauchy(F, P)
     expansion = (pore.active + pore.inert)[grid.cells[grid.biomass]] @ elements.QUADRATIC.T * system.body.expanded

@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from repro import kinetics as law
-from repro.assembly import ElementSystem
-from repro.curved import elements
+from repro.assembly import ElementSystem, each
 from repro.curved.fields import Space, space
 from repro.curved.mesh import CurvedMesh
 from repro.errors import TransportError
@@ -38,12 +38,14 @@ OVERSHOOT = 0.02
 class Problem:
     """Both substrates in one geometry, with n nodes in all and k a triangle.
 
-    matrices: (T, k, k) um2/h; sources: (n,) um2 mg/L/h; inflow, outflow: (n,) um2/h, integrals of u_x N_i over an end;
-    reused: does Newton's method use its derivative again?
+    matrices: (T, k, k) um2/h of each; operators: (n, n) the same, sparse, and their magnitudes; sources: (n,) um2
+    mg/L/h of each; inflow, outflow: (n,) um2/h, integrals of u_x N_i over an end; system: of both, coupled where there
+    is biomass; reused: does Newton's method use its derivative again?
     """
 
     space: Space
     matrices: tuple[np.ndarray, ...]
+    operators: tuple[tuple[sp.csc_matrix, sp.csc_matrix], ...]
     sources: tuple[np.ndarray, ...]
     inflow: np.ndarray
     outflow: np.ndarray
@@ -74,7 +76,7 @@ def problem(mesh: CurvedMesh, flow: Flow | None, substrates, kinetics, reused: b
     if flow is not None:
         speed = flow.mean_velocity
         u = values @ flow.velocity[here.cells]
-        along = (at.grad[..., 0] * u[..., :1] + at.grad[..., 1] * u[..., 1:]) * at.dx[..., None]
+        along = (at.slopes[:, :, 0] * u[..., :1] + at.slopes[:, :, 1] * u[..., 1:]) * at.dx[..., None]
         carried = -np.swapaxes(along, 1, 2) @ values
         inflow = _end_loads(here, here.inlet, flow.velocity[:, 0])
         owner, blocks = _outlet_matrix(here, flow.velocity[:, 0])
@@ -82,20 +84,25 @@ def problem(mesh: CurvedMesh, flow: Flow | None, substrates, kinetics, reused: b
         outflow = _end_loads(here, here.outlet, flow.velocity[:, 0])
     kinds = (substrates.acceptor, substrates.donor)
     spread = [np.where(mesh.biomass, s.diffusivity_in_aggregate, s.diffusivity) for s in kinds]
-    matrices = tuple(elements.stiffness(d, at) + carried for d in spread)
+    matrices = tuple(each(d, here.stiffness) + carried for d in spread)
+    scalar = mesh.once(("scalar", order), lambda: ElementSystem(here.cells, np.arange(count), np.zeros(count, bool)))
+    sparse = [scalar.matrix(K) for K in matrices]
+    operators = tuple((K, abs(K)) for K in sparse)
     system = mesh.once(("transport", order, flow is None), lambda: _system(here, flow is None))
     sources = tuple(s.supply * inflow for s in kinds)
-    return Problem(here, matrices, sources, inflow, outflow, speed, substrates, kinetics, system, reused)
+    return Problem(here, matrices, operators, sources, inflow, outflow, speed, substrates, kinetics, system, reused)
 
 
 def _system(here: Space, held_ends: bool) -> ElementSystem:
-    """Acceptor and donor of a node side by side, nodes in elimination order."""
+    """Acceptor and donor of a node side by side, nodes in elimination order: their own triangles, then both together
+    on those of the biomass, where the uptake couples them."""
     place = np.empty(here.count)
     place[here.order] = np.arange(here.count)
     held = np.zeros(here.count, bool)
     held[_both_ends(here)] = held_ends
-    return ElementSystem(np.concatenate([here.cells, here.count + here.cells], axis=1),
-                         np.concatenate([place, place + 0.5]), np.tile(held, 2))
+    both = np.concatenate([here.biomass_cells, here.count + here.biomass_cells], axis=1)
+    return ElementSystem((here.cells, here.count + here.cells, both), np.concatenate([place, place + 0.5]),
+                         np.tile(held, 2))
 
 
 def _both_ends(here: Space) -> np.ndarray:
@@ -145,18 +152,26 @@ def steady(problem: Problem, active: np.ndarray | None, guess: Concentrations | 
     concentration is outside of zero to the supply by more than UNRESOLVED and OVERSHOOT say: the mesh is too coarse
     for its front.
     """
-    count = problem.space.count
-    supply = np.repeat([s.supply for s in problem.both], count)
+    supply, weight = np.repeat([s.supply for s in problem.both], problem.space.count), sinks(problem, active)
     state = supply.copy() if guess is None else np.concatenate([guess.acceptor, guess.donor])
     state[problem.system.held] = supply[problem.system.held]
     try:
-        found = _newton(problem, active, state, _full_or_swept)
+        found = _newton(problem, weight, state, _full_or_swept)
     except TransportError:
-        found = _eased(problem, active, supply)
+        found = _eased(problem, weight, supply)
     return _checked(problem, *found)
 
 
-def _eased(problem: Problem, active, state):
+def sinks(problem: Problem, active: np.ndarray | None) -> np.ndarray | None:
+    """X_A dx (t, q) on the biomass from X_A (N,) at the mesh's nodes; None where nothing is taken up."""
+    if problem.kinetics is None or active is None:
+        return None
+    here, biomass = problem.space, problem.mesh.biomass
+    density = active[problem.mesh.cells[biomass]] @ here.of.shape.T
+    return density * here.at.dx[biomass]
+
+
+def _eased(problem: Problem, weight, state):
     """Newton's method with half saturations that fall from the supply to what they are."""
     least = min(s.half_saturation / max(s.supply, s.half_saturation) for s in problem.both)
     total = 0
@@ -164,23 +179,23 @@ def _eased(problem: Problem, active, state):
         both = {name: replace(s, half_saturation=max(s.half_saturation, min(factor * s.half_saturation, s.supply)))
                 for name, s in zip(("acceptor", "donor"), problem.both)}
         eased = replace(problem, substrates=replace(problem.substrates, **both))
-        state, iterations = _newton(eased, active, state, _shortened)
+        state, iterations = _newton(eased, weight, state, _shortened)
         total += iterations
     return state, total
 
 
-def _newton(problem: Problem, active, state, advance):
+def _newton(problem: Problem, weight, state, advance):
     """(2n,) solution and Newton's iterations."""
     jacobian, defect, nothing = Jacobian(problem.reused), np.inf, np.zeros(len(state))
-    residual, size = _balance(problem, active, state)
+    residual, size = balance(problem, weight, state)
     for iteration in range(MOST_ITERATIONS):
         last, defect = defect, _relative(problem, residual, size)
         if defect <= NEWTON or 0.1 * last < defect <= ROUND_OFF:
             return state, iteration
         if jacobian.stale(defect):
-            jacobian.factors = problem.system.factored(_tangent(problem, active, state))
+            jacobian.factors = problem.system.factored(tangent(problem, weight, state))
         step = jacobian.factors.solve(-residual, nothing)
-        state, residual, size = advance(problem, active, state, residual, step)
+        state, residual, size = advance(problem, weight, state, residual, step)
     raise TransportError(f"Newton's method for the substrates stands at a defect of {defect:.2g} after "
                          f"{MOST_ITERATIONS} iterations; try a larger numerics.refinement")
 
@@ -191,104 +206,83 @@ def _relative(problem: Problem, residual, size) -> float:
     return float(np.max(np.abs(residual[free]) / np.maximum(size[free], np.finfo(float).tiny)))
 
 
-def _full_or_swept(problem: Problem, active, state, residual, step):
+def _full_or_swept(problem: Problem, weight, state, residual, step):
     """A Newton step where it lowers the residual and nothing is negative; else a sweep with the uptake's coefficients
     q(C) / C frozen, which keeps what is positive so, as far as quadratic functions can."""
     trial = state + step
-    found = _balance(problem, active, trial)
+    found = balance(problem, weight, trial)
     free = ~problem.system.held
     worse = np.linalg.norm(found[0][free]) > np.linalg.norm(residual[free])
     if worse or trial.min() < -UNRESOLVED * max(s.supply for s in problem.both):
-        trial = _sweep(problem, active, np.maximum(state, 0.0))
-        found = _balance(problem, active, trial)
+        trial = _sweep(problem, weight, np.maximum(state, 0.0))
+        found = balance(problem, weight, trial)
     return trial, *found
 
 
-def _shortened(problem: Problem, active, state, residual, step):
+def _shortened(problem: Problem, weight, state, residual, step):
     """The longest part of a Newton step that lowers the residual; a sweep where none does."""
     free = ~problem.system.held
     before = np.linalg.norm(residual[free])
     for length in LENGTHS:
         trial = state + length * step
-        found = _balance(problem, active, trial)
+        found = balance(problem, weight, trial)
         if np.linalg.norm(found[0][free]) <= (1 - FALL * length) * before:
             return trial, *found
-    trial = _sweep(problem, active, np.maximum(state, 0.0))
-    return trial, *_balance(problem, active, trial)
+    trial = _sweep(problem, weight, np.maximum(state, 0.0))
+    return trial, *balance(problem, weight, trial)
 
 
-def _sweep(problem: Problem, active, state) -> np.ndarray:
+def _sweep(problem: Problem, weight, state) -> np.ndarray:
     """Solve (matrix + X_A q(C) / C) C_new = source, with q(C) / C at the state."""
-    matrices = _linear_part(problem)
-    weight, values, (q_a, q_d, slopes) = _uptake_at_points(problem, active, state)
-    biomass = np.flatnonzero(problem.mesh.biomass)
-    for k, (rate, substrate) in enumerate(zip((q_a, q_d), problem.both)):
-        tiny = 1e-9 * substrate.half_saturation
-        per = np.where(values[k] > tiny, rate / np.maximum(values[k], tiny), slopes[k][k])
-        matrices[biomass, _rows(problem, k), _rows(problem, k)] += problem.space.mass(weight * per)
-    return problem.system.solve(matrices, np.concatenate(problem.sources), state)
+    per = {}
+    if weight is not None:
+        values, (*rates, slopes) = _uptake(problem, state)
+        for k, (c, rate, substrate) in enumerate(zip(values, rates, problem.both)):
+            tiny = 1e-9 * substrate.half_saturation
+            per[k, k] = weight * np.where(c > tiny, rate / np.maximum(c, tiny), slopes[k][k])
+    elements = *problem.matrices, _coupled(problem, per)
+    return problem.system.solve(elements, np.concatenate(problem.sources), state)
 
 
-def _rows(problem: Problem, k: int) -> slice:
-    """Of one substrate in the element matrices."""
-    width = problem.space.cells.shape[1]
-    return slice(width * k, width * k + width)
+def balance(problem: Problem, weight, state):
+    """Residual (2n,) and size of its terms (2n,) for C_A, then C_D, of all nodes (2n,); weight: as :func:`sinks`'."""
+    total, size = np.empty_like(state), np.empty_like(state)
+    both = zip(np.split(state, 2), np.split(total, 2), np.split(size, 2), problem.operators, problem.sources)
+    for values, left, terms, (matrix, magnitude), source in both:
+        left[:] = matrix @ values - source
+        terms[:] = magnitude @ np.abs(values) + np.abs(source)
+    if weight is not None:
+        sink = weight * np.stack(_uptake(problem, state)[1][:2])
+        where, values = problem.system.unknowns[2].ravel(), problem.space.of.values
+        for found, loads in (total, sink @ values), (size, np.abs(sink) @ np.abs(values)):
+            found += np.bincount(where, np.swapaxes(loads, 0, 1).ravel(), len(state))
+    return total, size
 
 
-def _balance(problem: Problem, active, state):
-    """Residual (2n,) and size of its terms (2n,)."""
-    cells, count = problem.space.cells, problem.space.count
-    local = np.zeros((len(cells), 2 * cells.shape[1]))
-    scale = np.zeros_like(local)
-    for k, matrix in enumerate(problem.matrices):
-        rows = _rows(problem, k)
-        values = state[k * count + cells]
-        local[:, rows] = (matrix @ values[..., None])[..., 0]
-        scale[:, rows] = (np.abs(matrix) @ np.abs(values)[..., None])[..., 0]
-    if problem.kinetics is not None and active is not None:
-        _add_uptake(problem, active, state, local, scale)
-    source = np.concatenate(problem.sources)
-    total, size = (np.bincount(problem.system.unknowns.ravel(), part.ravel(), 2 * count) for part in (local, scale))
-    return total - source, size + np.abs(source)
+def _uptake(problem: Problem, state):
+    """C_A and C_D (2, t, q) on the biomass, and the uptake there with its derivatives."""
+    here = problem.space
+    values = here.at_points(state.reshape(2, -1), here.biomass_cells)
+    rates = law.paired_uptake(*values, problem.substrates, problem.kinetics)
+    return values, rates
 
 
-def _uptake_at_points(problem: Problem, active, state):
-    """X_A dx (t, q) on the biomass, C_A and C_D (t, q) there, and the uptake with its derivatives."""
-    here, biomass = problem.space, problem.mesh.biomass
-    acceptor, donor = (here.at_points(values, here.cells[biomass]) for values in np.split(state, 2))
-    density = active[problem.mesh.cells[biomass]] @ here.of.shape.T
-    rates = law.paired_uptake(acceptor, donor, problem.substrates, problem.kinetics)
-    return density * here.at.dx[biomass], (acceptor, donor), rates
-
-
-def _add_uptake(problem: Problem, active, state, local, scale) -> None:
-    """Add (q X_A, N_i) to the element arrays."""
-    weight, _, (q_a, q_d, _) = _uptake_at_points(problem, active, state)
-    biomass = np.flatnonzero(problem.mesh.biomass)
-    for k, rate in enumerate((q_a, q_d)):
-        rows = _rows(problem, k)
-        local[biomass, rows] += problem.space.load(weight * rate)
-        scale[biomass, rows] += np.abs(weight * rate) @ np.abs(problem.space.of.values)
-
-
-def _linear_part(problem: Problem) -> np.ndarray:
-    """(T, 2k, 2k) element matrices of diffusion, advection and the ends."""
-    cells, width = problem.space.cells.shape
-    found = np.zeros((cells, 2 * width, 2 * width))
-    for k, matrix in enumerate(problem.matrices):
-        found[:, _rows(problem, k), _rows(problem, k)] = matrix
+def _coupled(problem: Problem, slopes: dict[tuple[int, int], np.ndarray]) -> np.ndarray:
+    """(t, 2k, 2k) of the derivatives dx d(uptake of i) / d(concentration of j), (t, q), of (i, j) in ``slopes``."""
+    k = problem.space.cells.shape[1]
+    found = np.zeros((len(problem.space.biomass_cells), 2 * k, 2 * k))
+    for (i, j), slope in slopes.items():
+        found[:, i * k: i * k + k, j * k: j * k + k] = problem.space.mass(slope)
     return found
 
 
-def _tangent(problem: Problem, active, state) -> np.ndarray:
-    """(T, 2k, 2k) element matrices of the residual's derivative."""
-    found = _linear_part(problem)
-    if problem.kinetics is not None and active is not None:
-        weight, _, (_, _, slopes) = _uptake_at_points(problem, active, state)
-        biomass = np.flatnonzero(problem.mesh.biomass)
-        for k, m in np.ndindex(2, 2):
-            found[biomass, _rows(problem, k), _rows(problem, m)] += problem.space.mass(weight * slopes[k][m])
-    return found
+def tangent(problem: Problem, weight, state) -> tuple[np.ndarray, ...]:
+    """Element matrices of the derivative of :func:`balance`, of both substrates and of their uptake."""
+    slopes = {}
+    if weight is not None:
+        by = _uptake(problem, state)[1][2]
+        slopes = {(i, j): weight * by[i][j] for i, j in np.ndindex(2, 2)}
+    return *problem.matrices, _coupled(problem, slopes)
 
 
 def _checked(problem: Problem, state, iterations: int) -> Concentrations:
@@ -310,8 +304,9 @@ def fluxes(problem: Problem, active: np.ndarray | None, state: Concentrations) -
     """Ledger of the acceptor and of the donor in one geometry."""
     both = np.concatenate([state.acceptor, state.donor])
     consumed: tuple[float, ...] = (0.0, 0.0)
-    if problem.kinetics is not None and active is not None:
-        weight, _, (*rates, _) = _uptake_at_points(problem, active, both)
+    weight = sinks(problem, active)
+    if weight is not None:
+        *rates, _ = _uptake(problem, both)[1]
         consumed = tuple(float(np.sum(weight * rate)) for rate in rates)
     return (_fluxes(problem, 0, state.acceptor, consumed[0]), _fluxes(problem, 1, state.donor, consumed[1]))
 

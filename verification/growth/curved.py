@@ -152,7 +152,7 @@ def taylor() -> Outcome:
     more, steps = random.standard_normal(body.corners), 0.25 * 0.5 ** np.arange(4)
     tangents = system.tangent(here, push, theta)
     direction = np.concatenate([move[:, 0], move[:, 1], more])
-    linear = np.bincount(system.unknowns.ravel(), np.einsum("tij,tj->ti", tangents, direction[system.unknowns]).ravel())
+    linear = system.sparse.product(tangents, direction)
     start = system.residual(here, push, theta)[0]
     left = [np.abs(system.residual(here + s * move, push + s * more, theta)[0] - start - s * linear).max()
             for s in steps]

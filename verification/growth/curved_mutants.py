@@ -26,6 +26,6 @@ CURVED = (
            new="(dx * (J - theta ** 0.5)) @ elements.LINEAR"),
     Mutant("curved-stress-transposed", GROWTH,
            says="The first Piola-Kirchhoff stress is transposed: the force does not turn with the body.",
-           old="piola(F, P)) @ slopes",
-           new="np.swapaxes(piola(F, P), 2, 3)) @ slopes"),
+           old="self._forces(piola(F, P), slopes)",
+           new="self._forces(np.swapaxes(piola(F, P), 2, 3), slopes)"),
 )

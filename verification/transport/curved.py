@@ -55,7 +55,8 @@ def settled(problem, active) -> Concentrations:
     terms, which at Peclet 0.1 and little uptake may be 1e-7 of the supply, more than the mesh does."""
     state, count = transport.steady(problem, active), problem.space.count
     both = np.concatenate([state.acceptor, state.donor])
-    tangent, residual = transport._tangent(problem, active, both), transport._balance(problem, active, both)[0]
+    weight = transport.sinks(problem, active)
+    tangent, residual = transport.tangent(problem, weight, both), transport.balance(problem, weight, both)[0]
     both = both + problem.system.solve(tangent, -residual, np.zeros(2 * count))
     return Concentrations(both[:count], both[count:], state.iterations + 1)
 
