@@ -50,16 +50,15 @@ def _package(name: str):
 
 def node_order(count: int, elements: np.ndarray) -> np.ndarray:
     """(count,) nodes in a fill-reducing order, from the elements (T, k) that couple them."""
-    pairs = elements.shape[1] ** 2
-    rows = np.repeat(elements, elements.shape[1], axis=1).ravel()
-    columns = np.tile(elements, (1, elements.shape[1])).ravel()
-    graph = sp.csc_array((np.ones(len(elements) * pairs), (rows, columns)), shape=(count, count))
+    k = elements.shape[1]
+    rows, columns = np.repeat(elements, k, axis=1).ravel(), np.tile(elements, (1, k)).ravel()
+    dominant = np.tile((np.ones((k, k)) + k * np.eye(k)).ravel(), len(elements))
+    graph = sp.csc_array((dominant, (rows, columns)), shape=(count, count))
     return (_dissected if _chosen["ordering"] == "metis" else _by_degree)(graph)
 
 
 def _by_degree(graph) -> np.ndarray:
-    """Minimum degree, as SuperLU orders a symmetric matrix."""
-    graph = graph + sp.diags_array(graph.sum(axis=0) + 1.0)
+    """Minimum degree, as SuperLU orders a symmetric matrix, the diagonal of which must dominate."""
     symmetric = {"SymmetricMode": True}
     factor = splu(sp.csc_matrix(graph), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=symmetric)
     return np.argsort(factor.perm_c)

@@ -84,7 +84,8 @@ def corners(outline: Outline) -> Outline:
 
 def arcs(values: np.ndarray) -> np.ndarray:
     """(M, 3, ...) nodes of each arc from values (2 M, ...) at all nodes."""
-    return np.stack([values[::2], values[1::2], np.roll(values, -2, axis=0)[::2]], axis=1)
+    ends = np.concatenate([values[2::2], values[:1]])
+    return np.stack([values[::2], values[1::2], ends], axis=1)
 
 
 def split(outline: Outline, width: float, refinement: float, film: float,
@@ -101,27 +102,23 @@ def split(outline: Outline, width: float, refinement: float, film: float,
     for first, last in geometry.runs(polygon):
         keep = np.arange(first, last + 1) % count
         if outline.wall[2 * keep[0] + 1] != FREE:
-            t = np.concatenate([[0.0], _on_the_wall(outline, polygon, keep, sizes, largest, gradation)])
+            pieces.append(_on_the_wall(outline, polygon, keep, sizes, largest, gradation))
         else:
-            parts = len(geometry.split_parameters(polygon, keep, sizes)) - 1
-            t = np.linspace(0.0, 1.0, 2 * parts + 1)
-        pieces.append(_placed(outline, keep, t[:-1]))
-    return Arcs(*(np.concatenate(columns) for columns in zip(*pieces)))
+            parts = 2 * (len(geometry.split_parameters(polygon, keep, sizes)) - 1)
+            pieces.append((np.full(parts, keep[0]), np.arange(parts) / parts))
+    return _placed(outline, *(np.concatenate(columns) for columns in zip(*pieces)))
 
 
 def halved(outline: Outline, which: np.ndarray) -> Arcs:
     """The same curve with some of its arcs, ``which`` (M,), cut at their middles."""
-    pieces = []
-    for arc in range(len(which)):
-        keep = np.array([arc, (arc + 1) % len(which)])
-        t = np.linspace(0.0, 1.0, 5 if which[arc] else 3)[:-1]
-        pieces.append(_placed(outline, keep, t))
-    return Arcs(*(np.concatenate(columns) for columns in zip(*pieces)))
+    parts = np.where(which, 4, 2)
+    arc = np.repeat(np.arange(len(which)), parts)
+    return _placed(outline, arc, (np.arange(len(arc)) - (np.cumsum(parts) - parts)[arc]) / parts[arc])
 
 
 def _on_the_wall(outline: Outline, polygon: Outline, keep: np.ndarray, sizes, largest: float,
-                 gradation: float) -> np.ndarray:
-    """Parameters (arc number + t), the first left out, of corners and middles along a stretch of wall."""
+                 gradation: float) -> tuple[np.ndarray, np.ndarray]:
+    """Arc and t on it of corners and middles along a stretch of wall, but for its end."""
     free = polygon.wall == FREE
     ends = polygon.points[keep[[0, -1]]]
     x = geometry.graded_line(ends[0], ends[1], polygon.points[free], sizes[free], largest, gradation)[:, 0]
@@ -134,19 +131,19 @@ def _on_the_wall(outline: Outline, polygon: Outline, keep: np.ndarray, sizes, la
     for _ in range(6):
         t = t - (np.einsum("ka,ka->k", shape(t), nodes) - x) / (slope + bend * t)
     t = np.clip(t, 0.0, 1.0)
-    t[0], t[-1] = 0.0, 1.0
-    return (arc + t)[1:]
+    t[0] = 0.0
+    return keep[arc[:-1]], t[:-1]
 
 
-def _placed(outline: Outline, keep: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Points, wall, fixed and origin at parameters t (arc number + t) along the arcs that start at ``keep``."""
-    low = np.minimum(t.astype(int), len(keep) - 2)
-    weight, arc = shape(t - low), keep[low]
+def _placed(outline: Outline, arc: np.ndarray, t: np.ndarray) -> Arcs:
+    """New nodes (K,), each at t in [0, 1) of an arc: where t is zero the arc's own first corner."""
+    first, corner, weight = t == 0, 2 * arc, shape(t)
     points, origin = (np.einsum("ka,kai->ki", weight, arcs(part)[arc]) for part in (outline.points, outline.origin))
-    wall = np.where(t == 0, outline.wall[2 * keep[0]], arcs(outline.wall)[arc, 1])
-    points[wall != FREE, 1] = outline.points[2 * keep[0], 1] if (wall != FREE).any() else 0.0
-    origin[t == 0], points[t == 0] = outline.origin[2 * keep[0]], outline.points[2 * keep[0]]
-    return points, wall, (t == 0) & outline.fixed[2 * keep[0]], origin
+    wall = np.where(first, outline.wall[corner], outline.wall[corner + 1])
+    on = wall != FREE
+    points[on, 1] = outline.points[corner[on], 1]
+    points[first], origin[first] = outline.points[corner[first]], outline.origin[corner[first]]
+    return Arcs(points, wall, first & outline.fixed[corner], origin)
 
 
 def closing(outline: Arcs, width: float, film: float, angle: float) -> np.ndarray:

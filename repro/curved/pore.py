@@ -16,6 +16,7 @@ from repro.curved.mesh import CurvedMesh, curved, unlocked
 from repro.curved.outline import Arcs
 from repro.flow import poiseuille_loss
 from repro.pore import Solved, film, peclet, refuse_no_supply
+from repro.timing import timed
 from repro.transport import Concentrations
 
 #: Elements are made no larger than this asks for: the concentration boundary layer is W Pe^(-1/3) thick (Leveque), and
@@ -110,6 +111,7 @@ def seeded(scene) -> Pore:
                 grid.points, np.zeros(grid.corners))
 
 
+@timed("meshing")
 def generate(scene, around: Arcs | None) -> tuple[CurvedMesh, Arcs | None]:
     """A new curved mesh around an aggregate (None: a clean channel), and the outline with the nodes that it has there.
 

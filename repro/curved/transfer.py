@@ -9,6 +9,7 @@ import shapely
 
 from repro.curved import elements
 from repro.errors import TransferError
+from repro.timing import timed
 
 NEWTON_STEPS = 12
 #: A triangle's map to t = 0 is taken as folded where its determinant falls under this part of its largest.
@@ -39,16 +40,18 @@ def locate(nodes: np.ndarray, where: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 def _inverted(nodes: np.ndarray, where: np.ndarray) -> np.ndarray:
     """(K, 2) on the unit triangle for places (K, 2) in triangles (K, 6, 2); far outside where it does not converge."""
-    local = np.full((len(where), 2), 1 / 3)
+    local, rest = np.full((len(where), 2), 1 / 3), np.arange(len(where))
     for _ in range(NEWTON_STEPS):
-        apart = (elements.functions(local)[:, None] @ nodes)[:, 0] - where
-        J = np.swapaxes(nodes, 1, 2) @ elements.derivatives(local)
+        now, there = local[rest], nodes[rest]
+        apart = (elements.functions(now)[:, None] @ there)[:, 0] - where[rest]
+        J = np.swapaxes(there, 1, 2) @ elements.derivatives(now)
         det = elements.determinant(J)
         det = np.where(np.abs(det) > 1e-12 * np.abs(det).max(), det, np.inf)
         step = np.stack([J[:, 1, 1] * apart[:, 0] - J[:, 0, 1] * apart[:, 1],
                          J[:, 0, 0] * apart[:, 1] - J[:, 1, 0] * apart[:, 0]], axis=1) / det[:, None]
-        local = np.clip(local - step, -2.0, 3.0)
-        if np.abs(step).max() < 1e-12:
+        local[rest] = np.clip(now - step, -2.0, 3.0)
+        rest = rest[np.abs(step).max(axis=1) >= 1e-12]
+        if len(rest) == 0:
             break
     apart = np.einsum("ka,kai->ki", elements.functions(local), nodes) - where
     lost = np.hypot(*apart.T) > 1e-6 * np.ptp(nodes, axis=(1, 2))
@@ -71,6 +74,7 @@ class Located:
         return np.einsum("ka,ka->k", elements.linear_functions(self.local), field[self.nodes[:, :3]])
 
 
+@timed("transfer")
 def located(points: np.ndarray, cells: np.ndarray, where: np.ndarray) -> Located:
     """Places (K, 2) in triangles (T, 6); one outside by a little is moved to the edge of the nearest."""
     cell, local = locate(points[cells], where)
