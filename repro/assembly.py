@@ -16,7 +16,6 @@ import scipy.sparse as sp
 
 from repro import linear
 
-
 #: Of one kind of element, or of several.
 Parts: TypeAlias = np.ndarray | tuple[np.ndarray, ...]
 
@@ -36,14 +35,6 @@ def each(coefficient: np.ndarray, elements: np.ndarray) -> np.ndarray:
 def mass(areas: np.ndarray) -> np.ndarray:
     """(T, 3, 3) mass matrices of the linear nodal functions on triangles of the given areas (T,)."""
     return each(areas, (np.ones((1, 3, 3)) + np.eye(3)) / 12)
-
-
-def two_components(elements: np.ndarray) -> np.ndarray:
-    """(T, 2a, 2a): the same element matrices (T, a, a) for x and for y."""
-    a = elements.shape[1]
-    found = np.zeros((len(elements), 2 * a, 2 * a))
-    found[:, :a, :a] = found[:, a:, a:] = elements
-    return found
 
 
 class ElementSystem:
@@ -137,13 +128,20 @@ def _pairs(unknowns: Parts) -> tuple[np.ndarray, np.ndarray]:
             _flat([np.tile(kind, (1, kind.shape[1])) for kind in kinds]))
 
 
-def saddle_blocks(upper, divergence, lower) -> np.ndarray:
-    """(T, a + b, a + b) symmetric element matrices [[upper, -divergence^T], [-divergence, -lower]]."""
-    a, b = upper.shape[1], lower.shape[1]
-    elements = np.empty((len(upper), a + b, a + b))
-    elements[:, :a, :a], elements[:, a:, a:] = upper, -lower
+def saddle_blocks(upper: np.ndarray, divergence: np.ndarray, lower: np.ndarray | None = None) -> np.ndarray:
+    """(T, a + b, a + b) symmetric element matrices [[upper, -divergence^T], [-divergence, -lower]].
+
+    upper: (T, a, a), or (T, a / 2, a / 2) for each of two components that are not coupled; divergence: (T, b, a);
+    lower: (T, b, b), zero by default.
+    """
+    (count, b, a), k = divergence.shape, upper.shape[1]
+    elements = np.zeros((count, a + b, a + b))
+    for first in range(0, a, k):
+        elements[:, first: first + k, first: first + k] = upper
     elements[:, a:, :a] = -divergence
     elements[:, :a, a:] = -np.swapaxes(divergence, 1, 2)
+    if lower is not None:
+        elements[:, a:, a:] = -lower
     return elements
 
 

@@ -29,7 +29,7 @@ from functools import cached_property
 import numpy as np
 from skfem import Basis, BilinearForm, ElementTriP1, ElementTriP2
 
-from repro.assembly import each, local, saddle_blocks, saddle_system, two_components
+from repro.assembly import each, local, saddle_blocks, saddle_system
 from repro.mesh import PoreMesh
 from repro.timing import timed
 
@@ -177,10 +177,11 @@ def bubble_mobility(mesh: PoreMesh, viscosity: np.ndarray, interface: str) -> np
 
 
 def _viscous(found: Forms, viscosity: np.ndarray, interface: str) -> np.ndarray:
-    """(T, 2a, 2a) element matrices of a(u, v): test functions of x, then y, by trial functions alike."""
+    """(T, 2a, 2a) element matrices of a(u, v): test functions of x, then y, by trial functions alike; (T, a, a) of each
+    component where they are not coupled."""
     laplace = each(viscosity, found.laplace)
     if interface == "laplacian":
-        return two_components(laplace)
+        return laplace
     k = np.broadcast_to(viscosity[:, None], found.basis.dx.shape)
     # nu u_j,i v_i,j: row i is the component of v, column j that of u
     xx, xy, yx, yy = (local(stiffness, found.basis, k=k, i=i, j=j) for i, j in ((0, 0), (0, 1), (1, 0), (1, 1)))

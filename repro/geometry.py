@@ -249,8 +249,11 @@ def closing_nodes(outline: Outline, width: float, film: float, angle: float) -> 
 def contact_lines(outline: Outline, wall: int) -> list[tuple[int, int]]:
     """(node, direction) of each end of a contact surface: the next node in that direction is not on the wall."""
     on = outline.wall == wall
-    ends = [(int(i), 1) for i in np.flatnonzero(on & ~np.roll(on, -1))]
-    return ends + [(int(i), -1) for i in np.flatnonzero(on & ~np.roll(on, 1))]
+    if not on.any():
+        return []
+    last = on & ~np.append(on[1:], on[0])
+    first = on & ~np.append(on[-1], on[:-1])
+    return [(int(i), 1) for i in np.flatnonzero(last)] + [(int(i), -1) for i in np.flatnonzero(first)]
 
 
 def _closing_run(outline: Outline, gap: np.ndarray, line: int, step: int, film: float, slope: float) -> np.ndarray:

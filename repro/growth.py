@@ -100,8 +100,9 @@ def tangent(F: np.ndarray, P: np.ndarray) -> np.ndarray:
     H, J = inverse_transpose(F)
     trace = np.sum(F**2, axis=(-2, -1)) + 1
     A, PJ = J ** (-2 / 3), P * J
-    FH, HF = np.einsum("...ik,...jl->...ikjl", F, H), np.einsum("...ik,...jl->...ikjl", H, F)
-    HH, swap = np.einsum("...ik,...jl->...ikjl", H, H), np.einsum("...il,...jk->...ikjl", H, H)
+    first, second = (F[..., None, None], H[..., None, None]), (F[..., None, None, :, :], H[..., None, None, :, :])
+    FH, HF, HH = first[0] * second[1], first[1] * second[0], first[1] * second[1]
+    swap = np.swapaxes(HH, -3, -1)
     identity = np.einsum("ij,kl->ikjl", np.eye(2), np.eye(2))
 
     def times(scalar, tensor):

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from repro.assembly import each, mass, saddle_blocks, saddle_system, two_components
+from repro.assembly import each, mass, saddle_blocks, saddle_system
 from repro.flow import forms
 from repro.mesh import PoreMesh
 from repro.timing import timed
@@ -39,7 +39,7 @@ def _fluid_displacement(mesh: PoreMesh, known: np.ndarray, gamma: float, c: floa
     tau = mesh.circumdiameter[there] ** 2 / c
     laplace = found.laplace[there]
     lower = each(tau, laplace) + gamma * mass(mesh.areas[there])
-    elements = saddle_blocks(two_components(laplace), found.divergence[there], lower)
+    elements = saddle_blocks(laplace, found.divergence[there], lower)
     system = mesh.once("mesh motion", lambda: _system(mesh, mesh.triangles[there]))
     value = np.concatenate([known[fluid, 0], known[fluid, 1], np.zeros(len(fluid))])
     return system.solve(elements, np.zeros(len(value)), value)[: 2 * len(fluid)].reshape(2, -1).T

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from repro import geometry
-from repro.curved import elements, fields, pore
+from repro.curved import fields, pore
 from repro.scene import Numerics, SceneError, load_scene
 from repro.simulation import simulate
 

@@ -52,7 +52,7 @@ def midpoint(scene, now: Pore, solved: Solved, duration: float) -> Midpoint:
     rates = rates_of(scene, found.concentrations)
     if remeshed:
         rates = _carried_back(there, half, rates)
-    weight = elements.weights(now.mesh.points, now.mesh)
+    weight = now.mesh.weights()
     apart = np.abs(rates[0] + rates[1] - first[0] - first[1])
     return Midpoint(found, rates, float(weight @ apart / weight.sum()), half)
 
@@ -205,7 +205,7 @@ def remesh(scene, now: Pore, expanded: Pore, state: Concentrations) -> Pore:
     carried = at.quadratic(np.column_stack([expanded.origin, share]))
     origin, inert, active = grid.points.copy(), np.zeros(count), np.zeros(count)
     origin[nodes], inert[nodes] = carried[:, :2], np.clip(carried[:, 2], 0.0, 1.0)
-    inert = _conserved(inert, elements.weights(grid.points, grid), expanded.inert_mass())
+    inert = _conserved(inert, grid.weights(), expanded.inert_mass())
     origin[grid.loop] = shape.origin
     active[nodes] = 1 - inert[nodes]
     pressure = np.zeros(grid.corners)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from repro.assembly import each, saddle_blocks, saddle_system, two_components
+from repro.assembly import each, saddle_blocks, saddle_system
 from repro.curved.fields import Space, space
 from repro.curved.mesh import CurvedMesh
 from repro.flow import Flow, poiseuille_loss
@@ -37,19 +37,18 @@ def unit_flow(mesh: CurvedMesh, viscosity_ratio: float, order: int = 2) -> tuple
     value, inlet = np.zeros(len(system.held)), here.end_nodes(here.inlet)
     share = here.points[inlet, 1] / mesh.width
     value[inlet] = 6 * share * (1 - share)
-    found = system.solve(blocks, np.zeros(len(value)), value)
-    force = system.product(blocks, found)
-    loss = float(force[inlet] @ value[inlet]) / mesh.width
+    held = system.product(blocks, value)
+    found = value + system.solve(blocks, -held, np.zeros(len(value)))
+    loss = float(held @ found) / mesh.width
     return found[: 2 * here.count].reshape(2, here.count).T, found[2 * here.count:], loss
 
 
 def stokes(here: Space, viscosity: np.ndarray) -> np.ndarray:
     """(T, 2k + h, 2k + h) element matrices of (nu grad u, grad v) - (p, div v) - (q, div u); viscosity: (T,)."""
-    at, heads = here.at, here.of.head.shape[1]
+    at = here.at
     slopes = at.slopes.reshape(*at.dx.shape, -1)  # of u_x by x for its nodes, then of u_y by y
     divergence = here.of.head.T @ (at.dx[:, :, None] * slopes)
-    return saddle_blocks(two_components(each(viscosity, here.stiffness)), divergence,
-                         np.zeros((len(at.dx), heads, heads)))
+    return saddle_blocks(each(viscosity, here.stiffness), divergence)
 
 
 def _system(here: Space):

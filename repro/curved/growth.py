@@ -132,7 +132,7 @@ class System:
         K = np.swapaxes(stacked, 1, 2) @ (moduli @ unit).reshape(count, -1, 12)
         slope = ((self.at.dx * J)[..., None, None] * H) @ self.at.slopes
         B = elements.LINEAR.T @ slope.reshape(count, points, 12)
-        return saddle_blocks(K, -B, np.zeros((count, 3, 3)))
+        return saddle_blocks(K, -B)
 
     def admissible(self, position: np.ndarray) -> bool:
         """Is det F > 0 wherever it is integrated?"""

@@ -95,6 +95,10 @@ class CurvedMesh:
         nodes = np.flatnonzero(self.points[:, 0] == level)
         return nodes[np.argsort(self.points[nodes, 1])]
 
+    def weights(self) -> np.ndarray:
+        """(N,) integrals of the nodal functions over the aggregate, um2."""
+        return elements.weights(self.places.dx[self.biomass], self)
+
     def area(self) -> float:
         """Of the aggregate, um2."""
         return float(self.places.dx[self.biomass].sum())

@@ -58,7 +58,7 @@ class Arcs(Outline):
         bend = 4 * (nodes[:, 0] - 2 * nodes[:, 1] + nodes[:, 2])
         flat = np.abs(bend) <= 1e-12 * np.ptp(self.points)
         t = np.clip(np.where(flat, 0.0, -slope / np.where(flat, 1.0, bend)), 0.0, 1.0)
-        peak = np.einsum("mka,mai->mki", np.stack([shape(t[:, 0]), shape(t[:, 1])], axis=1), nodes)
+        peak = shape(t) @ nodes
         x, y = np.concatenate([peak[:, 0], peak[:, 1], self.points]).T
         return float(x.min()), float(x.max()), float(y.max()), float(x[y.argmax()])
 

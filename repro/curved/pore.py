@@ -62,15 +62,17 @@ class Pore:
 
     def mass(self) -> float:
         """(X_A + X_I) / X_m integrated over the aggregate, um2."""
-        return float(self._weight() @ (self.active + self.inert))
+        return float(self.weights() @ (self.active + self.inert))
 
     def inert_mass(self) -> float:
         """X_I / X_m integrated over the aggregate, um2."""
-        return float(self._weight() @ self.inert)
+        return float(self.weights() @ self.inert)
 
-    def _weight(self) -> np.ndarray:
+    def weights(self) -> np.ndarray:
         """(N,) integrals of the nodal functions over the aggregate as it was when the mesh was made, um2."""
-        return self.mesh.once("reference weights", lambda: elements.weights(self.reference, self.mesh))
+        def found():
+            return elements.weights(elements.places(self.reference[self.mesh.cells[self.mesh.biomass]]).dx, self.mesh)
+        return self.mesh.once("reference weights", found)
 
     def composition(self, maximum_density: float) -> tuple[float, float, float]:
         """Share of X_I in the biomass, and the least and the largest (X_A + X_I) / X_m, which the constraint J = theta

@@ -38,15 +38,16 @@ OVERSHOOT = 0.02
 class Problem:
     """Both substrates in one geometry, with n nodes in all and k a triangle.
 
-    matrices: (T, k, k) um2/h of each; operators: (n, n) the same, sparse, and their magnitudes; sources: (n,) um2
-    mg/L/h of each; inflow, outflow: (n,) um2/h, integrals of u_x N_i over an end; system: of both, coupled where there
-    is biomass; reused: does Newton's method use its derivative again?
+    matrices: (T, k, k) um2/h of each; operator: (2n, 2n) of both, not coupled, and magnitude: the same of its entries;
+    source: (2n,) um2 mg/L/h; inflow, outflow: (n,) um2/h, integrals of u_x N_i over an end; system: of both, coupled
+    where there is biomass; reused: does Newton's method use its derivative again?
     """
 
     space: Space
     matrices: tuple[np.ndarray, ...]
-    operators: tuple[tuple[sp.csc_matrix, sp.csc_matrix], ...]
-    sources: tuple[np.ndarray, ...]
+    operator: sp.csc_matrix
+    magnitude: sp.csc_matrix
+    source: np.ndarray
     inflow: np.ndarray
     outflow: np.ndarray
     speed: float
@@ -71,26 +72,38 @@ def problem(mesh: CurvedMesh, flow: Flow | None, substrates, kinetics, reused: b
     """Assemble the linear parts for one geometry and flow of the same order (None: pure diffusion, the supply held at
     both ends)."""
     here = space(mesh, order)
-    at, count, values = here.at, here.count, here.of.values
-    carried, inflow, outflow, speed = 0.0, np.zeros(count), np.zeros(count), 0.0
+    carried, inflow, outflow = 0.0, np.zeros(here.count), np.zeros(here.count)
     if flow is not None:
-        speed = flow.mean_velocity
-        u = values @ flow.velocity[here.cells]
-        along = (at.slopes[:, :, 0] * u[..., :1] + at.slopes[:, :, 1] * u[..., 1:]) * at.dx[..., None]
-        carried = -np.swapaxes(along, 1, 2) @ values
-        inflow = _end_loads(here, here.inlet, flow.velocity[:, 0])
-        owner, blocks = _outlet_matrix(here, flow.velocity[:, 0])
-        carried[owner] += blocks
-        outflow = _end_loads(here, here.outlet, flow.velocity[:, 0])
+        u_x = flow.velocity[:, 0]
+        carried, inflow = _advection(here, flow.velocity), _end_loads(here, here.inlet, u_x)
+        outflow = _end_loads(here, here.outlet, u_x)
     kinds = (substrates.acceptor, substrates.donor)
     spread = [np.where(mesh.biomass, s.diffusivity_in_aggregate, s.diffusivity) for s in kinds]
     matrices = tuple(each(d, here.stiffness) + carried for d in spread)
-    scalar = mesh.once(("scalar", order), lambda: ElementSystem(here.cells, np.arange(count), np.zeros(count, bool)))
-    sparse = [scalar.matrix(K) for K in matrices]
-    operators = tuple((K, abs(K)) for K in sparse)
+    operator = mesh.once(("both", order), lambda: _apart(here)).matrix(matrices)
     system = mesh.once(("transport", order, flow is None), lambda: _system(here, flow is None))
-    sources = tuple(s.supply * inflow for s in kinds)
-    return Problem(here, matrices, operators, sources, inflow, outflow, speed, substrates, kinetics, system, reused)
+    source = np.concatenate([s.supply * inflow for s in kinds])
+    speed = flow.mean_velocity if flow else 0.0
+    return Problem(here, matrices, operator, abs(operator), source, inflow, outflow, speed, substrates, kinetics,
+                   system, reused)
+
+
+def _advection(here: Space, velocity: np.ndarray) -> np.ndarray:
+    """(T, k, k) of -(C u, grad v), and of u_x C v over the outlet."""
+    at, values = here.at, here.of.values
+    u = (values @ velocity[here.cells]) * -at.dx[..., None]
+    along = np.einsum("tqi,tqik->tqk", u, at.slopes)
+    found = np.swapaxes(along, 1, 2) @ values
+    owner, place = here.mesh.once(("outlet triangles", here.cubic), lambda: _owners(here))
+    blocks = _outlet_matrix(here, velocity[:, 0])
+    found[owner[:, None, None], place[:, :, None], place[:, None, :]] += blocks
+    return found
+
+
+def _apart(here: Space) -> ElementSystem:
+    """Acceptor, then donor of all nodes in their own order, without their uptake."""
+    count = 2 * here.count
+    return ElementSystem((here.cells, here.count + here.cells), np.arange(count), np.zeros(count, bool))
 
 
 def _system(here: Space, held_ends: bool) -> ElementSystem:
@@ -123,23 +136,20 @@ def _end_loads(here: Space, edges: np.ndarray, speed: np.ndarray) -> np.ndarray:
     return found
 
 
-def _outlet_matrix(here: Space, speed: np.ndarray):
-    """Integrals of u_x N_i N_j over the outlet: (E,) triangles that have its edges, and a block (E, k, k) for each."""
-    edges, along = here.outlet, here.of.along
-    u = speed[edges] @ along.T
-    local = _lengths(here, edges)[:, None, None] * np.einsum("eq,q,qa,qb->eab", u, here.of.line_weights, along, along,
-                                                             optimize=True)
-    owner = here.mesh.once("outlet triangles", lambda: _owners(here.mesh))
-    blocks = np.zeros((len(edges), *here.cells.shape[1:] * 2))
-    where = np.argmax(here.cells[owner][:, :, None] == edges[:, None, :], axis=1)
-    each = np.arange(len(edges))
-    blocks[each[:, None, None], where[:, :, None], where[:, None, :]] = local
-    return owner, blocks
+def _outlet_matrix(here: Space, speed: np.ndarray) -> np.ndarray:
+    """(E, e, e) integrals of u_x N_i N_j over the outlet's edges with e nodes."""
+    along = here.of.along
+    weight = (speed[here.outlet] @ along.T) * here.of.line_weights * _lengths(here, here.outlet)[:, None]
+    return (along.T * weight[:, None]) @ along
 
 
-def _owners(mesh: CurvedMesh) -> np.ndarray:
-    """The triangle of each of the outlet's edges, by its middle node."""
-    return np.array([np.flatnonzero((mesh.cells[:, 3:] == m).any(axis=1))[0] for m in mesh.outlet[1::2]])
+def _owners(here: Space) -> tuple[np.ndarray, np.ndarray]:
+    """The triangle of each of the outlet's edges (E,), by its middle node, and where the edge's nodes (E, e) are among
+    the triangle's."""
+    mesh, edges = here.mesh, here.outlet
+    owner = np.array([np.flatnonzero((mesh.cells[:, 3:] == m).any(axis=1))[0] for m in mesh.outlet[1::2]])
+    place = np.argmax(here.cells[owner][:, :, None] == edges[:, None, :], axis=1)
+    return owner, place
 
 
 @timed("transport")
@@ -241,16 +251,13 @@ def _sweep(problem: Problem, weight, state) -> np.ndarray:
             tiny = 1e-9 * substrate.half_saturation
             per[k, k] = weight * np.where(c > tiny, rate / np.maximum(c, tiny), slopes[k][k])
     elements = *problem.matrices, _coupled(problem, per)
-    return problem.system.solve(elements, np.concatenate(problem.sources), state)
+    return problem.system.solve(elements, problem.source, state)
 
 
 def balance(problem: Problem, weight, state):
     """Residual (2n,) and size of its terms (2n,) for C_A, then C_D, of all nodes (2n,); weight: as :func:`sinks`'."""
-    total, size = np.empty_like(state), np.empty_like(state)
-    both = zip(np.split(state, 2), np.split(total, 2), np.split(size, 2), problem.operators, problem.sources)
-    for values, left, terms, (matrix, magnitude), source in both:
-        left[:] = matrix @ values - source
-        terms[:] = magnitude @ np.abs(values) + np.abs(source)
+    total = problem.operator @ state - problem.source
+    size = problem.magnitude @ np.abs(state) + np.abs(problem.source)
     if weight is not None:
         sink = weight * np.stack(_uptake(problem, state)[1][:2])
         where, values = problem.system.unknowns[2].ravel(), problem.space.of.values
@@ -315,7 +322,7 @@ def _fluxes(problem: Problem, k: int, field: np.ndarray, consumed: float) -> Flu
     here = problem.space
     if problem.speed:
         ends = [float(w @ field / w.sum()) for w in (problem.inflow, problem.outflow)]
-        return Fluxes(float(problem.sources[k].sum()), float(problem.outflow @ field), consumed, *ends)
+        return Fluxes(float(np.split(problem.source, 2)[k].sum()), float(problem.outflow @ field), consumed, *ends)
     flux = np.bincount(here.cells.ravel(), np.einsum("tab,tb->ta", problem.matrices[k], field[here.cells]).ravel(),
                        len(field))
     ends = [_mean(here, edges, field) for edges in (here.inlet, here.outlet)]

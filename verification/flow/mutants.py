@@ -7,8 +7,8 @@ from verification.mutants import Mutant
 MUTANTS = (
     Mutant("saddle-sign", "repro/assembly.py",
            says="The stabilisation of the pressure enters with the sign that destabilises.",
-           old="elements[:, a:, a:] = upper, -lower",
-           new="elements[:, a:, a:] = upper, lower"),
+           old="elements[:, a:, a:] = -lower",
+           new="elements[:, a:, a:] = lower"),
     Mutant("tau-of-water", "repro/flow.py",
            says="The stabilisation is scaled by the viscosity of water in the biomass too.",
            old="(stabilisation * viscosity) if order",

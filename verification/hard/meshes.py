@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from repro import flow, geometry, mesh, reprojection
-from repro.curved import elements, transfer
 from repro.curved import flow as curved_flow
 from repro.curved import outline as curved_outline
 from repro.curved import pore as curved_pore
+from repro.curved import transfer
 from verification.case import Check, at_least, at_most
 from verification.hard import common
 from verification.hard.common import TOLERANCE, HardCase
@@ -47,7 +47,7 @@ def _kept(made, first, now) -> list[Check]:
 
 def _integral(pore, field) -> float:
     if isinstance(pore, curved_pore.Pore):
-        return elements.weights(pore.reference, pore.mesh) @ field
+        return pore.weights() @ field
     return pore.mesh.lumped(pore.mesh.biomass) @ field
 
 

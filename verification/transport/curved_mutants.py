@@ -6,8 +6,8 @@ TRANSPORT = "repro/curved/transport.py"
 CURVED = (
     Mutant("curved-outlet-forgotten", TRANSPORT,
            says="What flows out through the outlet is left out of the weak form.",
-           old="carried[owner] += blocks",
-           new="carried[owner] += 0 * blocks"),
+           old="place[:, None, :]] += blocks",
+           new="place[:, None, :]] += 0 * blocks"),
     Mutant("curved-fluid-diffusivity", TRANSPORT,
            says="Substrates diffuse in the biomass as in water.",
            old="np.where(mesh.biomass, s.diffusivity_in_aggregate, s.diffusivity)",
