@@ -66,7 +66,7 @@ class ElementSystem:
         place = np.cumsum(free) - 1
         self.held, self.order, self.count = held, self._ranked[free], int(free.sum())
         kept = free[self._rows] & free[self._columns]
-        self._kept = np.flatnonzero(kept)
+        self._kept = np.flatnonzero(kept) if held.any() else slice(None)
         self.indices = place[self._rows[kept]].astype(np.int32)
         self.indptr = np.searchsorted(place[self._columns[kept]], np.arange(self.count + 1)).astype(np.int32)
         self._pattern = sp.csc_matrix((np.zeros(len(self.indices)), self.indices, self.indptr),

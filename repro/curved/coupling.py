@@ -127,33 +127,33 @@ def expand(scene, now: Pore) -> tuple[Pore, int, float]:
     It starts from the places and the pressure of ``now``; the fluid's nodes stay where they were. Raises GrowthError
     where no equilibrium is found or contact does not rest.
     """
-    grid = now.mesh
-    nodes, rim = grid.body, grid.body_loop
-    corners = int(np.searchsorted(nodes, grid.corners))
-    start, push, theta = grid.points[nodes], now.pressure[nodes[:corners]], (now.active + now.inert)[nodes]
-    wall, fixed, iterations, gaps = now.wall.copy(), now.fixed, 0, []
+    nodes, rim = now.mesh.body, now.mesh.body_loop
+    corners = nodes[nodes < now.mesh.corners]
+    theta, found, iterations, gaps = (now.active + now.inert)[nodes], now, 0, []
     for _ in range(CONTACT_ROUNDS):
-        body = growth.of(now, held_at(len(nodes), rim, wall, fixed), scene.numerics.jacobian == "reused")
+        held = held_at(len(nodes), rim, found.wall, found.fixed)
+        start = found.mesh.points[nodes]
         target = start.copy()
         for side, height in ((geometry.BOTTOM, 0.0), (geometry.TOP, scene.pore.width)):
-            target[rim[wall == side], 1] = height
-        found = growth.equilibrium(body, theta, start, push, target)
-        start, push, iterations = found.position, found.pressure, iterations + found.iterations
-        shape = Arcs(start[rim], wall, fixed, now.origin[grid.loop])
-        gaps.append(scene.pore.width - shape.thickness)
-        joins = outline.closing(shape, scene.pore.width, scene.growth.minimum_film, scene.growth.minimum_contact_angle)
+            target[rim[found.wall == side], 1] = height
+        rest = growth.equilibrium(growth.of(now, held, scene.numerics.jacobian == "reused"), theta, start,
+                                  found.pressure[corners], target)
+        points, pressure = now.mesh.points.copy(), now.pressure.copy()
+        points[nodes], pressure[corners] = rest.position, rest.pressure
+        found, iterations = replace(found, mesh=now.mesh.moved(points), pressure=pressure), iterations + rest.iterations
+        gaps.append(scene.pore.width - found.outline.thickness)
+        joins = outline.closing(found.outline, scene.pore.width, scene.growth.minimum_film,
+                                scene.growth.minimum_contact_angle)
         if not joins.any():
             break
-        wall = np.where(joins != geometry.FREE, joins, wall)
+        found = replace(found, wall=np.where(joins != geometry.FREE, joins, found.wall))
     else:
         raise GrowthError(f"the contact surfaces still change after {CONTACT_ROUNDS} rounds; "
                           "try a shorter growth.time_step")
-    points, pressure = grid.points.copy(), now.pressure.copy()
-    points[nodes], pressure[nodes[:corners]] = start, push
-    top = wall == geometry.TOP
-    if top.any() and not fixed[top].any():
-        fixed = fixed | _corner_near(shape, middle_of(shape, geometry.TOP))
-    return replace(now, mesh=grid.moved(points), wall=wall, fixed=fixed, pressure=pressure), iterations, gaps[0]
+    top = found.wall == geometry.TOP
+    if top.any() and not found.fixed[top].any():
+        found = replace(found, fixed=found.fixed | _corner_near(found.outline, middle_of(found.outline, geometry.TOP)))
+    return found, iterations, gaps[0]
 
 
 def _corner_near(shape: Arcs, chosen: np.ndarray) -> np.ndarray:

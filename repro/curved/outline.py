@@ -53,13 +53,12 @@ class Arcs(Outline):
 
     @cached_property
     def _extremes(self) -> tuple[float, float, float, float]:
-        nodes = arcs(self.points)
-        slope = -3 * nodes[:, 0] + 4 * nodes[:, 1] - nodes[:, 2]
-        bend = 4 * (nodes[:, 0] - 2 * nodes[:, 1] + nodes[:, 2])
+        first, middle, last = np.moveaxis(arcs(self.points), 1, 0)
+        slope, bend = -3 * first + 4 * middle - last, 4 * (first - 2 * middle + last)
         flat = np.abs(bend) <= 1e-12 * np.ptp(self.points)
         t = np.clip(np.where(flat, 0.0, -slope / np.where(flat, 1.0, bend)), 0.0, 1.0)
-        peak = shape(t) @ nodes
-        x, y = np.concatenate([peak[:, 0], peak[:, 1], self.points]).T
+        peak = [first + turn[:, None] * (slope + 0.5 * turn[:, None] * bend) for turn in t.T]
+        x, y = np.concatenate([*peak, self.points]).T
         return float(x.min()), float(x.max()), float(y.max()), float(x[y.argmax()])
 
 

@@ -7,6 +7,7 @@ The sum over i is the balance: supply in = out + consumed, to round-off. (11) is
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -62,6 +63,12 @@ class Problem:
         return self.space.mesh
 
     @property
+    def free(self):
+        """Index of the unknowns that are not held."""
+        held = self.system.held
+        return ~held if held.any() else slice(None)
+
+    @property
     def both(self):
         """Acceptor and donor, as the scene describes them."""
         return self.substrates.acceptor, self.substrates.donor
@@ -82,9 +89,11 @@ def problem(mesh: CurvedMesh, flow: Flow | None, substrates, kinetics, reused: b
     matrices = tuple(each(d, here.stiffness) + carried for d in spread)
     operator = mesh.once(("both", order), lambda: _apart(here)).matrix(matrices)
     system = mesh.once(("transport", order, flow is None), lambda: _system(here, flow is None))
+    magnitude = copy(operator)
+    magnitude.data = np.abs(operator.data)
     source = np.concatenate([s.supply * inflow for s in kinds])
     speed = flow.mean_velocity if flow else 0.0
-    return Problem(here, matrices, operator, abs(operator), source, inflow, outflow, speed, substrates, kinetics,
+    return Problem(here, matrices, operator, magnitude, source, inflow, outflow, speed, substrates, kinetics,
                    system, reused)
 
 
@@ -212,7 +221,7 @@ def _newton(problem: Problem, weight, state, advance):
 
 def _relative(problem: Problem, residual, size) -> float:
     """Largest residual of a free node against the size of its row's terms."""
-    free = ~problem.system.held
+    free = problem.free
     return float(np.max(np.abs(residual[free]) / np.maximum(size[free], np.finfo(float).tiny)))
 
 
@@ -220,8 +229,7 @@ def _full_or_swept(problem: Problem, weight, state, residual, step):
     """A Newton step where it lowers the residual and nothing is negative; else a sweep with the uptake's coefficients
     q(C) / C frozen, which keeps what is positive so, as far as quadratic functions can."""
     trial = state + step
-    found = balance(problem, weight, trial)
-    free = ~problem.system.held
+    found, free = balance(problem, weight, trial), problem.free
     worse = np.linalg.norm(found[0][free]) > np.linalg.norm(residual[free])
     if worse or trial.min() < -UNRESOLVED * max(s.supply for s in problem.both):
         trial = _sweep(problem, weight, np.maximum(state, 0.0))
@@ -231,7 +239,7 @@ def _full_or_swept(problem: Problem, weight, state, residual, step):
 
 def _shortened(problem: Problem, weight, state, residual, step):
     """The longest part of a Newton step that lowers the residual; a sweep where none does."""
-    free = ~problem.system.held
+    free = problem.free
     before = np.linalg.norm(residual[free])
     for length in LENGTHS:
         trial = state + length * step
