@@ -46,11 +46,11 @@ class ElementSystem:
     """
 
     def __init__(self, unknowns: Parts, rank: np.ndarray, held: np.ndarray):
-        self.unknowns = unknowns
+        self.kinds = _several(unknowns)
         self._ranked = np.argsort(rank, kind="stable")
         place = np.empty(len(rank), int)
         place[self._ranked] = np.arange(len(rank))
-        rows, columns = (place[part] for part in _pairs(unknowns))
+        rows, columns = (place[part] for part in _pairs(self.kinds))
         keys, self._slot = np.unique(columns * len(rank) + rows, return_inverse=True)
         self._columns, self._rows = np.divmod(keys, len(rank))
         self._hold(held)
@@ -81,9 +81,8 @@ class ElementSystem:
 
     def product(self, elements: Parts, x: np.ndarray) -> np.ndarray:
         """(n,) K x for all unknowns x (n,)."""
-        kinds = _several(self.unknowns)
-        parts = [K @ x[unknowns][:, :, None] for K, unknowns in zip(_several(elements), kinds, strict=True)]
-        return np.bincount(_flat(kinds), _flat(parts), len(x))
+        parts = [K @ x[unknowns][:, :, None] for K, unknowns in zip(_several(elements), self.kinds, strict=True)]
+        return np.bincount(_flat(self.kinds), _flat(parts), len(x))
 
     def factored(self, elements: Parts) -> Factored:
         """K, factorised."""
@@ -121,9 +120,8 @@ def _flat(parts: Sequence[np.ndarray]) -> np.ndarray:
     return parts[0].ravel() if len(parts) == 1 else np.concatenate([part.ravel() for part in parts])
 
 
-def _pairs(unknowns: Parts) -> tuple[np.ndarray, np.ndarray]:
+def _pairs(kinds: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """Row and column unknown of every entry of element matrices (T, k, k), flattened."""
-    kinds = _several(unknowns)
     return (_flat([np.repeat(kind, kind.shape[1], axis=1) for kind in kinds]),
             _flat([np.tile(kind, (1, kind.shape[1])) for kind in kinds]))
 

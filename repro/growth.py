@@ -159,7 +159,7 @@ class System:
         self.strains = _strains(self.slopes)
         self.stabilising = stabilising
         self.sparse = body.sparse
-        self.unknowns, self.free = self.sparse.unknowns, ~self.sparse.held
+        self.unknowns, self.free = self.sparse.kinds[0], ~self.sparse.held
 
     def residual(self, position: np.ndarray, pressure: np.ndarray, theta: np.ndarray):
         """Residual (3n,) [x of all nodes, y, then P] and the size of its terms; the caller excludes det F <= 0."""

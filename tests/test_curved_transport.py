@@ -149,6 +149,28 @@ def test_the_tangent_is_the_derivative_of_the_balance(held):
     assert all(3.6 < a / b < 4.4 for a, b in zip(left, left[1:]))
 
 
+def test_substrates_are_coupled_in_the_biomass_alone():
+    """Acceptor and donor of a node of the water have no entry in common. Mutant: all triangles coupled."""
+    made = thick("2.9 m/day")
+    now, found = solved(made)
+    system, count = found.problem.system, found.problem.space.count
+    rows, columns = system.matrix(transport.tangent(
+        found.problem, transport.sinks(found.problem, pore.active_biomass(made, now)),
+        np.ones(2 * count))).nonzero()
+    rows, columns = system.order[rows], system.order[columns]
+    pairs = (rows < count) != (columns < count)
+    assert pairs.any() and np.isin(rows[pairs] % count, now.mesh.body).all()
+
+
+def test_a_sweep_without_biomass_is_the_linear_solution():
+    """What Newton's method falls back to has nothing to freeze then. Mutant: the uptake asked for all the same."""
+    made = thick("2.9 m/day")
+    found = solved(made)[1].problem
+    swept = transport._sweep(found, None, np.zeros(2 * found.space.count))
+    for k, substrate in enumerate(found.both):
+        assert np.allclose(np.split(swept, 2)[k], substrate.supply, rtol=0.01)
+
+
 def test_without_flow_the_ends_hold_the_supply_and_feed_the_aggregate():
     """Pure diffusion: what comes in through the held ends is what is taken up. Mutant: the ends' flux of one end only,
     ends not held."""

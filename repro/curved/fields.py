@@ -70,12 +70,13 @@ class Functions:
 
 def _functions(order: int) -> Functions:
     area, line = DEGREES[order]
-    where, weights = get_quadrature_tri(area)
     (s,), line_weights = get_quadrature_line(line)
-    shape, bends = elements.functions(where.T), elements.derivatives(where.T)
     if order == 2:
         along = np.column_stack([(1 - s) * (1 - 2 * s), 4 * s * (1 - s), s * (2 * s - 1)])
-        return Functions(weights, shape, bends, shape, bends, elements.linear_functions(where.T), along, line_weights)
+        places = elements.QUADRATIC, elements.DERIVATIVES
+        return Functions(elements.WEIGHTS, *places, *places, elements.LINEAR, along, line_weights)
+    where, weights = get_quadrature_tri(area)
+    shape, bends = elements.functions(where.T), elements.derivatives(where.T)
     edge = cubic_functions(np.column_stack([s, 0 * s]))[:, [0, 3, 4, 1]]
     return Functions(weights, cubic_functions(where.T), cubic_derivatives(where.T), shape, bends, shape, edge,
                      line_weights)

@@ -85,12 +85,12 @@ class System:
     def __init__(self, body: Body):
         self.body, self.sparse = body, body.sparse
         self.at = body.places
-        self.unknowns, self.free = self.sparse.unknowns, ~self.sparse.held
-        self._last = None, None, None
+        self.unknowns, self.free = self.sparse.kinds[0], ~self.sparse.held
+        self._last: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
 
     def deformed(self, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """F[i, K] = d x_i / d X_K (t, q, 2, 2) and J (t, q), kept until another position is asked for."""
-        if self._last[0] is not position:
+        if self._last is None or self._last[0] is not position:
             slopes = self.at.rows @ position[self.body.cells]
             F = np.ascontiguousarray(np.swapaxes(slopes.reshape(*self.at.dx.shape, 2, 2), 2, 3))
             self._last = position, F, elements.determinant(F)

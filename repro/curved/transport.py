@@ -79,7 +79,8 @@ def problem(mesh: CurvedMesh, flow: Flow | None, substrates, kinetics, reused: b
     """Assemble the linear parts for one geometry and flow of the same order (None: pure diffusion, the supply held at
     both ends)."""
     here = space(mesh, order)
-    carried, inflow, outflow = 0.0, np.zeros(here.count), np.zeros(here.count)
+    inflow, outflow = np.zeros(here.count), np.zeros(here.count)
+    carried: np.ndarray | float = 0.0
     if flow is not None:
         u_x = flow.velocity[:, 0]
         carried, inflow = _advection(here, flow.velocity), _end_loads(here, here.inlet, u_x)
@@ -268,18 +269,17 @@ def balance(problem: Problem, weight, state):
     size = problem.magnitude @ np.abs(state) + np.abs(problem.source)
     if weight is not None:
         sink = weight * np.stack(_uptake(problem, state)[1][:2])
-        where, values = problem.system.unknowns[2].ravel(), problem.space.of.values
+        where, values = problem.system.kinds[2].ravel(), problem.space.of.values
         for found, loads in (total, sink @ values), (size, np.abs(sink) @ np.abs(values)):
             found += np.bincount(where, np.swapaxes(loads, 0, 1).ravel(), len(state))
     return total, size
 
 
 def _uptake(problem: Problem, state):
-    """C_A and C_D (2, t, q) on the biomass, and the uptake there with its derivatives."""
+    """C_A and C_D (t, q) on the biomass, and the uptake there with its derivatives."""
     here = problem.space
-    values = here.at_points(state.reshape(2, -1), here.biomass_cells)
-    rates = law.paired_uptake(*values, problem.substrates, problem.kinetics)
-    return values, rates
+    acceptor, donor = here.at_points(state.reshape(2, -1), here.biomass_cells)
+    return (acceptor, donor), law.paired_uptake(acceptor, donor, problem.substrates, problem.kinetics)
 
 
 def _coupled(problem: Problem, slopes: dict[tuple[int, int], np.ndarray]) -> np.ndarray:

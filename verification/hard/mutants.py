@@ -65,6 +65,6 @@ MUTANTS = (
            new="return bool(self.areas.min() > 0)"),
     Mutant("hard-keys-overflow", "repro/assembly.py",
            says="Places in the sparse matrix are counted in 32 bits, which end at 46 000 unknowns.",
-           old="rows, columns = (place[part] for part in _pairs(unknowns))",
-           new="rows, columns = (place[part].astype(np.int32) for part in _pairs(unknowns))"),
+           old="rows, columns = (place[part] for part in _pairs(self.kinds))",
+           new="rows, columns = (place[part].astype(np.int32) for part in _pairs(self.kinds))"),
 )

@@ -1,0 +1,54 @@
+"""Sparse systems from element matrices: of one kind of element or several, some unknowns prescribed."""
+import numpy as np
+import pytest
+
+from repro.assembly import ElementSystem, saddle_blocks
+
+RANDOM = np.random.default_rng(3)
+LINE = np.column_stack([np.arange(9), np.arange(1, 10)])
+#: Of the first kind all pieces of a line, of the second one piece with another far away.
+KINDS = LINE, np.column_stack([LINE[:4], LINE[5:]])
+ELEMENTS = tuple(part @ np.swapaxes(part, 1, 2) + np.eye(part.shape[1])
+                 for part in (RANDOM.standard_normal((len(k), k.shape[1], k.shape[1])) for k in KINDS))
+
+
+def dense():
+    found = np.zeros((10, 10))
+    for kind, elements in zip(KINDS, ELEMENTS):
+        for unknowns, element in zip(kind, elements):
+            found[np.ix_(unknowns, unknowns)] += element
+    return found
+
+
+@pytest.mark.parametrize("held", [[], [0, 9], [4]])
+def test_kinds_of_elements_make_one_system(held):
+    """Its product, its matrix between free unknowns in elimination order, and its solution are those of the dense
+    matrix. Mutants: the second kind at the first one's places, prescribed unknowns not moved to the right-hand side."""
+    rank, prescribed, right = RANDOM.permutation(10).astype(float), np.isin(np.arange(10), held), np.arange(10.0)
+    system, K, value = ElementSystem(KINDS, rank, prescribed), dense(), np.linspace(1, 2, 10)
+    assert np.allclose(system.product(ELEMENTS, right), K @ right, rtol=1e-13)
+    order = [i for i in np.argsort(rank) if i not in held]
+    assert np.allclose(system.matrix(ELEMENTS).toarray(), K[np.ix_(order, order)], rtol=1e-13, atol=0)
+    found = system.solve(ELEMENTS, right, value)
+    assert np.array_equal(found[held], value[held])
+    assert np.allclose((K @ found - right)[order], 0, atol=1e-11)
+
+
+def test_a_missing_kind_is_refused():
+    """Mutant: kinds paired as far as they go."""
+    system = ElementSystem(KINDS, np.arange(10.0), np.zeros(10, bool))
+    with pytest.raises(ValueError):
+        system.product(ELEMENTS[:1], np.ones(10))
+
+
+def test_saddle_blocks_with_and_without_coupled_components():
+    """The same from one component's matrix, told once for both, as from the pair; zero is the default below. Mutants:
+    the second component's block at the first one's place, the lower block not turned in sign."""
+    one, divergence = RANDOM.standard_normal((4, 3, 3)), RANDOM.standard_normal((4, 2, 6))
+    lower = RANDOM.standard_normal((4, 2, 2))
+    pair = np.zeros((4, 6, 6))
+    pair[:, :3, :3] = pair[:, 3:, 3:] = one
+    found = saddle_blocks(one, divergence, lower)
+    assert np.array_equal(found, saddle_blocks(pair, divergence, lower))
+    assert np.array_equal(found[:, 6:, 6:], -lower) and np.array_equal(found[:, 6:, :6], -divergence)
+    assert not saddle_blocks(one, divergence)[:, 6:, 6:].any()
