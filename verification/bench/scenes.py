@@ -17,7 +17,7 @@ from repro.simulation import simulate
 from verification.bench.clock import measured
 from verification.bench.size import STAGES
 
-REPEATS = 9
+REPEATS = 31
 SUBSTRATES = {"substrates": {}}
 GROWTH = {"growth": {"end": "2.4 h"}}
 FLOW = {"flow": {"head": "1e-3 cm"}}
