@@ -4,12 +4,11 @@ import pytest
 
 from repro.assembly import ElementSystem, saddle_blocks
 
-RANDOM = np.random.default_rng(3)
 LINE = np.column_stack([np.arange(9), np.arange(1, 10)])
 #: Of the first kind all pieces of a line, of the second one piece with another far away.
 KINDS = LINE, np.column_stack([LINE[:4], LINE[5:]])
-ELEMENTS = tuple(part @ np.swapaxes(part, 1, 2) + np.eye(part.shape[1])
-                 for part in (RANDOM.standard_normal((len(k), k.shape[1], k.shape[1])) for k in KINDS))
+ELEMENTS = tuple(part @ np.swapaxes(part, 1, 2) + np.eye(part.shape[1]) for part in (
+    np.random.default_rng(3).standard_normal((len(k), k.shape[1], k.shape[1])) for k in KINDS))
 
 
 def dense():
@@ -24,8 +23,9 @@ def dense():
 def test_kinds_of_elements_make_one_system(held):
     """Its product, its matrix between free unknowns in elimination order, and its solution are those of the dense
     matrix. Mutants: the second kind at the first one's places, prescribed unknowns not moved to the right-hand side."""
-    rank, prescribed, right = RANDOM.permutation(10).astype(float), np.isin(np.arange(10), held), np.arange(10.0)
-    system, K, value = ElementSystem(KINDS, rank, prescribed), dense(), np.linspace(1, 2, 10)
+    rank, prescribed = np.random.default_rng(len(held)).permutation(10).astype(float), np.isin(np.arange(10), held)
+    system, K = ElementSystem(KINDS, rank, prescribed), dense()
+    right, value = np.arange(10.0), np.linspace(1, 2, 10)
     assert np.allclose(system.product(ELEMENTS, right), K @ right, rtol=1e-13)
     order = [i for i in np.argsort(rank) if i not in held]
     assert np.allclose(system.matrix(ELEMENTS).toarray(), K[np.ix_(order, order)], rtol=1e-13, atol=0)
@@ -44,8 +44,8 @@ def test_a_missing_kind_is_refused():
 def test_saddle_blocks_with_and_without_coupled_components():
     """The same from one component's matrix, told once for both, as from the pair; zero is the default below. Mutants:
     the second component's block at the first one's place, the lower block not turned in sign."""
-    one, divergence = RANDOM.standard_normal((4, 3, 3)), RANDOM.standard_normal((4, 2, 6))
-    lower = RANDOM.standard_normal((4, 2, 2))
+    random = np.random.default_rng(4)
+    one, divergence, lower = (random.standard_normal((4, *shape)) for shape in ((3, 3), (2, 6), (2, 2)))
     pair = np.zeros((4, 6, 6))
     pair[:, :3, :3] = pair[:, 3:, 3:] = one
     found = saddle_blocks(one, divergence, lower)
