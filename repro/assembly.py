@@ -28,8 +28,8 @@ def local(form, trial, test=None, **parameters) -> np.ndarray:
 
 
 def each(coefficient: np.ndarray, elements: np.ndarray) -> np.ndarray:
-    """Element matrices (T, a, b) times a coefficient (T,) of each triangle."""
-    return coefficient[:, None, None] * elements
+    """Element matrices (T, a, b) times a coefficient (T,) of each triangle, or (T, a) of each of its rows."""
+    return coefficient.reshape(len(coefficient), -1, 1) * elements
 
 
 def mass(areas: np.ndarray) -> np.ndarray:
@@ -50,7 +50,7 @@ class ElementSystem:
         self._ranked = np.argsort(rank, kind="stable")
         place = np.empty(len(rank), int)
         place[self._ranked] = np.arange(len(rank))
-        rows, columns = (place[part] for part in _pairs(self.kinds))
+        rows, columns = (place[_flat(part)] for part in zip(*map(linear.pairs, self.kinds)))
         keys, self._slot = np.unique(columns * len(rank) + rows, return_inverse=True)
         self._columns, self._rows = np.divmod(keys, len(rank))
         self._hold(held)
@@ -65,6 +65,7 @@ class ElementSystem:
         free = ~held[self._ranked]
         place = np.cumsum(free) - 1
         self.held, self.order, self.count = held, self._ranked[free], int(free.sum())
+        self.free = ~held if held.any() else slice(None)
         kept = free[self._rows] & free[self._columns]
         self._kept = np.flatnonzero(kept) if held.any() else slice(None)
         self.indices = place[self._rows[kept]].astype(np.int32)
@@ -88,8 +89,8 @@ class ElementSystem:
         """K, factorised."""
         return Factored(self, elements, linear.factorised(self.matrix(elements)))
 
-    def solve(self, elements: Parts, right: np.ndarray, value: np.ndarray) -> np.ndarray:
-        """x (n,) of K x = b (n,) with the prescribed unknowns as in ``value`` (n,)."""
+    def solve(self, elements: Parts, right: np.ndarray, value: np.ndarray | None = None) -> np.ndarray:
+        """x (n,) of K x = b (n,) with the prescribed unknowns as in ``value`` (n,), zero by default."""
         return self.factored(elements).solve(right, value)
 
 
@@ -101,13 +102,14 @@ class Factored:
     elements: Parts
     solver: linear.Solver
 
-    def solve(self, right: np.ndarray, value: np.ndarray) -> np.ndarray:
-        """x (n,) of K x = b (n,) with the prescribed unknowns as in ``value`` (n,)."""
-        order, known = self.system.order, np.where(self.system.held, value, 0.0)
-        if known.any():
-            right = right - self.system.product(self.elements, known)
-        known[order] = self.solver.solve(right[order])
-        return known
+    def solve(self, right: np.ndarray, value: np.ndarray | None = None) -> np.ndarray:
+        """x (n,) of K x = b (n,) with the prescribed unknowns as in ``value`` (n,), zero by default."""
+        order, found = self.system.order, np.zeros(len(right))
+        if value is not None:
+            found = np.where(self.system.held, value, 0.0)
+            right = right - self.system.product(self.elements, found)
+        found[order] = self.solver.solve(right[order])
+        return found
 
 
 def _several(parts: Parts) -> tuple[np.ndarray, ...]:
@@ -118,12 +120,6 @@ def _several(parts: Parts) -> tuple[np.ndarray, ...]:
 def _flat(parts: Sequence[np.ndarray]) -> np.ndarray:
     """One after the other, flattened."""
     return parts[0].ravel() if len(parts) == 1 else np.concatenate([part.ravel() for part in parts])
-
-
-def _pairs(kinds: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Row and column unknown of every entry of element matrices (T, k, k), flattened."""
-    return (_flat([np.repeat(kind, kind.shape[1], axis=1) for kind in kinds]),
-            _flat([np.tile(kind, (1, kind.shape[1])) for kind in kinds]))
 
 
 def saddle_blocks(upper: np.ndarray, divergence: np.ndarray, lower: np.ndarray | None = None) -> np.ndarray:

@@ -260,10 +260,11 @@ def _closing_run(outline: Outline, gap: np.ndarray, line: int, step: int, film: 
     """Free nodes from a contact line outwards, up to the last one with too little fluid between it and the wall."""
     count = len(gap)
     walk = (line + step * np.arange(1, count)) % count
-    free = np.cumprod(outline.wall[walk] == FREE).astype(bool)
-    x = outline.points[:, 0]
-    along = np.sign(x[line] - x[line - step]) * (x[walk] - x[line])
-    other = walk[np.count_nonzero(free)]  # where the free nodes end: on the same wall, the nearer line takes a node
-    nearer = (outline.wall[other] != outline.wall[line]) | (np.abs(x[walk] - x[line]) <= np.abs(x[walk] - x[other]))
-    thin = free & ((nearer & (gap[walk] < 0)) | (gap[walk] < np.minimum(film, slope * along)))
+    reach = np.flatnonzero(outline.wall[walk] != FREE)[0]
+    walk, other = walk[:reach], walk[reach]  # the free nodes end there: on the same wall, the nearer line takes a node
+    x, gaps = outline.points[:, 0], gap[walk]
+    apart = x[walk] - x[line]
+    nearer = (outline.wall[other] != outline.wall[line]) | (np.abs(apart) <= np.abs(x[walk] - x[other]))
+    along = np.sign(x[line] - x[line - step]) * apart
+    thin = (nearer & (gaps < 0)) | (gaps < np.minimum(film, slope * along))
     return walk[: np.flatnonzero(thin)[-1] + 1] if thin.any() else walk[:0]

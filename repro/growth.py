@@ -19,6 +19,7 @@ With A = mu J^(-2/3) and H = F^-T (dJ = J H : dF), first Piola-Kirchhoff stress 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -81,6 +82,56 @@ def inverse_transpose(F: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return H / J[..., None, None], J
 
 
+@dataclass(frozen=True, eq=False)
+class Strained:
+    """Plane deformations F (..., 2, 2) and what stress and tangent take from them, each worked out once."""
+
+    F: np.ndarray
+
+    @cached_property
+    def _inverse(self) -> tuple[np.ndarray, np.ndarray]:
+        return inverse_transpose(self.F)
+
+    @property
+    def H(self) -> np.ndarray:
+        """(..., 2, 2) F^-T."""
+        return self._inverse[0]
+
+    @property
+    def J(self) -> np.ndarray:
+        """(...) det F."""
+        return self._inverse[1]
+
+    @cached_property
+    def A(self) -> np.ndarray:
+        """(...) J^(-2/3)."""
+        return self.J ** (-2 / 3)
+
+    @cached_property
+    def trace(self) -> np.ndarray:
+        """(...) tr C."""
+        return np.sum(self.F**2, axis=(-2, -1)) + 1
+
+    def piola(self, P: np.ndarray) -> np.ndarray:
+        """First Piola-Kirchhoff stress (..., 2, 2), the derivative of (21) by F, at a pressure P (...); both over mu_L.
+        """
+        return self.A[..., None, None] * self.F + (P * self.J - self.A * self.trace / 3)[..., None, None] * self.H
+
+    def tangent(self, P: np.ndarray) -> np.ndarray:
+        """d piola / d F, (..., i, K, j, L), over mu_L."""
+        F, H, A, trace, PJ = self.F, self.H, self.A, self.trace, P * self.J
+        first, second = (F[..., None, None], H[..., None, None]), (F[..., None, None, :, :], H[..., None, None, :, :])
+        FH, HF, HH = first[0] * second[1], first[1] * second[0], first[1] * second[1]
+        swap = np.swapaxes(HH, -3, -1)
+        identity = np.einsum("ij,kl->ikjl", np.eye(2), np.eye(2))
+
+        def times(scalar, tensor):
+            return scalar[..., None, None, None, None] * tensor
+
+        return (times(A, identity - 2 / 3 * (FH + HF)) + times(2 / 9 * A * trace + PJ, HH)
+                + times(A * trace / 3 - PJ, swap))
+
+
 def energy(F: np.ndarray) -> np.ndarray:
     """mu/2 (J^(-2/3) tr C - 3) for mu = 1 (17), of F (..., 2, 2)."""
     J = np.linalg.det(F)
@@ -88,28 +139,13 @@ def energy(F: np.ndarray) -> np.ndarray:
 
 
 def piola(F: np.ndarray, P: np.ndarray) -> np.ndarray:
-    """First Piola-Kirchhoff stress (..., 2, 2) over mu_L, at pressure P (...) over mu_L: derivative of (21) by F."""
-    H, J = inverse_transpose(F)
-    trace = np.sum(F**2, axis=(-2, -1)) + 1
-    A, PJ = J ** (-2 / 3), P * J
-    return A[..., None, None] * F + (PJ - A * trace / 3)[..., None, None] * H
+    """:meth:`Strained.piola` of F (..., 2, 2)."""
+    return Strained(F).piola(P)
 
 
 def tangent(F: np.ndarray, P: np.ndarray) -> np.ndarray:
-    """d piola / d F, (..., i, K, j, L), over mu_L."""
-    H, J = inverse_transpose(F)
-    trace = np.sum(F**2, axis=(-2, -1)) + 1
-    A, PJ = J ** (-2 / 3), P * J
-    first, second = (F[..., None, None], H[..., None, None]), (F[..., None, None, :, :], H[..., None, None, :, :])
-    FH, HF, HH = first[0] * second[1], first[1] * second[0], first[1] * second[1]
-    swap = np.swapaxes(HH, -3, -1)
-    identity = np.einsum("ij,kl->ikjl", np.eye(2), np.eye(2))
-
-    def times(scalar, tensor):
-        return scalar[..., None, None, None, None] * tensor
-
-    return (times(A, identity - 2 / 3 * (FH + HF)) + times(2 / 9 * A * trace + PJ, HH)
-            + times(A * trace / 3 - PJ, swap))
+    """:meth:`Strained.tangent` of F (..., 2, 2)."""
+    return Strained(F).tangent(P)
 
 
 def cauchy(F: np.ndarray, P: np.ndarray) -> np.ndarray:
@@ -159,7 +195,7 @@ class System:
         self.strains = _strains(self.slopes)
         self.stabilising = stabilising
         self.sparse = body.sparse
-        self.unknowns, self.free = self.sparse.kinds[0], ~self.sparse.held
+        self.unknowns, self.free = self.sparse.kinds[0], self.sparse.free
 
     def residual(self, position: np.ndarray, pressure: np.ndarray, theta: np.ndarray):
         """Residual (3n,) [x of all nodes, y, then P] and the size of its terms; the caller excludes det F <= 0."""
@@ -250,7 +286,7 @@ def _newton(system: System, theta, position, pressure, target):
         last, defect = defect, _relative(residual[system.free], size[system.free])
         if not lag.any() and (defect <= NEWTON or 0.1 * last < defect <= ROUND_OFF):
             return position, pressure, iteration
-        move = np.concatenate([lag[:, 0], lag[:, 1], np.zeros(len(pressure))])
+        move = np.concatenate([lag[:, 0], lag[:, 1], np.zeros(len(pressure))]) if lag.any() else None
         if jacobian.stale(defect):
             jacobian.factors = system.sparse.factored(system.tangent(position, pressure, theta))
         step = jacobian.factors.solve(-residual, move)

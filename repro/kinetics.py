@@ -16,6 +16,11 @@ from __future__ import annotations
 import numpy as np
 
 
+def fraction(concentration, half_saturation: float):
+    """m of :func:`monod` alone."""
+    return concentration / (np.maximum(concentration, 0.0) + half_saturation)
+
+
 def monod(concentration, half_saturation: float):
     """m = C / (C + K) and dm/dC for C >= 0; below zero their tangent at zero, C / K and 1 / K. Shapes as C's (mg/L)."""
     bounded = np.maximum(concentration, 0.0) + half_saturation
@@ -25,6 +30,11 @@ def monod(concentration, half_saturation: float):
 def _both(acceptor, donor, substrates):
     """:func:`monod` of the acceptor and of the donor."""
     return monod(acceptor, substrates.acceptor.half_saturation), monod(donor, substrates.donor.half_saturation)
+
+
+def _fractions(acceptor, donor, substrates):
+    """:func:`fraction` of the acceptor and of the donor."""
+    return fraction(acceptor, substrates.acceptor.half_saturation), fraction(donor, substrates.donor.half_saturation)
 
 
 def decay_demand(kinetics) -> float:
@@ -47,25 +57,37 @@ def uptake(acceptor, donor, substrates, kinetics):
 
 
 def paired_uptake(acceptor, donor, substrates, kinetics):
-    """As :func:`uptake`, but with one rate r = k m_A m_D for both substrates below zero too, where quadratic functions
-    may go by a little: what is taken up of one stays in proportion to the other. r is zero where both are negative.
+    """(q_A, q_D) as :func:`uptake`'s (1/h), but with one rate r = k m_A m_D for both substrates below zero too, where
+    quadratic functions may go by a little: what is taken up of one stays in proportion to the other. r is zero where
+    both are negative.
     """
+    m_a, m_d = _fractions(acceptor, donor, substrates)
+    rate = _paired_most(m_a, m_d, kinetics) * m_a * m_d
+    return kinetics.acceptor_to_donor_ratio * rate + decay_demand(kinetics) * m_a, rate
+
+
+def paired_slopes(acceptor, donor, substrates, kinetics):
+    """Derivatives of :func:`paired_uptake` (1/h per mg/L): ((dq_A/dC_A, dq_A/dC_D), (dq_D/dC_A, dq_D/dC_D))."""
     (m_a, d_a), (m_d, d_d) = _both(acceptor, donor, substrates)
-    demand, decay = kinetics.acceptor_to_donor_ratio, decay_demand(kinetics)
-    k = np.where((m_a < 0) & (m_d < 0), 0.0, kinetics.maximum_utilization_rate)
-    rate, by_a, by_d = k * m_a * m_d, k * d_a * m_d, k * m_a * d_d
-    return demand * rate + decay * m_a, rate, ((demand * by_a + decay * d_a, demand * by_d), (by_a, by_d))
+    demand, k = kinetics.acceptor_to_donor_ratio, _paired_most(m_a, m_d, kinetics)
+    by_a, by_d = k * d_a * m_d, k * m_a * d_d
+    return (demand * by_a + decay_demand(kinetics) * d_a, demand * by_d), (by_a, by_d)
+
+
+def _paired_most(m_a, m_d, kinetics):
+    """k (1/h), and zero where both fractions are negative."""
+    return np.where((m_a < 0) & (m_d < 0), 0.0, kinetics.maximum_utilization_rate)
 
 
 def growth_rate(acceptor, donor, substrates, kinetics):
     """F3 / X_A (1/h), net growth of active biomass (9)."""
-    (m_a, _), (m_d, _) = _both(acceptor, donor, substrates)
+    m_a, m_d = _fractions(acceptor, donor, substrates)
     return m_a * (kinetics.maximum_utilization_rate * kinetics.yield_coefficient * m_d - kinetics.decay_coefficient)
 
 
 def inert_rate(acceptor, substrates, kinetics):
     """F4 / X_A (1/h), inert remains left by decay (10)."""
-    m_a, _ = monod(acceptor, substrates.acceptor.half_saturation)
+    m_a = fraction(acceptor, substrates.acceptor.half_saturation)
     return m_a * kinetics.decay_coefficient * (1 - kinetics.degradable_fraction)
 
 

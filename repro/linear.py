@@ -48,10 +48,17 @@ def _package(name: str):
                           "numerics.ordering out") from None
 
 
-def node_order(count: int, elements: np.ndarray) -> np.ndarray:
-    """(count,) nodes in a fill-reducing order, from the elements (T, k) that couple them."""
+def pairs(elements: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(T, k k) row and column of every entry of the matrices of elements (T, k)."""
     k = elements.shape[1]
-    rows, columns = np.repeat(elements, k, axis=1).ravel(), np.tile(elements, (1, k)).ravel()
+    return np.repeat(elements, k, axis=1), np.tile(elements, (1, k))
+
+
+def node_order(count: int, elements: np.ndarray) -> np.ndarray:
+    """(count,) nodes in a fill-reducing order, from the elements (T, k) that couple them; each node is in one at least.
+    """
+    k = elements.shape[1]
+    rows, columns = (part.ravel() for part in pairs(elements))
     dominant = np.tile((np.ones((k, k)) + k * np.eye(k)).ravel(), len(elements))
     graph = sp.csc_array((dominant, (rows, columns)), shape=(count, count))
     return (_dissected if _chosen["ordering"] == "metis" else _by_degree)(graph)

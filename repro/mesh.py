@@ -52,7 +52,7 @@ class PoreMesh:
     def edges(self) -> np.ndarray:
         """(T, 3, 2) um: edge i of a triangle is opposite its node i."""
         corner = self.points[self.triangles]
-        return np.roll(corner, -2, axis=1) - np.roll(corner, -1, axis=1)
+        return np.take(corner, [2, 0, 1], axis=1) - np.take(corner, [1, 2, 0], axis=1)
 
     @cached_property
     def areas(self) -> np.ndarray:
@@ -154,7 +154,7 @@ def triangle_areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 def gradients(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """(T, 3, 2) gradients of the linear nodal functions."""
     corner = points[triangles]
-    edge = np.roll(corner, -2, axis=1) - np.roll(corner, -1, axis=1)
+    edge = np.take(corner, [2, 0, 1], axis=1) - np.take(corner, [1, 2, 0], axis=1)
     double = 2 * triangle_areas(points, triangles)[:, None]
     return np.stack([-edge[:, :, 1] / double, edge[:, :, 0] / double], axis=2)
 

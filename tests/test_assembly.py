@@ -32,6 +32,7 @@ def test_kinds_of_elements_make_one_system(held):
     found = system.solve(ELEMENTS, right, value)
     assert np.array_equal(found[held], value[held])
     assert np.allclose((K @ found - right)[order], 0, atol=1e-11)
+    assert np.array_equal(system.solve(ELEMENTS, right), system.solve(ELEMENTS, right, 0 * value))
 
 
 def test_a_missing_kind_is_refused():

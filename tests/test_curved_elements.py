@@ -131,6 +131,31 @@ def test_no_triangle_has_two_edges_on_the_boundary_of_its_region():
     assert (alone < 2).all()
 
 
+def test_a_middle_lies_between_the_ends_of_its_edge(grid):
+    """``edges`` are in the order of the middles' nodes: a linear field keeps its values at straight middles. Mutants:
+    the edges of a triangle in another order than its middles, middles at one of the ends."""
+    straight = grid.with_middles(grid.points[: grid.corners])
+    inner = np.setdiff1d(np.arange(len(grid.points)), grid.loop)
+    made = pore.seeded(scene("20 um", numerics={"preset": "fast"})).mesh
+    assert np.allclose(straight[inner], made.points[inner], rtol=0, atol=1e-12)
+    assert np.allclose(grid.with_middles(straight[: grid.corners] @ [2.0, -3.0]), straight @ [2.0, -3.0])
+
+
+def test_only_triangles_at_the_aggregate_are_bent(grid):
+    """In a mesh that was made, the others are straight, which ``acceptable`` stands on; and a bent one that is turned
+    over is found. Mutants: those of the biomass alone, those of the fluid."""
+    made = pore.seeded(scene("20 um", numerics={"preset": "fast"})).mesh
+    straight, others = made.moved(made.with_middles(made.points[: made.corners])), np.ones(len(made.cells), bool)
+    others[made.bent] = False
+    assert np.allclose(made.points[made.cells[others]], straight.points[made.cells[others]], rtol=0, atol=1e-12)
+    apart = np.abs(made.points[made.cells] - straight.points[made.cells]).max(axis=(1, 2))
+    assert not made.biomass[made.bent[apart[made.bent] > 0.01]].all() and made.acceptable()
+    points = made.points.copy()
+    middle = made.loop[np.flatnonzero(points[made.loop, 1] > 10)[0] // 2 * 2 + 1]
+    points[middle, 1] += 10.0
+    assert not made.moved(points).acceptable()
+
+
 def test_a_triangle_that_is_turned_over_is_refused(grid):
     """A middle pulled across its triangle. Mutant: only the corners' area looked at."""
     assert not grid.turned_over().any()

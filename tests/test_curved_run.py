@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from repro import results, simulation
-from repro.curved import coupling, elements
+from repro.curved import coupling
 from repro.curved import growth as mechanics
 from repro.curved import results as curved_results
 from repro.kinetics import growth_rate, inert_rate
 from repro.rules import CURVED
 from repro.scene import PRESETS, Numerics, load_scene, parse_scene, scene_tables
+from repro.transport import Concentrations
 from repro.units import SceneError
 from tests.strategies import scene
 
@@ -46,6 +47,18 @@ def test_growth_in_plenty_is_exponential_and_round():
     assert last.pore.outline.area == pytest.approx(wanted, rel=1e-6)
     free = last.pore.outline.wall == 0
     assert np.allclose(np.hypot(*last.pore.outline.points[free].T), np.sqrt(2 * wanted / np.pi), rtol=1e-4)
+
+
+def test_the_first_guess_at_a_step_s_end():
+    """As much change again as the first half has made; not below zero, nor on another mesh. Mutants: the half's own
+    state, a guess below zero."""
+    start, half, other = (Concentrations(np.array(a), np.array(b)) for a, b in (
+        ([3.0, 2.0], [5.0, 4.0]), ([2.5, 1.5], [5.0, 3.5]), ([1.0], [1.0])))
+    guess = coupling._extrapolated(start, half)
+    assert np.array_equal(guess.acceptor, [2.0, 1.0]) and np.array_equal(guess.donor, [5.0, 3.0])
+    assert coupling._extrapolated(start, other) is start
+    spent = replace(half, acceptor=np.array([2.5, 0.5]))
+    assert coupling._extrapolated(start, spent) is spent
 
 
 def test_density_is_kept(contact):
@@ -123,8 +136,8 @@ def test_fields_are_written_on_curved_triangles(contact, tmp_path):
     assert (read.cell_data["theta"][0][found[-1].pore.mesh.biomass] > 1).all()
     grid, head = found[-1].pore.mesh, read.point_data["head_cm"]
     assert np.allclose(head[grid.cells[:, 3]], 0.5 * (head[grid.cells[:, 0]] + head[grid.cells[:, 1]]))
-    assert head[grid.inlet].mean() > 0 and elements.determinant(mechanics.System(mechanics.of(
-        found[-1].pore)).deformed(grid.points[body])[0]).min() > 0
+    assert head[grid.inlet].mean() > 0 and mechanics.System(mechanics.of(
+        found[-1].pore)).deformed(grid.points[body]).J.min() > 0
 
 
 TABLES = {"aggregate": {}, "flow": {"head": "1e-3 cm"}, "substrates": {}, "growth": {"end": "1 h"}}

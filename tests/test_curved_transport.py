@@ -142,11 +142,24 @@ def test_the_tangent_is_the_derivative_of_the_balance(held):
     weight, random = transport.sinks(found.problem, pore.active_biomass(made, now)), np.random.default_rng(1)
     state = 1 + 8 * random.random(2 * len(now.mesh.points))
     move = random.standard_normal(len(state))
-    start, _ = transport.balance(found.problem, weight, state)
+    start = transport.balance(found.problem, weight, state)
     linear = found.problem.system.product(transport.tangent(found.problem, weight, state), move)
-    left = [np.abs(transport.balance(found.problem, weight, state + s * move)[0] - start - s * linear).max()
+    left = [np.abs(transport.balance(found.problem, weight, state + s * move) - start - s * linear).max()
             for s in (0.02, 0.01, 0.005)]
     assert all(3.6 < a / b < 4.4 for a, b in zip(left, left[1:]))
+
+
+def test_the_sizes_of_the_terms_bound_the_balance():
+    """They do not cancel: no residual is larger, of either sign of the concentrations, and without biomass they are
+    those of the linear parts. Mutants: the uptake's terms left out, a size of the state with its sign."""
+    made = thick("2.9 m/day")
+    now, found = solved(made)
+    problem, random = found.problem, np.random.default_rng(2)
+    weight = 100 * transport.sinks(problem, pore.active_biomass(made, now))
+    state = random.uniform(-1, 1, 2 * len(now.mesh.points))
+    sizes = transport.terms(problem, weight, state)
+    assert (np.abs(transport.balance(problem, weight, state)) <= sizes * (1 + 1e-12)).all()
+    assert np.allclose(transport.terms(problem, None, state), abs(problem.operator) @ abs(state) + problem.source)
 
 
 def test_substrates_are_coupled_in_the_biomass_alone():

@@ -82,8 +82,7 @@ def attempt(scene, now: Pore, solved: Solved, duration: float, most: float = np.
     expanded, iterations, gap = expand(scene, _ahead(now, half.shape, after))
     if leaves := pore_end(scene, expanded, 0.1):
         raise PoreEnd(f"{leaves} in the step from t = {now.time:g} h")
-    guess = half.solved.concentrations
-    guess = guess if len(guess.acceptor) == len(now.mesh.points) else solved.concentrations
+    guess = _extrapolated(solved.concentrations, half.solved.concentrations)
     new, remeshed = new_mesh(scene, now, expanded, guess)
     flows = {key: tuple(duration * getattr(flux, key) for flux in half.solved.fluxes)
              for key in ("supplied", "out", "consumed")}
@@ -93,6 +92,15 @@ def attempt(scene, now: Pore, solved: Solved, duration: float, most: float = np.
                     biomass_after=density * new.mesh.area())
     return Attempt(Step(new, (now, solved), ledger, remeshed, iterations), half.change,
                    first_contact(scene, now, expanded, gap))
+
+
+def _extrapolated(start: Concentrations, half: Concentrations) -> Concentrations:
+    """A first guess of the substrates at the end: as much change again as the first half of the step has made. Where
+    that takes one below zero, what they are half way; where the mesh there is another, what they are at the start."""
+    if len(half.acceptor) != len(start.acceptor):
+        return start
+    acceptor, donor = 2 * half.acceptor - start.acceptor, 2 * half.donor - start.donor
+    return replace(start, acceptor=acceptor, donor=donor) if min(acceptor.min(), donor.min()) >= 0 else half
 
 
 def _scaled(now: Pore, after: Pore) -> Pore:
@@ -187,9 +195,7 @@ def follow(scene, now: Pore, expanded: Pore):
     grid, straight = now.mesh, now.mesh.straight
     corners = mesh_motion.move(straight, expanded.mesh.points[straight.body], scene.numerics.mesh_compressibility,
                                scene.numerics.flow_stabilisation)
-    points = np.empty_like(grid.points)
-    points[: grid.corners] = corners
-    points[grid.cells[:, 3:]] = 0.5 * (corners[grid.cells[:, :3]] + corners[grid.cells[:, [1, 2, 0]]])
+    points = grid.with_middles(corners)
     points[grid.body] = expanded.mesh.points[grid.body]
     return grid.moved(points)
 

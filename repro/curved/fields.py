@@ -67,7 +67,6 @@ class Functions:
         """(q, k k) of two nodal functions."""
         return (self.values[:, :, None] * self.values[:, None, :]).reshape(len(self.weights), -1)
 
-
 def _functions(order: int) -> Functions:
     area, line = DEGREES[order]
     (s,), line_weights = get_quadrature_line(line)
@@ -160,13 +159,14 @@ class Space:
         return values[..., cells] @ self.of.values.T
 
     def mass(self, coefficient: np.ndarray) -> np.ndarray:
-        """(..., t, k, k) of (c u, v) with c dx (..., t, q)."""
+        """(t, k, k) of (c u, v) with c dx (t, q)."""
         k = self.cells.shape[1]
-        return (coefficient @ self.of.products).reshape(*coefficient.shape[:-1], k, k)
+        return (coefficient @ self.of.products).reshape(-1, k, k)
 
     def load(self, coefficient: np.ndarray) -> np.ndarray:
-        """(..., t, k) of (c, v) with c dx (..., t, q)."""
-        return coefficient @ self.of.values
+        """(t, ..., k) of (c, v) with c dx (t, ..., q), all in one product of two matrices."""
+        flat = coefficient.reshape(-1, coefficient.shape[-1])
+        return (flat @ self.of.values).reshape(*coefficient.shape[:-1], -1)
 
     def end_nodes(self, edges: np.ndarray) -> np.ndarray:
         """Nodes of an end's edges, each once."""

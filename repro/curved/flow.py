@@ -38,7 +38,7 @@ def unit_flow(mesh: CurvedMesh, viscosity_ratio: float, order: int = 2) -> tuple
     share = here.points[inlet, 1] / mesh.width
     value[inlet] = 6 * share * (1 - share)
     held = system.product(blocks, value)
-    found = value + system.solve(blocks, -held, np.zeros(len(value)))
+    found = value + system.solve(blocks, -held)
     loss = float(held @ found) / mesh.width
     return found[: 2 * here.count].reshape(2, here.count).T, found[2 * here.count:], loss
 

@@ -14,13 +14,15 @@ was made, where it is integrated, times the expansion e since then, a quadratic 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
-from repro.assembly import ElementSystem, saddle_blocks, saddle_system
+from repro.assembly import ElementSystem, each, saddle_blocks, saddle_system
 from repro.curved import elements
-from repro.growth import Equilibrium, inverse_transpose, piola, reach, refuse_turned_over, tangent
+from repro.growth import Equilibrium, Strained, reach, refuse_turned_over
 from repro.timing import timed
 
 #: gamma: the energy's curvature in J is -2/9 J^(-5/3) and less, so that one makes it convex with room to spare.
@@ -64,6 +66,14 @@ class Body:
         return self.topology["origin"]
 
     @property
+    def weighted(self) -> tuple[np.ndarray, np.ndarray]:
+        """Its gradients times weights, (t, 2 q, 6) um, and the sizes of these."""
+        if "weighted" not in self.topology:
+            found = self.places.weighted
+            self.topology["weighted"] = found, np.abs(found)
+        return self.topology["weighted"]
+
+    @property
     def expanded(self) -> np.ndarray:
         """(t, q) J of the reference."""
         if "expanded" not in self.topology:
@@ -79,64 +89,86 @@ def of(pore, held: np.ndarray | None = None, reused: bool = False) -> Body:
                 held, grid.once("growth", dict), reused)
 
 
+class Last:
+    """A function of one array, its last result kept until another array is asked for."""
+
+    def __init__(self, function: Callable[[np.ndarray], Any]):
+        self.function = function
+        self.of: Any = None
+        self.found: Any = None
+
+    def __call__(self, array: np.ndarray) -> Any:
+        if self.of is not array:
+            self.of, self.found = array, self.function(array)
+        return self.found
+
+
 class System:
     """Residual and tangent for one body, in the shape that :func:`repro.growth.reach` asks for."""
 
     def __init__(self, body: Body):
         self.body, self.sparse = body, body.sparse
         self.at = body.places
-        self.unknowns, self.free = self.sparse.kinds[0], ~self.sparse.held
-        self._last: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+        self.unknowns, self.free = self.sparse.kinds[0], self.sparse.free
+        self.weighted, self.magnitude = body.weighted
+        self.deformed, self._stabilising = Last(self._deformed), Last(lambda theta: GAMMA * theta ** (-5 / 3))
+        self._sized: tuple[Any, Any] = None, None
 
-    def deformed(self, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """F[i, K] = d x_i / d X_K (t, q, 2, 2) and J (t, q), kept until another position is asked for."""
-        if self._last is None or self._last[0] is not position:
-            slopes = self.at.rows @ position[self.body.cells]
-            F = np.ascontiguousarray(np.swapaxes(slopes.reshape(*self.at.dx.shape, 2, 2), 2, 3))
-            self._last = position, F, elements.determinant(F)
-        return self._last[1:]
+    def _deformed(self, position: np.ndarray) -> Strained:
+        """F[i, K] = d x_i / d X_K (t, q, 2, 2) and what goes with it."""
+        slopes = np.swapaxes(position[self.body.cells], 1, 2) @ np.swapaxes(self.at.rows, 1, 2)
+        count, points = self.at.dx.shape
+        return Strained(elements.by_component(slopes.reshape(count, 2, points, 2).transpose(1, 3, 0, 2)))
 
-    def _strained(self, position, pressure, theta):
-        """F (t, q, 2, 2), J, and P with its stabilisation (t, q)."""
-        F, J = self.deformed(position)
+    def _pressed(self, position, pressure, theta) -> tuple[Strained, np.ndarray]:
+        """The deformation, and P with its stabilisation (t, q)."""
+        at = self.deformed(position)
         linear = pressure[self.body.cells[:, :3]] @ elements.LINEAR.T
-        return F, J, linear + GAMMA * theta ** (-5 / 3) * (J - theta)
+        return at, linear + self._stabilising(theta) * (at.J - theta)
 
-    def _forces(self, stress: np.ndarray, slopes: np.ndarray) -> np.ndarray:
-        """(t, 2, 6) of the integral of stress (t, q, 2, 2) : grad v, slopes (t, 2 q, 6) being those of v."""
-        weighted = self.at.dx[..., None, None] * stress
-        return np.moveaxis(weighted, 2, 1).reshape(len(stress), 2, -1) @ slopes
+    def _forces(self, stress: np.ndarray, weighted: np.ndarray) -> np.ndarray:
+        """(t, 2, 6) of the integral of stress (t, q, 2, 2) : grad v, weighted (t, 2 q, 6) being dx grad v."""
+        return np.swapaxes(stress, 1, 2).reshape(len(stress), 2, -1) @ weighted
 
     def residual(self, position: np.ndarray, pressure: np.ndarray, theta: np.ndarray):
-        """Residual [x of all nodes, y, then P of the corners] and the size of its terms; theta: (t, q)."""
-        F, J, P = self._strained(position, pressure, theta)
-        dx, slopes = self.at.dx, self.at.rows
-        force = self._forces(piola(F, P), slopes)
-        terms = self._forces(J[..., None, None] ** (-2 / 3) * np.abs(F), np.abs(slopes))
-        gap, scale = (dx * (J - theta)) @ elements.LINEAR, (dx * theta) @ elements.LINEAR
-        n = 2 * len(position) + self.body.corners
-        return tuple(np.bincount(self.unknowns.ravel(), np.concatenate([a[:, 0], a[:, 1], b], axis=1).ravel(), n)
-                     for a, b in ((force, gap), (terms, scale)))
+        """Residual [x of all nodes, y, then P of the corners] and the size of its terms where this theta (t, q) was
+        first asked for."""
+        at, P = self._pressed(position, pressure, theta)
+        force, gap = self._forces(at.piola(P), self.weighted), (self.at.dx * (at.J - theta)) @ elements.LINEAR
+        if self._sized[0] is not theta:
+            terms = self._forces(at.A[..., None, None] * np.abs(at.F), self.magnitude)
+            self._sized = theta, self._summed(terms, (self.at.dx * theta) @ elements.LINEAR)
+        return self._summed(force, gap), self._sized[1]
+
+    def _summed(self, force: np.ndarray, gap: np.ndarray) -> np.ndarray:
+        """Of all triangles, from (t, 2, 6) and (t, 3)."""
+        local = np.concatenate([force[:, 0], force[:, 1], gap], axis=1)
+        return np.bincount(self.unknowns.ravel(), local.ravel(), len(self.sparse.held))
 
     def tangent(self, position: np.ndarray, pressure: np.ndarray, theta: np.ndarray) -> np.ndarray:
         """(t, 15, 15) symmetric element matrices of the residual's derivative."""
-        F, _, P = self._strained(position, pressure, theta)
-        count, points = F.shape[:2]
-        unit = np.zeros((count, points, 4, 12))
-        unit[:, :, :2, :6] = unit[:, :, 2:, 6:] = self.at.slopes
-        H, J = inverse_transpose(F)
-        JH = (J[..., None, None] * H).reshape(count, points, 4)
-        stiff = (GAMMA * theta ** (-5 / 3))[..., None, None] * JH[..., :, None] * JH[..., None, :]
-        moduli = self.at.dx[..., None, None] * (tangent(F, P).reshape(count, points, 4, 4) + stiff)
-        stacked = unit.reshape(count, -1, 12)
-        K = np.swapaxes(stacked, 1, 2) @ (moduli @ unit).reshape(count, -1, 12)
-        slope = ((self.at.dx * J)[..., None, None] * H) @ self.at.slopes
-        B = elements.LINEAR.T @ slope.reshape(count, points, 12)
+        at, P = self._pressed(position, pressure, theta)
+        h, f, dx, PJ = self._pulled(at.H), self._pulled(at.F), self.at.dx, P * at.J
+        both = 2 / 9 * at.A * at.trace + PJ + self._stabilising(theta) * at.J**2
+        half = each(dx * both / 2, h) - each(2 / 3 * dx * at.A, f)
+        swap = each(dx * (at.A * at.trace / 3 - PJ), h)
+        found = np.swapaxes(h, 1, 2) @ np.concatenate([half, swap], axis=2)
+        K = found[:, :, :12] + np.swapaxes(found[:, :, :12], 1, 2)
+        exchanged = K.reshape(-1, 2, 6, 2, 6)
+        exchanged += np.swapaxes(found[:, :, 12:].reshape(exchanged.shape), 1, 3)
+        plain = np.swapaxes(self.at.rows, 1, 2) @ (np.repeat(at.A, 2, axis=1)[:, :, None] * self.weighted)
+        exchanged[:, 0, :, 0] += plain
+        exchanged[:, 1, :, 1] += plain
+        B = elements.LINEAR.T @ each(dx * at.J, h)
         return saddle_blocks(K, -B)
+
+    def _pulled(self, tensor: np.ndarray) -> np.ndarray:
+        """(t, q, 12) a tensor (t, q, 2, 2) times grad N_a: component x for every node a, then y."""
+        return (tensor @ self.at.slopes).reshape(*self.at.dx.shape, 12)
 
     def admissible(self, position: np.ndarray) -> bool:
         """Is det F > 0 wherever it is integrated?"""
-        return bool(self.deformed(position)[1].min() > 0)
+        return bool(self.deformed(position).J.min() > 0)
 
 
 @timed("growth")
@@ -144,7 +176,7 @@ def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: n
                 prescribed: np.ndarray) -> Equilibrium:
     """Equilibrium under theta (n,) nodal since the reference; other arguments as :func:`repro.growth.equilibrium`'s."""
     system = System(body)
-    _, start = system.deformed(position)
+    start = system.deformed(position).J
     target = elements.at_points(theta, body.cells) * body.expanded
     refuse_turned_over(start, target)
     parts = int(np.ceil(np.abs(np.log(target / start)).max() / np.log(FACTOR)))

@@ -107,9 +107,30 @@ class CurvedMesh:
         """The same triangles with their nodes at ``points`` (N, 2)."""
         return replace(self, points=points)
 
-    def turned_over(self) -> np.ndarray:
-        """(T,) is the map of a triangle not one to one where it is integrated, or at its nodes?"""
-        return elements.determinant(elements.jacobian(self.points[self.cells], CHECKED)).min(axis=1) <= 0
+    @property
+    def edges(self) -> np.ndarray:
+        """(E, 2) corners at the ends of every edge, the middle of which is node ``corners`` + its number."""
+        return self.once("edges", self._edges)
+
+    def _edges(self) -> np.ndarray:
+        found = np.empty((len(self.points) - self.corners, 2), int)
+        found[self.cells[:, 3:] - self.corners] = np.stack([self.cells[:, :3], self.cells[:, elements.NEXT]], axis=2)
+        return found
+
+    def with_middles(self, field: np.ndarray) -> np.ndarray:
+        """(N, ...) a linear field (corners, ...) at the middles of the edges too."""
+        a, b = self.edges.T
+        return np.concatenate([field, 0.5 * (field[a] + field[b])])
+
+    def turned_over(self, which: np.ndarray | slice = slice(None)) -> np.ndarray:
+        """(T,) is the map of a triangle (of those in ``which``) not one to one where it is integrated, or at its nodes?
+        """
+        return elements.determinant(elements.jacobian(self.points[self.cells[which]], CHECKED)).min(axis=1) <= 0
+
+    @property
+    def bent(self) -> np.ndarray:
+        """Triangles with a node of the aggregate: the other ones of a mesh that has followed it are straight."""
+        return self.once("bent", lambda: np.flatnonzero(np.isin(self.cells, self.body).any(axis=1)))
 
     def strained_arcs(self) -> np.ndarray:
         """(M,) has an arc of the outline a triangle beside it that is turned over?"""
@@ -125,8 +146,8 @@ class CurvedMesh:
         return self
 
     def acceptable(self) -> bool:
-        """The paper's criterion (3.5) for the straight triangles, and no curved one turned over."""
-        return self.straight.acceptable() and not self.turned_over().any()
+        """The paper's criterion (3.5) for the straight triangles, and none at the aggregate turned over."""
+        return self.straight.acceptable() and not self.turned_over(self.bent).any()
 
 
 #: Derivatives of the nodal functions at the six nodes and at the points of the quadrature.

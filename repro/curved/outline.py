@@ -53,12 +53,12 @@ class Arcs(Outline):
 
     @cached_property
     def _extremes(self) -> tuple[float, float, float, float]:
-        first, middle, last = np.moveaxis(arcs(self.points), 1, 0)
-        slope, bend = -3 * first + 4 * middle - last, 4 * (first - 2 * middle + last)
+        nodes = arcs(self.points)
+        slope, bend = slopes(nodes)
         flat = np.abs(bend) <= 1e-12 * np.ptp(self.points)
-        t = np.clip(np.where(flat, 0.0, -slope / np.where(flat, 1.0, bend)), 0.0, 1.0)
-        peak = [first + turn[:, None] * (slope + 0.5 * turn[:, None] * bend) for turn in t.T]
-        x, y = np.concatenate([*peak, self.points]).T
+        t = np.clip(np.where(flat, 0.0, -slope / np.where(flat, 1.0, bend)), 0.0, 1.0).T[..., None]
+        peaks = nodes[:, 0] + t * (slope + 0.5 * t * bend)
+        x, y = np.concatenate([*peaks, self.points]).T
         return float(x.min()), float(x.max()), float(y.max()), float(x[y.argmax()])
 
 
@@ -85,6 +85,12 @@ def arcs(values: np.ndarray) -> np.ndarray:
     """(M, 3, ...) nodes of each arc from values (2 M, ...) at all nodes."""
     ends = np.concatenate([values[2::2], values[:1]])
     return np.stack([values[::2], values[1::2], ends], axis=1)
+
+
+def slopes(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """First derivative by t at t = 0, and the second one, (M, ...) each, on arcs with nodes (M, 3, ...)."""
+    first, middle, last = nodes[:, 0], nodes[:, 1], nodes[:, 2]
+    return -3 * first + 4 * middle - last, 4 * (first - 2 * middle + last)
 
 
 def split(outline: Outline, width: float, refinement: float, film: float,
@@ -126,7 +132,7 @@ def _on_the_wall(outline: Outline, polygon: Outline, keep: np.ndarray, sizes, la
     arc = np.clip(np.searchsorted(sign * polygon.points[keep, 0], sign * x, side="right") - 1, 0, len(keep) - 2)
     nodes = arcs(outline.points)[keep[arc], :, 0]
     t = (x - nodes[:, 0]) / (nodes[:, 2] - nodes[:, 0])
-    slope, bend = -3 * nodes[:, 0] + 4 * nodes[:, 1] - nodes[:, 2], 4 * (nodes[:, 0] - 2 * nodes[:, 1] + nodes[:, 2])
+    slope, bend = slopes(nodes)
     for _ in range(6):
         t = t - (np.einsum("ka,ka->k", shape(t), nodes) - x) / (slope + bend * t)
     t = np.clip(t, 0.0, 1.0)
@@ -154,6 +160,8 @@ def closing(outline: Arcs, width: float, film: float, angle: float) -> np.ndarra
     depend on how many are taken at once. A middle joins with both corners of its arc, never alone.
     """
     joins = geometry.closing_nodes(outline, width, film, angle)
+    if (joins == FREE).all():
+        return joins
     if (outline.wall == geometry.TOP).any() or not (joins == geometry.TOP).any():
         joins = _next_arcs(outline, joins)
     else:

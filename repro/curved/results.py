@@ -19,7 +19,7 @@ def fields(scene, pore, solved) -> meshio.Mesh:
     points, cells = {}, {"region": grid.biomass.astype(float)}
     if solved.flow:
         points["velocity_m_per_d"] = _three(M_PER_D * solved.flow.velocity)
-        points["head_cm"] = CM * _at_all_nodes(grid, solved.flow.head)
+        points["head_cm"] = CM * grid.with_middles(solved.flow.head)
     if solved.concentrations:
         points["acceptor_mg_per_L"] = solved.concentrations.acceptor
         points["donor_mg_per_L"] = solved.concentrations.donor
@@ -33,27 +33,19 @@ def fields(scene, pore, solved) -> meshio.Mesh:
                        cell_data={name: [value] for name, value in cells.items()})
 
 
-def _at_all_nodes(grid, field: np.ndarray) -> np.ndarray:
-    """A linear field (corners,) at the middles too."""
-    found = np.zeros(len(grid.points))
-    found[: grid.corners] = field
-    found[grid.cells[:, 3:]] = 0.5 * (field[grid.cells[:, :3]] + field[grid.cells[:, [1, 2, 0]]])
-    return found
-
-
 def _add_mechanics(scene, pore, points: dict, cells: dict) -> None:
     grid, modulus = pore.mesh, scene.growth.shear_modulus
     body = np.isin(np.arange(len(grid.points)), grid.body)
     origin = np.where(body[:, None], pore.origin, grid.points)
     points["displacement_um"], points["position_t0_um"] = _three(grid.points - origin), _three(origin)
-    points["pressure_MPa"] = modulus * _at_all_nodes(grid, pore.pressure)
+    points["pressure_MPa"] = modulus * grid.with_middles(pore.pressure)
     system = mechanics.System(mechanics.of(pore))
-    F, _ = system.deformed(grid.points[grid.body])
+    strained = system.deformed(grid.points[grid.body])
     P = pore.pressure[grid.cells[grid.biomass][:, :3]] @ elements.LINEAR.T
-    stress = modulus * growth.cauchy(F, P)
+    stress = modulus * growth.cauchy(strained.F, P)
     expansion = (pore.active + pore.inert)[grid.cells[grid.biomass]] @ elements.QUADRATIC.T * system.body.expanded
     names = ("stress_xx_MPa", "stress_yy_MPa", "stress_zz_MPa", "stress_xy_MPa")
-    values = dict(zip(names, np.moveaxis(stress, -1, 0)), theta=expansion, J=elements.determinant(F),
+    values = dict(zip(names, np.moveaxis(stress, -1, 0)), theta=expansion, J=strained.J,
                   largest_principal_stress_MPa=growth.largest_principal(stress))
     for name, value in values.items():
         cells[name] = np.full(len(grid.cells), 1.0 if name in ("theta", "J") else 0.0)

@@ -63,12 +63,6 @@ class Problem:
         return self.space.mesh
 
     @property
-    def free(self):
-        """Index of the unknowns that are not held."""
-        held = self.system.held
-        return ~held if held.any() else slice(None)
-
-    @property
     def both(self):
         """Acceptor and donor, as the scene describes them."""
         return self.substrates.acceptor, self.substrates.donor
@@ -100,10 +94,11 @@ def problem(mesh: CurvedMesh, flow: Flow | None, substrates, kinetics, reused: b
 
 def _advection(here: Space, velocity: np.ndarray) -> np.ndarray:
     """(T, k, k) of -(C u, grad v), and of u_x C v over the outlet."""
-    at, values = here.at, here.of.values
-    u = (values @ velocity[here.cells]) * -at.dx[..., None]
-    along = np.einsum("tqi,tqik->tqk", u, at.slopes)
-    found = np.swapaxes(along, 1, 2) @ values
+    at = here.at
+    u_x, u_y = here.at_points(velocity.T, here.cells) * -at.dx
+    along = u_x[..., None] * at.slopes[:, :, 0]
+    along += u_y[..., None] * at.slopes[:, :, 1]
+    found = here.load(np.swapaxes(along, 1, 2))
     owner, place = here.mesh.once(("outlet triangles", here.cubic), lambda: _owners(here))
     blocks = _outlet_matrix(here, velocity[:, 0])
     found[owner[:, None, None], place[:, :, None], place[:, None, :]] += blocks
@@ -183,7 +178,7 @@ def steady(problem: Problem, active: np.ndarray | None, guess: Concentrations | 
 
 
 def sinks(problem: Problem, active: np.ndarray | None) -> np.ndarray | None:
-    """X_A dx (t, q) on the biomass from X_A (N,) at the mesh's nodes; None where nothing is taken up."""
+    """X_A dx (t, q), um2 mg/L, on the biomass, from X_A (N,) mg/L at the mesh's nodes; None: nothing is taken up."""
     if problem.kinetics is None or active is None:
         return None
     here, biomass = problem.space, problem.mesh.biomass
@@ -205,24 +200,26 @@ def _eased(problem: Problem, weight, state):
 
 
 def _newton(problem: Problem, weight, state, advance):
-    """(2n,) solution and Newton's iterations."""
-    jacobian, defect, nothing = Jacobian(problem.reused), np.inf, np.zeros(len(state))
-    residual, size = balance(problem, weight, state)
+    """(2n,) solution and Newton's iterations; sizes of the terms are those after the first step of each derivative."""
+    jacobian, defect = Jacobian(problem.reused), np.inf
+    residual, size = balance(problem, weight, state), terms(problem, weight, state)
     for iteration in range(MOST_ITERATIONS):
         last, defect = defect, _relative(problem, residual, size)
         if defect <= NEWTON or 0.1 * last < defect <= ROUND_OFF:
             return state, iteration
-        if jacobian.stale(defect):
+        fresh = jacobian.stale(defect)
+        if fresh:
             jacobian.factors = problem.system.factored(tangent(problem, weight, state))
-        step = jacobian.factors.solve(-residual, nothing)
-        state, residual, size = advance(problem, weight, state, residual, step)
+        step = jacobian.factors.solve(-residual)
+        state, residual = advance(problem, weight, state, residual, step)
+        size = terms(problem, weight, state) if fresh else size
     raise TransportError(f"Newton's method for the substrates stands at a defect of {defect:.2g} after "
                          f"{MOST_ITERATIONS} iterations; try a larger numerics.refinement")
 
 
 def _relative(problem: Problem, residual, size) -> float:
     """Largest residual of a free node against the size of its row's terms."""
-    free = problem.free
+    free = problem.system.free
     return float(np.max(np.abs(residual[free]) / np.maximum(size[free], np.finfo(float).tiny)))
 
 
@@ -230,60 +227,78 @@ def _full_or_swept(problem: Problem, weight, state, residual, step):
     """A Newton step where it lowers the residual and nothing is negative; else a sweep with the uptake's coefficients
     q(C) / C frozen, which keeps what is positive so, as far as quadratic functions can."""
     trial = state + step
-    found, free = balance(problem, weight, trial), problem.free
-    worse = np.linalg.norm(found[0][free]) > np.linalg.norm(residual[free])
+    found, free = balance(problem, weight, trial), problem.system.free
+    worse = np.linalg.norm(found[free]) > np.linalg.norm(residual[free])
     if worse or trial.min() < -UNRESOLVED * max(s.supply for s in problem.both):
         trial = _sweep(problem, weight, np.maximum(state, 0.0))
         found = balance(problem, weight, trial)
-    return trial, *found
+    return trial, found
 
 
 def _shortened(problem: Problem, weight, state, residual, step):
     """The longest part of a Newton step that lowers the residual; a sweep where none does."""
-    free = problem.free
+    free = problem.system.free
     before = np.linalg.norm(residual[free])
     for length in LENGTHS:
         trial = state + length * step
         found = balance(problem, weight, trial)
-        if np.linalg.norm(found[0][free]) <= (1 - FALL * length) * before:
-            return trial, *found
+        if np.linalg.norm(found[free]) <= (1 - FALL * length) * before:
+            return trial, found
     trial = _sweep(problem, weight, np.maximum(state, 0.0))
-    return trial, *balance(problem, weight, trial)
+    return trial, balance(problem, weight, trial)
 
 
 def _sweep(problem: Problem, weight, state) -> np.ndarray:
     """Solve (matrix + X_A q(C) / C) C_new = source, with q(C) / C at the state."""
     per = {}
     if weight is not None:
-        values, (*rates, slopes) = _uptake(problem, state)
-        for k, (c, rate, substrate) in enumerate(zip(values, rates, problem.both)):
-            tiny = 1e-9 * substrate.half_saturation
+        slopes = _slopes(problem, state)
+        for k, (c, rate) in enumerate(zip(_on_the_biomass(problem, state), _uptake(problem, state))):
+            tiny = 1e-9 * problem.both[k].half_saturation
             per[k, k] = weight * np.where(c > tiny, rate / np.maximum(c, tiny), slopes[k][k])
     elements = *problem.matrices, _coupled(problem, per)
     return problem.system.solve(elements, problem.source, state)
 
 
-def balance(problem: Problem, weight, state):
-    """Residual (2n,) and size of its terms (2n,) for C_A, then C_D, of all nodes (2n,); weight: as :func:`sinks`'."""
-    total = problem.operator @ state - problem.source
-    size = problem.magnitude @ np.abs(state) + np.abs(problem.source)
+def balance(problem: Problem, weight, state) -> np.ndarray:
+    """Residual (2n,), um2 mg/L/h, for C_A, then C_D, of all nodes (2n,), mg/L; weight: as :func:`sinks`'."""
+    found = problem.operator @ state - problem.source
     if weight is not None:
-        sink = weight * np.stack(_uptake(problem, state)[1][:2])
-        where, values = problem.system.kinds[2].ravel(), problem.space.of.values
-        for found, loads in (total, sink @ values), (size, np.abs(sink) @ np.abs(values)):
-            found += np.bincount(where, np.swapaxes(loads, 0, 1).ravel(), len(state))
-    return total, size
+        sink = weight[:, None] * np.stack(_uptake(problem, state), axis=1)
+        found += np.bincount(problem.system.kinds[2].ravel(), problem.space.load(sink).ravel(), len(state))
+    return found
+
+
+def terms(problem: Problem, weight, state) -> np.ndarray:
+    """Sizes (2n,) of the terms of :func:`balance`, all taken as positive."""
+    found = problem.magnitude @ np.abs(state) + np.abs(problem.source)
+    if weight is not None:
+        sink = np.abs(weight[:, None] * np.stack(_uptake(problem, state), axis=1))
+        loads = sink @ np.abs(problem.space.of.values)
+        found += np.bincount(problem.system.kinds[2].ravel(), loads.ravel(), len(state))
+    return found
+
+
+def _on_the_biomass(problem: Problem, state) -> np.ndarray:
+    """(2, t, q) mg/L of C_A and C_D in the points of the biomass."""
+    return problem.space.at_points(state.reshape(2, -1), problem.space.biomass_cells)
 
 
 def _uptake(problem: Problem, state):
-    """C_A and C_D (t, q) on the biomass, and the uptake there with its derivatives."""
-    here = problem.space
-    acceptor, donor = here.at_points(state.reshape(2, -1), here.biomass_cells)
-    return (acceptor, donor), law.paired_uptake(acceptor, donor, problem.substrates, problem.kinetics)
+    """Uptake of both substrates per X_A there, (t, q) 1/h each."""
+    acceptor, donor = _on_the_biomass(problem, state)
+    return law.paired_uptake(acceptor, donor, problem.substrates, problem.kinetics)
+
+
+def _slopes(problem: Problem, state):
+    """Its derivatives by both concentrations."""
+    acceptor, donor = _on_the_biomass(problem, state)
+    return law.paired_slopes(acceptor, donor, problem.substrates, problem.kinetics)
 
 
 def _coupled(problem: Problem, slopes: dict[tuple[int, int], np.ndarray]) -> np.ndarray:
-    """(t, 2k, 2k) of the derivatives dx d(uptake of i) / d(concentration of j), (t, q), of (i, j) in ``slopes``."""
+    """(t, 2k, 2k) um2/h of the derivatives X_A dx d(uptake of i) / d(concentration of j), (t, q), of (i, j) in
+    ``slopes``."""
     k = problem.space.cells.shape[1]
     found = np.zeros((len(problem.space.biomass_cells), 2 * k, 2 * k))
     for (i, j), slope in slopes.items():
@@ -292,10 +307,10 @@ def _coupled(problem: Problem, slopes: dict[tuple[int, int], np.ndarray]) -> np.
 
 
 def tangent(problem: Problem, weight, state) -> tuple[np.ndarray, ...]:
-    """Element matrices of the derivative of :func:`balance`, of both substrates and of their uptake."""
+    """Element matrices, um2/h, of the derivative of :func:`balance`: of both substrates and of their uptake."""
     slopes = {}
     if weight is not None:
-        by = _uptake(problem, state)[1][2]
+        by = _slopes(problem, state)
         slopes = {(i, j): weight * by[i][j] for i, j in np.ndindex(2, 2)}
     return *problem.matrices, _coupled(problem, slopes)
 
@@ -317,26 +332,17 @@ def _checked(problem: Problem, state, iterations: int) -> Concentrations:
 
 def fluxes(problem: Problem, active: np.ndarray | None, state: Concentrations) -> tuple[Fluxes, Fluxes]:
     """Ledger of the acceptor and of the donor in one geometry."""
-    both = np.concatenate([state.acceptor, state.donor])
-    consumed: tuple[float, ...] = (0.0, 0.0)
-    weight = sinks(problem, active)
+    here, both = problem.space, np.stack([state.acceptor, state.donor])
+    weight, consumed = sinks(problem, active), np.zeros(2)
     if weight is not None:
-        *rates, _ = _uptake(problem, both)[1]
-        consumed = tuple(float(np.sum(weight * rate)) for rate in rates)
-    return (_fluxes(problem, 0, state.acceptor, consumed[0]), _fluxes(problem, 1, state.donor, consumed[1]))
-
-
-def _fluxes(problem: Problem, k: int, field: np.ndarray, consumed: float) -> Fluxes:
-    here = problem.space
+        consumed = np.array([np.vdot(weight, rate) for rate in _uptake(problem, both)])
     if problem.speed:
-        ends = [float(w @ field / w.sum()) for w in (problem.inflow, problem.outflow)]
-        return Fluxes(float(np.split(problem.source, 2)[k].sum()), float(problem.outflow @ field), consumed, *ends)
-    flux = np.bincount(here.cells.ravel(), np.einsum("tab,tb->ta", problem.matrices[k], field[here.cells]).ravel(),
-                       len(field))
-    ends = [_mean(here, edges, field) for edges in (here.inlet, here.outlet)]
-    return Fluxes(float(flux[_both_ends(here)].sum()), 0.0, consumed, *ends)
-
-
-def _mean(here: Space, edges: np.ndarray, field: np.ndarray) -> float:
-    weight = _end_loads(here, edges, np.ones(len(field)))
-    return float(weight @ field / weight.sum())
+        ends, out = [problem.inflow, problem.outflow], both @ problem.outflow
+        supplied = problem.source.reshape(2, -1).sum(axis=1)
+    else:
+        ends = [_end_loads(here, edges, np.ones(here.count)) for edges in (here.inlet, here.outlet)]
+        flux, out = (problem.operator @ both.ravel()).reshape(2, -1), np.zeros(2)
+        supplied = flux[:, _both_ends(here)].sum(axis=1)
+    means = [both @ load / load.sum() for load in ends]
+    acceptor, donor = np.column_stack([supplied, out, consumed, *means]).tolist()
+    return Fluxes(*acceptor), Fluxes(*donor)

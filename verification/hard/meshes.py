@@ -194,9 +194,7 @@ def _moved(preset: str, grid, corners):
     """The mesh with its corners elsewhere, the fluid's edges straight."""
     if preset == "paper":
         return grid.moved(corners)
-    points = grid.points.copy()
-    points[: grid.corners] = corners
-    points[grid.cells[:, 3:]] = 0.5 * (corners[grid.cells[:, :3]] + corners[grid.cells[:, [1, 2, 0]]])
+    points = grid.with_middles(corners)
     points[grid.body] = grid.points[grid.body]
     return grid.moved(points)
 

@@ -56,8 +56,8 @@ def settled(problem, active) -> Concentrations:
     state, count = transport.steady(problem, active), problem.space.count
     both = np.concatenate([state.acceptor, state.donor])
     weight = transport.sinks(problem, active)
-    tangent, residual = transport.tangent(problem, weight, both), transport.balance(problem, weight, both)[0]
-    both = both + problem.system.solve(tangent, -residual, np.zeros(2 * count))
+    tangent, residual = transport.tangent(problem, weight, both), transport.balance(problem, weight, both)
+    both = both + problem.system.solve(tangent, -residual)
     return Concentrations(both[:count], both[count:], state.iterations + 1)
 
 
