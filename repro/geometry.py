@@ -21,6 +21,22 @@ GRADATION = 0.25
 SPLIT = 1.4
 
 
+@dataclass(frozen=True)
+class Sizing:
+    """How large the elements of a mesh are to be: width of the pore (um); refinement, by which sizes are divided; film,
+    the thinnest that is resolved (um); gradation, growth of the size with the distance from where it is prescribed."""
+
+    width: float
+    refinement: float
+    film: float
+    gradation: float = GRADATION
+
+    @property
+    def largest(self) -> float:
+        """The largest size (um): a fourteenth of the pore's width."""
+        return self.width / ACROSS_PORE / self.refinement
+
+
 @dataclass(frozen=True, eq=False)
 class Outline:
     """Closed boundary polygon of the aggregate.
@@ -107,52 +123,58 @@ def extent_too_short(outline: Outline, ends: tuple[float, float], width: float, 
     return left or right
 
 
-def interface_sizes(outline: Outline, width: float, refinement: float, thinnest: float) -> np.ndarray:
+def interface_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
     """(M,) wanted element size (um) at each node of the outline.
 
     A tenth of the aggregate's thickness, a fourteenth of the pore's width, and for free nodes the film's size.
     """
-    size = np.full(len(outline.points), min(outline.thickness / ACROSS_AGGREGATE, width / ACROSS_PORE) / refinement)
-    return np.where(outline.wall == FREE, np.minimum(size, film_sizes(outline, width, refinement, thinnest)), size)
+    across = min(outline.thickness / ACROSS_AGGREGATE, sizing.width / ACROSS_PORE)
+    size = np.full(len(outline.points), across / sizing.refinement)
+    return np.where(outline.wall == FREE, np.minimum(size, film_sizes(outline, sizing)), size)
 
 
-def film_sizes(outline: Outline, width: float, refinement: float, thinnest: float) -> np.ndarray:
+def too_coarse(outline: Outline, sizing: Sizing) -> bool:
+    """Is an interface edge twice longer than a new mesh would have it?"""
+    sizes = interface_sizes(outline, sizing)
+    wanted = 0.5 * (sizes + np.roll(sizes, -1))
+    return bool((outline.interface_edges() & (outline.edge_lengths() > 2 * SPLIT * wanted)).any())
+
+
+def film_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
     """(M,) wanted element size (um) in the fluid between each node and the opposite wall, while that is not touched.
 
-    A tenth of its thickness; films thinner than ``thinnest`` count as that: they close.
+    A tenth of its thickness; films thinner than the thinnest that is resolved count as that: they close.
     """
     if (outline.wall == TOP).any():
         return np.full(len(outline.points), np.inf)
-    return np.maximum(width - outline.points[:, 1], thinnest) / ACROSS_FILM / refinement
+    return np.maximum(sizing.width - outline.points[:, 1], sizing.film) / ACROSS_FILM / sizing.refinement
 
 
-def size_sources(outline: Outline, width: float, refinement: float, thinnest: float) -> tuple[np.ndarray, np.ndarray]:
+def size_sources(outline: Outline, sizing: Sizing) -> tuple[np.ndarray, np.ndarray]:
     """Where element sizes are prescribed, (K, 2) um, and how large, (K,) um.
 
     At the interface nodes and, across the fluid, on the opposite wall, so that a film has elements of one size.
     Interface edges that are shorter than wanted (they are never merged) are matched by what is around them.
     """
     free = outline.wall == FREE
-    near, film = (find(outline, width, refinement, thinnest)[free] for find in (interface_sizes, film_sizes))
+    near, film = (find(outline, sizing)[free] for find in (interface_sizes, film_sizes))
     edge = outline.edge_lengths()
     near = np.minimum(near, SPLIT * np.maximum(edge, np.roll(edge, 1))[free])
-    across = np.column_stack([outline.points[free, 0], np.full(len(near), width)])
+    across = np.column_stack([outline.points[free, 0], np.full(len(near), sizing.width)])
     there = np.isfinite(film)
     return np.vstack([outline.points[free], across[there]]), np.concatenate([near, film[there]])
 
 
-def graded_size(where: np.ndarray, sources: np.ndarray, sizes: np.ndarray, largest: float,
-                gradation: float = GRADATION) -> np.ndarray:
-    """Wanted element size (um) at points (K, 2): grows with slope ``gradation`` from the sources (M, 2), up to
-    largest."""
+def graded_size(where: np.ndarray, sources: np.ndarray, sizes: np.ndarray, sizing: Sizing) -> np.ndarray:
+    """Wanted element size (um) at points (K, 2): grows from the sizes (M,) of the sources (M, 2), up to the largest."""
     if len(sources) == 0:
-        return np.full(len(where), largest)
+        return np.full(len(where), sizing.largest)
     distance = np.hypot(where[:, None, 0] - sources[None, :, 0], where[:, None, 1] - sources[None, :, 1])
-    return np.minimum(largest, (sizes + gradation * distance).min(axis=1))
+    return np.minimum(sizing.largest, (sizes + sizing.gradation * distance).min(axis=1))
 
 
-def refine_outline(outline: Outline, sizes: np.ndarray, largest: float, gradation: float = GRADATION) -> Outline:
-    """The same polygon with nodes spaced for a new mesh.
+def refine_outline(outline: Outline, sizes: np.ndarray, sizing: Sizing) -> Outline:
+    """The same polygon with nodes spaced for a new mesh, as the sizes (M,) at its nodes (um) ask.
 
     Interface edges are split into equal parts, which keeps the area exactly, and never merged. Contact surfaces are
     straight, so their nodes are placed anew, but for their ends and the fixed points.
@@ -161,7 +183,7 @@ def refine_outline(outline: Outline, sizes: np.ndarray, largest: float, gradatio
     for first, last in runs(outline):
         keep = np.arange(first, last + 1) % len(outline.points)
         on_wall = outline.wall[keep[0]] != FREE and outline.wall[keep[0]] == outline.wall[keep[-1]]
-        t = _spread(outline, keep, sizes, largest, gradation) if on_wall else split_parameters(outline, keep, sizes)
+        t = _spread(outline, keep, sizes, sizing) if on_wall else split_parameters(outline, keep, sizes)
         pieces.append(_resample(outline, keep, t[:-1]))
     return Outline(*(np.concatenate(columns) for columns in zip(*pieces)))
 
@@ -182,11 +204,10 @@ def split_parameters(outline: Outline, keep: np.ndarray, sizes: np.ndarray) -> n
     return np.linspace(0.0, 1.0, max(1, int(np.ceil(length / (SPLIT * wanted)))) + 1)
 
 
-def _spread(outline: Outline, keep: np.ndarray, sizes: np.ndarray, largest: float, gradation: float) -> np.ndarray:
+def _spread(outline: Outline, keep: np.ndarray, sizes: np.ndarray, sizing: Sizing) -> np.ndarray:
     """Parameters 0..len - 1 along a stretch of wall, graded from the interface nodes."""
     free = outline.wall == FREE
-    line = graded_line(outline.points[keep[0]], outline.points[keep[-1]], outline.points[free], sizes[free], largest,
-                       gradation)
+    line = graded_line(outline.points[keep[0]], outline.points[keep[-1]], outline.points[free], sizes[free], sizing)
     x = outline.points[keep, 0]
     sign = np.sign(x[-1] - x[0])
     t = np.interp(sign * line[:, 0], sign * x, np.arange(len(keep)))
@@ -215,13 +236,12 @@ def _on_arc(places: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.nda
     return places * np.where(arc, radius / np.where(arc, now, 1.0), 1.0)[:, None]
 
 
-def graded_line(start, end, sources: np.ndarray, sizes: np.ndarray, largest: float,
-                gradation: float = GRADATION) -> np.ndarray:
+def graded_line(start, end, sources: np.ndarray, sizes: np.ndarray, sizing: Sizing) -> np.ndarray:
     """(K, 2) nodes from start to end, spaced as :func:`graded_size` asks; both ends included."""
     start, end = np.asarray(start, float), np.asarray(end, float)
     length = np.linalg.norm(end - start)
     s = np.linspace(0.0, 1.0, 401)
-    density = length / graded_size(start + s[:, None] * (end - start), sources, sizes, largest, gradation)
+    density = length / graded_size(start + s[:, None] * (end - start), sources, sizes, sizing)
     count = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(s))])
     parts = max(1, int(np.ceil(count[-1] - 0.3)))
     t = np.interp(np.linspace(0.0, count[-1], parts + 1), count, s)

@@ -21,7 +21,7 @@ from skfem import MeshTri
 
 from repro import geometry
 from repro.errors import MeshError
-from repro.geometry import Outline
+from repro.geometry import Outline, Sizing
 from repro.timing import timed
 
 #: Remesh when more than POOR_ALLOWED triangles have a quality under POOR (3.5).
@@ -160,29 +160,25 @@ def gradients(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 @timed("meshing")
-def generate(outline: Outline | None, ends: tuple[float, float], width: float, refinement: float, film: float,
-             gradation: float = geometry.GRADATION):
+def generate(outline: Outline | None, ends: tuple[float, float], sizing: Sizing):
     """A new mesh around the aggregate, and the outline with the nodes that the mesh has on it.
 
-    outline: None for a clean channel; ends: x of inlet and outlet (um); film: thinnest film to resolve (um);
-    gradation: growth of element sizes with the distance from the aggregate.
+    outline: None for a clean channel; ends: x of inlet and outlet (um).
     Returns (PoreMesh, Outline | None). Raises MeshError where the outline crosses itself or the channel's ends.
     """
     if outline is not None:
-        check_outline(outline, ends, width)
-        sizes = geometry.interface_sizes(outline, width, refinement, film)
-        outline = geometry.refine_outline(outline, sizes, width / geometry.ACROSS_PORE / refinement, gradation)
-    return around(outline, ends, width, refinement, film, gradation), outline
+        check_outline(outline, ends, sizing.width)
+        outline = geometry.refine_outline(outline, geometry.interface_sizes(outline, sizing), sizing)
+    return around(outline, ends, sizing), outline
 
 
-def around(outline: Outline | None, ends, width: float, refinement: float, film: float,
-           gradation: float = geometry.GRADATION) -> PoreMesh:
+def around(outline: Outline | None, ends, sizing: Sizing) -> PoreMesh:
     """A new mesh around an outline whose nodes stay as they are; arguments as those of :func:`generate`."""
-    largest = width / geometry.ACROSS_PORE / refinement
+    width = sizing.width
     sources, sizes = np.empty((0, 2)), np.empty(0)
     if outline is not None:
-        sources, sizes = geometry.size_sources(outline, width, refinement, film)
-    wanted = sources, sizes, largest, gradation
+        sources, sizes = geometry.size_sources(outline, sizing)
+    wanted = sources, sizes, sizing
     points, polygons = _boundaries(outline, ends, width, wanted)
     mesh = _fill(points, polygons, lambda where: geometry.graded_size(where, *wanted), ends, width)
     loop = mesh.loop[: 0 if outline is None else len(outline.points)]  # its points come first among the prescribed ones

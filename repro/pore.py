@@ -74,12 +74,17 @@ def film(scene) -> float:
     return scene.growth.minimum_film if scene.growth else MINIMUM_FILM
 
 
+def sizing(scene) -> geometry.Sizing:
+    """How large the elements of its meshes are to be."""
+    return geometry.Sizing(scene.pore.width, scene.numerics.refinement, film(scene), scene.numerics.gradation)
+
+
 def seeded(scene) -> Pore:
     """The pore at t = 0: X_A = X_m in a half-disc (Table 1), or a clean channel."""
     numerics, width = scene.numerics, scene.pore.width
     outline = geometry.seed(scene.aggregate.radius, numerics.refinement) if scene.aggregate else None
     ends = geometry.meshed_extent(outline, width, scene.pore.length, numerics.extent == "full")
-    grid, outline = mesh.generate(outline, ends, width, numerics.refinement, film(scene), numerics.gradation)
+    grid, outline = mesh.generate(outline, ends, sizing(scene))
     count = len(grid.points)
     density = scene.kinetics.maximum_density if scene.kinetics else 0.0
     active = np.zeros(count)

@@ -29,7 +29,7 @@ def followed(scene, now: Pore, expanded: Pore) -> mesh.PoreMesh | None:
     """The mesh moved with the aggregate, None where a new one is due."""
     outline, width = expanded.outline, scene.pore.width
     stale = (geometry.extent_too_short(outline, now.mesh.ends, width, scene.pore.length)
-             or (expanded.wall != now.wall).any() or _too_coarse(scene, outline))
+             or (expanded.wall != now.wall).any() or geometry.too_coarse(outline, pore.sizing(scene)))
     if stale:
         return None
     moved = now.mesh.moved(mesh_motion.move(now.mesh, expanded.mesh.points[now.mesh.body],
@@ -40,15 +40,7 @@ def followed(scene, now: Pore, expanded: Pore) -> mesh.PoreMesh | None:
 def anew(scene, outline: geometry.Outline) -> tuple[mesh.PoreMesh, geometry.Outline]:
     """A new mesh around the aggregate with the extent of 3.1, and the outline with the nodes that it has on it."""
     ends = geometry.meshed_extent(outline, scene.pore.width, scene.pore.length, scene.numerics.extent == "full")
-    return mesh.generate(outline, ends, scene.pore.width, scene.numerics.refinement, pore.film(scene),
-                         scene.numerics.gradation)
-
-
-def _too_coarse(scene, outline: geometry.Outline) -> bool:
-    """Is an interface edge twice longer than a new mesh would have it?"""
-    sizes = geometry.interface_sizes(outline, scene.pore.width, scene.numerics.refinement, pore.film(scene))
-    wanted = 0.5 * (sizes + np.roll(sizes, -1))
-    return bool((outline.interface_edges() & (outline.edge_lengths() > 2 * geometry.SPLIT * wanted)).any())
+    return mesh.generate(outline, ends, pore.sizing(scene))
 
 
 def remesh(scene, now: Pore, expanded: Pore, solved: Solved) -> Pore:

@@ -177,7 +177,7 @@ def mirrored(outline):
 def meshed(outline, width=50.0, refinement=1.0, ends=None, film=2.0):
     """(PoreMesh, refined outline) with the extent of 3.1."""
     ends = geometry.meshed_extent(outline, width, LENGTH) if ends is None else ends
-    return mesh.generate(outline, ends, width, refinement, film)
+    return mesh.generate(outline, ends, geometry.Sizing(width, refinement, film))
 
 
 def relabelled(grid, biomass):

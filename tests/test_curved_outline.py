@@ -58,7 +58,7 @@ def test_a_split_changes_neither_shape_nor_area(refinement):
     """New nodes lie on the same parabolas, and so do their places at t = 0. Mutants: middles on chords, origin
     interpolated linearly."""
     shape = wavy()
-    finer = outline.split(shape, 50.0, refinement, 2.0)
+    finer = outline.split(shape, geometry.Sizing(50.0, refinement, 2.0))
     assert len(finer.points) > len(shape.points)
     assert finer.area == pytest.approx(shape.area, rel=1e-13)
     assert (finer.thickness, finer.upstream) == pytest.approx((shape.thickness, shape.upstream), rel=1e-13)

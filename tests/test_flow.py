@@ -212,7 +212,7 @@ def test_every_inlet_node_takes_part_wherever_the_ends_are(left):
     """The discrete influx is u_ave W to round-off at ends that are no round numbers. Mutant: nodes found on the ends by
     equality with scikit-fem's places, which round-off moves off them."""
     outline = geometry.seed(1.0)
-    grid, _ = mesh.generate(outline, (left, 0.7 - left / 7), 7.123456, 1.0, 2.0)
+    grid, _ = mesh.generate(outline, (left, 0.7 - left / 7), geometry.Sizing(7.123456, 1.0, 2.0))
     found = flow.unit_flow(grid, 2000.0)
     for nodes in (grid.inlet, grid.outlet):
         assert np.trapezoid(found.velocity[nodes, 0], grid.points[nodes, 1]) == pytest.approx(grid.width, rel=1e-10)

@@ -1,4 +1,6 @@
 """Geometry of the pore (2.3.3, 3.1): the outline, the meshed extent, and which nodes must close a film."""
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -58,8 +60,9 @@ def test_refining_an_outline_keeps_its_shape_exactly(drawn, refinement):
     Mutant: short interface edges merged, an edge's middle moved onto a smooth curve, the fixed point resampled away.
     """
     outline, width = drawn
-    sizes = geometry.interface_sizes(outline, width, refinement, FILM)
-    fine = geometry.refine_outline(outline, sizes, width / geometry.ACROSS_PORE / refinement)
+    sizing = geometry.Sizing(width, refinement, FILM)
+    sizes = geometry.interface_sizes(outline, sizing)
+    fine = geometry.refine_outline(outline, sizes, sizing)
     assert fine.area == pytest.approx(outline.area, rel=1e-13)
     kept = {tuple(p) for p in fine.points}
     assert {tuple(p) for p in outline.points[outline.wall == FREE]} <= kept
@@ -76,7 +79,7 @@ def test_new_nodes_of_a_grown_seed_remember_its_arc(stretch):
     Mutant: origins on the chord, or drawn to the arc on the wall as well."""
     old = geometry.seed(5.0, 0.5)
     grown = Outline(old.points * [stretch, 1.1 * stretch], old.wall, old.fixed, old.origin)
-    fine = geometry.refine_outline(grown, np.full(len(old.points), 0.5), 1.0)
+    fine = geometry.refine_outline(grown, np.full(len(old.points), 0.5), geometry.Sizing(14.0, 1.0, FILM))
     free = fine.wall == FREE
     assert free.sum() > (old.wall == FREE).sum()
     assert np.hypot(*fine.origin[free].T) == pytest.approx(5.0, rel=1e-9)
@@ -88,12 +91,29 @@ def test_new_nodes_of_a_grown_seed_remember_its_arc(stretch):
 def test_refining_leaves_contact_nodes_exactly_on_their_wall(width, lean):
     """Walls are found by y == W: a node one round-off beside it would slip. Mutant: (1 - t) a + t b in _resample."""
     outline = plug(width, -0.3 * width, 0.4 * width, lean)
-    sizes = geometry.interface_sizes(outline, width, 1.0, FILM)
-    fine = geometry.refine_outline(outline, sizes, width / geometry.ACROSS_PORE)
+    sizing = geometry.Sizing(width, 1.0, FILM)
+    fine = geometry.refine_outline(outline, geometry.interface_sizes(outline, sizing), sizing)
     assert (fine.points[fine.wall == TOP, 1] == width).all() and (fine.points[fine.wall == BOTTOM, 1] == 0).all()
     assert ((fine.points[fine.wall == FREE, 1] > 0) & (fine.points[fine.wall == FREE, 1] < width)).all()
     assert fine.area == pytest.approx(outline.area, rel=1e-13)
     assert fine.fixed.sum() == 2 and (fine.wall == FREE).sum() > 0
+
+
+@given(attached_aggregates(width=widths), refinements)
+def test_an_outline_is_too_coarse_where_an_edge_is_twice_what_is_wanted(drawn, refinement):
+    """Never as a new mesh has it; of the same outline, from the refinement on at which its longest interface edge is
+    2 x 1.4 times the mean of the sizes wanted at its ends. Mutants: edges on the wall counted too, once for twice, one
+    end's size for the mean."""
+    outline, width = drawn
+    sizing = geometry.Sizing(width, refinement, FILM)
+    fine = geometry.refine_outline(outline, geometry.interface_sizes(outline, sizing), sizing)
+    assert not geometry.too_coarse(fine, sizing)
+    sizes, ends = geometry.interface_sizes(fine, sizing), np.column_stack([range(len(fine.points)), range(
+        1, len(fine.points) + 1)])[fine.interface_edges()] % len(fine.points)
+    longest = (np.hypot(*(fine.points[ends[:, 0]] - fine.points[ends[:, 1]]).T) / sizes[ends].mean(axis=1)).max()
+    for part, wanted in ((0.999, False), (1.001, True)):
+        finer = replace(sizing, refinement=part * refinement * 2.8 / longest)
+        assert geometry.too_coarse(fine, finer) == wanted
 
 
 @given(outlines(width=widths), lengths)
@@ -151,12 +171,13 @@ def test_element_sizes_resolve_aggregate_pore_and_film(drawn, refinement):
     """A tenth of the thickness, a fourteenth of the width, a tenth of the film. Mutant: no film term, film under a
     plug."""
     outline, width = drawn
-    size = geometry.interface_sizes(outline, width, refinement, FILM) * refinement
+    sizing = geometry.Sizing(width, refinement, FILM)
+    size = geometry.interface_sizes(outline, sizing) * refinement
     assert size.max() <= min(outline.thickness / 10, width / 14) * (1 + 1e-12)
     film = np.maximum(width - outline.points[:, 1], FILM)
     assert (size <= np.where(outline.wall == FREE, film / 10, np.inf) * (1 + 1e-12)).all()
     across = plug(width, -0.1 * width, 0.1 * width)
-    size = geometry.interface_sizes(across, width, refinement, FILM) * refinement
+    size = geometry.interface_sizes(across, sizing) * refinement
     assert size == pytest.approx(width / 14, rel=1e-14)
 
 
@@ -235,7 +256,8 @@ def test_closing_is_the_same_in_a_mirror(drawn):
 def test_a_graded_line_spaces_its_nodes_as_asked(near, far, length):
     """From ``near`` at its source up to at most ``far``. Mutant: gradation ignored, ends moved, spacing twice too
     wide."""
-    line = geometry.graded_line((0.0, 3.0), (length, 3.0), np.array([[0.0, 3.0]]), np.array([near]), far)
+    sizing = geometry.Sizing(far * geometry.ACROSS_PORE, 1.0, FILM)
+    line = geometry.graded_line((0.0, 3.0), (length, 3.0), np.array([[0.0, 3.0]]), np.array([near]), sizing)
     assert line[0].tolist() == [0.0, 3.0] and line[-1].tolist() == [length, 3.0] and (line[:, 1] == 3.0).all()
     step = np.diff(line[:, 0])
     wanted = np.minimum(far, near + geometry.GRADATION * line[1:, 0])

@@ -176,18 +176,12 @@ def new_mesh(scene, now: Pore, expanded: Pore, state: Concentrations) -> tuple[P
     """The mesh moved with the aggregate, or a new one where the paper's criteria (3.1, 3.5) ask for it."""
     shape, width = expanded.outline, scene.pore.width
     stale = geometry.extent_too_short(shape, now.mesh.ends, width, scene.pore.length) or (
-        expanded.wall != now.wall).any() or _too_coarse(scene, outline.corners(shape))
+        expanded.wall != now.wall).any() or geometry.too_coarse(outline.corners(shape), pore.sizing(scene))
     if not stale:
         moved = follow(scene, now, expanded)
         if moved.acceptable():
             return replace(expanded, mesh=moved, concentrations=state), False
     return remesh(scene, now, expanded, state), True
-
-
-def _too_coarse(scene, polygon: geometry.Outline) -> bool:
-    sizes = geometry.interface_sizes(polygon, scene.pore.width, pore.resolution(scene), pore.film(scene))
-    wanted = 0.5 * (sizes + np.roll(sizes, -1))
-    return bool((polygon.interface_edges() & (polygon.edge_lengths() > 2 * geometry.SPLIT * wanted)).any())
 
 
 def follow(scene, now: Pore, expanded: Pore):

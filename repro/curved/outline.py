@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from repro import geometry
-from repro.geometry import FREE, Outline, polygon_area
+from repro.geometry import FREE, Outline, Sizing, polygon_area
 
 
 def shape(t: np.ndarray) -> np.ndarray:
@@ -93,21 +93,19 @@ def slopes(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return -3 * first + 4 * middle - last, 4 * (first - 2 * middle + last)
 
 
-def split(outline: Outline, width: float, refinement: float, film: float,
-          gradation: float = geometry.GRADATION) -> Arcs:
+def split(outline: Outline, sizing: Sizing) -> Arcs:
     """The same curve with corners spaced as :func:`repro.geometry.interface_sizes` wants them, and their middles.
 
     Arcs at the fluid are split into equal parts of their parameter, and never merged; straight contact surfaces get
     new nodes, but for their ends and the fixed points.
     """
     polygon = corners(outline)
-    sizes = geometry.interface_sizes(polygon, width, refinement, film)
-    largest, count = width / geometry.ACROSS_PORE / refinement, len(polygon.points)
+    sizes, count = geometry.interface_sizes(polygon, sizing), len(polygon.points)
     pieces = []
     for first, last in geometry.runs(polygon):
         keep = np.arange(first, last + 1) % count
         if outline.wall[2 * keep[0] + 1] != FREE:
-            pieces.append(_on_the_wall(outline, polygon, keep, sizes, largest, gradation))
+            pieces.append(_on_the_wall(outline, polygon, keep, sizes, sizing))
         else:
             parts = 2 * (len(geometry.split_parameters(polygon, keep, sizes)) - 1)
             pieces.append((np.full(parts, keep[0]), np.arange(parts) / parts))
@@ -121,12 +119,12 @@ def halved(outline: Outline, which: np.ndarray) -> Arcs:
     return _placed(outline, arc, (np.arange(len(arc)) - (np.cumsum(parts) - parts)[arc]) / parts[arc])
 
 
-def _on_the_wall(outline: Outline, polygon: Outline, keep: np.ndarray, sizes, largest: float,
-                 gradation: float) -> tuple[np.ndarray, np.ndarray]:
+def _on_the_wall(outline: Outline, polygon: Outline, keep: np.ndarray, sizes: np.ndarray,
+                 sizing: Sizing) -> tuple[np.ndarray, np.ndarray]:
     """Arc and t on it of corners and middles along a stretch of wall, but for its end."""
     free = polygon.wall == FREE
     ends = polygon.points[keep[[0, -1]]]
-    x = geometry.graded_line(ends[0], ends[1], polygon.points[free], sizes[free], largest, gradation)[:, 0]
+    x = geometry.graded_line(ends[0], ends[1], polygon.points[free], sizes[free], sizing)[:, 0]
     x = np.insert(x, np.arange(1, len(x)), 0.5 * (x[1:] + x[:-1]))
     sign = np.sign(x[-1] - x[0])
     arc = np.clip(np.searchsorted(sign * polygon.points[keep, 0], sign * x, side="right") - 1, 0, len(keep) - 2)

@@ -94,6 +94,11 @@ def resolution(scene) -> float:
     return max(scene.numerics.refinement, BOUNDARY_LAYER * peclet(scene, _fastest(scene)) ** (1 / 3))
 
 
+def sizing(scene) -> geometry.Sizing:
+    """How large the elements of its meshes are to be."""
+    return geometry.Sizing(scene.pore.width, resolution(scene), film(scene), scene.numerics.gradation)
+
+
 def _fastest(scene) -> float:
     drive = scene.flow
     if drive.head is None:
@@ -120,17 +125,17 @@ def generate(scene, around: Arcs | None) -> tuple[CurvedMesh, Arcs | None]:
     Raises MeshError where the outline crosses itself or the channel's ends, or where a curved triangle is turned over.
     """
     width = scene.pore.width
-    sizes = width, resolution(scene), film(scene), scene.numerics.gradation
+    sizes = sizing(scene)
     ends = geometry.meshed_extent(around, width, scene.pore.length,
                                   scene.numerics.extent == "full")
     if around is None:
-        straight = linear_mesh.around(None, ends, *sizes)
+        straight = linear_mesh.around(None, ends, sizes)
         return curved(straight, np.empty((0, 2))), None
     for _ in range(HALVINGS):
-        around = outline.split(around, *sizes)
+        around = outline.split(around, sizes)
         polygon = outline.corners(around)
         linear_mesh.check_outline(polygon, ends, width)
-        straight = unlocked(linear_mesh.around(polygon, ends, *sizes))
+        straight = unlocked(linear_mesh.around(polygon, ends, sizes))
         grid = curved(straight, around.points[1::2])
         strained = grid.strained_arcs()
         if not strained.any():

@@ -81,7 +81,7 @@ def uneven(said: Scene, bulge: float) -> Pore:
     points = seed.points * (1 + bulge * np.cos(3 * np.arctan2(*seed.points.T[::-1])))[:, None]
     outline = geometry.Outline(points, seed.wall, seed.fixed, points.copy())
     ends = geometry.meshed_extent(outline, said.pore.width, said.pore.length, numerics.extent == "full")
-    grid, outline = mesh.generate(outline, ends, said.pore.width, numerics.refinement, pore.film(said))
+    grid, outline = mesh.generate(outline, ends, pore.sizing(said))
     count = len(grid.points)
     active = np.zeros(count)
     active[grid.body] = said.kinetics.maximum_density

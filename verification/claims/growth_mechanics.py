@@ -27,7 +27,8 @@ def half_disc(refinement: float) -> Body:
     refinement: at the default level.
     """
     refinement /= current().size
-    grid, _ = mesh.generate(geometry.seed(RADIUS, refinement), (-2 * RADIUS, 2 * RADIUS), 50.0, refinement, 2.0)
+    grid, _ = mesh.generate(geometry.seed(RADIUS, refinement), (-2 * RADIUS, 2 * RADIUS),
+                            geometry.Sizing(50.0, refinement, 2.0))
     local = np.full(len(grid.points), -1)
     local[grid.body] = np.arange(len(grid.body))
     return sliding(grid.points[grid.body], local[grid.triangles[grid.biomass]])

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from repro import geometry, mesh
-from repro.pore import film
+from repro.pore import sizing
 from verification.claims import Finding, at_least, at_most, claim, near
 from verification.claims.levels import ALONE, WIDE_SIZES
 from verification.claims.runs import WIDE, scene, series
@@ -68,7 +68,7 @@ def plug(said, length: float) -> tuple[float, float]:
     wall = np.repeat([geometry.BOTTOM, geometry.TOP], 3)
     outline = geometry.Outline(points, wall, np.zeros(6, bool), points)
     ends = -half - 1.5 * width, half + 1.5 * width
-    grid, _ = mesh.generate(outline, ends, width, said.numerics.refinement, film(said))
+    grid, _ = mesh.generate(outline, ends, sizing(said))
     exact = 1 / (1 + (said.flow.viscosity_ratio - 1) * length / said.pore.length)
     return flow_in(said, grid).conductivity / clean(said), exact
 
@@ -79,7 +79,7 @@ def filled() -> Finding:
     """Clean over filled conductivity, biomass in every triangle of the whole pore, at the default mesh."""
     said = scene("flow_only")
     half = said.pore.length / 2
-    empty, _ = mesh.generate(None, (-half, half), said.pore.width, said.numerics.refinement, film(said))
+    empty, _ = mesh.generate(None, (-half, half), sizing(said))
     full = replace(empty, biomass=np.ones(len(empty.triangles), bool))
     open_, closed = (flow_in(said, grid).conductivity for grid in (empty, full))
     check = near("reduction of the conductivity (times)", "2000", open_ / closed, said.flow.viscosity_ratio,

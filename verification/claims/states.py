@@ -9,7 +9,7 @@ import numpy as np
 
 from repro import flow, geometry, kinetics, mesh, transport
 from repro.mesh import PoreMesh
-from repro.pore import film
+from repro.pore import sizing
 
 
 def saved_mesh(fields: meshio.Mesh, width: float) -> PoreMesh:
@@ -61,9 +61,7 @@ def full_biomass(scene, grid: PoreMesh) -> np.ndarray:
 def half_disc(scene, radius: float, reach: float | None) -> PoreMesh:
     """The mesh around a half-disc, to the distance ``reach`` (um) on both sides; None: over the whole pore."""
     end = scene.pore.length / 2 if reach is None else min(radius + reach, scene.pore.length / 2)
-    refinement = scene.numerics.refinement
-    outline = geometry.seed(radius, refinement)
-    return mesh.generate(outline, (-end, end), scene.pore.width, refinement, film(scene))[0]
+    return mesh.generate(geometry.seed(radius, scene.numerics.refinement), (-end, end), sizing(scene))[0]
 
 
 def growth_rate(scene, fields: meshio.Mesh) -> np.ndarray:

@@ -111,7 +111,7 @@ def _losses(aspect: float) -> tuple[float, float, float]:
     """
     half, reach = LOW / aspect, LOW / aspect + LONG
     outline = bump(half, lambda s: LOW * (1 - s**2) ** 2, round(48 / np.sqrt(aspect)), round(15 / aspect))
-    grid, _ = mesh.generate(outline, (-reach, reach), WIDTH, 1.25, 2.0)
+    grid, _ = mesh.generate(outline, (-reach, reach), geometry.Sizing(WIDTH, 1.25, 2.0))
     whole = flow.scaled(flow.unit_flow(grid, RATIO, order=2), grid, LENGTH, 1.0, head=None, mean_velocity=1.0)
     s, weight = np.polynomial.legendre.leggauss(200)
     height, slope = LOW * (1 - s**2) ** 2, -4 * aspect * s * (1 - s**2)

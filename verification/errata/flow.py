@@ -68,7 +68,7 @@ def plug(said, length: float) -> PoreMesh:
     wall = np.repeat([geometry.BOTTOM, geometry.TOP], 2)
     outline = geometry.Outline(points, wall, np.zeros(4, bool), points)
     ends = -half - 1.5 * width, half + 1.5 * width
-    return mesh.generate(outline, ends, width, said.numerics.refinement, pore.film(said))[0]
+    return mesh.generate(outline, ends, pore.sizing(said))[0]
 
 
 @erratum(
@@ -91,7 +91,7 @@ def outlet() -> dict[str, str]:
     rows = []
     for refinement in (1.0, 2.0):
         said = scene("flow_only", f"numerics.refinement={refinement}")
-        grid, _ = mesh.generate(None, (-75.0, 75.0), said.pore.width, refinement, pore.film(said))
+        grid, _ = mesh.generate(None, (-75.0, 75.0), pore.sizing(said))
         found = {form: flow.unit_flow(grid, 1.0, interface=form) for form in ("laplacian", "traction")}
         cases = {"laplacian (ours)": (found["laplacian"].velocity, found["laplacian"].loss),
                  "traction, u_y = 0 at the outlet": (found["traction"].velocity, found["traction"].loss),

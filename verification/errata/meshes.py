@@ -53,7 +53,7 @@ def chain(transfer: str, radius: float = 30.0, decay: float = 6.0, count: int = 
     outline, field, masses, largest, old = geometry.seed(radius), None, [], 0.0, ()
     for k in range(count + 1):
         refinement = 1.0 + 0.3 * (0.618 * k % 1)
-        grid, _ = mesh.generate(outline, (-105.0, 105.0), 50.0, refinement, 2.0)
+        grid, _ = mesh.generate(outline, (-105.0, 105.0), geometry.Sizing(50.0, refinement, 2.0))
         points, triangles = grid.points[grid.body], np.searchsorted(grid.body, grid.triangles[grid.biomass])
         if field is None:
             field = np.exp((np.linalg.norm(points, axis=1) - radius) / decay)[:, None]

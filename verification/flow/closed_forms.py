@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 
 from reference import poiseuille
-from repro import flow, mesh
+from repro import flow, geometry, mesh
 from repro.mesh import PoreMesh
 from verification import norms
 from verification.case import Outcome, Profile, case
@@ -41,7 +41,7 @@ def poiseuille_channel() -> Outcome:
 
 @cache
 def _clean_mesh(refinement: float) -> PoreMesh:
-    return mesh.generate(None, ENDS, WIDTH, refinement, 2.0)[0]
+    return mesh.generate(None, ENDS, geometry.Sizing(WIDTH, refinement, 2.0))[0]
 
 
 def _clean(refinement: float, interface: str) -> dict[str, float]:

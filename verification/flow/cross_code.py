@@ -133,7 +133,7 @@ def _trusted(radius: float, ratio: float, interface: str, level: int) -> taylor_
 
 @cache
 def _grid(radius: float, refinement: float) -> PoreMesh:
-    return mesh.generate(geometry.seed(radius, refinement), ENDS, WIDTH, refinement, 2.0)[0]
+    return mesh.generate(geometry.seed(radius, refinement), ENDS, geometry.Sizing(WIDTH, refinement, 2.0))[0]
 
 
 def _apart(radius: float, ratio: float, interface: str, level: int, refinement: float) -> dict[str, float]:

@@ -21,7 +21,7 @@ def _half_disc(radius: float, lean: float = 0.0, reach: float = 75.0) -> PoreMes
     seed = geometry.seed(radius)
     points = seed.points + lean * seed.points[:, [1]] * [1.0, 0.0]
     outline = geometry.Outline(points, seed.wall, seed.fixed, points)
-    return mesh.generate(outline, (-reach, reach), WIDTH, 1.0, 2.0)[0]
+    return mesh.generate(outline, (-reach, reach), geometry.Sizing(WIDTH, 1.0, 2.0))[0]
 
 
 @case("flow-sections", kind="property", norm="largest relative error of the flux through 25 sections",

@@ -35,7 +35,7 @@ def first_rise() -> Outcome:
 
 @cache
 def _grid(refinement: float) -> PoreMesh:
-    return mesh.generate(geometry.seed(RADIUS, refinement), ENDS, WIDTH, refinement, 2.0)[0]
+    return mesh.generate(geometry.seed(RADIUS, refinement), ENDS, geometry.Sizing(WIDTH, refinement, 2.0))[0]
 
 
 def _rise_errors(level: int, interface: str) -> dict[str, float]:

@@ -20,7 +20,7 @@ def half_disc(refinement: float) -> tuple[growth.Body, np.ndarray]:
     """(body, nodes of its arc without the corners (M,)): a half-disc on the wall on which it slides, its middle fixed,
     in a mesh of the package's own."""
     outline = geometry.seed(RADIUS, refinement)
-    grid, outline = mesh.generate(outline, (-60.0, 60.0), 50.0, refinement, 2.0)
+    grid, outline = mesh.generate(outline, (-60.0, 60.0), geometry.Sizing(50.0, refinement, 2.0))
     rim, free = grid.body_loop, outline.wall == geometry.FREE
     held = np.zeros((len(grid.body), 2), bool)
     held[rim[outline.fixed], 0] = True

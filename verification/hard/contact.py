@@ -175,7 +175,7 @@ def _loss(preset: str, made) -> float:
         return curved_flow.unit_flow(grid, made.flow.viscosity_ratio)[2]
     shape = Outline(*wedge(LEAST))
     ends = geometry.meshed_extent(shape, 20.0, made.pore.length)
-    grid, _ = mesh.generate(shape, ends, 20.0, made.numerics.refinement, 2.0)
+    grid, _ = mesh.generate(shape, ends, geometry.Sizing(20.0, made.numerics.refinement, 2.0))
     return flow.unit_flow(grid, made.flow.viscosity_ratio).loss
 
 

@@ -109,7 +109,7 @@ def _meshed(preset: str, made, noise: float):
     if preset == "paper":
         shape = _noisy(geometry.seed(20.0, made.numerics.refinement), noise, random)
         ends = geometry.meshed_extent(shape, 50.0, made.pore.length)
-        grid, _ = mesh.generate(shape, ends, 50.0, made.numerics.refinement, 2.0)
+        grid, _ = mesh.generate(shape, ends, geometry.Sizing(50.0, made.numerics.refinement, 2.0))
         return grid, flow.unit_flow(grid, 2000.0).loss
     shape = _noisy(curved_outline.seed(20.0, made.numerics.refinement), noise, random)
     grid, _ = curved_pore.generate(made, shape)

@@ -72,7 +72,7 @@ def _segment(contact: float, refinement: float) -> mesh.PoreMesh:
     points = np.vstack([np.column_stack([base, 0 * base]), arc[1:-1]])
     wall = np.where(np.arange(len(points)) < len(base), geometry.BOTTOM, geometry.FREE)
     outline = geometry.Outline(points, wall, np.arange(len(points)) == 2, points)
-    return mesh.generate(outline, (-END, END), WIDTH, refinement, FILM)[0]
+    return mesh.generate(outline, (-END, END), geometry.Sizing(WIDTH, refinement, FILM))[0]
 
 
 def _displacement(grid, gamma: float, name: str) -> np.ndarray:

@@ -35,7 +35,7 @@ def growth() -> Outcome:
 
 
 def _half_disc(radius: float) -> mesh.PoreMesh:
-    return mesh.generate(geometry.seed(radius), ENDS, WIDTH, 1.0, 2.0)[0]
+    return mesh.generate(geometry.seed(radius), ENDS, geometry.Sizing(WIDTH, 1.0, 2.0))[0]
 
 
 def _journey(grid: mesh.PoreMesh, stretch: float, shift: float) -> list[mesh.PoreMesh]:

@@ -25,7 +25,7 @@ def scene(*changes: str):
 def placed(outline: geometry.Outline, refinement: float, density=lambda x, y: DENSITY + 0 * x,
            ends=(-75.0, 75.0)) -> Pore:
     """An aggregate at t = 0 with X_A = density(x, y), on a mesh of its own."""
-    grid, outline = mesh.generate(outline, ends, WIDTH, refinement, FILM)
+    grid, outline = mesh.generate(outline, ends, geometry.Sizing(WIDTH, refinement, FILM))
     active, none = np.zeros(len(grid.points)), np.zeros(len(grid.points))
     active[grid.body] = density(*grid.points[grid.body].T)
     return Pore(0.0, grid, outline.wall, outline.fixed, active, none, grid.points.copy(),

@@ -38,7 +38,7 @@ def load(v, w):
 @cache
 def _meshed(refinement: float, sample: int) -> mesh.PoreMesh:
     about = refinement * NEAR ** (sample - REFINEMENTS[refinement] // 2)
-    return mesh.generate(geometry.seed(RADIUS, about), ENDS, WIDTH, about, 2.0)[0]
+    return mesh.generate(geometry.seed(RADIUS, about), ENDS, geometry.Sizing(WIDTH, about, 2.0))[0]
 
 
 @cache

@@ -44,7 +44,7 @@ def _meshed(cell: float, sample: int, shape: str):
     if shape == "block":
         return following(2 * SIDE**2, cell, sample, (-BOX, BOX), BOX, lambda x, y: (np.abs(x) < SIDE) & (y < SIDE),
                          across=(-SIDE, SIDE), along=(SIDE,))
-    return mesh.generate(geometry.seed(SIDE, DISC[cell]), (-BOX, BOX), BOX, DISC[cell], 2.0)[0]
+    return mesh.generate(geometry.seed(SIDE, DISC[cell]), (-BOX, BOX), geometry.Sizing(BOX, DISC[cell], 2.0))[0]
 
 
 def _ours(cell: float, sample: int, density: float, shape: str) -> np.ndarray:

@@ -48,7 +48,7 @@ def biomass(acceptor, donor, active):
 
 @cache
 def _box():
-    grid, _ = mesh.generate(geometry.seed(RADIUS, 0.5), (-BOX, BOX), BOX, 0.3, 2.0)
+    grid, _ = mesh.generate(geometry.seed(RADIUS, 0.5), (-BOX, BOX), geometry.Sizing(BOX, 0.3, 2.0))
     return transport.problem(grid, None, CLOSED, LAW)
 
 
