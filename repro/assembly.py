@@ -105,7 +105,7 @@ class Factored:
     def solve(self, right: np.ndarray, value: np.ndarray | None = None) -> np.ndarray:
         """x (n,) of K x = b (n,) with the prescribed unknowns as in ``value`` (n,), zero by default."""
         order, found = self.system.order, np.zeros(len(right))
-        if value is not None:
+        if value is not None and self.system.held.any():
             found = np.where(self.system.held, value, 0.0)
             right = right - self.system.product(self.elements, found)
         found[order] = self.solver.solve(right[order])

@@ -33,7 +33,7 @@ class Sizing:
 
     @property
     def largest(self) -> float:
-        """The largest size (um): a fourteenth of the pore's width."""
+        """The largest size (um): a fourteenth of the pore's width, divided by the refinement."""
         return self.width / ACROSS_PORE / self.refinement
 
 
@@ -128,8 +128,8 @@ def interface_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
 
     A tenth of the aggregate's thickness, a fourteenth of the pore's width, and for free nodes the film's size.
     """
-    across = min(outline.thickness / ACROSS_AGGREGATE, sizing.width / ACROSS_PORE)
-    size = np.full(len(outline.points), across / sizing.refinement)
+    across = min(outline.thickness / ACROSS_AGGREGATE / sizing.refinement, sizing.largest)
+    size = np.full(len(outline.points), across)
     return np.where(outline.wall == FREE, np.minimum(size, film_sizes(outline, sizing)), size)
 
 

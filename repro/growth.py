@@ -76,31 +76,30 @@ def deformation(position: np.ndarray, triangles: np.ndarray, slopes: np.ndarray)
 
 def inverse_transpose(F: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """H = F^-T and J of plane deformations (..., 2, 2)."""
-    J = F[..., 0, 0] * F[..., 1, 1] - F[..., 0, 1] * F[..., 1, 0]
-    H = np.empty_like(F)
-    H[..., 0, 0], H[..., 1, 1], H[..., 0, 1], H[..., 1, 0] = F[..., 1, 1], F[..., 0, 0], -F[..., 1, 0], -F[..., 0, 1]
-    return H / J[..., None, None], J
+    at = Strained(F)
+    return at.H, at.J
 
 
 @dataclass(frozen=True, eq=False)
 class Strained:
-    """Plane deformations F (..., 2, 2) and what stress and tangent take from them, each worked out once."""
+    """Plane deformations F (..., 2, 2) and what the stress takes from them, each worked out once, where it is asked
+    for: J before anything is divided by it."""
 
     F: np.ndarray
 
     @cached_property
-    def _inverse(self) -> tuple[np.ndarray, np.ndarray]:
-        return inverse_transpose(self.F)
-
-    @property
-    def H(self) -> np.ndarray:
-        """(..., 2, 2) F^-T."""
-        return self._inverse[0]
-
-    @property
     def J(self) -> np.ndarray:
         """(...) det F."""
-        return self._inverse[1]
+        F = self.F
+        return F[..., 0, 0] * F[..., 1, 1] - F[..., 0, 1] * F[..., 1, 0]
+
+    @cached_property
+    def H(self) -> np.ndarray:
+        """(..., 2, 2) F^-T."""
+        F, H = self.F, np.empty_like(self.F)
+        H[..., 0, 0], H[..., 1, 1] = F[..., 1, 1], F[..., 0, 0]
+        H[..., 0, 1], H[..., 1, 0] = -F[..., 1, 0], -F[..., 0, 1]
+        return H / self.J[..., None, None]
 
     @cached_property
     def A(self) -> np.ndarray:
@@ -117,20 +116,6 @@ class Strained:
         """
         return self.A[..., None, None] * self.F + (P * self.J - self.A * self.trace / 3)[..., None, None] * self.H
 
-    def tangent(self, P: np.ndarray) -> np.ndarray:
-        """d piola / d F, (..., i, K, j, L), over mu_L."""
-        F, H, A, trace, PJ = self.F, self.H, self.A, self.trace, P * self.J
-        first, second = (F[..., None, None], H[..., None, None]), (F[..., None, None, :, :], H[..., None, None, :, :])
-        FH, HF, HH = first[0] * second[1], first[1] * second[0], first[1] * second[1]
-        swap = np.swapaxes(HH, -3, -1)
-        identity = np.einsum("ij,kl->ikjl", np.eye(2), np.eye(2))
-
-        def times(scalar, tensor):
-            return scalar[..., None, None, None, None] * tensor
-
-        return (times(A, identity - 2 / 3 * (FH + HF)) + times(2 / 9 * A * trace + PJ, HH)
-                + times(A * trace / 3 - PJ, swap))
-
 
 def energy(F: np.ndarray) -> np.ndarray:
     """mu/2 (J^(-2/3) tr C - 3) for mu = 1 (17), of F (..., 2, 2)."""
@@ -144,8 +129,19 @@ def piola(F: np.ndarray, P: np.ndarray) -> np.ndarray:
 
 
 def tangent(F: np.ndarray, P: np.ndarray) -> np.ndarray:
-    """:meth:`Strained.tangent` of F (..., 2, 2)."""
-    return Strained(F).tangent(P)
+    """d piola / d F, (..., i, K, j, L), over mu_L."""
+    at = Strained(F)
+    H, A, trace, PJ = at.H, at.A, at.trace, P * at.J
+    first, second = (F[..., None, None], H[..., None, None]), (F[..., None, None, :, :], H[..., None, None, :, :])
+    FH, HF, HH = first[0] * second[1], first[1] * second[0], first[1] * second[1]
+    swap = np.swapaxes(HH, -3, -1)
+    identity = np.einsum("ij,kl->ikjl", np.eye(2), np.eye(2))
+
+    def times(scalar, tensor):
+        return scalar[..., None, None, None, None] * tensor
+
+    return (times(A, identity - 2 / 3 * (FH + HF)) + times(2 / 9 * A * trace + PJ, HH)
+            + times(A * trace / 3 - PJ, swap))
 
 
 def cauchy(F: np.ndarray, P: np.ndarray) -> np.ndarray:

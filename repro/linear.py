@@ -73,9 +73,9 @@ def _by_degree(graph) -> np.ndarray:
 
 def _dissected(graph) -> np.ndarray:
     """Nested dissection by METIS; the graph without its diagonal."""
-    pairs = sp.coo_array(graph)
-    away = pairs.row != pairs.col
-    graph = sp.csr_array((pairs.data[away], (pairs.row[away], pairs.col[away])), shape=graph.shape)
+    found = sp.coo_array(graph)
+    away = found.row != found.col
+    graph = sp.csr_array((found.data[away], (found.row[away], found.col[away])), shape=graph.shape)
     metis = _package("pymetis")
     return np.asarray(metis.nested_dissection(metis.CSRAdjacency(graph.indptr, graph.indices))[0])
 

@@ -132,8 +132,8 @@ def test_no_triangle_has_two_edges_on_the_boundary_of_its_region():
 
 
 def test_a_middle_lies_between_the_ends_of_its_edge(grid):
-    """``edges`` are in the order of the middles' nodes: a linear field keeps its values at straight middles. Mutants:
-    the edges of a triangle in another order than its middles, middles at one of the ends."""
+    """``edge_ends`` are in the order of the middles' nodes: a linear field keeps its values at straight middles.
+    Mutants: the edges of a triangle in another order than its middles, middles at one of the ends."""
     straight = grid.with_middles(grid.points[: grid.corners])
     inner = np.setdiff1d(np.arange(len(grid.points)), grid.loop)
     made = pore.seeded(scene("20 um", numerics={"preset": "fast"})).mesh

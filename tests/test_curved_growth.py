@@ -1,4 +1,7 @@
 """Growth on curved triangles: closed forms at small cost, tangent, what the grad-div term is for, what is refused."""
+import gc
+import weakref
+
 import numpy as np
 import pytest
 
@@ -84,3 +87,30 @@ def test_what_is_turned_over_is_refused():
         with pytest.raises(GrowthError, match="turned over or from theta <= 0"):
             growth.equilibrium(body, theta, start, push, start)
     assert not growth.System(body).admissible(grid.points * [-1, 1])
+
+
+def _plate():
+    grid, left, _, bottom = cases._rectangle()
+    return grid, cases._body(grid.points, grid.points, np.column_stack([left, bottom]))
+
+
+def test_a_body_that_is_pressed_flat_is_not_admissible():
+    """J = 0 is told before anything is divided by it. Mutant: J taken from what also works out F^-T."""
+    grid, body = _plate()
+    with np.errstate(all="raise"):
+        assert not growth.System(body).admissible(grid.points * [1.0, 0.0])
+        assert growth.System(body).admissible(grid.points)
+
+
+def test_a_system_is_freed_when_nobody_has_it():
+    """It holds fields at every point of the quadrature. Mutant: what it keeps its last results with refers to it."""
+    gc.disable()
+    try:
+        grid, body = _plate()
+        system = growth.System(body)
+        system.residual(grid.points, np.zeros(body.corners), np.ones(system.at.dx.shape))
+        alive = weakref.ref(system)
+        del system
+        assert alive() is None
+    finally:
+        gc.enable()

@@ -67,6 +67,7 @@ class Functions:
         """(q, k k) of two nodal functions."""
         return (self.values[:, :, None] * self.values[:, None, :]).reshape(len(self.weights), -1)
 
+
 def _functions(order: int) -> Functions:
     area, line = DEGREES[order]
     (s,), line_weights = get_quadrature_line(line)

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -66,11 +67,10 @@ class Body:
         return self.topology["origin"]
 
     @property
-    def weighted(self) -> tuple[np.ndarray, np.ndarray]:
-        """Its gradients times weights, (t, 2 q, 6) um, and the sizes of these."""
+    def weighted(self) -> np.ndarray:
+        """(t, 2 q, 6) um, its gradients times weights."""
         if "weighted" not in self.topology:
-            found = self.places.weighted
-            self.topology["weighted"] = found, np.abs(found)
+            self.topology["weighted"] = self.places.weighted
         return self.topology["weighted"]
 
     @property
@@ -90,7 +90,8 @@ def of(pore, held: np.ndarray | None = None, reused: bool = False) -> Body:
 
 
 class Last:
-    """A function of one array, its last result kept until another array is asked for."""
+    """A function of one array, its last result kept until another array is asked for; arrays do not change in place.
+    """
 
     def __init__(self, function: Callable[[np.ndarray], Any]):
         self.function = function
@@ -103,6 +104,13 @@ class Last:
         return self.found
 
 
+def _deformed(at: elements.Places, cells: np.ndarray, position: np.ndarray) -> Strained:
+    """F[i, K] = d x_i / d X_K (t, q, 2, 2) of triangles (t, 6) at positions (n, 2), and what goes with it."""
+    slopes = np.swapaxes(position[cells], 1, 2) @ np.swapaxes(at.rows, 1, 2)
+    count, points = at.dx.shape
+    return Strained(elements.by_component(slopes.reshape(count, 2, points, 2).transpose(1, 3, 0, 2)))
+
+
 class System:
     """Residual and tangent for one body, in the shape that :func:`repro.growth.reach` asks for."""
 
@@ -110,21 +118,16 @@ class System:
         self.body, self.sparse = body, body.sparse
         self.at = body.places
         self.unknowns, self.free = self.sparse.kinds[0], self.sparse.free
-        self.weighted, self.magnitude = body.weighted
-        self.deformed, self._stabilising = Last(self._deformed), Last(lambda theta: GAMMA * theta ** (-5 / 3))
+        self.weighted = body.weighted
+        self.deformed = Last(partial(_deformed, self.at, body.cells))
+        self._grad_div = Last(lambda theta: GAMMA * theta ** (-5 / 3))
         self._sized: tuple[Any, Any] = None, None
-
-    def _deformed(self, position: np.ndarray) -> Strained:
-        """F[i, K] = d x_i / d X_K (t, q, 2, 2) and what goes with it."""
-        slopes = np.swapaxes(position[self.body.cells], 1, 2) @ np.swapaxes(self.at.rows, 1, 2)
-        count, points = self.at.dx.shape
-        return Strained(elements.by_component(slopes.reshape(count, 2, points, 2).transpose(1, 3, 0, 2)))
 
     def _pressed(self, position, pressure, theta) -> tuple[Strained, np.ndarray]:
         """The deformation, and P with its stabilisation (t, q)."""
         at = self.deformed(position)
         linear = pressure[self.body.cells[:, :3]] @ elements.LINEAR.T
-        return at, linear + self._stabilising(theta) * (at.J - theta)
+        return at, linear + self._grad_div(theta) * (at.J - theta)
 
     def _forces(self, stress: np.ndarray, weighted: np.ndarray) -> np.ndarray:
         """(t, 2, 6) of the integral of stress (t, q, 2, 2) : grad v, weighted (t, 2 q, 6) being dx grad v."""
@@ -136,7 +139,7 @@ class System:
         at, P = self._pressed(position, pressure, theta)
         force, gap = self._forces(at.piola(P), self.weighted), (self.at.dx * (at.J - theta)) @ elements.LINEAR
         if self._sized[0] is not theta:
-            terms = self._forces(at.A[..., None, None] * np.abs(at.F), self.magnitude)
+            terms = self._forces(at.A[..., None, None] * np.abs(at.F), np.abs(self.weighted))
             self._sized = theta, self._summed(terms, (self.at.dx * theta) @ elements.LINEAR)
         return self._summed(force, gap), self._sized[1]
 
@@ -149,12 +152,12 @@ class System:
         """(t, 15, 15) symmetric element matrices of the residual's derivative."""
         at, P = self._pressed(position, pressure, theta)
         h, f, dx, PJ = self._pulled(at.H), self._pulled(at.F), self.at.dx, P * at.J
-        both = 2 / 9 * at.A * at.trace + PJ + self._stabilising(theta) * at.J**2
+        both = 2 / 9 * at.A * at.trace + PJ + self._grad_div(theta) * at.J**2
         half = each(dx * both / 2, h) - each(2 / 3 * dx * at.A, f)
         swap = each(dx * (at.A * at.trace / 3 - PJ), h)
         found = np.swapaxes(h, 1, 2) @ np.concatenate([half, swap], axis=2)
         K = found[:, :, :12] + np.swapaxes(found[:, :, :12], 1, 2)
-        exchanged = K.reshape(-1, 2, 6, 2, 6)
+        exchanged = K.reshape(-1, 2, 6, 2, 6)  # the same memory
         exchanged += np.swapaxes(found[:, :, 12:].reshape(exchanged.shape), 1, 3)
         plain = np.swapaxes(self.at.rows, 1, 2) @ (np.repeat(at.A, 2, axis=1)[:, :, None] * self.weighted)
         exchanged[:, 0, :, 0] += plain

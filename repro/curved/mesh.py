@@ -108,18 +108,18 @@ class CurvedMesh:
         return replace(self, points=points)
 
     @property
-    def edges(self) -> np.ndarray:
+    def edge_ends(self) -> np.ndarray:
         """(E, 2) corners at the ends of every edge, the middle of which is node ``corners`` + its number."""
-        return self.once("edges", self._edges)
+        return self.once("edge ends", self._edge_ends)
 
-    def _edges(self) -> np.ndarray:
+    def _edge_ends(self) -> np.ndarray:
         found = np.empty((len(self.points) - self.corners, 2), int)
         found[self.cells[:, 3:] - self.corners] = np.stack([self.cells[:, :3], self.cells[:, elements.NEXT]], axis=2)
         return found
 
     def with_middles(self, field: np.ndarray) -> np.ndarray:
         """(N, ...) a linear field (corners, ...) at the middles of the edges too."""
-        a, b = self.edges.T
+        a, b = self.edge_ends.T
         return np.concatenate([field, 0.5 * (field[a] + field[b])])
 
     def turned_over(self, which: np.ndarray | slice = slice(None)) -> np.ndarray:

@@ -33,7 +33,7 @@ class Pore:
     time: h; wall, fixed: (2 M,) of each node of ``mesh.loop``; origin: (N, 2) um, places of the material at t = 0;
     reference: (N, 2) um, places when the mesh was made; active, inert: (N,) mass of X_A and X_I per area of the
     reference over X_m: their sum is the expansion since then, and X_A = X_m active / (active + inert); zero outside the
-    aggregate; pressure: (corners,) P / mu_L; concentrations: the last known ones.
+    aggregate; pressure: (corners,) P / mu_L; concentrations: a first guess of them.
     """
 
     time: float
@@ -125,17 +125,17 @@ def generate(scene, around: Arcs | None) -> tuple[CurvedMesh, Arcs | None]:
     Raises MeshError where the outline crosses itself or the channel's ends, or where a curved triangle is turned over.
     """
     width = scene.pore.width
-    sizes = sizing(scene)
+    wanted = sizing(scene)
     ends = geometry.meshed_extent(around, width, scene.pore.length,
                                   scene.numerics.extent == "full")
     if around is None:
-        straight = linear_mesh.around(None, ends, sizes)
+        straight = linear_mesh.around(None, ends, wanted)
         return curved(straight, np.empty((0, 2))), None
     for _ in range(HALVINGS):
-        around = outline.split(around, sizes)
+        around = outline.split(around, wanted)
         polygon = outline.corners(around)
         linear_mesh.check_outline(polygon, ends, width)
-        straight = unlocked(linear_mesh.around(polygon, ends, sizes))
+        straight = unlocked(linear_mesh.around(polygon, ends, wanted))
         grid = curved(straight, around.points[1::2])
         strained = grid.strained_arcs()
         if not strained.any():

@@ -200,7 +200,8 @@ def _eased(problem: Problem, weight, state):
 
 
 def _newton(problem: Problem, weight, state, advance):
-    """(2n,) solution and Newton's iterations; sizes of the terms are those after the first step of each derivative."""
+    """(2n,) solution and Newton's iterations; sizes of the terms are those of the first guess, then those after the
+    first step of each derivative."""
     jacobian, defect = Jacobian(problem.reused), np.inf
     residual, size = balance(problem, weight, state), terms(problem, weight, state)
     for iteration in range(MOST_ITERATIONS):

@@ -26,7 +26,7 @@ PRESET_PAPER = "preset paper: linear elements, updates"
 #: Refinement and time step (min) of the paper's scheme; those of them at which it is changed in one thing; refinement
 #: and tolerance of the midpoint rule's.
 PAPER = ((0.25, 60), (0.35, 48), (0.5, 48), (0.7, 96), (0.7, 48), (0.7, 24), (1.0, 120), (1.0, 96), (1.0, 48),
-         (1.0, 12), (1.4, 96), (1.4, 48), (1.4, 24), (1.4, 12), (1.4, 6), (2.0, 6))
+         (1.0, 12), (1.4, 96), (1.4, 48), (1.4, 24), (1.4, 12), (1.4, 6), (2.0, 6), (2.8, 12), (2.8, 6))
 CHANGED = ((0.7, 24), (1.0, 48), (1.0, 12))
 MIDPOINT = ((0.35, 0.03), (0.5, 0.03), (0.7, 0.01), (1.0, 0.01), (1.4, 0.003), (2.0, 0.002))
 QUADRATIC = ((0.15, 0.02), (0.15, 0.01), (0.2, 0.01), (0.3, 0.005), (0.45, 0.002), (0.45, 0.001), (0.6, 0.0005),
