@@ -127,7 +127,7 @@ def _scenes(part: dict) -> Iterator[dict]:
             continue
         strange = sorted({stage for row, _ in rows for stage in row["unneeded"]})
         worst = max(excess(row, whole) for row, whole in rows)
-        told = f"{100 * worst:.0f} % at most above them; other stages: {', '.join(strange) or 'none'}"
+        told = f"{round(100 * worst)} % at most above them; other stages: {', '.join(strange) or 'none'}"
         yield verdict(claim, wanted, told, not strange and worst <= EXCESS)
 
 
