@@ -13,9 +13,14 @@ from tests.strategies import meshed, scene
 
 
 @pytest.fixture(scope="module")
-def grid():
-    """Around a half-disc, its inner edges bent too."""
-    made = pore.seeded(scene("20 um", numerics={"preset": "fast"})).mesh
+def made():
+    """Around a half-disc, as it was made."""
+    return pore.seeded(scene("20 um", numerics={"preset": "fast"})).mesh
+
+
+@pytest.fixture(scope="module")
+def grid(made):
+    """The same, its inner edges bent too."""
     points, random = made.points.copy(), np.random.default_rng(1)
     outer = np.concatenate([made.inlet, made.outlet, made.walls, made.loop])
     inner = np.setdiff1d(np.arange(made.corners, len(points)), outer)
@@ -131,20 +136,18 @@ def test_no_triangle_has_two_edges_on_the_boundary_of_its_region():
     assert (alone < 2).all()
 
 
-def test_a_middle_lies_between_the_ends_of_its_edge(grid):
+def test_a_middle_lies_between_the_ends_of_its_edge(grid, made):
     """``edge_ends`` are in the order of the middles' nodes: a linear field keeps its values at straight middles.
     Mutants: the edges of a triangle in another order than its middles, middles at one of the ends."""
     straight = grid.with_middles(grid.points[: grid.corners])
     inner = np.setdiff1d(np.arange(len(grid.points)), grid.loop)
-    made = pore.seeded(scene("20 um", numerics={"preset": "fast"})).mesh
     assert np.allclose(straight[inner], made.points[inner], rtol=0, atol=1e-12)
     assert np.allclose(grid.with_middles(straight[: grid.corners] @ [2.0, -3.0]), straight @ [2.0, -3.0])
 
 
-def test_only_triangles_at_the_aggregate_are_bent(grid):
+def test_only_triangles_at_the_aggregate_are_bent(made):
     """In a mesh that was made, the others are straight, which ``acceptable`` stands on; and a bent one that is turned
     over is found. Mutants: those of the biomass alone, those of the fluid."""
-    made = pore.seeded(scene("20 um", numerics={"preset": "fast"})).mesh
     straight, others = made.moved(made.with_middles(made.points[: made.corners])), np.ones(len(made.cells), bool)
     others[made.bent] = False
     assert np.allclose(made.points[made.cells[others]], straight.points[made.cells[others]], rtol=0, atol=1e-12)

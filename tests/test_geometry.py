@@ -108,9 +108,10 @@ def test_an_outline_is_too_coarse_where_an_edge_is_twice_what_is_wanted(drawn, r
     sizing = geometry.Sizing(width, refinement, FILM)
     fine = geometry.refine_outline(outline, geometry.interface_sizes(outline, sizing), sizing)
     assert not geometry.too_coarse(fine, sizing)
-    sizes, ends = geometry.interface_sizes(fine, sizing), np.column_stack([range(len(fine.points)), range(
-        1, len(fine.points) + 1)])[fine.interface_edges()] % len(fine.points)
-    longest = (np.hypot(*(fine.points[ends[:, 0]] - fine.points[ends[:, 1]]).T) / sizes[ends].mean(axis=1)).max()
+    sizes, first = geometry.interface_sizes(fine, sizing), np.flatnonzero(fine.interface_edges())
+    second = (first + 1) % len(fine.points)
+    length = np.hypot(*(fine.points[first] - fine.points[second]).T)
+    longest = (length / (0.5 * (sizes[first] + sizes[second]))).max()
     for part, wanted in ((0.999, False), (1.001, True)):
         finer = replace(sizing, refinement=part * refinement * 2.8 / longest)
         assert geometry.too_coarse(fine, finer) == wanted
