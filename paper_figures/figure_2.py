@@ -7,8 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from paper_figures import runs, style
-from repro import Scene, geometry
-from repro.geometry import Outline
+from repro import Scene
+from repro.fem import geometry
+from repro.fem.geometry import Outline
 
 TITLE = "Figure 2. The pore, its domains and boundaries"
 RUNS = ()

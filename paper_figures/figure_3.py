@@ -8,8 +8,9 @@ from matplotlib.patches import Rectangle
 
 from paper_figures import runs, style
 from paper_figures.figure_2 import THICKNESS, inflow
-from repro import Scene, geometry
-from repro.geometry import Outline
+from repro import Scene
+from repro.fem import geometry
+from repro.fem.geometry import Outline
 
 TITLE = "Figure 3. Conditions at the ends of the pore and of its meshed part"
 RUNS = ()

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from paper_figures import runs, states, style
 from paper_figures.states import State
-from repro.reprojection import locate
+from repro.fem.reprojection import locate
 
 TITLE = "Figure 5. Stokes flow around the aggregate"
 RUNS = (runs.BASE,)

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from shapely import Polygon, box
 
 from paper_figures import runs, states, style
-from repro.cache import provenance
+from repro.run.cache import provenance
 
 TITLE = "Figure 6. Outlines of an aggregate that meets the opposite wall"
 RUNS = (runs.WIDE,)

@@ -24,8 +24,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from paper_figures import FIGURES, runs, states
-from repro.cache import provenance, run_folder, source_hash
 from repro.results import PACKAGES
+from repro.run.cache import provenance, run_folder, source_hash
 from verification.bench.record import processor
 
 OUT = Path(__file__).parent / "out"

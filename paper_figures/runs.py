@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from repro import Scene, load_scene
-from repro.cache import cached_run, cached_runs
+from repro.run.cache import cached_run, cached_runs
 
 CACHE = Path(__file__).parent / "cache"
 

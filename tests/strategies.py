@@ -5,8 +5,9 @@ import numpy as np
 from hypothesis import settings
 from hypothesis import strategies as st
 
-from repro import geometry, growth, mesh
-from repro.geometry import BOTTOM, FREE, TOP, Outline
+from repro.fem import geometry, mesh
+from repro.fem.geometry import BOTTOM, FREE, TOP, Outline
+from repro.model import growth
 from repro.scene import parse_scene
 
 LENGTH = 600.0

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from repro import coupling
+from repro.march import coupling
 from tests import oracles
 from tests.strategies import between, scene, scenes, share
 

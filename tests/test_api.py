@@ -11,9 +11,9 @@ import pytest
 
 import repro
 from repro import results
-from repro.running import run
+from repro.results.tables import SHOWN, Results, solve, unit
+from repro.run.running import run
 from repro.scene import load_scene
-from repro.tables import SHOWN, Results, solve, unit
 
 SHORT = ["numerics.preset=fast", 'growth.end="0.6 h"']
 
@@ -104,7 +104,7 @@ def test_importing_takes_next_to_nothing():
     """And writing a scene out no more than its units do (pint, which takes others along). Mutant: the
     solver imported with the package."""
     for code, heavy in (("import repro, repro.scene", "numpy pint scipy skfem"),
-                        ("from repro.scene_text import scene_text; scene_text('flow_only')", "skfem meshio mmgpy")):
+                        ("from repro.scene.text import scene_text; scene_text('flow_only')", "skfem meshio mmgpy")):
         loaded = f"{code}; import sys; sys.exit(' '.join(name for name in '{heavy}'.split() if name in sys.modules))"
         done = subprocess.run([sys.executable, "-c", loaded], capture_output=True, text=True, check=False)
         assert done.stderr.strip() == ""
@@ -157,6 +157,6 @@ def test_users_of_mypy_see_types(tmp_path):
                           check=False, env={"MYPYPATH": where, "PATH": ""})
     revealed = re.findall(r'Revealed type is "(.*)"', done.stdout)
     assert [re.sub(r"builtins\.|_typeshed\.", "", one).split("[")[0] for one in revealed] == [
-        "repro.tables.Results", "numpy.ndarray", "dict", "dict", "int"], done.stdout
+        "repro.results.tables.Results", "numpy.ndarray", "dict", "dict", "int"], done.stdout
     errors = re.findall(r"error: .*\[([a-z-]+)\]$", done.stdout, re.M)
     assert sorted(errors) == ["arg-type", "attr-defined", "attr-defined"], done.stdout

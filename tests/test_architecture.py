@@ -85,7 +85,7 @@ def test_nobody_imports_what_the_rules_forbid(folder):
 
 
 @pytest.mark.parametrize("folder, source", [
-    ("reference", "import repro.flow"),
+    ("reference", "import repro.model.flow"),
     ("reference", "def f():\n    from repro import flow"),
     ("repro", "from verification.claims import judge"),
     ("repro", "import numpy, tests"),

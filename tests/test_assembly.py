@@ -2,7 +2,7 @@
 import numpy as np
 import pytest
 
-from repro.assembly import ElementSystem, saddle_blocks
+from repro.fem.assembly import ElementSystem, saddle_blocks
 
 LINE = np.column_stack([np.arange(9), np.arange(1, 10)])
 #: Of the first kind all pieces of a line, of the second one piece with another far away.

@@ -4,7 +4,7 @@ import json
 import numpy as np
 import pytest
 
-from repro import pore
+from repro.model import pore
 from repro.scene import load_scene, scene_tables
 from verification.audit import __main__ as audit
 from verification.audit import measure, special

@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 from hypothesis import event, given
 
-from repro import coupling, pore, transport
 from repro.errors import TransportError
+from repro.march import coupling
+from repro.model import pore, transport
 from tests import oracles
 from tests.strategies import between, constants, scenes
 

@@ -4,10 +4,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from repro import reprojection
-from repro.mesh import triangle_areas
+from repro.fem import reprojection
+from repro.fem.mesh import triangle_areas
+from repro.march.simulation import simulate
 from repro.scene import SceneError, load_scene
-from repro.simulation import simulate
 from verification.reprojection import grids
 
 OLD, NEW = grids.grid(6.0, 1), grids.grid(5.0, 2)

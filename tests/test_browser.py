@@ -140,8 +140,8 @@ def test_mesh_lines_and_scales_are_switches(window, runs):
 
 
 def test_a_run_that_stops_before_its_first_row(window, tmp_path, monkeypatch):
-    from repro import running
     from repro.errors import SimulationError
+    from repro.run import running
 
     def stops(scene, state=None):
         raise SimulationError("no")

@@ -5,11 +5,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from skfem.quadrature import get_quadrature_tri
 
-from repro import flow
-from repro.mesh import PoreMesh, triangle_areas
+from repro.fem.mesh import PoreMesh, triangle_areas
+from repro.march.simulation import simulate
+from repro.model import flow
 from repro.results import row
 from repro.scene import SceneError, load_scene
-from repro.simulation import simulate
 
 corners = st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6).map(lambda x: np.array(x).reshape(3, 2)).filter(
     lambda x: triangle_areas(x, np.array([[0, 1, 2]]))[0] > 1e-3)

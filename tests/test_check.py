@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from repro import cost, numbers, simplifications
-from repro.check import check
+from repro.check import cost, numbers, simplifications
+from repro.check.checked import check
+from repro.check.modelled import modelled
 from repro.cli import main
-from repro.modelled import modelled
+from repro.march.simulation import simulate
 from repro.scene import load_scene, packaged_scenes
-from repro.simulation import simulate
 
 #: Mean velocity of the clean channel of base: (1e-3 cm / 600 um) g W^2 / (12 nu), um/h.
 CLEAN = 1e-5 / 600e-6 * 9.81 * (50e-6) ** 2 / (12 * 1.003e-6) * 3600e6
@@ -232,7 +232,7 @@ def test_for_machines(capsys):
 ])
 def test_what_cannot_be_run_is_refused(overrides, said, capsys, monkeypatch):
     """Mutants: only the scene is read, nothing is tried; a traceback."""
-    from repro import linear
+    from repro.fem import linear
 
     def absent(name):
         raise linear.LinearError(f"the package {name} is not installed")

@@ -11,14 +11,14 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from repro import checkpoint, stored
-from repro.checkpoint import NEWEST, PREVIOUS, decoded, encoded
 from repro.errors import CheckpointError
-from repro.loop import State
-from repro.recorder import Recorder
-from repro.running import Watch, run
+from repro.march.loop import State
+from repro.march.simulation import steps
+from repro.run import checkpoint, stored
+from repro.run.checkpoint import NEWEST, PREVIOUS, decoded, encoded
+from repro.run.recorder import Recorder
+from repro.run.running import Watch, run
 from repro.scene import load_scene
-from repro.simulation import steps
 
 THOROUGH = os.environ.get("HYPOTHESIS_PROFILE") == "thorough"
 EXAMPLES = settings(max_examples=500 if THOROUGH else 20)  # by two tests and two presets: 2000 malformed checkpoints

@@ -13,9 +13,10 @@ import meshio
 import numpy as np
 import pytest
 
-from repro import growth, results
+from repro import results
 from repro.cli import main
-from repro.running import OutputError, prepare
+from repro.model import growth
+from repro.run.running import OutputError, prepare
 
 
 def run(tmp_path, scene, *sets, status=0):

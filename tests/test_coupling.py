@@ -4,7 +4,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from repro import coupling, geometry, kinetics, pore, remeshing
+from repro.fem import geometry
+from repro.march import coupling
+from repro.model import kinetics, pore, remeshing
 from repro.scene import load_scene
 from tests.strategies import scene
 from tests.test_mesh import fluid_regions

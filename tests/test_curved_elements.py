@@ -3,12 +3,12 @@ import numpy as np
 import pytest
 from skfem import Basis, BilinearForm, ElementTriP1, ElementTriP2, LinearForm, MeshTri2
 
-from repro.assembly import local
 from repro.curved import elements, pore
 from repro.curved.fields import space
 from repro.curved.mesh import curved, unlocked
 from repro.errors import MeshError
-from repro.mesh import triangle_areas
+from repro.fem.assembly import local
+from repro.fem.mesh import triangle_areas
 from tests.strategies import meshed, scene
 
 

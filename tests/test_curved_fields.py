@@ -2,10 +2,10 @@
 import numpy as np
 import pytest
 
-from repro import geometry
 from repro.curved import fields, pore
+from repro.fem import geometry
+from repro.march.simulation import simulate
 from repro.scene import Numerics, SceneError, load_scene
-from repro.simulation import simulate
 
 WHERE = np.random.default_rng(3).uniform(0, 0.5, (20, 2))
 

@@ -2,9 +2,9 @@
 import numpy as np
 import pytest
 
-from repro.assembly import each
 from repro.curved import elements, flow, pore
-from repro.flow import poiseuille_loss
+from repro.fem.assembly import each
+from repro.model.flow import poiseuille_loss
 from tests.strategies import scene
 
 FAST = {"preset": "fast"}

@@ -5,9 +5,9 @@ import weakref
 import numpy as np
 import pytest
 
-from repro import growth as linear_growth
 from repro.curved import elements, growth
 from repro.errors import GrowthError
+from repro.model import growth as linear_growth
 from verification.growth import curved as cases
 
 

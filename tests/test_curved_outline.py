@@ -4,12 +4,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from repro import geometry
 from repro.curved import coupling, elements, outline, pore, transfer
 from repro.curved.mesh import curved
 from repro.curved.outline import Arcs
 from repro.errors import TransferError
-from repro.geometry import BOTTOM, FREE, TOP
+from repro.fem import geometry
+from repro.fem.geometry import BOTTOM, FREE, TOP
 from repro.scene import load_scene
 from tests.strategies import scene
 

@@ -5,15 +5,16 @@ import meshio
 import numpy as np
 import pytest
 
-from repro import results, simulation
+from repro import results
 from repro.curved import coupling
 from repro.curved import growth as mechanics
 from repro.curved import results as curved_results
-from repro.kinetics import growth_rate, inert_rate
-from repro.rules import CURVED
+from repro.march import simulation
+from repro.model.kinetics import growth_rate, inert_rate
+from repro.model.transport import Concentrations
 from repro.scene import PRESETS, Numerics, load_scene, parse_scene, scene_tables
-from repro.transport import Concentrations
-from repro.units import SceneError
+from repro.scene.rules import CURVED
+from repro.scene.units import SceneError
 from tests.strategies import scene
 
 

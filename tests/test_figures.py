@@ -11,7 +11,8 @@ import pytest
 import paper_figures
 from paper_figures import __main__ as figures
 from paper_figures import claims, overview, page, runs, states, style
-from repro import cli, geometry, load_scene, run
+from repro import cli, load_scene, run
+from repro.fem import geometry
 from repro.scene import scene_hash
 
 MODULES = {name: import_module(f"paper_figures.{name}") for name in paper_figures.FIGURES}

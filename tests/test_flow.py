@@ -6,9 +6,10 @@ import pytest
 from skfem import Basis, ElementTriP2, MeshTri
 
 from reference import layered_channel, poiseuille
-from repro import flow, geometry, mesh
-from repro.mesh import PoreMesh
-from repro.reprojection import interpolate
+from repro.fem import geometry, mesh
+from repro.fem.mesh import PoreMesh
+from repro.fem.reprojection import interpolate
+from repro.model import flow
 from tests.strategies import LENGTH, fitted_order, meshed, plug, relabelled, reversed_mesh
 
 RATIO = 2000.0

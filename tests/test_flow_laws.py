@@ -17,7 +17,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from repro import flow, pore
+from repro.model import flow, pore
 from tests import oracles
 from tests.strategies import between, meshes, relabelled, reversed_mesh, scenes, share, upside_down
 

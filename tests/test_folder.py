@@ -9,12 +9,13 @@ import sys
 
 import pytest
 
-from repro import checkpoint, results
-from repro.checkpoint import NEWEST
+from repro import results
 from repro.cli import main
 from repro.errors import OutputError
-from repro.folder import LOCK, OWN, PARTS, held, prepare
-from repro.running import Watch, resume, run
+from repro.run import checkpoint
+from repro.run.checkpoint import NEWEST
+from repro.run.folder import LOCK, OWN, PARTS, held, prepare
+from repro.run.running import Watch, resume, run
 from repro.scene import load_scene, parse_scene, scene_tables
 from tests.shell import SHORT, files, shell, started, told, wait_for
 
@@ -177,7 +178,7 @@ def test_no_name_of_a_scene_is_a_path(tmp_path, capsys, monkeypatch, name):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "inside").mkdir()
     scene = parse_scene(scene_tables(load_scene("flow_only")), name, "scene.toml")
-    monkeypatch.setattr("repro.commands.run.load_scene", lambda *_: scene)
+    monkeypatch.setattr("repro.cli.run.load_scene", lambda *_: scene)
     assert main(["run", "x", "--out", "inside/run"]) == 0
     out = capsys.readouterr().out
     assert out.count("\n") == 1 and out.strip("\n").isprintable() and told(tmp_path / "inside" / "run")["scene"] == name

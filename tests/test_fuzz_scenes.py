@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 from repro.cli import main
 from repro.scene import KEYS, SceneError, load_scene, packaged_scenes, parse_scene, scene_tables
-from repro.scene_text import scene_text
+from repro.scene.text import scene_text
 from tests.blocks import ROOT
 
 EACH = 500 if os.environ.get("HYPOTHESIS_PROFILE") == "thorough" else 25

@@ -9,9 +9,10 @@ import pytest
 import scipy.sparse as sp
 from scipy.integrate import solve_ivp
 
-from repro import coupling, gear, pore, transport
 from repro.errors import TransportError
-from repro.transport import Concentrations
+from repro.march import coupling
+from repro.model import gear, pore, transport
+from repro.model.transport import Concentrations
 from tests.strategies import fitted_order, scene
 
 SECOND = 1 / 3600

@@ -6,8 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from repro import coupling, geometry, remeshing
-from repro.geometry import BOTTOM, FREE, TOP, Outline
+from repro.fem import geometry
+from repro.fem.geometry import BOTTOM, FREE, TOP, Outline
+from repro.march import coupling
+from repro.model import remeshing
 from tests import oracles
 from tests.strategies import (
     attached_aggregates,

@@ -5,8 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from reference import neo_hookean
-from repro import growth, mesh
 from repro.errors import GrowthError, LinearError
+from repro.fem import mesh
+from repro.model import growth
 from tests import oracles
 from tests.strategies import (
     between,

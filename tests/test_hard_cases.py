@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from repro.errors import SimulationError, TransportError
 from repro.scene import load_scene
-from repro.units import SceneError
+from repro.scene.units import SceneError
 from verification import hard_cases
 from verification.case import Check, Result, at_least, at_most, between
 from verification.hard import common, judge, registered, runs

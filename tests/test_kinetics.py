@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from repro import kinetics
+from repro.model import kinetics
 from tests import oracles
 from tests.strategies import between, concentrations, constants, scene, scenes
 

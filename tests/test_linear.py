@@ -5,8 +5,8 @@ import scipy.sparse as sp
 from hypothesis import given
 from hypothesis import strategies as st
 
-from repro import linear
 from repro.errors import LinearError
+from repro.fem import linear
 from tests.strategies import meshed
 
 

@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from skfem import Basis, BilinearForm, ElementTriP1
 
-from repro import flow, transport
-from repro.assembly import local
+from repro.fem.assembly import local
+from repro.model import flow, transport
 from tests.strategies import meshed, meshes
 
 ROUND_OFF = 1e-13

@@ -5,10 +5,10 @@ from hypothesis import given, settings
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from repro import geometry, mesh
 from repro.errors import MeshError
-from repro.geometry import Outline
-from repro.mesh import PoreMesh
+from repro.fem import geometry, mesh
+from repro.fem.geometry import Outline
+from repro.fem.mesh import PoreMesh
 from tests.strategies import LENGTH, attached_aggregates, meshed, plug, widths
 
 

@@ -6,8 +6,9 @@ from hypothesis import strategies as st
 from skfem import Basis, BilinearForm, ElementTriP1, MeshTri
 from skfem.helpers import dot, grad
 
-from repro import geometry, mesh, mesh_motion
-from repro.mesh import PoreMesh
+from repro.fem import geometry, mesh
+from repro.fem.mesh import PoreMesh
+from repro.model import mesh_motion
 from tests.strategies import between, body_of, meshed, meshes, plug, reversed_mesh, share, upside_down
 
 GAMMA, C = 1.0, 100.0

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from reference import neo_hookean
-from repro import growth
+from repro.model import growth
 from tests import oracles
 from tests.strategies import admissible_F, angles, half_disc, rotation, share
 

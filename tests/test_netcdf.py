@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 import xarray
 
-from repro import names, netcdf, results, rules
+from repro import results
 from repro.cli import main
-from repro.scene import load_scene, scene_hash, scene_tables
+from repro.results import names, netcdf
+from repro.scene import load_scene, rules, scene_hash, scene_tables
 
 SETS = ['numerics.preset="fast"', 'growth.end="1 h"', 'growth.time_step="1 min"', 'output.timeseries="netcdf"']
 UNITS = {"m d-1", "mg L-1", "um2", "um", "cm", "h", "1"}

@@ -1,5 +1,5 @@
 """When Newton's method factorises its derivative anew."""
-from repro.newton import ENOUGH, Jacobian
+from repro.fem.newton import ENOUGH, Jacobian
 
 
 def visits(reused, defects):

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from repro.pace import EXCESS, FASTER, SAFETY, SLOWER, STRETCH, Pace, allowed, fitted, following
+from repro.march.pace import EXCESS, FASTER, SAFETY, SLOWER, STRETCH, Pace, allowed, fitted, following
 
 LENGTHS = st.floats(1e-3, 1e3)
 

@@ -13,9 +13,9 @@ import time
 
 import pytest
 
-from repro import growth
 from repro.cli import main
-from repro.interrupts import SAME, noted
+from repro.model import growth
+from repro.run.interrupts import SAME, noted
 from tests.shell import started, told, wait_for
 
 CONTACT = ["base", "--set", 'numerics.preset="fast"', "--set", 'aggregate.radius="17.98 um"', "--set",

@@ -137,7 +137,7 @@ def test_wheel_and_source_distribution_hold_what_they_should(tmp_path):
                    capture_output=True, check=True)
     (wheel,), (source,) = ((tmp_path / "dist").glob(kind) for kind in ("*.whl", "*.tar.gz"))
     inside = zipfile.ZipFile(wheel).namelist()
-    data = {f"repro/scenes/{path.name}" for path in (ROOT / "repro" / "scenes").glob("*.toml")}
+    data = {f"repro/scene/packaged/{path.name}" for path in (ROOT / "repro" / "scene" / "packaged").glob("*.toml")}
     assert {name.partition("/")[0] for name in inside} == {"repro", f"dupin2001_repro-{PROJECT['version']}.dist-info"}
     assert data <= set(inside) and len(data) >= 4
     with tarfile.open(source) as archive:

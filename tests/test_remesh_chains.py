@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from repro import pore, remeshing, reprojection
+from repro.fem import reprojection
+from repro.model import pore, remeshing
 from tests import oracles
 from tests.strategies import angles, remesh_chains, rotation, scenes, share
 

@@ -11,9 +11,10 @@ import meshio
 import numpy as np
 import pytest
 
-from repro import names, report, results
+from repro import report, results
 from repro.report import fields, page, quantities
 from repro.report.reading import NoRun, read
+from repro.results import names
 from tests.pages import FAST, HOSTILE, Page, hostile, numbers, run, stored, text_of
 
 
@@ -160,8 +161,8 @@ def test_contact_is_marked(tmp_path):
 
 def test_a_run_that_stops_has_its_page(tmp_path, monkeypatch, capsys):
     """Before its first row too. Mutants: a page only at a good end; the status left out."""
-    from repro import running
     from repro.errors import SimulationError
+    from repro.run import running
 
     def stops(scene, state=None):
         raise SimulationError("stopped in the step from t = 0 h, in <growth>: no")

@@ -5,8 +5,8 @@ import shapely
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from repro import geometry, mesh, reprojection
 from repro.errors import TransferError
+from repro.fem import geometry, mesh, reprojection
 from tests import oracles
 from tests.strategies import between, body_of, lumped, meshed, meshes
 

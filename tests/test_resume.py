@@ -7,14 +7,16 @@ from subprocess import TimeoutExpired
 
 import pytest
 
-from repro import growth, loop, results
-from repro.checkpoint import NEWEST, PREVIOUS
+from repro import results
 from repro.cli import main
-from repro.coupling import PoreEnd
 from repro.errors import Interrupted, OutputError, SimulationError
-from repro.running import Watch, resume, run
+from repro.march import loop
+from repro.march.coupling import PoreEnd
+from repro.march.simulation import simulate, steps
+from repro.model import growth
+from repro.run.checkpoint import NEWEST, PREVIOUS
+from repro.run.running import Watch, resume, run
 from repro.scene import load_scene
-from repro.simulation import simulate, steps
 from tests.shell import LONG, SHORT, files, lasting, shell, started, told, wait_for
 
 CONTACT = ('aggregate.radius="17.98 um"', 'pore.width="20 um"', 'growth.end="0.6 h"')

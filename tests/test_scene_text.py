@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 
 from repro.cli import main
-from repro.reading import entries
 from repro.scene import KEYS, OURS, PRESETS, Scene, load_scene, packaged_scenes, parse_scene, scene_tables
-from repro.scene_text import scene_text
-from repro.units import quantity
+from repro.scene.reading import entries
+from repro.scene.text import scene_text
+from repro.scene.units import quantity
 from tests.strategies import scenes
 
 #: Keys that exclude another one that is set: they stay commented out.
@@ -122,7 +122,7 @@ def test_the_name_of_a_file_adds_no_key(tmp_path):
 @given(scenes())
 def test_any_scene_is_written_as_it_is(made):
     """Mutant: numbers shortened."""
-    from repro import scene_text as module
+    from repro.scene import text as module
     tables = scene_tables(made)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "load_tables", lambda source, overrides: tables)

@@ -4,12 +4,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from repro import growth, pore, shape, traction
 from repro.errors import GrowthError, StageError
-from repro.flow import Flow
+from repro.march.simulation import simulate
+from repro.model import growth, pore, shape, traction
+from repro.model.flow import Flow
 from repro.results import row
 from repro.scene import SceneError, load_scene
-from repro.simulation import simulate
 
 
 def base(*changes):

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 
 from reference import robin_channel
-from repro import kinetics, pore, transport
-from repro.flow import Flow
+from repro.model import kinetics, pore, transport
+from repro.model.flow import Flow
 from tests.strategies import between, fitted_order, meshed, plug, scene, scenes, share
 from verification.bench import ribbons
 

@@ -118,7 +118,7 @@ def test_a_quick_case_runs_and_passes(id):
 
 def test_a_mutant_is_caught(monkeypatch):
     """J^(1/3) in the stress: the closed form sees it."""
-    from repro import growth
+    from repro.model import growth
     driver.load()
     monkeypatch.setattr(growth, "cauchy", lambda F, P: _wrong_cauchy(F, P, growth.piola(F, P)))
     assert not case.run(case.CASES["growth-stress"]).holds

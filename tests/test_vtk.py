@@ -8,9 +8,11 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import reference
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
-from repro import names, results, running
+from repro import results
+from repro.march.simulation import simulate
+from repro.results import names
+from repro.run import running
 from repro.scene import load_scene
-from repro.simulation import simulate
 
 TRIANGLE, QUADRATIC_TRIANGLE = 5, 22
 PRESETS = {"paper": (TRIANGLE, "triangle"), "fast": (QUADRATIC_TRIANGLE, "triangle6")}

@@ -1,6 +1,7 @@
 """Meshes of rectangles for cases whose geometry is simpler than the paper's: random, and unrelated from size to size.
 
-Made without :mod:`repro.mesh`: nodes on the given lines, a jittered lattice between them, one Delaunay triangulation.
+Made without :mod:`repro.fem.mesh`: nodes on the given lines, a jittered lattice between them, one
+Delaunay triangulation.
 """
 
 from __future__ import annotations
@@ -8,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import Delaunay
 
-from repro.mesh import PoreMesh, triangle_areas
+from repro.fem.mesh import PoreMesh, triangle_areas
 
 #: Displacement of the lattice's nodes, and the least distance of a lattice node from a line, over the element size.
 JITTER, CLEARANCE = 0.22, 0.45

@@ -6,7 +6,7 @@ import numpy as np
 from skfem import Basis, ElementTriP1, MeshTri
 from skfem.quadrature import get_quadrature_tri
 
-from repro.mesh import PoreMesh
+from repro.fem.mesh import PoreMesh
 
 WEIGHTS = get_quadrature_tri(6)
 

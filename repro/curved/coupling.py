@@ -1,4 +1,4 @@
-"""One step of the coupling on curved triangles: second order in space and in time; as :mod:`repro.coupling`.
+"""One step of the coupling on curved triangles: second order in space and in time; as :mod:`repro.march.coupling`.
 
 The midpoint rule: half a step with the rates of its start gives the shape half way; the rates of flow and substrates
 there carry (9)-(10), exactly integrated at constant rates, over the whole step; the aggregate finds its equilibrium
@@ -11,16 +11,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from repro import geometry, kinetics, mesh_motion
-from repro.coupling import Attempt, Ledger, PoreEnd, Step, pore_end, rates_of
 from repro.curved import elements, growth, outline, pore, transfer
 from repro.curved.outline import Arcs
 from repro.curved.pore import Pore, seeded, solve
 from repro.errors import GrowthError
-from repro.midpoint import first_contact
-from repro.pore import Solved
-from repro.shape import CONTACT_ROUNDS, held_at, middle_of
-from repro.transport import Concentrations
+from repro.fem import geometry
+from repro.march.coupling import Attempt, Ledger, PoreEnd, Step, pore_end, rates_of
+from repro.march.midpoint import first_contact
+from repro.model import kinetics, mesh_motion
+from repro.model.pore import Solved
+from repro.model.shape import CONTACT_ROUNDS, held_at, middle_of
+from repro.model.transport import Concentrations
 
 __all__ = ["attempt", "seeded", "solve"]
 
@@ -185,7 +186,7 @@ def new_mesh(scene, now: Pore, expanded: Pore, state: Concentrations) -> tuple[P
 
 
 def follow(scene, now: Pore, expanded: Pore):
-    """The mesh with its corners moved as in :mod:`repro.mesh_motion`, its fluid edges straight but at the interface."""
+    """The mesh with its corners moved as in :mod:`repro.model.mesh_motion`, its fluid edges straight but at the interface."""
     grid, straight = now.mesh, now.mesh.straight
     corners = mesh_motion.move(straight, expanded.mesh.points[straight.body], scene.numerics.mesh_compressibility,
                                scene.numerics.flow_stabilisation)

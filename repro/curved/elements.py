@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from skfem.quadrature import get_quadrature_tri
 
-from repro.growth import inverse_transpose
+from repro.model.growth import inverse_transpose
 
 #: Degree of the quadrature: products of two quadratic functions and a coefficient that is nearly linear.
 DEGREE = 6

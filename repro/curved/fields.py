@@ -15,7 +15,7 @@ from skfem.quadrature import get_quadrature_line, get_quadrature_tri
 
 from repro.curved import elements
 from repro.curved.mesh import CurvedMesh
-from repro.linear import node_order
+from repro.fem.linear import node_order
 
 #: Degrees of the quadratures on triangles and on edges: products of two functions and a coefficient nearly linear.
 DEGREES = {2: (elements.DEGREE, 6), 3: (8, 9)}

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from repro.assembly import each, saddle_blocks, saddle_system
 from repro.curved.fields import Space, space
 from repro.curved.mesh import CurvedMesh
-from repro.flow import Flow, poiseuille_loss
+from repro.fem.assembly import each, saddle_blocks, saddle_system
+from repro.model.flow import Flow, poiseuille_loss
 from repro.timing import timed
 
 

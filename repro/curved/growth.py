@@ -1,4 +1,4 @@
-"""Growth mechanics (2.3) with quadratic places and a linear pressure (Taylor-Hood); as :mod:`repro.growth`.
+"""Growth mechanics (2.3) with quadratic places and a linear pressure (Taylor-Hood); as :mod:`repro.model.growth`.
 
 Pi without the stabilisation, which a stable pair does not need: the residual is
 
@@ -21,9 +21,9 @@ from typing import Any
 
 import numpy as np
 
-from repro.assembly import ElementSystem, each, saddle_blocks, saddle_system
 from repro.curved import elements
-from repro.growth import Equilibrium, Strained, reach, refuse_turned_over
+from repro.fem.assembly import ElementSystem, each, saddle_blocks, saddle_system
+from repro.model.growth import Equilibrium, Strained, reach, refuse_turned_over
 from repro.timing import timed
 
 #: gamma: the energy's curvature in J is -2/9 J^(-5/3) and less, so that one makes it convex with room to spare.
@@ -112,7 +112,7 @@ def _deformed(at: elements.Places, cells: np.ndarray, position: np.ndarray) -> S
 
 
 class System:
-    """Residual and tangent for one body, in the shape that :func:`repro.growth.reach` asks for."""
+    """Residual and tangent for one body, in the shape that :func:`repro.model.growth.reach` asks for."""
 
     def __init__(self, body: Body):
         self.body, self.sparse = body, body.sparse
@@ -177,7 +177,7 @@ class System:
 @timed("growth")
 def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: np.ndarray,
                 prescribed: np.ndarray) -> Equilibrium:
-    """Equilibrium under theta (n,) nodal since the reference; other arguments as :func:`repro.growth.equilibrium`'s."""
+    """Equilibrium under theta (n,) nodal since the reference; other arguments as :func:`repro.model.growth.equilibrium`'s."""
     system = System(body)
     start = system.deformed(position).J
     target = elements.at_points(theta, body.cells) * body.expanded

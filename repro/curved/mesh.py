@@ -1,4 +1,4 @@
-"""Curved triangulation: the straight one of :mod:`repro.mesh` with a node in the middle of every edge."""
+"""Curved triangulation: the straight one of :mod:`repro.fem.mesh` with a node in the middle of every edge."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 
 from repro.curved import elements
 from repro.errors import MeshError
-from repro.linear import node_order
-from repro.mesh import PoreMesh, triangle_areas
+from repro.fem.linear import node_order
+from repro.fem.mesh import PoreMesh, triangle_areas
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,8 +11,8 @@ from functools import cached_property
 
 import numpy as np
 
-from repro import geometry
-from repro.geometry import FREE, Outline, Sizing, polygon_area
+from repro.fem import geometry
+from repro.fem.geometry import FREE, Outline, Sizing, polygon_area
 
 
 def shape(t: np.ndarray) -> np.ndarray:
@@ -94,7 +94,7 @@ def slopes(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def split(outline: Outline, sizing: Sizing) -> Arcs:
-    """The same curve with corners spaced as :func:`repro.geometry.interface_sizes` wants them, and their middles.
+    """The same curve with corners spaced as :func:`repro.fem.geometry.interface_sizes` wants them, and their middles.
 
     Arcs at the fluid are split into equal parts of their parameter, and never merged; straight contact surfaces get
     new nodes, but for their ends and the fixed points.

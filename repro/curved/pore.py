@@ -1,4 +1,4 @@
-"""The state of a pore on a curved mesh, and what is solved in its geometry; as :mod:`repro.pore`."""
+"""The state of a pore on a curved mesh, and what is solved in its geometry; as :mod:`repro.model.pore`."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from functools import cached_property
 
 import numpy as np
 
-from repro import geometry
-from repro import mesh as linear_mesh
 from repro.curved import elements, flow, outline, transport
 from repro.curved.fields import space
 from repro.curved.mesh import CurvedMesh, curved, unlocked
 from repro.curved.outline import Arcs
-from repro.flow import poiseuille_loss
-from repro.pore import Solved, film, peclet, refuse_no_supply
+from repro.fem import geometry
+from repro.fem import mesh as linear_mesh
+from repro.model.flow import poiseuille_loss
+from repro.model.pore import Solved, film, peclet, refuse_no_supply
+from repro.model.transport import Concentrations
 from repro.timing import timed
-from repro.transport import Concentrations
 
 #: Elements are made no larger than this asks for: the concentration boundary layer is W Pe^(-1/3) thick (Leveque), and
 #: with four elements across the pore and this factor an overshoot upstream of an aggregate stays under 1 %.

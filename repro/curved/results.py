@@ -5,10 +5,10 @@ from __future__ import annotations
 import meshio
 import numpy as np
 
-from repro import growth
 from repro.curved import elements
 from repro.curved import growth as mechanics
 from repro.curved.pore import active_biomass
+from repro.model import growth
 
 M_PER_D, CM = 24e-6, 1e-4
 

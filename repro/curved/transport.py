@@ -1,4 +1,4 @@
-"""Substrates (2.2) with quadratic or cubic concentrations, in the form that conserves; as :mod:`repro.transport`.
+"""Substrates (2.2) with quadratic or cubic concentrations, in the form that conserves; as :mod:`repro.model.transport`.
 
     (D grad C, grad N_i) - (C u, grad N_i) + <u_x C, N_i>_outlet + (q(C) X_A, N_i)_biomass = <u_x C_supply, N_i>_inlet
 
@@ -14,15 +14,15 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from repro import kinetics as law
-from repro.assembly import ElementSystem, each
 from repro.curved.fields import Space, space
 from repro.curved.mesh import CurvedMesh
 from repro.errors import TransportError
-from repro.flow import Flow
-from repro.newton import Jacobian
+from repro.fem.assembly import ElementSystem, each
+from repro.fem.newton import Jacobian
+from repro.model import kinetics as law
+from repro.model.flow import Flow
+from repro.model.transport import Concentrations, Fluxes
 from repro.timing import timed
-from repro.transport import Concentrations, Fluxes
 
 #: Newton stops at this residual against the size of its terms, or at the second where round-off keeps it from falling.
 NEWTON, ROUND_OFF, MOST_ITERATIONS = 1e-13, 1e-12, 60

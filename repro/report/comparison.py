@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from repro import names
 from repro.report import charts, page, quantities
 from repro.report.reading import Run
+from repro.results import names
 
 #: Columns without a value between rows, and defects, which are round-off.
 NOT_COMPARED = {"time_h", "nodes", "acceptor_balance", "donor_balance", "biomass_balance", *names.YES_NO}

@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 
-from repro import names
+from repro.results import names
 
 MOST_FRAMES = 40
 MOST_BYTES = 5_000_000  # of all frames in the page; two frames are always shown

@@ -9,9 +9,9 @@ from xml.etree.ElementTree import ParseError
 import meshio
 import numpy as np
 
-from repro import names
 from repro.report import charts, fields, page, quantities
 from repro.report.reading import Run
+from repro.results import names
 
 #: What each section of a scene stands for.
 PHYSICS = {

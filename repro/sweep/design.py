@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from repro.reading import shown
 from repro.scene import KEYS, Scene, SceneError, parse_scene, scene_hash
-from repro.scene_files import override, read_tables
+from repro.scene.files import override, read_tables
+from repro.scene.reading import shown
 
 MOST_POINTS = 10_000
 #: Of each pair one is given: varying it replaces the other.

@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from repro.results import write_json
-from repro.running import OutputError
+from repro.run.running import OutputError
 from repro.scene import scene_hash
 from repro.sweep import task
 from repro.sweep.design import Factor, Point

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from repro import results
-from repro.recorder import UNDONE
+from repro.run.recorder import UNDONE
 from repro.sweep import task
 from repro.sweep.design import Point
 from repro.sweep.state import Sweep

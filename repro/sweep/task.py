@@ -9,11 +9,11 @@ import traceback
 from importlib.metadata import version
 from pathlib import Path
 
-from repro.cache import source_hash
-from repro.checkpoint import NEWEST, PREVIOUS
 from repro.errors import SimulationError
-from repro.recorder import UNDONE
-from repro.running import OutputError, resume, run
+from repro.run.cache import source_hash
+from repro.run.checkpoint import NEWEST, PREVIOUS
+from repro.run.recorder import UNDONE
+from repro.run.running import OutputError, resume, run
 from repro.scene import Scene, scene_hash
 
 

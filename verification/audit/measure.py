@@ -10,12 +10,13 @@ from time import process_time
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from repro import coupling, mesh_motion, pore, shape
 from repro.errors import StageError
-from repro.geometry import Outline
-from repro.pore import Pore, Solved
+from repro.fem.geometry import Outline
+from repro.march import coupling
+from repro.march.simulation import simulate
+from repro.model import mesh_motion, pore, shape
+from repro.model.pore import Pore, Solved
 from repro.scene import Scene, load_scene
-from repro.simulation import simulate
 
 #: The time of the geometry that the paper plots [E12], and the step: twice the paper's, which both runs share.
 END, STEP = 19.2, 0.4

@@ -7,8 +7,10 @@ from functools import cache
 
 import numpy as np
 
-from repro import coupling, geometry, mesh, pore
-from repro.pore import Pore
+from repro.fem import geometry, mesh
+from repro.march import coupling
+from repro.model import pore
+from repro.model.pore import Pore
 from repro.scene import Scene
 from verification.audit import measure
 from verification.errata.coupling import step_restarting_as_j

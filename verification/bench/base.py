@@ -9,9 +9,9 @@ import numpy as np
 
 from reference import whole_run
 from repro import timing
+from repro.march.simulation import simulate
 from repro.results import row
 from repro.scene import load_scene
-from repro.simulation import simulate
 from verification.bench import options, record
 from verification.bench.clock import measured
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import cache, partial
 
 from reference import taylor_hood
-from repro import flow, pore
 from repro.curved import flow as curved_flow
 from repro.curved import pore as curved_pore
+from repro.model import flow, pore
 from verification.bench import options, pores
 from verification.bench.clock import measured
 

@@ -10,10 +10,11 @@ from functools import cache, partial
 import numpy as np
 
 from reference import neo_hookean, quadratic_growth
-from repro import geometry, growth, pore
 from repro.curved import growth as curved_growth
 from repro.curved import pore as curved_pore
-from repro.shape import held_at
+from repro.fem import geometry
+from repro.model import growth, pore
+from repro.model.shape import held_at
 from verification.bench import options, pores
 from verification.bench.clock import measured
 

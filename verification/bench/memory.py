@@ -11,8 +11,8 @@ import tracemalloc
 
 import numpy as np
 
+from repro.march.simulation import simulate
 from repro.scene import load_scene
-from repro.simulation import simulate
 
 #: Steps, the length of one (h), and the part of them that is not looked at.
 STEPS, QUICK_STEPS, LENGTH, WARM = 180, 16, 0.001, 0.25

@@ -39,7 +39,7 @@ FOLDER = Path(__file__).parents[1] / "report"
 FILE = FOLDER / "bench.json"
 PACKAGES = ("numpy", "scipy", "scikit-fem", "shapely", "mmgpy", "fipy", "py-pde", "numba")
 #: What a user imports to run a scene here, or a problem there.
-IMPORTED = {"dupin2001-repro": "repro.simulation", "fipy": "fipy", "py-pde": "pde", "scikit-fem": "skfem"}
+IMPORTED = {"dupin2001-repro": "repro.march.simulation", "fipy": "fipy", "py-pde": "pde", "scikit-fem": "skfem"}
 IMPORTS = 3
 
 

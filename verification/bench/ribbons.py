@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from repro import transport
 from repro.curved import fields
 from repro.curved import mesh as curved_mesh
 from repro.curved import transport as curved_transport
-from repro.flow import Flow
-from repro.mesh import PoreMesh
+from repro.fem.mesh import PoreMesh
+from repro.model import transport
+from repro.model.flow import Flow
 from repro.scene import parse_scene
 
 #: um2/h of acceptor and donor, in fluid and biomass alike; mg/L.

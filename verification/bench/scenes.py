@@ -12,8 +12,8 @@ from statistics import median
 from time import perf_counter
 
 from repro import timing
+from repro.march.simulation import simulate
 from repro.scene import parse_scene
-from repro.simulation import simulate
 from verification.bench.clock import measured
 from verification.bench.size import STAGES
 

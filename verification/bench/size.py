@@ -15,8 +15,10 @@ from pathlib import Path
 from statistics import median
 from time import perf_counter, process_time
 
-from repro import coupling, pore, timing
+from repro import timing
 from repro.curved import coupling as curved
+from repro.march import coupling
+from repro.model import pore
 from repro.scene import load_scene
 from verification.bench.envelope import exponent
 

@@ -9,9 +9,9 @@ from functools import cache, partial
 
 import numpy as np
 
-from repro import reprojection
 from repro.curved import elements, transfer
 from repro.curved.mesh import curved
+from repro.fem import reprojection
 from verification import meshes, norms
 from verification.bench import options
 from verification.bench.clock import measured

@@ -10,10 +10,10 @@ from functools import cache, partial
 
 import numpy as np
 
-from repro import pore, transport
 from repro.curved import flow as curved_flow
 from repro.curved import pore as curved_pore
 from repro.curved import transport as curved_transport
+from repro.model import pore, transport
 from verification.bench import options, pores
 from verification.bench.clock import measured
 

@@ -12,7 +12,7 @@ from itertools import repeat
 import numpy as np
 
 import verification.claims as package
-from repro.cache import cached_runs
+from repro.run.cache import cached_runs
 from repro.scene import Scene
 from verification.claims import CLAIMS, runs
 from verification.claims.bars import Numbers, numbers

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from repro import mesh
-from repro.reprojection import interpolate
+from repro.fem import mesh
+from repro.fem.reprojection import interpolate
 from verification.claims import Finding, at_least, at_most, claim
 from verification.claims.levels import WIDE_SIZES
 from verification.claims.restored import Body, body, in_plane, stress

@@ -10,9 +10,10 @@ from scipy.linalg import eigh
 from skfem import MeshTri
 
 from reference import neo_hookean
-from repro import geometry, growth, mesh
 from repro.errors import StageError
-from repro.growth import Body
+from repro.fem import geometry, mesh
+from repro.model import growth
+from repro.model.growth import Body
 from verification.claims import Finding, at_least, at_most, between, claim, near, without_limit
 from verification.claims.levels import ALONE, WIDE_SIZES, cached, current
 from verification.claims.restored import bodies

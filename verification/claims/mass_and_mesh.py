@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from repro import coupling, mesh, remeshing, reprojection, shape
+from repro.fem import mesh, reprojection
+from repro.march import coupling
+from repro.model import remeshing, shape
 from repro.results import read_table
 from verification.claims import Finding, at_least, at_most, claim, without_limit
 from verification.claims.levels import ALONE, WIDE_SIZES

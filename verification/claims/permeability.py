@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from repro import geometry, mesh
-from repro.pore import sizing
+from repro.fem import geometry, mesh
+from repro.model.pore import sizing
 from verification.claims import Finding, at_least, at_most, claim, near
 from verification.claims.levels import ALONE, WIDE_SIZES
 from verification.claims.runs import WIDE, scene, series

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from repro import transport
-from repro.pore import Pore, Solved
-from repro.reprojection import interpolate
+from repro.fem.reprojection import interpolate
+from repro.model import transport
+from repro.model.pore import Pore, Solved
+from repro.model.transport import Concentrations
 from repro.scene import Scene
-from repro.transport import Concentrations
 from verification.claims import Finding, at_most, claim, near
 from verification.claims.accuracy import FEW, FEW_WORDS, TRANSPORT, TRANSPORT_WORDS
 from verification.claims.levels import cached

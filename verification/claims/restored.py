@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 import meshio
 import numpy as np
 
-from repro import geometry, remeshing
-from repro.mesh import PoreMesh
-from repro.pore import Pore, Solved, solve
+from repro.fem import geometry
+from repro.fem.mesh import PoreMesh
+from repro.model import remeshing
+from repro.model.pore import Pore, Solved, solve
+from repro.model.transport import Concentrations
 from repro.scene import Scene
-from repro.transport import Concentrations
 from verification.claims.levels import cached
 from verification.claims.runs import fields, row_number, scene, series
 from verification.claims.states import saved_mesh

@@ -12,8 +12,8 @@ import meshio
 import numpy as np
 
 from paper_figures import runs as figures
-from repro.cache import cached_runs, run_folder
 from repro.results import read_table
+from repro.run.cache import cached_runs, run_folder
 from repro.scene import Scene, load_scene
 from verification.claims.levels import cached, current
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import log
 
-from repro.kinetics import growth_rate
+from repro.model.kinetics import growth_rate
 from verification.claims import Finding, at_least, at_most, between, claim, near
 from verification.claims.runs import BASE, at, scene
 

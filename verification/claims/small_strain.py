@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from repro import growth
+from repro.model import growth
 from verification.claims import Finding, at_most, claim, near
 from verification.claims.growth_mechanics import listed
 

@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 import meshio
 import numpy as np
 
-from repro import flow, geometry, kinetics, mesh, transport
-from repro.mesh import PoreMesh
-from repro.pore import sizing
+from repro.fem import geometry, mesh
+from repro.fem.mesh import PoreMesh
+from repro.model import flow, kinetics, transport
+from repro.model.pore import sizing
 
 
 def saved_mesh(fields: meshio.Mesh, width: float) -> PoreMesh:

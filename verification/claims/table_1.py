@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from repro import transport
+from repro.model import transport
 from verification.claims import Finding, at_most, claim, near
 from verification.claims.restored import solved_pore
 from verification.claims.runs import BASE, at, scene, series

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from repro import gear
-from repro.transport import Concentrations
+from repro.model import gear
+from repro.model.transport import Concentrations
 from verification.claims import Finding, at_least, at_most, between, claim, without_limit
 from verification.claims.levels import cached
 from verification.claims.restored import solved_pore

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from reference import averaged_pore
-from repro import pore, results
-from repro.coupling import Instant, simulate
+from repro import results
+from repro.march.coupling import Instant, simulate
+from repro.model import pore
 from repro.scene import Scene
 from verification.case import Profile
 from verification.coupling import runs

@@ -8,7 +8,8 @@ from unittest import mock
 import numpy as np
 
 from reference import averaged_pore, layered_channel, poiseuille
-from repro import flow, geometry, mesh, pore
+from repro.fem import geometry, mesh
+from repro.model import flow, pore
 from repro.scene import Scene
 from verification.case import Outcome, at_most, between, case
 from verification.convergence import study

@@ -7,7 +7,8 @@ from unittest import mock
 
 import numpy as np
 
-from repro import geometry, pore
+from repro.fem import geometry
+from repro.model import pore
 from verification.case import Outcome, Profile, at_most, case
 from verification.convergence import study
 from verification.coupling import averaged, averaged_thin, runs

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from repro import coupling, pore, remeshing
-from repro.coupling import simulate
+from repro.march import coupling
+from repro.march.coupling import simulate
+from repro.model import pore, remeshing
 from repro.scene import Scene
 from verification.case import Outcome, at_least, at_most, between, case
 from verification.convergence import study

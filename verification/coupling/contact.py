@@ -8,8 +8,8 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from repro import geometry
-from repro.coupling import simulate
+from repro.fem import geometry
+from repro.march.coupling import simulate
 from repro.scene import Scene
 from verification.case import Outcome, Profile, at_least, at_most, between, case
 from verification.coupling import runs

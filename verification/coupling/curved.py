@@ -9,11 +9,12 @@ from unittest import mock
 import numpy as np
 
 from reference import whole_run
-from repro import geometry, linear, midpoint
-from repro.coupling import simulate as paper_run
 from repro.curved import coupling as curved
+from repro.fem import geometry, linear
+from repro.march import midpoint
+from repro.march.coupling import simulate as paper_run
+from repro.march.simulation import simulate
 from repro.scene import load_scene
-from repro.simulation import simulate
 from verification.case import Outcome, at_least, at_most, case
 from verification.convergence import study
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from repro import geometry, pore
-from repro.coupling import simulate
+from repro.fem import geometry
+from repro.march.coupling import simulate
+from repro.model import pore
 from verification.case import Outcome, Profile, at_least, at_most, case
 from verification.coupling import runs
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from repro.coupling import Instant, simulate
-from repro.pore import Pore, Solved
+from repro.march.coupling import Instant, simulate
+from repro.model.pore import Pore, Solved
 from repro.scene import Scene, load_scene
 from verification import norms
 

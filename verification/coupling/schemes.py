@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from repro import pore, transport
+from repro.model import pore, transport
 from repro.scene import load_scene
 from verification.case import Outcome, Profile, at_most, case
 from verification.convergence import study

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from reference import poiseuille
-from repro import flow, geometry, mesh
-from repro.coupling import simulate
+from repro.fem import geometry, mesh
+from repro.march.coupling import simulate
+from repro.model import flow
 from repro.scene import load_scene
 from verification.case import Outcome, at_least, at_most, case
 from verification.convergence import study

@@ -7,8 +7,9 @@ from unittest import mock
 
 import numpy as np
 
-from repro import geometry, pore, transport
-from repro.coupling import simulate
+from repro.fem import geometry
+from repro.march.coupling import simulate
+from repro.model import pore, transport
 from repro.scene import load_scene
 from verification import norms
 from verification.case import Outcome, Profile, at_least, at_most, case

@@ -7,9 +7,11 @@ from functools import cache
 import numpy as np
 
 from reference import layered_channel
-from repro import coupling, flow, geometry, pore, shape, traction
-from repro.flow import Flow
-from repro.mesh import PoreMesh
+from repro.fem import geometry
+from repro.fem.mesh import PoreMesh
+from repro.march import coupling
+from repro.model import flow, pore, shape, traction
+from repro.model.flow import Flow
 from verification.case import Outcome, at_least, at_most, case
 from verification.convergence import refine, study
 from verification.coupling import runs

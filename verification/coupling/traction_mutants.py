@@ -2,7 +2,7 @@
 
 from verification.mutants import Mutant
 
-FLUID, GROWTH, SHAPE = "repro/traction.py", "repro/growth.py", "repro/shape.py"
+FLUID, GROWTH, SHAPE = "repro/model/traction.py", "repro/model/growth.py", "repro/model/shape.py"
 TRACTION = (
     Mutant("traction-pressure-left-out", FLUID,
            says="The fluid's pressure is left out of its traction.",

@@ -7,8 +7,9 @@ from functools import cache
 
 import numpy as np
 
-from repro import geometry, growth, mesh_motion, pore, remeshing, shape, traction
-from repro.flow import Flow
+from repro.fem import geometry
+from repro.model import growth, mesh_motion, pore, remeshing, shape, traction
+from repro.model.flow import Flow
 from verification import meshes
 from verification.case import Outcome, at_least, at_most, between, case
 from verification.convergence import study

@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from repro import coupling, kinetics, pore, remeshing, shape
-from repro.mesh import triangle_areas
+from repro.fem.mesh import triangle_areas
+from repro.march import coupling
+from repro.model import kinetics, pore, remeshing, shape
 from verification.claims.mass_balance import bookkeeping
 from verification.claims.runs import BASE, WIDE, at, fields, scene, series
 from verification.claims.states import saved_mesh

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from repro import assembly, flow, geometry, mesh, pore
-from repro.mesh import PoreMesh
+from repro.fem import assembly, geometry, mesh
+from repro.fem.mesh import PoreMesh
+from repro.model import flow, pore
 from verification.claims.runs import BASE, scene
 from verification.claims.states import half_disc
 from verification.errata import TRACTION, erratum, percent, state, table

@@ -10,9 +10,10 @@ from scipy.optimize import brentq
 from scipy.spatial import Delaunay
 
 from reference import neo_hookean
-from repro import assembly, growth
 from repro.errors import GrowthError
-from repro.mesh import triangle_areas
+from repro.fem import assembly
+from repro.fem.mesh import triangle_areas
+from repro.model import growth
 from verification.errata import erratum, small, table
 
 #: Elements across the radius.

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from repro import geometry, mesh, mesh_motion, reprojection
-from repro.mesh import triangle_areas
+from repro.fem import geometry, mesh, reprojection
+from repro.fem.mesh import triangle_areas
+from repro.model import mesh_motion
 from repro.results import read_table
 from verification.claims.runs import BASE, folder, scene
 from verification.claims.states import half_disc

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from repro import kinetics
+from repro.model import kinetics
 from verification.claims.base_run import upstream_distance, upstream_means
 from verification.claims.mass_balance import bookkeeping
 from verification.claims.runs import BASE, PLATES, at, fields_at, scene, series

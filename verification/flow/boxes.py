@@ -1,8 +1,8 @@
 """Stokes flow with the exact velocity prescribed all around a box, for exact solutions without inlet and outlet.
 
 The element matrices of every form, the stabilisation, the assembly and the solver are those of ``repro``; only the
-boundary conditions of :mod:`repro.flow` are replaced, and a force may act. One pressure is prescribed in the place of
-the constant that the velocity leaves open, and the mean of the pressure is not compared.
+boundary conditions of :mod:`repro.model.flow` are replaced, and a force may act. One pressure is prescribed in the
+place of the constant that the velocity leaves open, and the mean of the pressure is not compared.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from skfem import Basis
 
-from repro import flow
-from repro.assembly import ElementSystem, each, saddle_blocks, saddle_system
-from repro.mesh import PoreMesh
+from repro.fem.assembly import ElementSystem, each, saddle_blocks, saddle_system
+from repro.fem.mesh import PoreMesh
+from repro.model import flow
 
 QUADRATURE = 6
 

@@ -16,8 +16,8 @@ from skfem import Basis, BilinearForm, ElementTriMini, ElementTriP1, ElementVect
 from skfem.helpers import ddot, div, grad, transpose
 
 from reference import layered_channel
-from repro import flow
-from repro.mesh import PoreMesh
+from repro.fem.mesh import PoreMesh
+from repro.model import flow
 from verification import norms
 from verification.case import Outcome, at_least, at_most, between, case
 from verification.convergence import refine, study

@@ -11,9 +11,9 @@ from functools import cache
 import numpy as np
 
 from reference import manufactured_flow, poiseuille
-from repro.assembly import saddle_system
 from repro.curved import fields, flow
 from repro.curved.mesh import curved
+from repro.fem.assembly import saddle_system
 from verification.case import Outcome, at_most, case
 from verification.convergence import Study, refine, study
 from verification.flow import grids

@@ -36,7 +36,7 @@ CURVED = (
            says="Cubic functions are integrated by a rule of degree 2.",
            old="3: (8, 9)}",
            new="3: (2, 9)}"),
-    Mutant("gradation-ignored", "repro/mesh.py",
+    Mutant("gradation-ignored", "repro/fem/mesh.py",
            says="Element sizes on straight triangles grow at the packaged rate, whatever the scene says.",
            old="return around(outline, ends, sizing), outline",
            new="return around(outline, ends, replace(sizing, gradation=geometry.GRADATION)), outline"),

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from repro import pore as linear_pore
 from repro.curved import pore
+from repro.model import pore as linear_pore
 from repro.scene import parse_scene
 from verification.case import Outcome, at_most, case
 

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial import Delaunay
 
-from repro.mesh import PoreMesh, triangle_areas
+from repro.fem.mesh import PoreMesh, triangle_areas
 from verification import meshes
 
 #: The least distance of a node from the curve, over the element size: over a half, as edges on the curve are not quite

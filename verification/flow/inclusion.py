@@ -13,7 +13,7 @@ from functools import cache
 import numpy as np
 
 from reference import viscous_inclusion
-from repro.mesh import PoreMesh
+from repro.fem.mesh import PoreMesh
 from verification import norms
 from verification.case import Outcome, Profile, case
 from verification.convergence import Study, refine, study

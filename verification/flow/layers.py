@@ -11,8 +11,8 @@ from functools import cache
 import numpy as np
 
 from reference import layered_channel
-from repro import flow
-from repro.mesh import PoreMesh
+from repro.fem.mesh import PoreMesh
+from repro.model import flow
 from verification import norms
 from verification.case import Outcome, Profile, case
 from verification.convergence import refine, study

@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 
 from reference import manufactured_flow
-from repro.mesh import PoreMesh
+from repro.fem.mesh import PoreMesh
 from verification import norms
 from verification.case import Outcome, Profile, case
 from verification.convergence import Study, refine, study

@@ -6,9 +6,10 @@ from functools import cache
 
 import numpy as np
 
-from repro import flow, geometry, mesh
-from repro.assembly import each, saddle_blocks
-from repro.mesh import PoreMesh
+from repro.fem import geometry, mesh
+from repro.fem.assembly import each, saddle_blocks
+from repro.fem.mesh import PoreMesh
+from repro.model import flow
 from verification.case import Outcome, at_least, at_most, case
 from verification.flow import grids
 

@@ -7,8 +7,9 @@ from functools import cache
 import numpy as np
 
 from reference import poiseuille
-from repro import flow, geometry, mesh
-from repro.mesh import PoreMesh
+from repro.fem import geometry, mesh
+from repro.fem.mesh import PoreMesh
+from repro.model import flow
 from verification import norms
 from verification.case import Outcome, case
 from verification.convergence import refine, study

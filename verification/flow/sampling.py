@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.tri import Triangulation
 
-from repro.mesh import PoreMesh
+from repro.fem.mesh import PoreMesh
 
 
 def sampled(grid: PoreMesh, values: np.ndarray, where: np.ndarray) -> np.ndarray:

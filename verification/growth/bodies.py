@@ -7,7 +7,8 @@ from functools import cache
 
 import numpy as np
 
-from repro import geometry, growth, mesh
+from repro.fem import geometry, mesh
+from repro.model import growth
 from verification import meshes
 
 #: Radius of the half-discs (um), and the factor by which theta is raised at a time.

@@ -14,7 +14,7 @@ import numpy as np
 
 from reference import quadratic_growth
 from reference.quadratic_growth import Contact
-from repro import growth
+from repro.model import growth
 from verification import norms
 from verification.case import Check, Outcome, Profile, at_most, case
 from verification.convergence import Study, refine, study

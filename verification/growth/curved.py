@@ -7,11 +7,11 @@ from functools import cache
 import numpy as np
 
 from reference import neo_hookean
-from repro import geometry
 from repro.curved import elements, growth, pore
 from repro.curved.mesh import curved
+from repro.fem import geometry
+from repro.model.shape import held_at
 from repro.scene import parse_scene
-from repro.shape import held_at
 from verification import meshes
 from verification.case import Outcome, Profile, at_most, case
 from verification.convergence import refine, study

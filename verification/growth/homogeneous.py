@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from reference import neo_hookean
-from repro import growth
-from repro.mesh import gradients
+from repro.fem.mesh import gradients
+from repro.model import growth
 from verification.case import Check, Outcome, at_most, case
 from verification.growth import bodies
 

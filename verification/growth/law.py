@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from reference import neo_hookean
-from repro import growth
+from repro.model import growth
 from verification.case import Outcome, at_most, case
 from verification.convergence import study
 from verification.growth import bodies

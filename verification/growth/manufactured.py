@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from reference import manufactured_growth
-from repro import growth
+from repro.model import growth
 from verification import meshes, norms
 from verification.case import Outcome, Profile, case
 from verification.convergence import refine, study

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from reference import neo_hookean
-from repro import growth
+from repro.model import growth
 from verification.case import Check, Outcome, case
 from verification.growth import bodies, loaded
 from verification.growth.homogeneous import NORM, exactly

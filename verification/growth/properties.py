@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from repro import growth
-from repro.mesh import triangle_areas
+from repro.fem.mesh import triangle_areas
+from repro.model import growth
 from verification.case import Outcome, at_most, case
 from verification.growth import bodies
 

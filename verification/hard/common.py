@@ -8,15 +8,16 @@ from functools import cache
 
 import numpy as np
 
-from repro import midpoint, remeshing, transport
-from repro.coupling import Instant, PoreEnd
 from repro.curved import coupling as curved_coupling
 from repro.curved import pore as curved_pore
 from repro.curved import transport as curved_transport
-from repro.pore import peclet
+from repro.march import midpoint
+from repro.march.coupling import Instant, PoreEnd
+from repro.march.simulation import simulate
+from repro.model import remeshing, transport
+from repro.model.pore import peclet
 from repro.results import row
 from repro.scene import Scene, load_scene
-from repro.simulation import simulate
 from verification.case import Check, at_least, at_most, between
 
 PRESETS = ("paper", "fast", "accurate")

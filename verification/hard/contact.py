@@ -9,13 +9,15 @@ from unittest import mock
 import numpy as np
 
 from reference import poiseuille
-from repro import flow, geometry, mesh, remeshing, stepping
 from repro.curved import coupling as curved_coupling
 from repro.curved import flow as curved_flow
 from repro.curved import outline as curved_outline
 from repro.curved import pore as curved_pore
 from repro.curved.outline import Arcs
-from repro.geometry import FREE, TOP, Outline
+from repro.fem import geometry, mesh
+from repro.fem.geometry import FREE, TOP, Outline
+from repro.march import stepping
+from repro.model import flow, remeshing
 from repro.results import M_PER_D
 from verification.case import Check, at_least, at_most, between
 from verification.hard import common

@@ -9,10 +9,10 @@ import numpy as np
 from scipy.optimize import brentq
 
 from reference import layered_channel, poiseuille
-from repro import flow
 from repro.curved import flow as curved_flow
 from repro.curved import transfer
 from repro.curved.mesh import curved
+from repro.model import flow
 from repro.results import M_PER_D
 from verification import meshes, norms
 from verification.case import Check, at_most, between

@@ -9,11 +9,12 @@ from functools import partial
 import numpy as np
 
 from reference import neo_hookean
-from repro import geometry, growth
 from repro.curved import elements
 from repro.curved import growth as curved_growth
-from repro.mesh import triangle_areas
-from repro.shape import held_at
+from repro.fem import geometry
+from repro.fem.mesh import triangle_areas
+from repro.model import growth
+from repro.model.shape import held_at
 from verification.case import Check, at_least, at_most, between
 from verification.hard import common
 from verification.hard.common import DRIVE, SHAPE, TOLERANCE, HardCase, Run

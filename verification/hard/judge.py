@@ -18,7 +18,7 @@ from time import process_time
 import numpy as np
 
 from repro.errors import SimulationError, StageError
-from repro.units import SceneError
+from repro.scene.units import SceneError
 from verification.case import Check, Outcome, at_most
 from verification.hard.common import PRESETS, HardCase, Run, sound
 

@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from repro import flow, geometry, mesh, reprojection
 from repro.curved import flow as curved_flow
 from repro.curved import outline as curved_outline
 from repro.curved import pore as curved_pore
 from repro.curved import transfer
+from repro.fem import geometry, mesh, reprojection
+from repro.model import flow
 from verification.case import Check, at_least, at_most
 from verification.hard import common
 from verification.hard.common import TOLERANCE, HardCase

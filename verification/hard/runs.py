@@ -8,9 +8,9 @@ from functools import cache, partial
 
 import numpy as np
 
-from repro import coupling
-from repro.coupling import Instant
 from repro.curved import coupling as curved_coupling
+from repro.march import coupling
+from repro.march.coupling import Instant
 from repro.results import row
 from repro.scene import Scene, parse_scene, scene_tables
 from verification.case import at_least, at_most

@@ -8,9 +8,9 @@ from functools import partial
 import numpy as np
 
 from reference import slab
-from repro import transport
 from repro.curved import transport as curved_transport
 from repro.curved.mesh import curved
+from repro.model import transport
 from verification import meshes
 from verification.case import Check, at_least, at_most, between
 from verification.hard import common

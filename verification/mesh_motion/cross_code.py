@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from reference import quadratic_mesh_motion
-from repro import geometry, mesh
+from repro.fem import geometry, mesh
 from verification import norms
 from verification.case import Outcome, Profile, case
 from verification.convergence import study

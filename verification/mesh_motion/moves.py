@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 
-from repro import mesh_motion
-from repro.mesh import PoreMesh
+from repro.fem.mesh import PoreMesh
+from repro.model import mesh_motion
 
 #: gamma of (35) and c of the stabilisation as scenes have them, and the gammas that cases compare (E13).
 GAMMA, STABILISATION = 1.0, 100.0

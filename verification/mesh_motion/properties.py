@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from repro import geometry, mesh
+from repro.fem import geometry, mesh
 from verification import meshes
 from verification.case import Outcome, Profile, at_least, at_most, case
 from verification.convergence import study

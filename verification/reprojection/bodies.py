@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from repro import geometry, mesh, pore, remeshing, shape
-from repro.pore import Pore, Solved
+from repro.fem import geometry, mesh
+from repro.model import pore, remeshing, shape
+from repro.model.pore import Pore, Solved
+from repro.model.transport import Concentrations
 from repro.scene import load_scene
-from repro.transport import Concentrations
 from verification.reprojection import grids
 
 WIDTH, FILM = 50.0, 2.0

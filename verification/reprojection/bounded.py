@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from repro import reprojection
+from repro.fem import reprojection
 from verification import norms
 from verification.case import Outcome, Profile, at_least, at_most, between, case
 from verification.convergence import refine, study

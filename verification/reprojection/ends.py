@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from repro import geometry, remeshing
-from repro.flow import Flow
-from repro.pore import Solved
-from repro.transport import Concentrations
+from repro.fem import geometry
+from repro.model import remeshing
+from repro.model.flow import Flow
+from repro.model.pore import Solved
+from repro.model.transport import Concentrations
 from verification import norms
 from verification.case import Outcome, Profile, at_least, at_most, case
 from verification.reprojection import bodies

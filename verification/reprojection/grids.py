@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import Delaunay
 from skfem import MeshTri
 
-from repro.mesh import triangle_areas
+from repro.fem.mesh import triangle_areas
 from verification import meshes, norms
 
 ENDS, WIDTH = (0.0, 40.0), 25.0

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from repro.mesh import triangle_areas
+from repro.fem.mesh import triangle_areas
 from verification.case import Outcome, Profile, at_least, at_most, case
 from verification.reprojection import bodies
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from repro import geometry
+from repro.fem import geometry
 from verification.case import Outcome, at_least, at_most, case
 from verification.reprojection import bodies
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from reference import galerkin_transfer
-from repro import reprojection
+from repro.fem import reprojection
 from verification import norms
 from verification.case import Outcome, Profile, at_least, at_most, case
 from verification.convergence import refine, study

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from repro import geometry
+from repro.fem import geometry
 from verification import norms
 from verification.case import Outcome, Profile, at_least, at_most, case
 from verification.convergence import refine, study

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from reference import galerkin_transfer
-from repro import reprojection
-from repro.mesh import triangle_areas
+from repro.fem import reprojection
+from repro.fem.mesh import triangle_areas
 from verification import norms
 from verification.case import Outcome, at_most, case
 from verification.reprojection import grids

@@ -11,8 +11,8 @@ from functools import cache
 
 import numpy as np
 
-from repro import flow, transport
-from repro.mesh import PoreMesh
+from repro.fem.mesh import PoreMesh
+from repro.model import flow, transport
 from repro.scene import load_scene
 from verification import meshes, norms
 

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from reference import robin_channel, slab
-from repro import transport
+from repro.model import transport
 from verification import norms
 from verification.case import Outcome, Profile, at_most, case
 from verification.convergence import refine, study

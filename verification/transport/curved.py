@@ -14,9 +14,9 @@ import numpy as np
 from reference import channel_bvp, robin_channel
 from repro.curved import fields, pore, transfer, transport
 from repro.curved.mesh import curved
-from repro.flow import Flow
+from repro.model.flow import Flow
+from repro.model.transport import Concentrations
 from repro.scene import load_scene, parse_scene
-from repro.transport import Concentrations
 from verification import meshes, norms
 from verification.case import Outcome, Profile, at_most, case
 from verification.convergence import refine, study

@@ -12,7 +12,7 @@ CURVED = (
            says="Substrates diffuse in the biomass as in water.",
            old="np.where(mesh.biomass, s.diffusivity_in_aggregate, s.diffusivity)",
            new="np.where(mesh.biomass, s.diffusivity, s.diffusivity)"),
-    Mutant("paired-without-decay", "repro/kinetics.py",
+    Mutant("paired-without-decay", "repro/model/kinetics.py",
            says="Decay takes up no acceptor.",
            old="acceptor_to_donor_ratio * rate + decay_demand(kinetics) * m_a, rate",
            new="acceptor_to_donor_ratio * rate, rate"),

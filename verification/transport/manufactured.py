@@ -12,7 +12,8 @@ import numpy as np
 from skfem import Basis, ElementTriP1, FacetBasis, LinearForm
 
 from reference import manufactured_transport
-from repro import flow, geometry, mesh, transport
+from repro.fem import geometry, mesh
+from repro.model import flow, transport
 from verification import norms
 from verification.case import Outcome, Profile, case
 from verification.convergence import refine, study

@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 
 from reference import channel_bvp, channel_fipy
-from repro import transport
+from repro.model import transport
 from verification.case import Outcome, Profile, case
 from verification.convergence import refine, study
 from verification.transport.channels import (

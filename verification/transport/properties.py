@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from repro import gear, pore, transport
+from repro.model import gear, pore, transport
 from repro.scene import load_scene
 from verification.case import Outcome, at_most, case
 from verification.transport.channels import both

@@ -15,7 +15,8 @@ import numpy as np
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 
 from reference import diffusion_reaction_pypde as pypde
-from repro import geometry, mesh, transport
+from repro.fem import geometry, mesh
+from repro.model import transport
 from verification.case import Outcome, Profile, case
 from verification.convergence import refine, study
 from verification.transport.channels import SCENE, averaged, both, filled, following, pair, rates

@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 
 from reference import channel_fipy
 from reference.monod import sink, slopes
-from repro import gear, transport
+from repro.model import gear, transport
 from verification.case import Outcome, Profile, case
 from verification.convergence import refine, study
 from verification.transport.channels import (

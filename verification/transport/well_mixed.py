@@ -18,7 +18,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from reference.monod import uptake
-from repro import gear, geometry, kinetics, mesh, transport
+from repro.fem import geometry, mesh
+from repro.model import gear, kinetics, transport
 from verification.case import Outcome, Profile, at_most, case
 from verification.convergence import study
 from verification.transport.channels import SCENE, rates

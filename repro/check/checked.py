@@ -1,0 +1,103 @@
+"""What a scene will be: what it models, its first mesh, its numbers, where its simplifications fail, what it costs."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+
+from repro.check import cost
+from repro.check.cost import Cost
+from repro.check.modelled import modelled
+from repro.check.numbers import Number, numbers
+from repro.check.simplifications import Warned, warnings
+from repro.curved import pore as curved
+from repro.errors import SimulationError
+from repro.fem import linear
+from repro.march.loop import stopping
+from repro.model import pore
+from repro.scene import Scene
+from repro.scene.units import SceneError
+
+WIDTH = 110
+
+
+@dataclass(frozen=True)
+class Checked:
+    """modelled: (section, words); nodes, triangles: of the first mesh; nodes of quadratic triangles are all six."""
+
+    scene: str
+    modelled: list[tuple[str, str]]
+    nodes: int
+    triangles: int
+    numbers: list[Number]
+    warnings: list[Warned]
+    cost: Cost
+
+    def tables(self) -> dict:
+        """For JSON."""
+        return {**asdict(self), "modelled": dict(self.modelled)}
+
+
+def check(scene: Scene, file: str) -> Checked:
+    """Look at a scene before it is run. Raises SceneError, naming ``file``, where its first state or step fails."""
+    try:
+        with stopping(0.0):
+            linear.use(scene.numerics.solver, scene.numerics.ordering)
+            grid = (curved if scene.numerics.curved else pore).seeded(scene).mesh
+        trial = cost.tried(scene, len(grid.points))
+        flow = trial.first.solved.flow
+        found = numbers(scene, flow.mean_velocity if flow else None)
+        return Checked(scene.name, modelled(scene), len(grid.points), len(grid.biomass), found,
+                       warnings(scene, found), cost.expected(scene, trial, len(grid.points)))
+    except (SimulationError, ArithmeticError) as error:
+        raise SceneError(f"{file}: it cannot be run: {error}") from error
+
+
+def report(found: Checked) -> str:
+    """The whole in words."""
+    lines = [f"{found.scene}: can be run", "", "What is modelled"]
+    for section, words in found.modelled:
+        lines += _item(section, words)
+    lines += ["", f"Mesh at t = 0: {found.nodes} nodes, {found.triangles} triangles", "", *_cost(found.cost)]
+    if found.numbers:
+        lines += ["", *_numbers(found.numbers)]
+    lines += ["", *_warnings(found.warnings)]
+    return "\n".join(lines)
+
+
+def _item(name: str, words: str) -> list[str]:
+    return textwrap.wrap(words, WIDTH, initial_indent=f"  {name:12}", subsequent_indent=" " * 14)
+
+
+def _cost(expected: Cost) -> Iterator[str]:
+    steps = f"{expected.steps} steps" if expected.steps else "no step"
+    memory = f", {expected.memory:.0f} MB" if expected.memory else ""
+    yield f"Cost, roughly: {_seconds(expected.seconds)} ({steps}){memory}, writing not counted"
+    how = (f"The first state and steps were made and timed just now, times the steps expected; one in contact with the "
+           f"opposite wall counts {cost.IN_CONTACT:g} times. Right within a factor of three in the paper's pores.")
+    yield from textwrap.wrap(how, WIDTH, initial_indent="  ", subsequent_indent="  ")
+
+
+def _seconds(value: float) -> str:
+    """Two digits."""
+    if value < 120:
+        return f"{value:.2g} s"
+    return f"{value / 60:.0f} min" if value < 7200 else f"{value / 3600:.0f} h"
+
+
+def _numbers(found: list[Number]) -> Iterator[str]:
+    later = any(number.end is not None for number in found)
+    yield f"Numbers{'':23}{'t = 0':>9}{'at end, at most' if later else '':>17}".rstrip()
+    for number in found:
+        end = "" if number.end is None else f"{number.end:.2g}"
+        yield f"  {number.name:28}{number.start:>9.2g}{end:>17}".rstrip()
+    for name, definition in {number.name.partition(",")[0]: number.definition for number in found}.items():
+        yield from textwrap.wrap(f"{name} = {definition}", WIDTH, initial_indent="    ", subsequent_indent="      ")
+
+
+def _warnings(found: list[Warned]) -> Iterator[str]:
+    if not found:
+        yield "No simplification that is checked is out of its range."
+    for warned in found:
+        yield from textwrap.wrap(f"WARNING {warned.key}: {warned.text}.", WIDTH + 2, subsequent_indent="  ")

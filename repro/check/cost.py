@@ -1,0 +1,127 @@
+"""What a run will cost on this machine: its first solves are made for real and timed, its steps are estimated.
+
+    seconds = first state + (steps until contact + IN_CONTACT x steps after it) x one step x REMESHING
+
+A step of the midpoint rule is at first growth.time_step and doubles up to the length that the tolerance allows. All
+three factors are those of the packaged scenes: the estimate is meant to be right within a factor of three there.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+from repro.check import numbers
+from repro.march.coupling import Instant, PoreEnd
+from repro.march.simulation import simulate
+
+#: A step with what it takes besides the first one: new meshes, and larger ones; and a step in contact, which is one
+#: with many rounds of closing films and a new mesh.
+REMESHING, IN_CONTACT = 1.5, 15.0
+#: The length of a midpoint step that tolerance 0.01 allows, times the growth rate; it goes as the tolerance's root.
+ALLOWED = 0.5
+#: The first steps are taken over so many growth.time_step; the first of all is slow, the fastest one counts.
+FIRST_STEPS = 3
+#: Larger meshes are not tried: a coarser one is, and its time grows with the nodes to this power.
+MOST_NODES, POWER = 5000, 1.2
+COARSER = 0.9
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What was made for real: the first state; seconds that it and a step took (0 where there is none); nodes of the
+    mesh that was tried; memory (MB) before and at its peak, None where the system does not tell."""
+
+    first: Instant
+    start: float
+    step: float
+    nodes: int
+    memory: tuple[float, float] | None
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Steps, seconds and memory (MB, None where the system does not tell) of a run, estimated."""
+
+    steps: int
+    seconds: float
+    memory: float | None
+
+
+def tried(scene, nodes: int) -> Trial:
+    """The first state and the first steps of the scene, or of a coarser one where its mesh has too many nodes.
+
+    Raises SimulationError where a stage fails in them.
+    """
+    if nodes > MOST_NODES:
+        size = scene.numerics.refinement * COARSER * math.sqrt(MOST_NODES / nodes)
+        scene = replace(scene, numerics=replace(scene.numerics, refinement=size))
+    if scene.growth:
+        end = min(scene.growth.end, FIRST_STEPS * scene.growth.time_step)
+        scene = replace(scene, growth=replace(scene.growth, end=end), output=replace(scene.output, times=None))
+    before, clock, run = _memory(), [perf_counter()], _until_the_end(simulate(scene))
+    first = next(run)
+    clock.append(perf_counter())
+    clock += [perf_counter() for _ in run]
+    spent, peak = [b - a for a, b in zip(clock, clock[1:])], _memory()
+    memory = (before, peak) if before is not None and peak is not None else None
+    return Trial(first, spent[0], min(spent[1:], default=0.0), len(first.pore.mesh.points), memory)
+
+
+def _until_the_end(run: Iterator[Instant]) -> Iterator[Instant]:
+    """The instants of a run, which may end at the pore's end."""
+    try:
+        yield from run
+    except PoreEnd:
+        return
+
+
+def expected(scene, trial: Trial, nodes: int) -> Cost:
+    """Of the whole run, from its trial and the nodes of its first mesh."""
+    free, touching = steps(scene)
+    larger = nodes / trial.nodes
+    factor = (free + IN_CONTACT * touching) * REMESHING
+    memory = trial.memory and trial.memory[0] + REMESHING * larger * (trial.memory[1] - trial.memory[0])
+    return Cost(free + touching, (trial.start + factor * trial.step) * larger**POWER, memory)
+
+
+def steps(scene) -> tuple[int, int]:
+    """Steps before and after the aggregate is expected to touch the opposite wall."""
+    if scene.growth is None or scene.growth.end == 0:
+        return 0, 0
+    contact, end = numbers.at_end(scene).contact, scene.growth.end
+    free = end if contact is None else min(contact, end)
+    longest = longest_step(scene)
+    total = max(_count(min(scene.growth.time_step, longest), longest, end), len(scene.output.times or ()))
+    touching = min(total, math.ceil((end - free) / longest - 1e-9))
+    return total - touching, touching
+
+
+def longest_step(scene) -> float:
+    """The longest step (h) that is expected."""
+    rate = abs(numbers.fastest_growth(scene))
+    if scene.numerics.time == "updates":
+        return scene.growth.time_step
+    return min(scene.growth.end, ALLOWED * math.sqrt(scene.numerics.tolerance / 0.01) / rate if rate else math.inf)
+
+
+def _count(first: float, longest: float, duration: float) -> int:
+    """Steps in a duration (h): each twice the one before, until they are the longest."""
+    ramp = math.ceil(math.log2(longest / first))
+    covered = first * (2**ramp - 1)
+    if covered >= duration:
+        return math.ceil(math.log2(duration / first + 1) - 1e-9)
+    return ramp + math.ceil((duration - covered) / longest - 1e-9)
+
+
+def _memory() -> float | None:
+    """Peak of the memory of this process so far, MB."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return None
+    unit = 2**20 if sys.platform == "darwin" else 2**10
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit

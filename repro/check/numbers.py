@@ -1,0 +1,169 @@
+"""Dimensionless numbers of a scene: what its simplifications rest on.
+
+Each is told for t = 0 and, where the aggregate grows, for ``growth.end``, with bounds in place of what only the run
+knows: the aggregate grows at the rate of the supply (9), in the layer that the supply reaches, so that it is no larger
+and touches the opposite wall no earlier than said here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from repro.fem import geometry
+from repro.model import kinetics
+from repro.model.pore import film
+from repro.model.traction import MPA_PER_UM
+from repro.scene import Substrate
+
+#: Steps in which the bound on the growth is followed, and the largest exponent of one.
+STEPS, LARGEST = 2000, 50.0
+
+
+@dataclass(frozen=True)
+class Number:
+    """A dimensionless number: its name, value at t = 0, bound at growth.end (None without growth), and definition."""
+
+    name: str
+    start: float
+    end: float | None
+    definition: str
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """What the aggregate is at a time: area (um2), thickness (um), reach (um) to either side of the origin; contact:
+    the time (h) at which it touches the opposite wall, None where it does not."""
+
+    area: float
+    thickness: float
+    reach: float
+    contact: float | None
+
+
+def sizes(scene, area: float, contact: float | None = None) -> Sizes:
+    """A half-disc while that fits into the pore, wall to wall after that."""
+    width, radius = scene.pore.width, math.sqrt(2 * area / math.pi)
+    if radius <= width:
+        return Sizes(area, radius, radius, contact)
+    return Sizes(area, width, 0.5 * area / width + (1 - math.pi / 4) * width, contact)
+
+
+def at_start(scene) -> Sizes:
+    """The seed."""
+    radius = scene.aggregate.radius
+    return sizes(scene, math.pi / 2 * radius**2, 0.0 if scene.pore.width - radius < film(scene) else None)
+
+
+def at_end(scene) -> Sizes:
+    """The bound at growth.end; the seed without growth."""
+    now = at_start(scene)
+    if scene.growth is None:
+        return now
+    rate, layer, step = fastest_growth(scene), depth(scene), scene.growth.end / STEPS
+    full = scene.pore.width * scene.pore.length
+    for k in range(STEPS):
+        exposed = math.pi * now.thickness if now.contact is None else 2 * scene.pore.width
+        share = min(1.0, layer * exposed / now.area)
+        area = min(full, now.area * math.exp(min(LARGEST, rate * share * step)))
+        touches = math.sqrt(2 * area / math.pi) >= scene.pore.width - film(scene)
+        now = sizes(scene, area, (k + 1) * step if touches and now.contact is None else now.contact)
+    return now
+
+
+def fastest_growth(scene) -> float:
+    """F3 / X_A (1/h) at the concentrations of the supply (9)."""
+    supply = (scene.substrates.acceptor.supply, scene.substrates.donor.supply)
+    return float(kinetics.growth_rate(*supply, scene.substrates, scene.kinetics))
+
+
+def uptakes(scene) -> Iterator[tuple[str, Substrate, float]]:
+    """Name, substrate and largest uptake q X_m (mg/L/h) of each substrate, the other one in excess: (7)-(8)."""
+    law = scene.kinetics
+    rates = (law.maximum_utilization_rate * law.acceptor_to_donor_ratio + kinetics.decay_demand(law),
+             law.maximum_utilization_rate)
+    for name, rate in zip(("acceptor", "donor"), rates):
+        yield name, getattr(scene.substrates, name), rate * law.maximum_density
+
+
+def depth(scene) -> float:
+    """Depth (um) to which the scarcer substrate reaches into biomass that takes it up at the full rate."""
+    depths = [math.sqrt(2 * s.diffusivity_in_aggregate * s.supply / rate) for _, s, rate in uptakes(scene) if rate]
+    return min(depths, default=math.inf)
+
+
+def numbers(scene, speed: float | None) -> list[Number]:
+    """Those that the sections of the scene give rise to; speed: mean velocity at t = 0 (um/h)."""
+    found: list[Number] = []
+    if speed is not None:
+        found.append(Number("Reynolds", speed * scene.pore.width / scene.flow.kinematic_viscosity, None, "u W / nu"))
+    if speed is not None and scene.substrates:
+        found += _transported(scene, speed)
+    if scene.kinetics:
+        found += _taken_up(scene, speed)
+    if scene.growth:
+        found += _grown(scene, speed)
+    return found
+
+
+def _transported(scene, speed: float) -> Iterator[Number]:
+    for name in ("acceptor", "donor"):
+        value = speed * scene.pore.width / getattr(scene.substrates, name).diffusivity
+        yield Number(f"Peclet, {name}", value, None, "u W / D, D in water")
+    size = scene.pore.width / geometry.ACROSS_PORE / scene.numerics.refinement
+    yield Number("cell Peclet", 1.5 * speed * size / slowest(scene), None,
+                 "1.5 u h / D, h of the largest elements, the smallest D")
+
+
+def slowest(scene) -> float:
+    """The smallest of all diffusivities, um2/h."""
+    kinds = (scene.substrates.acceptor, scene.substrates.donor)
+    return min(min(s.diffusivity, s.diffusivity_in_aggregate) for s in kinds)
+
+
+def _taken_up(scene, speed: float | None) -> Iterator[Number]:
+    start, end = at_start(scene), at_end(scene)
+    later = scene.growth is not None
+    for name, s, rate in uptakes(scene):
+        per = math.sqrt(rate / (s.half_saturation * s.diffusivity_in_aggregate))
+        yield Number(f"Thiele, {name}", start.thickness * per, end.thickness * per if later else None,
+                     "R (q X_m / (K_s D))^1/2, R thickness, q largest uptake, D in the aggregate")
+    for name, s, rate in uptakes(scene):
+        if speed and s.supply:
+            per = rate * kinetics.monod(s.supply, s.half_saturation)[0] / (speed * scene.pore.width * s.supply)
+            yield Number(f"Damkoehler, {name}", start.area * per, end.area * per if later else None,
+                         "q X_m m A / (u W C), uptake of the area A at the supply over what flows in")
+
+
+def _grown(scene, speed: float | None) -> Iterator[Number]:
+    across = half_length(scene) if speed is None else scene.pore.width
+    yield Number("transport over growth time", fastest_growth(scene) * across**2 / slowest(scene), None,
+                 "(l^2 / D) F3 / X_A, " + ("l half of the meshed part" if speed is None else "l = W"))
+    if speed is not None:
+        yield Number("fluid stress over modulus", *stresses(scene, speed),
+                     "shear 6 rho nu u / W at t = 0; at the end the pressure drop over the aggregate; over mu_L")
+
+
+def half_length(scene) -> float:
+    """Half of the part that is meshed at t = 0 (um)."""
+    seed = geometry.seed(scene.aggregate.radius)
+    whole = scene.numerics.extent == "full"
+    first, last = geometry.meshed_extent(seed, scene.pore.width, scene.pore.length, whole)
+    return (last - first) / 2
+
+
+def stresses(scene, speed: float) -> tuple[float, float]:
+    """The fluid's shear on the wall at t = 0, and the drop of pressure over the aggregate at the end, over mu_L.
+
+    The drop is that of a film as long as the aggregate, or of as much biomass from wall to wall; never more than the
+    scene's head.
+    """
+    drive, width, end = scene.flow, scene.pore.width, at_end(scene)
+    viscosity = MPA_PER_UM * drive.density * drive.kinematic_viscosity / scene.growth.shear_modulus
+    gap = max(width - end.thickness, scene.growth.minimum_film)
+    film_loss = math.inf if end.contact is not None else (width / gap) ** 3
+    drop = 12 * viscosity * speed * 2 * end.reach / width**2 * min(drive.viscosity_ratio, film_loss)
+    if drive.head is not None:
+        drop = min(drop, MPA_PER_UM * drive.density * drive.gravity * drive.head / scene.growth.shear_modulus)
+    return 6 * viscosity * speed / width, drop

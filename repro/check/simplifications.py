@@ -1,0 +1,129 @@
+"""Where a simplification that a scene has chosen does not hold: thresholds, each with its reason."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from repro.check import numbers
+from repro.check.numbers import Number
+from repro.fem import geometry
+from repro.model.pore import film
+
+#: (1) has no inertia, whose share of the viscous forces is of the order of the Reynolds number.
+REYNOLDS = 0.1
+#: Linear elements may overshoot where a concentration changes within an element of a cell Peclet number above this.
+CELL_PECLET = 2.0
+#: Quasi-steady substrates are behind the growth by about this share.
+LAG = 0.05
+#: The aggregate is strained by the neglected forces by about this much.
+STRAIN = 0.01
+#: A shape update with the rates of its start is off by about half of the growth in it.
+GROWTH_IN_A_STEP = 0.1
+#: The bound on the time of contact is 10 % early in the paper's pores; later than this times it is long after.
+AFTER_CONTACT = 1.2
+#: Distances between nodes across a film, under which its flow (the cube of its thickness) is a matter of the mesh.
+ACROSS_FILM = 4.0
+
+
+@dataclass(frozen=True)
+class Warned:
+    """A key of the scene and what does not hold."""
+
+    key: str
+    text: str
+
+
+def warnings(scene, found: list[Number]) -> list[Warned]:
+    """Every simplification that does not hold; found: the numbers of the scene."""
+    value = {number.name: number.start for number in found}
+    checks = [_inertia(value), _cells(scene, value)]
+    if scene.aggregate:
+        checks += [_seed_film(scene), _ends(scene)]
+    if scene.kinetics:
+        checks.append(_fronts(scene))
+    if scene.growth:
+        checks += [_lag(scene, value), _forces(scene, found), _steps(scene), _contact(scene)]
+    return [warned for check in checks for warned in check]
+
+
+def _inertia(value: dict[str, float]) -> Iterator[Warned]:
+    reynolds = value.get("Reynolds", 0.0)
+    if reynolds > REYNOLDS:
+        yield Warned("flow", f"the Reynolds number is {reynolds:.2g}, above {REYNOLDS:g}: the inertia that Stokes flow "
+                             "(1) leaves out is of this share of the viscous forces")
+
+
+def _cells(scene, value: dict[str, float]) -> Iterator[Warned]:
+    cell = value.get("cell Peclet", 0.0)
+    if scene.numerics.elements == "linear" and cell > CELL_PECLET:
+        wanted = scene.numerics.refinement * cell / CELL_PECLET
+        yield Warned("numerics.refinement", f"the cell Peclet number is {cell:.2g}, above {CELL_PECLET:g}: linear "
+                     f"elements may overshoot where concentrations are steep; {wanted:.2g} would do, and the presets "
+                     "fast and accurate refine by themselves")
+
+
+def _lag(scene, value: dict[str, float]) -> Iterator[Warned]:
+    lag = value["transport over growth time"]
+    if scene.numerics.transport == "quasi_steady" and lag > LAG:
+        yield Warned("numerics.transport", f"transport takes {lag:.2g} of the time of growth, above {LAG:g}: quasi-"
+                     'steady substrates are off by about this share; "gear" (preset paper) follows them in time')
+
+
+def _forces(scene, found: list[Number]) -> Iterator[Warned]:
+    told = [number for number in found if number.name == "fluid stress over modulus"]
+    if told and scene.growth.fluid_forces == "neglected":
+        strain = max(told[0].start, told[0].end or 0.0)
+        if strain > STRAIN:
+            yield Warned("growth.fluid_forces", f"the fluid's stress comes to {strain:.2g} of mu_L, above {STRAIN:g}: "
+                         "neglected (2.3.3), it would strain the aggregate by about this much; "
+                         '"included" takes it in (preset paper)')
+
+
+def _fronts(scene) -> Iterator[Warned]:
+    numerics, thickness = scene.numerics, numbers.at_end(scene).thickness
+    size = min(thickness / geometry.ACROSS_AGGREGATE, scene.pore.width / geometry.ACROSS_PORE) / numerics.refinement
+    nodes = size / numerics.order
+    for name, s, rate in numbers.uptakes(scene):
+        layer = math.sqrt(s.diffusivity_in_aggregate * s.half_saturation / rate) if rate and s.supply else math.inf
+        if layer < min(nodes, thickness):
+            kind = "zero-order front" if s.supply > s.half_saturation else "layer of first-order uptake"
+            yield Warned("numerics.refinement", f"the {name} is used up in a {kind} (D K_s / (q X_m))^1/2 = "
+                         f"{layer:.2g} um thick, thinner than the {nodes:.2g} um between nodes in the aggregate; "
+                         f"{numerics.refinement * nodes / layer:.2g} would resolve it")
+
+
+def _seed_film(scene) -> Iterator[Warned]:
+    gap, numerics = scene.pore.width - scene.aggregate.radius, scene.numerics
+    nodes = geometry.ACROSS_FILM * numerics.refinement * min(1.0, gap / film(scene)) * numerics.order
+    if nodes < ACROSS_FILM:
+        yield Warned("aggregate.radius", f"the film over the seed is {gap:.2g} um thin and resolved by {nodes:.2g} "
+                     f"distances between nodes, under {ACROSS_FILM:g}: its flow is a matter of the mesh; films are "
+                     f"resolved as if they were {film(scene):g} um (2.3.3)")
+
+
+def _ends(scene) -> Iterator[Warned]:
+    end = numbers.at_end(scene)
+    free = min(10 * end.thickness, 1.5 * scene.pore.width)
+    if end.reach + free > scene.pore.length / 2:
+        when = "by growth.end" if end.reach > scene.aggregate.radius else "from the start"
+        yield Warned("pore.length", f"the aggregate may come within {free:.3g} um of the pore's ends {when} (reach "
+                     f"{end.reach:.3g} of {scene.pore.length / 2:g} um): the inlet's and the outlet's conditions (3.1, "
+                     "(11)-(12)) are then too near, and at the end itself the run is over")
+
+
+def _steps(scene) -> Iterator[Warned]:
+    grown = numbers.fastest_growth(scene) * scene.growth.time_step
+    if scene.numerics.time == "updates" and grown > GROWTH_IN_A_STEP:
+        yield Warned("growth.time_step", f"the aggregate grows by {100 * grown:.2g} % in a shape update, above "
+                     f"{100 * GROWTH_IN_A_STEP:g} %: its rates are those of the shape before; shorten it, or take "
+                     'numerics.time = "midpoint"')
+
+
+def _contact(scene) -> Iterator[Warned]:
+    contact = numbers.at_end(scene).contact
+    if contact is not None and scene.growth.end > AFTER_CONTACT * contact:
+        yield Warned("growth.end", f"contact with the opposite wall is expected from {contact:.3g} h on, long before "
+                     f"{scene.growth.end:g} h: from then on which nodes join the wall (2.3.3) is a rule, and "
+                     "conductivity is known to a few percent")

@@ -1,0 +1,55 @@
+"""Command line: ``repro COMMAND ...``; each command is a module of :mod:`repro.cli`.
+
+Exit status: 0 when the command has done what it is for, 1 when a stage failed, 2 when something in the input is wrong
+or a folder cannot be used, 3 when some runs of a sweep have failed, 130 or 143 when interrupted or terminated.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from repro.cli import check, compare, run, scene, sweep
+from repro.errors import Interrupted, OutputError, SimulationError
+from repro.run.progress import in_json, printable
+from repro.scene import SceneError
+
+#: The commands, one a module. Each has ``add(commands)``, which adds its parser with ``set_defaults(call=...)``;
+#: what is called takes the parsed arguments and returns the exit status.
+COMMANDS = (run, scene, check, compare, sweep)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Entry point; returns the exit status."""
+    chosen = _parser().parse_args(arguments)
+    try:
+        return chosen.call(chosen)
+    except (SceneError, OutputError) as error:
+        return _fail(chosen, error, 2)
+    except SimulationError as error:
+        return _fail(chosen, error, 1)
+    except Interrupted as error:
+        return _fail(chosen, error, 128 + error.signal)
+    except KeyboardInterrupt:
+        return _fail(chosen, "interrupted; what was computed is written", 130)
+
+
+def _fail(chosen, message, status: int) -> int:
+    """Tell what went wrong, as an object too where machines listen."""
+    if getattr(chosen, "json", False):
+        in_json({"event": "error", "exit_status": status, "message": str(message)})
+    print(f"repro: {printable(str(message))}", file=sys.stderr)
+    return status
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="repro", description="Biological clogging of one pore by the growth of an "
+                                     "aggregate (Dupin, Kitanidis & McCarty 2001).")
+    commands = parser.add_subparsers(dest="command", required=True)
+    for command in COMMANDS:
+        command.add(commands)
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,66 @@
+"""``repro run SCENE --out DIR``, ``repro run --resume DIR``: run a scene into a folder, or go on with a run there."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+
+from repro.run import interrupts, progress
+from repro.run.running import INTERVAL, Watch, resume, run
+from repro.scene import load_scene, packaged_scenes
+
+STATUS = """exit status:
+  0    done: the scene's end, or the pore's, is reached, now or before
+  1    a stage failed; the message says at what simulated time, in which stage, why, where the last good state is, and
+       what to change
+  2    wrong input, or the folder cannot be used: not a run's, not writable, disk full, in use by another run
+  130  interrupted (SIGINT, Ctrl-C); 143 terminated (SIGTERM): the step in hand is finished, results and checkpoint are
+       written, and --resume goes on from there; a second signal, after a second or more, stops at once"""
+
+
+def add(commands) -> None:
+    """The parser of this command."""
+    command = commands.add_parser("run", help="run a scene, or go on with a run",
+                                  description="Run a scene and write its results, or go on with a run that was "
+                                  "interrupted or killed: the result is the same to the last bit.",
+                                  epilog=STATUS, formatter_class=argparse.RawDescriptionHelpFormatter)
+    add_scene(command, nargs="?")
+    command.add_argument("--out", metavar="DIR", type=Path, help="folder for the results")
+    command.add_argument("--resume", metavar="DIR", type=Path, help="go on with the run in this folder")
+    command.add_argument("--checkpoint", metavar="SECONDS", type=_seconds, default=INTERVAL,
+                         help="write what a run can go on from, and results so far, so often (default: %(default)g)")
+    command.add_argument("--quiet", action="store_true", help="say nothing but warnings and errors")
+    command.add_argument("--json", action="store_true", help="say what happens as one JSON object a line")
+    command.set_defaults(call=call, refuse=command.error)
+
+
+def add_scene(command, nargs: str | None = None) -> None:
+    """The arguments that name a scene."""
+    command.add_argument("scene", metavar="SCENE", nargs=nargs,
+                         help=f"a TOML file, or a packaged scene: {', '.join(packaged_scenes())}")
+    command.add_argument("--set", metavar="KEY=VALUE", action="append", default=[],
+                         help='change a key of the scene, such as growth.end="5 h"; may be repeated')
+
+
+def _seconds(text: str) -> float:
+    value = float(text)
+    if not 0 <= value < math.inf:
+        raise argparse.ArgumentTypeError(f"{text}: a number of seconds, zero or more, is needed")
+    return value
+
+
+def call(chosen) -> int:
+    """Run the scene that was chosen, or go on with the run."""
+    if chosen.resume and (chosen.scene or chosen.set or chosen.out):
+        chosen.refuse("--resume takes the scene from the run's folder: no SCENE, --set or --out is accepted with it")
+    if not chosen.resume and not (chosen.scene and chosen.out):
+        chosen.refuse("SCENE and --out DIR are needed, or --resume DIR")
+    scene = None if chosen.resume else load_scene(chosen.scene, chosen.set)
+    with interrupts.noted() as stop, progress.told(chosen.quiet, chosen.json) as tell:
+        watch = Watch(tell, chosen.checkpoint, stop)
+        if scene is None:
+            resume(chosen.resume, watch=watch)
+        else:
+            run(scene, chosen.out, watch=watch)
+    return 0

@@ -1,0 +1,1 @@
+"""Finite elements: meshes, their generation, assembly, linear solvers, transfer between meshes. No scene in here."""

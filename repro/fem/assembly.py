@@ -1,0 +1,156 @@
+"""From element matrices to a sparse system: what depends on the mesh's connections alone is worked out once.
+
+The weak forms are scikit-fem's (:func:`local` gives their element matrices); while a mesh only moves, its sparsity,
+elimination order and the place of every element entry in the sparse matrix stay, and an assembly is one summation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+import scipy.sparse as sp
+
+from repro.fem import linear
+
+#: Of one kind of element, or of several.
+Parts: TypeAlias = np.ndarray | tuple[np.ndarray, ...]
+
+
+def local(form, trial, test=None, **parameters) -> np.ndarray:
+    """(T, test functions, trial functions) element matrices of a scikit-fem bilinear form."""
+    test = trial if test is None else test
+    data = form.coo_data(trial, test, **parameters).data.reshape(trial.Nbfun, test.Nbfun, -1)
+    return np.moveaxis(data, (2, 1, 0), (0, 1, 2))
+
+
+def each(coefficient: np.ndarray, elements: np.ndarray) -> np.ndarray:
+    """Element matrices (T, a, b) times a coefficient (T,) of each triangle, or (T, a) of each of its rows."""
+    return coefficient.reshape(len(coefficient), -1, 1) * elements
+
+
+def mass(areas: np.ndarray) -> np.ndarray:
+    """(T, 3, 3) mass matrices of the linear nodal functions on triangles of the given areas (T,)."""
+    return each(areas, (np.ones((1, 3, 3)) + np.eye(3)) / 12)
+
+
+class ElementSystem:
+    """K x = b with some unknowns prescribed, K summed from element matrices.
+
+    unknowns: (T, k) numbers of each element's unknowns, or several of these, one for each kind of element; rank: (n,)
+    sorting key of the unknowns in elimination order; held: (n,) True where the unknown is prescribed. Wherever element
+    matrices (T, k, k) are asked for, they are as many as the kinds.
+    """
+
+    def __init__(self, unknowns: Parts, rank: np.ndarray, held: np.ndarray):
+        self.kinds = _several(unknowns)
+        self._ranked = np.argsort(rank, kind="stable")
+        place = np.empty(len(rank), int)
+        place[self._ranked] = np.arange(len(rank))
+        rows, columns = (place[_flat(part)] for part in zip(*map(linear.pairs, self.kinds)))
+        keys, self._slot = np.unique(columns * len(rank) + rows, return_inverse=True)
+        self._columns, self._rows = np.divmod(keys, len(rank))
+        self._hold(held)
+
+    def holding(self, held: np.ndarray) -> ElementSystem:
+        """The same elements with other unknowns (n,) prescribed."""
+        other = copy(self)
+        other._hold(held)
+        return other
+
+    def _hold(self, held: np.ndarray) -> None:
+        free = ~held[self._ranked]
+        place = np.cumsum(free) - 1
+        self.held, self.order, self.count = held, self._ranked[free], int(free.sum())
+        self.free = ~held if held.any() else slice(None)
+        kept = free[self._rows] & free[self._columns]
+        self._kept = np.flatnonzero(kept) if held.any() else slice(None)
+        self.indices = place[self._rows[kept]].astype(np.int32)
+        self.indptr = np.searchsorted(place[self._columns[kept]], np.arange(self.count + 1)).astype(np.int32)
+        self._pattern = sp.csc_matrix((np.zeros(len(self.indices)), self.indices, self.indptr),
+                                      shape=(self.count, self.count))
+        self._pattern.has_canonical_format = True  # what is filled in is not looked through again
+
+    def matrix(self, elements: Parts) -> sp.csc_matrix:
+        """K between the free unknowns, in elimination order."""
+        found = copy(self._pattern)
+        found.data = np.bincount(self._slot, _flat(_several(elements)), len(self._rows))[self._kept]
+        return found
+
+    def product(self, elements: Parts, x: np.ndarray) -> np.ndarray:
+        """(n,) K x for all unknowns x (n,)."""
+        parts = [K @ x[unknowns][:, :, None] for K, unknowns in zip(_several(elements), self.kinds, strict=True)]
+        return np.bincount(_flat(self.kinds), _flat(parts), len(x))
+
+    def factored(self, elements: Parts) -> Factored:
+        """K, factorised."""
+        return Factored(self, elements, linear.factorised(self.matrix(elements)))
+
+    def solve(self, elements: Parts, right: np.ndarray, value: np.ndarray | None = None) -> np.ndarray:
+        """x (n,) of K x = b (n,) with the prescribed unknowns as in ``value`` (n,), zero by default."""
+        return self.factored(elements).solve(right, value)
+
+
+@dataclass(frozen=True, eq=False)
+class Factored:
+    """K of a system, from its element matrices, with its factors."""
+
+    system: ElementSystem
+    elements: Parts
+    solver: linear.Solver
+
+    def solve(self, right: np.ndarray, value: np.ndarray | None = None) -> np.ndarray:
+        """x (n,) of K x = b (n,) with the prescribed unknowns as in ``value`` (n,), zero by default."""
+        order, found = self.system.order, np.zeros(len(right))
+        if value is not None and self.system.held.any():
+            found = np.where(self.system.held, value, 0.0)
+            right = right - self.system.product(self.elements, found)
+        found[order] = self.solver.solve(right[order])
+        return found
+
+
+def _several(parts: Parts) -> tuple[np.ndarray, ...]:
+    """Of each kind of element."""
+    return parts if isinstance(parts, tuple) else (parts,)
+
+
+def _flat(parts: Sequence[np.ndarray]) -> np.ndarray:
+    """One after the other, flattened."""
+    return parts[0].ravel() if len(parts) == 1 else np.concatenate([part.ravel() for part in parts])
+
+
+def saddle_blocks(upper: np.ndarray, divergence: np.ndarray, lower: np.ndarray | None = None) -> np.ndarray:
+    """(T, a + b, a + b) symmetric element matrices [[upper, -divergence^T], [-divergence, -lower]].
+
+    upper: (T, a, a), or (T, a / 2, a / 2) for each of two components that are not coupled; divergence: (T, b, a);
+    lower: (T, b, b), zero by default.
+    """
+    (count, b, a), k = divergence.shape, upper.shape[1]
+    elements = np.zeros((count, a + b, a + b))
+    for first in range(0, a, k):
+        elements[:, first: first + k, first: first + k] = upper
+    elements[:, a:, :a] = -divergence
+    elements[:, :a, a:] = -np.swapaxes(divergence, 1, 2)
+    if lower is not None:
+        elements[:, a:, a:] = -lower
+    return elements
+
+
+def saddle_system(velocity: np.ndarray, pressure: np.ndarray, held: np.ndarray,
+                  order: np.ndarray | None = None) -> ElementSystem:
+    """The system of two components on the same nodes and a pressure on other ones, pressures after their node.
+
+    velocity: (T, a) nodes of each component; pressure: (T, b) nodes among the first ones of the velocity's;
+    held: (n, 2) prescribed components; order: (n,) nodes in elimination order, if known. Unknowns are numbered x, then
+    y, then pressure.
+    """
+    count = len(held)
+    pressures = pressure.max() + 1
+    place = np.empty(count)
+    place[linear.node_order(count, velocity) if order is None else order] = np.arange(count)
+    rank = np.concatenate([place, place, place[:pressures] + 0.5])
+    unknowns = np.concatenate([velocity, count + velocity, 2 * count + pressure], axis=1)
+    return ElementSystem(unknowns, rank, np.concatenate([held[:, 0], held[:, 1], np.zeros(pressures, bool)]))

@@ -1,0 +1,202 @@
+"""Reprojection of the biomass after growth, (30)-(34), and transfer of fields to a new mesh (3.5, [E8]).
+
+The mass of a nodal field X on the aggregate is sum_i S_i X_i, with S_i = sum of |tau| / 3 over the biomass triangles at
+node i: the integral of the linear field. (34) keeps each node's mass when the triangles change their areas. To a new
+mesh the paper interpolates linearly, which drifts; the conserving transfer is the Galerkin projection
+
+    (X_new, N_i) = (X_old, N_i)  for every new N_i, integrated exactly over the common pieces of both meshes,
+
+which keeps the total, constants and linear fields to round-off as long as both meshes cover the same polygon. It may
+overshoot where a field is steep. The bounded transfer is the same, limited by flux-corrected transport (Zalesak 1979;
+Kuzmin 2012): with m_ij the mass matrix, m_i its row sums and b_i = (X_old, N_i), the projection is
+
+    m_i X_i = b_i + sum_j f_ij,        f_ij = m_ij (X_i - X_j) = -f_ji
+
+and b_i / m_i alone is a mean of the old field around node i, bounded by its values there. Each f_ij is multiplied by
+the largest alpha_ij = alpha_ji from 0 to 1 that Zalesak's limiter finds safe: no flux is lost, no bound exceeded.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from repro.errors import TransferError
+from repro.fem import linear
+from repro.fem.assembly import ElementSystem, mass
+from repro.fem.mesh import triangle_areas
+from repro.timing import timed
+
+#: The common pieces of two meshes must cover both to this relative accuracy.
+COVER = 1e-9
+#: A projection that exceeds its bounds by less than this part of the field's largest value is not limited.
+OVERSHOOT = 1e-14
+
+
+def reproject(field: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """(34): X'_i = X_i S_i / S'_i, with lumped areas S before and after (um2), zero where there is no biomass."""
+    there = after > 0
+    return np.where(there, field * before / np.where(there, after, 1.0), 0.0)
+
+
+def locate(points: np.ndarray, triangles: np.ndarray, where: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Triangle (K,) that holds, or is nearest to, each of the points ``where`` (K, 2), and its three weights (K, 3)."""
+    tree = shapely.STRtree(shapely.polygons(points[triangles]))
+    found = tree.nearest(shapely.points(where))
+    return found, barycentric(points, triangles[found], where)
+
+
+def barycentric(points: np.ndarray, corners: np.ndarray, where: np.ndarray) -> np.ndarray:
+    """(..., 3) values of the nodal functions of triangles ``corners`` (..., 3) at ``where`` (..., 2)."""
+    a, b, c = (points[corners[..., i]] for i in range(3))
+
+    def cross(u, v):
+        return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+
+    double = cross(b - a, c - a)
+    a, b, c = (corner - where for corner in (a, b, c))
+    return np.stack([cross(b, c), cross(c, a), cross(a, b)], -1) / double[..., None]
+
+
+@timed("transfer")
+def interpolate(points: np.ndarray, triangles: np.ndarray, fields: np.ndarray, where: np.ndarray) -> np.ndarray:
+    """Linear interpolation of nodal fields (N, m) at points (K, 2), the paper's transfer; bounded by the nodal values
+    (a point outside takes the value of the nearest point of the mesh)."""
+    found, weight = locate(points, triangles, where)
+    weight = np.clip(weight, 0.0, 1.0)
+    weight /= weight.sum(axis=1, keepdims=True)
+    return np.einsum("ka,kam->km", weight, fields[triangles[found]])
+
+
+def supermesh(points, triangles, new_points, new_triangles) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Common pieces of two meshes: (p, 3, 2) corners of triangles, and the old and new triangle (p,) each lies in."""
+    boxes = shapely.STRtree(shapely.polygons(points[triangles]))
+    new, old = boxes.query(shapely.polygons(new_points[new_triangles]))
+    pieces = clip(points[triangles[old]], new_points[new_triangles[new]])
+    fans = np.stack([np.repeat(pieces[:, :1], pieces.shape[1] - 2, axis=1), pieces[:, 1:-1], pieces[:, 2:]], axis=2)
+    edge = fans[:, :, 1:] - fans[:, :, :1]
+    pair, fan = np.nonzero(edge[..., 0, 0] * edge[..., 1, 1] != edge[..., 0, 1] * edge[..., 1, 0])
+    return fans[pair, fan], old[pair], new[pair]
+
+
+def clip(polygons: np.ndarray, windows: np.ndarray) -> np.ndarray:
+    """Convex polygons (p, k, 2) cut to counterclockwise triangles (p, 3, 2), pair by pair: (p, m, 2) of as many corners
+    as the largest has, three at least.
+
+    Sutherland and Hodgman's algorithm: each side of the window in turn keeps what is to its left. Polygons with fewer
+    corners repeat one of them, empty ones are a single point. m is k + 3 at most but where round-off has corners on a
+    line of the window change sides more than twice.
+    """
+    for side in range(3):
+        start, along = windows[:, side, None], windows[:, (side + 1) % 3, None] - windows[:, side, None]
+        depth = along[..., 0] * (polygons[..., 1] - start[..., 1]) - along[..., 1] * (polygons[..., 0] - start[..., 0])
+        after, depth_after = np.roll(polygons, -1, axis=1), np.roll(depth, -1, axis=1)
+        crosses = (depth < 0) != (depth_after < 0)
+        part = np.where(crosses, depth, 0.0) / np.where(crosses, depth - depth_after, 1.0)
+        crossing = polygons + part[..., None] * (after - polygons)
+        both = np.stack([polygons, crossing], axis=2).reshape(len(polygons), -1, 2)
+        kept = np.stack([depth >= 0, crosses], axis=2).reshape(len(polygons), -1)
+        polygons = _packed(both, kept)
+    return polygons
+
+
+def _packed(points: np.ndarray, kept: np.ndarray) -> np.ndarray:
+    """The kept points (p, k, 2) moved to the front, in order, and the first of them repeated behind: (p, room, 2)."""
+    count = kept.sum(axis=1)[:, None]
+    room = max(3, int(count.max(initial=0)))
+    front = np.argsort(~kept, axis=1, kind="stable")[:, :room]
+    chosen = np.where(np.arange(room) < count, front, front[:, :1])
+    return np.take_along_axis(points, chosen[..., None], axis=1)
+
+
+def project(points, triangles, fields, new_points, new_triangles) -> np.ndarray:
+    """Galerkin projection of nodal fields (N, m) onto the nodes of another mesh of the same polygon: (K, m).
+
+    Raises TransferError where the two meshes do not cover the same area.
+    """
+    pieces = _pieces(points, triangles, new_points, new_triangles)
+    right = _loads(pieces, points, triangles, fields, new_points, new_triangles)
+    return _solve_mass(new_points, new_triangles, right)
+
+
+def project_bounded(points, triangles, fields, new_points, new_triangles) -> np.ndarray:
+    """As :func:`project`, each field limited at each node by its old values around that node."""
+    pieces = _pieces(points, triangles, new_points, new_triangles)
+    right = _loads(pieces, points, triangles, fields, new_points, new_triangles)
+    found, bounds = _solve_mass(new_points, new_triangles, right), _bounds(pieces, triangles, fields, new_triangles)
+    areas = triangle_areas(new_points, new_triangles)
+    lumped = np.bincount(new_triangles.ravel(), np.repeat(areas / 3, 3), len(new_points))
+    ends, coupling = _edges(new_triangles, areas)
+    for column, (least, most) in enumerate(zip(*(bound.T for bound in bounds))):
+        room = OVERSHOOT * np.abs(fields[:, column]).max()
+        if (found[:, column] < least - room).any() or (found[:, column] > most + room).any():
+            flux = coupling * (found[ends[:, 0], column] - found[ends[:, 1], column])
+            found[:, column] = _limited(right[:, column] / lumped, lumped, ends, flux, least, most)
+        found[:, column] = np.clip(found[:, column], least, most)  # round-off
+    return found
+
+
+def _edges(triangles: np.ndarray, areas: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(e, 2) nodes of every edge, and (e,) the entry of the mass matrix that couples them, um2."""
+    pairs = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    ends, which = np.unique(pairs, axis=0, return_inverse=True)
+    return ends, np.bincount(which.ravel(), np.repeat(areas / 12, 3), len(ends))
+
+
+def _bounds(pieces, triangles: np.ndarray, fields: np.ndarray, new_triangles: np.ndarray):
+    """Least and largest old nodal value (K, m) in the old triangles that share area with a triangle of a new node."""
+    _, old, new, _ = pieces
+    shape = (new_triangles.max() + 1, fields.shape[1])
+    least, most = np.full(shape, np.inf), np.full(shape, -np.inf)
+    values = fields[triangles[old]]
+    for corner in new_triangles[new].T:
+        np.minimum.at(least, corner, values.min(axis=1))
+        np.maximum.at(most, corner, values.max(axis=1))
+    return least, most
+
+
+def _limited(low, lumped, ends, flux, least, most) -> np.ndarray:
+    """(K,) values ``low`` with as much of the fluxes (e,), um2 times the field, into the first of the two ``ends`` and
+    out of the second as keeps them from ``least`` to ``most`` (K,)."""
+    first, second = ends.T
+    into = [np.bincount(first, np.maximum(sign * flux, 0), len(low))
+            + np.bincount(second, np.maximum(-sign * flux, 0), len(low)) for sign in (1, -1)]
+    room = [lumped * np.maximum(most - low, 0), lumped * np.maximum(low - least, 0)]
+    up, down = (np.minimum(1.0, r / np.where(p > 0, p, 1.0)) for r, p in zip(room, into))
+    part = np.where(flux > 0, np.minimum(up[first], down[second]), np.minimum(down[first], up[second])) * flux
+    return low + (np.bincount(first, part, len(low)) - np.bincount(second, part, len(low))) / lumped
+
+
+def _pieces(points, triangles, new_points, new_triangles):
+    """Corners of the common pieces (p, 3, 2), the old and new triangle (p,) of each, and their areas (p,)."""
+    corners, old, new = supermesh(points, triangles, new_points, new_triangles)
+    edge = corners[:, 1:] - corners[:, :1]
+    area = 0.5 * np.abs(edge[:, 0, 0] * edge[:, 1, 1] - edge[:, 0, 1] * edge[:, 1, 0])
+    areas = [triangle_areas(p, t).sum() for p, t in ((points, triangles), (new_points, new_triangles))]
+    if max(abs(area.sum() / a - 1) for a in areas) > COVER:
+        raise TransferError(f"the old mesh covers {areas[0]:.12g} um2, the new one {areas[1]:.12g} um2, "
+                            f"their common pieces {area.sum():.12g} um2; try a shorter growth.time_step")
+    return corners, old, new, area
+
+
+def _loads(pieces, points, triangles, fields, new_points, new_triangles) -> np.ndarray:
+    """(K, m) integrals of the old fields times each new nodal function."""
+    corners, old, new, area = pieces
+    middles = 0.5 * (corners + np.roll(corners, -1, axis=1))
+    old_weight = barycentric(points, np.repeat(triangles[old][:, None], 3, 1), middles)
+    new_weight = barycentric(new_points, np.repeat(new_triangles[new][:, None], 3, 1), middles)
+    values = np.einsum("pqa,pam->pqm", old_weight, fields[triangles[old]])
+    load = np.einsum("p,pqa,pqm->pam", area / 3, new_weight, values)
+    right = np.zeros((len(new_points), fields.shape[1]))
+    np.add.at(right, new_triangles[new], load)
+    return right
+
+
+def _solve_mass(points: np.ndarray, triangles: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Solve with the mass matrix of the linear nodal functions for each column of (K, m); every node has a triangle."""
+    rank = np.argsort(linear.node_order(len(points), triangles))
+    system = ElementSystem(triangles, rank, np.zeros(len(points), bool))
+    solver, solution = linear.Solver(system.matrix(mass(triangle_areas(points, triangles)))), np.empty_like(right)
+    for column, load in enumerate(right.T):
+        solution[system.order, column] = solver.solve(load[system.order])
+    return solution

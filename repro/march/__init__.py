@@ -1,0 +1,1 @@
+"""When steps are made: the paper's updates, the midpoint rule with error control, and the loop that both share."""

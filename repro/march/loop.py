@@ -1,0 +1,208 @@
+"""The one loop of steps that every scheme shares, and the state from which it goes on bit for bit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+import numpy as np
+
+from repro.errors import SimulationError, StageError
+from repro.fem import geometry
+from repro.march.pace import Pace
+from repro.model.pore import Solved
+
+#: A step of the grid this close (h) to a reported time is that time.
+SAME_TIME = 1e-9
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """Mass balance of one step, per depth (um2 mg/L = 1e-12 g/m): both substrates, then the biomass."""
+
+    start: float
+    end: float
+    supplied: tuple[float, float]
+    out: tuple[float, float]
+    consumed: tuple[float, float]
+    stored: tuple[float, float]
+    biomass_before: float
+    biomass_made: float
+    biomass_after: float
+
+
+@dataclass(frozen=True, eq=False)
+class Instant:
+    """The pore at ``pore.time`` with what is solved in its geometry, and how it came there.
+
+    before: the pore and its solution at the end of the last step, grown but not yet expanded (Plate 1), None at t = 0
+    and where the step that follows cannot be made; ledgers, remeshes, iterations: of the steps since the last instant.
+    """
+
+    pore: Any
+    solved: Solved
+    before: tuple[Any, Solved] | None
+    ledgers: tuple[Ledger, ...]
+    remeshes: int
+    iterations: dict[str, int]
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """What one step made: the new pore, the pore and its solution before it expanded, the ledger, and counts."""
+
+    pore: Any
+    before: tuple[Any, Solved] | None
+    ledger: Ledger
+    remeshed: bool
+    iterations: int
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """All that a run goes on from after a step.
+
+    pore: as the step left it, with the guess from which its substrates are solved; pace: of the step to try next;
+    ledgers, remeshes, iterations: of the steps since the last Instant.
+    """
+
+    pore: Any
+    pace: Pace
+    ledgers: tuple[Ledger, ...] = ()
+    remeshes: int = 0
+    iterations: dict[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """What the loop needs of a scheme, each called with the scene first.
+
+    seeded(): the pore at t = 0; solve(pore): what is solved in it; times(): at which steps must end, h, ascending;
+    advance(pore, solved, time, pace): one step to that time or on the way there, as (Step, what is solved after it,
+    pace of the next); first: length of the first step that is tried, in parts of growth.time_step.
+    """
+
+    seeded: Callable[..., Any]
+    solve: Callable[..., Solved]
+    times: Callable[..., list[float]]
+    advance: Callable[..., tuple[Step, Solved, Pace]]
+    first: float = 1.0
+
+
+class PoreEnd(Exception):
+    """The aggregate has reached an end of the pore: the run is over."""
+
+
+def steps(scene, scheme: Scheme, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
+    """Every step of a run from t = 0, or after ``state``, with the Instant where its time is reported.
+
+    Raises SimulationError where a stage fails, and PoreEnd, after a last Instant, where the aggregate reaches an end of
+    the pore.
+    """
+    first = state is None
+    with stopping(state.pore.time if state else 0.0):
+        first_step = scheme.first * scene.growth.time_step if scene.growth else 0.0
+        state = state or State(laid_out(scheme.seeded(scene)), Pace(first_step))
+        solved = scheme.solve(scene, state.pore)
+    now = replace(state.pore, concentrations=solved.concentrations)
+    if first:
+        yield state, Instant(now, solved, None, (), 0, newton_counts(solved))
+    elif now.time > 0:
+        refuse_end(scene, now)
+    for time in scheme.times(scene) if scene.growth else ():
+        while time - now.time > SAME_TIME:
+            try:
+                with stopping(now.time):
+                    taken, solved, pace = scheme.advance(scene, now, solved, time, state.pace)
+            except PoreEnd:
+                if state.ledgers:  # steps that are not reported yet
+                    yield reported(state), instant(state, now, solved, None)
+                raise
+            state = _after(state, taken, solved, pace)
+            now = replace(state.pore, concentrations=solved.concentrations)
+            if _wanted(scene, now.time) or pore_end(scene, now, 1.0):
+                yield reported(state), instant(state, now, solved, taken.before)
+                state = reported(state)
+            else:
+                yield state, None
+            refuse_end(scene, now)
+
+
+def _after(state: State, taken: Step, solved: Solved, pace: Pace) -> State:
+    """The state with one step more to report."""
+    before = newton_counts(taken.before[1]) if taken.before else {}
+    counts = added(state.iterations, {"growth": taken.iterations}, before, newton_counts(solved))
+    return State(taken.pore, pace, (*state.ledgers, taken.ledger), state.remeshes + taken.remeshed, counts)
+
+
+def _wanted(scene, time: float) -> bool:
+    """Is a step's end reported? Steps end at ``output.times`` to the last bit."""
+    return scene.output.times is None or time in scene.output.times
+
+
+def instant(state: State, now, solved: Solved, before) -> Instant:
+    """The Instant that reports the steps of a state."""
+    return Instant(now, solved, before, state.ledgers, state.remeshes, state.iterations)
+
+
+def reported(state: State) -> State:
+    """The state with nothing to report."""
+    return State(state.pore, state.pace)
+
+
+def laid_out(pore):
+    """The same pore, none of its arrays a strided view: sums over those may differ in the last bit from sums over the
+    copies that a checkpoint gives back."""
+    state = pore.concentrations
+    return replace(_flat(pore), mesh=_flat(pore.mesh), concentrations=state and _flat(state))
+
+
+def _flat(data):
+    """A dataclass with its strided arrays copied; itself where there are none."""
+    arrays = {each.name: getattr(data, each.name) for each in fields(data) if each.init}
+    strided = {name: np.ascontiguousarray(array) for name, array in arrays.items()
+               if isinstance(array, np.ndarray) and not array.flags.forc}
+    return replace(data, **strided) if strided else data
+
+
+@contextmanager
+def stopping(time: float):
+    """Floating-point errors and want of memory stop the run; a failure is told with the simulated time of its step."""
+    try:
+        with np.errstate(all="raise", under="ignore"):
+            yield
+    except StageError as error:
+        raise SimulationError(f"stopped in the step from t = {time:g} h, in {error.stage}: {error}") from error
+    except FloatingPointError as error:
+        raise SimulationError(f"stopped in the step from t = {time:g} h by a floating-point error ({error}); "
+                              "try a shorter growth.time_step or a larger numerics.refinement") from error
+    except MemoryError as error:
+        raise SimulationError(f"stopped in the step from t = {time:g} h, out of memory ({error}); "
+                              "try a smaller numerics.refinement") from error
+
+
+def newton_counts(solved: Solved) -> dict[str, int]:
+    return {"transport": solved.concentrations.iterations if solved.concentrations else 0}
+
+
+def added(*counts: dict[str, int]) -> dict[str, int]:
+    keys = {key for count in counts for key in count}
+    return {key: sum(count.get(key, 0) for count in counts) for key in sorted(keys)}
+
+
+def pore_end(scene, now, elements: float) -> str:
+    """Which end of the pore the aggregate has reached, to so many elements of the fluid; empty while it has not."""
+    outline, end = now.outline, scene.pore.length / 2
+    near = elements * scene.pore.width / geometry.ACROSS_PORE
+    if outline.upstream < near - end or outline.downstream > end - near:
+        side = "upstream" if outline.upstream < near - end else "downstream"
+        return f"the aggregate reaches the pore's {side} end"
+    return ""
+
+
+def refuse_end(scene, now) -> None:
+    """Raises PoreEnd where the aggregate has reached an end of the pore."""
+    if over := pore_end(scene, now, 1.0):
+        raise PoreEnd(f"{over} at t = {now.time:g} h")

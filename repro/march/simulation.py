@@ -1,0 +1,24 @@
+"""Run a scene in the way that its ``numerics.time`` names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from repro.fem import linear
+from repro.march import coupling, stepping
+from repro.march.loop import Instant, State
+
+
+def simulate(scene, state: State | None = None) -> Iterator[Instant]:
+    """Yields an Instant at t = 0 and at each reported time: at ``output.times``, or after every step.
+
+    state: one of :func:`steps`, after which to go on. Raises SimulationError where a stage fails, and PoreEnd, after a
+    last Instant, where the aggregate reaches an end of the pore.
+    """
+    return (instant for _, instant in steps(scene, state) if instant)
+
+
+def steps(scene, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
+    """Every step, t = 0 first: the state from which a run goes on bit for bit, and the Instant where one is due."""
+    linear.use(scene.numerics.solver, scene.numerics.ordering)
+    return (stepping if scene.numerics.time == "midpoint" else coupling).steps(scene, state)

@@ -1,0 +1,84 @@
+"""Steps of the length that the growth asks for (``numerics.time = "midpoint"``): second order in time.
+
+The midpoint rule carries (9)-(10) over a step with the rates of the shape half way. Euler's rule would take those of
+the start: the mean over the aggregate of their difference, times the step, is what ``numerics.tolerance`` bounds; the
+error of the midpoint rule is of higher order, and what a tolerance makes of it is measured in ``make bench``. A step
+ends at each reported time, and when the film between the aggregate and the opposite wall is first too thin (2.3.3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from repro.curved import coupling as curved
+from repro.errors import StageError
+from repro.march import loop, midpoint
+from repro.march.coupling import Attempt
+from repro.march.loop import SAME_TIME, Instant, PoreEnd, Scheme, State, Step, laid_out
+from repro.march.pace import EXCESS, STRETCH, Pace, allowed, fitted, following
+from repro.model.pore import Solved
+
+#: The first step that is tried, in parts of growth.time_step; one that fails or errs too much is tried again, shorter,
+#: until it is SHORTEST parts.
+FIRST, SHORTEST = 8.0, 1e-3
+#: Contact is met when the film is no thinner than this part of what it may be.
+LANDED = 0.995
+
+
+def steps(scene, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
+    """:func:`repro.march.loop.steps` of the midpoint rule; without ``output.times`` every step is reported."""
+    scheme = curved if scene.numerics.curved else midpoint
+
+    def advance(*now) -> tuple[Step, Solved, Pace]:
+        taken, solved, pace = _advance(scheme, *now)
+        return replace(taken, before=None), solved, pace
+
+    return loop.steps(scene, Scheme(scheme.seeded, scheme.solve, _targets, advance, FIRST), state)
+
+
+def _targets(scene) -> list[float]:
+    """Times (h) at which a step must end."""
+    return sorted({time for time in scene.output.times or () if time > 0} | {scene.growth.end})
+
+
+def _advance(scheme, scene, now, solved, time: float, asked: Pace):
+    """The first step that is good enough, what is solved after it, and the pace of the next."""
+    tolerance, shortest, length = scene.numerics.tolerance, SHORTEST * scene.growth.time_step, asked.length
+    duration = fitted(length, time - now.time, STRETCH)
+    while True:
+        most = np.inf if duration <= shortest else EXCESS * tolerance / duration
+        try:
+            found = scheme.attempt(scene, now, solved, duration, most)
+            estimate = found.change * duration
+            if found.step and (duration <= shortest or not _overshoots(found)):
+                taken = _ending_at(found.step, now.time + duration, time)
+                contact = found.gaps is not None  # that alone made the step short
+                pace = asked if contact else following(replace(asked, length=length), duration, estimate, tolerance)
+                return taken, scheme.solve(scene, taken.pore), pace
+            length = duration * (_to_contact(found.gaps) if found.step else allowed(estimate, tolerance))
+        except (PoreEnd, StageError, FloatingPointError):
+            if duration <= shortest:
+                raise
+            length = duration / 2
+        duration = fitted(length, time - now.time)
+
+
+def _overshoots(found: Attempt) -> bool:
+    """Does the step end with a film much thinner than it may be, when contact is first made?"""
+    return found.gaps is not None and found.gaps[1] < LANDED * found.gaps[2]
+
+
+def _to_contact(gaps: tuple[float, float, float]) -> float:
+    """The part of the step after which the film, thinning at a constant rate, is just too thin."""
+    before, after, film = gaps
+    aim = 0.5 * (1 + LANDED) * film
+    return min(0.95, max(0.02, (before - aim) / (before - after)))
+
+
+def _ending_at(taken: Step, end: float, time: float) -> Step:
+    """The step with the time of its end, the reported one where they are the same."""
+    exact = time if abs(time - end) <= SAME_TIME else end
+    return replace(taken, pore=laid_out(replace(taken.pore, time=exact)))

@@ -1,0 +1,223 @@
+"""What a run leaves: ``timeseries.csv``, ``ledger.csv``, fields as ``.vtu`` with a ``.pvd`` index, and ``run.json``.
+
+Every file appears whole or not at all: it is written beside its place and moved there. Names carry units; what a scene
+does not model is an empty field. The package's units (um, h, mg/L) become those of the names here and nowhere else.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import platform
+from importlib.metadata import version
+from pathlib import Path
+from xml.etree import ElementTree
+
+import meshio
+import numpy as np
+
+from repro.curved import results as curved
+from repro.curved.mesh import CurvedMesh
+from repro.fem import mesh
+from repro.march.coupling import Instant, Ledger
+from repro.model import growth
+from repro.scene import Scene, scene_hash, scene_tables
+
+M_PER_D, CM = 24e-6, 1e-4  # of um/h, of um
+
+COLUMNS = """time_h mean_velocity_m_per_d head_loss_cm conductivity_m_per_d effluent_acceptor_mg_per_L
+effluent_donor_mg_per_L inlet_acceptor_mg_per_L inlet_donor_mg_per_L aggregate_area_um2 thickness_um upstream_um
+downstream_um meshed_length_um inert_fraction biomass_density_min biomass_density_max acceptor_min_mg_per_L
+donor_min_mg_per_L acceptor_balance donor_balance biomass_balance nodes remeshed contact""".split()
+
+LEDGER_COLUMNS = ["start_h", "end_h"] + [f"{name}_{part}_pg_per_m" for name in ("acceptor", "donor") for part in
+                  ("supplied", "out", "consumed", "stored")] + [f"biomass_{part}_pg_per_m" for part in
+                  ("before", "made", "after")]
+
+PACKAGES = ("numpy", "scipy", "scikit-fem", "meshio", "mmgpy", "shapely", "pint")
+
+
+def row(scene: Scene, instant: Instant) -> dict[str, float | None]:
+    """One row of ``timeseries.csv``: the geometry at its time, with flow and substrates solved in it."""
+    pore = instant.pore
+    found = dict.fromkeys(COLUMNS)
+    found.update(time_h=pore.time, meshed_length_um=pore.mesh.ends[1] - pore.mesh.ends[0], nodes=len(pore.mesh.points),
+                 remeshed=int(instant.remeshes > 0), contact=int(pore.contact))
+    for columns in (_flow_columns(instant), _substrate_columns(instant), _transient_columns(scene, instant),
+                    _aggregate_columns(scene, instant)):
+        found.update(columns)
+    return found
+
+
+def _flow_columns(instant: Instant) -> dict[str, float]:
+    flow = instant.solved.flow
+    if flow is None:
+        return {}
+    return {"mean_velocity_m_per_d": M_PER_D * flow.mean_velocity, "head_loss_cm": CM * flow.head_loss,
+            "conductivity_m_per_d": M_PER_D * flow.conductivity}
+
+
+def _substrate_columns(instant: Instant) -> dict[str, float]:
+    state = instant.solved.concentrations
+    found: dict[str, float] = {}
+    if state is None:
+        return found
+    for name, field, flux in zip(("acceptor", "donor"), (state.acceptor, state.donor), instant.solved.fluxes):
+        found[f"{name}_min_mg_per_L"] = float(field.min())
+        found[f"inlet_{name}_mg_per_L"] = flux.inlet
+        found[f"effluent_{name}_mg_per_L"] = flux.effluent
+        found[f"{name}_balance"] = _defect(flux.supplied, flux.out, flux.consumed)
+    return found
+
+
+def _transient_columns(scene: Scene, instant: Instant) -> dict[str, float]:
+    """The substrate balances of the transient scheme: the worst of the steps since the last row, storage included."""
+    if scene.numerics.transport != "gear" or instant.solved.concentrations is None:
+        return {}
+    problem, found = instant.solved.problem, {}
+    for k, name in enumerate(("acceptor", "donor")):
+        room = problem.both[k].supply * problem.total.sum()
+        steps = [_defect(ledger.supplied[k], ledger.out[k] + ledger.stored[k], ledger.consumed[k], room)
+                 for ledger in instant.ledgers]
+        found[f"{name}_balance"] = max(steps, key=abs, default=0.0)
+    return found
+
+
+def _defect(supplied: float, out: float, consumed: float, room: float = 0.0) -> float:
+    """(in - out - consumed) over the largest of what comes in, what is consumed, and, in the transient, what the meshed
+    part holds at the concentration of the supply."""
+    scale = max(abs(supplied), consumed, room)
+    return (supplied - out - consumed) / scale if scale else 0.0
+
+
+def _aggregate_columns(scene: Scene, instant: Instant) -> dict[str, float]:
+    pore = instant.pore
+    outline = pore.outline
+    if outline is None:
+        return {}
+    found = {"aggregate_area_um2": outline.area, "thickness_um": outline.thickness, "upstream_um": outline.upstream,
+             "downstream_um": outline.downstream}
+    if scene.kinetics:
+        names = ("inert_fraction", "biomass_density_min", "biomass_density_max")
+        found.update(zip(names, pore.composition(scene.kinetics.maximum_density)))
+    if scene.growth:
+        defects = [(a.biomass_after - a.biomass_before - a.biomass_made) / a.biomass_after for a in instant.ledgers]
+        found["biomass_balance"] = max(defects, key=abs, default=0.0)
+    return found
+
+
+def ledger_row(ledger: Ledger) -> list[float]:
+    """One row of ``ledger.csv``: a step's balances per metre of depth; 1 um2 mg/L is 1 pg/m."""
+    parts = (ledger.supplied, ledger.out, ledger.consumed, ledger.stored)
+    substrates = [part[which] for which in (0, 1) for part in parts]
+    return [ledger.start, ledger.end, *substrates, ledger.biomass_before, ledger.biomass_made, ledger.biomass_after]
+
+
+def fields(scene: Scene, pore, solved) -> meshio.Mesh:
+    """The fields of an instant for meshio: places in um, one value a node or a triangle, named with their units.
+
+    In the fluid there is no biomass, stress or pressure P (zero), theta and J are 1, and places have not moved. Stress
+    and P are those of the strain since t = 0: a scene whose new biomass is born stress-free has none to tell.
+    """
+    grid = pore.mesh
+    if isinstance(grid, CurvedMesh):
+        return curved.fields(scene, pore, solved)
+    points, cells = {}, {"region": grid.biomass.astype(float)}
+    if solved.flow:
+        points["velocity_m_per_d"] = _three(M_PER_D * solved.flow.velocity[: len(grid.points)])
+        points["head_cm"] = CM * solved.flow.head
+    if solved.concentrations:
+        points["acceptor_mg_per_L"] = solved.concentrations.acceptor
+        points["donor_mg_per_L"] = solved.concentrations.donor
+    if scene.kinetics:
+        points["active_biomass"] = pore.active / scene.kinetics.maximum_density
+        points["inert_biomass"] = pore.inert / scene.kinetics.maximum_density
+    if scene.growth:
+        _add_mechanics(scene, pore, points, cells)
+    return meshio.Mesh(_three(grid.points), [("triangle", grid.triangles)], point_data=points,
+                       cell_data={name: [value] for name, value in cells.items()})
+
+
+def _add_mechanics(scene: Scene, pore, points: dict, cells: dict) -> None:
+    grid, modulus = pore.mesh, scene.growth.shear_modulus
+    body = np.isin(np.arange(len(grid.points)), grid.body)
+    origin = np.where(body[:, None], pore.origin, grid.points)
+    points["displacement_um"], points["position_t0_um"] = _three(grid.points - origin), _three(origin)
+    triangles = grid.triangles[grid.biomass]
+    F = growth.deformation(grid.points, triangles, mesh.gradients(origin, triangles))
+    values = {"theta": pore.theta, "J": np.linalg.det(F)}
+    if scene.growth.new_biomass == "stressed":
+        points["pressure_MPa"] = modulus * pore.pressure
+        stress = modulus * growth.cauchy(F, pore.pressure[triangles].mean(axis=1))
+        names = ("stress_xx_MPa", "stress_yy_MPa", "stress_zz_MPa", "stress_xy_MPa")
+        values |= dict(zip(names, stress.T), largest_principal_stress_MPa=growth.largest_principal(stress))
+    for name, value in values.items():
+        cells[name] = np.full(len(grid.triangles), 1.0 if name in ("theta", "J") else 0.0)
+        cells[name][grid.biomass] = value
+
+
+def _three(plane: np.ndarray) -> np.ndarray:
+    """(N, 3) vectors from plane ones (N, 2)."""
+    return np.column_stack([plane, np.zeros(len(plane))])
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file whole or not at all."""
+    beside = path.with_name(f".{path.name}.part")
+    try:
+        beside.write_text(text, encoding="utf-8", newline="")
+        os.replace(beside, path)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def write_fields(path: Path, content: meshio.Mesh) -> None:
+    """Write a ``.vtu`` file whole or not at all."""
+    beside = path.with_name(f".part-{path.name}")
+    try:
+        content.write(beside, file_format="vtu")
+        os.replace(beside, path)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def write_index(path: Path, entries: list[tuple[float, str]]) -> None:
+    """Write the ``.pvd`` index of fields: (time in h, file name) pairs."""
+    root = ElementTree.Element("VTKFile", type="Collection", version="0.1")
+    collection = ElementTree.SubElement(root, "Collection")
+    for time, name in entries:
+        ElementTree.SubElement(collection, "DataSet", timestep=repr(time), part="0", file=name)
+    ElementTree.indent(root)
+    write_text(path, '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n")
+
+
+def write_table(path: Path, columns: list[str], rows: list[list]) -> None:
+    """Write a CSV table; None is an empty field, floats keep every digit."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(["" if value is None else repr(value) if isinstance(value, float) else value for value in line]
+                     for line in rows)
+    write_text(path, text.getvalue())
+
+
+def read_table(path: Path) -> dict[str, np.ndarray]:
+    """The columns of a CSV table that a run has written; an empty field is not-a-number."""
+    with path.open(encoding="utf-8", newline="") as lines:
+        reader = csv.DictReader(lines)
+        rows, columns = list(reader), reader.fieldnames or ()
+    return {name: np.array([float(row[name] or "nan") for row in rows]) for name in columns}
+
+
+def provenance(scene: Scene) -> dict:
+    """The scene as read, its hash, and the versions that its numbers come from."""
+    return {"scene": scene.name, "hash": scene_hash(scene), "tables": scene_tables(scene),
+            "versions": {"dupin2001-repro": version("dupin2001-repro"), "python": platform.python_version(),
+                         **{name: version(name) for name in PACKAGES}}}
+
+
+def write_json(path: Path, content: dict) -> None:
+    """Write a JSON file; not-a-number is refused."""
+    write_text(path, json.dumps(content, indent=2, allow_nan=False) + "\n")

@@ -1,0 +1,51 @@
+"""The time series as NetCDF with CF conventions (``output.timeseries = "netcdf"``), read back equal to the CSV table.
+
+The time is the simulated one since the start of the run, which has no date: a coordinate in hours without the
+"since ..." of a CF time axis, which would have to invent one.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+
+from repro import results
+from repro.results import names
+from repro.scene import Scene
+
+CONVENTIONS = "CF-1.11"
+PACKAGE = "xarray"  # optional: a scene that asks for it is refused where it is not installed
+TIME = "time_h"
+
+
+def write(path: Path, scene: Scene, rows: list[list]) -> None:
+    """Write ``rows`` (of ``results.COLUMNS``), whole or not at all; what is not modelled is not-a-number."""
+    xarray = import_module(PACKAGE)
+    table = np.array([[np.nan if value is None else value for value in line] for line in rows], dtype=float)
+    columns = dict(zip(results.COLUMNS, table.reshape(len(rows), len(results.COLUMNS)).T))
+    variables = {name: (TIME, column, _attributes(name)) for name, column in columns.items() if name != TIME}
+    content = xarray.Dataset(variables, {TIME: (TIME, columns[TIME], _attributes(TIME))}, _provenance(scene))
+    encoding = {name: {"_FillValue": None if name == TIME else np.nan} for name in columns}
+    beside = path.with_name(f".{path.name}.part")
+    try:
+        content.to_netcdf(beside, engine="scipy", format="NETCDF3_64BIT", encoding=encoding)
+        os.replace(beside, path)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def _attributes(name: str) -> dict[str, str]:
+    return {"long_name": names.words(name), "units": names.udunits(name)}
+
+
+def _provenance(scene: Scene) -> dict[str, str]:
+    """Attributes of the whole file; the scene's tables and the versions as JSON."""
+    found = results.provenance(scene)
+    return {"Conventions": CONVENTIONS, "title": f"Clogging of one pore: {scene.name}",
+            "source": f"dupin2001-repro {found['versions']['dupin2001-repro']}", "scene": scene.name,
+            "scene_hash": found["hash"], "scene_tables": json.dumps(found["tables"]),
+            "versions": json.dumps(found["versions"])}

@@ -1,0 +1,1 @@
+"""A run on the disk: recorder, checkpoint, folder, progress, provenance."""

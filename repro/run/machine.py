@@ -1,0 +1,46 @@
+"""What a run's numbers could depend on, besides its scene: versions, machine, threads."""
+
+from __future__ import annotations
+
+import os
+import platform
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import numpy as np
+import shapely
+
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+OPTIONAL = ("pymetis", "pypardiso")
+
+
+def conditions() -> dict:
+    """For ``run.json``: runs under equal ones are equal bit for bit."""
+    from repro.run.cache import source_hash
+
+    built: Any = np.show_config(mode="dicts")
+    blas = built["Build Dependencies"]["blas"]
+    return {"system": platform.system(), "machine": platform.machine(), "libc": " ".join(platform.libc_ver()),
+            "blas": f"{blas['name']} {blas['version']}", "simd": built["SIMD Extensions"].get("found", []),
+            "geos": shapely.geos_version_string, "source": source_hash(),
+            "optional": {name: found for name in OPTIONAL if (found := _version(name))},
+            "threads": {name: os.environ[name] for name in THREADS if name in os.environ}}
+
+
+def _version(name: str) -> str | None:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None
+
+
+def differences(before: dict, after: dict) -> dict[str, list]:
+    """{key: [before, after]} of what is not the same, keys of tables within dotted."""
+    found: dict[str, list] = {}
+    for key in sorted(before.keys() | after.keys()):
+        one, two = before.get(key), after.get(key)
+        if isinstance(one, dict) and isinstance(two, dict):
+            found |= {f"{key}.{name}": pair for name, pair in differences(one, two).items()}
+        elif one != two:
+            found[key] = [one, two]
+    return found

@@ -1,0 +1,97 @@
+"""What a run says while it runs: a bar on a terminal, a line each tenth elsewhere, JSON for machines, or nothing.
+
+Each is a context that yields what :class:`repro.run.running.Watch` calls ``tell``.
+Warnings go to standard error always.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
+
+from tqdm import tqdm
+
+Tell = Callable[[dict], None]
+
+
+def told(quiet: bool, machine: bool):
+    """The context that suits: for a person, unless asked for quiet or JSON."""
+    if machine:
+        return nullcontext(in_json)
+    if quiet:
+        return nullcontext(only_warnings)
+    return on_a_terminal() if sys.stderr.isatty() else nullcontext(in_tenths())
+
+
+def printable(text: str) -> str:
+    """The text on one line, without what would command a terminal."""
+    return "".join(letter if letter.isprintable() else " " for letter in text)
+
+
+def in_json(event: dict) -> None:
+    """A line of JSON on standard output, while anybody reads it; warnings on standard error too."""
+    try:
+        print(json.dumps(event), flush=True)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    only_warnings(event)
+
+
+def only_warnings(event: dict) -> None:
+    """Nothing but warnings."""
+    if event["event"] == "warning":
+        print(f"repro: warning: {printable(event['message'])}", file=sys.stderr, flush=True)
+
+
+def in_tenths() -> Tell:
+    """A line each tenth of the simulated time, and at the end."""
+    reached = 0
+
+    def tell(event: dict) -> None:
+        nonlocal reached
+        only_warnings(event)
+        _begin_and_end(event, lambda line: print(line, file=sys.stderr, flush=True))
+        if event["event"] == "step":
+            tenth = int(10 * event["time_h"] / event["end_h"] + 1e-9) if event["end_h"] else 0
+            if tenth > reached:
+                reached = tenth
+                print(f"{event['time_h']:g} of {event['end_h']:g} h simulated", file=sys.stderr, flush=True)
+    return tell
+
+
+def _begin_and_end(event: dict, aside: Callable[[str], None]) -> None:
+    """What a person is told when a run goes on, and when it is over."""
+    if event["event"] == "start" and event["from_h"] > 0:
+        aside(f"{printable(event['scene'])}: goes on from t = {event['from_h']:g} h, step {event['step']}")
+    if event["event"] == "end" and not event["status"].startswith(("failed", "interrupted")):
+        before = "" if event["changed"] else ", before this: nothing to do"
+        print(f"{printable(event['scene'])}: {event['status']}{before}; results in {event['folder']}", flush=True)
+
+
+@contextmanager
+def on_a_terminal() -> Iterator[Tell]:
+    """A bar with simulated time, steps, remeshes, contact, and the time that is left."""
+    form = "{desc} {percentage:3.0f}%|{bar}| {n:.1f} of {total:.1f} h [{elapsed} < {remaining}{postfix}]"
+    with tqdm(total=1.0, bar_format=form, dynamic_ncols=True, delay=1e-3) as bar:
+        def tell(event: dict) -> None:
+            if event["event"] == "start":
+                bar.set_description_str(printable(event["scene"]), refresh=False)
+                bar.total, bar.n, bar.initial = event["end_h"] or 1.0, event["from_h"], event["from_h"]
+            elif event["event"] == "step":
+                bar.set_postfix_str(_counts(event), refresh=False)
+                bar.update(event["time_h"] - bar.n)
+            elif event["event"] == "warning":
+                bar.write(f"repro: warning: {printable(event['message'])}", file=sys.stderr)
+            elif event["event"] == "end":
+                bar.close()
+            _begin_and_end(event, lambda line: bar.write(line, file=sys.stderr))
+        yield tell
+
+
+def _counts(event: dict) -> str:
+    """Steps, remeshes and contact in words."""
+    remeshes = f", remeshes {event['remeshes']}" if event["remeshes"] else ""
+    return f"step {event['step']}{remeshes}{', contact' if event['contact'] else ''}"

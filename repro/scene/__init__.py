@@ -1,0 +1,39 @@
+"""What a scene says: its keys, their units, how a file is read, checked and written, and the packaged scenes.
+
+    keys      the dataclasses of a scene: default, unit, range, source of every key
+    units     quantities with units
+    reading   tables of a TOML file into dataclasses, and back
+    rules     what keys ask of each other
+    files     TOML files, packaged scenes, ``--set``
+    text      a scene as a TOML text with every key explained
+    packaged  the packaged scenes
+"""
+
+from repro.scene.files import packaged_scenes
+from repro.scene.keys import (
+    KEYS,
+    OURS,
+    PRESETS,
+    Acceptor,
+    Aggregate,
+    Donor,
+    Flow,
+    Growth,
+    Kinetics,
+    Numerics,
+    Output,
+    Pore,
+    Scene,
+    Substrate,
+    Substrates,
+    load_scene,
+    load_tables,
+    parse_scene,
+    scene_hash,
+    scene_tables,
+)
+from repro.scene.units import SceneError
+
+__all__ = ["KEYS", "OURS", "PRESETS", "Acceptor", "Aggregate", "Donor", "Flow", "Growth", "Kinetics", "Numerics",
+           "Output", "Pore", "Scene", "SceneError", "Substrate", "Substrates", "load_scene", "load_tables", "packaged_scenes",
+           "parse_scene", "scene_hash", "scene_tables"]

@@ -1,0 +1,90 @@
+"""Where the tables of a scene come from: a TOML file, or a packaged one, and the "KEY=VALUE" of --set."""
+import os
+import re
+import tomllib
+from importlib import resources
+from pathlib import Path
+
+from repro.scene.reading import Place, did_you_mean, elsewhere, shown
+from repro.scene.units import SceneError, nearest
+
+LONGEST_LINE = 80  # characters of a line of a file in a message
+BARE = re.compile(r"=\s*[-+.\d][-+.\deE]*\s*[A-Za-z\u00b5\u03bc]")  # a value with a unit, without quotes
+
+
+def packaged_scenes() -> tuple[str, ...]:
+    """The names of the scenes that come with the package."""
+    return tuple(sorted(path.name.removesuffix(".toml") for path in _folder().iterdir() if path.name.endswith(".toml")))
+
+
+def _folder():
+    return resources.files("repro.scene").joinpath("packaged")
+
+
+def read_text(file: str) -> str:
+    """The text of a packaged scene or of a file; SceneError if there is none."""
+    try:
+        return _content(file).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise SceneError(f"{file}: not UTF-8 text (at byte {error.start + 1}); a scene is a TOML file") from None
+
+
+def _content(file: str) -> bytes:
+    names = packaged_scenes()
+    if file in names:
+        return _folder().joinpath(f"{file}.toml").read_bytes()
+    if not os.path.isfile(file):
+        found = "a directory, not" if os.path.isdir(file) else "neither a file nor"
+        hint = did_you_mean(nearest(file, names))
+        raise SceneError(f"{file}: {found} a packaged scene ({', '.join(names)}){hint}")
+    try:
+        return Path(file).read_bytes()
+    except OSError as error:
+        raise SceneError(f"{file}: cannot be read ({error.strerror})") from None
+
+
+def read_tables(file: str) -> dict:
+    """The tables of a packaged scene or of a file; SceneError if it is not TOML."""
+    text = read_text(file)
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise SceneError(f"{file}: not TOML: values nested too deeply; a scene has tables of plain values") from None
+    except ValueError as error:
+        raise SceneError(f"{file}: not TOML: {error}{_line_of(text, str(error))}") from None
+
+
+def _line_of(text: str, message: str) -> str:
+    """The line that the parser's message speaks of, if it does of one."""
+    lines = text.replace("\r\n", "\n").split("\n")
+    found = re.search(r"\(at line (\d+)", message)
+    if found is None:
+        return ""
+    line = lines[int(found[1]) - 1].strip()
+    hint = '; a value with a unit stands in quotes, such as width = "50 um"' if BARE.search(line) else ""
+    return f": {line if len(line) <= LONGEST_LINE else line[:LONGEST_LINE - 3] + '...'}{hint}"
+
+
+def override(tables: dict, entry: str, file: str, known: tuple[str, ...]) -> None:
+    """Set one "KEY=VALUE" in the tables; known: every dotted key."""
+    key, equals, text = entry.partition("=")
+    path = [part.strip() for part in key.split(".")]
+    if not equals or not all(path):
+        hint = did_you_mean(elsewhere(".".join(part for part in path if part)[:60], known))
+        raise SceneError(f'{file}: --set {shown(entry)}: KEY=VALUE is needed, such as pore.width="50 um"{hint}')
+    place = Place(file)
+    for part in path[:-1]:
+        tables, place = tables.setdefault(part, {}), place.below(part)
+        if not isinstance(tables, dict):
+            hint = did_you_mean(place.key if place.key in known else "")
+            raise place.refuse(tables, f"it takes no keys, so that --set {shown(entry)} is not accepted{hint}")
+    tables[path[-1]] = _toml_value(text.strip())
+
+
+def _toml_value(text: str) -> object:
+    """The TOML value that a text is, or the text itself."""
+    try:
+        read = tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError):
+        return text
+    return read["value"] if list(read) == ["value"] else text

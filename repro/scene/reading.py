@@ -1,0 +1,104 @@
+"""Tables of TOML read into the dataclasses of a scene and written out of them, and how a refusal is told.
+
+A refusal is one line that names the file, the key, the value, what is accepted and, where there is one, the nearest
+thing that is.
+"""
+import json
+from collections.abc import Iterator
+from dataclasses import MISSING, Field, dataclass, fields, replace
+
+from repro.scene.units import SceneError, nearest
+
+LONGEST_KEY = 60  # characters of a key in a message
+
+
+@dataclass(frozen=True)
+class Place:
+    """A key of a file, to be named in a message; known: every dotted key that the file may have."""
+
+    file: str
+    key: str = ""
+    known: tuple[str, ...] = ()
+
+    def below(self, key: str) -> "Place":
+        key = key if len(key) <= LONGEST_KEY else key[: LONGEST_KEY - 3] + "..."
+        return replace(self, key=f"{self.key}.{key}" if self.key else key)
+
+    def refuse(self, value: object, wanted: str) -> SceneError:
+        stated = f"{self.key} is missing" if value is MISSING else f"{self.key} = {shown(value)}"
+        return SceneError(f"{self.file}: {stated}: {wanted}")
+
+
+def entries(kind: type) -> dict[str, Field]:
+    """The keys of a section: its fields that are told about."""
+    return {entry.name: entry for entry in fields(kind) if entry.metadata}
+
+
+def dotted(kind: type, above: str = "") -> Iterator[str]:
+    """Every key of a section and of those in it, the sections themselves included."""
+    for key, entry in entries(kind).items():
+        yield above + key
+        if "section" in entry.metadata:
+            yield from dotted(entry.metadata["section"], f"{above}{key}.")
+
+
+def read_table(kind: type, table: object, place: Place, **given):
+    """The dataclass `kind` that a TOML table describes, with `given` for what is no key; SceneError if not accepted."""
+    keys = entries(kind)
+    if not isinstance(table, dict):
+        raise place.refuse(table, f"a table [{place.key}] is needed, with the keys {', '.join(keys)}")
+    for key in table:
+        if key not in keys:
+            raise place.below(key).refuse(table[key], _instead(key, list(keys), place))
+    for key, entry in keys.items():
+        if key not in table and entry.default is MISSING and entry.default_factory is MISSING:
+            raise place.below(key).refuse(MISSING, entry.metadata["kind"].wanted)
+    return kind(**given, **{key: _read_entry(keys[key], table[key], place.below(key)) for key in table})
+
+
+def _read_entry(entry: Field, value: object, place: Place):
+    if "section" in entry.metadata:
+        return read_table(entry.metadata["section"], value, place)
+    kind = entry.metadata["kind"]
+    try:
+        return kind.read(value)
+    except (ValueError, OverflowError):
+        raise place.refuse(value, kind.wanted + did_you_mean(kind.near(value))) from None
+
+
+def write_table(part) -> dict:
+    """The TOML table of a dataclass, with units; what is None is left out."""
+    table = {}
+    for key, entry in entries(type(part)).items():
+        value = getattr(part, key)
+        if value is not None:
+            table[key] = entry.metadata["kind"].write(value) if "kind" in entry.metadata else write_table(value)
+    return table
+
+
+def _instead(key: str, keys: list[str], place: Place) -> str:
+    near = nearest(key, keys) or elsewhere(key, place.known)
+    table = f"[{place.key}]" if place.key else "a scene"
+    return f"there is no such key; {table} takes {', '.join(keys)}{did_you_mean(near)}"
+
+
+def elsewhere(key: str, known: tuple[str, ...]) -> str:
+    """The dotted keys, joined by "or", whose last part, or all of which, may have been meant; "" where there are none.
+    """
+    whole = nearest(key, known) if "." in key else ""
+    last = nearest(key.rpartition(".")[2], [other.rpartition(".")[2] for other in known])
+    return whole or " or ".join(other for other in known if last and other.rpartition(".")[2] == last)
+
+
+def did_you_mean(near: str) -> str:
+    """A hint in brackets; "" where there is nothing near."""
+    return f" (did you mean {near}?)" if near else ""
+
+
+def shown(value: object, longest: int = 60) -> str:
+    """A value as a message quotes it: as TOML would write it, shortened."""
+    try:
+        text = json.dumps(value, ensure_ascii=False, default=str)
+    except (ValueError, RecursionError):  # an integer of thousands of digits, tables nested by the thousand
+        text = type(value).__name__
+    return text if len(text) <= longest else text[: longest - 3] + "..."
