@@ -1,4 +1,4 @@
-"""Numerical failures: each names its stage; :func:`repro.march.coupling.simulate` adds the simulated time."""
+"""Numerical failures: each names its stage; :func:`repro.march.loop.stopping` adds the simulated time."""
 
 
 class StageError(RuntimeError):

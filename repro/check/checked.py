@@ -11,9 +11,8 @@ from repro.check.cost import Cost
 from repro.check.modelled import modelled
 from repro.check.numbers import Number, numbers
 from repro.check.simplifications import Warned, warnings
-from repro.curved import pore as curved
 from repro.errors import SimulationError
-from repro.fem import linear
+from repro.fem.linear import Method
 from repro.march.loop import stopping
 from repro.model import pore
 from repro.scene import Scene
@@ -24,7 +23,7 @@ WIDTH = 110
 
 @dataclass(frozen=True)
 class Checked:
-    """modelled: (section, words); nodes, triangles: of the first mesh; nodes of quadratic triangles are all six."""
+    """modelled: (section, words); nodes, triangles: of the first mesh; a curved triangle has six nodes."""
 
     scene: str
     modelled: list[tuple[str, str]]
@@ -43,13 +42,13 @@ def check(scene: Scene, file: str) -> Checked:
     """Look at a scene before it is run. Raises SceneError, naming ``file``, where its first state or step fails."""
     try:
         with stopping(0.0):
-            linear.use(scene.numerics.solver, scene.numerics.ordering)
-            grid = (curved if scene.numerics.curved else pore).seeded(scene).mesh
-        trial = cost.tried(scene, len(grid.points))
+            Method(scene.numerics.solver, scene.numerics.ordering).checked()
+            mesh = pore.seeded(scene).mesh
+        trial = cost.tried(scene, len(mesh.points))
         flow = trial.first.solved.flow
         found = numbers(scene, flow.mean_velocity if flow else None)
-        return Checked(scene.name, modelled(scene), len(grid.points), len(grid.biomass), found,
-                       warnings(scene, found), cost.expected(scene, trial, len(grid.points)))
+        return Checked(scene.name, modelled(scene), len(mesh.points), len(mesh.biomass), found,
+                       warnings(scene, found), cost.expected(scene, trial, len(mesh.points)))
     except (SimulationError, ArithmeticError) as error:
         raise SceneError(f"{file}: it cannot be run: {error}") from error
 

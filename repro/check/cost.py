@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from time import perf_counter
 
 from repro.check import numbers
-from repro.march.coupling import Instant, PoreEnd
+from repro.march.loop import Instant, PoreEnd
 from repro.march.simulation import simulate
 
 #: A step with what it takes besides the first one: new meshes, and larger ones; and a step in contact, which is one

@@ -11,9 +11,10 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from repro.fem import geometry
+from repro.fem.outline import half_disc
+from repro.fem.sizing import ACROSS_AGGREGATE, meshed_extent
 from repro.model import kinetics
-from repro.model.pore import film
+from repro.model.pore import film, sized
 from repro.model.traction import MPA_PER_UM
 from repro.scene import Substrate
 
@@ -111,8 +112,7 @@ def _transported(scene, speed: float) -> Iterator[Number]:
     for name in ("acceptor", "donor"):
         value = speed * scene.pore.width / getattr(scene.substrates, name).diffusivity
         yield Number(f"Peclet, {name}", value, None, "u W / D, D in water")
-    size = scene.pore.width / geometry.ACROSS_PORE / scene.numerics.refinement
-    yield Number("cell Peclet", 1.5 * speed * size / slowest(scene), None,
+    yield Number("cell Peclet", 1.5 * speed * sized(scene).largest / slowest(scene), None,
                  "1.5 u h / D, h of the largest elements, the smallest D")
 
 
@@ -147,9 +147,9 @@ def _grown(scene, speed: float | None) -> Iterator[Number]:
 
 def half_length(scene) -> float:
     """Half of the part that is meshed at t = 0 (um)."""
-    seed = geometry.seed(scene.aggregate.radius)
+    seed = half_disc(scene.aggregate.radius, ACROSS_AGGREGATE)
     whole = scene.numerics.extent == "full"
-    first, last = geometry.meshed_extent(seed, scene.pore.width, scene.pore.length, whole)
+    first, last = meshed_extent(seed, scene.pore.width, scene.pore.length, whole)
     return (last - first) / 2
 
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from repro.check import numbers
 from repro.check.numbers import Number
-from repro.fem import geometry
-from repro.model.pore import film
+from repro.fem import sizing
+from repro.model.pore import film, resolution
 
 #: (1) has no inertia, whose share of the viscous forces is of the order of the Reynolds number.
 REYNOLDS = 0.1
@@ -83,7 +83,7 @@ def _forces(scene, found: list[Number]) -> Iterator[Warned]:
 
 def _fronts(scene) -> Iterator[Warned]:
     numerics, thickness = scene.numerics, numbers.at_end(scene).thickness
-    size = min(thickness / geometry.ACROSS_AGGREGATE, scene.pore.width / geometry.ACROSS_PORE) / numerics.refinement
+    size = min(thickness / sizing.ACROSS_AGGREGATE, scene.pore.width / sizing.ACROSS_PORE) / resolution(scene)
     nodes = size / numerics.order
     for name, s, rate in numbers.uptakes(scene):
         layer = math.sqrt(s.diffusivity_in_aggregate * s.half_saturation / rate) if rate and s.supply else math.inf
@@ -91,12 +91,12 @@ def _fronts(scene) -> Iterator[Warned]:
             kind = "zero-order front" if s.supply > s.half_saturation else "layer of first-order uptake"
             yield Warned("numerics.refinement", f"the {name} is used up in a {kind} (D K_s / (q X_m))^1/2 = "
                          f"{layer:.2g} um thick, thinner than the {nodes:.2g} um between nodes in the aggregate; "
-                         f"{numerics.refinement * nodes / layer:.2g} would resolve it")
+                         f"{resolution(scene) * nodes / layer:.2g} would resolve it")
 
 
 def _seed_film(scene) -> Iterator[Warned]:
     gap, numerics = scene.pore.width - scene.aggregate.radius, scene.numerics
-    nodes = geometry.ACROSS_FILM * numerics.refinement * min(1.0, gap / film(scene)) * numerics.order
+    nodes = sizing.ACROSS_FILM * resolution(scene) * min(1.0, gap / film(scene)) * numerics.order
     if nodes < ACROSS_FILM:
         yield Warned("aggregate.radius", f"the film over the seed is {gap:.2g} um thin and resolved by {nodes:.2g} "
                      f"distances between nodes, under {ACROSS_FILM:g}: its flow is a matter of the mesh; films are "

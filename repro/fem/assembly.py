@@ -15,6 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from repro.fem import linear
+from repro.fem.linear import DEFAULT, Method
 
 #: Of one kind of element, or of several.
 Parts: TypeAlias = np.ndarray | tuple[np.ndarray, ...]
@@ -45,14 +46,16 @@ class ElementSystem:
     matrices (T, k, k) are asked for, they are as many as the kinds.
     """
 
-    def __init__(self, unknowns: Parts, rank: np.ndarray, held: np.ndarray):
-        self.kinds = _several(unknowns)
+    def __init__(self, unknowns: Parts, rank: np.ndarray, held: np.ndarray, method: Method = DEFAULT):
+        self.kinds, self.method = _several(unknowns), method
         self._ranked = np.argsort(rank, kind="stable")
         place = np.empty(len(rank), int)
         place[self._ranked] = np.arange(len(rank))
         rows, columns = (place[_flat(part)] for part in zip(*map(linear.pairs, self.kinds)))
         keys, self._slot = np.unique(columns * len(rank) + rows, return_inverse=True)
         self._columns, self._rows = np.divmod(keys, len(rank))
+        ends = np.cumsum([part.shape[0] * part.shape[1] ** 2 for part in self.kinds])
+        self._slots = np.split(self._slot, ends[:-1])
         self._hold(held)
 
     def holding(self, held: np.ndarray) -> ElementSystem:
@@ -80,6 +83,16 @@ class ElementSystem:
         found.data = np.bincount(self._slot, _flat(_several(elements)), len(self._rows))[self._kept]
         return found
 
+    def entries(self, which: int, elements: np.ndarray) -> np.ndarray:
+        """Entries of the matrix between all unknowns, in the order of its columns, from one kind of element."""
+        return np.bincount(self._slots[which], elements.ravel(), len(self._rows))
+
+    def filled(self, entries: np.ndarray) -> sp.csc_matrix:
+        """K between the free unknowns from entries as :meth:`entries` gives them."""
+        found = copy(self._pattern)
+        found.data = entries[self._kept]
+        return found
+
     def product(self, elements: Parts, x: np.ndarray) -> np.ndarray:
         """(n,) K x for all unknowns x (n,)."""
         parts = [K @ x[unknowns][:, :, None] for K, unknowns in zip(_several(elements), self.kinds, strict=True)]
@@ -87,7 +100,7 @@ class ElementSystem:
 
     def factored(self, elements: Parts) -> Factored:
         """K, factorised."""
-        return Factored(self, elements, linear.factorised(self.matrix(elements)))
+        return Factored(self, elements, linear.factorised(self.matrix(elements), self.method))
 
     def solve(self, elements: Parts, right: np.ndarray, value: np.ndarray | None = None) -> np.ndarray:
         """x (n,) of K x = b (n,) with the prescribed unknowns as in ``value`` (n,), zero by default."""
@@ -140,7 +153,7 @@ def saddle_blocks(upper: np.ndarray, divergence: np.ndarray, lower: np.ndarray |
 
 
 def saddle_system(velocity: np.ndarray, pressure: np.ndarray, held: np.ndarray,
-                  order: np.ndarray | None = None) -> ElementSystem:
+                  order: np.ndarray | None = None, method: Method = DEFAULT) -> ElementSystem:
     """The system of two components on the same nodes and a pressure on other ones, pressures after their node.
 
     velocity: (T, a) nodes of each component; pressure: (T, b) nodes among the first ones of the velocity's;
@@ -150,7 +163,8 @@ def saddle_system(velocity: np.ndarray, pressure: np.ndarray, held: np.ndarray,
     count = len(held)
     pressures = pressure.max() + 1
     place = np.empty(count)
-    place[linear.node_order(count, velocity) if order is None else order] = np.arange(count)
+    place[linear.node_order(count, velocity, method) if order is None else order] = np.arange(count)
     rank = np.concatenate([place, place, place[:pressures] + 0.5])
     unknowns = np.concatenate([velocity, count + velocity, 2 * count + pressure], axis=1)
-    return ElementSystem(unknowns, rank, np.concatenate([held[:, 0], held[:, 1], np.zeros(pressures, bool)]))
+    both = np.concatenate([held[:, 0], held[:, 1], np.zeros(pressures, bool)])
+    return ElementSystem(unknowns, rank, both, method)

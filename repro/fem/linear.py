@@ -6,12 +6,14 @@ SciPy's default, and safe as long as pressure blocks are negative definite; the 
 where that is not enough the system is factored again with partial pivoting.
 
 Optional packages do the same faster on large meshes: METIS orders nodes by nested dissection (`numerics.ordering`,
-package pymetis), PARDISO factors (`numerics.solver`, package pypardiso).
+package pymetis), PARDISO factors (`numerics.solver`, package pypardiso). Which of them is used is a
+:class:`Method`, which a mesh hands to all that is solved on it.
 """
 
 from __future__ import annotations
 
 from copy import copy
+from dataclasses import dataclass
 from importlib import import_module
 
 import numpy as np
@@ -27,17 +29,24 @@ RESIDUAL, REFINE = 1e-10, 1e-14
 #: The stage that factorising and solving is timed as.
 FLOOR = "factorise and solve"
 
-#: What factors and what orders: set for a run by :func:`use`.
-_chosen = {"solver": "superlu", "ordering": "degree"}
+
+@dataclass(frozen=True)
+class Method:
+    """solver: what factors, "superlu" or "pardiso"; ordering: what orders the nodes, "degree" or "metis"."""
+
+    solver: str = "superlu"
+    ordering: str = "degree"
+
+    def checked(self) -> Method:
+        """Itself. Raises LinearError where a package that it takes is not installed."""
+        for wanted, package in ((self.solver == "pardiso", "pypardiso"), (self.ordering == "metis", "pymetis")):
+            if wanted:
+                _package(package)
+        return self
 
 
-def use(solver: str, ordering: str) -> None:
-    """Choose for what follows: "superlu" or "pardiso", "degree" or "metis". Raises LinearError where the package that
-    it takes is not installed."""
-    for wanted, package in ((solver == "pardiso", "pypardiso"), (ordering == "metis", "pymetis")):
-        if wanted:
-            _package(package)
-    _chosen.update(solver=solver, ordering=ordering)
+#: What needs no optional package.
+DEFAULT = Method()
 
 
 def _package(name: str):
@@ -54,14 +63,14 @@ def pairs(elements: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.repeat(elements, k, axis=1), np.tile(elements, (1, k))
 
 
-def node_order(count: int, elements: np.ndarray) -> np.ndarray:
+def node_order(count: int, elements: np.ndarray, method: Method = DEFAULT) -> np.ndarray:
     """(count,) nodes in a fill-reducing order, from the elements (T, k) that couple them; each node is in one at least.
     """
     k = elements.shape[1]
     rows, columns = (part.ravel() for part in pairs(elements))
     dominant = np.tile((np.ones((k, k)) + k * np.eye(k)).ravel(), len(elements))
     graph = sp.csc_array((dominant, (rows, columns)), shape=(count, count))
-    return (_dissected if _chosen["ordering"] == "metis" else _by_degree)(graph)
+    return (_dissected if method.ordering == "metis" else _by_degree)(graph)
 
 
 def _by_degree(graph) -> np.ndarray:
@@ -103,12 +112,12 @@ class Solver:
     under RESIDUAL.
     """
 
-    def __init__(self, matrix):
+    def __init__(self, matrix, method: Method = DEFAULT):
         self.matrix = matrix if isinstance(matrix, sp.csc_matrix) else sp.csc_matrix(matrix)
         self.magnitude = copy(self.matrix)
         self.magnitude.data = np.abs(self.matrix.data)
-        fast = _chosen["solver"] == "pardiso"
-        self.factor = _Pardiso(self.matrix) if fast else self._factor("NATURAL", 0.0, True)
+        pardiso = method.solver == "pardiso"
+        self.factor = _Pardiso(self.matrix) if pardiso else self._factor("NATURAL", 0.0, True)
         self.pivoted = False
 
     def _factor(self, column_order: str, threshold: float, symmetric: bool):
@@ -143,11 +152,6 @@ class Solver:
 
 
 @timed(FLOOR)
-def factorised(matrix) -> Solver:
+def factorised(matrix, method: Method = DEFAULT) -> Solver:
     """A matrix, ready for right-hand sides."""
-    return Solver(matrix)
-
-
-def solve(matrix, right: np.ndarray) -> np.ndarray:
-    """Solve one system once."""
-    return factorised(matrix).solve(right)
+    return Solver(matrix, method)

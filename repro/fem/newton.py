@@ -1,4 +1,4 @@
-"""The derivative in Newton's method: factorised anew for every step, or used again while it still does enough.
+"""Newton's method: one driver, full or modified (the derivative of an earlier iterate is kept).
 
 With the derivative of an earlier iterate the defect falls by about the same factor in every step, instead of by its
 square: cheaper by far on a large mesh, where factorising is what a step costs.
@@ -7,21 +7,69 @@ square: cheaper by far on a large mesh, where factorising is what a step costs.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Protocol, TypeVar
 
-#: A factorisation is used again where the last step with it left no more than this part of the defect.
+import numpy as np
+
+from repro.fem.assembly import Factored
+
+#: Modified Newton: a factorisation is kept while each step cuts the defect to this part or less.
 ENOUGH = 0.01
+#: Where round-off keeps the defect from falling: the least fall of a step that still counts.
+STALLED = 0.1
 
 
-@dataclass(eq=False)
-class Jacobian:
-    """The derivative in one solution by Newton's method. reused: is it used again? factors: it, factorised."""
+class Iterate(Protocol):
+    """An iterate with what is known of it."""
 
-    reused: bool
-    factors: Any = None
-    _defect: float = 0.0
+    @property
+    def defect(self) -> float:
+        """Largest residual of a row over the size of its terms."""
 
-    def stale(self, defect: float) -> bool:
-        """At an iterate with a relative defect: must the derivative be factorised anew?"""
-        last, self._defect = self._defect, defect
-        return self.factors is None or not self.reused or defect > ENOUGH * last
+    @property
+    def complete(self) -> bool:
+        """Does it meet its constraints?"""
+
+
+It = TypeVar("It", bound=Iterate)
+
+
+class System(Protocol[It]):
+    """What the driver asks of a system of equations."""
+
+    def factored(self, iterate: It) -> Factored:
+        """The derivative at an iterate, factorised."""
+
+    def advanced(self, iterate: It, factors: Factored, fresh: bool) -> It:
+        """The next iterate; fresh: the derivative is that of this iterate."""
+
+
+@dataclass(frozen=True)
+class Newton:
+    """tolerance: of the defect; round_off: a defect that is enough where it does not fall any more; most: iterations;
+    reused: is the derivative kept while it does enough?"""
+
+    tolerance: float
+    round_off: float
+    most: int
+    reused: bool = False
+
+    def solve(self, system: System[It], iterate: It) -> tuple[It, int, bool]:
+        """The last iterate, how many steps led to it, and whether it has converged."""
+        factors, last = None, np.inf
+        for count in range(self.most):
+            defect = iterate.defect
+            stalled = STALLED * last < defect <= self.round_off
+            if iterate.complete and (defect <= self.tolerance or stalled):
+                return iterate, count, True
+            fresh = factors is None or not self.reused or defect > ENOUGH * last
+            if fresh:
+                factors = system.factored(iterate)
+            last = defect
+            iterate = system.advanced(iterate, factors, fresh)
+        return iterate, self.most, False
+
+
+def relative(residual: np.ndarray, size: np.ndarray) -> float:
+    """Largest residual against the size of its row's terms."""
+    return float(np.max(np.abs(residual) / np.maximum(size, np.finfo(float).tiny), initial=0.0))

@@ -5,14 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 
 from repro.errors import SimulationError, StageError
-from repro.fem import geometry
+from repro.fem.mesh import Mesh
+from repro.fem.sizing import ACROSS_PORE
 from repro.march.pace import Pace
-from repro.model.pore import Solved
+from repro.model.growth import Body
+from repro.model.pore import Pore, Solved, seeded, solve
+from repro.model.transport import Concentrations
+from repro.scene import Scene
+
+Data = TypeVar("Data", Pore, Mesh, Body, Concentrations)
 
 #: A step of the grid this close (h) to a reported time is that time.
 SAME_TIME = 1e-9
@@ -41,9 +47,9 @@ class Instant:
     and where the step that follows cannot be made; ledgers, remeshes, iterations: of the steps since the last instant.
     """
 
-    pore: Any
+    pore: Pore
     solved: Solved
-    before: tuple[Any, Solved] | None
+    before: tuple[Pore, Solved] | None
     ledgers: tuple[Ledger, ...]
     remeshes: int
     iterations: dict[str, int]
@@ -53,8 +59,8 @@ class Instant:
 class Step:
     """What one step made: the new pore, the pore and its solution before it expanded, the ledger, and counts."""
 
-    pore: Any
-    before: tuple[Any, Solved] | None
+    pore: Pore
+    before: tuple[Pore, Solved] | None
     ledger: Ledger
     remeshed: bool
     iterations: int
@@ -68,7 +74,7 @@ class State:
     ledgers, remeshes, iterations: of the steps since the last Instant.
     """
 
-    pore: Any
+    pore: Pore
     pace: Pace
     ledgers: tuple[Ledger, ...] = ()
     remeshes: int = 0
@@ -77,17 +83,15 @@ class State:
 
 @dataclass(frozen=True)
 class Scheme:
-    """What the loop needs of a scheme, each called with the scene first.
+    """What the loop needs of a way to make steps.
 
-    seeded(): the pore at t = 0; solve(pore): what is solved in it; times(): at which steps must end, h, ascending;
-    advance(pore, solved, time, pace): one step to that time or on the way there, as (Step, what is solved after it,
-    pace of the next); first: length of the first step that is tried, in parts of growth.time_step.
+    times(scene): at which steps must end, h, ascending; advance(scene, pore, solved, time, pace): one step to that time
+    or on the way there, as (Step, what is solved after it, pace of the next); first: length of the first step that is
+    tried, in parts of growth.time_step.
     """
 
-    seeded: Callable[..., Any]
-    solve: Callable[..., Solved]
-    times: Callable[..., list[float]]
-    advance: Callable[..., tuple[Step, Solved, Pace]]
+    times: Callable[[Scene], list[float]]
+    advance: Callable[[Scene, Pore, Solved, float, Pace], tuple[Step, Solved, Pace]]
     first: float = 1.0
 
 
@@ -95,7 +99,7 @@ class PoreEnd(Exception):
     """The aggregate has reached an end of the pore: the run is over."""
 
 
-def steps(scene, scheme: Scheme, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
+def steps(scene: Scene, scheme: Scheme, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
     """Every step of a run from t = 0, or after ``state``, with the Instant where its time is reported.
 
     Raises SimulationError where a stage fails, and PoreEnd, after a last Instant, where the aggregate reaches an end of
@@ -104,8 +108,8 @@ def steps(scene, scheme: Scheme, state: State | None = None) -> Iterator[tuple[S
     first = state is None
     with stopping(state.pore.time if state else 0.0):
         first_step = scheme.first * scene.growth.time_step if scene.growth else 0.0
-        state = state or State(laid_out(scheme.seeded(scene)), Pace(first_step))
-        solved = scheme.solve(scene, state.pore)
+        state = state or State(laid_out(seeded(scene)), Pace(first_step))
+        solved = solve(scene, state.pore)
     now = replace(state.pore, concentrations=solved.concentrations)
     if first:
         yield state, Instant(now, solved, None, (), 0, newton_counts(solved))
@@ -137,12 +141,12 @@ def _after(state: State, taken: Step, solved: Solved, pace: Pace) -> State:
     return State(taken.pore, pace, (*state.ledgers, taken.ledger), state.remeshes + taken.remeshed, counts)
 
 
-def _wanted(scene, time: float) -> bool:
+def _wanted(scene: Scene, time: float) -> bool:
     """Is a step's end reported? Steps end at ``output.times`` to the last bit."""
     return scene.output.times is None or time in scene.output.times
 
 
-def instant(state: State, now, solved: Solved, before) -> Instant:
+def instant(state: State, now: Pore, solved: Solved, before: tuple[Pore, Solved] | None) -> Instant:
     """The Instant that reports the steps of a state."""
     return Instant(now, solved, before, state.ledgers, state.remeshes, state.iterations)
 
@@ -152,14 +156,17 @@ def reported(state: State) -> State:
     return State(state.pore, state.pace)
 
 
-def laid_out(pore):
+def laid_out(pore: Pore) -> Pore:
     """The same pore, none of its arrays a strided view: sums over those may differ in the last bit from sums over the
     copies that a checkpoint gives back."""
-    state = pore.concentrations
-    return replace(_flat(pore), mesh=_flat(pore.mesh), concentrations=state and _flat(state))
+    state, mesh, body = pore.concentrations, _flat(pore.mesh), _flat(pore.body)
+    found = replace(_flat(pore), concentrations=state and _flat(state))
+    if body is not pore.body:
+        found = replace(found, body=body)
+    return found if mesh is pore.mesh else replace(found, space=replace(pore.space, mesh=mesh))
 
 
-def _flat(data):
+def _flat(data: Data) -> Data:
     """A dataclass with its strided arrays copied; itself where there are none."""
     arrays = {each.name: getattr(data, each.name) for each in fields(data) if each.init}
     strided = {name: np.ascontiguousarray(array) for name, array in arrays.items()
@@ -192,17 +199,17 @@ def added(*counts: dict[str, int]) -> dict[str, int]:
     return {key: sum(count.get(key, 0) for count in counts) for key in sorted(keys)}
 
 
-def pore_end(scene, now, elements: float) -> str:
+def pore_end(scene: Scene, now: Pore, elements: float) -> str:
     """Which end of the pore the aggregate has reached, to so many elements of the fluid; empty while it has not."""
     outline, end = now.outline, scene.pore.length / 2
-    near = elements * scene.pore.width / geometry.ACROSS_PORE
+    near = elements * scene.pore.width / ACROSS_PORE
     if outline.upstream < near - end or outline.downstream > end - near:
         side = "upstream" if outline.upstream < near - end else "downstream"
         return f"the aggregate reaches the pore's {side} end"
     return ""
 
 
-def refuse_end(scene, now) -> None:
+def refuse_end(scene: Scene, now: Pore) -> None:
     """Raises PoreEnd where the aggregate has reached an end of the pore."""
     if over := pore_end(scene, now, 1.0):
         raise PoreEnd(f"{over} at t = {now.time:g} h")

@@ -1,69 +1,154 @@
-"""One step of the midpoint rule with linear elements: see :mod:`repro.march.stepping`."""
+"""One step of the midpoint rule, second order in time: see :mod:`repro.march.stepping`.
+
+Half a step with the rates of its start gives the shape half way. There the substrates are solved with the *mean*
+biomass of the step, that which the very rates make that are found: M (e^z - 1) / z of a mass M that grows by e^z. These
+rates carry (9)-(10) over the whole step. So what is taken up and what is made in a step are one integral, and both
+balances close to round-off.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from repro.fem import reprojection
-from repro.march.coupling import Attempt, Ledger, PoreEnd, Step, increase, mass_of, pore_end, rates_of
-from repro.model import kinetics, remeshing, shape
-from repro.model.pore import Pore, Solved, seeded, solve
+from repro.fem import transfer
+from repro.fem.space import Space
+from repro.march.loop import Ledger, PoreEnd, Step, pore_end
+from repro.march.updates import enlarged, grown, rates_of
+from repro.model import biomass, contact, pore, remeshing
+from repro.model.biomass import Rates
+from repro.model.pore import Pore, Solved
+from repro.model.transport import Concentrations
+from repro.scene import Scene
 
-__all__ = ["attempt", "seeded", "solve"]
+
+@dataclass(frozen=True, eq=False)
+class Attempt:
+    """A step of the midpoint rule that may be taken: what it makes, None where the rates change more than is allowed;
+    their mean change over its first half, 1/h; and, where it first makes contact with the opposite wall, the least
+    distance (um) to that before and after the step, and the film's least thickness."""
+
+    step: Step | None
+    change: float
+    gaps: tuple[float, float, float] | None
 
 
-def attempt(scene, now: Pore, solved: Solved, duration: float, most: float = np.inf) -> Attempt:
+@dataclass(frozen=True, eq=False)
+class Halfway:
+    """What half a step has found.
+
+    shape: the aggregate half way, with the fluid's nodes where they were; solved: flow and substrates there; rates: at
+    the points of the mesh at the start; made: growth of active and of inert biomass over the whole step, um2 mg/L.
+    """
+
+    shape: Pore
+    solved: Solved
+    rates: Rates
+    made: tuple[float, float]
+
+
+def attempt(scene: Scene, now: Pore, solved: Solved, duration: float, most: float = np.inf) -> Attempt:
     """A step of ``duration`` (h), if the rates change by no more than ``most`` (1/h) over its first half. Raises
     StageError where it cannot be made."""
-    first = rates_of(scene, solved.concentrations)
-    half, rates = half_way(scene, now, solved, first, duration)
-    weight = now.mesh.lumped(now.mesh.biomass)
-    change = float(weight @ np.abs(rates[0] + rates[1] - first[0] - first[1]) / weight.sum())
+    first = rates_of(scene, now, solved.concentrations)
+    half = halfway(scene, now, solved, first, duration)
+    change = biomass.change(first, half.rates, now.space.reaction.dx)
     if change > most:
         return Attempt(None, change, None)
-    grown = _grown(now, rates, duration)
-    expanded, iterations, gap = _expanded(scene, now, grown)
+    after = _matched(now, grown(now, half.rates, duration), half.made)
+    expanded, iterations, gap = contact.expand(scene, after, enlarged(scene, now, after), _ahead(now, half.shape))
     if leaves := pore_end(scene, expanded, 0.1):
         raise PoreEnd(f"{leaves} in the step from t = {now.time:g} h")
-    same = len(half.concentrations.acceptor) == len(now.mesh.points)
-    carried = half if same else solved
-    after, remeshed = remeshing.new_mesh(scene, now, expanded, replace(carried, flow=solved.flow))
-    made = float(np.sum(weight * (grown.active + grown.inert - now.active - now.inert)))
-    flows = {key: tuple(duration * getattr(flux, key) for flux in half.fluxes)
-             for key in ("supplied", "out", "consumed")}
-    ledger = Ledger(now.time, now.time + duration, **flows, stored=(0.0, 0.0), biomass_before=mass_of(now),
-                    biomass_made=made, biomass_after=mass_of(after))
-    return Attempt(Step(after, (now, solved), ledger, remeshed, iterations), change,
+    guess = _extrapolated(solved.concentrations, half.solved.concentrations)
+    new, remeshed = remeshing.new_mesh(scene, now, replace(expanded, concentrations=guess), _speed(solved))
+    supplied, out, consumed = (tuple(duration * getattr(flux, key) for flux in half.solved.fluxes)
+                               for key in ("supplied", "out", "consumed"))
+    ledger = Ledger(now.time, now.time + duration, supplied, out, consumed, (0.0, 0.0), now.mass,
+                    after.mass - now.mass, new.mass)
+    return Attempt(Step(new, (now, solved), ledger, remeshed, iterations), change,
                    first_contact(scene, now, expanded, gap))
 
 
-def half_way(scene, now: Pore, solved: Solved, first, duration: float):
-    """What is solved in the shape that half the step makes with the rates of its start, and the rates there at the
-    nodes of the present mesh: where a new mesh had to be made they are carried back to the material's nodes."""
-    moved, _, _ = _expanded(scene, now, _grown(now, first, duration / 2))
-    there, remeshed = remeshing.new_mesh(scene, now, moved, solved)
-    found = solve(scene, there)
-    rates = rates_of(scene, found.concentrations)
-    if not remeshed:
-        return found, rates
-    back, nodes = np.zeros((len(now.mesh.points), 2)), now.mesh.body
-    back[nodes] = reprojection.interpolate(there.mesh.points, there.mesh.triangles[there.mesh.biomass],
-                                           np.column_stack(rates), moved.mesh.points[nodes])
-    return found, tuple(back.T)
+def halfway(scene: Scene, now: Pore, solved: Solved, first: Rates, duration: float) -> Halfway:
+    """Solve in the shape that half of ``duration`` (h) makes with the rates of its start. Where the moved mesh is not
+    acceptable a new one is made: masses go to its points, and the rates back to those of the material."""
+    ahead = grown(now, first, duration / 2)
+    shape, _, _ = contact.expand(scene, ahead, enlarged(scene, now, ahead), _scaled(now, ahead))
+    mesh = remeshing.followed(scene, now, shape)
+    if mesh is not None:
+        there = replace(now, space=Space(mesh, now.space.order))
+    else:
+        there, (active, inert) = remeshing.remesh(scene, now, shape, _speed(solved), (now.active, now.inert))
+        there = replace(there, active=active, inert=inert)
+    found = pore.solve(scene, there, duration)
+    rates = rates_of(scene, there, found.concentrations)
+    after = grown(there, rates, duration)
+    if mesh is None:
+        rates = _carried_back(there, shape, rates)
+    made = float((after.active - there.active).sum()), float((after.inert - there.inert).sum())
+    return Halfway(shape, found, rates, made)
 
 
-def _grown(now: Pore, rates, duration: float) -> Pore:
-    active, inert = kinetics.grow(now.active, now.inert, rates[0], rates[1], duration)
-    return replace(now, active=active, inert=inert)
+def _speed(solved: Solved) -> float:
+    """Mean velocity, um/h; zero without flow."""
+    return solved.flow.mean_velocity if solved.flow else 0.0
 
 
-def _expanded(scene, now: Pore, grown: Pore) -> tuple[Pore, int, float]:
-    return shape.expand(scene, grown, now.theta * (1 + increase(now, grown) / scene.kinetics.maximum_density))
+def _carried_back(there: Pore, shape: Pore, rates: Rates) -> Rates:
+    """Rates in the points of a new mesh, interpolated to the material's points of the mesh before."""
+    mesh, body = there.mesh, shape.mesh.body
+    nodal = np.column_stack([biomass.at_nodes(there.space, field) for field in (rates.growth, rates.remains)])
+    found = np.zeros((len(shape.mesh.points), 2))
+    found[body] = transfer.interpolate(mesh.points, mesh.cells[mesh.biomass], nodal, shape.mesh.points[body])
+    growth, remains = (biomass.at_points(shape.space, column) for column in found.T)
+    return Rates(growth, remains)
 
 
-def first_contact(scene, now, expanded, gap: float) -> tuple[float, float, float] | None:
+def _matched(now: Pore, after: Pore, made: tuple[float, float]) -> Pore:
+    """The pore with what was made half way, to the last bit: what an interpolation of the rates has lost or added is
+    spread over the active biomass as that is."""
+    share = now.active / now.active.sum()
+    lacking = [wanted - float((new - old).sum()) for wanted, new, old in
+               zip(made, (after.active, after.inert), (now.active, now.inert))]
+    return replace(after, active=after.active + lacking[0] * share, inert=after.inert + lacking[1] * share)
+
+
+def _extrapolated(start: Concentrations, half: Concentrations) -> Concentrations:
+    """A first guess of the substrates at the end: as much change again as the first half of the step has made. Where
+    that takes one below zero, what they are half way; where the mesh there is another, what they are at the start."""
+    if len(half.acceptor) != len(start.acceptor):
+        return start
+    acceptor, donor = 2 * half.acceptor - start.acceptor, 2 * half.donor - start.donor
+    return replace(start, acceptor=acceptor, donor=donor) if min(acceptor.min(), donor.min()) >= 0 else half
+
+
+def _scaled(now: Pore, after: Pore) -> Pore:
+    """A first guess of the shape: all lengths grow alike, while the aggregate is free."""
+    if now.contact:
+        return after
+    fixed = now.outline.points[now.fixed][:1]
+    return _placed(after, fixed + (now.mesh.points - fixed) * np.sqrt(after.mass / now.mass))
+
+
+def _ahead(now: Pore, half: Pore) -> Pore:
+    """A first guess of the shape: as much again as half the step has made, while contact stays as it is."""
+    if (half.wall != now.wall).any():
+        return now
+    push = 2 * half.pressure - now.pressure
+    return _placed(replace(now, pressure=push), 2 * half.mesh.points - now.mesh.points)
+
+
+def _placed(after: Pore, points: np.ndarray) -> Pore:
+    """The pore with its aggregate's nodes at guessed places, unless they turn a triangle over."""
+    guess, body = after.mesh.points.copy(), after.mesh.body
+    guess[body] = points[body]
+    moved = after.moved(guess)
+    biomass_cells = np.flatnonzero(moved.mesh.biomass)
+    return after if moved.mesh.turned_over(biomass_cells).any() else moved
+
+
+def first_contact(scene: Scene, now: Pore, expanded: Pore, gap: float) -> tuple[float, float, float] | None:
     """Least distance to the opposite wall before and after a step that makes contact, and the film's least thickness;
     None where contact is not made, or was there before."""
     if now.contact or not expanded.contact:

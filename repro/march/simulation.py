@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from repro.fem import linear
-from repro.march import coupling, stepping
+from repro.fem.linear import Method
+from repro.march import stepping, updates
 from repro.march.loop import Instant, State
+from repro.scene import Scene
+
+#: Ways to make steps, by the names that scenes have for them.
+WAYS = {"updates": updates.steps, "midpoint": stepping.steps}
 
 
-def simulate(scene, state: State | None = None) -> Iterator[Instant]:
+def simulate(scene: Scene, state: State | None = None) -> Iterator[Instant]:
     """Yields an Instant at t = 0 and at each reported time: at ``output.times``, or after every step.
 
     state: one of :func:`steps`, after which to go on. Raises SimulationError where a stage fails, and PoreEnd, after a
@@ -18,7 +22,7 @@ def simulate(scene, state: State | None = None) -> Iterator[Instant]:
     return (instant for _, instant in steps(scene, state) if instant)
 
 
-def steps(scene, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
+def steps(scene: Scene, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
     """Every step, t = 0 first: the state from which a run goes on bit for bit, and the Instant where one is due."""
-    linear.use(scene.numerics.solver, scene.numerics.ordering)
-    return (stepping if scene.numerics.time == "midpoint" else coupling).steps(scene, state)
+    Method(scene.numerics.solver, scene.numerics.ordering).checked()
+    return WAYS[scene.numerics.time](scene, state)

@@ -13,13 +13,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from repro.curved import coupling as curved
 from repro.errors import StageError
 from repro.march import loop, midpoint
-from repro.march.coupling import Attempt
 from repro.march.loop import SAME_TIME, Instant, PoreEnd, Scheme, State, Step, laid_out
 from repro.march.pace import EXCESS, STRETCH, Pace, allowed, fitted, following
-from repro.model.pore import Solved
+from repro.model import pore
+from repro.model.pore import Pore, Solved
+from repro.scene import Scene
 
 #: The first step that is tried, in parts of growth.time_step; one that fails or errs too much is tried again, shorter,
 #: until it is SHORTEST parts.
@@ -28,36 +28,35 @@ FIRST, SHORTEST = 8.0, 1e-3
 LANDED = 0.995
 
 
-def steps(scene, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
+def steps(scene: Scene, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
     """:func:`repro.march.loop.steps` of the midpoint rule; without ``output.times`` every step is reported."""
-    scheme = curved if scene.numerics.curved else midpoint
 
     def advance(*now) -> tuple[Step, Solved, Pace]:
-        taken, solved, pace = _advance(scheme, *now)
+        taken, solved, pace = _advance(*now)
         return replace(taken, before=None), solved, pace
 
-    return loop.steps(scene, Scheme(scheme.seeded, scheme.solve, _targets, advance, FIRST), state)
+    return loop.steps(scene, Scheme(_targets, advance, FIRST), state)
 
 
-def _targets(scene) -> list[float]:
+def _targets(scene: Scene) -> list[float]:
     """Times (h) at which a step must end."""
     return sorted({time for time in scene.output.times or () if time > 0} | {scene.growth.end})
 
 
-def _advance(scheme, scene, now, solved, time: float, asked: Pace):
+def _advance(scene: Scene, now: Pore, solved: Solved, time: float, asked: Pace) -> tuple[Step, Solved, Pace]:
     """The first step that is good enough, what is solved after it, and the pace of the next."""
     tolerance, shortest, length = scene.numerics.tolerance, SHORTEST * scene.growth.time_step, asked.length
     duration = fitted(length, time - now.time, STRETCH)
     while True:
         most = np.inf if duration <= shortest else EXCESS * tolerance / duration
         try:
-            found = scheme.attempt(scene, now, solved, duration, most)
+            found = midpoint.attempt(scene, now, solved, duration, most)
             estimate = found.change * duration
             if found.step and (duration <= shortest or not _overshoots(found)):
                 taken = _ending_at(found.step, now.time + duration, time)
                 contact = found.gaps is not None  # that alone made the step short
                 pace = asked if contact else following(replace(asked, length=length), duration, estimate, tolerance)
-                return taken, scheme.solve(scene, taken.pore), pace
+                return taken, pore.solve(scene, taken.pore), pace
             length = duration * (_to_contact(found.gaps) if found.step else allowed(estimate, tolerance))
         except (PoreEnd, StageError, FloatingPointError):
             if duration <= shortest:
@@ -66,7 +65,7 @@ def _advance(scheme, scene, now, solved, time: float, asked: Pace):
         duration = fitted(length, time - now.time)
 
 
-def _overshoots(found: Attempt) -> bool:
+def _overshoots(found: midpoint.Attempt) -> bool:
     """Does the step end with a film much thinner than it may be, when contact is first made?"""
     return found.gaps is not None and found.gaps[1] < LANDED * found.gaps[2]
 

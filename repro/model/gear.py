@@ -10,8 +10,8 @@ For C_A and C_D, (7) and (8), the corrector is one linear system each,
 
     M (C - C_n - carry dC_n) / (weight h) + L C - b + m X_A (q(C*) + q'(C*) (C - C*)) = 0
 
-with M the lumped area, L and b of :mod:`repro.model.transport`, m the lumped area of biomass and X_A predicted. The uptake q
-is linearised in the substrate's own concentration; the acceptor sees the predicted donor, the donor the corrected
+with M the mass matrix (lumped for linear concentrations), L and b of :mod:`repro.model.transport`, and the uptake in
+the points of the reaction with X_A predicted; q is linearised in the substrate's own concentration; the acceptor sees the predicted donor, the donor the corrected
 acceptor. (9) advances ln X_A and (10) X_I at the corrected concentrations: both stay positive. Fluxes are integrated by
 the formula of the concentrations that they change, so that supplied - out - consumed = stored to round-off. Where the
 corrector gives a negative concentration, the step is backward Euler's with the sink C q(C*) / C*, which keeps C >= 0.
@@ -22,14 +22,18 @@ Steps are controlled by |C - C*| within the aggregate (3.3.2), relative to the s
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 
 from repro.errors import TransportError
 from repro.fem import linear
+from repro.fem.assembly import ElementSystem, each
+from repro.fem.space import Space
 from repro.model import kinetics as law
-from repro.model.transport import Concentrations, Operator, Problem, supplied_everywhere
+from repro.model.kinetics import Sink
+from repro.model.transport import Concentrations, Problem, both_ends, supplied_everywhere
 from repro.timing import timed
 
 #: Largest accepted |C - C*| in the aggregate over the supply. Measured against a tolerance of 3e-6, 12 min from settled
@@ -47,20 +51,23 @@ SETTLED, LONG, SETTLING, FASTER, MOST_STEPS = 1e-9, 1e6, 0.3, 10.0, 1000
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """State (4, N): C_A, C_D (mg/L), rise of ln X_A since the start, X_I (mg/L); flows (2, 3): each substrate supplied,
-    out and consumed since the start (um2 mg/L); their increments in the last step, and its size (h)."""
+    """One time level: fields (2, n) C_A, C_D (mg/L); biomass (2, r, q): rise of ln X_A since the start, and X_I (um2
+    mg/L); flows (2, 3): each substrate supplied, out and consumed since the start (um2 mg/L); the increments of all
+    three in the last step, and its size (h)."""
 
-    state: np.ndarray
+    fields: np.ndarray
+    biomass: np.ndarray
     flows: np.ndarray
-    rise: np.ndarray
-    flow: np.ndarray
+    field_rise: np.ndarray
+    biomass_rise: np.ndarray
+    flow_rise: np.ndarray
     step: float = np.inf
 
 
 @dataclass(frozen=True, eq=False)
 class Advance:
-    """X_A, X_I and concentrations (mg/L) at the end; flows: (acceptor, donor) pairs supplied, out, consumed, stored in
-    um2 mg/L; steps: sizes of the steps taken (h)."""
+    """X_A, X_I (r, q) um2 mg/L and concentrations (mg/L) at the end; flows: (acceptor, donor) pairs supplied, out,
+    consumed, stored in um2 mg/L; steps: sizes of the steps taken (h)."""
 
     active: np.ndarray
     inert: np.ndarray
@@ -71,36 +78,89 @@ class Advance:
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """One substrate's operator, nodes in elimination order: ``matrix`` with zero rows where C is held, the places of
-    its diagonal in ``matrix.data``, and those rows as they were."""
+    """One substrate's equations: entries of its operator and of the mass matrix, in the order of the system's columns,
+    and both as matrices."""
 
+    operator: np.ndarray
+    storage: np.ndarray
     matrix: sp.csc_matrix
-    diagonal: np.ndarray
-    held: np.ndarray
-    held_rows: sp.csr_matrix
+    mass: sp.csc_matrix
     source: np.ndarray
-    operator: Operator
-    outflow: np.ndarray
+    supply: float
 
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """What the scheme needs, nodes in elimination order: watched (N,) nodes of the step control; scale (2, 1) of the
-    concentrations; living: are F3 and F4 integrated; simultaneous: see :func:`advance`."""
+    """What the scheme needs: active: (r, q) um2 mg/L at the start; watched: (n,) nodes of the step control; scale:
+    (2, 1) of the concentrations; living: are F3 and F4 integrated; simultaneous: see :func:`advance`."""
 
     problem: Problem
-    rows: tuple[Row, Row]
-    body: np.ndarray
-    total: np.ndarray
     active: np.ndarray
     watched: np.ndarray
     scale: np.ndarray
     living: bool
     simultaneous: bool = False
 
+    @property
+    def space(self) -> Space:
+        """Of the problem."""
+        return self.problem.space
+
+    @cached_property
+    def sparse(self) -> ElementSystem:
+        """One substrate's unknowns: all triangles, then the pieces of biomass."""
+        held = bool(self.problem.system.held.any())
+        return self.space.mesh.topology.system(("gear", self.space.order, held), lambda: _sparse(self.space, held))
+
+    @cached_property
+    def storage(self) -> np.ndarray:
+        """(T, k, k) um2, the mass matrix; lumped for linear functions."""
+        space = self.space
+        if space.order > 1:
+            return space.mass(space.at.dx)
+        return each(space.mesh.areas / 3, np.eye(3)[None])
+
+    @cached_property
+    def rows(self) -> tuple[Row, Row]:
+        """Of acceptor and donor."""
+        acceptor, donor = (self._row(s) for s in (0, 1))
+        return acceptor, donor
+
+    def _row(self, s: int) -> Row:
+        problem, system, count = self.problem, self.sparse, self.space.count
+        operator, storage = system.entries(0, problem.matrices[s]), system.entries(0, self.storage)
+        matrices = problem.operator[s * count: s * count + count, s * count: s * count + count], self.mass
+        return Row(operator, storage, *matrices, problem.source[s * count: s * count + count], problem.both[s].supply)
+
+    @cached_property
+    def mass(self) -> sp.csc_matrix:
+        """(n, n) um2, of :attr:`storage`."""
+        cells, size = self.space.cells, self.space.count
+        k = cells.shape[1]
+        rows, columns = np.repeat(cells, k, axis=1).ravel(), np.tile(cells, (1, k)).ravel()
+        return sp.csc_matrix((self.storage.ravel(), (rows, columns)), shape=(size, size))
+
+    def at(self, fields: np.ndarray) -> np.ndarray:
+        """(2, r, q) concentrations (2, n) in the points of the reaction."""
+        pieces = self.space.reaction
+        return fields[:, pieces.cells] @ pieces.values.T
+
+    def taken(self, loads: np.ndarray) -> np.ndarray:
+        """(n,) sum of loads (r, q) times the nodal functions."""
+        pieces = self.space.reaction
+        return np.bincount(pieces.cells.ravel(), (loads @ pieces.values).ravel(), self.space.count)
+
+
+def _sparse(space: Space, held_ends: bool) -> ElementSystem:
+    place = np.empty(space.count)
+    place[space.dofs.elimination] = np.arange(space.count)
+    held = np.zeros(space.count, bool)
+    held[both_ends(space)] = held_ends
+    return ElementSystem((space.cells, space.reaction.cells), place, held, space.mesh.topology.method)
+
 
 @timed("transport")
-def settle(problem: Problem, active: np.ndarray | None, guess: Concentrations | None) -> Concentrations:
+def settle(problem: Problem, sink: Sink | None, guess: Concentrations | None) -> Concentrations:
     """Profiles consistent with the biomass after a shape update: the scheme with F3 = F4 = 0 until nothing changes.
 
     The way there does not matter (3.3.2): backward Euler in steps that rise to LONG as fast as SETTLING permits. Where
@@ -108,18 +168,18 @@ def settle(problem: Problem, active: np.ndarray | None, guess: Concentrations | 
     Raises TransportError where the profiles do not come to rest.
     """
     start = supplied_everywhere(problem) if guess is None else guess
-    if not any(operator.inflow.any() or len(operator.held) for operator in problem.both):
+    if not (problem.inflow.any() or problem.system.held.any()):
         return start
-    nothing = np.zeros(len(problem.body))
-    system, now = _started(problem, nothing if active is None else active, nothing, start, living=False)
-    system = replace(system, watched=np.ones(len(nothing), bool))
+    nothing = np.zeros_like(problem.space.reaction.dx)
+    system, now = _started(problem, nothing if sink is None else sink.active, nothing, start, living=False)
+    system = replace(system, watched=np.ones(problem.space.count, bool))
     step, last = LONG, np.inf
     for count in range(1, MOST_STEPS + 1):
         new, change = _accepted(system, now, step, SETTLING, "while the profiles settle", 1 / FASTER)
         if new.step >= LONG and change <= SETTLED * (1 - change / last):
-            acceptor, donor = _restored(system, new)[:2]
+            acceptor, donor = new.fields
             return Concentrations(acceptor, donor, count)
-        now, step, last = _level(new.state), min(FASTER * new.step, LONG), change
+        now, step, last = _level(new.fields, now.biomass), min(FASTER * new.step, LONG), change
     raise TransportError(f"the profiles still change by {change:.2g} of the supply a step after {MOST_STEPS} steps; "
                          'try numerics.transport = "quasi_steady"')
 
@@ -129,12 +189,13 @@ def advance(problem: Problem, active: np.ndarray, inert: np.ndarray, start: Conc
             tolerance: float = TOLERANCE, fixed_step: float | None = None, simultaneous: bool = False) -> Advance:
     """Integrate (7)-(10) over a duration (h) in one geometry.
 
-    active, inert: X_A, X_I (N,) mg/L at the start; fixed_step: steps of that size (h), uncontrolled; simultaneous: both
-    substrates see the other's prediction, as (3.3.1) may be read; less accurate, and long steps may then oscillate.
-    Raises TransportError where the step falls under SHORTEST.
+    active, inert: X_A, X_I (r, q) um2 mg/L at the start; fixed_step: steps of that size (h), uncontrolled;
+    simultaneous: both substrates see the other's prediction, as (3.3.1) may be read; less accurate, and long steps may
+    then oscillate. Raises TransportError where the step falls under SHORTEST.
     """
     system, now = _started(problem, active, inert, start, simultaneous=simultaneous)
-    before, steps, step, left = now.state[:2], [], fixed_step or min(FIRST, duration), duration
+    before, left = now.fields, duration
+    steps, step = [], fixed_step or min(FIRST, duration)
     while left > 1e-12 * duration:
         step = left / np.ceil(left / step - 1e-9)
         when = f"{duration - left:.6g} h after the start"
@@ -142,60 +203,40 @@ def advance(problem: Problem, active: np.ndarray, inert: np.ndarray, start: Conc
         steps.append(float(now.step))
         left -= now.step
         step = fixed_step or now.step * min(LONGER, _factor(tolerance, size))
-    stored = (now.state[:2] - before) @ system.total
-    _, _, growth, remains = fields = _restored(system, now)
+    stored = (system.mass @ (now.fields - before).T).sum(axis=0)
     flows = tuple((float(a), float(d)) for a, d in (*now.flows.T, stored))
-    end = Concentrations(fields[0], fields[1], len(steps))
+    growth, remains = now.biomass
+    end = Concentrations(now.fields[0], now.fields[1], len(steps))
     return Advance(active * np.exp(growth), remains, end, flows, tuple(steps))
 
 
-def make_biomass(scene, now, solved, duration: float):
-    """(9)-(10) over a step (h) in a fixed geometry: the grown pore, concentrations at its end, substrate flows."""
-    done = advance(solved.problem, now.active, now.inert, solved.concentrations, duration)
-    return replace(now, active=done.active, inert=done.inert), done.concentrations, done.flows
-
-
-def _started(problem: Problem, active, inert, start: Concentrations, living=True, simultaneous=False):
+def _started(problem: Problem, active: np.ndarray, inert: np.ndarray, start: Concentrations, living: bool = True,
+             simultaneous: bool = False) -> tuple[System, Level]:
     """The system and its first time level."""
-    order, state = problem.nodes, np.stack([start.acceptor, start.donor, np.zeros_like(active), inert])
-    largest = np.maximum([operator.supply for operator in problem.both], state[:2].max(axis=1))
-    scale, body = np.where(largest > 0, largest, 1.0)[:, None], problem.body[order]
-    acceptor, donor = (_row(operator, order) for operator in problem.both)
-    system = System(problem, (acceptor, donor), body, problem.total[order], active[order], body > 0, scale, living,
-                    simultaneous)
-    return system, _level(state[:, order])
+    fields = np.stack([start.acceptor, start.donor])
+    largest = np.maximum([s.supply for s in problem.both], fields.max(axis=1))
+    scale = np.where(largest > 0, largest, 1.0)[:, None]
+    watched = np.zeros(problem.space.count, bool)
+    watched[problem.space.reaction.cells] = True
+    system = System(problem, active, watched, scale, living, simultaneous)
+    return system, _level(fields, np.stack([np.zeros_like(active), inert]))
 
 
-def _level(state: np.ndarray) -> Level:
+def _level(fields: np.ndarray, biomass: np.ndarray) -> Level:
     """A first level, without a past."""
-    return Level(state, np.zeros((2, 3)), np.zeros_like(state), np.zeros((2, 3)))
-
-
-def _restored(system: System, level: Level) -> np.ndarray:
-    """(4, N) state in the mesh's numbering."""
-    state = np.empty_like(level.state)
-    state[:, system.problem.nodes] = level.state
-    return state
-
-
-def _row(operator: Operator, order: np.ndarray) -> Row:
-    held = np.isin(order, operator.held)
-    matrix = sp.csc_matrix(operator.matrix[order][:, order])
-    held_rows = sp.csr_matrix(matrix)[held]
-    matrix.data[held[matrix.indices]] = 0.0
-    diagonal = np.flatnonzero(matrix.indices == np.repeat(np.arange(len(order)), np.diff(matrix.indptr)))
-    return Row(matrix, diagonal, held, held_rows, operator.source[order], operator, operator.outflow[order])
+    return Level(fields, biomass, np.zeros((2, 3)), np.zeros_like(fields), np.zeros_like(biomass), np.zeros((2, 3)))
 
 
 def _accepted(system: System, now: Level, step: float, tolerance: float, when: str, least: float):
     """A step of this size, or of the first smaller one that is positive and differs little enough from its prediction,
     and that difference over the scale; each try is shorter than the last by a factor of 1/2 to ``least``."""
+    floor = -system.problem.floor
     while step >= SHORTEST:
         new, difference = _corrected(system, now, step, positive=False)
-        if new.state[:2].min() < 0:
+        if new.fields.min() < floor:
             new, difference = _corrected(system, now, step, positive=True)
-        size = float(np.max(difference[:, system.watched]))
-        if new.state[:2].min() >= 0 and size <= tolerance:
+        size = float(np.max(difference[:, system.watched], initial=0.0))
+        if new.fields.min() >= floor and size <= tolerance:
             return new, size
         step *= max(least, min(0.5, _factor(tolerance, size)))
     raise _too_short(system, new, difference, when)
@@ -207,60 +248,76 @@ def _factor(tolerance: float, size: float) -> float:
 
 
 def _too_short(system: System, new: Level, difference: np.ndarray, when: str) -> TransportError:
-    negative = new.state[:2].min() < 0
-    wrong = new.state[:2] if negative else -difference * system.watched
-    species, node = divmod(int(np.argmin(wrong)), len(system.body))
-    x, y = system.problem.mesh.points[system.problem.nodes[node]]
+    negative = new.fields.min() < -system.problem.floor
+    wrong = new.fields if negative else -difference * system.watched
+    species, node = divmod(int(np.argmin(wrong)), system.space.count)
+    x, y = system.space.points[node]
     why = "becomes negative" if negative else "does not follow its prediction"
     return TransportError(f"the {('acceptor', 'donor')[species]} {why} at x = {x:.4g}, y = {y:.4g} um {when}, even in "
                           f"steps of {3600 * SHORTEST:g} s; try a larger numerics.refinement")
 
 
 def _corrected(system: System, now: Level, step: float, positive: bool) -> tuple[Level, np.ndarray]:
-    """One step, and |C - C*| over the scale (2, N); positive: by backward Euler with the positive sink."""
+    """One step, and |C - C*| over the scale (2, n); positive: by backward Euler with the positive sink."""
     ratio = step / now.step
     carry, weight = (0.0, 1.0) if positive else (ratio**2 / (1 + 2 * ratio), (1 + ratio) / (1 + 2 * ratio))
-    rise, flux, interval = carry * now.rise, np.empty((2, 3)), weight * step
-    fields = np.maximum(now.state[:2] + ratio * now.rise[:2], 0.0 if positive else -np.inf)
+    interval, flux = weight * step, np.empty((2, 3))
+    fields = np.maximum(now.fields + ratio * now.field_rise, 0.0 if positive else -np.inf)
     predicted = fields.copy()
-    active = system.active * np.exp(now.state[2] + rise[2] + interval * _rates(system, fields)[0])
-    for s, row in enumerate(system.rows):
-        sink = _sink(system, active, predicted if system.simultaneous else fields, s, positive)
-        fields[s], flux[s] = _solved(row, system.total / interval, now.state[s] + rise[s], *sink)
-    rise[:2] = fields - now.state[:2]
+    field_rise, biomass_rise = carry * now.field_rise, carry * now.biomass_rise
+    rise = now.biomass[0] + biomass_rise[0] + interval * _rates(system, fields)[0]
+    active = system.active * np.exp(rise)
+    for s in (0, 1):
+        seen = predicted if system.simultaneous else fields
+        fields[s], flux[s] = _solved(system, s, interval, now.fields[s] + field_rise[s],
+                                     *_sink(system, active, seen, s, positive))
+    field_rise = fields - now.fields
     growth, remains = _rates(system, fields)
-    rise[2] += interval * growth
-    rise[3] += interval * system.active * np.exp(now.state[2] + rise[2]) * remains
-    flow = carry * now.flow + interval * flux
-    state = np.vstack([fields, now.state[2:] + rise[2:]])
-    return Level(state, now.flows + flow, rise, flow, step), np.abs(fields - predicted) / system.scale
+    biomass_rise[0] += interval * growth
+    biomass_rise[1] += interval * system.active * np.exp(now.biomass[0] + biomass_rise[0]) * remains
+    flow_rise = carry * now.flow_rise + interval * flux
+    new = Level(fields, now.biomass + biomass_rise, now.flows + flow_rise, field_rise, biomass_rise, flow_rise, step)
+    return new, np.abs(fields - predicted) / system.scale
 
 
 def _rates(system: System, fields: np.ndarray):
-    """F3 / X_A and F4 / X_A (1/h), zero where the biomass does not live."""
-    if not system.living:
+    """F3 / X_A and F4 / X_A (r, q) 1/h, zero where the biomass does not live."""
+    problem = system.problem
+    if not system.living or problem.kinetics is None:
         return 0.0, 0.0
-    substrates, kinetics = system.problem.substrates, system.problem.kinetics
-    return law.growth_rate(fields[0], fields[1], substrates, kinetics), law.inert_rate(fields[0], substrates, kinetics)
+    acceptor, donor = system.at(fields)
+    return (law.growth_rate(acceptor, donor, problem.substrates, problem.kinetics),
+            law.inert_rate(acceptor, problem.substrates, problem.kinetics))
 
 
 def _sink(system: System, active: np.ndarray, fields: np.ndarray, s: int, positive: bool):
-    """Slope and offset (N,) of the uptake of substrate s, slope C + offset (um2 mg/L/h), linearised at the fields."""
-    if system.problem.kinetics is None:
+    """Slope and offset (r, q) of the uptake of substrate s, slope C + offset (um2 mg/L/h), linearised at the fields."""
+    problem = system.problem
+    if problem.kinetics is None:
         return np.zeros_like(active), np.zeros_like(active)
-    *uptake, slopes = law.uptake(fields[0], fields[1], system.problem.substrates, system.problem.kinetics)
-    load, slope, own = system.body * active, slopes[s][s], fields[s]
+    at = *system.at(fields), problem.substrates, problem.kinetics
+    uptake, slope, own = law.uptake(*at, True)[s], law.uptake_slopes(*at, True)[s][s], at[s]
     if positive:
         tiny = np.finfo(float).tiny
-        return load * np.where(own > tiny, uptake[s] / np.maximum(own, tiny), slope), np.zeros_like(active)
-    return load * slope, load * (uptake[s] - slope * own)
+        return active * np.where(own > tiny, uptake / np.maximum(own, tiny), slope), np.zeros_like(active)
+    return active * slope, active * (uptake - slope * own)
 
 
-def _solved(row: Row, storage: np.ndarray, past: np.ndarray, slope: np.ndarray, offset: np.ndarray):
-    """C (N,) of storage (C - past) + L C - b + slope C + offset = 0, and what is supplied, leaves and is consumed."""
-    matrix = row.matrix.copy()
-    matrix.data[row.diagonal] += np.where(row.held, 1.0, storage + slope)
-    field = linear.solve(matrix, np.where(row.held, row.operator.supply, storage * past + row.source - offset))
-    sink = slope * field + offset
-    entered = row.held_rows @ field + (storage * (field - past) - row.source + sink)[row.held]
-    return field, (row.operator.supplied + entered.sum(), row.outflow @ field, sink.sum())
+def _solved(system: System, s: int, interval: float, past: np.ndarray, slope: np.ndarray, offset: np.ndarray):
+    """C (n,) of M (C - past) / interval + L C - b + slope C + offset = 0, and what is supplied, leaves and is consumed.
+    """
+    row, sparse, pieces, problem = system.rows[s], system.sparse, system.space.reaction, system.problem
+    k = pieces.cells.shape[1]
+    products = (pieces.values[:, :, None] * pieces.values[:, None, :]).reshape(len(pieces.values), -1)
+    reaction = (slope @ products).reshape(-1, k, k)
+    entries = row.operator + row.storage / interval + sparse.entries(1, reaction)
+    right = row.mass @ past / interval + row.source - system.taken(offset)
+    held = np.where(sparse.held, row.supply, 0.0)
+    known = row.matrix @ held + row.mass @ held / interval
+    field, order = held, sparse.order
+    solver = linear.factorised(sparse.filled(entries), problem.space.mesh.topology.method)
+    field[order] = solver.solve((right - known)[order])
+    consumed = slope * (field[pieces.cells] @ pieces.values.T) + offset
+    entered = row.matrix @ field + row.mass @ (field - past) / interval - row.source + system.taken(consumed)
+    supplied = row.source.sum() + entered[sparse.held].sum()
+    return field, (supplied, problem.outflow @ field, consumed.sum())

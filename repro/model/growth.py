@@ -5,28 +5,39 @@ Plane strain, from the configuration of t = 0: F = d phi / d X, J = det F, tr C 
     Pi = integral of mu/2 (J^(-2/3) tr C - 3) + P (J - theta) dV - 1/2 sum_tau integral of h^2/(12 mu_tau) |grad P|^2 dv
 
 (14)-(17), (21)-(24) and (27), hence J = theta. Signs are [E5]'s: the stabilisation makes the pressure block negative.
-[E6]: h, grad and dv are those of the last known shape, and the modulus is the incremental one there,
-mu_tau = mu_L theta^(-2/3); in reference quantities the stabilisation so grows as J^(5/3). It is kept fixed while an
-equilibrium is sought. Without tractions mu_L scales P and nothing else: it is 1 in here.
-
-With A = mu J^(-2/3) and H = F^-T (dJ = J H : dF), first Piola-Kirchhoff stress and tangent are
+Without tractions mu_L scales P and nothing else: it is 1 in here. P is linear. With A = mu J^(-2/3) and H = F^-T
+(dJ = J H : dF), first Piola-Kirchhoff stress and tangent are
 
     S = A (F - tr C / 3 H) + P J H
     dS = A (dF - 2/3 (H : dF) F - 2/3 (F : dF) H + 2/9 tr C (H : dF) H + tr C / 3 H dF^T H)
          + P J ((H : dF) H - H dF^T H)
+
+*Straight triangles*, linear displacements. [E6]: h, grad and dv are those of the last known shape, and the modulus is
+the incremental one there, mu_tau = mu_L theta^(-2/3); in reference quantities the stabilisation so grows as J^(5/3).
+It is kept fixed while an equilibrium is sought.
+
+*Curved triangles*, quadratic displacements (Taylor-Hood): no term in |grad P|^2, but P + gamma theta^(-5/3) (J - theta)
+for P in S. That (grad-div stabilisation) vanishes where J = theta. It is needed: at a given shape the energy of plane
+expansion is J^(1/3) + J^(-2/3) / 2, which is concave, and what the linear pressure leaves free of J would grow from
+nothing.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Generic, TypeVar
 
 import numpy as np
 
 from repro.errors import GrowthError, LinearError
-from repro.fem.assembly import ElementSystem, each, saddle_blocks, saddle_system
+from repro.fem import elements
+from repro.fem.assembly import ElementSystem, Factored, each, saddle_blocks, saddle_system
+from repro.fem.elements import Points, Table
+from repro.fem.linear import DEFAULT, Method
 from repro.fem.mesh import gradients, triangle_areas
-from repro.fem.newton import Jacobian
+from repro.fem.newton import Newton, relative
 from repro.timing import timed
 
 #: Newton stops at this residual against the size of its terms, or at the second where round-off keeps it from falling.
@@ -34,50 +45,76 @@ NEWTON, ROUND_OFF, MOST_ITERATIONS = 1e-11, 1e-8, 25
 #: Halvings in a line search; sub-steps of a continuation.
 HALVINGS = 8
 CONTINUATION = (1, 8, 64)
+#: gamma: the energy's curvature in J is -2/9 J^(-5/3) and less, so that one makes it convex with room to spare.
+GAMMA = 1.0
+#: On curved triangles theta goes to its target in parts of at most this factor: a longer step of Newton's method may
+#: end in another equilibrium, with a wrinkled surface.
+FACTOR = 1.2
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """Connections of the aggregate's own mesh. cells: (t, 3 or 6), corners numbered first; corners: how many; degree:
+    of the quadrature; method: of the linear systems."""
+
+    cells: np.ndarray
+    corners: int
+    degree: int
+    method: Method = DEFAULT
+
+    @property
+    def geometry(self) -> int:
+        """1: straight triangles, linear displacements; 2: curved ones, quadratic displacements."""
+        return 1 if self.cells.shape[1] == 3 else 2
+
+    @property
+    def triangles(self) -> np.ndarray:
+        """(t, 3) corners."""
+        return self.cells[:, :3]
+
+    @property
+    def table(self) -> Table:
+        """The displacements' functions where they are integrated."""
+        return elements.table(self.geometry, self.geometry, self.degree)
+
+    @cached_property
+    def unconstrained(self) -> ElementSystem:
+        """The sparse system of positions and pressure, nothing prescribed."""
+        held = np.zeros((int(self.cells.max()) + 1, 2), bool)
+        return saddle_system(self.cells, self.triangles, held, method=self.method)
 
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """The aggregate's own mesh in its reference configuration.
+    """The aggregate in its reference configuration: places of its nodes (n, 2) um on the mesh of ``shape``."""
 
-    reference: (n, 2) um; triangles: (t, 3); held: (n, 2) True where a coordinate is prescribed; topology: what has been
-    worked out from connections and held coordinates; reused: does Newton's method use its derivative again?
-    """
-
+    shape: Shape
     reference: np.ndarray
-    triangles: np.ndarray
-    held: np.ndarray
-    topology: dict = field(default_factory=dict, repr=False)
-    reused: bool = False
 
-    @property
-    def sparse(self) -> ElementSystem:
-        """The sparse system of positions and pressure."""
-        if "growth" not in self.topology:
-            self.topology["growth"] = saddle_system(self.triangles, self.triangles, self.held)
-        held = np.concatenate([self.held[:, 0], self.held[:, 1], np.zeros(len(self.held), bool)])
-        found = self.topology["growth"]
-        return found if np.array_equal(found.held, held) else found.holding(held)
+    @cached_property
+    def at(self) -> Points:
+        """Quadrature points: weights and gradients of the reference."""
+        return elements.points(self.reference[self.shape.cells], self.shape.table)
+
+    @cached_property
+    def weighted(self) -> np.ndarray:
+        """(t, 2 q, k) um, its gradients times weights."""
+        return self.at.weighted
+
+    def strained(self, position: np.ndarray) -> Strained:
+        """The deformation (t, q, 2, 2) that brings the reference to positions (n, 2) um, and what goes with it."""
+        gradient = np.swapaxes(position[self.shape.cells], 1, 2) @ np.swapaxes(self.at.rows, 1, 2)
+        count, points = self.at.dx.shape
+        return Strained(elements.by_component(gradient.reshape(count, 2, points, 2).transpose(1, 3, 0, 2)))
 
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """position: (n, 2) um; pressure: (n,) P / mu_L; iterations of Newton's method, all sub-steps together."""
+    """position: (n, 2) um; pressure: (corners,) P / mu_L; iterations of Newton's method, all sub-steps together."""
 
     position: np.ndarray
     pressure: np.ndarray
     iterations: int
-
-
-def deformation(position: np.ndarray, triangles: np.ndarray, slopes: np.ndarray) -> np.ndarray:
-    """(t, 2, 2) F[i, K] = d x_i / d X_K, from reference gradients (t, 3, 2) of the nodal functions."""
-    return np.einsum("tai,tak->tik", position[triangles], slopes)
-
-
-def inverse_transpose(F: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """H = F^-T and J of plane deformations (..., 2, 2)."""
-    at = Strained(F)
-    return at.H, at.J
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,16 +127,12 @@ class Strained:
     @cached_property
     def J(self) -> np.ndarray:
         """(...) det F."""
-        F = self.F
-        return F[..., 0, 0] * F[..., 1, 1] - F[..., 0, 1] * F[..., 1, 0]
+        return elements.determinant(self.F)
 
     @cached_property
     def H(self) -> np.ndarray:
         """(..., 2, 2) F^-T."""
-        F, H = self.F, np.empty_like(self.F)
-        H[..., 0, 0], H[..., 1, 1] = F[..., 1, 1], F[..., 0, 0]
-        H[..., 0, 1], H[..., 1, 0] = -F[..., 1, 0], -F[..., 0, 1]
-        return H / self.J[..., None, None]
+        return elements.inverse_transpose(self.F, self.J)
 
     @cached_property
     def A(self) -> np.ndarray:
@@ -161,7 +194,7 @@ def largest_principal(stress: np.ndarray) -> np.ndarray:
     return np.maximum(0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy), zz)
 
 
-def stabilisation(position: np.ndarray, triangles: np.ndarray, theta: np.ndarray) -> np.ndarray:
+def gradient_stabilisation(position: np.ndarray, triangles: np.ndarray, theta: np.ndarray) -> np.ndarray:
     """(t, 3, 3) matrices of sum_tau h^2 / (12 theta^(-2/3)) (grad p, grad q) on the shape ``position`` [E6]."""
     slopes, areas = gradients(position, triangles), triangle_areas(position, triangles)
     corner = position[triangles]
@@ -171,143 +204,211 @@ def stabilisation(position: np.ndarray, triangles: np.ndarray, theta: np.ndarray
     return weight[:, None, None] * np.einsum("tai,tbi->tab", slopes, slopes)
 
 
-def _strains(slopes: np.ndarray) -> np.ndarray:
-    """(t, 4, 6) dF [xX, xY, yX, yY] of unit displacements [x of the three nodes, then y]."""
-    found = np.zeros((len(slopes), 4, 6))
-    found[:, :2, :3] = found[:, 2:, 3:] = np.swapaxes(slopes, 1, 2)
-    return found
+Found = TypeVar("Found")
+
+
+class Last(Generic[Found]):
+    """A function of one array that keeps its last result until another array is asked for; arrays do not change in
+    place."""
+
+    def __init__(self, function: Callable[[np.ndarray], Found]):
+        self._function = function
+        self._last: tuple[np.ndarray, Found] | None = None
+
+    def __call__(self, array: np.ndarray) -> Found:
+        if self._last is None or self._last[0] is not array:
+            self._last = array, self._function(array)
+        return self._last[1]
+
+
+@dataclass(frozen=True, eq=False)
+class Iterate:
+    """position: (n, 2) um; pressure: (corners,) P / mu_L; residual and the size of its terms; lag: (n, 2) um, what
+    prescribed coordinates still lack; free: unknowns that are not prescribed."""
+
+    position: np.ndarray
+    pressure: np.ndarray
+    residual: np.ndarray
+    size: np.ndarray
+    lag: np.ndarray
+    free: np.ndarray | slice
+
+    @property
+    def defect(self) -> float:
+        """Largest residual against the size of its row's terms."""
+        return relative(self.residual[self.free], self.size[self.free])
+
+    @property
+    def complete(self) -> bool:
+        """Are prescribed coordinates where they are to be?"""
+        return not self.lag.any()
+
+    @property
+    def length(self) -> float:
+        """Of the residual."""
+        return float(np.linalg.norm(self.residual[self.free]))
 
 
 class System:
-    """Residual and tangent of Pi for one body; theta and prescribed coordinates vary, the sparsity does not."""
+    """Residual and tangent of Pi for one body at one theta and prescribed coordinates."""
 
-    def __init__(self, body: Body, stabilising: np.ndarray, forces: np.ndarray | None = None):
-        """forces: (n, 2) um, nodal forces over mu_L that do not depend on the shape (the t0 of (20)); none by default.
-        """
-        self.body = body
-        self.pull = None if forces is None else np.concatenate([forces[:, 0], forces[:, 1], np.zeros(len(forces))])
-        self.slopes = gradients(body.reference, body.triangles)
-        self.areas = triangle_areas(body.reference, body.triangles)
-        self.strains = _strains(self.slopes)
-        self.stabilising = stabilising
-        self.sparse = body.sparse
+    def __init__(self, body: Body, held: np.ndarray, *, stabilising: np.ndarray | None = None,
+                 forces: np.ndarray | None = None, system: ElementSystem | None = None):
+        """held: (n, 2) True where a coordinate is prescribed; stabilising: (t, 3, 3) of |grad P|^2, None on curved
+        triangles; forces: (n, 2) um, nodal forces over mu_L that do not depend on the shape (the t0 of (20)), none by
+        default; system: the sparse system with nothing prescribed, if it is known."""
+        self.body, self.held, self.stabilising = body, held, stabilising
+        rows = np.concatenate([held[:, 0], held[:, 1], np.zeros(body.shape.corners, bool)])
+        whole = body.shape.unconstrained if system is None else system
+        self.sparse = whole.holding(rows) if rows.any() else whole
         self.unknowns, self.free = self.sparse.kinds[0], self.sparse.free
+        self.pull = np.zeros(len(rows))
+        if forces is not None:
+            self.pull[: held.size] = forces.T.ravel()
+        self.strained = Last(body.strained)
+        self.theta = self.target = np.empty(0)
+        self.sizes = np.empty(0)
 
-    def residual(self, position: np.ndarray, pressure: np.ndarray, theta: np.ndarray):
-        """Residual (3n,) [x of all nodes, y, then P] and the size of its terms; the caller excludes det F <= 0."""
-        t, n = self.body.triangles, len(position)
-        F = deformation(position, t, self.slopes)
-        P = pressure[t]
-        S = piola(F, P.mean(axis=1))
-        force = self.areas[:, None, None] * np.einsum("tik,tak->tia", S, self.slopes)
-        terms = self.areas[:, None, None] * np.einsum("tik,tak->tia", *map(np.abs, (F, self.slopes)))
-        terms = terms * np.linalg.det(F)[:, None, None] ** (-2 / 3)
-        gap = (self.areas * (np.linalg.det(F) - theta))[:, None] / 3 - np.einsum("tab,tb->ta", self.stabilising, P)
+    def under(self, theta: np.ndarray, target: np.ndarray, position: np.ndarray, pressure: np.ndarray) -> Iterate:
+        """The first iterate for an expansion theta (t, q) and prescribed coordinates (n, 2) um."""
+        self.theta, self.target = theta, target
+        self.sizes = self._sizes(position)
+        return self._iterate(position, pressure)
+
+    def _iterate(self, position: np.ndarray, pressure: np.ndarray) -> Iterate:
+        lag = np.where(self.held, self.target - position, 0.0)
+        return Iterate(position, pressure, self.residual(position, pressure), self.sizes, lag, self.free)
+
+    def _stiffening(self) -> np.ndarray | float:
+        """gamma theta^(-5/3)."""
+        return 0.0 if self.stabilising is not None else GAMMA * self.theta ** (-5 / 3)
+
+    def _pressed(self, position: np.ndarray, pressure: np.ndarray) -> tuple[Strained, np.ndarray]:
+        """The deformation, and P with its stabilisation (t, q)."""
+        at = self.strained(position)
+        linear = pressure[self.body.shape.triangles] @ self.body.shape.table.linear.T
+        if self.stabilising is not None:
+            return at, linear
+        return at, linear + self._stiffening() * (at.J - self.theta)
+
+    def residual(self, position: np.ndarray, pressure: np.ndarray) -> np.ndarray:
+        """(2n + corners,) [x of all nodes, y, then P of the corners]; the caller excludes det F <= 0."""
+        at, P = self._pressed(position, pressure)
+        gap = (self.body.at.dx * (at.J - self.theta)) @ self.body.shape.table.linear
+        if self.stabilising is not None:
+            gap = gap - np.einsum("tab,tb->ta", self.stabilising, pressure[self.body.shape.triangles])
+        return self._summed(self._forces(at.piola(P), self.body.weighted), gap) - self.pull
+
+    def _sizes(self, position: np.ndarray) -> np.ndarray:
+        """Sizes of the terms of the residual."""
+        at, linear = self.strained(position), self.body.shape.table.linear
+        terms = self._forces(at.A[..., None, None] * np.abs(at.F), np.abs(self.body.weighted))
+        return self._summed(terms, (self.body.at.dx * self.theta) @ linear) + np.abs(self.pull)
+
+    def _forces(self, stress: np.ndarray, weighted: np.ndarray) -> np.ndarray:
+        """(t, 2, k) of the integral of stress (t, q, 2, 2) : grad v, weighted (t, 2 q, k) being dx grad v."""
+        return np.swapaxes(stress, 1, 2).reshape(len(stress), 2, -1) @ weighted
+
+    def _summed(self, force: np.ndarray, gap: np.ndarray) -> np.ndarray:
+        """Of all triangles, from (t, 2, k) and (t, 3)."""
         local = np.concatenate([force[:, 0], force[:, 1], gap], axis=1)
-        scale = np.concatenate([terms[:, 0], terms[:, 1],
-                                np.broadcast_to((self.areas * theta)[:, None] / 3, P.shape)], axis=1)
-        total, size = (np.bincount(self.unknowns.ravel(), part.ravel(), 3 * n) for part in (local, scale))
-        if self.pull is None:
-            return total, size
-        return total - self.pull, size + np.abs(self.pull)
+        return np.bincount(self.unknowns.ravel(), local.ravel(), len(self.pull))
 
-    def tangent(self, position: np.ndarray, pressure: np.ndarray, theta: np.ndarray | None = None) -> np.ndarray:
-        """(t, 9, 9) symmetric element matrices of the residual's derivative, which theta does not enter."""
-        t = self.body.triangles
-        F = deformation(position, t, self.slopes)
-        moduli = tangent(F, pressure[t].mean(axis=1))
-        K = np.swapaxes(self.strains, 1, 2) @ each(self.areas, moduli.reshape(-1, 4, 4)) @ self.strains
-        H, J = inverse_transpose(F)
-        B = (self.areas * J)[:, None, None] * np.einsum("tik,tak->tia", H, self.slopes) / 3
-        return saddle_blocks(K, -np.repeat(B.reshape(len(t), 1, 6), 3, axis=1), self.stabilising)
+    def tangent(self, position: np.ndarray, pressure: np.ndarray) -> np.ndarray:
+        """(t, 2k + 3, 2k + 3) symmetric element matrices of the residual's derivative."""
+        at, P = self._pressed(position, pressure)
+        k, dx, PJ = self.body.shape.cells.shape[1], self.body.at.dx, P * at.J
+        h, f = self._pulled(at.H), self._pulled(at.F)
+        both = 2 / 9 * at.A * at.trace + PJ + self._stiffening() * at.J**2
+        half = each(dx * both / 2, h) - each(2 / 3 * dx * at.A, f)
+        swap = each(dx * (at.A * at.trace / 3 - PJ), h)
+        found = np.swapaxes(h, 1, 2) @ np.concatenate([half, swap], axis=2)
+        K = found[:, :, : 2 * k] + np.swapaxes(found[:, :, : 2 * k], 1, 2)
+        exchanged = K.reshape(-1, 2, k, 2, k)  # the same memory
+        exchanged += np.swapaxes(found[:, :, 2 * k:].reshape(exchanged.shape), 1, 3)
+        plain = np.swapaxes(self.body.at.rows, 1, 2) @ (np.repeat(at.A, 2, axis=1)[:, :, None] * self.body.weighted)
+        exchanged[:, 0, :, 0] += plain
+        exchanged[:, 1, :, 1] += plain
+        return saddle_blocks(K, -(self.body.shape.table.linear.T @ each(dx * at.J, h)), self.stabilising)
 
-    def admissible(self, position: np.ndarray) -> bool:
-        """Is det F > 0 everywhere?"""
-        return bool(triangle_areas(position, self.body.triangles).min() > 0)
+    def _pulled(self, tensor: np.ndarray) -> np.ndarray:
+        """(t, q, 2k) a tensor (t, q, 2, 2) times grad N_a: component x for every node a, then y."""
+        return (tensor @ self.body.at.slopes).reshape(*self.body.at.dx.shape, -1)
+
+    def factored(self, iterate: Iterate) -> Factored:
+        """The derivative, factorised."""
+        return self.sparse.factored(self.tangent(iterate.position, iterate.pressure))
+
+    def advanced(self, iterate: Iterate, factors: Factored, fresh: bool) -> Iterate:
+        """The longest of the steps 1, 1/2, ... with det F > 0 that does not raise the residual fourfold; the first step
+        carries prescribed coordinates to their target."""
+        lag = iterate.lag
+        move = None if iterate.complete else np.concatenate([lag[:, 0], lag[:, 1], np.zeros(len(iterate.pressure))])
+        step = factors.solve(-iterate.residual, move)
+        n = len(iterate.position)
+        move, push = step[: 2 * n].reshape(2, n).T, step[2 * n:]
+        for length in 0.5 ** np.arange(HALVINGS):
+            position = iterate.position + length * move
+            if self.strained(position).J.min() <= 0:
+                continue
+            trial = self._iterate(position, iterate.pressure + length * push)
+            if not iterate.complete or trial.length < 4 * iterate.length:
+                return trial
+        raise GrowthError(f"no step of Newton's method keeps det F > 0 and the residual in bounds "
+                          f"(shortest tried {0.5 ** (HALVINGS - 1):.2g})")
 
 
 @timed("growth")
-def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: np.ndarray,
-                prescribed: np.ndarray, forces: np.ndarray | None = None) -> Equilibrium:
-    """Equilibrium under the expansion theta (t,) since the reference, from a start.
+def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: np.ndarray, held: np.ndarray,
+                prescribed: np.ndarray, *, last: np.ndarray | None = None, forces: np.ndarray | None = None,
+                reused: bool = False) -> Equilibrium:
+    """Equilibrium under the expansion theta (t, q) since the reference, from a start.
 
-    position: (n, 2) um, the last shape, with det F > 0; pressure: (n,) P / mu_L there; prescribed: (n, 2) um, the
-    coordinates to reach where ``body.held``; forces: (n, 2) um, nodal forces over mu_L, none by default. Newton's
-    method with a line search that rejects det F <= 0; where it fails, theta and the prescribed coordinates go from
-    where they are to their targets in geometric sub-steps. Raises GrowthError where that fails too.
+    position: (n, 2) um, where to start, with det F > 0; pressure: (corners,) P / mu_L there; held: (n, 2) True where a
+    coordinate is prescribed, and prescribed: (n, 2) um, what it is to reach; last: (n, 2) um, the last known shape, the
+    start by default; forces: (n, 2) um, nodal forces over mu_L, none by default; reused: is Newton's derivative kept
+    while it does enough? Newton's method with a line search that rejects det F <= 0; where it fails, theta and the
+    prescribed coordinates go from where they are to their targets in geometric sub-steps. Raises GrowthError where that
+    fails too.
     """
-    start = triangle_areas(position, body.triangles) / triangle_areas(body.reference, body.triangles)
-    refuse_turned_over(start, theta)
-    system = System(body, stabilisation(position, body.triangles, start), forces)
-    return reach(system, start, theta, position, pressure, prescribed)
-
-
-def refuse_turned_over(start: np.ndarray, theta: np.ndarray) -> None:
-    """Raises GrowthError where J at the start or theta is not positive."""
+    start = body.strained(position).J
     if start.min() <= 0 or theta.min() <= 0:
         raise GrowthError("growth starts from a triangle that is turned over or from theta <= 0; "
                           "try a shorter growth.time_step")
+    stabilising, parts = None, 1
+    if body.shape.geometry == 1:
+        known = position if last is None else last
+        stabilising = gradient_stabilisation(known, body.shape.triangles, body.strained(known).J[:, 0])
+    else:
+        parts = max(1, int(np.ceil(np.abs(np.log(theta / start)).max() / np.log(FACTOR))))
+    system = System(body, held, stabilising=stabilising, forces=forces)
+    first = Equilibrium(position, pressure, 0)
+    return reach(system, start, theta, first, prescribed, parts, reused)
 
 
-def reach(system, start: np.ndarray, theta: np.ndarray, position: np.ndarray, pressure: np.ndarray,
-          prescribed: np.ndarray, parts: int = 1) -> Equilibrium:
+def reach(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibrium, prescribed: np.ndarray,
+          parts: int = 1, reused: bool = False) -> Equilibrium:
     """Equilibrium of a system under theta, from J = ``start`` (shaped alike), in ``parts`` or, where that fails, more;
     see :func:`equilibrium`."""
     failure = ""
     for steps in CONTINUATION:
         try:
-            return _continued(system, start, theta, position, pressure, prescribed, parts * steps)
+            return _continued(system, start, theta, first, prescribed, parts * steps, reused)
         except (GrowthError, LinearError) as error:
             failure = str(error)
     raise GrowthError(f"{failure}; try a shorter growth.time_step or a larger numerics.refinement")
 
 
-def _continued(system, start, theta, position, pressure, prescribed, steps: int) -> Equilibrium:
+def _continued(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibrium, prescribed: np.ndarray,
+               steps: int, reused: bool) -> Equilibrium:
     """Newton's method at theta = start (theta / start)^s for s = 1 / steps ... 1."""
-    first, iterations = position, 0
+    newton, now = Newton(NEWTON, ROUND_OFF, MOST_ITERATIONS, reused), first
     for part in np.arange(1, steps + 1) / steps:
-        target = np.where(system.body.held, first + part * (prescribed - first), position)
-        position, pressure, used = _newton(system, start * (theta / start) ** part, position, pressure, target)
-        iterations += used
-    return Equilibrium(position, pressure, iterations)
-
-
-def _newton(system: System, theta, position, pressure, target):
-    """Solve at one theta; the first step carries the prescribed coordinates to their target."""
-    lag = np.where(system.body.held, target - position, 0.0)
-    jacobian = Jacobian(system.body.reused)
-    residual, size = system.residual(position, pressure, theta)
-    defect = np.inf
-    for iteration in range(MOST_ITERATIONS):
-        last, defect = defect, _relative(residual[system.free], size[system.free])
-        if not lag.any() and (defect <= NEWTON or 0.1 * last < defect <= ROUND_OFF):
-            return position, pressure, iteration
-        move = np.concatenate([lag[:, 0], lag[:, 1], np.zeros(len(pressure))]) if lag.any() else None
-        if jacobian.stale(defect):
-            jacobian.factors = system.sparse.factored(system.tangent(position, pressure, theta))
-        step = jacobian.factors.solve(-residual, move)
-        position, pressure, residual, size = _line_search(system, theta, position, pressure, step, residual, lag)
-        lag = np.where(system.body.held, target - position, 0.0)
-    raise GrowthError(f"Newton's method for the growth stands at a defect of {defect:.2g} "
-                      f"after {MOST_ITERATIONS} iterations")
-
-
-def _relative(residual: np.ndarray, size: np.ndarray) -> float:
-    """Largest residual against the size of its row's terms."""
-    return float(np.max(np.abs(residual) / np.maximum(size, np.finfo(float).tiny)))
-
-
-def _line_search(system, theta, position, pressure, step, residual, lag):
-    """The longest of the steps 1, 1/2, ... with det F > 0 that does not raise the residual fourfold."""
-    n = len(position)
-    move, push = step[: 2 * n].reshape(2, n).T, step[2 * n:]
-    before = np.linalg.norm(residual[system.free])
-    for length in 0.5 ** np.arange(HALVINGS):
-        trial = position + length * move
-        if not system.admissible(trial):
-            continue
-        found, size = system.residual(trial, pressure + length * push, theta)
-        if lag.any() or np.linalg.norm(found[system.free]) < 4 * before:
-            return trial, pressure + length * push, found, size
-    raise GrowthError(f"no step of Newton's method keeps det F > 0 and the residual in bounds "
-                      f"(shortest tried {0.5 ** (HALVINGS - 1):.2g})")
+        target = first.position + part * (prescribed - first.position)
+        iterate = system.under(start * (theta / start) ** part, target, now.position, now.pressure)
+        last, count, converged = newton.solve(system, iterate)
+        if not converged:
+            raise GrowthError(f"Newton's method for the growth stands at a defect of {last.defect:.2g} "
+                              f"after {count} iterations")
+        now = replace(now, position=last.position, pressure=last.pressure, iterations=now.iterations + count)
+    return now

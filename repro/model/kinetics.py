@@ -1,24 +1,27 @@
-"""Dual Monod kinetics (2.2): sinks of the substrates (7)-(8), growth and decay of the biomass (9)-(10).
+"""Dual Monod kinetics (2.2): uptake of the substrates (7)-(8), growth and decay of the biomass (9)-(10).
 
 With m_A = C_A / (C_A + K_sA) and m_D alike:
 
     F1 = -X_A m_A (k F m_D + d_c f_d b)        F3 = X_A m_A (k Y m_D - b)
     F2 = -k X_A m_A m_D                        F4 = X_A m_A b (1 - f_d)
 
-[E3]: the demand of decay is d_c f_d b. [E1]: F is the 1.52 of Table 1 by default, not COD - Y d_c = 1.5138.
+[E3]: the demand of decay is d_c f_d b. [E1]: F is the 1.52 of Table 1 by default, not COD - Y d_c = 1.5138. So, for
+whatever concentrations, F3 + F4 = -Y F2 + (F1 - F F2) / d_c: biomass is made of donor, and what decays takes acceptor.
 
-Below zero, which no solution is but an iterate can be, each sink goes on linearly in its own substrate and takes the
-other as zero: it stays monotone, so that Newton's method has no negative root to fall into.
+Uptake and growth are functions of max(C, 0). Newton's iterates alone may ask for the *extended* uptake, which goes on
+linearly below zero in its own substrate and takes the other as zero: it stays monotone, so that the method has no
+negative root to fall into.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
+from repro.scene import Kinetics, Substrates
 
-def fraction(concentration, half_saturation: float):
-    """m of :func:`monod` alone."""
-    return concentration / (np.maximum(concentration, 0.0) + half_saturation)
+Slopes = tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 def monod(concentration, half_saturation: float):
@@ -27,76 +30,109 @@ def monod(concentration, half_saturation: float):
     return concentration / bounded, half_saturation / bounded**2
 
 
-def _both(acceptor, donor, substrates):
-    """:func:`monod` of the acceptor and of the donor."""
-    return monod(acceptor, substrates.acceptor.half_saturation), monod(donor, substrates.donor.half_saturation)
-
-
-def _fractions(acceptor, donor, substrates):
-    """:func:`fraction` of the acceptor and of the donor."""
-    return fraction(acceptor, substrates.acceptor.half_saturation), fraction(donor, substrates.donor.half_saturation)
-
-
-def decay_demand(kinetics) -> float:
+def decay_demand(kinetics: Kinetics) -> float:
     """d_c f_d b (1/h): the acceptor that decay takes up per active biomass at m_A = 1 [E3]."""
     return kinetics.decay_oxygen_demand * kinetics.degradable_fraction * kinetics.decay_coefficient
 
 
-def uptake(acceptor, donor, substrates, kinetics):
-    """Uptake per active biomass (1/h): -F1/X_A, -F2/X_A and their derivatives (1/h per mg/L).
-
-    acceptor, donor: C_A and C_D (mg/L). Returns (q_A, q_D, ((dq_A/dC_A, dq_A/dC_D), (dq_D/dC_A, dq_D/dC_D))).
-    """
-    (m_a, d_a), (m_d, d_d) = _both(acceptor, donor, substrates)
-    k, demand, decay = kinetics.maximum_utilization_rate, kinetics.acceptor_to_donor_ratio, decay_demand(kinetics)
-    other_a, slope_a = np.maximum(m_a, 0.0), np.where(acceptor > 0, d_a, 0.0)
-    other_d, slope_d = np.maximum(m_d, 0.0), np.where(donor > 0, d_d, 0.0)
-    per_acceptor = k * demand * other_d + decay
-    jacobian = ((d_a * per_acceptor, m_a * k * demand * slope_d), (k * slope_a * m_d, k * other_a * d_d))
-    return m_a * per_acceptor, k * other_a * m_d, jacobian
+def fractions(acceptor, donor, substrates: Substrates):
+    """m_A and m_D of max(C, 0)."""
+    return (monod(np.maximum(acceptor, 0.0), substrates.acceptor.half_saturation)[0],
+            monod(np.maximum(donor, 0.0), substrates.donor.half_saturation)[0])
 
 
-def paired_uptake(acceptor, donor, substrates, kinetics):
-    """(q_A, q_D) as :func:`uptake`'s (1/h), but with one rate r = k m_A m_D for both substrates below zero too, where
-    quadratic functions may go by a little: what is taken up of one stays in proportion to the other. r is zero where
-    both are negative.
-    """
-    m_a, m_d = _fractions(acceptor, donor, substrates)
-    rate = _paired_most(m_a, m_d, kinetics) * m_a * m_d
-    return kinetics.acceptor_to_donor_ratio * rate + decay_demand(kinetics) * m_a, rate
+def uptake(acceptor, donor, substrates: Substrates, kinetics: Kinetics, extended: bool = False):
+    """Uptake per active biomass (1/h): -F1/X_A and -F2/X_A at C_A and C_D (mg/L); extended: see the module."""
+    if not extended:
+        m_a, m_d = fractions(acceptor, donor, substrates)
+        return m_a * (kinetics.maximum_utilization_rate * kinetics.acceptor_to_donor_ratio * m_d
+                      + decay_demand(kinetics)), kinetics.maximum_utilization_rate * m_a * m_d
+    m_a, m_d = (monod(c, s.half_saturation)[0]
+                for c, s in zip((acceptor, donor), (substrates.acceptor, substrates.donor)))
+    k, demand = kinetics.maximum_utilization_rate, kinetics.acceptor_to_donor_ratio
+    return m_a * (k * demand * np.maximum(m_d, 0.0) + decay_demand(kinetics)), k * np.maximum(m_a, 0.0) * m_d
 
 
-def paired_slopes(acceptor, donor, substrates, kinetics):
-    """Derivatives of :func:`paired_uptake` (1/h per mg/L): ((dq_A/dC_A, dq_A/dC_D), (dq_D/dC_A, dq_D/dC_D))."""
-    (m_a, d_a), (m_d, d_d) = _both(acceptor, donor, substrates)
-    demand, k = kinetics.acceptor_to_donor_ratio, _paired_most(m_a, m_d, kinetics)
-    by_a, by_d = k * d_a * m_d, k * m_a * d_d
-    return (demand * by_a + decay_demand(kinetics) * d_a, demand * by_d), (by_a, by_d)
+def uptake_slopes(acceptor, donor, substrates: Substrates, kinetics: Kinetics, extended: bool = False) -> Slopes:
+    """Derivatives of :func:`uptake` (1/h per mg/L): ((dq_A/dC_A, dq_A/dC_D), (dq_D/dC_A, dq_D/dC_D))."""
+    (m_a, d_a), (m_d, d_d) = (monod(c, s.half_saturation)
+                              for c, s in zip((acceptor, donor), (substrates.acceptor, substrates.donor)))
+    k, demand = kinetics.maximum_utilization_rate, kinetics.acceptor_to_donor_ratio
+    other_a, cross_a = np.maximum(m_a, 0.0), np.where(acceptor > 0, d_a, 0.0)
+    other_d, cross_d = np.maximum(m_d, 0.0), np.where(donor > 0, d_d, 0.0)
+    if not extended:
+        m_a, m_d, d_a, d_d = other_a, other_d, cross_a, cross_d
+    per_acceptor = k * demand * other_d + decay_demand(kinetics)
+    return ((d_a * per_acceptor, m_a * k * demand * cross_d), (k * cross_a * m_d, k * other_a * d_d))
 
 
-def _paired_most(m_a, m_d, kinetics):
-    """k (1/h), and zero where both fractions are negative."""
-    return np.where((m_a < 0) & (m_d < 0), 0.0, kinetics.maximum_utilization_rate)
-
-
-def growth_rate(acceptor, donor, substrates, kinetics):
+def growth_rate(acceptor, donor, substrates: Substrates, kinetics: Kinetics):
     """F3 / X_A (1/h), net growth of active biomass (9)."""
-    m_a, m_d = _fractions(acceptor, donor, substrates)
+    m_a, m_d = fractions(acceptor, donor, substrates)
     return m_a * (kinetics.maximum_utilization_rate * kinetics.yield_coefficient * m_d - kinetics.decay_coefficient)
 
 
-def inert_rate(acceptor, substrates, kinetics):
+def growth_slopes(acceptor, donor, substrates: Substrates, kinetics: Kinetics):
+    """Its derivatives by C_A and C_D (1/h per mg/L)."""
+    m_a, m_d = fractions(acceptor, donor, substrates)
+    d_a = np.where(acceptor > 0, monod(acceptor, substrates.acceptor.half_saturation)[1], 0.0)
+    d_d = np.where(donor > 0, monod(donor, substrates.donor.half_saturation)[1], 0.0)
+    most = kinetics.maximum_utilization_rate * kinetics.yield_coefficient
+    return d_a * (most * m_d - kinetics.decay_coefficient), m_a * most * d_d
+
+
+def inert_rate(acceptor, substrates: Substrates, kinetics: Kinetics):
     """F4 / X_A (1/h), inert remains left by decay (10)."""
-    m_a = fraction(acceptor, substrates.acceptor.half_saturation)
+    m_a = monod(np.maximum(acceptor, 0.0), substrates.acceptor.half_saturation)[0]
     return m_a * kinetics.decay_coefficient * (1 - kinetics.degradable_fraction)
+
+
+def mean_growth(exponent):
+    """(e^z - 1) / z, the mean over a step of what grows by e^z in it; and its derivative by z."""
+    zero, small = exponent == 0, np.abs(exponent) < 1e-4
+    z = np.where(zero, 1.0, exponent)
+    mean = np.where(zero, 1.0, np.expm1(z) / z)
+    slope = np.where(small, 0.5 + exponent / 3, (np.exp(z) - mean) / z)
+    return mean, slope
 
 
 def grow(active, inert, growth, remains, step: float):
     """(9)-(10) integrated over a step (h) at constant rates: X_A grows by exp(growth step), exactly.
 
-    active, inert: X_A, X_I (mg/L); growth, remains: F3/X_A and F4/X_A (1/h). Returns the new X_A, X_I.
+    active, inert: X_A, X_I, mg/L, or masses of them; growth, remains: F3/X_A and F4/X_A (1/h). Returns the new two.
     """
-    exponent = growth * step
-    small = np.abs(exponent) < 1e-12
-    mean = np.where(small, 1.0, np.expm1(exponent) / np.where(small, 1.0, exponent))
-    return active * np.exp(exponent), inert + active * mean * remains * step
+    mean = mean_growth(growth * step)[0]
+    return active * (1 + growth * step * mean), inert + active * mean * remains * step
+
+
+@dataclass(frozen=True, eq=False)
+class Sink:
+    """Active biomass that takes up substrates: its masses at the points of a reaction, (r, q) um2 mg/L, and the time
+    (h) over which it grows meanwhile; zero: as it is. Over a time, the mean of its mass takes part, that of the rate
+    at the very concentrations that are sought: so what is taken up and what is made are one integral."""
+
+    active: np.ndarray
+    duration: float = 0.0
+
+    def mean(self, acceptor, donor, substrates: Substrates, kinetics: Kinetics) -> np.ndarray:
+        """(r, q) um2 mg/L, mean over the time."""
+        if self.duration == 0:
+            return self.active
+        rate = growth_rate(acceptor, donor, substrates, kinetics)
+        return self.active * mean_growth(rate * self.duration)[0]
+
+    def uptake(self, acceptor, donor, substrates: Substrates, kinetics: Kinetics, extended: bool = False) -> np.ndarray:
+        """(r, 2, q) um2 mg/L/h, taken up of the acceptor and of the donor."""
+        rates = np.stack(uptake(acceptor, donor, substrates, kinetics, extended), axis=1)
+        return self.mean(acceptor, donor, substrates, kinetics)[:, None] * rates
+
+    def slopes(self, acceptor, donor, substrates: Substrates, kinetics: Kinetics, extended: bool = False) -> Slopes:
+        """Derivatives of :meth:`uptake`, um2/h: [of the acceptor's, of the donor's][by C_A, by C_D]."""
+        at = acceptor, donor, substrates, kinetics
+        by = uptake_slopes(*at, extended)
+        if self.duration == 0:
+            return tuple(tuple(self.active * slope for slope in row) for row in by)
+        rates, growth = uptake(*at, extended), growth_slopes(*at)
+        mean, rise = mean_growth(growth_rate(*at) * self.duration)
+        more = [self.active * rise * self.duration * slope for slope in growth]
+        return tuple(tuple(self.active * mean * by[i][j] + more[j] * rates[i] for j in (0, 1)) for i in (0, 1))

@@ -2,61 +2,94 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from repro.errors import TransportError
-from repro.fem import geometry, mesh
-from repro.fem.geometry import Outline
-from repro.fem.mesh import PoreMesh
-from repro.model import flow, gear, transport
+from repro.fem import elements, mesher, sizing
+from repro.fem.linear import Method
+from repro.fem.mesh import Mesh
+from repro.fem.outline import TOP, Outline, half_disc
+from repro.fem.sizing import Sizing
+from repro.fem.space import Space
+from repro.model import biomass, flow, gear, growth, transport
+from repro.model.flow import Bubble, Flow, Stabilised
+from repro.model.transport import Concentrations, Fluxes, Problem
+from repro.scene import Scene
 
 #: The thinnest film to resolve where no [growth] says when it closes (Table 1), um.
 MINIMUM_FILM = 2.0
 #: Under this Peclet number u W / D the inlet supplies nothing that could be told from round-off.
 SLOWEST = 1e-9
+#: With order 2 and 3 elements are made no larger than this asks for: the concentration boundary layer is W Pe^(-1/3)
+#: thick (Leveque), and with four elements across the pore and this factor an overshoot upstream of an aggregate stays
+#: under 1 %.
+BOUNDARY_LAYER = 0.15
 
 
 @dataclass(frozen=True, eq=False)
 class Pore:
     """Geometry and biomass at one time.
 
-    time: h; wall: (M,) contact of each node of ``mesh.loop``; fixed: (M,) its x is held; active, inert: X_A, X_I (N,)
-    mg/L, zero outside the aggregate; origin: (N, 2) um, where the material at a node was at t = 0 (meaningful in the
-    aggregate); theta: (t,) expansion since t = 0 of each biomass triangle; pressure: (N,) P / mu_L;
-    concentrations: the last known ones, None before the first.
+    time: h; space: of velocity and concentrations, on the mesh; wall: (M,) contact of each node of the mesh's loop;
+    fixed: (M,) its x is constrained; active, inert: X_A, X_I, (r, q) um2 mg/L at the points of the reaction; theta:
+    (t, q) expansion since t = 0 in the aggregate's triangles; body: the aggregate as it was at t = 0; pressure:
+    (corners,) P / mu_L; concentrations: the last known ones, None before the first.
     """
 
     time: float
-    mesh: PoreMesh
+    space: Space
     wall: np.ndarray
     fixed: np.ndarray
     active: np.ndarray
     inert: np.ndarray
-    origin: np.ndarray
     theta: np.ndarray
+    body: growth.Body
     pressure: np.ndarray
-    concentrations: transport.Concentrations | None = None
+    concentrations: Concentrations | None = None
 
     @property
+    def mesh(self) -> Mesh:
+        """Of the space."""
+        return self.space.mesh
+
+    @property
+    def origin(self) -> np.ndarray:
+        """(N, 2) um, where the material at a node was at t = 0; in the fluid, where the node is."""
+        found = self.mesh.points.copy()
+        found[self.mesh.body] = self.body.reference
+        return found
+
+    @cached_property
     def outline(self) -> Outline | None:
         """Boundary of the aggregate, None in a clean channel."""
         loop = self.mesh.loop
         if len(loop) == 0:
             return None
-        return Outline(self.mesh.points[loop], self.wall, self.fixed, self.origin[loop])
+        origin = self.body.reference[self.mesh.topology.body_loop]
+        return Outline(self.mesh.points[loop], self.wall, self.fixed, origin, self.mesh.geometry)
 
     @property
     def contact(self) -> bool:
         """Does the aggregate touch the opposite wall?"""
-        return bool((self.wall == geometry.TOP).any())
+        return bool((self.wall == TOP).any())
+
+    @property
+    def mass(self) -> float:
+        """X_A + X_I, integrated over the aggregate, um2 mg/L."""
+        return float(self.active.sum() + self.inert.sum())
+
+    def moved(self, points: np.ndarray) -> Pore:
+        """With its mesh's nodes at ``points`` (N, 2) um."""
+        return replace(self, space=Space(self.mesh.moved(points), self.space.order))
 
     def composition(self, maximum_density: float) -> tuple[float, float, float]:
-        """Share of X_I in the biomass, and the least and the largest (X_A + X_I) / X_m."""
-        weight, total = self.mesh.lumped(self.mesh.biomass), self.active + self.inert
-        density = total[self.mesh.body] / maximum_density
-        return float(weight @ self.inert / (weight @ total)), float(density.min()), float(density.max())
+        """Share of X_I in the biomass, and the least and the largest (X_A + X_I) / X_m, which the constraint J = theta
+        keeps near one."""
+        density = (self.active + self.inert) / self.space.reaction.dx / maximum_density
+        return float(self.inert.sum() / self.mass), float(density.min()), float(density.max())
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,69 +97,113 @@ class Solved:
     """Flow and substrates in the geometry of a pore, and the ledgers of acceptor and donor; None where the scene does
     not model them."""
 
-    flow: flow.Flow | None
-    problem: transport.Problem | None
-    concentrations: transport.Concentrations | None
-    fluxes: tuple[transport.Fluxes, transport.Fluxes] | None = None
+    flow: Flow | None
+    problem: Problem | None
+    concentrations: Concentrations | None
+    fluxes: tuple[Fluxes, Fluxes] | None = None
 
 
-def film(scene) -> float:
+def film(scene: Scene) -> float:
     """Thickness (um) at which a film closes, and the least that the mesh resolves."""
     return scene.growth.minimum_film if scene.growth else MINIMUM_FILM
 
 
-def sizing(scene) -> geometry.Sizing:
+def resolution(scene: Scene) -> float:
+    """What element sizes are divided by: ``numerics.refinement``, or more where boundary layers ask for it.
+
+    The speed is the scene's mean velocity, or that of the clean channel under its head.
+    """
+    if scene.numerics.order == 1 or scene.flow is None or scene.substrates is None:
+        return scene.numerics.refinement
+    return max(scene.numerics.refinement, BOUNDARY_LAYER * peclet(scene, fastest(scene)) ** (1 / 3))
+
+
+def fastest(scene: Scene) -> float:
+    """Mean velocity (um/h) of a scene with flow; under a head that of the clean channel, its largest."""
+    drive = scene.flow
+    if drive.mean_velocity is not None:
+        return drive.mean_velocity
+    loss = flow.poiseuille_loss(scene.pore.length, scene.pore.width)
+    return drive.head * drive.gravity / drive.kinematic_viscosity / loss
+
+
+def sized(scene: Scene) -> Sizing:
     """How large the elements of its meshes are to be."""
-    return geometry.Sizing(scene.pore.width, scene.numerics.refinement, film(scene), scene.numerics.gradation)
+    return Sizing(scene.pore.width, resolution(scene), film(scene), scene.numerics.gradation)
 
 
-def seeded(scene) -> Pore:
-    """The pore at t = 0: X_A = X_m in a half-disc (Table 1), or a clean channel."""
-    numerics, width = scene.numerics, scene.pore.width
-    outline = geometry.seed(scene.aggregate.radius, numerics.refinement) if scene.aggregate else None
-    ends = geometry.meshed_extent(outline, width, scene.pore.length, numerics.extent == "full")
-    grid, outline = mesh.generate(outline, ends, sizing(scene))
-    count = len(grid.points)
+def generate(scene: Scene, outline: Outline | None) -> tuple[Mesh, Outline | None]:
+    """A new mesh around the aggregate (None: a clean channel) with the extent of 3.1, and the outline with the nodes
+    that it has there. Raises MeshError where that cannot be."""
+    numerics = scene.numerics
+    whole = numerics.extent == "full"
+    ends = sizing.meshed_extent(outline, scene.pore.width, scene.pore.length, whole)
+    method = Method(numerics.solver, numerics.ordering)
+    return mesher.generate(outline, ends, sized(scene), numerics.geometry, method)
+
+
+def seeded(scene: Scene) -> Pore:
+    """The pore at t = 0: X_A = X_m in the aggregate (Table 1), or a clean channel."""
+    numerics, outline = scene.numerics, None
+    if scene.aggregate:
+        across = sizing.ACROSS_AGGREGATE * resolution(scene)
+        outline = half_disc(scene.aggregate.radius, across, numerics.geometry)
+    mesh, outline = generate(scene, outline)
+    space = Space(mesh, numerics.order)
     density = scene.kinetics.maximum_density if scene.kinetics else 0.0
-    active = np.zeros(count)
-    active[grid.body] = density
-    wall, fixed = (outline.wall, outline.fixed) if outline else (np.empty(0, int), np.empty(0, bool))
-    return Pore(0.0, grid, wall, fixed, active, np.zeros(count), grid.points.copy(),
-                np.ones(np.count_nonzero(grid.biomass)), np.zeros(count))
+    active = density * space.reaction.dx
+    wall, fixed = np.empty(0, int), np.empty(0, bool)
+    if outline:
+        wall, fixed = outline.wall, outline.fixed
+    body = material(space, mesh.points[mesh.body])
+    theta = np.ones((np.count_nonzero(mesh.biomass), len(body.shape.table.weights)))
+    return Pore(0.0, space, wall, fixed, active, np.zeros_like(active), theta, body, np.zeros(mesh.corners))
 
 
-def solve(scene, pore: Pore) -> Solved:
-    """Flow, then substrates, in the geometry of the pore: what the scene's sections ask for."""
-    carried = solve_flow(scene, pore) if scene.flow else None
+def material(space: Space, reference: np.ndarray) -> growth.Body:
+    """The aggregate of a mesh with its nodes' places (n, 2) um in the reference configuration, integrated where its
+    growth is taken: in one point of a straight triangle."""
+    topology = space.mesh.topology
+    degree = elements.GRADIENT_DEGREES[1] if space.mesh.geometry == 1 else elements.DEGREES[max(2, space.order)]
+    shape = growth.Shape(topology.body_cells, len(topology.body_corners), degree, topology.method)
+    return growth.Body(shape, reference)
+
+
+def solve(scene: Scene, now: Pore, over: float = 0.0) -> Solved:
+    """Flow, then substrates, in the geometry of the pore: what the scene's sections ask for.
+
+    over: h, in which the biomass of ``now`` grows at the rates that are found meanwhile; its mean takes part.
+    """
+    carried = solve_flow(scene, now.space) if scene.flow else None
     if scene.substrates is None:
         return Solved(carried, None, None)
-    problem = transport.problem(pore.mesh, carried, scene.substrates, scene.kinetics, scene.numerics.inlet,
-                                scene.numerics.jacobian == "reused")
-    find = gear.settle
-    if scene.numerics.transport != "gear":
+    numerics = scene.numerics
+    problem = transport.problem(now.space, carried, scene.substrates, scene.kinetics, numerics.inlet,
+                                numerics.jacobian == "reused")
+    sink = biomass.sink(now.active if scene.kinetics else None, over)
+    if numerics.transport == "gear":
+        state = gear.settle(problem, sink, now.concentrations)
+    else:
         refuse_no_supply(scene, carried)
-        find = transport.steady
-    state = find(problem, pore.active, pore.concentrations)
-    return Solved(carried, problem, state, transport.fluxes(problem, pore.active, state))
+        state = transport.steady(problem, sink, now.concentrations)
+    return Solved(carried, problem, state, transport.fluxes(problem, sink, state))
 
 
-def peclet(scene, speed: float) -> float:
+def peclet(scene: Scene, speed: float) -> float:
     """u W / D with the smaller diffusivity, for a mean velocity (um/h)."""
     kinds = (scene.substrates.acceptor, scene.substrates.donor)
     return speed * scene.pore.width / min(min(s.diffusivity, s.diffusivity_in_aggregate) for s in kinds)
 
 
-def refuse_no_supply(scene, carried: flow.Flow | None) -> None:
+def refuse_no_supply(scene: Scene, carried: Flow | None) -> None:
     """Raises TransportError where the flow is too slow to supply anything: no state would be steady."""
     if carried and peclet(scene, carried.mean_velocity) < SLOWEST:
         raise TransportError(f"the Peclet number u W / D is {peclet(scene, carried.mean_velocity):.2g}, under "
                              f"{SLOWEST:g}: nothing is supplied through the inlet; leave [flow] out for pure diffusion")
 
 
-def solve_flow(scene, pore: Pore) -> flow.Flow:
+def solve_flow(scene: Scene, space: Space) -> Flow:
     """Stokes flow under the scene's head or mean velocity."""
-    numerics, drive = scene.numerics, scene.flow
-    unit = flow.unit_flow(pore.mesh, drive.viscosity_ratio, interface=numerics.interface,
-                          stabilisation=numerics.flow_stabilisation, element=numerics.flow_element)
-    return flow.scaled(unit, pore.mesh, scene.pore.length, drive.kinematic_viscosity / drive.gravity, head=drive.head,
-                       mean_velocity=drive.mean_velocity)
+    numerics = scene.numerics
+    element = Bubble() if numerics.flow_element == "bubble" else Stabilised(numerics.flow_stabilisation)
+    return flow.solve(space, scene.flow, scene.pore.length, interface=numerics.interface, element=element)

@@ -3,7 +3,7 @@
 The momentum balance of the fluid's triangles alone, tested with the nodal functions of the interface, is what the fluid
 is pushed with there; the aggregate is pushed back (consistent nodal forces). With head phi and velocity u,
 
-    f_i = - sum over fluid triangles of |tau| sigma grad N_i,        sigma = rho nu grad u - rho g phi
+    f_i = - integral over the fluid's triangles of sigma grad N_i,        sigma = rho nu grad u - rho g phi
 
 or rho nu (grad u + grad u^T) in the traction form [E2]: the form of the scene's flow, so that the forces on the
 aggregate, the walls and the ends add up to nothing, to round-off. Where hardly anything flows through the aggregate
@@ -15,16 +15,18 @@ that touches walls and fluid alone.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from repro.errors import GrowthError
-from repro.fem import reprojection
-from repro.fem.mesh import PoreMesh
+from repro.fem import elements, transfer
+from repro.fem.mesh import Mesh
+from repro.fem.space import Space
 from repro.model import mesh_motion, pore, remeshing
-from repro.model.flow import Flow
+from repro.model.flow import Flow, pressure_space
 from repro.model.pore import Pore
+from repro.scene import Scene
 
 #: rho g in MPa/um, for rho in mg/L and g in um/h^2.
 MPA_PER_UM = 1e-3 * 1e-6 / 3600**2 * 1e-12
@@ -36,55 +38,60 @@ ROUND_OFF = 1e-14
 class Surroundings:
     """The mesh in which the flow around a shape is solved. It may be another than the aggregate's own.
 
-    grid: the mesh; nodes: (k, a) numbers in ``mesh.body`` of the aggregate's own mesh, and share: (k, a) their weights:
-    a node of ``grid.body`` is the mean of their places, and what pushes it pushes them in these shares.
+    mesh: it; nodes: (k, a) numbers in ``mesh.body`` of the aggregate's own mesh, and share: (k, a) their weights: a
+    node of this mesh's body is the mean of their places, and what pushes it pushes them in these shares.
     """
 
-    grid: PoreMesh
+    mesh: Mesh
     nodes: np.ndarray
     share: np.ndarray
 
 
-def surroundings(scene, before: Pore, shaped: Pore) -> Surroundings:
+def surroundings(scene: Scene, before: Pore, shaped: Pore) -> Surroundings:
     """The mesh that has followed the aggregate from a pore with a good mesh, or a new one where that is due."""
-    grid = before.mesh if shaped is before else remeshing.followed(scene, before, shaped)
-    if grid is not None:
-        own = np.arange(len(grid.body))[:, None]
-        return Surroundings(grid, own, np.ones(own.shape))
-    grid, _ = remeshing.anew(scene, shaped.outline)
-    body = shaped.mesh.body
-    found, share = reprojection.locate(shaped.mesh.points[body], shaped.mesh.body_triangles, grid.points[grid.body])
-    return Surroundings(grid, shaped.mesh.body_triangles[found], share)
+    mesh = before.mesh if shaped is before else remeshing.followed(scene, before, shaped)
+    if mesh is not None:
+        own = np.arange(len(mesh.body))[:, None]
+        return Surroundings(mesh, own, np.ones(own.shape))
+    mesh, _ = pore.generate(scene, shaped.outline)
+    cells = shaped.mesh.topology.body_cells
+    at = transfer.located(shaped.mesh.points[shaped.mesh.body], cells, mesh.points[mesh.body])
+    return Surroundings(mesh, cells[at.triangle], elements.values(mesh.geometry, at.local))
 
 
-def forces(scene, around: Surroundings, shaped: Pore) -> np.ndarray:
+def forces(scene: Scene, around: Surroundings, shaped: Pore) -> np.ndarray:
     """(n, 2) um: nodal forces over mu_L on ``shaped.mesh.body`` by the flow around that shape."""
-    grid, own = around.grid, shaped.mesh.points[shaped.mesh.body]
+    mesh, own = around.mesh, shaped.mesh.points[shaped.mesh.body]
     places = np.einsum("ka,kai->ki", around.share, own[around.nodes])
-    if np.abs(places - grid.points[grid.body]).max() > ROUND_OFF * grid.width:
+    if np.abs(places - mesh.points[mesh.body]).max() > ROUND_OFF * mesh.width:
         numerics = scene.numerics
-        grid = grid.moved(mesh_motion.move(grid, places, numerics.mesh_compressibility, numerics.flow_stabilisation))
-    if grid.areas.min() <= 0:
+        mesh = mesh.moved(mesh_motion.move(mesh, places, numerics.mesh_compressibility, numerics.flow_stabilisation))
+    if mesh.areas.min() <= 0 or mesh.turned_over().any():
         raise GrowthError("the fluid's forces move the aggregate so far that the mesh around it turns over; "
                           'try a shorter growth.time_step, or growth.fluid_forces = "neglected"')
-    drive = scene.flow
-    found = pore.solve_flow(scene, replace(shaped, mesh=grid))
-    on = nodal(grid, found, drive.kinematic_viscosity / drive.gravity, scene.numerics.interface)[grid.body]
+    drive, space = scene.flow, Space(mesh, shaped.space.order)
+    found = pore.solve_flow(scene, space)
+    on = nodal(space, found, drive.kinematic_viscosity / drive.gravity, scene.numerics.interface)[mesh.body]
     total = np.zeros_like(own)
     np.add.at(total, around.nodes, around.share[..., None] * on[:, None])
     return MPA_PER_UM * drive.density * drive.gravity / scene.growth.shear_modulus * total
 
 
-def nodal(grid: PoreMesh, found: Flow, viscosity: float, interface: str) -> np.ndarray:
-    """(N, 2) um2 of head: forces of the fluid's triangles on all nodes, over rho g; zero inside fluid and aggregate.
+def nodal(space: Space, found: Flow, viscosity: float, interface: str) -> np.ndarray:
+    """(N, 2) um2 of head: forces of the fluid's triangles on all nodes of the mesh, over rho g; zero inside fluid and
+    aggregate.
 
     viscosity: nu_water / g, um h; interface: "laplacian" or "traction".
     """
-    wet = ~grid.biomass
-    nodes, slopes = grid.triangles[wet], grid.gradients[wet]
-    grad = np.einsum("tai,tak->tik", found.velocity[nodes], slopes)
+    mesh, wet, pressure = space.mesh, ~space.mesh.biomass, pressure_space(space)
+    at = space.gradients_at
+    grad = np.einsum("tai,tqka->tqik", found.velocity[space.cells[wet]], at.slopes[wet])
     if interface == "traction":
-        grad = grad + np.swapaxes(grad, 1, 2)
-    stress = viscosity * grad - found.head[nodes].mean(axis=1)[:, None, None] * np.eye(2)
-    local = -grid.areas[wet][:, None, None] * np.einsum("tik,tak->tai", stress, slopes)
-    return np.column_stack([np.bincount(nodes.ravel(), local[..., i].ravel(), len(grid.points)) for i in (0, 1)])
+        grad = grad + np.swapaxes(grad, 2, 3)
+    head = found.head[pressure.cells[wet]] @ pressure.values_at(space.gradient_table).T
+    stress = viscosity * grad - head[..., None, None] * np.eye(2)
+    of = elements.table(mesh.geometry, mesh.geometry, space.gradient_degree)
+    slopes = elements.points(mesh.points[mesh.cells[wet]], of).slopes
+    local = -np.einsum("tq,tqik,tqka->tai", at.dx[wet], stress, slopes)
+    nodes = mesh.cells[wet].ravel()
+    return np.column_stack([np.bincount(nodes, local[..., i].ravel(), len(mesh.points)) for i in (0, 1)])

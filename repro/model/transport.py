@@ -1,83 +1,96 @@
 """Substrates (2.2, 3.3): advection, diffusion and uptake of acceptor and donor, (7)-(8) with (11)-(13).
 
-Linear nodal functions N_i; the reaction is lumped at the nodes with the area of the biomass triangles around each,
-so that the substrate taken up and the biomass made are the same sums. For one substrate
+For one substrate and every nodal function N_i, with order 2 or 3 in the form that conserves,
+
+    (D grad C, grad N_i) - (C u, grad N_i) + <u_x C, N_i>_outlet + (q(C) X_A, N_i)_biomass = <u_x C_supply, N_i>_inlet
+
+and with linear functions, the reaction lumped at the nodes,
 
     (D grad C, grad N_i) + (w . grad C, N_i) + <u_x (C - C_supply), N_i>_inlet + m_i q(C_i) X_i = 0
 
-where w = u - tau grad p is the divergence-free velocity of :mod:`repro.model.flow`. Summed over i, the second term is the net
-flux of u C through the ends, so the balance closes to round-off: supply in = out + consumed. Without flow the supply is
-held at both ends, or nothing passes them ("closed"). With u_ave for the inlet's u_x, (11) reads as printed [E4], and
-what is supplied, u_ave W C_supply, is not quite what enters.
+where w = u - tau grad p is the divergence-free velocity of :mod:`repro.model.flow`. Summed over i either is the balance:
+supply in = out + consumed, to round-off. Without flow the supply is held at both ends, or nothing passes them
+("closed"). With u_ave for the inlet's u_x, (11) reads as printed [E4], and what is supplied, u_ave W C_supply, is not
+quite what enters.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
 
 from repro.errors import TransportError
-from repro.fem import linear
-from repro.fem.assembly import ElementSystem, each, mass
-from repro.fem.mesh import PoreMesh
-from repro.fem.newton import Jacobian
-from repro.model import kinetics as law
-from repro.model.flow import Flow, forms, mean_over
+from repro.fem.assembly import ElementSystem, Factored, each, mass
+from repro.fem.mesh import Mesh
+from repro.fem.newton import Newton, relative
+from repro.fem.space import Space
+from repro.model.flow import Flow
+from repro.model.kinetics import Sink
+from repro.scene import Kinetics, Substrate, Substrates
 from repro.timing import timed
 
-#: Newton stops when the residual is this small against the largest term of its row's balance.
-NEWTON, MOST_ITERATIONS = 1e-13, 60
-#: Concentrations below zero by less than this part of the supply are round-off, anything more is a failure.
-ROUND_OFF = 1e-9
-
-
-@dataclass(frozen=True, eq=False)
-class Operator:
-    """Linear part of one substrate in one geometry: matrix @ C - source is what must balance the uptake.
-
-    matrix: (N, N) um2/h, symmetric in its sparsity; magnitude: its absolute values; source: (N,) um2 mg/L/h; held:
-    nodes where C = supply; inflow, outflow: (N,) um2/h weights of the flux through inlet and outlet; supplied: the flux
-    supplied by the inlet, um2 mg/L/h; supply: mg/L.
-    """
-
-    matrix: sp.csc_matrix
-    magnitude: sp.csc_matrix
-    source: np.ndarray
-    held: np.ndarray
-    inflow: np.ndarray
-    outflow: np.ndarray
-    supplied: float
-    supply: float
+#: Newton stops at this residual against the size of its terms, or at the second where round-off keeps it from falling.
+NEWTON, ROUND_OFF, MOST_ITERATIONS = 1e-13, 1e-12, 60
+#: Parts of a step of Newton's method that are tried, and by how much of them the residual must fall.
+LENGTHS, FALL = 0.5 ** np.arange(8), 1e-4
+#: A concentration below zero by more than this part of the larger supply is not resolved. Where a substrate is used up
+#: behind a front of 2 um, the coarsest preset has -1.6e-4, with effluents right to 5e-5 of the supply.
+UNRESOLVED = 1e-3
+#: Neither is one above its supply by more than this part of it.
+OVERSHOOT = 0.02
+#: Linear concentrations with a lumped reaction below zero by less than this part of the supply are so by round-off.
+NEGATIVE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Both substrates in one geometry: their operators, body (N,) um2 lumped biomass area, total (N,) lumped area;
-    nodes: (N,) in elimination order; newton: the sparsity of both substrates' Newton matrix; reused: does Newton's
-    method use its derivative again?"""
+    """Both substrates in one geometry, with n nodes in all and k a triangle.
 
-    mesh: PoreMesh
-    acceptor: Operator
-    donor: Operator
-    body: np.ndarray
-    total: np.ndarray
-    substrates: object
-    kinetics: object
-    nodes: np.ndarray
-    newton: PairPattern
+    matrices: (T, k, k) um2/h of each, without uptake; operator: (2n, 2n) of both, not coupled, and magnitude: the same
+    of its entries; source: (2n,) um2 mg/L/h; inflow, outflow: (n,) um2/h, integrals of u_x N_i over an end; system: of
+    both, coupled where there is biomass; kinetics: None without biomass; reused: does Newton's method keep its
+    derivative while that does enough?
+    """
+
+    space: Space
+    matrices: tuple[np.ndarray, np.ndarray]
+    operator: sp.csc_matrix
+    magnitude: sp.csc_matrix
+    source: np.ndarray
+    inflow: np.ndarray
+    outflow: np.ndarray
+    system: ElementSystem
+    substrates: Substrates
+    kinetics: Kinetics | None
     reused: bool
 
     @property
-    def both(self) -> tuple[Operator, Operator]:
-        """Acceptor and donor."""
-        return self.acceptor, self.donor
+    def mesh(self) -> Mesh:
+        """Of the space."""
+        return self.space.mesh
+
+    @property
+    def both(self) -> tuple[Substrate, Substrate]:
+        """Acceptor and donor, as the scene describes them."""
+        return self.substrates.acceptor, self.substrates.donor
+
+    @property
+    def supply(self) -> np.ndarray:
+        """(2n,) mg/L, of the acceptor at all nodes, then of the donor."""
+        return np.repeat([s.supply for s in self.both], self.space.count)
+
+    @property
+    def floor(self) -> float:
+        """How far (mg/L) below zero a concentration may be: a lumped reaction of linear ones keeps them positive."""
+        return 0.0 if self.space.order == 1 else UNRESOLVED * max(s.supply for s in self.both)
 
 
 @dataclass(frozen=True, eq=False)
 class Concentrations:
-    """C_A and C_D (N,) mg/L at the nodes, and the iterations that they took."""
+    """C_A and C_D (n,) mg/L at the nodes of their space, and the iterations that they took."""
 
     acceptor: np.ndarray
     donor: np.ndarray
@@ -85,192 +98,311 @@ class Concentrations:
 
 
 @timed("transport")
-def problem(mesh: PoreMesh, flow: Flow | None, substrates, kinetics, inlet: str = "local",
-            reused: bool = False) -> Problem:
-    """Assemble both substrates' linear parts for one geometry and flow (None: pure diffusion).
+def problem(space: Space, flow: Flow | None, substrates: Substrates, kinetics: Kinetics | None,
+            inlet: str = "local", reused: bool = False) -> Problem:
+    """Assemble both substrates' linear parts for one geometry and flow of the same space (None: pure diffusion).
 
-    substrates, kinetics: of a scene (kinetics None without biomass); inlet: "local" or "mean", u_x or u_ave in (11);
-    reused: as :class:`Problem`'s.
+    inlet: "local" or "mean", u_x or u_ave in (11); reused: as :class:`Problem`'s.
     """
-    dofs, count = mesh.triangles, len(mesh.points)
-    scalar = mesh.once("scalar", lambda: ElementSystem(dofs, np.arange(count), np.zeros(count, bool)))
-    carried = 0.0 if flow is None else advection(mesh, flow)
-    acceptor, donor = [_operator(mesh, flow, carried, scalar, s, inlet, substrates.boundary)
-                       for s in (substrates.acceptor, substrates.donor)]
-    nodes = mesh.once("node order", lambda: linear.node_order(count, dofs))
-    newton = mesh.once("newton", lambda: PairPattern(scalar.indices, scalar.indptr, mesh.body, nodes))
-    return Problem(mesh, acceptor, donor, mesh.lumped(mesh.biomass), mesh.lumped(), substrates, kinetics, nodes,
-                   newton, reused)
-
-
-def advection(mesh: PoreMesh, flow: Flow) -> np.ndarray:
-    """(T, 3, 3) of (w . grad C, v) with w = u - tau grad p, linear on each triangle: the mass matrix times w . grad."""
-    w = flow.velocity[mesh.triangles] - flow.correction[:, None, :]
-    return mass(mesh.areas) @ (w @ np.swapaxes(mesh.gradients, 1, 2))
-
-
-def _operator(mesh: PoreMesh, flow: Flow | None, carried, scalar, substrate, inlet: str, boundary: str) -> Operator:
-    """Diffusion, advection and the conditions at both ends for one substrate."""
-    diffusivity = np.where(mesh.biomass, substrate.diffusivity_in_aggregate, substrate.diffusivity)
-    spread = each(diffusivity, forms(mesh).laplace)
-    nothing, held, supplied = np.zeros(len(mesh.points)), np.empty(0, int), 0.0
-    inflow = outflow = robin = nothing
+    kinds, dofs = (substrates.acceptor, substrates.donor), space.dofs
+    carried, source = np.zeros((1, 1, 1)), np.zeros(space.count)
+    inflow, outflow = np.zeros(space.count), np.zeros(space.count)
     if flow is not None:
-        inflow, outflow = (_edge_flux(mesh, nodes, flow.velocity[nodes, 0]) for nodes in (mesh.inlet, mesh.outlet))
-        mean = np.full(len(mesh.inlet), flow.mean_velocity)
-        robin = inflow if inlet == "local" else _edge_flux(mesh, mesh.inlet, mean)
-        supplied = flow.mean_velocity * mesh.width * substrate.supply
-    elif boundary == "open":
-        held = np.concatenate([mesh.inlet, mesh.outlet])
-    matrix = scalar.matrix(spread + carried)
-    matrix.setdiag(matrix.diagonal() + robin)  # in its place: a sum would drop entries that happen to be zero
-    return Operator(matrix, abs(matrix), robin * substrate.supply, held, inflow, outflow, supplied, substrate.supply)
+        u_x = flow.velocity[:, 0]
+        enters = u_x if inlet == "local" else np.full(space.count, flow.mean_velocity)
+        inflow = space.summed(dofs.inlet, space.end_loads(dofs.inlet, u_x))
+        outflow = space.summed(dofs.outlet, space.end_loads(dofs.outlet, u_x))
+        source = space.summed(dofs.inlet, space.end_loads(dofs.inlet, enters))
+        carried = advection(space, flow, enters)
+    spread = [np.where(space.mesh.biomass, s.diffusivity_in_aggregate, s.diffusivity) for s in kinds]
+    matrices = each(spread[0], space.stiffness) + carried, each(spread[1], space.stiffness) + carried
+    held = flow is None and substrates.boundary == "open"
+    operator = space.mesh.topology.system(("both", space.order), lambda: _apart(space)).matrix(matrices)
+    system = space.mesh.topology.system(("transport", space.order, held), lambda: _system(space, held))
+    magnitude = copy(operator)
+    magnitude.data = np.abs(operator.data)
+    return Problem(space, matrices, operator, magnitude, np.concatenate([s.supply * source for s in kinds]), inflow,
+                   outflow, system, substrates, kinetics, reused)
 
 
-def _edge_flux(mesh: PoreMesh, nodes: np.ndarray, speed: np.ndarray) -> np.ndarray:
-    """(N,) integrals of u_x N_i over the inlet or outlet, um2/h, u_x linear between its nodes."""
-    length = np.diff(mesh.points[nodes, 1])
-    weight = np.zeros(len(mesh.points))
-    weight[nodes[:-1]] += length * (2 * speed[:-1] + speed[1:]) / 6
-    weight[nodes[1:]] += length * (speed[:-1] + 2 * speed[1:]) / 6
-    return weight
+def advection(space: Space, flow: Flow, enters: np.ndarray) -> np.ndarray:
+    """(T, k, k) um2/h of what the flow carries, with the conditions at inlet and outlet; enters: (n,) um/h, the speed
+    in (11)."""
+    if flow.correction is None:
+        return _conserving(space, flow.velocity, enters)
+    return _by_divergence_free(space, flow, enters)
+
+
+def _conserving(space: Space, velocity: np.ndarray, enters: np.ndarray) -> np.ndarray:
+    """-(C u, grad v), u_x C v over the outlet, and (u_ave - u_x) C v over the inlet where (11) has u_ave [E4]."""
+    at, dofs = space.at, space.dofs
+    u_x, u_y = space.at_points(velocity.T) * -at.dx
+    along = u_x[..., None] * at.slopes[:, :, 0]
+    along += u_y[..., None] * at.slopes[:, :, 1]
+    found = space.load(np.swapaxes(along, 1, 2))
+    _add_at(space, found, dofs.outlet, space.end_masses(dofs.outlet, velocity[:, 0]))
+    if enters is not velocity[:, 0] and np.any(enters[dofs.inlet] != velocity[dofs.inlet, 0]):
+        _add_at(space, found, dofs.inlet, space.end_masses(dofs.inlet, enters - velocity[:, 0]))
+    return found
+
+
+def _by_divergence_free(space: Space, flow: Flow, enters: np.ndarray) -> np.ndarray:
+    """(w . grad C, v) with w = u - tau grad p, linear on each triangle, and u_x C v over the inlet, lumped."""
+    mesh, dofs = space.mesh, space.dofs
+    w = flow.velocity[mesh.triangles] - flow.correction[:, None, :]
+    found = mass(mesh.areas) @ (w @ np.swapaxes(mesh.gradients, 1, 2))
+    loads = space.end_loads(dofs.inlet, enters)
+    _add_at(space, found, dofs.inlet, loads[:, :, None] * np.eye(loads.shape[1]))
+    return found
+
+
+def _add_at(space: Space, matrices: np.ndarray, edges: np.ndarray, blocks: np.ndarray) -> None:
+    """Add (E, e, e) of the edges of an end to the element matrices of their triangles, in place."""
+    owner, place = space.owners(edges)
+    np.add.at(matrices, (owner[:, None, None], place[:, :, None], place[:, None, :]), blocks)
+
+
+def _apart(space: Space) -> ElementSystem:
+    """Acceptor, then donor of all nodes in their own order, without their uptake."""
+    count = 2 * space.count
+    return ElementSystem((space.cells, space.count + space.cells), np.arange(count), np.zeros(count, bool),
+                         space.mesh.topology.method)
+
+
+def _system(space: Space, held_ends: bool) -> ElementSystem:
+    """Acceptor and donor of a node side by side, nodes in elimination order: their own triangles, then both together
+    on the pieces of biomass, where the uptake couples them."""
+    place = np.empty(space.count)
+    place[space.dofs.elimination] = np.arange(space.count)
+    held = np.zeros(space.count, bool)
+    held[both_ends(space)] = held_ends
+    pieces = space.reaction.cells
+    both = np.concatenate([pieces, space.count + pieces], axis=1)
+    return ElementSystem((space.cells, space.count + space.cells, both), np.concatenate([place, place + 0.5]),
+                         np.tile(held, 2), space.mesh.topology.method)
+
+
+def both_ends(space: Space) -> np.ndarray:
+    """Nodes of the inlet and of the outlet."""
+    return np.concatenate([space.end_nodes(space.dofs.inlet), space.end_nodes(space.dofs.outlet)])
 
 
 def supplied_everywhere(problem: Problem) -> Concentrations:
     """C = C_supply in the whole pore, the state at t = 0 (2.2)."""
-    ones = np.ones(len(problem.mesh.points))
-    return Concentrations(problem.acceptor.supply * ones, problem.donor.supply * ones)
+    acceptor, donor = problem.supply.reshape(2, -1)
+    return Concentrations(acceptor, donor)
+
+
+@dataclass(frozen=True, eq=False)
+class Iterate:
+    """Both concentrations (2n,), their residual and the size of its terms, um2 mg/L/h."""
+
+    state: np.ndarray
+    residual: np.ndarray
+    size: np.ndarray
+    free: np.ndarray | slice
+
+    #: Constrained nodes have their supply from the start.
+    complete = True
+
+    @property
+    def defect(self) -> float:
+        """Largest residual of a free node against the size of its row's terms."""
+        return relative(self.residual[self.free], self.size[self.free])
+
+    @property
+    def length(self) -> float:
+        """Of the residual at free nodes."""
+        return float(np.linalg.norm(self.residual[self.free]))
+
+
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """The equations of a problem with a sink (None: nothing is taken up), as Newton's method asks for them.
+
+    extended: uptake below zero as :mod:`repro.model.kinetics` has it for iterates; shortened: steps are cut until the
+    residual falls.
+    """
+
+    problem: Problem
+    sink: Sink | None
+    extended: bool = True
+    shortened: bool = False
+
+    def _at(self, state: np.ndarray):
+        """C_A and C_D (r, q) in the points of the reaction, and the laws."""
+        problem = self.problem
+        pieces = problem.space.reaction
+        acceptor, donor = state.reshape(2, -1)[:, pieces.cells] @ pieces.values.T
+        return acceptor, donor, problem.substrates, problem.kinetics
+
+    def _taken(self, loads: np.ndarray) -> np.ndarray:
+        """(2n,) sum of loads (r, 2, q) times the nodal functions."""
+        pieces, count = self.problem.space.reaction, self.problem.space.count
+        nodes = np.stack([pieces.cells, count + pieces.cells], axis=1)
+        return np.bincount(nodes.ravel(), (loads @ pieces.values).ravel(), 2 * count)
+
+    def uptake(self, state: np.ndarray) -> np.ndarray:
+        """(r, 2, q) um2 mg/L/h."""
+        return self.sink.uptake(*self._at(state), self.extended)
+
+    def residual(self, state: np.ndarray) -> np.ndarray:
+        """(2n,) um2 mg/L/h for C_A, then C_D, of all nodes (2n,), mg/L."""
+        found = self.problem.operator @ state - self.problem.source
+        return found if self.sink is None else found + self._taken(self.uptake(state))
+
+    def sizes(self, state: np.ndarray) -> np.ndarray:
+        """Sizes (2n,) of the terms of the residual, all taken as positive."""
+        found = self.problem.magnitude @ np.abs(state) + np.abs(self.problem.source)
+        if self.sink is None:
+            return found
+        pieces, count = self.problem.space.reaction, self.problem.space.count
+        nodes = np.stack([pieces.cells, count + pieces.cells], axis=1)
+        loads = np.abs(self.uptake(state)) @ np.abs(pieces.values)
+        return found + np.bincount(nodes.ravel(), loads.ravel(), 2 * count)
+
+    def tangent(self, state: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Element matrices, um2/h, of the residual's derivative: of both substrates and of their uptake."""
+        slopes = {}
+        if self.sink is not None:
+            by = self.sink.slopes(*self._at(state), self.extended)
+            slopes = {(i, j): by[i][j] for i, j in np.ndindex(2, 2)}
+        return *self.problem.matrices, self._coupled(slopes)
+
+    def _coupled(self, slopes: dict[tuple[int, int], np.ndarray]) -> np.ndarray:
+        """(r, 2k, 2k) of the derivatives (r, q) of the uptake of i by the concentration of j, um2/h."""
+        pieces = self.problem.space.reaction
+        count, k = pieces.cells.shape
+        products = (pieces.values[:, :, None] * pieces.values[:, None, :]).reshape(len(pieces.values), -1)
+        found = np.zeros((count, 2 * k, 2 * k))
+        for (i, j), slope in slopes.items():
+            found[:, i * k: i * k + k, j * k: j * k + k] = (slope @ products).reshape(count, k, k)
+        return found
+
+    def begun(self, state: np.ndarray) -> Iterate:
+        """The first iterate."""
+        return Iterate(state, self.residual(state), self.sizes(state), self.problem.system.free)
+
+    def factored(self, iterate: Iterate) -> Factored:
+        """The derivative, factorised."""
+        return self.problem.system.factored(self.tangent(iterate.state))
+
+    def advanced(self, iterate: Iterate, factors: Factored, fresh: bool) -> Iterate:
+        """A step of Newton's method where it lowers the residual and nothing is negative, else :meth:`swept`; sizes of
+        the terms are those of the first guess, then those after the first step of each derivative."""
+        step = factors.solve(-iterate.residual)
+        new = self._shorter(iterate, step) if self.shortened else self._full(iterate, step)
+        return replace(new, size=self.sizes(new.state)) if fresh else new
+
+    def _tried(self, iterate: Iterate, state: np.ndarray) -> Iterate:
+        return replace(iterate, state=state, residual=self.residual(state))
+
+    def _full(self, iterate: Iterate, step: np.ndarray) -> Iterate:
+        trial = self._tried(iterate, iterate.state + step)
+        if trial.length > iterate.length or trial.state.min() < -self.problem.floor:
+            return self._tried(iterate, self.swept(np.maximum(iterate.state, 0.0)))
+        return trial
+
+    def _shorter(self, iterate: Iterate, step: np.ndarray) -> Iterate:
+        """The longest part of a step that lowers the residual."""
+        for length in LENGTHS:
+            trial = self._tried(iterate, iterate.state + length * step)
+            if trial.length <= (1 - FALL * length) * iterate.length:
+                return trial
+        return self._tried(iterate, self.swept(np.maximum(iterate.state, 0.0)))
+
+    def swept(self, state: np.ndarray) -> np.ndarray:
+        """(2n,) solution with the uptake's coefficients q(C) / C frozen at the state, which keeps what is positive so,
+        as far as functions of higher order can."""
+        per = {}
+        if self.sink is not None:
+            at = self._at(state)
+            taken, slopes = self.sink.uptake(*at, True), self.sink.slopes(*at, True)
+            for k, c in enumerate(at[:2]):
+                tiny = 1e-9 * self.problem.both[k].half_saturation
+                per[k, k] = np.where(c > tiny, taken[:, k] / np.maximum(c, tiny), slopes[k][k])
+        elements = *self.problem.matrices, self._coupled(per)
+        return self.problem.system.solve(elements, self.problem.source, state)
 
 
 @timed("transport")
-def steady(problem: Problem, active: np.ndarray | None, guess: Concentrations | None = None) -> Concentrations:
-    """Steady concentrations: Newton's method on both substrates at once.
+def steady(problem: Problem, sink: Sink | None, guess: Concentrations | None = None) -> Concentrations:
+    """Steady concentrations by Newton's method on both substrates at once.
 
-    active: X_A (N,) mg/L, None without biomass; guess: a first iterate, C_supply everywhere by default.
-    Raises TransportError where Newton does not converge or a concentration is negative.
+    sink: what takes them up, None without biomass; guess: at the problem's nodes, C_supply everywhere by default. Where
+    the method does not converge, as behind a sharp front, it starts again from the supply with shorter steps, and half
+    saturations come down from the supply to what they are, a tenth at a time. Raises TransportError where that fails
+    too, or where a concentration is outside of zero to the supply by more than UNRESOLVED and OVERSHOOT say: the mesh
+    is too coarse for its front.
     """
-    start = supplied_everywhere(problem) if guess is None else guess
-    state = np.stack([start.acceptor, start.donor])
-    weight = np.zeros(len(problem.mesh.points)) if active is None else problem.body * active
-    jacobian = Jacobian(problem.reused)
-    residual, size, slopes = _balance(problem, weight, state)
-    for iteration in range(MOST_ITERATIONS):
-        defect = _relative(residual, size)
-        if defect <= NEWTON:
-            return _checked(problem, weight, state, iteration)
-        if jacobian.stale(defect):
-            blocks = [[weight * entry for entry in row] for row in slopes]
-            jacobian.factors = linear.factorised(problem.newton.matrix(*problem.both, blocks))
-        state, residual, size, slopes = _advance(problem, weight, state, residual, jacobian.factors)
-    raise TransportError(f"Newton's method for the substrates stands at a defect of {defect:.2g} after "
-                         f"{MOST_ITERATIONS} iterations; try a larger numerics.refinement")
+    if problem.kinetics is None:
+        sink = None
+    supply = problem.supply
+    state = supply.copy() if guess is None else np.concatenate([guess.acceptor, guess.donor])
+    state[problem.system.held] = supply[problem.system.held]
+    try:
+        found, count = _found(Balance(problem, sink), state)
+    except TransportError:
+        found, count = _eased(problem, sink, supply)
+    if sink is not None and found.min() < 0:
+        found, more = _found(Balance(problem, sink, extended=False), found)
+        count += more
+    return _checked(problem, sink, found, count)
 
 
-def _balance(problem: Problem, weight: np.ndarray, state: np.ndarray):
-    """Residual (2, N), the size of the terms in each row, and the uptake's derivatives [[AA, AD], [DA, DD]] (N,)."""
-    nothing = np.zeros(len(weight))
-    uptake, slopes = (nothing, nothing), ((nothing, nothing), (nothing, nothing))
-    if problem.kinetics is not None:
-        *uptake, slopes = law.uptake(state[0], state[1], problem.substrates, problem.kinetics)
-    residual, size = np.empty_like(state), np.empty_like(state)
-    for k, operator in enumerate(problem.both):
-        sink = weight * uptake[k]
-        residual[k] = operator.matrix @ state[k] - operator.source + sink
-        size[k] = operator.magnitude @ np.abs(state[k]) + operator.source + np.abs(sink)
-        residual[k, operator.held] = state[k, operator.held] - operator.supply
-        size[k, operator.held] = operator.supply
-    return residual, size, slopes
+def _found(balance: Balance, state: np.ndarray) -> tuple[np.ndarray, int]:
+    """(2n,) the solution from a start, and Newton's iterations."""
+    newton = Newton(NEWTON, ROUND_OFF, MOST_ITERATIONS, balance.problem.reused)
+    last, count, converged = newton.solve(balance, balance.begun(state))
+    if not converged:
+        raise TransportError(f"Newton's method for the substrates stands at a defect of {last.defect:.2g} after "
+                             f"{count} iterations; try a larger numerics.refinement")
+    return last.state, count
 
 
-def _relative(residual: np.ndarray, size: np.ndarray) -> float:
-    """Largest residual against the size of its row's terms."""
-    return float(np.max(np.abs(residual)[size > 0] / size[size > 0], initial=0.0))
+def _eased(problem: Problem, sink: Sink | None, state: np.ndarray) -> tuple[np.ndarray, int]:
+    """Newton's method with half saturations that fall from the supply to what they are."""
+    least = min(s.half_saturation / max(s.supply, s.half_saturation) for s in problem.both)
+    total = 0
+    for factor in 10.0 ** np.arange(np.ceil(-np.log10(least)), -1, -1):
+        acceptor, donor = (_softened(substrate, factor) for substrate in problem.both)
+        eased = replace(problem, substrates=replace(problem.substrates, acceptor=acceptor, donor=donor))
+        state, iterations = _found(Balance(eased, sink, shortened=True), state)
+        total += iterations
+    return state, total
 
 
-def _advance(problem: Problem, weight, state, residual, factors):
-    """A Newton step where it keeps both substrates positive and lowers the residual; else a positive sweep."""
-    trial = state + _solve(problem, factors, -residual)
-    found = _balance(problem, weight, trial)
-    if trial.min() < 0 or np.linalg.norm(found[0]) > np.linalg.norm(residual):
-        trial = _sweep(problem, weight, np.maximum(state, 0.0))
-        found = _balance(problem, weight, trial)
-    return trial, *found
+def _softened(substrate: Substrate, factor: float) -> Substrate:
+    """With a half saturation larger by a factor, but for one above the supply."""
+    half = max(substrate.half_saturation, min(factor * substrate.half_saturation, substrate.supply))
+    return replace(substrate, half_saturation=half)
 
 
-def _solve(problem: Problem, factors: linear.Solver, right: np.ndarray) -> np.ndarray:
-    """(2, N) solution with a matrix of both substrates, factorised."""
-    solution = np.empty_like(right)
-    found = factors.solve(right[:, problem.nodes].T.ravel())
-    solution[:, problem.nodes] = found.reshape(-1, 2).T
-    return solution
+def _checked(problem: Problem, sink: Sink | None, state: np.ndarray, iterations: int) -> Concentrations:
+    """The solution, if it stays between zero and the supply as well as it has to. Linear concentrations that are below
+    zero by round-off are swept once, which keeps a non-negative right-hand side's solution non-negative."""
+    round_off = NEGATIVE * max(s.supply for s in problem.both)
+    if problem.floor == 0 and -round_off <= state.min() < 0:
+        state = Balance(problem, sink).swept(np.maximum(state, 0.0))
+    for name, field, substrate in zip(("acceptor", "donor"), state.reshape(2, -1), problem.both):
+        if field.min() < -problem.floor:
+            raise _outside(problem, name, field, int(field.argmin()), substrate)
+        if problem.space.order > 1 and field.max() > (1 + OVERSHOOT) * substrate.supply:
+            raise _outside(problem, name, field, int(field.argmax()), substrate)
+    acceptor, donor = state.reshape(2, -1)
+    return Concentrations(acceptor, donor, iterations)
 
 
-class PairPattern:
-    """Sparsity of the Newton matrix of both substrates, acceptor and donor of a node side by side, nodes in elimination
-    order; the substrates are coupled at the aggregate's nodes alone.
-
-    indices, indptr: of an operator's (N, N) matrix by columns; body: coupled nodes; nodes: (N,) in elimination order.
-    """
-
-    def __init__(self, indices: np.ndarray, indptr: np.ndarray, body: np.ndarray, nodes: np.ndarray):
-        self.body, self.count = body, 2 * len(nodes)
-        place = np.empty(len(nodes), int)
-        place[nodes] = 2 * np.arange(len(nodes))
-        rows, columns = place[indices], place[np.repeat(np.arange(len(nodes)), np.diff(indptr))]
-        coupled = place[body]
-        pairs = [(rows, columns), (rows + 1, columns + 1), (coupled, coupled + 1), (coupled + 1, coupled)]
-        keys = np.concatenate([column * self.count + row for row, column in pairs])
-        by_column = np.argsort(keys)
-        slot = np.empty(len(keys), int)
-        slot[by_column] = np.arange(len(keys))
-        self.slots = np.split(slot, np.cumsum([len(row) for row, _ in pairs])[:-1])
-        self.indices = (keys[by_column] % self.count).astype(np.int32)
-        self.indptr = np.searchsorted(keys[by_column], self.count * np.arange(self.count + 1)).astype(np.int32)
-        self.diagonals = [np.searchsorted(keys[by_column], (place + k) * (self.count + 1)) for k in (0, 1)]
-
-    def matrix(self, acceptor: Operator, donor: Operator, blocks) -> sp.csc_matrix:
-        """(2N, 2N) operators' matrices plus diagonal blocks; the rows of held nodes are the identity's."""
-        data = np.zeros(len(self.indices))
-        data[self.slots[0]], data[self.slots[1]] = acceptor.matrix.data, donor.matrix.data
-        for k, operator in enumerate((acceptor, donor)):
-            data[self.diagonals[k]] += blocks[k][k]
-            data[self.slots[2 + k]] = blocks[k][1 - k][self.body]
-            rows = self.indices[self.diagonals[k][operator.held]]
-            data[np.isin(self.indices, rows)] = 0.0
-            data[self.diagonals[k][operator.held]] = 1.0
-        return sp.csc_matrix((data, self.indices, self.indptr), shape=(self.count, self.count))
-
-
-def _checked(problem: Problem, weight, state, iterations: int) -> Concentrations:
-    """The solution, positive: round-off below zero is removed by one sweep with the sink written as C times a
-    coefficient, which keeps a non-negative right-hand side's solution non-negative."""
-    if state.min() < 0 and state.min() >= -ROUND_OFF * max(operator.supply for operator in problem.both):
-        state = _sweep(problem, weight, np.maximum(state, 0.0))
-    if state.min() < 0:
-        which, worst = np.unravel_index(np.argmin(state), state.shape)
-        x, y = problem.mesh.points[worst]
-        raise TransportError(f"the {('acceptor', 'donor')[which]} is negative, {state[which, worst]:.3g} mg/L at "
-                             f"x = {x:.4g}, y = {y:.4g} um; the mesh is too coarse there: "
-                             "try a larger numerics.refinement")
-    return Concentrations(state[0], state[1], iterations)
-
-
-def _sweep(problem: Problem, weight, state) -> np.ndarray:
-    """Solve (matrix + weight q(C) / C) C_new = source, with the uptake's coefficients frozen at the state."""
-    *uptake, slopes = law.uptake(state[0], state[1], problem.substrates, problem.kinetics)
-    tiny, zero, right = np.finfo(float).tiny, np.zeros(len(weight)), np.empty_like(state)
-    per = [np.where(c > tiny, q / np.maximum(c, tiny), slopes[k][k]) for k, (c, q) in enumerate(zip(state, uptake))]
-    for k, operator in enumerate(problem.both):
-        right[k] = operator.source
-        right[k, operator.held] = operator.supply
-    blocks = [[weight * per[0], zero], [zero, weight * per[1]]]
-    return _solve(problem, linear.factorised(problem.newton.matrix(*problem.both, blocks)), right)
+def _outside(problem: Problem, name: str, field: np.ndarray, node: int, substrate: Substrate) -> TransportError:
+    x, y = problem.space.points[node]
+    return TransportError(f"the {name} is {field[node]:.3g} mg/L at x = {x:.4g}, y = {y:.4g} um, outside of 0 to "
+                          f"{substrate.supply:g}; the mesh is too coarse there: try a larger numerics.refinement")
 
 
 @dataclass(frozen=True)
 class Fluxes:
     """One substrate's ledger in an instant, per um of depth (um2 mg/L/h): in, out and consumed; and concentrations
-    (mg/L): flow-weighted at the meshed inlet and at the outlet (the mean over the end's nodes without flow)."""
+    (mg/L): flow-weighted at the meshed inlet and at the outlet (the mean over the end without flow)."""
 
     supplied: float
     out: float
@@ -279,21 +411,25 @@ class Fluxes:
     effluent: float
 
 
-def fluxes(problem: Problem, active: np.ndarray | None, state: Concentrations) -> tuple[Fluxes, Fluxes]:
-    """Ledger of the acceptor and of the donor in one geometry."""
-    q = (0.0, 0.0)
-    if problem.kinetics is not None and active is not None:
-        q = law.uptake(state.acceptor, state.donor, problem.substrates, problem.kinetics)[:2]
-    weight = 0.0 if active is None else problem.body * active
-    acceptor, donor = (_fluxes(problem.mesh, operator, field, float(np.sum(weight * rate)))
-                       for operator, field, rate in zip(problem.both, (state.acceptor, state.donor), q))
-    return acceptor, donor
+def fluxes(problem: Problem, sink: Sink | None, state: Concentrations) -> tuple[Fluxes, Fluxes]:
+    """Ledger of the acceptor and of the donor in one geometry: supplied and out from the ends, consumed from the uptake
+    at the state."""
+    space, both = problem.space, np.stack([state.acceptor, state.donor])
+    consumed, out = np.zeros(2), both @ problem.outflow
+    if sink is not None and problem.kinetics is not None:
+        consumed = Balance(problem, sink, extended=False).uptake(both.ravel()).sum(axis=(0, 2))
+    supplied = problem.source.reshape(2, -1).sum(axis=1)
+    if problem.system.held.any():
+        through = (problem.operator @ both.ravel()).reshape(2, -1)
+        supplied = through[:, both_ends(space)].sum(axis=1)
+    means = [_end_means(space, both, edges, load) for edges, load in
+             ((space.dofs.inlet, problem.inflow), (space.dofs.outlet, problem.outflow))]
+    acceptor, donor = np.column_stack([supplied, out, consumed, *means]).tolist()
+    return Fluxes(*acceptor), Fluxes(*donor)
 
 
-def _fluxes(mesh: PoreMesh, operator: Operator, field: np.ndarray, consumed: float) -> Fluxes:
-    supplied = operator.supplied
-    if len(operator.held):
-        supplied = float(np.sum((operator.matrix @ field - operator.source)[operator.held]))
-    ends = [float(weight @ field / weight.sum()) if weight.any() else mean_over(mesh, nodes, field)
-            for weight, nodes in ((operator.inflow, mesh.inlet), (operator.outflow, mesh.outlet))]
-    return Fluxes(supplied, float(operator.outflow @ field), consumed, *ends)
+def _end_means(space: Space, both: np.ndarray, edges: np.ndarray, load: np.ndarray) -> np.ndarray:
+    """(2,) mg/L, weighted with the flow through an end, plain where nothing flows."""
+    if not load.any():
+        load = space.summed(edges, space.end_loads(edges, np.ones(space.count)))
+    return both @ load / load.sum()

@@ -18,23 +18,22 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 
-from repro.curved import results as curved
-from repro.curved.mesh import CurvedMesh
-from repro.fem import mesh
-from repro.march.coupling import Instant, Ledger
-from repro.model import growth
-from repro.scene import Scene, scene_hash, scene_tables
+from repro.march.loop import Instant, Ledger
+from repro.model import biomass, growth
+from repro.model.pore import Pore, Solved
+from repro.scene import Kinetics, Scene, scene_hash, scene_tables
 
 M_PER_D, CM = 24e-6, 1e-4  # of um/h, of um
 
 COLUMNS = """time_h mean_velocity_m_per_d head_loss_cm conductivity_m_per_d effluent_acceptor_mg_per_L
 effluent_donor_mg_per_L inlet_acceptor_mg_per_L inlet_donor_mg_per_L aggregate_area_um2 thickness_um upstream_um
 downstream_um meshed_length_um inert_fraction biomass_density_min biomass_density_max acceptor_min_mg_per_L
-donor_min_mg_per_L acceptor_balance donor_balance biomass_balance nodes remeshed contact""".split()
+donor_min_mg_per_L acceptor_balance donor_balance biomass_balance oxygen_demand_balance nodes
+remeshed contact""".split()
 
 LEDGER_COLUMNS = ["start_h", "end_h"] + [f"{name}_{part}_pg_per_m" for name in ("acceptor", "donor") for part in
                   ("supplied", "out", "consumed", "stored")] + [f"biomass_{part}_pg_per_m" for part in
-                  ("before", "made", "after")]
+                  ("before", "made", "after")] + ["oxygen_demand_balance"]
 
 PACKAGES = ("numpy", "scipy", "scikit-fem", "meshio", "mmgpy", "shapely", "pint")
 
@@ -78,7 +77,7 @@ def _transient_columns(scene: Scene, instant: Instant) -> dict[str, float]:
         return {}
     problem, found = instant.solved.problem, {}
     for k, name in enumerate(("acceptor", "donor")):
-        room = problem.both[k].supply * problem.total.sum()
+        room = problem.both[k].supply * float(problem.space.at.dx.sum())
         steps = [_defect(ledger.supplied[k], ledger.out[k] + ledger.stored[k], ledger.consumed[k], room)
                  for ledger in instant.ledgers]
         found[f"{name}_balance"] = max(steps, key=abs, default=0.0)
@@ -105,57 +104,70 @@ def _aggregate_columns(scene: Scene, instant: Instant) -> dict[str, float]:
     if scene.growth:
         defects = [(a.biomass_after - a.biomass_before - a.biomass_made) / a.biomass_after for a in instant.ledgers]
         found["biomass_balance"] = max(defects, key=abs, default=0.0)
+        demands = [oxygen_demand_balance(scene.kinetics, ledger) for ledger in instant.ledgers]
+        found["oxygen_demand_balance"] = max(demands, key=abs, default=0.0)
     return found
 
 
-def ledger_row(ledger: Ledger) -> list[float]:
+def oxygen_demand_balance(kinetics: Kinetics, ledger: Ledger) -> float:
+    """Defect of a step's ledger by (7)-(10): biomass made less Y donor - (acceptor - F donor) / d_c, of what was
+    consumed, over the larger of the two terms. The first is what the donor makes, the second what decays."""
+    acceptor, donor = ledger.consumed
+    grown = kinetics.yield_coefficient * donor
+    decayed = (acceptor - kinetics.acceptor_to_donor_ratio * donor) / kinetics.decay_oxygen_demand
+    scale = max(abs(grown), abs(decayed))
+    return (ledger.biomass_made - grown + decayed) / scale if scale else 0.0
+
+
+def ledger_row(scene: Scene, ledger: Ledger) -> list[float]:
     """One row of ``ledger.csv``: a step's balances per metre of depth; 1 um2 mg/L is 1 pg/m."""
     parts = (ledger.supplied, ledger.out, ledger.consumed, ledger.stored)
     substrates = [part[which] for which in (0, 1) for part in parts]
-    return [ledger.start, ledger.end, *substrates, ledger.biomass_before, ledger.biomass_made, ledger.biomass_after]
+    return [ledger.start, ledger.end, *substrates, ledger.biomass_before, ledger.biomass_made, ledger.biomass_after,
+            oxygen_demand_balance(scene.kinetics, ledger)]
 
 
-def fields(scene: Scene, pore, solved) -> meshio.Mesh:
+def fields(scene: Scene, pore: Pore, solved: Solved) -> meshio.Mesh:
     """The fields of an instant for meshio: places in um, one value a node or a triangle, named with their units.
 
     In the fluid there is no biomass, stress or pressure P (zero), theta and J are 1, and places have not moved. Stress
     and P are those of the strain since t = 0: a scene whose new biomass is born stress-free has none to tell.
     """
-    grid = pore.mesh
-    if isinstance(grid, CurvedMesh):
-        return curved.fields(scene, pore, solved)
-    points, cells = {}, {"region": grid.biomass.astype(float)}
+    mesh, space = pore.mesh, pore.space
+    points, cells = {}, {"region": mesh.biomass.astype(float)}
     if solved.flow:
-        points["velocity_m_per_d"] = _three(M_PER_D * solved.flow.velocity[: len(grid.points)])
-        points["head_cm"] = CM * solved.flow.head
+        points["velocity_m_per_d"] = _three(M_PER_D * space.to_mesh(solved.flow.velocity))
+        points["head_cm"] = CM * mesh.with_middles(solved.flow.head[: mesh.corners])
     if solved.concentrations:
-        points["acceptor_mg_per_L"] = solved.concentrations.acceptor
-        points["donor_mg_per_L"] = solved.concentrations.donor
+        points["acceptor_mg_per_L"] = space.to_mesh(solved.concentrations.acceptor)
+        points["donor_mg_per_L"] = space.to_mesh(solved.concentrations.donor)
     if scene.kinetics:
-        points["active_biomass"] = pore.active / scene.kinetics.maximum_density
-        points["inert_biomass"] = pore.inert / scene.kinetics.maximum_density
+        whole = space.reaction.dx * scene.kinetics.maximum_density
+        points["active_biomass"] = biomass.at_nodes(space, pore.active / whole)
+        points["inert_biomass"] = biomass.at_nodes(space, pore.inert / whole)
     if scene.growth:
         _add_mechanics(scene, pore, points, cells)
-    return meshio.Mesh(_three(grid.points), [("triangle", grid.triangles)], point_data=points,
+    kind = "triangle" if mesh.geometry == 1 else "triangle6"
+    return meshio.Mesh(_three(mesh.points), [(kind, mesh.cells)], point_data=points,
                        cell_data={name: [value] for name, value in cells.items()})
 
 
-def _add_mechanics(scene: Scene, pore, points: dict, cells: dict) -> None:
-    grid, modulus = pore.mesh, scene.growth.shear_modulus
-    body = np.isin(np.arange(len(grid.points)), grid.body)
-    origin = np.where(body[:, None], pore.origin, grid.points)
-    points["displacement_um"], points["position_t0_um"] = _three(grid.points - origin), _three(origin)
-    triangles = grid.triangles[grid.biomass]
-    F = growth.deformation(grid.points, triangles, mesh.gradients(origin, triangles))
-    values = {"theta": pore.theta, "J": np.linalg.det(F)}
+def _add_mechanics(scene: Scene, pore: Pore, points: dict[str, np.ndarray], cells: dict[str, np.ndarray]) -> None:
+    mesh, body, modulus = pore.mesh, pore.body, scene.growth.shear_modulus
+    points["displacement_um"] = _three(mesh.points - pore.origin)
+    points["position_t0_um"] = _three(pore.origin)
+    strained = body.strained(mesh.points[mesh.body])
+    values = {"theta": pore.theta, "J": strained.J}
     if scene.growth.new_biomass == "stressed":
-        points["pressure_MPa"] = modulus * pore.pressure
-        stress = modulus * growth.cauchy(F, pore.pressure[triangles].mean(axis=1))
+        points["pressure_MPa"] = modulus * mesh.with_middles(pore.pressure)
+        pressure = pore.pressure[mesh.triangles[mesh.biomass]] @ body.shape.table.linear.T
+        stress = modulus * growth.cauchy(strained.F, pressure)
         names = ("stress_xx_MPa", "stress_yy_MPa", "stress_zz_MPa", "stress_xy_MPa")
-        values |= dict(zip(names, stress.T), largest_principal_stress_MPa=growth.largest_principal(stress))
+        values |= dict(zip(names, np.moveaxis(stress, -1, 0)))
+        values["largest_principal_stress_MPa"] = growth.largest_principal(stress)
     for name, value in values.items():
-        cells[name] = np.full(len(grid.triangles), 1.0 if name in ("theta", "J") else 0.0)
-        cells[name][grid.biomass] = value
+        cells[name] = np.full(len(mesh.cells), 1.0 if name in ("theta", "J") else 0.0)
+        cells[name][mesh.biomass] = (value * body.at.dx).sum(axis=1) / body.at.dx.sum(axis=1)
 
 
 def _three(plane: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ ENDINGS = {"_m_per_d": ("m d-1", "m/day"), "_mg_per_L": ("mg L-1", "mg/L"), "_pg
 
 #: Everything that is a pure number.
 PURE = {"inert_fraction", "biomass_density_min", "biomass_density_max", "acceptor_balance", "donor_balance",
-        "biomass_balance", "nodes", "remeshed", "contact", "region", "theta", "J", "active_biomass", "inert_biomass"}
+        "biomass_balance", "oxygen_demand_balance", "nodes", "remeshed", "contact", "region", "theta", "J", "active_biomass", "inert_biomass"}
 
 #: Pure numbers that stand for yes (1) and no (0).
 YES_NO = {"remeshed", "contact"}
@@ -40,6 +40,7 @@ _WORDS = {
     "acceptor_balance": "relative defect of the acceptor's balance",
     "donor_balance": "relative defect of the donor's balance",
     "biomass_balance": "relative defect of the biomass's balance",
+    "oxygen_demand_balance": "biomass made less Y donor - (acceptor - F donor) / d_c, relative",
     "nodes": "nodes of the mesh",
     "remeshed": "mesh made anew",
     "contact": "contact with the opposite wall",

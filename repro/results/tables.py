@@ -9,7 +9,7 @@ from html import escape
 import numpy as np
 
 from repro import results
-from repro.march.coupling import SAME_TIME, PoreEnd
+from repro.march.loop import SAME_TIME, PoreEnd
 from repro.march.simulation import simulate
 from repro.scene import Scene
 

@@ -70,7 +70,7 @@ class Recorder:
                 self._write_fields(self.before, "before_expansion", *instant.before)
             found = results.row(self.scene, instant)
             self.rows.append([found[name] for name in results.COLUMNS])
-            self.ledgers += [results.ledger_row(ledger) for ledger in instant.ledgers]
+            self.ledgers += [results.ledger_row(self.scene, ledger) for ledger in instant.ledgers]
             self.remeshes += instant.remeshes
             self.iterations = added(self.iterations, instant.iterations)
         self.state = state

@@ -3,41 +3,44 @@
 from __future__ import annotations
 
 from dataclasses import astuple
-from typing import Any
 
 import numpy as np
 
-from repro.curved.mesh import CurvedMesh
-from repro.curved.pore import Pore as CurvedPore
 from repro.errors import CheckpointError
-from repro.fem import geometry
-from repro.fem.mesh import PoreMesh, triangle_areas
+from repro.fem.linear import Method
+from repro.fem.mesh import Mesh, triangle_areas
+from repro.fem.outline import BOTTOM, FREE, TOP
+from repro.fem.space import Space
 from repro.march.loop import Ledger, State
 from repro.march.pace import Pace
-from repro.model.pore import Pore
+from repro.model.pore import Pore, material
 from repro.model.transport import Concentrations
-from repro.scene import scene_hash
+from repro.scene import Scene, scene_hash
 
-#: {array: (kind of its numbers, shape)}; a letter is the same number wherever it stands.
-COMMON = {"points": ("f", "N", 2), "biomass": ("b", "T"), "loop": ("i", "M"), "wall": ("i", "M"), "fixed": ("b", "M"),
-          "active": ("f", "N"), "inert": ("f", "N"), "origin": ("f", "N", 2)}
-LINEAR = {**COMMON, "triangles": ("i", "T", 3), "theta": ("f", "B"), "pressure": ("f", "N")}
-CURVED = {**COMMON, "cells": ("i", "T", 6), "reference": ("f", "N", 2), "pressure": ("f", "C")}
-GUESS = {"acceptor": ("f", "N"), "donor": ("f", "N")}
-PLAIN = {"scene", "time_h", "pace", "ends_um", "corners", "guess", "ledgers", "remeshes", "iterations"}
+#: {array: (kind of its numbers, shape)}; a letter is the same number wherever it stands. N nodes, T triangles of G nodes,
+#: B of them biomass with Q points of growth, R pieces of reaction with P points, M nodes of the boundary, n of the
+#: aggregate, C corners, D nodes of the concentrations.
+ARRAYS = {"points": ("f", "N", 2), "cells": ("i", "T", "G"), "biomass": ("b", "T"), "loop": ("i", "M"),
+          "wall": ("i", "M"), "fixed": ("b", "M"), "active": ("f", "R", "P"), "inert": ("f", "R", "P"),
+          "theta": ("f", "B", "Q"), "reference": ("f", "n", 2), "pressure": ("f", "C")}
+#: No expansion, concentration or other number of a state is as large.
+LARGEST = 1e9
+GUESS = {"acceptor": ("f", "D"), "donor": ("f", "D")}
+PLAIN = {"scene", "time_h", "pace", "ends_um", "guess", "ledgers", "remeshes", "iterations"}
 
 
-def packed(scene, state: State) -> tuple[dict, dict[str, np.ndarray]]:
+def packed(scene: Scene, state: State) -> tuple[dict, dict[str, np.ndarray]]:
     """A state as what JSON can say, and arrays."""
     now, guess = state.pore, state.pore.concentrations
-    names = CURVED if isinstance(now, CurvedPore) else LINEAR
-    arrays = {name: getattr(now if hasattr(now, name) else now.mesh, name) for name in names}
+    parts = {"points": now.mesh.points, "cells": now.mesh.cells, "biomass": now.mesh.biomass, "loop": now.mesh.loop,
+             "reference": now.body.reference}
+    arrays = {name: parts[name] if name in parts else getattr(now, name) for name in ARRAYS}
     if guess:
         arrays |= {name: getattr(guess, name) for name in GUESS}
     return {"scene": scene_hash(scene), "time_h": now.time, "pace": list(astuple(state.pace)),
-            "ends_um": [float(x) for x in now.mesh.ends], "corners": getattr(now.mesh, "corners", None),
-            "guess": guess.iterations if guess else None, "ledgers": [_numbers(ledger) for ledger in state.ledgers],
-            "remeshes": int(state.remeshes), "iterations": state.iterations}, arrays
+            "ends_um": [float(x) for x in now.mesh.ends], "guess": guess.iterations if guess else None,
+            "ledgers": [_numbers(ledger) for ledger in state.ledgers], "remeshes": int(state.remeshes),
+            "iterations": state.iterations}, arrays
 
 
 def _numbers(ledger: Ledger) -> list[float]:
@@ -45,7 +48,7 @@ def _numbers(ledger: Ledger) -> list[float]:
     return [float(value) for part in astuple(ledger) for value in np.atleast_1d(part)]
 
 
-def unpacked(scene, plain: dict, arrays: dict[str, np.ndarray]) -> State:
+def unpacked(scene: Scene, plain: dict, arrays: dict[str, np.ndarray]) -> State:
     """The state that :func:`packed` was given. Raises CheckpointError where it is none of this scene, or no state."""
     if set(plain) != PLAIN or plain["scene"] != scene_hash(scene):
         raise CheckpointError("it is of another scene")
@@ -53,8 +56,7 @@ def unpacked(scene, plain: dict, arrays: dict[str, np.ndarray]) -> State:
     _refuse(not (counted(plain["remeshes"]) and counts(plain["iterations"])), "its counts")
     _refuse(plain["guess"] is not None and not counted(plain["guess"]), "its counts")
     _check(scene, plain, arrays)
-    pore = (_curved if scene.numerics.curved else _linear)(scene, plain, arrays)
-    _refuse_turned_over(pore)
+    pore = _pore(scene, plain, arrays)
     return State(pore, _pace(plain["pace"]), _ledgers(plain["ledgers"]), plain["remeshes"], plain["iterations"])
 
 
@@ -99,63 +101,71 @@ def _ledger(row) -> Ledger:
     return Ledger(row[0], row[1], **pairs, biomass_before=before, biomass_made=made, biomass_after=after)
 
 
-def _check(scene, plain: dict, arrays: dict[str, np.ndarray]) -> None:
+def _check(scene: Scene, plain: dict, arrays: dict[str, np.ndarray]) -> None:
     """Kinds and shapes of all arrays, finite numbers, indices that are nodes."""
-    wanted = CURVED if scene.numerics.curved else LINEAR
+    wanted = ARRAYS
     if plain["guess"] is not None:
         wanted = {**wanted, **GUESS}
     _refuse(arrays.keys() != wanted.keys(), "its list of arrays")
-    sizes = {"C": plain["corners"], "B": np.count_nonzero(arrays["biomass"])}
+    sizes = {"B": np.count_nonzero(arrays["biomass"]), "G": 3 * scene.numerics.geometry}
     for name, (kind, *shape) in wanted.items():
         array = arrays[name]
         right = array.ndim == len(shape) and array.dtype.kind == kind and all(
             sizes.setdefault(letter, count) == count if isinstance(letter, str) else letter == count
             for letter, count in zip(shape, array.shape))
         _refuse(not right or kind == "f" and not np.isfinite(array).all(), f"array {name!r}")
-    for name in ("triangles", "cells", "loop"):
-        indices = arrays.get(name, np.zeros(1, int))
+    for name in ("cells", "loop"):
+        indices = arrays[name]
         _refuse(indices.size > 0 and not 0 <= indices.min() <= indices.max() < sizes["N"], f"array {name!r}")
-    _refuse(not np.isin(arrays["wall"], (geometry.FREE, geometry.BOTTOM, geometry.TOP)).all(), "array 'wall'")
+    _refuse(not np.isin(arrays["wall"], (FREE, BOTTOM, TOP)).all(), "array 'wall'")
     _refuse(sizes["T"] == 0, "a mesh without triangles")
     _refuse((sizes["M"] > 0) != (scene.aggregate is not None) or (sizes["B"] > 0) != (sizes["M"] > 0), "its aggregate")
     _check_places(scene, plain["ends_um"], arrays)
 
 
-def _check_places(scene, ends, arrays: dict[str, np.ndarray]) -> None:
+def _check_places(scene: Scene, ends, arrays: dict[str, np.ndarray]) -> None:
     """Ends within the pore, and places within it too, but for a hundredth of its width."""
     half, width, slack = 0.5 * scene.pore.length * (1 + 1e-9), scene.pore.width, 0.01 * scene.pore.width
     right = isinstance(ends, list) and len(ends) == 2 and all(in_range(x, -half, half) for x in ends)
     _refuse(not right or ends[0] >= ends[1], "its extent")
-    for name in arrays.keys() & {"points", "origin", "reference"}:
+    for name in ("points", "reference"):
         x, y = arrays[name].T
-        _refuse(bool(np.abs(x).max() > half + slack or y.min() < -slack or y.max() > width + slack), f"array {name!r}")
+        outside = np.abs(x).max(initial=0.0) > half + slack or y.min(initial=0.0) < -slack or (
+            y.max(initial=0.0) > width + slack)
+        _refuse(bool(outside), f"array {name!r}")
 
 
-def _refuse_turned_over(pore) -> None:
-    """Raises CheckpointError where a triangle has no area, at present or as it was at first."""
-    grid = pore.mesh
-    corners = grid.cells[:, :3] if isinstance(grid, CurvedMesh) else grid.triangles
-    _refuse(not triangle_areas(grid.points, corners).min() > 0, "a triangle")
-    if grid.biomass.any():
-        _refuse(not triangle_areas(pore.origin, corners[grid.biomass]).min() > 0, "a triangle's place at t = 0")
+def _pore(scene: Scene, plain: dict, arrays: dict[str, np.ndarray]) -> Pore:
+    """The pore, if its nodes are in order and no triangle is without area, at present or as it was at first."""
+    cells, loop, numerics = arrays["cells"], arrays["loop"], scene.numerics
+    if numerics.geometry == 2:
+        corners = int(cells[:, :3].max()) + 1
+        right = cells[:, 3:].min() == corners and len(loop) % 2 == 0
+        _refuse(not right or bool((loop[::2] >= corners).any() or (loop[1::2] < corners).any()), "its nodes' order")
+    _refuse(not triangle_areas(arrays["points"], cells[:, :3]).min() > 0, "a triangle")
+    method = Method(numerics.solver, numerics.ordering)
+    mesh = Mesh.of(arrays["points"], cells, arrays["biomass"], loop, scene.pore.width, tuple(plain["ends_um"]), method)
+    space = Space(mesh, numerics.order)
+    _check_sizes(space, plain, arrays)
+    body = material(space, arrays["reference"])
+    if mesh.biomass.any():
+        _refuse(not body.at.dx.min() > 0, "a triangle's place at t = 0")
+    own = {name: arrays[name] for name in ("wall", "fixed", "active", "inert", "theta", "pressure")}
+    return Pore(time=plain["time_h"], space=space, body=body, **own, concentrations=_guess(plain, arrays))
 
 
-def _linear(scene, plain: dict, arrays: dict[str, np.ndarray]) -> Pore:
-    mesh: dict[str, Any] = {name: arrays[name] for name in ("points", "triangles", "biomass", "loop")}
-    grid = PoreMesh(**mesh, width=scene.pore.width, ends=tuple(plain["ends_um"]))
-    _refuse(arrays["theta"].min(initial=1.0) <= 0, "array 'theta'")
-    own = {name: arrays[name] for name in LINEAR.keys() - mesh.keys()}
-    return Pore(time=plain["time_h"], mesh=grid, **own, concentrations=_guess(plain, arrays))
-
-
-def _curved(scene, plain: dict, arrays: dict[str, np.ndarray]) -> CurvedPore:
-    corners, cells, loop = plain["corners"], arrays["cells"], arrays["loop"]
-    right = counted(corners) and cells[:, :3].max() < corners <= cells[:, 3:].min() and len(loop) % 2 == 0
-    _refuse(not right or bool((loop[::2] >= corners).any() or (loop[1::2] < corners).any()), "its nodes' order")
-    mesh: dict[str, Any] = {name: arrays[name] for name in ("points", "cells", "biomass", "loop")}
-    grid = CurvedMesh(**mesh, corners=corners, width=scene.pore.width, ends=tuple(plain["ends_um"]))
-    own = {name: arrays[name] for name in CURVED.keys() - mesh.keys()}
-    return CurvedPore(time=plain["time_h"], mesh=grid, **own, concentrations=_guess(plain, arrays))
+def _check_sizes(space: Space, plain: dict, arrays: dict[str, np.ndarray]) -> None:
+    """Sizes that the mesh decides, and amounts that can be: no mass below zero, densities and expansions in bounds."""
+    mesh, dx = space.mesh, space.reaction.dx
+    _refuse(len(arrays["reference"]) != len(mesh.body) or len(arrays["pressure"]) != mesh.corners, "its list of arrays")
+    _refuse(arrays["active"].shape != dx.shape or arrays["theta"].shape[0] != np.count_nonzero(mesh.biomass),
+            "its list of arrays")
+    _refuse(plain["guess"] is not None and len(arrays["acceptor"]) != space.count, "its concentrations")
+    theta = arrays["theta"]
+    _refuse(bool(theta.min(initial=1.0) <= 0 or theta.max(initial=1.0) > LARGEST), "array 'theta'")
+    _refuse(min(arrays[name].min(initial=0.0) for name in ("active", "inert")) < 0, "its biomass")
+    for name in GUESS.keys() & arrays.keys():
+        _refuse(float(np.abs(arrays[name]).max()) > LARGEST, f"array {name!r}")
 
 
 def _guess(plain: dict, arrays: dict[str, np.ndarray]) -> Concentrations | None:

@@ -9,9 +9,8 @@ if TYPE_CHECKING:
 _UNSTEADY = ', or numerics.transport = "gear": nothing is supplied, so that no state is steady'
 MOST_STEPS = 100_000  # shape updates of a run
 SHORTEST_STEP = 1e-6  # h: times are told apart to 1e-9 h
-#: What curved elements have one way of, and what that is.
-CURVED = {"time": "midpoint", "transport": "quasi_steady", "transfer": "conserving", "interface": "laplacian",
-          "inlet": "local", "fixed_point": "kept", "flow_element": "stabilised"}
+#: What only linear elements have a choice of, and what the others have.
+HIGHER_ORDER = {"transfer": "conserving", "flow_element": "stabilised"}
 
 Rules = Iterator[tuple[bool, str, str]]  # (is it broken, the key to name, what is accepted)
 
@@ -68,22 +67,15 @@ def _growth_rules(scene: "Scene") -> Rules:
 def _force_rules(scene: "Scene") -> Rules:
     wanted = '"neglected" is needed without [flow]'
     yield scene.flow is None, "growth.fluid_forces", wanted
-    elements = f'with numerics.elements = "{scene.numerics.elements}"'
-    wanted = f'"neglected" is needed {elements}; preset = "paper" has the other'
-    yield scene.numerics.curved, "growth.fluid_forces", wanted
     wanted = '"neglected" is needed with growth.new_biomass = "stress_free", which would yield at every update'
     yield scene.growth.new_biomass == "stress_free", "growth.fluid_forces", wanted
 
 
 def _numerics_rules(scene: "Scene") -> Rules:
     numerics = scene.numerics
-    if numerics.curved:
-        elements = f'with numerics.elements = "{numerics.elements}"'
-        for key, only in CURVED.items():
-            wanted = f'"{only}" is needed {elements}; preset = "paper" has the others'
-            yield getattr(numerics, key) != only, f"numerics.{key}", wanted
-        stress_free = scene.growth is not None and scene.growth.new_biomass == "stress_free"
-        yield stress_free, "growth.new_biomass", f'"stressed" is needed {elements}'
+    for key, only in HIGHER_ORDER.items() if numerics.order > 1 else ():
+        wanted = f'"{only}" is needed with numerics.elements = "{numerics.elements}"; "linear" has the others'
+        yield getattr(numerics, key) != only, f"numerics.{key}", wanted
     gear = numerics.time == "midpoint" and numerics.transport == "gear"
     yield gear, "numerics.transport", '"quasi_steady" is needed with numerics.time = "midpoint"'
 

@@ -1,8 +1,7 @@
-"""Reprojection of the biomass after growth, (30)-(34), and transfer of fields to a new mesh (3.5, [E8]).
+"""Fields from one mesh to another (3.5, [E8]).
 
-The mass of a nodal field X on the aggregate is sum_i S_i X_i, with S_i = sum of |tau| / 3 over the biomass triangles at
-node i: the integral of the linear field. (34) keeps each node's mass when the triangles change their areas. To a new
-mesh the paper interpolates linearly, which drifts; the conserving transfer is the Galerkin projection
+Interpolation: where a place lies in the old triangles, straight or curved, and what a field of any order is there. It
+is the paper's transfer, and drifts. The conserving transfer of linear fields is the Galerkin projection
 
     (X_new, N_i) = (X_old, N_i)  for every new N_i, integrated exactly over the common pieces of both meshes,
 
@@ -18,37 +17,93 @@ the largest alpha_ij = alpha_ji from 0 to 1 that Zalesak's limiter finds safe: n
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import shapely
 
 from repro.errors import TransferError
-from repro.fem import linear
+from repro.fem import elements, linear
 from repro.fem.assembly import ElementSystem, mass
-from repro.fem.mesh import triangle_areas
+from repro.fem.mesh import Mesh, checked_bends, triangle_areas
 from repro.timing import timed
 
 #: The common pieces of two meshes must cover both to this relative accuracy.
 COVER = 1e-9
 #: A projection that exceeds its bounds by less than this part of the field's largest value is not limited.
 OVERSHOOT = 1e-14
+#: Newton's steps to the place in a curved triangle.
+NEWTON_STEPS = 12
+#: A triangle's map to t = 0 is taken as folded where its determinant falls under this part of its largest.
+FOLD = 0.02
 
 
-def reproject(field: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """(34): X'_i = X_i S_i / S'_i, with lumped areas S before and after (um2), zero where there is no biomass."""
-    there = after > 0
-    return np.where(there, field * before / np.where(there, after, 1.0), 0.0)
+@dataclass(frozen=True, eq=False)
+class Located:
+    """Places in old triangles. triangle: (K,) which; local: (K, 2) on the unit triangle."""
+
+    triangle: np.ndarray
+    local: np.ndarray
+
+    def field(self, values: np.ndarray, cells: np.ndarray, order: int) -> np.ndarray:
+        """(K, ...) there of values (N, ...) at the nodes (T, k) of functions of an order."""
+        return np.einsum("ka,ka...->k...", elements.values(order, self.local), values[cells[self.triangle]])
 
 
-def locate(points: np.ndarray, triangles: np.ndarray, where: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Triangle (K,) that holds, or is nearest to, each of the points ``where`` (K, 2), and its three weights (K, 3)."""
-    tree = shapely.STRtree(shapely.polygons(points[triangles]))
-    found = tree.nearest(shapely.points(where))
-    return found, barycentric(points, triangles[found], where)
+@timed("transfer")
+def located(points: np.ndarray, cells: np.ndarray, where: np.ndarray) -> Located:
+    """Places (K, 2) um in triangles (T, 3 or 6); one outside by a little is moved to the edge of the nearest.
+
+    Newton's method on x(s, t) in every triangle whose box holds the place; the one in which it lies deepest is taken.
+    Raises TransferError where a place is far from all of them.
+    """
+    geometry = 1 if cells.shape[1] == 3 else 2
+    nodes = points[cells]
+    size = np.ptp(nodes, axis=1).max(axis=1)
+    low, high = nodes.min(axis=1) - 0.1 * size[:, None], nodes.max(axis=1) + 0.1 * size[:, None]
+    place, cell = shapely.STRtree(shapely.box(*low.T, *high.T)).query(shapely.points(where))
+    local = _inverted(nodes[cell], where[place], geometry)
+    depth = elements.values(1, local).min(axis=1)
+    best = np.lexsort((-depth, place))
+    first = best[np.unique(place[best], return_index=True)[1]]
+    if len(first) < len(where):
+        x, y = where[np.setdiff1d(np.arange(len(where)), place)[0]]
+        raise TransferError(f"x = {x:.4g}, y = {y:.4g} um of the new mesh is not in the old one; "
+                            "try a shorter growth.time_step")
+    return Located(cell[first], _inside(local[first]))
 
 
-def barycentric(points: np.ndarray, corners: np.ndarray, where: np.ndarray) -> np.ndarray:
-    """(..., 3) values of the nodal functions of triangles ``corners`` (..., 3) at ``where`` (..., 2)."""
-    a, b, c = (points[corners[..., i]] for i in range(3))
+def _inverted(nodes: np.ndarray, where: np.ndarray, geometry: int) -> np.ndarray:
+    """(K, 2) on the unit triangle for places (K, 2) in triangles (K, g, 2); far outside where it does not converge."""
+    if geometry == 1:
+        return barycentric(nodes, where)[:, 1:]
+    local, rest = np.full((len(where), 2), 1 / 3), np.arange(len(where))
+    for _ in range(NEWTON_STEPS):
+        now, there = local[rest], nodes[rest]
+        apart = (elements.values(2, now)[:, None] @ there)[:, 0] - where[rest]
+        J = np.swapaxes(there, 1, 2) @ elements.derivatives(2, now)
+        det = elements.determinant(J)
+        det = np.where(np.abs(det) > 1e-12 * np.abs(det).max(), det, np.inf)
+        step = np.stack([J[:, 1, 1] * apart[:, 0] - J[:, 0, 1] * apart[:, 1],
+                         J[:, 0, 0] * apart[:, 1] - J[:, 1, 0] * apart[:, 0]], axis=1) / det[:, None]
+        local[rest] = np.clip(now - step, -2.0, 3.0)
+        rest = rest[np.abs(step).max(axis=1) >= 1e-12]
+        if len(rest) == 0:
+            break
+    apart = np.einsum("ka,kai->ki", elements.values(2, local), nodes) - where
+    lost = np.hypot(*apart.T) > 1e-6 * np.ptp(nodes, axis=(1, 2))
+    return np.where(lost[:, None], 99.0, local)
+
+
+def _inside(local: np.ndarray) -> np.ndarray:
+    """Places on the unit triangle, those outside moved to its edge."""
+    L = np.clip(elements.values(1, local), 0.0, None)
+    return (L / L.sum(axis=1, keepdims=True))[:, 1:]
+
+
+def barycentric(corners: np.ndarray, where: np.ndarray) -> np.ndarray:
+    """(..., 3) coordinates of places (..., 2) in triangles (..., 3, 2)."""
+    a, b, c = (corners[..., i, :] for i in range(3))
 
     def cross(u, v):
         return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
@@ -58,14 +113,34 @@ def barycentric(points: np.ndarray, corners: np.ndarray, where: np.ndarray) -> n
     return np.stack([cross(b, c), cross(c, a), cross(a, b)], -1) / double[..., None]
 
 
-@timed("transfer")
-def interpolate(points: np.ndarray, triangles: np.ndarray, fields: np.ndarray, where: np.ndarray) -> np.ndarray:
-    """Linear interpolation of nodal fields (N, m) at points (K, 2), the paper's transfer; bounded by the nodal values
-    (a point outside takes the value of the nearest point of the mesh)."""
-    found, weight = locate(points, triangles, where)
-    weight = np.clip(weight, 0.0, 1.0)
-    weight /= weight.sum(axis=1, keepdims=True)
-    return np.einsum("ka,kam->km", weight, fields[triangles[found]])
+def interpolate(points: np.ndarray, cells: np.ndarray, fields: np.ndarray, where: np.ndarray) -> np.ndarray:
+    """(K, m) fields (N, m) at the mesh's own nodes, at places (K, 2): the paper's transfer, bounded for linear ones."""
+    return located(points, cells, where).field(fields, cells, 1 if cells.shape[1] == 3 else 2)
+
+
+def interpolated(points, triangles, fields, new_points, new_triangles) -> np.ndarray:
+    """(K, m) of linear fields (N, m) at the nodes of another mesh, called as :func:`project` is."""
+    return interpolate(points, triangles, fields, new_points)
+
+
+def unfolded(mesh: Mesh, origin: np.ndarray) -> np.ndarray:
+    """Places at t = 0 (N, 2) um that no triangle of the aggregate turns over: where the interpolated ones would,
+    middles go half way between their corners. Raises TransferError where that is not enough."""
+    cells, bends = mesh.cells[mesh.biomass], checked_bends(mesh.geometry)
+    for _ in range(3):
+        det = elements.determinant(elements.jacobian(origin[cells], bends))
+        bad = cells[det.min(axis=1) <= (FOLD * det.max(axis=1) if mesh.geometry == 2 else 0.0)]
+        if len(bad) == 0:
+            return origin
+        if mesh.geometry == 1:
+            break
+        origin = origin.copy()
+        origin[bad[:, 3:]] = 0.5 * (origin[bad[:, :3]] + origin[bad[:, elements.NEXT]])
+    if det.min() <= 0:
+        x, y = mesh.points[bad[0]].mean(axis=0)
+        raise TransferError(f"after a remesh the places at t = 0 fold near x = {x:.4g}, y = {y:.4g} um; "
+                            "try a larger numerics.refinement")
+    return origin
 
 
 def supermesh(points, triangles, new_points, new_triangles) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -183,8 +258,8 @@ def _loads(pieces, points, triangles, fields, new_points, new_triangles) -> np.n
     """(K, m) integrals of the old fields times each new nodal function."""
     corners, old, new, area = pieces
     middles = 0.5 * (corners + np.roll(corners, -1, axis=1))
-    old_weight = barycentric(points, np.repeat(triangles[old][:, None], 3, 1), middles)
-    new_weight = barycentric(new_points, np.repeat(new_triangles[new][:, None], 3, 1), middles)
+    old_weight = barycentric(np.repeat(points[triangles[old]][:, None], 3, 1), middles)
+    new_weight = barycentric(np.repeat(new_points[new_triangles[new]][:, None], 3, 1), middles)
     values = np.einsum("pqa,pam->pqm", old_weight, fields[triangles[old]])
     load = np.einsum("p,pqa,pqm->pam", area / 3, new_weight, values)
     right = np.zeros((len(new_points), fields.shape[1]))

@@ -1,0 +1,159 @@
+"""Lagrange elements of order 1, 2 and 3 on triangles, straight or curved, tabulated at quadrature points.
+
+Shape functions, their derivatives and the quadratures are scikit-fem's (``ElementTriP1``, ``P2``, ``P3``). A curved
+triangle has the nodes of ``ElementTriP2``, as those of scikit-fem's ``MeshTri2``: the map from the unit triangle is
+x(s, t) = sum_a x_a N_a(s, t), and gradients are grad N = N_,st (x_,st)^-1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from skfem import ElementTriP1, ElementTriP2, ElementTriP3
+from skfem.quadrature import get_quadrature_line, get_quadrature_tri
+
+ELEMENTS = {1: ElementTriP1(), 2: ElementTriP2(), 3: ElementTriP3()}
+#: Degrees of the quadrature on triangles and on edges, for each order of the functions: products of two functions and
+#: a coefficient that is nearly linear.
+DEGREES = {1: 2, 2: 6, 3: 8}
+EDGE_DEGREES = {1: 2, 2: 6, 3: 9}
+#: Of gradients, the same but for linear functions on straight triangles, where they are constant.
+GRADIENT_DEGREES = {1: 1, 2: 6, 3: 8}
+#: The corner at the other end of the edges 01, 12 and 20.
+NEXT = [1, 2, 0]
+#: Shape functions of an edge among those of a triangle: the edge 01.
+ON_EDGE = {1: [0, 1], 2: [0, 3, 1], 3: [0, 3, 4, 1]}
+
+
+def nodes(order: int) -> np.ndarray:
+    """(k, 2) places of the nodes of an element on the unit triangle."""
+    return np.asarray(ELEMENTS[order].doflocs)
+
+
+def values(order: int, where: np.ndarray) -> np.ndarray:
+    """(q, k) shape functions at points (q, 2) of the unit triangle."""
+    element = ELEMENTS[order]
+    found = [element.lbasis(where.T, k)[0] for k in range(len(element.doflocs))]
+    return np.column_stack([np.broadcast_to(value, len(where)) for value in found])
+
+
+def derivatives(order: int, where: np.ndarray) -> np.ndarray:
+    """(q, k, 2) their derivatives by s and t."""
+    element, found = ELEMENTS[order], np.empty((len(where), len(nodes(order)), 2))
+    for k in range(found.shape[1]):
+        found[:, k] = np.asarray(element.lbasis(where.T, k)[1]).T
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Functions of an order at quadrature points of the unit triangle.
+
+    weights: (q,); values: (q, k), slopes: (q, k, 2) of the functions; shape: (q, g), bends: (q, g, 2) of those that
+    map the triangle; linear: (q, 3) barycentric coordinates.
+    """
+
+    weights: np.ndarray
+    values: np.ndarray
+    slopes: np.ndarray
+    shape: np.ndarray
+    bends: np.ndarray
+    linear: np.ndarray
+
+    @property
+    def products(self) -> np.ndarray:
+        """(q, k k) of two functions."""
+        count, k = self.values.shape
+        return (self.values[:, :, None] * self.values[:, None, :]).reshape(count, k * k)
+
+
+@cache
+def table(order: int, geometry: int, degree: int) -> Table:
+    """Functions of an order on triangles of a geometry (1: straight, 2: curved), in the quadrature of a degree."""
+    where, weights = get_quadrature_tri(degree)
+    return _tabulated(order, geometry, where.T, weights)
+
+
+@cache
+def vertex_table(order: int, geometry: int) -> Table:
+    """The same at the corners: what is integrated with it is lumped."""
+    return _tabulated(order, geometry, nodes(1), np.full(3, 1 / 6))
+
+
+def _tabulated(order: int, geometry: int, where: np.ndarray, weights: np.ndarray) -> Table:
+    return Table(weights, values(order, where), derivatives(order, where), values(geometry, where),
+                 derivatives(geometry, where), values(1, where))
+
+
+@cache
+def values_on(order: int, of: Table) -> np.ndarray:
+    """(q, k) shape functions of another order at the points of a table."""
+    return values(order, of.linear[:, 1:])
+
+
+@cache
+def edge_table(order: int) -> tuple[np.ndarray, np.ndarray]:
+    """(p, e) shape functions of an edge's nodes at the points of its quadrature, and their weights (p,)."""
+    (s,), weights = get_quadrature_line(EDGE_DEGREES[order])
+    along = values(order, np.column_stack([s, 0 * s]))
+    return along[:, ON_EDGE[order]], weights
+
+
+def by_component(tensor: np.ndarray) -> np.ndarray:
+    """(T, q, 2, 2) of (2, 2, T, q), each component contiguous in memory: arithmetic on them is faster."""
+    return np.ascontiguousarray(tensor).transpose(2, 3, 0, 1)
+
+
+def determinant(matrix: np.ndarray) -> np.ndarray:
+    """(...) of (..., 2, 2)."""
+    return matrix[..., 0, 0] * matrix[..., 1, 1] - matrix[..., 0, 1] * matrix[..., 1, 0]
+
+
+def inverse_transpose(matrix: np.ndarray, det: np.ndarray) -> np.ndarray:
+    """(..., 2, 2) of matrices with known determinants (...)."""
+    found = np.empty_like(matrix)
+    found[..., 0, 0], found[..., 1, 1] = matrix[..., 1, 1], matrix[..., 0, 0]
+    found[..., 0, 1], found[..., 1, 0] = -matrix[..., 1, 0], -matrix[..., 0, 1]
+    return found / det[..., None, None]
+
+
+def jacobian(corners: np.ndarray, bends: np.ndarray) -> np.ndarray:
+    """(T, q, 2, 2) d x_i / d (s, t)_k of triangles with nodes (T, g, 2), bends (q, g, 2) as :class:`Table`'s."""
+    return by_component(np.moveaxis(corners, 2, 0)[:, None] @ bends.transpose(2, 1, 0))
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Quadrature points on triangles. dx: (T, q) um2, weights of the integral; slopes: (T, q, 2, k) derivatives of k
+    functions by x and by y, 1/um."""
+
+    dx: np.ndarray
+    slopes: np.ndarray
+
+    @property
+    def rows(self) -> np.ndarray:
+        """(T, 2 q, k) the same slopes, one row for each point and direction."""
+        return self.slopes.reshape(len(self.dx), -1, self.slopes.shape[3])
+
+    @property
+    def weighted(self) -> np.ndarray:
+        """(T, 2 q, k) the rows times dx."""
+        return np.repeat(self.dx, 2, axis=1)[:, :, None] * self.rows
+
+
+def points(corners: np.ndarray, of: Table) -> Points:
+    """Quadrature points on triangles with nodes (T, g, 2) um, none of them turned over."""
+    J = jacobian(corners, of.bends)
+    det = determinant(J)
+    turned = inverse_transpose(J, det)
+    by_point = np.swapaxes(turned, 0, 1).reshape(len(of.weights), -1, 2)  # few products of large matrices
+    found = by_point @ np.swapaxes(of.slopes, 1, 2)
+    slopes = found.reshape(len(of.weights), len(corners), 2, -1)
+    return Points(det * of.weights, np.ascontiguousarray(np.swapaxes(slopes, 0, 1)))
+
+
+def weights(corners: np.ndarray, of: Table) -> np.ndarray:
+    """(T, q) um2, dx alone."""
+    return determinant(jacobian(corners, of.bends)) * of.weights

@@ -1,0 +1,141 @@
+"""The aggregate's boundary (2.3.3): a closed chain of straight edges, or of parabolic arcs on curved triangles.
+
+The channel is 0 <= y <= W, -L/2 <= x <= L/2; the origin is below the middle of the seed, on the lower wall. Nodes run
+counterclockwise; each of them is FREE (on the interface with the fluid), or touches the lower (BOTTOM) or the upper
+wall (TOP). Where edges are arcs, corners and middles take turns: arc k has the nodes 2 k, 2 k + 1 and 2 k + 2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+FREE, BOTTOM, TOP = 0, 1, 2
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """Boundary of the aggregate.
+
+    points: (M, 2) um; wall: (M,) FREE, BOTTOM or TOP; fixed: (M,) True where x is constrained for good; origin: (M, 2)
+    um, where the material of each node was at t = 0; geometry: 1, edges are straight; 2, they are arcs.
+    """
+
+    points: np.ndarray
+    wall: np.ndarray
+    fixed: np.ndarray
+    origin: np.ndarray
+    geometry: int = 1
+
+    @property
+    def upstream(self) -> float:
+        """Smallest x (um)."""
+        return self._extremes[0]
+
+    @property
+    def downstream(self) -> float:
+        """Largest x (um)."""
+        return self._extremes[1]
+
+    @property
+    def thickness(self) -> float:
+        """Largest y (um): the paper's R_aggregate."""
+        return self._extremes[2]
+
+    @property
+    def highest(self) -> float:
+        """x of the largest y (um)."""
+        return self._extremes[3]
+
+    @cached_property
+    def area(self) -> float:
+        """Area inside (um2): that of the corners' polygon, and two thirds of chord times height for each arc."""
+        if self.geometry == 1:
+            return polygon_area(self.points)
+        a, m, b = np.moveaxis(self.arcs(self.points), 1, 0)
+        chord, bow = b - a, m - 0.5 * (a + b)
+        lens = bow[:, 0] * chord[:, 1] - bow[:, 1] * chord[:, 0]
+        return polygon_area(self.points[::2]) + float(2 / 3 * np.sum(lens))
+
+    @cached_property
+    def corners(self) -> Outline:
+        """The polygon of the corners alone."""
+        if self.geometry == 1:
+            return self
+        return Outline(self.points[::2], self.wall[::2], self.fixed[::2], self.origin[::2])
+
+    @property
+    def edge_wall(self) -> np.ndarray:
+        """The wall that each edge lies on; FREE where it borders the fluid."""
+        if self.geometry == 2:
+            return self.wall[1::2]
+        return np.where(self.wall == np.roll(self.wall, -1), self.wall, FREE)
+
+    def edge_lengths(self) -> np.ndarray:
+        """Length (um) of the straight line from each node to the next."""
+        return np.linalg.norm(np.roll(self.points, -1, axis=0) - self.points, axis=1)
+
+    def interface_edges(self) -> np.ndarray:
+        """(M,) True where the line from node i to node i + 1 borders the fluid: its ends are not on one same wall."""
+        return (self.wall == FREE) | (self.wall != np.roll(self.wall, -1))
+
+    def arcs(self, values: np.ndarray) -> np.ndarray:
+        """(edges, 3, ...) values (M, ...) of the nodes at the start, middle and end of each edge."""
+        if self.geometry == 1:
+            after = np.roll(values, -1, axis=0)
+            return np.stack([values, 0.5 * (values + after), after], axis=1)
+        ends = np.concatenate([values[2::2], values[:1]])
+        return np.stack([values[::2], values[1::2], ends], axis=1)
+
+    @cached_property
+    def _extremes(self) -> tuple[float, float, float, float]:
+        x, y = self.points.T
+        if self.geometry == 2:
+            x, y = np.concatenate([*self._peaks(), self.points]).T
+        return float(x.min()), float(x.max()), float(y.max()), float(x[y.argmax()])
+
+    def _peaks(self) -> np.ndarray:
+        """(2, arcs, 2) um, where each arc's x and y are stationary, or its start."""
+        nodes = self.arcs(self.points)
+        slope, bend = slopes(nodes)
+        flat = np.abs(bend) <= 1e-12 * np.ptp(self.points)
+        t = np.clip(np.where(flat, 0.0, -slope / np.where(flat, 1.0, bend)), 0.0, 1.0).T[..., None]
+        return nodes[:, 0] + t * (slope + 0.5 * t * bend)
+
+
+def polygon_area(points: np.ndarray) -> float:
+    """Signed area of a closed polygon, points (M, 2); positive counterclockwise."""
+    x, y = points.T
+    return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+
+
+def parabola(t: np.ndarray) -> np.ndarray:
+    """(..., 3) shape functions of start, middle and end of an arc at t in [0, 1]."""
+    return np.stack([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)], axis=-1)
+
+
+def slopes(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """First derivative by t at t = 0, and the second one, of arcs with nodes (M, 3, ...)."""
+    first, middle, last = nodes[:, 0], nodes[:, 1], nodes[:, 2]
+    return -3 * first + 4 * middle - last, 4 * (first - 2 * middle + last)
+
+
+def half_disc(radius: float, across: float, geometry: int = 1, middle: float = 0.0) -> Outline:
+    """Half-disc of a radius (um) on the lower wall, its middle, which is its fixed point, at x = ``middle`` (um).
+
+    across: elements over its radius.
+    """
+    edges = 2 * int(np.ceil(np.pi / 2 * across))
+    edges = geometry * (edges if geometry == 1 else max(6, edges))
+    angle = np.linspace(0.0, np.pi, edges + 1)
+    arc = radius * np.column_stack([np.cos(angle), np.sin(angle)])
+    arc[[0, -1], 1] = 0.0
+    half = geometry * max(2, int(np.ceil(across)))
+    base = np.linspace(-radius, radius, 2 * half + 1)
+    base[half] = 0.0
+    points = np.vstack([np.column_stack([base, 0.0 * base]), arc[1:-1]])
+    points[:, 0] += middle
+    wall = np.where(np.arange(len(points)) < len(base), BOTTOM, FREE)
+    return Outline(points, wall, np.arange(len(points)) == half, points.copy(), geometry)

@@ -1,0 +1,217 @@
+"""How large elements are to be, how far the mesh reaches (3.1), and where the outline's nodes go for a new mesh.
+
+Lengths in um.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from repro.fem.outline import FREE, TOP, Outline, parabola, slopes
+
+#: Elements across half a pore's width and across the aggregate's thickness, and across the narrowest film.
+ACROSS_PORE, ACROSS_AGGREGATE, ACROSS_FILM = 14.0, 10.0, 10.0
+#: Growth of the element size with the distance from where it is prescribed; zero: one size everywhere.
+GRADATION = 0.25
+#: An interface edge is split when it is this much longer than the wanted size.
+SPLIT = 1.4
+
+
+@dataclass(frozen=True)
+class Sizing:
+    """How large the elements of a mesh are to be: width of the pore (um); refinement, by which sizes are divided; film,
+    the thinnest that is resolved (um); gradation, growth of the size with the distance from where it is prescribed."""
+
+    width: float
+    refinement: float
+    film: float
+    gradation: float = GRADATION
+
+    @property
+    def largest(self) -> float:
+        """The largest size (um): a fourteenth of the pore's width, divided by the refinement."""
+        return self.width / ACROSS_PORE / self.refinement
+
+
+def meshed_extent(outline: Outline | None, width: float, length: float, whole: bool = False) -> tuple[float, float]:
+    """Ends (um) of the part to mesh when a mesh is generated (3.1).
+
+    min(10 R, 1.5 W) from the aggregate on both sides, never past the pore's ends; a clean channel is meshed over 3 W.
+    """
+    if whole:
+        return -length / 2, length / 2
+    if outline is None:
+        reach, first, last = 1.5 * width, 0.0, 0.0
+    else:
+        reach, first, last = min(10 * outline.thickness, 1.5 * width), outline.upstream, outline.downstream
+    return max(first - reach, -length / 2), min(last + reach, length / 2)
+
+
+def extent_too_short(outline: Outline, ends: tuple[float, float], width: float, length: float) -> bool:
+    """Is the aggregate closer to an end of the mesh than min(7 R, 1.3 W), with pore left to mesh there (3.1)?"""
+    reach = min(7 * outline.thickness, 1.3 * width)
+    left = outline.upstream - ends[0] < reach and ends[0] > -length / 2
+    right = ends[1] - outline.downstream < reach and ends[1] < length / 2
+    return left or right
+
+
+def interface_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
+    """(M,) wanted element size (um) at each node of the outline.
+
+    A tenth of the aggregate's thickness, a fourteenth of the pore's width, and for free nodes the film's size.
+    """
+    across = min(outline.thickness / ACROSS_AGGREGATE / sizing.refinement, sizing.largest)
+    size = np.full(len(outline.points), across)
+    return np.where(outline.wall == FREE, np.minimum(size, film_sizes(outline, sizing)), size)
+
+
+def too_coarse(outline: Outline, sizing: Sizing) -> bool:
+    """Is an interface edge twice longer than a new mesh would have it?"""
+    sizes = interface_sizes(outline, sizing)
+    wanted = 0.5 * (sizes + np.roll(sizes, -1))
+    return bool((outline.interface_edges() & (outline.edge_lengths() > 2 * SPLIT * wanted)).any())
+
+
+def film_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
+    """(M,) wanted element size (um) in the fluid between each node and the opposite wall, while that is not touched.
+
+    A tenth of its thickness; films thinner than the thinnest that is resolved count as that: they close.
+    """
+    if (outline.wall == TOP).any():
+        return np.full(len(outline.points), np.inf)
+    return np.maximum(sizing.width - outline.points[:, 1], sizing.film) / ACROSS_FILM / sizing.refinement
+
+
+def size_sources(outline: Outline, sizing: Sizing) -> tuple[np.ndarray, np.ndarray]:
+    """Where element sizes are prescribed, (K, 2) um, and how large, (K,) um.
+
+    At the interface nodes and, across the fluid, on the opposite wall, so that a film has elements of one size.
+    Interface edges that are shorter than wanted (they are never merged) are matched by what is around them.
+    """
+    free = outline.wall == FREE
+    near = interface_sizes(outline, sizing)[free]
+    film = film_sizes(outline, sizing)[free]
+    edge = outline.edge_lengths()
+    near = np.minimum(near, SPLIT * np.maximum(edge, np.roll(edge, 1))[free])
+    across = np.column_stack([outline.points[free, 0], np.full(len(near), sizing.width)])
+    there = np.isfinite(film)
+    return np.vstack([outline.points[free], across[there]]), np.concatenate([near, film[there]])
+
+
+def graded_size(where: np.ndarray, sources: np.ndarray, sizes: np.ndarray, sizing: Sizing) -> np.ndarray:
+    """Wanted element size (um) at points (K, 2): grows from the sizes (M,) of the sources (M, 2), up to the largest."""
+    if len(sources) == 0:
+        return np.full(len(where), sizing.largest)
+    distance = np.hypot(where[:, None, 0] - sources[None, :, 0], where[:, None, 1] - sources[None, :, 1])
+    return np.minimum(sizing.largest, (sizes + sizing.gradation * distance).min(axis=1))
+
+
+def split(outline: Outline, sizing: Sizing) -> Outline:
+    """The same curve with corners spaced as :func:`interface_sizes` wants them, and their middles where it has arcs.
+
+    Interface edges are split into equal parts, which changes neither shape nor area, and never merged. Contact
+    surfaces are straight, so their nodes are placed anew, but for their ends and the fixed points.
+    """
+    polygon = outline.corners
+    sizes, on_wall = interface_sizes(polygon, sizing), outline.edge_wall != FREE
+    pieces = []
+    for first, last in runs(polygon):
+        keep = np.arange(first, last + 1) % len(polygon.points)
+        if on_wall[keep[0]]:
+            pieces.append(_on_the_wall(outline, keep, sizes, sizing))
+        else:
+            parts = outline.geometry * split_count(polygon, keep, sizes)
+            pieces.append((np.full(parts, keep[0]), np.arange(parts) / parts))
+    edges, t = zip(*pieces)
+    return placed(outline, np.concatenate(edges), np.concatenate(t))
+
+
+def halved(outline: Outline, which: np.ndarray) -> Outline:
+    """The same curve with some of its arcs, ``which`` (arcs,), cut at their middles."""
+    parts = np.where(which, 4, 2)
+    arc = np.repeat(np.arange(len(which)), parts)
+    return placed(outline, arc, (np.arange(len(arc)) - (np.cumsum(parts) - parts)[arc]) / parts[arc])
+
+
+def runs(outline: Outline) -> list[tuple[int, int]]:
+    """Pieces (first, last) of the loop: single interface edges, and stretches of wall between ends or fixed points."""
+    count = len(outline.points)
+    free_edge = outline.interface_edges()
+    breaks = free_edge | np.roll(free_edge, 1) | outline.fixed
+    starts = np.flatnonzero(breaks)
+    return list(zip(starts, np.append(starts[1:], starts[0] + count)))
+
+
+def split_count(outline: Outline, keep: np.ndarray, sizes: np.ndarray) -> int:
+    """Into how many parts to split the edge between two nodes, ``keep``, for sizes (M,) um at the nodes."""
+    length = np.linalg.norm(outline.points[keep[1]] - outline.points[keep[0]])
+    wanted = 0.5 * (sizes[keep[0]] + sizes[keep[1]])
+    return max(1, int(np.ceil(length / (SPLIT * wanted))))
+
+
+def _on_the_wall(outline: Outline, keep: np.ndarray, sizes: np.ndarray,
+                 sizing: Sizing) -> tuple[np.ndarray, np.ndarray]:
+    """Edge, and t on it, of the new nodes along a stretch of wall, but for its end; graded from the interface."""
+    polygon = outline.corners
+    free = polygon.wall == FREE
+    ends = polygon.points[keep[[0, -1]]]
+    x = graded_line(ends[0], ends[1], polygon.points[free], sizes[free], sizing)[:, 0]
+    if outline.geometry == 2:
+        x = np.insert(x, np.arange(1, len(x)), 0.5 * (x[1:] + x[:-1]))
+    sign = np.sign(x[-1] - x[0])
+    place = np.searchsorted(sign * polygon.points[keep, 0], sign * x, side="right") - 1
+    edge = keep[np.clip(place, 0, len(keep) - 2)]
+    t = _parameters(outline.arcs(outline.points)[edge, :, 0], x)
+    return edge[:-1], t[:-1]
+
+
+def _parameters(nodes: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """(K,) t in [0, 1] at which arcs with nodes (K, 3) um along the wall reach x (K,); zero for the first."""
+    t = (x - nodes[:, 0]) / (nodes[:, 2] - nodes[:, 0])
+    slope, bend = slopes(nodes)
+    for _ in range(6):
+        t = t - (np.einsum("ka,ka->k", parabola(t), nodes) - x) / (slope + bend * t)
+    t = np.clip(t, 0.0, 1.0)
+    t[0] = 0.0
+    return t
+
+
+def placed(outline: Outline, edge: np.ndarray, t: np.ndarray) -> Outline:
+    """New nodes (K,), each at t in [0, 1) of an edge: where t is zero the edge's own first corner.
+
+    Places at t = 0 between two nodes of the seed's arc lie on that arc: a straight edge of today's outline was round
+    at t = 0, and what the material remembers makes it round again at the next update.
+    """
+    first, corner, weight = t == 0, outline.geometry * edge, parabola(t)
+    points, origin = (np.einsum("ka,kai->ki", weight, outline.arcs(part)[edge])
+                      for part in (outline.points, outline.origin))
+    if outline.geometry == 1:
+        ends = outline.arcs(outline.origin)[edge]
+        origin = _on_arc(origin, ends[:, 0], ends[:, 2])
+    wall = np.where(first, outline.wall[corner], outline.edge_wall[edge])
+    on = wall != FREE
+    points[on, 1] = outline.points[corner[on], 1]
+    points[first], origin[first] = outline.points[corner[first]], outline.origin[corner[first]]
+    return Outline(points, wall, first & outline.fixed[corner], origin, outline.geometry)
+
+
+def _on_arc(places: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Places (K, 2) between two points each, moved to their arc around the origin where both are as far from it."""
+    radius, now = np.hypot(*first.T), np.hypot(*places.T)
+    arc = np.isclose(radius, np.hypot(*second.T), rtol=1e-9, atol=0) & (places[:, 1] > 0)
+    return places * np.where(arc, radius / np.where(arc, now, 1.0), 1.0)[:, None]
+
+
+def graded_line(start, end, sources: np.ndarray, sizes: np.ndarray, sizing: Sizing) -> np.ndarray:
+    """(K, 2) nodes from start to end, spaced as :func:`graded_size` asks; both ends included."""
+    start, end = np.asarray(start, float), np.asarray(end, float)
+    length = np.linalg.norm(end - start)
+    s = np.linspace(0.0, 1.0, 401)
+    density = length / graded_size(start + s[:, None] * (end - start), sources, sizes, sizing)
+    count = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(s))])
+    parts = max(1, int(np.ceil(count[-1] - 0.3)))
+    t = np.interp(np.linspace(0.0, count[-1], parts + 1), count, s)
+    t[[0, -1]] = 0.0, 1.0
+    return start + t[:, None] * (end - start)
