@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import Delaunay
 
-from repro.fem.mesh import PoreMesh, triangle_areas
+from repro.fem.mesh import Mesh, triangle_areas
 
 #: Displacement of the lattice's nodes, and the least distance of a lattice node from a line, over the element size.
 JITTER, CLEARANCE = 0.22, 0.45
@@ -49,8 +49,8 @@ def _inside(x_lines, y_lines, size: float, random) -> np.ndarray:
     return points[within & (np.minimum(*gaps) > CLEARANCE * size)]
 
 
-def channel(ends, width: float, size: float, is_biomass, *, across=(), along=(), seed: int = 0) -> PoreMesh:
-    """A PoreMesh of a rectangle; ``is_biomass(x, y)`` says which triangles, by their middles, are biomass."""
+def channel(ends, width: float, size: float, is_biomass, *, across=(), along=(), seed: int = 0) -> Mesh:
+    """A straight mesh of a rectangle; ``is_biomass(x, y)`` says which triangles, by their middles, are biomass."""
     points, triangles = rectangle(ends, width, size, across=across, along=along, seed=seed)
     middle = points[triangles].mean(axis=1)
-    return PoreMesh(points, triangles, is_biomass(*middle.T), np.empty(0, int), width, tuple(map(float, ends)))
+    return Mesh.of(points, triangles, is_biomass(*middle.T), np.empty(0, int), width, tuple(map(float, ends)))

@@ -6,7 +6,7 @@ import numpy as np
 from skfem import Basis, ElementTriP1, MeshTri
 from skfem.quadrature import get_quadrature_tri
 
-from repro.fem.mesh import PoreMesh
+from repro.fem.mesh import Mesh
 
 WEIGHTS = get_quadrature_tri(6)
 
@@ -36,6 +36,6 @@ def sample(points, triangles, values, where) -> np.ndarray:
     return weights @ np.asarray(values)
 
 
-def mean_size(mesh: PoreMesh) -> float:
+def mean_size(mesh: Mesh) -> float:
     """Side of the square of mean triangle area twice over: the spacing of a lattice of as many nodes, um."""
     return float(np.sqrt(2 * mesh.areas.mean()))
