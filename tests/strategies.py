@@ -5,9 +5,13 @@ import numpy as np
 from hypothesis import settings
 from hypothesis import strategies as st
 
-from repro.fem import geometry, mesh
-from repro.fem.geometry import BOTTOM, FREE, TOP, Outline
-from repro.model import growth
+from repro.fem import mesher, sizing
+from repro.fem.mesh import Mesh, curved, triangle_areas
+from repro.fem.outline import BOTTOM, FREE, TOP, Outline
+from repro.fem.outline import half_disc as half_disc_outline
+from repro.fem.sizing import Sizing
+from repro.fem.space import Space
+from repro.model import contact, pore
 from repro.scene import parse_scene
 
 LENGTH = 600.0
@@ -18,6 +22,10 @@ standard = st.just(50.0)  # the width of section 4
 lengths = st.floats(300.0, 1000.0)
 refinements = st.floats(0.4, 2.0)
 angles = st.floats(-math.pi, math.pi)
+
+
+#: Orders of velocity and concentrations, and what scenes call them.
+ORDERS = {1: "linear", 2: "quadratic", 3: "cubic"}
 
 
 def share(part):
@@ -67,7 +75,7 @@ def outlines(draw, width=standard):
 
 @st.composite
 def meshes(draw, width=standard, finest=0.6, clean=True):
-    """PoreMesh, coarse: around an aggregate on the wall, around a plug, or, where ``clean``, of a channel without."""
+    """Coarse straight Mesh: around an aggregate on the wall, a plug, or, where ``clean``, of an empty channel."""
     kinds = [attached_aggregates(width), outlines(width)] + [st.tuples(st.none(), width)] * clean
     outline, width = draw(st.one_of(kinds))
     return meshed(outline, width, draw(st.floats(0.35, finest)), film=0.1 * width)[0]
@@ -80,7 +88,7 @@ def remesh_chains(draw, longest=4, finest=0.9):
     chain = []
     for refinement in draw(st.lists(st.floats(0.35, finest), min_size=2, max_size=longest)):
         grid, outline = meshed(outline, width, refinement)
-        chain.append((grid.points[grid.body], grid.body_triangles))
+        chain.append((grid.points[grid.body], grid.topology.body_cells))
     return chain
 
 
@@ -99,9 +107,9 @@ def admissible_F(draw):
 
 
 @st.composite
-def scenes(draw, drives=("none", "head", "mean_velocity"), peclet=3.0, thiele=30.0, steps=2):
+def scenes(draw, drives=("none", "head", "mean_velocity"), peclet=3.0, thiele=30.0, steps=2, elements=("linear",)):
     """A small scene of any kind: narrow or wide, a seed or nearly a plug, fed, starved or with nothing at all, driven
-    by a head, by a velocity or not; it grows for a step or up to ``steps``.
+    by a head, by a velocity or not; it grows for a step or up to ``steps``, on elements of one of the kinds named.
 
     peclet: the largest u_ave W / D of a clean pore and the slower substrate; the paper's are 0.6 and 1.4, and at 3 no
     element of these meshes (the largest have W / 6) sees more than u h / D = 1. thiele: the largest Thiele number of
@@ -127,6 +135,9 @@ def scenes(draw, drives=("none", "head", "mean_velocity"), peclet=3.0, thiele=30
         "numerics": {"preset": "paper", "refinement": draw(st.floats(0.4, 0.7)),
                      "transfer": draw(st.sampled_from(["conserving", "linear"]))},
     }
+    kind = draw(st.sampled_from(elements))
+    if kind != "linear":
+        tables["numerics"] |= {"elements": kind, "transfer": "conserving"}
     drive, speed = draw(st.sampled_from(drives)), draw(between(0.01, 1.0)) * peclet * slowest * DIFFUSIVITY / width
     if drive != "none":
         value = speed if drive == "mean_velocity" else 12 * VISCOSITY * length * speed / width**2
@@ -175,49 +186,67 @@ def mirrored(outline):
                    back(outline.origin) * [-1, 1])
 
 
-def meshed(outline, width=50.0, refinement=1.0, ends=None, film=2.0):
-    """(PoreMesh, refined outline) with the extent of 3.1."""
-    ends = geometry.meshed_extent(outline, width, LENGTH) if ends is None else ends
-    return mesh.generate(outline, ends, geometry.Sizing(width, refinement, film))
+def seed(radius, refinement=1.0, geometry=1):
+    """Outline of a half-disc with as many elements across as a scene's."""
+    return half_disc_outline(radius, sizing.ACROSS_AGGREGATE * refinement, geometry)
+
+
+def meshed(around, width=50.0, refinement=1.0, ends=None, film=2.0):
+    """(Mesh, refined outline) with the extent of 3.1, straight or curved as the outline is."""
+    ends = sizing.meshed_extent(around, width, LENGTH) if ends is None else ends
+    return mesher.generate(around, ends, Sizing(width, refinement, film), around.geometry if around else 1)
+
+
+def space_of(grid, order):
+    """Functions of an order on a straight mesh, or on the curved one with its middles half way along straight edges."""
+    return Space(grid if order == 1 or grid.geometry == 2 else curved(grid, None), order)
 
 
 def relabelled(grid, biomass):
     """The same triangles with others of them as biomass: a mesh of its own, with nothing remembered of the first."""
-    return mesh.PoreMesh(grid.points, grid.triangles, biomass, np.empty(0, int), grid.width, grid.ends)
+    return Mesh.of(grid.points, grid.cells, biomass, np.empty(0, int), grid.width, grid.ends)
+
+
+def turned(cells):
+    """Triangles (T, 3 or 6) with their corners the other way round, each middle still on its edge."""
+    return cells[:, [0, 2, 1] if cells.shape[1] == 3 else [0, 2, 1, 5, 4, 3]]
+
+
+def reversed_loop(grid):
+    """A loop the other way round, corners first where there are middles."""
+    back = grid.loop[::-1]
+    return back if grid.geometry == 1 else np.roll(back, -1)
 
 
 def reversed_mesh(grid):
     """The image of a mesh in x -> -x."""
-    return mesh.PoreMesh(grid.points * [-1, 1], grid.triangles[:, ::-1], grid.biomass, grid.loop[::-1], grid.width,
-                         (-grid.ends[1], -grid.ends[0]))
+    return Mesh.of(grid.points * [-1, 1], turned(grid.cells), grid.biomass, reversed_loop(grid), grid.width,
+                   (-grid.ends[1], -grid.ends[0]))
 
 
 def upside_down(grid):
     """The image of a mesh in y -> W - y."""
-    return mesh.PoreMesh(grid.points * [1, -1] + [0, grid.width], grid.triangles[:, ::-1], grid.biomass,
-                         grid.loop[::-1], grid.width, grid.ends)
+    return Mesh.of(grid.points * [1, -1] + [0, grid.width], turned(grid.cells), grid.biomass, reversed_loop(grid),
+                   grid.width, grid.ends)
 
 
-def body_of(grid, outline):
-    """(growth.Body, loop in its numbering): the aggregate held as 2.3.3 asks, y on the walls and x at fixed points."""
-    local = np.full(len(grid.points), -1)
-    local[grid.body] = np.arange(len(grid.body))
-    rim = local[grid.loop]
-    held = np.zeros((len(grid.body), 2), bool)
-    held[rim[outline.fixed], 0] = True
-    held[rim[outline.wall != FREE], 1] = True
-    return growth.Body(grid.points[grid.body], local[grid.triangles[grid.biomass]], held), rim
+def body_of(grid, around, order=None):
+    """(growth.Body, held (n, 2), rim (M,)): the aggregate at rest, what 2.3.3 prescribes of it, y on the walls and x at
+    fixed points, and its boundary in its own numbering. order: that of the concentrations, the mesh's by default."""
+    body = pore.material(Space(grid, order or grid.geometry), grid.points[grid.body])
+    rim = grid.topology.body_loop
+    return body, contact.constrained(len(grid.body), rim, around.wall, around.fixed), rim
 
 
-def half_disc(radius, refinement=1.0, width=50.0):
-    """(growth.Body, its loop, outline) of a half-disc on the lower wall."""
-    grid, outline = meshed(geometry.seed(radius, refinement), width, refinement)
-    return *body_of(grid, outline), outline
+def half_disc(radius, refinement=1.0, width=50.0, geometry=1):
+    """(growth.Body, held, its rim, outline) of a half-disc on the lower wall."""
+    grid, around = meshed(seed(radius, refinement, geometry), width, refinement)
+    return *body_of(grid, around), around
 
 
 def lumped(points, triangles):
     """(N,) sum of |tau| / 3 over the triangles at each node."""
-    return np.bincount(triangles.ravel(), np.repeat(mesh.triangle_areas(points, triangles) / 3, 3), len(points))
+    return np.bincount(triangles.ravel(), np.repeat(triangle_areas(points, triangles) / 3, 3), len(points))
 
 
 def fitted_order(sizes, errors):
