@@ -42,23 +42,28 @@ concentrations = st.sampled_from([0.0, 1.0, 10.0]) | between(1e-9, 1e-2) | st.fl
 
 
 @st.composite
-def attached_aggregates(draw, width=standard, thinnest=0.05, thickest=0.9, uneven=0.45):
-    """(Outline, width): an aggregate on the lower wall, star-shaped about the origin, that leaves a film above it."""
+def attached_aggregates(draw, width=standard, thinnest=0.05, thickest=0.9, uneven=0.45, geometry=1):
+    """(Outline, width): an aggregate on the lower wall, star-shaped about the origin, that leaves a film above it; its
+    edges straight (geometry 1) or arcs (2)."""
     width = draw(width)
     shares = draw(st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3))
     weight = uneven / max(1.0, sum(abs(s) for s in shares))
-    angle = np.linspace(0.0, np.pi, draw(st.integers(16, 48)))
+    nodes = draw(st.integers(16, 48))
+    angle = np.linspace(0.0, np.pi, nodes if geometry == 1 else nodes // 2 * 2 + 1)
     radius = 1 + weight * sum(s * np.cos((k + 1) * angle) for k, s in enumerate(shares))
     radius *= draw(st.floats(thinnest, thickest)) * width / (radius * np.sin(angle)).max()
-    return _on_the_wall(radius, angle), width
+    return _on_the_wall(radius, angle, geometry), width
 
 
-def _on_the_wall(radius, angle):
+def _on_the_wall(radius, angle, geometry):
     arc = radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
-    base = np.concatenate([np.linspace(-radius[-1], 0.0, 6), np.linspace(0.0, radius[0], 6)[1:]])
-    points = np.vstack([np.column_stack([base, np.zeros(11)]), arc[1:-1]])
-    wall = np.where(np.arange(len(points)) < 11, BOTTOM, FREE)
-    return Outline(points, wall, np.arange(len(points)) == 5, points.copy())
+    half = 5 * geometry
+    right = np.linspace(0.0, radius[0], half + 1)[1:]
+    base = np.concatenate([np.linspace(-radius[-1], 0.0, half + 1), right])
+    points = np.vstack([np.column_stack([base, 0.0 * base]), arc[1:-1]])
+    number = np.arange(len(points))
+    wall = np.where(number < len(base), BOTTOM, FREE)
+    return Outline(points, wall, number == half, points.copy(), geometry)
 
 
 @st.composite
@@ -178,12 +183,12 @@ def plug(width, left, right, lean=0.0):
 
 
 def mirrored(outline):
-    """The image of an outline in x -> -x, still counterclockwise."""
+    """The image of an outline in x -> -x, still counterclockwise, a corner first."""
     def back(values):
-        return values[::-1].copy()
+        return np.roll(values[::-1], 1 - outline.geometry, axis=0)
 
     return Outline(back(outline.points) * [-1, 1], back(outline.wall), back(outline.fixed),
-                   back(outline.origin) * [-1, 1])
+                   back(outline.origin) * [-1, 1], outline.geometry)
 
 
 def seed(radius, refinement=1.0, geometry=1):
@@ -200,6 +205,16 @@ def meshed(around, width=50.0, refinement=1.0, ends=None, film=2.0):
 def space_of(grid, order):
     """Functions of an order on a straight mesh, or on the curved one with its middles half way along straight edges."""
     return Space(grid if order == 1 or grid.geometry == 2 else curved(grid, None), order)
+
+
+def bent_inside(grid, by=0.2):
+    """A curved mesh with the middles of its inner edges pushed aside by up to so many um, none turned over."""
+    points, random = grid.points.copy(), np.random.default_rng(1)
+    dofs = grid.topology.dofs(2)
+    outer = np.concatenate([dofs.inlet.ravel(), dofs.outlet.ravel(), dofs.walls, grid.loop])
+    inner = np.setdiff1d(np.arange(grid.corners, len(points)), outer)
+    points[inner] += random.uniform(-by, by, (len(inner), 2))
+    return grid.moved(points).checked()
 
 
 def relabelled(grid, biomass):
