@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
 
-from repro.curved import coupling as curved_coupling
-from repro.curved import pore as curved_pore
-from repro.curved import transport as curved_transport
-from repro.march import midpoint
-from repro.march.coupling import Instant, PoreEnd
+from repro.fem.mesh import Mesh, curved
+from repro.fem.space import Space
+from repro.march import midpoint, updates
+from repro.march.loop import Instant, PoreEnd, Step
 from repro.march.simulation import simulate
-from repro.model import remeshing, transport
-from repro.model.pore import peclet
+from repro.model import biomass, pore, transport
+from repro.model.pore import Pore, Solved, peclet
 from repro.results import row
 from repro.scene import Scene, load_scene
 from verification.case import Check, at_least, at_most, between
 
 PRESETS = ("paper", "fast", "accurate")
+#: With the paper's scheme any part may be refused, and an error that is explained is accepted.
+LENIENT = ("paper",)
 #: Relative error that a preset stands for, in velocity, conductivity, area, thickness and tips, and of effluents over
 #: the supply. The paper names none: linear triangles of its sizes were measured 1 to 4 % off in the head loss.
 TOLERANCE = {"paper": 0.04, "fast": 0.01, "accurate": 0.001}
@@ -96,11 +97,11 @@ def scene(name: str, preset: str, *changes: str) -> Scene:
     return load_scene(name, (f"numerics.preset={preset}", *changes))
 
 
-def ran(made: Scene, **how) -> Run:
-    """Run a scene to its end, or to the pore's."""
+def ran(made: Scene, way: Callable[[Scene], Iterator[Instant]] = simulate, **how) -> Run:
+    """Run a scene to its end, or to the pore's; how: of :class:`Run`."""
     instants, ended = [], ""
     try:
-        for instant in simulate(made):
+        for instant in way(made):
             instants.append(instant)
     except PoreEnd as end:
         ended = str(end)
@@ -118,23 +119,13 @@ def reference(name: str, *changes: str, refinement: float = 1.0) -> Run:
     return run(name, "accurate", *changes, f"numerics.refinement={refinement}", "numerics.tolerance=0.0005")
 
 
-def scheme_of(preset: str):
-    """The module with ``seeded``, ``solve`` and ``attempt`` of a preset's discretisation."""
-    return midpoint if preset == "paper" else curved_coupling
+def midpoint_step(made: Scene, now: Pore, solved: Solved, duration: float) -> Step:
+    """A step (h) of the midpoint rule, whatever its estimate."""
+    return midpoint.attempt(made, now, solved, duration).step
 
 
-def remeshed(preset: str, made: Scene, now, solved):
-    """The pore on a new mesh around its present shape."""
-    if preset == "paper":
-        return remeshing.remesh(made, now, now, solved)
-    return curved_coupling.remesh(made, now, now, solved.concentrations)
-
-
-def mass(now) -> float:
-    """X_A + X_I over X_m in the aggregate, um2."""
-    if isinstance(now, curved_pore.Pore):
-        return now.mass()
-    return float(now.mesh.lumped(now.mesh.biomass) @ (now.active + now.inert))
+#: A step of a length (h), by the scene's ``numerics.time``.
+STEP = {"updates": updates.step, "midpoint": midpoint_step}
 
 
 def close(found: Run, trusted: Run, preset: str, *columns: str, allowed: float = 0.0) -> list[Check]:
@@ -177,7 +168,7 @@ def unreal(found: Run) -> int:
 
 def _fields(instant: Instant):
     now, solved = instant.pore, instant.solved
-    yield from (now.mesh.points, now.active, now.inert, now.origin, now.pressure)
+    yield from (now.mesh.points, now.active, now.inert, now.theta, now.origin, now.pressure)
     if solved.flow:
         yield from (solved.flow.velocity, solved.flow.head)
     if solved.concentrations:
@@ -223,38 +214,49 @@ def _biomass(found: Run) -> list[Check]:
               between("local density over X_m, largest", high, 1 - found.density, 1 + found.density, DENSITY),
               between("share of X_I", max(inert, key=abs), -1e-12, 1.0, "a share")]
     if found.scene.growth:
-        apart = max(abs(mass(i.pore) / _density(found, i) / i.pore.outline.area - 1) for i in found.instants)
+        whole = found.scene.kinetics.maximum_density
+        apart = max(abs(i.pore.mass / whole / i.pore.outline.area - 1) for i in found.instants)
         missing = max(abs(line["biomass_balance"]) for line in found.rows)
         checks += [at_most("biomass after - before - made, over after", missing, BALANCE, MEAN),
                    at_most("area against biomass over X_m", apart, AREA[found.scene.numerics.elements], MEAN)]
+        checks += _oxygen_demand(found) if found.scene.numerics.time == "midpoint" else []
     return checks
+
+
+def _oxygen_demand(found: Run) -> list[Check]:
+    """Of the midpoint rule alone: the updates take up substrates at the concentrations of a step's ends, and grow with
+    rates of both."""
+    missing = max(abs(line["oxygen_demand_balance"]) for line in found.rows)
+    return [at_most("biomass made less what donor makes and acceptor decays, over the larger", missing, BALANCE,
+                    "one integral, in the same points; round-off")]
 
 
 MEAN = "J = theta in the mean; Newton's tolerance"
 DENSITY = "J = theta holds in the mean over elements: a local density is off by what an element does not resolve [E7]"
-#: Exact for the curved scheme, which keeps biomass by its mass; with (34) a remesh leaves an error that is worked off
-#: at the next update [E7].
-AREA = {"linear": 1e-4, "quadratic": 1e-8}
-
-
-def _density(found: Run, instant: Instant) -> float:
-    return 1.0 if isinstance(instant.pore, curved_pore.Pore) else found.scene.kinetics.maximum_density
+#: Exact on curved triangles, where biomass is kept by its mass; with (34) on straight ones a remesh leaves an error
+#: that is worked off at the next update [E7].
+AREA = {"linear": 1e-4, "quadratic": 1e-8, "cubic": 1e-8}
 
 
 def steady(found: Run, acceptor: float, donor: float) -> transport.Concentrations:
     """The substrates of a run's last instant, solved anew from other uniform values (mg/L)."""
     now, problem = found.instants[-1].pore, found.instants[-1].solved.problem
-    ones = np.ones(len(now.mesh.points))
-    start = transport.Concentrations(acceptor * ones, donor * ones)
-    if isinstance(now, curved_pore.Pore):
-        return curved_transport.steady(problem, curved_pore.active_biomass(found.scene, now), start)
-    return transport.steady(problem, now.active, start)
+    ones = np.ones(now.space.count)
+    return transport.steady(problem, biomass.sink(now.active), transport.Concentrations(acceptor * ones, donor * ones))
 
 
-def seeded(preset: str, made: Scene):
-    """The pore at t = 0 and what is solved in it, with the scheme of a preset."""
-    now = scheme_of(preset).seeded(made)
-    solved = scheme_of(preset).solve(made, now)
-    return replace(now, concentrations=solved.concentrations), solved
+def space_on(straight: Mesh, made: Scene) -> Space:
+    """The scene's functions on a mesh of straight triangles, or on the same with middles."""
+    numerics = made.numerics
+    return Space(straight if numerics.geometry == 1 else curved(straight, None), numerics.order)
 
 
+def seeded(made: Scene) -> tuple[Pore, Solved]:
+    """The pore at t = 0 and what is solved in it."""
+    return solved_in(made, pore.seeded(made))
+
+
+def solved_in(made: Scene, now: Pore) -> tuple[Pore, Solved]:
+    """A pore with its concentrations, and what is solved in it."""
+    found = pore.solve(made, now)
+    return replace(now, concentrations=found.concentrations), found

@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager
+from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
-from unittest import mock
 
 import numpy as np
 
 from reference import poiseuille
-from repro.curved import coupling as curved_coupling
-from repro.curved import flow as curved_flow
-from repro.curved import outline as curved_outline
-from repro.curved import pore as curved_pore
-from repro.curved.outline import Arcs
-from repro.fem import geometry, mesh
-from repro.fem.geometry import FREE, TOP, Outline
-from repro.march import stepping
-from repro.model import flow, remeshing
+from repro.fem.outline import BOTTOM, FREE, TOP, Outline
+from repro.fem.sizing import ACROSS_FILM
+from repro.fem.space import Space
+from repro.march import midpoint, simulation, stepping
+from repro.march.loop import Instant
+from repro.model import contact, flow, pore, remeshing
 from repro.results import M_PER_D
+from repro.scene import Scene
 from verification.case import Check, at_least, at_most, between
 from verification.hard import common
 from verification.hard.common import DRIVE, EFFLUENTS, FIXED, SHAPE, TOLERANCE, HardCase, Run
@@ -28,54 +26,52 @@ CLOSING = 0.3
 FILM = ('pore.width="20 um"', 'aggregate.radius="17.6 um"', 'growth.end="1 h"')
 
 
-@contextmanager
-def remeshing_always():
-    """Every step ends with a new mesh."""
-    def linear(scene, now, expanded, solved):
-        return remeshing.remesh(scene, now, expanded, solved), True
+def remeshing_always(made: Scene) -> Iterator[Instant]:
+    """A run each of whose steps ends with a new mesh, from which the next one goes on."""
+    state, instant = next(simulation.steps(made))
+    while True:
+        yield instant
+        try:
+            state, instant = next(simulation.steps(made, state))
+        except StopIteration:
+            return
+        if instant.remeshes == 0:
+            state, instant = _on_a_new_mesh(made, state, instant)
 
-    def quadratic(scene, now, expanded, state):
-        return curved_coupling.remesh(scene, now, expanded, state), True
 
-    with mock.patch.object(remeshing, "new_mesh", linear), mock.patch.object(curved_coupling, "new_mesh", quadratic):
-        yield
+def _on_a_new_mesh(made: Scene, state, instant: Instant):
+    """The same step, its pore and what is solved there on a new mesh."""
+    now, speed = instant.pore, instant.solved.flow.mean_velocity
+    fresh, _ = remeshing.remesh(made, now, now, speed)
+    last = replace(instant.ledgers[-1], biomass_after=fresh.mass)
+    there, solved = common.solved_in(made, fresh)
+    again = replace(instant, pore=there, solved=solved, ledgers=(*instant.ledgers[:-1], last), remeshes=1)
+    return replace(state, pore=fresh), again
 
 
-@contextmanager
-def landings(preset: str, found: list):
-    """Collects the films (um) of accepted steps that make contact: before, after, and the least that stays."""
-    advance = stepping._advance
+def landings(found: Run) -> list[tuple[float, float, float]]:
+    """The films (um) of steps that make contact: before, after, and the least that stays; each step made again."""
+    pairs = zip(found.instants, found.instants[1:])
+    steps = [midpoint.attempt(found.scene, a.pore, a.solved, b.pore.time - a.pore.time)
+             for a, b in pairs if b.pore.contact and not a.pore.contact]
+    return [step.gaps for step in steps]
 
-    def watched(scheme, scene, now, solved, time, length):
-        seen = []
 
-        def attempt(*given):
-            seen.append(scheme.attempt(*given))
-            return seen[-1]
-
-        watched_scheme = mock.Mock(attempt=attempt, solve=scheme.solve)
-        done = advance(watched_scheme, scene, now, solved, time, length)
-        found.extend([seen[-1].gaps] if seen[-1].gaps else [])
-        return done
-
-    with mock.patch.object(stepping, "_advance", watched):
-        yield
+#: Ways to run a scene.
+WAYS = {False: simulation.simulate, True: remeshing_always}
+#: What is known of contact from a step to the next: a midpoint step ends where the film is first too thin, an update
+#: comes up to 12 min late.
+LATE = {"midpoint": (0.0, ""), "updates": (1.0, ", and 12 min between updates")}
 
 
 def film_closes(preset: str, forced: bool) -> list:
     """From a film of 2.4 um through contact; forced: every step remeshes, also those just before and after it."""
-    landed = []
-    with landings(preset, landed):
-        if forced:
-            with remeshing_always():
-                found = common.run("wide", preset, *FILM, density=CLOSING)
-        else:
-            found = common.run("wide", preset, *FILM, density=CLOSING)
+    found = common.ran(common.scene("wide", preset, *FILM), way=WAYS[forced], density=CLOSING)
     fine = common.reference("wide", *FILM, 'output.times=["1 h"]')
     checks = [found, *contact_rests(found), *common.close(found, fine, preset, "aggregate_area_um2", *EFFLUENTS),
               *_edge_wide(found, fine, preset)]
-    if preset != "paper":
-        thinnest = min((gaps[1] / gaps[2] for gaps in landed), default=0.0)
+    if found.scene.numerics.time == "midpoint":
+        thinnest = min((gaps[1] / gaps[2] for gaps in landings(found)), default=0.0)
         checks.append(between("film when it closes over the least that stays", thinnest, stepping.LANDED, 1.0,
                               "a step ends where the film is first too thin: stepping.LANDED"))
     return checks
@@ -90,16 +86,16 @@ def _edge_wide(found: Run, fine: Run, preset: str) -> list[Check]:
     each side of a plug W high."""
     width, ratio = found.scene.pore.width, found.scene.flow.viscosity_ratio
     film = found.scene.growth.minimum_film
-    edge = film / geometry.ACROSS_FILM / found.scene.numerics.refinement
+    edge = film / ACROSS_FILM / found.scene.numerics.refinement
     drive = found.scene.flow
     clean = poiseuille.conductivity(width, drive.kinematic_viscosity / drive.gravity) * M_PER_D
     loss = found.scene.pore.length * clean / fine.last[DRIVE[0]]
     ours, theirs = (_contact_length(run) for run in (found, fine))
     fall = -np.diff([width - line["thickness_um"] for line in found.rows if not line["contact"]]).min()
-    known = 2 * edge + (np.sqrt(8 * width * fall) if preset == "paper" else 0.0)
+    share, late = LATE[found.scene.numerics.time]
+    known = 2 * edge + share * np.sqrt(8 * width * fall)
     tips = {tip: known * film / width / 2 / abs(fine.last[tip]) for tip in SHAPE[2:]}
     bounds = {DRIVE[0]: known * ratio / loss, **tips}
-    late = ", and 12 min between updates" if preset == "paper" else ""
     return [at_most("length of the contact surface against a finer run, um", abs(ours - theirs), known,
                     f"an edge of the interface at each end{late}"),
             *(check for name, more in bounds.items() for check in common.close(
@@ -118,8 +114,8 @@ def contact_rests(found: Run) -> list[Check]:
     before = [width - i.pore.outline.thickness for i in found.instants if not i.pore.contact]
     for instant in found.instants:
         shape = instant.pore.outline
-        closing = curved_outline.closing if isinstance(shape, Arcs) else geometry.closing_nodes
-        open_nodes += int(np.count_nonzero(closing(shape, width, film, found.scene.growth.minimum_contact_angle)))
+        joins = contact.closing(shape, width, film, found.scene.growth.minimum_contact_angle)
+        open_nodes += int(np.count_nonzero(joins))
         crossed += int(shape.points[:, 1].max() > width or shape.points[:, 1].min() < 0)
     return [at_most("nodes whose film or wedge should have closed", open_nodes, 0, "contact rests (2.3.3)"),
             at_most("instants with nodes beyond a wall", crossed, 0, "the walls hold"),
@@ -138,24 +134,25 @@ CONTACT = HardCase(
 LEAST = 16.7
 
 
-def wedge(angle: float) -> tuple[np.ndarray, ...]:
-    """Points, wall, fixed of a plug 20 um high, whose sides leave the upper wall at an angle (degrees) in the fluid."""
+def wedge(angle: float, geometry: int) -> Outline:
+    """A plug 20 um high, whose sides leave the upper wall at an angle (degrees) in the fluid."""
     height, half, side = 20.0, 30.0, np.linspace(0, 1, 13)[1:-1]
     reach = height / np.tan(np.deg2rad(angle))
     bottom, top = np.linspace(-half - reach, half + reach, 17), np.linspace(half, -half, 9)
     right = np.column_stack([half + reach * (1 - side), height * side])
     points = np.vstack([np.column_stack([bottom, 0 * bottom]), right, np.column_stack([top, 0 * top + height]),
                         right[::-1] * [-1, 1]])
-    wall = np.repeat([geometry.BOTTOM, FREE, TOP, FREE], [len(bottom), len(side), len(top), len(side)])
+    wall = np.repeat([BOTTOM, FREE, TOP, FREE], [len(bottom), len(side), len(top), len(side)])
     fixed = np.isin(np.arange(len(points)), [8, len(bottom) + len(side) + 4])
-    return points, wall, fixed, points.copy()
+    return Outline(points, wall, fixed, points.copy(), geometry)
 
 
 def least_angle(preset: str) -> list:
     """The stage alone: which nodes join the wall a tenth of a degree under and over the least angle."""
-    kind, closing = (Outline, geometry.closing_nodes) if preset == "paper" else (Arcs, curved_outline.closing)
-    under, over = (closing(kind(*wedge(angle)), 20.0, 2.0, np.deg2rad(LEAST)) for angle in (LEAST - 0.1, LEAST + 0.1))
-    x = wedge(LEAST)[0][:, 0]
+    kind = common.scene("wide", preset).numerics.geometry
+    under, over = (contact.closing(wedge(angle, kind), 20.0, 2.0, np.deg2rad(LEAST))
+                   for angle in (LEAST - 0.1, LEAST + 0.1))
+    x = wedge(LEAST, kind).points[:, 0]
     return [at_least("nodes a side that join, a tenth of a degree under", min(
                 (under[x > 0] != FREE).sum(), (under[x < 0] != FREE).sum()), 1, "2.3.3: the wedge closes"),
             at_most("nodes that join, a tenth of a degree over", (over != FREE).sum(), 0, "2.3.3: it stays")]
@@ -163,22 +160,16 @@ def least_angle(preset: str) -> list:
 
 def in_a_wedge(preset: str) -> list:
     """The stage alone: a mesh around a plug with sides at the least angle, and the flow through it."""
-    made = common.scene("wide", preset, 'pore.width="20 um"')
-    losses = [_loss(preset, made), _loss("accurate", common.scene("wide", "accurate", 'pore.width="20 um"',
-                                                                  "numerics.refinement=1"))]
-    return [at_most("head loss against a finer mesh", abs(losses[0] / losses[1] - 1), 3 * TOLERANCE[preset],
+    own, fine = (_loss(common.scene("wide", which, 'pore.width="20 um"', *more))
+                 for which, more in ((preset, ()), ("accurate", ("numerics.refinement=1",))))
+    return [at_most("head loss against a finer mesh", abs(own / fine - 1), 3 * TOLERANCE[preset],
                     "that of velocity, times three: the loss is lambda h^-3")]
 
 
-def _loss(preset: str, made) -> float:
+def _loss(made: Scene) -> float:
     """Loss over the meshed part, 1/um."""
-    if preset != "paper":
-        grid, _ = curved_pore.generate(made, Arcs(*wedge(LEAST)))
-        return curved_flow.unit_flow(grid, made.flow.viscosity_ratio)[2]
-    shape = Outline(*wedge(LEAST))
-    ends = geometry.meshed_extent(shape, 20.0, made.pore.length)
-    grid, _ = mesh.generate(shape, ends, geometry.Sizing(20.0, made.numerics.refinement, 2.0))
-    return flow.unit_flow(grid, made.flow.viscosity_ratio).loss
+    grid, _ = pore.generate(made, wedge(LEAST, made.numerics.geometry))
+    return flow.unit_flow(Space(grid, made.numerics.order), made.flow.viscosity_ratio).loss
 
 
 def wedges_close(preset: str) -> list:

@@ -9,12 +9,10 @@ import numpy as np
 from scipy.optimize import brentq
 
 from reference import layered_channel, poiseuille
-from repro.curved import flow as curved_flow
-from repro.curved import transfer
-from repro.curved.mesh import curved
+from repro.fem.transfer import located
 from repro.model import flow
 from repro.results import M_PER_D
-from verification import meshes, norms
+from verification import meshes
 from verification.case import Check, at_most, between
 from verification.hard import common
 from verification.hard.common import DRIVE, EFFLUENTS, FIXED, SHAPE, TOLERANCE, HardCase, Run
@@ -44,7 +42,7 @@ def _finer(found: Run, preset: str, factor: float) -> list[Check]:
                     "that of concentrations at the aggregate, area and rate: twice the preset's")]
 
 
-#: Boundary layers ask for refinements of 0.23, 0.49, 1.06 and 2.3 (curved.pore.resolution); the finer run has more.
+#: Boundary layers ask for refinements of 0.23, 0.49, 1.06 and 2.3 (pore.resolution); the finer run has more.
 FINER = {1: 1.0, 10: 1.0, 100: 1.5, 1000: 2.8}
 
 
@@ -143,12 +141,18 @@ def rigid(preset: str) -> list:
     """lambda from 1e5 to 1e9: nothing passes the aggregate any more."""
     soft, hard = (common.run("wide", preset, *disc(80, f"flow.viscosity_ratio={ratio}")) for ratio in (1e5, 1e9))
     layers = [layered_channel.gradient(soft.scene.pore.width, 80.0, ratio) for ratio in (1e5, 1e9)]
-    through = np.hypot(*hard.instants[-1].solved.flow.velocity[_inside(hard)].T).max()
-    fastest = np.hypot(*hard.instants[-1].solved.flow.velocity.T).max()
+    through = np.hypot(*_velocity(hard)[_inside(hard)].T).max()
+    fastest = np.hypot(*_velocity(hard).T).max()
     return [soft, hard,
             between("conductivity at 1e9 over that at 1e5", hard.last[DRIVE[0]] / soft.last[DRIVE[0]],
                     layers[0] / layers[1], 1.0, "falls with lambda, by less than with a layer 80 um thick all along"),
             at_most("largest speed inside over the largest", through / fastest, 1e-5, "of the order of 1 / lambda")]
+
+
+def _velocity(found: Run) -> np.ndarray:
+    """(N, 2) at the nodes of the last instant's mesh."""
+    last = found.instants[-1]
+    return last.pore.space.to_mesh(last.solved.flow.velocity)
 
 
 def _inside(found: Run) -> np.ndarray:
@@ -165,21 +169,22 @@ def plugged(preset: str, size: float) -> list:
     """The stage alone: biomass from wall to wall, lambda = 2000, elements of W / 4 and W / 7."""
     grid = meshes.channel(ENDS, WIDTH, size, lambda x, y: np.abs(x) < PLUG, across=(-PLUG, PLUG), seed=3)
     exact = 12 / WIDTH**2 * (ENDS[1] - ENDS[0] + 1999 * 2 * PLUG)
-    if preset == "paper":
-        found = flow.unit_flow(grid, 2000.0)
-        checks = [at_most("sources of the velocity that carries, over the flux", _sources(grid, found), 1e-10,
-                          "w = u - tau grad p is divergence-free")]
-        flux, loss = _fluxes(lambda where: norms.sample(grid.points, grid.triangles, found.velocity, where)), found.loss
-    else:
-        grid, checks = curved(grid, None), []
-        velocity, _, loss = curved_flow.unit_flow(grid, 2000.0)
-        flux = _fluxes(lambda where: transfer.interpolate(grid.points, grid.cells, velocity, where))
-    leak, lost, origin = LEAK[size] if preset == "paper" else (1e-10, 1e-10, "round-off: the elements hold a parabola")
+    space = common.space_on(grid, common.scene("wide", preset))
+    found = flow.unit_flow(space, 2000.0)
+    flux = _fluxes(lambda where: located(space.mesh.points, space.mesh.cells, where).field(
+        found.velocity, space.cells, space.order))
+    leak, lost, origin = LEAK[size] if space.order == 1 else HELD
+    checks = []
+    if found.correction is not None:
+        checks.append(at_most("sources of the velocity that carries, over the flux", _sources(grid, found), 1e-10,
+                              "w = u - tau grad p is divergence-free"))
     return [*checks, at_most("flux through a section against that supplied, largest difference", np.abs(flux - 1).max(),
                              leak, origin),
-            at_most("head loss against Poiseuille's", abs(loss / exact - 1), lost, origin)]
+            at_most("head loss against Poiseuille's", abs(found.loss / exact - 1), lost, origin)]
 
 
+#: Quadratic and cubic velocities hold the parabola.
+HELD = (1e-10, 1e-10, "round-off: the elements hold a parabola")
 #: What the paper's velocity and head may miss in a plug with elements of so many um, 3.3 and 12 % on a coarse mesh as
 #: numerics.md has it, and of second order.
 COARSE = "3.3 and 12.3 % with elements of W / 4 (numerics.md), second order"
@@ -199,7 +204,7 @@ def _sources(grid, found) -> float:
     w = found.velocity[grid.triangles].mean(axis=1) - found.correction
     local = grid.areas[:, None] * np.einsum("tai,ti->ta", grid.gradients, w)
     total = np.bincount(grid.triangles.ravel(), local.ravel(), len(grid.points))
-    rim = np.concatenate([grid.walls, grid.inlet, grid.outlet])
+    rim = np.concatenate([grid.topology.walls, grid.topology.inlet, grid.topology.outlet])
     return float(np.abs(np.delete(total, rim)).max() / grid.width)
 
 

@@ -8,9 +8,7 @@ from functools import cache, partial
 
 import numpy as np
 
-from repro.curved import coupling as curved_coupling
-from repro.march import coupling
-from repro.march.coupling import Instant
+from repro.march.loop import Instant, Step
 from repro.results import row
 from repro.scene import Scene, parse_scene, scene_tables
 from verification.case import at_least, at_most
@@ -141,30 +139,31 @@ SEEDS = HardCase(
      "20 um in 50 um": partial(seeded, name="base", radius=20.0, end="4 h")},
     mutants=("curved-half-of-the-half",))
 
-#: Refinement with which base has 1e5 nodes.
-HUGE = {"linear": 11.4, "quadratic": 5.7}
+#: Refinement with which base has 1e5 nodes, and a preset of those elements: fast and accurate differ in the step's
+#: tolerance alone.
+HUGE = {1: ("paper", 11.4), 2: ("accurate", 5.7)}
 
 
 @cache
-def _huge(kind: str):
-    """(first Run, Step) of base from 15 um with 1e5 nodes; fast and accurate differ in the step's tolerance alone."""
-    preset = "paper" if kind == "linear" else "accurate"
-    return _first_step(preset, f"numerics.refinement={HUGE[kind]}")
+def _huge(order: int) -> tuple[Run, Step]:
+    """Base from 15 um with 1e5 nodes, by :func:`_first_step`."""
+    preset, refinement = HUGE[order]
+    return _first_step(preset, f"numerics.refinement={refinement}")
 
 
-def _first_step(preset: str, *changes: str):
+def _first_step(preset: str, *changes: str) -> tuple[Run, Step]:
     """What is solved in the seed of 15 um as a Run, and one step of 6 min from it."""
     made = common.scene("base", preset, 'aggregate.radius="15 um"', *changes)
-    now, solved = common.seeded(preset, made)
-    step = coupling.step(made, now, solved, 0.1) if preset == "paper" else curved_coupling.attempt(
-        made, now, solved, 0.1).step
+    now, solved = common.seeded(made)
+    step = common.STEP[made.numerics.time](made, now, solved, 0.1)
     start = Instant(now, solved, None, (), 0, {})
     return Run(made, [start], [row(made, start)]), step
 
 
 def huge(preset: str) -> list:
     """One step of 6 min with 1e5 nodes, against the preset's own mesh."""
-    (fine, far), (own, near) = _huge("linear" if preset == "paper" else "quadratic"), _first_step(preset)
+    own, near = _first_step(preset)
+    fine, far = _huge(own.scene.numerics.order)
     missing = far.ledger.biomass_after - far.ledger.biomass_before - far.ledger.biomass_made
     taken = [abs(1 - (far.ledger.out[k] + far.ledger.consumed[k]) / far.ledger.supplied[k]) for k in (0, 1)]
     shapes = [(step.pore.outline.area, step.pore.outline.thickness, step.pore.outline.upstream) for step in (near, far)]

@@ -8,9 +8,8 @@ from functools import partial
 import numpy as np
 
 from reference import slab
-from repro.curved import transport as curved_transport
-from repro.curved.mesh import curved
 from repro.model import transport
+from repro.model.kinetics import Sink
 from verification import meshes
 from verification.case import Check, at_least, at_most, between
 from verification.hard import common
@@ -130,14 +129,13 @@ def slab_front(preset: str) -> list:
     depth, ratio = DEPTH * HALF, donor.diffusivity_in_aggregate / donor.diffusivity
     sink = donor.supply * donor.diffusivity_in_aggregate / (depth**2 / 2 + FILM * ratio * depth)
     law = replace(made.kinetics, decay_coefficient=0.0, acceptor_to_donor_ratio=1e-9)
-    grid = grid if preset == "paper" else curved(grid, None)
-    stage = transport if preset == "paper" else curved_transport
-    problem = stage.problem(grid, None, replace(made.substrates, acceptor=acceptor, donor=donor), law)
-    active = np.full(len(grid.points), sink / law.maximum_utilization_rate)
-    state = stage.steady(problem, active)
+    space = common.space_on(grid, made)
+    problem = transport.problem(space, None, replace(made.substrates, acceptor=acceptor, donor=donor), law)
+    active = Sink(sink / law.maximum_utilization_rate * space.reaction.dx)
+    state = transport.steady(problem, active)
     given = (donor.supply, sink, HALF, donor.diffusivity_in_aggregate, FILM, donor.diffusivity)
-    exact = slab.zero_order(grid.points[:, 0], *given)
-    entering = stage.fluxes(problem, active, state)[1].consumed / (2 * width * sink)
+    exact = slab.zero_order(space.points[:, 0], *given)
+    entering = transport.fluxes(problem, active, state)[1].consumed / (2 * width * sink)
     return [at_most("C_D over the supply, largest error at a node", np.abs(state.donor - exact).max() / donor.supply,
                     bound, origin),
             at_most("depth of the front, over that of the closed form", abs(entering / depth - 1), bound, origin),
