@@ -105,8 +105,7 @@ def carried(how: str, old: Space, new: Space, at: Located, amounts: Amounts, den
     inside = [np.clip(at_points(new, column), 0.0, 1.0) for column in nodal.T]
     masses = density * new.reaction.dx
     inert = _conserved(inside[0], masses, amounts[1].sum())
-    others = [share * masses * (amount.sum() / np.vdot(share, masses)) for share, amount in
-              zip(inside[1:], amounts[2:])]
+    others = [_scaled(share * masses, amount.sum()) for share, amount in zip(inside[1:], amounts[2:])]
     return (masses * (1 - inert), masses * inert, *others)
 
 
@@ -118,6 +117,12 @@ def _linear(how: str, old: Space, new: Space, amounts: Amounts) -> Amounts:
     found = choose[how](old.mesh.points[nodes], old.mesh.straight.topology.body_cells, densities,
                         new.mesh.points[there], new.mesh.straight.topology.body_cells)
     return tuple(column[:, None] * new.reaction.dx for column in found.T)
+
+
+def _scaled(amount: np.ndarray, wanted: float) -> np.ndarray:
+    """An amount (r, q) times the factor that gives it the sum ``wanted``; no inert biomass at t = 0 stays none."""
+    total = float(amount.sum())
+    return amount * (wanted / total) if total > 0 else amount
 
 
 def _conserved(share: np.ndarray, weight: np.ndarray, wanted: float) -> np.ndarray:
