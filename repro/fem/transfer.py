@@ -98,7 +98,8 @@ def _inverted(nodes: np.ndarray, where: np.ndarray, geometry: int) -> np.ndarray
 def _inside(local: np.ndarray) -> np.ndarray:
     """Places on the unit triangle, those outside moved to its edge."""
     L = np.clip(elements.values(1, local), 0.0, None)
-    return (L / L.sum(axis=1, keepdims=True))[:, 1:]
+    s, t = (L / L.sum(axis=1, keepdims=True))[:, 1:].T
+    return np.column_stack([s, np.minimum(t, 1 - s)])  # 1 - s - t is not negative to the last bit
 
 
 def barycentric(corners: np.ndarray, where: np.ndarray) -> np.ndarray:
