@@ -6,69 +6,86 @@ from dataclasses import replace
 
 import numpy as np
 
-from repro.fem import geometry, mesh
-from repro.model import pore, remeshing, shape
-from repro.model.pore import Pore, Solved
-from repro.model.transport import Concentrations
+from repro.fem import mesher, outline
+from repro.fem.outline import Outline
+from repro.fem.sizing import ACROSS_AGGREGATE, Sizing
+from repro.fem.space import Space
+from repro.march import updates
+from repro.model import contact, pore, remeshing
+from repro.model.pore import Pore
 from repro.scene import load_scene
 from verification.reprojection import grids
 
 WIDTH, FILM = 50.0, 2.0
 #: X_m of Table 1, mg/L.
 DENSITY = 3e4
+#: Orders of the elements, by the names that scenes have for them.
+ORDERS = {1: "linear", 2: "quadratic", 3: "cubic"}
 
 
-def scene(*changes: str):
+def scene(*changes: str, order: int = 1):
     """The base scene with changes: what (34) and the transfer read of it."""
-    return load_scene("base", changes)
+    return load_scene("base", (f'numerics.elements="{ORDERS[order]}"', *changes))
 
 
-def placed(outline: geometry.Outline, refinement: float, density=lambda x, y: DENSITY + 0 * x,
-           ends=(-75.0, 75.0)) -> Pore:
+def half_disc(radius: float, refinement: float = 1.0, order: int = 1) -> Outline:
+    """Of a seed."""
+    return outline.half_disc(radius, ACROSS_AGGREGATE * refinement, min(order, 2))
+
+
+def placed(around: Outline, refinement: float, density=lambda x, y: DENSITY + 0 * x, ends=(-75.0, 75.0),
+           order: int = 1) -> Pore:
     """An aggregate at t = 0 with X_A = density(x, y), on a mesh of its own."""
-    grid, outline = mesh.generate(outline, ends, geometry.Sizing(WIDTH, refinement, FILM))
-    active, none = np.zeros(len(grid.points)), np.zeros(len(grid.points))
-    active[grid.body] = density(*grid.points[grid.body].T)
-    return Pore(0.0, grid, outline.wall, outline.fixed, active, none, grid.points.copy(),
-                np.ones(np.count_nonzero(grid.biomass)), none)
+    grid, around = mesher.generate(around, ends, Sizing(WIDTH, refinement, FILM), around.geometry)
+    space = Space(grid, order)
+    active = density(*places(space)) * space.reaction.dx
+    body = pore.material(space, grid.points[grid.body])
+    return Pore(0.0, space, around.wall, around.fixed, active, 0 * active, np.ones_like(body.at.dx), body,
+                np.zeros(grid.corners))
 
 
-def quiet(now: Pore) -> Solved:
-    """No flow, no substrates."""
-    none = np.zeros(len(now.mesh.points))
-    return Solved(None, None, Concentrations(none, none))
+def places(space: Space) -> np.ndarray:
+    """(2, r, q) um, the points of the reaction."""
+    mesh, pieces = space.mesh, space.reaction
+    if space.order == 1:
+        return np.moveaxis(mesh.points[pieces.cells], 2, 0)
+    return np.moveaxis(np.einsum("qa,tai->tqi", space.table.shape, mesh.points[mesh.cells[mesh.biomass]]), 2, 0)
 
 
-def remeshed(given, now: Pore, expanded: Pore | None = None) -> Pore:
+def remeshed(given, now: Pore) -> Pore:
     """A new mesh around the aggregate."""
-    return remeshing.remesh(given, now, now if expanded is None else expanded, quiet(now))
+    return remeshing.remesh(given, now, now, 0.0)[0]
 
 
 def expanded(given, now: Pore, made) -> Pore:
-    """The shape after X_A has grown by the factors 1 + made (N,), (28)-(34), on the old mesh."""
+    """The shape after X_A has grown by the factors 1 + made (r, q), (28)-(34), on the old mesh."""
     grown = replace(now, active=now.active * (1 + made))
-    more = (grown.active - now.active)[now.mesh.triangles[now.mesh.biomass]].mean(axis=1)
-    return shape.expand(given, grown, now.theta * (1 + more / DENSITY))[0]
+    return contact.expand(given, grown, updates.enlarged(given, now, grown))[0]
 
 
 def updated(given, now: Pore, made) -> tuple[Pore, bool]:
     """A whole update: growth, then a moved mesh or a new one, and which of them it is."""
-    return remeshing.new_mesh(given, now, expanded(given, now, made), quiet(now))
+    return remeshing.new_mesh(given, now, expanded(given, now, made), 0.0)
 
 
-def seed(radius: float, refinement: float = 1.0) -> Pore:
+def seed(radius: float, refinement: float = 1.0, order: int = 1) -> Pore:
     """A half-disc at t = 0 in the base scene."""
-    return pore.seeded(scene(f'aggregate.radius="{radius} um"', f"numerics.refinement={refinement}"))
+    return pore.seeded(scene(f'aggregate.radius="{radius} um"', f"numerics.refinement={refinement}", order=order))
 
 
-def node_areas(now: Pore) -> np.ndarray:
-    """(N,) a third of the area of the biomass triangles at each node, um2: triangle by triangle."""
-    found = np.zeros(len(now.mesh.points))
-    for nodes in now.mesh.triangles[now.mesh.biomass]:
-        found[nodes] += abs(np.linalg.det(now.mesh.points[nodes[1:]] - now.mesh.points[nodes[0]])) / 6
-    return found
+def areas(now: Pore) -> np.ndarray:
+    """(r, q) um2, the weights of the points of the reaction, worked out here: at nodes a third of the area of the
+    biomass triangles around them, triangle by triangle; else the quadrature's weights times the map's determinant."""
+    mesh = now.mesh
+    if now.space.order == 1:
+        found = np.zeros(len(mesh.points))
+        for nodes in mesh.triangles[mesh.biomass]:
+            found[nodes] += abs(np.linalg.det(mesh.points[nodes[1:]] - mesh.points[nodes[0]])) / 6
+        return found[mesh.body, None]
+    return grids.curved_weights(mesh.points[mesh.cells[mesh.biomass]], now.space.table.linear, now.space.table.weights)
 
 
-def mass(now: Pore) -> float:
-    """Integral of X_A + X_I over the aggregate, um2 mg/L."""
-    return grids.integral((now.mesh.points, now.mesh.triangles[now.mesh.biomass]), now.active + now.inert)
+def densities(now: Pore) -> tuple[np.ndarray, np.ndarray]:
+    """X_A and X_I (r, q) mg/L in the points of the reaction."""
+    weight = areas(now)
+    return now.active / weight, now.inert / weight

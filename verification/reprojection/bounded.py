@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from repro.fem import reprojection
+from repro.fem import transfer
 from verification import norms
 from verification.case import Outcome, Profile, at_least, at_most, between, case
 from verification.convergence import refine, study
 from verification.reprojection import grids, orders
 
 FIELDS = {"hill": orders.steep, "cylinder": lambda x, y: 1.0 * (np.hypot(x - 18, y - 10) < 6)}
-CARRIERS = {"bounded": reprojection.project_bounded, "projection": reprojection.project}
+CARRIERS = {"bounded": transfer.project_bounded, "projection": transfer.project}
 
 
 @case("reprojection-bounded-chain", kind="property",
@@ -70,12 +70,12 @@ def _carried(size: float) -> dict[str, float]:
     errors = []
     for seed in orders.SEEDS:
         old, new = grids.grid(size, 2 * seed), grids.grid(0.9 * size, 2 * seed + 1)
-        found = reprojection.project_bounded(*old, orders.smooth(*old[0].T)[:, None], *new)
+        found = transfer.project_bounded(*old, orders.smooth(*old[0].T)[:, None], *new)
         errors.append(norms.l2_error(*new, found[:, 0], orders.smooth))
     return {"bounded": float(np.mean(errors))}
 
 
 def _linear(old: grids.Grid, new: grids.Grid) -> float:
     before, wanted = (3 + 2 * mesh[0][:, 0] - mesh[0][:, 1] for mesh in (old, new))
-    found = reprojection.project_bounded(*old, before[:, None], *new)[:, 0]
+    found = transfer.project_bounded(*old, before[:, None], *new)[:, 0]
     return float(np.abs(found - wanted).max() / np.ptp(wanted))

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from repro.fem import geometry
 from repro.model import remeshing
-from repro.model.flow import Flow
-from repro.model.pore import Solved
 from repro.model.transport import Concentrations
-from verification import norms
 from verification.case import Outcome, Profile, at_least, at_most, case
-from verification.reprojection import bodies
+from verification.reprojection import bodies, grids
 
 #: um/h, of the order of the base scene's; ends of the old mesh, um.
 SPEED, ENDS = 1.2e5, (-40.0, 30.0)
@@ -23,15 +21,18 @@ SPEED, ENDS = 1.2e5, (-40.0, 30.0)
             "beyond both ends",
       mutants=("upstream-reversed", "diffusivity-of-the-acceptor"))
 def beyond_the_ends() -> Outcome:
-    now = bodies.placed(geometry.seed(10.0), 1.0, ends=ENDS)
-    old = _exact(np.clip(now.mesh.points[:, 0], *ENDS))
-    flowing, still = (_carried(now, old, speed) for speed in (SPEED, 0.0))
-    x = flowing.mesh.points[:, 0]
-    reach = min(ENDS[0] - x.min(), x.max() - ENDS[1])
-    checks = [check for column, name in enumerate(("acceptor", "donor"))
-              for check in _judged(name, now, old[column], flowing, still, column)]
-    return Outcome((*checks, at_least("reach beyond both ends (um)", reach, 20.0, "else nothing is tested")), (),
-                   (_along(flowing),))
+    checks, profiles = [], []
+    for order in bodies.ORDERS:
+        now = bodies.placed(bodies.half_disc(10.0, order=order), 1.0, ends=ENDS, order=order)
+        old = _exact(np.clip(now.space.points[:, 0], *ENDS))
+        flowing, still = (_carried(now, old, speed) for speed in (SPEED, 0.0))
+        x = flowing.space.points[:, 0]
+        for column, name in enumerate(("acceptor", "donor")):
+            checks += _judged(f"{name}, {bodies.ORDERS[order]}", now, old[column], flowing, still, column)
+        checks.append(at_least(f"reach beyond both ends (um), {bodies.ORDERS[order]}",
+                               min(ENDS[0] - x.min(), x.max() - ENDS[1]), 20.0, "else nothing is tested"))
+        profiles.append(_along(flowing, bodies.ORDERS[order]))
+    return Outcome(tuple(checks), (), tuple(profiles))
 
 
 def _substrates():
@@ -46,17 +47,16 @@ def _exact(x: np.ndarray) -> list[np.ndarray]:
 
 def _carried(now, old, speed: float):
     """The pore on its new mesh; the whole of what the flow says there is its mean velocity."""
-    none = np.zeros(len(now.mesh.points))
-    flow = Flow(speed, none, none, none, 0.0, 0.0, 0.0)
-    return remeshing.remesh(bodies.scene(), now, now, Solved(flow, None, Concentrations(*old)))
+    filled = replace(now, concentrations=Concentrations(*old))
+    return remeshing.remesh(bodies.scene(order=now.space.order), filled, filled, speed)[0]
 
 
 def _judged(name: str, now, old: np.ndarray, flowing, still, column: int) -> list:
     """Checks of one substrate."""
-    supply, x = _substrates()[column].supply, flowing.mesh.points[:, 0]
+    supply, x = _substrates()[column].supply, flowing.space.points[:, 0]
     found, resting = (_fields(new)[column] for new in (flowing, still))
     outside, inside = (x < ENDS[0]) | (x > ENDS[1]), (x >= ENDS[0]) & (x <= ENDS[1])
-    between = norms.sample(now.mesh.points, now.mesh.triangles, old, flowing.mesh.points[inside])
+    between = grids.sample(now.space, old, flowing.space.points[inside])
     gaps = {"beyond the ends": (found - _exact(x)[column])[outside], "between": found[inside] - between,
             "beyond the ends, no flow": resting[outside] - supply, "between, no flow": resting[inside] - between}
     return [at_most(f"{name} {where}", np.abs(gap).max() / supply, 1e-12, "closed form: round-off")
@@ -67,12 +67,12 @@ def _fields(new):
     return new.concentrations.acceptor, new.concentrations.donor
 
 
-def _along(new) -> Profile:
+def _along(new, name: str) -> Profile:
     """Both concentrations along the lower wall of the new mesh."""
-    grid = new.mesh
-    wall = np.flatnonzero(grid.points[:, 1] == 0)
-    wall = wall[np.argsort(grid.points[wall, 0])]
-    x, curves = grid.points[wall, 0], []
-    for name, found, exact in zip(("acceptor", "donor"), _fields(new), _exact(x)):
-        curves += [(name, "ours", x, found[wall]), (f"{name}, closed form", "exact", x, exact)]
-    return Profile("carried to a longer mesh (old: -40 to 30 um)", "x (um)", "C (mg/L)", tuple(curves))
+    places = new.space.points
+    wall = np.flatnonzero(places[:, 1] == 0)
+    wall = wall[np.argsort(places[wall, 0])]
+    x, curves = places[wall, 0], []
+    for substrate, found, exact in zip(("acceptor", "donor"), _fields(new), _exact(x)):
+        curves += [(substrate, "ours", x, found[wall]), (f"{substrate}, closed form", "exact", x, exact)]
+    return Profile(f"carried to a longer mesh (old: -40 to 30 um), {name}", "x (um)", "C (mg/L)", tuple(curves))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from reference import galerkin_transfer
-from repro.fem import reprojection
+from repro.fem import transfer
 from repro.fem.mesh import triangle_areas
 from verification import norms
 from verification.case import Outcome, at_most, case
@@ -33,7 +33,7 @@ def _worst(rows: list[dict[str, float]], bound: float) -> Outcome:
 
 def _pieces(old: grids.Grid, new: grids.Grid) -> dict[str, float]:
     """The errors of one pair of meshes."""
-    corners, of_old, of_new = reprojection.supermesh(*old, *new)
+    corners, of_old, of_new = transfer.supermesh(*old, *new)
     rim = corners.reshape(-1, 2), np.arange(3 * len(corners)).reshape(-1, 3)
     expected = galerkin_transfer.overlaps(*old, *new)
     shared = np.zeros_like(expected)
@@ -67,7 +67,7 @@ def projection() -> Outcome:
 
 def _projected(old: grids.Grid, new: grids.Grid, rough: np.ndarray) -> dict[str, float]:
     """The errors of a rough field, and of a linear one, on one pair of meshes."""
-    found = reprojection.project(*old, np.column_stack([rough, _plane(old)]), *new)
+    found = transfer.project(*old, np.column_stack([rough, _plane(old)]), *new)
     expected = galerkin_transfer.project(*old, rough[:, None], *new)[:, 0]
     drifts = {name: abs(grids.integral(new, found[:, 0], weight) / grids.integral(old, rough, weight) - 1)
               for name, weight in (("integral", lambda x, y: 1 + 0 * x), ("centre, x", lambda x, y: x),
@@ -84,11 +84,11 @@ def _plane(mesh: grids.Grid) -> np.ndarray:
 def _pythagoras(old: grids.Grid, before: np.ndarray, new: grids.Grid, after: np.ndarray) -> float:
     """|X_old|^2 - |X_new|^2 - |X_old - X_new|^2 over the first: zero where the difference is at right angles to X_new.
     """
-    corners, of_old, of_new = reprojection.supermesh(*old, *new)
+    corners, of_old, of_new = transfer.supermesh(*old, *new)
     gap = 0.0
     for (points, triangles), field, owner, sign in ((old, before, of_old, 1), (new, after, of_new, -1)):
         nodes = np.repeat(triangles[owner][:, None], 3, axis=1)
-        gap = gap + sign * np.sum(reprojection.barycentric(points, nodes, corners) * field[nodes], axis=2)
+        gap = gap + sign * np.sum(transfer.barycentric(points[nodes], corners) * field[nodes], axis=2)
     pieces = corners.reshape(-1, 2), np.arange(gap.size).reshape(-1, 3)
     left = grids.square(old, before) - grids.square(new, after) - grids.square(pieces, gap.ravel())
     return abs(left) / grids.square(old, before)
