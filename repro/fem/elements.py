@@ -47,6 +47,15 @@ def derivatives(order: int, where: np.ndarray) -> np.ndarray:
     return found
 
 
+def quadrature(degree: int) -> tuple[np.ndarray, np.ndarray]:
+    """Points (q, 2) of the unit triangle and their weights (q,), exact for polynomials of a degree: scikit-fem's rules,
+    and the centroid for a degree of one or less, where scikit-fem takes three points."""
+    if degree <= 1:
+        return np.full((1, 2), 1 / 3), np.full(1, 0.5)
+    where, weights = get_quadrature_tri(degree)
+    return where.T, weights
+
+
 @dataclass(frozen=True, eq=False)
 class Table:
     """Functions of an order at quadrature points of the unit triangle.
@@ -72,8 +81,7 @@ class Table:
 @cache
 def table(order: int, geometry: int, degree: int) -> Table:
     """Functions of an order on triangles of a geometry (1: straight, 2: curved), in the quadrature of a degree."""
-    where, weights = get_quadrature_tri(degree)
-    return _tabulated(order, geometry, where.T, weights)
+    return _tabulated(order, geometry, *quadrature(degree))
 
 
 @cache

@@ -198,12 +198,15 @@ def _on_walls(topology: Topology, order: int) -> np.ndarray:
     on = np.zeros(topology.corners, bool)
     on[topology.walls] = True
     single = np.bincount(topology.cell_edges.ravel(), minlength=len(topology.edges)) == 1
-    ends = np.zeros(topology.corners, bool)
-    ends[topology.inlet] = ends[topology.outlet] = True
-    across = ends[topology.edges].all(axis=1)  # an inlet of one edge joins both walls
-    middles = topology.corners + np.flatnonzero(single & on[topology.edges].all(axis=1) & ~across)
+    middles = topology.corners + np.flatnonzero(single & on[topology.edges].all(axis=1) & ~_across(topology))
     nodes = [topology.walls, middles]
     return np.concatenate(nodes if order == 2 else [*nodes, middles + len(topology.edges)])
+
+
+def _across(topology: Topology) -> np.ndarray:
+    """(E,) are both corners of an edge on the inlet, or both on the outlet? One alone there joins both walls."""
+    at_ends = [np.isin(topology.edges, line).all(axis=1) for line in (topology.inlet, topology.outlet)]
+    return np.logical_or(*at_ends)
 
 
 @dataclass(frozen=True, eq=False)
