@@ -17,8 +17,15 @@ SATURATIONS = (1.0, 0.3, 20.0)
 LAWS = scenes(drives=("none",))  # any constants
 
 
-def uptake(acceptor, donor, made=SCENE):
-    return kinetics.uptake(np.asarray(acceptor, float), np.asarray(donor, float), made.substrates, made.kinetics)
+def uptake(acceptor, donor, made=SCENE, extended=False):
+    """(q_A, q_D)."""
+    at = np.asarray(acceptor, float), np.asarray(donor, float)
+    return kinetics.uptake(*at, made.substrates, made.kinetics, extended)
+
+
+def uptake_slopes(acceptor, donor, made=SCENE, extended=False):
+    at = np.asarray(acceptor, float), np.asarray(donor, float)
+    return kinetics.uptake_slopes(*at, made.substrates, made.kinetics, extended)
 
 
 def growth_rate(acceptor, donor, made):
@@ -37,7 +44,7 @@ def saturations(made):
 def test_the_rates_are_those_of_the_paper(made, acceptor, donor):
     """Mutant: d_f d_b for d_c f_d b, b without m_A, f_d for 1 - f_d, the yield in F2, K_sA for K_sD."""
     F1, F2, F3, F4 = oracles.rates(acceptor, donor, **constants(made))
-    q_a, q_d, _ = uptake(acceptor, donor, made)
+    q_a, q_d = uptake(acceptor, donor, made)
     assert (-q_a, -q_d) == pytest.approx((F1, F2), rel=1e-13, abs=1e-300)
     assert growth_rate(acceptor, donor, made) == pytest.approx(F3, rel=1e-12, abs=1e-17)
     assert inert_rate(acceptor, made) == pytest.approx(F4, rel=1e-13, abs=1e-17)
@@ -48,7 +55,7 @@ def test_the_oxygen_demand_of_the_donor_is_spent_or_kept(made, acceptor, donor):
     """|F1| + d_c (F3 + F4) = (F + Y d_c) |F2| at all concentrations: what decay takes is what the biomass loses.
     Mutant: d_f d_b for d_c f_d b [E3], f_d for 1 - f_d, decay without m_A in one of the three."""
     k = made.kinetics
-    q_a, q_d, _ = uptake(acceptor, donor, made)
+    q_a, q_d = uptake(acceptor, donor, made)
     kept = k.decay_oxygen_demand * (growth_rate(acceptor, donor, made) + inert_rate(acceptor, made))
     demand = k.acceptor_to_donor_ratio + k.yield_coefficient * k.decay_oxygen_demand
     terms = demand * q_d + k.decay_oxygen_demand * k.decay_coefficient * acceptor / (acceptor + saturations(made)[0])
@@ -74,30 +81,58 @@ def test_monod_is_bounded_and_half_at_its_constant(half, concentration):
     assert slope == pytest.approx((1 - m) ** 2 / half, rel=1e-12)
 
 
+@pytest.mark.parametrize("extended", [False, True])
 @given(LAWS, between(0.01, 100.0), between(0.01, 100.0))
-def test_the_jacobian_is_the_derivative(made, acceptor, donor):
+def test_the_jacobian_is_the_derivative(extended, made, acceptor, donor):
     """Of F1, F2 and, with Y, F3, by central differences of order 4 in C / (C + K), good to about 1e-12 of the rates.
     Mutant: rows and columns swapped, K for K^2, F left out of dF1/dC_D, K_sA for K_sD."""
     half = saturations(made)
     place = half * [acceptor, donor]
     scale = half + place
-    slopes = np.array(uptake(*place, made)[2]) * scale
-    found = oracles.derivative(lambda c: np.array(uptake(*(c * scale), made)[:2]), place / scale, 1e-3)
+    slopes = np.array(uptake_slopes(*place, made, extended)) * scale
+    found = oracles.derivative(lambda c: np.array(uptake(*(c * scale), made, extended)), place / scale, 1e-3)
     assert slopes == pytest.approx(found, abs=1e-10 * np.abs(slopes).max())
+    growth = np.array(kinetics.growth_slopes(*place, made.substrates, made.kinetics)) * scale
     k, m_slope = made.kinetics, half * [1.0, 0.0] / scale
-    growth = k.yield_coefficient * slopes[1] - k.decay_coefficient * m_slope
+    wanted = k.yield_coefficient * slopes[1] - k.decay_coefficient * m_slope
+    assert growth == pytest.approx(wanted, abs=1e-13 * np.abs(slopes).max())
     found = oracles.derivative(lambda c: growth_rate(*(c * scale), made), place / scale, 1e-3)
     assert growth == pytest.approx(found, abs=1e-10 * np.abs(slopes).max())
 
 
+@pytest.mark.parametrize("extended", [False, True])
+@given(LAWS, between(0.01, 100.0), between(0.01, 100.0), st.sampled_from([(-1, 1), (1, -1), (-1, -1)]))
+def test_below_zero_the_slopes_are_the_derivatives_too(extended, made, acceptor, donor, signs):
+    """Of what is taken up there, which is nothing, and of its extension, by central differences. Mutant: a cross slope
+    of the other substrate below zero, where it counts as none."""
+    scale, place = saturations(made), np.array([acceptor, donor]) * signs
+    slopes = np.array(uptake_slopes(*(place * scale), made, extended)) * scale
+    step = 1e-3 * np.abs(place).min()
+    found = oracles.derivative(lambda c: np.array(uptake(*(c * scale), made, extended)), place, step)
+    most = made.kinetics.maximum_utilization_rate * max(1.0, np.abs(place).max())
+    assert slopes == pytest.approx(found, abs=1e-9 * most / min(1.0, np.abs(place).min()))
+
+
 @given(st.floats(-100.0, 100.0), st.floats(-100.0, 100.0), st.floats(0.001, 50.0))
 def test_each_sink_rises_with_its_own_substrate_below_zero_too(acceptor, donor, more):
-    """So the uptake of nothing is zero and below zero it is a source. Mutant: C / (C + K) there, which is positive
-    again below -K and has a root for Newton's method to fall into."""
-    q_a, q_d, slopes = uptake(acceptor, donor)
-    assert uptake(acceptor + more, donor)[0] >= q_a and uptake(acceptor, donor + more)[1] >= q_d
+    """As the transient scheme linearises it: the uptake of nothing is zero and below zero it is a source. Mutant: C over
+    (C + K) there, which is positive again below -K and has a root for Newton's method to fall into."""
+    q_a, q_d = uptake(acceptor, donor, extended=True)
+    slopes = uptake_slopes(acceptor, donor, extended=True)
+    more_a, more_d = uptake(acceptor + more, donor, extended=True), uptake(acceptor, donor + more, extended=True)
+    assert more_a[0] >= q_a and more_d[1] >= q_d
     assert q_a * acceptor >= 0 and q_d * donor >= 0
     assert slopes[0][0] > 0 and slopes[1][1] >= 0 and slopes[0][1] * acceptor >= 0 and slopes[1][0] * donor >= 0
+
+
+@given(LAWS, st.floats(-100.0, 100.0), st.floats(-100.0, 100.0))
+def test_what_is_below_zero_is_nothing_to_uptake_and_growth(made, acceptor, donor):
+    """Both are functions of max(C, 0), so that what decays, grows and is taken up stay in proportion. Mutant: either of
+    them extended below zero."""
+    above = max(acceptor, 0.0), max(donor, 0.0)
+    assert uptake(acceptor, donor, made) == uptake(*above, made)
+    assert growth_rate(acceptor, donor, made) == growth_rate(*above, made)
+    assert inert_rate(acceptor, made) == inert_rate(above[0], made)
 
 
 @given(LAWS, concentrations, concentrations, between(1e-3, 50.0))
@@ -106,7 +141,7 @@ def test_more_of_either_substrate_takes_up_more(made, acceptor, donor, more):
     and k; F3 rises with the donor, from -b at the least to k Y at the most. Mutant: m_A left out of F2, b times
     m_D in F3, C / K in place of C / (C + K)."""
     k = made.kinetics
-    q_a, q_d, _ = uptake(acceptor, donor, made)
+    q_a, q_d = uptake(acceptor, donor, made)
     by_a, by_d = uptake(acceptor + more, donor, made), uptake(acceptor, donor + more, made)
     assert by_a[0] > q_a or max(donor, k.degradable_fraction) < 1e-3
     assert by_d[0] > q_a and by_d[1] > q_d or acceptor < 1e-3
@@ -147,3 +182,55 @@ def test_two_steps_at_the_same_rates_are_one(growth, remains, first, second):
     both = kinetics.grow(*after, growth, remains, second)
     assert both == pytest.approx(kinetics.grow(1.0, 0.5, growth, remains, first + second), rel=1e-12)
     assert both[0] > 0 and both[1] >= after[1] >= 0.5
+
+
+@given(st.floats(-3.0, 3.0) | st.floats(-1e-3, 1e-3) | st.just(0.0))
+def test_the_mean_of_what_grows_over_a_step_and_its_slope(z):
+    """(e^z - 1) / z is the mean of e^(z s), s from 0 to 1, and the slope that of s e^(z s), by Gauss's rule of 20
+    points. Mutants: e^z, the mean of the ends, a series where it is no longer small."""
+    s, weight = np.polynomial.legendre.leggauss(20)
+    grown = np.exp(z * (s + 1) / 2)
+    mean, slope = kinetics.mean_growth(np.array(z))
+    assert mean == pytest.approx(weight @ grown / 2, rel=1e-13)
+    assert slope == pytest.approx(weight @ (grown * (s + 1) / 2) / 2, rel=1e-8)
+
+
+DURATIONS = st.just(0.0) | between(1e-3, 5.0)
+
+
+def fractions_of(acceptor, donor, made):
+    """(2, 1, 1) m_A and m_D."""
+    return np.array(kinetics.fractions(acceptor, donor, made.substrates)).reshape(2, 1, 1)
+
+
+@given(LAWS, concentrations, concentrations, DURATIONS)
+def test_what_a_sink_takes_up_over_a_step_is_what_the_step_makes(made, acceptor, donor, duration):
+    """Y q_D - (q_A - F q_D) / d_c, times the step, is the growth of X_A and X_I at the same concentrations: in every
+    point and to round-off. Mutants: the biomass of the step's start or end, F for COD - Y d_c."""
+    k, sink = made.kinetics, kinetics.Sink(np.array([[3.0]]), duration)
+    q_a, q_d = duration * sink.uptake(fractions_of(acceptor, donor, made), k)[0, :, 0]
+    active, inert = kinetics.grow(3.0, 0.5, growth_rate(acceptor, donor, made), inert_rate(acceptor, made), duration)
+    made_of = k.yield_coefficient * q_d - (q_a - k.acceptor_to_donor_ratio * q_d) / k.decay_oxygen_demand
+    size = k.yield_coefficient * q_d + q_a / k.decay_oxygen_demand + active
+    assert active + inert - 3.5 == pytest.approx(made_of, abs=1e-13 * size)
+
+
+@given(LAWS, concentrations, concentrations)
+def test_a_sink_that_does_not_grow_takes_up_at_the_rates_of_the_law(made, acceptor, donor):
+    """Mutant: donor and acceptor exchanged."""
+    found = kinetics.Sink(np.array([[3.0]])).uptake(fractions_of(acceptor, donor, made), made.kinetics)[0, :, 0]
+    assert found == pytest.approx(3 * np.array(uptake(acceptor, donor, made)), rel=1e-15)
+
+
+@given(LAWS, st.floats(0.01, 0.99), st.floats(0.01, 0.99), DURATIONS)
+def test_the_slopes_of_a_sink_are_the_derivatives(made, m_a, m_d, duration):
+    """By m_A and m_D, by central differences of order 4, its mean included. Mutants: the growth within a step left out,
+    by the other substrate, of the other sink."""
+    sink, place = kinetics.Sink(np.array([[2.0]]), duration), np.array([m_a, m_d])
+
+    def taken(m):
+        return sink.uptake(m.reshape(2, 1, 1), made.kinetics)[0, :, 0]
+
+    slopes = sink.slopes(place.reshape(2, 1, 1), made.kinetics)[:, :, 0, 0]
+    found = oracles.derivative(taken, place, 3e-4)
+    assert slopes == pytest.approx(found, abs=1e-8 * np.abs(slopes).max())
