@@ -115,8 +115,8 @@ def test_below_zero_the_slopes_are_the_derivatives_too(extended, made, acceptor,
 
 @given(st.floats(-100.0, 100.0), st.floats(-100.0, 100.0), st.floats(0.001, 50.0))
 def test_each_sink_rises_with_its_own_substrate_below_zero_too(acceptor, donor, more):
-    """As the transient scheme linearises it: the uptake of nothing is zero and below zero it is a source. Mutant: C over
-    (C + K) there, which is positive again below -K and has a root for Newton's method to fall into."""
+    """As the transient scheme linearises it: the uptake of nothing is zero and below zero it is a source. Mutant:
+    C / (C + K) there, positive again below -K, which has a root for Newton's method to fall into."""
     q_a, q_d = uptake(acceptor, donor, extended=True)
     slopes = uptake_slopes(acceptor, donor, extended=True)
     more_a, more_d = uptake(acceptor + more, donor, extended=True), uptake(acceptor, donor + more, extended=True)
