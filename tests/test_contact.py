@@ -1,0 +1,122 @@
+"""Which nodes must close a film or a wedge of fluid (2.3.3), of straight edges and of arcs."""
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from repro.fem.outline import BOTTOM, FREE, TOP, Outline
+from repro.model import contact
+from tests.strategies import attached_aggregates, mirrored, plug, seed
+
+FILM, ANGLE = 2.0, np.radians(16.7)
+
+
+def beside_contact(along, gap, then=(30.0, 20.0), width=100.0):
+    """Lower contact from x = -40 to 10 um; the next node is ``gap`` over the wall, ``along`` beyond the contact
+    line."""
+    points = np.array([[-40.0, 0.0], [0.0, 0.0], [10.0, 0.0], [10.0 + along, gap], then, (-30.0, 30.0)])
+    wall = np.array([BOTTOM] * 3 + [FREE] * 3)
+    return Outline(points, wall, np.arange(6) == 1, points.copy())
+
+
+def joins(outline, width=100.0):
+    return contact.closing_nodes(outline, width, FILM, ANGLE).tolist()
+
+
+NONE = [FREE] * 6
+
+
+@pytest.mark.parametrize("name, outline, wanted", [
+    ("a wedge of 11 degrees closes", beside_contact(1.0, 0.2), [0, 0, 0, BOTTOM, 0, 0]),
+    ("a wedge of 16.6 degrees closes", beside_contact(1.0, np.tan(np.radians(16.6))), [0, 0, 0, BOTTOM, 0, 0]),
+    ("a wedge of 16.8 degrees stays", beside_contact(1.0, np.tan(np.radians(16.8))), NONE),
+    ("a gap over 2 um stays whatever its angle", beside_contact(10.0, 2.1), NONE),
+    ("a thin gap far from contact closes", beside_contact(10.0, 1.9), [0, 0, 0, BOTTOM, 0, 0]),
+    ("a node through the wall closes", beside_contact(1.0, -0.01), [0, 0, 0, BOTTOM, 0, 0]),
+    ("so does one that leans back over the contact", beside_contact(-1.0, -0.01), [0, 0, 0, BOTTOM, 0, 0]),
+    ("a steep side stays", beside_contact(-1.0, 0.5), NONE),
+    ("no fluid is trapped behind a closing node", beside_contact(1.0, 3.0, (18.0, 1.5)), [0, 0, 0, BOTTOM, BOTTOM, 0]),
+])
+def test_what_closes_beside_a_contact_surface(name, outline, wanted):
+    """Minimum angle 16.7 degrees, minimum film 2 um (Table 1). Mutant: only the film, only the angle, no look
+    behind."""
+    assert joins(outline) == wanted
+    assert joins(mirrored(outline)) == wanted[::-1]
+
+
+@pytest.mark.parametrize("gap, closes", [(2.01, False), (1.99, True), (0.0, True), (-0.5, True)])
+def test_a_film_under_2_um_to_the_opposite_wall_closes(gap, closes):
+    """Mutant: film > gap turned round, all free nodes closed, the width forgotten."""
+    outline = beside_contact(5.0, 30.0, (0.0, 100.0 - gap))
+    assert joins(outline) == ([0, 0, 0, 0, TOP, 0] if closes else NONE)
+
+
+def test_a_wedge_beside_the_upper_contact_closes():
+    """With contact on top the film alone no longer closes, the wedge rule does. Mutant: the top's wedges not looked
+    at."""
+    outline = plug(100.0, -10.0, 10.0)
+    points = np.insert(outline.points, 3, [[12.0, 99.8]], axis=0)
+    wall, fixed = np.insert(outline.wall, 3, FREE), np.insert(outline.fixed, 3, False)
+    near = Outline(points, wall, fixed, points)
+    assert joins(near) == [0, 0, 0, TOP, 0, 0, 0]
+    assert joins(mirrored(near)) == joins(near)[::-1]
+    far = Outline(points - [0, 1.0] * (wall == FREE)[:, None], wall, fixed, points)
+    assert joins(far) == [FREE] * 7
+
+
+@given(st.floats(5.0, 97.9))
+def test_a_half_disc_with_a_film_closes_nothing(radius):
+    """It meets the wall at 90 degrees. Mutant: an absolute distance to the lower wall closes the nodes beside
+    contact."""
+    assert not contact.closing_nodes(seed(radius), 100.0, FILM, ANGLE).any()
+
+
+@given(attached_aggregates(thickest=1.02))
+def test_closing_is_the_same_in_a_mirror(drawn):
+    """Mutant: the contact line followed in one direction only, the sign of the direction lost."""
+    outline, width = drawn
+    found = contact.closing_nodes(outline, width, FILM, ANGLE)
+    assert contact.closing_nodes(mirrored(outline), width, FILM, ANGLE).tolist() == found[::-1].tolist()
+    assert contact.closing(outline, width, FILM, ANGLE).tolist() == found.tolist()
+    assert ((found == FREE) | (outline.wall == FREE)).all()
+    over = (outline.wall == FREE) & (width - outline.points[:, 1] < FILM)
+    assert (found[over] == TOP).all() and not (found[~over] == TOP).any()
+
+
+@given(attached_aggregates(thickest=1.02, geometry=2))
+def test_closing_of_arcs_is_the_same_in_a_mirror(drawn):
+    """Nothing that is on a wall joins again, and middles join with both corners of their arc on one wall. Mutants: the
+    arc after the contact line for the one before it, the corner after a middle for the nearer one."""
+    outline, width = drawn
+    found = contact.closing(outline, width, FILM, ANGLE)
+    image = contact.closing(mirrored(outline), width, FILM, ANGLE)
+    assert image.tolist() == np.roll(found[::-1], -1).tolist()
+    assert ((found == FREE) | (outline.wall == FREE)).all()
+    wall = np.where(found == FREE, outline.wall, found)
+    middles = np.flatnonzero(wall[1::2] != FREE) * 2 + 1
+    assert (wall[middles - 1] == wall[middles]).all() and (wall[(middles + 1) % len(wall)] == wall[middles]).all()
+
+
+def flat_top(heights, width=20.0):
+    """A block whose upper side has nodes at the given heights, corner and middle in turn."""
+    count = len(heights)
+    x = np.linspace(10.0, -10.0, count)
+    top = np.column_stack([x, heights])
+    left, right = np.array([[-10.0, 0.5 * heights[-1]]]), np.array([[10.0, 0.5 * heights[0]]])
+    base = np.column_stack([np.linspace(-10, 10, 5), np.zeros(5)])
+    points = np.vstack([base, right, top, left])
+    wall = np.where(np.arange(len(points)) < 5, BOTTOM, FREE)
+    return Outline(points, wall, np.arange(len(points)) == 2, points.copy(), 2), 6 + np.arange(count)
+
+
+def test_a_middle_never_joins_alone():
+    """An arc of which only the middle is too near brings its nearer corner; a middle joins with both corners. Mutants:
+    the rule of straight edges on all nodes alike, the farther corner."""
+    shape, top = flat_top([12.0, 16.0, 17.0, 18.5, 17.5, 16.0, 12.0])
+    joins = contact.closing(shape, 20.0, 2.0, 0.0)
+    assert np.array_equal(np.flatnonzero(joins == TOP), [top[4]]), "the corner beside it at 17.5, not that at 17"
+    shape, top = flat_top([12.0, 16.0, 18.5, 18.9, 18.6, 16.0, 12.0])
+    joins = contact.closing(shape, 20.0, 2.0, 0.0)
+    assert np.array_equal(np.flatnonzero(joins == TOP), top[2:5]), "both corners, and the middle with them"
+    shape, _ = flat_top([12.0, 16.0, 17.0, 17.5, 17.0, 16.0, 12.0])
+    assert not contact.closing(shape, 20.0, 2.0, 0.0).any()

@@ -1,0 +1,148 @@
+"""The aggregate's boundary, of straight edges or of parabolic arcs: measures, and splits that change nothing."""
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+
+from repro.fem import outline as of
+from repro.fem import sizing
+from repro.fem.outline import BOTTOM, FREE, Outline
+from repro.fem.sizing import Sizing
+from tests.strategies import attached_aggregates, mirrored, plug, seed, widths
+
+both = pytest.mark.parametrize("geometry", [1, 2])
+
+
+def wavy(radius=20.0, refinement=0.5, bend=0.03):
+    """A seed with its free nodes pushed about, so that its arcs are bent unevenly; places at t = 0 as the half-disc."""
+    start = seed(radius, refinement, 2)
+    random = np.random.default_rng(7)
+    free = (start.wall == FREE)[:, None]
+    points = start.points + free * random.uniform(-bend, bend, start.points.shape) * radius
+    return replace(start, points=points)
+
+
+def sampled(shape, per_edge=2000):
+    """Points of the edges, densely."""
+    t = np.linspace(0, 1, per_edge, endpoint=False)
+    return np.einsum("ta,mai->mti", of.parabola(t), shape.arcs(shape.points)).reshape(-1, 2)
+
+
+@both
+@pytest.mark.parametrize("refinement", [0.5, 1.0, 2.5])
+def test_the_seed_is_a_half_disc_on_the_wall_centred_at_its_fixed_point(refinement, geometry):
+    """Middles on the arc too; only the middle of the base is fixed. Mutant: an arc of radius R (1 + 1e-3), a base off
+    the wall, a fixed point beside the origin."""
+    start = seed(5.0, refinement, geometry)
+    free = start.wall == FREE
+    assert np.hypot(*start.points[free].T) == pytest.approx(5.0, rel=1e-15)
+    assert (start.points[free, 1] > 0).all() and (start.points[~free, 1] == 0).all()
+    assert (start.wall[~free] == BOTTOM).all()
+    bounds = start.upstream, start.downstream, start.thickness
+    assert bounds == ((-5.0, 5.0, 5.0) if geometry == 1 else pytest.approx((-5.0, 5.0, 5.0), rel=1e-4))
+    assert start.highest == pytest.approx(0.0, abs=1e-12)
+    assert start.points[start.fixed].tolist() == [[0.0, 0.0]]
+    assert (start.origin == start.points).all() and start.geometry == geometry
+    assert len(start.points) % (2 * geometry) == 0
+
+
+@both
+def test_the_seed_may_lie_elsewhere(geometry):
+    """Mutant: the fixed point left at x = 0."""
+    here, there = seed(5.0, 1.0, geometry), of.half_disc(5.0, 10.0, geometry, -30.0)
+    assert np.allclose(there.points, here.points + [-30.0, 0.0], rtol=0, atol=1e-13)
+    assert there.points[there.fixed].tolist() == [[-30.0, 0.0]] and (there.origin == there.points).all()
+
+
+def test_the_seed_has_the_area_of_the_polygon_inscribed_in_the_half_disc():
+    """n chords cut a half-disc to n R^2 sin(pi/n) / 2. Mutant: clockwise nodes, a node repeated, a node left out."""
+    start = seed(5.0)
+    chords = int((start.wall == FREE).sum()) + 1
+    assert start.area == pytest.approx(chords * 12.5 * np.sin(np.pi / chords), rel=1e-14)
+    assert start.area == pytest.approx(np.pi * 12.5, rel=3e-3)
+
+
+@pytest.mark.parametrize("refinement, error", [(0.25, 2e-4), (0.5, 2e-4), (1.0, 1e-5)])
+def test_a_seed_of_arcs_has_the_area_of_the_half_disc(refinement, error):
+    """To (edge / R)^4. Mutants: middles on the chords (area 1 % low), chords for arcs."""
+    assert seed(10.0, refinement, 2).area == pytest.approx(np.pi / 2 * 100, rel=error)
+
+
+def test_the_interface_is_what_borders_the_fluid():
+    """Mutant: an edge counted as interface when *either* end is on a wall, or never between two different walls."""
+    sides = plug(50.0, -10.0, 10.0)
+    assert sides.interface_edges().tolist() == [False, False, True, False, False, True]
+    assert (sides.edge_wall != FREE).tolist() == [True, True, False, True, True, False]
+    for geometry in (1, 2):
+        start = seed(5.0, 1.0, geometry)
+        assert start.interface_edges().sum() == (start.wall == FREE).sum() + 1
+        edges = start.corners.interface_edges()
+        assert np.array_equal(edges, start.edge_wall == FREE)
+
+
+def test_area_and_extremes_are_those_of_the_arcs():
+    """Against a polygon of 2000 points an arc; the largest y is between nodes. Mutants: the polygon of the nodes, two
+    thirds for four thirds of the triangle, extremes of nodes only."""
+    shape = wavy(bend=0.1)
+    x = sampled(shape)
+    assert shape.area == pytest.approx(of.polygon_area(x), rel=1e-6)
+    assert shape.upstream == pytest.approx(x[:, 0].min(), abs=1e-5)
+    assert shape.downstream == pytest.approx(x[:, 0].max(), abs=1e-5)
+    assert shape.thickness == pytest.approx(x[:, 1].max(), abs=1e-5)
+    assert shape.highest == pytest.approx(x[x[:, 1].argmax(), 0], abs=1e-2)
+    assert shape.thickness > shape.points[:, 1].max() + 1e-3, "else nothing is tested"
+
+
+@given(attached_aggregates(width=widths))
+def test_arcs_with_middles_half_way_are_the_polygon(drawn):
+    """What both kinds of outlines say of the same curve. Mutants: corners and middles exchanged, a wall's middle that
+    is free."""
+    straight, _ = drawn
+    ends = straight.arcs(straight.points)
+    points = ends[:, :2].reshape(-1, 2)
+    wall = np.column_stack([straight.wall, straight.edge_wall]).ravel()
+    fixed = np.column_stack([straight.fixed, np.zeros_like(straight.fixed)]).ravel()
+    arcs = Outline(points, wall, fixed, points, 2)
+    assert arcs.area == pytest.approx(straight.area, rel=1e-13)
+    for name in ("upstream", "downstream", "thickness"):
+        assert getattr(arcs, name) == pytest.approx(getattr(straight, name), rel=1e-13)
+    assert np.array_equal(arcs.edge_wall, straight.edge_wall)
+    assert np.array_equal(arcs.corners.points, straight.points) and arcs.corners.geometry == 1
+    assert straight.corners is straight
+    assert np.allclose(arcs.arcs(arcs.points), ends, rtol=0, atol=1e-13)
+
+
+@given(attached_aggregates(width=widths) | attached_aggregates(width=widths, geometry=2))
+def test_a_mirror_keeps_the_measures(drawn):
+    """Mutants: x of the first largest y only, the sign of the area's arcs."""
+    outline, _ = drawn
+    image = mirrored(outline)
+    assert image.area == pytest.approx(outline.area, rel=1e-13)
+    found = image.upstream, image.downstream, image.thickness
+    assert found == pytest.approx((-outline.downstream, -outline.upstream, outline.thickness), rel=1e-13)
+
+
+@pytest.mark.parametrize("refinement", [1.0, 2.0])
+def test_a_split_changes_neither_shape_nor_area(refinement):
+    """New nodes lie on the same parabolas, and so do their places at t = 0. Mutants: middles on chords, origin
+    interpolated linearly."""
+    shape = wavy()
+    finer = sizing.split(shape, Sizing(50.0, refinement, 2.0))
+    assert len(finer.points) > len(shape.points)
+    assert finer.area == pytest.approx(shape.area, rel=1e-13)
+    assert (finer.thickness, finer.upstream) == pytest.approx((shape.thickness, shape.upstream), rel=1e-13)
+    at_start = [of.polygon_area(sampled(replace(s, points=s.origin), 1000)) for s in (shape, finer)]
+    assert at_start[1] == pytest.approx(at_start[0], rel=1e-6)
+    assert np.array_equal(finer.points[finer.fixed], shape.points[shape.fixed])
+
+
+def test_halved_arcs_are_the_same_curve():
+    """Only those asked for; twice as many nodes there. Mutant: all of them, or the neighbour."""
+    shape = wavy()
+    which = np.zeros(len(shape.points) // 2, bool)
+    which[[2, -1]] = True
+    cut = sizing.halved(shape, which)
+    assert len(cut.points) == len(shape.points) + 4 and cut.area == pytest.approx(shape.area, rel=1e-13)
+    kept = (shape.points[:, None] == cut.points[None]).all(axis=2).any(axis=1)
+    assert kept.all()
