@@ -146,3 +146,31 @@ def functional(reference, triangles, shape, start, theta, position, pressure):
         h, mu = diameter(shape[nodes]), J_start ** (-2 / 3)
         total -= area(shape[nodes]) * h**2 / (12 * mu) * uneven @ uneven / 2
     return total
+
+
+#: Places of the six nodes of a curved triangle on the unit triangle: corners, then middles of the edges 01, 12, 20.
+SIX = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])
+
+
+def quadratic(s, t):
+    """(6,) derivatives by s, and by t, of the functions of the six nodes: each is a polynomial of degree two that is
+    one at its own node and zero at the others."""
+    monomials = np.column_stack([np.ones(6), SIX[:, 0], SIX[:, 1], SIX[:, 0] ** 2, SIX.prod(axis=1), SIX[:, 1] ** 2])
+    coefficients = np.linalg.inv(monomials)
+    return np.array([0, 1, 0, 2 * s, t, 0]) @ coefficients, np.array([0, 0, 1, 0, s, 2 * t]) @ coefficients
+
+
+def curved_functional(reference, cells, theta, position, pressure, rule, gamma):
+    """Pi of curved triangles: the energy at t = 0, P linear between the corners, and gamma theta^(-5/3) (J - theta)^2
+    / 2. rule: (s, t, weight) of each point of the quadrature, on the unit triangle; theta: of each triangle and point.
+    """
+    total = 0.0
+    for nodes, of_cell in zip(cells, theta):
+        for (s, t, weight), grown in zip(rule, of_cell):
+            by = np.array(quadratic(s, t))
+            before, now = by @ reference[nodes], by @ position[nodes]
+            F = (np.linalg.inv(before) @ now).T
+            P = np.array([1 - s - t, s, t]) @ pressure[nodes[:3]]
+            grad_div = gamma * grown ** (-5 / 3) * (np.linalg.det(F) - grown) ** 2 / 2
+            total += weight * np.linalg.det(before) * (energy(F, P, grown) + grad_div)
+    return total
