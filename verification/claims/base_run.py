@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from repro.fem.reprojection import interpolate
+from repro.fem.transfer import interpolate
 from verification.claims import Finding, at_most, between, claim, near, without_limit
 from verification.claims.mass_balance import PAPER_CORRECTION, bookkeeping
 from verification.claims.runs import BASE, PLATES, at, fields_at, scene, series

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from repro.fem import mesh
-from repro.fem.reprojection import interpolate
+from repro.fem.mesh import gradients
+from repro.fem.transfer import interpolate
 from verification.claims import Finding, at_least, at_most, claim
 from verification.claims.levels import WIDE_SIZES
 from verification.claims.restored import Body, body, in_plane, stress
@@ -112,7 +112,7 @@ def interface_forces(drive, found: Body) -> tuple[np.ndarray, np.ndarray]:
     first, last, beyond = interface(found)
     pressure = density * gravity * 1e-2 * found.node("head_cm")
     velocity = found.node("velocity_m_per_d")[:, :2] / 86400
-    slope = np.einsum("tai,tak->tik", velocity[beyond], 1e6 * mesh.gradients(found.grid.points, beyond))
+    slope = np.einsum("tai,tak->tik", velocity[beyond], 1e6 * gradients(found.grid.points, beyond))
     edge = found.grid.points[last] - found.grid.points[first]
     s = edge / np.linalg.norm(edge, axis=1)[:, None]
     n = np.column_stack([s[:, 1], -s[:, 0]])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from unittest.mock import patch
 
 import numpy as np
 from scipy.linalg import eigh
@@ -11,9 +10,12 @@ from skfem import MeshTri
 
 from reference import neo_hookean
 from repro.errors import StageError
-from repro.fem import geometry, mesh
+from repro.fem.elements import GRADIENT_DEGREES
+from repro.fem.mesh import gradients, triangle_areas
+from repro.fem.mesher import generate
+from repro.fem.outline import half_disc as seed
+from repro.fem.sizing import ACROSS_AGGREGATE, Sizing
 from repro.model import growth
-from repro.model.growth import Body
 from verification.claims import Finding, at_least, at_most, between, claim, near, without_limit
 from verification.claims.levels import ALONE, WIDE_SIZES, cached, current
 from verification.claims.restored import bodies
@@ -22,20 +24,36 @@ from verification.claims.runs import WIDE, series
 RADIUS = 5.0
 
 
-def half_disc(refinement: float) -> Body:
+@dataclass(frozen=True, eq=False)
+class Sliding:
+    """A body that slides on the wall y = 0 with its middle fixed (2.3.3); held: (n, 2) where a coordinate is so."""
+
+    body: growth.Body
+    held: np.ndarray
+
+    @property
+    def reference(self) -> np.ndarray:
+        """(n, 2) um, places at t = 0."""
+        return self.body.reference
+
+    @property
+    def triangles(self) -> np.ndarray:
+        """(t, 3)."""
+        return self.body.shape.triangles
+
+
+def half_disc(refinement: float) -> Sliding:
     """A seed alone, in a mesh of the package's own generator: meshes of different refinement share nothing.
 
     refinement: at the default level.
     """
     refinement /= current().size
-    grid, _ = mesh.generate(geometry.seed(RADIUS, refinement), (-2 * RADIUS, 2 * RADIUS),
-                            geometry.Sizing(50.0, refinement, 2.0))
-    local = np.full(len(grid.points), -1)
-    local[grid.body] = np.arange(len(grid.body))
-    return sliding(grid.points[grid.body], local[grid.triangles[grid.biomass]])
+    outline = seed(RADIUS, ACROSS_AGGREGATE * refinement)
+    grid, _ = generate(outline, (-2 * RADIUS, 2 * RADIUS), Sizing(50.0, refinement, 2.0))
+    return sliding(grid.points[grid.body], grid.topology.body_cells)
 
 
-def regular_half_disc(parts: int) -> Body:
+def regular_half_disc(parts: int) -> Sliding:
     """A seed in a regular grid of 2 n by n squares, each cut in two, mapped onto the half-disc.
 
     parts: n at the default level.
@@ -45,26 +63,27 @@ def regular_half_disc(parts: int) -> Body:
     x, y = grid.p
     points = RADIUS * np.column_stack([x * np.sqrt(1 - y**2 / 2), y * np.sqrt(1 - x**2 / 2)])
     triangles = grid.t.T.copy()
-    turned = mesh.triangle_areas(points, triangles) < 0
+    turned = triangle_areas(points, triangles) < 0
     triangles[turned] = triangles[turned][:, ::-1]
     return sliding(points, triangles)
 
 
-def sliding(points: np.ndarray, triangles: np.ndarray) -> Body:
-    """The body that slides on the wall y = 0 with its middle fixed (2.3.3)."""
+def sliding(points: np.ndarray, triangles: np.ndarray) -> Sliding:
+    """Of a mesh: points (n, 2) um, triangles (t, 3)."""
     on_wall = np.abs(points[:, 1]) < 1e-9 * RADIUS
     middle = on_wall & (np.abs(points[:, 0]) < 1e-9 * RADIUS)
-    return Body(points, triangles, np.column_stack([middle, on_wall]))
+    shape = growth.Shape(triangles, len(points), GRADIENT_DEGREES[1])
+    return Sliding(growth.Body(shape, points), np.column_stack([middle, on_wall]))
 
 
-def radial_theta(body: Body, inner: float, more: float) -> np.ndarray:
-    """(t,) theta = inner + more (R / R_0)^2 at the triangles' middles."""
-    return inner + more * np.sum(body.reference[body.triangles].mean(axis=1) ** 2, axis=1) / RADIUS**2
+def radial_theta(body: Sliding, inner: float, more: float) -> np.ndarray:
+    """(t, 1) theta = inner + more (R / R_0)^2 at the triangles' middles."""
+    return inner + more * np.sum(body.reference[body.triangles].mean(axis=1) ** 2, axis=1)[:, None] / RADIUS**2
 
 
-def areas(body: Body) -> np.ndarray:
+def areas(body: Sliding) -> np.ndarray:
     """(t,) areas of a body's triangles at t = 0, um2."""
-    return mesh.triangle_areas(body.reference, body.triangles)
+    return triangle_areas(body.reference, body.triangles)
 
 
 # C22: theta = INNER + MORE (R / R_0)^2 on meshes of the package's own, by refinement, and on regular ones, by parts.
@@ -112,7 +131,7 @@ def listed(values) -> str:
     return ", ".join(f"{value:.2g}" for value in values)
 
 
-def attempt(body: Body, factor: float) -> str:
+def attempt(body: Sliding, factor: float) -> str:
     """What growth comes to with the stabilisation times a factor, in words."""
     try:
         return f"the pressure is off by {100 * growth_errors(body, factor)[1]:.2g} %"
@@ -120,17 +139,19 @@ def attempt(body: Body, factor: float) -> str:
         return f"Newton's method fails ({str(error).partition(';')[0]})"
 
 
-def order(family: list[Body], errors) -> float:
+def order(family: list[Sliding], errors) -> float:
     """Slope of log error against log h."""
     h = [np.sqrt(areas(body).sum() / len(body.reference)) for body in family]
     return float(np.polyfit(np.log(h), np.log(errors), 1)[0])
 
 
-def growth_errors(body: Body, factor: float) -> tuple[float, float]:
+def growth_errors(body: Sliding, factor: float) -> tuple[float, float]:
     """Mean-square errors, relative, of the outline's radius and of the pressure, the stabilisation times a factor."""
-    original, nothing = growth.stabilisation, np.zeros(len(body.reference))
-    with patch.object(growth, "stabilisation", lambda *shape: factor * original(*shape)):
-        found = growth.equilibrium(body, radial_theta(body, INNER, MORE), body.reference, nothing, body.reference)
+    start = growth.Equilibrium(body.reference, np.zeros(len(body.reference)), 0)
+    theta = radial_theta(body, INNER, MORE)
+    stabilising = factor * growth.gradient_stabilisation(body.reference, body.triangles, np.ones(len(body.triangles)))
+    system = growth.System(body.body, body.held, stabilising=stabilising)
+    found = growth.reach(system, np.ones_like(theta), theta, start, body.reference)
     R = np.minimum(np.hypot(*body.reference.T), RADIUS)
     rim = R > (1 - 1e-9) * RADIUS
     radius, pressure = (exact(R, INNER, MORE, RADIUS) for exact in (neo_hookean.cylinder_radius,
@@ -141,14 +162,14 @@ def growth_errors(body: Body, factor: float) -> tuple[float, float]:
             float(np.sqrt(weight @ (found.pressure - pressure) ** 2 / (weight @ pressure**2))))
 
 
-def stability(body: Body, factor: float) -> float:
+def stability(body: Sliding, factor: float) -> float:
     """Least eigenvalue of B K^-1 B^T + factor C against the pressure's mass matrix, at t = 0 (dense)."""
     t, n, area = body.triangles, len(body.reference), areas(body)
-    slopes = mesh.gradients(body.reference, t)
+    slopes = gradients(body.reference, t)
     moduli = growth.tangent(np.tile(np.eye(2), (len(t), 1, 1)), np.zeros(len(t)))
     K = np.einsum("t,tikjl,tak,tbl->taibj", area, moduli, slopes, slopes).reshape(len(t), 6, 6)
     B = np.repeat((area[:, None, None] * slopes / 3).reshape(len(t), 1, 6), 3, axis=1)
-    C = factor * growth.stabilisation(body.reference, t, np.ones(len(t)))
+    C = factor * growth.gradient_stabilisation(body.reference, t, np.ones(len(t)))
     M = area[:, None, None] * (np.ones((3, 3)) + np.eye(3)) / 12
     places, free = np.stack([2 * t, 2 * t + 1], axis=2).reshape(len(t), 6), ~body.held.ravel()
     stiffness = dense(K, places, places, 2 * n, 2 * n)[free][:, free]
@@ -220,9 +241,9 @@ def expanded(exponent: float) -> Expanded:
     steps = round(STEPS / current().step)
     for t in TOTAL ** (np.arange(1, steps + 1) / steps):
         theta = radial_theta(body, t**exponent, t - t**exponent)
-        found = growth.equilibrium(body, theta, position, pressure, body.reference)
+        found = growth.equilibrium(body.body, theta, position, pressure, body.held, body.reference)
         position, pressure, iterations = found.position, found.pressure, iterations + found.iterations
     R = np.hypot(*body.reference.T)
-    area = mesh.triangle_areas(position, body.triangles).sum() / areas(body).sum()
+    area = triangle_areas(position, body.triangles).sum() / areas(body).sum()
     return Expanded(float(np.hypot(*position[R > (1 - 1e-9) * RADIUS].T).mean()), area, float(pressure[np.argmin(R)]),
                     iterations)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
+from repro.fem.space import Space
 from verification.claims import Finding, at_least, at_most, between, claim
 from verification.claims.accuracy import FEW, FEW_WORDS
 from verification.claims.levels import WIDE_SIZES
@@ -46,7 +47,7 @@ def oxygen() -> Finding:
 
 def share_under(found: Body, bound: float) -> float:
     """Percentage of the active biomass at nodes with C_A under a bound (mg/L)."""
-    mass = found.grid.lumped(found.grid.biomass) * found.node("active_biomass")
+    mass = Space(found.grid, 1).lumped(found.grid.biomass) * found.node("active_biomass")
     return 100 * float(mass[found.node("acceptor_mg_per_L") < bound].sum() / mass.sum())
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from repro.fem import geometry, mesh
-from repro.model.pore import sizing
+from repro.fem.mesh import Mesh
+from repro.fem.mesher import generate
+from repro.fem.outline import BOTTOM, TOP, Outline
+from repro.model.pore import sized
 from verification.claims import Finding, at_least, at_most, claim, near
 from verification.claims.levels import ALONE, WIDE_SIZES
 from verification.claims.runs import WIDE, scene, series
@@ -65,10 +65,10 @@ def plug(said, length: float) -> tuple[float, float]:
     """K / K_clean with biomass over the whole width and a length (um): computed, and exact (parallel flow)."""
     half, width = length / 2, said.pore.width
     points = np.array([[-half, 0.0], [0.0, 0.0], [half, 0.0], [half, width], [0.0, width], [-half, width]])
-    wall = np.repeat([geometry.BOTTOM, geometry.TOP], 3)
-    outline = geometry.Outline(points, wall, np.zeros(6, bool), points)
+    wall = np.repeat([BOTTOM, TOP], 3)
+    outline = Outline(points, wall, np.zeros(6, bool), points)
     ends = -half - 1.5 * width, half + 1.5 * width
-    grid, _ = mesh.generate(outline, ends, sizing(said))
+    grid, _ = generate(outline, ends, sized(said))
     exact = 1 / (1 + (said.flow.viscosity_ratio - 1) * length / said.pore.length)
     return flow_in(said, grid).conductivity / clean(said), exact
 
@@ -79,8 +79,8 @@ def filled() -> Finding:
     """Clean over filled conductivity, biomass in every triangle of the whole pore, at the default mesh."""
     said = scene("flow_only")
     half = said.pore.length / 2
-    empty, _ = mesh.generate(None, (-half, half), sizing(said))
-    full = replace(empty, biomass=np.ones(len(empty.triangles), bool))
+    empty, _ = generate(None, (-half, half), sized(said))
+    full = Mesh.of(empty.points, empty.cells, np.ones(len(empty.cells), bool), empty.loop, empty.width, empty.ends)
     open_, closed = (flow_in(said, grid).conductivity for grid in (empty, full))
     check = near("reduction of the conductivity (times)", "2000", open_ / closed, said.flow.viscosity_ratio,
                  relative=0.001, why="exact in the Laplacian form: the problems differ by the factor lambda alone")

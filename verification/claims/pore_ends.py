@@ -6,8 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from repro.fem.reprojection import interpolate
+from repro.errors import TransportError
+from repro.fem.newton import Newton
+from repro.fem.transfer import interpolate
 from repro.model import transport
+from repro.model.kinetics import Sink
 from repro.model.pore import Pore, Solved
 from repro.model.transport import Concentrations
 from repro.scene import Scene
@@ -98,7 +101,8 @@ def downgradient_end() -> Finding:
 
 def uptake(now: Pore, solved: Solved) -> np.ndarray:
     """(2,) acceptor and donor consumed, um2 mg/L/h."""
-    return np.array([flux.consumed for flux in transport.fluxes(solved.problem, now.active, solved.concentrations)])
+    fluxes = transport.fluxes(solved.problem, Sink(now.active), solved.concentrations)
+    return np.array([flux.consumed for flux in fluxes])
 
 
 def end_effect(*changes: str) -> float:
@@ -109,11 +113,19 @@ def end_effect(*changes: str) -> float:
 
 def held(now: Pore, solved: Solved, part: float) -> Solved:
     """Solved again with both concentrations at the outlet held at a part of their supply, instead of (12)."""
-    acceptor, donor = (replace(operator, held=now.mesh.outlet, supply=part * operator.supply)
-                       for operator in (solved.problem.acceptor, solved.problem.donor))
-    problem, state = replace(solved.problem, acceptor=acceptor, donor=donor), solved.concentrations
-    guess = Concentrations(0.5 * state.acceptor, 0.5 * state.donor)
-    return replace(solved, problem=problem, concentrations=transport.steady(problem, now.active, guess))
+    problem, state = solved.problem, solved.concentrations
+    at_the_end = np.zeros(problem.space.count, bool)
+    at_the_end[problem.space.end_nodes(problem.space.dofs.outlet)] = True
+    rows = np.tile(at_the_end, 2)
+    problem = replace(problem, system=problem.system.holding(rows))
+    guess = 0.5 * np.concatenate([state.acceptor, state.donor])
+    guess[rows] = part * problem.supply[rows]
+    balance = transport.Balance(problem, Sink(now.active))
+    newton = Newton(transport.NEWTON, transport.ROUND_OFF, transport.MOST_ITERATIONS)
+    last, _, converged = newton.solve(balance, balance.begun(guess))
+    if not converged:
+        raise TransportError(f"Newton's method stands at a defect of {last.defect:.2g}")
+    return replace(solved, problem=problem, concentrations=Concentrations(*last.state.reshape(2, -1)))
 
 
 def apart(ours: np.ndarray, other: np.ndarray) -> float:

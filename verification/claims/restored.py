@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 import meshio
 import numpy as np
 
-from repro.fem import geometry
-from repro.fem.mesh import PoreMesh
-from repro.model import remeshing
-from repro.model.pore import Pore, Solved, solve
+from repro.fem.mesh import Mesh
+from repro.fem.outline import BOTTOM, FREE, TOP, Outline
+from repro.fem.space import Space
+from repro.model import biomass, remeshing
+from repro.model.pore import Pore, Solved, material, solve
 from repro.model.transport import Concentrations
 from repro.scene import Scene
 from verification.claims.levels import cached
@@ -25,10 +26,10 @@ class Body:
     grid: the mesh, with its loop; fields: as saved; triangles: (t, 3) of the biomass; outline: closed polygon.
     """
 
-    grid: PoreMesh
+    grid: Mesh
     fields: meshio.Mesh
     triangles: np.ndarray
-    outline: geometry.Outline
+    outline: Outline
 
     def cell(self, name: str) -> np.ndarray:
         """(t,) values of saved cell data on the biomass triangles."""
@@ -50,10 +51,11 @@ def read_body(saved: meshio.Mesh, width: float) -> Body:
     triangles = grid.triangles[grid.biomass]
     loop = boundary_loop(triangles)
     points = grid.points[loop]
-    wall = np.where(points[:, 1] == 0, geometry.BOTTOM, np.where(points[:, 1] == width, geometry.TOP, geometry.FREE))
+    wall = np.where(points[:, 1] == 0, BOTTOM, np.where(points[:, 1] == width, TOP, FREE))
     origin = saved.point_data["position_t0_um"][loop, :2]
-    fixed = (wall == geometry.BOTTOM) & (points[:, 0] == 0)
-    return Body(replace(grid, loop=loop), saved, triangles, geometry.Outline(points, wall, fixed, origin))
+    fixed = (wall == BOTTOM) & (points[:, 0] == 0)
+    with_loop = replace(grid, topology=replace(grid.topology, loop=loop))
+    return Body(with_loop, saved, triangles, Outline(points, wall, fixed, origin))
 
 
 def boundary_loop(triangles: np.ndarray) -> np.ndarray:
@@ -71,15 +73,16 @@ def pore(run: tuple[str, ...], time: float) -> Pore:
     """The pore of a run, before it meets the opposite wall, as it was at a time (h)."""
     found, density = body(run, time), scene(*run).kinetics.maximum_density
     grid, outline = found.grid, found.outline
-    if (outline.wall == geometry.TOP).any():
+    if (outline.wall == TOP).any():
         raise ValueError(f"{run} at t = {time} h: the fixed point on the upper wall is not saved")
-    origin = np.where(np.isin(np.arange(len(grid.points)), grid.body)[:, None],
-                      found.node("position_t0_um")[:, :2], grid.points)
+    space = Space(grid, scene(*run).numerics.order)
     state = Concentrations(found.node("acceptor_mg_per_L"), found.node("donor_mg_per_L"))
-    modulus = scene(*run).growth.shear_modulus
-    return Pore(time, grid, outline.wall, outline.fixed, density * found.node("active_biomass"),
-                density * found.node("inert_biomass"), origin, found.cell("theta"),
-                found.node("pressure_MPa") / modulus, state)
+    reference = found.node("position_t0_um")[grid.body, :2]
+    active, inert = (density * biomass.at_points(space, found.node(name)) * space.reaction.dx
+                     for name in ("active_biomass", "inert_biomass"))
+    pressure = found.node("pressure_MPa") / scene(*run).growth.shear_modulus
+    return Pore(time, space, outline.wall, outline.fixed, active, inert, found.cell("theta")[:, None],
+                material(space, reference), pressure, state)
 
 
 @cached
@@ -91,7 +94,7 @@ def solved_pore(run: tuple[str, ...], time: float) -> tuple[Pore, Solved]:
 
 def remeshed(chosen: Scene, now: Pore, solved: Solved) -> tuple[Pore, Solved]:
     """The same aggregate in a new mesh of the extent that the scene asks for, solved."""
-    new = remeshing.remesh(chosen, now, now, solved)
+    new, _ = remeshing.remesh(chosen, now, now, solved.flow.mean_velocity)
     return new, solve(chosen, new)
 
 

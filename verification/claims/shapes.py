@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from repro.fem.geometry import BOTTOM, FREE, TOP, Outline
+from repro.fem.outline import BOTTOM, FREE, TOP, Outline
 from verification.claims import Finding, at_least, at_most, claim, without_limit
 from verification.claims.accuracy import FEW
 from verification.claims.levels import WIDE_SIZES

@@ -7,18 +7,21 @@ from dataclasses import dataclass, replace
 import meshio
 import numpy as np
 
-from repro.fem import geometry, mesh
-from repro.fem.mesh import PoreMesh
-from repro.model import flow, kinetics, transport
-from repro.model.pore import sizing
+from repro.fem import mesher
+from repro.fem.mesh import Mesh
+from repro.fem.outline import half_disc as seed
+from repro.fem.sizing import ACROSS_AGGREGATE
+from repro.fem.space import Space
+from repro.model import biomass, flow, kinetics, pore, transport
+from repro.model.kinetics import Sink
 
 
-def saved_mesh(fields: meshio.Mesh, width: float) -> PoreMesh:
+def saved_mesh(fields: meshio.Mesh, width: float) -> Mesh:
     """The mesh of saved fields; its loop, which flow and transport do not need, is left empty."""
     points = np.ascontiguousarray(fields.points[:, :2])
-    biomass = fields.cell_data_dict["region"]["triangle"] > 0.5
+    inside = fields.cell_data_dict["region"]["triangle"] > 0.5
     ends = float(points[:, 0].min()), float(points[:, 0].max())
-    return PoreMesh(points, fields.cells_dict["triangle"].astype(np.int64), biomass, np.empty(0, int), width, ends)
+    return Mesh.of(points, fields.cells_dict["triangle"].astype(np.int64), inside, np.empty(0, int), width, ends)
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,38 +34,38 @@ class Solution:
     fluxes: tuple[transport.Fluxes, transport.Fluxes]
 
 
-def solution(scene, grid: PoreMesh, active: np.ndarray, carried_by_u: bool = False) -> Solution:
+def solution(scene, grid: Mesh, active: np.ndarray, carried_by_u: bool = False) -> Solution:
     """Flow under the scene's drive, then steady substrates over X_A (N,) mg/L.
 
     carried_by_u: advect with u itself, as the paper writes it, and not with the divergence-free w = u - tau grad p.
     """
     found = flow_in(scene, grid)
     carrier = replace(found, correction=0 * found.correction) if carried_by_u else found
-    problem = transport.problem(grid, carrier, scene.substrates, scene.kinetics, scene.numerics.inlet)
-    state = transport.steady(problem, active)
-    return Solution(found, problem, state, transport.fluxes(problem, active, state))
+    space = Space(grid, scene.numerics.order)
+    problem = transport.problem(space, carrier, scene.substrates, scene.kinetics, scene.numerics.inlet)
+    sink = Sink(biomass.at_points(space, active) * space.reaction.dx)
+    state = transport.steady(problem, sink)
+    return Solution(found, problem, state, transport.fluxes(problem, sink, state))
 
 
-def flow_in(scene, grid: PoreMesh) -> flow.Flow:
+def flow_in(scene, grid: Mesh) -> flow.Flow:
     """Flow under the scene's drive."""
-    drive, numerics = scene.flow, scene.numerics
-    unit = flow.unit_flow(grid, drive.viscosity_ratio, interface=numerics.interface,
-                          stabilisation=numerics.flow_stabilisation)
-    return flow.scaled(unit, grid, scene.pore.length, drive.kinematic_viscosity / drive.gravity, head=drive.head,
-                       mean_velocity=drive.mean_velocity)
+    return pore.solve_flow(scene, Space(grid, scene.numerics.order))
 
 
-def full_biomass(scene, grid: PoreMesh) -> np.ndarray:
+def full_biomass(scene, grid: Mesh) -> np.ndarray:
     """X_A (N,) = X_m on the aggregate."""
     active = np.zeros(len(grid.points))
     active[grid.body] = scene.kinetics.maximum_density
     return active
 
 
-def half_disc(scene, radius: float, reach: float | None) -> PoreMesh:
+def half_disc(scene, radius: float, reach: float | None) -> Mesh:
     """The mesh around a half-disc, to the distance ``reach`` (um) on both sides; None: over the whole pore."""
     end = scene.pore.length / 2 if reach is None else min(radius + reach, scene.pore.length / 2)
-    return mesh.generate(geometry.seed(radius, scene.numerics.refinement), (-end, end), sizing(scene))[0]
+    numerics = scene.numerics
+    outline = seed(radius, ACROSS_AGGREGATE * numerics.refinement, numerics.geometry)
+    return mesher.generate(outline, (-end, end), pore.sized(scene), numerics.geometry)[0]
 
 
 def growth_rate(scene, fields: meshio.Mesh) -> np.ndarray:

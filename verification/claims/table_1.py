@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from repro.model import transport
+from repro.model.kinetics import Sink
 from verification.claims import Finding, at_most, claim, near
 from verification.claims.restored import solved_pore
 from verification.claims.runs import BASE, at, scene, series
@@ -112,7 +113,8 @@ def effect_of_f() -> str:
     now, solved = solved_pore(BASE, PLOTTED)
     kinetics = replace(scene(*BASE).kinetics, acceptor_to_donor_ratio=F_COMPUTED)
     problem = replace(solved.problem, kinetics=kinetics)
-    states = solved.concentrations, transport.steady(problem, now.active, solved.concentrations)
-    pairs = zip(*(transport.fluxes(each, now.active, state) for each, state in zip((solved.problem, problem), states)))
+    sink = Sink(now.active)
+    state = transport.steady(problem, sink, solved.concentrations)
+    pairs = zip(solved.fluxes, transport.fluxes(problem, sink, state))
     alone = ", ".join(f"{name} {100 * (b.effluent / a.effluent - 1):+.2f} %" for name, (a, b) in zip(SUBSTRATES, pairs))
     return f"Base at {PLOTTED} h with {F_COMPUTED:.4f}: {told}; in one and the same geometry the effluents: {alone}."

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from repro.model import gear
+from repro.model.kinetics import Sink
 from repro.model.transport import Concentrations
 from verification.claims import Finding, at_least, at_most, between, claim, without_limit
 from verification.claims.levels import cached
@@ -66,14 +67,14 @@ def update(time: float, tolerance: float | None, fixed_step: float | None = None
 def settled(time: float) -> Concentrations:
     """Profiles of the transient scheme with F3 = F4 = 0 (3.3.2) in base's geometry at a time (h)."""
     now, solved = solved_pore(BASE, time)
-    return gear.settle(solved.problem, now.active, solved.concentrations)
+    return gear.settle(solved.problem, Sink(now.active), solved.concentrations)
 
 
 def deviation(time: float, tolerance: float | None, fixed_step: float | None = None) -> float:
     """Error of an update: of both concentrations over the supply, and of the biomass made; the largest."""
     now, solved = solved_pore(BASE, time)
     problem, both = solved.problem, (update(time, tolerance, fixed_step), update(time, EXACT))
-    errors = [np.abs(np.subtract(*(getattr(found.concentrations, name) for found in both))).max()
-              / getattr(problem, name).supply for name in ("acceptor", "donor")]
-    made = [problem.body @ (found.active + found.inert - now.active - now.inert) for found in both]
+    errors = [np.abs(np.subtract(*(getattr(found.concentrations, name) for found in both))).max() / substrate.supply
+              for name, substrate in zip(("acceptor", "donor"), problem.both)]
+    made = [float((found.active + found.inert - now.active - now.inert).sum()) for found in both]
     return float(max(*errors, abs(made[0] / made[1] - 1)))
