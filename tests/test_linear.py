@@ -7,7 +7,17 @@ from hypothesis import strategies as st
 
 from repro.errors import LinearError
 from repro.fem import linear
+from repro.fem.linear import DEFAULT, Method
+from tests import faults
 from tests.strategies import meshed
+
+METIS, PARDISO = Method("superlu", "metis"), Method("pardiso", "degree")
+OPTIONAL = pytest.mark.parametrize("method, package", [(PARDISO, "pypardiso"), (METIS, "pymetis")])
+
+
+def solve(matrix, right, method=DEFAULT):
+    """x of A x = right."""
+    return linear.factorised(matrix, method).solve(right)
 
 
 def saddle(size, seed):
@@ -25,7 +35,7 @@ def test_a_saddle_point_system_is_solved(size, seed):
     right = np.random.default_rng(seed).normal(size=matrix.shape[0])
     dense = matrix.toarray()
     bound = 1e-13 * np.linalg.cond(dense) * max(1.0, np.abs(np.linalg.solve(dense, right)).max())
-    assert linear.solve(matrix, right) == pytest.approx(np.linalg.solve(dense, right), rel=1e-9, abs=bound)
+    assert solve(matrix, right) == pytest.approx(np.linalg.solve(dense, right), rel=1e-9, abs=bound)
 
 
 def test_one_factorisation_serves_many_right_hand_sides():
@@ -41,7 +51,7 @@ def test_a_zero_pivot_is_got_round():
     """Without pivots the factorisation stops, with them it does not. Mutant: no second attempt with partial
     pivoting."""
     matrix = sp.csc_array(np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 2.0]]))
-    assert linear.solve(matrix, np.array([3.0, 5.0, 4.0])) == pytest.approx([5.0, 3.0, 2.0], rel=1e-15)
+    assert solve(matrix, np.array([3.0, 5.0, 4.0])) == pytest.approx([5.0, 3.0, 2.0], rel=1e-15)
 
 
 def test_tiny_pivots_do_not_spoil_the_answer():
@@ -62,7 +72,7 @@ def test_a_singular_system_is_refused(matrix):
     """Pure Neumann problems among them, whose factors are not exactly singular. Mutant: what SuperLU leaves is
     returned."""
     with pytest.raises(LinearError, match="singular|residual"):
-        linear.solve(sp.csc_array(np.array(matrix)), np.arange(1.0, len(matrix) + 1))
+        solve(sp.csc_array(np.array(matrix)), np.arange(1.0, len(matrix) + 1))
 
 
 def test_a_node_order_is_a_permutation_that_saves_fill():
@@ -85,37 +95,67 @@ def fill(matrix):
                           options={"SymmetricMode": True}).nnz
 
 
-@pytest.fixture
-def default():
-    """What is chosen for other tests afterwards."""
-    yield
-    linear.use("superlu", "degree")
-
-
-@pytest.mark.parametrize("solver, ordering, package", [("pardiso", "degree", "pypardiso"),
-                                                       ("superlu", "metis", "pymetis")])
-def test_optional_packages_give_the_same_or_are_named(solver, ordering, package, default):
-    """The same solution by both, to round-off; one clear error where the package is not there. Mutants: METIS' inverse
-    permutation in place of the order, a missing package passed over in silence."""
-    try:
-        __import__(package)
-    except ImportError:
-        with pytest.raises(LinearError, match=f"package {package} is not installed"):
-            linear.use(solver, ordering)
-        return
+def check_alike(method):
+    """A method gives the default's solution to round-off, and orders nodes nearly as well."""
     grid = meshed(None, 50.0, 0.6)[0]
-    elements, right = grid.triangles, np.ones(60)
-    matrix = saddle(40, 3)
-    expected, plain = linear.solve(matrix, right), linear.node_order(len(grid.points), elements)
-    linear.use(solver, ordering)
-    assert linear.solve(matrix, right) == pytest.approx(expected, rel=1e-9, abs=1e-9)
-    fill = [_fill(grid, order) for order in (plain, linear.node_order(len(grid.points), elements))]
-    assert fill[1] <= 1.3 * fill[0]
+    matrix, right = saddle(40, 3), np.ones(60)
+    assert solve(matrix, right, method) == pytest.approx(solve(matrix, right), rel=1e-9, abs=1e-9)
+    orders = [linear.node_order(len(grid.points), grid.triangles, m) for m in (DEFAULT, method)]
+    assert np.sort(orders[1]).tolist() == list(range(len(grid.points)))
+    fills = [_fill(grid, order) for order in orders]
+    assert fills[1] <= 1.3 * fills[0]
 
 
 def _fill(grid, order):
     """Entries of the factor of the mesh's Laplacian, its nodes in this order."""
     rows, columns = np.repeat(grid.triangles, 3, axis=1).ravel(), np.tile(grid.triangles, (1, 3)).ravel()
     graph = sp.csc_array((np.ones(len(rows)), (rows, columns)), shape=2 * (len(grid.points),))
-    matrix = sp.csc_matrix((graph + sp.diags_array(graph.sum(axis=0) + 1.0))[order][:, order])
-    return sp.linalg.splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True}).nnz
+    return fill((graph + sp.diags_array(graph.sum(axis=0) + 1.0))[order][:, order])
+
+
+@OPTIONAL
+def test_optional_packages_give_the_same_or_are_named(method, package):
+    """The same solution by both, to round-off; one clear error where the package is not there. Mutants: METIS' inverse
+    permutation in place of the order, a missing package passed over in silence."""
+    try:
+        __import__(package)
+    except ImportError:
+        with pytest.raises(LinearError, match=f"package {package} is not installed"):
+            method.checked()
+        return
+    assert method.checked() is method
+    check_alike(method)
+
+
+@OPTIONAL
+def test_an_absent_package_is_named_wherever_it_is_asked_for(method, package, monkeypatch):
+    """Whether it is installed here or not; the default asks for none. Mutants: a missing package passed over in
+    silence, both packages asked for at once."""
+    for name in ("pypardiso", "pymetis"):
+        faults.absent_package(monkeypatch, name)
+    asked = {"pypardiso": lambda: linear.factorised(sp.eye_array(2, format="csc"), method),
+             "pymetis": lambda: linear.node_order(3, np.array([[0, 1, 2]]), method)}
+    for ask in (method.checked, asked[package]):
+        with pytest.raises(LinearError, match=f"package {package} is not installed; pip install {package}"):
+            ask()
+    assert DEFAULT.checked() is DEFAULT and solve(saddle(4, 1), np.ones(6)).shape == (6,)
+
+
+@OPTIONAL
+def test_what_a_package_does_is_used_as_it_is_meant(method, package, monkeypatch):
+    """With a stand-in that does what the package says: it is called, orders are permutations from new to old, and the
+    solution is the same. Mutants: the inverse permutation, the diagonal left in the graph, PARDISO's solution for
+    another right-hand side."""
+    made = faults.stand_in_package(monkeypatch, package)
+    matrix, right = saddle(40, 3), np.ones(60)
+    assert method.checked() is method
+    assert solve(matrix, right, method) == pytest.approx(solve(matrix, right), rel=1e-9, abs=1e-9)
+    grid = meshed(None, 50.0, 0.6)[0]
+    order = linear.node_order(len(grid.points), grid.triangles, method)
+    assert np.sort(order).tolist() == list(range(len(grid.points))) and len(made.calls) == 1
+    if package == "pymetis":
+        graph, = made.calls
+        rows = np.repeat(np.arange(len(grid.points)), np.diff(graph.indptr))
+        assert (rows != graph.indices).all() and len(rows) == 2 * len(grid.topology.edges)
+        assert _fill(grid, order) < 0.8 * _fill(grid, np.random.default_rng(1).permutation(order))
+        assert np.array_equal(order, np.asarray(made.nested_dissection(graph)[0]))

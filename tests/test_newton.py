@@ -1,19 +1,55 @@
-"""When Newton's method factorises its derivative anew."""
-from repro.fem.newton import ENOUGH, Jacobian
+"""Newton's method: when its derivative is factorised anew, and when it stops."""
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from repro.fem.newton import ENOUGH, STALLED, Newton, relative
+
+TOLERANCE, ROUND_OFF = 1e-12, 1e-8
+
+
+@dataclass(frozen=True)
+class Told:
+    """An iterate of which only the defect is known; its number."""
+
+    defect: float
+    number: int
+    complete: bool = True
+
+
+class Script:
+    """A system whose iterates have given defects, told one after the other; what was asked of it."""
+
+    def __init__(self, defects, incomplete=()):
+        self.told = [Told(defect, k, k not in incomplete) for k, defect in enumerate(defects)]
+        self.factorised, self.fresh = [], []
+
+    def factored(self, iterate):
+        self.factorised.append(iterate.number)
+        return f"of {iterate.number}"
+
+    def advanced(self, iterate, factors, fresh):
+        assert factors == f"of {self.factorised[-1]}"
+        self.fresh.append(fresh)
+        return self.told[iterate.number + 1]
+
+
+def run(script, reused=False, most=20):
+    return Newton(TOLERANCE, ROUND_OFF, most, reused).solve(script, script.told[0])
 
 
 def visits(reused, defects):
-    """Whether each iterate with these defects asks for a new factorisation."""
-    jacobian, found = Jacobian(reused), []
-    for defect in defects:
-        found.append(jacobian.stale(defect))
-        jacobian.factors = "made"
-    return found
+    """Whether each iterate with these defects asks for a new factorisation; the last one has converged."""
+    script = Script([*defects, 0.0])
+    run(script, reused)
+    assert script.fresh == [k in script.factorised for k in range(len(defects))]
+    return script.fresh
 
 
 def test_fresh_derivatives_are_made_for_every_iterate():
     """Mutant: the choice ignored."""
-    assert visits(False, [1.0, 1e-9, 1e-18]) == [True, True, True]
+    assert visits(False, [1.0, 1e-3, 1e-6]) == [True, True, True]
 
 
 def test_a_derivative_is_used_again_while_it_does_enough():
@@ -22,3 +58,63 @@ def test_a_derivative_is_used_again_while_it_does_enough():
     slow, quick = 2 * ENOUGH, ENOUGH / 2
     assert visits(True, [1.0, slow, slow * quick, slow * quick**2, slow**2 * quick**2]) == [
         True, True, False, False, True]
+
+
+@pytest.mark.parametrize("defects, count, converged", [
+    ([1.0, 1e-13], 1, True),
+    ([1e-13], 0, True),
+    ([1.0, 1e-9, 5e-10], 2, True),
+    ([1.0, 1e-9, 5e-11, 1e-13], 3, True),
+    ([1.0, 1e-7, 5e-8, 1e-13], 3, True),
+    ([1.0, 2.0, 3.0, 4.0], 3, False),
+])
+def test_when_it_stops(defects, count, converged):
+    """Under the tolerance; or where round-off keeps a defect that is small enough from falling. Mutants: any defect
+    under the second measure, one that does not fall but is not small either, one iteration more."""
+    assert STALLED == 0.1
+    last, steps, done = run(Script(defects), most=4 if converged else 3)
+    assert (last.number, steps, done) == (count, count, converged)
+
+
+def test_constraints_come_first():
+    """However small the defect. Mutant: convergence judged by the residual alone."""
+    last, steps, done = run(Script([0.0, 0.0, 0.0], incomplete={0, 1}))
+    assert (last.number, steps, done) == (2, 2, True)
+
+
+def test_a_root_is_found_quadratically_and_by_the_modified_method_in_more_steps():
+    """x^3 = 2, with its derivative and with that of an earlier iterate. Mutant: the derivative never made again, made
+    again at once."""
+    @dataclass(frozen=True)
+    class At:
+        x: float
+
+        @property
+        def defect(self):
+            return abs(self.x**3 - 2) / 2
+
+        complete = True
+
+    class Cube:
+        made = 0
+
+        def factored(self, iterate):
+            self.made += 1
+            return 3 * iterate.x**2
+
+        def advanced(self, iterate, factors, fresh):
+            return At(iterate.x - (iterate.x**3 - 2) / factors)
+
+    counts = {}
+    for reused in (False, True):
+        system = Cube()
+        last, steps, done = Newton(1e-14, 1e-13, 30, reused).solve(system, At(1.3))
+        assert done and last.x == pytest.approx(2 ** (1 / 3), rel=1e-14)
+        counts[reused] = steps, system.made
+    assert counts[False][0] == counts[False][1] < counts[True][0] and counts[True][1] < counts[False][1]
+
+
+def test_a_residual_counts_against_the_size_of_its_row():
+    """Mutants: against the largest size of all, no guard where a row is empty."""
+    assert relative(np.array([1.0, -4.0, 0.0]), np.array([10.0, 8.0, 0.0])) == 0.5
+    assert relative(np.empty(0), np.empty(0)) == 0.0

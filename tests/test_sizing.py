@@ -70,7 +70,7 @@ def test_new_nodes_of_a_grown_seed_remember_its_arc(stretch):
 
 @given(widths, st.floats(-20.0, 20.0))
 def test_refining_leaves_contact_nodes_exactly_on_their_wall(width, lean):
-    """Walls are found by y == W: a node one round-off beside it would slip. Mutant: y of new nodes as (1 - t) a + t b."""
+    """Walls are found by y == W: a node one round-off beside it would slip. Mutant: new y (1 - t) a + t b."""
     outline = plug(width, -0.3 * width, 0.4 * width, lean)
     sizing = Sizing(width, 1.0, FILM)
     fine = of.split(outline, sizing)

@@ -92,9 +92,9 @@ def _dissected(graph) -> np.ndarray:
 class _Pardiso:
     """A factorisation by PARDISO, which orders the unknowns itself."""
 
-    def __init__(self, matrix):
+    def __init__(self, matrix, package):
         self.matrix = sp.csr_matrix(matrix)
-        self.solver = _package("pypardiso").PyPardisoSolver(mtype=11)
+        self.solver = package.PyPardisoSolver(mtype=11)
         self.solver.factorize(self.matrix)
 
     def solve(self, right: np.ndarray) -> np.ndarray:
@@ -116,8 +116,8 @@ class Solver:
         self.matrix = matrix if isinstance(matrix, sp.csc_matrix) else sp.csc_matrix(matrix)
         self.magnitude = copy(self.matrix)
         self.magnitude.data = np.abs(self.matrix.data)
-        pardiso = method.solver == "pardiso"
-        self.factor = _Pardiso(self.matrix) if pardiso else self._factor("NATURAL", 0.0, True)
+        pardiso = _package("pypardiso") if method.solver == "pardiso" else None
+        self.factor = _Pardiso(self.matrix, pardiso) if pardiso else self._factor("NATURAL", 0.0, True)
         self.pivoted = False
 
     def _factor(self, column_order: str, threshold: float, symmetric: bool):
