@@ -8,8 +8,9 @@ from matplotlib.figure import Figure
 
 from paper_figures import runs, style
 from repro import Scene
-from repro.fem import geometry
-from repro.fem.geometry import Outline
+from repro.fem.outline import BOTTOM, TOP, Outline, half_disc
+from repro.fem.sizing import ACROSS_AGGREGATE
+from repro.model.contact import closing_nodes
 
 TITLE = "Figure 2. The pore, its domains and boundaries"
 RUNS = ()
@@ -26,7 +27,7 @@ def draw() -> Figure:
     made = style.figure(4.1)
     panels = made.subplot_mosaic([["pore", "pore"], ["domains", "closing"]], height_ratios=[1, 2.4],
                                  width_ratios=[1.45, 1])
-    outline = geometry.seed(THICKNESS * scene.pore.width, 3.0)
+    outline = half_disc(THICKNESS * scene.pore.width, 3 * ACROSS_AGGREGATE)
     _pore(panels["pore"], scene, outline)
     _domains(panels["domains"], scene, outline)
     _closing(panels["closing"], scene)
@@ -64,7 +65,7 @@ def _domains(axes: Axes, scene: Scene, outline: Outline) -> None:
     style.channel(axes, (-reach, reach), width, 2)
     style.fluid(axes, (-reach, reach), width)
     style.aggregate(axes, outline.points)
-    axes.plot(*outline.points[outline.wall == geometry.BOTTOM].T, color=style.RED, linewidth=2.4, clip_on=False)
+    axes.plot(*outline.points[outline.wall == BOTTOM].T, color=style.RED, linewidth=2.4, clip_on=False)
     axes.plot(*outline.points[outline.fixed].T, "o", color=style.BLACK, markersize=4, clip_on=False, zorder=5)
     axes.set_title("domains and boundaries")
     radius = outline.thickness
@@ -79,8 +80,8 @@ def _closing(axes: Axes, scene: Scene) -> None:
     """An aggregate on the opposite wall: the nodes that `closing_nodes` joins to it, and the least gap allowed."""
     width, film, angle = scene.pore.width, scene.growth.minimum_film, scene.growth.minimum_contact_angle
     outline = flattened(width)
-    joins = geometry.closing_nodes(outline, width, film, angle) == geometry.TOP
-    line = outline.points[outline.wall == geometry.TOP, 0].max()
+    joins = closing_nodes(outline, width, film, angle) == TOP
+    line = outline.points[outline.wall == TOP, 0].max()
     steps = np.array([0, film / np.tan(angle), 3 * film / np.tan(angle)])
     low, high = (line - 3, line + 17), (width - 9.5, width + 2.5)
     style.plane(axes, low, high)
@@ -99,10 +100,10 @@ def _closing(axes: Axes, scene: Scene) -> None:
 
 def flattened(width: float) -> Outline:
     """A half-disc a little thicker than the pore is wide, cut off by the opposite wall."""
-    whole = geometry.seed(1.02 * width, 4.0)
+    whole = half_disc(1.02 * width, 4 * ACROSS_AGGREGATE)
     beyond = whole.points[:, 1] >= width
     points = np.column_stack([whole.points[:, 0], np.minimum(whole.points[:, 1], width)])
-    return Outline(points, np.where(beyond, geometry.TOP, whole.wall), whole.fixed, points)
+    return Outline(points, np.where(beyond, TOP, whole.wall), whole.fixed, points)
 
 
 def caption() -> str:

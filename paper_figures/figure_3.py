@@ -9,8 +9,8 @@ from matplotlib.patches import Rectangle
 from paper_figures import runs, style
 from paper_figures.figure_2 import THICKNESS, inflow
 from repro import Scene
-from repro.fem import geometry
-from repro.fem.geometry import Outline
+from repro.fem.outline import BOTTOM, Outline, half_disc
+from repro.fem.sizing import ACROSS_AGGREGATE, meshed_extent
 
 TITLE = "Figure 3. Conditions at the ends of the pore and of its meshed part"
 RUNS = ()
@@ -20,11 +20,11 @@ Ends = tuple[float, float]
 
 
 @style.styled
-def draw() -> Figure:
-    """The pore with its meshed part, and that part closer."""
-    scene = runs.BASE.load()
-    outline = geometry.seed(THICKNESS * scene.pore.width, 3.0)
-    ends = geometry.meshed_extent(outline, scene.pore.width, scene.pore.length)
+def draw(scene: Scene | None = None) -> Figure:
+    """The pore of a scene, Base by default, with its meshed part, and that part closer."""
+    scene = scene or runs.BASE.load()
+    outline = half_disc(THICKNESS * scene.pore.width, 3 * ACROSS_AGGREGATE)
+    ends = meshed_extent(outline, scene.pore.width, scene.pore.length)
     made = style.figure(4.0)
     whole, part = made.subplots(2, 1, height_ratios=[1, 2.6])
     _whole(whole, scene, outline, ends)
@@ -53,7 +53,7 @@ def _part(axes: Axes, scene: Scene, outline: Outline, ends: Ends) -> None:
     style.channel(axes, ends, width, 2)
     style.fluid(axes, ends, width)
     style.aggregate(axes, outline.points)
-    axes.plot(*outline.points[outline.wall == geometry.BOTTOM].T, color=style.RED, linewidth=2.4, clip_on=False)
+    axes.plot(*outline.points[outline.wall == BOTTOM].T, color=style.RED, linewidth=2.4, clip_on=False)
     inflow(axes, ends, width, 0.12 * ends[1])
     axes.set(title="the meshed part and its conditions", ylim=(-0.24 * width, 1.24 * width), yticks=[0, width])
     for side, start in ((0, outline.upstream), (1, outline.downstream)):
@@ -74,12 +74,12 @@ def _conditions(axes: Axes, ends: Ends, width: float, radius: float) -> None:
     axes.text(0, 0.66 * width, "interface: no forces on the biomass", ha="center", va="center", color=style.RIM)
 
 
-def caption() -> str:
+def caption(scene: Scene | None = None) -> str:
     """What is seen, with the extents that the model chooses."""
-    scene = runs.BASE.load()
+    scene = scene or runs.BASE.load()
     width, length = scene.pore.width, scene.pore.length
-    grown = geometry.meshed_extent(geometry.seed(THICKNESS * width), width, length)
-    seed = geometry.meshed_extent(geometry.seed(scene.aggregate.radius), width, length)
+    grown, seed = (meshed_extent(half_disc(radius, ACROSS_AGGREGATE), width, length)
+                   for radius in (THICKNESS * width, scene.aggregate.radius))
     return (f"Drawn by the code that the model uses. (a) Of the pore's {length:g} µm only the part around the "
             "aggregate is meshed: outside it the flow is that between two plates, substrate upstream follows (26) and "
             "does not change downstream. (b) The conditions on the boundaries of that part; inlet and outlet take over "

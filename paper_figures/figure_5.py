@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from paper_figures import runs, states, style
 from paper_figures.states import State
-from repro.fem.reprojection import locate
+from repro.fem.transfer import located
 
 TITLE = "Figure 5. Stokes flow around the aggregate"
 RUNS = (runs.BASE,)
@@ -50,7 +50,7 @@ def share_through(state: State) -> float:
     """Share of the flow that crosses x = 0 inside the aggregate."""
     y = (np.arange(2000) + 0.5) * state.width / 2000
     where = np.column_stack([0 * y, y])
-    inside = state.biomass[locate(state.points, state.triangles, where)[0]]
+    inside = state.biomass[located(state.points, state.triangles, where).triangle]
     u = state.at("velocity_m_per_d", where)[:, 0]
     return float(u[inside].sum() / u.sum())
 

@@ -11,7 +11,7 @@ from matplotlib.tri import Triangulation
 
 from paper_figures import runs, states, style
 from paper_figures.states import State
-from repro.fem.reprojection import interpolate
+from repro.fem.transfer import interpolate
 
 TITLE = "Plate 2. One expansion of the aggregate and the deformation of the mesh"
 RUNS = (runs.BASE,)

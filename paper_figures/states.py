@@ -11,7 +11,7 @@ import meshio
 import numpy as np
 from matplotlib.tri import Triangulation
 
-from repro.fem.reprojection import interpolate
+from repro.fem.transfer import interpolate
 from repro.results import read_table
 
 

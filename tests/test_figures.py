@@ -12,7 +12,8 @@ import paper_figures
 from paper_figures import __main__ as figures
 from paper_figures import claims, overview, page, runs, states, style
 from repro import cli, load_scene, run
-from repro.fem import geometry
+from repro.fem.outline import FREE, TOP, polygon_area
+from repro.model.contact import closing_nodes
 from repro.scene import scene_hash
 
 MODULES = {name: import_module(f"paper_figures.{name}") for name in paper_figures.FIGURES}
@@ -100,21 +101,26 @@ def test_the_page_escapes_text():
     assert root.find(".//script") is None
 
 
-def test_the_schematics_follow_the_model(monkeypatch):
+def test_the_schematics_follow_the_model():
+    """Around a half-disc 0.6 W thick 1.5 W are meshed on both sides, unless the pore ends before."""
     assert "210 µm in all" in figure_3.caption() and "110 µm around the seed" in figure_3.caption()
-    monkeypatch.setattr(geometry, "meshed_extent", lambda outline, width, length: (-61.0, 62.0))
-    assert "123 µm in all" in figure_3.caption()
-    texts = {text.get_text() for axes in figure_3.draw().axes for text in axes.texts}
-    assert {"31 µm", "32 µm"} <= texts
+    narrow = load_scene("base", ['pore.width="30 um"', 'pore.length="90 um"'])
+    assert "90 µm in all" in figure_3.caption(narrow)
+    texts = {text.get_text() for axes in figure_3.draw(narrow).axes for text in axes.texts}
+    assert "27 µm" in texts
+    narrow = load_scene("base", ['pore.width="30 um"'])
+    assert "126 µm in all" in figure_3.caption(narrow)
+    texts = {text.get_text() for axes in figure_3.draw(narrow).axes for text in axes.texts}
+    assert "45 µm" in texts
     assert "16.7°" in figure_2.caption()
 
 
 def test_the_flattened_aggregate_closes_beside_its_contact():
     outline = figure_2.flattened(50.0)
-    joins = geometry.closing_nodes(outline, 50.0, 2.0, np.radians(16.7)) == geometry.TOP
+    joins = closing_nodes(outline, 50.0, 2.0, np.radians(16.7)) == TOP
     assert outline.points[:, 1].max() == 50
     gaps = 50 - outline.points[joins, 1]
-    assert 0 < np.count_nonzero(joins) and gaps.max() < 2 and (outline.wall[joins] == geometry.FREE).all()
+    assert 0 < np.count_nonzero(joins) and gaps.max() < 2 and (outline.wall[joins] == FREE).all()
 
 
 def test_figure_4_shows_every_triangle(short):
@@ -127,7 +133,7 @@ def test_figure_4_shows_every_triangle(short):
 
 def test_a_state_agrees_with_the_time_series(short):
     state, row = states.last(short["base"]), states.row(short["base"], 0.6)
-    assert geometry.polygon_area(state.rim) == pytest.approx(row["aggregate_area_um2"], rel=1e-12)
+    assert polygon_area(state.rim) == pytest.approx(row["aggregate_area_um2"], rel=1e-12)
     assert np.ptp(state.ends) == pytest.approx(row["meshed_length_um"], rel=1e-12)
     for name in ("acceptor", "donor"):
         for end, place in enumerate(("inlet", "effluent")):
