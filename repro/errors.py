@@ -25,6 +25,10 @@ class TransportError(StageError):
     stage = "transport"
 
 
+class Unresolved(TransportError):
+    """The mesh is too coarse for a front of the substrates."""
+
+
 class GrowthError(StageError):
     """No equilibrium of the aggregate was found."""
 

@@ -22,12 +22,14 @@ SPLIT = 1.4
 @dataclass(frozen=True)
 class Sizing:
     """How large the elements of a mesh are to be: width of the pore (um); refinement, by which sizes are divided; film,
-    the thinnest that is resolved (um); gradation, growth of the size with the distance from where it is prescribed."""
+    the thinnest that is resolved (um); gradation, growth of the size with the distance from where it is prescribed; front,
+    by which sizes at the aggregate are divided besides, for a front of the substrates in it."""
 
     width: float
     refinement: float
     film: float
     gradation: float = GRADATION
+    front: float = 1.0
 
     @property
     def largest(self) -> float:
@@ -62,7 +64,7 @@ def interface_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
 
     A tenth of the aggregate's thickness, a fourteenth of the pore's width, and for free nodes the film's size.
     """
-    across = min(outline.thickness / ACROSS_AGGREGATE / sizing.refinement, sizing.largest)
+    across = min(outline.thickness / ACROSS_AGGREGATE / sizing.refinement, sizing.largest) / sizing.front
     size = np.full(len(outline.points), across)
     return np.where(outline.wall == FREE, np.minimum(size, film_sizes(outline, sizing)), size)
 

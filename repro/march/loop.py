@@ -14,7 +14,8 @@ from repro.fem.mesh import Mesh
 from repro.fem.sizing import ACROSS_PORE
 from repro.march.pace import Pace
 from repro.model.growth import Body
-from repro.model.pore import Pore, Solved, seeded, solve
+from repro.model.pore import Pore, Solved, seeded
+from repro.model.remeshing import resolved
 from repro.model.transport import Concentrations
 from repro.scene import Scene
 
@@ -109,7 +110,9 @@ def steps(scene: Scene, scheme: Scheme, state: State | None = None) -> Iterator[
     with stopping(state.pore.time if state else 0.0):
         first_step = scheme.first * scene.growth.time_step if scene.growth else 0.0
         state = state or State(laid_out(seeded(scene)), Pace(first_step))
-        solved = solve(scene, state.pore)
+        begun, solved = resolved(scene, state.pore)
+        if begun is not state.pore:
+            state = replace(state, pore=laid_out(begun))
     now = replace(state.pore, concentrations=solved.concentrations)
     if first:
         yield state, Instant(now, solved, None, (), 0, newton_counts(solved))

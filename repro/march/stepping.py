@@ -13,11 +13,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from repro.errors import StageError
+from repro.errors import StageError, Unresolved
 from repro.march import loop, midpoint
 from repro.march.loop import SAME_TIME, Instant, PoreEnd, Scheme, State, Step, laid_out
 from repro.march.pace import EXCESS, STRETCH, Pace, allowed, fitted, following
-from repro.model import pore
+from repro.model import remeshing
 from repro.model.pore import Pore, Solved
 from repro.scene import Scene
 
@@ -53,16 +53,33 @@ def _advance(scene: Scene, now: Pore, solved: Solved, time: float, asked: Pace) 
             found = midpoint.attempt(scene, now, solved, duration, most)
             estimate = found.change * duration
             if found.step and (duration <= shortest or not _overshoots(found)):
-                taken = _ending_at(found.step, now.time + duration, time)
+                taken, after = _solved(scene, _ending_at(found.step, now.time + duration, time))
                 contact = found.gaps is not None  # that alone made the step short
                 pace = asked if contact else following(replace(asked, length=length), duration, estimate, tolerance)
-                return taken, pore.solve(scene, taken.pore), pace
+                return taken, after, pace
             length = duration * (_to_contact(found.gaps) if found.step else allowed(estimate, tolerance))
+        except Unresolved:
+            finer = remeshing.graded(scene, now)
+            if finer is None and duration <= shortest:
+                raise
+            if finer is None:
+                length = duration / 2
+            else:
+                now, solved = remeshing.resolved(scene, finer)
+                now = replace(now, concentrations=solved.concentrations)
         except (PoreEnd, StageError, FloatingPointError):
             if duration <= shortest:
                 raise
             length = duration / 2
         duration = fitted(length, time - now.time)
+
+
+def _solved(scene: Scene, taken: Step) -> tuple[Step, Solved]:
+    """A step with what is solved after it, on a mesh graded to a front where that is needed."""
+    after, solved = remeshing.resolved(scene, taken.pore)
+    if after is not taken.pore:
+        taken = replace(taken, pore=laid_out(after), remeshed=True)
+    return taken, solved
 
 
 def _overshoots(found: midpoint.Attempt) -> bool:

@@ -8,9 +8,8 @@ With m_A = C_A / (C_A + K_sA) and m_D alike:
 [E3]: the demand of decay is d_c f_d b. [E1]: F is the 1.52 of Table 1 by default, not COD - Y d_c = 1.5138. So, for
 whatever concentrations, F3 + F4 = -Y F2 + (F1 - F F2) / d_c: biomass is made of donor, and what decays takes acceptor.
 
-Uptake and growth are functions of max(C, 0). Newton's iterates alone may ask for the *extended* uptake, which goes on
-linearly below zero in its own substrate and takes the other as zero: it stays monotone, so that the method has no
-negative root to fall into.
+Uptake and growth are functions of max(C, 0). The transient scheme's linearisation alone asks for the *extended* uptake,
+which goes on linearly below zero in its own substrate and takes the other as zero: it stays monotone.
 """
 
 from __future__ import annotations
@@ -44,9 +43,7 @@ def fractions(acceptor, donor, substrates: Substrates):
 def uptake(acceptor, donor, substrates: Substrates, kinetics: Kinetics, extended: bool = False):
     """Uptake per active biomass (1/h): -F1/X_A and -F2/X_A at C_A and C_D (mg/L); extended: see the module."""
     if not extended:
-        m_a, m_d = fractions(acceptor, donor, substrates)
-        return m_a * (kinetics.maximum_utilization_rate * kinetics.acceptor_to_donor_ratio * m_d
-                      + decay_demand(kinetics)), kinetics.maximum_utilization_rate * m_a * m_d
+        return _of_fractions(*fractions(acceptor, donor, substrates), kinetics)
     m_a, m_d = (monod(c, s.half_saturation)[0]
                 for c, s in zip((acceptor, donor), (substrates.acceptor, substrates.donor)))
     k, demand = kinetics.maximum_utilization_rate, kinetics.acceptor_to_donor_ratio
@@ -109,30 +106,41 @@ def grow(active, inert, growth, remains, step: float):
 class Sink:
     """Active biomass that takes up substrates: its masses at the points of a reaction, (r, q) um2 mg/L, and the time
     (h) over which it grows meanwhile; zero: as it is. Over a time, the mean of its mass takes part, that of the rate
-    at the very concentrations that are sought: so what is taken up and what is made are one integral."""
+    at the very concentrations that are sought: so what is taken up and what is made are one integral.
+
+    All of it is a function of the fractions m_A and m_D, (2, r, q).
+    """
 
     active: np.ndarray
     duration: float = 0.0
 
-    def mean(self, acceptor, donor, substrates: Substrates, kinetics: Kinetics) -> np.ndarray:
-        """(r, q) um2 mg/L, mean over the time."""
-        if self.duration == 0:
-            return self.active
-        rate = growth_rate(acceptor, donor, substrates, kinetics)
-        return self.active * mean_growth(rate * self.duration)[0]
+    def _exponent(self, fractions: np.ndarray, kinetics: Kinetics) -> np.ndarray:
+        """(r, q) growth of ln X_A over the time."""
+        m_a, m_d = fractions
+        most = kinetics.maximum_utilization_rate * kinetics.yield_coefficient
+        return self.duration * m_a * (most * m_d - kinetics.decay_coefficient)
 
-    def uptake(self, acceptor, donor, substrates: Substrates, kinetics: Kinetics, extended: bool = False) -> np.ndarray:
+    def uptake(self, fractions: np.ndarray, kinetics: Kinetics) -> np.ndarray:
         """(r, 2, q) um2 mg/L/h, taken up of the acceptor and of the donor."""
-        rates = np.stack(uptake(acceptor, donor, substrates, kinetics, extended), axis=1)
-        return self.mean(acceptor, donor, substrates, kinetics)[:, None] * rates
+        rates = np.stack(_of_fractions(*fractions, kinetics), axis=1)
+        mass = self.active if self.duration == 0 else self.active * mean_growth(self._exponent(fractions, kinetics))[0]
+        return mass[:, None] * rates
 
-    def slopes(self, acceptor, donor, substrates: Substrates, kinetics: Kinetics, extended: bool = False) -> Slopes:
-        """Derivatives of :meth:`uptake`, um2/h: [of the acceptor's, of the donor's][by C_A, by C_D]."""
-        at = acceptor, donor, substrates, kinetics
-        by = uptake_slopes(*at, extended)
+    def slopes(self, fractions: np.ndarray, kinetics: Kinetics) -> np.ndarray:
+        """(2, 2, r, q) um2 mg/L/h, derivatives of :meth:`uptake` of acceptor and donor by m_A and by m_D."""
+        m_a, m_d = fractions
+        k, demand = kinetics.maximum_utilization_rate, kinetics.acceptor_to_donor_ratio
+        by = np.stack([[k * demand * m_d + decay_demand(kinetics), k * demand * m_a], [k * m_d, k * m_a]])
         if self.duration == 0:
-            return tuple(tuple(self.active * slope for slope in row) for row in by)
-        rates, growth = uptake(*at, extended), growth_slopes(*at)
-        mean, rise = mean_growth(growth_rate(*at) * self.duration)
-        more = [self.active * rise * self.duration * slope for slope in growth]
-        return tuple(tuple(self.active * mean * by[i][j] + more[j] * rates[i] for j in (0, 1)) for i in (0, 1))
+            return self.active * by
+        most = k * kinetics.yield_coefficient
+        mean, rise = mean_growth(self._exponent(fractions, kinetics))
+        growth = self.duration * np.stack([most * m_d - kinetics.decay_coefficient, most * m_a])
+        rates = np.stack(_of_fractions(m_a, m_d, kinetics))
+        return self.active * (mean * by + rise * rates[:, None] * growth[None])
+
+
+def _of_fractions(m_a, m_d, kinetics: Kinetics):
+    """Uptake of acceptor and donor per active biomass (1/h)."""
+    k = kinetics.maximum_utilization_rate
+    return m_a * (k * kinetics.acceptor_to_donor_ratio * m_d + decay_demand(kinetics)), k * m_a * m_d

@@ -36,7 +36,8 @@ class Pore:
     time: h; space: of velocity and concentrations, on the mesh; wall: (M,) contact of each node of the mesh's loop;
     fixed: (M,) its x is constrained; active, inert: X_A, X_I, (r, q) um2 mg/L at the points of the reaction; theta:
     (t, q) expansion since t = 0 in the aggregate's triangles; body: the aggregate as it was at t = 0; pressure:
-    (corners,) P / mu_L; concentrations: the last known ones, None before the first.
+    (corners,) P / mu_L; concentrations: the last known ones, None before the first; front: what element sizes at the
+    aggregate are divided by, for a front of the substrates in it.
     """
 
     time: float
@@ -49,6 +50,7 @@ class Pore:
     body: growth.Body
     pressure: np.ndarray
     concentrations: Concentrations | None = None
+    front: float = 1.0
 
     @property
     def mesh(self) -> Mesh:
@@ -127,28 +129,28 @@ def fastest(scene: Scene) -> float:
     return drive.head * drive.gravity / drive.kinematic_viscosity / loss
 
 
-def sized(scene: Scene) -> Sizing:
-    """How large the elements of its meshes are to be."""
-    return Sizing(scene.pore.width, resolution(scene), film(scene), scene.numerics.gradation)
+def sized(scene: Scene, front: float = 1.0) -> Sizing:
+    """How large the elements of its meshes are to be; front: as :class:`Pore`'s."""
+    return Sizing(scene.pore.width, resolution(scene), film(scene), scene.numerics.gradation, front)
 
 
-def generate(scene: Scene, outline: Outline | None) -> tuple[Mesh, Outline | None]:
+def generate(scene: Scene, outline: Outline | None, front: float = 1.0) -> tuple[Mesh, Outline | None]:
     """A new mesh around the aggregate (None: a clean channel) with the extent of 3.1, and the outline with the nodes
     that it has there. Raises MeshError where that cannot be."""
     numerics = scene.numerics
     whole = numerics.extent == "full"
     ends = sizing.meshed_extent(outline, scene.pore.width, scene.pore.length, whole)
     method = Method(numerics.solver, numerics.ordering)
-    return mesher.generate(outline, ends, sized(scene), numerics.geometry, method)
+    return mesher.generate(outline, ends, sized(scene, front), numerics.geometry, method)
 
 
-def seeded(scene: Scene) -> Pore:
-    """The pore at t = 0: X_A = X_m in the aggregate (Table 1), or a clean channel."""
+def seeded(scene: Scene, front: float = 1.0) -> Pore:
+    """The pore at t = 0: X_A = X_m in the aggregate (Table 1), or a clean channel; front: as :class:`Pore`'s."""
     numerics, outline = scene.numerics, None
     if scene.aggregate:
-        across = sizing.ACROSS_AGGREGATE * resolution(scene)
+        across = sizing.ACROSS_AGGREGATE * resolution(scene) * front
         outline = half_disc(scene.aggregate.radius, across, numerics.geometry)
-    mesh, outline = generate(scene, outline)
+    mesh, outline = generate(scene, outline, front)
     space = Space(mesh, numerics.order)
     density = scene.kinetics.maximum_density if scene.kinetics else 0.0
     active = density * space.reaction.dx
@@ -157,7 +159,8 @@ def seeded(scene: Scene) -> Pore:
         wall, fixed = outline.wall, outline.fixed
     body = material(space, mesh.points[mesh.body])
     theta = np.ones((np.count_nonzero(mesh.biomass), len(body.shape.table.weights)))
-    return Pore(0.0, space, wall, fixed, active, np.zeros_like(active), theta, body, np.zeros(mesh.corners))
+    return Pore(0.0, space, wall, fixed, active, np.zeros_like(active), theta, body, np.zeros(mesh.corners),
+                front=front)
 
 
 def material(space: Space, reference: np.ndarray) -> growth.Body:

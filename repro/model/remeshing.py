@@ -6,15 +6,21 @@ from dataclasses import replace
 
 import numpy as np
 
+from repro.errors import StageError, Unresolved
 from repro.fem import sizing, transfer
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
 from repro.fem.transfer import Located
 from repro.model import biomass, mesh_motion, pore
 from repro.model.biomass import Amounts
-from repro.model.pore import Pore
+from repro.model.pore import Pore, Solved
 from repro.model.transport import Concentrations
 from repro.scene import Scene, Substrate
+
+#: What element sizes at the aggregate are divided by at most, for a front of the substrates.
+MOST_GRADED = 4.0
+#: Factors of the refinement that are tried where that is not enough, and the largest refinement that scenes accept.
+TRIED, MOST_REFINED = (1.5, 2.0, 3.0, 4.0, 6.0), 20.0
 
 
 def new_mesh(scene: Scene, now: Pore, expanded: Pore, speed: float) -> tuple[Pore, bool]:
@@ -28,6 +34,45 @@ def new_mesh(scene: Scene, now: Pore, expanded: Pore, speed: float) -> tuple[Por
     if mesh is not None:
         return replace(expanded, space=Space(mesh, now.space.order)), False
     return remesh(scene, now, expanded, speed)[0], True
+
+
+def resolved(scene: Scene, now: Pore) -> tuple[Pore, Solved]:
+    """The pore with what is solved in it; with order 2 and 3 on a mesh that is graded to a front of the substrates,
+    where the present one is too coarse for it. Raises Unresolved where that does not do."""
+    while True:
+        try:
+            return now, pore.solve(scene, now)
+        except Unresolved as error:
+            finer = graded(scene, now)
+            if finer is None:
+                raise Unresolved(f"{error}; {_advice(scene, now)}") from None
+            now = finer
+
+
+def graded(scene: Scene, now: Pore) -> Pore | None:
+    """The same pore on elements half as large at the aggregate; None where they have been halved often enough."""
+    front = 2 * now.front
+    if scene.numerics.order == 1 or front > MOST_GRADED:
+        return None
+    if now.time == 0:
+        return pore.seeded(scene, front)
+    return remesh(scene, now, replace(now, front=front), 0.0)[0]
+
+
+def _advice(scene: Scene, now: Pore) -> str:
+    """A numerics.refinement with which the present state can be solved, found by trying."""
+    for factor in TRIED:
+        wanted = round(factor * pore.resolution(scene), 2)
+        if wanted > MOST_REFINED:
+            break
+        finer = replace(scene, numerics=replace(scene.numerics, refinement=wanted))
+        try:
+            trial = pore.seeded(finer, now.front) if now.time == 0 else remesh(finer, now, now, 0.0)[0]
+            pore.solve(finer, trial)
+        except StageError:
+            continue
+        return f"numerics.refinement = {wanted:g} resolves it"
+    return f"no numerics.refinement up to {MOST_REFINED:g} was found that resolves it"
 
 
 def followed(scene: Scene, now: Pore, expanded: Pore) -> Mesh | None:
@@ -51,7 +96,7 @@ def remesh(scene: Scene, now: Pore, expanded: Pore, speed: float, others: Amount
     theta restarts as J times the density over X_m: the expansion that brings each density back to X_m, so that the
     error of the constraint is worked off at the next update and does not accumulate [E7].
     """
-    mesh, outline = pore.generate(scene, expanded.outline)
+    mesh, outline = pore.generate(scene, expanded.outline, expanded.front)
     old, new = expanded.mesh, Space(mesh, now.space.order)
     at = transfer.located(old.points, old.cells[old.biomass], mesh.points[mesh.body])
     body = _material(new, expanded, outline.origin, at)
@@ -61,7 +106,7 @@ def remesh(scene: Scene, now: Pore, expanded: Pore, speed: float, others: Amount
     inside = mesh.body < mesh.corners
     pressure[mesh.topology.body_corners] = at.field(expanded.pressure, old.triangles[old.biomass], 1)[inside]
     found = Pore(expanded.time, new, outline.wall, outline.fixed, amounts[0], amounts[1], np.empty(0), body, pressure,
-                 carried_substrates(scene, now.space, new, expanded.concentrations, speed))
+                 carried_substrates(scene, now.space, new, expanded.concentrations, speed), expanded.front)
     return replace(found, theta=expansion(scene, found)), amounts[2:]
 
 

@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from repro.errors import TransportError
+from repro.errors import TransportError, Unresolved
 from repro.fem.assembly import ElementSystem, Factored, each, mass
 from repro.fem.mesh import Mesh
 from repro.fem.newton import Newton, relative
@@ -34,15 +34,12 @@ from repro.timing import timed
 
 #: Newton stops at this residual against the size of its terms, or at the second where round-off keeps it from falling.
 NEWTON, ROUND_OFF, MOST_ITERATIONS = 1e-13, 1e-12, 60
-#: Parts of a step of Newton's method that are tried, and by how much of them the residual must fall.
-LENGTHS, FALL = 0.5 ** np.arange(8), 1e-4
-#: A concentration below zero by more than this part of the larger supply is not resolved. Where a substrate is used up
-#: behind a front of 2 um, the coarsest preset has -1.6e-4, with effluents right to 5e-5 of the supply.
+#: No fraction m is larger than this in an iterate, so that C = K m / (1 - m) is finite.
+SATURATED = 0.9
+#: A concentration below zero by more than this part of its supply is not resolved.
 UNRESOLVED = 1e-3
 #: Neither is one above its supply by more than this part of it.
 OVERSHOOT = 0.02
-#: Linear concentrations with a lumped reaction below zero by less than this part of the supply are so by round-off.
-NEGATIVE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,11 +78,6 @@ class Problem:
     def supply(self) -> np.ndarray:
         """(2n,) mg/L, of the acceptor at all nodes, then of the donor."""
         return np.repeat([s.supply for s in self.both], self.space.count)
-
-    @property
-    def floor(self) -> float:
-        """How far (mg/L) below zero a concentration may be: a lumped reaction of linear ones keeps them positive."""
-        return 0.0 if self.space.order == 1 else UNRESOLVED * max(s.supply for s in self.both)
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,9 +187,11 @@ def supplied_everywhere(problem: Problem) -> Concentrations:
 
 @dataclass(frozen=True, eq=False)
 class Iterate:
-    """Both concentrations (2n,), their residual and the size of its terms, um2 mg/L/h."""
+    """Both concentrations (2n,); the fractions m_A and m_D (2, r, q) about which the uptake is linearised; the residual
+    at the concentrations and the size of its terms, um2 mg/L/h."""
 
     state: np.ndarray
+    fractions: np.ndarray
     residual: np.ndarray
     size: np.ndarray
     free: np.ndarray | slice
@@ -210,31 +204,35 @@ class Iterate:
         """Largest residual of a free node against the size of its row's terms."""
         return relative(self.residual[self.free], self.size[self.free])
 
-    @property
-    def length(self) -> float:
-        """Of the residual at free nodes."""
-        return float(np.linalg.norm(self.residual[self.free]))
-
 
 @dataclass(frozen=True, eq=False)
 class Balance:
     """The equations of a problem with a sink (None: nothing is taken up), as Newton's method asks for them.
 
-    extended: uptake below zero as :mod:`repro.model.kinetics` has it for iterates; shortened: steps are cut until the
-    residual falls.
+    Uptake is a function of max(C, 0) through the fractions m = C / (C + K). Where half saturations are far below the
+    supply that is nearly a step, and Newton's method in C goes from one side of it to the other. So every point of the
+    reaction has a fraction m of its own, about which C = K m / (1 - m) is linearised: slope dm/dC = (1 - m)^2 / K. Where
+    m is over one half it is C's own, which is Newton's method in C; below that it follows the linearisation from 0 up,
+    as in primal-dual active-set methods (Hintermueller, Ito and Kunisch 2002).
     """
 
     problem: Problem
     sink: Sink | None
-    extended: bool = True
-    shortened: bool = False
 
-    def _at(self, state: np.ndarray):
-        """C_A and C_D (r, q) in the points of the reaction, and the laws."""
-        problem = self.problem
-        pieces = problem.space.reaction
-        acceptor, donor = state.reshape(2, -1)[:, pieces.cells] @ pieces.values.T
-        return acceptor, donor, problem.substrates, problem.kinetics
+    def at(self, state: np.ndarray) -> np.ndarray:
+        """(2, r, q) C_A and C_D in the points of the reaction."""
+        pieces = self.problem.space.reaction
+        return state.reshape(2, -1)[:, pieces.cells] @ pieces.values.T
+
+    @property
+    def _half(self) -> np.ndarray:
+        """(2, 1, 1) mg/L, K_sA and K_sD."""
+        return np.array([s.half_saturation for s in self.problem.both])[:, None, None]
+
+    def fractions(self, concentrations: np.ndarray) -> np.ndarray:
+        """m of max(C, 0), shaped as C."""
+        positive = np.maximum(concentrations, 0.0)
+        return positive / (positive + self._half)
 
     def _taken(self, loads: np.ndarray) -> np.ndarray:
         """(2n,) sum of loads (r, 2, q) times the nodal functions."""
@@ -244,7 +242,7 @@ class Balance:
 
     def uptake(self, state: np.ndarray) -> np.ndarray:
         """(r, 2, q) um2 mg/L/h."""
-        return self.sink.uptake(*self._at(state), self.extended)
+        return self.sink.uptake(self.fractions(self.at(state)), self.problem.kinetics)
 
     def residual(self, state: np.ndarray) -> np.ndarray:
         """(2n,) um2 mg/L/h for C_A, then C_D, of all nodes (2n,), mg/L."""
@@ -261,68 +259,68 @@ class Balance:
         loads = np.abs(self.uptake(state)) @ np.abs(pieces.values)
         return found + np.bincount(nodes.ravel(), loads.ravel(), 2 * count)
 
-    def tangent(self, state: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Element matrices, um2/h, of the residual's derivative: of both substrates and of their uptake."""
-        slopes = {}
-        if self.sink is not None:
-            by = self.sink.slopes(*self._at(state), self.extended)
-            slopes = {(i, j): by[i][j] for i, j in np.ndindex(2, 2)}
-        return *self.problem.matrices, self._coupled(slopes)
+    def _slopes(self, state: np.ndarray, fractions: np.ndarray) -> np.ndarray:
+        """(2, r, q) dm/dC at the fractions; zero where nothing is there to be taken up."""
+        empty = (fractions <= 0) & (self.at(state) <= 0)
+        return np.where(empty, 0.0, (1 - fractions) ** 2 / self._half)
 
-    def _coupled(self, slopes: dict[tuple[int, int], np.ndarray]) -> np.ndarray:
-        """(r, 2k, 2k) of the derivatives (r, q) of the uptake of i by the concentration of j, um2/h."""
+    def tangent(self, state: np.ndarray, fractions: np.ndarray | None = None) -> tuple[np.ndarray, ...]:
+        """Element matrices, um2/h, of the residual's derivative: of both substrates and of their uptake."""
+        if self.sink is None:
+            return *self.problem.matrices, self._coupled(None)
+        about = self.fractions(self.at(state)) if fractions is None else fractions
+        by = self.sink.slopes(about, self.problem.kinetics)
+        return *self.problem.matrices, self._coupled(by * self._slopes(state, about))
+
+    def _coupled(self, slopes: np.ndarray | None) -> np.ndarray:
+        """(r, 2k, 2k) um2/h from the derivatives (2, 2, r, q) of the uptake of i by the concentration of j."""
         pieces = self.problem.space.reaction
         count, k = pieces.cells.shape
-        products = (pieces.values[:, :, None] * pieces.values[:, None, :]).reshape(len(pieces.values), -1)
         found = np.zeros((count, 2 * k, 2 * k))
-        for (i, j), slope in slopes.items():
-            found[:, i * k: i * k + k, j * k: j * k + k] = (slope @ products).reshape(count, k, k)
+        if slopes is not None:
+            products = (pieces.values[:, :, None] * pieces.values[:, None, :]).reshape(len(pieces.values), -1)
+            for i, j in np.ndindex(2, 2):
+                found[:, i * k: i * k + k, j * k: j * k + k] = (slopes[i, j] @ products).reshape(count, k, k)
         return found
 
     def begun(self, state: np.ndarray) -> Iterate:
         """The first iterate."""
-        return Iterate(state, self.residual(state), self.sizes(state), self.problem.system.free)
+        fractions = np.zeros((2, 1, 1)) if self.sink is None else self.fractions(self.at(state))
+        return Iterate(state, fractions, self.residual(state), self.sizes(state), self.problem.system.free)
 
     def factored(self, iterate: Iterate) -> Factored:
         """The derivative, factorised."""
-        return self.problem.system.factored(self.tangent(iterate.state))
+        return self.problem.system.factored(self.tangent(iterate.state, iterate.fractions))
 
     def advanced(self, iterate: Iterate, factors: Factored, fresh: bool) -> Iterate:
-        """A step of Newton's method where it lowers the residual and nothing is negative, else :meth:`swept`; sizes of
-        the terms are those of the first guess, then those after the first step of each derivative."""
-        step = factors.solve(-iterate.residual)
-        new = self._shorter(iterate, step) if self.shortened else self._full(iterate, step)
-        return replace(new, size=self.sizes(new.state)) if fresh else new
+        """A step of Newton's method; sizes of the terms are those of the first guess, then those after the first step
+        of each derivative."""
+        state = iterate.state + factors.solve(-self._linearised(iterate))
+        fractions = iterate.fractions if self.sink is None else self._followed(iterate, state)
+        size = self.sizes(state) if fresh else iterate.size
+        return replace(iterate, state=state, fractions=fractions, residual=self.residual(state), size=size)
 
-    def _tried(self, iterate: Iterate, state: np.ndarray) -> Iterate:
-        return replace(iterate, state=state, residual=self.residual(state))
+    def _linearised(self, iterate: Iterate) -> np.ndarray:
+        """(2n,) the residual with the uptake that the linearisation about the fractions gives."""
+        if self.sink is None:
+            return iterate.residual
+        m, law = iterate.fractions, self.problem.kinetics
+        apart = self._predicted(iterate, iterate.state) - m
+        loads = self.sink.uptake(m, law) + np.einsum("ijrq,jrq->riq", self.sink.slopes(m, law), apart)
+        return self.problem.operator @ iterate.state - self.problem.source + self._taken(loads)
 
-    def _full(self, iterate: Iterate, step: np.ndarray) -> Iterate:
-        trial = self._tried(iterate, iterate.state + step)
-        if trial.length > iterate.length or trial.state.min() < -self.problem.floor:
-            return self._tried(iterate, self.swept(np.maximum(iterate.state, 0.0)))
-        return trial
+    def _predicted(self, iterate: Iterate, state: np.ndarray) -> np.ndarray:
+        """(2, r, q) fractions at other concentrations by the linearisation."""
+        m = iterate.fractions
+        return m + self._slopes(iterate.state, m) * (self.at(state) - self._half * m / (1 - m))
 
-    def _shorter(self, iterate: Iterate, step: np.ndarray) -> Iterate:
-        """The longest part of a step that lowers the residual."""
-        for length in LENGTHS:
-            trial = self._tried(iterate, iterate.state + length * step)
-            if trial.length <= (1 - FALL * length) * iterate.length:
-                return trial
-        return self._tried(iterate, self.swept(np.maximum(iterate.state, 0.0)))
-
-    def swept(self, state: np.ndarray) -> np.ndarray:
-        """(2n,) solution with the uptake's coefficients q(C) / C frozen at the state, which keeps what is positive so,
-        as far as functions of higher order can."""
-        per = {}
-        if self.sink is not None:
-            at = self._at(state)
-            taken, slopes = self.sink.uptake(*at, True), self.sink.slopes(*at, True)
-            for k, c in enumerate(at[:2]):
-                tiny = 1e-9 * self.problem.both[k].half_saturation
-                per[k, k] = np.where(c > tiny, taken[:, k] / np.maximum(c, tiny), slopes[k][k])
-        elements = *self.problem.matrices, self._coupled(per)
-        return self.problem.system.solve(elements, self.problem.source, state)
+    def _followed(self, iterate: Iterate, state: np.ndarray) -> np.ndarray:
+        """(2, r, q) fractions about which to linearise next."""
+        there = self.at(state)
+        own, predicted = self.fractions(there), np.clip(self._predicted(iterate, state), 0.0, SATURATED)
+        woken = (iterate.fractions <= 0) & (predicted <= 0) & (there > 0)
+        predicted = np.where(woken, np.minimum(there / self._half, 0.5), predicted)
+        return np.where((predicted > 0.5) & (there > 0), own, np.minimum(predicted, SATURATED))
 
 
 @timed("transport")
@@ -330,10 +328,10 @@ def steady(problem: Problem, sink: Sink | None, guess: Concentrations | None = N
     """Steady concentrations by Newton's method on both substrates at once.
 
     sink: what takes them up, None without biomass; guess: at the problem's nodes, C_supply everywhere by default. Where
-    the method does not converge, as behind a sharp front, it starts again from the supply with shorter steps, and half
-    saturations come down from the supply to what they are, a tenth at a time. Raises TransportError where that fails
-    too, or where a concentration is outside of zero to the supply by more than UNRESOLVED and OVERSHOOT say: the mesh
-    is too coarse for its front.
+    the method does not converge, as behind a sharp front, it starts again from the supply, and half saturations come
+    down from the supply to what they are, a tenth at a time. Raises TransportError where that fails too, and Unresolved
+    where a concentration is outside of zero to the supply by more than UNRESOLVED and OVERSHOOT say, or where uptake
+    is not resolved: the mesh is too coarse for its front.
     """
     if problem.kinetics is None:
         sink = None
@@ -344,10 +342,7 @@ def steady(problem: Problem, sink: Sink | None, guess: Concentrations | None = N
         found, count = _found(Balance(problem, sink), state)
     except TransportError:
         found, count = _eased(problem, sink, supply)
-    if sink is not None and found.min() < 0:
-        found, more = _found(Balance(problem, sink, extended=False), found)
-        count += more
-    return _checked(problem, sink, found, count)
+    return _checked(problem, found, count)
 
 
 def _found(balance: Balance, state: np.ndarray) -> tuple[np.ndarray, int]:
@@ -366,8 +361,8 @@ def _eased(problem: Problem, sink: Sink | None, state: np.ndarray) -> tuple[np.n
     total = 0
     for factor in 10.0 ** np.arange(np.ceil(-np.log10(least)), -1, -1):
         acceptor, donor = (_softened(substrate, factor) for substrate in problem.both)
-        eased = replace(problem, substrates=replace(problem.substrates, acceptor=acceptor, donor=donor))
-        state, iterations = _found(Balance(eased, sink, shortened=True), state)
+        eased = replace(problem, substrates=replace(problem.substrates, acceptor=acceptor, donor=donor), reused=False)
+        state, iterations = _found(Balance(eased, sink), state)
         total += iterations
     return state, total
 
@@ -378,14 +373,10 @@ def _softened(substrate: Substrate, factor: float) -> Substrate:
     return replace(substrate, half_saturation=half)
 
 
-def _checked(problem: Problem, sink: Sink | None, state: np.ndarray, iterations: int) -> Concentrations:
-    """The solution, if it stays between zero and the supply as well as it has to. Linear concentrations that are below
-    zero by round-off are swept once, which keeps a non-negative right-hand side's solution non-negative."""
-    round_off = NEGATIVE * max(s.supply for s in problem.both)
-    if problem.floor == 0 and -round_off <= state.min() < 0:
-        state = Balance(problem, sink).swept(np.maximum(state, 0.0))
+def _checked(problem: Problem, state: np.ndarray, iterations: int) -> Concentrations:
+    """The solution, if it stays between zero and the supply as well as it has to."""
     for name, field, substrate in zip(("acceptor", "donor"), state.reshape(2, -1), problem.both):
-        if field.min() < -problem.floor:
+        if field.min() < -UNRESOLVED * substrate.supply:
             raise _outside(problem, name, field, int(field.argmin()), substrate)
         if problem.space.order > 1 and field.max() > (1 + OVERSHOOT) * substrate.supply:
             raise _outside(problem, name, field, int(field.argmax()), substrate)
@@ -393,10 +384,10 @@ def _checked(problem: Problem, sink: Sink | None, state: np.ndarray, iterations:
     return Concentrations(acceptor, donor, iterations)
 
 
-def _outside(problem: Problem, name: str, field: np.ndarray, node: int, substrate: Substrate) -> TransportError:
+def _outside(problem: Problem, name: str, field: np.ndarray, node: int, substrate: Substrate) -> Unresolved:
     x, y = problem.space.points[node]
-    return TransportError(f"the {name} is {field[node]:.3g} mg/L at x = {x:.4g}, y = {y:.4g} um, outside of 0 to "
-                          f"{substrate.supply:g}; the mesh is too coarse there: try a larger numerics.refinement")
+    return Unresolved(f"the {name} is {field[node]:.3g} mg/L at x = {x:.4g}, y = {y:.4g} um, outside of 0 to "
+                      f"{substrate.supply:g} mg/L; the mesh is too coarse there")
 
 
 @dataclass(frozen=True)
@@ -417,7 +408,7 @@ def fluxes(problem: Problem, sink: Sink | None, state: Concentrations) -> tuple[
     space, both = problem.space, np.stack([state.acceptor, state.donor])
     consumed, out = np.zeros(2), both @ problem.outflow
     if sink is not None and problem.kinetics is not None:
-        consumed = Balance(problem, sink, extended=False).uptake(both.ravel()).sum(axis=(0, 2))
+        consumed = Balance(problem, sink).uptake(both.ravel()).sum(axis=(0, 2))
     supplied = problem.source.reshape(2, -1).sum(axis=1)
     if problem.system.held.any():
         through = (problem.operator @ both.ravel()).reshape(2, -1)

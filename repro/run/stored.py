@@ -14,6 +14,7 @@ from repro.fem.space import Space
 from repro.march.loop import Ledger, State
 from repro.march.pace import Pace
 from repro.model.pore import Pore, material
+from repro.model.remeshing import MOST_GRADED
 from repro.model.transport import Concentrations
 from repro.scene import Scene, scene_hash
 
@@ -26,7 +27,7 @@ ARRAYS = {"points": ("f", "N", 2), "cells": ("i", "T", "G"), "biomass": ("b", "T
 #: No expansion, concentration or other number of a state is as large.
 LARGEST = 1e9
 GUESS = {"acceptor": ("f", "D"), "donor": ("f", "D")}
-PLAIN = {"scene", "time_h", "pace", "ends_um", "guess", "ledgers", "remeshes", "iterations"}
+PLAIN = {"scene", "time_h", "pace", "ends_um", "front", "guess", "ledgers", "remeshes", "iterations"}
 
 
 def packed(scene: Scene, state: State) -> tuple[dict, dict[str, np.ndarray]]:
@@ -38,7 +39,7 @@ def packed(scene: Scene, state: State) -> tuple[dict, dict[str, np.ndarray]]:
     if guess:
         arrays |= {name: getattr(guess, name) for name in GUESS}
     return {"scene": scene_hash(scene), "time_h": now.time, "pace": list(astuple(state.pace)),
-            "ends_um": [float(x) for x in now.mesh.ends], "guess": guess.iterations if guess else None,
+            "ends_um": [float(x) for x in now.mesh.ends], "front": float(now.front), "guess": guess.iterations if guess else None,
             "ledgers": [_numbers(ledger) for ledger in state.ledgers], "remeshes": int(state.remeshes),
             "iterations": state.iterations}, arrays
 
@@ -55,6 +56,7 @@ def unpacked(scene: Scene, plain: dict, arrays: dict[str, np.ndarray]) -> State:
     _refuse(not in_range(plain["time_h"], 0.0, scene.growth.end if scene.growth else 0.0), "its time")
     _refuse(not (counted(plain["remeshes"]) and counts(plain["iterations"])), "its counts")
     _refuse(plain["guess"] is not None and not counted(plain["guess"]), "its counts")
+    _refuse(not in_range(plain["front"], 1.0, MOST_GRADED), "its element sizes")
     _check(scene, plain, arrays)
     pore = _pore(scene, plain, arrays)
     return State(pore, _pace(plain["pace"]), _ledgers(plain["ledgers"]), plain["remeshes"], plain["iterations"])
@@ -151,7 +153,8 @@ def _pore(scene: Scene, plain: dict, arrays: dict[str, np.ndarray]) -> Pore:
     if mesh.biomass.any():
         _refuse(not body.at.dx.min() > 0, "a triangle's place at t = 0")
     own = {name: arrays[name] for name in ("wall", "fixed", "active", "inert", "theta", "pressure")}
-    return Pore(time=plain["time_h"], space=space, body=body, **own, concentrations=_guess(plain, arrays))
+    return Pore(time=plain["time_h"], space=space, body=body, **own, concentrations=_guess(plain, arrays),
+                front=plain["front"])
 
 
 def _check_sizes(space: Space, plain: dict, arrays: dict[str, np.ndarray]) -> None:
