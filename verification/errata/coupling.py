@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from repro.fem.mesh import triangle_areas
-from repro.march import coupling
-from repro.model import kinetics, pore, remeshing, shape
+from repro.fem.space import Space
+from repro.march import updates
+from repro.model import contact, pore, remeshing
 from verification.claims.mass_balance import bookkeeping
 from verification.claims.runs import BASE, WIDE, at, fields, scene, series
 from verification.claims.states import saved_mesh
@@ -62,19 +62,19 @@ def density_drift() -> dict[str, str]:
 def drift_restarting_as_j(said) -> np.ndarray:
     """Largest |X / X_m - 1| at each shape update of a run whose theta restarts as J at a remesh."""
     pores = (now for now, _ in march(said, step_restarting_as_j))
-    return np.array([np.abs(density(said, now)[now.mesh.body] - 1).max() for now in pores])
+    return np.array([np.abs(density(said, now) - 1).max() for now in pores])
 
 
 def density_rms(saved) -> float:
     """Root of the mean square of X / X_m - 1 over the aggregate, from saved fields."""
     grid = saved_mesh(saved, 0.0)
     deviation = saved.point_data["active_biomass"] + saved.point_data["inert_biomass"] - 1
-    return float(np.sqrt(np.average(deviation**2, weights=grid.lumped(grid.biomass))))
+    return float(np.sqrt(np.average(deviation**2, weights=Space(grid, 1).lumped(grid.biomass))))
 
 
 def march(said, advance: Callable) -> Iterator[tuple]:
     """(pore, its solution) at each shape update of a scene whose step is ``advance(said, now, solved, hours)``."""
-    now, times = pore.seeded(said), coupling.schedule(said)[0]
+    now, times = pore.seeded(said), updates.schedule(said)[0]
     solved = pore.solve(said, now)
     yield now, solved
     for time in times[1:]:
@@ -85,18 +85,17 @@ def march(said, advance: Callable) -> Iterator[tuple]:
 
 
 def density(said, now) -> np.ndarray:
-    """(N,) (X_A + X_I) / X_m."""
-    return (now.active + now.inert) / said.kinetics.maximum_density
+    """(r, q) (X_A + X_I) / X_m, in the points of the reaction."""
+    return (now.active + now.inert) / now.space.reaction.dx / said.kinetics.maximum_density
 
 
 def step_restarting_as_j(said, now, solved, hours: float):
     """The pore after one step; after a remesh theta = J."""
-    done = coupling.step(said, now, solved, hours)
+    done = updates.step(said, now, solved, hours)
     if not done.remeshed:
         return done.pore
-    grid = done.pore.mesh
-    before = triangle_areas(done.pore.origin, grid.triangles[grid.biomass])
-    return replace(done.pore, theta=grid.areas[grid.biomass] / before)
+    after = done.pore
+    return replace(after, theta=after.body.strained(after.mesh.points[after.mesh.body]).J)
 
 
 @erratum(
@@ -176,10 +175,8 @@ def explicit_increment() -> dict[str, str]:
 
 def explicit_step(said, now, solved, hours: float):
     """The pore after one step with dX_A = dt F_3 and dX_I = dt F_4 at the rates of its beginning, (28)-(29)."""
-    state = solved.concentrations
-    gain = now.active * hours * kinetics.growth_rate(state.acceptor, state.donor, said.substrates, said.kinetics)
-    remains = now.active * hours * kinetics.inert_rate(state.acceptor, said.substrates, said.kinetics)
+    rates = updates.rates_of(said, now, solved.concentrations)
+    gain, remains = (now.active * hours * rate for rate in (rates.growth, rates.remains))
     grown = replace(now, active=now.active + gain, inert=now.inert + remains)
-    share = (gain + remains)[now.mesh.triangles[now.mesh.biomass]].mean(axis=1) / said.kinetics.maximum_density
-    expanded, *_ = shape.expand(said, grown, now.theta * (1 + share))
-    return remeshing.new_mesh(said, now, expanded, solved)[0]
+    expanded, *_ = contact.expand(said, grown, updates.enlarged(said, now, grown))
+    return remeshing.new_mesh(said, now, expanded, solved.flow.mean_velocity)[0]

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from repro.fem import assembly, geometry, mesh
-from repro.fem.mesh import PoreMesh
+from repro.fem.assembly import saddle_system
+from repro.fem.mesh import Mesh
+from repro.fem.mesher import generate
+from repro.fem.outline import BOTTOM, TOP, Outline
+from repro.fem.space import Space
 from repro.model import flow, pore
 from verification.claims.runs import BASE, scene
 from verification.claims.states import half_disc
@@ -50,26 +53,27 @@ def interface_forms() -> dict[str, str]:
             "velocity": f"{state(TRACTION)[0]:.3f}", "deviation": percent(state(TRACTION)[0] / state(BASE)[0])}
 
 
-def losses(grid: PoreMesh) -> dict[str, float]:
+def losses(grid: Mesh) -> dict[str, float]:
     """Loss (1/um) of the whole pore of 600 um in both forms."""
     rest = flow.poiseuille_loss(600 - float(np.ptp(grid.ends)), grid.width)
-    return {form: flow.unit_flow(grid, 2000.0, interface=form).loss + rest for form in ("laplacian", "traction")}
+    space = Space(grid, 1)
+    return {form: flow.unit_flow(space, 2000.0, interface=form).loss + rest for form in ("laplacian", "traction")}
 
 
-def interface_difference(grid: PoreMesh) -> str:
+def interface_difference(grid: Mesh) -> str:
     """Traction against laplacian head loss."""
     found = losses(grid)
     return percent(found["traction"] / found["laplacian"])
 
 
-def plug(said, length: float) -> PoreMesh:
+def plug(said, length: float) -> Mesh:
     """Biomass over the pore's whole width and a length (um), meshed to 1.5 W on both sides."""
     half, width = length / 2, said.pore.width
     points = np.array([[-half, 0.0], [half, 0.0], [half, width], [-half, width]])
-    wall = np.repeat([geometry.BOTTOM, geometry.TOP], 2)
-    outline = geometry.Outline(points, wall, np.zeros(4, bool), points)
+    wall = np.repeat([BOTTOM, TOP], 2)
+    outline = Outline(points, wall, np.zeros(4, bool), points)
     ends = -half - 1.5 * width, half + 1.5 * width
-    return mesh.generate(outline, ends, pore.sizing(said))[0]
+    return generate(outline, ends, pore.sized(said))[0]
 
 
 @erratum(
@@ -92,8 +96,8 @@ def outlet() -> dict[str, str]:
     rows = []
     for refinement in (1.0, 2.0):
         said = scene("flow_only", f"numerics.refinement={refinement}")
-        grid, _ = mesh.generate(None, (-75.0, 75.0), pore.sizing(said))
-        found = {form: flow.unit_flow(grid, 1.0, interface=form) for form in ("laplacian", "traction")}
+        grid, _ = generate(None, (-75.0, 75.0), pore.sized(said))
+        found = {form: flow.unit_flow(Space(grid, 1), 1.0, interface=form) for form in ("laplacian", "traction")}
         cases = {"laplacian (ours)": (found["laplacian"].velocity, found["laplacian"].loss),
                  "traction, u_y = 0 at the outlet": (found["traction"].velocity, found["traction"].loss),
                  "traction, u_y free at the outlet": free_outlet(grid)}
@@ -103,23 +107,15 @@ def outlet() -> dict[str, str]:
     return {"table": table(["form", "refinement", "largest u_y", "head loss"], rows)}
 
 
-def free_outlet(grid: PoreMesh) -> tuple[np.ndarray, float]:
+def free_outlet(grid: Mesh) -> tuple[np.ndarray, float]:
     """Velocity and loss of unit flow in a clean channel, traction form, nothing prescribed at the outlet."""
-    found, count = flow.forms(grid), len(grid.points)
+    space, count, topology = Space(grid, 1), len(grid.points), grid.topology
     held = np.zeros((count, 2), bool)
-    held[grid.walls] = held[grid.inlet] = True
-    dofs = found.cells
-    lower = assembly.each(grid.circumdiameter**2 / 100.0, found.pressure_laplace)
-    elements = assembly.saddle_blocks(symmetric_viscous(found), found.divergence, lower)
-    value = np.zeros(3 * count)
-    value[grid.inlet] = flow.inlet_profile(grid, grid.points[grid.inlet, 1])
-    solution = assembly.saddle_system(dofs, dofs, held).solve(elements, np.zeros(3 * count), value)
-    ends = [np.trapezoid(solution[2 * count + nodes], grid.points[nodes, 1]) for nodes in (grid.inlet, grid.outlet)]
+    held[topology.walls] = held[topology.inlet] = True
+    viscosity = np.ones(len(grid.triangles))
+    elements = flow.stokes(space, viscosity, "traction", flow.Stabilised().mobility(grid, viscosity, "traction"))
+    system = saddle_system(space.cells, space.cells, held)
+    solution = system.solve(elements, np.zeros(3 * count), flow.prescribed(space))
+    ends = [np.trapezoid(solution[2 * count + nodes], grid.points[nodes, 1])
+            for nodes in (topology.inlet, topology.outlet)]
     return solution[: 2 * count].reshape(2, -1).T, float(ends[0] - ends[1]) / grid.width
-
-
-def symmetric_viscous(found: flow.Forms) -> np.ndarray:
-    """(T, 6, 6) element matrices of (grad u + grad u^T, grad v)."""
-    k = np.ones(found.basis.dx.shape)
-    xx, xy, yx, yy = (assembly.local(flow.stiffness, found.basis, k=k, i=i, j=j) for i in (0, 1) for j in (0, 1))
-    return np.block([[found.laplace + xx, xy], [yx, found.laplace + yy]])

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from repro.fem import geometry, mesh, reprojection
+from repro.fem import transfer
 from repro.fem.mesh import triangle_areas
+from repro.fem.mesher import generate
+from repro.fem.outline import half_disc as seed
+from repro.fem.sizing import ACROSS_AGGREGATE, Sizing
 from repro.model import mesh_motion
 from repro.results import read_table
 from verification.claims.runs import BASE, folder, scene
@@ -49,19 +52,21 @@ def biomass_defects(run) -> np.ndarray:
     return (after - before - made) / after
 
 
-def chain(transfer: str, radius: float = 30.0, decay: float = 6.0, count: int = 40) -> tuple[np.ndarray, float]:
+#: How the field of :func:`chain` goes to the next mesh.
+TRANSFER = {"linear": transfer.interpolated, "conserving": transfer.project}
+
+
+def chain(how: str, radius: float = 30.0, decay: float = 6.0, count: int = 40) -> tuple[np.ndarray, float]:
     """Masses (count + 1,) of a steep field through a chain of remeshes of one half-disc, and its largest value."""
-    outline, field, masses, largest, old = geometry.seed(radius), None, [], 0.0, ()
+    outline, field, masses, largest, old = seed(radius, ACROSS_AGGREGATE), None, [], 0.0, ()
     for k in range(count + 1):
         refinement = 1.0 + 0.3 * (0.618 * k % 1)
-        grid, _ = mesh.generate(outline, (-105.0, 105.0), geometry.Sizing(50.0, refinement, 2.0))
-        points, triangles = grid.points[grid.body], np.searchsorted(grid.body, grid.triangles[grid.biomass])
+        grid, _ = generate(outline, (-105.0, 105.0), Sizing(50.0, refinement, 2.0))
+        points, triangles = grid.points[grid.body], grid.topology.body_cells
         if field is None:
             field = np.exp((np.linalg.norm(points, axis=1) - radius) / decay)[:, None]
-        elif transfer == "linear":
-            field = reprojection.interpolate(*old, field, points)
         else:
-            field = reprojection.project(*old, field, points, triangles)
+            field = TRANSFER[how](*old, field, points, triangles)
         old, largest = (points, triangles), max(largest, float(field.max()))
         masses.append(float(triangle_areas(points, triangles) @ field[triangles, 0].mean(axis=1)))
     return np.array(masses), largest

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from repro.fem.space import Space
 from repro.model import kinetics
 from verification.claims.base_run import upstream_distance, upstream_means
 from verification.claims.mass_balance import bookkeeping
@@ -83,8 +84,8 @@ def plotted_biomass():
     """(weight, C_A, C_D) at the nodes of base at 19.2 h; weight: X_A times the biomass area around the node."""
     saved = fields_at(PLATES, PLOTTED)
     grid = saved_mesh(saved, scene(*PLATES).pore.width)
-    values = saved.point_data
-    return (grid.lumped(grid.biomass) * values["active_biomass"], values["acceptor_mg_per_L"], values["donor_mg_per_L"])
+    values, area = saved.point_data, Space(grid, 1).lumped(grid.biomass)
+    return area * values["active_biomass"], values["acceptor_mg_per_L"], values["donor_mg_per_L"]
 
 
 def decay_share(law) -> float:
@@ -104,7 +105,7 @@ def electron_defect(law, demand: float | None = None) -> float:
     weight, acceptor, donor = plotted_biomass()
     substrates = scene(*BASE).substrates
     used = law if demand is None else replace(law, decay_oxygen_demand=demand)
-    q_a, q_d, _ = kinetics.uptake(acceptor, donor, substrates, used)
+    q_a, q_d = kinetics.uptake(acceptor, donor, substrates, used)
     made = kinetics.growth_rate(acceptor, donor, substrates, law) + kinetics.inert_rate(acceptor, substrates, law)
     spent = float(weight @ q_a)
     return float(weight @ (q_a + law.decay_oxygen_demand * made - COD * q_d)) / spent
