@@ -53,3 +53,35 @@ def test_saddle_blocks_with_and_without_coupled_components():
     assert np.array_equal(found, saddle_blocks(pair, divergence, lower))
     assert np.array_equal(found[:, 6:, 6:], -lower) and np.array_equal(found[:, 6:, :6], -divergence)
     assert not saddle_blocks(one, divergence)[:, 6:, 6:].any()
+
+
+@pytest.mark.parametrize("held", [[], [0, 9], [4]])
+def test_other_unknowns_may_be_prescribed(held):
+    """Of the same elements: as a system made for them; the first one is left as it was. Mutants: what was prescribed
+    before stays so, the first system changed with the second."""
+    rank, prescribed = np.random.default_rng(7).permutation(10).astype(float), np.isin(np.arange(10), held)
+    first, fresh = (ElementSystem(KINDS, rank, at) for at in (np.arange(10) == 2, prescribed))
+    before, other = first.matrix(ELEMENTS).toarray(), first.holding(prescribed)
+    assert np.array_equal(other.matrix(ELEMENTS).toarray(), fresh.matrix(ELEMENTS).toarray())
+    right, value = np.arange(10.0), np.linspace(1, 2, 10)
+    assert np.array_equal(other.solve(ELEMENTS, right, value), fresh.solve(ELEMENTS, right, value))
+    assert np.array_equal(first.matrix(ELEMENTS).toarray(), before)
+
+
+@pytest.mark.parametrize("held", [[], [4]])
+def test_a_matrix_may_be_filled_from_entries_of_each_kind(held):
+    """What one kind adds is worked out apart. Mutant: entries of the first kind at the second one's places."""
+    system = ElementSystem(KINDS, np.arange(10.0)[::-1], np.isin(np.arange(10), held))
+    entries = sum(system.entries(which, part) for which, part in enumerate(ELEMENTS))
+    assert np.allclose(system.filled(entries).toarray(), system.matrix(ELEMENTS).toarray(), rtol=1e-14)
+    alone = system.filled(system.entries(0, ELEMENTS[0])).toarray()
+    assert np.allclose(alone, system.matrix((ELEMENTS[0], 0 * ELEMENTS[1])).toarray(), rtol=1e-14)
+
+
+def test_a_factorised_system_serves_many_right_hand_sides_and_values():
+    """Mutant: the first values kept."""
+    system = ElementSystem(KINDS, np.arange(10.0), np.isin(np.arange(10), [3]))
+    factors = system.factored(ELEMENTS)
+    for seed in (1, 2):
+        right, value = np.random.default_rng(seed).standard_normal((2, 10))
+        assert np.array_equal(factors.solve(right, value), system.solve(ELEMENTS, right, value))
