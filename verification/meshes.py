@@ -1,7 +1,7 @@
 """Meshes of rectangles for cases whose geometry is simpler than the paper's: random, and unrelated from size to size.
 
-Made without :mod:`repro.fem.mesh`: nodes on the given lines, a jittered lattice between them, one
-Delaunay triangulation.
+They are made without the package's mesher: nodes on the given lines, a jittered lattice between them, one Delaunay
+triangulation. Half-discs are the package's own.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import Delaunay
 
+from repro.fem import mesher, outline, sizing
 from repro.fem.mesh import Mesh, triangle_areas
 
 #: Displacement of the lattice's nodes, and the least distance of a lattice node from a line, over the element size.
@@ -54,3 +55,12 @@ def channel(ends, width: float, size: float, is_biomass, *, across=(), along=(),
     points, triangles = rectangle(ends, width, size, across=across, along=along, seed=seed)
     middle = points[triangles].mean(axis=1)
     return Mesh.of(points, triangles, is_biomass(*middle.T), np.empty(0, int), width, tuple(map(float, ends)))
+
+
+def half_disc(radius: float, refinement: float, ends, width: float, *, geometry: int = 1, lean: float = 0.0) -> Mesh:
+    """The package's mesh around a half-disc on the lower wall, straight (geometry 1) or curved (2), sheared by
+    ``lean``; a film of 2 um is the thinnest that is resolved."""
+    seed = outline.half_disc(radius, sizing.ACROSS_AGGREGATE * refinement, geometry)
+    points = seed.points + lean * seed.points[:, [1]] * [1.0, 0.0]
+    sheared = outline.Outline(points, seed.wall, seed.fixed, points, geometry)
+    return mesher.generate(sheared, ends, sizing.Sizing(width, refinement, 2.0), geometry)[0]

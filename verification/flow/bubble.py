@@ -16,7 +16,8 @@ from skfem import Basis, BilinearForm, ElementTriMini, ElementTriP1, ElementVect
 from skfem.helpers import ddot, div, grad, transpose
 
 from reference import layered_channel
-from repro.fem.mesh import PoreMesh
+from repro.fem.mesh import Mesh
+from repro.fem.space import Space
 from repro.model import flow
 from verification import norms
 from verification.case import Outcome, at_least, at_most, between, case
@@ -25,6 +26,7 @@ from verification.flow import grids, layers, properties
 
 RATIO = 2000.0
 DRAWS = (8, 6, 3, 1)
+STABILISED, BUBBLE = flow.Stabilised(), flow.Bubble()
 
 
 @BilinearForm
@@ -45,7 +47,7 @@ def continuity(u, q, w):
     return q * div(u)
 
 
-def uncondensed(grid: PoreMesh, ratio: float, form, interface: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def uncondensed(grid: Mesh, ratio: float, form, interface: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Velocity (N, 2) at the nodes, mean velocity (T, 2), bubble included, and pressure (N,) of scikit-fem's MINI
     element, bubbles kept as unknowns, under the conditions (3)-(5)."""
     basis = Basis(grid.fem, ElementVector(ElementTriMini()), intorder=4)
@@ -59,7 +61,9 @@ def uncondensed(grid: PoreMesh, ratio: float, form, interface: str) -> tuple[np.
     rim = (y == 0) | (y == grid.width) | (x == grid.ends[0])
     held[nodes[:, rim].ravel()] = True
     held[nodes[1, (x == grid.ends[1]) & (interface == "traction")]] = True
-    value[nodes[0, grid.inlet]] = flow.inlet_profile(grid, y[grid.inlet])
+    inlet = grid.topology.inlet
+    profile = y[inlet] * (grid.width - y[inlet])
+    value[nodes[0, inlet]] = profile * grid.width / np.trapezoid(profile, y[inlet])
     value[~held] = spsolve(system[~held][:, ~held], -(system[~held][:, held] @ value[held]))
     velocity, bubbles = value[nodes].T, value[basis.interior_dofs].T
     mean = velocity[grid.triangles].mean(axis=1) + 9 / 20 * bubbles
@@ -77,14 +81,14 @@ def condensed() -> Outcome:
     checks = []
     for interface, form in (("laplacian", laplacian), ("traction", symmetric)):
         velocity, mean, pressure = uncondensed(grid, RATIO, form, interface)
-        ours = flow.unit_flow(grid, RATIO, interface=interface, element="bubble")
+        ours = flow.unit_flow(Space(grid, 1), RATIO, interface=interface, element=flow.Bubble())
         carried = ours.velocity[grid.triangles].mean(axis=1) - ours.correction
         why = "the same equations: round-off of a system whose viscosities differ by 2000"
         pairs = {"velocity": (ours.velocity, velocity), "pressure": (ours.pressure, pressure),
                  "mean velocity": (carried, mean)}
         checks += [at_most(f"{name}, {interface}", np.abs(found - other).max() / np.abs(other).max(), 1e-9, why)
                    for name, (found, other) in pairs.items()]
-        checks.append(at_most(f"flux of the mean velocity, {interface}", properties._flux_error(grid, carried), 1e-9,
+        checks.append(at_most(f"flux of the mean velocity, {interface}", properties.flux_error(grid, carried), 1e-9,
                               "(2) tested with linear ramps, round-off"))
     return Outcome(tuple(checks))
 
@@ -96,14 +100,14 @@ def condensed() -> Outcome:
             "stabilised element with c = 100 does on good triangles, many times less on triangles stretched eightfold",
       mutants=("bubble-of-water", "bubble-tenfold"))
 def along_a_layer() -> Outcome:
-    errors = refine(_errors, range(len(layers.SIZES)), "bubble")
-    stabilised = refine(_errors, range(len(layers.SIZES)), "stabilised")
+    errors = refine(_errors, range(len(layers.SIZES)), BUBBLE)
+    stabilised = refine(_errors, range(len(layers.SIZES)), STABILISED)
     studies = (study("velocity", layers.SIZES, errors["velocity"], 2, layers.SECOND, ceiling=1e-3),
                study("pressure gradient", layers.SIZES, errors["gradient"], 2, layers.SECOND, ceiling=1.2e-3),
                study("velocity's gradient", layers.SIZES, errors["slope"], 1, "linear elements: first order in H1",
                      ceiling=0.1))
     ratio = stabilised["velocity"] / errors["velocity"]
-    stretched = [_stretched(1, draw, element)["velocity"] for element in ("stabilised", "bubble") for draw in range(3)]
+    stretched = [_stretched(1, draw, element)["velocity"] for element in (STABILISED, BUBBLE) for draw in range(3)]
     why = "tau is the same to 7 % where triangles are equilateral"
     return Outcome((between("stabilised over bubble, least", ratio.min(), 0.9, 1.1, why),
                     between("stabilised over bubble, largest", ratio.max(), 0.9, 1.1, why),
@@ -112,18 +116,18 @@ def along_a_layer() -> Outcome:
                              "the square of the stretch, 64")), studies)
 
 
-def _errors(level: int, element: str) -> dict[str, float]:
+def _errors(level: int, element: flow.Stabilised | flow.Bubble) -> dict[str, float]:
     return grids.root_mean_square(lambda draw: _layered(layers._grid(level, draw), element, layers.MIDDLE),
                                   DRAWS[level])
 
 
-def _layered(grid: PoreMesh, element: str, half: float) -> dict[str, float]:
+def _layered(grid: Mesh, element: flow.Stabilised | flow.Bubble, half: float) -> dict[str, float]:
     """Relative errors for |x| < half (um)."""
-    found = flow.unit_flow(grid, RATIO, element=element)
-    middle = grid.triangles[np.abs(grid.points[grid.triangles, 0].mean(axis=1)) < half]
+    found = flow.unit_flow(Space(grid, 1), RATIO, element=element)
+    middle = np.abs(grid.points[grid.triangles, 0].mean(axis=1)) < half
     gradient = layered_channel.gradient(layers.WIDTH, layers.LAYER, RATIO)
-    return {"velocity": norms.l2_error(grid.points, middle, found.velocity, _exact),
-            "gradient": abs(layers._slope(grid, middle, found.pressure) / gradient - 1),
+    return {"velocity": norms.l2_error(grid.points, grid.triangles[middle], found.velocity, _exact),
+            "gradient": abs(layers.slope(Space(grid, 1), found.pressure, middle) / gradient - 1),
             "slope": _slope_error(grid, found.velocity[:, 0], half)}
 
 
@@ -131,7 +135,7 @@ def _exact(x, y):
     return np.stack([layered_channel.velocity(y, layers.WIDTH, layers.LAYER, RATIO), 0 * y], axis=-1)
 
 
-def _slope_error(grid: PoreMesh, speed: np.ndarray, half: float) -> float:
+def _slope_error(grid: Mesh, speed: np.ndarray, half: float) -> float:
     """Relative L2 error of grad u_x for |x| < half, exact slopes by differences of the exact velocity."""
     chosen = np.abs(grid.points[grid.triangles, 0].mean(axis=1)) < half
     where, weight, _ = norms.quadrature(grid.points, grid.triangles[chosen])
@@ -146,15 +150,15 @@ STRETCH = 8.0
 
 
 @cache
-def _long_triangles(level: int, draw: int) -> PoreMesh:
+def _long_triangles(level: int, draw: int) -> Mesh:
     """A mesh of a layer whose triangles are STRETCH times longer than high."""
     end = layers.LAYER_END / STRETCH
     rim = end + layers.SIZES[level]
     short = grids.channel((-rim, rim), layers.WIDTH, layers.SIZES[level], lambda x, y: (y < layers.LAYER)
                           & (np.abs(x) < end), across=(-end, end), along=(layers.LAYER,), seed=7 * level + draw)
-    return PoreMesh(short.points * [STRETCH, 1.0], short.triangles, short.biomass, short.loop, short.width,
-                    (-STRETCH * rim, STRETCH * rim))
+    return Mesh.of(short.points * [STRETCH, 1.0], short.cells, short.biomass, short.loop, short.width,
+                   (-STRETCH * rim, STRETCH * rim))
 
 
-def _stretched(level: int, draw: int, element: str) -> dict[str, float]:
+def _stretched(level: int, draw: int, element: flow.Stabilised | flow.Bubble) -> dict[str, float]:
     return _layered(_long_triangles(level, draw), element, 60.0)

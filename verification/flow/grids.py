@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial import Delaunay
 
-from repro.fem.mesh import PoreMesh, triangle_areas
+from repro.fem.mesh import Mesh, curved, triangle_areas
 from verification import meshes
 
 #: The least distance of a node from the curve, over the element size: over a half, as edges on the curve are not quite
@@ -21,7 +21,7 @@ CLEARANCE = 0.6
 SPREAD = (1.0, 0.9, 1.1)
 
 
-def channel(ends, width: float, size: float, is_biomass, *, across=(), along=(), seed: int = 0) -> PoreMesh:
+def channel(ends, width: float, size: float, is_biomass, *, across=(), along=(), seed: int = 0) -> Mesh:
     """A rectangle cut by the lines x in ``across`` and y in ``along``; ``is_biomass(x, y)`` of triangles' middles."""
     points, _ = meshes.rectangle(ends, width, size, across=across, along=along, seed=seed)
 
@@ -32,8 +32,8 @@ def channel(ends, width: float, size: float, is_biomass, *, across=(), along=(),
     return _mesh(points[(apart == 0) | (apart > CLEARANCE * size)], beside, size, is_biomass, ends, width)
 
 
-def disc(ends, width: float, size: float, centre, radius: float, seed: int) -> PoreMesh:
-    """A rectangle with a disc of biomass inside, a polygon of edges of about ``size``."""
+def disc(ends, width: float, size: float, centre, radius: float, seed: int) -> Mesh:
+    """A rectangle with a disc of biomass inside, a polygon of edges of about ``size``, which is the mesh's loop."""
     points, _ = meshes.rectangle(ends, width, size, seed=seed)
     parts = round(2 * np.pi * radius / size)
     angle = 2 * np.pi * (np.arange(parts) + np.random.default_rng(seed).uniform()) / parts
@@ -43,10 +43,19 @@ def disc(ends, width: float, size: float, centre, radius: float, seed: int) -> P
         return np.hypot(*(where - centre).T)[:, None] - radius
 
     points = np.vstack([points[np.abs(beside(points)[:, 0]) > CLEARANCE * size], circle])
-    return _mesh(points, beside, size, lambda x, y: np.hypot(x - centre[0], y - centre[1]) < radius, ends, width)
+    loop = np.arange(len(points) - parts, len(points))
+    return _mesh(points, beside, size, lambda x, y: np.hypot(x - centre[0], y - centre[1]) < radius, ends, width, loop)
 
 
-def _mesh(points, beside, size: float, is_biomass, ends, width: float) -> PoreMesh:
+def round_disc(ends, width: float, size: float, centre, radius: float, seed: int) -> Mesh:
+    """The same of six-node triangles, middles of the polygon's edges on the circle."""
+    straight = disc(ends, width, size, centre, radius, seed)
+    start = straight.points[straight.loop] - centre
+    middle = start + np.roll(start, -1, axis=0)
+    return curved(straight, centre + radius * middle / np.hypot(*middle.T)[:, None]).checked()
+
+
+def _mesh(points, beside, size: float, is_biomass, ends, width: float, loop=()) -> Mesh:
     """Delaunay's triangles, counterclockwise, without those that round-off makes flat along the rim; ``beside(points)``
     (N, k) are distances from the curves, of one sign on each side. Raises ValueError where a triangle lies across."""
     triangles = Delaunay(points).simplices
@@ -56,8 +65,8 @@ def _mesh(points, beside, size: float, is_biomass, ends, width: float) -> PoreMe
     sides = beside(points)[triangles]
     if ((sides.min(axis=1) < -1e-9 * size) & (sides.max(axis=1) > 1e-9 * size)).any():
         raise ValueError("a triangle lies across the curve between fluid and biomass")
-    return PoreMesh(points, triangles, is_biomass(*points[triangles].mean(axis=1).T), np.empty(0, int), width,
-                    tuple(map(float, ends)))
+    biomass = is_biomass(*points[triangles].mean(axis=1).T)
+    return Mesh.of(points, triangles, biomass, np.array(loop, int), width, tuple(map(float, ends)))
 
 
 def root_mean_square(measure: Callable[[int], dict[str, float]], draws: int) -> dict[str, float]:
