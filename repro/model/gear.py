@@ -33,7 +33,7 @@ from repro.fem.assembly import ElementSystem, each
 from repro.fem.space import Space
 from repro.model import kinetics as law
 from repro.model.kinetics import Sink
-from repro.model.transport import Concentrations, Problem, both_ends, supplied_everywhere
+from repro.model.transport import UNRESOLVED, Concentrations, Problem, both_ends, supplied_everywhere
 from repro.timing import timed
 
 #: Largest accepted |C - C*| in the aggregate over the supply. Measured against a tolerance of 3e-6, 12 min from settled
@@ -105,6 +105,11 @@ class System:
     def space(self) -> Space:
         """Of the problem."""
         return self.problem.space
+
+    @property
+    def floor(self) -> float:
+        """How far (mg/L) below zero a concentration may be: a lumped reaction of linear ones keeps them positive."""
+        return 0.0 if self.space.order == 1 else UNRESOLVED * max(s.supply for s in self.problem.both)
 
     @cached_property
     def sparse(self) -> ElementSystem:
@@ -230,7 +235,7 @@ def _level(fields: np.ndarray, biomass: np.ndarray) -> Level:
 def _accepted(system: System, now: Level, step: float, tolerance: float, when: str, least: float):
     """A step of this size, or of the first smaller one that is positive and differs little enough from its prediction,
     and that difference over the scale; each try is shorter than the last by a factor of 1/2 to ``least``."""
-    floor = -system.problem.floor
+    floor = _lowest(system.problem)
     while step >= SHORTEST:
         new, difference = _corrected(system, now, step, positive=False)
         if new.fields.min() < floor:
@@ -242,13 +247,18 @@ def _accepted(system: System, now: Level, step: float, tolerance: float, when: s
     raise _too_short(system, new, difference, when)
 
 
+def _lowest(problem: Problem) -> float:
+    """The least concentration (mg/L) that is accepted: a lumped reaction of linear ones keeps them positive."""
+    return 0.0 if problem.space.order == 1 else -UNRESOLVED * max(s.supply for s in problem.both)
+
+
 def _factor(tolerance: float, size: float) -> float:
     """Change of the step that brings the difference, of second order in it, just under the tolerance."""
     return SAFETY * np.sqrt(tolerance / max(size, 1e-99))
 
 
 def _too_short(system: System, new: Level, difference: np.ndarray, when: str) -> TransportError:
-    negative = new.fields.min() < -system.problem.floor
+    negative = new.fields.min() < _lowest(system.problem)
     wrong = new.fields if negative else -difference * system.watched
     species, node = divmod(int(np.argmin(wrong)), system.space.count)
     x, y = system.space.points[node]
