@@ -106,11 +106,6 @@ class System:
         """Of the problem."""
         return self.problem.space
 
-    @property
-    def floor(self) -> float:
-        """How far (mg/L) below zero a concentration may be: a lumped reaction of linear ones keeps them positive."""
-        return 0.0 if self.space.order == 1 else UNRESOLVED * max(s.supply for s in self.problem.both)
-
     @cached_property
     def sparse(self) -> ElementSystem:
         """One substrate's unknowns: all triangles, then the pieces of biomass."""
