@@ -92,7 +92,7 @@ def test_an_uneven_seed_is_one_percent_off():
     assert np.ptp(apart) > 0.02  # and not a half-disc that has moved
     assert bulging.outline.area == pytest.approx(plain.outline.area, rel=1e-4)
     assert np.array_equal(bulging.origin, bulging.mesh.points) and bulging.fixed.sum() == 1
-    assert (bulging.active[bulging.mesh.body] == said.kinetics.maximum_density).all()
+    assert (bulging.active == said.kinetics.maximum_density * bulging.space.reaction.dx).all()
 
 
 def test_the_record_is_written_whole_and_the_table_names_every_row(tmp_path):

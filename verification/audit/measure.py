@@ -11,10 +11,10 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from repro.errors import StageError
-from repro.fem.geometry import Outline
-from repro.march import coupling
+from repro.fem.outline import Outline
+from repro.march import updates
 from repro.march.simulation import simulate
-from repro.model import mesh_motion, pore, shape
+from repro.model import contact, mesh_motion, pore
 from repro.model.pore import Pore, Solved
 from repro.scene import Scene, load_scene
 
@@ -92,7 +92,7 @@ def reshaped(now: Pore, outline: Outline) -> Pore:
     places = now.mesh.points[now.mesh.body]
     angle = np.arctan2(places[:, 1], places[:, 0])
     factor = _radius(outline)(angle) / _radius(now.outline)(angle)
-    return replace(now, mesh=now.mesh.moved(mesh_motion.move(now.mesh, places * factor[:, None], 1.0, 100.0)))
+    return now.moved(mesh_motion.move(now.mesh, places * factor[:, None], 1.0, 100.0))
 
 
 def _radius(outline: Outline) -> CubicSpline:
@@ -114,9 +114,8 @@ def one_state(said: Scene, changed: Scene, found: Run) -> dict[str, float]:
 
 
 def _next_shape(said: Scene, now: Pore, solved: Solved) -> dict[str, float]:
-    grown, _, _ = coupling.make_biomass(said, now, solved, STEP)
-    theta = now.theta * (1 + coupling.increase(now, grown) / said.kinetics.maximum_density)
-    outline = shape.expand(said, grown, theta)[0].outline
+    grown, _, _ = updates.make_biomass(said, now, solved, STEP)
+    outline = contact.expand(said, grown, updates.enlarged(said, now, grown))[0].outline
     return {"area": outline.area, "thickness": outline.thickness, "upstream": outline.upstream,
             "downstream": outline.downstream}
 

@@ -7,8 +7,10 @@ from functools import cache
 
 import numpy as np
 
-from repro.fem import geometry, mesh
-from repro.march import coupling
+from repro.fem.outline import half_disc
+from repro.fem.sizing import ACROSS_AGGREGATE
+from repro.fem.space import Space
+from repro.march import updates
 from repro.model import pore
 from repro.model.pore import Pore
 from repro.scene import Scene
@@ -78,17 +80,16 @@ def symmetry() -> list[dict]:
 
 def uneven(said: Scene, bulge: float) -> Pore:
     """The pore at t = 0 with a seed of radius R (1 + bulge cos 3 phi), phi from downstream."""
-    now, numerics = pore.seeded(said), said.numerics
-    seed = geometry.seed(said.aggregate.radius, numerics.refinement)
+    numerics = said.numerics
+    seed = half_disc(said.aggregate.radius, ACROSS_AGGREGATE * numerics.refinement, numerics.geometry)
     points = seed.points * (1 + bulge * np.cos(3 * np.arctan2(*seed.points.T[::-1])))[:, None]
-    outline = geometry.Outline(points, seed.wall, seed.fixed, points.copy())
-    ends = geometry.meshed_extent(outline, said.pore.width, said.pore.length, numerics.extent == "full")
-    grid, outline = mesh.generate(outline, ends, pore.sizing(said))
-    count = len(grid.points)
-    active = np.zeros(count)
-    active[grid.body] = said.kinetics.maximum_density
-    return replace(now, mesh=grid, wall=outline.wall, fixed=outline.fixed, active=active, inert=np.zeros(count),
-                   origin=grid.points.copy(), theta=np.ones(np.count_nonzero(grid.biomass)), pressure=np.zeros(count))
+    grid, outline = pore.generate(said, replace(seed, points=points, origin=points.copy()))
+    space = Space(grid, numerics.order)
+    body = pore.material(space, grid.points[grid.body])
+    active = said.kinetics.maximum_density * space.reaction.dx
+    return replace(pore.seeded(said), space=space, wall=outline.wall, fixed=outline.fixed, active=active,
+                   inert=np.zeros_like(active), body=body, theta=np.ones_like(body.at.dx),
+                   pressure=np.zeros(grid.corners))
 
 
 @cache
@@ -99,7 +100,7 @@ def _plain():
 
 
 def _step(said: Scene, now: Pore, solved, hours: float) -> Pore:
-    return coupling.step(said, now, solved, hours).pore
+    return updates.step(said, now, solved, hours).pore
 
 
 def row(choice: str, default: str, alternative: str, ratio: float, effects: dict[str, float], note: str) -> dict:
