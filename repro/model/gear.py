@@ -11,10 +11,11 @@ For C_A and C_D, (7) and (8), the corrector is one linear system each,
     M (C - C_n - carry dC_n) / (weight h) + L C - b + m X_A (q(C*) + q'(C*) (C - C*)) = 0
 
 with M the mass matrix (lumped for linear concentrations), L and b of :mod:`repro.model.transport`, and the uptake in
-the points of the reaction with X_A predicted; q is linearised in the substrate's own concentration; the acceptor sees the predicted donor, the donor the corrected
-acceptor. (9) advances ln X_A and (10) X_I at the corrected concentrations: both stay positive. Fluxes are integrated by
-the formula of the concentrations that they change, so that supplied - out - consumed = stored to round-off. Where the
-corrector gives a negative concentration, the step is backward Euler's with the sink C q(C*) / C*, which keeps C >= 0.
+the points of the reaction with X_A predicted; q is linearised in the substrate's own concentration; the acceptor sees
+the predicted donor, the donor the corrected acceptor. (9) advances ln X_A and (10) X_I at the corrected concentrations:
+both stay positive. Fluxes are integrated by the formula of the concentrations that they change, so that supplied - out
+- consumed = stored to round-off. Where the corrector gives a negative concentration, the step is backward Euler's with
+the sink C q(C*) / C*, which keeps C >= 0.
 
 Steps are controlled by |C - C*| within the aggregate (3.3.2), relative to the substrate's largest concentration.
 """
