@@ -6,7 +6,8 @@ import numpy as np
 
 from reference import averaged_pore
 from repro import results
-from repro.march.coupling import Instant, simulate
+from repro.march.loop import Instant
+from repro.march.simulation import simulate
 from repro.model import pore
 from repro.scene import Scene
 from verification.case import Profile

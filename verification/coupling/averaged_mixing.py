@@ -6,7 +6,7 @@ import numpy as np
 
 from reference import averaged_pore
 from repro import results
-from repro.march.coupling import simulate
+from repro.march.simulation import simulate
 from verification.case import Outcome, at_most, between, case
 from verification.convergence import study
 from verification.coupling import averaged, runs

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from unittest import mock
 
 import numpy as np
 
 from reference import averaged_pore, layered_channel, poiseuille
-from repro.fem import geometry, mesh
+from repro.fem import mesher
+from repro.fem.outline import BOTTOM, FREE, Outline
+from repro.fem.sizing import Sizing
+from repro.fem.space import Space
 from repro.model import flow, pore
 from repro.scene import Scene
 from verification.case import Outcome, at_most, between, case
@@ -52,7 +54,7 @@ def _strip(aspect: float):
     """Largest differences; of the ends, relative; (upstream over downstream length - 1) over the averaged one's;
     profiles."""
     given = scene(aspect)
-    with mock.patch.object(geometry, "seed", lambda radius, _: half_ellipse(radius / aspect, radius)):
+    with runs.shaped(lambda radius, geometry: half_ellipse(radius / aspect, radius, geometry)):
         area, instants = pore.seeded(given).outline.area, averaged.ours(given)
     moments = strip_of(given, area, 2 * averaged.CELLS).run(given.output.times)
     rows = [averaged.apart(given, *pair) for pair in zip(instants, moments)]
@@ -68,22 +70,25 @@ def strip_of(given: Scene, area: float, cells: int) -> averaged_pore.Averaged:
     return averaged_pore.Averaged(averaged.pore_of(given), lengths, heights, 4 * cells, keeps_shape=False)
 
 
-def half_ellipse(half_length: float, thickness: float) -> geometry.Outline:
+def half_ellipse(half_length: float, thickness: float, geometry: int = 1) -> Outline:
     """A seed, its interface nodes at equal eccentric angles, its fixed point in the middle."""
     def shape(s):
         return thickness * np.sqrt(np.maximum(1 - s**2, 0.0))
 
-    return bump(half_length, shape, round(32 * np.sqrt(half_length / thickness)), round(10 * half_length / thickness))
+    edges = round(32 * np.sqrt(half_length / thickness))
+    return bump(half_length, shape, edges, round(10 * half_length / thickness), geometry)
 
 
-def bump(half_length: float, shape, edges: int, half: int) -> geometry.Outline:
-    """An outline of height shape(x / half_length): edges on the interface, twice ``half`` on the wall."""
+def bump(half_length: float, shape, edges: int, half: int, geometry: int = 1) -> Outline:
+    """An outline of height shape(x / half_length): edges, or arcs (geometry 2), on the interface, twice ``half`` on the
+    wall."""
+    edges, half = geometry * edges, geometry * half
     angle = np.linspace(0.0, np.pi, edges + 1)[1:-1]
     base = half_length * np.arange(-half, half + 1) / half
     arc = np.column_stack([half_length * np.cos(angle), shape(np.cos(angle))])
     points = np.vstack([np.column_stack([base, 0.0 * base]), arc])
-    wall = np.where(np.arange(len(points)) < len(base), geometry.BOTTOM, geometry.FREE)
-    return geometry.Outline(points, wall, np.arange(len(points)) == half, points.copy())
+    wall = np.where(np.arange(len(points)) < len(base), BOTTOM, FREE)
+    return Outline(points, wall, np.arange(len(points)) == half, points.copy(), geometry)
 
 
 LOW, LONG, RATIO, LENGTH = 8.0, 40.0, 2000.0, 600.0
@@ -112,8 +117,9 @@ def _losses(aspect: float) -> tuple[float, float, float]:
     """
     half, reach = LOW / aspect, LOW / aspect + LONG
     outline = bump(half, lambda s: LOW * (1 - s**2) ** 2, round(48 / np.sqrt(aspect)), round(15 / aspect))
-    grid, _ = mesh.generate(outline, (-reach, reach), geometry.Sizing(WIDTH, 1.25, 2.0))
-    whole = flow.scaled(flow.unit_flow(grid, RATIO, order=2), grid, LENGTH, 1.0, head=None, mean_velocity=1.0)
+    grid, _ = mesher.generate(outline, (-reach, reach), Sizing(WIDTH, 1.25, 2.0), outline.geometry)
+    drive = replace(scene(0.5).flow, viscosity_ratio=RATIO, mean_velocity=1.0, kinematic_viscosity=1.0, gravity=1.0)
+    whole = flow.solve(Space(grid, 2), drive, LENGTH)
     s, weight = np.polynomial.legendre.leggauss(200)
     height, slope = LOW * (1 - s**2) ** 2, -4 * aspect * s * (1 - s**2)
     thin = half * weight @ layered_channel.gradient(WIDTH, height, RATIO)

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from unittest import mock
 
 import numpy as np
 
-from repro.fem import geometry
 from repro.model import pore
 from verification.case import Outcome, Profile, at_most, case
 from verification.convergence import study
@@ -37,7 +35,7 @@ def uptake() -> Outcome:
 
 def _around(aspect: float) -> dict:
     """{(Peclet, density): (largest difference, profile)} on one mesh."""
-    with mock.patch.object(geometry, "seed", lambda radius, _: averaged_thin.half_ellipse(radius / aspect, radius)):
+    with runs.shaped(lambda radius, geometry: averaged_thin.half_ellipse(radius / aspect, radius, geometry)):
         now = pore.seeded(averaged_thin.scene(aspect))
     return {(peclet, density): _compared(aspect, now, peclet, density) for peclet in PECLETS for density in DENSITIES}
 

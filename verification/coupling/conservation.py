@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from repro.march import coupling
-from repro.march.coupling import simulate
+from repro.march import updates
+from repro.march.simulation import simulate
 from repro.model import pore, remeshing
 from repro.scene import Scene
 from verification.case import Outcome, at_least, at_most, between, case
@@ -107,11 +107,12 @@ def _restored(refinement: float) -> tuple[float, float]:
     scene = runs.base("1 h", 'kinetics.decay_coefficient="0 1/d"', 'kinetics.maximum_utilization_rate="0 1/d"',
                       f"numerics.refinement={refinement}", 'aggregate.radius="20 um"')
     now = pore.seeded(scene)
-    now = replace(now, active=now.active * (1 + 0.1 * now.mesh.points[:, 0] / scene.aggregate.radius))
+    x = now.mesh.points[now.space.reaction.cells, 0]
+    now = replace(now, active=now.active * (1 + 0.1 * x / scene.aggregate.radius))
     solved = pore.solve(scene, now)
-    anew = remeshing.remesh(scene, now, now, solved)
-    after = coupling.step(scene, anew, pore.solve(scene, anew), 0.2).pore
-    weight = after.mesh.lumped(after.mesh.biomass)
-    density = (after.active + after.inert) / scene.kinetics.maximum_density
-    error = np.sqrt(weight @ (density - 1) ** 2 / weight.sum())
-    return float(error), abs(float(weight @ density) / after.outline.area - 1)
+    anew = remeshing.remesh(scene, now, now, solved.flow.mean_velocity)[0]
+    after = updates.step(scene, anew, pore.solve(scene, anew), 0.2).pore
+    weight = after.space.reaction.dx
+    density = (after.active + after.inert) / weight / scene.kinetics.maximum_density
+    error = np.sqrt(np.vdot(weight, (density - 1) ** 2) / weight.sum())
+    return float(error), abs(float(np.vdot(weight, density)) / after.outline.area - 1)

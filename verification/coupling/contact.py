@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from unittest import mock
-
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from repro.fem import geometry
-from repro.march.coupling import simulate
+from repro.fem.outline import BOTTOM, FREE, TOP, Outline
+from repro.march.simulation import simulate
 from repro.scene import Scene
 from verification.case import Outcome, Profile, at_least, at_most, between, case
 from verification.coupling import runs
@@ -32,7 +30,7 @@ def contact() -> Outcome:
     return Outcome((at_most("substrates", substrates(rows), 1e-10, "Newton's tolerance"),
                     at_most("biomass, worst step", biomass(rows), 1e-10, runs.ROUND_OFF),
                     at_most("X_m times the area", abs(total / rows[-1].biomass_after - 1), 3e-6, AREA),
-                    at_least("narrowest gap over the least allowed", _narrowest(scene, last, geometry.TOP), 1 - 1e-9,
+                    at_least("narrowest gap over the least allowed", _narrowest(scene, last, TOP), 1 - 1e-9,
                              "2 um, or 16.7 degrees beside contact"),
                     between("parts of the fluid", _parts(last.mesh), 1.9, 2.1, "a plug")), (), (_outlines(instants),))
 
@@ -43,9 +41,9 @@ def contact() -> Outcome:
       mutants=("no-wedge-closes", "films-stay-open"))
 def wedge() -> Outcome:
     scene = runs.base("0.2 h")
-    with mock.patch.object(geometry, "seed", lambda *_: _disc(20.0, 19.8)):
+    with runs.shaped(lambda radius, geometry: _disc(20.0, 19.8)):
         instants = list(simulate(scene))
-    gaps = [_narrowest(scene, instant.pore, geometry.BOTTOM) for instant in instants]
+    gaps = [_narrowest(scene, instant.pore, BOTTOM) for instant in instants]
     total = scene.kinetics.maximum_density * instants[-1].pore.outline.area
     return Outcome((at_most("narrowest gap over the least allowed, seed", gaps[0], 0.9, "8 degrees are under 16.7"),
                     at_least("the same after a step", gaps[1], 1 - 1e-9, "2 um, or 16.7 degrees beside contact"),
@@ -53,26 +51,26 @@ def wedge() -> Outcome:
                    (), (_outlines(instants),))
 
 
-def _disc(radius: float, height: float) -> geometry.Outline:
+def _disc(radius: float, height: float) -> Outline:
     """A disc around (0, height), cut by the lower wall."""
     start = np.arcsin(height / radius)
     angle = np.linspace(-start, np.pi + start, 61)
     arc = np.column_stack([radius * np.cos(angle), height + radius * np.sin(angle)])
     base = np.column_stack([np.linspace(arc[-1, 0], arc[0, 0], 11), np.zeros(11)])
     points = np.vstack([base, arc[1:-1]])
-    wall = np.where(np.arange(len(points)) < len(base), geometry.BOTTOM, geometry.FREE)
-    return geometry.Outline(points, wall, np.arange(len(points)) == 5, points.copy())
+    wall = np.where(np.arange(len(points)) < len(base), BOTTOM, FREE)
+    return Outline(points, wall, np.arange(len(points)) == 5, points.copy())
 
 
 def _narrowest(scene: Scene, now, wall: int) -> float:
     """Least gap between a wall and the interface beyond the contact surface, over the smaller of the least film and
     tan(least angle) times the distance from contact; zero without contact."""
     outline, growth = now.outline, scene.growth
-    free, on = outline.points[outline.wall == geometry.FREE], outline.points[outline.wall == wall, 0]
+    free, on = outline.points[outline.wall == FREE], outline.points[outline.wall == wall, 0]
     if len(on) == 0:
         return 0.0
     along = np.maximum(on.min() - free[:, 0], free[:, 0] - on.max())
-    gap = free[:, 1] if wall == geometry.BOTTOM else scene.pore.width - free[:, 1]
+    gap = free[:, 1] if wall == BOTTOM else scene.pore.width - free[:, 1]
     allowed = np.minimum(growth.minimum_film, np.tan(growth.minimum_contact_angle) * along)
     return float((gap[along > 0] / allowed[along > 0]).min())
 
@@ -82,7 +80,7 @@ def _parts(mesh) -> int:
     corners = mesh.triangles[~mesh.biomass]
     links = (np.ones(corners.size), (corners.ravel(), np.roll(corners, 1, axis=1).ravel()))
     labels = connected_components(coo_array(links, shape=2 * (len(mesh.points),)), directed=False)[1]
-    return len(np.unique(labels[mesh.fluid]))
+    return len(np.unique(labels[mesh.topology.fluid]))
 
 
 def _outlines(instants) -> Profile:

@@ -2,23 +2,46 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from unittest import mock
 
 import numpy as np
 
-from repro.march.coupling import Instant, simulate
+from repro.fem.outline import Outline
+from repro.march.loop import Instant
+from repro.march.simulation import simulate
+from repro.model import pore
 from repro.model.pore import Pore, Solved
 from repro.scene import Scene, load_scene
-from verification import norms
+from verification.reprojection import grids
 
 ROUND_OFF = "round-off"
 #: The velocity of base at t = 0, 2.9 m/d, in um/h.
 SPEED = 2.9e6 / 24
+PRESETS = ("paper", "fast", "accurate")
+#: Kinds of elements, by the names that scenes have for them: of order 1, 2 and 3.
+ELEMENTS = ("linear", "quadratic", "cubic")
 
 
 def base(end: str, *changes: str, times: str = "") -> Scene:
     """The paper's scene to a time ("6 h"), reported at its end, or at ``times`` ('"3 h", "6 h"')."""
     return load_scene("base", (f'growth.end="{end}"', f'output.times=[{times or repr(end)}]', *changes))
+
+
+def of(elements: str) -> str:
+    """The change of a scene that makes its elements linear, quadratic or cubic."""
+    return f'numerics.elements="{elements}"'
+
+
+def by(preset: str) -> str:
+    """The change of a scene that makes its numerics those of a preset."""
+    return f'numerics.preset="{preset}"'
+
+
+def shaped(seed: Callable[[float, int], Outline]):
+    """A context in which seeds are ``seed(radius, geometry)``, geometry 1 with straight edges, 2 with arcs."""
+    return mock.patch.object(pore, "half_disc", lambda radius, across, geometry: seed(radius, geometry))
 
 
 def last(scene: Scene) -> Instant:
@@ -57,14 +80,15 @@ def with_diffusivities(scene: Scene, change) -> Scene:
 def density_drift(scene: Scene, instant: Instant) -> float:
     """Largest |(X_A + X_I) / X_m - 1| in the aggregate."""
     now = instant.pore
-    return float(np.abs((now.active + now.inert)[now.mesh.body] / scene.kinetics.maximum_density - 1).max())
+    density = (now.active + now.inert) / now.space.reaction.dx
+    return float(np.abs(density / scene.kinetics.maximum_density - 1).max())
 
 
 def section_means(now: Pore, solved: Solved, x: np.ndarray, points: int = 16) -> np.ndarray:
     """(2, K) means of C_A and C_D over the sections x (K,) of the mesh."""
-    grid, found = now.mesh, solved.concentrations
+    found = solved.concentrations
     place, weight = np.polynomial.legendre.leggauss(points)
-    y = 0.5 * grid.width * (1 + place)
+    y = 0.5 * now.mesh.width * (1 + place)
     where = np.column_stack([np.repeat(x, points), np.tile(y, len(x))])
-    values = norms.sample(grid.points, grid.triangles, np.column_stack([found.acceptor, found.donor]), where)
+    values = grids.sample(now.space, np.column_stack([found.acceptor, found.donor]), where)
     return np.einsum("kpm,p->mk", values.reshape(len(x), points, 2), 0.5 * weight)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from repro.model import pore, transport
+from repro.model import pore
 from repro.scene import load_scene
 from verification.case import Outcome, Profile, at_most, case
 from verification.convergence import study
@@ -93,7 +93,7 @@ def _solved(radius: str, extent: str):
                                 "numerics.refinement=2.0"))
     now = pore.seeded(scene)
     solved = pore.solve(scene, now)
-    leaving = transport.fluxes(solved.problem, now.active, solved.concentrations)
+    leaving = solved.fluxes
     reach = min(10 * scene.aggregate.radius, 1.5 * scene.pore.width) + scene.aggregate.radius
     x = np.linspace(-reach, reach, averaged.PLACES)
     return ({"conductivity": solved.flow.conductivity, "effluent acceptor": leaving[0].effluent,

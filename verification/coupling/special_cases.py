@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from reference import poiseuille
-from repro.fem import geometry, mesh
-from repro.march.coupling import simulate
-from repro.model import flow
+from repro.fem.mesh import Mesh
+from repro.fem.space import Space
+from repro.march.simulation import simulate
+from repro.model import flow, pore
 from repro.scene import load_scene
 from verification.case import Outcome, at_least, at_most, case
 from verification.convergence import study
@@ -70,9 +71,8 @@ def equal_viscosities() -> Outcome:
     scene = runs.base("1 h", 'aggregate.radius="25 um"', "flow.viscosity_ratio=1.0")
     first, last = list(simulate(scene))
     grid, found = last.pore.mesh, last.solved.flow
-    bare = mesh.PoreMesh(grid.points, grid.triangles, np.zeros_like(grid.biomass), np.empty(0, int), grid.width,
-                         grid.ends)
-    empty = flow.unit_flow(bare, 7.0)
+    bare = Mesh.of(grid.points, grid.cells, np.zeros_like(grid.biomass), np.empty(0, int), grid.width, grid.ends)
+    empty = flow.unit_flow(Space(bare, last.pore.space.order), 7.0)
     viscosity = scene.flow.kinematic_viscosity / scene.flow.gravity
     exact = scene.flow.head / poiseuille.head_loss(scene.pore.length, scene.pore.width, 1.0, viscosity)
     return Outcome((at_most("u", np.abs(found.velocity / found.mean_velocity - empty.velocity).max(), 1e-13,
@@ -88,7 +88,7 @@ def equal_viscosities() -> Outcome:
       mutants=("modulus-in-the-shape",))
 def stiffness() -> Outcome:
     soft, stiff = (runs.last(runs.base("1 h", f'growth.shear_modulus="{value} MPa"')).pore for value in (0.001, 10))
-    seed = geometry.seed(5.0).area
+    seed = pore.seeded(runs.base("1 h")).outline.area
     return Outcome((at_most("places", np.abs(soft.mesh.points - stiff.mesh.points).max(), 0.0,
                             "it is nowhere in the equations without tractions"),
                     at_least("growth of the area", soft.outline.area / seed, 1.1, "else nothing is tested")))

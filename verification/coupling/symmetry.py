@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from unittest import mock
 
 import numpy as np
 
-from repro.fem import geometry
-from repro.march.coupling import simulate
-from repro.model import pore, transport
+from repro.fem.outline import BOTTOM, FREE, Outline
+from repro.march.simulation import simulate
+from repro.model import pore
 from repro.scene import load_scene
 from verification import norms
 from verification.case import Outcome, Profile, at_least, at_most, case
@@ -109,19 +108,19 @@ def _lopsided(sign: float) -> dict[str, float]:
     law = replace(scene.kinetics, maximum_utilization_rate=0.5 * LARGE, decay_coefficient=0.0,
                   acceptor_to_donor_ratio=1e-12)
     scene = replace(scene, substrates=both, kinetics=law)
-    with mock.patch.object(geometry, "seed", lambda *_: _outline(sign)):
+    with runs.shaped(lambda radius, geometry: _outline(sign, geometry)):
         now = pore.seeded(scene)
     solved = pore.solve(scene, now)
-    donor = transport.fluxes(solved.problem, now.active, solved.concentrations)[1]
+    donor = solved.fluxes[1]
     return {"conductivity": solved.flow.conductivity, "effluent": donor.effluent, "inlet": donor.inlet}
 
 
-def _outline(sign: float) -> geometry.Outline:
+def _outline(sign: float, geometry: int) -> Outline:
     """24 um (1 + 0.35 cos a - 0.15 cos 2a), or its image in x -> -x for sign = -1."""
-    angle = np.linspace(0.0, np.pi, 81)
+    angle = np.linspace(0.0, np.pi, 80 * geometry + 1)
     radius = 24.0 * (1 + 0.35 * sign * np.cos(angle) - 0.15 * np.cos(2 * angle))
     arc = radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
-    base = np.column_stack([np.linspace(arc[-1, 0], arc[0, 0], 21), np.zeros(21)])
+    base = np.column_stack([np.linspace(arc[-1, 0], arc[0, 0], 20 * geometry + 1), np.zeros(20 * geometry + 1)])
     points = np.vstack([base, arc[1:-1]])
-    wall = np.where(np.arange(len(points)) < len(base), geometry.BOTTOM, geometry.FREE)
-    return geometry.Outline(points, wall, np.arange(len(points)) == 10, points.copy())
+    wall = np.where(np.arange(len(points)) < len(base), BOTTOM, FREE)
+    return Outline(points, wall, np.arange(len(points)) == 10 * geometry, points.copy(), geometry)

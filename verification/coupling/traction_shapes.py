@@ -7,15 +7,16 @@ from functools import cache
 
 import numpy as np
 
-from repro.fem import geometry
-from repro.model import growth, mesh_motion, pore, remeshing, shape, traction
+from repro.fem.mesh import Mesh, curved
+from repro.fem.outline import FREE, Outline, slopes
+from repro.fem.space import Space
+from repro.model import contact, flow, growth, mesh_motion, pore, traction
 from repro.model.flow import Flow
 from verification import meshes
 from verification.case import Outcome, at_least, at_most, between, case
-from verification.convergence import study
+from verification.convergence import Study, study
 from verification.coupling import runs
 from verification.coupling.traction import loaded_scene, nodal
-from verification.growth import loaded
 
 
 @case("coupling-traction-stretch", kind="exact", norm="relative error of positions; of P over mu_L",
@@ -23,32 +24,41 @@ from verification.growth import loaded
             "and keeps its area, on any mesh",
       mutants=("forces-pushed", "forces-halved"))
 def stretch() -> Outcome:
+    factors = (0.8, 1.01, 1.5)
+    return Outcome(tuple(check for order in (1, 2) for factor in factors for check in _stretched(order, factor)))
+
+
+def _stretched(order: int, factor: float) -> list:
+    """Checks of a block of linear or quadratic displacements."""
     points, triangles = meshes.rectangle((-20.0, 20.0), 15.0, 4.0, seed=2)
-    held = np.zeros((len(points), 2), bool)
-    held[points[:, 1] == 0, 1] = True
-    held[np.argmin(np.hypot(*points.T)), 0] = True
-    points[held[:, 0], 0] = 0.0
-    body, checks = growth.Body(points, triangles, held), []
-    for factor in (0.8, 1.01, 1.5):
-        pull = factor - factor**-3
-        right, left = points[:, 0] == 20.0, points[:, 0] == -20.0
-        forces = pull * (_ends(points, right) - _ends(points, left))
-        found = growth.equilibrium(body, np.ones(len(triangles)), points, np.zeros(len(points)), points, forces)
-        apart = np.abs(found.position - points * [factor, 1 / factor]).max() / 20.0
-        pressure = (factor**2 + factor**-2 + 1) / 3 - factor**-2
-        checks += [at_most(f"places, a = {factor:g}", apart, 1e-9, "linear displacement: Newton's tolerance"),
-                   at_most(f"P, a = {factor:g}", np.abs(found.pressure - pressure).max(), 1e-9, "even: as before")]
-    return Outcome(tuple(checks))
+    points[np.argmin(np.hypot(*points.T)), 0] = 0.0
+    mesh = Mesh.of(points, triangles, np.ones(len(triangles), bool), np.empty(0, int), 15.0, (-20.0, 20.0))
+    mesh = mesh if order == 1 else curved(mesh, None)
+    where = mesh.points
+    held = np.zeros((len(where), 2), bool)
+    held[where[:, 1] == 0, 1] = True
+    held[np.flatnonzero((where == 0).all(axis=1)), 0] = True
+    body = growth.Body(growth.Shape(mesh.cells, mesh.corners, {1: 1, 2: 6}[order]), where)
+    forces = (factor - factor**-3) * (_ends(mesh, 20.0) - _ends(mesh, -20.0))
+    found = growth.equilibrium(body, np.ones_like(body.at.dx), where, np.zeros(mesh.corners), held, where,
+                               forces=forces)
+    apart = np.abs(found.position - where * [factor, 1 / factor]).max() / 20.0
+    pressure = (factor**2 + factor**-2 + 1) / 3 - factor**-2
+    name = f"a = {factor:g}, order {order}"
+    return [at_most(f"places, {name}", apart, 1e-9, "linear displacement: Newton's tolerance"),
+            at_most(f"P, {name}", np.abs(found.pressure - pressure).max(), 1e-9, "even: as before")]
 
 
-def _ends(points: np.ndarray, side: np.ndarray) -> np.ndarray:
-    """(n, 2): lengths of the side's edges shared between their nodes, along x."""
-    nodes = np.flatnonzero(side)
-    nodes = nodes[np.argsort(points[nodes, 1])]
-    share = np.zeros_like(points)
-    length = np.diff(points[nodes, 1]) / 2
-    share[nodes[:-1], 0] += length
-    share[nodes[1:], 0] += length
+def _ends(mesh: Mesh, side: float) -> np.ndarray:
+    """(N, 2): lengths of a side's edges shared between their nodes, along x: halves, or a sixth, two thirds and a sixth
+    where there are middles."""
+    share = np.zeros_like(mesh.points)
+    nodes = np.flatnonzero(mesh.points[:, 0] == side)
+    nodes = nodes[np.argsort(mesh.points[nodes, 1])]
+    part = np.array([0.5, 0.5]) if mesh.geometry == 1 else np.array([1.0, 4.0, 1.0]) / 6
+    for first in range(0, len(nodes) - 1, mesh.geometry):
+        edge = nodes[first: first + mesh.geometry + 1]
+        share[edge, 0] += part * np.ptp(mesh.points[edge, 1])
     return share
 
 
@@ -59,48 +69,85 @@ def _ends(points: np.ndarray, side: np.ndarray) -> np.ndarray:
             "and its P takes the pressure up",
       mutants=("traction-pressure-left-out", "forces-pushed"))
 def even_pressure() -> Outcome:
-    scene = loaded_scene()
+    return Outcome(tuple(check for elements in runs.ELEMENTS for check in _under_even_pressure(elements)))
+
+
+def _under_even_pressure(elements: str) -> list:
+    """Checks with one kind of elements."""
+    scene = loaded_scene(runs.of(elements))
     now = pore.seeded(scene)
-    theta = now.theta * (1.1 + 0.002 * now.mesh.points[now.mesh.triangles[now.mesh.biomass], 0].mean(axis=1))
-    plain, _, _ = shape._at_rest(scene, now, theta, None)
-    still = Flow(0.0, 0 * now.mesh.points, np.full(len(now.mesh.points), 5.0), 0 * now.mesh.edges[:, 0], 0.0, 0.0, 0.0)
-    loop, checks = plain.mesh.loop, []
-    grid = now.mesh.moved(mesh_motion.move(now.mesh, plain.mesh.points[now.mesh.body], 1.0, 100.0))
-    on = traction.nodal(grid, still, 1.0, "laplacian")
+    theta = _uneven(now, 1.1, 0.002)
+    plain, _, _ = contact._at_rest(scene, now, theta, now, None)
+    mesh, space = now.mesh, now.space
+    mesh = mesh.moved(mesh_motion.move(mesh, plain.mesh.points[mesh.body], 1.0, 100.0))
+    space = Space(mesh, space.order)
+    still = Flow(0.0, np.zeros((space.count, 2)), np.full(flow.pressure_space(space).count, 5.0), None, 0.0, 0.0, 0.0)
+    on = traction.nodal(space, still, 1.0, "laplacian")
     by_hand = -5.0 * _normals(plain.outline)
-    free = plain.wall == geometry.FREE
-    checks.append(at_most("forces", np.abs(on[loop[free]] - by_hand[free]).max() / np.abs(by_hand).max(), 1e-12,
-                          "the divergence theorem: round-off"))
+    free = plain.wall == FREE
+    checks = [at_most(f"forces, {elements}", np.abs(on[mesh.loop[free]] - by_hand[free]).max() / np.abs(by_hand).max(),
+                      1e-12, "the divergence theorem: round-off")]
+    inside = mesh.topology.body_corners
     for sign in (1.0, -1.0):
-        pushed, _, _ = shape._at_rest(scene, now, theta, sign * on[now.mesh.body])
+        pushed, _, _ = contact._at_rest(scene, now, theta, now, sign * on[mesh.body])
         apart = np.abs(pushed.mesh.points - plain.mesh.points).max() / 25.0
-        change = (pushed.pressure - plain.pressure)[now.mesh.body] + sign * 5.0
-        checks += [at_most(f"move, {sign:+g}", apart, 1e-9, "J = theta: Newton's tolerance"),
-                   at_most(f"P, {sign:+g}", np.abs(change).max(), 1e-8, "Newton's tolerance")]
-    return Outcome(tuple(checks))
+        change = (pushed.pressure - plain.pressure)[inside] + sign * 5.0
+        checks += [at_most(f"move, {sign:+g}, {elements}", apart, 1e-9, "J = theta: Newton's tolerance"),
+                   at_most(f"P, {sign:+g}, {elements}", np.abs(change).max(), 1e-8, "Newton's tolerance")]
+    return checks
 
 
-def _normals(outline: geometry.Outline) -> np.ndarray:
-    """(M, 2) outward normals times length of the interface edges, shared between their nodes."""
-    edge = np.roll(outline.points, -1, axis=0) - outline.points
-    out = np.column_stack([edge[:, 1], -edge[:, 0]]) * outline.interface_edges()[:, None]
-    return 0.5 * (out + np.roll(out, 1, axis=0))
+def _uneven(now: pore.Pore, mean: float, slope: float) -> np.ndarray:
+    """(t, q) theta of a seed times mean + slope x."""
+    shape = now.body.shape
+    places = np.einsum("qa,ta->tq", shape.table.shape, now.body.reference[shape.cells, 0])
+    return now.theta * (mean + slope * places)
+
+
+def _normals(outline: Outline) -> np.ndarray:
+    """(M, 2) outward normals times length of the interface's edges, shared between their nodes: along a parabola by the
+    integral of its tangent times the nodes' functions."""
+    nodes = outline.arcs(outline.points)
+    first, bend = slopes(nodes)
+    t, weight = np.polynomial.legendre.leggauss(3)
+    t, weight = 0.5 * (1 + t), 0.5 * weight
+    tangent = first[:, None] + t[:, None] * bend[:, None]
+    normal = np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1) * weight[:, None]
+    share = _shares(outline.geometry, t)
+    local = np.einsum("qa,mqi->mai", share, normal)
+    count, step = len(outline.points), outline.geometry
+    total = np.zeros((count, 2))
+    wet = outline.interface_edges()[::step]
+    for edge in np.flatnonzero(wet):
+        total[(step * edge + np.arange(step + 1)) % count] += local[edge]
+    return total
+
+
+def _shares(geometry: int, t: np.ndarray) -> np.ndarray:
+    """(q, geometry + 1) the functions of an edge's nodes at t."""
+    if geometry == 1:
+        return np.column_stack([1 - t, t])
+    return np.column_stack([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)])
 
 
 FACTORS = (800.0, 400.0, 200.0, 100.0)
 
 
-@cache
-def _moved(factor: float) -> tuple[pore.Pore, pore.Pore, np.ndarray]:
-    """A half-disc of 25 um, what a step of uneven growth makes of it in water ``factor`` times as dense at the same
-    velocities (0: without fluid forces), and its theta."""
-    scene = loaded_scene()
-    said = replace(scene, flow=replace(scene.flow, density=factor * scene.flow.density))
+def _said(elements: str, factor: float):
+    """A scene in water ``factor`` times as dense at the same velocities (0: without fluid forces)."""
+    scene = loaded_scene(runs.of(elements))
     if factor == 0:
-        said = replace(scene, growth=replace(scene.growth, fluid_forces="neglected"))
+        return replace(scene, growth=replace(scene.growth, fluid_forces="neglected"))
+    return replace(scene, flow=replace(scene.flow, density=factor * scene.flow.density))
+
+
+@cache
+def _moved(elements: str, factor: float) -> tuple[pore.Pore, pore.Pore, np.ndarray]:
+    """A half-disc of 25 um, what a step of uneven growth makes of it, and its theta."""
+    said = _said(elements, factor)
     now = pore.seeded(said)
-    theta = now.theta * (1.1 - 0.002 * now.mesh.points[now.mesh.triangles[now.mesh.biomass], 0].mean(axis=1))
-    return now, shape.expand(said, now, theta)[0], theta
+    theta = _uneven(now, 1.1, -0.002)
+    return now, contact.expand(said, now, theta)[0], theta
 
 
 @case("coupling-traction-fixed-point", kind="property",
@@ -109,43 +156,49 @@ def _moved(factor: float) -> tuple[pore.Pore, pore.Pore, np.ndarray]:
       claim="The move is proportional to the force as the force falls, and shape and flow agree in the end",
       mutants=("forces-of-the-first-round", "forces-pushed", "density-squared"))
 def fixed_point() -> Outcome:
-    plain = _moved(0.0)[1].mesh.points
-    moves = [(_moved(factor)[1].mesh.points - plain) / factor for factor in (*FACTORS, 1.0)]
+    found = [_proportional(elements) for elements in runs.ELEMENTS]
+    return Outcome(tuple(check for checks, _ in found for check in checks), tuple(one for _, one in found))
+
+
+def _proportional(elements: str) -> tuple[list, Study]:
+    """Checks, and the study, of one kind of elements."""
+    plain = _moved(elements, 0.0)[1].mesh.points
+    moves = [(_moved(elements, factor)[1].mesh.points - plain) / factor for factor in (*FACTORS, 1.0)]
     size = np.abs(moves[-1]).max()
     apart = [np.abs(move - moves[-1]).max() / size for move in moves[:-1]]
-    own, before = _defects(FACTORS[-1])
-    return Outcome((at_most("defect with its own flow", own, 1e-8, "nodes at rest to 1e-8 of R"),
-                    at_least("defect with the flow before", before, 1e-5, "else no round is needed"),
-                    between("downstream tip's move at factor 1, over the upstream one's", _tips(moves[-1]), 0.2, 5.0,
-                            "both are pushed downstream"),
-                    at_most("largest move at factor 1, over R", size / 25.0, 1e-4, "0.1 Pa on 10 kPa")),
-                   (study("move over force", FACTORS, apart, 1, "quadratic remainder of a smooth map: first "
-                          "order", ceiling=1e-3),))
+    own, before = _defects(elements, FACTORS[-1])
+    checks = [at_most(f"defect with its own flow, {elements}", own, 1e-8, "nodes at rest to 1e-8 of R"),
+              at_least(f"defect with the flow before, {elements}", before, 1e-5, "else no round is needed"),
+              between(f"downstream tip's move at factor 1, over the upstream one's, {elements}",
+                      _tips(elements, moves[-1]), 0.2, 5.0, "both are pushed downstream"),
+              at_most(f"largest move at factor 1, over R, {elements}", size / 25.0, 1e-4, "0.1 Pa on 10 kPa")]
+    return checks, study(f"move over force, {elements}", FACTORS, apart, 1, "quadratic remainder of a smooth map: "
+                         "first order", ceiling=1e-3)
 
 
-def _tips(move: np.ndarray) -> float:
+def _tips(elements: str, move: np.ndarray) -> float:
     """Move along x of the downstream contact line over that of the upstream one."""
-    now = _moved(0.0)[0]
-    x = now.mesh.points[now.mesh.loop, 0]
-    ends = now.mesh.loop[[np.argmax(x), np.argmin(x)]]
+    mesh = _moved(elements, 0.0)[0].mesh
+    x = mesh.points[mesh.loop, 0]
+    ends = mesh.loop[[np.argmax(x), np.argmin(x)]]
     return float(move[ends[0], 0] / move[ends[1], 0])
 
 
-def _defects(factor: float) -> tuple[float, float]:
+def _defects(elements: str, factor: float) -> tuple[float, float]:
     """Residual of the equilibrium over the size of its terms under the forces around its own shape, and the last's."""
-    scene = loaded_scene()
-    said = replace(scene, flow=replace(scene.flow, density=factor * scene.flow.density))
-    now, found, theta = _moved(factor)
-    nodes, triangles = now.mesh.body, now.mesh.body_triangles
-    held = shape.held_at(len(nodes), now.mesh.body_loop, now.wall, now.fixed)
-    body = growth.Body(now.origin[nodes], triangles, held)
-    stabilising = growth.stabilisation(now.mesh.points[nodes], triangles, np.ones(len(triangles)))
-    defects = []
+    said = _said(elements, factor)
+    now, found, theta = _moved(elements, factor)
+    nodes, body = now.mesh.body, now.body
+    held = contact.constrained(len(nodes), now.mesh.topology.body_loop, now.wall, now.fixed)
+    stabilising, defects = None, []
+    if body.shape.geometry == 1:
+        cells = body.shape.cells
+        stabilising = growth.gradient_stabilisation(now.mesh.points[nodes], cells, np.ones(len(cells)))
+    place, pressure = found.mesh.points[nodes], found.pressure[now.mesh.topology.body_corners]
     for around in (found, now):
         forces = traction.forces(said, traction.surroundings(said, now, around), around)
-        system = loaded.Loaded(body, stabilising, forces)
-        residual, size = system.residual(found.mesh.points[nodes], found.pressure[nodes], theta)
-        defects.append(growth._relative(residual[system.free], size[system.free]))
+        system = growth.System(body, held, stabilising=stabilising, forces=forces)
+        defects.append(system.under(theta, place, place, pressure).defect)
     return tuple(defects)
 
 
@@ -155,19 +208,27 @@ def _defects(factor: float) -> tuple[float, float]:
       claim="Where a new mesh must be made for the flow, its forces go to the aggregate's nodes, sum and moment kept",
       mutants=("forces-shared-evenly",))
 def remeshed() -> Outcome:
-    now, found, _ = _moved(0.0)
-    fine, coarse = loaded_scene("numerics.refinement=3"), loaded_scene()
-    grid, _ = remeshing.anew(fine, found.outline)
-    on = nodal(fine, replace(found, mesh=grid))[0]
+    return Outcome(tuple(check for elements in runs.ELEMENTS for check in _remeshed(elements)))
+
+
+def _remeshed(elements: str) -> list:
+    """Checks with one kind of elements."""
+    now, found, _ = _moved(elements, 0.0)
+    finer = 3 if elements == "linear" else 2
+    fine = loaded_scene(f"numerics.refinement={finer}", runs.of(elements))
+    coarse = loaded_scene(runs.of(elements))
+    mesh, _ = pore.generate(fine, found.outline)
+    on = nodal(fine, Space(mesh, found.space.order))[0]
     scale = traction.MPA_PER_UM * fine.flow.density * fine.flow.gravity / fine.growth.shear_modulus
-    new = _sums(grid.points[grid.loop], scale * on[grid.loop])
+    new = _sums(mesh.points[mesh.loop], scale * on[mesh.loop])
     places = found.mesh.points[now.mesh.body]
     both = [traction.forces(scene, traction.surroundings(scene, now, found), found) for scene in (fine, coarse)]
     ours, followed = (_sums(places, forces) for forces in both)
-    return Outcome((at_most("new mesh, nodes of the outline", np.abs(ours / new - 1).max(), 1e-9, runs.ROUND_OFF),
-                    at_most("new mesh, mesh that followed, x", abs(ours[0] / followed[0] - 1), 0.02,
-                            "the drag's own error at this refinement: 0.012"),
-                    at_least("nodes, new over old", len(grid.loop) / len(now.mesh.loop), 1.5, "else none was split")))
+    return [at_most(f"new mesh, nodes of the outline, {elements}", np.abs(ours / new - 1).max(), 1e-9, runs.ROUND_OFF),
+            at_most(f"new mesh, mesh that followed, x, {elements}", abs(ours[0] / followed[0] - 1), 0.02,
+                    "the drag's own error at this refinement: 0.012"),
+            at_least(f"nodes, new over old, {elements}", len(mesh.loop) / len(now.mesh.loop), 1.5,
+                     "else none was split")]
 
 
 def _sums(places: np.ndarray, on: np.ndarray) -> np.ndarray:

@@ -18,7 +18,7 @@ AREA = (ENDS[1] - ENDS[0]) * WIDTH
 ASIDE, SLIVER = (1e-14, 1e-9, 1e-4), 1e-6
 Grid = tuple[np.ndarray, np.ndarray]
 #: Triangles in which a place is looked for.
-NEAR = 12
+NEAR = 16
 ELEMENTS = {1: ElementTriP1(), 2: ElementTriP2(), 3: ElementTriP3()}
 
 
@@ -99,8 +99,8 @@ def curved_weights(nodes: np.ndarray, barycentric: np.ndarray, weights: np.ndarr
 
 
 def sample(space: Space, values: np.ndarray, where: np.ndarray) -> np.ndarray:
-    """A field (count,) at places (K, 2) by scikit-fem's mesh and maps; each place is tried in the NEAR triangles with
-    the nearest middles. The field's nodes are known by where they are."""
+    """A field (count, ...) at places (K, 2) by scikit-fem's mesh and maps; each place is tried in the NEAR triangles
+    with the nearest middles. The field's nodes are known by where they are."""
     mapping, element = _fem(space.mesh).mapping(), ELEMENTS[space.order]
     middles = mapping.F(np.full((2, 1), 1 / 3))[:, :, 0].T
     cells = cKDTree(middles).query(where, k=NEAR)[1]
@@ -114,7 +114,7 @@ def sample(space: Space, values: np.ndarray, where: np.ndarray) -> np.ndarray:
     nodes = mapping.F(np.asarray(element.doflocs).T, tind=cell)
     numbers = cKDTree(space.points).query(np.moveaxis(nodes, 0, 2))[1]
     shape = [element.lbasis(place.T, k)[0] for k in range(numbers.shape[1])]
-    return np.sum(np.column_stack(np.broadcast_arrays(*shape)) * values[numbers], axis=1)
+    return np.einsum("ka,ka...->k...", np.column_stack(np.broadcast_arrays(*shape)), values[numbers])
 
 
 def _local(mapping, where: np.ndarray, cell: np.ndarray) -> np.ndarray:
