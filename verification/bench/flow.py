@@ -5,8 +5,7 @@ from __future__ import annotations
 from functools import cache, partial
 
 from reference import taylor_hood
-from repro.curved import flow as curved_flow
-from repro.curved import pore as curved_pore
+from repro.fem.space import Space
 from repro.model import flow, pore
 from verification.bench import options, pores
 from verification.bench.clock import measured
@@ -28,10 +27,10 @@ def run(quick: bool) -> dict:
         for r in linear:
             jobs[interface, f"refinement {r:g}"] = partial(_linear, truth, r, **element)
     for r in linear[: len(linear) - 2]:
-        jobs["order 2 on straight triangles", f"refinement {r:g}"] = partial(_order_2, truth, r)
-    for r in quadratic:
-        jobs["order 2 on curved triangles (fast, accurate)", f"refinement {r:g}"] = partial(_curved, truth, r, 2)
-        jobs["order 3 on curved triangles", f"refinement {r:g}"] = partial(_curved, truth, r, 3)
+        jobs["order 2 on straight triangles", f"refinement {r:g}"] = partial(_of_order, truth, r, "paper", 2)
+    for order, name in ((2, "order 2 on curved triangles (fast, accurate)"), (3, "order 3 on curved triangles")):
+        for r in quadratic:
+            jobs[name, f"refinement {r:g}"] = partial(_of_order, truth, r, "accurate", order)
     for k in skfem:
         jobs["scikit-fem: Taylor-Hood, two pressures", f"{k} refinements"] = partial(_taylor_hood, truth, k)
     for n in sections:
@@ -55,23 +54,18 @@ def reference(rings: int) -> float:
 
 def _linear(truth: float, refinement: float, **element) -> dict:
     scene = pores.scene(refinement=refinement, **element)
-    now = pore.seeded(scene)
-    found = pore.solve_flow(scene, now)
-    return _judged(truth, found.head_loss / scene.flow.mean_velocity / _nu(scene), now.mesh)
+    mesh = pore.seeded(scene).mesh
+    found = pore.solve_flow(scene, Space(mesh, 1))
+    return _judged(truth, found.head_loss / scene.flow.mean_velocity / _nu(scene), mesh)
 
 
 def _nu(scene) -> float:
     return scene.flow.kinematic_viscosity / scene.flow.gravity
 
 
-def _order_2(truth: float, refinement: float) -> dict:
-    now = pore.seeded(pores.scene(preset="paper", refinement=refinement))
-    return _judged(truth, flow.unit_flow(now.mesh, pores.RATIO, order=2).loss + pores.outside_loss(), now.mesh)
-
-
-def _curved(truth: float, refinement: float, order: int) -> dict:
-    now = curved_pore.seeded(pores.scene(preset="accurate", refinement=refinement))
-    return _judged(truth, curved_flow.unit_flow(now.mesh, pores.RATIO, order)[2] + pores.outside_loss(), now.mesh)
+def _of_order(truth: float, refinement: float, preset: str, order: int) -> dict:
+    mesh = pore.seeded(pores.scene(preset=preset, refinement=refinement)).mesh
+    return _judged(truth, flow.unit_flow(Space(mesh, order), pores.RATIO).loss + pores.outside_loss(), mesh)
 
 
 def _taylor_hood(truth: float, refinements: int) -> dict:

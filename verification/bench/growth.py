@@ -10,11 +10,9 @@ from functools import cache, partial
 import numpy as np
 
 from reference import neo_hookean, quadratic_growth
-from repro.curved import growth as curved_growth
-from repro.curved import pore as curved_pore
-from repro.fem import geometry
+from repro.fem.outline import FREE
 from repro.model import growth, pore
-from repro.model.shape import held_at
+from repro.model.contact import constrained
 from verification.bench import options, pores
 from verification.bench.clock import measured
 
@@ -27,8 +25,8 @@ LINEAR, QUADRATIC, RINGS = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8), (0.15, 0.25, 0.45, 0.
 def run(quick: bool) -> dict:
     """The part."""
     linear, quadratic, rings = ((0.5, 1.0), (0.25, 0.45), (4,)) if quick else (LINEAR, QUADRATIC, RINGS)
-    jobs = {(options.PAPER, f"refinement {r:g}"): partial(_linear, r) for r in linear}
-    jobs |= {("order 2 on curved triangles (fast, accurate)", f"refinement {r:g}"): partial(_curved, r)
+    jobs = {(options.PAPER, f"refinement {r:g}"): partial(_ours, "paper", r) for r in linear}
+    jobs |= {("order 2 on curved triangles (fast, accurate)", f"refinement {r:g}"): partial(_ours, "accurate", r)
              for r in quadratic}
     jobs |= {("scikit-fem: quadratic elements", f"{n} rings"): partial(_skfem, n) for n in rings}
     repeats = 1 if quick else REPEATS
@@ -61,37 +59,24 @@ def _apart(found: np.ndarray, rim: np.ndarray) -> float:
 
 
 @cache
-def _seeded(scheme, refinement: float, preset: str):
-    now = scheme.seeded(pores.scene(preset=preset, refinement=refinement))
-    return now, held_at(len(now.mesh.body), now.mesh.body_loop, now.wall, now.fixed)
+def _seeded(refinement: float, preset: str):
+    now = pore.seeded(pores.scene(preset=preset, refinement=refinement))
+    return now, constrained(len(now.mesh.body), now.mesh.topology.body_loop, now.wall, now.fixed)
 
 
-def _linear(refinement: float):
-    now, held = _seeded(pore, refinement, "paper")
-    scale = RADIUS / pores.RADIUS
-    points, triangles = now.mesh.points[now.mesh.body] * scale, now.mesh.body_triangles
-    body = growth.Body(points, triangles, held)
+def _ours(preset: str, refinement: float):
+    now, held = _seeded(refinement, preset)
+    points = now.mesh.points[now.mesh.body] * RADIUS / pores.RADIUS
+    body = growth.Body(now.body.shape, points)
+    whole = theta(*(body.shape.table.values @ points[body.shape.cells]).transpose(2, 0, 1))
     start = exact(points, BEFORE)
-    found = growth.equilibrium(body, theta(*points[triangles].mean(axis=1).T), start, pressure(points, BEFORE), start)
+    found = growth.equilibrium(body, whole, start, pressure(points[: body.shape.corners], BEFORE), held, start)
     return partial(_judged, now, points, found.position)
-
-
-def _curved(refinement: float):
-    now, held = _seeded(curved_pore, refinement, "accurate")
-    points, corners = now.mesh.points[now.mesh.body] * RADIUS / pores.RADIUS, _corners(now)
-    body = curved_growth.Body(points, points, now.mesh.body_cells, corners, held)
-    start = exact(points, BEFORE)
-    found = curved_growth.equilibrium(body, theta(*points.T), start, pressure(points[:corners], BEFORE), start)
-    return partial(_judged, now, points, found.position)
-
-
-def _corners(now) -> int:
-    return int(np.searchsorted(now.mesh.body, now.mesh.corners))
 
 
 def _judged(now, points, found) -> dict:
-    rim = now.mesh.body_loop
-    rim = rim[now.wall == geometry.FREE]
+    rim = now.mesh.topology.body_loop
+    rim = rim[now.wall == FREE]
     return {"error": _apart(found[rim], points[rim]), "nodes": len(points)}
 
 

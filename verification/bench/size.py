@@ -16,8 +16,7 @@ from statistics import median
 from time import perf_counter, process_time
 
 from repro import timing
-from repro.curved import coupling as curved
-from repro.march import coupling
+from repro.march import midpoint, updates
 from repro.model import pore
 from repro.scene import load_scene
 from verification.bench.envelope import exponent
@@ -80,11 +79,11 @@ def scene(kind: str, refinement: float):
 
 def sized(kind: str, nodes: int):
     """(scene, pore) of about so many nodes."""
-    scheme, (factor, power) = _scheme(kind), FIRST[kind.split()[0]]
+    factor, power = FIRST[kind.split()[0]]
     refinement = factor * nodes**power
     for _ in range(3):
         given = scene(kind, refinement)
-        now = scheme.seeded(given)
+        now = pore.seeded(given)
         count = len(now.mesh.points)
         if abs(count / nodes - 1) < 0.1:
             break
@@ -92,25 +91,23 @@ def sized(kind: str, nodes: int):
     return given, now
 
 
-def _scheme(kind: str):
-    return pore if kind.startswith("paper") else curved
+#: A step of a length (h), by the scene's ``numerics.time``.
+STEPS = {"updates": updates.step, "midpoint": lambda *given: midpoint.attempt(*given).step}
 
 
 def measure(kind: str, nodes: int, steps: int) -> dict:
     """Seconds of a step and of its stages, their floor, and memory."""
     before = _resident()
     given, now = sized(kind, nodes)
-    scheme = _scheme(kind)
-    solved = scheme.solve(given, now)
+    solved = pore.solve(given, now)
     now = replace(now, concentrations=solved.concentrations)
     rows = []
     for _ in range(steps + 1):
         timing.reset()
         wall, spent = perf_counter(), process_time()
-        taken = coupling.step(given, now, solved, STEP) if scheme is pore else curved.attempt(
-            given, now, solved, STEP).step
+        taken = STEPS[given.numerics.time](given, now, solved, STEP)
         after = replace(taken.pore, time=now.time + STEP)
-        solved = scheme.solve(given, after)
+        solved = pore.solve(given, after)
         now = replace(after, concentrations=solved.concentrations)
         rows.append((perf_counter() - wall, process_time() - spent, dict(timing.seconds), taken.remeshed))
     rows = rows[1:] or rows

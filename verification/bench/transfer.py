@@ -9,9 +9,9 @@ from functools import cache, partial
 
 import numpy as np
 
-from repro.curved import elements, transfer
-from repro.curved.mesh import curved
-from repro.fem import reprojection
+from repro.fem import transfer
+from repro.fem.mesh import curved
+from repro.fem.space import Space
 from verification import meshes, norms
 from verification.bench import options
 from verification.bench.clock import measured
@@ -25,9 +25,9 @@ REMESHES, SIZES, QUADRATIC = 20, (4.0, 2.8, 2.0, 1.4, 1.0), (8.0, 5.6, 4.0, 2.8,
 def run(quick: bool) -> dict:
     """The part."""
     count, sizes, quadratic = (3, (4.0, 2.8), (5.6,)) if quick else (REMESHES, SIZES, QUADRATIC)
-    ways = {"conserving projection": reprojection.project,
-            "bounded conserving projection": reprojection.project_bounded,
-            f"linear interpolation, {options.PAPER}": None}
+    ways = {"conserving projection": transfer.project,
+            "bounded conserving projection": transfer.project_bounded,
+            f"linear interpolation, {options.PAPER}": transfer.interpolated}
     jobs = {(name, f"{size:g} um"): partial(_linear, size, count, way) for name, way in ways.items() for size in sizes}
     jobs |= {("quadratic interpolation (fast, accurate)", f"{size:g} um"): partial(_quadratic, size, count)
              for size in quadratic}
@@ -50,7 +50,7 @@ def _meshed(size: float, which: int):
 @cache
 def _curved(size: float, which: int):
     straight = meshes.channel(ENDS, WIDTH, size, lambda x, y: x < np.inf, seed=which)
-    return curved(straight, None)
+    return Space(curved(straight, None), 2)
 
 
 @cache
@@ -67,7 +67,7 @@ def _linear(size: float, count: int, project):
     start = _integral(*old, field)
     for which in range(1, count + 1):
         new = _meshed(size, which)
-        field = (project(*old, field, *new) if project else reprojection.interpolate(*old, field, new[0]))
+        field = project(*old, field, *new)
         old = new
     return lambda: {"error": norms.l2_error(*old, field[:, 0], exact), "nodes": len(old[0]),
                     "drift": abs(_integral(*old, field) - start) / _total(),
@@ -85,19 +85,19 @@ def _quadratic(size: float, count: int):
     start = _weighed(old, field)
     for which in range(1, count + 1):
         new = _curved(size, which)
-        field = transfer.interpolate(old.points, old.cells, field, new.points)
+        field = transfer.interpolate(old.mesh.points, old.mesh.cells, field, new.points)
         old = new
-    return lambda: {"error": _apart(old, field), "nodes": len(old.points),
+    return lambda: {"error": _apart(old, field), "nodes": old.count,
                     "drift": abs(_weighed(old, field) - start) / _total(),
                     "beyond": float(max(1.0 - field.min(), field.max() - 2.0, 0.0))}
 
 
-def _weighed(mesh, field) -> float:
-    return float(np.sum(mesh.places.dx * elements.at_points(field[:, 0], mesh.cells)))
+def _weighed(space, field) -> float:
+    return float(np.sum(space.at.dx * space.at_points(field[:, 0])))
 
 
-def _apart(mesh, field) -> float:
+def _apart(space, field) -> float:
     """L2 of a quadratic field less the exact one, relative."""
-    truth = exact(*(elements.at_points(mesh.points[:, k], mesh.cells) for k in (0, 1)))
-    gap = elements.at_points(field[:, 0], mesh.cells) - truth
-    return float(np.sqrt(np.sum(mesh.places.dx * gap**2) / np.sum(mesh.places.dx * truth**2)))
+    truth = exact(*space.at_points(space.points.T))
+    gap = space.at_points(field[:, 0]) - truth
+    return float(np.sqrt(np.sum(space.at.dx * gap**2) / np.sum(space.at.dx * truth**2)))

@@ -6,14 +6,14 @@ flow and transport, time of transport alone.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache, partial
 
 import numpy as np
 
-from repro.curved import flow as curved_flow
-from repro.curved import pore as curved_pore
-from repro.curved import transport as curved_transport
+from repro.fem.space import Space
 from repro.model import pore, transport
+from repro.model.kinetics import Sink
 from verification.bench import options, pores
 from verification.bench.clock import measured
 
@@ -30,9 +30,9 @@ def run(quick: bool) -> dict:
     coarse, truth = reference(rings[0]), reference(rings[1])
     jobs = {}
     for name, element in options.flow_elements():
-        jobs |= {(name, f"refinement {r:g}"): _linear(truth, r, element) for r in linear}
+        jobs |= {(name, f"refinement {r:g}"): _ours(truth, 1, refinement=r, **element) for r in linear}
     for order, name in ((2, "order 2 on curved triangles (fast, accurate)"), (3, "order 3 on curved triangles")):
-        jobs |= {(name, f"refinement {r:g}"): _curved(truth, r, order) for r in quadratic}
+        jobs |= {(name, f"refinement {r:g}"): _ours(truth, order, preset="accurate", refinement=r) for r in quadratic}
     jobs |= {("scikit-fem: quadratic elements", f"{n} rings"): partial(_section, truth, *prepared(n)) for n in sections}
     repeats, change = 1 if quick else REPEATS, pores.largest(coarse, truth, supply())
     return {"title": "Transport: dual Monod uptake around a half-disc of 40 um in a pore of 50 um, 2.9 m/d; assembly "
@@ -72,22 +72,16 @@ def _section(truth, section, flow) -> dict:
     return {"error": pores.largest(_effluents(section, flow), truth, supply())}
 
 
-def _linear(truth, refinement: float, element: dict):
-    scene = pores.scene(refinement=refinement, **element)
+def _ours(truth, order: int, **numerics):
+    scene = pores.scene(**numerics)
     now = pore.seeded(scene)
-    return partial(_solved, truth, scene, now, now.active, pore.solve_flow(scene, now), transport)
+    space = Space(now.mesh, order)
+    return partial(_solved, truth, scene, space, pore.solve_flow(scene, space))
 
 
-def _curved(truth, refinement: float, order: int):
-    scene = pores.scene(preset="accurate", refinement=refinement)
-    now = curved_pore.seeded(scene)
-    found = curved_flow.solve(now.mesh, scene.flow, scene.pore.length, order)
-    return partial(_solved, truth, scene, now, curved_pore.active_biomass(scene, now), found, curved_transport,
-                   order=order)
-
-
-def _solved(truth, scene, now, active, flow, stage, **order) -> dict:
-    now.mesh.topology.clear()  # orderings and sparsity too are worked out anew
-    problem = stage.problem(now.mesh, flow, scene.substrates, scene.kinetics, **order)
-    found = stage.fluxes(problem, active, stage.steady(problem, active))
-    return {"error": pores.largest([flux.effluent for flux in found], truth, supply()), "nodes": len(now.mesh.points)}
+def _solved(truth, scene, space, flow) -> dict:
+    space = Space(replace(space.mesh, topology=replace(space.mesh.topology)), space.order)  # nothing is known of it
+    problem = transport.problem(space, flow, scene.substrates, scene.kinetics)
+    sink = Sink(scene.kinetics.maximum_density * space.reaction.dx)
+    found = transport.fluxes(problem, sink, transport.steady(problem, sink))
+    return {"error": pores.largest([flux.effluent for flux in found], truth, supply()), "nodes": len(space.mesh.points)}
