@@ -23,10 +23,12 @@ import numpy as np
 import scipy.sparse as sp
 
 from repro.errors import TransportError, Unresolved
+from repro.fem import elements
 from repro.fem.assembly import ElementSystem, Factored, each, mass
 from repro.fem.mesh import Mesh
 from repro.fem.newton import Newton, relative
 from repro.fem.space import Space
+from repro.model import kinetics as kinetics_law
 from repro.model.flow import Flow
 from repro.model.kinetics import Sink
 from repro.scene import Kinetics, Substrate, Substrates
@@ -38,6 +40,10 @@ NEWTON, ROUND_OFF, MOST_ITERATIONS = 1e-13, 1e-12, 60
 SATURATED = 0.9
 #: A concentration below zero by more than this part of its supply is not resolved.
 UNRESOLVED = 1e-3
+#: Neither is uptake where a quadrature of a degree higher by FINER differs by more than this. The difference is of the
+#: same concentrations, which have not come to rest with the finer one: in base with fronts of half saturations from 1e-1
+#: to 1e-6 of the supply, biomass made in 2 h was wrong by a hundredth of the largest difference or less.
+APART, FINER = 0.05, 3
 #: Neither is one above its supply by more than this part of it.
 OVERSHOOT = 0.02
 
@@ -342,7 +348,10 @@ def steady(problem: Problem, sink: Sink | None, guess: Concentrations | None = N
         found, count = _found(Balance(problem, sink), state)
     except TransportError:
         found, count = _eased(problem, sink, supply)
-    return _checked(problem, found, count)
+    state = _checked(problem, found, count)
+    if sink is not None and problem.space.order > 1:
+        _refuse_unresolved(problem, sink, state)
+    return state
 
 
 def _found(balance: Balance, state: np.ndarray) -> tuple[np.ndarray, int]:
@@ -382,6 +391,29 @@ def _checked(problem: Problem, state: np.ndarray, iterations: int) -> Concentrat
             raise _outside(problem, name, field, int(field.argmax()), substrate)
     acceptor, donor = state.reshape(2, -1)
     return Concentrations(acceptor, donor, iterations)
+
+
+def _refuse_unresolved(problem: Problem, sink: Sink, state: Concentrations) -> None:
+    """Raises Unresolved where two quadratures of the uptake differ by more than APART."""
+    apart = quadrature_error(problem, sink, state)
+    if apart > APART:
+        raise Unresolved(f"two quadratures of the uptake differ by {100 * apart:.2g} % (up to {100 * APART:g} % is "
+                         "accepted); the mesh is too coarse for the front in the aggregate")
+
+
+def quadrature_error(problem: Problem, sink: Sink, state: Concentrations) -> float:
+    """How much the donor taken up differs, relatively, by a finer quadrature of the same concentrations; biomass as it
+    is, its density linear in each triangle."""
+    space, mesh = problem.space, problem.mesh
+    of = elements.table(space.order, mesh.geometry, elements.DEGREES[space.order] + FINER)
+    corners = mesh.points[mesh.cells[mesh.biomass]]
+    densities = sink.active / space.reaction.dx @ np.linalg.pinv(space.table.linear).T @ of.linear.T
+    both = np.stack([state.acceptor, state.donor])
+    acceptor, donor = both[:, space.cells[mesh.biomass]] @ of.values.T
+    rate = kinetics_law.uptake(acceptor, donor, problem.substrates, problem.kinetics)[1]
+    finer = float(np.vdot(densities * elements.weights(corners, of), rate))
+    own = float(Balance(problem, Sink(sink.active)).uptake(both.ravel())[:, 1].sum())
+    return abs(finer - own) / own if own else 0.0
 
 
 def _outside(problem: Problem, name: str, field: np.ndarray, node: int, substrate: Substrate) -> Unresolved:
