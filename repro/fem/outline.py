@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 FREE, BOTTOM, TOP = 0, 1, 2
 
@@ -139,3 +140,78 @@ def half_disc(radius: float, across: float, geometry: int = 1, middle: float = 0
     points[:, 0] += middle
     wall = np.where(np.arange(len(points)) < len(base), BOTTOM, FREE)
     return Outline(points, wall, np.arange(len(points)) == half, points.copy(), geometry)
+
+
+def polygon(corners: np.ndarray, width: float, geometry: int = 1, smooth: bool = False) -> Outline:
+    """The outline of an aggregate through points (K, 2) um from its upstream to its downstream end on the lower wall.
+
+    Points on the upper wall, y = ``width`` um, are contact. smooth: a natural cubic spline
+    takes the place of straight lines between two points of which one is free. The middle of each contact surface is its
+    fixed point. Raises ValueError where the curve leaves the pore.
+    """
+    rim = np.asarray(corners, float)[::-1]  # counterclockwise: downstream end first, over the top, upstream end
+    if smooth:
+        rim = _splined(rim, width)
+    first, last = rim[-1], rim[0]
+    base = np.column_stack([np.linspace(first[0], last[0], 3), np.zeros(3)])
+    points = np.vstack([base, rim[1:-1]])
+    if points[:, 1].min() < 0 or points[:, 1].max() > width:
+        raise ValueError("the curve through the points of the outline leaves the pore")
+    wall = np.where(points[:, 1] == width, TOP, FREE)
+    wall[:3] = BOTTOM
+    points, wall = _with_contact_middle(points, wall)
+    fixed = _middles(points, wall)
+    if geometry == 2:
+        points, wall, fixed = _with_arc_middles(points, wall, fixed)
+    return Outline(points, wall, fixed, points.copy(), geometry)
+
+
+#: Points of a spline between two of the points that it goes through.
+BETWEEN = 8
+
+
+def _splined(rim: np.ndarray, width: float) -> np.ndarray:
+    """Points (M, 2) on a spline through points (K, 2), straight along the upper wall."""
+    length = np.sqrt(np.linalg.norm(np.diff(rim, axis=0), axis=1))
+    knots = np.concatenate([[0.0], np.cumsum(length)])
+    curve = CubicSpline(knots, rim, bc_type="natural")
+    pieces = []
+    for k, (start, end) in enumerate(zip(rim, rim[1:])):
+        flat = start[1] == width and end[1] == width
+        t = np.linspace(knots[k], knots[k + 1], BETWEEN + 1)[:-1]
+        pieces.append(start[None] if flat else np.vstack([start, curve(t[1:])]))
+    return np.vstack([*pieces, rim[-1]])
+
+
+def _with_contact_middle(points: np.ndarray, wall: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A node in the middle of the upper contact surface, where there is one."""
+    top = np.flatnonzero(wall == TOP)
+    if len(top) == 0:
+        return points, wall
+    x = points[top, 0]
+    middle = 0.5 * (x.min() + x.max())
+    if np.isclose(x, middle).any():
+        return points, wall
+    after = top[np.searchsorted(-x, -middle)]  # the loop runs from downstream to upstream along the upper wall
+    return np.insert(points, after, [middle, points[after, 1]], axis=0), np.insert(wall, after, TOP)
+
+
+def _middles(points: np.ndarray, wall: np.ndarray) -> np.ndarray:
+    """(M,) True at the node in the middle of each contact surface."""
+    fixed = np.zeros(len(points), bool)
+    for side in (BOTTOM, TOP):
+        on = np.flatnonzero(wall == side)
+        if len(on):
+            x = points[on, 0]
+            fixed[on[np.argmin(np.abs(x - 0.5 * (x.min() + x.max())))]] = True
+    return fixed
+
+
+def _with_arc_middles(points: np.ndarray, wall: np.ndarray,
+                      fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Corners and the middles of straight edges in turn."""
+    after = np.roll(points, -1, axis=0)
+    both = np.stack([points, 0.5 * (points + after)], axis=1).reshape(-1, 2)
+    between = np.where(wall == np.roll(wall, -1), wall, FREE)
+    walls = np.stack([wall, between], axis=1).ravel()
+    return both, walls, np.stack([fixed, np.zeros_like(fixed)], axis=1).ravel()
