@@ -3,17 +3,6 @@
 Where a reference has one dimension, the pore is a narrow channel, meshed at random, with biomass from wall to wall.
 """
 
-from verification.transport import (
-    closed_forms,
-    cubic,
-    curved,
-    manufactured,
-    monod_channel,
-    properties,
-    still_water,
-    transients,
-    well_mixed,
-)
+from verification.transport import closed_forms, manufactured, monod_channel, transients
 
-__all__ = ["closed_forms", "cubic", "curved", "manufactured", "monod_channel", "properties", "still_water",
-           "transients", "well_mixed"]
+__all__ = ["closed_forms", "manufactured", "monod_channel", "transients"]
