@@ -4,8 +4,6 @@ from verification.flow import (  # noqa: F401
     bubble,
     closed_forms,
     cross_code,
-    cubic,
-    curved,
     graded,
     inclusion,
     layers,

@@ -36,8 +36,8 @@ LONG, LEFT = 250.0, 2e-6
 
 @case("flow-layers", kind="exact", slow=True, norm="middle of a long layer, root mean square over random meshes of a "
       "size: L2 of u, of u within the layer (relative to that), and relative error of the pressure gradient",
-      claim="Along a layer of biomass the flow is that of two viscous layers, for lambda from 1 to 1e8, to second order "
-            "with linear elements in both forms and on any mesh with quadratic and cubic ones",
+      claim="Along a layer of biomass the flow is that of two viscous layers, for lambda from 1 to 1e8, to second "
+            "order with linear elements in both forms and on any mesh with quadratic and cubic ones",
       mutants=("tau-of-water", "viscosity-swapped"))
 def layers() -> Outcome:
     studies = [part for ratio in RATIOS for part in _studies(ratio, "laplacian")]

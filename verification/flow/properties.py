@@ -2,104 +2,168 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
+from itertools import product
 
 import numpy as np
 
-from repro.fem import geometry, mesh
-from repro.fem.assembly import each, saddle_blocks
-from repro.fem.mesh import PoreMesh
+from repro.fem import elements
+from repro.fem.assembly import saddle_blocks
+from repro.fem.mesh import Mesh, curved
+from repro.fem.space import Space
 from repro.model import flow
-from verification.case import Outcome, at_least, at_most, case
+from verification import meshes, norms
+from verification.case import Check, Outcome, at_least, at_most, between, case
 from verification.flow import grids
+from verification.flow.closed_forms import LENGTH, drive
 
 WIDTH, ENDS, RATIO = 50.0, (-75.0, 75.0), 2000.0
+ORDERS, FORMS = (1, 2, 3), ("laplacian", "traction")
+#: Refinement of the meshes of each order.
+REFINED = {1: 1.0, 2: 0.5, 3: 0.4}
 
 
 @cache
-def _half_disc(radius: float, lean: float = 0.0, reach: float = 75.0) -> PoreMesh:
-    """The mesh around a half-disc that is sheared by ``lean``."""
-    seed = geometry.seed(radius)
-    points = seed.points + lean * seed.points[:, [1]] * [1.0, 0.0]
-    outline = geometry.Outline(points, seed.wall, seed.fixed, points)
-    return mesh.generate(outline, (-reach, reach), geometry.Sizing(WIDTH, 1.0, 2.0))[0]
+def _half_disc(radius: float, order: int = 1, lean: float = 0.0, reach: float = 75.0) -> Space:
+    """Functions of an order on the mesh around a half-disc that is sheared by ``lean``."""
+    grid = meshes.half_disc(radius, REFINED[order], (-reach, reach), WIDTH, geometry=min(order, 2), lean=lean)
+    return Space(grid, order)
+
+
+@cache
+def _plugged(order: int) -> Space:
+    grid = grids.channel(ENDS, WIDTH, 3.1 if order == 1 else 6.0, lambda x, y: np.abs(x) < 30, across=(-30.0, 30.0))
+    return Space(grid if order == 1 else curved(grid, None), order)
 
 
 @case("flow-sections", kind="property", norm="largest relative error of the flux through 25 sections",
-      claim="The same flux passes every section of a pore, plugged or not: to round-off for w = u - tau grad p",
-      mutants=("tau-of-water", "carried-by-u-plus", "inlet-not-scaled"))
+      claim="The same flux passes every section of a pore, plugged or not: to round-off for w = u - tau grad p of "
+            "linear elements and for u itself of quadratic and cubic ones, in both forms",
+      mutants=("tau-of-water", "carried-by-u-plus", "inlet-not-scaled", "curved-straight-divergence",
+               "inlet-parabola"))
 def sections() -> Outcome:
-    plug = grids.channel(ENDS, WIDTH, 3.1, lambda x, y: np.abs(x) < 30, across=(-30.0, 30.0))
-    checks = []
-    for name, grid, drop in (("plug", plug, 0.003), ("half-disc of 40 um", _half_disc(40.0), 0.012),
-                             ("half-disc of 46 um", _half_disc(46.0), 0.008)):
-        found = flow.unit_flow(grid, RATIO)
-        carried = found.velocity[grid.triangles].mean(axis=1) - found.correction
-        checks += [at_most(f"w, {name}", _flux_error(grid, carried), 1e-9, "(2) tested with linear ramps, round-off"),
-                   at_most(f"u, {name}", _flux_error(grid, carried + found.correction), drop,
-                           "the defect of u on a coarse mesh, with margin (trap 3: 98 %)")]
+    checks, why = [], "(2) tested with linear ramps, round-off"
+    pores = {"plug": (_plugged, 0.003), "half-disc of 40 um": (partial(_half_disc, 40.0), 0.012),
+             "half-disc of 46 um": (partial(_half_disc, 46.0), 0.008)}
+    for name, (of, drop) in pores.items():
+        grid, linear = of(1).mesh, flow.unit_flow(of(1), RATIO)
+        carried = linear.velocity[grid.triangles].mean(axis=1) - linear.correction
+        checks += [at_most(f"w, {name}", flux_error(grid, carried), 1e-9, why),
+                   at_most(f"u, {name}", flux_error(grid, carried + linear.correction), drop,
+                           "the defect of u on a coarse mesh, with margin")]
+        for order, interface in product((2, 3), FORMS):
+            found = flow.unit_flow(of(order), RATIO, interface=interface)
+            checks.append(at_most(f"u, {name}, order {order}, {interface}", _carried_error(of(order), found.velocity),
+                                  1e-9, why))
     return Outcome(tuple(checks))
 
 
-def _flux_error(grid: PoreMesh, carried: np.ndarray) -> float:
+def _ramps(grid: Mesh):
+    """Values at the corners of functions that fall from one at the inlet to zero at the outlet, one for each section.
+    """
+    for x in np.linspace(-65.0, 65.0, 25):
+        yield np.clip((x + 5.0 - grid.points[: grid.corners, 0]) / 10.0, 0.0, 1.0)
+
+
+def flux_error(grid: Mesh, carried: np.ndarray) -> float:
     """Largest error of the flux of a field (T, 2) through sections, each a ramp of linear functions."""
     worst = 0.0
-    for x in np.linspace(-65.0, 65.0, 25):
-        ramp = np.clip((x + 5.0 - grid.points[:, 0]) / 10.0, 0.0, 1.0)
+    for ramp in _ramps(grid):
         slope = np.einsum("tai,ta->ti", grid.gradients, ramp[grid.triangles])
         flux = -np.sum(grid.areas * np.sum(carried * slope, axis=1))
         worst = max(worst, abs(flux / grid.width - 1))
     return worst
 
 
+def _carried_error(space: Space, velocity: np.ndarray) -> float:
+    """The same of a velocity (n, 2) at the nodes of a space."""
+    grid, worst = space.mesh, 0.0
+    _, weight, shape = norms.fine(space)
+    at = np.einsum("qa,tai->tqi", shape, velocity[space.cells])
+    linear = elements.points(grid.points[grid.cells], elements.table(1, grid.geometry, norms.FINE)).slopes
+    for ramp in _ramps(grid):
+        slope = np.einsum("tqia,ta->tqi", linear, ramp[grid.triangles])
+        flux = -np.sum(weight * np.sum(at * slope, axis=2))
+        worst = max(worst, abs(flux / grid.width - 1))
+    return worst
+
+
 @case("flow-energy", kind="property", norm="relative difference",
-      claim="The work of the inlet is what viscosity and stabilisation dissipate, and the flow is linear in its drive",
-      mutants=("correction-not-scaled",))
+      claim="The work of the inlet is what viscosity and stabilisation dissipate, of order 2 and 3 the head loss times "
+            "the flux, and the flow is linear in its drive",
+      mutants=("correction-not-scaled", "loss-per-width"))
 def energy() -> Outcome:
-    grid = _half_disc(25.0)
-    unit = flow.unit_flow(grid, RATIO)
-    work, dissipated = _power(grid, unit)
-    driven = [flow.scaled(unit, grid, 600.0, 3e-4, head=head, mean_velocity=None) for head in (10.0, 20.0)]
-    twice = [abs(np.abs(b).max() / np.abs(a).max() - 2) for a, b in
-             zip(*((f.velocity, f.head, f.correction) for f in driven))]
-    return Outcome((at_most("work less dissipation", abs(work / dissipated - 1), 1e-9,
-                            "symmetry of the weak form, round-off"),
-                    at_most("twice the head, twice the flow", max(twice), 1e-12, "linearity, round-off"),
-                    at_most("head given, head lost", abs(driven[0].head_loss / 10.0 - 1), 1e-12,
-                            "linearity, round-off")))
+    checks = []
+    for order, interface in product(ORDERS, FORMS):
+        space, name = _half_disc(25.0, order), f"order {order}, {interface}"
+        unit = flow.unit_flow(space, RATIO, interface=interface)
+        work, dissipated = _power(space, unit, interface)
+        driven = [flow.scaled(unit, space.mesh, LENGTH, drive(head=head)) for head in (10.0, 20.0)]
+        checks += [at_most(f"work less dissipation, {name}", abs(work / dissipated - 1), 1e-9,
+                           "symmetry of the weak form, round-off"),
+                   at_most(f"twice the head, twice the flow, {name}", _off_twice(*driven), 1e-12,
+                           "linearity, round-off"),
+                   at_most(f"head given, head lost, {name}", abs(driven[0].head_loss / 10.0 - 1), 1e-12,
+                           "linearity, round-off")]
+        if order > 1:
+            checks.append(at_most(f"loss times flux, {name}", abs(unit.loss * WIDTH / dissipated - 1), 1e-9,
+                                  "the loss is the work of the inlet, round-off"))
+    return Outcome(tuple(checks))
 
 
-def _power(grid: PoreMesh, unit: flow.UnitFlow) -> tuple[float, float]:
+def _off_twice(once: flow.Flow, twice: flow.Flow) -> float:
+    """By how much the ratios of the fields of two flows differ from two."""
+    fields = [(getattr(once, name), getattr(twice, name)) for name in ("velocity", "head", "correction")]
+    return max(abs(np.abs(b).max() / np.abs(a).max() - 2) for a, b in fields if a is not None)
+
+
+def _power(space: Space, unit: flow.UnitFlow, interface: str) -> tuple[float, float]:
     """Work of the inlet's forces on the unit flow, and a(u, u) + (tau grad p, grad p)."""
-    found = flow.forms(grid)
-    dofs, viscosity = found.cells, np.where(grid.biomass, RATIO, 1.0)
-    local = np.concatenate([unit.velocity[dofs, 0], unit.velocity[dofs, 1], unit.pressure[dofs]], axis=1)
-    upper = np.einsum("tab,tbi,tai,t->", found.laplace, unit.velocity[dofs], unit.velocity[dofs], viscosity)
-    blocks = saddle_blocks(flow._viscous(found, viscosity, "laplacian"), found.divergence,
-                           each(0 * viscosity, found.laplace))
-    force = np.bincount(dofs.ravel(), np.einsum("tij,tj->ti", blocks, local)[:, :3].ravel(), len(grid.points))
+    grid, cells, pressure = space.mesh, space.cells, flow.pressure_space(space).cells
+    viscosity, count = np.where(grid.biomass, RATIO, 1.0), space.cells.shape[1]
+    blocks = saddle_blocks(flow.viscous(space, viscosity, interface), flow.divergence(space))
+    local = np.concatenate([unit.velocity[cells, 0], unit.velocity[cells, 1], unit.pressure[pressure]], axis=1)
+    moving = local[:, : 2 * count]
+    upper = np.einsum("tab,ta,tb->", blocks[:, : 2 * count, : 2 * count], moving, moving)
+    force = np.bincount(cells.ravel(), np.einsum("tij,tj->ti", blocks, local)[:, :count].ravel(), space.count)
+    inlet = space.end_nodes(space.dofs.inlet)
+    work = float(force[inlet] @ unit.velocity[inlet, 0])
+    if space.order > 1:
+        return work, float(upper)
     tau = grid.circumdiameter**2 / (100.0 * viscosity)
-    lower = np.einsum("tab,ta,tb,t->", found.laplace, unit.pressure[dofs], unit.pressure[dofs], tau)
-    return float(force[grid.inlet] @ unit.velocity[grid.inlet, 0]), float(upper + lower)
+    slope = np.einsum("tai,ta->ti", grid.gradients, unit.pressure[grid.triangles])
+    return work, float(upper + np.sum(tau * grid.areas * np.sum(slope**2, axis=1)))
 
 
 @case("flow-reversed", kind="property", norm="L2 of the difference of both velocities, in the middle and everywhere",
       claim="Flow through a leaning aggregate is its mirror image's flow mirrored, since Stokes flow is reversible",
       mutants=("outlet-free",))
 def reversed_flow() -> Outcome:
-    grid = _half_disc(25.0, lean=0.6, reach=150.0)
-    mirror = PoreMesh(grid.points * [-1.0, 1.0], grid.triangles[:, ::-1], grid.biomass, grid.loop, WIDTH, grid.ends)
     checks = []
-    for interface in ("laplacian", "traction"):
-        there, back = (flow.unit_flow(way, RATIO, interface=interface).velocity for way in (grid, mirror))
-        apart = np.sum((there - back * [1.0, -1.0]) ** 2, axis=1)
-        near = np.abs(grid.points[:, 0]) < 40
+    for order, interface in product(ORDERS, FORMS):
+        space = _half_disc(25.0, order, lean=0.6, reach=150.0)
+        mirror = Space(_mirrored(space.mesh), order)
+        there, back = (flow.unit_flow(way, RATIO, interface=interface).velocity for way in (space, mirror))
+        near = np.abs(space.mesh.points[space.mesh.triangles, 0]).max(axis=1) < 40
         for where, chosen, bound, why in (
                 ("around the aggregate", near, 1e-6, "what differs at inlet and outlet decays like exp(-4.2 x / W)"),
                 ("everywhere", near | True, 5e-4, "second order, in the layer where inlet and outlet differ")):
-            size = np.sqrt(grid.lumped() @ (apart * chosen) / (grid.lumped() @ np.sum(there**2, axis=1)))
-            checks.append(at_most(f"difference {where}, {interface}", size, bound, why))
+            size = _size(space, there - back * [1.0, -1.0], chosen) / _size(space, there, near | True)
+            checks.append(at_most(f"difference {where}, order {order}, {interface}", size, bound, why))
     return Outcome(tuple(checks))
+
+
+def _mirrored(grid: Mesh) -> Mesh:
+    """The mesh with inlet and outlet exchanged, nodes numbered as before."""
+    cells = grid.cells[:, [2, 1, 0, 4, 3, 5][: grid.cells.shape[1]]]
+    return Mesh.of(grid.points * [-1.0, 1.0], cells, grid.biomass, grid.loop, WIDTH, grid.ends)
+
+
+def _size(space: Space, field: np.ndarray, chosen: np.ndarray) -> float:
+    """L2 norm of a field (n, 2) over the triangles ``chosen``."""
+    _, weight, shape = norms.fine(space, chosen)
+    at = np.einsum("qa,tai->tqi", shape, field[space.cells[chosen]])
+    return float(np.sqrt(np.sum(weight[..., None] * at**2)))
 
 
 RATIOS = np.array([1.0, 2.0, 10.0, 100.0, 2000.0, 1e5])
@@ -109,12 +173,48 @@ RATIOS = np.array([1.0, 2.0, 10.0, 100.0, 2000.0, 1e5])
       claim="Viscous biomass never raises the conductivity: the loss rises with lambda, ever more slowly, and with R",
       mutants=("thin-biomass",))
 def obstacle() -> Outcome:
-    losses = np.array([[flow.unit_flow(_half_disc(radius), ratio).loss for ratio in RATIOS]
+    return Outcome(tuple(check for order in ORDERS for interface in FORMS for check in _rising(order, interface)))
+
+
+def _rising(order: int, interface: str) -> list[Check]:
+    """Losses of four half-discs."""
+    losses = np.array([[flow.unit_flow(_half_disc(radius, order), ratio, interface=interface).loss for ratio in RATIOS]
                        for radius in (5.0, 25.0, 40.0, 46.0)])
     slopes = np.diff(losses, axis=1) / np.diff(RATIOS)
+    name = f"order {order}, {interface}"
     why = "least dissipation (Helmholtz): the loss is the least of functions that are linear in lambda"
-    return Outcome((at_least("least rise with lambda, over the loss", (np.diff(losses, axis=1) / losses[:, 1:]).min(),
-                             0.0, why),
-                    at_most("largest slope over the one before", (slopes[:, 1:] / slopes[:, :-1]).max(), 1.0, why),
-                    at_least("least rise with R at lambda = 2000, over the loss",
-                             (np.diff(losses[:, 4]) / losses[1:, 4]).min(), 0.0, "nested obstacles: " + why)))
+    return [at_least(f"least rise with lambda, over the loss, {name}",
+                     (np.diff(losses, axis=1) / losses[:, 1:]).min(), 0.0, why),
+            at_most(f"largest slope over the one before, {name}", (slopes[:, 1:] / slopes[:, :-1]).max(), 1.0, why),
+            at_least(f"least rise with R at lambda = 2000, over the loss, {name}",
+                     (np.diff(losses[:, 4]) / losses[1:, 4]).min(), 0.0, "nested obstacles: " + why)]
+
+
+#: Weights of the nodes of an edge, exact for polynomials of the order.
+SIMPSON = {2: np.array([1, 4, 1]) / 6, 3: np.array([1, 3, 3, 1]) / 8}
+
+
+@case("flow-curved-flux", kind="property", norm="flux through sections over that of the inlet",
+      claim="What comes in goes through every section, order 2 and 3 and both forms: exactly at the outlet, and as "
+            "well as the mesh resolves it across the aggregate",
+      mutants=("curved-straight-divergence",))
+def curved_flux() -> Outcome:
+    return Outcome(tuple(check for order in (2, 3) for interface in FORMS for check in _through(order, interface)))
+
+
+def _through(order: int, interface: str) -> list[Check]:
+    """Fluxes by the midpoint rule across the pore, and over the outlet by Simpson's rules."""
+    space = Space(meshes.half_disc(20.0, 1.2, ENDS, WIDTH, geometry=2), order)
+    velocity, name = flow.unit_flow(space, RATIO, interface=interface).velocity, f"order {order}, {interface}"
+    y = (np.arange(2000) + 0.5) / 2000 * WIDTH
+    out = space.end_lengths(space.dofs.outlet) @ velocity[space.dofs.outlet, 0] @ SIMPSON[order] / WIDTH
+    checks = [_whole(f"outlet, {name}", out, 1e-11, "q = 1: round-off")]
+    for x in (-40.0, -20.0, -7.0, 0.0, 13.0, 33.0):
+        through = norms.field_at(space, velocity, np.column_stack([np.full(len(y), x), y]))[:, 0].mean()
+        checks.append(_whole(f"x = {x:g} um, {name}", through, 1e-4,
+                             "div u vanishes in the mean only of each test function: third order"))
+    return checks
+
+
+def _whole(name: str, value: float, apart: float, why: str) -> Check:
+    return between(name, value, 1 - apart, 1 + apart, why)

@@ -29,8 +29,8 @@ CURVED, BOW = 0.5, 1e-5
 
 @case("flow-first-rise", kind="exact", norm="root mean square over meshes of about a size: "
       "relative error of d(head loss)/d(lambda) by a central difference",
-      claim="At lambda = 1 the head loss rises with lambda by what Poiseuille flow dissipates in a half-disc: to second "
-            "order with linear elements, on a coarse mesh with quadratic and cubic ones",
+      claim="At lambda = 1 the head loss rises with lambda by what Poiseuille flow dissipates in a half-disc: to "
+            "second order with linear elements, on a coarse mesh with quadratic and cubic ones",
       mutants=("viscosity-swapped", "loss-per-width"))
 def first_rise() -> Outcome:
     studies, checks = [], []

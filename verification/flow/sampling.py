@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.tri import Triangulation
 
-from repro.fem.mesh import PoreMesh
+from repro.fem.mesh import Mesh
 
 
-def sampled(grid: PoreMesh, values: np.ndarray, where: np.ndarray) -> np.ndarray:
+def sampled(grid: Mesh, values: np.ndarray, where: np.ndarray) -> np.ndarray:
     """A nodal field (N,) or (N, m) at points (K, 2) of the mesh; points that round-off puts outside are moved in."""
     near = 1e-9 * grid.width
     inside = np.clip(where, grid.points.min(axis=0) + near, grid.points.max(axis=0) - near)
