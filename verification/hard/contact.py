@@ -91,7 +91,7 @@ def _edge_wide(found: Run, fine: Run, preset: str) -> list[Check]:
     clean = poiseuille.conductivity(width, drive.kinematic_viscosity / drive.gravity) * M_PER_D
     loss = found.scene.pore.length * clean / fine.last[DRIVE[0]]
     ours, theirs = (_contact_length(run) for run in (found, fine))
-    fall = -np.diff([width - line["thickness_um"] for line in found.rows if not line["contact"]]).min()
+    fall = -np.diff([width - line["thickness_um"] for line in found.rows if not line["contact"]]).min(initial=0.0)
     share, late = LATE[found.scene.numerics.time]
     known = 2 * edge + share * np.sqrt(8 * width * fall)
     tips = {tip: known * film / width / 2 / abs(fine.last[tip]) for tip in SHAPE[2:]}
