@@ -32,19 +32,26 @@ def nodes(order: int) -> np.ndarray:
     return np.asarray(ELEMENTS[order].doflocs)
 
 
+def evaluated(order: int, where: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(q, k) shape functions at points (q, 2) of the unit triangle, and (q, k, 2) their derivatives by s and t."""
+    element, places = ELEMENTS[order], np.ascontiguousarray(where.T)
+    count = len(element.doflocs)
+    found, slopes = np.empty((len(where), count)), np.empty((len(where), count, 2))
+    for k in range(count):
+        value, gradient = element.lbasis(places, k)
+        found[:, k] = value
+        slopes[:, k, 0], slopes[:, k, 1] = gradient
+    return found, slopes
+
+
 def values(order: int, where: np.ndarray) -> np.ndarray:
     """(q, k) shape functions at points (q, 2) of the unit triangle."""
-    element = ELEMENTS[order]
-    found = [element.lbasis(where.T, k)[0] for k in range(len(element.doflocs))]
-    return np.column_stack([np.broadcast_to(value, len(where)) for value in found])
+    return evaluated(order, where)[0]
 
 
 def derivatives(order: int, where: np.ndarray) -> np.ndarray:
     """(q, k, 2) their derivatives by s and t."""
-    element, found = ELEMENTS[order], np.empty((len(where), len(nodes(order)), 2))
-    for k in range(found.shape[1]):
-        found[:, k] = np.asarray(element.lbasis(where.T, k)[1]).T
-    return found
+    return evaluated(order, where)[1]
 
 
 def quadrature(degree: int) -> tuple[np.ndarray, np.ndarray]:

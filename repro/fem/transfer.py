@@ -80,8 +80,9 @@ def _inverted(nodes: np.ndarray, where: np.ndarray, geometry: int) -> np.ndarray
     local, rest = np.full((len(where), 2), 1 / 3), np.arange(len(where))
     for _ in range(NEWTON_STEPS):
         now, there = local[rest], nodes[rest]
-        apart = (elements.values(2, now)[:, None] @ there)[:, 0] - where[rest]
-        J = np.swapaxes(there, 1, 2) @ elements.derivatives(2, now)
+        values, slopes = elements.evaluated(2, now)
+        apart = (values[:, None] @ there)[:, 0] - where[rest]
+        J = np.swapaxes(there, 1, 2) @ slopes
         det = elements.determinant(J)
         det = np.where(np.abs(det) > 1e-12 * np.abs(det).max(), det, np.inf)
         step = np.stack([J[:, 1, 1] * apart[:, 0] - J[:, 0, 1] * apart[:, 1],

@@ -25,7 +25,7 @@ nothing.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Generic, TypeVar
 
@@ -61,6 +61,7 @@ class Shape:
     corners: int
     degree: int
     method: Method = DEFAULT
+    _constrained: dict[str, ElementSystem] = field(init=False, repr=False, default_factory=dict)
 
     @property
     def geometry(self) -> int:
@@ -82,6 +83,14 @@ class Shape:
         """The sparse system of positions and pressure, nothing prescribed."""
         held = np.zeros((int(self.cells.max()) + 1, 2), bool)
         return saddle_system(self.cells, self.triangles, held, method=self.method)
+
+    def constrained(self, rows: np.ndarray) -> ElementSystem:
+        """The system with unknowns (2n + corners,) prescribed; the last one asked for is kept."""
+        last = self._constrained.get("last")
+        if last is None or not np.array_equal(last.held, rows):
+            last = self.unconstrained.holding(rows)
+            self._constrained["last"] = last
+        return last
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,8 +268,7 @@ class System:
         default; system: the sparse system with nothing prescribed, if it is known."""
         self.body, self.held, self.stabilising = body, held, stabilising
         rows = np.concatenate([held[:, 0], held[:, 1], np.zeros(body.shape.corners, bool)])
-        whole = body.shape.unconstrained if system is None else system
-        self.sparse = whole.holding(rows) if rows.any() else whole
+        self.sparse = body.shape.constrained(rows) if system is None else system.holding(rows)
         self.unknowns, self.free = self.sparse.kinds[0], self.sparse.free
         self.pull = np.zeros(len(rows))
         if forces is not None:

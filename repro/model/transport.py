@@ -38,6 +38,8 @@ from repro.timing import timed
 NEWTON, ROUND_OFF, MOST_ITERATIONS = 1e-13, 1e-12, 60
 #: No fraction m is larger than this in an iterate, so that C = K m / (1 - m) is finite.
 SATURATED = 0.9
+#: Above this fraction uptake is linearised about the concentration itself.
+SWITCH = 0.5
 #: A concentration below zero by more than this part of its supply is not resolved.
 UNRESOLVED = 1e-3
 #: Neither is uptake where a quadrature of a degree higher by FINER differs by more than this. The difference is of the
@@ -194,13 +196,14 @@ def supplied_everywhere(problem: Problem) -> Concentrations:
 @dataclass(frozen=True, eq=False)
 class Iterate:
     """Both concentrations (2n,); the fractions m_A and m_D (2, r, q) about which the uptake is linearised; the residual
-    at the concentrations and the size of its terms, um2 mg/L/h."""
+    at the concentrations and the size of its terms, um2 mg/L/h; own: are the fractions those of the concentrations?"""
 
     state: np.ndarray
     fractions: np.ndarray
     residual: np.ndarray
     size: np.ndarray
     free: np.ndarray | slice
+    own: bool = True
 
     #: Constrained nodes have their supply from the start.
     complete = True
@@ -302,13 +305,13 @@ class Balance:
         """A step of Newton's method; sizes of the terms are those of the first guess, then those after the first step
         of each derivative."""
         state = iterate.state + factors.solve(-self._linearised(iterate))
-        fractions = iterate.fractions if self.sink is None else self._followed(iterate, state)
         size = self.sizes(state) if fresh else iterate.size
-        return replace(iterate, state=state, fractions=fractions, residual=self.residual(state), size=size)
+        new = replace(iterate, state=state, residual=self.residual(state), size=size)
+        return new if self.sink is None else self._followed(iterate, new)
 
     def _linearised(self, iterate: Iterate) -> np.ndarray:
         """(2n,) the residual with the uptake that the linearisation about the fractions gives."""
-        if self.sink is None:
+        if self.sink is None or iterate.own:
             return iterate.residual
         m, law = iterate.fractions, self.problem.kinetics
         apart = self._predicted(iterate, iterate.state) - m
@@ -320,13 +323,17 @@ class Balance:
         m = iterate.fractions
         return m + self._slopes(iterate.state, m) * (self.at(state) - self._half * m / (1 - m))
 
-    def _followed(self, iterate: Iterate, state: np.ndarray) -> np.ndarray:
-        """(2, r, q) fractions about which to linearise next."""
-        there = self.at(state)
-        own, predicted = self.fractions(there), np.clip(self._predicted(iterate, state), 0.0, SATURATED)
+    def _followed(self, iterate: Iterate, new: Iterate) -> Iterate:
+        """The new iterate with the fractions about which to linearise next."""
+        there = self.at(new.state)
+        own = self.fractions(there)
+        if iterate.own and own.min() > SWITCH:
+            return replace(new, fractions=own)
+        predicted = np.clip(self._predicted(iterate, new.state), 0.0, SATURATED)
         woken = (iterate.fractions <= 0) & (predicted <= 0) & (there > 0)
-        predicted = np.where(woken, np.minimum(there / self._half, 0.5), predicted)
-        return np.where((predicted > 0.5) & (there > 0), own, np.minimum(predicted, SATURATED))
+        predicted = np.where(woken, np.minimum(there / self._half, SWITCH), predicted)
+        fractions = np.where((predicted > SWITCH) & (there > 0), own, predicted)
+        return replace(new, fractions=fractions, own=bool((fractions == own).all()))
 
 
 @timed("transport")
