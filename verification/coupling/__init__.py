@@ -6,6 +6,7 @@ from verification.coupling import (  # noqa: F401
     averaged_mixing,
     averaged_thin,
     averaged_uptake,
+    balances,
     conservation,
     contact,
     exponential,

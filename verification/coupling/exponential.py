@@ -35,7 +35,8 @@ def uniform_growth() -> Outcome:
 
 def _updated(elements: str) -> tuple[list, Profile]:
     """Checks and a picture of a run by the paper's updates."""
-    scene = _everywhere(runs.base("6 h", runs.of(elements), times=", ".join(f'"{time} h"' for time in TIMES)))
+    times = ", ".join(f'"{time} h"' for time in TIMES)
+    scene = _everywhere(runs.base("6 h", runs.of(elements), runs.coarser(elements, 0.3), times=times))
     seed, instants = pore.seeded(scene).outline, list(simulate(scene))[1:]
     areas = np.array([instant.pore.outline.area for instant in instants])
     expected = seed.area * np.array([_mass_after(scene, time) for time in TIMES])
@@ -76,8 +77,7 @@ def long_steps() -> Outcome:
 
 def _by_midpoints(elements: str) -> list:
     """Checks of a run to 9 h with the steps of the preset fast."""
-    refinement = 1.0 if elements == "linear" else 0.2
-    scene = _everywhere(runs.base("9 h", runs.by("fast"), runs.of(elements), f"numerics.refinement={refinement}"))
+    scene = _everywhere(runs.base("9 h", runs.by("fast"), runs.of(elements), runs.coarser(elements, 0.2)))
     first, last = simulate(scene)
     wanted = first.pore.outline.area * _mass_after(scene, 9.0)
     bound, origin = _roundness(scene, first.pore.outline)

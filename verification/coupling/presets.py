@@ -73,8 +73,8 @@ def limit() -> Outcome:
 
 def _at_the_end(elements: str, *changes: str) -> np.ndarray:
     """Area and upstream tip at 3.2 h."""
-    outline = runs.last(runs.base("3.2 h", runs.of(elements), 'aggregate.radius="25 um"', "numerics.refinement=0.6",
-                                  *changes)).pore.outline
+    outline = runs.last(runs.base("3.2 h", runs.of(elements), 'aggregate.radius="25 um"',
+                                  runs.coarser(elements, 0.3, 0.6), *changes)).pore.outline
     return np.array([outline.area, outline.upstream])
 
 

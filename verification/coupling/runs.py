@@ -29,9 +29,19 @@ def base(end: str, *changes: str, times: str = "") -> Scene:
     return load_scene("base", (f'growth.end="{end}"', f'output.times=[{times or repr(end)}]', *changes))
 
 
+def every_step(end: str, *changes: str) -> Scene:
+    """The paper's scene to a time, reported after every step."""
+    return load_scene("base", (f'growth.end="{end}"', *changes))
+
+
 def of(elements: str) -> str:
     """The change of a scene that makes its elements linear, quadratic or cubic."""
     return f'numerics.elements="{elements}"'
+
+
+def coarser(elements: str, refinement: float, linear: float = 1.0) -> str:
+    """The change of a scene that gives quadratic and cubic elements a refinement, and linear ones another."""
+    return f"numerics.refinement={linear if elements == 'linear' else refinement}"
 
 
 def by(preset: str) -> str:

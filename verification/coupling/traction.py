@@ -184,20 +184,18 @@ def small_in_base() -> Outcome:
     return Outcome(tuple(checks))
 
 
-#: Meshes on which the move can be told.
-COARSE = {elements: f"numerics.refinement={size}" for elements, size in zip(runs.ELEMENTS, (0.6, 0.2, 0.2))}
-
-
 @cache
 def _pores(end: int, elements: str) -> Instant:
-    return runs.last(runs.base(f"{end} h", 'growth.time_step="24 min"', COARSE[elements], runs.of(elements)))
+    return runs.last(runs.base(f"{end} h", 'growth.time_step="24 min"', runs.coarser(elements, 0.2, 0.6),
+                               runs.of(elements)))
 
 
 def _move_in_base(hours: int, elements: str) -> float:
     """Both from the same pore: on the same mesh."""
     found, shapes = _pores(hours, elements), []
     for word in ("neglected", "included"):
-        scene = runs.base(f"{hours} h", COARSE[elements], runs.of(elements), f'growth.fluid_forces="{word}"')
+        scene = runs.base(f"{hours} h", runs.coarser(elements, 0.2, 0.6), runs.of(elements),
+                          f'growth.fluid_forces="{word}"')
         grown, _, _ = updates.make_biomass(scene, found.pore, found.solved, 0.4)
         shapes.append(contact.expand(scene, grown, updates.enlarged(scene, found.pore, grown))[0])
     return float(np.abs(shapes[1].mesh.points - shapes[0].mesh.points).max() / shapes[0].outline.thickness)
