@@ -1,18 +1,21 @@
 """Fields from one mesh to another (3.5, [E8]).
 
-Interpolation: where a place lies in the old triangles, straight or curved, and what a field of any order is there. It
-is the paper's transfer, and drifts. The conserving transfer of linear fields is the Galerkin projection
+Interpolation: where a place lies in the old triangles, straight or curved, and what a field of any
+order is there. It is the paper's transfer, and drifts. The conserving transfer of linear fields is
+the Galerkin projection
 
     (X_new, N_i) = (X_old, N_i)  for every new N_i, integrated exactly over the common pieces of both meshes,
 
-which keeps the total, constants and linear fields to round-off as long as both meshes cover the same polygon. It may
-overshoot where a field is steep. The bounded transfer is the same, limited by flux-corrected transport (Zalesak 1979;
-Kuzmin 2012): with m_ij the mass matrix, m_i its row sums and b_i = (X_old, N_i), the projection is
+which keeps the total, constants and linear fields to round-off as long as both meshes cover the
+same polygon. It may overshoot where a field is steep. The bounded transfer is the same, limited by
+flux-corrected transport (Zalesak 1979; Kuzmin 2012): with m_ij the mass matrix, m_i its row sums
+and b_i = (X_old, N_i), the projection is
 
     m_i X_i = b_i + sum_j f_ij,        f_ij = m_ij (X_i - X_j) = -f_ji
 
-and b_i / m_i alone is a mean of the old field around node i, bounded by its values there. Each f_ij is multiplied by
-the largest alpha_ij = alpha_ji from 0 to 1 that Zalesak's limiter finds safe: no flux is lost, no bound exceeded.
+and b_i / m_i alone is a mean of the old field around node i, bounded by its values there. Each f_ij
+is multiplied by the largest alpha_ij = alpha_ji from 0 to 1 that Zalesak's limiter finds safe: no
+flux is lost, no bound exceeded.
 """
 
 from __future__ import annotations
@@ -30,11 +33,13 @@ from repro.timing import timed
 
 #: The common pieces of two meshes must cover both to this relative accuracy.
 COVER = 1e-9
-#: A projection that exceeds its bounds by less than this part of the field's largest value is not limited.
+#: A projection that exceeds its bounds by less than this part of the field's largest value is not
+#: limited.
 OVERSHOOT = 1e-14
 #: Newton's steps to the place in a curved triangle.
 NEWTON_STEPS = 12
-#: A triangle's map to t = 0 is taken as folded where its determinant falls under this part of its largest.
+#: A triangle's map to t = 0 is taken as folded where its determinant falls under this part of its
+#: largest.
 FOLD = 0.02
 
 
@@ -52,10 +57,11 @@ class Located:
 
 @timed("transfer")
 def located(points: np.ndarray, cells: np.ndarray, where: np.ndarray) -> Located:
-    """Places (K, 2) um in triangles (T, 3 or 6); one outside by a little is moved to the edge of the nearest.
+    """Places (K, 2) um in triangles (T, 3 or 6); one outside by a little is moved to the edge of
+    the nearest.
 
-    Newton's method on x(s, t) in every triangle whose box holds the place; the one in which it lies deepest is taken.
-    Raises TransferError where a place is far from all of them.
+    Newton's method on x(s, t) in every triangle whose box holds the place; the one in which it lies
+    deepest is taken. Raises TransferError where a place is far from all of them.
     """
     geometry = 1 if cells.shape[1] == 3 else 2
     nodes = points[cells]
@@ -74,10 +80,11 @@ def located(points: np.ndarray, cells: np.ndarray, where: np.ndarray) -> Located
 
 
 def _inverted(nodes: np.ndarray, where: np.ndarray, geometry: int) -> np.ndarray:
-    """(K, 2) on the unit triangle for places (K, 2) in triangles (K, g, 2); far outside where it does not converge."""
+    """(K, 2) on the unit triangle for places (K, 2) in triangles (K, g, 2); far outside where it
+    does not converge."""
     if geometry == 1:
         return barycentric(nodes, where)[:, 1:]
-    local, rest = np.full((len(where), 2), 1 / 3), np.arange(len(where))
+    local, rest = np.clip(barycentric(nodes[:, :3], where)[:, 1:], -2.0, 3.0), np.arange(len(where))
     for _ in range(NEWTON_STEPS):
         now, there = local[rest], nodes[rest]
         values, slopes = elements.evaluated(2, now)
@@ -116,7 +123,8 @@ def barycentric(corners: np.ndarray, where: np.ndarray) -> np.ndarray:
 
 
 def interpolate(points: np.ndarray, cells: np.ndarray, fields: np.ndarray, where: np.ndarray) -> np.ndarray:
-    """(K, m) fields (N, m) at the mesh's own nodes, at places (K, 2): the paper's transfer, bounded for linear ones."""
+    """(K, m) fields (N, m) at the mesh's own nodes, at places (K, 2): the paper's transfer, bounded
+    for linear ones."""
     return located(points, cells, where).field(fields, cells, 1 if cells.shape[1] == 3 else 2)
 
 
@@ -126,8 +134,9 @@ def interpolated(points, triangles, fields, new_points, new_triangles) -> np.nda
 
 
 def unfolded(mesh: Mesh, origin: np.ndarray) -> np.ndarray:
-    """Places at t = 0 (N, 2) um that no triangle of the aggregate turns over: where the interpolated ones would,
-    middles go half way between their corners. Raises TransferError where that is not enough."""
+    """Places at t = 0 (N, 2) um that no triangle of the aggregate turns over: where the
+    interpolated ones would, middles go half way between their corners. Raises TransferError where
+    that is not enough."""
     cells, bends = mesh.cells[mesh.biomass], checked_bends(mesh.geometry)
     for _ in range(3):
         det = elements.determinant(elements.jacobian(origin[cells], bends))
@@ -146,7 +155,8 @@ def unfolded(mesh: Mesh, origin: np.ndarray) -> np.ndarray:
 
 
 def supermesh(points, triangles, new_points, new_triangles) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Common pieces of two meshes: (p, 3, 2) corners of triangles, and the old and new triangle (p,) each lies in."""
+    """Common pieces of two meshes: (p, 3, 2) corners of triangles, and the old and new triangle
+    (p,) each lies in."""
     boxes = shapely.STRtree(shapely.polygons(points[triangles]))
     new, old = boxes.query(shapely.polygons(new_points[new_triangles]))
     pieces = clip(points[triangles[old]], new_points[new_triangles[new]])
@@ -157,12 +167,12 @@ def supermesh(points, triangles, new_points, new_triangles) -> tuple[np.ndarray,
 
 
 def clip(polygons: np.ndarray, windows: np.ndarray) -> np.ndarray:
-    """Convex polygons (p, k, 2) cut to counterclockwise triangles (p, 3, 2), pair by pair: (p, m, 2) of as many corners
-    as the largest has, three at least.
+    """Convex polygons (p, k, 2) cut to counterclockwise triangles (p, 3, 2), pair by pair:
+    (p, m, 2) of as many corners as the largest has, three at least.
 
-    Sutherland and Hodgman's algorithm: each side of the window in turn keeps what is to its left. Polygons with fewer
-    corners repeat one of them, empty ones are a single point. m is k + 3 at most but where round-off has corners on a
-    line of the window change sides more than twice.
+    Sutherland and Hodgman's algorithm: each side of the window in turn keeps what is to its left.
+    Polygons with fewer corners repeat one of them, empty ones are a single point. m is k + 3 at
+    most but where round-off has corners on a line of the window change sides more than twice.
     """
     for side in range(3):
         start, along = windows[:, side, None], windows[:, (side + 1) % 3, None] - windows[:, side, None]
@@ -178,7 +188,8 @@ def clip(polygons: np.ndarray, windows: np.ndarray) -> np.ndarray:
 
 
 def _packed(points: np.ndarray, kept: np.ndarray) -> np.ndarray:
-    """The kept points (p, k, 2) moved to the front, in order, and the first of them repeated behind: (p, room, 2)."""
+    """The kept points (p, k, 2) moved to the front, in order, and the first of them repeated
+    behind: (p, room, 2)."""
     count = kept.sum(axis=1)[:, None]
     room = max(3, int(count.max(initial=0)))
     front = np.argsort(~kept, axis=1, kind="stable")[:, :room]
@@ -187,7 +198,8 @@ def _packed(points: np.ndarray, kept: np.ndarray) -> np.ndarray:
 
 
 def project(points, triangles, fields, new_points, new_triangles) -> np.ndarray:
-    """Galerkin projection of nodal fields (N, m) onto the nodes of another mesh of the same polygon: (K, m).
+    """Galerkin projection of nodal fields (N, m) onto the nodes of another mesh of the same
+    polygon: (K, m).
 
     Raises TransferError where the two meshes do not cover the same area.
     """
@@ -221,7 +233,8 @@ def _edges(triangles: np.ndarray, areas: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def _bounds(pieces, triangles: np.ndarray, fields: np.ndarray, new_triangles: np.ndarray):
-    """Least and largest old nodal value (K, m) in the old triangles that share area with a triangle of a new node."""
+    """Least and largest old nodal value (K, m) in the old triangles that share area with a triangle
+    of a new node."""
     _, old, new, _ = pieces
     shape = (new_triangles.max() + 1, fields.shape[1])
     least, most = np.full(shape, np.inf), np.full(shape, -np.inf)
@@ -233,8 +246,8 @@ def _bounds(pieces, triangles: np.ndarray, fields: np.ndarray, new_triangles: np
 
 
 def _limited(low, lumped, ends, flux, least, most) -> np.ndarray:
-    """(K,) values ``low`` with as much of the fluxes (e,), um2 times the field, into the first of the two ``ends`` and
-    out of the second as keeps them from ``least`` to ``most`` (K,)."""
+    """(K,) values ``low`` with as much of the fluxes (e,), um2 times the field, into the first of
+    the two ``ends`` and out of the second as keeps them from ``least`` to ``most`` (K,)."""
     first, second = ends.T
     into = [np.bincount(first, np.maximum(sign * flux, 0), len(low))
             + np.bincount(second, np.maximum(-sign * flux, 0), len(low)) for sign in (1, -1)]
@@ -245,7 +258,8 @@ def _limited(low, lumped, ends, flux, least, most) -> np.ndarray:
 
 
 def _pieces(points, triangles, new_points, new_triangles):
-    """Corners of the common pieces (p, 3, 2), the old and new triangle (p,) of each, and their areas (p,)."""
+    """Corners of the common pieces (p, 3, 2), the old and new triangle (p,) of each, and their
+    areas (p,)."""
     corners, old, new = supermesh(points, triangles, new_points, new_triangles)
     edge = corners[:, 1:] - corners[:, :1]
     area = 0.5 * np.abs(edge[:, 0, 0] * edge[:, 1, 1] - edge[:, 0, 1] * edge[:, 1, 0])
@@ -270,7 +284,8 @@ def _loads(pieces, points, triangles, fields, new_points, new_triangles) -> np.n
 
 
 def _solve_mass(points: np.ndarray, triangles: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Solve with the mass matrix of the linear nodal functions for each column of (K, m); every node has a triangle."""
+    """Solve with the mass matrix of the linear nodal functions for each column of (K, m); every
+    node has a triangle."""
     rank = np.argsort(linear.node_order(len(points), triangles))
     system = ElementSystem(triangles, rank, np.zeros(len(points), bool))
     solver, solution = linear.Solver(system.matrix(mass(triangle_areas(points, triangles)))), np.empty_like(right)
