@@ -31,6 +31,8 @@ TABLE_1 = {  # worked out by hand: 1 m = 1e6 um, 1 cm2 = 1e8 um2, 1 day = 24 h, 
     "pore.length": 600.0,
     "pore.width": 100.0,
     "aggregate.radius": 5.0,
+    "aggregate.position": 0.0,
+    "aggregate.smooth": False,
     "flow.viscosity_ratio": 2000.0,
     "flow.kinematic_viscosity": 3.6108e9,
     "flow.gravity": 1.271376e14,
@@ -77,7 +79,7 @@ TABLE_1 = {  # worked out by hand: 1 m = 1e6 um, 1 cm2 = 1e8 um2, 1 day = 24 h, 
     "numerics.mesh_compressibility": 1.0,
     "output.timeseries": "csv",
 }
-GIVEN = {"name", "growth.end", "flow.head", "flow.mean_velocity", "output.times"}
+GIVEN = {"name", "growth.end", "flow.head", "flow.mean_velocity", "output.times", "aggregate.outline"}
 
 
 def flat(section, prefix="") -> dict:

@@ -34,6 +34,7 @@ from repro.scene.keys import (
 )
 from repro.scene.units import SceneError
 
-__all__ = ["KEYS", "OURS", "PRESETS", "Acceptor", "Aggregate", "Donor", "Flow", "Growth", "Kinetics", "Numerics",
-           "Output", "Pore", "Scene", "SceneError", "Substrate", "Substrates", "load_scene", "load_tables", "packaged_scenes",
-           "parse_scene", "scene_hash", "scene_tables"]
+__all__ = ["KEYS", "OURS", "PRESETS", "Acceptor", "Aggregate", "Donor", "Flow", "Growth",
+           "Kinetics", "Numerics", "Output", "Pore", "Scene", "SceneError", "Substrate",
+           "Substrates", "load_scene", "load_tables", "packaged_scenes", "parse_scene",
+           "scene_hash", "scene_tables"]

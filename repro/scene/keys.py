@@ -3,8 +3,8 @@
 A scene is a TOML file, or the name of a packaged one, with units in its values. The dataclasses below are the only
 place where its keys, defaults, units, accepted ranges and sources are written down; reading, checking, writing and
 `repro scene` go through them. Their floats are in the units of the package (`repro.scene.units`): um, h, mg/L,
-head in um, MPa, rad. A section that a scene leaves out is None and its physics is not run, but for `pore`, `numerics` and `output`,
-which have defaults, and `kinetics`, which comes with substrates and aggregate. [En] are the ambiguities of
+head in um, MPa, rad. A section that a scene leaves out is None and its physics is not run, but for
+`pore`, `numerics` and `output`, which have defaults, and `kinetics`, which comes with substrates and aggregate. [En] are the ambiguities of
 `reference/ERRATA.md`.
 """
 import hashlib
@@ -18,6 +18,7 @@ from repro.scene.reading import Place, dotted, read_table, write_table
 from repro.scene.rules import rules
 from repro.scene.units import (
     ACUTE,
+    EITHER_SIGN,
     FRACTION,
     NON_NEGATIVE,
     POSITIVE_FRACTION,
@@ -25,7 +26,9 @@ from repro.scene.units import (
     UP_TO_20,
     SceneError,
     choice,
+    flag,
     number,
+    points,
     quantity,
     required,
     section,
@@ -35,6 +38,7 @@ from repro.scene.units import (
 __all__ = ["Scene", "SceneError", "load_scene", "packaged_scenes", "parse_scene", "scene_hash", "scene_tables"]
 
 OURS = "Not in the paper"
+SEED_RADIUS = 5.0  # um, Table 1
 
 
 @dataclass(frozen=True)
@@ -48,9 +52,29 @@ class Pore:
 
 @dataclass(frozen=True)
 class Aggregate:
-    """The seed, a half-disc on the lower wall (um)."""
+    """The seed on the lower wall (um): a half-disc, or a body with an `outline`.
 
-    radius: float = quantity("5 um", "um", about="R_0 of the seed, a half-disc on the lower wall", source="Table 1")
+    `outline`: the points (x, y) of its free surface and of its contact with the upper wall, from
+    the upstream end on the lower wall to the downstream one. With it `radius` is None and
+    `position` zero.
+    """
+
+    radius: float | None = quantity(
+        "5 um", "um", default=None, stated='default "5 um" without outline',
+        about="R_0 of the seed, a half-disc on the lower wall; either this or outline",
+        source="Table 1")
+    position: float = quantity("0 um", "um", EITHER_SIGN, source=OURS,
+                               about="x of the middle of the half-disc; 0 is the middle of the pore")
+    outline: tuple[tuple[float, float], ...] | None = points(
+        about="The seed's surface instead of a half-disc: both ends on the lower wall (y = 0), the "
+        "upstream one first; points with y = pore.width are contact with the upper wall",
+        source=OURS)
+    smooth: bool = flag(about="A spline through the points of outline, or straight lines",
+                        source=OURS)
+
+    def __post_init__(self):
+        if self.radius is None and self.outline is None:
+            object.__setattr__(self, "radius", SEED_RADIUS)
 
 
 @dataclass(frozen=True)
@@ -243,6 +267,8 @@ class Scene:
     output: Output = section(Output, about="What is written", source=OURS)
 
 
+#: Keys that came after hashes of scenes were recorded, with their defaults as tables write them.
+LATER: dict[str, dict[str, object]] = {"aggregate": {"position": "0.0 um", "smooth": False}}
 KEYS = tuple(dotted(Scene))  # every dotted key of a scene, its sections among them
 
 
@@ -286,9 +312,19 @@ def scene_tables(scene: Scene) -> dict:
 
 
 def scene_hash(scene: Scene) -> str:
-    """16 hexadecimal digits that stand for all that a scene says but its name."""
-    canonical = json.dumps(scene_tables(scene), sort_keys=True, separators=(",", ":"), allow_nan=False)
+    """16 hexadecimal digits that stand for all that a scene says but its name.
+
+    A key of `LATER` counts where it does not have its default, so that recorded hashes stand.
+    """
+    tables = {key: _without_later(key, table) for key, table in scene_tables(scene).items()}
+    canonical = json.dumps(tables, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(canonical.encode()).hexdigest()[:16]
+
+
+def _without_later(section: str, table: dict) -> dict:
+    """The table of a section without the keys of `LATER` that have their default."""
+    later = LATER.get(section, {})
+    return {key: value for key, value in table.items() if key not in later or value != later[key]}
 
 
 def _at(tables: dict, key: str, default: object) -> object:

@@ -15,7 +15,7 @@ from pathlib import Path
 from repro.scene import OURS, PRESETS, Numerics, Scene, load_tables, packaged_scenes, parse_scene
 from repro.scene.files import read_text
 from repro.scene.reading import entries
-from repro.scene.units import Quantity, Times
+from repro.scene.units import Points, Quantity, Times
 
 WIDTH = 100
 HEAD = ("A \"#\" without a space is before what this scene leaves out, or leaves to the default shown: remove it to "
@@ -63,6 +63,8 @@ def _about(field: Field) -> str:
 
 def _stated(kind: type, key: str, field: Field) -> str:
     """What holds where a scene does not say."""
+    if field.metadata["stated"]:
+        return field.metadata["stated"]
     if field.default is MISSING and field.default_factory is MISSING:
         return "must be given"
     if field.default is None:
@@ -77,7 +79,7 @@ def _stated(kind: type, key: str, field: Field) -> str:
 def _default(field: Field, made: object) -> object:
     """The value to show where the scene writes none: what a preset has made of it, else the default or an example."""
     kind = field.metadata["kind"]
-    if isinstance(kind, Quantity | Times):
+    if isinstance(kind, Quantity | Times | Points):
         return kind.example
     return field.default if made is None else made
 

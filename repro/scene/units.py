@@ -32,6 +32,7 @@ NOUNS = {
 }
 ANGLES = ("deg", "degree", "degrees", "rad", "radian", "radians")  # to pint "ppm" is an angle too
 LONGEST = 80  # characters of a value with its unit
+MOST_POINTS = 1000  # of an outline
 _DIGITS = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _FACTOR = r"[A-Za-z\u00b5\u03bc]+(?:(?:\^|\*\*)-?[1-9])?"
 _UNIT = rf"(?:1? ?/ ?)?{_FACTOR}(?:(?: ?[*/] ?| ){_FACTOR})*"
@@ -52,6 +53,7 @@ POSITIVE_FRACTION = Range("greater than 0, at most 1", lambda value: 0 < value <
 UP_TO_1 = Range("greater than zero, at most 1", lambda value: 0 < value <= 1)
 UP_TO_20 = Range("greater than zero, at most 20", lambda value: 0 < value <= 20)
 ACUTE = Range("between 0 and 90 deg", lambda value: 0 < value < math.pi / 2)
+EITHER_SIGN = Range("of either sign", math.isfinite)
 
 
 @dataclass(frozen=True)
@@ -163,13 +165,74 @@ class Times:
         return f"[{json.dumps(value)}]" if isinstance(value, str) and _takes(self.each, value) else ""
 
 
-Kind = Quantity | Number | Choice | Times
+@dataclass(frozen=True)
+class Points:
+    """A list of points (x, y), um, in their order."""
+
+    each = Quantity("um", "4 um", EITHER_SIGN)
+    example = [["-5 um", "0 um"], ["0 um", "4 um"], ["5 um", "0 um"]]
+    accepted = f"a list of 3 to {MOST_POINTS} points [x, y], each a pair of lengths"
+    wanted = f"{accepted}, is needed, such as {json.dumps(example)}"
+
+    def read(self, value: object) -> tuple[tuple[float, float], ...]:
+        if not isinstance(value, list) or not 3 <= len(value) <= MOST_POINTS:
+            raise ValueError("not a list of points")
+        return tuple(map(self._point, value))
+
+    def _point(self, pair: object) -> tuple[float, float]:
+        if not isinstance(pair, list) or len(pair) != 2:
+            raise ValueError("not a pair of lengths")
+        return self.each.read(pair[0]), self.each.read(pair[1])
+
+    def write(self, value: tuple[tuple[float, float], ...]) -> list[list[str]]:
+        return [[self.each.write(x), self.each.write(y)] for x, y in value]
+
+    def near(self, value: object) -> str:
+        return ""
+
+
+@dataclass(frozen=True)
+class Flag:
+    """Yes or no."""
+
+    accepted = "true or false"
+    wanted = "true or false is needed, without quotes"
+
+    def read(self, value: object) -> bool:
+        if not isinstance(value, bool):
+            raise ValueError("neither true nor false")
+        return value
+
+    def write(self, value: bool) -> bool:
+        return value
+
+    def near(self, value: object) -> str:
+        """The word that a text, in quotes, is."""
+        word = value.casefold() if isinstance(value, str) else ""
+        return word if word in ("true", "false") else ""
+
+
+Kind = Quantity | Number | Choice | Times | Points | Flag
 
 
 def quantity(text: str, unit: str, accepts: Range = POSITIVE, *, about: str, source: str, **default):
-    """A value with a unit: `text` is its default, or only an example where another default is given."""
+    """A value with a unit: `text` is its default, or only an example where another default is given.
+
+    `stated` says in words what holds where the key is left out, if that hangs on other keys.
+    """
+    stated = default.pop("stated", "")
     default = default or {"default_factory": partial(to_internal, text, unit)}
-    return _told(Quantity(unit, text, accepts), about, source, **default)
+    return _told(Quantity(unit, text, accepts), about, source, stated, **default)
+
+
+def points(*, about: str, source: str):
+    """A list of points, or None."""
+    return _told(Points(), about, source, default=None)
+
+
+def flag(*, about: str, source: str):
+    """True or false, false by default."""
+    return _told(Flag(), about, source, default=False)
 
 
 def required(example: str, unit: str, accepts: Range = POSITIVE, *, about: str, source: str):
@@ -192,8 +255,9 @@ def times(*, about: str, source: str):
     return _told(Times(), about, source, default=None)
 
 
-def _told(kind: Kind, about: str, source: str, **default):
-    return field(metadata={"kind": kind, "about": about, "source": source}, **default)
+def _told(kind: Kind, about: str, source: str, stated: str = "", **default):
+    told = {"kind": kind, "about": about, "source": source, "stated": stated}
+    return field(metadata=told, **default)
 
 
 def section(kind: type, *, about: str, source: str, **default):
