@@ -44,7 +44,7 @@ def test_hashes_stand(name):
 
 def test_a_seed_is_5_um_unless_it_has_an_outline():
     """Mutants: a radius beside an outline; none without."""
-    assert Aggregate() == Aggregate(radius=5.0, position=0.0, outline=None, smooth=False)
+    assert Aggregate() == Aggregate(radius=5.0, position=0.0, outline=None, smooth=False, inert_fraction=0.0)
     seed = outlined(BUMP)
     assert (seed.radius, seed.position, seed.smooth) == (None, 0.0, False)
     assert seed.outline == ((-5.0, 0.0), (-4.0, 3.0), (6.0, 4.0), (5.0, 0.0))
@@ -57,6 +57,22 @@ def test_position_is_of_either_sign(value, position):
     scene = load_scene("base", [f"aggregate.position={value}"])
     assert scene.aggregate == Aggregate(radius=5.0, position=position)
     assert parse_scene(scene_tables(scene), "base", "again") == scene
+
+
+@pytest.mark.parametrize("value", [0.0, 0.3, 0.999999])
+def test_inert_fraction(value):
+    """Mutants: a share that is not hashed, or that only counts where it is not zero."""
+    scene = load_scene("base", [f"aggregate.inert_fraction={value}"])
+    assert scene.aggregate == Aggregate(inert_fraction=value)
+    assert parse_scene(scene_tables(scene), "base", "again") == scene
+    assert (scene_hash(scene) == HASHES["base"]) == (value == 0)
+
+
+def test_inert_fraction_needs_biomass_that_is_modelled():
+    """Mutant: a share that nothing reads is accepted."""
+    said = "aggregate.inert_fraction = 0.3: 0 is needed without [substrates]"
+    assert said in refusal("flow_only", "aggregate.inert_fraction=0.3")
+    assert load_scene("flow_only", ["aggregate.inert_fraction=0.3", "substrates={}"]).aggregate.inert_fraction == 0.3
 
 
 @pytest.mark.parametrize("points", [BUMP, PLUG, [["10 um", "0 um"], ["9 um", "1 um"], ["11 um", "0 um"]],
@@ -137,6 +153,10 @@ def test_no_outline(tmp_path, points, said):
     (["aggregate.position=inf um"], "a length is needed"),
     (["aggregate.smooth=true"], "aggregate.smooth = true: true is accepted with aggregate.outline alone"),
     (['aggregate.smooth="true"'], "true or false is needed, without quotes (did you mean true?)"),
+    (["aggregate.inert_fraction=1"], "a plain number is needed, such as 0 (zero or more, less than 1)"),
+    (["aggregate.inert_fraction=-0.1"], "zero or more, less than 1"),
+    (["aggregate.inert_fraction=nan"], "zero or more, less than 1"),
+    (['aggregate.inert_fraction="0.3"'], "(did you mean 0.3?)"),
     (["aggregate.smooth=1"], "aggregate.smooth = 1: true or false is needed"),
     ([f"aggregate.outline={json.dumps(BUMP)}"], "one of them is accepted, not both"),
     ([f"aggregate={{outline={json.dumps(BUMP)}, position=\"2 um\"}}"],

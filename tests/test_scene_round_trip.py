@@ -100,8 +100,8 @@ def test_an_unknown_key_is_refused_by_its_name(made, data, name):
         assert "there is no such key" in refused(changed(tables, (*where, name), "5 um"), "")
 
 
-KNOWN_BUT_ABSENT = {"head", "mean_velocity", "outline", "times", "aggregate", "flow", "substrates", "kinetics", "growth",
-                    "output"}
+KNOWN_BUT_ABSENT = {"head", "mean_velocity", "outline", "times", "aggregate", "flow", "substrates", "kinetics",
+                    "growth", "output"}
 
 
 @given(st.text(max_size=100) | st.integers() | st.floats() | st.recursive(

@@ -1,10 +1,11 @@
 """What a scene says: its sections are the physics that runs, its defaults are Table 1 of the paper.
 
-A scene is a TOML file, or the name of a packaged one, with units in its values. The dataclasses below are the only
-place where its keys, defaults, units, accepted ranges and sources are written down; reading, checking, writing and
-`repro scene` go through them. Their floats are in the units of the package (`repro.scene.units`): um, h, mg/L,
-head in um, MPa, rad. A section that a scene leaves out is None and its physics is not run, but for
-`pore`, `numerics` and `output`, which have defaults, and `kinetics`, which comes with substrates and aggregate. [En] are the ambiguities of
+A scene is a TOML file, or the name of a packaged one, with units in its values. The dataclasses
+below are the only place where its keys, defaults, units, accepted ranges and sources are written
+down; reading, checking, writing and `repro scene` go through them. Their floats are in the units of
+the package (`repro.scene.units`): um, h, mg/L, head in um, MPa, rad. A section that a scene leaves
+out is None and its physics is not run, but for `pore`, `numerics` and `output`, which have
+defaults, and `kinetics`, which comes with substrates and aggregate. [En] are the ambiguities of
 `reference/ERRATA.md`.
 """
 import hashlib
@@ -18,6 +19,7 @@ from repro.scene.reading import Place, dotted, read_table, write_table
 from repro.scene.rules import rules
 from repro.scene.units import (
     ACUTE,
+    BELOW_1,
     EITHER_SIGN,
     FRACTION,
     NON_NEGATIVE,
@@ -56,7 +58,7 @@ class Aggregate:
 
     `outline`: the points (x, y) of its free surface and of its contact with the upper wall, from
     the upstream end on the lower wall to the downstream one. With it `radius` is None and
-    `position` zero.
+    `position` zero. `inert_fraction`: X_I / (X_A + X_I) of all of it at t = 0.
     """
 
     radius: float | None = quantity(
@@ -71,6 +73,8 @@ class Aggregate:
         source=OURS)
     smooth: bool = flag(about="A spline through the points of outline, or straight lines",
                         source=OURS)
+    inert_fraction: float = number(0.0, BELOW_1, source=OURS,
+                                   about="Share of X_I in the biomass at t = 0, where X_A + X_I = X_m")
 
     def __post_init__(self):
         if self.radius is None and self.outline is None:
@@ -268,7 +272,9 @@ class Scene:
 
 
 #: Keys that came after hashes of scenes were recorded, with their defaults as tables write them.
-LATER: dict[str, dict[str, object]] = {"aggregate": {"position": "0.0 um", "smooth": False}}
+LATER: dict[str, dict[str, object]] = {
+    "aggregate": {"position": "0.0 um", "smooth": False, "inert_fraction": 0.0},
+}
 KEYS = tuple(dotted(Scene))  # every dotted key of a scene, its sections among them
 
 

@@ -24,6 +24,9 @@ def rules(scene: "Scene") -> Rules:
     if scene.aggregate:
         shape_rules = _seed_rules if scene.aggregate.outline is None else _outline_rules
         yield from shape_rules(scene.aggregate, scene.pore)
+        without = "0 is needed without [substrates], which tell active from inert biomass"
+        inert = scene.aggregate.inert_fraction != 0 and scene.substrates is None
+        yield inert, "aggregate.inert_fraction", without
     if scene.flow:
         yield from _flow_rules(scene, scene.flow.head, scene.flow.mean_velocity)
     if scene.substrates:
