@@ -209,7 +209,8 @@ def test_set_reads_lists_and_numbers_and_the_last_one_wins():
 
 
 def test_set_creates_an_absent_section():
-    scene = load_scene("initial_mesh", ["flow.head=1e-3 cm", "substrates.donor.supply=3 mg/L", "growth.end=0 h"])
+    scene = load_scene("initial_mesh", ["flow.head=1e-3 cm", "substrates.donor.supply=3 mg/L", "substrates.acceptor={}",
+                                        "growth.end=0 h"])
     assert (scene.flow.head, scene.substrates.donor.supply, scene.growth.end) == (10, 3, 0)
     assert scene.substrates.acceptor.supply == 10
     assert load_scene("initial_mesh").flow is None

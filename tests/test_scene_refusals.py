@@ -1,9 +1,12 @@
 """Scenes that are not accepted: one clear line that names file, key, value and what is accepted."""
+import re
+import time
+import tomllib
 from pathlib import Path
 
 import pytest
 
-from repro.scene import SceneError, load_scene, parse_scene, scene_tables
+from repro.scene import SceneError, Substrates, files, load_scene, parse_scene, scene_tables
 from tests.test_scene import refusal, written
 
 LENGTH = 'a length is needed, such as "100 um" (greater than zero)'
@@ -191,10 +194,10 @@ def test_a_directory_is_refused(tmp_path):
 def test_a_file_that_cannot_be_read_is_refused(tmp_path, monkeypatch):
     path = written(tmp_path, "[pore]")
 
-    def denied(self):
+    def denied(self, mode):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(Path, "read_bytes", denied)
+    monkeypatch.setattr(Path, "open", denied)
     assert "mine.toml: cannot be read (Permission denied)" in refusal(str(path))
 
 
@@ -208,8 +211,90 @@ def test_hostile_toml_is_refused(tmp_path, text):
     assert "not TOML: " in refusal(written(tmp_path, text))
 
 
-def test_keys_nested_by_the_thousand_are_refused(tmp_path):
-    assert "there is no such key" in refusal(written(tmp_path, ".".join("a" * 5000) + " = 1"))
+DEEP = ".".join("a" * 20_000)
+POINTS = "".join(f'["{k / 10 - 4} um", "3.0 um"], ' for k in range(80))
+DOTTED = f"""# {"." * 99}
+[pore] # a.b.c.d.e.f.g.h.i.j.k.l.m.n.o.p.q.r.s.t.u.v.w.x.y.z = 1
+width = "50 um" # 1.2.3.4.5.6.7.8.9.10.11.12.13.14.15.16.17.18.19.20.21.22
+[aggregate]
+outline = [["-5.0 um", "0.0 um"], {POINTS} ["5.0 um", "0.0 um"]]
+"""
+
+
+@pytest.mark.parametrize("text, line", [
+    (f"{DEEP} = 1", 1), (f"[pore]\n\n[{DEEP}]", 3), (f"a = {{{DEEP} = 1}}", 1), (f"a = [{{{DEEP} = 1}}]", 1),
+    (DEEP.replace(".", " .\t") + " = 1", 1), (DEEP.replace("a", '"a.\\""') + " = 1", 1),
+    (DEEP.replace("a", "'a.\"'") + " = 1", 1), ('a = """\n\\" "" x"""\n' + f"{DEEP} = 1", 3),
+    ("a = '''\n\"'' '''\n" + f"{DEEP} = 1", 3), (f"a = '#'\n{DEEP}", 2), (".".join("a" * 21) + " = 1", 1),
+])
+def test_keys_of_many_parts_are_refused_before_they_are_parsed(tmp_path, monkeypatch, text, line):
+    """They take memory as the square of the parts: 1.5 GB here. Mutants: keys in headers, in inline tables, quoted
+    ones, ones with blanks, ones after a string with quotes or a # in it passed over."""
+    monkeypatch.setattr(tomllib, "loads", None)
+    said = f"a key of more than 20 parts (at line {line}); one of a scene has at most 3"
+    assert said in refusal(written(tmp_path, text))
+
+
+@pytest.mark.parametrize("entry, said", [
+    (f"{DEEP}=1", "a key of at most 20 parts is needed"), (f"pore={{{DEEP}=1}}", "a table [pore] is needed"),
+    (f"pore.width={{{DEEP}=1}}", LENGTH)])
+def test_set_takes_no_key_of_many_parts(monkeypatch, entry, said):
+    """Mutant: the key or the value of --set parsed before it is looked at."""
+    read = files.read_tables("base")
+    monkeypatch.setattr(tomllib, "loads", None)
+    with pytest.raises(SceneError, match=re.escape(said)):
+        files.override(read, entry, "base", ())
+        parse_scene(read, "base", "base")
+
+
+def test_dots_that_are_no_keys_are_read(tmp_path):
+    """Dots of comments, texts and numbers; keys of 20 parts. Mutant: dots counted wherever they are."""
+    assert len(load_scene(written(tmp_path, DOTTED)).aggregate.outline) == 82
+    assert "there is no such key" in refusal(written(tmp_path, ".".join("a" * 20) + " = 1"))
+
+
+@pytest.mark.parametrize("piece", ["a", '"', '\\"', "'", "a.", "a .", '"a', "#", '"""', "'''", "\\", " ", '"\\'])
+def test_looking_for_deep_keys_takes_no_longer_than_reading(piece):
+    """A file as large as is accepted, made of whatever: linear in its size. Mutant: a pattern that goes back."""
+    text = "x = 1\n" + (piece * files.LARGEST)[:files.LARGEST]
+    start = time.process_time()
+    files.line_of_a_deep_key(text)
+    assert time.process_time() - start < 10
+
+
+def test_a_large_file_is_refused_unread(tmp_path):
+    """Mutant: the whole file read, or parsed, first."""
+    path = tmp_path / "mine.toml"
+    path.write_bytes(b"[pore]\n#" + b"x" * (files.LARGEST - 8))
+    assert load_scene(path).pore.width == 100
+    with path.open("ab") as file:
+        file.truncate(10**11)
+    assert "mine.toml: more than 1000000 bytes; a scene has a few thousand" in refusal(path)
+
+
+@pytest.mark.parametrize("text", ["", "# nothing\n", "\ufeff\n\n"])
+def test_an_empty_scene_is_refused(tmp_path, text):
+    """Mutant: Table 1's pore, unasked."""
+    path = written(tmp_path, text)
+    assert refusal(path).startswith(f"{path}: an empty scene: one section or more is needed of [pore], [aggregate], ")
+    assert load_scene(path, ["pore={}"]).pore.width == 100
+
+
+@pytest.mark.parametrize("given, absent", [("acceptor", "donor"), ("donor", "acceptor")])
+@pytest.mark.parametrize("with_aggregate", [True, False])
+def test_one_substrate_alone_is_refused(tmp_path, given, absent, with_aggregate):
+    """Mutant: Table 1's other substrate, unasked, which may be the one that limits."""
+    path = written(tmp_path, f"[substrates.{given}]\nsupply = \"5 mg/L\"\n" + "[aggregate]\n" * with_aggregate)
+    message = refusal(path)
+    assert f"mine.toml: substrates.{absent} is missing: it is needed beside substrates.{given}; " in message
+    assert "not to limit is supplied at many times its half_saturation" in message
+    for other in (f"substrates.{absent}={{}}", f"substrates.{absent}.supply=1000 mg/L"):
+        assert load_scene(path, [other]).substrates is not None
+
+
+def test_both_substrates_unsaid_are_table_1():
+    assert load_scene("initial_mesh", ["substrates={}"]).substrates == Substrates()
+    assert "substrates.donor is missing" in refusal("initial_mesh", "substrates.acceptor.supply=5 mg/L")
 
 
 def test_not_utf_8_is_refused(tmp_path):

@@ -136,7 +136,7 @@ def test_round_trip_is_exact(size, angle, velocity):
         "pore": {"width": f"{10 * size!r} um", "length": f"{100 * size!r} um"},
         "aggregate": {"radius": f"{size!r} um"},
         "flow": {"mean_velocity": f"{velocity!r} um/h", "viscosity_ratio": size},
-        "substrates": {"donor": {"diffusivity": f"{size!r} um^2/h", "supply": f"{velocity!r} mg/L"}},
+        "substrates": {"acceptor": {}, "donor": {"diffusivity": f"{size!r} um^2/h", "supply": f"{velocity!r} mg/L"}},
         "growth": {"end": f"{velocity!r} h", "minimum_contact_angle": f"{angle!r} rad",
                    "time_step": f"{max(velocity, 1e-6)!r} h", "minimum_film": f"{size!r} um"},
         "numerics": {"preset": "paper", "transport": "gear"},

@@ -9,7 +9,15 @@ from repro.scene.reading import Place, did_you_mean, elsewhere, shown
 from repro.scene.units import SceneError, nearest
 
 LONGEST_LINE = 80  # characters of a line of a file in a message
+LARGEST = 1_000_000  # bytes of a file
+MOST_PARTS = 20  # of a dotted key; tomllib's memory grows with their square
 BARE = re.compile(r"=\s*[-+.\d][-+.\deE]*\s*[A-Za-z\u00b5\u03bc]")  # a value with a unit, without quotes
+#: Pieces of TOML, without backtracking: what may be a part of a key, a dot, and all else.
+TOKEN = re.compile(
+    r'''(?P<blank>[ \t]++)|(?P<dot>\.)|(?P<comment>\#[^\n]*+)
+    |"""(?:[^"\\]|\\.|"(?!""))*+(?:"{3,5})?|'{3}(?:[^']|'(?!''))*+(?:'{3,5})?
+    |(?P<part>[A-Za-z0-9_-]++|"(?:[^"\\\n]|\\.)*+"?|'[^'\n]*+'?)
+    |.''', re.S | re.X)
 
 
 def packaged_scenes() -> tuple[str, ...]:
@@ -38,20 +46,41 @@ def _content(file: str) -> bytes:
         hint = did_you_mean(nearest(file, names))
         raise SceneError(f"{file}: {found} a packaged scene ({', '.join(names)}){hint}")
     try:
-        return Path(file).read_bytes()
+        with Path(file).open("rb") as opened:
+            content = opened.read(LARGEST + 1)
     except OSError as error:
         raise SceneError(f"{file}: cannot be read ({error.strerror})") from None
+    if len(content) > LARGEST:
+        raise SceneError(f"{file}: more than {LARGEST} bytes; a scene has a few thousand")
+    return content
 
 
 def read_tables(file: str) -> dict:
     """The tables of a packaged scene or of a file; SceneError if it is not TOML."""
     text = read_text(file)
+    deep = line_of_a_deep_key(text)
+    if deep:
+        raise SceneError(f"{file}: a key of more than {MOST_PARTS} parts (at line {deep}); "
+                         "one of a scene has at most 3, such as substrates.donor.supply")
     try:
         return tomllib.loads(text)
     except RecursionError:
         raise SceneError(f"{file}: not TOML: values nested too deeply; a scene has tables of plain values") from None
     except ValueError as error:
         raise SceneError(f"{file}: not TOML: {error}{_line_of(text, str(error))}") from None
+
+
+def line_of_a_deep_key(text: str) -> int:
+    """The number of the first line with a key of more parts than MOST_PARTS; 0 where there is none."""
+    dots = 0
+    for token in TOKEN.finditer(text):
+        kind = token.lastgroup
+        dots += kind == "dot"
+        if dots >= MOST_PARTS:
+            return text.count("\n", 0, token.start()) + 1
+        if kind not in ("part", "dot", "blank"):
+            dots = 0
+    return 0
 
 
 def _line_of(text: str, message: str) -> str:
@@ -72,6 +101,8 @@ def override(tables: dict, entry: str, file: str, known: tuple[str, ...]) -> Non
     if not equals or not all(path):
         hint = did_you_mean(elsewhere(".".join(part for part in path if part)[:60], known))
         raise SceneError(f'{file}: --set {shown(entry)}: KEY=VALUE is needed, such as pore.width="50 um"{hint}')
+    if len(path) > MOST_PARTS:
+        raise SceneError(f"{file}: --set {shown(entry)}: a key of at most {MOST_PARTS} parts is needed")
     place = Place(file)
     for part in path[:-1]:
         tables, place = tables.setdefault(part, {}), place.below(part)
@@ -83,6 +114,8 @@ def override(tables: dict, entry: str, file: str, known: tuple[str, ...]) -> Non
 
 def _toml_value(text: str) -> object:
     """The TOML value that a text is, or the text itself."""
+    if line_of_a_deep_key(text):
+        return text
     try:
         read = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):

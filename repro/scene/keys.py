@@ -15,7 +15,7 @@ from dataclasses import MISSING, dataclass
 from pathlib import Path
 
 from repro.scene.files import override, packaged_scenes, read_tables
-from repro.scene.reading import Place, dotted, read_table, write_table
+from repro.scene.reading import Place, dotted, entries, read_table, write_table
 from repro.scene.rules import rules
 from repro.scene.units import (
     ACUTE,
@@ -294,6 +294,7 @@ def load_tables(file: str, overrides: Sequence[str] = ()) -> dict:
 
 def parse_scene(tables: dict, name: str, file: str) -> Scene:
     """The scene that TOML `tables` describe, called `name`; SceneError, naming `file`, if it is not accepted."""
+    _refuse_missing(tables, file)
     if "substrates" in tables and "aggregate" in tables:
         tables = {"kinetics": {}, **tables}
     scene = read_table(Scene, _with_preset(tables), Place(file, known=KEYS), name=name)
@@ -301,6 +302,19 @@ def parse_scene(tables: dict, name: str, file: str) -> Scene:
         if broken:
             raise Place(file, key).refuse(_at(tables, key, _at(scene_tables(scene), key, MISSING)), wanted)
     return scene
+
+
+def _refuse_missing(tables: dict, file: str) -> None:
+    """Raise SceneError where there is no section at all, or one substrate without the other."""
+    if not tables:
+        sections = ", ".join(f"[{key}]" for key in entries(Scene))
+        raise SceneError(f"{file}: an empty scene: one section or more is needed of {sections}")
+    given = tables.get("substrates")
+    for key, other in (("acceptor", "donor"), ("donor", "acceptor")):
+        if isinstance(given, dict) and other in given and key not in given:
+            wanted = (f"it is needed beside substrates.{other}; one that is not to limit is supplied "
+                      'at many times its half_saturation, such as supply = "1000 mg/L"')
+            raise Place(file, f"substrates.{key}").refuse(MISSING, wanted)
 
 
 def _with_preset(tables: dict) -> dict:
