@@ -6,6 +6,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from contextlib import suppress
 
 import pytest
 
@@ -14,7 +15,7 @@ from repro.cli import main
 from repro.errors import OutputError
 from repro.run import checkpoint
 from repro.run.checkpoint import NEWEST
-from repro.run.folder import LOCK, OWN, PARTS, held, prepare
+from repro.run.folder import LOCK, OWN, held, prepare
 from repro.run.running import Watch, resume, run
 from repro.scene import load_scene, parse_scene, scene_tables
 from tests.shell import SHORT, files, shell, started, told, wait_for
@@ -69,7 +70,7 @@ def test_a_lock_that_was_removed_is_none(tmp_path):
                 pass
 
 
-@pytest.mark.parametrize("name", [*OWN, *PARTS, LOCK])
+@pytest.mark.parametrize("name", OWN)
 def test_what_a_run_may_leave_is_a_runs(tmp_path, name):
     """Beside a run.json. Mutants: a killed run's folder that no run accepts, a file of an earlier run that stays."""
     (tmp_path / "run.json").write_text("{}")
@@ -79,15 +80,51 @@ def test_what_a_run_may_leave_is_a_runs(tmp_path, name):
 
 
 def test_what_a_killed_run_was_writing_is_removed(tmp_path):
-    """Mutant: parts that stay beside the results."""
+    """What is in such a folder and no run's stays. Mutants: parts that stay beside the results; a folder removed with
+    whatever is in it."""
     scene = load_scene("base", FAST)
     with pytest.raises(ZeroDivisionError):
         run(scene, tmp_path / "run", lambda time: 1 / (time < 0.5))
-    for part in (f".{NEWEST}.part", ".timeseries.csv.part", "fields/.part-fields_0001.vtu"):
+    for part in (f".writing-abcdefgh/{NEWEST}", ".writing-01234567/.timeseries.csv.part",
+                 "fields/.writing-_1234567/.part-fields_0001.vtu", ".writing-thesis00/thesis.tex"):
+        (tmp_path / "run" / part).parent.mkdir()
         (tmp_path / "run" / part).write_text("half")
     assert resume(tmp_path / "run") == "completed"
+    assert (tmp_path / "run" / ".writing-thesis00" / "thesis.tex").read_text() == "half"
+    shutil.rmtree(tmp_path / "run" / ".writing-thesis00")
     run(scene, tmp_path / "whole")
     assert files(tmp_path / "run") == files(tmp_path / "whole")
+    assert not list((tmp_path / "run").rglob(".writing-*"))
+
+
+def test_no_link_is_written_through(tmp_path):
+    """Whatever a file is written as before it is moved to its place: what the links lead to stays as it is. Mutants: a
+    file of a name that everybody knows, opened as it is; a lock that is a link."""
+    victim = tmp_path / "thesis.tex"
+    victim.write_text("years of work")
+
+    def plant(event):
+        for name in ("run.json", "timeseries.csv", NEWEST, "report.html", "fields.pvd", "ledger.csv"):
+            with suppress(FileExistsError):
+                (tmp_path / "run" / f".{name}.part").symlink_to(victim)
+        for k in range(9):
+            with suppress(FileExistsError):
+                (tmp_path / "run" / "fields" / f".part-fields_{k:04d}.vtu").symlink_to(victim)
+
+    assert run(load_scene("base", FAST), tmp_path / "run", watch=Watch(tell=plant, interval=0.0)) == "completed"
+    assert victim.read_text() == "years of work"
+    assert not (tmp_path / "run" / "timeseries.csv").is_symlink()
+
+
+@pytest.mark.parametrize("make", [lambda lock, to: lock.symlink_to(to), lambda lock, to: lock.write_text("mine"),
+                                  lambda lock, to: os.mkfifo(lock), lambda lock, to: lock.mkdir()])
+def test_a_lock_that_is_somebody_elses_is_left_alone(tmp_path, capsys, make):
+    """A link, a file with content, a pipe, a folder. Mutants: one opened through a link, one that is removed."""
+    make(tmp_path / LOCK, tmp_path / "elsewhere")
+    before = (tmp_path / LOCK).lstat()
+    assert main(["run", "flow_only", "--out", str(tmp_path)]) == 2
+    assert (message := capsys.readouterr().err).startswith("repro: --out") and message.count("\n") == 1
+    assert (tmp_path / LOCK).lstat() == before and not (tmp_path / "elsewhere").exists()
 
 
 @LINUX

@@ -21,6 +21,7 @@ from typing import Literal
 import numpy as np
 
 from repro.errors import CheckpointError
+from repro.files import whole
 
 #: Where a run keeps the state that it goes on from, the one before, and the last one that could not be used.
 NEWEST, PREVIOUS, REFUSED = "checkpoint.state", "checkpoint.previous", "checkpoint.refused"
@@ -98,14 +99,10 @@ def synced(path: Path) -> None:
 
 def write(folder: Path, content: bytes) -> None:
     """Make this the newest checkpoint of a folder and the newest before the previous one; OSError where it cannot."""
-    newest, beside = folder / NEWEST, folder / f".{NEWEST}.part"
-    try:
-        with beside.open("wb") as file:
+    with whole(folder / NEWEST) as beside:
+        with beside.open("xb") as file:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
         with suppress(FileNotFoundError):
-            os.replace(newest, folder / PREVIOUS)
-        os.replace(beside, newest)
-    finally:
-        beside.unlink(missing_ok=True)
+            os.replace(folder / NEWEST, folder / PREVIOUS)

@@ -10,15 +10,17 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from repro.errors import OutputError
+from repro.files import WRITING, is_file, is_folder, open_lock
 from repro.run.checkpoint import NEWEST, PREVIOUS, REFUSED
 
 LOCK = ".lock"
 #: Everything that a run writes, beside its fields; a folder that holds anything else is not written to.
 OWN = ("run.json", "timeseries.csv", "ledger.csv", "fields.pvd", "before_expansion.pvd", "report.html", "timeseries.nc",
        NEWEST, PREVIOUS, REFUSED)
-#: What a run that was killed may leave of a file that it was writing.
-PARTS = tuple(f".{name}.part" for name in OWN)
-FIELDS = re.compile(r"(?:\.part-)?(?:fields|before_expansion)_\d{4,}\.vtu")
+FIELDS = re.compile(r"(?:fields|before_expansion)_\d{4,}\.vtu")
+#: A folder in which a run was writing a file when it was killed, and what that may hold.
+ROOM = re.compile(re.escape(WRITING) + r"\w{8}")
+PART = re.compile(rf"(?:\.part-)?{FIELDS.pattern}|\.?(?:{'|'.join(map(re.escape, OWN))})(?:\.part)?")
 
 
 def prepare(folder: Path) -> None:
@@ -40,14 +42,25 @@ def clear(folder: Path) -> None:
 
 
 def tidy(folder: Path) -> None:
-    """Remove files that a run was writing when it was killed."""
-    for part in (*(folder / "fields").glob(".part-*"), *(folder / name for name in PARTS)):
-        part.unlink(missing_ok=True)
+    """Remove what a run was writing when it was killed."""
+    for room in (*folder.glob(WRITING + "*"), *(folder / "fields").glob(WRITING + "*")):
+        if ROOM.fullmatch(room.name) and is_folder(room):
+            _empty(room)
+
+
+def _empty(room: Path) -> None:
+    """Remove a folder with the files of a run in it, but for what is none of these."""
+    for part in room.iterdir():
+        if PART.fullmatch(part.name) and is_file(part):
+            part.unlink()
+    with suppress(OSError):  # something else is there
+        room.rmdir()
 
 
 def _strange(folder: Path) -> list[str]:
     """What no run has written there: tables count as a run's beside a run.json only, fields by their names."""
-    told = (*OWN, *PARTS, LOCK) if (folder / "run.json").exists() else (LOCK, ".run.json.part")
+    tidy(folder)
+    told = (*OWN, LOCK) if (folder / "run.json").exists() else (LOCK,)
     found = [path.name for path in folder.iterdir() if path.name not in (*told, "fields")]
     inside = sorted((folder / "fields").iterdir()) if (folder / "fields").is_dir() else []
     return sorted(found) + [f"fields/{path.name}" for path in inside if not FIELDS.fullmatch(path.name)]
@@ -94,7 +107,7 @@ def held(folder: Path) -> Iterator[None]:
 def _locked(folder: Path) -> int:
     """The descriptor of the locked file; another try where it was removed between opening and locking."""
     while True:
-        number = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o666)
+        number = open_lock(folder / LOCK)
         try:
             _exclude(number)
             with suppress(FileNotFoundError):

@@ -7,16 +7,16 @@ from time import perf_counter
 
 from repro import report, results, timing
 from repro.errors import CheckpointError, Interrupted
+from repro.files import whole
 from repro.march.loop import Instant, State, added
 from repro.results import netcdf
 from repro.run import checkpoint, stored
 from repro.run.folder import writing
 from repro.run.machine import conditions
+from repro.run.status import done, undone
 from repro.run.stored import counted, counts, in_range
 from repro.scene import Scene
 
-#: How a run can have ended without being done; any other status is that of a run that is over.
-UNDONE = ("running", "interrupted", "failed")
 CHECKPOINTS = (checkpoint.NEWEST, checkpoint.PREVIOUS, checkpoint.REFUSED)
 RECORD = {"rows", "ledgers", "index", "before", "remeshes", "iterations", "seconds", "stages", "resumes"}
 
@@ -77,14 +77,14 @@ class Recorder:
 
     def _write_fields(self, index: list, kind: str, pore, solved) -> None:
         name = f"fields/{kind}_{len(index):04d}.vtu"
-        with writing(self.folder / name):
-            results.write_fields(self.folder / name, results.fields(self.scene, pore, solved))
+        with writing(self.folder / name), whole(self.folder / name) as beside:
+            results.write_fields(beside, results.fields(self.scene, pore, solved))
         index.append([pore.time, name])
         self.unsynced.append(name)
 
     def save(self, status: str) -> None:
         """Write checkpoint, tables, indices and provenance as they are now."""
-        if self.state and status.startswith(UNDONE):
+        if self.state and undone(status):
             self._write_checkpoint(self.state)
         self._write("timeseries.csv", results.write_table, results.COLUMNS, self.rows)
         self._write("fields.pvd", results.write_index, self.index)
@@ -107,11 +107,11 @@ class Recorder:
         if self.scene.output.timeseries == "netcdf":
             self._write("timeseries.nc", netcdf.write, self.scene, self.rows)
         self.save(status)
-        settle(self.folder, not status.startswith(UNDONE))
+        settle(self.folder, done(status))
 
     def _write(self, name: str, write, *content) -> None:
-        with writing(self.folder / name):
-            write(self.folder / name, *content)
+        with writing(self.folder / name), whole(self.folder / name) as beside:
+            write(beside, *content)
 
     def _times(self) -> tuple[float, dict[str, float]]:
         """Seconds spent, all together and by stage, before a resume and since."""

@@ -17,7 +17,8 @@ from repro.march.simulation import steps
 from repro.run import checkpoint
 from repro.run.folder import clear, held, prepare, tidy, usable
 from repro.run.machine import conditions, differences
-from repro.run.recorder import CHECKPOINTS, UNDONE, Recorder, interrupted, settle
+from repro.run.recorder import CHECKPOINTS, Recorder, interrupted, settle
+from repro.run.status import done, undone
 from repro.scene import Scene, parse_scene, scene_hash
 
 __all__ = ["OutputError", "Recorder", "Watch", "prepare", "resume", "run"]
@@ -68,7 +69,7 @@ def resume(folder: Path, progress: Callable[[float], None] = lambda time: None, 
         raise OutputError(f"--resume {folder}: there is no run.json; the folder of a run is needed")
     with held(folder):
         told, scene = _told(folder / "run.json")
-        if not told["status"].startswith(UNDONE):
+        if done(told["status"]):
             if any((folder / name).exists() for name in CHECKPOINTS):  # it was killed at its very end
                 settle(folder, over=True)
             watch.tell({"event": "end", "scene": scene.name, "status": told["status"], "folder": str(folder),
@@ -93,6 +94,8 @@ def _told(path: Path) -> tuple[dict, Scene]:
     wanted = {"scene": str, "hash": str, "tables": dict, "status": str}
     if not isinstance(told, dict) or not all(isinstance(told.get(key), kind) for key, kind in wanted.items()):
         raise OutputError(f"{path}: it has no scene or no status; the run.json of a run is needed")
+    if not (done(told["status"]) or undone(told["status"])):
+        raise OutputError(f"{path}: its status {told['status']!r} is none that a run writes")
     scene = parse_scene(told["tables"], told["scene"], str(path))
     if scene_hash(scene) != told["hash"]:
         raise OutputError(f"{path}: its scene is not the one that was run: the hash {told['hash']!r} is of another")

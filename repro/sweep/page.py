@@ -6,6 +6,7 @@ from html import escape
 
 import numpy as np
 
+from repro.files import whole
 from repro.results import write_text
 from repro.sweep import picture
 from repro.sweep.design import Factor, label
@@ -47,7 +48,8 @@ SHOWN = (("end_h", "end (h)"), ("clogging_time_h", "clogged (h)"), ("clogging_bi
 
 def write(sweep: Sweep, told: list[Told], clogged: float) -> None:
     """Write ``summary.html``."""
-    write_text(sweep.folder / "summary.html", page(sweep, told, clogged))
+    with whole(sweep.folder / "summary.html") as beside:
+        write_text(beside, page(sweep, told, clogged))
 
 
 def page(sweep: Sweep, told: list[Told], clogged: float) -> str:
