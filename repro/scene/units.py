@@ -19,6 +19,8 @@ from fractions import Fraction
 from functools import cache, partial
 from typing import NamedTuple
 
+from repro.scene import exact
+
 NOUNS = {
     "um": "a length",
     "h": "a time",
@@ -313,6 +315,12 @@ def _conversion(given: str, unit: str) -> Fraction:
     """How many internal units the unit `given` is; ValueError if it is no unit, or of another dimension."""
     if unit == "rad" and given not in ANGLES:
         raise ValueError(f"{given} is not a unit of angle")
+    known = exact.conversion(given, unit)
+    return _by_pint(given, unit) if known is None else known
+
+
+def _by_pint(given: str, unit: str) -> Fraction:
+    """As `_conversion`, for any unit there is."""
     registry = _registry()
     try:
         one = registry.Quantity(Fraction(1), registry.Unit(re.sub("^ ?/", "1/", given)))
@@ -323,7 +331,7 @@ def _conversion(given: str, unit: str) -> Fraction:
 
 @cache
 def _registry():
-    """The unit registry, in exact fractions; imported when first needed, for it takes half a second."""
+    """Every unit, in exact fractions; made when first needed, for it takes half a second."""
     import pint
 
     return pint.UnitRegistry(non_int_type=Fraction)
