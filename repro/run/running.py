@@ -81,7 +81,7 @@ def resume(folder: Path, progress: Callable[[float], None] = lambda time: None, 
         with usable(folder):
             tidy(folder)
             restored = _restored(recorder, watch)
-        recorder.resumes.append({"time_h": recorder.time, "changed": changed})
+        recorder.record.resumes.append({"time_h": recorder.time, "changed": changed})
         return (_recorded if restored else _from_the_start)(recorder, progress, watch)
 
 
@@ -160,7 +160,7 @@ def _recorded(recorder: Recorder, progress: Callable[[float], None], watch: Watc
 def _end(recorder: Recorder, status: str, watch: Watch) -> str:
     recorder.finish(status)
     watch.tell({"event": "end", "scene": recorder.scene.name, "status": status, "folder": str(recorder.folder),
-                "time_h": recorder.time, "step": recorder.steps, "rows": len(recorder.rows), "changed": True})
+                "time_h": recorder.time, "step": recorder.steps, "rows": len(recorder.record.rows), "changed": True})
     return status
 
 
@@ -169,9 +169,9 @@ def _simulated(recorder: Recorder, progress: Callable[[float], None], watch: Wat
     written = perf_counter()
     try:
         for state, instant in steps(recorder.scene, recorder.state):
-            remeshes, contact = recorder.all_remeshes, recorder.contact
+            remeshes, contact = recorder.remeshes, recorder.contact
             recorder.add(state, instant)
-            _tell_step(recorder, recorder.all_remeshes > remeshes, recorder.contact > contact, watch)
+            _tell_step(recorder, recorder.remeshes > remeshes, recorder.contact > contact, watch)
             progress(recorder.time)
             if number := watch.stop():
                 raise interrupted(recorder, number)
@@ -188,7 +188,7 @@ def _simulated(recorder: Recorder, progress: Callable[[float], None], watch: Wat
 
 def _tell_step(recorder: Recorder, remeshed: bool, contact: bool, watch: Watch) -> None:
     """A step as events."""
-    now = {"time_h": recorder.time, "end_h": recorder.end, "step": recorder.steps, "remeshes": recorder.all_remeshes,
+    now = {"time_h": recorder.time, "end_h": recorder.end, "step": recorder.steps, "remeshes": recorder.remeshes,
            "contact": recorder.contact}
     watch.tell({"event": "step", **now})
     for event, happened in (("remesh", remeshed), ("contact", contact)):
