@@ -10,10 +10,10 @@ import pytest
 from repro.scene import SceneError, load_scene, packaged_scenes, parse_scene
 
 
-def refusal(source, *overrides) -> str:
+def refusal(source, *overrides, unset=()) -> str:
     """The message of the SceneError, which is one line of bearable length."""
     with pytest.raises(SceneError) as caught:
-        load_scene(source, overrides)
+        load_scene(source, overrides, unset)
     message = str(caught.value)
     assert message.isprintable() and len(message) < 500 and "Traceback" not in message
     return message
@@ -223,3 +223,18 @@ def test_a_value_cannot_smuggle_in_another_key():
 @pytest.mark.parametrize("override", ["", "pore.width", "=5 um", " = 5", "pore.=5 um", ".width=5 um", "a..b=5 um"])
 def test_set_needs_a_key_and_a_value(override):
     assert "KEY=VALUE is needed" in refusal("base", override)
+
+
+# ---------------------------------------------------------------- --unset
+
+
+def test_unset_leaves_keys_and_sections_out():
+    """Mutants: --set read first; a section that stays, empty; only the last of several."""
+    base = load_scene("base")
+    driven = load_scene("base", ["flow.mean_velocity=1 m/day"], ["flow.head"])
+    assert (driven.flow.head, driven.flow.mean_velocity) == (None, pytest.approx(1e6 / 24))
+    assert load_scene("base", (), ["substrates.donor.supply", " substrates . acceptor.supply "]) == base
+    still = load_scene("base", (), ["flow", "growth"])
+    assert still.flow is None and still.growth is None and still.kinetics == base.kinetics
+    assert load_scene("base", ["flow.head=10 um"], ["flow.head"]) == base
+    assert load_scene("base", ["flow.head=1 cm"], ["flow"]).flow.head == 10_000

@@ -127,7 +127,7 @@ def test_any_scene_is_written_as_it_is(made):
     from repro.scene import text as module
     tables = scene_tables(made)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "load_tables", lambda source, overrides: tables)
+        patch.setattr(module, "load_tables", lambda source, overrides, unset: tables)
         assert parsed(scene_text("drawn"), "drawn") == made
 
 

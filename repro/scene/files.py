@@ -1,4 +1,4 @@
-"""Where the tables of a scene come from: a TOML file, or a packaged one, and the "KEY=VALUE" of --set."""
+"""Where the tables of a scene come from: a TOML file, or a packaged one, and what --set and --unset change."""
 import os
 import re
 import tomllib
@@ -94,10 +94,27 @@ def _line_of(text: str, message: str) -> str:
     return f": {line if len(line) <= LONGEST_LINE else line[:LONGEST_LINE - 3] + '...'}{hint}"
 
 
+def key_of(entry: str) -> str:
+    """The dotted key of a "KEY=VALUE"."""
+    return ".".join(part.strip() for part in entry.partition("=")[0].split("."))
+
+
+def leave_out(tables: dict, key: str, file: str, known: tuple[str, ...]) -> None:
+    """Take a dotted key, or a section, out of the tables. Raises SceneError if it is not there."""
+    *above, last = key_of(key).split(".")
+    table: object = tables
+    for part in above:
+        table = table.get(part) if isinstance(table, dict) else None
+    if not isinstance(table, dict) or last not in table:
+        hint = did_you_mean("" if key_of(key) in known else elsewhere(key_of(key)[:60], known))
+        raise SceneError(f"{file}: --unset {shown(key)}: the scene does not set it{hint}")
+    del table[last]
+
+
 def override(tables: dict, entry: str, file: str, known: tuple[str, ...]) -> None:
     """Set one "KEY=VALUE" in the tables; known: every dotted key."""
-    key, equals, text = entry.partition("=")
-    path = [part.strip() for part in key.split(".")]
+    equals, text = entry.partition("=")[1:]
+    path = key_of(entry).split(".")
     if not equals or not all(path):
         hint = did_you_mean(elsewhere(".".join(part for part in path if part)[:60], known))
         raise SceneError(f'{file}: --set {shown(entry)}: KEY=VALUE is needed, such as pore.width="50 um"{hint}')

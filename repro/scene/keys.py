@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import MISSING, dataclass
 from pathlib import Path
 
-from repro.scene.files import override, packaged_scenes, read_tables
+from repro.scene.files import key_of, leave_out, override, packaged_scenes, read_tables
 from repro.scene.reading import Place, dotted, entries, read_table, write_table
 from repro.scene.rules import rules
 from repro.scene.units import (
@@ -278,30 +278,55 @@ LATER: dict[str, dict[str, object]] = {
 KEYS = tuple(dotted(Scene))  # every dotted key of a scene, its sections among them
 
 
-def load_scene(source: str | Path, overrides: Sequence[str] = ()) -> Scene:
-    """The scene in a TOML file or of a packaged name, with the "KEY=VALUE" of --set; SceneError if not accepted."""
+def load_scene(source: str | Path, overrides: Sequence[str] = (),
+               unset: Sequence[str] = ()) -> Scene:
+    """The scene in a TOML file or of a packaged name, without the keys of --unset and with the
+    "KEY=VALUE" of --set. Raises SceneError if it is not accepted.
+    """
     file = str(source)
-    return parse_scene(load_tables(file, overrides), Path(file).stem, file)
+    tables = load_tables(file, overrides, unset)
+    return parse_scene(tables, Path(file).stem, file, [key_of(entry) for entry in overrides])
 
 
-def load_tables(file: str, overrides: Sequence[str] = ()) -> dict:
-    """What a TOML file or a packaged scene and the "KEY=VALUE" of --set say, as it stands."""
+def load_tables(file: str, overrides: Sequence[str] = (), unset: Sequence[str] = ()) -> dict:
+    """What a TOML file or a packaged scene says, as it stands, after --unset and then --set."""
     tables = read_tables(file)
+    for key in unset:
+        leave_out(tables, key, file, KEYS)
     for entry in overrides:
         override(tables, entry, file, KEYS)
     return tables
 
 
-def parse_scene(tables: dict, name: str, file: str) -> Scene:
-    """The scene that TOML `tables` describe, called `name`; SceneError, naming `file`, if it is not accepted."""
+def parse_scene(tables: dict, name: str, file: str, changed: Sequence[str] = ()) -> Scene:
+    """The scene that TOML `tables` describe, called `name`.
+
+    `changed`: the dotted keys that were set last, such as those of --set; of keys that do not go
+    together an error names one of these. Raises SceneError, naming `file`, if it is not accepted.
+    """
     _refuse_missing(tables, file)
     if "substrates" in tables and "aggregate" in tables:
         tables = {"kinetics": {}, **tables}
     scene = read_table(Scene, _with_preset(tables), Place(file, known=KEYS), name=name)
-    for broken, key, wanted in rules(scene):
+    for broken, wanted in rules(scene):
         if broken:
-            raise Place(file, key).refuse(_at(tables, key, _at(scene_tables(scene), key, MISSING)), wanted)
+            key = _to_name(list(wanted), tables, changed)
+            value = _at(tables, key, _at(scene_tables(scene), key, MISSING))
+            raise Place(file, key).refuse(value, wanted[key])
     return scene
+
+
+def _to_name(keys: list[str], tables: dict, changed: Sequence[str]) -> str:
+    """Of keys that do not go together the first that was changed, else that the tables set."""
+    for key in keys:
+        if any(_within(key, other) or _within(other, key) for other in changed):
+            return key
+    said = [key for key in keys if _at(tables, key, MISSING) is not MISSING]
+    return [*said, *keys][0]
+
+
+def _within(key: str, section: str) -> bool:
+    return f"{key}.".startswith(f"{section}.")
 
 
 def _refuse_missing(tables: dict, file: str) -> None:

@@ -7,9 +7,15 @@ import json
 from collections.abc import Iterator
 from dataclasses import MISSING, Field, dataclass, fields, replace
 
-from repro.scene.units import SceneError, nearest
+from repro.scene.units import SceneError, nearest, unlike
 
 LONGEST_KEY = 60  # characters of a key in a message
+SCOPE = "docs/scope.md"
+#: Words of keys that other models have.
+NOT_MODELLED = frozenset({
+    "attachment", "detachment", "erosion", "sloughing", "depth", "dimension", "dimensions",
+    "inhibition", "temperature",
+})
 
 
 @dataclass(frozen=True)
@@ -46,7 +52,10 @@ def read_table(kind: type, table: object, place: Place, **given):
     """The dataclass `kind` that a TOML table describes, with `given` for what is no key; SceneError if not accepted."""
     keys = entries(kind)
     if not isinstance(table, dict):
-        raise place.refuse(table, f"a table [{place.key}] is needed, with the keys {', '.join(keys)}")
+        several = isinstance(table, list) and place.key in ("aggregate", "pore")
+        one = f"one {place.key} is modelled, see {SCOPE}: " if several else ""
+        wanted = f"{one}a table [{place.key}] is needed, with the keys {', '.join(keys)}"
+        raise place.refuse(table, wanted)
     for key in table:
         if key not in keys:
             raise place.below(key).refuse(table[key], _instead(key, list(keys), place))
@@ -63,7 +72,8 @@ def _read_entry(entry: Field, value: object, place: Place):
     try:
         return kind.read(value)
     except (ValueError, OverflowError):
-        raise place.refuse(value, kind.wanted + did_you_mean(kind.near(value))) from None
+        hint = unlike(kind, value) or did_you_mean(kind.near(value))
+        raise place.refuse(value, kind.wanted + hint) from None
 
 
 def write_table(part) -> dict:
@@ -77,9 +87,12 @@ def write_table(part) -> dict:
 
 
 def _instead(key: str, keys: list[str], place: Place) -> str:
-    near = nearest(key, keys) or elsewhere(key, place.known)
     table = f"[{place.key}]" if place.key else "a scene"
-    return f"there is no such key; {table} takes {', '.join(keys)}{did_you_mean(near)}"
+    told = f"there is no such key; {table} takes {', '.join(keys)}"
+    words = NOT_MODELLED & set(key.casefold().split("_"))
+    if words:
+        return f"{told}; {min(words)} is not modelled, see {SCOPE}"
+    return told + did_you_mean(nearest(key, keys) or elsewhere(key, place.known))
 
 
 def elsewhere(key: str, known: tuple[str, ...]) -> str:

@@ -13,7 +13,7 @@ from dataclasses import MISSING, Field
 from pathlib import Path
 
 from repro.scene import OURS, PRESETS, Numerics, Scene, load_tables, packaged_scenes, parse_scene
-from repro.scene.files import read_text
+from repro.scene.files import key_of, read_text
 from repro.scene.reading import entries
 from repro.scene.units import Points, Quantity, Times
 
@@ -23,10 +23,14 @@ HEAD = ("A \"#\" without a space is before what this scene leaves out, or leaves
         "ambiguities, reference/ERRATA.md.")
 
 
-def scene_text(source: str, overrides: Sequence[str] = ()) -> str:
-    """The TOML text of a packaged scene or of a file; it parses to an equal scene. Raises SceneError as load_scene."""
-    tables = load_tables(source, overrides)
-    scene = parse_scene(tables, Path(source).stem, source)
+def scene_text(source: str, overrides: Sequence[str] = (), unset: Sequence[str] = ()) -> str:
+    """The TOML text of a packaged scene or of a file, with what --set and --unset change.
+
+    It parses to an equal scene. Raises SceneError as load_scene.
+    """
+    tables = load_tables(source, overrides, unset)
+    changed = [key_of(entry) for entry in overrides]
+    scene = parse_scene(tables, Path(source).stem, source, changed)
     name = "".join(letter if letter.isprintable() and letter.isascii() else "?" for letter in scene.name)
     lines = [*_comment(f"Scene {name}. {HEAD}")]
     for key, entry in entries(Scene).items():

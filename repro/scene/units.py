@@ -39,6 +39,8 @@ _DIGITS = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _FACTOR = r"[A-Za-z\u00b5\u03bc]+(?:(?:\^|\*\*)-?[1-9])?"
 _UNIT = rf"(?:1? ?/ ?)?{_FACTOR}(?:(?: ?[*/] ?| ){_FACTOR})*"
 _QUANTITY = re.compile(rf"({_DIGITS}) *({_UNIT})")
+_MOLES = re.compile(r"[0-9 /](?:[num\u00b5\u03bc]|milli|micro|nano)?(?:mol(?:es?|ars?)?|M)(?![A-Za-z])")
+_PARTS = re.compile(r"[0-9 ]pp[mb](?![A-Za-z])")
 
 
 class Range(NamedTuple):
@@ -285,6 +287,16 @@ def to_internal(value: object, unit: str) -> float:
     if not math.isfinite(float(digits)):
         raise OverflowError("too large")
     return float(Fraction(digits) * factor) if float(digits) else 0.0
+
+
+def unlike(kind: Kind, value: object) -> str:
+    """What to give instead of moles, or of parts per million for a concentration; "" for others."""
+    text = value if isinstance(value, str) and len(value) <= LONGEST else ""
+    if _MOLES.search(text):
+        return "; moles need a molar mass, which is not known here: give milligrams"
+    if isinstance(kind, Quantity) and kind.unit == "mg/L" and _PARTS.search(text):
+        return "; give mg/L (in water 1 ppm is about 1 mg/L, 1 ppb about 1 ug/L)"
+    return ""
 
 
 def nearest(word: str, words: Iterable[str]) -> str:
