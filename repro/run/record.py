@@ -38,6 +38,10 @@ class Mark:
     size: int
     digest: bytes
 
+    def line(self, name: str) -> str:
+        """The line of a file with this mark in what ``sha256sum --check`` takes."""
+        return f"{self.digest.hex()}  {name}\n"
+
 
 def mark(path: Path) -> Mark:
     """The mark of a file as it is now. Raises OSError where it cannot be read."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
@@ -9,29 +10,32 @@ from time import perf_counter
 import numpy as np
 
 from repro import report, results, timing
-from repro.errors import CheckpointError, Interrupted
-from repro.files import whole
+from repro.errors import CheckpointError, Interrupted, OutputError
+from repro.files import is_file, whole
 from repro.march.loop import Instant, State, added
 from repro.results import netcdf
 from repro.run import checkpoint, record, stored
 from repro.run.checkpoint import Arrays
-from repro.run.folder import writing
+from repro.run.folder import CHECKPOINTS, OWN, PROVENANCE, SUMS, claimed, remove, writing
 from repro.run.machine import conditions
-from repro.run.record import PREFIX, Record
+from repro.run.record import PREFIX, Mark, Record
 from repro.run.status import done, undone
 from repro.scene import Scene
 
-CHECKPOINTS = (checkpoint.NEWEST, checkpoint.PREVIOUS, checkpoint.REFUSED)
 #: The ledgers of steps that are not reported yet: of a state, but an array in a checkpoint.
 PENDING = "pending.ledgers"
 
 
 class Recorder:
-    """Collects a run's rows and writes its files to ``folder``."""
+    """Collects a run's rows and writes its files to ``folder``.
 
-    def __init__(self, scene: Scene, folder: Path):
+    own: the names of the files in the folder that this run has written, or an earlier one.
+    """
+
+    def __init__(self, scene: Scene, folder: Path, own: Collection[str] = ()):
         self.scene = scene
         self.folder = folder
+        self.own = set(own)
         self.conditions = conditions()
         self.state: State | None = None
         self.record = Record()
@@ -81,11 +85,19 @@ class Recorder:
 
     def _write_fields(self, index: list, kind: str, pore, solved) -> None:
         name = record.fields_name(kind, len(index))
-        with writing(self.folder / name), whole(self.folder / name) as beside:
+        path = claimed(self.folder, name, self.own)
+        with writing(path), whole(path) as beside:
             results.write_fields(beside, results.fields(self.scene, pore, solved))
             self.record.marks[name] = record.mark(beside)
+            self._list_fields(name)
         index.append((pore.time, name))
         self.unsynced.append(name)
+
+    def _list_fields(self, name: str) -> None:
+        """Add a file of fields to those that the run has written, before it is there."""
+        path = claimed(self.folder, SUMS, self.own)
+        with path.open("a", encoding="utf-8", newline="") as sums:
+            sums.write(self.record.marks[name].line(name))
 
     def save(self, status: str) -> None:
         """Write checkpoint, tables, indices and provenance as they are now."""
@@ -105,19 +117,29 @@ class Recorder:
         now = self._now()
         self._write("run.json", results.write_json, {
             **results.provenance(self.scene), "conditions": self.conditions, "status": status,
-            "rows": len(now.rows), "wall_time_s": now.seconds,
+            "files": self._files(done(status)), "rows": len(now.rows), "wall_time_s": now.seconds,
             "wall_time_by_stage_s": now.stages, "newton_iterations": now.iterations,
             "remeshes": now.remeshes, "resumes": now.resumes})
+
+    def _files(self, over: bool) -> list[str]:
+        """The names of the run's files: those there are, or may come while it is not over."""
+        names = set(OWN) - _never(self.scene)
+        if over:
+            there = {name for name in names if is_file(self.folder / name)}
+            names = (there | {"report.html"}) - set(CHECKPOINTS)
+        return sorted(names | self.record.marks.keys())
 
     def finish(self, status: str) -> None:
         """Write everything at the end of a run."""
         if self.scene.output.timeseries == "netcdf":
             self._write("timeseries.nc", netcdf.write, self.scene, self.record.rows)
+        self._write(SUMS, _write_sums, self.record.marks)
         self.save(status)
-        settle(self.folder, done(status))
+        settle(self.folder, done(status), self.own)
 
     def _write(self, name: str, write, *content) -> None:
-        with writing(self.folder / name), whole(self.folder / name) as beside:
+        path = claimed(self.folder, name, self.own)
+        with writing(path), whole(path) as beside:
             write(beside, *content)
 
     def _now(self) -> Record:
@@ -134,7 +156,8 @@ class Recorder:
                 checkpoint.synced(self.folder / name)
         self.unsynced = []
         content = checkpoint.encoded(*packed(self.scene, state, self._now()))
-        with writing(self.folder / checkpoint.NEWEST):
+        claimed(self.folder, checkpoint.PREVIOUS, self.own)
+        with writing(claimed(self.folder, checkpoint.NEWEST, self.own)):
             checkpoint.write(self.folder, content)
 
     def restore(self, path: Path) -> None:
@@ -147,6 +170,20 @@ class Recorder:
         record.check(self.folder, state, before)
         self.state = state
         self.record = before
+
+    def drop_later(self) -> None:
+        """Remove fields that were written after the state gone on from: they are made again."""
+        fields = {name for name in self.own if name.startswith("fields/")}
+        remove(self.folder, fields - self.record.marks.keys())
+        self._write(SUMS, _write_sums, self.record.marks)
+
+    def clear(self) -> None:
+        """Remove what an earlier run has written, but for ``run.json``: it lists the rest."""
+        remove(self.folder, sorted(self.own - {PROVENANCE, SUMS}))
+        remove(self.folder, [SUMS])
+        self.own = {PROVENANCE}
+        with writing(self.folder / "fields"):
+            (self.folder / "fields").mkdir(exist_ok=True)
 
     def last_good(self) -> str:
         """Where the last good state is, in words."""
@@ -182,12 +219,32 @@ def unpacked(scene: Scene, plain: dict, arrays: Arrays) -> tuple[State, Record]:
     return state, record.unpacked(plain["record"], tables)
 
 
-def settle(folder: Path, over: bool) -> None:
-    """The last things of a run's end: its page, and no checkpoint where it is over."""
-    with writing(folder / "report.html"):
-        report.write(folder)
-    for name in CHECKPOINTS if over else ():
-        (folder / name).unlink(missing_ok=True)
+def _never(scene: Scene) -> set[str]:
+    """The files that a run of this scene does not write."""
+    absent = {"timeseries.nc": scene.output.timeseries != "netcdf",
+              "ledger.csv": scene.growth is None, "before_expansion.pvd": not scene.output.times}
+    return {name for name, never in absent.items() if never}
+
+
+def _write_sums(path: Path, marks: dict[str, Mark]) -> None:
+    """Write what ``sha256sum --check`` takes."""
+    lines = [marks[name].line(name) for name in sorted(marks)]
+    path.write_text("".join(lines), encoding="utf-8", newline="")
+
+
+def settle(folder: Path, over: bool, own: set[str]) -> None:
+    """The last things of a run's end: its page, and no checkpoint where it is over.
+
+    own: the names of its files. Raises OutputError where the page cannot be made or written.
+    """
+    path = claimed(folder, "report.html", own)
+    try:
+        with writing(path):
+            report.write(folder)
+    except ValueError as error:
+        raise OutputError(f"{path}: it cannot be made: {error}") from error
+    if over:
+        remove(folder, CHECKPOINTS)
 
 
 def interrupted(recorder: Recorder, number: int) -> Interrupted:

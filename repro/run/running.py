@@ -1,4 +1,7 @@
-"""Run a scene into a folder, or go on with a run there: rows and fields as they come, and nothing lost on the way."""
+"""Run a scene into a folder, or go on with a run there.
+
+Rows and fields are written as they come, and nothing is lost on the way.
+"""
 
 from __future__ import annotations
 
@@ -12,13 +15,23 @@ from time import perf_counter
 
 from repro import results, timing
 from repro.errors import CheckpointError, Interrupted, OutputError, SimulationError
+from repro.files import is_file
 from repro.march.loop import PoreEnd
 from repro.march.simulation import steps
 from repro.run import checkpoint
-from repro.run.folder import clear, held, prepare, tidy, usable
+from repro.run.folder import (
+    CHECKPOINTS,
+    PROVENANCE,
+    held,
+    listed,
+    prepare,
+    refuse_links,
+    tidy,
+    usable,
+)
 from repro.run.machine import conditions, differences
-from repro.run.recorder import CHECKPOINTS, Recorder, interrupted, settle
-from repro.run.status import done, undone
+from repro.run.recorder import Recorder, interrupted, settle
+from repro.run.status import COMPLETED, FAILED, INTERRUPTED, RUNNING, done, undone
 from repro.scene import Scene, parse_scene, scene_hash
 
 __all__ = ["OutputError", "Recorder", "Watch", "prepare", "resume", "run"]
@@ -26,57 +39,78 @@ __all__ = ["OutputError", "Recorder", "Watch", "prepare", "resume", "run"]
 #: Seconds of wall time between checkpoints.
 INTERVAL = 60.0
 
+Progress = Callable[[float], None]
+
 
 def untold(event: dict) -> None:
-    """What is done with events where nobody asks for them: warnings are given, the others dropped."""
+    """What is done with events where nobody asks for them: warnings are given, others dropped."""
     if event["event"] == "warning":
         warnings.warn(event["message"], stacklevel=2)
 
 
+def unwatched(time: float) -> None:
+    """What is done with simulated times where nobody asks for them."""
+
+
 @dataclass(frozen=True)
 class Watch:
-    """Who is told what happens, how often the state is written (s of wall time), and who says when to stop, by a
-    signal's number."""
+    """Who is told what happens, how often the state is written (s of wall time), and who says when
+    to stop, by a signal's number."""
 
     tell: Callable[[dict], None] = untold
     interval: float = INTERVAL
     stop: Callable[[], int] = lambda: 0
 
+    def warn(self, message: str) -> None:
+        """Tell a warning."""
+        self.tell({"event": "warning", "message": message})
+
 
 ALONE = Watch()
 
 
-def run(scene: Scene, folder: Path, progress: Callable[[float], None] = lambda time: None, watch: Watch = ALONE) -> str:
-    """Run a scene into a folder; ``progress`` is told each simulated time (h). Returns how the run ended.
+def run(scene: Scene, folder: Path, progress: Progress = unwatched, watch: Watch = ALONE) -> str:
+    """Run a scene into a folder; ``progress`` is told each simulated time (h).
 
-    Raises OutputError where the folder cannot be used or another run uses it, SimulationError where a stage fails, and
-    Interrupted where ``watch.stop`` asks for it: what was computed until then is written all the same, ``run.json``
-    says why it ends, and :func:`resume` goes on from there.
+    Returns how the run ended. Raises OutputError where the folder cannot be used or another run
+    uses it, SimulationError where a stage fails, and Interrupted where ``watch.stop`` asks for it:
+    what was computed until then is written all the same, ``run.json`` says why it ends, and
+    :func:`resume` goes on from there.
     """
     with held(folder):
-        prepare(folder)
+        own = _own(folder)
+        prepare(folder, own)
         timing.reset()
-        return _from_the_start(Recorder(scene, folder), progress, watch)
+        return _from_the_start(Recorder(scene, folder, own), progress, watch)
 
 
-def resume(folder: Path, progress: Callable[[float], None] = lambda time: None, watch: Watch = ALONE) -> str:
-    """Go on with a run that was interrupted, killed or has failed, and give bit for bit what it would have given.
+def _own(folder: Path) -> set[str]:
+    """The files of an earlier run in a folder."""
+    if not is_file(folder / PROVENANCE):
+        return set()
+    with suppress(OSError, ValueError, RecursionError):
+        told = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
+        return listed(folder, told if isinstance(told, dict) else {})
+    return {PROVENANCE}
 
-    Returns how the run ended, at once where it had ended before. Where versions have changed, or a checkpoint cannot be
-    used, a warning says so. Raises as :func:`run`, and OutputError where there is no run.
+
+def resume(folder: Path, progress: Progress = unwatched, watch: Watch = ALONE) -> str:
+    """Go on with a run that was interrupted, killed or has failed.
+
+    Gives bit for bit what it would have given. Returns how the run ended, at once where it had
+    ended before. Where versions have changed, or a checkpoint cannot be used, a warning says so.
+    Raises as :func:`run`, and OutputError where there is no run.
     """
-    if not (folder / "run.json").is_file():
+    if not is_file(folder / PROVENANCE):
         raise OutputError(f"--resume {folder}: there is no run.json; the folder of a run is needed")
     with held(folder):
-        told, scene = _told(folder / "run.json")
+        told, scene = _told(folder / PROVENANCE)
+        own = listed(folder, told)
+        refuse_links(folder, own)
         if done(told["status"]):
-            if any((folder / name).exists() for name in CHECKPOINTS):  # it was killed at its very end
-                settle(folder, over=True)
-            watch.tell({"event": "end", "scene": scene.name, "status": told["status"], "folder": str(folder),
-                        "changed": False})
-            return told["status"]
+            return _left_alone(scene, folder, told["status"], own, watch)
         timing.reset()
-        recorder = Recorder(scene, folder)
+        recorder = Recorder(scene, folder, own)
         changed = _changed(told, recorder, watch)
         with usable(folder):
             tidy(folder)
@@ -85,34 +119,56 @@ def resume(folder: Path, progress: Callable[[float], None] = lambda time: None, 
         return (_recorded if restored else _from_the_start)(recorder, progress, watch)
 
 
+def _left_alone(scene: Scene, folder: Path, status: str, own: set[str], watch: Watch) -> str:
+    """What is said of a run that is over; where it was killed at its very end, that is made."""
+    if any((folder / name).exists() for name in CHECKPOINTS):
+        settle(folder, True, own)
+    watch.tell({"event": "end", "scene": scene.name, "status": status, "folder": str(folder),
+                "changed": False})
+    return status
+
+
 def _told(path: Path) -> tuple[dict, Scene]:
-    """What ``run.json`` says, and its scene. Raises OutputError or SceneError where it is none."""
+    """What ``run.json`` says, and its scene.
+
+    Raises OutputError or SceneError where it is none of a run.
+    """
     try:
         told = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
-        raise OutputError(f"{path}: cannot be read ({error}); the run.json of a run is needed") from None
-    wanted = {"scene": str, "hash": str, "tables": dict, "status": str}
-    if not isinstance(told, dict) or not all(isinstance(told.get(key), kind) for key, kind in wanted.items()):
+        why = f"cannot be read ({error})"
+        raise OutputError(f"{path}: {why}; the run.json of a run is needed") from None
+    if not _is_record(told):
         raise OutputError(f"{path}: it has no scene or no status; the run.json of a run is needed")
     if not (done(told["status"]) or undone(told["status"])):
         raise OutputError(f"{path}: its status {told['status']!r} is none that a run writes")
     scene = parse_scene(told["tables"], told["scene"], str(path))
     if scene_hash(scene) != told["hash"]:
-        raise OutputError(f"{path}: its scene is not the one that was run: the hash {told['hash']!r} is of another")
+        raise OutputError(f"{path}: its scene is not the one that was run: the hash "
+                          f"{told['hash']!r} is of another")
     return told, scene
 
 
+def _is_record(told) -> bool:
+    """Has it what every ``run.json`` has?"""
+    wanted = {"scene": str, "hash": str, "tables": dict, "status": str}
+    return isinstance(told, dict) and all(
+        isinstance(told.get(key), kind) for key, kind in wanted.items())
+
+
 def _changed(told: dict, recorder: Recorder, watch: Watch) -> dict[str, list]:
-    """What has changed since the run began that could change its numbers; a warning where anything has."""
+    """What has changed since the run began that could change its numbers; a warning tells it."""
     keys = ("versions", "conditions")
     before = {key: told[key] if isinstance(told.get(key), dict) else {} for key in keys}
-    after = {"versions": results.provenance(recorder.scene)["versions"], "conditions": conditions()}
-    found = {key: pair for key, pair in differences(before, after).items() if not key.startswith("conditions.threads")}
-    if found:
-        names = ", ".join(f"{key} ({one} before, now {two})" for key, (one, two) in found.items())
-        watch.tell({"event": "warning", "message": f"{recorder.folder}: not as it was when the run began: {names}; the "
-                    "result need not be that of an uninterrupted run to the last bit"})
-    return found
+    versions = results.provenance(recorder.scene)["versions"]
+    after = {"versions": versions, "conditions": conditions()}
+    changed = {key: pair for key, pair in differences(before, after).items()
+               if not key.startswith("conditions.threads")}
+    if changed:
+        pairs = [f"{key} ({one} before, now {two})" for key, (one, two) in changed.items()]
+        watch.warn(f"{recorder.folder}: not as it was when the run began: {', '.join(pairs)}; the "
+                   "result need not be that of an uninterrupted run to the last bit")
+    return changed
 
 
 def _restored(recorder: Recorder, watch: Watch) -> bool:
@@ -122,22 +178,22 @@ def _restored(recorder: Recorder, watch: Watch) -> bool:
         if path.exists():
             try:
                 recorder.restore(path)
+                recorder.drop_later()
                 return True
             except CheckpointError as error:
-                watch.tell({"event": "warning", "message": f"{path}: refused: {error}"})
+                watch.warn(f"{path}: refused: {error}")
                 path.replace(recorder.folder / checkpoint.REFUSED)
-    watch.tell({"event": "warning", "message": f"{recorder.folder}: no checkpoint to go on from; it starts again from "
-                "t = 0"})
+    watch.warn(f"{recorder.folder}: no checkpoint to go on from; it starts again from t = 0")
     return False
 
 
-def _from_the_start(recorder: Recorder, progress: Callable[[float], None], watch: Watch) -> str:
-    recorder.tell("running")
-    clear(recorder.folder)
+def _from_the_start(recorder: Recorder, progress: Progress, watch: Watch) -> str:
+    recorder.tell(RUNNING)
+    recorder.clear()
     return _recorded(recorder, progress, watch)
 
 
-def _recorded(recorder: Recorder, progress: Callable[[float], None], watch: Watch) -> str:
+def _recorded(recorder: Recorder, progress: Progress, watch: Watch) -> str:
     """Run to the end, whatever it is, and write that; how the run ended."""
     watch.tell({"event": "start", "scene": recorder.scene.name, "folder": str(recorder.folder),
                 "from_h": recorder.time, "end_h": recorder.end, "step": recorder.steps})
@@ -145,51 +201,57 @@ def _recorded(recorder: Recorder, progress: Callable[[float], None], watch: Watc
         status = _simulated(recorder, progress, watch)
     except SimulationError as error:
         told = SimulationError(f"{error}; {recorder.last_good()}")
-        _end(recorder, f"failed: {told}", watch)
+        _end(recorder, f"{FAILED}{told}", watch)
         raise told from error
     except (KeyboardInterrupt, Interrupted):
-        _end(recorder, "interrupted", watch)
+        _end(recorder, INTERRUPTED, watch)
         raise
     except BaseException as error:
         with suppress(OutputError):  # the first trouble is the one to tell
-            _end(recorder, f"failed: {error}", watch)
+            _end(recorder, f"{FAILED}{error}", watch)
         raise
     return _end(recorder, status, watch)
 
 
 def _end(recorder: Recorder, status: str, watch: Watch) -> str:
     recorder.finish(status)
-    watch.tell({"event": "end", "scene": recorder.scene.name, "status": status, "folder": str(recorder.folder),
-                "time_h": recorder.time, "step": recorder.steps, "rows": len(recorder.record.rows), "changed": True})
+    watch.tell({"event": "end", "scene": recorder.scene.name, "status": status,
+                "folder": str(recorder.folder), "time_h": recorder.time, "step": recorder.steps,
+                "rows": len(recorder.record.rows), "changed": True})
     return status
 
 
-def _simulated(recorder: Recorder, progress: Callable[[float], None], watch: Watch) -> str:
+def _simulated(recorder: Recorder, progress: Progress, watch: Watch) -> str:
     """Record every step of a run, from the recorder's state on; how it ended."""
-    written = perf_counter()
     try:
-        for state, instant in steps(recorder.scene, recorder.state):
-            remeshes, contact = recorder.remeshes, recorder.contact
-            recorder.add(state, instant)
-            _tell_step(recorder, recorder.remeshes > remeshes, recorder.contact > contact, watch)
-            progress(recorder.time)
-            if number := watch.stop():
-                raise interrupted(recorder, number)
-            if perf_counter() - written >= watch.interval:
-                _checkpoint(recorder, watch)
-                written = perf_counter()
+        _record_steps(recorder, progress, watch)
     except PoreEnd as end:
         return str(end)
     except MemoryError as error:
-        raise SimulationError(f"stopped at t = {recorder.time:g} h, out of memory while results are written ({error}); "
-                              "try a smaller numerics.refinement") from error
-    return "completed"
+        raise SimulationError(f"stopped at t = {recorder.time:g} h, out of memory while results "
+                              f"are written ({error}); try a smaller numerics.refinement") from error
+    return COMPLETED
+
+
+def _record_steps(recorder: Recorder, progress: Progress, watch: Watch) -> None:
+    written = perf_counter()
+    for state, instant in steps(recorder.scene, recorder.state):
+        remeshes = recorder.remeshes
+        contact = recorder.contact
+        recorder.add(state, instant)
+        _tell_step(recorder, recorder.remeshes > remeshes, recorder.contact > contact, watch)
+        progress(recorder.time)
+        if number := watch.stop():
+            raise interrupted(recorder, number)
+        if perf_counter() - written >= watch.interval:
+            _checkpoint(recorder, watch)
+            written = perf_counter()
 
 
 def _tell_step(recorder: Recorder, remeshed: bool, contact: bool, watch: Watch) -> None:
     """A step as events."""
-    now = {"time_h": recorder.time, "end_h": recorder.end, "step": recorder.steps, "remeshes": recorder.remeshes,
-           "contact": recorder.contact}
+    now = {"time_h": recorder.time, "end_h": recorder.end, "step": recorder.steps,
+           "remeshes": recorder.remeshes, "contact": recorder.contact}
     watch.tell({"event": "step", **now})
     for event, happened in (("remesh", remeshed), ("contact", contact)):
         if happened:
@@ -198,6 +260,7 @@ def _tell_step(recorder: Recorder, remeshed: bool, contact: bool, watch: Watch) 
 
 def _checkpoint(recorder: Recorder, watch: Watch) -> None:
     start = perf_counter()
-    recorder.save("running")
-    watch.tell({"event": "checkpoint", "time_h": recorder.time, "file": str(recorder.folder / checkpoint.NEWEST),
+    recorder.save(RUNNING)
+    file = str(recorder.folder / checkpoint.NEWEST)
+    watch.tell({"event": "checkpoint", "time_h": recorder.time, "file": file,
                 "seconds": perf_counter() - start})
