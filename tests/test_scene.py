@@ -80,7 +80,8 @@ TABLE_1 = {  # worked out by hand: 1 m = 1e6 um, 1 cm2 = 1e8 um2, 1 day = 24 h, 
     "numerics.mesh_compressibility": 1.0,
     "output.timeseries": "csv",
 }
-GIVEN = {"name", "growth.end", "flow.head", "flow.mean_velocity", "output.times", "aggregate.outline"}
+GIVEN = {"name", "growth.end", "flow.head", "flow.mean_velocity", "output.times", "aggregate.outline",
+         "kinetics.donor_oxygen_demand"}
 
 
 def flat(section, prefix="") -> dict:

@@ -16,7 +16,7 @@ from tests.strategies import scenes
 #: Keys that exclude another one that is set: they stay commented out.
 OTHER_DRIVE = {"head": "mean_velocity", "mean_velocity": "head"}
 #: Keys without a default: what is shown is an example.
-EXAMPLES = {"times", "outline"}
+EXAMPLES = {"times", "outline", "donor_oxygen_demand"}
 SOURCE = re.compile(r"Table 1|[Ss]ection \d|\(\d+\)|\b[23]\.\d|[Ff]igures? \d")
 
 

@@ -12,6 +12,7 @@ import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import MISSING, dataclass
+from fractions import Fraction
 from pathlib import Path
 
 from repro.scene.files import key_of, leave_out, override, packaged_scenes, read_tables
@@ -34,6 +35,7 @@ from repro.scene.units import (
     quantity,
     required,
     section,
+    share,
     times,
 )
 
@@ -41,6 +43,7 @@ __all__ = ["Scene", "SceneError", "load_scene", "packaged_scenes", "parse_scene"
 
 OURS = "Not in the paper"
 SEED_RADIUS = 5.0  # um, Table 1
+RATIO = 1.52  # F, mg/mg, Table 1
 
 
 @dataclass(frozen=True)
@@ -101,14 +104,24 @@ class Flow:
 
 @dataclass(frozen=True, kw_only=True)
 class Substrate:
-    """A substrate of section 2.2: supply (10 K_s in section 4), K_s (mg/L), D in water and in biomass (um^2/h)."""
+    """A substrate of section 2.2: supply and K_s (mg/L), D in water and in biomass (um^2/h).
+
+    A Fraction for D in biomass is a share of D in water.
+    """
 
     supply: float = quantity("10 mg/L", "mg/L", NON_NEGATIVE, source="(11), section 4 (10 K_s)",
                              about="C_supply of the water that comes in, and of all water at t = 0")
     half_saturation: float = quantity("1.0 mg/L", "mg/L", about="K_s of Monod's law", source="(7)-(10), Table 1")
     diffusivity: float = required("2.32 cm^2/day", "um^2/h", about="D in water", source="(7)-(8), Table 1")
-    diffusivity_in_aggregate: float = required("1.85 cm^2/day", "um^2/h", about="D in the aggregate",
-                                               source="2.2, Table 1")
+    diffusivity_in_aggregate: float = share(
+        "1.85 cm^2/day", "um^2/h", "diffusivity", about="D in the aggregate",
+        source="2.2, Table 1", default=MISSING)
+
+    def __post_init__(self):
+        inside = self.diffusivity_in_aggregate
+        if isinstance(inside, Fraction):
+            inside = float(inside * Fraction(self.diffusivity))
+            object.__setattr__(self, "diffusivity_in_aggregate", inside)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,8 +129,9 @@ class Acceptor(Substrate):
     """The electron acceptor, oxygen: C_A, K_sA, D_A."""
 
     diffusivity: float = quantity("2.32 cm^2/day", "um^2/h", about="D_A in water", source="(7), Table 1")
-    diffusivity_in_aggregate: float = quantity("1.85 cm^2/day", "um^2/h", about="D_A in the aggregate",
-                                               source="2.2 (80 % of that in water), Table 1")
+    diffusivity_in_aggregate: float = share(
+        "1.85 cm^2/day", "um^2/h", "diffusivity", about="D_A in the aggregate",
+        source="2.2 (80 % of that in water), Table 1")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,8 +139,9 @@ class Donor(Substrate):
     """The electron donor, phenol: C_D, K_sD, D_D."""
 
     diffusivity: float = quantity("1.01 cm^2/day", "um^2/h", about="D_D in water", source="(8), Table 1")
-    diffusivity_in_aggregate: float = quantity("0.81 cm^2/day", "um^2/h", about="D_D in the aggregate",
-                                               source="2.2 (80 % of that in water), Table 1")
+    diffusivity_in_aggregate: float = share(
+        "0.81 cm^2/day", "um^2/h", "diffusivity", about="D_D in the aggregate",
+        source="2.2 (80 % of that in water), Table 1")
 
 
 @dataclass(frozen=True)
@@ -153,10 +168,28 @@ class Kinetics:
                                         source="(7), (10), Table 1")
     decay_oxygen_demand: float = number(1.42, about="d_c, mg of acceptor per mg of biomass that degrades",
                                         source="(7) [E3], Table 1")
-    acceptor_to_donor_ratio: float = number(1.52, about="F, mg of acceptor per mg of donor",
-                                            source="(7), Table 1 as printed, where COD - Y d_c is 1.5138 [E1]")
+    donor_oxygen_demand: float | None = number(
+        2.38, default=None, source="(7), Table 1 [E1]",
+        about="COD, mg of acceptor that a mg of donor takes when it is oxidised; gives the next key")
+    acceptor_to_donor_ratio: float = number(
+        RATIO, default=None, stated=f"default {RATIO}, or COD - Y d_c where COD is given",
+        about="F, mg of acceptor per mg of donor",
+        source="(7), Table 1 as printed, where COD - Y d_c is 1.5138 [E1]")
     maximum_density: float = quantity("30000 mg/L", "mg/L", about="X_m, mass of biomass per volume of aggregate",
                                       source="(28), Table 1")
+
+    def __post_init__(self):
+        if self.acceptor_to_donor_ratio is None:
+            implied = self.implied_ratio
+            ratio = RATIO if implied is None else implied
+            object.__setattr__(self, "acceptor_to_donor_ratio", ratio)
+
+    @property
+    def implied_ratio(self) -> float | None:
+        """COD - Y d_c (mg/mg), which F is by (7); None where no COD is given."""
+        if self.donor_oxygen_demand is None:
+            return None
+        return self.donor_oxygen_demand - self.yield_coefficient * self.decay_oxygen_demand
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from repro.scene import Aggregate, Pore, Scene
+    from repro.scene import Aggregate, Kinetics, Pore, Scene
 
 _NO_STATE = "nothing is supplied, so that no state is steady"
 _UNSTEADY = f', or numerics.transport = "gear": {_NO_STATE}'
@@ -168,6 +168,10 @@ def _per_day(velocity: float | None) -> str:
 
 
 def _boundary_rules(scene: "Scene") -> Rules:
+    for name in ("acceptor", "donor"):
+        inside = getattr(scene.substrates, name).diffusivity_in_aggregate
+        key = f"substrates.{name}.diffusivity_in_aggregate"
+        yield inside <= 0, {key: "greater than zero is needed"}
     closed = scene.substrates.boundary == "closed"
     yield closed and scene.flow is not None, {
         "substrates.boundary": '"open" is needed with [flow]',
@@ -184,6 +188,8 @@ def _growth_rules(scene: "Scene") -> Rules:
     wanted = "[aggregate] and [substrates] are needed with it"
     yield alone and scene.kinetics is not None, {"kinetics": wanted}
     yield alone and scene.growth is not None, {"growth": wanted}
+    if scene.kinetics:
+        yield from _demand_rules(scene.kinetics)
     if scene.growth:
         yield from _step_rules(scene.growth.end, scene.growth.time_step)
     if scene.growth and scene.growth.fluid_forces == "included":
@@ -192,6 +198,18 @@ def _growth_rules(scene: "Scene") -> Rules:
     yield film >= scene.pore.width, {
         "growth.minimum_film": f"less than pore.width ({scene.pore.width:g} um) is needed",
         "pore.width": f"more than growth.minimum_film ({film:g} um) is needed",
+    }
+
+
+def _demand_rules(law: "Kinetics") -> Rules:
+    implied = law.implied_ratio
+    demand = f"kinetics.donor_oxygen_demand ({law.donor_oxygen_demand})"
+    biomass = law.yield_coefficient * law.decay_oxygen_demand
+    less = f"less than {demand} is needed of Y d_c ({biomass:g}), its product with"
+    yield implied is not None and implied <= 0, {
+        "kinetics.donor_oxygen_demand": f"more than Y d_c ({biomass:g}) is needed: F is the rest",
+        "kinetics.yield_coefficient": f"{less} decay_oxygen_demand",
+        "kinetics.decay_oxygen_demand": f"{less} yield_coefficient",
     }
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from repro.scene import OURS, PRESETS, Numerics, Scene, load_tables, packaged_scenes, parse_scene
 from repro.scene.files import key_of, read_text
 from repro.scene.reading import entries
-from repro.scene.units import Points, Quantity, Times
+from repro.scene.units import Choice, Flag, Number
 
 WIDTH = 100
 HEAD = ("A \"#\" without a space is before what this scene leaves out, or leaves to the default shown: remove it to "
@@ -83,9 +83,10 @@ def _stated(kind: type, key: str, field: Field) -> str:
 def _default(field: Field, made: object) -> object:
     """The value to show where the scene writes none: what a preset has made of it, else the default or an example."""
     kind = field.metadata["kind"]
-    if isinstance(kind, Quantity | Times | Points):
-        return kind.example
-    return field.default if made is None else made
+    if isinstance(kind, Choice | Flag | Number):
+        made = field.default if made is None else made
+        return kind.example if made is None and isinstance(kind, Number) else made
+    return kind.example
 
 
 def _comment(text: str) -> Iterator[str]:

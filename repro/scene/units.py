@@ -38,6 +38,7 @@ MOST_POINTS = 1000  # of an outline
 _DIGITS = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _FACTOR = r"[A-Za-z\u00b5\u03bc]+(?:(?:\^|\*\*)-?[1-9])?"
 _UNIT = rf"(?:1? ?/ ?)?{_FACTOR}(?:(?: ?[*/] ?| ){_FACTOR})*"
+_PERCENT = re.compile(rf"({_DIGITS}) *%")
 _QUANTITY = re.compile(rf"({_DIGITS}) *({_UNIT})")
 _MOLES = re.compile(r"[0-9 /](?:[num\u00b5\u03bc]|milli|micro|nano)?(?:mol(?:es?|ars?)?|M)(?![A-Za-z])")
 _PARTS = re.compile(r"[0-9 ]pp[mb](?![A-Za-z])")
@@ -90,6 +91,41 @@ class Quantity:
 
     def write(self, value: float) -> str:
         return f"{float(value)!r} {self.unit}"
+
+
+@dataclass(frozen=True)
+class Share:
+    """A quantity, or a percentage of the quantity of the key `of`: read as a float or a Fraction."""
+
+    whole: Quantity
+    of: str
+
+    @property
+    def example(self) -> str:
+        return self.whole.example
+
+    @property
+    def accepted(self) -> str:
+        return f'{self.whole.accepted}, or a share of {self.of} such as "80 %"'
+
+    @property
+    def wanted(self) -> str:
+        return f'{self.whole.wanted}, or a share of {self.of} up to "100 %"'
+
+    def read(self, value: object) -> float | Fraction:
+        text = value if isinstance(value, str) and len(value) <= LONGEST else ""
+        match = _PERCENT.fullmatch(text)
+        if match is None:
+            return self.whole.read(value)
+        if not 0 < float(match[1]) <= 100:
+            raise ValueError("not a share")
+        return Fraction(match[1]) / 100
+
+    def write(self, value: float) -> str:
+        return self.whole.write(value)
+
+    def near(self, value: object) -> str:
+        return self.whole.near(value)
 
 
 @dataclass(frozen=True)
@@ -217,7 +253,7 @@ class Flag:
         return word if word in ("true", "false") else ""
 
 
-Kind = Quantity | Number | Choice | Times | Points | Flag
+Kind = Quantity | Share | Number | Choice | Times | Points | Flag
 
 
 def quantity(text: str, unit: str, accepts: Range = POSITIVE, *, about: str, source: str, **default):
@@ -245,9 +281,17 @@ def required(example: str, unit: str, accepts: Range = POSITIVE, *, about: str, 
     return _told(Quantity(unit, example, accepts), about, source)
 
 
-def number(default: float, accepts: Range = POSITIVE, *, about: str, source: str):
-    """A plain number."""
-    return _told(Number(default, accepts), about, source, default=default)
+def share(text: str, unit: str, of: str, *, about: str, source: str, **default):
+    """A quantity with a default, or a percentage of the key `of`."""
+    default = default or {"default_factory": partial(to_internal, text, unit)}
+    return _told(Share(Quantity(unit, text), of), about, source, **default)
+
+
+def number(example: float, accepts: Range = POSITIVE, *, about: str, source: str,
+           stated: str = "", **default):
+    """A plain number; `example` is its default where no other one is given."""
+    default = default or {"default": example}
+    return _told(Number(example, accepts), about, source, stated, **default)
 
 
 def choice(*words: str, about: str, source: str):
