@@ -19,9 +19,9 @@ from repro.model import growth
 from repro.run.running import OutputError, prepare
 
 
-def run(tmp_path, scene, *sets, status=0):
+def run(tmp_path, scene, *sets, status=0, options=()):
     out = tmp_path / "run"
-    arguments = ["run", scene, "--out", str(out)]
+    arguments = ["run", scene, "--out", str(out), *options]
     for entry in sets:
         arguments += ["--set", entry]
     assert main(arguments) == status
@@ -156,10 +156,10 @@ def test_a_file_in_the_way_is_refused(tmp_path):
         prepare(tmp_path / "run")
 
 
-def test_a_second_run_replaces_the_first(tmp_path):
+def test_a_forced_run_replaces_the_first(tmp_path):
     """Mutant: fields of an earlier run left beside the new ones."""
     run(tmp_path, "base", 'growth.end="0.4 h"')
-    out = run(tmp_path, "flow_only")
+    out = run(tmp_path, "flow_only", options=["--force"])
     assert len(list((out / "fields").iterdir())) == 1 and not (out / "ledger.csv").exists()
 
 

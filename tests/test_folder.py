@@ -58,7 +58,7 @@ def test_a_killed_run_leaves_no_lock_that_counts(tmp_path, capsys):
     process.kill()
     process.communicate()
     assert process.returncode == -signal.SIGKILL and (out / LOCK).exists()
-    assert main(["run", "flow_only", "--out", str(out)]) == 0
+    assert main(["run", "flow_only", "--out", str(out), "--force"]) == 0
     assert told(out)["scene"] == "flow_only" and not (out / NEWEST).exists() and not (out / LOCK).exists()
 
 
@@ -127,7 +127,8 @@ def test_nothing_is_replaced_that_no_run_wrote(tmp_path, capsys):
     assert main(["run", "--resume", str(tmp_path), "--quiet"]) == 0
 
 
-@pytest.mark.parametrize("name", ["fields", "timeseries.csv", NEWEST, PREVIOUS, "report.html", "fields/fields_0001.vtu"])
+@pytest.mark.parametrize("name", ["fields", "timeseries.csv", NEWEST, PREVIOUS, "report.html",
+                                  "fields/fields_0001.vtu"])
 def test_links_are_refused(tmp_path, capsys, name):
     """What they lead to stays, whatever it is called. Mutants: files removed, or read, behind a link."""
     out = tmp_path / "run"

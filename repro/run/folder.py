@@ -79,6 +79,14 @@ def refuse_links(folder: Path, own: Collection[str]) -> None:
                               "run; move it away")
 
 
+def refuse_others(folder: Path, own: Collection[str]) -> None:
+    """Raises OutputError where a file that is not among these has a name that a run gives."""
+    with usable(folder):
+        for name in _strange(folder, own):
+            if name in OWN or FIELDS.fullmatch(name):
+                raise OutputError(f"{folder / name}: no run has written it; move it away")
+
+
 def remove(folder: Path, names: Collection[str]) -> None:
     """Remove files of a run, by their names in its folder; links and whatever is no file stay."""
     with usable(folder):

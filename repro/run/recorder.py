@@ -29,13 +29,16 @@ PENDING = "pending.ledgers"
 class Recorder:
     """Collects a run's rows and writes its files to ``folder``.
 
-    own: the names of the files in the folder that this run has written, or an earlier one.
+    own: the names of the files in the folder that this run has written, or an earlier one;
+    origin: the file that the scene was read from and what was set in it, empty where nobody tells.
     """
 
-    def __init__(self, scene: Scene, folder: Path, own: Collection[str] = ()):
+    def __init__(self, scene: Scene, folder: Path, own: Collection[str] = (),
+                 origin: dict | None = None):
         self.scene = scene
         self.folder = folder
         self.own = set(own)
+        self.origin = origin or {}
         self.conditions = conditions()
         self.state: State | None = None
         self.record = Record()
@@ -119,7 +122,7 @@ class Recorder:
             **results.provenance(self.scene), "conditions": self.conditions, "status": status,
             "files": self._files(done(status)), "rows": len(now.rows), "wall_time_s": now.seconds,
             "wall_time_by_stage_s": now.stages, "newton_iterations": now.iterations,
-            "remeshes": now.remeshes, "resumes": now.resumes})
+            "remeshes": now.remeshes, "resumes": now.resumes, "origin": self.origin})
 
     def _files(self, over: bool) -> list[str]:
         """The names of the run's files: those there are, or may come while it is not over."""

@@ -26,16 +26,19 @@ from repro.run.folder import (
     listed,
     prepare,
     refuse_links,
+    refuse_others,
     tidy,
     usable,
 )
 from repro.run.machine import conditions, differences
 from repro.run.recorder import Recorder, interrupted, settle
 from repro.run.status import COMPLETED, FAILED, INTERRUPTED, RUNNING, done, undone
-from repro.scene import Scene, parse_scene, scene_hash
+from repro.scene import Scene, SceneError, load_scene, parse_scene, scene_hash, scene_tables
 
 __all__ = ["OutputError", "Recorder", "Watch", "prepare", "resume", "run"]
 
+#: Of what differs so many keys are told.
+MOST_SHOWN = 4
 #: Seconds of wall time between checkpoints.
 INTERVAL = 60.0
 
@@ -69,29 +72,64 @@ class Watch:
 ALONE = Watch()
 
 
-def run(scene: Scene, folder: Path, progress: Progress = unwatched, watch: Watch = ALONE) -> str:
+def run(scene: Scene, folder: Path, progress: Progress = unwatched, watch: Watch = ALONE, *,
+        force: bool = False, origin: dict | None = None) -> str:
     """Run a scene into a folder; ``progress`` is told each simulated time (h).
 
-    Returns how the run ended. Raises OutputError where the folder cannot be used or another run
-    uses it, SimulationError where a stage fails, and Interrupted where ``watch.stop`` asks for it:
-    what was computed until then is written all the same, ``run.json`` says why it ends, and
-    :func:`resume` goes on from there.
+    A run of the same scene, source and versions that is there is gone on with, or left alone where
+    it is over; with ``force`` the files of whatever run is there are removed first. origin: the
+    ``file`` of the scene and the entries ``set`` in it, for ``run.json``.
+
+    Returns how the run ended. Raises OutputError where the folder holds anything else, cannot be
+    used or another run uses it, SimulationError where a stage fails, and Interrupted where
+    ``watch.stop`` asks for it: what was computed until then is written all the same, ``run.json``
+    says why it ends, and :func:`resume` goes on from there.
     """
     with held(folder):
-        own = _own(folder)
-        prepare(folder, own)
-        timing.reset()
-        return _from_the_start(Recorder(scene, folder, own), progress, watch)
+        recorder = Recorder(scene, folder, origin=origin)
+        if not is_file(folder / PROVENANCE):
+            prepare(folder)
+            return _from_the_start(recorder, progress, watch)
+        told = _told(folder / PROVENANCE)
+        recorder.own = listed(folder, told)
+        refuse_links(folder, recorder.own)
+        if force:
+            refuse_others(folder, recorder.own)
+            return _from_the_start(recorder, progress, watch)
+        _refuse_another(recorder, told)
+        prepare(folder, recorder.own)
+        return _continued(recorder, told, progress, watch)
 
 
-def _own(folder: Path) -> set[str]:
-    """The files of an earlier run in a folder."""
-    if not is_file(folder / PROVENANCE):
-        return set()
-    with suppress(OSError, ValueError, RecursionError):
-        told = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
-        return listed(folder, told if isinstance(told, dict) else {})
-    return {PROVENANCE}
+def _refuse_another(recorder: Recorder, told: dict) -> None:
+    """Raises OutputError, with what differs, where this is not what the run there was begun with.
+    """
+    now = results.provenance(recorder.scene) | {"source": recorder.conditions["source"]}
+    there = told | {"source": _table(told, "conditions").get("source")}
+    keys = ("source", "versions") if there["hash"] == now["hash"] else ("tables",)
+    differing = differences(*({key: which.get(key) for key in keys} for which in (there, now)))
+    if differing:
+        raise OutputError(
+            f"--out {recorder.folder}: the run there is another one: {_shown(differing)}; a new "
+            "folder is needed, or --force, which removes the files of that run")
+
+
+def _shown(differing: dict[str, list]) -> str:
+    """What differs, for people to read: the first keys with both values, and how many more."""
+    pairs = [f"{key.removeprefix('tables.')} ({_value(one)} there, now {_value(two)})"
+             for key, (one, two) in differing.items()]
+    more = f" and {len(pairs) - MOST_SHOWN} more" if len(pairs) > MOST_SHOWN else ""
+    return ", ".join(pairs[:MOST_SHOWN]) + more
+
+
+def _value(value: object) -> str:
+    if isinstance(value, dict):
+        return "a section"
+    return "not set" if value is None else str(value)
+
+
+def _table(told: dict, key: str) -> dict:
+    return told[key] if isinstance(told.get(key), dict) else {}
 
 
 def resume(folder: Path, progress: Progress = unwatched, watch: Watch = ALONE) -> str:
@@ -104,35 +142,54 @@ def resume(folder: Path, progress: Progress = unwatched, watch: Watch = ALONE) -
     if not is_file(folder / PROVENANCE):
         raise OutputError(f"--resume {folder}: there is no run.json; the folder of a run is needed")
     with held(folder):
-        told, scene = _told(folder / PROVENANCE)
+        told = _told(folder / PROVENANCE)
         own = listed(folder, told)
         refuse_links(folder, own)
-        if done(told["status"]):
-            return _left_alone(scene, folder, told["status"], own, watch)
-        timing.reset()
-        recorder = Recorder(scene, folder, own)
-        changed = _changed(told, recorder, watch)
-        with usable(folder):
-            tidy(folder)
-            restored = _restored(recorder, watch)
-        recorder.record.resumes.append({"time_h": recorder.time, "changed": changed})
-        return (_recorded if restored else _from_the_start)(recorder, progress, watch)
+        scene = _scene(told, folder / PROVENANCE)
+        recorder = Recorder(scene, folder, own, _table(told, "origin"))
+        _tell_another_file(recorder, watch)
+        return _continued(recorder, told, progress, watch)
 
 
-def _left_alone(scene: Scene, folder: Path, status: str, own: set[str], watch: Watch) -> str:
+def _tell_another_file(recorder: Recorder, watch: Watch) -> None:
+    """Warn where the file that a run's scene was read from says something else by now."""
+    file = recorder.origin.get("file")
+    entries = recorder.origin.get("set")
+    if not isinstance(file, str) or not isinstance(entries, list):
+        return
+    with suppress(SceneError, TypeError, AttributeError):  # it is gone, or is no scene any more
+        now = load_scene(file, entries)
+        differing = differences(scene_tables(recorder.scene), scene_tables(now))
+        if differing:
+            watch.warn(f"{file}: it is not the scene of the run any more: {_shown(differing)}; "
+                       "the run goes on with its own")
+
+
+def _continued(recorder: Recorder, told: dict, progress: Progress, watch: Watch) -> str:
+    """Go on with the run that ``run.json`` tells of, unless it is over; how it ended."""
+    if done(told["status"]):
+        return _left_alone(recorder, told["status"], watch)
+    timing.reset()
+    changed = _changed(told, recorder, watch)
+    with usable(recorder.folder):
+        tidy(recorder.folder)
+        restored = _restored(recorder, watch)
+    recorder.record.resumes.append({"time_h": recorder.time, "changed": changed})
+    return (_recorded if restored else _from_the_start)(recorder, progress, watch)
+
+
+def _left_alone(recorder: Recorder, status: str, watch: Watch) -> str:
     """What is said of a run that is over; where it was killed at its very end, that is made."""
+    folder = recorder.folder
     if any((folder / name).exists() for name in CHECKPOINTS):
-        settle(folder, True, own)
-    watch.tell({"event": "end", "scene": scene.name, "status": status, "folder": str(folder),
-                "changed": False})
+        settle(folder, True, recorder.own)
+    watch.tell({"event": "end", "scene": recorder.scene.name, "status": status,
+                "folder": str(folder), "changed": False})
     return status
 
 
-def _told(path: Path) -> tuple[dict, Scene]:
-    """What ``run.json`` says, and its scene.
-
-    Raises OutputError or SceneError where it is none of a run.
-    """
+def _told(path: Path) -> dict:
+    """What ``run.json`` says. Raises OutputError where it is none of a run."""
     try:
         told = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
@@ -142,11 +199,16 @@ def _told(path: Path) -> tuple[dict, Scene]:
         raise OutputError(f"{path}: it has no scene or no status; the run.json of a run is needed")
     if not (done(told["status"]) or undone(told["status"])):
         raise OutputError(f"{path}: its status {told['status']!r} is none that a run writes")
+    return told
+
+
+def _scene(told: dict, path: Path) -> Scene:
+    """The scene of ``run.json``. Raises SceneError, or OutputError where it is of another run."""
     scene = parse_scene(told["tables"], told["scene"], str(path))
     if scene_hash(scene) != told["hash"]:
         raise OutputError(f"{path}: its scene is not the one that was run: the hash "
                           f"{told['hash']!r} is of another")
-    return told, scene
+    return scene
 
 
 def _is_record(told) -> bool:
@@ -158,8 +220,7 @@ def _is_record(told) -> bool:
 
 def _changed(told: dict, recorder: Recorder, watch: Watch) -> dict[str, list]:
     """What has changed since the run began that could change its numbers; a warning tells it."""
-    keys = ("versions", "conditions")
-    before = {key: told[key] if isinstance(told.get(key), dict) else {} for key in keys}
+    before = {key: _table(told, key) for key in ("versions", "conditions")}
     versions = results.provenance(recorder.scene)["versions"]
     after = {"versions": versions, "conditions": conditions()}
     changed = {key: pair for key, pair in differences(before, after).items()
@@ -188,6 +249,7 @@ def _restored(recorder: Recorder, watch: Watch) -> bool:
 
 
 def _from_the_start(recorder: Recorder, progress: Progress, watch: Watch) -> str:
+    timing.reset()
     recorder.tell(RUNNING)
     recorder.clear()
     return _recorded(recorder, progress, watch)
