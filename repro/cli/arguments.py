@@ -15,7 +15,8 @@ def add_scene(command, nargs: str | None = None) -> None:
 def add_changes(command) -> None:
     """--set and --unset, for ``load_scene(scene, set, unset)``."""
     command.add_argument("--set", metavar="KEY=VALUE", action="append", default=[],
-                         help='change a key of the scene, such as growth.end="5 h"; may be repeated')
+                         help='change a key of the scene, such as growth.end="5 h"; may be '
+                         "repeated")
     command.add_argument("--unset", metavar="KEY", action="append", default=[],
-                         help="leave a key or a section of the scene out, such as flow.head, before "
-                         "--set is read; may be repeated")
+                         help="leave a key or a section of the scene out, such as flow.head, "
+                         "before --set is read; may be repeated")

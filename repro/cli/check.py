@@ -1,4 +1,4 @@
-"""``repro check SCENE [--set KEY=VALUE] [--unset KEY] [--json]``: validate a scene and say what a run of it will be."""
+"""``repro check SCENE [--set KEY=VALUE] [--unset KEY] [--json]``: say what a run will be."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ def add(commands) -> None:
     """The parser of this command."""
     command = commands.add_parser(
         "check", help="validate a scene and say what a run of it will be",
-        description="Validate a scene; say what it models, its mesh, its dimensionless numbers, where "
-        "a simplification does not hold, and what a run costs. Exit status: 0 where it can be run, "
-        "with warnings or without, 2 where not.")
+        description="Validate a scene; say what it models, its mesh, its dimensionless numbers, "
+        "where a simplification does not hold, and what a run costs. Exit status: 0 where it can "
+        "be run, with warnings or without, 2 where not.")
     add_scene(command)
     command.add_argument("--json", action="store_true", help="for machines")
     command.set_defaults(call=call)

@@ -1,4 +1,4 @@
-"""What a scene says: its keys, their units, how a file is read, checked and written, and the packaged scenes.
+"""What a scene says: its keys, their units, how a file is read, checked and written.
 
     keys      the dataclasses of a scene: default, unit, range, source of every key
     units     quantities with units

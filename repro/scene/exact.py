@@ -7,8 +7,8 @@ import re
 from fractions import Fraction
 from typing import NamedTuple
 
-SHORT = {"": 0, "n": -9, "u": -6, "\u00b5": -6, "\u03bc": -6, "m": -3, "c": -2, "d": -1, "h": 2, "k": 3,
-         "M": 6, "G": 9}
+SHORT = {"": 0, "n": -9, "u": -6, "\u00b5": -6, "\u03bc": -6, "m": -3, "c": -2, "d": -1, "h": 2,
+         "k": 3, "M": 6, "G": 9}
 LONG = {"": 0, "nano": -9, "micro": -6, "milli": -3, "centi": -2, "deci": -1, "hecto": 2, "kilo": 3,
         "mega": 6, "giga": 9}
 PI = Fraction("3.1415926535897932384626433832795028841971693993751")  # as many digits as pint's

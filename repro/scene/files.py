@@ -1,4 +1,4 @@
-"""Where the tables of a scene come from: a TOML file, or a packaged one, and what --set and --unset change."""
+"""Where the tables of a scene come from: a file, or a packaged one, and --set and --unset."""
 import os
 import re
 import tomllib
@@ -11,7 +11,8 @@ from repro.scene.units import SceneError, nearest
 LONGEST_LINE = 80  # characters of a line of a file in a message
 LARGEST = 1_000_000  # bytes of a file
 MOST_PARTS = 20  # of a dotted key; tomllib's memory grows with their square
-BARE = re.compile(r"=\s*[-+.\d][-+.\deE]*\s*[A-Za-z\u00b5\u03bc]")  # a value with a unit, without quotes
+#: A value with a unit, without quotes.
+BARE = re.compile(r"=\s*[-+.\d][-+.\deE]*\s*[A-Za-z\u00b5\u03bc]")
 #: Pieces of TOML, without backtracking: what may be a part of a key, a dot, and all else.
 TOKEN = re.compile(
     r'''(?P<blank>[ \t]++)|(?P<dot>\.)|(?P<comment>\#[^\n]*+)
@@ -22,7 +23,8 @@ TOKEN = re.compile(
 
 def packaged_scenes() -> tuple[str, ...]:
     """The names of the scenes that come with the package."""
-    return tuple(sorted(path.name.removesuffix(".toml") for path in _folder().iterdir() if path.name.endswith(".toml")))
+    names = [path.name for path in _folder().iterdir()]
+    return tuple(sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml")))
 
 
 def _folder():
@@ -34,7 +36,8 @@ def read_text(file: str) -> str:
     try:
         return _content(file).decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise SceneError(f"{file}: not UTF-8 text (at byte {error.start + 1}); a scene is a TOML file") from None
+        raise SceneError(f"{file}: not UTF-8 text (at byte {error.start + 1}); "
+                         "a scene is a TOML file") from None
 
 
 def _content(file: str) -> bytes:
@@ -65,13 +68,14 @@ def read_tables(file: str) -> dict:
     try:
         return tomllib.loads(text)
     except RecursionError:
-        raise SceneError(f"{file}: not TOML: values nested too deeply; a scene has tables of plain values") from None
+        raise SceneError(f"{file}: not TOML: values nested too deeply; "
+                         "a scene has tables of plain values") from None
     except ValueError as error:
         raise SceneError(f"{file}: not TOML: {error}{_line_of(text, str(error))}") from None
 
 
 def line_of_a_deep_key(text: str) -> int:
-    """The number of the first line with a key of more parts than MOST_PARTS; 0 where there is none."""
+    """The number of the first line with a key of more parts than MOST_PARTS; 0 without one."""
     dots = 0
     for token in TOKEN.finditer(text):
         kind = token.lastgroup
@@ -90,7 +94,8 @@ def _line_of(text: str, message: str) -> str:
     if found is None:
         return ""
     line = lines[int(found[1]) - 1].strip()
-    hint = '; a value with a unit stands in quotes, such as width = "50 um"' if BARE.search(line) else ""
+    quotes = '; a value with a unit stands in quotes, such as width = "50 um"'
+    hint = quotes if BARE.search(line) else ""
     return f": {line if len(line) <= LONGEST_LINE else line[:LONGEST_LINE - 3] + '...'}{hint}"
 
 
@@ -117,15 +122,18 @@ def override(tables: dict, entry: str, file: str, known: tuple[str, ...]) -> Non
     path = key_of(entry).split(".")
     if not equals or not all(path):
         hint = did_you_mean(elsewhere(".".join(part for part in path if part)[:60], known))
-        raise SceneError(f'{file}: --set {shown(entry)}: KEY=VALUE is needed, such as pore.width="50 um"{hint}')
+        raise SceneError(f"{file}: --set {shown(entry)}: KEY=VALUE is needed, such as "
+                         f'pore.width="50 um"{hint}')
     if len(path) > MOST_PARTS:
-        raise SceneError(f"{file}: --set {shown(entry)}: a key of at most {MOST_PARTS} parts is needed")
+        raise SceneError(f"{file}: --set {shown(entry)}: a key of at most {MOST_PARTS} parts "
+                         "is needed")
     place = Place(file)
     for part in path[:-1]:
         tables, place = tables.setdefault(part, {}), place.below(part)
         if not isinstance(tables, dict):
             hint = did_you_mean(place.key if place.key in known else "")
-            raise place.refuse(tables, f"it takes no keys, so that --set {shown(entry)} is not accepted{hint}")
+            wanted = f"it takes no keys, so that --set {shown(entry)} is not accepted{hint}"
+            raise place.refuse(tables, wanted)
     tables[path[-1]] = _toml_value(text.strip())
 
 

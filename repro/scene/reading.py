@@ -1,7 +1,7 @@
-"""Tables of TOML read into the dataclasses of a scene and written out of them, and how a refusal is told.
+"""Tables of TOML read into the dataclasses of a scene and written out of them; refusals.
 
-A refusal is one line that names the file, the key, the value, what is accepted and, where there is one, the nearest
-thing that is.
+A refusal is one line that names the file, the key, the value, what is accepted and, where there is
+one, the nearest thing that is.
 """
 import json
 from collections.abc import Iterator
@@ -49,7 +49,10 @@ def dotted(kind: type, above: str = "") -> Iterator[str]:
 
 
 def read_table(kind: type, table: object, place: Place, **given):
-    """The dataclass `kind` that a TOML table describes, with `given` for what is no key; SceneError if not accepted."""
+    """The dataclass `kind` that a TOML table describes, with `given` for what is no key.
+
+    Raises SceneError if it is not accepted.
+    """
     keys = entries(kind)
     if not isinstance(table, dict):
         several = isinstance(table, list) and place.key in ("aggregate", "pore")
@@ -62,7 +65,8 @@ def read_table(kind: type, table: object, place: Place, **given):
     for key, entry in keys.items():
         if key not in table and entry.default is MISSING and entry.default_factory is MISSING:
             raise place.below(key).refuse(MISSING, entry.metadata["kind"].wanted)
-    return kind(**given, **{key: _read_entry(keys[key], table[key], place.below(key)) for key in table})
+    read = {key: _read_entry(keys[key], table[key], place.below(key)) for key in table}
+    return kind(**given, **read)
 
 
 def _read_entry(entry: Field, value: object, place: Place):
@@ -82,7 +86,8 @@ def write_table(part) -> dict:
     for key, entry in entries(type(part)).items():
         value = getattr(part, key)
         if value is not None:
-            table[key] = entry.metadata["kind"].write(value) if "kind" in entry.metadata else write_table(value)
+            write = entry.metadata["kind"].write if "kind" in entry.metadata else write_table
+            table[key] = write(value)
     return table
 
 
@@ -96,11 +101,14 @@ def _instead(key: str, keys: list[str], place: Place) -> str:
 
 
 def elsewhere(key: str, known: tuple[str, ...]) -> str:
-    """The dotted keys, joined by "or", whose last part, or all of which, may have been meant; "" where there are none.
+    """The dotted keys, joined by "or", whose last part, or all of which, may have been meant.
+
+    "" where there are none.
     """
     whole = nearest(key, known) if "." in key else ""
-    last = nearest(key.rpartition(".")[2], [other.rpartition(".")[2] for other in known])
-    return whole or " or ".join(other for other in known if last and other.rpartition(".")[2] == last)
+    lasts = [other.rpartition(".")[2] for other in known]
+    last = nearest(key.rpartition(".")[2], lasts)
+    return whole or " or ".join(other for other, end in zip(known, lasts) if last and end == last)
 
 
 def did_you_mean(near: str) -> str:
@@ -112,6 +120,6 @@ def shown(value: object, longest: int = 60) -> str:
     """A value as a message quotes it: as TOML would write it, shortened."""
     try:
         text = json.dumps(value, ensure_ascii=False, default=str)
-    except (ValueError, RecursionError):  # an integer of thousands of digits, tables nested by the thousand
+    except (ValueError, RecursionError):  # thousands of digits, tables nested by the thousand
         text = type(value).__name__
     return text if len(text) <= longest else text[: longest - 3] + "..."

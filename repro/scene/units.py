@@ -1,13 +1,15 @@
 """What the values and tables of a scene may be, and their numbers in the units of the package.
 
-Inside the package a length and a head are in um, a time in h, a concentration in mg/L, a modulus in MPa, an angle in
-rad, and what is made of them likewise (a velocity in um/h). A scene's values are converted here and nowhere else:
-exactly, and rounded once, so that "1164 min" and "19.4 h" are the same number.
+Inside the package a length and a head are in um, a time in h, a concentration in mg/L, a modulus in
+MPa, an angle in rad, and what is made of them likewise (a velocity in um/h). A scene's values are
+converted here and nowhere else: exactly, and rounded once, so that "1164 min" and "19.4 h" are the
+same number.
 
-A kind of value has `read` (what TOML gave -> what the model uses; ValueError or OverflowError when it is not accepted),
-its inverse `write`, `accepted` and `wanted`, the words that say what is accepted, and `near`, what may have been meant
-by a value that is not ("" where there is no telling). A table of a scene is a dataclass, whose fields carry their kind,
-or the dataclass of their section, in their metadata, with what they are about and their source in the paper.
+A kind of value has `read` (what TOML gave -> what the model uses; ValueError or OverflowError when
+it is not accepted), its inverse `write`, `accepted` and `wanted`, the words that say what is
+accepted, and `near`, what may have been meant by a value that is not ("" where that is unknown). A
+table of a scene is a dataclass, whose fields carry their kind, or the dataclass of their section, in
+their metadata, with what they are about and their source in the paper.
 """
 import difflib
 import json
@@ -40,7 +42,8 @@ _FACTOR = r"[A-Za-z\u00b5\u03bc]+(?:(?:\^|\*\*)-?[1-9])?"
 _UNIT = rf"(?:1? ?/ ?)?{_FACTOR}(?:(?: ?[*/] ?| ){_FACTOR})*"
 _PERCENT = re.compile(rf"({_DIGITS}) *%")
 _QUANTITY = re.compile(rf"({_DIGITS}) *({_UNIT})")
-_MOLES = re.compile(r"[0-9 /](?:[num\u00b5\u03bc]|milli|micro|nano)?(?:mol(?:es?|ars?)?|M)(?![A-Za-z])")
+_MOLES = re.compile(r"[0-9 /](?:[num\u00b5\u03bc]|milli|micro|nano)?"
+                    r"(?:mol(?:es?|ars?)?|M)(?![A-Za-z])")
 _PARTS = re.compile(r"[0-9 ]pp[mb](?![A-Za-z])")
 
 
@@ -95,7 +98,7 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Share:
-    """A quantity, or a percentage of the quantity of the key `of`: read as a float or a Fraction."""
+    """A quantity, read as a float, or a percentage of that of the key `of`, as a Fraction."""
 
     whole: Quantity
     of: str
@@ -145,7 +148,8 @@ class Number:
 
     def near(self, value: object) -> str:
         """The number that a text begins with."""
-        match = re.match(_DIGITS, value) if isinstance(value, str) and len(value) <= LONGEST else None
+        text = value if isinstance(value, str) and len(value) <= LONGEST else ""
+        match = re.match(_DIGITS, text)
         return match[0] if match and _takes(self, float(match[0])) else ""
 
     def read(self, value: object) -> float:
@@ -203,7 +207,8 @@ class Times:
 
     def near(self, value: object) -> str:
         """A single time, in a list."""
-        return f"[{json.dumps(value)}]" if isinstance(value, str) and _takes(self.each, value) else ""
+        taken = isinstance(value, str) and _takes(self.each, value)
+        return f"[{json.dumps(value)}]" if taken else ""
 
 
 @dataclass(frozen=True)
@@ -256,12 +261,12 @@ class Flag:
 Kind = Quantity | Share | Number | Choice | Times | Points | Flag
 
 
-def quantity(text: str, unit: str, accepts: Range = POSITIVE, *, about: str, source: str, **default):
-    """A value with a unit: `text` is its default, or only an example where another default is given.
+def quantity(text: str, unit: str, accepts: Range = POSITIVE, *, about: str, source: str,
+             stated: str = "", **default):
+    """A value with a unit: `text` is its default, or an example where another default is given.
 
     `stated` says in words what holds where the key is left out, if that hangs on other keys.
     """
-    stated = default.pop("stated", "")
     default = default or {"default_factory": partial(to_internal, text, unit)}
     return _told(Quantity(unit, text, accepts), about, source, stated, **default)
 
@@ -316,14 +321,17 @@ def section(kind: type, *, about: str, source: str, **default):
 
 
 class SceneError(ValueError):
-    """A scene that cannot be run; its message is one line naming file, key, value and what is accepted."""
+    """A scene that cannot be run: one line that names file, key, value and what is accepted."""
 
     def __init__(self, message: str):
         super().__init__("".join(letter if letter.isprintable() else " " for letter in message))
 
 
 def to_internal(value: object, unit: str) -> float:
-    """The number in the internal `unit` of a text such as "50 um"; ValueError or OverflowError if it is none."""
+    """The number in the internal `unit` of a text such as "50 um".
+
+    Raises ValueError or OverflowError if it is none.
+    """
     match = _QUANTITY.fullmatch(value) if isinstance(value, str) and len(value) <= LONGEST else None
     if match is None:
         raise ValueError("not a number with a unit")
@@ -344,7 +352,9 @@ def unlike(kind: Kind, value: object) -> str:
 
 
 def nearest(word: str, words: Iterable[str]) -> str:
-    """The one of the words that may have been meant: near in its letters, or with it as a part; "" where there is none.
+    """The one of the words that may have been meant: near in its letters, or with it as a part.
+
+    "" where there is none.
     """
     folded, word = {other.casefold(): other for other in words}, word[:60].casefold()
     parts = [other for other in folded if word in other.split("_")]
@@ -368,7 +378,10 @@ def _within(accepts: Range, value: float) -> float:
 
 @cache
 def _conversion(given: str, unit: str) -> Fraction:
-    """How many internal units the unit `given` is; ValueError if it is no unit, or of another dimension."""
+    """How many internal units the unit `given` is.
+
+    Raises ValueError if it is no unit, or of another dimension.
+    """
     if unit == "rad" and given not in ANGLES:
         raise ValueError(f"{given} is not a unit of angle")
     known = exact.conversion(given, unit)
@@ -381,7 +394,7 @@ def _by_pint(given: str, unit: str) -> Fraction:
     try:
         one = registry.Quantity(Fraction(1), registry.Unit(re.sub("^ ?/", "1/", given)))
         return Fraction(one.to(unit).magnitude)
-    except Exception as error:  # pint lets errors of its parser through: of the tokenizer, of types, ...
+    except Exception as error:  # pint lets errors of its parser through: of tokens, of types, ...
         raise ValueError(f"{given} is not convertible to {unit}") from error
 
 
