@@ -8,8 +8,8 @@ same number.
 A kind of value has `read` (what TOML gave -> what the model uses; ValueError or OverflowError when
 it is not accepted), its inverse `write`, `accepted` and `wanted`, the words that say what is
 accepted, and `near`, what may have been meant by a value that is not ("" where that is unknown). A
-table of a scene is a dataclass, whose fields carry their kind, or the dataclass of their section, in
-their metadata, with what they are about and their source in the paper.
+table of a scene is a dataclass, whose fields carry their kind, or the dataclass of their section,
+in their metadata, with what they are about and their source in the paper.
 """
 import difflib
 import json
