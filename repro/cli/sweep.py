@@ -11,6 +11,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from repro.cli.run import add_scene
+from repro.run.machine import require_packages
 from repro.sweep import cluster, design, page, pool, table
 from repro.sweep.state import Sweep, opened, usable
 
@@ -92,7 +93,10 @@ def _wanted(chosen) -> Sweep:
     """The sweep that the arguments describe, every run of it checked."""
     factors = [design.parse(text) for text in chosen.vary]
     found = design.grid(factors) if chosen.samples is None else design.latin(factors, chosen.samples, chosen.seed)
-    return Sweep(chosen.out, chosen.scene, factors, design.points(chosen.scene, chosen.set, factors, found))
+    points = design.points(chosen.scene, chosen.set, factors, found)
+    for point in points if chosen.scheduler is None else ():
+        require_packages(point.scene)
+    return Sweep(chosen.out, chosen.scene, factors, points)
 
 
 def _make(sweep: Sweep, quiet: bool, each: pool.Each, ended: dict[int, str]) -> None:

@@ -30,7 +30,7 @@ from repro.run.folder import (
     tidy,
     usable,
 )
-from repro.run.machine import conditions, differences
+from repro.run.machine import conditions, differences, require_packages
 from repro.run.recorder import Recorder, interrupted, settle
 from repro.run.status import COMPLETED, FAILED, INTERRUPTED, RUNNING, done, undone
 from repro.scene import Scene, SceneError, load_scene, parse_scene, scene_hash, scene_tables
@@ -80,11 +80,13 @@ def run(scene: Scene, folder: Path, progress: Progress = unwatched, watch: Watch
     it is over; with ``force`` the files of whatever run is there are removed first. origin: the
     ``file`` of the scene and the entries ``set`` in it, for ``run.json``.
 
-    Returns how the run ended. Raises OutputError where the folder holds anything else, cannot be
-    used or another run uses it, SimulationError where a stage fails, and Interrupted where
+    Returns how the run ended. Raises SceneError where the scene takes a package that is not
+    installed, OutputError where the folder holds anything else, cannot be used or another run uses
+    it, SimulationError where a stage fails, and Interrupted where
     ``watch.stop`` asks for it: what was computed until then is written all the same, ``run.json``
     says why it ends, and :func:`resume` goes on from there.
     """
+    require_packages(scene)
     with held(folder):
         recorder = Recorder(scene, folder, origin=origin)
         if not is_file(folder / PROVENANCE):
@@ -169,6 +171,7 @@ def _continued(recorder: Recorder, told: dict, progress: Progress, watch: Watch)
     """Go on with the run that ``run.json`` tells of, unless it is over; how it ended."""
     if done(told["status"]):
         return _left_alone(recorder, told["status"], watch)
+    require_packages(recorder.scene)
     timing.reset()
     changed = _changed(told, recorder, watch)
     with usable(recorder.folder):

@@ -14,7 +14,7 @@ from repro.run.cache import source_hash
 from repro.run.checkpoint import NEWEST, PREVIOUS
 from repro.run.running import OutputError, resume, run
 from repro.run.status import done, undone
-from repro.scene import Scene, scene_hash
+from repro.scene import Scene, SceneError, scene_hash
 
 
 def code() -> str:
@@ -61,7 +61,7 @@ def _begun(scene: Scene, beside: Path) -> bool:
 def _made(scene: Scene, beside: Path) -> str:
     try:
         return resume(beside) if beside.exists() else run(scene, beside)
-    except (SimulationError, OutputError) as error:
+    except (SimulationError, OutputError, SceneError) as error:
         return f"failed: {error}"
     except Exception as error:  # a bug is one run's failure, and told whole
         traceback.print_exc()
