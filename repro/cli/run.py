@@ -7,9 +7,10 @@ import math
 import os
 from pathlib import Path
 
+from repro.errors import SimulationError
 from repro.run import interrupts, progress
 from repro.run.running import INTERVAL, Watch, resume, run
-from repro.scene import load_scene, packaged_scenes
+from repro.scene import Scene, load_scene, packaged_scenes
 
 STATUS = """exit status:
   0    done: the scene's end, or the pore's, is reached, now or before
@@ -63,12 +64,19 @@ def call(chosen) -> int:
         chosen.refuse("SCENE and --out DIR are needed, or --resume DIR")
     scene = None if chosen.resume else load_scene(chosen.scene, chosen.set)
     with interrupts.noted() as stop, progress.told(chosen.quiet, chosen.json) as tell:
-        watch = Watch(tell, chosen.checkpoint, stop)
-        if scene is None:
-            resume(chosen.resume, watch=watch)
-        else:
-            run(scene, chosen.out, watch=watch, force=chosen.force, origin=_origin(chosen))
+        try:
+            _run(chosen, scene, Watch(tell, chosen.checkpoint, stop))
+        except MemoryError as error:  # outside of the steps, whose failures tell more
+            raise SimulationError(f"out of memory ({error}); try a smaller numerics.refinement") from error
     return 0
+
+
+def _run(chosen, scene: Scene | None, watch: Watch) -> None:
+    """Run the scene, or go on with the run where there is none."""
+    if scene is None:
+        resume(chosen.resume, watch=watch)
+    else:
+        run(scene, chosen.out, watch=watch, force=chosen.force, origin=_origin(chosen))
 
 
 def _origin(chosen) -> dict:

@@ -31,6 +31,7 @@ from repro.run.folder import (
     usable,
 )
 from repro.run.machine import conditions, differences, require_packages
+from repro.run.memory import require_memory
 from repro.run.recorder import Recorder, interrupted, settle
 from repro.run.status import COMPLETED, FAILED, INTERRUPTED, RUNNING, done, undone
 from repro.scene import Scene, SceneError, load_scene, parse_scene, scene_hash, scene_tables
@@ -80,13 +81,13 @@ def run(scene: Scene, folder: Path, progress: Progress = unwatched, watch: Watch
     it is over; with ``force`` the files of whatever run is there are removed first. origin: the
     ``file`` of the scene and the entries ``set`` in it, for ``run.json``.
 
-    Returns how the run ended. Raises SceneError where the scene takes a package that is not
-    installed, OutputError where the folder holds anything else, cannot be used or another run uses
+    Returns how the run ended. Raises SceneError where the machine lacks a package or the memory
+    that the scene takes, OutputError where the folder holds anything else, cannot be used or another run uses
     it, SimulationError where a stage fails, and Interrupted where
     ``watch.stop`` asks for it: what was computed until then is written all the same, ``run.json``
     says why it ends, and :func:`resume` goes on from there.
     """
-    require_packages(scene)
+    _require(scene, watch)
     with held(folder):
         recorder = Recorder(scene, folder, origin=origin)
         if not is_file(folder / PROVENANCE):
@@ -101,6 +102,12 @@ def run(scene: Scene, folder: Path, progress: Progress = unwatched, watch: Watch
         _refuse_another(recorder, told)
         prepare(folder, recorder.own)
         return _continued(recorder, told, progress, watch)
+
+
+def _require(scene: Scene, watch: Watch) -> None:
+    """Raises SceneError where the machine lacks a package or the memory that a scene takes."""
+    require_packages(scene)
+    require_memory(scene, watch.warn)
 
 
 def _refuse_another(recorder: Recorder, told: dict) -> None:
@@ -171,7 +178,7 @@ def _continued(recorder: Recorder, told: dict, progress: Progress, watch: Watch)
     """Go on with the run that ``run.json`` tells of, unless it is over; how it ended."""
     if done(told["status"]):
         return _left_alone(recorder, told["status"], watch)
-    require_packages(recorder.scene)
+    _require(recorder.scene, watch)
     timing.reset()
     changed = _changed(told, recorder, watch)
     with usable(recorder.folder):
