@@ -7,6 +7,7 @@ from html import escape
 import numpy as np
 
 from repro.files import whole
+from repro.report.page import policy
 from repro.results import write_text
 from repro.sweep import picture
 from repro.sweep.design import Factor, label
@@ -58,7 +59,9 @@ def page(sweep: Sweep, told: list[Told], clogged: float) -> str:
     title = f"Sweep of {escape(sweep.source)}"
     varied = "".join(f"<li>{escape(_described(factor))}</li>" for factor in sweep.factors)
     return f"""<!DOCTYPE html>
-<html lang="en"><head><meta charset="utf-8"/><meta name="viewport" content="width=device-width, initial-scale=1"/>
+<html lang="en"><head><meta charset="utf-8"/>
+<meta http-equiv="Content-Security-Policy" content="{policy(LOOK)}"/>
+<meta name="viewport" content="width=device-width, initial-scale=1"/>
 <title>{title}</title><style>{LOOK}</style></head><body>
 <h1>{title}</h1>
 <p>{done} of {len(told)} runs have come to their end. Varied:</p><ul>{varied}</ul>
