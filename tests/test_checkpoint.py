@@ -4,6 +4,7 @@ import copy
 import json
 import math
 import os
+import shutil
 import tracemalloc
 
 import numpy as np
@@ -16,7 +17,7 @@ from repro.march.loop import State
 from repro.march.simulation import steps
 from repro.run import checkpoint, stored
 from repro.run.checkpoint import NEWEST, PREVIOUS, decoded, encoded
-from repro.run.recorder import Recorder
+from repro.run.recorder import PENDING, Recorder, packed, unpacked
 from repro.run.running import Watch, run
 from repro.scene import load_scene
 
@@ -37,8 +38,8 @@ def kept(request, tmp_path_factory):
             found.append((folder / NEWEST).read_bytes())
 
     run(scene, folder, watch=Watch(tell=keep, interval=0.0))
-    told = [decoded(content)[0] for content in found]
-    both = [k for k, plain in enumerate(told) if plain["state"]["ledgers"] and plain["record"]["ledgers"]]
+    told = [decoded(content)[1] for content in found]
+    both = [k for k, arrays in enumerate(told) if len(arrays[PENDING]) and len(arrays["record.ledgers"])]
     return scene, folder, found[both[0]]
 
 
@@ -54,17 +55,18 @@ def restored(kept, content, path):
 def test_what_is_written_is_read(kept, tmp_path):
     """To the last bit, layout and type included. Mutants: a field left out, columns for rows, ints for floats."""
     scene, _, content = kept
-    state = restored(kept, content, tmp_path / "x").state
-    plain, arrays = stored.packed(scene, state)
-    assert encoded({**decoded(content)[0], "state": plain}, arrays) == content
-    assert plain["ledgers"] and plain["pace"][0] > 0 and isinstance(state.ledgers[0].supplied, tuple)
+    found = restored(kept, content, tmp_path / "x")
+    plain, arrays = packed(scene, found.state, found.record)
+    assert encoded(plain, arrays) == encoded(*decoded(content)) == content
+    assert plain["state"]["pace"][0] > 0 and isinstance(found.state.ledgers[0].supplied, tuple)
+    assert {type(value) for row in found.record.rows for value in row} <= {int, float, type(None)}
 
 
 def test_every_array_of_a_state_is_kept(kept):
     """Mutant: a new field of a pore or a mesh that nobody stores."""
     scene, _, content = kept
     plain, arrays = decoded(content)
-    state = stored.unpacked(scene, plain["state"], arrays)
+    state, _ = unpacked(scene, plain, arrays)
     for data in (state.pore, state.pore.mesh):
         fields = {name for name, kind in type(data).__annotations__.items() if "ndarray" in kind}
         assert fields and fields <= arrays.keys()
@@ -162,7 +164,7 @@ def spoil_array(data, plain, arrays):
 
 
 def spoil_numbers(data, plain, arrays):
-    name = data.draw(st.sampled_from([name for name in arrays if arrays[name].dtype.kind == "f"]))
+    name = data.draw(st.sampled_from([name for name in arrays if arrays[name].dtype.kind == "f" and arrays[name].size]))
     arrays[name] = spoilt(data, arrays[name], data.draw(st.sampled_from([*NEVER, 1e300, -1e300])))
 
 
@@ -181,7 +183,8 @@ def test_numbers_that_are_none_and_indices_that_are_no_nodes_are_refused(kept, t
     """In every array. Mutant: one array that is not looked at."""
     plain, arrays = decoded(kept[2])
     for name, array in arrays.items():
-        for value in {"f": NEVER, "i": (-1, len(arrays["points"]), 2**40), "b": ()}[array.dtype.kind]:
+        spoilers = {"f": NEVER, "i": (-1, len(arrays["points"]), 2**40)}.get(array.dtype.kind, ())
+        for value in spoilers if array.size else ():
             changed = array.copy(order="K")
             changed.flat[-1] = value
             assert refused(kept, encoded(plain, {**arrays, name: changed}), tmp_path / "x")
@@ -199,18 +202,48 @@ def test_what_makes_no_sense_is_refused(kept, tmp_path, key, value):
 
 
 @pytest.mark.parametrize("change", [
-    lambda record: record["rows"].pop(), lambda record: record["index"].pop(),
-    lambda record: record["ledgers"].append([0]),
-    lambda record: record["index"][0].__setitem__(1, "../../../etc/passwd"), lambda record: record.pop("remeshes"),
-    lambda record: record["rows"][0].pop(), lambda record: record["rows"][0].__setitem__(0, "0"),
+    lambda record: record.pop("remeshes"), lambda record: record.update(index=[]),
     lambda record: record.update(seconds=-1.0), lambda record: record.update(stages=[]),
-    lambda record: record["ledgers"].clear(), lambda record: record.update(rows=[], index=[]),
-    lambda record: record.update(iterations=[])])
-def test_rows_that_are_not_those_of_the_state_are_refused(kept, tmp_path, change):
-    """Mutants: names of files taken from a checkpoint, rows of another length or of another time."""
+    lambda record: record.update(iterations=[]), lambda record: record.update(resumes=[1])])
+def test_counts_that_are_none_are_refused(kept, tmp_path, change):
     plain, arrays = copy.deepcopy(decoded(kept[2])[0]), decoded(kept[2])[1]
     change(plain["record"])
     assert refused(kept, encoded(plain, arrays), tmp_path / "x")
+
+
+def all_rows(cut):
+    """Rows, and what there is of each row, cut alike."""
+    return {f"record.{name}": cut for name in ("rows", "whole")}
+
+
+@pytest.mark.parametrize("changes", [
+    all_rows(lambda a: a[:-1]), all_rows(lambda a: a[:, 1:]), all_rows(lambda a: a[:0]), {"record.rows": lambda a: -a},
+    {"record.rows": lambda a: a + 1.0}, {"record.whole": lambda a: ~a}, {"record.ledgers": lambda a: a[:0]},
+    {"record.ledgers": lambda a: np.column_stack([a, a])}, {"record.before_h": lambda a: np.append(a, 1.0)},
+    {"record.sizes": lambda a: a + 1}, {"record.hashes": lambda a: a[::-1].copy()},
+    {"record.hashes": lambda a: np.zeros_like(a)}, {PENDING: lambda a: a[:0]}, {PENDING: lambda a: a[:, 1:]},
+    {PENDING: lambda a: a[0]}])
+def test_rows_that_are_not_those_of_the_state_are_refused(kept, tmp_path, changes):
+    """Mutants: rows of another length or of another time, files that are not those that were written."""
+    plain, arrays = decoded(kept[2])
+    for name, change in changes.items():
+        arrays[name] = np.ascontiguousarray(change(arrays[name]))
+    assert refused(kept, encoded(plain, arrays), tmp_path / "x")
+
+
+@pytest.mark.parametrize("spoil", [lambda path: path.write_bytes(path.read_bytes()[:-9]), os.unlink,
+                                   lambda path: path.write_bytes(path.read_bytes().replace(b"0", b"1", 1)),
+                                   lambda path: path.rename(path.with_name("x")) and path.symlink_to("x")])
+def test_fields_that_are_not_as_they_were_written_are_refused(kept, tmp_path, spoil):
+    """Cut short, gone, altered with the same length, or moved and linked to. Mutants: a look at names alone, or at
+    sizes."""
+    scene, folder, content = kept
+    (tmp_path / "x").write_bytes(content)
+    copied = shutil.copytree(folder, tmp_path / "run")
+    Recorder(scene, copied).restore(tmp_path / "x")
+    spoil(copied / "fields" / "fields_0000.vtu")
+    with pytest.raises(CheckpointError, match="fields_0000.vtu is not as it was written"):
+        Recorder(scene, copied).restore(tmp_path / "x")
 
 
 def signed(header: bytes, data: bytes = b"") -> bytes:
@@ -248,8 +281,57 @@ def test_headers_that_cannot_be_are_refused(header):
 @example(b"\n")
 @given(st.binary(max_size=300))
 def test_other_files_are_refused(content):
-    with pytest.raises(CheckpointError, match="does not begin as|checksum"):
+    with pytest.raises(CheckpointError, match="does not begin as|checksum|format is not"):
         decoded(content)
+
+
+def test_a_checkpoint_of_another_format_is_refused_in_one_line(kept, tmp_path):
+    """Mutant: the old one read as the new one."""
+    old = checkpoint.MAGIC.replace(b" 2 ", b" 1 ") + kept[2].removeprefix(checkpoint.MAGIC)
+    (tmp_path / "x").write_bytes(old)
+    with pytest.raises(CheckpointError, match="^its format is not 2: another version wrote it$"):
+        Recorder(kept[0], kept[1]).restore(tmp_path / "x")
+
+
+def test_a_long_header_is_refused_without_memory():
+    """48 MB of empty lists would take 1.3 GB as objects. Mutant: a header of any length read as JSON."""
+    content = signed(b'{"plain": {}, "arrays": [' + b"[]," * 16_000_000 + b"[]]}")
+    tracemalloc.start()
+    with pytest.raises(CheckpointError, match="longer than"):
+        decoded(content)
+    assert tracemalloc.get_traced_memory()[1] < 2 * len(content)
+    tracemalloc.stop()
+
+
+def test_the_header_does_not_grow_with_the_run(kept):
+    """Rows, ledgers and files, reported or not, are arrays. Mutant: a long run whose checkpoints nobody can read."""
+    plain, arrays = decoded(kept[2])
+    header = kept[2].split(b"\n")[1]
+    for name in (PENDING, "record.rows", "record.whole", "record.ledgers", "record.sizes", "record.hashes"):
+        arrays[name] = np.concatenate([arrays[name]] * 1000)
+    assert len(encoded(plain, arrays).split(b"\n")[1]) < len(header) + 100
+
+
+@pytest.mark.parametrize("make", [lambda path: os.mkfifo(path), lambda path: path.symlink_to("/dev/zero"),
+                                  lambda path: path.symlink_to("good"), lambda path: path.mkdir()])
+def test_nothing_but_a_regular_file_is_read(kept, tmp_path, make):
+    """A pipe that nobody writes to, a device without end, a link to what would be right, a folder. Mutants: a resume
+    that hangs, or takes all memory."""
+    (tmp_path / "good").write_bytes(kept[2])
+    make(tmp_path / "x")
+    with pytest.raises(CheckpointError, match="cannot be read"):
+        Recorder(kept[0], kept[1]).restore(tmp_path / "x")
+
+
+def test_a_file_that_is_too_long_is_not_read(kept, tmp_path):
+    """One of 2 GB with nothing in it. Mutant: read, and refused after that."""
+    with (tmp_path / "x").open("wb") as file:
+        file.truncate(2**31)
+    tracemalloc.start()
+    with pytest.raises(CheckpointError, match="longer than"):
+        Recorder(kept[0], kept[1]).restore(tmp_path / "x")
+    assert tracemalloc.get_traced_memory()[1] < 2**20
+    tracemalloc.stop()
 
 
 def test_a_checkpoint_of_another_scene_is_refused(kept, tmp_path):

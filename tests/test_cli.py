@@ -19,9 +19,9 @@ from repro.model import growth
 from repro.run.running import OutputError, prepare
 
 
-def run(tmp_path, scene, *sets, status=0):
+def run(tmp_path, scene, *sets, status=0, options=()):
     out = tmp_path / "run"
-    arguments = ["run", scene, "--out", str(out)]
+    arguments = ["run", scene, "--out", str(out), *options]
     for entry in sets:
         arguments += ["--set", entry]
     assert main(arguments) == status
@@ -156,10 +156,10 @@ def test_a_file_in_the_way_is_refused(tmp_path):
         prepare(tmp_path / "run")
 
 
-def test_a_second_run_replaces_the_first(tmp_path):
+def test_a_forced_run_replaces_the_first(tmp_path):
     """Mutant: fields of an earlier run left beside the new ones."""
     run(tmp_path, "base", 'growth.end="0.4 h"')
-    out = run(tmp_path, "flow_only")
+    out = run(tmp_path, "flow_only", options=["--force"])
     assert len(list((out / "fields").iterdir())) == 1 and not (out / "ledger.csv").exists()
 
 
@@ -170,3 +170,17 @@ def test_a_failure_says_when_and_where_and_keeps_what_was_done(tmp_path, capsys,
     message = capsys.readouterr().err
     assert "t = 0 h, in growth" in message and "try" in message and message.count("\n") == 1
     assert len(rows(out)) == 1 and json.loads((out / "run.json").read_text())["status"].startswith("failed")
+
+
+def test_unset_beside_set(capsys):
+    """In the commands that look at a scene. Mutants: an --unset that is not handed on; one that takes one key alone."""
+    changes = ["--unset", "flow.head", "--unset", "growth", "--set", "flow.mean_velocity=1 m/day"]
+    assert main(["scene", "base", *changes]) == 0
+    text = capsys.readouterr().out
+    assert '\n#head = "1e-3 cm"\n' in text and '\nmean_velocity = "1 m/day"\n' in text and "\n#[growth]\n" in text
+    assert main(["check", "base", *changes, "--set", "substrates.boundary=shut"]) == 2
+    assert "substrates.boundary" in capsys.readouterr().err
+    assert main(["check", "initial_mesh", "--unset", "aggregate"]) == 0
+    assert "no aggregate: a clean channel" in capsys.readouterr().out
+    assert main(["check", "initial_mesh", "--unset", "flow"]) == 2
+    assert capsys.readouterr().err == 'repro: initial_mesh: --unset "flow": the scene does not set it\n'

@@ -6,6 +6,8 @@ import shutil
 import signal
 import subprocess
 import sys
+from contextlib import suppress
+from hashlib import sha256
 
 import pytest
 
@@ -13,8 +15,8 @@ from repro import results
 from repro.cli import main
 from repro.errors import OutputError
 from repro.run import checkpoint
-from repro.run.checkpoint import NEWEST
-from repro.run.folder import LOCK, OWN, PARTS, held, prepare
+from repro.run.checkpoint import NEWEST, PREVIOUS
+from repro.run.folder import LOCK, SUMS, held, prepare
 from repro.run.running import Watch, resume, run
 from repro.scene import load_scene, parse_scene, scene_tables
 from tests.shell import SHORT, files, shell, started, told, wait_for
@@ -56,7 +58,7 @@ def test_a_killed_run_leaves_no_lock_that_counts(tmp_path, capsys):
     process.kill()
     process.communicate()
     assert process.returncode == -signal.SIGKILL and (out / LOCK).exists()
-    assert main(["run", "flow_only", "--out", str(out)]) == 0
+    assert main(["run", "flow_only", "--out", str(out), "--force"]) == 0
     assert told(out)["scene"] == "flow_only" and not (out / NEWEST).exists() and not (out / LOCK).exists()
 
 
@@ -69,25 +71,161 @@ def test_a_lock_that_was_removed_is_none(tmp_path):
                 pass
 
 
-@pytest.mark.parametrize("name", [*OWN, *PARTS, LOCK])
-def test_what_a_run_may_leave_is_a_runs(tmp_path, name):
-    """Beside a run.json. Mutants: a killed run's folder that no run accepts, a file of an earlier run that stays."""
-    (tmp_path / "run.json").write_text("{}")
-    (tmp_path / name).write_text("x")
+def spoil(folder):
+    """Cut the checkpoints of a run short."""
+    for name in (NEWEST, PREVIOUS):
+        (folder / name).write_bytes((folder / name).read_bytes()[:1000])
+
+
+def cut_off(folder):
+    """A run with two checkpoints that was cut off; its scene."""
+    scene = load_scene("base", FAST)
+    with pytest.raises(ZeroDivisionError):
+        run(scene, folder, lambda time: 1 / (time < 0.5), watch=Watch(interval=0.0))
+    return scene
+
+
+def test_a_runs_files_are_listed(tmp_path):
+    """All that there is in the end, and nothing else, by name in run.json; the fields' sums are right. Mutants: a file
+    that is not listed, one that is but never was written."""
+    run(load_scene("base", FAST), tmp_path)
+    assert sorted({*files(tmp_path), "run.json", "report.html"}) == told(tmp_path)["files"]
+    sums = dict(line.split("  ")[::-1] for line in (tmp_path / SUMS).read_text().splitlines())
+    assert sums == {name: sha256(content).hexdigest() for name, content in files(tmp_path).items() if "vtu" in name}
+
+
+def test_nothing_is_removed_that_no_run_wrote(tmp_path, capsys):
+    """A resume without a good checkpoint starts again, beside what others have put there, names of fields and tables
+    among them. Mutants: the whole of fields/ removed; whatever has a name that a run might give."""
+    out = tmp_path / "run"
+    scene = cut_off(out)
+    spoil(out)
+    mine = ["thesis.tex", "timeseries.nc", "fields/mine.vtu", "fields/fields_0099.vtu", "fields/notes/a.txt",
+            "before_expansion.pvd"]
+    (out / "fields" / "notes").mkdir()
+    for name in mine:
+        (out / name).write_text("years of work")
+    assert main(["run", "--resume", str(out), "--quiet"]) == 0
+    assert "starts again from t = 0" in capsys.readouterr().err
+    assert [(out / name).read_text() for name in mine] == ["years of work"] * len(mine)
+    run(scene, tmp_path / "whole")
+    assert {name: content for name, content in files(out).items() if name not in mine} == files(tmp_path / "whole")
+    assert not {*mine} & {*told(out)["files"]}
+
+
+def test_nothing_is_replaced_that_no_run_wrote(tmp_path, capsys):
+    """A file of the name of the next fields: told in one line, and left as it is. Mutant: written over."""
+    cut_off(tmp_path)
+    count = len(list((tmp_path / "fields").iterdir()))
+    mine = tmp_path / "fields" / f"fields_{count:04d}.vtu"
+    mine.write_text("years of work")
+    assert main(["run", "--resume", str(tmp_path), "--quiet"]) == 2
+    message = capsys.readouterr().err
+    assert f"{mine}: it is there, and this run has not written it" in message and message.count("\n") == 1
+    assert mine.read_text() == "years of work"
+    mine.unlink()
+    assert main(["run", "--resume", str(tmp_path), "--quiet"]) == 0
+
+
+@pytest.mark.parametrize("name", ["fields", "timeseries.csv", NEWEST, PREVIOUS, "report.html",
+                                  "fields/fields_0001.vtu"])
+def test_links_are_refused(tmp_path, capsys, name):
+    """What they lead to stays, whatever it is called. Mutants: files removed, or read, behind a link."""
+    out = tmp_path / "run"
+    cut_off(out)
+    spoil(out)
+    (out / "report.html").touch()
+    (out / name).rename(tmp_path / "elsewhere")
+    (out / name).symlink_to(tmp_path / "elsewhere")
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    assert main(["run", "--resume", str(out), "--quiet"]) == 2
+    message = capsys.readouterr().err
+    assert str(out / name) in message and "link" in message and message.count("\n") == 1
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, os.mkdir, lambda path: os.symlink("/dev/zero", path)])
+def test_a_checkpoint_that_is_no_file_is_refused(tmp_path, capsys, make):
+    """A pipe, a folder, a device: no hang. Mutant: opened as it is."""
+    cut_off(tmp_path)
+    (tmp_path / NEWEST).unlink()
+    make(tmp_path / NEWEST)
+    assert main(["run", "--resume", str(tmp_path), "--quiet"]) == 2
+    message = capsys.readouterr().err
+    assert f"{tmp_path / NEWEST}: it is a link, or no regular file" in message and message.count("\n") == 1
+
+
+@pytest.mark.parametrize("content", [b"", b"<VTKFile", b'<VTKFile type="UnstructuredGrid"/>', b"\xff" * 5000])
+def test_altered_fields_are_told_and_made_again(tmp_path, capsys, content):
+    """The resume starts where all is right, here from t = 0, and ends with the bits of the whole run. Mutants: a
+    traceback of the page that cannot read them, a resume that never works again."""
+    out = tmp_path / "run"
+    scene = cut_off(out)
+    (out / "fields" / "fields_0000.vtu").write_bytes(content)
+    assert main(["run", "--resume", str(out), "--quiet"]) == 0
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 3 and "starts again from t = 0" in lines[-1]
+    assert all("fields_0000.vtu is not as it was written" in line for line in lines[:-1])
+    run(scene, tmp_path / "whole")
+    assert files(out) == files(tmp_path / "whole")
+
+
+def test_a_page_that_cannot_be_made_is_told(tmp_path, capsys):
+    """Of a run that was killed at its very end, and its fields altered. Mutant: a traceback."""
     run(load_scene("flow_only"), tmp_path)
-    assert set(files(tmp_path)) == {"timeseries.csv", "fields.pvd", "fields/fields_0000.vtu"}
+    (tmp_path / NEWEST).write_bytes(b"left")
+    (tmp_path / "fields" / "fields_0000.vtu").write_text("<VTKFile")
+    assert main(["run", "--resume", str(tmp_path), "--quiet"]) == 2
+    message = capsys.readouterr().err
+    assert "report.html: it cannot be made" in message and message.count("\n") == 1
 
 
 def test_what_a_killed_run_was_writing_is_removed(tmp_path):
-    """Mutant: parts that stay beside the results."""
+    """What is in such a folder and no run's stays. Mutants: parts that stay beside the results; a folder removed with
+    whatever is in it."""
     scene = load_scene("base", FAST)
     with pytest.raises(ZeroDivisionError):
         run(scene, tmp_path / "run", lambda time: 1 / (time < 0.5))
-    for part in (f".{NEWEST}.part", ".timeseries.csv.part", "fields/.part-fields_0001.vtu"):
+    for part in (f".writing-abcdefgh/{NEWEST}", ".writing-01234567/.timeseries.csv.part",
+                 "fields/.writing-_1234567/.part-fields_0001.vtu", ".writing-thesis00/thesis.tex"):
+        (tmp_path / "run" / part).parent.mkdir()
         (tmp_path / "run" / part).write_text("half")
     assert resume(tmp_path / "run") == "completed"
+    assert (tmp_path / "run" / ".writing-thesis00" / "thesis.tex").read_text() == "half"
+    shutil.rmtree(tmp_path / "run" / ".writing-thesis00")
     run(scene, tmp_path / "whole")
     assert files(tmp_path / "run") == files(tmp_path / "whole")
+    assert not list((tmp_path / "run").rglob(".writing-*"))
+
+
+def test_no_link_is_written_through(tmp_path):
+    """Whatever a file is written as before it is moved to its place: what the links lead to stays as it is. Mutants: a
+    file of a name that everybody knows, opened as it is; a lock that is a link."""
+    victim = tmp_path / "thesis.tex"
+    victim.write_text("years of work")
+
+    def plant(event):
+        for name in ("run.json", "timeseries.csv", NEWEST, "report.html", "fields.pvd", "ledger.csv"):
+            with suppress(FileExistsError):
+                (tmp_path / "run" / f".{name}.part").symlink_to(victim)
+        for k in range(9):
+            with suppress(FileExistsError):
+                (tmp_path / "run" / "fields" / f".part-fields_{k:04d}.vtu").symlink_to(victim)
+
+    assert run(load_scene("base", FAST), tmp_path / "run", watch=Watch(tell=plant, interval=0.0)) == "completed"
+    assert victim.read_text() == "years of work"
+    assert not (tmp_path / "run" / "timeseries.csv").is_symlink()
+
+
+@pytest.mark.parametrize("make", [lambda lock, to: lock.symlink_to(to), lambda lock, to: lock.write_text("mine"),
+                                  lambda lock, to: os.mkfifo(lock), lambda lock, to: lock.mkdir()])
+def test_a_lock_that_is_somebody_elses_is_left_alone(tmp_path, capsys, make):
+    """A link, a file with content, a pipe, a folder. Mutants: one opened through a link, one that is removed."""
+    make(tmp_path / LOCK, tmp_path / "elsewhere")
+    before = (tmp_path / LOCK).lstat()
+    assert main(["run", "flow_only", "--out", str(tmp_path)]) == 2
+    assert (message := capsys.readouterr().err).startswith("repro: --out") and message.count("\n") == 1
+    assert (tmp_path / LOCK).lstat() == before and not (tmp_path / "elsewhere").exists()
 
 
 @LINUX
@@ -183,7 +321,7 @@ def test_no_name_of_a_scene_is_a_path(tmp_path, capsys, monkeypatch, name):
     out = capsys.readouterr().out
     assert out.count("\n") == 1 and out.strip("\n").isprintable() and told(tmp_path / "inside" / "run")["scene"] == name
     assert {str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file()} == {
-        f"inside/run/{file}" for file in ("run.json", "timeseries.csv", "fields.pvd", "fields/fields_0000.vtu",
+        f"inside/run/{file}" for file in ("run.json", SUMS, "timeseries.csv", "fields.pvd", "fields/fields_0000.vtu",
                                         "report.html")}
 
 

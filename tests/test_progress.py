@@ -83,7 +83,8 @@ def test_on_a_terminal_a_bar(tmp_path):
 
 
 @pytest.mark.parametrize("arguments", [[], ["base"], ["--out", "x"], ["base", "--resume", "x"], ["--checkpoint", "-1"],
-                                       ["--resume", "x", "--set", "a=1"], ["base", "--out", "x", "--checkpoint", "?"]])
+                                       ["--resume", "x", "--set", "a=1"],
+                                       ["--resume", "x", "--force"], ["base", "--out", "x", "--checkpoint", "?"]])
 def test_arguments_that_do_not_go_together_are_refused(capsys, arguments):
     with pytest.raises(SystemExit) as refused:
         main(["run", *arguments])
@@ -140,12 +141,23 @@ def test_a_second_signal_stops_at_once(tmp_path):
     assert told(tmp_path / "run")["status"] == "running"
 
 
-def test_nobody_listens(tmp_path):
-    """What reads the JSON goes away: the run goes on to its end. Mutant: a run that dies of a broken pipe."""
-    process = started("base", "--set", 'numerics.preset="fast"', "--out", tmp_path / "run", "--json")
+@pytest.mark.parametrize("options", [["--json"], []])
+def test_nobody_listens(tmp_path, options):
+    """What reads the output goes away: the run goes on to its end. Mutant: a run that dies of a broken pipe."""
+    process = started("base", "--set", 'numerics.preset="fast"', "--out", tmp_path / "run", *options)
     process.stdout.close()
-    assert process.wait(60) == 0 and process.stderr.read() == ""
+    message = process.stderr.read()
     process.stderr.close()
+    assert process.wait(60) == 0 and "Traceback" not in message and "BrokenPipe" not in message
+    assert told(tmp_path / "run")["status"] == "completed"
+
+
+def test_nobody_reads_what_is_said_aside(tmp_path):
+    """As under `2>&1 | head -0`. Mutant: a run that dies of the second line."""
+    process = started("base", "--set", 'numerics.preset="fast"', "--out", tmp_path / "run")
+    process.stderr.close()
+    assert process.wait(60) == 0 and "completed" in process.stdout.read()
+    process.stdout.close()
     assert told(tmp_path / "run")["status"] == "completed"
 
 

@@ -17,6 +17,7 @@ from repro.model import growth
 from repro.run.checkpoint import NEWEST, PREVIOUS
 from repro.run.running import Watch, resume, run
 from repro.scene import load_scene
+from repro.sweep import task
 from tests.shell import LONG, SHORT, files, lasting, shell, started, told, wait_for
 
 CONTACT = ('aggregate.radius="17.98 um"', 'pore.width="20 um"', 'growth.end="0.6 h"')
@@ -134,6 +135,7 @@ def test_a_run_that_is_over_is_left_alone(tmp_path, capsys):
 
 @pytest.mark.parametrize("content", [None, "{", "[]", "null", '{"scene": "x"}', "[" * 100_000,
                                      '{"scene": "x", "hash": "0", "tables": {}, "status": "running"}',
+                                     '{"scene": "x", "hash": "0", "tables": {}, "status": "sunning"}',
                                      '{"scene": "x", "hash": "0", "tables": {"pore": 3}, "status": "running"}'])
 def test_a_folder_without_a_run_is_refused(tmp_path, capsys, content):
     """With status 2 and one line, and nothing is written. Mutants: a traceback, a run from nothing."""
@@ -142,6 +144,18 @@ def test_a_folder_without_a_run_is_refused(tmp_path, capsys, content):
     assert main(["run", "--resume", str(tmp_path)]) == 2
     assert "run.json" in (message := capsys.readouterr().err) and message.count("\n") == 1
     assert files(tmp_path) == {}
+
+
+@pytest.mark.parametrize("status", ["sunning", "", "Completed", "completed ", "failed", "runningly", "interrupted?"])
+def test_a_status_that_no_run_writes_is_none(tmp_path, capsys, status):
+    """Neither finished nor to be gone on with. Mutant: whatever is not known counts as an end."""
+    run(load_scene("flow_only"), tmp_path / "run")
+    record = told(tmp_path / "run")
+    results.write_json(tmp_path / "run" / "run.json", record | {"status": status})
+    before = files(tmp_path / "run")
+    assert main(["run", "--resume", str(tmp_path / "run")]) == 2
+    assert f"its status {status!r} is none that a run writes" in (message := capsys.readouterr().err)
+    assert message.count("\n") == 1 and files(tmp_path / "run") == before and not task.finished(tmp_path / "run")
 
 
 def stopped(folder, *sets, after=3):
@@ -186,7 +200,7 @@ def test_a_checkpoint_without_its_fields_is_refused(tmp_path):
     (tmp_path / "run" / "fields" / "fields_0001.vtu").unlink()
     with pytest.warns(UserWarning) as warned:
         resume(tmp_path / "run")
-    assert [str(w.message).split(": ")[-1].startswith("its rows or fields") for w in warned] == [True, True, False]
+    assert ["fields_0001.vtu is not as it was written" in str(w.message) for w in warned] == [True, True, False]
 
 
 def test_a_change_of_versions_is_told_and_recorded(tmp_path, monkeypatch):

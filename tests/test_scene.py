@@ -10,10 +10,10 @@ import pytest
 from repro.scene import SceneError, load_scene, packaged_scenes, parse_scene
 
 
-def refusal(source, *overrides) -> str:
+def refusal(source, *overrides, unset=()) -> str:
     """The message of the SceneError, which is one line of bearable length."""
     with pytest.raises(SceneError) as caught:
-        load_scene(source, overrides)
+        load_scene(source, overrides, unset)
     message = str(caught.value)
     assert message.isprintable() and len(message) < 500 and "Traceback" not in message
     return message
@@ -31,6 +31,9 @@ TABLE_1 = {  # worked out by hand: 1 m = 1e6 um, 1 cm2 = 1e8 um2, 1 day = 24 h, 
     "pore.length": 600.0,
     "pore.width": 100.0,
     "aggregate.radius": 5.0,
+    "aggregate.position": 0.0,
+    "aggregate.smooth": False,
+    "aggregate.inert_fraction": 0.0,
     "flow.viscosity_ratio": 2000.0,
     "flow.kinematic_viscosity": 3.6108e9,
     "flow.gravity": 1.271376e14,
@@ -77,7 +80,8 @@ TABLE_1 = {  # worked out by hand: 1 m = 1e6 um, 1 cm2 = 1e8 um2, 1 day = 24 h, 
     "numerics.mesh_compressibility": 1.0,
     "output.timeseries": "csv",
 }
-GIVEN = {"name", "growth.end", "flow.head", "flow.mean_velocity", "output.times"}
+GIVEN = {"name", "growth.end", "flow.head", "flow.mean_velocity", "output.times", "aggregate.outline",
+         "kinetics.donor_oxygen_demand"}
 
 
 def flat(section, prefix="") -> dict:
@@ -206,7 +210,8 @@ def test_set_reads_lists_and_numbers_and_the_last_one_wins():
 
 
 def test_set_creates_an_absent_section():
-    scene = load_scene("initial_mesh", ["flow.head=1e-3 cm", "substrates.donor.supply=3 mg/L", "growth.end=0 h"])
+    scene = load_scene("initial_mesh", ["flow.head=1e-3 cm", "substrates.donor.supply=3 mg/L", "substrates.acceptor={}",
+                                        "growth.end=0 h"])
     assert (scene.flow.head, scene.substrates.donor.supply, scene.growth.end) == (10, 3, 0)
     assert scene.substrates.acceptor.supply == 10
     assert load_scene("initial_mesh").flow is None
@@ -219,3 +224,18 @@ def test_a_value_cannot_smuggle_in_another_key():
 @pytest.mark.parametrize("override", ["", "pore.width", "=5 um", " = 5", "pore.=5 um", ".width=5 um", "a..b=5 um"])
 def test_set_needs_a_key_and_a_value(override):
     assert "KEY=VALUE is needed" in refusal("base", override)
+
+
+# ---------------------------------------------------------------- --unset
+
+
+def test_unset_leaves_keys_and_sections_out():
+    """Mutants: --set read first; a section that stays, empty; only the last of several."""
+    base = load_scene("base")
+    driven = load_scene("base", ["flow.mean_velocity=1 m/day"], ["flow.head"])
+    assert (driven.flow.head, driven.flow.mean_velocity) == (None, pytest.approx(1e6 / 24))
+    assert load_scene("base", (), ["substrates.donor.supply", " substrates . acceptor.supply "]) == base
+    still = load_scene("base", (), ["flow", "growth"])
+    assert still.flow is None and still.growth is None and still.kinetics == base.kinetics
+    assert load_scene("base", ["flow.head=10 um"], ["flow.head"]) == base
+    assert load_scene("base", ["flow.head=1 cm"], ["flow"]).flow.head == 10_000

@@ -1,9 +1,15 @@
 """Scenes that are not accepted: one clear line that names file, key, value and what is accepted."""
+import json
+import re
+import time
+import tomllib
 from pathlib import Path
 
 import pytest
 
-from repro.scene import SceneError, load_scene, parse_scene, scene_tables
+from repro.scene import SceneError, Substrates, files, load_scene, load_tables, parse_scene, scene_tables
+from repro.scene.reading import NOT_MODELLED, SCOPE
+from tests.blocks import ROOT
 from tests.test_scene import refusal, written
 
 LENGTH = 'a length is needed, such as "100 um" (greater than zero)'
@@ -109,7 +115,8 @@ LENGTH = 'a length is needed, such as "100 um" (greater than zero)'
     # several keys
     ('aggregate.radius="80 um"', 'aggregate.radius = "80 um": less than pore.width (50 um)'),
     ("aggregate.radius=50 um", "aggregate.radius"),
-    ("pore.length=10 um", 'aggregate.radius = "5 um": less than pore.width (50 um) and half of pore.length (10 um)'),
+    ("pore.length=10 um", 'pore.length = "10 um": more than twice aggregate.radius (5 um) is needed'),
+    ("growth.end=1e9 h", 'growth.end = "1e9 h": at most 100000 times growth.time_step (0.2 h) is needed'),
     ('flow.mean_velocity="1 m/day"', 'flow.mean_velocity = "1 m/day": flow.head (10.0 um) is given too'),
     ("substrates.boundary=closed", 'substrates.boundary = "closed": "open" is needed with [flow]'),
     ("growth.minimum_film=50 um", "growth.minimum_film"),
@@ -133,7 +140,9 @@ def test_refused(override, said):
 @pytest.mark.parametrize("source, overrides, said", [
     ("wide", ["flow.mean_velocity=0 m/day"], 'flow.mean_velocity = "0 m/day": greater than zero is needed, or num'),
     ("wide", ["flow.mean_velocity=-1 m/day"], "a velocity is needed"),
-    ("wide", ["flow.head=1 cm"], 'flow.mean_velocity = "2.9 m/day": flow.head (10000.0 um) is given too'),
+    ("wide", ["flow.head=1 cm"], 'flow.head = "1 cm": flow.mean_velocity (2.9 m/day) is given too; one of them is '
+     "accepted, not both (--unset flow.mean_velocity leaves that out)"),
+    ("base", ["flow.mean_velocity=1 m/day"], "not both (--unset flow.head leaves that out)"),
     ("initial_mesh", ["flow.viscosity_ratio=5"], "flow.head is missing: it or flow.mean_velocity is needed"),
     ("initial_mesh", ["substrates.boundary=closed"], '"open" is needed, or numerics.transport = "gear"'),
     ("flow_only", ["growth.end=1 h"], "growth = "),
@@ -151,7 +160,8 @@ def test_growth_needs_an_aggregate():
 
 
 def test_a_default_that_does_not_fit_is_shown():
-    with pytest.raises(SceneError, match=r'mine.toml: aggregate.radius = "5.0 um": less than pore.width \(4 um\)'):
+    """In the words, for the key that was set is named. Mutant: a key named that the scene does not have."""
+    with pytest.raises(SceneError, match=r'mine.toml: pore.width = "4 um": more than aggregate.radius \(5 um\)'):
         parse_scene({"pore": {"width": "4 um"}, "aggregate": {}}, "mine", "mine.toml")
 
 
@@ -174,6 +184,144 @@ def test_the_edge_of_what_is_accepted(source, overrides):
     assert parse_scene(scene_tables(scene), scene.name, "again") == scene
 
 
+#: Two keys that do not go together, set in either order in a file that is else without them: what is told of each.
+PAIRS = [
+    ("initial_mesh", "aggregate.radius=30 um", "pore.width=20 um", "less than pore.width (20 um)",
+     "more than aggregate.radius (30 um) is needed"),
+    ("initial_mesh", "aggregate.radius=30 um", "pore.length=60 um", "half of pore.length (60 um) is needed",
+     "more than twice aggregate.radius (30 um) is needed"),
+    ("initial_mesh", "aggregate.radius=0.04 um", "pore.width=50 um", "a thousandth of pore.width (50 um) or more",
+     "at most a thousand times aggregate.radius (0.04 um)"),
+    ("initial_mesh", "aggregate.position=50 um", "pore.length=100 um", "less than half of pore.length (100 um) less",
+     "more than twice aggregate.radius (5 um) and the distance of aggregate.position (50 um)"),
+    ("initial_mesh", "aggregate.position=20 um", "aggregate.radius=45 um; pore.length=120 um",
+     "less aggregate.radius (45 um), upstream or downstream, is needed",
+     "less than half of pore.length (120 um) less the distance of aggregate.position (20 um) is needed"),
+    ("initial_mesh --unset aggregate.radius", 'aggregate.outline=[["-5 um","0 um"],["0 um","9 um"],["5 um","0 um"]]',
+     "pore.width=8 um", "0 < y <= pore.width (8 um) at point 2 (0 um, 9 um) is needed",
+     "y of point 2 (0 um, 9 um) of aggregate.outline, or more, is needed"),
+    ("initial_mesh --unset aggregate.radius", 'aggregate.outline=[["-5 um","0 um"],["0 um","9 um"],["5 um","0 um"]]',
+     "pore.length=9 um", "|x| < half of pore.length (9 um) at point 1",
+     "more than twice |x| of point 1 (-5 um, 0 um) of aggregate.outline is needed"),
+    ("initial_mesh --unset aggregate.radius", 'aggregate.outline=[["-5 um","0 um"],["0 um","9 um"],["5 um","0 um"]]',
+     "aggregate.radius=9 um", "aggregate.radius (9 um) is given too; one of them is accepted, not both "
+     "(--unset aggregate.radius leaves that out)", "(--unset aggregate.outline leaves that out)"),
+    ("initial_mesh --unset aggregate.radius", 'aggregate.outline=[["-5 um","0 um"],["0 um","9 um"],["5 um","0 um"]]',
+     "aggregate.position=9 um", "aggregate.position (9 um) is given too", "0 um is needed with aggregate.outline"),
+    ("initial_mesh", "flow.head=1 cm", "flow.mean_velocity=1 m/day",
+     "flow.mean_velocity (1 m/day) is given too; one of them is accepted, not both (--unset flow.mean_velocity leaves",
+     "flow.head (10000.0 um) is given too; one of them is accepted, not both (--unset flow.head leaves that out)"),
+    ("initial_mesh", "flow.mean_velocity=0 m/day", "substrates={}; numerics.transport=quasi_steady",
+     'greater than zero is needed, or numerics.transport = "gear"', '"gear" is needed with flow.mean_velocity = 0'),
+    ("initial_mesh", "substrates.boundary=closed", "flow.head=1 cm", '"open" is needed with [flow]',
+     'substrates.boundary = "open" is needed with it'),
+    ("initial_mesh", "substrates.boundary=closed", "numerics.transport=quasi_steady",
+     '"open" is needed, or numerics.transport = "gear"', '"gear" is needed with substrates.boundary = "closed"'),
+    ("base", "growth.time_step=1e-4 h", "growth.end=11 h", "growth.end (11 h) over 100000 or more is needed",
+     "at most 100000 times growth.time_step (0.0001 h) is needed"),
+    ("base", "growth.minimum_film=30 um", "pore.width=20 um", "less than pore.width (20 um) is needed",
+     "more than growth.minimum_film (30 um) is needed"),
+    ("base", "growth.fluid_forces=included", "numerics.preset=fast", '"neglected" is needed with numerics.elements',
+     'growth.fluid_forces = "neglected" is needed with it, not "included"'),
+    ("base", "growth.fluid_forces=included", "numerics.elements=quadratic", '"neglected" is needed with numerics.elem',
+     'growth.fluid_forces = "neglected" is needed with it, not "included"'),
+    ("wide", "numerics.preset=fast; numerics.time=updates", "numerics.elements=cubic; numerics.preset=paper",
+     '"midpoint" is needed with numerics.elements = "cubic"',
+     'numerics.time = "midpoint" is needed with it, not "updates"'),
+    ("base", "growth.fluid_forces=included", "growth.new_biomass=stress_free", "which would yield at every update",
+     '"stressed" is needed with growth.fluid_forces = "included"'),
+    ("base", "numerics.transport=gear", "numerics.preset=accurate", '"quasi_steady" is needed with numerics.elements',
+     'numerics.transport = "quasi_steady" is needed with it, not "gear"'),
+    ("base", "numerics.transport=gear", "numerics.time=midpoint", '"quasi_steady" is needed with numerics.time = "mid',
+     '"updates" is needed with numerics.transport = "gear"'),
+    ("base", "growth.new_biomass=stress_free", "numerics.preset=fast", '"stressed" is needed with numerics.elements',
+     'growth.new_biomass = "stressed" is needed with it, not "stress_free"'),
+    ("base", 'output.times=["5 h"]', "growth.end=4 h", "none after 4 h is accepted: growth.end is 4 h",
+     "5 h or more, the last of output.times, is needed"),
+]
+
+
+@pytest.mark.parametrize("source, first, second, of_first, of_second", PAIRS)
+def test_the_key_that_was_set_is_named(tmp_path, source, first, second, of_first, of_second):
+    """What the file says is right; what --set says beside it is wrong. Mutants: the same key named whichever was set;
+    the first in the file named."""
+    name, _, unset = source.partition(" --unset ")
+    for entries, last, said in ((second, first, of_first), (first, second, of_second)):
+        path = tmp_path / "mine.toml"
+        path.write_text(as_toml(load_tables(name, entries.split("; "), [unset] if unset else [])))
+        message = refusal(path, *last.split("; "))
+        assert said in message
+        assert any(message.startswith(f"{path}: {key} = ") for key in named(last))
+
+
+def named(entries):
+    """The keys of several --set, and their sections."""
+    keys = [entry.partition("=")[0] for entry in entries.split("; ")]
+    return [*keys, *(key.partition(".")[0] for key in keys)]
+
+
+def as_toml(tables):
+    """The tables as a file."""
+    return "\n".join(f"{section} = {inline(table)}" for section, table in tables.items())
+
+
+def inline(value):
+    if not isinstance(value, dict):
+        return json.dumps(value)
+    return "{" + ", ".join(f"{key} = {inline(inner)}" for key, inner in value.items()) + "}"
+
+
+def test_without_set_the_key_that_the_file_has_is_named(tmp_path):
+    """Mutant: the first key of the rule, which has its default."""
+    path = written(tmp_path, '[aggregate]\n[substrates]\n[growth]\nend = "1e9 h"\n')
+    assert 'mine.toml: growth.end = "1e9 h": at most 100000 times growth.time_step (0.2 h)' in refusal(path)
+    both = written(tmp_path, '[flow]\nhead = "1 cm"\nmean_velocity = "1 m/day"\n')
+    assert 'mine.toml: flow.mean_velocity = "1 m/day": flow.head (10000.0 um) is given too' in refusal(both)
+
+
+# ---------------------------------------------------------------- what is not modelled
+
+
+@pytest.mark.parametrize("override, said", [
+    ("growth.detachment=1 1/day", "[growth] takes end,"),
+    ("growth.detachment=1 1/day", "; detachment is not modelled, see docs/scope.md"),
+    ("detachment_rate=1 1/day", "; detachment is not modelled, see docs/scope.md"),
+    ("pore.depth=50 um", "; depth is not modelled, see docs/scope.md"),
+    ("kinetics.inhibition=5 mg/L", "; inhibition is not modelled, see docs/scope.md"),
+    ("kinetics.Temperature=20", "; temperature is not modelled, see docs/scope.md"),
+    ("aggregate=[{radius=\"5 um\"}, {}]", "one aggregate is modelled, see docs/scope.md: a table ["),
+    ("substrates.donor.supply=20 ppm", "; give mg/L (in water 1 ppm is about 1 mg/L, 1 ppb about 1 ug/L)"),
+    ("kinetics.maximum_density=20ppb", "; give mg/L (in water"),
+    *((f"substrates.donor.supply={value}", "; moles need a molar mass, which is not known here: give milligrams")
+      for value in ("8 mmol/L", "8mmol/L", "8 mol/m^3", "8 mM", "8 \u00b5M", "0.1 M", "3 micromoles/l", "2 molar")),
+    ('kinetics.acceptor_to_donor_ratio="7 mol/mol"', "; moles need a molar mass"),
+    ("kinetics.maximum_utilization_rate=7 mmol/g/day", "; moles need a molar mass"),
+])
+def test_what_is_not_modelled_is_said(override, said):
+    """Mutants: did you mean, with what is near in letters; a hint that has been lost."""
+    message = refusal("base", override)
+    assert said in message and "did you mean" not in message
+
+
+@pytest.mark.parametrize("override", ["growth.minimum_contact_angle=3 ppm", "growth.shear_modulus=1 MPaz",
+                                      "pore=[{}, 1]", "pore.depht=5 um", "numerics=[{}]", "pore.width=5 M/s"])
+def test_hints_are_given_where_they_help_alone(override):
+    message = refusal("base", override)
+    assert "mg/L" not in message and ("docs/scope.md" in message) == ("pore=" in override), message
+
+
+def test_a_second_table_of_an_aggregate_is_refused(tmp_path):
+    path = written(tmp_path, '[[aggregate]]\nradius = "5 um"\n[[aggregate]]\nradius = "6 um"\n')
+    assert f"{path}: aggregate = [" in refusal(path) and "one aggregate is modelled, see docs/scope.md" in refusal(path)
+
+
+def test_the_page_on_scope_is_there():
+    """And speaks of all that messages send there for. Mutant: a page that has moved."""
+    page = (ROOT / SCOPE).read_text(encoding="utf-8").casefold()
+    words = NOT_MODELLED - {"dimension", "dimensions"} | {"several aggregates", "third dimension", "kinetics", "moles"}
+    assert {word for word in words if word not in page} == set()
+
+
 # ---------------------------------------------------------------- files
 
 
@@ -191,10 +339,10 @@ def test_a_directory_is_refused(tmp_path):
 def test_a_file_that_cannot_be_read_is_refused(tmp_path, monkeypatch):
     path = written(tmp_path, "[pore]")
 
-    def denied(self):
+    def denied(self, mode):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(Path, "read_bytes", denied)
+    monkeypatch.setattr(Path, "open", denied)
     assert "mine.toml: cannot be read (Permission denied)" in refusal(str(path))
 
 
@@ -208,8 +356,90 @@ def test_hostile_toml_is_refused(tmp_path, text):
     assert "not TOML: " in refusal(written(tmp_path, text))
 
 
-def test_keys_nested_by_the_thousand_are_refused(tmp_path):
-    assert "there is no such key" in refusal(written(tmp_path, ".".join("a" * 5000) + " = 1"))
+DEEP = ".".join("a" * 20_000)
+POINTS = "".join(f'["{k / 10 - 4} um", "3.0 um"], ' for k in range(80))
+DOTTED = f"""# {"." * 99}
+[pore] # a.b.c.d.e.f.g.h.i.j.k.l.m.n.o.p.q.r.s.t.u.v.w.x.y.z = 1
+width = "50 um" # 1.2.3.4.5.6.7.8.9.10.11.12.13.14.15.16.17.18.19.20.21.22
+[aggregate]
+outline = [["-5.0 um", "0.0 um"], {POINTS} ["5.0 um", "0.0 um"]]
+"""
+
+
+@pytest.mark.parametrize("text, line", [
+    (f"{DEEP} = 1", 1), (f"[pore]\n\n[{DEEP}]", 3), (f"a = {{{DEEP} = 1}}", 1), (f"a = [{{{DEEP} = 1}}]", 1),
+    (DEEP.replace(".", " .\t") + " = 1", 1), (DEEP.replace("a", '"a.\\""') + " = 1", 1),
+    (DEEP.replace("a", "'a.\"'") + " = 1", 1), ('a = """\n\\" "" x"""\n' + f"{DEEP} = 1", 3),
+    ("a = '''\n\"'' '''\n" + f"{DEEP} = 1", 3), (f"a = '#'\n{DEEP}", 2), (".".join("a" * 21) + " = 1", 1),
+])
+def test_keys_of_many_parts_are_refused_before_they_are_parsed(tmp_path, monkeypatch, text, line):
+    """They take memory as the square of the parts: 1.5 GB here. Mutants: keys in headers, in inline tables, quoted
+    ones, ones with blanks, ones after a string with quotes or a # in it passed over."""
+    monkeypatch.setattr(tomllib, "loads", None)
+    said = f"a key of more than 20 parts (at line {line}); one of a scene has at most 3"
+    assert said in refusal(written(tmp_path, text))
+
+
+@pytest.mark.parametrize("entry, said", [
+    (f"{DEEP}=1", "a key of at most 20 parts is needed"), (f"pore={{{DEEP}=1}}", "a table [pore] is needed"),
+    (f"pore.width={{{DEEP}=1}}", LENGTH)])
+def test_set_takes_no_key_of_many_parts(monkeypatch, entry, said):
+    """Mutant: the key or the value of --set parsed before it is looked at."""
+    read = files.read_tables("base")
+    monkeypatch.setattr(tomllib, "loads", None)
+    with pytest.raises(SceneError, match=re.escape(said)):
+        files.override(read, entry, "base", ())
+        parse_scene(read, "base", "base")
+
+
+def test_dots_that_are_no_keys_are_read(tmp_path):
+    """Dots of comments, texts and numbers; keys of 20 parts. Mutant: dots counted wherever they are."""
+    assert len(load_scene(written(tmp_path, DOTTED)).aggregate.outline) == 82
+    assert "there is no such key" in refusal(written(tmp_path, ".".join("a" * 20) + " = 1"))
+
+
+@pytest.mark.parametrize("piece", ["a", '"', '\\"', "'", "a.", "a .", '"a', "#", '"""', "'''", "\\", " ", '"\\'])
+def test_looking_for_deep_keys_takes_no_longer_than_reading(piece):
+    """A file as large as is accepted, made of whatever: linear in its size. Mutant: a pattern that goes back."""
+    text = "x = 1\n" + (piece * files.LARGEST)[:files.LARGEST]
+    start = time.process_time()
+    files.line_of_a_deep_key(text)
+    assert time.process_time() - start < 10
+
+
+def test_a_large_file_is_refused_unread(tmp_path):
+    """Mutant: the whole file read, or parsed, first."""
+    path = tmp_path / "mine.toml"
+    path.write_bytes(b"[pore]\n#" + b"x" * (files.LARGEST - 8))
+    assert load_scene(path).pore.width == 100
+    with path.open("ab") as file:
+        file.truncate(10**11)
+    assert "mine.toml: more than 1000000 bytes; a scene has a few thousand" in refusal(path)
+
+
+@pytest.mark.parametrize("text", ["", "# nothing\n", "\ufeff\n\n"])
+def test_an_empty_scene_is_refused(tmp_path, text):
+    """Mutant: Table 1's pore, unasked."""
+    path = written(tmp_path, text)
+    assert refusal(path).startswith(f"{path}: an empty scene: one section or more is needed of [pore], [aggregate], ")
+    assert load_scene(path, ["pore={}"]).pore.width == 100
+
+
+@pytest.mark.parametrize("given, absent", [("acceptor", "donor"), ("donor", "acceptor")])
+@pytest.mark.parametrize("with_aggregate", [True, False])
+def test_one_substrate_alone_is_refused(tmp_path, given, absent, with_aggregate):
+    """Mutant: Table 1's other substrate, unasked, which may be the one that limits."""
+    path = written(tmp_path, f"[substrates.{given}]\nsupply = \"5 mg/L\"\n" + "[aggregate]\n" * with_aggregate)
+    message = refusal(path)
+    assert f"mine.toml: substrates.{absent} is missing: it is needed beside substrates.{given}; " in message
+    assert "not to limit is supplied at many times its half_saturation" in message
+    for other in (f"substrates.{absent}={{}}", f"substrates.{absent}.supply=1000 mg/L"):
+        assert load_scene(path, [other]).substrates is not None
+
+
+def test_both_substrates_unsaid_are_table_1():
+    assert load_scene("initial_mesh", ["substrates={}"]).substrates == Substrates()
+    assert "substrates.donor is missing" in refusal("initial_mesh", "substrates.acceptor.supply=5 mg/L")
 
 
 def test_not_utf_8_is_refused(tmp_path):
@@ -257,6 +487,15 @@ def test_what_would_never_end_is_refused():
 def test_what_may_have_been_meant(override, meant):
     """Mutants: no hint; one from the section alone; one that would be refused too."""
     assert refusal("base", override).endswith(f"(did you mean {meant}?)")
+
+
+def test_unset_hints():
+    """Mutants: a key that is not there passed over; a hint of the key itself."""
+    said = 'base: --unset "flow.haed": the scene does not set it (did you mean flow.head?)'
+    assert refusal("base", unset=["flow.haed"]) == said
+    for key in ("flow.mean_velocity", "growth.minimum_film", "", "flow.head.deep", ".", "name", "a" * 9000):
+        message = refusal("base", unset=[key])
+        assert message.startswith("base: --unset ") and "the scene does not set it" in message and len(message) < 200
 
 
 @pytest.mark.parametrize("override", ["pore.width=-50", "pore.width=true", "pore.width={}", "numerics.preset=7",

@@ -1,6 +1,8 @@
 """A sweep as its user has it: runs, tables, page, what is refused, what is gone on with, what kills a run."""
 
+import base64
 import csv
+import hashlib
 import json
 import math
 import os
@@ -158,6 +160,11 @@ def test_the_page_needs_no_network_and_escapes_what_it_tells(finished):
     told = (finished / "summary.html").read_text()
     assert "<svg" in told and told.count("<polyline") == 2 and "2 of 3 runs" in told and "Peclet" in told
     assert not re.search(r"https?:|<script|<img|@import|url\(|src=", told)
+    (style,) = re.findall("<style>(.*?)</style>", told, re.S)
+    digest = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode()
+    (policy,) = re.findall('http-equiv="Content-Security-Policy" content="(.*?)"', told)
+    assert policy == (f"default-src 'none'; style-src 'sha256-{digest}'; script-src 'none'; base-uri 'none'; "
+                      "form-action 'none'") and ' style="' not in told
     factors = [parse("numerics.preset=fast, paper")]
     found = points("base", [], factors, grid(factors))
     strange = Sweep(finished, '<script>alert("1")</script>', factors, found)
@@ -264,6 +271,28 @@ def test_killing_the_process_of_a_run_harms_no_other(tmp_path):
     assert process.returncode == 3
     found = [row["status"] for row in rows(tmp_path / "sweep" / "runs.csv")]
     assert found == ["failed: the process of the run was killed by SIGKILL", "completed", "completed"]
+
+
+def test_sigterm_ends_a_sweep_quietly(tmp_path):
+    """Status 143, one line, tables of what there is, no process left. Mutants: killed at once, with runs that go on; a
+    traceback."""
+    out = tmp_path / "sweep"
+    process, _ = started(out, "--vary", "pore.width=48 um, 50 um", "--workers", "1", "--quiet")
+    family = children(process.pid)
+    process.terminate()
+    said = process.communicate(timeout=60)[1]
+    assert process.returncode == 143 and said.startswith("repro: terminated") and said.count("\n") == 1, said
+    assert (out / "table.csv").exists() and (out / "summary.html").exists() and not any(map(alive, family))
+
+
+def test_nobody_reads_what_a_sweep_says(tmp_path):
+    """As under `| head -0`: it goes on to its end. Mutant: a traceback of a broken pipe."""
+    command = [sys.executable, "-m", "repro", "sweep", "base", "--out", str(tmp_path / "sweep"), *VARY, *SHORT]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    process.stdout.close()
+    message = process.stderr.read()
+    process.stderr.close()
+    assert process.wait(120) == 3 and "Traceback" not in message and "BrokenPipe" not in message
 
 
 @pytest.mark.thorough

@@ -3,26 +3,72 @@
 import csv
 import json
 import os
+import re
 import shutil
 import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
 
 from repro.cli import main
 from repro.sweep import cluster, task
+from repro.sweep.state import SweepError
 
 VARY = ["--vary", "pore.width=48:52 um:linear:6", "--set", "numerics.preset=fast"]
 
 
-def test_without_the_package_the_message_says_what_to_install(tmp_path, capsys, monkeypatch):
-    monkeypatch.setitem(sys.modules, "distributed", None)
+@pytest.mark.parametrize("package", ["distributed", "dask"])
+def test_without_the_package_the_message_says_what_to_install(tmp_path, capsys, monkeypatch, package):
+    """Mutant: what is needed looked for when the folder is made."""
+    monkeypatch.delitem(sys.modules, "distributed", raising=False)
+    monkeypatch.setitem(sys.modules, package, None)
     assert main(["sweep", "base", *VARY, "--out", str(tmp_path / "sweep"), "--scheduler", "tcp://127.0.0.1:1"]) == 2
     message = capsys.readouterr().err
     assert "pip install 'dupin2001-repro[dask]'" in message and message.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+ADDRESSES = ["nonsense", "tcp://", "tcp://127.0.0.1:99999", "tcp://[::1", "tcp://127.0.0.1:{closed}",
+             "127.0.0.1:{silent}", "tcp://host.invalid:8786"]
+
+
+@pytest.mark.parametrize("address", ADDRESSES)
+def test_a_bad_address_is_refused_within_five_seconds(address):
+    """Where nobody listens, where nobody answers, where there is no such host, where it is no address. Mutants: ten
+    seconds for each try; an answer that is waited for for ever."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        where = address.format(closed=free_port(), silent=server.getsockname()[1])
+        pytest.importorskip("distributed")
+        start = time.monotonic()
+        with pytest.raises(SweepError, match=f"--scheduler {re.escape(where)}: no Dask scheduler answers there"):
+            with cluster.ready(where):
+                pass
+        assert time.monotonic() - start < 5
+
+
+def test_what_greets_otherwise_is_no_scheduler():
+    """Mutant: the banner of another server taken for a length, and as much memory."""
+    def greet():
+        with server.accept()[0] as connection:
+            connection.sendall(b"SSH-2.0-OpenSSH_9.9\r\n")
+
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        thread = threading.Thread(target=greet)
+        thread.start()
+        assert not cluster._is_open(f"tcp://127.0.0.1:{server.getsockname()[1]}")
+        thread.join()
+
+
+def test_a_bad_address_writes_nothing(tmp_path):
+    """In one line, with status 2. Mutants: the folder made first; a traceback of the package."""
+    process = on_cluster(f"tcp://127.0.0.1:{free_port()}", tmp_path / "sweep")
+    message = process.communicate(timeout=60)[1]
+    assert process.returncode == 2 and message.startswith("repro: --scheduler") and message.count("\n") == 1, message
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_worker_with_other_code_makes_nothing(tmp_path):
@@ -113,7 +159,7 @@ def test_a_sweep_that_lost_its_cluster_is_gone_on_with_here(workers, tmp_path):
 
 @pytest.mark.thorough
 def test_a_cluster_that_cannot_be_used_is_refused(workers, tmp_path, capsys, monkeypatch):
-    """No scheduler, no workers, workers with another version. Mutant: waiting for ever."""
+    """No workers, workers with another version. Mutant: waiting for ever."""
     address, start = workers
     monkeypatch.setattr(cluster, "PATIENCE", 2)
 
@@ -122,8 +168,6 @@ def test_a_cluster_that_cannot_be_used_is_refused(workers, tmp_path, capsys, mon
         message = capsys.readouterr().err
         assert message.count("\n") == 1 and message.startswith(f"repro: --scheduler {where}: ")
         return message
-    assert "no Dask scheduler answers" in refused(f"tcp://127.0.0.1:{free_port()}")
-    assert "no Dask scheduler answers" in refused("nonsense")
     assert "has no workers" in refused(address)
     start("one")
     monkeypatch.setattr(task, "code", lambda: "0.0.1-abc")

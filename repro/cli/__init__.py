@@ -1,7 +1,8 @@
 """Command line: ``repro COMMAND ...``; each command is a module of :mod:`repro.cli`.
 
-Exit status: 0 when the command has done what it is for, 1 when a stage failed, 2 when something in the input is wrong
-or a folder cannot be used, 3 when some runs of a sweep have failed, 130 or 143 when interrupted or terminated.
+Exit status: 0 when the command has done what it is for, 1 when a stage failed, 2 when something in
+the input is wrong or a folder cannot be used, 3 when some runs of a sweep have failed, 130 or 143
+when interrupted or terminated.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ from repro.errors import Interrupted, OutputError, SimulationError
 from repro.run.progress import in_json, printable
 from repro.scene import SceneError
 
-#: The commands, one a module. Each has ``add(commands)``, which adds its parser with ``set_defaults(call=...)``;
-#: what is called takes the parsed arguments and returns the exit status.
+#: The commands, one a module. Each has ``add(commands)``, which adds its parser with
+#: ``set_defaults(call=...)``; what is called takes the parsed arguments, returns the exit status.
 COMMANDS = (run, scene, check, compare, sweep)
 
 
@@ -43,8 +44,9 @@ def _fail(chosen, message, status: int) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="repro", description="Biological clogging of one pore by the growth of an "
-                                     "aggregate (Dupin, Kitanidis & McCarty 2001).")
+    parser = argparse.ArgumentParser(
+        prog="repro", description="Biological clogging of one pore by the growth of an aggregate "
+        "(Dupin, Kitanidis & McCarty 2001).")
     commands = parser.add_subparsers(dest="command", required=True)
     for command in COMMANDS:
         command.add(commands)

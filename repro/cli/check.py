@@ -1,28 +1,28 @@
-"""``repro check SCENE [--set KEY=VALUE ...] [--json]``: validate a scene and say what a run of it will be."""
+"""``repro check SCENE [--set KEY=VALUE] [--unset KEY] [--json]``: say what a run will be."""
 
 from __future__ import annotations
 
 import json
 
-from repro.scene import load_scene, packaged_scenes
+from repro.cli.arguments import add_scene
+from repro.scene import load_scene
 
 
 def add(commands) -> None:
     """The parser of this command."""
-    command = commands.add_parser("check", help="validate a scene and say what a run of it will be", description=(
-        "Validate a scene; say what it models, its mesh, its dimensionless numbers, where a simplification does not "
-        "hold, and what a run costs. Exit status: 0 where it can be run, with warnings or without, 2 where not."))
-    command.add_argument("scene", metavar="SCENE",
-                         help=f"a TOML file, or a packaged scene: {', '.join(packaged_scenes())}")
-    command.add_argument("--set", metavar="KEY=VALUE", action="append", default=[],
-                         help='change a key of the scene, such as growth.end="5 h"; may be repeated')
+    command = commands.add_parser(
+        "check", help="validate a scene and say what a run of it will be",
+        description="Validate a scene; say what it models, its mesh, its dimensionless numbers, "
+        "where a simplification does not hold, and what a run costs. Exit status: 0 where it can "
+        "be run, with warnings or without, 2 where not.")
+    add_scene(command)
     command.add_argument("--json", action="store_true", help="for machines")
     command.set_defaults(call=call)
 
 
 def call(chosen) -> int:
     """Check the scene that was chosen."""
-    scene = load_scene(chosen.scene, chosen.set)
+    scene = load_scene(chosen.scene, chosen.set, chosen.unset)
     from repro.check.checked import check, report
 
     found = check(scene, chosen.scene)

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 from pathlib import Path
 
+from repro.errors import SimulationError
 from repro.run import interrupts, progress
 from repro.run.running import INTERVAL, Watch, resume, run
-from repro.scene import load_scene, packaged_scenes
+from repro.scene import Scene, load_scene, packaged_scenes
 
 STATUS = """exit status:
   0    done: the scene's end, or the pore's, is reached, now or before
   1    a stage failed; the message says at what simulated time, in which stage, why, where the last good state is, and
        what to change
-  2    wrong input, or the folder cannot be used: not a run's, not writable, disk full, in use by another run
+  2    wrong input, or the folder cannot be used: another run's or not a run's, not writable, disk full, in use
   130  interrupted (SIGINT, Ctrl-C); 143 terminated (SIGTERM): the step in hand is finished, results and checkpoint are
        written, and --resume goes on from there; a second signal, after a second or more, stops at once"""
 
@@ -23,11 +25,14 @@ def add(commands) -> None:
     """The parser of this command."""
     command = commands.add_parser("run", help="run a scene, or go on with a run",
                                   description="Run a scene and write its results, or go on with a run that was "
-                                  "interrupted or killed: the result is the same to the last bit.",
+                                  "interrupted or killed: the result is the same to the last bit. Where DIR holds a "
+                                  "run of the same scene, that is gone on with, or left alone where it is over.",
                                   epilog=STATUS, formatter_class=argparse.RawDescriptionHelpFormatter)
     add_scene(command, nargs="?")
     command.add_argument("--out", metavar="DIR", type=Path, help="folder for the results")
     command.add_argument("--resume", metavar="DIR", type=Path, help="go on with the run in this folder")
+    command.add_argument("--force", action="store_true",
+                         help="remove the files of the run in DIR, as its run.json lists them, and begin anew")
     command.add_argument("--checkpoint", metavar="SECONDS", type=_seconds, default=INTERVAL,
                          help="write what a run can go on from, and results so far, so often (default: %(default)g)")
     command.add_argument("--quiet", action="store_true", help="say nothing but warnings and errors")
@@ -52,15 +57,29 @@ def _seconds(text: str) -> float:
 
 def call(chosen) -> int:
     """Run the scene that was chosen, or go on with the run."""
-    if chosen.resume and (chosen.scene or chosen.set or chosen.out):
-        chosen.refuse("--resume takes the scene from the run's folder: no SCENE, --set or --out is accepted with it")
+    if chosen.resume and (chosen.scene or chosen.set or chosen.out or chosen.force):
+        chosen.refuse("--resume takes the scene from the run's folder: no SCENE, --set, --out or --force is accepted "
+                      "with it")
     if not chosen.resume and not (chosen.scene and chosen.out):
         chosen.refuse("SCENE and --out DIR are needed, or --resume DIR")
     scene = None if chosen.resume else load_scene(chosen.scene, chosen.set)
     with interrupts.noted() as stop, progress.told(chosen.quiet, chosen.json) as tell:
-        watch = Watch(tell, chosen.checkpoint, stop)
-        if scene is None:
-            resume(chosen.resume, watch=watch)
-        else:
-            run(scene, chosen.out, watch=watch)
+        try:
+            _run(chosen, scene, Watch(tell, chosen.checkpoint, stop))
+        except MemoryError as error:  # outside of the steps, whose failures tell more
+            raise SimulationError(f"out of memory ({error}); try a smaller numerics.refinement") from error
     return 0
+
+
+def _run(chosen, scene: Scene | None, watch: Watch) -> None:
+    """Run the scene, or go on with the run where there is none."""
+    if scene is None:
+        resume(chosen.resume, watch=watch)
+    else:
+        run(scene, chosen.out, watch=watch, force=chosen.force, origin=_origin(chosen))
+
+
+def _origin(chosen) -> dict:
+    """Where the scene comes from, for ``run.json``: a packaged name or a whole path, and --set."""
+    packaged = chosen.scene in packaged_scenes()
+    return {"file": chosen.scene if packaged else os.path.abspath(chosen.scene), "set": chosen.set}

@@ -1,19 +1,23 @@
-"""``repro scene [SCENE] [--set KEY=VALUE ...]``: a scene written out with every key, or the list of packaged ones."""
+"""``repro scene [SCENE] [--set KEY=VALUE] [--unset KEY]``: a scene written out with every key.
+
+Without a scene, the list of packaged ones.
+"""
 
 from __future__ import annotations
 
+from repro.cli.arguments import add_changes
 from repro.scene.text import scene_text, titles
 
 
 def add(commands) -> None:
     """The parser of this command."""
-    command = commands.add_parser("scene", help="write a scene out with every key, commented", description=(
-        "Write a scene to the standard output, with every key it could have: repro scene base > mine.toml. "
-        "Without SCENE, list the packaged ones."))
+    command = commands.add_parser(
+        "scene", help="write a scene out with every key, commented",
+        description="Write a scene to the standard output, with every key it could have: "
+        "repro scene base > mine.toml. Without SCENE, list the packaged ones.")
     command.add_argument("scene", metavar="SCENE", nargs="?",
-                         help="a packaged scene, or a TOML file (do not write onto the file itself)")
-    command.add_argument("--set", metavar="KEY=VALUE", action="append", default=[],
-                         help='change a key of the scene, such as growth.end="5 h"; may be repeated')
+                         help="a packaged scene, or a TOML file (do not write onto the file)")
+    add_changes(command)
     command.set_defaults(call=call)
 
 
@@ -23,5 +27,5 @@ def call(chosen) -> int:
         for name, title in titles().items():
             print(f"{name:14}{title}")
     else:
-        print(scene_text(chosen.scene, chosen.set), end="")
+        print(scene_text(chosen.scene, chosen.set, chosen.unset), end="")
     return 0

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import signal
 import sys
-from contextlib import AbstractContextManager, nullcontext
-from functools import partial
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
 from tqdm import tqdm
 
 from repro.cli.run import add_scene
+from repro.errors import Interrupted
+from repro.run.machine import require_packages
+from repro.run.progress import say
 from repro.sweep import cluster, design, page, pool, table
 from repro.sweep.state import Sweep, opened, usable
 
@@ -20,7 +24,8 @@ EPILOG = """Two forms of --vary: a range KEY=a:b UNIT:linear|log:N, and a list K
 grid. With --samples a range is KEY=a:b UNIT:linear|log, and a Latin hypercube is drawn. Varying flow.head replaces
 flow.mean_velocity, and the other way round. The same command goes on with a sweep that was cut off: it makes what is
 missing, and what has failed, again. On a cluster DIR must be on a file system that all workers share.
-Exit status: 0 every run has come to its end, 3 some have failed, 2 wrong input, 130 interrupted."""
+Exit status: 0 every run has come to its end, 3 some have failed, 2 wrong input, 130 interrupted,
+143 terminated."""
 
 
 def add(commands) -> None:
@@ -62,7 +67,7 @@ def _part(text: str) -> float:
 def call(chosen) -> int:
     """Make the sweep that was chosen."""
     ended: dict[int, str] = {}
-    with _ready(chosen) as each:
+    with _ended_by_sigterm(), _ready(chosen) as each:
         sweep = _wanted(chosen)
         with opened(sweep):
             try:
@@ -72,10 +77,27 @@ def call(chosen) -> int:
     return _report(sweep, told)
 
 
+@contextmanager
+def _ended_by_sigterm() -> Iterator[None]:
+    """Within, SIGTERM ends the sweep as Ctrl-C does; a second one ends the process at once."""
+    def end(number: int, frame) -> None:
+        signal.signal(number, signal.SIG_DFL)
+        raise Interrupted("terminated; what was computed is written, and the same command goes on "
+                          "with it", number)
+
+    kept = signal.getsignal(signal.SIGTERM)
+    if kept != signal.SIG_IGN:
+        signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, kept)
+
+
 def _ready(chosen) -> AbstractContextManager[pool.Each]:
-    """What makes the runs: processes here, which load what they need while the sweep is looked at, or a cluster."""
+    """What makes the runs: processes here, which load what they need meanwhile, or a cluster."""
     if chosen.scheduler:
-        return nullcontext(partial(cluster.each, address=chosen.scheduler))
+        return cluster.ready(chosen.scheduler)
     return pool.ready(chosen.workers or pool.cores())
 
 
@@ -92,7 +114,10 @@ def _wanted(chosen) -> Sweep:
     """The sweep that the arguments describe, every run of it checked."""
     factors = [design.parse(text) for text in chosen.vary]
     found = design.grid(factors) if chosen.samples is None else design.latin(factors, chosen.samples, chosen.seed)
-    return Sweep(chosen.out, chosen.scene, factors, design.points(chosen.scene, chosen.set, factors, found))
+    points = design.points(chosen.scene, chosen.set, factors, found)
+    for point in points if chosen.scheduler is None else ():
+        require_packages(point.scene)
+    return Sweep(chosen.out, chosen.scene, factors, points)
 
 
 def _make(sweep: Sweep, quiet: bool, each: pool.Each, ended: dict[int, str]) -> None:
@@ -104,16 +129,16 @@ def _make(sweep: Sweep, quiet: bool, each: pool.Each, ended: dict[int, str]) -> 
             ended[point.index] = status
             bar.update()
             if not quiet and silent:
-                print(f"{total - len(missing) + len(ended)} of {total}: run {point.index}, "
-                      f"{design.label(sweep.factors, point.values)}: {status}", file=sys.stderr, flush=True)
+                say(f"{total - len(missing) + len(ended)} of {total}: run {point.index}, "
+                    f"{design.label(sweep.factors, point.values)}: {status}", aside=True)
 
 
 def _report(sweep: Sweep, told: list[table.Told]) -> int:
     """Say what there is now; the exit status."""
     failed = [one for one in told if not one.done]
     for one in failed:
-        print(f"repro: run {one.point.index} ({design.label(sweep.factors, one.point.values)}): {one.status}",
-              file=sys.stderr)
-    print(f"{sweep.source}: {len(told) - len(failed)} of {len(told)} runs done, {len(failed)} failed; "
-          f"results in {sweep.folder}")
+        say(f"repro: run {one.point.index} ({design.label(sweep.factors, one.point.values)}): "
+            f"{one.status}", aside=True)
+    say(f"{sweep.source}: {len(told) - len(failed)} of {len(told)} runs done, {len(failed)} failed; "
+        f"results in {sweep.folder}")
     return SOME_FAILED if failed else 0

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from repro.files import whole
 from repro.report import comparison, run_page
 from repro.report.reading import NoRun, read
 from repro.results import write_text
@@ -27,11 +28,16 @@ def write(folder: Path) -> Path:
     Raises NoRun where the folder holds no run, ValueError where its fields cannot be read.
     """
     target = folder / "report.html"
-    write_text(target, run_page.build(read(folder)))
+    _write(target, run_page.build(read(folder)))
     return target
 
 
 def compare(folders: Sequence[Path], target: Path) -> Path:
     """Make a page of two runs or more at ``target``; returns it. Raises NoRun where a folder holds no run."""
-    write_text(target, comparison.build([read(folder) for folder in folders]))
+    _write(target, comparison.build([read(folder) for folder in folders]))
     return target
+
+
+def _write(target: Path, text: str) -> None:
+    with whole(target) as beside:
+        write_text(beside, text)

@@ -14,14 +14,20 @@ def page(title: str, body: str, scripts: Sequence[str]) -> str:
     """A whole page with the package's scripts of these names; what the browser runs is known by its hash."""
     style = _content("page.css")
     code = [_content(name) for name in ("errors.js", *scripts)]
-    policy = (f"default-src 'none'; style-src {_hash(style)}; script-src {' '.join(map(_hash, code))}; "
-              "base-uri 'none'; form-action 'none'")
     run = "".join(f"<script>{text}</script>\n" for text in code)
     return (f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-            f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
+            f'<meta http-equiv="Content-Security-Policy" content="{policy(style, code)}">\n'
             f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
             f"<title>{escape(title)}</title>\n<style>{style}</style>\n</head>\n<body>\n"
             f'<pre id="errors" class="errors" hidden></pre>\n{body}\n{run}</body>\n</html>\n')
+
+
+def policy(style: str, code: Sequence[str] = ()) -> str:
+    """The content security policy of a page that has this style and these scripts, and loads
+    nothing."""
+    scripts = " ".join(map(_hash, code)) or "'none'"
+    return (f"default-src 'none'; style-src {_hash(style)}; script-src {scripts}; base-uri 'none'; "
+            "form-action 'none'")
 
 
 def _content(name: str) -> str:

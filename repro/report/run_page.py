@@ -23,7 +23,7 @@ PHYSICS = {
 }
 #: What the page tells in a place of its own.
 TOLD = {"scene", "hash", "tables", "versions", "status", "rows", "wall_time_s", "wall_time_by_stage_s",
-        "newton_iterations", "remeshes", "warnings"}
+        "newton_iterations", "remeshes", "warnings", "files", "origin"}
 
 NESTED = ("Each bar is the time within that stage, calls within calls counted in both: what is spent on factorising "
           "and solving is also in the stage that asked for it, so that the bars do not add up to the whole.")

@@ -1,56 +1,117 @@
-"""The folder of a run: what may be in it, who may write there, and how trouble with it is told."""
+"""The folder of a run: what is a run's in it, who may write there, how trouble with it is told.
+
+A run removes and replaces nothing but regular files that it has written itself: those that its
+``run.json`` lists, and the fields that its ``fields.sha256`` lists, each before it is there.
+"""
 
 from __future__ import annotations
 
 import os
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from repro.errors import OutputError
+from repro.files import WRITING, is_file, is_folder, open_lock
 from repro.run.checkpoint import NEWEST, PREVIOUS, REFUSED
 
-LOCK = ".lock"
-#: Everything that a run writes, beside its fields; a folder that holds anything else is not written to.
-OWN = ("run.json", "timeseries.csv", "ledger.csv", "fields.pvd", "before_expansion.pvd", "report.html", "timeseries.nc",
-       NEWEST, PREVIOUS, REFUSED)
-#: What a run that was killed may leave of a file that it was writing.
-PARTS = tuple(f".{name}.part" for name in OWN)
-FIELDS = re.compile(r"(?:\.part-)?(?:fields|before_expansion)_\d{4,}\.vtu")
+LOCK, PROVENANCE, SUMS = ".lock", "run.json", "fields.sha256"
+CHECKPOINTS = (NEWEST, PREVIOUS, REFUSED)
+#: Every file that a run may write, besides its fields.
+OWN = (PROVENANCE, "timeseries.csv", "ledger.csv", "fields.pvd", "before_expansion.pvd", SUMS,
+       "timeseries.nc", "report.html", *CHECKPOINTS)
+FIELDS = re.compile(r"fields/(?:fields|before_expansion)_\d{4,}\.vtu")
+#: A line of SUMS, as sha256sum writes and checks it.
+SUM = re.compile(rf"[0-9a-f]{{64}}  ({FIELDS.pattern})")
+#: A folder in which a run was writing a file when it was killed, and what that may hold.
+ROOM = re.compile(re.escape(WRITING) + r"\w{8}")
+_NAMES = "|".join([FIELDS.pattern.removeprefix("fields/"), *map(re.escape, OWN)])
+PART = re.compile(rf"\.?(?:part-)?(?:{_NAMES})(?:\.part)?")
 
 
-def prepare(folder: Path) -> None:
-    """Make the folder. Raises OutputError where it holds anything that is not a run's, or can't be made."""
+def listed(folder: Path, told: dict) -> set[str]:
+    """The files that a run has written, by its ``run.json`` (``told``) and its SUMS."""
+    names = told.get("files")
+    names = names if isinstance(names, list) else []
+    found = {name for name in names if isinstance(name, str)}
+    found = {name for name in found if name in OWN or FIELDS.fullmatch(name)}
+    if SUMS in found and is_file(folder / SUMS):
+        lines = (folder / SUMS).read_text(encoding="utf-8", errors="replace").splitlines()
+        found |= {match[1] for match in map(SUM.fullmatch, lines) if match}
+    return found | {PROVENANCE}
+
+
+def prepare(folder: Path, own: Collection[str] = ()) -> None:
+    """Make the folder of a run. ``own``: the files of an earlier run in it.
+
+    Raises OutputError where it holds anything else, or cannot be made.
+    """
     with usable(folder):
-        strange = _strange(folder) if folder.exists() else []
+        strange = _strange(folder, own) if folder.exists() else []
         if strange:
             raise OutputError(f"--out {folder}: it holds {strange[0]!r}, which is not of a run; "
                               "a new or empty folder, or one of an earlier run, is accepted")
         (folder / "fields").mkdir(parents=True, exist_ok=True)
 
 
-def clear(folder: Path) -> None:
-    """Remove what a run has left, but for ``run.json``: it says that the rest is a run's."""
+def _strange(folder: Path, own: Collection[str]) -> list[str]:
+    """What is neither among these files nor made by a run that was killed before it had any."""
+    tidy(folder)
+    names = [path.name for path in folder.iterdir() if path.name not in (LOCK, "fields")]
+    fields = folder / "fields"
+    if is_folder(fields):
+        names += [f"fields/{path.name}" for path in fields.iterdir()]
+    elif os.path.lexists(fields):
+        names.append("fields")
+    return sorted(name for name in names if name not in own or not is_file(folder / name))
+
+
+def refuse_links(folder: Path, own: Collection[str]) -> None:
+    """Raises OutputError where a name that a run writes to is a link, or no file at all."""
+    if os.path.lexists(folder / "fields") and not is_folder(folder / "fields"):
+        raise OutputError(f"{folder / 'fields'}: it is no folder, or a link to one; a run's own "
+                          "folder is needed there: move the files of the run into one")
+    for name in sorted({*own, *OWN}):
+        if os.path.lexists(folder / name) and not is_file(folder / name):
+            raise OutputError(f"{folder / name}: it is a link, or no regular file, and so not of a "
+                              "run; move it away")
+
+
+def refuse_others(folder: Path, own: Collection[str]) -> None:
+    """Raises OutputError where a file that is not among these has a name that a run gives."""
     with usable(folder):
-        for old in (*(folder / "fields").iterdir(), *(folder / name for name in OWN[1:])):
-            old.unlink(missing_ok=True)
-        tidy(folder)
+        for name in _strange(folder, own):
+            if name in OWN or FIELDS.fullmatch(name):
+                raise OutputError(f"{folder / name}: no run has written it; move it away")
+
+
+def remove(folder: Path, names: Collection[str]) -> None:
+    """Remove files of a run, by their names in its folder; links and whatever is no file stay."""
+    with usable(folder):
+        inside = is_folder(folder / "fields")
+        for name in names:
+            if is_file(folder / name) and (inside or not name.startswith("fields/")):
+                (folder / name).unlink()
 
 
 def tidy(folder: Path) -> None:
-    """Remove files that a run was writing when it was killed."""
-    for part in (*(folder / "fields").glob(".part-*"), *(folder / name for name in PARTS)):
-        part.unlink(missing_ok=True)
+    """Remove what a run was writing when it was killed."""
+    places = [folder, folder / "fields"] if is_folder(folder / "fields") else [folder]
+    for place in places:
+        for room in place.glob(WRITING + "*"):
+            if ROOM.fullmatch(room.name) and is_folder(room):
+                _empty(room)
 
 
-def _strange(folder: Path) -> list[str]:
-    """What no run has written there: tables count as a run's beside a run.json only, fields by their names."""
-    told = (*OWN, *PARTS, LOCK) if (folder / "run.json").exists() else (LOCK, ".run.json.part")
-    found = [path.name for path in folder.iterdir() if path.name not in (*told, "fields")]
-    inside = sorted((folder / "fields").iterdir()) if (folder / "fields").is_dir() else []
-    return sorted(found) + [f"fields/{path.name}" for path in inside if not FIELDS.fullmatch(path.name)]
+def _empty(room: Path) -> None:
+    """Remove a folder with the files of a run in it, but for what is none of these."""
+    for part in room.iterdir():
+        if PART.fullmatch(part.name) and is_file(part):
+            part.unlink()
+    with suppress(OSError):  # something else is there
+        room.rmdir()
 
 
 @contextmanager
@@ -69,8 +130,20 @@ def writing(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise OutputError(f"{path}: {error.strerror or error}; what was written before is whole: make room, or give "
-                          "leave to write, and go on with --resume") from error
+        raise OutputError(f"{path}: {error.strerror or error}; what was written before is whole: "
+                          "make room, or give leave to write, and go on with --resume") from error
+
+
+def claimed(folder: Path, name: str, own: set[str]) -> Path:
+    """The path of a file that a run is about to write, which from then on is among its ``own``.
+
+    Raises OutputError where there is something that the run has not written.
+    """
+    if name not in own and os.path.lexists(folder / name):
+        raise OutputError(f"{folder / name}: it is there, and this run has not written it; move it "
+                          "away, and go on with --resume")
+    own.add(name)
+    return folder / name
 
 
 @contextmanager
@@ -94,7 +167,7 @@ def held(folder: Path) -> Iterator[None]:
 def _locked(folder: Path) -> int:
     """The descriptor of the locked file; another try where it was removed between opening and locking."""
     while True:
-        number = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o666)
+        number = open_lock(folder / LOCK)
         try:
             _exclude(number)
             with suppress(FileNotFoundError):

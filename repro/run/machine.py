@@ -1,17 +1,29 @@
-"""What a run's numbers could depend on, besides its scene: versions, machine, threads."""
+"""What a run needs of a machine, and what its numbers could depend on besides its scene."""
 
 from __future__ import annotations
 
 import os
 import platform
 from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 import shapely
 
+from repro.scene import Scene, SceneError
+
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-OPTIONAL = ("pymetis", "pypardiso")
+#: {(key of numerics, choice): the optional package that makes it}
+OPTIONAL = {("ordering", "metis"): "pymetis", ("solver", "pardiso"): "pypardiso"}
+
+
+def require_packages(scene: Scene) -> None:
+    """Raises SceneError where a scene chooses what takes a package that is not installed."""
+    for (key, choice), package in OPTIONAL.items():
+        if getattr(scene.numerics, key) == choice and find_spec(package) is None:
+            raise SceneError(f'{scene.name}: numerics.{key} = "{choice}": the package {package} is '
+                             f"not installed; pip install {package}, or leave the key out")
 
 
 def conditions() -> dict:
@@ -23,7 +35,7 @@ def conditions() -> dict:
     return {"system": platform.system(), "machine": platform.machine(), "libc": " ".join(platform.libc_ver()),
             "blas": f"{blas['name']} {blas['version']}", "simd": built["SIMD Extensions"].get("found", []),
             "geos": shapely.geos_version_string, "source": source_hash(),
-            "optional": {name: found for name in OPTIONAL if (found := _version(name))},
+            "optional": {name: found for name in OPTIONAL.values() if (found := _version(name))},
             "threads": {name: os.environ[name] for name in THREADS if name in os.environ}}
 
 

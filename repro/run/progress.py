@@ -11,6 +11,7 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
+from functools import partial
 
 from tqdm import tqdm
 
@@ -31,19 +32,35 @@ def printable(text: str) -> str:
     return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
-def in_json(event: dict) -> None:
-    """A line of JSON on standard output, while anybody reads it; warnings on standard error too."""
+def say(text: str, *, aside: bool = False) -> None:
+    """A line on standard output, or aside on standard error, while anybody reads that.
+
+    When the other end of a pipe is closed, what follows goes nowhere, at the end of the process
+    too.
+    """
+    stream = sys.stderr if aside else sys.stdout
     try:
-        print(json.dumps(event), flush=True)
+        print(text, file=stream, flush=True)
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())
+        os.close(nowhere)
+
+
+def in_json(event: dict) -> None:
+    """A line of JSON on standard output; warnings on standard error too."""
+    say(json.dumps(event))
     only_warnings(event)
 
 
 def only_warnings(event: dict) -> None:
     """Nothing but warnings."""
     if event["event"] == "warning":
-        print(f"repro: warning: {printable(event['message'])}", file=sys.stderr, flush=True)
+        say(_warning(event), aside=True)
+
+
+def _warning(event: dict) -> str:
+    return f"repro: warning: {printable(event['message'])}"
 
 
 def in_tenths() -> Tell:
@@ -53,12 +70,12 @@ def in_tenths() -> Tell:
     def tell(event: dict) -> None:
         nonlocal reached
         only_warnings(event)
-        _begin_and_end(event, lambda line: print(line, file=sys.stderr, flush=True))
+        _begin_and_end(event, partial(say, aside=True))
         if event["event"] == "step":
             tenth = int(10 * event["time_h"] / event["end_h"] + 1e-9) if event["end_h"] else 0
             if tenth > reached:
                 reached = tenth
-                print(f"{event['time_h']:g} of {event['end_h']:g} h simulated", file=sys.stderr, flush=True)
+                say(f"{event['time_h']:g} of {event['end_h']:g} h simulated", aside=True)
     return tell
 
 
@@ -68,7 +85,7 @@ def _begin_and_end(event: dict, aside: Callable[[str], None]) -> None:
         aside(f"{printable(event['scene'])}: goes on from t = {event['from_h']:g} h, step {event['step']}")
     if event["event"] == "end" and not event["status"].startswith(("failed", "interrupted")):
         before = "" if event["changed"] else ", before this: nothing to do"
-        print(f"{printable(event['scene'])}: {event['status']}{before}; results in {event['folder']}", flush=True)
+        say(f"{printable(event['scene'])}: {event['status']}{before}; results in {event['folder']}")
 
 
 @contextmanager
@@ -84,7 +101,7 @@ def on_a_terminal() -> Iterator[Tell]:
                 bar.set_postfix_str(_counts(event), refresh=False)
                 bar.update(event["time_h"] - bar.n)
             elif event["event"] == "warning":
-                bar.write(f"repro: warning: {printable(event['message'])}", file=sys.stderr)
+                bar.write(_warning(event), file=sys.stderr)
             elif event["event"] == "end":
                 bar.close()
             _begin_and_end(event, lambda line: bar.write(line, file=sys.stderr))

@@ -2,40 +2,48 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
+import numpy as np
+
 from repro import report, results, timing
-from repro.errors import CheckpointError, Interrupted
+from repro.errors import CheckpointError, Interrupted, OutputError
+from repro.files import is_file, whole
 from repro.march.loop import Instant, State, added
 from repro.results import netcdf
-from repro.run import checkpoint, stored
-from repro.run.folder import writing
+from repro.run import checkpoint, record, stored
+from repro.run.checkpoint import Arrays
+from repro.run.folder import CHECKPOINTS, OWN, PROVENANCE, SUMS, claimed, remove, writing
 from repro.run.machine import conditions
-from repro.run.stored import counted, counts, in_range
+from repro.run.record import PREFIX, Mark, Record
+from repro.run.status import done, undone
 from repro.scene import Scene
 
-#: How a run can have ended without being done; any other status is that of a run that is over.
-UNDONE = ("running", "interrupted", "failed")
-CHECKPOINTS = (checkpoint.NEWEST, checkpoint.PREVIOUS, checkpoint.REFUSED)
-RECORD = {"rows", "ledgers", "index", "before", "remeshes", "iterations", "seconds", "stages", "resumes"}
+#: The ledgers of steps that are not reported yet: of a state, but an array in a checkpoint.
+PENDING = "pending.ledgers"
 
 
 class Recorder:
-    """Collects a run's rows and writes its files to ``folder``."""
+    """Collects a run's rows and writes its files to ``folder``.
 
-    def __init__(self, scene: Scene, folder: Path):
-        self.scene, self.folder, self.conditions = scene, folder, conditions()
+    own: the names of the files in the folder that this run has written, or an earlier one;
+    origin: the file that the scene was read from and what was set in it, empty where nobody tells.
+    """
+
+    def __init__(self, scene: Scene, folder: Path, own: Collection[str] = (),
+                 origin: dict | None = None):
+        self.scene = scene
+        self.folder = folder
+        self.own = set(own)
+        self.origin = origin or {}
+        self.conditions = conditions()
         self.state: State | None = None
-        self.rows: list[list] = []
-        self.ledgers: list[list[float]] = []
-        self.index: list[list] = []  # [time, file] of each row's fields
-        self.before: list[list] = []
-        self.remeshes = 0
-        self.iterations: dict[str, int] = {}
-        self.resumes: list[dict] = []
+        self.record = Record()
         self.unsynced: list[str] = []  # fields that the system may still lose with the power
-        self.begun, self.spent, self.stages = perf_counter(), 0.0, dict[str, float]()
+        self.begun = perf_counter()
 
     @property
     def time(self) -> float:
@@ -50,12 +58,12 @@ class Recorder:
     @property
     def steps(self) -> int:
         """How many steps were made, reported or not."""
-        return len(self.ledgers) + (len(self.state.ledgers) if self.state else 0)
+        return len(self.record.ledgers) + (len(self.state.ledgers) if self.state else 0)
 
     @property
-    def all_remeshes(self) -> int:
+    def remeshes(self) -> int:
         """How many of them made a new mesh."""
-        return self.remeshes + (self.state.remeshes if self.state else 0)
+        return self.record.remeshes + (self.state.remeshes if self.state else 0)
 
     @property
     def contact(self) -> bool:
@@ -63,141 +71,187 @@ class Recorder:
         return self.state is not None and self.state.pore.contact
 
     def add(self, state: State, instant: Instant | None) -> None:
-        """Take one step: the state after it and, where it is reported, its row, its ledgers and its fields."""
+        """Take one step: the state after it and, where it is reported, its row and its fields."""
         if instant:
-            self._write_fields(self.index, "fields", instant.pore, instant.solved)
-            if instant.before and self.scene.output.times:
-                self._write_fields(self.before, "before_expansion", *instant.before)
-            found = results.row(self.scene, instant)
-            self.rows.append([found[name] for name in results.COLUMNS])
-            self.ledgers += [results.ledger_row(self.scene, ledger) for ledger in instant.ledgers]
-            self.remeshes += instant.remeshes
-            self.iterations = added(self.iterations, instant.iterations)
+            self._add_fields(instant)
+            row = results.row(self.scene, instant)
+            self.record.rows.append([row[name] for name in results.COLUMNS])
+            self.record.ledgers += [results.ledger_row(self.scene, ledger) for ledger in instant.ledgers]
+            self.record.remeshes += int(instant.remeshes)
+            self.record.iterations = added(self.record.iterations, instant.iterations)
         self.state = state
 
+    def _add_fields(self, instant: Instant) -> None:
+        self._write_fields(self.record.index, "fields", instant.pore, instant.solved)
+        if instant.before and self.scene.output.times:
+            self._write_fields(self.record.before, "before_expansion", *instant.before)
+
     def _write_fields(self, index: list, kind: str, pore, solved) -> None:
-        name = f"fields/{kind}_{len(index):04d}.vtu"
-        with writing(self.folder / name):
-            results.write_fields(self.folder / name, results.fields(self.scene, pore, solved))
-        index.append([pore.time, name])
+        name = record.fields_name(kind, len(index))
+        path = claimed(self.folder, name, self.own)
+        with writing(path), whole(path) as beside:
+            results.write_fields(beside, results.fields(self.scene, pore, solved))
+            self.record.marks[name] = record.mark(beside)
+            self._list_fields(name)
+        index.append((pore.time, name))
         self.unsynced.append(name)
+
+    def _list_fields(self, name: str) -> None:
+        """Add a file of fields to those that the run has written, before it is there."""
+        path = claimed(self.folder, SUMS, self.own)
+        with path.open("a", encoding="utf-8", newline="") as sums:
+            sums.write(self.record.marks[name].line(name))
 
     def save(self, status: str) -> None:
         """Write checkpoint, tables, indices and provenance as they are now."""
-        if self.state and status.startswith(UNDONE):
+        now = self.record
+        if self.state and undone(status):
             self._write_checkpoint(self.state)
-        self._write("timeseries.csv", results.write_table, results.COLUMNS, self.rows)
-        self._write("fields.pvd", results.write_index, self.index)
-        if self.ledgers:
-            self._write("ledger.csv", results.write_table, results.LEDGER_COLUMNS, self.ledgers)
-        if self.before:
-            self._write("before_expansion.pvd", results.write_index, self.before)
+        self._write("timeseries.csv", results.write_table, results.COLUMNS, now.rows)
+        self._write("fields.pvd", results.write_index, now.index)
+        if now.ledgers:
+            self._write("ledger.csv", results.write_table, results.LEDGER_COLUMNS, now.ledgers)
+        if now.before:
+            self._write("before_expansion.pvd", results.write_index, now.before)
         self.tell(status)
 
     def tell(self, status: str) -> None:
         """Write ``run.json``."""
-        seconds, stages = self._times()
+        now = self._now()
         self._write("run.json", results.write_json, {
-            **results.provenance(self.scene), "conditions": self.conditions, "status": status, "rows": len(self.rows),
-            "wall_time_s": seconds, "wall_time_by_stage_s": stages, "newton_iterations": self.iterations,
-            "remeshes": self.remeshes, "resumes": self.resumes})
+            **results.provenance(self.scene), "conditions": self.conditions, "status": status,
+            "files": self._files(done(status)), "rows": len(now.rows), "wall_time_s": now.seconds,
+            "wall_time_by_stage_s": now.stages, "newton_iterations": now.iterations,
+            "remeshes": now.remeshes, "resumes": now.resumes, "origin": self.origin})
+
+    def _files(self, over: bool) -> list[str]:
+        """The names of the run's files: those there are, or may come while it is not over."""
+        names = set(OWN) - _never(self.scene)
+        if over:
+            there = {name for name in names if is_file(self.folder / name)}
+            names = (there | {"report.html"}) - set(CHECKPOINTS)
+        return sorted(names | self.record.marks.keys())
 
     def finish(self, status: str) -> None:
         """Write everything at the end of a run."""
         if self.scene.output.timeseries == "netcdf":
-            self._write("timeseries.nc", netcdf.write, self.scene, self.rows)
+            self._write("timeseries.nc", netcdf.write, self.scene, self.record.rows)
+        self._write(SUMS, _write_sums, self.record.marks)
         self.save(status)
-        settle(self.folder, not status.startswith(UNDONE))
+        settle(self.folder, done(status), self.own)
 
     def _write(self, name: str, write, *content) -> None:
-        with writing(self.folder / name):
-            write(self.folder / name, *content)
+        path = claimed(self.folder, name, self.own)
+        with writing(path), whole(path) as beside:
+            write(beside, *content)
 
-    def _times(self) -> tuple[float, dict[str, float]]:
-        """Seconds spent, all together and by stage, before a resume and since."""
-        stages = {key: self.stages.get(key, 0.0) + timing.seconds.get(key, 0.0)
-                  for key in (self.stages.keys() | timing.seconds.keys())}
-        return self.spent + perf_counter() - self.begun, dict(sorted(stages.items()))
+    def _now(self) -> Record:
+        """The record with the seconds spent so far, before a resume and since."""
+        before = self.record
+        names = sorted(before.stages.keys() | timing.seconds.keys())
+        stages = {name: before.stages.get(name, 0.0) + timing.seconds.get(name, 0.0)
+                  for name in names}
+        return replace(before, seconds=before.seconds + perf_counter() - self.begun, stages=stages)
 
     def _write_checkpoint(self, state: State) -> None:
         for name in self.unsynced:
             with writing(self.folder / name):
                 checkpoint.synced(self.folder / name)
         self.unsynced = []
-        plain, arrays = stored.packed(self.scene, state)
-        seconds, stages = self._times()
-        record = {"rows": self.rows, "ledgers": self.ledgers, "index": self.index, "before": self.before,
-                  "remeshes": int(self.remeshes), "iterations": self.iterations, "seconds": seconds, "stages": stages,
-                  "resumes": self.resumes}
-        with writing(self.folder / checkpoint.NEWEST):
-            checkpoint.write(self.folder, checkpoint.encoded({"state": plain, "record": record}, arrays))
+        content = checkpoint.encoded(*packed(self.scene, state, self._now()))
+        claimed(self.folder, checkpoint.PREVIOUS, self.own)
+        with writing(claimed(self.folder, checkpoint.NEWEST, self.own)):
+            checkpoint.write(self.folder, content)
 
     def restore(self, path: Path) -> None:
-        """Be as the recorder was that wrote a checkpoint. Raises CheckpointError where it cannot be gone on from."""
-        try:
-            content = path.read_bytes()
-        except OSError as error:
-            raise CheckpointError(f"it cannot be read ({error.strerror})") from None
-        plain, arrays = checkpoint.decoded(content)
-        if set(plain) != {"state", "record"} or not all(isinstance(part, dict) for part in plain.values()):
-            raise CheckpointError("its header does not hold what it should")
-        state, record = stored.unpacked(self.scene, plain["state"], arrays), plain["record"]
-        _check(self.folder, state, record)
-        self.state, self.spent, self.stages = state, record["seconds"], record["stages"]
-        for name in RECORD - {"seconds", "stages"}:
-            setattr(self, name, record[name])
+        """Be as the recorder was that wrote a checkpoint.
+
+        Raises CheckpointError where it cannot be gone on from.
+        """
+        plain, arrays = checkpoint.decoded(checkpoint.read(path))
+        state, before = unpacked(self.scene, plain, arrays)
+        record.check(self.folder, state, before)
+        self.state = state
+        self.record = before
+
+    def drop_later(self) -> None:
+        """Remove fields that were written after the state gone on from: they are made again."""
+        fields = {name for name in self.own if name.startswith("fields/")}
+        remove(self.folder, fields - self.record.marks.keys())
+        self._write(SUMS, _write_sums, self.record.marks)
+
+    def clear(self) -> None:
+        """Remove what an earlier run has written, but for ``run.json``: it lists the rest."""
+        remove(self.folder, sorted(self.own - {PROVENANCE, SUMS}))
+        remove(self.folder, [SUMS])
+        self.own = {PROVENANCE}
+        with writing(self.folder / "fields"):
+            (self.folder / "fields").mkdir(exist_ok=True)
 
     def last_good(self) -> str:
         """Where the last good state is, in words."""
         if not self.state:
             return "no state before it is there"
-        shown = f"; fields of t = {self.index[-1][0]:g} h: {self.index[-1][1]}" if self.index else ""
-        return f"the last good state, t = {self.state.pore.time:g} h, is in {self.folder / checkpoint.NEWEST}{shown}"
+        index = self.record.index
+        shown = f"; fields of t = {index[-1][0]:g} h: {index[-1][1]}" if index else ""
+        where = self.folder / checkpoint.NEWEST
+        return f"the last good state, t = {self.state.pore.time:g} h, is in {where}{shown}"
 
 
-def _check(folder: Path, state: State, record: dict) -> None:
-    """Raises CheckpointError where the rows are not those of a run that has come to the state."""
-    right = set(record) == RECORD and _table(record["rows"], len(results.COLUMNS)) and (
-        _table(record["ledgers"], len(results.LEDGER_COLUMNS))) and counted(record["remeshes"]) and (
-        counts(record["iterations"])) and in_range(record["seconds"], 0.0, float("inf")) and (
-        isinstance(record["stages"], dict)) and isinstance(record["resumes"], list) and (
-        all(in_range(value, 0.0, float("inf")) for value in record["stages"].values()))
-    right = right and _files(folder, record["index"], "fields") and _files(folder, record["before"], "before_expansion")
-    if not right or [row[0] for row in record["rows"]] != [time for time, _ in record["index"]]:
-        raise CheckpointError("its rows or fields are not those of a run")
-    spans = [row[:2] for row in record["ledgers"]] + [[ledger.start, ledger.end] for ledger in state.ledgers]
-    ends = [0.0, *(end for _, end in spans)]
-    starts = [*(start for start, _ in spans), state.pore.time]
-    if None in ends + starts or any(abs(end - start) > 1e-6 for end, start in zip(ends, starts)) or (
-            not record["rows"] or not state.ledgers and record["rows"][-1][0] != state.pore.time):
-        raise CheckpointError("its rows do not end where its state is")
+def packed(scene: Scene, state: State, now: Record) -> tuple[dict, Arrays]:
+    """A state and a record as what a checkpoint takes."""
+    plain, arrays = stored.packed(scene, state)
+    pending = plain.pop("ledgers")
+    told, tables = record.packed(now)
+    table = np.array(pending, dtype=float).reshape(len(pending), -1 if pending else 0)
+    return {"state": plain, "record": told}, {**arrays, PENDING: table, **tables}
 
 
-def _table(rows, width: int) -> bool:
-    """Are these rows of so many numbers or empty fields?"""
-    return isinstance(rows, list) and all(
-        isinstance(row, list) and len(row) == width and
-        all(value is None or counted(value) or in_range(value, -float("inf"), float("inf")) for value in row)
-        for row in rows)
+def unpacked(scene: Scene, plain: dict, arrays: Arrays) -> tuple[State, Record]:
+    """What :func:`packed` was given. Raises CheckpointError where it makes no sense."""
+    tables = {name.removeprefix(PREFIX): array for name, array in arrays.items()
+              if name.startswith(PREFIX)}
+    own = {name: array for name, array in arrays.items()
+           if not name.startswith(PREFIX) and name != PENDING}
+    pending = arrays.get(PENDING)
+    told = plain.get("state")
+    right = set(plain) == {"state", "record"} and isinstance(told, dict) and pending is not None
+    if not right or pending.ndim != 2 or pending.dtype.kind != "f" or "ledgers" in told:
+        raise CheckpointError("it does not hold what it should")
+    state = stored.unpacked(scene, {**told, "ledgers": pending.tolist()}, own)
+    return state, record.unpacked(plain["record"], tables)
 
 
-def _files(folder: Path, index, kind: str) -> bool:
-    """Are these the times of fields that are there, under the names that a run gives them?"""
-    return isinstance(index, list) and all(
-        isinstance(entry, list) and len(entry) == 2 and in_range(entry[0], 0.0, float("inf")) and
-        entry[1] == f"fields/{kind}_{number:04d}.vtu" and (folder / entry[1]).is_file()
-        for number, entry in enumerate(index))
+def _never(scene: Scene) -> set[str]:
+    """The files that a run of this scene does not write."""
+    absent = {"timeseries.nc": scene.output.timeseries != "netcdf",
+              "ledger.csv": scene.growth is None, "before_expansion.pvd": not scene.output.times}
+    return {name for name, never in absent.items() if never}
 
 
-def settle(folder: Path, over: bool) -> None:
-    """The last things of a run's end: its page, and no checkpoint where it is over and has nothing to go on from."""
-    with writing(folder / "report.html"):
-        report.write(folder)
-    for name in CHECKPOINTS if over else ():
-        (folder / name).unlink(missing_ok=True)
+def _write_sums(path: Path, marks: dict[str, Mark]) -> None:
+    """Write what ``sha256sum --check`` takes."""
+    lines = [marks[name].line(name) for name in sorted(marks)]
+    path.write_text("".join(lines), encoding="utf-8", newline="")
+
+
+def settle(folder: Path, over: bool, own: set[str]) -> None:
+    """The last things of a run's end: its page, and no checkpoint where it is over.
+
+    own: the names of its files. Raises OutputError where the page cannot be made or written.
+    """
+    path = claimed(folder, "report.html", own)
+    try:
+        with writing(path):
+            report.write(folder)
+    except ValueError as error:
+        raise OutputError(f"{path}: it cannot be made: {error}") from error
+    if over:
+        remove(folder, CHECKPOINTS)
 
 
 def interrupted(recorder: Recorder, number: int) -> Interrupted:
     """What to raise when a signal has asked the run to stop."""
-    return Interrupted(f"interrupted by signal {number} at t = {recorder.time:g} h; what was computed is "
-                       f"written, and --resume {recorder.folder} goes on from there", number)
+    return Interrupted(f"interrupted by signal {number} at t = {recorder.time:g} h; what was "
+                       f"computed is written, and --resume {recorder.folder} goes on from there",
+                       number)

@@ -1,4 +1,7 @@
-"""Run a scene into a folder, or go on with a run there: rows and fields as they come, and nothing lost on the way."""
+"""Run a scene into a folder, or go on with a run there.
+
+Rows and fields are written as they come, and nothing is lost on the way.
+"""
 
 from __future__ import annotations
 
@@ -12,104 +15,231 @@ from time import perf_counter
 
 from repro import results, timing
 from repro.errors import CheckpointError, Interrupted, OutputError, SimulationError
+from repro.files import is_file
 from repro.march.loop import PoreEnd
 from repro.march.simulation import steps
 from repro.run import checkpoint
-from repro.run.folder import clear, held, prepare, tidy, usable
-from repro.run.machine import conditions, differences
-from repro.run.recorder import CHECKPOINTS, UNDONE, Recorder, interrupted, settle
-from repro.scene import Scene, parse_scene, scene_hash
+from repro.run.folder import (
+    CHECKPOINTS,
+    PROVENANCE,
+    held,
+    listed,
+    prepare,
+    refuse_links,
+    refuse_others,
+    tidy,
+    usable,
+)
+from repro.run.machine import conditions, differences, require_packages
+from repro.run.memory import require_memory
+from repro.run.recorder import Recorder, interrupted, settle
+from repro.run.status import COMPLETED, FAILED, INTERRUPTED, RUNNING, done, undone
+from repro.scene import Scene, SceneError, load_scene, parse_scene, scene_hash, scene_tables
 
 __all__ = ["OutputError", "Recorder", "Watch", "prepare", "resume", "run"]
 
+#: Of what differs so many keys are told.
+MOST_SHOWN = 4
 #: Seconds of wall time between checkpoints.
 INTERVAL = 60.0
 
+Progress = Callable[[float], None]
+
 
 def untold(event: dict) -> None:
-    """What is done with events where nobody asks for them: warnings are given, the others dropped."""
+    """What is done with events where nobody asks for them: warnings are given, others dropped."""
     if event["event"] == "warning":
         warnings.warn(event["message"], stacklevel=2)
 
 
+def unwatched(time: float) -> None:
+    """What is done with simulated times where nobody asks for them."""
+
+
 @dataclass(frozen=True)
 class Watch:
-    """Who is told what happens, how often the state is written (s of wall time), and who says when to stop, by a
-    signal's number."""
+    """Who is told what happens, how often the state is written (s of wall time), and who says when
+    to stop, by a signal's number."""
 
     tell: Callable[[dict], None] = untold
     interval: float = INTERVAL
     stop: Callable[[], int] = lambda: 0
 
+    def warn(self, message: str) -> None:
+        """Tell a warning."""
+        self.tell({"event": "warning", "message": message})
+
 
 ALONE = Watch()
 
 
-def run(scene: Scene, folder: Path, progress: Callable[[float], None] = lambda time: None, watch: Watch = ALONE) -> str:
-    """Run a scene into a folder; ``progress`` is told each simulated time (h). Returns how the run ended.
+def run(scene: Scene, folder: Path, progress: Progress = unwatched, watch: Watch = ALONE, *,
+        force: bool = False, origin: dict | None = None) -> str:
+    """Run a scene into a folder; ``progress`` is told each simulated time (h).
 
-    Raises OutputError where the folder cannot be used or another run uses it, SimulationError where a stage fails, and
-    Interrupted where ``watch.stop`` asks for it: what was computed until then is written all the same, ``run.json``
+    A run of the same scene, source and versions that is there is gone on with, or left alone where
+    it is over; with ``force`` the files of whatever run is there are removed first. origin: the
+    ``file`` of the scene and the entries ``set`` in it, for ``run.json``.
+
+    Returns how the run ended. Raises SceneError where the machine lacks a package or the memory
+    that the scene takes, OutputError where the folder holds anything else, cannot be used or another run uses
+    it, SimulationError where a stage fails, and Interrupted where
+    ``watch.stop`` asks for it: what was computed until then is written all the same, ``run.json``
     says why it ends, and :func:`resume` goes on from there.
     """
+    _require(scene, watch)
     with held(folder):
-        prepare(folder)
-        timing.reset()
-        return _from_the_start(Recorder(scene, folder), progress, watch)
+        recorder = Recorder(scene, folder, origin=origin)
+        if not is_file(folder / PROVENANCE):
+            prepare(folder)
+            return _from_the_start(recorder, progress, watch)
+        told = _told(folder / PROVENANCE)
+        recorder.own = listed(folder, told)
+        refuse_links(folder, recorder.own)
+        if force:
+            refuse_others(folder, recorder.own)
+            return _from_the_start(recorder, progress, watch)
+        _refuse_another(recorder, told)
+        prepare(folder, recorder.own)
+        return _continued(recorder, told, progress, watch)
 
 
-def resume(folder: Path, progress: Callable[[float], None] = lambda time: None, watch: Watch = ALONE) -> str:
-    """Go on with a run that was interrupted, killed or has failed, and give bit for bit what it would have given.
+def _require(scene: Scene, watch: Watch) -> None:
+    """Raises SceneError where the machine lacks a package or the memory that a scene takes."""
+    require_packages(scene)
+    require_memory(scene, watch.warn)
 
-    Returns how the run ended, at once where it had ended before. Where versions have changed, or a checkpoint cannot be
-    used, a warning says so. Raises as :func:`run`, and OutputError where there is no run.
+
+def _refuse_another(recorder: Recorder, told: dict) -> None:
+    """Raises OutputError, with what differs, where this is not what the run there was begun with.
     """
-    if not (folder / "run.json").is_file():
+    now = results.provenance(recorder.scene) | {"source": recorder.conditions["source"]}
+    there = told | {"source": _table(told, "conditions").get("source")}
+    keys = ("source", "versions") if there["hash"] == now["hash"] else ("tables",)
+    differing = differences(*({key: which.get(key) for key in keys} for which in (there, now)))
+    if differing:
+        raise OutputError(
+            f"--out {recorder.folder}: the run there is another one: {_shown(differing)}; a new "
+            "folder is needed, or --force, which removes the files of that run")
+
+
+def _shown(differing: dict[str, list]) -> str:
+    """What differs, for people to read: the first keys with both values, and how many more."""
+    pairs = [f"{key.removeprefix('tables.')} ({_value(one)} there, now {_value(two)})"
+             for key, (one, two) in differing.items()]
+    more = f" and {len(pairs) - MOST_SHOWN} more" if len(pairs) > MOST_SHOWN else ""
+    return ", ".join(pairs[:MOST_SHOWN]) + more
+
+
+def _value(value: object) -> str:
+    if isinstance(value, dict):
+        return "a section"
+    return "not set" if value is None else str(value)
+
+
+def _table(told: dict, key: str) -> dict:
+    return told[key] if isinstance(told.get(key), dict) else {}
+
+
+def resume(folder: Path, progress: Progress = unwatched, watch: Watch = ALONE) -> str:
+    """Go on with a run that was interrupted, killed or has failed.
+
+    Gives bit for bit what it would have given. Returns how the run ended, at once where it had
+    ended before. Where versions have changed, or a checkpoint cannot be used, a warning says so.
+    Raises as :func:`run`, and OutputError where there is no run.
+    """
+    if not is_file(folder / PROVENANCE):
         raise OutputError(f"--resume {folder}: there is no run.json; the folder of a run is needed")
     with held(folder):
-        told, scene = _told(folder / "run.json")
-        if not told["status"].startswith(UNDONE):
-            if any((folder / name).exists() for name in CHECKPOINTS):  # it was killed at its very end
-                settle(folder, over=True)
-            watch.tell({"event": "end", "scene": scene.name, "status": told["status"], "folder": str(folder),
-                        "changed": False})
-            return told["status"]
-        timing.reset()
-        recorder = Recorder(scene, folder)
-        changed = _changed(told, recorder, watch)
-        with usable(folder):
-            tidy(folder)
-            restored = _restored(recorder, watch)
-        recorder.resumes.append({"time_h": recorder.time, "changed": changed})
-        return (_recorded if restored else _from_the_start)(recorder, progress, watch)
+        told = _told(folder / PROVENANCE)
+        own = listed(folder, told)
+        refuse_links(folder, own)
+        scene = _scene(told, folder / PROVENANCE)
+        recorder = Recorder(scene, folder, own, _table(told, "origin"))
+        _tell_another_file(recorder, watch)
+        return _continued(recorder, told, progress, watch)
 
 
-def _told(path: Path) -> tuple[dict, Scene]:
-    """What ``run.json`` says, and its scene. Raises OutputError or SceneError where it is none."""
+def _tell_another_file(recorder: Recorder, watch: Watch) -> None:
+    """Warn where the file that a run's scene was read from says something else by now."""
+    file = recorder.origin.get("file")
+    entries = recorder.origin.get("set")
+    if not isinstance(file, str) or not isinstance(entries, list):
+        return
+    with suppress(SceneError, TypeError, AttributeError):  # it is gone, or is no scene any more
+        now = load_scene(file, entries)
+        differing = differences(scene_tables(recorder.scene), scene_tables(now))
+        if differing:
+            watch.warn(f"{file}: it is not the scene of the run any more: {_shown(differing)}; "
+                       "the run goes on with its own")
+
+
+def _continued(recorder: Recorder, told: dict, progress: Progress, watch: Watch) -> str:
+    """Go on with the run that ``run.json`` tells of, unless it is over; how it ended."""
+    if done(told["status"]):
+        return _left_alone(recorder, told["status"], watch)
+    _require(recorder.scene, watch)
+    timing.reset()
+    changed = _changed(told, recorder, watch)
+    with usable(recorder.folder):
+        tidy(recorder.folder)
+        restored = _restored(recorder, watch)
+    recorder.record.resumes.append({"time_h": recorder.time, "changed": changed})
+    return (_recorded if restored else _from_the_start)(recorder, progress, watch)
+
+
+def _left_alone(recorder: Recorder, status: str, watch: Watch) -> str:
+    """What is said of a run that is over; where it was killed at its very end, that is made."""
+    folder = recorder.folder
+    if any((folder / name).exists() for name in CHECKPOINTS):
+        settle(folder, True, recorder.own)
+    watch.tell({"event": "end", "scene": recorder.scene.name, "status": status,
+                "folder": str(folder), "changed": False})
+    return status
+
+
+def _told(path: Path) -> dict:
+    """What ``run.json`` says. Raises OutputError where it is none of a run."""
     try:
         told = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
-        raise OutputError(f"{path}: cannot be read ({error}); the run.json of a run is needed") from None
-    wanted = {"scene": str, "hash": str, "tables": dict, "status": str}
-    if not isinstance(told, dict) or not all(isinstance(told.get(key), kind) for key, kind in wanted.items()):
+        why = f"cannot be read ({error})"
+        raise OutputError(f"{path}: {why}; the run.json of a run is needed") from None
+    if not _is_record(told):
         raise OutputError(f"{path}: it has no scene or no status; the run.json of a run is needed")
+    if not (done(told["status"]) or undone(told["status"])):
+        raise OutputError(f"{path}: its status {told['status']!r} is none that a run writes")
+    return told
+
+
+def _scene(told: dict, path: Path) -> Scene:
+    """The scene of ``run.json``. Raises SceneError, or OutputError where it is of another run."""
     scene = parse_scene(told["tables"], told["scene"], str(path))
     if scene_hash(scene) != told["hash"]:
-        raise OutputError(f"{path}: its scene is not the one that was run: the hash {told['hash']!r} is of another")
-    return told, scene
+        raise OutputError(f"{path}: its scene is not the one that was run: the hash "
+                          f"{told['hash']!r} is of another")
+    return scene
+
+
+def _is_record(told) -> bool:
+    """Has it what every ``run.json`` has?"""
+    wanted = {"scene": str, "hash": str, "tables": dict, "status": str}
+    return isinstance(told, dict) and all(
+        isinstance(told.get(key), kind) for key, kind in wanted.items())
 
 
 def _changed(told: dict, recorder: Recorder, watch: Watch) -> dict[str, list]:
-    """What has changed since the run began that could change its numbers; a warning where anything has."""
-    keys = ("versions", "conditions")
-    before = {key: told[key] if isinstance(told.get(key), dict) else {} for key in keys}
-    after = {"versions": results.provenance(recorder.scene)["versions"], "conditions": conditions()}
-    found = {key: pair for key, pair in differences(before, after).items() if not key.startswith("conditions.threads")}
-    if found:
-        names = ", ".join(f"{key} ({one} before, now {two})" for key, (one, two) in found.items())
-        watch.tell({"event": "warning", "message": f"{recorder.folder}: not as it was when the run began: {names}; the "
-                    "result need not be that of an uninterrupted run to the last bit"})
-    return found
+    """What has changed since the run began that could change its numbers; a warning tells it."""
+    before = {key: _table(told, key) for key in ("versions", "conditions")}
+    versions = results.provenance(recorder.scene)["versions"]
+    after = {"versions": versions, "conditions": conditions()}
+    changed = {key: pair for key, pair in differences(before, after).items()
+               if not key.startswith("conditions.threads")}
+    if changed:
+        pairs = [f"{key} ({one} before, now {two})" for key, (one, two) in changed.items()]
+        watch.warn(f"{recorder.folder}: not as it was when the run began: {', '.join(pairs)}; the "
+                   "result need not be that of an uninterrupted run to the last bit")
+    return changed
 
 
 def _restored(recorder: Recorder, watch: Watch) -> bool:
@@ -119,22 +249,23 @@ def _restored(recorder: Recorder, watch: Watch) -> bool:
         if path.exists():
             try:
                 recorder.restore(path)
+                recorder.drop_later()
                 return True
             except CheckpointError as error:
-                watch.tell({"event": "warning", "message": f"{path}: refused: {error}"})
+                watch.warn(f"{path}: refused: {error}")
                 path.replace(recorder.folder / checkpoint.REFUSED)
-    watch.tell({"event": "warning", "message": f"{recorder.folder}: no checkpoint to go on from; it starts again from "
-                "t = 0"})
+    watch.warn(f"{recorder.folder}: no checkpoint to go on from; it starts again from t = 0")
     return False
 
 
-def _from_the_start(recorder: Recorder, progress: Callable[[float], None], watch: Watch) -> str:
-    recorder.tell("running")
-    clear(recorder.folder)
+def _from_the_start(recorder: Recorder, progress: Progress, watch: Watch) -> str:
+    timing.reset()
+    recorder.tell(RUNNING)
+    recorder.clear()
     return _recorded(recorder, progress, watch)
 
 
-def _recorded(recorder: Recorder, progress: Callable[[float], None], watch: Watch) -> str:
+def _recorded(recorder: Recorder, progress: Progress, watch: Watch) -> str:
     """Run to the end, whatever it is, and write that; how the run ended."""
     watch.tell({"event": "start", "scene": recorder.scene.name, "folder": str(recorder.folder),
                 "from_h": recorder.time, "end_h": recorder.end, "step": recorder.steps})
@@ -142,51 +273,57 @@ def _recorded(recorder: Recorder, progress: Callable[[float], None], watch: Watc
         status = _simulated(recorder, progress, watch)
     except SimulationError as error:
         told = SimulationError(f"{error}; {recorder.last_good()}")
-        _end(recorder, f"failed: {told}", watch)
+        _end(recorder, f"{FAILED}{told}", watch)
         raise told from error
     except (KeyboardInterrupt, Interrupted):
-        _end(recorder, "interrupted", watch)
+        _end(recorder, INTERRUPTED, watch)
         raise
     except BaseException as error:
         with suppress(OutputError):  # the first trouble is the one to tell
-            _end(recorder, f"failed: {error}", watch)
+            _end(recorder, f"{FAILED}{error}", watch)
         raise
     return _end(recorder, status, watch)
 
 
 def _end(recorder: Recorder, status: str, watch: Watch) -> str:
     recorder.finish(status)
-    watch.tell({"event": "end", "scene": recorder.scene.name, "status": status, "folder": str(recorder.folder),
-                "time_h": recorder.time, "step": recorder.steps, "rows": len(recorder.rows), "changed": True})
+    watch.tell({"event": "end", "scene": recorder.scene.name, "status": status,
+                "folder": str(recorder.folder), "time_h": recorder.time, "step": recorder.steps,
+                "rows": len(recorder.record.rows), "changed": True})
     return status
 
 
-def _simulated(recorder: Recorder, progress: Callable[[float], None], watch: Watch) -> str:
+def _simulated(recorder: Recorder, progress: Progress, watch: Watch) -> str:
     """Record every step of a run, from the recorder's state on; how it ended."""
-    written = perf_counter()
     try:
-        for state, instant in steps(recorder.scene, recorder.state):
-            remeshes, contact = recorder.all_remeshes, recorder.contact
-            recorder.add(state, instant)
-            _tell_step(recorder, recorder.all_remeshes > remeshes, recorder.contact > contact, watch)
-            progress(recorder.time)
-            if number := watch.stop():
-                raise interrupted(recorder, number)
-            if perf_counter() - written >= watch.interval:
-                _checkpoint(recorder, watch)
-                written = perf_counter()
+        _record_steps(recorder, progress, watch)
     except PoreEnd as end:
         return str(end)
     except MemoryError as error:
-        raise SimulationError(f"stopped at t = {recorder.time:g} h, out of memory while results are written ({error}); "
-                              "try a smaller numerics.refinement") from error
-    return "completed"
+        raise SimulationError(f"stopped at t = {recorder.time:g} h, out of memory while results "
+                              f"are written ({error}); try a smaller numerics.refinement") from error
+    return COMPLETED
+
+
+def _record_steps(recorder: Recorder, progress: Progress, watch: Watch) -> None:
+    written = perf_counter()
+    for state, instant in steps(recorder.scene, recorder.state):
+        remeshes = recorder.remeshes
+        contact = recorder.contact
+        recorder.add(state, instant)
+        _tell_step(recorder, recorder.remeshes > remeshes, recorder.contact > contact, watch)
+        progress(recorder.time)
+        if number := watch.stop():
+            raise interrupted(recorder, number)
+        if perf_counter() - written >= watch.interval:
+            _checkpoint(recorder, watch)
+            written = perf_counter()
 
 
 def _tell_step(recorder: Recorder, remeshed: bool, contact: bool, watch: Watch) -> None:
     """A step as events."""
-    now = {"time_h": recorder.time, "end_h": recorder.end, "step": recorder.steps, "remeshes": recorder.all_remeshes,
-           "contact": recorder.contact}
+    now = {"time_h": recorder.time, "end_h": recorder.end, "step": recorder.steps,
+           "remeshes": recorder.remeshes, "contact": recorder.contact}
     watch.tell({"event": "step", **now})
     for event, happened in (("remesh", remeshed), ("contact", contact)):
         if happened:
@@ -195,6 +332,7 @@ def _tell_step(recorder: Recorder, remeshed: bool, contact: bool, watch: Watch) 
 
 def _checkpoint(recorder: Recorder, watch: Watch) -> None:
     start = perf_counter()
-    recorder.save("running")
-    watch.tell({"event": "checkpoint", "time_h": recorder.time, "file": str(recorder.folder / checkpoint.NEWEST),
+    recorder.save(RUNNING)
+    file = str(recorder.folder / checkpoint.NEWEST)
+    watch.tell({"event": "checkpoint", "time_h": recorder.time, "file": file,
                 "seconds": perf_counter() - start})

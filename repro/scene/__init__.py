@@ -1,7 +1,8 @@
-"""What a scene says: its keys, their units, how a file is read, checked and written, and the packaged scenes.
+"""What a scene says: its keys, their units, how a file is read, checked and written.
 
     keys      the dataclasses of a scene: default, unit, range, source of every key
     units     quantities with units
+    exact     the units that scenes use, as exact fractions
     reading   tables of a TOML file into dataclasses, and back
     rules     what keys ask of each other
     files     TOML files, packaged scenes, ``--set``
@@ -34,6 +35,7 @@ from repro.scene.keys import (
 )
 from repro.scene.units import SceneError
 
-__all__ = ["KEYS", "OURS", "PRESETS", "Acceptor", "Aggregate", "Donor", "Flow", "Growth", "Kinetics", "Numerics",
-           "Output", "Pore", "Scene", "SceneError", "Substrate", "Substrates", "load_scene", "load_tables", "packaged_scenes",
-           "parse_scene", "scene_hash", "scene_tables"]
+__all__ = ["KEYS", "OURS", "PRESETS", "Acceptor", "Aggregate", "Donor", "Flow", "Growth",
+           "Kinetics", "Numerics", "Output", "Pore", "Scene", "SceneError", "Substrate",
+           "Substrates", "load_scene", "load_tables", "packaged_scenes", "parse_scene",
+           "scene_hash", "scene_tables"]

@@ -1,4 +1,4 @@
-"""Where the tables of a scene come from: a TOML file, or a packaged one, and the "KEY=VALUE" of --set."""
+"""Where the tables of a scene come from: a file, or a packaged one, and --set and --unset."""
 import os
 import re
 import tomllib
@@ -9,12 +9,22 @@ from repro.scene.reading import Place, did_you_mean, elsewhere, shown
 from repro.scene.units import SceneError, nearest
 
 LONGEST_LINE = 80  # characters of a line of a file in a message
-BARE = re.compile(r"=\s*[-+.\d][-+.\deE]*\s*[A-Za-z\u00b5\u03bc]")  # a value with a unit, without quotes
+LARGEST = 1_000_000  # bytes of a file
+MOST_PARTS = 20  # of a dotted key; tomllib's memory grows with their square
+#: A value with a unit, without quotes.
+BARE = re.compile(r"=\s*[-+.\d][-+.\deE]*\s*[A-Za-z\u00b5\u03bc]")
+#: Pieces of TOML, without backtracking: what may be a part of a key, a dot, and all else.
+TOKEN = re.compile(
+    r'''(?P<blank>[ \t]++)|(?P<dot>\.)|(?P<comment>\#[^\n]*+)
+    |"""(?:[^"\\]|\\.|"(?!""))*+(?:"{3,5})?|'{3}(?:[^']|'(?!''))*+(?:'{3,5})?
+    |(?P<part>[A-Za-z0-9_-]++|"(?:[^"\\\n]|\\.)*+"?|'[^'\n]*+'?)
+    |.''', re.S | re.X)
 
 
 def packaged_scenes() -> tuple[str, ...]:
     """The names of the scenes that come with the package."""
-    return tuple(sorted(path.name.removesuffix(".toml") for path in _folder().iterdir() if path.name.endswith(".toml")))
+    names = [path.name for path in _folder().iterdir()]
+    return tuple(sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml")))
 
 
 def _folder():
@@ -26,7 +36,8 @@ def read_text(file: str) -> str:
     try:
         return _content(file).decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise SceneError(f"{file}: not UTF-8 text (at byte {error.start + 1}); a scene is a TOML file") from None
+        raise SceneError(f"{file}: not UTF-8 text (at byte {error.start + 1}); "
+                         "a scene is a TOML file") from None
 
 
 def _content(file: str) -> bytes:
@@ -38,20 +49,42 @@ def _content(file: str) -> bytes:
         hint = did_you_mean(nearest(file, names))
         raise SceneError(f"{file}: {found} a packaged scene ({', '.join(names)}){hint}")
     try:
-        return Path(file).read_bytes()
+        with Path(file).open("rb") as opened:
+            content = opened.read(LARGEST + 1)
     except OSError as error:
         raise SceneError(f"{file}: cannot be read ({error.strerror})") from None
+    if len(content) > LARGEST:
+        raise SceneError(f"{file}: more than {LARGEST} bytes; a scene has a few thousand")
+    return content
 
 
 def read_tables(file: str) -> dict:
     """The tables of a packaged scene or of a file; SceneError if it is not TOML."""
     text = read_text(file)
+    deep = line_of_a_deep_key(text)
+    if deep:
+        raise SceneError(f"{file}: a key of more than {MOST_PARTS} parts (at line {deep}); "
+                         "one of a scene has at most 3, such as substrates.donor.supply")
     try:
         return tomllib.loads(text)
     except RecursionError:
-        raise SceneError(f"{file}: not TOML: values nested too deeply; a scene has tables of plain values") from None
+        raise SceneError(f"{file}: not TOML: values nested too deeply; "
+                         "a scene has tables of plain values") from None
     except ValueError as error:
         raise SceneError(f"{file}: not TOML: {error}{_line_of(text, str(error))}") from None
+
+
+def line_of_a_deep_key(text: str) -> int:
+    """The number of the first line with a key of more parts than MOST_PARTS; 0 without one."""
+    dots = 0
+    for token in TOKEN.finditer(text):
+        kind = token.lastgroup
+        dots += kind == "dot"
+        if dots >= MOST_PARTS:
+            return text.count("\n", 0, token.start()) + 1
+        if kind not in ("part", "dot", "blank"):
+            dots = 0
+    return 0
 
 
 def _line_of(text: str, message: str) -> str:
@@ -61,28 +94,53 @@ def _line_of(text: str, message: str) -> str:
     if found is None:
         return ""
     line = lines[int(found[1]) - 1].strip()
-    hint = '; a value with a unit stands in quotes, such as width = "50 um"' if BARE.search(line) else ""
+    quotes = '; a value with a unit stands in quotes, such as width = "50 um"'
+    hint = quotes if BARE.search(line) else ""
     return f": {line if len(line) <= LONGEST_LINE else line[:LONGEST_LINE - 3] + '...'}{hint}"
+
+
+def key_of(entry: str) -> str:
+    """The dotted key of a "KEY=VALUE"."""
+    return ".".join(part.strip() for part in entry.partition("=")[0].split("."))
+
+
+def leave_out(tables: dict, key: str, file: str, known: tuple[str, ...]) -> None:
+    """Take a dotted key, or a section, out of the tables. Raises SceneError if it is not there."""
+    *above, last = key_of(key).split(".")
+    table: object = tables
+    for part in above:
+        table = table.get(part) if isinstance(table, dict) else None
+    if not isinstance(table, dict) or last not in table:
+        hint = did_you_mean("" if key_of(key) in known else elsewhere(key_of(key)[:60], known))
+        raise SceneError(f"{file}: --unset {shown(key)}: the scene does not set it{hint}")
+    del table[last]
 
 
 def override(tables: dict, entry: str, file: str, known: tuple[str, ...]) -> None:
     """Set one "KEY=VALUE" in the tables; known: every dotted key."""
-    key, equals, text = entry.partition("=")
-    path = [part.strip() for part in key.split(".")]
+    equals, text = entry.partition("=")[1:]
+    path = key_of(entry).split(".")
     if not equals or not all(path):
         hint = did_you_mean(elsewhere(".".join(part for part in path if part)[:60], known))
-        raise SceneError(f'{file}: --set {shown(entry)}: KEY=VALUE is needed, such as pore.width="50 um"{hint}')
+        raise SceneError(f"{file}: --set {shown(entry)}: KEY=VALUE is needed, such as "
+                         f'pore.width="50 um"{hint}')
+    if len(path) > MOST_PARTS:
+        raise SceneError(f"{file}: --set {shown(entry)}: a key of at most {MOST_PARTS} parts "
+                         "is needed")
     place = Place(file)
     for part in path[:-1]:
         tables, place = tables.setdefault(part, {}), place.below(part)
         if not isinstance(tables, dict):
             hint = did_you_mean(place.key if place.key in known else "")
-            raise place.refuse(tables, f"it takes no keys, so that --set {shown(entry)} is not accepted{hint}")
+            wanted = f"it takes no keys, so that --set {shown(entry)} is not accepted{hint}"
+            raise place.refuse(tables, wanted)
     tables[path[-1]] = _toml_value(text.strip())
 
 
 def _toml_value(text: str) -> object:
     """The TOML value that a text is, or the text itself."""
+    if line_of_a_deep_key(text):
+        return text
     try:
         read = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):

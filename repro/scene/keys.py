@@ -1,23 +1,27 @@
 """What a scene says: its sections are the physics that runs, its defaults are Table 1 of the paper.
 
-A scene is a TOML file, or the name of a packaged one, with units in its values. The dataclasses below are the only
-place where its keys, defaults, units, accepted ranges and sources are written down; reading, checking, writing and
-`repro scene` go through them. Their floats are in the units of the package (`repro.scene.units`): um, h, mg/L,
-head in um, MPa, rad. A section that a scene leaves out is None and its physics is not run, but for `pore`, `numerics` and `output`,
-which have defaults, and `kinetics`, which comes with substrates and aggregate. [En] are the ambiguities of
+A scene is a TOML file, or the name of a packaged one, with units in its values. The dataclasses
+below are the only place where its keys, defaults, units, accepted ranges and sources are written
+down; reading, checking, writing and `repro scene` go through them. Their floats are in the units of
+the package (`repro.scene.units`): um, h, mg/L, head in um, MPa, rad. A section that a scene leaves
+out is None and its physics is not run, but for `pore`, `numerics` and `output`, which have
+defaults, and `kinetics`, which comes with substrates and aggregate. [En] are the ambiguities of
 `reference/ERRATA.md`.
 """
 import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import MISSING, dataclass
+from fractions import Fraction
 from pathlib import Path
 
-from repro.scene.files import override, packaged_scenes, read_tables
-from repro.scene.reading import Place, dotted, read_table, write_table
+from repro.scene.files import key_of, leave_out, override, packaged_scenes, read_tables
+from repro.scene.reading import Place, dotted, entries, read_table, write_table
 from repro.scene.rules import rules
 from repro.scene.units import (
     ACUTE,
+    BELOW_1,
+    EITHER_SIGN,
     FRACTION,
     NON_NEGATIVE,
     POSITIVE_FRACTION,
@@ -25,16 +29,22 @@ from repro.scene.units import (
     UP_TO_20,
     SceneError,
     choice,
+    flag,
     number,
+    points,
     quantity,
     required,
     section,
+    share,
     times,
 )
 
-__all__ = ["Scene", "SceneError", "load_scene", "packaged_scenes", "parse_scene", "scene_hash", "scene_tables"]
+__all__ = ["Scene", "SceneError", "load_scene", "packaged_scenes", "parse_scene", "scene_hash",
+           "scene_tables"]
 
 OURS = "Not in the paper"
+SEED_RADIUS = 5.0  # um, Table 1
+RATIO = 1.52  # F, mg/mg, Table 1
 
 
 @dataclass(frozen=True)
@@ -48,19 +58,48 @@ class Pore:
 
 @dataclass(frozen=True)
 class Aggregate:
-    """The seed, a half-disc on the lower wall (um)."""
+    """The seed on the lower wall (um): a half-disc, or a body with an `outline`.
 
-    radius: float = quantity("5 um", "um", about="R_0 of the seed, a half-disc on the lower wall", source="Table 1")
+    `outline`: the points (x, y) of its free surface and of its contact with the upper wall, from
+    the upstream end on the lower wall to the downstream one. With it `radius` is None and
+    `position` zero. `inert_fraction`: X_I / (X_A + X_I) of all of it at t = 0.
+    """
+
+    radius: float | None = quantity(
+        "5 um", "um", default=None, stated='default "5 um" without outline',
+        about="R_0 of the seed, a half-disc on the lower wall; either this or outline",
+        source="Table 1")
+    position: float = quantity(
+        "0 um", "um", EITHER_SIGN, source=OURS,
+        about="x of the middle of the half-disc; 0 is the middle of the pore")
+    outline: tuple[tuple[float, float], ...] | None = points(
+        about="The seed's surface instead of a half-disc: both ends on the lower wall (y = 0), the "
+        "upstream one first; points with y = pore.width are contact with the upper wall",
+        source=OURS)
+    smooth: bool = flag(about="A spline through the points of outline, or straight lines",
+                        source=OURS)
+    inert_fraction: float = number(
+        0.0, BELOW_1, source=OURS,
+        about="Share of X_I in the biomass at t = 0, where X_A + X_I = X_m")
+
+    def __post_init__(self):
+        if self.radius is None and self.outline is None:
+            object.__setattr__(self, "radius", SEED_RADIUS)
 
 
 @dataclass(frozen=True)
 class Flow:
-    """Section 2.1, (1)-(6): driven by `head` (um, whole pore) or `mean_velocity` (um/h), the other is None."""
+    """Section 2.1, (1)-(6): driven by `head` (um, whole pore) or `mean_velocity` (um/h).
 
-    head: float | None = quantity("1e-3 cm", "um", default=None, source="(6), section 4",
-                                  about="Head lost over the whole pore; either this or mean_velocity")
-    mean_velocity: float | None = quantity("2.9 m/day", "um/h", NON_NEGATIVE, default=None, source="(3), section 4",
-                                           about="u_ave, mean over the width; either this or head")
+    The other one of them is None.
+    """
+
+    head: float | None = quantity(
+        "1e-3 cm", "um", default=None, source="(6), section 4",
+        about="Head lost over the whole pore; either this or mean_velocity")
+    mean_velocity: float | None = quantity(
+        "2.9 m/day", "um/h", NON_NEGATIVE, default=None, source="(3), section 4",
+        about="u_ave, mean over the width; either this or head")
     viscosity_ratio: float = number(2.0e3, source="2.1, Table 1",
                                     about="lambda, viscosity of the aggregate over that of water")
     kinematic_viscosity: float = quantity("0.01003 cm^2/s", "um^2/h", about="nu of water",
@@ -73,120 +112,186 @@ class Flow:
 
 @dataclass(frozen=True, kw_only=True)
 class Substrate:
-    """A substrate of section 2.2: supply (10 K_s in section 4), K_s (mg/L), D in water and in biomass (um^2/h)."""
+    """A substrate of section 2.2: supply and K_s (mg/L), D in water and in biomass (um^2/h).
+
+    A Fraction for D in biomass is a share of D in water.
+    """
 
     supply: float = quantity("10 mg/L", "mg/L", NON_NEGATIVE, source="(11), section 4 (10 K_s)",
                              about="C_supply of the water that comes in, and of all water at t = 0")
-    half_saturation: float = quantity("1.0 mg/L", "mg/L", about="K_s of Monod's law", source="(7)-(10), Table 1")
-    diffusivity: float = required("2.32 cm^2/day", "um^2/h", about="D in water", source="(7)-(8), Table 1")
-    diffusivity_in_aggregate: float = required("1.85 cm^2/day", "um^2/h", about="D in the aggregate",
-                                               source="2.2, Table 1")
+    half_saturation: float = quantity(
+        "1.0 mg/L", "mg/L", about="K_s of Monod's law", source="(7)-(10), Table 1")
+    diffusivity: float = required(
+        "2.32 cm^2/day", "um^2/h", about="D in water", source="(7)-(8), Table 1")
+    diffusivity_in_aggregate: float = share(
+        "1.85 cm^2/day", "um^2/h", "diffusivity", about="D in the aggregate",
+        source="2.2, Table 1", default=MISSING)
+
+    def __post_init__(self):
+        inside = self.diffusivity_in_aggregate
+        if isinstance(inside, Fraction):
+            inside = float(inside * Fraction(self.diffusivity))
+            object.__setattr__(self, "diffusivity_in_aggregate", inside)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Acceptor(Substrate):
     """The electron acceptor, oxygen: C_A, K_sA, D_A."""
 
-    diffusivity: float = quantity("2.32 cm^2/day", "um^2/h", about="D_A in water", source="(7), Table 1")
-    diffusivity_in_aggregate: float = quantity("1.85 cm^2/day", "um^2/h", about="D_A in the aggregate",
-                                               source="2.2 (80 % of that in water), Table 1")
+    diffusivity: float = quantity(
+        "2.32 cm^2/day", "um^2/h", about="D_A in water", source="(7), Table 1")
+    diffusivity_in_aggregate: float = share(
+        "1.85 cm^2/day", "um^2/h", "diffusivity", about="D_A in the aggregate",
+        source="2.2 (80 % of that in water), Table 1")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Donor(Substrate):
     """The electron donor, phenol: C_D, K_sD, D_D."""
 
-    diffusivity: float = quantity("1.01 cm^2/day", "um^2/h", about="D_D in water", source="(8), Table 1")
-    diffusivity_in_aggregate: float = quantity("0.81 cm^2/day", "um^2/h", about="D_D in the aggregate",
-                                               source="2.2 (80 % of that in water), Table 1")
+    diffusivity: float = quantity(
+        "1.01 cm^2/day", "um^2/h", about="D_D in water", source="(8), Table 1")
+    diffusivity_in_aggregate: float = share(
+        "0.81 cm^2/day", "um^2/h", "diffusivity", about="D_D in the aggregate",
+        source="2.2 (80 % of that in water), Table 1")
 
 
 @dataclass(frozen=True)
 class Substrates:
-    """Section 2.2, (7)-(8). `boundary`: without flow the pore's ends hold the supply, or let nothing pass."""
+    """Section 2.2, (7)-(8).
 
-    acceptor: Substrate = section(Acceptor, about="The electron acceptor, oxygen", source="(7), Table 1")
+    `boundary`: without flow the pore's ends hold the supply, or let nothing pass.
+    """
+
+    acceptor: Substrate = section(
+        Acceptor, about="The electron acceptor, oxygen", source="(7), Table 1")
     donor: Substrate = section(Donor, about="The electron donor, phenol", source="(8), Table 1")
-    boundary: str = choice("open", "closed", source=OURS,
-                           about="Without [flow] the pore's ends hold the supply, or let nothing pass")
+    boundary: str = choice(
+        "open", "closed", source=OURS,
+        about="Without [flow] the pore's ends hold the supply, or let nothing pass")
 
 
 @dataclass(frozen=True)
 class Kinetics:
-    """Dual Monod kinetics, (7)-(10), with Table 1's symbols (rates in 1/h, density in mg/L, the others in mg/mg)."""
+    """Dual Monod kinetics, (7)-(10), with Table 1's symbols.
 
-    maximum_utilization_rate: float = quantity("9.3 1/day", "1/h", NON_NEGATIVE, source="(7)-(9), Table 1",
-                                               about="k, mg of donor per mg of active biomass and time")
-    yield_coefficient: float = number(0.61, POSITIVE_FRACTION, about="Y, mg of biomass per mg of donor",
-                                      source="(9), Table 1")
-    decay_coefficient: float = quantity("0.12 1/day", "1/h", NON_NEGATIVE, about="b, decay of active biomass",
-                                        source="(9)-(10), Table 1")
-    degradable_fraction: float = number(0.8, FRACTION, about="f_d; of what decays, 1 - f_d stays as inert biomass",
-                                        source="(7), (10), Table 1")
-    decay_oxygen_demand: float = number(1.42, about="d_c, mg of acceptor per mg of biomass that degrades",
-                                        source="(7) [E3], Table 1")
-    acceptor_to_donor_ratio: float = number(1.52, about="F, mg of acceptor per mg of donor",
-                                            source="(7), Table 1 as printed, where COD - Y d_c is 1.5138 [E1]")
-    maximum_density: float = quantity("30000 mg/L", "mg/L", about="X_m, mass of biomass per volume of aggregate",
-                                      source="(28), Table 1")
+    Rates are in 1/h, the density in mg/L, the others in mg/mg.
+    """
+
+    maximum_utilization_rate: float = quantity(
+        "9.3 1/day", "1/h", NON_NEGATIVE, source="(7)-(9), Table 1",
+        about="k, mg of donor per mg of active biomass and time")
+    yield_coefficient: float = number(
+        0.61, POSITIVE_FRACTION, about="Y, mg of biomass per mg of donor", source="(9), Table 1")
+    decay_coefficient: float = quantity(
+        "0.12 1/day", "1/h", NON_NEGATIVE, about="b, decay of active biomass",
+        source="(9)-(10), Table 1")
+    degradable_fraction: float = number(
+        0.8, FRACTION, about="f_d; of what decays, 1 - f_d stays as inert biomass",
+        source="(7), (10), Table 1")
+    decay_oxygen_demand: float = number(
+        1.42, about="d_c, mg of acceptor per mg of biomass that degrades",
+        source="(7) [E3], Table 1")
+    donor_oxygen_demand: float | None = number(
+        2.38, default=None, source="(7), Table 1 [E1]",
+        about="COD, mg of acceptor per mg of donor oxidised; acceptor_to_donor_ratio follows")
+    acceptor_to_donor_ratio: float = number(
+        RATIO, default=None, stated=f"default {RATIO}, or COD - Y d_c where COD is given",
+        about="F, mg of acceptor per mg of donor",
+        source="(7), Table 1 as printed, where COD - Y d_c is 1.5138 [E1]")
+    maximum_density: float = quantity(
+        "30000 mg/L", "mg/L", about="X_m, mass of biomass per volume of aggregate",
+        source="(28), Table 1")
+
+    def __post_init__(self):
+        if self.acceptor_to_donor_ratio is None:
+            implied = self.implied_ratio
+            ratio = RATIO if implied is None else implied
+            object.__setattr__(self, "acceptor_to_donor_ratio", ratio)
+
+    @property
+    def implied_ratio(self) -> float | None:
+        """COD - Y d_c (mg/mg), which F is by (7); None where no COD is given."""
+        if self.donor_oxygen_demand is None:
+            return None
+        return self.donor_oxygen_demand - self.yield_coefficient * self.decay_oxygen_demand
 
 
 @dataclass(frozen=True)
 class Growth:
-    """Sections 2.3 and 3.4, (14)-(29), to the time `end` (h) in shape updates of `time_step` (h)."""
+    """Sections 2.3 and 3.4, (14)-(29), to the time `end` (h), updates every `time_step` (h)."""
 
-    end: float = required("19.4 h", "h", NON_NEGATIVE, about="Time at which the run ends", source="Section 4")
-    time_step: float = quantity("12 min", "h", source="Section 2, Table 1",
-                                about="Delta t between shape updates; with numerics.time = \"midpoint\" the first one")
-    shear_modulus: float = quantity("0.01 MPa", "MPa", source="(14)-(24), Table 1",
-                                    about="mu_L; it scales the stresses and, without fluid_forces, moves nothing")
-    minimum_contact_angle: float = quantity("16.7 deg", "rad", ACUTE, source="2.3.3, Table 1",
-                                            about="A wedge of fluid beside a contact surface closes under this angle")
-    minimum_film: float = quantity("2 um", "um", source="2.3.3, Table 1",
-                                   about="A film of fluid to the opposite wall closes when it is thinner than this")
-    fluid_forces: str = choice("neglected", "included", about="The fluid's traction on the aggregate",
-                               source="(20), (22), 2.3.3")
-    new_biomass: str = choice("stressed", "stress_free", source="2.3, section 5",
-                              about="Strain counts from t = 0 (2.3), or new biomass is born without (section 5)")
+    end: float = required(
+        "19.4 h", "h", NON_NEGATIVE, about="Time at which the run ends", source="Section 4")
+    time_step: float = quantity(
+        "12 min", "h", source="Section 2, Table 1",
+        about="Delta t between shape updates; with numerics.time = \"midpoint\" the first one")
+    shear_modulus: float = quantity(
+        "0.01 MPa", "MPa", source="(14)-(24), Table 1",
+        about="mu_L; it scales the stresses and, without fluid_forces, moves nothing")
+    minimum_contact_angle: float = quantity(
+        "16.7 deg", "rad", ACUTE, source="2.3.3, Table 1",
+        about="A wedge of fluid beside a contact surface closes under this angle")
+    minimum_film: float = quantity(
+        "2 um", "um", source="2.3.3, Table 1",
+        about="A film of fluid to the opposite wall closes when it is thinner than this")
+    fluid_forces: str = choice(
+        "neglected", "included", about="The fluid's traction on the aggregate",
+        source="(20), (22), 2.3.3")
+    new_biomass: str = choice(
+        "stressed", "stress_free", source="2.3, section 5",
+        about="Strain counts from t = 0 (2.3), or new biomass is born without (section 5)")
 
 
 @dataclass(frozen=True)
 class Numerics:
     """Section 3: how it is solved."""
 
-    preset: str = choice("fast", "accurate", "paper", source="Section 3 is \"paper\"",
-                         about="Defaults of this section: errors of about 1 %, of about 0.1 %, the paper's own scheme")
-    elements: str = choice("linear", "quadratic", "cubic", source="3.2-3.4 have linear ones",
-                           about="Linear triangles, or curved ones: all quadratic, or velocity and substrates cubic")
-    time: str = choice("updates", "midpoint", source="Section 2, 3.3 have updates",
-                       about="Every growth.time_step, or second-order steps as long as tolerance allows")
+    preset: str = choice(
+        "fast", "accurate", "paper", source="Section 3 is \"paper\"",
+        about="Defaults of this section: errors of about 1 %, of about 0.1 %, the paper's own "
+              "scheme")
+    elements: str = choice(
+        "linear", "quadratic", "cubic", source="3.2-3.4 have linear ones",
+        about="Linear triangles, or curved ones: all quadratic, or velocity and substrates cubic")
+    time: str = choice(
+        "updates", "midpoint", source="Section 2, 3.3 have updates",
+        about="Every growth.time_step, or second-order steps as long as tolerance allows")
     tolerance: float = number(0.01, UP_TO_1, source=OURS,
                               about="Of a midpoint step: change of the growth rate, times the step")
-    transport: str = choice("quasi_steady", "gear", source="2.2; 3.3 has gear",
-                            about="Substrates at rest in each shape, or the transient predictor-corrector scheme")
+    transport: str = choice(
+        "quasi_steady", "gear", source="2.2; 3.3 has gear",
+        about="Substrates at rest in each shape, or the transient predictor-corrector scheme")
     transfer: str = choice("conserving", "linear", "bounded", source="3.5 is linear [E8]",
                            about="How X_A and X_I go to a new mesh")
     extent: str = choice("central", "full", source="3.1",
                          about="Mesh the part around the aggregate, or the whole pore")
     interface: str = choice("laplacian", "traction", source="(1) [E2]",
                             about="What of the flow is continuous across the interface")
-    inlet: str = choice("local", "mean", source="(11) [E4]", about="u_x(y) or u_ave in the inlet condition")
+    inlet: str = choice(
+        "local", "mean", source="(11) [E4]", about="u_x(y) or u_ave in the inlet condition")
     fixed_point: str = choice("kept", "rechosen", source="2.3.3 [E20]",
                               about="Which point of a contact surface stays in place")
     solver: str = choice("superlu", "pardiso", source=OURS,
                          about="Of linear systems; the second needs the package pypardiso")
     ordering: str = choice("degree", "metis", source=OURS,
                            about="Of nodes before SuperLU; the second needs the package pymetis")
-    refinement: float = number(1.0, UP_TO_20, source="3.1 [E13]", about="Element sizes are divided by it")
-    gradation: float = number(0.25, FRACTION, source="3.1 [E13]",
-                              about="Growth of element sizes with distance from the aggregate; 0: one size everywhere")
-    jacobian: str = choice("fresh", "reused", source=OURS,
-                           about="Newton's derivative: of every iterate, or one while it does enough")
-    flow_element: str = choice("stabilised", "bubble", source="3.2",
-                               about="Stabilised linear velocities, or linear ones with a bubble (MINI)")
-    flow_stabilisation: float = number(100.0, source="3.2 [E13]",
-                                       about="c of tau = h^2 / (c nu), with which linear elements are stabilised")
-    mesh_compressibility: float = number(1.0, about="gamma of the mesh motion", source="(35) [E13], [E15]")
+    refinement: float = number(
+        1.0, UP_TO_20, source="3.1 [E13]", about="Element sizes are divided by it")
+    gradation: float = number(
+        0.25, FRACTION, source="3.1 [E13]",
+        about="Growth of element sizes with distance from the aggregate; 0: one size everywhere")
+    jacobian: str = choice(
+        "fresh", "reused", source=OURS,
+        about="Newton's derivative: of every iterate, or one while it does enough")
+    flow_element: str = choice(
+        "stabilised", "bubble", source="3.2",
+        about="Stabilised linear velocities, or linear ones with a bubble (MINI)")
+    flow_stabilisation: float = number(
+        100.0, source="3.2 [E13]",
+        about="c of tau = h^2 / (c nu), with which linear elements are stabilised")
+    mesh_compressibility: float = number(
+        1.0, about="gamma of the mesh motion", source="(35) [E13], [E15]")
 
     @property
     def order(self) -> int:
@@ -199,11 +304,13 @@ class Numerics:
         return min(self.order, 2)
 
 
-#: What each preset changes of the defaults above: about 1 %, about 0.1 % (see `make bench`), the paper's own scheme.
+#: What each preset changes of the defaults above: errors of about 1 %, of about 0.1 % (see
+#: `make bench`), the paper's own scheme.
 PRESETS: dict[str, dict[str, str | float]] = {
-    "fast": {"elements": "quadratic", "time": "midpoint", "refinement": 0.2, "tolerance": 0.0075, "jacobian": "reused"},
-    "accurate": {"elements": "quadratic", "time": "midpoint", "refinement": 0.45, "tolerance": 0.001,
-                 "jacobian": "reused"},
+    "fast": {"elements": "quadratic", "time": "midpoint", "refinement": 0.2, "tolerance": 0.0075,
+             "jacobian": "reused"},
+    "accurate": {"elements": "quadratic", "time": "midpoint", "refinement": 0.45,
+                 "tolerance": 0.001, "jacobian": "reused"},
     "paper": {},
 }
 
@@ -212,63 +319,115 @@ PRESETS: dict[str, dict[str, str | float]] = {
 class Output:
     """Times (h) of the rows and fields wanted, ascending; None: every shape update."""
 
-    times: tuple[float, ...] | None = times(source="Figures 4-6",
-                                            about="Times of the rows and fields wanted; left out: every step")
-    timeseries: str = choice("csv", "netcdf", source=OURS,
-                             about="timeseries.csv alone, or timeseries.nc besides, which needs the package xarray")
+    times: tuple[float, ...] | None = times(
+        source="Figures 4-6", about="Times of the rows and fields wanted; left out: every step")
+    timeseries: str = choice(
+        "csv", "netcdf", source=OURS,
+        about="timeseries.csv alone, or timeseries.nc besides, which needs the package xarray")
 
 
 @dataclass(frozen=True)
 class Scene:
-    """A scene read and checked. `kinetics` is there if and only if there are both substrates and an aggregate."""
+    """A scene read and checked.
+
+    `kinetics` is there if and only if there are both substrates and an aggregate.
+    """
 
     name: str
     pore: Pore = section(Pore, about="The channel", source="Section 2, Figure 1")
     aggregate: Aggregate | None = section(
-        Aggregate, default=None, about="A colony of biomass on the lower wall; left out: a clean channel",
+        Aggregate, default=None,
+        about="A colony of biomass on the lower wall; left out: a clean channel",
         source="Section 4")
     flow: Flow | None = section(
-        Flow, default=None, about="Stokes flow through pore and aggregate; left out: pure diffusion",
+        Flow, default=None,
+        about="Stokes flow through pore and aggregate; left out: pure diffusion",
         source="2.1, (1)-(6), and 3.2")
     substrates: Substrates | None = section(
-        Substrates, default=None, about="Acceptor and donor, carried, diffusing and taken up; left out: none",
+        Substrates, default=None,
+        about="Acceptor and donor, carried, diffusing and taken up; left out: none",
         source="2.2, (7)-(13), and 3.3")
     kinetics: Kinetics | None = section(
-        Kinetics, default=None, about="Dual Monod uptake, growth and decay; comes with [aggregate] and [substrates]",
+        Kinetics, default=None,
+        about="Dual Monod uptake, growth and decay; comes with [aggregate] and [substrates]",
         source="2.2, (7)-(10)")
     growth: Growth | None = section(
         Growth, default=None, source="2.3, 3.4, (14)-(35)",
-        about="The aggregate grows as a neo-Hookean body and moves; left out: the state at t = 0 alone")
+        about="The aggregate grows as a neo-Hookean body and moves; left out: the state at t = 0 "
+              "alone")
     numerics: Numerics = section(Numerics, about="How it is solved", source="Section 3")
     output: Output = section(Output, about="What is written", source=OURS)
 
 
+#: Keys that came after hashes of scenes were recorded, with their defaults as tables write them.
+LATER: dict[str, dict[str, object]] = {
+    "aggregate": {"position": "0.0 um", "smooth": False, "inert_fraction": 0.0},
+}
 KEYS = tuple(dotted(Scene))  # every dotted key of a scene, its sections among them
 
 
-def load_scene(source: str | Path, overrides: Sequence[str] = ()) -> Scene:
-    """The scene in a TOML file or of a packaged name, with the "KEY=VALUE" of --set; SceneError if not accepted."""
+def load_scene(source: str | Path, overrides: Sequence[str] = (),
+               unset: Sequence[str] = ()) -> Scene:
+    """The scene in a TOML file or of a packaged name, without the keys of --unset and with the
+    "KEY=VALUE" of --set. Raises SceneError if it is not accepted.
+    """
     file = str(source)
-    return parse_scene(load_tables(file, overrides), Path(file).stem, file)
+    tables = load_tables(file, overrides, unset)
+    return parse_scene(tables, Path(file).stem, file, [key_of(entry) for entry in overrides])
 
 
-def load_tables(file: str, overrides: Sequence[str] = ()) -> dict:
-    """What a TOML file or a packaged scene and the "KEY=VALUE" of --set say, as it stands."""
+def load_tables(file: str, overrides: Sequence[str] = (), unset: Sequence[str] = ()) -> dict:
+    """What a TOML file or a packaged scene says, as it stands, after --unset and then --set."""
     tables = read_tables(file)
+    for key in unset:
+        leave_out(tables, key, file, KEYS)
     for entry in overrides:
         override(tables, entry, file, KEYS)
     return tables
 
 
-def parse_scene(tables: dict, name: str, file: str) -> Scene:
-    """The scene that TOML `tables` describe, called `name`; SceneError, naming `file`, if it is not accepted."""
+def parse_scene(tables: dict, name: str, file: str, changed: Sequence[str] = ()) -> Scene:
+    """The scene that TOML `tables` describe, called `name`.
+
+    `changed`: the dotted keys that were set last, such as those of --set; of keys that do not go
+    together an error names one of these. Raises SceneError, naming `file`, if it is not accepted.
+    """
+    _refuse_missing(tables, file)
     if "substrates" in tables and "aggregate" in tables:
         tables = {"kinetics": {}, **tables}
     scene = read_table(Scene, _with_preset(tables), Place(file, known=KEYS), name=name)
-    for broken, key, wanted in rules(scene):
+    for broken, wanted in rules(scene):
         if broken:
-            raise Place(file, key).refuse(_at(tables, key, _at(scene_tables(scene), key, MISSING)), wanted)
+            key = _to_name(list(wanted), tables, changed)
+            value = _at(tables, key, _at(scene_tables(scene), key, MISSING))
+            raise Place(file, key).refuse(value, wanted[key])
     return scene
+
+
+def _to_name(keys: list[str], tables: dict, changed: Sequence[str]) -> str:
+    """Of keys that do not go together the first that was changed, else that the tables set."""
+    for key in keys:
+        if any(_within(key, other) or _within(other, key) for other in changed):
+            return key
+    said = [key for key in keys if _at(tables, key, MISSING) is not MISSING]
+    return [*said, *keys][0]
+
+
+def _within(key: str, section: str) -> bool:
+    return f"{key}.".startswith(f"{section}.")
+
+
+def _refuse_missing(tables: dict, file: str) -> None:
+    """Raise SceneError where there is no section at all, or one substrate without the other."""
+    if not tables:
+        sections = ", ".join(f"[{key}]" for key in entries(Scene))
+        raise SceneError(f"{file}: an empty scene: one section or more is needed of {sections}")
+    given = tables.get("substrates")
+    for key, other in (("acceptor", "donor"), ("donor", "acceptor")):
+        if isinstance(given, dict) and other in given and key not in given:
+            wanted = (f"it is needed beside substrates.{other}; one that is not to limit is "
+                      'supplied at many times its half_saturation, such as supply = "1000 mg/L"')
+            raise Place(file, f"substrates.{key}").refuse(MISSING, wanted)
 
 
 def _with_preset(tables: dict) -> dict:
@@ -281,14 +440,27 @@ def _with_preset(tables: dict) -> dict:
 
 
 def scene_tables(scene: Scene) -> dict:
-    """The scene as TOML tables with every default spelt out; `parse_scene` reads an equal scene back, bit by bit."""
+    """The scene as TOML tables with every default spelt out.
+
+    `parse_scene` reads an equal scene back, bit by bit.
+    """
     return write_table(scene)
 
 
 def scene_hash(scene: Scene) -> str:
-    """16 hexadecimal digits that stand for all that a scene says but its name."""
-    canonical = json.dumps(scene_tables(scene), sort_keys=True, separators=(",", ":"), allow_nan=False)
+    """16 hexadecimal digits that stand for all that a scene says but its name.
+
+    A key of `LATER` counts where it does not have its default, so that recorded hashes stand.
+    """
+    tables = {key: _without_later(key, table) for key, table in scene_tables(scene).items()}
+    canonical = json.dumps(tables, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(canonical.encode()).hexdigest()[:16]
+
+
+def _without_later(section: str, table: dict) -> dict:
+    """The table of a section without the keys of `LATER` that have their default."""
+    later = LATER.get(section, {})
+    return {key: value for key, value in table.items() if key not in later or value != later[key]}
 
 
 def _at(tables: dict, key: str, default: object) -> object:

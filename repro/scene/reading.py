@@ -1,15 +1,21 @@
-"""Tables of TOML read into the dataclasses of a scene and written out of them, and how a refusal is told.
+"""Tables of TOML read into the dataclasses of a scene and written out of them; refusals.
 
-A refusal is one line that names the file, the key, the value, what is accepted and, where there is one, the nearest
-thing that is.
+A refusal is one line that names the file, the key, the value, what is accepted and, where there is
+one, the nearest thing that is.
 """
 import json
 from collections.abc import Iterator
 from dataclasses import MISSING, Field, dataclass, fields, replace
 
-from repro.scene.units import SceneError, nearest
+from repro.scene.units import SceneError, nearest, unlike
 
 LONGEST_KEY = 60  # characters of a key in a message
+SCOPE = "docs/scope.md"
+#: Words of keys that other models have.
+NOT_MODELLED = frozenset({
+    "attachment", "detachment", "erosion", "sloughing", "depth", "dimension", "dimensions",
+    "inhibition", "temperature",
+})
 
 
 @dataclass(frozen=True)
@@ -43,17 +49,24 @@ def dotted(kind: type, above: str = "") -> Iterator[str]:
 
 
 def read_table(kind: type, table: object, place: Place, **given):
-    """The dataclass `kind` that a TOML table describes, with `given` for what is no key; SceneError if not accepted."""
+    """The dataclass `kind` that a TOML table describes, with `given` for what is no key.
+
+    Raises SceneError if it is not accepted.
+    """
     keys = entries(kind)
     if not isinstance(table, dict):
-        raise place.refuse(table, f"a table [{place.key}] is needed, with the keys {', '.join(keys)}")
+        several = isinstance(table, list) and place.key in ("aggregate", "pore")
+        one = f"one {place.key} is modelled, see {SCOPE}: " if several else ""
+        wanted = f"{one}a table [{place.key}] is needed, with the keys {', '.join(keys)}"
+        raise place.refuse(table, wanted)
     for key in table:
         if key not in keys:
             raise place.below(key).refuse(table[key], _instead(key, list(keys), place))
     for key, entry in keys.items():
         if key not in table and entry.default is MISSING and entry.default_factory is MISSING:
             raise place.below(key).refuse(MISSING, entry.metadata["kind"].wanted)
-    return kind(**given, **{key: _read_entry(keys[key], table[key], place.below(key)) for key in table})
+    read = {key: _read_entry(keys[key], table[key], place.below(key)) for key in table}
+    return kind(**given, **read)
 
 
 def _read_entry(entry: Field, value: object, place: Place):
@@ -63,7 +76,8 @@ def _read_entry(entry: Field, value: object, place: Place):
     try:
         return kind.read(value)
     except (ValueError, OverflowError):
-        raise place.refuse(value, kind.wanted + did_you_mean(kind.near(value))) from None
+        hint = unlike(kind, value) or did_you_mean(kind.near(value))
+        raise place.refuse(value, kind.wanted + hint) from None
 
 
 def write_table(part) -> dict:
@@ -72,22 +86,29 @@ def write_table(part) -> dict:
     for key, entry in entries(type(part)).items():
         value = getattr(part, key)
         if value is not None:
-            table[key] = entry.metadata["kind"].write(value) if "kind" in entry.metadata else write_table(value)
+            write = entry.metadata["kind"].write if "kind" in entry.metadata else write_table
+            table[key] = write(value)
     return table
 
 
 def _instead(key: str, keys: list[str], place: Place) -> str:
-    near = nearest(key, keys) or elsewhere(key, place.known)
     table = f"[{place.key}]" if place.key else "a scene"
-    return f"there is no such key; {table} takes {', '.join(keys)}{did_you_mean(near)}"
+    told = f"there is no such key; {table} takes {', '.join(keys)}"
+    words = NOT_MODELLED & set(key.casefold().split("_"))
+    if words:
+        return f"{told}; {min(words)} is not modelled, see {SCOPE}"
+    return told + did_you_mean(nearest(key, keys) or elsewhere(key, place.known))
 
 
 def elsewhere(key: str, known: tuple[str, ...]) -> str:
-    """The dotted keys, joined by "or", whose last part, or all of which, may have been meant; "" where there are none.
+    """The dotted keys, joined by "or", whose last part, or all of which, may have been meant.
+
+    "" where there are none.
     """
     whole = nearest(key, known) if "." in key else ""
-    last = nearest(key.rpartition(".")[2], [other.rpartition(".")[2] for other in known])
-    return whole or " or ".join(other for other in known if last and other.rpartition(".")[2] == last)
+    lasts = [other.rpartition(".")[2] for other in known]
+    last = nearest(key.rpartition(".")[2], lasts)
+    return whole or " or ".join(other for other, end in zip(known, lasts) if last and end == last)
 
 
 def did_you_mean(near: str) -> str:
@@ -99,6 +120,6 @@ def shown(value: object, longest: int = 60) -> str:
     """A value as a message quotes it: as TOML would write it, shortened."""
     try:
         text = json.dumps(value, ensure_ascii=False, default=str)
-    except (ValueError, RecursionError):  # an integer of thousands of digits, tables nested by the thousand
+    except (ValueError, RecursionError):  # thousands of digits, tables nested by the thousand
         text = type(value).__name__
     return text if len(text) <= longest else text[: longest - 3] + "..."

@@ -1,24 +1,29 @@
 """What keys of a scene ask of each other."""
+import math
 from collections.abc import Iterator
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from repro.scene import Pore, Scene
+    from repro.scene import Aggregate, Kinetics, Pore, Scene
 
-_UNSTEADY = ', or numerics.transport = "gear": nothing is supplied, so that no state is steady'
+_NO_STATE = "nothing is supplied, so that no state is steady"
+_UNSTEADY = f', or numerics.transport = "gear": {_NO_STATE}'
 MOST_STEPS = 100_000  # shape updates of a run
 SHORTEST_STEP = 1e-6  # h: times are told apart to 1e-9 h
+FINEST = 1e-3  # of the width: the smallest seed, and edge of an outline
 #: What only linear elements have a choice of, and what the others have.
 HIGHER_ORDER = {"transfer": "conserving", "flow_element": "stabilised"}
 
-Rules = Iterator[tuple[bool, str, str]]  # (is it broken, the key to name, what is accepted)
+Outlined = tuple[tuple[float, float], ...]
+#: Is it broken, and what is accepted of each key that breaks it, the likeliest first?
+Rules = Iterator[tuple[bool, dict[str, str]]]
 
 
 def rules(scene: "Scene") -> Rules:
     """What is accepted of each key in the light of the others."""
     if scene.aggregate:
-        yield from _seed_rules(scene.aggregate.radius, scene.pore)
+        yield from _aggregate_rules(scene)
     if scene.flow:
         yield from _flow_rules(scene, scene.flow.head, scene.flow.mean_velocity)
     if scene.substrates:
@@ -28,64 +33,239 @@ def rules(scene: "Scene") -> Rules:
     yield from _output_rules(scene)
 
 
-def _seed_rules(radius: float, pore: "Pore") -> Rules:
-    wanted = f"less than pore.width ({pore.width:g} um) and half of pore.length ({pore.length:g} um) is needed"
-    yield radius >= pore.width or 2 * radius >= pore.length, "aggregate.radius", wanted
-    wanted = f"a thousandth of pore.width ({pore.width:g} um) or more is needed"
-    yield radius < pore.width / 1000, "aggregate.radius", wanted
+def _not_both(other: str, value: str = "") -> str:
+    """What is told of a key that another excludes."""
+    said = f"{other} ({value})" if value else other
+    return (f"{said} is given too; one of them is accepted, not both "
+            f"(--unset {other} leaves that out)")
+
+
+def _aggregate_rules(scene: "Scene") -> Rules:
+    aggregate = scene.aggregate
+    if aggregate.outline is None:
+        yield from _seed_rules(aggregate, scene.pore)
+        yield from _position_rules(aggregate, scene.pore)
+    else:
+        yield from _outline_rules(aggregate)
+        yield from _shape_rules(aggregate.outline, scene.pore)
+    inert = aggregate.inert_fraction != 0 and scene.substrates is None
+    wanted = "0 is needed without [substrates], which tell active from inert biomass"
+    yield inert, {"aggregate.inert_fraction": wanted}
+
+
+def _seed_rules(aggregate: "Aggregate", pore: "Pore") -> Rules:
+    radius = aggregate.radius
+    least = f"aggregate.radius ({radius:g} um) is needed"
+    wanted = (f"less than pore.width ({pore.width:g} um) and half of pore.length "
+              f"({pore.length:g} um) is needed")
+    yield radius >= pore.width, {
+        "aggregate.radius": wanted,
+        "pore.width": f"more than {least}",
+    }
+    yield 2 * radius >= pore.length, {
+        "aggregate.radius": wanted,
+        "pore.length": f"more than twice {least}",
+    }
+    yield radius < pore.width * FINEST, {
+        "aggregate.radius": f"a thousandth of pore.width ({pore.width:g} um) or more is needed",
+        "pore.width": f"at most a thousand times {least}",
+    }
+
+
+def _position_rules(aggregate: "Aggregate", pore: "Pore") -> Rules:
+    radius = f"aggregate.radius ({aggregate.radius:g} um)"
+    position = f"aggregate.position ({aggregate.position:g} um)"
+    half = f"half of pore.length ({pore.length:g} um)"
+    yield abs(aggregate.position) + aggregate.radius >= pore.length / 2, {
+        "aggregate.position": f"less than {half} less {radius}, upstream or downstream, is needed",
+        "aggregate.radius": f"less than {half} less the distance of {position} is needed",
+        "pore.length": f"more than twice {radius} and the distance of {position} is needed",
+    }
+    wanted = "true is accepted with aggregate.outline alone"
+    yield aggregate.smooth, {"aggregate.smooth": wanted}
+
+
+def _outline_rules(aggregate: "Aggregate") -> Rules:
+    radius = "" if aggregate.radius is None else f"{aggregate.radius:g} um"
+    yield aggregate.radius is not None, {
+        "aggregate.radius": _not_both("aggregate.outline"),
+        "aggregate.outline": _not_both("aggregate.radius", radius),
+    }
+    wanted = "0 um is needed with aggregate.outline, whose points say where it is"
+    yield aggregate.position != 0, {
+        "aggregate.position": wanted,
+        "aggregate.outline": _not_both("aggregate.position", f"{aggregate.position:g} um"),
+    }
+
+
+def _shape_rules(points: Outlined, pore: "Pore") -> Rules:
+    """What is asked of an outline."""
+    first = points[0]
+    last = points[-1]
+    wanted = "y = 0 um at the first and the last point is needed"
+    yield first[1] != 0 or last[1] != 0, {"aggregate.outline": wanted}
+    wanted = "the upstream end first (x of the first point less than of the last) is needed"
+    yield first[0] >= last[0], {"aggregate.outline": wanted}
+    for number, point in enumerate(points, 1):
+        end = number in (1, len(points))
+        said = f"point {number} ({point[0]:g} um, {point[1]:g} um)"
+        yield from _point_rules(said, point, end, pore)
+    yield from _spacing_rules(points, pore.width)
+    wanted = "a line that neither crosses nor touches itself is needed"
+    yield _crosses(points, pore.width), {"aggregate.outline": wanted}
+
+
+def _point_rules(said: str, point: tuple[float, float], end: bool, pore: "Pore") -> Rules:
+    x, y = point
+    yield abs(x) >= pore.length / 2, {
+        "aggregate.outline": f"|x| < half of pore.length ({pore.length:g} um) at {said} is needed",
+        "pore.length": f"more than twice |x| of {said} of aggregate.outline is needed",
+    }
+    wanted = f"0 < y <= pore.width ({pore.width:g} um) at {said} is needed"
+    yield y <= 0 and not end, {"aggregate.outline": wanted}
+    yield y > pore.width, {
+        "aggregate.outline": wanted,
+        "pore.width": f"y of {said} of aggregate.outline, or more, is needed",
+    }
+
+
+def _spacing_rules(points: Outlined, width: float) -> Rules:
+    wanted = f"a thousandth of pore.width ({width:g} um) or more is needed from point"
+    for number, (start, end) in enumerate(zip(points, points[1:]), 1):
+        near = math.dist(start, end) < width * FINEST
+        yield near, {"aggregate.outline": f"{wanted} {number} to the next"}
+    above = [number for number, (_, y) in enumerate(points) if y == width]
+    run = above == list(range(above[0], above[0] + len(above))) if above else True
+    wanted = "two points or more in a row, or none, on the upper wall (y = pore.width) are needed"
+    yield len(above) == 1 or not run, {"aggregate.outline": wanted}
+
+
+def _crosses(points: Outlined, width: float) -> bool:
+    """Does a line cross or touch itself?"""
+    from shapely import LineString
+
+    return not LineString([(x / width, y / width) for x, y in points]).is_simple
 
 
 def _flow_rules(scene: "Scene", head: float | None, velocity: float | None) -> Rules:
-    wanted = 'it or flow.mean_velocity is needed, such as head = "1e-3 cm" or mean_velocity = "2.9 m/day"'
-    yield head is None and velocity is None, "flow.head", wanted
-    wanted = f"flow.head ({head} um) is given too; one of them is accepted, not both"
-    yield head is not None and velocity is not None, "flow.mean_velocity", wanted
-    wanted = f"greater than zero is needed{_UNSTEADY}"
-    yield velocity == 0 and scene.substrates is not None and _steady(scene), "flow.mean_velocity", wanted
+    example = 'such as head = "1e-3 cm" or mean_velocity = "2.9 m/day"'
+    wanted = f"it or flow.mean_velocity is needed, {example}"
+    yield head is None and velocity is None, {"flow.head": wanted}
+    yield head is not None and velocity is not None, {
+        "flow.mean_velocity": _not_both("flow.head", f"{head} um"),
+        "flow.head": _not_both("flow.mean_velocity", _per_day(velocity)),
+    }
+    yield velocity == 0 and scene.substrates is not None and _steady(scene), {
+        "flow.mean_velocity": f"greater than zero is needed{_UNSTEADY}",
+        "numerics.transport": f'"gear" is needed with flow.mean_velocity = 0: {_NO_STATE}',
+    }
+
+
+def _per_day(velocity: float | None) -> str:
+    return "" if velocity is None else f"{24e-6 * velocity:g} m/day"
 
 
 def _boundary_rules(scene: "Scene") -> Rules:
+    for name in ("acceptor", "donor"):
+        inside = getattr(scene.substrates, name).diffusivity_in_aggregate
+        key = f"substrates.{name}.diffusivity_in_aggregate"
+        yield inside <= 0, {key: "greater than zero is needed"}
     closed = scene.substrates.boundary == "closed"
-    yield closed and scene.flow is not None, "substrates.boundary", '"open" is needed with [flow]'
-    yield closed and _steady(scene), "substrates.boundary", f'"open" is needed{_UNSTEADY}'
+    yield closed and scene.flow is not None, {
+        "substrates.boundary": '"open" is needed with [flow]',
+        "flow": 'substrates.boundary = "open" is needed with it',
+    }
+    yield closed and _steady(scene), {
+        "substrates.boundary": f'"open" is needed{_UNSTEADY}',
+        "numerics.transport": f'"gear" is needed with substrates.boundary = "closed": {_NO_STATE}',
+    }
 
 
 def _growth_rules(scene: "Scene") -> Rules:
-    alone, wanted = not (scene.substrates and scene.aggregate), "[aggregate] and [substrates] are needed with it"
-    yield alone and scene.kinetics is not None, "kinetics", wanted
-    yield alone and scene.growth is not None, "growth", wanted
+    alone = not (scene.substrates and scene.aggregate)
+    wanted = "[aggregate] and [substrates] are needed with it"
+    yield alone and scene.kinetics is not None, {"kinetics": wanted}
+    yield alone and scene.growth is not None, {"growth": wanted}
+    if scene.kinetics:
+        yield from _demand_rules(scene.kinetics)
     if scene.growth:
-        wanted = f"growth.end ({scene.growth.end:g} h) over {MOST_STEPS} or more is needed"
-        yield scene.growth.time_step < SHORTEST_STEP, "growth.time_step", f"{SHORTEST_STEP:g} h or more is needed"
-        yield scene.growth.end > MOST_STEPS * scene.growth.time_step, "growth.time_step", wanted
+        yield from _step_rules(scene.growth.end, scene.growth.time_step)
     if scene.growth and scene.growth.fluid_forces == "included":
         yield from _force_rules(scene)
-    film, width = scene.growth.minimum_film if scene.growth else 0.0, scene.pore.width
-    yield film >= width, "growth.minimum_film", f"less than pore.width ({width:g} um) is needed"
+    film = scene.growth.minimum_film if scene.growth else 0.0
+    yield film >= scene.pore.width, {
+        "growth.minimum_film": f"less than pore.width ({scene.pore.width:g} um) is needed",
+        "pore.width": f"more than growth.minimum_film ({film:g} um) is needed",
+    }
+
+
+def _demand_rules(law: "Kinetics") -> Rules:
+    implied = law.implied_ratio
+    demand = f"kinetics.donor_oxygen_demand ({law.donor_oxygen_demand})"
+    biomass = law.yield_coefficient * law.decay_oxygen_demand
+    less = f"less than {demand} is needed of Y d_c ({biomass:g}), its product with"
+    yield implied is not None and implied <= 0, {
+        "kinetics.donor_oxygen_demand": f"more than Y d_c ({biomass:g}) is needed: F is the rest",
+        "kinetics.yield_coefficient": f"{less} decay_oxygen_demand",
+        "kinetics.decay_oxygen_demand": f"{less} yield_coefficient",
+    }
+
+
+def _step_rules(end: float, step: float) -> Rules:
+    yield step < SHORTEST_STEP, {"growth.time_step": f"{SHORTEST_STEP:g} h or more is needed"}
+    yield end > MOST_STEPS * step, {
+        "growth.time_step": f"growth.end ({end:g} h) over {MOST_STEPS} or more is needed",
+        "growth.end": f"at most {MOST_STEPS} times growth.time_step ({step:g} h) is needed",
+    }
 
 
 def _force_rules(scene: "Scene") -> Rules:
-    wanted = '"neglected" is needed without [flow]'
-    yield scene.flow is None, "growth.fluid_forces", wanted
-    wanted = '"neglected" is needed with growth.new_biomass = "stress_free", which would yield at every update'
-    yield scene.growth.new_biomass == "stress_free", "growth.fluid_forces", wanted
+    yield scene.flow is None, {"growth.fluid_forces": '"neglected" is needed without [flow]'}
+    wanted = ('"neglected" is needed with growth.new_biomass = "stress_free", '
+              "which would yield at every update")
+    yield scene.growth.new_biomass == "stress_free", {
+        "growth.fluid_forces": wanted,
+        "growth.new_biomass": '"stressed" is needed with growth.fluid_forces = "included"',
+    }
+
+
+def _with_elements(scene: "Scene") -> str:
+    return f'with numerics.elements = "{scene.numerics.elements}"'
+
+
+def _element_keys(wanted: str) -> dict[str, str]:
+    """The keys that choose the elements, of which a rule may be told."""
+    return {"numerics.elements": wanted, "numerics.preset": wanted}
 
 
 def _numerics_rules(scene: "Scene") -> Rules:
-    numerics = scene.numerics
-    for key, only in HIGHER_ORDER.items() if numerics.order > 1 else ():
-        wanted = f'"{only}" is needed with numerics.elements = "{numerics.elements}"; "linear" has the others'
-        yield getattr(numerics, key) != only, f"numerics.{key}", wanted
-    gear = numerics.time == "midpoint" and numerics.transport == "gear"
-    yield gear, "numerics.transport", '"quasi_steady" is needed with numerics.time = "midpoint"'
+    if scene.numerics.order > 1:
+        yield from _higher_order_rules(scene)
+    yield scene.numerics.time == "midpoint" and scene.numerics.transport == "gear", {
+        "numerics.transport": '"quasi_steady" is needed with numerics.time = "midpoint"',
+        "numerics.time": '"updates" is needed with numerics.transport = "gear"',
+    }
+
+
+def _higher_order_rules(scene: "Scene") -> Rules:
+    for key, only in HIGHER_ORDER.items():
+        value = getattr(scene.numerics, key)
+        wanted = f'"{only}" is needed {_with_elements(scene)}; "linear" has the others'
+        other = f'numerics.{key} = "{only}" is needed with it, not "{value}"'
+        yield value != only, {f"numerics.{key}": wanted, **_element_keys(other)}
 
 
 def _output_rules(scene: "Scene") -> Rules:
     end = scene.growth.end if scene.growth else 0.0
-    wanted = f"growth.end is {end:g} h" if scene.growth else "there is no [growth]"
-    yield max(scene.output.times or (0.0,)) > end, "output.times", f"none after {end:g} h is accepted: {wanted}"
+    last = max(scene.output.times or (0.0,))
+    reason = f"growth.end is {end:g} h" if scene.growth else "there is no [growth]"
+    told = {"output.times": f"none after {end:g} h is accepted: {reason}"}
+    if scene.growth:
+        told["growth.end"] = f"{last:g} h or more, the last of output.times, is needed"
+    yield last > end, told
     missing = scene.output.timeseries == "netcdf" and find_spec("xarray") is None
-    yield missing, "output.timeseries", '"csv" is needed, or the package xarray: pip install xarray'
+    wanted = '"csv" is needed, or the package xarray: pip install xarray'
+    yield missing, {"output.timeseries": wanted}
 
 
 def _steady(scene: "Scene") -> bool:

@@ -1,7 +1,8 @@
-"""A scene written out with every key that it could have: value, default, unit, accepted range and source.
+"""A scene written out with every key that it could have: value, default, unit, range and source.
 
-What the scene says is active. What it leaves to the defaults is there too, behind a "#" without a space: changing the
-preset goes on changing what hangs on it. All words come from the fields of :mod:`repro.scene`.
+What the scene says is active. What it leaves to the defaults is there too, behind a "#" without a
+space: changing the preset goes on changing what hangs on it. All words come from the fields of
+:mod:`repro.scene`.
 """
 
 from __future__ import annotations
@@ -13,21 +14,25 @@ from dataclasses import MISSING, Field
 from pathlib import Path
 
 from repro.scene import OURS, PRESETS, Numerics, Scene, load_tables, packaged_scenes, parse_scene
-from repro.scene.files import read_text
+from repro.scene.files import key_of, read_text
 from repro.scene.reading import entries
-from repro.scene.units import Quantity, Times
+from repro.scene.units import Choice, Flag, Number
 
 WIDTH = 100
-HEAD = ("A \"#\" without a space is before what this scene leaves out, or leaves to the default shown: remove it to "
-        "set the key. \"Paper\" is Dupin, Kitanidis & McCarty (2001), by section, equation or table; [En] are its "
-        "ambiguities, reference/ERRATA.md.")
+HEAD = ("A \"#\" without a space is before what this scene leaves out, or leaves to the default "
+        "shown: remove it to set the key. \"Paper\" is Dupin, Kitanidis & McCarty (2001), by "
+        "section, equation or table; [En] are its ambiguities, reference/ERRATA.md.")
 
 
-def scene_text(source: str, overrides: Sequence[str] = ()) -> str:
-    """The TOML text of a packaged scene or of a file; it parses to an equal scene. Raises SceneError as load_scene."""
-    tables = load_tables(source, overrides)
-    scene = parse_scene(tables, Path(source).stem, source)
-    name = "".join(letter if letter.isprintable() and letter.isascii() else "?" for letter in scene.name)
+def scene_text(source: str, overrides: Sequence[str] = (), unset: Sequence[str] = ()) -> str:
+    """The TOML text of a packaged scene or of a file, with what --set and --unset change.
+
+    It parses to an equal scene. Raises SceneError as load_scene.
+    """
+    tables = load_tables(source, overrides, unset)
+    changed = [key_of(entry) for entry in overrides]
+    scene = parse_scene(tables, Path(source).stem, source, changed)
+    name = "".join(one if one.isprintable() and one.isascii() else "?" for one in scene.name)
     lines = [*_comment(f"Scene {name}. {HEAD}")]
     for key, entry in entries(Scene).items():
         lines += _table(key, entry, tables.get(key, {}), getattr(scene, key))
@@ -36,11 +41,15 @@ def scene_text(source: str, overrides: Sequence[str] = ()) -> str:
 
 def titles() -> dict[str, str]:
     """The first line of each packaged scene, which says what it is."""
-    return {name: read_text(name).partition("\n")[0].removeprefix("# ") for name in packaged_scenes()}
+    first = {name: read_text(name).partition("\n")[0] for name in packaged_scenes()}
+    return {name: line.removeprefix("# ") for name, line in first.items()}
 
 
 def _table(path: str, entry: Field, said: dict, made: object) -> Iterator[str]:
-    """The lines of a section; said: what the scene writes in it, made: what it reads as, None where it is left out."""
+    """The lines of a section.
+
+    said: what the scene writes in it; made: what it reads as, None where it is left out.
+    """
     kind = entry.metadata["section"]
     yield ""
     yield from _comment(_about(entry))
@@ -50,10 +59,10 @@ def _table(path: str, entry: Field, said: dict, made: object) -> Iterator[str]:
         if key not in inner:
             yield from _comment(_about(field))
             yield from _comment(f"{field.metadata['kind'].accepted}; {_stated(kind, key, field)}")
-            value = said[key] if key in said else _default(field, getattr(made, key) if made else None)
+            value = said[key] if key in said else _default(field, getattr(made, key, None))
             yield f"{'' if key in said else '#'}{key} = {_toml(value)}"
     for key, field in inner.items():
-        yield from _table(f"{path}.{key}", field, said.get(key, {}), getattr(made, key) if made else None)
+        yield from _table(f"{path}.{key}", field, said.get(key, {}), getattr(made, key, None))
 
 
 def _about(field: Field) -> str:
@@ -63,6 +72,8 @@ def _about(field: Field) -> str:
 
 def _stated(kind: type, key: str, field: Field) -> str:
     """What holds where a scene does not say."""
+    if field.metadata["stated"]:
+        return field.metadata["stated"]
     if field.default is MISSING and field.default_factory is MISSING:
         return "must be given"
     if field.default is None:
@@ -71,19 +82,25 @@ def _stated(kind: type, key: str, field: Field) -> str:
     values = [preset.get(key, own) for preset in PRESETS.values()] if kind is Numerics else []
     if set(values) <= {own}:
         return f"default {_toml(own)}"
-    return "default " + ", ".join(f"{_toml(value)} ({preset})" for preset, value in zip(PRESETS, values))
+    told = [f"{_toml(value)} ({preset})" for preset, value in zip(PRESETS, values)]
+    return "default " + ", ".join(told)
 
 
 def _default(field: Field, made: object) -> object:
-    """The value to show where the scene writes none: what a preset has made of it, else the default or an example."""
+    """The value to show where the scene writes none.
+
+    It is what a preset has made of it, else the default or an example.
+    """
     kind = field.metadata["kind"]
-    if isinstance(kind, Quantity | Times):
-        return kind.example
-    return field.default if made is None else made
+    if isinstance(kind, Choice | Flag | Number):
+        made = field.default if made is None else made
+        return kind.example if made is None and isinstance(kind, Number) else made
+    return kind.example
 
 
 def _comment(text: str) -> Iterator[str]:
-    yield from textwrap.wrap(text, WIDTH, initial_indent="# ", subsequent_indent="# ", break_on_hyphens=False)
+    yield from textwrap.wrap(text, WIDTH, initial_indent="# ", subsequent_indent="# ",
+                             break_on_hyphens=False)
 
 
 def _toml(value: object) -> str:

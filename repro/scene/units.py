@@ -1,13 +1,15 @@
 """What the values and tables of a scene may be, and their numbers in the units of the package.
 
-Inside the package a length and a head are in um, a time in h, a concentration in mg/L, a modulus in MPa, an angle in
-rad, and what is made of them likewise (a velocity in um/h). A scene's values are converted here and nowhere else:
-exactly, and rounded once, so that "1164 min" and "19.4 h" are the same number.
+Inside the package a length and a head are in um, a time in h, a concentration in mg/L, a modulus in
+MPa, an angle in rad, and what is made of them likewise (a velocity in um/h). A scene's values are
+converted here and nowhere else: exactly, and rounded once, so that "1164 min" and "19.4 h" are the
+same number.
 
-A kind of value has `read` (what TOML gave -> what the model uses; ValueError or OverflowError when it is not accepted),
-its inverse `write`, `accepted` and `wanted`, the words that say what is accepted, and `near`, what may have been meant
-by a value that is not ("" where there is no telling). A table of a scene is a dataclass, whose fields carry their kind,
-or the dataclass of their section, in their metadata, with what they are about and their source in the paper.
+A kind of value has `read` (what TOML gave -> what the model uses; ValueError or OverflowError when
+it is not accepted), its inverse `write`, `accepted` and `wanted`, the words that say what is
+accepted, and `near`, what may have been meant by a value that is not ("" where that is unknown). A
+table of a scene is a dataclass, whose fields carry their kind, or the dataclass of their section,
+in their metadata, with what they are about and their source in the paper.
 """
 import difflib
 import json
@@ -18,6 +20,8 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cache, partial
 from typing import NamedTuple
+
+from repro.scene import exact
 
 NOUNS = {
     "um": "a length",
@@ -32,10 +36,15 @@ NOUNS = {
 }
 ANGLES = ("deg", "degree", "degrees", "rad", "radian", "radians")  # to pint "ppm" is an angle too
 LONGEST = 80  # characters of a value with its unit
+MOST_POINTS = 1000  # of an outline
 _DIGITS = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _FACTOR = r"[A-Za-z\u00b5\u03bc]+(?:(?:\^|\*\*)-?[1-9])?"
 _UNIT = rf"(?:1? ?/ ?)?{_FACTOR}(?:(?: ?[*/] ?| ){_FACTOR})*"
+_PERCENT = re.compile(rf"({_DIGITS}) *%")
 _QUANTITY = re.compile(rf"({_DIGITS}) *({_UNIT})")
+_MOLES = re.compile(r"[0-9 /](?:[num\u00b5\u03bc]|milli|micro|nano)?"
+                    r"(?:mol(?:es?|ars?)?|M)(?![A-Za-z])")
+_PARTS = re.compile(r"[0-9 ]pp[mb](?![A-Za-z])")
 
 
 class Range(NamedTuple):
@@ -49,9 +58,11 @@ POSITIVE = Range("greater than zero", lambda value: value > 0)
 NON_NEGATIVE = Range("zero or more", lambda value: value >= 0)
 FRACTION = Range("from 0 to 1", lambda value: 0 <= value <= 1)
 POSITIVE_FRACTION = Range("greater than 0, at most 1", lambda value: 0 < value <= 1)
+BELOW_1 = Range("zero or more, less than 1", lambda value: 0 <= value < 1)
 UP_TO_1 = Range("greater than zero, at most 1", lambda value: 0 < value <= 1)
 UP_TO_20 = Range("greater than zero, at most 20", lambda value: 0 < value <= 20)
 ACUTE = Range("between 0 and 90 deg", lambda value: 0 < value < math.pi / 2)
+EITHER_SIGN = Range("of either sign", math.isfinite)
 
 
 @dataclass(frozen=True)
@@ -86,6 +97,41 @@ class Quantity:
 
 
 @dataclass(frozen=True)
+class Share:
+    """A quantity, read as a float, or a percentage of that of the key `of`, as a Fraction."""
+
+    whole: Quantity
+    of: str
+
+    @property
+    def example(self) -> str:
+        return self.whole.example
+
+    @property
+    def accepted(self) -> str:
+        return f'{self.whole.accepted}, or a share of {self.of} such as "80 %"'
+
+    @property
+    def wanted(self) -> str:
+        return f'{self.whole.wanted}, or a share of {self.of} up to "100 %"'
+
+    def read(self, value: object) -> float | Fraction:
+        text = value if isinstance(value, str) and len(value) <= LONGEST else ""
+        match = _PERCENT.fullmatch(text)
+        if match is None:
+            return self.whole.read(value)
+        if not 0 < float(match[1]) <= 100:
+            raise ValueError("not a share")
+        return Fraction(match[1]) / 100
+
+    def write(self, value: float) -> str:
+        return self.whole.write(value)
+
+    def near(self, value: object) -> str:
+        return self.whole.near(value)
+
+
+@dataclass(frozen=True)
 class Number:
     """A plain number, without a unit."""
 
@@ -102,7 +148,8 @@ class Number:
 
     def near(self, value: object) -> str:
         """The number that a text begins with."""
-        match = re.match(_DIGITS, value) if isinstance(value, str) and len(value) <= LONGEST else None
+        text = value if isinstance(value, str) and len(value) <= LONGEST else ""
+        match = re.match(_DIGITS, text)
         return match[0] if match and _takes(self, float(match[0])) else ""
 
     def read(self, value: object) -> float:
@@ -160,16 +207,78 @@ class Times:
 
     def near(self, value: object) -> str:
         """A single time, in a list."""
-        return f"[{json.dumps(value)}]" if isinstance(value, str) and _takes(self.each, value) else ""
+        taken = isinstance(value, str) and _takes(self.each, value)
+        return f"[{json.dumps(value)}]" if taken else ""
 
 
-Kind = Quantity | Number | Choice | Times
+@dataclass(frozen=True)
+class Points:
+    """A list of points (x, y), um, in their order."""
+
+    each = Quantity("um", "4 um", EITHER_SIGN)
+    example = [["-5 um", "0 um"], ["0 um", "4 um"], ["5 um", "0 um"]]
+    accepted = f"a list of 3 to {MOST_POINTS} points [x, y], each a pair of lengths"
+    wanted = f"{accepted}, is needed, such as {json.dumps(example)}"
+
+    def read(self, value: object) -> tuple[tuple[float, float], ...]:
+        if not isinstance(value, list) or not 3 <= len(value) <= MOST_POINTS:
+            raise ValueError("not a list of points")
+        return tuple(map(self._point, value))
+
+    def _point(self, pair: object) -> tuple[float, float]:
+        if not isinstance(pair, list) or len(pair) != 2:
+            raise ValueError("not a pair of lengths")
+        return self.each.read(pair[0]), self.each.read(pair[1])
+
+    def write(self, value: tuple[tuple[float, float], ...]) -> list[list[str]]:
+        return [[self.each.write(x), self.each.write(y)] for x, y in value]
+
+    def near(self, value: object) -> str:
+        return ""
 
 
-def quantity(text: str, unit: str, accepts: Range = POSITIVE, *, about: str, source: str, **default):
-    """A value with a unit: `text` is its default, or only an example where another default is given."""
+@dataclass(frozen=True)
+class Flag:
+    """Yes or no."""
+
+    accepted = "true or false"
+    wanted = "true or false is needed, without quotes"
+
+    def read(self, value: object) -> bool:
+        if not isinstance(value, bool):
+            raise ValueError("neither true nor false")
+        return value
+
+    def write(self, value: bool) -> bool:
+        return value
+
+    def near(self, value: object) -> str:
+        """The word that a text, in quotes, is."""
+        word = value.casefold() if isinstance(value, str) else ""
+        return word if word in ("true", "false") else ""
+
+
+Kind = Quantity | Share | Number | Choice | Times | Points | Flag
+
+
+def quantity(text: str, unit: str, accepts: Range = POSITIVE, *, about: str, source: str,
+             stated: str = "", **default):
+    """A value with a unit: `text` is its default, or an example where another default is given.
+
+    `stated` says in words what holds where the key is left out, if that hangs on other keys.
+    """
     default = default or {"default_factory": partial(to_internal, text, unit)}
-    return _told(Quantity(unit, text, accepts), about, source, **default)
+    return _told(Quantity(unit, text, accepts), about, source, stated, **default)
+
+
+def points(*, about: str, source: str):
+    """A list of points, or None."""
+    return _told(Points(), about, source, default=None)
+
+
+def flag(*, about: str, source: str):
+    """True or false, false by default."""
+    return _told(Flag(), about, source, default=False)
 
 
 def required(example: str, unit: str, accepts: Range = POSITIVE, *, about: str, source: str):
@@ -177,9 +286,17 @@ def required(example: str, unit: str, accepts: Range = POSITIVE, *, about: str, 
     return _told(Quantity(unit, example, accepts), about, source)
 
 
-def number(default: float, accepts: Range = POSITIVE, *, about: str, source: str):
-    """A plain number."""
-    return _told(Number(default, accepts), about, source, default=default)
+def share(text: str, unit: str, of: str, *, about: str, source: str, **default):
+    """A quantity with a default, or a percentage of the key `of`."""
+    default = default or {"default_factory": partial(to_internal, text, unit)}
+    return _told(Share(Quantity(unit, text), of), about, source, **default)
+
+
+def number(example: float, accepts: Range = POSITIVE, *, about: str, source: str,
+           stated: str = "", **default):
+    """A plain number; `example` is its default where no other one is given."""
+    default = default or {"default": example}
+    return _told(Number(example, accepts), about, source, stated, **default)
 
 
 def choice(*words: str, about: str, source: str):
@@ -192,8 +309,9 @@ def times(*, about: str, source: str):
     return _told(Times(), about, source, default=None)
 
 
-def _told(kind: Kind, about: str, source: str, **default):
-    return field(metadata={"kind": kind, "about": about, "source": source}, **default)
+def _told(kind: Kind, about: str, source: str, stated: str = "", **default):
+    told = {"kind": kind, "about": about, "source": source, "stated": stated}
+    return field(metadata=told, **default)
 
 
 def section(kind: type, *, about: str, source: str, **default):
@@ -203,14 +321,17 @@ def section(kind: type, *, about: str, source: str, **default):
 
 
 class SceneError(ValueError):
-    """A scene that cannot be run; its message is one line naming file, key, value and what is accepted."""
+    """A scene that cannot be run: one line that names file, key, value and what is accepted."""
 
     def __init__(self, message: str):
         super().__init__("".join(letter if letter.isprintable() else " " for letter in message))
 
 
 def to_internal(value: object, unit: str) -> float:
-    """The number in the internal `unit` of a text such as "50 um"; ValueError or OverflowError if it is none."""
+    """The number in the internal `unit` of a text such as "50 um".
+
+    Raises ValueError or OverflowError if it is none.
+    """
     match = _QUANTITY.fullmatch(value) if isinstance(value, str) and len(value) <= LONGEST else None
     if match is None:
         raise ValueError("not a number with a unit")
@@ -220,8 +341,20 @@ def to_internal(value: object, unit: str) -> float:
     return float(Fraction(digits) * factor) if float(digits) else 0.0
 
 
+def unlike(kind: Kind, value: object) -> str:
+    """What to give instead of moles, or of parts per million for a concentration; "" for others."""
+    text = value if isinstance(value, str) and len(value) <= LONGEST else ""
+    if _MOLES.search(text):
+        return "; moles need a molar mass, which is not known here: give milligrams"
+    if isinstance(kind, Quantity) and kind.unit == "mg/L" and _PARTS.search(text):
+        return "; give mg/L (in water 1 ppm is about 1 mg/L, 1 ppb about 1 ug/L)"
+    return ""
+
+
 def nearest(word: str, words: Iterable[str]) -> str:
-    """The one of the words that may have been meant: near in its letters, or with it as a part; "" where there is none.
+    """The one of the words that may have been meant: near in its letters, or with it as a part.
+
+    "" where there is none.
     """
     folded, word = {other.casefold(): other for other in words}, word[:60].casefold()
     parts = [other for other in folded if word in other.split("_")]
@@ -245,20 +378,29 @@ def _within(accepts: Range, value: float) -> float:
 
 @cache
 def _conversion(given: str, unit: str) -> Fraction:
-    """How many internal units the unit `given` is; ValueError if it is no unit, or of another dimension."""
+    """How many internal units the unit `given` is.
+
+    Raises ValueError if it is no unit, or of another dimension.
+    """
     if unit == "rad" and given not in ANGLES:
         raise ValueError(f"{given} is not a unit of angle")
+    known = exact.conversion(given, unit)
+    return _by_pint(given, unit) if known is None else known
+
+
+def _by_pint(given: str, unit: str) -> Fraction:
+    """As `_conversion`, for any unit there is."""
     registry = _registry()
     try:
         one = registry.Quantity(Fraction(1), registry.Unit(re.sub("^ ?/", "1/", given)))
         return Fraction(one.to(unit).magnitude)
-    except Exception as error:  # pint lets errors of its parser through: of the tokenizer, of types, ...
+    except Exception as error:  # pint lets errors of its parser through: of tokens, of types, ...
         raise ValueError(f"{given} is not convertible to {unit}") from error
 
 
 @cache
 def _registry():
-    """The unit registry, in exact fractions; imported when first needed, for it takes half a second."""
+    """Every unit, in exact fractions; made when first needed, for it takes half a second."""
     import pint
 
     return pint.UnitRegistry(non_int_type=Fraction)

@@ -8,36 +8,48 @@ from __future__ import annotations
 
 import json
 import os
+import re
+import socket
 import uuid
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from queue import Empty, SimpleQueue
+from threading import Thread
+from typing import Any
 
 from repro.sweep import task
 from repro.sweep.design import Point
+from repro.sweep.pool import Each
 from repro.sweep.server import Server, ask
 from repro.sweep.state import SweepError
 
 PACKAGE = "distributed"
-PATIENCE = 10  # s that the scheduler may take to answer
+#: Seconds that a scheduler may take to answer, and to have workers.
+ANSWER, PATIENCE = 2, 10
+LONGEST_GREETING = 2**20  # bytes
+ADDRESS = re.compile(r"([a-z]+://)?(?:\[([^]]+)\]|([^][:/]+)):([0-9]{1,5})")
 #: The servers of a worker that no run is at work in.
 _idle: SimpleQueue[Server] = SimpleQueue()
 
 
-def each(points: list[Point], folder: Path, address: str) -> Iterator[tuple[Point, str]]:
-    """Make the runs into `folder`; yields each with how it ended, as they end. Raises SweepError where there is no such
-    cluster, or its workers have another version of this package or do not share the folder."""
-    distributed, folder = _package(address), folder.resolve()
-    with _client(distributed, address) as client:
-        _check(client, folder, address)
-        futures = {_submit(client, point, folder): point for point in points}
-        try:
-            for future in distributed.as_completed(futures, loop=client.loop):
-                yield futures[future], _ended(future)
-        finally:
-            client.cancel(list(futures))
+@contextmanager
+def ready(address: str) -> Iterator[Each]:
+    """What makes runs on the cluster of the scheduler at an address, such as tcp://host:8786.
+
+    Raises SweepError, in seconds and with nothing written, where no scheduler answers there, or
+    the package is not installed that speaks to one.
+    """
+    distributed = _package(address)
+    client = _is_open(address) and _within(ANSWER, lambda: distributed.Client(
+        address, timeout=ANSWER, set_as_default=False))
+    if not client:
+        raise SweepError(f"--scheduler {address}: no Dask scheduler answers there; an address such "
+                         "as tcp://host:8786 is needed")
+    with client:
+        yield partial(each, distributed=distributed, client=client, address=address)
 
 
 def _package(address: str):
@@ -48,15 +60,51 @@ def _package(address: str):
                          "pip install 'dupin2001-repro[dask]'") from None
 
 
-@contextmanager
-def _client(distributed, address: str):
+def _is_open(address: str) -> bool:
+    """Does a scheduler listen at an address, or something that may be one?"""
+    match = ADDRESS.fullmatch(address)
+    return bool(match and _within(2 * ANSWER, lambda: _greets(
+        match[2] or match[3], int(match[4]), match[1] or "tcp://")))
+
+
+def _greets(host: str, port: int, protocol: str) -> bool:
+    """Does what listens there greet as Dask does over TCP: with the length of what follows?"""
+    with socket.create_connection((host, port), timeout=ANSWER) as connection:
+        if protocol != "tcp://":
+            return True
+        greeting = connection.recv(8, socket.MSG_WAITALL)
+        return len(greeting) == 8 and int.from_bytes(greeting, "little") < LONGEST_GREETING
+
+
+def _within(seconds: float, make: Callable[[], Any]) -> Any:
+    """What is made, None where it fails or takes longer: a name or a greeting may never come."""
+    made: list[Any] = []
+
+    def attempt() -> None:
+        with suppress(OSError, ValueError, TypeError, OverflowError):
+            made.append(make())
+
+    thread = Thread(target=attempt, daemon=True)
+    thread.start()
+    thread.join(seconds)
+    return made[0] if made else None
+
+
+def each(points: list[Point], folder: Path, distributed, client,
+         address: str) -> Iterator[tuple[Point, str]]:
+    """Make the runs into `folder`; yields each with how it ended, as they end.
+
+    Raises SweepError where the cluster has no workers, or they have another version of this
+    package or do not share the folder.
+    """
+    folder = folder.resolve()
+    _check(client, folder, address)
+    futures = {_submit(client, point, folder): point for point in points}
     try:
-        client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
-    except (OSError, ValueError, TypeError) as error:
-        raise SweepError(f"--scheduler {address}: no Dask scheduler answers there ({type(error).__name__}); an address "
-                         "such as tcp://host:8786 is needed") from None
-    with client:
-        yield client
+        for future in distributed.as_completed(futures, loop=client.loop):
+            yield futures[future], _ended(future)
+    finally:
+        client.cancel(list(futures))
 
 
 def _check(client, folder: Path, address: str) -> None:

@@ -6,6 +6,8 @@ from html import escape
 
 import numpy as np
 
+from repro.files import whole
+from repro.report.page import policy
 from repro.results import write_text
 from repro.sweep import picture
 from repro.sweep.design import Factor, label
@@ -47,7 +49,8 @@ SHOWN = (("end_h", "end (h)"), ("clogging_time_h", "clogged (h)"), ("clogging_bi
 
 def write(sweep: Sweep, told: list[Told], clogged: float) -> None:
     """Write ``summary.html``."""
-    write_text(sweep.folder / "summary.html", page(sweep, told, clogged))
+    with whole(sweep.folder / "summary.html") as beside:
+        write_text(beside, page(sweep, told, clogged))
 
 
 def page(sweep: Sweep, told: list[Told], clogged: float) -> str:
@@ -56,7 +59,9 @@ def page(sweep: Sweep, told: list[Told], clogged: float) -> str:
     title = f"Sweep of {escape(sweep.source)}"
     varied = "".join(f"<li>{escape(_described(factor))}</li>" for factor in sweep.factors)
     return f"""<!DOCTYPE html>
-<html lang="en"><head><meta charset="utf-8"/><meta name="viewport" content="width=device-width, initial-scale=1"/>
+<html lang="en"><head><meta charset="utf-8"/>
+<meta http-equiv="Content-Security-Policy" content="{policy(LOOK)}"/>
+<meta name="viewport" content="width=device-width, initial-scale=1"/>
 <title>{title}</title><style>{LOOK}</style></head><body>
 <h1>{title}</h1>
 <p>{done} of {len(told)} runs have come to their end. Varied:</p><ul>{varied}</ul>

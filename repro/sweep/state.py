@@ -7,11 +7,13 @@ the same command: it makes what is missing, and what has failed, again.
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from repro.files import open_lock, whole
 from repro.results import write_json
 from repro.run.running import OutputError
 from repro.scene import scene_hash
@@ -49,12 +51,13 @@ def opened(sweep: Sweep):
     with usable(sweep.folder):
         _check(sweep.folder, _as_json(sweep))
         sweep.runs.mkdir(parents=True, exist_ok=True)
-        lock = (sweep.folder / ".lock").open("a")
+        lock = os.fdopen(open_lock(sweep.folder / ".lock"), "a")
     with lock:
         _hold(lock, sweep.folder)
         with usable(sweep.folder):
             _check(sweep.folder, _as_json(sweep))  # again: another may have begun here meanwhile
-            write_json(sweep.folder / "sweep.json", _as_json(sweep))
+            with whole(sweep.folder / "sweep.json") as beside:
+                write_json(beside, _as_json(sweep))
         yield
         _clean(sweep)
 

@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from repro import results
-from repro.run.recorder import UNDONE
+from repro.files import whole
+from repro.run import status
 from repro.sweep import task
 from repro.sweep.design import Point
 from repro.sweep.state import Sweep
@@ -38,7 +39,7 @@ class Told:
     @property
     def done(self) -> bool:
         """Has it come to its end?"""
-        return not self.status.startswith((*UNDONE, "not run"))
+        return status.done(self.status)
 
 
 def tell(sweep: Sweep, ended: dict[int, str], clogged: float) -> list[Told]:
@@ -47,16 +48,16 @@ def tell(sweep: Sweep, ended: dict[int, str], clogged: float) -> list[Told]:
 
 
 def _told(point: Point, folder: Path, otherwise: str, clogged: float) -> Told:
-    status, found = task.status(folder), _series(folder)
-    if status is None or found is None:
+    ended, found = task.status(folder), _series(folder)
+    if ended is None or found is None:
         empty = np.zeros(0)
-        return Told(point, status or otherwise, empty, empty, empty, dict.fromkeys(COLUMNS))
+        return Told(point, ended or otherwise, empty, empty, empty, dict.fromkeys(COLUMNS))
     pore, conductivity, times = point.scene.pore, found["conductivity_m_per_d"], found["time_h"]
     relative, biomass = conductivity / conductivity[0], found["aggregate_area_um2"] / (pore.width * pore.length)
     wall = json.loads((folder / "run.json").read_text(encoding="utf-8"))["wall_time_s"]
     numbers = {"end_h": times[-1], "wall_time_s": wall, **clogging(times, relative, biomass, clogged),
                **_contact(times, relative, biomass, found["contact"] > 0)}
-    return Told(point, status, times, relative, biomass, {name: _or_none(numbers.get(name)) for name in COLUMNS})
+    return Told(point, ended, times, relative, biomass, {name: _or_none(numbers.get(name)) for name in COLUMNS})
 
 
 def _series(folder: Path) -> dict[str, np.ndarray] | None:
@@ -93,10 +94,12 @@ def _contact(times: np.ndarray, relative: np.ndarray, biomass: np.ndarray, touch
 def write(sweep: Sweep, told: list[Told]) -> None:
     """Write ``table.csv`` and ``runs.csv``."""
     varied = [factor.column for factor in sweep.factors]
-    results.write_table(sweep.folder / "table.csv", ["run", *varied, *results.COLUMNS], list(_rows(sweep, told)))
+    with whole(sweep.folder / "table.csv") as beside:
+        results.write_table(beside, ["run", *varied, *results.COLUMNS], list(_rows(sweep, told)))
     runs = [[one.point.index, *one.point.values, one.status, *one.numbers.values(), f"runs/{one.point.name}"]
             for one in told]
-    results.write_table(sweep.folder / "runs.csv", ["run", *varied, "status", *COLUMNS, "folder"], runs)
+    with whole(sweep.folder / "runs.csv") as beside:
+        results.write_table(beside, ["run", *varied, "status", *COLUMNS, "folder"], runs)
 
 
 def _rows(sweep: Sweep, told: list[Told]) -> Iterator[list]:

@@ -12,9 +12,9 @@ from pathlib import Path
 from repro.errors import SimulationError
 from repro.run.cache import source_hash
 from repro.run.checkpoint import NEWEST, PREVIOUS
-from repro.run.recorder import UNDONE
 from repro.run.running import OutputError, resume, run
-from repro.scene import Scene, scene_hash
+from repro.run.status import done, undone
+from repro.scene import Scene, SceneError, scene_hash
 
 
 def code() -> str:
@@ -23,18 +23,17 @@ def code() -> str:
 
 
 def status(folder: Path) -> str | None:
-    """How the run in a folder has ended, None where there is none."""
+    """How the run in a folder has ended, None where there is none that a run tells."""
     try:
-        told = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-        return str(told["status"])
+        told = str(json.loads((folder / "run.json").read_text(encoding="utf-8"))["status"])
     except (OSError, ValueError, KeyError, TypeError):
         return None
+    return told if done(told) or undone(told) else None
 
 
 def finished(folder: Path) -> bool:
     """Has the run in a folder come to its end?"""
-    told = status(folder)
-    return told is not None and not told.startswith(UNDONE)
+    return done(status(folder))
 
 
 def make(scene: Scene, folder: Path, beside: Path) -> str:
@@ -62,7 +61,7 @@ def _begun(scene: Scene, beside: Path) -> bool:
 def _made(scene: Scene, beside: Path) -> str:
     try:
         return resume(beside) if beside.exists() else run(scene, beside)
-    except (SimulationError, OutputError) as error:
+    except (SimulationError, OutputError, SceneError) as error:
         return f"failed: {error}"
     except Exception as error:  # a bug is one run's failure, and told whole
         traceback.print_exc()

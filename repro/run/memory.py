@@ -1,0 +1,158 @@
+"""How much memory a run will take, by arithmetic, and how much there is.
+
+The nodes of a mesh are the integral of the inverse area per node, (sqrt(3) / 2) h^2, over what is
+meshed; the size h grows from the aggregate's surface, at a distance d from it as s + g d, up to the
+largest L (3.1):
+
+    nodes = A / (sqrt(3)/2 L^2) + 2 l / (sqrt(3)/2) ((1/s - 1/L) / g - (L - s) / (g L^2))
+
+with the area A of the meshed part and the length l of the surface: right within a third.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+
+from repro.check import numbers
+from repro.fem import geometry
+from repro.scene import Scene, SceneError
+
+#: Bytes per node at the peak of a run, by the order of elements: measured at 800 to 50 000 nodes.
+PER_NODE = {1: 25e3, 2: 25e3, 3: 65e3}
+#: Bytes that a run takes whatever its mesh is.
+LEAST = 30e6
+#: Nodes of six-node triangles per corner.
+PER_CORNER = 4.0
+#: Of what is free, a run that takes more than this part of it is warned of.
+WARNED = 0.5
+HEXAGON = math.sqrt(3) / 2
+MB = 1e6
+
+
+def expected_nodes(scene: Scene) -> float:
+    """Nodes of the largest mesh, roughly: of the first one, or of that at the end.
+
+    Midside nodes count too. Nothing is meshed for it.
+    """
+    if scene.aggregate is None:
+        return _nodes(scene, 0.0, 0.0)
+    sizes = [_seed(scene)]
+    if scene.aggregate.radius is not None and scene.growth:
+        end = numbers.at_end(scene)
+        sizes.append((end.thickness, end.reach))
+    return max(_nodes(scene, *size) for size in sizes)
+
+
+def _seed(scene: Scene) -> tuple[float, float]:
+    """Thickness of the seed and half of its length (um)."""
+    radius = scene.aggregate.radius
+    if radius is not None:
+        return radius, radius
+    x, y = zip(*scene.aggregate.outline)
+    return max(y), (max(x) - min(x)) / 2
+
+
+def _nodes(scene: Scene, thickness: float, reach: float) -> float:
+    """Nodes of a mesh around an aggregate of this thickness and half length (um); 0: none."""
+    pore = scene.pore
+    numerics = scene.numerics
+    largest = pore.width / geometry.ACROSS_PORE / numerics.refinement
+    clear = min(10 * thickness, 1.5 * pore.width) if thickness else 1.5 * pore.width
+    length = pore.length if numerics.extent == "full" else min(pore.length, 2 * (reach + clear))
+    near = thickness / geometry.ACROSS_AGGREGATE / numerics.refinement
+    near = min(near or largest, largest)
+    if numerics.gradation == 0:
+        largest = near
+    corners = length * pore.width / (HEXAGON * largest**2) + 2 * (length + pore.width) / largest
+    corners += _graded(math.pi * min(thickness, reach), near, largest, numerics.gradation)
+    return corners * (PER_CORNER if numerics.curved else 1.0)
+
+
+def _graded(surface: float, near: float, largest: float, gradation: float) -> float:
+    """Nodes that the smaller elements on both sides of a surface (um) add."""
+    if near >= largest:
+        return 0.0
+    wide = (largest - near) / gradation
+    return 2 * surface / HEXAGON * ((1 / near - 1 / largest) / gradation - wide / largest**2)
+
+
+def expected_bytes(scene: Scene) -> float:
+    """Memory that a run takes besides that of the program, roughly."""
+    return LEAST + PER_NODE[scene.numerics.order] * expected_nodes(scene)
+
+
+def require_memory(scene: Scene, warn: Callable[[str], None]) -> None:
+    """Warn of a run that may take more than half of the free memory.
+
+    Raises SceneError where it would take more than all of it.
+    """
+    free = free_bytes()
+    needed = expected_bytes(scene)
+    told = (f"about {needed / MB:.0f} MB of memory are needed ({expected_nodes(scene):.0f} nodes), "
+            f"{free / MB:.0f} MB are free")
+    if needed > free:
+        raise SceneError(f"{scene.name}: {told}; a smaller numerics.refinement is needed")
+    if needed > WARNED * free:
+        warn(f"{scene.name}: {told}")
+
+
+def free_bytes(root: Path = Path("/")) -> float:
+    """Memory that this process may still take: what the system has, its control groups and its
+    limit of address space leave; infinite where nothing tells."""
+    limits = [_available(root), *_groups(root), _address_space(root)]
+    return max(0.0, min(limits))
+
+
+def _available(root: Path) -> float:
+    """What the system has, without pushing anything out to the disk."""
+    for line in _lines(root / "proc/meminfo"):
+        if line.startswith("MemAvailable:"):
+            return 1024.0 * int(line.split()[1])
+    return math.inf
+
+
+def _groups(root: Path) -> Iterator[float]:
+    """What each control group that this process is in leaves, of either version."""
+    for line in _lines(root / "proc/self/cgroup"):
+        _, controllers, path = line.split(":", 2)
+        if controllers in ("", "memory"):
+            base = root / "sys/fs/cgroup" / controllers
+            group = base / path.lstrip("/")
+            inside = [group, *group.parents]
+            yield from map(_left, inside[: inside.index(base) + 1])
+
+
+def _left(group: Path) -> float:
+    """What a control group leaves; files that are kept in memory give way."""
+    for limit, used, given_way in (("memory.max", "memory.current", "inactive_file"),
+                                   ("memory.limit_in_bytes", "memory.usage_in_bytes",
+                                    "total_inactive_file")):
+        with suppress(OSError, ValueError):
+            most = float((group / limit).read_text())  # "max" is none
+            kept = dict(line.split() for line in _lines(group / "memory.stat"))
+            return most - float((group / used).read_text()) + float(kept.get(given_way, 0))
+    return math.inf
+
+
+def _address_space(root: Path) -> float:
+    """What ``ulimit -v`` leaves."""
+    with suppress(ImportError, OSError, ValueError, IndexError):
+        import resource
+
+        most = resource.getrlimit(resource.RLIMIT_AS)[0]
+        if most != resource.RLIM_INFINITY:
+            pages = int(_lines(root / "proc/self/statm")[0].split()[0])
+            return float(most - pages * os.sysconf("SC_PAGE_SIZE"))
+    return math.inf
+
+
+def _lines(path: Path) -> list[str]:
+    """The lines of a file of the system; none where there is no such file."""
+    try:
+        return path.read_text().splitlines()
+    except OSError:
+        return []

@@ -1,0 +1,101 @@
+"""The units that scenes are written in, as exact fractions of SI units, and their products.
+
+What is not here is left to pint (:mod:`repro.scene.units`), which knows every unit and takes half a
+second to say so. Each factor is pint's, which a test holds.
+"""
+import re
+from fractions import Fraction
+from typing import NamedTuple
+
+SHORT = {"": 0, "n": -9, "u": -6, "\u00b5": -6, "\u03bc": -6, "m": -3, "c": -2, "d": -1, "h": 2,
+         "k": 3, "M": 6, "G": 9}
+LONG = {"": 0, "nano": -9, "micro": -6, "milli": -3, "centi": -2, "deci": -1, "hecto": 2, "kilo": 3,
+        "mega": 6, "giga": 9}
+PI = Fraction("3.1415926535897932384626433832795028841971693993751")  # as many digits as pint's
+FACTOR = re.compile(r"(?P<sign>[*/ ]*)(?P<name>[^\W\d_]+)(?:(?:\^|\*\*)(?P<power>-?[1-9]))?")
+
+
+class Unit(NamedTuple):
+    """`size` in m^length kg^mass s^time."""
+
+    size: Fraction
+    length: int = 0
+    mass: int = 0
+    time: int = 0
+
+    def __pow__(self, power: int) -> "Unit":
+        return Unit(self.size**power, *(power * exponent for exponent in self[1:]))
+
+    def by(self, other: "Unit") -> "Unit":
+        """The product of two units."""
+        return Unit(self.size * other.size, *(a + b for a, b in zip(self[1:], other[1:])))
+
+
+def _prefixed(names: str, unit: Unit, prefixes: dict[str, int]) -> dict[str, Unit]:
+    """Every name with every prefix."""
+    return {prefix + name: unit._replace(size=unit.size * Fraction(10) ** power)
+            for name in names.split() for prefix, power in prefixes.items()}
+
+
+def _plain(names: str, unit: Unit) -> dict[str, Unit]:
+    return dict.fromkeys(names.split(), unit)
+
+
+METER = Unit(Fraction(1), length=1)
+GRAM = Unit(Fraction(1, 1000), mass=1)
+SECOND = Unit(Fraction(1), time=1)
+LITER = Unit(Fraction(1, 1000), length=3)
+NEWTON = Unit(Fraction(1), length=1, mass=1, time=-2)
+PASCAL = Unit(Fraction(1), length=-1, mass=1, time=-2)
+DAY = SECOND._replace(size=Fraction(86_400))
+#: Every spelling known here.
+UNITS: dict[str, Unit] = {
+    **_prefixed("m", METER, SHORT),
+    **_prefixed("meter meters metre metres", METER, LONG),
+    **_plain("micron microns", METER._replace(size=Fraction(1, 10**6))),
+    **_prefixed("g", GRAM, SHORT),
+    **_prefixed("gram grams", GRAM, LONG),
+    **_prefixed("L l", LITER, SHORT),
+    **_prefixed("liter liters litre litres", LITER, LONG),
+    **_prefixed("s", SECOND, SHORT),
+    **_prefixed("second seconds", SECOND, LONG),
+    **_plain("sec", SECOND),
+    **_plain("min minute minutes", SECOND._replace(size=Fraction(60))),
+    **_plain("h hr hour hours", SECOND._replace(size=Fraction(3600))),
+    **_plain("d day days", DAY),
+    **_plain("week weeks", DAY._replace(size=7 * DAY.size)),
+    **_plain("yr year years", DAY._replace(size=Fraction(1461, 4) * DAY.size)),
+    **_prefixed("N", NEWTON, SHORT),
+    **_prefixed("Pa", PASCAL, SHORT),
+    **_prefixed("pascal pascals", PASCAL, LONG),
+    **_plain("bar", PASCAL._replace(size=Fraction(100_000))),
+    **_plain("mbar", PASCAL._replace(size=Fraction(100))),
+    **_plain("rad radian radians", Unit(Fraction(1))),
+    **_plain("deg degree degrees", Unit(PI / 180)),
+}
+
+
+def conversion(given: str, unit: str) -> Fraction | None:
+    """How many of `unit` the unit `given` is; None where either has a unit that is not known here.
+
+    Both are products and quotients such as "mg/L", "1/day", "m^2 s^-1". Raises ValueError where
+    they are of different dimensions.
+    """
+    one = _product(given)
+    other = _product(unit)
+    if one is None or other is None:
+        return None
+    if one[1:] != other[1:]:
+        raise ValueError(f"{given} is not convertible to {unit}")
+    return one.size / other.size
+
+
+def _product(text: str) -> Unit | None:
+    """The unit that a product of units is, from left to right; None where one is not known."""
+    made = Unit(Fraction(1))
+    for factor in FACTOR.finditer(text.removeprefix("1")):
+        if factor["name"] not in UNITS:
+            return None
+        power = int(factor["power"] or 1)
+        made = made.by(UNITS[factor["name"]] ** (-power if "/" in factor["sign"] else power))
+    return made

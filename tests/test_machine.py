@@ -1,0 +1,149 @@
+"""What a run needs of the machine that it is on: packages, memory."""
+
+import json
+import sys
+
+import pytest
+
+from repro.cli import main
+from repro.errors import Interrupted
+from repro.fem import linear
+from repro.march.simulation import simulate
+from repro.run import machine, memory
+from repro.run.running import Watch, resume, run
+from repro.scene import SceneError, load_scene
+from tests.shell import SHORT, files, shell
+
+CHOICES = [("numerics.solver=pardiso", "pypardiso"), ("numerics.ordering=metis", "pymetis")]
+
+
+@pytest.mark.parametrize("entry, package", CHOICES)
+@pytest.mark.parametrize("command", [["run", "base"], ["sweep", "base", "--vary", "pore.width=50 um, 60 um"]])
+def test_a_package_that_is_not_there_is_told_before_anything_is_written(tmp_path, capsys, monkeypatch, command, entry,
+                                                                        package):
+    """One line, status 2, no folder. Mutants: a traceback, a run that fails with files."""
+    monkeypatch.setitem(sys.modules, package, None)
+    assert main([*command, "--set", entry, "--out", str(tmp_path / "out")]) == 2
+    out, err = capsys.readouterr()
+    key, _, choice = entry.partition("=")
+    assert f'base: {key} = "{choice}": the package {package} is not installed; pip install {package}' in err
+    assert err.count("\n") == 1 and out == "" and list(tmp_path.iterdir()) == []
+
+
+def test_a_package_that_went_is_told_at_a_resume(tmp_path, monkeypatch):
+    """Mutant: a traceback at the first linear system."""
+    scene = load_scene("base", ("numerics.preset=fast", "numerics.ordering=metis"))
+    with monkeypatch.context() as there:
+        there.setattr(machine, "find_spec", lambda name: name)
+        there.setattr(linear, "use", lambda *_: None)
+        with pytest.raises(Interrupted):
+            run(scene, tmp_path, watch=Watch(stop=lambda: 15))
+    monkeypatch.setitem(sys.modules, "pymetis", None)
+    with pytest.raises(SceneError, match="pymetis is not installed"):
+        resume(tmp_path)
+
+
+@pytest.mark.parametrize("name, sets", [
+    ("base", ["preset=paper"]), ("base", ["preset=paper", "refinement=2"]), ("base", ["preset=fast"]),
+    ("base", ["preset=fast", "refinement=1"]), ("base", ["preset=accurate", "elements=cubic"]),
+    ("base", ["preset=paper", "gradation=0", "refinement=0.4"]), ("base", ["preset=paper", "extent=full"]),
+    ("flow_only", ["preset=paper", "refinement=2"]), ("wide", ["preset=accurate"])])
+def test_the_nodes_that_are_expected_are_those_of_the_mesh(name, sets):
+    """At t = 0, within a half. Mutants: corners alone; the small elements around the aggregate left out; the whole pore
+    for the meshed part."""
+    end = [] if name == "flow_only" else ["growth.end=0 h"]
+    scene = load_scene(name, [*(f"numerics.{entry}" for entry in sets), *end])
+    found = len(next(simulate(scene)).pore.mesh.points)
+    assert found / 1.5 < memory.expected_nodes(scene) < 1.5 * found
+
+
+def test_more_memory_is_expected_of_larger_meshes():
+    """Of those at the end too. Mutant: the mesh at t = 0 for that of the whole run."""
+    base = [memory.expected_nodes(load_scene("base", [f"growth.end={end} h"])) for end in (0, 10, 19.4)]
+    assert base == sorted(base) and base[2] > 1.3 * base[0]
+    kinds = [load_scene("base", ["numerics.preset=fast", f"numerics.elements={kind}"])
+             for kind in ("linear", "quadratic", "cubic")]
+    linear, quadratic, cubic = map(memory.expected_bytes, kinds)
+    assert linear < quadratic < cubic
+
+
+def test_a_run_that_needs_more_memory_than_there_is_is_refused(tmp_path, capsys, monkeypatch):
+    """Before anything is written, with both numbers. Mutant: a run that the system kills."""
+    monkeypatch.setattr(memory, "free_bytes", lambda: 1e9)
+    assert main(["run", "base", "--set", "numerics.refinement=10", "--out", str(tmp_path / "run")]) == 2
+    message = capsys.readouterr().err
+    assert "MB of memory are needed" in message and "1000 MB are free" in message and message.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_that_may_take_more_than_half_of_the_memory_is_warned_of(tmp_path, capsys, monkeypatch):
+    """Under --quiet and --json too, and runs. Mutants: silence; a refusal."""
+    needed = memory.expected_bytes(load_scene("flow_only"))
+    for factor, warned in ((2.1, False), (1.9, True)):
+        monkeypatch.setattr(memory, "free_bytes", lambda factor=factor: factor * needed)
+        assert main(["run", "flow_only", "--out", str(tmp_path / str(factor)), "--json"]) == 0
+        out, err = capsys.readouterr()
+        events = [json.loads(line) for line in out.splitlines()]
+        assert (err.startswith("repro: warning: flow_only: about ")) == warned == (events[0]["event"] == "warning")
+
+
+def group(root, path, **content):
+    (root / path).mkdir(parents=True, exist_ok=True)
+    for name, text in content.items():
+        (root / path / name.replace("_", ".", 1)).write_text(f"{text}\n")
+
+
+def test_what_is_free_is_the_least_that_anything_leaves(tmp_path):
+    """Of the system, of the process's control group and of those above it, in both versions, with files in memory that
+    give way. Mutants: the first limit alone; a group's limit without what it uses; kibibytes for bytes."""
+    (tmp_path / "proc/self").mkdir(parents=True)
+    assert memory.free_bytes(tmp_path) > 1e15
+    (tmp_path / "proc/meminfo").write_text("MemTotal: 9 kB\nMemAvailable:   2000000 kB\n")
+    assert memory.free_bytes(tmp_path) == 2000000 * 1024
+    (tmp_path / "proc/self/cgroup").write_text("4:memory:/jobs/one\n3:cpu:/\n0::/user/two\n")
+    group(tmp_path, "sys/fs/cgroup/user/two", memory_max="max", memory_current=10)
+    assert memory.free_bytes(tmp_path) == 2000000 * 1024
+    group(tmp_path, "sys/fs/cgroup/user", memory_max=1_000_000_000, memory_current=300_000_000,
+          memory_stat="anon 1\ninactive_file 100000000")
+    assert memory.free_bytes(tmp_path) == 800_000_000
+    group(tmp_path, "sys/fs/cgroup/memory/jobs/one", memory_limit_in_bytes=500_000_000,
+          memory_usage_in_bytes=100_000_000, memory_stat="total_inactive_file 50000000")
+    assert memory.free_bytes(tmp_path) == 450_000_000
+    group(tmp_path, "sys/fs/cgroup/memory", memory_limit_in_bytes=50, memory_usage_in_bytes=100)
+    assert memory.free_bytes(tmp_path) == 0
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="for Linux alone")
+def test_a_limit_of_address_space_ends_a_run_in_one_line(tmp_path):
+    """As if there were no more memory. Mutants: a traceback, a limit that only a stage that fails knows of."""
+    import resource
+    limit = lambda: resource.setrlimit(resource.RLIMIT_AS, (1000 << 20,) * 2)  # noqa: E731
+    status, _, message = shell("base", "--set", "numerics.refinement=10", "--out", tmp_path / "run", preexec_fn=limit)
+    assert status == 2 and "MB are free" in message and message.count("\n") == 1
+
+
+MORE = [pytest.param(size, marks=pytest.mark.thorough) for size in (0, 8_000, 40_000)]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="for Linux alone")
+@pytest.mark.parametrize("most", [500, *MORE])
+def test_a_limit_of_file_sizes_ends_a_run_in_one_line(tmp_path, most):
+    """Whichever file it is that may not grow; with more room the run goes on. Mutant: a traceback of the second file
+    that cannot be written."""
+    import resource
+    limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))  # noqa: E731
+    status, _, message = shell(*SHORT, "--out", tmp_path / "run", "--quiet", preexec_fn=limit)
+    assert status == 2 and "File too large" in message and message.count("\n") == 1, message
+    assert not [name for name in files(tmp_path / "run") if "writing" in name]
+    assert shell(*SHORT, "--out", tmp_path / "run", "--quiet")[0] == 0
+
+
+def test_want_of_memory_outside_of_the_steps_is_told_in_one_line(tmp_path, capsys, monkeypatch):
+    """Mutant: a traceback."""
+    def none_left(*_):
+        raise MemoryError("Unable to allocate 1 GiB")
+
+    monkeypatch.setattr("repro.cli.run.run", lambda *_, **__: none_left())
+    assert main(["run", "flow_only", "--out", str(tmp_path / "run")]) == 1
+    assert capsys.readouterr().err == ("repro: out of memory (Unable to allocate 1 GiB); try a smaller "
+                                       "numerics.refinement\n")
