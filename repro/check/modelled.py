@@ -27,7 +27,14 @@ def _pore(scene) -> Iterator[str]:
 
 
 def _aggregate(scene) -> Iterator[str]:
-    yield f"a half-disc of biomass of radius {scene.aggregate.radius:g} um on the lower wall"
+    seed = scene.aggregate
+    if seed.outline is None:
+        yield f"a half-disc of biomass of radius {seed.radius:g} um on the lower wall at x = {seed.position:g} um"
+    else:
+        through = "a spline through" if seed.smooth else "straight lines between"
+        yield f"biomass inside {through} {len(seed.outline)} points, on the lower wall"
+    if seed.inert_fraction:
+        yield f"{100 * seed.inert_fraction:g} % of it inert at t = 0"
 
 
 def _flow(scene) -> Iterator[str]:

@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from repro.fem.outline import half_disc
-from repro.fem.sizing import ACROSS_AGGREGATE, meshed_extent
+from repro.fem.sizing import meshed_extent
 from repro.model import kinetics
-from repro.model.pore import film, sized
+from repro.model.pore import film, initial_outline, sized
 from repro.model.traction import MPA_PER_UM
 from repro.scene import Substrate
 
@@ -53,8 +52,15 @@ def sizes(scene, area: float, contact: float | None = None) -> Sizes:
 
 def at_start(scene) -> Sizes:
     """The seed."""
-    radius = scene.aggregate.radius
-    return sizes(scene, math.pi / 2 * radius**2, 0.0 if scene.pore.width - radius < film(scene) else None)
+    seed = scene.aggregate
+    if seed.outline is None:
+        touches = scene.pore.width - seed.radius < film(scene)
+        now = sizes(scene, math.pi / 2 * seed.radius**2, 0.0 if touches else None)
+        return replace(now, reach=now.reach + abs(seed.position))
+    outline = initial_outline(scene)
+    touches = scene.pore.width - outline.thickness < film(scene)
+    reach = max(-outline.upstream, outline.downstream)
+    return Sizes(outline.area, outline.thickness, reach, 0.0 if touches else None)
 
 
 def at_end(scene) -> Sizes:
@@ -62,15 +68,16 @@ def at_end(scene) -> Sizes:
     now = at_start(scene)
     if scene.growth is None:
         return now
+    aside = max(0.0, now.reach - sizes(scene, now.area).reach)
     rate, layer, step = fastest_growth(scene), depth(scene), scene.growth.end / STEPS
     full = scene.pore.width * scene.pore.length
-    for k in range(STEPS):
+    for k in range(STEPS):  # as a half-disc of the same area
         exposed = math.pi * now.thickness if now.contact is None else 2 * scene.pore.width
         share = min(1.0, layer * exposed / now.area)
         area = min(full, now.area * math.exp(min(LARGEST, rate * share * step)))
         touches = math.sqrt(2 * area / math.pi) >= scene.pore.width - film(scene)
         now = sizes(scene, area, (k + 1) * step if touches and now.contact is None else now.contact)
-    return now
+    return replace(now, reach=now.reach + aside)
 
 
 def fastest_growth(scene) -> float:
@@ -147,7 +154,7 @@ def _grown(scene, speed: float | None) -> Iterator[Number]:
 
 def half_length(scene) -> float:
     """Half of the part that is meshed at t = 0 (um)."""
-    seed = half_disc(scene.aggregate.radius, ACROSS_AGGREGATE)
+    seed = initial_outline(scene)
     whole = scene.numerics.extent == "full"
     first, last = meshed_extent(seed, scene.pore.width, scene.pore.length, whole)
     return (last - first) / 2

@@ -95,10 +95,11 @@ def _fronts(scene) -> Iterator[Warned]:
 
 
 def _seed_film(scene) -> Iterator[Warned]:
-    gap, numerics = scene.pore.width - scene.aggregate.radius, scene.numerics
+    gap, numerics = scene.pore.width - numbers.at_start(scene).thickness, scene.numerics
     nodes = sizing.ACROSS_FILM * resolution(scene) * min(1.0, gap / film(scene)) * numerics.order
     if nodes < ACROSS_FILM:
-        yield Warned("aggregate.radius", f"the film over the seed is {gap:.2g} um thin and resolved by {nodes:.2g} "
+        key = "aggregate.radius" if scene.aggregate.outline is None else "aggregate.outline"
+        yield Warned(key, f"the film over the seed is {gap:.2g} um thin and resolved by {nodes:.2g} "
                      f"distances between nodes, under {ACROSS_FILM:g}: its flow is a matter of the mesh; films are "
                      f"resolved as if they were {film(scene):g} um (2.3.3)")
 
@@ -107,7 +108,7 @@ def _ends(scene) -> Iterator[Warned]:
     end = numbers.at_end(scene)
     free = min(10 * end.thickness, 1.5 * scene.pore.width)
     if end.reach + free > scene.pore.length / 2:
-        when = "by growth.end" if end.reach > scene.aggregate.radius else "from the start"
+        when = "by growth.end" if end.reach > numbers.at_start(scene).reach else "from the start"
         yield Warned("pore.length", f"the aggregate may come within {free:.3g} um of the pore's ends {when} (reach "
                      f"{end.reach:.3g} of {scene.pore.length / 2:g} um): the inlet's and the outlet's conditions (3.1, "
                      "(11)-(12)) are then too near, and at the end itself the run is over")

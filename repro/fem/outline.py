@@ -13,6 +13,8 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from repro.errors import MeshError
+
 FREE, BOTTOM, TOP = 0, 1, 2
 
 
@@ -147,7 +149,7 @@ def polygon(corners: np.ndarray, width: float, geometry: int = 1, smooth: bool =
 
     Points on the upper wall, y = ``width`` um, are contact. smooth: a natural cubic spline
     takes the place of straight lines between two points of which one is free. The middle of each contact surface is its
-    fixed point. Raises ValueError where the curve leaves the pore.
+    fixed point. Raises MeshError where the curve leaves the pore.
     """
     rim = np.asarray(corners, float)[::-1]  # counterclockwise: downstream end first, over the top, upstream end
     if smooth:
@@ -156,7 +158,8 @@ def polygon(corners: np.ndarray, width: float, geometry: int = 1, smooth: bool =
     base = np.column_stack([np.linspace(first[0], last[0], 3), np.zeros(3)])
     points = np.vstack([base, rim[1:-1]])
     if points[:, 1].min() < 0 or points[:, 1].max() > width:
-        raise ValueError("the curve through the points of the outline leaves the pore")
+        raise MeshError("the spline through the points of aggregate.outline leaves the pore; give more points, or "
+                        "smooth = false")
     wall = np.where(points[:, 1] == width, TOP, FREE)
     wall[:3] = BOTTOM
     points, wall = _with_contact_middle(points, wall)

@@ -23,13 +23,15 @@ SPLIT = 1.4
 class Sizing:
     """How large the elements of a mesh are to be: width of the pore (um); refinement, by which sizes are divided; film,
     the thinnest that is resolved (um); gradation, growth of the size with the distance from where it is prescribed; front,
-    by which sizes at the aggregate are divided besides, for a front of the substrates in it."""
+    by which sizes at the aggregate are divided besides, for a front of the substrates in it; seed, x (um) of the middle of
+    the half-disc that the aggregate was at t = 0, None where it was none."""
 
     width: float
     refinement: float
     film: float
     gradation: float = GRADATION
     front: float = 1.0
+    seed: float | None = None
 
     @property
     def largest(self) -> float:
@@ -127,7 +129,7 @@ def split(outline: Outline, sizing: Sizing) -> Outline:
             parts = outline.geometry * split_count(polygon, keep, sizes)
             pieces.append((np.full(parts, keep[0]), np.arange(parts) / parts))
     edges, t = zip(*pieces)
-    return placed(outline, np.concatenate(edges), np.concatenate(t))
+    return placed(outline, np.concatenate(edges), np.concatenate(t), sizing.seed)
 
 
 def halved(outline: Outline, which: np.ndarray) -> Outline:
@@ -180,18 +182,19 @@ def _parameters(nodes: np.ndarray, x: np.ndarray) -> np.ndarray:
     return t
 
 
-def placed(outline: Outline, edge: np.ndarray, t: np.ndarray) -> Outline:
+def placed(outline: Outline, edge: np.ndarray, t: np.ndarray, seed: float | None = None) -> Outline:
     """New nodes (K,), each at t in [0, 1) of an edge: where t is zero the edge's own first corner.
 
-    Places at t = 0 between two nodes of the seed's arc lie on that arc: a straight edge of today's outline was round
+    seed: as :class:`Sizing`'s. Places at t = 0 between two nodes of the seed's arc lie on that arc: a straight edge of today's outline was round
     at t = 0, and what the material remembers makes it round again at the next update.
     """
     first, corner, weight = t == 0, outline.geometry * edge, parabola(t)
     points, origin = (np.einsum("ka,kai->ki", weight, outline.arcs(part)[edge])
                       for part in (outline.points, outline.origin))
-    if outline.geometry == 1:
+    if outline.geometry == 1 and seed is not None:
         ends = outline.arcs(outline.origin)[edge]
-        origin = _on_arc(origin, ends[:, 0], ends[:, 2])
+        middle = np.array([seed, 0.0])
+        origin = middle + _on_arc(origin - middle, ends[:, 0] - middle, ends[:, 2] - middle)
     wall = np.where(first, outline.wall[corner], outline.edge_wall[edge])
     on = wall != FREE
     points[on, 1] = outline.points[corner[on], 1]

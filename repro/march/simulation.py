@@ -2,24 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+
+import numpy as np
 
 from repro.fem.linear import Method
 from repro.march import stepping, updates
 from repro.march.loop import Instant, State
-from repro.scene import Scene
+from repro.scene import Scene, parse_scene, scene_tables
+
+#: Points (x, y), um.
+Shape = Sequence[tuple[float, float]] | np.ndarray
 
 #: Ways to make steps, by the names that scenes have for them.
 WAYS = {"updates": updates.steps, "midpoint": stepping.steps}
 
 
-def simulate(scene: Scene, state: State | None = None) -> Iterator[Instant]:
+def simulate(scene: Scene, shape: Shape | None = None, state: State | None = None) -> Iterator[Instant]:
     """Yields an Instant at t = 0 and at each reported time: at ``output.times``, or after every step.
 
-    state: one of :func:`steps`, after which to go on. Raises SimulationError where a stage fails, and PoreEnd, after a
-    last Instant, where the aggregate reaches an end of the pore.
+    shape: the aggregate's boundary at t = 0, (x, y) um from its upstream to its downstream end on the lower wall, in
+    place of the scene's (see ``aggregate.outline``); state: one of :func:`steps`, after which to go on. Raises
+    SceneError where the shape is not accepted, SimulationError where a stage fails, and PoreEnd,
+    after a last Instant, where the aggregate reaches an end of the pore.
     """
+    if shape is not None:
+        scene = shaped(scene, shape)
     return (instant for _, instant in steps(scene, state) if instant)
+
+
+def shaped(scene: Scene, shape: Shape) -> Scene:
+    """The scene with another boundary of the aggregate at t = 0, checked as if it stood in its file."""
+    tables = scene_tables(scene)
+    seed = {key: value for key, value in tables.get("aggregate", {}).items() if key not in ("radius", "position")}
+    seed["outline"] = [[f"{float(x)!r} um", f"{float(y)!r} um"] for x, y in shape]
+    return parse_scene({**tables, "aggregate": seed}, scene.name, f"{scene.name} with a shape")
 
 
 def steps(scene: Scene, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:

@@ -11,7 +11,7 @@ from repro.errors import TransportError
 from repro.fem import elements, mesher, sizing
 from repro.fem.linear import Method
 from repro.fem.mesh import Mesh
-from repro.fem.outline import TOP, Outline, half_disc
+from repro.fem.outline import TOP, Outline, half_disc, polygon
 from repro.fem.sizing import Sizing
 from repro.fem.space import Space
 from repro.model import biomass, flow, gear, growth, transport
@@ -131,7 +131,9 @@ def fastest(scene: Scene) -> float:
 
 def sized(scene: Scene, front: float = 1.0) -> Sizing:
     """How large the elements of its meshes are to be; front: as :class:`Pore`'s."""
-    return Sizing(scene.pore.width, resolution(scene), film(scene), scene.numerics.gradation, front)
+    seed = scene.aggregate
+    middle = seed.position if seed and seed.outline is None else None
+    return Sizing(scene.pore.width, resolution(scene), film(scene), scene.numerics.gradation, front, middle)
 
 
 def generate(scene: Scene, outline: Outline | None, front: float = 1.0) -> tuple[Mesh, Outline | None]:
@@ -144,22 +146,31 @@ def generate(scene: Scene, outline: Outline | None, front: float = 1.0) -> tuple
     return mesher.generate(outline, ends, sized(scene, front), numerics.geometry, method)
 
 
+def initial_outline(scene: Scene, front: float = 1.0) -> Outline | None:
+    """The aggregate's boundary at t = 0, None in a clean channel; front: as :class:`Pore`'s."""
+    seed, geometry = scene.aggregate, scene.numerics.geometry
+    if seed is None:
+        return None
+    if seed.outline is not None:
+        return polygon(np.array(seed.outline), scene.pore.width, geometry, seed.smooth)
+    across = sizing.ACROSS_AGGREGATE * resolution(scene) * front
+    return half_disc(seed.radius, across, geometry, seed.position)
+
+
 def seeded(scene: Scene, front: float = 1.0) -> Pore:
-    """The pore at t = 0: X_A = X_m in the aggregate (Table 1), or a clean channel; front: as :class:`Pore`'s."""
-    numerics, outline = scene.numerics, None
-    if scene.aggregate:
-        across = sizing.ACROSS_AGGREGATE * resolution(scene) * front
-        outline = half_disc(scene.aggregate.radius, across, numerics.geometry)
-    mesh, outline = generate(scene, outline, front)
+    """The pore at t = 0: X_A + X_I = X_m in the aggregate (Table 1), or a clean channel; front: as :class:`Pore`'s."""
+    numerics = scene.numerics
+    mesh, outline = generate(scene, initial_outline(scene, front), front)
     space = Space(mesh, numerics.order)
     density = scene.kinetics.maximum_density if scene.kinetics else 0.0
-    active = density * space.reaction.dx
+    total = density * space.reaction.dx
+    inert = total * (scene.aggregate.inert_fraction if scene.aggregate else 0.0)
     wall, fixed = np.empty(0, int), np.empty(0, bool)
     if outline:
         wall, fixed = outline.wall, outline.fixed
     body = material(space, mesh.points[mesh.body])
     theta = np.ones((np.count_nonzero(mesh.biomass), len(body.shape.table.weights)))
-    return Pore(0.0, space, wall, fixed, active, np.zeros_like(active), theta, body, np.zeros(mesh.corners),
+    return Pore(0.0, space, wall, fixed, total - inert, inert, theta, body, np.zeros(mesh.corners),
                 front=front)
 
 
