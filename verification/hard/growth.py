@@ -123,7 +123,7 @@ def pushed(preset: str, inner: float, outer: float) -> list[Check]:
 
 
 #: Half of the size of the elements, R / 10, R / 2.5, R / 4.5: first order at least.
-PRESSURE = {"paper": 0.05, "fast": 0.2, "accurate": 0.11}
+PRESSURE = {"paper": 0.05, "fast": 0.2, "accurate": 0.11, "cubic": 0.2}
 
 LARGE = HardCase(
     9, "theta-2000", "theta to 2000 from one configuration",
