@@ -14,15 +14,16 @@ WAYS = {"updates": updates.steps, "midpoint": stepping.steps}
 
 
 def simulate(scene: Scene, state: State | None = None) -> Iterator[Instant]:
-    """Yields an Instant at t = 0 and at each reported time: at ``output.times``, or after every step.
+    """Yields an Instant at t = 0 and at each of ``output.times``, or after every step.
 
-    state: one of :func:`steps`, after which to go on. Raises SimulationError where a stage fails, and PoreEnd, after a
-    last Instant, where the aggregate reaches an end of the pore.
+    state: one of :func:`steps`, after which to go on. Raises SimulationError where a stage fails,
+    and PoreEnd, after a last Instant, where the aggregate reaches an end of the pore.
     """
     return (instant for _, instant in steps(scene, state) if instant)
 
 
 def steps(scene: Scene, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
-    """Every step, t = 0 first: the state from which a run goes on bit for bit, and the Instant where one is due."""
+    """Every step, t = 0 first: the state from which a run goes on bit for bit, and the Instant if
+    one is due."""
     Method(scene.numerics.solver, scene.numerics.ordering).checked()
     return WAYS[scene.numerics.time](scene, state)
