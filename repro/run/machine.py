@@ -1,10 +1,13 @@
-"""What a run's numbers could depend on, besides its scene: versions, machine, threads."""
+"""What a run's numbers could depend on, besides its scene: source, versions, machine, threads."""
 
 from __future__ import annotations
 
+import hashlib
 import os
 import platform
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,10 +17,17 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 OPTIONAL = ("pymetis", "pypardiso")
 
 
+@cache
+def source_hash() -> str:
+    """8 hexadecimal digits that stand for the package's source."""
+    digest = hashlib.sha256()
+    for path in sorted(Path(__file__).parents[1].rglob("*.py")):
+        digest.update(path.name.encode() + path.read_bytes())
+    return digest.hexdigest()[:8]
+
+
 def conditions() -> dict:
     """For ``run.json``: runs under equal ones are equal bit for bit."""
-    from repro.run.cache import source_hash
-
     built: Any = np.show_config(mode="dicts")
     blas = built["Build Dependencies"]["blas"]
     return {"system": platform.system(), "machine": platform.machine(), "libc": " ".join(platform.libc_ver()),
