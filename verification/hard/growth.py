@@ -182,7 +182,7 @@ def long_steps(preset: str) -> list:
             *common.close(found, fine, preset, *DRIVE, allowed=TOLERANCE[preset] + late)]
 
 
-#: Half the step changes u by 0.2 % (numerics.md): updates of 12 min are 0.4 % off, of 3 h fifteen times as much.
+#: Half the step changes u by 0.2 %: updates of 12 min are 0.4 % off, of 3 h fifteen times as much.
 UPDATES = {"updates": 0.06, "midpoint": 0.0}
 LONG = HardCase(
     11, "three-hours", "A growth step of 3 h",

@@ -20,7 +20,7 @@ MUTANTS = (
            old="SWITCH = 0.5",
            new="SWITCH = -1.0"),
     Mutant("hard-tau-of-water", "repro/model/flow.py",
-           says="The stabilisation has water's viscosity in the biomass too: a plug leaks (numerics.md, trap 3).",
+           says="The stabilisation has water's viscosity in the biomass too: a plug leaks.",
            old="mesh.circumdiameter**2 / (self.constant * viscosity)",
            new="mesh.circumdiameter**2 / (self.constant + 0 * viscosity)"),
     Mutant("hard-contact-passed-over", "repro/march/stepping.py",

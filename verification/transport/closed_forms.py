@@ -304,7 +304,7 @@ def _exhausted(film: float):
     title = f"K = {LEAST:g} mg/L, " + (f"films of {film:g} um" if film else "no films")
     return [at_most(f"C beyond the depth of penetration, {title}, over the supply",
                     field[beyond].max() / ACCEPTOR.supply, 1e-8, "falls by h^2 s / (D K), 20 or more, an element"),
-            at_most(f"least C, {title}, over the supply", field.min() / ACCEPTOR.supply, 1e-8, "C >= 0 (trap 1)")]
+            at_most(f"least C, {title}, over the supply", field.min() / ACCEPTOR.supply, 1e-8, "C >= 0")]
 
 
 def _depth_profile(film: float) -> Profile:

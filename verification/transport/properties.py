@@ -104,7 +104,7 @@ def _titled(radius: float, acceptor: float, donor: float, order: int) -> str:
 
 
 #: How far C may be below zero over the supply, and why; how alike ways to the steady state end up.
-BELOW = {1: (0.0, "C >= 0 (trap 1)"), 2: (1e-3, "what is let pass as resolved"), 3: (1e-3, "what is let pass")}
+BELOW = {1: (0.0, "C >= 0"), 2: (1e-3, "what is let pass as resolved"), 3: (1e-3, "what is let pass")}
 
 
 def _starved(radius: float, *supplies: float, order: int = 1):
