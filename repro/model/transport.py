@@ -261,20 +261,24 @@ class Balance:
         """(r, 2, q) um2 mg/L/h."""
         return self.sink.uptake(self.fractions(self.at(state)), self.problem.kinetics)
 
-    def residual(self, state: np.ndarray) -> np.ndarray:
-        """(2n,) um2 mg/L/h for C_A, then C_D, of all nodes (2n,), mg/L."""
+    def residual(self, state: np.ndarray, loads: np.ndarray | None = None) -> np.ndarray:
+        """(2n,) um2 mg/L/h for C_A, then C_D, of all nodes (2n,), mg/L; loads: the uptake, if it is
+        known."""
         found = self.problem.operator @ state - self.problem.source
-        return found if self.sink is None else found + self._taken(self.uptake(state))
+        if self.sink is None:
+            return found
+        return found + self._taken(self.uptake(state) if loads is None else loads)
 
-    def sizes(self, state: np.ndarray) -> np.ndarray:
-        """Sizes (2n,) of the terms of the residual, all taken as positive."""
+    def sizes(self, state: np.ndarray, loads: np.ndarray | None = None) -> np.ndarray:
+        """Sizes (2n,) of the terms of the residual, all taken as positive; loads: the uptake, if it
+        is known."""
         found = self.problem.magnitude @ np.abs(state) + np.abs(self.problem.source)
         if self.sink is None:
             return found
         pieces, count = self.problem.space.reaction, self.problem.space.count
         nodes = np.stack([pieces.cells, count + pieces.cells], axis=1)
-        loads = np.abs(self.uptake(state)) @ np.abs(pieces.values)
-        return found + np.bincount(nodes.ravel(), loads.ravel(), 2 * count)
+        terms = np.abs(self.uptake(state) if loads is None else loads) @ np.abs(pieces.values)
+        return found + np.bincount(nodes.ravel(), terms.ravel(), 2 * count)
 
     def _slopes(self, state: np.ndarray, fractions: np.ndarray) -> np.ndarray:
         """(2, r, q) dm/dC at the fractions; zero where nothing is there to be taken up."""
@@ -313,9 +317,15 @@ class Balance:
         """A step of Newton's method; sizes of the terms are those of the first guess, then those
         after the first step of each derivative."""
         state = iterate.state + factors.solve(-self._linearised(iterate))
-        size = self.sizes(state) if fresh else iterate.size
-        new = replace(iterate, state=state, residual=self.residual(state), size=size)
-        return new if self.sink is None else self._followed(iterate, new)
+        if self.sink is None:
+            size = self.sizes(state) if fresh else iterate.size
+            return replace(iterate, state=state, residual=self.residual(state), size=size)
+        there = self.at(state)
+        own = self.fractions(there)
+        loads = self.sink.uptake(own, self.problem.kinetics)
+        size = self.sizes(state, loads) if fresh else iterate.size
+        new = replace(iterate, state=state, residual=self.residual(state, loads), size=size)
+        return self._followed(iterate, new, there, own)
 
     def _linearised(self, iterate: Iterate) -> np.ndarray:
         """(2n,) the residual with the uptake that the linearisation about the fractions gives."""
@@ -331,10 +341,10 @@ class Balance:
         m = iterate.fractions
         return m + self._slopes(iterate.state, m) * (self.at(state) - self._half * m / (1 - m))
 
-    def _followed(self, iterate: Iterate, new: Iterate) -> Iterate:
-        """The new iterate with the fractions about which to linearise next."""
-        there = self.at(new.state)
-        own = self.fractions(there)
+    def _followed(self, iterate: Iterate, new: Iterate, there: np.ndarray,
+                  own: np.ndarray) -> Iterate:
+        """The new iterate with the fractions about which to linearise next; there: its
+        concentrations in the points of the reaction, own: their fractions."""
         if iterate.own and own.min() > SWITCH:
             return replace(new, fractions=own)
         predicted = np.clip(self._predicted(iterate, new.state), 0.0, SATURATED)
