@@ -25,7 +25,8 @@ from matplotlib.figure import Figure
 
 from paper_figures import FIGURES, runs, states
 from repro.results import PACKAGES
-from repro.run.cache import provenance, run_folder, source_hash
+from repro.run.cache import provenance, run_folder
+from repro.run.machine import source_hash
 from verification.bench.record import processor
 
 OUT = Path(__file__).parent / "out"

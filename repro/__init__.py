@@ -1,47 +1,55 @@
-"""Pore-scale biological clogging by the growth of an aggregate: Dupin, Kitanidis & McCarty (2001), reproduced.
+"""Biological clogging of a pore by a growing aggregate: Dupin, Kitanidis & McCarty (2001).
 
-Where the paper is in the code:
+Where the paper is in the code, whose modules name the equations that they solve:
 
-    section                   equations   module
-    2    coupling                         repro.march.coupling, repro.model.pore; repro.march.simulation chooses the scheme
-         steps by their error             repro.march.stepping, repro.march.midpoint (second order in time; not in the paper)
-    2    geometry, 2.3.3, 3.1             repro.fem.geometry, repro.fem.mesh, repro.model.shape
-    2.1  flow, 3.2            (1)-(6)     repro.model.flow
-    2.2  kinetics             (7)-(10)    repro.model.kinetics
-    2.2  substrates, 3.3      (7)-(13)    repro.model.transport (quasi-steady), repro.model.gear (the paper's transient scheme)
-    2.3  growth, 3.4          (14)-(29)   repro.model.growth
-    2.3.2 fluid forces        (20), (22)  repro.model.traction
-    3.4  reprojection         (30)-(34)   repro.fem.reprojection
-    3.5  mesh motion          (35)        repro.model.mesh_motion, repro.model.remeshing
-    Table 1                               repro.scene, repro.scenes
-    all of it on curved triangles         repro.curved, with modules of the same names; repro.curved.fields has the
-                                          order of velocity and substrates: quadratic or cubic
+    section                    equations    module
+    Table 1, 2.1-2.3                        repro.scene: keys with unit, default, range and source
+    3.2-3.4  finite elements                repro.fem.elements, .space, .assembly, .linear, .newton
+    3.1  mesh                               repro.fem.outline, .sizing, .mesher, .mesh
+    3.5  transfer to a new mesh             repro.fem.transfer
+    2.1, 3.2  flow             (1)-(6)      repro.model.flow
+    2.2  kinetics              (7)-(10)     repro.model.kinetics
+    2.2  substrates            (7)-(13)     repro.model.transport (at rest in each shape)
+    3.3  transient scheme      (7)-(13)     repro.model.gear (predictor-corrector)
+    2.3, 3.4  growth           (14)-(27)    repro.model.growth
+    3.4  biomass               (28)-(34)    repro.model.biomass
+    2.3.2  fluid forces        (20), (22)   repro.model.traction
+    2.3.3  contact                          repro.model.contact
+    3.5  mesh motion           (35)         repro.model.mesh_motion
+    3.1, 3.5  remeshing                     repro.model.remeshing
+    2    state of the pore                  repro.model.pore
+    2    coupling, 3.3                      repro.march.updates (the paper's shape updates)
+         steps by their error               repro.march.midpoint, .stepping, .pace (not the paper's)
+         the loop of both                   repro.march.loop, .simulation
+    4    results                            repro.results, .names, .tables, .netcdf
 
-and what is around it:
+Where data enters, and what it passes:
 
-    scenes                                repro.scene (keys, defaults, sources), repro.scene.units, repro.scene.reading,
-                                          repro.scene.rules, repro.scene.files, repro.scene.text (repro scene)
-    what a run will be                    repro.check, of repro.check.modelled, repro.check.numbers, repro.check.simplifications,
-                                          repro.check.cost (repro check)
-    one loop of steps, and their length   repro.march.loop, repro.march.pace
-    runs and results                      repro.run.running, repro.run.recorder, repro.results, repro.results.names, repro.results.netcdf,
-                                          repro.results.tables (NumPy arrays), repro.timing, repro.run.machine
-    runs that lose nothing                repro.run.checkpoint, repro.run.stored, repro.run.folder, repro.run.interrupts
-    pages that show and compare runs      repro.report
-    many pores                            repro.sweep
-    linear algebra                        repro.fem.assembly, repro.fem.linear, repro.fem.newton, repro.run.cache
-    command line                          repro.cli, repro.cli, repro.run.progress
+    repro.scene       a .toml file is read, checked and converted to um, h, mg/L: a Scene, or one
+                      line that says what is wrong (.files, .reading, .units, .rules; .text)
+    repro.model.pore  the Scene becomes a Pore at t = 0: outline, mesh, masses
+    repro.march       a Pore goes through steps, and gives Instants: pore, flow, substrates, ledgers
+    repro.results     an Instant becomes rows and fields in the units that their names end in
+    repro.check       what a run of a scene will be: numbers, doubts, cost (repro check)
+    repro.report      pages that show and compare runs (repro compare)
+    repro.run         a run on the disk: folder, recorder, checkpoints, provenance (repro run)
+    repro.sweep       many scenes at once (repro sweep)
+    repro.cli         the command line
+
+A room imports only from rooms further up in this list, repro.fem before repro.model; repro.errors
+and repro.timing serve all of them.
 
 Ten lines of use; ``repro/tutorial.md`` has more:
 
     from repro import load_scene, simulate, solve
 
     scene = load_scene("base", ['growth.end="5 h"'])
-    found = solve(scene)                                    # rows of timeseries.csv, as NumPy arrays
-    print(found["conductivity_m_per_d"], found.units["conductivity_m_per_d"], found.fields(5.0).keys())
+    found = solve(scene)                                # rows of timeseries.csv, as NumPy arrays
+    print(found["conductivity_m_per_d"], found.units["conductivity_m_per_d"])
+    print(found.fields(5.0).keys())
 
-    for instant in simulate(scene):                         # or step by step, with all that is known
-        pore, flow = instant.pore, instant.solved.flow      # um, h, mg/L: see the docstrings
+    for instant in simulate(scene):                     # or step by step, with all that is known
+        pore, flow = instant.pore, instant.solved.flow  # um, h, mg/L: see the docstrings
         print(pore.time, 24e-6 * flow.mean_velocity, pore.outline.thickness)
 """
 
@@ -60,10 +68,12 @@ if TYPE_CHECKING:
     from repro.run.running import resume, run
     from repro.scene import Scene, SceneError, load_scene
 else:
-    #: The module of each public name, imported when it is first asked for: the solver takes half a second.
-    _MODULES = {"PoreEnd": "march.loop", "Results": "results.tables", "Scene": "scene", "SceneError": "scene",
-                "SimulationError": "errors", "load_scene": "scene", "resume": "run.running", "run": "run.running",
-                "simulate": "march.simulation", "solve": "results.tables"}
+    #: The module of each public name, imported when it is first asked for: the solver takes half a
+    #: second.
+    _MODULES = {"PoreEnd": "march.loop", "Results": "results.tables", "Scene": "scene",
+                "SceneError": "scene", "SimulationError": "errors", "load_scene": "scene",
+                "resume": "run.running", "run": "run.running", "simulate": "march.simulation",
+                "solve": "results.tables"}
 
     def __getattr__(name: str):
         if name not in _MODULES:
@@ -74,7 +84,8 @@ else:
         return sorted({*globals(), *__all__})
 
     class _Package(ModuleType):
-        """``repro.run`` is the function, though there is a room of that name: importing it does not take its place."""
+        """``repro.run`` is the function, though a package has that name: importing that does not
+        take its place."""
 
         def __setattr__(self, name, value):
             if not (name in _MODULES and isinstance(value, ModuleType)):
@@ -82,5 +93,5 @@ else:
 
     sys.modules[__name__].__class__ = _Package
 
-__all__ = ["PoreEnd", "Results", "Scene", "SceneError", "SimulationError", "load_scene", "resume", "run", "simulate",
-           "solve"]
+__all__ = ["PoreEnd", "Results", "Scene", "SceneError", "SimulationError", "load_scene", "resume",
+           "run", "simulate", "solve"]

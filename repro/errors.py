@@ -1,4 +1,4 @@
-"""Numerical failures: each names its stage; :func:`repro.march.loop.stopping` adds the simulated time."""
+"""Numerical failures, each named by its stage; :func:`repro.march.loop.stopping` adds the time."""
 
 
 class StageError(RuntimeError):

@@ -1,4 +1,4 @@
-"""Wall time by stage, for ``run.json`` and the benchmarks: seconds that have been spent in each timed function."""
+"""Wall time by stage, for ``run.json`` and the benchmarks: seconds spent in each timed function."""
 
 from __future__ import annotations
 

@@ -2,6 +2,7 @@
 import ast
 import pathlib
 import re
+import subprocess
 import sys
 import tomllib
 from functools import cache
@@ -26,6 +27,12 @@ LOCK = (ROOT / "requirements.lock").read_text(encoding="utf-8")
 PIN = re.compile(r"^([a-z0-9-]+)==(\d+(?:\.\d+)*)(?: ; [\w .<>=!'()]+)? \\$", re.M)
 ADDRESS = re.compile(r"//|file:|index|--find-links|(^|\s)/\w")
 HASH = re.compile(r"^    --hash=sha256:[0-9a-f]{64}(?: \\)?$")
+#: The rooms of `repro`, in the one order in which they may import each other: each those before it.
+ROOMS = ("errors", "timing", "scene", "fem", "model", "march", "results", "check", "report", "run", "sweep", "cli")
+#: Modules and packages at the top of `repro`, at most.
+MOST = 14
+#: Of the rooms before it, those that a room may not import: finite elements know sizes and solvers, not scenes.
+CLOSED = {"fem": {"scene"}}
 
 
 def imported(source):
@@ -49,6 +56,81 @@ def imports(folder):
 
 def trespasses(folder, names):
     return names & FORBIDDEN[folder]
+
+
+def module_of(path):
+    """Dotted name of a file of the repository."""
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def modules():
+    """{dotted name: source} of every module of `repro`."""
+    return {module_of(path): path.read_text(encoding="utf-8") for path in sorted((ROOT / "repro").rglob("*.py"))}
+
+
+def asked_for(node, name, known):
+    """Dotted names that one node of a source asks for; name: of the module it stands in. ``from a import b`` asks for
+    a.b where that is a module."""
+    if isinstance(node, ast.Import):
+        return [alias.name for alias in node.names]
+    if isinstance(node, ast.ImportFrom):
+        package = name if any(other.startswith(f"{name}.") for other in known) else name.rpartition(".")[0]
+        base = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
+        base = ".".join([*base, *([node.module] if node.module else [])])
+        return [inner if (inner := f"{base}.{alias.name}") in known else base for alias in node.names]
+    if isinstance(node, ast.Call) and node.args and isinstance(node.args[0], ast.Constant):
+        called = getattr(node.func, "attr", getattr(node.func, "id", ""))
+        return [str(node.args[0].value)] if called in ("import_module", "__import__") else []
+    return []
+
+
+def for_types(tree):
+    """Nodes of a source that are for whoever checks its types: nothing is imported there when it runs."""
+    blocks = [node for node in ast.walk(tree) if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"]
+    return {inner for block in blocks for part in block.body for inner in ast.walk(part)}
+
+
+def links(sources, types=True):
+    """{module: modules of `repro` that it imports}, wherever in its text, for types too or not; the package `repro`
+    itself imports names when they are asked for."""
+    known, found = set(sources), {}
+    for name, source in sources.items():
+        tree = ast.parse(source)
+        left_out = set() if types else for_types(tree)
+        nodes = [node for node in ast.walk(tree) if node not in left_out]
+        every = [asked for node in nodes for asked in asked_for(node, name, known)]
+        found[name] = {asked for asked in every if asked.split(".")[0] == "repro"} - {name}
+    return {name: found[name] for name in found if name != "repro"}
+
+
+def room_of(module):
+    """The room that a module is in; empty for `repro` itself."""
+    return (module.split(".") + [""])[1]
+
+
+def out_of_order(sources):
+    """Imports (module, imported) of a room that does not come before, or that is closed to the module's."""
+    found = []
+    for module, wanted in links(sources).items():
+        here = room_of(module)
+        place = ROOMS.index(here) if here in ROOMS else len(ROOMS) * (here == "__main__")
+        before = {here, *ROOMS[:place]} - CLOSED.get(here, set())
+        found += [(module, other) for other in sorted(wanted) if room_of(other) not in before]
+    return found
+
+
+def circles(sources):
+    """Modules that import themselves by way of others: what is left without those that import none of the others, and
+    those that none of the others imports."""
+    graph = {module: wanted & set(sources) for module, wanted in links(sources, types=False).items()}
+    count = len(graph) + 1
+    while len(graph) < count:
+        count = len(graph)
+        imported_by_one = set().union(*graph.values())
+        inner = {module for module, wanted in graph.items() if wanted and module in imported_by_one}
+        graph = {module: wanted & inner for module, wanted in graph.items() if module in inner}
+    return sorted(graph)
 
 
 def normal(name):
@@ -98,6 +180,55 @@ def test_the_rules_see_a_trespass(folder, source):
 
 def test_relative_imports_are_ones_own():
     assert imported("from . import reference\nfrom .tests import x\nimport numpy.linalg") == {"numpy"}
+
+
+def test_repro_has_the_rooms_that_it_is_to_have():
+    """Each of them is there, nothing else is but what starts the package."""
+    top = {path.stem for path in (ROOT / "repro").iterdir() if path.suffix == ".py" or (path / "__init__.py").exists()}
+    assert top == {*ROOMS, "__init__", "__main__"} and len(top) <= MOST
+
+
+def test_rooms_import_those_before_them_alone():
+    assert out_of_order(modules()) == []
+
+
+def test_no_module_imports_itself_by_way_of_others():
+    assert circles(modules()) == []
+
+
+def test_importing_the_package_imports_no_room():
+    """Its public names are imported when they are asked for: `import repro` costs nothing."""
+    code = "import sys, repro; print([name for name in sys.modules if name.startswith('repro.')])"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("module, source", [
+    ("repro.fem.mesh", "from repro.scene import Scene"),
+    ("repro.fem.mesh", "def f():\n    import repro.scene.keys"),
+    ("repro.fem.mesh", "from ..scene import keys"),
+    ("repro.model.flow", "from repro.march import loop"),
+    ("repro.scene.keys", "from repro.fem.mesh import Mesh"),
+    ("repro.errors", "import repro.timing"),
+    ("repro.results", "from .check import numbers\nfrom ..check import numbers"),
+    ("repro.model.flow", "from importlib import import_module\nimport_module('repro.cli')"),
+    ("repro.run.folder", "from repro import solve"),
+    ("repro.utils", "from repro import errors"),
+])
+def test_the_order_of_rooms_sees_a_trespass(module, source):
+    sources = modules()
+    changed = sources | {module: sources.get(module, "") + "\n" + source}
+    assert [name for name, _ in out_of_order(changed)] == [module]
+
+
+@pytest.mark.parametrize("module, source", [
+    ("repro.fem.linear", "from repro.fem import assembly"),
+    ("repro.fem.elements", "def f():\n    from repro.fem.transfer import located"),
+    ("repro.model.growth", "from . import contact"),
+])
+def test_the_search_for_circles_sees_one(module, source):
+    sources = modules()
+    assert module in circles(sources | {module: sources[module] + "\n" + source})
 
 
 def test_every_runtime_dependency_is_imported():

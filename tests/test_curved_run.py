@@ -4,11 +4,11 @@ from dataclasses import replace
 import meshio
 import numpy as np
 import pytest
-
-from repro import results
 from repro.curved import coupling
 from repro.curved import growth as mechanics
 from repro.curved import results as curved_results
+
+from repro import results
 from repro.march import simulation
 from repro.model.kinetics import growth_rate, inert_rate
 from repro.model.transport import Concentrations

@@ -29,7 +29,7 @@ def test_uptake_is_dual_monod_and_its_slopes_are_its_derivative():
 
 
 def test_below_zero_the_uptake_stays_monotone():
-    """Nothing is given back that could feed the other substrate (trap 1). Mutant: C / (C + K) below zero."""
+    """Nothing is given back that could feed the other substrate. Mutant: C / (C + K) below zero."""
     acceptor = np.linspace(-5.0, 5.0, 101)
     q_a, q_d = uptake(acceptor, 3.0, RATES)
     assert (np.diff(q_a) > 0).all() and (np.diff(q_d) >= 0).all() and (q_d[:50] == 0).all()
@@ -129,7 +129,7 @@ def test_collocation_keeps_the_flux_of_both_substrates():
 
 def test_fipys_outlet_lets_the_flow_out():
     """Each cell's balance: columns of M sum to zero, and to u in the last cell. Unless the gradient is constrained on
-    the outlet's face the last one is zero too (trap 6)."""
+    the outlet's face the last one is zero too."""
     channel = channel_fipy.Channel(24, (-40.0, 80.0), *GIVEN)
     for k in (0, 1):
         sums = np.asarray(channel.transport.sum(axis=0)).ravel()[24 * k:24 * (k + 1)]

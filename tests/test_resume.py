@@ -6,12 +6,12 @@ from contextlib import suppress
 from subprocess import TimeoutExpired
 
 import pytest
+from repro.march.coupling import PoreEnd
 
 from repro import results
 from repro.cli import main
 from repro.errors import Interrupted, OutputError, SimulationError
 from repro.march import loop
-from repro.march.coupling import PoreEnd
 from repro.march.simulation import simulate, steps
 from repro.model import growth
 from repro.run.checkpoint import NEWEST, PREVIOUS

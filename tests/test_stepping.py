@@ -4,12 +4,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-
 from repro.curved import coupling as curved
+from repro.march.coupling import Attempt, PoreEnd
+
 from repro.errors import GrowthError, SimulationError
 from repro.fem import geometry
 from repro.march import midpoint, pace, simulation, stepping
-from repro.march.coupling import Attempt, PoreEnd
 from repro.scene import load_scene
 from tests.strategies import scene
 

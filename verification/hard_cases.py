@@ -1,8 +1,9 @@
 """Twenty-two hard cases with every preset: ``python -m verification.hard_cases [--case N ...] [--preset P ...]``.
 
-Each cell of the matrix, a case with a preset, is right, refused or wrong, see :mod:`verification.hard.judge`. Refusing
-is accepted in the parts that a case names, and with ``paper``; wrong is never. The matrix is printed; a whole one is
-written to ``verification/report/hard_cases.json`` too. Exit status 1 if a cell is what it may not be.
+"cubic" is the preset fast with cubic elements. Each cell of the matrix, a case with a preset, is right, refused or
+wrong, see :mod:`verification.hard.judge`. Refusing is accepted in the parts that a case names, and with ``paper``;
+wrong is never. The matrix is printed; a whole one is written to ``verification/report/hard_cases.json`` too. Exit
+status 1 if a cell is what it may not be.
 """
 
 from __future__ import annotations

@@ -95,7 +95,7 @@ def _points(part: dict) -> Iterator[tuple[str, ...]]:
 def _hard(record: dict) -> Iterator[Block]:
     if not record:
         return
-    presets = ("paper", "fast", "accurate")
+    presets = tuple(record["cases"][0]["cells"])
     yield Block("heading", "Hard cases")
     yield Block("text", "Right: the exact value, bound or conserved quantity of the case is met, and so are the "
                         "balances; refused: an error says which bound was met; wrong: anything else. `make verify` "

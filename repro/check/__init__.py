@@ -1,1 +1,1 @@
-"""What a scene will be: what it models, its mesh, its numbers, where its simplifications fail, what it costs."""
+"""What a scene will be: its model, mesh and numbers, simplifications that fail, and its cost."""

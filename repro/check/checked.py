@@ -1,4 +1,4 @@
-"""What a scene will be: what it models, its first mesh, its numbers, where its simplifications fail, what it costs."""
+"""A scene before it is run: model, first mesh, numbers, simplifications that fail, and cost."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ WIDTH = 110
 
 @dataclass(frozen=True)
 class Checked:
-    """modelled: (section, words); nodes, triangles: of the first mesh; a curved triangle has six nodes."""
+    """modelled: (section, words); nodes, triangles: of the first mesh, six nodes to a curved
+    triangle."""
 
     scene: str
     modelled: list[tuple[str, str]]
@@ -39,7 +40,8 @@ class Checked:
 
 
 def check(scene: Scene, file: str) -> Checked:
-    """Look at a scene before it is run. Raises SceneError, naming ``file``, where its first state or step fails."""
+    """What is to be told of a scene before it is run. Raises SceneError, naming ``file``, where its
+    first state or step fails."""
     try:
         with stopping(0.0):
             Method(scene.numerics.solver, scene.numerics.ordering).checked()

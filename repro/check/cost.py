@@ -1,9 +1,11 @@
-"""What a run will cost on this machine: its first solves are made for real and timed, its steps are estimated.
+"""What a run will cost on this machine: first solves are made and timed, steps are estimated.
 
-    seconds = first state + (steps until contact + IN_CONTACT x steps after it) x one step x REMESHING
+    seconds = first state + (steps until contact + IN_CONTACT x steps after it)
+                            x one step x REMESHING
 
-A step of the midpoint rule is at first growth.time_step and doubles up to the length that the tolerance allows. All
-three factors are those of the packaged scenes: the estimate is meant to be right within a factor of three there.
+A step of the midpoint rule is at first growth.time_step and doubles up to the length that the
+tolerance allows. All three factors are those of the packaged scenes: the estimate is meant to be
+right within a factor of three there.
 """
 
 from __future__ import annotations
@@ -18,12 +20,14 @@ from repro.check import numbers
 from repro.march.loop import Instant, PoreEnd
 from repro.march.simulation import simulate
 
-#: A step with what it takes besides the first one: new meshes, and larger ones; and a step in contact, which is one
-#: with many rounds of closing films and a new mesh.
+#: A step with what it takes besides the first one: new meshes, and larger ones; and a step in
+#: contact, which is one with many rounds of closing films and a new mesh.
 REMESHING, IN_CONTACT = 1.5, 15.0
-#: The length of a midpoint step that tolerance 0.01 allows, times the growth rate; it goes as the tolerance's root.
+#: The length of a midpoint step that tolerance 0.01 allows, times the growth rate; it goes as the
+#: tolerance's root.
 ALLOWED = 0.5
-#: The first steps are taken over so many growth.time_step; the first of all is slow, the fastest one counts.
+#: The first steps are taken over so many growth.time_step; the first of all is slow, the fastest
+#: one counts.
 FIRST_STEPS = 3
 #: Larger meshes are not tried: a coarser one is, and its time grows with the nodes to this power.
 MOST_NODES, POWER = 5000, 1.2
@@ -32,8 +36,9 @@ COARSER = 0.9
 
 @dataclass(frozen=True)
 class Trial:
-    """What was made for real: the first state; seconds that it and a step took (0 where there is none); nodes of the
-    mesh that was tried; memory (MB) before and at its peak, None where the system does not tell."""
+    """What was made for real: the first state; seconds that it and a step took (0 where there is
+    none); nodes of the mesh that was tried; memory (MB) before and at its peak, None where the
+    system does not tell."""
 
     first: Instant
     start: float
@@ -52,7 +57,7 @@ class Cost:
 
 
 def tried(scene, nodes: int) -> Trial:
-    """The first state and the first steps of the scene, or of a coarser one where its mesh has too many nodes.
+    """First state and first steps of the scene, or of a coarser one where it has too many nodes.
 
     Raises SimulationError where a stage fails in them.
     """

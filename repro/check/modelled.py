@@ -1,4 +1,4 @@
-"""What a scene models, in words: section by section, with the paper's equations; and what it leaves out."""
+"""What a scene models and leaves out, in words, section by section, with the paper's equations."""
 
 from __future__ import annotations
 

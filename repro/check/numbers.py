@@ -1,8 +1,8 @@
 """Dimensionless numbers of a scene: what its simplifications rest on.
 
-Each is told for t = 0 and, where the aggregate grows, for ``growth.end``, with bounds in place of what only the run
-knows: the aggregate grows at the rate of the supply (9), in the layer that the supply reaches, so that it is no larger
-and touches the opposite wall no earlier than said here.
+Each is told for t = 0 and, where the aggregate grows, for ``growth.end``, with bounds in place of
+what only the run knows: the aggregate grows at the rate of the supply (9), in the layer that the
+supply reaches, so that it is no larger and touches the opposite wall no earlier than said here.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ STEPS, LARGEST = 2000, 50.0
 
 @dataclass(frozen=True)
 class Number:
-    """A dimensionless number: its name, value at t = 0, bound at growth.end (None without growth), and definition."""
+    """A dimensionless number: its name, its value at t = 0, its bound at growth.end (None without
+    growth), and its definition."""
 
     name: str
     start: float
@@ -33,8 +34,8 @@ class Number:
 
 @dataclass(frozen=True)
 class Sizes:
-    """What the aggregate is at a time: area (um2), thickness (um), reach (um) to either side of the origin; contact:
-    the time (h) at which it touches the opposite wall, None where it does not."""
+    """What the aggregate is at a time: area (um2), thickness (um), reach (um) to either side of the
+    origin; contact: the time (h) at which it touches the opposite wall, None where it does not."""
 
     area: float
     thickness: float
@@ -87,7 +88,7 @@ def fastest_growth(scene) -> float:
 
 
 def uptakes(scene) -> Iterator[tuple[str, Substrate, float]]:
-    """Name, substrate and largest uptake q X_m (mg/L/h) of each substrate, the other one in excess: (7)-(8)."""
+    """Name, substrate and largest uptake q X_m (mg/L/h) of each, the other in excess: (7)-(8)."""
     law = scene.kinetics
     rates = (law.maximum_utilization_rate * law.acceptor_to_donor_ratio + kinetics.decay_demand(law),
              law.maximum_utilization_rate)
@@ -96,7 +97,7 @@ def uptakes(scene) -> Iterator[tuple[str, Substrate, float]]:
 
 
 def depth(scene) -> float:
-    """Depth (um) to which the scarcer substrate reaches into biomass that takes it up at the full rate."""
+    """Depth (um) that the scarcer substrate reaches in biomass that takes it up at full rate."""
     depths = [math.sqrt(2 * s.diffusivity_in_aggregate * s.supply / rate) for _, s, rate in uptakes(scene) if rate]
     return min(depths, default=math.inf)
 
@@ -161,10 +162,10 @@ def half_length(scene) -> float:
 
 
 def stresses(scene, speed: float) -> tuple[float, float]:
-    """The fluid's shear on the wall at t = 0, and the drop of pressure over the aggregate at the end, over mu_L.
+    """Shear on the wall at t = 0 and drop of pressure over the aggregate at the end, over mu_L.
 
-    The drop is that of a film as long as the aggregate, or of as much biomass from wall to wall; never more than the
-    scene's head.
+    The drop is that of a film as long as the aggregate, or of as much biomass from wall to wall;
+    never more than the scene's head.
     """
     drive, width, end = scene.flow, scene.pore.width, at_end(scene)
     viscosity = MPA_PER_UM * drive.density * drive.kinematic_viscosity / scene.growth.shear_modulus

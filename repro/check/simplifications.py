@@ -1,4 +1,4 @@
-"""Where a simplification that a scene has chosen does not hold: thresholds, each with its reason."""
+"""Where a simplification that a scene has chosen fails: thresholds, each with its reason."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from repro.model.pore import film, resolution
 
 #: (1) has no inertia, whose share of the viscous forces is of the order of the Reynolds number.
 REYNOLDS = 0.1
-#: Linear elements may overshoot where a concentration changes within an element of a cell Peclet number above this.
+#: Linear elements may overshoot where a concentration changes within an element of a cell Peclet
+#: number above this.
 CELL_PECLET = 2.0
 #: Quasi-steady substrates are behind the growth by about this share.
 LAG = 0.05
@@ -21,9 +22,11 @@ LAG = 0.05
 STRAIN = 0.01
 #: A shape update with the rates of its start is off by about half of the growth in it.
 GROWTH_IN_A_STEP = 0.1
-#: The bound on the time of contact is 10 % early in the paper's pores; later than this times it is long after.
+#: The bound on the time of contact is 10 % early in the paper's pores; later than this times it is
+#: long after.
 AFTER_CONTACT = 1.2
-#: Distances between nodes across a film, under which its flow (the cube of its thickness) is a matter of the mesh.
+#: Distances between nodes across a film, under which its flow (the cube of its thickness) is a
+#: matter of the mesh.
 ACROSS_FILM = 4.0
 
 

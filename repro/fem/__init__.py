@@ -1,1 +1,1 @@
-"""Finite elements: meshes, their generation, assembly, linear solvers, transfer between meshes. No scene in here."""
+"""Finite elements: meshes and their generation, assembly, solvers, transfer. No scene in here."""

@@ -1,7 +1,8 @@
-"""From element matrices to a sparse system: what depends on the mesh's connections alone is worked out once.
+"""From element matrices to a sparse system; what the connections alone decide is worked out once.
 
-The weak forms are scikit-fem's (:func:`local` gives their element matrices); while a mesh only moves, its sparsity,
-elimination order and the place of every element entry in the sparse matrix stay, and an assembly is one summation.
+The weak forms are scikit-fem's (:func:`local` gives their element matrices); while a mesh only
+moves, its sparsity, elimination order and the place of every element entry in the sparse matrix
+stay, and an assembly is one summation.
 """
 
 from __future__ import annotations
@@ -29,21 +30,23 @@ def local(form, trial, test=None, **parameters) -> np.ndarray:
 
 
 def each(coefficient: np.ndarray, elements: np.ndarray) -> np.ndarray:
-    """Element matrices (T, a, b) times a coefficient (T,) of each triangle, or (T, a) of each of its rows."""
+    """Element matrices (T, a, b) times coefficients (T,) of the triangles, or (T, a) of the
+    rows."""
     return coefficient.reshape(len(coefficient), -1, 1) * elements
 
 
 def mass(areas: np.ndarray) -> np.ndarray:
-    """(T, 3, 3) mass matrices of the linear nodal functions on triangles of the given areas (T,)."""
+    """(T, 3, 3) mass matrices of the linear nodal functions on triangles of areas (T,)."""
     return each(areas, (np.ones((1, 3, 3)) + np.eye(3)) / 12)
 
 
 class ElementSystem:
     """K x = b with some unknowns prescribed, K summed from element matrices.
 
-    unknowns: (T, k) numbers of each element's unknowns, or several of these, one for each kind of element; rank: (n,)
-    sorting key of the unknowns in elimination order; held: (n,) True where the unknown is prescribed. Wherever element
-    matrices (T, k, k) are asked for, they are as many as the kinds.
+    unknowns: (T, k) numbers of each element's unknowns, or several of these, one for each kind of
+    element; rank: (n,) sorting key of the unknowns in elimination order; held: (n,) True where the
+    unknown is prescribed. Wherever element matrices (T, k, k) are asked for, they are as many as
+    the kinds.
     """
 
     def __init__(self, unknowns: Parts, rank: np.ndarray, held: np.ndarray, method: Method = DEFAULT):
@@ -84,7 +87,7 @@ class ElementSystem:
         return found
 
     def entries(self, which: int, elements: np.ndarray) -> np.ndarray:
-        """Entries of the matrix between all unknowns, in the order of its columns, from one kind of element."""
+        """Entries, column by column, of the matrix between all unknowns, of one kind of element."""
         return np.bincount(self._slots[which], elements.ravel(), len(self._rows))
 
     def filled(self, entries: np.ndarray) -> sp.csc_matrix:
@@ -103,7 +106,7 @@ class ElementSystem:
         return Factored(self, elements, linear.factorised(self.matrix(elements), self.method))
 
     def solve(self, elements: Parts, right: np.ndarray, value: np.ndarray | None = None) -> np.ndarray:
-        """x (n,) of K x = b (n,) with the prescribed unknowns as in ``value`` (n,), zero by default."""
+        """x (n,) of K x = b (n,); prescribed unknowns are as in ``value`` (n,), zero by default."""
         return self.factored(elements).solve(right, value)
 
 
@@ -116,7 +119,7 @@ class Factored:
     solver: linear.Solver
 
     def solve(self, right: np.ndarray, value: np.ndarray | None = None) -> np.ndarray:
-        """x (n,) of K x = b (n,) with the prescribed unknowns as in ``value`` (n,), zero by default."""
+        """x (n,) of K x = b (n,); prescribed unknowns are as in ``value`` (n,), zero by default."""
         order, found = self.system.order, np.zeros(len(right))
         if value is not None and self.system.held.any():
             found = np.where(self.system.held, value, 0.0)
@@ -138,8 +141,8 @@ def _flat(parts: Sequence[np.ndarray]) -> np.ndarray:
 def saddle_blocks(upper: np.ndarray, divergence: np.ndarray, lower: np.ndarray | None = None) -> np.ndarray:
     """(T, a + b, a + b) symmetric element matrices [[upper, -divergence^T], [-divergence, -lower]].
 
-    upper: (T, a, a), or (T, a / 2, a / 2) for each of two components that are not coupled; divergence: (T, b, a);
-    lower: (T, b, b), zero by default.
+    upper: (T, a, a), or (T, a / 2, a / 2) for each of two components that are not coupled;
+    divergence: (T, b, a); lower: (T, b, b), zero by default.
     """
     (count, b, a), k = divergence.shape, upper.shape[1]
     elements = np.zeros((count, a + b, a + b))
@@ -154,11 +157,12 @@ def saddle_blocks(upper: np.ndarray, divergence: np.ndarray, lower: np.ndarray |
 
 def saddle_system(velocity: np.ndarray, pressure: np.ndarray, held: np.ndarray,
                   order: np.ndarray | None = None, method: Method = DEFAULT) -> ElementSystem:
-    """The system of two components on the same nodes and a pressure on other ones, pressures after their node.
+    """The system of two components on the same nodes and a pressure on some of these.
 
-    velocity: (T, a) nodes of each component; pressure: (T, b) nodes among the first ones of the velocity's;
-    held: (n, 2) prescribed components; order: (n,) nodes in elimination order, if known. Unknowns are numbered x, then
-    y, then pressure.
+    velocity: (T, a) nodes of each component; pressure: (T, b) nodes among the first ones of the
+    velocity's; held: (n, 2) prescribed components; order: (n,) nodes in elimination order, if
+    known. Unknowns are numbered x, then y, then pressure; each
+    pressure is eliminated after the components at its node.
     """
     count = len(held)
     pressures = pressure.max() + 1

@@ -1,8 +1,9 @@
-"""Lagrange elements of order 1, 2 and 3 on triangles, straight or curved, tabulated at quadrature points.
+"""Lagrange elements of order 1, 2 and 3 on straight or curved triangles, at quadrature points.
 
-Shape functions, their derivatives and the quadratures are scikit-fem's (``ElementTriP1``, ``P2``, ``P3``). A curved
-triangle has the nodes of ``ElementTriP2``, as those of scikit-fem's ``MeshTri2``: the map from the unit triangle is
-x(s, t) = sum_a x_a N_a(s, t), and gradients are grad N = N_,st (x_,st)^-1.
+Shape functions, their derivatives and the quadratures are scikit-fem's (``ElementTriP1``, ``P2``,
+``P3``). A curved triangle has the nodes of ``ElementTriP2``, as those of scikit-fem's ``MeshTri2``:
+the map from the unit triangle is x(s, t) = sum_a x_a N_a(s, t), and gradients are grad N = N_,st
+(x_,st)^-1.
 """
 
 from __future__ import annotations
@@ -15,8 +16,8 @@ from skfem import ElementTriP1, ElementTriP2, ElementTriP3
 from skfem.quadrature import get_quadrature_line, get_quadrature_tri
 
 ELEMENTS = {1: ElementTriP1(), 2: ElementTriP2(), 3: ElementTriP3()}
-#: Degrees of the quadrature on triangles and on edges, for each order of the functions: products of two functions and
-#: a coefficient that is nearly linear.
+#: Degrees of the quadrature on triangles and on edges, for each order of the functions: products of
+#: two functions and a coefficient that is nearly linear.
 DEGREES = {1: 2, 2: 6, 3: 8}
 EDGE_DEGREES = {1: 2, 2: 6, 3: 9}
 #: Of gradients, the same but for linear functions on straight triangles, where they are constant.
@@ -33,7 +34,8 @@ def nodes(order: int) -> np.ndarray:
 
 
 def evaluated(order: int, where: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(q, k) shape functions at points (q, 2) of the unit triangle, and (q, k, 2) their derivatives by s and t."""
+    """Shape functions (q, k) at points (q, 2) of the unit triangle, and their derivatives by s and
+    t, (q, k, 2)."""
     element, places = ELEMENTS[order], np.ascontiguousarray(where.T)
     count = len(element.doflocs)
     found, slopes = np.empty((len(where), count)), np.empty((len(where), count, 2))
@@ -55,8 +57,9 @@ def derivatives(order: int, where: np.ndarray) -> np.ndarray:
 
 
 def quadrature(degree: int) -> tuple[np.ndarray, np.ndarray]:
-    """Points (q, 2) of the unit triangle and their weights (q,), exact for polynomials of a degree: scikit-fem's rules,
-    and the centroid for a degree of one or less, where scikit-fem takes three points."""
+    """Points (q, 2) of the unit triangle and their weights (q,), exact for polynomials of a degree:
+    scikit-fem's rules, and the centroid for a degree of one or less, where scikit-fem takes three
+    points."""
     if degree <= 1:
         return np.full((1, 2), 1 / 3), np.full(1, 0.5)
     where, weights = get_quadrature_tri(degree)
@@ -67,8 +70,8 @@ def quadrature(degree: int) -> tuple[np.ndarray, np.ndarray]:
 class Table:
     """Functions of an order at quadrature points of the unit triangle.
 
-    weights: (q,); values: (q, k), slopes: (q, k, 2) of the functions; shape: (q, g), bends: (q, g, 2) of those that
-    map the triangle; linear: (q, 3) barycentric coordinates.
+    weights: (q,); values: (q, k), slopes: (q, k, 2) of the functions; shape: (q, g), bends:
+    (q, g, 2) of those that map the triangle; linear: (q, 3) barycentric coordinates.
     """
 
     weights: np.ndarray
@@ -87,7 +90,8 @@ class Table:
 
 @cache
 def table(order: int, geometry: int, degree: int) -> Table:
-    """Functions of an order on triangles of a geometry (1: straight, 2: curved), in the quadrature of a degree."""
+    """Functions of an order on triangles of a geometry (1: straight, 2: curved), at the points of
+    the quadrature of a degree."""
     return _tabulated(order, geometry, *quadrature(degree))
 
 
@@ -110,14 +114,14 @@ def values_on(order: int, of: Table) -> np.ndarray:
 
 @cache
 def edge_table(order: int) -> tuple[np.ndarray, np.ndarray]:
-    """(p, e) shape functions of an edge's nodes at the points of its quadrature, and their weights (p,)."""
+    """(p, e) shape functions of an edge's nodes at its quadrature points, and the weights (p,)."""
     (s,), weights = get_quadrature_line(EDGE_DEGREES[order])
     along = values(order, np.column_stack([s, 0 * s]))
     return along[:, ON_EDGE[order]], weights
 
 
 def by_component(tensor: np.ndarray) -> np.ndarray:
-    """(T, q, 2, 2) of (2, 2, T, q), each component contiguous in memory: arithmetic on them is faster."""
+    """(T, q, 2, 2) of (2, 2, T, q), each component contiguous in memory, for faster arithmetic."""
     return np.ascontiguousarray(tensor).transpose(2, 3, 0, 1)
 
 
@@ -135,14 +139,15 @@ def inverse_transpose(matrix: np.ndarray, det: np.ndarray) -> np.ndarray:
 
 
 def jacobian(corners: np.ndarray, bends: np.ndarray) -> np.ndarray:
-    """(T, q, 2, 2) d x_i / d (s, t)_k of triangles with nodes (T, g, 2), bends (q, g, 2) as :class:`Table`'s."""
+    """(T, q, 2, 2) d x_i / d (s, t)_k of triangles with nodes (T, g, 2); bends: (q, g, 2), as those
+    of a :class:`Table`."""
     return by_component(np.moveaxis(corners, 2, 0)[:, None] @ bends.transpose(2, 1, 0))
 
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Quadrature points on triangles. dx: (T, q) um2, weights of the integral; slopes: (T, q, 2, k) derivatives of k
-    functions by x and by y, 1/um."""
+    """Quadrature points on triangles. dx: (T, q) um2, weights of the integral; slopes: (T, q, 2, k)
+    derivatives of k functions by x and by y, 1/um."""
 
     dx: np.ndarray
     slopes: np.ndarray

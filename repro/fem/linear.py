@@ -1,13 +1,14 @@
-"""Sparse linear systems: order the nodes once per topology, factor without pivoting, check the residual.
+"""Sparse linear systems: order nodes once, factor without pivoting, check the residual.
 
-Orders and factors with SuperLU: a minimum-degree ordering of the graph of *nodes*, in which the callers number all
-unknowns of a node together, in symmetric mode with pivots on the diagonal. That is two to five times faster than
-SciPy's default, and safe as long as pressure blocks are negative definite; the residual is checked, refined once, and
-where that is not enough the system is factored again with partial pivoting.
+Orders and factors with SuperLU: a minimum-degree ordering of the graph of *nodes*, in which the
+callers number all unknowns of a node together, in symmetric mode with pivots on the diagonal. That
+is two to five times faster than SciPy's default, and safe as long as pressure blocks are negative
+definite; the residual is checked, refined once, and where that is not enough the system is factored
+again with partial pivoting.
 
-Optional packages do the same faster on large meshes: METIS orders nodes by nested dissection (`numerics.ordering`,
-package pymetis), PARDISO factors (`numerics.solver`, package pypardiso). Which of them is used is a
-:class:`Method`, which a mesh hands to all that is solved on it.
+Optional packages do the same faster on large meshes: METIS orders nodes by nested dissection
+(`numerics.ordering`, package pymetis), PARDISO factors (`numerics.solver`, package pypardiso).
+Which of them is used is a :class:`Method`, which a mesh hands to all that is solved on it.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ from scipy.sparse.linalg import splu
 from repro.errors import LinearError
 from repro.timing import timed
 
-#: Largest accepted componentwise backward error, max |A x - b|_i / (|A| |x| + |b|)_i, and where refinement starts.
+#: Largest accepted componentwise backward error, max |A x - b|_i / (|A| |x| + |b|)_i, and where
+#: refinement starts.
 RESIDUAL, REFINE = 1e-10, 1e-14
 
 #: The stage that factorising and solving is timed as.
@@ -32,7 +34,7 @@ FLOOR = "factorise and solve"
 
 @dataclass(frozen=True)
 class Method:
-    """solver: what factors, "superlu" or "pardiso"; ordering: what orders the nodes, "degree" or "metis"."""
+    """solver: "superlu" or "pardiso" factors; ordering: "degree" or "metis" orders the nodes."""
 
     solver: str = "superlu"
     ordering: str = "degree"
@@ -64,8 +66,8 @@ def pairs(elements: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def node_order(count: int, elements: np.ndarray, method: Method = DEFAULT) -> np.ndarray:
-    """(count,) nodes in a fill-reducing order, from the elements (T, k) that couple them; each node is in one at least.
-    """
+    """(count,) nodes in a fill-reducing order, from the elements (T, k) that couple them; each node
+    is in at least one element."""
     k = elements.shape[1]
     rows, columns = (part.ravel() for part in pairs(elements))
     dominant = np.tile((np.ones((k, k)) + k * np.eye(k)).ravel(), len(elements))
@@ -108,8 +110,8 @@ class _Pardiso:
 class Solver:
     """Solves A x = b for one matrix (n, n) and any number of right-hand sides.
 
-    The unknowns are taken in the order in which they come. Raises LinearError where the residual cannot be brought
-    under RESIDUAL.
+    The unknowns are taken in the order in which they come. Raises LinearError where the residual
+    cannot be brought under RESIDUAL.
     """
 
     def __init__(self, matrix, method: Method = DEFAULT):

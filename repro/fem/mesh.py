@@ -1,8 +1,9 @@
-"""Triangulation of the meshed part of the pore (3.1): one mesh for fluid and biomass, straight or curved.
+"""Triangles of the meshed part of the pore (3.1): one mesh for fluid and biomass.
 
-A curved triangle has six nodes: corners, then the middles of the edges 01, 12 and 20 (isoparametric). What depends on
-the connections alone is a :class:`Topology`; it stays while the mesh moves. What depends on the places of the nodes
-too is worked out once for a :class:`Mesh`, whose nodes never change.
+A curved triangle has six nodes: corners, then the middles of the edges 01, 12 and 20
+(isoparametric). What depends on the connections alone is a :class:`Topology`; it stays while the
+mesh moves. What depends on the places of the nodes too is worked out once for a :class:`Mesh`,
+whose nodes never change.
 """
 
 from __future__ import annotations
@@ -25,9 +26,9 @@ POOR, POOR_ALLOWED = 0.6, 6
 
 @dataclass(frozen=True, eq=False)
 class Dofs:
-    """Nodes of functions of one order. cells: (T, k), corners of the mesh first; count: of all nodes; elimination:
-    (count,) nodes in elimination order; inlet, outlet: (E, order + 1) nodes of their edges, from the lower wall up;
-    walls: nodes of both walls."""
+    """Nodes of functions of one order. cells: (T, k), corners of the mesh first; count: of all
+    nodes; elimination: (count,) nodes in elimination order; inlet, outlet: (E, order + 1) nodes of
+    their edges, from the lower wall up; walls: nodes of both walls."""
 
     cells: np.ndarray
     count: int
@@ -41,10 +42,11 @@ class Dofs:
 class Topology:
     """Connections of a mesh.
 
-    cells: (T, 3 or 6) nodes, corners counterclockwise, then middles; corners: how many nodes are corners; biomass:
-    (T,) True in the aggregate; loop: (M,) nodes of the aggregate's boundary, counterclockwise, corner and middle in
-    turn where there are middles, empty in a clean channel; inlet, outlet: corners from the lower wall up; walls:
-    corners of both walls; method: of the linear systems.
+    cells: (T, 3 or 6) nodes, corners counterclockwise, then middles; corners: how many nodes are
+    corners; biomass: (T,) True in the aggregate; loop: (M,) nodes of the aggregate's boundary,
+    counterclockwise, corner and middle in turn where there are middles, empty in a clean channel;
+    inlet, outlet: corners from the lower wall up; walls: corners of both walls; method: of the
+    linear systems.
     """
 
     cells: np.ndarray
@@ -102,7 +104,8 @@ class Topology:
 
     @cached_property
     def bent(self) -> np.ndarray:
-        """Triangles with a node of the aggregate: the others of a mesh that has followed it are straight."""
+        """Triangles with a node of the aggregate; the others of a mesh that has moved with it are
+        straight."""
         return np.flatnonzero(np.isin(self.cells, self.body).any(axis=1))
 
     @cached_property
@@ -118,7 +121,8 @@ class Topology:
 
     @property
     def edges(self) -> np.ndarray:
-        """(E, 2) corners at the ends of every edge; on curved triangles its middle is node ``corners`` + its number."""
+        """(E, 2) corners at the ends of every edge; with curved triangles edge i has its middle at
+        node ``corners`` + i."""
         return self._edges[0]
 
     @property
@@ -153,9 +157,9 @@ class Topology:
 
 
 def _numbered(topology: Topology, order: int) -> Dofs:
-    """An edge has order - 1 nodes; of two, the one near the corner with the lower number takes the edge's own number,
-    the other that and the count of edges. So the nodes of order 2 are among those of order 3, and a curved mesh's own
-    nodes are those of order 2."""
+    """An edge has order - 1 nodes; of two, the one near the corner with the lower number takes the
+    edge's own number, the other that and the count of edges. So the nodes of order 2 are among
+    those of order 3, and a curved mesh's own nodes are those of order 2."""
     corners, edges = topology.corners, topology.cell_edges + topology.corners
     if order == 1:
         cells, count = topology.triangles, corners
@@ -169,7 +173,8 @@ def _numbered(topology: Topology, order: int) -> Dofs:
 
 
 def _cubic(topology: Topology) -> tuple[np.ndarray, int]:
-    """(T, 10) nodes in scikit-fem's order, whose third edge runs from corner 0 to corner 2, and their count."""
+    """(T, 10) nodes in scikit-fem's order, whose third edge runs from corner 0 to corner 2; and how
+    many they are."""
     first, many = topology.corners, len(topology.edges)
     starts, ends = topology.triangles[:, [0, 1, 0]], topology.triangles[:, [1, 2, 2]]
     own = first + topology.cell_edges
@@ -192,7 +197,7 @@ def _along(topology: Topology, line: np.ndarray, order: int) -> np.ndarray:
 
 
 def _on_walls(topology: Topology, order: int) -> np.ndarray:
-    """Nodes of both walls: an edge of one triangle alone between two corners on one wall lies on it."""
+    """Nodes of both walls: an edge of one triangle only, between corners of one wall, is on it."""
     if order == 1:
         return topology.walls
     on = np.zeros(topology.corners, bool)
@@ -204,14 +209,18 @@ def _on_walls(topology: Topology, order: int) -> np.ndarray:
 
 
 def _across(topology: Topology) -> np.ndarray:
-    """(E,) are both corners of an edge on the inlet, or both on the outlet? One alone there joins both walls."""
+    """(E,) True where both corners of an edge are on the inlet, or both on the outlet. An end that
+    is one edge long joins both walls."""
     at_ends = [np.isin(topology.edges, line).all(axis=1) for line in (topology.inlet, topology.outlet)]
     return np.logical_or(*at_ends)
 
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles of fluid and biomass over ``ends`` x [0, width] (um), nodes at ``points`` (N, 2) um, corners first."""
+    """Triangles of fluid and biomass over ``ends`` x [0, width] (um).
+
+    points: (N, 2) um, places of the nodes, corners first.
+    """
 
     points: np.ndarray
     topology: Topology
@@ -221,7 +230,8 @@ class Mesh:
     @staticmethod
     def of(points: np.ndarray, cells: np.ndarray, biomass: np.ndarray, loop: np.ndarray, width: float,
            ends: tuple[float, float], method: Method = DEFAULT) -> Mesh:
-        """A mesh from the nodes of its triangles (T, 3 or 6), corners numbered first; loop as :class:`Topology`'s."""
+        """The mesh of triangles with nodes (T, 3 or 6), corners numbered first; loop: as that of a
+        :class:`Topology`."""
         count = len(points) if cells.shape[1] == 3 else int(cells[:, 3:].min())
         x, y = points[:count].T
 
@@ -298,7 +308,7 @@ class Mesh:
 
     @cached_property
     def gradients(self) -> np.ndarray:
-        """(T, 3, 2) gradients of the barycentric coordinates of the triangles between the corners, 1/um."""
+        """(T, 3, 2) gradients, 1/um, of the barycentric coordinates between the corners."""
         return gradients(self.points, self.triangles)
 
     @cached_property
@@ -319,17 +329,19 @@ class Mesh:
         return np.concatenate([field, 0.5 * (field[a] + field[b])])
 
     def moved(self, points: np.ndarray) -> Mesh:
-        """The same triangles with their nodes at ``points`` (N, 2), nodes of walls and ends still on their lines."""
+        """The same triangles with their nodes at ``points`` (N, 2); nodes of walls and ends must
+        still be on their lines."""
         return replace(self, points=points)
 
     def turned_over(self, which: np.ndarray | slice = slice(None)) -> np.ndarray:
-        """(T,) is the map of a triangle (of those in ``which``) not one to one where it is integrated, or at its nodes?
-        """
+        """(T,) True where the map of a triangle (of those in ``which``) is not one to one at a node
+        or a quadrature point."""
         J = elements.jacobian(self.points[self.cells[which]], checked_bends(self.geometry))
         return elements.determinant(J).min(axis=1) <= 0
 
     def strained_arcs(self) -> np.ndarray:
-        """(M,) has an edge of the aggregate's boundary a curved triangle beside it that is turned over?"""
+        """(M,) True where an edge of the aggregate's boundary has a curved triangle beside it that
+        is turned over."""
         if self.geometry == 1:
             return np.zeros(len(self.loop), bool)
         return np.isin(self.loop[1::2], self.cells[self.turned_over(), 3:])
@@ -370,7 +382,11 @@ def gradients(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def curved(straight: Mesh, middles: np.ndarray | None) -> Mesh:
-    """Nodes in the middles of all edges; on the aggregate's boundary those given, (M, 2) um, after each loop node."""
+    """The mesh with a node in the middle of every edge.
+
+    middles: (M, 2) um, those on the aggregate's boundary, each after the loop's node of the same
+    number; None: on the straight edge.
+    """
     topology, count = straight.topology, straight.corners
     points = np.vstack([straight.points, straight.points[topology.edges].mean(axis=1)])
     cells = np.column_stack([topology.triangles, count + topology.cell_edges])

@@ -1,6 +1,7 @@
-"""New meshes (3.1): boundary, interface and contact nodes are placed first, Mmg (through mmgpy) fills the inside.
+"""New meshes (3.1): boundary, interface and contact nodes are placed first, Mmg fills the inside.
 
-Mmg starts from a constrained Delaunay triangulation (shapely) and keeps every edge that it was given.
+Mmg (through mmgpy) starts from a constrained Delaunay triangulation (shapely) and keeps every edge
+that it was given.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ from repro.fem.outline import BOTTOM, TOP, Outline
 from repro.fem.sizing import Sizing
 from repro.timing import timed
 
-#: Sizes of the first of two meshing passes over the wanted ones, and Mmg's own limit on the ratio of adjacent edges.
+#: Sizes of the first of two meshing passes over the wanted ones, and Mmg's own limit on the ratio
+#: of adjacent edges.
 FIRST_PASS, HGRAD = 2.0, 1.5
 #: Rounds in which arcs that bend too much for the triangles beside them are halved.
 HALVINGS = 6
@@ -34,9 +36,10 @@ def generate(outline: Outline | None, ends: tuple[float, float], sizing: Sizing,
              method: Method = DEFAULT) -> tuple[Mesh, Outline | None]:
     """A new mesh around the aggregate, and the outline with the nodes that the mesh has on it.
 
-    outline: None for a clean channel; ends: x of inlet and outlet (um); geometry: 1, straight triangles, 2, curved
-    ones, as the outline's edges are; method: of the linear systems on the mesh. Raises MeshError where the outline
-    crosses itself or the channel's ends, or where a curved triangle is turned over.
+    outline: None for a clean channel; ends: x of inlet and outlet (um); geometry: 1, straight
+    triangles, 2, curved ones, as the outline's edges are; method: of the linear systems on the
+    mesh. Raises MeshError where the outline crosses itself or the channel's ends, or where a curved
+    triangle is turned over.
     """
     if outline is None:
         straight = around(None, ends, sizing, method)
@@ -56,7 +59,8 @@ def generate(outline: Outline | None, ends: tuple[float, float], sizing: Sizing,
 
 
 def around(outline: Outline | None, ends: tuple[float, float], sizing: Sizing, method: Method = DEFAULT) -> Mesh:
-    """A new straight mesh around a polygon whose nodes stay as they are; arguments as those of :func:`generate`."""
+    """A new straight mesh around a polygon whose nodes stay as they are; arguments: those of
+    :func:`generate`."""
     width = sizing.width
     sources, sizes = np.empty((0, 2)), np.empty(0)
     if outline is not None:
@@ -131,10 +135,11 @@ def _backwards(first: int, last: int, count: int) -> np.ndarray:
 
 
 def _fill(points, polygons, size_at):
-    """Triangles inside the polygons, of the size that ``size_at(points)`` wants (um): (T, 3), their regions (T,), where
-    the prescribed points went, and all points.
+    """Triangles (T, 3) inside the polygons, of the size (um) that ``size_at(points)`` asks for;
+    their regions (T,); where the prescribed points went; and all points.
 
-    The first pass knows the wanted size at the prescribed points alone, the second one at every point of the first.
+    The first pass knows the wanted size at the prescribed points alone, the second one at every
+    point of the first.
     """
     triangles = [_constrained_delaunay(points, nodes) for nodes, _ in polygons]
     region = np.repeat([1 + biomass for _, biomass in polygons], [len(t) for t in triangles])
@@ -146,7 +151,8 @@ def _fill(points, polygons, size_at):
 
 
 def _mmg(points, triangles, region, rim, prescribed, sizes):
-    """One pass of Mmg that keeps the rim: (points, triangles, region), and where the prescribed points went."""
+    """One pass of Mmg, which keeps the rim: points, triangles and region, and where the prescribed
+    points went."""
     mmg = MmgMesh2D()
     mmg.set_mesh_size(vertices=len(points), triangles=len(triangles), quadrilaterals=0, edges=len(rim))
     mmg.set_vertices(points)
@@ -187,7 +193,7 @@ def _constrained_delaunay(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:
 
 
 def _find(new_points: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Indices in the new mesh of the prescribed points. Raises MeshError where one of them has moved."""
+    """Indices of the prescribed points in the new mesh. Raises MeshError where one has moved."""
     distance, found = cKDTree(new_points).query(points)
     if distance.max() > 1e-9 * np.ptp(points[:, 0]) or len(np.unique(found)) < len(points):
         raise MeshError(f"the mesher moved a boundary node by {distance.max():.3g} um")
@@ -195,10 +201,11 @@ def _find(new_points: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def unlocked(straight: Mesh) -> Mesh:
-    """The same nodes without triangles that have two edges on the boundary of their region, fluid or biomass.
+    """The same nodes without triangles that have two edges on the boundary of their region.
 
-    Linear pressures on such a corner leave quadratic displacements too little freedom; the corner's inner edge is
-    exchanged for the other diagonal where that is possible.
+    A region is the fluid or the biomass. Linear pressures in such a corner leave quadratic
+    displacements too little freedom; the corner's
+    inner edge is exchanged for the other diagonal where that is possible.
     """
     triangles = straight.triangles.copy()
     for corner in _cornered(triangles, straight.biomass):
@@ -219,7 +226,8 @@ def _cornered(triangles: np.ndarray, biomass: np.ndarray) -> np.ndarray:
 
 
 def _flip(points: np.ndarray, triangles: np.ndarray, biomass: np.ndarray, corner: int) -> None:
-    """Exchange the inner edge of a cornered triangle for the other diagonal of it and its neighbour, in place."""
+    """Exchange, in place, the inner edge of a cornered triangle for the other diagonal of the
+    quadrilateral that it forms with its neighbour."""
     inner = int(np.flatnonzero(~_region_edges(triangles, biomass)[corner])[0]) if (
         _region_edges(triangles, biomass)[corner].sum() == 2) else -1
     if inner < 0:

@@ -1,7 +1,7 @@
 """Newton's method: one driver, full or modified (the derivative of an earlier iterate is kept).
 
-With the derivative of an earlier iterate the defect falls by about the same factor in every step, instead of by its
-square: cheaper by far on a large mesh, where factorising is what a step costs.
+With the derivative of an earlier iterate the defect falls by about the same factor in every step,
+instead of by its square: cheaper by far on a large mesh, where factorising is what a step costs.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ class System(Protocol[It]):
 
 @dataclass(frozen=True)
 class Newton:
-    """tolerance: of the defect; round_off: a defect that is enough where it does not fall any more; most: iterations;
-    reused: is the derivative kept while it does enough?"""
+    """tolerance: of the defect; round_off: a defect that is enough where it does not fall any more;
+    most: iterations; reused: is the derivative kept while it does enough?"""
 
     tolerance: float
     round_off: float

@@ -1,8 +1,9 @@
-"""The aggregate's boundary (2.3.3): a closed chain of straight edges, or of parabolic arcs on curved triangles.
+"""The aggregate's boundary (2.3.3): a closed chain of straight edges or of parabolic arcs.
 
-The channel is 0 <= y <= W, -L/2 <= x <= L/2; the origin is below the middle of the seed, on the lower wall. Nodes run
-counterclockwise; each of them is FREE (on the interface with the fluid), or touches the lower (BOTTOM) or the upper
-wall (TOP). Where edges are arcs, corners and middles take turns: arc k has the nodes 2 k, 2 k + 1 and 2 k + 2.
+The channel is 0 <= y <= W, -L/2 <= x <= L/2; the origin is below the middle of the seed, on the
+lower wall. Nodes run counterclockwise; each of them is FREE (on the interface with the fluid), or
+touches the lower (BOTTOM) or the upper wall (TOP). Where edges are arcs, corners and middles take
+turns: arc k has the nodes 2 k, 2 k + 1 and 2 k + 2.
 """
 
 from __future__ import annotations
@@ -22,8 +23,9 @@ FREE, BOTTOM, TOP = 0, 1, 2
 class Outline:
     """Boundary of the aggregate.
 
-    points: (M, 2) um; wall: (M,) FREE, BOTTOM or TOP; fixed: (M,) True where x is constrained for good; origin: (M, 2)
-    um, where the material of each node was at t = 0; geometry: 1, edges are straight; 2, they are arcs.
+    points: (M, 2) um; wall: (M,) FREE, BOTTOM or TOP; fixed: (M,) True where x is constrained for
+    good; origin: (M, 2) um, where the material of each node was at t = 0; geometry: 1, edges are
+    straight; 2, they are arcs.
     """
 
     points: np.ndarray
@@ -54,7 +56,8 @@ class Outline:
 
     @cached_property
     def area(self) -> float:
-        """Area inside (um2): that of the corners' polygon, and two thirds of chord times height for each arc."""
+        """Area inside (um2): that of the corners' polygon, and two thirds of chord times height of
+        each arc."""
         if self.geometry == 1:
             return polygon_area(self.points)
         a, m, b = np.moveaxis(self.arcs(self.points), 1, 0)
@@ -81,11 +84,12 @@ class Outline:
         return np.linalg.norm(np.roll(self.points, -1, axis=0) - self.points, axis=1)
 
     def interface_edges(self) -> np.ndarray:
-        """(M,) True where the line from node i to node i + 1 borders the fluid: its ends are not on one same wall."""
+        """(M,) True where the line from node i to node i + 1 borders the fluid: its ends are not
+        both on one wall."""
         return (self.wall == FREE) | (self.wall != np.roll(self.wall, -1))
 
     def arcs(self, values: np.ndarray) -> np.ndarray:
-        """(edges, 3, ...) values (M, ...) of the nodes at the start, middle and end of each edge."""
+        """(edges, 3, ...) of nodal values (M, ...), at the start, middle and end of each edge."""
         if self.geometry == 1:
             after = np.roll(values, -1, axis=0)
             return np.stack([values, 0.5 * (values + after), after], axis=1)
@@ -126,7 +130,7 @@ def slopes(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def half_disc(radius: float, across: float, geometry: int = 1, middle: float = 0.0) -> Outline:
-    """Half-disc of a radius (um) on the lower wall, its middle, which is its fixed point, at x = ``middle`` (um).
+    """Half-disc of a radius (um) on the lower wall, around x = ``middle`` (um), its fixed point.
 
     across: elements over its radius.
     """
@@ -145,11 +149,12 @@ def half_disc(radius: float, across: float, geometry: int = 1, middle: float = 0
 
 
 def polygon(corners: np.ndarray, width: float, geometry: int = 1, smooth: bool = False) -> Outline:
-    """The outline of an aggregate through points (K, 2) um from its upstream to its downstream end on the lower wall.
+    """The outline of an aggregate through points (K, 2) um, from lower wall to lower wall.
 
-    Points on the upper wall, y = ``width`` um, are contact. smooth: a natural cubic spline
-    takes the place of straight lines between two points of which one is free. The middle of each contact surface is its
-    fixed point. Raises MeshError where the curve leaves the pore.
+    The points go from the upstream to the downstream end; those on the upper wall, y = ``width``
+    um, are contact. smooth: a natural cubic spline takes
+    the place of straight lines between two points of which one is free. The middle of each contact
+    surface is its fixed point. Raises MeshError where the curve leaves the pore.
     """
     rim = np.asarray(corners, float)[::-1]  # counterclockwise: downstream end first, over the top, upstream end
     if smooth:

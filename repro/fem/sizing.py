@@ -1,4 +1,4 @@
-"""How large elements are to be, how far the mesh reaches (3.1), and where the outline's nodes go for a new mesh.
+"""Element sizes, extent and outline nodes of a new mesh (3.1).
 
 Lengths in um.
 """
@@ -11,9 +11,11 @@ import numpy as np
 
 from repro.fem.outline import FREE, TOP, Outline, parabola, slopes
 
-#: Elements across half a pore's width and across the aggregate's thickness, and across the narrowest film.
+#: Elements across half a pore's width and across the aggregate's thickness, and across the
+#: narrowest film.
 ACROSS_PORE, ACROSS_AGGREGATE, ACROSS_FILM = 14.0, 10.0, 10.0
-#: Growth of the element size with the distance from where it is prescribed; zero: one size everywhere.
+#: Growth of the element size with the distance from where it is prescribed; zero: one size
+#: everywhere.
 GRADATION = 0.25
 #: An interface edge is split when it is this much longer than the wanted size.
 SPLIT = 1.4
@@ -42,7 +44,8 @@ class Sizing:
 def meshed_extent(outline: Outline | None, width: float, length: float, whole: bool = False) -> tuple[float, float]:
     """Ends (um) of the part to mesh when a mesh is generated (3.1).
 
-    min(10 R, 1.5 W) from the aggregate on both sides, never past the pore's ends; a clean channel is meshed over 3 W.
+    min(10 R, 1.5 W) from the aggregate on both sides, never past the pore's ends; a clean channel
+    is meshed over 3 W.
     """
     if whole:
         return -length / 2, length / 2
@@ -54,7 +57,8 @@ def meshed_extent(outline: Outline | None, width: float, length: float, whole: b
 
 
 def extent_too_short(outline: Outline, ends: tuple[float, float], width: float, length: float) -> bool:
-    """Is the aggregate closer to an end of the mesh than min(7 R, 1.3 W), with pore left to mesh there (3.1)?"""
+    """Is the aggregate closer to an end of the mesh than min(7 R, 1.3 W), with more of the pore
+    beyond (3.1)?"""
     reach = min(7 * outline.thickness, 1.3 * width)
     left = outline.upstream - ends[0] < reach and ends[0] > -length / 2
     right = ends[1] - outline.downstream < reach and ends[1] < length / 2
@@ -64,7 +68,8 @@ def extent_too_short(outline: Outline, ends: tuple[float, float], width: float, 
 def interface_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
     """(M,) wanted element size (um) at each node of the outline.
 
-    A tenth of the aggregate's thickness, a fourteenth of the pore's width, and for free nodes the film's size.
+    A tenth of the aggregate's thickness, a fourteenth of the pore's width, and for free nodes the
+    film's size.
     """
     across = min(outline.thickness / ACROSS_AGGREGATE / sizing.refinement, sizing.largest) / sizing.front
     size = np.full(len(outline.points), across)
@@ -79,9 +84,10 @@ def too_coarse(outline: Outline, sizing: Sizing) -> bool:
 
 
 def film_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
-    """(M,) wanted element size (um) in the fluid between each node and the opposite wall, while that is not touched.
+    """(M,) wanted element size (um) in the fluid between each node and the opposite wall.
 
-    A tenth of its thickness; films thinner than the thinnest that is resolved count as that: they close.
+    A tenth of its thickness; films thinner than the thinnest that is resolved count as that: they
+    close.
     """
     if (outline.wall == TOP).any():
         return np.full(len(outline.points), np.inf)
@@ -91,8 +97,9 @@ def film_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
 def size_sources(outline: Outline, sizing: Sizing) -> tuple[np.ndarray, np.ndarray]:
     """Where element sizes are prescribed, (K, 2) um, and how large, (K,) um.
 
-    At the interface nodes and, across the fluid, on the opposite wall, so that a film has elements of one size.
-    Interface edges that are shorter than wanted (they are never merged) are matched by what is around them.
+    At the interface nodes and, across the fluid, on the opposite wall, so that a film has elements
+    of one size. Interface edges that are shorter than wanted (they are never merged) are matched by
+    what is around them.
     """
     free = outline.wall == FREE
     near = interface_sizes(outline, sizing)[free]
@@ -105,7 +112,8 @@ def size_sources(outline: Outline, sizing: Sizing) -> tuple[np.ndarray, np.ndarr
 
 
 def graded_size(where: np.ndarray, sources: np.ndarray, sizes: np.ndarray, sizing: Sizing) -> np.ndarray:
-    """Wanted element size (um) at points (K, 2): grows from the sizes (M,) of the sources (M, 2), up to the largest."""
+    """Wanted element size (um) at points (K, 2): it grows from the sizes (M,) at the sources (M, 2)
+    up to the largest."""
     if len(sources) == 0:
         return np.full(len(where), sizing.largest)
     distance = np.hypot(where[:, None, 0] - sources[None, :, 0], where[:, None, 1] - sources[None, :, 1])
@@ -113,10 +121,11 @@ def graded_size(where: np.ndarray, sources: np.ndarray, sizes: np.ndarray, sizin
 
 
 def split(outline: Outline, sizing: Sizing) -> Outline:
-    """The same curve with corners spaced as :func:`interface_sizes` wants them, and their middles where it has arcs.
+    """The same curve with corners spaced as :func:`interface_sizes` asks for.
 
-    Interface edges are split into equal parts, which changes neither shape nor area, and never merged. Contact
-    surfaces are straight, so their nodes are placed anew, but for their ends and the fixed points.
+    Interface edges are split into equal parts, which changes neither shape nor area, and never
+    merged. Contact surfaces are straight, so their nodes are placed anew, but for their ends and
+    the fixed points.
     """
     polygon = outline.corners
     sizes, on_wall = interface_sizes(polygon, sizing), outline.edge_wall != FREE
@@ -140,7 +149,8 @@ def halved(outline: Outline, which: np.ndarray) -> Outline:
 
 
 def runs(outline: Outline) -> list[tuple[int, int]]:
-    """Pieces (first, last) of the loop: single interface edges, and stretches of wall between ends or fixed points."""
+    """Pieces (first, last) of the loop: single interface edges, and stretches of wall between their
+    ends and fixed points."""
     count = len(outline.points)
     free_edge = outline.interface_edges()
     breaks = free_edge | np.roll(free_edge, 1) | outline.fixed
@@ -149,7 +159,7 @@ def runs(outline: Outline) -> list[tuple[int, int]]:
 
 
 def split_count(outline: Outline, keep: np.ndarray, sizes: np.ndarray) -> int:
-    """Into how many parts to split the edge between two nodes, ``keep``, for sizes (M,) um at the nodes."""
+    """How many parts the edge between the two nodes ``keep`` needs for sizes (M,) um."""
     length = np.linalg.norm(outline.points[keep[1]] - outline.points[keep[0]])
     wanted = 0.5 * (sizes[keep[0]] + sizes[keep[1]])
     return max(1, int(np.ceil(length / (SPLIT * wanted))))
@@ -157,7 +167,8 @@ def split_count(outline: Outline, keep: np.ndarray, sizes: np.ndarray) -> int:
 
 def _on_the_wall(outline: Outline, keep: np.ndarray, sizes: np.ndarray,
                  sizing: Sizing) -> tuple[np.ndarray, np.ndarray]:
-    """Edge, and t on it, of the new nodes along a stretch of wall, but for its end; graded from the interface."""
+    """Edge, and t on it, of the new nodes along a stretch of wall without its end, graded from the
+    interface."""
     polygon = outline.corners
     free = polygon.wall == FREE
     ends = polygon.points[keep[[0, -1]]]
@@ -172,7 +183,8 @@ def _on_the_wall(outline: Outline, keep: np.ndarray, sizes: np.ndarray,
 
 
 def _parameters(nodes: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """(K,) t in [0, 1] at which arcs with nodes (K, 3) um along the wall reach x (K,); zero for the first."""
+    """(K,) t in [0, 1] at which arcs along the wall, nodes at (K, 3) um, reach x (K,); the first is
+    zero."""
     t = (x - nodes[:, 0]) / (nodes[:, 2] - nodes[:, 0])
     slope, bend = slopes(nodes)
     for _ in range(6):
@@ -203,7 +215,8 @@ def placed(outline: Outline, edge: np.ndarray, t: np.ndarray, seed: float | None
 
 
 def _on_arc(places: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Places (K, 2) between two points each, moved to their arc around the origin where both are as far from it."""
+    """Places (K, 2) between two points each, moved to the arc around the origin where both points
+    are equally far from it."""
     radius, now = np.hypot(*first.T), np.hypot(*places.T)
     arc = np.isclose(radius, np.hypot(*second.T), rtol=1e-9, atol=0) & (places[:, 1] > 0)
     return places * np.where(arc, radius / np.where(arc, now, 1.0), 1.0)[:, None]

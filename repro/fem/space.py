@@ -1,8 +1,9 @@
-"""Functions of order 1, 2 or 3 on a mesh, straight or curved: nodes, quadrature points, element matrices.
+"""Functions of order 1, 2 or 3 on a mesh: nodes, quadrature points, element matrices.
 
-Every integral of a weak form is a sum over quadrature points; element matrices are those that scikit-fem's assembly
-gives with the same quadrature. The reaction of the substrates is taken in the points of a :class:`Reaction`: all
-quadrature points of the biomass, or, with linear functions, the nodes alone (lumped, as the paper has it).
+Every integral of a weak form is a sum over quadrature points; element matrices are those that
+scikit-fem's assembly gives with the same quadrature. The reaction of the substrates is taken in the
+points of a :class:`Reaction`: all quadrature points of the biomass, or, with linear functions, the
+nodes alone (lumped, as the paper has it).
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ from repro.fem.mesh import Dofs, Mesh
 
 @dataclass(frozen=True, eq=False)
 class Reaction:
-    """Points in which the reaction is integrated. cells: (r, k) nodes of each piece of biomass; values: (q, k) the
-    functions in its points; dx: (r, q) um2, the points' weights."""
+    """Points in which the reaction is integrated. cells: (r, k) nodes of each piece of biomass;
+    values: (q, k) the functions in its points; dx: (r, q) um2, the points' weights."""
 
     cells: np.ndarray
     values: np.ndarray
@@ -66,7 +67,7 @@ class Space:
 
     @property
     def gradient_degree(self) -> int:
-        """Of the quadrature where gradients are integrated: one point on straight linear triangles."""
+        """At the quadrature points of gradients: a single one on straight linear triangles."""
         return max(elements.GRADIENT_DEGREES[self.order], self._curved_degree)
 
     @cached_property
@@ -173,7 +174,8 @@ class Space:
         return float(load @ field / load.sum())
 
     def owners(self, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The triangle of each edge of an end (E,), and where the edge's nodes (E, e) are among the triangle's."""
+        """(E,) triangle of each edge of an end, and (E, e) places of the edge's nodes among those
+        of the triangle."""
         corners = self.mesh.triangles
         first = np.flatnonzero(np.isin(corners, edges[:, [0, -1]]).sum(axis=1) >= 2)
         near = corners[first]

@@ -4,12 +4,12 @@ Interpolation: where a place lies in the old triangles, straight or curved, and 
 order is there. It is the paper's transfer, and drifts. The conserving transfer of linear fields is
 the Galerkin projection
 
-    (X_new, N_i) = (X_old, N_i)  for every new N_i, integrated exactly over the common pieces of both meshes,
+    (X_new, N_i) = (X_old, N_i)  for every new N_i,
 
-which keeps the total, constants and linear fields to round-off as long as both meshes cover the
-same polygon. It may overshoot where a field is steep. The bounded transfer is the same, limited by
-flux-corrected transport (Zalesak 1979; Kuzmin 2012): with m_ij the mass matrix, m_i its row sums
-and b_i = (X_old, N_i), the projection is
+integrated exactly over the common pieces of both meshes. It keeps the total, constants and linear
+fields to round-off as long as both meshes cover the same polygon, and may overshoot where a field
+is steep. The bounded transfer is the same, limited by flux-corrected transport (Zalesak 1979;
+Kuzmin 2012): with m_ij the mass matrix, m_i its row sums and b_i = (X_old, N_i), the projection is
 
     m_i X_i = b_i + sum_j f_ij,        f_ij = m_ij (X_i - X_j) = -f_ji
 
@@ -57,11 +57,11 @@ class Located:
 
 @timed("transfer")
 def located(points: np.ndarray, cells: np.ndarray, where: np.ndarray) -> Located:
-    """Places (K, 2) um in triangles (T, 3 or 6); one outside by a little is moved to the edge of
-    the nearest.
+    """Places (K, 2) um in triangles (T, 3 or 6).
 
     Newton's method on x(s, t) in every triangle whose box holds the place; the one in which it lies
-    deepest is taken. Raises TransferError where a place is far from all of them.
+    deepest is taken. A place a little outside is moved to the edge of the nearest triangle. Raises
+    TransferError where a place is far from all of them.
     """
     geometry = 1 if cells.shape[1] == 3 else 2
     nodes = points[cells]
@@ -80,8 +80,8 @@ def located(points: np.ndarray, cells: np.ndarray, where: np.ndarray) -> Located
 
 
 def _inverted(nodes: np.ndarray, where: np.ndarray, geometry: int) -> np.ndarray:
-    """(K, 2) on the unit triangle for places (K, 2) in triangles (K, g, 2); far outside where it
-    does not converge."""
+    """(K, 2) on the unit triangle of places (K, 2) in triangles (K, g, 2); far outside where
+    Newton's method does not converge."""
     if geometry == 1:
         return barycentric(nodes, where)[:, 1:]
     local, rest = np.clip(barycentric(nodes[:, :3], where)[:, 1:], -2.0, 3.0), np.arange(len(where))
@@ -123,8 +123,8 @@ def barycentric(corners: np.ndarray, where: np.ndarray) -> np.ndarray:
 
 
 def interpolate(points: np.ndarray, cells: np.ndarray, fields: np.ndarray, where: np.ndarray) -> np.ndarray:
-    """(K, m) fields (N, m) at the mesh's own nodes, at places (K, 2): the paper's transfer, bounded
-    for linear ones."""
+    """(K, m) values at places (K, 2) of fields (N, m) at the mesh's nodes: the paper's transfer,
+    bounded on straight triangles."""
     return located(points, cells, where).field(fields, cells, 1 if cells.shape[1] == 3 else 2)
 
 
@@ -155,8 +155,8 @@ def unfolded(mesh: Mesh, origin: np.ndarray) -> np.ndarray:
 
 
 def supermesh(points, triangles, new_points, new_triangles) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Common pieces of two meshes: (p, 3, 2) corners of triangles, and the old and new triangle
-    (p,) each lies in."""
+    """Common pieces of two meshes: (p, 3, 2) corners of triangles, and the old and the new triangle
+    (p,) that holds each."""
     boxes = shapely.STRtree(shapely.polygons(points[triangles]))
     new, old = boxes.query(shapely.polygons(new_points[new_triangles]))
     pieces = clip(points[triangles[old]], new_points[new_triangles[new]])
@@ -167,8 +167,9 @@ def supermesh(points, triangles, new_points, new_triangles) -> tuple[np.ndarray,
 
 
 def clip(polygons: np.ndarray, windows: np.ndarray) -> np.ndarray:
-    """Convex polygons (p, k, 2) cut to counterclockwise triangles (p, 3, 2), pair by pair:
-    (p, m, 2) of as many corners as the largest has, three at least.
+    """Convex polygons (p, k, 2) cut to counterclockwise triangles (p, 3, 2), pair by pair.
+
+    Returns (p, m, 2), m being the corners of the largest, at least three.
 
     Sutherland and Hodgman's algorithm: each side of the window in turn keeps what is to its left.
     Polygons with fewer corners repeat one of them, empty ones are a single point. m is k + 3 at
@@ -188,8 +189,7 @@ def clip(polygons: np.ndarray, windows: np.ndarray) -> np.ndarray:
 
 
 def _packed(points: np.ndarray, kept: np.ndarray) -> np.ndarray:
-    """The kept points (p, k, 2) moved to the front, in order, and the first of them repeated
-    behind: (p, room, 2)."""
+    """(p, room, 2) the kept ones of points (p, k, 2), in order, then the first of them repeated."""
     count = kept.sum(axis=1)[:, None]
     room = max(3, int(count.max(initial=0)))
     front = np.argsort(~kept, axis=1, kind="stable")[:, :room]
@@ -198,8 +198,7 @@ def _packed(points: np.ndarray, kept: np.ndarray) -> np.ndarray:
 
 
 def project(points, triangles, fields, new_points, new_triangles) -> np.ndarray:
-    """Galerkin projection of nodal fields (N, m) onto the nodes of another mesh of the same
-    polygon: (K, m).
+    """(K, m) Galerkin projection of nodal fields (N, m) onto another mesh of the same polygon.
 
     Raises TransferError where the two meshes do not cover the same area.
     """
@@ -233,8 +232,8 @@ def _edges(triangles: np.ndarray, areas: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def _bounds(pieces, triangles: np.ndarray, fields: np.ndarray, new_triangles: np.ndarray):
-    """Least and largest old nodal value (K, m) in the old triangles that share area with a triangle
-    of a new node."""
+    """Least and largest old nodal value (K, m) in the old triangles that share area with those of
+    each new node."""
     _, old, new, _ = pieces
     shape = (new_triangles.max() + 1, fields.shape[1])
     least, most = np.full(shape, np.inf), np.full(shape, -np.inf)
@@ -258,8 +257,7 @@ def _limited(low, lumped, ends, flux, least, most) -> np.ndarray:
 
 
 def _pieces(points, triangles, new_points, new_triangles):
-    """Corners of the common pieces (p, 3, 2), the old and new triangle (p,) of each, and their
-    areas (p,)."""
+    """Common pieces: corners (p, 3, 2), old and new triangle (p,) of each, and areas (p,)."""
     corners, old, new = supermesh(points, triangles, new_points, new_triangles)
     edge = corners[:, 1:] - corners[:, :1]
     area = 0.5 * np.abs(edge[:, 0, 0] * edge[:, 1, 1] - edge[:, 0, 1] * edge[:, 1, 0])
@@ -284,8 +282,8 @@ def _loads(pieces, points, triangles, fields, new_points, new_triangles) -> np.n
 
 
 def _solve_mass(points: np.ndarray, triangles: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Solve with the mass matrix of the linear nodal functions for each column of (K, m); every
-    node has a triangle."""
+    """(K, m) solution with the mass matrix of the linear nodal functions for each column of the
+    right side; every node has a triangle."""
     rank = np.argsort(linear.node_order(len(points), triangles))
     system = ElementSystem(triangles, rank, np.zeros(len(points), bool))
     solver, solution = linear.Solver(system.matrix(mass(triangle_areas(points, triangles)))), np.empty_like(right)

@@ -1,1 +1,2 @@
-"""When steps are made: the paper's updates, the midpoint rule with error control, and the loop that both share."""
+"""When steps are made: the paper's updates, the midpoint rule with error control, and the loop of
+both."""

@@ -1,4 +1,4 @@
-"""The one loop of steps that every scheme shares, and the state from which it goes on bit for bit."""
+"""The one loop of steps of every scheme, and the state from which it goes on bit for bit."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SAME_TIME = 1e-9
 
 @dataclass(frozen=True)
 class Ledger:
-    """Mass balance of one step, per depth (um2 mg/L = 1e-12 g/m): both substrates, then the biomass."""
+    """Mass balance of one step per depth (um2 mg/L = 1e-12 g/m): both substrates, then biomass."""
 
     start: float
     end: float
@@ -44,8 +44,9 @@ class Ledger:
 class Instant:
     """The pore at ``pore.time`` with what is solved in its geometry, and how it came there.
 
-    before: the pore and its solution at the end of the last step, grown but not yet expanded (Plate 1), None at t = 0
-    and where the step that follows cannot be made; ledgers, remeshes, iterations: of the steps since the last instant.
+    before: the pore and its solution at the end of the last step, grown but not yet expanded
+    (Plate 1), None at t = 0 and where the step that follows cannot be made; ledgers, remeshes,
+    iterations: of the steps since the last instant.
     """
 
     pore: Pore
@@ -58,7 +59,8 @@ class Instant:
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """What one step made: the new pore, the pore and its solution before it expanded, the ledger, and counts."""
+    """What one step made: the new pore, the pore and its solution before it expanded, the ledger
+    and counts."""
 
     pore: Pore
     before: tuple[Pore, Solved] | None
@@ -71,8 +73,8 @@ class Step:
 class State:
     """All that a run goes on from after a step.
 
-    pore: as the step left it, with the guess from which its substrates are solved; pace: of the step to try next;
-    ledgers, remeshes, iterations: of the steps since the last Instant.
+    pore: as the step left it, with the guess from which its substrates are solved; pace: of the
+    step to try next; ledgers, remeshes, iterations: of the steps since the last Instant.
     """
 
     pore: Pore
@@ -86,9 +88,9 @@ class State:
 class Scheme:
     """What the loop needs of a way to make steps.
 
-    times(scene): at which steps must end, h, ascending; advance(scene, pore, solved, time, pace): one step to that time
-    or on the way there, as (Step, what is solved after it, pace of the next); first: length of the first step that is
-    tried, in parts of growth.time_step.
+    times(scene): at which steps must end, h, ascending; advance(scene, pore, solved, time, pace):
+    one step to that time or on the way there, as (Step, what is solved after it, pace of the next);
+    first: length of the first step that is tried, in parts of growth.time_step.
     """
 
     times: Callable[[Scene], list[float]]
@@ -101,10 +103,10 @@ class PoreEnd(Exception):
 
 
 def steps(scene: Scene, scheme: Scheme, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
-    """Every step of a run from t = 0, or after ``state``, with the Instant where its time is reported.
+    """Every step of a run from t = 0, or after ``state``, with an Instant at reported times.
 
-    Raises SimulationError where a stage fails, and PoreEnd, after a last Instant, where the aggregate reaches an end of
-    the pore.
+    Raises SimulationError where a stage fails, and PoreEnd, after a last Instant, where the
+    aggregate reaches an end of the pore.
     """
     first = state is None
     with stopping(state.pore.time if state else 0.0):
@@ -160,8 +162,8 @@ def reported(state: State) -> State:
 
 
 def laid_out(pore: Pore) -> Pore:
-    """The same pore, none of its arrays a strided view: sums over those may differ in the last bit from sums over the
-    copies that a checkpoint gives back."""
+    """The same pore, none of its arrays a strided view: sums over those may differ in the last bit
+    from sums over the copies that a checkpoint gives back."""
     state, mesh, body = pore.concentrations, _flat(pore.mesh), _flat(pore.body)
     found = replace(_flat(pore), concentrations=state and _flat(state))
     if body is not pore.body:
@@ -179,7 +181,8 @@ def _flat(data: Data) -> Data:
 
 @contextmanager
 def stopping(time: float):
-    """Floating-point errors and want of memory stop the run; a failure is told with the simulated time of its step."""
+    """Floating-point errors and lack of memory stop the run; a failure is told with the simulated
+    time of its step."""
     try:
         with np.errstate(all="raise", under="ignore"):
             yield
@@ -203,7 +206,8 @@ def added(*counts: dict[str, int]) -> dict[str, int]:
 
 
 def pore_end(scene: Scene, now: Pore, elements: float) -> str:
-    """Which end of the pore the aggregate has reached, to so many elements of the fluid; empty while it has not."""
+    """Which end of the pore the aggregate has reached, to within so many elements of the fluid;
+    empty while it has reached none."""
     outline, end = now.outline, scene.pore.length / 2
     near = elements * scene.pore.width / ACROSS_PORE
     if outline.upstream < near - end or outline.downstream > end - near:

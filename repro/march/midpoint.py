@@ -1,9 +1,9 @@
 """One step of the midpoint rule, second order in time: see :mod:`repro.march.stepping`.
 
-Half a step with the rates of its start gives the shape half way. There the substrates are solved with the *mean*
-biomass of the step, that which the very rates make that are found: M (e^z - 1) / z of a mass M that grows by e^z. These
-rates carry (9)-(10) over the whole step. So what is taken up and what is made in a step are one integral, and both
-balances close to round-off.
+Half a step with the rates of its start gives the shape half way. There the substrates are solved
+with the *mean* biomass of the step, that which the very rates make that are found: M (e^z - 1) / z
+of a mass M that grows by e^z. These rates carry (9)-(10) over the whole step. So what is taken up
+and what is made in a step are one integral, and both balances close to round-off.
 """
 
 from __future__ import annotations
@@ -25,9 +25,10 @@ from repro.scene import Scene
 
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """A step of the midpoint rule that may be taken: what it makes, None where the rates change more than is allowed;
-    their mean change over its first half, 1/h; and, where it first makes contact with the opposite wall, the least
-    distance (um) to that before and after the step, and the film's least thickness."""
+    """A step of the midpoint rule that may be taken: what it makes, None where the rates change
+    more than is allowed; their mean change over its first half, 1/h; and, where it first makes
+    contact with the opposite wall, the least distance (um) to that before and after the step, and
+    the film's least thickness."""
 
     step: Step | None
     change: float
@@ -38,8 +39,9 @@ class Attempt:
 class Halfway:
     """What half a step has found.
 
-    shape: the aggregate half way, with the fluid's nodes where they were; solved: flow and substrates there; rates: at
-    the points of the mesh at the start; made: growth of active and of inert biomass over the whole step, um2 mg/L.
+    shape: the aggregate half way, with the fluid's nodes where they were; solved: flow and
+    substrates there; rates: at the points of the mesh at the start; made: growth of active and of
+    inert biomass over the whole step, um2 mg/L.
     """
 
     shape: Pore
@@ -49,8 +51,8 @@ class Halfway:
 
 
 def attempt(scene: Scene, now: Pore, solved: Solved, duration: float, most: float = np.inf) -> Attempt:
-    """A step of ``duration`` (h), if the rates change by no more than ``most`` (1/h) over its first half. Raises
-    StageError where it cannot be made."""
+    """A step of ``duration`` (h), if the rates change by no more than ``most`` (1/h) over its first
+    half. Raises StageError where it cannot be made."""
     first = rates_of(scene, now, solved.concentrations)
     half = halfway(scene, now, solved, first, duration)
     change = biomass.change(first, half.rates, now.space.reaction.dx)
@@ -71,8 +73,9 @@ def attempt(scene: Scene, now: Pore, solved: Solved, duration: float, most: floa
 
 
 def halfway(scene: Scene, now: Pore, solved: Solved, first: Rates, duration: float) -> Halfway:
-    """Solve in the shape that half of ``duration`` (h) makes with the rates of its start. Where the moved mesh is not
-    acceptable a new one is made: masses go to its points, and the rates back to those of the material."""
+    """Solve in the shape that half of ``duration`` (h) makes with the rates of its start. Where the
+    moved mesh is not acceptable a new one is made: masses go to its points, and the rates back to
+    those of the material."""
     ahead = grown(now, first, duration / 2)
     shape, _, _ = contact.expand(scene, ahead, enlarged(scene, now, ahead), _scaled(now, ahead))
     mesh = remeshing.followed(scene, now, shape)
@@ -96,7 +99,7 @@ def _speed(solved: Solved) -> float:
 
 
 def _carried_back(there: Pore, shape: Pore, rates: Rates) -> Rates:
-    """Rates in the points of a new mesh, interpolated to the material's points of the mesh before."""
+    """Rates at the points of a new mesh, interpolated to those of the material's mesh before."""
     mesh, body = there.mesh, shape.mesh.body
     nodal = np.column_stack([biomass.at_nodes(there.space, field) for field in (rates.growth, rates.remains)])
     found = np.zeros((len(shape.mesh.points), 2))
@@ -106,8 +109,8 @@ def _carried_back(there: Pore, shape: Pore, rates: Rates) -> Rates:
 
 
 def _matched(now: Pore, after: Pore, made: tuple[float, float]) -> Pore:
-    """The pore with what was made half way, to the last bit: what an interpolation of the rates has lost or added is
-    spread over the active biomass as that is."""
+    """The pore with what was made half way, to the last bit: what an interpolation of the rates has
+    lost or added is spread over the active biomass as that is."""
     share = now.active / now.active.sum()
     lacking = [wanted - float((new - old).sum()) for wanted, new, old in
                zip(made, (after.active, after.inert), (now.active, now.inert))]
@@ -115,8 +118,9 @@ def _matched(now: Pore, after: Pore, made: tuple[float, float]) -> Pore:
 
 
 def _extrapolated(start: Concentrations, half: Concentrations) -> Concentrations:
-    """A first guess of the substrates at the end: as much change again as the first half of the step has made. Where
-    that takes one below zero, what they are half way; where the mesh there is another, what they are at the start."""
+    """A first guess of the substrates at the end: as much change again as the first half of the
+    step has made. Where that takes one below zero, what they are half way; where the mesh there is
+    another, what they are at the start."""
     if len(half.acceptor) != len(start.acceptor):
         return start
     acceptor, donor = 2 * half.acceptor - start.acceptor, 2 * half.donor - start.donor
@@ -132,7 +136,8 @@ def _scaled(now: Pore, after: Pore) -> Pore:
 
 
 def _ahead(now: Pore, half: Pore) -> Pore:
-    """A first guess of the shape: as much again as half the step has made, while contact stays as it is."""
+    """A first guess of the shape: as much growth again as half the step has made, with contact as
+    it is."""
     if (half.wall != now.wall).any():
         return now
     push = 2 * half.pressure - now.pressure
@@ -149,8 +154,8 @@ def _placed(after: Pore, points: np.ndarray) -> Pore:
 
 
 def first_contact(scene: Scene, now: Pore, expanded: Pore, gap: float) -> tuple[float, float, float] | None:
-    """Least distance to the opposite wall before and after a step that makes contact, and the film's least thickness;
-    None where contact is not made, or was there before."""
+    """Least distance to the opposite wall before and after a step that makes contact, and the
+    film's least thickness; None where contact is not made, or was there before."""
     if now.contact or not expanded.contact:
         return None
     return scene.pore.width - now.outline.thickness, gap, scene.growth.minimum_film

@@ -1,9 +1,10 @@
 """How long a step of the midpoint rule is: what its estimate allows, foreseen from the step before.
 
-The estimate of a step of length h is c h^2, so that the tolerance allows h (tolerance / estimate)^(1/2). The closer the
-aggregate comes to the opposite wall the faster c grows, by about the same factor from step to step: that factor is
-taken off the next step too (Gustafsson's controller: Hairer and Wanner, Solving Ordinary Differential Equations II,
-section IV.8), so that few steps are tried in vain.
+The estimate of a step of length h is c h^2, so that the tolerance allows h (tolerance /
+estimate)^(1/2). The closer the aggregate comes to the opposite wall the faster c grows, by about
+the same factor from step to step: that factor is taken off the next step too (Gustafsson's
+controller: Hairer and Wanner, Solving Ordinary Differential Equations II, section IV.8), so that
+few steps are tried in vain.
 """
 
 from __future__ import annotations
@@ -12,16 +13,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-#: Limits of the ratio of consecutive steps, and what is kept of the length that the estimate allows.
-FASTER, SLOWER, SAFETY = 5.0, 0.2, 0.9
-#: An estimate up to so many tolerances is accepted; and so much longer than it should be a step may be.
+#: Limits of the ratio of consecutive steps.
+FASTER = 5.0
+SLOWER = 0.2
+#: A step is this part of the length that the estimate allows.
+SAFETY = 0.9
+#: An estimate of up to so many tolerances is accepted: a step may exceed its ideal length by the
+#: root of it.
 EXCESS = 1.5
 STRETCH = EXCESS**0.5
 
 
 @dataclass(frozen=True)
 class Pace:
-    """length: h to try next; duration, estimate: of the last step that was taken, h and 1 (zero: there is none)."""
+    """length: h, to try next; duration (h) and estimate: of the last step taken, zero where there
+    is none."""
 
     length: float
     duration: float = 0.0
@@ -29,8 +35,8 @@ class Pace:
 
 
 def fitted(length: float, left: float, stretch: float = 1.0) -> float:
-    """A step of about ``length`` that leaves no crumb of the time that is left; up to ``stretch`` times as long where
-    that makes it the last."""
+    """A step of about ``length`` that leaves no crumb of the time that is left; up to ``stretch``
+    times as long where that makes it the last."""
     if stretch * length >= left * (1 - 1e-9):
         return left
     return min(length, left / 2) if 2 * length > left else length
@@ -44,8 +50,8 @@ def allowed(estimate: float, tolerance: float, most: float = FASTER) -> float:
 
 
 def following(pace: Pace, duration: float, estimate: float, tolerance: float) -> Pace:
-    """After a step that was taken: longer by FASTER at most, or as long as what was asked for and cut short to end at a
-    reported time."""
+    """After a step that was taken: longer by FASTER at most, or as long as what was asked for and
+    cut short to end at a reported time."""
     most = max(FASTER, pace.length / duration)
     factor = allowed(estimate, tolerance, most)
     if pace.estimate > 0 and estimate > 0:

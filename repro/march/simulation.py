@@ -40,6 +40,7 @@ def shaped(scene: Scene, shape: Shape) -> Scene:
 
 
 def steps(scene: Scene, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
-    """Every step, t = 0 first: the state from which a run goes on bit for bit, and the Instant where one is due."""
+    """Every step, t = 0 first: the state from which a run goes on bit for bit, and the Instant if
+    one is due."""
     Method(scene.numerics.solver, scene.numerics.ordering).checked()
     return WAYS[scene.numerics.time](scene, state)

@@ -1,9 +1,10 @@
-"""Steps of the length that the growth asks for (``numerics.time = "midpoint"``): second order in time.
+"""Steps as long as the growth allows (``numerics.time = "midpoint"``): second order in time.
 
-The midpoint rule carries (9)-(10) over a step with the rates of the shape half way. Euler's rule would take those of
-the start: the mean over the aggregate of their difference, times the step, is what ``numerics.tolerance`` bounds; the
-error of the midpoint rule is of higher order, and what a tolerance makes of it is measured in ``make bench``. A step
-ends at each reported time, and when the film between the aggregate and the opposite wall is first too thin (2.3.3).
+The midpoint rule carries (9)-(10) over a step with the rates of the shape half way. Euler's rule
+would take those of the start: the mean over the aggregate of their difference, times the step, is
+what ``numerics.tolerance`` bounds; the error of the midpoint rule is of higher order, and what a
+tolerance makes of it is measured in ``make bench``. A step ends at each reported time, and when the
+film between the aggregate and the opposite wall is first too thin (2.3.3).
 """
 
 from __future__ import annotations
@@ -21,15 +22,16 @@ from repro.model import remeshing
 from repro.model.pore import Pore, Solved
 from repro.scene import Scene
 
-#: The first step that is tried, in parts of growth.time_step; one that fails or errs too much is tried again, shorter,
-#: until it is SHORTEST parts.
+#: The first step that is tried, in parts of growth.time_step; one that fails or errs too much is
+#: tried again, shorter, until it is SHORTEST parts.
 FIRST, SHORTEST = 8.0, 1e-3
 #: Contact is met when the film is no thinner than this part of what it may be.
 LANDED = 0.995
 
 
 def steps(scene: Scene, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
-    """:func:`repro.march.loop.steps` of the midpoint rule; without ``output.times`` every step is reported."""
+    """:func:`repro.march.loop.steps` by the midpoint rule; every step is reported where there are
+    no ``output.times``."""
 
     def advance(*now) -> tuple[Step, Solved, Pace]:
         taken, solved, pace = _advance(*now)

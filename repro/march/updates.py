@@ -1,8 +1,8 @@
-"""The sequential coupling (section 2): flow -> substrates -> biomass -> shape -> moved mesh, once every 12 min.
+"""The sequential coupling (section 2): flow, substrates, biomass, shape, moved mesh, every 12 min.
 
-One step: (9)-(10) are integrated over the step in the present geometry, theta grows by (28)-(29), the aggregate finds
-its new equilibrium, films that have become too thin close (2.3.3), the mesh moves (35) or, by the paper's criteria
-(3.1, 3.5), is made anew.
+One step: (9)-(10) are integrated over the step in the present geometry, theta grows by (28)-(29),
+the aggregate finds its new equilibrium, films that have become too thin close (2.3.3), the mesh
+moves (35) or, by the paper's criteria (3.1, 3.5), is made anew.
 """
 
 from __future__ import annotations
@@ -63,10 +63,10 @@ def step(scene: Scene, now: Pore, solved: Solved, duration: float) -> Step:
 
 
 def make_biomass(scene: Scene, now: Pore, solved: Solved, duration: float) -> tuple[Pore, Concentrations, Flows]:
-    """(9)-(10) over a step (h) in a fixed geometry: the grown pore, concentrations at its end, substrate flows.
+    """(9)-(10) over a step (h) in a fixed geometry: the grown pore, concentrations and flows.
 
-    Quasi-steady: Heun's method on the rates, each biomass exponential in its rate; the second rates are those of the
-    steady concentrations over the grown biomass. Gear: the transient of the paper.
+    Quasi-steady: Heun's method on the rates, each biomass exponential in its rate; the second rates
+    are those of the steady concentrations over the grown biomass. Gear: the transient of the paper.
     """
     if scene.numerics.transport == "gear":
         done = gear.advance(solved.problem, now.active, now.inert, solved.concentrations, duration)
@@ -95,8 +95,8 @@ def grown(now: Pore, rates: Rates, duration: float) -> Pore:
 
 
 def enlarged(scene: Scene, now: Pore, after: Pore) -> np.ndarray:
-    """(t, q) theta after the biomass has grown: on straight triangles (28)-(29), by the increase of X_A + X_I over X_m;
-    on curved ones as the mass in each point."""
+    """(t, q) theta after the biomass has grown: on straight triangles (28)-(29), by the increase of
+    X_A + X_I over X_m; on curved ones as the mass in each point."""
     before, total = now.active + now.inert, after.active + after.inert
     if now.space.order > 1:
         return now.theta * (total / before)

@@ -1,1 +1,2 @@
-"""The paper: geometry and state of a pore, flow, kinetics, substrates, growth, contact, mesh motion, traction."""
+"""The paper's model: flow, kinetics, substrates, growth, contact, mesh motion, traction, and the
+state of the pore that they work on."""

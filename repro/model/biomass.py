@@ -1,13 +1,14 @@
-"""Active and inert biomass, X_A and X_I ((9)-(10), (28)-(34)): masses at the points in which the reaction is taken.
+"""Active and inert biomass, X_A and X_I ((9)-(10), (28)-(34)): masses at the reaction's points.
 
-A mass stays with its material when the aggregate changes its shape: that is (34), X'_i = X_i S_i / S'_i with the lumped
-areas S of linear elements, at the nodes; and the same at every quadrature point with those of higher order. Densities
-are masses over the points' weights (um2). Uptake and growth see the same masses in the same points, so that
+A mass stays with its material when the aggregate changes its shape: that is (34), X'_i = X_i S_i /
+S'_i with the lumped areas S of linear elements, at the nodes; and the same at every quadrature
+point with those of higher order. Densities are masses over the points' weights (um2). Uptake and
+growth see the same masses in the same points, so that
 
     biomass made = Y donor - (acceptor - F donor) / d_c
 
-of what is taken up, in every point and so in all. A new mesh gets the masses by a transfer that conserves their sum, or
-by the paper's interpolation, which does not [E8].
+of what is taken up, in every point and so in all. A new mesh gets the masses by a transfer that
+conserves their sum, or by the paper's interpolation, which does not [E8].
 """
 
 from __future__ import annotations
@@ -60,8 +61,9 @@ def sink(active: np.ndarray | None, duration: float = 0.0) -> Sink | None:
 
 
 def at_nodes(space: Space, field: np.ndarray) -> np.ndarray:
-    """(N,) at the mesh's nodes of a field (r, q) in the points of the reaction, zero where there is no biomass: the
-    mean of what the triangles around a node fit to theirs, linear in each; with lumping the nodal values themselves."""
+    """(N,) at the mesh's nodes of a field (r, q) in the points of the reaction, zero where there is
+    no biomass: the mean of what the triangles around a node fit to theirs, linear in each; with
+    lumping the nodal values themselves."""
     mesh, pieces = space.mesh, space.reaction
     found = np.zeros(len(mesh.points))
     if space.order == 1:
@@ -83,18 +85,20 @@ def at_points(space: Space, nodal: np.ndarray) -> np.ndarray:
 
 
 def _fit(space: Space) -> np.ndarray:
-    """(g, q) least-squares fit of a linear function to the values in a triangle's points, at the triangle's nodes."""
+    """(g, q) from values at a triangle's points to those of their linear least-squares fit at its
+    nodes."""
     from_points = np.linalg.pinv(space.table.linear)
     nodes = elements.values(1, elements.nodes(space.mesh.geometry))
     return nodes @ from_points
 
 
 def carried(how: str, old: Space, new: Space, at: Located, amounts: Amounts, density: float) -> Amounts:
-    """Amounts (r, q) on a new mesh: active and inert masses, and any others that are made of the same material.
+    """Amounts (r, q) on a new mesh: active and inert masses, and others of the same material.
 
-    how: "conserving", "bounded" or "linear", for linear elements; at: the new mesh's aggregate in the old one; density:
-    X_m, mg/L. With higher orders the new mesh's masses are X_m all together, so that what the constraint leaves of
-    J - theta within a triangle is worked off, and each amount keeps its share of them and its sum.
+    how: "conserving", "bounded" or "linear", for linear elements; at: the new mesh's aggregate in
+    the old one; density: X_m, mg/L. With higher orders the new mesh's masses are X_m all together,
+    so that what the constraint leaves of J - theta within a triangle is worked off, and each amount
+    keeps its share of them and its sum.
     """
     if old.order == 1:
         return _linear(how, old, new, amounts)
@@ -120,14 +124,14 @@ def _linear(how: str, old: Space, new: Space, amounts: Amounts) -> Amounts:
 
 
 def _scaled(amount: np.ndarray, wanted: float) -> np.ndarray:
-    """An amount (r, q) times the factor that gives it the sum ``wanted``; no inert biomass at t = 0 stays none."""
+    """An amount (r, q) scaled to the sum ``wanted``; what is zero everywhere stays zero."""
     total = float(amount.sum())
     return amount * (wanted / total) if total > 0 else amount
 
 
 def _conserved(share: np.ndarray, weight: np.ndarray, wanted: float) -> np.ndarray:
-    """Shares (r, q) with the sum ``wanted``: share (1 - share) is added as often as that takes, so that they stay
-    between zero and one."""
+    """Shares (r, q) with the weighted sum ``wanted``: a multiple of share (1 - share) is added, so
+    that they stay between zero and one."""
     room = float(np.vdot(weight, share * (1 - share)))
     lacking = wanted - float(np.vdot(weight, share))
     return share + lacking / room * share * (1 - share) if abs(lacking) < room else share

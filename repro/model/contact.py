@@ -1,4 +1,4 @@
-"""Contact with the walls, closing films, and the aggregate's new shape after it has grown (2.3.3, 3.4)."""
+"""Contact with the walls, closing films, and the grown aggregate's new shape (2.3.3, 3.4)."""
 
 from __future__ import annotations
 
@@ -14,17 +14,19 @@ from repro.scene import Scene
 
 #: Rounds in which closing films may change the contact surfaces within one step.
 CONTACT_ROUNDS = 60
-#: Rounds of shape and fluid forces, and the largest move of a node in the last of them over the aggregate's thickness.
+#: Rounds of shape and fluid forces, and the largest move of a node in the last of them over the
+#: aggregate's thickness.
 FORCE_ROUNDS, FORCE_REST = 12, 1e-8
 
 
 def expand(scene: Scene, grown: Pore, theta: np.ndarray, guess: Pore | None = None) -> tuple[Pore, int, float]:
-    """The aggregate in its new shape under theta (t, q); Newton's iterations; and the least distance (um) to the
-    opposite wall before films closed.
+    """The aggregate in its new shape under theta (t, q); Newton's iterations; and the least
+    distance (um) to the opposite wall before films closed.
 
-    guess: a pore with the shape and pressure from which the search starts, those of ``grown`` by default. With fluid forces, shape and flow are sought in turn
-    until both agree. The fluid's nodes stay where they were. Raises GrowthError where no equilibrium is found, contact
-    does not rest, or shape and flow do not agree.
+    guess: a pore with the shape and pressure from which the search starts, those of ``grown`` by
+    default. With fluid forces, shape and flow are sought in turn until both agree. The fluid's
+    nodes stay where they were. Raises GrowthError where no equilibrium is found, contact does not
+    rest, or shape and flow do not agree.
     """
     start = grown if guess is None else guess
     if scene.growth.fluid_forces == "neglected":
@@ -48,7 +50,8 @@ def _at_rest(scene: Scene, grown: Pore, theta: np.ndarray, start: Pore,
              forces: np.ndarray | None) -> tuple[Pore, int, float]:
     """The new shape under nodal forces (n, 2) um, over mu_L, that stay as they are (None: none).
 
-    After each equilibrium, films and wedges that are too thin close, and the equilibrium is sought again until none is.
+    After each equilibrium, films and wedges that are too thin close, and the equilibrium is sought
+    again until none is.
     """
     body, target_J = grown.body, theta
     if scene.growth.new_biomass == "stress_free":  # strain counts from the present shape (section 5)
@@ -79,8 +82,8 @@ def _placed(grown: Pore, found: Pore, rest: growth.Equilibrium) -> Pore:
 
 
 def _constraints(now: Pore, width: float) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 2) True where a coordinate is prescribed: x at fixed points, y on the walls (2.3.3); and (n, 2) um, what it
-    is to be."""
+    """(n, 2) True where a coordinate is prescribed: x at fixed points, y on the walls (2.3.3); and
+    (n, 2) um, its prescribed value."""
     rim, position = now.mesh.topology.body_loop, now.mesh.points[now.mesh.body]
     target = position.copy()
     target[rim[now.wall == BOTTOM], 1] = 0.0
@@ -89,7 +92,9 @@ def _constraints(now: Pore, width: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def constrained(count: int, rim: np.ndarray, wall: np.ndarray, fixed: np.ndarray) -> np.ndarray:
-    """(count, 2): x is prescribed at fixed points, y on the walls (2.3.3), of the nodes ``rim`` (M,) of the boundary.
+    """(count, 2) True where a coordinate is prescribed: x at fixed points, y on the walls (2.3.3).
+
+    rim: (M,) the boundary's nodes among all; wall, fixed: (M,), as those of an outline.
     """
     held = np.zeros((count, 2), bool)
     held[rim[fixed], 0] = True
@@ -113,8 +118,8 @@ def _with_new_surface(outline: Outline) -> np.ndarray:
 
 
 def middle_of(outline: Outline, wall: int) -> np.ndarray:
-    """(M,) True at the node nearest to the middle of the contact surface with a wall; the corner before it where that
-    is the middle of an arc."""
+    """(M,) True at the node nearest to the middle of the contact surface with a wall; the corner
+    before it where that is the middle of an arc."""
     on, x = outline.wall == wall, outline.points[:, 0]
     chosen = np.zeros(len(on), bool)
     if on.any():
@@ -125,13 +130,14 @@ def middle_of(outline: Outline, wall: int) -> np.ndarray:
 
 
 def closing(outline: Outline, width: float, film: float, angle: float) -> np.ndarray:
-    """(M,) wall that each node must join next, FREE where none (2.3.3): all nodes of straight edges that are too near,
-    of arcs the next one beside each contact line.
+    """(M,) wall that each node must join next, FREE where none (2.3.3): with straight edges all
+    nodes that are too near, with arcs the next one beside each contact line.
 
-    Contact of arcs with the opposite wall begins over the film's least thickness to both sides of the highest place, as
-    the paper's nodes make it: a single point could not hold the aggregate, whatever is enforced there. From then on
-    each contact line that must advance does so by one arc: what joins pulls its neighbours along, and where it ends
-    must not depend on how many are taken at once. A middle joins with both corners of its arc, never alone.
+    Contact of arcs with the opposite wall begins over the film's least thickness to both sides of
+    the highest place, as the paper's nodes make it: a single point could not hold the aggregate,
+    whatever is enforced there. From then on each contact line that must advance does so by one arc:
+    what joins pulls its neighbours along, and where it ends must not depend on how many are taken
+    at once. A middle joins with both corners of its arc, never alone.
     """
     joins = closing_nodes(outline, width, film, angle)
     if outline.geometry == 1 or (joins == FREE).all():
@@ -156,7 +162,8 @@ def _next_arcs(outline: Outline, joins: np.ndarray) -> np.ndarray:
 
 
 def _with_middles(outline: Outline, joins: np.ndarray, width: float) -> np.ndarray:
-    """Middles join where both corners of their arc are on the wall; one that is too near brings its nearer corner."""
+    """Middles join where both corners of their arc are on the wall; a middle that is too near joins
+    with its nearer corner."""
     gap = np.minimum(outline.points[:, 1], width - outline.points[:, 1])
     for middle in np.flatnonzero(joins[1::2] != FREE) * 2 + 1:
         ends = np.array([middle - 1, (middle + 1) % len(joins)])
@@ -173,9 +180,10 @@ def _with_middles(outline: Outline, joins: np.ndarray, width: float) -> np.ndarr
 def closing_nodes(outline: Outline, width: float, film: float, angle: float) -> np.ndarray:
     """(M,) wall that each node must join next: FREE where none (2.3.3).
 
-    A layer of fluid thinner than ``film`` to the opposite wall closes, and so does a wedge of fluid beside a contact
-    surface whose angle is under ``angle``. Beside contact both say: the gap must not be less than the smaller of film
-    and tan(angle) times the distance from the contact line. Nodes between closing ones close too: no fluid is trapped.
+    A layer of fluid thinner than ``film`` to the opposite wall closes, and so does a wedge of fluid
+    beside a contact surface whose angle is under ``angle``. Beside contact both say: the gap must
+    not be less than the smaller of film and tan(angle) times the distance from the contact line.
+    Nodes between closing ones close too: no fluid is trapped.
     """
     joins = np.full(len(outline.points), FREE)
     for wall, gap in ((BOTTOM, outline.points[:, 1]), (TOP, width - outline.points[:, 1])):
@@ -188,7 +196,8 @@ def closing_nodes(outline: Outline, width: float, film: float, angle: float) -> 
 
 
 def contact_lines(outline: Outline, wall: int) -> list[tuple[int, int]]:
-    """(node, direction) of each end of a contact surface: the next node in that direction is not on the wall."""
+    """(node, direction) of each end of a contact surface: the next node in that direction is off
+    the wall."""
     on = outline.wall == wall
     if not on.any():
         return []
@@ -198,7 +207,8 @@ def contact_lines(outline: Outline, wall: int) -> list[tuple[int, int]]:
 
 
 def _closing_run(outline: Outline, gap: np.ndarray, line: int, step: int, film: float, slope: float) -> np.ndarray:
-    """Free nodes from a contact line outwards, up to the last one with too little fluid between it and the wall."""
+    """Free nodes from a contact line outwards, up to the last with too little fluid between it and
+    the wall."""
     count = len(gap)
     walk = (line + step * np.arange(1, count)) % count
     reach = np.flatnonzero(outline.wall[walk] != FREE)[0]

@@ -1,25 +1,31 @@
 """Flow (2.1, 3.2): steady Stokes flow with a viscosity jump between fluid and biomass.
 
-(1) ``(nu/g) lap u - grad phi = 0`` and (2) ``div u = 0``, with nu = nu_water in the fluid, lambda nu_water in biomass;
-(3) parabolic profile at the inlet; (4) ``du/dx = 0`` and mean head zero at the outlet; (5) u = 0 on the walls. In the
-weak form, with the velocity scaled to mean 1 um/h and p = phi g / nu_water,
+(1) ``(nu/g) lap u - grad phi = 0`` and (2) ``div u = 0``, with nu = nu_water in the fluid, lambda
+nu_water in biomass; (3) parabolic profile at the inlet; (4) ``du/dx = 0`` and mean head zero at the
+outlet; (5) u = 0 on the walls. In the weak form, with the velocity scaled to mean 1 um/h and p =
+phi g / nu_water,
 
-    a(u, v) - (p, div v) = 0                      a(u, v) = (nu_r grad u, grad v)          "laplacian" [E2]
-    (q, div u) + sum_tau (tau grad p, grad q) = 0         or (nu_r (grad u + grad u^T), grad v)   "traction"
+    a(u, v) - (p, div v) = 0
+    (q, div u) + sum_tau (tau grad p, grad q) = 0
 
-with nu_r = 1 or lambda. Velocities of order 2 or 3 with a pressure of one order less (Taylor-Hood) need no tau. Linear
-ones with a linear pressure do: tau = h_tau^2 / (c nu_r). The paper prints no constant c [E13];
-``reference/ERRATA.md`` reports what it does. The second line says that ``w = u - tau grad p`` is divergence-free for
-every linear q: w is what carries the substrates.
+    a(u, v) = (nu_r grad u, grad v)                 "laplacian" [E2]
+           or (nu_r (grad u + grad u^T), grad v)    "traction"
 
-Linear velocities with a bubble b = 27 L1 L2 L3 in each triangle (MINI: Arnold, Brezzi and Fortin 1984) need no
-stabilisation. A linear function has a constant gradient, and the integral of grad b is zero: the bubbles' coefficients
-beta do not meet the linear part in a(u, v), and the test with b alone is A beta = -(integral of b) grad p, with A the
-bubble's 2 x 2 block of a. Put into the second line, this is the same system with tau = (integral of b)^2 / |tau| A^-1,
-and w = u - tau grad p is the mean velocity in the triangle, bubble included. With g_i = grad L_i and G = sum g_i g_i^T,
-the integral of b is 9/20 |tau|, that of grad b grad b^T is 81/20 |tau| G, and so
+with nu_r = 1 or lambda. Velocities of order 2 or 3 with a pressure of one order less (Taylor-Hood)
+need no tau. Linear ones with a linear pressure do: tau = h_tau^2 / (c nu_r). The paper prints no
+constant c [E13]; ``reference/ERRATA.md`` reports what it does. The second line says that
+``w = u - tau grad p`` is divergence-free for every linear q: w is what carries the substrates.
 
-    tau = 1 / (20 nu_r) (tr G)^-1                "laplacian"            or  1 / (20 nu_r) (tr G + G)^-1   "traction"
+Linear velocities with a bubble b = 27 L1 L2 L3 in each triangle (MINI: Arnold, Brezzi and Fortin
+1984) need no stabilisation. A linear function has a constant gradient, and the integral of grad b
+is zero: the bubbles' coefficients beta do not meet the linear part in a(u, v), and the test with b
+alone is A beta = -(integral of b) grad p, with A the bubble's 2 x 2 block of a. Put into the second
+line, this is the same system with tau = (integral of b)^2 / |tau| A^-1, and w = u - tau grad p is
+the mean velocity in the triangle, bubble included. With g_i = grad L_i and G = sum g_i g_i^T, the
+integral of b is 9/20 |tau|, that of grad b grad b^T is 81/20 |tau| G, and so
+
+    tau = 1 / (20 nu_r) (tr G)^-1         "laplacian"
+       or 1 / (20 nu_r) (tr G + G)^-1     "traction"
 """
 
 from __future__ import annotations
@@ -39,9 +45,9 @@ from repro.timing import timed
 class Flow:
     """Flow with the given mean velocity.
 
-    mean_velocity: um/h; velocity: (n, 2) um/h at the nodes of its space; head: (m,) um at the nodes of
-    the pressure's order, the mesh's corners first; correction: (T, 2) um/h,
-    tau grad p, so that w = u - correction, None where u itself carries the substrates; meshed_loss, head_loss: um, over
+    mean_velocity: um/h; velocity: (n, 2) um/h at the nodes of its space; head: (m,) um at the nodes
+    of the pressure's order, the mesh's corners first; correction: (T, 2) um/h, tau grad p, so that
+    w = u - correction, None where u itself carries the substrates; meshed_loss, head_loss: um, over
     the meshed part and the whole pore; conductivity: um/h.
     """
 
@@ -56,9 +62,9 @@ class Flow:
 
 @dataclass(frozen=True, eq=False)
 class UnitFlow:
-    """Flow of mean velocity one: velocity (n, 2) and correction (T, 2) without unit, pressure (m,) in 1/um at the nodes
-    of its own order, and its loss over the meshed part, 1/um (times nu_water / g and the mean velocity: the head loss
-    (6))."""
+    """Flow of mean velocity one: velocity (n, 2) and correction (T, 2) without unit, pressure (m,)
+    in 1/um at the nodes of its own order, and its loss over the meshed part, 1/um (times nu_water /
+    g and the mean velocity: the head loss (6))."""
 
     velocity: np.ndarray
     pressure: np.ndarray
@@ -82,7 +88,8 @@ class Bubble:
     """Linear velocity with a bubble in each triangle, condensed, and linear pressure."""
 
     def mobility(self, mesh: Mesh, viscosity: np.ndarray, interface: str) -> np.ndarray:
-        """(T, 2, 2) um2: tau of the condensed bubble, by which grad p drives the mean of the bubble's velocity."""
+        """(T, 2, 2) um2: tau of the condensed bubble, by which grad p drives the bubble's mean
+        velocity."""
         G = np.einsum("tai,taj->tij", mesh.gradients, mesh.gradients)
         block = each(np.trace(G, axis1=1, axis2=2), np.eye(2)[None])
         if interface == "traction":
@@ -109,8 +116,8 @@ def divergence(velocity: Space) -> np.ndarray:
 
 
 def viscous(velocity: Space, viscosity: np.ndarray, interface: str) -> np.ndarray:
-    """(T, 2k, 2k) element matrices of a(u, v): test functions of x, then y, by trial functions alike; (T, k, k) of each
-    component where they are not coupled. viscosity: (T,) nu_r."""
+    """(T, 2k, 2k) element matrices of a(u, v): test functions of x, then y, by trial functions
+    alike; (T, k, k) of each component where they are not coupled. viscosity: (T,) nu_r."""
     laplace = each(viscosity, velocity.stiffness)
     if interface == "laplacian":
         return laplace
@@ -130,8 +137,8 @@ def unit_flow(velocity: Space, viscosity_ratio: float, *, interface: str = "lapl
               element: Stabilised | Bubble = Stabilised()) -> UnitFlow:
     """Stokes flow of mean velocity one through the meshed part, (1)-(5).
 
-    velocity: its space; interface: "laplacian" or "traction" [E2]; element: what stabilises linear velocities. Raises
-    LinearError where the system cannot be solved.
+    velocity: its space; interface: "laplacian" or "traction" [E2]; element: what stabilises linear
+    velocities. Raises LinearError where the system cannot be solved.
     """
     mesh = velocity.mesh
     viscosity = np.where(mesh.biomass, viscosity_ratio, 1.0)
@@ -149,7 +156,10 @@ def unit_flow(velocity: Space, viscosity_ratio: float, *, interface: str = "lapl
 
 
 def stokes(velocity: Space, viscosity: np.ndarray, interface: str, mobility: np.ndarray | None) -> np.ndarray:
-    """(T, 2k + m, 2k + m) element matrices of the whole system; viscosity: (T,) nu_r; mobility: (T, 2, 2) um2, tau."""
+    """(T, 2k + m, 2k + m) element matrices of the whole system.
+
+    viscosity: (T,) nu_r; mobility: (T, 2, 2) um2, tau.
+    """
     lower = None
     if mobility is not None:
         slopes, mesh = velocity.mesh.gradients, velocity.mesh
@@ -158,7 +168,8 @@ def stokes(velocity: Space, viscosity: np.ndarray, interface: str, mobility: np.
 
 
 def _system(velocity: Space, interface: str) -> ElementSystem:
-    """u = 0 on the walls, the parabola at the inlet, u_y = 0 at the outlet in the traction form [E10]."""
+    """u = 0 on the walls, a parabola at the inlet, u_y = 0 at the outlet in the traction form
+    [E10]."""
     dofs = velocity.dofs
     held = np.zeros((velocity.count, 2), bool)
     held[np.concatenate([dofs.walls, velocity.end_nodes(dofs.inlet)])] = True
@@ -169,9 +180,9 @@ def _system(velocity: Space, interface: str) -> ElementSystem:
 
 
 def prescribed(velocity: Space) -> np.ndarray:
-    """(2n + m,) values of the constrained unknowns: u_x at the inlet (3), the parabola scaled so that the discrete flux
-    is exactly u_ave W. Between the nodes of linear triangles the parabola is cut by its chords, which lose 1 / n^2 of
-    the flux; higher orders hold it exactly."""
+    """(2n + m,) values of the constrained unknowns: u_x at the inlet (3), the parabola scaled so
+    that the discrete flux is exactly u_ave W. Between the nodes of linear triangles the parabola is
+    cut by its chords, which lose 1 / n^2 of the flux; higher orders hold it exactly."""
     dofs, width = velocity.dofs, velocity.mesh.width
     value = np.zeros(2 * velocity.count + pressure_space(velocity).count)
     nodes = velocity.end_nodes(dofs.inlet)
@@ -183,8 +194,8 @@ def prescribed(velocity: Space) -> np.ndarray:
 
 
 def work(system: ElementSystem, blocks: np.ndarray, found: np.ndarray, value: np.ndarray, width: float) -> float:
-    """Loss (1/um) as the work of the inlet per unit flux: (6) where the flow is developed, and of the order of the
-    energy, twice that of the velocity's gradient."""
+    """Loss (1/um) as the work of the inlet per unit flux: (6) where the flow is developed, and of
+    the order of the energy, twice that of the velocity's gradient."""
     return float(system.product(blocks, value) @ found) / width
 
 
@@ -194,8 +205,8 @@ def _drop(space: Space, pressure: np.ndarray) -> float:
 
 
 def scaled(unit: UnitFlow, mesh: Mesh, length: float, drive: Drive) -> Flow:
-    """The flow driven by a scene's head over the whole pore, of a length (um), or of its mean velocity: the problem is
-    linear (2.1). The head is zero at the outlet in the mean (4)."""
+    """The flow driven by a scene's head over the whole pore, of a length (um), or of its mean
+    velocity: the problem is linear (2.1). The head is zero at the outlet in the mean (4)."""
     viscosity = drive.kinematic_viscosity / drive.gravity
     whole = unit.loss + poiseuille_loss(length - (mesh.ends[1] - mesh.ends[0]), mesh.width)
     speed = drive.mean_velocity
@@ -211,6 +222,6 @@ def scaled(unit: UnitFlow, mesh: Mesh, length: float, drive: Drive) -> Flow:
 
 def solve(velocity: Space, drive: Drive, length: float, *, interface: str = "laplacian",
           element: Stabilised | Bubble = Stabilised()) -> Flow:
-    """Stokes flow through a pore of a length (um) under the drive of a scene; see :func:`unit_flow`."""
+    """Stokes flow through a pore of a length (um): :func:`unit_flow`, scaled to its drive."""
     unit = unit_flow(velocity, drive.viscosity_ratio, interface=interface, element=element)
     return scaled(unit, velocity.mesh, length, drive)

@@ -1,23 +1,26 @@
-"""The paper's transient scheme (3.3): substrates and biomass by a predictor-corrector modified Gear method.
+"""The paper's transient scheme (3.3): a modified Gear method for substrates and biomass.
 
-Every quantity y of (7)-(10), dy/dt = f, advances by Gear's second-order formula (BDF2). With r the ratio of a step h
-to the one before it (r = 0, backward Euler, in the first step),
+Every quantity y of (7)-(10), dy/dt = f, advances by Gear's second-order formula (BDF2). With r the
+ratio of a step h to the one before it (r = 0, backward Euler, in the first step),
 
     predictor   y* = y + r dy                        dy the last increment
-    corrector   dy_new = carry dy + weight h f_new   carry = r^2 / (1 + 2 r), weight = (1 + r) / (1 + 2 r)
+    corrector   dy_new = carry dy + weight h f_new   carry = r^2 / (1 + 2 r)
+                                                     weight = (1 + r) / (1 + 2 r)
 
 For C_A and C_D, (7) and (8), the corrector is one linear system each,
 
     M (C - C_n - carry dC_n) / (weight h) + L C - b + m X_A (q(C*) + q'(C*) (C - C*)) = 0
 
-with M the mass matrix (lumped for linear concentrations), L and b of :mod:`repro.model.transport`, and the uptake in
-the points of the reaction with X_A predicted; q is linearised in the substrate's own concentration; the acceptor sees
-the predicted donor, the donor the corrected acceptor. (9) advances ln X_A and (10) X_I at the corrected concentrations:
-both stay positive. Fluxes are integrated by the formula of the concentrations that they change, so that supplied - out
-- consumed = stored to round-off. Where the corrector gives a negative concentration, the step is backward Euler's with
-the sink C q(C*) / C*, which keeps C >= 0.
+with M the mass matrix (lumped for linear concentrations), L and b of :mod:`repro.model.transport`,
+and the uptake in the points of the reaction with X_A predicted; q is linearised in the substrate's
+own concentration; the acceptor sees the predicted donor, the donor the corrected acceptor. (9)
+advances ln X_A and (10) X_I at the corrected concentrations: both stay positive. Fluxes are
+integrated by the formula of the concentrations that they change, so that supplied - out - consumed
+= stored to round-off. Where the corrector gives a negative concentration, the step is backward
+Euler's with the sink C q(C*) / C*, which keeps C >= 0.
 
-Steps are controlled by |C - C*| within the aggregate (3.3.2), relative to the substrate's largest concentration.
+Steps are controlled by |C - C*| within the aggregate (3.3.2), relative to the substrate's largest
+concentration.
 """
 
 from __future__ import annotations
@@ -37,24 +40,27 @@ from repro.model.kinetics import Sink
 from repro.model.transport import UNRESOLVED, Concentrations, Problem, both_ends, supplied_everywhere
 from repro.timing import timed
 
-#: Largest accepted |C - C*| in the aggregate over the supply. Measured against a tolerance of 3e-6, 12 min from settled
-#: pores (base; a seed of 40 um; wide at 40 h) and from closed ones filled with the supply (seeds of 5 and 40 um), the
-#: largest error in concentrations, biomass made or uptake is 2e-2 at 1e-1, 9e-4 at 1e-2, 3.1e-4 at 1e-3: 0.1 % is kept.
+#: Largest accepted |C - C*| in the aggregate over the supply. Measured against a tolerance of 3e-6,
+#: 12 min from settled pores (base; a seed of 40 um; wide at 40 h) and from closed ones filled with
+#: the supply (seeds of 5 and 40 um), the largest error in concentrations, biomass made or uptake is
+#: 2e-2 at 1e-1, 9e-4 at 1e-2, 3.1e-4 at 1e-3: 0.1 % is kept.
 TOLERANCE = 1e-3
-#: Bounds on the ratio of successive steps, and the part taken of the step that would just be accepted.
+#: Bounds on the ratio of successive steps, and the part taken of the step that would just be
+#: accepted.
 LONGER, SHORTER, SAFETY = 2.0, 0.2, 0.8
-#: Longest first step, which is of first order: 45 s keep its error under 2e-4 (720 s: 2e-2). A step under 1e-6 s fails.
+#: Longest first step, which is of first order: 45 s keep its error under 2e-4 (720 s: 2e-2). A step
+#: under 1e-6 s fails.
 FIRST, SHORTEST = 45 / 3600, 1e-6 / 3600
-#: Settled: the change over the supply that further steps of LONG (h) would sum up to. On the way there: the largest
-#: change in a step, the factor by which steps rise and fall, and most steps.
+#: Settled: the change over the supply that further steps of LONG (h) would sum up to. On the way
+#: there: the largest change in a step, the factor by which steps rise and fall, and most steps.
 SETTLED, LONG, SETTLING, FASTER, MOST_STEPS = 1e-9, 1e6, 0.3, 10.0, 1000
 
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """One time level: fields (2, n) C_A, C_D (mg/L); biomass (2, r, q): rise of ln X_A since the start, and X_I (um2
-    mg/L); flows (2, 3): each substrate supplied, out and consumed since the start (um2 mg/L); the increments of all
-    three in the last step, and its size (h)."""
+    """One time level: fields (2, n) C_A, C_D (mg/L); biomass (2, r, q): rise of ln X_A since the
+    start, and X_I (um2 mg/L); flows (2, 3): each substrate supplied, out and consumed since the
+    start (um2 mg/L); the increments of all three in the last step, and its size (h)."""
 
     fields: np.ndarray
     biomass: np.ndarray
@@ -67,8 +73,8 @@ class Level:
 
 @dataclass(frozen=True, eq=False)
 class Advance:
-    """X_A, X_I (r, q) um2 mg/L and concentrations (mg/L) at the end; flows: (acceptor, donor) pairs supplied, out,
-    consumed, stored in um2 mg/L; steps: sizes of the steps taken (h)."""
+    """X_A, X_I (r, q) um2 mg/L and concentrations (mg/L) at the end; flows: (acceptor, donor) pairs
+    supplied, out, consumed, stored in um2 mg/L; steps: sizes of the steps taken (h)."""
 
     active: np.ndarray
     inert: np.ndarray
@@ -79,8 +85,8 @@ class Advance:
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """One substrate's equations: entries of its operator and of the mass matrix, in the order of the system's columns,
-    and both as matrices."""
+    """One substrate's equations: entries of its operator and of the mass matrix, in the order of
+    the system's columns, and both as matrices."""
 
     operator: np.ndarray
     storage: np.ndarray
@@ -92,8 +98,9 @@ class Row:
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """What the scheme needs: active: (r, q) um2 mg/L at the start; watched: (n,) nodes of the step control; scale:
-    (2, 1) of the concentrations; living: are F3 and F4 integrated; simultaneous: see :func:`advance`."""
+    """What the scheme needs: active: (r, q) um2 mg/L at the start; watched: (n,) nodes of the step
+    control; scale: (2, 1) of the concentrations; living: are F3 and F4 integrated; simultaneous:
+    see :func:`advance`."""
 
     problem: Problem
     active: np.ndarray
@@ -162,11 +169,13 @@ def _sparse(space: Space, held_ends: bool) -> ElementSystem:
 
 @timed("transport")
 def settle(problem: Problem, sink: Sink | None, guess: Concentrations | None) -> Concentrations:
-    """Profiles consistent with the biomass after a shape update: the scheme with F3 = F4 = 0 until nothing changes.
+    """Profiles consistent with the biomass after a shape update: the scheme with F3 = F4 = 0, run
+    until nothing changes.
 
-    The way there does not matter (3.3.2): backward Euler in steps that rise to LONG as fast as SETTLING permits. Where
-    nothing can enter or leave the pore no profile is steady: returns the guess unchanged (None: C_supply everywhere).
-    Raises TransportError where the profiles do not come to rest.
+    The way there does not matter (3.3.2): backward Euler in steps that rise to LONG as fast as
+    SETTLING permits. Where nothing can enter or leave the pore no profile is steady: returns the
+    guess unchanged (None: C_supply everywhere). Raises TransportError where the profiles do not
+    come to rest.
     """
     start = supplied_everywhere(problem) if guess is None else guess
     if not (problem.inflow.any() or problem.system.held.any()):
@@ -190,9 +199,10 @@ def advance(problem: Problem, active: np.ndarray, inert: np.ndarray, start: Conc
             tolerance: float = TOLERANCE, fixed_step: float | None = None, simultaneous: bool = False) -> Advance:
     """Integrate (7)-(10) over a duration (h) in one geometry.
 
-    active, inert: X_A, X_I (r, q) um2 mg/L at the start; fixed_step: steps of that size (h), uncontrolled;
-    simultaneous: both substrates see the other's prediction, as (3.3.1) may be read; less accurate, and long steps may
-    then oscillate. Raises TransportError where the step falls under SHORTEST.
+    active, inert: X_A, X_I (r, q) um2 mg/L at the start; fixed_step: steps of that size (h),
+    uncontrolled; simultaneous: both substrates see the other's prediction, as (3.3.1) may be read;
+    less accurate, and long steps may then oscillate. Raises TransportError where the step falls
+    under SHORTEST.
     """
     system, now = _started(problem, active, inert, start, simultaneous=simultaneous)
     before, left = now.fields, duration
@@ -229,8 +239,9 @@ def _level(fields: np.ndarray, biomass: np.ndarray) -> Level:
 
 
 def _accepted(system: System, now: Level, step: float, tolerance: float, when: str, least: float):
-    """A step of this size, or of the first smaller one that is positive and differs little enough from its prediction,
-    and that difference over the scale; each try is shorter than the last by a factor of 1/2 to ``least``."""
+    """A step of this size, or of the first smaller one that is positive and differs little enough
+    from its prediction, and that difference over the scale; each try is shorter than the last by a
+    factor of 1/2 to ``least``."""
     floor = _lowest(system.problem)
     while step >= SHORTEST:
         new, difference = _corrected(system, now, step, positive=False)
@@ -244,12 +255,13 @@ def _accepted(system: System, now: Level, step: float, tolerance: float, when: s
 
 
 def _lowest(problem: Problem) -> float:
-    """The least concentration (mg/L) that is accepted: a lumped reaction of linear ones keeps them positive."""
+    """The least concentration (mg/L) that is accepted: the lumped reaction of linear elements keeps
+    them positive."""
     return 0.0 if problem.space.order == 1 else -UNRESOLVED * max(s.supply for s in problem.both)
 
 
 def _factor(tolerance: float, size: float) -> float:
-    """Change of the step that brings the difference, of second order in it, just under the tolerance."""
+    """Ratio of steps that brings a difference of second order in it just under the tolerance."""
     return SAFETY * np.sqrt(tolerance / max(size, 1e-99))
 
 
@@ -264,7 +276,8 @@ def _too_short(system: System, new: Level, difference: np.ndarray, when: str) ->
 
 
 def _corrected(system: System, now: Level, step: float, positive: bool) -> tuple[Level, np.ndarray]:
-    """One step, and |C - C*| over the scale (2, n); positive: by backward Euler with the positive sink."""
+    """One step, and |C - C*| over the scale (2, n); positive: by backward Euler with the positive
+    form of the sink."""
     ratio = step / now.step
     carry, weight = (0.0, 1.0) if positive else (ratio**2 / (1 + 2 * ratio), (1 + ratio) / (1 + 2 * ratio))
     interval, flux = weight * step, np.empty((2, 3))
@@ -297,7 +310,8 @@ def _rates(system: System, fields: np.ndarray):
 
 
 def _sink(system: System, active: np.ndarray, fields: np.ndarray, s: int, positive: bool):
-    """Slope and offset (r, q) of the uptake of substrate s, slope C + offset (um2 mg/L/h), linearised at the fields."""
+    """Slope and offset (r, q) of the uptake of substrate s linearised at the fields, slope C +
+    offset (um2 mg/L/h)."""
     problem = system.problem
     if problem.kinetics is None:
         return np.zeros_like(active), np.zeros_like(active)
@@ -310,8 +324,8 @@ def _sink(system: System, active: np.ndarray, fields: np.ndarray, s: int, positi
 
 
 def _solved(system: System, s: int, interval: float, past: np.ndarray, slope: np.ndarray, offset: np.ndarray):
-    """C (n,) of M (C - past) / interval + L C - b + slope C + offset = 0, and what is supplied, leaves and is consumed.
-    """
+    """C (n,) of M (C - past) / interval + L C - b + slope C + offset = 0; and what is supplied,
+    what leaves and what is consumed."""
     row, sparse, pieces, problem = system.rows[s], system.sparse, system.space.reaction, system.problem
     k = pieces.cells.shape[1]
     products = (pieces.values[:, :, None] * pieces.values[:, None, :]).reshape(len(pieces.values), -1)

@@ -1,25 +1,28 @@
 """Growth mechanics (2.3, 3.4): the aggregate as an incompressible neo-Hookean body that grows.
 
-Plane strain, from the configuration of t = 0: F = d phi / d X, J = det F, tr C = F : F + 1. Stationary in phi and P is
+Plane strain, from the configuration of t = 0: F = d phi / d X, J = det F, tr C = F : F + 1.
+Stationary in phi and P is
 
-    Pi = integral of mu/2 (J^(-2/3) tr C - 3) + P (J - theta) dV - 1/2 sum_tau integral of h^2/(12 mu_tau) |grad P|^2 dv
+    Pi = integral of mu/2 (J^(-2/3) tr C - 3) + P (J - theta) dV
+         - 1/2 sum_tau integral of h^2/(12 mu_tau) |grad P|^2 dv
 
-(14)-(17), (21)-(24) and (27), hence J = theta. Signs are [E5]'s: the stabilisation makes the pressure block negative.
-Without tractions mu_L scales P and nothing else: it is 1 in here. P is linear. With A = mu J^(-2/3) and H = F^-T
-(dJ = J H : dF), first Piola-Kirchhoff stress and tangent are
+(14)-(17), (21)-(24) and (27), hence J = theta. Signs are [E5]'s: the stabilisation makes the
+pressure block negative. Without tractions mu_L scales P and nothing else: it is 1 in here. P is
+linear. With A = mu J^(-2/3) and H = F^-T (dJ = J H : dF), first Piola-Kirchhoff stress and tangent
+are
 
     S = A (F - tr C / 3 H) + P J H
     dS = A (dF - 2/3 (H : dF) F - 2/3 (F : dF) H + 2/9 tr C (H : dF) H + tr C / 3 H dF^T H)
          + P J ((H : dF) H - H dF^T H)
 
-*Straight triangles*, linear displacements. [E6]: h, grad and dv are those of the last known shape, and the modulus is
-the incremental one there, mu_tau = mu_L theta^(-2/3); in reference quantities the stabilisation so grows as J^(5/3).
-It is kept fixed while an equilibrium is sought.
+*Straight triangles*, linear displacements. [E6]: h, grad and dv are those of the last known shape,
+and the modulus is the incremental one there, mu_tau = mu_L theta^(-2/3); in reference quantities
+the stabilisation so grows as J^(5/3). It is kept fixed while an equilibrium is sought.
 
-*Curved triangles*, quadratic displacements (Taylor-Hood): no term in |grad P|^2, but P + gamma theta^(-5/3) (J - theta)
-for P in S. That (grad-div stabilisation) vanishes where J = theta. It is needed: at a given shape the energy of plane
-expansion is J^(1/3) + J^(-2/3) / 2, which is concave, and what the linear pressure leaves free of J would grow from
-nothing.
+*Curved triangles*, quadratic displacements (Taylor-Hood): no term in |grad P|^2, but P + gamma
+theta^(-5/3) (J - theta) for P in S. That (grad-div stabilisation) vanishes where J = theta. It is
+needed: at a given shape the energy of plane expansion is J^(1/3) + J^(-2/3) / 2, which is concave,
+and what the linear pressure leaves free of J would grow from nothing.
 """
 
 from __future__ import annotations
@@ -40,22 +43,24 @@ from repro.fem.mesh import gradients, triangle_areas
 from repro.fem.newton import Newton, relative
 from repro.timing import timed
 
-#: Newton stops at this residual against the size of its terms, or at the second where round-off keeps it from falling.
+#: Newton stops at this residual against the size of its terms, or at the second where round-off
+#: keeps it from falling.
 NEWTON, ROUND_OFF, MOST_ITERATIONS = 1e-11, 1e-8, 25
 #: Halvings in a line search; sub-steps of a continuation.
 HALVINGS = 8
 CONTINUATION = (1, 8, 64)
-#: gamma: the energy's curvature in J is -2/9 J^(-5/3) and less, so that one makes it convex with room to spare.
+#: gamma: the energy's curvature in J is -2/9 J^(-5/3) and less, so that one makes it convex with
+#: room to spare.
 GAMMA = 1.0
-#: On curved triangles theta goes to its target in parts of at most this factor: a longer step of Newton's method may
-#: end in another equilibrium, with a wrinkled surface.
+#: On curved triangles theta goes to its target in parts of at most this factor: a longer step of
+#: Newton's method may end in another equilibrium, with a wrinkled surface.
 FACTOR = 1.2
 
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """Connections of the aggregate's own mesh. cells: (t, 3 or 6), corners numbered first; corners: how many; degree:
-    of the quadrature; method: of the linear systems."""
+    """Connections of the aggregate's own mesh. cells: (t, 3 or 6), corners numbered first; corners:
+    how many; degree: of the quadrature; method: of the linear systems."""
 
     cells: np.ndarray
     corners: int
@@ -95,7 +100,8 @@ class Shape:
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """The aggregate in its reference configuration: places of its nodes (n, 2) um on the mesh of ``shape``."""
+    """The aggregate in its reference configuration: its nodes, on the mesh of ``shape``, are at
+    (n, 2) um."""
 
     shape: Shape
     reference: np.ndarray
@@ -111,7 +117,8 @@ class Body:
         return self.at.weighted
 
     def strained(self, position: np.ndarray) -> Strained:
-        """The deformation (t, q, 2, 2) that brings the reference to positions (n, 2) um, and what goes with it."""
+        """The deformation (t, q, 2, 2) that brings the reference to positions (n, 2) um, with what
+        the stress takes from it."""
         gradient = np.swapaxes(position[self.shape.cells], 1, 2) @ np.swapaxes(self.at.rows, 1, 2)
         count, points = self.at.dx.shape
         return Strained(elements.by_component(gradient.reshape(count, 2, points, 2).transpose(1, 3, 0, 2)))
@@ -119,7 +126,8 @@ class Body:
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """position: (n, 2) um; pressure: (corners,) P / mu_L; iterations of Newton's method, all sub-steps together."""
+    """position: (n, 2) um; pressure: (corners,) P / mu_L; iterations: of Newton's method, over all
+    sub-steps."""
 
     position: np.ndarray
     pressure: np.ndarray
@@ -128,8 +136,8 @@ class Equilibrium:
 
 @dataclass(frozen=True, eq=False)
 class Strained:
-    """Plane deformations F (..., 2, 2) and what the stress takes from them, each worked out once, where it is asked
-    for: J before anything is divided by it."""
+    """Plane deformations F (..., 2, 2) and what the stress takes from them, each worked out once,
+    where it is asked for: J before anything is divided by it."""
 
     F: np.ndarray
 
@@ -154,8 +162,8 @@ class Strained:
         return np.sum(self.F**2, axis=(-2, -1)) + 1
 
     def piola(self, P: np.ndarray) -> np.ndarray:
-        """First Piola-Kirchhoff stress (..., 2, 2), the derivative of (21) by F, at a pressure P (...); both over mu_L.
-        """
+        """First Piola-Kirchhoff stress (..., 2, 2) at a pressure P (...), both over mu_L: the
+        derivative of (21) by F."""
         return self.A[..., None, None] * self.F + (P * self.J - self.A * self.trace / 3)[..., None, None] * self.H
 
 
@@ -204,7 +212,7 @@ def largest_principal(stress: np.ndarray) -> np.ndarray:
 
 
 def gradient_stabilisation(position: np.ndarray, triangles: np.ndarray, theta: np.ndarray) -> np.ndarray:
-    """(t, 3, 3) matrices of sum_tau h^2 / (12 theta^(-2/3)) (grad p, grad q) on the shape ``position`` [E6]."""
+    """(t, 3, 3) matrices of sum_tau h^2 / (12 theta^(-2/3)) (grad p, grad q) on a shape [E6]."""
     slopes, areas = gradients(position, triangles), triangle_areas(position, triangles)
     corner = position[triangles]
     sides = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2)
@@ -217,8 +225,8 @@ Found = TypeVar("Found")
 
 
 class Last(Generic[Found]):
-    """A function of one array that keeps its last result until another array is asked for; arrays do not change in
-    place."""
+    """A function of one array that keeps its last result until it is asked for another array, which
+    must not change in place."""
 
     def __init__(self, function: Callable[[np.ndarray], Found]):
         self._function = function
@@ -232,8 +240,8 @@ class Last(Generic[Found]):
 
 @dataclass(frozen=True, eq=False)
 class Iterate:
-    """position: (n, 2) um; pressure: (corners,) P / mu_L; residual and the size of its terms; lag: (n, 2) um, what
-    prescribed coordinates still lack; free: unknowns that are not prescribed."""
+    """position: (n, 2) um; pressure: (corners,) P / mu_L; residual and the size of its terms; lag:
+    (n, 2) um, what prescribed coordinates still lack; free: unknowns that are not prescribed."""
 
     position: np.ndarray
     pressure: np.ndarray
@@ -263,9 +271,10 @@ class System:
 
     def __init__(self, body: Body, held: np.ndarray, *, stabilising: np.ndarray | None = None,
                  forces: np.ndarray | None = None, system: ElementSystem | None = None):
-        """held: (n, 2) True where a coordinate is prescribed; stabilising: (t, 3, 3) of |grad P|^2, None on curved
-        triangles; forces: (n, 2) um, nodal forces over mu_L that do not depend on the shape (the t0 of (20)), none by
-        default; system: the sparse system with nothing prescribed, if it is known."""
+        """held: (n, 2) True where a coordinate is prescribed; stabilising: (t, 3, 3) of |grad P|^2,
+        None on curved triangles; forces: (n, 2) um, nodal forces over mu_L that do not depend on
+        the shape (the t0 of (20)), none by default; system: the sparse system with nothing
+        prescribed, if it is known."""
         self.body, self.held, self.stabilising = body, held, stabilising
         rows = np.concatenate([held[:, 0], held[:, 1], np.zeros(body.shape.corners, bool)])
         self.sparse = body.shape.constrained(rows) if system is None else system.holding(rows)
@@ -300,7 +309,8 @@ class System:
         return at, linear + self._stiffening() * (at.J - self.theta)
 
     def residual(self, position: np.ndarray, pressure: np.ndarray) -> np.ndarray:
-        """(2n + corners,) [x of all nodes, y, then P of the corners]; the caller excludes det F <= 0."""
+        """(2n + corners,): x of all nodes, y, then P of the corners; det F > 0 is the caller's
+        business."""
         at, P = self._pressed(position, pressure)
         gap = (self.body.at.dx * (at.J - self.theta)) @ self.body.shape.table.linear
         if self.stabilising is not None:
@@ -314,7 +324,7 @@ class System:
         return self._summed(terms, (self.body.at.dx * self.theta) @ linear) + np.abs(self.pull)
 
     def _forces(self, stress: np.ndarray, weighted: np.ndarray) -> np.ndarray:
-        """(t, 2, k) of the integral of stress (t, q, 2, 2) : grad v, weighted (t, 2 q, k) being dx grad v."""
+        """(t, 2, k) integrals of stress (t, q, 2, 2) : grad v; weighted: (t, 2 q, k) dx grad v."""
         return np.swapaxes(stress, 1, 2).reshape(len(stress), 2, -1) @ weighted
 
     def _summed(self, force: np.ndarray, gap: np.ndarray) -> np.ndarray:
@@ -348,8 +358,8 @@ class System:
         return self.sparse.factored(self.tangent(iterate.position, iterate.pressure))
 
     def advanced(self, iterate: Iterate, factors: Factored, fresh: bool) -> Iterate:
-        """The longest of the steps 1, 1/2, ... with det F > 0 that does not raise the residual fourfold; the first step
-        carries prescribed coordinates to their target."""
+        """The longest of the steps 1, 1/2, ... with det F > 0 that does not raise the residual
+        fourfold; the first step carries prescribed coordinates to their target."""
         lag = iterate.lag
         move = None if iterate.complete else np.concatenate([lag[:, 0], lag[:, 1], np.zeros(len(iterate.pressure))])
         step = factors.solve(-iterate.residual, move)
@@ -372,12 +382,13 @@ def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: n
                 reused: bool = False) -> Equilibrium:
     """Equilibrium under the expansion theta (t, q) since the reference, from a start.
 
-    position: (n, 2) um, where to start, with det F > 0; pressure: (corners,) P / mu_L there; held: (n, 2) True where a
-    coordinate is prescribed, and prescribed: (n, 2) um, what it is to reach; last: (n, 2) um, the last known shape, the
-    start by default; forces: (n, 2) um, nodal forces over mu_L, none by default; reused: is Newton's derivative kept
-    while it does enough? Newton's method with a line search that rejects det F <= 0; where it fails, theta and the
-    prescribed coordinates go from where they are to their targets in geometric sub-steps. Raises GrowthError where that
-    fails too.
+    position: (n, 2) um, where to start, with det F > 0; pressure: (corners,) P / mu_L there; held:
+    (n, 2) True where a coordinate is prescribed, and prescribed: (n, 2) um, what it is to reach;
+    last: (n, 2) um, the last known shape, the start by default; forces: (n, 2) um, nodal forces
+    over mu_L, none by default; reused: is Newton's derivative kept while it does enough? Newton's
+    method with a line search that rejects det F <= 0; where it fails, theta and the prescribed
+    coordinates go from where they are to their targets in geometric sub-steps. Raises GrowthError
+    where that fails too.
     """
     start = body.strained(position).J
     if start.min() <= 0 or theta.min() <= 0:
@@ -396,8 +407,8 @@ def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: n
 
 def reach(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibrium, prescribed: np.ndarray,
           parts: int = 1, reused: bool = False) -> Equilibrium:
-    """Equilibrium of a system under theta, from J = ``start`` (shaped alike), in ``parts`` or, where that fails, more;
-    see :func:`equilibrium`."""
+    """Equilibrium of a system under theta, from J = ``start`` (shaped alike), in ``parts`` or,
+    where that fails, more; see :func:`equilibrium`."""
     failure = ""
     for steps in CONTINUATION:
         try:

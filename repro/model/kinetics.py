@@ -1,15 +1,17 @@
-"""Dual Monod kinetics (2.2): uptake of the substrates (7)-(8), growth and decay of the biomass (9)-(10).
+"""Dual Monod kinetics (2.2): uptake of the substrates (7)-(8), growth and decay (9)-(10).
 
 With m_A = C_A / (C_A + K_sA) and m_D alike:
 
     F1 = -X_A m_A (k F m_D + d_c f_d b)        F3 = X_A m_A (k Y m_D - b)
     F2 = -k X_A m_A m_D                        F4 = X_A m_A b (1 - f_d)
 
-[E3]: the demand of decay is d_c f_d b. [E1]: F is the 1.52 of Table 1 by default, not COD - Y d_c = 1.5138. So, for
-whatever concentrations, F3 + F4 = -Y F2 + (F1 - F F2) / d_c: biomass is made of donor, and what decays takes acceptor.
+[E3]: the demand of decay is d_c f_d b. [E1]: F is the 1.52 of Table 1 by default, not COD - Y d_c =
+1.5138. So, for whatever concentrations, F3 + F4 = -Y F2 + (F1 - F F2) / d_c: biomass is made of
+donor, and what decays takes acceptor.
 
-Uptake and growth are functions of max(C, 0). The transient scheme's linearisation alone asks for the *extended* uptake,
-which goes on linearly below zero in its own substrate and takes the other as zero: it stays monotone.
+Uptake and growth are functions of max(C, 0). The transient scheme's linearisation alone asks for
+the *extended* uptake, which goes on linearly below zero in its own substrate and takes the other as
+zero: it stays monotone.
 """
 
 from __future__ import annotations
@@ -24,7 +26,8 @@ Slopes = tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 def monod(concentration, half_saturation: float):
-    """m = C / (C + K) and dm/dC for C >= 0; below zero their tangent at zero, C / K and 1 / K. Shapes as C's (mg/L)."""
+    """m = C / (C + K) and dm/dC for C >= 0 (mg/L); below zero their tangent at zero, C / K and
+    1 / K."""
     bounded = np.maximum(concentration, 0.0) + half_saturation
     return concentration / bounded, half_saturation / bounded**2
 
@@ -41,7 +44,10 @@ def fractions(acceptor, donor, substrates: Substrates):
 
 
 def uptake(acceptor, donor, substrates: Substrates, kinetics: Kinetics, extended: bool = False):
-    """Uptake per active biomass (1/h): -F1/X_A and -F2/X_A at C_A and C_D (mg/L); extended: see the module."""
+    """Uptake per active biomass (1/h): -F1/X_A and -F2/X_A at C_A and C_D (mg/L).
+
+    extended: goes on linearly below zero, see the module's docstring.
+    """
     if not extended:
         return _of_fractions(*fractions(acceptor, donor, substrates), kinetics)
     m_a, m_d = (monod(c, s.half_saturation)[0]
@@ -51,7 +57,8 @@ def uptake(acceptor, donor, substrates: Substrates, kinetics: Kinetics, extended
 
 
 def uptake_slopes(acceptor, donor, substrates: Substrates, kinetics: Kinetics, extended: bool = False) -> Slopes:
-    """Derivatives of :func:`uptake` (1/h per mg/L): ((dq_A/dC_A, dq_A/dC_D), (dq_D/dC_A, dq_D/dC_D))."""
+    """Derivatives of :func:`uptake`: ((dq_A/dC_A, dq_A/dC_D), (dq_D/dC_A, dq_D/dC_D)), 1/h per
+    mg/L."""
     (m_a, d_a), (m_d, d_d) = (monod(c, s.half_saturation)
                               for c, s in zip((acceptor, donor), (substrates.acceptor, substrates.donor)))
     k, demand = kinetics.maximum_utilization_rate, kinetics.acceptor_to_donor_ratio
@@ -94,9 +101,10 @@ def mean_growth(exponent):
 
 
 def grow(active, inert, growth, remains, step: float):
-    """(9)-(10) integrated over a step (h) at constant rates: X_A grows by exp(growth step), exactly.
+    """(9)-(10) integrated exactly over a step (h) at constant rates: X_A grows by exp(growth step).
 
-    active, inert: X_A, X_I, mg/L, or masses of them; growth, remains: F3/X_A and F4/X_A (1/h). Returns the new two.
+    active, inert: X_A, X_I, mg/L, or masses of them; growth, remains: F3/X_A and F4/X_A (1/h).
+    Returns the new two.
     """
     mean = mean_growth(growth * step)[0]
     return active * (1 + growth * step * mean), inert + active * mean * remains * step
@@ -104,9 +112,11 @@ def grow(active, inert, growth, remains, step: float):
 
 @dataclass(frozen=True, eq=False)
 class Sink:
-    """Active biomass that takes up substrates: its masses at the points of a reaction, (r, q) um2 mg/L, and the time
-    (h) over which it grows meanwhile; zero: as it is. Over a time, the mean of its mass takes part, that of the rate
-    at the very concentrations that are sought: so what is taken up and what is made are one integral.
+    """Active biomass that takes up substrates, as it is or as it grows over a time.
+
+    active: (r, q) um2 mg/L, masses at the points of the reaction; duration: h, the time over which
+    it grows meanwhile, zero: as it is. Over a time its mean mass takes part, at the growth rate of
+    the very concentrations that are sought: what is taken up and what is made are one integral.
 
     All of it is a function of the fractions m_A and m_D, (2, r, q).
     """
@@ -127,7 +137,8 @@ class Sink:
         return mass[:, None] * rates
 
     def slopes(self, fractions: np.ndarray, kinetics: Kinetics) -> np.ndarray:
-        """(2, 2, r, q) um2 mg/L/h, derivatives of :meth:`uptake` of acceptor and donor by m_A and by m_D."""
+        """(2, 2, r, q) um2 mg/L/h, derivatives of :meth:`uptake`, of acceptor and donor, by m_A and
+        m_D."""
         m_a, m_d = fractions
         k, demand = kinetics.maximum_utilization_rate, kinetics.acceptor_to_donor_ratio
         by = np.stack([[k * demand * m_d + decay_demand(kinetics), k * demand * m_a], [k * m_d, k * m_a]])

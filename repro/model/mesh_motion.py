@@ -1,12 +1,14 @@
 """Mesh motion (3.5): the mesh of the fluid follows the aggregate.
 
-The displacement d of the fluid's corners solves a pseudo-Stokes problem that may be compressed, (35):
+The displacement d of the fluid's corners solves a pseudo-Stokes problem that may be compressed,
+(35):
 
-    (grad d, grad v) - (P, div v) = 0,        (q, div d) + gamma (P, q) + sum_tau (tau grad P, grad q) = 0
+    (grad d, grad v) - (P, div v) = 0
+    (q, div d) + gamma (P, q) + sum_tau (tau grad P, grad q) = 0
 
-with linear functions and the flow's stabilisation tau = h^2 / c. Interface nodes move with the biomass; corners of
-walls, inlet and outlet slide along their line. gamma is not printed [E13]: 1 by default. Edges of the fluid stay
-straight but at the interface.
+with linear functions and the flow's stabilisation tau = h^2 / c. Interface nodes move with the
+biomass; corners of walls, inlet and outlet slide along their line. gamma is not printed [E13]: 1 by
+default. Edges of the fluid stay straight but at the interface.
 """
 
 from __future__ import annotations
@@ -24,8 +26,8 @@ from repro.timing import timed
 def move(mesh: Mesh, body: np.ndarray, compressibility: float, stabilisation: float) -> np.ndarray:
     """(N, 2) um: nodes of the whole mesh after the aggregate's nodes have moved.
 
-    body: (n, 2) um, new places of ``mesh.body``; compressibility: gamma; stabilisation: c of tau = h^2 / c.
-    The result may hold triangles that are turned over: that is for the caller to judge.
+    body: (n, 2) um, new places of ``mesh.body``; compressibility: gamma; stabilisation: c of tau =
+    h^2 / c. The result may hold triangles that are turned over: that is for the caller to judge.
     """
     points, straight = mesh.points.copy(), mesh.straight
     points[mesh.body] = body
@@ -38,7 +40,8 @@ def move(mesh: Mesh, body: np.ndarray, compressibility: float, stabilisation: fl
 
 
 def _fluid_displacement(mesh: Mesh, known: np.ndarray, gamma: float, c: float) -> np.ndarray:
-    """(f, 2) displacement of the fluid's corners; ``known`` (N, 2) holds the aggregate's, and zero elsewhere."""
+    """(f, 2) displacement of the fluid's corners; known: (N, 2) that of the aggregate, zero
+    elsewhere."""
     fluid, there, space = mesh.topology.fluid, ~mesh.biomass, Space(mesh, 1)
     laplace = space.stiffness[there]
     lower = each(mesh.circumdiameter[there] ** 2 / c, laplace) + gamma * mass(mesh.areas[there])
@@ -56,7 +59,8 @@ def _system(mesh: Mesh) -> ElementSystem:
 
 
 def _held(mesh: Mesh) -> np.ndarray:
-    """(N, 2) True where x or y of a node is prescribed: the aggregate's nodes, and across walls, inlet and outlet."""
+    """(N, 2) True where x or y of a node is prescribed: in the aggregate, and across walls, inlet
+    and outlet."""
     held, topology = np.zeros((len(mesh.points), 2), bool), mesh.topology
     held[np.concatenate([topology.inlet, topology.outlet]), 0] = True
     held[topology.walls, 1] = True

@@ -23,9 +23,9 @@ from repro.scene import Scene
 MINIMUM_FILM = 2.0
 #: Under this Peclet number u W / D the inlet supplies nothing that could be told from round-off.
 SLOWEST = 1e-9
-#: With order 2 and 3 elements are made no larger than this asks for: the concentration boundary layer is W Pe^(-1/3)
-#: thick (Leveque), and with four elements across the pore and this factor an overshoot upstream of an aggregate stays
-#: under 1 %.
+#: With order 2 and 3 elements are made no larger than this asks for: the concentration boundary
+#: layer is W Pe^(-1/3) thick (Leveque), and with four elements across the pore and this factor an
+#: overshoot upstream of an aggregate stays under 1 %.
 BOUNDARY_LAYER = 0.15
 
 
@@ -33,11 +33,12 @@ BOUNDARY_LAYER = 0.15
 class Pore:
     """Geometry and biomass at one time.
 
-    time: h; space: of velocity and concentrations, on the mesh; wall: (M,) contact of each node of the mesh's loop;
-    fixed: (M,) its x is constrained; active, inert: X_A, X_I, (r, q) um2 mg/L at the points of the reaction; theta:
-    (t, q) expansion since t = 0 in the aggregate's triangles; body: the aggregate as it was at t = 0; pressure:
-    (corners,) P / mu_L; concentrations: the last known ones, None before the first; front: what element sizes at the
-    aggregate are divided by, for a front of the substrates in it.
+    time: h; space: of velocity and concentrations, on the mesh; wall: (M,) contact of each node of
+    the mesh's loop; fixed: (M,) its x is constrained; active, inert: X_A, X_I, (r, q) um2 mg/L at
+    the points of the reaction; theta: (t, q) expansion since t = 0 in the aggregate's triangles;
+    body: the aggregate as it was at t = 0; pressure: (corners,) P / mu_L; concentrations: the last
+    known ones, None before the first; front: what element sizes at the aggregate are divided by,
+    for a front of the substrates in it.
     """
 
     time: float
@@ -88,16 +89,16 @@ class Pore:
         return replace(self, space=Space(self.mesh.moved(points), self.space.order))
 
     def composition(self, maximum_density: float) -> tuple[float, float, float]:
-        """Share of X_I in the biomass, and the least and the largest (X_A + X_I) / X_m, which the constraint J = theta
-        keeps near one."""
+        """Share of X_I in the biomass, and the least and the largest (X_A + X_I) / X_m, which the
+        constraint J = theta keeps near one."""
         density = (self.active + self.inert) / self.space.reaction.dx / maximum_density
         return float(self.inert.sum() / self.mass), float(density.min()), float(density.max())
 
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """Flow and substrates in the geometry of a pore, and the ledgers of acceptor and donor; None where the scene does
-    not model them."""
+    """Flow and substrates in the geometry of a pore, and the ledgers of acceptor and donor; None
+    where the scene models none."""
 
     flow: Flow | None
     problem: Problem | None
@@ -111,7 +112,7 @@ def film(scene: Scene) -> float:
 
 
 def resolution(scene: Scene) -> float:
-    """What element sizes are divided by: ``numerics.refinement``, or more where boundary layers ask for it.
+    """What element sizes are divided by: ``numerics.refinement``, or more for boundary layers.
 
     The speed is the scene's mean velocity, or that of the clean channel under its head.
     """
@@ -121,7 +122,8 @@ def resolution(scene: Scene) -> float:
 
 
 def fastest(scene: Scene) -> float:
-    """Mean velocity (um/h) of a scene with flow; under a head that of the clean channel, its largest."""
+    """Mean velocity (um/h) of a scene's flow; under a head that of the clean channel, the
+    largest."""
     drive = scene.flow
     if drive.mean_velocity is not None:
         return drive.mean_velocity
@@ -137,8 +139,8 @@ def sized(scene: Scene, front: float = 1.0) -> Sizing:
 
 
 def generate(scene: Scene, outline: Outline | None, front: float = 1.0) -> tuple[Mesh, Outline | None]:
-    """A new mesh around the aggregate (None: a clean channel) with the extent of 3.1, and the outline with the nodes
-    that it has there. Raises MeshError where that cannot be."""
+    """A new mesh around the aggregate (None: a clean channel) with the extent of 3.1, and the
+    outline with the nodes that it has there. Raises MeshError where that cannot be."""
     numerics = scene.numerics
     whole = numerics.extent == "full"
     ends = sizing.meshed_extent(outline, scene.pore.width, scene.pore.length, whole)
@@ -175,8 +177,8 @@ def seeded(scene: Scene, front: float = 1.0) -> Pore:
 
 
 def material(space: Space, reference: np.ndarray) -> growth.Body:
-    """The aggregate of a mesh with its nodes' places (n, 2) um in the reference configuration, integrated where its
-    growth is taken: in one point of a straight triangle."""
+    """The aggregate of a mesh with its nodes' places (n, 2) um in the reference configuration,
+    integrated where its growth is taken: in one point of a straight triangle."""
     topology = space.mesh.topology
     degree = elements.GRADIENT_DEGREES[1] if space.mesh.geometry == 1 else elements.DEGREES[max(2, space.order)]
     shape = growth.Shape(topology.body_cells, len(topology.body_corners), degree, topology.method)
@@ -186,7 +188,8 @@ def material(space: Space, reference: np.ndarray) -> growth.Body:
 def solve(scene: Scene, now: Pore, over: float = 0.0) -> Solved:
     """Flow, then substrates, in the geometry of the pore: what the scene's sections ask for.
 
-    over: h, in which the biomass of ``now`` grows at the rates that are found meanwhile; its mean takes part.
+    over: h, in which the biomass of ``now`` grows at the rates that are found meanwhile; its mean
+    takes part.
     """
     carried = solve_flow(scene, now.space) if scene.flow else None
     if scene.substrates is None:
@@ -210,7 +213,7 @@ def peclet(scene: Scene, speed: float) -> float:
 
 
 def refuse_no_supply(scene: Scene, carried: Flow | None) -> None:
-    """Raises TransportError where the flow is too slow to supply anything: no state would be steady."""
+    """Raises TransportError where the flow is too slow to supply anything: no state is steady."""
     if carried and peclet(scene, carried.mean_velocity) < SLOWEST:
         raise TransportError(f"the Peclet number u W / D is {peclet(scene, carried.mean_velocity):.2g}, under "
                              f"{SLOWEST:g}: nothing is supplied through the inlet; leave [flow] out for pure diffusion")

@@ -1,4 +1,4 @@
-"""The mesh of the next step: moved with the aggregate, or made anew with the fields carried over (3.1, 3.5)."""
+"""The mesh of the next step (3.1, 3.5): moved with the aggregate, or new, fields carried over."""
 
 from __future__ import annotations
 
@@ -19,16 +19,18 @@ from repro.scene import Scene, Substrate
 
 #: What element sizes at the aggregate are divided by at most, for a front of the substrates.
 MOST_GRADED = 4.0
-#: Factors of the refinement that are tried where that is not enough, and the largest refinement that scenes accept.
+#: Factors of the refinement that are tried where that is not enough, and the largest refinement
+#: that scenes accept.
 TRIED, MOST_REFINED = (1.5, 2.0, 3.0, 4.0, 6.0), 20.0
 
 
 def new_mesh(scene: Scene, now: Pore, expanded: Pore, speed: float) -> tuple[Pore, bool]:
     """The mesh moved with the aggregate, or a new one, and which of them it is.
 
-    speed: mean velocity (um/h), for the substrates beyond the old mesh's ends. New where the paper says so: the extent
-    is too short (3.1), or the moved mesh would not be acceptable (3.5); and where a moved mesh cannot do: contact has
-    changed, or interface edges are twice too long for the narrowest film.
+    speed: mean velocity (um/h), for the substrates beyond the old mesh's ends. New where the paper
+    says so: the extent is too short (3.1), or the moved mesh would not be acceptable (3.5); and
+    where a moved mesh cannot do: contact has changed, or interface edges are twice too long for the
+    narrowest film.
     """
     mesh = followed(scene, now, expanded)
     if mesh is not None:
@@ -37,8 +39,9 @@ def new_mesh(scene: Scene, now: Pore, expanded: Pore, speed: float) -> tuple[Por
 
 
 def resolved(scene: Scene, now: Pore) -> tuple[Pore, Solved]:
-    """The pore with what is solved in it; with order 2 and 3 on a mesh that is graded to a front of the substrates,
-    where the present one is too coarse for it. Raises Unresolved where that does not do."""
+    """The pore with what is solved in it; with order 2 and 3 on a mesh that is graded to a front of
+    the substrates, where the present one is too coarse for it. Raises Unresolved where that does
+    not do."""
     while True:
         try:
             return now, pore.solve(scene, now)
@@ -50,7 +53,8 @@ def resolved(scene: Scene, now: Pore) -> tuple[Pore, Solved]:
 
 
 def graded(scene: Scene, now: Pore) -> Pore | None:
-    """The same pore on elements half as large at the aggregate; None where they have been halved often enough."""
+    """The same pore on elements half as large at the aggregate; None where they may not be halved
+    again."""
     front = 2 * now.front
     if scene.numerics.order == 1 or front > MOST_GRADED:
         return None
@@ -90,11 +94,12 @@ def followed(scene: Scene, now: Pore, expanded: Pore) -> Mesh | None:
 
 
 def remesh(scene: Scene, now: Pore, expanded: Pore, speed: float, others: Amounts = ()) -> tuple[Pore, Amounts]:
-    """A new mesh around the aggregate with the extent of 3.1; fields, places at t = 0, and other amounts (r, q) of the
-    same material are carried over.
+    """The pore on a new mesh around the aggregate, with the extent of 3.1; fields, places at t = 0
+    and other amounts (r, q) of the same material are carried over.
 
-    theta restarts as J times the density over X_m: the expansion that brings each density back to X_m, so that the
-    error of the constraint is worked off at the next update and does not accumulate [E7].
+    theta restarts as J times the density over X_m: the expansion that brings each density back to
+    X_m, so that the error of the constraint is worked off at the next update and does not
+    accumulate [E7].
     """
     mesh, outline = pore.generate(scene, expanded.outline, expanded.front)
     old, new = expanded.mesh, Space(mesh, now.space.order)
@@ -111,8 +116,8 @@ def remesh(scene: Scene, now: Pore, expanded: Pore, speed: float, others: Amount
 
 
 def _material(new: Space, expanded: Pore, rim: np.ndarray, at: Located):
-    """The aggregate at t = 0 on a new mesh: interpolated places, those of its boundary (M, 2) um as the outline has
-    them."""
+    """The aggregate at t = 0 on a new mesh: interpolated places, on its boundary (M, 2) um those of
+    the outline."""
     mesh, old = new.mesh, expanded.mesh
     origin = mesh.points.copy()
     origin[mesh.body] = at.field(expanded.origin, old.cells[old.biomass], old.geometry)
@@ -121,16 +126,17 @@ def _material(new: Space, expanded: Pore, rim: np.ndarray, at: Located):
 
 
 def expansion(scene: Scene, now: Pore) -> np.ndarray:
-    """(t, q) J times the density over X_m, in the points where growth is taken: on straight triangles the mean density
-    of their nodes (29), on curved ones that of each point."""
+    """(t, q) J times the density over X_m, in the points where growth is taken: on straight
+    triangles the mean density of their nodes (29), on curved ones that of each point."""
     J = now.body.strained(now.mesh.points[now.mesh.body]).J
     density = (now.active + now.inert) / now.space.reaction.dx / scene.kinetics.maximum_density
     return J * spread(now.space, density)
 
 
 def spread(space: Space, field: np.ndarray) -> np.ndarray:
-    """(t, q) in the points where growth is taken, of a field (r, q) in the points of the reaction: the mean of the
-    nodes of each straight triangle (29), and itself on curved ones, where the points are the same."""
+    """(t, q) in the points where growth is taken, of a field (r, q) in the points of the reaction:
+    the mean of the nodes of each straight triangle (29), and itself on curved ones, where the
+    points are the same."""
     if space.order > 1:
         return field
     return field[space.mesh.straight.topology.body_cells, 0].mean(axis=1, keepdims=True)
@@ -138,8 +144,8 @@ def spread(space: Space, field: np.ndarray) -> np.ndarray:
 
 def carried_substrates(scene: Scene, old: Space, new: Space, state: Concentrations | None,
                        speed: float) -> Concentrations | None:
-    """C_A and C_D on a new mesh: interpolated; beyond the old ends (26) upstream, constant downstream, and the supply
-    where nothing flows."""
+    """C_A and C_D on a new mesh: interpolated; beyond the old ends (26) upstream, constant
+    downstream, and the supply where nothing flows."""
     if state is None:
         return None
     x = new.points[:, 0]
@@ -154,7 +160,7 @@ def carried_substrates(scene: Scene, old: Space, new: Space, state: Concentratio
 
 def _beyond(field: np.ndarray, substrate: Substrate, x: np.ndarray, ends: tuple[float, float],
             speed: float) -> np.ndarray:
-    """(n,) mg/L with what is beyond the old ends, where ``field`` has the value of the nearest end."""
+    """(n,) mg/L with what is beyond the old ends; ``field`` has the nearest end's value there."""
     before = np.minimum(x - ends[0], 0.0)
     if speed == 0:
         return np.where((before < 0) | (x > ends[1]), substrate.supply, field)

@@ -1,15 +1,18 @@
 """The fluid's traction on the aggregate, the t0 of (20) and (22): an option, which 2.3.3 neglects.
 
-The momentum balance of the fluid's triangles alone, tested with the nodal functions of the interface, is what the fluid
-is pushed with there; the aggregate is pushed back (consistent nodal forces). With head phi and velocity u,
+The momentum balance of the fluid's triangles alone, tested with the nodal functions of the
+interface, is what the fluid is pushed with there; the aggregate is pushed back (consistent nodal
+forces). With head phi and velocity u,
 
-    f_i = - integral over the fluid's triangles of sigma grad N_i,        sigma = rho nu grad u - rho g phi
+    f_i = - integral over the fluid's triangles of sigma grad N_i
+    sigma = rho nu grad u - rho g phi
 
-or rho nu (grad u + grad u^T) in the traction form [E2]: the form of the scene's flow, so that the forces on the
-aggregate, the walls and the ends add up to nothing, to round-off. Where hardly anything flows through the aggregate
-both forms are the same traction: u is about zero along the interface and div u = 0. At a contact line the force along
-the wall holds the shear of half an edge of wall; that across it is the wall's, as the aggregate's y is held there. The
-head counts from the mean at the outlet, which does not matter: an even pressure does nothing to an incompressible body
+or rho nu (grad u + grad u^T) in the traction form [E2]: the form of the scene's flow, so that the
+forces on the aggregate, the walls and the ends add up to nothing, to round-off. Where hardly
+anything flows through the aggregate both forms are the same traction: u is about zero along the
+interface and div u = 0. At a contact line the force along the wall holds the shear of half an edge
+of wall; that across it is the wall's, as the aggregate's y is held there. The head counts from the
+mean at the outlet, which does not matter: an even pressure does nothing to an incompressible body
 that touches walls and fluid alone.
 """
 
@@ -36,10 +39,11 @@ ROUND_OFF = 1e-14
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """The mesh in which the flow around a shape is solved. It may be another than the aggregate's own.
+    """The mesh in which the flow around a shape is solved; it need not be the aggregate's own.
 
-    mesh: it; nodes: (k, a) numbers in ``mesh.body`` of the aggregate's own mesh, and share: (k, a) their weights: a
-    node of this mesh's body is the mean of their places, and what pushes it pushes them in these shares.
+    mesh: it; nodes: (k, a) numbers in ``mesh.body`` of the aggregate's own mesh, and share: (k, a)
+    their weights: a node of this mesh's body is the mean of their places, and what pushes it pushes
+    them in these shares.
     """
 
     mesh: Mesh
@@ -48,7 +52,8 @@ class Surroundings:
 
 
 def surroundings(scene: Scene, before: Pore, shaped: Pore) -> Surroundings:
-    """The mesh that has followed the aggregate from a pore with a good mesh, or a new one where that is due."""
+    """The mesh that has followed the aggregate from a pore with a good mesh, or a new one where one
+    is due."""
     mesh = before.mesh if shaped is before else remeshing.followed(scene, before, shaped)
     if mesh is not None:
         own = np.arange(len(mesh.body))[:, None]
@@ -78,8 +83,7 @@ def forces(scene: Scene, around: Surroundings, shaped: Pore) -> np.ndarray:
 
 
 def nodal(space: Space, found: Flow, viscosity: float, interface: str) -> np.ndarray:
-    """(N, 2) um2 of head: forces of the fluid's triangles on all nodes of the mesh, over rho g; zero inside fluid and
-    aggregate.
+    """(N, 2) um2 of head: forces of the fluid's triangles on all nodes of the mesh, over rho g.
 
     viscosity: nu_water / g, um h; interface: "laplacian" or "traction".
     """

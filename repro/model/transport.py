@@ -1,17 +1,18 @@
-"""Substrates (2.2, 3.3): advection, diffusion and uptake of acceptor and donor, (7)-(8) with (11)-(13).
+"""Substrates (2.2, 3.3): advection, diffusion and uptake of acceptor and donor, (7)-(13).
 
 For one substrate and every nodal function N_i, with order 2 or 3 in the form that conserves,
 
-    (D grad C, grad N_i) - (C u, grad N_i) + <u_x C, N_i>_outlet + (q(C) X_A, N_i)_biomass = <u_x C_supply, N_i>_inlet
+    (D grad C, grad N_i) - (C u, grad N_i) + <u_x C, N_i>_outlet + (q(C) X_A, N_i)_biomass
+        = <u_x C_supply, N_i>_inlet
 
 and with linear functions, the reaction lumped at the nodes,
 
     (D grad C, grad N_i) + (w . grad C, N_i) + <u_x (C - C_supply), N_i>_inlet + m_i q(C_i) X_i = 0
 
-where w = u - tau grad p is the divergence-free velocity of :mod:`repro.model.flow`. Summed over i either is the balance:
-supply in = out + consumed, to round-off. Without flow the supply is held at both ends, or nothing passes them
-("closed"). With u_ave for the inlet's u_x, (11) reads as printed [E4], and what is supplied, u_ave W C_supply, is not
-quite what enters.
+where w = u - tau grad p is the divergence-free velocity of :mod:`repro.model.flow`. Summed over i
+either is the balance: supply in = out + consumed, to round-off. Without flow the supply is held at
+both ends, or nothing passes them ("closed"). With u_ave for the inlet's u_x, (11) reads as printed
+[E4], and what is supplied, u_ave W C_supply, is not quite what enters.
 """
 
 from __future__ import annotations
@@ -34,7 +35,8 @@ from repro.model.kinetics import Sink
 from repro.scene import Kinetics, Substrate, Substrates
 from repro.timing import timed
 
-#: Newton stops at this residual against the size of its terms, or at the second where round-off keeps it from falling.
+#: Newton stops at this residual against the size of its terms, or at the second where round-off
+#: keeps it from falling.
 NEWTON, ROUND_OFF, MOST_ITERATIONS = 1e-13, 1e-12, 60
 #: No fraction m is larger than this in an iterate, so that C = K m / (1 - m) is finite.
 SATURATED = 0.9
@@ -42,9 +44,10 @@ SATURATED = 0.9
 SWITCH = 0.5
 #: A concentration below zero by more than this part of its supply is not resolved.
 UNRESOLVED = 1e-3
-#: Neither is uptake where a quadrature of a degree higher by FINER differs by more than this. The difference is of the
-#: same concentrations, which have not come to rest with the finer one: in base with fronts of half saturations from 1e-1
-#: to 1e-6 of the supply, biomass made in 2 h was wrong by a hundredth of the largest difference or less.
+#: Neither is uptake where a quadrature of a degree higher by FINER differs by more than this. The
+#: difference is of the same concentrations, which have not come to rest with the finer one: in base
+#: with fronts of half saturations from 1e-1 to 1e-6 of the supply, biomass made in 2 h was wrong by
+#: a hundredth of the largest difference or less.
 APART, FINER = 0.05, 3
 #: Neither is one above its supply by more than this part of it.
 OVERSHOOT = 0.02
@@ -54,10 +57,10 @@ OVERSHOOT = 0.02
 class Problem:
     """Both substrates in one geometry, with n nodes in all and k a triangle.
 
-    matrices: (T, k, k) um2/h of each, without uptake; operator: (2n, 2n) of both, not coupled, and magnitude: the same
-    of its entries; source: (2n,) um2 mg/L/h; inflow, outflow: (n,) um2/h, integrals of u_x N_i over an end; system: of
-    both, coupled where there is biomass; kinetics: None without biomass; reused: does Newton's method keep its
-    derivative while that does enough?
+    matrices: (T, k, k) um2/h of each, without uptake; operator: (2n, 2n) of both, not coupled, and
+    magnitude: the same of its entries; source: (2n,) um2 mg/L/h; inflow, outflow: (n,) um2/h,
+    integrals of u_x N_i over an end; system: of both, coupled where there is biomass; kinetics:
+    None without biomass; reused: does Newton's method keep its derivative while that does enough?
     """
 
     space: Space
@@ -100,7 +103,7 @@ class Concentrations:
 @timed("transport")
 def problem(space: Space, flow: Flow | None, substrates: Substrates, kinetics: Kinetics | None,
             inlet: str = "local", reused: bool = False) -> Problem:
-    """Assemble both substrates' linear parts for one geometry and flow of the same space (None: pure diffusion).
+    """Both substrates' linear parts for one geometry and a flow of the same space.
 
     inlet: "local" or "mean", u_x or u_ave in (11); reused: as :class:`Problem`'s.
     """
@@ -126,15 +129,16 @@ def problem(space: Space, flow: Flow | None, substrates: Substrates, kinetics: K
 
 
 def advection(space: Space, flow: Flow, enters: np.ndarray) -> np.ndarray:
-    """(T, k, k) um2/h of what the flow carries, with the conditions at inlet and outlet; enters: (n,) um/h, the speed
-    in (11)."""
+    """(T, k, k) um2/h of what the flow carries, with the conditions at inlet and outlet; enters:
+    (n,) um/h, the speed of (11)."""
     if flow.correction is None:
         return _conserving(space, flow.velocity, enters)
     return _by_divergence_free(space, flow, enters)
 
 
 def _conserving(space: Space, velocity: np.ndarray, enters: np.ndarray) -> np.ndarray:
-    """-(C u, grad v), u_x C v over the outlet, and (u_ave - u_x) C v over the inlet where (11) has u_ave [E4]."""
+    """-(C u, grad v), u_x C v over the outlet, and (u_ave - u_x) C v over the inlet where (11)
+    takes u_ave [E4]."""
     at, dofs = space.at, space.dofs
     u_x, u_y = space.at_points(velocity.T) * -at.dx
     along = u_x[..., None] * at.slopes[:, :, 0]
@@ -147,7 +151,8 @@ def _conserving(space: Space, velocity: np.ndarray, enters: np.ndarray) -> np.nd
 
 
 def _by_divergence_free(space: Space, flow: Flow, enters: np.ndarray) -> np.ndarray:
-    """(w . grad C, v) with w = u - tau grad p, linear on each triangle, and u_x C v over the inlet, lumped."""
+    """(w . grad C, v) with w = u - tau grad p, linear on each triangle, and, lumped, u_x C v over
+    the inlet."""
     mesh, dofs = space.mesh, space.dofs
     w = flow.velocity[mesh.triangles] - flow.correction[:, None, :]
     found = mass(mesh.areas) @ (w @ np.swapaxes(mesh.gradients, 1, 2))
@@ -170,8 +175,8 @@ def _apart(space: Space) -> ElementSystem:
 
 
 def _system(space: Space, held_ends: bool) -> ElementSystem:
-    """Acceptor and donor of a node side by side, nodes in elimination order: their own triangles, then both together
-    on the pieces of biomass, where the uptake couples them."""
+    """Acceptor and donor of a node side by side, nodes in elimination order: their own triangles,
+    then both together on the pieces of biomass, where the uptake couples them."""
     place = np.empty(space.count)
     place[space.dofs.elimination] = np.arange(space.count)
     held = np.zeros(space.count, bool)
@@ -195,8 +200,9 @@ def supplied_everywhere(problem: Problem) -> Concentrations:
 
 @dataclass(frozen=True, eq=False)
 class Iterate:
-    """Both concentrations (2n,); the fractions m_A and m_D (2, r, q) about which the uptake is linearised; the residual
-    at the concentrations and the size of its terms, um2 mg/L/h; own: are the fractions those of the concentrations?"""
+    """Both concentrations (2n,); the fractions m_A and m_D (2, r, q) about which the uptake is
+    linearised; the residual at the concentrations and the size of its terms, um2 mg/L/h; own: are
+    the fractions those of the concentrations?"""
 
     state: np.ndarray
     fractions: np.ndarray
@@ -216,13 +222,15 @@ class Iterate:
 
 @dataclass(frozen=True, eq=False)
 class Balance:
-    """The equations of a problem with a sink (None: nothing is taken up), as Newton's method asks for them.
+    """The equations of a problem with a sink, as Newton's method asks for them.
 
-    Uptake is a function of max(C, 0) through the fractions m = C / (C + K). Where half saturations are far below the
-    supply that is nearly a step, and Newton's method in C goes from one side of it to the other. So every point of the
-    reaction has a fraction m of its own, about which C = K m / (1 - m) is linearised: slope dm/dC = (1 - m)^2 / K. Where
-    m is over one half it is C's own, which is Newton's method in C; below that it follows the linearisation from 0 up,
-    as in primal-dual active-set methods (Hintermueller, Ito and Kunisch 2002).
+    Without a sink nothing is taken up. Uptake is a function of max(C, 0) through the fractions m =
+    C / (C + K). Where half saturations are far below the supply that is nearly a step, and Newton's
+    method in C goes from one side of it to the other. So every point of the reaction has a fraction
+    m of its own, about which C = K m / (1 - m) is linearised: slope dm/dC = (1 - m)^2 / K. Where m
+    is over one half it is C's own, which is Newton's method in C; below that it follows the
+    linearisation from 0 up, as in primal-dual active-set methods (Hintermueller, Ito and Kunisch
+    2002).
     """
 
     problem: Problem
@@ -253,20 +261,24 @@ class Balance:
         """(r, 2, q) um2 mg/L/h."""
         return self.sink.uptake(self.fractions(self.at(state)), self.problem.kinetics)
 
-    def residual(self, state: np.ndarray) -> np.ndarray:
-        """(2n,) um2 mg/L/h for C_A, then C_D, of all nodes (2n,), mg/L."""
+    def residual(self, state: np.ndarray, loads: np.ndarray | None = None) -> np.ndarray:
+        """(2n,) um2 mg/L/h for C_A, then C_D, of all nodes (2n,), mg/L; loads: the uptake, if it is
+        known."""
         found = self.problem.operator @ state - self.problem.source
-        return found if self.sink is None else found + self._taken(self.uptake(state))
+        if self.sink is None:
+            return found
+        return found + self._taken(self.uptake(state) if loads is None else loads)
 
-    def sizes(self, state: np.ndarray) -> np.ndarray:
-        """Sizes (2n,) of the terms of the residual, all taken as positive."""
+    def sizes(self, state: np.ndarray, loads: np.ndarray | None = None) -> np.ndarray:
+        """Sizes (2n,) of the terms of the residual, all taken as positive; loads: the uptake, if it
+        is known."""
         found = self.problem.magnitude @ np.abs(state) + np.abs(self.problem.source)
         if self.sink is None:
             return found
         pieces, count = self.problem.space.reaction, self.problem.space.count
         nodes = np.stack([pieces.cells, count + pieces.cells], axis=1)
-        loads = np.abs(self.uptake(state)) @ np.abs(pieces.values)
-        return found + np.bincount(nodes.ravel(), loads.ravel(), 2 * count)
+        terms = np.abs(self.uptake(state) if loads is None else loads) @ np.abs(pieces.values)
+        return found + np.bincount(nodes.ravel(), terms.ravel(), 2 * count)
 
     def _slopes(self, state: np.ndarray, fractions: np.ndarray) -> np.ndarray:
         """(2, r, q) dm/dC at the fractions; zero where nothing is there to be taken up."""
@@ -274,7 +286,7 @@ class Balance:
         return np.where(empty, 0.0, (1 - fractions) ** 2 / self._half)
 
     def tangent(self, state: np.ndarray, fractions: np.ndarray | None = None) -> tuple[np.ndarray, ...]:
-        """Element matrices, um2/h, of the residual's derivative: of both substrates and of their uptake."""
+        """Element matrices, um2/h, of the residual's derivative: both substrates, then uptake."""
         if self.sink is None:
             return *self.problem.matrices, self._coupled(None)
         about = self.fractions(self.at(state)) if fractions is None else fractions
@@ -282,7 +294,7 @@ class Balance:
         return *self.problem.matrices, self._coupled(by * self._slopes(state, about))
 
     def _coupled(self, slopes: np.ndarray | None) -> np.ndarray:
-        """(r, 2k, 2k) um2/h from the derivatives (2, 2, r, q) of the uptake of i by the concentration of j."""
+        """(r, 2k, 2k) um2/h from the derivatives (2, 2, r, q) of uptake i by concentration j."""
         pieces = self.problem.space.reaction
         count, k = pieces.cells.shape
         found = np.zeros((count, 2 * k, 2 * k))
@@ -302,12 +314,18 @@ class Balance:
         return self.problem.system.factored(self.tangent(iterate.state, iterate.fractions))
 
     def advanced(self, iterate: Iterate, factors: Factored, fresh: bool) -> Iterate:
-        """A step of Newton's method; sizes of the terms are those of the first guess, then those after the first step
-        of each derivative."""
+        """A step of Newton's method; sizes of the terms are those of the first guess, then those
+        after the first step of each derivative."""
         state = iterate.state + factors.solve(-self._linearised(iterate))
-        size = self.sizes(state) if fresh else iterate.size
-        new = replace(iterate, state=state, residual=self.residual(state), size=size)
-        return new if self.sink is None else self._followed(iterate, new)
+        if self.sink is None:
+            size = self.sizes(state) if fresh else iterate.size
+            return replace(iterate, state=state, residual=self.residual(state), size=size)
+        there = self.at(state)
+        own = self.fractions(there)
+        loads = self.sink.uptake(own, self.problem.kinetics)
+        size = self.sizes(state, loads) if fresh else iterate.size
+        new = replace(iterate, state=state, residual=self.residual(state, loads), size=size)
+        return self._followed(iterate, new, there, own)
 
     def _linearised(self, iterate: Iterate) -> np.ndarray:
         """(2n,) the residual with the uptake that the linearisation about the fractions gives."""
@@ -323,10 +341,10 @@ class Balance:
         m = iterate.fractions
         return m + self._slopes(iterate.state, m) * (self.at(state) - self._half * m / (1 - m))
 
-    def _followed(self, iterate: Iterate, new: Iterate) -> Iterate:
-        """The new iterate with the fractions about which to linearise next."""
-        there = self.at(new.state)
-        own = self.fractions(there)
+    def _followed(self, iterate: Iterate, new: Iterate, there: np.ndarray,
+                  own: np.ndarray) -> Iterate:
+        """The new iterate with the fractions about which to linearise next; there: its
+        concentrations in the points of the reaction, own: their fractions."""
         if iterate.own and own.min() > SWITCH:
             return replace(new, fractions=own)
         predicted = np.clip(self._predicted(iterate, new.state), 0.0, SATURATED)
@@ -340,11 +358,12 @@ class Balance:
 def steady(problem: Problem, sink: Sink | None, guess: Concentrations | None = None) -> Concentrations:
     """Steady concentrations by Newton's method on both substrates at once.
 
-    sink: what takes them up, None without biomass; guess: at the problem's nodes, C_supply everywhere by default. Where
-    the method does not converge, as behind a sharp front, it starts again from the supply, and half saturations come
-    down from the supply to what they are, a tenth at a time. Raises TransportError where that fails too, and Unresolved
-    where a concentration is outside of zero to the supply by more than UNRESOLVED and OVERSHOOT say, or where uptake
-    is not resolved: the mesh is too coarse for its front.
+    sink: what takes them up, None without biomass; guess: at the problem's nodes, C_supply
+    everywhere by default. Where the method does not converge, as behind a sharp front, it starts
+    again from the supply, and half saturations come down from the supply to what they are, a tenth
+    at a time. Raises TransportError where that fails too, and Unresolved where a concentration is
+    outside of zero to the supply by more than UNRESOLVED and OVERSHOOT say, or where uptake is not
+    resolved: the mesh is too coarse for its front.
     """
     if problem.kinetics is None:
         sink = None
@@ -409,8 +428,8 @@ def _refuse_unresolved(problem: Problem, sink: Sink, state: Concentrations) -> N
 
 
 def quadrature_error(problem: Problem, sink: Sink, state: Concentrations) -> float:
-    """How much the donor taken up differs, relatively, by a finer quadrature of the same concentrations; biomass as it
-    is, its density linear in each triangle."""
+    """How much the donor taken up differs, relatively, by a finer quadrature of the same
+    concentrations; biomass as it is, its density linear in each triangle."""
     space, mesh = problem.space, problem.mesh
     of = elements.table(space.order, mesh.geometry, elements.DEGREES[space.order] + FINER)
     corners = mesh.points[mesh.cells[mesh.biomass]]
@@ -431,8 +450,9 @@ def _outside(problem: Problem, name: str, field: np.ndarray, node: int, substrat
 
 @dataclass(frozen=True)
 class Fluxes:
-    """One substrate's ledger in an instant, per um of depth (um2 mg/L/h): in, out and consumed; and concentrations
-    (mg/L): flow-weighted at the meshed inlet and at the outlet (the mean over the end without flow)."""
+    """One substrate's ledger in an instant, per um of depth (um2 mg/L/h): in, out and consumed; and
+    concentrations (mg/L): flow-weighted at the meshed inlet and at the outlet (the mean over the
+    end without flow)."""
 
     supplied: float
     out: float
@@ -442,8 +462,8 @@ class Fluxes:
 
 
 def fluxes(problem: Problem, sink: Sink | None, state: Concentrations) -> tuple[Fluxes, Fluxes]:
-    """Ledger of the acceptor and of the donor in one geometry: supplied and out from the ends, consumed from the uptake
-    at the state."""
+    """Ledger of the acceptor and of the donor in one geometry: supplied and out from the ends,
+    consumed from the uptake at the state."""
     space, both = problem.space, np.stack([state.acceptor, state.donor])
     consumed, out = np.zeros(2), both @ problem.outflow
     if sink is not None and problem.kinetics is not None:

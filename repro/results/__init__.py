@@ -1,7 +1,8 @@
-"""What a run leaves: ``timeseries.csv``, ``ledger.csv``, fields as ``.vtu`` with a ``.pvd`` index, and ``run.json``.
+"""What a run leaves: ``timeseries.csv``, ``ledger.csv``, ``run.json``, and fields as ``.vtu``.
 
-Every file appears whole or not at all: it is written beside its place and moved there. Names carry units; what a scene
-does not model is an empty field. The package's units (um, h, mg/L) become those of the names here and nowhere else.
+Every file appears whole or not at all: it is written beside its place and moved there. Names carry
+units; what a scene does not model is an empty field. The package's units (um, h, mg/L) become those
+of the names here and nowhere else.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ PACKAGES = ("numpy", "scipy", "scikit-fem", "meshio", "mmgpy", "shapely", "pint"
 
 
 def row(scene: Scene, instant: Instant) -> dict[str, float | None]:
-    """One row of ``timeseries.csv``: the geometry at its time, with flow and substrates solved in it."""
+    """One row of ``timeseries.csv``: the geometry at its time, and flow and substrates in it."""
     pore = instant.pore
     found = dict.fromkeys(COLUMNS)
     found.update(time_h=pore.time, meshed_length_um=pore.mesh.ends[1] - pore.mesh.ends[0], nodes=len(pore.mesh.points),
@@ -72,7 +73,7 @@ def _substrate_columns(instant: Instant) -> dict[str, float]:
 
 
 def _transient_columns(scene: Scene, instant: Instant) -> dict[str, float]:
-    """The substrate balances of the transient scheme: the worst of the steps since the last row, storage included."""
+    """The transient scheme's substrate balances, storage included: the worst since the last row."""
     if scene.numerics.transport != "gear" or instant.solved.concentrations is None:
         return {}
     problem, found = instant.solved.problem, {}
@@ -85,8 +86,8 @@ def _transient_columns(scene: Scene, instant: Instant) -> dict[str, float]:
 
 
 def _defect(supplied: float, out: float, consumed: float, room: float = 0.0) -> float:
-    """(in - out - consumed) over the largest of what comes in, what is consumed, and, in the transient, what the meshed
-    part holds at the concentration of the supply."""
+    """(in - out - consumed) over the largest of what comes in, what is consumed, and, in the
+    transient, what the meshed part holds at the concentration of the supply."""
     scale = max(abs(supplied), consumed, room)
     return (supplied - out - consumed) / scale if scale else 0.0
 
@@ -110,8 +111,9 @@ def _aggregate_columns(scene: Scene, instant: Instant) -> dict[str, float]:
 
 
 def oxygen_demand_balance(kinetics: Kinetics, ledger: Ledger) -> float:
-    """Defect of a step's ledger by (7)-(10): biomass made less Y donor - (acceptor - F donor) / d_c, of what was
-    consumed, over the larger of the two terms. The first is what the donor makes, the second what decays."""
+    """Defect of a step's ledger by (7)-(10): biomass made less Y donor - (acceptor - F donor) /
+    d_c, of what was consumed, over the larger of the two terms. The first is what the donor makes,
+    the second what decays."""
     acceptor, donor = ledger.consumed
     grown = kinetics.yield_coefficient * donor
     decayed = (acceptor - kinetics.acceptor_to_donor_ratio * donor) / kinetics.decay_oxygen_demand
@@ -128,10 +130,11 @@ def ledger_row(scene: Scene, ledger: Ledger) -> list[float]:
 
 
 def fields(scene: Scene, pore: Pore, solved: Solved) -> meshio.Mesh:
-    """The fields of an instant for meshio: places in um, one value a node or a triangle, named with their units.
+    """The fields of an instant for meshio, at nodes or in triangles, named with their units.
 
-    In the fluid there is no biomass, stress or pressure P (zero), theta and J are 1, and places have not moved. Stress
-    and P are those of the strain since t = 0: a scene whose new biomass is born stress-free has none to tell.
+    Places are in um. In the fluid there is no biomass, stress or pressure P (zero), theta and J are
+    1, and places have not moved. Stress and P are those of the strain since t = 0: a scene whose
+    new biomass is born stress-free has none to tell.
     """
     mesh, space = pore.mesh, pore.space
     points, cells = {}, {"region": mesh.biomass.astype(float)}

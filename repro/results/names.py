@@ -1,6 +1,7 @@
 """What the columns and arrays of a run's files are called in words, and their units.
 
-A name ends in its unit (``conductivity_m_per_d``, ``aggregate_area_um2``); a name that ends in none is a pure number.
+A name ends in its unit (``conductivity_m_per_d``, ``aggregate_area_um2``); a name that ends in none
+is a pure number.
 """
 
 from __future__ import annotations

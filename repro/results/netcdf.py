@@ -1,7 +1,7 @@
-"""The time series as NetCDF with CF conventions (``output.timeseries = "netcdf"``), read back equal to the CSV table.
+"""The time series as NetCDF with CF conventions; what is read back equals the CSV table.
 
-The time is the simulated one since the start of the run, which has no date: a coordinate in hours without the
-"since ..." of a CF time axis, which would have to invent one.
+The time is the simulated one since the start of the run, which has no date: a coordinate in hours
+without the "since ..." of a CF time axis, which would have to invent one.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ TIME = "time_h"
 
 
 def write(path: Path, scene: Scene, rows: list[list]) -> None:
-    """Write ``rows`` (of ``results.COLUMNS``), whole or not at all; what is not modelled is not-a-number."""
+    """Write ``rows`` of ``results.COLUMNS``, whole or not at all; what is not modelled is NaN."""
     xarray = import_module(PACKAGE)
     table = np.array([[np.nan if value is None else value for value in line] for line in rows], dtype=float)
     columns = dict(zip(results.COLUMNS, table.reshape(len(rows), len(results.COLUMNS)).T))

@@ -1,4 +1,4 @@
-"""The results of a run as NumPy arrays with names and units: ``solve`` for a script or a notebook."""
+"""Results of a run as NumPy arrays with names and units: ``solve`` for scripts and notebooks."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ def unit(name: str) -> str:
 
 
 class Results(Mapping[str, np.ndarray]):
-    """Columns of a run by name, (rows,) each, a row at each reported time: those of ``timeseries.csv`` that the scene
-    models; ``status`` says how the run ended. ``dict(results)`` makes a data frame.
-    """
+    """Columns of a run by name, (rows,) each, a row at each reported time: those of
+    ``timeseries.csv`` that the scene models; ``status`` says how the run ended. ``dict(results)``
+    makes a data frame."""
 
     def __init__(self, name: str, rows: list[dict], fields: list[dict[str, np.ndarray]], status: str):
         names = [key for key in results.COLUMNS if any(row[key] is not None for row in rows)]
@@ -57,8 +57,9 @@ class Results(Mapping[str, np.ndarray]):
         return self.columns["time_h"]
 
     def fields(self, time: float) -> dict[str, np.ndarray]:
-        """What is known all over the pore at a reported time (h): places_um (N, 2), triangles (T, 3), or (T, 6) of
-        quadratic ones, and values (N,), (N, 3) for vectors, or (T,) by name. Raises KeyError for any other time."""
+        """What is known all over the pore at a reported time (h): places_um (N, 2), triangles
+        (T, 3), or (T, 6) of quadratic ones, and values (N,), (N, 3) for vectors, or (T,) by name.
+        Raises KeyError for any other time."""
         row = int(np.argmin(np.abs(self.time - time)))
         if abs(self.time[row] - time) > SAME_TIME:
             raise KeyError(f"{time} h: not a reported time; the nearest is {self.time[row]} h")

@@ -6,27 +6,17 @@ change of the scene or of the code is another key, so a stale number cannot be s
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import shutil
 from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor
-from functools import cache
 from pathlib import Path
 from tempfile import mkdtemp
 
+from repro.run.machine import source_hash
 from repro.run.running import run
 from repro.scene import Scene, scene_hash
-
-
-@cache
-def source_hash() -> str:
-    """8 hexadecimal digits that stand for the package's source."""
-    digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parents[1].rglob("*.py")):
-        digest.update(path.name.encode() + path.read_bytes())
-    return digest.hexdigest()[:8]
 
 
 def run_folder(scene: Scene, folder: Path) -> Path:

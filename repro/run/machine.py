@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import platform
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,10 +29,17 @@ def require_packages(scene: Scene) -> None:
                              f"not installed; pip install {package}, or leave the key out")
 
 
+@cache
+def source_hash() -> str:
+    """8 hexadecimal digits that stand for the package's source."""
+    digest = hashlib.sha256()
+    for path in sorted(Path(__file__).parents[1].rglob("*.py")):
+        digest.update(path.name.encode() + path.read_bytes())
+    return digest.hexdigest()[:8]
+
+
 def conditions() -> dict:
     """For ``run.json``: runs under equal ones are equal bit for bit."""
-    from repro.run.cache import source_hash
-
     built: Any = np.show_config(mode="dicts")
     blas = built["Build Dependencies"]["blas"]
     return {"system": platform.system(), "machine": platform.machine(), "libc": " ".join(platform.libc_ver()),

@@ -1,4 +1,4 @@
-"""States of a run as plain data and arrays, field by field, and back: what makes no sense is refused."""
+"""States of a run as plain data and arrays, and back; what makes no sense is refused."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from repro.model.remeshing import MOST_GRADED
 from repro.model.transport import Concentrations
 from repro.scene import Scene, scene_hash
 
-#: {array: (kind of its numbers, shape)}; a letter is the same number wherever it stands. N nodes, T triangles of G nodes,
-#: B of them biomass with Q points of growth, R pieces of reaction with P points, M nodes of the boundary, n of the
-#: aggregate, C corners, D nodes of the concentrations.
+#: {array: (kind of its numbers, shape)}; a letter is the same number wherever it stands. N nodes, T
+#: triangles of G nodes, B of them biomass with Q points of growth, R pieces of reaction with P
+#: points, M nodes of the boundary, n of the aggregate, C corners, D nodes of the concentrations.
 ARRAYS = {"points": ("f", "N", 2), "cells": ("i", "T", "G"), "biomass": ("b", "T"), "loop": ("i", "M"),
           "wall": ("i", "M"), "fixed": ("b", "M"), "active": ("f", "R", "P"), "inert": ("f", "R", "P"),
           "theta": ("f", "B", "Q"), "reference": ("f", "n", 2), "pressure": ("f", "C")}
@@ -50,7 +50,8 @@ def _numbers(ledger: Ledger) -> list[float]:
 
 
 def unpacked(scene: Scene, plain: dict, arrays: dict[str, np.ndarray]) -> State:
-    """The state that :func:`packed` was given. Raises CheckpointError where it is none of this scene, or no state."""
+    """The state that :func:`packed` was given. Raises CheckpointError where it is of another scene,
+    or no state."""
     if set(plain) != PLAIN or plain["scene"] != scene_hash(scene):
         raise CheckpointError("it is of another scene")
     _refuse(not in_range(plain["time_h"], 0.0, scene.growth.end if scene.growth else 0.0), "its time")
@@ -138,7 +139,7 @@ def _check_places(scene: Scene, ends, arrays: dict[str, np.ndarray]) -> None:
 
 
 def _pore(scene: Scene, plain: dict, arrays: dict[str, np.ndarray]) -> Pore:
-    """The pore, if its nodes are in order and no triangle is without area, at present or as it was at first."""
+    """The pore, if its nodes are in order and every triangle has an area, now and at t = 0."""
     cells, loop, numerics = arrays["cells"], arrays["loop"], scene.numerics
     if numerics.geometry == 2:
         corners = int(cells[:, :3].max()) + 1
@@ -158,7 +159,8 @@ def _pore(scene: Scene, plain: dict, arrays: dict[str, np.ndarray]) -> Pore:
 
 
 def _check_sizes(space: Space, plain: dict, arrays: dict[str, np.ndarray]) -> None:
-    """Sizes that the mesh decides, and amounts that can be: no mass below zero, densities and expansions in bounds."""
+    """Refuse sizes that are not the mesh's, masses below zero, densities and expansions out of
+    bounds."""
     mesh, dx = space.mesh, space.reaction.dx
     _refuse(len(arrays["reference"]) != len(mesh.body) or len(arrays["pressure"]) != mesh.corners, "its list of arrays")
     _refuse(arrays["active"].shape != dx.shape or arrays["theta"].shape[0] != np.count_nonzero(mesh.biomass),

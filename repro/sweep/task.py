@@ -10,8 +10,8 @@ from importlib.metadata import version
 from pathlib import Path
 
 from repro.errors import SimulationError
-from repro.run.cache import source_hash
 from repro.run.checkpoint import NEWEST, PREVIOUS
+from repro.run.machine import source_hash
 from repro.run.running import OutputError, resume, run
 from repro.run.status import done, undone
 from repro.scene import Scene, SceneError, scene_hash

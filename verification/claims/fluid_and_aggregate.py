@@ -136,7 +136,7 @@ def interface(found: Body) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def crossing() -> Finding:
     """Share of the flux that crosses x = 0 inside the aggregate: base at 19.2 h, wide at its contact and its end."""
     first, last = contact_time(), float(series(*WIDE)["time_h"][-1])
-    through = ("all of it; 5 % for the flux of u through a plug of stabilised linear triangles (trap 3 of numerics.md)")
+    through = "all of it; 5 % for the flux of u through a plug of stabilised linear triangles"
     checks = (at_most("base, 19.2 h: share through the aggregate (%)", "around", inside(BASE, PLOTTED), 5,
                       "all but a few percent"),
               *(at_least(f"wide, {time:g} h: share through the aggregate (%)", "through", inside(WIDE, time), 95,

@@ -207,7 +207,7 @@ def expansion() -> Finding:
               near("uniform: radius (um)", "handled", uniform.radius, RADIUS * np.sqrt(TOTAL), relative=0.001,
                    why="exact: R_0 theta^(1/2); 0.1 %, the paper's own accuracy"),
               near("theta(R): radius (um)", "handled", radial.radius, rim, relative=0.01,
-                   why="closed form; 1 %, what refining a mesh may change (issue 2)"),
+                   why="closed form; 1 %, what refining a mesh may change"),
               at_least("wide: largest expansion", "up to 2000", largest.max(), TOTAL, "as stated"),
               between("wide: time at which it is 2000 (h)", "a couple of days", min(reached, default=np.inf), 24, 72,
                       "one to three days"))

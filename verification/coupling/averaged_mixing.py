@@ -7,8 +7,8 @@ import numpy as np
 from reference import averaged_pore
 from repro import results
 from repro.march.simulation import simulate
-from verification.case import Outcome, at_most, between, case
-from verification.convergence import study
+from verification.case import Check, Outcome, at_most, between, case
+from verification.convergence import Study, study
 from verification.coupling import averaged, runs
 
 SQUARE = "regular perturbation in 1 / D: the square of the transverse Thiele number"
@@ -32,18 +32,26 @@ FASTER = (4.0, 16.0, 64.0, 256.0)
             "half-disc in a strip, in closed form",
       mutants=("effluent-at-the-inlet", "inlet-held", "seed-too-thin"))
 def mixing() -> Outcome:
-    scene = runs.at_velocity(runs.base("0 h", 'aggregate.radius="20 um"', "numerics.refinement=1.5"), runs.SPEED)
+    found = [_mixed(elements) for elements in runs.ELEMENTS]
+    return Outcome(tuple(check for checks, _ in found for check in checks),
+                   tuple(one for _, studies in found for one in studies))
+
+
+def _mixed(elements: str) -> tuple[list[Check], list[Study]]:
+    """Checks and studies with one kind of elements."""
+    scene = runs.base("0 h", 'aggregate.radius="20 um"', runs.of(elements), runs.coarser(elements, 0.5, 1.5))
+    scene = runs.at_velocity(scene, runs.SPEED)
     found = [_leaving(scene, factor) for factor in FASTER]
     sizes = [thiele(scene, factor) for factor in FASTER]
     studies, checks = [], []
     for k, name in enumerate(("acceptor", "donor")):
         gaps = np.array([(ours - reference)[k] for ours, reference, _ in found])
         theory = np.array([first[k] for _, _, first in found])
-        studies.append(study(f"effluent {name} (mg/L)", sizes, np.abs(gaps), 2, SQUARE, ceiling=2.5e-5))
-        checks.append(between(f"{name}: disagreement over first-order theory", gaps[-1] / theory[-1],
+        studies.append(study(f"effluent {name} (mg/L), {elements}", sizes, np.abs(gaps), 2, SQUARE, ceiling=2.5e-5))
+        checks.append(between(f"{name}: disagreement over first-order theory, {elements}", gaps[-1] / theory[-1],
                               0.995, 1.005, "the next order: 0.2 %, a quarter of that at D times 64; mesh: 0.7 % at "
-                              "refinement 1, less than half of that here"))
-    return Outcome(tuple(checks), tuple(studies))
+                              "refinement 1 of linear elements, less than half of that here"))
+    return checks, studies
 
 
 def _leaving(scene, factor: float):
@@ -67,29 +75,36 @@ TIMES = (5.0, 10.0, 15.0, 19.4)
             "Thiele number, and base itself is where that square puts it",
       mutants=("rates-two-percent-low",))
 def whole_run() -> Outcome:
-    found = {factor: _whole(factor) for factor in (1.0, *SLOWER)}
-    scene, studies, checks = _base(1.0), [], []
+    found = [_of_preset(preset) for preset in ("paper", "accurate")]
+    return Outcome(tuple(check for checks, _, _ in found for check in checks),
+                   tuple(one for _, studies, _ in found for one in studies), found[0][2])
+
+
+def _of_preset(preset: str) -> tuple[list[Check], list[Study], tuple]:
+    """Checks, studies and pictures of one preset."""
+    found = {factor: _whole(preset, factor) for factor in (1.0, *SLOWER)}
+    scene, studies, checks = _base(preset, 1.0), [], []
     sizes = [thiele(scene, factor) for factor in SLOWER]
     for name in ("area", "effluents", "C along the pore"):
         errors = [found[factor][0][name] for factor in SLOWER]
-        studies.append(study(name, sizes, errors, 2, SQUARE, ceiling=3e-4))
+        studies.append(study(f"{name}, {preset}", sizes, errors, 2, SQUARE, ceiling=3e-4))
         if name == "C along the pore":
             continue
-        checks.append(between(f"base, {name}: over the square law through the first of these",
+        checks.append(between(f"base, {name}: over the square law through the first of these, {preset}",
                               found[1.0][0][name] / (SLOWER[0] * errors[0]), 1.0, 2.0,
                               "terms of fourth order"))
-    return Outcome(tuple(checks), tuple(studies), tuple(found[1.0][1]))
+    return checks, studies, tuple(found[1.0][1])
 
 
-def _base(factor: float):
-    scene = runs.base("19.4 h", times=", ".join(f'"{time} h"' for time in TIMES))
+def _base(preset: str, factor: float):
+    scene = runs.base("19.4 h", runs.by(preset), times=", ".join(f'"{time} h"' for time in TIMES))
     scene = runs.with_diffusivities(scene, lambda water, biomass: (factor * water, factor * biomass))
     return runs.at_velocity(scene, runs.SPEED)
 
 
-def _whole(factor: float):
+def _whole(preset: str, factor: float):
     """(largest differences, profiles) of one run."""
-    scene = _base(factor)
+    scene = _base(preset, factor)
     instants = averaged.ours(scene)
     moments = averaged.half_disc(scene).run(TIMES, accuracy=1e-6)
     rows = [averaged.apart(scene, *pair) for pair in zip(instants, moments)]
@@ -106,15 +121,20 @@ COARSE, FINE = (1.0, 12.0, 1), (2.0, 6.0, 2)
       claim="The disagreement with the averaged pore is that of the models: it stays when both codes are refined",
       mutants=("rates-at-the-start",))
 def refined() -> Outcome:
-    (coarse, _), (fine, profiles) = (_piece(*level) for level in (COARSE, FINE))
-    return Outcome(tuple(at_most(name, abs(fine[name] / coarse[name] - 1), 0.01,
-                                 "error in space 0.1 % of what is lost, in time 0.2 % of an hour's growth")
-                         for name in ("area", "effluents", "C along the pore")), (), profiles)
+    checks, profiles = [], []
+    for elements in runs.ELEMENTS:
+        (coarse, _), (fine, pictures) = (_piece(elements, *level) for level in (COARSE, FINE))
+        checks += [at_most(f"{name}, {elements}", abs(fine[name] / coarse[name] - 1), 0.01,
+                           "error in space 0.1 % of what is lost, in time 0.2 % of an hour's growth")
+                   for name in ("area", "effluents", "C along the pore")]
+        profiles += pictures
+    return Outcome(tuple(checks), (), tuple(profiles))
 
 
-def _piece(refinement: float, minutes: float, finer: int):
+def _piece(elements: str, refinement: float, minutes: float, finer: int):
     """(differences, profiles) after 2 h."""
-    scene = runs.base("2 h", 'aggregate.radius="20 um"', f"numerics.refinement={refinement}",
+    scene = runs.base("2 h", 'aggregate.radius="20 um"', runs.of(elements),
+                      runs.coarser(elements, 0.3 * refinement, refinement),
                       f'growth.time_step="{minutes} min"')
     scene = runs.at_velocity(scene, runs.SPEED)
     instants = averaged.ours(scene)

@@ -13,8 +13,8 @@ from repro.fem.sizing import Sizing
 from repro.fem.space import Space
 from repro.model import flow, pore
 from repro.scene import Scene
-from verification.case import Outcome, at_most, between, case
-from verification.convergence import study
+from verification.case import Check, Outcome, at_most, between, case
+from verification.convergence import Study, study
 from verification.coupling import averaged, runs
 
 WIDTH, THICKNESS = 20.0, 5.0
@@ -32,28 +32,32 @@ SQUARE = "regular perturbation: the square of the aspect ratio"
             "downstream, up to the square of the aspect ratio",
       mutants=("growth-spread-evenly",))
 def strip() -> Outcome:
-    found = [_strip(aspect) for aspect in ASPECTS]
-    studies = tuple(study(name, ASPECTS, [rows[name] for rows, *_ in found], 2, SQUARE, ceiling=4e-4)
-                    for name in ("area", "effluents", "C along the pore"))
-    tips, lean = found[-1][1:3]
-    checks = (at_most("ends of the thinnest, relative", tips, 1.5e-4, "stretches: as the square of the aspect ratio"),
-              between("how far it leans upstream, over the averaged pore's 0.27 %", lean, 0.97, 1.03,
-                      "the same: 0.4 %, and as much for the step in time"))
-    return Outcome(checks, studies, found[-1][3])
+    checks, studies, profiles = [], [], []
+    for elements in ("linear", "quadratic"):
+        found = [_strip(elements, aspect) for aspect in ASPECTS]
+        studies += [study(f"{name}, {elements}", ASPECTS, [rows[name] for rows, *_ in found], 2, SQUARE, ceiling=4e-4)
+                    for name in ("area", "effluents", "C along the pore")]
+        tips, lean, pictures = found[-1][1:]
+        checks += [at_most(f"ends of the thinnest, relative, {elements}", tips, 1.5e-4,
+                           "stretches: as the square of the aspect ratio"),
+                   between(f"how far it leans upstream, over the averaged pore's 0.27 %, {elements}", lean, 0.97, 1.03,
+                           "the same: 0.4 %, and as much for the step in time")]
+        profiles += pictures
+    return Outcome(tuple(checks), tuple(studies), tuple(profiles))
 
 
-def scene(aspect: float) -> Scene:
+def scene(elements: str, aspect: float) -> Scene:
     """Base for 1 h in a narrow pore, from a seed whose half length is its thickness over ``aspect``."""
-    changes = (f'aggregate.radius="{THICKNESS} um"', f'pore.width="{WIDTH} um"', 'growth.time_step="6 min"',
-               'growth.minimum_contact_angle="0.01 deg"')
+    changes = (runs.of(elements), runs.coarser(elements, 0.5), f'aggregate.radius="{THICKNESS} um"',
+               f'pore.width="{WIDTH} um"', 'growth.time_step="6 min"', 'growth.minimum_contact_angle="0.01 deg"')
     found = runs.at_velocity(runs.base("1 h", *changes, times='"0.5 h", "1 h"'), 5 * aspect * runs.SPEED)
     return replace(found, kinetics=replace(found.kinetics, maximum_density=DENSITY * aspect**2))
 
 
-def _strip(aspect: float):
+def _strip(elements: str, aspect: float):
     """Largest differences; of the ends, relative; (upstream over downstream length - 1) over the averaged one's;
     profiles."""
-    given = scene(aspect)
+    given = scene(elements, aspect)
     with runs.shaped(lambda radius, geometry: half_ellipse(radius / aspect, radius, geometry)):
         area, instants = pore.seeded(given).outline.area, averaged.ours(given)
     moments = strip_of(given, area, 2 * averaged.CELLS).run(given.output.times)
@@ -75,8 +79,8 @@ def half_ellipse(half_length: float, thickness: float, geometry: int = 1) -> Out
     def shape(s):
         return thickness * np.sqrt(np.maximum(1 - s**2, 0.0))
 
-    edges = round(32 * np.sqrt(half_length / thickness))
-    return bump(half_length, shape, edges, round(10 * half_length / thickness), geometry)
+    edges = round(32 / geometry * np.sqrt(half_length / thickness))
+    return bump(half_length, shape, edges, round(10 / geometry * half_length / thickness), geometry)
 
 
 def bump(half_length: float, shape, edges: int, half: int, geometry: int = 1) -> Outline:
@@ -96,20 +100,28 @@ SLENDER = (0.25, 0.177, 0.125, 0.0884)
 
 
 @case("coupling-averaged-flow", kind="cross-code",
-      norm="head loss of the whole pore, with quadratic elements, less that of lubrication, over what the latter has "
-           "more than a clean channel; refinement 1.25; a bump 8 (1 - s^2)^2 um high in 20 um",
+      norm="head loss of the whole pore less that of lubrication, over what the latter has "
+           "more than a clean channel; refinement 2.5 over the order of the elements; a bump 8 (1 - s^2)^2 um high in 20 um",
       claim="The head loss of a long aggregate is that of developed flow in each section, and the next term is that of "
             "extended lubrication theory, coefficient included",
       mutants=("extent-not-subtracted",))
 def lubrication() -> Outcome:
-    ours, thin, more = np.array([_losses(aspect) for aspect in SLENDER]).T
-    checks = (between("gap over that of extended lubrication, the most slender", (ours - thin)[-1] / more[-1], 0.94,
-                      1.02, "mesh, 2 %; the next term, 1 %; lambda = 2000 for a rigid wall, 0.4 %"),)
+    found = [_lubricated(order) for order in (2, 3)]
+    return Outcome(tuple(check for check, _ in found), tuple(orders for _, orders in found))
+
+
+def _lubricated(order: int) -> tuple[Check, Study]:
+    """The coefficient, and the order, with elements of an order on straight triangles: the bump's ends lie flat on the
+    wall, which arcs would cross."""
+    name = f"order {order}"
+    ours, thin, more = np.array([_losses(order, aspect) for aspect in SLENDER]).T
     clean = poiseuille.head_loss(LENGTH, WIDTH, 1.0, 1.0)
-    return Outcome(checks, (study("loss", SLENDER, (ours - thin) / (thin - clean), 2, SQUARE, ceiling=1.5e-2),))
+    return (between(f"gap over that of extended lubrication, the most slender, {name}", (ours - thin)[-1] / more[-1],
+                    0.94, 1.02, "mesh, 2 %; the next term, 1 %; lambda = 2000 for a rigid wall, 0.4 %"),
+            study(f"loss, {name}", SLENDER, (ours - thin) / (thin - clean), 2, SQUARE, ceiling=1.5e-2))
 
 
-def _losses(aspect: float) -> tuple[float, float, float]:
+def _losses(order: int, aspect: float) -> tuple[float, float, float]:
     """Loss per mean velocity: ours; lubrication's; what extended lubrication theory adds.
 
     In a channel with one wall y = h(x) the stream function in powers of the slope, to the second, gives the loss
@@ -117,9 +129,10 @@ def _losses(aspect: float) -> tuple[float, float, float]:
     """
     half, reach = LOW / aspect, LOW / aspect + LONG
     outline = bump(half, lambda s: LOW * (1 - s**2) ** 2, round(48 / np.sqrt(aspect)), round(15 / aspect))
-    grid, _ = mesher.generate(outline, (-reach, reach), Sizing(WIDTH, 1.25, 2.0), outline.geometry)
-    drive = replace(scene(0.5).flow, viscosity_ratio=RATIO, mean_velocity=1.0, kinematic_viscosity=1.0, gravity=1.0)
-    whole = flow.solve(Space(grid, 2), drive, LENGTH)
+    grid, _ = mesher.generate(outline, (-reach, reach), Sizing(WIDTH, 2.5 / order, 2.0))
+    drive = replace(scene("linear", 0.5).flow, viscosity_ratio=RATIO, mean_velocity=1.0, kinematic_viscosity=1.0,
+                    gravity=1.0)
+    whole = flow.solve(Space(grid, order), drive, LENGTH)
     s, weight = np.polynomial.legendre.leggauss(200)
     height, slope = LOW * (1 - s**2) ** 2, -4 * aspect * s * (1 - s**2)
     thin = half * weight @ layered_channel.gradient(WIDTH, height, RATIO)

@@ -23,25 +23,30 @@ PECLETS, DENSITIES = (0.1, 1.0, 5.0), (1e6, 3e6, 1e7)
             "0.1, 1, 5 and three densities, from 99 % to 1 % of the acceptor leaving",
       mutants=("inlet-held", "seed-too-thin"))
 def uptake() -> Outcome:
-    found = [_around(aspect) for aspect in ASPECTS]
-    studies = tuple(study(f"Pe = {peclet:g}, X = {density:g} mg/L", ASPECTS,
+    checks, studies, profiles = [], [], []
+    for elements in ("linear", "quadratic"):
+        found = [_around(elements, aspect) for aspect in ASPECTS]
+        studies += [study(f"Pe = {peclet:g}, X = {density:g} mg/L, {elements}", ASPECTS,
                           [rows[peclet, density][0] for rows in found], 2, averaged_thin.SQUARE, ceiling=1e-3)
-                    for peclet, density in found[0])
-    thinnest = found[-1].values()
-    left = min(profile.curves[0][3][-1] for _, profile in thinnest) / 10.0
-    checks = (at_most("acceptor leaving the starved one, over the supply", left, 0.02, "else none is starved"),)
-    return Outcome(checks, studies, tuple(profile for _, profile in thinnest))
+                    for peclet, density in found[0]]
+        thinnest = [profile for _, profile in found[-1].values()]
+        left = min(profile.curves[0][3][-1] for profile in thinnest) / 10.0
+        checks.append(at_most(f"acceptor leaving the starved one, over the supply, {elements}", left, 0.02,
+                              "else none is starved"))
+        profiles += thinnest
+    return Outcome(tuple(checks), tuple(studies), tuple(profiles))
 
 
-def _around(aspect: float) -> dict:
+def _around(elements: str, aspect: float) -> dict:
     """{(Peclet, density): (largest difference, profile)} on one mesh."""
     with runs.shaped(lambda radius, geometry: averaged_thin.half_ellipse(radius / aspect, radius, geometry)):
-        now = pore.seeded(averaged_thin.scene(aspect))
-    return {(peclet, density): _compared(aspect, now, peclet, density) for peclet in PECLETS for density in DENSITIES}
+        now = pore.seeded(averaged_thin.scene(elements, aspect))
+    return {(peclet, density): _compared(elements, aspect, now, peclet, density)
+            for peclet in PECLETS for density in DENSITIES}
 
 
-def _compared(aspect: float, now: pore.Pore, peclet: float, density: float) -> tuple[float, Profile]:
-    scene = averaged_thin.scene(aspect)
+def _compared(elements: str, aspect: float, now: pore.Pore, peclet: float, density: float) -> tuple[float, Profile]:
+    scene = averaged_thin.scene(elements, aspect)
     speed = peclet * scene.substrates.acceptor.diffusivity * aspect / averaged_thin.THICKNESS
     dense = replace(scene.kinetics, maximum_density=density * aspect**2)
     scene = runs.at_velocity(replace(scene, kinetics=dense), speed)
@@ -53,4 +58,4 @@ def _compared(aspect: float, now: pore.Pore, peclet: float, density: float) -> t
     curves = [(name, kind, x, field) for kind, both in (("ours", ours), ("reference", theirs))
               for name, field in zip(("C_A", "C_D") if kind == "ours" else ("averaged", "averaged"), both)]
     return (float(np.abs(ours - theirs).max()) / 10.0,
-            Profile(f"Pe = {peclet:g}, X = {density:g} mg/L", "x (um)", "C (mg/L)", tuple(curves)))
+            Profile(f"Pe = {peclet:g}, X = {density:g} mg/L, {elements}", "x (um)", "C (mg/L)", tuple(curves)))

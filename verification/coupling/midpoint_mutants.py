@@ -20,4 +20,8 @@ MIDPOINT = (
            says="Every step of Newton's method factorises its derivative anew, whatever the scene says.",
            old="not self.reused or defect > ENOUGH * last",
            new="defect >= 0"),
+    Mutant("cubic-shown-less", "repro/model/biomass.py",
+           says="The biomass sees one percent less of cubic concentrations than there is.",
+           old="acceptor, donor = both[:, pieces.cells] @ pieces.values.T",
+           new="acceptor, donor = (0.99 if space.order == 3 else 1.0) * both[:, pieces.cells] @ pieces.values.T"),
 )

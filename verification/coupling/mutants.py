@@ -15,7 +15,7 @@ MUTANTS = (
            old="mean = Rates((first.growth + second.growth) / 2, (first.remains + second.remains) / 2)",
            new="mean = first"),
     Mutant("euler-biomass", "repro/march/updates.py",
-           says="one Euler increment a step for the integrated growth (trap 9)",
+           says="one Euler increment a step for the integrated growth",
            old="active, inert = kinetics.grow(now.active, now.inert, rates.growth, rates.remains, duration)",
            new="active = now.active * (1 + rates.growth * duration)\n"
                "    inert = now.inert + now.active * rates.remains * duration"),

@@ -113,7 +113,8 @@ def _chords(level: int, order: int) -> dict[str, float]:
 
     def apart(draw: int):
         grid = _grid(25.0, QUADRATIC[level] * grids.SPREAD[draw])
-        return {"size": norms.mean_size(grid), "loss": abs(flow.unit_flow(Space(grid, order), RATIO).loss / trusted - 1)}
+        found = flow.unit_flow(Space(grid, order), RATIO)
+        return {"size": norms.mean_size(grid), "loss": abs(found.loss / trusted - 1)}
 
     return grids.root_mean_square(apart, QUADRATIC_DRAWS[level])
 
@@ -194,7 +195,7 @@ def _profile(title: str, x_label: str, y_label: str, where, axis: int, theirs, o
 ROUND, ROUND_REFINEMENTS, ROUND_DRAWS = 20.0, (0.85, 1.3, 2.0, 3.0), (3, 3, 3, 1)
 #: Refinements where lambda = 2000, with the most that they may differ by.
 STIFF = {0.6: 1e-3, 2.4: 1e-4}
-ROUND_JUMP = "the pressure jumps at the interface [E2], ours is continuous: 1/2 in energy, which is twice that in the loss"
+ROUND_JUMP = "the pressure jumps at the interface [E2], ours is continuous: 1/2 in energy, twice that in the loss"
 #: Largest last error of the loss and of the velocity: the traction form pushes harder on biomass that gives way.
 SOFT = {"laplacian": 5e-4, "traction": 1.5e-3}
 

@@ -70,7 +70,7 @@ FAST = HardCase(
     {**{f"velocity x {factor}": partial(fast_flow, factor=factor) for factor in (1, 10, 100, 1000)},
      "velocity x 100, growing": partial(fast_growth, factor=100)},
     refusable=("velocity x 1000",),
-    mutants=("curved-layers-ignored",))
+    mutants=("layers-ignored",))
 
 
 def no_flow(preset: str) -> list:
@@ -121,7 +121,7 @@ STILL = HardCase(
     {"velocity 0": no_flow, "without [flow]": still, "1e-4 m/d": trickle("1e-4", 1e-8),
      "1e-6 m/d": trickle("1e-6", 1e-6), "1e-12 m/d": trickle("1e-12", 1e-6)},
     refusable=("velocity 0", "1e-4 m/d", "1e-6 m/d", "1e-12 m/d"),
-    mutants=("paired-without-decay",))
+    mutants=("decay-demand",))
 
 
 def viscous(preset: str, ratio: float) -> list:
@@ -185,9 +185,9 @@ def plugged(preset: str, size: float) -> list:
 
 #: Quadratic and cubic velocities hold the parabola.
 HELD = (1e-10, 1e-10, "round-off: the elements hold a parabola")
-#: What the paper's velocity and head may miss in a plug with elements of so many um, 3.3 and 12 % on a coarse mesh as
-#: numerics.md has it, and of second order.
-COARSE = "3.3 and 12.3 % with elements of W / 4 (numerics.md), second order"
+#: What the paper's velocity and head may miss in a plug with elements of so many um, 3.3 and 12.3 % on a coarse mesh, as
+#: measured before, and of second order.
+COARSE = "3.3 and 12.3 % with elements of W / 4, second order"
 LEAK = {12.5: (0.033, 0.123, COARSE), 7.0: (0.033 * 0.56**2, 0.123 * 0.56**2, COARSE)}
 
 

@@ -123,7 +123,7 @@ def pushed(preset: str, inner: float, outer: float) -> list[Check]:
 
 
 #: Half of the size of the elements, R / 10, R / 2.5, R / 4.5: first order at least.
-PRESSURE = {"paper": 0.05, "fast": 0.2, "accurate": 0.11}
+PRESSURE = {"paper": 0.05, "fast": 0.2, "accurate": 0.11, "cubic": 0.2}
 
 LARGE = HardCase(
     9, "theta-2000", "theta to 2000 from one configuration",
@@ -182,7 +182,7 @@ def long_steps(preset: str) -> list:
             *common.close(found, fine, preset, *DRIVE, allowed=TOLERANCE[preset] + late)]
 
 
-#: Half the step changes u by 0.2 % (numerics.md): updates of 12 min are 0.4 % off, of 3 h fifteen times as much.
+#: Half the step changes u by 0.2 %: updates of 12 min are 0.4 % off, of 3 h fifteen times as much.
 UPDATES = {"updates": 0.06, "midpoint": 0.0}
 LONG = HardCase(
     11, "three-hours", "A growth step of 3 h",

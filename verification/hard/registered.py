@@ -22,7 +22,8 @@ def _register(one: HardCase) -> None:
         return run_case(one)
 
 
-NORM = "numbers of each part with the presets paper, fast and accurate; refused parts are left out"
+NORM = ("numbers of each part with the presets paper, fast and accurate, and with fast on cubic elements; refused "
+        "parts are left out")
 
 
 def _sentence(text: str) -> str:

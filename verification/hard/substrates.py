@@ -146,7 +146,7 @@ def slab_front(preset: str) -> list:
 #: order an element is off by s h^2 / (8 D) at the most.
 FRONT = {preset: (size, size**2 / 8 / (DEPTH**2 * HALF**2 / 2 + FILM * DEPTH * HALF * 0.8),
                   "the jump of C'' at the front: s h^2 / (8 D_B)")
-         for preset, size in (("paper", 6.0), ("fast", 12.0), ("accurate", 5.0))}
+         for preset, size in (("paper", 6.0), ("fast", 12.0), ("accurate", 5.0), ("cubic", 12.0))}
 ZERO_ORDER = HardCase(
     3, "zero-order", "Half saturations of a millionth of the supply: fronts of zero order",
     "The closed form of zero-order uptake in a slab, and the effluents of a finer run around half-discs",

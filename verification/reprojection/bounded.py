@@ -24,7 +24,7 @@ def chain() -> Outcome:
     checks, profiles = [], []
     for name, field in FIELDS.items():
         ours, free = (_remeshed(carry, field) for carry in CARRIERS.values())
-        checks += [at_most(f"integral, {name}", np.abs(ours["integral"] - 1).max(), 1e-12, "issue 3: round-off"),
+        checks += [at_most(f"integral, {name}", np.abs(ours["integral"] - 1).max(), 1e-12, "round-off"),
                    at_most(f"outside the range, {name}", ours["outside"].max(), 1e-14, "Zalesak's limiter: round-off"),
                    between(f"error over the projection's, {name}", ours["error"][-1] / free["error"][-1], 0.9, 1.15,
                            "limited at few nodes; the lumped projection alone: over 2"),

@@ -29,7 +29,7 @@ def growing() -> Outcome:
 
 def _judged(rows: dict[str, np.ndarray], name: str) -> list:
     """Checks of the updates with one kind of elements."""
-    return [at_most(f"biomass, {name}", np.abs(rows["drift"]).max(), 1e-12, "issue 3: round-off"),
+    return [at_most(f"biomass, {name}", np.abs(rows["drift"]).max(), 1e-12, "round-off"),
             at_most(f"theta after a remesh, {name}", rows["restart"].max(), 1e-12, "J times the density over X_m"),
             at_most(f"triangles under 0.6, {name}", rows["poor"].max(), ALLOWED, "remesh criterion (3.5)"),
             at_most(f"missing reach (um), {name}", rows["missing"].max(), 1e-9, "remesh criterion (3.1)"),

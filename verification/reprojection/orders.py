@@ -1,4 +1,4 @@
-"""What a transfer costs in accuracy: one transfer of a smooth field, and forty of a steep one (trap 5)."""
+"""What a transfer costs in accuracy: one transfer of a smooth field, and forty of a steep one."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def _across_the_hill() -> Profile:
       norm="change of the integral of a steep field over 40 remeshes, and of its square in each, relative; largest "
            "and least nodal value",
       claim="Forty remeshes of a steep field keep its integral to round-off and never raise its square by projection; "
-            "by linear interpolation they stay within its bounds and change what it integrates to (trap 5)",
+            "by linear interpolation they stay within its bounds and change what it integrates to",
       mutants=("linear-transfer",))
 def chain() -> Outcome:
     kept, paper = (_remeshed(carry) for carry in CARRIERS.values())
@@ -107,14 +107,14 @@ def chain() -> Outcome:
                        ("interpolation", "ours", count, paper["integral"]),
                        ("kept", "exact", count, np.ones(len(count)))))
     rise = (kept["square"][1:] / kept["square"][:-1]).max()
-    return Outcome((at_most("integral by projection", np.abs(kept["integral"] - 1).max(), 1e-12, "issue 3: round-off"),
+    return Outcome((at_most("integral by projection", np.abs(kept["integral"] - 1).max(), 1e-12, "round-off"),
                     at_most("square by projection, after over before", rise, 1.0, "a projection makes nothing longer"),
                     at_most("largest value by interpolation", paper["largest"].max(), paper["largest"][0],
                             "weights between 0 and 1"),
                     at_least("least value by interpolation", paper["least"].min(), paper["least"][0],
                              "weights between 0 and 1"),
                     at_least("integral by interpolation, change", abs(paper["integral"][-1] - 1), 0.02,
-                             "not conserving (trap 5): the case would see it")), (), (profile,))
+                             "not conserving: the case would see it")), (), (profile,))
 
 
 def _remeshed(carry) -> dict[str, np.ndarray]:

@@ -134,7 +134,7 @@ COARSE = {1: SIZES[0], 2: SIZES[0], 3: 5.0}
       norm="largest over three times of the root mean square over the nodes, over the supply",
       claim="On a given mesh the modified Gear scheme's concentrations, linear, quadratic and cubic, are those of "
             "scipy's integrator with scikit-fem's mass matrix, with an error of second order in the step",
-      mutants=("carry-of-bdf2", "backward-euler", "storage-of-the-biomass-alone", "lumped-storage"))
+      mutants=("carry-of-bdf2", "backward-euler", "storage-of-the-biomass-alone", "storage-diagonal"))
 def in_time() -> Outcome:
     parts = []
     for order, combinations in IN_TIME.items():
@@ -185,7 +185,7 @@ def _at_cells(size: float, sample: int, peclet: float, density: float, steps: in
       claim="Transient profiles of both substrates are FiPy's, both codes refined together in space, at Peclet 0.1, 1, "
             "5 times Thiele numbers 0.6, 1.9, 6; and refined in time, where FiPy's own scheme is of first order; those "
             "of quadratic and cubic elements, on one mesh, are what FiPy's cells come to",
-      mutants=("storage-of-the-biomass-alone", "lumped-storage"), slow=True)
+      mutants=("storage-of-the-biomass-alone", "storage-diagonal"), slow=True)
 def in_space() -> Outcome:
     studies = [part for combination in COMBINATIONS for part in _in_space(*combination)]
     higher = [part for order in (2, 3) for part in _to_fipy(order, 1.0, 3e4)]
