@@ -23,10 +23,13 @@ SPLIT = 1.4
 
 @dataclass(frozen=True)
 class Sizing:
-    """How large the elements of a mesh are to be: width of the pore (um); refinement, by which sizes are divided; film,
-    the thinnest that is resolved (um); gradation, growth of the size with the distance from where it is prescribed; front,
-    by which sizes at the aggregate are divided besides, for a front of the substrates in it; seed, x (um) of the middle of
-    the half-disc that the aggregate was at t = 0, None where it was none."""
+    """How large the elements of a mesh are to be.
+
+    width: of the pore (um); refinement: what sizes are divided by; film: the thinnest that is
+    resolved (um); gradation: growth of the size with the distance from where it is prescribed;
+    front: what sizes at the aggregate are divided by besides, for a front of the substrates in it;
+    seed: x (um) of the middle of the half-disc that the aggregate was at t = 0, None if it was none.
+    """
 
     width: float
     refinement: float
@@ -197,8 +200,9 @@ def _parameters(nodes: np.ndarray, x: np.ndarray) -> np.ndarray:
 def placed(outline: Outline, edge: np.ndarray, t: np.ndarray, seed: float | None = None) -> Outline:
     """New nodes (K,), each at t in [0, 1) of an edge: where t is zero the edge's own first corner.
 
-    seed: as :class:`Sizing`'s. Places at t = 0 between two nodes of the seed's arc lie on that arc: a straight edge of today's outline was round
-    at t = 0, and what the material remembers makes it round again at the next update.
+    seed: as that of :class:`Sizing`. Places at t = 0 between two nodes of the seed's arc lie on that
+    arc: a straight edge of today's outline was round at t = 0, and what the material remembers makes
+    it round again at the next update.
     """
     first, corner, weight = t == 0, outline.geometry * edge, parabola(t)
     points, origin = (np.einsum("ka,kai->ki", weight, outline.arcs(part)[edge])

@@ -14,10 +14,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from repro.files import whole
 from repro.report import comparison, run_page
 from repro.report.reading import NoRun, read
 from repro.results import write_text
+from repro.results.files import whole
 
 __all__ = ["NoRun", "compare", "write"]
 

@@ -23,7 +23,7 @@ from typing import Literal
 import numpy as np
 
 from repro.errors import CheckpointError
-from repro.files import whole
+from repro.results.files import whole
 
 #: Where a run keeps the state that it goes on from, the one before, and the last one refused.
 NEWEST, PREVIOUS, REFUSED = "checkpoint.state", "checkpoint.previous", "checkpoint.refused"

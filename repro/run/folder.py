@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from repro.errors import OutputError
-from repro.files import WRITING, is_file, is_folder, open_lock
+from repro.results.files import WRITING, is_file, is_folder, open_lock
 from repro.run.checkpoint import NEWEST, PREVIOUS, REFUSED
 
 LOCK, PROVENANCE, SUMS = ".lock", "run.json", "fields.sha256"

@@ -18,7 +18,8 @@ from contextlib import suppress
 from pathlib import Path
 
 from repro.check import numbers
-from repro.fem import geometry
+from repro.fem.sizing import ACROSS_AGGREGATE, ACROSS_PORE
+from repro.model.pore import resolution
 from repro.scene import Scene, SceneError
 
 #: Bytes per node at the peak of a run, by the order of elements: measured at 800 to 50 000 nodes.
@@ -60,16 +61,16 @@ def _nodes(scene: Scene, thickness: float, reach: float) -> float:
     """Nodes of a mesh around an aggregate of this thickness and half length (um); 0: none."""
     pore = scene.pore
     numerics = scene.numerics
-    largest = pore.width / geometry.ACROSS_PORE / numerics.refinement
+    largest = pore.width / ACROSS_PORE / resolution(scene)
     clear = min(10 * thickness, 1.5 * pore.width) if thickness else 1.5 * pore.width
     length = pore.length if numerics.extent == "full" else min(pore.length, 2 * (reach + clear))
-    near = thickness / geometry.ACROSS_AGGREGATE / numerics.refinement
+    near = thickness / ACROSS_AGGREGATE / resolution(scene)
     near = min(near or largest, largest)
     if numerics.gradation == 0:
         largest = near
     corners = length * pore.width / (HEXAGON * largest**2) + 2 * (length + pore.width) / largest
     corners += _graded(math.pi * min(thickness, reach), near, largest, numerics.gradation)
-    return corners * (PER_CORNER if numerics.curved else 1.0)
+    return corners * (PER_CORNER if numerics.geometry == 2 else 1.0)
 
 
 def _graded(surface: float, near: float, largest: float, gradation: float) -> float:

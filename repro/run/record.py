@@ -15,8 +15,8 @@ import numpy as np
 
 from repro import results
 from repro.errors import CheckpointError
-from repro.files import is_file
 from repro.march.loop import State
+from repro.results.files import is_file
 from repro.run.checkpoint import Arrays
 from repro.run.stored import counted, counts, in_range
 

@@ -11,9 +11,9 @@ import numpy as np
 
 from repro import report, results, timing
 from repro.errors import CheckpointError, Interrupted, OutputError
-from repro.files import is_file, whole
 from repro.march.loop import Instant, State, added
 from repro.results import netcdf
+from repro.results.files import is_file, whole
 from repro.run import checkpoint, record, stored
 from repro.run.checkpoint import Arrays
 from repro.run.folder import CHECKPOINTS, OWN, PROVENANCE, SUMS, claimed, remove, writing

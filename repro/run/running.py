@@ -15,9 +15,9 @@ from time import perf_counter
 
 from repro import results, timing
 from repro.errors import CheckpointError, Interrupted, OutputError, SimulationError
-from repro.files import is_file
 from repro.march.loop import PoreEnd
 from repro.march.simulation import steps
+from repro.results.files import is_file
 from repro.run import checkpoint
 from repro.run.folder import (
     CHECKPOINTS,

@@ -6,9 +6,9 @@ from html import escape
 
 import numpy as np
 
-from repro.files import whole
 from repro.report.page import policy
 from repro.results import write_text
+from repro.results.files import whole
 from repro.sweep import picture
 from repro.sweep.design import Factor, label
 from repro.sweep.picture import Axis, at

@@ -13,8 +13,8 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from repro.files import open_lock, whole
 from repro.results import write_json
+from repro.results.files import open_lock, whole
 from repro.run.running import OutputError
 from repro.scene import scene_hash
 from repro.sweep import task

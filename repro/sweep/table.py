@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from repro import results
-from repro.files import whole
+from repro.results.files import whole
 from repro.run import status
 from repro.sweep import task
 from repro.sweep.design import Point
