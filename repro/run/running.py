@@ -9,14 +9,17 @@ import json
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from time import perf_counter
 
 from repro import results, timing
+from repro.check import simplifications
+from repro.check.numbers import numbers
+from repro.check.simplifications import Warned
 from repro.errors import CheckpointError, Interrupted, OutputError, SimulationError
 from repro.files import is_file
-from repro.march.loop import PoreEnd
+from repro.march.loop import Instant, PoreEnd
 from repro.march.simulation import steps
 from repro.run import checkpoint
 from repro.run.folder import (
@@ -47,8 +50,11 @@ Progress = Callable[[float], None]
 
 
 def untold(event: dict) -> None:
-    """What is done with events where nobody asks for them: warnings are given, others dropped."""
-    if event["event"] == "warning":
+    """What is done with events where nobody asks for them: warnings are given, others dropped.
+
+    Those of the scene's simplifications, which have its key, are left to ``run.json``.
+    """
+    if event["event"] == "warning" and "key" not in event:
         warnings.warn(event["message"], stacklevel=2)
 
 
@@ -311,6 +317,8 @@ def _record_steps(recorder: Recorder, progress: Progress, watch: Watch) -> None:
         remeshes = recorder.remeshes
         contact = recorder.contact
         recorder.add(state, instant)
+        if instant and len(recorder.record.rows) == 1:
+            _warn(recorder, instant, watch)
         _tell_step(recorder, recorder.remeshes > remeshes, recorder.contact > contact, watch)
         progress(recorder.time)
         if number := watch.stop():
@@ -318,6 +326,28 @@ def _record_steps(recorder: Recorder, progress: Progress, watch: Watch) -> None:
         if perf_counter() - written >= watch.interval:
             _checkpoint(recorder, watch)
             written = perf_counter()
+
+
+def _warn(recorder: Recorder, first: Instant, watch: Watch) -> None:
+    """Tell and record which simplifications do not hold, as ``repro check`` finds them."""
+    recorder.record.warnings = [asdict(each) for each in warned(recorder.scene, first)]
+    for each in recorder.record.warnings:
+        watch.tell({"event": "warning", "key": each["key"],
+                    "message": f"{each['key']}: {each['text']}"})
+
+
+def warned(scene: Scene, first: Instant) -> list[Warned]:
+    """The simplifications of a scene that do not hold; first: its state at t = 0.
+
+    None of a seed with an outline: what is checked is bounds of half-discs.
+    """
+    if scene.aggregate and scene.aggregate.radius is None:
+        return []
+    flow = first.solved.flow
+    try:
+        return simplifications.warnings(scene, numbers(scene, flow.mean_velocity if flow else None))
+    except ArithmeticError as error:
+        return [Warned("scene", f"its dimensionless numbers cannot be worked out ({error})")]
 
 
 def _tell_step(recorder: Recorder, remeshed: bool, contact: bool, watch: Watch) -> None:
