@@ -87,7 +87,8 @@ def test_on_a_terminal_a_bar(tmp_path):
 
 @pytest.mark.parametrize("arguments", [[], ["base"], ["--out", "x"], ["base", "--resume", "x"], ["--checkpoint", "-1"],
                                        ["--resume", "x", "--set", "a=1"],
-                                       ["--resume", "x", "--force"], ["base", "--out", "x", "--checkpoint", "?"]])
+                                       ["--resume", "x", "--force"], ["--resume", "x", "--unset", "growth"],
+                                       ["base", "--out", "x", "--checkpoint", "?"]])
 def test_arguments_that_do_not_go_together_are_refused(capsys, arguments):
     with pytest.raises(SystemExit) as refused:
         main(["run", *arguments])

@@ -85,13 +85,13 @@ def run(scene: Scene, folder: Path, progress: Progress = unwatched, watch: Watch
 
     A run of the same scene, source and versions that is there is gone on with, or left alone where
     it is over; with ``force`` the files of whatever run is there are removed first. origin: the
-    ``file`` of the scene and the entries ``set`` in it, for ``run.json``.
+    ``file`` of the scene and what was ``set`` and ``unset`` in it, for ``run.json``.
 
     Returns how the run ended. Raises SceneError where the machine lacks a package or the memory
-    that the scene takes, OutputError where the folder holds anything else, cannot be used or another run uses
-    it, SimulationError where a stage fails, and Interrupted where
-    ``watch.stop`` asks for it: what was computed until then is written all the same, ``run.json``
-    says why it ends, and :func:`resume` goes on from there.
+    that the scene takes, OutputError where the folder holds anything else, cannot be used or
+    another run uses it, SimulationError where a stage fails, and Interrupted where ``watch.stop``
+    asks for it: what was computed until then is written all the same, ``run.json`` says why it
+    ends, and :func:`resume` goes on from there.
     """
     _require(scene, watch)
     with held(folder):
@@ -169,11 +169,11 @@ def resume(folder: Path, progress: Progress = unwatched, watch: Watch = ALONE) -
 def _tell_another_file(recorder: Recorder, watch: Watch) -> None:
     """Warn where the file that a run's scene was read from says something else by now."""
     file = recorder.origin.get("file")
-    entries = recorder.origin.get("set")
-    if not isinstance(file, str) or not isinstance(entries, list):
+    changes = [recorder.origin.get(key, []) for key in ("set", "unset")]
+    if not isinstance(file, str) or not all(isinstance(entries, list) for entries in changes):
         return
     with suppress(SceneError, TypeError, AttributeError):  # it is gone, or is no scene any more
-        now = load_scene(file, entries)
+        now = load_scene(file, *changes)
         differing = differences(scene_tables(recorder.scene), scene_tables(now))
         if differing:
             watch.warn(f"{file}: it is not the scene of the run any more: {_shown(differing)}; "
@@ -306,8 +306,8 @@ def _simulated(recorder: Recorder, progress: Progress, watch: Watch) -> str:
     except PoreEnd as end:
         return str(end)
     except MemoryError as error:
-        raise SimulationError(f"stopped at t = {recorder.time:g} h, out of memory while results "
-                              f"are written ({error}); try a smaller numerics.refinement") from error
+        raise SimulationError(f"stopped at t = {recorder.time:g} h, out of memory while results are "
+                              f"written ({error}); try a smaller numerics.refinement") from error
     return COMPLETED
 
 
