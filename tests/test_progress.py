@@ -29,7 +29,10 @@ def test_json_is_an_object_a_line_and_nothing_else(tmp_path, capsys):
     out, err = capsys.readouterr()
     events = [json.loads(line) for line in out.splitlines()]
     names = [event["event"] for event in events]
-    assert names[0] == "start" and names[-1] == "end" and err == "" and names.count("contact") == 1
+    assert names[0] == "start" and names[-1] == "end" and names.count("contact") == 1
+    warnings = [event for event in events if event["event"] == "warning"]
+    assert err == "".join(f"repro: warning: {event['message']}\n" for event in warnings)
+    assert {event["key"] for event in warnings} == {"growth.end"}
     steps = [event for event in events if event["event"] == "step"]
     assert [event["step"] for event in steps] == list(range(len(steps))) and steps[-1]["time_h"] == 0.6
     assert names.count("remesh") == steps[-1]["remeshes"] == told(tmp_path / "run")["remeshes"] > 0
@@ -84,7 +87,8 @@ def test_on_a_terminal_a_bar(tmp_path):
 
 @pytest.mark.parametrize("arguments", [[], ["base"], ["--out", "x"], ["base", "--resume", "x"], ["--checkpoint", "-1"],
                                        ["--resume", "x", "--set", "a=1"],
-                                       ["--resume", "x", "--force"], ["base", "--out", "x", "--checkpoint", "?"]])
+                                       ["--resume", "x", "--force"], ["--resume", "x", "--unset", "growth"],
+                                       ["base", "--out", "x", "--checkpoint", "?"]])
 def test_arguments_that_do_not_go_together_are_refused(capsys, arguments):
     with pytest.raises(SystemExit) as refused:
         main(["run", *arguments])

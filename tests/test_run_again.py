@@ -150,7 +150,8 @@ def test_a_scene_file_that_was_changed_is_told_on_resume(tmp_path, capsys):
         assert capsys.readouterr().err == ""
 
 
-@pytest.mark.parametrize("origin", [{"file": 3, "set": []}, {"file": "base", "set": [3]}, {"file": "base"}, [], None])
+@pytest.mark.parametrize("origin", [{"file": 3, "set": []}, {"file": "base", "set": [3]}, {"file": "base", "set": None},
+                                    [], None])
 def test_an_origin_that_makes_no_sense_is_none(tmp_path, capsys, origin):
     run(load_scene("flow_only"), tmp_path)
     results.write_json(tmp_path / "run.json", told(tmp_path) | {"origin": origin})

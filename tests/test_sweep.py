@@ -220,7 +220,9 @@ def test_a_killed_run_is_one_runs_failure(tmp_path):
     assert one.returncode == 0
 
 
-@pytest.mark.parametrize("name, sets", [("base", []), ("wide", ['output.times=["1 h", "3 h"]']), ("initial_mesh", [])])
+@pytest.mark.parametrize("name, sets", [("base", []), ("wide", ['output.times=["1 h", "3 h"]']), ("initial_mesh", []),
+                                        ("base", ['aggregate={outline=[["-5 um", "0 um"], ["0 um", "4 um"], '
+                                                  '["6 um", "0 um"]]}'])])
 def test_a_scene_comes_to_the_other_process_bit_by_bit(name, sets):
     scene = load_scene(name, sets)
     assert server._asked(ask(scene, Path("a"), Path("b"))) == (scene, Path("a"), Path("b"))

@@ -7,6 +7,7 @@ import math
 import os
 from pathlib import Path
 
+from repro.cli.arguments import add_scene
 from repro.errors import SimulationError
 from repro.run import interrupts, progress
 from repro.run.running import INTERVAL, Watch, resume, run
@@ -40,14 +41,6 @@ def add(commands) -> None:
     command.set_defaults(call=call, refuse=command.error)
 
 
-def add_scene(command, nargs: str | None = None) -> None:
-    """The arguments that name a scene."""
-    command.add_argument("scene", metavar="SCENE", nargs=nargs,
-                         help=f"a TOML file, or a packaged scene: {', '.join(packaged_scenes())}")
-    command.add_argument("--set", metavar="KEY=VALUE", action="append", default=[],
-                         help='change a key of the scene, such as growth.end="5 h"; may be repeated')
-
-
 def _seconds(text: str) -> float:
     value = float(text)
     if not 0 <= value < math.inf:
@@ -57,12 +50,13 @@ def _seconds(text: str) -> float:
 
 def call(chosen) -> int:
     """Run the scene that was chosen, or go on with the run."""
-    if chosen.resume and (chosen.scene or chosen.set or chosen.out or chosen.force):
-        chosen.refuse("--resume takes the scene from the run's folder: no SCENE, --set, --out or --force is accepted "
-                      "with it")
+    others = (chosen.scene, chosen.set, chosen.unset, chosen.out, chosen.force)
+    if chosen.resume and any(others):
+        chosen.refuse("--resume takes the scene from the run's folder: no SCENE, --set, --unset, "
+                      "--out or --force is accepted with it")
     if not chosen.resume and not (chosen.scene and chosen.out):
         chosen.refuse("SCENE and --out DIR are needed, or --resume DIR")
-    scene = None if chosen.resume else load_scene(chosen.scene, chosen.set)
+    scene = None if chosen.resume else load_scene(chosen.scene, chosen.set, chosen.unset)
     with interrupts.noted() as stop, progress.told(chosen.quiet, chosen.json) as tell:
         try:
             _run(chosen, scene, Watch(tell, chosen.checkpoint, stop))
@@ -80,6 +74,7 @@ def _run(chosen, scene: Scene | None, watch: Watch) -> None:
 
 
 def _origin(chosen) -> dict:
-    """Where the scene comes from, for ``run.json``: a packaged name or a whole path, and --set."""
+    """Where the scene comes from, for ``run.json``: a packaged name or a path, and its changes."""
     packaged = chosen.scene in packaged_scenes()
-    return {"file": chosen.scene if packaged else os.path.abspath(chosen.scene), "set": chosen.set}
+    file = chosen.scene if packaged else os.path.abspath(chosen.scene)
+    return {"file": file, "set": chosen.set, "unset": chosen.unset}

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from repro.cli.run import add_scene
+from repro.cli.arguments import add_scene
 from repro.errors import Interrupted
 from repro.run.machine import require_packages
 from repro.run.progress import say
@@ -114,7 +114,7 @@ def _wanted(chosen) -> Sweep:
     """The sweep that the arguments describe, every run of it checked."""
     factors = [design.parse(text) for text in chosen.vary]
     found = design.grid(factors) if chosen.samples is None else design.latin(factors, chosen.samples, chosen.seed)
-    points = design.points(chosen.scene, chosen.set, factors, found)
+    points = design.points(chosen.scene, chosen.set, factors, found, chosen.unset)
     for point in points if chosen.scheduler is None else ():
         require_packages(point.scene)
     return Sweep(chosen.out, chosen.scene, factors, points)

@@ -63,11 +63,19 @@ def _head(run: Run) -> str:
     stopped = "" if status == "completed" else " stopped"
     there = [words for name, words in PHYSICS.items() if name in _tables(run)]
     rows = f'<p class="note">{len(run.times)} rows, to t = {run.times[-1]:g} h.</p>' if len(run.times) > 1 else ""
-    warnings = "".join(f"<li>{html.escape(str(one))}</li>" for one in _list(record.get("warnings")))
-    warnings = f'<ul aria-label="warnings">{warnings}</ul>' if warnings else ""
+    warnings = "".join(map(_warning, _list(record.get("warnings"))))
+    warnings = f'<ul class="warnings" aria-label="warnings">{warnings}</ul>' if warnings else ""
     return (f"<header><h1>{html.escape(str(record.get('scene')))}</h1>"
             f'<p class="status{stopped}">{html.escape(status[0].upper() + status[1:])}</p>{rows}'
             f"<p>{html.escape(_sentence(there))} {html.escape(_numerics(run))}</p>{warnings}</header>\n")
+
+
+def _warning(one: object) -> str:
+    """A warning of the record, which has the scene's key and a text, as an item of a list."""
+    if not isinstance(one, dict):
+        return f"<li>{html.escape(str(one))}</li>"
+    key = html.escape(str(one.get("key")))
+    return f"<li>Warning: <b>{key}</b>: {html.escape(str(one.get('text')))}</li>"
 
 
 def _tables(run: Run) -> dict:

@@ -121,7 +121,8 @@ def usable(folder: Path) -> Iterator[None]:
         yield
     except OSError as error:
         why = error.strerror or error
-        raise OutputError(f"--out {folder}: {why}; a folder that can be written is needed") from error
+        needed = "a folder that can be written is needed"
+        raise OutputError(f"--out {folder}: {why}; {needed}") from error
 
 
 @contextmanager
@@ -150,8 +151,8 @@ def claimed(folder: Path, name: str, own: set[str]) -> Path:
 def held(folder: Path) -> Iterator[None]:
     """Keep everybody else out of the folder, which is made where it is not there.
 
-    The lock is the kernel's and goes when the process does, however that ends. Raises OutputError where another run
-    holds it.
+    The lock is the kernel's and goes when the process does, however that ends. Raises OutputError
+    where another run holds it.
     """
     with usable(folder):
         folder.mkdir(parents=True, exist_ok=True)
@@ -165,7 +166,8 @@ def held(folder: Path) -> Iterator[None]:
 
 
 def _locked(folder: Path) -> int:
-    """The descriptor of the locked file; another try where it was removed between opening and locking."""
+    """The descriptor of the locked file; tried again where that was removed before it was locked.
+    """
     while True:
         number = open_lock(folder / LOCK)
         try:
@@ -175,8 +177,8 @@ def _locked(folder: Path) -> int:
                     return number
         except BlockingIOError:
             os.close(number)
-            raise OutputError(f"--out {folder}: another run is writing there; another folder is needed, or "
-                              "that run's end") from None
+            raise OutputError(f"--out {folder}: another run is writing there; another folder is "
+                              "needed, or that run's end") from None
         os.close(number)
 
 

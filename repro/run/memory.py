@@ -43,8 +43,9 @@ def expected_nodes(scene: Scene) -> float:
         return _nodes(scene, 0.0, 0.0)
     sizes = [_seed(scene)]
     if scene.aggregate.radius is not None and scene.growth:
-        end = numbers.at_end(scene)
-        sizes.append((end.thickness, end.reach))
+        with suppress(ArithmeticError):  # then the run itself says what is wrong
+            end = numbers.at_end(scene)
+            sizes.append((end.thickness, end.reach))
     return max(_nodes(scene, *size) for size in sizes)
 
 

@@ -22,7 +22,7 @@ from repro.run.stored import counted, counts, in_range
 
 #: How the arrays of a record are called in a checkpoint.
 PREFIX = "record."
-PLAIN = {"remeshes", "iterations", "seconds", "stages", "resumes"}
+PLAIN = {"remeshes", "iterations", "seconds", "stages", "resumes", "warnings"}
 #: {array: (kind of its numbers, shape)}; a letter is the same number wherever it stands.
 ARRAYS = {"rows": ("f", "R", len(results.COLUMNS)), "whole": ("b", "R", len(results.COLUMNS)),
           "ledgers": ("f", "L", len(results.LEDGER_COLUMNS)), "before_h": ("f", "B"),
@@ -53,7 +53,8 @@ def mark(path: Path) -> Mark:
 class Record:
     """Rows of the tables, ``(time in h, file)`` of the fields, their marks, and counts.
 
-    seconds: of wall time, all together; stages: by stage; resumes: when the run was gone on with.
+    seconds: of wall time, all together; stages: by stage; resumes: when the run was gone on with;
+    warnings: ``key`` of the scene and ``text`` of each simplification that does not hold.
     """
 
     rows: Table = field(default_factory=list)
@@ -66,6 +67,7 @@ class Record:
     seconds: float = 0.0
     stages: dict[str, float] = field(default_factory=dict)
     resumes: list[dict] = field(default_factory=list)
+    warnings: list[dict[str, str]] = field(default_factory=list)
 
     @property
     def fields(self) -> list[str]:
@@ -146,8 +148,14 @@ def _is_plain(plain: dict) -> bool:
     return (counted(plain["remeshes"]) and counts(plain["iterations"])
             and in_range(plain["seconds"], 0.0, math.inf) and isinstance(plain["resumes"], list)
             and all(isinstance(resume, dict) for resume in plain["resumes"])
+            and isinstance(plain["warnings"], list) and all(map(_is_warning, plain["warnings"]))
             and isinstance(stages, dict)
             and all(in_range(value, 0.0, math.inf) for value in stages.values()))
+
+
+def _is_warning(value) -> bool:
+    return (isinstance(value, dict) and value.keys() == {"key", "text"}
+            and all(isinstance(part, str) for part in value.values()))
 
 
 def _is_numbers(arrays: Arrays) -> bool:

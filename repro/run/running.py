@@ -9,13 +9,16 @@ import json
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from time import perf_counter
 
 from repro import results, timing
+from repro.check import simplifications
+from repro.check.numbers import numbers
+from repro.check.simplifications import Warned
 from repro.errors import CheckpointError, Interrupted, OutputError, SimulationError
-from repro.march.loop import PoreEnd
+from repro.march.loop import Instant, PoreEnd
 from repro.march.simulation import steps
 from repro.results.files import is_file
 from repro.run import checkpoint
@@ -47,8 +50,11 @@ Progress = Callable[[float], None]
 
 
 def untold(event: dict) -> None:
-    """What is done with events where nobody asks for them: warnings are given, others dropped."""
-    if event["event"] == "warning":
+    """What is done with events where nobody asks for them: warnings are given, others dropped.
+
+    Those of the scene's simplifications, which have its key, are left to ``run.json``.
+    """
+    if event["event"] == "warning" and "key" not in event:
         warnings.warn(event["message"], stacklevel=2)
 
 
@@ -79,13 +85,13 @@ def run(scene: Scene, folder: Path, progress: Progress = unwatched, watch: Watch
 
     A run of the same scene, source and versions that is there is gone on with, or left alone where
     it is over; with ``force`` the files of whatever run is there are removed first. origin: the
-    ``file`` of the scene and the entries ``set`` in it, for ``run.json``.
+    ``file`` of the scene and what was ``set`` and ``unset`` in it, for ``run.json``.
 
     Returns how the run ended. Raises SceneError where the machine lacks a package or the memory
-    that the scene takes, OutputError where the folder holds anything else, cannot be used or another run uses
-    it, SimulationError where a stage fails, and Interrupted where
-    ``watch.stop`` asks for it: what was computed until then is written all the same, ``run.json``
-    says why it ends, and :func:`resume` goes on from there.
+    that the scene takes, OutputError where the folder holds anything else, cannot be used or
+    another run uses it, SimulationError where a stage fails, and Interrupted where ``watch.stop``
+    asks for it: what was computed until then is written all the same, ``run.json`` says why it
+    ends, and :func:`resume` goes on from there.
     """
     _require(scene, watch)
     with held(folder):
@@ -163,11 +169,11 @@ def resume(folder: Path, progress: Progress = unwatched, watch: Watch = ALONE) -
 def _tell_another_file(recorder: Recorder, watch: Watch) -> None:
     """Warn where the file that a run's scene was read from says something else by now."""
     file = recorder.origin.get("file")
-    entries = recorder.origin.get("set")
-    if not isinstance(file, str) or not isinstance(entries, list):
+    changes = [recorder.origin.get(key, []) for key in ("set", "unset")]
+    if not isinstance(file, str) or not all(isinstance(entries, list) for entries in changes):
         return
     with suppress(SceneError, TypeError, AttributeError):  # it is gone, or is no scene any more
-        now = load_scene(file, entries)
+        now = load_scene(file, *changes)
         differing = differences(scene_tables(recorder.scene), scene_tables(now))
         if differing:
             watch.warn(f"{file}: it is not the scene of the run any more: {_shown(differing)}; "
@@ -300,8 +306,8 @@ def _simulated(recorder: Recorder, progress: Progress, watch: Watch) -> str:
     except PoreEnd as end:
         return str(end)
     except MemoryError as error:
-        raise SimulationError(f"stopped at t = {recorder.time:g} h, out of memory while results "
-                              f"are written ({error}); try a smaller numerics.refinement") from error
+        raise SimulationError(f"stopped at t = {recorder.time:g} h, out of memory while results are "
+                              f"written ({error}); try a smaller numerics.refinement") from error
     return COMPLETED
 
 
@@ -311,6 +317,8 @@ def _record_steps(recorder: Recorder, progress: Progress, watch: Watch) -> None:
         remeshes = recorder.remeshes
         contact = recorder.contact
         recorder.add(state, instant)
+        if instant and len(recorder.record.rows) == 1:
+            _warn(recorder, instant, watch)
         _tell_step(recorder, recorder.remeshes > remeshes, recorder.contact > contact, watch)
         progress(recorder.time)
         if number := watch.stop():
@@ -318,6 +326,28 @@ def _record_steps(recorder: Recorder, progress: Progress, watch: Watch) -> None:
         if perf_counter() - written >= watch.interval:
             _checkpoint(recorder, watch)
             written = perf_counter()
+
+
+def _warn(recorder: Recorder, first: Instant, watch: Watch) -> None:
+    """Tell and record which simplifications do not hold, as ``repro check`` finds them."""
+    recorder.record.warnings = [asdict(each) for each in warned(recorder.scene, first)]
+    for each in recorder.record.warnings:
+        watch.tell({"event": "warning", "key": each["key"],
+                    "message": f"{each['key']}: {each['text']}"})
+
+
+def warned(scene: Scene, first: Instant) -> list[Warned]:
+    """The simplifications of a scene that do not hold; first: its state at t = 0.
+
+    None of a seed with an outline: what is checked is bounds of half-discs.
+    """
+    if scene.aggregate and scene.aggregate.radius is None:
+        return []
+    flow = first.solved.flow
+    try:
+        return simplifications.warnings(scene, numbers(scene, flow.mean_velocity if flow else None))
+    except ArithmeticError as error:
+        return [Warned("scene", f"its dimensionless numbers cannot be worked out ({error})")]
 
 
 def _tell_step(recorder: Recorder, remeshed: bool, contact: bool, watch: Watch) -> None:

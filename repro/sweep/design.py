@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -17,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from repro.scene import KEYS, Scene, SceneError, parse_scene, scene_hash
-from repro.scene.files import override, read_tables
+from repro.scene import KEYS, Scene, SceneError, load_tables, parse_scene, scene_hash
+from repro.scene.files import override
 from repro.scene.reading import shown
 
 MOST_POINTS = 10_000
@@ -163,15 +164,21 @@ def _at(factor: Factor, part: float) -> float | str:
     return low * (high / low) ** part if factor.spacing == "log" else low + part * (high - low)
 
 
-def points(source: str, sets: list[str], factors: list[Factor], combinations: list[tuple]) -> list[Point]:
-    """The runs of a sweep, each checked. Raises SceneError, naming the run, where one is not accepted or is another's
-    twin, and where a key is given twice."""
+def points(source: str, sets: list[str], factors: list[Factor], combinations: list[tuple],
+           unset: Sequence[str] = ()) -> list[Point]:
+    """The runs of a sweep, each checked; sets, unset: the entries of --set and --unset.
+
+    Raises SceneError, naming the run, where one is not accepted or is another's twin, and where a
+    key is given twice.
+    """
     _check_keys(sets, [factor.key for factor in factors])
     found: list[Point] = []
     first: dict[str, int] = {}
     for index, values in enumerate(combinations, 1):
         said = label(factors, values)
-        point = Point(index, values, _scene(source, sets, factors, values, f"run {index} ({said})"))
+        tables = load_tables(source, sets, unset)
+        scene = _scene(source, tables, factors, values, f"run {index} ({said})")
+        point = Point(index, values, scene)
         twin = first.setdefault(scene_hash(point.scene), index)
         if twin != index:
             raise SceneError(f"run {index} ({said}): the same scene as run {twin}; each run once is accepted")
@@ -191,10 +198,7 @@ def _check_keys(sets: list[str], varied: list[str]) -> None:
                              f"{key}, which replaces it")
 
 
-def _scene(source: str, sets: list[str], factors: list[Factor], values: tuple, said: str) -> Scene:
-    tables = read_tables(source)
-    for entry in sets:
-        override(tables, entry, source, KEYS)
+def _scene(source: str, tables: dict, factors: list[Factor], values: tuple, said: str) -> Scene:
     for factor, value in zip(factors, values):
         section, _, key = PAIRS.get(factor.key, "").partition(".")
         if isinstance(tables.get(section), dict):

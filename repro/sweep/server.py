@@ -89,8 +89,13 @@ def _asked(line: str) -> tuple[Scene, Path, Path]:
 def _built(kind: Any, values: dict):
     """The dataclass that `asdict` has taken apart."""
     parts = {entry.name: entry.metadata.get("section") for entry in fields(kind)}
-    return kind(**{name: _built(parts[name], value) if isinstance(value, dict) else
-                   tuple(value) if isinstance(value, list) else value for name, value in values.items()})
+    return kind(**{name: _built(parts[name], value) if isinstance(value, dict) else _frozen(value)
+                   for name, value in values.items()})
+
+
+def _frozen(value: Any) -> Any:
+    """A value with tuples for lists, within it too."""
+    return tuple(map(_frozen, value)) if isinstance(value, list) else value
 
 
 def _died(code: int) -> str:
