@@ -244,14 +244,23 @@ def _accepted(system: System, now: Level, step: float, tolerance: float, when: s
     factor of 1/2 to ``least``."""
     floor = _lowest(system.problem)
     while step >= SHORTEST:
-        new, difference = _corrected(system, now, step, positive=False)
-        if new.fields.min() < floor:
-            new, difference = _corrected(system, now, step, positive=True)
+        new, difference = _tried(system, now, step, floor)
         size = float(np.max(difference[:, system.watched], initial=0.0))
         if new.fields.min() >= floor and size <= tolerance:
             return new, size
         step *= max(least, min(0.5, _factor(tolerance, size)))
     raise _too_short(system, new, difference, when)
+
+
+def _tried(system: System, now: Level, step: float, floor: float) -> tuple[Level, np.ndarray]:
+    """One step, and its difference from the prediction; with the positive sink where a concentration
+    would fall below zero and that prevents it, or below the least that is accepted."""
+    plain = _corrected(system, now, step, positive=False)
+    least = plain[0].fields.min()
+    if least >= 0:
+        return plain
+    positive = _corrected(system, now, step, positive=True)
+    return positive if positive[0].fields.min() >= 0 or least < floor else plain
 
 
 def _lowest(problem: Problem) -> float:
