@@ -10,6 +10,7 @@ from repro.check import numbers
 from repro.check.numbers import Number
 from repro.fem import sizing
 from repro.model.pore import film, resolution
+from repro.model.remeshing import MOST_REFINED
 
 #: (1) has no inertia, whose share of the viscous forces is of the order of the Reynolds number.
 REYNOLDS = 0.1
@@ -94,7 +95,14 @@ def _fronts(scene) -> Iterator[Warned]:
             kind = "zero-order front" if s.supply > s.half_saturation else "layer of first-order uptake"
             yield Warned("numerics.refinement", f"the {name} is used up in a {kind} (D K_s / (q X_m))^1/2 = "
                          f"{layer:.2g} um thick, thinner than the {nodes:.2g} um between nodes in the aggregate; "
-                         f"{resolution(scene) * nodes / layer:.2g} would resolve it")
+                         + _resolving(resolution(scene) * nodes / layer))
+
+
+def _resolving(refinement: float) -> str:
+    """What resolves a layer, in words."""
+    if refinement <= MOST_REFINED:
+        return f"{refinement:.2g} would resolve it"
+    return f"no refinement up to {MOST_REFINED:g} resolves it, and a run judges its front by what it solves"
 
 
 def _seed_film(scene) -> Iterator[Warned]:

@@ -60,10 +60,10 @@ def _advance(scene: Scene, now: Pore, solved: Solved, time: float, asked: Pace) 
                 pace = asked if contact else following(replace(asked, length=length), duration, estimate, tolerance)
                 return taken, after, pace
             length = duration * (_to_contact(found.gaps) if found.step else allowed(estimate, tolerance))
-        except Unresolved:
+        except Unresolved as error:
             finer = remeshing.graded(scene, now)
-            if finer is None and duration <= shortest:
-                raise
+            if finer is None and duration <= scene.growth.time_step:
+                raise remeshing.advised(scene, now, error) from None
             if finer is None:
                 length = duration / 2
             else:

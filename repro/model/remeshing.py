@@ -14,7 +14,7 @@ from repro.fem.transfer import Located
 from repro.model import biomass, mesh_motion, pore
 from repro.model.biomass import Amounts
 from repro.model.pore import Pore, Solved
-from repro.model.transport import Concentrations
+from repro.model.transport import UNRESOLVED, Concentrations
 from repro.scene import Scene, Substrate
 
 #: What element sizes at the aggregate are divided by at most, for a front of the substrates.
@@ -48,7 +48,7 @@ def resolved(scene: Scene, now: Pore) -> tuple[Pore, Solved]:
         except Unresolved as error:
             finer = graded(scene, now)
             if finer is None:
-                raise Unresolved(f"{error}; {_advice(scene, now)}") from None
+                raise advised(scene, now, error) from None
             now = finer
 
 
@@ -63,8 +63,8 @@ def graded(scene: Scene, now: Pore) -> Pore | None:
     return remesh(scene, now, replace(now, front=front), 0.0)[0]
 
 
-def _advice(scene: Scene, now: Pore) -> str:
-    """A numerics.refinement with which the present state can be solved, found by trying."""
+def advised(scene: Scene, now: Pore, error: Unresolved) -> Unresolved:
+    """The error with a numerics.refinement that resolves the present state, found by trying."""
     for factor in TRIED:
         wanted = round(factor * pore.resolution(scene), 2)
         if wanted > MOST_REFINED:
@@ -72,11 +72,19 @@ def _advice(scene: Scene, now: Pore) -> str:
         finer = replace(scene, numerics=replace(scene.numerics, refinement=wanted))
         try:
             trial = pore.seeded(finer, now.front) if now.time == 0 else remesh(finer, now, now, 0.0)[0]
-            pore.solve(finer, trial)
+            solved = pore.solve(finer, trial)
         except StageError:
             continue
-        return f"numerics.refinement = {wanted:g} resolves it"
-    return f"no numerics.refinement up to {MOST_REFINED:g} was found that resolves it"
+        if _with_room(scene, solved):
+            return Unresolved(f"{error}; numerics.refinement = {wanted:g} resolves this state")
+    return Unresolved(f"{error}; no numerics.refinement up to {wanted:g} was found to resolve it")
+
+
+def _with_room(scene: Scene, solved: Solved) -> bool:
+    """Are concentrations no further below zero than half of what is accepted?"""
+    kinds = (scene.substrates.acceptor, scene.substrates.donor)
+    fields = (solved.concentrations.acceptor, solved.concentrations.donor)
+    return all(field.min() >= -0.5 * UNRESOLVED * s.supply for field, s in zip(fields, kinds))
 
 
 def followed(scene: Scene, now: Pore, expanded: Pore) -> Mesh | None:

@@ -42,7 +42,7 @@ def expected_nodes(scene: Scene) -> float:
     if scene.aggregate is None:
         return _nodes(scene, 0.0, 0.0)
     sizes = [_seed(scene)]
-    if scene.aggregate.radius is not None and scene.growth:
+    if scene.growth:
         with suppress(ArithmeticError):  # then the run itself says what is wrong
             end = numbers.at_end(scene)
             sizes.append((end.thickness, end.reach))

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import asdict, dataclass
+from itertools import chain
 from pathlib import Path
 from time import perf_counter
 
@@ -18,7 +19,7 @@ from repro.check import simplifications
 from repro.check.numbers import numbers
 from repro.check.simplifications import Warned
 from repro.errors import CheckpointError, Interrupted, OutputError, SimulationError
-from repro.march.loop import Instant, PoreEnd
+from repro.march.loop import Instant, PoreEnd, State
 from repro.march.simulation import steps
 from repro.results.files import is_file
 from repro.run import checkpoint
@@ -41,6 +42,8 @@ from repro.scene import Scene, SceneError, load_scene, parse_scene, scene_hash, 
 
 __all__ = ["OutputError", "Recorder", "Watch", "prepare", "resume", "run"]
 
+#: Steps as they are made, with what is reported of them.
+Made = Iterator[tuple[State, Instant | None]]
 #: Of what differs so many keys are told.
 MOST_SHOWN = 4
 #: Seconds of wall time between checkpoints.
@@ -191,7 +194,9 @@ def _continued(recorder: Recorder, told: dict, progress: Progress, watch: Watch)
         tidy(recorder.folder)
         restored = _restored(recorder, watch)
     recorder.record.resumes.append({"time_h": recorder.time, "changed": changed})
-    return (_recorded if restored else _from_the_start)(recorder, progress, watch)
+    if not restored:
+        return _from_the_start(recorder, progress, watch)
+    return _recorded(recorder, steps(recorder.scene, recorder.state), progress, watch)
 
 
 def _left_alone(recorder: Recorder, status: str, watch: Watch) -> str:
@@ -265,18 +270,25 @@ def _restored(recorder: Recorder, watch: Watch) -> bool:
 
 
 def _from_the_start(recorder: Recorder, progress: Progress, watch: Watch) -> str:
+    """Run from t = 0; the first state is solved before anything is written. Raises SceneError where
+    that cannot be."""
     timing.reset()
+    made = steps(recorder.scene)
+    try:
+        first = next(made)
+    except SimulationError as error:
+        raise SceneError(f"{recorder.scene.name}: it cannot be run: {error}") from error
     recorder.tell(RUNNING)
     recorder.clear()
-    return _recorded(recorder, progress, watch)
+    return _recorded(recorder, chain([first], made), progress, watch)
 
 
-def _recorded(recorder: Recorder, progress: Progress, watch: Watch) -> str:
+def _recorded(recorder: Recorder, made: Made, progress: Progress, watch: Watch) -> str:
     """Run to the end, whatever it is, and write that; how the run ended."""
     watch.tell({"event": "start", "scene": recorder.scene.name, "folder": str(recorder.folder),
                 "from_h": recorder.time, "end_h": recorder.end, "step": recorder.steps})
     try:
-        status = _simulated(recorder, progress, watch)
+        status = _simulated(recorder, made, progress, watch)
     except SimulationError as error:
         told = SimulationError(f"{error}; {recorder.last_good()}")
         _end(recorder, f"{FAILED}{told}", watch)
@@ -299,10 +311,10 @@ def _end(recorder: Recorder, status: str, watch: Watch) -> str:
     return status
 
 
-def _simulated(recorder: Recorder, progress: Progress, watch: Watch) -> str:
+def _simulated(recorder: Recorder, made: Made, progress: Progress, watch: Watch) -> str:
     """Record every step of a run, from the recorder's state on; how it ended."""
     try:
-        _record_steps(recorder, progress, watch)
+        _record_steps(recorder, made, progress, watch)
     except PoreEnd as end:
         return str(end)
     except MemoryError as error:
@@ -311,9 +323,9 @@ def _simulated(recorder: Recorder, progress: Progress, watch: Watch) -> str:
     return COMPLETED
 
 
-def _record_steps(recorder: Recorder, progress: Progress, watch: Watch) -> None:
+def _record_steps(recorder: Recorder, made: Made, progress: Progress, watch: Watch) -> None:
     written = perf_counter()
-    for state, instant in steps(recorder.scene, recorder.state):
+    for state, instant in made:
         remeshes = recorder.remeshes
         contact = recorder.contact
         recorder.add(state, instant)
@@ -337,12 +349,7 @@ def _warn(recorder: Recorder, first: Instant, watch: Watch) -> None:
 
 
 def warned(scene: Scene, first: Instant) -> list[Warned]:
-    """The simplifications of a scene that do not hold; first: its state at t = 0.
-
-    None of a seed with an outline: what is checked is bounds of half-discs.
-    """
-    if scene.aggregate and scene.aggregate.radius is None:
-        return []
+    """The simplifications of a scene that do not hold; first: its state at t = 0."""
     flow = first.solved.flow
     try:
         return simplifications.warnings(scene, numbers(scene, flow.mean_velocity if flow else None))
