@@ -4,6 +4,7 @@
     units     quantities with units
     reading   tables of a TOML file into dataclasses, and back
     rules     what keys ask of each other
+    needed    sections that the physics at hand cannot be without
     files     TOML files, packaged scenes, ``--set``
     text      a scene as a TOML text with every key explained
     packaged  the packaged scenes
@@ -32,8 +33,10 @@ from repro.scene.keys import (
     scene_hash,
     scene_tables,
 )
+from repro.scene.needed import MissingError, needed
 from repro.scene.units import SceneError
 
-__all__ = ["KEYS", "OURS", "PRESETS", "Acceptor", "Aggregate", "Donor", "Flow", "Growth", "Kinetics", "Numerics",
-           "Output", "Pore", "Scene", "SceneError", "Substrate", "Substrates", "load_scene", "load_tables", "packaged_scenes",
-           "parse_scene", "scene_hash", "scene_tables"]
+__all__ = ["KEYS", "OURS", "PRESETS", "Acceptor", "Aggregate", "Donor", "Flow", "Growth",
+           "Kinetics", "MissingError", "Numerics", "Output", "Pore", "Scene", "SceneError", "Substrate",
+           "Substrates", "load_scene", "load_tables", "needed", "packaged_scenes", "parse_scene",
+           "scene_hash", "scene_tables"]
