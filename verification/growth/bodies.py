@@ -25,6 +25,8 @@ RADIUS, FACTOR = 20.0, 1.5
 LENGTH, HEIGHT = 10.0, 7.0
 KINDS = (1, 2, 3)
 WORDS = {1: "straight", 2: "curved", 3: "curved, of cubic scenes"}
+#: Ends of the mesh around a half-disc, at either side of it (um).
+ENDS = {1: 60.0, 2: 95.0, 3: 95.0}
 #: Degree of the quadrature of norms, and how far middles of inner edges are moved at random (of the elements' size).
 DEGREE, BENT = 6, 0.075
 
@@ -86,7 +88,7 @@ def half_disc(refinement: float, kind: int = 1) -> tuple[Supported, np.ndarray]:
     in a mesh of the package's own."""
     geometry = min(kind, 2)
     outline = half_disc_outline(RADIUS, ACROSS_AGGREGATE * refinement, geometry)
-    grid, outline = mesher.generate(outline, (-60.0, 60.0), Sizing(50.0, refinement, 2.0), geometry)
+    grid, outline = mesher.generate(outline, (-ENDS[kind], ENDS[kind]), Sizing(50.0, refinement, 2.0), geometry)
     rim, free = grid.topology.body_loop, outline.wall == FREE
     held = np.zeros((len(grid.body), 2), bool)
     held[rim[outline.fixed], 0] = True
