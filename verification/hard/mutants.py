@@ -5,8 +5,8 @@ from verification.mutants import Mutant
 MUTANTS = (
     Mutant("hard-newton-too-soon", "repro/model/transport.py",
            says="Newton's method stops at a defect of a hundredth, wherever that is.",
-           old="NEWTON, ROUND_OFF, MOST_ITERATIONS = 1e-13, 1e-12, 60",
-           new="NEWTON, ROUND_OFF, MOST_ITERATIONS = 1e-2, 1e-2, 60"),
+           old="(NEWTON, ROUND_OFF, MOST_ITERATIONS, balance.problem.reused)",
+           new="(1e-2, 1e-2, MOST_ITERATIONS, balance.problem.reused)"),
     Mutant("hard-decay-unlimited", "repro/model/kinetics.py",
            says="Decay takes up acceptor at its full rate whatever there is of it.",
            old="    return m_a * per_acceptor, k * m_a * m_d\n",
