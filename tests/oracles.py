@@ -6,8 +6,6 @@ import math
 
 import numpy as np
 import shapely
-from skfem import ElementTriP2
-from skfem.quadrature import get_quadrature_tri
 
 
 def area(corners):
@@ -40,20 +38,6 @@ def reprojected(points, moved, triangles, field):
     """(34) node by node: what lay at a node lies there still, on the area that it has now."""
     before, after = nodal_areas(points, triangles), nodal_areas(moved, triangles)
     return [x * s / t if t > 0 else 0.0 for x, s, t in zip(field, before, after)]
-
-
-def point_areas(mesh, order):
-    """(r, q) areas that the points of a reaction stand for: a third of each triangle to its nodes, lumped; or the
-    weights of a quadrature times the determinant of the map of six nodes, point by point, with scikit-fem's rule and
-    its functions."""
-    if order == 1:
-        found = np.array(nodal_areas(mesh.points, mesh.triangles[mesh.biomass]))
-        return found[np.unique(mesh.triangles[mesh.biomass])][:, None]
-    places, weights = get_quadrature_tri({2: 6, 3: 8}[order])
-    slopes = np.array([ElementTriP2().lbasis(places, a)[1] for a in range(6)])
-    found = [[weight * np.linalg.det(mesh.points[cell].T @ slopes[:, :, q]) for q, weight in enumerate(weights)]
-             for cell in mesh.cells[mesh.biomass]]
-    return np.array(found)
 
 
 def mass(points, triangles, field):

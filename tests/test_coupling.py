@@ -1,20 +1,35 @@
-"""The sequential coupling: schedule, ledgers, growth against its rate laws, symmetry, contact."""
+"""The sequential coupling, with elements of every order: schedule, ledgers, growth against its rate laws, symmetry,
+contact."""
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from repro.fem import geometry
-from repro.march import coupling
-from repro.model import kinetics, pore, remeshing
+from repro.fem.outline import BOTTOM, TOP
+from repro.march import updates
+from repro.march.loop import PoreEnd
+from repro.march.simulation import simulate
+from repro.model import contact, kinetics, pore, remeshing
 from repro.scene import load_scene
-from tests.strategies import scene
+from tests.strategies import ORDERS, scene
 from tests.test_mesh import fluid_regions
+
+EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
+
+
+def elements(order):
+    """The paper's scheme with elements of an order, fewer of them the higher it is."""
+    return {"elements": ORDERS[order], "refinement": {1: 1.0, 2: 0.4, 3: 0.3}[order]}
+
+
+def sets(order):
+    """The same for a packaged scene."""
+    return ('numerics.preset="paper"', *(f"numerics.{key}={value}" for key, value in elements(order).items()))
 
 
 def run(made):
     """All instants of a scene."""
-    return list(coupling.simulate(made))
+    return list(simulate(made))
 
 
 def ledgers(instants):
@@ -23,8 +38,13 @@ def ledgers(instants):
 
 def mass(now):
     """(total of X_A + X_I, of X_I)."""
-    weight = now.mesh.lumped(now.mesh.biomass)
-    return weight @ (now.active + now.inert), weight @ now.inert
+    return now.active.sum() + now.inert.sum(), now.inert.sum()
+
+
+def in_body(instant, name):
+    """A concentration in the points of the reaction."""
+    pieces = instant.pore.space.reaction
+    return getattr(instant.solved.concentrations, name)[pieces.cells] @ pieces.values.T
 
 
 def assert_ledgers_close(instants):
@@ -38,17 +58,17 @@ def assert_ledgers_close(instants):
         assert two.biomass_before == pytest.approx(one.biomass_after, rel=1e-14) and two.start == one.end
 
 
-@pytest.fixture(scope="module")
-def base():
+@pytest.fixture(scope="module", params=ORDERS)
+def base(request):
     """The paper's run to 1 h, with its scene."""
-    made = load_scene("base", ['growth.end="1 h"'])
+    made = load_scene("base", [*sets(request.param), 'growth.end="1 h"'])
     return made, run(made)
 
 
-@pytest.fixture(scope="module")
-def contact():
+@pytest.fixture(scope="module", params=ORDERS)
+def touching(request):
     """An aggregate 0.1 um short of the film that closes, under a constant velocity, through contact."""
-    made = scene("17.9 um", "20 um", velocity="2.9 m/day", growth={"end": "0.6 h"})
+    made = scene("17.9 um", "20 um", velocity="2.9 m/day", growth={"end": "0.6 h"}, numerics=elements(request.param))
     return made, run(made)
 
 
@@ -65,10 +85,10 @@ def test_steps_land_on_output_times_and_on_the_end(end, step, times, steps, rows
     (0.6000000000000001), the end missed by half a step, a row at the end that nobody asked for."""
     more = {"output": {"times": times}} if times else {}
     made = scene(velocity="2.9 m/day", growth={"end": end, "time_step": step}, **more)
-    found, reported = coupling.schedule(made)
+    found, reported = updates.schedule(made)
     assert found == pytest.approx(steps, abs=1e-12)
     assert sorted(reported) == pytest.approx(rows, abs=1e-12) and reported <= set(found)
-    assert coupling.schedule(scene(velocity="2.9 m/day")) == ([0.0], {0.0})
+    assert updates.schedule(scene(velocity="2.9 m/day")) == ([0.0], {0.0})
 
 
 def test_a_run_reports_what_was_asked_for():
@@ -96,10 +116,10 @@ def test_the_area_grows_by_the_biomass_made(base):
     first, last = found[0].pore, found[-1].pore
     grown = (last.outline.area - first.outline.area) * made.kinetics.maximum_density
     assert grown == pytest.approx(sum(row.biomass_made for row in ledgers(found)), rel=1e-4)
-    density = (last.active + last.inert)[last.mesh.body] / made.kinetics.maximum_density
+    density = (last.active + last.inert) / last.space.reaction.dx / made.kinetics.maximum_density
     assert np.abs(density - 1).max() < 1e-3
     start = found[0].pore.outline.area
-    areas = last.mesh.areas[last.mesh.biomass]
+    areas = last.body.at.dx * last.body.strained(last.mesh.points[last.mesh.body]).J
     assert (areas / last.theta).sum() == pytest.approx(start, rel=1e-6)
     radius = 5 * np.sqrt(last.outline.area / start)
     assert np.hypot(*last.outline.points[last.wall == 0].T) == pytest.approx(radius, rel=1e-3)
@@ -110,10 +130,10 @@ def test_base_grows_at_the_rate_of_its_concentrations(base):
     apart. Mutant: one explicit increment a step (0.4 % low), a rate per day, the step's first rate throughout."""
     made, found = base
     def rate(instant, pick):
-        body, c = instant.pore.mesh.body, instant.solved.concentrations
-        return pick(kinetics.growth_rate(c.acceptor[body], c.donor[body], made.substrates, made.kinetics))
+        at = (in_body(instant, name) for name in ("acceptor", "donor"))
+        return pick(kinetics.growth_rate(*at, made.substrates, made.kinetics))
 
-    low, high = (np.exp(pick([rate(i, pick) for i in found])) for pick in (min, max))
+    low, high = (np.exp(pick([rate(i, pick) for i in found])) for pick in (np.min, np.max))
     total, inert = mass(found[-1].pore)
     assert high / low < 1.001
     assert low * (1 - 1e-9) <= (total - inert) / mass(found[0].pore)[0] <= high * (1 + 1e-9)
@@ -126,7 +146,7 @@ def test_base_starts_as_the_paper_says(base):
     _, found = base
     first = found[0]
     assert first.solved.flow.mean_velocity * 24e-6 == pytest.approx(2.90, rel=1e-2)
-    assert np.ptp(first.pore.mesh.ends) == 110.0
+    assert np.ptp(first.pore.mesh.ends) == pytest.approx(110.0, rel=1e-15)
     speeds = [i.solved.flow.mean_velocity for i in found]
     assert (np.diff(speeds) < 0).all() and all(i.solved.flow.head_loss == pytest.approx(10.0, rel=1e-12) for i in found)
 
@@ -140,16 +160,19 @@ def test_what_was_before_the_expansion(base):
         assert grown.mesh.points.tobytes() == last.pore.mesh.points.tobytes()
         assert grown.time == pytest.approx(instant.pore.time)
         assert mass(grown)[0] == pytest.approx(instant.ledgers[-1].biomass_after, rel=1e-12)
-        body, now, then = grown.mesh.body, solution.concentrations, last.solved.concentrations
-        assert (now.acceptor[body] < then.acceptor[body]).all()
+        assert grown.space.mesh is last.pore.mesh
+        nodes, now, then = grown.space.reaction.cells, solution.concentrations, last.solved.concentrations
+        assert (now.acceptor[nodes] < then.acceptor[nodes]).all()
 
 
-def test_decay_alone_follows_its_exponential():
+@EVERY_ORDER
+def test_decay_alone_follows_its_exponential(order):
     """No donor: X_A + X_I = X_m (0.2 + 0.8 exp(-b m_A t)), m_A between its least and largest value (1e-5 apart), and
     the aggregate shrinks with it. Mutant: f_d for 1 - f_d, decay without m_A, growth that cannot shrink."""
-    made = scene(head="1e-3 cm", donor="0 mg/L", growth={"end": "6 h", "time_step": "1.5 h"}, output={"times": ["6 h"]})
+    made = scene(head="1e-3 cm", donor="0 mg/L", growth={"end": "6 h", "time_step": "1.5 h"}, output={"times": ["6 h"]},
+                 numerics=elements(order))
     first, last = run(made)
-    acceptor = last.solved.concentrations.acceptor[last.pore.mesh.body]
+    acceptor = in_body(last, "acceptor")
     bounds = acceptor.min() - 1e-4, acceptor.max() + 1e-4
     most, least = (0.2 + 0.8 * np.exp(-0.12 / 24 * 6 * c / (c + 1)) for c in bounds)
     left = mass(last.pore)[0] / mass(first.pore)[0]
@@ -159,10 +182,12 @@ def test_decay_alone_follows_its_exponential():
     assert_ledgers_close([first, last])
 
 
-def test_growth_by_pure_diffusion_is_symmetric():
+@EVERY_ORDER
+def test_growth_by_pure_diffusion_is_symmetric(order):
     """Same supply at both ends, no flow: the outline stays its own mirror image to the asymmetry of the mesh
     (measured 2e-5 of R), though it starves within. Mutant: one end held, the fixed point beside the middle."""
-    made = scene("20 um", acceptor="2 mg/L", growth={"end": "2 h", "time_step": "30 min"}, output={"times": ["2 h"]})
+    made = scene("20 um", acceptor="2 mg/L", growth={"end": "2 h", "time_step": "30 min"}, output={"times": ["2 h"]},
+                 numerics=elements(order))
     first, last = run(made)
     arc = last.pore.outline.points[last.pore.wall == 0]
     assert last.pore.outline.area > 1.2 * first.pore.outline.area
@@ -172,50 +197,52 @@ def test_growth_by_pure_diffusion_is_symmetric():
     assert_ledgers_close([first, last])
 
 
-def test_halving_the_step_changes_little():
+@EVERY_ORDER
+def test_halving_the_step_changes_little(order):
     """Second order in time: 0.4 h in one step against four, area within 2e-5; its growth is 8 %. Mutant: rates of the
     step's start (first order: 1e-4)."""
     areas = []
     for step in ("24 min", "6 min"):
         made = scene("30 um", velocity="1.4 m/day", growth={"end": "0.4 h", "time_step": step},
-                     output={"times": ["0.4 h"]})
+                     output={"times": ["0.4 h"]}, numerics=elements(order))
         areas.append(run(made)[-1].pore.outline.area)
     assert areas[0] == pytest.approx(areas[1], rel=5e-5)
 
 
-def test_contact_closes_the_film_and_the_run_goes_on(contact):
+def test_contact_closes_the_film_and_the_run_goes_on(touching):
     """The thickness passes W - 2 um: contact nodes lie on the upper wall to the last bit, the fluid splits in two,
     flow is forced through the plug, ledgers close across the remeshes. Mutant: the film never closes; contact without
     a remesh; linear transfer."""
-    made, found = contact
+    made, found = touching
     states = [i.pore.contact for i in found]
     assert states == sorted(states) and not states[0] and states[-1]
     first = found[states.index(True)]
     assert fluid_regions(found[0].pore.mesh) == 1 and fluid_regions(first.pore.mesh) == 2
     for instant in found[states.index(True):]:
         outline = instant.pore.outline
-        assert (outline.points[outline.wall == geometry.TOP, 1] == 20.0).all()
-        assert (outline.points[outline.wall == geometry.BOTTOM, 1] == 0.0).all()
-        assert outline.thickness == 20.0 and outline.fixed[outline.wall == geometry.TOP].sum() == 1
+        assert (outline.points[outline.wall == TOP, 1] == 20.0).all()
+        assert (outline.points[outline.wall == BOTTOM, 1] == 0.0).all()
+        assert outline.thickness == pytest.approx(20.0, rel=1e-15 if outline.geometry == 1 else 1e-14)
+        assert outline.fixed[outline.wall == TOP].sum() == 1
         assert instant.solved.flow.conductivity < 0.3 * found[0].solved.flow.conductivity
         assert instant.solved.concentrations.acceptor.min() > 0
     assert first.remeshes >= 1
     assert_ledgers_close(found)
 
 
-def test_contact_surfaces_grow_and_never_detach(contact):
+def test_contact_surfaces_grow_and_never_detach(touching):
     """From contact on both surfaces widen, no material leaves them, their fixed points keep their x, and the area
     goes on growing with the biomass made (density after contact is off by 1 %). Mutant: contact found anew at each
     step; fixed point chosen anew."""
-    made, found = contact
-    for wall in (geometry.BOTTOM, geometry.TOP):
-        touching = [i.pore for i in found if (i.pore.wall == wall).any()]
-        for places, since in (([p.outline.origin for p in touching], 0), ([p.outline.points for p in touching], -3)):
-            spans = np.array([np.sort(x[p.wall == wall, 0])[[0, -1]] for x, p in zip(places, touching)])[since:]
+    made, found = touching
+    for wall in (BOTTOM, TOP):
+        there = [i.pore for i in found if (i.pore.wall == wall).any()]
+        for places, since in (([p.outline.origin for p in there], 0), ([p.outline.points for p in there], -3)):
+            spans = np.array([np.sort(x[p.wall == wall, 0])[[0, -1]] for x, p in zip(places, there)])[since:]
             assert (np.diff(spans[:, 0]) <= 1e-12).all() and (np.diff(spans[:, 1]) >= -1e-12).all()
-        fixed = [p.outline.points[p.fixed & (p.wall == wall), 0] for p in touching]
+        fixed = [p.outline.points[p.fixed & (p.wall == wall), 0] for p in there]
         assert all(x.tolist() == fixed[0].tolist() for x in fixed)
-        left, right = np.sort(touching[0].outline.points[touching[0].wall == wall, 0])[[0, -1]]
+        left, right = np.sort(there[0].outline.points[there[0].wall == wall, 0])[[0, -1]]
         assert abs(fixed[0][0] - 0.5 * (left + right)) <= 0.2 * (right - left)
     grown = (found[-1].pore.outline.area - found[0].pore.outline.area) * made.kinetics.maximum_density
     assert grown == pytest.approx(sum(row.biomass_made for row in ledgers(found)), rel=2e-2)
@@ -226,9 +253,9 @@ def test_a_remesh_carries_everything_over(base):
     and theta as before. Mutant: J from the old mesh's places, theta reset to one, the fixed point lost."""
     made, found = base
     last = found[-1]
-    again = remeshing.remesh(made, last.pore, last.pore, last.solved)
+    again, _ = remeshing.remesh(made, last.pore, last.pore, last.solved.flow.mean_velocity)
     assert mass(again) == pytest.approx(mass(last.pore), rel=1e-12)
-    assert again.theta == pytest.approx(np.full(len(again.theta), last.pore.theta.mean()), rel=2e-2)
+    assert again.theta == pytest.approx(np.full(again.theta.shape, last.pore.theta.mean()), rel=2e-2)
     body = again.mesh.body
     assert again.origin[body] == pytest.approx(again.mesh.points[body] / np.sqrt(last.pore.theta.mean()), abs=0.02)
     assert again.outline.area == pytest.approx(last.pore.outline.area, rel=1e-13)
@@ -238,12 +265,91 @@ def test_a_remesh_carries_everything_over(base):
         assert carried == pytest.approx(solution, abs=5e-3)  # of 10 mg/L; beyond the old ends by (26)
 
 
-def test_an_aggregate_at_the_pores_end_stops_the_run():
+@EVERY_ORDER
+def test_an_aggregate_at_the_pores_end_stops_the_run(order):
     """After a last instant. Mutant: the end of the mesh for the end of the pore, one end looked at."""
-    made = scene("28 um", "60 um", velocity="2.9 m/day", growth={"end": "5 h"})
+    made = scene("28 um", "60 um", velocity="2.9 m/day", growth={"end": "5 h"}, numerics=elements(order))
     made = replace(made, pore=replace(made.pore, length=66.0))
     seen = []
-    with pytest.raises(coupling.PoreEnd, match="reaches the pore's"):
-        for instant in coupling.simulate(made):
+    with pytest.raises(PoreEnd, match="reaches the pore's"):
+        for instant in simulate(made):
             seen.append(instant.pore.time)
     assert 0 < seen[-1] < 5.0
+
+
+OPTIONS = {
+    "interface": (("numerics.interface=traction",), 1e-2),
+    "inlet": (("numerics.inlet=mean",), 1e-2),
+    "fixed point": (("numerics.fixed_point=rechosen",), 1e-2),
+    "stress-free": (('growth.new_biomass="stress_free"',), 1e-2),
+    "gear": (('numerics.transport="gear"',), 1e-2),
+    "forces": (('growth.fluid_forces="included"',), 1e-2),
+    "all": (("numerics.interface=traction", "numerics.inlet=mean", "numerics.fixed_point=rechosen",
+             'growth.fluid_forces="included"'), 1e-2),
+}
+
+
+def lost_at_the_inlet(instant):
+    """(supplied - out - consumed) / supplied of both substrates that (11) with u_ave loses [E4]."""
+    problem, state = instant.solved.problem, instant.solved.concentrations
+    lost = []
+    for k, field in enumerate((state.acceptor, state.donor)):
+        enters = np.split(problem.source, 2)[k] / problem.both[k].supply
+        lost.append((enters - problem.inflow) @ field / instant.solved.fluxes[k].supplied)
+    return lost
+
+
+@pytest.mark.parametrize("name", OPTIONS)
+def test_every_option_works_with_elements_of_every_order(name):
+    """From before contact with the opposite wall to after it: order 1, 2 and 3 agree on the area to 1 %, and on the
+    velocity before contact to 3 %; balances close, but for what the printed inlet loses. Mutants: an option that is not
+    heard with one of the orders, forces of the corners alone, a strain counted from t = 0 where it should not."""
+    changes, bound = OPTIONS[name]
+    areas, speeds = [], []
+    for order in ORDERS:
+        made = load_scene("base", [*sets(order), 'aggregate.radius="17.9 um"', 'pore.width="20 um"', *changes,
+                                   'growth.end="0.6 h"', "flow.head=1e-2 cm"])
+        found = run(made)
+        assert found[-1].pore.contact and not found[0].pore.contact
+        areas.append([instant.pore.outline.area for instant in found])
+        speeds.append(found[0].solved.flow.mean_velocity)
+        for instant in found:
+            for row in instant.ledgers:
+                assert abs(row.biomass_before + row.biomass_made - row.biomass_after) < 1e-10 * row.biomass_after
+            lost = [0.0, 0.0] if made.numerics.inlet == "local" else lost_at_the_inlet(instant)
+            for flux, share in zip(instant.solved.fluxes, lost):
+                rest = (flux.supplied - flux.out - flux.consumed) / flux.supplied
+                assert rest == pytest.approx(share, abs=1e-6 if made.numerics.transport == "gear" else 1e-9)
+    assert areas[0] == pytest.approx(areas[2], rel=bound) and areas[1] == pytest.approx(areas[2], rel=bound)
+    assert speeds == pytest.approx([speeds[2]] * 3, rel=3e-2)
+
+
+@pytest.mark.parametrize("order", [1, 2, pytest.param(3, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("name", sorted(OPTIONS.keys() - {"fixed point"}))
+def test_every_option_makes_a_difference(name, order):
+    """In a run through contact. Mutant: an option that elements of one order do not hear."""
+    rows = []
+    for changes in ((), OPTIONS[name][0]):
+        made = load_scene("base", [*sets(order), "numerics.refinement=0.3", 'aggregate.radius="17.9 um"',
+                                   'pore.width="20 um"', 'growth.end="0.6 h"', "flow.head=1e-2 cm", *changes])
+        *_, last = simulate(made)
+        rows.append([last.pore.outline.upstream, last.solved.flow.mean_velocity, last.pore.mass,
+                     last.solved.fluxes[0].supplied])
+    assert rows[0] != rows[1]
+
+
+@EVERY_ORDER
+def test_the_fixed_point_is_kept_or_chosen_anew(order):
+    """Of an aggregate whose fixed point is beside the middle: "kept" it keeps its x to the last bit, "rechosen" the
+    middle does [E20]. Mutants: the word not heard, a middle of an arc chosen."""
+    made = scene("10 um", velocity="2.9 m/day", growth={"end": "1 h"}, numerics=elements(order))
+    now = pore.seeded(made)
+    x, middle = now.outline.points[:, 0], int(np.flatnonzero(now.fixed)[0])
+    aside = middle + 2 * now.mesh.geometry
+    beside = replace(now, fixed=np.arange(len(x)) == aside)
+    for word, stays, goes in (("kept", aside, middle), ("rechosen", middle, aside)):
+        said = replace(made, numerics=replace(made.numerics, fixed_point=word))
+        found, _, _ = contact.expand(said, beside, 1.2 * now.theta)
+        assert np.flatnonzero(found.fixed).tolist() == [stays]
+        after = found.outline.points[:, 0]
+        assert after[stays] == x[stays] and abs(after[goes] - x[goes]) > 0.05

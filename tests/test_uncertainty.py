@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from repro.march.coupling import schedule
 
+from repro.march.updates import schedule
 from repro.scene import load_scene, scene_hash
 from verification import claims, uncertainty
 from verification.claims import Claim, ClaimError, Finding, bars, evaluate, levels, runs

@@ -14,6 +14,7 @@ from typing import TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
+from skfem import Basis, BilinearForm
 
 from repro.fem import linear
 from repro.fem.linear import DEFAULT, Method
@@ -22,7 +23,8 @@ from repro.fem.linear import DEFAULT, Method
 Parts: TypeAlias = np.ndarray | tuple[np.ndarray, ...]
 
 
-def local(form, trial, test=None, **parameters) -> np.ndarray:
+def local(form: BilinearForm, trial: Basis, test: Basis | None = None,
+          **parameters: np.ndarray | float) -> np.ndarray:
     """(T, test functions, trial functions) element matrices of a scikit-fem bilinear form."""
     test = trial if test is None else test
     data = form.coo_data(trial, test, **parameters).data.reshape(trial.Nbfun, test.Nbfun, -1)
@@ -30,8 +32,7 @@ def local(form, trial, test=None, **parameters) -> np.ndarray:
 
 
 def each(coefficient: np.ndarray, elements: np.ndarray) -> np.ndarray:
-    """Element matrices (T, a, b) times coefficients (T,) of the triangles, or (T, a) of the
-    rows."""
+    """Element matrices (T, a, b) times coefficients of the triangles (T,) or of the rows (T, a)."""
     return coefficient.reshape(len(coefficient), -1, 1) * elements
 
 
@@ -49,8 +50,10 @@ class ElementSystem:
     the kinds.
     """
 
-    def __init__(self, unknowns: Parts, rank: np.ndarray, held: np.ndarray, method: Method = DEFAULT):
-        self.kinds, self.method = _several(unknowns), method
+    def __init__(self, unknowns: Parts, rank: np.ndarray, held: np.ndarray,
+                 method: Method = DEFAULT):
+        self.kinds = _several(unknowns)
+        self.method = method
         self._ranked = np.argsort(rank, kind="stable")
         place = np.empty(len(rank), int)
         place[self._ranked] = np.arange(len(rank))
@@ -70,12 +73,15 @@ class ElementSystem:
     def _hold(self, held: np.ndarray) -> None:
         free = ~held[self._ranked]
         place = np.cumsum(free) - 1
-        self.held, self.order, self.count = held, self._ranked[free], int(free.sum())
+        self.held = held
+        self.order = self._ranked[free]
+        self.count = int(free.sum())
         self.free = ~held if held.any() else slice(None)
         kept = free[self._rows] & free[self._columns]
         self._kept = np.flatnonzero(kept) if held.any() else slice(None)
         self.indices = place[self._rows[kept]].astype(np.int32)
-        self.indptr = np.searchsorted(place[self._columns[kept]], np.arange(self.count + 1)).astype(np.int32)
+        starts = np.searchsorted(place[self._columns[kept]], np.arange(self.count + 1))
+        self.indptr = starts.astype(np.int32)
         self._pattern = sp.csc_matrix((np.zeros(len(self.indices)), self.indices, self.indptr),
                                       shape=(self.count, self.count))
         self._pattern.has_canonical_format = True  # what is filled in is not looked through again
@@ -98,14 +104,16 @@ class ElementSystem:
 
     def product(self, elements: Parts, x: np.ndarray) -> np.ndarray:
         """(n,) K x for all unknowns x (n,)."""
-        parts = [K @ x[unknowns][:, :, None] for K, unknowns in zip(_several(elements), self.kinds, strict=True)]
+        parts = [K @ x[unknowns][:, :, None]
+                 for K, unknowns in zip(_several(elements), self.kinds, strict=True)]
         return np.bincount(_flat(self.kinds), _flat(parts), len(x))
 
     def factored(self, elements: Parts) -> Factored:
         """K, factorised."""
         return Factored(self, elements, linear.factorised(self.matrix(elements), self.method))
 
-    def solve(self, elements: Parts, right: np.ndarray, value: np.ndarray | None = None) -> np.ndarray:
+    def solve(self, elements: Parts, right: np.ndarray,
+              value: np.ndarray | None = None) -> np.ndarray:
         """x (n,) of K x = b (n,); prescribed unknowns are as in ``value`` (n,), zero by default."""
         return self.factored(elements).solve(right, value)
 
@@ -120,7 +128,8 @@ class Factored:
 
     def solve(self, right: np.ndarray, value: np.ndarray | None = None) -> np.ndarray:
         """x (n,) of K x = b (n,); prescribed unknowns are as in ``value`` (n,), zero by default."""
-        order, found = self.system.order, np.zeros(len(right))
+        order = self.system.order
+        found = np.zeros(len(right))
         if value is not None and self.system.held.any():
             found = np.where(self.system.held, value, 0.0)
             right = right - self.system.product(self.elements, found)
@@ -138,13 +147,15 @@ def _flat(parts: Sequence[np.ndarray]) -> np.ndarray:
     return parts[0].ravel() if len(parts) == 1 else np.concatenate([part.ravel() for part in parts])
 
 
-def saddle_blocks(upper: np.ndarray, divergence: np.ndarray, lower: np.ndarray | None = None) -> np.ndarray:
+def saddle_blocks(upper: np.ndarray, divergence: np.ndarray,
+                  lower: np.ndarray | None = None) -> np.ndarray:
     """(T, a + b, a + b) symmetric element matrices [[upper, -divergence^T], [-divergence, -lower]].
 
     upper: (T, a, a), or (T, a / 2, a / 2) for each of two components that are not coupled;
     divergence: (T, b, a); lower: (T, b, b), zero by default.
     """
-    (count, b, a), k = divergence.shape, upper.shape[1]
+    count, b, a = divergence.shape
+    k = upper.shape[1]
     elements = np.zeros((count, a + b, a + b))
     for first in range(0, a, k):
         elements[:, first: first + k, first: first + k] = upper
@@ -161,8 +172,8 @@ def saddle_system(velocity: np.ndarray, pressure: np.ndarray, held: np.ndarray,
 
     velocity: (T, a) nodes of each component; pressure: (T, b) nodes among the first ones of the
     velocity's; held: (n, 2) prescribed components; order: (n,) nodes in elimination order, if
-    known. Unknowns are numbered x, then y, then pressure; each
-    pressure is eliminated after the components at its node.
+    known. Unknowns are numbered x, then y, then pressure; each pressure is eliminated after the
+    components at its node.
     """
     count = len(held)
     pressures = pressure.max() + 1

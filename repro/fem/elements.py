@@ -36,9 +36,11 @@ def nodes(order: int) -> np.ndarray:
 def evaluated(order: int, where: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Shape functions (q, k) at points (q, 2) of the unit triangle, and their derivatives by s and
     t, (q, k, 2)."""
-    element, places = ELEMENTS[order], np.ascontiguousarray(where.T)
+    element = ELEMENTS[order]
+    places = np.ascontiguousarray(where.T)
     count = len(element.doflocs)
-    found, slopes = np.empty((len(where), count)), np.empty((len(where), count, 2))
+    found = np.empty((len(where), count))
+    slopes = np.empty((len(where), count, 2))
     for k in range(count):
         value, gradient = element.lbasis(places, k)
         found[:, k] = value
@@ -133,8 +135,10 @@ def determinant(matrix: np.ndarray) -> np.ndarray:
 def inverse_transpose(matrix: np.ndarray, det: np.ndarray) -> np.ndarray:
     """(..., 2, 2) of matrices with known determinants (...)."""
     found = np.empty_like(matrix)
-    found[..., 0, 0], found[..., 1, 1] = matrix[..., 1, 1], matrix[..., 0, 0]
-    found[..., 0, 1], found[..., 1, 0] = -matrix[..., 1, 0], -matrix[..., 0, 1]
+    found[..., 0, 0] = matrix[..., 1, 1]
+    found[..., 1, 1] = matrix[..., 0, 0]
+    found[..., 0, 1] = -matrix[..., 1, 0]
+    found[..., 1, 0] = -matrix[..., 0, 1]
     return found / det[..., None, None]
 
 
@@ -168,7 +172,8 @@ def points(corners: np.ndarray, of: Table) -> Points:
     J = jacobian(corners, of.bends)
     det = determinant(J)
     turned = inverse_transpose(J, det)
-    by_point = np.swapaxes(turned, 0, 1).reshape(len(of.weights), -1, 2)  # few products of large matrices
+    # Few products of large matrices.
+    by_point = np.swapaxes(turned, 0, 1).reshape(len(of.weights), -1, 2)
     found = by_point @ np.swapaxes(of.slopes, 1, 2)
     slopes = found.reshape(len(of.weights), len(corners), 2, -1)
     return Points(det * of.weights, np.ascontiguousarray(np.swapaxes(slopes, 0, 1)))

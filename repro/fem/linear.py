@@ -16,6 +16,8 @@ from __future__ import annotations
 from copy import copy
 from dataclasses import dataclass
 from importlib import import_module
+from types import ModuleType
+from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -24,9 +26,10 @@ from scipy.sparse.linalg import splu
 from repro.errors import LinearError
 from repro.timing import timed
 
-#: Largest accepted componentwise backward error, max |A x - b|_i / (|A| |x| + |b|)_i, and where
-#: refinement starts.
-RESIDUAL, REFINE = 1e-10, 1e-14
+#: Largest accepted componentwise backward error, max |A x - b|_i / (|A| |x| + |b|)_i.
+RESIDUAL = 1e-10
+#: The solution is refined where the error is larger than this.
+REFINE = 1e-14
 
 #: The stage that factorising and solving is timed as.
 FLOOR = "factorise and solve"
@@ -41,9 +44,10 @@ class Method:
 
     def checked(self) -> Method:
         """Itself. Raises LinearError where a package that it takes is not installed."""
-        for wanted, package in ((self.solver == "pardiso", "pypardiso"), (self.ordering == "metis", "pymetis")):
-            if wanted:
-                _package(package)
+        if self.solver == "pardiso":
+            _package("pypardiso")
+        if self.ordering == "metis":
+            _package("pymetis")
         return self
 
 
@@ -51,12 +55,12 @@ class Method:
 DEFAULT = Method()
 
 
-def _package(name: str):
+def _package(name: str) -> ModuleType:
     try:
         return import_module(name)
     except ImportError:
-        raise LinearError(f"the package {name} is not installed; pip install {name}, or leave numerics.solver and "
-                          "numerics.ordering out") from None
+        raise LinearError(f"the package {name} is not installed; pip install {name}, or leave "
+                          "numerics.solver and numerics.ordering out") from None
 
 
 def pairs(elements: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -75,26 +79,35 @@ def node_order(count: int, elements: np.ndarray, method: Method = DEFAULT) -> np
     return (_dissected if method.ordering == "metis" else _by_degree)(graph)
 
 
-def _by_degree(graph) -> np.ndarray:
+def _by_degree(graph: sp.csc_array) -> np.ndarray:
     """Minimum degree, as SuperLU orders a symmetric matrix, the diagonal of which must dominate."""
     symmetric = {"SymmetricMode": True}
-    factor = splu(sp.csc_matrix(graph), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=symmetric)
+    factor = splu(sp.csc_matrix(graph), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
+                  options=symmetric)
     return np.argsort(factor.perm_c)
 
 
-def _dissected(graph) -> np.ndarray:
+def _dissected(graph: sp.csc_array) -> np.ndarray:
     """Nested dissection by METIS; the graph without its diagonal."""
     found = sp.coo_array(graph)
     away = found.row != found.col
-    graph = sp.csr_array((found.data[away], (found.row[away], found.col[away])), shape=graph.shape)
+    places = found.row[away], found.col[away]
+    graph = sp.csr_array((found.data[away], places), shape=graph.shape)
     metis = _package("pymetis")
     return np.asarray(metis.nested_dissection(metis.CSRAdjacency(graph.indptr, graph.indices))[0])
+
+
+class Factors(Protocol):
+    """A factorised matrix A."""
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        """x of A x = right."""
 
 
 class _Pardiso:
     """A factorisation by PARDISO, which orders the unknowns itself."""
 
-    def __init__(self, matrix, package):
+    def __init__(self, matrix: sp.csc_matrix, package: ModuleType):
         self.matrix = sp.csr_matrix(matrix)
         self.solver = package.PyPardisoSolver(mtype=11)
         self.solver.factorize(self.matrix)
@@ -103,7 +116,7 @@ class _Pardiso:
         """x of A x = right."""
         return self.solver.solve(self.matrix, right)
 
-    def __del__(self):
+    def __del__(self) -> None:
         self.solver.free_memory(everything=True)
 
 
@@ -114,15 +127,20 @@ class Solver:
     cannot be brought under RESIDUAL.
     """
 
-    def __init__(self, matrix, method: Method = DEFAULT):
+    def __init__(self, matrix: sp.spmatrix, method: Method = DEFAULT):
         self.matrix = matrix if isinstance(matrix, sp.csc_matrix) else sp.csc_matrix(matrix)
         self.magnitude = copy(self.matrix)
         self.magnitude.data = np.abs(self.matrix.data)
-        pardiso = _package("pypardiso") if method.solver == "pardiso" else None
-        self.factor = _Pardiso(self.matrix, pardiso) if pardiso else self._factor("NATURAL", 0.0, True)
+        self.factor = self._first(method)
         self.pivoted = False
 
-    def _factor(self, column_order: str, threshold: float, symmetric: bool):
+    def _first(self, method: Method) -> Factors | None:
+        if method.solver == "pardiso":
+            return _Pardiso(self.matrix, _package("pypardiso"))
+        return self._factor("NATURAL", 0.0, True)
+
+    def _factor(self, column_order: str, threshold: float, symmetric: bool) -> Factors | None:
+        """By SuperLU; None where the matrix is singular."""
         try:
             return splu(self.matrix, permc_spec=column_order, diag_pivot_thresh=threshold,
                         options={"SymmetricMode": symmetric})
@@ -132,14 +150,16 @@ class Solver:
     def _defect(self, solution: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, float]:
         residual = right - self.matrix @ solution
         scale = self.magnitude @ np.abs(solution) + np.abs(right)
-        return residual, float(np.max(np.abs(residual) / np.maximum(scale, np.finfo(float).tiny), initial=0.0))
+        relative = np.abs(residual) / np.maximum(scale, np.finfo(float).tiny)
+        return residual, float(np.max(relative, initial=0.0))
 
     @timed(FLOOR)
     def solve(self, right: np.ndarray) -> np.ndarray:
         """x (n,) of A x = right (n,)."""
         for attempt in ("plain", "pivoted"):
             if attempt == "pivoted" and not self.pivoted:
-                self.factor, self.pivoted = self._factor("COLAMD", 1.0, False), True
+                self.factor = self._factor("COLAMD", 1.0, False)
+                self.pivoted = True
             if self.factor is None:
                 continue
             solution = self.factor.solve(right)
@@ -149,11 +169,13 @@ class Solver:
                 residual, defect = self._defect(solution, right)
             if defect <= RESIDUAL:
                 return solution
-        found = "is singular" if self.factor is None else f"leaves a residual of {defect:.2g}, above {RESIDUAL:g}"
-        raise LinearError(f"a linear system of {len(right)} unknowns {found}; try a finer numerics.refinement")
+        raise LinearError(f"a linear system of {len(right)} unknowns "
+                          + ("is singular" if self.factor is None else
+                             f"leaves a residual of {defect:.2g}, above {RESIDUAL:g}")
+                          + "; try a finer numerics.refinement")
 
 
 @timed(FLOOR)
-def factorised(matrix, method: Method = DEFAULT) -> Solver:
+def factorised(matrix: sp.spmatrix, method: Method = DEFAULT) -> Solver:
     """A matrix, ready for right-hand sides."""
     return Solver(matrix, method)

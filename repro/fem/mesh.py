@@ -21,7 +21,8 @@ from repro.fem.assembly import ElementSystem
 from repro.fem.linear import DEFAULT, Method, node_order
 
 #: Remesh when more than POOR_ALLOWED triangles have a quality under POOR (3.5).
-POOR, POOR_ALLOWED = 0.6, 6
+POOR = 0.6
+POOR_ALLOWED = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,25 +161,34 @@ def _numbered(topology: Topology, order: int) -> Dofs:
     """An edge has order - 1 nodes; of two, the one near the corner with the lower number takes the
     edge's own number, the other that and the count of edges. So the nodes of order 2 are among
     those of order 3, and a curved mesh's own nodes are those of order 2."""
-    corners, edges = topology.corners, topology.cell_edges + topology.corners
-    if order == 1:
-        cells, count = topology.triangles, corners
-    elif order == 2:
-        cells, count = np.column_stack([topology.triangles, edges]), corners + len(topology.edges)
-    else:
-        cells, count = _cubic(topology)
-    lines = [_along(topology, line, order) for line in (topology.inlet, topology.outlet)]
-    walls = _on_walls(topology, order)
-    return Dofs(cells, count, node_order(count, cells, topology.method), lines[0], lines[1], walls)
+    make = {1: _linear, 2: _quadratic, 3: _cubic}[order]
+    cells, count = make(topology)
+    elimination = node_order(count, cells, topology.method)
+    inlet, outlet = (_along(topology, line, order) for line in (topology.inlet, topology.outlet))
+    return Dofs(cells, count, elimination, inlet, outlet, _on_walls(topology, order))
+
+
+def _linear(topology: Topology) -> tuple[np.ndarray, int]:
+    """(T, 3) nodes, the corners, and how many they are."""
+    return topology.triangles, topology.corners
+
+
+def _quadratic(topology: Topology) -> tuple[np.ndarray, int]:
+    """(T, 6) nodes, corners and edges, and how many they are."""
+    middles = topology.corners + topology.cell_edges
+    return np.column_stack([topology.triangles, middles]), topology.corners + len(topology.edges)
 
 
 def _cubic(topology: Topology) -> tuple[np.ndarray, int]:
     """(T, 10) nodes in scikit-fem's order, whose third edge runs from corner 0 to corner 2; and how
     many they are."""
-    first, many = topology.corners, len(topology.edges)
-    starts, ends = topology.triangles[:, [0, 1, 0]], topology.triangles[:, [1, 2, 2]]
+    first = topology.corners
+    many = len(topology.edges)
+    starts = topology.triangles[:, [0, 1, 0]]
+    ends = topology.triangles[:, [1, 2, 2]]
     own = first + topology.cell_edges
-    near, far = own + many * (starts > ends), own + many * (starts < ends)
+    near = own + many * (starts > ends)
+    far = own + many * (starts < ends)
     centre = first + 2 * many + np.arange(len(own))
     on_edges = np.stack([near, far], axis=2).reshape(-1, 6)
     return np.column_stack([topology.triangles, on_edges, centre]), first + 2 * many + len(own)
@@ -186,7 +196,8 @@ def _cubic(topology: Topology) -> tuple[np.ndarray, int]:
 
 def _along(topology: Topology, line: np.ndarray, order: int) -> np.ndarray:
     """(E, order + 1) nodes of the edges of a line of corners."""
-    a, b = line[:-1], line[1:]
+    a = line[:-1]
+    b = line[1:]
     if order == 1:
         return np.column_stack([a, b])
     middle = topology.corners + topology.edge_numbers(a, b)
@@ -203,7 +214,8 @@ def _on_walls(topology: Topology, order: int) -> np.ndarray:
     on = np.zeros(topology.corners, bool)
     on[topology.walls] = True
     single = np.bincount(topology.cell_edges.ravel(), minlength=len(topology.edges)) == 1
-    middles = topology.corners + np.flatnonzero(single & on[topology.edges].all(axis=1) & ~_across(topology))
+    along = single & on[topology.edges].all(axis=1) & ~_across(topology)
+    middles = topology.corners + np.flatnonzero(along)
     nodes = [topology.walls, middles]
     return np.concatenate(nodes if order == 2 else [*nodes, middles + len(topology.edges)])
 
@@ -211,8 +223,8 @@ def _on_walls(topology: Topology, order: int) -> np.ndarray:
 def _across(topology: Topology) -> np.ndarray:
     """(E,) True where both corners of an edge are on the inlet, or both on the outlet. An end that
     is one edge long joins both walls."""
-    at_ends = [np.isin(topology.edges, line).all(axis=1) for line in (topology.inlet, topology.outlet)]
-    return np.logical_or(*at_ends)
+    lines = [np.isin(topology.edges, line) for line in (topology.inlet, topology.outlet)]
+    return np.any(np.all(lines, axis=2), axis=0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -336,7 +348,8 @@ class Mesh:
     def turned_over(self, which: np.ndarray | slice = slice(None)) -> np.ndarray:
         """(T,) True where the map of a triangle (of those in ``which``) is not one to one at a node
         or a quadrature point."""
-        J = elements.jacobian(self.points[self.cells[which]], checked_bends(self.geometry))
+        corners = self.points[self.cells[which]]
+        J = elements.jacobian(corners, checked_bends(self.geometry))
         return elements.determinant(J).min(axis=1) <= 0
 
     def strained_arcs(self) -> np.ndarray:
@@ -387,7 +400,8 @@ def curved(straight: Mesh, middles: np.ndarray | None) -> Mesh:
     middles: (M, 2) um, those on the aggregate's boundary, each after the loop's node of the same
     number; None: on the straight edge.
     """
-    topology, count = straight.topology, straight.corners
+    topology = straight.topology
+    count = straight.corners
     points = np.vstack([straight.points, straight.points[topology.edges].mean(axis=1)])
     cells = np.column_stack([topology.triangles, count + topology.cell_edges])
     loop = np.empty(0, int)

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import signal
 import threading
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 import shapely
@@ -24,16 +26,22 @@ from repro.fem.outline import BOTTOM, TOP, Outline
 from repro.fem.sizing import Sizing
 from repro.timing import timed
 
-#: Sizes of the first of two meshing passes over the wanted ones, and Mmg's own limit on the ratio
-#: of adjacent edges.
-FIRST_PASS, HGRAD = 2.0, 1.5
+#: Sizes of the first of two meshing passes over the wanted ones.
+FIRST_PASS = 2.0
+#: Mmg's own limit on the ratio of adjacent edges.
+HGRAD = 1.5
 #: Rounds in which arcs that bend too much for the triangles beside them are halved.
 HALVINGS = 6
 
+#: Nodes of a polygon, and whether there is biomass in it.
+Polygon: TypeAlias = tuple[np.ndarray, bool]
+#: Points, triangles, and region of each triangle: 1 fluid, 2 biomass.
+Regions: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]
+
 
 @timed("meshing")
-def generate(outline: Outline | None, ends: tuple[float, float], sizing: Sizing, geometry: int = 1,
-             method: Method = DEFAULT) -> tuple[Mesh, Outline | None]:
+def generate(outline: Outline | None, ends: tuple[float, float], sizing: Sizing,
+             geometry: int = 1, method: Method = DEFAULT) -> tuple[Mesh, Outline | None]:
     """A new mesh around the aggregate, and the outline with the nodes that the mesh has on it.
 
     outline: None for a clean channel; ends: x of inlet and outlet (um); geometry: 1, straight
@@ -58,63 +66,104 @@ def generate(outline: Outline | None, ends: tuple[float, float], sizing: Sizing,
     return mesh.checked(), outline
 
 
-def around(outline: Outline | None, ends: tuple[float, float], sizing: Sizing, method: Method = DEFAULT) -> Mesh:
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """Element sizes of a mesh: sources (K, 2) um, where they are prescribed; sizes (K,) um there."""
+
+    sources: np.ndarray
+    sizes: np.ndarray
+    sizing: Sizing
+
+    @staticmethod
+    def around(outline: Outline | None, sizing: Sizing) -> Wanted:
+        """As the outline asks for, or the largest everywhere."""
+        if outline is None:
+            return Wanted(np.empty((0, 2)), np.empty(0), sizing)
+        return Wanted(*sizes_of.size_sources(outline, sizing), sizing)
+
+    def at(self, where: np.ndarray) -> np.ndarray:
+        """(N,) um at points (N, 2) um."""
+        return sizes_of.graded_size(where, self.sources, self.sizes, self.sizing)
+
+    def path(self, *corners: np.ndarray) -> np.ndarray:
+        """(N, 2) um, nodes on the straight lines from corner to corner (2,), but for the last one."""
+        lines = [sizes_of.graded_line(start, end, self.sources, self.sizes, self.sizing)
+                 for start, end in zip(corners, corners[1:])]
+        return np.vstack([line[:-1] for line in lines])
+
+
+def around(outline: Outline | None, ends: tuple[float, float], sizing: Sizing,
+           method: Method = DEFAULT) -> Mesh:
     """A new straight mesh around a polygon whose nodes stay as they are; arguments: those of
     :func:`generate`."""
-    width = sizing.width
-    sources, sizes = np.empty((0, 2)), np.empty(0)
-    if outline is not None:
-        sources, sizes = sizes_of.size_sources(outline, sizing)
-    wanted = sources, sizes, sizing
-    points, polygons = _boundaries(outline, ends, width, wanted)
-    triangles, region, found, points = _fill(points, polygons, lambda where: sizes_of.graded_size(where, *wanted))
-    loop = found[: 0 if outline is None else len(outline.points)]  # its points come first among the prescribed ones
-    return Mesh.of(points, triangles, region == 2, loop, width, ends, method)
+    wanted = Wanted.around(outline, sizing)
+    points, polygons = _boundaries(outline, ends, wanted)
+    (points, triangles, region), places = _fill(points, polygons, wanted.at)
+    # The outline's points come first among the prescribed ones.
+    loop = places[: 0 if outline is None else len(outline.points)]
+    return Mesh.of(points, triangles, region == 2, loop, sizing.width, ends, method)
 
 
 def check_outline(outline: Outline, ends: tuple[float, float], width: float) -> None:
     """Raises MeshError where an outline crosses itself or leaves the meshed part."""
     polygon = shapely.Polygon(outline.points)
     if not polygon.is_valid:
-        raise MeshError(f"the outline of the aggregate crosses itself: {shapely.is_valid_reason(polygon)}; "
-                        "try a shorter growth.time_step")
+        raise MeshError("the outline of the aggregate crosses itself: "
+                        f"{shapely.is_valid_reason(polygon)}; try a shorter growth.time_step")
     inside = ends[0] < outline.upstream and outline.downstream < ends[1]
     if not inside or outline.points[:, 1].min() < 0 or outline.points[:, 1].max() > width:
-        raise MeshError(f"the aggregate, x from {outline.upstream:.4g} to {outline.downstream:.4g} um, "
-                        f"leaves the meshed part, x from {ends[0]:.4g} to {ends[1]:.4g} um")
+        raise MeshError(f"the aggregate, x from {outline.upstream:.4g} to "
+                        f"{outline.downstream:.4g} um, leaves the meshed part, "
+                        f"x from {ends[0]:.4g} to {ends[1]:.4g} um")
 
 
-def _boundaries(outline, ends, width, wanted):
-    """All prescribed points (K, 2) and the polygons [(indices, is biomass)] that they bound."""
-    def line(start, end):
-        return sizes_of.graded_line(start, end, *wanted)
-
+def _boundaries(outline: Outline | None, ends: tuple[float, float],
+                wanted: Wanted) -> tuple[np.ndarray, list[Polygon]]:
+    """All prescribed points (K, 2) and the polygons that they bound."""
     left, right = ends
-    corners = [(left, 0.0), (right, 0.0), (right, width), (left, width)]
+    width = wanted.sizing.width
+    corners = np.array([(left, 0.0), (right, 0.0), (right, width), (left, width)])
     if outline is None:
-        rim = np.vstack([line(a, b)[:-1] for a, b in zip(corners, corners[1:] + corners[:1])])
+        rim = wanted.path(*corners, corners[0])
         return rim, [(np.arange(len(rim)), False)]
-    bottom, top = (np.flatnonzero(outline.wall == w) for w in (BOTTOM, TOP))
-    x = outline.points[:, 0]
-    west, east = bottom[np.argmin(x[bottom])], bottom[np.argmax(x[bottom])]
     store = _PointStore(outline.points)
-    if len(top) == 0:
-        start = store.add(line(corners[0], outline.points[west])[:-1])
-        around = store.add(np.vstack([line(a, b)[:-1] for a, b in zip(corners[1:], corners[2:] + corners[:1])]))
-        end = store.add(line(outline.points[east], corners[1])[1:-1])
-        fluid = np.concatenate([start, _backwards(west, east, len(x)), end, around])
-        polygons = [(fluid, False)]
-    else:
-        north_west, north_east = top[np.argmin(x[top])], top[np.argmax(x[top])]
-        polygons = []
-        first = store.add(line(corners[0], outline.points[west])[:-1])
-        close = store.add(np.vstack([line(outline.points[north_west], corners[3])[1:-1],
-                                     line(corners[3], corners[0])[:-1]]))
-        polygons.append((np.concatenate([first, _backwards(west, north_west, len(x)), close]), False))
-        out = store.add(np.vstack([line(outline.points[east], corners[1])[1:-1], line(corners[1], corners[2])[:-1],
-                                   line(corners[2], outline.points[north_east])[:-1]]))
-        polygons.append((np.concatenate([_backwards(north_east, east, len(x)), out]), False))
-    return store.points, polygons + [(np.arange(len(x)), True)]
+    bounds = _both_sides if (outline.wall == TOP).any() else _over_the_top
+    fluid = bounds(outline, corners, wanted, store)
+    return store.points, [*fluid, (np.arange(len(outline.points)), True)]
+
+
+def _over_the_top(outline: Outline, corners: np.ndarray, wanted: Wanted,
+                  store: _PointStore) -> list[Polygon]:
+    """The fluid around an aggregate that touches the lower wall alone."""
+    south_west, south_east, north_east, north_west = corners
+    west, east = _contact(outline, BOTTOM)
+    start = store.add(wanted.path(south_west, outline.points[west]))
+    over = store.add(wanted.path(south_east, north_east, north_west, south_west))
+    end = store.add(wanted.path(outline.points[east], south_east)[1:])
+    top = _backwards(west, east, len(outline.points))
+    return [(np.concatenate([start, top, end, over]), False)]
+
+
+def _both_sides(outline: Outline, corners: np.ndarray, wanted: Wanted,
+                store: _PointStore) -> list[Polygon]:
+    """The fluid upstream and downstream of an aggregate that touches both walls."""
+    south_west, south_east, north_east, north_west = corners
+    west, east = _contact(outline, BOTTOM)
+    upper_west, upper_east = _contact(outline, TOP)
+    points = outline.points
+    start = store.add(wanted.path(south_west, points[west]))
+    close = store.add(wanted.path(points[upper_west], north_west, south_west)[1:])
+    out = store.add(wanted.path(points[east], south_east, north_east, points[upper_east])[1:])
+    upstream = [start, _backwards(west, upper_west, len(points)), close]
+    downstream = [_backwards(upper_east, east, len(points)), out]
+    return [(np.concatenate(upstream), False), (np.concatenate(downstream), False)]
+
+
+def _contact(outline: Outline, wall: int) -> tuple[int, int]:
+    """The outline's first and last node on a wall, by x."""
+    nodes = np.flatnonzero(outline.wall == wall)
+    x = outline.points[nodes, 0]
+    return int(nodes[np.argmin(x)]), int(nodes[np.argmax(x)])
 
 
 class _PointStore:
@@ -134,9 +183,10 @@ def _backwards(first: int, last: int, count: int) -> np.ndarray:
     return (first - np.arange((first - last) % count + 1)) % count
 
 
-def _fill(points, polygons, size_at):
-    """Triangles (T, 3) inside the polygons, of the size (um) that ``size_at(points)`` asks for;
-    their regions (T,); where the prescribed points went; and all points.
+def _fill(points: np.ndarray, polygons: list[Polygon],
+          size_at: Callable[[np.ndarray], np.ndarray]) -> tuple[Regions, np.ndarray]:
+    """Triangles inside the polygons, of the size (um) that ``size_at(points)`` asks for; and where
+    the prescribed points went.
 
     The first pass knows the wanted size at the prescribed points alone, the second one at every
     point of the first.
@@ -145,16 +195,17 @@ def _fill(points, polygons, size_at):
     region = np.repeat([1 + biomass for _, biomass in polygons], [len(t) for t in triangles])
     rim = np.vstack([np.column_stack([nodes, np.roll(nodes, -1)]) for nodes, _ in polygons])
     rim = np.unique(np.sort(rim, axis=1), axis=0)
-    coarse, found = _mmg(points, np.vstack(triangles), region, rim, points, FIRST_PASS * size_at(points))
-    fine, found = _mmg(coarse[0], coarse[1], coarse[2], found[rim], points, size_at(coarse[0]))
-    return fine[1], fine[2], found, fine[0]
+    sizes = FIRST_PASS * size_at(points)
+    coarse, found = _mmg(points, np.vstack(triangles), region, rim, points, sizes)
+    return _mmg(*coarse, found[rim], points, size_at(coarse[0]))
 
 
-def _mmg(points, triangles, region, rim, prescribed, sizes):
-    """One pass of Mmg, which keeps the rim: points, triangles and region, and where the prescribed
-    points went."""
+def _mmg(points: np.ndarray, triangles: np.ndarray, region: np.ndarray, rim: np.ndarray,
+         prescribed: np.ndarray, sizes: np.ndarray) -> tuple[Regions, np.ndarray]:
+    """One pass of Mmg, which keeps the rim, and where the prescribed points went."""
     mmg = MmgMesh2D()
-    mmg.set_mesh_size(vertices=len(points), triangles=len(triangles), quadrilaterals=0, edges=len(rim))
+    mmg.set_mesh_size(vertices=len(points), triangles=len(triangles), quadrilaterals=0,
+                      edges=len(rim))
     mmg.set_vertices(points)
     mmg.set_triangles(triangles.astype(np.int32), region.astype(np.int64))
     mmg.set_edges(rim.astype(np.int32))
@@ -163,14 +214,15 @@ def _mmg(points, triangles, region, rim, prescribed, sizes):
     mmg["metric"] = sizes[:, None]
     with _signals_kept():
         mmg.remesh(verbose=-1, hgrad=HGRAD, nosurf=True)
-    points, (triangles, region) = mmg.get_vertices(), mmg.get_triangles_with_refs()
+    points = mmg.get_vertices()
+    triangles, region = mmg.get_triangles_with_refs()
     found = _find(points, prescribed)
     points[found] = prescribed
     return (points, triangles.astype(np.int64), region), found
 
 
 @contextmanager
-def _signals_kept():
+def _signals_kept() -> Iterator[None]:
     """Mmg resets what the process does on Ctrl-C and on termination; put it back."""
     kept = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
@@ -228,13 +280,13 @@ def _cornered(triangles: np.ndarray, biomass: np.ndarray) -> np.ndarray:
 def _flip(points: np.ndarray, triangles: np.ndarray, biomass: np.ndarray, corner: int) -> None:
     """Exchange, in place, the inner edge of a cornered triangle for the other diagonal of the
     quadrilateral that it forms with its neighbour."""
-    inner = int(np.flatnonzero(~_region_edges(triangles, biomass)[corner])[0]) if (
-        _region_edges(triangles, biomass)[corner].sum() == 2) else -1
-    if inner < 0:
+    outer = _region_edges(triangles, biomass)[corner]
+    if outer.sum() != 2:
         return
-    c, a, b = np.roll(triangles[corner], -inner)
-    sharing = np.flatnonzero((triangles == a).any(axis=1) & (triangles == c).any(axis=1) & (biomass == biomass[corner]))
-    beside = int(sharing[sharing != corner][0])
+    c, a, b = np.roll(triangles[corner], -int(np.flatnonzero(~outer)[0]))
+    sharing = (triangles == a).any(axis=1) & (triangles == c).any(axis=1)
+    inside = np.flatnonzero(sharing & (biomass == biomass[corner]))
+    beside = int(inside[inside != corner][0])
     d = int(triangles[beside][(triangles[beside] != a) & (triangles[beside] != c)][0])
     pair = np.array([[a, b, d], [b, c, d]])
     if triangle_areas(points, pair).min() > 0:

@@ -56,15 +56,17 @@ class Newton:
 
     def solve(self, system: System[It], iterate: It) -> tuple[It, int, bool]:
         """The last iterate, how many steps led to it, and whether it has converged."""
-        factors, last = None, np.inf
+        factors: Factored | None = None
+        last = np.inf
         for count in range(self.most):
             defect = iterate.defect
             stalled = STALLED * last < defect <= self.round_off
             if iterate.complete and (defect <= self.tolerance or stalled):
                 return iterate, count, True
-            fresh = factors is None or not self.reused or defect > ENOUGH * last
-            if fresh:
-                factors = system.factored(iterate)
+            if not self.reused or defect > ENOUGH * last:
+                factors = None
+            fresh = factors is None
+            factors = factors or system.factored(iterate)
             last = defect
             iterate = system.advanced(iterate, factors, fresh)
         return iterate, self.most, False

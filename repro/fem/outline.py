@@ -16,7 +16,9 @@ from scipy.interpolate import CubicSpline
 
 from repro.errors import MeshError
 
-FREE, BOTTOM, TOP = 0, 1, 2
+FREE = 0
+BOTTOM = 1
+TOP = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +63,8 @@ class Outline:
         if self.geometry == 1:
             return polygon_area(self.points)
         a, m, b = np.moveaxis(self.arcs(self.points), 1, 0)
-        chord, bow = b - a, m - 0.5 * (a + b)
+        chord = b - a
+        bow = m - 0.5 * (a + b)
         lens = bow[:, 0] * chord[:, 1] - bow[:, 1] * chord[:, 0]
         return polygon_area(self.points[::2]) + float(2 / 3 * np.sum(lens))
 
@@ -125,7 +128,7 @@ def parabola(t: np.ndarray) -> np.ndarray:
 
 def slopes(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """First derivative by t at t = 0, and the second one, of arcs with nodes (M, 3, ...)."""
-    first, middle, last = nodes[:, 0], nodes[:, 1], nodes[:, 2]
+    first, middle, last = np.moveaxis(nodes, 1, 0)
     return -3 * first + 4 * middle - last, 4 * (first - 2 * middle + last)
 
 
@@ -152,15 +155,15 @@ def polygon(corners: np.ndarray, width: float, geometry: int = 1, smooth: bool =
     """The outline of an aggregate through points (K, 2) um, from lower wall to lower wall.
 
     The points go from the upstream to the downstream end; those on the upper wall, y = ``width``
-    um, are contact. smooth: a natural cubic spline takes
-    the place of straight lines between two points of which one is free. The middle of each contact
-    surface is its fixed point. Raises MeshError where the curve leaves the pore.
+    um, are contact. smooth: a natural cubic spline takes the place of straight lines between two
+    points of which one is free. The middle of each contact surface is its fixed point. Raises
+    MeshError where the curve leaves the pore.
     """
-    rim = np.asarray(corners, float)[::-1]  # counterclockwise: downstream end first, over the top, upstream end
+    # Counterclockwise: from the downstream end over the top to the upstream end.
+    rim = np.asarray(corners, float)[::-1]
     if smooth:
         rim = _splined(rim, width)
-    first, last = rim[-1], rim[0]
-    base = np.column_stack([np.linspace(first[0], last[0], 3), np.zeros(3)])
+    base = np.column_stack([np.linspace(rim[-1, 0], rim[0, 0], 3), np.zeros(3)])
     points = np.vstack([base, rim[1:-1]])
     if points[:, 1].min() < 0 or points[:, 1].max() > width:
         raise MeshError("the spline through the points of aggregate.outline leaves the pore; give more points, or "
@@ -200,8 +203,10 @@ def _with_contact_middle(points: np.ndarray, wall: np.ndarray) -> tuple[np.ndarr
     middle = 0.5 * (x.min() + x.max())
     if np.isclose(x, middle).any():
         return points, wall
-    after = top[np.searchsorted(-x, -middle)]  # the loop runs from downstream to upstream along the upper wall
-    return np.insert(points, after, [middle, points[after, 1]], axis=0), np.insert(wall, after, TOP)
+    # Along the upper wall the loop runs from downstream to upstream.
+    after = top[np.searchsorted(-x, -middle)]
+    points = np.insert(points, after, [middle, points[after, 1]], axis=0)
+    return points, np.insert(wall, after, TOP)
 
 
 def _middles(points: np.ndarray, wall: np.ndarray) -> np.ndarray:

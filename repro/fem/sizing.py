@@ -8,12 +8,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from repro.fem.outline import FREE, TOP, Outline, parabola, slopes
 
-#: Elements across half a pore's width and across the aggregate's thickness, and across the
-#: narrowest film.
-ACROSS_PORE, ACROSS_AGGREGATE, ACROSS_FILM = 14.0, 10.0, 10.0
+#: Elements across the pore's width, across the aggregate's thickness and across the narrowest film.
+ACROSS_PORE = 14.0
+ACROSS_AGGREGATE = 10.0
+ACROSS_FILM = 10.0
 #: Growth of the element size with the distance from where it is prescribed; zero: one size
 #: everywhere.
 GRADATION = 0.25
@@ -44,7 +46,8 @@ class Sizing:
         return self.width / ACROSS_PORE / self.refinement
 
 
-def meshed_extent(outline: Outline | None, width: float, length: float, whole: bool = False) -> tuple[float, float]:
+def meshed_extent(outline: Outline | None, width: float, length: float,
+                  whole: bool = False) -> tuple[float, float]:
     """Ends (um) of the part to mesh when a mesh is generated (3.1).
 
     min(10 R, 1.5 W) from the aggregate on both sides, never past the pore's ends; a clean channel
@@ -52,14 +55,13 @@ def meshed_extent(outline: Outline | None, width: float, length: float, whole: b
     """
     if whole:
         return -length / 2, length / 2
-    if outline is None:
-        reach, first, last = 1.5 * width, 0.0, 0.0
-    else:
-        reach, first, last = min(10 * outline.thickness, 1.5 * width), outline.upstream, outline.downstream
+    first, last = (0.0, 0.0) if outline is None else (outline.upstream, outline.downstream)
+    reach = 1.5 * width if outline is None else min(10 * outline.thickness, 1.5 * width)
     return max(first - reach, -length / 2), min(last + reach, length / 2)
 
 
-def extent_too_short(outline: Outline, ends: tuple[float, float], width: float, length: float) -> bool:
+def extent_too_short(outline: Outline, ends: tuple[float, float], width: float,
+                     length: float) -> bool:
     """Is the aggregate closer to an end of the mesh than min(7 R, 1.3 W), with more of the pore
     beyond (3.1)?"""
     reach = min(7 * outline.thickness, 1.3 * width)
@@ -74,8 +76,8 @@ def interface_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
     A tenth of the aggregate's thickness, a fourteenth of the pore's width, and for free nodes the
     film's size.
     """
-    across = min(outline.thickness / ACROSS_AGGREGATE / sizing.refinement, sizing.largest) / sizing.front
-    size = np.full(len(outline.points), across)
+    across = min(outline.thickness / ACROSS_AGGREGATE / sizing.refinement, sizing.largest)
+    size = np.full(len(outline.points), across / sizing.front)
     return np.where(outline.wall == FREE, np.minimum(size, film_sizes(outline, sizing)), size)
 
 
@@ -94,7 +96,8 @@ def film_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
     """
     if (outline.wall == TOP).any():
         return np.full(len(outline.points), np.inf)
-    return np.maximum(sizing.width - outline.points[:, 1], sizing.film) / ACROSS_FILM / sizing.refinement
+    film = np.maximum(sizing.width - outline.points[:, 1], sizing.film)
+    return film / ACROSS_FILM / sizing.refinement
 
 
 def size_sources(outline: Outline, sizing: Sizing) -> tuple[np.ndarray, np.ndarray]:
@@ -114,12 +117,14 @@ def size_sources(outline: Outline, sizing: Sizing) -> tuple[np.ndarray, np.ndarr
     return np.vstack([outline.points[free], across[there]]), np.concatenate([near, film[there]])
 
 
-def graded_size(where: np.ndarray, sources: np.ndarray, sizes: np.ndarray, sizing: Sizing) -> np.ndarray:
+def graded_size(where: np.ndarray, sources: np.ndarray, sizes: np.ndarray,
+                sizing: Sizing) -> np.ndarray:
     """Wanted element size (um) at points (K, 2): it grows from the sizes (M,) at the sources (M, 2)
     up to the largest."""
     if len(sources) == 0:
         return np.full(len(where), sizing.largest)
-    distance = np.hypot(where[:, None, 0] - sources[None, :, 0], where[:, None, 1] - sources[None, :, 1])
+    apart = where[:, None] - sources[None]
+    distance = np.hypot(apart[..., 0], apart[..., 1])
     return np.minimum(sizing.largest, (sizes + sizing.gradation * distance).min(axis=1))
 
 
@@ -131,7 +136,8 @@ def split(outline: Outline, sizing: Sizing) -> Outline:
     the fixed points.
     """
     polygon = outline.corners
-    sizes, on_wall = interface_sizes(polygon, sizing), outline.edge_wall != FREE
+    sizes = interface_sizes(polygon, sizing)
+    on_wall = outline.edge_wall != FREE
     pieces = []
     for first, last in runs(polygon):
         keep = np.arange(first, last + 1) % len(polygon.points)
@@ -148,7 +154,8 @@ def halved(outline: Outline, which: np.ndarray) -> Outline:
     """The same curve with some of its arcs, ``which`` (arcs,), cut at their middles."""
     parts = np.where(which, 4, 2)
     arc = np.repeat(np.arange(len(which)), parts)
-    return placed(outline, arc, (np.arange(len(arc)) - (np.cumsum(parts) - parts)[arc]) / parts[arc])
+    first = np.cumsum(parts) - parts
+    return placed(outline, arc, (np.arange(len(arc)) - first[arc]) / parts[arc])
 
 
 def runs(outline: Outline) -> list[tuple[int, int]]:
@@ -204,8 +211,9 @@ def placed(outline: Outline, edge: np.ndarray, t: np.ndarray, seed: float | None
     arc: a straight edge of today's outline was round at t = 0, and what the material remembers makes
     it round again at the next update.
     """
-    first, corner, weight = t == 0, outline.geometry * edge, parabola(t)
-    points, origin = (np.einsum("ka,kai->ki", weight, outline.arcs(part)[edge])
+    first = t == 0
+    corner = outline.geometry * edge
+    points, origin = (np.einsum("ka,kai->ki", parabola(t), outline.arcs(part)[edge])
                       for part in (outline.points, outline.origin))
     if outline.geometry == 1 and seed is not None:
         ends = outline.arcs(outline.origin)[edge]
@@ -214,26 +222,30 @@ def placed(outline: Outline, edge: np.ndarray, t: np.ndarray, seed: float | None
     wall = np.where(first, outline.wall[corner], outline.edge_wall[edge])
     on = wall != FREE
     points[on, 1] = outline.points[corner[on], 1]
-    points[first], origin[first] = outline.points[corner[first]], outline.origin[corner[first]]
+    points[first] = outline.points[corner[first]]
+    origin[first] = outline.origin[corner[first]]
     return Outline(points, wall, first & outline.fixed[corner], origin, outline.geometry)
 
 
 def _on_arc(places: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Places (K, 2) between two points each, moved to the arc around the origin where both points
     are equally far from it."""
-    radius, now = np.hypot(*first.T), np.hypot(*places.T)
+    radius = np.hypot(*first.T)
+    now = np.hypot(*places.T)
     arc = np.isclose(radius, np.hypot(*second.T), rtol=1e-9, atol=0) & (places[:, 1] > 0)
     return places * np.where(arc, radius / np.where(arc, now, 1.0), 1.0)[:, None]
 
 
-def graded_line(start, end, sources: np.ndarray, sizes: np.ndarray, sizing: Sizing) -> np.ndarray:
+def graded_line(start: ArrayLike, end: ArrayLike, sources: np.ndarray, sizes: np.ndarray,
+                sizing: Sizing) -> np.ndarray:
     """(K, 2) nodes from start to end, spaced as :func:`graded_size` asks; both ends included."""
-    start, end = np.asarray(start, float), np.asarray(end, float)
-    length = np.linalg.norm(end - start)
+    first = np.asarray(start, float)
+    way = np.asarray(end, float) - first
     s = np.linspace(0.0, 1.0, 401)
-    density = length / graded_size(start + s[:, None] * (end - start), sources, sizes, sizing)
+    wanted = graded_size(first + s[:, None] * way, sources, sizes, sizing)
+    density = np.linalg.norm(way) / wanted
     count = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(s))])
     parts = max(1, int(np.ceil(count[-1] - 0.3)))
     t = np.interp(np.linspace(0.0, count[-1], parts + 1), count, s)
     t[[0, -1]] = 0.0, 1.0
-    return start + t[:, None] * (end - start)
+    return first + t[:, None] * way

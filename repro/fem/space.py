@@ -53,8 +53,8 @@ class Space:
     @cached_property
     def table(self) -> Table:
         """The functions where products of them are integrated."""
-        degrees = elements.DEGREES
-        return elements.table(self.order, self.mesh.geometry, max(degrees[self.order], self._curved_degree))
+        degree = max(elements.DEGREES[self.order], self._curved_degree)
+        return elements.table(self.order, self.mesh.geometry, degree)
 
     @property
     def _curved_degree(self) -> int:
@@ -67,7 +67,7 @@ class Space:
 
     @property
     def gradient_degree(self) -> int:
-        """At the quadrature points of gradients: a single one on straight linear triangles."""
+        """Degree of the quadrature of gradients; it has one point on straight linear triangles."""
         return max(elements.GRADIENT_DEGREES[self.order], self._curved_degree)
 
     @cached_property
@@ -179,6 +179,7 @@ class Space:
         corners = self.mesh.triangles
         first = np.flatnonzero(np.isin(corners, edges[:, [0, -1]]).sum(axis=1) >= 2)
         near = corners[first]
-        has = (near == edges[:, None, None, 0]).any(axis=2) & (near == edges[:, None, None, -1]).any(axis=2)
-        owner = first[has.argmax(axis=1)]
+        has_start = (near == edges[:, None, None, 0]).any(axis=2)
+        has_end = (near == edges[:, None, None, -1]).any(axis=2)
+        owner = first[(has_start & has_end).argmax(axis=1)]
         return owner, np.argmax(self.cells[owner][:, :, None] == edges[:, None, :], axis=1)

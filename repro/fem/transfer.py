@@ -52,7 +52,8 @@ class Located:
 
     def field(self, values: np.ndarray, cells: np.ndarray, order: int) -> np.ndarray:
         """(K, ...) there of values (N, ...) at the nodes (T, k) of functions of an order."""
-        return np.einsum("ka,ka...->k...", elements.values(order, self.local), values[cells[self.triangle]])
+        weights = elements.values(order, self.local)
+        return np.einsum("ka,ka...->k...", weights, values[cells[self.triangle]])
 
 
 @timed("transfer")
@@ -66,7 +67,8 @@ def located(points: np.ndarray, cells: np.ndarray, where: np.ndarray) -> Located
     geometry = 1 if cells.shape[1] == 3 else 2
     nodes = points[cells]
     size = np.ptp(nodes, axis=1).max(axis=1)
-    low, high = nodes.min(axis=1) - 0.1 * size[:, None], nodes.max(axis=1) + 0.1 * size[:, None]
+    low = nodes.min(axis=1) - 0.1 * size[:, None]
+    high = nodes.max(axis=1) + 0.1 * size[:, None]
     place, cell = shapely.STRtree(shapely.box(*low.T, *high.T)).query(shapely.points(where))
     local = _inverted(nodes[cell], where[place], geometry)
     depth = elements.values(1, local).min(axis=1)
@@ -84,16 +86,19 @@ def _inverted(nodes: np.ndarray, where: np.ndarray, geometry: int) -> np.ndarray
     Newton's method does not converge."""
     if geometry == 1:
         return barycentric(nodes, where)[:, 1:]
-    local, rest = np.clip(barycentric(nodes[:, :3], where)[:, 1:], -2.0, 3.0), np.arange(len(where))
+    local = np.clip(barycentric(nodes[:, :3], where)[:, 1:], -2.0, 3.0)
+    rest = np.arange(len(where))
     for _ in range(NEWTON_STEPS):
-        now, there = local[rest], nodes[rest]
+        now = local[rest]
+        there = nodes[rest]
         values, slopes = elements.evaluated(2, now)
         apart = (values[:, None] @ there)[:, 0] - where[rest]
         J = np.swapaxes(there, 1, 2) @ slopes
         det = elements.determinant(J)
         det = np.where(np.abs(det) > 1e-12 * np.abs(det).max(), det, np.inf)
-        step = np.stack([J[:, 1, 1] * apart[:, 0] - J[:, 0, 1] * apart[:, 1],
-                         J[:, 0, 0] * apart[:, 1] - J[:, 1, 0] * apart[:, 0]], axis=1) / det[:, None]
+        ds = J[:, 1, 1] * apart[:, 0] - J[:, 0, 1] * apart[:, 1]
+        dt = J[:, 0, 0] * apart[:, 1] - J[:, 1, 0] * apart[:, 0]
+        step = np.stack([ds, dt], axis=1) / det[:, None]
         local[rest] = np.clip(now - step, -2.0, 3.0)
         rest = rest[np.abs(step).max(axis=1) >= 1e-12]
         if len(rest) == 0:
@@ -114,7 +119,7 @@ def barycentric(corners: np.ndarray, where: np.ndarray) -> np.ndarray:
     """(..., 3) coordinates of places (..., 2) in triangles (..., 3, 2)."""
     a, b, c = (corners[..., i, :] for i in range(3))
 
-    def cross(u, v):
+    def cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:
         return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
 
     double = cross(b - a, c - a)
@@ -122,13 +127,15 @@ def barycentric(corners: np.ndarray, where: np.ndarray) -> np.ndarray:
     return np.stack([cross(b, c), cross(c, a), cross(a, b)], -1) / double[..., None]
 
 
-def interpolate(points: np.ndarray, cells: np.ndarray, fields: np.ndarray, where: np.ndarray) -> np.ndarray:
+def interpolate(points: np.ndarray, cells: np.ndarray, fields: np.ndarray,
+                where: np.ndarray) -> np.ndarray:
     """(K, m) values at places (K, 2) of fields (N, m) at the mesh's nodes: the paper's transfer,
     bounded on straight triangles."""
     return located(points, cells, where).field(fields, cells, 1 if cells.shape[1] == 3 else 2)
 
 
-def interpolated(points, triangles, fields, new_points, new_triangles) -> np.ndarray:
+def interpolated(points: np.ndarray, triangles: np.ndarray, fields: np.ndarray,
+                 new_points: np.ndarray, new_triangles: np.ndarray) -> np.ndarray:
     """(K, m) of linear fields (N, m) at the nodes of another mesh, called as :func:`project` is."""
     return interpolate(points, triangles, fields, new_points)
 
@@ -137,7 +144,8 @@ def unfolded(mesh: Mesh, origin: np.ndarray) -> np.ndarray:
     """Places at t = 0 (N, 2) um that no triangle of the aggregate turns over: where the
     interpolated ones would, middles go half way between their corners. Raises TransferError where
     that is not enough."""
-    cells, bends = mesh.cells[mesh.biomass], checked_bends(mesh.geometry)
+    cells = mesh.cells[mesh.biomass]
+    bends = checked_bends(mesh.geometry)
     for _ in range(3):
         det = elements.determinant(elements.jacobian(origin[cells], bends))
         bad = cells[det.min(axis=1) <= (FOLD * det.max(axis=1) if mesh.geometry == 2 else 0.0)]
@@ -149,18 +157,21 @@ def unfolded(mesh: Mesh, origin: np.ndarray) -> np.ndarray:
         origin[bad[:, 3:]] = 0.5 * (origin[bad[:, :3]] + origin[bad[:, elements.NEXT]])
     if det.min() <= 0:
         x, y = mesh.points[bad[0]].mean(axis=0)
-        raise TransferError(f"after a remesh the places at t = 0 fold near x = {x:.4g}, y = {y:.4g} um; "
-                            "try a larger numerics.refinement")
+        raise TransferError(f"after a remesh the places at t = 0 fold near x = {x:.4g}, "
+                            f"y = {y:.4g} um; try a larger numerics.refinement")
     return origin
 
 
-def supermesh(points, triangles, new_points, new_triangles) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def supermesh(points: np.ndarray, triangles: np.ndarray, new_points: np.ndarray,
+              new_triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Common pieces of two meshes: (p, 3, 2) corners of triangles, and the old and the new triangle
     (p,) that holds each."""
     boxes = shapely.STRtree(shapely.polygons(points[triangles]))
     new, old = boxes.query(shapely.polygons(new_points[new_triangles]))
     pieces = clip(points[triangles[old]], new_points[new_triangles[new]])
-    fans = np.stack([np.repeat(pieces[:, :1], pieces.shape[1] - 2, axis=1), pieces[:, 1:-1], pieces[:, 2:]], axis=2)
+    last = pieces.shape[1] - 1
+    first = np.repeat(pieces[:, :1], last - 1, axis=1)
+    fans = np.stack([first, pieces[:, 1:last], pieces[:, 2: last + 1]], axis=2)
     edge = fans[:, :, 1:] - fans[:, :, :1]
     pair, fan = np.nonzero(edge[..., 0, 0] * edge[..., 1, 1] != edge[..., 0, 1] * edge[..., 1, 0])
     return fans[pair, fan], old[pair], new[pair]
@@ -169,16 +180,18 @@ def supermesh(points, triangles, new_points, new_triangles) -> tuple[np.ndarray,
 def clip(polygons: np.ndarray, windows: np.ndarray) -> np.ndarray:
     """Convex polygons (p, k, 2) cut to counterclockwise triangles (p, 3, 2), pair by pair.
 
-    Returns (p, m, 2), m being the corners of the largest, at least three.
-
-    Sutherland and Hodgman's algorithm: each side of the window in turn keeps what is to its left.
-    Polygons with fewer corners repeat one of them, empty ones are a single point. m is k + 3 at
-    most but where round-off has corners on a line of the window change sides more than twice.
+    Returns (p, m, 2): polygons with fewer than m corners repeat one of them, empty ones are a
+    single point. m is at least 3, and k + 3 at most but where round-off has corners on a line of
+    the window change sides more than twice. Sutherland and Hodgman's algorithm: each side of the
+    window in turn keeps what is to its left.
     """
     for side in range(3):
-        start, along = windows[:, side, None], windows[:, (side + 1) % 3, None] - windows[:, side, None]
-        depth = along[..., 0] * (polygons[..., 1] - start[..., 1]) - along[..., 1] * (polygons[..., 0] - start[..., 0])
-        after, depth_after = np.roll(polygons, -1, axis=1), np.roll(depth, -1, axis=1)
+        start = windows[:, side, None]
+        along = windows[:, (side + 1) % 3, None] - start
+        way = polygons - start
+        depth = along[..., 0] * way[..., 1] - along[..., 1] * way[..., 0]
+        after = np.roll(polygons, -1, axis=1)
+        depth_after = np.roll(depth, -1, axis=1)
         crosses = (depth < 0) != (depth_after < 0)
         part = np.where(crosses, depth, 0.0) / np.where(crosses, depth - depth_after, 1.0)
         crossing = polygons + part[..., None] * (after - polygons)
@@ -197,7 +210,8 @@ def _packed(points: np.ndarray, kept: np.ndarray) -> np.ndarray:
     return np.take_along_axis(points, chosen[..., None], axis=1)
 
 
-def project(points, triangles, fields, new_points, new_triangles) -> np.ndarray:
+def project(points: np.ndarray, triangles: np.ndarray, fields: np.ndarray,
+            new_points: np.ndarray, new_triangles: np.ndarray) -> np.ndarray:
     """(K, m) Galerkin projection of nodal fields (N, m) onto another mesh of the same polygon.
 
     Raises TransferError where the two meshes do not cover the same area.
@@ -207,15 +221,17 @@ def project(points, triangles, fields, new_points, new_triangles) -> np.ndarray:
     return _solve_mass(new_points, new_triangles, right)
 
 
-def project_bounded(points, triangles, fields, new_points, new_triangles) -> np.ndarray:
+def project_bounded(points: np.ndarray, triangles: np.ndarray, fields: np.ndarray,
+                    new_points: np.ndarray, new_triangles: np.ndarray) -> np.ndarray:
     """As :func:`project`, each field limited at each node by its old values around that node."""
     pieces = _pieces(points, triangles, new_points, new_triangles)
     right = _loads(pieces, points, triangles, fields, new_points, new_triangles)
-    found, bounds = _solve_mass(new_points, new_triangles, right), _bounds(pieces, triangles, fields, new_triangles)
+    found = _solve_mass(new_points, new_triangles, right)
+    lowest, highest = _bounds(pieces, triangles, fields, new_triangles)
     areas = triangle_areas(new_points, new_triangles)
     lumped = np.bincount(new_triangles.ravel(), np.repeat(areas / 3, 3), len(new_points))
     ends, coupling = _edges(new_triangles, areas)
-    for column, (least, most) in enumerate(zip(*(bound.T for bound in bounds))):
+    for column, (least, most) in enumerate(zip(lowest.T, highest.T)):
         room = OVERSHOOT * np.abs(fields[:, column]).max()
         if (found[:, column] < least - room).any() or (found[:, column] > most + room).any():
             flux = coupling * (found[ends[:, 0], column] - found[ends[:, 1], column])
@@ -226,25 +242,27 @@ def project_bounded(points, triangles, fields, new_points, new_triangles) -> np.
 
 def _edges(triangles: np.ndarray, areas: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(e, 2) nodes of every edge, and (e,) the entry of the mass matrix that couples them, um2."""
-    pairs = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-    ends, which = np.unique(pairs, axis=0, return_inverse=True)
+    pairs = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
+    ends, which = np.unique(np.sort(pairs, axis=1), axis=0, return_inverse=True)
     return ends, np.bincount(which.ravel(), np.repeat(areas / 12, 3), len(ends))
 
 
-def _bounds(pieces, triangles: np.ndarray, fields: np.ndarray, new_triangles: np.ndarray):
+def _bounds(pieces: Pieces, triangles: np.ndarray, fields: np.ndarray,
+            new_triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Least and largest old nodal value (K, m) in the old triangles that share area with those of
     each new node."""
-    _, old, new, _ = pieces
     shape = (new_triangles.max() + 1, fields.shape[1])
-    least, most = np.full(shape, np.inf), np.full(shape, -np.inf)
-    values = fields[triangles[old]]
-    for corner in new_triangles[new].T:
+    least = np.full(shape, np.inf)
+    most = np.full(shape, -np.inf)
+    values = fields[triangles[pieces.old]]
+    for corner in new_triangles[pieces.new].T:
         np.minimum.at(least, corner, values.min(axis=1))
         np.maximum.at(most, corner, values.max(axis=1))
     return least, most
 
 
-def _limited(low, lumped, ends, flux, least, most) -> np.ndarray:
+def _limited(low: np.ndarray, lumped: np.ndarray, ends: np.ndarray, flux: np.ndarray,
+             least: np.ndarray, most: np.ndarray) -> np.ndarray:
     """(K,) values ``low`` with as much of the fluxes (e,), um2 times the field, into the first of
     the two ``ends`` and out of the second as keeps them from ``least`` to ``most`` (K,)."""
     first, second = ends.T
@@ -252,32 +270,51 @@ def _limited(low, lumped, ends, flux, least, most) -> np.ndarray:
             + np.bincount(second, np.maximum(-sign * flux, 0), len(low)) for sign in (1, -1)]
     room = [lumped * np.maximum(most - low, 0), lumped * np.maximum(low - least, 0)]
     up, down = (np.minimum(1.0, r / np.where(p > 0, p, 1.0)) for r, p in zip(room, into))
-    part = np.where(flux > 0, np.minimum(up[first], down[second]), np.minimum(down[first], up[second])) * flux
-    return low + (np.bincount(first, part, len(low)) - np.bincount(second, part, len(low))) / lumped
+    forward = np.minimum(up[first], down[second])
+    backward = np.minimum(down[first], up[second])
+    part = np.where(flux > 0, forward, backward) * flux
+    gain = np.bincount(first, part, len(low)) - np.bincount(second, part, len(low))
+    return low + gain / lumped
 
 
-def _pieces(points, triangles, new_points, new_triangles):
-    """Common pieces: corners (p, 3, 2), old and new triangle (p,) of each, and areas (p,)."""
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """Common pieces of two meshes. corners: (p, 3, 2) um; old, new: (p,) triangle that each is a
+    part of; area: (p,) um2."""
+
+    corners: np.ndarray
+    old: np.ndarray
+    new: np.ndarray
+    area: np.ndarray
+
+
+def _pieces(points: np.ndarray, triangles: np.ndarray, new_points: np.ndarray,
+            new_triangles: np.ndarray) -> Pieces:
+    """Raises TransferError where the two meshes do not cover the same area."""
     corners, old, new = supermesh(points, triangles, new_points, new_triangles)
     edge = corners[:, 1:] - corners[:, :1]
     area = 0.5 * np.abs(edge[:, 0, 0] * edge[:, 1, 1] - edge[:, 0, 1] * edge[:, 1, 0])
-    areas = [triangle_areas(p, t).sum() for p, t in ((points, triangles), (new_points, new_triangles))]
-    if max(abs(area.sum() / a - 1) for a in areas) > COVER:
-        raise TransferError(f"the old mesh covers {areas[0]:.12g} um2, the new one {areas[1]:.12g} um2, "
-                            f"their common pieces {area.sum():.12g} um2; try a shorter growth.time_step")
-    return corners, old, new, area
+    before = triangle_areas(points, triangles).sum()
+    after = triangle_areas(new_points, new_triangles).sum()
+    if max(abs(area.sum() / before - 1), abs(area.sum() / after - 1)) > COVER:
+        raise TransferError(f"the old mesh covers {before:.12g} um2, the new one {after:.12g} um2, "
+                            f"their common pieces {area.sum():.12g} um2; "
+                            "try a shorter growth.time_step")
+    return Pieces(corners, old, new, area)
 
 
-def _loads(pieces, points, triangles, fields, new_points, new_triangles) -> np.ndarray:
+def _loads(pieces: Pieces, points: np.ndarray, triangles: np.ndarray, fields: np.ndarray,
+           new_points: np.ndarray, new_triangles: np.ndarray) -> np.ndarray:
     """(K, m) integrals of the old fields times each new nodal function."""
-    corners, old, new, area = pieces
-    middles = 0.5 * (corners + np.roll(corners, -1, axis=1))
-    old_weight = barycentric(np.repeat(points[triangles[old]][:, None], 3, 1), middles)
-    new_weight = barycentric(np.repeat(new_points[new_triangles[new]][:, None], 3, 1), middles)
-    values = np.einsum("pqa,pam->pqm", old_weight, fields[triangles[old]])
-    load = np.einsum("p,pqa,pqm->pam", area / 3, new_weight, values)
+    old = triangles[pieces.old]
+    new = new_triangles[pieces.new]
+    middles = 0.5 * (pieces.corners + np.roll(pieces.corners, -1, axis=1))
+    old_weight = barycentric(np.repeat(points[old][:, None], 3, 1), middles)
+    new_weight = barycentric(np.repeat(new_points[new][:, None], 3, 1), middles)
+    values = np.einsum("pqa,pam->pqm", old_weight, fields[old])
+    load = np.einsum("p,pqa,pqm->pam", pieces.area / 3, new_weight, values)
     right = np.zeros((len(new_points), fields.shape[1]))
-    np.add.at(right, new_triangles[new], load)
+    np.add.at(right, new, load)
     return right
 
 
@@ -286,7 +323,8 @@ def _solve_mass(points: np.ndarray, triangles: np.ndarray, right: np.ndarray) ->
     right side; every node has a triangle."""
     rank = np.argsort(linear.node_order(len(points), triangles))
     system = ElementSystem(triangles, rank, np.zeros(len(points), bool))
-    solver, solution = linear.Solver(system.matrix(mass(triangle_areas(points, triangles)))), np.empty_like(right)
+    solver = linear.Solver(system.matrix(mass(triangle_areas(points, triangles))))
+    solution = np.empty_like(right)
     for column, load in enumerate(right.T):
         solution[system.order, column] = solver.solve(load[system.order])
     return solution

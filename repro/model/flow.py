@@ -38,6 +38,7 @@ from repro.fem.assembly import ElementSystem, each, saddle_blocks, saddle_system
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
 from repro.scene import Flow as Drive
+from repro.scene import needed
 from repro.timing import timed
 
 
@@ -121,10 +122,12 @@ def viscous(velocity: Space, viscosity: np.ndarray, interface: str) -> np.ndarra
     laplace = each(viscosity, velocity.stiffness)
     if interface == "laplacian":
         return laplace
-    at, k = velocity.gradients_at, velocity.cells.shape[1]
+    at = velocity.gradients_at
+    k = velocity.cells.shape[1]
     weight = (viscosity[:, None] * at.dx)[:, None, :]
     found = np.zeros((len(laplace), 2 * k, 2 * k))
-    for i, j in np.ndindex(2, 2):  # nu u_j,i v_i,j: rows of component i of v, columns of component j of u
+    # nu u_j,i v_i,j: rows of component i of v, columns of component j of u.
+    for i, j in np.ndindex(2, 2):
         test, trial = at.slopes[:, :, j], at.slopes[:, :, i]
         found[:, i * k: i * k + k, j * k: j * k + k] = (weight * np.swapaxes(test, 1, 2)) @ trial
     for first in (0, k):
@@ -144,26 +147,30 @@ def unit_flow(velocity: Space, viscosity_ratio: float, *, interface: str = "lapl
     viscosity = np.where(mesh.biomass, viscosity_ratio, 1.0)
     mobility = element.mobility(mesh, viscosity, interface) if velocity.order == 1 else None
     blocks = stokes(velocity, viscosity, interface, mobility)
-    system = mesh.topology.system(("flow", interface, velocity.order), lambda: _system(velocity, interface))
+    system = mesh.topology.system(("flow", interface, velocity.order),
+                                  lambda: _system(velocity, interface))
     value = prescribed(velocity)
     found = system.solve(blocks, np.zeros(len(value)), value)
     n = velocity.count
-    u, pressure = found[: 2 * n].reshape(2, n).T, found[2 * n:]
+    u = found[: 2 * n].reshape(2, n).T
+    pressure = found[2 * n:]
     if mobility is None:
         return UnitFlow(u, pressure, None, work(system, blocks, found, value, mesh.width))
     slope = np.einsum("tai,ta->ti", mesh.gradients, pressure[mesh.triangles])
-    return UnitFlow(u, pressure, np.einsum("tij,tj->ti", mobility, slope), _drop(pressure_space(velocity), pressure))
+    correction = np.einsum("tij,tj->ti", mobility, slope)
+    return UnitFlow(u, pressure, correction, _drop(pressure_space(velocity), pressure))
 
 
-def stokes(velocity: Space, viscosity: np.ndarray, interface: str, mobility: np.ndarray | None) -> np.ndarray:
+def stokes(velocity: Space, viscosity: np.ndarray, interface: str,
+           mobility: np.ndarray | None) -> np.ndarray:
     """(T, 2k + m, 2k + m) element matrices of the whole system.
 
     viscosity: (T,) nu_r; mobility: (T, 2, 2) um2, tau.
     """
     lower = None
     if mobility is not None:
-        slopes, mesh = velocity.mesh.gradients, velocity.mesh
-        lower = each(mesh.areas, slopes @ mobility @ np.swapaxes(slopes, 1, 2))
+        slopes = velocity.mesh.gradients
+        lower = each(velocity.mesh.areas, slopes @ mobility @ np.swapaxes(slopes, 1, 2))
     return saddle_blocks(viscous(velocity, viscosity, interface), divergence(velocity), lower)
 
 
@@ -175,15 +182,17 @@ def _system(velocity: Space, interface: str) -> ElementSystem:
     held[np.concatenate([dofs.walls, velocity.end_nodes(dofs.inlet)])] = True
     if interface == "traction":
         held[velocity.end_nodes(dofs.outlet), 1] = True
-    pressure, method = pressure_space(velocity).cells, velocity.mesh.topology.method
-    return saddle_system(velocity.cells, pressure, held, dofs.elimination, method)
+    pressure = pressure_space(velocity).cells
+    return saddle_system(velocity.cells, pressure, held, dofs.elimination,
+                         velocity.mesh.topology.method)
 
 
 def prescribed(velocity: Space) -> np.ndarray:
     """(2n + m,) values of the constrained unknowns: u_x at the inlet (3), the parabola scaled so
     that the discrete flux is exactly u_ave W. Between the nodes of linear triangles the parabola is
     cut by its chords, which lose 1 / n^2 of the flux; higher orders hold it exactly."""
-    dofs, width = velocity.dofs, velocity.mesh.width
+    dofs = velocity.dofs
+    width = velocity.mesh.width
     value = np.zeros(2 * velocity.count + pressure_space(velocity).count)
     nodes = velocity.end_nodes(dofs.inlet)
     share = velocity.points[nodes, 1] / width
@@ -193,7 +202,8 @@ def prescribed(velocity: Space) -> np.ndarray:
     return value
 
 
-def work(system: ElementSystem, blocks: np.ndarray, found: np.ndarray, value: np.ndarray, width: float) -> float:
+def work(system: ElementSystem, blocks: np.ndarray, found: np.ndarray, value: np.ndarray,
+         width: float) -> float:
     """Loss (1/um) as the work of the inlet per unit flux: (6) where the flow is developed, and of
     the order of the energy, twice that of the velocity's gradient."""
     return float(system.product(blocks, value) @ found) / width
@@ -201,7 +211,8 @@ def work(system: ElementSystem, blocks: np.ndarray, found: np.ndarray, value: np
 
 def _drop(space: Space, pressure: np.ndarray) -> float:
     """Mean pressure at the inlet less the mean at the outlet (6)."""
-    return space.mean_over(space.dofs.inlet, pressure) - space.mean_over(space.dofs.outlet, pressure)
+    at_inlet = space.mean_over(space.dofs.inlet, pressure)
+    return at_inlet - space.mean_over(space.dofs.outlet, pressure)
 
 
 def scaled(unit: UnitFlow, mesh: Mesh, length: float, drive: Drive) -> Flow:
@@ -211,10 +222,11 @@ def scaled(unit: UnitFlow, mesh: Mesh, length: float, drive: Drive) -> Flow:
     whole = unit.loss + poiseuille_loss(length - (mesh.ends[1] - mesh.ends[0]), mesh.width)
     speed = drive.mean_velocity
     if speed is None:
-        speed = drive.head / (viscosity * whole)
+        speed = needed(drive.head, "flow.head") / (viscosity * whole)
     scale = viscosity * speed
     linear = Space(mesh, 1)
-    head = scale * (unit.pressure - linear.mean_over(linear.dofs.outlet, unit.pressure[: mesh.corners]))
+    at_outlet = linear.mean_over(linear.dofs.outlet, unit.pressure[: mesh.corners])
+    head = scale * (unit.pressure - at_outlet)
     correction = None if unit.correction is None else speed * unit.correction
     return Flow(speed, speed * unit.velocity, head, correction, scale * unit.loss, scale * whole,
                 length / (viscosity * whole))

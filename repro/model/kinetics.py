@@ -17,15 +17,18 @@ zero: it stays monotone.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 
 from repro.scene import Kinetics, Substrates
 
-Slopes = tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+#: A number, or an array of them: results are shaped alike.
+Values = TypeVar("Values", np.ndarray, float)
+Slopes: TypeAlias = tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
-def monod(concentration, half_saturation: float):
+def monod(concentration: Values, half_saturation: float) -> tuple[Values, Values]:
     """m = C / (C + K) and dm/dC for C >= 0 (mg/L); below zero their tangent at zero, C / K and
     1 / K."""
     bounded = np.maximum(concentration, 0.0) + half_saturation
@@ -37,46 +40,59 @@ def decay_demand(kinetics: Kinetics) -> float:
     return kinetics.decay_oxygen_demand * kinetics.degradable_fraction * kinetics.decay_coefficient
 
 
-def fractions(acceptor, donor, substrates: Substrates):
+def fractions(acceptor: Values, donor: Values, substrates: Substrates) -> tuple[Values, Values]:
     """m_A and m_D of max(C, 0)."""
     return (monod(np.maximum(acceptor, 0.0), substrates.acceptor.half_saturation)[0],
             monod(np.maximum(donor, 0.0), substrates.donor.half_saturation)[0])
 
 
-def uptake(acceptor, donor, substrates: Substrates, kinetics: Kinetics, extended: bool = False):
+def uptake(acceptor: Values, donor: Values, substrates: Substrates, kinetics: Kinetics,
+           extended: bool = False) -> tuple[Values, Values]:
     """Uptake per active biomass (1/h): -F1/X_A and -F2/X_A at C_A and C_D (mg/L).
 
     extended: goes on linearly below zero, see the module's docstring.
     """
     if not extended:
         return _of_fractions(*fractions(acceptor, donor, substrates), kinetics)
-    m_a, m_d = (monod(c, s.half_saturation)[0]
-                for c, s in zip((acceptor, donor), (substrates.acceptor, substrates.donor)))
-    k, demand = kinetics.maximum_utilization_rate, kinetics.acceptor_to_donor_ratio
-    return m_a * (k * demand * np.maximum(m_d, 0.0) + decay_demand(kinetics)), k * np.maximum(m_a, 0.0) * m_d
+    m_a = monod(acceptor, substrates.acceptor.half_saturation)[0]
+    m_d = monod(donor, substrates.donor.half_saturation)[0]
+    k = kinetics.maximum_utilization_rate
+    demand = kinetics.acceptor_to_donor_ratio
+    per_acceptor = k * demand * np.maximum(m_d, 0.0) + decay_demand(kinetics)
+    return m_a * per_acceptor, k * np.maximum(m_a, 0.0) * m_d
 
 
-def uptake_slopes(acceptor, donor, substrates: Substrates, kinetics: Kinetics, extended: bool = False) -> Slopes:
+def uptake_slopes(acceptor: np.ndarray, donor: np.ndarray, substrates: Substrates,
+                  kinetics: Kinetics, extended: bool = False) -> Slopes:
     """Derivatives of :func:`uptake`: ((dq_A/dC_A, dq_A/dC_D), (dq_D/dC_A, dq_D/dC_D)), 1/h per
     mg/L."""
-    (m_a, d_a), (m_d, d_d) = (monod(c, s.half_saturation)
-                              for c, s in zip((acceptor, donor), (substrates.acceptor, substrates.donor)))
-    k, demand = kinetics.maximum_utilization_rate, kinetics.acceptor_to_donor_ratio
-    other_a, cross_a = np.maximum(m_a, 0.0), np.where(acceptor > 0, d_a, 0.0)
-    other_d, cross_d = np.maximum(m_d, 0.0), np.where(donor > 0, d_d, 0.0)
+    m_a, d_a = monod(acceptor, substrates.acceptor.half_saturation)
+    m_d, d_d = monod(donor, substrates.donor.half_saturation)
+    k = kinetics.maximum_utilization_rate
+    demand = kinetics.acceptor_to_donor_ratio
+    other_a = np.maximum(m_a, 0.0)
+    other_d = np.maximum(m_d, 0.0)
+    cross_a = np.where(acceptor > 0, d_a, 0.0)
+    cross_d = np.where(donor > 0, d_d, 0.0)
     if not extended:
-        m_a, m_d, d_a, d_d = other_a, other_d, cross_a, cross_d
+        m_a, d_a = other_a, cross_a
+        m_d, d_d = other_d, cross_d
     per_acceptor = k * demand * other_d + decay_demand(kinetics)
-    return ((d_a * per_acceptor, m_a * k * demand * cross_d), (k * cross_a * m_d, k * other_a * d_d))
+    of_acceptor = d_a * per_acceptor, m_a * k * demand * cross_d
+    of_donor = k * cross_a * m_d, k * other_a * d_d
+    return of_acceptor, of_donor
 
 
-def growth_rate(acceptor, donor, substrates: Substrates, kinetics: Kinetics):
+def growth_rate(acceptor: Values, donor: Values, substrates: Substrates,
+                kinetics: Kinetics) -> Values:
     """F3 / X_A (1/h), net growth of active biomass (9)."""
     m_a, m_d = fractions(acceptor, donor, substrates)
-    return m_a * (kinetics.maximum_utilization_rate * kinetics.yield_coefficient * m_d - kinetics.decay_coefficient)
+    most = kinetics.maximum_utilization_rate * kinetics.yield_coefficient
+    return m_a * (most * m_d - kinetics.decay_coefficient)
 
 
-def growth_slopes(acceptor, donor, substrates: Substrates, kinetics: Kinetics):
+def growth_slopes(acceptor: np.ndarray, donor: np.ndarray, substrates: Substrates,
+                  kinetics: Kinetics) -> tuple[np.ndarray, np.ndarray]:
     """Its derivatives by C_A and C_D (1/h per mg/L)."""
     m_a, m_d = fractions(acceptor, donor, substrates)
     d_a = np.where(acceptor > 0, monod(acceptor, substrates.acceptor.half_saturation)[1], 0.0)
@@ -85,22 +101,24 @@ def growth_slopes(acceptor, donor, substrates: Substrates, kinetics: Kinetics):
     return d_a * (most * m_d - kinetics.decay_coefficient), m_a * most * d_d
 
 
-def inert_rate(acceptor, substrates: Substrates, kinetics: Kinetics):
+def inert_rate(acceptor: Values, substrates: Substrates, kinetics: Kinetics) -> Values:
     """F4 / X_A (1/h), inert remains left by decay (10)."""
     m_a = monod(np.maximum(acceptor, 0.0), substrates.acceptor.half_saturation)[0]
     return m_a * kinetics.decay_coefficient * (1 - kinetics.degradable_fraction)
 
 
-def mean_growth(exponent):
+def mean_growth(exponent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(e^z - 1) / z, the mean over a step of what grows by e^z in it; and its derivative by z."""
-    zero, small = exponent == 0, np.abs(exponent) < 1e-4
+    zero = exponent == 0
+    small = np.abs(exponent) < 1e-4
     z = np.where(zero, 1.0, exponent)
     mean = np.where(zero, 1.0, np.expm1(z) / z)
     slope = np.where(small, 0.5 + exponent / 3, (np.exp(z) - mean) / z)
     return mean, slope
 
 
-def grow(active, inert, growth, remains, step: float):
+def grow(active: np.ndarray, inert: np.ndarray, growth: np.ndarray, remains: np.ndarray,
+         step: float) -> tuple[np.ndarray, np.ndarray]:
     """(9)-(10) integrated exactly over a step (h) at constant rates: X_A grows by exp(growth step).
 
     active, inert: X_A, X_I, mg/L, or masses of them; growth, remains: F3/X_A and F4/X_A (1/h).
@@ -132,16 +150,20 @@ class Sink:
 
     def uptake(self, fractions: np.ndarray, kinetics: Kinetics) -> np.ndarray:
         """(r, 2, q) um2 mg/L/h, taken up of the acceptor and of the donor."""
-        rates = np.stack(_of_fractions(*fractions, kinetics), axis=1)
-        mass = self.active if self.duration == 0 else self.active * mean_growth(self._exponent(fractions, kinetics))[0]
-        return mass[:, None] * rates
+        m_a, m_d = fractions
+        mass = self.active
+        if self.duration > 0:
+            mass = self.active * mean_growth(self._exponent(fractions, kinetics))[0]
+        return mass[:, None] * np.stack(_of_fractions(m_a, m_d, kinetics), axis=1)
 
     def slopes(self, fractions: np.ndarray, kinetics: Kinetics) -> np.ndarray:
         """(2, 2, r, q) um2 mg/L/h, derivatives of :meth:`uptake`, of acceptor and donor, by m_A and
         m_D."""
         m_a, m_d = fractions
-        k, demand = kinetics.maximum_utilization_rate, kinetics.acceptor_to_donor_ratio
-        by = np.stack([[k * demand * m_d + decay_demand(kinetics), k * demand * m_a], [k * m_d, k * m_a]])
+        k = kinetics.maximum_utilization_rate
+        demand = kinetics.acceptor_to_donor_ratio
+        of_acceptor = [k * demand * m_d + decay_demand(kinetics), k * demand * m_a]
+        by = np.stack([of_acceptor, [k * m_d, k * m_a]])
         if self.duration == 0:
             return self.active * by
         most = k * kinetics.yield_coefficient
@@ -151,7 +173,8 @@ class Sink:
         return self.active * (mean * by + rise * rates[:, None] * growth[None])
 
 
-def _of_fractions(m_a, m_d, kinetics: Kinetics):
+def _of_fractions(m_a: Values, m_d: Values, kinetics: Kinetics) -> tuple[Values, Values]:
     """Uptake of acceptor and donor per active biomass (1/h)."""
     k = kinetics.maximum_utilization_rate
-    return m_a * (k * kinetics.acceptor_to_donor_ratio * m_d + decay_demand(kinetics)), k * m_a * m_d
+    per_acceptor = k * kinetics.acceptor_to_donor_ratio * m_d + decay_demand(kinetics)
+    return m_a * per_acceptor, k * m_a * m_d

@@ -32,25 +32,28 @@ from repro.fem.space import Space
 from repro.model import kinetics as kinetics_law
 from repro.model.flow import Flow
 from repro.model.kinetics import Sink
-from repro.scene import Kinetics, Substrate, Substrates
+from repro.scene import Kinetics, Substrate, Substrates, needed
 from repro.timing import timed
 
-#: Newton stops at this residual against the size of its terms, or at the second where round-off
-#: keeps it from falling.
-NEWTON, ROUND_OFF, MOST_ITERATIONS = 1e-13, 1e-12, 60
+#: Newton's method stops at this residual against the size of its terms.
+NEWTON = 1e-13
+#: Or at this one, where round-off keeps it from falling.
+ROUND_OFF = 1e-12
+MOST_ITERATIONS = 60
 #: No fraction m is larger than this in an iterate, so that C = K m / (1 - m) is finite.
 SATURATED = 0.9
 #: Above this fraction uptake is linearised about the concentration itself.
 SWITCH = 0.5
 #: A concentration below zero by more than this part of its supply is not resolved.
 UNRESOLVED = 1e-3
+#: Neither is one above its supply by more than this part of it.
+OVERSHOOT = 0.02
 #: Neither is uptake where a quadrature of a degree higher by FINER differs by more than this. The
 #: difference is of the same concentrations, which have not come to rest with the finer one: in base
 #: with fronts of half saturations from 1e-1 to 1e-6 of the supply, biomass made in 2 h was wrong by
 #: a hundredth of the largest difference or less.
-APART, FINER = 0.05, 3
-#: Neither is one above its supply by more than this part of it.
-OVERSHOOT = 0.02
+APART = 0.05
+FINER = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,25 +110,40 @@ def problem(space: Space, flow: Flow | None, substrates: Substrates, kinetics: K
 
     inlet: "local" or "mean", u_x or u_ave in (11); reused: as :class:`Problem`'s.
     """
-    kinds, dofs = (substrates.acceptor, substrates.donor), space.dofs
-    carried, source = np.zeros((1, 1, 1)), np.zeros(space.count)
-    inflow, outflow = np.zeros(space.count), np.zeros(space.count)
-    if flow is not None:
-        u_x = flow.velocity[:, 0]
-        enters = u_x if inlet == "local" else np.full(space.count, flow.mean_velocity)
-        inflow = space.summed(dofs.inlet, space.end_loads(dofs.inlet, u_x))
-        outflow = space.summed(dofs.outlet, space.end_loads(dofs.outlet, u_x))
-        source = space.summed(dofs.inlet, space.end_loads(dofs.inlet, enters))
-        carried = advection(space, flow, enters)
-    spread = [np.where(space.mesh.biomass, s.diffusivity_in_aggregate, s.diffusivity) for s in kinds]
-    matrices = each(spread[0], space.stiffness) + carried, each(spread[1], space.stiffness) + carried
+    topology = space.mesh.topology
+    kinds = substrates.acceptor, substrates.donor
+    carried, source, inflow, outflow = _through(space, flow, inlet)
+    acceptor, donor = (diffusion(space, kind) + carried for kind in kinds)
     held = flow is None and substrates.boundary == "open"
-    operator = space.mesh.topology.system(("both", space.order), lambda: _apart(space)).matrix(matrices)
-    system = space.mesh.topology.system(("transport", space.order, held), lambda: _system(space, held))
+    apart = topology.system(("both", space.order), lambda: _apart(space))
+    operator = apart.matrix((acceptor, donor))
+    system = topology.system(("transport", space.order, held), lambda: _system(space, held))
     magnitude = copy(operator)
     magnitude.data = np.abs(operator.data)
-    return Problem(space, matrices, operator, magnitude, np.concatenate([s.supply * source for s in kinds]), inflow,
-                   outflow, system, substrates, kinetics, reused)
+    sources = np.concatenate([kind.supply * source for kind in kinds])
+    return Problem(space, (acceptor, donor), operator, magnitude, sources, inflow, outflow, system,
+                   substrates, kinetics, reused)
+
+
+def diffusion(space: Space, kind: Substrate) -> np.ndarray:
+    """(T, k, k) um2/h of (D grad C, grad v)."""
+    spread = np.where(space.mesh.biomass, kind.diffusivity_in_aggregate, kind.diffusivity)
+    return each(spread, space.stiffness)
+
+
+def _through(space: Space, flow: Flow | None,
+             inlet: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """What the flow carries (T, k, k), and the loads (n,) of the supply, of what flows in and of
+    what flows out, um2/h; zero without flow."""
+    if flow is None:
+        return np.zeros((1, 1, 1)), *np.zeros((3, space.count))
+    ends = space.dofs
+    u_x = flow.velocity[:, 0]
+    enters = u_x if inlet == "local" else np.full(space.count, flow.mean_velocity)
+    source = space.summed(ends.inlet, space.end_loads(ends.inlet, enters))
+    inflow = space.summed(ends.inlet, space.end_loads(ends.inlet, u_x))
+    outflow = space.summed(ends.outlet, space.end_loads(ends.outlet, u_x))
+    return advection(space, flow, enters), source, inflow, outflow
 
 
 def advection(space: Space, flow: Flow, enters: np.ndarray) -> np.ndarray:
@@ -133,13 +151,14 @@ def advection(space: Space, flow: Flow, enters: np.ndarray) -> np.ndarray:
     (n,) um/h, the speed of (11)."""
     if flow.correction is None:
         return _conserving(space, flow.velocity, enters)
-    return _by_divergence_free(space, flow, enters)
+    return _by_divergence_free(space, flow.velocity, flow.correction, enters)
 
 
 def _conserving(space: Space, velocity: np.ndarray, enters: np.ndarray) -> np.ndarray:
     """-(C u, grad v), u_x C v over the outlet, and (u_ave - u_x) C v over the inlet where (11)
     takes u_ave [E4]."""
-    at, dofs = space.at, space.dofs
+    at = space.at
+    dofs = space.dofs
     u_x, u_y = space.at_points(velocity.T) * -at.dx
     along = u_x[..., None] * at.slopes[:, :, 0]
     along += u_y[..., None] * at.slopes[:, :, 1]
@@ -150,14 +169,16 @@ def _conserving(space: Space, velocity: np.ndarray, enters: np.ndarray) -> np.nd
     return found
 
 
-def _by_divergence_free(space: Space, flow: Flow, enters: np.ndarray) -> np.ndarray:
+def _by_divergence_free(space: Space, velocity: np.ndarray, correction: np.ndarray,
+                        enters: np.ndarray) -> np.ndarray:
     """(w . grad C, v) with w = u - tau grad p, linear on each triangle, and, lumped, u_x C v over
     the inlet."""
-    mesh, dofs = space.mesh, space.dofs
-    w = flow.velocity[mesh.triangles] - flow.correction[:, None, :]
+    mesh = space.mesh
+    inlet = space.dofs.inlet
+    w = velocity[mesh.triangles] - correction[:, None, :]
     found = mass(mesh.areas) @ (w @ np.swapaxes(mesh.gradients, 1, 2))
-    loads = space.end_loads(dofs.inlet, enters)
-    _add_at(space, found, dofs.inlet, loads[:, :, None] * np.eye(loads.shape[1]))
+    loads = space.end_loads(inlet, enters)
+    _add_at(space, found, inlet, loads[:, :, None] * np.eye(loads.shape[1]))
     return found
 
 
@@ -170,8 +191,8 @@ def _add_at(space: Space, matrices: np.ndarray, edges: np.ndarray, blocks: np.nd
 def _apart(space: Space) -> ElementSystem:
     """Acceptor, then donor of all nodes in their own order, without their uptake."""
     count = 2 * space.count
-    return ElementSystem((space.cells, space.count + space.cells), np.arange(count), np.zeros(count, bool),
-                         space.mesh.topology.method)
+    return ElementSystem((space.cells, space.count + space.cells), np.arange(count),
+                         np.zeros(count, bool), space.mesh.topology.method)
 
 
 def _system(space: Space, held_ends: bool) -> ElementSystem:
@@ -183,8 +204,9 @@ def _system(space: Space, held_ends: bool) -> ElementSystem:
     held[both_ends(space)] = held_ends
     pieces = space.reaction.cells
     both = np.concatenate([pieces, space.count + pieces], axis=1)
-    return ElementSystem((space.cells, space.count + space.cells, both), np.concatenate([place, place + 0.5]),
-                         np.tile(held, 2), space.mesh.topology.method)
+    rank = np.concatenate([place, place + 0.5])
+    return ElementSystem((space.cells, space.count + space.cells, both), rank, np.tile(held, 2),
+                         space.mesh.topology.method)
 
 
 def both_ends(space: Space) -> np.ndarray:
@@ -251,15 +273,23 @@ class Balance:
         positive = np.maximum(concentrations, 0.0)
         return positive / (positive + self._half)
 
+    @property
+    def _law(self) -> Kinetics:
+        return needed(self.problem.kinetics, "[kinetics]")
+
     def _taken(self, loads: np.ndarray) -> np.ndarray:
         """(2n,) sum of loads (r, 2, q) times the nodal functions."""
-        pieces, count = self.problem.space.reaction, self.problem.space.count
-        nodes = np.stack([pieces.cells, count + pieces.cells], axis=1)
-        return np.bincount(nodes.ravel(), (loads @ pieces.values).ravel(), 2 * count)
+        return self._summed(loads @ self.problem.space.reaction.values)
+
+    def _summed(self, parts: np.ndarray) -> np.ndarray:
+        """(2n,) sum of the parts (r, 2, k) of each piece's nodes, for acceptor and donor."""
+        cells, count = self.problem.space.reaction.cells, self.problem.space.count
+        nodes = np.stack([cells, count + cells], axis=1)
+        return np.bincount(nodes.ravel(), parts.ravel(), 2 * count)
 
     def uptake(self, state: np.ndarray) -> np.ndarray:
         """(r, 2, q) um2 mg/L/h."""
-        return self.sink.uptake(self.fractions(self.at(state)), self.problem.kinetics)
+        return needed(self.sink, "a sink").uptake(self.fractions(self.at(state)), self._law)
 
     def residual(self, state: np.ndarray, loads: np.ndarray | None = None) -> np.ndarray:
         """(2n,) um2 mg/L/h for C_A, then C_D, of all nodes (2n,), mg/L; loads: the uptake, if it is
@@ -275,22 +305,21 @@ class Balance:
         found = self.problem.magnitude @ np.abs(state) + np.abs(self.problem.source)
         if self.sink is None:
             return found
-        pieces, count = self.problem.space.reaction, self.problem.space.count
-        nodes = np.stack([pieces.cells, count + pieces.cells], axis=1)
-        terms = np.abs(self.uptake(state) if loads is None else loads) @ np.abs(pieces.values)
-        return found + np.bincount(nodes.ravel(), terms.ravel(), 2 * count)
+        loads = self.uptake(state) if loads is None else loads
+        return found + self._summed(np.abs(loads) @ np.abs(self.problem.space.reaction.values))
 
     def _slopes(self, state: np.ndarray, fractions: np.ndarray) -> np.ndarray:
         """(2, r, q) dm/dC at the fractions; zero where nothing is there to be taken up."""
         empty = (fractions <= 0) & (self.at(state) <= 0)
         return np.where(empty, 0.0, (1 - fractions) ** 2 / self._half)
 
-    def tangent(self, state: np.ndarray, fractions: np.ndarray | None = None) -> tuple[np.ndarray, ...]:
+    def tangent(self, state: np.ndarray,
+                fractions: np.ndarray | None = None) -> tuple[np.ndarray, ...]:
         """Element matrices, um2/h, of the residual's derivative: both substrates, then uptake."""
         if self.sink is None:
             return *self.problem.matrices, self._coupled(None)
         about = self.fractions(self.at(state)) if fractions is None else fractions
-        by = self.sink.slopes(about, self.problem.kinetics)
+        by = self.sink.slopes(about, self._law)
         return *self.problem.matrices, self._coupled(by * self._slopes(state, about))
 
     def _coupled(self, slopes: np.ndarray | None) -> np.ndarray:
@@ -298,16 +327,19 @@ class Balance:
         pieces = self.problem.space.reaction
         count, k = pieces.cells.shape
         found = np.zeros((count, 2 * k, 2 * k))
-        if slopes is not None:
-            products = (pieces.values[:, :, None] * pieces.values[:, None, :]).reshape(len(pieces.values), -1)
-            for i, j in np.ndindex(2, 2):
-                found[:, i * k: i * k + k, j * k: j * k + k] = (slopes[i, j] @ products).reshape(count, k, k)
+        if slopes is None:
+            return found
+        products = pieces.values[:, :, None] * pieces.values[:, None, :]
+        for i, j in np.ndindex(2, 2):
+            block = slopes[i, j] @ products.reshape(-1, k * k)
+            found[:, i * k: i * k + k, j * k: j * k + k] = block.reshape(count, k, k)
         return found
 
     def begun(self, state: np.ndarray) -> Iterate:
         """The first iterate."""
         fractions = np.zeros((2, 1, 1)) if self.sink is None else self.fractions(self.at(state))
-        return Iterate(state, fractions, self.residual(state), self.sizes(state), self.problem.system.free)
+        return Iterate(state, fractions, self.residual(state), self.sizes(state),
+                       self.problem.system.free)
 
     def factored(self, iterate: Iterate) -> Factored:
         """The derivative, factorised."""
@@ -322,7 +354,7 @@ class Balance:
             return replace(iterate, state=state, residual=self.residual(state), size=size)
         there = self.at(state)
         own = self.fractions(there)
-        loads = self.sink.uptake(own, self.problem.kinetics)
+        loads = self.sink.uptake(own, self._law)
         size = self.sizes(state, loads) if fresh else iterate.size
         new = replace(iterate, state=state, residual=self.residual(state, loads), size=size)
         return self._followed(iterate, new, there, own)
@@ -331,9 +363,10 @@ class Balance:
         """(2n,) the residual with the uptake that the linearisation about the fractions gives."""
         if self.sink is None or iterate.own:
             return iterate.residual
-        m, law = iterate.fractions, self.problem.kinetics
+        m = iterate.fractions
         apart = self._predicted(iterate, iterate.state) - m
-        loads = self.sink.uptake(m, law) + np.einsum("ijrq,jrq->riq", self.sink.slopes(m, law), apart)
+        rise = np.einsum("ijrq,jrq->riq", self.sink.slopes(m, self._law), apart)
+        loads = self.sink.uptake(m, self._law) + rise
         return self.problem.operator @ iterate.state - self.problem.source + self._taken(loads)
 
     def _predicted(self, iterate: Iterate, state: np.ndarray) -> np.ndarray:
@@ -355,7 +388,8 @@ class Balance:
 
 
 @timed("transport")
-def steady(problem: Problem, sink: Sink | None, guess: Concentrations | None = None) -> Concentrations:
+def steady(problem: Problem, sink: Sink | None,
+           guess: Concentrations | None = None) -> Concentrations:
     """Steady concentrations by Newton's method on both substrates at once.
 
     sink: what takes them up, None without biomass; guess: at the problem's nodes, C_supply
@@ -374,10 +408,10 @@ def steady(problem: Problem, sink: Sink | None, guess: Concentrations | None = N
         found, count = _found(Balance(problem, sink), state)
     except TransportError:
         found, count = _eased(problem, sink, supply)
-    state = _checked(problem, found, count)
+    solution = _checked(problem, found, count)
     if sink is not None and problem.space.order > 1:
-        _refuse_unresolved(problem, sink, state)
-    return state
+        _refuse_unresolved(problem, sink, solution)
+    return solution
 
 
 def _found(balance: Balance, state: np.ndarray) -> tuple[np.ndarray, int]:
@@ -385,8 +419,9 @@ def _found(balance: Balance, state: np.ndarray) -> tuple[np.ndarray, int]:
     newton = Newton(NEWTON, ROUND_OFF, MOST_ITERATIONS, balance.problem.reused)
     last, count, converged = newton.solve(balance, balance.begun(state))
     if not converged:
-        raise TransportError(f"Newton's method for the substrates stands at a defect of {last.defect:.2g} after "
-                             f"{count} iterations; try a larger numerics.refinement")
+        raise TransportError("Newton's method for the substrates stands at a defect of "
+                             f"{last.defect:.2g} after {count} iterations; "
+                             "try a larger numerics.refinement")
     return last.state, count
 
 
@@ -396,7 +431,8 @@ def _eased(problem: Problem, sink: Sink | None, state: np.ndarray) -> tuple[np.n
     total = 0
     for factor in 10.0 ** np.arange(np.ceil(-np.log10(least)), -1, -1):
         acceptor, donor = (_softened(substrate, factor) for substrate in problem.both)
-        eased = replace(problem, substrates=replace(problem.substrates, acceptor=acceptor, donor=donor), reused=False)
+        softened = replace(problem.substrates, acceptor=acceptor, donor=donor)
+        eased = replace(problem, substrates=softened, reused=False)
         state, iterations = _found(Balance(eased, sink), state)
         total += iterations
     return state, total
@@ -423,29 +459,34 @@ def _refuse_unresolved(problem: Problem, sink: Sink, state: Concentrations) -> N
     """Raises Unresolved where two quadratures of the uptake differ by more than APART."""
     apart = quadrature_error(problem, sink, state)
     if apart > APART:
-        raise Unresolved(f"two quadratures of the uptake differ by {100 * apart:.2g} % (up to {100 * APART:g} % is "
-                         "accepted); the mesh is too coarse for the front in the aggregate")
+        raise Unresolved(f"two quadratures of the uptake differ by {100 * apart:.2g} % (up to "
+                         f"{100 * APART:g} % is accepted); the mesh is too coarse for the front in "
+                         "the aggregate")
 
 
 def quadrature_error(problem: Problem, sink: Sink, state: Concentrations) -> float:
     """How much the donor taken up differs, relatively, by a finer quadrature of the same
     concentrations; biomass as it is, its density linear in each triangle."""
-    space, mesh = problem.space, problem.mesh
+    space = problem.space
+    mesh = problem.mesh
     of = elements.table(space.order, mesh.geometry, elements.DEGREES[space.order] + FINER)
     corners = mesh.points[mesh.cells[mesh.biomass]]
-    densities = sink.active / space.reaction.dx @ np.linalg.pinv(space.table.linear).T @ of.linear.T
+    fit = np.linalg.pinv(space.table.linear).T
+    densities = sink.active / space.reaction.dx @ fit @ of.linear.T
     both = np.stack([state.acceptor, state.donor])
     acceptor, donor = both[:, space.cells[mesh.biomass]] @ of.values.T
-    rate = kinetics_law.uptake(acceptor, donor, problem.substrates, problem.kinetics)[1]
+    kinetics = needed(problem.kinetics, "[kinetics]")
+    rate = kinetics_law.uptake(acceptor, donor, problem.substrates, kinetics)[1]
     finer = float(np.vdot(densities * elements.weights(corners, of), rate))
     own = float(Balance(problem, Sink(sink.active)).uptake(both.ravel())[:, 1].sum())
     return abs(finer - own) / own if own else 0.0
 
 
-def _outside(problem: Problem, name: str, field: np.ndarray, node: int, substrate: Substrate) -> Unresolved:
+def _outside(problem: Problem, name: str, field: np.ndarray, node: int,
+             substrate: Substrate) -> Unresolved:
     x, y = problem.space.points[node]
-    return Unresolved(f"the {name} is {field[node]:.3g} mg/L at x = {x:.4g}, y = {y:.4g} um, outside of 0 to "
-                      f"{substrate.supply:g} mg/L; the mesh is too coarse there")
+    return Unresolved(f"the {name} is {field[node]:.3g} mg/L at x = {x:.4g}, y = {y:.4g} um, "
+                      f"outside of 0 to {substrate.supply:g} mg/L; the mesh is too coarse there")
 
 
 @dataclass(frozen=True)
@@ -464,17 +505,19 @@ class Fluxes:
 def fluxes(problem: Problem, sink: Sink | None, state: Concentrations) -> tuple[Fluxes, Fluxes]:
     """Ledger of the acceptor and of the donor in one geometry: supplied and out from the ends,
     consumed from the uptake at the state."""
-    space, both = problem.space, np.stack([state.acceptor, state.donor])
-    consumed, out = np.zeros(2), both @ problem.outflow
+    dofs = problem.space.dofs
+    both = np.stack([state.acceptor, state.donor])
+    out = both @ problem.outflow
+    consumed = np.zeros(2)
     if sink is not None and problem.kinetics is not None:
         consumed = Balance(problem, sink).uptake(both.ravel()).sum(axis=(0, 2))
     supplied = problem.source.reshape(2, -1).sum(axis=1)
     if problem.system.held.any():
         through = (problem.operator @ both.ravel()).reshape(2, -1)
-        supplied = through[:, both_ends(space)].sum(axis=1)
-    means = [_end_means(space, both, edges, load) for edges, load in
-             ((space.dofs.inlet, problem.inflow), (space.dofs.outlet, problem.outflow))]
-    acceptor, donor = np.column_stack([supplied, out, consumed, *means]).tolist()
+        supplied = through[:, both_ends(problem.space)].sum(axis=1)
+    enters = _end_means(problem.space, both, dofs.inlet, problem.inflow)
+    leaves = _end_means(problem.space, both, dofs.outlet, problem.outflow)
+    acceptor, donor = np.column_stack([supplied, out, consumed, enters, leaves]).tolist()
     return Fluxes(*acceptor), Fluxes(*donor)
 
 

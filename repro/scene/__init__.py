@@ -5,6 +5,7 @@
     exact     the units that scenes use, as exact fractions
     reading   tables of a TOML file into dataclasses, and back
     rules     what keys ask of each other
+    needed    sections that the physics at hand cannot be without
     files     TOML files, packaged scenes, ``--set``
     text      a scene as a TOML text with every key explained
     packaged  the packaged scenes
@@ -33,9 +34,10 @@ from repro.scene.keys import (
     scene_hash,
     scene_tables,
 )
+from repro.scene.needed import MissingError, needed
 from repro.scene.units import SceneError
 
 __all__ = ["KEYS", "OURS", "PRESETS", "Acceptor", "Aggregate", "Donor", "Flow", "Growth",
-           "Kinetics", "Numerics", "Output", "Pore", "Scene", "SceneError", "Substrate",
-           "Substrates", "load_scene", "load_tables", "packaged_scenes", "parse_scene",
+           "Kinetics", "MissingError", "Numerics", "Output", "Pore", "Scene", "SceneError", "Substrate",
+           "Substrates", "load_scene", "load_tables", "needed", "packaged_scenes", "parse_scene",
            "scene_hash", "scene_tables"]

@@ -70,7 +70,7 @@ def _unround(instant, area: float) -> float:
       norm="relative error of area and mass; largest deviation of the outline from a half-disc",
       claim="Where diffusion holds the supply everywhere the midpoint rule keeps a half-disc of exactly exp-growing "
             "mass through remeshes, in few long steps",
-      mutants=("curved-expansion-forgotten", "curved-mass-lost", "curved-half-of-the-half"))
+      mutants=("theta-power", "curved-mass-lost", "curved-half-of-the-half"))
 def long_steps() -> Outcome:
     return Outcome(tuple(check for elements in runs.ELEMENTS for check in _by_midpoints(elements)))
 

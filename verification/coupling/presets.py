@@ -111,7 +111,7 @@ def _listed(preset: str, *changes: str) -> np.ndarray:
       norm="largest difference at 19.2 and 19.4 h to an independent solver, extrapolated in space and time: relative, "
            "of effluents over the supply",
       claim="Each of the eight numbers of base is within 1 % with preset fast, and within 0.1 % with preset accurate",
-      mutants=("curved-rates-of-the-start", "curved-fluid-diffusivity", "paired-without-decay"))
+      mutants=("curved-rates-of-the-start", "fluid-diffusivity", "uptake-without-decay"))
 def presets() -> Outcome:
     theirs, error = _reference()
     checks = [at_most("the reference itself", error, 2e-4, "a fifth of what is asked of accurate")]

@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 
 from repro.fem.mesh import Mesh, curved
+from repro.fem.newton import relative
 from repro.fem.outline import FREE, Outline, slopes
 from repro.fem.space import Space
 from repro.model import contact, flow, growth, mesh_motion, pore, traction
@@ -195,10 +196,11 @@ def _defects(elements: str, factor: float) -> tuple[float, float]:
         cells = body.shape.cells
         stabilising = growth.gradient_stabilisation(now.mesh.points[nodes], cells, np.ones(len(cells)))
     place, pressure = found.mesh.points[nodes], found.pressure[now.mesh.topology.body_corners]
+    rest = growth.System(body, held, stabilising=stabilising).under(theta, place, place, pressure)
     for around in (found, now):
         forces = traction.forces(said, traction.surroundings(said, now, around), around)
-        system = growth.System(body, held, stabilising=stabilising, forces=forces)
-        defects.append(system.under(theta, place, place, pressure).defect)
+        load = np.concatenate([forces.T.ravel(), np.zeros(len(pressure))])
+        defects.append(relative((rest.residual - load)[rest.free], (rest.size + np.abs(load))[rest.free]))
     return tuple(defects)
 
 

@@ -70,45 +70,87 @@ def _along(F, P, G):
 @case("growth-differences", kind="property", norm="largest difference to central differences, by the step",
       claim="Stress is the derivative of the energy, the tangent that of the stress, and the element tangent that of "
             "the residual: by finite differences",
-      mutants=("third-power", "tangent-coefficient", "one-corner-pressure"))
+      mutants=("third-power", "tangent-coefficient", "element-tangent-coefficient", "one-corner-pressure"))
 def differences() -> Outcome:
     F, P, G = _near_one()
     stress, slope = np.sum(growth.piola(F, P) * G, axis=(1, 2)), _along(F, P, G)
-    linear, residual = _body_slope()
     errors = {"energy": [np.abs((_potential(F + s * G, P) - _potential(F - s * G, P)) / (2 * s) - stress).max()
                          for s in STEPS],
               "stress": [np.abs((growth.piola(F + s * G, P) - growth.piola(F - s * G, P)) / (2 * s) - slope).max()
-                         for s in STEPS],
-              "residual": [np.abs((residual(s) - residual(-s)) / (2 * s) - linear).max() for s in STEPS]}
+                         for s in STEPS]}
+    for kind in bodies.KINDS[:2]:
+        linear, residual = _body_slope(kind)
+        errors[f"residual, {bodies.WORDS[kind]}"] = [np.abs((residual(s) - residual(-s)) / (2 * s) - linear).max()
+                                                     for s in STEPS]
     return Outcome(studies=tuple(study(name, STEPS, found, 2, CENTRAL) for name, found in errors.items()))
 
 
 @case("growth-taylor", kind="property", norm="remainder of a first-order Taylor expansion over the size of the step",
       claim="Stress is the derivative of the energy, the tangent that of the stress, and the element tangent that of "
             "the residual: by Taylor remainders",
-      mutants=("tangent-coefficient", "one-corner-pressure"))
+      mutants=("tangent-coefficient", "element-tangent-coefficient", "one-corner-pressure"))
 def taylor() -> Outcome:
     F, P, G = _near_one()
     stress, slope = np.sum(growth.piola(F, P) * G, axis=(1, 2)), _along(F, P, G)
-    linear, residual = _body_slope()
     errors = {"energy": [np.abs(_potential(F + s * G, P) - _potential(F, P) - s * stress).max() for s in STEPS],
-              "stress": [np.abs(growth.piola(F + s * G, P) - growth.piola(F, P) - s * slope).max() for s in STEPS],
-              "residual": [np.abs(residual(s) - residual(0.0) - s * linear).max() for s in STEPS]}
+              "stress": [np.abs(growth.piola(F + s * G, P) - growth.piola(F, P) - s * slope).max() for s in STEPS]}
+    for kind in bodies.KINDS[:2]:
+        linear, residual = _body_slope(kind)
+        errors[f"residual, {bodies.WORDS[kind]}"] = [np.abs(residual(s) - residual(0.0) - s * linear).max()
+                                                     for s in STEPS]
     return Outcome(studies=tuple(study(name, STEPS, found, 2, TAYLOR) for name, found in errors.items()))
 
 
-def _body_slope():
+def _body_slope(kind: int):
     """The discrete residual of a sheared half-disc in a random direction: its slope, and itself after a step."""
-    body, _ = bodies.half_disc(0.6)
-    theta, random = np.full(len(body.triangles), 1.2), np.random.default_rng(3)
+    body, _ = bodies.half_disc(0.6 if kind == 1 else 0.3, kind)
+    random = np.random.default_rng(3)
     position = body.reference @ np.array([[1.1, 0.1], [0.2, 1.2]])
-    pressure = random.standard_normal(len(position))
-    system = growth.System(body, growth.stabilisation(position, body.triangles, theta))
-    move, push = 0.3 * random.standard_normal(position.shape), random.standard_normal(len(position))
+    pressure = random.standard_normal(body.corners)
+    theta = random.uniform(1.1, 1.4, body.body.at.dx.shape)
+    system = bodies.system(body, position, theta)
+    system.under(theta, position, position, pressure)
+    move, push = 0.3 * random.standard_normal(position.shape), random.standard_normal(body.corners)
     direction = np.concatenate([move[:, 0], move[:, 1], push])
-    slopes = np.einsum("tij,tj->ti", system.tangent(position, pressure), direction[system.unknowns])
-    linear = np.bincount(system.unknowns.ravel(), slopes.ravel(), len(direction))
-    return linear, lambda s: system.residual(position + s * move, pressure + s * push, theta)[0]
+    linear = system.sparse.product(system.tangent(position, pressure), direction)
+    return linear, lambda s: system.residual(position + s * move, pressure + s * push)
+
+
+@case("growth-curved-taylor", kind="property", norm="remainder of a first-order Taylor expansion; largest difference "
+      "over the largest force",
+      claim="On straight triangles, and on curved ones with their inner edges bent, the element tangent is the "
+            "derivative of the residual, is symmetric, and the residual turns with the body",
+      mutants=("tangent-without-grad-div", "constraint-sign", "stress-transposed", "element-tangent-coefficient"))
+def curved_taylor() -> Outcome:
+    checks, studies = [], []
+    for kind in bodies.KINDS:
+        parts = _sheared_rectangle(kind)
+        checks += parts[0]
+        studies.append(parts[1])
+    return Outcome(tuple(checks), tuple(studies))
+
+
+def _sheared_rectangle(kind: int):
+    """Checks and the study of one kind of triangles."""
+    grid, side = bodies.rectangle(1.6, 4, kind)
+    body = bodies.on_mesh(grid, kind, grid.points, np.column_stack([side["left"], side["bottom"]]))
+    random, theta = np.random.default_rng(6), body.constant(1.4)
+    here = grid.points @ np.array([[1.2, 0.1], [0.2, 1.1]])
+    push, move = random.standard_normal(body.corners), 0.05 * random.standard_normal(here.shape)
+    more, steps = random.standard_normal(body.corners), 0.25 * 0.5 ** np.arange(4)
+    system = bodies.system(body, here, theta)
+    system.under(theta, here, here, push)
+    tangents, start = system.tangent(here, push), system.residual(here, push)
+    linear = system.sparse.product(tangents, np.concatenate([move[:, 0], move[:, 1], more]))
+    left = [np.abs(system.residual(here + s * move, push + s * more) - start - s * linear).max() for s in steps]
+    Q = np.array([[0.6, -0.8], [0.8, 0.6]])
+    turned, n = system.residual(here @ Q.T, push), 2 * len(here)
+    apart = np.abs(turned[:n].reshape(2, -1) - Q @ start[:n].reshape(2, -1)).max() / np.abs(start[:n]).max()
+    skew, told = np.abs(tangents - np.swapaxes(tangents, 1, 2)).max() / np.abs(tangents).max(), bodies.WORDS[kind]
+    return ([at_most(f"objectivity, {told}", apart, 1e-12, ROUND_OFF),
+             at_most(f"symmetry, {told}", skew, 1e-13, ROUND_OFF),
+             at_most(f"J, turned, {told}", np.abs(turned[n:] - start[n:]).max(), 1e-11, ROUND_OFF)],
+            study(f"residual, {told}", steps, left, 2, TAYLOR, band=0.25))
 
 
 @case("growth-stabilisation", kind="exact", norm="largest relative difference over the triangles of a random mesh",
@@ -116,12 +158,13 @@ def _body_slope():
             "h the diameter of the circle through its corners [E6]",
       mutants=("stabilisation-power", "stabilisation-too-weak", "circumradius"))
 def stabilisation() -> Outcome:
-    points, triangles, _ = bodies.rectangle(1.3, seed=6)
+    grid, _ = bodies.rectangle(1.3, 6)
+    points, triangles = grid.points, grid.triangles
     theta, g = np.random.default_rng(7).uniform(1, 2000, len(triangles)), np.array([0.3, -0.7])
     a, b, c = (points[triangles[:, i]] for i in range(3))
     edges = np.stack([b - a, c - a], axis=1)
     centre = np.linalg.solve(2 * edges, np.sum(edges**2, axis=2)[..., None])[..., 0]
     exact = np.linalg.det(edges) / 2 * 4 * np.sum(centre**2, axis=1) * theta ** (2 / 3) / 12 * (g @ g)
     pressure = (points @ g)[triangles]
-    found = np.einsum("ta,tab,tb->t", pressure, growth.stabilisation(points, triangles, theta), pressure)
+    found = np.einsum("ta,tab,tb->t", pressure, growth.gradient_stabilisation(points, triangles, theta), pressure)
     return Outcome((at_most("stabilisation", np.abs(found / exact - 1).max(), 1e-11, ROUND_OFF),))

@@ -185,8 +185,8 @@ def plugged(preset: str, size: float) -> list:
 
 #: Quadratic and cubic velocities hold the parabola.
 HELD = (1e-10, 1e-10, "round-off: the elements hold a parabola")
-#: What the paper's velocity and head may miss in a plug with elements of so many um, 3.3 and 12.3 % on a coarse mesh, as
-#: measured before, and of second order.
+#: What the paper's velocity and head may miss in a plug with elements of so many um: 3.3 and 12.3 % on a coarse mesh,
+#: as was measured, and of second order.
 COARSE = "3.3 and 12.3 % with elements of W / 4, second order"
 LEAK = {12.5: (0.033, 0.123, COARSE), 7.0: (0.033 * 0.56**2, 0.123 * 0.56**2, COARSE)}
 

@@ -58,8 +58,10 @@ def _fluxes(tables: dict):
     try:
         return remeshing.resolved(scene, pore.seeded(scene))[1].fluxes
     except Unresolved as refusal:
-        advised = float(re.search(r"numerics\.refinement = ([\d.]+) resolves it", str(refusal))[1])
-    scene = replace(scene, numerics=replace(scene.numerics, refinement=advised))
+        advised = re.search(r"numerics\.refinement = ([\d.]+) resolves it", str(refusal))
+        if advised is None:
+            raise
+    scene = replace(scene, numerics=replace(scene.numerics, refinement=float(advised[1])))
     return remeshing.resolved(scene, pore.seeded(scene))[1].fluxes
 
 
