@@ -27,7 +27,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -89,15 +89,24 @@ class Level:
     step: float = np.inf
 
 
+class Flows(NamedTuple):
+    """Of acceptor and donor in a step, um2 mg/L."""
+
+    supplied: tuple[float, float]
+    out: tuple[float, float]
+    consumed: tuple[float, float]
+    stored: tuple[float, float]
+
+
 @dataclass(frozen=True, eq=False)
 class Advance:
-    """X_A, X_I (r, q) um2 mg/L and concentrations (mg/L) at the end; flows: (acceptor, donor) pairs
-    supplied, out, consumed, stored in um2 mg/L; steps: sizes of the steps taken (h)."""
+    """X_A, X_I (r, q) um2 mg/L and concentrations (mg/L) at the end; flows; steps: sizes of the
+    steps taken (h)."""
 
     active: np.ndarray
     inert: np.ndarray
     concentrations: Concentrations
-    flows: tuple[tuple[float, float], ...]
+    flows: Flows
     steps: tuple[float, ...]
 
 
@@ -244,7 +253,7 @@ def advance(problem: Problem, active: np.ndarray, inert: np.ndarray, start: Conc
         left -= now.step
         step = fixed_step or now.step * min(LONGER, _factor(tolerance, size))
     stored = (system.mass @ (now.fields - before).T).sum(axis=0)
-    flows = tuple((float(a), float(d)) for a, d in (*now.flows.T, stored))
+    flows = Flows(*((float(a), float(d)) for a, d in (*now.flows.T, stored)))
     growth, remains = now.biomass
     end = Concentrations(now.fields[0], now.fields[1], len(steps))
     return Advance(active * np.exp(growth), remains, end, flows, tuple(steps))
