@@ -212,3 +212,20 @@ def test_a_run_ends_where_the_aggregate_reaches_an_end_of_the_pore(order):
             found.append(instant)
     near = made.pore.width / ACROSS_PORE
     assert 0.1 * near - 45 <= found[-1].pore.outline.upstream < near - 45 <= found[-2].pore.outline.upstream
+
+
+@pytest.mark.parametrize("before, after", [(1.0, 1.0), (1.0, 1.2), (1.0, 0.9), (3.0, 0.0), (2.01, 1.0)])
+def test_the_part_of_a_step_to_contact_is_bounded(before, after):
+    """Also where the film was too thin from the start and does not thin. Mutant: a division by no change."""
+    assert 0.02 <= stepping._to_contact((before, after, 2.0)) <= 0.95
+
+
+@EVERY_ORDER
+def test_a_film_too_thin_from_the_start_closes(order):
+    """Though nothing grows: without a supply the aggregate neither grows nor decays. Mutants: a division by no change,
+    a search for the step that ends with the film."""
+    numerics = {"preset": "fast", "elements": ORDERS[order], "refinement": 0.6 if order == 1 else 0.2}
+    made = scene("18.5 um", "20 um", acceptor="0 mg/L", donor="0 mg/L", velocity="2.9 m/day", growth={"end": "0.1 h"},
+                 numerics=numerics)
+    found = run(made)
+    assert found[-1].pore.contact and found[-1].pore.mass == pytest.approx(found[0].pore.mass, rel=1e-9)

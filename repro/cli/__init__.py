@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import argparse
 import sys
+from contextlib import suppress
 
 from repro.cli import check, compare, run, scene, sweep
 from repro.errors import Interrupted, OutputError, SimulationError
-from repro.run.progress import in_json, printable
+from repro.run.progress import in_json, printable, say
 from repro.scene import SceneError
 
 #: The commands, one a module. Each has ``add(commands)``, which adds its parser with
@@ -25,7 +26,7 @@ def main(arguments: list[str] | None = None) -> int:
     chosen = _parser().parse_args(arguments)
     try:
         return chosen.call(chosen)
-    except (SceneError, OutputError) as error:
+    except (SceneError, OutputError, OSError) as error:
         return _fail(chosen, error, 2)
     except SimulationError as error:
         return _fail(chosen, error, 1)
@@ -38,8 +39,9 @@ def main(arguments: list[str] | None = None) -> int:
 def _fail(chosen, message, status: int) -> int:
     """Tell what went wrong, as an object too where machines listen."""
     if getattr(chosen, "json", False):
-        in_json({"event": "error", "exit_status": status, "message": str(message)})
-    print(f"repro: {printable(str(message))}", file=sys.stderr)
+        with suppress(OutputError):  # which standard error tells, or nothing can
+            in_json({"event": "error", "exit_status": status, "message": str(message)})
+    say(f"repro: {printable(str(message))}", aside=True)
     return status
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 from repro.cli.arguments import add_scene
+from repro.run.progress import say
 from repro.scene import load_scene
 
 
@@ -26,5 +27,5 @@ def call(chosen) -> int:
     from repro.check.checked import check, report
 
     found = check(scene, chosen.scene)
-    print(json.dumps(found.tables(), indent=2) if chosen.json else report(found))
+    say(json.dumps(found.tables(), indent=2) if chosen.json else report(found))
     return 0

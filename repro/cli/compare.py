@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from repro import report
+from repro.run.progress import say
 from repro.run.running import OutputError
 
 
@@ -30,7 +31,7 @@ def call(chosen) -> int:
     except OSError as error:
         raise OutputError(f"--out {chosen.out}: {error.strerror or error}; a file that can be written is "
                           "needed") from error
-    print(f"{len(chosen.runs)} runs compared in {chosen.out}")
+    say(f"{len(chosen.runs)} runs compared in {chosen.out}")
     return 0
 
 

@@ -6,6 +6,7 @@ Without a scene, the list of packaged ones.
 from __future__ import annotations
 
 from repro.cli.arguments import add_changes
+from repro.run.progress import say
 from repro.scene.text import scene_text, titles
 
 
@@ -25,7 +26,7 @@ def call(chosen) -> int:
     """Print the scene that was chosen, or what there is to choose from."""
     if chosen.scene is None:
         for name, title in titles().items():
-            print(f"{name:14}{title}")
+            say(f"{name:14}{title}")
     else:
-        print(scene_text(chosen.scene, chosen.set, chosen.unset), end="")
+        say(scene_text(chosen.scene, chosen.set, chosen.unset).removesuffix("\n"))
     return 0

@@ -93,7 +93,8 @@ def _to_contact(gaps: tuple[float, float, float]) -> float:
     """The part of the step after which the film, thinning at a constant rate, is just too thin."""
     before, after, film = gaps
     aim = 0.5 * (1 + LANDED) * film
-    return min(0.95, max(0.02, (before - aim) / (before - after)))
+    part = (before - aim) / (before - after) if after < before else 0.0
+    return min(0.95, max(0.02, part))
 
 
 def _ending_at(taken: Step, end: float, time: float) -> Step:

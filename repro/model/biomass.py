@@ -14,6 +14,7 @@ conserves their sum, or by the paper's interpolation, which does not [E8].
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
@@ -25,7 +26,11 @@ from repro.model.kinetics import Sink
 from repro.model.transport import Concentrations
 from repro.scene import Kinetics, Substrates
 
-Amounts = tuple[np.ndarray, ...]
+Amounts: TypeAlias = tuple[np.ndarray, ...]
+
+#: Of densities at the nodes of straight triangles, by the names that scenes have for them.
+TRANSFERS = {"conserving": transfer.project, "bounded": transfer.project_bounded,
+             "linear": transfer.interpolated}
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +69,8 @@ def at_nodes(space: Space, field: np.ndarray) -> np.ndarray:
     """(N,) at the mesh's nodes of a field (r, q) in the points of the reaction, zero where there is
     no biomass: the mean of what the triangles around a node fit to theirs, linear in each; with
     lumping the nodal values themselves."""
-    mesh, pieces = space.mesh, space.reaction
+    mesh = space.mesh
+    pieces = space.reaction
     found = np.zeros(len(mesh.points))
     if space.order == 1:
         found[pieces.cells[:, 0]] = field[:, 0]
@@ -78,9 +84,9 @@ def at_nodes(space: Space, field: np.ndarray) -> np.ndarray:
 
 def at_points(space: Space, nodal: np.ndarray) -> np.ndarray:
     """(r, q) in the points of the reaction of a field (N,) at the mesh's nodes."""
-    mesh, pieces = space.mesh, space.reaction
+    mesh = space.mesh
     if space.order == 1:
-        return nodal[pieces.cells]
+        return nodal[space.reaction.cells]
     return nodal[mesh.cells[mesh.biomass]] @ elements.values_on(mesh.geometry, space.table).T
 
 
@@ -92,7 +98,8 @@ def _fit(space: Space) -> np.ndarray:
     return nodes @ from_points
 
 
-def carried(how: str, old: Space, new: Space, at: Located, amounts: Amounts, density: float) -> Amounts:
+def carried(how: str, old: Space, new: Space, at: Located, amounts: Amounts,
+            density: float) -> Amounts:
     """Amounts (r, q) on a new mesh: active and inert masses, and others of the same material.
 
     how: "conserving", "bounded" or "linear", for linear elements; at: the new mesh's aggregate in
@@ -109,17 +116,18 @@ def carried(how: str, old: Space, new: Space, at: Located, amounts: Amounts, den
     inside = [np.clip(at_points(new, column), 0.0, 1.0) for column in nodal.T]
     masses = density * new.reaction.dx
     inert = _conserved(inside[0], masses, amounts[1].sum())
-    others = [_scaled(share * masses, amount.sum()) for share, amount in zip(inside[1:], amounts[2:])]
+    others = [_scaled(share * masses, amount.sum())
+              for share, amount in zip(inside[1:], amounts[2:])]
     return (masses * (1 - inert), masses * inert, *others)
 
 
 def _linear(how: str, old: Space, new: Space, amounts: Amounts) -> Amounts:
     """Densities at the nodes of straight triangles, by the chosen transfer."""
-    nodes, there = old.reaction.cells[:, 0], new.reaction.cells[:, 0]
+    nodes = old.reaction.cells[:, 0]
+    there = new.reaction.cells[:, 0]
     densities = np.column_stack([amount[:, 0] / old.reaction.dx[:, 0] for amount in amounts])
-    choose = {"conserving": transfer.project, "bounded": transfer.project_bounded, "linear": transfer.interpolated}
-    found = choose[how](old.mesh.points[nodes], old.mesh.straight.topology.body_cells, densities,
-                        new.mesh.points[there], new.mesh.straight.topology.body_cells)
+    found = TRANSFERS[how](old.mesh.points[nodes], old.mesh.straight.topology.body_cells, densities,
+                           new.mesh.points[there], new.mesh.straight.topology.body_cells)
     return tuple(column[:, None] * new.reaction.dx for column in found.T)
 
 

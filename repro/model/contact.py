@@ -10,16 +10,18 @@ from repro.errors import GrowthError
 from repro.fem.outline import BOTTOM, FREE, TOP, Outline
 from repro.model import growth, traction
 from repro.model.pore import Pore
-from repro.scene import Scene
+from repro.scene import Growth, Scene, needed
 
 #: Rounds in which closing films may change the contact surfaces within one step.
 CONTACT_ROUNDS = 60
-#: Rounds of shape and fluid forces, and the largest move of a node in the last of them over the
-#: aggregate's thickness.
-FORCE_ROUNDS, FORCE_REST = 12, 1e-8
+#: Rounds of shape and fluid forces.
+FORCE_ROUNDS = 12
+#: The largest move of a node in the last of them over the aggregate's thickness.
+FORCE_REST = 1e-8
 
 
-def expand(scene: Scene, grown: Pore, theta: np.ndarray, guess: Pore | None = None) -> tuple[Pore, int, float]:
+def expand(scene: Scene, grown: Pore, theta: np.ndarray,
+           guess: Pore | None = None) -> tuple[Pore, int, float]:
     """The aggregate in its new shape under theta (t, q); Newton's iterations; and the least
     distance (um) to the opposite wall before films closed.
 
@@ -29,21 +31,25 @@ def expand(scene: Scene, grown: Pore, theta: np.ndarray, guess: Pore | None = No
     rest, or shape and flow do not agree.
     """
     start = grown if guess is None else guess
-    if scene.growth.fluid_forces == "neglected":
+    if needed(scene.growth, "[growth]").fluid_forces == "neglected":
         return _at_rest(scene, grown, theta, start, None)
-    around, last, iterations = traction.surroundings(scene, grown, grown), grown, 0
+    around = traction.surroundings(scene, grown, grown)
+    last = grown
+    iterations = 0
     for count in range(FORCE_ROUNDS):
-        found, used, gap = _at_rest(scene, grown, theta, start, traction.forces(scene, around, last))
+        forces = traction.forces(scene, around, last)
+        found, used, gap = _at_rest(scene, grown, theta, start, forces)
         moved = np.abs(found.mesh.points - last.mesh.points).max()
         iterations += used
-        if moved <= FORCE_REST * found.outline.thickness:
+        if moved <= FORCE_REST * found.boundary.thickness:
             return found, iterations, gap
         if count == 0 or (found.wall != last.wall).any():
             around = traction.surroundings(scene, grown, found)
         last = found
-    raise GrowthError(f"the fluid's forces and the shape do not agree after {FORCE_ROUNDS} rounds, a node still moves "
-                      f"by {moved:.2g} um: the aggregate is too soft for this flow; try a shorter growth.time_step, a "
-                      'larger growth.shear_modulus, or growth.fluid_forces = "neglected"')
+    raise GrowthError(f"the fluid's forces and the shape do not agree after {FORCE_ROUNDS} rounds, "
+                      f"a node still moves by {moved:.2g} um: the aggregate is too soft for this "
+                      "flow; try a shorter growth.time_step, a larger growth.shear_modulus, or "
+                      'growth.fluid_forces = "neglected"')
 
 
 def _at_rest(scene: Scene, grown: Pore, theta: np.ndarray, start: Pore,
@@ -53,38 +59,55 @@ def _at_rest(scene: Scene, grown: Pore, theta: np.ndarray, start: Pore,
     After each equilibrium, films and wedges that are too thin close, and the equilibrium is sought
     again until none is.
     """
-    body, target_J = grown.body, theta
-    if scene.growth.new_biomass == "stress_free":  # strain counts from the present shape (section 5)
-        body, target_J = replace(body, reference=grown.mesh.points[grown.mesh.body]), theta / grown.theta
-    nodes, inside = grown.mesh.body, grown.mesh.topology.body_corners
-    found = replace(grown, space=start.space, pressure=start.pressure, theta=theta, fixed=_fixed_points(scene, grown))
-    iterations, gaps = 0, []
+    keys = needed(scene.growth, "[growth]")
+    width = scene.pore.width
+    nodes = grown.mesh.body
+    inside = grown.mesh.topology.body_corners
+    body, target_J = _strained_from(keys, grown, theta)
+    found = replace(grown, space=start.space, pressure=start.pressure, theta=theta,
+                    fixed=_fixed_points(scene, grown))
+    iterations = 0
+    gaps: list[float] = []
     for _ in range(CONTACT_ROUNDS):
-        held, target = _constraints(found, scene.pore.width)
-        rest = growth.equilibrium(body, target_J, found.mesh.points[nodes], found.pressure[inside], held, target,
-                                  last=grown.mesh.points[nodes] if not gaps else None, forces=forces,
+        held, target = _constraints(found, width)
+        rest = growth.equilibrium(body, target_J, found.mesh.points[nodes], found.pressure[inside],
+                                  held, target, forces=forces,
+                                  last=None if gaps else grown.mesh.points[nodes],
                                   reused=scene.numerics.jacobian == "reused")
-        found, iterations = _placed(grown, found, rest), iterations + rest.iterations
-        gaps.append(scene.pore.width - found.outline.thickness)
-        joins = closing(found.outline, scene.pore.width, scene.growth.minimum_film, scene.growth.minimum_contact_angle)
+        found = _placed(grown, found, rest)
+        iterations += rest.iterations
+        gaps.append(width - found.boundary.thickness)
+        joins = closing(found.boundary, width, keys.minimum_film, keys.minimum_contact_angle)
         if not joins.any():
-            return replace(found, fixed=_with_new_surface(found.outline)), iterations, gaps[0]
+            return replace(found, fixed=_with_new_surface(found.boundary)), iterations, gaps[0]
         found = replace(found, wall=np.where(joins != FREE, joins, found.wall))
     raise GrowthError(f"the contact surfaces still change after {CONTACT_ROUNDS} rounds; "
                       "try a shorter growth.time_step")
 
 
+def _strained_from(keys: Growth, grown: Pore, theta: np.ndarray) -> tuple[growth.Body, np.ndarray]:
+    """The configuration from which strain counts, that of t = 0 or the present one (section 5), and
+    the expansion since then."""
+    if keys.new_biomass == "stressed":
+        return grown.body, theta
+    present = replace(grown.body, reference=grown.mesh.points[grown.mesh.body])
+    return present, theta / grown.theta
+
+
 def _placed(grown: Pore, found: Pore, rest: growth.Equilibrium) -> Pore:
     """The pore with its aggregate at rest, the fluid's nodes where they were."""
-    points, pressure = grown.mesh.points.copy(), grown.pressure.copy()
-    points[grown.mesh.body], pressure[grown.mesh.topology.body_corners] = rest.position, rest.pressure
+    points = grown.mesh.points.copy()
+    points[grown.mesh.body] = rest.position
+    pressure = grown.pressure.copy()
+    pressure[grown.mesh.topology.body_corners] = rest.pressure
     return replace(found.moved(points), pressure=pressure)
 
 
 def _constraints(now: Pore, width: float) -> tuple[np.ndarray, np.ndarray]:
     """(n, 2) True where a coordinate is prescribed: x at fixed points, y on the walls (2.3.3); and
     (n, 2) um, its prescribed value."""
-    rim, position = now.mesh.topology.body_loop, now.mesh.points[now.mesh.body]
+    rim = now.mesh.topology.body_loop
+    position = now.mesh.points[now.mesh.body]
     target = position.copy()
     target[rim[now.wall == BOTTOM], 1] = 0.0
     target[rim[now.wall == TOP], 1] = width
@@ -106,7 +129,7 @@ def _fixed_points(scene: Scene, grown: Pore) -> np.ndarray:
     """(M,) fixed points: those of before, or the present middles of the contact surfaces."""
     if scene.numerics.fixed_point == "kept":
         return grown.fixed
-    return middle_of(grown.outline, BOTTOM) | middle_of(grown.outline, TOP)
+    return middle_of(grown.boundary, BOTTOM) | middle_of(grown.boundary, TOP)
 
 
 def _with_new_surface(outline: Outline) -> np.ndarray:
@@ -120,7 +143,8 @@ def _with_new_surface(outline: Outline) -> np.ndarray:
 def middle_of(outline: Outline, wall: int) -> np.ndarray:
     """(M,) True at the node nearest to the middle of the contact surface with a wall; the corner
     before it where that is the middle of an arc."""
-    on, x = outline.wall == wall, outline.points[:, 0]
+    on = outline.wall == wall
+    x = outline.points[:, 0]
     chosen = np.zeros(len(on), bool)
     if on.any():
         middle = 0.5 * (x[on].min() + x[on].max())
@@ -203,19 +227,26 @@ def contact_lines(outline: Outline, wall: int) -> list[tuple[int, int]]:
         return []
     last = on & ~np.append(on[1:], on[0])
     first = on & ~np.append(on[-1], on[:-1])
-    return [(int(i), 1) for i in np.flatnonzero(last)] + [(int(i), -1) for i in np.flatnonzero(first)]
+    forward = [(int(i), 1) for i in np.flatnonzero(last)]
+    return forward + [(int(i), -1) for i in np.flatnonzero(first)]
 
 
-def _closing_run(outline: Outline, gap: np.ndarray, line: int, step: int, film: float, slope: float) -> np.ndarray:
+def _closing_run(outline: Outline, gap: np.ndarray, line: int, step: int, film: float,
+                 slope: float) -> np.ndarray:
     """Free nodes from a contact line outwards, up to the last with too little fluid between it and
     the wall."""
     count = len(gap)
     walk = (line + step * np.arange(1, count)) % count
     reach = np.flatnonzero(outline.wall[walk] != FREE)[0]
-    walk, other = walk[:reach], walk[reach]  # the free nodes end there: on the same wall, the nearer line takes a node
-    x, gaps = outline.points[:, 0], gap[walk]
+    other = walk[reach]
+    walk = walk[:reach]
+    x = outline.points[:, 0]
+    gaps = gap[walk]
     apart = x[walk] - x[line]
-    nearer = (outline.wall[other] != outline.wall[line]) | (np.abs(apart) <= np.abs(x[walk] - x[other]))
+    # Free nodes end at the other line; where that is on the same wall, the nearer one takes a node.
+    nearer = np.abs(apart) <= np.abs(x[walk] - x[other])
+    if outline.wall[other] != outline.wall[line]:
+        nearer = np.ones(len(walk), bool)
     along = np.sign(x[line] - x[line - step]) * apart
     thin = (nearer & (gaps < 0)) | (gaps < np.minimum(film, slope * along))
     return walk[: np.flatnonzero(thin)[-1] + 1] if thin.any() else walk[:0]

@@ -27,6 +27,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -37,7 +38,13 @@ from repro.fem.assembly import ElementSystem, each
 from repro.fem.space import Space
 from repro.model import kinetics as law
 from repro.model.kinetics import Sink
-from repro.model.transport import UNRESOLVED, Concentrations, Problem, both_ends, supplied_everywhere
+from repro.model.transport import (
+    UNRESOLVED,
+    Concentrations,
+    Problem,
+    both_ends,
+    supplied_everywhere,
+)
 from repro.timing import timed
 
 #: Largest accepted |C - C*| in the aggregate over the supply. Measured against a tolerance of 3e-6,
@@ -45,15 +52,26 @@ from repro.timing import timed
 #: the supply (seeds of 5 and 40 um), the largest error in concentrations, biomass made or uptake is
 #: 2e-2 at 1e-1, 9e-4 at 1e-2, 3.1e-4 at 1e-3: 0.1 % is kept.
 TOLERANCE = 1e-3
-#: Bounds on the ratio of successive steps, and the part taken of the step that would just be
-#: accepted.
-LONGER, SHORTER, SAFETY = 2.0, 0.2, 0.8
-#: Longest first step, which is of first order: 45 s keep its error under 2e-4 (720 s: 2e-2). A step
-#: under 1e-6 s fails.
-FIRST, SHORTEST = 45 / 3600, 1e-6 / 3600
-#: Settled: the change over the supply that further steps of LONG (h) would sum up to. On the way
-#: there: the largest change in a step, the factor by which steps rise and fall, and most steps.
-SETTLED, LONG, SETTLING, FASTER, MOST_STEPS = 1e-9, 1e6, 0.3, 10.0, 1000
+#: Bounds on the ratio of successive steps.
+LONGER = 2.0
+SHORTER = 0.2
+#: The part taken of the step that would just be accepted.
+SAFETY = 0.8
+#: Longest first step (h), which is of first order: 45 s keep its error under 2e-4 (720 s: 2e-2).
+FIRST = 45 / 3600
+#: A shorter step (h) fails.
+SHORTEST = 1e-6 / 3600
+#: Settled: the change over the supply that further steps of LONG (h) would sum up to.
+SETTLED = 1e-9
+LONG = 1e6
+#: On the way there: the largest change over the supply in a step.
+SETTLING = 0.3
+#: The factor by which steps rise and fall there, and most steps.
+FASTER = 10.0
+MOST_STEPS = 1000
+
+#: (r, q) 1/h, or one number everywhere.
+Rate: TypeAlias = np.ndarray | float
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,15 +89,24 @@ class Level:
     step: float = np.inf
 
 
+class Flows(NamedTuple):
+    """Of acceptor and donor in a step, um2 mg/L."""
+
+    supplied: tuple[float, float]
+    out: tuple[float, float]
+    consumed: tuple[float, float]
+    stored: tuple[float, float]
+
+
 @dataclass(frozen=True, eq=False)
 class Advance:
-    """X_A, X_I (r, q) um2 mg/L and concentrations (mg/L) at the end; flows: (acceptor, donor) pairs
-    supplied, out, consumed, stored in um2 mg/L; steps: sizes of the steps taken (h)."""
+    """X_A, X_I (r, q) um2 mg/L and concentrations (mg/L) at the end; flows; steps: sizes of the
+    steps taken (h)."""
 
     active: np.ndarray
     inert: np.ndarray
     concentrations: Concentrations
-    flows: tuple[tuple[float, float], ...]
+    flows: Flows
     steps: tuple[float, ...]
 
 
@@ -118,7 +145,8 @@ class System:
     def sparse(self) -> ElementSystem:
         """One substrate's unknowns: all triangles, then the pieces of biomass."""
         held = bool(self.problem.system.held.any())
-        return self.space.mesh.topology.system(("gear", self.space.order, held), lambda: _sparse(self.space, held))
+        return self.space.mesh.topology.system(("gear", self.space.order, held),
+                                               lambda: _sparse(self.space, held))
 
     @cached_property
     def storage(self) -> np.ndarray:
@@ -135,17 +163,18 @@ class System:
         return acceptor, donor
 
     def _row(self, s: int) -> Row:
-        problem, system, count = self.problem, self.sparse, self.space.count
-        operator, storage = system.entries(0, problem.matrices[s]), system.entries(0, self.storage)
-        matrices = problem.operator[s * count: s * count + count, s * count: s * count + count], self.mass
-        return Row(operator, storage, *matrices, problem.source[s * count: s * count + count], problem.both[s].supply)
+        problem = self.problem
+        own = slice(s * self.space.count, (s + 1) * self.space.count)
+        operator = self.sparse.entries(0, problem.matrices[s])
+        storage = self.sparse.entries(0, self.storage)
+        return Row(operator, storage, problem.operator[own, own], self.mass, problem.source[own],
+                   problem.both[s].supply)
 
     @cached_property
     def mass(self) -> sp.csc_matrix:
         """(n, n) um2, of :attr:`storage`."""
-        cells, size = self.space.cells, self.space.count
-        k = cells.shape[1]
-        rows, columns = np.repeat(cells, k, axis=1).ravel(), np.tile(cells, (1, k)).ravel()
+        size = self.space.count
+        rows, columns = (part.ravel() for part in linear.pairs(self.space.cells))
         return sp.csc_matrix((self.storage.ravel(), (rows, columns)), shape=(size, size))
 
     def at(self, fields: np.ndarray) -> np.ndarray:
@@ -164,7 +193,8 @@ def _sparse(space: Space, held_ends: bool) -> ElementSystem:
     place[space.dofs.elimination] = np.arange(space.count)
     held = np.zeros(space.count, bool)
     held[both_ends(space)] = held_ends
-    return ElementSystem((space.cells, space.reaction.cells), place, held, space.mesh.topology.method)
+    return ElementSystem((space.cells, space.reaction.cells), place, held,
+                         space.mesh.topology.method)
 
 
 @timed("transport")
@@ -181,22 +211,28 @@ def settle(problem: Problem, sink: Sink | None, guess: Concentrations | None) ->
     if not (problem.inflow.any() or problem.system.held.any()):
         return start
     nothing = np.zeros_like(problem.space.reaction.dx)
-    system, now = _started(problem, nothing if sink is None else sink.active, nothing, start, living=False)
+    active = nothing if sink is None else sink.active
+    system, now = _started(problem, active, nothing, start, living=False)
     system = replace(system, watched=np.ones(problem.space.count, bool))
-    step, last = LONG, np.inf
+    step = LONG
+    last = np.inf
     for count in range(1, MOST_STEPS + 1):
-        new, change = _accepted(system, now, step, SETTLING, "while the profiles settle", 1 / FASTER)
+        new, change = _accepted(system, now, step, SETTLING, "while the profiles settle",
+                                1 / FASTER)
         if new.step >= LONG and change <= SETTLED * (1 - change / last):
             acceptor, donor = new.fields
             return Concentrations(acceptor, donor, count)
-        now, step, last = _level(new.fields, now.biomass), min(FASTER * new.step, LONG), change
-    raise TransportError(f"the profiles still change by {change:.2g} of the supply a step after {MOST_STEPS} steps; "
-                         'try numerics.transport = "quasi_steady"')
+        now = _level(new.fields, now.biomass)
+        step = min(FASTER * new.step, LONG)
+        last = change
+    raise TransportError(f"the profiles still change by {change:.2g} of the supply a step after "
+                         f'{MOST_STEPS} steps; try numerics.transport = "quasi_steady"')
 
 
 @timed("transport")
-def advance(problem: Problem, active: np.ndarray, inert: np.ndarray, start: Concentrations, duration: float, *,
-            tolerance: float = TOLERANCE, fixed_step: float | None = None, simultaneous: bool = False) -> Advance:
+def advance(problem: Problem, active: np.ndarray, inert: np.ndarray, start: Concentrations,
+            duration: float, *, tolerance: float = TOLERANCE, fixed_step: float | None = None,
+            simultaneous: bool = False) -> Advance:
     """Integrate (7)-(10) over a duration (h) in one geometry.
 
     active, inert: X_A, X_I (r, q) um2 mg/L at the start; fixed_step: steps of that size (h),
@@ -205,8 +241,10 @@ def advance(problem: Problem, active: np.ndarray, inert: np.ndarray, start: Conc
     under SHORTEST.
     """
     system, now = _started(problem, active, inert, start, simultaneous=simultaneous)
-    before, left = now.fields, duration
-    steps, step = [], fixed_step or min(FIRST, duration)
+    before = now.fields
+    left = duration
+    step = fixed_step or min(FIRST, duration)
+    steps = []
     while left > 1e-12 * duration:
         step = left / np.ceil(left / step - 1e-9)
         when = f"{duration - left:.6g} h after the start"
@@ -215,14 +253,14 @@ def advance(problem: Problem, active: np.ndarray, inert: np.ndarray, start: Conc
         left -= now.step
         step = fixed_step or now.step * min(LONGER, _factor(tolerance, size))
     stored = (system.mass @ (now.fields - before).T).sum(axis=0)
-    flows = tuple((float(a), float(d)) for a, d in (*now.flows.T, stored))
+    flows = Flows(*((float(a), float(d)) for a, d in (*now.flows.T, stored)))
     growth, remains = now.biomass
     end = Concentrations(now.fields[0], now.fields[1], len(steps))
     return Advance(active * np.exp(growth), remains, end, flows, tuple(steps))
 
 
-def _started(problem: Problem, active: np.ndarray, inert: np.ndarray, start: Concentrations, living: bool = True,
-             simultaneous: bool = False) -> tuple[System, Level]:
+def _started(problem: Problem, active: np.ndarray, inert: np.ndarray, start: Concentrations,
+             living: bool = True, simultaneous: bool = False) -> tuple[System, Level]:
     """The system and its first time level."""
     fields = np.stack([start.acceptor, start.donor])
     largest = np.maximum([s.supply for s in problem.both], fields.max(axis=1))
@@ -235,10 +273,12 @@ def _started(problem: Problem, active: np.ndarray, inert: np.ndarray, start: Con
 
 def _level(fields: np.ndarray, biomass: np.ndarray) -> Level:
     """A first level, without a past."""
-    return Level(fields, biomass, np.zeros((2, 3)), np.zeros_like(fields), np.zeros_like(biomass), np.zeros((2, 3)))
+    still = np.zeros_like(fields), np.zeros_like(biomass), np.zeros((2, 3))
+    return Level(fields, biomass, np.zeros((2, 3)), *still)
 
 
-def _accepted(system: System, now: Level, step: float, tolerance: float, when: str, least: float):
+def _accepted(system: System, now: Level, step: float, tolerance: float, when: str,
+              least: float) -> tuple[Level, float]:
     """A step of this size, or of the first smaller one that is positive and differs little enough
     from its prediction, and that difference over the scale; each try is shorter than the last by a
     factor of 1/2 to ``least``."""
@@ -253,8 +293,9 @@ def _accepted(system: System, now: Level, step: float, tolerance: float, when: s
 
 
 def _tried(system: System, now: Level, step: float, floor: float) -> tuple[Level, np.ndarray]:
-    """One step, and its difference from the prediction; with the positive sink where a concentration
-    would fall below zero and that prevents it, or below the least that is accepted."""
+    """One step, and its difference from the prediction; with the positive sink where a
+    concentration would fall below zero and that prevents it, or below the least that is accepted.
+    """
     plain = _corrected(system, now, step, positive=False)
     least = plain[0].fields.min()
     if least >= 0:
@@ -280,19 +321,22 @@ def _too_short(system: System, new: Level, difference: np.ndarray, when: str) ->
     species, node = divmod(int(np.argmin(wrong)), system.space.count)
     x, y = system.space.points[node]
     why = "becomes negative" if negative else "does not follow its prediction"
-    return TransportError(f"the {('acceptor', 'donor')[species]} {why} at x = {x:.4g}, y = {y:.4g} um {when}, even in "
-                          f"steps of {3600 * SHORTEST:g} s; try a larger numerics.refinement")
+    name = ("acceptor", "donor")[species]
+    return TransportError(f"the {name} {why} at x = {x:.4g}, y = {y:.4g} um {when}, even in steps "
+                          f"of {3600 * SHORTEST:g} s; try a larger numerics.refinement")
 
 
 def _corrected(system: System, now: Level, step: float, positive: bool) -> tuple[Level, np.ndarray]:
     """One step, and |C - C*| over the scale (2, n); positive: by backward Euler with the positive
     form of the sink."""
     ratio = step / now.step
-    carry, weight = (0.0, 1.0) if positive else (ratio**2 / (1 + 2 * ratio), (1 + ratio) / (1 + 2 * ratio))
-    interval, flux = weight * step, np.empty((2, 3))
+    carry, weight = (0.0, 1.0) if positive else _formula(ratio)
+    interval = weight * step
     fields = np.maximum(now.fields + ratio * now.field_rise, 0.0 if positive else -np.inf)
     predicted = fields.copy()
-    field_rise, biomass_rise = carry * now.field_rise, carry * now.biomass_rise
+    field_rise = carry * now.field_rise
+    biomass_rise = carry * now.biomass_rise
+    flux = np.empty((2, 3))
     rise = now.biomass[0] + biomass_rise[0] + interval * _rates(system, fields)[0]
     active = system.active * np.exp(rise)
     for s in (0, 1):
@@ -304,11 +348,17 @@ def _corrected(system: System, now: Level, step: float, positive: bool) -> tuple
     biomass_rise[0] += interval * growth
     biomass_rise[1] += interval * system.active * np.exp(now.biomass[0] + biomass_rise[0]) * remains
     flow_rise = carry * now.flow_rise + interval * flux
-    new = Level(fields, now.biomass + biomass_rise, now.flows + flow_rise, field_rise, biomass_rise, flow_rise, step)
+    new = Level(fields, now.biomass + biomass_rise, now.flows + flow_rise, field_rise, biomass_rise,
+                flow_rise, step)
     return new, np.abs(fields - predicted) / system.scale
 
 
-def _rates(system: System, fields: np.ndarray):
+def _formula(ratio: float) -> tuple[float, float]:
+    """Carry and weight of Gear's formula for the ratio of a step to the one before it."""
+    return ratio**2 / (1 + 2 * ratio), (1 + ratio) / (1 + 2 * ratio)
+
+
+def _rates(system: System, fields: np.ndarray) -> tuple[Rate, Rate]:
     """F3 / X_A and F4 / X_A (r, q) 1/h, zero where the biomass does not live."""
     problem = system.problem
     if not system.living or problem.kinetics is None:
@@ -318,35 +368,44 @@ def _rates(system: System, fields: np.ndarray):
             law.inert_rate(acceptor, problem.substrates, problem.kinetics))
 
 
-def _sink(system: System, active: np.ndarray, fields: np.ndarray, s: int, positive: bool):
+def _sink(system: System, active: np.ndarray, fields: np.ndarray, s: int,
+          positive: bool) -> tuple[np.ndarray, np.ndarray]:
     """Slope and offset (r, q) of the uptake of substrate s linearised at the fields, slope C +
     offset (um2 mg/L/h)."""
     problem = system.problem
     if problem.kinetics is None:
         return np.zeros_like(active), np.zeros_like(active)
-    at = *system.at(fields), problem.substrates, problem.kinetics
-    uptake, slope, own = law.uptake(*at, True)[s], law.uptake_slopes(*at, True)[s][s], at[s]
+    acceptor, donor = system.at(fields)
+    own = (acceptor, donor)[s]
+    both = problem.substrates
+    uptake = law.uptake(acceptor, donor, both, problem.kinetics, extended=True)[s]
+    slope = law.uptake_slopes(acceptor, donor, both, problem.kinetics, extended=True)[s][s]
     if positive:
         tiny = np.finfo(float).tiny
-        return active * np.where(own > tiny, uptake / np.maximum(own, tiny), slope), np.zeros_like(active)
+        secant = np.where(own > tiny, uptake / np.maximum(own, tiny), slope)
+        return active * secant, np.zeros_like(active)
     return active * slope, active * (uptake - slope * own)
 
 
-def _solved(system: System, s: int, interval: float, past: np.ndarray, slope: np.ndarray, offset: np.ndarray):
+def _solved(system: System, s: int, interval: float, past: np.ndarray, slope: np.ndarray,
+            offset: np.ndarray) -> tuple[np.ndarray, tuple[float, float, float]]:
     """C (n,) of M (C - past) / interval + L C - b + slope C + offset = 0; and what is supplied,
     what leaves and what is consumed."""
-    row, sparse, pieces, problem = system.rows[s], system.sparse, system.space.reaction, system.problem
+    row = system.rows[s]
+    sparse = system.sparse
+    pieces = system.space.reaction
     k = pieces.cells.shape[1]
-    products = (pieces.values[:, :, None] * pieces.values[:, None, :]).reshape(len(pieces.values), -1)
-    reaction = (slope @ products).reshape(-1, k, k)
+    products = pieces.values[:, :, None] * pieces.values[:, None, :]
+    reaction = (slope @ products.reshape(-1, k * k)).reshape(-1, k, k)
     entries = row.operator + row.storage / interval + sparse.entries(1, reaction)
     right = row.mass @ past / interval + row.source - system.taken(offset)
     held = np.where(sparse.held, row.supply, 0.0)
     known = row.matrix @ held + row.mass @ held / interval
-    field, order = held, sparse.order
-    solver = linear.factorised(sparse.filled(entries), problem.space.mesh.topology.method)
-    field[order] = solver.solve((right - known)[order])
+    field = held
+    solver = linear.factorised(sparse.filled(entries), system.space.mesh.topology.method)
+    field[sparse.order] = solver.solve((right - known)[sparse.order])
     consumed = slope * (field[pieces.cells] @ pieces.values.T) + offset
-    entered = row.matrix @ field + row.mass @ (field - past) / interval - row.source + system.taken(consumed)
+    stored = row.mass @ (field - past) / interval
+    entered = row.matrix @ field + stored - row.source + system.taken(consumed)
     supplied = row.source.sum() + entered[sparse.held].sum()
-    return field, (supplied, problem.outflow @ field, consumed.sum())
+    return field, (supplied, float(system.problem.outflow @ field), consumed.sum())

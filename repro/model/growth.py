@@ -28,7 +28,7 @@ and what the linear pressure leaves free of J would grow from nothing.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Generic, TypeVar
 
@@ -43,11 +43,14 @@ from repro.fem.mesh import gradients, triangle_areas
 from repro.fem.newton import Newton, relative
 from repro.timing import timed
 
-#: Newton stops at this residual against the size of its terms, or at the second where round-off
-#: keeps it from falling.
-NEWTON, ROUND_OFF, MOST_ITERATIONS = 1e-11, 1e-8, 25
-#: Halvings in a line search; sub-steps of a continuation.
+#: Newton's method stops at this residual against the size of its terms.
+NEWTON = 1e-11
+#: Or at this one, where round-off keeps it from falling.
+ROUND_OFF = 1e-8
+MOST_ITERATIONS = 25
+#: Halvings in a line search.
 HALVINGS = 8
+#: Sub-steps of a continuation.
 CONTINUATION = (1, 8, 64)
 #: gamma: the energy's curvature in J is -2/9 J^(-5/3) and less, so that one makes it convex with
 #: room to spare.
@@ -121,7 +124,8 @@ class Body:
         the stress takes from it."""
         gradient = np.swapaxes(position[self.shape.cells], 1, 2) @ np.swapaxes(self.at.rows, 1, 2)
         count, points = self.at.dx.shape
-        return Strained(elements.by_component(gradient.reshape(count, 2, points, 2).transpose(1, 3, 0, 2)))
+        F = gradient.reshape(count, 2, points, 2).transpose(1, 3, 0, 2)
+        return Strained(elements.by_component(F))
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +168,8 @@ class Strained:
     def piola(self, P: np.ndarray) -> np.ndarray:
         """First Piola-Kirchhoff stress (..., 2, 2) at a pressure P (...), both over mu_L: the
         derivative of (21) by F."""
-        return self.A[..., None, None] * self.F + (P * self.J - self.A * self.trace / 3)[..., None, None] * self.H
+        volumetric = P * self.J - self.A * self.trace / 3
+        return self.A[..., None, None] * self.F + volumetric[..., None, None] * self.H
 
 
 def energy(F: np.ndarray) -> np.ndarray:
@@ -181,17 +186,23 @@ def piola(F: np.ndarray, P: np.ndarray) -> np.ndarray:
 def tangent(F: np.ndarray, P: np.ndarray) -> np.ndarray:
     """d piola / d F, (..., i, K, j, L), over mu_L."""
     at = Strained(F)
-    H, A, trace, PJ = at.H, at.A, at.trace, P * at.J
-    first, second = (F[..., None, None], H[..., None, None]), (F[..., None, None, :, :], H[..., None, None, :, :])
-    FH, HF, HH = first[0] * second[1], first[1] * second[0], first[1] * second[1]
+    PJ = P * at.J
+    both = _outer(F, at.H) + _outer(at.H, F)
+    HH = _outer(at.H, at.H)
     swap = np.swapaxes(HH, -3, -1)
     identity = np.einsum("ij,kl->ikjl", np.eye(2), np.eye(2))
+    return (_times(at.A, identity - 2 / 3 * both) + _times(2 / 9 * at.A * at.trace + PJ, HH)
+            + _times(at.A * at.trace / 3 - PJ, swap))
 
-    def times(scalar, tensor):
-        return scalar[..., None, None, None, None] * tensor
 
-    return (times(A, identity - 2 / 3 * (FH + HF)) + times(2 / 9 * A * trace + PJ, HH)
-            + times(A * trace / 3 - PJ, swap))
+def _outer(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """(..., i, K, j, L) first_iK second_jL."""
+    return first[..., None, None] * second[..., None, None, :, :]
+
+
+def _times(scalar: np.ndarray, tensor: np.ndarray) -> np.ndarray:
+    """(..., i, K, j, L) with a factor (...)."""
+    return scalar[..., None, None, None, None] * tensor
 
 
 def cauchy(F: np.ndarray, P: np.ndarray) -> np.ndarray:
@@ -211,9 +222,11 @@ def largest_principal(stress: np.ndarray) -> np.ndarray:
     return np.maximum(0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy), zz)
 
 
-def gradient_stabilisation(position: np.ndarray, triangles: np.ndarray, theta: np.ndarray) -> np.ndarray:
+def gradient_stabilisation(position: np.ndarray, triangles: np.ndarray,
+                           theta: np.ndarray) -> np.ndarray:
     """(t, 3, 3) matrices of sum_tau h^2 / (12 theta^(-2/3)) (grad p, grad q) on a shape [E6]."""
-    slopes, areas = gradients(position, triangles), triangle_areas(position, triangles)
+    slopes = gradients(position, triangles)
+    areas = triangle_areas(position, triangles)
     corner = position[triangles]
     sides = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2)
     h = np.prod(sides, axis=1) / (2 * areas)
@@ -275,10 +288,13 @@ class System:
         None on curved triangles; forces: (n, 2) um, nodal forces over mu_L that do not depend on
         the shape (the t0 of (20)), none by default; system: the sparse system with nothing
         prescribed, if it is known."""
-        self.body, self.held, self.stabilising = body, held, stabilising
+        self.body = body
+        self.held = held
+        self.stabilising = stabilising
         rows = np.concatenate([held[:, 0], held[:, 1], np.zeros(body.shape.corners, bool)])
         self.sparse = body.shape.constrained(rows) if system is None else system.holding(rows)
-        self.unknowns, self.free = self.sparse.kinds[0], self.sparse.free
+        self.unknowns = self.sparse.kinds[0]
+        self.free = self.sparse.free
         self.pull = np.zeros(len(rows))
         if forces is not None:
             self.pull[: held.size] = forces.T.ravel()
@@ -286,15 +302,18 @@ class System:
         self.theta = self.target = np.empty(0)
         self.sizes = np.empty(0)
 
-    def under(self, theta: np.ndarray, target: np.ndarray, position: np.ndarray, pressure: np.ndarray) -> Iterate:
+    def under(self, theta: np.ndarray, target: np.ndarray, position: np.ndarray,
+              pressure: np.ndarray) -> Iterate:
         """The first iterate for an expansion theta (t, q) and prescribed coordinates (n, 2) um."""
-        self.theta, self.target = theta, target
+        self.theta = theta
+        self.target = target
         self.sizes = self._sizes(position)
         return self._iterate(position, pressure)
 
     def _iterate(self, position: np.ndarray, pressure: np.ndarray) -> Iterate:
         lag = np.where(self.held, self.target - position, 0.0)
-        return Iterate(position, pressure, self.residual(position, pressure), self.sizes, lag, self.free)
+        residual = self.residual(position, pressure)
+        return Iterate(position, pressure, residual, self.sizes, lag, self.free)
 
     def _stiffening(self) -> np.ndarray | float:
         """gamma theta^(-5/3)."""
@@ -314,12 +333,14 @@ class System:
         at, P = self._pressed(position, pressure)
         gap = (self.body.at.dx * (at.J - self.theta)) @ self.body.shape.table.linear
         if self.stabilising is not None:
-            gap = gap - np.einsum("tab,tb->ta", self.stabilising, pressure[self.body.shape.triangles])
+            local = pressure[self.body.shape.triangles]
+            gap = gap - np.einsum("tab,tb->ta", self.stabilising, local)
         return self._summed(self._forces(at.piola(P), self.body.weighted), gap) - self.pull
 
     def _sizes(self, position: np.ndarray) -> np.ndarray:
         """Sizes of the terms of the residual."""
-        at, linear = self.strained(position), self.body.shape.table.linear
+        at = self.strained(position)
+        linear = self.body.shape.table.linear
         terms = self._forces(at.A[..., None, None] * np.abs(at.F), np.abs(self.body.weighted))
         return self._summed(terms, (self.body.at.dx * self.theta) @ linear) + np.abs(self.pull)
 
@@ -335,8 +356,11 @@ class System:
     def tangent(self, position: np.ndarray, pressure: np.ndarray) -> np.ndarray:
         """(t, 2k + 3, 2k + 3) symmetric element matrices of the residual's derivative."""
         at, P = self._pressed(position, pressure)
-        k, dx, PJ = self.body.shape.cells.shape[1], self.body.at.dx, P * at.J
-        h, f = self._pulled(at.H), self._pulled(at.F)
+        k = self.body.shape.cells.shape[1]
+        dx = self.body.at.dx
+        PJ = P * at.J
+        h = self._pulled(at.H)
+        f = self._pulled(at.F)
         both = 2 / 9 * at.A * at.trace + PJ + self._stiffening() * at.J**2
         half = each(dx * both / 2, h) - each(2 / 3 * dx * at.A, f)
         swap = each(dx * (at.A * at.trace / 3 - PJ), h)
@@ -344,10 +368,12 @@ class System:
         K = found[:, :, : 2 * k] + np.swapaxes(found[:, :, : 2 * k], 1, 2)
         exchanged = K.reshape(-1, 2, k, 2, k)  # the same memory
         exchanged += np.swapaxes(found[:, :, 2 * k:].reshape(exchanged.shape), 1, 3)
-        plain = np.swapaxes(self.body.at.rows, 1, 2) @ (np.repeat(at.A, 2, axis=1)[:, :, None] * self.body.weighted)
+        weighted = np.repeat(at.A, 2, axis=1)[:, :, None] * self.body.weighted
+        plain = np.swapaxes(self.body.at.rows, 1, 2) @ weighted
         exchanged[:, 0, :, 0] += plain
         exchanged[:, 1, :, 1] += plain
-        return saddle_blocks(K, -(self.body.shape.table.linear.T @ each(dx * at.J, h)), self.stabilising)
+        volume = self.body.shape.table.linear.T @ each(dx * at.J, h)
+        return saddle_blocks(K, -volume, self.stabilising)
 
     def _pulled(self, tensor: np.ndarray) -> np.ndarray:
         """(t, q, 2k) a tensor (t, q, 2, 2) times grad N_a: component x for every node a, then y."""
@@ -361,10 +387,13 @@ class System:
         """The longest of the steps 1, 1/2, ... with det F > 0 that does not raise the residual
         fourfold; the first step carries prescribed coordinates to their target."""
         lag = iterate.lag
-        move = None if iterate.complete else np.concatenate([lag[:, 0], lag[:, 1], np.zeros(len(iterate.pressure))])
-        step = factors.solve(-iterate.residual, move)
+        carried = None
+        if not iterate.complete:
+            carried = np.concatenate([lag[:, 0], lag[:, 1], np.zeros(len(iterate.pressure))])
+        step = factors.solve(-iterate.residual, carried)
         n = len(iterate.position)
-        move, push = step[: 2 * n].reshape(2, n).T, step[2 * n:]
+        move = step[: 2 * n].reshape(2, n).T
+        push = step[2 * n:]
         for length in 0.5 ** np.arange(HALVINGS):
             position = iterate.position + length * move
             if self.strained(position).J.min() <= 0:
@@ -372,14 +401,14 @@ class System:
             trial = self._iterate(position, iterate.pressure + length * push)
             if not iterate.complete or trial.length < 4 * iterate.length:
                 return trial
-        raise GrowthError(f"no step of Newton's method keeps det F > 0 and the residual in bounds "
+        raise GrowthError("no step of Newton's method keeps det F > 0 and the residual in bounds "
                           f"(shortest tried {0.5 ** (HALVINGS - 1):.2g})")
 
 
 @timed("growth")
-def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: np.ndarray, held: np.ndarray,
-                prescribed: np.ndarray, *, last: np.ndarray | None = None, forces: np.ndarray | None = None,
-                reused: bool = False) -> Equilibrium:
+def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: np.ndarray,
+                held: np.ndarray, prescribed: np.ndarray, *, last: np.ndarray | None = None,
+                forces: np.ndarray | None = None, reused: bool = False) -> Equilibrium:
     """Equilibrium under the expansion theta (t, q) since the reference, from a start.
 
     position: (n, 2) um, where to start, with det F > 0; pressure: (corners,) P / mu_L there; held:
@@ -394,10 +423,12 @@ def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: n
     if start.min() <= 0 or theta.min() <= 0:
         raise GrowthError("growth starts from a triangle that is turned over or from theta <= 0; "
                           "try a shorter growth.time_step")
-    stabilising, parts = None, 1
+    stabilising = None
+    parts = 1
     if body.shape.geometry == 1:
         known = position if last is None else last
-        stabilising = gradient_stabilisation(known, body.shape.triangles, body.strained(known).J[:, 0])
+        expansion = body.strained(known).J[:, 0]
+        stabilising = gradient_stabilisation(known, body.shape.triangles, expansion)
     else:
         parts = max(1, int(np.ceil(np.abs(np.log(theta / start)).max() / np.log(FACTOR))))
     system = System(body, held, stabilising=stabilising, forces=forces)
@@ -405,8 +436,8 @@ def equilibrium(body: Body, theta: np.ndarray, position: np.ndarray, pressure: n
     return reach(system, start, theta, first, prescribed, parts, reused)
 
 
-def reach(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibrium, prescribed: np.ndarray,
-          parts: int = 1, reused: bool = False) -> Equilibrium:
+def reach(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibrium,
+          prescribed: np.ndarray, parts: int = 1, reused: bool = False) -> Equilibrium:
     """Equilibrium of a system under theta, from J = ``start`` (shaped alike), in ``parts`` or,
     where that fails, more; see :func:`equilibrium`."""
     failure = ""
@@ -418,16 +449,17 @@ def reach(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibri
     raise GrowthError(f"{failure}; try a shorter growth.time_step or a larger numerics.refinement")
 
 
-def _continued(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibrium, prescribed: np.ndarray,
-               steps: int, reused: bool) -> Equilibrium:
+def _continued(system: System, start: np.ndarray, theta: np.ndarray, first: Equilibrium,
+               prescribed: np.ndarray, steps: int, reused: bool) -> Equilibrium:
     """Newton's method at theta = start (theta / start)^s for s = 1 / steps ... 1."""
-    newton, now = Newton(NEWTON, ROUND_OFF, MOST_ITERATIONS, reused), first
+    newton = Newton(NEWTON, ROUND_OFF, MOST_ITERATIONS, reused)
+    now = first
     for part in np.arange(1, steps + 1) / steps:
         target = first.position + part * (prescribed - first.position)
         iterate = system.under(start * (theta / start) ** part, target, now.position, now.pressure)
         last, count, converged = newton.solve(system, iterate)
         if not converged:
-            raise GrowthError(f"Newton's method for the growth stands at a defect of {last.defect:.2g} "
-                              f"after {count} iterations")
-        now = replace(now, position=last.position, pressure=last.pressure, iterations=now.iterations + count)
+            raise GrowthError("Newton's method for the growth stands at a defect of "
+                              f"{last.defect:.2g} after {count} iterations")
+        now = Equilibrium(last.position, last.pressure, now.iterations + count)
     return now

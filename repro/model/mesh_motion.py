@@ -29,11 +29,13 @@ def move(mesh: Mesh, body: np.ndarray, compressibility: float, stabilisation: fl
     body: (n, 2) um, new places of ``mesh.body``; compressibility: gamma; stabilisation: c of tau =
     h^2 / c. The result may hold triangles that are turned over: that is for the caller to judge.
     """
-    points, straight = mesh.points.copy(), mesh.straight
+    straight = mesh.straight
+    points = mesh.points.copy()
     points[mesh.body] = body
-    corners = straight.points.copy()
     known = points[: mesh.corners] - straight.points
-    corners[straight.topology.fluid] += _fluid_displacement(straight, known, compressibility, stabilisation)
+    moved = _fluid_displacement(straight, known, compressibility, stabilisation)
+    corners = straight.points.copy()
+    corners[straight.topology.fluid] += moved
     found = mesh.with_middles(corners)
     found[mesh.body] = body
     return found
@@ -42,13 +44,16 @@ def move(mesh: Mesh, body: np.ndarray, compressibility: float, stabilisation: fl
 def _fluid_displacement(mesh: Mesh, known: np.ndarray, gamma: float, c: float) -> np.ndarray:
     """(f, 2) displacement of the fluid's corners; known: (N, 2) that of the aggregate, zero
     elsewhere."""
-    fluid, there, space = mesh.topology.fluid, ~mesh.biomass, Space(mesh, 1)
+    fluid = mesh.topology.fluid
+    there = ~mesh.biomass
+    space = Space(mesh, 1)
     laplace = space.stiffness[there]
     lower = each(mesh.circumdiameter[there] ** 2 / c, laplace) + gamma * mass(mesh.areas[there])
     elements = saddle_blocks(laplace, divergence(space)[there], lower)
     system = mesh.topology.system("mesh motion", lambda: _system(mesh))
     value = np.concatenate([known[fluid, 0], known[fluid, 1], np.zeros(len(fluid))])
-    return system.solve(elements, np.zeros(len(value)), value)[: 2 * len(fluid)].reshape(2, -1).T
+    solution = system.solve(elements, np.zeros(len(value)), value)
+    return solution[: 2 * len(fluid)].reshape(2, -1).T
 
 
 def _system(mesh: Mesh) -> ElementSystem:
@@ -61,7 +66,8 @@ def _system(mesh: Mesh) -> ElementSystem:
 def _held(mesh: Mesh) -> np.ndarray:
     """(N, 2) True where x or y of a node is prescribed: in the aggregate, and across walls, inlet
     and outlet."""
-    held, topology = np.zeros((len(mesh.points), 2), bool), mesh.topology
+    topology = mesh.topology
+    held = np.zeros((len(mesh.points), 2), bool)
     held[np.concatenate([topology.inlet, topology.outlet]), 0] = True
     held[topology.walls, 1] = True
     held[mesh.body] = True

@@ -17,7 +17,7 @@ from repro.fem.space import Space
 from repro.model import biomass, flow, gear, growth, transport
 from repro.model.flow import Bubble, Flow, Stabilised
 from repro.model.transport import Concentrations, Fluxes, Problem
-from repro.scene import Scene
+from repro.scene import Scene, needed
 
 #: The thinnest film to resolve where no [growth] says when it closes (Table 1), um.
 MINIMUM_FILM = 2.0
@@ -75,6 +75,11 @@ class Pore:
         return Outline(self.mesh.points[loop], self.wall, self.fixed, origin, self.mesh.geometry)
 
     @property
+    def boundary(self) -> Outline:
+        """The outline of an aggregate that is there. Raises MissingError in a clean channel."""
+        return needed(self.outline, "an aggregate")
+
+    @property
     def contact(self) -> bool:
         """Does the aggregate touch the opposite wall?"""
         return bool((self.wall == TOP).any())
@@ -118,27 +123,30 @@ def resolution(scene: Scene) -> float:
     """
     if scene.numerics.order == 1 or scene.flow is None or scene.substrates is None:
         return scene.numerics.refinement
-    return max(scene.numerics.refinement, BOUNDARY_LAYER * peclet(scene, fastest(scene)) ** (1 / 3))
+    layers = peclet(scene, fastest(scene)) ** (1 / 3)
+    return max(scene.numerics.refinement, BOUNDARY_LAYER * layers)
 
 
 def fastest(scene: Scene) -> float:
     """Mean velocity (um/h) of a scene's flow; under a head that of the clean channel, the
     largest."""
-    drive = scene.flow
+    drive = needed(scene.flow, "[flow]")
     if drive.mean_velocity is not None:
         return drive.mean_velocity
     loss = flow.poiseuille_loss(scene.pore.length, scene.pore.width)
-    return drive.head * drive.gravity / drive.kinematic_viscosity / loss
+    return needed(drive.head, "flow.head") * drive.gravity / drive.kinematic_viscosity / loss
 
 
 def sized(scene: Scene, front: float = 1.0) -> Sizing:
     """How large the elements of its meshes are to be; front: as :class:`Pore`'s."""
     seed = scene.aggregate
     middle = seed.position if seed and seed.outline is None else None
-    return Sizing(scene.pore.width, resolution(scene), film(scene), scene.numerics.gradation, front, middle)
+    return Sizing(scene.pore.width, resolution(scene), film(scene), scene.numerics.gradation, front,
+                  middle)
 
 
-def generate(scene: Scene, outline: Outline | None, front: float = 1.0) -> tuple[Mesh, Outline | None]:
+def generate(scene: Scene, outline: Outline | None,
+             front: float = 1.0) -> tuple[Mesh, Outline | None]:
     """A new mesh around the aggregate (None: a clean channel) with the extent of 3.1, and the
     outline with the nodes that it has there. Raises MeshError where that cannot be."""
     numerics = scene.numerics
@@ -149,38 +157,41 @@ def generate(scene: Scene, outline: Outline | None, front: float = 1.0) -> tuple
 
 
 def initial_outline(scene: Scene, front: float = 1.0) -> Outline | None:
-    """The aggregate's boundary at t = 0, None in a clean channel; front: as :class:`Pore`'s."""
-    seed, geometry = scene.aggregate, scene.numerics.geometry
+    """The aggregate's boundary at t = 0, None in a clean channel; front: as that of a
+    :class:`Pore`."""
+    seed = scene.aggregate
     if seed is None:
         return None
+    geometry = scene.numerics.geometry
     if seed.outline is not None:
         return polygon(np.array(seed.outline), scene.pore.width, geometry, seed.smooth)
     across = sizing.ACROSS_AGGREGATE * resolution(scene) * front
-    return half_disc(seed.radius, across, geometry, seed.position)
+    return half_disc(needed(seed.radius, "aggregate.radius"), across, geometry, seed.position)
 
 
 def seeded(scene: Scene, front: float = 1.0) -> Pore:
-    """The pore at t = 0: X_A + X_I = X_m in the aggregate (Table 1), or a clean channel; front: as :class:`Pore`'s."""
-    numerics = scene.numerics
+    """The pore at t = 0: X_A + X_I = X_m in the aggregate (Table 1), or a clean channel; front: as
+    that of a :class:`Pore`."""
     mesh, outline = generate(scene, initial_outline(scene, front), front)
-    space = Space(mesh, numerics.order)
+    space = Space(mesh, scene.numerics.order)
     density = scene.kinetics.maximum_density if scene.kinetics else 0.0
     total = density * space.reaction.dx
     inert = total * (scene.aggregate.inert_fraction if scene.aggregate else 0.0)
-    wall, fixed = np.empty(0, int), np.empty(0, bool)
-    if outline:
-        wall, fixed = outline.wall, outline.fixed
+    wall = outline.wall if outline else np.empty(0, int)
+    fixed = outline.fixed if outline else np.empty(0, bool)
     body = material(space, mesh.points[mesh.body])
     theta = np.ones((np.count_nonzero(mesh.biomass), len(body.shape.table.weights)))
-    return Pore(0.0, space, wall, fixed, total - inert, inert, theta, body, np.zeros(mesh.corners),
-                front=front)
+    return Pore(0.0, space, wall, fixed, total - inert, inert, theta, body,
+                np.zeros(mesh.corners), front=front)
 
 
 def material(space: Space, reference: np.ndarray) -> growth.Body:
     """The aggregate of a mesh with its nodes' places (n, 2) um in the reference configuration,
     integrated where its growth is taken: in one point of a straight triangle."""
     topology = space.mesh.topology
-    degree = elements.GRADIENT_DEGREES[1] if space.mesh.geometry == 1 else elements.DEGREES[max(2, space.order)]
+    degree = elements.DEGREES[max(2, space.order)]
+    if space.mesh.geometry == 1:
+        degree = elements.GRADIENT_DEGREES[1]
     shape = growth.Shape(topology.body_cells, len(topology.body_corners), degree, topology.method)
     return growth.Body(shape, reference)
 
@@ -195,8 +206,8 @@ def solve(scene: Scene, now: Pore, over: float = 0.0) -> Solved:
     if scene.substrates is None:
         return Solved(carried, None, None)
     numerics = scene.numerics
-    problem = transport.problem(now.space, carried, scene.substrates, scene.kinetics, numerics.inlet,
-                                numerics.jacobian == "reused")
+    problem = transport.problem(now.space, carried, scene.substrates, scene.kinetics,
+                                numerics.inlet, numerics.jacobian == "reused")
     sink = biomass.sink(now.active if scene.kinetics else None, over)
     if numerics.transport == "gear":
         state = gear.settle(problem, sink, now.concentrations)
@@ -208,19 +219,27 @@ def solve(scene: Scene, now: Pore, over: float = 0.0) -> Solved:
 
 def peclet(scene: Scene, speed: float) -> float:
     """u W / D with the smaller diffusivity, for a mean velocity (um/h)."""
-    kinds = (scene.substrates.acceptor, scene.substrates.donor)
-    return speed * scene.pore.width / min(min(s.diffusivity, s.diffusivity_in_aggregate) for s in kinds)
+    both = needed(scene.substrates, "[substrates]")
+    slowest = min(min(s.diffusivity, s.diffusivity_in_aggregate)
+                  for s in (both.acceptor, both.donor))
+    return speed * scene.pore.width / slowest
 
 
 def refuse_no_supply(scene: Scene, carried: Flow | None) -> None:
     """Raises TransportError where the flow is too slow to supply anything: no state is steady."""
     if carried and peclet(scene, carried.mean_velocity) < SLOWEST:
-        raise TransportError(f"the Peclet number u W / D is {peclet(scene, carried.mean_velocity):.2g}, under "
-                             f"{SLOWEST:g}: nothing is supplied through the inlet; leave [flow] out for pure diffusion")
+        raise TransportError("the Peclet number u W / D is "
+                             f"{peclet(scene, carried.mean_velocity):.2g}, under {SLOWEST:g}: "
+                             "nothing is supplied through the inlet; leave [flow] out for pure "
+                             "diffusion")
 
 
 def solve_flow(scene: Scene, space: Space) -> Flow:
     """Stokes flow under the scene's head or mean velocity."""
     numerics = scene.numerics
-    element = Bubble() if numerics.flow_element == "bubble" else Stabilised(numerics.flow_stabilisation)
-    return flow.solve(space, scene.flow, scene.pore.length, interface=numerics.interface, element=element)
+    element: Bubble | Stabilised = Stabilised(numerics.flow_stabilisation)
+    if numerics.flow_element == "bubble":
+        element = Bubble()
+    drive = needed(scene.flow, "[flow]")
+    length = scene.pore.length
+    return flow.solve(space, drive, length, interface=numerics.interface, element=element)

@@ -13,15 +13,17 @@ from repro.fem.space import Space
 from repro.fem.transfer import Located
 from repro.model import biomass, mesh_motion, pore
 from repro.model.biomass import Amounts
+from repro.model.growth import Body
 from repro.model.pore import Pore, Solved
 from repro.model.transport import UNRESOLVED, Concentrations
-from repro.scene import Scene, Substrate
+from repro.scene import Scene, Substrate, needed
 
 #: What element sizes at the aggregate are divided by at most, for a front of the substrates.
 MOST_GRADED = 4.0
-#: Factors of the refinement that are tried where that is not enough, and the largest refinement
-#: that scenes accept.
-TRIED, MOST_REFINED = (1.5, 2.0, 3.0, 4.0, 6.0), 20.0
+#: Factors of the refinement that are tried where that is not enough.
+TRIED = (1.5, 2.0, 3.0, 4.0, 6.0)
+#: The largest refinement that scenes accept.
+MOST_REFINED = 20.0
 
 
 def new_mesh(scene: Scene, now: Pore, expanded: Pore, speed: float) -> tuple[Pore, bool]:
@@ -71,7 +73,10 @@ def advised(scene: Scene, now: Pore, error: Unresolved) -> Unresolved:
             break
         finer = replace(scene, numerics=replace(scene.numerics, refinement=wanted))
         try:
-            trial = pore.seeded(finer, now.front) if now.time == 0 else remesh(finer, now, now, 0.0)[0]
+            if now.time == 0:
+                trial = pore.seeded(finer, now.front)
+            else:
+                trial = remesh(finer, now, now, 0.0)[0]
             solved = pore.solve(finer, trial)
         except StageError:
             continue
@@ -89,19 +94,21 @@ def _with_room(scene: Scene, solved: Solved) -> bool:
 
 def followed(scene: Scene, now: Pore, expanded: Pore) -> Mesh | None:
     """The mesh moved with the aggregate, None where a new one is due."""
-    outline, width = expanded.outline, scene.pore.width
-    stale = (sizing.extent_too_short(outline, now.mesh.ends, width, scene.pore.length)
-             or (expanded.wall != now.wall).any() or sizing.too_coarse(outline.corners, pore.sized(scene)))
-    if stale:
+    outline = expanded.boundary
+    mesh = now.mesh
+    if (sizing.extent_too_short(outline, mesh.ends, scene.pore.width, scene.pore.length)
+            or (expanded.wall != now.wall).any()
+            or sizing.too_coarse(outline.corners, pore.sized(scene))):
         return None
-    numerics, mesh = scene.numerics, now.mesh
-    points = mesh_motion.move(mesh, expanded.mesh.points[mesh.body], numerics.mesh_compressibility,
-                              numerics.flow_stabilisation)
+    numerics = scene.numerics
+    points = mesh_motion.move(mesh, expanded.mesh.points[mesh.body],
+                              numerics.mesh_compressibility, numerics.flow_stabilisation)
     moved = mesh.moved(points)
     return moved if moved.acceptable() else None
 
 
-def remesh(scene: Scene, now: Pore, expanded: Pore, speed: float, others: Amounts = ()) -> tuple[Pore, Amounts]:
+def remesh(scene: Scene, now: Pore, expanded: Pore, speed: float,
+           others: Amounts = ()) -> tuple[Pore, Amounts]:
     """The pore on a new mesh around the aggregate, with the extent of 3.1; fields, places at t = 0
     and other amounts (r, q) of the same material are carried over.
 
@@ -109,24 +116,35 @@ def remesh(scene: Scene, now: Pore, expanded: Pore, speed: float, others: Amount
     X_m, so that the error of the constraint is worked off at the next update and does not
     accumulate [E7].
     """
-    mesh, outline = pore.generate(scene, expanded.outline, expanded.front)
-    old, new = expanded.mesh, Space(mesh, now.space.order)
+    mesh, generated = pore.generate(scene, expanded.boundary, expanded.front)
+    outline = needed(generated, "an aggregate")
+    old = expanded.mesh
+    new = Space(mesh, now.space.order)
     at = transfer.located(old.points, old.cells[old.biomass], mesh.points[mesh.body])
     body = _material(new, expanded, outline.origin, at)
-    amounts = biomass.carried(scene.numerics.transfer, expanded.space, new, at,
-                              (expanded.active, expanded.inert, *others), scene.kinetics.maximum_density)
+    active, inert, *rest = biomass.carried(scene.numerics.transfer, expanded.space, new, at,
+                                           (expanded.active, expanded.inert, *others),
+                                           needed(scene.kinetics, "[kinetics]").maximum_density)
+    substrates = carried_substrates(scene, now.space, new, expanded.concentrations, speed)
+    found = Pore(expanded.time, new, outline.wall, outline.fixed, active, inert, np.empty(0), body,
+                 _pressure(mesh, expanded, at), substrates, expanded.front)
+    return replace(found, theta=expansion(scene, found)), tuple(rest)
+
+
+def _pressure(mesh: Mesh, expanded: Pore, at: Located) -> np.ndarray:
+    """(corners,) P / mu_L on a new mesh, interpolated in the aggregate, zero in the fluid."""
+    old = expanded.mesh
     pressure = np.zeros(mesh.corners)
-    inside = mesh.body < mesh.corners
-    pressure[mesh.topology.body_corners] = at.field(expanded.pressure, old.triangles[old.biomass], 1)[inside]
-    found = Pore(expanded.time, new, outline.wall, outline.fixed, amounts[0], amounts[1], np.empty(0), body, pressure,
-                 carried_substrates(scene, now.space, new, expanded.concentrations, speed), expanded.front)
-    return replace(found, theta=expansion(scene, found)), amounts[2:]
+    inside = at.field(expanded.pressure, old.triangles[old.biomass], 1)[mesh.body < mesh.corners]
+    pressure[mesh.topology.body_corners] = inside
+    return pressure
 
 
-def _material(new: Space, expanded: Pore, rim: np.ndarray, at: Located):
+def _material(new: Space, expanded: Pore, rim: np.ndarray, at: Located) -> Body:
     """The aggregate at t = 0 on a new mesh: interpolated places, on its boundary (M, 2) um those of
     the outline."""
-    mesh, old = new.mesh, expanded.mesh
+    mesh = new.mesh
+    old = expanded.mesh
     origin = mesh.points.copy()
     origin[mesh.body] = at.field(expanded.origin, old.cells[old.biomass], old.geometry)
     origin[mesh.loop] = rim
@@ -137,7 +155,8 @@ def expansion(scene: Scene, now: Pore) -> np.ndarray:
     """(t, q) J times the density over X_m, in the points where growth is taken: on straight
     triangles the mean density of their nodes (29), on curved ones that of each point."""
     J = now.body.strained(now.mesh.points[now.mesh.body]).J
-    density = (now.active + now.inert) / now.space.reaction.dx / scene.kinetics.maximum_density
+    maximum = needed(scene.kinetics, "[kinetics]").maximum_density
+    density = (now.active + now.inert) / now.space.reaction.dx / maximum
     return J * spread(now.space, density)
 
 
@@ -161,8 +180,9 @@ def carried_substrates(scene: Scene, old: Space, new: Space, state: Concentratio
     where = np.column_stack([np.clip(x, first, last), new.points[:, 1]])
     at = transfer.located(old.mesh.points, old.mesh.cells, where)
     fields = at.field(np.column_stack([state.acceptor, state.donor]), old.cells, old.order)
-    kinds = (scene.substrates.acceptor, scene.substrates.donor)
-    acceptor, donor = (_beyond(field, substrate, x, old.mesh.ends, speed) for field, substrate in zip(fields.T, kinds))
+    both = needed(scene.substrates, "[substrates]")
+    acceptor, donor = (_beyond(field, substrate, x, old.mesh.ends, speed)
+                       for field, substrate in zip(fields.T, (both.acceptor, both.donor)))
     return Concentrations(acceptor, donor)
 
 
@@ -172,4 +192,5 @@ def _beyond(field: np.ndarray, substrate: Substrate, x: np.ndarray, ends: tuple[
     before = np.minimum(x - ends[0], 0.0)
     if speed == 0:
         return np.where((before < 0) | (x > ends[1]), substrate.supply, field)
-    return substrate.supply - (substrate.supply - field) * np.exp(speed * before / substrate.diffusivity)
+    faded = np.exp(speed * before / substrate.diffusivity)
+    return substrate.supply - (substrate.supply - field) * faded

@@ -29,7 +29,7 @@ from repro.fem.space import Space
 from repro.model import mesh_motion, pore, remeshing
 from repro.model.flow import Flow, pressure_space
 from repro.model.pore import Pore
-from repro.scene import Scene
+from repro.scene import Scene, needed
 
 #: rho g in MPa/um, for rho in mg/L and g in um/h^2.
 MPA_PER_UM = 1e-3 * 1e-6 / 3600**2 * 1e-12
@@ -66,20 +66,26 @@ def surroundings(scene: Scene, before: Pore, shaped: Pore) -> Surroundings:
 
 def forces(scene: Scene, around: Surroundings, shaped: Pore) -> np.ndarray:
     """(n, 2) um: nodal forces over mu_L on ``shaped.mesh.body`` by the flow around that shape."""
-    mesh, own = around.mesh, shaped.mesh.points[shaped.mesh.body]
+    mesh = around.mesh
+    own = shaped.mesh.points[shaped.mesh.body]
     places = np.einsum("ka,kai->ki", around.share, own[around.nodes])
     if np.abs(places - mesh.points[mesh.body]).max() > ROUND_OFF * mesh.width:
         numerics = scene.numerics
-        mesh = mesh.moved(mesh_motion.move(mesh, places, numerics.mesh_compressibility, numerics.flow_stabilisation))
+        mesh = mesh.moved(mesh_motion.move(mesh, places, numerics.mesh_compressibility,
+                                           numerics.flow_stabilisation))
     if mesh.areas.min() <= 0 or mesh.turned_over().any():
-        raise GrowthError("the fluid's forces move the aggregate so far that the mesh around it turns over; "
-                          'try a shorter growth.time_step, or growth.fluid_forces = "neglected"')
-    drive, space = scene.flow, Space(mesh, shaped.space.order)
+        raise GrowthError("the fluid's forces move the aggregate so far that the mesh around it "
+                          "turns over; try a shorter growth.time_step, or "
+                          'growth.fluid_forces = "neglected"')
+    drive = needed(scene.flow, "[flow]")
+    modulus = needed(scene.growth, "[growth]").shear_modulus
+    space = Space(mesh, shaped.space.order)
     found = pore.solve_flow(scene, space)
-    on = nodal(space, found, drive.kinematic_viscosity / drive.gravity, scene.numerics.interface)[mesh.body]
+    viscosity = drive.kinematic_viscosity / drive.gravity
+    on = nodal(space, found, viscosity, scene.numerics.interface)[mesh.body]
     total = np.zeros_like(own)
     np.add.at(total, around.nodes, around.share[..., None] * on[:, None])
-    return MPA_PER_UM * drive.density * drive.gravity / scene.growth.shear_modulus * total
+    return MPA_PER_UM * drive.density * drive.gravity / modulus * total
 
 
 def nodal(space: Space, found: Flow, viscosity: float, interface: str) -> np.ndarray:
@@ -87,7 +93,9 @@ def nodal(space: Space, found: Flow, viscosity: float, interface: str) -> np.nda
 
     viscosity: nu_water / g, um h; interface: "laplacian" or "traction".
     """
-    mesh, wet, pressure = space.mesh, ~space.mesh.biomass, pressure_space(space)
+    mesh = space.mesh
+    wet = ~mesh.biomass
+    pressure = pressure_space(space)
     at = space.gradients_at
     grad = np.einsum("tai,tqka->tqik", found.velocity[space.cells[wet]], at.slopes[wet])
     if interface == "traction":
@@ -98,4 +106,5 @@ def nodal(space: Space, found: Flow, viscosity: float, interface: str) -> np.nda
     slopes = elements.points(mesh.points[mesh.cells[wet]], of).slopes
     local = -np.einsum("tq,tqik,tqka->tai", at.dx[wet], stress, slopes)
     nodes = mesh.cells[wet].ravel()
-    return np.column_stack([np.bincount(nodes, local[..., i].ravel(), len(mesh.points)) for i in (0, 1)])
+    return np.column_stack([np.bincount(nodes, local[..., i].ravel(), len(mesh.points))
+                            for i in (0, 1)])

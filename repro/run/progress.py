@@ -12,8 +12,11 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from functools import partial
+from typing import TextIO
 
 from tqdm import tqdm
+
+from repro.errors import OutputError
 
 Tell = Callable[[dict], None]
 
@@ -36,15 +39,23 @@ def say(text: str, *, aside: bool = False) -> None:
     """A line on standard output, or aside on standard error, while anybody reads that.
 
     When the other end of a pipe is closed, what follows goes nowhere, at the end of the process
-    too.
+    too. Raises OutputError where standard output takes nothing more, as on a full disk; what is
+    said aside is then lost.
     """
     stream = sys.stderr if aside else sys.stdout
     try:
         print(text, file=stream, flush=True)
-    except BrokenPipeError:
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, stream.fileno())
-        os.close(nowhere)
+    except OSError as error:
+        _lead_nowhere(stream)
+        if not aside and not isinstance(error, BrokenPipeError):
+            raise OutputError(f"standard output: {error.strerror or error}") from error
+
+
+def _lead_nowhere(stream: TextIO) -> None:
+    """Have what is written to a stream from now on, and what waits to be, thrown away."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, stream.fileno())
+    os.close(nowhere)
 
 
 def in_json(event: dict) -> None:

@@ -134,7 +134,7 @@ def refined() -> Outcome:
 def _piece(elements: str, refinement: float, minutes: float, finer: int):
     """(differences, profiles) after 2 h."""
     scene = runs.base("2 h", 'aggregate.radius="20 um"', runs.of(elements),
-                      runs.coarser(elements, 0.3 * refinement, refinement),
+                      runs.coarser(elements, 0.45 * refinement, refinement),
                       f'growth.time_step="{minutes} min"')
     scene = runs.at_velocity(scene, runs.SPEED)
     instants = averaged.ours(scene)

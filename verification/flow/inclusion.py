@@ -73,10 +73,10 @@ def inclusion_quadratic() -> Outcome:
 
 def _round_studies(order: int, interface: str) -> list[Study]:
     """Of a disc bounded by arcs."""
-    soft, stiff = (refine(_errors, range(len(SIZES)), _problem(ratio, interface, order), ROUND_SIZES[order], ROUND_DRAWS,
+    sizes, where = np.array(ROUND_SIZES[order]), f"round, order {order}, {interface}"
+    soft, stiff = (refine(_errors, range(len(sizes)), _problem(ratio, interface, order), sizes, ROUND_DRAWS,
                           grids.round_disc) for ratio in (10.0, 2000.0))
     low, high, why, ceiling = ROUND[order]
-    sizes, where = np.array(ROUND_SIZES[order]), f"round, order {order}, {interface}"
     return [Study(f"velocity, lambda = 10, {where}", sizes, soft["velocity"], 0.9, 1.8, SLOW, 1e-3),
             Study(f"velocity, lambda = 2000, {where}", sizes, stiff["velocity"], low, high, why, ceiling),
             _pressure_study(f"pressure, lambda = 10, {where}", sizes, soft["pressure"]),
