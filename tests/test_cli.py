@@ -3,10 +3,12 @@
 import csv
 import json
 import math
+import os
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 from xml.etree import ElementTree
 
 import meshio
@@ -184,3 +186,37 @@ def test_unset_beside_set(capsys):
     assert "no aggregate: a clean channel" in capsys.readouterr().out
     assert main(["check", "initial_mesh", "--unset", "flow"]) == 2
     assert capsys.readouterr().err == 'repro: initial_mesh: --unset "flow": the scene does not set it\n'
+
+
+#: What writes text of its own to standard output: long, in lines, for machines.
+WRITERS = [["scene", "base"], ["scene"], ["check", "base"], ["check", "base", "--json"]]
+
+
+def process_of(arguments, out):
+    """`repro ARGUMENTS` in a process of its own, with a file as its standard output."""
+    code = "import sys; from repro.cli import main; sys.exit(main(sys.argv[1:]))"
+    command = [sys.executable, "-c", code, *arguments]
+    return subprocess.run(command, stdout=out, stderr=subprocess.PIPE, text=True, timeout=60)
+
+
+@pytest.mark.parametrize("arguments", WRITERS)
+def test_nobody_reads_what_is_written(arguments):
+    """As under `| head -1`. Mutants: a traceback, then or when the process ends."""
+    end, pipe = os.pipe()
+    os.close(end)
+    process = process_of(arguments, pipe)
+    os.close(pipe)
+    assert (process.returncode, process.stderr) == (0, "")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that takes nothing is needed")
+@pytest.mark.parametrize("arguments, message", [
+    *((arguments, "standard output: No space left on device") for arguments in WRITERS),
+    (["run", "nowhere", "--out", "x", "--json"], "nowhere: neither a file nor a packaged scene"),
+])
+def test_what_cannot_be_written_is_told_in_a_line(arguments, message):
+    """A full disk is a failure. Mutants: a traceback, then or when the process ends; status 0."""
+    with open("/dev/full", "w") as full:
+        process = process_of(arguments, full)
+    assert process.returncode == 2 and process.stderr.count("\n") == 1
+    assert process.stderr.startswith(f"repro: {message}")

@@ -1,8 +1,9 @@
 """Command line: ``repro COMMAND ...``; each command is a module of :mod:`repro.cli`.
 
 Exit status: 0 when the command has done what it is for, 1 when a stage failed, 2 when something in
-the input is wrong or a folder cannot be used, 3 when some runs of a sweep have failed, 130 or 143
-when interrupted or terminated.
+the input is wrong, or a folder, a file or standard output cannot be used, 3 when some runs of a
+sweep have failed, 130 or 143 when interrupted or terminated. Output that nobody reads any more, as
+under ``| head -1``, is no failure.
 """
 
 from __future__ import annotations
