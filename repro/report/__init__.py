@@ -33,7 +33,10 @@ def write(folder: Path) -> Path:
 
 
 def compare(folders: Sequence[Path], target: Path) -> Path:
-    """Make a page of two runs or more at ``target``; returns it. Raises NoRun where a folder holds no run."""
+    """Make a page of two runs or more at ``target``; returns it.
+
+    Raises NoRun where a folder holds no run.
+    """
     _write(target, comparison.build([read(folder) for folder in folders]))
     return target
 

@@ -1,6 +1,7 @@
 """Line charts as inline SVG, drawn from numbers alone: the same numbers, the same bytes.
 
-Colours and fonts are the page's (classes ``line0`` ... ``line7``); what a pointer is told goes into ``data-chart``.
+Colours and fonts are the page's (classes ``line0`` ... ``line7``); what a pointer is told goes into
+``data-chart``.
 """
 
 from __future__ import annotations
@@ -14,7 +15,11 @@ from html import escape
 import numpy as np
 
 WIDTH, HEIGHT = 360, 224
-LEFT, RIGHT, TOP, BOTTOM = 72, 10, 8, 38
+#: Room around the drawing for what is written.
+LEFT = 72
+RIGHT = 10
+TOP = 8
+BOTTOM = 38
 COLOURS = 8
 #: A positive quantity that spans more than this factor is drawn on a logarithmic scale.
 LOG_FROM = 30.0
@@ -52,8 +57,12 @@ class Scale:
     log: bool = False
 
     def __call__(self, value):
-        low, high, value = (np.log10(v) if self.log else np.asarray(v, float) for v in (self.low, self.high, value))
-        return self.start + (value - low) / (high - low) * (self.end - self.start)
+        low, high = self._even(self.low), self._even(self.high)
+        return self.start + (self._even(value) - low) / (high - low) * (self.end - self.start)
+
+    def _even(self, value):
+        """The value, or its logarithm: what is spaced evenly along the axis."""
+        return np.log10(value) if self.log else np.asarray(value, float)
 
 
 def svg(chart: Chart) -> str:
@@ -62,14 +71,22 @@ def svg(chart: Chart) -> str:
     x, y = _scales(lines)
     body = _grid(x, y) + "".join(_mark(x, time) for time in chart.marks if x.low <= time <= x.high)
     body += "".join(_drawn(line, k, x, y) for k, line in enumerate(lines))
-    log = " (log scale)" if y.log else ""
-    body += (f'<text class="name" x="{(LEFT + WIDTH - RIGHT) / 2:g}" y="{HEIGHT - 4}">time (h)</text>'
-             f'<text class="name" transform="translate(10 {(TOP + HEIGHT - BOTTOM) / 2:g}) rotate(-90)">'
-             f"{escape(chart.axis + log)}</text>")
-    body += f'<line class="now" x1="0" x2="0" y1="{TOP}" y2="{HEIGHT - BOTTOM}" visibility="hidden"/>'
-    return (f'<figure class="chart" data-chart="{escape(_told(lines, x))}"><figcaption>{escape(chart.title)}'
-            f'{_legend(lines)}</figcaption><svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" '
-            f'aria-label="{escape(chart.title)} over time">{body}</svg><output>&nbsp;</output></figure>')
+    body += _names(chart.axis + (" (log scale)" if y.log else ""))
+    body += (f'<line class="now" x1="0" x2="0" y1="{TOP}" y2="{HEIGHT - BOTTOM}" '
+             'visibility="hidden"/>')
+    title = escape(chart.title)
+    return (f'<figure class="chart" data-chart="{escape(_told(lines, x))}">'
+            f"<figcaption>{title}{_legend(lines)}</figcaption>"
+            f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{title} over time">{body}'
+            "</svg><output>&nbsp;</output></figure>")
+
+
+def _names(up: str) -> str:
+    """What the axes show: time, and upwards what is drawn."""
+    middle = (TOP + HEIGHT - BOTTOM) / 2
+    return (f'<text class="name" x="{(LEFT + WIDTH - RIGHT) / 2:g}" y="{HEIGHT - 4}">time (h)</text>'
+            f'<text class="name" transform="translate(10 {middle:g}) rotate(-90)">'
+            f"{escape(up)}</text>")
 
 
 def thinned(line: Line) -> Line:
@@ -135,23 +152,38 @@ def number(value: float, digits: int | None = None) -> str:
 
 
 def _grid(x: Scale, y: Scale) -> str:
+    """Lines across with their values, and the time axis with its ticks."""
+    right, bottom = WIDTH - RIGHT, HEIGHT - BOTTOM
+    rows = "".join(_row(y(value), text) for value, text in ticks(y, 4))
+    columns = "".join(_tick(x(value), text) for value, text in ticks(x))
+    axis = f'<line class="tick" x1="{LEFT}" x2="{right}" y1="{bottom}" y2="{bottom}"/>'
+    return rows + columns + axis
+
+
+def _row(place: float, text: str) -> str:
+    """A line across the drawing, with the value that it stands for."""
+    return (f'<line class="grid" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{place:.1f}" y2="{place:.1f}"/>'
+            f'<text class="y" x="{LEFT - 5}" y="{place + 3.5:.1f}">{text}</text>')
+
+
+def _tick(place: float, text: str) -> str:
+    """A tick of the time axis, with its time."""
     bottom = HEIGHT - BOTTOM
-    rows = "".join(f'<line class="grid" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{y(v):.1f}" y2="{y(v):.1f}"/>'
-                   f'<text class="y" x="{LEFT - 5}" y="{y(v) + 3.5:.1f}">{text}</text>' for v, text in ticks(y, 4))
-    columns = "".join(f'<line class="tick" x1="{x(v):.1f}" x2="{x(v):.1f}" y1="{bottom}" y2="{bottom + 4}"/>'
-                      f'<text class="x" x="{x(v):.1f}" y="{bottom + 15}">{text}</text>' for v, text in ticks(x))
-    return f'{rows}{columns}<line class="tick" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{bottom}" y2="{bottom}"/>'
+    return (f'<line class="tick" x1="{place:.1f}" x2="{place:.1f}" y1="{bottom}" y2="{bottom + 4}"/>'
+            f'<text class="x" x="{place:.1f}" y="{bottom + 15}">{text}</text>')
 
 
 def _mark(x: Scale, time: float) -> str:
-    return f'<line class="mark" x1="{x(time):.1f}" x2="{x(time):.1f}" y1="{TOP}" y2="{HEIGHT - BOTTOM}"/>'
+    place = f"{x(time):.1f}"
+    return f'<line class="mark" x1="{place}" x2="{place}" y1="{TOP}" y2="{HEIGHT - BOTTOM}"/>'
 
 
 def _drawn(line: Line, k: int, x: Scale, y: Scale) -> str:
     """A line's pieces between gaps; a piece of one point is a dot."""
-    known = np.isfinite(line.values) & ((line.values > 0) | (not y.log))
-    pieces = np.split(np.flatnonzero(known), np.flatnonzero(np.diff(np.flatnonzero(known)) > 1) + 1)
-    return "".join(_piece(x(line.times[piece]), y(line.values[piece]), k, line.dots) for piece in pieces)
+    known = np.flatnonzero(np.isfinite(line.values) & ((line.values > 0) | (not y.log)))
+    pieces = np.split(known, np.flatnonzero(np.diff(known) > 1) + 1)
+    return "".join(_piece(x(line.times[piece]), y(line.values[piece]), k, line.dots)
+                   for piece in pieces)
 
 
 def _piece(across: np.ndarray, up: np.ndarray, k: int, dots: bool) -> str:
@@ -159,14 +191,16 @@ def _piece(across: np.ndarray, up: np.ndarray, k: int, dots: bool) -> str:
     if len(points) > 1 and not dots:
         return f'<polyline class="line{k % COLOURS}" points="{" ".join(points)}"/>'
     places = (point.split(",") for point in points)
-    return "".join(f'<circle class="dot{k % COLOURS}" cx="{a}" cy="{b}" r="2.6"/>' for a, b in places)
+    return "".join(f'<circle class="dot{k % COLOURS}" cx="{a}" cy="{b}" r="2.6"/>'
+                   for a, b in places)
 
 
 def _legend(lines: Sequence[Line]) -> str:
     if len(lines) < 2:
         return ""
-    return '<span class="legend">' + "".join(f"<span>{swatch(k, line.dots)}{escape(line.label)}</span>"
-                                             for k, line in enumerate(lines)) + "</span>"
+    entries = "".join(f"<span>{swatch(k, line.dots)}{escape(line.label)}</span>"
+                      for k, line in enumerate(lines))
+    return f'<span class="legend">{entries}</span>'
 
 
 def swatch(k: int, dots: bool = False) -> str:
@@ -177,10 +211,14 @@ def swatch(k: int, dots: bool = False) -> str:
 
 
 def _told(lines: Sequence[Line], x: Scale) -> str:
-    """What a pointer is told, as JSON: the time axis (from, to, in the drawing from, to), and the lines' numbers."""
-    return json.dumps({"axis": [x.low, x.high, x.start, x.end],
-                       "lines": [{"label": line.label, "t": _short(line.times), "y": _short(line.values)}
-                                 for line in lines]}, separators=(",", ":"), allow_nan=False)
+    """What a pointer is told, as JSON: the time axis and the lines' numbers.
+
+    The axis is four numbers: from which time to which, and from where to where in the drawing.
+    """
+    numbers = [{"label": line.label, "t": _short(line.times), "y": _short(line.values)}
+               for line in lines]
+    told = {"axis": [x.low, x.high, x.start, x.end], "lines": numbers}
+    return json.dumps(told, separators=(",", ":"), allow_nan=False)
 
 
 def _short(values: np.ndarray) -> list[float | None]:

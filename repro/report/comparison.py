@@ -13,7 +13,8 @@ from repro.report.reading import Run
 from repro.results import names
 
 #: Columns without a value between rows, and defects, which are round-off.
-NOT_COMPARED = {"time_h", "nodes", "acceptor_balance", "donor_balance", "biomass_balance", *names.YES_NO}
+NOT_COMPARED = {"time_h", "nodes", "acceptor_balance", "donor_balance", "biomass_balance",
+                *names.YES_NO}
 
 
 def build(runs: Sequence[Run]) -> str:
@@ -32,9 +33,14 @@ def short(folders: Sequence[Path]) -> list[str]:
 
 
 def _head(runs: Sequence[Run], labels: Sequence[str]) -> str:
-    rows = "".join(f"<li>{charts.swatch(k)}<b>{escape(label)}</b>: {escape(_told(run))}; {escape(str(run.folder))}</li>"
-                   for k, (run, label) in enumerate(zip(runs, labels)))
+    rows = "".join(map(_item, range(len(runs)), runs, labels))
     return f'<header><h1>{len(runs)} runs compared</h1><ul class="runs">{rows}</ul></header>\n'
+
+
+def _item(k: int, run: Run, label: str) -> str:
+    """The run of this number in the page's list of runs."""
+    return (f"<li>{charts.swatch(k)}<b>{escape(label)}</b>: {escape(_told(run))}; "
+            f"{escape(str(run.folder))}</li>")
 
 
 def _told(run: Run) -> str:
@@ -43,11 +49,23 @@ def _told(run: Run) -> str:
 
 
 def differences(runs: Sequence[Run]) -> list[tuple[str, ...]]:
-    """(key, value in each run) of the scenes' keys that are not the same in all; "-" where a run has none."""
+    """The scenes' keys that are not the same in all runs: (key, value in each run).
+
+    "-" stands where a run has none.
+    """
     scenes = [page.flat(run.record.get("tables", {})) for run in runs]
-    keys = dict.fromkeys(key for scene in scenes for key in scene)
-    return [(key, *(page.shown(scene[key]) if key in scene else "-" for scene in scenes))
-            for key in keys if any(scene.get(key) != scenes[0].get(key) for scene in scenes)]
+    keys = dict.fromkeys(key for keys in scenes for key in keys)
+    return [(key, *_shown(key, scenes)) for key in keys if _differs(key, scenes)]
+
+
+def _differs(key: str, scenes: Sequence[dict[str, object]]) -> bool:
+    """Has a scene another value of a key than the first one?"""
+    return any(keys.get(key) != scenes[0].get(key) for keys in scenes)
+
+
+def _shown(key: str, scenes: Sequence[dict[str, object]]) -> list[str]:
+    """The value of a key in each scene, for people to read."""
+    return [page.shown(keys[key]) if key in keys else "-" for keys in scenes]
 
 
 def _scenes(runs: Sequence[Run], labels: Sequence[str]) -> str:
@@ -61,9 +79,16 @@ def common_time(runs: Sequence[Run]) -> float | None:
 
 
 def values(runs: Sequence[Run], time: float) -> dict[str, list[float | None]]:
-    """Each column's value in each run at a time (h), linear between rows; None where it is not known then."""
+    """Each column's value in each run at a time (h), linear between rows.
+
+    None where it is not known then.
+    """
     columns = dict.fromkeys(name for run in runs for name in run.series if name not in NOT_COMPARED)
-    return {name: [_at(run, name, time) for run in runs] for name in columns}
+    return {name: _in_each(runs, name, time) for name in columns}
+
+
+def _in_each(runs: Sequence[Run], name: str, time: float) -> list[float | None]:
+    return [_at(run, name, time) for run in runs]
 
 
 def _at(run: Run, name: str, time: float) -> float | None:
@@ -79,9 +104,9 @@ def _values(runs: Sequence[Run], labels: Sequence[str]) -> str:
         return ""
     head = ["", labels[0], *(text for label in labels[1:] for text in (label, "difference"))]
     rows = [(names.with_unit(name), *_row(found)) for name, found in values(runs, time).items()
-            if any(value is not None for value in found)]
-    note = (f'<p class="note">At t = {time:.6g} h, the last time that every run has reached, linear between rows. '
-            "Differences are relative to the first run.</p>")
+            if found != [None] * len(runs)]
+    note = (f'<p class="note">At t = {time:.6g} h, the last time that every run has reached, '
+            "linear between rows. Differences are relative to the first run.</p>")
     return page.section("Values at the common last time", note, page.table("", head, rows))
 
 

@@ -45,12 +45,12 @@ def _read(folder: Path, name: str, how):
     try:
         return how(folder / name)
     except FileNotFoundError:
-        raise NoRun(f"{folder}: it holds no run: {name} is missing; a folder that `repro run` wrote is "
-                          "needed") from None
+        raise NoRun(f"{folder}: it holds no run: {name} is missing; a folder that `repro run` "
+                    "wrote is needed") from None
     except (OSError, ValueError, RecursionError, csv.Error) as error:
         why = getattr(error, "strerror", None) or error
         raise NoRun(f"{folder}: {name} cannot be read: {why}; a folder that `repro run` wrote is "
-                          "needed") from error
+                    "needed") from error
 
 
 def _record(path: Path) -> dict:

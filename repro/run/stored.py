@@ -39,7 +39,8 @@ def packed(scene: Scene, state: State) -> tuple[dict, dict[str, np.ndarray]]:
     if guess:
         arrays |= {name: getattr(guess, name) for name in GUESS}
     return {"scene": scene_hash(scene), "time_h": now.time, "pace": list(astuple(state.pace)),
-            "ends_um": [float(x) for x in now.mesh.ends], "front": float(now.front), "guess": guess.iterations if guess else None,
+            "ends_um": [float(x) for x in now.mesh.ends], "front": float(now.front),
+            "guess": guess.iterations if guess else None,
             "ledgers": [_numbers(ledger) for ledger in state.ledgers], "remeshes": int(state.remeshes),
             "iterations": state.iterations}, arrays
 
