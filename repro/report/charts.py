@@ -83,8 +83,8 @@ def svg(chart: Chart) -> str:
 
 def _names(up: str) -> str:
     """What the axes show: time, and upwards what is drawn."""
-    middle = (TOP + HEIGHT - BOTTOM) / 2
-    return (f'<text class="name" x="{(LEFT + WIDTH - RIGHT) / 2:g}" y="{HEIGHT - 4}">time (h)</text>'
+    across, middle = (LEFT + WIDTH - RIGHT) / 2, (TOP + HEIGHT - BOTTOM) / 2
+    return (f'<text class="name" x="{across:g}" y="{HEIGHT - 4}">time (h)</text>'
             f'<text class="name" transform="translate(10 {middle:g}) rotate(-90)">'
             f"{escape(up)}</text>")
 
@@ -103,7 +103,8 @@ def _scales(lines: Sequence[Line]) -> tuple[Scale, Scale]:
     low, high = float(values.min()), float(values.max())
     log = low > 0 and high / LOG_FROM > low
     if log:
-        low, high = 10.0 ** math.floor(math.log10(low)), 10.0 ** math.ceil(math.log10(high))
+        low = 10.0 ** math.floor(math.log10(low))
+        high = 10.0 ** math.ceil(math.log10(high))
     else:
         low, high = _roomy(low, high)
     first, last = float(times.min()), float(times.max())
@@ -162,14 +163,16 @@ def _grid(x: Scale, y: Scale) -> str:
 
 def _row(place: float, text: str) -> str:
     """A line across the drawing, with the value that it stands for."""
-    return (f'<line class="grid" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{place:.1f}" y2="{place:.1f}"/>'
+    return (f'<line class="grid" x1="{LEFT}" x2="{WIDTH - RIGHT}" '
+            f'y1="{place:.1f}" y2="{place:.1f}"/>'
             f'<text class="y" x="{LEFT - 5}" y="{place + 3.5:.1f}">{text}</text>')
 
 
 def _tick(place: float, text: str) -> str:
     """A tick of the time axis, with its time."""
     bottom = HEIGHT - BOTTOM
-    return (f'<line class="tick" x1="{place:.1f}" x2="{place:.1f}" y1="{bottom}" y2="{bottom + 4}"/>'
+    return (f'<line class="tick" x1="{place:.1f}" x2="{place:.1f}" '
+            f'y1="{bottom}" y2="{bottom + 4}"/>'
             f'<text class="x" x="{place:.1f}" y="{bottom + 15}">{text}</text>')
 
 

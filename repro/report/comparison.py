@@ -70,7 +70,8 @@ def _shown(key: str, scenes: Sequence[dict[str, object]]) -> list[str]:
 
 def _scenes(runs: Sequence[Run], labels: Sequence[str]) -> str:
     found = page.table("", ["key", *labels], differences(runs))
-    return page.section("What differs in the scenes", found or "<p>Nothing: the scenes are the same.</p>")
+    nothing = "<p>Nothing: the scenes are the same.</p>"
+    return page.section("What differs in the scenes", found or nothing)
 
 
 def common_time(runs: Sequence[Run]) -> float | None:

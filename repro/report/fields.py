@@ -1,7 +1,8 @@
-"""The fields of a run as the page's script reads them: quantised to 16 bits, connectivities told once.
+"""The fields of a run as the page's script reads them: in 16 bits, connectivities told once.
 
-Each array is base64 of little-endian integers: places over the box of all frames, values over their own range, the
-largest integer where a value is not finite. Fields of the aggregate alone hold its nodes or triangles only, ascending.
+Each array is base64 of little-endian integers: places over the box of all frames, values over their
+own range, the largest integer where a value is not finite. Fields of the aggregate alone hold its
+nodes or triangles only, ascending.
 """
 
 from __future__ import annotations
@@ -22,9 +23,9 @@ LEVELS = 65534  # of a value; one more means that there is none
 _FILE = re.compile(r"fields/fields_\d{4,}\.vtu")
 
 #: What can be chosen, in this order.
-SHOWN = """velocity_m_per_d head_cm acceptor_mg_per_L donor_mg_per_L active_biomass inert_biomass theta J
-largest_principal_stress_MPa stress_xx_MPa stress_yy_MPa stress_zz_MPa stress_xy_MPa pressure_MPa
-displacement_um region""".split()
+SHOWN = """velocity_m_per_d head_cm acceptor_mg_per_L donor_mg_per_L active_biomass inert_biomass
+theta J largest_principal_stress_MPa stress_xx_MPa stress_yy_MPa stress_zz_MPa stress_xy_MPa
+pressure_MPa displacement_um region""".split()
 OF_AGGREGATE = {"active_biomass", "inert_biomass", "theta", "J", "displacement_um"}
 
 
@@ -34,30 +35,43 @@ def index(folder: Path) -> list[tuple[float, Path]]:
         return []
     entries = ElementTree.parse(folder / "fields.pvd").getroot().iter("DataSet")
     named = [(float(entry.get("timestep", "nan")), entry.get("file", "")) for entry in entries]
-    return [(time, folder / name) for time, name in named if _FILE.fullmatch(name) and (folder / name).is_file()]
+    return [(time, folder / name) for time, name in named
+            if _FILE.fullmatch(name) and (folder / name).is_file()]
 
 
 def packed(entries: list[tuple[float, Path]]) -> dict:
-    """What the script is given: the fields that there are, meshes, and frames; empty without any."""
+    """What the script is given: the fields that there are, meshes, and frames; empty without any.
+    """
     if not entries:
         return {}
     chosen = _chosen(entries)
     grids = [meshio.vtu.read(path) for _, path in chosen]
-    low, high = np.min([g.points.min(0) for g in grids], 0), np.max([g.points.max(0) for g in grids], 0)
+    low = np.min([grid.points.min(0) for grid in grids], 0)
+    high = np.max([grid.points.max(0) for grid in grids], 0)
     meshes: dict[bytes, dict] = {}
-    frames = [_frame(time, grid, low[:2], high[:2], meshes) for (time, _), grid in zip(chosen, grids)]
-    present = [name for name in SHOWN if any(name in frame["values"] for frame in frames)]
+    frames = [_frame(time, grid, low[:2], high[:2], meshes)
+              for (time, _), grid in zip(chosen, grids)]
+    described = [_described(name, grids[0]) for name in SHOWN if _in_any(frames, name)]
     return {"box": [low[0], high[0], low[1], high[1]], "of": len(entries), "frames": frames,
-            "meshes": list(meshes.values()), "fields": [_described(name, grids[0]) for name in present]}
+            "meshes": list(meshes.values()), "fields": described}
+
+
+def _in_any(frames: list[dict], name: str) -> bool:
+    """Does a frame have values of this field?"""
+    return any(name in frame["values"] for frame in frames)
 
 
 def _chosen(entries: list[tuple[float, Path]]) -> list[tuple[float, Path]]:
-    """Evenly chosen frames, the first and last among them, as many as the page may hold; the last is the largest."""
+    """Evenly chosen frames, the first and last among them, as many as the page may hold.
+
+    The last one is taken for the largest.
+    """
     grid = meshio.vtu.read(entries[-1][1])
     size = 8 / 3 * (len(grid.points) * (2 + len(grid.point_data)) + grid.cells[0].data.size
                     + len(grid.cells[0].data) * len(grid.cell_data))
     count = min(len(entries), MOST_FRAMES, max(2, int(MOST_BYTES / size)))
-    return [entries[k] for k in np.unique(np.linspace(0, len(entries) - 1, count).round().astype(int))]
+    evenly = np.linspace(0, len(entries) - 1, count).round().astype(int)
+    return [entries[k] for k in np.unique(evenly)]
 
 
 def _described(name: str, grid: meshio.Mesh) -> dict:
@@ -76,17 +90,26 @@ def _frame(time: float, grid: meshio.Mesh, low, high, meshes: dict[bytes, dict])
     region = grid.cell_data["region"][0] > 0.5
     key = cells.tobytes() + region.tobytes()
     if key not in meshes:
-        meshes[key] = {"per": cells.shape[1], "cells": _text(cells, "<u4"), "body": _text(region, "<u1")}
+        meshes[key] = {"per": cells.shape[1], "cells": _text(cells, "<u4"),
+                       "body": _text(region, "<u1")}
     span = np.where(high > low, high - low, 1.0)
     points = np.round((grid.points[:, :2] - low) / span * LEVELS)
+    return {"time": time, "mesh": list(meshes).index(key), "points": _text(points, "<u2"),
+            "values": _values(grid, region)}
+
+
+def _values(grid: meshio.Mesh, region: np.ndarray) -> dict[str, list]:
+    """What there is of SHOWN, of the aggregate's fields what lies in its `region` of triangles."""
+    nodes = np.unique(grid.cells[0].data[region])
+    cells = np.flatnonzero(region)
     found = grid.point_data | {name: value[0] for name, value in grid.cell_data.items()}
-    body = {"node": np.unique(cells[region]), "cell": np.flatnonzero(region)}
     values = {}
     for name in (name for name in SHOWN if name in found):
         value = np.linalg.norm(found[name], axis=1) if found[name].ndim == 2 else found[name]
-        here = body["node" if name in grid.point_data else "cell"] if _of_aggregate(name) else slice(None)
-        values[name] = _levels(value[here])
-    return {"time": time, "mesh": list(meshes).index(key), "points": _text(points, "<u2"), "values": values}
+        if _of_aggregate(name):
+            value = value[nodes if name in grid.point_data else cells]
+        values[name] = _levels(value)
+    return values
 
 
 def _levels(values: np.ndarray) -> list:
@@ -94,7 +117,10 @@ def _levels(values: np.ndarray) -> list:
     known = values[np.isfinite(values)]
     low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 0.0)
     steps = np.full(len(values), LEVELS + 1.0)
-    steps[np.isfinite(values)] = np.round((known - low) / (high - low) * LEVELS) if high > low else 0.0
+    if high > low:
+        steps[np.isfinite(values)] = np.round((known - low) / (high - low) * LEVELS)
+    else:
+        steps[np.isfinite(values)] = 0.0
     return [low, high, _text(steps, "<u2")]
 
 

@@ -1,4 +1,7 @@
-"""A page that is one file: style and scripts within it, nothing from elsewhere, everything told by others escaped."""
+"""A page that is one file: style and scripts within it, nothing from elsewhere.
+
+Everything that others tell is escaped.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,10 @@ from importlib import resources
 
 
 def page(title: str, body: str, scripts: Sequence[str]) -> str:
-    """A whole page with the package's scripts of these names; what the browser runs is known by its hash."""
+    """A whole page with the package's scripts of these names.
+
+    The browser knows what it may run by its hash.
+    """
     style = _content("page.css")
     code = [_content(name) for name in ("errors.js", *scripts)]
     run = "".join(f"<script>{text}</script>\n" for text in code)
@@ -55,12 +61,17 @@ def table(caption: str, head: Sequence[str], rows: Iterable[Sequence[object]]) -
     rows = list(rows)
     if not rows:
         return ""
-    heads = "".join(f'<th scope="col"{_value(k)}>{escape(text)}</th>' for k, text in enumerate(head))
-    body = "".join("<tr>" + "".join(f"<td{_value(k)}>{escape(str(text))}</td>" for k, text in enumerate(row)) + "</tr>"
-                   for row in rows)
+    heads = "".join(f'<th scope="col"{_value(k)}>{escape(text)}</th>'
+                    for k, text in enumerate(head))
+    body = "".join(map(_row, rows))
     top = f"<thead><tr>{heads}</tr></thead>" if head else ""
     title = f"<caption>{escape(caption)}</caption>" if caption else ""
     return f'<div class="scroll"><table>{title}{top}<tbody>{body}</tbody></table></div>'
+
+
+def _row(values: Sequence[object]) -> str:
+    cells = "".join(f"<td{_value(k)}>{escape(str(value))}</td>" for k, value in enumerate(values))
+    return f"<tr>{cells}</tr>"
 
 
 def _value(column: int) -> str:
@@ -86,7 +97,9 @@ def shown(value: object) -> str:
     if isinstance(value, list):
         return ", ".join(map(shown, value)) or "none"
     number, _, unit = str(value).partition(" ")
-    return f"{_six(number)} {unit}" if unit and isinstance(value, str) and _six(number) else str(value)
+    if unit and isinstance(value, str) and _six(number):
+        return f"{_six(number)} {unit}"
+    return str(value)
 
 
 def _six(text: str) -> str:

@@ -32,11 +32,15 @@ class Run:
 
 
 def read(folder: Path) -> Run:
-    """The run in a folder. Raises NoRun where it holds none, or one whose files cannot be read."""
+    """The run in a folder.
+
+    Raises NoRun where it holds none, or one whose files cannot be read.
+    """
     record = _read(folder, "run.json", _record)
     series = _read(folder, "timeseries.csv", lambda path: _table(path, ["time_h"]))
-    wanted = (folder / "ledger.csv").exists()
-    ledger = _read(folder, "ledger.csv", lambda path: _table(path, LEDGER_COLUMNS)) if wanted else {}
+    ledger = {}
+    if (folder / "ledger.csv").exists():
+        ledger = _read(folder, "ledger.csv", lambda path: _table(path, LEDGER_COLUMNS))
     return Run(folder, record, series, ledger)
 
 

@@ -22,14 +22,15 @@ PHYSICS = {
     "growth": "growth of the aggregate as a neo-Hookean body (2.3)",
 }
 #: What the page tells in a place of its own.
-TOLD = {"scene", "hash", "tables", "versions", "status", "rows", "wall_time_s", "wall_time_by_stage_s",
-        "newton_iterations", "remeshes", "warnings", "files", "origin"}
+TOLD = {"scene", "hash", "tables", "versions", "status", "rows", "wall_time_s",
+        "wall_time_by_stage_s", "newton_iterations", "remeshes", "warnings", "files", "origin"}
 
-NESTED = ("Each bar is the time within that stage, calls within calls counted in both: what is spent on factorising "
-          "and solving is also in the stage that asked for it, so that the bars do not add up to the whole.")
+NESTED = ("Each bar is the time within that stage, calls within calls counted in both: what is "
+          "spent on factorising and solving is also in the stage that asked for it, so that the "
+          "bars do not add up to the whole.")
 #: The numerics that the head of the page tells, and what must be modelled for them to matter.
-NUMERICS = {"preset": None, "elements": None, "refinement": None, "transport": "substrates", "time": "growth",
-            "transfer": "growth"}
+NUMERICS = {"preset": None, "elements": None, "refinement": None, "transport": "substrates",
+            "time": "growth", "transfer": "growth"}
 
 CONTROLS = """<div class="controls"><label>Field <select id="field"></select></label>
 <label><input type="checkbox" id="lines"> mesh</label>
@@ -37,15 +38,18 @@ CONTROLS = """<div class="controls"><label>Field <select id="field"></select></l
 <label{several}><input type="checkbox" id="fixed" checked> one colour scale for all times</label>
 <label{several}><input type="checkbox" id="whole" checked> one frame for all times</label></div>
 <div class="time"{several}><button type="button" id="play">Play</button>
-<input type="range" id="frame" min="0" value="0" step="1" aria-label="time"><output id="now"></output></div>
-<div class="scroll"><canvas id="picture" role="img"></canvas></div><output id="probe">&nbsp;</output>"""
+<input type="range" id="frame" min="0" value="0" step="1" aria-label="time">\
+<output id="now"></output></div>
+<div class="scroll"><canvas id="picture" role="img"></canvas></div>\
+<output id="probe">&nbsp;</output>"""
 
 
 def build(run: Run) -> str:
     """The page's text. Raises ValueError where a file of fields cannot be read."""
     drawn, packed = quantities.charts_of(run), _packed(run)
     body = (_head(run) + _fields(run, packed) + _charts(run, drawn)
-            + f'<div class="pair">{_numbers(run)}{_cost(run)}</div>' + _modelled(run) + _others(run))
+            + f'<div class="pair">{_numbers(run)}{_cost(run)}</div>' + _modelled(run)
+            + _others(run))
     more = page.data("fields", packed) if packed else ""
     return page.page(f"{run.record.get('scene')}: a pore", body + more,
                      ["charts.js", *(["mesh.js", "fields.js"] if packed else [])])
@@ -59,15 +63,27 @@ def _packed(run: Run) -> dict:
 
 
 def _head(run: Run) -> str:
-    status, record = str(run.record.get("status") or "status unknown"), run.record
+    status = str(run.record.get("status") or "status unknown")
     stopped = "" if status == "completed" else " stopped"
     there = [words for name, words in PHYSICS.items() if name in _tables(run)]
-    rows = f'<p class="note">{len(run.times)} rows, to t = {run.times[-1]:g} h.</p>' if len(run.times) > 1 else ""
-    warnings = "".join(map(_warning, _list(record.get("warnings"))))
-    warnings = f'<ul class="warnings" aria-label="warnings">{warnings}</ul>' if warnings else ""
-    return (f"<header><h1>{html.escape(str(record.get('scene')))}</h1>"
-            f'<p class="status{stopped}">{html.escape(status[0].upper() + status[1:])}</p>{rows}'
-            f"<p>{html.escape(_sentence(there))} {html.escape(_numerics(run))}</p>{warnings}</header>\n")
+    return (f"<header><h1>{html.escape(str(run.record.get('scene')))}</h1>"
+            f'<p class="status{stopped}">{html.escape(status[0].upper() + status[1:])}</p>'
+            f"{_rows_note(run)}"
+            f"<p>{html.escape(_sentence(there))} {html.escape(_numerics(run))}</p>"
+            f"{_warnings(run)}</header>\n")
+
+
+def _rows_note(run: Run) -> str:
+    """How many rows there are, and to what time; nothing of a single row."""
+    if len(run.times) < 2:
+        return ""
+    return f'<p class="note">{len(run.times)} rows, to t = {run.times[-1]:g} h.</p>'
+
+
+def _warnings(run: Run) -> str:
+    """The list of the record's warnings; nothing without any."""
+    items = "".join(map(_warning, _list(run.record.get("warnings"))))
+    return f'<ul class="warnings" aria-label="warnings">{items}</ul>' if items else ""
 
 
 def _warning(one: object) -> str:
@@ -103,28 +119,39 @@ def _fields(run: Run, packed: dict) -> str:
     if not packed:
         return ""
     hidden = {True: "", False: " hidden"}
-    controls = CONTROLS.format(aggregate=hidden["aggregate" in _tables(run)], several=hidden[packed["of"] > 1])
+    controls = CONTROLS.format(aggregate=hidden["aggregate" in _tables(run)],
+                               several=hidden[packed["of"] > 1])
     return page.section("Fields and mesh", controls, f'<p class="note">{_field_note(packed)}</p>')
 
 
 def _field_note(packed: dict) -> str:
-    shown, of = len(packed["frames"]), packed["of"]
-    times = f"{shown} of {of} times shown" if shown < of else f"all {of} times shown" if of > 1 else "one time"
-    note = "Quadratic triangles, drawn curved" if packed["meshes"][0]["per"] == 6 else "Linear triangles"
-    note += f"; {times}. Values are rounded to 1/65534 of their range; the .vtu files have every time and digit."
+    quadratic = packed["meshes"][0]["per"] == 6
+    note = "Quadratic triangles, drawn curved" if quadratic else "Linear triangles"
+    note += (f"; {_times_note(len(packed['frames']), packed['of'])}. Values are rounded to 1/65534 "
+             "of their range; the .vtu files have every time and digit.")
     if any(field["body"] for field in packed["fields"]):
         note += " Fields of the aggregate alone leave the fluid grey."
-    return note + (" Arrow keys move the slider." if of > 1 else "")
+    return note + (" Arrow keys move the slider." if packed["of"] > 1 else "")
+
+
+def _times_note(shown: int, of: int) -> str:
+    """How many of the times with fields are shown."""
+    if shown < of:
+        return f"{shown} of {of} times shown"
+    return f"all {of} times shown" if of > 1 else "one time"
 
 
 def _charts(run: Run, drawn: list[charts.Chart]) -> str:
+    if not drawn:
+        return ""
     note = "Point at a chart for its values; a click shows the fields of that time."
     if touching := quantities.contact(run):
         note += f" Dotted: contact with the opposite wall, t = {touching[0]:.6g} h."
     if len(run.times) > charts.MOST_POINTS:
         note += f" {charts.MOST_POINTS} of {len(run.times)} rows are drawn."
     figures = "".join(map(charts.svg, drawn))
-    return page.section("Over time", f'<p class="note">{note}</p><div class="charts">{figures}</div>') if drawn else ""
+    return page.section("Over time", f'<p class="note">{note}</p>',
+                        f'<div class="charts">{figures}</div>')
 
 
 def _numbers(run: Run) -> str:
@@ -132,13 +159,18 @@ def _numbers(run: Run) -> str:
     if not len(run.times):
         return page.section("Numbers", "<p>The run has no row: it stopped before the first.</p>")
     ends = [0, -1] if len(run.times) > 1 else [0]
-    rows = [(names.with_unit(name), *(_told(name, float(values[k])) for k in ends))
-            for name, values in run.series.items() if name != "time_h" and np.isfinite(values[ends]).all()]
-    return page.section("Numbers", page.table("", ["", *(f"t = {run.times[k]:.6g} h" for k in ends)], rows))
+    head = ["", *(f"t = {time:.6g} h" for time in run.times[ends])]
+    rows = [(names.with_unit(name), *_told(name, values[ends]))
+            for name, values in run.series.items()
+            if name != "time_h" and np.isfinite(values[ends]).all()]
+    return page.section("Numbers", page.table("", head, rows))
 
 
-def _told(name: str, value: float) -> str:
-    return page.shown(value == 1) if name in names.YES_NO else charts.number(value)
+def _told(name: str, values: np.ndarray) -> list[str]:
+    """The values of a column for people to read."""
+    if name in names.YES_NO:
+        return [page.shown(value == 1) for value in values.tolist()]
+    return [charts.number(value) for value in values.tolist()]
 
 
 def _modelled(run: Run) -> str:
@@ -146,17 +178,23 @@ def _modelled(run: Run) -> str:
     tables = _tables(run)
     missing = [name for name in PHYSICS if name not in tables]
     note = f'<p class="note">Not modelled: {", ".join(missing)}.</p>' if missing else ""
-    found = "".join(page.table(f"[{name}]", [], [(key, page.shown(value)) for key, value in page.flat(part).items()])
-                    for name, part in tables.items())
-    scene = f'<details><summary>The scene, every key</summary><div class="tables">{found}</div></details>'
+    found = "".join(page.table(f"[{name}]", [], _pairs(part)) for name, part in tables.items())
+    scene = ("<details><summary>The scene, every key</summary>"
+             f'<div class="tables">{found}</div></details>')
     return page.section("What was modelled", note, scene if found else "")
+
+
+def _pairs(part: object) -> list[tuple[str, str]]:
+    """(key, value for people to read) of a part of the record."""
+    return [(key, page.shown(value)) for key, value in page.flat(part).items()]
 
 
 def _cost(run: Run) -> str:
     record, total = run.record, _positive(run.record.get("wall_time_s"))
-    counts = [(f"Newton iterations, {name}", value)
-              for name, value in page.flat(_table(record.get("newton_iterations"))).items() if value]
-    counts += [("meshes made anew", record["remeshes"])] if "growth" in _tables(run) and "remeshes" in record else []
+    iterations = page.flat(_table(record.get("newton_iterations")))
+    counts = [(f"Newton iterations, {name}", value) for name, value in iterations.items() if value]
+    if "growth" in _tables(run) and "remeshes" in record:
+        counts.append(("meshes made anew", record["remeshes"]))
     whole = f"<p>{total:.3g} s in all, without this page.</p>" if total else ""
     bars = _bars(_table(record.get("wall_time_by_stage_s")), total) if total else ""
     return page.section("Cost", whole, bars, page.table("", [], counts))
@@ -172,11 +210,18 @@ def _positive(value: object) -> float:
 
 
 def _bars(stages: dict, total: float) -> str:
-    """Seconds by stage, the longest first, as parts of the whole; nothing where no stage has taken any time."""
-    known = sorted(((name, value) for name, value in stages.items() if _positive(value)), key=lambda each: -each[1])
-    rows = "".join(_bar(22 * k, name, value, 150 * min(1.0, value / total)) for k, (name, value) in enumerate(known))
-    return (f'<svg class="bars" viewBox="0 0 340 {22 * len(known) + 4}" role="img" aria-label="seconds by stage">{rows}'
-            f'</svg><p class="note">{NESTED}</p>') if known else ""
+    """Seconds by stage, the longest first, as parts of the whole.
+
+    Nothing where no stage has taken any time.
+    """
+    known = [(name, value) for name, value in stages.items() if _positive(value)]
+    if not known:
+        return ""
+    known.sort(key=lambda each: -each[1])
+    rows = "".join(_bar(22 * k, name, value, 150 * min(1.0, value / total))
+                   for k, (name, value) in enumerate(known))
+    return (f'<svg class="bars" viewBox="0 0 340 {22 * len(known) + 4}" role="img" '
+            f'aria-label="seconds by stage">{rows}</svg><p class="note">{NESTED}</p>')
 
 
 def _bar(top: float, name: str, seconds: float, width: float) -> str:
@@ -189,6 +234,7 @@ def _others(run: Run) -> str:
     """Versions, the hash of the scene, and whatever else the run has recorded."""
     record = run.record
     rest = {key: value for key, value in record.items() if key not in TOLD}
-    rows = [(key, page.shown(value)) for key, value in page.flat(rest).items()]
-    versions = [("scene hash", record.get("hash", "unknown")), *page.flat(_table(record.get("versions"))).items()]
-    return page.section("Made with", page.table("", [], versions), page.table("Also recorded", [], rows))
+    versions = [("scene hash", record.get("hash", "unknown")),
+                *page.flat(_table(record.get("versions"))).items()]
+    return page.section("Made with", page.table("", [], versions),
+                        page.table("Also recorded", [], _pairs(rest)))
