@@ -6,9 +6,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from repro.march import coupling
+from repro.errors import SimulationError, Unresolved
+from repro.march import updates
+from repro.march.simulation import simulate
 from tests import oracles
-from tests.strategies import between, scene, scenes, share
+from tests.strategies import ORDERS, between, scene, scenes, share
+
+ANY_ORDER = tuple(ORDERS.values())
+
+
+def run(made):
+    """All instants, or none where a mesh of higher order is too coarse and says so."""
+    try:
+        return list(simulate(made))
+    except SimulationError as error:
+        assert made.numerics.order > 1 and isinstance(error.__cause__, Unresolved)
+        return []
 
 
 @given(between(1e-3, 1e3), between(0.01, 1000.0), st.lists(st.floats(0.0, 1.0), max_size=5))
@@ -20,7 +33,7 @@ def test_steps_are_no_longer_than_asked_and_end_where_they_should(step, count, p
     wanted = sorted({part * end for part in parts})
     more = {"output": {"times": [f"{time!r} h" for time in wanted]}} if wanted else {}
     made = scene(velocity="1 m/day", growth={"end": f"{end!r} h", "time_step": f"{step!r} h"}, **more)
-    times, reported = coupling.schedule(made)
+    times, reported = updates.schedule(made)
     assert times[0] == 0 and times[-1] == pytest.approx(end, rel=1e-12)
     assert (np.diff(times) > 0).all() and np.diff(times).max() <= step * (1 + 1e-9) + 2e-9
     assert len(times) <= np.ceil(end / step) + len(wanted) + 2
@@ -28,25 +41,30 @@ def test_steps_are_no_longer_than_asked_and_end_where_they_should(step, count, p
 
 
 @share(0.4)
-@given(scenes(steps=1))
+@given(scenes(steps=1, elements=ANY_ORDER))
 def test_the_aggregate_grows_by_the_biomass_made(made):
     """In the first step, where J was one: (28)-(29) and (24) in the mean make its area larger by the biomass made over
     X_m, to round-off, and shrink it likewise; a film that closes takes no area. Mutant: growth by X_A alone, a sum for
     the mean in (29), the node with the most for the mean, increments over X_A in place of X_m."""
-    first, last = coupling.simulate(made)
+    found = run(made)
+    if not found:
+        return
+    first, last = found
     (row,) = last.ledgers
-    grown = oracles.mass(last.pore.mesh.points, last.pore.mesh.triangles[last.pore.mesh.biomass],
-                         np.ones(len(last.pore.mesh.points)))
+    grown = last.pore.mesh.area()
+    if made.numerics.order == 1:
+        grown = oracles.mass(last.pore.mesh.points, last.pore.mesh.triangles[last.pore.mesh.biomass],
+                             np.ones(len(last.pore.mesh.points)))
     assert grown == pytest.approx(first.pore.outline.area + row.biomass_made / made.kinetics.maximum_density, rel=1e-10)
     assert grown == pytest.approx(last.pore.outline.area, rel=1e-12)
 
 
 @share(0.4)
-@given(scenes(steps=1), between(1e-3, 1e3))
+@given(scenes(steps=1, elements=ANY_ORDER), between(1e-3, 1e3))
 def test_the_unit_of_time_does_not_matter(made, unit):
     """All rates times a factor and all times over it: the same shapes, substrates and biomass. Mutant: a rate or a time
     written into the code, X_A over the step without its length, D of Table 1 at the new mesh."""
-    for one, other in zip(coupling.simulate(made), coupling.simulate(faster(made, unit)), strict=True):
+    for one, other in zip(run(made), run(faster(made, unit)), strict=True):
         assert other.pore.time * unit == pytest.approx(one.pore.time, rel=1e-12)
         assert other.pore.outline.points == pytest.approx(one.pore.outline.points, abs=1e-7 * made.pore.width)
         for name, size in (("acceptor", made.substrates.acceptor.supply), ("donor", made.substrates.donor.supply)):

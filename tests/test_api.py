@@ -34,11 +34,11 @@ def test_columns_are_those_of_the_table_of_a_run(found, tmp_path):
 
 
 def test_fields_are_those_of_the_files_of_a_run(tmp_path):
-    """On linear triangles and on quadratic ones. Mutants: fields of the row before; corners alone."""
-    for preset, corners in (("paper", 3), ("fast", 6)):
-        scene = load_scene("base", [f"numerics.preset={preset}", 'growth.end="0.2 h"'])
-        run(scene, tmp_path / preset)
-        fields, written = solve(scene).fields(0.2), meshio.read(tmp_path / preset / "fields/fields_0001.vtu")
+    """On straight triangles and on curved ones. Mutants: fields of the row before; corners alone."""
+    for elements, corners in (("linear", 3), ("quadratic", 6), ("cubic", 6)):
+        scene = load_scene("base", ["numerics.preset=fast", f"numerics.elements={elements}", 'growth.end="0.2 h"'])
+        run(scene, tmp_path / elements)
+        fields, written = solve(scene).fields(0.2), meshio.read(tmp_path / elements / "fields/fields_0001.vtu")
         assert np.array_equal(fields["places_um"], written.points[:, :2])
         assert np.array_equal(fields["triangles"], written.cells[0].data) and fields["triangles"].shape[1] == corners
         named = {**written.point_data, **{name: values for name, (values,) in written.cell_data.items()}}
@@ -53,7 +53,7 @@ def test_units_are_what_the_names_end_with(found):
     told = {name: unit(name) for name in results.COLUMNS}
     plain = {name for name, one in told.items() if one == "1"}
     assert plain == {"inert_fraction", "biomass_density_min", "biomass_density_max", "acceptor_balance",
-                     "donor_balance", "biomass_balance", "nodes", "remeshed", "contact"}
+                     "donor_balance", "biomass_balance", "oxygen_demand_balance", "nodes", "remeshed", "contact"}
     assert {one for name, one in told.items() if name.endswith("mg_per_L")} == {"mg/L"}
     assert (unit("head_loss_cm"), unit("time_h"), unit("upstream_um"), unit("stress_xx_MPa"), unit("theta")) == (
         "cm", "h", "um", "MPa", "1")
@@ -89,7 +89,7 @@ def test_the_table_of_a_notebook_escapes_and_is_short(found):
     assert html.count("<td>") == 2 * SHOWN and "<td>39</td>" in html and "<td>20</td>" not in html
     assert found._repr_html_().count("<td>") == len(found) * len(found.time)
     assert "<th>conductivity_m_per_d (m/d)</th>" in found._repr_html_()
-    assert repr(found) == f"<Results of base: {len(found.time)} rows, 24 columns, completed>"
+    assert repr(found) == f"<Results of base: {len(found.time)} rows, 25 columns, completed>"
 
 
 def test_public_names():

@@ -22,9 +22,11 @@ from repro.run.running import Watch, run
 from repro.scene import load_scene
 
 THOROUGH = os.environ.get("HYPOTHESIS_PROFILE") == "thorough"
-EXAMPLES = settings(max_examples=500 if THOROUGH else 20)  # by two tests and two presets: 2000 malformed checkpoints
+EXAMPLES = settings(max_examples=500 if THOROUGH else 20)  # by two tests and three presets: 3000 malformed checkpoints
 TIMES = ('growth.end="0.6 h"', 'output.times=["0.2 h", "0.6 h"]')
-PRESETS = {"paper": TIMES, "fast": ('numerics.preset="fast"', 'growth.end="3 h"', 'output.times=["0.2 h", "3 h"]')}
+LATER = ('growth.end="3 h"', 'output.times=["0.2 h", "3 h"]')
+PRESETS = {"paper": ('numerics.preset="paper"', *TIMES), "fast": ('numerics.preset="fast"', *LATER),
+           "cubic": ('numerics.preset="fast"', 'numerics.elements="cubic"', *LATER)}
 
 
 @pytest.fixture(scope="module", params=PRESETS)
@@ -191,7 +193,8 @@ def test_numbers_that_are_none_and_indices_that_are_no_nodes_are_refused(kept, t
 
 
 @pytest.mark.parametrize("key, value", [
-    ("time_h", 1e9), ("time_h", -1.0), ("time_h", 0), ("pace", "1"), ("pace", [1.0, 1.0]), ("pace", [-0.1, 0.0, 0.0]),
+    ("time_h", 1e9), ("time_h", -1.0), ("time_h", 0), ("front", 0.5), ("front", 1e9), ("front", None), ("front", 1),
+    ("pace", "1"), ("pace", [1.0, 1.0]), ("pace", [-0.1, 0.0, 0.0]),
     ("remeshes", -1), ("ends_um", [1.0, -1.0]), ("ends_um", [-1e9, 1e9]), ("scene", "0" * 16), ("guess", 1.5),
     ("iterations", {"a": 0.5}),
     ("ledgers", [[0.0]]), ("ledgers", None)])
@@ -199,6 +202,43 @@ def test_what_makes_no_sense_is_refused(kept, tmp_path, key, value):
     plain, arrays = copy.deepcopy(decoded(kept[2])[0]), decoded(kept[2])[1]
     plain["state"][key] = value
     assert refused(kept, encoded(plain, arrays), tmp_path / "x")
+
+
+@pytest.mark.parametrize("name, value", [
+    ("active", -1e-9), ("inert", -1.0), ("theta", 0.0), ("theta", -1.0), ("theta", 1e300), ("acceptor", 1e300),
+    ("donor", -1e300), ("pressure", 1e300), ("points", 1e6), ("reference", -1e6), ("wall", 3), ("cells", 0)])
+def test_amounts_that_cannot_be_are_refused(kept, tmp_path, name, value):
+    """Of a number in the middle of an array: masses below zero, expansions and concentrations that nothing has, places
+    outside of the pore, a wall that is none, a triangle whose corners are one node. Mutants: any of the checks left
+    out, or of the first entry alone."""
+    plain, arrays = decoded(kept[2])
+    changed = arrays[name].copy(order="K")
+    changed.flat[changed.size // 2] = value
+    if name == "cells":
+        changed[len(changed) // 2, :3] = value
+    assert refused(kept, encoded(plain, {**arrays, name: changed}), tmp_path / "x")
+
+
+@pytest.mark.parametrize("name", ["points", "cells", "biomass", "loop", "wall", "fixed", "active", "inert", "theta",
+                                  "reference", "pressure", "acceptor", "donor"])
+def test_arrays_of_another_size_are_refused(kept, tmp_path, name):
+    """A row too few, a row twice, and one column too many. Mutant: a size that is taken from what is read."""
+    plain, arrays = decoded(kept[2])
+    array = arrays[name]
+    for wrong in (array[:-1], np.concatenate([array, array[-1:]]), np.column_stack([array, array])):
+        again = {**arrays, name: np.ascontiguousarray(wrong)}
+        assert refused(kept, encoded(plain, again), tmp_path / "x")
+
+
+def test_the_elements_of_another_order_are_refused(kept, tmp_path):
+    """Triangles of a scene of other elements, in a state that says it is of this one. Mutant: the order taken from the
+    arrays."""
+    scene, _, content = kept
+    other = load_scene("base", PRESETS["paper" if scene.numerics.order > 1 else "fast"])
+    state, _ = next(steps(other))
+    plain, arrays = stored.packed(scene, state)
+    with pytest.raises(CheckpointError):
+        stored.unpacked(scene, plain, arrays)
 
 
 @pytest.mark.parametrize("change", [
@@ -346,10 +386,29 @@ def test_what_cannot_be_read_is_refused(kept, tmp_path):
         Recorder(kept[0], kept[1]).restore(tmp_path)
 
 
+@pytest.mark.parametrize("elements", ["linear", "quadratic", "cubic"])
+def test_a_pore_that_is_read_back_goes_on_as_the_one_that_was_written(elements):
+    """The same rows, to the last bit, from every state on. Mutants: the reference's body or the space of another order,
+    a mesh whose derived values are of another one."""
+    sets = ("numerics.preset=fast", f"numerics.elements={elements}", 'growth.end="1 h"', 'aggregate.radius="25 um"',
+            f"numerics.refinement={0.5 if elements == 'linear' else 0.2}", 'output.times=["0.3 h", "0.6 h", "1 h"]')
+    scene = load_scene("base", sets)
+    for state, _ in steps(scene):
+        again = stored.unpacked(scene, *stored.packed(scene, state))
+        assert stored.packed(scene, again)[0] == stored.packed(scene, state)[0]
+        assert again.pore.space.order == state.pore.space.order
+        assert again.pore.mass == state.pore.mass and again.pore.outline.area == state.pore.outline.area
+        assert (again.pore.body.at.dx == state.pore.body.at.dx).all()
+        for one, other in zip(steps(scene, again), steps(scene, state), strict=True):
+            for name in ("points", "cells"):
+                assert np.array_equal(getattr(one[0].pore.mesh, name), getattr(other[0].pore.mesh, name))
+            assert np.array_equal(one[0].pore.active, other[0].pore.active)
+
+
 def test_states_of_clean_channels_are_kept():
     """No aggregate, no substrates. Mutant: empty arrays refused."""
-    for preset in ("paper", "fast"):
-        scene = load_scene("flow_only", (f'numerics.preset="{preset}"',))
+    for elements in ("linear", "quadratic", "cubic"):
+        scene = load_scene("flow_only", (f'numerics.elements="{elements}"',))
         ((state, _),) = steps(scene)
         plain, arrays = stored.packed(scene, state)
         assert stored.packed(scene, stored.unpacked(scene, plain, arrays))[0] == plain

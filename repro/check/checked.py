@@ -60,7 +60,8 @@ def report(found: Checked) -> str:
     lines = [f"{found.scene}: can be run", "", "What is modelled"]
     for section, words in found.modelled:
         lines += _item(section, words)
-    lines += ["", f"Mesh at t = 0: {found.nodes} nodes, {found.triangles} triangles", "", *_cost(found.cost)]
+    lines += ["", f"Mesh at t = 0: {found.nodes} nodes, {found.triangles} triangles", ""]
+    lines += _cost(found.cost)
     if found.numbers:
         lines += ["", *_numbers(found.numbers)]
     lines += ["", *_warnings(found.warnings)]
@@ -75,8 +76,9 @@ def _cost(expected: Cost) -> Iterator[str]:
     steps = f"{expected.steps} steps" if expected.steps else "no step"
     memory = f", {expected.memory:.0f} MB" if expected.memory else ""
     yield f"Cost, roughly: {_seconds(expected.seconds)} ({steps}){memory}, writing not counted"
-    how = (f"The first state and steps were made and timed just now, times the steps expected; one in contact with the "
-           f"opposite wall counts {cost.IN_CONTACT:g} times. Right within a factor of three in the paper's pores.")
+    how = ("The first state and steps were made and timed just now, times the steps expected; one "
+           f"in contact with the opposite wall counts {cost.IN_CONTACT:g} times. Right within a "
+           "factor of three in the paper's pores.")
     yield from textwrap.wrap(how, WIDTH, initial_indent="  ", subsequent_indent="  ")
 
 
@@ -93,12 +95,15 @@ def _numbers(found: list[Number]) -> Iterator[str]:
     for number in found:
         end = "" if number.end is None else f"{number.end:.2g}"
         yield f"  {number.name:28}{number.start:>9.2g}{end:>17}".rstrip()
-    for name, definition in {number.name.partition(",")[0]: number.definition for number in found}.items():
-        yield from textwrap.wrap(f"{name} = {definition}", WIDTH, initial_indent="    ", subsequent_indent="      ")
+    definitions = {number.name.partition(",")[0]: number.definition for number in found}
+    for name, definition in definitions.items():
+        yield from textwrap.wrap(f"{name} = {definition}", WIDTH, initial_indent="    ",
+                                 subsequent_indent="      ")
 
 
 def _warnings(found: list[Warned]) -> Iterator[str]:
     if not found:
         yield "No simplification that is checked is out of its range."
     for warned in found:
-        yield from textwrap.wrap(f"WARNING {warned.key}: {warned.text}.", WIDTH + 2, subsequent_indent="  ")
+        yield from textwrap.wrap(f"WARNING {warned.key}: {warned.text}.", WIDTH + 2,
+                                 subsequent_indent="  ")

@@ -19,10 +19,12 @@ from time import perf_counter
 from repro.check import numbers
 from repro.march.loop import Instant, PoreEnd
 from repro.march.simulation import simulate
+from repro.scene import Scene
 
-#: A step with what it takes besides the first one: new meshes, and larger ones; and a step in
-#: contact, which is one with many rounds of closing films and a new mesh.
-REMESHING, IN_CONTACT = 1.5, 15.0
+#: A step with what it takes besides the first one: new meshes, and larger ones.
+REMESHING = 1.5
+#: A step in contact, which is one with many rounds of closing films and a new mesh.
+IN_CONTACT = 15.0
 #: The length of a midpoint step that tolerance 0.01 allows, times the growth rate; it goes as the
 #: tolerance's root.
 ALLOWED = 0.5
@@ -30,7 +32,8 @@ ALLOWED = 0.5
 #: one counts.
 FIRST_STEPS = 3
 #: Larger meshes are not tried: a coarser one is, and its time grows with the nodes to this power.
-MOST_NODES, POWER = 5000, 1.2
+MOST_NODES = 5000
+POWER = 1.2
 COARSER = 0.9
 
 
@@ -56,7 +59,7 @@ class Cost:
     memory: float | None
 
 
-def tried(scene, nodes: int) -> Trial:
+def tried(scene: Scene, nodes: int) -> Trial:
     """First state and first steps of the scene, or of a coarser one where it has too many nodes.
 
     Raises SimulationError where a stage fails in them.
@@ -66,12 +69,16 @@ def tried(scene, nodes: int) -> Trial:
         scene = replace(scene, numerics=replace(scene.numerics, refinement=size))
     if scene.growth:
         end = min(scene.growth.end, FIRST_STEPS * scene.growth.time_step)
-        scene = replace(scene, growth=replace(scene.growth, end=end), output=replace(scene.output, times=None))
-    before, clock, run = _memory(), [perf_counter()], _until_the_end(simulate(scene))
+        scene = replace(scene, growth=replace(scene.growth, end=end),
+                        output=replace(scene.output, times=None))
+    before = _memory()
+    clock = [perf_counter()]
+    run = _until_the_end(simulate(scene))
     first = next(run)
     clock.append(perf_counter())
     clock += [perf_counter() for _ in run]
-    spent, peak = [b - a for a, b in zip(clock, clock[1:])], _memory()
+    spent = [b - a for a, b in zip(clock, clock[1:])]
+    peak = _memory()
     memory = (before, peak) if before is not None and peak is not None else None
     return Trial(first, spent[0], min(spent[1:], default=0.0), len(first.pore.mesh.points), memory)
 
@@ -84,33 +91,39 @@ def _until_the_end(run: Iterator[Instant]) -> Iterator[Instant]:
         return
 
 
-def expected(scene, trial: Trial, nodes: int) -> Cost:
+def expected(scene: Scene, trial: Trial, nodes: int) -> Cost:
     """Of the whole run, from its trial and the nodes of its first mesh."""
     free, touching = steps(scene)
     larger = nodes / trial.nodes
     factor = (free + IN_CONTACT * touching) * REMESHING
-    memory = trial.memory and trial.memory[0] + REMESHING * larger * (trial.memory[1] - trial.memory[0])
+    memory = None
+    if trial.memory:
+        before, peak = trial.memory
+        memory = before + REMESHING * larger * (peak - before)
     return Cost(free + touching, (trial.start + factor * trial.step) * larger**POWER, memory)
 
 
-def steps(scene) -> tuple[int, int]:
+def steps(scene: Scene) -> tuple[int, int]:
     """Steps before and after the aggregate is expected to touch the opposite wall."""
     if scene.growth is None or scene.growth.end == 0:
         return 0, 0
-    contact, end = numbers.at_end(scene).contact, scene.growth.end
+    end = scene.growth.end
+    contact = numbers.at_end(scene).contact
     free = end if contact is None else min(contact, end)
     longest = longest_step(scene)
-    total = max(_count(min(scene.growth.time_step, longest), longest, end), len(scene.output.times or ()))
+    counted = _count(min(scene.growth.time_step, longest), longest, end)
+    total = max(counted, len(scene.output.times or ()))
     touching = min(total, math.ceil((end - free) / longest - 1e-9))
     return total - touching, touching
 
 
-def longest_step(scene) -> float:
+def longest_step(scene: Scene) -> float:
     """The longest step (h) that is expected."""
-    rate = abs(numbers.fastest_growth(scene))
     if scene.numerics.time == "updates":
         return scene.growth.time_step
-    return min(scene.growth.end, ALLOWED * math.sqrt(scene.numerics.tolerance / 0.01) / rate if rate else math.inf)
+    rate = abs(numbers.fastest_growth(scene))
+    allowed = ALLOWED * math.sqrt(scene.numerics.tolerance / 0.01)
+    return min(scene.growth.end, allowed / rate if rate else math.inf)
 
 
 def _count(first: float, longest: float, duration: float) -> int:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from repro.scene import Scene
+
 LEFT_OUT = {
     "aggregate": "no aggregate: a clean channel",
     "flow": "no flow: pure diffusion",
@@ -13,23 +15,29 @@ LEFT_OUT = {
 }
 
 
-def modelled(scene) -> list[tuple[str, str]]:
+def modelled(scene: Scene) -> list[tuple[str, str]]:
     """(section, what it adds) in the order of the scene; what is left out too."""
-    words = {"pore": _pore, "aggregate": _aggregate, "flow": _flow, "substrates": _substrates, "kinetics": _kinetics,
-             "growth": _growth, "numerics": _numerics, "output": _output}
-    return [(name, "; ".join(tell(scene)) if getattr(scene, name) else LEFT_OUT[name]) for name, tell in words.items()]
+    words = {"pore": _pore, "aggregate": _aggregate, "flow": _flow, "substrates": _substrates,
+             "kinetics": _kinetics, "growth": _growth, "numerics": _numerics, "output": _output}
+    return [(name, "; ".join(tell(scene)) if getattr(scene, name) else LEFT_OUT[name])
+            for name, tell in words.items()]
 
 
-def _pore(scene) -> Iterator[str]:
+def _pore(scene: Scene) -> Iterator[str]:
     yield f"a channel {scene.pore.width:g} um wide and {scene.pore.length:g} um long"
-    part = "meshed around the aggregate (3.1)" if scene.aggregate else "meshed over three widths (3.1)"
-    yield "meshed as a whole" if scene.numerics.extent == "full" else part
+    if scene.numerics.extent == "full":
+        yield "meshed as a whole"
+    elif scene.aggregate:
+        yield "meshed around the aggregate (3.1)"
+    else:
+        yield "meshed over three widths (3.1)"
 
 
-def _aggregate(scene) -> Iterator[str]:
+def _aggregate(scene: Scene) -> Iterator[str]:
     seed = scene.aggregate
     if seed.outline is None:
-        yield f"a half-disc of biomass of radius {seed.radius:g} um on the lower wall at x = {seed.position:g} um"
+        yield (f"a half-disc of biomass of radius {seed.radius:g} um on the lower wall at "
+               f"x = {seed.position:g} um")
     else:
         through = "a spline through" if seed.smooth else "straight lines between"
         yield f"biomass inside {through} {len(seed.outline)} points, on the lower wall"
@@ -37,56 +45,63 @@ def _aggregate(scene) -> Iterator[str]:
         yield f"{100 * seed.inert_fraction:g} % of it inert at t = 0"
 
 
-def _flow(scene) -> Iterator[str]:
+def _flow(scene: Scene) -> Iterator[str]:
     flow = scene.flow
     yield "Stokes flow (1)-(6)"
-    yield (f"driven by a mean velocity of {24e-6 * flow.mean_velocity:.4g} m/day" if flow.head is None
-           else f"driven by a head of {1e-4 * flow.head:g} cm over the whole pore")
+    if flow.head is None:
+        yield f"driven by a mean velocity of {24e-6 * flow.mean_velocity:.4g} m/day"
+    else:
+        yield f"driven by a head of {1e-4 * flow.head:g} cm over the whole pore"
     if scene.aggregate:
         yield f"{flow.viscosity_ratio:g} times the viscosity of water in the aggregate"
-        yield {"laplacian": "interface in the form of (1) [E2]", "traction": "continuous traction [E2]"}[
-            scene.numerics.interface]
+        yield {"laplacian": "interface in the form of (1) [E2]",
+               "traction": "continuous traction [E2]"}[scene.numerics.interface]
 
 
-def _substrates(scene) -> Iterator[str]:
+def _substrates(scene: Scene) -> Iterator[str]:
     carried = "advection and diffusion" if scene.flow else "diffusion"
-    yield f"{carried} of acceptor ({scene.substrates.acceptor.supply:g} mg/L) and donor (" \
-          f"{scene.substrates.donor.supply:g} mg/L), (7)-(8)"
+    acceptor = scene.substrates.acceptor.supply
+    donor = scene.substrates.donor.supply
+    yield f"{carried} of acceptor ({acceptor:g} mg/L) and donor ({donor:g} mg/L), (7)-(8)"
     if scene.flow:
         yield "(11) at the inlet, (12) at the outlet, (13) on the walls"
     else:
-        yield "the supply held at both ends" if scene.substrates.boundary == "open" else "closed ends"
-    yield "at rest in each shape" if scene.numerics.transport == "quasi_steady" else "followed in time (3.3, Gear)"
+        yield {"open": "the supply held at both ends",
+               "closed": "closed ends"}[scene.substrates.boundary]
+    yield {"quasi_steady": "at rest in each shape",
+           "gear": "followed in time (3.3, Gear)"}[scene.numerics.transport]
 
 
-def _kinetics(scene) -> Iterator[str]:
+def _kinetics(scene: Scene) -> Iterator[str]:
     yield "dual Monod uptake by the aggregate, (7)-(8)"
     if scene.growth:
         yield "growth and decay of active, gain of inert biomass, (9)-(10)"
 
 
-def _growth(scene) -> Iterator[str]:
+def _growth(scene: Scene) -> Iterator[str]:
     growth = scene.growth
-    yield f"to {growth.end:g} h: an incompressible neo-Hookean body that expands with its biomass, (14)-(29)"
+    yield (f"to {growth.end:g} h: an incompressible neo-Hookean body that expands with its "
+           "biomass, (14)-(29)")
     yield f"films under {growth.minimum_film:g} um close (2.3.3)"
     yield f"fluid forces {growth.fluid_forces}"
-    yield {"stressed": "strain since t = 0", "stress_free": "new biomass without stress (section 5)"}[
-        growth.new_biomass]
+    yield {"stressed": "strain since t = 0",
+           "stress_free": "new biomass without stress (section 5)"}[growth.new_biomass]
 
 
-def _numerics(scene) -> Iterator[str]:
+def _numerics(scene: Scene) -> Iterator[str]:
     numerics = scene.numerics
     yield f"preset {numerics.preset}"
     yield {"linear": "linear triangles (3.2-3.4)", "quadratic": "quadratic curved triangles",
            "cubic": "curved triangles, velocity and substrates cubic"}[numerics.elements]
     yield f"refinement {numerics.refinement:g}"
     if scene.growth:
-        yield (f"a shape update every {60 * scene.growth.time_step:.4g} min" if numerics.time == "updates"
-               else f"midpoint steps, tolerance {numerics.tolerance:g}")
+        yield (f"a shape update every {60 * scene.growth.time_step:.4g} min"
+               if numerics.time == "updates" else
+               f"midpoint steps, tolerance {numerics.tolerance:g}")
         yield f"biomass to new meshes: {numerics.transfer} [E8]"
 
 
-def _output(scene) -> Iterator[str]:
+def _output(scene: Scene) -> Iterator[str]:
     times = scene.output.times
     if times is None:
         yield "rows and fields of every step" if scene.growth else "one row and fields at t = 0"

@@ -15,10 +15,12 @@ from repro.fem.sizing import meshed_extent
 from repro.model import kinetics
 from repro.model.pore import film, initial_outline, sized
 from repro.model.traction import MPA_PER_UM
-from repro.scene import Substrate
+from repro.scene import Scene, Substrate
 
-#: Steps in which the bound on the growth is followed, and the largest exponent of one.
-STEPS, LARGEST = 2000, 50.0
+#: Steps in which the bound on the growth is followed.
+STEPS = 2000
+#: The largest exponent of one of them.
+LARGEST = 50.0
 
 
 @dataclass(frozen=True)
@@ -43,15 +45,16 @@ class Sizes:
     contact: float | None
 
 
-def sizes(scene, area: float, contact: float | None = None) -> Sizes:
+def sizes(scene: Scene, area: float, contact: float | None = None) -> Sizes:
     """A half-disc while that fits into the pore, wall to wall after that."""
-    width, radius = scene.pore.width, math.sqrt(2 * area / math.pi)
+    width = scene.pore.width
+    radius = math.sqrt(2 * area / math.pi)
     if radius <= width:
         return Sizes(area, radius, radius, contact)
     return Sizes(area, width, 0.5 * area / width + (1 - math.pi / 4) * width, contact)
 
 
-def at_start(scene) -> Sizes:
+def at_start(scene: Scene) -> Sizes:
     """The seed."""
     seed = scene.aggregate
     if seed.outline is None:
@@ -64,13 +67,15 @@ def at_start(scene) -> Sizes:
     return Sizes(outline.area, outline.thickness, reach, 0.0 if touches else None)
 
 
-def at_end(scene) -> Sizes:
+def at_end(scene: Scene) -> Sizes:
     """The bound at growth.end; the seed without growth."""
     now = at_start(scene)
     if scene.growth is None:
         return now
     aside = max(0.0, now.reach - sizes(scene, now.area).reach)
-    rate, layer, step = fastest_growth(scene), depth(scene), scene.growth.end / STEPS
+    rate = fastest_growth(scene)
+    layer = depth(scene)
+    step = scene.growth.end / STEPS
     full = scene.pore.width * scene.pore.length
     for k in range(STEPS):  # as a half-disc of the same area
         exposed = math.pi * now.thickness if now.contact is None else 2 * scene.pore.width
@@ -81,32 +86,34 @@ def at_end(scene) -> Sizes:
     return replace(now, reach=now.reach + aside)
 
 
-def fastest_growth(scene) -> float:
+def fastest_growth(scene: Scene) -> float:
     """F3 / X_A (1/h) at the concentrations of the supply (9)."""
     supply = (scene.substrates.acceptor.supply, scene.substrates.donor.supply)
     return float(kinetics.growth_rate(*supply, scene.substrates, scene.kinetics))
 
 
-def uptakes(scene) -> Iterator[tuple[str, Substrate, float]]:
+def uptakes(scene: Scene) -> Iterator[tuple[str, Substrate, float]]:
     """Name, substrate and largest uptake q X_m (mg/L/h) of each, the other in excess: (7)-(8)."""
     law = scene.kinetics
-    rates = (law.maximum_utilization_rate * law.acceptor_to_donor_ratio + kinetics.decay_demand(law),
-             law.maximum_utilization_rate)
-    for name, rate in zip(("acceptor", "donor"), rates):
-        yield name, getattr(scene.substrates, name), rate * law.maximum_density
+    k = law.maximum_utilization_rate
+    of_acceptor = k * law.acceptor_to_donor_ratio + kinetics.decay_demand(law)
+    yield "acceptor", scene.substrates.acceptor, of_acceptor * law.maximum_density
+    yield "donor", scene.substrates.donor, k * law.maximum_density
 
 
-def depth(scene) -> float:
+def depth(scene: Scene) -> float:
     """Depth (um) that the scarcer substrate reaches in biomass that takes it up at full rate."""
-    depths = [math.sqrt(2 * s.diffusivity_in_aggregate * s.supply / rate) for _, s, rate in uptakes(scene) if rate]
+    depths = [math.sqrt(2 * s.diffusivity_in_aggregate * s.supply / rate)
+              for _, s, rate in uptakes(scene) if rate]
     return min(depths, default=math.inf)
 
 
-def numbers(scene, speed: float | None) -> list[Number]:
+def numbers(scene: Scene, speed: float | None) -> list[Number]:
     """Those that the sections of the scene give rise to; speed: mean velocity at t = 0 (um/h)."""
     found: list[Number] = []
     if speed is not None:
-        found.append(Number("Reynolds", speed * scene.pore.width / scene.flow.kinematic_viscosity, None, "u W / nu"))
+        reynolds = speed * scene.pore.width / scene.flow.kinematic_viscosity
+        found.append(Number("Reynolds", reynolds, None, "u W / nu"))
     if speed is not None and scene.substrates:
         found += _transported(scene, speed)
     if scene.kinetics:
@@ -116,44 +123,52 @@ def numbers(scene, speed: float | None) -> list[Number]:
     return found
 
 
-def _transported(scene, speed: float) -> Iterator[Number]:
-    for name in ("acceptor", "donor"):
-        value = speed * scene.pore.width / getattr(scene.substrates, name).diffusivity
+def _transported(scene: Scene, speed: float) -> Iterator[Number]:
+    both = {"acceptor": scene.substrates.acceptor, "donor": scene.substrates.donor}
+    for name, s in both.items():
+        value = speed * scene.pore.width / s.diffusivity
         yield Number(f"Peclet, {name}", value, None, "u W / D, D in water")
     yield Number("cell Peclet", 1.5 * speed * sized(scene).largest / slowest(scene), None,
                  "1.5 u h / D, h of the largest elements, the smallest D")
 
 
-def slowest(scene) -> float:
+def slowest(scene: Scene) -> float:
     """The smallest of all diffusivities, um2/h."""
     kinds = (scene.substrates.acceptor, scene.substrates.donor)
     return min(min(s.diffusivity, s.diffusivity_in_aggregate) for s in kinds)
 
 
-def _taken_up(scene, speed: float | None) -> Iterator[Number]:
-    start, end = at_start(scene), at_end(scene)
+def _taken_up(scene: Scene, speed: float | None) -> Iterator[Number]:
+    start = at_start(scene)
+    end = at_end(scene)
     later = scene.growth is not None
     for name, s, rate in uptakes(scene):
         per = math.sqrt(rate / (s.half_saturation * s.diffusivity_in_aggregate))
-        yield Number(f"Thiele, {name}", start.thickness * per, end.thickness * per if later else None,
+        yield Number(f"Thiele, {name}", start.thickness * per,
+                     end.thickness * per if later else None,
                      "R (q X_m / (K_s D))^1/2, R thickness, q largest uptake, D in the aggregate")
     for name, s, rate in uptakes(scene):
         if speed and s.supply:
-            per = rate * kinetics.monod(s.supply, s.half_saturation)[0] / (speed * scene.pore.width * s.supply)
+            taken = rate * kinetics.monod(s.supply, s.half_saturation)[0]
+            per = taken / (speed * scene.pore.width * s.supply)
             yield Number(f"Damkoehler, {name}", start.area * per, end.area * per if later else None,
-                         "q X_m m A / (u W C), uptake of the area A at the supply over what flows in")
+                         "q X_m m A / (u W C), uptake of the area A at the supply over what flows "
+                         "in")
 
 
-def _grown(scene, speed: float | None) -> Iterator[Number]:
+def _grown(scene: Scene, speed: float | None) -> Iterator[Number]:
     across = half_length(scene) if speed is None else scene.pore.width
-    yield Number("transport over growth time", fastest_growth(scene) * across**2 / slowest(scene), None,
-                 "(l^2 / D) F3 / X_A, " + ("l half of the meshed part" if speed is None else "l = W"))
+    length = "l half of the meshed part" if speed is None else "l = W"
+    yield Number("transport over growth time",
+                 fastest_growth(scene) * across**2 / slowest(scene), None,
+                 f"(l^2 / D) F3 / X_A, {length}")
     if speed is not None:
         yield Number("fluid stress over modulus", *stresses(scene, speed),
-                     "shear 6 rho nu u / W at t = 0; at the end the pressure drop over the aggregate; over mu_L")
+                     "shear 6 rho nu u / W at t = 0; at the end the pressure drop over the "
+                     "aggregate; over mu_L")
 
 
-def half_length(scene) -> float:
+def half_length(scene: Scene) -> float:
     """Half of the part that is meshed at t = 0 (um)."""
     seed = initial_outline(scene)
     whole = scene.numerics.extent == "full"
@@ -161,17 +176,20 @@ def half_length(scene) -> float:
     return (last - first) / 2
 
 
-def stresses(scene, speed: float) -> tuple[float, float]:
+def stresses(scene: Scene, speed: float) -> tuple[float, float]:
     """Shear on the wall at t = 0 and drop of pressure over the aggregate at the end, over mu_L.
 
     The drop is that of a film as long as the aggregate, or of as much biomass from wall to wall;
     never more than the scene's head.
     """
-    drive, width, end = scene.flow, scene.pore.width, at_end(scene)
-    viscosity = MPA_PER_UM * drive.density * drive.kinematic_viscosity / scene.growth.shear_modulus
+    drive = scene.flow
+    width = scene.pore.width
+    end = at_end(scene)
+    modulus = scene.growth.shear_modulus
+    viscosity = MPA_PER_UM * drive.density * drive.kinematic_viscosity / modulus
     gap = max(width - end.thickness, scene.growth.minimum_film)
     film_loss = math.inf if end.contact is not None else (width / gap) ** 3
     drop = 12 * viscosity * speed * 2 * end.reach / width**2 * min(drive.viscosity_ratio, film_loss)
     if drive.head is not None:
-        drop = min(drop, MPA_PER_UM * drive.density * drive.gravity * drive.head / scene.growth.shear_modulus)
+        drop = min(drop, MPA_PER_UM * drive.density * drive.gravity * drive.head / modulus)
     return 6 * viscosity * speed / width, drop

@@ -11,6 +11,7 @@ from repro.check.numbers import Number
 from repro.fem import sizing
 from repro.model.pore import film, resolution
 from repro.model.remeshing import MOST_REFINED
+from repro.scene import Scene
 
 #: (1) has no inertia, whose share of the viscous forces is of the order of the Reynolds number.
 REYNOLDS = 0.1
@@ -39,7 +40,7 @@ class Warned:
     text: str
 
 
-def warnings(scene, found: list[Number]) -> list[Warned]:
+def warnings(scene: Scene, found: list[Number]) -> list[Warned]:
     """Every simplification that does not hold; found: the numbers of the scene."""
     value = {number.name: number.start for number in found}
     checks = [_inertia(value), _cells(scene, value)]
@@ -55,46 +56,53 @@ def warnings(scene, found: list[Number]) -> list[Warned]:
 def _inertia(value: dict[str, float]) -> Iterator[Warned]:
     reynolds = value.get("Reynolds", 0.0)
     if reynolds > REYNOLDS:
-        yield Warned("flow", f"the Reynolds number is {reynolds:.2g}, above {REYNOLDS:g}: the inertia that Stokes flow "
-                             "(1) leaves out is of this share of the viscous forces")
+        yield Warned("flow", f"the Reynolds number is {reynolds:.2g}, above {REYNOLDS:g}: the "
+                     "inertia that Stokes flow (1) leaves out is of this share of the viscous "
+                     "forces")
 
 
-def _cells(scene, value: dict[str, float]) -> Iterator[Warned]:
+def _cells(scene: Scene, value: dict[str, float]) -> Iterator[Warned]:
     cell = value.get("cell Peclet", 0.0)
     if scene.numerics.elements == "linear" and cell > CELL_PECLET:
         wanted = scene.numerics.refinement * cell / CELL_PECLET
-        yield Warned("numerics.refinement", f"the cell Peclet number is {cell:.2g}, above {CELL_PECLET:g}: linear "
-                     f"elements may overshoot where concentrations are steep; {wanted:.2g} would do, and the presets "
-                     "fast and accurate refine by themselves")
+        yield Warned("numerics.refinement", f"the cell Peclet number is {cell:.2g}, above "
+                     f"{CELL_PECLET:g}: linear elements may overshoot where concentrations are "
+                     f"steep; {wanted:.2g} would do, and the presets fast and accurate refine by "
+                     "themselves")
 
 
-def _lag(scene, value: dict[str, float]) -> Iterator[Warned]:
+def _lag(scene: Scene, value: dict[str, float]) -> Iterator[Warned]:
     lag = value["transport over growth time"]
     if scene.numerics.transport == "quasi_steady" and lag > LAG:
-        yield Warned("numerics.transport", f"transport takes {lag:.2g} of the time of growth, above {LAG:g}: quasi-"
-                     'steady substrates are off by about this share; "gear" (preset paper) follows them in time')
+        yield Warned("numerics.transport", f"transport takes {lag:.2g} of the time of growth, "
+                     f"above {LAG:g}: quasi-steady substrates are off by about this share; "
+                     '"gear" (preset paper) follows them in time')
 
 
-def _forces(scene, found: list[Number]) -> Iterator[Warned]:
-    told = [number for number in found if number.name == "fluid stress over modulus"]
-    if told and scene.growth.fluid_forces == "neglected":
-        strain = max(told[0].start, told[0].end or 0.0)
-        if strain > STRAIN:
-            yield Warned("growth.fluid_forces", f"the fluid's stress comes to {strain:.2g} of mu_L, above {STRAIN:g}: "
-                         "neglected (2.3.3), it would strain the aggregate by about this much; "
-                         '"included" takes it in (preset paper)')
+def _forces(scene: Scene, found: list[Number]) -> Iterator[Warned]:
+    told = [max(number.start, number.end or 0.0) for number in found
+            if number.name == "fluid stress over modulus"]
+    strain = max(told, default=0.0)
+    if scene.growth.fluid_forces == "neglected" and strain > STRAIN:
+        yield Warned("growth.fluid_forces", f"the fluid's stress comes to {strain:.2g} of mu_L, "
+                     f"above {STRAIN:g}: neglected (2.3.3), it would strain the aggregate by about "
+                     'this much; "included" takes it in (preset paper)')
 
 
-def _fronts(scene) -> Iterator[Warned]:
-    numerics, thickness = scene.numerics, numbers.at_end(scene).thickness
-    size = min(thickness / sizing.ACROSS_AGGREGATE, scene.pore.width / sizing.ACROSS_PORE) / resolution(scene)
-    nodes = size / numerics.order
+def _fronts(scene: Scene) -> Iterator[Warned]:
+    thickness = numbers.at_end(scene).thickness
+    size = min(thickness / sizing.ACROSS_AGGREGATE, scene.pore.width / sizing.ACROSS_PORE)
+    nodes = size / resolution(scene) / scene.numerics.order
     for name, s, rate in numbers.uptakes(scene):
-        layer = math.sqrt(s.diffusivity_in_aggregate * s.half_saturation / rate) if rate and s.supply else math.inf
+        layer = math.inf
+        if rate and s.supply:
+            layer = math.sqrt(s.diffusivity_in_aggregate * s.half_saturation / rate)
         if layer < min(nodes, thickness):
-            kind = "zero-order front" if s.supply > s.half_saturation else "layer of first-order uptake"
-            yield Warned("numerics.refinement", f"the {name} is used up in a {kind} (D K_s / (q X_m))^1/2 = "
-                         f"{layer:.2g} um thick, thinner than the {nodes:.2g} um between nodes in the aggregate; "
+            zero_order = s.supply > s.half_saturation
+            kind = "zero-order front" if zero_order else "layer of first-order uptake"
+            yield Warned("numerics.refinement", f"the {name} is used up in a {kind} "
+                         f"(D K_s / (q X_m))^1/2 = {layer:.2g} um thick, thinner than the "
+                         f"{nodes:.2g} um between nodes in the aggregate; "
                          + _resolving(resolution(scene) * nodes / layer))
 
 
@@ -102,40 +110,44 @@ def _resolving(refinement: float) -> str:
     """What resolves a layer, in words."""
     if refinement <= MOST_REFINED:
         return f"{refinement:.2g} would resolve it"
-    return f"no refinement up to {MOST_REFINED:g} resolves it, and a run judges its front by what it solves"
+    return (f"no refinement up to {MOST_REFINED:g} resolves it, and a run judges its front by what "
+            "it solves")
 
 
-def _seed_film(scene) -> Iterator[Warned]:
-    gap, numerics = scene.pore.width - numbers.at_start(scene).thickness, scene.numerics
-    nodes = sizing.ACROSS_FILM * resolution(scene) * min(1.0, gap / film(scene)) * numerics.order
+def _seed_film(scene: Scene) -> Iterator[Warned]:
+    gap = scene.pore.width - numbers.at_start(scene).thickness
+    share = min(1.0, gap / film(scene))
+    nodes = sizing.ACROSS_FILM * resolution(scene) * share * scene.numerics.order
     if nodes < ACROSS_FILM:
         key = "aggregate.radius" if scene.aggregate.outline is None else "aggregate.outline"
-        yield Warned(key, f"the film over the seed is {gap:.2g} um thin and resolved by {nodes:.2g} "
-                     f"distances between nodes, under {ACROSS_FILM:g}: its flow is a matter of the mesh; films are "
-                     f"resolved as if they were {film(scene):g} um (2.3.3)")
+        yield Warned(key, f"the film over the seed is {gap:.2g} um thin and "
+                     f"resolved by {nodes:.2g} distances between nodes, under {ACROSS_FILM:g}: its "
+                     "flow is a matter of the mesh; films are resolved as if they were "
+                     f"{film(scene):g} um (2.3.3)")
 
 
-def _ends(scene) -> Iterator[Warned]:
+def _ends(scene: Scene) -> Iterator[Warned]:
     end = numbers.at_end(scene)
     free = min(10 * end.thickness, 1.5 * scene.pore.width)
     if end.reach + free > scene.pore.length / 2:
         when = "by growth.end" if end.reach > numbers.at_start(scene).reach else "from the start"
-        yield Warned("pore.length", f"the aggregate may come within {free:.3g} um of the pore's ends {when} (reach "
-                     f"{end.reach:.3g} of {scene.pore.length / 2:g} um): the inlet's and the outlet's conditions (3.1, "
-                     "(11)-(12)) are then too near, and at the end itself the run is over")
+        yield Warned("pore.length", f"the aggregate may come within {free:.3g} um of the pore's "
+                     f"ends {when} (reach {end.reach:.3g} of {scene.pore.length / 2:g} um): the "
+                     "inlet's and the outlet's conditions (3.1, (11)-(12)) are then too near, and "
+                     "at the end itself the run is over")
 
 
-def _steps(scene) -> Iterator[Warned]:
+def _steps(scene: Scene) -> Iterator[Warned]:
     grown = numbers.fastest_growth(scene) * scene.growth.time_step
     if scene.numerics.time == "updates" and grown > GROWTH_IN_A_STEP:
-        yield Warned("growth.time_step", f"the aggregate grows by {100 * grown:.2g} % in a shape update, above "
-                     f"{100 * GROWTH_IN_A_STEP:g} %: its rates are those of the shape before; shorten it, or take "
-                     'numerics.time = "midpoint"')
+        yield Warned("growth.time_step", f"the aggregate grows by {100 * grown:.2g} % in a shape "
+                     f"update, above {100 * GROWTH_IN_A_STEP:g} %: its rates are those of the "
+                     'shape before; shorten it, or take numerics.time = "midpoint"')
 
 
-def _contact(scene) -> Iterator[Warned]:
+def _contact(scene: Scene) -> Iterator[Warned]:
     contact = numbers.at_end(scene).contact
     if contact is not None and scene.growth.end > AFTER_CONTACT * contact:
-        yield Warned("growth.end", f"contact with the opposite wall is expected from {contact:.3g} h on, long before "
-                     f"{scene.growth.end:g} h: from then on which nodes join the wall (2.3.3) is a rule, and "
-                     "conductivity is known to a few percent")
+        yield Warned("growth.end", f"contact with the opposite wall is expected from {contact:.3g} "
+                     f"h on, long before {scene.growth.end:g} h: from then on which nodes join the "
+                     "wall (2.3.3) is a rule, and conductivity is known to a few percent")

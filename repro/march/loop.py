@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from repro.errors import SimulationError, StageError
-from repro.fem.mesh import Mesh
 from repro.fem.sizing import ACROSS_PORE
 from repro.march.pace import Pace
-from repro.model.growth import Body
 from repro.model.pore import Pore, Solved, seeded
 from repro.model.remeshing import resolved
-from repro.model.transport import Concentrations
 from repro.scene import Scene
 
-Data = TypeVar("Data", Pore, Mesh, Body, Concentrations)
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+Data = TypeVar("Data", bound="DataclassInstance")
 
 #: A step of the grid this close (h) to a reported time is that time.
 SAME_TIME = 1e-9
@@ -102,7 +103,8 @@ class PoreEnd(Exception):
     """The aggregate has reached an end of the pore: the run is over."""
 
 
-def steps(scene: Scene, scheme: Scheme, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
+def steps(scene: Scene, scheme: Scheme,
+          state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
     """Every step of a run from t = 0, or after ``state``, with an Instant at reported times.
 
     Raises SimulationError where a stage fails, and PoreEnd, after a last Instant, where the
@@ -143,7 +145,8 @@ def _after(state: State, taken: Step, solved: Solved, pace: Pace) -> State:
     """The state with one step more to report."""
     before = newton_counts(taken.before[1]) if taken.before else {}
     counts = added(state.iterations, {"growth": taken.iterations}, before, newton_counts(solved))
-    return State(taken.pore, pace, (*state.ledgers, taken.ledger), state.remeshes + taken.remeshed, counts)
+    ledgers = (*state.ledgers, taken.ledger)
+    return State(taken.pore, pace, ledgers, state.remeshes + taken.remeshed, counts)
 
 
 def _wanted(scene: Scene, time: float) -> bool:
@@ -164,7 +167,9 @@ def reported(state: State) -> State:
 def laid_out(pore: Pore) -> Pore:
     """The same pore, none of its arrays a strided view: sums over those may differ in the last bit
     from sums over the copies that a checkpoint gives back."""
-    state, mesh, body = pore.concentrations, _flat(pore.mesh), _flat(pore.body)
+    state = pore.concentrations
+    mesh = _flat(pore.mesh)
+    body = _flat(pore.body)
     found = replace(_flat(pore), concentrations=state and _flat(state))
     if body is not pore.body:
         found = replace(found, body=body)
@@ -180,35 +185,41 @@ def _flat(data: Data) -> Data:
 
 
 @contextmanager
-def stopping(time: float):
+def stopping(time: float) -> Iterator[None]:
     """Floating-point errors and lack of memory stop the run; a failure is told with the simulated
     time of its step."""
+    stopped = f"stopped in the step from t = {time:g} h"
     try:
         with np.errstate(all="raise", under="ignore"):
             yield
     except StageError as error:
-        raise SimulationError(f"stopped in the step from t = {time:g} h, in {error.stage}: {error}") from error
+        raise SimulationError(f"{stopped}, in {error.stage}: {error}") from error
     except FloatingPointError as error:
-        raise SimulationError(f"stopped in the step from t = {time:g} h by a floating-point error ({error}); "
-                              "try a shorter growth.time_step or a larger numerics.refinement") from error
+        raise SimulationError(f"{stopped} by a floating-point error ({error}); try a shorter "
+                              "growth.time_step or a larger numerics.refinement") from error
     except MemoryError as error:
-        raise SimulationError(f"stopped in the step from t = {time:g} h, out of memory ({error}); "
+        raise SimulationError(f"{stopped}, out of memory ({error}); "
                               "try a smaller numerics.refinement") from error
 
 
 def newton_counts(solved: Solved) -> dict[str, int]:
+    """Iterations by what they were spent on."""
     return {"transport": solved.concentrations.iterations if solved.concentrations else 0}
 
 
 def added(*counts: dict[str, int]) -> dict[str, int]:
-    keys = {key for count in counts for key in count}
-    return {key: sum(count.get(key, 0) for count in counts) for key in sorted(keys)}
+    """The sum of counts, key by key."""
+    total: Counter[str] = Counter()
+    for count in counts:
+        total.update(count)
+    return dict(sorted(total.items()))
 
 
 def pore_end(scene: Scene, now: Pore, elements: float) -> str:
     """Which end of the pore the aggregate has reached, to within so many elements of the fluid;
     empty while it has reached none."""
-    outline, end = now.outline, scene.pore.length / 2
+    outline = now.boundary
+    end = scene.pore.length / 2
     near = elements * scene.pore.width / ACROSS_PORE
     if outline.upstream < near - end or outline.downstream > end - near:
         side = "upstream" if outline.upstream < near - end else "downstream"

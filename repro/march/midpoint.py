@@ -18,9 +18,10 @@ from repro.march.loop import Ledger, PoreEnd, Step, pore_end
 from repro.march.updates import enlarged, grown, rates_of
 from repro.model import biomass, contact, pore, remeshing
 from repro.model.biomass import Rates
+from repro.model.gear import Flows
 from repro.model.pore import Pore, Solved
 from repro.model.transport import Concentrations
-from repro.scene import Scene
+from repro.scene import Scene, needed
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +51,8 @@ class Halfway:
     made: tuple[float, float]
 
 
-def attempt(scene: Scene, now: Pore, solved: Solved, duration: float, most: float = np.inf) -> Attempt:
+def attempt(scene: Scene, now: Pore, solved: Solved, duration: float,
+            most: float = np.inf) -> Attempt:
     """A step of ``duration`` (h), if the rates change by no more than ``most`` (1/h) over its first
     half. Raises StageError where it cannot be made."""
     first = rates_of(scene, now, solved.concentrations)
@@ -59,17 +61,26 @@ def attempt(scene: Scene, now: Pore, solved: Solved, duration: float, most: floa
     if change > most:
         return Attempt(None, change, None)
     after = _matched(now, grown(now, half.rates, duration), half.made)
-    expanded, iterations, gap = contact.expand(scene, after, enlarged(scene, now, after), _ahead(now, half.shape))
+    theta = enlarged(scene, now, after)
+    expanded, iterations, gap = contact.expand(scene, after, theta, _ahead(now, half.shape))
     if leaves := pore_end(scene, expanded, 0.1):
         raise PoreEnd(f"{leaves} in the step from t = {now.time:g} h")
-    guess = _extrapolated(solved.concentrations, half.solved.concentrations)
-    new, remeshed = remeshing.new_mesh(scene, now, replace(expanded, concentrations=guess), _speed(solved))
-    supplied, out, consumed = (tuple(duration * getattr(flux, key) for flux in half.solved.fluxes)
-                               for key in ("supplied", "out", "consumed"))
-    ledger = Ledger(now.time, now.time + duration, supplied, out, consumed, (0.0, 0.0), now.mass,
+    guess = _extrapolated(needed(solved.concentrations, "[substrates]"),
+                          needed(half.solved.concentrations, "[substrates]"))
+    expanded = replace(expanded, concentrations=guess)
+    new, remeshed = remeshing.new_mesh(scene, now, expanded, _speed(solved))
+    ledger = Ledger(now.time, now.time + duration, *_flows(half.solved, duration), now.mass,
                     after.mass - now.mass, new.mass)
     return Attempt(Step(new, (now, solved), ledger, remeshed, iterations), change,
                    first_contact(scene, now, expanded, gap))
+
+
+def _flows(solved: Solved, duration: float) -> Flows:
+    """What the fluxes of acceptor and donor come to in a step (h)."""
+    acceptor, donor = ((duration * flux.supplied, duration * flux.out, duration * flux.consumed)
+                       for flux in needed(solved.fluxes, "[substrates]"))
+    supplied, out, consumed = zip(acceptor, donor)
+    return Flows(supplied, out, consumed, stored=(0.0, 0.0))
 
 
 def halfway(scene: Scene, now: Pore, solved: Solved, first: Rates, duration: float) -> Halfway:
@@ -82,7 +93,8 @@ def halfway(scene: Scene, now: Pore, solved: Solved, first: Rates, duration: flo
     if mesh is not None:
         there = replace(now, space=Space(mesh, now.space.order))
     else:
-        there, (active, inert) = remeshing.remesh(scene, now, shape, _speed(solved), (now.active, now.inert))
+        there, (active, inert) = remeshing.remesh(scene, now, shape, _speed(solved),
+                                                  (now.active, now.inert))
         there = replace(there, active=active, inert=inert)
     found = pore.solve(scene, there, duration)
     rates = rates_of(scene, there, found.concentrations)
@@ -100,10 +112,13 @@ def _speed(solved: Solved) -> float:
 
 def _carried_back(there: Pore, shape: Pore, rates: Rates) -> Rates:
     """Rates at the points of a new mesh, interpolated to those of the material's mesh before."""
-    mesh, body = there.mesh, shape.mesh.body
-    nodal = np.column_stack([biomass.at_nodes(there.space, field) for field in (rates.growth, rates.remains)])
+    mesh = there.mesh
+    body = shape.mesh.body
+    nodal = np.column_stack([biomass.at_nodes(there.space, field)
+                             for field in (rates.growth, rates.remains)])
     found = np.zeros((len(shape.mesh.points), 2))
-    found[body] = transfer.interpolate(mesh.points, mesh.cells[mesh.biomass], nodal, shape.mesh.points[body])
+    found[body] = transfer.interpolate(mesh.points, mesh.cells[mesh.biomass], nodal,
+                                       shape.mesh.points[body])
     growth, remains = (biomass.at_points(shape.space, column) for column in found.T)
     return Rates(growth, remains)
 
@@ -114,7 +129,8 @@ def _matched(now: Pore, after: Pore, made: tuple[float, float]) -> Pore:
     share = now.active / now.active.sum()
     lacking = [wanted - float((new - old).sum()) for wanted, new, old in
                zip(made, (after.active, after.inert), (now.active, now.inert))]
-    return replace(after, active=after.active + lacking[0] * share, inert=after.inert + lacking[1] * share)
+    return replace(after, active=after.active + lacking[0] * share,
+                   inert=after.inert + lacking[1] * share)
 
 
 def _extrapolated(start: Concentrations, half: Concentrations) -> Concentrations:
@@ -123,15 +139,18 @@ def _extrapolated(start: Concentrations, half: Concentrations) -> Concentrations
     another, what they are at the start."""
     if len(half.acceptor) != len(start.acceptor):
         return start
-    acceptor, donor = 2 * half.acceptor - start.acceptor, 2 * half.donor - start.donor
-    return replace(start, acceptor=acceptor, donor=donor) if min(acceptor.min(), donor.min()) >= 0 else half
+    acceptor = 2 * half.acceptor - start.acceptor
+    donor = 2 * half.donor - start.donor
+    if min(acceptor.min(), donor.min()) < 0:
+        return half
+    return replace(start, acceptor=acceptor, donor=donor)
 
 
 def _scaled(now: Pore, after: Pore) -> Pore:
     """A first guess of the shape: all lengths grow alike, while the aggregate is free."""
     if now.contact:
         return after
-    fixed = now.outline.points[now.fixed][:1]
+    fixed = now.boundary.points[now.fixed][:1]
     return _placed(after, fixed + (now.mesh.points - fixed) * np.sqrt(after.mass / now.mass))
 
 
@@ -146,16 +165,19 @@ def _ahead(now: Pore, half: Pore) -> Pore:
 
 def _placed(after: Pore, points: np.ndarray) -> Pore:
     """The pore with its aggregate's nodes at guessed places, unless they turn a triangle over."""
-    guess, body = after.mesh.points.copy(), after.mesh.body
+    body = after.mesh.body
+    guess = after.mesh.points.copy()
     guess[body] = points[body]
     moved = after.moved(guess)
     biomass_cells = np.flatnonzero(moved.mesh.biomass)
     return after if moved.mesh.turned_over(biomass_cells).any() else moved
 
 
-def first_contact(scene: Scene, now: Pore, expanded: Pore, gap: float) -> tuple[float, float, float] | None:
+def first_contact(scene: Scene, now: Pore, expanded: Pore,
+                  gap: float) -> tuple[float, float, float] | None:
     """Least distance to the opposite wall before and after a step that makes contact, and the
     film's least thickness; None where contact is not made, or was there before."""
     if now.contact or not expanded.contact:
         return None
-    return scene.pore.width - now.outline.thickness, gap, scene.growth.minimum_film
+    film = needed(scene.growth, "[growth]").minimum_film
+    return scene.pore.width - now.boundary.thickness, gap, film

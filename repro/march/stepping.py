@@ -20,11 +20,12 @@ from repro.march.loop import SAME_TIME, Instant, PoreEnd, Scheme, State, Step, l
 from repro.march.pace import EXCESS, STRETCH, Pace, allowed, fitted, following
 from repro.model import remeshing
 from repro.model.pore import Pore, Solved
-from repro.scene import Scene
+from repro.scene import Scene, needed
 
-#: The first step that is tried, in parts of growth.time_step; one that fails or errs too much is
-#: tried again, shorter, until it is SHORTEST parts.
-FIRST, SHORTEST = 8.0, 1e-3
+#: The first step that is tried, in parts of growth.time_step.
+FIRST = 8.0
+#: A step that fails or errs too much is tried again, shorter, until it is this part of it.
+SHORTEST = 1e-3
 #: Contact is met when the film is no thinner than this part of what it may be.
 LANDED = 0.995
 
@@ -32,22 +33,28 @@ LANDED = 0.995
 def steps(scene: Scene, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
     """:func:`repro.march.loop.steps` by the midpoint rule; every step is reported where there are
     no ``output.times``."""
-
-    def advance(*now) -> tuple[Step, Solved, Pace]:
-        taken, solved, pace = _advance(*now)
-        return replace(taken, before=None), solved, pace
-
-    return loop.steps(scene, Scheme(_targets, advance, FIRST), state)
+    return loop.steps(scene, Scheme(_targets, _advance, FIRST), state)
 
 
 def _targets(scene: Scene) -> list[float]:
     """Times (h) at which a step must end."""
-    return sorted({time for time in scene.output.times or () if time > 0} | {scene.growth.end})
+    end = needed(scene.growth, "[growth]").end
+    return sorted({time for time in scene.output.times or () if time > 0} | {end})
 
 
-def _advance(scene: Scene, now: Pore, solved: Solved, time: float, asked: Pace) -> tuple[Step, Solved, Pace]:
+def _advance(scene: Scene, now: Pore, solved: Solved, time: float,
+             asked: Pace) -> tuple[Step, Solved, Pace]:
+    """One step towards a time (h), without the state before it."""
+    taken, after, pace = _accepted(scene, now, solved, time, asked)
+    return replace(taken, before=None), after, pace
+
+
+def _accepted(scene: Scene, now: Pore, solved: Solved, time: float,
+              asked: Pace) -> tuple[Step, Solved, Pace]:
     """The first step that is good enough, what is solved after it, and the pace of the next."""
-    tolerance, shortest, length = scene.numerics.tolerance, SHORTEST * scene.growth.time_step, asked.length
+    tolerance = scene.numerics.tolerance
+    shortest = SHORTEST * needed(scene.growth, "[growth]").time_step
+    length = asked.length
     duration = fitted(length, time - now.time, STRETCH)
     while True:
         most = np.inf if duration <= shortest else EXCESS * tolerance / duration
@@ -56,10 +63,14 @@ def _advance(scene: Scene, now: Pore, solved: Solved, time: float, asked: Pace) 
             estimate = found.change * duration
             if found.step and (duration <= shortest or not _overshoots(found)):
                 taken, after = _solved(scene, _ending_at(found.step, now.time + duration, time))
-                contact = found.gaps is not None  # that alone made the step short
-                pace = asked if contact else following(replace(asked, length=length), duration, estimate, tolerance)
-                return taken, after, pace
-            length = duration * (_to_contact(found.gaps) if found.step else allowed(estimate, tolerance))
+                if found.gaps is not None:  # contact alone made the step short
+                    return taken, after, asked
+                tried = replace(asked, length=length)
+                return taken, after, following(tried, duration, estimate, tolerance)
+            if found.step and found.gaps:
+                length = duration * _to_contact(found.gaps)
+            else:
+                length = duration * allowed(estimate, tolerance)
         except Unresolved as error:
             finer = remeshing.graded(scene, now)
             if finer is None and duration <= scene.growth.time_step:

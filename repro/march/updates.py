@@ -7,34 +7,48 @@ moves (35) or, by the paper's criteria (3.1, 3.5), is made anew.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from repro.march import loop
-from repro.march.loop import SAME_TIME, Instant, Ledger, PoreEnd, Scheme, State, Step, laid_out, pore_end
+from repro.march.loop import (
+    SAME_TIME,
+    Instant,
+    Ledger,
+    PoreEnd,
+    Scheme,
+    State,
+    Step,
+    laid_out,
+    pore_end,
+)
 from repro.march.pace import Pace
 from repro.model import biomass, contact, gear, kinetics, pore, remeshing, transport
 from repro.model.biomass import Rates
+from repro.model.gear import Flows
 from repro.model.kinetics import Sink
 from repro.model.pore import Pore, Solved
-from repro.model.transport import Concentrations
-from repro.scene import Scene
-
-#: Of a step, of acceptor and donor: supplied, out, consumed and stored, um2 mg/L.
-Flows = tuple[tuple[float, float], ...]
+from repro.model.transport import Concentrations, Fluxes
+from repro.scene import Scene, needed
 
 
 def schedule(scene: Scene) -> tuple[list[float], set[float]]:
     """Times (h) at which steps end, and those of them that are reported; t = 0 first."""
     if scene.growth is None:
         return [0.0], {0.0}
-    end, step, wanted = scene.growth.end, scene.growth.time_step, scene.output.times
+    end = scene.growth.end
+    step = scene.growth.time_step
     grid = [round(k * step, 9) for k in range(int(np.ceil(round(end / step, 9))))]
-    reported = {0.0, *(wanted or (*grid, end))}
-    between = [time for time in grid if min(abs(time - other) for other in (*reported, end)) > SAME_TIME]
-    return sorted({*between, *reported, end}), reported
+    reported = {0.0, *(scene.output.times or (*grid, end))}
+    exact = {*reported, end}
+    between = [time for time in grid if not _among(exact, time)]
+    return sorted({*between, *exact}), reported
+
+
+def _among(times: set[float], time: float) -> bool:
+    return any(abs(time - other) <= SAME_TIME for other in times)
 
 
 def steps(scene: Scene, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
@@ -42,7 +56,8 @@ def steps(scene: Scene, state: State | None = None) -> Iterator[tuple[State, Ins
     return loop.steps(scene, Scheme(lambda scene: schedule(scene)[0], _advance), state)
 
 
-def _advance(scene: Scene, now: Pore, solved: Solved, time: float, pace: Pace) -> tuple[Step, Solved, Pace]:
+def _advance(scene: Scene, now: Pore, solved: Solved, time: float,
+             pace: Pace) -> tuple[Step, Solved, Pace]:
     """One step to the time ``time`` (h)."""
     done = step(scene, now, solved, time - now.time)
     after = laid_out(replace(done.pore, time=time))
@@ -57,35 +72,48 @@ def step(scene: Scene, now: Pore, solved: Solved, duration: float) -> Step:
         raise PoreEnd(f"{leaves} in the step from t = {now.time:g} h")
     speed = solved.flow.mean_velocity if solved.flow else 0.0
     after, remeshed = remeshing.new_mesh(scene, now, replace(expanded, concentrations=end), speed)
-    ledger = Ledger(now.time, now.time + duration, *flows, now.mass, grown.mass - now.mass, after.mass)
+    ledger = Ledger(now.time, now.time + duration, *flows, now.mass, grown.mass - now.mass,
+                    after.mass)
     before = replace(grown, time=now.time + duration), replace(solved, concentrations=end)
     return Step(after, before, ledger, remeshed, iterations)
 
 
-def make_biomass(scene: Scene, now: Pore, solved: Solved, duration: float) -> tuple[Pore, Concentrations, Flows]:
+def make_biomass(scene: Scene, now: Pore, solved: Solved,
+                 duration: float) -> tuple[Pore, Concentrations, Flows]:
     """(9)-(10) over a step (h) in a fixed geometry: the grown pore, concentrations and flows.
 
     Quasi-steady: Heun's method on the rates, each biomass exponential in its rate; the second rates
     are those of the steady concentrations over the grown biomass. Gear: the transient of the paper.
     """
+    problem = needed(solved.problem, "[substrates]")
+    start = needed(solved.concentrations, "[substrates]")
     if scene.numerics.transport == "gear":
-        done = gear.advance(solved.problem, now.active, now.inert, solved.concentrations, duration)
+        done = gear.advance(problem, now.active, now.inert, start, duration)
         return replace(now, active=done.active, inert=done.inert), done.concentrations, done.flows
-    first = rates_of(scene, now, solved.concentrations)
+    first = rates_of(scene, now, start)
     guess = grown(now, first, duration)
-    end = transport.steady(solved.problem, Sink(guess.active), solved.concentrations)
+    end = transport.steady(problem, Sink(guess.active), start)
     second = rates_of(scene, now, end)
     mean = Rates((first.growth + second.growth) / 2, (first.remains + second.remains) / 2)
-    ends = (transport.fluxes(solved.problem, Sink(now.active), solved.concentrations),
-            transport.fluxes(solved.problem, Sink(guess.active), end))
-    flows = [tuple(duration * (getattr(a, key) + getattr(b, key)) / 2 for a, b in zip(*ends))
-             for key in ("supplied", "out", "consumed")]
-    return grown(now, mean, duration), end, (*flows, (0.0, 0.0))
+    before = transport.fluxes(problem, Sink(now.active), start)
+    after = transport.fluxes(problem, Sink(guess.active), end)
+    return grown(now, mean, duration), end, _mean_flows(before, after, duration)
 
 
-def rates_of(scene: Scene, now: Pore, state: Concentrations) -> Rates:
+def _mean_flows(before: Sequence[Fluxes], after: Sequence[Fluxes], duration: float) -> Flows:
+    """The trapezoidal rule over a step (h), from the fluxes of acceptor and donor at its ends."""
+    acceptor, donor = (
+        (duration * (a.supplied + b.supplied) / 2, duration * (a.out + b.out) / 2,
+         duration * (a.consumed + b.consumed) / 2) for a, b in zip(before, after))
+    supplied, out, consumed = zip(acceptor, donor)
+    return Flows(supplied, out, consumed, stored=(0.0, 0.0))
+
+
+def rates_of(scene: Scene, now: Pore, state: Concentrations | None) -> Rates:
     """F3 / X_A and F4 / X_A, 1/h, at the points of the reaction."""
-    return biomass.rates(now.space, state, scene.substrates, scene.kinetics)
+    return biomass.rates(now.space, needed(state, "[substrates]"),
+                         needed(scene.substrates, "[substrates]"),
+                         needed(scene.kinetics, "[kinetics]"))
 
 
 def grown(now: Pore, rates: Rates, duration: float) -> Pore:
@@ -97,8 +125,10 @@ def grown(now: Pore, rates: Rates, duration: float) -> Pore:
 def enlarged(scene: Scene, now: Pore, after: Pore) -> np.ndarray:
     """(t, q) theta after the biomass has grown: on straight triangles (28)-(29), by the increase of
     X_A + X_I over X_m; on curved ones as the mass in each point."""
-    before, total = now.active + now.inert, after.active + after.inert
+    before = now.active + now.inert
+    total = after.active + after.inert
     if now.space.order > 1:
         return now.theta * (total / before)
-    more = (total - before) / now.space.reaction.dx / scene.kinetics.maximum_density
+    density = needed(scene.kinetics, "[kinetics]").maximum_density
+    more = (total - before) / now.space.reaction.dx / density
     return now.theta * (1 + remeshing.spread(now.space, more))

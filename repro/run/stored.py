@@ -152,6 +152,7 @@ def _pore(scene: Scene, plain: dict, arrays: dict[str, np.ndarray]) -> Pore:
     space = Space(mesh, numerics.order)
     _check_sizes(space, plain, arrays)
     body = material(space, arrays["reference"])
+    _refuse(arrays["theta"].shape[1] != len(body.shape.table.weights), "array 'theta'")
     if mesh.biomass.any():
         _refuse(not body.at.dx.min() > 0, "a triangle's place at t = 0")
     own = {name: arrays[name] for name in ("wall", "fixed", "active", "inert", "theta", "pressure")}
@@ -167,10 +168,11 @@ def _check_sizes(space: Space, plain: dict, arrays: dict[str, np.ndarray]) -> No
     _refuse(arrays["active"].shape != dx.shape or arrays["theta"].shape[0] != np.count_nonzero(mesh.biomass),
             "its list of arrays")
     _refuse(plain["guess"] is not None and len(arrays["acceptor"]) != space.count, "its concentrations")
+    _refuse(len(arrays["points"]) != mesh.cells.max() + 1, "array 'points'")
     theta = arrays["theta"]
     _refuse(bool(theta.min(initial=1.0) <= 0 or theta.max(initial=1.0) > LARGEST), "array 'theta'")
     _refuse(min(arrays[name].min(initial=0.0) for name in ("active", "inert")) < 0, "its biomass")
-    for name in GUESS.keys() & arrays.keys():
+    for name in ("pressure", *(GUESS.keys() & arrays.keys())):
         _refuse(float(np.abs(arrays[name]).max()) > LARGEST, f"array {name!r}")
 
 

@@ -1,7 +1,8 @@
-"""Runs on a Dask cluster, into a folder that its workers share: each in a process of its own, beside its worker.
+"""Runs on a Dask cluster, into a folder that its workers share.
 
-A run whose worker dies goes to another one. Each attempt writes into a folder of its own, and the first that ends moves
-it to its place, so that no run is lost, and none is there twice.
+Each is made in a process of its own, beside its worker. A run whose worker dies goes to another
+one. Each attempt writes into a folder of its own, and the first that ends moves it to its place, so
+that no run is lost, and none is there twice.
 """
 
 from __future__ import annotations
@@ -119,11 +120,11 @@ def _check(client, folder: Path, address: str) -> None:
         raise SweepError(f"--scheduler {address}: a worker lacks this package ({error})") from None
     for worker, (theirs, shared) in found.items():
         if theirs != task.code():
-            raise SweepError(f"--scheduler {address}: the worker {worker} has version {theirs} of this package, this "
-                             f"is {task.code()}; the same is needed")
+            raise SweepError(f"--scheduler {address}: the worker {worker} has version {theirs} of "
+                             f"this package, this is {task.code()}; the same is needed")
         if not shared:
-            raise SweepError(f"--scheduler {address}: the worker {worker} does not see {folder}; a folder on a file "
-                             "system that all share is needed")
+            raise SweepError(f"--scheduler {address}: the worker {worker} does not see {folder}; a "
+                             "folder on a file system that all share is needed")
 
 
 def look(path: str) -> tuple[str, bool]:
@@ -134,13 +135,18 @@ def look(path: str) -> tuple[str, bool]:
 def _submit(client, point: Point, folder: Path):
     token = uuid.uuid4().hex  # two sweeps may have the same run
     asked = ask(point.scene, folder / point.name, folder / f".part-{point.name}")
-    return client.submit(attempt, asked, task.code(), key=f"repro-sweep-{point.name}-{token}", pure=False)
+    key = f"repro-sweep-{point.name}-{token}"
+    return client.submit(attempt, asked, task.code(), key=key, pure=False)
 
 
 def attempt(asked: str, wanted: str) -> str:
-    """On a worker: make a run in a process of its own, and a folder that no other attempt has; how it ended."""
+    """On a worker: make a run in a process of its own; how it ended.
+
+    It is made in a folder that no other attempt has.
+    """
     if task.code() != wanted:
-        return f"failed: a worker that joined has version {task.code()} of this package, {wanted} is needed"
+        return (f"failed: a worker that joined has version {task.code()} of this package, {wanted} "
+                "is needed")
     told = json.loads(asked)
     told["beside"] += f"-{uuid.uuid4().hex}"
     try:

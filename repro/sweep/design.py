@@ -1,8 +1,8 @@
 """The points of a sweep: what ``--vary`` asks for, crossed in a grid or drawn as a Latin hypercube.
 
-Two forms: a range ``flow.mean_velocity=0.3:30 m/day:log:8`` (both ends in the unit that follows; ``linear`` or ``log``;
-how many values), and a list ``pore.width=50 um, 60 um`` or ``numerics.preset=fast, paper``. A Latin hypercube takes its
-ranges without the number of values.
+Two forms: a range ``flow.mean_velocity=0.3:30 m/day:log:8`` (both ends in the unit that follows;
+``linear`` or ``log``; how many values), and a list ``pore.width=50 um, 60 um`` or
+``numerics.preset=fast, paper``. A Latin hypercube takes its ranges without the number of values.
 """
 
 from __future__ import annotations
@@ -32,7 +32,10 @@ _NUMBER = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s
 
 @dataclass(frozen=True)
 class Factor:
-    """A key that is varied: numbers in `unit` ("" for plain ones), or words; a range has two, its ends."""
+    """A key that is varied: numbers in `unit` ("" for plain ones), or words.
+
+    A range has two, its ends.
+    """
 
     key: str
     unit: str
@@ -77,7 +80,10 @@ class Point:
 
 
 def parse(text: str) -> Factor:
-    """The factor that one ``--vary`` names. Raises SceneError where it is neither a range nor a list."""
+    """The factor that one ``--vary`` names.
+
+    Raises SceneError where it is neither a range nor a list.
+    """
     key, equals, rest = (part.strip() for part in text.partition("="))
     if not (key and equals and rest):
         raise _refused(text, WANTED)
@@ -91,7 +97,9 @@ def _refused(text: str, wanted: str) -> SceneError:
 def _range(text: str, key: str, rest: str) -> Factor:
     low, high, spacing, count = (*(part.strip() for part in rest.split(":", 3)), "", "", "")[:4]
     (start, other), (end, unit) = _number(low), _number(high)
-    if not (start and end) or other or spacing not in ("linear", "log") or not re.fullmatch("[0-9]{0,9}", count):
+    if not (start and end) or other:
+        raise _refused(text, WANTED)
+    if spacing not in ("linear", "log") or not re.fullmatch("[0-9]{0,9}", count):
         raise _refused(text, WANTED)
     first, last = float(start), float(end)
     if not first < last < math.inf:
@@ -104,8 +112,7 @@ def _range(text: str, key: str, rest: str) -> Factor:
 
 
 def _list(text: str, key: str, rest: str) -> Factor:
-    items = [item.strip() for item in rest.split(",")]
-    items = [item[1:-1] if len(item) > 1 and item[0] == item[-1] == '"' else item for item in items]
+    items = [_bare(item.strip()) for item in rest.split(",")]
     numbers = [_number(item) for item in items]
     if "" in items or len({(bool(digits), unit) for digits, unit in numbers}) > 1:
         raise _refused(text, "values in one and the same unit, or words, are needed")
@@ -117,6 +124,11 @@ def _list(text: str, key: str, rest: str) -> Factor:
     return Factor(key, numbers[0][1], values)
 
 
+def _bare(item: str) -> str:
+    """An item of a list without the quotes around it."""
+    return item[1:-1] if len(item) > 1 and item[0] == item[-1] == '"' else item
+
+
 def _number(text: str) -> tuple[str, str]:
     """The digits and the unit of a text, both empty where it is no number."""
     match = _NUMBER.fullmatch(text)
@@ -124,32 +136,41 @@ def _number(text: str) -> tuple[str, str]:
 
 
 def levels(factor: Factor) -> list[float | str]:
-    """The values that a grid takes of a factor; those between the ends of a range have 12 digits."""
+    """The values that a grid takes of a factor; those between the ends of a range have 12 digits.
+    """
     if factor.spacing == "list":
         return list(factor.values)
     low, high = factor.values
-    found = (np.geomspace if factor.spacing == "log" else np.linspace)(low, high, factor.count or 2).tolist()
+    spaced = np.geomspace if factor.spacing == "log" else np.linspace
+    found = spaced(low, high, factor.count or 2).tolist()
     return [low, *(float(f"{value:.12g}") for value in found[1:-1]), high]
 
 
 def grid(factors: list[Factor]) -> list[tuple]:
-    """Every combination, the last factor changing first. Raises SceneError for a range without a number of values."""
+    """Every combination, the last factor changing first.
+
+    Raises SceneError for a range without a number of values.
+    """
     for factor in factors:
         if factor.spacing != "list" and factor.count is None:
-            raise SceneError(f"--vary {factor.key}: how many values is needed after {factor.spacing}, such as :8, "
-                             "or --samples N for a Latin hypercube")
+            raise SceneError(f"--vary {factor.key}: how many values is needed after "
+                             f"{factor.spacing}, such as :8, or --samples N for a Latin hypercube")
     if math.prod(factor.count or len(factor.values) for factor in factors) > MOST_POINTS:
         raise SceneError(f"--vary: at most {MOST_POINTS} runs are accepted")
     return list(product(*map(levels, factors)))
 
 
 def latin(factors: list[Factor], samples: int, seed: int) -> list[tuple]:
-    """A Latin hypercube: each of `samples` strata of each range has one value, a list's are drawn evenly."""
+    """A Latin hypercube: each of `samples` strata of each range has one value.
+
+    A list's values are drawn evenly.
+    """
     from scipy.stats import qmc
 
     for factor in factors:
         if factor.count is not None:
-            raise SceneError(f"--vary {factor.key}: leave :{factor.count} out, --samples says how many runs there are")
+            raise SceneError(f"--vary {factor.key}: leave :{factor.count} out, --samples says how "
+                             "many runs there are")
     if not 1 <= samples <= MOST_POINTS:
         raise SceneError(f"--samples {samples}: from 1 to {MOST_POINTS} are accepted")
     drawn = qmc.LatinHypercube(len(factors), rng=np.random.default_rng(seed)).random(samples)
@@ -192,10 +213,12 @@ def _check_keys(sets: list[str], varied: list[str]) -> None:
         if count > 1:
             raise SceneError(f"--vary {key}: one --vary of it is accepted, with all its values")
         if other in varied:
-            raise SceneError(f"--vary {key}: it and {other} exclude each other; one of them is accepted")
+            raise SceneError(f"--vary {key}: it and {other} exclude each other; one of them is "
+                             "accepted")
         if any(entry.partition("=")[0].strip() in (key, other) for entry in sets):
-            raise SceneError(f"--set of {key}{f' or {other}' if other else ''}: it is not accepted beside --vary "
-                             f"{key}, which replaces it")
+            both = f"{key} or {other}" if other else key
+            raise SceneError(f"--set of {both}: it is not accepted beside --vary {key}, which "
+                             "replaces it")
 
 
 def _scene(source: str, tables: dict, factors: list[Factor], values: tuple, said: str) -> Scene:
@@ -212,4 +235,5 @@ def _scene(source: str, tables: dict, factors: list[Factor], values: tuple, said
 
 def label(factors: list[Factor], values: tuple) -> str:
     """What a run has of each factor, for people to read."""
-    return ", ".join(f"{factor.key} = {factor.short(value)}" for factor, value in zip(factors, values))
+    return ", ".join(f"{factor.key} = {factor.short(value)}"
+                     for factor, value in zip(factors, values))

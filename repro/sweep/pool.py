@@ -1,4 +1,7 @@
-"""Runs side by side on this machine, each in a process of its own: what kills one is the failure of no other."""
+"""Runs side by side on this machine, each in a process of its own.
+
+What kills one is the failure of no other.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +36,10 @@ def ready(workers: int) -> Iterator[Each]:
 
 
 def each(points: list[Point], folder: Path, servers: list[Server]) -> Iterator[tuple[Point, str]]:
-    """Make the runs into `folder`, one at a time in each server; yields each with how it ended, as they end."""
+    """Make the runs into `folder`, one at a time in each server.
+
+    Yields each with how it ended, as they end.
+    """
     idle: SimpleQueue[Server] = SimpleQueue()
     for server in servers:
         idle.put(server)

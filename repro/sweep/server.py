@@ -1,8 +1,9 @@
 """A process that makes runs, one after the other: ``python -m repro.sweep.server``.
 
-It has imported everything and forks a process for each run, so that what kills that is the run's failure alone; where
-processes cannot be forked it makes them itself. A line of its input asks for a run, a line of its output says how it
-ended, both JSON; when the input ends, so does the run at work. Inside them the linear algebra has one thread.
+It has imported everything and forks a process for each run, so that what kills that is the run's
+failure alone; where processes cannot be forked it makes them itself. A line of its input asks for a
+run, a line of its output says how it ended, both JSON; when the input ends, so does the run at
+work. Inside them the linear algebra has one thread.
 """
 
 from __future__ import annotations
@@ -23,8 +24,9 @@ from typing import Any
 from repro.scene import Scene
 from repro.sweep import task
 
-#: For these processes: one thread each; and glibc keeps the memory that a run frees for its next step, where asking the
-#: system for it again and again, a page at a time, takes a short run 5 % of its time.
+#: For these processes: one thread each; and glibc keeps the memory that a run frees for its next
+#: step, where asking the system for it again and again, a page at a time, takes a short run 5 % of
+#: its time.
 ENVIRONMENT = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1",
                "MALLOC_MMAP_THRESHOLD_": "1073741824", "MALLOC_TRIM_THRESHOLD_": "1073741824",
                "MALLOC_TOP_PAD_": "67108864"}
@@ -42,7 +44,9 @@ class Server:
         """Have a run made that :func:`ask` describes; how it ended."""
         if self.closed:
             return "interrupted"
-        self.process, self.asked, answer = self.process or _process(), True, ""
+        self.process = self.process or _process()
+        self.asked = True
+        answer = ""
         with suppress(BrokenPipeError):
             self.process.stdin.write(asked + "\n")
             self.process.stdin.flush()
@@ -72,8 +76,9 @@ class Server:
 
 
 def _process() -> subprocess.Popen:
-    return subprocess.Popen([sys.executable, "-m", __name__], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-                            env=os.environ | ENVIRONMENT, start_new_session=True)  # Ctrl-C is for whoever asks
+    return subprocess.Popen([sys.executable, "-m", __name__], stdin=subprocess.PIPE,
+                            stdout=subprocess.PIPE, text=True, env=os.environ | ENVIRONMENT,
+                            start_new_session=True)  # Ctrl-C is for whoever asks
 
 
 def ask(scene: Scene, folder: Path, beside: Path) -> str:

@@ -1,7 +1,7 @@
 """A sweep's folder: ``sweep.json`` says what is wanted, the folders of ``runs/`` what is there.
 
-A run is there when its folder is; it is moved there whole. So a sweep that was cut off, by whatever, is gone on with by
-the same command: it makes what is missing, and what has failed, again.
+A run is there when its folder is; it is moved there whole. So a sweep that was cut off, by whatever,
+is gone on with by the same command: it makes what is missing, and what has failed, again.
 """
 
 from __future__ import annotations
@@ -46,8 +46,11 @@ class Sweep:
 
 @contextmanager
 def opened(sweep: Sweep):
-    """Hold the sweep's folder, made if it is not there. Raises OutputError where it holds anything else, or another
-    sweep, where another process has it, and where it cannot be written."""
+    """Hold the sweep's folder, made if it is not there.
+
+    Raises OutputError where it holds anything else, or another sweep, where another process has it,
+    and where it cannot be written.
+    """
     with usable(sweep.folder):
         _check(sweep.folder, _as_json(sweep))
         sweep.runs.mkdir(parents=True, exist_ok=True)
@@ -69,7 +72,8 @@ def usable(folder: Path):
         yield
     except OSError as error:
         why = error.strerror or error
-        raise SweepError(f"--out {folder}: {why}; a folder that can be written is needed") from error
+        needed = "a folder that can be written is needed"
+        raise SweepError(f"--out {folder}: {why}; {needed}") from error
 
 
 def _as_json(sweep: Sweep) -> dict:
@@ -84,8 +88,8 @@ def _check(folder: Path, wanted: dict) -> None:
     if folder.is_dir() and not (folder / "sweep.json").exists():
         strange = sorted({path.name for path in folder.iterdir()} - {"runs", ".lock"})
         if strange:
-            raise SweepError(f"--out {folder}: it holds {strange[0]!r}, which is not of a sweep; a new or empty "
-                             "folder, or one of the same sweep, is accepted")
+            raise SweepError(f"--out {folder}: it holds {strange[0]!r}, which is not of a sweep; a "
+                             "new or empty folder, or one of the same sweep, is accepted")
     elif folder.exists():
         _compare(folder, _read(folder), wanted)
 
@@ -95,16 +99,18 @@ def _read(folder: Path) -> dict:
         told = json.loads((folder / "sweep.json").read_text(encoding="utf-8"))
         return {name: told[name] for name in ("scene", "code", "varied", "points")}
     except (ValueError, KeyError, TypeError):
-        raise SweepError(f"--out {folder}: its sweep.json cannot be read; a new folder is needed") from None
+        raise SweepError(f"--out {folder}: its sweep.json cannot be read; a new folder is "
+                         "needed") from None
 
 
 def _compare(folder: Path, told: dict, wanted: dict) -> None:
     if told["code"] != wanted["code"]:
-        raise SweepError(f"--out {folder}: its sweep was begun with version {told['code']} of this package, this is "
-                         f"{wanted['code']}; a new folder is needed")
+        raise SweepError(f"--out {folder}: its sweep was begun with version {told['code']} of this "
+                         f"package, this is {wanted['code']}; a new folder is needed")
     if (told["varied"], told["points"]) != (wanted["varied"], wanted["points"]):
-        raise SweepError(f"--out {folder}: it holds another sweep ({told['scene']}, {len(told['points'])} runs); a new "
-                         "folder, or the same scene, --set, --vary, --samples and --seed, is needed")
+        raise SweepError(f"--out {folder}: it holds another sweep ({told['scene']}, "
+                         f"{len(told['points'])} runs); a new folder, or the same scene, --set, "
+                         "--vary, --samples and --seed, is needed")
 
 
 def _hold(lock, folder: Path) -> None:

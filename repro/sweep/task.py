@@ -1,4 +1,7 @@
-"""One run of a sweep: made beside its place and moved there at its end, so that none is half there or there twice."""
+"""One run of a sweep: made beside its place and moved there at its end.
+
+So none is half there, or there twice.
+"""
 
 from __future__ import annotations
 
@@ -37,8 +40,10 @@ def finished(folder: Path) -> bool:
 
 
 def make(scene: Scene, folder: Path, beside: Path) -> str:
-    """Run a scene in `beside`, or go on with it there, then move it to `folder`; how it ended, in one line, whatever
-    the trouble is."""
+    """Run a scene in `beside`, or go on with it there, then move it to `folder`.
+
+    Returns how it ended, in one line, whatever the trouble is.
+    """
     if not _begun(scene, beside):
         shutil.rmtree(beside, ignore_errors=True)
     try:
@@ -53,7 +58,8 @@ def _begun(scene: Scene, beside: Path) -> bool:
     """Is there a state of this scene's run to go on from?"""
     try:
         told = json.loads((beside / "run.json").read_text(encoding="utf-8"))
-        return told["hash"] == scene_hash(scene) and any((beside / name).is_file() for name in (NEWEST, PREVIOUS))
+        kept = any((beside / name).is_file() for name in (NEWEST, PREVIOUS))
+        return kept and told["hash"] == scene_hash(scene)
     except (OSError, ValueError, KeyError, TypeError):
         return False
 

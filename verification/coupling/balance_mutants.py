@@ -18,6 +18,6 @@ BALANCES = (
            new="found = replace(grown, active=start.active, inert=start.inert, space=start.space,"),
     Mutant("flows-of-the-start", MIDPOINT_RULE,
            says="A step's ledger has the flows of its start, not those half way.",
-           old="for flux in half.solved.fluxes)",
-           new="for flux in solved.fluxes)"),
+           old="_flows(half.solved, duration)",
+           new="_flows(solved, duration)"),
 )
