@@ -65,6 +65,6 @@ MUTANTS = (
            new="straight = self.areas.min() > 0"),
     Mutant("hard-keys-overflow", "repro/fem/assembly.py",
            says="Places in the sparse matrix are counted in 32 bits, which end at 46 000 unknowns.",
-           old="(place[_flat(part)] for part in zip(*map(linear.pairs, self.kinds)))",
-           new="(place[_flat(part)].astype(np.int32) for part in zip(*map(linear.pairs, self.kinds)))"),
+           old="np.unique(columns * len(rank) + rows, return_inverse=True)",
+           new="np.unique(np.minimum(columns * len(rank) + rows, 2**31 - 1), return_inverse=True)"),
 )

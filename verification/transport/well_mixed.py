@@ -160,7 +160,7 @@ def _profiles() -> tuple[Profile, ...]:
             Profile("biomass", "time (h)", "X (mg/L)", curves((2, 3))))
 
 
-#: Lengths of a step (h); X_A grows by up to a half in the last.
+#: Lengths of a step (h); X_A more than doubles in the last.
 HOURS = (0.2, 2.0, 8.0)
 #: The paper's kinetics and diffusivities, the supply held at both ends: both substrates fall towards the wall.
 OPEN = replace(SCENE.substrates, acceptor=replace(SCENE.substrates.acceptor, supply=1.0))
