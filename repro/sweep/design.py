@@ -202,7 +202,8 @@ def points(source: str, sets: list[str], factors: list[Factor], combinations: li
         point = Point(index, values, scene)
         twin = first.setdefault(scene_hash(point.scene), index)
         if twin != index:
-            raise SceneError(f"run {index} ({said}): the same scene as run {twin}; each run once is accepted")
+            raise SceneError(f"run {index} ({said}): the same scene as run {twin}; each run once "
+                             "is accepted")
         found.append(point)
     return found
 

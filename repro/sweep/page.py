@@ -1,4 +1,7 @@
-"""``summary.html``: the laws of a single pore that a sweep finds, and how its runs ended. It needs no network."""
+"""``summary.html``: the laws of a single pore that a sweep finds, and how its runs ended.
+
+It needs no network.
+"""
 
 from __future__ import annotations
 
@@ -17,34 +20,51 @@ from repro.sweep.table import Told
 
 #: From here on the values of a list are shown on a logarithmic scale.
 WIDE = 20
-#: Viridis, dark to light on a light page and without its darkest part on a dark one: told apart by the colour-blind.
+#: Viridis, dark to light on a light page and without its darkest part on a dark one: told apart by
+#: the colour-blind.
 LIGHT = ("#440154", "#46327e", "#365c8d", "#277f8e", "#1fa187", "#4ab36b", "#86a51a")
 DARK = ("#8d7fe0", "#6f93dd", "#4fa5d0", "#35b7ae", "#5ac883", "#a5d84a", "#fde725")
-COLOURS = [" ".join(f"--level{i}: {colour};" for i, colour in enumerate(colours)) for colours in (LIGHT, DARK)]
+
+
+def _levels(colours: tuple[str, ...]) -> str:
+    """The colours as the style names them."""
+    return " ".join(f"--level{i}: {colour};" for i, colour in enumerate(colours))
+
+
 LOOK = """
-:root { color-scheme: light dark; --ink: #1c1c1c; --soft: #5a5a5a; --line: #d9d9d6; --page: #fff; --bad: #a5330d;
-        LIGHT }
+:root { color-scheme: light dark; --ink: #1c1c1c; --soft: #5a5a5a; --line: #d9d9d6; --page: #fff;
+        --bad: #a5330d; LIGHT }
 @media (prefers-color-scheme: dark) {
-  :root { --ink: #ececea; --soft: #a9a9a6; --line: #3a3c40; --page: #15171a; --bad: #ff9b73; DARK } }
-body { max-width: 66rem; margin: 0 auto; padding: 1.5rem 1rem 3rem; color: var(--ink); background: var(--page);
-       font: 1rem/1.5 system-ui, sans-serif; overflow-wrap: anywhere; }
+  :root { --ink: #ececea; --soft: #a9a9a6; --line: #3a3c40; --page: #15171a; --bad: #ff9b73; DARK }
+}
+body { max-width: 66rem; margin: 0 auto; padding: 1.5rem 1rem 3rem; color: var(--ink);
+       background: var(--page); font: 1rem/1.5 system-ui, sans-serif; overflow-wrap: anywhere; }
 h1 { font-size: 1.5rem; line-height: 1.25; } h2 { font-size: 1.1rem; margin: 2rem 0 .5rem; }
 .note { color: var(--soft); } .bad { color: var(--bad); }
-.pictures { display: grid; gap: 1.5rem; grid-template-columns: repeat(auto-fit, minmax(min(100%, 25rem), 1fr)); }
+.pictures { display: grid; gap: 1.5rem;
+            grid-template-columns: repeat(auto-fit, minmax(min(100%, 25rem), 1fr)); }
 figure { margin: 0; } figcaption { color: var(--soft); font-size: .9rem; }
-svg { display: block; width: 100%; max-width: 34rem; height: auto; } svg text { fill: var(--ink); font-size: 13px; }
+svg { display: block; width: 100%; max-width: 34rem; height: auto; }
+svg text { fill: var(--ink); font-size: 13px; }
 .frame { fill: none; stroke: var(--soft); } .grid { stroke: var(--line); }
-.line { fill: none; stroke-width: 2; } .later { fill: none; stroke-width: 1.8; } .dot { stroke: var(--page); }
-.key { display: flex; flex-wrap: wrap; gap: .2rem 1rem; padding: 0; list-style: none; font-size: .9rem; }
+.line { fill: none; stroke-width: 2; } .later { fill: none; stroke-width: 1.8; }
+.dot { stroke: var(--page); }
+.key { display: flex; flex-wrap: wrap; gap: .2rem 1rem; padding: 0; list-style: none;
+       font-size: .9rem; }
 .key svg { display: inline-block; width: 1.6rem; height: .7rem; margin-right: .35rem; }
-.wide { overflow-x: auto; } table { border-collapse: collapse; font-size: .9rem; font-variant-numeric: tabular-nums; }
-th, td { text-align: right; padding: .25rem .6rem; border-bottom: 1px solid var(--line); overflow-wrap: normal; }
+.wide { overflow-x: auto; }
+table { border-collapse: collapse; font-size: .9rem; font-variant-numeric: tabular-nums; }
+th, td { text-align: right; padding: .25rem .6rem; border-bottom: 1px solid var(--line);
+         overflow-wrap: normal; }
 th { vertical-align: bottom; } td.text, th.text { text-align: left; } a { color: inherit; }
-""".replace("LIGHT", COLOURS[0]).replace("DARK", COLOURS[1])
-LOOK += "".join(f".level{i} {{ stroke: var(--level{i}); }} .dot.level{i} {{ fill: var(--level{i}); }}\n"
+""".replace("LIGHT", _levels(LIGHT)).replace("DARK", _levels(DARK))
+LOOK += "".join(f".level{i} {{ stroke: var(--level{i}); }} "
+                f".dot.level{i} {{ fill: var(--level{i}); }}\n"
                 for i in range(picture.LEVELS))
-SHOWN = (("end_h", "end (h)"), ("clogging_time_h", "clogged (h)"), ("clogging_biomass", "biomass then"),
-         ("contact_time_h", "contact (h)"), ("contact_biomass", "biomass then"), ("wall_time_s", "wall time (s)"))
+#: The numbers of a run that its row shows, and what stands above them.
+SHOWN = {"end_h": "end (h)", "clogging_time_h": "clogged (h)", "clogging_biomass": "biomass then",
+         "contact_time_h": "contact (h)", "contact_biomass": "biomass then",
+         "wall_time_s": "wall time (s)"}
 
 
 def write(sweep: Sweep, told: list[Told], clogged: float) -> None:
@@ -65,9 +85,10 @@ def page(sweep: Sweep, told: list[Told], clogged: float) -> str:
 <title>{title}</title><style>{LOOK}</style></head><body>
 <h1>{title}</h1>
 <p>{done} of {len(told)} runs have come to their end. Varied:</p><ul>{varied}</ul>
-<p class="note">Biomass is the aggregate's area over the pore's. Conductivity is relative to that of the run's start. A
-pore counts as clogged where that has fallen to {clogged:g}; contact is the first row in which the aggregate touches the
-opposite wall. Between the rows of a run what is shown is interpolated: <code>output.times</code> makes more.</p>
+<p class="note">Biomass is the aggregate's area over the pore's. Conductivity is relative to that of
+the run's start. A pore counts as clogged where that has fallen to {clogged:g}; contact is the first
+row in which the aggregate touches the opposite wall. Between the rows of a run what is shown is
+interpolated: <code>output.times</code> makes more.</p>
 {_conductivity(sweep, told)}
 {_clogging(sweep, told, clogged)}
 <h2>Runs</h2>{_table(sweep, told)}
@@ -101,18 +122,25 @@ def _level(factor: Factor, value: float | str) -> int:
     low, high = min(numbers), max(numbers)
     if low == high:
         return 0
-    return round((picture.LEVELS - 1) * Axis("", low, high, _log(factor)).part(_number(factor, value)))
+    part = Axis("", low, high, _log(factor)).part(_number(factor, value))
+    return round((picture.LEVELS - 1) * part)
 
 
 def _key(factor: Factor, told: list[Told], which: int) -> str:
     """What the colours stand for."""
-    values = sorted({one.point.values[which] for one in told}, key=lambda value: _number(factor, value))
+    values = sorted({one.point.values[which] for one in told},
+                    key=lambda value: _number(factor, value))
     if len(values) > 2 * picture.LEVELS:
-        values = [values[round(i * (len(values) - 1) / (picture.LEVELS - 1))] for i in range(picture.LEVELS)]
-    entries = "".join(f'<li><svg viewBox="0 0 24 10" aria-hidden="true"><line x1="0" x2="24" y1="5" y2="5" '
-                      f'class="line level{_level(factor, value)}"/></svg>{escape(factor.short(value))}</li>'
-                      for value in values)
+        last = len(values) - 1
+        values = [values[round(i * last / (picture.LEVELS - 1))] for i in range(picture.LEVELS)]
+    entries = "".join(_entry(factor, value) for value in values)
     return f'<ul class="key"><li>{escape(factor.key)}</li>{entries}</ul>'
+
+
+def _entry(factor: Factor, value: float | str) -> str:
+    """A value in the key, beside a line in its colour."""
+    return ('<li><svg viewBox="0 0 24 10" aria-hidden="true"><line x1="0" x2="24" y1="5" y2="5" '
+            f'class="line level{_level(factor, value)}"/></svg>{escape(factor.short(value))}</li>')
 
 
 def _said(sweep: Sweep, one: Told) -> str:
@@ -120,20 +148,33 @@ def _said(sweep: Sweep, one: Told) -> str:
 
 
 def _conductivity(sweep: Sweep, told: list[Told]) -> str:
-    """Conductivity against biomass, a line a run; a picture for each key that is varied, coloured by it."""
-    shown = [one for one in told if np.isfinite(one.relative).any() and np.isfinite(one.biomass).any()]
+    """Conductivity against biomass, a line a run.
+
+    There is a picture for each key that is varied, coloured by it.
+    """
+    shown = [one for one in told
+             if np.isfinite(one.relative).any() and np.isfinite(one.biomass).any()]
     head = "<h2>Conductivity against biomass</h2>"
     if not shown:
         return f'{head}<p class="note">No run has both a flow and an aggregate.</p>'
+    figures = "".join(f"<figure>{_coloured(sweep, shown, which)}</figure>"
+                      for which in range(len(sweep.factors)))
+    return f'{head}<div class="pictures">{figures}</div>'
+
+
+def _coloured(sweep: Sweep, shown: list[Told], which: int) -> str:
+    """A line a run, coloured by one of the keys that are varied."""
+    factor = sweep.factors[which]
     x = _axis("biomass: aggregate area / pore area", np.concatenate([one.biomass for one in shown]))
-    y = _axis("conductivity / initial conductivity", np.concatenate([one.relative for one in shown]))
-    figures = []
-    for which, factor in enumerate(sweep.factors):
-        marks = [picture.line([at(x, y, pair) for pair in zip(one.biomass, one.relative)],
-                              _level(factor, one.point.values[which]), _said(sweep, one)) for one in shown]
-        said = f"Conductivity against biomass, coloured by {factor.key}"
-        figures.append(f"<figure>{picture.plot(x, y, said, marks)}{_key(factor, shown, which)}</figure>")
-    return f'{head}<div class="pictures">{"".join(figures)}</div>'
+    y = _axis("conductivity / initial conductivity",
+              np.concatenate([one.relative for one in shown]))
+    marks = []
+    for one in shown:
+        places = [at(x, y, pair) for pair in zip(one.biomass, one.relative)]
+        level = _level(factor, one.point.values[which])
+        marks.append(picture.line(places, level, _said(sweep, one)))
+    said = f"Conductivity against biomass, coloured by {factor.key}"
+    return picture.plot(x, y, said, marks) + _key(factor, shown, which)
 
 
 def _axis(name: str, values) -> Axis:
@@ -143,13 +184,15 @@ def _axis(name: str, values) -> Axis:
 
 def _clogging(sweep: Sweep, told: list[Told], clogged: float) -> str:
     """Clogging time against each key that is varied, coloured by another one."""
-    shown = [one for one in told if _time(one) > 0 and (one.done or one.numbers["clogging_time_h"])]
+    shown = [one for one in told
+             if _time(one) > 0 and (one.done or one.numbers["clogging_time_h"])]
     head = "<h2>Clogging time</h2>"
     if not shown:
         return f'{head}<p class="note">No run has both a flow and a length in time.</p>'
-    figures = "".join(f"<figure>{_times(sweep, shown, which, clogged)}</figure>" for which in range(len(sweep.factors)))
-    return (f'{head}<p class="note">A hollow triangle stands at the end of a run that was not clogged by then.</p>'
-            f'<div class="pictures">{figures}</div>')
+    figures = "".join(f"<figure>{_times(sweep, shown, which, clogged)}</figure>"
+                      for which in range(len(sweep.factors)))
+    return (f'{head}<p class="note">A hollow triangle stands at the end of a run that was not '
+            f'clogged by then.</p><div class="pictures">{figures}</div>')
 
 
 def _times(sweep: Sweep, shown: list[Told], which: int, clogged: float) -> str:
@@ -168,7 +211,8 @@ def _times(sweep: Sweep, shown: list[Told], which: int, clogged: float) -> str:
         rest = one.point.values[:which] + one.point.values[which + 1:]
         alike.setdefault(rest, (level, []))[1].extend([place] if reached else [])
     if len(sweep.factors) > 1:
-        lines = [picture.line(places, level, "") for level, places in alike.values() if len(places) > 1]
+        lines = [picture.line(places, level, "")
+                 for level, places in alike.values() if len(places) > 1]
     key = _key(sweep.factors[other], shown, other) if other != which else ""
     return picture.plot(x, y, f"Clogging time against {factor.key}", lines + marks) + key
 
@@ -177,11 +221,15 @@ def _across(factor: Factor, numbers: list[float]) -> Axis:
     """The axis of a key that is varied."""
     if not factor.numeric:
         return Axis(factor.key, -0.5, len(factor.values) - 0.5, words=factor.values)
-    return picture.around(f"{factor.key} ({factor.unit})" if factor.unit else factor.key, numbers, _log(factor))
+    name = f"{factor.key} ({factor.unit})" if factor.unit else factor.key
+    return picture.around(name, numbers, _log(factor))
 
 
 def _time(one: Told) -> float:
-    """When a pore has clogged, or how long it has been simulated (h); zero where there is no flow to clog."""
+    """When a pore has clogged, or how long it has been simulated (h).
+
+    Zero where there is no flow to clog.
+    """
     if not np.isfinite(one.relative).any():
         return 0.0
     reached = one.numbers["clogging_time_h"]
@@ -189,19 +237,23 @@ def _time(one: Told) -> float:
 
 
 def _table(sweep: Sweep, told: list[Told]) -> str:
-    names = ["run", *(factor.key for factor in sweep.factors), *(name for _, name in SHOWN)]
+    names = ["run", *(factor.key for factor in sweep.factors), *SHOWN.values()]
     head = "".join(f"<th>{escape(name)}</th>" for name in names) + '<th class="text">status</th>'
     rows = "".join(_row(sweep, one) for one in told)
     failures = "".join(f'<li class="bad">run {one.point.index}: {escape(one.status)}</li>'
                        for one in told if not one.done)
-    return (f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
-            f"<ul>{failures}</ul>")
+    return (f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>'
+            f"</div><ul>{failures}</ul>")
 
 
 def _row(sweep: Sweep, one: Told) -> str:
     values = [factor.short(value) for factor, value in zip(sweep.factors, one.point.values)]
-    numbers = ["" if value is None else f"{value:.4g}" for value in (one.numbers[key] for key, _ in SHOWN)]
+    numbers = [_short(one.numbers[name]) for name in SHOWN]
     cells = "".join(f"<td>{escape(text)}</td>" for text in (*values, *numbers))
     link = f'<td><a href="runs/{escape(one.point.name)}/">{one.point.index}</a></td>'
     status = escape(one.status if one.done else one.status.partition(":")[0])
     return f'<tr>{link}{cells}<td class="text{"" if one.done else " bad"}">{status}</td></tr>'
+
+
+def _short(value: float | None) -> str:
+    return "" if value is None else f"{value:.4g}"

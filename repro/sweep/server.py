@@ -133,7 +133,7 @@ def _forked(*asked) -> str:
         _work(asked, alive, end)
     os.close(end)
     if answer not in select.select([answer, sys.stdin], [], [])[0]:
-        _stop(child, answer)  # nothing more is asked for while a run is at work: the input has ended
+        _stop(child, answer)  # the input has ended: nothing is asked for while a run is at work
     with open(answer) as told:
         ended = told.read()
     code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])

@@ -1,7 +1,7 @@
 """A sweep's folder: ``sweep.json`` says what is wanted, the folders of ``runs/`` what is there.
 
-A run is there when its folder is; it is moved there whole. So a sweep that was cut off, by whatever,
-is gone on with by the same command: it makes what is missing, and what has failed, again.
+A run is there when its folder is; it is moved there whole. So a sweep that was cut off, by
+whatever, is gone on with by the same command: it makes what is missing, and what has failed, again.
 """
 
 from __future__ import annotations
@@ -114,7 +114,8 @@ def _compare(folder: Path, told: dict, wanted: dict) -> None:
 
 
 def _hold(lock, folder: Path) -> None:
-    """Hold the folder against other sweeps, until the file `lock` is closed or this process ends."""
+    """Hold the folder against other sweeps, until the file `lock` is closed or this process ends.
+    """
     try:
         import fcntl
     except ImportError:  # Windows: two sweeps in one folder cost time there, and lose nothing

@@ -1,4 +1,7 @@
-"""What a sweep leaves for others to read: ``table.csv``, a row a run and time, and ``runs.csv``, a row a run."""
+"""What a sweep leaves for others to read.
+
+``table.csv`` has a row a run and time, ``runs.csv`` a row a run.
+"""
 
 from __future__ import annotations
 
@@ -25,8 +28,9 @@ contact_relative_conductivity""".split()
 class Told:
     """A run as a sweep tells it.
 
-    times (h), relative: conductivity over the first one; biomass: area of the aggregate over that of the pore; all of
-    them (T,), empty where there is no run. `numbers`: those of COLUMNS, None where there is none.
+    times (h), relative: conductivity over the first one; biomass: area of the aggregate over that
+    of the pore; all of them (T,), empty where there is no run. `numbers`: those of COLUMNS, None
+    where there is none.
     """
 
     point: Point
@@ -44,7 +48,8 @@ class Told:
 
 def tell(sweep: Sweep, ended: dict[int, str], clogged: float) -> list[Told]:
     """Every run of a sweep; `ended` says how those ended that left no run.json, by number."""
-    return [_told(point, sweep.runs / point.name, ended.get(point.index, "not run"), clogged) for point in sweep.points]
+    return [_told(point, sweep.runs / point.name, ended.get(point.index, "not run"), clogged)
+            for point in sweep.points]
 
 
 def _told(point: Point, folder: Path, otherwise: str, clogged: float) -> Told:
@@ -52,12 +57,15 @@ def _told(point: Point, folder: Path, otherwise: str, clogged: float) -> Told:
     if ended is None or found is None:
         empty = np.zeros(0)
         return Told(point, ended or otherwise, empty, empty, empty, dict.fromkeys(COLUMNS))
-    pore, conductivity, times = point.scene.pore, found["conductivity_m_per_d"], found["time_h"]
-    relative, biomass = conductivity / conductivity[0], found["aggregate_area_um2"] / (pore.width * pore.length)
+    pore, times = point.scene.pore, found["time_h"]
+    relative = found["conductivity_m_per_d"] / found["conductivity_m_per_d"][0]
+    biomass = found["aggregate_area_um2"] / (pore.width * pore.length)
     wall = json.loads((folder / "run.json").read_text(encoding="utf-8"))["wall_time_s"]
-    numbers = {"end_h": times[-1], "wall_time_s": wall, **clogging(times, relative, biomass, clogged),
-               **_contact(times, relative, biomass, found["contact"] > 0)}
-    return Told(point, ended, times, relative, biomass, {name: _or_none(numbers.get(name)) for name in COLUMNS})
+    known = {"end_h": times[-1], "wall_time_s": wall,
+             **clogging(times, relative, biomass, clogged),
+             **_contact(times, relative, biomass, found["contact"] > 0)}
+    numbers = {name: _or_none(known.get(name)) for name in COLUMNS}
+    return Told(point, ended, times, relative, biomass, numbers)
 
 
 def _series(folder: Path) -> dict[str, np.ndarray] | None:
@@ -72,9 +80,13 @@ def _or_none(value: float | None) -> float | None:
     return None if value is None or np.isnan(value) else float(value)
 
 
-def clogging(times: np.ndarray, relative: np.ndarray, biomass: np.ndarray, part: float) -> dict[str, float]:
-    """When the relative conductivity has fallen to `part`, and the biomass then: the first time, between two rows
-    with the logarithm of the conductivity linear in time; nothing where it has not."""
+def clogging(times: np.ndarray, relative: np.ndarray, biomass: np.ndarray,
+             part: float) -> dict[str, float]:
+    """When the relative conductivity has first fallen to `part`, and the biomass then.
+
+    Between two rows the logarithm of the conductivity is linear in time. Nothing where it has not
+    fallen so far.
+    """
     low = np.flatnonzero(relative <= part)
     if not len(low):
         return {}
@@ -84,11 +96,18 @@ def clogging(times: np.ndarray, relative: np.ndarray, biomass: np.ndarray, part:
     return dict(zip(("clogging_time_h", "clogging_biomass"), between))
 
 
-def _contact(times: np.ndarray, relative: np.ndarray, biomass: np.ndarray, touches: np.ndarray) -> dict[str, float]:
-    """The first row in which the aggregate touches the opposite wall: a plug, through which the fluid seeps."""
+def _contact(times: np.ndarray, relative: np.ndarray, biomass: np.ndarray,
+             touches: np.ndarray) -> dict[str, float]:
+    """The first row in which the aggregate touches the opposite wall.
+
+    It is a plug then, through which the fluid seeps.
+    """
     found = np.flatnonzero(touches)
-    names = ("contact_time_h", "contact_biomass", "contact_relative_conductivity")
-    return dict(zip(names, (values[found[0]] for values in (times, biomass, relative)))) if len(found) else {}
+    if not len(found):
+        return {}
+    first = found[0]
+    return {"contact_time_h": times[first], "contact_biomass": biomass[first],
+            "contact_relative_conductivity": relative[first]}
 
 
 def write(sweep: Sweep, told: list[Told]) -> None:
@@ -96,8 +115,8 @@ def write(sweep: Sweep, told: list[Told]) -> None:
     varied = [factor.column for factor in sweep.factors]
     with whole(sweep.folder / "table.csv") as beside:
         results.write_table(beside, ["run", *varied, *results.COLUMNS], list(_rows(sweep, told)))
-    runs = [[one.point.index, *one.point.values, one.status, *one.numbers.values(), f"runs/{one.point.name}"]
-            for one in told]
+    runs = [[one.point.index, *one.point.values, one.status, *one.numbers.values(),
+             f"runs/{one.point.name}"] for one in told]
     with whole(sweep.folder / "runs.csv") as beside:
         results.write_table(beside, ["run", *varied, "status", *COLUMNS, "folder"], runs)
 
@@ -106,6 +125,8 @@ def _rows(sweep: Sweep, told: list[Told]) -> Iterator[list]:
     """The rows of every run as its own table has them, behind its number and what was varied."""
     for one in told:
         if len(one.times):
-            with (sweep.runs / one.point.name / "timeseries.csv").open(encoding="utf-8", newline="") as lines:
+            path = sweep.runs / one.point.name / "timeseries.csv"
+            with path.open(encoding="utf-8", newline="") as lines:
                 for row in csv.DictReader(lines):
-                    yield [one.point.index, *one.point.values, *(row[name] for name in results.COLUMNS)]
+                    values = [row[name] for name in results.COLUMNS]
+                    yield [one.point.index, *one.point.values, *values]

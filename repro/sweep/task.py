@@ -75,7 +75,10 @@ def _made(scene: Scene, beside: Path) -> str:
 
 
 def _place(beside: Path, folder: Path) -> None:
-    """Move a run to its place, unless another has finished it meanwhile; one that failed gives way."""
+    """Move a run to its place, unless another has finished it meanwhile.
+
+    One that failed gives way.
+    """
     if not finished(folder):
         shutil.rmtree(folder, ignore_errors=True)
     try:
