@@ -7,7 +7,6 @@ from dataclasses import replace
 from subprocess import TimeoutExpired
 
 import pytest
-from repro.march.coupling import PoreEnd
 
 from repro import results
 from repro.cli import main

@@ -5,7 +5,7 @@ import pytest
 from repro import results
 from repro.cli import main
 from repro.errors import Interrupted
-from repro.run import cache, running
+from repro.run import machine, running
 from repro.run.checkpoint import NEWEST
 from repro.run.running import Watch, run
 from repro.scene import load_scene
@@ -78,7 +78,7 @@ def test_other_versions_are_refused_with_what_differs(tmp_path, capsys, monkeypa
     run(load_scene("base", FAST), tmp_path / "done")
     interrupted(tmp_path / "run")
     if key == "source":
-        monkeypatch.setattr(cache, "source_hash", lambda: "01234567")
+        monkeypatch.setattr(machine, "source_hash", lambda: "01234567")
     else:
         known = results.version
         monkeypatch.setattr(results, "version", lambda name: "0.0" if name == "scipy" else known(name))

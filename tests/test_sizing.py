@@ -60,7 +60,7 @@ def test_new_nodes_of_a_grown_seed_remember_its_arc(stretch):
     Mutant: origins on the chord, or drawn to the arc on the wall as well."""
     old = seed(5.0, 0.5)
     grown = replace(old, points=old.points * [stretch, 1.1 * stretch])
-    fine = of.split(grown, Sizing(100.0, 4.0, FILM))
+    fine = of.split(grown, Sizing(100.0, 4.0, FILM, seed=0.0))
     free = fine.wall == FREE
     assert free.sum() > (old.wall == FREE).sum()
     assert np.hypot(*fine.origin[free].T) == pytest.approx(5.0, rel=1e-9)

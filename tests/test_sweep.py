@@ -61,7 +61,7 @@ def test_every_run_has_its_place_and_a_failure_is_recorded(finished):
     assert [row["flow.mean_velocity_m_per_day"] for row in found] == ["2.9", "1e-12", "5.8"]
     assert [row["status"].partition(":")[0] for row in found] == ["completed", "failed", "completed"]
     assert "transport" in found[1]["status"] and "Peclet" in found[1]["status"]
-    assert json.loads((finished / found[1]["folder"] / "run.json").read_text())["status"] == found[1]["status"]
+    assert not (finished / found[1]["folder"] / "run.json").exists(), "its first state fails: nothing is written"
 
 
 def test_the_table_is_the_runs_own(finished):
@@ -92,14 +92,14 @@ def test_a_run_of_a_sweep_is_that_run(finished, tmp_path):
 def test_the_same_command_makes_what_is_missing_and_nothing_else(copied, capsys):
     """Mutants: everything made again; a failed run taken for a finished one."""
     places = [copied / row["folder"] for row in rows(copied / "runs.csv")]
-    before = [(place / "run.json").stat().st_mtime_ns for place in places]
+    before = [(places[k] / "run.json").stat().st_mtime_ns for k in (0, 2)]
     table_before = (copied / "table.csv").read_bytes()
     shutil.rmtree(places[0])
     for left in (f".part-{places[0].name}", f".part-{places[2].name}-attempt"):  # of a sweep that was killed
         (copied / "runs" / left).mkdir()
     assert sweep(copied, *VARY, *SHORT) == 3
-    after = [(place / "run.json").stat().st_mtime_ns for place in places]
-    assert after[0] > before[0] and after[1] > before[1] and after[2] == before[2]
+    after = [(places[k] / "run.json").stat().st_mtime_ns for k in (0, 2)]
+    assert after[0] > before[0] and after[1] == before[1]
     assert (copied / "table.csv").read_bytes() == table_before
     assert sorted(path.name for path in (copied / "runs").iterdir()) == [place.name for place in places]
     out, err = capsys.readouterr()

@@ -11,11 +11,14 @@ from repro.run.running import OutputError
 
 def add(commands) -> None:
     """The parser of this command."""
-    command = commands.add_parser("compare", help="lay runs over each other in one page", description="Make a page "
-                                  "with the charts of several runs, what differs in their scenes, and last values.")
+    command = commands.add_parser(
+        "compare", help="lay runs over each other in one page",
+        description="Make a page with the charts of several runs, what differs in their scenes, "
+        "and last values.")
     command.add_argument("runs", metavar="RUN", type=Path, nargs="+",
                          help="folder of a run; the first is what the others are compared with")
-    command.add_argument("--out", metavar="FILE.html", type=Path, required=True, help="the page to write")
+    command.add_argument("--out", metavar="FILE.html", type=Path, required=True,
+                         help="the page to write")
     command.set_defaults(call=call)
 
 
@@ -29,8 +32,8 @@ def call(chosen) -> int:
     except report.NoRun as error:
         raise OutputError(str(error)) from error
     except OSError as error:
-        raise OutputError(f"--out {chosen.out}: {error.strerror or error}; a file that can be written is "
-                          "needed") from error
+        raise OutputError(f"--out {chosen.out}: {error.strerror or error}; a file that can be "
+                          "written is needed") from error
     say(f"{len(chosen.runs)} runs compared in {chosen.out}")
     return 0
 
@@ -40,4 +43,5 @@ def _check(out: Path) -> None:
     if out.suffix != ".html":
         raise OutputError(f"--out {out}: a file name that ends in .html is needed")
     if (out.parent / "run.json").exists():
-        raise OutputError(f"--out {out}: {out.parent} is the folder of a run; a file elsewhere is needed")
+        raise OutputError(f"--out {out}: {out.parent} is the folder of a run; a file elsewhere is "
+                          "needed")

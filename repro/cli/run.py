@@ -1,4 +1,7 @@
-"""``repro run SCENE --out DIR``, ``repro run --resume DIR``: run a scene into a folder, or go on with a run there."""
+"""``repro run SCENE --out DIR``: run a scene into a folder.
+
+``repro run --resume DIR`` goes on with the run in a folder.
+"""
 
 from __future__ import annotations
 
@@ -13,31 +16,39 @@ from repro.run import interrupts, progress
 from repro.run.running import INTERVAL, Watch, resume, run
 from repro.scene import Scene, load_scene, packaged_scenes
 
+DESCRIPTION = """\
+Run a scene and write its results, or go on with a run that was interrupted or killed: the result is
+the same to the last bit. Where DIR holds a run of the same scene, that is gone on with, or left
+alone where it is over."""
 STATUS = """exit status:
   0    done: the scene's end, or the pore's, is reached, now or before
-  1    a stage failed; the message says at what simulated time, in which stage, why, where the last good state is, and
-       what to change
-  2    wrong input, or the folder cannot be used: another run's or not a run's, not writable, disk full, in use
-  130  interrupted (SIGINT, Ctrl-C); 143 terminated (SIGTERM): the step in hand is finished, results and checkpoint are
-       written, and --resume goes on from there; a second signal, after a second or more, stops at once"""
+  1    a stage failed; the message says at what simulated time, in which stage, why, where the
+       last good state is, and what to change
+  2    wrong input, or the folder cannot be used: another run's or not a run's, not writable, disk
+       full, in use
+  130  interrupted (SIGINT, Ctrl-C); 143 terminated (SIGTERM): the step in hand is finished, results
+       and checkpoint are written, and --resume goes on from there; a second signal, after a second
+       or more, stops at once"""
 
 
 def add(commands) -> None:
     """The parser of this command."""
-    command = commands.add_parser("run", help="run a scene, or go on with a run",
-                                  description="Run a scene and write its results, or go on with a run that was "
-                                  "interrupted or killed: the result is the same to the last bit. Where DIR holds a "
-                                  "run of the same scene, that is gone on with, or left alone where it is over.",
-                                  epilog=STATUS, formatter_class=argparse.RawDescriptionHelpFormatter)
+    command = commands.add_parser(
+        "run", help="run a scene, or go on with a run", description=DESCRIPTION, epilog=STATUS,
+        formatter_class=argparse.RawDescriptionHelpFormatter)
     add_scene(command, nargs="?")
     command.add_argument("--out", metavar="DIR", type=Path, help="folder for the results")
-    command.add_argument("--resume", metavar="DIR", type=Path, help="go on with the run in this folder")
+    command.add_argument("--resume", metavar="DIR", type=Path,
+                         help="go on with the run in this folder")
     command.add_argument("--force", action="store_true",
-                         help="remove the files of the run in DIR, as its run.json lists them, and begin anew")
+                         help="remove the files of the run in DIR, as its run.json lists them, and "
+                         "begin anew")
     command.add_argument("--checkpoint", metavar="SECONDS", type=_seconds, default=INTERVAL,
-                         help="write what a run can go on from, and results so far, so often (default: %(default)g)")
+                         help="write what a run can go on from, and results so far, so often "
+                         "(default: %(default)g)")
     command.add_argument("--quiet", action="store_true", help="say nothing but warnings and errors")
-    command.add_argument("--json", action="store_true", help="say what happens as one JSON object a line")
+    command.add_argument("--json", action="store_true",
+                         help="say what happens as one JSON object a line")
     command.set_defaults(call=call, refuse=command.error)
 
 
@@ -61,7 +72,8 @@ def call(chosen) -> int:
         try:
             _run(chosen, scene, Watch(tell, chosen.checkpoint, stop))
         except MemoryError as error:  # outside of the steps, whose failures tell more
-            raise SimulationError(f"out of memory ({error}); try a smaller numerics.refinement") from error
+            raise SimulationError(f"out of memory ({error}); try a smaller "
+                                  "numerics.refinement") from error
     return 0
 
 

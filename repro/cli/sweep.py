@@ -1,4 +1,7 @@
-"""``repro sweep SCENE --vary KEY=... --out DIR``: many runs of a scene with keys varied, their table and their page."""
+"""``repro sweep SCENE --vary KEY=... --out DIR``: many runs of a scene with keys varied.
+
+Their table and their page are written beside them.
+"""
 
 from __future__ import annotations
 
@@ -20,26 +23,32 @@ from repro.sweep.state import Sweep, opened, usable
 
 #: Exit status where some runs have failed.
 SOME_FAILED = 3
-EPILOG = """Two forms of --vary: a range KEY=a:b UNIT:linear|log:N, and a list KEY=VALUE, VALUE, ...; several make a
-grid. With --samples a range is KEY=a:b UNIT:linear|log, and a Latin hypercube is drawn. Varying flow.head replaces
-flow.mean_velocity, and the other way round. The same command goes on with a sweep that was cut off: it makes what is
-missing, and what has failed, again. On a cluster DIR must be on a file system that all workers share.
-Exit status: 0 every run has come to its end, 3 some have failed, 2 wrong input, 130 interrupted,
-143 terminated."""
+EPILOG = """Two forms of --vary: a range KEY=a:b UNIT:linear|log:N, and a list KEY=VALUE, VALUE, ...;
+several make a grid. With --samples a range is KEY=a:b UNIT:linear|log, and a Latin hypercube is
+drawn. Varying flow.head replaces flow.mean_velocity, and the other way round. The same command
+goes on with a sweep that was cut off: it makes what is missing, and what has failed, again. On a
+cluster DIR must be on a file system that all workers share. Exit status: 0 every run has come to
+its end, 3 some have failed, 2 wrong input, 130 interrupted, 143 terminated."""
 
 
 def add(commands) -> None:
     """The parser of this command."""
-    command = commands.add_parser("sweep", help="run a scene many times with keys varied", epilog=EPILOG,
-                                  description="Run a scene many times with keys varied, on all cores.")
+    command = commands.add_parser(
+        "sweep", help="run a scene many times with keys varied", epilog=EPILOG,
+        description="Run a scene many times with keys varied, on all cores.")
     add_scene(command)
     command.add_argument("--vary", metavar="KEY=...", action="append", required=True,
-                         help='"flow.mean_velocity=0.3:30 m/day:log:8" or "pore.width=50 um, 60 um"; may be repeated')
-    command.add_argument("--samples", metavar="N", type=int, help="a Latin hypercube of N runs instead of a grid")
-    command.add_argument("--seed", metavar="S", type=_whole, default=0, help="of the Latin hypercube (0)")
-    command.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for runs, table and page")
+                         help='"flow.mean_velocity=0.3:30 m/day:log:8" or '
+                         '"pore.width=50 um, 60 um"; may be repeated')
+    command.add_argument("--samples", metavar="N", type=int,
+                         help="a Latin hypercube of N runs instead of a grid")
+    command.add_argument("--seed", metavar="S", type=_whole, default=0,
+                         help="of the Latin hypercube (0)")
+    command.add_argument("--out", metavar="DIR", type=Path, required=True,
+                         help="folder for runs, table and page")
     command.add_argument("--workers", metavar="N", type=_count, help="runs at a time (all cores)")
-    command.add_argument("--scheduler", metavar="tcp://HOST:PORT", help="a Dask scheduler, for its workers to run them")
+    command.add_argument("--scheduler", metavar="tcp://HOST:PORT",
+                         help="a Dask scheduler, for its workers to run them")
     command.add_argument("--clogged", metavar="PART", type=_part, default=0.1,
                          help="of the first conductivity at which a pore counts as clogged (0.1)")
     command.add_argument("--quiet", action="store_true", help="no progress")
@@ -113,7 +122,10 @@ def _told(sweep: Sweep, ended: dict[int, str], clogged: float) -> list[table.Tol
 def _wanted(chosen) -> Sweep:
     """The sweep that the arguments describe, every run of it checked."""
     factors = [design.parse(text) for text in chosen.vary]
-    found = design.grid(factors) if chosen.samples is None else design.latin(factors, chosen.samples, chosen.seed)
+    if chosen.samples is None:
+        found = design.grid(factors)
+    else:
+        found = design.latin(factors, chosen.samples, chosen.seed)
     points = design.points(chosen.scene, chosen.set, factors, found, chosen.unset)
     for point in points if chosen.scheduler is None else ():
         require_packages(point.scene)
@@ -124,7 +136,8 @@ def _make(sweep: Sweep, quiet: bool, each: pool.Each, ended: dict[int, str]) -> 
     """Make what is missing; `ended` gets how each run ended, by number."""
     missing, total = sweep.missing(), len(sweep.points)
     silent = quiet or not sys.stderr.isatty()
-    with tqdm(total=total, initial=total - len(missing), desc=sweep.source, unit="run", disable=silent) as bar:
+    with tqdm(total=total, initial=total - len(missing), desc=sweep.source, unit="run",
+              disable=silent) as bar:
         for point, status in each(missing, sweep.runs) if missing else ():
             ended[point.index] = status
             bar.update()
@@ -139,6 +152,6 @@ def _report(sweep: Sweep, told: list[table.Told]) -> int:
     for one in failed:
         say(f"repro: run {one.point.index} ({design.label(sweep.factors, one.point.values)}): "
             f"{one.status}", aside=True)
-    say(f"{sweep.source}: {len(told) - len(failed)} of {len(told)} runs done, {len(failed)} failed; "
-        f"results in {sweep.folder}")
+    say(f"{sweep.source}: {len(told) - len(failed)} of {len(told)} runs done, {len(failed)} "
+        f"failed; results in {sweep.folder}")
     return SOME_FAILED if failed else 0

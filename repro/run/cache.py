@@ -1,7 +1,8 @@
 """Runs that are computed once: cached by the hash of their scene and of this package's source.
 
-A figure or a claim asks for the run of a scene; whoever asks first computes it, into a folder that appears whole. A
-change of the scene or of the code is another key, so a stale number cannot be shown.
+A figure or a claim asks for the run of a scene; whoever asks first computes it, into a folder that
+appears whole. A change of the scene or of the code is another key, so a stale number cannot be
+shown.
 """
 
 from __future__ import annotations
@@ -25,7 +26,10 @@ def run_folder(scene: Scene, folder: Path) -> Path:
 
 
 def cached_run(scene: Scene, folder: Path) -> Path:
-    """The results folder of a scene's run, computed if it is not there. Raises SimulationError where the run fails."""
+    """The results folder of a scene's run, computed if it is not there.
+
+    Raises SimulationError where the run fails.
+    """
     target = run_folder(scene, folder)
     if (target / "run.json").exists():
         return target
@@ -44,7 +48,10 @@ def cached_run(scene: Scene, folder: Path) -> Path:
 
 
 def cached_runs(scenes: Iterable[Scene], folder: Path) -> list[Path]:
-    """The results folders of several scenes, the missing ones computed side by side, a process a core."""
+    """The results folders of several scenes.
+
+    The missing ones are computed side by side, a process a core.
+    """
     scenes = list(scenes)
     wanted = {run_folder(scene, folder): scene for scene in scenes}
     missing = [scene for target, scene in wanted.items() if not (target / "run.json").exists()]

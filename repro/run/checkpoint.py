@@ -26,7 +26,9 @@ from repro.errors import CheckpointError
 from repro.results.files import whole
 
 #: Where a run keeps the state that it goes on from, the one before, and the last one refused.
-NEWEST, PREVIOUS, REFUSED = "checkpoint.state", "checkpoint.previous", "checkpoint.refused"
+NEWEST = "checkpoint.state"
+PREVIOUS = "checkpoint.previous"
+REFUSED = "checkpoint.refused"
 KIND, FORMAT = b"dupin2001-repro checkpoint ", b"2"
 MAGIC = KIND + FORMAT + b" "
 DTYPES = ("<f8", "<i8", "<i4", "|b1", "|u1")

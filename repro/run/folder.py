@@ -17,7 +17,9 @@ from repro.errors import OutputError
 from repro.results.files import WRITING, is_file, is_folder, open_lock
 from repro.run.checkpoint import NEWEST, PREVIOUS, REFUSED
 
-LOCK, PROVENANCE, SUMS = ".lock", "run.json", "fields.sha256"
+LOCK = ".lock"
+PROVENANCE = "run.json"
+SUMS = "fields.sha256"
 CHECKPOINTS = (NEWEST, PREVIOUS, REFUSED)
 #: Every file that a run may write, besides its fields.
 OWN = (PROVENANCE, "timeseries.csv", "ledger.csv", "fields.pvd", "before_expansion.pvd", SUMS,

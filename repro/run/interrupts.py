@@ -1,4 +1,7 @@
-"""Signals that ask a run to stop: the first one is noted, one that comes later ends the process at once."""
+"""Signals that ask a run to stop.
+
+The first one is noted, one that comes later ends the process at once.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,8 @@ from contextlib import contextmanager
 from time import monotonic
 
 ASKED = (signal.SIGINT, signal.SIGTERM)
-#: Seconds in which a signal is the first one come twice: timeout(1) and shells send it to the process and to its group.
+#: Seconds in which a signal is the first one come twice: timeout(1) and shells send it to the
+#: process and to its group.
 SAME = 1.0
 
 
@@ -18,8 +22,9 @@ SAME = 1.0
 def noted() -> Iterator[Callable[[], int]]:
     """Within, SIGINT and SIGTERM are noted; yields what says which came first, zero while none has.
 
-    A thread waits for them, so that neither a long call into compiled code nor a library that takes signals for itself
-    (Mmg) keeps them from being seen. Signals that are ignored stay so. For the main thread alone.
+    A thread waits for them, so that neither a long call into compiled code nor a library that takes
+    signals for itself (Mmg) keeps them from being seen. Signals that are ignored stay so. For the
+    main thread alone.
     """
     came: list[int] = []
     when = [0.0]

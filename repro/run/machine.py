@@ -42,8 +42,9 @@ def conditions() -> dict:
     """For ``run.json``: runs under equal ones are equal bit for bit."""
     built: Any = np.show_config(mode="dicts")
     blas = built["Build Dependencies"]["blas"]
-    return {"system": platform.system(), "machine": platform.machine(), "libc": " ".join(platform.libc_ver()),
-            "blas": f"{blas['name']} {blas['version']}", "simd": built["SIMD Extensions"].get("found", []),
+    return {"system": platform.system(), "machine": platform.machine(),
+            "libc": " ".join(platform.libc_ver()), "blas": f"{blas['name']} {blas['version']}",
+            "simd": built["SIMD Extensions"].get("found", []),
             "geos": shapely.geos_version_string, "source": source_hash(),
             "optional": {name: found for name in OPTIONAL.values() if (found := _version(name))},
             "threads": {name: os.environ[name] for name in THREADS if name in os.environ}}

@@ -1,5 +1,6 @@
-"""What a run says while it runs: a bar on a terminal, a line each tenth elsewhere, JSON for machines, or nothing.
+"""What a run says while it runs.
 
+A bar on a terminal, a line each tenth elsewhere, JSON for machines, or nothing.
 Each is a context that yields what :class:`repro.run.running.Watch` calls ``tell``.
 Warnings go to standard error always.
 """
@@ -93,7 +94,8 @@ def in_tenths() -> Tell:
 def _begin_and_end(event: dict, aside: Callable[[str], None]) -> None:
     """What a person is told when a run goes on, and when it is over."""
     if event["event"] == "start" and event["from_h"] > 0:
-        aside(f"{printable(event['scene'])}: goes on from t = {event['from_h']:g} h, step {event['step']}")
+        aside(f"{printable(event['scene'])}: goes on from t = {event['from_h']:g} h, "
+              f"step {event['step']}")
     if event["event"] == "end" and not event["status"].startswith(("failed", "interrupted")):
         before = "" if event["changed"] else ", before this: nothing to do"
         say(f"{printable(event['scene'])}: {event['status']}{before}; results in {event['folder']}")
@@ -102,12 +104,14 @@ def _begin_and_end(event: dict, aside: Callable[[str], None]) -> None:
 @contextmanager
 def on_a_terminal() -> Iterator[Tell]:
     """A bar with simulated time, steps, remeshes, contact, and the time that is left."""
-    form = "{desc} {percentage:3.0f}%|{bar}| {n:.1f} of {total:.1f} h [{elapsed} < {remaining}{postfix}]"
+    form = ("{desc} {percentage:3.0f}%|{bar}| {n:.1f} of {total:.1f} h "
+            "[{elapsed} < {remaining}{postfix}]")
     with tqdm(total=1.0, bar_format=form, dynamic_ncols=True, delay=1e-3) as bar:
         def tell(event: dict) -> None:
             if event["event"] == "start":
                 bar.set_description_str(printable(event["scene"]), refresh=False)
-                bar.total, bar.n, bar.initial = event["end_h"] or 1.0, event["from_h"], event["from_h"]
+                bar.total = event["end_h"] or 1.0
+                bar.n = bar.initial = event["from_h"]
             elif event["event"] == "step":
                 bar.set_postfix_str(_counts(event), refresh=False)
                 bar.update(event["time_h"] - bar.n)

@@ -76,7 +76,8 @@ class Recorder:
             self._add_fields(instant)
             row = results.row(self.scene, instant)
             self.record.rows.append([row[name] for name in results.COLUMNS])
-            self.record.ledgers += [results.ledger_row(self.scene, ledger) for ledger in instant.ledgers]
+            self.record.ledgers += [results.ledger_row(self.scene, ledger)
+                                    for ledger in instant.ledgers]
             self.record.remeshes += int(instant.remeshes)
             self.record.iterations = added(self.record.iterations, instant.iterations)
         self.state = state

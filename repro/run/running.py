@@ -125,7 +125,8 @@ def _refuse_another(recorder: Recorder, told: dict) -> None:
     now = results.provenance(recorder.scene) | {"source": recorder.conditions["source"]}
     there = told | {"source": _table(told, "conditions").get("source")}
     keys = ("source", "versions") if there["hash"] == now["hash"] else ("tables",)
-    differing = differences(*({key: which.get(key) for key in keys} for which in (there, now)))
+    differing = differences({key: there.get(key) for key in keys},
+                            {key: now.get(key) for key in keys})
     if differing:
         raise OutputError(
             f"--out {recorder.folder}: the run there is another one: {_shown(differing)}; a new "

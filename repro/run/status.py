@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-COMPLETED, RUNNING, INTERRUPTED = "completed", "running", "interrupted"
+COMPLETED = "completed"
+RUNNING = "running"
+INTERRUPTED = "interrupted"
 #: How a status begins that goes on with the reason.
 FAILED, PORE_END = "failed: ", "the aggregate reaches "
 
