@@ -23,7 +23,8 @@ from repro.sweep.state import Sweep, opened, usable
 
 #: Exit status where some runs have failed.
 SOME_FAILED = 3
-EPILOG = """Two forms of --vary: a range KEY=a:b UNIT:linear|log:N, and a list KEY=VALUE, VALUE, ...;
+EPILOG = """\
+Two forms of --vary: a range KEY=a:b UNIT:linear|log:N, and a list KEY=VALUE, VALUE, ...;
 several make a grid. With --samples a range is KEY=a:b UNIT:linear|log, and a Latin hypercube is
 drawn. Varying flow.head replaces flow.mean_velocity, and the other way round. The same command
 goes on with a sweep that was cut off: it makes what is missing, and what has failed, again. On a

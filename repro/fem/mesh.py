@@ -113,7 +113,8 @@ class Topology:
     def _edges(self) -> tuple[np.ndarray, np.ndarray]:
         ends = np.stack([self.triangles, self.triangles[:, elements.NEXT]], axis=2)
         if self.geometry == 1:
-            edges, which = np.unique(np.sort(ends.reshape(-1, 2), axis=1), axis=0, return_inverse=True)
+            pairs = np.sort(ends.reshape(-1, 2), axis=1)
+            edges, which = np.unique(pairs, axis=0, return_inverse=True)
             return edges, which.reshape(-1, 3)
         which = self.cells[:, 3:] - self.corners
         edges = np.empty((which.max(initial=-1) + 1, 2), int)
@@ -240,8 +241,8 @@ class Mesh:
     ends: tuple[float, float]
 
     @staticmethod
-    def of(points: np.ndarray, cells: np.ndarray, biomass: np.ndarray, loop: np.ndarray, width: float,
-           ends: tuple[float, float], method: Method = DEFAULT) -> Mesh:
+    def of(points: np.ndarray, cells: np.ndarray, biomass: np.ndarray, loop: np.ndarray,
+           width: float, ends: tuple[float, float], method: Method = DEFAULT) -> Mesh:
         """The mesh of triangles with nodes (T, 3 or 6), corners numbered first; loop: as that of a
         :class:`Topology`."""
         count = len(points) if cells.shape[1] == 3 else int(cells[:, 3:].min())
@@ -252,7 +253,8 @@ class Mesh:
             return nodes[np.argsort(y[nodes])]
 
         walls = np.flatnonzero((y == 0) | (y == width))
-        topology = Topology(cells, count, biomass, loop, line(ends[0]), line(ends[1]), walls, method)
+        topology = Topology(cells, count, biomass, loop, line(ends[0]), line(ends[1]), walls,
+                            method)
         return Mesh(points, topology, width, ends)
 
     @property
@@ -371,7 +373,9 @@ class Mesh:
     def acceptable(self) -> bool:
         """Does the mesh pass the paper's criterion (3.5), with no triangle turned over?"""
         straight = self.areas.min() > 0 and np.count_nonzero(self.quality < POOR) <= POOR_ALLOWED
-        return bool(straight and not (self.geometry == 2 and self.turned_over(self.topology.bent).any()))
+        if not straight or self.geometry == 1:
+            return bool(straight)
+        return not self.turned_over(self.topology.bent).any()
 
 
 def checked_bends(geometry: int) -> np.ndarray:
@@ -383,7 +387,9 @@ def checked_bends(geometry: int) -> np.ndarray:
 def triangle_areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """(T,) signed areas of triangles with corners points (N, 2)."""
     a, b, c = (points[triangles[:, i]] for i in range(3))
-    return 0.5 * ((b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0]))
+    u = b - a
+    v = c - a
+    return 0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
 
 
 def gradients(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:

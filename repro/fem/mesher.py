@@ -68,7 +68,7 @@ def generate(outline: Outline | None, ends: tuple[float, float], sizing: Sizing,
 
 @dataclass(frozen=True, eq=False)
 class Wanted:
-    """Element sizes of a mesh: sources (K, 2) um, where they are prescribed; sizes (K,) um there."""
+    """Element sizes of a mesh, prescribed at the sources (K, 2) um: sizes (K,) um."""
 
     sources: np.ndarray
     sizes: np.ndarray
@@ -86,7 +86,7 @@ class Wanted:
         return sizes_of.graded_size(where, self.sources, self.sizes, self.sizing)
 
     def path(self, *corners: np.ndarray) -> np.ndarray:
-        """(N, 2) um, nodes on the straight lines from corner to corner (2,), but for the last one."""
+        """(N, 2) um, nodes on straight lines from corner to corner (2,), without the last one."""
         lines = [sizes_of.graded_line(start, end, self.sources, self.sizes, self.sizing)
                  for start, end in zip(corners, corners[1:])]
         return np.vstack([line[:-1] for line in lines])

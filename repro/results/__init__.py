@@ -24,17 +24,21 @@ from repro.model import biomass, growth
 from repro.model.pore import Pore, Solved
 from repro.scene import Kinetics, Scene, scene_hash, scene_tables
 
-M_PER_D, CM = 24e-6, 1e-4  # of um/h, of um
+#: Of um/h.
+M_PER_D = 24e-6
+#: Of um.
+CM = 1e-4
 
-COLUMNS = """time_h mean_velocity_m_per_d head_loss_cm conductivity_m_per_d effluent_acceptor_mg_per_L
-effluent_donor_mg_per_L inlet_acceptor_mg_per_L inlet_donor_mg_per_L aggregate_area_um2 thickness_um upstream_um
-downstream_um meshed_length_um inert_fraction biomass_density_min biomass_density_max acceptor_min_mg_per_L
-donor_min_mg_per_L acceptor_balance donor_balance biomass_balance oxygen_demand_balance nodes
-remeshed contact""".split()
+COLUMNS = """time_h mean_velocity_m_per_d head_loss_cm conductivity_m_per_d
+effluent_acceptor_mg_per_L effluent_donor_mg_per_L inlet_acceptor_mg_per_L inlet_donor_mg_per_L
+aggregate_area_um2 thickness_um upstream_um downstream_um meshed_length_um inert_fraction
+biomass_density_min biomass_density_max acceptor_min_mg_per_L donor_min_mg_per_L acceptor_balance
+donor_balance biomass_balance oxygen_demand_balance nodes remeshed contact""".split()
 
-LEDGER_COLUMNS = ["start_h", "end_h"] + [f"{name}_{part}_pg_per_m" for name in ("acceptor", "donor") for part in
-                  ("supplied", "out", "consumed", "stored")] + [f"biomass_{part}_pg_per_m" for part in
-                  ("before", "made", "after")] + ["oxygen_demand_balance"]
+LEDGER_COLUMNS = """start_h end_h acceptor_supplied_pg_per_m acceptor_out_pg_per_m
+acceptor_consumed_pg_per_m acceptor_stored_pg_per_m donor_supplied_pg_per_m donor_out_pg_per_m
+donor_consumed_pg_per_m donor_stored_pg_per_m biomass_before_pg_per_m biomass_made_pg_per_m
+biomass_after_pg_per_m oxygen_demand_balance""".split()
 
 PACKAGES = ("numpy", "scipy", "scikit-fem", "meshio", "mmgpy", "shapely", "pint")
 
@@ -42,12 +46,14 @@ PACKAGES = ("numpy", "scipy", "scikit-fem", "meshio", "mmgpy", "shapely", "pint"
 def row(scene: Scene, instant: Instant) -> dict[str, float | None]:
     """One row of ``timeseries.csv``: the geometry at its time, and flow and substrates in it."""
     pore = instant.pore
-    found = dict.fromkeys(COLUMNS)
-    found.update(time_h=pore.time, meshed_length_um=pore.mesh.ends[1] - pore.mesh.ends[0], nodes=len(pore.mesh.points),
+    first, last = pore.mesh.ends
+    found: dict[str, float | None] = dict.fromkeys(COLUMNS)
+    found.update(time_h=pore.time, meshed_length_um=last - first, nodes=len(pore.mesh.points),
                  remeshed=int(instant.remeshes > 0), contact=int(pore.contact))
-    for columns in (_flow_columns(instant), _substrate_columns(instant), _transient_columns(scene, instant),
-                    _aggregate_columns(scene, instant)):
-        found.update(columns)
+    found.update(_flow_columns(instant))
+    found.update(_substrate_columns(instant))
+    found.update(_transient_columns(scene, instant))
+    found.update(_aggregate_columns(scene, instant))
     return found
 
 
@@ -55,7 +61,8 @@ def _flow_columns(instant: Instant) -> dict[str, float]:
     flow = instant.solved.flow
     if flow is None:
         return {}
-    return {"mean_velocity_m_per_d": M_PER_D * flow.mean_velocity, "head_loss_cm": CM * flow.head_loss,
+    return {"mean_velocity_m_per_d": M_PER_D * flow.mean_velocity,
+            "head_loss_cm": CM * flow.head_loss,
             "conductivity_m_per_d": M_PER_D * flow.conductivity}
 
 
@@ -64,7 +71,8 @@ def _substrate_columns(instant: Instant) -> dict[str, float]:
     found: dict[str, float] = {}
     if state is None:
         return found
-    for name, field, flux in zip(("acceptor", "donor"), (state.acceptor, state.donor), instant.solved.fluxes):
+    fields = {"acceptor": state.acceptor, "donor": state.donor}
+    for (name, field), flux in zip(fields.items(), instant.solved.fluxes):
         found[f"{name}_min_mg_per_L"] = float(field.min())
         found[f"inlet_{name}_mg_per_L"] = flux.inlet
         found[f"effluent_{name}_mg_per_L"] = flux.effluent
@@ -76,11 +84,12 @@ def _transient_columns(scene: Scene, instant: Instant) -> dict[str, float]:
     """The transient scheme's substrate balances, storage included: the worst since the last row."""
     if scene.numerics.transport != "gear" or instant.solved.concentrations is None:
         return {}
-    problem, found = instant.solved.problem, {}
+    problem = instant.solved.problem
+    found = {}
     for k, name in enumerate(("acceptor", "donor")):
         room = problem.both[k].supply * float(problem.space.at.dx.sum())
-        steps = [_defect(ledger.supplied[k], ledger.out[k] + ledger.stored[k], ledger.consumed[k], room)
-                 for ledger in instant.ledgers]
+        steps = [_defect(step.supplied[k], step.out[k] + step.stored[k], step.consumed[k], room)
+                 for step in instant.ledgers]
         found[f"{name}_balance"] = max(steps, key=abs, default=0.0)
     return found
 
@@ -97,13 +106,14 @@ def _aggregate_columns(scene: Scene, instant: Instant) -> dict[str, float]:
     outline = pore.outline
     if outline is None:
         return {}
-    found = {"aggregate_area_um2": outline.area, "thickness_um": outline.thickness, "upstream_um": outline.upstream,
-             "downstream_um": outline.downstream}
+    found = {"aggregate_area_um2": outline.area, "thickness_um": outline.thickness,
+             "upstream_um": outline.upstream, "downstream_um": outline.downstream}
     if scene.kinetics:
         names = ("inert_fraction", "biomass_density_min", "biomass_density_max")
         found.update(zip(names, pore.composition(scene.kinetics.maximum_density)))
     if scene.growth:
-        defects = [(a.biomass_after - a.biomass_before - a.biomass_made) / a.biomass_after for a in instant.ledgers]
+        defects = [(step.biomass_after - step.biomass_before - step.biomass_made)
+                   / step.biomass_after for step in instant.ledgers]
         found["biomass_balance"] = max(defects, key=abs, default=0.0)
         demands = [oxygen_demand_balance(scene.kinetics, ledger) for ledger in instant.ledgers]
         found["oxygen_demand_balance"] = max(demands, key=abs, default=0.0)
@@ -125,8 +135,8 @@ def ledger_row(scene: Scene, ledger: Ledger) -> list[float]:
     """One row of ``ledger.csv``: a step's balances per metre of depth; 1 um2 mg/L is 1 pg/m."""
     parts = (ledger.supplied, ledger.out, ledger.consumed, ledger.stored)
     substrates = [part[which] for which in (0, 1) for part in parts]
-    return [ledger.start, ledger.end, *substrates, ledger.biomass_before, ledger.biomass_made, ledger.biomass_after,
-            oxygen_demand_balance(scene.kinetics, ledger)]
+    return [ledger.start, ledger.end, *substrates, ledger.biomass_before, ledger.biomass_made,
+            ledger.biomass_after, oxygen_demand_balance(scene.kinetics, ledger)]
 
 
 def fields(scene: Scene, pore: Pore, solved: Solved) -> meshio.Mesh:
@@ -136,8 +146,10 @@ def fields(scene: Scene, pore: Pore, solved: Solved) -> meshio.Mesh:
     1, and places have not moved. Stress and P are those of the strain since t = 0: a scene whose
     new biomass is born stress-free has none to tell.
     """
-    mesh, space = pore.mesh, pore.space
-    points, cells = {}, {"region": mesh.biomass.astype(float)}
+    mesh = pore.mesh
+    space = pore.space
+    points: dict[str, np.ndarray] = {}
+    cells = {"region": mesh.biomass.astype(float)}
     if solved.flow:
         points["velocity_m_per_d"] = _three(M_PER_D * space.to_mesh(solved.flow.velocity))
         points["head_cm"] = CM * mesh.with_middles(solved.flow.head[: mesh.corners])
@@ -155,8 +167,11 @@ def fields(scene: Scene, pore: Pore, solved: Solved) -> meshio.Mesh:
                        cell_data={name: [value] for name, value in cells.items()})
 
 
-def _add_mechanics(scene: Scene, pore: Pore, points: dict[str, np.ndarray], cells: dict[str, np.ndarray]) -> None:
-    mesh, body, modulus = pore.mesh, pore.body, scene.growth.shear_modulus
+def _add_mechanics(scene: Scene, pore: Pore, points: dict[str, np.ndarray],
+                   cells: dict[str, np.ndarray]) -> None:
+    mesh = pore.mesh
+    body = pore.body
+    modulus = scene.growth.shear_modulus
     points["displacement_um"] = _three(mesh.points - pore.origin)
     points["position_t0_um"] = _three(pore.origin)
     strained = body.strained(mesh.points[mesh.body])
@@ -205,7 +220,8 @@ def write_index(path: Path, entries: list[tuple[float, str]]) -> None:
     for time, name in entries:
         ElementTree.SubElement(collection, "DataSet", timestep=repr(time), part="0", file=name)
     ElementTree.indent(root)
-    write_text(path, '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n")
+    content = ElementTree.tostring(root, encoding="unicode")
+    write_text(path, f'<?xml version="1.0"?>\n{content}\n')
 
 
 def write_table(path: Path, columns: list[str], rows: list[list]) -> None:
@@ -213,24 +229,35 @@ def write_table(path: Path, columns: list[str], rows: list[list]) -> None:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
-    writer.writerows(["" if value is None else repr(value) if isinstance(value, float) else value for value in line]
-                     for line in rows)
+    for line in rows:
+        writer.writerow([_shown(value) for value in line])
     write_text(path, text.getvalue())
+
+
+def _shown(value: object) -> object:
+    """A value as a CSV file has it."""
+    if value is None:
+        return ""
+    return repr(value) if isinstance(value, float) else value
 
 
 def read_table(path: Path) -> dict[str, np.ndarray]:
     """The columns of a CSV table that a run has written; an empty field is not-a-number."""
     with path.open(encoding="utf-8", newline="") as lines:
         reader = csv.DictReader(lines)
-        rows, columns = list(reader), reader.fieldnames or ()
-    return {name: np.array([float(row[name] or "nan") for row in rows]) for name in columns}
+        rows = list(reader)
+    found = {}
+    for name in reader.fieldnames or ():
+        found[name] = np.array([float(row[name] or "nan") for row in rows])
+    return found
 
 
 def provenance(scene: Scene) -> dict:
     """The scene as read, its hash, and the versions that its numbers come from."""
+    versions = {"dupin2001-repro": version("dupin2001-repro"), "python": platform.python_version()}
+    versions |= {name: version(name) for name in PACKAGES}
     return {"scene": scene.name, "hash": scene_hash(scene), "tables": scene_tables(scene),
-            "versions": {"dupin2001-repro": version("dupin2001-repro"), "python": platform.python_version(),
-                         **{name: version(name) for name in PACKAGES}}}
+            "versions": versions}
 
 
 def write_json(path: Path, content: dict) -> None:

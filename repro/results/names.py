@@ -9,15 +9,14 @@ from __future__ import annotations
 import re
 
 #: Endings of names: the unit as UDUNITS (and so CF) writes it, and as a reader does.
-ENDINGS = {"_m_per_d": ("m d-1", "m/day"), "_mg_per_L": ("mg L-1", "mg/L"), "_pg_per_m": ("pg m-1", "pg/m"),
-           "_um2": ("um2", "um²"), "_um": ("um", "um"), "_cm": ("cm", "cm"), "_h": ("h", "h"), "_MPa": ("MPa", "MPa")}
+ENDINGS = {"_m_per_d": ("m d-1", "m/day"), "_mg_per_L": ("mg L-1", "mg/L"),
+           "_pg_per_m": ("pg m-1", "pg/m"), "_um2": ("um2", "um²"), "_um": ("um", "um"),
+           "_cm": ("cm", "cm"), "_h": ("h", "h"), "_MPa": ("MPa", "MPa")}
 
 #: Everything that is a pure number.
-PURE = {
-    "inert_fraction", "biomass_density_min", "biomass_density_max", "acceptor_balance",
-    "donor_balance", "biomass_balance", "oxygen_demand_balance", "nodes", "remeshed", "contact",
-    "region", "theta", "J", "active_biomass", "inert_biomass",
-}
+PURE = {"inert_fraction", "biomass_density_min", "biomass_density_max", "acceptor_balance",
+        "donor_balance", "biomass_balance", "oxygen_demand_balance", "nodes", "remeshed", "contact",
+        "region", "theta", "J", "active_biomass", "inert_biomass"}
 
 #: Pure numbers that stand for yes (1) and no (0).
 YES_NO = {"remeshed", "contact"}

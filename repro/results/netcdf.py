@@ -25,10 +25,11 @@ TIME = "time_h"
 def write(path: Path, scene: Scene, rows: list[list]) -> None:
     """Write ``rows`` of ``results.COLUMNS``, whole or not at all; what is not modelled is NaN."""
     xarray = import_module(PACKAGE)
-    table = np.array([[np.nan if value is None else value for value in line] for line in rows], dtype=float)
+    table = np.array(rows, dtype=float)  # None becomes NaN
     columns = dict(zip(results.COLUMNS, table.reshape(len(rows), len(results.COLUMNS)).T))
-    variables = {name: (TIME, column, _attributes(name)) for name, column in columns.items() if name != TIME}
-    content = xarray.Dataset(variables, {TIME: (TIME, columns[TIME], _attributes(TIME))}, _provenance(scene))
+    variables = {name: (TIME, column, _attributes(name)) for name, column in columns.items()}
+    times = {TIME: variables.pop(TIME)}
+    content = xarray.Dataset(variables, times, _provenance(scene))
     encoding = {name: {"_FillValue": None if name == TIME else np.nan} for name in columns}
     beside = path.with_name(f".{path.name}.part")
     try:
@@ -46,6 +47,7 @@ def _provenance(scene: Scene) -> dict[str, str]:
     """Attributes of the whole file; the scene's tables and the versions as JSON."""
     found = results.provenance(scene)
     return {"Conventions": CONVENTIONS, "title": f"Clogging of one pore: {scene.name}",
-            "source": f"dupin2001-repro {found['versions']['dupin2001-repro']}", "scene": scene.name,
-            "scene_hash": found["hash"], "scene_tables": json.dumps(found["tables"]),
+            "source": f"dupin2001-repro {found['versions']['dupin2001-repro']}",
+            "scene": scene.name, "scene_hash": found["hash"],
+            "scene_tables": json.dumps(found["tables"]),
             "versions": json.dumps(found["versions"])}

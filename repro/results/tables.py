@@ -6,6 +6,7 @@ import difflib
 from collections.abc import Iterator, Mapping
 from html import escape
 
+import meshio
 import numpy as np
 
 from repro import results
@@ -14,7 +15,8 @@ from repro.march.simulation import simulate
 from repro.scene import Scene
 
 #: How names end, and what they are then in.
-UNITS = {"_m_per_d": "m/d", "_mg_per_L": "mg/L", "_um2": "um2", "_um": "um", "_cm": "cm", "_h": "h", "_MPa": "MPa"}
+UNITS = {"_m_per_d": "m/d", "_mg_per_L": "mg/L", "_um2": "um2", "_um": "um", "_cm": "cm", "_h": "h",
+         "_MPa": "MPa"}
 #: Times of a notebook's table at either end.
 SHOWN = 5
 
@@ -29,15 +31,23 @@ class Results(Mapping[str, np.ndarray]):
     ``timeseries.csv`` that the scene models; ``status`` says how the run ended. ``dict(results)``
     makes a data frame."""
 
-    def __init__(self, name: str, rows: list[dict], fields: list[dict[str, np.ndarray]], status: str):
-        names = [key for key in results.COLUMNS if any(row[key] is not None for row in rows)]
-        self.columns = {key: np.array([np.nan if row[key] is None else row[key] for row in rows]) for key in names}
-        self.name, self.status, self._fields = name, status, fields
+    def __init__(self, name: str, rows: list[dict[str, float | None]],
+                 fields: list[dict[str, np.ndarray]], status: str):
+        self.columns: dict[str, np.ndarray] = {}
+        for key in results.COLUMNS:
+            values = [row[key] for row in rows]
+            if values.count(None) < len(values):
+                self.columns[key] = np.array([np.nan if value is None else value
+                                              for value in values])
+        self.name = name
+        self.status = status
+        self._fields = fields
 
     def __getitem__(self, name: str) -> np.ndarray:
         if name not in self.columns:
             near = difflib.get_close_matches(name, self.columns, n=1, cutoff=0.5)
-            raise KeyError(f"{name}: this scene has no such column" + (f"; did you mean {near[0]}?" if near else ""))
+            meant = f"; did you mean {near[0]}?" if near else ""
+            raise KeyError(f"{name}: this scene has no such column{meant}")
         return self.columns[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -66,21 +76,22 @@ class Results(Mapping[str, np.ndarray]):
         return self._fields[row]
 
     def __repr__(self) -> str:
-        return f"<Results of {self.name}: {len(self.time)} rows, {len(self)} columns, {self.status}>"
+        size = f"{len(self.time)} rows, {len(self)} columns"
+        return f"<Results of {self.name}: {size}, {self.status}>"
 
     def _repr_html_(self) -> str:
         """A table for notebooks: a line a column, the first and the last times side by side."""
         shown = list(range(len(self.time)))
         shown = shown if len(shown) <= 2 * SHOWN else [*shown[:SHOWN], *shown[-SHOWN:]]
-        lines = [_html_row([f"{name} ({unit(name)})", *(f"{column[row]:.4g}" for row in shown)])
+        lines = [_html_row(f"{name} ({unit(name)})", column[shown])
                  for name, column in self.items()]
         caption = escape(f"{self.name}: {len(self.time)} rows, {len(shown)} shown; {self.status}")
         return f"<table><caption>{caption}</caption>{''.join(lines)}</table>"
 
 
-def _html_row(values: list[str]) -> str:
-    head, *rest = map(escape, values)
-    return f"<tr><th>{head}</th>" + "".join(f"<td>{value}</td>" for value in rest) + "</tr>"
+def _html_row(head: str, values: np.ndarray) -> str:
+    cells = "".join(f"<td>{value:.4g}</td>" for value in values)
+    return f"<tr><th>{escape(head)}</th>{cells}</tr>"
 
 
 def solve(scene: Scene) -> Results:
@@ -88,7 +99,9 @@ def solve(scene: Scene) -> Results:
 
     Raises SimulationError where a stage fails. Memory grows with the reported times.
     """
-    rows, fields, status = [], [], "completed"
+    rows = []
+    fields = []
+    status = "completed"
     try:
         for instant in simulate(scene):
             rows.append(results.row(scene, instant))
@@ -98,8 +111,9 @@ def solve(scene: Scene) -> Results:
     return Results(scene.name, rows, fields, status)
 
 
-def _arrays(content) -> dict[str, np.ndarray]:
+def _arrays(content: meshio.Mesh) -> dict[str, np.ndarray]:
     """The arrays of a meshio mesh."""
     (cells,) = content.cells
     by_cell = {name: values for name, (values,) in content.cell_data.items()}
-    return {"places_um": content.points[:, :2], "triangles": cells.data, **content.point_data, **by_cell}
+    return {"places_um": content.points[:, :2], "triangles": cells.data, **content.point_data,
+            **by_cell}

@@ -319,8 +319,9 @@ def _simulated(recorder: Recorder, made: Made, progress: Progress, watch: Watch)
     except PoreEnd as end:
         return str(end)
     except MemoryError as error:
-        raise SimulationError(f"stopped at t = {recorder.time:g} h, out of memory while results are "
-                              f"written ({error}); try a smaller numerics.refinement") from error
+        raise SimulationError(f"stopped at t = {recorder.time:g} h, out of memory while results "
+                              f"are written ({error}); try a smaller "
+                              "numerics.refinement") from error
     return COMPLETED
 
 

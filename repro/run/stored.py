@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import astuple
+from typing import TypeAlias
 
 import numpy as np
 
@@ -18,31 +19,38 @@ from repro.model.remeshing import MOST_GRADED
 from repro.model.transport import Concentrations
 from repro.scene import Scene, scene_hash
 
+Shape: TypeAlias = tuple[str | int, ...]
+
 #: {array: (kind of its numbers, shape)}; a letter is the same number wherever it stands. N nodes, T
 #: triangles of G nodes, B of them biomass with Q points of growth, R pieces of reaction with P
 #: points, M nodes of the boundary, n of the aggregate, C corners, D nodes of the concentrations.
-ARRAYS = {"points": ("f", "N", 2), "cells": ("i", "T", "G"), "biomass": ("b", "T"), "loop": ("i", "M"),
-          "wall": ("i", "M"), "fixed": ("b", "M"), "active": ("f", "R", "P"), "inert": ("f", "R", "P"),
-          "theta": ("f", "B", "Q"), "reference": ("f", "n", 2), "pressure": ("f", "C")}
+ARRAYS: dict[str, tuple[str, Shape]] = {
+    "points": ("f", ("N", 2)), "cells": ("i", ("T", "G")), "biomass": ("b", ("T",)),
+    "loop": ("i", ("M",)), "wall": ("i", ("M",)), "fixed": ("b", ("M",)),
+    "active": ("f", ("R", "P")), "inert": ("f", ("R", "P")), "theta": ("f", ("B", "Q")),
+    "reference": ("f", ("n", 2)), "pressure": ("f", ("C",))}
 #: No expansion, concentration or other number of a state is as large.
 LARGEST = 1e9
-GUESS = {"acceptor": ("f", "D"), "donor": ("f", "D")}
-PLAIN = {"scene", "time_h", "pace", "ends_um", "front", "guess", "ledgers", "remeshes", "iterations"}
+GUESS: dict[str, tuple[str, Shape]] = {"acceptor": ("f", ("D",)), "donor": ("f", ("D",))}
+PLAIN = {"scene", "time_h", "pace", "ends_um", "front", "guess", "ledgers", "remeshes",
+         "iterations"}
 
 
 def packed(scene: Scene, state: State) -> tuple[dict, dict[str, np.ndarray]]:
     """A state as what JSON can say, and arrays."""
-    now, guess = state.pore, state.pore.concentrations
-    parts = {"points": now.mesh.points, "cells": now.mesh.cells, "biomass": now.mesh.biomass, "loop": now.mesh.loop,
-             "reference": now.body.reference}
+    now = state.pore
+    guess = now.concentrations
+    parts = {"points": now.mesh.points, "cells": now.mesh.cells, "biomass": now.mesh.biomass,
+             "loop": now.mesh.loop, "reference": now.body.reference}
     arrays = {name: parts[name] if name in parts else getattr(now, name) for name in ARRAYS}
     if guess:
         arrays |= {name: getattr(guess, name) for name in GUESS}
-    return {"scene": scene_hash(scene), "time_h": now.time, "pace": list(astuple(state.pace)),
-            "ends_um": [float(x) for x in now.mesh.ends], "front": float(now.front),
-            "guess": guess.iterations if guess else None,
-            "ledgers": [_numbers(ledger) for ledger in state.ledgers], "remeshes": int(state.remeshes),
-            "iterations": state.iterations}, arrays
+    plain = {"scene": scene_hash(scene), "time_h": now.time, "pace": list(astuple(state.pace)),
+             "ends_um": [float(x) for x in now.mesh.ends], "front": float(now.front),
+             "guess": guess.iterations if guess else None,
+             "ledgers": [_numbers(ledger) for ledger in state.ledgers],
+             "remeshes": int(state.remeshes), "iterations": state.iterations}
+    return plain, arrays
 
 
 def _numbers(ledger: Ledger) -> list[float]:
@@ -55,13 +63,15 @@ def unpacked(scene: Scene, plain: dict, arrays: dict[str, np.ndarray]) -> State:
     or no state."""
     if set(plain) != PLAIN or plain["scene"] != scene_hash(scene):
         raise CheckpointError("it is of another scene")
-    _refuse(not in_range(plain["time_h"], 0.0, scene.growth.end if scene.growth else 0.0), "its time")
+    end = scene.growth.end if scene.growth else 0.0
+    _refuse(not in_range(plain["time_h"], 0.0, end), "its time")
     _refuse(not (counted(plain["remeshes"]) and counts(plain["iterations"])), "its counts")
     _refuse(plain["guess"] is not None and not counted(plain["guess"]), "its counts")
     _refuse(not in_range(plain["front"], 1.0, MOST_GRADED), "its element sizes")
     _check(scene, plain, arrays)
     pore = _pore(scene, plain, arrays)
-    return State(pore, _pace(plain["pace"]), _ledgers(plain["ledgers"]), plain["remeshes"], plain["iterations"])
+    return State(pore, _pace(plain["pace"]), _ledgers(plain["ledgers"]), plain["remeshes"],
+                 plain["iterations"])
 
 
 def _refuse(wrong: bool, what: str) -> None:
@@ -86,8 +96,8 @@ def counts(value) -> bool:
 
 def _pace(told) -> Pace:
     """A pace from its numbers in the order of its fields."""
-    right = isinstance(told, list) and len(told) == 3 and all(in_range(value, 0.0, np.inf) for value in told)
-    _refuse(not right, "its step")
+    right = isinstance(told, list) and len(told) == 3
+    _refuse(not right or not all(in_range(value, 0.0, np.inf) for value in told), "its step")
     return Pace(*told)
 
 
@@ -98,11 +108,10 @@ def _ledgers(told) -> tuple[Ledger, ...]:
 
 def _ledger(row) -> Ledger:
     """A ledger from its numbers in the order of :func:`_numbers`."""
-    right = isinstance(row, list) and len(row) == 13 and all(in_range(value, -np.inf, np.inf) for value in row)
-    _refuse(not right, "a ledger")
-    pairs = dict(zip(("supplied", "out", "consumed", "stored"), zip(row[2:10:2], row[3:10:2])))
-    before, made, after = row[10:]
-    return Ledger(row[0], row[1], **pairs, biomass_before=before, biomass_made=made, biomass_after=after)
+    right = isinstance(row, list) and len(row) == 13
+    _refuse(not right or not all(in_range(value, -np.inf, np.inf) for value in row), "a ledger")
+    supplied, out, consumed, stored = zip(row[2:10:2], row[3:10:2])
+    return Ledger(row[0], row[1], supplied, out, consumed, stored, *row[10:])
 
 
 def _check(scene: Scene, plain: dict, arrays: dict[str, np.ndarray]) -> None:
@@ -111,44 +120,57 @@ def _check(scene: Scene, plain: dict, arrays: dict[str, np.ndarray]) -> None:
     if plain["guess"] is not None:
         wanted = {**wanted, **GUESS}
     _refuse(arrays.keys() != wanted.keys(), "its list of arrays")
-    sizes = {"B": np.count_nonzero(arrays["biomass"]), "G": 3 * scene.numerics.geometry}
-    for name, (kind, *shape) in wanted.items():
+    sizes = {"B": int(np.count_nonzero(arrays["biomass"])), "G": 3 * scene.numerics.geometry}
+    for name, (kind, shape) in wanted.items():
         array = arrays[name]
-        right = array.ndim == len(shape) and array.dtype.kind == kind and all(
-            sizes.setdefault(letter, count) == count if isinstance(letter, str) else letter == count
-            for letter, count in zip(shape, array.shape))
+        right = array.dtype.kind == kind and _fits(array, shape, sizes)
         _refuse(not right or kind == "f" and not np.isfinite(array).all(), f"array {name!r}")
     for name in ("cells", "loop"):
         indices = arrays[name]
-        _refuse(indices.size > 0 and not 0 <= indices.min() <= indices.max() < sizes["N"], f"array {name!r}")
+        right = indices.size == 0 or 0 <= indices.min() <= indices.max() < sizes["N"]
+        _refuse(not right, f"array {name!r}")
     _refuse(not np.isin(arrays["wall"], (FREE, BOTTOM, TOP)).all(), "array 'wall'")
     _refuse(sizes["T"] == 0, "a mesh without triangles")
-    _refuse((sizes["M"] > 0) != (scene.aggregate is not None) or (sizes["B"] > 0) != (sizes["M"] > 0), "its aggregate")
+    _refuse((sizes["M"] > 0) != (scene.aggregate is not None), "its aggregate")
+    _refuse((sizes["B"] > 0) != (sizes["M"] > 0), "its aggregate")
     _check_places(scene, plain["ends_um"], arrays)
+
+
+def _fits(array: np.ndarray, shape: Shape, sizes: dict[str, int]) -> bool:
+    """Has an array a shape of :data:`ARRAYS`? Notes the numbers that letters stand for in it."""
+    if array.ndim != len(shape):
+        return False
+    return all(count == (sizes.setdefault(letter, count) if isinstance(letter, str) else letter)
+               for letter, count in zip(shape, array.shape))
 
 
 def _check_places(scene: Scene, ends, arrays: dict[str, np.ndarray]) -> None:
     """Ends within the pore, and places within it too, but for a hundredth of its width."""
-    half, width, slack = 0.5 * scene.pore.length * (1 + 1e-9), scene.pore.width, 0.01 * scene.pore.width
-    right = isinstance(ends, list) and len(ends) == 2 and all(in_range(x, -half, half) for x in ends)
-    _refuse(not right or ends[0] >= ends[1], "its extent")
+    half = 0.5 * scene.pore.length * (1 + 1e-9)
+    width = scene.pore.width
+    slack = 0.01 * width
+    right = isinstance(ends, list) and len(ends) == 2
+    _refuse(not right or not all(in_range(x, -half, half) for x in ends), "its extent")
+    _refuse(ends[0] >= ends[1], "its extent")
     for name in ("points", "reference"):
         x, y = arrays[name].T
-        outside = np.abs(x).max(initial=0.0) > half + slack or y.min(initial=0.0) < -slack or (
-            y.max(initial=0.0) > width + slack)
-        _refuse(bool(outside), f"array {name!r}")
+        _refuse(bool(np.abs(x).max(initial=0.0) > half + slack), f"array {name!r}")
+        _refuse(bool(y.min(initial=0.0) < -slack), f"array {name!r}")
+        _refuse(bool(y.max(initial=0.0) > width + slack), f"array {name!r}")
 
 
 def _pore(scene: Scene, plain: dict, arrays: dict[str, np.ndarray]) -> Pore:
     """The pore, if its nodes are in order and every triangle has an area, now and at t = 0."""
-    cells, loop, numerics = arrays["cells"], arrays["loop"], scene.numerics
+    cells = arrays["cells"]
+    loop = arrays["loop"]
+    numerics = scene.numerics
     if numerics.geometry == 2:
-        corners = int(cells[:, :3].max()) + 1
-        right = cells[:, 3:].min() == corners and len(loop) % 2 == 0
-        _refuse(not right or bool((loop[::2] >= corners).any() or (loop[1::2] < corners).any()), "its nodes' order")
+        _check_order(cells, loop)
     _refuse(not triangle_areas(arrays["points"], cells[:, :3]).min() > 0, "a triangle")
     method = Method(numerics.solver, numerics.ordering)
-    mesh = Mesh.of(arrays["points"], cells, arrays["biomass"], loop, scene.pore.width, tuple(plain["ends_um"]), method)
+    first, last = plain["ends_um"]
+    mesh = Mesh.of(arrays["points"], cells, arrays["biomass"], loop, scene.pore.width,
+                   (first, last), method)
     space = Space(mesh, numerics.order)
     _check_sizes(space, plain, arrays)
     body = material(space, arrays["reference"])
@@ -156,20 +178,30 @@ def _pore(scene: Scene, plain: dict, arrays: dict[str, np.ndarray]) -> Pore:
     if mesh.biomass.any():
         _refuse(not body.at.dx.min() > 0, "a triangle's place at t = 0")
     own = {name: arrays[name] for name in ("wall", "fixed", "active", "inert", "theta", "pressure")}
-    return Pore(time=plain["time_h"], space=space, body=body, **own, concentrations=_guess(plain, arrays),
-                front=plain["front"])
+    return Pore(time=plain["time_h"], space=space, body=body, **own,
+                concentrations=_guess(plain, arrays), front=plain["front"])
+
+
+def _check_order(cells: np.ndarray, loop: np.ndarray) -> None:
+    """Corners are numbered first, and take turns with middles along the aggregate's boundary."""
+    corners = int(cells[:, :3].max()) + 1
+    _refuse(bool(cells[:, 3:].min() != corners) or len(loop) % 2 == 1, "its nodes' order")
+    _refuse(bool((loop[::2] >= corners).any()), "its nodes' order")
+    _refuse(bool((loop[1::2] < corners).any()), "its nodes' order")
 
 
 def _check_sizes(space: Space, plain: dict, arrays: dict[str, np.ndarray]) -> None:
     """Refuse sizes that are not the mesh's, masses below zero, densities and expansions out of
     bounds."""
-    mesh, dx = space.mesh, space.reaction.dx
-    _refuse(len(arrays["reference"]) != len(mesh.body) or len(arrays["pressure"]) != mesh.corners, "its list of arrays")
-    _refuse(arrays["active"].shape != dx.shape or arrays["theta"].shape[0] != np.count_nonzero(mesh.biomass),
-            "its list of arrays")
-    _refuse(plain["guess"] is not None and len(arrays["acceptor"]) != space.count, "its concentrations")
-    _refuse(len(arrays["points"]) != mesh.cells.max() + 1, "array 'points'")
+    mesh = space.mesh
     theta = arrays["theta"]
+    _refuse(len(arrays["reference"]) != len(mesh.body), "its list of arrays")
+    _refuse(len(arrays["pressure"]) != mesh.corners, "its list of arrays")
+    _refuse(arrays["active"].shape != space.reaction.dx.shape, "its list of arrays")
+    _refuse(len(theta) != np.count_nonzero(mesh.biomass), "its list of arrays")
+    guessed = plain["guess"] is not None
+    _refuse(guessed and len(arrays["acceptor"]) != space.count, "its concentrations")
+    _refuse(len(arrays["points"]) != mesh.cells.max() + 1, "array 'points'")
     _refuse(bool(theta.min(initial=1.0) <= 0 or theta.max(initial=1.0) > LARGEST), "array 'theta'")
     _refuse(min(arrays[name].min(initial=0.0) for name in ("active", "inert")) < 0, "its biomass")
     for name in ("pressure", *(GUESS.keys() & arrays.keys())):
@@ -177,4 +209,6 @@ def _check_sizes(space: Space, plain: dict, arrays: dict[str, np.ndarray]) -> No
 
 
 def _guess(plain: dict, arrays: dict[str, np.ndarray]) -> Concentrations | None:
-    return None if plain["guess"] is None else Concentrations(arrays["acceptor"], arrays["donor"], plain["guess"])
+    if plain["guess"] is None:
+        return None
+    return Concentrations(arrays["acceptor"], arrays["donor"], plain["guess"])
