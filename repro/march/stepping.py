@@ -53,7 +53,8 @@ def _accepted(scene: Scene, now: Pore, solved: Solved, time: float,
               asked: Pace) -> tuple[Step, Solved, Pace]:
     """The first step that is good enough, what is solved after it, and the pace of the next."""
     tolerance = scene.numerics.tolerance
-    shortest = SHORTEST * needed(scene.growth, "[growth]").time_step
+    time_step = needed(scene.growth, "[growth]").time_step
+    shortest = SHORTEST * time_step
     length = asked.length
     duration = fitted(length, time - now.time, STRETCH)
     while True:
@@ -73,7 +74,7 @@ def _accepted(scene: Scene, now: Pore, solved: Solved, time: float,
                 length = duration * allowed(estimate, tolerance)
         except Unresolved as error:
             finer = remeshing.graded(scene, now)
-            if finer is None and duration <= scene.growth.time_step:
+            if finer is None and duration <= time_step:
                 raise remeshing.advised(scene, now, error) from None
             if finer is None:
                 length = duration / 2

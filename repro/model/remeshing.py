@@ -87,8 +87,10 @@ def advised(scene: Scene, now: Pore, error: Unresolved) -> Unresolved:
 
 def _with_room(scene: Scene, solved: Solved) -> bool:
     """Are concentrations no further below zero than half of what is accepted?"""
-    kinds = (scene.substrates.acceptor, scene.substrates.donor)
-    fields = (solved.concentrations.acceptor, solved.concentrations.donor)
+    substrates = needed(scene.substrates, "[substrates]")
+    state = needed(solved.concentrations, "concentrations")
+    kinds = (substrates.acceptor, substrates.donor)
+    fields = (state.acceptor, state.donor)
     return all(field.min() >= -0.5 * UNRESOLVED * s.supply for field, s in zip(fields, kinds))
 
 

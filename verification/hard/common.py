@@ -32,7 +32,7 @@ PROMISED = {"paper": "linear triangles: 1 to 4 % in the head loss",
             "fast": "what fast is for: 1 %", "accurate": "what accurate is for: 0.1 %",
             "cubic": "as fast: 1 %"}
 #: Bounds of concentrations over the supply that the stages document (UNRESOLVED, OVERSHOOT).
-LOWEST, HIGHEST = -1e-4, 1.02
+LOWEST, HIGHEST = -1e-3, 1.02
 BALANCE = 1e-9
 NEWTON = "Newton's tolerance of 1e-12 a row, times the rows, a thousand at least, over Peclet's number where under one"
 FIXED = ('growth.end="0 h"',)

@@ -152,6 +152,7 @@ ZERO_ORDER = HardCase(
     "The closed form of zero-order uptake in a slab, and the effluents of a finer run around half-discs",
     "Newton's method that cycles at the front, or concentrations under zero behind it",
     {"slab": slab_front, "R = 60 um": front(60), "R = 80 um": front(80), "0.35 m/d, R = 40 um": front(40, SLOW)},
+    refusable=("slab",),
     mutants=("hard-front-smoothed", "hard-newton-unshortened"))
 
 
