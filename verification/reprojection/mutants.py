@@ -65,7 +65,7 @@ MUTANTS = (
            new="reach = min(5 * outline.thickness, 1.3 * width)"),
     Mutant("origin-on-the-chord", "repro/fem/sizing.py",
            says="A node that splits an edge of the seed's arc is put on the chord at t = 0.",
-           old="origin = _on_arc(origin, ends[:, 0], ends[:, 2])",
+           old="origin = middle + _on_arc(origin - middle, ends[:, 0] - middle, ends[:, 2] - middle)",
            new="origin = 1.0 * origin"),
     Mutant("remeshed-too-late", "repro/fem/mesh.py",
            says="Triangles count as poor under a quality of 0.3, not 0.6.",
