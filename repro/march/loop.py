@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, TypeVar
+from dataclasses import Field, dataclass, field, fields, replace
+from typing import ClassVar, Protocol, TypeVar
 
 import numpy as np
 
@@ -17,10 +17,14 @@ from repro.model.pore import Pore, Solved, seeded
 from repro.model.remeshing import resolved
 from repro.scene import Scene
 
-if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
 
-Data = TypeVar("Data", bound="DataclassInstance")
+class Dataclass(Protocol):
+    """An instance of any dataclass."""
+
+    __dataclass_fields__: ClassVar[dict[str, Field]]
+
+
+Data = TypeVar("Data", bound=Dataclass)
 
 #: A step of the grid this close (h) to a reported time is that time.
 SAME_TIME = 1e-9
