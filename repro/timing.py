@@ -3,8 +3,14 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Callable
 from functools import wraps
 from time import perf_counter
+from typing import ParamSpec, TypeVar
+
+Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result")
+Function = Callable[Arguments, Result]
 
 #: Seconds by stage since the last :func:`reset`, calls within calls counted in both.
 seconds: defaultdict[str, float] = defaultdict(float)
@@ -15,11 +21,11 @@ def reset() -> None:
     seconds.clear()
 
 
-def timed(stage: str):
+def timed(stage: str) -> Callable[[Function[Arguments, Result]], Function[Arguments, Result]]:
     """Add the time that each call of the decorated function takes to a stage."""
-    def decorate(function):
+    def decorate(function: Function[Arguments, Result]) -> Function[Arguments, Result]:
         @wraps(function)
-        def wrapper(*args, **kwargs):
+        def wrapper(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
             start = perf_counter()
             try:
                 return function(*args, **kwargs)

@@ -170,6 +170,12 @@ def test_a_shape_with_its_own_mesh_needs_no_other(order):
     twice = replace(said, flow=replace(said.flow, density=2 * said.flow.density))
     one, two = (traction.forces(s, around, now) for s in (said, twice))
     assert np.allclose(two, 2 * one, rtol=1e-14)
+    drive = said.flow
+    on = traction.nodal(now.space, pore.solve_flow(said, now.space), drive.kinematic_viscosity / drive.gravity,
+                        "laplacian")
+    pascal = 9.81 * 1e-3 * drive.density * 1e-6  # of a head of 1 um; 1 mg/L is 1e-3 kg/m3
+    wanted = on[now.mesh.body] * pascal * 1e-6 / said.growth.shear_modulus
+    assert one == pytest.approx(wanted, rel=1e-3, abs=1e-3 * np.abs(wanted).max())
 
 
 @pytest.mark.parametrize("order", [2, 3])

@@ -18,13 +18,13 @@ from repro.model.remeshing import resolved
 from repro.scene import Scene
 
 
-class Fielded(Protocol):
-    """Any dataclass."""
+class Dataclass(Protocol):
+    """An instance of any dataclass."""
 
     __dataclass_fields__: ClassVar[dict[str, Field]]
 
 
-Data = TypeVar("Data", bound=Fielded)
+Data = TypeVar("Data", bound=Dataclass)
 
 #: A step of the grid this close (h) to a reported time is that time.
 SAME_TIME = 1e-9

@@ -53,7 +53,12 @@ def _among(times: set[float], time: float) -> bool:
 
 def steps(scene: Scene, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
     """:func:`repro.march.loop.steps` of the paper's scheme."""
-    return loop.steps(scene, Scheme(lambda scene: schedule(scene)[0], _advance), state)
+    return loop.steps(scene, Scheme(_ends, _advance), state)
+
+
+def _ends(scene: Scene) -> list[float]:
+    """Times (h) at which steps end."""
+    return schedule(scene)[0]
 
 
 def _advance(scene: Scene, now: Pore, solved: Solved, time: float,

@@ -283,7 +283,8 @@ class Balance:
 
     def _summed(self, parts: np.ndarray) -> np.ndarray:
         """(2n,) sum of the parts (r, 2, k) of each piece's nodes, for acceptor and donor."""
-        cells, count = self.problem.space.reaction.cells, self.problem.space.count
+        cells = self.problem.space.reaction.cells
+        count = self.problem.space.count
         nodes = np.stack([cells, count + cells], axis=1)
         return np.bincount(nodes.ravel(), parts.ravel(), 2 * count)
 

@@ -130,7 +130,7 @@ def quadratic_robin() -> Outcome:
       norm="root mean square of C over the mesh, and C leaving with 1.6 um, over the supply",
       claim="Cubic concentrations follow the closed form of first-order uptake in a slab to fourth order, the inlet's "
             "(11) included, at Peclet 1 and 10",
-      mutants=("cubic-edge-nodes", "reaction-in-few-points", "outlet-forgotten"))
+      mutants=("reaction-evenly-weighted", "outlet-forgotten"))
 def cubic_robin() -> Outcome:
     studies, checks = [], []
     for peclet, ceiling in ((1.0, 2e-11), (10.0, 1e-9)):
@@ -182,7 +182,7 @@ def first_order() -> Outcome:
 @case("transport-first-order-slab-higher", kind="exact", norm=NORM, slow=True,
       claim="With quadratic and cubic elements the slab that takes up kappa C has its profile to third and fourth "
             "order, and its effectiveness to fourth and sixth",
-      mutants=("reaction-in-few-points", "one-supply-held", "fluid-diffusivity"))
+      mutants=("reaction-evenly-weighted", "one-supply-held", "fluid-diffusivity"))
 def first_order_of_higher_order() -> Outcome:
     quadratic, cubic = _first_orders(2), _first_orders(3)
     return Outcome((*quadratic[0], *cubic[0]), (*quadratic[1], *cubic[1]))

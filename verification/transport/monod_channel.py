@@ -150,7 +150,7 @@ def _quadratic_profile(peclet: float, density: float) -> Profile:
       norm="root mean square over the mesh of both substrates less solve_bvp, over the supply",
       claim="Dual Monod uptake under plug flow on cubic triangles is solve_bvp's, to fourth order, from barely touched "
             "to starved biomass",
-      mutants=("reaction-in-few-points", "uptake-without-decay"))
+      mutants=("reaction-evenly-weighted", "uptake-without-decay"))
 def cubic() -> Outcome:
     return Outcome(studies=tuple(_higher(3, 1.0, density, 1e-9) for density in DENSITIES))
 

@@ -31,9 +31,9 @@ CARRIED = (
            old="loads[:, :, None] * np.eye(",
            new="0 * loads[:, :, None] * np.eye("),
     Mutant("outlet-forgotten", TRANSPORT,
-           says="what flows out through the outlet is left out of the conserving form",
+           says="half of what flows out through the outlet is left out of the conserving form",
            old="dofs.outlet, space.end_masses(dofs.outlet, velocity[:, 0])",
-           new="dofs.outlet, 0 * space.end_masses(dofs.outlet, velocity[:, 0])"),
+           new="dofs.outlet, 0.5 * space.end_masses(dofs.outlet, velocity[:, 0])"),
     Mutant("printed-inlet-forgotten", TRANSPORT,
            says="with u_ave in (11) the conserving form leaves out (u_ave - u_x) C at the inlet [E4]",
            old="enters - velocity[:, 0])",
@@ -65,13 +65,12 @@ TAKEN_UP = (
            says="a node of the interface takes up substrate for the fluid around it too",
            old="lumped = self.lumped(biomass)",
            new="lumped = self.lumped()"),
-    Mutant("reaction-in-few-points", SPACE,
-           says="the first six quadrature points stand for all in the reaction: too few for cubic functions",
+    Mutant("reaction-evenly-weighted", SPACE,
+           says="in the reaction all quadrature points of a triangle count alike",
            old="return Reaction(self.cells[biomass], self.table.values, self.at.dx[biomass])",
-           new="part = self.at.dx[biomass].copy()\n"
-               "            part[:, 6:] = 0.0\n"
-               "            part *= (self.at.dx[biomass].sum(axis=1) / part.sum(axis=1))[:, None]\n"
-               "            return Reaction(self.cells[biomass], self.table.values, part)"),
+           new="part = self.at.dx[biomass]\n"
+               "            even = part.mean(axis=1, keepdims=True) + 0 * part\n"
+               "            return Reaction(self.cells[biomass], self.table.values, even)"),
     Mutant("quarter-of-a-triangle", "repro/fem/elements.py",
            says="a node's area is a quarter, not a third, of the triangles around it",
            old="np.full(3, 1 / 6)",

@@ -57,16 +57,12 @@ def front() -> Outcome:
 
 
 def _front(half: str, numerics: dict):
-    """Ledgers of a thick half-disc that the donor, 1 mg/L, does not pass; without decay."""
+    """Ledgers of a thick half-disc that the donor, 1 mg/L, does not pass, without decay; on elements that are graded to
+    the front, and if these are refused, with the refinement that is then advised."""
     both = {"acceptor": {"half_saturation": half}, "donor": {"supply": "1 mg/L", "half_saturation": half}}
     tables = {"pore": {"width": "100 um"}, "aggregate": {"radius": "60 um"}, "flow": {"mean_velocity": "0.29 m/day"},
               "substrates": both, "kinetics": {"decay_coefficient": "0 1/day"}, "numerics": numerics}
-    return _fluxes(tables)
-
-
-def _fluxes(tables: dict):
-    """Ledgers of a scene at t = 0; if its mesh is refused, with the refinement that is then advised."""
-    scene = parse_scene(tables, "half disc", "half_disc.toml")
+    scene = _scene(tables)
     try:
         return remeshing.resolved(scene, pore.seeded(scene))[1].fluxes
     except Unresolved as refusal:
@@ -75,6 +71,16 @@ def _fluxes(tables: dict):
             raise
     scene = replace(scene, numerics=replace(scene.numerics, refinement=float(advised[1])))
     return remeshing.resolved(scene, pore.seeded(scene))[1].fluxes
+
+
+def _scene(tables: dict):
+    return parse_scene(tables, "half disc", "half_disc.toml")
+
+
+def _fluxes(tables: dict):
+    """Ledgers of a scene at t = 0, on the first mesh that is made."""
+    scene = _scene(tables)
+    return pore.solve(scene, pore.seeded(scene)).fluxes
 
 
 FAR, WITHIN = 2.5, "0.1 %, what preset accurate is for"
