@@ -95,7 +95,7 @@ def test_simulate_goes_on_from_any_state():
     scene = load_scene("base", SCENES["fast"])
     whole = list(steps(scene))
     for k in (0, 2, len(whole) - 1):
-        found, expected = list(simulate(scene, whole[k][0])), [instant for _, instant in whole[k + 1:] if instant]
+        found, expected = list(simulate(scene, state=whole[k][0])), [instant for _, instant in whole[k + 1:] if instant]
         assert [i.pore.time for i in found] == [i.pore.time for i in expected]
         assert [results.row(scene, i) for i in found] == [results.row(scene, i) for i in expected]
 
