@@ -51,7 +51,8 @@ def by(preset: str) -> str:
 
 def shaped(seed: Callable[[float, int], Outline]):
     """A context in which seeds are ``seed(radius, geometry)``, geometry 1 with straight edges, 2 with arcs."""
-    return mock.patch.object(pore, "half_disc", lambda radius, across, geometry: seed(radius, geometry))
+    return mock.patch.object(pore, "half_disc",
+                             lambda radius, across, geometry, middle: seed(radius, geometry))
 
 
 def last(scene: Scene) -> Instant:
