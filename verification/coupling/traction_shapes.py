@@ -216,7 +216,7 @@ def remeshed() -> Outcome:
 def _remeshed(elements: str) -> list:
     """Checks with one kind of elements."""
     now, found, _ = _moved(elements, 0.0)
-    fine = loaded_scene(runs.coarser(elements, 2.0, 3.0), runs.of(elements))
+    fine = loaded_scene(runs.coarser(elements, 3.0, 3.0), runs.of(elements))
     coarse = loaded_scene(runs.of(elements))
     mesh, _ = pore.generate(fine, found.outline)
     on = nodal(fine, Space(mesh, found.space.order))[0]
