@@ -2,12 +2,12 @@
 
 import json
 import sys
+from types import SimpleNamespace
 
 import pytest
 
 from repro.cli import main
 from repro.errors import Interrupted
-from repro.fem import linear
 from repro.march.simulation import simulate
 from repro.run import machine, memory
 from repro.run.running import Watch, resume, run
@@ -33,9 +33,11 @@ def test_a_package_that_is_not_there_is_told_before_anything_is_written(tmp_path
 def test_a_package_that_went_is_told_at_a_resume(tmp_path, monkeypatch):
     """Mutant: a traceback at the first linear system."""
     scene = load_scene("base", ("numerics.preset=fast", "numerics.ordering=metis"))
+    stand_in = SimpleNamespace(CSRAdjacency=lambda starts, others: len(starts) - 1,
+                               nested_dissection=lambda nodes: (range(nodes), None))
     with monkeypatch.context() as there:
         there.setattr(machine, "find_spec", lambda name: name)
-        there.setattr(linear, "use", lambda *_: None)
+        there.setitem(sys.modules, "pymetis", stand_in)
         with pytest.raises(Interrupted):
             run(scene, tmp_path, watch=Watch(stop=lambda: 15))
     monkeypatch.setitem(sys.modules, "pymetis", None)
