@@ -171,8 +171,8 @@ def test_the_triangle_of_each_edge_of_an_end(meshes, kind, order):
     nodes in the order of another edge of it."""
     mesh = meshes[kind]
     space = Space(mesh, order)
-    for edges in (space.dofs.inlet, space.dofs.outlet):
-        owner, place = space.owners(edges)
+    dofs = space.dofs
+    for edges, (owner, place) in ((dofs.inlet, dofs.beside_inlet), (dofs.outlet, dofs.beside_outlet)):
         assert np.array_equal(np.take_along_axis(space.cells[owner], place, axis=1), edges)
         for one, nodes in zip(owner, edges):
             holding = np.isin(space.cells, nodes).sum(axis=1) == order + 1

@@ -115,6 +115,13 @@ def values_on(order: int, of: Table) -> np.ndarray:
 
 
 @cache
+def linear_fit(of: Table) -> np.ndarray:
+    """(3, q) from values at the points of a table to those at the corners of the linear function
+    that fits them best, by least squares."""
+    return np.linalg.pinv(of.linear)
+
+
+@cache
 def edge_table(order: int) -> tuple[np.ndarray, np.ndarray]:
     """(p, e) shape functions of an edge's nodes at its quadrature points, and the weights (p,)."""
     (s,), weights = get_quadrature_line(EDGE_DEGREES[order])

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from skfem import MeshTri
@@ -28,15 +28,41 @@ POOR_ALLOWED = 6
 @dataclass(frozen=True, eq=False)
 class Dofs:
     """Nodes of functions of one order. cells: (T, k), corners of the mesh first; count: of all
-    nodes; elimination: (count,) nodes in elimination order; inlet, outlet: (E, order + 1) nodes of
-    their edges, from the lower wall up; walls: nodes of both walls."""
+    nodes; inlet, outlet: (E, order + 1) nodes of their edges, from the lower wall up; walls: nodes
+    of both walls; method: of the linear systems."""
 
     cells: np.ndarray
     count: int
-    elimination: np.ndarray
     inlet: np.ndarray
     outlet: np.ndarray
     walls: np.ndarray
+    method: Method
+
+    @cached_property
+    def elimination(self) -> np.ndarray:
+        """(count,) nodes in elimination order."""
+        return node_order(self.count, self.cells, self.method)
+
+    @cached_property
+    def beside_inlet(self) -> tuple[np.ndarray, np.ndarray]:
+        """(E,) triangle of each edge of the inlet, and (E, order + 1) places of the edge's nodes
+        among those of the triangle."""
+        return _beside(self.cells, self.inlet)
+
+    @cached_property
+    def beside_outlet(self) -> tuple[np.ndarray, np.ndarray]:
+        """The same of the outlet."""
+        return _beside(self.cells, self.outlet)
+
+
+def _beside(cells: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Triangle of each edge (E, e) of an end, and places of the edge's nodes in it."""
+    first = np.flatnonzero(np.isin(cells[:, :3], edges[:, [0, -1]]).sum(axis=1) >= 2)
+    near = cells[first, :3]
+    has_start = (near == edges[:, None, None, 0]).any(axis=2)
+    has_end = (near == edges[:, None, None, -1]).any(axis=2)
+    owner = first[(has_start & has_end).argmax(axis=1)]
+    return owner, np.argmax(cells[owner][:, :, None] == edges[:, None, :], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,9 +190,8 @@ def _numbered(topology: Topology, order: int) -> Dofs:
     those of order 3, and a curved mesh's own nodes are those of order 2."""
     make = {1: _linear, 2: _quadratic, 3: _cubic}[order]
     cells, count = make(topology)
-    elimination = node_order(count, cells, topology.method)
     inlet, outlet = (_along(topology, line, order) for line in (topology.inlet, topology.outlet))
-    return Dofs(cells, count, elimination, inlet, outlet, _on_walls(topology, order))
+    return Dofs(cells, count, inlet, outlet, _on_walls(topology, order), topology.method)
 
 
 def _linear(topology: Topology) -> tuple[np.ndarray, int]:
@@ -378,6 +403,7 @@ class Mesh:
         return not self.turned_over(self.topology.bent).any()
 
 
+@cache
 def checked_bends(geometry: int) -> np.ndarray:
     """Derivatives of the maps' shape functions at a triangle's nodes and where it is integrated."""
     of = elements.table(geometry, geometry, elements.GRADIENT_DEGREES[geometry])

@@ -166,8 +166,8 @@ def polygon(corners: np.ndarray, width: float, geometry: int = 1, smooth: bool =
     base = np.column_stack([np.linspace(rim[-1, 0], rim[0, 0], 3), np.zeros(3)])
     points = np.vstack([base, rim[1:-1]])
     if points[:, 1].min() < 0 or points[:, 1].max() > width:
-        raise MeshError("the spline through the points of aggregate.outline leaves the pore; give more points, or "
-                        "smooth = false")
+        raise MeshError("the spline through the points of aggregate.outline leaves the pore; give "
+                        "more points, or smooth = false")
     wall = np.where(points[:, 1] == width, TOP, FREE)
     wall[:3] = BOTTOM
     points, wall = _with_contact_middle(points, wall)

@@ -30,7 +30,8 @@ class Sizing:
     width: of the pore (um); refinement: what sizes are divided by; film: the thinnest that is
     resolved (um); gradation: growth of the size with the distance from where it is prescribed;
     front: what sizes at the aggregate are divided by besides, for a front of the substrates in it;
-    seed: x (um) of the middle of the half-disc that the aggregate was at t = 0, None if it was none.
+    seed: x (um) of the middle of the half-disc that the aggregate was at t = 0, None if it was
+    none.
     """
 
     width: float
@@ -123,8 +124,8 @@ def graded_size(where: np.ndarray, sources: np.ndarray, sizes: np.ndarray,
     up to the largest."""
     if len(sources) == 0:
         return np.full(len(where), sizing.largest)
-    apart = where[:, None] - sources[None]
-    distance = np.hypot(apart[..., 0], apart[..., 1])
+    x, y = where.T
+    distance = np.hypot(x[:, None] - sources[:, 0], y[:, None] - sources[:, 1])
     return np.minimum(sizing.largest, (sizes + sizing.gradation * distance).min(axis=1))
 
 
@@ -207,9 +208,9 @@ def _parameters(nodes: np.ndarray, x: np.ndarray) -> np.ndarray:
 def placed(outline: Outline, edge: np.ndarray, t: np.ndarray, seed: float | None = None) -> Outline:
     """New nodes (K,), each at t in [0, 1) of an edge: where t is zero the edge's own first corner.
 
-    seed: as that of :class:`Sizing`. Places at t = 0 between two nodes of the seed's arc lie on that
-    arc: a straight edge of today's outline was round at t = 0, and what the material remembers makes
-    it round again at the next update.
+    seed: as that of :class:`Sizing`. Places at t = 0 between two nodes of the seed's arc lie on
+    that arc: a straight edge of today's outline was round at t = 0, and what the material remembers
+    makes it round again at the next update.
     """
     first = t == 0
     corner = outline.geometry * edge

@@ -173,13 +173,3 @@ class Space:
         load = self.summed(edges, self.end_loads(edges, np.ones(self.count)))
         return float(load @ field / load.sum())
 
-    def owners(self, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(E,) triangle of each edge of an end, and (E, e) places of the edge's nodes among those
-        of the triangle."""
-        corners = self.mesh.triangles
-        first = np.flatnonzero(np.isin(corners, edges[:, [0, -1]]).sum(axis=1) >= 2)
-        near = corners[first]
-        has_start = (near == edges[:, None, None, 0]).any(axis=2)
-        has_end = (near == edges[:, None, None, -1]).any(axis=2)
-        owner = first[(has_start & has_end).argmax(axis=1)]
-        return owner, np.argmax(self.cells[owner][:, :, None] == edges[:, None, :], axis=1)

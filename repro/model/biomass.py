@@ -93,9 +93,8 @@ def at_points(space: Space, nodal: np.ndarray) -> np.ndarray:
 def _fit(space: Space) -> np.ndarray:
     """(g, q) from values at a triangle's points to those of their linear least-squares fit at its
     nodes."""
-    from_points = np.linalg.pinv(space.table.linear)
     nodes = elements.values(1, elements.nodes(space.mesh.geometry))
-    return nodes @ from_points
+    return nodes @ elements.linear_fit(space.table)
 
 
 def carried(how: str, old: Space, new: Space, at: Located, amounts: Amounts,

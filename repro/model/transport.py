@@ -163,9 +163,9 @@ def _conserving(space: Space, velocity: np.ndarray, enters: np.ndarray) -> np.nd
     along = u_x[..., None] * at.slopes[:, :, 0]
     along += u_y[..., None] * at.slopes[:, :, 1]
     found = space.load(np.swapaxes(along, 1, 2))
-    _add_at(space, found, dofs.outlet, space.end_masses(dofs.outlet, velocity[:, 0]))
+    _add_at(found, dofs.beside_outlet, space.end_masses(dofs.outlet, velocity[:, 0]))
     if enters is not velocity[:, 0] and np.any(enters[dofs.inlet] != velocity[dofs.inlet, 0]):
-        _add_at(space, found, dofs.inlet, space.end_masses(dofs.inlet, enters - velocity[:, 0]))
+        _add_at(found, dofs.beside_inlet, space.end_masses(dofs.inlet, enters - velocity[:, 0]))
     return found
 
 
@@ -178,13 +178,15 @@ def _by_divergence_free(space: Space, velocity: np.ndarray, correction: np.ndarr
     w = velocity[mesh.triangles] - correction[:, None, :]
     found = mass(mesh.areas) @ (w @ np.swapaxes(mesh.gradients, 1, 2))
     loads = space.end_loads(inlet, enters)
-    _add_at(space, found, inlet, loads[:, :, None] * np.eye(loads.shape[1]))
+    _add_at(found, space.dofs.beside_inlet, loads[:, :, None] * np.eye(loads.shape[1]))
     return found
 
 
-def _add_at(space: Space, matrices: np.ndarray, edges: np.ndarray, blocks: np.ndarray) -> None:
-    """Add (E, e, e) of the edges of an end to the element matrices of their triangles, in place."""
-    owner, place = space.owners(edges)
+def _add_at(matrices: np.ndarray, beside: tuple[np.ndarray, np.ndarray],
+            blocks: np.ndarray) -> None:
+    """Add (E, e, e) of the edges of an end to the element matrices of the triangles beside them, in
+    place."""
+    owner, place = beside
     np.add.at(matrices, (owner[:, None, None], place[:, :, None], place[:, None, :]), blocks)
 
 
@@ -379,7 +381,7 @@ class Balance:
                   own: np.ndarray) -> Iterate:
         """The new iterate with the fractions about which to linearise next; there: its
         concentrations in the points of the reaction, own: their fractions."""
-        if iterate.own and own.min() > SWITCH:
+        if iterate.own and there.min() > 0:
             return replace(new, fractions=own)
         predicted = np.clip(self._predicted(iterate, new.state), 0.0, SATURATED)
         woken = (iterate.fractions <= 0) & (predicted <= 0) & (there > 0)
@@ -472,8 +474,8 @@ def quadrature_error(problem: Problem, sink: Sink, state: Concentrations) -> flo
     mesh = problem.mesh
     of = elements.table(space.order, mesh.geometry, elements.DEGREES[space.order] + FINER)
     corners = mesh.points[mesh.cells[mesh.biomass]]
-    fit = np.linalg.pinv(space.table.linear).T
-    densities = sink.active / space.reaction.dx @ fit @ of.linear.T
+    fitted = elements.linear_fit(space.table).T @ of.linear.T
+    densities = sink.active / space.reaction.dx @ fitted
     both = np.stack([state.acceptor, state.donor])
     acceptor, donor = both[:, space.cells[mesh.biomass]] @ of.values.T
     kinetics = needed(problem.kinetics, "[kinetics]")
