@@ -422,9 +422,11 @@ def _found(balance: Balance, state: np.ndarray) -> tuple[np.ndarray, int]:
     newton = Newton(NEWTON, ROUND_OFF, MOST_ITERATIONS, balance.problem.reused)
     last, count, converged = newton.solve(balance, balance.begun(state))
     if not converged:
-        raise TransportError("Newton's method for the substrates stands at a defect of "
-                             f"{last.defect:.2g} after {count} iterations; "
-                             "try a larger numerics.refinement")
+        stands = ("Newton's method for the substrates stands at a defect of "
+                  f"{last.defect:.2g} after {count} iterations")
+        if balance.sink is not None and balance.problem.space.order > 1:
+            raise Unresolved(f"{stands}; the mesh is too coarse for the front in the aggregate")
+        raise TransportError(f"{stands}; try a larger numerics.refinement")
     return last.state, count
 
 
