@@ -144,6 +144,15 @@ def test_refused(override, said):
      "accepted, not both (--unset flow.mean_velocity leaves that out)"),
     ("base", ["flow.mean_velocity=1 m/day"], "not both (--unset flow.head leaves that out)"),
     ("initial_mesh", ["flow.viscosity_ratio=5"], "flow.head is missing: it or flow.mean_velocity is needed"),
+    ("base", ["flow.permeability=1e-15 m^2"], 'flow.biomass = "brinkman" is needed with it'),
+    ("base", ["flow.biomass=brinkman"], 'flow.permeability is needed with "brinkman", such as "1e-15 m^2"'),
+    ("base", ["flow.biomass=brinkman", "flow.permeability=1e-15 m^2", "flow.viscosity_ratio=5"],
+     'flow.biomass = "viscous" is needed with it'),
+    ("base", ["flow.biomass=brinkman", "flow.permeability=1e-15 m^2"],
+     'flow.biomass = "brinkman": numerics.elements = "quadratic" or "cubic" is needed'),
+    ("base", ["numerics.preset=fast", "flow.biomass=brinkman", "flow.permeability=1e-15 m^2",
+              "growth.fluid_forces=included"], '"neglected" is needed with flow.biomass = "brinkman"'),
+    ("base", ["flow.permeability=0 m^2"], "a permeability"),
     ("initial_mesh", ["substrates.boundary=closed"], '"open" is needed, or numerics.transport = "gear"'),
     ("flow_only", ["growth.end=1 h"], "growth = "),
     ("flow_only", ["substrates={}", "growth.time_step=1 h"], 'growth.end is missing: a time is needed'),
@@ -152,6 +161,12 @@ def test_refused(override, said):
 def test_refused_by_what_else_the_scene_says(source, overrides, said):
     message = refusal(source, *overrides)
     assert message.startswith(f"{source}: ") and said in message
+
+
+def test_a_permeable_body_needs_an_aggregate():
+    drive = {"head": "1e-3 cm", "biomass": "brinkman", "permeability": "1e-15 m^2"}
+    with pytest.raises(SceneError, match=r'mine.toml: flow.biomass = "brinkman": "viscous" is needed without'):
+        parse_scene({"flow": drive, "numerics": {"preset": "fast"}}, "mine", "mine.toml")
 
 
 def test_growth_needs_an_aggregate():

@@ -16,7 +16,7 @@ from tests.strategies import scenes
 #: Keys that exclude another one that is set: they stay commented out.
 OTHER_DRIVE = {"head": "mean_velocity", "mean_velocity": "head"}
 #: Keys without a default: what is shown is an example.
-EXAMPLES = {"times", "outline", "donor_oxygen_demand"}
+EXAMPLES = {"times", "outline", "donor_oxygen_demand", "permeability"}
 SOURCE = re.compile(r"Table 1|[Ss]ection \d|\(\d+\)|\b[23]\.\d|[Ff]igures? \d")
 
 
@@ -67,7 +67,7 @@ def test_every_key_may_be_made_active_at_once(name):
     """Mutants: an example that is not accepted, a key in the table of another section."""
     drive = load_scene(name).flow
     excluded = "head" if drive and drive.head is None else "mean_velocity"
-    made = parsed(uncommented(scene_text(name), but={excluded, "outline"}), name)
+    made = parsed(uncommented(scene_text(name), but={excluded, "outline", "permeability"}), name)
     assert made.growth is not None and made.output.times == (5.0, 18.0)
     assert {section for section in ("aggregate", "flow", "substrates", "kinetics") if getattr(made, section)} == {
         "aggregate", "flow", "substrates", "kinetics"}

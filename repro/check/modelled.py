@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from repro.scene import Scene
+from repro.scene import Flow, Scene
 
 LEFT_OUT = {
     "aggregate": "no aggregate: a clean channel",
@@ -53,9 +53,16 @@ def _flow(scene: Scene) -> Iterator[str]:
     else:
         yield f"driven by a head of {1e-4 * flow.head:g} cm over the whole pore"
     if scene.aggregate:
-        yield f"{flow.viscosity_ratio:g} times the viscosity of water in the aggregate"
+        yield _slowed_by(flow)
         yield {"laplacian": "interface in the form of (1) [E2]",
                "traction": "continuous traction [E2]"}[scene.numerics.interface]
+
+
+def _slowed_by(flow: Flow) -> str:
+    """What slows the water in it."""
+    if flow.permeability is None:
+        return f"{flow.viscosity_ratio:g} times the viscosity of water in the aggregate"
+    return f"an aggregate with a permeability of {1e-12 * flow.permeability:g} m2 (Brinkman's drag)"
 
 
 def _substrates(scene: Scene) -> Iterator[str]:

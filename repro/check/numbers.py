@@ -189,7 +189,8 @@ def stresses(scene: Scene, speed: float) -> tuple[float, float]:
     viscosity = MPA_PER_UM * drive.density * drive.kinematic_viscosity / modulus
     gap = max(width - end.thickness, scene.growth.minimum_film)
     film_loss = math.inf if end.contact is not None else (width / gap) ** 3
-    drop = 12 * viscosity * speed * 2 * end.reach / width**2 * min(drive.viscosity_ratio, film_loss)
+    body_loss = drive.viscosity_ratio or 1 + width**2 / 12 / drive.permeability
+    drop = 12 * viscosity * speed * 2 * end.reach / width**2 * min(body_loss, film_loss)
     if drive.head is not None:
         drop = min(drop, MPA_PER_UM * drive.density * drive.gravity * drive.head / modulus)
     return 6 * viscosity * speed / width, drop

@@ -11,9 +11,11 @@ phi g / nu_water,
     a(u, v) = (nu_r grad u, grad v)                 "laplacian" [E2]
            or (nu_r (grad u + grad u^T), grad v)    "traction"
 
-with nu_r = 1 or lambda. Velocities of order 2 or 3 with a pressure of one order less (Taylor-Hood)
-need no tau. Linear ones with a linear pressure do: tau = h_tau^2 / (c nu_r). The paper prints no
-constant c [E13]; ``reference/ERRATA.md`` reports what it does. The second line says that
+with nu_r = 1 or lambda; or, for a permeable body instead of a viscous one (Brinkman), with nu_r = 1
+in both and (u / k, v) besides, over the biomass, of permeability k. Velocities of order 2 or 3 with
+a pressure of one order less (Taylor-Hood) need no tau. Linear ones with a linear pressure do: tau =
+h_tau^2 / (c nu_r). The paper prints no constant c [E13]; ``reference/ERRATA.md`` reports what it
+does. The second line says that
 ``w = u - tau grad p`` is divergence-free for every linear q: w is what carries the substrates.
 
 Linear velocities with a bubble b = 27 L1 L2 L3 in each triangle (MINI: Arnold, Brezzi and Fortin
@@ -116,10 +118,14 @@ def divergence(velocity: Space) -> np.ndarray:
     return values.T @ (at.dx[:, :, None] * slopes)
 
 
-def viscous(velocity: Space, viscosity: np.ndarray, interface: str) -> np.ndarray:
+def viscous(velocity: Space, viscosity: np.ndarray, interface: str,
+            drag: np.ndarray | None = None) -> np.ndarray:
     """(T, 2k, 2k) element matrices of a(u, v): test functions of x, then y, by trial functions
-    alike; (T, k, k) of each component where they are not coupled. viscosity: (T,) nu_r."""
+    alike; (T, k, k) of each component where they are not coupled. viscosity: (T,) nu_r; drag: (T,)
+    1/um2, of a permeable body."""
     laplace = each(viscosity, velocity.stiffness)
+    if drag is not None:
+        laplace = laplace + velocity.mass(drag[:, None] * velocity.at.dx)
     if interface == "laplacian":
         return laplace
     at = velocity.gradients_at
@@ -136,17 +142,20 @@ def viscous(velocity: Space, viscosity: np.ndarray, interface: str) -> np.ndarra
 
 
 @timed("flow")
-def unit_flow(velocity: Space, viscosity_ratio: float, *, interface: str = "laplacian",
-              element: Stabilised | Bubble = Stabilised()) -> UnitFlow:
+def unit_flow(velocity: Space, viscosity_ratio: float = 1.0, *, interface: str = "laplacian",
+              element: Stabilised | Bubble = Stabilised(),
+              permeability: float | None = None) -> UnitFlow:
     """Stokes flow of mean velocity one through the meshed part, (1)-(5).
 
     velocity: its space; interface: "laplacian" or "traction" [E2]; element: what stabilises linear
-    velocities. Raises LinearError where the system cannot be solved.
+    velocities; permeability: of the biomass (um2), which slows the water by its drag, None: it does
+    not; for velocities of order 2 and 3. Raises LinearError where the system cannot be solved.
     """
     mesh = velocity.mesh
     viscosity = np.where(mesh.biomass, viscosity_ratio, 1.0)
     mobility = element.mobility(mesh, viscosity, interface) if velocity.order == 1 else None
-    blocks = stokes(velocity, viscosity, interface, mobility)
+    drag = None if permeability is None else mesh.biomass / permeability
+    blocks = stokes(velocity, viscosity, interface, mobility, drag)
     system = mesh.topology.system(("flow", interface, velocity.order),
                                   lambda: _system(velocity, interface))
     value = prescribed(velocity)
@@ -162,16 +171,16 @@ def unit_flow(velocity: Space, viscosity_ratio: float, *, interface: str = "lapl
 
 
 def stokes(velocity: Space, viscosity: np.ndarray, interface: str,
-           mobility: np.ndarray | None) -> np.ndarray:
+           mobility: np.ndarray | None, drag: np.ndarray | None = None) -> np.ndarray:
     """(T, 2k + m, 2k + m) element matrices of the whole system.
 
-    viscosity: (T,) nu_r; mobility: (T, 2, 2) um2, tau.
+    viscosity: (T,) nu_r; mobility: (T, 2, 2) um2, tau; drag: (T,) 1/um2.
     """
     lower = None
     if mobility is not None:
         slopes = velocity.mesh.gradients
         lower = each(velocity.mesh.areas, slopes @ mobility @ np.swapaxes(slopes, 1, 2))
-    return saddle_blocks(viscous(velocity, viscosity, interface), divergence(velocity), lower)
+    return saddle_blocks(viscous(velocity, viscosity, interface, drag), divergence(velocity), lower)
 
 
 def _system(velocity: Space, interface: str) -> ElementSystem:
@@ -235,5 +244,6 @@ def scaled(unit: UnitFlow, mesh: Mesh, length: float, drive: Drive) -> Flow:
 def solve(velocity: Space, drive: Drive, length: float, *, interface: str = "laplacian",
           element: Stabilised | Bubble = Stabilised()) -> Flow:
     """Stokes flow through a pore of a length (um): :func:`unit_flow`, scaled to its drive."""
-    unit = unit_flow(velocity, drive.viscosity_ratio, interface=interface, element=element)
+    unit = unit_flow(velocity, drive.viscosity_ratio or 1.0, interface=interface, element=element,
+                     permeability=drive.permeability)
     return scaled(unit, velocity.mesh, length, drive)

@@ -44,6 +44,7 @@ __all__ = ["Scene", "SceneError", "load_scene", "packaged_scenes", "parse_scene"
 
 OURS = "Not in the paper"
 SEED_RADIUS = 5.0  # um, Table 1
+LAMBDA = 2000.0  # Table 1
 RATIO = 1.52  # F, mg/mg, Table 1
 
 
@@ -91,7 +92,8 @@ class Aggregate:
 class Flow:
     """Section 2.1, (1)-(6): driven by `head` (um, whole pore) or `mean_velocity` (um/h).
 
-    The other one of them is None.
+    The other one of them is None. Of `viscosity_ratio` and `permeability` (um^2) the one that
+    `biomass` does not ask for is None.
     """
 
     head: float | None = quantity(
@@ -100,14 +102,26 @@ class Flow:
     mean_velocity: float | None = quantity(
         "2.9 m/day", "um/h", NON_NEGATIVE, default=None, source="(3), section 4",
         about="u_ave, mean over the width; either this or head")
-    viscosity_ratio: float = number(2.0e3, source="2.1, Table 1",
-                                    about="lambda, viscosity of the aggregate over that of water")
+    biomass: str = choice(
+        "viscous", "brinkman", source="2.1; the other one is discussed in 5",
+        about="What slows the water in the aggregate: a viscosity lambda times its own, or the drag "
+        "of a permeable body")
+    viscosity_ratio: float | None = number(
+        LAMBDA, source="2.1, Table 1", stated="default 2000 with biomass = \"viscous\"",
+        default=None, about="lambda, viscosity of the aggregate over that of water")
+    permeability: float | None = quantity(
+        "1e-15 m^2", "um^2", default=None, source=OURS,
+        about="Of the aggregate, with biomass = \"brinkman\"")
     kinematic_viscosity: float = quantity("0.01003 cm^2/s", "um^2/h", about="nu of water",
                                           source="(1), Table 1")
     gravity: float = quantity("9.81 m/s^2", "um/h^2", about="g, the acceleration of gravity",
                               source="(1), Table 1")
     density: float = quantity("998 mg/cm^3", "mg/L", source="Table 1 [E19]",
                               about="rho of water; only growth.fluid_forces needs it")
+
+    def __post_init__(self):
+        if self.viscosity_ratio is None and self.biomass == "viscous":
+            object.__setattr__(self, "viscosity_ratio", LAMBDA)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,7 +5,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from repro.scene import Aggregate, Kinetics, Pore, Scene
+    from repro.scene import Aggregate, Flow, Kinetics, Pore, Scene
 
 _NO_STATE = "nothing is supplied, so that no state is steady"
 _UNSTEADY = f', or numerics.transport = "gear": {_NO_STATE}'
@@ -26,6 +26,7 @@ def rules(scene: "Scene") -> Rules:
         yield from _aggregate_rules(scene)
     if scene.flow:
         yield from _flow_rules(scene, scene.flow.head, scene.flow.mean_velocity)
+        yield from _biomass_rules(scene, scene.flow)
     if scene.substrates:
         yield from _boundary_rules(scene)
     yield from _growth_rules(scene)
@@ -158,6 +159,34 @@ def _flow_rules(scene: "Scene", head: float | None, velocity: float | None) -> R
     yield velocity == 0 and scene.substrates is not None and _steady(scene), {
         "flow.mean_velocity": f"greater than zero is needed{_UNSTEADY}",
         "numerics.transport": f'"gear" is needed with flow.mean_velocity = 0: {_NO_STATE}',
+    }
+
+
+def _biomass_rules(scene: "Scene", drive: "Flow") -> Rules:
+    """What slows the water in the aggregate."""
+    drag = drive.biomass == "brinkman"
+    permeable = f"{drive.permeability} um^2"
+    yield not drag and drive.permeability is not None, {
+        "flow.permeability": 'flow.biomass = "brinkman" is needed with it',
+        "flow.biomass": f'"brinkman" is needed with flow.permeability = {permeable}',
+    }
+    yield drag and drive.permeability is None, {
+        "flow.biomass": 'flow.permeability is needed with "brinkman", such as "1e-15 m^2"'}
+    yield drag and drive.viscosity_ratio is not None, {
+        "flow.viscosity_ratio": 'flow.biomass = "viscous" is needed with it',
+        "flow.biomass": f'"viscous" is needed with flow.viscosity_ratio = {drive.viscosity_ratio}',
+    }
+    yield drag and scene.aggregate is None, {"flow.biomass": '"viscous" is needed without [aggregate]'}
+    wanted = '"quadratic" or "cubic" is needed with flow.biomass = "brinkman"'
+    yield drag and scene.numerics.order == 1, {
+        "flow.biomass": 'numerics.elements = "quadratic" or "cubic" is needed with it',
+        "numerics.elements": wanted,
+        "numerics.preset": f'numerics.elements = {wanted}',
+    }
+    forces = scene.growth is not None and scene.growth.fluid_forces == "included"
+    yield drag and forces, {
+        "growth.fluid_forces": '"neglected" is needed with flow.biomass = "brinkman"',
+        "flow.biomass": '"viscous" is needed with growth.fluid_forces = "included"',
     }
 
 

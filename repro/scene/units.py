@@ -26,6 +26,7 @@ from repro.scene import exact
 NOUNS = {
     "um": "a length",
     "h": "a time",
+    "um^2": "a permeability",
     "um/h": "a velocity",
     "um/h^2": "an acceleration",
     "um^2/h": "a diffusivity or kinematic viscosity",

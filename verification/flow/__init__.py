@@ -8,6 +8,7 @@ from verification.flow import (  # noqa: F401
     inclusion,
     layers,
     manufactured,
+    permeable,
     properties,
     rise,
 )

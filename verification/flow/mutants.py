@@ -116,4 +116,12 @@ MUTANTS = (
            says="The traction form's bubble has the Laplacian form's block.",
            old="            block = block + G\n",
            new="            block = 1.0 * block\n"),
+    Mutant("drag-in-the-water", FLOW,
+           says="The drag of a permeable body slows the water beside it.",
+           old="mesh.biomass / permeability",
+           new="~mesh.biomass / permeability"),
+    Mutant("drag-halved", FLOW,
+           says="The drag of a permeable body is half as strong.",
+           old="laplace = laplace + velocity.mass(drag[:, None] * velocity.at.dx)",
+           new="laplace = laplace + velocity.mass(drag[:, None] / 2 * velocity.at.dx)"),
 )
