@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from repro.march import stepping
 from repro.scene import Scene
 
 LEFT_OUT = {
@@ -104,6 +105,12 @@ def _numerics(scene: Scene) -> Iterator[str]:
 def _output(scene: Scene) -> Iterator[str]:
     times = scene.output.times
     if times is None:
-        yield "rows and fields of every step" if scene.growth else "one row and fields at t = 0"
+        yield _every_step(scene) if scene.growth else "one row and fields at t = 0"
     else:
         yield f"rows and fields at {len({0.0, *times})} times, t = 0 among them"
+
+
+def _every_step(scene: Scene) -> str:
+    """The rows of a scene without output.times."""
+    rows = stepping.rows(scene) if scene.numerics.time == "midpoint" else ()
+    return "rows and fields of every step" + (f", and every {rows[0]:g} h" if rows else "")

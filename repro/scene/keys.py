@@ -317,10 +317,12 @@ PRESETS: dict[str, dict[str, str | float]] = {
 
 @dataclass(frozen=True)
 class Output:
-    """Times (h) of the rows and fields wanted, ascending; None: every shape update."""
+    """Times (h) of the rows and fields wanted, ascending; None: every step and, with midpoint, 24
+    times or more at equal distances."""
 
     times: tuple[float, ...] | None = times(
-        source="Figures 4-6", about="Times of the rows and fields wanted; left out: every step")
+        source="Figures 4-6", about="Times of the rows and fields wanted, which change no step; left out: every step, "
+        "with midpoint also 24 times or more at equal distances")
     timeseries: str = choice(
         "csv", "netcdf", source=OURS,
         about="timeseries.csv alone, or timeseries.nc besides, which needs the package xarray")
