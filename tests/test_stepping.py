@@ -55,7 +55,7 @@ def attempts(monkeypatch):
 @EVERY_ORDER
 def test_rows_are_at_the_reported_times_to_the_last_bit(order):
     """Rows are t = 0 and the times asked for, and nothing else; the ledgers of all steps that ended are in them.
-    Mutants: times that are sums of steps (0.37000000000000005), the end reported too, ledgers of the last step alone."""
+    Mutants: times that are sums of steps (0.37000000000000005), the end reported too, the last step's ledger alone."""
     made = base('growth.end="0.9 h"', 'output.times=["0.37 h", "0.5 h", "0.8 h"]', *sets(order),
                 "numerics.tolerance=0.0001", "numerics.refinement=0.3")
     found = run(made)
@@ -68,14 +68,17 @@ def test_rows_are_at_the_reported_times_to_the_last_bit(order):
 
 
 def test_without_times_every_step_is_a_row_and_there_are_25():
-    """And the last one is at the end. Mutants: only targets reported, LEAST = 12, every step alone."""
-    for end in (0.5, 19.4):
+    """And the last one is at the end; a run of less than 24 times 12 min has one every 12 min. Mutants: only targets
+    reported, LEAST = 12, every step alone, rows ever closer in ever shorter runs."""
+    for end, apart in ((4.8, 0.2), (9.59, 0.2), (9.6, 0.4), (19.4, 0.8), (45.0, 1.6)):
         rows = stepping.rows(base(f'growth.end="{end} h"'))
-        assert 24 <= len(rows) <= 49 and rows[-1] == end and np.diff(rows[:-1]) == pytest.approx(rows[0], abs=1e-9)
+        assert 24 <= len(rows) <= 49 and rows[-1] == end and rows[0] == apart
+        assert np.diff(rows[:-1]) == pytest.approx(apart, abs=1e-9) and rows[-1] - rows[-2] <= apart * 1.0001
+    assert stepping.rows(base('growth.end="0.5 h"')) == (0.2, 0.4, 0.5) and stepping.rows(base('growth.end="0 h"')) == ()
     found = run(base('growth.end="0.5 h"', "numerics.tolerance=0.0001"))
     steps = [row.end for instant in found for row in instant.ledgers]
     times = [instant.pore.time for instant in found]
-    assert times[-1] == steps[-1] == 0.5 and len(steps) > 2 and len(found) >= 25
+    assert times[-1] == steps[-1] == 0.5 and len(steps) > 2 and len(found) >= 6
     assert set(steps) | set(stepping.rows(base('growth.end="0.5 h"'))) == set(times[1:])
     assert all(len(instant.ledgers) == (instant.pore.time in steps) for instant in found)
 

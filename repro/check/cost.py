@@ -4,8 +4,8 @@
                             x one step x REMESHING
 
 A step of the midpoint rule is at first growth.time_step and doubles up to the length that the
-tolerance allows; rows are those within steps. All four factors are those of the packaged scenes: the estimate is meant to be
-right within a factor of three there.
+tolerance allows; rows are those within steps. All four factors are those of the packaged scenes:
+the estimate is meant to be right within a factor of three there.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ def steps(scene: Scene) -> tuple[int, int]:
     if scene.growth is None or scene.growth.end == 0:
         return 0, 0
     end = scene.growth.end
-    contact = numbers.at_end(scene).contact
+    contact = numbers.at_end(scene.largest).contact
     free = end if contact is None else min(contact, end)
     longest = longest_step(scene)
     total = _count(min(scene.growth.time_step, longest), longest, end)
@@ -137,7 +137,7 @@ def longest_step(scene: Scene) -> float:
     """The longest step (h) that is expected."""
     if scene.numerics.time == "updates":
         return scene.growth.time_step
-    rate = abs(numbers.fastest_growth(scene))
+    rate = abs(numbers.fastest_growth(scene.largest))
     allowed = ALLOWED * math.sqrt(scene.numerics.tolerance / 0.01)
     return min(scene.growth.end, allowed / rate if rate else math.inf)
 

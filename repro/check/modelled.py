@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from repro.march import stepping
 from repro.scene import Scene
+from repro.scene.course import Course
 
 LEFT_OUT = {
     "aggregate": "no aggregate: a clean channel",
@@ -50,9 +51,9 @@ def _flow(scene: Scene) -> Iterator[str]:
     flow = scene.flow
     yield "Stokes flow (1)-(6)"
     if flow.head is None:
-        yield f"driven by a mean velocity of {24e-6 * flow.mean_velocity:.4g} m/day"
+        yield f"driven by a mean velocity of {_over_time(flow.mean_velocity, 24e-6, 'm/day')}"
     else:
-        yield f"driven by a head of {1e-4 * flow.head:g} cm over the whole pore"
+        yield f"driven by a head of {_over_time(flow.head, 1e-4, 'cm')} over the whole pore"
     if scene.aggregate:
         yield f"{flow.viscosity_ratio:g} times the viscosity of water in the aggregate"
         yield {"laplacian": "interface in the form of (1) [E2]",
@@ -61,9 +62,9 @@ def _flow(scene: Scene) -> Iterator[str]:
 
 def _substrates(scene: Scene) -> Iterator[str]:
     carried = "advection and diffusion" if scene.flow else "diffusion"
-    acceptor = scene.substrates.acceptor.supply
-    donor = scene.substrates.donor.supply
-    yield f"{carried} of acceptor ({acceptor:g} mg/L) and donor ({donor:g} mg/L), (7)-(8)"
+    acceptor = _over_time(scene.substrates.acceptor.supply, 1.0, "mg/L")
+    donor = _over_time(scene.substrates.donor.supply, 1.0, "mg/L")
+    yield f"{carried} of acceptor ({acceptor}) and donor ({donor}), (7)-(8)"
     if scene.flow:
         yield "(11) at the inlet, (12) at the outlet, (13) on the walls"
     else:
@@ -71,6 +72,16 @@ def _substrates(scene: Scene) -> Iterator[str]:
                "closed": "closed ends"}[scene.substrates.boundary]
     yield {"quasi_steady": "at rest in each shape",
            "gear": "followed in time (3.3, Gear)"}[scene.numerics.transport]
+
+
+def _over_time(value: float | Course, factor: float, unit: str) -> str:
+    """A value in a unit, or what a table of it says."""
+    if not isinstance(value, Course):
+        return f"{factor * value:.4g} {unit}"
+    least = factor * min(value.values)
+    most = factor * value.largest
+    how = "linear in time" if value.linear else "in steps"
+    return f"{least:.4g} to {most:.4g} {unit}, {how}, the last from {value.times[-1]:g} h"
 
 
 def _kinetics(scene: Scene) -> Iterator[str]:

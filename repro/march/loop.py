@@ -172,9 +172,9 @@ def steps(scene: Scene, scheme: Scheme,
                 yield state, found
         state = replace(_after(state, taken, solved, pace), apart=cut)
         now = replace(state.pore, concentrations=solved.concentrations)
-        time = _asked(rows, now.time)
-        if scene.output.times is None or time is not None or pore_end(scene, now, 1.0):
-            shown = now if time is None else replace(now, time=time)
+        asked = _asked(rows, now.time)
+        if scene.output.times is None or asked is not None or pore_end(scene, now, 1.0):
+            shown = now if asked is None else replace(now, time=asked)
             yield reported(state, now.time), instant(state, shown, solved, taken.before)
             state = reported(state, now.time)
         else:
@@ -184,6 +184,8 @@ def steps(scene: Scene, scheme: Scheme,
 
 def _rows(scene: Scene, scheme: Scheme) -> tuple[float, ...]:
     """Times (h) of rows after t = 0, ascending: ``output.times``, or those of the scheme."""
+    if scene.growth is None:
+        return ()
     return scheme.rows(scene) if scene.output.times is None else scene.output.times
 
 

@@ -22,7 +22,7 @@ import numpy as np
 from repro.fem import transfer
 from repro.fem.space import Space
 from repro.march.loop import Ledger, Moment, PoreEnd, Step, pore_end
-from repro.march.updates import enlarged, grown, rates_of
+from repro.march.updates import before, enlarged, grown, rates_of
 from repro.model import biomass, contact, pore, remeshing
 from repro.model.biomass import Rates
 from repro.model.gear import Flows
@@ -71,6 +71,7 @@ def attempt(scene: Scene, now: Pore, solved: Solved, duration: float,
     if change > most:
         return Attempt(None, change, None)
     after = _matched(now, grown(now, half.rates, duration), half.made)
+    after = replace(after, time=before(now, duration))
     theta = enlarged(scene, now, after)
     expanded, iterations, gap = contact.expand(scene, after, theta, _ahead(now, half.shape, 1.0))
     if leaves := pore_end(scene, expanded, 0.1):
@@ -96,11 +97,11 @@ def halfway(scene: Scene, now: Pore, solved: Solved, first: Rates, duration: flo
     """Solve in the shape that half of ``duration`` (h) makes with the rates of its start. Where the
     moved mesh is not acceptable a new one is made: masses go to its points, and the rates back to
     those of the material."""
-    ahead = grown(now, first, duration / 2)
+    ahead = replace(grown(now, first, duration / 2), time=now.time + duration / 2)
     shape, _, _ = contact.expand(scene, ahead, enlarged(scene, now, ahead), _scaled(now, ahead))
     mesh = remeshing.followed(scene, now, shape)
     if mesh is not None:
-        there = replace(now, space=Space(mesh, now.space.order))
+        there = replace(now, space=Space(mesh, now.space.order), time=shape.time)
     else:
         there, (active, inert) = remeshing.remesh(scene, now, shape, _speed(solved),
                                                   (now.active, now.inert))

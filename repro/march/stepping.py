@@ -4,7 +4,8 @@ The midpoint rule carries (9)-(10) over a step with the rates of the shape half 
 would take those of the start: the mean over the aggregate of their difference, times the step, is
 what ``numerics.tolerance`` bounds; the error of the midpoint rule is of higher order, and what a
 tolerance makes of it is measured in ``make bench``. A step ends when the film between the aggregate
-and the opposite wall is first too thin (2.3.3); rows and the run's end leave all steps as they are.
+and the opposite wall is first too thin (2.3.3), and at the times of the scene's tables; rows and the
+run's end leave all steps as they are.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import numpy as np
 from repro.errors import StageError, Unresolved
 from repro.march import loop, midpoint
 from repro.march.loop import SAME_TIME, Instant, PoreEnd, Scheme, State, Step, laid_out
-from repro.march.pace import EXCESS, STRETCH, Pace, allowed, following
+from repro.march.pace import EXCESS, STRETCH, Pace, allowed, fitted, following
 from repro.model import remeshing
 from repro.model.pore import Pore, Solved
 from repro.scene import Scene, needed
@@ -41,13 +42,13 @@ def steps(scene: Scene, state: State | None = None) -> Iterator[tuple[State, Ins
 
 
 def rows(scene: Scene) -> tuple[float, ...]:
-    """Times (h) of rows besides the ends of steps: growth.end, and multiples of growth.time_step
-    times the largest power of two with LEAST of them or more."""
+    """Times (h) of rows besides the ends of steps: growth.end, and the multiples of growth.time_step
+    times the largest power of two with LEAST of them or more; of itself in a run that has fewer."""
     growth = needed(scene.growth, "[growth]")
-    count = growth.end / growth.time_step
+    count = round(growth.end / growth.time_step, 9)
     if count == 0:
         return ()
-    apart = growth.time_step * 2.0 ** math.floor(math.log2(count / LEAST))
+    apart = growth.time_step * 2.0 ** max(0, math.floor(math.log2(count / LEAST)))
     times = [round(k * apart, 9) for k in range(1, int(growth.end / apart) + 1)]
     return (*(time for time in times if growth.end - time > SAME_TIME), growth.end)
 
@@ -58,7 +59,7 @@ def _advance(scene: Scene, now: Pore, solved: Solved,
     it would be nearly the last, one to growth.end."""
     end = needed(scene.growth, "[growth]").end
     left = end - now.time
-    if STRETCH * asked.length >= left:
+    if STRETCH * asked.length >= left and end < scene.corner(now.time):
         most = EXCESS * scene.numerics.tolerance / left
         with suppress(PoreEnd, StageError, FloatingPointError):
             if last := _cut(scene, now, solved, left, most):
@@ -89,14 +90,16 @@ def _accepted(scene: Scene, now: Pore, solved: Solved,
     time_step = needed(scene.growth, "[growth]").time_step
     shortest = SHORTEST * time_step
     length = asked.length
-    duration = length
+    corner = scene.corner(now.time)
+    left = corner - now.time
+    duration = fitted(length, left, STRETCH)
     while True:
         most = np.inf if duration <= shortest else EXCESS * tolerance / duration
         try:
             found = midpoint.attempt(scene, now, solved, duration, most)
             estimate = found.change * duration
             if found.step and (duration <= shortest or not _overshoots(found)):
-                taken, after = _solved(scene, _ending_at(found.step, now.time + duration))
+                taken, after = _solved(scene, _ending_at(found.step, _end_of(now, duration, corner)))
                 if found.gaps is not None:  # contact alone made the step short
                     return taken, after, asked
                 tried = replace(asked, length=length)
@@ -118,7 +121,7 @@ def _accepted(scene: Scene, now: Pore, solved: Solved,
             if duration <= shortest:
                 raise
             length = duration / 2
-        duration = length
+        duration = fitted(length, left)
 
 
 def _solved(scene: Scene, taken: Step) -> tuple[Step, Solved]:
@@ -140,6 +143,12 @@ def _to_contact(gaps: tuple[float, float, float]) -> float:
     aim = 0.5 * (1 + LANDED) * film
     part = (before - aim) / (before - after) if after < before else 0.0
     return min(0.95, max(0.02, part))
+
+
+def _end_of(now: Pore, duration: float, corner: float) -> float:
+    """The end (h) of a step: the corner of the scene's tables that it comes to, to the last bit."""
+    end = now.time + duration
+    return corner if abs(corner - end) <= SAME_TIME else end
 
 
 def _ending_at(taken: Step, end: float) -> Step:

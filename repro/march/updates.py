@@ -7,6 +7,7 @@ moves (35) or, by the paper's criteria (3.1, 3.5), is made anew.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -35,6 +36,9 @@ from repro.model.pore import Pore, Solved
 from repro.model.transport import Concentrations, Fluxes
 from repro.scene import Scene, needed
 
+#: An update this close to a multiple of growth.time_step, in parts of it, is that multiple.
+ON_GRID = 1e-3
+
 
 def schedule(scene: Scene) -> tuple[list[float], set[float]]:
     """Times (h) at which steps end, and those that are reported; t = 0 first. The last step is cut
@@ -49,10 +53,12 @@ def schedule(scene: Scene) -> tuple[list[float], set[float]]:
 
 
 def next_time(scene: Scene, time: float) -> tuple[float, bool]:
-    """The time (h) at which the step from an update ends: the next multiple of growth.time_step,
-    rounded; or growth.end, where that comes first or is as good as there. And is it cut so?"""
+    """The time (h) at which a step ends: the next multiple of growth.time_step, rounded, or of a
+    table's times; or growth.end, where that comes first or is as good as there. And is it cut so?
+    """
     growth = needed(scene.growth, "[growth]")
-    update = round((round(time / growth.time_step) + 1) * growth.time_step, 9)
+    count = math.floor(time / growth.time_step + ON_GRID) + 1
+    update = min(round(count * growth.time_step, 9), scene.corner(time))
     if update < growth.end - max(SAME_TIME, SAME_TIME * growth.time_step):
         return update, False
     return growth.end, update != growth.end
@@ -82,7 +88,9 @@ def _within(scene: Scene, now: Pore, solved: Solved, time: float) -> Moment:
 
 def step(scene: Scene, now: Pore, solved: Solved, duration: float) -> Step:
     """One step (h): biomass, shape, mesh."""
+    solved = _midway(scene, now, solved, duration)
     grown, end, flows = make_biomass(scene, now, solved, duration)
+    grown = replace(grown, time=before(now, duration))
     expanded, iterations, _ = contact.expand(scene, grown, enlarged(scene, now, grown))
     if leaves := pore_end(scene, expanded, 0.1):
         raise PoreEnd(f"{leaves} in the step from t = {now.time:g} h")
@@ -90,8 +98,25 @@ def step(scene: Scene, now: Pore, solved: Solved, duration: float) -> Step:
     after, remeshed = remeshing.new_mesh(scene, now, replace(expanded, concentrations=end), speed)
     ledger = Ledger(now.time, now.time + duration, *flows, now.mass, grown.mass - now.mass,
                     after.mass)
-    before = replace(grown, time=now.time + duration), replace(solved, concentrations=end)
-    return Step(after, before, ledger, remeshed, iterations)
+    last = replace(grown, time=now.time + duration), replace(solved, concentrations=end)
+    return Step(after, last, ledger, remeshed, iterations)
+
+
+def before(now: Pore, duration: float) -> float:
+    """The time (h) just before the end of a step, so that a jump there is not yet made."""
+    return max(now.time, now.time + duration - SAME_TIME)
+
+
+def _midway(scene: Scene, now: Pore, solved: Solved, duration: float) -> Solved:
+    """What is solved at the start of a step, with the supplies and the drive half way, their mean
+    over it, where a table changes them in it."""
+    middle = now.time + duration / 2
+    if scene.at(middle) == scene.at(now.time):
+        return solved
+    there = pore.solve(scene, replace(now, time=middle))
+    if scene.numerics.transport == "gear":
+        return replace(there, concentrations=solved.concentrations)
+    return there
 
 
 def make_biomass(scene: Scene, now: Pore, solved: Solved,
