@@ -1,7 +1,7 @@
 """Dimensionless numbers of a scene: what its simplifications rest on.
 
 Each is told for t = 0 and, where the aggregate grows, for ``growth.end``, with bounds in place of
-what only the run knows: the aggregate grows at the rate of the supply (9), in the layer that the
+what only the run knows, and tables of the scene at their largest values: the aggregate grows at the rate of the supply (9), in the layer that the
 supply reaches, so that it is no larger and touches the opposite wall no earlier than said here.
 """
 
@@ -12,10 +12,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from repro.fem.sizing import meshed_extent
+from repro.march.loop import Instant
 from repro.model import kinetics
 from repro.model.pore import film, initial_outline, sized
 from repro.model.traction import MPA_PER_UM
-from repro.scene import Scene, Substrate
+from repro.scene import Scene, Substrate, needed
 
 #: Steps in which the bound on the growth is followed.
 STEPS = 2000
@@ -121,6 +122,21 @@ def numbers(scene: Scene, speed: float | None) -> list[Number]:
     if scene.growth:
         found += _grown(scene, speed)
     return found
+
+
+def judged(scene: Scene, first: Instant) -> tuple[Scene, list[Number]]:
+    """What a scene is judged by: each of its tables at its largest value, and the numbers of that;
+    first: its state at t = 0."""
+    most = scene.largest
+    flow = first.solved.flow
+    if flow is None:
+        return most, numbers(most, None)
+    start = needed(scene.at(0.0).flow, "[flow]")
+    drive = needed(most.flow, "[flow]")
+    if drive.mean_velocity is not None:
+        return most, numbers(most, drive.mean_velocity)
+    rise = needed(drive.head, "flow.head") / needed(start.head, "flow.head")
+    return most, numbers(most, flow.mean_velocity * rise)
 
 
 def _transported(scene: Scene, speed: float) -> Iterator[Number]:

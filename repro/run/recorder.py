@@ -48,7 +48,7 @@ class Recorder:
     @property
     def time(self) -> float:
         """How far the run has come, h."""
-        return self.state.pore.time if self.state else 0.0
+        return self.state.time if self.state else 0.0
 
     @property
     def end(self) -> float:

@@ -16,7 +16,7 @@ from time import perf_counter
 
 from repro import results, timing
 from repro.check import simplifications
-from repro.check.numbers import numbers
+from repro.check.numbers import judged
 from repro.check.simplifications import Warned
 from repro.errors import CheckpointError, Interrupted, OutputError, SimulationError
 from repro.march.loop import Instant, PoreEnd, State
@@ -330,10 +330,12 @@ def _record_steps(recorder: Recorder, made: Made, progress: Progress, watch: Wat
     for state, instant in made:
         remeshes = recorder.remeshes
         contact = recorder.contact
+        steps_before = recorder.steps if recorder.state else -1
         recorder.add(state, instant)
         if instant and len(recorder.record.rows) == 1:
             _warn(recorder, instant, watch)
-        _tell_step(recorder, recorder.remeshes > remeshes, recorder.contact > contact, watch)
+        if recorder.steps > steps_before:  # no row within a step
+            _tell_step(recorder, recorder.remeshes > remeshes, recorder.contact > contact, watch)
         progress(recorder.time)
         if number := watch.stop():
             raise interrupted(recorder, number)
@@ -352,9 +354,8 @@ def _warn(recorder: Recorder, first: Instant, watch: Watch) -> None:
 
 def warned(scene: Scene, first: Instant) -> list[Warned]:
     """The simplifications of a scene that do not hold; first: its state at t = 0."""
-    flow = first.solved.flow
     try:
-        return simplifications.warnings(scene, numbers(scene, flow.mean_velocity if flow else None))
+        return simplifications.warnings(*judged(scene, first))
     except ArithmeticError as error:
         return [Warned("scene", f"its dimensionless numbers cannot be worked out ({error})")]
 
