@@ -14,7 +14,8 @@ from repro.march.loop import Ledger
 from repro.march.simulation import simulate
 from repro.model import pore, remeshing, transport
 from repro.model.kinetics import Sink
-from repro.results import ledger_row, oxygen_demand_balance, row
+from repro.march.balance import oxygen_demand as oxygen_demand_balance
+from repro.results import ledger_row, row
 from repro.scene import load_scene
 from tests import oracles
 from tests.strategies import ORDERS, between, constants, scenes, share

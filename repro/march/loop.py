@@ -12,6 +12,7 @@ import numpy as np
 
 from repro.errors import SimulationError, StageError
 from repro.fem.sizing import ACROSS_PORE
+from repro.march import balance
 from repro.march.pace import Pace
 from repro.model.pore import Pore, Solved, seeded
 from repro.model.remeshing import resolved
@@ -131,6 +132,7 @@ def steps(scene: Scene, scheme: Scheme,
             try:
                 with stopping(now.time):
                     taken, solved, pace = scheme.advance(scene, now, solved, time, state.pace)
+                    balance.refuse(scene, taken.pore, taken.ledger)
             except PoreEnd:
                 if state.ledgers:  # steps that are not reported yet
                     yield reported(state), instant(state, now, solved, None)
