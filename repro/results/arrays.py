@@ -9,7 +9,7 @@ from functools import cached_property, partial
 import meshio
 import numpy as np
 
-from repro.model import biomass, growth
+from repro.model import biomass, flow, growth
 from repro.model.pore import Pore, Solved
 from repro.results.quantities import Quantity
 from repro.scene import Scene
@@ -84,8 +84,7 @@ def _three(plane: np.ndarray) -> np.ndarray:
 
 
 def _head(state: State) -> np.ndarray:
-    mesh = state.pore.mesh
-    return mesh.with_middles(state.solved.flow.head[: mesh.corners])
+    return flow.pressure_space(state.pore.space).to_mesh(state.solved.flow.head)
 
 
 def _concentration(name: str, state: State) -> np.ndarray:

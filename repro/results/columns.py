@@ -110,7 +110,7 @@ SERIES = (
              lambda scene, at: _of_steps(partial(balance.oxygen_demand, scene.kinetics), at),
              "oxygen demand", "growth"),
     Quantity("nodes", "nodes of the mesh", "corners, and middles of the sides of curved triangles",
-             lambda scene, at: len(at.pore.mesh.points)),
+             lambda scene, at: len(at.pore.mesh.points), "nodes"),
     Quantity("remeshed", "mesh made anew", "1 where a step since the last row made a new mesh",
              lambda scene, at: int(at.remeshes > 0), yes_no=True),
     Quantity("contact", "contact with the opposite wall",
