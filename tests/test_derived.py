@@ -19,6 +19,7 @@ from repro.report import quantities
 from repro.report.reading import Run
 from repro.scene import load_scene
 from tests import oracles
+from tests.pages import AXES, CHARTS, LEDGERS
 from tests.strategies import ORDERS, constants
 
 EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
@@ -407,31 +408,6 @@ def test_every_column_of_the_ledger_is_its_own():
     check_ledger()
 
 
-#: {chart: {label of a line: column}}, as a reader understands them.
-CHARTS = {
-    "Conductivity": {"conductivity": "conductivity_m_per_d"},
-    "Mean velocity": {"mean velocity": "mean_velocity_m_per_d"},
-    "Head loss": {"head loss": "head_loss_cm"},
-    "Effluents": {"acceptor": "effluent_acceptor_mg_per_L", "donor": "effluent_donor_mg_per_L"},
-    "Inlet of the meshed part": {"acceptor": "inlet_acceptor_mg_per_L", "donor": "inlet_donor_mg_per_L"},
-    "Least concentrations": {"acceptor": "acceptor_min_mg_per_L", "donor": "donor_min_mg_per_L"},
-    "Area of the aggregate": {"area": "aggregate_area_um2"},
-    "Extent of the aggregate": {"thickness": "thickness_um", "upstream end": "upstream_um",
-                                "downstream end": "downstream_um"},
-    "Inert part of the biomass": {"inert part": "inert_fraction"},
-    "Biomass density": {"least": "biomass_density_min", "largest": "biomass_density_max"},
-    "Defects of the balances": {"acceptor": "acceptor_balance", "donor": "donor_balance",
-                                "biomass": "biomass_balance", "oxygen demand": "oxygen_demand_balance"},
-    "Mesh": {"nodes": "nodes", "made anew": "remeshed"},
-}
-UNITS = {"Conductivity": "(m/day)", "Mean velocity": "(m/day)", "Head loss": "(cm)", "Effluents": "(mg/L)",
-         "Inlet of the meshed part": "(mg/L)", "Least concentrations": "(mg/L)", "Area of the aggregate": "(um²)",
-         "Extent of the aggregate": "(um)"}
-LEDGERS = {f"Ledger: {name}": {label: f"{name}_{part}_pg_per_m" for label, part in
-                               {"supplied": "supplied", "leaving": "out", "taken up": "consumed",
-                                "stored": "stored"}.items()} for name in ("acceptor", "donor")}
-
-
 def told_apart():
     """A run of three rows and two steps in which every number is another one."""
     series = {name: 1.0 + k + np.array([0.1, 0.2, 0.4]) for k, name in enumerate(results.COLUMNS)}
@@ -446,7 +422,7 @@ def check_charts():
     found = {chart.title: chart for chart in quantities.charts_of(run)}
     assert found.keys() == {*CHARTS, *LEDGERS, "Ledger: biomass"}
     for title, columns in CHARTS.items():
-        assert found[title].axis.endswith(UNITS.get(title, "")) and [line.label for line in found[title].lines] == [
+        assert found[title].axis.endswith(AXES.get(title, "")) and [line.label for line in found[title].lines] == [
             *columns], title
         for line, column in zip(found[title].lines, columns.values()):
             wanted = run.series[column]
