@@ -222,3 +222,22 @@ def test_what_cannot_be_written_is_told_in_a_line(arguments, message):
         process = process_of(arguments, full)
     assert process.returncode == 2 and process.stderr.count("\n") == 1
     assert process.stderr.startswith(f"repro: {message}")
+
+
+def test_closed_ends_with_gears_method_are_a_table_of_numbers(tmp_path):
+    """What is there is stored or consumed, and every field is a number of Python's or empty. Mutants: repr of NumPy's
+    number in a field ("np.float64(0.1)"), what is stored left out of the balance."""
+    scene = tmp_path / "closed.toml"
+    scene.write_text('[pore]\nwidth = "50 um"\nlength = "600 um"\n[aggregate]\nradius = "5 um"\n[substrates]\n'
+                     'boundary = "closed"\n[substrates.acceptor]\nsupply = "10 mg/L"\n[substrates.donor]\n'
+                     'supply = "7 mg/L"\n[growth]\nend = "0.4 h"\n[numerics]\ntransport = "gear"\nrefinement = 0.5\n')
+    out = run(tmp_path, str(scene))
+    table = [float(value) for row in rows(out) for value in row.values() if value]
+    ledger = list(csv.DictReader((out / "ledger.csv").read_text().splitlines()))
+    assert len(table) > 50 and json.loads((out / "run.json").read_text())["status"] == "completed"
+    for step in ledger:
+        one = {name: float(value) for name, value in step.items()}
+        assert one["donor_supplied_pg_per_m"] == one["donor_out_pg_per_m"] == 0 < one["donor_consumed_pg_per_m"]
+        assert math.isclose(one["donor_stored_pg_per_m"], -one["donor_consumed_pg_per_m"], rel_tol=1e-6)
+    results.write_table(tmp_path / "t.csv", ["a"], [[np.float64(0.1)], [0.1], [np.int64(3)], [None]])
+    assert (tmp_path / "t.csv").read_text() == "a\n0.1\n0.1\n3\n\"\"\n"

@@ -3,6 +3,7 @@ in: at a late, uneven pore that the aggregate has plugged, where no two quantiti
 import inspect
 import math
 import sys
+from collections import Counter
 from dataclasses import replace
 from functools import cache
 from importlib import import_module
@@ -14,13 +15,18 @@ from skfem.refdom import RefTri
 
 from repro import results
 from repro.errors import SimulationError
+from repro.fem.newton import Newton
 from repro.march.simulation import simulate
+from repro.model import remeshing
 from repro.report import quantities
 from repro.report.reading import Run
+from repro.run.running import run
 from repro.scene import load_scene
 from tests import oracles
 from tests.pages import AXES, CHARTS, LEDGERS
+from tests.shell import told
 from tests.strategies import ORDERS, constants
+from tests.test_resume import CONTACT, in_parts
 
 EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
 #: Leans upstream, and touches the upper wall of a pore of 20 um after some minutes.
@@ -408,7 +414,7 @@ def test_every_column_of_the_ledger_is_its_own():
     check_ledger()
 
 
-def told_apart():
+def apart():
     """A run of three rows and two steps in which every number is another one."""
     series = {name: 1.0 + k + np.array([0.1, 0.2, 0.4]) for k, name in enumerate(results.COLUMNS)}
     series |= {"time_h": np.array([0.0, 1.0, 3.0]), "remeshed": np.array([0.0, 1.0, 0.0])}
@@ -418,7 +424,7 @@ def told_apart():
 
 
 def check_charts():
-    run = told_apart()
+    run = apart()
     found = {chart.title: chart for chart in quantities.charts_of(run)}
     assert found.keys() == {*CHARTS, *LEDGERS, "Ledger: biomass"}
     for title, columns in CHARTS.items():
@@ -443,6 +449,37 @@ def check_charts():
 
 def test_every_line_of_every_chart_is_the_column_that_it_names():
     check_charts()
+
+
+def test_counts_are_of_every_step_with_several_a_row_and_over_resumes(tmp_path, monkeypatch):
+    """Newton's iterations (of solves that converge) and new meshes, counted where they are made, against run.json of
+    the same run in one piece and of one that is stopped after every step. Mutants: counts of the last step alone, of
+    the last row alone, of t = 0 left out."""
+    scene = load_scene("base", ["numerics.refinement=0.5", *CONTACT, 'output.times=["0.6 h"]'])
+    made = Counter()
+    solve, remesh = Newton.solve, remeshing.remesh
+
+    def counted(self, system, first):
+        found = solve(self, system, first)
+        _, count, converged = found
+        made[{"System": "growth", "Balance": "transport"}[type(system).__name__]] += count * converged
+        return found
+
+    def noted(*arguments):
+        made["remeshes"] += 1
+        return remesh(*arguments)
+
+    monkeypatch.setattr(Newton, "solve", counted)
+    monkeypatch.setattr(remeshing, "remesh", noted)
+    run(scene, tmp_path / "whole")
+    counts = dict(made)
+    assert counts.pop("remeshes") == told(tmp_path / "whole")["remeshes"] > 0
+    assert told(tmp_path / "whole")["newton_iterations"] == counts
+    assert in_parts(scene, tmp_path / "parts", 1) >= 3
+    table, ledger = (results.read_table(tmp_path / "parts" / name) for name in ("timeseries.csv", "ledger.csv"))
+    assert table["remeshed"].tolist() == [0, 1] and len(ledger["end_h"]) == 3
+    for key in ("remeshes", "newton_iterations"):
+        assert told(tmp_path / "parts")[key] == told(tmp_path / "whole")[key]
 
 
 def changed(monkeypatch, module, old, new):
