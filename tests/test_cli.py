@@ -230,7 +230,8 @@ def test_closed_ends_with_gears_method_are_a_table_of_numbers(tmp_path):
     scene = tmp_path / "closed.toml"
     scene.write_text('[pore]\nwidth = "50 um"\nlength = "600 um"\n[aggregate]\nradius = "5 um"\n[substrates]\n'
                      'boundary = "closed"\n[substrates.acceptor]\nsupply = "10 mg/L"\n[substrates.donor]\n'
-                     'supply = "7 mg/L"\n[growth]\nend = "0.4 h"\n[numerics]\ntransport = "gear"\nrefinement = 0.5\n')
+                     'supply = "7 mg/L"\n[growth]\nend = "0.4 h"\n'
+                     '[numerics]\npreset = "paper"\ntransport = "gear"\nrefinement = 0.5\n')
     out = run(tmp_path, str(scene))
     table = [float(value) for row in rows(out) for value in row.values() if value]
     ledger = list(csv.DictReader((out / "ledger.csv").read_text().splitlines()))
