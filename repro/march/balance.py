@@ -87,9 +87,10 @@ def refuse(scene: Scene, after: Pore, ledger: Ledger) -> None:
 def accepted_demand(scene: Scene, ledger: Ledger) -> float:
     """The largest defect of the oxygen demand that is accepted of a step.
 
-    The midpoint rule closes to round-off. In the paper's updates Heun's rule errs by (dt times the
-    fastest rate, k Y + b)^2 / 12 of what grows and decays, here with a factor of 3 for the rates'
-    own change: in a step of base 2e-4 at most is measured. Gear's method: 1e-3.
+    The midpoint rule closes to round-off. In the paper's updates the trapezoidal rule errs by (dt
+    times the fastest rate, k Y + b)^2 / 12 of what is turned over, 1e-3 in a step of base, where
+    2e-4 at most is measured (of 132 random scenes the worst came to a tenth of it). Gear's method
+    may err by GEAR more.
     """
     kinetics = needed(scene.kinetics, "[kinetics]")
     grown, decayed = demand_terms(kinetics, ledger)
@@ -100,7 +101,7 @@ def accepted_demand(scene: Scene, ledger: Ledger) -> float:
     if scene.numerics.time == "updates":
         fastest = (kinetics.maximum_utilization_rate * kinetics.yield_coefficient
                    + kinetics.decay_coefficient)
-        error = (fastest * (ledger.end - ledger.start)) ** 2 / 4
+        error = (fastest * (ledger.end - ledger.start)) ** 2 / 12
         found += error * _turned_over(kinetics, ledger) / scale
     return found + GEAR if scene.numerics.transport == "gear" else found
 
