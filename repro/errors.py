@@ -41,6 +41,12 @@ class TransferError(StageError):
     stage = "transfer between meshes"
 
 
+class BalanceError(StageError):
+    """A step does not conserve what it should."""
+
+    stage = "its balance"
+
+
 class SimulationError(RuntimeError):
     """A run has stopped: at what simulated time, in which stage, why, and what to try."""
 

@@ -14,6 +14,30 @@ VOID = {"meta", "input", "br", "link", "img", "hr"}
 FAST = 'numerics.preset="fast"'
 HOSTILE = "<script>pwned=1<!--\"'&<img src=x onerror=pwned=1>.toml"
 
+#: {chart: {label of a line: column}}, as a reader understands them.
+CHARTS = {
+    "Conductivity": {"conductivity": "conductivity_m_per_d"},
+    "Mean velocity": {"mean velocity": "mean_velocity_m_per_d"},
+    "Head loss": {"head loss": "head_loss_cm"},
+    "Effluents": {"acceptor": "effluent_acceptor_mg_per_L", "donor": "effluent_donor_mg_per_L"},
+    "Inlet of the meshed part": {"acceptor": "inlet_acceptor_mg_per_L", "donor": "inlet_donor_mg_per_L"},
+    "Least concentrations": {"acceptor": "acceptor_min_mg_per_L", "donor": "donor_min_mg_per_L"},
+    "Area of the aggregate": {"area": "aggregate_area_um2"},
+    "Extent of the aggregate": {"thickness": "thickness_um", "upstream end": "upstream_um",
+                                "downstream end": "downstream_um"},
+    "Inert part of the biomass": {"inert part": "inert_fraction"},
+    "Biomass density": {"least": "biomass_density_min", "largest": "biomass_density_max"},
+    "Defects of the balances": {"acceptor": "acceptor_balance", "donor": "donor_balance",
+                                "biomass": "biomass_balance", "oxygen demand": "oxygen_demand_balance"},
+    "Mesh": {"nodes": "nodes", "made anew": "remeshed"},
+}
+AXES = {"Conductivity": "(m/day)", "Mean velocity": "(m/day)", "Head loss": "(cm)", "Effluents": "(mg/L)",
+         "Inlet of the meshed part": "(mg/L)", "Least concentrations": "(mg/L)", "Area of the aggregate": "(um²)",
+         "Extent of the aggregate": "(um)"}
+LEDGERS = {f"Ledger: {name}": {label: f"{name}_{part}_pg_per_m" for label, part in
+                               {"supplied": "supplied", "leaving": "out", "taken up": "consumed",
+                                "stored": "stored"}.items()} for name in ("acceptor", "donor")}
+
 
 class Page(HTMLParser):
     """Parses strictly: every tag is closed in its turn. `outside` are addresses; `texts` what a reader sees."""

@@ -44,7 +44,7 @@ def test_fields_are_those_of_the_files_of_a_run(tmp_path):
         named = {**written.point_data, **{name: values for name, (values,) in written.cell_data.items()}}
         assert set(fields) == {"places_um", "triangles", *named}
         for name, values in named.items():
-            assert np.array_equal(fields[name], values), name
+            assert np.array_equal(fields[name], values, equal_nan=True), name
 
 
 def test_units_are_what_the_names_end_with(found):

@@ -1,4 +1,6 @@
 """Balances of substrates and biomass on scenes of any kind (2.2), kept in loops that know nothing but the paper."""
+import json
+import re
 from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
@@ -7,14 +9,16 @@ import numpy as np
 import pytest
 from hypothesis import event, given
 
+from repro.cli import main
 from repro.errors import SimulationError, TransportError, Unresolved
 from repro.fem import elements
 from repro.march import midpoint, updates
+from repro.march.balance import oxygen_demand as oxygen_demand_balance
 from repro.march.loop import Ledger
 from repro.march.simulation import simulate
 from repro.model import pore, remeshing, transport
 from repro.model.kinetics import Sink
-from repro.results import ledger_row, oxygen_demand_balance, row
+from repro.results import ledger_row, read_table, row
 from repro.scene import load_scene
 from tests import oracles
 from tests.strategies import ORDERS, between, constants, scenes, share
@@ -318,3 +322,60 @@ def test_every_update_of_the_paper_keeps_the_demand(order, transport_by, bound):
     for instant in found:
         for ledger in instant.ledgers:
             assert abs(oxygen_demand_balance(made.kinetics, ledger)) <= bound
+
+
+def run_leaking(monkeypatch, tmp_path, number, changes, *sets):
+    """(exit status, folder) of a run in which a step of that number has a ledger with ``changes(ledger)``."""
+    made = []
+
+    def leaking(*parts):
+        ledger = Ledger(*parts)
+        made.append(ledger)
+        return replace(ledger, **changes(ledger)) if len(made) == number else ledger
+
+    for way in (midpoint, updates):
+        monkeypatch.setattr(way, "Ledger", leaking)
+    out = tmp_path / "run"
+    return main(["run", "base", "--out", str(out), *(part for one in sets for part in ("--set", one))]), out
+
+
+LEAKS = {"acceptor": lambda ledger: {"supplied": (1.01 * ledger.supplied[0], ledger.supplied[1])},
+         "donor": lambda ledger: {"out": (ledger.out[0], ledger.out[1] - 0.01 * ledger.supplied[1])},
+         "biomass": lambda ledger: {"biomass_after": 1.01 * ledger.biomass_after},
+         "oxygen demand": lambda ledger: {"biomass_made": 1.01 * ledger.biomass_made}}
+
+
+@pytest.mark.parametrize("what", LEAKS)
+def test_a_step_that_does_not_balance_ends_the_run_and_keeps_its_files(what, monkeypatch, tmp_path, capsys):
+    """Exit status 1, one line that says what, how much, where, when and what to try; rows, fields and the checkpoint of
+    what was good stay. Mutants: each of the four checks left out, a warning for an error, the step written first."""
+    sets = ["numerics.preset=fast", 'growth.end="3 h"']
+    status, out = run_leaking(monkeypatch, tmp_path, 2, LEAKS[what], *sets)
+    (line,) = [line for line in capsys.readouterr().err.splitlines() if "balance" in line]
+    table = read_table(out / "timeseries.csv")
+    assert status == 1 and len(table["time_h"]) == 2 and len(list((out / "fields").iterdir())) == 2
+    assert f"stopped in the step from t = {table['time_h'][-1]:g} h, in its balance: " in line
+    assert re.search(rf"x = -\S+ and \S+ um: it lacks (.*, )?-?0\.0\d+ of the {what}.*; try a shorter", line)
+    record = json.loads((out / "run.json").read_text())
+    assert record["status"].startswith("failed: ") and "last good state" in line and (out / "checkpoint.state").exists()
+
+
+@pytest.mark.parametrize("sets, column", [
+    (["numerics.inlet=mean"], "acceptor_balance"),
+    (["growth.time_step=12 min"], "oxygen_demand_balance"),
+    (["numerics.transport=gear"], "oxygen_demand_balance")])
+def test_stated_defects_are_shown_and_stop_nothing(sets, column, tmp_path):
+    """E4, the paper's updates and Gear's method (E8: tests/test_derived.py): more than what stops a run, told as it is.
+    """
+    found = list(simulate(load_scene("base", ["numerics.refinement=0.5", 'growth.end="0.4 h"', *sets])))
+    told = [abs(row(load_scene("base", sets), instant)[column]) for instant in found[1:]]
+    assert max(told) > 1e-6 and (column != "oxygen_demand_balance" or max(told) < 1e-3)
+
+
+def test_a_slow_flow_is_no_leak():
+    """At a Peclet number of 2e-9, just over what is refused, diffusion moves so much more than the flow that round-off
+    is more than a millionth of what is supplied. Mutant: defects over what is supplied and consumed alone."""
+    made = load_scene("wide", ["numerics.preset=fast", "numerics.elements=cubic", "numerics.refinement=0.25",
+                               "flow.mean_velocity=1e-4 um/h", 'growth.time_step="0.1 h"', 'growth.end="1 h"'])
+    found = list(simulate(made))
+    assert found[-1].pore.time == 1.0 and 0 < found[-1].ledgers[0].supplied[0] < 1

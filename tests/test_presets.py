@@ -175,10 +175,11 @@ def test_fields_are_written(contact, tmp_path):
     assert read.cells[0].type == ("triangle6" if curved else "triangle") and len(read.points) == len(now.mesh.points)
     total = read.point_data["active_biomass"] + read.point_data["inert_biomass"]
     assert np.allclose(total[now.mesh.body], 1.0, rtol=1e-5 if curved else 0.2)
-    assert np.allclose(read.cell_data["theta"][0], read.cell_data["J"][0], rtol=0.05 if curved else 0.4)
+    assert np.allclose(read.cell_data["theta"][0], read.cell_data["J"][0], rtol=0.05 if curved else 0.4,
+                       equal_nan=True)
     assert (read.cell_data["theta"][0][now.mesh.biomass] > 1).all()
     cells, head = now.mesh.cells, read.point_data["head_cm"]
-    if curved:
+    if made.numerics.order == 2:  # a linear head; that of order 3 has values of its own there
         assert np.allclose(head[cells[:, 3]], 0.5 * (head[cells[:, 0]] + head[cells[:, 1]]))
     assert head[now.mesh.topology.inlet].mean() > 0
     assert now.body.strained(now.mesh.points[now.mesh.body]).J.min() > 0

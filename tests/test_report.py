@@ -5,7 +5,9 @@ import hashlib
 import html
 import json
 import re
+import runpy
 import shutil
+from pathlib import Path
 
 import meshio
 import numpy as np
@@ -15,7 +17,7 @@ from repro import report, results
 from repro.report import fields, page, quantities
 from repro.report.reading import NoRun, read
 from repro.results import names
-from tests.pages import FAST, HOSTILE, Page, hostile, numbers, run, stored, text_of
+from tests.pages import CHARTS, FAST, HOSTILE, LEDGERS, Page, first, hostile, numbers, run, stored, text_of
 
 
 def test_every_run_has_a_page_that_needs_nothing_else(fast, paper, flow_only):
@@ -32,14 +34,49 @@ def test_every_run_has_a_page_that_needs_nothing_else(fast, paper, flow_only):
         assert {"style", "script"} == {kind for kind, _, _ in found.scripts}
 
 
-def test_charts_of_a_whole_run(fast):
-    """Mutant: a chart that is forgotten."""
+def test_charts_of_a_whole_run_are_its_columns(fast):
+    """Every line of the page's own data, by its label, to the six digits that a pointer is told. Mutants: a chart that
+    is forgotten, a line of another column."""
     text = text_of(fast)
     titles = re.findall("<figcaption>(.*?)<", text)
     assert titles == [kind.title for kind in quantities.KINDS]
-    assert "Head loss" in titles and "Defects of the balances" in titles
+    assert {*CHARTS, *LEDGERS, "Ledger: biomass"} == {*titles}
+    data = [json.loads(html.unescape(one))["lines"] for one in re.findall('data-chart="([^"]*)"', text)]
+    series, book = (results.read_table(fast / f"{name}.csv") for name in ("timeseries", "ledger"))
+    hours = book["end_h"] - book["start_h"]
+    drawn = 0
+    for title, lines in zip(titles, data, strict=True):
+        for line in lines:
+            name = CHARTS.get(title, LEDGERS.get(title, {})).get(line["label"])
+            if title in LEDGERS:
+                assert line["y"] == pytest.approx((1e-6 * book[name] / hours).tolist(), rel=1e-5)
+            elif name and name != "remeshed":
+                assert line["t"] == pytest.approx(series["time_h"].tolist(), rel=1e-5)
+                assert line["y"] == pytest.approx(series[name].tolist(), rel=1e-5), (title, line["label"])
+            drawn += 1
+    assert drawn >= 28
     for word in ("factorise and solve", "Newton iterations, transport", "scene hash", "numpy", "kinematic_viscosity"):
         assert word in text
+
+
+def test_numbers_are_those_of_the_first_and_the_last_row(fast, paper):
+    """As the page's table has them. Mutants: the second row, the row before the last, a value beside another's name."""
+    for out in (fast, paper):
+        panel = first("<h2>Numbers</h2>(.*?)</table>", text_of(out))
+        rows = [re.findall("<td.*?>(.*?)</td>", row) for row in re.findall("<tr>(.*?)</tr>", panel)][1:]
+        series = results.read_table(out / "timeseries.csv")
+        assert re.findall("t = ([^ ]*) h", panel) == [f"{series['time_h'][k]:.6g}" for k in (0, -1)]
+        told = {html.unescape(name): values for name, *values in rows}
+        assert len(told) == len(rows) == len(series) - 1
+        for name, column in series.items():
+            if name != "time_h":
+                shown = told[names.with_unit(name)]
+                wanted = [column[0], column[-1]]
+                if name in ("remeshed", "contact"):
+                    assert shown == [{0.0: "no", 1.0: "yes"}[value] for value in wanted]
+                else:
+                    assert list(map(float, shown)) == pytest.approx(wanted, rel=5.1e-5), name  # four digits
+        assert (series["conductivity_m_per_d"][[0, -1]] > 0).all() and len(series["time_h"]) > 2
 
 
 def test_what_is_not_modelled_is_left_out(flow_only, fast):
@@ -138,16 +175,9 @@ def test_the_same_run_makes_the_same_page(fast):
     assert text_of(fast) == before
 
 
-def test_ledger_rates_add_up(paper):
-    """Rate times step is the ledger's own sum. Mutants: a rate over the step before, one step left out."""
-    found, book = quantities.series(read(paper)), results.read_table(paper / "ledger.csv")
-    for part in ("supplied", "out", "consumed"):
-        times, rates = found[f"acceptor_{part}"]
-        assert np.allclose(times, (book["start_h"] + book["end_h"]) / 2)
-        total = np.sum(rates * (book["end_h"] - book["start_h"])) * 1e6
-        assert total == pytest.approx(book[f"acceptor_{part}_pg_per_m"].sum(), rel=1e-12)
-    assert found["biomass_made"][1][-1] == pytest.approx(1e-6 * book["biomass_made_pg_per_m"].sum(), rel=1e-12)
-    assert "acceptor_stored" not in found
+def test_storage_is_drawn_where_there_is_some(paper):
+    """Mutant: four lines of zeros."""
+    assert "acceptor_stored_ug_per_m_per_h" not in quantities.series(read(paper))
 
 
 def test_contact_is_marked(tmp_path):
@@ -176,16 +206,28 @@ def test_a_run_that_stops_has_its_page(tmp_path, monkeypatch, capsys):
     Page(text)
 
 
+PURE = """inert_fraction biomass_density_min biomass_density_max acceptor_balance donor_balance biomass_balance
+oxygen_demand_balance nodes remeshed contact region theta J active_biomass inert_biomass""".split()
+
+
 def test_every_name_has_its_unit_or_is_a_pure_number(fast, paper):
     """Names of columns, ledgers and arrays. Mutant: an array whose name says nothing of its unit."""
     arrays = [meshio.vtu.read(fields.index(out)[-1][1]) for out in (fast, paper)]
     told = {name for grid in arrays for name in (*grid.point_data, *grid.cell_data)}
-    assert {"velocity_m_per_d", "stress_xy_MPa", "theta"} <= told
-    for name in told | set(results.COLUMNS) | set(results.LEDGER_COLUMNS):
-        assert bool(names.unit(name)) != (name in names.PURE), name
-        assert name in results.LEDGER_COLUMNS or names.words(name) != name or name in names.PURE, name
+    assert told | {*results.COLUMNS, *results.LEDGER_COLUMNS} == names.KNOWN.keys()
+    for name, each in names.KNOWN.items():
+        assert bool(names.unit(name)) != (name in PURE) and each.formula and names.words(name) != name or name == "J"
     assert (names.unit("mean_velocity_m_per_d"), names.unit("thickness_um")) == ("m/day", "um")
     assert (names.udunits("donor_min_mg_per_L"), names.udunits("aggregate_area_um2")) == ("mg L-1", "um2")
+
+
+def test_the_table_in_docs_is_that_of_the_definitions():
+    """Mutant: a column added, and the table not made again."""
+    docs = Path(__file__).parents[1] / "docs"
+    made = runpy.run_path(str(docs / "quantities.py"))["text"]()
+    assert (docs / "quantities.md").read_text(encoding="utf-8") == made
+    for name in (*results.COLUMNS, *results.LEDGER_COLUMNS, *names.KNOWN, "clogging_time_h", "remeshed_nodes"):
+        assert f"| `{name}` |" in made
 
 
 def test_a_folder_without_a_run_has_no_page(tmp_path):

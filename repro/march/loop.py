@@ -18,6 +18,7 @@ import numpy as np
 
 from repro.errors import SimulationError, StageError
 from repro.fem.sizing import ACROSS_PORE
+from repro.march import balance
 from repro.march.pace import Pace
 from repro.model.pore import Pore, Solved, seeded
 from repro.model.remeshing import resolved
@@ -159,6 +160,7 @@ def steps(scene: Scene, scheme: Scheme,
         try:
             with stopping(now.time):
                 taken, solved, pace, cut = scheme.advance(scene, now, solved, state.pace)
+                balance.refuse(scene, taken.pore, taken.ledger)
         except PoreEnd:
             if state.ledgers:  # steps that are not reported yet
                 yield reported(state, now.time), instant(state, now, solved, None)

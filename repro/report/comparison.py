@@ -13,8 +13,7 @@ from repro.report.reading import Run
 from repro.results import names
 
 #: Columns without a value between rows, and defects, which are round-off.
-NOT_COMPARED = {"time_h", "nodes", "acceptor_balance", "donor_balance", "biomass_balance",
-                *names.YES_NO}
+NOT_COMPARED = {"time_h", "nodes", *names.DEFECTS, *names.YES_NO}
 
 
 def build(runs: Sequence[Run]) -> str:

@@ -16,6 +16,7 @@ import meshio
 import numpy as np
 
 from repro.results import names
+from repro.results.arrays import ARRAYS
 
 MOST_FRAMES = 40
 MOST_BYTES = 5_000_000  # of all frames in the page; two frames are always shown
@@ -26,7 +27,8 @@ _FILE = re.compile(r"fields/fields_\d{4,}\.vtu")
 SHOWN = """velocity_m_per_d head_cm acceptor_mg_per_L donor_mg_per_L active_biomass inert_biomass
 theta J largest_principal_stress_MPa stress_xx_MPa stress_yy_MPa stress_zz_MPa stress_xy_MPa
 pressure_MPa displacement_um region""".split()
-OF_AGGREGATE = {"active_biomass", "inert_biomass", "theta", "J", "displacement_um"}
+#: Of the aggregate alone: what is not known in the fluid, and biomass, of which it has none.
+OF_AGGREGATE = {each.name for each in ARRAYS if each.body} | {"active_biomass", "inert_biomass"}
 
 
 def index(folder: Path) -> list[tuple[float, Path]]:
@@ -78,11 +80,7 @@ def _described(name: str, grid: meshio.Mesh) -> dict:
     vector = name in grid.point_data and grid.point_data[name].ndim == 2
     words = names.words(name) + (" (magnitude)" if vector else "")
     return {"name": name, "label": words[0].upper() + words[1:], "unit": names.unit(name),
-            "at": "node" if name in grid.point_data else "cell", "body": _of_aggregate(name)}
-
-
-def _of_aggregate(name: str) -> bool:
-    return name in OF_AGGREGATE or name.endswith("_MPa")
+            "at": "node" if name in grid.point_data else "cell", "body": name in OF_AGGREGATE}
 
 
 def _frame(time: float, grid: meshio.Mesh, low, high, meshes: dict[bytes, dict]) -> dict:
@@ -106,7 +104,7 @@ def _values(grid: meshio.Mesh, region: np.ndarray) -> dict[str, list]:
     values = {}
     for name in (name for name in SHOWN if name in found):
         value = np.linalg.norm(found[name], axis=1) if found[name].ndim == 2 else found[name]
-        if _of_aggregate(name):
+        if name in OF_AGGREGATE:
             value = value[nodes if name in grid.point_data else cells]
         values[name] = _levels(value)
     return values

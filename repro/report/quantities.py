@@ -4,97 +4,114 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 
 from repro.report.charts import Chart, Line
 from repro.report.reading import Run
+from repro.results import names
+from repro.results.columns import PARTS, SUBSTRATES
+from repro.results.quantities import Quantity
 
-UG = 1e-6  # of pg
+#: Times (h) and values.
+Course = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A chart: what it shows, its axis, and (quantity, label) of its lines."""
+    """A chart: its title, what stands at its axis before the unit, and the quantities drawn."""
 
     title: str
-    axis: str
-    lines: tuple[tuple[str, str], ...]
+    what: str
+    drawn: tuple[str, ...]
+
+    @property
+    def axis(self) -> str:
+        """What is drawn, with its unit."""
+        unit = names.unit(self.drawn[0])
+        return f"{self.what} ({unit})" if unit else self.what
 
 
-_BOTH = ("acceptor", "donor")
-#: The parts of a substrate's ledger, and what the page calls them.
-_PARTS = {"supplied": "supplied", "out": "leaving", "consumed": "taken up", "stored": "stored"}
+def _middle(run: Run) -> np.ndarray:
+    return (run.ledger["start_h"] + run.ledger["end_h"]) / 2
 
 
-def _concentrations(title: str, pattern: str) -> Kind:
-    """A chart of both substrates, whose names go into the pattern of the quantity's."""
-    return Kind(title, "concentration (mg/L)",
-                tuple((pattern.format(name), name) for name in _BOTH))
+def _rate(name: str, part: str) -> Quantity:
+    """A part of a substrate's ledger over the length of the step, at its middle."""
+    column = f"{name}_{part}_pg_per_m"
+
+    def value(run: Run) -> Course:
+        lengths = run.ledger["end_h"] - run.ledger["start_h"]
+        return _middle(run), run.ledger[column] / lengths
+
+    return Quantity(f"{name}_{part}_ug_per_m_per_h", f"{name} {PARTS[part][0]} in an hour",
+                    f"{column} / (end_h - start_h), at the middle of the step", value,
+                    PARTS[part][0])
+
+
+def _anew(run: Run) -> Course:
+    made = run.series.get("remeshed", run.times * np.nan) == 1
+    return run.times, np.where(made, run.series.get("nodes", np.nan), np.nan)
+
+
+#: What is drawn besides the columns of the time series: value takes the run, and gives a course.
+DERIVED = (
+    *(_rate(name, part) for name in SUBSTRATES for part in PARTS),
+    Quantity("biomass_held_ug_per_m", "biomass held", "biomass_after_pg_per_m, at the step's end",
+             lambda run: (run.ledger["end_h"], run.ledger["biomass_after_pg_per_m"]), "held"),
+    Quantity("biomass_made_ug_per_m", "biomass made since t = 0",
+             "sum of biomass_made_pg_per_m up to the step's end",
+             lambda run: (run.ledger["end_h"], np.cumsum(run.ledger["biomass_made_pg_per_m"])),
+             "made since t = 0"),
+    Quantity("remeshed_nodes", "nodes of a mesh made anew", "nodes, where remeshed is 1", _anew,
+             "made anew"),
+)
+KNOWN = names.KNOWN | {each.name: each for each in DERIVED}
+
+
+def _pair(pattern: str) -> tuple[str, ...]:
+    """A quantity of both substrates, whose names go into the pattern."""
+    return tuple(pattern.format(name) for name in SUBSTRATES)
 
 
 def _ledger(name: str) -> Kind:
     """A chart of the rates of a substrate's ledger."""
-    return Kind(f"Ledger: {name}", "ug per m of depth and h",
-                tuple((f"{name}_{part}", words) for part, words in _PARTS.items()))
+    return Kind(f"Ledger: {name}", "rate",
+                tuple(f"{name}_{part}_ug_per_m_per_h" for part in PARTS))
 
 
 KINDS = (
-    Kind("Conductivity", "conductivity (m/day)", (("conductivity_m_per_d", "conductivity"),)),
-    Kind("Mean velocity", "velocity (m/day)", (("mean_velocity_m_per_d", "mean velocity"),)),
-    Kind("Head loss", "head (cm)", (("head_loss_cm", "head loss"),)),
-    _concentrations("Effluents", "effluent_{}_mg_per_L"),
-    _concentrations("Inlet of the meshed part", "inlet_{}_mg_per_L"),
-    _concentrations("Least concentrations", "{}_min_mg_per_L"),
-    Kind("Area of the aggregate", "area (um²)", (("aggregate_area_um2", "area"),)),
-    Kind("Extent of the aggregate", "length (um)",
-         (("thickness_um", "thickness"), ("upstream_um", "upstream end"),
-          ("downstream_um", "downstream end"))),
-    Kind("Inert part of the biomass", "inert over all", (("inert_fraction", "inert part"),)),
-    Kind("Biomass density", "X / X_m",
-         (("biomass_density_min", "least"), ("biomass_density_max", "largest"))),
-    *map(_ledger, _BOTH),
-    Kind("Ledger: biomass", "ug per m of depth",
-         (("biomass_held", "held"), ("biomass_made", "made since t = 0"))),
-    Kind("Defects of the balances", "|defect|, relative",
-         tuple((f"{name}_defect", name) for name in (*_BOTH, "biomass"))),
-    Kind("Mesh", "nodes", (("nodes", "nodes"), ("remeshed_nodes", "made anew"))),
+    Kind("Conductivity", "conductivity", ("conductivity_m_per_d",)),
+    Kind("Mean velocity", "velocity", ("mean_velocity_m_per_d",)),
+    Kind("Head loss", "head", ("head_loss_cm",)),
+    Kind("Effluents", "concentration", _pair("effluent_{}_mg_per_L")),
+    Kind("Inlet of the meshed part", "concentration", _pair("inlet_{}_mg_per_L")),
+    Kind("Least concentrations", "concentration", _pair("{}_min_mg_per_L")),
+    Kind("Area of the aggregate", "area", ("aggregate_area_um2",)),
+    Kind("Extent of the aggregate", "length", ("thickness_um", "upstream_um", "downstream_um")),
+    Kind("Inert part of the biomass", "inert over all", ("inert_fraction",)),
+    Kind("Biomass density", "X / X_m", ("biomass_density_min", "biomass_density_max")),
+    *map(_ledger, SUBSTRATES),
+    Kind("Ledger: biomass", "biomass", ("biomass_held_ug_per_m", "biomass_made_ug_per_m")),
+    Kind("Defects of the balances", "relative defect",
+         (*_pair("{}_balance"), "biomass_balance", "oxygen_demand_balance")),
+    Kind("Mesh", "nodes", ("nodes", "remeshed_nodes")),
 )
 
 
-def series(run: Run) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Times (h) and values of everything that can be drawn of a run.
+def series(run: Run) -> dict[str, Course]:
+    """Times (h) and values of everything that can be drawn of a run, by name.
 
-    What the run does not model is left out.
+    What the run does not model is left out, and storage where there is none.
     """
-    found = {name: (run.times, values) for name, values in run.series.items()}
-    for name in (*_BOTH, "biomass"):
-        defect = np.abs(run.series.get(f"{name}_balance", run.times * np.nan))
-        defect = np.where(defect > 0, defect, np.nan)  # zero has no logarithm
-        found[f"{name}_defect"] = (run.times, defect)
-    nodes, remeshed = (run.series.get(name, run.times * np.nan) for name in ("nodes", "remeshed"))
-    found["remeshed_nodes"] = (run.times, np.where(remeshed == 1, nodes, np.nan))
-    found |= _from_ledger(run.ledger)
+    found: dict[str, Course] = {name: (run.times, values) for name, values in run.series.items()}
+    steps = len(run.ledger["end_h"]) if run.ledger else 0
+    for each in DERIVED:
+        if steps or each.name == "remeshed_nodes":
+            times, values = each.value(run)
+            found[each.name] = times, each.unit.factor * values
     return {name: (times, values) for name, (times, values) in found.items()
-            if np.isfinite(values).any()}
-
-
-def _from_ledger(ledger: dict[str, np.ndarray]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Rates at the middle of each step, and the biomass at its end.
-
-    Storage only where there is some.
-    """
-    if not ledger or not len(ledger["end_h"]):
-        return {}
-    start, end = ledger["start_h"], ledger["end_h"]
-    found = {"biomass_held": (end, UG * ledger["biomass_after_pg_per_m"]),
-             "biomass_made": (end, UG * np.cumsum(ledger["biomass_made_pg_per_m"]))}
-    for name, part in product(_BOTH, _PARTS):
-        amount = UG * ledger[f"{name}_{part}_pg_per_m"]
-        if part != "stored" or amount.any():
-            found[f"{name}_{part}"] = ((start + end) / 2, amount / (end - start))
-    return found
+            if np.isfinite(values).any() and (values.any() or "_stored_" not in name)}
 
 
 def charts_of(run: Run) -> list[Chart]:
@@ -104,7 +121,7 @@ def charts_of(run: Run) -> list[Chart]:
     known, marks = series(run), contact(run)
     found = []
     for kind in KINDS:
-        lines = [_line(label, name, known) for name, label in kind.lines if name in known]
+        lines = [_line(KNOWN[name].label, name, known) for name in kind.drawn if name in known]
         if lines:
             found.append(Chart(kind.title, kind.axis, lines, marks))
     return found
@@ -114,15 +131,15 @@ def overlaid(runs: Sequence[Run], labels: Sequence[str]) -> list[Chart]:
     """A chart for each quantity that changes in time in a run, a line a run."""
     known, found = [series(run) if len(run.times) > 1 else {} for run in runs], []
     for kind in KINDS:
-        for name, label in kind.lines:
+        for name in kind.drawn:
             lines = [_line(one, name, each) for one, each in zip(labels, known)]
-            title = kind.title if len(kind.lines) == 1 else f"{kind.title}: {label}"
+            title = kind.title if len(kind.drawn) == 1 else f"{kind.title}: {KNOWN[name].label}"
             if any(name in each for each in known):
                 found.append(Chart(title, kind.axis, lines))
     return found
 
 
-def _line(label: str, name: str, known: dict) -> Line:
+def _line(label: str, name: str, known: dict[str, Course]) -> Line:
     """The line of a quantity; one without points where it is not known.
 
     So each run keeps its colour.

@@ -1,8 +1,13 @@
 """What a run leaves: ``timeseries.csv``, ``ledger.csv``, ``run.json``, and fields as ``.vtu``.
 
-Every file appears whole or not at all: it is written beside its place and moved there. Names carry
-units; what a scene does not model is an empty field. The package's units (um, h, mg/L) become those
-of the names here and nowhere else.
+    quantities    what a reported quantity is: name with its unit, words, formula
+    columns       those of the time series and the ledger
+    arrays        those of the fields
+    names         words and units of all of them, by name
+    tables, netcdf   from Python; the time series as NetCDF
+
+Every file appears whole or not at all: it is written beside its place and moved there. What a scene
+does not model is an empty field.
 """
 
 from __future__ import annotations
@@ -19,178 +24,16 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 
-from repro.march.loop import Instant, Ledger
-from repro.model import biomass, growth
-from repro.model.pore import Pore, Solved
-from repro.scene import Kinetics, Scene, scene_hash, scene_tables
+from repro.results.arrays import TIME, fields
+from repro.results.columns import COLUMNS, LEDGER_COLUMNS, ledger_row, row
+from repro.results.quantities import UNITS
+from repro.scene import Scene, scene_hash, scene_tables
+
+__all__ = ["COLUMNS", "LEDGER_COLUMNS", "fields", "ledger_row", "row"]
 
 #: Of um/h.
-M_PER_D = 24e-6
-#: Of um.
-CM = 1e-4
-
-COLUMNS = """time_h mean_velocity_m_per_d head_loss_cm conductivity_m_per_d
-effluent_acceptor_mg_per_L effluent_donor_mg_per_L inlet_acceptor_mg_per_L inlet_donor_mg_per_L
-aggregate_area_um2 thickness_um upstream_um downstream_um meshed_length_um inert_fraction
-biomass_density_min biomass_density_max acceptor_min_mg_per_L donor_min_mg_per_L acceptor_balance
-donor_balance biomass_balance oxygen_demand_balance nodes remeshed contact""".split()
-
-LEDGER_COLUMNS = """start_h end_h acceptor_supplied_pg_per_m acceptor_out_pg_per_m
-acceptor_consumed_pg_per_m acceptor_stored_pg_per_m donor_supplied_pg_per_m donor_out_pg_per_m
-donor_consumed_pg_per_m donor_stored_pg_per_m biomass_before_pg_per_m biomass_made_pg_per_m
-biomass_after_pg_per_m oxygen_demand_balance""".split()
-
+M_PER_D = UNITS["_m_per_d"].factor
 PACKAGES = ("numpy", "scipy", "scikit-fem", "meshio", "mmgpy", "shapely", "pint")
-
-
-def row(scene: Scene, instant: Instant) -> dict[str, float | None]:
-    """One row of ``timeseries.csv``: the geometry at its time, and flow and substrates in it."""
-    pore = instant.pore
-    first, last = pore.mesh.ends
-    found: dict[str, float | None] = dict.fromkeys(COLUMNS)
-    found.update(time_h=pore.time, meshed_length_um=last - first, nodes=len(pore.mesh.points),
-                 remeshed=int(instant.remeshes > 0), contact=int(pore.contact))
-    found.update(_flow_columns(instant))
-    found.update(_substrate_columns(instant))
-    found.update(_transient_columns(scene, instant))
-    found.update(_aggregate_columns(scene, instant))
-    return found
-
-
-def _flow_columns(instant: Instant) -> dict[str, float]:
-    flow = instant.solved.flow
-    if flow is None:
-        return {}
-    return {"mean_velocity_m_per_d": M_PER_D * flow.mean_velocity,
-            "head_loss_cm": CM * flow.head_loss,
-            "conductivity_m_per_d": M_PER_D * flow.conductivity}
-
-
-def _substrate_columns(instant: Instant) -> dict[str, float]:
-    state = instant.solved.concentrations
-    found: dict[str, float] = {}
-    if state is None:
-        return found
-    fields = {"acceptor": state.acceptor, "donor": state.donor}
-    for (name, field), flux in zip(fields.items(), instant.solved.fluxes):
-        found[f"{name}_min_mg_per_L"] = float(field.min())
-        found[f"inlet_{name}_mg_per_L"] = flux.inlet
-        found[f"effluent_{name}_mg_per_L"] = flux.effluent
-        found[f"{name}_balance"] = _defect(flux.supplied, flux.out, flux.consumed)
-    return found
-
-
-def _transient_columns(scene: Scene, instant: Instant) -> dict[str, float]:
-    """The transient scheme's substrate balances, storage included: the worst since the last row."""
-    if scene.numerics.transport != "gear" or instant.solved.concentrations is None:
-        return {}
-    problem = instant.solved.problem
-    found = {}
-    for k, name in enumerate(("acceptor", "donor")):
-        room = problem.both[k].supply * float(problem.space.at.dx.sum())
-        steps = [_defect(step.supplied[k], step.out[k] + step.stored[k], step.consumed[k], room)
-                 for step in instant.ledgers]
-        found[f"{name}_balance"] = max(steps, key=abs, default=0.0)
-    return found
-
-
-def _defect(supplied: float, out: float, consumed: float, room: float = 0.0) -> float:
-    """(in - out - consumed) over the largest of what comes in, what is consumed, and, in the
-    transient, what the meshed part holds at the concentration of the supply."""
-    scale = max(abs(supplied), consumed, room)
-    return (supplied - out - consumed) / scale if scale else 0.0
-
-
-def _aggregate_columns(scene: Scene, instant: Instant) -> dict[str, float]:
-    pore = instant.pore
-    outline = pore.outline
-    if outline is None:
-        return {}
-    found = {"aggregate_area_um2": outline.area, "thickness_um": outline.thickness,
-             "upstream_um": outline.upstream, "downstream_um": outline.downstream}
-    if scene.kinetics:
-        names = ("inert_fraction", "biomass_density_min", "biomass_density_max")
-        found.update(zip(names, pore.composition(scene.kinetics.maximum_density)))
-    if scene.growth:
-        defects = [(step.biomass_after - step.biomass_before - step.biomass_made)
-                   / step.biomass_after for step in instant.ledgers]
-        found["biomass_balance"] = max(defects, key=abs, default=0.0)
-        demands = [oxygen_demand_balance(scene.kinetics, ledger) for ledger in instant.ledgers]
-        found["oxygen_demand_balance"] = max(demands, key=abs, default=0.0)
-    return found
-
-
-def oxygen_demand_balance(kinetics: Kinetics, ledger: Ledger) -> float:
-    """Defect of a step's ledger by (7)-(10): biomass made less Y donor - (acceptor - F donor) /
-    d_c, of what was consumed, over the larger of the two terms. The first is what the donor makes,
-    the second what decays."""
-    acceptor, donor = ledger.consumed
-    grown = kinetics.yield_coefficient * donor
-    decayed = (acceptor - kinetics.acceptor_to_donor_ratio * donor) / kinetics.decay_oxygen_demand
-    scale = max(abs(grown), abs(decayed))
-    return (ledger.biomass_made - grown + decayed) / scale if scale else 0.0
-
-
-def ledger_row(scene: Scene, ledger: Ledger) -> list[float]:
-    """One row of ``ledger.csv``: a step's balances per metre of depth; 1 um2 mg/L is 1 pg/m."""
-    parts = (ledger.supplied, ledger.out, ledger.consumed, ledger.stored)
-    substrates = [part[which] for which in (0, 1) for part in parts]
-    return [ledger.start, ledger.end, *substrates, ledger.biomass_before, ledger.biomass_made,
-            ledger.biomass_after, oxygen_demand_balance(scene.kinetics, ledger)]
-
-
-def fields(scene: Scene, pore: Pore, solved: Solved) -> meshio.Mesh:
-    """The fields of an instant for meshio, at nodes or in triangles, named with their units.
-
-    Places are in um. In the fluid there is no biomass, stress or pressure P (zero), theta and J are
-    1, and places have not moved. Stress and P are those of the strain since t = 0: a scene whose
-    new biomass is born stress-free has none to tell.
-    """
-    mesh = pore.mesh
-    space = pore.space
-    points: dict[str, np.ndarray] = {}
-    cells = {"region": mesh.biomass.astype(float)}
-    if solved.flow:
-        points["velocity_m_per_d"] = _three(M_PER_D * space.to_mesh(solved.flow.velocity))
-        points["head_cm"] = CM * mesh.with_middles(solved.flow.head[: mesh.corners])
-    if solved.concentrations:
-        points["acceptor_mg_per_L"] = space.to_mesh(solved.concentrations.acceptor)
-        points["donor_mg_per_L"] = space.to_mesh(solved.concentrations.donor)
-    if scene.kinetics:
-        whole = space.reaction.dx * scene.kinetics.maximum_density
-        points["active_biomass"] = biomass.at_nodes(space, pore.active / whole)
-        points["inert_biomass"] = biomass.at_nodes(space, pore.inert / whole)
-    if scene.growth:
-        _add_mechanics(scene, pore, points, cells)
-    kind = "triangle" if mesh.geometry == 1 else "triangle6"
-    return meshio.Mesh(_three(mesh.points), [(kind, mesh.cells)], point_data=points,
-                       cell_data={name: [value] for name, value in cells.items()})
-
-
-def _add_mechanics(scene: Scene, pore: Pore, points: dict[str, np.ndarray],
-                   cells: dict[str, np.ndarray]) -> None:
-    mesh = pore.mesh
-    body = pore.body
-    modulus = scene.growth.shear_modulus
-    points["displacement_um"] = _three(mesh.points - pore.origin)
-    points["position_t0_um"] = _three(pore.origin)
-    strained = body.strained(mesh.points[mesh.body])
-    values = {"theta": pore.theta, "J": strained.J}
-    if scene.growth.new_biomass == "stressed":
-        points["pressure_MPa"] = modulus * mesh.with_middles(pore.pressure)
-        pressure = pore.pressure[mesh.triangles[mesh.biomass]] @ body.shape.table.linear.T
-        stress = modulus * growth.cauchy(strained.F, pressure)
-        names = ("stress_xx_MPa", "stress_yy_MPa", "stress_zz_MPa", "stress_xy_MPa")
-        values |= dict(zip(names, np.moveaxis(stress, -1, 0)))
-        values["largest_principal_stress_MPa"] = growth.largest_principal(stress)
-    for name, value in values.items():
-        cells[name] = np.full(len(mesh.cells), 1.0 if name in ("theta", "J") else 0.0)
-        cells[name][mesh.biomass] = (value * body.at.dx).sum(axis=1) / body.at.dx.sum(axis=1)
-
-
-def _three(plane: np.ndarray) -> np.ndarray:
-    """(N, 3) vectors from plane ones (N, 2)."""
-    return np.column_stack([plane, np.zeros(len(plane))])
 
 
 def write_text(path: Path, text: str) -> None:
@@ -204,10 +47,15 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_fields(path: Path, content: meshio.Mesh) -> None:
-    """Write a ``.vtu`` file whole or not at all."""
+    """Write a ``.vtu`` file whole or not at all, with its time, which meshio leaves out."""
     beside = path.with_name(f".part-{path.name}")
+    time = float(content.field_data[TIME][0])
+    field = (f'<FieldData><DataArray type="Float64" Name="{TIME}" NumberOfTuples="1" '
+             f'format="ascii">{time!r}</DataArray></FieldData>')
     try:
         content.write(beside, file_format="vtu")
+        grid = b"<UnstructuredGrid>"
+        beside.write_bytes(beside.read_bytes().replace(grid, grid + field.encode(), 1))
         os.replace(beside, path)
     finally:
         beside.unlink(missing_ok=True)
@@ -238,7 +86,7 @@ def _shown(value: object) -> object:
     """A value as a CSV file has it."""
     if value is None:
         return ""
-    return repr(value) if isinstance(value, float) else value
+    return repr(float(value)) if isinstance(value, float) else value
 
 
 def read_table(path: Path) -> dict[str, np.ndarray]:

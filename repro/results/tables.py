@@ -12,18 +12,11 @@ import numpy as np
 from repro import results
 from repro.march.loop import SAME_TIME, PoreEnd
 from repro.march.simulation import simulate
+from repro.results.quantities import plain as unit
 from repro.scene import Scene
 
-#: How names end, and what they are then in.
-UNITS = {"_m_per_d": "m/d", "_mg_per_L": "mg/L", "_um2": "um2", "_um": "um", "_cm": "cm", "_h": "h",
-         "_MPa": "MPa"}
 #: Times of a notebook's table at either end.
 SHOWN = 5
-
-
-def unit(name: str) -> str:
-    """The unit that a name ends with; "1" for a plain number."""
-    return next((unit for end, unit in UNITS.items() if name.endswith(end)), "1")
 
 
 class Results(Mapping[str, np.ndarray]):

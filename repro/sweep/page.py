@@ -12,11 +12,12 @@ import numpy as np
 from repro.report.page import policy
 from repro.results import write_text
 from repro.results.files import whole
+from repro.results.quantities import Quantity
 from repro.sweep import picture
 from repro.sweep.design import Factor, label
 from repro.sweep.picture import Axis, at
 from repro.sweep.state import Sweep
-from repro.sweep.table import Told
+from repro.sweep.table import NUMBERS, Told
 
 #: From here on the values of a list are shown on a logarithmic scale.
 WIDE = 20
@@ -61,10 +62,9 @@ th { vertical-align: bottom; } td.text, th.text { text-align: left; } a { color:
 LOOK += "".join(f".level{i} {{ stroke: var(--level{i}); }} "
                 f".dot.level{i} {{ fill: var(--level{i}); }}\n"
                 for i in range(picture.LEVELS))
-#: The numbers of a run that its row shows, and what stands above them.
-SHOWN = {"end_h": "end (h)", "clogging_time_h": "clogged (h)", "clogging_biomass": "biomass then",
-         "contact_time_h": "contact (h)", "contact_biomass": "biomass then",
-         "wall_time_s": "wall time (s)"}
+#: The numbers of a run that its row shows.
+SHOWN = """end_h clogging_time_h clogging_biomass contact_time_h contact_biomass
+wall_time_s""".split()
 
 
 def write(sweep: Sweep, told: list[Told], clogged: float) -> None:
@@ -237,13 +237,20 @@ def _time(one: Told) -> float:
 
 
 def _table(sweep: Sweep, told: list[Told]) -> str:
-    names = ["run", *(factor.key for factor in sweep.factors), *SHOWN.values()]
+    known = {each.name: each for each in NUMBERS}
+    names = ["run", *(factor.key for factor in sweep.factors),
+             *(_above(known[name]) for name in SHOWN)]
     head = "".join(f"<th>{escape(name)}</th>" for name in names) + '<th class="text">status</th>'
     rows = "".join(_row(sweep, one) for one in told)
     failures = "".join(f'<li class="bad">run {one.point.index}: {escape(one.status)}</li>'
                        for one in told if not one.done)
     return (f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>'
             f"</div><ul>{failures}</ul>")
+
+
+def _above(number: Quantity) -> str:
+    """What stands above a number: "end (h)"."""
+    return f"{number.label} ({number.unit.shown})" if number.unit.shown else number.label
 
 
 def _row(sweep: Sweep, one: Told) -> str:

@@ -9,19 +9,64 @@ import csv
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from repro import results
 from repro.results.files import whole
+from repro.results.quantities import Quantity
 from repro.run import status
 from repro.sweep import task
 from repro.sweep.design import Point
 from repro.sweep.state import Sweep
 
-COLUMNS = """end_h wall_time_s clogging_time_h clogging_biomass contact_time_h contact_biomass
-contact_relative_conductivity""".split()
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """A run's rows: times (h), conductivity over the first one, biomass, all (T,), and where the
+    aggregate touches the opposite wall; wall: seconds; clogged: see :func:`clogging`."""
+
+    times: np.ndarray
+    relative: np.ndarray
+    biomass: np.ndarray
+    touches: np.ndarray
+    wall: float
+    clogged: float
+
+    @cached_property
+    def clogging(self) -> tuple[float, float]:
+        """Time (h) and biomass of :func:`clogging`, NaN where there is none."""
+        return clogging(self.times, self.relative, self.biomass, self.clogged)
+
+    def at_contact(self, values: np.ndarray) -> float:
+        """In the first row with contact, NaN without; it is a plug then, through which the fluid
+        seeps."""
+        first = np.flatnonzero(self.touches)[:1]
+        return float(values[first[0]]) if len(first) else np.nan
+
+
+#: What ``runs.csv`` tells of a run besides what was varied: value takes its Course.
+NUMBERS = (
+    Quantity("end_h", "last time of the run", "time_h of the last row",
+             lambda run: run.times[-1], "end"),
+    Quantity("wall_time_s", "wall time", "that of run.json", lambda run: run.wall, "wall time"),
+    Quantity("clogging_time_h", "time of clogging",
+             "when conductivity_m_per_d over its first value has first fallen to --clogged; its "
+             "logarithm is linear between rows", lambda run: run.clogging[0], "clogged"),
+    Quantity("clogging_biomass", "biomass at clogging",
+             "aggregate_area_um2 / (W L) then, linear between rows", lambda run: run.clogging[1],
+             "biomass then"),
+    Quantity("contact_time_h", "time of contact", "time_h of the first row with contact",
+             lambda run: run.at_contact(run.times), "contact"),
+    Quantity("contact_biomass", "biomass at contact", "aggregate_area_um2 / (W L) in that row",
+             lambda run: run.at_contact(run.biomass), "biomass then"),
+    Quantity("contact_relative_conductivity", "relative conductivity at contact",
+             "conductivity_m_per_d in that row over its first value",
+             lambda run: run.at_contact(run.relative), "conductivity then"),
+)
+COLUMNS = [each.name for each in NUMBERS]
 
 
 @dataclass(frozen=True)
@@ -61,10 +106,8 @@ def _told(point: Point, folder: Path, otherwise: str, clogged: float) -> Told:
     relative = found["conductivity_m_per_d"] / found["conductivity_m_per_d"][0]
     biomass = found["aggregate_area_um2"] / (pore.width * pore.length)
     wall = json.loads((folder / "run.json").read_text(encoding="utf-8"))["wall_time_s"]
-    known = {"end_h": times[-1], "wall_time_s": wall,
-             **clogging(times, relative, biomass, clogged),
-             **_contact(times, relative, biomass, found["contact"] > 0)}
-    numbers = {name: _or_none(known.get(name)) for name in COLUMNS}
+    course = Course(times, relative, biomass, found["contact"] > 0, wall, clogged)
+    numbers = {each.name: _or_none(each.reported(course)) for each in NUMBERS}
     return Told(point, ended, times, relative, biomass, numbers)
 
 
@@ -76,38 +119,25 @@ def _series(folder: Path) -> dict[str, np.ndarray] | None:
     return results.read_table(path)
 
 
-def _or_none(value: float | None) -> float | None:
-    return None if value is None or np.isnan(value) else float(value)
+def _or_none(value: float) -> float | None:
+    return None if np.isnan(value) else float(value)
 
 
 def clogging(times: np.ndarray, relative: np.ndarray, biomass: np.ndarray,
-             part: float) -> dict[str, float]:
-    """When the relative conductivity has first fallen to `part`, and the biomass then.
+             part: float) -> tuple[float, float]:
+    """When (h) the relative conductivity has first fallen to `part`, and the biomass then.
 
-    Between two rows the logarithm of the conductivity is linear in time. Nothing where it has not
+    Between two rows the logarithm of the conductivity is linear in time. NaN where it has not
     fallen so far.
     """
     low = np.flatnonzero(relative <= part)
     if not len(low):
-        return {}
+        return np.nan, np.nan
     i = low[0]
     along = np.log(relative[i - 1] / part) / np.log(relative[i - 1] / relative[i])
-    between = [values[i - 1] + along * (values[i] - values[i - 1]) for values in (times, biomass)]
-    return dict(zip(("clogging_time_h", "clogging_biomass"), between))
-
-
-def _contact(times: np.ndarray, relative: np.ndarray, biomass: np.ndarray,
-             touches: np.ndarray) -> dict[str, float]:
-    """The first row in which the aggregate touches the opposite wall.
-
-    It is a plug then, through which the fluid seeps.
-    """
-    found = np.flatnonzero(touches)
-    if not len(found):
-        return {}
-    first = found[0]
-    return {"contact_time_h": times[first], "contact_biomass": biomass[first],
-            "contact_relative_conductivity": relative[first]}
+    time, held = (float(values[i - 1] + along * (values[i] - values[i - 1]))
+                  for values in (times, biomass))
+    return time, held
 
 
 def write(sweep: Sweep, told: list[Told]) -> None:

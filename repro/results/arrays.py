@@ -1,0 +1,163 @@
+"""The arrays of the ``.vtu`` files: each is defined here, once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, partial
+
+import meshio
+import numpy as np
+
+from repro.model import biomass, flow, growth
+from repro.model.pore import Pore, Solved
+from repro.results.quantities import Quantity
+from repro.scene import Scene
+
+#: The time (h) in the field data, by the name that VTK's readers know.
+TIME = "TimeValue"
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """What the arrays are made of."""
+
+    scene: Scene
+    pore: Pore
+    solved: Solved
+
+    @cached_property
+    def strained(self) -> growth.Strained:
+        """The aggregate's deformation since t = 0, in the points (t, q) where growth is taken."""
+        mesh = self.pore.mesh
+        return self.pore.body.strained(mesh.points[mesh.body])
+
+    @cached_property
+    def stress(self) -> np.ndarray:
+        """(t, q, 4) MPa there: xx, yy, zz, xy."""
+        mesh = self.pore.mesh
+        linear = self.pore.body.shape.table.linear
+        pressure = self.pore.pressure[mesh.triangles[mesh.biomass]] @ linear.T
+        return self.scene.growth.shear_modulus * growth.cauchy(self.strained.F, pressure)
+
+    def mean(self, value: np.ndarray) -> np.ndarray:
+        """(t,) of values (t, q), over each of the aggregate's triangles as it was at t = 0."""
+        dx = self.pore.body.at.dx
+        return (value * dx).sum(axis=1) / dx.sum(axis=1)
+
+
+#: What an array may need, and how a state tells that it is there.
+NEEDS: dict[str, Callable[[State], bool]] = {
+    "": lambda state: True,
+    "flow": lambda state: state.solved.flow is not None,
+    "substrates": lambda state: state.solved.concentrations is not None,
+    "biomass": lambda state: state.scene.kinetics is not None,
+    "growth": lambda state: state.scene.growth is not None,
+    "stress": lambda state: bool(state.scene.growth)
+    and state.scene.growth.new_biomass == "stressed"}
+
+
+@dataclass(frozen=True)
+class Array(Quantity):
+    """cells: is it of the triangles, not of the nodes? body: is its value that of the aggregate's
+    nodes or triangles alone, and NaN in the fluid?"""
+
+    cells: bool = False
+    body: bool = False
+
+    def whole(self, state: State) -> np.ndarray:
+        """(N,) or (T,) at all nodes or triangles of the mesh, (N, 3) of a vector."""
+        value = self.reported(state)
+        if value.ndim == 2:
+            value = _three(value)
+        if not self.body:
+            return value
+        mesh = state.pore.mesh
+        found = np.full((len(mesh.cells if self.cells else mesh.points), *value.shape[1:]), np.nan)
+        found[mesh.biomass if self.cells else mesh.body] = value
+        return found
+
+
+def _three(plane: np.ndarray) -> np.ndarray:
+    """(N, 3) vectors from plane ones (N, 2)."""
+    return np.column_stack([plane, np.zeros(len(plane))])
+
+
+def _head(state: State) -> np.ndarray:
+    return flow.pressure_space(state.pore.space).to_mesh(state.solved.flow.head)
+
+
+def _concentration(name: str, state: State) -> np.ndarray:
+    return state.pore.space.to_mesh(getattr(state.solved.concentrations, name))
+
+
+def _density(name: str, state: State) -> np.ndarray:
+    space = state.pore.space
+    full = space.reaction.dx * state.scene.kinetics.maximum_density
+    return biomass.at_nodes(space, getattr(state.pore, name) / full)
+
+
+def _displacement(state: State) -> np.ndarray:
+    mesh = state.pore.mesh
+    return mesh.points[mesh.body] - state.pore.body.reference
+
+
+def _pressure(state: State) -> np.ndarray:
+    mesh = state.pore.mesh
+    return state.scene.growth.shear_modulus * mesh.with_middles(state.pore.pressure)[mesh.body]
+
+
+def _stress(k: int, state: State) -> np.ndarray:
+    return state.mean(state.stress[..., k])
+
+
+_FITTED = "of the points where growth is integrated, fitted linearly in each triangle"
+_CAUCHY = "of mu_L (J^(-5/3) (F F^T - tr C / 3) + P / mu_L), the mean over the triangle at t = 0"
+
+ARRAYS = (
+    Array("velocity_m_per_d", "velocity", "u (1)-(5)",
+          lambda state: state.pore.space.to_mesh(state.solved.flow.velocity), needs="flow"),
+    Array("head_cm", "head", "phi (1)-(5), zero in the mean over the outlet of the meshed part",
+          _head, needs="flow"),
+    *(Array(f"{name}_mg_per_L", name, "C (7)-(13)", partial(_concentration, name),
+            needs="substrates") for name in ("acceptor", "donor")),
+    Array("active_biomass", "active biomass over X_m", f"X_A / X_m: {_FITTED}; zero in the fluid",
+          partial(_density, "active"), needs="biomass"),
+    Array("inert_biomass", "inert biomass over X_m", f"X_I / X_m: {_FITTED}; zero in the fluid",
+          partial(_density, "inert"), needs="biomass"),
+    Array("displacement_um", "displacement since t = 0", "x - X", _displacement, needs="growth",
+          body=True),
+    Array("position_t0_um", "position at t = 0", "X, where the material was",
+          lambda state: state.pore.body.reference, needs="growth", body=True),
+    Array("pressure_MPa", "pressure P of the aggregate", "P (21), linear between the corners",
+          _pressure, needs="stress", body=True),
+    Array("region", "aggregate (1) or fluid (0)", "1 in the aggregate's triangles",
+          lambda state: state.pore.mesh.biomass.astype(float), cells=True),
+    Array("theta", "expansion theta", "(28)-(29), the mean over the triangle at t = 0",
+          lambda state: state.mean(state.pore.theta), needs="growth", cells=True, body=True),
+    Array("J", "volume ratio J", "det dx/dX, the mean over the triangle at t = 0",
+          lambda state: state.mean(state.strained.J), needs="growth", cells=True, body=True),
+    *(Array(f"stress_{axes}_MPa", f"stress {axes}", f"Cauchy stress {axes}, {_CAUCHY}",
+            partial(_stress, k), needs="stress", cells=True, body=True)
+      for k, axes in enumerate(("xx", "yy", "zz", "xy"))),
+    Array("largest_principal_stress_MPa", "largest principal stress",
+          "largest eigenvalue of the Cauchy stress, the mean over the triangle at t = 0",
+          lambda state: state.mean(growth.largest_principal(state.stress)), needs="stress",
+          cells=True, body=True),
+)
+
+
+def fields(scene: Scene, pore: Pore, solved: Solved) -> meshio.Mesh:
+    """The fields of an instant for meshio, at nodes or in triangles, named with their units.
+
+    Places are in um. In the fluid there is no biomass (zero), and no displacement, theta, J, stress
+    or pressure P (NaN); nodes of the interface are the aggregate's. Stress and P are those of the
+    strain since t = 0: a scene whose new biomass is born stress-free has none to tell.
+    """
+    state = State(scene, pore, solved)
+    known = [each for each in ARRAYS if NEEDS[each.needs](state)]
+    points = {each.name: each.whole(state) for each in known if not each.cells}
+    cells = {each.name: [each.whole(state)] for each in known if each.cells}
+    kind = "triangle" if pore.mesh.geometry == 1 else "triangle6"
+    return meshio.Mesh(_three(pore.mesh.points), [(kind, pore.mesh.cells)], points, cells,
+                       field_data={TIME: np.array([pore.time])})

@@ -1,0 +1,161 @@
+"""The columns of ``timeseries.csv`` and ``ledger.csv``: each is defined here, once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+from repro.march import balance
+from repro.march.loop import Instant, Ledger
+from repro.results.quantities import Quantity
+from repro.scene import Scene
+
+SUBSTRATES = ("acceptor", "donor")
+#: What a quantity may need, and how an instant tells that it is there.
+NEEDS: dict[str, Callable[[Scene, Instant], bool]] = {
+    "": lambda scene, at: True,
+    "flow": lambda scene, at: at.solved.flow is not None,
+    "substrates": lambda scene, at: at.solved.concentrations is not None,
+    "aggregate": lambda scene, at: at.pore.outline is not None,
+    "biomass": lambda scene, at: at.pore.outline is not None and scene.kinetics is not None,
+    "growth": lambda scene, at: at.pore.outline is not None and scene.growth is not None}
+
+
+def _both(pattern: str, words: str, formula: str, value: Callable) -> list[Quantity]:
+    """A quantity of the acceptor and of the donor, whose names stand in the texts for {}."""
+    return [Quantity(pattern.format(name), words.format(name), formula, partial(value, k), name,
+                     "substrates") for k, name in enumerate(SUBSTRATES)]
+
+
+def _least(k: int, scene: Scene, at: Instant) -> float:
+    return float(getattr(at.solved.concentrations, SUBSTRATES[k]).min())
+
+
+def _worst(defects: list[float]) -> float:
+    """The one that is farthest from zero, with its sign; zero of none."""
+    return max(defects, key=abs, default=0.0)
+
+
+def _substrate_balance(k: int, scene: Scene, at: Instant) -> float:
+    """Of the steps since the last row and, where nothing is stored, of the present instant."""
+    gear = scene.numerics.transport == "gear"
+    problem = at.solved.problem
+    room = problem.both[k].supply * float(problem.space.at.dx.sum()) if gear else 0.0
+    found = [balance.substrate(ledger, k, room) for ledger in at.ledgers]
+    if not gear:
+        flux = at.solved.fluxes[k]
+        found.append(balance.defect(flux.supplied, flux.out, flux.consumed))
+    return _worst(found)
+
+
+def _of_steps(defect: Callable[[Ledger], float], at: Instant) -> float:
+    """The worst defect of the steps since the last row."""
+    return _worst([defect(ledger) for ledger in at.ledgers])
+
+
+def _composition(which: int, scene: Scene, at: Instant) -> float:
+    return at.pore.composition(scene.kinetics.maximum_density)[which]
+
+
+_BALANCE = ("(supplied - leaving - consumed - stored) / the largest of supplied, consumed and, "
+            "with Gear, what the meshed part holds at the supply; the worst of the steps since the "
+            "last row and, but for Gear, of the row's own fluxes")
+
+#: Of ``timeseries.csv``: value takes the scene and an Instant.
+SERIES = (
+    Quantity("time_h", "simulated time since the start of the run", "t",
+             lambda scene, at: at.pore.time, "time"),
+    Quantity("mean_velocity_m_per_d", "mean velocity", "u_ave: flow through a cross-section / W",
+             lambda scene, at: at.solved.flow.mean_velocity, "mean velocity", "flow"),
+    Quantity("head_loss_cm", "head loss over the whole pore",
+             "of the meshed part (6) + 12 nu u_ave / (g W^2) times the length that is not meshed",
+             lambda scene, at: at.solved.flow.head_loss, "head loss", "flow"),
+    Quantity("conductivity_m_per_d", "hydraulic conductivity of the pore",
+             "u_ave L / head loss, of the whole pore",
+             lambda scene, at: at.solved.flow.conductivity, "conductivity", "flow"),
+    *_both("effluent_{}_mg_per_L", "{} leaving (flux-averaged)",
+           "integral of u_x C over the outlet of the meshed part / that of u_x; without flow the "
+           "mean of C over it", lambda k, scene, at: at.solved.fluxes[k].effluent),
+    *_both("inlet_{}_mg_per_L", "{} at the inlet of the meshed part",
+           "integral of u_x C over the inlet of the meshed part / that of u_x; without flow the "
+           "mean of C over it", lambda k, scene, at: at.solved.fluxes[k].inlet),
+    Quantity("aggregate_area_um2", "area of the aggregate", "area inside its boundary",
+             lambda scene, at: at.pore.outline.area, "area", "aggregate"),
+    Quantity("thickness_um", "thickness of the aggregate", "largest y of its boundary",
+             lambda scene, at: at.pore.outline.thickness, "thickness", "aggregate"),
+    Quantity("upstream_um", "upstream end of the aggregate", "smallest x of its boundary",
+             lambda scene, at: at.pore.outline.upstream, "upstream end", "aggregate"),
+    Quantity("downstream_um", "downstream end of the aggregate", "largest x of its boundary",
+             lambda scene, at: at.pore.outline.downstream, "downstream end", "aggregate"),
+    Quantity("meshed_length_um", "length of the meshed part", "x of its outlet - x of its inlet",
+             lambda scene, at: at.pore.mesh.ends[1] - at.pore.mesh.ends[0], "length"),
+    Quantity("inert_fraction", "inert part of the biomass",
+             "integral of X_I / integral of X_A + X_I",
+             partial(_composition, 0), "inert part", "biomass"),
+    Quantity("biomass_density_min", "least biomass density over X_m",
+             "least (X_A + X_I) / X_m where growth is integrated",
+             partial(_composition, 1), "least", "biomass"),
+    Quantity("biomass_density_max", "largest biomass density over X_m",
+             "largest (X_A + X_I) / X_m where growth is integrated",
+             partial(_composition, 2), "largest", "biomass"),
+    *_both("{}_min_mg_per_L", "least {} concentration", "least C at the nodes", _least),
+    *_both("{}_balance", "relative defect of the {}'s balance", _BALANCE, _substrate_balance),
+    Quantity("biomass_balance", "relative defect of the biomass's balance",
+             "(after - before - made) / after, the worst of the steps since the last row",
+             lambda scene, at: _of_steps(balance.biomass, at), "biomass", "growth"),
+    Quantity("oxygen_demand_balance",
+             "biomass made less Y donor - (acceptor - F donor) / d_c, relative",
+             "(made - Y donor + (acceptor - F donor) / d_c) / the larger of the two terms, of what "
+             "a step consumes (7)-(10); the worst of the steps since the last row",
+             lambda scene, at: _of_steps(partial(balance.oxygen_demand, scene.kinetics), at),
+             "oxygen demand", "growth"),
+    Quantity("nodes", "nodes of the mesh", "corners, and middles of the sides of curved triangles",
+             lambda scene, at: len(at.pore.mesh.points), "nodes"),
+    Quantity("remeshed", "mesh made anew", "1 where a step since the last row made a new mesh",
+             lambda scene, at: int(at.remeshes > 0), yes_no=True),
+    Quantity("contact", "contact with the opposite wall",
+             "1 where a node of the aggregate is held on the upper wall",
+             lambda scene, at: int(at.pore.contact), yes_no=True),
+)
+
+#: Parts of a substrate's ledger: what they are called, short, and what they are.
+PARTS = {"supplied": ("supplied", "supply times the flow through the inlet, over the step"),
+         "out": ("leaving", "integral of u_x C over the outlet, over the step"),
+         "consumed": ("taken up", "uptake (7)-(8) over the aggregate and the step"),
+         "stored": ("stored", "what the meshed part holds more at the step's end; zero where "
+                              "substrates are quasi-steady")}
+
+#: Of ``ledger.csv``: value takes the scene and a Ledger; per metre of depth, 1 um2 mg/L is 1 pg/m.
+LEDGER = (
+    Quantity("start_h", "start of the step", "t", lambda scene, step: step.start),
+    Quantity("end_h", "end of the step", "t", lambda scene, step: step.end),
+    *(Quantity(f"{name}_{part}_pg_per_m", f"{name} {label}", formula,
+               lambda scene, step, part=part, k=k: getattr(step, part)[k], label)
+      for k, name in enumerate(SUBSTRATES) for part, (label, formula) in PARTS.items()),
+    Quantity("biomass_before_pg_per_m", "biomass at the step's start",
+             "integral of X_A + X_I over the aggregate",
+             lambda scene, step: step.biomass_before, "before"),
+    Quantity("biomass_made_pg_per_m", "biomass made", "integral of (9) + (10) over the step",
+             lambda scene, step: step.biomass_made, "made"),
+    Quantity("biomass_after_pg_per_m", "biomass at the step's end",
+             "integral of X_A + X_I over the aggregate, in its new shape and on its new mesh",
+             lambda scene, step: step.biomass_after, "held"),
+    Quantity("oxygen_demand_balance",
+             "biomass made less Y donor - (acceptor - F donor) / d_c, relative",
+             "as in timeseries.csv, of the step",
+             lambda scene, step: balance.oxygen_demand(scene.kinetics, step), "oxygen demand"),
+)
+
+COLUMNS = [each.name for each in SERIES]
+LEDGER_COLUMNS = [each.name for each in LEDGER]
+
+
+def row(scene: Scene, instant: Instant) -> dict[str, float | None]:
+    """One row of ``timeseries.csv``: the geometry at its time, and flow and substrates in it."""
+    return {each.name: each.reported(scene, instant) if NEEDS[each.needs](scene, instant) else None
+            for each in SERIES}
+
+
+def ledger_row(scene: Scene, ledger: Ledger) -> list[float]:
+    """One row of ``ledger.csv``: a step's balances per metre of depth."""
+    return [each.reported(scene, ledger) for each in LEDGER]

@@ -1,0 +1,542 @@
+"""Every column and array derived anew from the raw state, by formulas and quadratures that `repro.results` has no part
+in: at a late, uneven pore that the aggregate has plugged, where no two quantities are alike."""
+import inspect
+import math
+import sys
+from collections import Counter
+from dataclasses import replace
+from functools import cache
+from importlib import import_module
+
+import numpy as np
+import pytest
+from skfem.quadrature import get_quadrature
+from skfem.refdom import RefTri
+
+from repro import results
+from repro.errors import SimulationError
+from repro.fem.newton import Newton
+from repro.march.simulation import simulate
+from repro.model import remeshing
+from repro.report import quantities
+from repro.report.reading import Run
+from repro.run.running import run
+from repro.scene import load_scene
+from tests import oracles
+from tests.pages import AXES, CHARTS, LEDGERS
+from tests.shell import told
+from tests.strategies import ORDERS, constants
+from tests.test_resume import CONTACT, in_parts
+
+EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
+#: Leans upstream, and touches the upper wall of a pore of 20 um after some minutes.
+SHAPE = [(-21, 0), (-19, 9), (-12, 17), (-4, 19.2), (3, 18.6), (12, 12), (16, 5), (17, 0)]
+SETS = ['numerics.time="midpoint"', 'pore.width="20 um"', 'pore.length="400 um"', 'growth.end="1.2 h"',
+        'output.times=["0 h", "1.2 h"]', 'substrates.acceptor.supply="9 mg/L"', 'substrates.donor.supply="4 mg/L"',
+        'growth.shear_modulus="0.003 MPa"', "aggregate.inert_fraction=0.2"]
+
+
+@cache
+def late(order):
+    """(scene, Instant) of some steps, a new mesh and contact later."""
+    scene = load_scene("base", [f"numerics.elements={ORDERS[order]}",
+                                f"numerics.refinement={0.7 if order == 1 else 0.3}", *SETS])
+    *_, last = simulate(scene, SHAPE)
+    assert last.pore.contact and last.remeshes and len(last.ledgers) > 1, "else little is tested"
+    return scene, last
+
+
+# Lagrange's functions, from their nodes alone.
+THIRDS = [(1, 0), (2, 0), (2, 1), (1, 2), (0, 1), (0, 2), (1, 1)]
+CORNERS = [(0, 0), (1, 0), (0, 1)]
+NODES = {1: np.array(CORNERS, float), 2: np.array([*CORNERS, (0.5, 0), (0.5, 0.5), (0, 0.5)]),
+         3: np.array([*CORNERS, *(np.array(THIRDS) / 3)])}
+
+
+def powers(order):
+    return [(i, j) for i in range(order + 1) for j in range(order + 1 - i)]
+
+
+def functions(order, places):
+    """(q, k) values, and (q, k, 2) derivatives, at places (q, 2) of the unit triangle."""
+    x, y = np.asarray(places, float).T
+    vandermonde = np.column_stack([NODES[order][:, 0] ** i * NODES[order][:, 1] ** j for i, j in powers(order)])
+    coefficients = np.linalg.inv(vandermonde)
+    value = np.column_stack([x**i * y**j for i, j in powers(order)])
+    along = np.column_stack([i * x ** max(i - 1, 0) * y**j for i, j in powers(order)])
+    up = np.column_stack([j * x**i * y ** max(j - 1, 0) for i, j in powers(order)])
+    return value @ coefficients, np.stack([along @ coefficients, up @ coefficients], axis=-1)
+
+
+def jacobians(points, cells, places):
+    """(t, q, 2, 2) derivatives of x by the unit triangle's places."""
+    return np.einsum("tai,qaj->tqij", points[cells], functions({3: 1, 6: 2}[cells.shape[1]], places)[1])
+
+
+def rule(degree):
+    """(q, 2) places and (q,) weights of scikit-fem's quadrature."""
+    places, weights = get_quadrature(RefTri, degree)
+    return places.T, weights
+
+
+def places_of(space):
+    """(n, 2) um, where the nodes of a space are."""
+    found = np.empty((space.cells.max() + 1, 2))
+    values = functions(space.mesh.geometry, NODES[space.order])[0]
+    found[space.cells] = np.einsum("ka,tai->tki", values, space.mesh.points[space.mesh.cells])
+    return found
+
+
+def over_end(space, x, *fields):
+    """Integral over an end of the meshed part of the product of fields at the nodes, edge by edge."""
+    place = places_of(space)
+    nodes = np.flatnonzero(np.abs(place[:, 0] - x) < 1e-9)
+    nodes = nodes[np.argsort(place[nodes, 1])]
+    at, weights = np.polynomial.legendre.leggauss(6)
+    knots = np.linspace(-1, 1, space.order + 1)
+    along = np.vander(at, space.order + 1) @ np.linalg.inv(np.vander(knots, space.order + 1))
+    total = 0.0
+    for k in range(0, len(nodes) - 1, space.order):
+        edge = nodes[k: k + space.order + 1]
+        product = math.prod(along @ field[edge] for field in fields)
+        total += (place[edge[-1], 1] - place[edge[0], 1]) / 2 * weights @ product
+    return total
+
+
+def pressure_drop(scene, now, flow):
+    """Loss (um) over the meshed part: of linear elements the difference of the ends' mean heads, else the work of
+    viscosity, nu / g times the integral of nu_r |grad u|^2 over the flow."""
+    space = now.space
+    if space.order == 1:
+        first, last = (over_end(space, x, flow.head) / scene.pore.width for x in now.mesh.ends)
+        return first - last
+    at, weights = rule(space.gradient_degree)
+    J = jacobians(now.mesh.points, now.mesh.cells, at)
+    slopes = np.einsum("qkj,tqji->tqki", functions(space.order, at)[1], np.linalg.inv(J))
+    gradient = np.einsum("tkc,tqki->tqci", flow.velocity[space.cells], slopes)
+    thick = np.where(now.mesh.biomass, scene.flow.viscosity_ratio, 1.0)
+    work = np.einsum("t,tq,q,tqci->", thick, np.linalg.det(J), weights, gradient**2)
+    through = over_end(space, now.mesh.ends[0], flow.velocity[:, 0])
+    return scene.flow.kinematic_viscosity / scene.flow.gravity * work / through
+
+
+def arcs(now):
+    """(k, 2) places along the aggregate's boundary, so many on each arc that its extremes are met to 1e-6."""
+    loop = now.mesh.loop
+    if now.mesh.geometry == 1:
+        return now.mesh.points[loop]
+    a, m, b = (now.mesh.points[np.roll(loop, -k)[::2]][:, None] for k in range(3))
+    t = np.linspace(0, 1, 2001)[None, :, None]
+    return (a * (1 - t) * (1 - 2 * t) + 4 * m * t * (1 - t) + b * t * (2 * t - 1)).reshape(-1, 2)
+
+
+def taken_up(scene, now, state):
+    """(2,) um2 mg/L/h, of acceptor and donor, by (7) and (8) as they are printed."""
+    pieces, total = now.space.reaction, np.zeros(2)
+    for nodes, masses in zip(pieces.cells, now.active):
+        for N, X in zip(pieces.values, masses):
+            rates = oracles.rates(N @ state.acceptor[nodes], N @ state.donor[nodes], **constants(scene))
+            total -= X * np.array(rates[:2])
+    return total
+
+
+def derived_row(scene, at):
+    """{column: value} of an instant, and how far from it the row may be."""
+    now, flow, state = at.pore, at.solved.flow, at.solved.concentrations
+    W, L = scene.pore.width, scene.pore.length
+    (first, last), u_x = now.mesh.ends, flow.velocity[:, 0]
+    flux = over_end(now.space, last, u_x)
+    nu = scene.flow.kinematic_viscosity / scene.flow.gravity
+    loss = pressure_drop(scene, now, flow) + 12 * nu * flux / W**3 * (L - (last - first))
+    found = {"time_h": now.time, "mean_velocity_m_per_d": flux / W * 24 / 1e6, "head_loss_cm": loss / 1e4,
+             "conductivity_m_per_d": flux / W * L / loss * 24 / 1e6, "meshed_length_um": last - first,
+             "nodes": len(set(now.mesh.cells.ravel().tolist())), "remeshed": 1, "contact": 1}
+    taken = taken_up(scene, now, state)
+    for k, (name, field) in enumerate((("acceptor", state.acceptor), ("donor", state.donor))):
+        found[f"effluent_{name}_mg_per_L"] = over_end(now.space, last, u_x, field) / flux
+        found[f"inlet_{name}_mg_per_L"] = over_end(now.space, first, u_x, field) / over_end(now.space, first, u_x)
+        found[f"{name}_min_mg_per_L"] = min(field.tolist())
+        supplied = getattr(scene.substrates, name).supply * over_end(now.space, first, u_x)
+        assert abs(supplied - over_end(now.space, last, u_x, field) - taken[k]) <= 1e-9 * supplied
+        found[f"{name}_balance"] = 0.0
+    x, y = arcs(now).T
+    at_points, weights = rule(8)
+    body = now.mesh.cells[now.mesh.biomass]
+    found["aggregate_area_um2"] = (np.linalg.det(jacobians(now.mesh.points, body, at_points)) @ weights).sum()
+    found |= {"thickness_um": y.max(), "upstream_um": x.min(), "downstream_um": x.max()}
+    density = (now.active + now.inert) / areas_at_points(now) / scene.kinetics.maximum_density
+    found |= {"inert_fraction": now.inert.sum() / (now.active.sum() + now.inert.sum()),
+              "biomass_density_min": density.min(), "biomass_density_max": density.max(),
+              "biomass_balance": 0.0, "oxygen_demand_balance": 0.0}
+    return found
+
+
+def areas_at_points(now):
+    """(r, q) um2 that a point of the reaction stands for: a third of the triangles around a node, or its weight."""
+    body = now.mesh.cells[now.mesh.biomass]
+    if now.space.order == 1:
+        third = np.repeat(np.linalg.det(jacobians(now.mesh.points, body, [(0, 0)]))[:, 0] / 6, 3)
+        return np.bincount(body.ravel(), third)[np.unique(body), None]
+    at, weights = rule_with(now.active.shape[1])
+    return np.linalg.det(jacobians(now.mesh.points, body, at)) * weights
+
+
+def rule_with(points):
+    """The quadrature with so many points."""
+    if points == 1:
+        return np.array([[1 / 3, 1 / 3]]), np.array([0.5])
+    return next(found for found in map(rule, range(20)) if len(found[1]) == points)
+
+
+def check_row(order):
+    """Flow-weighted concentrations and places to 1e-6 (arcs are sampled), balances to 1e-6, which is what stops a
+    run, all else to round-off: heads hang on the linear system, whose defect is 1e-10."""
+    scene, at = late(order)
+    row, wanted = results.row(scene, at), derived_row(scene, at)
+    assert row.keys() == wanted.keys()
+    for name, value in wanted.items():
+        tight = name in ("time_h", "nodes", "remeshed", "contact", "inert_fraction", "aggregate_area_um2")
+        assert row[name] == pytest.approx(value, rel=1e-12 if tight else 1e-6,
+                                          abs=1e-6 if name.endswith("_balance") else 1e-12), name
+    assert row["head_loss_cm"] == pytest.approx(scene.flow.head / 1e4, rel=1e-9)
+    values = [value for name, value in row.items() if not name.endswith("_balance")]
+    assert len(set(values)) == len(values) - 1, "two columns alike would hide an exchange (remeshed and contact are)"
+
+
+@EVERY_ORDER
+def test_every_column_is_what_its_name_says(order):
+    check_row(order)
+
+
+def derived_arrays(scene, at):
+    """{array: values} of an instant."""
+    now, flow, state = at.pore, at.solved.flow, at.solved.concentrations
+    mesh, body, own = now.mesh, now.body, now.mesh.cells[now.mesh.biomass]
+    inside = sorted(set(own.ravel().tolist()))
+    def at_nodes(field, order=now.space.order, cells=now.space.cells):
+        values, of = np.empty((len(mesh.points), *field.shape[1:])), functions(order, NODES[mesh.geometry])[0]
+        values[mesh.cells] = np.einsum("ak,tk...->ta...", of, field[cells])
+        return values
+
+    def nodal(values):
+        found = np.full((len(mesh.points), *values.shape[1:]), np.nan)
+        found[inside] = values
+        return found
+
+    def by_triangle(values):
+        found = np.full(len(mesh.cells), np.nan)
+        found[mesh.biomass] = values
+        return found
+
+    def plane(vectors):
+        return np.column_stack([vectors, np.where(np.isnan(vectors[:, 0]), np.nan, 0.0)])
+
+    head_order = max(1, now.space.order - 1)  # the nodes of which are the mesh's own corners, or all of its nodes
+    found = {"velocity_m_per_d": plane(at_nodes(flow.velocity)) * 24 / 1e6,
+             "head_cm": at_nodes(flow.head, head_order, mesh.cells[:, : len(NODES[head_order])]) / 1e4,
+             "acceptor_mg_per_L": at_nodes(state.acceptor), "donor_mg_per_L": at_nodes(state.donor),
+             "displacement_um": plane(nodal(mesh.points[inside] - body.reference)),
+             "position_t0_um": plane(nodal(body.reference)), "region": mesh.biomass.astype(float)}
+    for name in ("active", "inert"):
+        found[f"{name}_biomass"] = density_at_nodes(now, getattr(now, name)) / scene.kinetics.maximum_density
+    places, weights = rule_with(now.theta.shape[1])
+    local = np.searchsorted(inside, own)
+    before, after = jacobians(body.reference, local, places), jacobians(mesh.points, own, places)
+    whole = np.linalg.det(before) * weights
+    F = np.zeros((*whole.shape, 3, 3))
+    F[..., :2, :2], F[..., 2, 2] = after @ np.linalg.inv(before), 1.0
+    P = now.pressure[own[:, :3]] @ functions(1, places)[0].T
+    found["pressure_MPa"] = nodal(scene.growth.shear_modulus * pressure_at_nodes(now, own)[inside])
+    found["theta"] = by_triangle((now.theta * whole).sum(1) / whole.sum(1))
+    found["J"] = by_triangle((np.linalg.det(after) @ weights) / whole.sum(1))
+    sigma = scene.growth.shear_modulus * cauchy(F, P)
+    mean = (sigma * whole[..., None, None]).sum(1) / whole.sum(1)[:, None, None]
+    for name, (i, j) in {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1)}.items():
+        found[f"stress_{name}_MPa"] = by_triangle(mean[:, i, j])
+    largest = np.linalg.eigvalsh(sigma)[..., -1]
+    found["largest_principal_stress_MPa"] = by_triangle((largest * whole).sum(1) / whole.sum(1))
+    return found
+
+
+def cauchy(F, P):
+    """(..., 3, 3) over mu_L: J^(-5/3) (F F^T - tr(F F^T) / 3) + P, the stress of (17) and (21)."""
+    B, J = F @ np.swapaxes(F, -1, -2), np.linalg.det(F)
+    isotropic = P - np.trace(B, axis1=-2, axis2=-1) / 3 * J ** (-5 / 3)
+    return J[..., None, None] ** (-5 / 3) * B + isotropic[..., None, None] * np.eye(3)
+
+
+def pressure_at_nodes(now, own):
+    """(N,) P at the aggregate's nodes: of a middle the mean of its side's ends."""
+    found = np.zeros(len(now.mesh.points))
+    for k in range(own.shape[1]):
+        found[own[:, k]] = now.pressure[own[:, :3]] @ functions(1, NODES[now.mesh.geometry])[0][k]
+    return found
+
+
+def density_at_nodes(now, mass):
+    """(N,) a density at the nodes of the mesh: mass over area, or the mean of what least squares make linear of the
+    points in each triangle around."""
+    found, own = np.zeros(len(now.mesh.points)), now.mesh.cells[now.mesh.biomass]
+    density = mass / areas_at_points(now)
+    if now.space.order == 1:
+        found[np.unique(own)] = density[:, 0]
+        return found
+    at, _ = rule_with(density.shape[1])
+    fitted = np.linalg.lstsq(np.column_stack([np.ones(len(at)), at]), density.T, rcond=None)[0]
+    told = (np.column_stack([np.ones(6), NODES[2]]) @ fitted).T
+    for node in np.unique(own):
+        found[node] = told[own == node].mean()
+    return found
+
+
+def check_arrays(order):
+    """To round-off: all of it is a rearrangement, or sums of few terms, of numbers of size one."""
+    scene, at = late(order)
+    content, wanted = results.fields(scene, at.pore, at.solved), derived_arrays(scene, at)
+    told = content.point_data | {name: values for name, (values,) in content.cell_data.items()}
+    assert told.keys() == wanted.keys()
+    for name, value in wanted.items():
+        size = np.nanmax(np.abs(value))
+        assert told[name] == pytest.approx(value, rel=1e-9, abs=1e-9 * size, nan_ok=True), name
+    fluid = ~np.isin(np.arange(len(at.pore.mesh.points)), at.pore.mesh.cells[at.pore.mesh.biomass])
+    assert not told["active_biomass"][fluid].any() and not told["inert_biomass"][fluid].any()
+    apart = np.nanmean(np.abs(told["stress_xx_MPa"] - told["stress_yy_MPa"]))
+    assert apart > 0.05 * np.nanmean(np.abs(told["stress_xx_MPa"])), "stresses alike would hide an exchange"
+
+
+@EVERY_ORDER
+def test_every_array_is_what_its_name_says(order):
+    check_arrays(order)
+
+
+def dense(part):
+    """The late pore of quadratic elements with so many X_m of active biomass upstream, and X_m downstream."""
+    scene, at = late(2)
+    full = scene.kinetics.maximum_density * areas_at_points(at.pore)
+    x = at.pore.mesh.points[at.pore.mesh.triangles[at.pore.mesh.biomass], 0].mean(axis=1)
+    active = np.where(x[:, None] < 0, part, 1.0) * full
+    return scene, replace(at, pore=replace(at.pore, active=active, inert=0 * full))
+
+
+def check_density():
+    scene, at = dense(1.2)
+    assert results.row(scene, at)["biomass_density_max"] == pytest.approx(1.2, rel=1e-12)
+    shown = results.fields(scene, at.pore, at.solved).point_data["active_biomass"]
+    assert shown.max() == pytest.approx(1.2, rel=1e-12)
+
+
+def test_a_density_over_the_largest_reads_as_it_is():
+    check_density()
+
+
+LEAKS = {"acceptor_balance": ("supplied", 0), "donor_balance": ("supplied", 1), "biomass_balance": ("biomass_after", 0)}
+
+
+def leaky(column, leak):
+    """(scene, Instant) after three steps of which the middle one supplies, or holds, so much too much."""
+    scene, at = late(2)
+    name, k = LEAKS[column]
+    even = replace(at.ledgers[0], supplied=(5.0, 3.0), out=(1.0, 1.0), consumed=(4.0, 2.0), stored=(0.0, 0.0),
+                   biomass_before=70.0, biomass_made=10.0, biomass_after=80.0)
+    if name == "supplied":
+        # Of a defect over what is supplied: x = (s - s0) / s, so s = s0 / (1 - x).
+        supplied = [5.0, 3.0]
+        supplied[k] /= 1 - leak
+        middle = replace(even, supplied=tuple(supplied))
+    else:
+        middle = replace(even, biomass_after=80.0 / (1 - leak))
+    return scene, replace(at, ledgers=(even, middle, even))
+
+
+def check_leak(column, leak):
+    scene, at = leaky(column, leak)
+    row = results.row(scene, at)
+    assert row[column] == pytest.approx(leak, rel=1e-9)
+    assert max(abs(row[name]) for name in LEAKS if name != column) < 1e-6
+    table = {name: np.array([0.0, value]) for name, value in row.items()}
+    (chart,) = [one for one in quantities.charts_of(Run(None, {}, table, {})) if "balances" in one.title]
+    (line,) = [one for one in chart.lines if one.label == column.removesuffix("_balance")]
+    assert line.values[-1] == pytest.approx(leak, rel=1e-9) and "relative defect" in chart.axis
+
+
+@pytest.mark.parametrize("leak", [0.01, -0.01])
+@pytest.mark.parametrize("column", LEAKS)
+def test_a_leak_in_the_middle_of_three_steps_is_read_with_its_sign(column, leak):
+    check_leak(column, leak)
+
+
+def lossy(time):
+    """Instants of linear elements whose masses are interpolated on new meshes [E8]."""
+    scene = load_scene("base", ["numerics.refinement=0.5", "numerics.transfer=linear", f"numerics.time={time}",
+                                'pore.width="20 um"', 'growth.end="0.4 h"', "flow.head=1e-2 cm"])
+    return scene, list(simulate(scene, SHAPE))
+
+
+def check_loss(time):
+    """What an interpolation loses is a defect of the biomass, and nothing that was made: the oxygen demand says so."""
+    scene, found = lossy(time)
+    steps = [ledger for instant in found for ledger in instant.ledgers]
+    rows = [dict(zip(results.LEDGER_COLUMNS, results.ledger_row(scene, ledger))) for ledger in steps]
+    assert any(instant.remeshes for instant in found)
+    for instant in found:
+        if instant.remeshes:
+            (ledger,) = instant.ledgers
+            lost = ledger.biomass_after - ledger.biomass_before - ledger.biomass_made
+            assert abs(lost) > 1e-6 * ledger.biomass_after
+            assert results.row(scene, instant)["biomass_balance"] == lost / ledger.biomass_after
+    k = scene.kinetics
+    for row in rows:
+        acceptor, donor = row["acceptor_consumed_pg_per_m"], row["donor_consumed_pg_per_m"]
+        grown, spent = k.yield_coefficient * donor, acceptor - k.acceptor_to_donor_ratio * donor
+        left = row["biomass_made_pg_per_m"] - grown + spent / k.decay_oxygen_demand
+        assert abs(left) <= 2e-4 * grown
+
+
+@pytest.mark.parametrize("time", ["updates", "midpoint"])
+def test_what_a_new_mesh_loses_is_not_taken_for_made(time):
+    check_loss(time)
+
+
+def check_ledger():
+    """Each column of a step's row is its own part."""
+    scene, at = late(1)
+    step = replace(at.ledgers[0], start=1.0, end=2.0, supplied=(3.0, 4.0), out=(5.0, 6.0), consumed=(7.0, 8.0),
+                   stored=(9.0, 10.0), biomass_before=11.0, biomass_made=12.0, biomass_after=13.0)
+    row = dict(zip(results.LEDGER_COLUMNS, results.ledger_row(scene, step)))
+    row.pop("oxygen_demand_balance")  # tests/test_balances.py
+    assert row == {"start_h": 1, "end_h": 2, "acceptor_supplied_pg_per_m": 3, "donor_supplied_pg_per_m": 4,
+                   "acceptor_out_pg_per_m": 5, "donor_out_pg_per_m": 6, "acceptor_consumed_pg_per_m": 7,
+                   "donor_consumed_pg_per_m": 8, "acceptor_stored_pg_per_m": 9, "donor_stored_pg_per_m": 10,
+                   "biomass_before_pg_per_m": 11, "biomass_made_pg_per_m": 12, "biomass_after_pg_per_m": 13}
+
+
+def test_every_column_of_the_ledger_is_its_own():
+    check_ledger()
+
+
+def apart():
+    """A run of three rows and two steps in which every number is another one."""
+    series = {name: 1.0 + k + np.array([0.1, 0.2, 0.4]) for k, name in enumerate(results.COLUMNS)}
+    series |= {"time_h": np.array([0.0, 1.0, 3.0]), "remeshed": np.array([0.0, 1.0, 0.0])}
+    ledger = {name: 50.0 + k + np.array([0.0, 0.5]) for k, name in enumerate(results.LEDGER_COLUMNS)}
+    ledger |= {"start_h": np.array([0.0, 1.0]), "end_h": np.array([1.0, 3.0])}
+    return Run(None, {}, series, ledger)
+
+
+def check_charts():
+    run = apart()
+    found = {chart.title: chart for chart in quantities.charts_of(run)}
+    assert found.keys() == {*CHARTS, *LEDGERS, "Ledger: biomass"}
+    for title, columns in CHARTS.items():
+        assert found[title].axis.endswith(AXES.get(title, "")) and [line.label for line in found[title].lines] == [
+            *columns], title
+        for line, column in zip(found[title].lines, columns.values()):
+            wanted = run.series[column]
+            if column == "remeshed":
+                wanted = np.where(wanted == 1, run.series["nodes"], np.nan)
+            assert np.array_equal(line.values, wanted, equal_nan=True) and (line.times == run.times).all(), title
+    for title, columns in LEDGERS.items():
+        assert found[title].axis.endswith("(ug/m/h)")
+        for line, column in zip(found[title].lines, columns.values()):
+            assert line.times.tolist() == [0.5, 2.0]
+            assert line.values == pytest.approx(1e-6 * run.ledger[column] / [1, 2], rel=1e-12), title
+        assert [line.label for line in found[title].lines] == [*columns]
+    held, made = found["Ledger: biomass"].lines
+    assert (held.label, made.label) == ("held", "made since t = 0") and held.times.tolist() == [1.0, 3.0]
+    assert held.values == pytest.approx(1e-6 * run.ledger["biomass_after_pg_per_m"], rel=1e-12)
+    assert made.values == pytest.approx(1e-6 * np.cumsum(run.ledger["biomass_made_pg_per_m"]), rel=1e-12)
+
+
+def test_every_line_of_every_chart_is_the_column_that_it_names():
+    check_charts()
+
+
+def test_counts_are_of_every_step_with_several_a_row_and_over_resumes(tmp_path, monkeypatch):
+    """Newton's iterations (of solves that converge) and new meshes, counted where they are made, against run.json of
+    the same run in one piece and of one that is stopped after every step. Mutants: counts of the last step alone, of
+    the last row alone, of t = 0 left out."""
+    scene = load_scene("base", ["numerics.refinement=0.5", *CONTACT, 'output.times=["0.6 h"]'])
+    made = Counter()
+    solve, remesh = Newton.solve, remeshing.remesh
+
+    def counted(self, system, first):
+        found = solve(self, system, first)
+        _, count, converged = found
+        made[{"System": "growth", "Balance": "transport"}[type(system).__name__]] += count * converged
+        return found
+
+    def noted(*arguments):
+        made["remeshes"] += 1
+        return remesh(*arguments)
+
+    monkeypatch.setattr(Newton, "solve", counted)
+    monkeypatch.setattr(remeshing, "remesh", noted)
+    run(scene, tmp_path / "whole")
+    counts = dict(made)
+    assert counts.pop("remeshes") == told(tmp_path / "whole")["remeshes"] > 0
+    assert told(tmp_path / "whole")["newton_iterations"] == counts
+    assert in_parts(scene, tmp_path / "parts", 1) >= 3
+    table, ledger = (results.read_table(tmp_path / "parts" / name) for name in ("timeseries.csv", "ledger.csv"))
+    assert table["remeshed"].tolist() == [0, 1] and len(ledger["end_h"]) == 3
+    for key in ("remeshes", "newton_iterations"):
+        assert told(tmp_path / "parts")[key] == told(tmp_path / "whole")[key]
+
+
+def changed(monkeypatch, module, old, new):
+    """A module with some of its text, which occurs there once, replaced; everybody else sees what is in it then."""
+    module = import_module(module)
+    source = inspect.getsource(module)
+    assert source.count(old) == 1, f"{old!r} occurs {source.count(old)} times: adapt the wrong change to the code"
+    made = dict(vars(module))
+    exec(compile(source.replace(old, new), module.__file__, "exec"), made)
+    swapped = {id(value): made[name] for name, value in vars(module).items() if made[name] is not value}
+    for known in [each for name, each in sys.modules.items() if name.startswith("repro")]:
+        for name, value in list(vars(known).items()):
+            if id(value) in swapped and not name.startswith("__"):
+                monkeypatch.setattr(known, name, swapped[id(value)])
+
+
+WRONG = {
+    "upstream for downstream": ("results.columns", "at.pore.outline.downstream", "at.pore.outline.upstream",
+                                lambda: check_row(2)),
+    "the inlet's concentration leaves": ("results.columns", "at.solved.fluxes[k].effluent",
+                                         "at.solved.fluxes[k].inlet", lambda: check_row(1)),
+    "velocities exchanged": ("results.arrays", "state.pore.space.to_mesh(state.solved.flow.velocity)",
+                             "state.pore.space.to_mesh(state.solved.flow.velocity)[:, ::-1]", lambda: check_arrays(2)),
+    "stresses exchanged": ("results.arrays", "state.stress[..., k]", "state.stress[..., (1, 0, 2, 3)[k]]",
+                           lambda: check_arrays(2)),
+    "pressure over the modulus": ("results.arrays", "state.scene.growth.shear_modulus * mesh.with_middles",
+                                  "mesh.with_middles", lambda: check_arrays(3)),
+    "displaced the other way": ("results.arrays", "mesh.points[mesh.body] - state.pore.body.reference",
+                                "state.pore.body.reference - mesh.points[mesh.body]", lambda: check_arrays(1)),
+    "effluents of the inlet": ("report.quantities", 'Kind("Effluents", "concentration", _pair("effluent_',
+                               'Kind("Effluents", "concentration", _pair("inlet_', check_charts),
+    "a ten thousandth": ("results.columns", "return max(defects, key=abs, default=0.0)",
+                         "return 1e-4 * max(defects, key=abs, default=0.0)",
+                         lambda: check_leak("acceptor_balance", 0.01)),
+    "the best step": ("results.columns", "max(defects, key=abs", "min(defects, key=abs",
+                      lambda: check_leak("biomass_balance", -0.01)),
+    "without a sign": ("results.columns", "return max(defects, key=abs, default=0.0)",
+                       "return abs(max(defects, key=abs, default=0.0))", lambda: check_leak("donor_balance", -0.01)),
+    "made is what is more, midpoint": ("march.midpoint", "after.mass - now.mass, new.mass",
+                                       "new.mass - now.mass, new.mass", lambda: check_loss("midpoint")),
+    "made is what is more, updates": ("march.updates", "grown.mass - now.mass,", "after.mass - now.mass,",
+                                      lambda: check_loss("updates")),
+    "made is what is more, ledger": ("results.columns", "step.biomass_made",
+                                     "step.biomass_after - step.biomass_before", check_ledger),
+    "density clipped": ("results.columns", "return at.pore.composition(scene.kinetics.maximum_density)[which]",
+                        "return min(1.0, at.pore.composition(scene.kinetics.maximum_density)[which])", check_density),
+    "density clipped in files": ("results.arrays", "getattr(state.pore, name) / full",
+                                 "np.minimum(getattr(state.pore, name) / full, 1.0)", check_density),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_wrong_change_is_noticed(name, monkeypatch):
+    """Each check of this module fails with a change that it is to notice, if no guard stops the run before."""
+    module, old, new, check = WRONG[name]
+    for order in ORDERS:
+        late(order)
+    changed(monkeypatch, f"repro.{module}", old, new)
+    with pytest.raises((AssertionError, SimulationError)):
+        check()
