@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 from repro.fem.sizing import meshed_extent
 from repro.model import kinetics
@@ -67,6 +68,7 @@ def at_start(scene: Scene) -> Sizes:
     return Sizes(outline.area, outline.thickness, reach, 0.0 if touches else None)
 
 
+@lru_cache(maxsize=1)
 def at_end(scene: Scene) -> Sizes:
     """The bound at growth.end; the seed without growth."""
     now = at_start(scene)

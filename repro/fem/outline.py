@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from repro.errors import MeshError
 
@@ -183,6 +182,8 @@ BETWEEN = 8
 
 def _splined(rim: np.ndarray, width: float) -> np.ndarray:
     """Points (M, 2) on a spline through points (K, 2), straight along the upper wall."""
+    from scipy.interpolate import CubicSpline  # a quarter of a second, and few scenes ask for it
+
     length = np.sqrt(np.linalg.norm(np.diff(rim, axis=0), axis=1))
     knots = np.concatenate([[0.0], np.cumsum(length)])
     curve = CubicSpline(knots, rim, bc_type="natural")

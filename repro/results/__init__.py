@@ -12,7 +12,8 @@ import io
 import json
 import os
 import platform
-from importlib.metadata import version
+from functools import cache
+from importlib import metadata
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -254,10 +255,17 @@ def read_table(path: Path) -> dict[str, np.ndarray]:
 
 def provenance(scene: Scene) -> dict:
     """The scene as read, its hash, and the versions that its numbers come from."""
-    versions = {"dupin2001-repro": version("dupin2001-repro"), "python": platform.python_version()}
+    versions = {"dupin2001-repro": version("dupin2001-repro"),
+                "python": platform.python_version()}
     versions |= {name: version(name) for name in PACKAGES}
     return {"scene": scene.name, "hash": scene_hash(scene), "tables": scene_tables(scene),
             "versions": versions}
+
+
+@cache
+def version(package: str) -> str:
+    """The version of an installed package, which is looked for on the disk once."""
+    return metadata.version(package)
 
 
 def write_json(path: Path, content: dict) -> None:

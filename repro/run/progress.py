@@ -15,8 +15,6 @@ from contextlib import contextmanager, nullcontext
 from functools import partial
 from typing import TextIO
 
-from tqdm import tqdm
-
 from repro.errors import OutputError
 
 Tell = Callable[[dict], None]
@@ -104,6 +102,8 @@ def _begin_and_end(event: dict, aside: Callable[[str], None]) -> None:
 @contextmanager
 def on_a_terminal() -> Iterator[Tell]:
     """A bar with simulated time, steps, remeshes, contact, and the time that is left."""
+    from tqdm import tqdm
+
     form = ("{desc} {percentage:3.0f}%|{bar}| {n:.1f} of {total:.1f} h "
             "[{elapsed} < {remaining}{postfix}]")
     with tqdm(total=1.0, bar_format=form, dynamic_ncols=True, delay=1e-3) as bar:
