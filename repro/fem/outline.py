@@ -14,12 +14,14 @@ from functools import cached_property
 import numpy as np
 
 from repro.errors import MeshError
+from repro.fem.brief import brief
 
 FREE = 0
 BOTTOM = 1
 TOP = 2
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class Outline:
     """Boundary of the aggregate.

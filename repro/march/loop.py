@@ -11,6 +11,7 @@ from typing import ClassVar, Protocol, TypeVar
 import numpy as np
 
 from repro.errors import SimulationError, StageError
+from repro.fem.brief import brief
 from repro.fem.sizing import ACROSS_PORE
 from repro.march.pace import Pace
 from repro.model.pore import Pore, Solved, seeded
@@ -45,6 +46,7 @@ class Ledger:
     biomass_after: float
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class Instant:
     """The pore at ``pore.time`` with what is solved in its geometry, and how it came there.
@@ -74,6 +76,7 @@ class Step:
     iterations: int
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class State:
     """All that a run goes on from after a step.

@@ -151,13 +151,17 @@ class Recorder:
         content = checkpoint.encoded(*packed(self.scene, self.state, self._now()))
         self._write(checkpoint.LAST, Path.write_bytes, content)
 
-    def lengthen(self, scene: Scene, changes: list[str]) -> None:
+    def lengthen(self, scene: Scene, changes: list[str], near: bool) -> None:
         """Be the recorder of a longer run from here on, whose checkpoint is there before
-        ``run.json`` tells of it. changes: what is now set in the file of its scene."""
+        ``run.json`` tells of it. changes: what is now set in the file of its scene; near: is this
+        also the state from which a still longer run goes on?"""
         self.scene = scene
         self.origin["set"] = changes
         self._write_checkpoint(self.state)
-        remove(self.folder, [checkpoint.LAST])
+        if near:
+            self.keep()
+        else:
+            remove(self.folder, [checkpoint.LAST])
         self.tell(RUNNING)
 
     def finish(self, status: str) -> None:

@@ -230,7 +230,7 @@ def _lengthened(recorder: Recorder, later: Scene, overrides: Sequence[str], told
         recorder.origin["set"] = changes
         return _from_the_start(recorder, progress, watch)
     _warn(recorder, later, recorder.first_velocity, watch)
-    recorder.lengthen(later, changes)
+    recorder.lengthen(later, changes, ends_soon(later, recorder.state))
     recorder.drop_later()
     return _recorded(recorder, steps(later, recorder.state), progress, watch)
 
