@@ -59,14 +59,15 @@ def test_little_is_computed_again(tmp_path):
 
 def test_a_run_that_is_not_over_is_made_longer(tmp_path):
     """Stopped before and after its end was near. Mutant: the newest state, after a step that the end has cut short."""
-    run(scene("fast"), tmp_path / "whole")
-    near = [ends_soon(scene("fast", 5.0), state) for state, _ in steps(scene("fast", 5.0))]
+    whole, short = scene("paper, an end within a step"), scene("paper, an end within a step", 1.2)
+    run(whole, tmp_path / "whole")
+    near = [ends_soon(short, state) for state, _ in steps(short)]
     assert not near[1] and near[-2]
-    for stop in (1, len(near) - 2):
+    for stop in (1, len(near) - 1):
         left = iter([0] * stop + [15])
         with pytest.raises(Interrupted):
-            run(scene("fast", 5.0), tmp_path / str(stop), watch=Watch(stop=lambda left=left: next(left)))
-        resume(tmp_path / str(stop), overrides=["growth.end=9 h"])
+            run(short, tmp_path / str(stop), watch=Watch(stop=lambda left=left: next(left)))
+        resume(tmp_path / str(stop), overrides=["growth.end=2.2 h"])
         assert same(tmp_path / str(stop), tmp_path / "whole")
 
 
