@@ -133,14 +133,15 @@ def _package(name: str):
         raise ImportError(f"the package {name} is not installed; pip install {name}") from None
 
 
-def solve(scene: Source) -> Results:
-    """Run a scene, one that was loaded, or a file, a packaged name, a dict of tables; keep its rows
-    and fields, at ``output.times`` or after every step.
+def solve(scene: Source, overrides: Sequence[str] = (), unset: Sequence[str] = ()) -> Results:
+    """Run a scene, one that was loaded, or a file, a packaged name, a dict of tables, with the keys
+    of ``overrides`` ("KEY=VALUE") set and those of ``unset`` left out; keep its rows and fields, at
+    ``output.times`` or after every step.
 
     Raises SceneError where it is not accepted, SimulationError where a stage fails. Memory grows
     with the reported times.
     """
-    scene = load_scene(scene)
+    scene = load_scene(scene, overrides, unset)
     rows = []
     fields = []
     status = "completed"
