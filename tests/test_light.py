@@ -9,7 +9,8 @@ from tests.shell import SHORT
 
 #: What no command and no run needs, whatever is installed; each takes from a twentieth to half a second.
 NEVER = {"matplotlib", "pandas", "xarray", "h5py", "scipy.interpolate", "scipy.optimize", "scipy.special",
-         "scipy.spatial", "scipy.integrate", "scipy.stats", "pint", "skfem.visuals", "sympy", "distributed"}
+         "scipy.spatial", "scipy.integrate", "scipy.stats", "pint", "meshio", "rich", "skfem.visuals", "sympy",
+         "distributed"}
 #: What those that run nothing do not need either.
 SOLVER = {"numpy", "scipy", "skfem", "meshio", "mmgpy", "shapely", "tqdm", "concurrent.futures"}
 CODE = """

@@ -12,11 +12,11 @@ import re
 from pathlib import Path
 from xml.etree import ElementTree
 
-import meshio
 import numpy as np
 
 from repro.fem.transfer import located
-from repro.results import names
+from repro.results import names, vtu
+from repro.results.vtu import Cells, Grid
 
 MOST_FRAMES = 40
 MOST_BYTES = 2_600_000  # of all frames in the page; two frames are always shown
@@ -51,9 +51,9 @@ def packed(entries: list[tuple[float, Path]], before: list[tuple[float, Path]] |
     """
     if not entries:
         return {}
-    last = meshio.vtu.read(entries[-1][1])
+    last = vtu.read(entries[-1][1])
     chosen = _chosen(entries, dict(before or []), _shown(last))
-    grids = [_shown(meshio.vtu.read(path)) for _, path, _ in chosen]
+    grids = [_shown(vtu.read(path)) for _, path, _ in chosen]
     low = np.min([grid.points.min(0) for grid in grids], 0)
     high = np.max([grid.points.max(0) for grid in grids], 0)
     meshes: dict[bytes, dict] = {}
@@ -70,7 +70,7 @@ def _in_any(frames: list[dict], name: str) -> bool:
 
 
 def _chosen(entries: list[tuple[float, Path]],
-            before: dict[float, Path], grid: meshio.Mesh) -> list[tuple[float, Path, str]]:
+            before: dict[float, Path], grid: Grid) -> list[tuple[float, Path, str]]:
     """Evenly chosen frames, the first and last among them, as many as the page may hold, and what
     is told of them; those before an expansion where there is room for all of them.
 
@@ -89,7 +89,7 @@ def _chosen(entries: list[tuple[float, Path]],
     return found
 
 
-def _shown(grid: meshio.Mesh) -> meshio.Mesh:
+def _shown(grid: Grid) -> Grid:
     """The fields as they are shown: on a regular grid of triangles where the mesh is a fine one."""
     if len(grid.points) <= MOST_NODES:
         return grid
@@ -101,8 +101,8 @@ def _shown(grid: meshio.Mesh) -> meshio.Mesh:
     nodal = {name: at.field(value, cells, order) for name, value in grid.point_data.items()}
     inside = located(points, cells, places[triangles].mean(axis=1)).triangle
     values = {name: [value[inside]] for name, (value,) in grid.cell_data.items()}
-    return meshio.Mesh(np.column_stack([places, np.zeros(len(places))]), [("triangle", triangles)],
-                       nodal, values)
+    return Grid(np.column_stack([places, np.zeros(len(places))]), [Cells("triangle", triangles)],
+                nodal, values)
 
 
 def _regular(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -115,7 +115,7 @@ def _regular(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return np.column_stack([x.ravel(), y.ravel()]), (corner[:, None, None] + halves).reshape(-1, 3)
 
 
-def _described(name: str, grid: meshio.Mesh) -> dict:
+def _described(name: str, grid: Grid) -> dict:
     vector = name in grid.point_data and grid.point_data[name].ndim == 2
     words = names.words(name) + (" (magnitude)" if vector else "")
     return {"name": name, "label": words[0].upper() + words[1:], "unit": names.unit(name),
@@ -126,7 +126,7 @@ def _of_aggregate(name: str) -> bool:
     return name in OF_AGGREGATE or name.endswith("_MPa")
 
 
-def _frame(time: float, grid: meshio.Mesh, low, high, meshes: dict[bytes, dict]) -> dict:
+def _frame(time: float, grid: Grid, low, high, meshes: dict[bytes, dict]) -> dict:
     cells = grid.cells[0].data
     region = grid.cell_data["region"][0] > 0.5
     key = cells.tobytes() + region.tobytes()
@@ -139,7 +139,7 @@ def _frame(time: float, grid: meshio.Mesh, low, high, meshes: dict[bytes, dict])
             "values": _values(grid, region)}
 
 
-def _values(grid: meshio.Mesh, region: np.ndarray) -> dict[str, list]:
+def _values(grid: Grid, region: np.ndarray) -> dict[str, list]:
     """What there is of SHOWN, of the aggregate's fields what lies in its `region` of triangles."""
     nodes = np.unique(grid.cells[0].data[region])
     cells = np.flatnonzero(region)

@@ -6,7 +6,6 @@ import html
 import zlib
 from xml.etree.ElementTree import ParseError
 
-import meshio
 import numpy as np
 
 from repro.report import charts, fields, page, quantities
@@ -67,7 +66,7 @@ def _packed(run: Run) -> dict:
     try:
         return fields.packed(fields.index(run.folder),
                              fields.index(run.folder, "before_expansion.pvd"))
-    except (ParseError, meshio.ReadError, LookupError, TypeError, zlib.error) as error:
+    except (ParseError, ValueError, LookupError, TypeError, zlib.error) as error:
         raise ValueError(f"{run.folder}: the fields cannot be read: {error!r}") from error
 
 

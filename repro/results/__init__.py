@@ -17,12 +17,13 @@ from importlib import metadata
 from pathlib import Path
 from xml.etree import ElementTree
 
-import meshio
 import numpy as np
 
 from repro.march.loop import Instant, Ledger
 from repro.model import biomass, growth
 from repro.model.pore import Pore, Solved
+from repro.results import vtu
+from repro.results.vtu import Cells, Grid
 from repro.scene import Kinetics, Scene, scene_hash, scene_tables
 
 #: Of um/h.
@@ -140,8 +141,8 @@ def ledger_row(scene: Scene, ledger: Ledger) -> list[float]:
             ledger.biomass_after, oxygen_demand_balance(scene.kinetics, ledger)]
 
 
-def fields(scene: Scene, pore: Pore, solved: Solved) -> meshio.Mesh:
-    """The fields of an instant for meshio, at nodes or in triangles, named with their units.
+def fields(scene: Scene, pore: Pore, solved: Solved) -> Grid:
+    """The fields of an instant, at nodes or in triangles, named with their units.
 
     Places are in um. In the fluid there is no biomass, stress or pressure P (zero), theta and J are
     1, and places have not moved. Stress and P are those of the strain since t = 0: a scene whose
@@ -164,8 +165,8 @@ def fields(scene: Scene, pore: Pore, solved: Solved) -> meshio.Mesh:
     if scene.growth:
         _add_mechanics(scene, pore, points, cells)
     kind = "triangle" if mesh.geometry == 1 else "triangle6"
-    return meshio.Mesh(_three(mesh.points), [(kind, mesh.cells)], point_data=points,
-                       cell_data={name: [value] for name, value in cells.items()})
+    return Grid(_three(mesh.points), [Cells(kind, mesh.cells)], points,
+                {name: [value] for name, value in cells.items()})
 
 
 def _add_mechanics(scene: Scene, pore: Pore, points: dict[str, np.ndarray],
@@ -204,11 +205,11 @@ def write_text(path: Path, text: str) -> None:
         beside.unlink(missing_ok=True)
 
 
-def write_fields(path: Path, content: meshio.Mesh) -> None:
+def write_fields(path: Path, content: Grid) -> None:
     """Write a ``.vtu`` file whole or not at all."""
     beside = path.with_name(f".part-{path.name}")
     try:
-        content.write(beside, file_format="vtu")
+        vtu.write(beside, content)
         os.replace(beside, path)
     finally:
         beside.unlink(missing_ok=True)

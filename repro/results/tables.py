@@ -7,13 +7,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from importlib import import_module
 
-import meshio
 import numpy as np
 
 from repro import results
 from repro.march.loop import SAME_TIME, PoreEnd
 from repro.march.simulation import simulate
 from repro.results import names, picture
+from repro.results.vtu import Grid
 from repro.scene import Source, load_scene
 
 #: How names end, and what they are then in.
@@ -154,8 +154,8 @@ def solve(scene: Source, overrides: Sequence[str] = (), unset: Sequence[str] = (
     return Results(scene.name, rows, fields, status)
 
 
-def arrays(content: meshio.Mesh) -> dict[str, np.ndarray]:
-    """The arrays of a meshio mesh."""
+def arrays(content: Grid) -> dict[str, np.ndarray]:
+    """The arrays of a grid."""
     (cells,) = content.cells
     by_cell = {name: values for name, (values,) in content.cell_data.items()}
     return {"places_um": content.points[:, :2], "triangles": cells.data, **content.point_data,

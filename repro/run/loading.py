@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-import meshio
 import numpy as np
 
 from repro.errors import OutputError
 from repro.report import fields, reading
+from repro.results import vtu
 from repro.results.tables import Results, arrays
 
 
@@ -43,7 +43,7 @@ class _Files(Sequence[dict[str, np.ndarray]]):
         return len(self.paths)
 
     def __getitem__(self, row):
-        return arrays(meshio.vtu.read(self.paths[row]))
+        return arrays(vtu.read(self.paths[row]))
 
     def __iter__(self) -> Iterator[dict[str, np.ndarray]]:
         return (self[row] for row in range(len(self)))
