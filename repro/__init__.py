@@ -1,5 +1,20 @@
 """Biological clogging of a pore by a growing aggregate: Dupin, Kitanidis & McCarty (2001).
 
+Ten lines of use; ``docs/tutorial.md`` of the repository has more:
+
+    import repro
+
+    scene = repro.load_scene("base", ['growth.end="5 h"'])  # a packaged scene, a file or a dict
+    print(scene)                                            # its TOML, every key with its unit
+    print(repro.check(scene))                               # what a run of it will be
+    found = repro.solve(scene)                              # rows of timeseries.csv, as arrays
+    print(found["conductivity_m_per_d"], found.units["conductivity_m_per_d"], found.fields(5.0))
+    repro.run(scene, "runs/base")                           # the same as files: rows, fields, a page
+    found = repro.load_run("runs/base")                     # ... and back; found.to_pandas()
+    repro.sweep(scene, ["pore.width=50 um, 60 um"], "sweep")
+
+``simulate(scene)`` yields the state step by step, with all that is known, in um, h, mg/L.
+
 Where the paper is in the code, whose modules name the equations that they solve:
 
     section                    equations    module
@@ -38,19 +53,6 @@ Where data enters, and what it passes:
 
 A room imports only from rooms further up in this list, repro.fem before repro.model; repro.errors
 and repro.timing serve all of them.
-
-Ten lines of use; ``repro/tutorial.md`` has more:
-
-    from repro import load_scene, simulate, solve
-
-    scene = load_scene("base", ['growth.end="5 h"'])
-    found = solve(scene)                                # rows of timeseries.csv, as NumPy arrays
-    print(found["conductivity_m_per_d"], found.units["conductivity_m_per_d"])
-    print(found.fields(5.0).keys())
-
-    for instant in simulate(scene):                     # or step by step, with all that is known
-        pore, flow = instant.pore, instant.solved.flow  # um, h, mg/L: see the docstrings
-        print(pore.time, 24e-6 * flow.mean_velocity, pore.outline.thickness)
 """
 
 from __future__ import annotations
@@ -61,31 +63,39 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from repro.errors import SimulationError
+    from repro.check.checked import check
+    from repro.errors import OutputError, SimulationError
     from repro.march.loop import PoreEnd
     from repro.march.simulation import simulate
     from repro.results.tables import Results, solve
+    from repro.run.loading import load_run
     from repro.run.running import resume, run
     from repro.scene import Scene, SceneError, load_scene
+    from repro.sweep.making import sweep
+
+    __version__: str
 else:
     #: The module of each public name, imported when it is first asked for: the solver takes half a
     #: second.
-    _MODULES = {"PoreEnd": "march.loop", "Results": "results.tables", "Scene": "scene",
-                "SceneError": "scene", "SimulationError": "errors", "load_scene": "scene",
+    _MODULES = {"OutputError": "errors", "PoreEnd": "march.loop", "Results": "results.tables",
+                "Scene": "scene", "SceneError": "scene", "SimulationError": "errors",
+                "check": "check.checked", "load_run": "run.loading", "load_scene": "scene",
                 "resume": "run.running", "run": "run.running", "simulate": "march.simulation",
-                "solve": "results.tables"}
+                "solve": "results.tables", "sweep": "sweep.making"}
 
     def __getattr__(name: str):
+        if name == "__version__":
+            return import_module("importlib.metadata").version("dupin2001-repro")
         if name not in _MODULES:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         return getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)
 
     def __dir__() -> list[str]:
-        return sorted({*globals(), *__all__})
+        return sorted(__all__)
 
     class _Package(ModuleType):
-        """``repro.run`` is the function, though a package has that name: importing that does not
-        take its place."""
+        """``repro.run``, ``check`` and ``sweep`` are the functions, though packages have these
+        names: importing those does not take their place."""
 
         def __setattr__(self, name, value):
             if not (name in _MODULES and isinstance(value, ModuleType)):
@@ -93,5 +103,5 @@ else:
 
     sys.modules[__name__].__class__ = _Package
 
-__all__ = ["PoreEnd", "Results", "Scene", "SceneError", "SimulationError", "load_scene", "resume",
-           "run", "simulate", "solve"]
+__all__ = ["OutputError", "PoreEnd", "Results", "Scene", "SceneError", "SimulationError", "check",
+           "load_run", "load_scene", "resume", "run", "simulate", "solve", "sweep"]

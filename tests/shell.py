@@ -9,6 +9,8 @@ import sys
 import time
 from pathlib import Path
 
+from repro.run.checkpoint import LAST
+
 #: A scene of a second or so, with remeshes, and one of several seconds.
 SHORT = ("base", "--set", 'numerics.preset="fast"')
 LONG = ("base", "--set", 'growth.end="4 h"')
@@ -38,9 +40,10 @@ def wait_for(there, process: subprocess.Popen) -> None:
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    """Every file of a folder by its name there, but those that tell times: run.json and the page."""
+    """Every file of a folder by its name there, but those that tell times: run.json, the page and what a longer run
+    goes on from."""
     return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*"))
-            if path.is_file() and path.name not in ("run.json", "report.html")}
+            if path.is_file() and path.name not in ("run.json", "report.html", LAST)}
 
 
 def told(folder: Path) -> dict:

@@ -1,19 +1,28 @@
 """From Python: what `repro` exports, results as arrays with names and units, and how little importing it takes."""
 
+import base64
+import copy
 import importlib.resources
+import io
 import re
 import subprocess
 import sys
+import tomllib
+from dataclasses import replace
+from importlib.metadata import version
 
+import matplotlib.pyplot as plt
 import meshio
 import numpy as np
 import pytest
 
 import repro
 from repro import results
+from repro.cli import main
+from repro.errors import OutputError
 from repro.results.tables import SHOWN, Results, solve, unit
 from repro.run.running import run
-from repro.scene import load_scene
+from repro.scene import SceneError, load_scene, packaged_scenes
 
 SHORT = ["numerics.preset=fast", 'growth.end="0.6 h"']
 
@@ -125,7 +134,7 @@ OTHERS = {"errors", "files"}
 def test_what_the_package_ships():
     """Mutant: data left out of the wheel."""
     project = (importlib.resources.files("repro") / ".." / "pyproject.toml").read_text(encoding="utf-8")
-    for name in ("py.typed", "tutorial.md"):
+    for name in ("py.typed",):
         assert (importlib.resources.files("repro") / name).is_file() and f'"{name}"' in project
 
 
@@ -160,3 +169,129 @@ def test_users_of_mypy_see_types(tmp_path):
         "repro.results.tables.Results", "numpy.ndarray", "dict", "dict", "int"], done.stdout
     errors = re.findall(r"error: .*\[([a-z-]+)\]$", done.stdout, re.M)
     assert sorted(errors) == ["arg-type", "attr-defined", "attr-defined"], done.stdout
+
+
+NARROW = {"pore": {"width": "30 um"}, "aggregate": {"radius": "8 um"}, "flow": {"mean_velocity": "1.5 m/day"},
+          "substrates": {"acceptor": {"supply": "8 mg/L"}, "donor": {"supply": "5 mg/L"}}, "growth": {"end": "1 h"}}
+
+
+def test_a_scene_may_be_a_dict_a_file_or_a_name(tmp_path):
+    """And one that was loaded; the dict is left as it is. Mutants: changes that are lost; a dict that is changed."""
+    kept = copy.deepcopy(NARROW)
+    scene = load_scene(NARROW)
+    assert kept == NARROW and scene == load_scene(scene) and scene.name == "scene"
+    file = tmp_path / "narrow.toml"
+    file.write_text(str(scene))
+    from_file = solve(str(file))
+    for other in (solve(NARROW), solve(scene)):
+        assert all(np.array_equal(from_file[name], other[name]) for name in from_file)
+    assert [load_scene(one, ["pore.width=40 um"]).pore.width for one in (scene, NARROW)] == [40, 40]
+    assert load_scene(scene, unset=["flow"]).flow is None and scene.flow is not None and kept == NARROW
+    with pytest.raises(SceneError, match=r"scene: pore.width = 3: a length"):
+        load_scene({"pore": {"width": 3}})
+
+
+def test_a_scene_prints_as_its_toml(tmp_path):
+    """Every key, with units, and it reads as an equal scene. Mutants: keys left out; tables before values."""
+    for name in packaged_scenes():
+        scene = load_scene(name)
+        assert load_scene(tomllib.loads(str(scene))) == replace(scene, name="scene") and 'width = "' in str(scene)
+    assert repr(load_scene("flow_only")).startswith("<Scene flow_only: pore, aggregate, flow, numerics, output; hash ")
+
+
+def test_representations_are_short(found, tmp_path):
+    """Of ten lines at most. Mutant: arrays in full."""
+    scene = load_scene("base", SHORT)
+    told = [scene, found, repro.check(scene), *repro.simulate(scene)]
+    told += [part for instant in told[3:] for part in (instant.pore, instant.solved, instant.pore.mesh,
+                                                       instant.pore.outline, instant.solved.flow)]
+    assert [type(one).__name__ for one in told if len(repr(one)) > 1000 or repr(one).count("\n") > 9] == []
+
+
+def test_check_tells_what_repro_check_does(capsys):
+    """Mutant: the check of another scene."""
+    checked = repro.check("wide")
+    assert main(["check", "wide"]) == 0
+    head = [line for line in str(checked).splitlines() if " s " not in line and "MB" not in line]
+    assert set(head) <= set(capsys.readouterr().out.splitlines()) and checked.nodes > 100
+    with pytest.raises(SceneError, match="nowhere"):
+        repro.check("nowhere")
+
+
+def test_a_run_is_loaded_as_it_was_solved(found, tmp_path):
+    """Rows and fields to the last bit, of a folder without fields too. Mutants: fields of another row; no status."""
+    repro.run(load_scene("base", SHORT), str(tmp_path))
+    loaded = repro.load_run(tmp_path)
+    assert list(loaded) == list(found) and loaded.units == found.units and repr(loaded) == repr(found)
+    for name in found:
+        assert np.array_equal(loaded[name], found[name], equal_nan=True), name
+    for time in found.time:
+        fields = loaded.fields(time)
+        assert set(fields) == set(found.fields(time))
+        assert all(np.array_equal(fields[name], found.fields(time)[name]) for name in fields)
+    assert loaded._repr_html_() == found._repr_html_()
+    (tmp_path / "fields.pvd").unlink()
+    assert "<img" not in repro.load_run(tmp_path)._repr_html_()
+    with pytest.raises(OutputError, match="holds no run"):
+        repro.load_run(tmp_path / "fields")
+
+
+def test_data_frames_and_datasets_have_names_and_units(found):
+    """Mutants: the time as a column; units left out."""
+    frame = pytest.importorskip("pandas") and found.to_pandas()
+    assert frame.index.name == "time_h" and list(frame) == list(found)[1:]
+    assert frame.attrs["units"]["conductivity_m_per_d"] == "m/d" and (frame["nodes"] == found["nodes"]).all()
+    dataset = pytest.importorskip("xarray") and found.to_xarray()
+    assert dataset["head_loss_cm"].attrs["units"] == "cm" and dataset.attrs["status"] == "completed"
+    assert np.array_equal(dataset["time_h"], found.time)
+
+
+@pytest.mark.parametrize("package, make", [("pandas", Results.to_pandas), ("xarray", Results.to_xarray)])
+def test_an_optional_package_that_is_not_there_is_told_in_one_line(found, monkeypatch, package, make):
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(ImportError, match=f"^the package {package} is not installed; pip install {package}$"):
+        make(found)
+
+
+def test_a_sweep_from_python(tmp_path):
+    """Runs, labels and tables; a second call makes nothing again. Mutants: runs of one value; a run made twice."""
+    events = []
+    asked = NARROW, ["pore.width=30 um, 40 um"], tmp_path / "sweep"
+    swept = repro.sweep(*asked, workers=1, tell=events.append)
+    assert [one.done for one in swept.runs] == [True, True] and swept.failed == []
+    assert [swept.label(one) for one in swept.runs] == ["pore.width = 30 um", "pore.width = 40 um"]
+    assert [event["done"] for event in events] == [0, 1, 2] and repr(swept).startswith("<Sweep of scene: 2 of 2 runs")
+    widths = [repro.load_run(path)["head_loss_cm"][0] for path in swept.paths]
+    assert widths[0] > widths[1] and (tmp_path / "sweep" / "runs.csv").exists()
+    again = []
+    repro.sweep(*asked, workers=1, tell=again.append)
+    assert [event["done"] for event in again] == [2]
+
+
+def test_a_notebook_shows_key_figures_and_a_picture(found):
+    """The picture is a PNG of the whole meshed part, with the aggregate's boundary. Mutants: upside down; the first
+    state's."""
+    html = found._repr_html_()
+    assert "conductivity 174.1 → 173.8 m/day; thickness 5 → 5.295 um" in html and "at t = 0.6 h" in html
+    data = base64.b64decode(re.search(r'src="data:image/png;base64,([^"]+)"', html)[1])
+    pixels = plt.imread(io.BytesIO(data))
+    height, width = pixels.shape[:2]
+    places = found.fields(0.6)["places_um"]
+    assert width == 480 and height == pytest.approx(480 * np.ptp(places[:, 1]) / np.ptp(places[:, 0]), abs=1)
+    white = np.argwhere((pixels[..., :3] == 1).all(axis=2))
+    size = np.ptp(places[:, 0]) / width
+    assert (height - white[:, 0].min()) * size == pytest.approx(found["thickness_um"][-1], abs=2 * size)
+    assert white[:, 0].max() == height - 1 and np.ptp(white[:, 1]) * size == pytest.approx(10.5, abs=3 * size)
+    assert len(html) < 100_000
+
+
+def test_help_begins_with_use_and_the_version_is_told(capsys):
+    """Mutants: the map of modules first; a version of its own."""
+    lines = repro.__doc__.splitlines()
+    assert "Ten lines of use" in lines[2] and sum("repro." in line for line in lines[4:14]) >= 6
+    code = "\n".join(line.strip() for line in lines[4:14])
+    assert set(re.findall(r"repro\.(\w+)\(", code)) <= set(repro.__all__)
+    with pytest.raises(SystemExit) as ended:
+        main(["--version"])
+    assert ended.value.code == 0 and capsys.readouterr().out == f"repro {repro.__version__}\n"
+    assert repro.__version__ == version("dupin2001-repro") and dir(repro) == sorted(repro.__all__)

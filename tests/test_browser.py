@@ -5,6 +5,7 @@ import re
 import socket
 import threading
 
+import meshio
 import numpy as np
 import pytest
 
@@ -99,7 +100,7 @@ def test_the_picture_is_the_field(window, runs, name):
     out = runs[name]
     show(window, out, "#field=acceptor_mg_per_L", width=1400)
     _, path = fields.index(out)[-1]
-    grid = fields.meshio.vtu.read(path)
+    grid = meshio.vtu.read(path)
     x, y = grid.points[:, :2].T
     inside = (np.abs(x) < 40) & (y > 1) & (y < y.max() - 1)
     value = "(x, y) => shown.all[Math.floor((shown.tall - (y - shown.box[2]) * shown.scale) * shown.ratio) * " \

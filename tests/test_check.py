@@ -142,6 +142,19 @@ FEW = ("substrates.acceptor.half_saturation=2e-3 mg/L", "substrates.donor.half_s
     # contact from 31.2 h on
     ("growth.end", ("wide", "pore.length=3000 um", "growth.end=37 h"),
      ("wide", "pore.length=3000 um", "growth.end=38 h")),
+    # a diffusivity of Table 1 is changed, and its partner in the aggregate too or not; F = COD - Y d_c
+    ("substrates.donor.diffusivity_in_aggregate",
+     ("base", *QUIET, "substrates.donor.diffusivity=2 cm^2/day", "substrates.donor.diffusivity_in_aggregate=80 %"),
+     ("base", *QUIET, "substrates.donor.diffusivity=2 cm^2/day")),
+    ("substrates.acceptor.diffusivity_in_aggregate",
+     ("base", *QUIET, "substrates.acceptor.diffusivity_in_aggregate=1 cm^2/day"),
+     ("base", *QUIET, "substrates.acceptor.diffusivity=3 cm^2/day")),
+    ("kinetics.acceptor_to_donor_ratio",
+     ("base", *QUIET, "kinetics.yield_coefficient=0.5", "kinetics.donor_oxygen_demand=2.38"),
+     ("base", *QUIET, "kinetics.yield_coefficient=0.5")),
+    ("kinetics.acceptor_to_donor_ratio",
+     ("base", *QUIET, "kinetics.decay_oxygen_demand=1.2", "kinetics.acceptor_to_donor_ratio=1.7"),
+     ("base", *QUIET, "kinetics.decay_oxygen_demand=1.2")),
 ])
 def test_warnings_are_exactly_where_a_simplification_fails(key, inside, outside):
     """Either side of the threshold, worked out by hand; nothing else is warned of. Mutants: any of the thresholds

@@ -9,7 +9,7 @@ import pytest
 from repro.cli import main
 from repro.errors import Interrupted
 from repro.march.simulation import simulate
-from repro.run import machine, memory
+from repro.run import machine, memory, running
 from repro.run.running import Watch, resume, run
 from repro.scene import SceneError, load_scene
 from tests.shell import SHORT, files, shell
@@ -145,7 +145,7 @@ def test_want_of_memory_outside_of_the_steps_is_told_in_one_line(tmp_path, capsy
     def none_left(*_):
         raise MemoryError("Unable to allocate 1 GiB")
 
-    monkeypatch.setattr("repro.cli.run.run", lambda *_, **__: none_left())
+    monkeypatch.setattr(running, "run", lambda *_, **__: none_left())
     assert main(["run", "flow_only", "--out", str(tmp_path / "run")]) == 1
     assert capsys.readouterr().err == ("repro: out of memory (Unable to allocate 1 GiB); try a smaller "
                                        "numerics.refinement\n")

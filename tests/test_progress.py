@@ -15,6 +15,7 @@ import pytest
 
 from repro.cli import main
 from repro.model import growth
+from repro.run import progress
 from repro.run.interrupts import SAME, noted
 from tests.shell import started, told, wait_for
 
@@ -65,10 +66,40 @@ def test_without_a_terminal_a_line_each_tenth(tmp_path, capsys):
     assert out == f"base: completed; results in {tmp_path / 'run'}\n"
 
 
+def test_a_long_step_is_not_silent(capsys, monkeypatch):
+    """Without a terminal lines go on coming while a step takes its time. Mutants: silence until the step's end; lines
+    after the end of the run."""
+    monkeypatch.setattr(progress, "TICK", 0.01)
+    monkeypatch.setattr(progress, "SILENCE", 0.02)
+    step = {"event": "step", "time_h": 3.5, "end_h": 45.0, "step": 17, "remeshes": 2, "contact": True}
+    with progress.in_lines() as tell:
+        tell(step)
+        lines, deadline = "", time.monotonic() + 20
+        while lines.count("\n") < 3 and time.monotonic() < deadline:
+            lines += capsys.readouterr().err
+            time.sleep(0.01)
+    capsys.readouterr()
+    assert re.fullmatch(r"(3\.5 of 45 h simulated, step 17, contact, \d+ s\n){3,}", lines)
+    time.sleep(0.1)
+    assert capsys.readouterr() == ("", "")
+
+
+def test_sixty_columns_are_enough(tmp_path):
+    """For all that is told. Mutant: words cut off at the right."""
+    last = terminal(tmp_path, 60)[-1]
+    assert re.fullmatch(r"base 0\.6/0\.6 h \d\d:\d\d<\d\d:\d\d, step \d+, mesh \d, contact *", last) and len(last) <= 60
+
+
 def test_on_a_terminal_a_bar(tmp_path):
     """Simulated time, steps, remeshes, contact and the time that is left. Mutants: a bar that counts rows, lines."""
+    last = terminal(tmp_path, 120)[-1]
+    assert re.search(r"base 100%\|.*\| 0\.6 of 0\.6 h \[\d\d:\d\d < \d\d:\d\d, step \d+, remeshes \d, contact\]", last)
+
+
+def terminal(tmp_path, columns):
+    """What a run shows on a terminal, state by state, up to the last with all steps."""
     here, there = pty.openpty()
-    fcntl.ioctl(there, termios.TIOCSWINSZ, struct.pack("HHHH", 40, 120, 0, 0))
+    fcntl.ioctl(there, termios.TIOCSWINSZ, struct.pack("HHHH", 40, columns, 0, 0))
     process = started(*CONTACT, "--out", tmp_path / "run", stdout=there, stderr=there, text=False)
     os.close(there)
     seen = b""
@@ -79,10 +110,9 @@ def test_on_a_terminal_a_bar(tmp_path):
         pass
     os.close(here)
     process.wait()
-    bars = seen.decode().split("\r")
-    last = [bar for bar in bars if "100%" in bar][-1]
-    assert re.search(r"base 100%\|.*\| 0\.6 of 0\.6 h \[\d\d:\d\d < \d\d:\d\d, step \d+, remeshes \d, contact\]", last)
     assert "simulated" not in seen.decode() and seen.decode().count("completed") == 1
+    bars = [bar.rstrip("\n") for bar in re.split(r"\r", seen.decode())]
+    return [bar for bar in bars if " h " in bar and "contact" in bar and "simulated" not in bar]
 
 
 @pytest.mark.parametrize("arguments", [[], ["base"], ["--out", "x"], ["base", "--resume", "x"], ["--checkpoint", "-1"],

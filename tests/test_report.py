@@ -244,3 +244,66 @@ def test_broken_fields_are_an_error_and_no_page(paper, tmp_path, content):
     with pytest.raises(ValueError, match="fields cannot be read"):
         report.write(copy)
     assert not (copy / "report.html").exists()
+
+
+def test_the_state_before_an_expansion_is_shown_ahead_of_that_after_it(tmp_path):
+    """Both at the same time, and the page says which is which. Mutants: the file of another time; one counted twice."""
+    folder = run(tmp_path, "base", "growth.end=0.6 h", 'output.times=["0 h", "0.4 h", "0.6 h"]')
+    packed = stored(folder)
+    told = [(frame["time"], frame.get("note")) for frame in packed["frames"]]
+    assert told == [(0, None), (0.4, fields.BEFORE), (0.4, None), (0.6, fields.BEFORE), (0.6, None)]
+    before, after = packed["frames"][1:3]
+    assert before["values"]["theta"][1] > after["values"]["theta"][1] or before["points"] != after["points"]
+    assert "all 3 times shown, those grown and not yet expanded besides" in text_of(folder)
+
+
+def test_warnings_come_first_and_then_what_is_assumed(tmp_path):
+    """On the first screen, ahead of fields and charts. Mutants: warnings at the end; an assumption of physics that is
+    not there."""
+    text = text_of(run(tmp_path / "one", "base", "growth.end=0.2 h", "kinetics.yield_coefficient=0.5"))
+    places = [text.index(words) for words in ("kinetics.acceptor_to_donor_ratio</b>", "Assumed: ", "Fields and mesh")]
+    assert places == sorted(places) and "traction on the aggregate neglected" in text and "quasi-steady" in text
+    text = text_of(run(tmp_path / "two", "flow_only"))
+    assert "quasi-steady" not in text and "traction" not in text and "Assumed: a pore in the plane" in text
+
+
+def with_middles(points, cells):
+    """Straight six-node triangles from those of three."""
+    edges = np.sort(cells[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    known, which = np.unique(edges, axis=0, return_inverse=True)
+    middles = len(points) + which.reshape(-1, 3)
+    return np.vstack([points, points[known].mean(axis=1)]), np.column_stack([cells, middles])
+
+
+@pytest.mark.parametrize("kind, corners", [("triangle", 3), ("triangle6", 6)])
+def test_a_page_of_a_fine_mesh_is_small_and_true(tmp_path, monkeypatch, kind, corners):
+    """1e5 nodes in several times take 3 MB at most; values on the grid are those of the mesh. Mutants: the mesh itself;
+    values of another place."""
+    monkeypatch.setattr(fields, "MOST_NODES", 101_000 if corners == 3 else 26_000)
+    points, cells = fields._regular(np.zeros(2), np.array([100.0, 50.0]))
+    monkeypatch.undo()
+    if corners == 6:
+        points, cells = with_middles(points, cells)
+    x, y = points.T
+    region = (np.hypot(points[cells[:, :3], 0].mean(1) - 50, points[cells[:, :3], 1].mean(1)) < 20).astype(float)
+    nodal = {name: 3 * x - 2 * y for name in ("head_cm", "acceptor_mg_per_L", "donor_mg_per_L", "active_biomass",
+                                              "inert_biomass", "pressure_MPa")}
+    nodal["velocity_m_per_d"] = np.column_stack([x, y, 0 * x])
+    celled = {name: [region] for name in ("region", "theta", "J", "largest_principal_stress_MPa", "stress_xx_MPa")}
+    grid = meshio.Mesh(np.column_stack([x, y, 0 * x]), [(kind, cells)], nodal, celled)
+    entries = [(float(k), tmp_path / f"{k}.vtu") for k in range(5)]
+    for _, path in entries:
+        meshio.vtu.write(path, grid)
+    packed = fields.packed(entries, entries)
+    assert len(json.dumps(packed)) < 3e6 - 200e3 and packed["nodes"] == len(points) >= 1e5
+    frame, mesh = packed["frames"][-1], packed["meshes"][0]
+    assert len(packed["frames"]) >= 2 and mesh["per"] == 3
+    box = np.array(packed["box"]).reshape(2, 2)
+    places = box[:, 0] + numbers(frame["points"], "<u2").reshape(-1, 2) / 65534 * (box[:, 1] - box[:, 0])
+    low, high, text = frame["values"]["head_cm"]
+    told = low + numbers(text, "<u2") / 65534 * (high - low)
+    assert np.abs(told - (3 * places[:, 0] - 2 * places[:, 1])).max() < 0.02
+    shown = places[numbers(mesh["cells"], "<u4").reshape(-1, 3)].mean(axis=1)
+    inside = numbers(mesh["body"], "<u1") == 1
+    clear = np.abs(np.hypot(shown[:, 0] - 50, shown[:, 1]) - 20) > 1
+    assert (inside == (np.hypot(shown[:, 0] - 50, shown[:, 1]) < 20))[clear].all()

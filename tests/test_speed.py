@@ -1,4 +1,6 @@
-"""What is told of speed, hard cases and assumptions follows from what was measured, in the README and on its page."""
+"""What is told of speed, hard cases and assumptions follows from what was measured, in all places that tell it."""
+import re
+
 import pytest
 
 from verification import speed
@@ -25,10 +27,14 @@ def told():
     return list(speed.blocks({"bench": BENCH, "hard_cases": HARD, "audit": AUDIT}))
 
 
-def test_the_readme_tells_what_was_measured():
+@pytest.mark.parametrize("file", [speed.README, speed.PERFORMANCE], ids=lambda file: file.name)
+def test_the_pages_tell_what_was_measured(file):
     """Mutants: a number edited by hand, a benchmark whose numbers were not told."""
-    text = speed.README.read_text(encoding="utf-8")
-    assert speed.in_readme(text, speed.markdown(list(speed.blocks(speed.records())))) == text
+    text = file.read_text(encoding="utf-8")
+    section = speed.pages_of(speed.records())[file]
+    assert speed.within(text, section) == text and "| accurate |" in section
+    pictures = re.findall(r"!\[[^]]*\]\(([^)]+)\)", section)
+    assert pictures and all((file.parent / name).exists() for name in pictures)
 
 
 def test_the_record_has_every_hard_case():
@@ -55,7 +61,7 @@ def test_a_change_is_told_in_percent_with_its_sign(told):
 
 
 def test_text_is_escaped(told):
-    """Mutants: cells written as they are, into HTML or into a table of the README."""
+    """Mutants: cells written as they are, into HTML or into a table in Markdown."""
     assert "a &lt;processor&gt;" in speed.page(told) and "too | fast" in speed.page(told)
     assert "| x \\| y |" in speed.markdown([speed.Block("table", rows=(("a",), ("x | y",)))])
 
@@ -68,6 +74,6 @@ def test_without_records_nothing_is_told():
 def test_the_section_replaces_the_one_before():
     """Text around the marks stays. Mutant: sections that pile up."""
     text = f"before\n{speed.BEGIN}\nold\n{speed.END}\nafter\n"
-    once = speed.in_readme(text, "new")
+    once = speed.within(text, "new")
     assert "old" not in once and once.startswith("before\n") and once.endswith(f"{speed.END}\nafter\n")
-    assert speed.in_readme(once, "new") == once
+    assert speed.within(once, "new") == once

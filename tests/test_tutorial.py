@@ -9,7 +9,7 @@ import pytest
 from repro.scene import load_scene
 from tests.blocks import ROOT, blocks, execute, is_repro, told
 
-PAGE = ROOT / "repro" / "tutorial.md"
+PAGE = ROOT / "docs" / "tutorial.md"
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +33,7 @@ def test_the_tutorial_works_from_its_first_line_to_its_last(folder, capsys, monk
             statuses.append(status)
             assert [err.strip()] == told(block) if status else told(block) == [], err
     plt.close("all")
-    assert statuses == [0, 0, 0, 0, 0, 0, 2, 0, 0, 0]
+    assert statuses == [0, 0, 0, 0, 0, 0, 2, 0, 0, 0, 0]
     assert load_scene("mine.toml").pore == load_scene("base").pore
     assert (folder / "runs" / "narrow" / "timeseries.csv").exists() and (folder / "oxygen.png").stat().st_size > 1000
     assert "WARNING" not in printed[3] and "WARNING growth.end" in printed[4]

@@ -23,7 +23,7 @@ RECORD = Path(__file__).parent / "report" / "hard_cases.json"
 
 
 def as_json(cells: Iterable[Cell]) -> dict:
-    """What the report and the README draw the matrix from."""
+    """What the report and docs/performance.md draw the matrix from."""
     rows: dict[int, dict] = {}
     for cell in cells:
         case = cell.case

@@ -1,7 +1,8 @@
-"""Speed against error, told: a section of the README and a page of the report, both from what was measured.
+"""Speed against error, told in ``docs/performance.md``, in the README, which has the presets alone, and on a page of
+the report, all from what was measured.
 
 ``python -m verification.speed`` writes them from ``bench.json`` (`make bench`), ``audit.json`` (`make bench`) and
-``hard_cases.json`` (`make verify`) in ``verification/report``. The README's section stands between two marks and is
+``hard_cases.json`` (`make verify`) in ``verification/report``. A section in Markdown stands between two marks and is
 never edited by hand; a test holds it to the records.
 """
 
@@ -18,7 +19,8 @@ from verification.bench import base
 from verification.bench.record import line
 
 FOLDER = Path(__file__).parent / "report"
-README = Path(__file__).parents[1] / "README.md"
+ROOT = Path(__file__).parents[1]
+README, PERFORMANCE = ROOT / "README.md", ROOT / "docs" / "performance.md"
 BEGIN, END = "<!-- speed: begin (python -m verification.speed) -->", "<!-- speed: end -->"
 QUANTITIES = ("velocity", "conductivity", "area", "thickness", "upstream", "downstream", "acceptor out", "donor out")
 PAPER_AS_IT_IS = "refinement 1, 12 min"
@@ -50,13 +52,27 @@ def blocks(found: dict[str, dict]) -> Iterator[Block]:
     yield from _audit(found["audit"])
 
 
+def summary(found: dict[str, dict]) -> Iterator[Block]:
+    """What the README tells: the presets on base, and the diagram of all methods."""
+    part = found["bench"].get("parts", {}).get("base")
+    if part:
+        yield _machine(found["bench"])
+        rows = (row[:4] for row in _presets(part))
+        yield Block("table", rows=(("preset", "time (s)", "faster than paper", "largest error"), *rows))
+        yield Block("picture", "bench_base.svg: error against time of the whole base run")
+
+
+def _machine(record: dict) -> Block:
+    about = record["machine"]
+    return Block("text", f"Measured by `make bench` on {about['cores']} cores of {about['processor']}, one thread, "
+                         f"Python {about['python']}; importing the packages is not counted. Times of another machine "
+                         "differ, ratios less.")
+
+
 def _bench(record: dict) -> Iterator[Block]:
     if not record.get("parts"):
         return
-    about = record["machine"]
-    yield Block("text", f"Measured by `make bench` on {about['cores']} cores of {about['processor']}, one thread, "
-                        f"Python {about['python']}; importing the packages is not counted. Times of another machine "
-                        "differ, ratios less.")
+    yield _machine(record)
     part = record["parts"].get("base")
     if part:
         yield Block("picture", "bench_base.svg: error against time of the whole base run")
@@ -152,17 +168,17 @@ def _word(holds: bool | None) -> str:
     return {True: "holds", False: "does not hold", None: "not measured"}[holds]
 
 
-def markdown(found: list[Block]) -> str:
-    """The README's section."""
-    return "\n\n".join(_markdown(block) for block in found if not block.detail)
+def markdown(found: list[Block], pictures: str = "../verification/report") -> str:
+    """The section of a page in Markdown; pictures: where they are from there."""
+    return "\n\n".join(_markdown(block, pictures) for block in found if not block.detail)
 
 
-def _markdown(block: Block) -> str:
+def _markdown(block: Block, pictures: str) -> str:
     if block.kind == "heading":
-        return f"### {block.text}"
+        return f"## {block.text}"
     if block.kind == "picture":
         name, _, shown = block.text.partition(": ")
-        return f"![{shown}](verification/report/{name})"
+        return f"![{shown}]({pictures}/{name})"
     if block.kind == "text":
         return block.text
     head, *rows = block.rows
@@ -190,18 +206,24 @@ def _html(block: Block) -> str:
     return f"<table>{pages.row('th', *map(html.escape, head))}{body}</table>"
 
 
-def in_readme(text: str, section: str) -> str:
-    """The README with the section between its marks."""
+def pages_of(found: dict[str, dict]) -> dict[Path, str]:
+    """The sections of the pages in Markdown."""
+    return {README: markdown(list(summary(found)), "verification/report"),
+            PERFORMANCE: markdown(list(blocks(found)))}
+
+
+def within(text: str, section: str) -> str:
+    """A page with the section between its marks."""
     before, _, rest = text.partition(BEGIN)
     _, _, after = rest.partition(END)
     return f"{before}{BEGIN}\n\n{section}\n\n{END}{after}"
 
 
 def main() -> None:
-    """Write both."""
-    found = list(blocks(records()))
+    """Write all of them."""
     write_page(FOLDER)
-    README.write_text(in_readme(README.read_text(encoding="utf-8"), markdown(found)), encoding="utf-8")
+    for file, section in pages_of(records()).items():
+        file.write_text(within(file.read_text(encoding="utf-8"), section), encoding="utf-8")
 
 
 def write_page(folder: Path) -> Path:

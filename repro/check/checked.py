@@ -15,7 +15,7 @@ from repro.errors import SimulationError
 from repro.fem.linear import Method
 from repro.march.loop import stopping
 from repro.model import pore
-from repro.scene import Scene
+from repro.scene import Source, label, load_scene
 from repro.scene.units import SceneError
 
 WIDTH = 110
@@ -34,20 +34,30 @@ class Checked:
     warnings: list[Warned]
     cost: Cost
 
+    def __str__(self) -> str:
+        return report(self)
+
+    def __repr__(self) -> str:
+        return (f"<Check of {self.scene}: it can be run, {len(self.warnings)} warnings, "
+                f"{self.nodes} nodes at t = 0>")
+
     def tables(self) -> dict:
         """For JSON."""
         return {**asdict(self), "modelled": dict(self.modelled)}
 
 
-def check(scene: Scene, file: str) -> Checked:
-    """What is to be told of a scene before it is run. Raises SceneError, naming ``file``, where its
-    first state or step fails."""
+def check(scene: Source, file: str = "") -> Checked:
+    """What is to be told of a scene before it is run; ``print`` shows it. Raises SceneError, naming
+    ``file`` or the scene, where it is not accepted, or its first state or step fails."""
+    file = file or label(scene)
+    scene = load_scene(scene)
     try:
         with stopping(0.0):
             Method(scene.numerics.solver, scene.numerics.ordering).checked()
             mesh = pore.seeded(scene).mesh
         trial = cost.tried(scene, len(mesh.points))
-        most, found = judged(scene, trial.first)
+        flow = trial.first.solved.flow
+        most, found = judged(scene, flow.mean_velocity if flow else None)
         return Checked(scene.name, modelled(scene), len(mesh.points), len(mesh.biomass), found,
                        warnings(most, found), cost.expected(scene, trial, len(mesh.points)))
     except (SimulationError, ArithmeticError) as error:

@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 from repro.fem.sizing import meshed_extent
-from repro.march.loop import Instant
 from repro.model import kinetics
 from repro.model.pore import film, initial_outline, sized
 from repro.model.traction import MPA_PER_UM
@@ -68,6 +68,7 @@ def at_start(scene: Scene) -> Sizes:
     return Sizes(outline.area, outline.thickness, reach, 0.0 if touches else None)
 
 
+@lru_cache(maxsize=1)
 def at_end(scene: Scene) -> Sizes:
     """The bound at growth.end; the seed without growth."""
     now = at_start(scene)
@@ -124,19 +125,18 @@ def numbers(scene: Scene, speed: float | None) -> list[Number]:
     return found
 
 
-def judged(scene: Scene, first: Instant) -> tuple[Scene, list[Number]]:
+def judged(scene: Scene, velocity: float | None) -> tuple[Scene, list[Number]]:
     """What a scene is judged by: each of its tables at its largest value, and the numbers of that;
-    first: its state at t = 0."""
+    velocity: mean, um/h, at t = 0, None without flow."""
     most = scene.largest
-    flow = first.solved.flow
-    if flow is None:
+    if velocity is None:
         return most, numbers(most, None)
     start = needed(scene.at(0.0).flow, "[flow]")
     drive = needed(most.flow, "[flow]")
     if drive.mean_velocity is not None:
         return most, numbers(most, drive.mean_velocity)
     rise = needed(drive.head, "flow.head") / needed(start.head, "flow.head")
-    return most, numbers(most, flow.mean_velocity * rise)
+    return most, numbers(most, velocity * rise)
 
 
 def _transported(scene: Scene, speed: float) -> Iterator[Number]:

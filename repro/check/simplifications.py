@@ -11,7 +11,8 @@ from repro.check.numbers import Number
 from repro.fem import sizing
 from repro.model.pore import film, resolution
 from repro.model.remeshing import MOST_REFINED
-from repro.scene import Scene
+from repro.scene import Kinetics, Scene
+from repro.scene.keys import RATIO
 
 #: (1) has no inertia, whose share of the viscous forces is of the order of the Reynolds number.
 REYNOLDS = 0.1
@@ -43,11 +44,11 @@ class Warned:
 def warnings(scene: Scene, found: list[Number]) -> list[Warned]:
     """Every simplification that does not hold; found: the numbers of the scene."""
     value = {number.name: number.start for number in found}
-    checks = [_inertia(value), _cells(scene, value)]
+    checks = [_inertia(value), _cells(scene, value), _diffusivities(scene)]
     if scene.aggregate:
         checks += [_seed_film(scene), _ends(scene)]
     if scene.kinetics:
-        checks.append(_fronts(scene))
+        checks += [_fronts(scene), _demand(scene.kinetics)]
     if scene.growth:
         checks += [_lag(scene, value), _forces(scene, found), _steps(scene), _contact(scene)]
     return [warned for check in checks for warned in check]
@@ -69,6 +70,30 @@ def _cells(scene: Scene, value: dict[str, float]) -> Iterator[Warned]:
                      f"{CELL_PECLET:g}: linear elements may overshoot where concentrations are "
                      f"steep; {wanted:.2g} would do, and the presets fast and accurate refine by "
                      "themselves")
+
+
+def _diffusivities(scene: Scene) -> Iterator[Warned]:
+    """Where one of two values of Table 1 that belong together is changed, and the other is not."""
+    for name in ("acceptor", "donor") if scene.substrates and scene.aggregate else ():
+        now = getattr(scene.substrates, name)
+        table = type(now)(supply=now.supply)
+        inside = now.diffusivity_in_aggregate
+        if now.diffusivity != table.diffusivity and inside == table.diffusivity_in_aggregate:
+            yield Warned(f"substrates.{name}.diffusivity_in_aggregate", "it is still that of Table "
+                         f"1, {100 * inside / now.diffusivity:.3g} % of the diffusivity in water, "
+                         'which was changed; "80 %" keeps their ratio (2.2)')
+
+
+def _demand(law: Kinetics) -> Iterator[Warned]:
+    """The same of F = COD - Y d_c (7)."""
+    table = Kinetics()
+    made = law.yield_coefficient * law.decay_oxygen_demand
+    before = table.yield_coefficient * table.decay_oxygen_demand
+    alone = law.donor_oxygen_demand is None and made != before
+    if alone and law.acceptor_to_donor_ratio == table.acceptor_to_donor_ratio:
+        yield Warned("kinetics.acceptor_to_donor_ratio", f"F is still {RATIO:g} of Table 1, while "
+                     f"Y d_c is {made:.3g} and no longer {before:.3g}: F = COD - Y d_c (7); with "
+                     "donor_oxygen_demand (COD) in its place it follows")
 
 
 def _lag(scene: Scene, value: dict[str, float]) -> Iterator[Warned]:

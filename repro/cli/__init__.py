@@ -46,10 +46,21 @@ def _fail(chosen, message, status: int) -> int:
     return status
 
 
+class _Version(argparse.Action):
+    """Tell the version, which is looked up when it is asked for, and end."""
+
+    def __call__(self, parser, *_):
+        from importlib.metadata import version
+
+        say(f"repro {version('dupin2001-repro')}")
+        parser.exit()
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="repro", description="Biological clogging of one pore by the growth of an aggregate "
         "(Dupin, Kitanidis & McCarty 2001).")
+    parser.add_argument("--version", action=_Version, nargs=0, help="tell the version and exit")
     commands = parser.add_subparsers(dest="command", required=True)
     for command in COMMANDS:
         command.add(commands)

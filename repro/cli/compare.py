@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from repro import report
+from repro.errors import OutputError
 from repro.run.progress import say
-from repro.run.running import OutputError
 
 
 def add(commands) -> None:
@@ -24,6 +23,8 @@ def add(commands) -> None:
 
 def call(chosen) -> int:
     """Write the page of the runs that were chosen."""
+    from repro import report
+
     if len(chosen.runs) < 2:
         raise OutputError(f"compare {chosen.runs[0]}: two runs or more are needed")
     _check(chosen.out)

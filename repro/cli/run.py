@@ -9,17 +9,22 @@ import argparse
 import math
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from repro.cli.arguments import add_scene
 from repro.errors import SimulationError
-from repro.run import interrupts, progress
-from repro.run.running import INTERVAL, Watch, resume, run
+from repro.run import INTERVAL, interrupts, progress
 from repro.scene import Scene, load_scene, packaged_scenes
+from repro.scene.files import key_of
+
+if TYPE_CHECKING:
+    from repro.run.running import Watch
 
 DESCRIPTION = """\
 Run a scene and write its results, or go on with a run that was interrupted or killed: the result is
 the same to the last bit. Where DIR holds a run of the same scene, that is gone on with, or left
-alone where it is over."""
+alone where it is over. --resume DIR --set growth.end="30 h" makes a run longer, over or not, as if
+that had been asked for at first."""
 STATUS = """exit status:
   0    done: the scene's end, or the pore's, is reached, now or before
   1    a stage failed; the message says at what simulated time, in which stage, why, where the
@@ -61,13 +66,16 @@ def _seconds(text: str) -> float:
 
 def call(chosen) -> int:
     """Run the scene that was chosen, or go on with the run."""
-    others = (chosen.scene, chosen.set, chosen.unset, chosen.out, chosen.force)
+    others = [chosen.scene, chosen.unset, chosen.out, chosen.force]
+    others += [entry for entry in chosen.set if key_of(entry) != "growth.end"]
     if chosen.resume and any(others):
-        chosen.refuse("--resume takes the scene from the run's folder: no SCENE, --set, --unset, "
-                      "--out or --force is accepted with it")
+        chosen.refuse("--resume takes the scene from the run's folder: no SCENE, --unset, --out or "
+                      "--force is accepted with it, and no --set but of growth.end")
     if not chosen.resume and not (chosen.scene and chosen.out):
         chosen.refuse("SCENE and --out DIR are needed, or --resume DIR")
     scene = None if chosen.resume else load_scene(chosen.scene, chosen.set, chosen.unset)
+    from repro.run.running import Watch
+
     with interrupts.noted() as stop, progress.told(chosen.quiet, chosen.json) as tell:
         try:
             _run(chosen, scene, Watch(tell, chosen.checkpoint, stop))
@@ -79,8 +87,10 @@ def call(chosen) -> int:
 
 def _run(chosen, scene: Scene | None, watch: Watch) -> None:
     """Run the scene, or go on with the run where there is none."""
+    from repro.run.running import resume, run
+
     if scene is None:
-        resume(chosen.resume, watch=watch)
+        resume(chosen.resume, watch=watch, overrides=chosen.set)
     else:
         run(scene, chosen.out, watch=watch, force=chosen.force, origin=_origin(chosen))
 

@@ -9,17 +9,16 @@ import argparse
 import signal
 import sys
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
-
-from tqdm import tqdm
+from typing import TYPE_CHECKING
 
 from repro.cli.arguments import add_scene
 from repro.errors import Interrupted
-from repro.run.machine import require_packages
 from repro.run.progress import say
-from repro.sweep import cluster, design, page, pool, table
-from repro.sweep.state import Sweep, opened, usable
+
+if TYPE_CHECKING:
+    from repro.sweep.making import Swept, Tell
 
 #: Exit status where some runs have failed.
 SOME_FAILED = 3
@@ -76,15 +75,13 @@ def _part(text: str) -> float:
 
 def call(chosen) -> int:
     """Make the sweep that was chosen."""
-    ended: dict[int, str] = {}
-    with _ended_by_sigterm(), _ready(chosen) as each:
-        sweep = _wanted(chosen)
-        with opened(sweep):
-            try:
-                _make(sweep, chosen.quiet, each, ended)
-            finally:
-                told = _told(sweep, ended, chosen.clogged)
-    return _report(sweep, told)
+    from repro.sweep.making import sweep
+
+    with _ended_by_sigterm(), _telling(chosen.quiet) as tell:
+        swept = sweep(chosen.scene, chosen.vary, chosen.out, chosen.set, chosen.unset,
+                      samples=chosen.samples, seed=chosen.seed, workers=chosen.workers,
+                      scheduler=chosen.scheduler, clogged=chosen.clogged, tell=tell)
+    return _report(swept)
 
 
 @contextmanager
@@ -104,55 +101,40 @@ def _ended_by_sigterm() -> Iterator[None]:
         signal.signal(signal.SIGTERM, kept)
 
 
-def _ready(chosen) -> AbstractContextManager[pool.Each]:
-    """What makes the runs: processes here, which load what they need meanwhile, or a cluster."""
-    if chosen.scheduler:
-        return cluster.ready(chosen.scheduler)
-    return pool.ready(chosen.workers or pool.cores())
+@contextmanager
+def _telling(quiet: bool) -> Iterator[Tell]:
+    """What tells a person how far a sweep is: nothing, a bar on a terminal, a line a run."""
+    if quiet or not sys.stderr.isatty():
+        yield _untold if quiet else _in_lines
+        return
+    from tqdm import tqdm
+
+    with tqdm(unit="run", delay=1e-3) as bar:
+        def tell(event: dict) -> None:
+            if event["event"] == "start":
+                bar.set_description_str(event["scene"], refresh=False)
+                bar.total = event["total"]
+                bar.initial = event["done"]
+            bar.n = event["done"]
+            bar.refresh()
+        yield tell
 
 
-def _told(sweep: Sweep, ended: dict[int, str], clogged: float) -> list[table.Told]:
-    """What there is now, which is written as tables and page too."""
-    told = table.tell(sweep, ended, clogged)
-    with usable(sweep.folder):
-        table.write(sweep, told)
-        page.write(sweep, told, clogged)
-    return told
+def _untold(event: dict) -> None:
+    """Nothing is told of a quiet sweep."""
 
 
-def _wanted(chosen) -> Sweep:
-    """The sweep that the arguments describe, every run of it checked."""
-    factors = [design.parse(text) for text in chosen.vary]
-    if chosen.samples is None:
-        found = design.grid(factors)
-    else:
-        found = design.latin(factors, chosen.samples, chosen.seed)
-    points = design.points(chosen.scene, chosen.set, factors, found, chosen.unset)
-    for point in points if chosen.scheduler is None else ():
-        require_packages(point.scene)
-    return Sweep(chosen.out, chosen.scene, factors, points)
+def _in_lines(event: dict) -> None:
+    if event["event"] == "run":
+        say(f"{event['done']} of {event['total']}: run {event['run']}, {event['values']}: "
+            f"{event['status']}", aside=True)
 
 
-def _make(sweep: Sweep, quiet: bool, each: pool.Each, ended: dict[int, str]) -> None:
-    """Make what is missing; `ended` gets how each run ended, by number."""
-    missing, total = sweep.missing(), len(sweep.points)
-    silent = quiet or not sys.stderr.isatty()
-    with tqdm(total=total, initial=total - len(missing), desc=sweep.source, unit="run",
-              disable=silent) as bar:
-        for point, status in each(missing, sweep.runs) if missing else ():
-            ended[point.index] = status
-            bar.update()
-            if not quiet and silent:
-                say(f"{total - len(missing) + len(ended)} of {total}: run {point.index}, "
-                    f"{design.label(sweep.factors, point.values)}: {status}", aside=True)
-
-
-def _report(sweep: Sweep, told: list[table.Told]) -> int:
+def _report(swept: Swept) -> int:
     """Say what there is now; the exit status."""
-    failed = [one for one in told if not one.done]
-    for one in failed:
-        say(f"repro: run {one.point.index} ({design.label(sweep.factors, one.point.values)}): "
-            f"{one.status}", aside=True)
-    say(f"{sweep.source}: {len(told) - len(failed)} of {len(told)} runs done, {len(failed)} "
-        f"failed; results in {sweep.folder}")
-    return SOME_FAILED if failed else 0
+    for one in swept.failed:
+        say(f"repro: run {one.point.index} ({swept.label(one)}): {one.status}", aside=True)
+    done = len(swept.runs) - len(swept.failed)
+    say(f"{swept.source}: {done} of {len(swept.runs)} runs done, {len(swept.failed)} "
+        f"failed; results in {swept.folder}")
+    return SOME_FAILED if swept.failed else 0

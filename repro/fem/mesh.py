@@ -18,6 +18,7 @@ from skfem import MeshTri
 from repro.errors import MeshError
 from repro.fem import elements
 from repro.fem.assembly import ElementSystem
+from repro.fem.brief import brief
 from repro.fem.linear import DEFAULT, Method, node_order
 
 #: Remesh when more than POOR_ALLOWED triangles have a quality under POOR (3.5).
@@ -253,6 +254,7 @@ def _across(topology: Topology) -> np.ndarray:
     return np.any(np.all(lines, axis=2), axis=0)
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """Triangles of fluid and biomass over ``ends`` x [0, width] (um).

@@ -16,7 +16,6 @@ from typing import TypeAlias
 import numpy as np
 import shapely
 from mmgpy import MmgMesh2D
-from scipy.spatial import cKDTree
 
 from repro.errors import MeshError
 from repro.fem import sizing as sizes_of
@@ -237,7 +236,7 @@ def _constrained_delaunay(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     """(K, 3) counterclockwise triangles between the given nodes of one polygon."""
     pieces = shapely.constrained_delaunay_triangles(shapely.Polygon(points[nodes]))
     corners = shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3]
-    distance, local = cKDTree(points[nodes]).query(corners.reshape(-1, 2))
+    local, _ = _nearest(points[nodes], corners.reshape(-1, 2))
     triangles = nodes[local].reshape(-1, 3)
     turned = triangle_areas(points, triangles) < 0
     triangles[turned] = triangles[turned][:, ::-1]
@@ -246,10 +245,18 @@ def _constrained_delaunay(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:
 
 def _find(new_points: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Indices of the prescribed points in the new mesh. Raises MeshError where one has moved."""
-    distance, found = cKDTree(new_points).query(points)
+    found, distance = _nearest(new_points, points)
     if distance.max() > 1e-9 * np.ptp(points[:, 0]) or len(np.unique(found)) < len(points):
         raise MeshError(f"the mesher moved a boundary node by {distance.max():.3g} um")
     return found
+
+
+def _nearest(points: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(K,) of the points (N, 2) the nearest to each of the places (K, 2), and its distance."""
+    tree = shapely.STRtree(shapely.points(points))
+    (_, found), distance = tree.query_nearest(shapely.points(places), return_distance=True,
+                                              all_matches=False)
+    return found, distance
 
 
 def unlocked(straight: Mesh) -> Mesh:

@@ -12,15 +12,16 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from repro.errors import MeshError
+from repro.fem.brief import brief
 
 FREE = 0
 BOTTOM = 1
 TOP = 2
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class Outline:
     """Boundary of the aggregate.
@@ -183,6 +184,8 @@ BETWEEN = 8
 
 def _splined(rim: np.ndarray, width: float) -> np.ndarray:
     """Points (M, 2) on a spline through points (K, 2), straight along the upper wall."""
+    from scipy.interpolate import CubicSpline  # a quarter of a second, and few scenes ask for it
+
     length = np.sqrt(np.linalg.norm(np.diff(rim, axis=0), axis=1))
     knots = np.concatenate([[0.0], np.cumsum(length)])
     curve = CubicSpline(knots, rim, bc_type="natural")

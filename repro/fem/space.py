@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from repro.fem import elements
+from repro.fem.brief import brief
 from repro.fem.elements import Points, Table
 from repro.fem.mesh import Dofs, Mesh
 
@@ -28,6 +29,7 @@ class Reaction:
     dx: np.ndarray
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class Space:
     """Continuous functions of an order on a mesh, by their values at the nodes of ``dofs``."""

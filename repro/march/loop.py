@@ -17,6 +17,7 @@ from typing import ClassVar, Protocol, TypeVar
 import numpy as np
 
 from repro.errors import SimulationError, StageError
+from repro.fem.brief import brief
 from repro.fem.sizing import ACROSS_PORE
 from repro.march import balance
 from repro.march.pace import Pace
@@ -52,6 +53,7 @@ class Ledger:
     biomass_after: float
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class Instant:
     """The pore at ``pore.time`` with what is solved in its geometry, and how it came there.
@@ -91,6 +93,7 @@ class Step:
     within: Callable[[float], Moment] | None = None
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class State:
     """All that a run goes on from after a step.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from repro.fem.linear import Method
 from repro.march import stepping, updates
 from repro.march.loop import Instant, State
-from repro.scene import Scene, parse_scene, scene_tables
+from repro.scene import Scene, Source, load_scene, parse_scene, scene_tables
 
 #: Points (x, y), um.
 Shape = Sequence[tuple[float, float]] | np.ndarray
@@ -18,14 +19,16 @@ Shape = Sequence[tuple[float, float]] | np.ndarray
 WAYS = {"updates": updates.steps, "midpoint": stepping.steps}
 
 
-def simulate(scene: Scene, shape: Shape | None = None, state: State | None = None) -> Iterator[Instant]:
+def simulate(scene: Source, shape: Shape | None = None, state: State | None = None) -> Iterator[Instant]:
     """Yields an Instant at t = 0 and at each reported time: at ``output.times``, or after every step.
 
-    shape: the aggregate's boundary at t = 0, (x, y) um from its upstream to its downstream end on the lower wall, in
-    place of the scene's (see ``aggregate.outline``); state: one of :func:`steps`, after which to go on. Raises
-    SceneError where the shape is not accepted, SimulationError where a stage fails, and PoreEnd,
-    after a last Instant, where the aggregate reaches an end of the pore.
+    scene: one that was loaded, or a file, a packaged name, a dict of tables; shape: the
+    aggregate's boundary at t = 0, (x, y) um from its upstream to its downstream end on the lower
+    wall, in place of the scene's (see ``aggregate.outline``); state: one of :func:`steps`, after
+    which to go on. Raises SceneError where scene or shape are not accepted, SimulationError where a
+    stage fails, and PoreEnd, after a last Instant, where the aggregate reaches an end of the pore.
     """
+    scene = load_scene(scene)
     if shape is not None:
         scene = shaped(scene, shape)
     return (instant for _, instant in steps(scene, state) if instant)
@@ -37,6 +40,13 @@ def shaped(scene: Scene, shape: Shape) -> Scene:
     seed = {key: value for key, value in tables.get("aggregate", {}).items() if key not in ("radius", "position")}
     seed["outline"] = [[f"{float(x)!r} um", f"{float(y)!r} um"] for x, y in shape]
     return parse_scene({**tables, "aggregate": seed}, scene.name, f"{scene.name} with a shape")
+
+
+def ends_soon(scene: Scene, state: State) -> bool:
+    """May the step after a state be another one where growth.end is later? A step is cut short, or
+    left room for one more, where less than twice its length is left."""
+    end = scene.growth.end if scene.growth else math.inf
+    return 2 * state.pace.length > end - state.pore.time
 
 
 def steps(scene: Scene, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:

@@ -37,6 +37,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from repro.fem.assembly import ElementSystem, each, saddle_blocks, saddle_system
+from repro.fem.brief import brief
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
 from repro.scene import Flow as Drive
@@ -44,6 +45,7 @@ from repro.scene import needed
 from repro.timing import timed
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class Flow:
     """Flow with the given mean velocity.

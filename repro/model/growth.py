@@ -37,6 +37,7 @@ import numpy as np
 from repro.errors import GrowthError, LinearError
 from repro.fem import elements
 from repro.fem.assembly import ElementSystem, Factored, each, saddle_blocks, saddle_system
+from repro.fem.brief import brief
 from repro.fem.elements import Points, Table
 from repro.fem.linear import DEFAULT, Method
 from repro.fem.mesh import gradients, triangle_areas
@@ -101,6 +102,7 @@ class Shape:
         return last
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class Body:
     """The aggregate in its reference configuration: its nodes, on the mesh of ``shape``, are at

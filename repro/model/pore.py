@@ -9,6 +9,7 @@ import numpy as np
 
 from repro.errors import TransportError
 from repro.fem import elements, mesher, sizing
+from repro.fem.brief import brief
 from repro.fem.linear import Method
 from repro.fem.mesh import Mesh
 from repro.fem.outline import TOP, Outline, half_disc, polygon
@@ -29,6 +30,7 @@ SLOWEST = 1e-9
 BOUNDARY_LAYER = 0.15
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class Pore:
     """Geometry and biomass at one time.
@@ -100,6 +102,7 @@ class Pore:
         return float(self.inert.sum() / self.mass), float(density.min()), float(density.max())
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class Solved:
     """Flow and substrates in the geometry of a pore, and the ledgers of acceptor and donor; None

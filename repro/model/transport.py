@@ -26,6 +26,7 @@ import scipy.sparse as sp
 from repro.errors import TransportError, Unresolved
 from repro.fem import elements
 from repro.fem.assembly import ElementSystem, Factored, each, mass
+from repro.fem.brief import brief
 from repro.fem.mesh import Mesh
 from repro.fem.newton import Newton, relative
 from repro.fem.space import Space
@@ -56,6 +57,7 @@ APART = 0.05
 FINER = 3
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class Problem:
     """Both substrates in one geometry, with n nodes in all and k a triangle.
@@ -94,6 +96,7 @@ class Problem:
         return np.repeat([s.supply for s in self.both], self.space.count)
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class Concentrations:
     """C_A and C_D (n,) mg/L at the nodes of their space, and the iterations that they took."""

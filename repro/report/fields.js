@@ -137,7 +137,7 @@ function bar(pen, field, low, high, left, top, width) {
 
 // What is shown, for the reader and, as data attributes, for a test.
 function told(frame, field, low, high) {
-  const text = `t = ${rounded(frame.time)} h`;
+  const text = `t = ${rounded(frame.time)} h${frame.note ? `, ${frame.note}` : ""}`;
   part.now.textContent = `${text} (${Number(part.frame.value) + 1} of ${data.frames.length})`;
   part.frame.setAttribute("aria-valuetext", text);
   const range = `${rounded(low)} to ${rounded(high)} ${field.unit}`;
@@ -183,7 +183,7 @@ part.play.addEventListener("click", play);
 part.picture.addEventListener("pointermove", probe);
 part.picture.addEventListener("pointerleave", () => { part.probe.textContent = "\u00a0"; });
 document.addEventListener("timechosen", event => {
-  part.frame.value = nearest(data.frames.map(frame => frame.time), event.detail);
+  part.frame.value = nearest(data.frames.map(frame => frame.note ? Infinity : frame.time), event.detail);
   draw();
 });
 window.addEventListener("hashchange", chosen);

@@ -12,16 +12,20 @@ import re
 from pathlib import Path
 from xml.etree import ElementTree
 
-import meshio
 import numpy as np
 
-from repro.results import names
+from repro.fem.transfer import located
+from repro.results import names, vtu
 from repro.results.arrays import ARRAYS
+from repro.results.vtu import Cells, Grid
 
 MOST_FRAMES = 40
-MOST_BYTES = 5_000_000  # of all frames in the page; two frames are always shown
+MOST_BYTES = 2_600_000  # of all frames in the page; two frames are always shown
+MOST_NODES = 10_000  # of a frame; a finer mesh is shown on a regular grid of so many points
+#: What is told of a frame of the grown aggregate that has not expanded yet (Plate 1).
+BEFORE = "before the expansion"
 LEVELS = 65534  # of a value; one more means that there is none
-_FILE = re.compile(r"fields/fields_\d{4,}\.vtu")
+_FILE = re.compile(r"fields/(?:fields|before_expansion)_\d{4,}\.vtu")
 
 #: What can be chosen, in this order.
 SHOWN = """velocity_m_per_d head_cm acceptor_mg_per_L donor_mg_per_L active_biomass inert_biomass
@@ -31,31 +35,35 @@ pressure_MPa displacement_um region""".split()
 OF_AGGREGATE = {each.name for each in ARRAYS if each.body} | {"active_biomass", "inert_biomass"}
 
 
-def index(folder: Path) -> list[tuple[float, Path]]:
-    """(time in h, file) of the fields that a run has written; only its own files are looked at."""
-    if not (folder / "fields.pvd").exists():
+def index(folder: Path, name: str = "fields.pvd") -> list[tuple[float, Path]]:
+    """(time in h, file) of the fields that a run has written; only its own files are looked at.
+    Another name, before_expansion.pvd, is of those before each expansion."""
+    if not (folder / name).exists():
         return []
-    entries = ElementTree.parse(folder / "fields.pvd").getroot().iter("DataSet")
+    entries = ElementTree.parse(folder / name).getroot().iter("DataSet")
     named = [(float(entry.get("timestep", "nan")), entry.get("file", "")) for entry in entries]
     return [(time, folder / name) for time, name in named
             if _FILE.fullmatch(name) and (folder / name).is_file()]
 
 
-def packed(entries: list[tuple[float, Path]]) -> dict:
+def packed(entries: list[tuple[float, Path]], before: list[tuple[float, Path]] | None = None) -> dict:
     """What the script is given: the fields that there are, meshes, and frames; empty without any.
+
+    before: those of the same times before the aggregate expanded, each shown ahead of its own.
     """
     if not entries:
         return {}
-    chosen = _chosen(entries)
-    grids = [meshio.vtu.read(path) for _, path in chosen]
+    last = vtu.read(entries[-1][1])
+    chosen = _chosen(entries, dict(before or []), _shown(last))
+    grids = [_shown(vtu.read(path)) for _, path, _ in chosen]
     low = np.min([grid.points.min(0) for grid in grids], 0)
     high = np.max([grid.points.max(0) for grid in grids], 0)
     meshes: dict[bytes, dict] = {}
-    frames = [_frame(time, grid, low[:2], high[:2], meshes)
-              for (time, _), grid in zip(chosen, grids)]
+    frames = [_frame(time, grid, low[:2], high[:2], meshes) | ({"note": note} if note else {})
+              for (time, _, note), grid in zip(chosen, grids)]
     described = [_described(name, grids[0]) for name in SHOWN if _in_any(frames, name)]
     return {"box": [low[0], high[0], low[1], high[1]], "of": len(entries), "frames": frames,
-            "meshes": list(meshes.values()), "fields": described}
+            "nodes": len(last.points), "meshes": list(meshes.values()), "fields": described}
 
 
 def _in_any(frames: list[dict], name: str) -> bool:
@@ -63,27 +71,60 @@ def _in_any(frames: list[dict], name: str) -> bool:
     return any(name in frame["values"] for frame in frames)
 
 
-def _chosen(entries: list[tuple[float, Path]]) -> list[tuple[float, Path]]:
-    """Evenly chosen frames, the first and last among them, as many as the page may hold.
+def _chosen(entries: list[tuple[float, Path]],
+            before: dict[float, Path], grid: Grid) -> list[tuple[float, Path, str]]:
+    """Evenly chosen frames, the first and last among them, as many as the page may hold, and what
+    is told of them; those before an expansion where there is room for all of them.
 
-    The last one is taken for the largest.
+    grid: the last one, which is taken for the largest.
     """
-    grid = meshio.vtu.read(entries[-1][1])
-    size = 8 / 3 * (len(grid.points) * (2 + len(grid.point_data)) + grid.cells[0].data.size
+    size = 8 / 3 * (len(grid.points) * (2 + len(grid.point_data)) + 2 * grid.cells[0].data.size
                     + len(grid.cells[0].data) * len(grid.cell_data))
-    count = min(len(entries), MOST_FRAMES, max(2, int(MOST_BYTES / size)))
+    room = int(MOST_BYTES / size)
+    count = min(len(entries), MOST_FRAMES, max(2, room))
     evenly = np.linspace(0, len(entries) - 1, count).round().astype(int)
-    return [entries[k] for k in np.unique(evenly)]
+    found: list[tuple[float, Path, str]] = []
+    for time, path in (entries[k] for k in np.unique(evenly)):
+        if time in before and 2 * count <= room:
+            found.append((time, before[time], BEFORE))
+        found.append((time, path, ""))
+    return found
 
 
-def _described(name: str, grid: meshio.Mesh) -> dict:
+def _shown(grid: Grid) -> Grid:
+    """The fields as they are shown: on a regular grid of triangles where the mesh is a fine one."""
+    if len(grid.points) <= MOST_NODES:
+        return grid
+    points = grid.points[:, :2]
+    cells = grid.cells[0].data
+    places, triangles = _regular(points.min(axis=0), points.max(axis=0))
+    at = located(points, cells, places)
+    order = 1 if cells.shape[1] == 3 else 2
+    nodal = {name: at.field(value, cells, order) for name, value in grid.point_data.items()}
+    inside = located(points, cells, places[triangles].mean(axis=1)).triangle
+    values = {name: [value[inside]] for name, (value,) in grid.cell_data.items()}
+    return Grid(np.column_stack([places, np.zeros(len(places))]), [Cells("triangle", triangles)],
+                nodal, values)
+
+
+def _regular(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 2) points of a regular grid over a box, and (t, 3) its triangles."""
+    size = np.sqrt(np.prod(high - low) / MOST_NODES)
+    along, across = np.maximum(2, ((high - low) / size).astype(int))
+    x, y = np.meshgrid(np.linspace(low[0], high[0], along), np.linspace(low[1], high[1], across))
+    corner = np.arange(along * across).reshape(across, along)[:-1, :-1].ravel()
+    halves = np.array([[0, 1, along + 1], [0, along + 1, along]])
+    return np.column_stack([x.ravel(), y.ravel()]), (corner[:, None, None] + halves).reshape(-1, 3)
+
+
+def _described(name: str, grid: Grid) -> dict:
     vector = name in grid.point_data and grid.point_data[name].ndim == 2
     words = names.words(name) + (" (magnitude)" if vector else "")
     return {"name": name, "label": words[0].upper() + words[1:], "unit": names.unit(name),
             "at": "node" if name in grid.point_data else "cell", "body": name in OF_AGGREGATE}
 
 
-def _frame(time: float, grid: meshio.Mesh, low, high, meshes: dict[bytes, dict]) -> dict:
+def _frame(time: float, grid: Grid, low, high, meshes: dict[bytes, dict]) -> dict:
     cells = grid.cells[0].data
     region = grid.cell_data["region"][0] > 0.5
     key = cells.tobytes() + region.tobytes()
@@ -96,7 +137,7 @@ def _frame(time: float, grid: meshio.Mesh, low, high, meshes: dict[bytes, dict])
             "values": _values(grid, region)}
 
 
-def _values(grid: meshio.Mesh, region: np.ndarray) -> dict[str, list]:
+def _values(grid: Grid, region: np.ndarray) -> dict[str, list]:
     """What there is of SHOWN, of the aggregate's fields what lies in its `region` of triangles."""
     nodes = np.unique(grid.cells[0].data[region])
     cells = np.flatnonzero(region)

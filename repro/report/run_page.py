@@ -6,7 +6,6 @@ import html
 import zlib
 from xml.etree.ElementTree import ParseError
 
-import meshio
 import numpy as np
 
 from repro.report import charts, fields, page, quantities
@@ -28,6 +27,14 @@ TOLD = {"scene", "hash", "tables", "versions", "status", "rows", "wall_time_s",
 NESTED = ("Each bar is the time within that stage, calls within calls counted in both: what is "
           "spent on factorising and solving is also in the stage that asked for it, so that the "
           "bars do not add up to the whole.")
+#: Choices of a scene that leave something out, in words; those of [numerics] hold where NEEDED is.
+ASSUMED = {
+    ("growth", "fluid_forces", "neglected"): "the fluid's traction on the aggregate neglected (2.3.3)",
+    ("growth", "new_biomass", "stressed"): "strain counted from t = 0 (2.3)",
+    ("numerics", "transport", "quasi_steady"): "substrates at rest in each shape (quasi-steady)",
+    ("numerics", "extent", "central"): "a clean channel outside of the meshed part (3.1)",
+}
+NEEDED = {"transport": "substrates", "extent": "aggregate"}
 #: The numerics that the head of the page tells, and what must be modelled for them to matter.
 NUMERICS = {"preset": None, "elements": None, "refinement": None, "transport": "substrates",
             "time": "growth", "transfer": "growth"}
@@ -57,8 +64,9 @@ def build(run: Run) -> str:
 
 def _packed(run: Run) -> dict:
     try:
-        return fields.packed(fields.index(run.folder))
-    except (ParseError, meshio.ReadError, LookupError, TypeError, zlib.error) as error:
+        return fields.packed(fields.index(run.folder),
+                             fields.index(run.folder, "before_expansion.pvd"))
+    except (ParseError, ValueError, LookupError, TypeError, zlib.error) as error:
         raise ValueError(f"{run.folder}: the fields cannot be read: {error!r}") from error
 
 
@@ -69,8 +77,9 @@ def _head(run: Run) -> str:
     return (f"<header><h1>{html.escape(str(run.record.get('scene')))}</h1>"
             f'<p class="status{stopped}">{html.escape(status[0].upper() + status[1:])}</p>'
             f"{_rows_note(run)}"
-            f"<p>{html.escape(_sentence(there))} {html.escape(_numerics(run))}</p>"
-            f"{_warnings(run)}</header>\n")
+            f"{_warnings(run)}"
+            f"<p>{html.escape(_sentence(there))} {html.escape(_assumed(run))} "
+            f"{html.escape(_numerics(run))}</p></header>\n")
 
 
 def _rows_note(run: Run) -> str:
@@ -106,6 +115,14 @@ def _sentence(parts: list[str]) -> str:
     return f"Modelled: {'; '.join(parts)}." if parts else "Modelled: the geometry and its mesh."
 
 
+def _assumed(run: Run) -> str:
+    """The simplifications that the scene has chosen, in words."""
+    tables = _tables(run)
+    told = [words for (part, key, value), words in ASSUMED.items()
+            if _table(tables.get(part)).get(key) == value and (part != "numerics" or NEEDED[key] in tables)]
+    return f"Assumed: {'; '.join(['a pore in the plane, one aggregate, no detachment', *told])}."
+
+
 def _numerics(run: Run) -> str:
     """The choices that matter most, in words."""
     tables = _tables(run)
@@ -127,7 +144,11 @@ def _fields(run: Run, packed: dict) -> str:
 def _field_note(packed: dict) -> str:
     quadratic = packed["meshes"][0]["per"] == 6
     note = "Quadratic triangles, drawn curved" if quadratic else "Linear triangles"
-    note += (f"; {_times_note(len(packed['frames']), packed['of'])}. Values are rounded to 1/65534 "
+    if packed["nodes"] > fields.MOST_NODES:
+        note = f"A mesh of {packed['nodes']} nodes, shown on a regular grid of triangles"
+    noted = sum("note" in frame for frame in packed["frames"])
+    note += (f"; {_times_note(len(packed['frames']) - noted, packed['of'])}"
+             f"{', those grown and not yet expanded besides' if noted else ''}. Values are rounded to 1/65534 "
              "of their range; the .vtu files have every time and digit.")
     if any(field["body"] for field in packed["fields"]):
         note += " Fields of the aggregate alone leave the fluid grey."

@@ -17,16 +17,18 @@ import io
 import json
 import os
 import platform
-from importlib.metadata import version
+from functools import cache
+from importlib import metadata
 from pathlib import Path
 from xml.etree import ElementTree
 
-import meshio
 import numpy as np
 
-from repro.results.arrays import TIME, fields
+from repro.results import vtu
+from repro.results.arrays import fields
 from repro.results.columns import COLUMNS, LEDGER_COLUMNS, ledger_row, row
 from repro.results.quantities import UNITS
+from repro.results.vtu import Grid
 from repro.scene import Scene, scene_hash, scene_tables
 
 __all__ = ["COLUMNS", "LEDGER_COLUMNS", "fields", "ledger_row", "row"]
@@ -46,16 +48,11 @@ def write_text(path: Path, text: str) -> None:
         beside.unlink(missing_ok=True)
 
 
-def write_fields(path: Path, content: meshio.Mesh) -> None:
-    """Write a ``.vtu`` file whole or not at all, with its time, which meshio leaves out."""
+def write_fields(path: Path, content: Grid) -> None:
+    """Write a ``.vtu`` file, with its time, whole or not at all."""
     beside = path.with_name(f".part-{path.name}")
-    time = float(content.field_data[TIME][0])
-    field = (f'<FieldData><DataArray type="Float64" Name="{TIME}" NumberOfTuples="1" '
-             f'format="ascii">{time!r}</DataArray></FieldData>')
     try:
-        content.write(beside, file_format="vtu")
-        grid = b"<UnstructuredGrid>"
-        beside.write_bytes(beside.read_bytes().replace(grid, grid + field.encode(), 1))
+        vtu.write(beside, content)
         os.replace(beside, path)
     finally:
         beside.unlink(missing_ok=True)
@@ -102,10 +99,17 @@ def read_table(path: Path) -> dict[str, np.ndarray]:
 
 def provenance(scene: Scene) -> dict:
     """The scene as read, its hash, and the versions that its numbers come from."""
-    versions = {"dupin2001-repro": version("dupin2001-repro"), "python": platform.python_version()}
+    versions = {"dupin2001-repro": version("dupin2001-repro"),
+                "python": platform.python_version()}
     versions |= {name: version(name) for name in PACKAGES}
     return {"scene": scene.name, "hash": scene_hash(scene), "tables": scene_tables(scene),
             "versions": versions}
+
+
+@cache
+def version(package: str) -> str:
+    """The version of an installed package, which is looked for on the disk once."""
+    return metadata.version(package)
 
 
 def write_json(path: Path, content: dict) -> None:

@@ -6,12 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
 
-import meshio
 import numpy as np
 
 from repro.model import biomass, flow, growth
 from repro.model.pore import Pore, Solved
 from repro.results.quantities import Quantity
+from repro.results.vtu import Cells, Grid
 from repro.scene import Scene
 
 #: The time (h) in the field data, by the name that VTK's readers know.
@@ -147,8 +147,8 @@ ARRAYS = (
 )
 
 
-def fields(scene: Scene, pore: Pore, solved: Solved) -> meshio.Mesh:
-    """The fields of an instant for meshio, at nodes or in triangles, named with their units.
+def fields(scene: Scene, pore: Pore, solved: Solved) -> Grid:
+    """The fields of an instant, at nodes or in triangles, named with their units.
 
     Places are in um. In the fluid there is no biomass (zero), and no displacement, theta, J, stress
     or pressure P (NaN); nodes of the interface are the aggregate's. Stress and P are those of the
@@ -159,5 +159,5 @@ def fields(scene: Scene, pore: Pore, solved: Solved) -> meshio.Mesh:
     points = {each.name: each.whole(state) for each in known if not each.cells}
     cells = {each.name: [each.whole(state)] for each in known if each.cells}
     kind = "triangle" if pore.mesh.geometry == 1 else "triangle6"
-    return meshio.Mesh(_three(pore.mesh.points), [(kind, pore.mesh.cells)], points, cells,
-                       field_data={TIME: np.array([pore.time])})
+    return Grid(_three(pore.mesh.points), [Cells(kind, pore.mesh.cells)], points, cells,
+                {TIME: np.array([pore.time])})

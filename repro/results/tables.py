@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from html import escape
+from importlib import import_module
 
-import meshio
 import numpy as np
 
 from repro import results
 from repro.march.loop import SAME_TIME, PoreEnd
 from repro.march.simulation import simulate
+from repro.results import names, picture
 from repro.results.quantities import plain as unit
-from repro.scene import Scene
+from repro.results.vtu import Grid
+from repro.scene import Source, load_scene
 
 #: Times of a notebook's table at either end.
 SHOWN = 5
@@ -21,11 +23,11 @@ SHOWN = 5
 
 class Results(Mapping[str, np.ndarray]):
     """Columns of a run by name, (rows,) each, a row at each reported time: those of
-    ``timeseries.csv`` that the scene models; ``status`` says how the run ended. ``dict(results)``
-    makes a data frame."""
+    ``timeseries.csv`` that the scene models; ``status`` says how the run ended. ``to_pandas``
+    makes a data frame, ``to_xarray`` a dataset."""
 
     def __init__(self, name: str, rows: list[dict[str, float | None]],
-                 fields: list[dict[str, np.ndarray]], status: str):
+                 fields: Sequence[Mapping[str, np.ndarray]], status: str):
         self.columns: dict[str, np.ndarray] = {}
         for key in results.COLUMNS:
             values = [row[key] for row in rows]
@@ -52,14 +54,15 @@ class Results(Mapping[str, np.ndarray]):
     @property
     def units(self) -> dict[str, str]:
         """The unit of each column and field; "1" for a plain number."""
-        return {name: unit(name) for name in (*self.columns, *self._fields[0])}
+        fields = self._fields[0] if len(self._fields) else {}
+        return {name: unit(name) for name in (*self.columns, *fields)}
 
     @property
     def time(self) -> np.ndarray:
         """Reported times, h."""
         return self.columns["time_h"]
 
-    def fields(self, time: float) -> dict[str, np.ndarray]:
+    def fields(self, time: float) -> Mapping[str, np.ndarray]:
         """What is known all over the pore at a reported time (h): places_um (N, 2), triangles
         (T, 3), or (T, 6) of quadratic ones, and values (N,), (N, 3) for vectors, or (T,) by name.
         Raises KeyError for any other time."""
@@ -68,18 +71,46 @@ class Results(Mapping[str, np.ndarray]):
             raise KeyError(f"{time} h: not a reported time; the nearest is {self.time[row]} h")
         return self._fields[row]
 
+    def to_pandas(self):
+        """A ``pandas.DataFrame`` of the columns by ``time_h``; ``attrs["units"]`` has their units.
+        Raises ImportError where pandas is not installed."""
+        frame = _package("pandas").DataFrame(self.columns).set_index("time_h")
+        frame.attrs.update(scene=self.name, status=self.status,
+                           units={name: unit(name) for name in self.columns})
+        return frame
+
+    def to_xarray(self):
+        """An ``xarray.Dataset`` of the columns over ``time_h``, each with its ``units`` and
+        ``long_name``. Raises ImportError where xarray is not installed."""
+        told = {name: {"units": names.udunits(name), "long_name": names.words(name)}
+                for name in self.columns}
+        columns = {name: ("time_h", values, told[name]) for name, values in self.columns.items()}
+        times = {"time_h": columns.pop("time_h")}
+        about = {"scene": self.name, "status": self.status}
+        return _package("xarray").Dataset(columns, times, about)
+
     def __repr__(self) -> str:
         size = f"{len(self.time)} rows, {len(self)} columns"
         return f"<Results of {self.name}: {size}, {self.status}>"
 
     def _repr_html_(self) -> str:
-        """A table for notebooks: a line a column, the first and the last times side by side."""
+        """For notebooks: key figures, a picture of the last state, and a table with a line a
+        column, the first and the last times side by side."""
         shown = list(range(len(self.time)))
         shown = shown if len(shown) <= 2 * SHOWN else [*shown[:SHOWN], *shown[-SHOWN:]]
         lines = [_html_row(f"{name} ({unit(name)})", column[shown])
                  for name, column in self.items()]
         caption = escape(f"{self.name}: {len(self.time)} rows, {len(shown)} shown; {self.status}")
-        return f"<table><caption>{caption}</caption>{''.join(lines)}</table>"
+        table = f"<table><caption>{caption}</caption>{''.join(lines)}</table>"
+        return f"{self._shown()}<details><summary>{caption}</summary>{table}</details>"
+
+    def _shown(self) -> str:
+        """Key figures and the picture of the last state; nothing of a run without rows."""
+        if not self.columns:
+            return ""
+        known = len(self._fields) == len(self.time)
+        shown = picture.figure(self._fields[-1], self.time[-1]) if known else ""
+        return f"<p>{escape(self.name)}, {escape(picture.key_figures(self))}</p>{shown}"
 
 
 def _html_row(head: str, values: np.ndarray) -> str:
@@ -87,25 +118,37 @@ def _html_row(head: str, values: np.ndarray) -> str:
     return f"<tr><th>{escape(head)}</th>{cells}</tr>"
 
 
-def solve(scene: Scene) -> Results:
-    """Run a scene and keep its rows and fields, at ``output.times`` or after every step.
+def _package(name: str):
+    """An optional package. Raises ImportError, in one line, where it is not installed."""
+    try:
+        return import_module(name)
+    except ImportError:
+        raise ImportError(f"the package {name} is not installed; pip install {name}") from None
 
-    Raises SimulationError where a stage fails. Memory grows with the reported times.
+
+def solve(scene: Source, overrides: Sequence[str] = (), unset: Sequence[str] = ()) -> Results:
+    """Run a scene, one that was loaded, or a file, a packaged name, a dict of tables, with the keys
+    of ``overrides`` ("KEY=VALUE") set and those of ``unset`` left out; keep its rows and fields, at
+    ``output.times`` or after every step.
+
+    Raises SceneError where it is not accepted, SimulationError where a stage fails. Memory grows
+    with the reported times.
     """
+    scene = load_scene(scene, overrides, unset)
     rows = []
     fields = []
     status = "completed"
     try:
         for instant in simulate(scene):
             rows.append(results.row(scene, instant))
-            fields.append(_arrays(results.fields(scene, instant.pore, instant.solved)))
+            fields.append(arrays(results.fields(scene, instant.pore, instant.solved)))
     except PoreEnd as end:
         status = str(end)
     return Results(scene.name, rows, fields, status)
 
 
-def _arrays(content: meshio.Mesh) -> dict[str, np.ndarray]:
-    """The arrays of a meshio mesh."""
+def arrays(content: Grid) -> dict[str, np.ndarray]:
+    """The arrays of a grid."""
     (cells,) = content.cells
     by_cell = {name: values for name, (values,) in content.cell_data.items()}
     return {"places_um": content.points[:, :2], "triangles": cells.data, **content.point_data,

@@ -1,1 +1,4 @@
 """A run on the disk: recorder, checkpoint, folder, progress, provenance."""
+
+#: Seconds of wall time between checkpoints.
+INTERVAL = 60.0

@@ -25,10 +25,12 @@ import numpy as np
 from repro.errors import CheckpointError
 from repro.results.files import whole
 
-#: Where a run keeps the state that it goes on from, the one before, and the last one refused.
+#: Where a run keeps the state that it goes on from, the one before, the last one refused, and the
+#: one from which a longer run goes on.
 NEWEST = "checkpoint.state"
 PREVIOUS = "checkpoint.previous"
 REFUSED = "checkpoint.refused"
+LAST = "checkpoint.last"
 KIND, FORMAT = b"dupin2001-repro checkpoint ", b"2"
 MAGIC = KIND + FORMAT + b" "
 DTYPES = ("<f8", "<i8", "<i4", "|b1", "|u1")

@@ -15,15 +15,16 @@ from pathlib import Path
 
 from repro.errors import OutputError
 from repro.results.files import WRITING, is_file, is_folder, open_lock
-from repro.run.checkpoint import NEWEST, PREVIOUS, REFUSED
+from repro.run.checkpoint import LAST, NEWEST, PREVIOUS, REFUSED
 
 LOCK = ".lock"
 PROVENANCE = "run.json"
 SUMS = "fields.sha256"
+#: What is removed where a run is over.
 CHECKPOINTS = (NEWEST, PREVIOUS, REFUSED)
 #: Every file that a run may write, besides its fields.
 OWN = (PROVENANCE, "timeseries.csv", "ledger.csv", "fields.pvd", "before_expansion.pvd", SUMS,
-       "timeseries.nc", "report.html", *CHECKPOINTS)
+       "timeseries.nc", "report.html", *CHECKPOINTS, LAST)
 FIELDS = re.compile(r"fields/(?:fields|before_expansion)_\d{4,}\.vtu")
 #: A line of SUMS, as sha256sum writes and checks it.
 SUM = re.compile(rf"[0-9a-f]{{64}}  ({FIELDS.pattern})")

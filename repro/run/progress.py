@@ -1,6 +1,6 @@
 """What a run says while it runs.
 
-A bar on a terminal, a line each tenth elsewhere, JSON for machines, or nothing.
+A bar on a terminal, lines elsewhere, JSON for machines, or nothing.
 Each is a context that yields what :class:`repro.run.running.Watch` calls ``tell``.
 Warnings go to standard error always.
 """
@@ -13,13 +13,19 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from functools import partial
+from threading import Event, Thread
+from time import monotonic
 from typing import TextIO
-
-from tqdm import tqdm
 
 from repro.errors import OutputError
 
 Tell = Callable[[dict], None]
+#: Seconds between signs of life on a terminal, and without a word elsewhere.
+TICK, SILENCE = 0.5, 1.0
+#: The bar, and what takes its place on a terminal with fewer columns.
+WIDE = ("{desc} {percentage:3.0f}%|{bar}| {n:.1f} of {total:.1f} h "
+        "[{elapsed} < {remaining}{postfix}]")
+NARROW, NARROWEST = "{desc:.12s} {n:.1f}/{total:.1f} h {elapsed}<{remaining}{postfix}", 80
 
 
 def told(quiet: bool, machine: bool):
@@ -28,7 +34,7 @@ def told(quiet: bool, machine: bool):
         return nullcontext(in_json)
     if quiet:
         return nullcontext(only_warnings)
-    return on_a_terminal() if sys.stderr.isatty() else nullcontext(in_tenths())
+    return on_a_terminal() if sys.stderr.isatty() else in_lines()
 
 
 def printable(text: str) -> str:
@@ -75,20 +81,56 @@ def _warning(event: dict) -> str:
     return f"repro: warning: {printable(event['message'])}"
 
 
-def in_tenths() -> Tell:
-    """A line each tenth of the simulated time, and at the end."""
+@contextmanager
+def in_lines() -> Iterator[Tell]:
+    """A line each tenth of the simulated time, where SILENCE s have passed without one, and at the
+    end. A line comes later than a fiftieth of the time since the start, so that a log stays short.
+    """
+    begun = said = monotonic()
     reached = 0
+    now: dict = {}
+
+    def line(more: str = "") -> None:
+        nonlocal said
+        said = monotonic()
+        say(f"{now['time_h']:g} of {now['end_h']:g} h simulated{more}", aside=True)
 
     def tell(event: dict) -> None:
-        nonlocal reached
+        nonlocal reached, now
         only_warnings(event)
         _begin_and_end(event, partial(say, aside=True))
         if event["event"] == "step":
+            now = event
             tenth = int(10 * event["time_h"] / event["end_h"] + 1e-9) if event["end_h"] else 0
             if tenth > reached:
                 reached = tenth
-                say(f"{event['time_h']:g} of {event['end_h']:g} h simulated", aside=True)
-    return tell
+                line()
+
+    def tick() -> None:
+        if now and monotonic() - said > max(SILENCE, (monotonic() - begun) / 50):
+            contact = ", contact" if now["contact"] else ""
+            line(f", step {now['step']}{contact}, {monotonic() - begun:.0f} s")
+
+    with _ticking(tick):
+        yield tell
+
+
+@contextmanager
+def _ticking(tick: Callable[[], None]) -> Iterator[None]:
+    """Within, have something done every TICK s, in the midst of a step too."""
+    over = Event()
+
+    def run() -> None:
+        while not over.wait(TICK):
+            tick()
+
+    thread = Thread(target=run, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
 
 
 def _begin_and_end(event: dict, aside: Callable[[str], None]) -> None:
@@ -104,26 +146,33 @@ def _begin_and_end(event: dict, aside: Callable[[str], None]) -> None:
 @contextmanager
 def on_a_terminal() -> Iterator[Tell]:
     """A bar with simulated time, steps, remeshes, contact, and the time that is left."""
-    form = ("{desc} {percentage:3.0f}%|{bar}| {n:.1f} of {total:.1f} h "
-            "[{elapsed} < {remaining}{postfix}]")
-    with tqdm(total=1.0, bar_format=form, dynamic_ncols=True, delay=1e-3) as bar:
+    from tqdm import tqdm
+
+    # miniters: else the bar waits for as much simulated time as the first steps have made
+    with tqdm(total=1.0, bar_format=WIDE, dynamic_ncols=True, delay=1e-3, miniters=0) as bar:
         def tell(event: dict) -> None:
             if event["event"] == "start":
                 bar.set_description_str(printable(event["scene"]), refresh=False)
                 bar.total = event["end_h"] or 1.0
                 bar.n = bar.initial = event["from_h"]
             elif event["event"] == "step":
-                bar.set_postfix_str(_counts(event), refresh=False)
+                _fit(bar, event)
                 bar.update(event["time_h"] - bar.n)
             elif event["event"] == "warning":
                 bar.write(_warning(event), file=sys.stderr)
             elif event["event"] == "end":
                 bar.close()
             _begin_and_end(event, lambda line: bar.write(line, file=sys.stderr))
-        yield tell
+
+        with _ticking(bar.refresh):
+            yield tell
 
 
-def _counts(event: dict) -> str:
-    """Steps, remeshes and contact in words."""
-    remeshes = f", remeshes {event['remeshes']}" if event["remeshes"] else ""
-    return f"step {event['step']}{remeshes}{', contact' if event['contact'] else ''}"
+def _fit(bar, event: dict) -> None:
+    """Have steps, remeshes and contact told in as many words as the terminal has room for."""
+    narrow = os.get_terminal_size(sys.stderr.fileno()).columns < NARROWEST
+    bar.bar_format = NARROW if narrow else WIDE
+    words = "mesh" if narrow else "remeshes"
+    remeshes = f", {words} {event['remeshes']}" if event["remeshes"] else ""
+    contact = ", contact" if event["contact"] else ""
+    bar.set_postfix_str(f"step {event['step']}{remeshes}{contact}", refresh=False)

@@ -19,8 +19,9 @@ from repro.run.checkpoint import Arrays
 from repro.run.folder import CHECKPOINTS, OWN, PROVENANCE, SUMS, claimed, remove, writing
 from repro.run.machine import conditions
 from repro.run.record import PREFIX, Mark, Record
-from repro.run.status import done, undone
+from repro.run.status import RUNNING, done, undone
 from repro.scene import Scene
+from repro.scene.units import to_internal
 
 #: The ledgers of steps that are not reported yet: of a state, but an array in a checkpoint.
 PENDING = "pending.ledgers"
@@ -69,6 +70,12 @@ class Recorder:
     def contact(self) -> bool:
         """Does the aggregate touch the opposite wall?"""
         return self.state is not None and self.state.pore.contact
+
+    @property
+    def first_velocity(self) -> float | None:
+        """Mean velocity at t = 0, um/h; None where there is no flow."""
+        velocity = self.record.rows[0][results.COLUMNS.index("mean_velocity_m_per_d")]
+        return None if velocity is None else to_internal(f"{velocity!r} m/day", "um/h")
 
     def add(self, state: State, instant: Instant | None) -> None:
         """Take one step: the state after it and, where it is reported, its row and its fields."""
@@ -133,6 +140,29 @@ class Recorder:
             there = {name for name in names if is_file(self.folder / name)}
             names = (there | {"report.html"}) - set(CHECKPOINTS)
         return sorted(names | self.record.marks.keys())
+
+    @property
+    def kept(self) -> bool:
+        """Is there a state from which a longer run goes on?"""
+        return is_file(self.folder / checkpoint.LAST)
+
+    def keep(self) -> None:
+        """Write the state now as that from which a longer run goes on."""
+        content = checkpoint.encoded(*packed(self.scene, self.state, self._now()))
+        self._write(checkpoint.LAST, Path.write_bytes, content)
+
+    def lengthen(self, scene: Scene, changes: list[str], near: bool) -> None:
+        """Be the recorder of a longer run from here on, whose checkpoint is there before
+        ``run.json`` tells of it. changes: what is now set in the file of its scene; near: is this
+        also the state from which a still longer run goes on?"""
+        self.scene = scene
+        self.origin["set"] = changes
+        self._write_checkpoint(self.state)
+        if near:
+            self.keep()
+        else:
+            remove(self.folder, [checkpoint.LAST])
+        self.tell(RUNNING)
 
     def finish(self, status: str) -> None:
         """Write everything at the end of a run."""
@@ -227,7 +257,8 @@ def unpacked(scene: Scene, plain: dict, arrays: Arrays) -> tuple[State, Record]:
 def _never(scene: Scene) -> set[str]:
     """The files that a run of this scene does not write."""
     absent = {"timeseries.nc": scene.output.timeseries != "netcdf",
-              "ledger.csv": scene.growth is None, "before_expansion.pvd": not scene.output.times}
+              "ledger.csv": scene.growth is None, checkpoint.LAST: scene.growth is None,
+              "before_expansion.pvd": not scene.output.times}
     return {name for name, never in absent.items() if never}
 
 

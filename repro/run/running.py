@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from itertools import chain
@@ -20,9 +20,9 @@ from repro.check.numbers import judged
 from repro.check.simplifications import Warned
 from repro.errors import CheckpointError, Interrupted, OutputError, SimulationError
 from repro.march.loop import Instant, PoreEnd, State
-from repro.march.simulation import steps
+from repro.march.simulation import ends_soon, steps
 from repro.results.files import is_file
-from repro.run import checkpoint
+from repro.run import INTERVAL, checkpoint
 from repro.run.folder import (
     CHECKPOINTS,
     PROVENANCE,
@@ -38,7 +38,17 @@ from repro.run.machine import conditions, differences, require_packages
 from repro.run.memory import require_memory
 from repro.run.recorder import Recorder, interrupted, settle
 from repro.run.status import COMPLETED, FAILED, INTERRUPTED, RUNNING, done, undone
-from repro.scene import Scene, SceneError, load_scene, parse_scene, scene_hash, scene_tables
+from repro.scene import (
+    KEYS,
+    Scene,
+    SceneError,
+    Source,
+    load_scene,
+    parse_scene,
+    scene_hash,
+    scene_tables,
+)
+from repro.scene.files import key_of, override
 
 __all__ = ["OutputError", "Recorder", "Watch", "prepare", "resume", "run"]
 
@@ -46,8 +56,8 @@ __all__ = ["OutputError", "Recorder", "Watch", "prepare", "resume", "run"]
 Made = Iterator[tuple[State, Instant | None]]
 #: Of what differs so many keys are told.
 MOST_SHOWN = 4
-#: Seconds of wall time between checkpoints.
-INTERVAL = 60.0
+#: What alone can be changed of a run that has begun.
+END = "growth.end"
 
 Progress = Callable[[float], None]
 
@@ -82,9 +92,10 @@ class Watch:
 ALONE = Watch()
 
 
-def run(scene: Scene, folder: Path, progress: Progress = unwatched, watch: Watch = ALONE, *,
+def run(scene: Source, folder: str | Path, progress: Progress = unwatched, watch: Watch = ALONE, *,
         force: bool = False, origin: dict | None = None) -> str:
-    """Run a scene into a folder; ``progress`` is told each simulated time (h).
+    """Run a scene, one that was loaded, or a file, a packaged name, a dict of tables, into a folder.
+    ``progress`` is told each simulated time (h).
 
     A run of the same scene, source and versions that is there is gone on with, or left alone where
     it is over; with ``force`` the files of whatever run is there are removed first. origin: the
@@ -96,6 +107,8 @@ def run(scene: Scene, folder: Path, progress: Progress = unwatched, watch: Watch
     asks for it: what was computed until then is written all the same, ``run.json`` says why it
     ends, and :func:`resume` goes on from there.
     """
+    scene = load_scene(scene)
+    folder = Path(folder)
     _require(scene, watch)
     with held(folder):
         recorder = Recorder(scene, folder, origin=origin)
@@ -128,9 +141,10 @@ def _refuse_another(recorder: Recorder, told: dict) -> None:
     differing = differences({key: there.get(key) for key in keys},
                             {key: now.get(key) for key in keys})
     if differing:
+        longer = " (--resume makes a run longer)" if list(differing) == [f"tables.{END}"] else ""
         raise OutputError(
             f"--out {recorder.folder}: the run there is another one: {_shown(differing)}; a new "
-            "folder is needed, or --force, which removes the files of that run")
+            f"folder is needed{longer}, or --force, which removes the files of that run")
 
 
 def _shown(differing: dict[str, list]) -> str:
@@ -151,13 +165,17 @@ def _table(told: dict, key: str) -> dict:
     return told[key] if isinstance(told.get(key), dict) else {}
 
 
-def resume(folder: Path, progress: Progress = unwatched, watch: Watch = ALONE) -> str:
-    """Go on with a run that was interrupted, killed or has failed.
+def resume(folder: str | Path, progress: Progress = unwatched, watch: Watch = ALONE, *,
+           overrides: Sequence[str] = ()) -> str:
+    """Go on with a run that was interrupted, killed or has failed, or make a run longer.
 
     Gives bit for bit what it would have given. Returns how the run ended, at once where it had
-    ended before. Where versions have changed, or a checkpoint cannot be used, a warning says so.
-    Raises as :func:`run`, and OutputError where there is no run.
+    ended before. overrides: of ``growth.end`` alone, to a later time; the run, over or not, then
+    becomes what it would be had that been asked for at first. Where versions have changed, or a
+    checkpoint cannot be used, a warning says so. Raises as :func:`run`, OutputError where there is
+    no run, and SceneError where the end is not a later one.
     """
+    folder = Path(folder)
     if not is_file(folder / PROVENANCE):
         raise OutputError(f"--resume {folder}: there is no run.json; the folder of a run is needed")
     with held(folder):
@@ -167,7 +185,54 @@ def resume(folder: Path, progress: Progress = unwatched, watch: Watch = ALONE) -
         scene = _scene(told, folder / PROVENANCE)
         recorder = Recorder(scene, folder, own, _table(told, "origin"))
         _tell_another_file(recorder, watch)
-        return _continued(recorder, told, progress, watch)
+        later = _later(scene, overrides, str(folder / PROVENANCE))
+        if later == scene:
+            return _continued(recorder, told, progress, watch)
+        return _lengthened(recorder, later, overrides, told, progress, watch)
+
+
+def _later(scene: Scene, overrides: Sequence[str], file: str) -> Scene:
+    """The scene with a later end. Raises SceneError where anything else is asked for."""
+    if not overrides:
+        return scene
+    if scene.growth is None:
+        raise SceneError(f"{file}: its scene has no [growth], which alone takes time")
+    tables = scene_tables(scene)
+    for entry in overrides:
+        if key_of(entry) != END:
+            raise SceneError(f"{file}: --set {entry}: {END} alone can be changed of a run that has "
+                             "begun; a new folder is needed for another scene")
+        override(tables, entry, file, KEYS)
+    later = parse_scene(tables, scene.name, file, [END])
+    if later.growth.end < scene.growth.end:
+        raise SceneError(f"{file}: {END} = {later.growth.end:g} h: {scene.growth.end:g} h were "
+                         "asked for before; a later time is needed")
+    return later
+
+
+def _lengthened(recorder: Recorder, later: Scene, overrides: Sequence[str], told: dict,
+                progress: Progress, watch: Watch) -> str:
+    """Make the run that ``run.json`` tells of one of a scene with a later end; how it ended."""
+    _require(later, watch)
+    timing.reset()
+    changed = _changed(told, recorder, watch)
+    before = recorder.origin.get("set")
+    before = before if isinstance(before, list) else []
+    changes = [*(entry for entry in before if key_of(str(entry)) != END), *overrides]
+    changed[END] = [f"{scene.growth.end:g} h" for scene in (recorder.scene, later)]
+    names = (checkpoint.LAST,) if recorder.kept else (checkpoint.NEWEST, checkpoint.PREVIOUS)
+    with usable(recorder.folder):
+        tidy(recorder.folder)
+        restored = _restored(recorder, names, watch)
+    recorder.record.resumes.append({"time_h": recorder.time, "changed": changed})
+    if not restored:
+        recorder.scene = later
+        recorder.origin["set"] = changes
+        return _from_the_start(recorder, progress, watch)
+    _warn(recorder, later, recorder.first_velocity, watch)
+    recorder.lengthen(later, changes, ends_soon(later, recorder.state))
+    recorder.drop_later()
+    return _recorded(recorder, steps(later, recorder.state), progress, watch)
 
 
 def _tell_another_file(recorder: Recorder, watch: Watch) -> None:
@@ -193,10 +258,11 @@ def _continued(recorder: Recorder, told: dict, progress: Progress, watch: Watch)
     changed = _changed(told, recorder, watch)
     with usable(recorder.folder):
         tidy(recorder.folder)
-        restored = _restored(recorder, watch)
+        restored = _restored(recorder, (checkpoint.NEWEST, checkpoint.PREVIOUS), watch)
     recorder.record.resumes.append({"time_h": recorder.time, "changed": changed})
     if not restored:
         return _from_the_start(recorder, progress, watch)
+    recorder.drop_later()
     return _recorded(recorder, steps(recorder.scene, recorder.state), progress, watch)
 
 
@@ -254,14 +320,13 @@ def _changed(told: dict, recorder: Recorder, watch: Watch) -> dict[str, list]:
     return changed
 
 
-def _restored(recorder: Recorder, watch: Watch) -> bool:
-    """Has the recorder its state from a checkpoint? Those that are refused are told."""
-    for name in (checkpoint.NEWEST, checkpoint.PREVIOUS):
+def _restored(recorder: Recorder, names: Sequence[str], watch: Watch) -> bool:
+    """Has the recorder its state from one of the checkpoints? Those that are refused are told."""
+    for name in names:
         path = recorder.folder / name
         if path.exists():
             try:
                 recorder.restore(path)
-                recorder.drop_later()
                 return True
             except CheckpointError as error:
                 watch.warn(f"{path}: refused: {error}")
@@ -317,6 +382,8 @@ def _simulated(recorder: Recorder, made: Made, progress: Progress, watch: Watch)
     try:
         _record_steps(recorder, made, progress, watch)
     except PoreEnd as end:
+        if not recorder.kept:
+            recorder.keep()
         return str(end)
     except MemoryError as error:
         raise SimulationError(f"stopped at t = {recorder.time:g} h, out of memory while results "
@@ -333,7 +400,9 @@ def _record_steps(recorder: Recorder, made: Made, progress: Progress, watch: Wat
         steps_before = recorder.steps if recorder.state else -1
         recorder.add(state, instant)
         if instant and len(recorder.record.rows) == 1:
-            _warn(recorder, instant, watch)
+            _warn(recorder, recorder.scene, recorder.first_velocity, watch)
+        if not recorder.kept and ends_soon(recorder.scene, state):
+            recorder.keep()
         if recorder.steps > steps_before:  # no row within a step
             _tell_step(recorder, recorder.remeshes > remeshes, recorder.contact > contact, watch)
         progress(recorder.time)
@@ -344,18 +413,19 @@ def _record_steps(recorder: Recorder, made: Made, progress: Progress, watch: Wat
             written = perf_counter()
 
 
-def _warn(recorder: Recorder, first: Instant, watch: Watch) -> None:
+def _warn(recorder: Recorder, scene: Scene, velocity: float | None, watch: Watch) -> None:
     """Tell and record which simplifications do not hold, as ``repro check`` finds them."""
-    recorder.record.warnings = [asdict(each) for each in warned(recorder.scene, first)]
+    recorder.record.warnings = [asdict(each) for each in warned(scene, velocity)]
     for each in recorder.record.warnings:
         watch.tell({"event": "warning", "key": each["key"],
                     "message": f"{each['key']}: {each['text']}"})
 
 
-def warned(scene: Scene, first: Instant) -> list[Warned]:
-    """The simplifications of a scene that do not hold; first: its state at t = 0."""
+def warned(scene: Scene, velocity: float | None) -> list[Warned]:
+    """The simplifications of a scene that do not hold; velocity: mean, um/h, at t = 0, if there is
+    flow."""
     try:
-        return simplifications.warnings(*judged(scene, first))
+        return simplifications.warnings(*judged(scene, velocity))
     except ArithmeticError as error:
         return [Warned("scene", f"its dimensionless numbers cannot be worked out ({error})")]
 

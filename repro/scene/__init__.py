@@ -27,8 +27,10 @@ from repro.scene.keys import (
     Output,
     Pore,
     Scene,
+    Source,
     Substrate,
     Substrates,
+    label,
     load_scene,
     load_tables,
     parse_scene,
@@ -39,6 +41,6 @@ from repro.scene.needed import MissingError, needed
 from repro.scene.units import SceneError
 
 __all__ = ["KEYS", "OURS", "PRESETS", "Acceptor", "Aggregate", "Donor", "Flow", "Growth",
-           "Kinetics", "MissingError", "Numerics", "Output", "Pore", "Scene", "SceneError", "Substrate",
-           "Substrates", "load_scene", "load_tables", "needed", "packaged_scenes", "parse_scene",
+           "Kinetics", "MissingError", "Numerics", "Output", "Pore", "Scene", "SceneError", "Source",
+           "Substrate", "Substrates", "label", "load_scene", "load_tables", "needed", "packaged_scenes", "parse_scene",
            "scene_hash", "scene_tables"]

@@ -11,6 +11,7 @@ defaults, and `kinetics`, which comes with substrates and aggregate. [En] are th
 import hashlib
 import json
 from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import MISSING, dataclass, replace
 from fractions import Fraction
 from math import inf
@@ -18,7 +19,7 @@ from pathlib import Path
 
 from repro.scene.course import Course, constant, courses
 from repro.scene.files import key_of, leave_out, override, packaged_scenes, read_tables
-from repro.scene.reading import Place, dotted, entries, read_table, write_table
+from repro.scene.reading import Place, dotted, entries, read_table, toml, write_table
 from repro.scene.rules import rules
 from repro.scene.units import (
     ACUTE,
@@ -410,6 +411,14 @@ class Scene:
         later = [corner for table in courses(self) for corner in table.times if corner > time]
         return min(later, default=inf)
 
+    def __str__(self) -> str:
+        """Its TOML, every key with its unit: a file with this text is an equal scene."""
+        return toml(scene_tables(self))
+
+    def __repr__(self) -> str:
+        there = [key for key in entries(Scene) if getattr(self, key) is not None]
+        return f"<Scene {self.name}: {', '.join(there)}; hash {scene_hash(self)}>"
+
 
 #: Keys that came after hashes of scenes were recorded, with their defaults as tables write them.
 LATER: dict[str, dict[str, object]] = {
@@ -418,22 +427,37 @@ LATER: dict[str, dict[str, object]] = {
     "substrates.acceptor": {"interpolation": "steps"},
     "substrates.donor": {"interpolation": "steps"},
 }
+#: A scene, or where it is said: a file, a packaged name, a dict of tables.
+Source = Scene | str | Path | dict
 KEYS = tuple(dotted(Scene))  # every dotted key of a scene, its sections among them
 
 
-def load_scene(source: str | Path, overrides: Sequence[str] = (),
-               unset: Sequence[str] = ()) -> Scene:
-    """The scene in a TOML file or of a packaged name, without the keys of --unset and with the
-    "KEY=VALUE" of --set. Raises SceneError if it is not accepted.
+def load_scene(source: Source, overrides: Sequence[str] = (), unset: Sequence[str] = ()) -> Scene:
+    """The scene in a TOML file, of a packaged name, in a dict of tables as a file has them, or as
+    it is, without the keys of --unset and with the "KEY=VALUE" of --set. Raises SceneError if it
+    is not accepted.
     """
-    file = str(source)
-    tables = load_tables(file, overrides, unset)
+    if isinstance(source, Scene) and not (overrides or unset):
+        return source
+    file = label(source)
+    tables = load_tables(source, overrides, unset)
     return parse_scene(tables, Path(file).stem, file, [key_of(entry) for entry in overrides])
 
 
-def load_tables(file: str, overrides: Sequence[str] = (), unset: Sequence[str] = ()) -> dict:
-    """What a TOML file or a packaged scene says, as it stands, after --unset and then --set."""
-    tables = read_tables(file)
+def label(source: Source) -> str:
+    """What a scene is called in messages: the name of its file, or its own."""
+    if isinstance(source, Scene):
+        return source.name
+    return "scene" if isinstance(source, dict) else str(source)
+
+
+def load_tables(source: Source, overrides: Sequence[str] = (), unset: Sequence[str] = ()) -> dict:
+    """What a scene says, as it stands, after --unset and then --set."""
+    file = label(source)
+    if isinstance(source, Scene):
+        tables = scene_tables(source)
+    else:
+        tables = deepcopy(source) if isinstance(source, dict) else read_tables(file)
     for key in unset:
         leave_out(tables, key, file, KEYS)
     for entry in overrides:

@@ -93,6 +93,16 @@ def write_table(part) -> dict:
     return table
 
 
+def toml(tables: dict, above: str = "") -> str:
+    """Tables as a TOML file has them, values before the tables within; in ASCII."""
+    lines = [f"[{above[:-1]}]"] if above else []
+    inner = {key: value for key, value in tables.items() if isinstance(value, dict)}
+    lines += [f"{key} = {json.dumps(value)}" for key, value in tables.items() if key not in inner]
+    parts = ["\n".join(lines)] if len(lines) > bool(above) else []
+    parts += [toml(value, f"{above}{key}.") for key, value in inner.items()]
+    return "\n\n".join(parts)
+
+
 def _instead(key: str, keys: list[str], place: Place) -> str:
     table = f"[{place.key}]" if place.key else "a scene"
     told = f"there is no such key; {table} takes {', '.join(keys)}"

@@ -9,4 +9,5 @@
     table     table.csv and runs.csv
     picture   lines and dots as SVG
     page      summary.html
+    making    all of it, for scripts too
 """

@@ -64,7 +64,7 @@ def _package(address: str):
 def _is_open(address: str) -> bool:
     """Does a scheduler listen at an address, or something that may be one?"""
     match = ADDRESS.fullmatch(address)
-    return bool(match and _within(2 * ANSWER, lambda: _greets(
+    return bool(match and _within(1.5 * ANSWER, lambda: _greets(
         match[2] or match[3], int(match[4]), match[1] or "tcp://")))
 
 

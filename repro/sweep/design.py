@@ -18,7 +18,16 @@ from typing import Any
 
 import numpy as np
 
-from repro.scene import KEYS, Scene, SceneError, load_tables, parse_scene, scene_hash
+from repro.scene import (
+    KEYS,
+    Scene,
+    SceneError,
+    Source,
+    load_tables,
+    parse_scene,
+    scene_hash,
+)
+from repro.scene import label as label_of
 from repro.scene.files import override
 from repro.scene.reading import shown
 
@@ -185,7 +194,7 @@ def _at(factor: Factor, part: float) -> float | str:
     return low * (high / low) ** part if factor.spacing == "log" else low + part * (high - low)
 
 
-def points(source: str, sets: list[str], factors: list[Factor], combinations: list[tuple],
+def points(source: Source, sets: list[str], factors: list[Factor], combinations: list[tuple],
            unset: Sequence[str] = ()) -> list[Point]:
     """The runs of a sweep, each checked; sets, unset: the entries of --set and --unset.
 
@@ -198,7 +207,7 @@ def points(source: str, sets: list[str], factors: list[Factor], combinations: li
     for index, values in enumerate(combinations, 1):
         said = label(factors, values)
         tables = load_tables(source, sets, unset)
-        scene = _scene(source, tables, factors, values, f"run {index} ({said})")
+        scene = _scene(label_of(source), tables, factors, values, f"run {index} ({said})")
         point = Point(index, values, scene)
         twin = first.setdefault(scene_hash(point.scene), index)
         if twin != index:

@@ -1,0 +1,148 @@
+"""A run that is made longer: `repro run --resume DIR --set growth.end=LATER`."""
+
+import pytest
+
+from repro.cli import main
+from repro.errors import Interrupted
+from repro.march.simulation import ends_soon, steps
+from repro.run.checkpoint import LAST, NEWEST, PREVIOUS
+from repro.run.running import Watch, resume, run
+from repro.scene import SceneError, load_scene
+from tests.shell import files, lasting, told
+
+SCENES = {
+    "paper": ["growth.end=2.2 h"],
+    "paper, an end within a step": ["growth.end=2.2 h", "growth.time_step=21 min"],
+    "fast": ["numerics.preset=fast", "numerics.tolerance=0.001", "growth.end=9 h"],
+    "fast, long steps": ["numerics.preset=fast", "growth.end=9 h"],
+    "fast, rows at times": ["numerics.preset=fast", "growth.end=9 h", 'output.times=["0 h", "2 h", "3 h"]'],
+    "to the pore's end": ["aggregate.radius=40 um", "pore.length=90 um", "growth.time_step=2 h", "growth.end=9 h",
+                          "numerics.refinement=0.5"],
+}
+#: Ends of the shorter runs (h): within the longer one's first step, within a later one, and near its own last.
+ENDS = {"paper": (0.1, 1.4, 2.1), "paper, an end within a step": (1.0,), "fast": (0.3, 4.0, 8.9),
+        "fast, long steps": (4.0,),
+        "fast, rows at times": (4.0,), "to the pore's end": (8.0,)}
+
+
+def scene(name, end=None):
+    return load_scene("base", SCENES[name] + ([f"growth.end={end} h"] if end else []))
+
+
+def same(one, other):
+    """Have two runs the same tables, fields and indices, and the same to say of themselves?"""
+    drop = {"origin", "files"}
+    left, right = ({key: value for key, value in lasting(folder).items() if key not in drop} for folder in (one, other))
+    return files(one) == files(other) and left == right
+
+
+@pytest.mark.parametrize("name, end", [(name, end) for name in SCENES for end in ENDS[name]])
+def test_a_longer_run_is_as_if_that_had_been_asked_for_at_first(tmp_path, name, end):
+    """Bit for bit, twice in a row. Mutants: the last step, cut short at the end, kept; rows and ledgers of the longer
+    run behind those of the shorter one; the scene, the warnings or the counts of the shorter one."""
+    whole = scene(name)
+    run(whole, tmp_path / "whole")
+    run(scene(name, end), tmp_path / "parts")
+    for later in (0.5 * (end + whole.growth.end), whole.growth.end):
+        resume(tmp_path / "parts", overrides=[f"growth.end={later} h"])
+    assert same(tmp_path / "parts", tmp_path / "whole")
+    resumes = told(tmp_path / "parts")["resumes"]
+    assert [one["changed"]["growth.end"][0] for one in resumes][0] == f"{end:g} h"
+
+
+def test_little_is_computed_again(tmp_path):
+    """Of the paper's scheme the last two steps. Mutant: a run from t = 0."""
+    run(scene("paper", 1.4), tmp_path)
+    resume(tmp_path, overrides=["growth.end=2.2 h"])
+    assert told(tmp_path)["resumes"][0]["time_h"] >= 1.0 - 1e-9
+
+
+def test_a_run_that_is_not_over_is_made_longer(tmp_path):
+    """Stopped before and after its end was near. Mutant: the newest state, after a step that the end has cut short."""
+    whole, short = scene("paper, an end within a step"), scene("paper, an end within a step", 1.2)
+    run(whole, tmp_path / "whole")
+    near = [ends_soon(short, state) for state, _ in steps(short)]
+    assert not near[1] and near[-2]
+    for stop in (1, len(near) - 1):
+        left = iter([0] * stop + [15])
+        with pytest.raises(Interrupted):
+            run(short, tmp_path / str(stop), watch=Watch(stop=lambda left=left: next(left)))
+        resume(tmp_path / str(stop), overrides=["growth.end=2.2 h"])
+        assert same(tmp_path / str(stop), tmp_path / "whole")
+
+
+def test_a_longer_run_that_was_stopped_goes_on(tmp_path):
+    """Mutants: the shorter run's end; a state of the shorter run that is taken for one of the longer."""
+    run(scene("fast"), tmp_path / "whole")
+    run(scene("fast", 4.0), tmp_path / "parts")
+    left = iter([0, 15])
+    with pytest.raises(Interrupted):
+        resume(tmp_path / "parts", overrides=["growth.end=9 h"], watch=Watch(stop=lambda: next(left)))
+    assert told(tmp_path / "parts")["tables"]["growth"]["end"] == "9.0 h"
+    assert resume(tmp_path / "parts") == "completed" and same(tmp_path / "parts", tmp_path / "whole")
+
+
+def test_without_the_state_it_starts_again(tmp_path):
+    """And says so. Mutant: rows of the shorter run before those of the longer."""
+    run(scene("fast", 4.0), tmp_path / "parts")
+    (tmp_path / "parts" / LAST).unlink()
+    with pytest.warns(UserWarning, match="no checkpoint to go on from; it starts again from t = 0"):
+        resume(tmp_path / "parts", overrides=["growth.end=9 h"])
+    run(scene("fast"), tmp_path / "whole")
+    assert same(tmp_path / "parts", tmp_path / "whole")
+
+
+def test_a_run_that_is_over_keeps_one_checkpoint(tmp_path):
+    """And lists it. Mutants: the others, which nothing reads any more; one of a run in which nothing moves."""
+    run(scene("fast", 4.0), tmp_path / "run")
+    assert (tmp_path / "run" / LAST).exists() and LAST in told(tmp_path / "run")["files"]
+    assert not any((tmp_path / "run" / name).exists() for name in (NEWEST, PREVIOUS))
+    run(load_scene("flow_only"), tmp_path / "still")
+    assert not (tmp_path / "still" / LAST).exists() and LAST not in told(tmp_path / "still")["files"]
+
+
+@pytest.mark.parametrize("entry, wanted", [
+    ("growth.end=2 h", "growth.end = 2 h: 4 h were asked for before; a later time is needed"),
+    ("growth.end=2 um", "growth.end = \"2 um\": a time"),
+    ("growth.end=1e9 h", "growth.end = \"1e9 h\": at most 100000 times growth.time_step"),
+    ("pore.width=3 um", "growth.end alone can be changed of a run that has begun"),
+])
+def test_what_is_no_later_end_is_refused(tmp_path, entry, wanted):
+    """And nothing is changed. Mutants: a run that is cut; another scene in the same folder."""
+    run(scene("fast", 4.0), tmp_path)
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    with pytest.raises(SceneError) as refused:
+        resume(tmp_path, overrides=[entry])
+    assert wanted in str(refused.value)
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+
+
+def test_the_command(tmp_path, capsys):
+    """The scene of the run says what was set last; the same end again changes nothing; a run without growth has no end,
+    and a shorter run that is there is not another one without a word on --resume."""
+    out = str(tmp_path / "run")
+    asked = ["run", "base", "--set", "numerics.preset=fast", "--set"]
+    assert main([*asked, "growth.end=4 h", "--out", out]) == 0
+    assert main([*asked, "growth.end=5 h", "--out", out]) == 2
+    assert "growth.end (4.0 h there, now 5.0 h); a new folder is needed (--resume makes a run longer)" in (
+        capsys.readouterr().err)
+    assert main(["run", "--resume", out, "--set", "growth.end=5 h"]) == 0
+    assert told(tmp_path / "run")["origin"]["set"] == ["numerics.preset=fast", "growth.end=5 h"]
+    capsys.readouterr()
+    assert main(["run", "--resume", out, "--set", "growth.end=300 min"]) == 0
+    assert "before this: nothing to do" in capsys.readouterr().out
+    assert main([*asked, "growth.end=5 h", "--out", out]) == 0
+    assert main(["run", "flow_only", "--out", str(tmp_path / "still")]) == 0
+    assert main(["run", "--resume", str(tmp_path / "still"), "--set", "growth.end=5 h"]) == 2
+    assert "its scene has no [growth]" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["paper", "fast"])
+def test_a_step_is_another_one_only_where_the_end_is_near(name):
+    """What is kept rests on it. Mutant: half the room."""
+    end = scene(name).growth.end / 2
+    ways = [[state for state, _ in steps(scene(name, end))] for end in (end, None)]
+    near = [ends_soon(scene(name, end), state) for state in ways[0]]
+    assert not near[0] and near[-1]
+    for short, long in list(zip(*ways))[: near.index(True) + 1]:
+        assert short.pore.time == long.pore.time and short.pace == long.pace
