@@ -27,9 +27,9 @@ SLOPING = {"paper": (1e-3, "second order in 12 min: a quarter of it with 6 min")
 
 
 @case("coupling-averaged-supply", kind="cross-code",
-      norm="largest difference at six times in 7 h, rows at jumps and within steps among them: area relative, effluents "
-           "and section means of C along the mesh over the acceptor's supply; a seed of 20 um in base at 2.9 m/d, "
-           "diffusivities times 64",
+      norm="largest difference at six times in 7 h, rows at jumps and within steps among them: area relative, "
+           "effluents and section means of C along the mesh over the acceptor's supply; a seed of 20 um in base at "
+           "2.9 m/d, diffusivities times 64",
       claim="An aggregate whose donor is taken away for 2.5 h and given back, at once or evenly, starves and recovers "
             "as its averaged pore (FiPy, solve_ivp) does",
       mutants=("supply-of-the-start", "supply-half-way-of-the-start", "supply-a-step-late", "supply-not-yet",
@@ -66,7 +66,7 @@ def _compared(preset: str, how: str, pieces, bound: float, origin: str) -> tuple
 def scene(preset: str, how: str, pieces):
     """Base with a donor whose supply changes."""
     table = [["0 h", f"{pieces[0][1]} mg/L"]]
-    for (end, _, last), (_, first, _) in zip(pieces, pieces[1:]):
+    for (end, _, _), (_, first, _) in zip(pieces, pieces[1:]):
         table.append([f"{end} h", f"{first} mg/L"])
     table += [[f"{pieces[-1][0]} h", f"{pieces[-1][2]} mg/L"]]
     made = runs.base("7 h", runs.by(preset), 'aggregate.radius="20 um"', f"substrates.donor.supply={json.dumps(table)}",
