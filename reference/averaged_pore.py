@@ -121,7 +121,7 @@ class Section:
         return np.abs(self._defect(weight, fields + step)[0]).sum() < np.abs(self._defect(weight, fields)[0]).sum()
 
     def _defect(self, weight, fields):
-        """What the cells still lack of rest, and the size of its terms: that of one not supplied against the other's."""
+        """What the cells still lack of rest, and the size of its terms: of one not supplied against the other's."""
         sinks = weight * np.stack(uptake(*fields, self.pore.rates))
         size = (self.source + np.abs(sinks)).ravel() + abs(self.transport) @ np.abs(fields.ravel())
         size = size + self.source.max()
@@ -170,9 +170,9 @@ class Averaged:
         return [self._moment(time, state) for time, state in zip(found.t, found.y.T)]
 
     def run_through(self, pieces, times, accuracy=1e-6):
-        """The moments at ``times``, ascending, while the supply changes: pieces (end, supply at the piece's start and at
-        its end), ascending, evenly in between; the last ends with the last time. A moment at a piece's end is one of the
-        next piece's start."""
+        """The moments at ``times``, ascending, while the supply changes: pieces (end, supply at the piece's start and
+        at its end), ascending, evenly in between; the last ends with the last time. A moment at a piece's end is one
+        of the next piece's start."""
         state, begin, found = self._start(), 0.0, []
         for number, (end, first, last) in enumerate(pieces, 1):
             self.fields = None

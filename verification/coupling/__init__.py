@@ -10,6 +10,7 @@ from verification.coupling import (  # noqa: F401
     balances,
     conservation,
     contact,
+    exact,
     exponential,
     presets,
     schemes,

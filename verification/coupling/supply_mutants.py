@@ -1,4 +1,4 @@
-"""Wrong changes to tables over time, and to rows within steps, that cases of this stage must catch."""
+"""Wrong changes to tables over time, rows within steps and the preset exact, that cases of this stage must catch."""
 
 from verification.mutants import Mutant
 
@@ -23,4 +23,8 @@ SUPPLY = (
            says="A row within a step has the biomass of the step's end.",
            old="part = (time - now.time) / half.duration",
            new="part = 1.0"),
+    Mutant("exact-steps-of-accurate", "repro/scene/keys.py",
+           says="The preset exact has the tolerance of accurate.",
+           old='"tolerance": 0.00025,',
+           new='"tolerance": 0.001,'),
 )
