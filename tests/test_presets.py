@@ -79,7 +79,7 @@ def test_the_first_guess_at_a_step_s_end():
 def test_density_is_kept(contact):
     """J = theta: (X_A + X_I) / X_m is one but for what the linear pressure cannot see, mass over area exactly on curved
     triangles. On straight ones mass follows the area to the drift [E7], and a film that closes squeezes a few of these
-    coarse triangles (0.63 of X_m; 0.56 a step later, before there is a new mesh). Mutants: J = theta at the corners only,
+    coarse triangles (0.63 of X_m; 0.56 a step later, before there is a new mesh). Mutants: J = theta at corners only,
     the expansion forgotten at a remesh."""
     made, found = contact
     most, drift = made.kinetics.maximum_density, 2e-2 if made.numerics.order == 1 else 1e-9
@@ -199,12 +199,14 @@ def test_a_preset_changes_the_defaults(preset):
 
 
 def test_presets_say_what_they_are():
-    """The paper's is the paper's scheme; the others are curved, second in time, the accurate one finer. Mutant: fast
-    and accurate exchanged."""
+    """The paper's is the paper's scheme; the others are curved, second in time, the accurate one finer, the exact one
+    cubic with shorter steps. Mutants: fast and accurate exchanged, the exact one with the steps of accurate."""
     paper, fast, accurate = (numerics(preset=name) for name in ("paper", "fast", "accurate"))
     assert (paper.elements, paper.time, paper.refinement) == ("linear", "updates", 1.0)
     assert fast.elements == accurate.elements == "quadratic" and fast.time == accurate.time == "midpoint"
     assert fast.refinement < accurate.refinement and fast.tolerance > accurate.tolerance
+    exact = numerics(preset="exact")
+    assert (exact.elements, exact.time) == ("cubic", "midpoint") and 3 * exact.tolerance < accurate.tolerance
 
 
 def test_what_is_written_wins_over_the_preset():

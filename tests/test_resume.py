@@ -25,6 +25,8 @@ CONTACT = ('aggregate.radius="17.98 um"', 'pore.width="20 um"', 'growth.end="0.6
 SCENES = {
     "paper, unreported steps": ('growth.end="1 h"', 'output.times=["0.3 h", "1 h"]'),
     "fast": ('numerics.preset="fast"', "numerics.tolerance=0.0005", 'aggregate.radius="25 um"', 'growth.end="3 h"'),
+    "fast, rows within steps": ('numerics.preset="fast"', 'growth.end="9.7 h"'),
+    "paper, rows within steps": ('growth.end="0.7 h"', 'output.times=["0.05 h", "0.1 h", "0.4 h", "0.47 h"]'),
     "fast, unreported steps, contact": ('numerics.preset="fast"', "numerics.tolerance=0.0001", *CONTACT,
                                         'output.times=["0.6 h"]'),
     "gear": ('numerics.transport="gear"', 'growth.end="0.4 h"'),

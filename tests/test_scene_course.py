@@ -20,6 +20,7 @@ from tests.strategies import scene
 
 DONOR = "substrates.donor.supply"
 STARVED = [["0 h", "10 mg/L"], ["0.3 h", "0 mg/L"], ["0.5 h", "20 mg/L"]]
+RISING = 'flow.head=[["0 h", "1e-3 cm"], ["0.4 h", "3e-3 cm"]]'
 SHORT = ('growth.end="0.8 h"', 'numerics.preset="fast"', f"{DONOR}={json.dumps(STARVED)}")
 
 
@@ -90,7 +91,7 @@ def test_a_table_between_its_times(gaps, values, time):
 
 def test_a_scene_at_a_time_is_one_with_numbers():
     """Mutants: one of the tables left; the first of its corners after a time is that time."""
-    made = load_scene("base", [*SHORT, 'flow.head=[["0 h", "1e-3 cm"], ["0.4 h", "3e-3 cm"]]', "flow.interpolation=linear"])
+    made = load_scene("base", [*SHORT, RISING, "flow.interpolation=linear"])
     there = made.at(0.2)
     assert (there.substrates.donor.supply, there.flow.head) == (10.0, pytest.approx(20.0))
     assert (made.largest.substrates.donor.supply, made.largest.flow.head) == (20.0, 30.0)
@@ -142,8 +143,8 @@ def test_a_drive_over_time_scales_the_flow():
 
 def test_what_is_judged_is_the_extreme():
     """Numbers and growth of the largest supply and the fastest flow. Mutants: those of t = 0; one table alone."""
-    made = load_scene("base", [*SHORT, 'flow.head=[["0 h", "1e-3 cm"], ["0.4 h", "3e-3 cm"]]'])
-    plain = load_scene("base", ['growth.end="0.8 h"', 'numerics.preset="fast"', 'flow.head="3e-3 cm"', f"{DONOR}=20 mg/L"])
+    made = load_scene("base", [*SHORT, RISING])
+    plain = load_scene("base", [*SHORT[:2], 'flow.head="3e-3 cm"', f"{DONOR}=20 mg/L"])
     now = pore.seeded(made)
     found, wanted = (judged(one, Instant(now, pore.solve(one, now), None, (), 0, {})) for one in (made, plain))
     assert found[0] == plain and [number.start for number in found[1]] == pytest.approx(

@@ -1,8 +1,9 @@
 """Dimensionless numbers of a scene: what its simplifications rest on.
 
 Each is told for t = 0 and, where the aggregate grows, for ``growth.end``, with bounds in place of
-what only the run knows, and tables of the scene at their largest values: the aggregate grows at the rate of the supply (9), in the layer that the
-supply reaches, so that it is no larger and touches the opposite wall no earlier than said here.
+what only the run knows, and tables of the scene at their largest values: the aggregate grows at the
+rate of the supply (9), in the layer that the supply reaches, so that it is no larger and touches
+the opposite wall no earlier than said here.
 """
 
 from __future__ import annotations

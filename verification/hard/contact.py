@@ -31,8 +31,9 @@ def remeshing_always(made: Scene) -> Iterator[Instant]:
     state, instant = next(simulation.steps(made))
     while True:
         yield instant
+        later = (pair for pair in simulation.steps(made, state) if pair[1] and pair[1].ledgers)
         try:
-            state, instant = next(simulation.steps(made, state))
+            state, instant = next(later)
         except StopIteration:
             return
         if instant.remeshes == 0:
@@ -51,7 +52,8 @@ def _on_a_new_mesh(made: Scene, state, instant: Instant):
 
 def landings(found: Run) -> list[tuple[float, float, float]]:
     """The films (um) of steps that make contact: before, after, and the least that stays; each step made again."""
-    pairs = zip(found.instants, found.instants[1:])
+    ends = [instant for instant in found.instants if instant.ledgers or instant.pore.time == 0]
+    pairs = zip(ends, ends[1:])
     steps = [midpoint.attempt(found.scene, a.pore, a.solved, b.pore.time - a.pore.time)
              for a, b in pairs if b.pore.contact and not a.pore.contact]
     return [step.gaps for step in steps]
