@@ -2,6 +2,7 @@
 from repro.report.quantities import DERIVED
 from repro.results.arrays import ARRAYS
 from repro.results.columns import LEDGER, SERIES
+from repro.run.record import COUNTS
 from repro.sweep.table import NUMBERS
 
 TABLES = {
@@ -9,15 +10,16 @@ TABLES = {
     "Columns of `ledger.csv`, a row a step": LEDGER,
     "Arrays of the `.vtu` files": ARRAYS,
     "Drawn in pages besides": DERIVED,
+    "Counts and times in `run.json`": COUNTS,
     "Columns of a sweep's `runs.csv`": NUMBERS,
 }
 INTRODUCTION = """# What is reported
 
 Made by `python docs/quantities.py > docs/quantities.md` from the definitions in `repro/results/columns.py`,
-`repro/results/arrays.py`, `repro/report/quantities.py` and `repro/sweep/table.py`. Symbols are the paper's. A column is
-empty where its part is not modelled. An array is given at nodes or in triangles, in the whole pore or in the aggregate
-alone, with NaN in the fluid; nodes of the interface have the aggregate's value. The time (h) is `TimeValue` in the
-field data of a `.vtu` file."""
+`repro/results/arrays.py`, `repro/report/quantities.py`, `repro/run/record.py` and `repro/sweep/table.py`. Symbols are
+the paper's. A column is empty where its part is not modelled. An array is given at nodes or in triangles, in the whole
+pore or in the aggregate alone, with NaN in the fluid; nodes of the interface have the aggregate's value. The time (h)
+is `TimeValue` in the field data of a `.vtu` file."""
 
 
 def text() -> str:

@@ -12,7 +12,7 @@ from repro import results
 from repro.cli import main
 from repro.report import comparison, quantities
 from repro.report.reading import read
-from tests.pages import Page
+from tests.pages import CHARTS, Page
 
 
 @pytest.fixture
@@ -30,11 +30,18 @@ def test_a_comparison_has_a_line_a_run(two, fast, paper):
     quiet = {"acceptor_stored_ug_per_m_per_h", "donor_stored_ug_per_m_per_h", "remeshed_nodes"}
     known = [name for kind in quantities.KINDS for name in kind.drawn if name not in quiet]
     assert len(figures) == len(titles) == len(known)
-    conductivity = figures[titles.index("Conductivity")]["lines"]
-    for line, out in zip(conductivity, (fast, paper)):
-        series = results.read_table(out / "timeseries.csv")
-        assert np.allclose(line["t"], series["time_h"], rtol=1e-5)
-        assert np.allclose(line["y"], series["conductivity_m_per_d"], rtol=1e-5)
+    drawn = 0
+    for title, figure in zip(titles, figures):
+        chart, _, label = title.partition(": ")
+        names = CHARTS.get(chart, {})
+        column = names.get(label, next(iter(names.values()), None)) if label or len(names) == 1 else None
+        if column not in (None, "remeshed"):
+            drawn += 1
+            for line, out in zip(figure["lines"], (fast, paper), strict=True):
+                series = results.read_table(out / "timeseries.csv")
+                assert line["t"] == pytest.approx(series["time_h"].tolist(), rel=1e-5)
+                assert line["y"] == pytest.approx(series[column].tolist(), rel=1e-5), title
+    assert drawn == sum(map(len, CHARTS.values())) - 1
     assert Page(two).outside == []
 
 

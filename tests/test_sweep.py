@@ -207,6 +207,28 @@ def test_rows_have_the_values_that_their_runs_were_made_with(tmp_path, monkeypat
                 check_factors(*two_factors(tmp_path), tmp_path / "sweep")
 
 
+def test_a_line_of_the_page_is_the_course_of_its_run(tmp_path):
+    """What is drawn, read off the ticks of the axes, is conductivity against biomass of the run that its title names.
+    Mutants: axes exchanged, a run's line under another's name."""
+    factors = [parse("pore.width=40 um, 50 um")]
+    found = points("flow_only", [], factors, grid(factors))
+    biomass, relative = np.array([0.1, 0.2, 0.4]), np.array([1.0, 0.6, 0.3])
+    told = [table.Told(point, "completed", np.array([0.0, 1.0, 2.0]), relative**k, k * biomass,
+                       dict.fromkeys(table.COLUMNS)) for k, point in enumerate(found, 1)]
+    made = page.page(Sweep(tmp_path, "base", factors, found), told, 0.1)
+    picture = made[made.index("<h2>Conductivity against biomass"): made.index("<h2>Clogging time")]
+    assert [label in picture for label in ("biomass: aggregate area", "conductivity / initial")] == [True, True]
+    across = re.findall(r'<text x="([\d.]+)" y="[\d.]+" text-anchor="middle">([\d.]+)</text>', picture)
+    upward = re.findall(r'<text x="[\d.]+" y="([\d.]+)" text-anchor="end">([\d.]+)</text>', picture)
+    (x, x0), (y, y0) = (np.polyfit(*np.array(ticks, float).T, 1) for ticks in (across, upward))
+    lines = re.findall('<polyline [^>]*points="([^"]*)"><title>run ([12])', picture)
+    assert [number for _, number in lines] == ["1", "2"]
+    for (drawn, _), one in zip(lines, told):
+        places = np.array([pair.split(",") for pair in drawn.split()], float)
+        assert x * places[:, 0] + x0 == pytest.approx(one.biomass, abs=0.002)
+        assert y * (places[:, 1] + 4) + y0 == pytest.approx(one.relative, abs=0.005)
+
+
 @pytest.mark.parametrize("part", [0.5, 0.1, 0.013])
 def test_clogging_time_of_an_exponential_fall_is_exact(part):
     """K / K_0 = exp(-t / 3), with biomass t / 10: whatever the rows, t = -3 ln part. Mutants: the row's time; a

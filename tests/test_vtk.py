@@ -14,7 +14,6 @@ from repro.march.simulation import shaped, simulate
 from repro.model import flow, pore
 from repro.model.pore import Solved
 from repro.model.transport import Concentrations
-from repro.results import names
 from repro.run import running
 from repro.scene import load_scene
 from tests.strategies import ORDERS
@@ -113,28 +112,6 @@ def test_middle_nodes_are_where_vtk_expects_them(made):
             assert np.allclose(place, cell.GetPoints().GetPoint(node), atol=1e-12)
             ends = [np.array(cell.GetPoints().GetPoint(i)) for i in ((0, 1), (1, 2), (2, 0))[node - 3]]
             assert np.linalg.norm(np.mean(ends, 0) - place) < 0.2 * np.linalg.norm(ends[1] - ends[0])
-
-
-def test_names_tell_units(made):
-    """Vectors have three components, as VTK wants them; numbers are what their names say. Mutants: a concentration in
-    g/L, J of another power, a head in um."""
-    folder, kind, computed = made
-    grid = by_vtk(entries(folder)[1.0])
-    found = arrays(grid.GetPointData())
-    assert {name: names.unit(name) for name in found} == {name: names.unit(name) for name in NODES}
-    assert {name: value.shape[1] for name, value in found.items() if value.ndim == 2} == {
-        "velocity_m_per_d": 3, "displacement_um": 3, "position_t0_um": 3}
-    table = results.read_table(folder / "timeseries.csv")
-    least = table["acceptor_min_mg_per_L"][-1]
-    if kind == "cubic":  # of all its nodes, more than a file has
-        assert 0 <= found["acceptor_mg_per_L"].min() / least - 1 < 1e-3
-    else:
-        assert found["acceptor_mg_per_L"].min() == least
-    cells = arrays(grid.GetCellData())
-    body = cells["region"] == 1
-    assert np.allclose(cells["J"][body], cells["theta"][body], rtol=0.1) and cells["theta"][body].min() > 1.15
-    length, loss = np.ptp(computed.points[:, 0]), np.ptp(found["head_cm"])
-    assert loss < table["head_loss_cm"][-1] and loss > 0.5 * table["head_loss_cm"][-1] * length / 600
 
 
 #: An aggregate that leans; how it is strained, its expansion, P / mu_L, and when.

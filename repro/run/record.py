@@ -17,6 +17,7 @@ from repro import results
 from repro.errors import CheckpointError
 from repro.march.loop import State
 from repro.results.files import is_file
+from repro.results.quantities import Quantity
 from repro.run.checkpoint import Arrays
 from repro.run.stored import counted, counts, in_range
 
@@ -73,6 +74,22 @@ class Record:
     def fields(self) -> list[str]:
         """The names of all files of fields."""
         return [name for _, name in (*self.index, *self.before)]
+
+
+#: What ``run.json`` tells of a record: value takes it.
+COUNTS = (
+    Quantity("rows", "rows of the time series", "those of timeseries.csv",
+             lambda now: len(now.rows)),
+    Quantity("wall_time_s", "wall time", "of the process that runs, and of those before a resume",
+             lambda now: now.seconds),
+    Quantity("wall_time_by_stage_s", "wall time by stage",
+             "within each stage; what a stage calls is counted in both", lambda now: now.stages),
+    Quantity("newton_iterations", "Newton's iterations, for growth and for transport",
+             "of the solutions that steps begin and end with: neither those of half a step nor "
+             "attempts that were given up", lambda now: now.iterations),
+    Quantity("remeshes", "meshes made anew", "steps that end on a new mesh",
+             lambda now: now.remeshes),
+)
 
 
 def fields_name(kind: str, number: int) -> str:

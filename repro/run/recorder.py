@@ -128,10 +128,9 @@ class Recorder:
         now = self._now()
         self._write("run.json", results.write_json, {
             **results.provenance(self.scene), "conditions": self.conditions, "status": status,
-            "files": self._files(done(status)), "rows": len(now.rows), "wall_time_s": now.seconds,
-            "wall_time_by_stage_s": now.stages, "newton_iterations": now.iterations,
-            "remeshes": now.remeshes, "resumes": now.resumes, "warnings": now.warnings,
-            "origin": self.origin})
+            "files": self._files(done(status)),
+            **{each.name: each.value(now) for each in record.COUNTS},
+            "resumes": now.resumes, "warnings": now.warnings, "origin": self.origin})
 
     def _files(self, over: bool) -> list[str]:
         """The names of the run's files: those there are, or may come while it is not over."""
