@@ -64,8 +64,9 @@ def build(run: Run) -> str:
 
 def _packed(run: Run) -> dict:
     try:
-        return fields.packed(fields.index(run.folder),
-                             fields.index(run.folder, "before_expansion.pvd"))
+        own = "before_expansion.pvd" in _list(run.record.get("files"))
+        before = fields.index(run.folder, "before_expansion.pvd") if own else []
+        return fields.packed(fields.index(run.folder), before)
     except (ParseError, ValueError, LookupError, TypeError, zlib.error) as error:
         raise ValueError(f"{run.folder}: the fields cannot be read: {error!r}") from error
 

@@ -21,7 +21,9 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
-from repro.scene import Scene
+from repro import results
+from repro.run.machine import conditions
+from repro.scene import Scene, load_scene
 from repro.sweep import task
 
 #: For these processes: one thread each; and glibc keeps the memory that a run frees for its next
@@ -116,6 +118,8 @@ def main() -> None:
     """Make the runs that the input asks for."""
     answers = os.dup(1)
     os.dup2(2, 1)  # whatever prints does not answer
+    results.provenance(load_scene("flow_only"))  # what every run looks for on the disk
+    conditions()
     gc.freeze()  # what is imported is not looked through again, and so not copied
     made = _forked if hasattr(os, "fork") else task.make
     with suppress(BrokenPipeError):  # nobody is there to be answered
