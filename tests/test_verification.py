@@ -5,10 +5,9 @@ import numpy as np
 import pytest
 
 from reference import channel_bvp, channel_fipy, taylor_hood
-from verification import __main__ as driver
-from verification import case, meshes, norms, report
-from verification.case import Check, Outcome, Result, at_least, at_most, between
-from verification.convergence import Study, study
+from verification.kernel import case, driver, report
+from verification.kernel.case import Check, Outcome, Result, Study, at_least, at_most, between, study
+from verification.problems import meshes, norms
 
 SIZES = 0.5 ** np.arange(4)
 
@@ -113,7 +112,7 @@ def test_selection_by_stage_and_by_id():
 def test_a_quick_case_runs_and_passes(id):
     driver.load()
     found = case.run(case.CASES[id])
-    assert found.holds, report.table([found])
+    assert found.holds, report.terminal([found])
 
 
 def test_a_mutant_is_caught(monkeypatch):
@@ -144,9 +143,9 @@ def test_the_exit_status_is_the_verdict(monkeypatch, capsys):
 def test_the_report_says_what_fell_short_and_holds_no_time():
     driver.load()
     found = [result(at_most("quantity A", 2.0, 1.0, "theory"))]
-    assert "quantity A: 2; expected at most 1 (theory)" in report.table(found)
-    text = report.markdown(found)
-    assert "FALLS SHORT" in text and "| quantity A | 2 | at most 1 | theory | NO |" in text
+    assert "quantity A: 2; expected at most 1 (theory)" in report.terminal(found)
+    text = report.texts(found)[f"{case.CASES['flow-plug'].stage}.md"]
+    assert "FALLS SHORT" in text and "| quantity A (2) | at most 1 | theory | NO |" in text
     assert "seconds" not in text and "1.0 s" not in text
 
 

@@ -1,27 +1,161 @@
-"""What every single step must balance, all at once, and how right the amounts are that balance.
+"""What a whole run conserves: substrates, biomass, the yield that links them, and X_m times the area.
+
+What every single step must balance, all at once, and how right the amounts are that balance.
 
 Two balances may close on wrong amounts, as both do when a step's ledger takes the flows of its start: the third one,
 of what is made against what is taken up, and a run with shorter steps see that.
+
+A short piece of a run through contact with the opposite wall, and a wedge that closes (2.3.3).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
+from repro.fem.outline import BOTTOM, FREE, TOP, Outline
+from repro.march import updates
 from repro.march.loop import Instant, Ledger
 from repro.march.simulation import simulate
+from repro.model import pore, remeshing
 from repro.scene import Kinetics, Scene
-from verification.case import Outcome, Profile, at_least, at_most, case
-from verification.convergence import Study, study
-from verification.coupling import runs
+from verification.kernel.case import Check, Outcome, Profile, Study, at_least, at_most, between, case, study
+from verification.problems import aggregates, runs
+
+
+@case("coupling-ledger", kind="property",
+      norm="base to 19.4 h in steps of 24 min: worst step of both substrates' balances and of the biomass', relative; "
+           "X_m times the area over the biomass; largest deviation of the density from X_m",
+      claim="Over a whole run with its remeshes substrates and biomass are accounted for to round-off, and the area is "
+            "the biomass over X_m",
+      mutants=("theta-anew-at-a-remesh", "biomass-interpolated-at-a-remesh", "growth-spread-evenly"))
+def ledger() -> Outcome:
+    steps = 'growth.time_step="24 min"'
+    checks = _accounted("linear", steps, 6e-7, 4e-3, 3.0)
+    for elements in ("quadratic", "cubic"):
+        checks += _accounted(elements, steps, 1e-10, 1e-3, 2.0, runs.of(elements), "numerics.refinement=0.2")
+    for preset in ("fast", "accurate"):
+        checks += _accounted(preset, runs.by(preset), 1e-10, 1e-3, 2.0)
+    return Outcome(tuple(checks))
+
+
+def _accounted(name: str, steps: str, area: float, density: float, remeshes: float, *changes: str) -> list:
+    """Checks of a run of base: largest deviations of the area and of the density, and fewest remeshes."""
+    scene = runs.base("19.4 h", steps, *changes)
+    instants = list(simulate(scene))
+    rows, last = instants[-1].ledgers, instants[-1].pore
+    made = sum(row.biomass_made for row in rows)
+    total = scene.kinetics.maximum_density * last.outline.area
+    return [at_most(f"substrates, {name}", substrates(rows), 1e-10, "Newton's tolerance, 1e-13 of the largest term of "
+                    "each row, over all rows"),
+            at_most(f"biomass, worst step, {name}", biomass(rows), 1e-10, runs.ROUND_OFF),
+            at_most(f"biomass, whole run, {name}", abs((rows[0].biomass_before + made) / rows[-1].biomass_after - 1),
+                    1e-10, runs.ROUND_OFF),
+            at_most(f"X_m times the area, {name}", abs(total / rows[-1].biomass_after - 1), area,
+                    "J = theta in the mean: to the stabilisation of linear elements, else to Newton's tolerance"),
+            at_most(f"density, {name}", runs.density_drift(scene, instants[-1]), density,
+                    "J = theta in the mean around a node only [E7]; worked off at each remesh"),
+            at_least(f"remeshes, {name}", instants[-1].remeshes, remeshes, "else they are not tested")]
+
+
+def substrates(rows) -> float:
+    """The worst of in - out - consumed over in."""
+    return max(abs(s - out - used) / s for row in rows for s, out, used in zip(row.supplied, row.out, row.consumed))
+
+
+def biomass(rows) -> float:
+    """The worst of before + made - after over after, and of one step's end against the next one's start."""
+    steps = [abs((row.biomass_before + row.biomass_made) / row.biomass_after - 1) for row in rows]
+    return max(steps + [abs(two.biomass_before / one.biomass_after - 1) for one, two in zip(rows, rows[1:])])
+
+
+STEPS = (0.8, 0.4, 0.2, 0.1)
+
+
+@case("coupling-yield", kind="property",
+      norm="biomass made over the yield of the substrates, less 1; base from 20 um to 1.6 h, steps of 0.8 to 0.1 h",
+      claim="The biomass made is Y times the donor consumed, less f_d of what decays, which the acceptor's demand "
+            "beyond F times the donor tells: the ledgers agree to second order in the step",
+      mutants=("euler-biomass", "rates-at-the-start", "rates-two-percent-low", "decay-leaves-all"))
+def yields() -> Outcome:
+    found = [_yield(elements) for elements in runs.ELEMENTS]
+    return Outcome(tuple(check for check, _ in found), tuple(orders for _, orders in found))
+
+
+def _yield(elements: str) -> tuple[Check, Study]:
+    """The size of the defect, and its order, with one kind of elements."""
+    defects = [_yield_defect(elements, step) for step in STEPS]
+    return (between(f"at 0.1 h, over (a step's growth)^2 / 12, {elements}", defects[-1] / _trapezoid(STEPS[-1]), 0.7,
+                    1.3, "the trapezoidal rule on an exponential; its rate falls by 30 % as the pore clogs"),
+            study(f"yield, {elements}", STEPS, np.abs(defects), 2, "Heun's method, and the trapezoidal rule on what is "
+                  "consumed: second order", ceiling=4e-5, band=0.1))
+
+
+def _scene(step: float, *changes: str) -> Scene:
+    return runs.base("1.6 h", 'aggregate.radius="20 um"', f'growth.time_step="{step} h"', *changes)
+
+
+def _yield_defect(elements: str, step: float) -> float:
+    scene = _scene(step, runs.of(elements), runs.coarser(elements, 0.3))
+    law, rows = scene.kinetics, runs.last(scene).ledgers
+    acceptor, donor = np.sum([row.consumed for row in rows], axis=0)
+    decayed = (acceptor - law.acceptor_to_donor_ratio * donor) / law.decay_oxygen_demand
+    return float(1 - sum(row.biomass_made for row in rows) / (law.yield_coefficient * donor - decayed))
+
+
+def _trapezoid(step: float) -> float:
+    """(r step)^2 / 12 at the supply's rate of growth r."""
+    law, both = _scene(step).kinetics, _scene(step).substrates
+    m_a, m_d = (s.supply / (s.supply + s.half_saturation) for s in (both.acceptor, both.donor))
+    return (m_a * (law.maximum_utilization_rate * law.yield_coefficient * m_d - law.decay_coefficient) * step) ** 2 / 12
+
+
+REFINEMENTS = (0.7, 1.0, 1.4, 2.0)
+
+
+@case("coupling-density-restored", kind="property",
+      norm="a half-disc of 20 um whose density is X_m (1 + 0.1 x / R), remeshed, one step without uptake or decay: L2 "
+           "of (X_A + X_I) / X_m - 1 over it; X_m times the area over the biomass, less 1",
+      claim="What a density has of error at a remesh is gone after the next update [E7]: the shape takes up X_m again",
+      mutants=("density-not-worked-off", "theta-anew-at-a-remesh"))
+def density_restored() -> Outcome:
+    found = [_restored(refinement) for refinement in REFINEMENTS]
+    sizes = [1 / refinement for refinement in REFINEMENTS]
+    checks = [at_most("X_m times the area", max(area for _, area in found), 1e-11, runs.ROUND_OFF)]
+    for elements in ("quadratic", "cubic"):
+        error, area = _restored(0.5, runs.of(elements))
+        checks += [at_most(f"density, {elements}", error, 1e-10, "the masses of a new mesh are X_m, and J = theta in "
+                           "each point where it can be"),
+                   at_most(f"X_m times the area, {elements}", area, 1e-11, runs.ROUND_OFF)]
+    return Outcome(tuple(checks),
+                   (study("density", sizes, [error for error, _ in found], 1.5,
+                          "theta of triangles against X of nodes: second order, but at the rim, where they lie on one "
+                          "side, first; in L2 half an order more", ceiling=1.2e-3),))
+
+
+def _restored(refinement: float, *changes: str) -> tuple[float, float]:
+    """L2 of the density's error, and X_m times the area over the biomass, less 1."""
+    scene = runs.base("1 h", 'kinetics.decay_coefficient="0 1/d"', 'kinetics.maximum_utilization_rate="0 1/d"',
+                      f"numerics.refinement={refinement}", 'aggregate.radius="20 um"', *changes)
+    now = pore.seeded(scene)
+    x = aggregates.places(now.space)[0]
+    now = replace(now, active=now.active * (1 + 0.1 * x / scene.aggregate.radius))
+    solved = pore.solve(scene, now)
+    anew = remeshing.remesh(scene, now, now, solved.flow.mean_velocity)[0]
+    after = updates.step(scene, anew, pore.solve(scene, anew), 0.2).pore
+    weight = after.space.reaction.dx
+    density = (after.active + after.inert) / weight / scene.kinetics.maximum_density
+    error = np.sqrt(np.vdot(weight, (density - 1) ** 2) / weight.sum())
+    return float(error), abs(float(np.vdot(weight, density)) / after.outline.area - 1)
+
 
 #: Round-off and Newton's tolerance, 1e-13 of the largest term of each row, over all rows and with room to spare.
 CLOSED, CLOSES = 1e-9, "identities of the discrete equations: round-off and Newton's tolerance, with room"
-#: Steps of the paper's updates (h), from the longest on.
-STEPS = (0.8, 0.4, 0.2, 0.1)
 #: How long (h) a run goes on after contact.
 PAST = 2.0
 
@@ -182,3 +316,97 @@ def _cumulated(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     ledgers = _ledgers(simulate(scene))
     consumed = np.cumsum([step.consumed for step in ledgers], axis=0)
     return np.array([0.0, *(step.end for step in ledgers)]), np.vstack([np.zeros(2), consumed])
+
+
+AREA = "J = theta to the stabilisation"
+
+
+@case("coupling-contact", kind="property",
+      norm="three steps from an aggregate 0.1 um short of closing the pore, 20 um wide",
+      claim="Through contact the ledgers close, the area stays the biomass over X_m, no film under 2 um is left, and "
+            "the fluid is cut in two",
+      mutants=("films-stay-open", "reprojection-left-out"))
+def contact() -> Outcome:
+    found = [_closing(elements, runs.of(elements), runs.coarser(elements, 0.4)) for elements in runs.ELEMENTS]
+    found += [_closing(preset, runs.by(preset)) for preset in ("fast", "accurate")]
+    return Outcome(tuple(check for checks, _ in found for check in checks), (), tuple(picture for _, picture in found))
+
+
+def _closing(name: str, *changes: str) -> tuple[list, Profile]:
+    """Checks and a picture of a run with one kind of elements, or one preset."""
+    scene = runs.base("0.6 h", 'pore.width="20 um"', 'aggregate.radius="17.9 um"', *changes,
+                      times='"0.2 h", "0.4 h", "0.6 h"')
+    instants = list(simulate(runs.at_velocity(scene, runs.SPEED)))
+    rows = [row for instant in instants for row in instant.ledgers]
+    last = instants[-1].pore
+    total = scene.kinetics.maximum_density * last.outline.area
+    checks = [at_most(f"substrates, {name}", substrates(rows), 1e-10, "Newton's tolerance"),
+              at_most(f"biomass, worst step, {name}", biomass(rows), 1e-10, runs.ROUND_OFF),
+              at_most(f"X_m times the area, {name}", abs(total / rows[-1].biomass_after - 1), 3e-6, AREA),
+              at_least(f"narrowest gap over the least allowed, {name}", _narrowest(scene, last, TOP), 1 - 1e-9,
+                       "2 um, or 16.7 degrees beside contact"),
+              between(f"parts of the fluid, {name}", _parts(last.mesh), 1.9, 2.1, "a plug")]
+    return checks, _outlines(instants, name)
+
+
+@case("coupling-wedge", kind="property",
+      norm="one step from a disc of 20 um that stands on a chord, the fluid under it at 8 degrees",
+      claim="Wedges of fluid beside a contact surface close until they have the least contact angle",
+      mutants=("no-wedge-closes", "films-stay-open"))
+def wedge() -> Outcome:
+    found = [_wedge(elements) for elements in runs.ELEMENTS]
+    return Outcome(tuple(check for checks, _ in found for check in checks), (), tuple(picture for _, picture in found))
+
+
+def _wedge(elements: str) -> tuple[list, Profile]:
+    """Checks and a picture of a step with one kind of elements."""
+    scene = runs.base("0.2 h", runs.of(elements), runs.coarser(elements, 0.6))
+    with runs.shaped(lambda radius, geometry: _disc(20.0, 19.8, geometry)):
+        instants = list(simulate(scene))
+    gaps = [_narrowest(scene, instant.pore, BOTTOM) for instant in instants]
+    total = scene.kinetics.maximum_density * instants[-1].pore.outline.area
+    checks = [at_most(f"narrowest gap over the least allowed, seed, {elements}", gaps[0], 0.9,
+                      "8 degrees are under 16.7"),
+              at_least(f"the same after a step, {elements}", gaps[1], 1 - 1e-9, "2 um, or 16.7 degrees beside contact"),
+              at_most(f"X_m times the area, {elements}", abs(total / instants[-1].ledgers[-1].biomass_after - 1), 3e-6,
+                      AREA)]
+    return checks, _outlines(instants, elements)
+
+
+def _disc(radius: float, height: float, geometry: int) -> Outline:
+    """A disc around (0, height), cut by the lower wall."""
+    start = np.arcsin(height / radius)
+    angle = np.linspace(-start, np.pi + start, 60 * geometry + 1)
+    arc = np.column_stack([radius * np.cos(angle), height + radius * np.sin(angle)])
+    base = np.linspace(arc[-1, 0], arc[0, 0], 10 * geometry + 1)
+    points = np.vstack([np.column_stack([base, 0 * base]), arc[1:-1]])
+    wall = np.where(np.arange(len(points)) < len(base), BOTTOM, FREE)
+    return Outline(points, wall, np.arange(len(points)) == len(base) // 2, points.copy(), geometry)
+
+
+def _narrowest(scene: Scene, now, wall: int) -> float:
+    """Least gap between a wall and the interface beyond the contact surface, over the smaller of the least film and
+    tan(least angle) times the distance from contact; zero without contact."""
+    outline, growth = now.outline, scene.growth
+    free, on = outline.points[outline.wall == FREE], outline.points[outline.wall == wall, 0]
+    if len(on) == 0:
+        return 0.0
+    along = np.maximum(on.min() - free[:, 0], free[:, 0] - on.max())
+    gap = free[:, 1] if wall == BOTTOM else scene.pore.width - free[:, 1]
+    allowed = np.minimum(growth.minimum_film, np.tan(growth.minimum_contact_angle) * along)
+    return float((gap[along > 0] / allowed[along > 0]).min())
+
+
+def _parts(mesh) -> int:
+    """Connected parts of the fluid."""
+    corners = mesh.triangles[~mesh.biomass]
+    links = (np.ones(corners.size), (corners.ravel(), np.roll(corners, 1, axis=1).ravel()))
+    labels = connected_components(coo_array(links, shape=2 * (len(mesh.points),)), directed=False)[1]
+    return len(np.unique(labels[mesh.topology.fluid]))
+
+
+def _outlines(instants, name: str) -> Profile:
+    """The outlines, closed."""
+    loops = [(instant.pore.time, instant.pore.outline.points) for instant in instants]
+    return Profile(f"outlines, {name}", "x (um)", "y (um)", tuple(
+        (f"{time:g} h", "ours", *np.vstack([loop, loop[:1]]).T) for time, loop in loops))

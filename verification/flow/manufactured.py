@@ -13,11 +13,9 @@ import numpy as np
 
 from reference import manufactured_flow
 from repro.fem.mesh import Mesh, curved
-from verification import norms
-from verification.case import Outcome, Profile, case
-from verification.convergence import Study, refine, study
-from verification.flow import boxes, grids
-from verification.flow.boxes import Problem
+from verification.kernel.case import Outcome, Profile, Study, case, refine, study
+from verification.problems import boxes, meshes, norms
+from verification.problems.boxes import Problem
 
 DRAWS = (10, 6, 3, 1)
 SIZES, COARSE = (0.14, 0.07, 0.035, 0.0175), (0.28, 0.14, 0.07, 0.035)
@@ -67,7 +65,7 @@ def manufactured_curved() -> Outcome:
 def _studies(form: tuple[float, str], order: int, bend: float | None, sizes, ceilings) -> tuple[Study, Study]:
     """Velocity and pressure of an order on meshes of some sizes; ceilings: their last errors at most."""
     problem, where = _problem(*form, order), f"order {order}, lambda = {form[0]:g}, {form[1]}"
-    errors = refine(lambda level: grids.root_mean_square(
+    errors = refine(lambda level: meshes.root_mean_square(
         lambda draw: boxes.errors(_grid(sizes[level], draw, bend), problem), DRAWS[level]), range(len(sizes)))
     low, high, why = PRESSURE[order]
     return (study(f"velocity, {where}", sizes, errors["velocity"], order + 1, FULL, ceiling=ceilings[0]),
@@ -78,7 +76,7 @@ def _studies(form: tuple[float, str], order: int, bend: float | None, sizes, cei
 def _grid(size: float, draw: int, bend: float | None) -> Mesh:
     """A box of unit width cut by the interface, which goes through the origin; both turned by ANGLE; bent triangles
     where ``bend`` is a number."""
-    grid = grids.channel((-0.6, 0.5), 1.0, size, lambda x, y: x > 0, across=(0.0,), seed=int(1e4 * size) + draw)
+    grid = meshes.cut((-0.6, 0.5), 1.0, size, lambda x, y: x > 0, across=(0.0,), seed=int(1e4 * size) + draw)
     if bend is not None:
         grid = curved(grid, None)
     s, t = (grid.points - [0.0, 0.5]).T

@@ -17,7 +17,7 @@ from repro.model import biomass, pore, transport
 from repro.model.pore import Pore, Solved, peclet
 from repro.results import row
 from repro.scene import Kinetics, Scene, load_scene
-from verification.case import Check, at_least, at_most, between
+from verification.kernel.case import Check, at_least, at_most, between
 
 #: The presets, and fast with cubic elements: [numerics] of each.
 NUMERICS = {"paper": {"preset": "paper"}, "fast": {"preset": "fast"}, "accurate": {"preset": "accurate"},

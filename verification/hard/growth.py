@@ -13,9 +13,9 @@ from repro.fem import elements
 from repro.fem.outline import FREE
 from repro.model import growth, pore
 from repro.model.contact import constrained
-from verification.case import Check, at_least, at_most, between
 from verification.hard import common
 from verification.hard.common import DRIVE, SHAPE, TOLERANCE, HardCase, Run
+from verification.kernel.case import Check, at_least, at_most, between
 
 RADIUS = 20.0
 

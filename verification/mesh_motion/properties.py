@@ -10,10 +10,9 @@ import numpy as np
 
 from repro.fem.mesh import Mesh, curved
 from repro.fem.space import Space
-from verification import meshes, norms
-from verification.case import Outcome, Profile, at_least, at_most, case
-from verification.convergence import study
-from verification.mesh_motion.moves import GEOMETRIES, moved
+from verification.kernel.case import Outcome, Profile, at_least, at_most, case, study
+from verification.mesh_motion.closed_forms import GEOMETRIES, moved
+from verification.problems import meshes, norms
 
 WIDTH, ENDS = 50.0, (-75.0, 75.0)
 #: Radius of the half-disc (um), by which factor it grows, and how far it slides over its radius.

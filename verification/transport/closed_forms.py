@@ -11,10 +11,9 @@ from reference import robin_channel, slab
 from repro.fem.space import Space
 from repro.model import transport
 from repro.model.kinetics import Sink
-from verification import norms
-from verification.case import Check, Outcome, Profile, at_most, case
-from verification.convergence import BAND, refine, study
-from verification.transport.channels import (
+from verification.kernel.case import BAND, Check, Outcome, Profile, at_most, case, refine, study
+from verification.problems import norms
+from verification.problems.channels import (
     CROSSED,
     EXPECTED,
     FILM,

@@ -17,10 +17,9 @@ from repro.fem.sizing import ACROSS_AGGREGATE, ACROSS_PORE, Sizing
 from repro.fem.space import Space
 from repro.model import flow, transport
 from repro.model.kinetics import Sink
-from verification import norms
-from verification.case import Outcome, Profile, case
-from verification.convergence import refine, study
-from verification.transport.channels import (
+from verification.kernel.case import Outcome, Profile, case, refine, study
+from verification.problems import norms
+from verification.problems.channels import (
     NAMES,
     SCENE,
     WORDS,
