@@ -18,10 +18,10 @@ from scipy.interpolate import CubicSpline
 from reference import averaged_pore, layered_channel, poiseuille, taylor_hood
 from repro import results
 from repro.fem import mesher
-from repro.fem.outline import BOTTOM, FREE, Outline
+from repro.fem.outline import polygon
 from repro.fem.sizing import Sizing
 from repro.fem.space import Space
-from repro.march.simulation import simulate
+from repro.march.simulation import shaped, simulate
 from repro.model import flow, pore
 from repro.scene import Scene
 from verification.kernel.case import Check, Outcome, Profile, Study, at_most, between, case, study
@@ -282,9 +282,8 @@ def thin_scene(elements: str, aspect: float) -> Scene:
 def _strip(elements: str, aspect: float):
     """Largest differences; of the ends, relative; (upstream over downstream length - 1) over the averaged one's;
     profiles."""
-    given = thin_scene(elements, aspect)
-    with runs.shaped(lambda radius, geometry: half_ellipse(radius / aspect, radius, geometry)):
-        area, instants = pore.seeded(given).outline.area, averaged.ours(given)
+    given = shaped(thin_scene(elements, aspect), half_ellipse(elements, aspect))
+    area, instants = pore.seeded(given).outline.area, averaged.ours(given)
     moments = strip_of(given, area, 2 * averaged.CELLS).run(given.output.times)
     rows = [averaged.apart(given, *pair) for pair in zip(instants, moments)]
     ends = np.array([(instants[-1].pore.outline.upstream, instants[-1].pore.outline.downstream), moments[-1].ends])
@@ -299,25 +298,16 @@ def strip_of(given: Scene, area: float, cells: int) -> averaged_pore.Averaged:
     return averaged_pore.Averaged(averaged.pore_of(given), lengths, heights, 4 * cells, keeps_shape=False)
 
 
-def half_ellipse(half_length: float, thickness: float, geometry: int = 1) -> Outline:
-    """A seed, its interface nodes at equal eccentric angles, its fixed point in the middle."""
-    def shape(s):
-        return thickness * np.sqrt(np.maximum(1 - s**2, 0.0))
-
-    edges = round(32 / geometry * np.sqrt(half_length / thickness))
-    return bump(half_length, shape, edges, round(10 / geometry * half_length / thickness), geometry)
+def half_ellipse(elements: str, aspect: float) -> np.ndarray:
+    """(n, 2) um of a seed THICKNESS high, at equal eccentric angles; twice as many edges on curved triangles."""
+    edges = round((32 if elements == "linear" else 64) / np.sqrt(aspect))
+    return bump(THICKNESS / aspect, lambda s: THICKNESS * np.sqrt(np.maximum(1 - s**2, 0.0)), edges)
 
 
-def bump(half_length: float, shape, edges: int, half: int, geometry: int = 1) -> Outline:
-    """An outline of height shape(x / half_length): edges, or arcs (geometry 2), on the interface, twice ``half`` on the
-    wall."""
-    edges, half = geometry * edges, geometry * half
-    angle = np.linspace(0.0, np.pi, edges + 1)[1:-1]
-    base = half_length * np.arange(-half, half + 1) / half
-    arc = np.column_stack([half_length * np.cos(angle), shape(np.cos(angle))])
-    points = np.vstack([np.column_stack([base, 0.0 * base]), arc])
-    wall = np.where(np.arange(len(points)) < len(base), BOTTOM, FREE)
-    return Outline(points, wall, np.arange(len(points)) == half, points.copy(), geometry)
+def bump(half_length: float, shape, edges: int) -> np.ndarray:
+    """(edges + 1, 2) um of height shape(x / half_length), from the upstream end."""
+    angle = np.linspace(np.pi, 0.0, edges + 1)
+    return np.column_stack([half_length * np.cos(angle), runs.on_wall(shape(np.cos(angle)))])
 
 
 LOW, LONG, RATIO, LENGTH = 8.0, 40.0, 2000.0, 600.0
@@ -353,7 +343,7 @@ def _losses(order: int, aspect: float) -> tuple[float, float, float]:
     12 W integral of (1 + 4/5 h'^2) / (W - h)^3 dx.
     """
     half, reach = LOW / aspect, LOW / aspect + LONG
-    outline = bump(half, lambda s: LOW * (1 - s**2) ** 2, round(48 / np.sqrt(aspect)), round(15 / aspect))
+    outline = polygon(bump(half, lambda s: LOW * (1 - s**2) ** 2, round(48 / np.sqrt(aspect))), WIDTH)
     grid, _ = mesher.generate(outline, (-reach, reach), Sizing(WIDTH, 2.5 / order, 2.0))
     drive = replace(thin_scene("linear", 0.5).flow, viscosity_ratio=RATIO, mean_velocity=1.0, kinematic_viscosity=1.0,
                     gravity=1.0)
@@ -393,8 +383,7 @@ def uptake() -> Outcome:
 
 def _around(elements: str, aspect: float) -> dict:
     """{(Peclet, density): (largest difference, profile)} on one mesh."""
-    with runs.shaped(lambda radius, geometry: half_ellipse(radius / aspect, radius, geometry)):
-        now = pore.seeded(thin_scene(elements, aspect))
+    now = pore.seeded(shaped(thin_scene(elements, aspect), half_ellipse(elements, aspect)))
     return {(peclet, density): _compared(elements, aspect, now, peclet, density)
             for peclet in PECLETS for density in DENSITIES}
 

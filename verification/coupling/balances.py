@@ -18,7 +18,7 @@ from scipy.interpolate import CubicSpline
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from repro.fem.outline import BOTTOM, FREE, TOP, Outline
+from repro.fem.outline import BOTTOM, FREE, TOP
 from repro.march import updates
 from repro.march.loop import Instant, Ledger
 from repro.march.simulation import simulate
@@ -361,8 +361,7 @@ def wedge() -> Outcome:
 def _wedge(elements: str) -> tuple[list, Profile]:
     """Checks and a picture of a step with one kind of elements."""
     scene = runs.base("0.2 h", runs.of(elements), runs.coarser(elements, 0.6))
-    with runs.shaped(lambda radius, geometry: _disc(20.0, 19.8, geometry)):
-        instants = list(simulate(scene))
+    instants = list(simulate(scene, _disc(20.0, 19.8, 60 * scene.numerics.geometry)))
     gaps = [_narrowest(scene, instant.pore, BOTTOM) for instant in instants]
     total = scene.kinetics.maximum_density * instants[-1].pore.outline.area
     checks = [at_most(f"narrowest gap over the least allowed, seed, {elements}", gaps[0], 0.9,
@@ -373,15 +372,11 @@ def _wedge(elements: str) -> tuple[list, Profile]:
     return checks, _outlines(instants, elements)
 
 
-def _disc(radius: float, height: float, geometry: int) -> Outline:
-    """A disc around (0, height), cut by the lower wall."""
+def _disc(radius: float, height: float, edges: int) -> np.ndarray:
+    """(edges + 1, 2) um of a disc around (0, height), cut by the lower wall, from its upstream end."""
     start = np.arcsin(height / radius)
-    angle = np.linspace(-start, np.pi + start, 60 * geometry + 1)
-    arc = np.column_stack([radius * np.cos(angle), height + radius * np.sin(angle)])
-    base = np.linspace(arc[-1, 0], arc[0, 0], 10 * geometry + 1)
-    points = np.vstack([np.column_stack([base, 0 * base]), arc[1:-1]])
-    wall = np.where(np.arange(len(points)) < len(base), BOTTOM, FREE)
-    return Outline(points, wall, np.arange(len(points)) == len(base) // 2, points.copy(), geometry)
+    angle = np.linspace(np.pi + start, -start, edges + 1)
+    return np.column_stack([radius * np.cos(angle), runs.on_wall(height + radius * np.sin(angle))])
 
 
 def _narrowest(scene: Scene, now, wall: int) -> float:

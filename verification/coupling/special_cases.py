@@ -13,9 +13,9 @@ import numpy as np
 
 from reference import poiseuille
 from repro.fem.mesh import Mesh
-from repro.fem.outline import BOTTOM, FREE, Outline
+from repro.fem.outline import FREE
 from repro.fem.space import Space
-from repro.march.simulation import simulate
+from repro.march.simulation import shaped, simulate
 from repro.model import flow, pore
 from repro.scene import load_scene
 from verification.kernel.case import Outcome, Profile, at_least, at_most, case, study
@@ -335,19 +335,15 @@ def _lopsided(elements: str, sign: float) -> dict[str, float]:
     law = replace(scene.kinetics, maximum_utilization_rate=0.5 * LARGE, decay_coefficient=0.0,
                   acceptor_to_donor_ratio=1e-12)
     scene = replace(scene, substrates=both, kinetics=law)
-    with runs.shaped(lambda radius, geometry: _outline(sign, geometry)):
-        now = pore.seeded(scene)
+    scene = shaped(scene, _outline(sign, 80 * scene.numerics.geometry))
+    now = pore.seeded(scene)
     solved = pore.solve(scene, now)
     donor = solved.fluxes[1]
     return {"conductivity": solved.flow.conductivity, "effluent": donor.effluent, "inlet": donor.inlet}
 
 
-def _outline(sign: float, geometry: int) -> Outline:
-    """24 um (1 + 0.35 cos a - 0.15 cos 2a), or its image in x -> -x for sign = -1."""
-    angle = np.linspace(0.0, np.pi, 80 * geometry + 1)
+def _outline(sign: float, edges: int) -> np.ndarray:
+    """(edges + 1, 2): 24 um (1 + 0.35 cos a - 0.15 cos 2a), or its image in x -> -x for sign = -1."""
+    angle = np.linspace(np.pi, 0.0, edges + 1)
     radius = 24.0 * (1 + 0.35 * sign * np.cos(angle) - 0.15 * np.cos(2 * angle))
-    arc = radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
-    base = np.column_stack([np.linspace(arc[-1, 0], arc[0, 0], 20 * geometry + 1), np.zeros(20 * geometry + 1)])
-    points = np.vstack([base, arc[1:-1]])
-    wall = np.where(np.arange(len(points)) < len(base), BOTTOM, FREE)
-    return Outline(points, wall, np.arange(len(points)) == 10 * geometry, points.copy(), geometry)
+    return np.column_stack([radius * np.cos(angle), runs.on_wall(radius * np.sin(angle))])

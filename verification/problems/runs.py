@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from unittest import mock
 
 import numpy as np
 
-from repro.fem.outline import Outline
 from repro.march.loop import Instant
 from repro.march.simulation import simulate
-from repro.model import pore
 from repro.model.pore import Pore, Solved
 from repro.scene import Scene, load_scene
 from verification.problems import pairs
@@ -49,10 +45,9 @@ def by(preset: str) -> str:
     return f'numerics.preset="{preset}"'
 
 
-def shaped(seed: Callable[[float, int], Outline]):
-    """A context in which seeds are ``seed(radius, geometry)``, geometry 1 with straight edges, 2 with arcs."""
-    return mock.patch.object(pore, "half_disc",
-                             lambda radius, across, geometry, middle: seed(radius, geometry))
+def on_wall(heights: np.ndarray) -> np.ndarray:
+    """Heights (n,) of a shape's points with the first and the last on the lower wall to the last bit."""
+    return np.concatenate([[0.0], heights[1:-1], [0.0]])
 
 
 def last(scene: Scene) -> Instant:
