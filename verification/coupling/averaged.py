@@ -24,7 +24,7 @@ from repro.fem.space import Space
 from repro.march.simulation import shaped, simulate
 from repro.model import flow, pore
 from repro.scene import Scene
-from verification.kernel.case import Check, Outcome, Profile, Study, at_most, between, case, study
+from verification.kernel.case import Profile, at_most, between, case, study
 from verification.problems import averaged, runs
 
 TIMES = (2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0, 19.4)
@@ -37,32 +37,25 @@ RADII, REACH = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 33.0), 75.0
            "relative, effluents and section means of C along the mesh over the supply",
       claim="Under its head base clogs as its averaged pore (FiPy, solve_ivp) does, up to what lubrication and section "
             "means are worth: a velocity 11 % too high, of which 1 % is left with a half-disc's own loss",
-      mutants=("stale-flow", "conductivity-for-velocity"))
-def base() -> Outcome:
-    found = [_with(preset) for preset in runs.PRESETS]
-    return Outcome(tuple(check for checks, _ in found for check in checks), (),
-                   tuple(picture for _, pictures in found for picture in pictures))
-
-
-def _with(preset: str) -> tuple[list, list[Profile]]:
+      mutants=("stale-flow", "conductivity-for-velocity"), over=runs.PRESETS)
+def base(preset: str):
     """Checks and pictures of one preset."""
     scene = runs.base("19.4 h", runs.by(preset), times=", ".join(f'"{time} h"' for time in TIMES))
     instants = averaged.ours(scene)
     thin, own = (averaged.half_disc(scene, speed).run(TIMES) for speed in speeds(scene))
     first, second = ([averaged.apart(scene, *pair) for pair in zip(instants, moments)] for moments in (thin, own))
     flow, rest = averaged.worst(first), averaged.worst(second)
-    checks = [between(f"velocity, lubrication, {preset}", flow["velocity"], 0.09, 0.12,
+    checks = [between("velocity, lubrication", flow["velocity"], 0.09, 0.12,
                       "lubrication loses 11.3 % of the loss around a half-disc of 30 um, by Taylor-Hood; less what its "
                       "aggregate, 2 % larger, gains"),
-              at_most(f"velocity, the loss of a half-disc of our area, {preset}", _at_our_area(scene, instants), 0.01,
+              at_most("velocity, the loss of a half-disc of our area", _at_our_area(scene, instants), 0.01,
                       "linear elements: 0.3 % at the ends of the mesh, 0.5 % around the aggregate")]
     if preset == "paper":  # without linear elements' error, which is of the other sign, 1.6 % with the averaged area
-        checks.append(at_most(f"velocity, a half-disc's loss, {preset}", rest["velocity"], 0.01,
+        checks.append(at_most("velocity, a half-disc's loss", rest["velocity"], 0.01,
                               "linear elements: 0.3 % at the ends of the mesh, 0.5 % around the aggregate"))
-    checks += [at_most(f"{name}, a half-disc's loss, {preset}", rest[name], bound, SQUARE_LAW)
+    checks += [at_most(f"{name}, a half-disc's loss", rest[name], bound, SQUARE_LAW)
                for name, bound in (("area", 0.013), ("effluents", 0.02), ("C along the pore", 0.02))]
-    pictures = [*_histories(scene, instants, thin, own), *averaged.profiles(instants[5::2], own[5::2])]
-    return checks, [replace(picture, title=f"{picture.title}, {preset}") for picture in pictures]
+    return checks, _histories(scene, instants, thin, own), averaged.profiles(instants[5::2], own[5::2])
 
 
 def _at_our_area(scene, instants) -> float:
@@ -128,14 +121,8 @@ FASTER = (4.0, 16.0, 64.0, 256.0)
            "fluid and biomass and times 4 to 256",
       claim="What averaging over sections costs in the effluents is, as diffusion becomes fast, the constriction of a "
             "half-disc in a strip, in closed form",
-      mutants=("effluent-at-the-inlet", "inlet-held", "seed-too-thin"))
-def mixing() -> Outcome:
-    found = [_mixed(elements) for elements in runs.ELEMENTS]
-    return Outcome(tuple(check for checks, _ in found for check in checks),
-                   tuple(one for _, studies in found for one in studies))
-
-
-def _mixed(elements: str) -> tuple[list[Check], list[Study]]:
+      mutants=("effluent-at-the-inlet", "inlet-held", "seed-too-thin"), over=runs.ELEMENTS)
+def mixing(elements: str):
     """Checks and studies with one kind of elements."""
     scene = runs.base("0 h", 'aggregate.radius="20 um"', runs.of(elements), runs.coarser(elements, 0.5, 1.5))
     scene = runs.at_velocity(scene, runs.SPEED)
@@ -145,8 +132,8 @@ def _mixed(elements: str) -> tuple[list[Check], list[Study]]:
     for k, name in enumerate(("acceptor", "donor")):
         gaps = np.array([(ours - reference)[k] for ours, reference, _ in found])
         theory = np.array([first[k] for _, _, first in found])
-        studies.append(study(f"effluent {name} (mg/L), {elements}", sizes, np.abs(gaps), 2, SQUARE, ceiling=2.5e-5))
-        checks.append(between(f"{name}: disagreement over first-order theory, {elements}", gaps[-1] / theory[-1],
+        studies.append(study(f"effluent {name} (mg/L)", sizes, np.abs(gaps), 2, SQUARE, ceiling=2.5e-5))
+        checks.append(between(f"{name}: disagreement over first-order theory", gaps[-1] / theory[-1],
                               0.995, 1.005, "the next order: 0.2 %, a quarter of that at D times 64; mesh: 0.7 % at "
                               "refinement 1 of linear elements, less than half of that here"))
     return checks, studies
@@ -172,24 +159,18 @@ MIXING_TIMES = (5.0, 10.0, 15.0, 19.4)
            "tolerance: its own error in time, 4e-5, would be seen",
       claim="The whole base run is that of the averaged pore (FiPy, solve_ivp) up to the square of the transverse "
             "Thiele number, and base itself is where that square puts it",
-      mutants=("rates-two-percent-low",))
-def whole_run() -> Outcome:
-    found = [_of_preset(preset) for preset in ("paper", "accurate")]
-    return Outcome(tuple(check for checks, _, _ in found for check in checks),
-                   tuple(one for _, studies, _ in found for one in studies), found[0][2])
-
-
-def _of_preset(preset: str) -> tuple[list[Check], list[Study], tuple]:
+      mutants=("rates-two-percent-low",), over=("paper", "accurate"))
+def whole_run(preset: str):
     """Checks, studies and pictures of one preset."""
     found = {factor: _whole(preset, factor) for factor in (1.0, *SLOWER)}
     scene, studies, checks = _base(preset, 1.0), [], []
     sizes = [thiele(scene, factor) for factor in SLOWER]
     for name in ("area", "effluents", "C along the pore"):
         errors = [found[factor][0][name] for factor in SLOWER]
-        studies.append(study(f"{name}, {preset}", sizes, errors, 2, SQUARE, ceiling=3e-4))
+        studies.append(study(f"{name}", sizes, errors, 2, SQUARE, ceiling=3e-4))
         if name == "C along the pore":
             continue
-        checks.append(between(f"base, {name}: over the square law through the first of these, {preset}",
+        checks.append(between(f"base, {name}: over the square law through the first of these",
                               found[1.0][0][name] / (SLOWER[0] * errors[0]), 1.0, 2.0,
                               "terms of fourth order"))
     return checks, studies, tuple(found[1.0][1])
@@ -219,16 +200,12 @@ COARSE, FINE = (1.0, 12.0, 1), (2.0, 6.0, 2)
       norm="change of the disagreement, over itself, when mesh, step and FiPy's cells are halved: area, effluents and "
            "section means of C; 2 h from 20 um at 2.9 m/d",
       claim="The disagreement with the averaged pore is that of the models: it stays when both codes are refined",
-      mutants=("rates-at-the-start",))
-def refined() -> Outcome:
-    checks, profiles = [], []
-    for elements in runs.ELEMENTS:
-        (coarse, _), (fine, pictures) = (_piece(elements, *level) for level in (COARSE, FINE))
-        checks += [at_most(f"{name}, {elements}", abs(fine[name] / coarse[name] - 1), 0.01,
-                           "error in space 0.1 % of what is lost, in time 0.2 % of an hour's growth")
-                   for name in ("area", "effluents", "C along the pore")]
-        profiles += pictures
-    return Outcome(tuple(checks), (), tuple(profiles))
+      mutants=("rates-at-the-start",), over=runs.ELEMENTS)
+def refined(elements: str):
+    (coarse, _), (fine, pictures) = (_piece(elements, *level) for level in (COARSE, FINE))
+    return pictures, [at_most(name, abs(fine[name] / coarse[name] - 1), 0.01,
+                              "error in space 0.1 % of what is lost, in time 0.2 % of an hour's growth")
+                      for name in ("area", "effluents", "C along the pore")]
 
 
 def _piece(elements: str, refinement: float, minutes: float, finer: int):
@@ -255,20 +232,16 @@ THIN_SQUARE = "regular perturbation: the square of the aspect ratio"
            "pore starts alike",
       claim="Thin aggregates grow as the averaged pore (FiPy, solve_ivp) with the stress-free strip says, starved "
             "downstream, up to the square of the aspect ratio",
-      mutants=("growth-spread-evenly",))
-def strip() -> Outcome:
-    checks, studies, profiles = [], [], []
-    for elements in ("linear", "quadratic"):
-        found = [_strip(elements, aspect) for aspect in ASPECTS]
-        studies += [study(f"{name}, {elements}", ASPECTS, [rows[name] for rows, *_ in found], 2, THIN_SQUARE,
-                          ceiling=4e-4) for name in ("area", "effluents", "C along the pore")]
-        tips, lean, pictures = found[-1][1:]
-        checks += [at_most(f"ends of the thinnest, relative, {elements}", tips, 1.5e-4,
-                           "stretches: as the square of the aspect ratio"),
-                   between(f"how far it leans upstream, over the averaged pore's 0.27 %, {elements}", lean, 0.97, 1.03,
-                           "the same: 0.4 %, and as much for the step in time")]
-        profiles += pictures
-    return Outcome(tuple(checks), tuple(studies), tuple(profiles))
+      mutants=("growth-spread-evenly",), over=("linear", "quadratic"))
+def strip(elements: str):
+    found = [_strip(elements, aspect) for aspect in ASPECTS]
+    studies = [study(name, ASPECTS, [rows[name] for rows, *_ in found], 2, THIN_SQUARE, ceiling=4e-4)
+               for name in ("area", "effluents", "C along the pore")]
+    tips, lean, pictures = found[-1][1:]
+    return studies, pictures, [
+        at_most("ends of the thinnest, relative", tips, 1.5e-4, "stretches: as the square of the aspect ratio"),
+        between("how far it leans upstream, over the averaged pore's 0.27 %", lean, 0.97, 1.03,
+                "the same: 0.4 %, and as much for the step in time")]
 
 
 def thin_scene(elements: str, aspect: float) -> Scene:
@@ -319,21 +292,15 @@ SLENDER = (0.25, 0.177, 0.125, 0.0884)
            "refinement 2.5 over the order of the elements; a bump 8 (1 - s^2)^2 um high in 20 um",
       claim="The head loss of a long aggregate is that of developed flow in each section, and the next term is that of "
             "extended lubrication theory, coefficient included",
-      mutants=("extent-not-subtracted",))
-def lubrication() -> Outcome:
-    found = [_lubricated(order) for order in (2, 3)]
-    return Outcome(tuple(check for check, _ in found), tuple(orders for _, orders in found))
-
-
-def _lubricated(order: int) -> tuple[Check, Study]:
+      mutants=("extent-not-subtracted",), over={f"order {order}": (order,) for order in (2, 3)})
+def lubrication(order: int):
     """The coefficient, and the order, with elements of an order on straight triangles: the bump's ends lie flat on the
     wall, which arcs would cross."""
-    name = f"order {order}"
     ours, thin, more = np.array([_losses(order, aspect) for aspect in SLENDER]).T
     clean = poiseuille.head_loss(LENGTH, WIDTH, 1.0, 1.0)
-    return (between(f"gap over that of extended lubrication, the most slender, {name}", (ours - thin)[-1] / more[-1],
+    return (between("gap over that of extended lubrication, the most slender", (ours - thin)[-1] / more[-1],
                     0.94, 1.02, "mesh, 2 %; the next term, 1 %; lambda = 2000 for a rigid wall, 0.4 %"),
-            study(f"loss, {name}", SLENDER, (ours - thin) / (thin - clean), 2, THIN_SQUARE, ceiling=1.5e-2))
+            study("loss", SLENDER, (ours - thin) / (thin - clean), 2, THIN_SQUARE, ceiling=1.5e-2))
 
 
 def _losses(order: int, aspect: float) -> tuple[float, float, float]:
@@ -365,20 +332,16 @@ PECLETS, DENSITIES = (0.1, 1.0, 5.0), (1e6, 3e6, 1e7)
            "high, thickness over half length 1/5 to 1/40 (FiPy's cells: its inverse, u: as it, X_m: as its square)",
       claim="Around thin aggregates C is the averaged pore's (FiPy) up to the square of the aspect ratio, at Peclet "
             "0.1, 1, 5 and three densities, from 99 % to 1 % of the acceptor leaving",
-      mutants=("inlet-held", "seed-too-thin"))
-def uptake() -> Outcome:
-    checks, studies, profiles = [], [], []
-    for elements in ("linear", "quadratic"):
-        found = [_around(elements, aspect) for aspect in UPTAKE_ASPECTS]
-        studies += [study(f"Pe = {peclet:g}, X = {density:g} mg/L, {elements}", UPTAKE_ASPECTS,
-                          [rows[peclet, density][0] for rows in found], 2, THIN_SQUARE, ceiling=1e-3)
-                    for peclet, density in found[0]]
-        thinnest = [profile for _, profile in found[-1].values()]
-        left = min(profile.curves[0][3][-1] for profile in thinnest) / 10.0
-        checks.append(at_most(f"acceptor leaving the starved one, over the supply, {elements}", left, 0.02,
-                              "else none is starved"))
-        profiles += thinnest
-    return Outcome(tuple(checks), tuple(studies), tuple(profiles))
+      mutants=("inlet-held", "seed-too-thin"), over=("linear", "quadratic"))
+def uptake(elements: str):
+    found = [_around(elements, aspect) for aspect in UPTAKE_ASPECTS]
+    studies = [study(f"Pe = {peclet:g}, X = {density:g} mg/L", UPTAKE_ASPECTS,
+                     [rows[peclet, density][0] for rows in found], 2, THIN_SQUARE, ceiling=1e-3)
+               for peclet, density in found[0]]
+    thinnest = [profile for _, profile in found[-1].values()]
+    left = min(profile.curves[0][3][-1] for profile in thinnest) / 10.0
+    starved = at_most("acceptor leaving the starved one, over the supply", left, 0.02, "else none is starved")
+    return studies, thinnest, starved
 
 
 def _around(elements: str, aspect: float) -> dict:
@@ -401,4 +364,4 @@ def _compared(elements: str, aspect: float, now: pore.Pore, peclet: float, densi
     curves = [(name, kind, x, field) for kind, both in (("ours", ours), ("reference", theirs))
               for name, field in zip(("C_A", "C_D") if kind == "ours" else ("averaged", "averaged"), both)]
     return (float(np.abs(ours - theirs).max()) / 10.0,
-            Profile(f"Pe = {peclet:g}, X = {density:g} mg/L, {elements}", "x (um)", "C (mg/L)", tuple(curves)))
+            Profile(f"Pe = {peclet:g}, X = {density:g} mg/L", "x (um)", "C (mg/L)", tuple(curves)))

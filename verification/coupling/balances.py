@@ -24,8 +24,11 @@ from repro.march.loop import Instant, Ledger
 from repro.march.simulation import simulate
 from repro.model import pore, remeshing
 from repro.scene import Kinetics, Scene
-from verification.kernel.case import Check, Outcome, Profile, Study, at_least, at_most, between, case, study
+from verification.kernel.case import Outcome, Profile, Study, at_least, at_most, between, case, study
 from verification.problems import aggregates, runs
+
+#: Steps twice as long as the paper's.
+LONG = 'growth.time_step="24 min"'
 
 
 @case("coupling-ledger", kind="property",
@@ -33,34 +36,27 @@ from verification.problems import aggregates, runs
            "X_m times the area over the biomass; largest deviation of the density from X_m",
       claim="Over a whole run with its remeshes substrates and biomass are accounted for to round-off, and the area is "
             "the biomass over X_m",
-      mutants=("theta-anew-at-a-remesh", "biomass-interpolated-at-a-remesh", "growth-spread-evenly"))
-def ledger() -> Outcome:
-    steps = 'growth.time_step="24 min"'
-    checks = _accounted("linear", steps, 6e-7, 4e-3, 3.0)
-    for elements in ("quadratic", "cubic"):
-        checks += _accounted(elements, steps, 1e-10, 1e-3, 2.0, runs.of(elements), "numerics.refinement=0.2")
-    for preset in ("fast", "accurate"):
-        checks += _accounted(preset, runs.by(preset), 1e-10, 1e-3, 2.0)
-    return Outcome(tuple(checks))
-
-
-def _accounted(name: str, steps: str, area: float, density: float, remeshes: float, *changes: str) -> list:
+      mutants=("theta-anew-at-a-remesh", "biomass-interpolated-at-a-remesh", "growth-spread-evenly"),
+      over={"linear": (6e-7, 4e-3, 3.0, LONG),
+            **{kind: (1e-10, 1e-3, 2.0, LONG, runs.of(kind), "numerics.refinement=0.2") for kind in runs.ELEMENTS[1:]},
+            **{kind: (1e-10, 1e-3, 2.0, runs.by(kind)) for kind in runs.PRESETS[1:]}})
+def ledger(area: float, density: float, remeshes: float, *changes: str):
     """Checks of a run of base: largest deviations of the area and of the density, and fewest remeshes."""
-    scene = runs.base("19.4 h", steps, *changes)
+    scene = runs.base("19.4 h", *changes)
     instants = list(simulate(scene))
     rows, last = instants[-1].ledgers, instants[-1].pore
     made = sum(row.biomass_made for row in rows)
     total = scene.kinetics.maximum_density * last.outline.area
-    return [at_most(f"substrates, {name}", substrates(rows), 1e-10, "Newton's tolerance, 1e-13 of the largest term of "
+    return [at_most("substrates", substrates(rows), 1e-10, "Newton's tolerance, 1e-13 of the largest term of "
                     "each row, over all rows"),
-            at_most(f"biomass, worst step, {name}", biomass(rows), 1e-10, runs.ROUND_OFF),
-            at_most(f"biomass, whole run, {name}", abs((rows[0].biomass_before + made) / rows[-1].biomass_after - 1),
+            at_most("biomass, worst step", biomass(rows), 1e-10, runs.ROUND_OFF),
+            at_most("biomass, whole run", abs((rows[0].biomass_before + made) / rows[-1].biomass_after - 1),
                     1e-10, runs.ROUND_OFF),
-            at_most(f"X_m times the area, {name}", abs(total / rows[-1].biomass_after - 1), area,
+            at_most("X_m times the area", abs(total / rows[-1].biomass_after - 1), area,
                     "J = theta in the mean: to the stabilisation of linear elements, else to Newton's tolerance"),
-            at_most(f"density, {name}", runs.density_drift(scene, instants[-1]), density,
+            at_most("density", runs.density_drift(scene, instants[-1]), density,
                     "J = theta in the mean around a node only [E7]; worked off at each remesh"),
-            at_least(f"remeshes, {name}", instants[-1].remeshes, remeshes, "else they are not tested")]
+            at_least("remeshes", instants[-1].remeshes, remeshes, "else they are not tested")]
 
 
 def substrates(rows) -> float:
@@ -81,18 +77,14 @@ STEPS = (0.8, 0.4, 0.2, 0.1)
       norm="biomass made over the yield of the substrates, less 1; base from 20 um to 1.6 h, steps of 0.8 to 0.1 h",
       claim="The biomass made is Y times the donor consumed, less f_d of what decays, which the acceptor's demand "
             "beyond F times the donor tells: the ledgers agree to second order in the step",
-      mutants=("euler-biomass", "rates-at-the-start", "rates-two-percent-low", "decay-leaves-all"))
-def yields() -> Outcome:
-    found = [_yield(elements) for elements in runs.ELEMENTS]
-    return Outcome(tuple(check for check, _ in found), tuple(orders for _, orders in found))
-
-
-def _yield(elements: str) -> tuple[Check, Study]:
+      mutants=("euler-biomass", "rates-at-the-start", "rates-two-percent-low", "decay-leaves-all"),
+      over=runs.ELEMENTS)
+def yields(elements: str):
     """The size of the defect, and its order, with one kind of elements."""
     defects = [_yield_defect(elements, step) for step in STEPS]
-    return (between(f"at 0.1 h, over (a step's growth)^2 / 12, {elements}", defects[-1] / _trapezoid(STEPS[-1]), 0.7,
+    return (between("at 0.1 h, over (a step's growth)^2 / 12", defects[-1] / _trapezoid(STEPS[-1]), 0.7,
                     1.3, "the trapezoidal rule on an exponential; its rate falls by 30 % as the pore clogs"),
-            study(f"yield, {elements}", STEPS, np.abs(defects), 2, "Heun's method, and the trapezoidal rule on what is "
+            study("yield", STEPS, np.abs(defects), 2, "Heun's method, and the trapezoidal rule on what is "
                   "consumed: second order", ceiling=4e-5, band=0.1))
 
 
@@ -283,17 +275,8 @@ IN_A_STEP = 3.0
            "at the ends of the steps by a cubic spline",
       claim="The amounts in the ledgers are those of ten times shorter steps: to 1 % by preset fast and 0.1 % by "
             "accurate in all, to three times that in every step",
-      mutants=("flows-of-the-start", "curved-rates-of-the-start"))
-def amounts() -> Outcome:
-    checks, profiles = [], []
-    for preset in RIGHT:
-        found, profile = _amounts(preset)
-        checks += found
-        profiles.append(profile)
-    return Outcome(tuple(checks), (), tuple(profiles))
-
-
-def _amounts(preset: str) -> tuple[list, Profile]:
+      mutants=("flows-of-the-start", "curved-rates-of-the-start"), over=tuple(RIGHT))
+def amounts(preset: str):
     """Checks and a picture of one preset."""
     scene = runs.base("19.4 h", runs.by(preset))
     shorter = runs.base("19.4 h", runs.by(preset), f"numerics.tolerance={scene.numerics.tolerance / 100}")
@@ -302,12 +285,12 @@ def _amounts(preset: str) -> tuple[list, Profile]:
     in_all, in_a_step = np.abs(ours[-1] / there[-1] - 1), np.abs(np.diff(ours, axis=0) / np.diff(there, axis=0) - 1)
     checks, bound = [], RIGHT[preset]
     for k, name in enumerate(("acceptor", "donor")):
-        checks += [at_most(f"{name} in all, {preset}", in_all[k], bound, "what the preset is for"),
-                   at_most(f"{name} in a step, {preset}", in_a_step[:, k].max(), IN_A_STEP * bound,
+        checks += [at_most(f"{name} in all", in_all[k], bound, "what the preset is for"),
+                   at_most(f"{name} in a step", in_a_step[:, k].max(), IN_A_STEP * bound,
                            "three times what the preset is for")]
-    checks.append(at_least(f"steps, of the other run over these, {preset}", len(fine) / len(times), 6.0,
+    checks.append(at_least("steps, of the other run over these", len(fine) / len(times), 6.0,
                            "tolerance to the power 1/2, ten; fewer where a step ends with the run"))
-    return checks, Profile(f"acceptor consumed, {preset}", "time (h)", "um2 mg/L",
+    return checks, Profile("acceptor consumed", "time (h)", "um2 mg/L",
                            (("ours", "ours", times, ours[:, 0]), ("shorter steps", "reference", fine, theirs[:, 0])))
 
 
@@ -325,14 +308,8 @@ AREA = "J = theta to the stabilisation"
       norm="three steps from an aggregate 0.1 um short of closing the pore, 20 um wide",
       claim="Through contact the ledgers close, the area stays the biomass over X_m, no film under 2 um is left, and "
             "the fluid is cut in two",
-      mutants=("films-stay-open", "reprojection-left-out"))
-def contact() -> Outcome:
-    found = [_closing(elements, runs.of(elements), runs.coarser(elements, 0.4)) for elements in runs.ELEMENTS]
-    found += [_closing(preset, runs.by(preset)) for preset in ("fast", "accurate")]
-    return Outcome(tuple(check for checks, _ in found for check in checks), (), tuple(picture for _, picture in found))
-
-
-def _closing(name: str, *changes: str) -> tuple[list, Profile]:
+      mutants=("films-stay-open", "reprojection-left-out"), over=runs.EVERY)
+def contact(*changes: str):
     """Checks and a picture of a run with one kind of elements, or one preset."""
     scene = runs.base("0.6 h", 'pore.width="20 um"', 'aggregate.radius="17.9 um"', *changes,
                       times='"0.2 h", "0.4 h", "0.6 h"')
@@ -340,36 +317,31 @@ def _closing(name: str, *changes: str) -> tuple[list, Profile]:
     rows = [row for instant in instants for row in instant.ledgers]
     last = instants[-1].pore
     total = scene.kinetics.maximum_density * last.outline.area
-    checks = [at_most(f"substrates, {name}", substrates(rows), 1e-10, "Newton's tolerance"),
-              at_most(f"biomass, worst step, {name}", biomass(rows), 1e-10, runs.ROUND_OFF),
-              at_most(f"X_m times the area, {name}", abs(total / rows[-1].biomass_after - 1), 3e-6, AREA),
-              at_least(f"narrowest gap over the least allowed, {name}", _narrowest(scene, last, TOP), 1 - 1e-9,
+    checks = [at_most("substrates", substrates(rows), 1e-10, "Newton's tolerance"),
+              at_most("biomass, worst step", biomass(rows), 1e-10, runs.ROUND_OFF),
+              at_most("X_m times the area", abs(total / rows[-1].biomass_after - 1), 3e-6, AREA),
+              at_least("narrowest gap over the least allowed", _narrowest(scene, last, TOP), 1 - 1e-9,
                        "2 um, or 16.7 degrees beside contact"),
-              between(f"parts of the fluid, {name}", _parts(last.mesh), 1.9, 2.1, "a plug")]
-    return checks, _outlines(instants, name)
+              between("parts of the fluid", _parts(last.mesh), 1.9, 2.1, "a plug")]
+    return checks, _outlines(instants)
 
 
 @case("coupling-wedge", kind="property",
       norm="one step from a disc of 20 um that stands on a chord, the fluid under it at 8 degrees",
       claim="Wedges of fluid beside a contact surface close until they have the least contact angle",
-      mutants=("no-wedge-closes", "films-stay-open"))
-def wedge() -> Outcome:
-    found = [_wedge(elements) for elements in runs.ELEMENTS]
-    return Outcome(tuple(check for checks, _ in found for check in checks), (), tuple(picture for _, picture in found))
-
-
-def _wedge(elements: str) -> tuple[list, Profile]:
+      mutants=("no-wedge-closes", "films-stay-open"), over=runs.ELEMENTS)
+def wedge(elements: str):
     """Checks and a picture of a step with one kind of elements."""
     scene = runs.base("0.2 h", runs.of(elements), runs.coarser(elements, 0.6))
     instants = list(simulate(scene, _disc(20.0, 19.8, 60 * scene.numerics.geometry)))
     gaps = [_narrowest(scene, instant.pore, BOTTOM) for instant in instants]
     total = scene.kinetics.maximum_density * instants[-1].pore.outline.area
-    checks = [at_most(f"narrowest gap over the least allowed, seed, {elements}", gaps[0], 0.9,
+    checks = [at_most("narrowest gap over the least allowed, seed", gaps[0], 0.9,
                       "8 degrees are under 16.7"),
-              at_least(f"the same after a step, {elements}", gaps[1], 1 - 1e-9, "2 um, or 16.7 degrees beside contact"),
-              at_most(f"X_m times the area, {elements}", abs(total / instants[-1].ledgers[-1].biomass_after - 1), 3e-6,
+              at_least("the same after a step", gaps[1], 1 - 1e-9, "2 um, or 16.7 degrees beside contact"),
+              at_most("X_m times the area", abs(total / instants[-1].ledgers[-1].biomass_after - 1), 3e-6,
                       AREA)]
-    return checks, _outlines(instants, elements)
+    return checks, _outlines(instants)
 
 
 def _disc(radius: float, height: float, edges: int) -> np.ndarray:
@@ -400,8 +372,8 @@ def _parts(mesh) -> int:
     return len(np.unique(labels[mesh.topology.fluid]))
 
 
-def _outlines(instants, name: str) -> Profile:
+def _outlines(instants) -> Profile:
     """The outlines, closed."""
     loops = [(instant.pore.time, instant.pore.outline.points) for instant in instants]
-    return Profile(f"outlines, {name}", "x (um)", "y (um)", tuple(
+    return Profile("outlines", "x (um)", "y (um)", tuple(
         (f"{time:g} h", "ours", *np.vstack([loop, loop[:1]]).T) for time, loop in loops))

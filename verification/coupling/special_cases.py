@@ -25,14 +25,8 @@ from verification.problems import pairs, runs
 @case("coupling-no-growth", kind="property",
       norm="t = 0 against 1 h: arrays of geometry, flow and C that differ in any bit; largest |X_A / X_m - 1|",
       claim="Biomass that neither takes up nor decays leaves the pore fixed, and C the supply",
-      mutants=("increase-not-taken",))
-def no_growth() -> Outcome:
-    ways = {elements: (runs.of(elements), runs.coarser(elements, 0.4)) for elements in runs.ELEMENTS}
-    ways |= {preset: (runs.by(preset),) for preset in ("fast", "accurate")}
-    return Outcome(tuple(check for name, changes in ways.items() for check in _resting(name, *changes)))
-
-
-def _resting(name: str, *changes: str) -> list:
+      mutants=("increase-not-taken",), over=runs.EVERY)
+def no_growth(*changes: str):
     """Checks of an hour with one kind of elements, or one preset."""
     scene = runs.base("1 h", 'kinetics.decay_coefficient="0 1/d"', 'kinetics.maximum_utilization_rate="0 1/d"',
                       *changes)
@@ -43,9 +37,9 @@ def _resting(name: str, *changes: str) -> list:
     state = last.solved.concentrations
     left = max(np.abs(c / 10.0 - 1).max() for c in (state.acceptor, state.donor))
     drift = runs.density_drift(scene, last)
-    return [at_most(f"arrays moved, {name}", moved, 0.0, "nothing acts on them: bit for bit"),
-            at_most(f"X_A, {name}", drift, 1e-14, "(34) multiplies and divides by the same areas"),
-            at_most(f"C over the supply, less 1, {name}", left, *(EVEN if name == "linear" else UNEVEN))]
+    return [at_most("arrays moved", moved, 0.0, "nothing acts on them: bit for bit"),
+            at_most("X_A", drift, 1e-14, "(34) multiplies and divides by the same areas"),
+            at_most("C over the supply, less 1", left, *(EVEN if scene.numerics.order == 1 else UNEVEN))]
 
 
 #: How far C may be from the supply. w is divergence-free for the very functions that carry C where these are linear;
@@ -90,12 +84,8 @@ def _clean(refinement: float, *changes: str) -> tuple[float, float]:
       norm="relative difference of the mean velocity from Poiseuille's, and of u from that in an empty channel on the "
            "same mesh; base from 25 um, 1 h, lambda = 1",
       claim="An aggregate as thin as water, growing, is hydraulically an empty channel",
-      mutants=("tau-jumps", "stale-flow", "extent-not-subtracted"))
-def equal_viscosities() -> Outcome:
-    return Outcome(tuple(check for elements in runs.ELEMENTS for check in _as_thin_as_water(elements)))
-
-
-def _as_thin_as_water(elements: str) -> list:
+      mutants=("tau-jumps", "stale-flow", "extent-not-subtracted"), over=runs.ELEMENTS)
+def equal_viscosities(elements: str):
     """Checks with one kind of elements."""
     scene = runs.base("1 h", 'aggregate.radius="25 um"', "flow.viscosity_ratio=1.0", runs.of(elements),
                       runs.coarser(elements, 0.4))
@@ -105,30 +95,26 @@ def _as_thin_as_water(elements: str) -> list:
     empty = flow.unit_flow(Space(bare, last.pore.space.order), 7.0)
     viscosity = scene.flow.kinematic_viscosity / scene.flow.gravity
     exact = scene.flow.head / poiseuille.head_loss(scene.pore.length, scene.pore.width, 1.0, viscosity)
-    return [at_most(f"u, {elements}", np.abs(found.velocity / found.mean_velocity - empty.velocity).max(), 1e-13,
+    return [at_most("u", np.abs(found.velocity / found.mean_velocity - empty.velocity).max(), 1e-13,
                     runs.ROUND_OFF),
-            at_most(f"mean velocity, {elements}", abs(found.mean_velocity / exact - 1), 5e-3,
+            at_most("mean velocity", abs(found.mean_velocity / exact - 1), 5e-3,
                     "linear elements: first order in the mesh, 0.3 % as in coupling-clean-channel"),
-            at_least(f"growth of the area, {elements}", last.pore.outline.area / first.pore.outline.area, 1.1,
+            at_least("growth of the area", last.pore.outline.area / first.pore.outline.area, 1.1,
                      "else nothing is tested")]
 
 
 @case("coupling-stiffness", kind="property", norm="largest difference of any node's place (um) at 1 h",
       claim="mu_L does not matter without tractions: 0.001 or 10 MPa make the same aggregate",
-      mutants=("modulus-in-the-shape",))
-def stiffness() -> Outcome:
-    return Outcome(tuple(check for elements in runs.ELEMENTS for check in _of_any_stiffness(elements)))
-
-
-def _of_any_stiffness(elements: str) -> list:
+      mutants=("modulus-in-the-shape",), over=runs.ELEMENTS)
+def stiffness(elements: str):
     """Checks with one kind of elements."""
     changes = runs.of(elements), runs.coarser(elements, 0.4)
     soft, stiff = (runs.last(runs.base("1 h", f'growth.shear_modulus="{value} MPa"', *changes)).pore
                    for value in (0.001, 10))
     seed = pore.seeded(runs.base("1 h", *changes)).outline.area
-    return [at_most(f"places, {elements}", np.abs(soft.mesh.points - stiff.mesh.points).max(), 0.0,
+    return [at_most("places", np.abs(soft.mesh.points - stiff.mesh.points).max(), 0.0,
                     "it is nowhere in the equations without tractions"),
-            at_least(f"growth of the area, {elements}", soft.outline.area / seed, 1.1, "else nothing is tested")]
+            at_least("growth of the area", soft.outline.area / seed, 1.1, "else nothing is tested")]
 
 
 TIMES = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
@@ -144,31 +130,22 @@ def _everywhere(scene):
       claim="Where diffusion holds the supply everywhere the aggregate stays a half-disc of exactly exp-growing mass, "
             "through a remesh",
       mutants=("growth-three-percent-low", "euler-biomass", "inert-not-in-the-area", "theta-anew-at-a-remesh",
-               "geometry-of-the-step-before"))
-def uniform_growth() -> Outcome:
-    checks, profiles = [], []
-    for elements in runs.ELEMENTS:
-        found, profile = _updated(elements)
-        checks += found
-        profiles.append(profile)
-    return Outcome(tuple(checks), (), tuple(profiles))
-
-
-def _updated(elements: str) -> tuple[list, Profile]:
+               "geometry-of-the-step-before"), over=runs.ELEMENTS)
+def uniform_growth(elements: str):
     """Checks and a picture of a run by the paper's updates."""
     times = ", ".join(f'"{time} h"' for time in TIMES)
     scene = _everywhere(runs.base("6 h", runs.of(elements), runs.coarser(elements, 0.3), times=times))
     seed, instants = pore.seeded(scene).outline, list(simulate(scene))[1:]
     areas = np.array([instant.pore.outline.area for instant in instants])
     expected = seed.area * np.array([_mass_after(scene, time) for time in TIMES])
-    profile = Profile(f"area, {elements}", "time (h)", "area (um2)",
+    profile = Profile("area", "time (h)", "area (um2)",
                       (("ours", "ours", np.array(TIMES), areas),
                        ("closed form", "exact", np.array(TIMES), expected)))
     bound, origin = _roundness(scene, seed)
-    checks = [at_most(f"area, {elements}", np.abs(areas / expected - 1).max(), 1e-8,
+    checks = [at_most("area", np.abs(areas / expected - 1).max(), 1e-8,
                       "J = theta to the stabilisation, and C to 1e-8 of the supply: D is a million times D_A"),
-              at_most(f"outline, {elements}", _unround(instants[-1], expected[-1]), bound, origin),
-              at_least(f"remeshes, {elements}", sum(i.remeshes for i in instants), 1.0, "else that is not tested")]
+              at_most("outline", _unround(instants[-1], expected[-1]), bound, origin),
+              at_least("remeshes", sum(i.remeshes for i in instants), 1.0, "else that is not tested")]
     return checks, profile
 
 
@@ -191,22 +168,18 @@ def _unround(instant, area: float) -> float:
       norm="relative error of area and mass; largest deviation of the outline from a half-disc",
       claim="Where diffusion holds the supply everywhere the midpoint rule keeps a half-disc of exactly exp-growing "
             "mass through remeshes, in few long steps",
-      mutants=("theta-power", "curved-mass-lost", "curved-half-of-the-half"))
-def long_steps() -> Outcome:
-    return Outcome(tuple(check for elements in runs.ELEMENTS for check in _by_midpoints(elements)))
-
-
-def _by_midpoints(elements: str) -> list:
+      mutants=("theta-power", "curved-mass-lost", "curved-half-of-the-half"), over=runs.ELEMENTS)
+def long_steps(elements: str):
     """Checks of a run to 9 h with the steps of the preset fast."""
     scene = _everywhere(runs.base("9 h", runs.by("fast"), runs.of(elements), runs.coarser(elements, 0.2)))
     first, last = simulate(scene)
     wanted = first.pore.outline.area * _mass_after(scene, 9.0)
     bound, origin = _roundness(scene, first.pore.outline)
     mass = last.pore.mass / scene.kinetics.maximum_density
-    return [at_most(f"mass, {elements}", abs(mass / wanted - 1), 1e-6, "C to 1e-7 of the supply"),
-            at_most(f"area, {elements}", abs(last.pore.outline.area / wanted - 1), 1e-6, "J = theta"),
-            at_most(f"outline, {elements}", _unround(last, wanted), bound, origin),
-            at_least(f"remeshes, {elements}", last.remeshes, 1.0, "else less is tested")]
+    return [at_most("mass", abs(mass / wanted - 1), 1e-6, "C to 1e-7 of the supply"),
+            at_most("area", abs(last.pore.outline.area / wanted - 1), 1e-6, "J = theta"),
+            at_most("outline", _unround(last, wanted), bound, origin),
+            at_least("remeshes", last.remeshes, 1.0, "else less is tested")]
 
 
 def _mass_after(scene, time: float) -> float:
@@ -221,14 +194,8 @@ def _mass_after(scene, time: float) -> float:
 @case("coupling-units", kind="property", norm="relative difference at 2 h",
       claim="A pore eight times larger or smaller, with transport to match, grows alike to the last bits: nothing has "
             "a scale of its own",
-      mutants=("length-scale",))
-def units() -> Outcome:
-    ways = {elements: (runs.of(elements), runs.coarser(elements, 0.4)) for elements in runs.ELEMENTS}
-    ways |= {preset: (runs.by(preset),) for preset in ("fast", "accurate")}
-    return Outcome(tuple(check for name, changes in ways.items() for check in _scale_free(name, *changes)))
-
-
-def _scale_free(name: str, *changes: str) -> list:
+      mutants=("length-scale",), over=runs.EVERY)
+def units(*changes: str):
     """Checks with one kind of elements, or one preset."""
     scene, checks = runs.base("2 h", *changes), []
     speed = next(simulate(scene)).solved.flow.mean_velocity
@@ -236,7 +203,7 @@ def _scale_free(name: str, *changes: str) -> list:
     for factor in (8.0, 0.125):
         other = runs.numbers(runs.last(_scaled(scene, factor, speed)))
         for quantity, power in (("area", 2), ("upstream tip", 1), ("conductivity", 2)):
-            checks.append(at_most(f"{quantity}, lengths times {factor:g}, {name}",
+            checks.append(at_most(f"{quantity}, lengths times {factor:g}",
                                   abs(other[quantity] / own[quantity] / factor**power - 1), 1e-14,
                                   "powers of two are exact: even the mesher does the same"))
     return checks
@@ -261,31 +228,22 @@ FOREIGN = ('pore.width="0.05 mm"', 'pore.length="0.06 cm"', 'aggregate.radius="5
 
 @case("coupling-foreign-units", kind="property", norm="largest difference of any node's place (um), and of C, at 1 h",
       claim="A scene written in other units is the same scene, bit for bit",
-      mutants=("rounded-twice",))
-def foreign_units() -> Outcome:
-    return Outcome(tuple(check for preset in runs.PRESETS for check in _foreign(preset)))
-
-
-def _foreign(preset: str) -> list:
+      mutants=("rounded-twice",), over=runs.PRESETS)
+def foreign_units(preset: str):
     """Checks with one preset."""
     ours, theirs = (runs.last(runs.base(end, runs.by(preset), *changes))
                     for end, changes in (("1 h", ()), ("60 min", FOREIGN)))
     apart = np.abs(ours.pore.mesh.points - theirs.pore.mesh.points).max()
     fields = np.abs(ours.solved.concentrations.acceptor - theirs.solved.concentrations.acceptor).max()
-    return [at_most(f"places, {preset}", apart, 0.0, "the same numbers after reading"),
-            at_most(f"C_A, {preset}", fields, 0.0, "the same numbers after reading")]
+    return [at_most("places", apart, 0.0, "the same numbers after reading"),
+            at_most("C_A", fields, 0.0, "the same numbers after reading")]
 
 
 @case("coupling-mirror", kind="property",
       norm="difference of the tips' distances from the origin, and of C_A left and right, relative",
       claim="Without flow an aggregate grows alike to both sides",
-      mutants=("one-supply-held", "fixed-beside-the-middle"))
-def mirror() -> Outcome:
-    found = [_alike(elements) for elements in runs.ELEMENTS]
-    return Outcome(tuple(check for checks, _ in found for check in checks), (), tuple(picture for _, picture in found))
-
-
-def _alike(elements: str) -> tuple[list, Profile]:
+      mutants=("one-supply-held", "fixed-beside-the-middle"), over=runs.ELEMENTS)
+def mirror(elements: str):
     """Checks and a picture with one kind of elements."""
     last = runs.last(runs.without_flow(runs.base("8 h", runs.of(elements), runs.coarser(elements, 0.5))))
     outline, space = last.pore.outline, last.pore.space
@@ -293,13 +251,13 @@ def _alike(elements: str) -> tuple[list, Profile]:
     x = np.linspace(1.0, 70.0, 70)
     sides = [pairs.sample(space, last.solved.concentrations.acceptor, np.column_stack([s * x, 0.3 + 0 * x]))
              for s in (-1, 1)]
-    profile = Profile(f"C_A along the lower wall, 8 h, {elements}", "|x| (um)", "C_A (mg/L)",
+    profile = Profile("C_A along the lower wall, 8 h", "|x| (um)", "C_A (mg/L)",
                       (("upstream", "ours", x, sides[0]), ("downstream", "reference", x, sides[1])))
-    checks = [at_most(f"tips, {elements}", tips, 3e-6, "unsymmetric mesh: the error of C_A, of which growth feels a "
+    checks = [at_most("tips", tips, 3e-6, "unsymmetric mesh: the error of C_A, of which growth feels a "
                       "tenth"),
-              at_most(f"C_A, {elements}", np.abs(sides[0] - sides[1]).max() / 10.0, 1e-4,
+              at_most("C_A", np.abs(sides[0] - sides[1]).max() / 10.0, 1e-4,
                       "unsymmetric mesh: error in space"),
-              at_least(f"it has grown (area over the seed's), {elements}", outline.area / 39.27, 2.0,
+              at_least("it has grown (area over the seed's)", outline.area / 39.27, 2.0,
                        "else nothing is tested")]
     return checks, profile
 
@@ -308,18 +266,14 @@ def _alike(elements: str) -> tuple[list, Profile]:
       norm="relative difference between a lopsided aggregate and its mirror image, refinement 2, t = 0",
       claim="Flow from the other side meets the same resistance (Stokes flow is reversible) and, where uptake is of "
             "first order, loses as much of its substrate (reciprocity of (7), (11) and (12))",
-      mutants=("inlet-held",))
-def reversed_flow() -> Outcome:
-    return Outcome(tuple(check for elements in runs.ELEMENTS for check in _reversed(elements)))
-
-
-def _reversed(elements: str) -> list:
+      mutants=("inlet-held",), over=runs.ELEMENTS)
+def reversed_flow(elements: str):
     """Checks with one kind of elements."""
     ours, theirs = (_lopsided(elements, sign) for sign in (1.0, -1.0))
     apart = {name: abs(ours[name] / theirs[name] - 1) for name in ours}
-    return [at_most(f"conductivity, {elements}", apart["conductivity"], 3e-4, ERROR),
-            at_most(f"effluent, {elements}", apart["effluent"], 3e-4, ERROR),
-            at_least(f"C at the inlet, which no theorem makes equal, {elements}", apart["inlet"], 3e-3,
+    return [at_most("conductivity", apart["conductivity"], 3e-4, ERROR),
+            at_most("effluent", apart["effluent"], 3e-4, ERROR),
+            at_least("C at the inlet, which no theorem makes equal", apart["inlet"], 3e-3,
                      "else the aggregate is not lopsided")]
 
 

@@ -23,7 +23,7 @@ from repro.march.loop import Instant
 from repro.model import contact, flow, growth, mesh_motion, pore, traction
 from repro.model.flow import Flow
 from verification.flow import closed_forms
-from verification.kernel.case import Outcome, Study, at_least, at_most, between, case, refine, study
+from verification.kernel.case import Outcome, at_least, at_most, between, case, refine, study
 from verification.problems import meshes, runs
 
 FORMS = ("laplacian", "traction")
@@ -178,15 +178,12 @@ def _tested(mesh: Mesh, line: np.ndarray, weight: np.ndarray) -> float:
       norm="base at 4, 10 and 16 h, steps of 24 min: largest move of the interface by the fluid in the next step, over "
            "the thickness",
       claim="The fluid's forces are small against those of growth (C26): they move base's interface by less than 1e-4",
-      mutants=("density-squared", "forces-thousandfold"))
-def small_in_base() -> Outcome:
-    checks = []
-    for elements in runs.ELEMENTS:
-        moves = [_move_in_base(hours, elements) for hours in (4, 10, 16)]
-        checks += [at_most(f"largest move, {elements}", max(moves), 1e-4, "0.1 Pa of the fluid on a stiffness of 2 to "
-                           "10 kPa, some times for the slender shape"),
-                   at_least(f"least move, {elements}", min(moves), 1e-7, "else no force has acted")]
-    return Outcome(tuple(checks))
+      mutants=("density-squared", "forces-thousandfold"), over=runs.ELEMENTS)
+def small_in_base(elements: str):
+    moves = [_move_in_base(hours, elements) for hours in (4, 10, 16)]
+    return (at_most("largest move", max(moves), 1e-4, "0.1 Pa of the fluid on a stiffness of 2 to 10 kPa, some times "
+                    "for the slender shape"),
+            at_least("least move", min(moves), 1e-7, "else no force has acted"))
 
 
 @cache
@@ -209,13 +206,9 @@ def _move_in_base(hours: int, elements: str) -> float:
 @case("coupling-traction-stretch", kind="exact", norm="relative error of positions; of P over mu_L",
       claim="A block on a wall that is pulled at both sides stretches as a neo-Hookean body does, a - a^-3 = T / mu_L, "
             "and keeps its area, on any mesh",
-      mutants=("forces-pushed", "forces-halved"))
-def stretch() -> Outcome:
-    factors = (0.8, 1.01, 1.5)
-    return Outcome(tuple(check for order in (1, 2) for factor in factors for check in _stretched(order, factor)))
-
-
-def _stretched(order: int, factor: float) -> list:
+      mutants=("forces-pushed", "forces-halved"),
+      over={f"a = {a:g}, order {order}": (order, a) for order in (1, 2) for a in (0.8, 1.01, 1.5)})
+def stretch(order: int, factor: float):
     """Checks of a block of linear or quadratic displacements."""
     points, triangles = meshes.rectangle((-20.0, 20.0), 15.0, 4.0, seed=2)
     points[np.argmin(np.hypot(*points.T)), 0] = 0.0
@@ -231,9 +224,8 @@ def _stretched(order: int, factor: float) -> list:
                                forces=forces)
     apart = np.abs(found.position - where * [factor, 1 / factor]).max() / 20.0
     pressure = (factor**2 + factor**-2 + 1) / 3 - factor**-2
-    name = f"a = {factor:g}, order {order}"
-    return [at_most(f"places, {name}", apart, 1e-9, "linear displacement: Newton's tolerance"),
-            at_most(f"P, {name}", np.abs(found.pressure - pressure).max(), 1e-9, "even: as before")]
+    return [at_most("places", apart, 1e-9, "linear displacement: Newton's tolerance"),
+            at_most("P", np.abs(found.pressure - pressure).max(), 1e-9, "even: as before")]
 
 
 def _ends(mesh: Mesh, side: float) -> np.ndarray:
@@ -254,12 +246,8 @@ def _ends(mesh: Mesh, side: float) -> np.ndarray:
            "those of an even pressure, over the largest",
       claim="An even pressure of the fluid, five times mu_L and more, moves nothing: the aggregate is incompressible, "
             "and its P takes the pressure up",
-      mutants=("traction-pressure-left-out", "forces-pushed"))
-def even_pressure() -> Outcome:
-    return Outcome(tuple(check for elements in runs.ELEMENTS for check in _under_even_pressure(elements)))
-
-
-def _under_even_pressure(elements: str) -> list:
+      mutants=("traction-pressure-left-out", "forces-pushed"), over=runs.ELEMENTS)
+def even_pressure(elements: str):
     """Checks with one kind of elements."""
     scene = loaded_scene(runs.of(elements))
     now = pore.seeded(scene)
@@ -272,15 +260,15 @@ def _under_even_pressure(elements: str) -> list:
     on = traction.nodal(space, still, 1.0, "laplacian")
     by_hand = -5.0 * _normals(plain.outline)
     free = plain.wall == FREE
-    checks = [at_most(f"forces, {elements}", np.abs(on[mesh.loop[free]] - by_hand[free]).max() / np.abs(by_hand).max(),
+    checks = [at_most("forces", np.abs(on[mesh.loop[free]] - by_hand[free]).max() / np.abs(by_hand).max(),
                       1e-12, "the divergence theorem: round-off")]
     inside = mesh.topology.body_corners
     for sign in (1.0, -1.0):
         pushed, _, _ = contact._at_rest(scene, now, theta, now, sign * on[mesh.body])
         apart = np.abs(pushed.mesh.points - plain.mesh.points).max() / 25.0
         change = (pushed.pressure - plain.pressure)[inside] + sign * 5.0
-        checks += [at_most(f"move, {sign:+g}, {elements}", apart, 1e-9, "J = theta: Newton's tolerance"),
-                   at_most(f"P, {sign:+g}, {elements}", np.abs(change).max(), 1e-8, "Newton's tolerance")]
+        checks += [at_most(f"move, {sign:+g}", apart, 1e-9, "J = theta: Newton's tolerance"),
+                   at_most(f"P, {sign:+g}", np.abs(change).max(), 1e-8, "Newton's tolerance")]
     return checks
 
 
@@ -341,25 +329,20 @@ def _moved(elements: str, factor: float) -> tuple[pore.Pore, pore.Pore, np.ndarr
       norm="nodes' move by the fluid, over the force's factor and R, against that of the factor below; defect of the "
            "equilibrium under the forces of the flow around its own shape, and around the shape before",
       claim="The move is proportional to the force as the force falls, and shape and flow agree in the end",
-      mutants=("forces-of-the-first-round", "forces-pushed", "density-squared"))
-def fixed_point() -> Outcome:
-    found = [_proportional(elements) for elements in runs.ELEMENTS]
-    return Outcome(tuple(check for checks, _ in found for check in checks), tuple(one for _, one in found))
-
-
-def _proportional(elements: str) -> tuple[list, Study]:
+      mutants=("forces-of-the-first-round", "forces-pushed", "density-squared"), over=runs.ELEMENTS)
+def fixed_point(elements: str):
     """Checks, and the study, of one kind of elements."""
     plain = _moved(elements, 0.0)[1].mesh.points
     moves = [(_moved(elements, factor)[1].mesh.points - plain) / factor for factor in (*FACTORS, 1.0)]
     size = np.abs(moves[-1]).max()
     apart = [np.abs(move - moves[-1]).max() / size for move in moves[:-1]]
     own, before = _defects(elements, FACTORS[-1])
-    checks = [at_most(f"defect with its own flow, {elements}", own, 1e-8, "nodes at rest to 1e-8 of R"),
-              at_least(f"defect with the flow before, {elements}", before, 1e-5, "else no round is needed"),
-              between(f"downstream tip's move at factor 1, over the upstream one's, {elements}",
+    checks = [at_most("defect with its own flow", own, 1e-8, "nodes at rest to 1e-8 of R"),
+              at_least("defect with the flow before", before, 1e-5, "else no round is needed"),
+              between("downstream tip's move at factor 1, over the upstream one's",
                       _tips(elements, moves[-1]), 0.2, 5.0, "both are pushed downstream"),
-              at_most(f"largest move at factor 1, over R, {elements}", size / 25.0, 1e-4, "0.1 Pa on 10 kPa")]
-    return checks, study(f"move over force, {elements}", FACTORS, apart, 1, "quadratic remainder of a smooth map: "
+              at_most("largest move at factor 1, over R", size / 25.0, 1e-4, "0.1 Pa on 10 kPa")]
+    return checks, study("move over force", FACTORS, apart, 1, "quadratic remainder of a smooth map: "
                          "first order", ceiling=1e-3)
 
 
@@ -394,12 +377,8 @@ def _defects(elements: str, factor: float) -> tuple[float, float]:
       norm="sum along x and moment of the forces on an outline's nodes against those on the nodes of a new mesh around "
            "it, and the sum against that on the mesh that followed; relative",
       claim="Where a new mesh must be made for the flow, its forces go to the aggregate's nodes, sum and moment kept",
-      mutants=("forces-shared-evenly",))
-def remeshed() -> Outcome:
-    return Outcome(tuple(check for elements in runs.ELEMENTS for check in _remeshed(elements)))
-
-
-def _remeshed(elements: str) -> list:
+      mutants=("forces-shared-evenly",), over=runs.ELEMENTS)
+def remeshed(elements: str):
     """Checks with one kind of elements."""
     now, found, _ = _moved(elements, 0.0)
     fine = loaded_scene(runs.coarser(elements, 3.0, 3.0), runs.of(elements))
@@ -411,10 +390,10 @@ def _remeshed(elements: str) -> list:
     places = found.mesh.points[now.mesh.body]
     both = [traction.forces(scene, traction.surroundings(scene, now, found), found) for scene in (fine, coarse)]
     ours, followed = (_sums(places, forces) for forces in both)
-    return [at_most(f"new mesh, nodes of the outline, {elements}", np.abs(ours / new - 1).max(), 1e-9, runs.ROUND_OFF),
-            at_most(f"new mesh, mesh that followed, x, {elements}", abs(ours[0] / followed[0] - 1), 0.02,
+    return [at_most("new mesh, nodes of the outline", np.abs(ours / new - 1).max(), 1e-9, runs.ROUND_OFF),
+            at_most("new mesh, mesh that followed, x", abs(ours[0] / followed[0] - 1), 0.02,
                     "the drag's own error at this refinement: 0.012"),
-            at_least(f"nodes, new over old, {elements}", len(mesh.loop) / len(now.mesh.loop), 1.5,
+            at_least("nodes, new over old", len(mesh.loop) / len(now.mesh.loop), 1.5,
                      "else none was split")]
 
 

@@ -10,7 +10,7 @@ holds; an exception, a not-a-number or an empty outcome is a failure.
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from math import floor, inf, isfinite, log10
 from time import perf_counter
@@ -22,9 +22,9 @@ STAGES = ("flow", "transport", "growth", "reprojection", "mesh_motion", "couplin
 PASSES, FALLS_SHORT = "passes", "FALLS SHORT"
 #: What a case may run with: elements of order 1, 2 and 3, and the presets of whole scenes.
 WAYS = ("1", "2", "3", "paper", "fast", "accurate")
-#: The way that a label of a variant stands for, where it is not one itself.
-OF_LABELS = {"linear": ("1",), "quadratic": ("2",), "cubic": ("3",), "straight": ("1",), "curved": ("2",),
-             "curved, of cubic scenes": ("3",)}
+#: The way that a word of a label stands for, where it is not one itself.
+OF_LABELS = {"linear": "1", "quadratic": "2", "cubic": "3", "order 1": "1", "order 2": "2", "order 3": "3",
+             "straight": "1", "curved": "2", "of cubic scenes": "3"}
 #: A tolerance under which a number is round-off: not told in what is committed, as every machine has its own.
 ROUND_OFF = 1e-6
 
@@ -227,11 +227,19 @@ class Outcome:
 
 
 def outcome(found: Outcome | Iterable) -> Outcome:
-    """What a function of a case gives, as an Outcome: checks, studies and profiles may come in any order."""
+    """What a function of a case gives, as an Outcome: checks, studies and profiles in any order, or lists of them."""
     if isinstance(found, Outcome):
         return found
-    parts = tuple(found)
+    parts = tuple(_flat(found))
     return Outcome(*(tuple(part for part in parts if isinstance(part, kind)) for kind in (Check, Study, Profile)))
+
+
+def _flat(found) -> Iterator:
+    if isinstance(found, Check | Study | Profile):
+        yield found
+    else:
+        for part in found:
+            yield from _flat(part)
 
 
 @dataclass(frozen=True)
@@ -304,7 +312,8 @@ def case(id: str, *, claim: str, kind: str, norm: str, mutants: tuple[str, ...],
 
 def _ways(id: str, variants: Iterable[str], more: str) -> tuple[str, ...]:
     """Those of the labels, and more, in their order. Raises ValueError for a word that is none."""
-    named = {way for label in variants for way in OF_LABELS.get(label, (label,))} & {*WAYS} | {*more.split()}
+    words = [word for label in variants for word in label.split(", ")]
+    named = {OF_LABELS.get(word, word) for word in words} & {*WAYS} | {*more.split()}
     if not named <= {*WAYS}:
         raise ValueError(f"{id}: {', '.join(sorted(named - {*WAYS}))} are none of {', '.join(WAYS)}")
     return tuple(way for way in WAYS if way in named)

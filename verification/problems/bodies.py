@@ -27,6 +27,8 @@ RADIUS, FACTOR = 20.0, 1.5
 LENGTH, HEIGHT = 10.0, 7.0
 KINDS = (1, 2, 3)
 WORDS = {1: "straight", 2: "curved", 3: "curved, of cubic scenes"}
+#: Every kind, by label.
+EVERY = {WORDS[kind]: (kind,) for kind in KINDS}
 #: Ends of the mesh around a half-disc, at either side of it (um).
 ENDS = {1: 60.0, 2: 95.0, 3: 95.0}
 #: Degree of the quadrature of norms, and how far middles of inner edges are moved at random (of the elements' size).

@@ -20,16 +20,6 @@ PRESETS = ("paper", "fast", "accurate")
 ELEMENTS = ("linear", "quadratic", "cubic")
 
 
-def base(end: str, *changes: str, times: str = "") -> Scene:
-    """The paper's scene to a time ("6 h"), reported at its end, or at ``times`` ('"3 h", "6 h"')."""
-    return load_scene("base", (f'growth.end="{end}"', f'output.times=[{times or repr(end)}]', *changes))
-
-
-def every_step(end: str, *changes: str) -> Scene:
-    """The paper's scene to a time, reported after every step."""
-    return load_scene("base", (f'growth.end="{end}"', *changes))
-
-
 def of(elements: str) -> str:
     """The change of a scene that makes its elements linear, quadratic or cubic."""
     return f'numerics.elements="{elements}"'
@@ -43,6 +33,20 @@ def coarser(elements: str, refinement: float, linear: float = 1.0) -> str:
 def by(preset: str) -> str:
     """The change of a scene that makes its numerics those of a preset."""
     return f'numerics.preset="{preset}"'
+
+
+#: Changes of a scene, by label: every kind of elements with the paper's scheme, and the presets.
+EVERY = {**{kind: (of(kind), coarser(kind, 0.4)) for kind in ELEMENTS}, **{kind: (by(kind),) for kind in PRESETS[1:]}}
+
+
+def base(end: str, *changes: str, times: str = "") -> Scene:
+    """The paper's scene to a time ("6 h"), reported at its end, or at ``times`` ('"3 h", "6 h"')."""
+    return load_scene("base", (f'growth.end="{end}"', f'output.times=[{times or repr(end)}]', *changes))
+
+
+def every_step(end: str, *changes: str) -> Scene:
+    """The paper's scene to a time, reported after every step."""
+    return load_scene("base", (f'growth.end="{end}"', *changes))
 
 
 def on_wall(heights: np.ndarray) -> np.ndarray:
