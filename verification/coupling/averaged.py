@@ -37,7 +37,8 @@ RADII, REACH = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 33.0), 75.0
            "relative, effluents and section means of C along the mesh over the supply",
       claim="Under its head base clogs as its averaged pore (FiPy, solve_ivp) does, up to what lubrication and section "
             "means are worth: a velocity 11 % too high, of which 1 % is left with a half-disc's own loss",
-      mutants=("stale-flow", "conductivity-for-velocity"), over=runs.PRESETS)
+      mutants=("stale-flow", "conductivity-for-velocity"), over=runs.PRESETS,
+      ways="1 2", because="order 3: coupling-averaged-refined")
 def base(preset: str):
     """Checks and pictures of one preset."""
     scene = runs.base("19.4 h", runs.by(preset), times=", ".join(f'"{time} h"' for time in TIMES))
@@ -121,7 +122,7 @@ FASTER = (4.0, 16.0, 64.0, 256.0)
            "fluid and biomass and times 4 to 256",
       claim="What averaging over sections costs in the effluents is, as diffusion becomes fast, the constriction of a "
             "half-disc in a strip, in closed form",
-      mutants=("effluent-at-the-inlet", "inlet-held", "seed-too-thin"), over=runs.ELEMENTS)
+      mutants=("effluent-at-the-inlet", "inlet-held", "seed-too-thin"), over=runs.ELEMENTS, ways="paper")
 def mixing(elements: str):
     """Checks and studies with one kind of elements."""
     scene = runs.base("0 h", 'aggregate.radius="20 um"', runs.of(elements), runs.coarser(elements, 0.5, 1.5))
@@ -159,7 +160,8 @@ MIXING_TIMES = (5.0, 10.0, 15.0, 19.4)
            "tolerance: its own error in time, 4e-5, would be seen",
       claim="The whole base run is that of the averaged pore (FiPy, solve_ivp) up to the square of the transverse "
             "Thiele number, and base itself is where that square puts it",
-      mutants=("rates-two-percent-low",), over=("paper", "accurate"))
+      mutants=("rates-two-percent-low",), over=("paper", "accurate"),
+      ways="1 2", because="fast: its own error in time would be seen; order 3: coupling-averaged-refined")
 def whole_run(preset: str):
     """Checks, studies and pictures of one preset."""
     found = {factor: _whole(preset, factor) for factor in (1.0, *SLOWER)}
@@ -200,7 +202,7 @@ COARSE, FINE = (1.0, 12.0, 1), (2.0, 6.0, 2)
       norm="change of the disagreement, over itself, when mesh, step and FiPy's cells are halved: area, effluents and "
            "section means of C; 2 h from 20 um at 2.9 m/d",
       claim="The disagreement with the averaged pore is that of the models: it stays when both codes are refined",
-      mutants=("rates-at-the-start",), over=runs.ELEMENTS)
+      mutants=("rates-at-the-start",), over=runs.ELEMENTS, ways="paper")
 def refined(elements: str):
     (coarse, _), (fine, pictures) = (_piece(elements, *level) for level in (COARSE, FINE))
     return pictures, [at_most(name, abs(fine[name] / coarse[name] - 1), 0.01,
@@ -232,7 +234,8 @@ THIN_SQUARE = "regular perturbation: the square of the aspect ratio"
            "pore starts alike",
       claim="Thin aggregates grow as the averaged pore (FiPy, solve_ivp) with the stress-free strip says, starved "
             "downstream, up to the square of the aspect ratio",
-      mutants=("growth-spread-evenly",), over=("linear", "quadratic"))
+      mutants=("growth-spread-evenly",), over=("linear", "quadratic"),
+      ways="paper", because="order 3: coupling-averaged-refined")
 def strip(elements: str):
     found = [_strip(elements, aspect) for aspect in ASPECTS]
     studies = [study(name, ASPECTS, [rows[name] for rows, *_ in found], 2, THIN_SQUARE, ceiling=4e-4)
@@ -292,7 +295,8 @@ SLENDER = (0.25, 0.177, 0.125, 0.0884)
            "refinement 2.5 over the order of the elements; a bump 8 (1 - s^2)^2 um high in 20 um",
       claim="The head loss of a long aggregate is that of developed flow in each section, and the next term is that of "
             "extended lubrication theory, coefficient included",
-      mutants=("extent-not-subtracted",), over={f"order {order}": (order,) for order in (2, 3)})
+      mutants=("extent-not-subtracted",), over={f"order {order}": (order,) for order in (2, 3)},
+      because="order 1: its own error is as large as what is measured")
 def lubrication(order: int):
     """The coefficient, and the order, with elements of an order on straight triangles: the bump's ends lie flat on the
     wall, which arcs would cross."""
@@ -332,7 +336,8 @@ PECLETS, DENSITIES = (0.1, 1.0, 5.0), (1e6, 3e6, 1e7)
            "high, thickness over half length 1/5 to 1/40 (FiPy's cells: its inverse, u: as it, X_m: as its square)",
       claim="Around thin aggregates C is the averaged pore's (FiPy) up to the square of the aspect ratio, at Peclet "
             "0.1, 1, 5 and three densities, from 99 % to 1 % of the acceptor leaving",
-      mutants=("inlet-held", "seed-too-thin"), over=("linear", "quadratic"))
+      mutants=("inlet-held", "seed-too-thin"), over=("linear", "quadratic"),
+      ways="paper", because="order 3: coupling-averaged-refined")
 def uptake(elements: str):
     found = [_around(elements, aspect) for aspect in UPTAKE_ASPECTS]
     studies = [study(f"Pe = {peclet:g}, X = {density:g} mg/L", UPTAKE_ASPECTS,

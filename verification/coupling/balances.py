@@ -39,7 +39,7 @@ LONG = 'growth.time_step="24 min"'
       mutants=("theta-anew-at-a-remesh", "biomass-interpolated-at-a-remesh", "growth-spread-evenly"),
       over={"linear": (6e-7, 4e-3, 3.0, LONG),
             **{kind: (1e-10, 1e-3, 2.0, LONG, runs.of(kind), "numerics.refinement=0.2") for kind in runs.ELEMENTS[1:]},
-            **{kind: (1e-10, 1e-3, 2.0, runs.by(kind)) for kind in runs.PRESETS[1:]}})
+            **{kind: (1e-10, 1e-3, 2.0, runs.by(kind)) for kind in runs.PRESETS[1:]}}, ways="paper")
 def ledger(area: float, density: float, remeshes: float, *changes: str):
     """Checks of a run of base: largest deviations of the area and of the density, and fewest remeshes."""
     scene = runs.base("19.4 h", *changes)
@@ -78,7 +78,7 @@ STEPS = (0.8, 0.4, 0.2, 0.1)
       claim="The biomass made is Y times the donor consumed, less f_d of what decays, which the acceptor's demand "
             "beyond F times the donor tells: the ledgers agree to second order in the step",
       mutants=("euler-biomass", "rates-at-the-start", "rates-two-percent-low", "decay-leaves-all"),
-      over=runs.ELEMENTS)
+      over=runs.ELEMENTS, ways="paper")
 def yields(elements: str):
     """The size of the defect, and its order, with one kind of elements."""
     defects = [_yield_defect(elements, step) for step in STEPS]
@@ -114,7 +114,7 @@ REFINEMENTS = (0.7, 1.0, 1.4, 2.0)
       norm="a half-disc of 20 um whose density is X_m (1 + 0.1 x / R), remeshed, one step without uptake or decay: L2 "
            "of (X_A + X_I) / X_m - 1 over it; X_m times the area over the biomass, less 1",
       claim="What a density has of error at a remesh is gone after the next update [E7]: the shape takes up X_m again",
-      mutants=("density-not-worked-off", "theta-anew-at-a-remesh"))
+      mutants=("density-not-worked-off", "theta-anew-at-a-remesh"), ways="1 2 3 paper")
 def density_restored() -> Outcome:
     found = [_restored(refinement) for refinement in REFINEMENTS]
     sizes = [1 / refinement for refinement in REFINEMENTS]
@@ -160,7 +160,7 @@ PAST = 2.0
             "and what is made is what the substrates taken up are worth: to round-off by the midpoint rule, to second "
             "order by the paper's updates",
       mutants=("biomass-of-the-start-takes-up", "remesh-half-way-unmatched", "masses-of-the-start-kept",
-               "flows-of-the-start"))
+               "flows-of-the-start"), ways="1 2 3 paper fast accurate")
 def one_balance() -> Outcome:
     checks = [check for preset in runs.PRESETS for check in (*_of_base(preset), *_of_narrow(preset))]
     for elements in runs.ELEMENTS:
@@ -275,7 +275,8 @@ IN_A_STEP = 3.0
            "at the ends of the steps by a cubic spline",
       claim="The amounts in the ledgers are those of ten times shorter steps: to 1 % by preset fast and 0.1 % by "
             "accurate in all, to three times that in every step",
-      mutants=("flows-of-the-start", "curved-rates-of-the-start"), over=tuple(RIGHT))
+      mutants=("flows-of-the-start", "curved-rates-of-the-start"), over=tuple(RIGHT),
+      ways="2", because="paper has no tolerance of its steps; order 1 is paper's, order 3: coupling-one-balance")
 def amounts(preset: str):
     """Checks and a picture of one preset."""
     scene = runs.base("19.4 h", runs.by(preset))
@@ -308,7 +309,7 @@ AREA = "J = theta to the stabilisation"
       norm="three steps from an aggregate 0.1 um short of closing the pore, 20 um wide",
       claim="Through contact the ledgers close, the area stays the biomass over X_m, no film under 2 um is left, and "
             "the fluid is cut in two",
-      mutants=("films-stay-open", "reprojection-left-out"), over=runs.EVERY)
+      mutants=("films-stay-open", "reprojection-left-out"), over=runs.EVERY, ways="paper")
 def contact(*changes: str):
     """Checks and a picture of a run with one kind of elements, or one preset."""
     scene = runs.base("0.6 h", 'pore.width="20 um"', 'aggregate.radius="17.9 um"', *changes,
@@ -329,7 +330,7 @@ def contact(*changes: str):
 @case("coupling-wedge", kind="property",
       norm="one step from a disc of 20 um that stands on a chord, the fluid under it at 8 degrees",
       claim="Wedges of fluid beside a contact surface close until they have the least contact angle",
-      mutants=("no-wedge-closes", "films-stay-open"), over=runs.ELEMENTS)
+      mutants=("no-wedge-closes", "films-stay-open"), over=runs.ELEMENTS, ways="paper")
 def wedge(elements: str):
     """Checks and a picture of a step with one kind of elements."""
     scene = runs.base("0.2 h", runs.of(elements), runs.coarser(elements, 0.6))

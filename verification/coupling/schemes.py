@@ -27,7 +27,7 @@ STEPS = (0.8, 0.4, 0.2, 0.1, 0.05)
 @case("coupling-time-step", kind="property", slow=True,
       norm="difference between a run and that with half the step, relative; base from 25 um, 3.2 h, no remesh",
       claim="The loop is of first order in the shape update: the geometry is frozen within a step, the rates are not",
-      mutants=("rates-at-the-start", "stale-flow"), over=runs.ELEMENTS)
+      mutants=("rates-at-the-start", "stale-flow"), over=runs.ELEMENTS, ways="paper")
 def time_step(elements: str):
     """Remeshes, and the orders, with one kind of elements."""
     instants = [runs.last(runs.base("3.2 h", 'aggregate.radius="25 um"', f'growth.time_step="{step} h"',
@@ -50,7 +50,7 @@ SLOWER = (16.0, 8.0, 4.0, 2.0)
            "with D, u and X_m over 16 to 2: steady states and growth stay, substrates are 16 to 2 times slower",
       claim="The paper's transient scheme and quasi-steady substrates make the same aggregate, up to the substrates' "
             "lag, which is as their storage",
-      mutants=("rates-two-percent-low",), over=runs.ELEMENTS)
+      mutants=("rates-two-percent-low",), over=runs.ELEMENTS, ways="paper")
 def quasi_steady(elements: str):
     """Studies with one kind of elements."""
     rows = [_lag(elements, factor) for factor in SLOWER]
@@ -80,7 +80,8 @@ def _slower(elements: str, factor: float, transport_scheme: str):
            "central mesh, over the supply",
       claim="The central mesh with (6) and (26) beyond it is worth the whole pore",
       mutants=("extent-not-subtracted", "inlet-held", "head-on-the-mesh-alone"),
-      over={f"R = {radius}, {kind}": (radius, kind) for radius, kind in product(("5 um", "25 um"), runs.ELEMENTS)})
+      over={f"R = {radius}, {kind}": (radius, kind) for radius, kind in product(("5 um", "25 um"), runs.ELEMENTS)},
+      ways="paper")
 def extent(radius: str, elements: str):
     (central, x, near), (full, _, far) = (_solved(radius, elements, name) for name in ("central", "full"))
     curves = tuple(curve for k, name in enumerate(("C_A", "C_D"))
@@ -134,7 +135,7 @@ def _equal_steps(scene, steps: int) -> np.ndarray:
 @case("coupling-midpoint-order", kind="property",
       norm="relative difference between a run and that with half the step; base from a seed of 25 um, 2 h, no remesh",
       claim="The midpoint rule is of second order in time, with every kind of elements",
-      mutants=("curved-rates-of-the-start", "midpoint-rates-of-the-start"), over=runs.ELEMENTS)
+      mutants=("curved-rates-of-the-start", "midpoint-rates-of-the-start"), over=runs.ELEMENTS, ways="fast")
 def order_in_time(elements: str):
     scene = _base(runs.by("fast"), runs.of(elements), "numerics.refinement=0.5", 'aggregate.radius="25 um"')
     values = np.array([_equal_steps(scene, steps) for steps in RULE_STEPS])
@@ -198,7 +199,8 @@ def _listed(preset: str, *changes: str) -> np.ndarray:
             "with quadratic and with cubic velocities and concentrations",
       mutants=("curved-rates-of-the-start", "fluid-diffusivity", "uptake-without-decay", "cubic-shown-less"),
       over={"fast": (1e-2, "fast"), "accurate": (1e-3, "accurate"),
-            "accurate, cubic": (1e-3, "accurate", runs.of("cubic"))}, ways="2")
+            "accurate, cubic": (1e-3, "accurate", runs.of("cubic"))}, ways="2",
+      because="paper, order 1: its error is that of linear elements, see bench")
 def presets(bound: float, *numerics: str):
     theirs, error = _reference()
     return at_most("the reference itself", error, 2e-4, "a fifth of what is asked of accurate"), [

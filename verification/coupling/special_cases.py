@@ -25,7 +25,7 @@ from verification.problems import pairs, runs
 @case("coupling-no-growth", kind="property",
       norm="t = 0 against 1 h: arrays of geometry, flow and C that differ in any bit; largest |X_A / X_m - 1|",
       claim="Biomass that neither takes up nor decays leaves the pore fixed, and C the supply",
-      mutants=("increase-not-taken",), over=runs.EVERY)
+      mutants=("increase-not-taken",), over=runs.EVERY, ways="paper")
 def no_growth(*changes: str):
     """Checks of an hour with one kind of elements, or one preset."""
     scene = runs.base("1 h", 'kinetics.decay_coefficient="0 1/d"', 'kinetics.maximum_utilization_rate="0 1/d"',
@@ -55,7 +55,7 @@ REFINEMENTS = (1.0, 1.4, 2.0, 2.8)
       norm="refinement 1 to 2.8: mean velocity under the head relative to Poiseuille's; largest |C / supply - 1|",
       claim="A scene without an aggregate is a clean channel: Poiseuille's flow under the head, and C the supply "
             "everywhere",
-      mutants=("extent-not-subtracted", "head-on-the-mesh-alone"))
+      mutants=("extent-not-subtracted", "head-on-the-mesh-alone"), ways="1 2 3 paper")
 def clean_channel() -> Outcome:
     found = [_clean(refinement) for refinement in REFINEMENTS]
     sizes = [1 / refinement for refinement in REFINEMENTS]
@@ -84,7 +84,7 @@ def _clean(refinement: float, *changes: str) -> tuple[float, float]:
       norm="relative difference of the mean velocity from Poiseuille's, and of u from that in an empty channel on the "
            "same mesh; base from 25 um, 1 h, lambda = 1",
       claim="An aggregate as thin as water, growing, is hydraulically an empty channel",
-      mutants=("tau-jumps", "stale-flow", "extent-not-subtracted"), over=runs.ELEMENTS)
+      mutants=("tau-jumps", "stale-flow", "extent-not-subtracted"), over=runs.ELEMENTS, ways="paper")
 def equal_viscosities(elements: str):
     """Checks with one kind of elements."""
     scene = runs.base("1 h", 'aggregate.radius="25 um"', "flow.viscosity_ratio=1.0", runs.of(elements),
@@ -105,7 +105,7 @@ def equal_viscosities(elements: str):
 
 @case("coupling-stiffness", kind="property", norm="largest difference of any node's place (um) at 1 h",
       claim="mu_L does not matter without tractions: 0.001 or 10 MPa make the same aggregate",
-      mutants=("modulus-in-the-shape",), over=runs.ELEMENTS)
+      mutants=("modulus-in-the-shape",), over=runs.ELEMENTS, ways="paper")
 def stiffness(elements: str):
     """Checks with one kind of elements."""
     changes = runs.of(elements), runs.coarser(elements, 0.4)
@@ -130,7 +130,7 @@ def _everywhere(scene):
       claim="Where diffusion holds the supply everywhere the aggregate stays a half-disc of exactly exp-growing mass, "
             "through a remesh",
       mutants=("growth-three-percent-low", "euler-biomass", "inert-not-in-the-area", "theta-anew-at-a-remesh",
-               "geometry-of-the-step-before"), over=runs.ELEMENTS)
+               "geometry-of-the-step-before"), over=runs.ELEMENTS, ways="paper")
 def uniform_growth(elements: str):
     """Checks and a picture of a run by the paper's updates."""
     times = ", ".join(f'"{time} h"' for time in TIMES)
@@ -168,7 +168,7 @@ def _unround(instant, area: float) -> float:
       norm="relative error of area and mass; largest deviation of the outline from a half-disc",
       claim="Where diffusion holds the supply everywhere the midpoint rule keeps a half-disc of exactly exp-growing "
             "mass through remeshes, in few long steps",
-      mutants=("theta-power", "curved-mass-lost", "curved-half-of-the-half"), over=runs.ELEMENTS)
+      mutants=("theta-power", "curved-mass-lost", "curved-half-of-the-half"), over=runs.ELEMENTS, ways="fast")
 def long_steps(elements: str):
     """Checks of a run to 9 h with the steps of the preset fast."""
     scene = _everywhere(runs.base("9 h", runs.by("fast"), runs.of(elements), runs.coarser(elements, 0.2)))
@@ -194,7 +194,7 @@ def _mass_after(scene, time: float) -> float:
 @case("coupling-units", kind="property", norm="relative difference at 2 h",
       claim="A pore eight times larger or smaller, with transport to match, grows alike to the last bits: nothing has "
             "a scale of its own",
-      mutants=("length-scale",), over=runs.EVERY)
+      mutants=("length-scale",), over=runs.EVERY, ways="paper")
 def units(*changes: str):
     """Checks with one kind of elements, or one preset."""
     scene, checks = runs.base("2 h", *changes), []
@@ -228,7 +228,7 @@ FOREIGN = ('pore.width="0.05 mm"', 'pore.length="0.06 cm"', 'aggregate.radius="5
 
 @case("coupling-foreign-units", kind="property", norm="largest difference of any node's place (um), and of C, at 1 h",
       claim="A scene written in other units is the same scene, bit for bit",
-      mutants=("rounded-twice",), over=runs.PRESETS)
+      mutants=("rounded-twice",), over=runs.PRESETS, ways="1 2", because="order 3: reading a scene knows no elements")
 def foreign_units(preset: str):
     """Checks with one preset."""
     ours, theirs = (runs.last(runs.base(end, runs.by(preset), *changes))
@@ -242,7 +242,7 @@ def foreign_units(preset: str):
 @case("coupling-mirror", kind="property",
       norm="difference of the tips' distances from the origin, and of C_A left and right, relative",
       claim="Without flow an aggregate grows alike to both sides",
-      mutants=("one-supply-held", "fixed-beside-the-middle"), over=runs.ELEMENTS)
+      mutants=("one-supply-held", "fixed-beside-the-middle"), over=runs.ELEMENTS, ways="paper")
 def mirror(elements: str):
     """Checks and a picture with one kind of elements."""
     last = runs.last(runs.without_flow(runs.base("8 h", runs.of(elements), runs.coarser(elements, 0.5))))
@@ -266,7 +266,7 @@ def mirror(elements: str):
       norm="relative difference between a lopsided aggregate and its mirror image, refinement 2, t = 0",
       claim="Flow from the other side meets the same resistance (Stokes flow is reversible) and, where uptake is of "
             "first order, loses as much of its substrate (reciprocity of (7), (11) and (12))",
-      mutants=("inlet-held",), over=runs.ELEMENTS)
+      mutants=("inlet-held",), over=runs.ELEMENTS, ways="paper")
 def reversed_flow(elements: str):
     """Checks with one kind of elements."""
     ours, theirs = (_lopsided(elements, sign) for sign in (1.0, -1.0))

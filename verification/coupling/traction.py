@@ -47,7 +47,7 @@ def nodal(scene, space: Space) -> tuple[np.ndarray, Flow]:
            "the fluid, over the largest; drag on a half-disc over head loss times W less wall shear, less 1",
       claim="What the fluid does to the aggregate the aggregate does to the fluid; no force is left in the fluid; the "
             "drag is what the ends' pressure and the walls' shear leave over",
-      mutants=("traction-pressure-left-out", "traction-form-mixed", "traction-of-both-phases"))
+      mutants=("traction-pressure-left-out", "traction-form-mixed", "traction-of-both-phases"), ways="1 2 3 paper")
 def balance() -> Outcome:
     checks = [check for elements in runs.ELEMENTS for form in FORMS for check in _balanced(elements, form)]
     errors = refine(_drag_error, REFINEMENTS)
@@ -131,7 +131,7 @@ def _wall_shear(grid: Mesh, velocity: np.ndarray) -> float:
       norm="x-force on the middle of a layer of biomass, lambda = 2000, over the shear stress of two viscous layers, "
            "less 1, root mean square over random meshes of a size",
       claim="The shear that the fluid exerts on a layer of biomass is that of two viscous layers",
-      mutants=("traction-pressure-left-out", "traction-transposed-gradient"))
+      mutants=("traction-pressure-left-out", "traction-transposed-gradient"), ways="1 2 3")
 def layer() -> Outcome:
     errors = refine(lambda level: meshes.root_mean_square(lambda draw: {"shear": _shear_error(level, draw)},
                                                          LAYER_DRAWS[level]), range(len(closed_forms.SIZES)))
@@ -178,7 +178,7 @@ def _tested(mesh: Mesh, line: np.ndarray, weight: np.ndarray) -> float:
       norm="base at 4, 10 and 16 h, steps of 24 min: largest move of the interface by the fluid in the next step, over "
            "the thickness",
       claim="The fluid's forces are small against those of growth (C26): they move base's interface by less than 1e-4",
-      mutants=("density-squared", "forces-thousandfold"), over=runs.ELEMENTS)
+      mutants=("density-squared", "forces-thousandfold"), over=runs.ELEMENTS, ways="paper")
 def small_in_base(elements: str):
     moves = [_move_in_base(hours, elements) for hours in (4, 10, 16)]
     return (at_most("largest move", max(moves), 1e-4, "0.1 Pa of the fluid on a stiffness of 2 to 10 kPa, some times "
@@ -207,7 +207,8 @@ def _move_in_base(hours: int, elements: str) -> float:
       claim="A block on a wall that is pulled at both sides stretches as a neo-Hookean body does, a - a^-3 = T / mu_L, "
             "and keeps its area, on any mesh",
       mutants=("forces-pushed", "forces-halved"),
-      over={f"a = {a:g}, order {order}": (order, a) for order in (1, 2) for a in (0.8, 1.01, 1.5)})
+      over={f"a = {a:g}, order {order}": (order, a) for order in (1, 2) for a in (0.8, 1.01, 1.5)},
+      because="order 3: its displacements are order 2's")
 def stretch(order: int, factor: float):
     """Checks of a block of linear or quadratic displacements."""
     points, triangles = meshes.rectangle((-20.0, 20.0), 15.0, 4.0, seed=2)
@@ -246,7 +247,7 @@ def _ends(mesh: Mesh, side: float) -> np.ndarray:
            "those of an even pressure, over the largest",
       claim="An even pressure of the fluid, five times mu_L and more, moves nothing: the aggregate is incompressible, "
             "and its P takes the pressure up",
-      mutants=("traction-pressure-left-out", "forces-pushed"), over=runs.ELEMENTS)
+      mutants=("traction-pressure-left-out", "forces-pushed"), over=runs.ELEMENTS, ways="paper")
 def even_pressure(elements: str):
     """Checks with one kind of elements."""
     scene = loaded_scene(runs.of(elements))
@@ -329,7 +330,7 @@ def _moved(elements: str, factor: float) -> tuple[pore.Pore, pore.Pore, np.ndarr
       norm="nodes' move by the fluid, over the force's factor and R, against that of the factor below; defect of the "
            "equilibrium under the forces of the flow around its own shape, and around the shape before",
       claim="The move is proportional to the force as the force falls, and shape and flow agree in the end",
-      mutants=("forces-of-the-first-round", "forces-pushed", "density-squared"), over=runs.ELEMENTS)
+      mutants=("forces-of-the-first-round", "forces-pushed", "density-squared"), over=runs.ELEMENTS, ways="paper")
 def fixed_point(elements: str):
     """Checks, and the study, of one kind of elements."""
     plain = _moved(elements, 0.0)[1].mesh.points
@@ -377,7 +378,7 @@ def _defects(elements: str, factor: float) -> tuple[float, float]:
       norm="sum along x and moment of the forces on an outline's nodes against those on the nodes of a new mesh around "
            "it, and the sum against that on the mesh that followed; relative",
       claim="Where a new mesh must be made for the flow, its forces go to the aggregate's nodes, sum and moment kept",
-      mutants=("forces-shared-evenly",), over=runs.ELEMENTS)
+      mutants=("forces-shared-evenly",), over=runs.ELEMENTS, ways="paper")
 def remeshed(elements: str):
     """Checks with one kind of elements."""
     now, found, _ = _moved(elements, 0.0)

@@ -57,7 +57,8 @@ def drive(**given) -> Drive:
 @case("flow-poiseuille", kind="exact", norm="L2 of u over the mesh; relative error of the head loss over it, and of "
       "the conductivity of a pore of 600 um",
       claim="In a clean channel the flow is plane Poiseuille's, in both forms of [E2]",
-      mutants=("saddle-sign", "tau-linear", "upper-wall-slips", "outlet-free", "unmeshed-forgotten"))
+      mutants=("saddle-sign", "tau-linear", "upper-wall-slips", "outlet-free", "unmeshed-forgotten"),
+      ways="1", because="orders 2, 3: flow-curved-poiseuille")
 def poiseuille_channel() -> Outcome:
     studies = []
     for interface in ("laplacian", "traction"):
@@ -94,7 +95,7 @@ PLUG, PLUG_SIZES, PLUG_DRAWS = (-30.0, 30.0), (8.0, 4.0, 2.0, 1.0), (12, 8, 4, 1
 @case("flow-plug", kind="exact", norm="root mean square over random meshes of a size: L2 of u over the mesh, relative "
       "error of the head loss",
       claim="Through a plug the Laplacian form keeps Poiseuille's profile and loses lambda times its head there",
-      mutants=("tau-of-water",))
+      mutants=("tau-of-water",), ways="1", because="orders 2, 3: flow-curved-poiseuille")
 def plug() -> Outcome:
     errors = refine(lambda level: meshes.root_mean_square(
         lambda draw: _plug_errors(PLUG_SIZES[level], draw), PLUG_DRAWS[level]), range(len(PLUG_SIZES)))
@@ -137,7 +138,8 @@ NORM = "largest difference over the largest velocity; relative difference of los
             "times the viscosity have the parabola at every node and the loss (6) of each part, on any mesh; the work "
             "of the inlet is that loss",
       mutants=("viscosity-swapped", "loss-per-width", "inlet-parabola", "whole-pore-twice", "outlet-free",
-               "cubic-edge-crossed"), over={"order 2": (2,), "order 3": (3,)})
+               "cubic-edge-crossed"), over={"order 2": (2,), "order 3": (3,)},
+      because="order 1: flow-poiseuille, flow-plug")
 def channels(order: int):
     """Of a clean channel in both forms, and of the plug in the Laplacian form."""
     kinds = ((1.0, "laplacian"), (1.0, "traction"), (RATIO, "laplacian"))
@@ -183,7 +185,7 @@ LONG, LEFT = 250.0, 2e-6
       "size: L2 of u, of u within the layer (relative to that), and relative error of the pressure gradient",
       claim="Along a layer of biomass the flow is that of two viscous layers, for lambda from 1 to 1e8, to second "
             "order with linear elements in both forms and on any mesh with quadratic and cubic ones",
-      mutants=("tau-of-water", "viscosity-swapped"))
+      mutants=("tau-of-water", "viscosity-swapped"), ways="1 2 3")
 def layers() -> Outcome:
     studies = [part for ratio in RATIOS for part in _studies(ratio, "laplacian")]
     studies += _studies(2000.0, "traction")[:1]  # what is left of the ends rules in the layer
@@ -274,7 +276,7 @@ CURVED, BOW = 0.5, 1e-5
       "relative error of d(head loss)/d(lambda) by a central difference",
       claim="At lambda = 1 the head loss rises with lambda by what Poiseuille flow dissipates in a half-disc: to "
             "second order with linear elements, on a coarse mesh with quadratic and cubic ones",
-      mutants=("viscosity-swapped", "loss-per-width"))
+      mutants=("viscosity-swapped", "loss-per-width"), ways="1 2 3")
 def first_rise() -> Outcome:
     studies, checks = [], []
     for interface in ("laplacian", "traction"):
@@ -315,7 +317,8 @@ STIFF = JUMP + "; more so where lambda multiplies the error of the disc's strain
 
 @case("flow-inclusion", kind="exact", norm="root mean square over random meshes of a size, relative L2 of u and p",
       claim="A viscous disc under pure shear strains as the closed form says, for lambda = 10 and 2000 in both forms",
-      mutants=("traction-transposed", "normal-stress-halved"))
+      mutants=("traction-transposed", "normal-stress-halved"),
+      ways="1", because="orders 2, 3: flow-inclusion-quadratic")
 def inclusion() -> Outcome:
     studies, profiles = [], []
     for interface in ("traction", "laplacian"):
@@ -340,7 +343,7 @@ ROUND = {2: (2.5, 3.3, "third order in L2, from below while the circle has few e
       norm="root mean square over random meshes of a size, relative L2 of u and p",
       claim="Quadratic and cubic velocities show what the jump of the pressure costs: first order where the disc gives "
             "way, in both forms; a stiff disc shows the chords of its polygon, second order, or, round, the full order",
-      mutants=("normal-stress-halved", "curved-straight-divergence"))
+      mutants=("normal-stress-halved", "curved-straight-divergence"), ways="2 3", because="order 1: flow-inclusion")
 def inclusion_quadratic() -> Outcome:
     soft, stiff = (refine(_disc_errors, range(len(DISC_SIZES)), _problem(ratio, "traction", 2), QUADRATIC_SIZES,
                           QUADRATIC_DRAWS) for ratio in (10.0, 2000.0))

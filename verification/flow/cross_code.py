@@ -62,7 +62,7 @@ EXCESS = "second order: what the ends spoil is in both losses"
 
 @case("flow-half-disc", kind="cross-code", norm=NORM, slow=True,
       claim="Around half-discs of 5 and 25 um, lambda = 2000, velocity, pressure and head loss are Taylor-Hood's",
-      mutants=("viscosity-swapped",))
+      mutants=("viscosity-swapped",), ways="1", because="orders 2, 3: flow-curved-half-disc")
 def half_disc() -> Outcome:
     seed, grown = (_series(radius, RATIO, "laplacian") for radius in (5.0, 25.0))
     studies = (*_studies(seed, "R = 5 um"), *_studies(grown, "R = 25 um"), _excess(grown, "R = 25 um"),
@@ -75,7 +75,7 @@ def half_disc() -> Outcome:
 @case("flow-film", kind="cross-code", norm=NORM, slow=True,
       claim="Through the film of 9 um that a half-disc of 41 um leaves open, lambda = 2000, the flow is Taylor-Hood's, "
             "with elements of every order",
-      mutants=("viscosity-swapped",))
+      mutants=("viscosity-swapped",), ways="1 2 3")
 def film() -> Outcome:
     """No order: elements grow from the walls of the film to its middle, whatever the refinement, so that no one size
     tells how fine a mesh is there."""
@@ -106,7 +106,7 @@ def _through_the_film(order: int, interface: str) -> dict[str, float]:
 
 @case("flow-half-disc-traction", kind="cross-code", norm=NORM, slow=True,
       claim="With continuous traction too the flow around a half-disc of 25 um is Taylor-Hood's, lambda = 10 and 2000",
-      mutants=("traction-transposed",))
+      mutants=("traction-transposed",), ways="1", because="orders 2, 3: flow-curved-half-disc")
 def half_disc_traction() -> Outcome:
     stiff, soft = (_series(25.0, ratio, "traction") for ratio in (RATIO, 10.0))
     studies = (*_studies(stiff, "lambda = 2000"), _excess(stiff, "lambda = 2000"),
@@ -125,7 +125,7 @@ QUADRATIC, QUADRATIC_DRAWS = (0.3, 0.6, 1.2, 2.4), (3, 3, 3, 1)
 @case("flow-half-disc-quadratic", kind="cross-code", norm=NORM,
       claim="The same forms with quadratic and cubic velocities on straight triangles give Taylor-Hood's head loss to "
             "0.1 %",
-      mutants=("quadratic-stabilised",))
+      mutants=("quadratic-stabilised",), ways="2 3", because="order 1: flow-half-disc")
 def half_disc_quadratic() -> Outcome:
     studies = []
     for order in (2, 3):
@@ -233,7 +233,8 @@ SOFT = {"laplacian": 5e-4, "traction": 1.5e-3}
       claim="Around a half-disc of biomass the whole velocity field and the loss are scikit-fem's, which has a "
             "pressure of its own on either side: to first order for lambda = 10, under 0.1 % for lambda = 2000, with "
             "elements of order 2 and 3 in both forms",
-      mutants=("viscosity-swapped", "curved-straight-divergence"))
+      mutants=("viscosity-swapped", "curved-straight-divergence"),
+      ways="2 3", because="order 1: flow-half-disc, flow-half-disc-traction")
 def round_half_disc() -> Outcome:
     return Outcome(tuple(check for part in HIGHER for check in _stiff(*part)),
                    tuple(found for part in HIGHER for found in _soft(*part)), (_above_the_middle(),))
@@ -344,7 +345,8 @@ def uncondensed(grid: Mesh, ratio: float, form, interface: str) -> tuple[np.ndar
       norm="largest difference over the largest value; largest relative error of the flux through 25 sections",
       claim="The condensed bubble is scikit-fem's MINI element with its bubbles as unknowns, in both forms, and the "
             "mean velocity of each triangle, bubble included, carries the same flux through every section",
-      mutants=("bubble-of-water", "bubble-mean-unweighted", "bubble-block-isotropic"))
+      mutants=("bubble-of-water", "bubble-mean-unweighted", "bubble-block-isotropic"),
+      ways="1", because="the bubble is of linear velocities")
 def condensed() -> Outcome:
     grid = meshes.cut(properties.ENDS, 50.0, 6.0, lambda x, y: (np.abs(x) < 20) & (y < 25), across=(-20.0, 20.0),
                          along=(25.0,), seed=5)
@@ -368,7 +370,7 @@ def condensed() -> Outcome:
            "and relative error of the pressure gradient; errors of the stabilised element over the bubble's",
       claim="The bubble is of second order in velocity and loss and of first in the gradient; it errs as the "
             "stabilised element with c = 100 does on good triangles, many times less on triangles stretched eightfold",
-      mutants=("bubble-of-water", "bubble-tenfold"))
+      mutants=("bubble-of-water", "bubble-tenfold"), ways="1", because="the bubble is of linear velocities")
 def along_a_layer() -> Outcome:
     errors = refine(_errors, range(len(closed_forms.SIZES)), BUBBLE)
     stabilised = refine(_errors, range(len(closed_forms.SIZES)), STABILISED)

@@ -31,7 +31,7 @@ PRESSURE = {1: (0.9, 1.7, LAYERS), 2: (1.7, 3.3, BELOW), 3: (2.7, 4.3, BELOW)}
 @case("flow-manufactured", kind="manufactured",
       norm="root mean square over random meshes of a size, relative L2 of u and p",
       claim="Where nothing jumps but the viscosity all orders are full, for lambda = 10 and 2000 in both forms",
-      mutants=("saddle-sign",))
+      mutants=("saddle-sign",), ways="1", because="orders 2, 3: flow-manufactured-quadratic")
 def manufactured() -> Outcome:
     studies = [part for form in FORMS for part in _studies(form, 1, STRAIGHT, SIZES, (2e-4, 0.06))]
     return Outcome(studies=tuple(studies), profiles=tuple(_profile(*form) for form in FORMS))
@@ -41,7 +41,7 @@ def manufactured() -> Outcome:
       norm="root mean square over random meshes of a size, relative L2 of u and p",
       claim="The same flow with quadratic velocities is of third order, its pressure of second; with cubic ones of "
             "fourth, its pressure of third",
-      mutants=("traction-transposed", "cubic-lower-degree"))
+      mutants=("traction-transposed", "cubic-lower-degree"), ways="2 3", because="order 1: flow-manufactured")
 def manufactured_quadratic() -> Outcome:
     studies = [part for form in FORMS for part in (*_studies(form, 2, STRAIGHT, SIZES, (1e-6, 3e-4)),
                                                    *_studies(form, 3, STRAIGHT, COARSE, (1e-7, 5e-5)))]
@@ -53,7 +53,7 @@ def manufactured_quadratic() -> Outcome:
       claim="On bent triangles quadratic velocities are of third order and cubic ones of fourth, their pressures of "
             "second and third, where the viscosity jumps tenfold at a straight interface, in both forms",
       mutants=("cubic-edge-crossed", "cubic-slope", "cubic-lower-degree", "curved-straight-divergence",
-               "traction-transposed"))
+               "traction-transposed"), ways="2 3", because="order 1 has straight triangles: flow-manufactured")
 def manufactured_curved() -> Outcome:
     studies = []
     for interface in ("laplacian", "traction"):

@@ -46,7 +46,7 @@ def _plugged(order: int) -> Space:
       claim="The same flux passes every section of a pore, plugged or not: to round-off for w = u - tau grad p of "
             "linear elements and for u itself of quadratic and cubic ones, in both forms",
       mutants=("tau-of-water", "carried-by-u-plus", "inlet-not-scaled", "curved-straight-divergence",
-               "inlet-parabola"))
+               "inlet-parabola"), ways="1 2 3")
 def sections() -> Outcome:
     checks, why = [], "(2) tested with linear ramps, round-off"
     pores = {"plug": (_plugged, 0.003), "half-disc of 40 um": (partial(_half_disc, 40.0), 0.012),
@@ -189,7 +189,7 @@ SIMPSON = {2: np.array([1, 4, 1]) / 6, 3: np.array([1, 3, 3, 1]) / 8}
 @case("flow-curved-flux", kind="property", norm="flux through sections over that of the inlet",
       claim="What comes in goes through every section, order 2 and 3 and both forms: exactly at the outlet, and as "
             "well as the mesh resolves it across the aggregate",
-      mutants=("curved-straight-divergence",), over=HIGHER)
+      mutants=("curved-straight-divergence",), over=HIGHER, because="order 1: flow-sections")
 def curved_flux(order: int, interface: str):
     """Fluxes by the midpoint rule across the pore, and over the outlet by Simpson's rules."""
     space = Space(meshes.half_disc(20.0, 1.2, ENDS, WIDTH, geometry=2), order)
@@ -216,7 +216,8 @@ SCHEMES = {"paper": ({"preset": "paper"}, 5e-3), "accurate": ({"preset": "accura
       norm="relative difference of the loss; nodes over those of graded sizes; largest over least edge",
       claim="With one element size everywhere the loss of a half-disc is that of sizes which grow with the distance "
             "from it, for more than twice the nodes, on straight triangles and on curved ones of order 2 and 3",
-      mutants=("gradation-ignored", "gradation-not-passed"), over=SCHEMES, ways="1 2")
+      mutants=("gradation-ignored", "gradation-not-passed"), over=SCHEMES, ways="1 2",
+      because="fast: elements as of accurate")
 def graded(numerics: dict[str, str], bound: float):
     (loss, nodes), (even, many) = (_graded_half_disc(numerics, gradation) for gradation in (0.25, 0.0))
     return (at_most("loss", abs(loss / even - 1), bound,

@@ -195,12 +195,14 @@ CLAIM = "A half-disc that grows by theta(R), {} on the rim, becomes the exact ha
 WRONG = ("stabilisation-power", "stabilisation-too-weak", "stabilisation-of-rest", "stabilisation-sign")
 
 
-@case("growth-half-cylinder", kind="exact", norm=CYLINDER_NORM, claim=CLAIM.format(36), mutants=(*WRONG, "theta-power"))
+@case("growth-half-cylinder", kind="exact", norm=CYLINDER_NORM, claim=CLAIM.format(36), mutants=(*WRONG, "theta-power"),
+      ways="1", because="orders 2, 3: growth-curved-half-cylinder")
 def half_cylinder() -> Outcome:
     return _outcome(36.0)
 
 
-@case("growth-half-cylinder-2000", kind="exact", norm=CYLINDER_NORM, claim=CLAIM.format(2000), mutants=WRONG, slow=True)
+@case("growth-half-cylinder-2000", kind="exact", norm=CYLINDER_NORM, claim=CLAIM.format(2000), mutants=WRONG, slow=True,
+      ways="1", because="orders 2, 3: growth-curved-half-cylinder")
 def half_cylinder_2000() -> Outcome:
     return _outcome(2000.0)
 
@@ -225,7 +227,8 @@ def _outlines(top: float) -> Profile:
       norm="largest relative error of the outline's radius; L2 of positions and of the pressure over the body at t = 0",
       claim="A curved half-disc that grows by theta(R) becomes the exact half-disc: places to third order, the "
             "pressure to second, and as well at theta = 2000 as at 36; in scenes of quadratic and of cubic elements",
-      mutants=("grad-div-dropped", "theta-power"), over={bodies.WORDS[kind]: (kind,) for kind in (2, 3)})
+      mutants=("grad-div-dropped", "theta-power"), over={bodies.WORDS[kind]: (kind,) for kind in (2, 3)},
+      because="order 1: growth-half-cylinder")
 def curved_half_cylinder(kind: int):
     found = refine(errors, REFINEMENTS[kind], 36.0, kind)
     yield study("position, theta to 36", found["size"], found["place"], 3, "quadratic places: third order in L2",

@@ -167,7 +167,8 @@ NORM = "L2 over the body at t = 0 of the difference to the reference on the same
 @case("growth-quadratic-cylinder", kind="cross-code", norm=f"{NORM}; the same of the reference to the closed form",
       claim="The half-cylinder grown to theta = 2000, on straight and on curved triangles, agrees with quadratic "
             "elements of scikit-fem, which have their orders 3 and 2 against the closed form",
-      mutants=("stabilisation-power", "stabilisation-of-rest"), slow=True)
+      mutants=("stabilisation-power", "stabilisation-of-rest"), slow=True,
+      ways="1 2", because="order 3: its displacements are order 2's")
 def quadratic_cylinder() -> Outcome:
     levels = range(len(RINGS))
     found, own = refine(gaps, levels, "half-cylinder"), refine(_own, levels)
@@ -190,7 +191,8 @@ def _own(level: int) -> dict[str, float]:
 @case("growth-uneven", kind="cross-code", norm=NORM,
       claim="A half-disc that grows ten times as much at the front as at the rear, and more above than on the wall, "
             "agrees with quadratic elements, whatever mu_L is, on straight and on curved triangles",
-      mutants=("theta-power", "third-power", "stabilisation-sign"))
+      mutants=("theta-power", "third-power", "stabilisation-sign"),
+      ways="1 2", because="order 3: its displacements are order 2's")
 def uneven() -> Outcome:
     found = refine(gaps, range(len(RINGS)), "uneven")
     studies = (_study(found, "place", 6e-4), _study(found, "pressure", 6e-3))
@@ -201,7 +203,8 @@ def uneven() -> Outcome:
 @case("growth-between-walls", kind="cross-code",
       norm=f"{NORM}, also further than a fifth of the radius from the ends of the contact",
       claim="The same half-disc, its arc held at the upper wall on which it slides, agrees with quadratic elements",
-      mutants=("held-short", "theta-power"), slow=True)
+      mutants=("held-short", "theta-power"), slow=True,
+      ways="1", because="orders 2, 3: growth-uneven; the corners of the contact rule")
 def between_walls() -> Outcome:
     found = refine(gaps, range(len(RINGS)), "between walls")
     studies = (_study(found, "place", 1e-3), _study(found, "pressure away", 6e-3))
@@ -248,19 +251,16 @@ def _errors(size: float, kind: int, exact) -> dict[str, float]:
       claim="A made-up growth with theta from 1 to 6.5, shears to one and an uneven pressure, held by body force and "
             "traction, is found at its order, whether the pressure has a slope on the rim or not, on straight and on "
             "curved triangles",
-      mutants=("theta-power", "third-power", "stabilisation-sign"))
-def manufactured() -> Outcome:
-    studies, profiles = [], []
-    for kind, orders in ORDERS.items():
-        for name, (order, why) in orders.items():
-            exact, told = manufactured_growth.growth(name), f"{name}, {bodies.WORDS[kind]}"
-            found, (place, pressure) = refine(_errors, SIZES[kind], kind, exact), CEILINGS[kind]
-            studies += [study(f"place, {told}", found["size"], found["place"], *PLACES[kind], ceiling=place,
-                              band=BANDS[kind]),
-                        study(f"pressure, {told}", found["size"], found["pressure"], order, why, ceiling=pressure)]
-            if kind == 1:
-                profiles.append(_profile(name, exact))
-    return Outcome(studies=tuple(studies), profiles=tuple(profiles))
+      mutants=("theta-power", "third-power", "stabilisation-sign"),
+      over={bodies.WORDS[kind]: (kind,) for kind in ORDERS}, because="order 3: its displacements are order 2's")
+def manufactured(kind: int):
+    for name, (order, why) in ORDERS[kind].items():
+        exact = manufactured_growth.growth(name)
+        found, (place, pressure) = refine(_errors, SIZES[kind], kind, exact), CEILINGS[kind]
+        yield study(f"place, {name}", found["size"], found["place"], *PLACES[kind], ceiling=place, band=BANDS[kind])
+        yield study(f"pressure, {name}", found["size"], found["pressure"], order, why, ceiling=pressure)
+        if kind == 1:
+            yield _profile(name, exact)
 
 
 def _profile(name: str, exact) -> Profile:

@@ -201,7 +201,7 @@ def register(cases: Iterable[HardCase]) -> None:
 
 def _register(one: HardCase) -> None:
     @case(one.full_id, kind="property", claim=f"{one.title}: {_sentence(one.right_is)}", norm=NORM, mutants=one.mutants,
-          slow=one.slow)
+          slow=one.slow, ways="1 2 3 paper fast accurate")
     def run() -> Verdicts:
         return run_case(one)
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 from verification.kernel.case import CASES, STAGES, WAYS, Case
 from verification.kernel.writing import Block, table
 
-#: Why a case does not run with any preset.
-ALONE = "a stage alone: presets choose among its elements"
+ORDERS, PRESETS = WAYS[:3], WAYS[3:]
+#: Why a case does not run with presets, and with all of them.
+ALONE = "presets: the stage alone, with the elements that they choose"
+ONE_BY_ONE = "other presets: their elements, by themselves"
 
 
 def blocks() -> list[Block]:
@@ -23,4 +25,11 @@ def row(case: Case) -> tuple[str, ...]:
 
 def reasons(case: Case) -> str:
     """Why it does not run with the others; "" where it runs with all."""
-    return case.because if {*WAYS} - {*case.ways} else ""
+    missing = [way for way in WAYS if way not in case.ways]
+    default = ALONE if {*PRESETS} <= {*missing} else ONE_BY_ONE
+    return "; ".join(filter(None, (case.because, default if {*PRESETS} & {*missing} else "")))
+
+
+def unexplained() -> list[str]:
+    """Cases that do not run with an order of elements, or with nothing at all, and do not say why."""
+    return [case.id for case in CASES.values() if not case.ways or ({*ORDERS} - {*case.ways} and not case.because)]

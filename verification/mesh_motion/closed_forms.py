@@ -18,7 +18,7 @@ from repro.fem.mesh import Mesh, curved
 from repro.fem.sizing import ACROSS_AGGREGATE, Sizing
 from repro.fem.space import Space
 from repro.model import mesh_motion
-from verification.kernel.case import Outcome, Profile, at_most, case, refine, study
+from verification.kernel.case import Profile, at_most, case, refine, study
 from verification.problems import meshes, norms
 
 #: gamma of (35) and c of the stabilisation as scenes have them, and the gammas that cases compare (E13).
@@ -26,6 +26,7 @@ GAMMA, STABILISATION = 1.0, 100.0
 GAMMAS = (0.1, GAMMA, 10.0)
 #: Straight triangles, as linear elements have them, and curved ones, as those of order 2 and 3.
 GEOMETRIES = {1: "straight", 2: "curved"}
+EITHER = {kind: (geometry,) for geometry, kind in GEOMETRIES.items()}
 
 
 def moved(grid: Mesh, points: np.ndarray, gamma: float = GAMMA) -> np.ndarray:
@@ -46,23 +47,19 @@ LINEAR = "the field is linear: round-off"
       norm="largest difference of displacement over the aggregate's largest, for gamma = 0.1, 1, 10",
       claim="A plug that slides and stretches along the pore, and a layer that thickens under a wall, stretch the "
             "fluid beside them linearly; a plug that rests moves nothing; on straight triangles and on curved ones",
-      mutants=("walls-held", "outlet-moves", "interface-slips", "middles-left-behind"))
-def plug() -> Outcome:
-    checks = []
-    for geometry, kind in GEOMETRIES.items():
-        grid = _nodes(meshes.channel(ENDS, WIDTH, 3.0, lambda x, y: np.abs(x) < HALF, across=(-HALF, HALF), seed=1),
-                      geometry)
-        layer = _nodes(meshes.channel(ENDS, WIDTH, 3.0, lambda x, y: y < 12.0, along=(12.0,), seed=2), geometry)
-        x, y = grid.points[:, 0], layer.points[:, 1]
-        slid = np.interp(x, [ENDS[0], -HALF, HALF, ENDS[1]], [0.0, 2.0, 5.0, 0.0])
-        thicker = np.interp(y, [0.0, 12.0, WIDTH], [0.0, 3.0, 0.0])
-        for name, mesh, exact in (("plug", grid, np.column_stack([slid, 0 * x])),
-                                  ("layer", layer, np.column_stack([0 * y, thicker]))):
-            checks += [at_most(f"{name}, gamma = {gamma:g}, {kind}", _error(mesh, exact, gamma), 1e-11, LINEAR)
-                       for gamma in GAMMAS]
-        rest = np.abs(moved(grid, grid.points) - grid.points).max()
-        checks.append(at_most(f"at rest, {kind}", rest, 0.0, "nothing moves"))
-    return Outcome(tuple(checks))
+      mutants=("walls-held", "outlet-moves", "interface-slips", "middles-left-behind"), over=EITHER, ways="3")
+def plug(geometry: int):
+    grid = _nodes(meshes.channel(ENDS, WIDTH, 3.0, lambda x, y: np.abs(x) < HALF, across=(-HALF, HALF), seed=1),
+                  geometry)
+    layer = _nodes(meshes.channel(ENDS, WIDTH, 3.0, lambda x, y: y < 12.0, along=(12.0,), seed=2), geometry)
+    x, y = grid.points[:, 0], layer.points[:, 1]
+    slid = np.interp(x, [ENDS[0], -HALF, HALF, ENDS[1]], [0.0, 2.0, 5.0, 0.0])
+    thicker = np.interp(y, [0.0, 12.0, WIDTH], [0.0, 3.0, 0.0])
+    for name, mesh, exact in (("plug", grid, np.column_stack([slid, 0 * x])),
+                              ("layer", layer, np.column_stack([0 * y, thicker]))):
+        for gamma in GAMMAS:
+            yield at_most(f"{name}, gamma = {gamma:g}", _error(mesh, exact, gamma), 1e-11, LINEAR)
+    yield at_most("at rest", np.abs(moved(grid, grid.points) - grid.points).max(), 0.0, "nothing moves")
 
 
 def _nodes(straight: Mesh, geometry: int) -> Mesh:
@@ -87,19 +84,16 @@ MOTIONS = {"slides": ([[0.0, 0.0], [0.0, 0.0]], (3.0, 1.0)),
       norm="largest difference of displacement over the aggregate's largest, for gamma = 0.1, 1, 10",
       claim="Fluid that an aggregate encloses follows every rigid and every linear motion of it, on straight triangles "
             "and on curved ones",
-      mutants=("interface-slips", "stale-fluid"))
-def pocket() -> Outcome:
+      mutants=("interface-slips", "stale-fluid"), over=EITHER, ways="3")
+def pocket(geometry: int):
     lines = {"across": (-HALF, -9.0, 9.0, HALF), "along": (8.0, 21.0)}
-    straight, checks = meshes.channel(ENDS, WIDTH, 2.5, _around_a_pocket, **lines, seed=3), []
-    for geometry, kind in GEOMETRIES.items():
-        grid = _nodes(straight, geometry)
-        x, y = grid.points.T
-        inside = np.flatnonzero((np.abs(x) <= 9.0) & (y >= 8.0) & (y <= 21.0))
-        for name, (matrix, shift) in MOTIONS.items():
-            displacement = grid.points @ np.transpose(matrix) + shift
-            error = max(_error(grid, displacement, gamma, inside) for gamma in GAMMAS)
-            checks.append(at_most(f"the aggregate {name}, {kind}", error, 1e-11, LINEAR))
-    return Outcome(tuple(checks))
+    grid = _nodes(meshes.channel(ENDS, WIDTH, 2.5, _around_a_pocket, **lines, seed=3), geometry)
+    x, y = grid.points.T
+    inside = np.flatnonzero((np.abs(x) <= 9.0) & (y >= 8.0) & (y <= 21.0))
+    for name, (matrix, shift) in MOTIONS.items():
+        displacement = grid.points @ np.transpose(matrix) + shift
+        error = max(_error(grid, displacement, gamma, inside) for gamma in GAMMAS)
+        yield at_most(f"the aggregate {name}", error, 1e-11, LINEAR)
 
 
 def _around_a_pocket(x, y):
@@ -117,15 +111,13 @@ CEILINGS = {0.01: 3e-3, 0.1: 3e-3, 1.0: 2e-3, 10.0: 1.2e-3}
       norm="L2 of the fluid's displacement, relative, mean of three random meshes a size",
       claim="Between a plug whose faces are bent by a wave and the ends of the mesh the fluid is displaced as the "
             "closed form says, for every gamma, sliding along walls and ends, on straight triangles and on curved ones",
-      mutants=("gamma-sign", "gamma-inverted", "twice-the-divergence", "walls-held"))
-def waves() -> Outcome:
-    studies = []
-    for geometry, kind in GEOMETRIES.items():
-        for gamma, ceiling in CEILINGS.items():
-            errors = refine(_wave_error, SIZES, gamma, geometry)["displacement"]
-            studies.append(study(f"gamma = {gamma:g}, {kind}", SIZES, errors, 2, "linear elements: second order",
-                                 ceiling=ceiling))
-    return Outcome(studies=tuple(studies), profiles=(_along_the_wall(),))
+      mutants=("gamma-sign", "gamma-inverted", "twice-the-divergence", "walls-held"), over=EITHER, ways="3")
+def waves(geometry: int):
+    for gamma, ceiling in CEILINGS.items():
+        errors = refine(_wave_error, SIZES, gamma, geometry)["displacement"]
+        yield study(f"gamma = {gamma:g}", SIZES, errors, 2, "linear elements: second order", ceiling=ceiling)
+    if geometry == 1:
+        yield _along_the_wall()
 
 
 def _bent(size: float, seed: int, geometry: int = 1) -> Mesh:
@@ -190,17 +182,21 @@ SEGMENT_MOTIONS = {"grows": _grows, "slides": _slides}
       norm="L2 of the difference of the whole displacement over that of the displacement",
       claim="Around a half-disc that grows, or slides along the wall, the fluid is displaced as an independent code "
             "displaces it, for three gamma, on straight triangles and on curved ones; both codes refined",
-      mutants=("gamma-sign", "twice-the-divergence", "gamma-inverted"))
-def half_disc() -> Outcome:
-    why, studies = f"linear elements: second order, no singular corner (mirror images); {BOTH}", []
-    for geometry, kind in GEOMETRIES.items():
-        grids = [_segment(np.pi / 2, refinement, geometry) for refinement, _ in LEVELS]
-        sizes = [norms.mean_size(grid) for grid in grids]
-        for name, gamma in product(SEGMENT_MOTIONS, GAMMAS):
-            errors = [_apart(grid, np.pi / 2, parts, gamma, name) for grid, (_, parts) in zip(grids, LEVELS)]
-            studies.append(study(f"{name}, gamma = {gamma:g}, {kind}", sizes, errors, 2, why, ceiling=1e-3))
-    shown = _segment(np.pi / 2, LEVELS[1][0], 1)
-    return Outcome(studies=tuple(studies), profiles=tuple(_beside(shown, name) for name in SEGMENT_MOTIONS))
+      mutants=("gamma-sign", "twice-the-divergence", "gamma-inverted"), over=EITHER, ways="3")
+def half_disc(geometry: int):
+    for name, gamma in product(SEGMENT_MOTIONS, GAMMAS):
+        yield _compared(geometry, np.pi / 2, LEVELS, name, gamma, 2,
+                        "linear elements: second order, no singular corner (mirror images)", f"{name}, ")
+    if geometry == 1:
+        yield [_beside(_segment(np.pi / 2, LEVELS[1][0], 1), name) for name in SEGMENT_MOTIONS]
+
+
+def _compared(geometry: int, contact: float, levels, motion: str, gamma: float, order: float, why: str, name: str = ""):
+    """The study of one motion."""
+    grids = [_segment(contact, refinement, geometry) for refinement, _ in levels]
+    errors = [_apart(grid, contact, parts, gamma, motion) for grid, (_, parts) in zip(grids, levels)]
+    return study(f"{name}gamma = {gamma:g}", [norms.mean_size(grid) for grid in grids], errors, order, f"{why}; {BOTH}",
+                 ceiling=1e-3)
 
 
 @case("mesh_motion-corner", kind="cross-code", slow=True,
@@ -208,18 +204,11 @@ def half_disc() -> Outcome:
       claim="Around an aggregate whose contact angle is 60 degrees the order falls to twice the exponent of the "
             "fluid's corner of 120 degrees, for three gamma, on straight triangles and on curved ones; both codes "
             "refined",
-      mutants=("gamma-inverted",))
-def corner() -> Outcome:
-    studies = []
-    for geometry, kind in GEOMETRIES.items():
-        grids = [_segment(CONTACT, refinement, geometry) for refinement, _ in CORNER_LEVELS]
-        sizes = [norms.mean_size(grid) for grid in grids]
-        for gamma in GAMMAS:
-            order = 2 * quadratic_mesh_motion.exponent(np.pi - CONTACT, gamma)
-            errors = [_apart(grid, CONTACT, parts, gamma, "grows") for grid, (_, parts) in zip(grids, CORNER_LEVELS)]
-            studies.append(study(f"gamma = {gamma:g}, {kind}", sizes, errors, order,
-                                 f"2 z, displacement like r^z at the corner; {BOTH}", ceiling=1e-3))
-    return Outcome(studies=tuple(studies))
+      mutants=("gamma-inverted",), over=EITHER, ways="3")
+def corner(geometry: int):
+    return [_compared(geometry, CONTACT, CORNER_LEVELS, "grows", gamma,
+                      2 * quadratic_mesh_motion.exponent(np.pi - CONTACT, gamma),
+                      "2 z, displacement like r^z at the corner") for gamma in GAMMAS]
 
 
 @cache

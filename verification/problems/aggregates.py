@@ -21,6 +21,7 @@ WIDTH, FILM = 50.0, 2.0
 DENSITY = 3e4
 #: Orders of the elements, by the names that scenes have for them.
 ORDERS = {1: "linear", 2: "quadratic", 3: "cubic"}
+EVERY = {name: (order,) for order, name in ORDERS.items()}
 
 
 def scene(*changes: str, order: int = 1):

@@ -33,6 +33,8 @@ SAMPLES = {4.0: 12, 2.0: 6, 1.0: 3, 0.5: 1}
 SECOND = "linear elements, lumped reaction: second order"
 ORDERS = (1, 2, 3)
 WORDS = {1: "linear", 2: "quadratic", 3: "cubic"}
+#: Every order, by its word.
+EVERY = {word: (order,) for order, word in WORDS.items()}
 #: Of concentrations of an order in L2, and why; of what leaves or is taken up, twice the order of the gradient.
 EXPECTED = {1: (2, SECOND), 2: (3, "quadratic elements: third order in L2"),
             3: (4, "cubic elements: fourth order in L2")}

@@ -42,7 +42,7 @@ CARRIERS = {"projection": transfer.project, "interpolation": sampled}
       norm="L2 of a smooth field, interpolated on one mesh and carried to another, mean of three pairs a size; root "
            "mean square error at a thousand places of fields of order 1, 2 and 3, mean of three meshes a size",
       claim="Neither transfer loses the accuracy of linear elements, and fields of each order are found to their order",
-      mutants=("corners-for-middles", "nearest-corner"))
+      mutants=("corners-for-middles", "nearest-corner"), ways="1 2 3")
 def order() -> Outcome:
     errors = refine(_carried_errors, SIZES)
     studies = [study(name, SIZES, errors[name], 2, "linear elements: second order", ceiling=ceiling)
@@ -101,7 +101,7 @@ def _across_the_hill() -> Profile:
            "and least nodal value",
       claim="Forty remeshes of a steep field keep its integral to round-off and never raise its square by projection; "
             "by linear interpolation they stay within its bounds and change what it integrates to",
-      mutants=("linear-transfer",))
+      mutants=("linear-transfer",), ways="1", because="orders 2 and 3 carry masses, not fields: reprojection-growing")
 def chain() -> Outcome:
     kept, paper = (_remeshed(carry) for carry in CARRIERS.values())
     count = np.arange(REMESHES + 1)
@@ -142,7 +142,8 @@ BOUNDED_CARRIERS = {"bounded": transfer.project_bounded, "projection": transfer.
            "much values leave their range, over it; L2 error over that of the unlimited projection",
       claim="Forty remeshes of a steep field keep its integral to round-off and every value in the range of the first; "
             "the unlimited projection leaves it, and is hardly more accurate",
-      mutants=("bounded-lumped", "bounded-unlimited", "bounded-one-sided"))
+      mutants=("bounded-lumped", "bounded-unlimited", "bounded-one-sided"),
+      ways="1", because="orders 2 and 3 carry masses, not fields: reprojection-growing")
 def bounded_chain() -> Outcome:
     checks, profiles = [], []
     for name, field in FIELDS.items():
@@ -180,7 +181,8 @@ def _bounded_remeshed(carry, field) -> dict[str, np.ndarray]:
       norm="L2 of a smooth field, interpolated on one mesh and carried to another, mean of three pairs a size; largest "
            "error of a linear field over nine pairs of meshes, over its range",
       claim="The limiter leaves linear fields alone, and a smooth one its second order",
-      mutants=("bounded-lumped", "bounds-of-one-piece"))
+      mutants=("bounded-lumped", "bounds-of-one-piece"),
+      ways="1", because="orders 2 and 3 carry masses, not fields: reprojection-growing")
 def bounded_order() -> Outcome:
     errors = refine(_carried, SIZES)
     linear = max(_linear(old, new) for _, old, new in pairs.pairs())
@@ -214,7 +216,8 @@ DEGREE = 6
            "largest area; largest relative error of the integrals of x^a y^b, a + b up to 6",
       claim="The common pieces of two meshes are shapely's, cover every triangle of both once, and integrate "
             "polynomials exactly, for unrelated meshes, shared nodes and edges, equal meshes and slivers",
-      mutants=("clip-two-sides", "fans-cut-short"))
+      mutants=("clip-two-sides", "fans-cut-short"),
+      ways="1", because="orders 2 and 3 carry masses, not fields: reprojection-growing")
 def supermesh() -> Outcome:
     return _worst([_pieces(old, new) for _, old, new in pairs.pairs()], 1e-12)
 
@@ -252,7 +255,8 @@ def _polynomials(pieces: pairs.Grid) -> float:
            "and y, and of its square, relative",
       claim="The projection of a random field is that of a dense code on shapely's pieces; it keeps linear fields, "
             "the field's integral and centre, and what it takes from the square is the square of the difference",
-      mutants=("lumped-mass", "corners-for-middles", "contributions-lost"))
+      mutants=("lumped-mass", "corners-for-middles", "contributions-lost"),
+      ways="1", because="orders 2 and 3 carry masses, not fields: reprojection-growing")
 def projection() -> Outcome:
     random = np.random.default_rng(6)
     return _worst([_projected(old, new, random.uniform(0.0, 1.0, len(old[0]))) for _, old, new in pairs.pairs()], 1e-11)

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from itertools import product
 
 import numpy as np
 
@@ -98,7 +99,8 @@ def fipy(size: float, peclet: float, density: float):
            "value; several meshes a size",
       claim="Dual Monod uptake under plug flow is solve_bvp's at Peclet 0.1, 1, 5 times Thiele numbers 0.6, 1.9, 6, "
             "from barely touched to starved",
-      mutants=("decay-demand", "ratio-on-the-donor-only", "reaction-in-the-fluid", "exchanged-substrates"))
+      mutants=("decay-demand", "ratio-on-the-donor-only", "reaction-in-the-fluid", "exchanged-substrates"),
+      ways="1", because="orders 2, 3: transport-monod-higher")
 def collocation() -> Outcome:
     studies = [part for combination in COMBINATIONS for part in _collocation(*combination)]
     errors = refine(lambda size: averaged(_relative_error, size, *STARVED), SIZES)["acceptor"]
@@ -145,15 +147,22 @@ def _higher(order: int, peclet: float, density: float, ceiling: float):
     return study(titled(peclet, density), errors["size"], errors["C"], *EXPECTED[order], ceiling=ceiling)
 
 
-@case("transport-curved-monod", kind="cross-code", slow=True,
+#: Peclet numbers and the last error, for each order.
+FAST_MONOD = {2: (FASTER, 1e-7), 3: ((1.0,), 1e-9)}
+
+
+@case("transport-monod-higher", kind="cross-code", slow=True,
       norm="root mean square over the mesh of both substrates less solve_bvp, over the supply",
-      claim="Dual Monod uptake under plug flow on quadratic triangles is solve_bvp's, to third order, at Peclet 0.5, "
-            "1, 5 times Thiele numbers 0.6, 1.9, 6, from barely touched to starved",
-      mutants=("uptake-without-decay", "fluid-diffusivity"))
-def quadratic() -> Outcome:
-    combinations = [(peclet, density) for peclet in FASTER for density in DENSITIES]
-    studies = tuple(_higher(2, peclet, density, 1e-7) for peclet, density in combinations)
-    return Outcome((), studies, tuple(_quadratic_profile(peclet, density) for peclet, density in combinations))
+      claim="Dual Monod uptake under plug flow on quadratic and cubic triangles is solve_bvp's, to third and fourth "
+            "order, at Peclet 0.5, 1, 5 (cubic: 1) times Thiele numbers 0.6, 1.9, 6, from barely touched to starved",
+      mutants=("uptake-without-decay", "fluid-diffusivity", "reaction-evenly-weighted"),
+      over={WORDS[order]: (order,) for order in FAST_MONOD}, because="order 1: transport-monod-collocation")
+def higher(order: int):
+    peclets, ceiling = FAST_MONOD[order]
+    for peclet, density in product(peclets, DENSITIES):
+        yield _higher(order, peclet, density, ceiling)
+        if order == 2:
+            yield _quadratic_profile(peclet, density)
 
 
 def _quadratic_profile(peclet: float, density: float) -> Profile:
@@ -165,21 +174,12 @@ def _quadratic_profile(peclet: float, density: float) -> Profile:
     return Profile(titled(peclet, density), "x (um)", "C (mg/L)", tuple(curves))
 
 
-@case("transport-cubic-monod", kind="cross-code", slow=True,
-      norm="root mean square over the mesh of both substrates less solve_bvp, over the supply",
-      claim="Dual Monod uptake under plug flow on cubic triangles is solve_bvp's, to fourth order, from barely touched "
-            "to starved biomass",
-      mutants=("reaction-evenly-weighted", "uptake-without-decay"))
-def cubic() -> Outcome:
-    return Outcome(studies=tuple(_higher(3, 1.0, density, 1e-9) for density in DENSITIES))
-
-
 @case("transport-monod-fipy", kind="cross-code",
       norm="root mean square over FiPy's cells, at five heights, of each substrate over its supply, and in the starved "
            "slab over its own value; several meshes a size",
       claim="Dual Monod uptake under plug flow is FiPy's, both codes refined together, at Peclet 0.1, 1, 5 times "
             "Thiele numbers 0.6, 1.9, 6, from barely touched to starved",
-      mutants=("decay-demand", "no-inlet-flux"), slow=True)
+      mutants=("decay-demand", "no-inlet-flux"), slow=True, ways="1", because="orders 2, 3: transport-monod-higher")
 def finite_volumes() -> Outcome:
     studies = [part for combination in COMBINATIONS for part in _finite_volumes(*combination)]
     errors = refine(lambda size: averaged(_relative_to_fipy, size, *STARVED), SIZES)["acceptor"]
@@ -317,7 +317,7 @@ def _at_rest(cell: float, size: float, density: float, shape: str, order: int) -
       claim="Diffusion into a block of biomass on a wall is py-pde's, both codes refined together, at Thiele numbers "
             "0.7, 2.2 and 4.3; with quadratic and cubic elements the transient scheme comes to rest in what py-pde's "
             "cells come to",
-      mutants=("one-supply-held", "reaction-in-the-fluid"), slow=True)
+      mutants=("one-supply-held", "reaction-in-the-fluid"), slow=True, ways="1 2 3")
 def block() -> Outcome:
     rows, studies = {1e5: (2e-5, 3e-5), 1e6: (1e-4, 3e-4), 4e6: (2e-4, 1e-3)}, []
     for density, ceilings in rows.items():
@@ -331,7 +331,7 @@ def block() -> Outcome:
       norm="root mean square over py-pde's cells over the supply; that of C_D in the biomass over itself",
       claim="Diffusion into a half-disc is py-pde's, both codes refined together, at Thiele numbers 0.7, 2.2 and 7; "
             "with quadratic and cubic elements the transient scheme comes to rest in what py-pde's cells come to",
-      mutants=("ratio-on-the-donor-only",), slow=True)
+      mutants=("ratio-on-the-donor-only",), slow=True, ways="1 2 3")
 def half_disc() -> Outcome:
     rows, studies = {1e5: (2e-5, 3e-5), 1e6: (1e-4, 4e-4), 1e7: (3e-4, 1e-2)}, []
     origin = ("second order: what the cut cells of py-pde take up is right, its place is off now to one side, now to "

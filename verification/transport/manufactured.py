@@ -171,7 +171,7 @@ def _through(space: Space, nodes, owner, ends, mean: float, supply: float, chose
       claim="Chosen concentrations around a half-disc come out of the full equations with second order, at Peclet "
             "numbers of the pore from 0.1 to 100 and of the elements from 0.002 to 18, with either inlet condition",
       mutants=("cross-flow-sign", "exchanged-half-saturation", "fluid-diffusivity", "ratio-on-the-donor-only",
-               "quarter-of-a-triangle"))
+               "quarter-of-a-triangle"), ways="1", because="orders 2, 3: transport-manufactured-higher")
 def chosen_concentrations() -> Outcome:
     return Outcome(studies=_all_studies(1), profiles=tuple(_profile(peclet) for peclet in PECLETS[1]))
 
@@ -180,7 +180,8 @@ def chosen_concentrations() -> Outcome:
       norm="L2 of each substrate over the mesh, relative",
       claim="The same with quadratic and cubic elements on curved triangles, at Peclet numbers from 0.1 to 100, with "
             "either inlet condition: third order, of advection alone fourth; and fourth order",
-      mutants=("printed-inlet-forgotten", "conserving-cross-flow", "exchanged-half-saturation", "fluid-diffusivity"))
+      mutants=("printed-inlet-forgotten", "conserving-cross-flow", "exchanged-half-saturation", "fluid-diffusivity"),
+      ways="2 3", because="order 1: transport-manufactured")
 def chosen_of_higher_order() -> Outcome:
     return Outcome(studies=(*_all_studies(2), *_all_studies(3)))
 

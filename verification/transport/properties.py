@@ -52,7 +52,7 @@ def _defects(now, solved) -> list[float]:
             "(u_ave - u_x) C is counted [E4]; and supply in = out + consumed + stored in the transient scheme; with "
             "linear, quadratic and cubic elements",
       mutants=("carried-by-u", "weights-of-the-ends", "ledger-of-backward-euler", "printed-inlet-forgotten",
-               "outlet-forgotten"))
+               "outlet-forgotten"), ways="1 2 3")
 def balance() -> Outcome:
     checks = []
     for order in ORDERS:
@@ -96,7 +96,7 @@ def _in_time(found, order: int):
       claim="Starved pores (0.35 m/d, radius 27 and 42 um, supplies of 0.15 and 10 mg/L) have one steady state, "
             "C >= 0, that closes the balance to round-off, whatever Newton's method starts from; the transient scheme "
             "comes to rest in it; with quadratic and cubic elements C is no more below zero than is let pass",
-      mutants=("newton-in-concentrations", "newton-stopped-early"))
+      mutants=("newton-in-concentrations", "newton-stopped-early"), ways="1 2 3")
 def starved() -> Outcome:
     checks = [check for row in STARVED for check in _starved(*row)]
     for order in (2, 3):
@@ -153,7 +153,7 @@ CUBIC = {"preset": "fast", "elements": "cubic", "refinement": 0.45}
 @case("transport-proportion", kind="property", norm="consumed acceptor over F times consumed donor, less one",
       claim="Behind a front where the donor is used up, at half saturations of a hundredth of its supply, both are "
             "taken up in their proportion, with linear, quadratic and cubic elements",
-      mutants=("unpaired",))
+      mutants=("unpaired",), ways="1 2 3 paper fast accurate")
 def proportion() -> Outcome:
     half = "1e-2 mg/L"
     kinds = {**{name: numerics for name, (numerics, _) in SOLVED.items()}, "cubic": CUBIC}
@@ -172,7 +172,7 @@ def _in_proportion(found, name: str, half: str) -> Check:
       claim="Behind a front where the donor is used up, to half saturations of a millionth of the supply, both are "
             "taken up in their proportion, with linear and quadratic elements, and what leaves is within the "
             "presets' accuracy; where a mesh is refused, with the refinement that the refusal names",
-      mutants=("unpaired",))
+      mutants=("unpaired",), ways="1 2 paper fast accurate", because="order 3: transport-proportion")
 def front() -> Outcome:
     checks = []
     for half in ("1e-2 mg/L", "1e-3 mg/L", "1e-5 mg/L"):
@@ -219,7 +219,8 @@ FAR, WITHIN = 2.5, "0.1 %, what preset accurate is for"
       norm="difference of effluents, over the supply, and of consumption, relative, to a mesh of refinement 2.5",
       claim="In fast water (u W / D to 3e4) the boundary layers that preset accurate makes its elements for are "
             "resolved to 0.1 %, with quadratic and with cubic elements",
-      mutants=("layers-ignored",))
+      mutants=("layers-ignored",),
+      ways="2 3 accurate", because="paper, fast: elements for boundary layers are accurate's")
 def peclet() -> Outcome:
     checks = []
     for speed in ("2.9 m/day", "29 m/day", "290 m/day"):
@@ -244,7 +245,8 @@ def _carried(speed: str, refinement: float, kind: str):
       norm="(in - out - consumed) over what comes in; difference over the supply to quadratic concentrations",
       claim="Around a half-disc, under the flow of cubic velocities, each substrate is in balance to round-off, and "
             "the effluents are those of quadratic elements on a mesh twice finer",
-      mutants=("cubic-edge-nodes", "outlet-forgotten"))
+      mutants=("cubic-edge-nodes", "outlet-forgotten"),
+      ways="2 3 accurate", because="order 1 and the others: transport-balance")
 def half_disc() -> Outcome:
     checks = []
     for name, ours, theirs in zip(PRESETS_NAMES, _around("cubic", 0.45), _around("quadratic", 0.9)):

@@ -41,8 +41,8 @@ from repro.model.transport import Balance, Concentrations
 from verification.kernel.case import Check, Outcome, Profile, Study, at_most, case, refine, study
 from verification.problems.channels import (
     CROSSED,
+    EVERY,
     NAMES,
-    ORDERS,
     SCENE,
     WORDS,
     along,
@@ -152,7 +152,7 @@ COARSE = {1: SIZES[0], 2: SIZES[0], 3: 5.0}
       norm="largest over three times of the root mean square over the nodes, over the supply",
       claim="On a given mesh the modified Gear scheme's concentrations, linear, quadratic and cubic, are those of "
             "scipy's integrator with scikit-fem's mass matrix, with an error of second order in the step",
-      mutants=("carry-of-bdf2", "backward-euler", "storage-of-the-biomass-alone", "storage-diagonal"))
+      mutants=("carry-of-bdf2", "backward-euler", "storage-of-the-biomass-alone", "storage-diagonal"), ways="1 2 3")
 def in_time() -> Outcome:
     parts = []
     for order, combinations in IN_TIME.items():
@@ -203,7 +203,7 @@ def _at_cells(size: float, sample: int, peclet: float, density: float, steps: in
       claim="Transient profiles of both substrates are FiPy's, both codes refined together in space, at Peclet 0.1, 1, "
             "5 times Thiele numbers 0.6, 1.9, 6; and refined in time, where FiPy's own scheme is of first order; those "
             "of quadratic and cubic elements, on one mesh, are what FiPy's cells come to",
-      mutants=("storage-of-the-biomass-alone", "storage-diagonal"), slow=True)
+      mutants=("storage-of-the-biomass-alone", "storage-diagonal"), slow=True, ways="1 2 3")
 def in_space() -> Outcome:
     studies = [part for combination in COMBINATIONS for part in _in_space(*combination)]
     higher = [part for order in (2, 3) for part in _to_fipy(order, 1.0, 3e4)]
@@ -322,32 +322,27 @@ NORM = "largest relative difference, twice a day for five days"
 @case("transport-well-mixed", kind="cross-code", norm=f"{NORM}; X at constant C: relative, after five days",
       claim="In a closed, well-mixed pore C_A, C_D, X_A and X_I follow the four ordinary equations over days, with an "
             "error of second order in the step; at constant C the shape updates integrate X_A and X_I exactly",
-      mutants=("inert-fraction", "yield-dropped", "remains-of-the-start", "growth-in-one-increment"))
-def well_mixed() -> Outcome:
-    checks, studies = _followed(1)
+      mutants=("inert-fraction", "yield-dropped", "remains-of-the-start", "growth-in-one-increment"),
+      ways="1", because="orders 2, 3: transport-well-mixed-higher")
+def well_mixed():
     exactly = at_most("X at constant C, 12 min steps", _constant_supply(), 1e-9,
                       "(9)-(10) are integrated exactly: round-off of 600 steps, and scipy's 1e-11")
-    return Outcome((exactly, checks), studies, _profiles())
+    return exactly, [part.labelled(WORDS[1]) for part in followed(1)], _profiles()
 
 
 @case("transport-well-mixed-higher", kind="cross-code", norm=NORM, slow=True,
       claim="With quadratic and cubic concentrations C_A, C_D, X_A and X_I of the well-mixed pore follow the four "
             "ordinary equations alike",
-      mutants=("storage-diagonal", "inert-fraction", "remains-of-the-start"))
-def well_mixed_of_higher_order() -> Outcome:
-    quadratic, cubic = _followed(2), _followed(3)
-    return Outcome((quadratic[0], cubic[0]), (*quadratic[1], *cubic[1]))
-
-
-def _followed(order: int) -> tuple[Check, tuple]:
+      mutants=("storage-diagonal", "inert-fraction", "remains-of-the-start"),
+      over={WORDS[order]: (order,) for order in (2, 3)}, because="order 1: transport-well-mixed")
+def followed(order: int):
     """How even the box is, and studies of the four."""
     exact = _theirs(HALF_DAYS, order)
     errors = np.array([np.abs(_mixed_ours(step, order)[:, :, 0] / exact - 1).max(axis=0) for step in MIXED_STEPS])
     uneven = (_mixed_ours(MIXED_STEPS[-1], order)[:, :, 1] / exact).max()
-    return (at_most(f"unevenness in the box, {WORDS[order]}", uneven, 1e-6,
-                    "L^2 / D over the time in which the supply lasts"),
-            tuple(study(f"{name}, {WORDS[order]}", MIXED_STEPS, errors[:, k], 2, "BDF2, started anew ten times",
-                        ceiling=ceiling) for k, (name, ceiling) in enumerate(zip(MIXED_NAMES, MIXED_CEILINGS))))
+    yield at_most("unevenness in the box", uneven, 1e-6, "L^2 / D over the time in which the supply lasts")
+    for k, (name, ceiling) in enumerate(zip(MIXED_NAMES, MIXED_CEILINGS)):
+        yield study(name, MIXED_STEPS, errors[:, k], 2, "BDF2, started anew ten times", ceiling=ceiling)
 
 
 def _constant_supply() -> float:
@@ -393,14 +388,12 @@ def _open(order: int) -> transport.Problem:
       claim="With the mean biomass of a step of hours, biomass made is Y donor - (acceptor - F donor) / d_c of what is "
             "taken up, to round-off, wherever concentrations are; at constant ones the uptake is the integral of "
             "(7)-(10) over the step; and the tangent is the uptake's derivative",
-      mutants=("biomass-of-the-start", "biomass-half-way", "mean-biomass-constant-in-c"))
-def mean_biomass() -> Outcome:
-    checks, studies = [], []
-    for order in ORDERS:
-        for hours in HOURS:
-            checks += [_balanced(order, hours), _integrated(order, hours)]
-        studies.append(_tangent(order, HOURS[-1]))
-    return Outcome(tuple(checks), tuple(studies))
+      mutants=("biomass-of-the-start", "biomass-half-way", "mean-biomass-constant-in-c"), over=EVERY)
+def mean_biomass(order: int):
+    for hours in HOURS:
+        yield _balanced(order, hours)
+        yield _integrated(order, hours)
+    yield _tangent(order, HOURS[-1])
 
 
 def _balanced(order: int, hours: float) -> Check:
@@ -415,7 +408,7 @@ def _balanced(order: int, hours: float) -> Check:
     grown = float(np.sum(after[0] - active) + np.sum(after[1]))
     F, d_c = law.acceptor_to_donor_ratio, law.decay_oxygen_demand
     asked = law.yield_coefficient * donor - (acceptor - F * donor) / d_c
-    return at_most(f"biomass made, {hours:g} h, {WORDS[order]}", abs(grown - asked) / grown, 1e-12,
+    return at_most(f"biomass made, {hours:g} h", abs(grown - asked) / grown, 1e-12,
                    "one integral of growth and uptake in each point: round-off")
 
 
@@ -432,7 +425,7 @@ def _integrated(order: int, hours: float) -> Check:
     found = solve_ivp(lambda t, y: [growth * y[0], y[0] * sinks[0], y[0] * sinks[1]], (0, hours), [seeded, 0.0, 0.0],
                       rtol=1e-12, atol=1e-9, method="DOP853").y[1:, -1]
     taken = hours * np.array([flux.consumed for flux in ours]) / made.space.reaction.dx.sum()
-    return at_most(f"uptake at constant C, {hours:g} h, {WORDS[order]}", np.abs(taken / found - 1).max(), 1e-10,
+    return at_most(f"uptake at constant C, {hours:g} h", np.abs(taken / found - 1).max(), 1e-10,
                    "scipy's 1e-12, in a few steps")
 
 
@@ -444,4 +437,4 @@ def _tangent(order: int, hours: float) -> Study:
     steps = 0.05 * 0.5 ** np.arange(4)
     linear, start = made.system.product(balance.tangent(state), along), balance.residual(state)
     left = [np.abs(balance.residual(state + s * along) - start - s * linear).max() for s in steps]
-    return study(f"tangent, {hours:g} h, {WORDS[order]}", steps, left, 2, "Taylor's theorem: second order")
+    return study(f"tangent, {hours:g} h", steps, left, 2, "Taylor's theorem: second order")
