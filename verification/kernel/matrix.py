@@ -77,12 +77,16 @@ def _file(module: str) -> str:
 
 def blocks() -> list[Block]:
     """Both tables."""
-    ordered = sorted(CASES.values(), key=lambda case: STAGES.index(case.stage))
     head = ("section", "equations", "modules", "cases", "references", "mutants", "claims")
     return [Block("heading", "Elements and presets"),
             Block("text", "run: with every `make verify-fast`; slow: with `make verify`; n/a: not applicable."),
-            table(("case", *WAYS, "not applicable because"), map(row, ordered)),
+            table(("case", *WAYS, "not applicable because"), map(row, ordered())),
             Block("heading", "Equation, module, case, reference, mutant, claim"), table(head, map(line, parts()))]
+
+
+def ordered() -> list[Case]:
+    """All cases, by stage and id: in whatever order they were registered."""
+    return sorted(CASES.values(), key=lambda case: (STAGES.index(case.stage), case.id))
 
 
 def row(case: Case) -> tuple[str, ...]:
@@ -100,7 +104,7 @@ def reasons(case: Case) -> str:
 
 def unexplained() -> list[str]:
     """Cases that do not run with an order of elements, or with nothing at all, and do not say why."""
-    return [case.id for case in CASES.values() if not case.ways or ({*ORDERS} - {*case.ways} and not case.because)]
+    return [case.id for case in ordered() if not case.ways or ({*ORDERS} - {*case.ways} and not case.because)]
 
 
 def line(part: Part) -> tuple[str, ...]:
@@ -120,12 +124,12 @@ def mutants_of(part: Part) -> list[str]:
 def cases_of(part: Part) -> list[str]:
     """Ids of the cases that name one of them."""
     wrong = {*mutants_of(part)}
-    return [case.id for case in CASES.values() if wrong & {*case.mutants}]
+    return [case.id for case in ordered() if wrong & {*case.mutants}]
 
 
 def claims_of(part: Part) -> list[str]:
     """Ids of the claims of its sections; figures, plates and discussion are of the results."""
-    return [id for id, sections in claims().items()
+    return [id for id, sections in sorted(claims().items())
             if any(_within(section, own) for section in sections for own in part.sections)]
 
 
