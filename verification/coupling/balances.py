@@ -102,9 +102,7 @@ def _yield_defect(elements: str, step: float) -> float:
 
 def _trapezoid(step: float) -> float:
     """(r step)^2 / 12 at the supply's rate of growth r."""
-    law, both = _scene(step).kinetics, _scene(step).substrates
-    m_a, m_d = (s.supply / (s.supply + s.half_saturation) for s in (both.acceptor, both.donor))
-    return (m_a * (law.maximum_utilization_rate * law.yield_coefficient * m_d - law.decay_coefficient) * step) ** 2 / 12
+    return (runs.growth_rates(_scene(step))[0] * step) ** 2 / 12
 
 
 REFINEMENTS = (0.7, 1.0, 1.4, 2.0)

@@ -137,7 +137,7 @@ def uniform_growth(elements: str):
     scene = _everywhere(runs.base("6 h", runs.of(elements), runs.coarser(elements, 0.3), times=times))
     seed, instants = pore.seeded(scene).outline, list(simulate(scene))[1:]
     areas = np.array([instant.pore.outline.area for instant in instants])
-    expected = seed.area * np.array([_mass_after(scene, time) for time in TIMES])
+    expected = seed.area * np.array([runs.mass_after(scene, time) for time in TIMES])
     profile = Profile("area", "time (h)", "area (um2)",
                       (("ours", "ours", np.array(TIMES), areas),
                        ("closed form", "exact", np.array(TIMES), expected)))
@@ -173,22 +173,13 @@ def long_steps(elements: str):
     """Checks of a run to 9 h with the steps of the preset fast."""
     scene = _everywhere(runs.base("9 h", runs.by("fast"), runs.of(elements), runs.coarser(elements, 0.2)))
     first, last = simulate(scene)
-    wanted = first.pore.outline.area * _mass_after(scene, 9.0)
+    wanted = first.pore.outline.area * runs.mass_after(scene, 9.0)
     bound, origin = _roundness(scene, first.pore.outline)
     mass = last.pore.mass / scene.kinetics.maximum_density
     return [at_most("mass", abs(mass / wanted - 1), 1e-6, "C to 1e-7 of the supply"),
             at_most("area", abs(last.pore.outline.area / wanted - 1), 1e-6, "J = theta"),
             at_most("outline", _unround(last, wanted), bound, origin),
             at_least("remeshes", last.remeshes, 1.0, "else less is tested")]
-
-
-def _mass_after(scene, time: float) -> float:
-    """(X_A + X_I) over that at the start, (9)-(10) at the supply, by hand."""
-    law, both = scene.kinetics, scene.substrates
-    m_a, m_d = (s.supply / (s.supply + s.half_saturation) for s in (both.acceptor, both.donor))
-    rise = m_a * (law.maximum_utilization_rate * law.yield_coefficient * m_d - law.decay_coefficient)
-    left = m_a * law.decay_coefficient * (1 - law.degradable_fraction)
-    return float(np.exp(rise * time) + left / rise * np.expm1(rise * time))
 
 
 @case("coupling-units", kind="property", norm="relative difference at 2 h",

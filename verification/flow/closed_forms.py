@@ -89,7 +89,7 @@ def _velocity(x, y):
     return np.stack([poiseuille.velocity(y, WIDTH), 0 * y], axis=-1)
 
 
-PLUG, PLUG_SIZES, PLUG_DRAWS = (-30.0, 30.0), (8.0, 4.0, 2.0, 1.0), (12, 8, 4, 1)
+PLUG, PLUG_SIZES, PLUG_DRAWS = 30.0, (8.0, 4.0, 2.0, 1.0), (12, 8, 4, 1)
 
 
 @case("flow-plug", kind="exact", norm="root mean square over random meshes of a size: L2 of u over the mesh, relative "
@@ -107,13 +107,12 @@ def plug() -> Outcome:
 
 @cache
 def _plugged(size: float, draw: int) -> Mesh:
-    return meshes.cut(ENDS, WIDTH, size, lambda x, y: (PLUG[0] < x) & (x < PLUG[1]), across=PLUG,
-                         seed=int(100 * size) + draw)
+    return meshes.plug(ENDS, WIDTH, PLUG, size, meshes.cut, int(100 * size) + draw)
 
 
 def _plug_errors(size: float, draw: int) -> dict[str, float]:
     grid = _plugged(size, draw)
-    found, length = flow.unit_flow(Space(grid, 1), RATIO), PLUG[1] - PLUG[0]
+    found, length = flow.unit_flow(Space(grid, 1), RATIO), 2 * PLUG
     exact = sum(poiseuille.head_loss(part, WIDTH, 1.0, viscosity)
                 for part, viscosity in ((ENDS[1] - ENDS[0] - length, 1.0), (length, RATIO)))
     return {"velocity": norms.l2_error(grid.points, grid.triangles, found.velocity, _velocity),
@@ -149,8 +148,7 @@ def channels(order: int):
 @cache
 def _curved_plug() -> Mesh:
     """A channel of six-node triangles with biomass from wall to wall."""
-    return curved(meshes.channel(CURVED_ENDS, WIDTH, 8.0, lambda x, y: np.abs(x) < HALF, across=(-HALF, HALF), seed=3),
-                  None)
+    return curved(meshes.plug(CURVED_ENDS, WIDTH, HALF, 8.0, seed=3), None)
 
 
 def _channel(order: int, ratio: float, interface: str) -> list[Check]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from repro.fem import elements
 from repro.fem.assembly import saddle_blocks
-from repro.fem.mesh import Mesh, curved
+from repro.fem.mesh import Mesh
 from repro.fem.space import Space
 from repro.model import flow, pore
 from repro.scene import parse_scene
@@ -32,14 +32,13 @@ REFINED = {1: 1.0, 2: 0.5, 3: 0.4}
 @cache
 def _half_disc(radius: float, order: int = 1, lean: float = 0.0, reach: float = 75.0) -> Space:
     """Functions of an order on the mesh around a half-disc that is sheared by ``lean``."""
-    grid = meshes.half_disc(radius, REFINED[order], (-reach, reach), WIDTH, geometry=min(order, 2), lean=lean)
-    return Space(grid, order)
+    return Space(meshes.half_disc(radius, REFINED[order], (-reach, reach), WIDTH, geometry=min(order, 2), lean=lean),
+                 order)
 
 
 @cache
 def _plugged(order: int) -> Space:
-    grid = meshes.cut(ENDS, WIDTH, 3.1 if order == 1 else 6.0, lambda x, y: np.abs(x) < 30, across=(-30.0, 30.0))
-    return Space(grid if order == 1 else curved(grid, None), order)
+    return meshes.space_on(meshes.plug(ENDS, WIDTH, 30.0, 3.1 if order == 1 else 6.0, meshes.cut), order)
 
 
 @case("flow-sections", kind="property", norm="largest relative error of the flux through 25 sections",

@@ -148,35 +148,16 @@ SECOND = "linear elements: second order"
 LAYER = "3/2 from a layer of one element at the rim, where the stabilisation wants dP/dn = 0"
 
 
-def coefficients(top: float) -> tuple[float, float, float]:
-    """theta = a + c (R / R_0)^2: a third of ``top`` in the middle, ``top`` on the rim; a, c, R_0."""
-    return top / 3, 2 * top / 3, bodies.RADIUS
-
-
-def theta(top: float):
-    """theta(X, Y)."""
-    inner, more, outer = coefficients(top)
-    return lambda x, y: inner + more * (x**2 + y**2) / outer**2
-
-
-def exact_place(top: float):
-    """Place (..., 2) of what was at X, Y."""
-    def place(x, y):
-        R = np.hypot(x, y)
-        return np.stack([x, y], axis=-1) * (neo_hookean.cylinder_radius(R, *coefficients(top)) / R)[..., None]
-    return place
-
-
-def exact_pressure(top: float):
-    """P over mu_L of what was at X, Y."""
-    return lambda x, y: neo_hookean.cylinder_pressure(np.hypot(x, y).ravel(), *coefficients(top)).reshape(np.shape(x))
+def exact(top: float) -> bodies.HalfCylinder:
+    """theta: a third of ``top`` in the middle, ``top`` on the rim."""
+    return bodies.HalfCylinder(top / 3, top)
 
 
 @cache
 def cylinder(refinement: float, top: float, kind: int = 1):
     """(body, nodes of the arc, equilibrium)."""
     body, rim = bodies.half_disc(refinement, kind)
-    return body, rim, bodies.grown(body, body.field(theta(top)))
+    return body, rim, bodies.grown(body, body.field(exact(top).theta))
 
 
 def errors(refinement: float, top: float, kind: int = 1) -> dict[str, float]:
@@ -184,9 +165,9 @@ def errors(refinement: float, top: float, kind: int = 1) -> dict[str, float]:
     body, rim, found = cylinder(refinement, top, kind)
     start, end = (np.hypot(*places[rim].T) for places in (body.reference, found.position))
     return {"size": bodies.size(body),
-            "outline": np.abs(end / neo_hookean.cylinder_radius(start, *coefficients(top)) - 1).max(),
-            "place": bodies.place_error(body, found.position, exact_place(top)),
-            "pressure": bodies.pressure_error(body, found.pressure, exact_pressure(top))}
+            "outline": np.abs(end / exact(top).radius(start) - 1).max(),
+            "place": bodies.place_error(body, found.position, exact(top).place),
+            "pressure": bodies.pressure_error(body, found.pressure, exact(top).pressure)}
 
 
 CYLINDER_NORM = ("largest relative error of the outline's radius; L2 of places and of the pressure over the body at "
@@ -218,7 +199,7 @@ def _outcome(top: float) -> Outcome:
 def _outlines(top: float) -> Profile:
     body, rim, found = cylinder(REFINEMENTS[1][0], top)
     rim = rim[np.argsort(body.reference[rim, 0])]
-    x, y = exact_place(top)(*body.reference[rim].T).T
+    x, y = exact(top).place(*body.reference[rim].T).T
     return Profile(f"outline, theta to {top:g}", "x (um)", "y (um)",
                    (("ours", "ours", *found.position[rim].T), ("closed form", "exact", x, y)))
 
@@ -247,6 +228,6 @@ def _pressure_profile(top: float, kind: int = 1) -> Profile:
     body, _, found = cylinder(REFINEMENTS[kind][1], top, kind)
     R, line = np.hypot(*body.reference[:body.corners].T), np.linspace(0.01, bodies.RADIUS, 100)
     order = np.argsort(R)
-    exact = neo_hookean.cylinder_pressure(line, *coefficients(top))
+    pressure = exact(top).pressure(line, 0 * line)
     return Profile(f"pressure, theta to {top:g}, {bodies.WORDS[kind]}", "R (um)", "P / mu_L",
-                   (("nodes", "points", R[order], found.pressure[order]), ("closed form", "exact", line, exact)))
+                   (("nodes", "points", R[order], found.pressure[order]), ("closed form", "exact", line, pressure)))

@@ -56,7 +56,8 @@ def _uneven(x, y):
     return FRONT * along * (1 + 0.5 * (y / bodies.RADIUS) ** 2)
 
 
-PROBLEMS = {"half-cylinder": Problem(closed_forms.theta(2000.0), 2000.0, None), "uneven": Problem(_uneven, FRONT, None),
+PROBLEMS = {"half-cylinder": Problem(closed_forms.exact(2000.0).theta, 2000.0, None),
+            "uneven": Problem(_uneven, FRONT, None),
             "between walls": Problem(_uneven, FRONT, CONTACT)}
 
 
@@ -183,7 +184,8 @@ def _own(level: int) -> dict[str, float]:
     """Size of the reference's elements, and its errors to the closed form."""
     where, weight = _points()
     place, pressure = trusted("half-cylinder", level).at(*where)
-    exact, level_of = closed_forms.exact_place(2000.0)(*where), closed_forms.exact_pressure(2000.0)(*where)
+    known = closed_forms.exact(2000.0)
+    exact, level_of = known.place(*where), known.pressure(*where)
     return {"size": bodies.RADIUS / RINGS[level], "place": bodies.relative(place, exact, weight[..., None]),
             "pressure": bodies.relative(pressure / MODULUS, level_of, weight)}
 

@@ -19,7 +19,7 @@ from repro.results import M_PER_D
 from verification.hard import common
 from verification.hard.common import DRIVE, EFFLUENTS, FIXED, SHAPE, TOLERANCE, HardCase, Run
 from verification.kernel.case import Check, at_least, at_most, between
-from verification.problems import meshes
+from verification.problems import meshes, runs
 
 BOTH = ("acceptor", "donor")
 
@@ -171,17 +171,10 @@ def saturated(preset: str) -> list:
 
 def exponential(found: Run) -> list[Check]:
     """Biomass over that at the start against (9)-(10) at the supply, and at the least concentrations of the run."""
-    law, both = found.scene.kinetics, found.scene.substrates
     time = found.last["time_h"]
-
-    def rates(acceptor, donor):
-        m_a, m_d = acceptor / (acceptor + both.acceptor.half_saturation), donor / (donor + both.donor.half_saturation)
-        return (m_a * (law.maximum_utilization_rate * law.yield_coefficient * m_d - law.decay_coefficient),
-                m_a * law.decay_coefficient * (1 - law.degradable_fraction))
-
-    rise, left = rates(both.acceptor.supply, both.donor.supply)
-    least, _ = rates(*(min(line[f"{name}_min_mg_per_L"] for line in found.rows) for name in BOTH))
-    most = np.exp(rise * time) + left / rise * np.expm1(rise * time)
+    least, _ = runs.growth_rates(found.scene, *(min(line[f"{name}_min_mg_per_L"] for line in found.rows)
+                                                for name in BOTH))
+    most = runs.mass_after(found.scene, time)
     grown = found.last["aggregate_area_um2"] / found.rows[0]["aggregate_area_um2"]
     return [between("area over that of the seed", grown, np.exp(least * time), most,
                     "rates at the least C of the run, and at the supply")]
@@ -345,7 +338,7 @@ SECTIONS = np.array([-55.0, -30.0, -21.0, -19.0, -10.0, 0.0, 7.0, 19.0, 21.0, 40
 
 def plugged(preset: str, size: float) -> list:
     """The stage alone: biomass from wall to wall, lambda = 2000, elements of W / 4 and W / 7."""
-    grid = meshes.channel(ENDS, WIDTH, size, lambda x, y: np.abs(x) < PLUG, across=(-PLUG, PLUG), seed=3)
+    grid = meshes.plug(ENDS, WIDTH, PLUG, size, seed=3)
     exact = 12 / WIDTH**2 * (ENDS[1] - ENDS[0] + 1999 * 2 * PLUG)
     space = common.space_on(grid, common.scene("wide", preset))
     found = flow.unit_flow(space, 2000.0)

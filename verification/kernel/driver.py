@@ -58,10 +58,11 @@ def load() -> None:
 
 
 def run_all(ids: list[str], jobs: int) -> list[case.Result]:
-    """Results in the order of ``ids``, several cases side by side; a line each as it ends."""
+    """Results in the order of ``ids``, several cases side by side, those of whole runs, which are the last and take
+    longest, first; a line each as it ends."""
     results = {}
     with ProcessPoolExecutor(max_workers=jobs) as pool:
-        for future in as_completed([pool.submit(_run_one, i) for i in ids]):
+        for future in as_completed([pool.submit(_run_one, i) for i in reversed(ids)]):
             result = future.result()
             results[result.id] = result
             print(f"{result.verdict:12} {result.id:28} {result.seconds:6.1f} s", file=sys.stderr, flush=True)

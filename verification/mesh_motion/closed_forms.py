@@ -14,7 +14,7 @@ import numpy as np
 
 from reference import quadratic_mesh_motion, sliding_waves
 from repro.fem import mesher, outline
-from repro.fem.mesh import Mesh, curved
+from repro.fem.mesh import Mesh
 from repro.fem.sizing import ACROSS_AGGREGATE, Sizing
 from repro.fem.space import Space
 from repro.model import mesh_motion
@@ -49,8 +49,7 @@ LINEAR = "the field is linear: round-off"
             "fluid beside them linearly; a plug that rests moves nothing; on straight triangles and on curved ones",
       mutants=("walls-held", "outlet-moves", "interface-slips", "middles-left-behind"), over=EITHER, ways="3")
 def plug(geometry: int):
-    grid = _nodes(meshes.channel(ENDS, WIDTH, 3.0, lambda x, y: np.abs(x) < HALF, across=(-HALF, HALF), seed=1),
-                  geometry)
+    grid = _nodes(meshes.plug(ENDS, WIDTH, HALF, 3.0, seed=1), geometry)
     layer = _nodes(meshes.channel(ENDS, WIDTH, 3.0, lambda x, y: y < 12.0, along=(12.0,), seed=2), geometry)
     x, y = grid.points[:, 0], layer.points[:, 1]
     slid = np.interp(x, [ENDS[0], -HALF, HALF, ENDS[1]], [0.0, 2.0, 5.0, 0.0])
@@ -64,7 +63,7 @@ def plug(geometry: int):
 
 def _nodes(straight: Mesh, geometry: int) -> Mesh:
     """With nodes in the middles of edges where triangles are to be curved."""
-    return straight if geometry == 1 else curved(straight, None)
+    return meshes.space_on(straight, geometry).mesh
 
 
 def _error(grid: Mesh, displacement: np.ndarray, gamma: float, nodes=slice(None)) -> float:
@@ -121,8 +120,7 @@ def waves(geometry: int):
 
 
 def _bent(size: float, seed: int, geometry: int = 1) -> Mesh:
-    return _nodes(meshes.channel((-END, END), NARROW, size, lambda x, y: np.abs(x) < FACE, across=(-FACE, FACE),
-                                 seed=seed), geometry)
+    return _nodes(meshes.plug((-END, END), NARROW, FACE, size, seed=seed), geometry)
 
 
 def _wave(x, y, gamma: float) -> np.ndarray:

@@ -6,17 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from repro.fem import mesher, outline
+from repro.fem import outline
 from repro.fem.outline import Outline
-from repro.fem.sizing import ACROSS_AGGREGATE, Sizing
+from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.fem.space import Space
 from repro.march import updates
 from repro.model import contact, pore, remeshing
 from repro.model.pore import Pore
 from repro.scene import load_scene
-from verification.problems import pairs
+from verification.problems import meshes, pairs
 
-WIDTH, FILM = 50.0, 2.0
+WIDTH = 50.0
 #: X_m of Table 1, mg/L.
 DENSITY = 3e4
 #: Orders of the elements, by the names that scenes have for them.
@@ -37,7 +37,7 @@ def half_disc(radius: float, refinement: float = 1.0, order: int = 1) -> Outline
 def placed(around: Outline, refinement: float, density=lambda x, y: DENSITY + 0 * x, ends=(-75.0, 75.0),
            order: int = 1) -> Pore:
     """An aggregate at t = 0 with X_A = density(x, y), on a mesh of its own."""
-    grid, around = mesher.generate(around, ends, Sizing(WIDTH, refinement, FILM), around.geometry)
+    grid, around = meshes.around(around, refinement, ends, WIDTH)
     space = Space(grid, order)
     active = density(*places(space)) * space.reaction.dx
     body = pore.material(space, grid.points[grid.body])

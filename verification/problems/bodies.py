@@ -13,11 +13,12 @@ from functools import cache
 
 import numpy as np
 
-from repro.fem import elements, mesher
+from reference import neo_hookean
+from repro.fem import elements
 from repro.fem.mesh import Mesh, curved
 from repro.fem.outline import FREE
 from repro.fem.outline import half_disc as half_disc_outline
-from repro.fem.sizing import ACROSS_AGGREGATE, Sizing
+from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.fem.space import Space
 from repro.model import growth, pore
 from verification.problems import meshes
@@ -91,8 +92,8 @@ def half_disc(refinement: float, kind: int = 1) -> tuple[Supported, np.ndarray]:
     """(body, nodes of its arc without the corners (M,)): a half-disc on the wall on which it slides, its middle fixed,
     in a mesh of the package's own."""
     geometry = min(kind, 2)
-    outline = half_disc_outline(RADIUS, ACROSS_AGGREGATE * refinement, geometry)
-    grid, outline = mesher.generate(outline, (-ENDS[kind], ENDS[kind]), Sizing(50.0, refinement, 2.0), geometry)
+    seed = half_disc_outline(RADIUS, ACROSS_AGGREGATE * refinement, geometry)
+    grid, outline = meshes.around(seed, refinement, (-ENDS[kind], ENDS[kind]), 50.0)
     rim, free = grid.topology.body_loop, outline.wall == FREE
     held = np.zeros((len(grid.body), 2), bool)
     held[rim[outline.fixed], 0] = True
@@ -120,6 +121,33 @@ def _bent(grid: Mesh, most: float, seed: int) -> Mesh:
     points = grid.points.copy()
     points[inner] += np.random.default_rng(seed + 1).uniform(-most, most, (len(inner), 2))
     return grid.moved(points).checked()
+
+
+@dataclass(frozen=True)
+class HalfCylinder:
+    """Closed forms of a half-disc of RADIUS that grows by theta = inner + (outer - inner) (R / RADIUS)^2."""
+
+    inner: float
+    outer: float
+
+    def theta(self, x, y):
+        """Of what was at X, Y."""
+        return self.inner + (self.outer - self.inner) * (x**2 + y**2) / RADIUS**2
+
+    def radius(self, R):
+        """um, of what was at R."""
+        return neo_hookean.cylinder_radius(R, self.inner, self.outer - self.inner, RADIUS)
+
+    def place(self, x, y) -> np.ndarray:
+        """(..., 2) um."""
+        R = np.maximum(np.hypot(x, y), 1e-12)
+        return np.stack([x, y], axis=-1) * (self.radius(R) / R)[..., None]
+
+    def pressure(self, x, y) -> np.ndarray:
+        """P over mu_L."""
+        R = np.hypot(x, y)
+        flat = neo_hookean.cylinder_pressure(R.ravel(), self.inner, self.outer - self.inner, RADIUS)
+        return flat.reshape(np.shape(R))
 
 
 def size(held: Supported) -> float:

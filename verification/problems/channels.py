@@ -13,7 +13,7 @@ from functools import cache
 import numpy as np
 
 from repro.fem import elements, transfer
-from repro.fem.mesh import Mesh, curved
+from repro.fem.mesh import Mesh
 from repro.fem.space import Space
 from repro.model import flow, transport
 from repro.model.kinetics import Sink
@@ -64,15 +64,10 @@ def following(area: float, size: float, sample: int, ends, width: float, is_biom
     raise ValueError(f"size {size:g}, sample {sample}: no mesh follows the sides of the biomass")
 
 
-def space_on(straight: Mesh, order: int) -> Space:
-    """Functions of an order on a straight mesh: those of order 2 and 3 on its triangles as curved ones."""
-    return Space(straight if order == 1 else curved(straight, None), order)
-
-
 @cache
 def spaced(size: float, sample: int, order: int = 1, ends=CROSSED, slab=(0.0, SLAB)) -> Space:
     """Functions of an order on one of the meshes of a size."""
-    return space_on(meshed(size, sample, ends, slab), order)
+    return meshes.space_on(meshed(size, sample, ends, slab), order)
 
 
 def carrying(space: Space, velocity: np.ndarray, mean: float) -> flow.Flow:

@@ -18,6 +18,7 @@ from scipy.spatial import Delaunay
 
 from repro.fem import mesher, outline, sizing
 from repro.fem.mesh import Mesh, curved, triangle_areas
+from repro.fem.space import Space
 
 #: Displacement of the lattice's nodes, and the least distance of a lattice node from a line, over the element size.
 JITTER, CLEARANCE = 0.22, 0.45
@@ -64,13 +65,32 @@ def channel(ends, width: float, size: float, is_biomass, *, across=(), along=(),
     return Mesh.of(points, triangles, is_biomass(*middle.T), np.empty(0, int), width, tuple(map(float, ends)))
 
 
+def plug(ends, width: float, half: float, size: float, make=channel, seed: int = 0) -> Mesh:
+    """Biomass from wall to wall for |x| < half (um); make: :func:`channel` or :func:`cut`."""
+    return make(ends, width, size, lambda x, y: np.abs(x) < half, across=(-half, half), seed=seed)
+
+
+def space_on(straight: Mesh, order: int) -> Space:
+    """Functions of an order on a straight mesh: those of order 2 and 3 on its triangles as curved ones."""
+    return Space(straight if order == 1 else curved(straight, None), order)
+
+
 def half_disc(radius: float, refinement: float, ends, width: float, *, geometry: int = 1, lean: float = 0.0) -> Mesh:
     """The package's mesh around a half-disc on the lower wall, straight (geometry 1) or curved (2), sheared by
     ``lean``; a film of 2 um is the thinnest that is resolved."""
     seed = outline.half_disc(radius, sizing.ACROSS_AGGREGATE * refinement, geometry)
     points = seed.points + lean * seed.points[:, [1]] * [1.0, 0.0]
-    sheared = outline.Outline(points, seed.wall, seed.fixed, points, geometry)
-    return mesher.generate(sheared, ends, sizing.Sizing(width, refinement, 2.0), geometry)[0]
+    return around(outline.Outline(points, seed.wall, seed.fixed, points, geometry), refinement, ends, width)[0]
+
+
+def around(seed: outline.Outline, refinement: float, ends, width: float) -> tuple[Mesh, outline.Outline]:
+    """The package's mesh around an outline, and the outline as its edges are split."""
+    return mesher.generate(seed, ends, sizing.Sizing(width, refinement, 2.0), seed.geometry)
+
+
+def half_disc_space(radius: float, refinement: float, ends, width: float, order: int) -> Space:
+    """Functions of an order on the package's mesh around a half-disc."""
+    return Space(half_disc(radius, refinement, ends, width, geometry=min(order, 2)), order)
 
 
 #: The least distance of a node from the curve, over the element size: over a half, as edges on the curve are not quite

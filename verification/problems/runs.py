@@ -102,3 +102,20 @@ def section_means(now: Pore, solved: Solved, x: np.ndarray, points: int = 16) ->
     where = np.column_stack([np.repeat(x, points), np.tile(y, len(x))])
     values = pairs.sample(now.space, np.column_stack([found.acceptor, found.donor]), where)
     return np.einsum("kpm,p->mk", values.reshape(len(x), points, 2), 0.5 * weight)
+
+
+def growth_rates(scene: Scene, acceptor: float | None = None, donor: float | None = None) -> tuple[float, float]:
+    """Rates (1/h) at which X_A grows and leaves X_I, (9)-(10), at concentrations (mg/L), those of the supply by
+    default: written down anew."""
+    law, both = scene.kinetics, scene.substrates
+    given = ((both.acceptor.supply if acceptor is None else acceptor, both.acceptor.half_saturation),
+             (both.donor.supply if donor is None else donor, both.donor.half_saturation))
+    m_a, m_d = (value / (value + half) for value, half in given)
+    return (m_a * (law.maximum_utilization_rate * law.yield_coefficient * m_d - law.decay_coefficient),
+            m_a * law.decay_coefficient * (1 - law.degradable_fraction))
+
+
+def mass_after(scene: Scene, time: float) -> float:
+    """(X_A + X_I) over that at the start, after hours at the supply: an exponential."""
+    rise, left = growth_rates(scene)
+    return float(np.exp(rise * time) + left / rise * np.expm1(rise * time))

@@ -21,14 +21,11 @@ import numpy as np
 
 from reference import channel_bvp, channel_fipy
 from reference import diffusion_reaction_pypde as pypde
-from repro.fem.mesher import generate
-from repro.fem.outline import half_disc as half_disc_outline
-from repro.fem.sizing import ACROSS_AGGREGATE, Sizing
 from repro.fem.space import Space
 from repro.model import gear, transport
 from repro.model.kinetics import Sink
 from verification.kernel.case import Check, Outcome, Profile, at_most, case, refine, study
-from verification.problems import norms
+from verification.problems import meshes, norms
 from verification.problems.channels import (
     CROSSED,
     EXPECTED,
@@ -51,7 +48,6 @@ from verification.problems.channels import (
     problem,
     rates,
     sample,
-    space_on,
     spaced,
     speed_of,
     steady,
@@ -249,11 +245,10 @@ def _pypde(cell: float, density: float, shape: str):
 @cache
 def _spaced(cell: float, number: int, shape: str, order: int = 1) -> Space:
     if shape == "block":
-        return space_on(following(2 * SIDE**2, cell, number, (-BOX, BOX), BOX,
-                                  lambda x, y: (np.abs(x) < SIDE) & (y < SIDE), across=(-SIDE, SIDE), along=(SIDE,)),
-                        order)
-    outline = half_disc_outline(SIDE, ACROSS_AGGREGATE * DISC[cell], min(order, 2))
-    return Space(generate(outline, (-BOX, BOX), Sizing(BOX, DISC[cell], 2.0), min(order, 2))[0], order)
+        return meshes.space_on(following(2 * SIDE**2, cell, number, (-BOX, BOX), BOX,
+                                         lambda x, y: (np.abs(x) < SIDE) & (y < SIDE), across=(-SIDE, SIDE),
+                                         along=(SIDE,)), order)
+    return meshes.half_disc_space(SIDE, DISC[cell], (-BOX, BOX), BOX, order)
 
 
 def _ours(space: Space, density: float, where: np.ndarray, transient: bool = False) -> np.ndarray:

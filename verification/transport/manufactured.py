@@ -11,14 +11,13 @@ from functools import cache
 import numpy as np
 
 from reference import manufactured_transport
-from repro.fem import elements, mesher
-from repro.fem.outline import half_disc
-from repro.fem.sizing import ACROSS_AGGREGATE, ACROSS_PORE, Sizing
+from repro.fem import elements
+from repro.fem.sizing import ACROSS_PORE
 from repro.fem.space import Space
 from repro.model import flow, transport
 from repro.model.kinetics import Sink
 from verification.kernel.case import Outcome, Profile, case, refine, study
-from verification.problems import norms
+from verification.problems import meshes, norms
 from verification.problems.channels import (
     NAMES,
     SCENE,
@@ -65,9 +64,7 @@ def _expected(order: int, peclet: float) -> dict[str, object]:
 @cache
 def _spaced(refinement: float, number: int, order: int) -> Space:
     about = refinement * NEAR ** (number - REFINEMENTS[order][refinement] // 2)
-    geometry = min(order, 2)
-    outline = half_disc(RADIUS, ACROSS_AGGREGATE * about, geometry)
-    return Space(mesher.generate(outline, ENDS, Sizing(WIDTH, about, 2.0), geometry)[0], order)
+    return meshes.half_disc_space(RADIUS, about, ENDS, WIDTH, order)
 
 
 @cache
