@@ -38,14 +38,15 @@ API = ROOT / "repro" / "__init__.py"
 
 
 def reached(folders: list[Path]) -> set[Path]:
-    """The files of folders, and all of this project that these import, directly or not."""
+    """The files of folders, and all of this project that these import, directly or not, but for what the kernel does:
+    it runs cases, and no case depends on it."""
     found: set[Path] = set()
     waiting = [path for folder in folders for path in folder.rglob("*.py")]
     while waiting:
         path = waiting.pop()
         if path not in found:
             found.add(path)
-            waiting += [] if path == API else imported(path)
+            waiting += [] if path == API or path.parent == Path(__file__).parent else imported(path)
     return found
 
 
@@ -268,7 +269,7 @@ def code() -> str:
     """16 hexadecimal digits that stand for the cases, the references, and what they reach of the code."""
     digest = hashlib.sha256()
     cases = [ROOT / "reference", *(ROOT / "verification" / stage for stage in STAGES)]
-    known = (ROOT / "repro", *cases)
+    known = (ROOT / "repro", ROOT / "verification" / "problems", *cases)
     for path in sorted(path for path in reached(cases) if any(folder in path.parents for folder in known)):
         digest.update(path.relative_to(ROOT).as_posix().encode() + path.read_bytes())
     return digest.hexdigest()[:16]
