@@ -14,10 +14,10 @@ from repro.errors import SimulationError, TransportError
 from repro.scene import load_scene
 from repro.scene.units import SceneError
 from verification import hard_cases
-from verification.case import Check, Result, at_least, at_most, between
-from verification.hard import common, judge, registered, runs
+from verification.hard import common, judge, runs
 from verification.hard.common import PRESETS, HardCase
 from verification.hard.judge import REFUSED, RIGHT, WRONG
+from verification.kernel.case import Check, Result, at_least, at_most, between
 
 GOOD, BAD = at_most("good", 0.5, 1.0, ""), at_most("bad", 2.0, 1.0, "")
 KNOWN = {case.number: case for case in hard_cases.CASES}
@@ -122,12 +122,13 @@ def test_the_matrix_is_told_and_written(tmp_path, monkeypatch):
     cells = [judge.run_cell(a_case([RIGHT, REFUSED]), preset) for preset in PRESETS]
     monkeypatch.setattr(hard_cases, "RECORD", tmp_path / "report" / "hard_cases.json")
     hard_cases.record([Result("hard-99", judge.outcome(cells), "", 0.0), Result("other", judge.Outcome(), "", 0.0)])
-    found = json.loads(hard_cases.RECORD.read_text())
-    (line,) = found["cases"]
-    assert line["number"] == 99 and set(line["cells"]) == set(PRESETS) and found["machine"]
-    assert line["cells"]["fast"]["verdict"] == REFUSED and not line["cells"]["fast"]["accepted"]
-    assert line["cells"]["paper"]["accepted"] and "try another mesh" in line["cells"]["paper"]["message"]
-    assert line["cells"]["fast"]["checks"][0]["quantity"] == "good"
+    kept, live = (json.loads((hard_cases.RECORD.parent / folder / hard_cases.RECORD.name).read_text())
+                  for folder in (".", "live"))
+    (line,), (measured,) = kept["cases"], live["cases"]
+    assert line["number"] == 99 and set(line["cells"]) == set(PRESETS) and live["machine"]
+    assert line["cells"]["fast"] == {"verdict": REFUSED, "accepted": False} and "machine" not in kept
+    assert line["cells"]["paper"]["accepted"] and "try another mesh" in measured["cells"]["paper"]["message"]
+    assert measured["cells"]["fast"]["checks"][0]["quantity"] == "good"
     told = hard_cases.matrix(cells)
     assert "refused!" in told and "99 fast: refused 1: try another mesh" in told
 
@@ -185,9 +186,9 @@ def test_a_run_of_any_parameters_ends_right_or_refuses(shares, preset):
 
 
 def test_every_hard_case_is_a_verification_case():
-    from verification import case
+    from verification.kernel import case
     assert {one.full_id for one in hard_cases.CASES} == {id for id, c in case.CASES.items() if c.stage == "hard"}
-    assert "presets" in registered.NORM
+    assert "presets" in judge.NORM
 
 
 def test_every_case_goes_from_process_to_process():

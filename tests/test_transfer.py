@@ -20,7 +20,7 @@ from repro.scene import SceneError, load_scene
 from tests import oracles
 from tests.strategies import ORDERS, between, body_of, lumped, meshed, meshes, scene, seed, space_of
 from tests.test_outline import wavy
-from verification.reprojection import grids
+from verification.problems import pairs
 
 SEED = seed(20.0, 0.7)
 seeds = st.integers(0, 2**32 - 1)
@@ -333,7 +333,7 @@ def at_reaction(space):
     return (space.points[pieces.cells].swapaxes(1, 2) @ pieces.values.T).swapaxes(0, 1)
 
 
-OLD, NEW = grids.grid(6.0, 1), grids.grid(5.0, 2)
+OLD, NEW = pairs.grid(6.0, 1), pairs.grid(5.0, 2)
 
 
 def mass(mesh, field) -> float:
@@ -356,7 +356,7 @@ def test_a_bounded_transfer_keeps_mass_and_bounds(seed, share, scale, level):
     before = scale * (random_field(seed, share) + level)
     after = transfer.project_bounded(*OLD, before[:, None], *NEW)[:, 0]
     assert after.min() >= before.min() and after.max() <= before.max()
-    assert abs(mass(NEW, after) - mass(OLD, before)) <= (1e-12 * np.abs(before).max() + TINY) * grids.AREA
+    assert abs(mass(NEW, after) - mass(OLD, before)) <= (1e-12 * np.abs(before).max() + TINY) * pairs.AREA
 
 
 def test_what_is_far_away_plays_no_part_in_a_bounded_transfer():

@@ -1,14 +1,16 @@
 """The verification can fail: verdicts follow from numbers, orders are judged on both sides."""
 import math
+import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from reference import channel_bvp, channel_fipy, taylor_hood
-from verification import __main__ as driver
-from verification import case, meshes, norms, report
-from verification.case import Check, Outcome, Result, at_least, at_most, between
-from verification.convergence import Study, study
+from repro.fem.space import Space
+from verification.kernel import case, driver, matrix, report
+from verification.kernel.case import Check, Outcome, Result, Study, at_least, at_most, between, study
+from verification.problems import meshes, norms
 
 SIZES = 0.5 ** np.arange(4)
 
@@ -94,6 +96,87 @@ def test_every_stage_has_cases_and_each_says_what_must_break_it():
     assert all(c.claim and c.norm and c.mutants and c.kind in case.KINDS for c in case.CASES.values())
 
 
+def test_a_case_is_called_for_each_of_its_variants_whose_label_ends_its_names():
+    """Mutants: the first variant alone; names without their labels; a list within a list that is left out."""
+    curve = case.Profile("picture", "x", "y", ())
+    chosen = case.Case("x", "flow", "c", "exact", "n", ("m",), False,
+                       lambda value: ([at_most("q", value, 1.5, "")], _of_order(2.0), (curve for _ in range(2))),
+                       {"one": (1.0,), "two": (2.0,)})
+    found = case.run(chosen).outcome
+    assert [part.quantity for part in found.checks] == ["q, one", "q, two"]
+    assert [part.holds for part in found.checks] == [True, False] and len(found.studies) == 2
+    assert [part.title for part in found.profiles] == ["picture, one", "picture, one", "picture, two", "picture, two"]
+
+
+@pytest.mark.parametrize("labels, more, ways", [
+    (("linear", "cubic"), "", ("1", "3")), (("order 2, traction",), "", ("2",)),
+    (("straight", "curved"), "3", ("1", "2", "3")), (("R = 5 um, quadratic",), "paper", ("2", "paper")),
+    (("fast", "accurate, cubic"), "2", ("2", "3", "fast", "accurate")),
+])
+def test_labels_tell_with_what_a_case_runs(labels, more, ways):
+    assert case._ways("x", labels, more) == ways
+
+
+def test_a_way_that_is_none_is_refused():
+    with pytest.raises(ValueError, match="x: 4 are none of 1, 2, 3, paper, fast, accurate"):
+        case._ways("x", (), "4")
+
+
+@pytest.mark.parametrize("id", ["flow-sections", "growth-homogeneous", "reprojection-mass", "coupling-stiffness"])
+def test_a_case_runs_with_the_orders_that_it_says(id, monkeypatch):
+    """Mutant: an order that is said and not run."""
+    driver.load()
+    orders, made = set(), Space.__init__
+
+    def watched(self, *given):
+        made(self, *given)
+        orders.add(str(self.order))
+
+    monkeypatch.setattr(Space, "__init__", watched)
+    _forget()
+    case.run(case.CASES[id])
+    assert orders == {way for way in case.CASES[id].ways if way in matrix.ORDERS}
+
+
+def _forget():
+    """Empty what the cases keep."""
+    rooms = [module for name, module in sys.modules.items() if name.startswith("verification.")]
+    for kept in [value for room in rooms for value in vars(room).values() if hasattr(value, "cache_clear")]:
+        kept.cache_clear()
+
+
+def test_what_is_verified_by_what_has_no_orphan_and_is_written():
+    """Every case, mutant, reference and claim stands in a line of the modules, and no line is without cases. Mutants: a
+    module of the table without cases; a reference that none uses; a page that was not written anew."""
+    driver.load()
+    assert matrix.orphans() == [] and matrix.unexplained() == []
+    assert matrix.FILE.read_text(encoding="utf-8") == matrix.text()
+
+
+def test_an_orphan_is_told(monkeypatch):
+    driver.load()
+    lost = replace(case.CASES["flow-plug"], mutants=("none",), ways=("1",), because="")
+    monkeypatch.setitem(case.CASES, "flow-plug", lost)
+    assert matrix.orphans() == ["case flow-plug"] and matrix.unexplained() == ["flow-plug"]
+
+
+def test_what_is_round_off_or_another_machines_is_not_committed():
+    """Mutants: all digits; the value of a number that is round-off."""
+    assert at_most("x", 3e-13, 1e-9, "").told == "" and at_most("x", 0.012345, 0.1, "").told == "0.01"
+    assert between("x", 1.0, 0.123456, 2.0, "").accepted == "0.123 to 2"
+    assert _of_order(2.0).told == "order 2.0, 2.0, 2.0"
+    driver.load()
+    (line,) = result(at_most("x", 3e-13, 1e-9, "why")).outcome.lines()
+    assert line == ("x", "at most 1e-09", "why", True)
+
+
+def test_committed_pages_are_short():
+    """An index, and a page a stage that a browser shows whole."""
+    sizes = {path.name: path.stat().st_size for path in report.FOLDER.glob("*.md")}
+    assert {f"{stage}.md" for stage in case.STAGES} | {"REPORT.md", "mutants.md", "matrix.md"} == {*sizes}
+    assert sizes.pop("REPORT.md") <= 60_000 and max(sizes.values()) <= 40_000
+
+
 def test_a_case_is_registered_once():
     driver.load()
     with pytest.raises(ValueError, match="flow-plug"):
@@ -113,7 +196,7 @@ def test_selection_by_stage_and_by_id():
 def test_a_quick_case_runs_and_passes(id):
     driver.load()
     found = case.run(case.CASES[id])
-    assert found.holds, report.table([found])
+    assert found.holds, report.terminal([found])
 
 
 def test_a_mutant_is_caught(monkeypatch):
@@ -144,9 +227,9 @@ def test_the_exit_status_is_the_verdict(monkeypatch, capsys):
 def test_the_report_says_what_fell_short_and_holds_no_time():
     driver.load()
     found = [result(at_most("quantity A", 2.0, 1.0, "theory"))]
-    assert "quantity A: 2; expected at most 1 (theory)" in report.table(found)
-    text = report.markdown(found)
-    assert "FALLS SHORT" in text and "| quantity A | 2 | at most 1 | theory | NO |" in text
+    assert "quantity A: 2; expected at most 1 (theory)" in report.terminal(found)
+    text = report.texts(found)[f"{case.CASES['flow-plug'].stage}.md"]
+    assert "FALLS SHORT" in text and "| quantity A (2) | at most 1 | theory | NO |" in text
     assert "seconds" not in text and "1.0 s" not in text
 
 

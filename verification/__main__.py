@@ -1,71 +1,9 @@
-"""Run the verification: ``python -m verification [STAGE ...]``. Exit status 1 if any case falls short.
+"""Run the verification: ``python -m verification``, see :mod:`verification.kernel.driver`."""
 
-A whole run writes ``verification/report``; a run of some stages, or a fast one, prints its table only.
-"""
-
-from __future__ import annotations
-
-import argparse
-import os
 import sys
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from importlib import import_module
 
-from verification import case, report
-
-
-def main(arguments: list[str] | None = None) -> int:
-    """Entry point; returns the exit status."""
-    chosen = _parser().parse_args(arguments)
-    results = run_all(selected(chosen.stages, chosen.case, chosen.fast), chosen.jobs)
-    print(report.table(results))
-    if not (chosen.stages or chosen.case or chosen.fast):
-        print(f"report: {report.write(results)}")
-    return 0 if results and all(result.holds for result in results) else 1
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m verification", description=__doc__.splitlines()[0])
-    parser.add_argument("stages", nargs="*", metavar="STAGE", choices=[*case.STAGES, []], default=[],
-                        help=f"{', '.join(case.STAGES)}; all by default")
-    parser.add_argument("--case", action="append", default=[], metavar="ID", help="this case alone; may be repeated")
-    parser.add_argument("--fast", action="store_true", help="without the cases that are marked as slow")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes; one a core by default")
-    return parser
-
-
-def selected(stages, ids, fast: bool = False) -> list[str]:
-    """Ids of the cases of some stages, or of some ids, in the order of the stages; all where both are empty."""
-    load()
-    unknown = [i for i in ids if i not in case.CASES]
-    if unknown:
-        sys.exit(f"no case {unknown[0]!r}; there are {', '.join(case.CASES)}")
-    wanted = stages or (case.STAGES if not ids else ())
-    ordered = sorted(case.CASES.values(), key=lambda c: case.STAGES.index(c.stage))
-    return [c.id for c in ordered if (c.stage in wanted and not (fast and c.slow)) or c.id in ids]
-
-
-def load() -> None:
-    """Register the cases of every stage."""
-    for stage in case.STAGES:
-        import_module(f"verification.{stage}")
-
-
-def run_all(ids: list[str], jobs: int) -> list[case.Result]:
-    """Results in the order of ``ids``, several cases side by side; a line each as it ends."""
-    results = {}
-    with ProcessPoolExecutor(max_workers=jobs) as pool:
-        for future in as_completed([pool.submit(_run_one, i) for i in ids]):
-            result = future.result()
-            results[result.id] = result
-            print(f"{result.verdict:12} {result.id:28} {result.seconds:6.1f} s", file=sys.stderr, flush=True)
-    return [results[i] for i in ids]
-
-
-def _run_one(id: str) -> case.Result:
-    load()
-    return case.run(case.CASES[id])
-
+from verification import hard_cases, speed
+from verification.kernel.driver import main
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(writers=(hard_cases.record, speed.record)))

@@ -2,8 +2,8 @@
 
 "cubic" is the preset fast with cubic elements. Each cell of the matrix, a case with a preset, is right, refused or
 wrong, see :mod:`verification.hard.judge`. Refusing is accepted in the parts that a case names, and with ``paper``;
-wrong is never. The matrix is printed; a whole one is written to ``verification/report/hard_cases.json`` too. Exit
-status 1 if a cell is what it may not be.
+wrong is never. The matrix is printed; a whole one is written to ``verification/report/hard_cases.json`` too, its
+numbers and seconds to ``live/`` beside it. Exit status 1 if a cell is what it may not be.
 """
 
 from __future__ import annotations
@@ -22,8 +22,9 @@ from verification.hard.judge import Cell, Verdicts, run_cell
 RECORD = Path(__file__).parent / "report" / "hard_cases.json"
 
 
-def as_json(cells: Iterable[Cell]) -> dict:
-    """What the report and docs/performance.md draw the matrix from."""
+def as_json(cells: Iterable[Cell], live: bool = False) -> dict:
+    """What the report and docs/performance.md draw the matrix from: verdicts; live: with messages, numbers and
+    seconds, which are this machine's."""
     rows: dict[int, dict] = {}
     for cell in cells:
         case = cell.case
@@ -31,10 +32,13 @@ def as_json(cells: Iterable[Cell]) -> dict:
                                             "title": case.title, "right_is": case.right_is,
                                             "failure_is": case.failure_is, "may_refuse": list(case.refusable),
                                             "explained": case.explained, "cells": {}})
-        row["cells"][cell.preset] = {"verdict": cell.verdict, "message": cell.message,
-                                     "accepted": not cell.unaccepted, "checks": _checks(cell),
-                                     "seconds": round(cell.seconds, 2)}
-    return {"cases": [rows[number] for number in sorted(rows)], "machine": machine()}
+        row["cells"][cell.preset] = {"verdict": cell.verdict, "accepted": not cell.unaccepted,
+                                     **(_digits(cell) if live else {})}
+    return {"cases": [rows[number] for number in sorted(rows)], **({"machine": machine()} if live else {})}
+
+
+def _digits(cell: Cell) -> dict:
+    return {"message": cell.message, "checks": _checks(cell), "seconds": round(cell.seconds, 2)}
 
 
 def _checks(cell: Cell) -> list[dict]:
@@ -49,8 +53,10 @@ def record(results: Iterable) -> None:
 
 
 def write(cells: Iterable[Cell]) -> None:
-    """Write the matrix for the report."""
-    save(as_json(cells), RECORD)
+    """Write the verdicts for the report and the README, and, not committed, all that this machine has measured."""
+    found = list(cells)
+    save(as_json(found), RECORD)
+    save(as_json(found, live=True), RECORD.parent / "live" / RECORD.name)
 
 
 def machine() -> str:

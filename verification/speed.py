@@ -8,15 +8,14 @@ never edited by hand; a test holds it to the records.
 
 from __future__ import annotations
 
-import html
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
-from verification import pages
 from verification.bench import base
 from verification.bench.record import line
+from verification.kernel import writing
+from verification.kernel.writing import Block, Link, markdown, table
 
 FOLDER = Path(__file__).parent / "report"
 ROOT = Path(__file__).parents[1]
@@ -26,21 +25,14 @@ QUANTITIES = ("velocity", "conductivity", "area", "thickness", "upstream", "down
 PAPER_AS_IT_IS = "refinement 1, 12 min"
 
 
-@dataclass(frozen=True)
-class Block:
-    """A piece of either: a heading, a paragraph, a picture (file and what it shows), or a table (head and rows)."""
-
-    kind: str
-    text: str = ""
-    rows: tuple[tuple[str, ...], ...] = ()
-    detail: bool = False
-
-
-def records() -> dict[str, dict]:
-    """What was measured, by name; empty where nothing was."""
+def records(live: bool = False) -> dict[str, dict]:
+    """What was measured, by name; empty where nothing was; live: the hard cases' numbers too, where this machine has
+    run them."""
     found = {}
     for name in ("bench", "audit", "hard_cases"):
         file = FOLDER / f"{name}.json"
+        if live and (there := FOLDER / "live" / file.name).exists():
+            file = there
         found[name] = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
     return found
 
@@ -120,11 +112,11 @@ def _hard(record: dict) -> Iterator[Block]:
         (str(case["number"]), case["title"], case["right_is"], *(_cell(case, preset) for preset in presets))
         for case in record["cases"])))
     notes = tuple((str(case["number"]), preset, cell["message"]) for case in record["cases"]
-                  for preset, cell in case["cells"].items() if cell["message"])
+                  for preset, cell in case["cells"].items() if cell.get("message"))
     yield Block("table", rows=(("case", "preset", "why it is not right"), *notes), detail=True)
     checks = tuple((str(case["number"]), preset, check["part"], check["quantity"], check["measured"], check["expected"],
                     check["origin"]) for case in record["cases"] for preset, cell in case["cells"].items()
-                   for check in cell["checks"])
+                   for check in cell.get("checks", ()))
     yield Block("table", rows=(("case", "preset", "part", "quantity", "measured", "expected", "origin"), *checks),
                 detail=True)
 
@@ -168,48 +160,16 @@ def _word(holds: bool | None) -> str:
     return {True: "holds", False: "does not hold", None: "not measured"}[holds]
 
 
-def markdown(found: list[Block], pictures: str = "../verification/report") -> str:
-    """The section of a page in Markdown; pictures: where they are from there."""
-    return "\n\n".join(_markdown(block, pictures) for block in found if not block.detail)
-
-
-def _markdown(block: Block, pictures: str) -> str:
-    if block.kind == "heading":
-        return f"## {block.text}"
-    if block.kind == "picture":
-        name, _, shown = block.text.partition(": ")
-        return f"![{shown}]({pictures}/{name})"
-    if block.kind == "text":
-        return block.text
-    head, *rows = block.rows
-    return "\n".join(["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |"
-                      for row in (head, ("---",) * len(head), *rows)])
-
-
 def page(found: list[Block]) -> str:
     """The page of the report."""
-    return pages.page("Speed against error, hard cases, assumptions",
-                      "<p><a href='index.html'>All cases</a>", *map(_html, found))
-
-
-def _html(block: Block) -> str:
-    if block.kind == "heading":
-        return f"<h2>{html.escape(block.text)}</h2>"
-    if block.kind == "picture":
-        name, _, shown = block.text.partition(": ")
-        return f"<img src='{html.escape(name)}' alt='{html.escape(shown)}'>"
-    if block.kind == "text":
-        return f"<p>{html.escape(block.text)}"
-    head, *rows = block.rows
-    body = "".join(pages.row("td", *map(html.escape, row), holds="wrong" not in row and "does not hold" not in row)
-                   for row in rows)
-    return f"<table>{pages.row('th', *map(html.escape, head))}{body}</table>"
+    back = table((Link("All cases", "index"),), ())
+    return writing.page("Speed against error, hard cases, assumptions", [back, *found])
 
 
 def pages_of(found: dict[str, dict]) -> dict[Path, str]:
     """The sections of the pages in Markdown."""
-    return {README: markdown(list(summary(found)), "verification/report"),
-            PERFORMANCE: markdown(list(blocks(found)))}
+    return {README: markdown(summary(found)),
+            PERFORMANCE: markdown(blocks(found), 2, "../verification/report")}
 
 
 def within(text: str, section: str) -> str:
@@ -226,10 +186,15 @@ def main() -> None:
         file.write_text(within(file.read_text(encoding="utf-8"), section), encoding="utf-8")
 
 
+def record(_: object = None) -> None:
+    """Write the page: after a whole verification run, whose hard cases it tells."""
+    write_page(FOLDER)
+
+
 def write_page(folder: Path) -> Path:
     """Write the page into a folder; its path."""
     file = folder / "speed.html"
-    file.write_text(page(list(blocks(records()))), encoding="utf-8")
+    file.write_text(page(list(blocks(records(live=True)))), encoding="utf-8")
     return file
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from math import nan
 from pathlib import Path
 
-from verification import pictures  # noqa: F401  chooses the backend
 from verification.bench import size
 from verification.bench.envelope import envelope
 

@@ -12,9 +12,9 @@ import numpy as np
 from repro.fem import transfer
 from repro.fem.mesh import curved
 from repro.fem.space import Space
-from verification import meshes, norms
 from verification.bench import options
 from verification.bench.clock import measured
+from verification.problems import meshes, norms
 
 REPEATS = 3
 #: um; the front's place along x and its width.

@@ -1,27 +1,151 @@
-"""What every single step must balance, all at once, and how right the amounts are that balance.
+"""What a whole run conserves: substrates, biomass, the yield that links them, and X_m times the area.
+
+What every single step must balance, all at once, and how right the amounts are that balance.
 
 Two balances may close on wrong amounts, as both do when a step's ledger takes the flows of its start: the third one,
 of what is made against what is taken up, and a run with shorter steps see that.
+
+A short piece of a run through contact with the opposite wall, and a wedge that closes (2.3.3).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
+from repro.fem.outline import BOTTOM, FREE, TOP
+from repro.march import updates
 from repro.march.loop import Instant, Ledger
 from repro.march.simulation import simulate
+from repro.model import pore, remeshing
 from repro.scene import Kinetics, Scene
-from verification.case import Outcome, Profile, at_least, at_most, case
-from verification.convergence import Study, study
-from verification.coupling import runs
+from verification.kernel.case import Outcome, Profile, Study, at_least, at_most, between, case, study
+from verification.problems import aggregates, runs
+
+#: Steps twice as long as the paper's.
+LONG = 'growth.time_step="24 min"'
+
+
+@case("coupling-ledger", kind="property",
+      norm="base to 19.4 h in steps of 24 min: worst step of both substrates' balances and of the biomass', relative; "
+           "X_m times the area over the biomass; largest deviation of the density from X_m",
+      claim="Over a whole run with its remeshes substrates and biomass are accounted for to round-off, and the area is "
+            "the biomass over X_m",
+      mutants=("theta-anew-at-a-remesh", "biomass-interpolated-at-a-remesh", "growth-spread-evenly"),
+      over={"linear": (6e-7, 4e-3, 3.0, LONG),
+            **{kind: (1e-10, 1e-3, 2.0, LONG, runs.of(kind), "numerics.refinement=0.2") for kind in runs.ELEMENTS[1:]},
+            **{kind: (1e-10, 1e-3, 2.0, runs.by(kind)) for kind in runs.PRESETS[1:]}}, ways="paper")
+def ledger(area: float, density: float, remeshes: float, *changes: str):
+    """Checks of a run of base: largest deviations of the area and of the density, and fewest remeshes."""
+    scene = runs.base("19.4 h", *changes)
+    instants = list(simulate(scene))
+    rows, last = instants[-1].ledgers, instants[-1].pore
+    made = sum(row.biomass_made for row in rows)
+    total = scene.kinetics.maximum_density * last.outline.area
+    return [at_most("substrates", substrates(rows), 1e-10, "Newton's tolerance, 1e-13 of the largest term of "
+                    "each row, over all rows"),
+            at_most("biomass, worst step", biomass(rows), 1e-10, runs.ROUND_OFF),
+            at_most("biomass, whole run", abs((rows[0].biomass_before + made) / rows[-1].biomass_after - 1),
+                    1e-10, runs.ROUND_OFF),
+            at_most("X_m times the area", abs(total / rows[-1].biomass_after - 1), area,
+                    "J = theta in the mean: to the stabilisation of linear elements, else to Newton's tolerance"),
+            at_most("density", runs.density_drift(scene, instants[-1]), density,
+                    "J = theta in the mean around a node only [E7]; worked off at each remesh"),
+            at_least("remeshes", instants[-1].remeshes, remeshes, "else they are not tested")]
+
+
+def substrates(rows) -> float:
+    """The worst of in - out - consumed over in."""
+    return max(abs(s - out - used) / s for row in rows for s, out, used in zip(row.supplied, row.out, row.consumed))
+
+
+def biomass(rows) -> float:
+    """The worst of before + made - after over after, and of one step's end against the next one's start."""
+    steps = [abs((row.biomass_before + row.biomass_made) / row.biomass_after - 1) for row in rows]
+    return max(steps + [abs(two.biomass_before / one.biomass_after - 1) for one, two in zip(rows, rows[1:])])
+
+
+STEPS = (0.8, 0.4, 0.2, 0.1)
+
+
+@case("coupling-yield", kind="property",
+      norm="biomass made over the yield of the substrates, less 1; base from 20 um to 1.6 h, steps of 0.8 to 0.1 h",
+      claim="The biomass made is Y times the donor consumed, less f_d of what decays, which the acceptor's demand "
+            "beyond F times the donor tells: the ledgers agree to second order in the step",
+      mutants=("euler-biomass", "rates-at-the-start", "rates-two-percent-low", "decay-leaves-all"),
+      over=runs.ELEMENTS, ways="paper")
+def yields(elements: str):
+    """The size of the defect, and its order, with one kind of elements."""
+    defects = [_yield_defect(elements, step) for step in STEPS]
+    return (between("at 0.1 h, over (a step's growth)^2 / 12", defects[-1] / _trapezoid(STEPS[-1]), 0.7,
+                    1.3, "the trapezoidal rule on an exponential; its rate falls by 30 % as the pore clogs"),
+            study("yield", STEPS, np.abs(defects), 2, "Heun's method, and the trapezoidal rule on what is "
+                  "consumed: second order", ceiling=4e-5, band=0.1))
+
+
+def _scene(step: float, *changes: str) -> Scene:
+    return runs.base("1.6 h", 'aggregate.radius="20 um"', f'growth.time_step="{step} h"', *changes)
+
+
+def _yield_defect(elements: str, step: float) -> float:
+    scene = _scene(step, runs.of(elements), runs.coarser(elements, 0.3))
+    law, rows = scene.kinetics, runs.last(scene).ledgers
+    acceptor, donor = np.sum([row.consumed for row in rows], axis=0)
+    decayed = (acceptor - law.acceptor_to_donor_ratio * donor) / law.decay_oxygen_demand
+    return float(1 - sum(row.biomass_made for row in rows) / (law.yield_coefficient * donor - decayed))
+
+
+def _trapezoid(step: float) -> float:
+    """(r step)^2 / 12 at the supply's rate of growth r."""
+    return (runs.growth_rates(_scene(step))[0] * step) ** 2 / 12
+
+
+REFINEMENTS = (0.7, 1.0, 1.4, 2.0)
+
+
+@case("coupling-density-restored", kind="property",
+      norm="a half-disc of 20 um whose density is X_m (1 + 0.1 x / R), remeshed, one step without uptake or decay: L2 "
+           "of (X_A + X_I) / X_m - 1 over it; X_m times the area over the biomass, less 1",
+      claim="What a density has of error at a remesh is gone after the next update [E7]: the shape takes up X_m again",
+      mutants=("density-not-worked-off", "theta-anew-at-a-remesh"), ways="1 2 3 paper")
+def density_restored() -> Outcome:
+    found = [_restored(refinement) for refinement in REFINEMENTS]
+    sizes = [1 / refinement for refinement in REFINEMENTS]
+    checks = [at_most("X_m times the area", max(area for _, area in found), 1e-11, runs.ROUND_OFF)]
+    for elements in ("quadratic", "cubic"):
+        error, area = _restored(0.5, runs.of(elements))
+        checks += [at_most(f"density, {elements}", error, 1e-10, "the masses of a new mesh are X_m, and J = theta in "
+                           "each point where it can be"),
+                   at_most(f"X_m times the area, {elements}", area, 1e-11, runs.ROUND_OFF)]
+    return Outcome(tuple(checks),
+                   (study("density", sizes, [error for error, _ in found], 1.5,
+                          "theta of triangles against X of nodes: second order, but at the rim, where they lie on one "
+                          "side, first; in L2 half an order more", ceiling=1.2e-3),))
+
+
+def _restored(refinement: float, *changes: str) -> tuple[float, float]:
+    """L2 of the density's error, and X_m times the area over the biomass, less 1."""
+    scene = runs.base("1 h", 'kinetics.decay_coefficient="0 1/d"', 'kinetics.maximum_utilization_rate="0 1/d"',
+                      f"numerics.refinement={refinement}", 'aggregate.radius="20 um"', *changes)
+    now = pore.seeded(scene)
+    x = aggregates.places(now.space)[0]
+    now = replace(now, active=now.active * (1 + 0.1 * x / scene.aggregate.radius))
+    solved = pore.solve(scene, now)
+    anew = remeshing.remesh(scene, now, now, solved.flow.mean_velocity)[0]
+    after = updates.step(scene, anew, pore.solve(scene, anew), 0.2).pore
+    weight = after.space.reaction.dx
+    density = (after.active + after.inert) / weight / scene.kinetics.maximum_density
+    error = np.sqrt(np.vdot(weight, (density - 1) ** 2) / weight.sum())
+    return float(error), abs(float(np.vdot(weight, density)) / after.outline.area - 1)
+
 
 #: Round-off and Newton's tolerance, 1e-13 of the largest term of each row, over all rows and with room to spare.
 CLOSED, CLOSES = 1e-9, "identities of the discrete equations: round-off and Newton's tolerance, with room"
-#: Steps of the paper's updates (h), from the longest on.
-STEPS = (0.8, 0.4, 0.2, 0.1)
 #: How long (h) a run goes on after contact.
 PAST = 2.0
 
@@ -34,7 +158,7 @@ PAST = 2.0
             "and what is made is what the substrates taken up are worth: to round-off by the midpoint rule, to second "
             "order by the paper's updates",
       mutants=("biomass-of-the-start-takes-up", "remesh-half-way-unmatched", "masses-of-the-start-kept",
-               "flows-of-the-start"))
+               "flows-of-the-start"), ways="1 2 3 paper fast accurate")
 def one_balance() -> Outcome:
     checks = [check for preset in runs.PRESETS for check in (*_of_base(preset), *_of_narrow(preset))]
     for elements in runs.ELEMENTS:
@@ -149,17 +273,9 @@ IN_A_STEP = 3.0
            "at the ends of the steps by a cubic spline",
       claim="The amounts in the ledgers are those of ten times shorter steps: to 1 % by preset fast and 0.1 % by "
             "accurate in all, to three times that in every step",
-      mutants=("flows-of-the-start", "curved-rates-of-the-start"))
-def amounts() -> Outcome:
-    checks, profiles = [], []
-    for preset in RIGHT:
-        found, profile = _amounts(preset)
-        checks += found
-        profiles.append(profile)
-    return Outcome(tuple(checks), (), tuple(profiles))
-
-
-def _amounts(preset: str) -> tuple[list, Profile]:
+      mutants=("flows-of-the-start", "curved-rates-of-the-start"), over=tuple(RIGHT),
+      ways="2", because="paper has no tolerance of its steps; order 1 is paper's, order 3: coupling-one-balance")
+def amounts(preset: str):
     """Checks and a picture of one preset."""
     scene = runs.base("19.4 h", runs.by(preset))
     shorter = runs.base("19.4 h", runs.by(preset), f"numerics.tolerance={scene.numerics.tolerance / 100}")
@@ -168,12 +284,12 @@ def _amounts(preset: str) -> tuple[list, Profile]:
     in_all, in_a_step = np.abs(ours[-1] / there[-1] - 1), np.abs(np.diff(ours, axis=0) / np.diff(there, axis=0) - 1)
     checks, bound = [], RIGHT[preset]
     for k, name in enumerate(("acceptor", "donor")):
-        checks += [at_most(f"{name} in all, {preset}", in_all[k], bound, "what the preset is for"),
-                   at_most(f"{name} in a step, {preset}", in_a_step[:, k].max(), IN_A_STEP * bound,
+        checks += [at_most(f"{name} in all", in_all[k], bound, "what the preset is for"),
+                   at_most(f"{name} in a step", in_a_step[:, k].max(), IN_A_STEP * bound,
                            "three times what the preset is for")]
-    checks.append(at_least(f"steps, of the other run over these, {preset}", len(fine) / len(times), 6.0,
+    checks.append(at_least("steps, of the other run over these", len(fine) / len(times), 6.0,
                            "tolerance to the power 1/2, ten; fewer where a step ends with the run"))
-    return checks, Profile(f"acceptor consumed, {preset}", "time (h)", "um2 mg/L",
+    return checks, Profile("acceptor consumed", "time (h)", "um2 mg/L",
                            (("ours", "ours", times, ours[:, 0]), ("shorter steps", "reference", fine, theirs[:, 0])))
 
 
@@ -182,3 +298,81 @@ def _cumulated(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     ledgers = _ledgers(simulate(scene))
     consumed = np.cumsum([step.consumed for step in ledgers], axis=0)
     return np.array([0.0, *(step.end for step in ledgers)]), np.vstack([np.zeros(2), consumed])
+
+
+AREA = "J = theta to the stabilisation"
+
+
+@case("coupling-contact", kind="property",
+      norm="three steps from an aggregate 0.1 um short of closing the pore, 20 um wide",
+      claim="Through contact the ledgers close, the area stays the biomass over X_m, no film under 2 um is left, and "
+            "the fluid is cut in two",
+      mutants=("films-stay-open", "reprojection-left-out"), over=runs.EVERY, ways="paper")
+def contact(*changes: str):
+    """Checks and a picture of a run with one kind of elements, or one preset."""
+    scene = runs.base("0.6 h", 'pore.width="20 um"', 'aggregate.radius="17.9 um"', *changes,
+                      times='"0.2 h", "0.4 h", "0.6 h"')
+    instants = list(simulate(runs.at_velocity(scene, runs.SPEED)))
+    rows = [row for instant in instants for row in instant.ledgers]
+    last = instants[-1].pore
+    total = scene.kinetics.maximum_density * last.outline.area
+    checks = [at_most("substrates", substrates(rows), 1e-10, "Newton's tolerance"),
+              at_most("biomass, worst step", biomass(rows), 1e-10, runs.ROUND_OFF),
+              at_most("X_m times the area", abs(total / rows[-1].biomass_after - 1), 3e-6, AREA),
+              at_least("narrowest gap over the least allowed", _narrowest(scene, last, TOP), 1 - 1e-9,
+                       "2 um, or 16.7 degrees beside contact"),
+              between("parts of the fluid", _parts(last.mesh), 1.9, 2.1, "a plug")]
+    return checks, _outlines(instants)
+
+
+@case("coupling-wedge", kind="property",
+      norm="one step from a disc of 20 um that stands on a chord, the fluid under it at 8 degrees",
+      claim="Wedges of fluid beside a contact surface close until they have the least contact angle",
+      mutants=("no-wedge-closes", "films-stay-open"), over=runs.ELEMENTS, ways="paper")
+def wedge(elements: str):
+    """Checks and a picture of a step with one kind of elements."""
+    scene = runs.base("0.2 h", runs.of(elements), runs.coarser(elements, 0.6))
+    instants = list(simulate(scene, _disc(20.0, 19.8, 60 * scene.numerics.geometry)))
+    gaps = [_narrowest(scene, instant.pore, BOTTOM) for instant in instants]
+    total = scene.kinetics.maximum_density * instants[-1].pore.outline.area
+    checks = [at_most("narrowest gap over the least allowed, seed", gaps[0], 0.9,
+                      "8 degrees are under 16.7"),
+              at_least("the same after a step", gaps[1], 1 - 1e-9, "2 um, or 16.7 degrees beside contact"),
+              at_most("X_m times the area", abs(total / instants[-1].ledgers[-1].biomass_after - 1), 3e-6,
+                      AREA)]
+    return checks, _outlines(instants)
+
+
+def _disc(radius: float, height: float, edges: int) -> np.ndarray:
+    """(edges + 1, 2) um of a disc around (0, height), cut by the lower wall, from its upstream end."""
+    start = np.arcsin(height / radius)
+    angle = np.linspace(np.pi + start, -start, edges + 1)
+    return np.column_stack([radius * np.cos(angle), runs.on_wall(height + radius * np.sin(angle))])
+
+
+def _narrowest(scene: Scene, now, wall: int) -> float:
+    """Least gap between a wall and the interface beyond the contact surface, over the smaller of the least film and
+    tan(least angle) times the distance from contact; zero without contact."""
+    outline, growth = now.outline, scene.growth
+    free, on = outline.points[outline.wall == FREE], outline.points[outline.wall == wall, 0]
+    if len(on) == 0:
+        return 0.0
+    along = np.maximum(on.min() - free[:, 0], free[:, 0] - on.max())
+    gap = free[:, 1] if wall == BOTTOM else scene.pore.width - free[:, 1]
+    allowed = np.minimum(growth.minimum_film, np.tan(growth.minimum_contact_angle) * along)
+    return float((gap[along > 0] / allowed[along > 0]).min())
+
+
+def _parts(mesh) -> int:
+    """Connected parts of the fluid."""
+    corners = mesh.triangles[~mesh.biomass]
+    links = (np.ones(corners.size), (corners.ravel(), np.roll(corners, 1, axis=1).ravel()))
+    labels = connected_components(coo_array(links, shape=2 * (len(mesh.points),)), directed=False)[1]
+    return len(np.unique(labels[mesh.topology.fluid]))
+
+
+def _outlines(instants) -> Profile:
+    """The outlines, closed."""
+    loops = [(instant.pore.time, instant.pore.outline.points) for instant in instants]
+    return Profile("outlines", "x (um)", "y (um)", tuple(
+        (f"{time:g} h", "ours", *np.vstack([loop, loop[:1]]).T) for time, loop in loops))

@@ -1,10 +1,134 @@
-"""Wrong changes to `repro/` that cases of this stage must catch."""
+"""Wrong changes to what is balanced in a step that cases of this stage must catch.
 
-from verification.coupling.balance_mutants import BALANCES
-from verification.coupling.midpoint_mutants import MIDPOINT
-from verification.coupling.supply_mutants import SUPPLY
-from verification.coupling.traction_mutants import TRACTION
-from verification.mutants import Mutant
+Wrong changes to the midpoint rule, and to what presets choose, that cases of this stage must catch.
+
+Wrong changes to the fluid's forces on the aggregate that cases of this stage must catch.
+
+Wrong changes to tables over time, rows within steps and the preset exact, that cases of this stage must catch.
+
+Wrong changes to `repro/` that cases of this stage must catch.
+"""
+
+from __future__ import annotations
+
+from verification.kernel.mutants import Mutant
+
+MIDPOINT_RULE = "repro/march/midpoint.py"
+BALANCES = (
+    Mutant("biomass-of-the-start-takes-up", MIDPOINT_RULE,
+           says="Half way the biomass of the step's start takes up substrates, not the mean of the step.",
+           old="found = pore.solve(scene, there, duration)",
+           new="found = pore.solve(scene, there)"),
+    Mutant("remesh-half-way-unmatched", MIDPOINT_RULE,
+           says="After a remesh half way what is made is not what was taken up for it there.",
+           old="after = _matched(now, grown(now, half.rates, duration), half.made)",
+           new="after = grown(now, half.rates, duration)"),
+    Mutant("masses-of-the-start-kept", "repro/model/contact.py",
+           says="The new shape has the masses of the pore from which its search starts: what has grown is lost.",
+           old="found = replace(grown, space=start.space,",
+           new="found = replace(grown, active=start.active, inert=start.inert, space=start.space,"),
+    Mutant("flows-of-the-start", MIDPOINT_RULE,
+           says="A step's ledger has the flows of its start, not those half way.",
+           old="_flows(half.solved, duration)",
+           new="_flows(solved, duration)"),
+)
+
+
+MIDPOINT = (
+    Mutant("midpoint-rates-of-the-start", MIDPOINT_RULE,
+           says="A whole step is made with the rates of its start: Euler's rule.",
+           old="after = _matched(now, grown(now, half.rates, duration), half.made)",
+           new="after = grown(now, first, duration)"),
+    Mutant("curved-rates-of-the-start", MIDPOINT_RULE,
+           says="The shape half way is that of the start.",
+           old="ahead = replace(grown(now, first, duration / 2),",
+           new="ahead = replace(grown(now, first, 0.0),"),
+    Mutant("curved-half-of-the-half", MIDPOINT_RULE,
+           says="Biomass grows for half of the step only.",
+           old="after = _matched(now, grown(now, half.rates, duration), half.made)",
+           new="after = grown(now, half.rates, duration / 2)"),
+    Mutant("newton-never-reused", "repro/fem/newton.py",
+           says="Every step of Newton's method factorises its derivative anew, whatever the scene says.",
+           old="not self.reused or defect > ENOUGH * last",
+           new="defect >= 0"),
+    Mutant("cubic-shown-less", "repro/model/biomass.py",
+           says="The biomass sees one percent less of cubic concentrations than there is.",
+           old="acceptor, donor = both[:, pieces.cells] @ pieces.values.T",
+           new="acceptor, donor = (0.99 if space.order == 3 else 1.0) * both[:, pieces.cells] @ pieces.values.T"),
+)
+
+
+FLUID, GROWTH, CONTACT = "repro/model/traction.py", "repro/model/growth.py", "repro/model/contact.py"
+TRACTION = (
+    Mutant("traction-pressure-left-out", FLUID,
+           says="The fluid's pressure is left out of its traction.",
+           old="stress = viscosity * grad - head",
+           new="stress = viscosity * grad - 0 * head"),
+    Mutant("traction-form-mixed", FLUID,
+           says="The Laplacian form's flow is taken to push as the traction form's does, and the other way round.",
+           old='if interface == "traction":',
+           new='if interface != "traction":'),
+    Mutant("traction-transposed-gradient", FLUID,
+           says="The viscous stress is that of the transposed gradient.",
+           old='np.einsum("tai,tqka->tqik", found.velocity',
+           new='np.einsum("tai,tqka->tqki", found.velocity'),
+    Mutant("traction-of-both-phases", FLUID,
+           says="The aggregate's own triangles push it too.",
+           old="wet = ~mesh.biomass",
+           new="wet = mesh.biomass | True"),
+    Mutant("forces-thousandfold", FLUID,
+           says="The density in mg/L is taken for one in kg/m3.",
+           old="MPA_PER_UM = 1e-3 * 1e-6",
+           new="MPA_PER_UM = 1e-6"),
+    Mutant("density-squared", FLUID,
+           says="The forces go with the square of the fluid's density.",
+           old="MPA_PER_UM * drive.density * drive.gravity",
+           new="MPA_PER_UM * drive.density**2 * drive.gravity"),
+    Mutant("forces-shared-evenly", FLUID,
+           says="A force on a node of a new mesh goes to three of the aggregate's in equal shares, wherever it acts.",
+           old="np.add.at(total, around.nodes, around.share[..., None] * on[:, None])",
+           new="np.add.at(total, around.nodes, on[:, None] / around.nodes.shape[1])"),
+    Mutant("forces-pushed", GROWTH,
+           says="The forces act the other way.",
+           old="gap) - self.pull",
+           new="gap) + self.pull"),
+    Mutant("forces-halved", GROWTH,
+           says="Half the forces act.",
+           old="gap) - self.pull",
+           new="gap) - 0.5 * self.pull"),
+    Mutant("forces-of-the-first-round", CONTACT,
+           says="The forces stay those of the flow around the shape before.",
+           old="traction.forces(scene, around, last)",
+           new="traction.forces(scene, traction.surroundings(scene, grown, grown), grown)"),
+)
+
+SUPPLY = (
+    Mutant("supply-of-the-start", "repro/march/updates.py",
+           says="In a step of the paper's scheme the supply is that of its start.",
+           old="middle = now.time + duration / 2",
+           new="middle = now.time"),
+    Mutant("supply-half-way-of-the-start", "repro/march/midpoint.py",
+           says="Half way through a step the supply is that of its start.",
+           old="ahead = replace(grown(now, first, duration / 2), time=now.time + duration / 2)",
+           new="ahead = grown(now, first, duration / 2)"),
+    Mutant("supply-a-step-late", "repro/march/stepping.py",
+           says="Steps go over the jumps of a table.",
+           old="left = corner - now.time",
+           new="left = np.inf"),
+    Mutant("supply-not-yet", "repro/scene/course.py",
+           says="At a jump the value before it still holds.",
+           old="last = bisect_right(self.times, time) - 1",
+           new="last = max(0, bisect_right(self.times, time - 1e-6) - 1)"),
+    Mutant("row-of-the-end", "repro/march/midpoint.py",
+           says="A row within a step has the biomass of the step's end.",
+           old="part = (time - now.time) / half.duration",
+           new="part = 1.0"),
+    Mutant("exact-steps-of-accurate", "repro/scene/keys.py",
+           says="The preset exact has the tolerance of accurate.",
+           old='"tolerance": 0.00025,',
+           new='"tolerance": 0.001,'),
+)
+
 
 MUTANTS = (
     Mutant("growth-three-percent-low", "repro/march/updates.py",

@@ -1,17 +1,25 @@
-"""What must not matter much: the time step, storage of the substrates, the part of the pore that is meshed."""
+"""What must not matter much: the time step, storage of the substrates, the part of the pore that is meshed.
+
+The midpoint rule and the presets: order in time, the limit of the paper's updates, an independent solver.
+"""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from itertools import product
+from unittest import mock
 
 import numpy as np
 
+from reference import whole_run
+from repro.fem import linear
+from repro.march import midpoint
+from repro.march.simulation import simulate
 from repro.model import pore
 from repro.scene import load_scene
-from verification.case import Check, Outcome, Profile, at_most, case
-from verification.convergence import Study, study
-from verification.coupling import averaged, runs
+from verification.kernel.case import Profile, at_most, case, study
+from verification.problems import averaged, runs
 
 STEPS = (0.8, 0.4, 0.2, 0.1, 0.05)
 
@@ -19,13 +27,8 @@ STEPS = (0.8, 0.4, 0.2, 0.1, 0.05)
 @case("coupling-time-step", kind="property", slow=True,
       norm="difference between a run and that with half the step, relative; base from 25 um, 3.2 h, no remesh",
       claim="The loop is of first order in the shape update: the geometry is frozen within a step, the rates are not",
-      mutants=("rates-at-the-start", "stale-flow"))
-def time_step() -> Outcome:
-    found = [_frozen(elements) for elements in runs.ELEMENTS]
-    return Outcome(tuple(check for check, _ in found), tuple(one for _, studies in found for one in studies))
-
-
-def _frozen(elements: str) -> tuple[Check, list[Study]]:
+      mutants=("rates-at-the-start", "stale-flow"), over=runs.ELEMENTS, ways="paper")
+def time_step(elements: str):
     """Remeshes, and the orders, with one kind of elements."""
     instants = [runs.last(runs.base("3.2 h", 'aggregate.radius="25 um"', f'growth.time_step="{step} h"',
                                     runs.of(elements), runs.coarser(elements, 0.3))) for step in STEPS]
@@ -33,10 +36,10 @@ def _frozen(elements: str) -> tuple[Check, list[Study]]:
     for name in numbers[0]:
         values = np.array([row[name] for row in numbers])
         apart = np.abs(np.diff(values) / values[-1])
-        studies.append(study(f"{name}, {elements}", STEPS[:-1], apart, 1, "frozen geometry: first order", ceiling=1e-3,
+        studies.append(study(f"{name}", STEPS[:-1], apart, 1, "frozen geometry: first order", ceiling=1e-3,
                              band=0.15))
     remeshes = sum(instant.remeshes for instant in instants)
-    return at_most(f"remeshes, all runs, {elements}", remeshes, 0.0, "one mesh: the error in space is common"), studies
+    return at_most("remeshes, all runs", remeshes, 0.0, "one mesh: the error in space is common"), studies
 
 
 SLOWER = (16.0, 8.0, 4.0, 2.0)
@@ -47,15 +50,11 @@ SLOWER = (16.0, 8.0, 4.0, 2.0)
            "with D, u and X_m over 16 to 2: steady states and growth stay, substrates are 16 to 2 times slower",
       claim="The paper's transient scheme and quasi-steady substrates make the same aggregate, up to the substrates' "
             "lag, which is as their storage",
-      mutants=("rates-two-percent-low",))
-def quasi_steady() -> Outcome:
-    return Outcome((), tuple(one for elements in runs.ELEMENTS for one in _lags(elements)))
-
-
-def _lags(elements: str) -> list[Study]:
+      mutants=("rates-two-percent-low",), over=runs.ELEMENTS, ways="paper")
+def quasi_steady(elements: str):
     """Studies with one kind of elements."""
     rows = [_lag(elements, factor) for factor in SLOWER]
-    return [study(f"{name}, {elements}", SLOWER, [row[name] for row in rows], 1,
+    return [study(f"{name}", SLOWER, [row[name] for row in rows], 1,
                   "lag: first order in storage over reaction, 2e-4 for base", ceiling=3e-6, band=0.15)
             for name in rows[0]]
 
@@ -80,19 +79,18 @@ def _slower(elements: str, factor: float, transport_scheme: str):
       norm="t = 0, refinement 2 (linear) and 0.6: conductivity and effluents relative; section means of C along the "
            "central mesh, over the supply",
       claim="The central mesh with (6) and (26) beyond it is worth the whole pore",
-      mutants=("extent-not-subtracted", "inlet-held", "head-on-the-mesh-alone"))
-def extent() -> Outcome:
-    checks, profiles = [], []
-    for radius, elements in product(("5 um", "25 um"), runs.ELEMENTS):
-        (central, x, near), (full, _, far) = (_solved(radius, elements, name) for name in ("central", "full"))
-        which = f"R = {radius}, {elements}"
-        checks += [at_most(f"{name}, {which}", abs(central[name] / full[name] - 1), bound, origin)
-                   for name, (bound, origin) in BOUNDS.items()]
-        checks.append(at_most(f"C, {which}", np.abs(near - far).max() / 10.0, 4e-4, IN_SPACE))
-        profiles.append(Profile(f"section means, {which}", "x (um)", "C (mg/L)", tuple(
-            curve for k, name in enumerate(("C_A", "C_D"))
-            for curve in ((f"{name}, central", "ours", x, near[k]), (f"{name}, whole pore", "reference", x, far[k])))))
-    return Outcome(tuple(checks), (), tuple(profiles))
+      mutants=("extent-not-subtracted", "inlet-held", "head-on-the-mesh-alone"),
+      over={f"R = {radius}, {kind}": (radius, kind) for radius, kind in product(("5 um", "25 um"), runs.ELEMENTS)},
+      ways="paper")
+def extent(radius: str, elements: str):
+    (central, x, near), (full, _, far) = (_solved(radius, elements, name) for name in ("central", "full"))
+    curves = tuple(curve for k, name in enumerate(("C_A", "C_D"))
+                   for curve in ((f"{name}, central", "ours", x, near[k]),
+                                 (f"{name}, whole pore", "reference", x, far[k])))
+    checks = [at_most(name, abs(central[name] / full[name] - 1), bound, origin)
+              for name, (bound, origin) in BOUNDS.items()]
+    return (checks, at_most("C", np.abs(near - far).max() / 10.0, 4e-4, IN_SPACE),
+            Profile("section means", "x (um)", "C (mg/L)", curves))
 
 
 IN_SPACE = "error in space, 0.1 % at refinement 1, a quarter of that here"
@@ -112,3 +110,134 @@ def _solved(radius: str, elements: str, extent: str):
     x = np.linspace(-reach, reach, averaged.PLACES)
     return ({"conductivity": solved.flow.conductivity, "effluent acceptor": leaving[0].effluent,
              "effluent donor": leaving[1].effluent}, x, runs.section_means(now, solved, x))
+
+
+def _base(*changes: str):
+    return load_scene("base", changes)
+
+
+RULE_STEPS = (1, 2, 4, 8, 16)
+
+
+def _equal_steps(scene, steps: int) -> np.ndarray:
+    """Area and upstream tip after 2 h in equal steps, on one mesh."""
+    now = pore.seeded(scene)
+    for _ in range(steps):
+        solved = pore.solve(scene, now)
+        now = replace(now, concentrations=solved.concentrations)
+        step = midpoint.attempt(scene, now, solved, 2.0 / steps).step
+        if step.remeshed:
+            raise RuntimeError("a new mesh: the error in space would not be common")
+        now = step.pore
+    return np.array([now.outline.area, now.outline.upstream])
+
+
+@case("coupling-midpoint-order", kind="property",
+      norm="relative difference between a run and that with half the step; base from a seed of 25 um, 2 h, no remesh",
+      claim="The midpoint rule is of second order in time, with every kind of elements",
+      mutants=("curved-rates-of-the-start", "midpoint-rates-of-the-start"), over=runs.ELEMENTS, ways="fast")
+def order_in_time(elements: str):
+    scene = _base(runs.by("fast"), runs.of(elements), "numerics.refinement=0.5", 'aggregate.radius="25 um"')
+    values = np.array([_equal_steps(scene, steps) for steps in RULE_STEPS])
+    apart = np.abs(np.diff(values, axis=0) / values[-1])
+    return [study(quantity, 2 / np.array(RULE_STEPS[:-1]), apart[:, k], 2, "midpoint rule", ceiling=2e-5, band=0.15)
+            for k, quantity in enumerate(("area", "upstream tip"))]
+
+
+@case("coupling-midpoint-limit", kind="property", slow=True,
+      norm="relative difference at 3.2 h from a seed of 25 um, base",
+      claim="With short steps the paper's shape updates and the midpoint rule come to the same, on the same triangles",
+      mutants=("midpoint-rates-of-the-start",), over=runs.ELEMENTS)
+def limit(elements: str):
+    steps = (0.8, 0.4, 0.2, 0.1)
+    middle = _at_the_end(elements, 'numerics.time="midpoint"', "numerics.tolerance=0.00003")
+    apart = np.array([np.abs(_at_the_end(elements, f'growth.time_step="{step} h"') / middle - 1) for step in steps])
+    return [study(name, steps, apart[:, k], 1, "shape updates: first order", ceiling=2e-3)
+            for k, name in enumerate(("area", "upstream tip"))]
+
+
+def _at_the_end(elements: str, *changes: str) -> np.ndarray:
+    """Area and upstream tip at 3.2 h."""
+    outline = runs.last(runs.base("3.2 h", runs.of(elements), 'aggregate.radius="25 um"',
+                                  runs.coarser(elements, 0.3, 0.6), *changes)).pore.outline
+    return np.array([outline.area, outline.upstream])
+
+
+TIMES = (19.2, 19.4)
+
+
+@cache
+def _reference():
+    """The independent solver's numbers of base at TIMES, (2, 8), and the largest estimate of their error."""
+    found = whole_run.converged(whole_run.Pore(), TIMES, rings=(6, 8), steps=(8, 16))
+    return found.values, _apart(found.values + np.abs(found.space) + np.abs(found.time), found.values).max()
+
+
+def _apart(ours: np.ndarray, theirs: np.ndarray) -> np.ndarray:
+    """(8,) largest differences over the times: relative, of effluents over the supply."""
+    scale = np.abs(theirs).copy()
+    scale[:, 6:] = whole_run.Pore().supply
+    return (np.abs(ours - theirs) / scale).max(axis=0)
+
+
+def _listed(preset: str, *changes: str) -> np.ndarray:
+    """(2, 8) of base at TIMES, as whole_run.NAMES lists them."""
+    times = ", ".join(f'"{time} h"' for time in TIMES)
+    _, *found = simulate(_base(runs.by(preset), f"output.times=[{times}]", *changes))
+    rows = []
+    for instant in found:
+        flow, outline, fluxes = instant.solved.flow, instant.pore.outline, instant.solved.fluxes
+        rows.append([whole_run.M_PER_D * flow.mean_velocity, whole_run.M_PER_D * flow.conductivity, outline.area,
+                     outline.thickness, outline.upstream, outline.downstream, *(flux.effluent for flux in fluxes)])
+    return np.array(rows)
+
+
+@case("coupling-presets", kind="cross-code", slow=True,
+      norm="largest difference at 19.2 and 19.4 h to an independent solver, extrapolated in space and time: relative, "
+           "of effluents over the supply",
+      claim="Each of the eight numbers of base is within 1 % with preset fast, and within 0.1 % with preset accurate, "
+            "with quadratic and with cubic velocities and concentrations",
+      mutants=("curved-rates-of-the-start", "fluid-diffusivity", "uptake-without-decay", "cubic-shown-less"),
+      over={"fast": (1e-2, "fast"), "accurate": (1e-3, "accurate"),
+            "accurate, cubic": (1e-3, "accurate", runs.of("cubic"))}, ways="2",
+      because="paper, order 1: its error is that of linear elements, see bench")
+def presets(bound: float, *numerics: str):
+    theirs, error = _reference()
+    return at_most("the reference itself", error, 2e-4, "a fifth of what is asked of accurate"), [
+        at_most(name, apart, bound, "what the preset is for")
+        for name, apart in zip(whole_run.NAMES, _apart(_listed(*numerics), theirs))]
+
+
+@case("coupling-exact", kind="cross-code", slow=True, norm="as coupling-presets",
+      claim="Each of the eight numbers of base is within 0.01 % with preset exact",
+      mutants=("exact-steps-of-accurate", "cubic-shown-less"), ways="3",
+      because="orders 1 and 2 and the other presets: coupling-presets")
+def exact():
+    theirs, error = _reference()
+    return at_most("the reference itself", error, 5e-5, "half of what is asked"), [
+        at_most(name, apart, 1e-4, "what the preset is for")
+        for name, apart in zip(whole_run.NAMES, _apart(_listed("exact"), theirs))]
+
+
+@case("coupling-jacobian-reused", kind="property",
+      norm="relative difference of the area, the tips and the conductivity at 2 h; factorisations over those of fresh "
+           "derivatives; base from a seed of 25 um",
+      claim="Newton's methods that use a derivative again come to the same with fewer factorisations",
+      mutants=("newton-never-reused",),
+      over={f"{kind}, {preset}": (preset, kind) for preset in ("fast", "paper") for kind in runs.ELEMENTS
+            if preset == "fast" or kind == "linear"})
+def reused(preset: str, elements: str):
+    (fresh, made), (again, fewer) = (_factorisations(preset, elements, kind) for kind in ("fresh", "reused"))
+    return (at_most("difference", np.abs(again / fresh - 1).max(), 1e-8,
+                    "Newton's tolerances, 1e-10 and less, times the steps"),
+            at_most("factorisations", fewer / made, 0.8, "one in three of Newton's is saved"))
+
+
+def _factorisations(preset: str, elements: str, kind: str) -> tuple[np.ndarray, int]:
+    """Area, tips and conductivity at 2 h, and how many matrices were factorised on the way."""
+    scene = runs.base("2 h", runs.by(preset), runs.of(elements), f'numerics.jacobian="{kind}"',
+                      'aggregate.radius="25 um"', 'growth.time_step="1 h"')
+    with mock.patch.object(linear, "factorised", wraps=linear.factorised) as factorised:
+        last = runs.last(scene)
+    shape, flow = last.pore.outline, last.solved.flow
+    return np.array([shape.area, shape.upstream, shape.downstream, flow.conductivity]), factorised.call_count

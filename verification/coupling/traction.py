@@ -1,7 +1,11 @@
-"""The fluid's traction on the aggregate (20), (22): its balance, a closed form, and how little it does in base."""
+"""The fluid's traction on the aggregate (20), (22): its balance, a closed form, and how little it does in base.
+
+The aggregate under the fluid's traction: closed forms, and that shape and flow agree.
+"""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -10,17 +14,17 @@ from skfem.quadrature import get_quadrature_tri
 
 from reference import layered_channel
 from repro.fem.elements import derivatives, values
-from repro.fem.mesh import Mesh
-from repro.fem.outline import FREE
+from repro.fem.mesh import Mesh, curved
+from repro.fem.newton import relative
+from repro.fem.outline import FREE, Outline, slopes
 from repro.fem.space import Space
 from repro.march import updates
 from repro.march.loop import Instant
-from repro.model import contact, flow, pore, traction
+from repro.model import contact, flow, growth, mesh_motion, pore, traction
 from repro.model.flow import Flow
-from verification.case import Outcome, at_least, at_most, case
-from verification.convergence import refine, study
-from verification.coupling import runs
-from verification.flow import grids, layers
+from verification.flow import closed_forms
+from verification.kernel.case import Outcome, at_least, at_most, between, case, refine, study
+from verification.problems import meshes, runs
 
 FORMS = ("laplacian", "traction")
 BOTH_ENDS = "the momentum balance of the solver's own equations: round-off"
@@ -43,7 +47,7 @@ def nodal(scene, space: Space) -> tuple[np.ndarray, Flow]:
            "the fluid, over the largest; drag on a half-disc over head loss times W less wall shear, less 1",
       claim="What the fluid does to the aggregate the aggregate does to the fluid; no force is left in the fluid; the "
             "drag is what the ends' pressure and the walls' shear leave over",
-      mutants=("traction-pressure-left-out", "traction-form-mixed", "traction-of-both-phases"))
+      mutants=("traction-pressure-left-out", "traction-form-mixed", "traction-of-both-phases"), ways="1 2 3 paper")
 def balance() -> Outcome:
     checks = [check for elements in runs.ELEMENTS for form in FORMS for check in _balanced(elements, form)]
     errors = refine(_drag_error, REFINEMENTS)
@@ -127,21 +131,21 @@ def _wall_shear(grid: Mesh, velocity: np.ndarray) -> float:
       norm="x-force on the middle of a layer of biomass, lambda = 2000, over the shear stress of two viscous layers, "
            "less 1, root mean square over random meshes of a size",
       claim="The shear that the fluid exerts on a layer of biomass is that of two viscous layers",
-      mutants=("traction-pressure-left-out", "traction-transposed-gradient"))
+      mutants=("traction-pressure-left-out", "traction-transposed-gradient"), ways="1 2 3")
 def layer() -> Outcome:
-    errors = refine(lambda level: grids.root_mean_square(lambda draw: {"shear": _shear_error(level, draw)},
-                                                         LAYER_DRAWS[level]), range(len(layers.SIZES)))
-    checks = [at_most(f"shear, order {order}", abs(_shear(Space(layers._long_layer(), order))), 1e-5,
+    errors = refine(lambda level: meshes.root_mean_square(lambda draw: {"shear": _shear_error(level, draw)},
+                                                         LAYER_DRAWS[level]), range(len(closed_forms.SIZES)))
+    checks = [at_most(f"shear, order {order}", abs(_shear(Space(closed_forms._long_layer(), order))), 1e-5,
                       "both parabolas are held; what is left of the layer's ends") for order in (2, 3)]
-    return Outcome(tuple(checks), (study("shear", layers.SIZES, errors["shear"], 2, "forces as residuals of linear "
-                                         "elements: second order, as the flux", ceiling=1e-3),))
+    return Outcome(tuple(checks), (study("shear", closed_forms.SIZES, errors["shear"], 2, "forces as residuals of "
+                                         "linear elements: second order, as the flux", ceiling=1e-3),))
 
 
 LAYER_DRAWS = (16, 12, 6, 2)
 
 
 def _shear_error(level: int, draw: int) -> float:
-    return _shear(Space(layers._grid(level, draw), 1))
+    return _shear(Space(closed_forms._grid(level, draw), 1))
 
 
 def _shear(space: Space) -> float:
@@ -150,12 +154,13 @@ def _shear(space: Space) -> float:
     found = flow.unit_flow(space, ratio)
     as_flow = Flow(1.0, found.velocity, found.pressure, found.correction, 1.0, 1.0, 1.0)
     on = traction.nodal(space, as_flow, 1.0, "laplacian")
-    line = np.flatnonzero((mesh.points[:, 1] == layers.LAYER) & (np.abs(mesh.points[:, 0]) < layers.LAYER_END))
+    along, across = mesh.points.T
+    line = np.flatnonzero((across == closed_forms.LAYER) & (np.abs(along) < closed_forms.LAYER_END))
     x, shear = mesh.points[line, 0], on[line, 0]
     weight = np.clip((half + 10 - np.abs(x)) / 10, 0, 1)  # level, then ramps: the sum is a tested integral
     length = _tested(mesh, line, weight)
-    gradient = layered_channel.gradient(layers.WIDTH, layers.LAYER, ratio)
-    exact = gradient * (layered_channel._stress(layers.WIDTH, layers.LAYER, ratio) - layers.LAYER)
+    gradient = layered_channel.gradient(closed_forms.WIDTH, closed_forms.LAYER, ratio)
+    exact = gradient * (layered_channel._stress(closed_forms.WIDTH, closed_forms.LAYER, ratio) - closed_forms.LAYER)
     return float(weight @ shear / length / exact - 1)
 
 
@@ -173,15 +178,12 @@ def _tested(mesh: Mesh, line: np.ndarray, weight: np.ndarray) -> float:
       norm="base at 4, 10 and 16 h, steps of 24 min: largest move of the interface by the fluid in the next step, over "
            "the thickness",
       claim="The fluid's forces are small against those of growth (C26): they move base's interface by less than 1e-4",
-      mutants=("density-squared", "forces-thousandfold"))
-def small_in_base() -> Outcome:
-    checks = []
-    for elements in runs.ELEMENTS:
-        moves = [_move_in_base(hours, elements) for hours in (4, 10, 16)]
-        checks += [at_most(f"largest move, {elements}", max(moves), 1e-4, "0.1 Pa of the fluid on a stiffness of 2 to "
-                           "10 kPa, some times for the slender shape"),
-                   at_least(f"least move, {elements}", min(moves), 1e-7, "else no force has acted")]
-    return Outcome(tuple(checks))
+      mutants=("density-squared", "forces-thousandfold"), over=runs.ELEMENTS, ways="paper")
+def small_in_base(elements: str):
+    moves = [_move_in_base(hours, elements) for hours in (4, 10, 16)]
+    return (at_most("largest move", max(moves), 1e-4, "0.1 Pa of the fluid on a stiffness of 2 to 10 kPa, some times "
+                    "for the slender shape"),
+            at_least("least move", min(moves), 1e-7, "else no force has acted"))
 
 
 @cache
@@ -199,3 +201,203 @@ def _move_in_base(hours: int, elements: str) -> float:
         grown, _, _ = updates.make_biomass(scene, found.pore, found.solved, 0.4)
         shapes.append(contact.expand(scene, grown, updates.enlarged(scene, found.pore, grown))[0])
     return float(np.abs(shapes[1].mesh.points - shapes[0].mesh.points).max() / shapes[0].outline.thickness)
+
+
+@case("coupling-traction-stretch", kind="exact", norm="relative error of positions; of P over mu_L",
+      claim="A block on a wall that is pulled at both sides stretches as a neo-Hookean body does, a - a^-3 = T / mu_L, "
+            "and keeps its area, on any mesh",
+      mutants=("forces-pushed", "forces-halved"),
+      over={f"a = {a:g}, order {order}": (order, a) for order in (1, 2) for a in (0.8, 1.01, 1.5)},
+      because="order 3: its displacements are order 2's")
+def stretch(order: int, factor: float):
+    """Checks of a block of linear or quadratic displacements."""
+    points, triangles = meshes.rectangle((-20.0, 20.0), 15.0, 4.0, seed=2)
+    points[np.argmin(np.hypot(*points.T)), 0] = 0.0
+    mesh = Mesh.of(points, triangles, np.ones(len(triangles), bool), np.empty(0, int), 15.0, (-20.0, 20.0))
+    mesh = mesh if order == 1 else curved(mesh, None)
+    where = mesh.points
+    held = np.zeros((len(where), 2), bool)
+    held[where[:, 1] == 0, 1] = True
+    held[np.flatnonzero((where == 0).all(axis=1)), 0] = True
+    body = growth.Body(growth.Shape(mesh.cells, mesh.corners, {1: 1, 2: 6}[order]), where)
+    forces = (factor - factor**-3) * (_ends(mesh, 20.0) - _ends(mesh, -20.0))
+    found = growth.equilibrium(body, np.ones_like(body.at.dx), where, np.zeros(mesh.corners), held, where,
+                               forces=forces)
+    apart = np.abs(found.position - where * [factor, 1 / factor]).max() / 20.0
+    pressure = (factor**2 + factor**-2 + 1) / 3 - factor**-2
+    return [at_most("places", apart, 1e-9, "linear displacement: Newton's tolerance"),
+            at_most("P", np.abs(found.pressure - pressure).max(), 1e-9, "even: as before")]
+
+
+def _ends(mesh: Mesh, side: float) -> np.ndarray:
+    """(N, 2): lengths of a side's edges shared between their nodes, along x: halves, or a sixth, two thirds and a sixth
+    where there are middles."""
+    share = np.zeros_like(mesh.points)
+    nodes = np.flatnonzero(mesh.points[:, 0] == side)
+    nodes = nodes[np.argsort(mesh.points[nodes, 1])]
+    part = np.array([0.5, 0.5]) if mesh.geometry == 1 else np.array([1.0, 4.0, 1.0]) / 6
+    for first in range(0, len(nodes) - 1, mesh.geometry):
+        edge = nodes[first: first + mesh.geometry + 1]
+        share[edge, 0] += part * np.ptp(mesh.points[edge, 1])
+    return share
+
+
+@case("coupling-traction-even", kind="exact",
+      norm="largest move of a node, over R; P over mu_L less what it was and the pressure; forces at free nodes less "
+           "those of an even pressure, over the largest",
+      claim="An even pressure of the fluid, five times mu_L and more, moves nothing: the aggregate is incompressible, "
+            "and its P takes the pressure up",
+      mutants=("traction-pressure-left-out", "forces-pushed"), over=runs.ELEMENTS, ways="paper")
+def even_pressure(elements: str):
+    """Checks with one kind of elements."""
+    scene = loaded_scene(runs.of(elements))
+    now = pore.seeded(scene)
+    theta = _uneven(now, 1.1, 0.002)
+    plain, _, _ = contact._at_rest(scene, now, theta, now, None)
+    mesh, space = now.mesh, now.space
+    mesh = mesh.moved(mesh_motion.move(mesh, plain.mesh.points[mesh.body], 1.0, 100.0))
+    space = Space(mesh, space.order)
+    still = Flow(0.0, np.zeros((space.count, 2)), np.full(flow.pressure_space(space).count, 5.0), None, 0.0, 0.0, 0.0)
+    on = traction.nodal(space, still, 1.0, "laplacian")
+    by_hand = -5.0 * _normals(plain.outline)
+    free = plain.wall == FREE
+    checks = [at_most("forces", np.abs(on[mesh.loop[free]] - by_hand[free]).max() / np.abs(by_hand).max(),
+                      1e-12, "the divergence theorem: round-off")]
+    inside = mesh.topology.body_corners
+    for sign in (1.0, -1.0):
+        pushed, _, _ = contact._at_rest(scene, now, theta, now, sign * on[mesh.body])
+        apart = np.abs(pushed.mesh.points - plain.mesh.points).max() / 25.0
+        change = (pushed.pressure - plain.pressure)[inside] + sign * 5.0
+        checks += [at_most(f"move, {sign:+g}", apart, 1e-9, "J = theta: Newton's tolerance"),
+                   at_most(f"P, {sign:+g}", np.abs(change).max(), 1e-8, "Newton's tolerance")]
+    return checks
+
+
+def _uneven(now: pore.Pore, mean: float, slope: float) -> np.ndarray:
+    """(t, q) theta of a seed times mean + slope x."""
+    shape = now.body.shape
+    places = np.einsum("qa,ta->tq", shape.table.shape, now.body.reference[shape.cells, 0])
+    return now.theta * (mean + slope * places)
+
+
+def _normals(outline: Outline) -> np.ndarray:
+    """(M, 2) outward normals times length of the interface's edges, shared between their nodes: along a parabola by the
+    integral of its tangent times the nodes' functions."""
+    nodes = outline.arcs(outline.points)
+    first, bend = slopes(nodes)
+    t, weight = np.polynomial.legendre.leggauss(3)
+    t, weight = 0.5 * (1 + t), 0.5 * weight
+    tangent = first[:, None] + t[:, None] * bend[:, None]
+    normal = np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1) * weight[:, None]
+    share = _shares(outline.geometry, t)
+    local = np.einsum("qa,mqi->mai", share, normal)
+    count, step = len(outline.points), outline.geometry
+    total = np.zeros((count, 2))
+    wet = outline.interface_edges()[::step]
+    for edge in np.flatnonzero(wet):
+        total[(step * edge + np.arange(step + 1)) % count] += local[edge]
+    return total
+
+
+def _shares(geometry: int, t: np.ndarray) -> np.ndarray:
+    """(q, geometry + 1) the functions of an edge's nodes at t."""
+    if geometry == 1:
+        return np.column_stack([1 - t, t])
+    return np.column_stack([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)])
+
+
+FACTORS = (800.0, 400.0, 200.0, 100.0)
+
+
+def _said(elements: str, factor: float):
+    """A scene in water ``factor`` times as dense at the same velocities (0: without fluid forces)."""
+    scene = loaded_scene(runs.of(elements))
+    if factor == 0:
+        return replace(scene, growth=replace(scene.growth, fluid_forces="neglected"))
+    return replace(scene, flow=replace(scene.flow, density=factor * scene.flow.density))
+
+
+@cache
+def _moved(elements: str, factor: float) -> tuple[pore.Pore, pore.Pore, np.ndarray]:
+    """A half-disc of 25 um, what a step of uneven growth makes of it, and its theta."""
+    said = _said(elements, factor)
+    now = pore.seeded(said)
+    theta = _uneven(now, 1.1, -0.002)
+    return now, contact.expand(said, now, theta)[0], theta
+
+
+@case("coupling-traction-fixed-point", kind="property",
+      norm="nodes' move by the fluid, over the force's factor and R, against that of the factor below; defect of the "
+           "equilibrium under the forces of the flow around its own shape, and around the shape before",
+      claim="The move is proportional to the force as the force falls, and shape and flow agree in the end",
+      mutants=("forces-of-the-first-round", "forces-pushed", "density-squared"), over=runs.ELEMENTS, ways="paper")
+def fixed_point(elements: str):
+    """Checks, and the study, of one kind of elements."""
+    plain = _moved(elements, 0.0)[1].mesh.points
+    moves = [(_moved(elements, factor)[1].mesh.points - plain) / factor for factor in (*FACTORS, 1.0)]
+    size = np.abs(moves[-1]).max()
+    apart = [np.abs(move - moves[-1]).max() / size for move in moves[:-1]]
+    own, before = _defects(elements, FACTORS[-1])
+    checks = [at_most("defect with its own flow", own, 1e-8, "nodes at rest to 1e-8 of R"),
+              at_least("defect with the flow before", before, 1e-5, "else no round is needed"),
+              between("downstream tip's move at factor 1, over the upstream one's",
+                      _tips(elements, moves[-1]), 0.2, 5.0, "both are pushed downstream"),
+              at_most("largest move at factor 1, over R", size / 25.0, 1e-4, "0.1 Pa on 10 kPa")]
+    return checks, study("move over force", FACTORS, apart, 1, "quadratic remainder of a smooth map: "
+                         "first order", ceiling=1e-3)
+
+
+def _tips(elements: str, move: np.ndarray) -> float:
+    """Move along x of the downstream contact line over that of the upstream one."""
+    mesh = _moved(elements, 0.0)[0].mesh
+    x = mesh.points[mesh.loop, 0]
+    ends = mesh.loop[[np.argmax(x), np.argmin(x)]]
+    return float(move[ends[0], 0] / move[ends[1], 0])
+
+
+def _defects(elements: str, factor: float) -> tuple[float, float]:
+    """Residual of the equilibrium over the size of its terms under the forces around its own shape, and the last's."""
+    said = _said(elements, factor)
+    now, found, theta = _moved(elements, factor)
+    nodes, body = now.mesh.body, now.body
+    held = contact.constrained(len(nodes), now.mesh.topology.body_loop, now.wall, now.fixed)
+    stabilising, defects = None, []
+    if body.shape.geometry == 1:
+        cells = body.shape.cells
+        stabilising = growth.gradient_stabilisation(now.mesh.points[nodes], cells, np.ones(len(cells)))
+    place, pressure = found.mesh.points[nodes], found.pressure[now.mesh.topology.body_corners]
+    rest = growth.System(body, held, stabilising=stabilising).under(theta, place, place, pressure)
+    for around in (found, now):
+        forces = traction.forces(said, traction.surroundings(said, now, around), around)
+        load = np.concatenate([forces.T.ravel(), np.zeros(len(pressure))])
+        defects.append(relative((rest.residual - load)[rest.free], (rest.size + np.abs(load))[rest.free]))
+    return tuple(defects)
+
+
+@case("coupling-traction-remeshed", kind="property",
+      norm="sum along x and moment of the forces on an outline's nodes against those on the nodes of a new mesh around "
+           "it, and the sum against that on the mesh that followed; relative",
+      claim="Where a new mesh must be made for the flow, its forces go to the aggregate's nodes, sum and moment kept",
+      mutants=("forces-shared-evenly",), over=runs.ELEMENTS, ways="paper")
+def remeshed(elements: str):
+    """Checks with one kind of elements."""
+    now, found, _ = _moved(elements, 0.0)
+    fine = loaded_scene(runs.coarser(elements, 3.0, 3.0), runs.of(elements))
+    coarse = loaded_scene(runs.of(elements))
+    mesh, _ = pore.generate(fine, found.outline)
+    on = nodal(fine, Space(mesh, found.space.order))[0]
+    scale = traction.MPA_PER_UM * fine.flow.density * fine.flow.gravity / fine.growth.shear_modulus
+    new = _sums(mesh.points[mesh.loop], scale * on[mesh.loop])
+    places = found.mesh.points[now.mesh.body]
+    both = [traction.forces(scene, traction.surroundings(scene, now, found), found) for scene in (fine, coarse)]
+    ours, followed = (_sums(places, forces) for forces in both)
+    return [at_most("new mesh, nodes of the outline", np.abs(ours / new - 1).max(), 1e-9, runs.ROUND_OFF),
+            at_most("new mesh, mesh that followed, x", abs(ours[0] / followed[0] - 1), 0.02,
+                    "the drag's own error at this refinement: 0.012"),
+            at_least("nodes, new over old", len(mesh.loop) / len(now.mesh.loop), 1.5,
+                     "else none was split")]
+
+
+def _sums(places: np.ndarray, on: np.ndarray) -> np.ndarray:
+    """Sum along x, and moment of the forces."""
+    return np.array([on[:, 0].sum(), np.sum(places[:, 0] * on[:, 1] - places[:, 1] * on[:, 0])])

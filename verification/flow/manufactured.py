@@ -13,11 +13,9 @@ import numpy as np
 
 from reference import manufactured_flow
 from repro.fem.mesh import Mesh, curved
-from verification import norms
-from verification.case import Outcome, Profile, case
-from verification.convergence import Study, refine, study
-from verification.flow import boxes, grids
-from verification.flow.boxes import Problem
+from verification.kernel.case import Outcome, Profile, Study, case, refine, study
+from verification.problems import boxes, meshes, norms
+from verification.problems.boxes import Problem
 
 DRAWS = (10, 6, 3, 1)
 SIZES, COARSE = (0.14, 0.07, 0.035, 0.0175), (0.28, 0.14, 0.07, 0.035)
@@ -33,7 +31,7 @@ PRESSURE = {1: (0.9, 1.7, LAYERS), 2: (1.7, 3.3, BELOW), 3: (2.7, 4.3, BELOW)}
 @case("flow-manufactured", kind="manufactured",
       norm="root mean square over random meshes of a size, relative L2 of u and p",
       claim="Where nothing jumps but the viscosity all orders are full, for lambda = 10 and 2000 in both forms",
-      mutants=("saddle-sign",))
+      mutants=("saddle-sign",), ways="1", because="orders 2, 3: flow-manufactured-quadratic")
 def manufactured() -> Outcome:
     studies = [part for form in FORMS for part in _studies(form, 1, STRAIGHT, SIZES, (2e-4, 0.06))]
     return Outcome(studies=tuple(studies), profiles=tuple(_profile(*form) for form in FORMS))
@@ -43,7 +41,7 @@ def manufactured() -> Outcome:
       norm="root mean square over random meshes of a size, relative L2 of u and p",
       claim="The same flow with quadratic velocities is of third order, its pressure of second; with cubic ones of "
             "fourth, its pressure of third",
-      mutants=("traction-transposed", "cubic-lower-degree"))
+      mutants=("traction-transposed", "cubic-lower-degree"), ways="2 3", because="order 1: flow-manufactured")
 def manufactured_quadratic() -> Outcome:
     studies = [part for form in FORMS for part in (*_studies(form, 2, STRAIGHT, SIZES, (1e-6, 3e-4)),
                                                    *_studies(form, 3, STRAIGHT, COARSE, (1e-7, 5e-5)))]
@@ -55,7 +53,7 @@ def manufactured_quadratic() -> Outcome:
       claim="On bent triangles quadratic velocities are of third order and cubic ones of fourth, their pressures of "
             "second and third, where the viscosity jumps tenfold at a straight interface, in both forms",
       mutants=("cubic-edge-crossed", "cubic-slope", "cubic-lower-degree", "curved-straight-divergence",
-               "traction-transposed"))
+               "traction-transposed"), ways="2 3", because="order 1 has straight triangles: flow-manufactured")
 def manufactured_curved() -> Outcome:
     studies = []
     for interface in ("laplacian", "traction"):
@@ -67,7 +65,7 @@ def manufactured_curved() -> Outcome:
 def _studies(form: tuple[float, str], order: int, bend: float | None, sizes, ceilings) -> tuple[Study, Study]:
     """Velocity and pressure of an order on meshes of some sizes; ceilings: their last errors at most."""
     problem, where = _problem(*form, order), f"order {order}, lambda = {form[0]:g}, {form[1]}"
-    errors = refine(lambda level: grids.root_mean_square(
+    errors = refine(lambda level: meshes.root_mean_square(
         lambda draw: boxes.errors(_grid(sizes[level], draw, bend), problem), DRAWS[level]), range(len(sizes)))
     low, high, why = PRESSURE[order]
     return (study(f"velocity, {where}", sizes, errors["velocity"], order + 1, FULL, ceiling=ceilings[0]),
@@ -78,7 +76,7 @@ def _studies(form: tuple[float, str], order: int, bend: float | None, sizes, cei
 def _grid(size: float, draw: int, bend: float | None) -> Mesh:
     """A box of unit width cut by the interface, which goes through the origin; both turned by ANGLE; bent triangles
     where ``bend`` is a number."""
-    grid = grids.channel((-0.6, 0.5), 1.0, size, lambda x, y: x > 0, across=(0.0,), seed=int(1e4 * size) + draw)
+    grid = meshes.cut((-0.6, 0.5), 1.0, size, lambda x, y: x > 0, across=(0.0,), seed=int(1e4 * size) + draw)
     if bend is not None:
         grid = curved(grid, None)
     s, t = (grid.points - [0.0, 0.5]).T

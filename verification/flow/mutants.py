@@ -1,6 +1,6 @@
 """Wrong changes to `repro/` that cases of this stage must catch."""
 
-from verification.mutants import Mutant
+from verification.kernel.mutants import Mutant
 
 ASSEMBLY, ELEMENTS, MESH = "repro/fem/assembly.py", "repro/fem/elements.py", "repro/fem/mesh.py"
 FLOW = "repro/model/flow.py"

@@ -1,4 +1,7 @@
-"""What no viscous flow may do, whatever its numbers: lose flux or energy, know its direction, gain by an obstacle."""
+"""What no viscous flow may do, whatever its numbers: lose flux or energy, know its direction, gain by an obstacle.
+
+Element sizes that grow with the distance from the aggregate, against one size everywhere.
+"""
 
 from __future__ import annotations
 
@@ -9,16 +12,19 @@ import numpy as np
 
 from repro.fem import elements
 from repro.fem.assembly import saddle_blocks
-from repro.fem.mesh import Mesh, curved
+from repro.fem.mesh import Mesh
 from repro.fem.space import Space
-from repro.model import flow
-from verification import meshes, norms
-from verification.case import Check, Outcome, at_least, at_most, between, case
-from verification.flow import grids
+from repro.model import flow, pore
+from repro.scene import parse_scene
 from verification.flow.closed_forms import LENGTH, drive
+from verification.kernel.case import Check, Outcome, at_least, at_most, between, case
+from verification.problems import meshes, norms
 
 WIDTH, ENDS, RATIO = 50.0, (-75.0, 75.0), 2000.0
-ORDERS, FORMS = (1, 2, 3), ("laplacian", "traction")
+FORMS = ("laplacian", "traction")
+#: Every order with both forms, by label.
+EVERY = {f"order {order}, {form}": (order, form) for order in (1, 2, 3) for form in FORMS}
+HIGHER = {label: given for label, given in EVERY.items() if given[0] > 1}
 #: Refinement of the meshes of each order.
 REFINED = {1: 1.0, 2: 0.5, 3: 0.4}
 
@@ -26,21 +32,20 @@ REFINED = {1: 1.0, 2: 0.5, 3: 0.4}
 @cache
 def _half_disc(radius: float, order: int = 1, lean: float = 0.0, reach: float = 75.0) -> Space:
     """Functions of an order on the mesh around a half-disc that is sheared by ``lean``."""
-    grid = meshes.half_disc(radius, REFINED[order], (-reach, reach), WIDTH, geometry=min(order, 2), lean=lean)
-    return Space(grid, order)
+    return Space(meshes.half_disc(radius, REFINED[order], (-reach, reach), WIDTH, geometry=min(order, 2), lean=lean),
+                 order)
 
 
 @cache
 def _plugged(order: int) -> Space:
-    grid = grids.channel(ENDS, WIDTH, 3.1 if order == 1 else 6.0, lambda x, y: np.abs(x) < 30, across=(-30.0, 30.0))
-    return Space(grid if order == 1 else curved(grid, None), order)
+    return meshes.space_on(meshes.plug(ENDS, WIDTH, 30.0, 3.1 if order == 1 else 6.0, meshes.cut), order)
 
 
 @case("flow-sections", kind="property", norm="largest relative error of the flux through 25 sections",
       claim="The same flux passes every section of a pore, plugged or not: to round-off for w = u - tau grad p of "
             "linear elements and for u itself of quadratic and cubic ones, in both forms",
       mutants=("tau-of-water", "carried-by-u-plus", "inlet-not-scaled", "curved-straight-divergence",
-               "inlet-parabola"))
+               "inlet-parabola"), ways="1 2 3")
 def sections() -> Outcome:
     checks, why = [], "(2) tested with linear ramps, round-off"
     pores = {"plug": (_plugged, 0.003), "half-disc of 40 um": (partial(_half_disc, 40.0), 0.012),
@@ -91,24 +96,18 @@ def _carried_error(space: Space, velocity: np.ndarray) -> float:
 @case("flow-energy", kind="property", norm="relative difference",
       claim="The work of the inlet is what viscosity and stabilisation dissipate, of order 2 and 3 the head loss times "
             "the flux, and the flow is linear in its drive",
-      mutants=("correction-not-scaled", "loss-per-width"))
-def energy() -> Outcome:
-    checks = []
-    for order, interface in product(ORDERS, FORMS):
-        space, name = _half_disc(25.0, order), f"order {order}, {interface}"
-        unit = flow.unit_flow(space, RATIO, interface=interface)
-        work, dissipated = _power(space, unit, interface)
-        driven = [flow.scaled(unit, space.mesh, LENGTH, drive(head=head)) for head in (10.0, 20.0)]
-        checks += [at_most(f"work less dissipation, {name}", abs(work / dissipated - 1), 1e-9,
-                           "symmetry of the weak form, round-off"),
-                   at_most(f"twice the head, twice the flow, {name}", _off_twice(*driven), 1e-12,
-                           "linearity, round-off"),
-                   at_most(f"head given, head lost, {name}", abs(driven[0].head_loss / 10.0 - 1), 1e-12,
-                           "linearity, round-off")]
-        if order > 1:
-            checks.append(at_most(f"loss times flux, {name}", abs(unit.loss * WIDTH / dissipated - 1), 1e-9,
-                                  "the loss is the work of the inlet, round-off"))
-    return Outcome(tuple(checks))
+      mutants=("correction-not-scaled", "loss-per-width"), over=EVERY)
+def energy(order: int, interface: str):
+    space = _half_disc(25.0, order)
+    unit = flow.unit_flow(space, RATIO, interface=interface)
+    work, dissipated = _power(space, unit, interface)
+    driven = [flow.scaled(unit, space.mesh, LENGTH, drive(head=head)) for head in (10.0, 20.0)]
+    yield at_most("work less dissipation", abs(work / dissipated - 1), 1e-9, "symmetry of the weak form, round-off")
+    yield at_most("twice the head, twice the flow", _off_twice(*driven), 1e-12, "linearity, round-off")
+    yield at_most("head given, head lost", abs(driven[0].head_loss / 10.0 - 1), 1e-12, "linearity, round-off")
+    if order > 1:
+        yield at_most("loss times flux", abs(unit.loss * WIDTH / dissipated - 1), 1e-9,
+                      "the loss is the work of the inlet, round-off")
 
 
 def _off_twice(once: flow.Flow, twice: flow.Flow) -> float:
@@ -137,20 +136,17 @@ def _power(space: Space, unit: flow.UnitFlow, interface: str) -> tuple[float, fl
 
 @case("flow-reversed", kind="property", norm="L2 of the difference of both velocities, in the middle and everywhere",
       claim="Flow through a leaning aggregate is its mirror image's flow mirrored, since Stokes flow is reversible",
-      mutants=("outlet-free",))
-def reversed_flow() -> Outcome:
-    checks = []
-    for order, interface in product(ORDERS, FORMS):
-        space = _half_disc(25.0, order, lean=0.6, reach=150.0)
-        mirror = Space(_mirrored(space.mesh), order)
-        there, back = (flow.unit_flow(way, RATIO, interface=interface).velocity for way in (space, mirror))
-        near = np.abs(space.mesh.points[space.mesh.triangles, 0]).max(axis=1) < 40
-        for where, chosen, bound, why in (
-                ("around the aggregate", near, 1e-6, "what differs at inlet and outlet decays like exp(-4.2 x / W)"),
-                ("everywhere", near | True, 5e-4, "second order, in the layer where inlet and outlet differ")):
-            size = _size(space, there - back * [1.0, -1.0], chosen) / _size(space, there, near | True)
-            checks.append(at_most(f"difference {where}, order {order}, {interface}", size, bound, why))
-    return Outcome(tuple(checks))
+      mutants=("outlet-free",), over=EVERY)
+def reversed_flow(order: int, interface: str):
+    space = _half_disc(25.0, order, lean=0.6, reach=150.0)
+    mirror = Space(_mirrored(space.mesh), order)
+    there, back = (flow.unit_flow(way, RATIO, interface=interface).velocity for way in (space, mirror))
+    near = np.abs(space.mesh.points[space.mesh.triangles, 0]).max(axis=1) < 40
+    for where, chosen, bound, why in (
+            ("around the aggregate", near, 1e-6, "what differs at inlet and outlet decays like exp(-4.2 x / W)"),
+            ("everywhere", near | True, 5e-4, "second order, in the layer where inlet and outlet differ")):
+        size = _size(space, there - back * [1.0, -1.0], chosen) / _size(space, there, near | True)
+        yield at_most(f"difference {where}", size, bound, why)
 
 
 def _mirrored(grid: Mesh) -> Mesh:
@@ -171,22 +167,17 @@ RATIOS = np.array([1.0, 2.0, 10.0, 100.0, 2000.0, 1e5])
 
 @case("flow-obstacle", kind="property", norm="head losses for six lambda, over that of the clean channel",
       claim="Viscous biomass never raises the conductivity: the loss rises with lambda, ever more slowly, and with R",
-      mutants=("thin-biomass",))
-def obstacle() -> Outcome:
-    return Outcome(tuple(check for order in ORDERS for interface in FORMS for check in _rising(order, interface)))
-
-
-def _rising(order: int, interface: str) -> list[Check]:
+      mutants=("thin-biomass",), over=EVERY)
+def obstacle(order: int, interface: str):
     """Losses of four half-discs."""
     losses = np.array([[flow.unit_flow(_half_disc(radius, order), ratio, interface=interface).loss for ratio in RATIOS]
                        for radius in (5.0, 25.0, 40.0, 46.0)])
     slopes = np.diff(losses, axis=1) / np.diff(RATIOS)
-    name = f"order {order}, {interface}"
     why = "least dissipation (Helmholtz): the loss is the least of functions that are linear in lambda"
-    return [at_least(f"least rise with lambda, over the loss, {name}",
+    return [at_least("least rise with lambda, over the loss",
                      (np.diff(losses, axis=1) / losses[:, 1:]).min(), 0.0, why),
-            at_most(f"largest slope over the one before, {name}", (slopes[:, 1:] / slopes[:, :-1]).max(), 1.0, why),
-            at_least(f"least rise with R at lambda = 2000, over the loss, {name}",
+            at_most("largest slope over the one before", (slopes[:, 1:] / slopes[:, :-1]).max(), 1.0, why),
+            at_least("least rise with R at lambda = 2000, over the loss",
                      (np.diff(losses[:, 4]) / losses[1:, 4]).min(), 0.0, "nested obstacles: " + why)]
 
 
@@ -197,24 +188,46 @@ SIMPSON = {2: np.array([1, 4, 1]) / 6, 3: np.array([1, 3, 3, 1]) / 8}
 @case("flow-curved-flux", kind="property", norm="flux through sections over that of the inlet",
       claim="What comes in goes through every section, order 2 and 3 and both forms: exactly at the outlet, and as "
             "well as the mesh resolves it across the aggregate",
-      mutants=("curved-straight-divergence",))
-def curved_flux() -> Outcome:
-    return Outcome(tuple(check for order in (2, 3) for interface in FORMS for check in _through(order, interface)))
-
-
-def _through(order: int, interface: str) -> list[Check]:
+      mutants=("curved-straight-divergence",), over=HIGHER, because="order 1: flow-sections")
+def curved_flux(order: int, interface: str):
     """Fluxes by the midpoint rule across the pore, and over the outlet by Simpson's rules."""
     space = Space(meshes.half_disc(20.0, 1.2, ENDS, WIDTH, geometry=2), order)
-    velocity, name = flow.unit_flow(space, RATIO, interface=interface).velocity, f"order {order}, {interface}"
+    velocity = flow.unit_flow(space, RATIO, interface=interface).velocity
     y = (np.arange(2000) + 0.5) / 2000 * WIDTH
     out = space.end_lengths(space.dofs.outlet) @ velocity[space.dofs.outlet, 0] @ SIMPSON[order] / WIDTH
-    checks = [_whole(f"outlet, {name}", out, 1e-11, "q = 1: round-off")]
+    checks = [_whole("outlet", out, 1e-11, "q = 1: round-off")]
     for x in (-40.0, -20.0, -7.0, 0.0, 13.0, 33.0):
         through = norms.field_at(space, velocity, np.column_stack([np.full(len(y), x), y]))[:, 0].mean()
-        checks.append(_whole(f"x = {x:g} um, {name}", through, 1e-4,
+        checks.append(_whole(f"x = {x:g} um", through, 1e-4,
                              "div u vanishes in the mean only of each test function: third order"))
     return checks
 
 
 def _whole(name: str, value: float, apart: float, why: str) -> Check:
     return between(name, value, 1 - apart, 1 + apart, why)
+
+
+SCHEMES = {"paper": ({"preset": "paper"}, 5e-3), "accurate": ({"preset": "accurate"}, 1e-3),
+           "cubic": ({"preset": "accurate", "elements": "cubic"}, 1e-3)}
+
+
+@case("flow-graded", kind="property",
+      norm="relative difference of the loss; nodes over those of graded sizes; largest over least edge",
+      claim="With one element size everywhere the loss of a half-disc is that of sizes which grow with the distance "
+            "from it, for more than twice the nodes, on straight triangles and on curved ones of order 2 and 3",
+      mutants=("gradation-ignored", "gradation-not-passed"), over=SCHEMES, ways="1 2",
+      because="fast: elements as of accurate")
+def graded(numerics: dict[str, str], bound: float):
+    (loss, nodes), (even, many) = (_graded_half_disc(numerics, gradation) for gradation in (0.25, 0.0))
+    return (at_most("loss", abs(loss / even - 1), bound,
+                    "errors near the aggregate rule: those of the preset's elements there"),
+            at_most("nodes", nodes / many, 0.5, "half"))
+
+
+def _graded_half_disc(numerics: dict[str, str], gradation: float) -> tuple[float, int]:
+    """Loss of the pore and nodes of its mesh."""
+    tables = {"pore": {"width": "50 um"}, "aggregate": {"radius": "10 um"},
+              "flow": {"mean_velocity": "2.9 m/day"}, "numerics": {**numerics, "gradation": gradation}}
+    scene = parse_scene(tables, "half disc", "half_disc.toml")
+    now = pore.seeded(scene)
+    return pore.solve(scene, now).flow.head_loss, len(now.mesh.points)

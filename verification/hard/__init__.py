@@ -3,8 +3,8 @@
 Each is run with every preset; see :mod:`verification.hard_cases` for the matrix.
 """
 
-from verification.hard import contact, flow, growth, meshes, registered, runs, substrates
+from verification.hard import contact, growth, judge, runs, stages
 
-CASES = tuple(sorted((case for module in (substrates, flow, contact, growth, meshes, runs) for case in module.CASES),
+CASES = tuple(sorted((*stages.SUBSTRATES, *stages.FLOWS, *contact.CASES, *growth.CASES, *runs.MESHES, *runs.RUNS),
                      key=lambda case: case.number))
-registered.register(CASES)
+judge.register(CASES)

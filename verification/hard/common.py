@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 
-from repro.fem.mesh import Mesh, curved
+from repro.fem.mesh import Mesh
 from repro.fem.space import Space
 from repro.march import midpoint, updates
 from repro.march.loop import Instant, Ledger, PoreEnd, Step
@@ -17,7 +17,8 @@ from repro.model import biomass, pore, transport
 from repro.model.pore import Pore, Solved, peclet
 from repro.results import row
 from repro.scene import Kinetics, Scene, load_scene
-from verification.case import Check, at_least, at_most, between
+from verification.kernel.case import Check, at_least, at_most, between
+from verification.problems import meshes
 
 #: The presets, and fast with cubic elements: [numerics] of each.
 NUMERICS = {"paper": {"preset": "paper"}, "fast": {"preset": "fast"}, "accurate": {"preset": "accurate"},
@@ -258,8 +259,7 @@ def steady(found: Run, acceptor: float, donor: float) -> transport.Concentration
 
 def space_on(straight: Mesh, made: Scene) -> Space:
     """The scene's functions on a mesh of straight triangles, or on the same with middles."""
-    numerics = made.numerics
-    return Space(straight if numerics.geometry == 1 else curved(straight, None), numerics.order)
+    return meshes.space_on(straight, made.numerics.order)
 
 
 def seeded(made: Scene) -> tuple[Pore, Solved]:

@@ -17,9 +17,9 @@ from repro.march.loop import Instant
 from repro.model import contact, flow, pore, remeshing
 from repro.results import M_PER_D
 from repro.scene import Scene
-from verification.case import Check, at_least, at_most, between
 from verification.hard import common
 from verification.hard.common import DRIVE, EFFLUENTS, FIXED, SHAPE, TOLERANCE, HardCase, Run
+from verification.kernel.case import Check, at_least, at_most, between
 
 #: A film that closes at once takes a seventh of the elements' height under it, and their biomass aside.
 CLOSING = 0.3

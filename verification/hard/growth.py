@@ -13,11 +13,11 @@ from repro.fem import elements
 from repro.fem.outline import FREE
 from repro.model import growth, pore
 from repro.model.contact import constrained
-from verification.case import Check, at_least, at_most, between
 from verification.hard import common
 from verification.hard.common import DRIVE, SHAPE, TOLERANCE, HardCase, Run
-
-RADIUS = 20.0
+from verification.kernel.case import Check, at_least, at_most, between
+from verification.problems import runs
+from verification.problems.bodies import RADIUS, HalfCylinder
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,12 +42,12 @@ class Grown:
 UPDATE = {1: 1.25, 2: np.inf}
 
 
-def grown(preset: str, theta: Callable[[np.ndarray], np.ndarray]) -> Grown:
-    """A half-disc of 20 um on a wall under theta(R); on straight triangles the mean of their corners."""
+def grown(preset: str, theta: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> Grown:
+    """A half-disc of 20 um on a wall under theta(X, Y); on straight triangles the mean of their corners."""
     now = pore.seeded(common.scene("wide", preset, f'aggregate.radius="{RADIUS} um"'))
     rim, shape, body = now.mesh.topology.body_loop, now.outline, now.body
     held = constrained(len(body.reference), rim, shape.wall, shape.fixed)
-    nodal = theta(np.hypot(*body.reference.T))
+    nodal = theta(*body.reference.T)
     whole = nodal[body.shape.cells] @ body.shape.table.values.T
     place, push = body.reference, now.pressure[now.mesh.topology.body_corners]
     parts = max(1, int(np.ceil(np.abs(np.log(whole)).max() / np.log(UPDATE[now.mesh.geometry]))))
@@ -59,7 +59,7 @@ def grown(preset: str, theta: Callable[[np.ndarray], np.ndarray]) -> Grown:
 
 def even(preset: str, theta: float) -> list[Check]:
     """Uniform theta: x = theta^1/2 X, and one pressure."""
-    found = grown(preset, lambda R: np.full(len(R), theta))
+    found = grown(preset, lambda x, y: np.full(len(x), theta))
     push = neo_hookean.free_growth_pressure(theta)
     apart = np.abs(found.position - np.sqrt(theta) * found.start).max() / (np.sqrt(theta) * RADIUS)
     return [at_most(f"places against theta^1/2 X, theta = {theta:g}, over the radius", apart, 1e-8, "exact; round-off"),
@@ -68,23 +68,20 @@ def even(preset: str, theta: float) -> list[Check]:
 
 def uneven(preset: str, inner: float, outer: float) -> list[Check]:
     """theta = a + c (R / R_0)^2: the closed forms of a half-cylinder."""
-    return _places(grown(preset, _theta(inner, outer)), inner, outer)
-
-
-def _theta(inner: float, outer: float):
-    return lambda R: inner + (outer - inner) * (R / RADIUS) ** 2
+    exact = HalfCylinder(inner, outer)
+    return _places(grown(preset, exact.theta), exact)
 
 
 #: A bound over that of interpolation: two for the pressure, and the paper's stabilisation errs as much again.
 CEA = {1: 4, 2: 2}
 
 
-def _places(found: Grown, inner: float, outer: float) -> list[Check]:
+def _places(found: Grown, exact: HalfCylinder) -> list[Check]:
     """Places and area; Cea's lemma: the error is that of interpolation times the root of the ratio of moduli, which go
     as theta^(-2/3), and two for the pressure; the paper's stabilisation errs as much again, in the same order."""
-    given = (inner, outer - inner, RADIUS)
-    size, contrast = neo_hookean.cylinder_radius(RADIUS, *given), max(inner / outer, outer / inner)
-    places, interpolated = _errors(found, given)
+    inner, outer = exact.inner, exact.outer
+    size, contrast = exact.radius(RADIUS), max(inner / outer, outer / inner)
+    places, interpolated = _errors(found, exact)
     bound = CEA[found.body.shape.geometry] * contrast ** (1 / 3) * interpolated / size
     rim = np.abs(np.hypot(*found.position[found.rim].T) / size - 1).max()
     weight = found.body.at.dx
@@ -95,29 +92,26 @@ def _places(found: Grown, inner: float, outer: float) -> list[Check]:
             at_most(f"radius of the rim, {told}", rim, bound, origin)]
 
 
-def _errors(found: Grown, given) -> tuple[float, float]:
+def _errors(found: Grown, exact: HalfCylinder) -> tuple[float, float]:
     """Root mean squares (um) over t = 0 of the places' error, and of the closed form's own interpolation."""
-    def exact(X):
-        R = np.maximum(np.hypot(X[..., 0], X[..., 1]), 1e-12)
-        return X * (neo_hookean.cylinder_radius(R, *given) / R)[..., None]
-
     cells, geometry = found.body.shape.cells, found.body.shape.geometry
     of = elements.table(geometry, geometry, 6)
     X, ours, best = (np.einsum("qa,tai->tqi", of.values, field[cells]) for field in (
-        found.start, found.position, exact(found.start)))
-    weight = elements.weights(found.start[cells], of)
-    return tuple(float(np.sqrt(np.sum(weight[..., None] * (field - exact(X)) ** 2) / weight.sum())) for field in (
-        ours, best))
+        found.start, found.position, exact.place(*found.start.T)))
+    weight, true = elements.weights(found.start[cells], of), exact.place(X[..., 0], X[..., 1])
+    return tuple(float(np.sqrt(np.sum(weight[..., None] * (field - true) ** 2) / weight.sum()))
+                 for field in (ours, best))
 
 
 def pushed(preset: str, inner: float, outer: float) -> list[Check]:
     """The pressure too, outside of the middle quarter, where linear functions of R meet."""
-    found = grown(preset, _theta(inner, outer))
-    R = np.hypot(*found.start[: found.body.shape.corners].T)
-    far = R > RADIUS / 4
-    push = neo_hookean.cylinder_pressure(R[far], inner, outer - inner, RADIUS)
+    exact = HalfCylinder(inner, outer)
+    found = grown(preset, exact.theta)
+    corners = found.start[: found.body.shape.corners]
+    far = np.hypot(*corners.T) > RADIUS / 4
+    push = exact.pressure(*corners[far].T)
     wrong = np.sqrt(np.mean((found.pressure[far] - push) ** 2) / np.mean(push**2))
-    return [*_places(found, inner, outer),
+    return [*_places(found, exact),
             at_most("pressure outside of R_0 / 4, root of mean squares", wrong, PRESSURE[preset],
                     "[E6]; first order at least: half of h / R")]
 
@@ -148,18 +142,9 @@ def still_water(preset: str, *changes: str) -> Run:
     return common.ran(replace(made, flow=None, substrates=replace(made.substrates, **quick)), balance=None)
 
 
-def _mass(found: Run, time: float) -> float:
-    """(X_A + X_I) over that at the start, (9)-(10) at the supply."""
-    law, both = found.scene.kinetics, found.scene.substrates
-    m_a, m_d = (s.supply / (s.supply + s.half_saturation) for s in (both.acceptor, both.donor))
-    rise = m_a * (law.maximum_utilization_rate * law.yield_coefficient * m_d - law.decay_coefficient)
-    left = m_a * law.decay_coefficient * (1 - law.degradable_fraction)
-    return float(np.exp(rise * time) + left / rise * np.expm1(rise * time))
-
-
 def _half_disc(found: Run) -> list[Check]:
     """Area and thickness of a half-disc that keeps its shape, against the mass."""
-    wanted = _mass(found, found.last["time_h"])
+    wanted = runs.mass_after(found.scene, found.last["time_h"])
     area, thickness = (found.last[name] / found.rows[0][name] for name in ("aggregate_area_um2", "thickness_um"))
     return [at_most("area against exp-growing mass, relative", abs(area / wanted - 1), 1e-6, "C to 1e-7 of the supply"),
             at_most("thickness against the root of it, relative", abs(thickness / np.sqrt(wanted) - 1), 1e-4,

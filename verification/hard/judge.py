@@ -1,8 +1,10 @@
 """When a cell of the matrix, a hard case with a preset, is right, refused or wrong.
 
-    right     all checks of its parts hold, and so does what must hold in every run (balances, bounds, finite numbers);
-    refused   a part has stopped with an error of ``repro``, which says what bound was met or what to change;
-    wrong     a check fails, another exception is raised, nothing is measured, or a part takes longer than LIMIT.
+right     all checks of its parts hold, and so does what must hold in every run (balances, bounds, finite numbers);
+refused   a part has stopped with an error of ``repro``, which says what bound was met or what to change;
+wrong     a check fails, another exception is raised, nothing is measured, or a part takes longer than LIMIT.
+
+Every hard case as a verification case, with all presets.
 """
 
 from __future__ import annotations
@@ -19,8 +21,8 @@ import numpy as np
 
 from repro.errors import SimulationError, StageError
 from repro.scene.units import SceneError
-from verification.case import Check, Outcome, at_most
 from verification.hard.common import LENIENT, PRESETS, HardCase, Run, sound
+from verification.kernel.case import Check, Outcome, at_most, case
 
 #: CPU seconds that a part may take: ten times what the longest does.
 LIMIT = 200.0
@@ -145,6 +147,29 @@ class Verdicts(Outcome):
 
     cells: tuple[Cell, ...] = ()
 
+    def lines(self) -> list[tuple[str, str, str, bool]]:
+        """Verdicts of the parts by preset; then what the right parts were judged by, by preset where bounds differ."""
+        presets = ", ".join(cell.preset for cell in self.cells)
+        found = [(f"verdict of {parts[0].name}", ", ".join(part.verdict for part in parts), presets,
+                  not any(part in cell.unaccepted for cell, part in zip(self.cells, parts)))
+                 for parts in zip(*(cell.parts for cell in self.cells))]
+        bounds: dict[tuple[str, str], dict[str, dict[str, str]]] = {}
+        for cell in self.cells:
+            for part in cell.parts:
+                for check in part.checks if part.verdict == RIGHT else ():
+                    of = bounds.setdefault((check.quantity, part.name), {})
+                    of[cell.preset] = {"expected": check.accepted, "origin": check.origin}
+        return found + [(f"{name}, {quantity}", *_said(of), True) for (quantity, name), of in bounds.items()]
+
+
+def _said(of: dict[str, dict[str, str]]) -> tuple[str, str]:
+    """Bound and origin, once if all presets have the same."""
+    both = []
+    for key in ("expected", "origin"):
+        words = [one[key] for one in of.values()]
+        both.append(words[0] if len({*words}) == 1 else "; ".join(dict.fromkeys(words)))
+    return both[0], both[1]
+
 
 def outcome(cells: Iterable[Cell]) -> Verdicts:
     """All own checks of the parts that are right; what must hold in every run, folded into one number a preset; and how
@@ -166,3 +191,23 @@ def outcome(cells: Iterable[Cell]) -> Verdicts:
 def run_case(case: HardCase) -> Verdicts:
     """A case with every preset."""
     return outcome(run_cell(case, preset) for preset in PRESETS)
+
+
+def register(cases: Iterable[HardCase]) -> None:
+    """Make them known to ``python -m verification``."""
+    for one in cases:
+        _register(one)
+
+
+def _register(one: HardCase) -> None:
+    @case(one.full_id, kind="property", claim=f"{one.title}: {_sentence(one.right_is)}", norm=NORM, mutants=one.mutants,
+          slow=one.slow, ways="1 2 3 paper fast accurate")
+    def run() -> Verdicts:
+        return run_case(one)
+
+
+NORM = "numbers of each part with all presets, and with fast on cubic elements; refused parts are left out"
+
+
+def _sentence(text: str) -> str:
+    return text[0].lower() + text[1:]

@@ -1,6 +1,6 @@
 """Wrong changes to `repro/` that hard cases must catch, each by the case whose difficulty it brings back."""
 
-from verification.mutants import Mutant
+from verification.kernel.mutants import Mutant
 
 MUTANTS = (
     Mutant("hard-newton-too-soon", "repro/model/transport.py",

@@ -1,6 +1,6 @@
 """Wrong changes to `repro/` that cases of this stage must catch."""
 
-from verification.mutants import Mutant
+from verification.kernel.mutants import Mutant
 
 MUTANTS = (
     Mutant("gamma-sign", "repro/model/mesh_motion.py",

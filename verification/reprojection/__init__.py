@@ -1,3 +1,1 @@
 """Reprojection (30)-(34) and the transfer to a new mesh (3.5): what is conserved, what is reproduced."""
-
-from verification.reprojection import bounded, ends, growing, nodes, orders, remeshes, supermesh  # noqa: F401

@@ -2,17 +2,3 @@
 
 Where a reference has one dimension, the pore is a narrow channel, meshed at random, with biomass from wall to wall.
 """
-
-from verification.transport import (
-    closed_forms,
-    manufactured,
-    monod_channel,
-    presets,
-    properties,
-    still_water,
-    transients,
-    well_mixed,
-)
-
-__all__ = ["closed_forms", "manufactured", "monod_channel", "presets", "properties", "still_water", "transients",
-           "well_mixed"]

@@ -11,10 +11,9 @@ from reference import robin_channel, slab
 from repro.fem.space import Space
 from repro.model import transport
 from repro.model.kinetics import Sink
-from verification import norms
-from verification.case import Check, Outcome, Profile, at_most, case
-from verification.convergence import BAND, refine, study
-from verification.transport.channels import (
+from verification.kernel.case import BAND, Outcome, Profile, at_most, case, refine, study
+from verification.problems import norms
+from verification.problems.channels import (
     CROSSED,
     EXPECTED,
     FILM,
@@ -49,7 +48,8 @@ UPTAKE = 2e4
 @case("transport-robin-channel", kind="exact", norm="L2 of C over the mesh, relative; several meshes a size",
       claim="First-order uptake in a slab under plug flow follows its closed form, (26) upstream included, at Peclet "
             "0.1, 1, 10, wherever the inlet is put",
-      mutants=("fluid-diffusivity", "half-of-the-advection", "no-inlet-flux", "weights-of-the-ends"))
+      mutants=("fluid-diffusivity", "half-of-the-advection", "no-inlet-flux", "weights-of-the-ends"),
+      ways="1", because="orders 2, 3: transport-robin-higher")
 def robin() -> Outcome:
     studies = [study(f"C, Pe = {peclet:g}", SIZES, _robin(peclet, CROSSED), 2, SECOND, ceiling=ceiling)
                for peclet, ceiling in ((0.1, 2e-4), (1.0, 2e-4), (10.0, 5e-5))]
@@ -112,32 +112,22 @@ def _higher(order: int, peclet: float) -> dict[str, np.ndarray]:
     return refine(lambda size: averaged(higher_errors, size, order, peclet, samples=samples), samples)
 
 
-@case("transport-curved-robin", kind="exact", slow=True,
+#: Peclet numbers with the last error of C, where and how large that of C leaving may be, for each order.
+ROBIN = {2: (((0.1, 3e-9), (1.0, 1.5e-8), (10.0, 1e-7)), -1, 6e-9), 3: (((1.0, 2e-11), (10.0, 1e-9)), 1, 1e-11)}
+
+
+@case("transport-robin-higher", kind="exact", slow=True,
       norm="root mean square of C over the mesh, and C leaving, over the supply",
-      claim="Quadratic concentrations follow the closed form of first-order uptake in a slab to third order, the "
-            "inlet's (11) included, at Peclet 0.1, 1, 10",
-      mutants=("outlet-forgotten", "fluid-diffusivity"))
-def quadratic_robin() -> Outcome:
-    studies, checks = [], []
-    for peclet, ceiling in ((0.1, 3e-9), (1.0, 1.5e-8), (10.0, 1e-7)):
-        errors = _higher(2, peclet)
-        studies.append(study(f"C, Pe = {peclet:g}", errors["size"], errors["C"], *EXPECTED[2], ceiling=ceiling))
-        checks.append(at_most(f"C leaving, Pe = {peclet:g}", errors["out"][-1], 6e-9, FUNCTIONAL[2][1]))
-    return Outcome(tuple(checks), tuple(studies))
-
-
-@case("transport-cubic-robin", kind="exact", slow=True,
-      norm="root mean square of C over the mesh, and C leaving with 1.6 um, over the supply",
-      claim="Cubic concentrations follow the closed form of first-order uptake in a slab to fourth order, the inlet's "
-            "(11) included, at Peclet 1 and 10",
-      mutants=("reaction-evenly-weighted", "outlet-forgotten"))
-def cubic_robin() -> Outcome:
-    studies, checks = [], []
-    for peclet, ceiling in ((1.0, 2e-11), (10.0, 1e-9)):
-        errors = _higher(3, peclet)
-        studies.append(study(f"C, Pe = {peclet:g}", errors["size"], errors["C"], *EXPECTED[3], ceiling=ceiling))
-        checks.append(at_most(f"C leaving, Pe = {peclet:g}", errors["out"][1], 1e-11, FUNCTIONAL[3][1]))
-    return Outcome(tuple(checks), tuple(studies))
+      claim="Quadratic and cubic concentrations follow the closed form of first-order uptake in a slab to third and "
+            "fourth order, the inlet's (11) included, at Peclet 0.1, 1, 10 (cubic: 1, 10)",
+      mutants=("outlet-forgotten", "fluid-diffusivity", "reaction-evenly-weighted"),
+      over={WORDS[order]: (order,) for order in ROBIN}, because="order 1: transport-robin-channel")
+def robin_of_higher_order(order: int):
+    peclets, at, bound = ROBIN[order]
+    for peclet, ceiling in peclets:
+        errors = _higher(order, peclet)
+        yield study(f"C, Pe = {peclet:g}", errors["size"], errors["C"], *EXPECTED[order], ceiling=ceiling)
+        yield at_most(f"C leaving, Pe = {peclet:g}", errors["out"][at], bound, FUNCTIONAL[order][1])
 
 
 @cache
@@ -173,28 +163,24 @@ NORM = "L2 of C over the mesh, relative; what is taken up, relative; several mes
 @case("transport-first-order-slab", kind="exact", norm=NORM,
       claim="A slab that takes up kappa C has the profile cosh(phi x / l) and the effectiveness tanh(phi) / phi of "
             "Thiele's modulus 0.1, 1, 10, and those of its films where it has some",
-      mutants=("decay-demand", "one-supply-held", "quarter-of-a-triangle", "fluid-diffusivity"))
-def first_order() -> Outcome:
-    checks, studies = _first_orders(1)
-    return Outcome(checks, studies, tuple(_first_order_profile(*row[:2]) for row in THIELE[1]))
+      mutants=("decay-demand", "one-supply-held", "quarter-of-a-triangle", "fluid-diffusivity"),
+      ways="1", because="orders 2, 3: transport-first-order-slab-higher")
+def first_order():
+    return _first_orders(1), [_first_order_profile(*row[:2]) for row in THIELE[1]]
 
 
 @case("transport-first-order-slab-higher", kind="exact", norm=NORM, slow=True,
       claim="With quadratic and cubic elements the slab that takes up kappa C has its profile to third and fourth "
             "order, and its effectiveness to fourth and sixth",
-      mutants=("reaction-evenly-weighted", "one-supply-held", "fluid-diffusivity"))
-def first_order_of_higher_order() -> Outcome:
-    quadratic, cubic = _first_orders(2), _first_orders(3)
-    return Outcome((*quadratic[0], *cubic[0]), (*quadratic[1], *cubic[1]))
+      mutants=("reaction-evenly-weighted", "one-supply-held", "fluid-diffusivity"), ways="2 3",
+      because="order 1: transport-first-order-slab")
+def first_order_of_higher_order():
+    return _first_orders(2), _first_orders(3)
 
 
-def _first_orders(order: int) -> tuple[tuple, tuple]:
+def _first_orders(order: int) -> list:
     """Checks and studies of one order of the elements."""
-    parts = []
-    for modulus, film, *ceilings in THIELE[order]:
-        parts += _first_order(order, modulus, film, ceilings)
-    checks = tuple(part for part in parts if isinstance(part, Check))
-    return checks, tuple(part for part in parts if not isinstance(part, Check))
+    return [_first_order(order, modulus, film, ceilings) for modulus, film, *ceilings in THIELE[order]]
 
 
 def _first_order(order: int, modulus: float, film: float, ceilings) -> list:
@@ -244,7 +230,7 @@ DEPTH, LIMIT, LEAST = 20.0, (0.3, 0.1, 0.03, 0.01), 1e-3
       claim="Where half saturation is small against the supply, uptake s goes on at its full rate down to the depth of "
             "penetration sqrt(2 D C_s / s), or that of its films, and nothing is left beyond; on the way there the "
             "slab follows Monod's first integral",
-      mutants=("reaction-in-the-fluid", "decay-demand"), slow=True)
+      mutants=("reaction-in-the-fluid", "decay-demand"), slow=True, ways="1 2 3")
 def zero_order() -> Outcome:
     rows = [(0.1, 0.0, 3e-4, 4e-5), (0.03, 0.0, 4e-4, 4e-5), (0.01, FILM, 1e-4, 3e-5)]
     studies = [part for half_saturation, film, *ceilings in rows for part in _monod(half_saturation, film, ceilings)]

@@ -11,16 +11,14 @@ from functools import cache
 import numpy as np
 
 from reference import manufactured_transport
-from repro.fem import elements, mesher
-from repro.fem.outline import half_disc
-from repro.fem.sizing import ACROSS_AGGREGATE, ACROSS_PORE, Sizing
+from repro.fem import elements
+from repro.fem.sizing import ACROSS_PORE
 from repro.fem.space import Space
 from repro.model import flow, transport
 from repro.model.kinetics import Sink
-from verification import norms
-from verification.case import Outcome, Profile, case
-from verification.convergence import refine, study
-from verification.transport.channels import (
+from verification.kernel.case import Outcome, Profile, case, refine, study
+from verification.problems import meshes, norms
+from verification.problems.channels import (
     NAMES,
     SCENE,
     WORDS,
@@ -66,9 +64,7 @@ def _expected(order: int, peclet: float) -> dict[str, object]:
 @cache
 def _spaced(refinement: float, number: int, order: int) -> Space:
     about = refinement * NEAR ** (number - REFINEMENTS[order][refinement] // 2)
-    geometry = min(order, 2)
-    outline = half_disc(RADIUS, ACROSS_AGGREGATE * about, geometry)
-    return Space(mesher.generate(outline, ENDS, Sizing(WIDTH, about, 2.0), geometry)[0], order)
+    return meshes.half_disc_space(RADIUS, about, ENDS, WIDTH, order)
 
 
 @cache
@@ -172,7 +168,7 @@ def _through(space: Space, nodes, owner, ends, mean: float, supply: float, chose
       claim="Chosen concentrations around a half-disc come out of the full equations with second order, at Peclet "
             "numbers of the pore from 0.1 to 100 and of the elements from 0.002 to 18, with either inlet condition",
       mutants=("cross-flow-sign", "exchanged-half-saturation", "fluid-diffusivity", "ratio-on-the-donor-only",
-               "quarter-of-a-triangle"))
+               "quarter-of-a-triangle"), ways="1", because="orders 2, 3: transport-manufactured-higher")
 def chosen_concentrations() -> Outcome:
     return Outcome(studies=_all_studies(1), profiles=tuple(_profile(peclet) for peclet in PECLETS[1]))
 
@@ -181,7 +177,8 @@ def chosen_concentrations() -> Outcome:
       norm="L2 of each substrate over the mesh, relative",
       claim="The same with quadratic and cubic elements on curved triangles, at Peclet numbers from 0.1 to 100, with "
             "either inlet condition: third order, of advection alone fourth; and fourth order",
-      mutants=("printed-inlet-forgotten", "conserving-cross-flow", "exchanged-half-saturation", "fluid-diffusivity"))
+      mutants=("printed-inlet-forgotten", "conserving-cross-flow", "exchanged-half-saturation", "fluid-diffusivity"),
+      ways="2 3", because="order 1: transport-manufactured")
 def chosen_of_higher_order() -> Outcome:
     return Outcome(studies=(*_all_studies(2), *_all_studies(3)))
 

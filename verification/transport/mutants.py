@@ -1,6 +1,6 @@
 """Wrong changes to `repro/` that cases of this stage must catch."""
 
-from verification.mutants import Mutant
+from verification.kernel.mutants import Mutant
 
 TRANSPORT, GEAR, KINETICS = "repro/model/transport.py", "repro/model/gear.py", "repro/model/kinetics.py"
 SPACE = "repro/fem/space.py"

@@ -1,0 +1,330 @@
+"""What a verification case is, and when it passes: the verdict is computed from its numbers and written down nowhere.
+
+A case is a function that gives checks (a number in an accepted range), studies (errors on at least four unrelated
+meshes or steps; orders between neighbours, judged two-sidedly: one above its band fails like one below it, as a
+surprise has to be explained before it is expected) and profiles, which are drawn. It is called once for each of the
+ways (orders of elements, presets) that it says it runs ``over``. It passes if it measures something and all of it
+holds; an exception, a not-a-number or an empty outcome is a failure.
+"""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from math import floor, inf, isfinite, log10
+from time import perf_counter
+
+import numpy as np
+
+KINDS = ("exact", "manufactured", "cross-code", "property")
+STAGES = ("flow", "transport", "growth", "reprojection", "mesh_motion", "coupling", "hard")
+PASSES, FALLS_SHORT = "passes", "FALLS SHORT"
+#: What a case may run with: elements of order 1, 2 and 3, and the presets of whole scenes.
+WAYS = ("1", "2", "3", "paper", "fast", "accurate")
+#: The way that a word of a label stands for, where it is not one itself.
+OF_LABELS = {"linear": "1", "quadratic": "2", "cubic": "3", "order 1": "1", "order 2": "2", "order 3": "3",
+             "straight": "1", "curved": "2", "of cubic scenes": "3"}
+#: A tolerance under which a number is round-off: not told in what is committed, as every machine has its own.
+ROUND_OFF = 1e-6
+
+
+@dataclass(frozen=True)
+class Check:
+    """One number in its accepted range; ``origin`` says where that range comes from."""
+
+    quantity: str
+    value: float
+    low: float
+    high: float
+    origin: str
+
+    @property
+    def holds(self) -> bool:
+        """Not-a-number never does."""
+        return bool(self.low <= self.value <= self.high)
+
+    @property
+    def measured(self) -> str:
+        """The number, rounded to a twentieth of its tolerance: stable from run to run."""
+        return rounded(self.value, self._tolerance / 20)
+
+    @property
+    def told(self) -> str:
+        """The number as another machine finds it too: to half of its tolerance, nothing where it is round-off."""
+        return rounded(self.value, self._tolerance / 2) if self._tolerance >= ROUND_OFF else ""
+
+    @property
+    def _tolerance(self) -> float:
+        if isfinite(self.low) and isfinite(self.high) and self.low != 0:
+            return (self.high - self.low) / 2
+        return abs(self.high if isfinite(self.high) else self.low)
+
+    def labelled(self, label: str) -> Check:
+        """The same number of one variant of its case."""
+        return replace(self, quantity=f"{self.quantity}, {label}")
+
+    @property
+    def expected(self) -> str:
+        """The accepted range in words."""
+        return self._range(6)
+
+    @property
+    def accepted(self) -> str:
+        """The same, of a range that a run has found, as another machine finds it too."""
+        return self._range(3)
+
+    def _range(self, digits: int) -> str:
+        if isfinite(self.low) and isfinite(self.high) and self.low != 0:
+            return f"{self.low:.{digits}g} to {self.high:.{digits}g}"
+        return f"at most {self.high:.3g}" if isfinite(self.high) else f"at least {self.low:.3g}"
+
+
+def at_most(quantity: str, value: float, bound: float, origin: str) -> Check:
+    """A size, of an error for instance: from zero to a bound."""
+    return Check(quantity, float(value), 0.0, bound, origin)
+
+
+def at_least(quantity: str, value: float, bound: float, origin: str) -> Check:
+    """A number that must not be under a bound."""
+    return Check(quantity, float(value), bound, inf, origin)
+
+
+def between(quantity: str, value: float, low: float, high: float, origin: str) -> Check:
+    """A number that must lie in a range."""
+    return Check(quantity, float(value), low, high, origin)
+
+
+def rounded(value: float, quantum: float) -> str:
+    """The value to the power of ten at or under ``quantum``; a size that vanishes there is told as "under" it."""
+    if not isfinite(value) or quantum <= 0:
+        return f"{value:.3g}"
+    unit = 10.0 ** floor(log10(quantum))
+    steps = round(value / unit)
+    if steps == 0:
+        return f"under {unit:.0e}"
+    digits = max(0, floor(log10(abs(steps)))) + 1
+    return f"{steps * unit:.{digits}g}"
+
+
+FEWEST = 4
+#: Half width of the band around an expected order: errors on unrelated meshes scatter by a tenth or two, which between
+#: neighbours whose sizes differ by a factor of 2 is an order of 0.2 or 0.3.
+BAND = 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """Errors (k,) on a series of sizes (k,), falling: orders between neighbours must lie from low to high.
+
+    ceiling: the last error must not exceed it; origin: where the expected order comes from.
+    """
+
+    quantity: str
+    sizes: np.ndarray
+    errors: np.ndarray
+    low: float
+    high: float
+    origin: str
+    ceiling: float = inf
+
+    def __post_init__(self):
+        if len(self.sizes) < FEWEST or len(self.sizes) != len(self.errors) or not (np.diff(self.sizes) < 0).all():
+            raise ValueError(f"{self.quantity}: a study takes {FEWEST} or more falling sizes, and an error of each")
+
+    @property
+    def orders(self) -> np.ndarray:
+        """(k - 1,) log of the ratio of errors over log of the ratio of sizes; not-a-number where an error is not
+        positive and finite."""
+        good = np.isfinite(self.errors) & (np.asarray(self.errors) > 0)
+        logs = np.log(np.where(good, self.errors, 1.0))
+        slopes = np.diff(logs) / np.diff(np.log(self.sizes))
+        return np.where(good[1:] & good[:-1], slopes, np.nan)
+
+    @property
+    def holds(self) -> bool:
+        """Are all orders in the band, and is the last error under its ceiling?"""
+        orders = self.orders
+        return bool(((self.low <= orders) & (orders <= self.high)).all() and self.errors[-1] <= self.ceiling)
+
+    @property
+    def measured(self) -> str:
+        """Orders to a tenth, and the last error to one digit."""
+        return f"{self.told}; last error {self._last}"
+
+    @property
+    def told(self) -> str:
+        """Orders to a tenth: what another machine finds too."""
+        return f"order {', '.join(f'{order:.1f}' for order in self.orders)}"
+
+    def labelled(self, label: str) -> Study:
+        """The same study of one variant of its case."""
+        return replace(self, quantity=f"{self.quantity}, {label}")
+
+    @property
+    def _last(self) -> str:
+        error = float(self.errors[-1])
+        if np.isfinite(self.ceiling):
+            return rounded(error, self.ceiling / 20)
+        return f"{error:.0e}"
+
+    @property
+    def expected(self) -> str:
+        """The band, and the ceiling where there is one."""
+        band = f"order {self.low:.3g} to {self.high:.3g}"
+        return band if self.ceiling == inf else f"{band}; at most {self.ceiling:.3g}"
+
+    @property
+    def accepted(self) -> str:
+        """The same: no run has found it."""
+        return self.expected
+
+
+def study(quantity: str, sizes, errors, order: float, origin: str, *, ceiling: float = inf,
+          band: float = BAND) -> Study:
+    """A study whose orders are expected within ``band`` of ``order``."""
+    return Study(quantity, np.asarray(sizes, float), np.asarray(errors, float), order - band, order + band, origin,
+                 ceiling)
+
+
+def refine(measure: Callable[..., dict[str, float]], sizes, *given) -> dict[str, np.ndarray]:
+    """Errors of each field on each size: ``measure(size, *given)`` gives {field: error}."""
+    rows = [measure(size, *given) for size in sizes]
+    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """Curves over one axis, for a picture: each (name, kind, x, y), kind "ours", "reference" or "exact"."""
+
+    title: str
+    x_label: str
+    y_label: str
+    curves: tuple[tuple[str, str, np.ndarray, np.ndarray], ...]
+
+    def labelled(self, label: str) -> Profile:
+        """The same picture of one variant of its case."""
+        return replace(self, title=f"{self.title}, {label}")
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What a case has measured."""
+
+    checks: tuple = ()
+    studies: tuple = ()
+    profiles: tuple[Profile, ...] = ()
+
+    @property
+    def measured(self) -> tuple:
+        """All that must hold: studies first."""
+        return (*self.studies, *self.checks)
+
+    def lines(self) -> list[tuple[str, str, str, bool]]:
+        """(quantity and what it is, expected, origin, holds) of each, as another machine finds them too."""
+        return [(part.quantity + (f" ({part.told})" if part.told else ""), part.accepted, part.origin, part.holds)
+                for part in self.measured]
+
+
+def outcome(found: Outcome | Iterable) -> Outcome:
+    """What a function of a case gives, as an Outcome: checks, studies and profiles in any order, or lists of them."""
+    if isinstance(found, Outcome):
+        return found
+    parts = tuple(_flat(found))
+    return Outcome(*(tuple(part for part in parts if isinstance(part, kind)) for kind in (Check, Study, Profile)))
+
+
+def _flat(found) -> Iterator:
+    if isinstance(found, Check | Study | Profile):
+        yield found
+    else:
+        for part in found:
+            yield from _flat(part)
+
+
+@dataclass(frozen=True)
+class Case:
+    """id: "flow-poiseuille"; claim: one sentence; norm: what is measured and how; mutants: ids of changes of code (see
+    :mod:`verification.kernel.mutants`), each of which must make the case fall short; slow: left out by ``make
+    verify-fast``; function: gives an Outcome, or an iterable of its parts; over: {label: arguments} of the variants
+    that it is called for, none: once without arguments; ways: which of WAYS it runs with; because: why not others."""
+
+    id: str
+    stage: str
+    claim: str
+    kind: str
+    norm: str
+    mutants: tuple[str, ...]
+    slow: bool
+    function: Callable
+    over: Mapping[str, tuple] = field(default_factory=dict)
+    ways: tuple[str, ...] = ()
+    because: str = ""
+
+    def measure(self) -> Outcome:
+        """Run the function, for every variant, whose label then ends the names of what it has measured."""
+        if not self.over:
+            return outcome(self.function())
+        parts: list = []
+        for label, arguments in self.over.items():
+            found = outcome(self.function(*arguments))
+            parts += [part.labelled(label) for part in (*found.measured, *found.profiles)]
+        return outcome(parts)
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """A case that has run: outcome, or the error that stopped it, and its seconds."""
+
+    id: str
+    outcome: Outcome
+    error: str
+    seconds: float
+
+    @property
+    def holds(self) -> bool:
+        """Did it measure something, and does all of it hold?"""
+        return not self.error and bool(self.outcome.measured) and all(part.holds for part in self.outcome.measured)
+
+    @property
+    def verdict(self) -> str:
+        """One of two words."""
+        return PASSES if self.holds else FALLS_SHORT
+
+
+CASES: dict[str, Case] = {}
+
+
+def case(id: str, *, claim: str, kind: str, norm: str, mutants: tuple[str, ...], slow: bool = False,
+         over: Iterable[str] | Mapping[str, tuple] = (), ways: str = "", because: str = ""):
+    """Register the decorated function; the stage is the package of its module. over: {label: arguments}, or labels that
+    are the arguments; ways: words of WAYS besides those that the labels stand for."""
+    variants = dict(over) if isinstance(over, Mapping) else {label: (label,) for label in over}
+
+    def register(function: Callable) -> Callable:
+        if id in CASES or kind not in KINDS or not all((claim, norm, mutants)):
+            raise ValueError(f"{id}: registered twice, of an unknown kind, or without claim, norm or mutants")
+        CASES[id] = Case(id, function.__module__.split(".")[1], claim, kind, norm, mutants, slow, function, variants,
+                         _ways(id, variants, ways), because)
+        return function
+    return register
+
+
+def _ways(id: str, variants: Iterable[str], more: str) -> tuple[str, ...]:
+    """Those of the labels, and more, in their order. Raises ValueError for a word that is none."""
+    words = [word for label in variants for word in label.split(", ")]
+    named = {OF_LABELS.get(word, word) for word in words} & {*WAYS} | {*more.split()}
+    if not named <= {*WAYS}:
+        raise ValueError(f"{id}: {', '.join(sorted(named - {*WAYS}))} are none of {', '.join(WAYS)}")
+    return tuple(way for way in WAYS if way in named)
+
+
+def run(chosen: Case) -> Result:
+    """Run one case; floating-point errors raise."""
+    start = perf_counter()
+    try:
+        with np.errstate(all="raise", under="ignore"):
+            found, error = chosen.measure(), ""
+    except Exception:
+        found, error = Outcome(), traceback.format_exc(limit=-3)
+    return Result(chosen.id, found, error, perf_counter() - start)

@@ -1,0 +1,242 @@
+"""What is verified by what: ``python -m verification.kernel.matrix`` writes ``verification/report/matrix.md``.
+
+Two tables: cases by the elements and presets that they run with; and the paper's equations by the modules that solve
+them, the cases that must fail with a wrong change of these, the references that those reach, and the claims of the
+sections. Nothing may be missing in any column (:func:`orphans`): all of it is derived, from the table of modules in
+``repro/__init__.py``, the registries, and what the functions of the cases use.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from types import CodeType, FunctionType, ModuleType
+
+import repro
+from verification.kernel import mutants
+from verification.kernel.case import CASES, STAGES, WAYS, Case
+from verification.kernel.writing import Block, markdown, table
+
+ROOT = Path(__file__).parents[2]
+FILE = ROOT / "verification" / "report" / "matrix.md"
+TITLE = "What is verified by what, with which elements and presets"
+ORDERS, PRESETS = WAYS[:3], WAYS[3:]
+#: Why a case does not run with presets, and with all of them.
+ALONE = "presets: the stage alone, with the elements that they choose"
+ONE_BY_ONE = "other presets: their elements, by themselves"
+#: A line of the table: sections and words, equations, modules, and a remark.
+LINE = re.compile(r"^ {4,}(\S.*?)\s{3,}((?:\(\d+\)[-, ]*)+)?\s*(repro\.[\w.]+(?:, \.\w+)*)(?:[: ].*)?$")
+#: The sections at the start of its first part: "3.1, 3.5", "2.1-2.3".
+SECTIONS = re.compile(r"(?:Table 1|[\d.]+(?:-[\d.]+)?|, )*")
+
+
+@dataclass(frozen=True)
+class Part:
+    """A line of the table of modules: "2.1, 3.2 flow", its sections, "(1)-(6)", and files."""
+
+    name: str
+    sections: tuple[str, ...]
+    equations: str
+    files: tuple[str, ...]
+
+
+@cache
+def parts() -> tuple[Part, ...]:
+    """The table of modules that ``repro/__init__.py`` has."""
+    head = (repro.__doc__ or "").partition("Where data enters")[0]
+    return tuple(_part(*found.groups("")) for found in map(LINE.match, head.splitlines()) if found)
+
+
+def _part(name: str, equations: str, names: str) -> Part:
+    first, *rest = names.split(", ")
+    package = first if _file(first).endswith("/") else first.rpartition(".")[0]
+    files = tuple(_file(module) for module in (first, *(package + module for module in rest)))
+    places = (SECTIONS.match(name) or [""])[0].split(", ")
+    sections = tuple(section for place in places for section in _ranged(place) if section)
+    return Part(" ".join(name.split()), sections, equations.strip(" ,"), files)
+
+
+def _ranged(place: str) -> list[str]:
+    """["2.1", "2.2", "2.3"] of "2.1-2.3"."""
+    first, _, last = place.partition("-")
+    if not last:
+        return [first]
+    chapter, low = first.split(".")
+    return [f"{chapter}.{number}" for number in range(int(low), int(last.split(".")[1]) + 1)]
+
+
+def _file(module: str) -> str:
+    """A module's file; a package's folder."""
+    path = module.replace(".", "/")
+    return f"{path}/" if (ROOT / path).is_dir() else f"{path}.py"
+
+
+def blocks() -> list[Block]:
+    """Both tables."""
+    head = ("section", "equations", "modules", "cases", "references", "mutants", "claims")
+    return [Block("heading", "Elements and presets"),
+            Block("text", "run: with every `make verify-fast`; slow: with `make verify`; n/a: not applicable."),
+            table(("case", *WAYS, "not applicable because"), map(row, ordered())),
+            Block("heading", "Equation, module, case, reference, mutant, claim"), table(head, map(line, parts()))]
+
+
+def ordered() -> list[Case]:
+    """All cases, by stage and id: in whatever order they were registered."""
+    return sorted(CASES.values(), key=lambda case: (STAGES.index(case.stage), case.id))
+
+
+def row(case: Case) -> tuple[str, ...]:
+    """A line of the first table."""
+    run = "slow" if case.slow else "run"
+    return (case.id, *(run if way in case.ways else "n/a" for way in WAYS), reasons(case))
+
+
+def reasons(case: Case) -> str:
+    """Why it does not run with the others; "" where it runs with all."""
+    missing = {*WAYS} - {*case.ways}
+    default = ALONE if {*PRESETS} <= missing else ONE_BY_ONE
+    return "; ".join(filter(None, (case.because, default if {*PRESETS} & missing else "")))
+
+
+def unexplained() -> list[str]:
+    """Cases that do not run with an order of elements, or with nothing at all, and do not say why."""
+    return [case.id for case in ordered() if not case.ways or ({*ORDERS} - {*case.ways} and not case.because)]
+
+
+def line(part: Part) -> tuple[str, ...]:
+    """A line of the second table."""
+    cases = cases_of(part)
+    references = sorted({name for id in cases for name in references_of(CASES[id])})
+    modules = [file.removeprefix("repro/") for file in part.files]
+    columns = (modules, cases, references, mutants_of(part), claims_of(part))
+    return (part.name, part.equations, *(", ".join(column) or "-" for column in columns))
+
+
+def mutants_of(part: Part) -> list[str]:
+    """Ids of the wrong changes to its files."""
+    return [id for id, mutant in mutants.everything().items() if mutant.file.startswith(part.files)]
+
+
+def cases_of(part: Part) -> list[str]:
+    """Ids of the cases that name one of them."""
+    wrong = {*mutants_of(part)}
+    return [case.id for case in ordered() if wrong & {*case.mutants}]
+
+
+def claims_of(part: Part) -> list[str]:
+    """Ids of the claims of its sections; figures, plates and discussion are of the results."""
+    return [id for id, sections in sorted(claims().items())
+            if any(_within(section, own) for section in sections for own in part.sections)]
+
+
+def _within(section: str, own: str) -> bool:
+    return section == own or section.startswith(f"{own}.")
+
+
+@cache
+def claims() -> dict[str, list[str]]:
+    """{claim: sections that it is of}."""
+    from verification.claims import CLAIMS, evaluate
+    evaluate.register_all()
+    return {claim.id: [_section(place.strip()) for place in claim.where.split(",")] for claim in CLAIMS.values()}
+
+
+def _section(place: str) -> str:
+    """A section's number; 4 for a figure, a plate, the introduction and the discussion."""
+    return place if re.fullmatch(r"[23][\d.]*|Table 1", place) else "4"
+
+
+def references_of(case: Case) -> set[str]:
+    """Modules of ``reference`` that a case's function uses, or that those import."""
+    found: set[str] = set()
+    for module in _used(case.function):
+        found |= {module, *_imported(module)}
+    return {name.removeprefix("reference.") for name in found if name != "reference"}
+
+
+def _used(function: FunctionType) -> set[str]:
+    """Names of the modules of ``reference`` that a function, or one that it uses of ``verification``, names."""
+    found: set[str] = set()
+    seen: set[int] = set()
+    waiting: list = [function]
+    while waiting:
+        thing = waiting.pop()
+        thing = getattr(thing, "func", thing)
+        name = thing.__name__ if isinstance(thing, ModuleType) else getattr(thing, "__module__", None) or ""
+        if id(thing) in seen:
+            continue
+        seen.add(id(thing))
+        if name.startswith("reference"):
+            found.add(name)
+        elif isinstance(thing, Mapping | tuple | list):
+            waiting += thing.values() if isinstance(thing, Mapping) else thing
+        elif name.startswith("verification") and not name.startswith("verification.kernel"):
+            waiting += _named(thing)
+    return found
+
+
+def _named(thing) -> Iterator:
+    """What a function uses of its own module, and of the modules of ``verification`` there; what an object is made of.
+    """
+    thing = getattr(thing, "__wrapped__", thing)
+    if not isinstance(thing, FunctionType):
+        yield from () if isinstance(thing, type | ModuleType) else vars(thing).values()
+        return
+    names = {*_names(thing.__code__)}
+    for value in (thing.__globals__[name] for name in names & {*thing.__globals__}):
+        if isinstance(value, ModuleType) and value.__name__.startswith("verification"):
+            yield from (vars(value)[name] for name in names & {*vars(value)})
+        else:
+            yield value
+    for cell in thing.__closure__ or ():
+        yield cell.cell_contents
+
+
+def _names(code: CodeType) -> Iterator[str]:
+    yield from code.co_names
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _names(constant)
+
+
+def _imported(module: str) -> set[str]:
+    """Modules of ``reference`` that one of them uses."""
+    found = {value.__name__ if isinstance(value, ModuleType) else getattr(value, "__module__", "") or ""
+             for value in vars(sys.modules[module]).values()}
+    return {name for name in found if name.startswith("reference.")}
+
+
+def orphans() -> list[str]:
+    """What stands in no line of the second table, and lines without a case or a mutant."""
+    lines = parts()
+    shown = {"case": {id for part in lines for id in cases_of(part)},
+             "mutant": {id for part in lines for id in mutants_of(part)},
+             "claim": {id for part in lines for id in claims_of(part)}}
+    shown["reference"] = {name for id in shown["case"] for name in references_of(CASES[id])}
+    every = {"case": {*CASES}, "mutant": {*mutants.everything()}, "claim": {*claims()},
+             "reference": {path.stem for path in (ROOT / "reference").glob("*.py")} - {"__init__"}}
+    bare = [f"line {part.name}" for part in lines if not cases_of(part)]
+    return [*bare, *(f"{kind} {id}" for kind in every for id in sorted(every[kind] - shown[kind]))]
+
+
+def text() -> str:
+    """The page."""
+    return f"# {TITLE}\n\n{markdown(blocks(), 2)}\n"
+
+
+def main() -> int:
+    """Write the page; 1 where something is missing in a column, which is told."""
+    from verification.kernel.driver import load
+    load()
+    FILE.write_text(text(), encoding="utf-8")
+    missing = [*orphans(), *(f"case {id}: not with every order, and no reason why" for id in unexplained())]
+    print("\n".join([*missing, f"{FILE.relative_to(ROOT)}: {len(CASES)} cases, {len(missing)} missing"]))
+    return 1 if missing else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,276 @@
+"""Can the verification fail? Small wrong changes to ``repro/``, each of which a case must catch: ``make mutants``.
+
+A mutant is a change of exact text; it is applied to a copy of the code, never to the code itself. Every case names
+mutants, and must fall short with each of them. A mutant is run against the cases that name it and then against all
+others, the quick ones first, until one catches it: a mutant that survives is a missing test. With ``--every`` it is run
+against all cases that name it, whichever catches it first.
+
+A case catches by a number out of its range, or by an error of ``repro.errors`` (a guard of the code that stops it).
+Whatever else stops a case, an ``AttributeError`` for instance, shows a broken mutant and catches nothing. No case knows
+stored results of ``repro``: what it expects comes from theory, from ``reference/`` or from a conserved quantity.
+
+A hunt is of the code that cases can reach: the stages of verification, the references, and the modules of repro that
+they import. Commands, pages, checkpoints and sweeps are not in it: no case exercises them, the tests do.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import hashlib
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from shutil import copytree, ignore_patterns
+from tempfile import TemporaryDirectory
+
+from verification.kernel.case import CASES, STAGES, Result
+
+ROOT = Path(__file__).parents[2]
+#: The names that it exports come from modules that cases import by themselves.
+API = ROOT / "repro" / "__init__.py"
+
+
+def reached(folders: list[Path]) -> set[Path]:
+    """The files of folders, and all of this project that these import, directly or not, but for what the kernel does:
+    it runs cases, and no case depends on it."""
+    found: set[Path] = set()
+    waiting = [path for folder in folders for path in folder.rglob("*.py")]
+    while waiting:
+        path = waiting.pop()
+        if path not in found:
+            found.add(path)
+            waiting += [] if path == API or path.parent == Path(__file__).parent else imported(path)
+    return found
+
+
+def imported(path: Path) -> Iterator[Path]:
+    """Files of this project that a file imports, inside functions too."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        names = [alias.name for alias in node.names] if isinstance(node, ast.Import | ast.ImportFrom) else []
+        if isinstance(node, ast.ImportFrom):
+            names = [node.module or "", *(f"{node.module}.{name}" for name in names)]
+        for name in names:
+            module = ROOT.joinpath(*name.split("."))
+            yield from (file for file in (module.with_suffix(".py"), module / "__init__.py") if file.is_file())
+
+
+RECORD = ROOT / "verification" / "report" / "mutants.json"
+COPIED = ("repro", "reference", "verification")
+#: No case takes a tenth of this; a mutant may make one run for ever.
+LONGEST = 600.0
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """A change to ``file``: ``old``, which occurs there once, becomes ``new``; ``says`` what is wrong then."""
+
+    id: str
+    file: str
+    says: str
+    old: str
+    new: str
+
+
+class MutantError(RuntimeError):
+    """A mutant cannot be applied, or what it does is no result."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A case run with a mutant: ``how`` it was caught, or why that is no catch."""
+
+    case: str
+    caught: bool
+    how: str
+
+
+@dataclass(frozen=True)
+class Hunt:
+    """All trials of one mutant."""
+
+    mutant: str
+    trials: tuple[Trial, ...]
+
+    @property
+    def caught_by(self) -> tuple[str, ...]:
+        """Ids of the cases that fell short."""
+        return tuple(trial.case for trial in self.trials if trial.caught)
+
+    @property
+    def missed_by(self) -> tuple[str, ...]:
+        """Ids of the cases that name this mutant and pass with it."""
+        return tuple(t.case for t in self.trials if not t.caught and self.mutant in CASES[t.case].mutants)
+
+
+def load() -> dict[str, dict[str, Mutant]]:
+    """Mutants by id, by stage. Raises MutantError where an id is used twice."""
+    found = {stage: import_module(f"verification.{stage}.mutants").MUTANTS for stage in STAGES}
+    ids = [mutant.id for mutants in found.values() for mutant in mutants]
+    twice = {id for id in ids if ids.count(id) > 1}
+    if twice:
+        raise MutantError(f"used twice: {', '.join(sorted(twice))}")
+    return {stage: {mutant.id: mutant for mutant in mutants} for stage, mutants in found.items()}
+
+
+def everything() -> dict[str, Mutant]:
+    """Mutants of all stages by id."""
+    return {id: mutant for mutants in load().values() for id, mutant in mutants.items()}
+
+
+def mutated(mutant: Mutant, root: Path = ROOT) -> str:
+    """The changed text of the file. Raises MutantError unless the text to change occurs exactly once."""
+    text = (root / mutant.file).read_text(encoding="utf-8")
+    count = text.count(mutant.old)
+    if count != 1 or mutant.old == mutant.new:
+        raise MutantError(f"{mutant.id}: the text to change occurs {count} times in {mutant.file}, not once, or it "
+                          "stays the same; adapt the mutant to the code")
+    return text.replace(mutant.old, mutant.new)
+
+
+def plan(mutant: Mutant) -> tuple[list[str], list[str]]:
+    """(cases that name the mutant, all others), the quick ones first."""
+    quick_first = sorted(CASES.values(), key=lambda case: case.slow)
+    named = [case.id for case in quick_first if mutant.id in case.mutants]
+    return named, [case.id for case in quick_first if case.id not in named]
+
+
+def hunt(mutant: Mutant, every: bool = False) -> Hunt:
+    """Run the mutant against the cases that name it, then against all others, to the first catch; ``every``: against
+    all that name it."""
+    named, others = plan(mutant)
+    trials = []
+    with TemporaryDirectory(prefix="mutant-") as folder:
+        copy(mutant, Path(folder))
+        for case in named + others:
+            caught = any(trial.caught for trial in trials)
+            if caught and not (every and case in named):
+                break
+            trials.append(trial(Path(folder), case))
+    return Hunt(mutant.id, tuple(trials))
+
+
+def copy(mutant: Mutant, folder: Path) -> None:
+    """The code with the mutant in it."""
+    text = mutated(mutant)
+    for name in COPIED:
+        copytree(ROOT / name, folder / name, ignore=ignore_patterns("__pycache__", "report", "out"))
+    (folder / mutant.file).write_text(text, encoding="utf-8")
+
+
+def trial(folder: Path, case: str) -> Trial:
+    """Run one case in the copy, in a process of its own."""
+    command = [sys.executable, "-c", f"from verification.kernel import mutants; mutants.examine({case!r})"]
+    try:
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=LONGEST,
+                              env={**os.environ, "PYTHONPATH": str(folder)})
+    except subprocess.TimeoutExpired:
+        return Trial(case, False, f"not done after {LONGEST:g} s")
+    if done.returncode:
+        return Trial(case, False, "broken: " + (done.stderr.strip().splitlines() or ["no message"])[-1])
+    return Trial(case, *json.loads(done.stdout.splitlines()[-1]))
+
+
+def examine(id: str) -> None:
+    """Run a case with the code of the present folder and print, as JSON, whether it is caught and how."""
+    import repro
+    from verification.kernel.case import run
+    from verification.kernel.driver import load as load_cases
+    if Path(repro.__file__).parents[1] != Path.cwd():
+        raise MutantError(f"repro is imported from {repro.__file__}, not from the copy with the mutant")
+    load_cases()
+    print(json.dumps(judged(run(CASES[id]))))
+
+
+def judged(result: Result) -> tuple[bool, str]:
+    """(caught, how) of a case that has run with a mutant."""
+    if result.error:
+        kind, _, message = result.error.strip().splitlines()[-1].partition(": ")
+        return kind.startswith("repro.errors."), f"{kind.rpartition('.')[2]}: {message}"
+    short = [part for part in result.outcome.measured if not part.holds]
+    if not short:
+        return False, "passes"
+    return True, f"{short[0].quantity}: {short[0].measured} (expected {short[0].expected})"
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Entry point; 0 if every mutant is caught, and no case that was run passes with a mutant that it names."""
+    from verification.kernel.driver import load as load_cases
+    load_cases()
+    chosen = _parser().parse_args(arguments)
+    unknown = sorted(set(chosen.ids) - set(everything()))
+    if unknown:
+        print(f"mutants: there is no {', '.join(unknown)}; there are {', '.join(everything())}", file=sys.stderr)
+        return 2
+    hunts = hunt_all(chosen.ids or everything(), chosen.jobs, chosen.every)
+    if not chosen.ids:
+        record(hunts)
+    return 0 if judge(hunts) else 1
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m verification.mutants", description=__doc__.splitlines()[0])
+    parser.add_argument("ids", nargs="*", metavar="MUTANT", help="all by default")
+    parser.add_argument("--every", action="store_true", help="against every case that names it, not to the first catch")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes; one a core by default")
+    return parser
+
+
+def hunt_all(ids: Iterable[str], jobs: int, every: bool = False) -> list[Hunt]:
+    """Hunts in the order of ``ids``, several side by side; a line or more each as it ends."""
+    known, hunts = everything(), []
+    with ThreadPoolExecutor(jobs) as pool:
+        for found in pool.map(lambda id: hunt(known[id], every), ids):
+            hunts.append(found)
+            print("\n".join(_lines(found)), flush=True)
+    return hunts
+
+
+def _lines(found: Hunt) -> list[str]:
+    verdict = "caught" if found.caught_by else "SURVIVES"
+    return [f"{verdict:9} {found.mutant}"] + [
+        f"{'':10}{trial.case}: {trial.how}" for trial in found.trials
+        if trial.caught or trial.case in found.missed_by or trial.how != "passes"]
+
+
+def judge(hunts: list[Hunt]) -> bool:
+    """Print what is wrong, if anything; is every mutant caught, and by every case that names it?"""
+    survivors = [found.mutant for found in hunts if not found.caught_by]
+    missed = [f"{case} passes with {found.mutant}, which it names" for found in hunts for case in found.missed_by]
+    print("\n".join([f"survives: {id}" for id in survivors] + missed
+                    + [f"{len(hunts) - len(survivors)} of {len(hunts)} mutants caught."]))
+    return bool(hunts) and not survivors and not missed
+
+
+def record(hunts: list[Hunt]) -> None:
+    """Write which cases caught which mutant, for the report; and how, which is another machine's to tell, beside it."""
+    caught = {found.mutant: list(found.caught_by) for found in hunts}
+    how = {found.mutant: {trial.case: trial.how for trial in found.trials} for found in hunts}
+    for file, rows in ((RECORD, {"code": code(), "caught": caught}), (RECORD.parent / "live" / RECORD.name, how)):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+
+
+def recorded() -> tuple[dict[str, list[str]], bool]:
+    """({mutant: [case, ...]} of the last whole hunt, whether the code is still the same)."""
+    if not RECORD.exists():
+        return {}, False
+    found = json.loads(RECORD.read_text(encoding="utf-8"))
+    return found["caught"], found["code"] == code()
+
+
+def code() -> str:
+    """16 hexadecimal digits that stand for the cases, the references, and what they reach of the code."""
+    digest = hashlib.sha256()
+    cases = [ROOT / "reference", *(ROOT / "verification" / stage for stage in STAGES)]
+    known = (ROOT / "repro", ROOT / "verification" / "problems", *cases)
+    for path in sorted(path for path in reached(cases) if any(folder in path.parents for folder in known)):
+        digest.update(path.relative_to(ROOT).as_posix().encode() + path.read_bytes())
+    return digest.hexdigest()[:16]
+

@@ -1,0 +1,197 @@
+"""The report: a table for the terminal; Markdown for the diff; pages with pictures, digits, seconds and environment.
+
+What is committed (``REPORT.md``, a page a stage, ``mutants.md``, ``matrix.md``) holds verdicts, orders and accepted
+ranges, and numbers to half of their tolerance: a run on another machine writes the same files. Digits and times are in
+``live/`` and on the pages, which are not committed.
+"""
+
+from __future__ import annotations
+
+import json
+import platform
+import shutil
+from importlib.metadata import version
+from pathlib import Path
+
+from verification.kernel import matrix, mutants, pictures
+from verification.kernel.case import CASES, STAGES, WAYS, Outcome, Result
+from verification.kernel.writing import Block, Link, markdown, page, table
+
+FOLDER = Path(__file__).parents[1] / "report"
+TITLES = {"flow": "Flow (2.1, 3.2)", "transport": "Substrates (2.2, 3.3)", "growth": "Growth mechanics (2.3, 3.4)",
+          "reprojection": "Reprojection and transfer (3.4, 3.5)", "mesh_motion": "Mesh motion (3.5)",
+          "coupling": "Coupling", "hard": "Hard cases"}
+INTRODUCTION = (
+    "Each case compares the implementation with a closed form, with a manufactured solution, with an independent code, "
+    "or with what must be conserved. Verdicts follow from the numbers; orders are judged two-sidedly, between "
+    "neighbours of a series of unrelated meshes. Each case names changes of the code (mutants) with which it must fall "
+    "short; `make mutants` runs each of these until a case catches it.")
+PACKAGES = ("numpy", "scipy", "scikit-fem", "shapely", "mmgpy", "fipy", "py-pde", "matplotlib")
+
+
+def terminal(results: list[Result]) -> str:
+    """The cases, what fell short in each, and the count."""
+    lines = []
+    for result in results:
+        lines.append(f"{result.verdict:12} {result.id:34} {result.seconds:6.1f} s  {CASES[result.id].claim}")
+        lines += [f"{'':14}{part.quantity}: {part.measured}; expected {part.expected} ({part.origin})"
+                  for part in result.outcome.measured if not part.holds]
+        lines += [f"{'':14}{line}" for line in result.error.splitlines()]
+    return "\n".join([*lines, summary(results)])
+
+
+def summary(results: list[Result]) -> str:
+    """How many hold, in one line."""
+    held, numbers = sum(r.holds for r in results), sum(len(r.outcome.measured) for r in results)
+    return f"{held} of {len(results)} cases pass; {numbers} numbers judged."
+
+
+def write(results: list[Result], folder: Path = FOLDER) -> Path:
+    """Write the report of a whole run; returns the path of its first page."""
+    folder.mkdir(exist_ok=True)
+    for name, text in texts(results).items():
+        (folder / name).write_text(text, encoding="utf-8")
+    _write_live(results, folder / "live")
+    return _write_pages(results, folder)
+
+
+def texts(results: list[Result]) -> dict[str, str]:
+    """What is committed: {file: Markdown}."""
+    found = {"REPORT.md": ("Verification", index(results)), "mutants.md": ("Mutants", mutant_blocks()),
+             "matrix.md": ("What is verified by what, with which elements and presets", matrix.blocks())}
+    for stage, chosen in by_stage(results):
+        parts = [Block("text", summary(chosen)), *(block for result in chosen for block in article(result))]
+        found[f"{stage}.md"] = TITLES[stage], parts
+    return {name: f"# {title}\n\n{markdown(blocks, 2)}\n" for name, (title, blocks) in found.items()}
+
+
+def by_stage(results: list[Result]) -> list[tuple[str, list[Result]]]:
+    """(stage, its results) of the stages that have any."""
+    grouped = [(stage, [r for r in results if CASES[r.id].stage == stage]) for stage in STAGES]
+    return [(stage, chosen) for stage, chosen in grouped if chosen]
+
+
+def index(results: list[Result]) -> list[Block]:
+    """The first page: stages, and a line a case."""
+    stages = [(Link(TITLES[stage], stage), summary(chosen)) for stage, chosen in by_stage(results)]
+    more = ((Link("Mutants", "mutants"), mutant_state()),
+            (Link("Equation, module, case, reference, mutant, claim", "matrix"), "what is verified by what, with which "
+             "elements and presets"))
+    return [Block("text", f"{INTRODUCTION} Written by `make verify`."), Block("text", f"**{summary(results)}**"),
+            table(("stage", ""), (*stages, *more)),
+            table(("case", "kind", "runs with", "numbers", "verdict", "must fall short with"),
+                  map(_index_row, results)),
+            table(("case", "claim", "measured", "expected", "seconds"), map(_live_row, results), detail=True)]
+
+
+def _index_row(result: Result) -> tuple:
+    case = CASES[result.id]
+    ways = " ".join(case.ways) if case.ways != WAYS else "all"
+    return (Link(case.id, case.stage, case.id), case.kind, ways, str(len(result.outcome.measured)), result.verdict,
+            ", ".join(case.mutants))
+
+
+def _live_row(result: Result) -> tuple:
+    case = CASES[result.id]
+    return Link(case.id, case.stage, case.id), case.claim, *headline(result), f"{result.seconds:.1f}"
+
+
+def headline(result: Result) -> tuple[str, str]:
+    """(measured, expected) of what fell short, else of the first number, with how many there are besides."""
+    parts = result.outcome.measured
+    short = [part for part in parts if not part.holds] or list(parts)
+    if not short:
+        return "nothing", "a number"
+    more = f" (and {len(parts) - 1} more)" if len(parts) > 1 else ""
+    return f"{short[0].quantity}: {short[0].measured}{more}", short[0].expected
+
+
+def article(result: Result) -> list[Block]:
+    """A case: what it says and how, its verdict, what is accepted, and, on pages, every number."""
+    case = CASES[result.id]
+    told = (f"**{result.verdict}**. {case.claim} ({case.kind}). Norm: {case.norm}. Must fall short with: "
+            f"{', '.join(case.mutants)}.")
+    blocks = [Block("heading", result.id), Block("text", told)]
+    if result.error:
+        blocks += [Block("text", "Stopped by an error: " + result.error.strip().splitlines()[-1]),
+                   Block("error", result.error, detail=True)]
+    rows = [(p.quantity, p.measured, p.expected, p.origin, _word(p.holds)) for p in result.outcome.measured]
+    return [*blocks, *judged(result.outcome),
+            table(("quantity", "measured", "expected", "origin", "holds"), rows, detail=True),
+            *(Block("picture", f"pictures/{name}", detail=True) for name in pictures.names(result))]
+
+
+def judged(found: Outcome) -> list[Block]:
+    """A table of what is accepted and why, and of the quantities that are, or are not; those alike in a row."""
+    alike: dict[tuple[str, str, str], list[str]] = {}
+    for quantity, expected, origin, holds in found.lines():
+        alike.setdefault((expected, origin, _word(holds)), []).append(quantity)
+    rows = [(shared(names), *key) for key, names in alike.items()]
+    return [table(("quantities", "expected", "origin", "hold"), rows, brief=True)] if rows else []
+
+
+def shared(names: list[str]) -> str:
+    """Names in a list, those that begin alike up to a comma together: "C, linear; C, cubic" is "C: linear; cubic"."""
+    begins: dict[str, list[str]] = {}
+    for name in names:
+        begins.setdefault(name.partition(", ")[0], []).append(name)
+    return " / ".join(alike[0] if len(alike) == 1 else f"{first}: {'; '.join(name[len(first) + 2:] for name in alike)}"
+                      for first, alike in begins.items())
+
+
+def _word(holds: bool) -> str:
+    return "yes" if holds else "NO"
+
+
+def mutant_rows() -> list[tuple[str, str, str, str]]:
+    """(mutant, stage, what is wrong with it, cases that caught it in the last whole hunt)."""
+    caught, _ = mutants.recorded()
+    return [(mutant.id, stage, mutant.says, ", ".join(caught.get(mutant.id, [])) or "not caught")
+            for stage, chosen in mutants.load().items() for mutant in chosen.values()]
+
+
+def mutant_state() -> str:
+    """Is the record of mutants that of the present code?"""
+    caught, fresh = mutants.recorded()
+    known = mutants.everything()
+    count = f"{sum(bool(caught.get(id)) for id in known)} of {len(known)} mutants caught"
+    return f"{count} by `make mutants`, {'run on this code' if fresh else 'run BEFORE THE LAST CHANGE of the code'}."
+
+
+def mutant_blocks() -> list[Block]:
+    """All mutants."""
+    head = ("mutant", "stage", "what is wrong with it", "caught by")
+    return [Block("text", mutant_state()), table(head, mutant_rows())]
+
+
+def _write_live(results: list[Result], folder: Path) -> None:
+    """Every number with all its digits, and the seconds of this machine."""
+    folder.mkdir(exist_ok=True)
+    cases = {result.id: {"verdict": result.verdict, "seconds": round(result.seconds, 2), "measured": {
+        part.quantity: part.measured for part in result.outcome.measured}} for result in results}
+    text = json.dumps({"environment": environment(), "cases": cases}, indent=1)
+    (folder / "measured.json").write_text(text + "\n", encoding="utf-8")
+
+
+def _write_pages(results: list[Result], folder: Path) -> Path:
+    """Write index.html, a page a stage and their pictures; returns the path of the index."""
+    shutil.rmtree(folder / "pictures", ignore_errors=True)
+    (folder / "pictures").mkdir(parents=True)
+    for result in results:
+        pictures.draw(result, folder / "pictures")
+    about, back = Block("text", environment()), table((Link("All cases", "index"),), ())
+    found = {stage: (TITLES[stage], [back, *(block for result in chosen for block in article(result))])
+             for stage, chosen in by_stage(results)}
+    speed = table((Link("Speed against error, hard cases, assumptions", "speed"),), ())
+    found["index"] = "Verification", [*index(results), speed]
+    found["mutants"] = "Mutants", [back, *mutant_blocks()]
+    found["matrix"] = "What is verified by what", [back, *matrix.blocks()]
+    for name, (title, blocks) in found.items():
+        (folder / f"{name}.html").write_text(page(title, [*blocks, about]), encoding="utf-8")
+    return folder / "index.html"
+
+
+def environment() -> str:
+    """Versions of Python and of what the numbers depend on."""
+    packages = ", ".join(f"{name} {version(name)}" for name in PACKAGES)
+    return f"Python {platform.python_version()}, {platform.system()} {platform.machine()}; {packages}."

@@ -1,0 +1,105 @@
+"""One writer: blocks of text, pictures and tables, as Markdown and as pages."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+STYLE = """body {font: 15px/1.5 sans-serif; max-width: 1200px; margin: 2em auto; padding: 0 1em; color: #222}
+table {border-collapse: collapse; font-size: 13px; margin: 1em 0} .no {background: #fbe3e0} img {max-width: 100%}
+td, th {border-bottom: 1px solid #ddd; padding: 3px 8px; text-align: left; vertical-align: top} pre {color: #a00}"""
+#: Cells that make a row of a page red.
+BAD = {"wrong", "does not hold", "FALLS SHORT", "NO", "not caught"}
+
+
+@dataclass(frozen=True)
+class Link:
+    """A cell that leads to a place on a page: page "flow", place "flow-plug" or ""."""
+
+    text: str
+    page: str
+    place: str = ""
+
+    def to(self, ending: str) -> str:
+        """The address, with the ending of the pages' files."""
+        return f"{self.page}.{ending}" + (f"#{self.place}" if self.place else "")
+
+
+Cell = str | Link
+Row = tuple[Cell, ...]
+
+
+@dataclass(frozen=True)
+class Block:
+    """A piece of a text: a heading, a paragraph, a picture (file and what it shows), an error, or a table (head and
+    rows); ``detail``: on pages alone; ``brief``: in Markdown alone."""
+
+    kind: str
+    text: str = ""
+    rows: tuple[Row, ...] = ()
+    detail: bool = False
+    brief: bool = False
+
+
+def table(head: Iterable[Cell], rows: Iterable[Iterable[Cell]], **where: bool) -> Block:
+    """A table of a head and rows; where: detail or brief, as of a Block."""
+    return Block("table", rows=(tuple(head), *map(tuple, rows)), **where)
+
+
+def markdown(blocks: Iterable[Block], level: int = 3, pictures: str = "verification/report") -> str:
+    """What is no detail; headings of a level; pictures: where they are from there."""
+    return "\n\n".join(_markdown(block, level, pictures) for block in blocks if not block.detail)
+
+
+def _markdown(block: Block, level: int, pictures: str) -> str:
+    if block.kind == "heading":
+        return f"{'#' * level} {block.text}"
+    if block.kind == "picture":
+        name, _, shown = block.text.partition(": ")
+        return f"![{shown}]({pictures}/{name})"
+    if block.kind != "table":
+        return block.text
+    head, *rows = block.rows
+    lines = (head, ("---",) * len(head), *rows)
+    return "\n".join("| " + " | ".join(map(_markdown_cell, row)) + " |" for row in lines)
+
+
+def _markdown_cell(cell: Cell) -> str:
+    if isinstance(cell, Link):
+        return f"[{cell.text}]({cell.to('md')})"
+    return cell.replace("|", "\\|")
+
+
+def page(title: str, blocks: Iterable[Block]) -> str:
+    """A whole page."""
+    body = "".join(_html(block) for block in blocks if not block.brief)
+    return (f"<!doctype html><html lang='en'><meta charset='utf-8'><title>{_safe(title)}</title><style>{STYLE}</style>"
+            f"<body><h1>{_safe(title)}</h1>{body}</body></html>\n")
+
+
+def _html(block: Block) -> str:
+    text = _safe(block.text)
+    if block.kind == "picture":
+        name, _, shown = text.partition(": ")
+        return f"<img src='{name}' alt='{shown or name}'>"
+    if block.kind == "table":
+        head, *rows = block.rows
+        return f"<table>{_row('th', head)}{''.join(_row('td', row) for row in rows)}</table>"
+    return {"heading": f"<h2 id='{text}'>{text}</h2>", "error": f"<pre>{text}</pre>"}.get(block.kind, f"<p>{text}")
+
+
+def _row(kind: str, row: Row) -> str:
+    """A row of a table; red where something does not hold."""
+    cells = "".join(f"<{kind}>{_html_cell(cell)}" for cell in row)
+    return f"<tr class='{'no' if BAD & {*row} else 'yes'}'>{cells}"
+
+
+def _html_cell(cell: Cell) -> str:
+    if isinstance(cell, Link):
+        return f"<a href='{_safe(cell.to('html'))}'>{_safe(cell.text)}</a>"
+    return _safe(cell)
+
+
+def _safe(text: str) -> str:
+    return html.escape(text)

@@ -1,0 +1,1 @@
+"""Pores, bodies, meshes and runs that cases, claims, errata, hard cases and benchmarks share: made once."""

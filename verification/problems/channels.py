@@ -1,0 +1,187 @@
+"""What the one-dimensional cases share: narrow channels, meshed at random, with biomass from wall to wall in a slab.
+
+Their references know nothing of y. Each size has several unrelated meshes, whose errors are averaged: in a channel of a
+few elements' width those of a single mesh scatter by a factor of 2. Linear concentrations are on straight triangles,
+those of order 2 and 3 on curved ones, as in the package's own runs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from repro.fem import elements, transfer
+from repro.fem.mesh import Mesh
+from repro.fem.space import Space
+from repro.model import flow, transport
+from repro.model.kinetics import Sink
+from repro.scene import load_scene
+from verification.problems import meshes
+
+SCENE = load_scene("base")
+WIDTH, SLAB = 10.0, 40.0
+NAMES = ("acceptor", "donor")
+#: Under plug flow the slab is 0 < x < SLAB; without flow |x| < SLAB, between films of fluid of thickness FILM or none.
+CROSSED, FILM = (-20.0, 60.0), 20.0
+#: The same with more fluid at both ends, for order 2 and 3.
+WIDE = (-40.0, 80.0)
+#: Sizes of elements (um), and how many meshes of each: the coarse ones cost nothing and scatter most.
+SIZES = (4.0, 2.0, 1.0, 0.5)
+SAMPLES = {4.0: 12, 2.0: 6, 1.0: 3, 0.5: 1}
+SECOND = "linear elements, lumped reaction: second order"
+ORDERS = (1, 2, 3)
+WORDS = {1: "linear", 2: "quadratic", 3: "cubic"}
+#: Every order, by its word.
+EVERY = {word: (order,) for order, word in WORDS.items()}
+#: Of concentrations of an order in L2, and why; of what leaves or is taken up, twice the order of the gradient.
+EXPECTED = {1: (2, SECOND), 2: (3, "quadratic elements: third order in L2"),
+            3: (4, "cubic elements: fourth order in L2")}
+FUNCTIONAL = {1: (2, SECOND), 2: (4, "twice the order of the gradient: fourth"),
+              3: (6, "twice the order of the gradient: sixth")}
+#: Degrees of the quadrature in which errors of an order are integrated.
+DEGREES = {1: 6, 2: 6, 3: 8}
+
+
+@cache
+def meshed(size: float, sample: int, ends=CROSSED, slab=(0.0, SLAB)) -> Mesh:
+    """One of the straight meshes of a size."""
+    sides = tuple(side for side in slab if side not in ends)
+    return following(WIDTH * (slab[1] - slab[0]), size, sample, ends, WIDTH,
+                     lambda x, y: (x > slab[0]) & (x < slab[1]), across=sides)
+
+
+def following(area: float, size: float, sample: int, ends, width: float, is_biomass, **lines) -> Mesh:
+    """A mesh of the first random lattice whose triangulation follows all lines, so that the biomass has its area.
+
+    Raises ValueError where none of a few does.
+    """
+    for attempt in range(9):
+        grid = meshes.channel(ends, width, size, is_biomass, **lines, seed=int(1000 * size) + 100 * sample + attempt)
+        if np.isclose(grid.areas[grid.biomass].sum(), area, rtol=1e-12):
+            return grid
+    raise ValueError(f"size {size:g}, sample {sample}: no mesh follows the sides of the biomass")
+
+
+@cache
+def spaced(size: float, sample: int, order: int = 1, ends=CROSSED, slab=(0.0, SLAB)) -> Space:
+    """Functions of an order on one of the meshes of a size."""
+    return meshes.space_on(meshed(size, sample, ends, slab), order)
+
+
+def carrying(space: Space, velocity: np.ndarray, mean: float) -> flow.Flow:
+    """A given flow: velocity (n, 2) um/h at the nodes of the space, mean velocity um/h."""
+    correction = np.zeros((len(space.cells), 2)) if space.order == 1 else None
+    return flow.Flow(mean, velocity, np.zeros(space.mesh.corners), correction, 0.0, 0.0, 1.0)
+
+
+def plug_flow(space: Space, speed: float) -> flow.Flow:
+    """The same velocity everywhere."""
+    return carrying(space, np.column_stack([np.full(space.count, speed), np.zeros(space.count)]), speed)
+
+
+def problem(space: Space, speed: float | None, substrates=SCENE.substrates, law=SCENE.kinetics) -> transport.Problem:
+    """Both substrates under plug flow, None: without flow."""
+    return transport.problem(space, None if speed is None else plug_flow(space, speed), substrates, law)
+
+
+def filled(space: Space, density: float) -> np.ndarray:
+    """(r, q) um2 mg/L, masses of biomass of one density (mg/L)."""
+    return density * space.reaction.dx
+
+
+def steady(made: transport.Problem, density: float) -> transport.Concentrations:
+    """Steady concentrations over biomass of one density, with a last step of Newton's method for order 2 and 3: it
+    stops where no row errs by more than 1e-13 of its terms, which at Peclet 0.1 and little uptake may be 1e-8 of the
+    supply, more than the mesh does."""
+    sink = Sink(filled(made.space, density))
+    found = transport.steady(made, sink)
+    if made.space.order == 1:
+        return found
+    balance, state = transport.Balance(made, sink), np.concatenate([found.acceptor, found.donor])
+    state = state + made.system.solve(balance.tangent(state), -balance.residual(state))
+    acceptor, donor = state.reshape(2, -1)
+    return transport.Concentrations(acceptor, donor, found.iterations + 1)
+
+
+def decay_demand(law) -> float:
+    """d_c f_d b of (7), 1/h."""
+    return law.decay_oxygen_demand * law.degradable_fraction * law.decay_coefficient
+
+
+def rates(law, substrates=SCENE.substrates) -> dict[str, float]:
+    """The kinetics for the references."""
+    return {"k": law.maximum_utilization_rate, "F": law.acceptor_to_donor_ratio, "decay": decay_demand(law),
+            "K_A": substrates.acceptor.half_saturation, "K_D": substrates.donor.half_saturation}
+
+
+def pair(name: str, substrates=SCENE.substrates) -> tuple[float, float]:
+    """A number of both substrates, acceptor first."""
+    return getattr(substrates.acceptor, name), getattr(substrates.donor, name)
+
+
+def changed(which: str, **values):
+    """The paper's substrates with other values for one of them."""
+    return replace(SCENE.substrates, **{which: replace(getattr(SCENE.substrates, which), **values)})
+
+
+def speed_of(peclet: float) -> float:
+    """u (um/h) of a Peclet number u SLAB / D of the acceptor in water."""
+    return peclet * SCENE.substrates.acceptor.diffusivity / SLAB
+
+
+def both(state: transport.Concentrations) -> np.ndarray:
+    """(2, n) C_A and C_D."""
+    return np.stack([state.acceptor, state.donor])
+
+
+def in_points(space: Space) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where errors are integrated: places (T, q, 2) um, weights (T, q) um2 and functions (q, k)."""
+    of = elements.table(space.order, space.mesh.geometry, DEGREES[space.order])
+    nodes = space.mesh.points[space.mesh.cells]
+    return np.einsum("qg,tgi->tqi", of.shape, nodes), elements.weights(nodes, of), of.values
+
+
+def apart(space: Space, fields: np.ndarray, exact) -> tuple[np.ndarray, np.ndarray]:
+    """Root mean squares (m,) over the mesh of fields (m, n) less exact(x, y) (m, T, q), and of exact(x, y)."""
+    where, weight, values = in_points(space)
+    truth = np.asarray(exact(where[..., 0], where[..., 1]))
+    gap = fields[:, space.cells] @ values.T - truth
+    return tuple(np.sqrt(np.sum(weight * part**2, axis=(1, 2)) / weight.sum()) for part in (gap, truth))
+
+
+def relative(space: Space, field: np.ndarray, exact) -> float:
+    """L2 over the mesh of one field (n,) less exact(x) over that of exact."""
+    gap, size = apart(space, field[None], lambda x, y: exact(x)[None])
+    return float(gap[0] / size[0])
+
+
+def distance(space: Space, fields: np.ndarray, exact) -> np.ndarray:
+    """(2,) L2 over the mesh of fields (2, n) less exact(x) (2, ...), acceptor and donor, over that of exact."""
+    gap, size = apart(space, fields, lambda x, y: exact(x))
+    return gap / size
+
+
+def averaged(measure, size: float, *given, samples=SAMPLES) -> dict[str, float]:
+    """Root mean square of what ``measure(size, sample, *given)`` gives on each mesh of a size, name by name."""
+    rows = [measure(size, sample, *given) for sample in range(samples[size])]
+    return {name: float(np.sqrt(np.mean([row[name] ** 2 for row in rows]))) for name in rows[0]}
+
+
+def sample(space: Space, fields: np.ndarray, where: np.ndarray) -> np.ndarray:
+    """(m, K) fields (m, n) at places (K, 2)."""
+    at = transfer.located(space.mesh.points, space.mesh.cells, where)
+    return at.field(fields.T, space.cells, space.order).T
+
+
+def along(space: Space, field: np.ndarray, x) -> np.ndarray:
+    """A field (n,) along the middle of the channel."""
+    return sample(space, field[None], np.column_stack([x, np.full(len(x), WIDTH / 2)]))[0]
+
+
+def at_heights(space: Space, fields: np.ndarray, x, heights: int = 5) -> np.ndarray:
+    """(2, heights, n) fields (2, n) at x (n,), at so many heights."""
+    y = WIDTH * (np.arange(heights) + 0.5) / heights
+    where = np.column_stack([np.tile(x, heights), np.repeat(y, len(x))])
+    return sample(space, fields, where).reshape(2, heights, -1)

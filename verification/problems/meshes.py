@@ -1,0 +1,155 @@
+"""Meshes of rectangles for cases whose geometry is simpler than the paper's: random, and unrelated from size to size.
+
+They are made without the package's mesher: nodes on the given lines, a jittered lattice between them, one Delaunay
+triangulation. Half-discs are the package's own.
+
+Random meshes whose edges follow lines or a circle between fluid and biomass, unrelated from draw to draw.
+
+An edge between neighbours on such a curve is Delaunay's if no other node lies in the circle around it: nodes nearer to
+the curve than CLEARANCE are left out. That no triangle lies across it is checked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.spatial import Delaunay
+
+from repro.fem import mesher, outline, sizing
+from repro.fem.mesh import Mesh, curved, triangle_areas
+from repro.fem.space import Space
+
+#: Displacement of the lattice's nodes, and the least distance of a lattice node from a line, over the element size.
+JITTER, CLEARANCE = 0.22, 0.45
+
+
+def rectangle(ends, width: float, size: float, *, across=(), along=(), seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """(points, triangles) of ends x [0, width] in elements of ``size``; edges follow the lines x in ``across`` and
+    y in ``along``. Boundary nodes are on their line to the last bit."""
+    random = np.random.default_rng(seed)
+    x_lines, y_lines = np.array([ends[0], *across, ends[1]]), np.array([0.0, *along, width])
+    xs, ys = _stations(x_lines, size), _stations(y_lines, size)
+    rim = [np.column_stack([xs, np.full(len(xs), y)]) for y in y_lines]
+    rim += [np.column_stack([np.full(len(ys), x), ys]) for x in x_lines]
+    points = np.vstack([np.unique(np.vstack(rim), axis=0), _inside(x_lines, y_lines, size, random)])
+    triangles = Delaunay(points).simplices
+    areas = triangle_areas(points, triangles)
+    triangles[areas < 0] = triangles[areas < 0][:, ::-1]
+    return points, triangles[np.abs(areas) > 1e-9 * size**2]
+
+
+def _stations(lines: np.ndarray, size: float) -> np.ndarray:
+    """Equal parts of about ``size`` between consecutive lines."""
+    pieces = [np.linspace(a, b, max(1, round((b - a) / size)) + 1)[:-1] for a, b in zip(lines, lines[1:])]
+    return np.append(np.concatenate(pieces), lines[-1])
+
+
+def _inside(x_lines, y_lines, size: float, random) -> np.ndarray:
+    """A jittered triangular lattice, without what comes near a line."""
+    rows = np.arange(y_lines[0], y_lines[-1], size * np.sqrt(0.75))
+    columns = np.arange(x_lines[0], x_lines[-1], size)
+    x, y = np.meshgrid(columns, rows)
+    x = x + 0.5 * size * (np.arange(len(rows)) % 2)[:, None]
+    points = np.column_stack([x.ravel(), y.ravel()]) + size * random.uniform(0, 1, 2)
+    points += size * random.uniform(-JITTER, JITTER, points.shape)
+    gaps = [np.abs(points[:, [axis]] - lines).min(axis=1) for axis, lines in ((0, x_lines), (1, y_lines))]
+    within = (points < [x_lines[-1], y_lines[-1]]).all(axis=1)
+    return points[within & (np.minimum(*gaps) > CLEARANCE * size)]
+
+
+def channel(ends, width: float, size: float, is_biomass, *, across=(), along=(), seed: int = 0) -> Mesh:
+    """A straight mesh of a rectangle; ``is_biomass(x, y)`` says which triangles, by their middles, are biomass."""
+    points, triangles = rectangle(ends, width, size, across=across, along=along, seed=seed)
+    middle = points[triangles].mean(axis=1)
+    return Mesh.of(points, triangles, is_biomass(*middle.T), np.empty(0, int), width, tuple(map(float, ends)))
+
+
+def plug(ends, width: float, half: float, size: float, make=channel, seed: int = 0) -> Mesh:
+    """Biomass from wall to wall for |x| < half (um); make: :func:`channel` or :func:`cut`."""
+    return make(ends, width, size, lambda x, y: np.abs(x) < half, across=(-half, half), seed=seed)
+
+
+def space_on(straight: Mesh, order: int) -> Space:
+    """Functions of an order on a straight mesh: those of order 2 and 3 on its triangles as curved ones."""
+    return Space(straight if order == 1 else curved(straight, None), order)
+
+
+def half_disc(radius: float, refinement: float, ends, width: float, *, geometry: int = 1, lean: float = 0.0) -> Mesh:
+    """The package's mesh around a half-disc on the lower wall, straight (geometry 1) or curved (2), sheared by
+    ``lean``; a film of 2 um is the thinnest that is resolved."""
+    seed = outline.half_disc(radius, sizing.ACROSS_AGGREGATE * refinement, geometry)
+    points = seed.points + lean * seed.points[:, [1]] * [1.0, 0.0]
+    return around(outline.Outline(points, seed.wall, seed.fixed, points, geometry), refinement, ends, width)[0]
+
+
+def around(seed: outline.Outline, refinement: float, ends, width: float) -> tuple[Mesh, outline.Outline]:
+    """The package's mesh around an outline, and the outline as its edges are split."""
+    return mesher.generate(seed, ends, sizing.Sizing(width, refinement, 2.0), seed.geometry)
+
+
+def half_disc_space(radius: float, refinement: float, ends, width: float, order: int) -> Space:
+    """Functions of an order on the package's mesh around a half-disc."""
+    return Space(half_disc(radius, refinement, ends, width, geometry=min(order, 2)), order)
+
+
+#: The least distance of a node from the curve, over the element size: over a half, as edges on the curve are not quite
+#: as long as an element.
+CURVE_CLEARANCE = 0.6
+#: The package's own mesher draws nothing: unrelated meshes of about a size come from slightly different refinements.
+SPREAD = (1.0, 0.9, 1.1)
+
+
+def cut(ends, width: float, size: float, is_biomass, *, across=(), along=(), seed: int = 0) -> Mesh:
+    """A rectangle cut by the lines x in ``across`` and y in ``along``; ``is_biomass(x, y)`` of triangles' middles."""
+    points, _ = rectangle(ends, width, size, across=across, along=along, seed=seed)
+
+    def beside(where):
+        return np.hstack([where[:, [axis]] - np.array(lines) for axis, lines in ((0, across), (1, along))])
+
+    apart = np.abs(beside(points)).min(axis=1)
+    return _delaunay(points[(apart == 0) | (apart > CURVE_CLEARANCE * size)], beside, size, is_biomass, ends, width)
+
+
+def disc(ends, width: float, size: float, centre, radius: float, seed: int) -> Mesh:
+    """A rectangle with a disc of biomass inside, a polygon of edges of about ``size``, which is the mesh's loop."""
+    points, _ = rectangle(ends, width, size, seed=seed)
+    parts = round(2 * np.pi * radius / size)
+    angle = 2 * np.pi * (np.arange(parts) + np.random.default_rng(seed).uniform()) / parts
+    circle = centre + radius * np.column_stack([np.cos(angle), np.sin(angle)])
+
+    def beside(where):
+        return np.hypot(*(where - centre).T)[:, None] - radius
+
+    points = np.vstack([points[np.abs(beside(points)[:, 0]) > CURVE_CLEARANCE * size], circle])
+    loop = np.arange(len(points) - parts, len(points))
+    return _delaunay(points, beside, size, lambda x, y: np.hypot(x - centre[0], y - centre[1]) < radius, ends, width,
+                     loop)
+
+
+def round_disc(ends, width: float, size: float, centre, radius: float, seed: int) -> Mesh:
+    """The same of six-node triangles, middles of the polygon's edges on the circle."""
+    straight = disc(ends, width, size, centre, radius, seed)
+    start = straight.points[straight.loop] - centre
+    middle = start + np.roll(start, -1, axis=0)
+    return curved(straight, centre + radius * middle / np.hypot(*middle.T)[:, None]).checked()
+
+
+def _delaunay(points, beside, size: float, is_biomass, ends, width: float, loop=()) -> Mesh:
+    """Delaunay's triangles, counterclockwise, without those that round-off makes flat along the rim; ``beside(points)``
+    (N, k) are distances from the curves, of one sign on each side. Raises ValueError where a triangle lies across."""
+    triangles = Delaunay(points).simplices
+    areas = triangle_areas(points, triangles)
+    triangles[areas < 0] = triangles[areas < 0][:, ::-1]
+    triangles = triangles[np.abs(areas) > 1e-9 * size**2]
+    sides = beside(points)[triangles]
+    if ((sides.min(axis=1) < -1e-9 * size) & (sides.max(axis=1) > 1e-9 * size)).any():
+        raise ValueError("a triangle lies across the curve between fluid and biomass")
+    biomass = is_biomass(*points[triangles].mean(axis=1).T)
+    return Mesh.of(points, triangles, biomass, np.array(loop, int), width, tuple(map(float, ends)))
+
+
+def root_mean_square(measure: Callable[[int], dict[str, float]], draws: int) -> dict[str, float]:
+    """Each error over several random meshes of one size: ``measure(draw)`` gives {field: error}."""
+    rows = [measure(draw) for draw in range(draws)]
+    return {name: float(np.sqrt(np.mean([row[name] ** 2 for row in rows]))) for name in rows[0]}

@@ -1,0 +1,121 @@
+"""Runs that the cases of this stage share, and what is read off them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from repro.march.loop import Instant
+from repro.march.simulation import simulate
+from repro.model.pore import Pore, Solved
+from repro.scene import Scene, load_scene
+from verification.problems import pairs
+
+ROUND_OFF = "round-off"
+#: The velocity of base at t = 0, 2.9 m/d, in um/h.
+SPEED = 2.9e6 / 24
+PRESETS = ("paper", "fast", "accurate")
+#: Kinds of elements, by the names that scenes have for them: of order 1, 2 and 3.
+ELEMENTS = ("linear", "quadratic", "cubic")
+
+
+def of(elements: str) -> str:
+    """The change of a scene that makes its elements linear, quadratic or cubic."""
+    return f'numerics.elements="{elements}"'
+
+
+def coarser(elements: str, refinement: float, linear: float = 1.0) -> str:
+    """The change of a scene that gives quadratic and cubic elements a refinement, and linear ones another."""
+    return f"numerics.refinement={linear if elements == 'linear' else refinement}"
+
+
+def by(preset: str) -> str:
+    """The change of a scene that makes its numerics those of a preset."""
+    return f'numerics.preset="{preset}"'
+
+
+#: Changes of a scene, by label: every kind of elements with the paper's scheme, and the presets.
+EVERY = {**{kind: (of(kind), coarser(kind, 0.4)) for kind in ELEMENTS}, **{kind: (by(kind),) for kind in PRESETS[1:]}}
+
+
+def base(end: str, *changes: str, times: str = "") -> Scene:
+    """The paper's scene to a time ("6 h"), reported at its end, or at ``times`` ('"3 h", "6 h"')."""
+    return load_scene("base", (f'growth.end="{end}"', f'output.times=[{times or repr(end)}]', *changes))
+
+
+def every_step(end: str, *changes: str) -> Scene:
+    """The paper's scene to a time, reported after every step."""
+    return load_scene("base", (f'growth.end="{end}"', *changes))
+
+
+def on_wall(heights: np.ndarray) -> np.ndarray:
+    """Heights (n,) of a shape's points with the first and the last on the lower wall to the last bit."""
+    return np.concatenate([[0.0], heights[1:-1], [0.0]])
+
+
+def last(scene: Scene) -> Instant:
+    """The last instant of a run."""
+    *_, found = simulate(scene)
+    return found
+
+
+def numbers(instant: Instant) -> dict[str, float]:
+    """What a run comes to: area (um2), upstream tip (um), conductivity (um/h)."""
+    outline, found = instant.pore.outline, instant.solved.flow
+    shape = {"area": outline.area, "upstream tip": outline.upstream}
+    return shape if found is None else {**shape, "conductivity": found.conductivity}
+
+
+def without_flow(scene: Scene) -> Scene:
+    """The supply held at both ends, and diffusion alone."""
+    return replace(scene, flow=None)
+
+
+def at_velocity(scene: Scene, speed: float) -> Scene:
+    """The scene driven by a mean velocity (um/h) instead of its head."""
+    return replace(scene, flow=replace(scene.flow, head=None, mean_velocity=speed))
+
+
+def with_diffusivities(scene: Scene, change) -> Scene:
+    """The scene with ``change`` (D, D_B) -> (D, D_B) made to both substrates."""
+    changed = {}
+    for name in ("acceptor", "donor"):
+        one = getattr(scene.substrates, name)
+        water, biomass = change(one.diffusivity, one.diffusivity_in_aggregate)
+        changed[name] = replace(one, diffusivity=water, diffusivity_in_aggregate=biomass)
+    return replace(scene, substrates=replace(scene.substrates, **changed))
+
+
+def density_drift(scene: Scene, instant: Instant) -> float:
+    """Largest |(X_A + X_I) / X_m - 1| in the aggregate."""
+    now = instant.pore
+    density = (now.active + now.inert) / now.space.reaction.dx
+    return float(np.abs(density / scene.kinetics.maximum_density - 1).max())
+
+
+def section_means(now: Pore, solved: Solved, x: np.ndarray, points: int = 16) -> np.ndarray:
+    """(2, K) means of C_A and C_D over the sections x (K,) of the mesh."""
+    found = solved.concentrations
+    place, weight = np.polynomial.legendre.leggauss(points)
+    y = 0.5 * now.mesh.width * (1 + place)
+    where = np.column_stack([np.repeat(x, points), np.tile(y, len(x))])
+    values = pairs.sample(now.space, np.column_stack([found.acceptor, found.donor]), where)
+    return np.einsum("kpm,p->mk", values.reshape(len(x), points, 2), 0.5 * weight)
+
+
+def growth_rates(scene: Scene, acceptor: float | None = None, donor: float | None = None) -> tuple[float, float]:
+    """Rates (1/h) at which X_A grows and leaves X_I, (9)-(10), at concentrations (mg/L), those of the supply by
+    default: written down anew."""
+    law, both = scene.kinetics, scene.substrates
+    given = ((both.acceptor.supply if acceptor is None else acceptor, both.acceptor.half_saturation),
+             (both.donor.supply if donor is None else donor, both.donor.half_saturation))
+    m_a, m_d = (value / (value + half) for value, half in given)
+    return (m_a * (law.maximum_utilization_rate * law.yield_coefficient * m_d - law.decay_coefficient),
+            m_a * law.decay_coefficient * (1 - law.degradable_fraction))
+
+
+def mass_after(scene: Scene, time: float) -> float:
+    """(X_A + X_I) over that at the start, after hours at the supply: an exponential."""
+    rise, left = growth_rates(scene)
+    return float(np.exp(rise * time) + left / rise * np.expm1(rise * time))

@@ -1,0 +1,409 @@
+"""(30)-(34): the mass in every point of the reaction is kept as the aggregate expands.
+
+An aggregate that grows unevenly through many updates and remeshes: what must hold after each of them.
+
+A new mesh around the aggregate: what it carries over, and what it starts from.
+
+Substrates on a new mesh that reaches further than the old one: (26) upstream, constant downstream.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from repro.fem.mesh import triangle_areas
+from repro.fem.outline import FREE
+from repro.model import remeshing
+from repro.model.transport import Concentrations
+from verification.kernel.case import Outcome, Profile, at_least, at_most, case, refine, study
+from verification.problems import aggregates, norms, pairs
+
+#: The seed's radius (um), the increase of the biomass in an update, and how many of them: the area grows eightfold.
+RADIUS, INCREASE, UPDATES = 5.0, 0.08, 27
+
+
+@case("reprojection-mass", kind="exact",
+      norm="largest relative difference over the aggregate's nodes (linear) or quadrature points; weights of the "
+           "points less those worked out here, over the largest",
+      claim="(34) keeps the mass of every node or quadrature point, X_A and X_I alike, over the biomass triangles "
+            "around it and no others",
+      mutants=("reprojection-left-out", "inverse-ratio", "fluid-triangles-too"), over=aggregates.EVERY)
+def node_mass(order: int):
+    """Checks of one update of a half-disc of 20 um with elements of an order."""
+    def density(x, y):
+        return aggregates.DENSITY * (1 + 0.02 * np.sin(0.3 * x + 0.2 * y))
+
+    now = aggregates.placed(aggregates.half_disc(20.0, order=order), 1.0, density, order=order)
+    x, y = aggregates.places(now.space)
+    weight, made = aggregates.areas(now), 0.05 * (1 + np.sin(0.2 * x))
+    now.inert[:] = (50 + y) * weight
+    after = aggregates.expanded(aggregates.scene(order=order), now, made)
+    ratio = aggregates.areas(after) / weight
+    dx = after.space.reaction.dx
+    kept = {"X_A": ratio * (after.active / dx) / (density(x, y) * (1 + made)),
+            "X_I": ratio * (after.inert / dx) / (50 + y)}
+    return [*(at_most(f"{kind}", np.abs(found - 1).max(), 1e-12, "(34): round-off")
+              for kind, found in kept.items()),
+            at_most("weights", np.abs(dx - aggregates.areas(after)).max() / dx.max(), 1e-12,
+                    "biomass triangles only: round-off"),
+            at_least("spread of the ratios of areas", np.ptp(ratio), 0.05, "else nothing is tested")]
+
+
+@case("reprojection-half-disc", kind="exact",
+      norm="largest relative error of radius, density, theta and mass in 27 updates, two remeshes among them",
+      claim="A half-disc that grows by 8 % an update everywhere stays one, of radius R_0 sqrt(theta), and (34) returns "
+            "its density to X_m in every point, through remeshes as well",
+      mutants=("reprojection-left-out", "inverse-ratio", "theta-forgotten", "extent-kept-too-long"),
+      over=aggregates.EVERY)
+def half_disc(order: int):
+    """Checks of 27 updates with elements of an order."""
+    given, now, rows, renewed = aggregates.scene(order=order), aggregates.seed(RADIUS, order=order), [], []
+    first = now.mass
+    for update in range(1, UPDATES + 1):
+        now, anew = aggregates.updated(given, now, INCREASE)
+        renewed += [update] if anew else []
+        rows.append(_errors(now, (1 + INCREASE) ** update, first))
+    round_off = 1e-12, "closed form: round-off"
+    bounds = {quantity: round_off for quantity in rows[0]}
+    if order > 1:
+        bounds["radius"] = 1e-4, "arcs that are parabolas: (edge / R)^4 / 100"
+    checks = [at_most(f"{quantity}", max(row[quantity] for row in rows), *bound)
+              for quantity, bound in bounds.items()]
+    return [*checks, at_least("remeshes", len(renewed), 2.0, "else the transfer is not tested"),
+            at_most("first remesh, updates from (3.1)'s", abs(renewed[0] - _first_remesh()), 0.0,
+                    "meshed to 11 R_0, remade beyond 8 R")]
+
+
+def _errors(now, theta: float, first: float) -> dict[str, float]:
+    """Relative errors against the closed form; the outline's nodes are on the arc."""
+    distance = np.hypot(*now.outline.points[now.wall == FREE].T)
+    active, _ = aggregates.densities(now)
+    return {"radius": np.abs(distance / (RADIUS * np.sqrt(theta)) - 1).max(),
+            "density": np.abs(active / aggregates.DENSITY - 1).max(),
+            "theta": np.abs(now.theta / theta - 1).max(), "mass": abs(now.mass / first / theta - 1)}
+
+
+def _first_remesh() -> int:
+    """The first update after which 8 R_0 sqrt(theta) > 11 R_0."""
+    return int(np.ceil(2 * np.log(11 / 8) / np.log(1 + INCREASE)))
+
+
+GROWING_UPDATES, SEED = 30, 8.0
+#: Remesh where more than six triangles are under 0.6 (3.5), or nearer to an end than min(7 R, 1.3 W) (3.1).
+POOR, ALLOWED, REACH, WIDEST = 0.6, 6, 7.0, 1.3
+
+
+@case("reprojection-growing", kind="property",
+      norm="biomass less what was made, relative; theta over J less the density over X_m; triangles, and um, by which "
+           "the criteria are missed; all updates",
+      claim="An aggregate that grows sixfold, seven times faster in front than behind, keeps its biomass to round-off "
+            "through every remesh, restarts theta at J times the density over X_m, and is remeshed in time",
+      mutants=("theta-without-density", "remeshed-too-late", "linear-transfer", "curved-mass-lost"), ways="1 2 3")
+def growing() -> Outcome:
+    kept = {order: _growing_grown("conserving", order) for order in aggregates.ORDERS}
+    paper = _growing_grown("linear", 1)
+    checks = [check for order, rows in kept.items() for check in _judged(rows, aggregates.ORDERS[order])]
+    checks.append(at_least("drift of the biomass by the paper's transfer", np.abs(paper["drift"]).max(), 1e-4,
+                           "not conserving [E8]: the case would see it"))
+    return Outcome(tuple(checks), (), (_drifts(kept[1]["drift"], paper["drift"]),))
+
+
+def _judged(rows: dict[str, np.ndarray], name: str) -> list:
+    """Checks of the updates with one kind of elements."""
+    return [at_most(f"biomass, {name}", np.abs(rows["drift"]).max(), 1e-12, "round-off"),
+            at_most(f"theta after a remesh, {name}", rows["restart"].max(), 1e-12, "J times the density over X_m"),
+            at_most(f"triangles under 0.6, {name}", rows["poor"].max(), ALLOWED, "remesh criterion (3.5)"),
+            at_most(f"missing reach (um), {name}", rows["missing"].max(), 1e-9, "remesh criterion (3.1)"),
+            at_least(f"remeshes, {name}", np.count_nonzero(rows["anew"]), 3, "else nothing is tested")]
+
+
+def _drifts(kept: np.ndarray, paper: np.ndarray) -> Profile:
+    update = np.arange(1, GROWING_UPDATES + 1)
+    return Profile("biomass less what was made", "update", "relative",
+                   (("conserving", "ours", update, kept), ("linear", "ours", update, paper),
+                    ("exact", "exact", update, 0.0 * update)))
+
+
+def _growing_grown(transfer: str, order: int) -> dict[str, np.ndarray]:
+    """A row of numbers of every update."""
+    given = aggregates.scene(f'numerics.transfer="{transfer}"', order=order)
+    now, rows = aggregates.seed(SEED, order=order), []
+    wanted = now.mass
+    for _ in range(GROWING_UPDATES):
+        made = _faster_in_front(now)
+        wanted += float((now.active * made).sum())
+        now, anew = aggregates.updated(given, now, made)
+        rows.append((now.mass / wanted - 1, _restart(now) if anew else 0.0, _poor(now), _missing(now), anew))
+    return dict(zip(("drift", "restart", "poor", "missing", "anew"), np.array(rows).T))
+
+
+def _faster_in_front(now) -> np.ndarray:
+    """(r, q) increase of X_A in an update: 15 % at the upstream tip, 2 % at the other."""
+    outline, x = now.outline, aggregates.places(now.space)[0]
+    return 0.15 * np.exp(-2 * (x - outline.upstream) / (outline.downstream - outline.upstream))
+
+
+def _restart(now) -> float:
+    """Largest relative difference of theta from J times the density over X_m: of straight triangles the mean of their
+    nodes, of curved ones that in each point."""
+    mesh = now.mesh
+    cells = mesh.cells[mesh.biomass]
+    density = sum(aggregates.densities(now)) / aggregates.DENSITY
+    if now.space.order == 1:
+        J = triangle_areas(mesh.points, cells) / triangle_areas(now.origin, cells)
+        mean = density[np.searchsorted(mesh.body, cells), 0].mean(axis=1)
+        return float(np.abs(now.theta[:, 0] / (J * mean) - 1).max())
+    table = now.space.table
+    present, first = (pairs.curved_weights(where[cells], table.linear, table.weights)
+                      for where in (mesh.points, now.origin))
+    return float(np.abs(now.theta / (present / first * density) - 1).max())
+
+
+def _poor(now) -> int:
+    """Triangles of quality under 0.6, from their sides alone."""
+    corner = now.mesh.points[now.mesh.triangles]
+    sides = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2)
+    half = sides.sum(axis=1) / 2
+    area = np.sqrt(half * np.prod(half[:, None] - sides, axis=1))
+    return int(np.count_nonzero(4 * np.sqrt(3) * area / np.sum(sides**2, axis=1) < POOR))
+
+
+def _missing(now) -> float:
+    """um of fluid that are missing beside the aggregate."""
+    outline, (left, right) = now.outline, now.mesh.ends
+    reach = min(REACH * outline.thickness, WIDEST * aggregates.WIDTH)
+    return max(0.0, reach - (outline.upstream - left), reach - (right - outline.downstream))
+
+
+#: A motion that is linear in the place and keeps the lower wall; det = 1.17.
+MOTION = np.array([[1.3, 0.2], [0.0, 0.9]])
+ROUND, REFINEMENTS = 20.0, (0.75, 1.3, 2.3, 4.0)
+#: Refinements of the meshes before the remesh over that of the new one: three unrelated pairs of meshes a size.
+OLD = (0.7, 0.8, 0.9)
+TRANSFERS = ("conserving", "bounded", "linear")
+
+
+@case("reprojection-remesh-linear", kind="exact",
+      norm="largest relative difference over all nodes or points of the new mesh",
+      claim="Through a remesh of an aggregate that was moved linearly, places at t = 0, densities and pressure that "
+            "are linear stay so, and theta is det F times the density over X_m, with every transfer; with higher "
+            "orders both kinds are X_m together, and a share of X_I that is linear stays so",
+      mutants=("theta-without-density", "kinds-exchanged", "jacobian-inverted", "curved-mass-lost"), ways="1 2 3")
+def linear() -> Outcome:
+    checks = [at_most(f"{name}, {transfer}", error, 1e-12, "linear fields: round-off")
+              for transfer in TRANSFERS for name, error in _carried_errors(1, transfer, KINDS).items()]
+    for order in (2, 3):
+        checks += [at_most(f"{name}, {aggregates.ORDERS[order]}", error, 1e-12, "linear fields: round-off")
+                   for name, error in _carried_errors(order, "conserving", SHARES).items()]
+    return Outcome(tuple(checks))
+
+
+#: mg/L, as a + b x + c y, of linear elements; and of both kinds X_m together. The pressure's, over mu_L.
+KINDS = {"active": (25000.0, 100.0, -200.0), "inert": (3000.0, -20.0, 50.0)}
+SHARES = {"active": (27000.0, 20.0, -50.0), "inert": (3000.0, -20.0, 50.0)}
+PRESSURE = (0.1, 0.01, 0.02)
+
+
+def _plane(coefficients, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    a, b, c = coefficients
+    return a + b * x + c * y
+
+
+def _moved_linearly(order: int, kinds: dict):
+    """An aggregate that is no half-disc, moved by MOTION; its arcs are straight, so that linear fields are linear in
+    all triangles' own coordinates too."""
+    outline = aggregates.half_disc(15.0, order=order)
+    flat = outline.points * [1.2, 1.0]
+    if order > 1:
+        flat[1::2] = 0.5 * (flat[::2] + np.roll(flat, -2, axis=0)[::2])
+    now = aggregates.placed(replace(outline, points=flat, origin=flat), 1.0, order=order)
+    points = now.mesh.points.copy()
+    points[now.mesh.body] = points[now.mesh.body] @ MOTION.T
+    moved = now.moved(points)
+    masses = {name: _plane(of, *aggregates.places(moved.space)) * moved.space.reaction.dx for name, of in kinds.items()}
+    inside = moved.mesh.topology.body_corners
+    pressure = np.zeros(moved.mesh.corners)
+    pressure[inside] = _plane(PRESSURE, *moved.mesh.points[inside].T)
+    return replace(moved, pressure=pressure, **masses)
+
+
+def _carried_errors(order: int, transfer: str, kinds: dict) -> dict[str, float]:
+    """Relative errors of everything that a remesh makes."""
+    given = aggregates.scene(f'numerics.transfer="{transfer}"', "numerics.refinement=1.2", order=order)
+    new = aggregates.remeshed(given, _moved_linearly(order, kinds))
+    mesh, inside = new.mesh, new.mesh.topology.body_corners
+    densities = dict(zip(kinds, aggregates.densities(new)))
+    exact = {name: _plane(of, *aggregates.places(new.space)) for name, of in kinds.items()}
+    errors = {name: np.abs(densities[name] / exact[name] - 1).max() for name in kinds}
+    there = mesh.points[mesh.body]
+    pressure = _plane(PRESSURE, *mesh.points[inside].T)
+    whole = sum(exact.values()) / aggregates.DENSITY
+    if order == 1:
+        whole = whole[np.searchsorted(mesh.body, mesh.cells[mesh.biomass]), 0].mean(axis=1, keepdims=True)
+    return {**errors, "pressure": np.abs(new.pressure[inside] / pressure - 1).max(),
+            "places at t = 0": np.abs(new.body.reference @ MOTION.T - there).max() / np.abs(there).max(),
+            "theta": np.abs(new.theta / (np.linalg.det(MOTION) * whole) - 1).max()}
+
+
+@case("reprojection-remesh-order", kind="manufactured", slow=True,
+      norm="L2 of the density on the new mesh less the exact one, and of the density over X_m less one after an update "
+           "without growth, relative, means of three pairs of meshes a size; area after that update, relative",
+      claim="A remesh carries a smooth density to second order; the next update brings it back to X_m to second order, "
+            "and the area to the biomass over X_m exactly",
+      mutants=("theta-without-density", "corners-for-middles"),
+      ways="1", because="orders 2, 3: reprojection-remesh-linear")
+def order() -> Outcome:
+    rows = refine(_density_errors, REFINEMENTS)
+    studies = (study("density after the remesh", rows["size"], rows["carried"], 2, "linear elements: second order",
+                     ceiling=1.5e-4),
+               study("density after the update", rows["size"], rows["restored"], 2,
+                     "mean over triangles for value at nodes: second order", ceiling=5e-4))
+    return Outcome((at_most("area after the update, over biomass / X_m", rows["area"].max(), 1e-12,
+                            "theta sums to the biomass: round-off"),
+                    at_least("density over X_m less one, before it", rows["before"].min(), 0.03,
+                             "else nothing is restored")), studies, (_along_the_wall(),))
+
+
+def _hump(x, y):
+    """X_A, level across the rim and the wall, 5 % above and below X_m."""
+    return aggregates.DENSITY * (1 + 0.05 * np.cos(np.pi * np.hypot(x, y) / ROUND))
+
+
+def _before_and_after(refinement: float, old: float):
+    """A half-disc with that density, and the same after a remesh."""
+    before = aggregates.placed(aggregates.half_disc(ROUND, refinement), old * refinement, _hump, (-30.0, 30.0))
+    given = aggregates.scene(f"numerics.refinement={refinement}", 'pore.length="60 um"')
+    return before, aggregates.remeshed(given, before)
+
+
+def _density_errors(refinement: float) -> dict[str, float]:
+    """Mean errors of one size."""
+    rows = [_errors_of_a_pair(refinement, old) for old in OLD]
+    return {name: float(np.mean([row[name] for row in rows])) for name in rows[0]}
+
+
+def _errors_of_a_pair(refinement: float, old: float) -> dict[str, float]:
+    """Errors after the remesh, and after the update that follows it."""
+    _, new = _before_and_after(refinement, old)
+    after, area = aggregates.expanded(aggregates.scene(), new, 0.0), new.mass / aggregates.DENSITY
+    return {"carried": norms.l2_error(*_body(new), _density(new), _hump), "restored": _off(after),
+            "before": _off(new), "area": abs(after.outline.area / area - 1),
+            "size": np.sqrt(2 * new.mesh.areas[new.mesh.biomass].mean())}
+
+
+def _body(now):
+    """Points and triangles of the aggregate."""
+    return now.mesh.points[now.mesh.body], now.mesh.topology.body_cells
+
+
+def _density(now) -> np.ndarray:
+    """(n,) X_A mg/L at the nodes of the aggregate."""
+    return aggregates.densities(now)[0][:, 0]
+
+
+def _off(now) -> float:
+    """L2 of the density over X_m less one."""
+    return norms.l2_error(*_body(now), _density(now), lambda x, y: aggregates.DENSITY + 0 * x)
+
+
+def _along_the_wall() -> Profile:
+    """Density along the wall: before the remesh, after it, after the update."""
+    old, new = _before_and_after(1.0, 0.8)
+    last, x = aggregates.expanded(aggregates.scene(), new, 0.0), np.linspace(-19.0, 19.0, 191)
+    line, dots = np.column_stack([x, 0 * x + 1e-6]), x[::10]
+    curves = [(name, "ours", x, norms.sample(*_body(now), _density(now) / aggregates.DENSITY, line))
+              for name, now in (("before", old), ("remeshed", new), ("updated", last))]
+    return Profile("density along the wall", "x (um)", "X_A / X_m",
+                   (*curves, ("exact before", "exact", dots, _hump(dots, 0 * dots) / aggregates.DENSITY),
+                    ("X_m", "reference", x, np.ones(len(x)))))
+
+
+@case("reprojection-remesh-arc", kind="exact",
+      norm="largest relative difference; distance of the interface's nodes from a circle, over that before the update",
+      claim="Where a remesh splits edges of what was the seed's arc, the new nodes were on it at t = 0, the polygon "
+            "stays what it is, and the next update rounds it",
+      mutants=("origin-on-the-chord",), ways="1", because="orders 2, 3 have arcs, which lie on it")
+def arc() -> Outcome:
+    coarse, fine = (aggregates.scene('aggregate.radius="10 um"', f"numerics.refinement={r}") for r in (0.5, 1.0))
+    grown = aggregates.expanded(coarse, aggregates.seed(10.0, 0.5), 3.0)
+    new = aggregates.remeshed(fine, grown)
+    after = aggregates.expanded(fine, new, 0.0)
+    free = new.wall == FREE
+    added = np.count_nonzero(free) / np.count_nonzero(grown.wall == FREE)
+    beside = np.abs(np.hypot(*new.outline.origin[free].T) / 10 - 1).max()
+    return Outcome((at_most("beside the arc at t = 0", beside, 1e-12, "the seed's arc: round-off"),
+                    at_most("area of the polygon", abs(new.outline.area / grown.outline.area - 1), 1e-12, "round-off"),
+                    at_most("unroundness left", _unround(after) / _unround(new), 0.25,
+                            "edges half as long: a quarter of the sag"),
+                    at_least("interface nodes, after over before", added, 1.9, "split, else nothing is tested")))
+
+
+def _unround(now) -> float:
+    """Spread of the distances of the interface's nodes from the origin, um."""
+    return float(np.ptp(np.hypot(*now.outline.points[now.wall == FREE].T)))
+
+
+#: um/h, of the order of the base scene's; ends of the old mesh, um.
+SPEED, ENDS = 1.2e5, (-40.0, 30.0)
+
+
+@case("reprojection-beyond-the-ends", kind="exact", norm="largest difference over the supply",
+      claim="On a mesh that reaches further both substrates follow (26) upstream of the old one, each with its own "
+            "diffusivity, stay constant downstream and are interpolated between; without flow they are the supply "
+            "beyond both ends",
+      mutants=("upstream-reversed", "diffusivity-of-the-acceptor"), over=aggregates.EVERY)
+def beyond_the_ends(order: int):
+    now = aggregates.placed(aggregates.half_disc(10.0, order=order), 1.0, ends=ENDS, order=order)
+    old = _exact(np.clip(now.space.points[:, 0], *ENDS))
+    flowing, still = (_carried(now, old, speed) for speed in (SPEED, 0.0))
+    x = flowing.space.points[:, 0]
+    for column, name in enumerate(("acceptor", "donor")):
+        yield _ends_judged(name, now, old[column], flowing, still, column)
+    yield at_least("reach beyond both ends (um)", min(ENDS[0] - x.min(), x.max() - ENDS[1]), 20.0,
+                   "else nothing is tested")
+    yield _along(flowing)
+
+
+def _substrates():
+    return aggregates.scene().substrates.acceptor, aggregates.scene().substrates.donor
+
+
+def _exact(x: np.ndarray) -> list[np.ndarray]:
+    """Both concentrations for places x, each constant beyond the old outlet: S (1 - 0.3 exp(u (x - x_out) / D))."""
+    return [s.supply * (1 - 0.3 * np.exp(SPEED / s.diffusivity * (np.minimum(x, ENDS[1]) - ENDS[1])))
+            for s in _substrates()]
+
+
+def _carried(now, old, speed: float):
+    """The pore on its new mesh; the whole of what the flow says there is its mean velocity."""
+    filled = replace(now, concentrations=Concentrations(*old))
+    return remeshing.remesh(aggregates.scene(order=now.space.order), filled, filled, speed)[0]
+
+
+def _ends_judged(name: str, now, old: np.ndarray, flowing, still, column: int) -> list:
+    """Checks of one substrate."""
+    supply, x = _substrates()[column].supply, flowing.space.points[:, 0]
+    found, resting = (_fields(new)[column] for new in (flowing, still))
+    outside, inside = (x < ENDS[0]) | (x > ENDS[1]), (x >= ENDS[0]) & (x <= ENDS[1])
+    between = pairs.sample(now.space, old, flowing.space.points[inside])
+    gaps = {"beyond the ends": (found - _exact(x)[column])[outside], "between": found[inside] - between,
+            "beyond the ends, no flow": resting[outside] - supply, "between, no flow": resting[inside] - between}
+    return [at_most(f"{name} {where}", np.abs(gap).max() / supply, 1e-12, "closed form: round-off")
+            for where, gap in gaps.items()]
+
+
+def _fields(new):
+    return new.concentrations.acceptor, new.concentrations.donor
+
+
+def _along(new) -> Profile:
+    """Both concentrations along the lower wall of the new mesh."""
+    places = new.space.points
+    wall = np.flatnonzero(places[:, 1] == 0)
+    wall = wall[np.argsort(places[wall, 0])]
+    x, curves = places[wall, 0], []
+    for substrate, found, exact in zip(("acceptor", "donor"), _fields(new), _exact(x)):
+        curves += [(substrate, "ours", x, found[wall]), (f"{substrate}, closed form", "exact", x, exact)]
+    return Profile("carried to a longer mesh (old: -40 to 30 um)", "x (um)", "C (mg/L)", tuple(curves))
