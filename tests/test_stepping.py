@@ -112,8 +112,8 @@ def same(one, two):
 
 @pytest.mark.parametrize("name", SCENES)
 def test_steps_depend_on_no_row(name):
-    """The last state and the ledger of every step, to the last bit, with 1, 5 and 16 rows, and every step's. Mutants: a
-    step that ends at a row; the next step from a row's substrates, or as long as what was left of it."""
+    """The last state and the ledger of every step, to the last bit, with 1, 5 and 16 rows, and every step's. Mutant: a
+    step that ends at a row."""
     end = float(SCENES[name][1 if "fast" in SCENES[name][0] else 0].split('"')[1].split()[0])
     found = [steps_of(name)]
     for count in (1, 5, 16):
@@ -127,8 +127,8 @@ def test_steps_depend_on_no_row(name):
 @pytest.mark.parametrize("name", SCENES)
 def test_steps_do_not_depend_on_the_end(name):
     """The ledgers of steps, and the state from which a later end goes on, to the last bit; the step that is cut closes
-    its ledger and ends where the run does. Mutants: the last steps shortened to fit, a step of the rest that the next
-    one goes on from."""
+    its ledger and ends where the run does. Mutants: the last steps shortened to fit, a cut step that is told as one of
+    the others."""
     whole, _, later = steps_of(name)
     end = 0.5 * (later[-2].start + later[-2].end) + 1e-3
     found, rows, ledgers = steps_of(name, f'growth.end="{end!r} h"')
