@@ -501,6 +501,8 @@ WRONG = {
                                 lambda: check_row(2)),
     "the inlet's concentration leaves": ("results.columns", "at.solved.fluxes[k].effluent",
                                          "at.solved.fluxes[k].inlet", lambda: check_row(1)),
+    "conductivity for velocity": ("results.columns", "at.solved.flow.mean_velocity", "at.solved.flow.conductivity",
+                                  lambda: check_row(3)),
     "velocities exchanged": ("results.arrays", "state.pore.space.to_mesh(state.solved.flow.velocity)",
                              "state.pore.space.to_mesh(state.solved.flow.velocity)[:, ::-1]", lambda: check_arrays(2)),
     "stresses exchanged": ("results.arrays", "state.stress[..., k]", "state.stress[..., (1, 0, 2, 3)[k]]",

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
 #: Largest defect that is accepted.
 LARGEST = 1e-6
-#: Of the oxygen demand with Gear's method, which takes growth and uptake by formulas of their own.
+#: Of the oxygen demand with Gear's method, which takes growth and uptake by formulas of their own,
+#: over what the biomass could turn over in the step.
 GEAR = 1e-3
 #: Of a mass: what round-off leaves of the difference of two.
 ROUND_OFF = 1e-13
@@ -90,20 +91,22 @@ def accepted_demand(scene: Scene, ledger: Ledger) -> float:
     The midpoint rule closes to round-off. In the paper's updates the trapezoidal rule errs by (dt
     times the fastest rate, k Y + b)^2 / 12 of what is turned over, 1e-3 in a step of base, where
     2e-4 at most is measured (of 132 random scenes the worst came to a tenth of it). Gear's method
-    may err by GEAR more.
+    controls concentrations over the supply, and so errs by GEAR of what the biomass could turn over
+    at the fastest rate (measured: 4e-4 at most, in 127 random steps and in closed pores).
     """
     kinetics = needed(scene.kinetics, "[kinetics]")
-    grown, decayed = demand_terms(kinetics, ledger)
-    scale = max(abs(grown), abs(decayed))
+    scale = max(map(abs, demand_terms(kinetics, ledger)))
     if scale == 0:
         return LARGEST
     found = LARGEST + ROUND_OFF * ledger.biomass_before / scale
-    if scene.numerics.time == "updates":
-        fastest = (kinetics.maximum_utilization_rate * kinetics.yield_coefficient
-                   + kinetics.decay_coefficient)
-        error = (fastest * (ledger.end - ledger.start)) ** 2 / 12
-        found += error * _turned_over(kinetics, ledger) / scale
-    return found + GEAR if scene.numerics.transport == "gear" else found
+    if scene.numerics.time == "midpoint":
+        return found
+    fastest = (kinetics.maximum_utilization_rate * kinetics.yield_coefficient
+               + kinetics.decay_coefficient)
+    part = fastest * (ledger.end - ledger.start)
+    if scene.numerics.transport == "gear":
+        return found + GEAR * part * ledger.biomass_before / scale
+    return found + part**2 / 12 * _turned_over(kinetics, ledger) / scale
 
 
 def _turned_over(kinetics: Kinetics, ledger: Ledger) -> float:
