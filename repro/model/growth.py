@@ -185,28 +185,6 @@ def piola(F: np.ndarray, P: np.ndarray) -> np.ndarray:
     return Strained(F).piola(P)
 
 
-def tangent(F: np.ndarray, P: np.ndarray) -> np.ndarray:
-    """d piola / d F, (..., i, K, j, L), over mu_L."""
-    at = Strained(F)
-    PJ = P * at.J
-    both = _outer(F, at.H) + _outer(at.H, F)
-    HH = _outer(at.H, at.H)
-    swap = np.swapaxes(HH, -3, -1)
-    identity = np.einsum("ij,kl->ikjl", np.eye(2), np.eye(2))
-    return (_times(at.A, identity - 2 / 3 * both) + _times(2 / 9 * at.A * at.trace + PJ, HH)
-            + _times(at.A * at.trace / 3 - PJ, swap))
-
-
-def _outer(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """(..., i, K, j, L) first_iK second_jL."""
-    return first[..., None, None] * second[..., None, None, :, :]
-
-
-def _times(scalar: np.ndarray, tensor: np.ndarray) -> np.ndarray:
-    """(..., i, K, j, L) with a factor (...)."""
-    return scalar[..., None, None, None, None] * tensor
-
-
 def cauchy(F: np.ndarray, P: np.ndarray) -> np.ndarray:
     """Cauchy stress over mu_L in plane strain: (..., 4) sigma_xx, sigma_yy, sigma_zz, sigma_xy.
 

@@ -36,6 +36,20 @@ ENDS = {1: 60.0, 2: 95.0, 3: 95.0}
 DEGREE, BENT = 6, 0.075
 
 
+def moduli(F: np.ndarray, P: np.ndarray) -> np.ndarray:
+    """(n, i, K, j, L) d S_iK / d F_jL over mu_L of deformations (n, 2, 2) with pressures (n,), S the first Piola stress:
+    read from the element tangents of n unit triangles, the gradients of whose second and third nodal function are the
+    unit vectors, and whose area is one half."""
+    count = len(F)
+    corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    shape = growth.Shape(np.arange(3 * count).reshape(count, 3), 3 * count, elements.GRADIENT_DEGREES[1])
+    body = growth.Body(shape, np.tile(corners, (count, 1)))
+    system = growth.System(body, np.zeros((3 * count, 2), bool), stabilising=np.zeros((count, 3, 3)))
+    position = (corners @ np.swapaxes(F, 1, 2)).reshape(-1, 2)
+    found = system.tangent(position, np.repeat(P, 3))[:, :6, :6].reshape(count, 2, 3, 2, 3)
+    return 2 * found[:, :, 1:, :, 1:]
+
+
 @dataclass(frozen=True, eq=False)
 class Supported:
     """A body in its reference configuration, and which coordinates are held, (n, 2)."""
