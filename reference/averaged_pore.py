@@ -22,8 +22,8 @@ keeps its shape, as a half-disc nearly does, stretches by the root of the mean t
 Units: any that agree. Pairs are of the acceptor and the donor.
 """
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, replace
+from functools import cache, partial
 
 import numpy as np
 import scipy.sparse as sp
@@ -121,9 +121,10 @@ class Section:
         return np.abs(self._defect(weight, fields + step)[0]).sum() < np.abs(self._defect(weight, fields)[0]).sum()
 
     def _defect(self, weight, fields):
-        """What the cells still lack of rest, and the size of its terms."""
+        """What the cells still lack of rest, and the size of its terms: of one not supplied against the other's."""
         sinks = weight * np.stack(uptake(*fields, self.pore.rates))
         size = (self.source + np.abs(sinks)).ravel() + abs(self.transport) @ np.abs(fields.ravel())
+        size = size + self.source.max()
         return (self.source - sinks).ravel() - self.transport @ fields.ravel(), size
 
 
@@ -156,6 +157,7 @@ class Averaged:
     def __init__(self, pore, lengths, heights, fluid, keeps_shape):
         self.pore, self.lengths, self.heights, self.fluid = pore, lengths, heights, fluid
         self.areas, self.keeps_shape, self.fields = lengths * heights, keeps_shape, None
+        self.supply = lambda _: pore.supply
 
     def seed(self):
         """The moment at t = 0."""
@@ -167,6 +169,21 @@ class Averaged:
                           rtol=accuracy, atol=accuracy)
         return [self._moment(time, state) for time, state in zip(found.t, found.y.T)]
 
+    def run_through(self, pieces, times, accuracy=1e-6):
+        """The moments at ``times``, ascending, while the supply changes: pieces (end, supply at the piece's start and
+        at its end), ascending, evenly in between; the last ends with the last time. A moment at a piece's end is one
+        of the next piece's start."""
+        state, begin, found = self._start(), 0.0, []
+        for number, (end, first, last) in enumerate(pieces, 1):
+            self.fields = None
+            self.supply = partial(_evenly, begin, end, np.array(first), np.array(last))
+            inside = [time for time in times if begin <= time < end or (number == len(pieces) and time == end)]
+            piece = solve_ivp(self._rise, (begin, end), state, method="DOP853", dense_output=True,
+                              rtol=accuracy, atol=accuracy)
+            found += [self._moment(time, piece.sol(time)) for time in inside]
+            state, begin = piece.y[:, -1], end
+        return found
+
     def _start(self):
         return np.concatenate([np.ones_like(self.areas), np.zeros_like(self.areas)])
 
@@ -174,25 +191,31 @@ class Averaged:
         """Of each cell; or the mean over the aggregate, if it keeps its shape."""
         return np.full_like(values, self.areas @ values / self.areas.sum()) if self.keeps_shape else values
 
-    def _solved(self, state):
+    def _solved(self, time, state):
         """The section, with the concentrations kept in ``fields``, and theta."""
+        pore = replace(self.pore, supply=tuple(self.supply(time)))
         active, inert = state.reshape(2, -1)
         theta = active + inert
         lengths, heights = np.sqrt(theta) * self.lengths, np.sqrt(theta) * self.heights
-        section = Section(self.pore, -lengths[: len(lengths) // 2].sum(), lengths, heights, self.fluid)
+        section = Section(pore, -lengths[: len(lengths) // 2].sum(), lengths, heights, self.fluid)
         self.fields = section.steady(self.pore.density * active / theta, self.fields)
         return section, theta
 
-    def _rise(self, _, state):
-        section, _ = self._solved(state)
+    def _rise(self, time, state):
+        section, _ = self._solved(time, state)
         rates, active = self.pore.rates, state[: len(self.areas)]
         m_a, m_d = (c[section.inside] / (c[section.inside] + rates[key]) for c, key in zip(self.fields, ("K_A", "K_D")))
         growth, remains = m_a * (rates["k"] * rates["Y"] * m_d - rates["b"]), m_a * rates["remains"]
         return np.concatenate([self._alike(active * growth), self._alike(active * remains)])
 
     def _moment(self, time, state):
-        section, theta = self._solved(state)
+        section, theta = self._solved(time, state)
         return Moment(time, section.x, self.fields, section.velocity, float(self.areas @ theta), section.ends)
+
+
+def _evenly(begin, end, first, last, time):
+    """What changes evenly from ``first`` to ``last``."""
+    return first + (last - first) * (time - begin) / (end - begin)
 
 
 def constriction(radius, width, modes=80, points=400):

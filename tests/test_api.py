@@ -80,8 +80,8 @@ def test_what_is_not_modelled_is_not_there():
 
 def test_another_time_is_refused_by_the_nearest(found):
     """Mutant: the fields of the nearest time without a word."""
-    with pytest.raises(KeyError, match=r"0.5 h: not a reported time; the nearest is 0.6"):
-        found.fields(0.5)
+    with pytest.raises(KeyError, match=r"0.55 h: not a reported time; the nearest is 0.6"):
+        found.fields(0.55)
 
 
 def test_a_run_to_the_pores_end_says_so():

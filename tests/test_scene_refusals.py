@@ -117,7 +117,7 @@ LENGTH = 'a length is needed, such as "100 um" (greater than zero)'
     ("aggregate.radius=50 um", "aggregate.radius"),
     ("pore.length=10 um", 'pore.length = "10 um": more than twice aggregate.radius (5 um) is needed'),
     ("growth.end=1e9 h", 'growth.end = "1e9 h": at most 100000 times growth.time_step (0.2 h) is needed'),
-    ('flow.mean_velocity="1 m/day"', 'flow.mean_velocity = "1 m/day": flow.head (10.0 um) is given too'),
+    ('flow.mean_velocity="1 m/day"', 'flow.mean_velocity = "1 m/day": flow.head (10 um) is given too'),
     ("substrates.boundary=closed", 'substrates.boundary = "closed": "open" is needed with [flow]'),
     ("growth.minimum_film=50 um", "growth.minimum_film"),
     ("pore.width=1.5 um", "aggregate.radius"),
@@ -210,7 +210,7 @@ PAIRS = [
      "aggregate.position=9 um", "aggregate.position (9 um) is given too", "0 um is needed with aggregate.outline"),
     ("initial_mesh", "flow.head=1 cm", "flow.mean_velocity=1 m/day",
      "flow.mean_velocity (1 m/day) is given too; one of them is accepted, not both (--unset flow.mean_velocity leaves",
-     "flow.head (10000.0 um) is given too; one of them is accepted, not both (--unset flow.head leaves that out)"),
+     "flow.head (10000 um) is given too; one of them is accepted, not both (--unset flow.head leaves that out)"),
     ("initial_mesh", "flow.mean_velocity=0 m/day", "substrates={}; numerics.transport=quasi_steady",
      'greater than zero is needed, or numerics.transport = "gear"', '"gear" is needed with flow.mean_velocity = 0'),
     ("initial_mesh", "substrates.boundary=closed", "flow.head=1 cm", '"open" is needed with [flow]',
@@ -271,7 +271,7 @@ def test_without_set_the_key_that_the_file_has_is_named(tmp_path):
     path = written(tmp_path, '[aggregate]\n[substrates]\n[growth]\nend = "1e9 h"\n')
     assert 'mine.toml: growth.end = "1e9 h": at most 100000 times growth.time_step (0.2 h)' in refusal(path)
     both = written(tmp_path, '[flow]\nhead = "1 cm"\nmean_velocity = "1 m/day"\n')
-    assert 'mine.toml: flow.mean_velocity = "1 m/day": flow.head (10000.0 um) is given too' in refusal(both)
+    assert 'mine.toml: flow.mean_velocity = "1 m/day": flow.head (10000 um) is given too' in refusal(both)
 
 
 # ---------------------------------------------------------------- what is not modelled

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from repro.check import cost
 from repro.check.cost import Cost
 from repro.check.modelled import modelled
-from repro.check.numbers import Number, numbers
+from repro.check.numbers import Number, judged
 from repro.check.simplifications import Warned, warnings
 from repro.errors import SimulationError
 from repro.fem.linear import Method
@@ -57,9 +57,9 @@ def check(scene: Source, file: str = "") -> Checked:
             mesh = pore.seeded(scene).mesh
         trial = cost.tried(scene, len(mesh.points))
         flow = trial.first.solved.flow
-        found = numbers(scene, flow.mean_velocity if flow else None)
+        most, found = judged(scene, flow.mean_velocity if flow else None)
         return Checked(scene.name, modelled(scene), len(mesh.points), len(mesh.biomass), found,
-                       warnings(scene, found), cost.expected(scene, trial, len(mesh.points)))
+                       warnings(most, found), cost.expected(scene, trial, len(mesh.points)))
     except (SimulationError, ArithmeticError) as error:
         raise SceneError(f"{file}: it cannot be run: {error}") from error
 

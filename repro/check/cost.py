@@ -1,11 +1,11 @@
 """What a run will cost on this machine: first solves are made and timed, steps are estimated.
 
-    seconds = first state + (steps until contact + IN_CONTACT x steps after it)
+    seconds = first state + (steps until contact + IN_CONTACT x steps after it + ROW x rows)
                             x one step x REMESHING
 
 A step of the midpoint rule is at first growth.time_step and doubles up to the length that the
-tolerance allows. All three factors are those of the packaged scenes: the estimate is meant to be
-right within a factor of three there.
+tolerance allows; rows are those within steps. All four factors are those of the packaged scenes:
+the estimate is meant to be right within a factor of three there.
 """
 
 from __future__ import annotations
@@ -15,16 +15,23 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from time import perf_counter
+from typing import TypeAlias
 
 from repro.check import numbers
-from repro.march.loop import Instant, PoreEnd
-from repro.march.simulation import simulate
-from repro.scene import Scene
+from repro.march import stepping, updates
+from repro.march.loop import Instant, PoreEnd, State
+from repro.march.simulation import steps as steps_of
+from repro.scene import Scene, needed
+
+#: What a step leaves.
+Made: TypeAlias = tuple[State, Instant | None]
 
 #: A step with what it takes besides the first one: new meshes, and larger ones.
 REMESHING = 1.5
 #: A step in contact, which is one with many rounds of closing films and a new mesh.
 IN_CONTACT = 15.0
+#: A row within a step: one equilibrium and one solution of flow and substrates of a step's two.
+ROW = 0.5
 #: The length of a midpoint step that tolerance 0.01 allows, times the growth rate; it goes as the
 #: tolerance's root.
 ALLOWED = 0.5
@@ -70,11 +77,11 @@ def tried(scene: Scene, nodes: int) -> Trial:
     if scene.growth:
         end = min(scene.growth.end, FIRST_STEPS * scene.growth.time_step)
         scene = replace(scene, growth=replace(scene.growth, end=end),
-                        output=replace(scene.output, times=None))
+                        output=replace(scene.output, times=(end,)))
     before = _memory()
     clock = [perf_counter()]
-    run = _until_the_end(simulate(scene))
-    first = next(run)
+    run = _until_the_end(steps_of(scene))
+    first = needed(next(run)[1], "the first row")
     clock.append(perf_counter())
     clock += [perf_counter() for _ in run]
     spent = [b - a for a, b in zip(clock, clock[1:])]
@@ -83,8 +90,8 @@ def tried(scene: Scene, nodes: int) -> Trial:
     return Trial(first, spent[0], min(spent[1:], default=0.0), len(first.pore.mesh.points), memory)
 
 
-def _until_the_end(run: Iterator[Instant]) -> Iterator[Instant]:
-    """The instants of a run, which may end at the pore's end."""
+def _until_the_end(run: Iterator[Made]) -> Iterator[Made]:
+    """The steps of a run, which may end at the pore's end."""
     try:
         yield from run
     except PoreEnd:
@@ -95,7 +102,7 @@ def expected(scene: Scene, trial: Trial, nodes: int) -> Cost:
     """Of the whole run, from its trial and the nodes of its first mesh."""
     free, touching = steps(scene)
     larger = nodes / trial.nodes
-    factor = (free + IN_CONTACT * touching) * REMESHING
+    factor = (free + IN_CONTACT * touching + ROW * rows(scene)) * REMESHING
     memory = None
     if trial.memory:
         before, peak = trial.memory
@@ -108,20 +115,29 @@ def steps(scene: Scene) -> tuple[int, int]:
     if scene.growth is None or scene.growth.end == 0:
         return 0, 0
     end = scene.growth.end
-    contact = numbers.at_end(scene).contact
+    contact = numbers.at_end(scene.largest).contact
     free = end if contact is None else min(contact, end)
     longest = longest_step(scene)
-    counted = _count(min(scene.growth.time_step, longest), longest, end)
-    total = max(counted, len(scene.output.times or ()))
+    total = _count(min(scene.growth.time_step, longest), longest, end)
     touching = min(total, math.ceil((end - free) / longest - 1e-9))
     return total - touching, touching
+
+
+def rows(scene: Scene) -> int:
+    """Rows that are likely to lie within steps."""
+    if scene.growth is None or scene.growth.end == 0:
+        return 0
+    if scene.numerics.time == "midpoint":
+        return len(scene.output.times or stepping.rows(scene))
+    ends, reported = updates.schedule(scene)
+    return len(reported.difference(ends))
 
 
 def longest_step(scene: Scene) -> float:
     """The longest step (h) that is expected."""
     if scene.numerics.time == "updates":
         return scene.growth.time_step
-    rate = abs(numbers.fastest_growth(scene))
+    rate = abs(numbers.fastest_growth(scene.largest))
     allowed = ALLOWED * math.sqrt(scene.numerics.tolerance / 0.01)
     return min(scene.growth.end, allowed / rate if rate else math.inf)
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from repro.march import stepping
 from repro.scene import Scene
+from repro.scene.course import Course
 
 LEFT_OUT = {
     "aggregate": "no aggregate: a clean channel",
@@ -49,9 +51,9 @@ def _flow(scene: Scene) -> Iterator[str]:
     flow = scene.flow
     yield "Stokes flow (1)-(6)"
     if flow.head is None:
-        yield f"driven by a mean velocity of {24e-6 * flow.mean_velocity:.4g} m/day"
+        yield f"driven by a mean velocity of {_over_time(flow.mean_velocity, 24e-6, 'm/day')}"
     else:
-        yield f"driven by a head of {1e-4 * flow.head:g} cm over the whole pore"
+        yield f"driven by a head of {_over_time(flow.head, 1e-4, 'cm')} over the whole pore"
     if scene.aggregate:
         yield f"{flow.viscosity_ratio:g} times the viscosity of water in the aggregate"
         yield {"laplacian": "interface in the form of (1) [E2]",
@@ -60,9 +62,9 @@ def _flow(scene: Scene) -> Iterator[str]:
 
 def _substrates(scene: Scene) -> Iterator[str]:
     carried = "advection and diffusion" if scene.flow else "diffusion"
-    acceptor = scene.substrates.acceptor.supply
-    donor = scene.substrates.donor.supply
-    yield f"{carried} of acceptor ({acceptor:g} mg/L) and donor ({donor:g} mg/L), (7)-(8)"
+    acceptor = _over_time(scene.substrates.acceptor.supply, 1.0, "mg/L")
+    donor = _over_time(scene.substrates.donor.supply, 1.0, "mg/L")
+    yield f"{carried} of acceptor ({acceptor}) and donor ({donor}), (7)-(8)"
     if scene.flow:
         yield "(11) at the inlet, (12) at the outlet, (13) on the walls"
     else:
@@ -70,6 +72,16 @@ def _substrates(scene: Scene) -> Iterator[str]:
                "closed": "closed ends"}[scene.substrates.boundary]
     yield {"quasi_steady": "at rest in each shape",
            "gear": "followed in time (3.3, Gear)"}[scene.numerics.transport]
+
+
+def _over_time(value: float | Course, factor: float, unit: str) -> str:
+    """A value in a unit, or what a table of it says."""
+    if not isinstance(value, Course):
+        return f"{factor * value:.4g} {unit}"
+    least = factor * min(value.values)
+    most = factor * value.largest
+    how = "linear in time" if value.linear else "in steps"
+    return f"{least:.4g} to {most:.4g} {unit}, {how}, the last from {value.times[-1]:g} h"
 
 
 def _kinetics(scene: Scene) -> Iterator[str]:
@@ -104,6 +116,12 @@ def _numerics(scene: Scene) -> Iterator[str]:
 def _output(scene: Scene) -> Iterator[str]:
     times = scene.output.times
     if times is None:
-        yield "rows and fields of every step" if scene.growth else "one row and fields at t = 0"
+        yield _every_step(scene) if scene.growth else "one row and fields at t = 0"
     else:
         yield f"rows and fields at {len({0.0, *times})} times, t = 0 among them"
+
+
+def _every_step(scene: Scene) -> str:
+    """The rows of a scene without output.times."""
+    rows = stepping.rows(scene) if scene.numerics.time == "midpoint" else ()
+    return "rows and fields of every step" + (f", and every {rows[0]:g} h" if rows else "")

@@ -1,8 +1,9 @@
 """Dimensionless numbers of a scene: what its simplifications rest on.
 
 Each is told for t = 0 and, where the aggregate grows, for ``growth.end``, with bounds in place of
-what only the run knows: the aggregate grows at the rate of the supply (9), in the layer that the
-supply reaches, so that it is no larger and touches the opposite wall no earlier than said here.
+what only the run knows, and tables of the scene at their largest values: the aggregate grows at the
+rate of the supply (9), in the layer that the supply reaches, so that it is no larger and touches
+the opposite wall no earlier than said here.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from repro.fem.sizing import meshed_extent
 from repro.model import kinetics
 from repro.model.pore import film, initial_outline, sized
 from repro.model.traction import MPA_PER_UM
-from repro.scene import Scene, Substrate
+from repro.scene import Scene, Substrate, needed
 
 #: Steps in which the bound on the growth is followed.
 STEPS = 2000
@@ -123,6 +124,20 @@ def numbers(scene: Scene, speed: float | None) -> list[Number]:
     if scene.growth:
         found += _grown(scene, speed)
     return found
+
+
+def judged(scene: Scene, velocity: float | None) -> tuple[Scene, list[Number]]:
+    """What a scene is judged by: each of its tables at its largest value, and the numbers of that;
+    velocity: mean, um/h, at t = 0, None without flow."""
+    most = scene.largest
+    if velocity is None:
+        return most, numbers(most, None)
+    start = needed(scene.at(0.0).flow, "[flow]")
+    drive = needed(most.flow, "[flow]")
+    if drive.mean_velocity is not None:
+        return most, numbers(most, drive.mean_velocity)
+    rise = needed(drive.head, "flow.head") / needed(start.head, "flow.head")
+    return most, numbers(most, velocity * rise)
 
 
 def _transported(scene: Scene, speed: float) -> Iterator[Number]:

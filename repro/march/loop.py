@@ -1,4 +1,10 @@
-"""The one loop of steps of every scheme, and the state from which it goes on bit for bit."""
+"""The one loop of steps of every scheme, and the state from which it goes on bit for bit.
+
+Steps, to the last bit, depend neither on which rows are asked for nor on when the run ends. A row
+between two steps is made of the step that passes it, and nothing goes on from it. The last step,
+where ``growth.end`` lies within what would have been a step, is cut there and made apart from the
+others: its ledger closes like theirs, and a run to a later end goes on from the state before it.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +22,7 @@ from repro.fem.sizing import ACROSS_PORE
 from repro.march.pace import Pace
 from repro.model.pore import Pore, Solved, seeded
 from repro.model.remeshing import resolved
-from repro.scene import Scene
+from repro.scene import Scene, needed
 
 
 class Dataclass(Protocol):
@@ -53,7 +59,7 @@ class Instant:
 
     before: the pore and its solution at the end of the last step, grown but not yet expanded
     (Plate 1), None at t = 0 and where the step that follows cannot be made; ledgers, remeshes,
-    iterations: of the steps since the last instant.
+    iterations: of the steps that ended since the last instant.
     """
 
     pore: Pore
@@ -65,15 +71,25 @@ class Instant:
 
 
 @dataclass(frozen=True, eq=False)
+class Moment:
+    """The pore at a time within a step, what is solved there, and both before it expanded."""
+
+    pore: Pore
+    solved: Solved
+    before: tuple[Pore, Solved] | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class Step:
     """What one step made: the new pore, the pore and its solution before it expanded, the ledger
-    and counts."""
+    and counts; and how it comes to any time (h) within it."""
 
     pore: Pore
     before: tuple[Pore, Solved] | None
     ledger: Ledger
     remeshed: bool
     iterations: int
+    within: Callable[[float], Moment] | None = None
 
 
 @brief
@@ -82,7 +98,10 @@ class State:
     """All that a run goes on from after a step.
 
     pore: as the step left it, with the guess from which its substrates are solved; pace: of the
-    step to try next; ledgers, remeshes, iterations: of the steps since the last Instant.
+    step to try next; ledgers, remeshes, iterations: of the steps since the last Instant; row: time
+    (h) of that Instant, later than the pore's where it lies within the step that follows; apart: is
+    the pore, or an Instant after it, of a step that growth.end cuts? A run to a later end goes on
+    from the last state that is not.
     """
 
     pore: Pore
@@ -90,19 +109,27 @@ class State:
     ledgers: tuple[Ledger, ...] = ()
     remeshes: int = 0
     iterations: dict[str, int] = field(default_factory=dict)
+    row: float = 0.0
+    apart: bool = False
+
+    @property
+    def time(self) -> float:
+        """How far the run has come, h."""
+        return max(self.pore.time, self.row)
 
 
 @dataclass(frozen=True)
 class Scheme:
     """What the loop needs of a way to make steps.
 
-    times(scene): at which steps must end, h, ascending; advance(scene, pore, solved, time, pace):
-    one step to that time or on the way there, as (Step, what is solved after it, pace of the next);
+    advance(scene, pore, solved, pace): one step that growth.end has no part in, nor have rows, or
+    the one that is cut there, as (Step, what is solved after it, pace of the next, is it cut?);
+    rows(scene): times (h) of rows where there are no ``output.times``, beside the ends of steps;
     first: length of the first step that is tried, in parts of growth.time_step.
     """
 
-    times: Callable[[Scene], list[float]]
-    advance: Callable[[Scene, Pore, Solved, float, Pace], tuple[Step, Solved, Pace]]
+    advance: Callable[[Scene, Pore, Solved, Pace], tuple[Step, Solved, Pace, bool]]
+    rows: Callable[[Scene], tuple[float, ...]] = lambda _: ()
     first: float = 1.0
 
 
@@ -129,23 +156,45 @@ def steps(scene: Scene, scheme: Scheme,
         yield state, Instant(now, solved, None, (), 0, newton_counts(solved))
     elif now.time > 0:
         refuse_end(scene, now)
-    for time in scheme.times(scene) if scene.growth else ():
-        while time - now.time > SAME_TIME:
-            try:
+    rows = _rows(scene, scheme)
+    end = scene.growth.end if scene.growth else 0.0
+    while end - now.time > SAME_TIME:
+        try:
+            with stopping(now.time):
+                taken, solved, pace, cut = scheme.advance(scene, now, solved, state.pace)
+        except PoreEnd:
+            if state.ledgers:  # steps that are not reported yet
+                yield reported(state, now.time), instant(state, now, solved, None)
+            raise
+        for time in rows:
+            if state.time + SAME_TIME < time < taken.pore.time - SAME_TIME:
                 with stopping(now.time):
-                    taken, solved, pace = scheme.advance(scene, now, solved, time, state.pace)
-            except PoreEnd:
-                if state.ledgers:  # steps that are not reported yet
-                    yield reported(state), instant(state, now, solved, None)
-                raise
-            state = _after(state, taken, solved, pace)
-            now = replace(state.pore, concentrations=solved.concentrations)
-            if _wanted(scene, now.time) or pore_end(scene, now, 1.0):
-                yield reported(state), instant(state, now, solved, taken.before)
-                state = reported(state)
-            else:
-                yield state, None
-            refuse_end(scene, now)
+                    there = needed(taken.within, "a step's interior")(time)
+                found = instant(state, there.pore, there.solved, there.before)
+                state = replace(reported(state, time), apart=cut)
+                yield state, found
+        state = replace(_after(state, taken, solved, pace), apart=cut)
+        now = replace(state.pore, concentrations=solved.concentrations)
+        asked = _asked(rows, now.time)
+        if scene.output.times is None or asked is not None or pore_end(scene, now, 1.0):
+            shown = now if asked is None else replace(now, time=asked)
+            yield reported(state, now.time), instant(state, shown, solved, taken.before)
+            state = reported(state, now.time)
+        else:
+            yield state, None
+        refuse_end(scene, now)
+
+
+def _rows(scene: Scene, scheme: Scheme) -> tuple[float, ...]:
+    """Times (h) of rows after t = 0, ascending: ``output.times``, or those of the scheme."""
+    if scene.growth is None:
+        return ()
+    return scheme.rows(scene) if scene.output.times is None else scene.output.times
+
+
+def _asked(rows: tuple[float, ...], time: float) -> float | None:
+    """The row's time that a step's end is, to the last bit; None where it is none."""
+    return next((row for row in rows if abs(row - time) <= SAME_TIME), None)
 
 
 def _after(state: State, taken: Step, solved: Solved, pace: Pace) -> State:
@@ -153,12 +202,7 @@ def _after(state: State, taken: Step, solved: Solved, pace: Pace) -> State:
     before = newton_counts(taken.before[1]) if taken.before else {}
     counts = added(state.iterations, {"growth": taken.iterations}, before, newton_counts(solved))
     ledgers = (*state.ledgers, taken.ledger)
-    return State(taken.pore, pace, ledgers, state.remeshes + taken.remeshed, counts)
-
-
-def _wanted(scene: Scene, time: float) -> bool:
-    """Is a step's end reported? Steps end at ``output.times`` to the last bit."""
-    return scene.output.times is None or time in scene.output.times
+    return State(taken.pore, pace, ledgers, state.remeshes + taken.remeshed, counts, state.row)
 
 
 def instant(state: State, now: Pore, solved: Solved, before: tuple[Pore, Solved] | None) -> Instant:
@@ -166,9 +210,9 @@ def instant(state: State, now: Pore, solved: Solved, before: tuple[Pore, Solved]
     return Instant(now, solved, before, state.ledgers, state.remeshes, state.iterations)
 
 
-def reported(state: State) -> State:
-    """The state with nothing to report."""
-    return State(state.pore, state.pace)
+def reported(state: State, time: float) -> State:
+    """The state with nothing to report, after a row at a time (h)."""
+    return State(state.pore, state.pace, row=time, apart=state.apart)
 
 
 def laid_out(pore: Pore) -> Pore:

@@ -4,18 +4,25 @@ Half a step with the rates of its start gives the shape half way. There the subs
 with the *mean* biomass of the step, that which the very rates make that are found: M (e^z - 1) / z
 of a mass M that grows by e^z. These rates carry (9)-(10) over the whole step. So what is taken up
 and what is made in a step are one integral, and both balances close to round-off.
+
+Within the step, at the part s of its length h, (9)-(10) are carried over s h with the rates
+(1 - s) k_1 + s k_2 of its start and of half way: the rule's own interpolation, of second order too
+and k_2 over h at its end (Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I,
+section II.6). Shape, contact and mesh follow from the start's as in a step, flow and substrates are
+solved there.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from repro.fem import transfer
 from repro.fem.space import Space
-from repro.march.loop import Ledger, PoreEnd, Step, pore_end
-from repro.march.updates import enlarged, grown, rates_of
+from repro.march.loop import Ledger, Moment, PoreEnd, Step, pore_end
+from repro.march.updates import before, enlarged, grown, rates_of
 from repro.model import biomass, contact, pore, remeshing
 from repro.model.biomass import Rates
 from repro.model.gear import Flows
@@ -40,11 +47,14 @@ class Attempt:
 class Halfway:
     """What half a step has found.
 
-    shape: the aggregate half way, with the fluid's nodes where they were; solved: flow and
-    substrates there; rates: at the points of the mesh at the start; made: growth of active and of
-    inert biomass over the whole step, um2 mg/L.
+    duration: h, of the whole step; first: rates at its start; shape: the aggregate half way, with
+    the fluid's nodes where they were; solved: flow and substrates there; rates: there, both at the
+    points of the mesh at the start; made: growth of active and of inert biomass over the whole
+    step, um2 mg/L.
     """
 
+    duration: float
+    first: Rates
     shape: Pore
     solved: Solved
     rates: Rates
@@ -61,17 +71,17 @@ def attempt(scene: Scene, now: Pore, solved: Solved, duration: float,
     if change > most:
         return Attempt(None, change, None)
     after = _matched(now, grown(now, half.rates, duration), half.made)
+    after = replace(after, time=before(now, duration))
     theta = enlarged(scene, now, after)
-    expanded, iterations, gap = contact.expand(scene, after, theta, _ahead(now, half.shape))
+    expanded, iterations, gap = contact.expand(scene, after, theta, _ahead(now, half.shape, 1.0))
     if leaves := pore_end(scene, expanded, 0.1):
         raise PoreEnd(f"{leaves} in the step from t = {now.time:g} h")
-    guess = _extrapolated(needed(solved.concentrations, "[substrates]"),
-                          needed(half.solved.concentrations, "[substrates]"))
-    expanded = replace(expanded, concentrations=guess)
+    expanded = replace(expanded, concentrations=_extrapolated(solved, half.solved, 1.0))
     new, remeshed = remeshing.new_mesh(scene, now, expanded, _speed(solved))
     ledger = Ledger(now.time, now.time + duration, *_flows(half.solved, duration), now.mass,
                     after.mass - now.mass, new.mass)
-    return Attempt(Step(new, (now, solved), ledger, remeshed, iterations), change,
+    inner = partial(within, scene, now, solved, half)
+    return Attempt(Step(new, (now, solved), ledger, remeshed, iterations, inner), change,
                    first_contact(scene, now, expanded, gap))
 
 
@@ -87,11 +97,11 @@ def halfway(scene: Scene, now: Pore, solved: Solved, first: Rates, duration: flo
     """Solve in the shape that half of ``duration`` (h) makes with the rates of its start. Where the
     moved mesh is not acceptable a new one is made: masses go to its points, and the rates back to
     those of the material."""
-    ahead = grown(now, first, duration / 2)
+    ahead = replace(grown(now, first, duration / 2), time=now.time + duration / 2)
     shape, _, _ = contact.expand(scene, ahead, enlarged(scene, now, ahead), _scaled(now, ahead))
     mesh = remeshing.followed(scene, now, shape)
     if mesh is not None:
-        there = replace(now, space=Space(mesh, now.space.order))
+        there = replace(now, space=Space(mesh, now.space.order), time=shape.time)
     else:
         there, (active, inert) = remeshing.remesh(scene, now, shape, _speed(solved),
                                                   (now.active, now.inert))
@@ -102,7 +112,21 @@ def halfway(scene: Scene, now: Pore, solved: Solved, first: Rates, duration: flo
     if mesh is None:
         rates = _carried_back(there, shape, rates)
     made = float((after.active - there.active).sum()), float((after.inert - there.inert).sum())
-    return Halfway(shape, found, rates, made)
+    return Halfway(duration, first, shape, found, rates, made)
+
+
+def within(scene: Scene, now: Pore, solved: Solved, half: Halfway, time: float) -> Moment:
+    """The pore at a time (h) within a step, and what is solved there. Raises StageError where that
+    cannot be."""
+    part = (time - now.time) / half.duration
+    mean = Rates((1 - part) * half.first.growth + part * half.rates.growth,
+                 (1 - part) * half.first.remains + part * half.rates.remains)
+    after = replace(grown(now, mean, part * half.duration), time=time)
+    expanded, _, _ = contact.expand(scene, after, enlarged(scene, now, after),
+                                    _ahead(now, half.shape, part))
+    expanded = replace(expanded, concentrations=_extrapolated(solved, half.solved, part))
+    there, _ = remeshing.new_mesh(scene, now, expanded, _speed(solved))
+    return Moment(*remeshing.resolved(scene, there))
 
 
 def _speed(solved: Solved) -> float:
@@ -133,17 +157,19 @@ def _matched(now: Pore, after: Pore, made: tuple[float, float]) -> Pore:
                    inert=after.inert + lacking[1] * share)
 
 
-def _extrapolated(start: Concentrations, half: Concentrations) -> Concentrations:
-    """A first guess of the substrates at the end: as much change again as the first half of the
-    step has made. Where that takes one below zero, what they are half way; where the mesh there is
-    another, what they are at the start."""
-    if len(half.acceptor) != len(start.acceptor):
-        return start
-    acceptor = 2 * half.acceptor - start.acceptor
-    donor = 2 * half.donor - start.donor
+def _extrapolated(start: Solved, half: Solved, part: float) -> Concentrations:
+    """A first guess of the substrates in a part of the step: as the first half of it has changed
+    them, and so on. Where that takes one below zero, what they are half way; where the mesh there
+    is another, what they are at the start."""
+    first = needed(start.concentrations, "[substrates]")
+    second = needed(half.concentrations, "[substrates]")
+    if len(second.acceptor) != len(first.acceptor):
+        return first
+    acceptor = first.acceptor + 2 * part * (second.acceptor - first.acceptor)
+    donor = first.donor + 2 * part * (second.donor - first.donor)
     if min(acceptor.min(), donor.min()) < 0:
-        return half
-    return replace(start, acceptor=acceptor, donor=donor)
+        return second
+    return replace(first, acceptor=acceptor, donor=donor)
 
 
 def _scaled(now: Pore, after: Pore) -> Pore:
@@ -154,13 +180,14 @@ def _scaled(now: Pore, after: Pore) -> Pore:
     return _placed(after, fixed + (now.mesh.points - fixed) * np.sqrt(after.mass / now.mass))
 
 
-def _ahead(now: Pore, half: Pore) -> Pore:
-    """A first guess of the shape: as much growth again as half the step has made, with contact as
-    it is."""
+def _ahead(now: Pore, half: Pore, part: float) -> Pore:
+    """A first guess of the shape in a part of the step: as half the step has changed it, and so on,
+    with contact as it is."""
     if (half.wall != now.wall).any():
         return now
-    push = 2 * half.pressure - now.pressure
-    return _placed(replace(now, pressure=push), 2 * half.mesh.points - now.mesh.points)
+    push = now.pressure + 2 * part * (half.pressure - now.pressure)
+    points = now.mesh.points + 2 * part * (half.mesh.points - now.mesh.points)
+    return _placed(replace(now, pressure=push), points)
 
 
 def _placed(after: Pore, points: np.ndarray) -> Pore:

@@ -3,13 +3,16 @@
 The midpoint rule carries (9)-(10) over a step with the rates of the shape half way. Euler's rule
 would take those of the start: the mean over the aggregate of their difference, times the step, is
 what ``numerics.tolerance`` bounds; the error of the midpoint rule is of higher order, and what a
-tolerance makes of it is measured in ``make bench``. A step ends at each reported time, and when the
-film between the aggregate and the opposite wall is first too thin (2.3.3).
+tolerance makes of it is measured in ``make bench``. A step ends when the film between the aggregate
+and the opposite wall is first too thin (2.3.3), and at the times of the scene's tables; rows and the
+run's end leave all steps as they are.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -26,44 +29,77 @@ from repro.scene import Scene, needed
 FIRST = 8.0
 #: A step that fails or errs too much is tried again, shorter, until it is this part of it.
 SHORTEST = 1e-3
+#: Rows after t = 0 where there are no ``output.times``.
+LEAST = 24
 #: Contact is met when the film is no thinner than this part of what it may be.
 LANDED = 0.995
 
 
 def steps(scene: Scene, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
-    """:func:`repro.march.loop.steps` by the midpoint rule; every step is reported where there are
-    no ``output.times``."""
-    return loop.steps(scene, Scheme(_targets, _advance, FIRST), state)
+    """:func:`repro.march.loop.steps` by the midpoint rule; where there are no ``output.times``,
+    every step is reported, and what :func:`rows` says."""
+    return loop.steps(scene, Scheme(_advance, rows, FIRST), state)
 
 
-def _targets(scene: Scene) -> list[float]:
-    """Times (h) at which a step must end."""
+def rows(scene: Scene) -> tuple[float, ...]:
+    """Times (h) of rows besides the ends of steps: growth.end, and the multiples of growth.time_step
+    times the largest power of two with LEAST of them or more; of itself in a run that has fewer."""
+    growth = needed(scene.growth, "[growth]")
+    count = round(growth.end / growth.time_step, 9)
+    if count == 0:
+        return ()
+    apart = growth.time_step * 2.0 ** max(0, math.floor(math.log2(count / LEAST)))
+    times = [round(k * apart, 9) for k in range(1, int(growth.end / apart) + 1)]
+    return (*(time for time in times if growth.end - time > SAME_TIME), growth.end)
+
+
+def _advance(scene: Scene, now: Pore, solved: Solved,
+             asked: Pace) -> tuple[Step, Solved, Pace, bool]:
+    """One step, without the state before it: the next one, or where growth.end lies within that, or
+    it would be nearly the last, one to growth.end."""
     end = needed(scene.growth, "[growth]").end
-    return sorted({time for time in scene.output.times or () if time > 0} | {end})
+    left = end - now.time
+    if STRETCH * asked.length >= left and end < scene.corner(now.time):
+        most = EXCESS * scene.numerics.tolerance / left
+        with suppress(PoreEnd, StageError, FloatingPointError):
+            if last := _cut(scene, now, solved, left, most):
+                return *last, asked, True
+    taken, after, pace = _accepted(scene, now, solved, asked)
+    if taken.pore.time - end > SAME_TIME:
+        taken, after = needed(_cut(scene, now, solved, left, np.inf), "a shorter step")
+        return taken, after, asked, True
+    return replace(taken, before=None), after, pace, False
 
 
-def _advance(scene: Scene, now: Pore, solved: Solved, time: float,
-             asked: Pace) -> tuple[Step, Solved, Pace]:
-    """One step towards a time (h), without the state before it."""
-    taken, after, pace = _accepted(scene, now, solved, time, asked)
-    return replace(taken, before=None), after, pace
+def _cut(scene: Scene, now: Pore, solved: Solved, left: float,
+         most: float) -> tuple[Step, Solved] | None:
+    """A step over the time that is left (h), and what is solved after it; None where the rates
+    change by more than ``most`` (1/h) or it overshoots contact."""
+    found = midpoint.attempt(scene, now, solved, left, most)
+    if found.step is None or (np.isfinite(most) and _overshoots(found)):
+        return None
+    end = needed(scene.growth, "[growth]").end
+    taken, after = _solved(scene, _ending_at(found.step, end))
+    return replace(taken, before=None), after
 
 
-def _accepted(scene: Scene, now: Pore, solved: Solved, time: float,
+def _accepted(scene: Scene, now: Pore, solved: Solved,
               asked: Pace) -> tuple[Step, Solved, Pace]:
     """The first step that is good enough, what is solved after it, and the pace of the next."""
     tolerance = scene.numerics.tolerance
     time_step = needed(scene.growth, "[growth]").time_step
     shortest = SHORTEST * time_step
     length = asked.length
-    duration = fitted(length, time - now.time, STRETCH)
+    corner = scene.corner(now.time)
+    left = corner - now.time
+    duration = fitted(length, left, STRETCH)
     while True:
         most = np.inf if duration <= shortest else EXCESS * tolerance / duration
         try:
             found = midpoint.attempt(scene, now, solved, duration, most)
             estimate = found.change * duration
             if found.step and (duration <= shortest or not _overshoots(found)):
-                taken, after = _solved(scene, _ending_at(found.step, now.time + duration, time))
+                taken, after = _solved(scene, _ending_at(found.step, _end_of(now, duration, corner)))
                 if found.gaps is not None:  # contact alone made the step short
                     return taken, after, asked
                 tried = replace(asked, length=length)
@@ -85,7 +121,7 @@ def _accepted(scene: Scene, now: Pore, solved: Solved, time: float,
             if duration <= shortest:
                 raise
             length = duration / 2
-        duration = fitted(length, time - now.time)
+        duration = fitted(length, left)
 
 
 def _solved(scene: Scene, taken: Step) -> tuple[Step, Solved]:
@@ -109,7 +145,12 @@ def _to_contact(gaps: tuple[float, float, float]) -> float:
     return min(0.95, max(0.02, part))
 
 
-def _ending_at(taken: Step, end: float, time: float) -> Step:
-    """The step with the time of its end, the reported one where they are the same."""
-    exact = time if abs(time - end) <= SAME_TIME else end
-    return replace(taken, pore=laid_out(replace(taken.pore, time=exact)))
+def _end_of(now: Pore, duration: float, corner: float) -> float:
+    """The end (h) of a step: the corner of the scene's tables that it comes to, to the last bit."""
+    end = now.time + duration
+    return corner if abs(corner - end) <= SAME_TIME else end
+
+
+def _ending_at(taken: Step, end: float) -> Step:
+    """The step with the time (h) of its end."""
+    return replace(taken, pore=laid_out(replace(taken.pore, time=end)))

@@ -7,8 +7,10 @@ moves (35) or, by the paper's criteria (3.1, 3.5), is made anew.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -17,6 +19,7 @@ from repro.march.loop import (
     SAME_TIME,
     Instant,
     Ledger,
+    Moment,
     PoreEnd,
     Scheme,
     State,
@@ -33,45 +36,61 @@ from repro.model.pore import Pore, Solved
 from repro.model.transport import Concentrations, Fluxes
 from repro.scene import Scene, needed
 
+#: An update this close to a multiple of growth.time_step, in parts of it, is that multiple.
+ON_GRID = 1e-3
+
 
 def schedule(scene: Scene) -> tuple[list[float], set[float]]:
-    """Times (h) at which steps end, and those of them that are reported; t = 0 first."""
+    """Times (h) at which steps end, and those that are reported; t = 0 first. The last step is cut
+    at growth.end; those reported between steps cut none."""
     if scene.growth is None:
         return [0.0], {0.0}
     end = scene.growth.end
-    step = scene.growth.time_step
-    grid = [round(k * step, 9) for k in range(int(np.ceil(round(end / step, 9))))]
-    reported = {0.0, *(scene.output.times or (*grid, end))}
-    exact = {*reported, end}
-    between = [time for time in grid if not _among(exact, time)]
-    return sorted({*between, *exact}), reported
+    ends = [0.0]
+    while end - ends[-1] > SAME_TIME:
+        ends.append(next_time(scene, ends[-1])[0])
+    return ends, {0.0, *(scene.output.times or ends)}
 
 
-def _among(times: set[float], time: float) -> bool:
-    return any(abs(time - other) <= SAME_TIME for other in times)
+def next_time(scene: Scene, time: float) -> tuple[float, bool]:
+    """The time (h) at which a step ends: the next multiple of growth.time_step, rounded, or of a
+    table's times; or growth.end, where that comes first or is as good as there. And is it cut so?
+    """
+    growth = needed(scene.growth, "[growth]")
+    count = math.floor(time / growth.time_step + ON_GRID) + 1
+    update = min(round(count * growth.time_step, 9), scene.corner(time))
+    if update < growth.end - max(SAME_TIME, SAME_TIME * growth.time_step):
+        return update, False
+    return growth.end, update != growth.end
 
 
 def steps(scene: Scene, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
     """:func:`repro.march.loop.steps` of the paper's scheme."""
-    return loop.steps(scene, Scheme(_ends, _advance), state)
+    return loop.steps(scene, Scheme(_advance), state)
 
 
-def _ends(scene: Scene) -> list[float]:
-    """Times (h) at which steps end."""
-    return schedule(scene)[0]
-
-
-def _advance(scene: Scene, now: Pore, solved: Solved, time: float,
-             pace: Pace) -> tuple[Step, Solved, Pace]:
-    """One step to the time ``time`` (h)."""
+def _advance(scene: Scene, now: Pore, solved: Solved,
+             pace: Pace) -> tuple[Step, Solved, Pace, bool]:
+    """The step to the next update, or to growth.end."""
+    time, cut = next_time(scene, now.time)
     done = step(scene, now, solved, time - now.time)
     after = laid_out(replace(done.pore, time=time))
-    return replace(done, pore=after), pore.solve(scene, after), pace
+    within = partial(_within, scene, now, solved)
+    return replace(done, pore=after, within=within), pore.solve(scene, after), pace, cut
+
+
+def _within(scene: Scene, now: Pore, solved: Solved, time: float) -> Moment:
+    """A time (h) within a step, by a shorter step that nothing goes on from."""
+    done = step(scene, now, solved, time - now.time)
+    after = replace(done.pore, time=time)
+    return Moment(after, pore.solve(scene, after), done.before)
 
 
 def step(scene: Scene, now: Pore, solved: Solved, duration: float) -> Step:
     """One step (h): biomass, shape, mesh."""
+    solved = _midway(scene, now, solved, duration)
     grown, end, flows = make_biomass(scene, now, solved, duration)
+    grown = replace(grown, time=before(now, duration))
     expanded, iterations, _ = contact.expand(scene, grown, enlarged(scene, now, grown))
     if leaves := pore_end(scene, expanded, 0.1):
         raise PoreEnd(f"{leaves} in the step from t = {now.time:g} h")
@@ -79,8 +98,25 @@ def step(scene: Scene, now: Pore, solved: Solved, duration: float) -> Step:
     after, remeshed = remeshing.new_mesh(scene, now, replace(expanded, concentrations=end), speed)
     ledger = Ledger(now.time, now.time + duration, *flows, now.mass, grown.mass - now.mass,
                     after.mass)
-    before = replace(grown, time=now.time + duration), replace(solved, concentrations=end)
-    return Step(after, before, ledger, remeshed, iterations)
+    last = replace(grown, time=now.time + duration), replace(solved, concentrations=end)
+    return Step(after, last, ledger, remeshed, iterations)
+
+
+def before(now: Pore, duration: float) -> float:
+    """The time (h) just before the end of a step, so that a jump there is not yet made."""
+    return max(now.time, now.time + duration - SAME_TIME)
+
+
+def _midway(scene: Scene, now: Pore, solved: Solved, duration: float) -> Solved:
+    """What is solved at the start of a step, with the supplies and the drive half way, their mean
+    over it, where a table changes them in it."""
+    middle = now.time + duration / 2
+    if scene.at(middle) == scene.at(now.time):
+        return solved
+    there = pore.solve(scene, replace(now, time=middle))
+    if scene.numerics.transport == "gear":
+        return replace(there, concentrations=solved.concentrations)
+    return there
 
 
 def make_biomass(scene: Scene, now: Pore, solved: Solved,

@@ -131,9 +131,8 @@ def resolution(scene: Scene) -> float:
 
 
 def fastest(scene: Scene) -> float:
-    """Mean velocity (um/h) of a scene's flow; under a head that of the clean channel, the
-    largest."""
-    drive = needed(scene.flow, "[flow]")
+    """Largest mean velocity (um/h) of a scene's flow; under a head that of the clean channel."""
+    drive = needed(scene.largest.flow, "[flow]")
     if drive.mean_velocity is not None:
         return drive.mean_velocity
     loss = flow.poiseuille_loss(scene.pore.length, scene.pore.width)
@@ -202,9 +201,10 @@ def material(space: Space, reference: np.ndarray) -> growth.Body:
 def solve(scene: Scene, now: Pore, over: float = 0.0) -> Solved:
     """Flow, then substrates, in the geometry of the pore: what the scene's sections ask for.
 
-    over: h, in which the biomass of ``now`` grows at the rates that are found meanwhile; its mean
-    takes part.
+    Tables of the scene count at the pore's time. over: h, in which the biomass of ``now`` grows at
+    the rates that are found meanwhile; its mean takes part.
     """
+    scene = scene.at(now.time)
     carried = solve_flow(scene, now.space) if scene.flow else None
     if scene.substrates is None:
         return Solved(carried, None, None)
@@ -238,7 +238,7 @@ def refuse_no_supply(scene: Scene, carried: Flow | None) -> None:
 
 
 def solve_flow(scene: Scene, space: Space) -> Flow:
-    """Stokes flow under the scene's head or mean velocity."""
+    """Stokes flow under the head or mean velocity of a scene at a time."""
     numerics = scene.numerics
     element: Bubble | Stabilised = Stabilised(numerics.flow_stabilisation)
     if numerics.flow_element == "bubble":

@@ -80,14 +80,14 @@ def advised(scene: Scene, now: Pore, error: Unresolved) -> Unresolved:
             solved = pore.solve(finer, trial)
         except StageError:
             continue
-        if _with_room(scene, solved):
+        if _with_room(scene, now, solved):
             return Unresolved(f"{error}; numerics.refinement = {wanted:g} resolves this state")
     return Unresolved(f"{error}; no numerics.refinement up to {wanted:g} was found to resolve it")
 
 
-def _with_room(scene: Scene, solved: Solved) -> bool:
+def _with_room(scene: Scene, now: Pore, solved: Solved) -> bool:
     """Are concentrations no further below zero than half of what is accepted?"""
-    substrates = needed(scene.substrates, "[substrates]")
+    substrates = needed(scene.at(now.time).substrates, "[substrates]")
     state = needed(solved.concentrations, "concentrations")
     kinds = (substrates.acceptor, substrates.donor)
     fields = (state.acceptor, state.donor)
@@ -182,7 +182,7 @@ def carried_substrates(scene: Scene, old: Space, new: Space, state: Concentratio
     where = np.column_stack([np.clip(x, first, last), new.points[:, 1]])
     at = transfer.located(old.mesh.points, old.mesh.cells, where)
     fields = at.field(np.column_stack([state.acceptor, state.donor]), old.cells, old.order)
-    both = needed(scene.substrates, "[substrates]")
+    both = needed(scene.largest.substrates, "[substrates]")
     acceptor, donor = (_beyond(field, substrate, x, old.mesh.ends, speed)
                        for field, substrate in zip(fields.T, (both.acceptor, both.donor)))
     return Concentrations(acceptor, donor)

@@ -80,7 +80,7 @@ def forces(scene: Scene, around: Surroundings, shaped: Pore) -> np.ndarray:
     drive = needed(scene.flow, "[flow]")
     modulus = needed(scene.growth, "[growth]").shear_modulus
     space = Space(mesh, shaped.space.order)
-    found = pore.solve_flow(scene, space)
+    found = pore.solve_flow(scene.at(shaped.time), space)
     viscosity = drive.kinematic_viscosity / drive.gravity
     on = nodal(space, found, viscosity, scene.numerics.interface)[mesh.body]
     total = np.zeros_like(own)

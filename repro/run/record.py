@@ -186,8 +186,8 @@ def check(folder: Path, state: State, record: Record) -> None:
     ends = [0.0, *(end for _, end in spans)]
     starts = [*(start for start, _ in spans), state.pore.time]
     apart = any(abs(end - start) > 1e-6 for end, start in zip(ends, starts))
-    reported = record.rows[-1][0] if record.rows else math.inf
-    if apart or abs(reported - ends[len(record.ledgers)]) > 1e-6:
+    last = record.rows[-1][0] if record.rows else math.inf
+    if apart or abs(last - state.row) > 1e-6 or last < ends[len(record.ledgers)] - 1e-6:
         raise CheckpointError("its rows do not end where its state is")
     for name, written in record.marks.items():
         if not _is_as_written(folder / name, written):

@@ -49,7 +49,7 @@ class Recorder:
     @property
     def time(self) -> float:
         """How far the run has come, h."""
-        return self.state.pore.time if self.state else 0.0
+        return self.state.time if self.state else 0.0
 
     @property
     def end(self) -> float:
@@ -205,6 +205,11 @@ class Recorder:
         record.check(self.folder, state, before)
         self.state = state
         self.record = before
+
+    def forget(self) -> None:
+        """Be as the recorder was before t = 0."""
+        self.state = None
+        self.record = Record()
 
     def drop_later(self) -> None:
         """Remove fields that were written after the state gone on from: they are made again."""

@@ -16,11 +16,11 @@ from time import perf_counter
 
 from repro import results, timing
 from repro.check import simplifications
-from repro.check.numbers import numbers
+from repro.check.numbers import judged
 from repro.check.simplifications import Warned
 from repro.errors import CheckpointError, Interrupted, OutputError, SimulationError
 from repro.march.loop import Instant, PoreEnd, State
-from repro.march.simulation import ends_soon, steps
+from repro.march.simulation import ends_soon, same_rows, steps
 from repro.results.files import is_file
 from repro.run import INTERVAL, checkpoint
 from repro.run.folder import (
@@ -224,6 +224,9 @@ def _lengthened(recorder: Recorder, later: Scene, overrides: Sequence[str], told
     with usable(recorder.folder):
         tidy(recorder.folder)
         restored = _restored(recorder, names, watch)
+    if restored and not same_rows(recorder.scene, later, recorder.time):
+        recorder.forget()  # rows lie as the end asks for them: these would not be the longer run's
+        restored = False
     recorder.record.resumes.append({"time_h": recorder.time, "changed": changed})
     if not restored:
         recorder.scene = later
@@ -397,12 +400,14 @@ def _record_steps(recorder: Recorder, made: Made, progress: Progress, watch: Wat
     for state, instant in made:
         remeshes = recorder.remeshes
         contact = recorder.contact
+        steps_before = recorder.steps if recorder.state else -1
         recorder.add(state, instant)
         if instant and len(recorder.record.rows) == 1:
             _warn(recorder, recorder.scene, recorder.first_velocity, watch)
         if not recorder.kept and ends_soon(recorder.scene, state):
             recorder.keep()
-        _tell_step(recorder, recorder.remeshes > remeshes, recorder.contact > contact, watch)
+        if recorder.steps > steps_before:  # no row within a step
+            _tell_step(recorder, recorder.remeshes > remeshes, recorder.contact > contact, watch)
         progress(recorder.time)
         if number := watch.stop():
             raise interrupted(recorder, number)
@@ -423,7 +428,7 @@ def warned(scene: Scene, velocity: float | None) -> list[Warned]:
     """The simplifications of a scene that do not hold; velocity: mean, um/h, at t = 0, if there is
     flow."""
     try:
-        return simplifications.warnings(scene, numbers(scene, velocity))
+        return simplifications.warnings(*judged(scene, velocity))
     except ArithmeticError as error:
         return [Warned("scene", f"its dimensionless numbers cannot be worked out ({error})")]
 

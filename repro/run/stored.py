@@ -33,7 +33,7 @@ ARRAYS: dict[str, tuple[str, Shape]] = {
 LARGEST = 1e9
 GUESS: dict[str, tuple[str, Shape]] = {"acceptor": ("f", ("D",)), "donor": ("f", ("D",))}
 PLAIN = {"scene", "time_h", "pace", "ends_um", "front", "guess", "ledgers", "remeshes",
-         "iterations"}
+         "iterations", "row_h", "apart"}
 
 
 def packed(scene: Scene, state: State) -> tuple[dict, dict[str, np.ndarray]]:
@@ -49,7 +49,8 @@ def packed(scene: Scene, state: State) -> tuple[dict, dict[str, np.ndarray]]:
              "ends_um": [float(x) for x in now.mesh.ends], "front": float(now.front),
              "guess": guess.iterations if guess else None,
              "ledgers": [_numbers(ledger) for ledger in state.ledgers],
-             "remeshes": int(state.remeshes), "iterations": state.iterations}
+             "remeshes": int(state.remeshes), "iterations": state.iterations,
+             "row_h": float(state.row), "apart": bool(state.apart)}
     return plain, arrays
 
 
@@ -64,14 +65,15 @@ def unpacked(scene: Scene, plain: dict, arrays: dict[str, np.ndarray]) -> State:
     if set(plain) != PLAIN or plain["scene"] != scene_hash(scene):
         raise CheckpointError("it is of another scene")
     end = scene.growth.end if scene.growth else 0.0
-    _refuse(not in_range(plain["time_h"], 0.0, end), "its time")
+    _refuse(not all(in_range(plain[key], 0.0, end) for key in ("time_h", "row_h")), "its time")
+    _refuse(type(plain["apart"]) is not bool, "its last step")
     _refuse(not (counted(plain["remeshes"]) and counts(plain["iterations"])), "its counts")
     _refuse(plain["guess"] is not None and not counted(plain["guess"]), "its counts")
     _refuse(not in_range(plain["front"], 1.0, MOST_GRADED), "its element sizes")
     _check(scene, plain, arrays)
     pore = _pore(scene, plain, arrays)
     return State(pore, _pace(plain["pace"]), _ledgers(plain["ledgers"]), plain["remeshes"],
-                 plain["iterations"])
+                 plain["iterations"], plain["row_h"], plain["apart"])
 
 
 def _refuse(wrong: bool, what: str) -> None:

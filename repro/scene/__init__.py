@@ -2,6 +2,7 @@
 
     keys      the dataclasses of a scene: default, unit, range, source of every key
     units     quantities with units
+    course    values over time
     exact     the units that scenes use, as exact fractions
     reading   tables of a TOML file into dataclasses, and back
     rules     what keys ask of each other

@@ -12,10 +12,12 @@ import hashlib
 import json
 from collections.abc import Sequence
 from copy import deepcopy
-from dataclasses import MISSING, dataclass
+from dataclasses import MISSING, dataclass, replace
 from fractions import Fraction
+from math import inf
 from pathlib import Path
 
+from repro.scene.course import Course, constant, courses
 from repro.scene.files import key_of, leave_out, override, packaged_scenes, read_tables
 from repro.scene.reading import Place, dotted, entries, read_table, toml, write_table
 from repro.scene.rules import rules
@@ -30,6 +32,7 @@ from repro.scene.units import (
     UP_TO_20,
     SceneError,
     choice,
+    course,
     flag,
     number,
     points,
@@ -88,19 +91,32 @@ class Aggregate:
             object.__setattr__(self, "radius", SEED_RADIUS)
 
 
+def _interpolate(section: "Flow | Substrate", *keys: str) -> None:
+    """Tell the tables of a section how they are interpolated."""
+    linear = section.interpolation == "linear"
+    for key in keys:
+        table = getattr(section, key)
+        if isinstance(table, Course):
+            object.__setattr__(section, key, replace(table, linear=linear))
+
+
 @dataclass(frozen=True)
 class Flow:
     """Section 2.1, (1)-(6): driven by `head` (um, whole pore) or `mean_velocity` (um/h).
 
-    The other one of them is None.
+    The other one of them is None. Either is a Course where the scene gives a table, a number in
+    what `Scene.at` returns.
     """
 
-    head: float | None = quantity(
+    head: float | None = course(
         "1e-3 cm", "um", default=None, source="(6), section 4",
         about="Head lost over the whole pore; either this or mean_velocity")
-    mean_velocity: float | None = quantity(
+    mean_velocity: float | None = course(
         "2.9 m/day", "um/h", NON_NEGATIVE, default=None, source="(3), section 4",
         about="u_ave, mean over the width; either this or head")
+    interpolation: str = choice(
+        "steps", "linear", source=OURS,
+        about="Between the times of a table of head or mean_velocity: jumps, or an even change")
     viscosity_ratio: float = number(2.0e3, source="2.1, Table 1",
                                     about="lambda, viscosity of the aggregate over that of water")
     kinematic_viscosity: float = quantity("0.01003 cm^2/s", "um^2/h", about="nu of water",
@@ -110,16 +126,23 @@ class Flow:
     density: float = quantity("998 mg/cm^3", "mg/L", source="Table 1 [E19]",
                               about="rho of water; only growth.fluid_forces needs it")
 
+    def __post_init__(self):
+        _interpolate(self, "head", "mean_velocity")
+
 
 @dataclass(frozen=True, kw_only=True)
 class Substrate:
     """A substrate of section 2.2: supply and K_s (mg/L), D in water and in biomass (um^2/h).
 
-    A Fraction for D in biomass is a share of D in water.
+    A Fraction for D in biomass is a share of D in water. `supply` is a Course where the scene gives
+    a table, a number in what `Scene.at` returns.
     """
 
-    supply: float = quantity("10 mg/L", "mg/L", NON_NEGATIVE, source="(11), section 4 (10 K_s)",
-                             about="C_supply of the water that comes in, and of all water at t = 0")
+    supply: float = course("10 mg/L", "mg/L", NON_NEGATIVE, source="(11), section 4 (10 K_s)",
+                           about="C_supply of the water that comes in, and of all water at t = 0")
+    interpolation: str = choice(
+        "steps", "linear", source=OURS,
+        about="Between the times of a table of supply: jumps, or an even change")
     half_saturation: float = quantity(
         "1.0 mg/L", "mg/L", about="K_s of Monod's law", source="(7)-(10), Table 1")
     diffusivity: float = required(
@@ -133,6 +156,7 @@ class Substrate:
         if isinstance(inside, Fraction):
             inside = float(inside * Fraction(self.diffusivity))
             object.__setattr__(self, "diffusivity_in_aggregate", inside)
+        _interpolate(self, "supply")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -249,9 +273,9 @@ class Numerics:
     """Section 3: how it is solved."""
 
     preset: str = choice(
-        "fast", "accurate", "paper", source="Section 3 is \"paper\"",
-        about="Defaults of this section: errors of about 1 %, of about 0.1 %, the paper's own "
-              "scheme")
+        "fast", "accurate", "exact", "paper", source="Section 3 is \"paper\"",
+        about="Defaults of this section: errors of about 1 %, of about 0.1 %, under 0.01 % until "
+              "contact, the paper's own scheme")
     elements: str = choice(
         "linear", "quadratic", "cubic", source="3.2-3.4 have linear ones",
         about="Linear triangles, or curved ones: all quadratic, or velocity and substrates cubic")
@@ -305,23 +329,27 @@ class Numerics:
         return min(self.order, 2)
 
 
-#: What each preset changes of the defaults above: errors of about 1 %, of about 0.1 % (see
-#: `make bench`), the paper's own scheme.
+#: What each preset changes of the defaults above: errors of about 1 %, of about 0.1 %, under 0.01 %
+#: until contact (see `make bench`), the paper's own scheme.
 PRESETS: dict[str, dict[str, str | float]] = {
     "fast": {"elements": "quadratic", "time": "midpoint", "refinement": 0.2, "tolerance": 0.0075,
              "jacobian": "reused"},
     "accurate": {"elements": "quadratic", "time": "midpoint", "refinement": 0.45,
                  "tolerance": 0.001, "jacobian": "reused"},
+    "exact": {"elements": "cubic", "time": "midpoint", "refinement": 0.3, "tolerance": 0.00025,
+              "jacobian": "reused"},
     "paper": {},
 }
 
 
 @dataclass(frozen=True)
 class Output:
-    """Times (h) of the rows and fields wanted, ascending; None: every shape update."""
+    """Times (h) of the rows and fields wanted, ascending; None: every step and, with midpoint,
+    every growth.time_step or a power of two of it, 24 times or more."""
 
     times: tuple[float, ...] | None = times(
-        source="Figures 4-6", about="Times of the rows and fields wanted; left out: every step")
+        source="Figures 4-6", about="Times of the rows and fields wanted, which change no step; left out: every step, "
+        "with midpoint also every growth.time_step, or 2, 4, 8 ... of it with 24 rows or more")
     timeseries: str = choice(
         "csv", "netcdf", source=OURS,
         about="timeseries.csv alone, or timeseries.nc besides, which needs the package xarray")
@@ -367,10 +395,27 @@ class Scene:
         there = [key for key in entries(Scene) if getattr(self, key) is not None]
         return f"<Scene {self.name}: {', '.join(there)}; hash {scene_hash(self)}>"
 
+    def at(self, time: float) -> "Scene":
+        """With what its tables say at a time (h), after the jump that may be there."""
+        return constant(self, lambda table: table.at(time))
+
+    @property
+    def largest(self) -> "Scene":
+        """With the largest value of each of its tables."""
+        return constant(self, lambda table: table.largest)
+
+    def corner(self, time: float) -> float:
+        """The first time (h) of its tables after this one; infinite where there is none."""
+        later = [corner for table in courses(self) for corner in table.times if corner > time]
+        return min(later, default=inf)
+
 
 #: Keys that came after hashes of scenes were recorded, with their defaults as tables write them.
 LATER: dict[str, dict[str, object]] = {
     "aggregate": {"position": "0.0 um", "smooth": False, "inert_fraction": 0.0},
+    "flow": {"interpolation": "steps"},
+    "substrates.acceptor": {"interpolation": "steps"},
+    "substrates.donor": {"interpolation": "steps"},
 }
 #: A scene, or where it is said: a file, a packaged name, a dict of tables.
 Source = Scene | str | Path | dict
@@ -484,7 +529,8 @@ def scene_hash(scene: Scene) -> str:
 def _without_later(section: str, table: dict) -> dict:
     """The table of a section without the keys of `LATER` that have their default."""
     later = LATER.get(section, {})
-    return {key: value for key, value in table.items() if key not in later or value != later[key]}
+    return {key: _without_later(f"{section}.{key}", value) if isinstance(value, dict) else value
+            for key, value in table.items() if key not in later or value != later[key]}
 
 
 def _at(tables: dict, key: str, default: object) -> object:

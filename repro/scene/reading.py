@@ -7,7 +7,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import MISSING, Field, dataclass, fields, replace
 
-from repro.scene.units import SceneError, nearest, unlike
+from repro.scene.units import Refused, SceneError, nearest, unlike
 
 LONGEST_KEY = 60  # characters of a key in a message
 SCOPE = "docs/scope.md"
@@ -75,6 +75,8 @@ def _read_entry(entry: Field, value: object, place: Place):
     kind = entry.metadata["kind"]
     try:
         return kind.read(value)
+    except Refused as error:
+        raise place.refuse(value, str(error)) from None
     except (ValueError, OverflowError):
         hint = unlike(kind, value) or did_you_mean(kind.near(value))
         raise place.refuse(value, kind.wanted + hint) from None

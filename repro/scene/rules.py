@@ -4,8 +4,10 @@ from collections.abc import Iterator
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
+from repro.scene.course import Course
+
 if TYPE_CHECKING:
-    from repro.scene import Aggregate, Kinetics, Pore, Scene
+    from repro.scene import Aggregate, Flow, Kinetics, Pore, Scene, Substrate
 
 _NO_STATE = "nothing is supplied, so that no state is steady"
 _UNSTEADY = f', or numerics.transport = "gear": {_NO_STATE}'
@@ -15,6 +17,8 @@ FINEST = 1e-3  # of the width: the smallest seed, and edge of an outline
 #: What only linear elements have a choice of, and what the others have.
 HIGHER_ORDER = {"transfer": "conserving", "flow_element": "stabilised"}
 
+#: What a number or a table gives.
+Driven = float | Course | None
 Outlined = tuple[tuple[float, float], ...]
 #: Is it broken, and what is accepted of each key that breaks it, the likeliest first?
 Rules = Iterator[tuple[bool, dict[str, str]]]
@@ -147,22 +151,33 @@ def _crosses(points: Outlined, width: float) -> bool:
     return not LineString([(x / width, y / width) for x, y in points]).is_simple
 
 
-def _flow_rules(scene: "Scene", head: float | None, velocity: float | None) -> Rules:
+def _flow_rules(scene: "Scene", head: Driven, velocity: Driven) -> Rules:
     example = 'such as head = "1e-3 cm" or mean_velocity = "2.9 m/day"'
     wanted = f"it or flow.mean_velocity is needed, {example}"
     yield head is None and velocity is None, {"flow.head": wanted}
     yield head is not None and velocity is not None, {
-        "flow.mean_velocity": _not_both("flow.head", f"{head} um"),
-        "flow.head": _not_both("flow.mean_velocity", _per_day(velocity)),
+        "flow.mean_velocity": _not_both("flow.head", _in_words(head, "um")),
+        "flow.head": _not_both("flow.mean_velocity", _in_words(velocity, "m/day", 24e-6)),
     }
-    yield velocity == 0 and scene.substrates is not None and _steady(scene), {
+    yield from _table_rules("flow", scene.flow, (head, velocity))
+    still = 0 in velocity.values if isinstance(velocity, Course) else velocity == 0
+    yield still and scene.substrates is not None and _steady(scene), {
         "flow.mean_velocity": f"greater than zero is needed{_UNSTEADY}",
         "numerics.transport": f'"gear" is needed with flow.mean_velocity = 0: {_NO_STATE}',
     }
 
 
-def _per_day(velocity: float | None) -> str:
-    return "" if velocity is None else f"{24e-6 * velocity:g} m/day"
+def _in_words(value: Driven, unit: str, factor: float = 1.0) -> str:
+    if value is None:
+        return ""
+    return "a table" if isinstance(value, Course) else f"{factor * value:g} {unit}"
+
+
+def _table_rules(section: str, part: "Flow | Substrate", values: tuple[Driven, ...]) -> Rules:
+    """What is asked of a section with tables over time, or without."""
+    constant = not any(isinstance(value, Course) for value in values)
+    wanted = '"steps" is needed where no table of times and values is given'
+    yield constant and part.interpolation != "steps", {f"{section}.interpolation": wanted}
 
 
 def _boundary_rules(scene: "Scene") -> Rules:
@@ -170,6 +185,8 @@ def _boundary_rules(scene: "Scene") -> Rules:
         inside = getattr(scene.substrates, name).diffusivity_in_aggregate
         key = f"substrates.{name}.diffusivity_in_aggregate"
         yield inside <= 0, {key: "greater than zero is needed"}
+        part = getattr(scene.substrates, name)
+        yield from _table_rules(f"substrates.{name}", part, (part.supply,))
     closed = scene.substrates.boundary == "closed"
     yield closed and scene.flow is not None, {
         "substrates.boundary": '"open" is needed with [flow]',

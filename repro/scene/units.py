@@ -22,6 +22,7 @@ from functools import cache, partial
 from typing import NamedTuple
 
 from repro.scene import exact
+from repro.scene.course import Course
 
 NOUNS = {
     "um": "a length",
@@ -94,6 +95,60 @@ class Quantity:
 
     def write(self, value: float) -> str:
         return f"{float(value)!r} {self.unit}"
+
+
+class Refused(ValueError):
+    """A value that is not accepted, with what is wrong with it in words."""
+
+
+@dataclass(frozen=True)
+class Timed(Quantity):
+    """A quantity, or a table of times (h) and values: read as a float, or as a Course."""
+
+    clock = Quantity("h", "5 h", NON_NEGATIVE)
+
+    @property
+    def accepted(self) -> str:
+        return f"{super().accepted}; or a table of times, ascending from 0 h, and values"
+
+    @property
+    def wanted(self) -> str:
+        return f"{super().wanted}, or a table such as {self._table}"
+
+    @property
+    def _table(self) -> str:
+        return json.dumps([["0 h", self.example], ["5 h", self.example]])
+
+    def read(self, value: object) -> float | Course:  # type: ignore[override]  # or a table
+        if not isinstance(value, list):
+            return super().read(value)
+        if not 1 <= len(value) <= MOST_POINTS:
+            raise Refused(f"a table of 1 to {MOST_POINTS} entries is needed, such as {self._table}")
+        times, values = zip(*map(self._entry, range(1, len(value) + 1), value))
+        if times[0] != 0:
+            raise Refused('the time of the first entry of a table must be "0 h"')
+        for number, (one, other) in enumerate(zip(times, times[1:]), 2):
+            if other <= one:
+                raise Refused(f"times of a table must ascend: {other:g} h of entry {number} is not "
+                              f"after {one:g} h")
+        return Course(times, values)
+
+    def _entry(self, number: int, entry: object) -> tuple[float, float]:
+        """Time and value of an entry of a table."""
+        if not isinstance(entry, list) or len(entry) != 2:
+            raise Refused(f"entry {number} of a table must be a time and a value, such as "
+                          f'["5 h", "{self.example}"]')
+        try:
+            return self.clock.read(entry[0]), super().read(entry[1])
+        except (ValueError, OverflowError):
+            raise Refused(f"entry {number} of a table must be a time of zero or more and "
+                          f'{super().accepted}, such as ["5 h", "{self.example}"]') from None
+
+    def write(self, value):
+        if not isinstance(value, Course):
+            return super().write(value)
+        return [[self.clock.write(time), super(Timed, self).write(one)]
+                for time, one in zip(value.times, value.values)]
 
 
 @dataclass(frozen=True)
@@ -269,6 +324,12 @@ def quantity(text: str, unit: str, accepts: Range = POSITIVE, *, about: str, sou
     """
     default = default or {"default_factory": partial(to_internal, text, unit)}
     return _told(Quantity(unit, text, accepts), about, source, stated, **default)
+
+
+def course(text: str, unit: str, accepts: Range = POSITIVE, *, about: str, source: str, **default):
+    """A value with a unit, as :func:`quantity`'s, or a table of it over time."""
+    default = default or {"default_factory": partial(to_internal, text, unit)}
+    return _told(Timed(unit, text, accepts), about, source, **default)
 
 
 def points(*, about: str, source: str):

@@ -4,11 +4,13 @@ order in the time step, and what must not matter."""
 from verification.coupling import (  # noqa: F401
     averaged_base,
     averaged_mixing,
+    averaged_supply,
     averaged_thin,
     averaged_uptake,
     balances,
     conservation,
     contact,
+    exact,
     exponential,
     presets,
     schemes,

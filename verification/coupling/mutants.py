@@ -2,6 +2,7 @@
 
 from verification.coupling.balance_mutants import BALANCES
 from verification.coupling.midpoint_mutants import MIDPOINT
+from verification.coupling.supply_mutants import SUPPLY
 from verification.coupling.traction_mutants import TRACTION
 from verification.mutants import Mutant
 
@@ -37,8 +38,8 @@ MUTANTS = (
            new="(1 + remeshing.spread(now.space, 0 * more + more.mean()))"),
     Mutant("geometry-of-the-step-before", "repro/march/loop.py",
            says="an instant holds the shape of the update before its own",
-           old="yield reported(state), instant(state, now, solved, taken.before)",
-           new="yield reported(state), instant(state, taken.before[0], solved, taken.before)"),
+           old="yield reported(state, now.time), instant(state, shown, solved, taken.before)",
+           new="yield reported(state, now.time), instant(state, taken.before[0], solved, taken.before)"),
     Mutant("stale-flow", "repro/model/pore.py",
            says="flow is solved once for each mesh, and not anew when the mesh has moved",
            old="return flow.solve(space, drive, length, interface=numerics.interface, element=element)",
@@ -114,5 +115,6 @@ MUTANTS = (
            new="space=start.space, pressure=start.pressure / scene.growth.shear_modulus,"),
     *BALANCES,
     *MIDPOINT,
+    *SUPPLY,
     *TRACTION,
 )

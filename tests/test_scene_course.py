@@ -1,0 +1,161 @@
+"""Supplies, head and mean velocity as tables over time: how they are read, written, and what runs make of them."""
+import json
+from dataclasses import replace
+from math import inf
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from repro.check.checked import check
+from repro.check.numbers import judged
+from repro.march.loop import Instant
+from repro.march.simulation import simulate, steps
+from repro.model import pore
+from repro.scene import SceneError, load_scene, parse_scene, scene_hash, scene_tables
+from repro.scene.course import Course
+from repro.scene.text import scene_text
+from tests.strategies import scene
+
+DONOR = "substrates.donor.supply"
+STARVED = [["0 h", "10 mg/L"], ["0.3 h", "0 mg/L"], ["0.5 h", "20 mg/L"]]
+RISING = 'flow.head=[["0 h", "1e-3 cm"], ["0.4 h", "3e-3 cm"]]'
+SHORT = ('growth.end="0.8 h"', 'numerics.preset="fast"', f"{DONOR}={json.dumps(STARVED)}")
+
+
+def refusal(*entries, unset=()):
+    with pytest.raises(SceneError) as found:
+        load_scene("base", entries, unset)
+    return str(found.value)
+
+
+def test_a_table_is_read_in_units_and_written_back():
+    """Mutants: times in minutes, the interpolation forgotten where a scene is read back."""
+    table = [["0 min", "10 mg/L"], ["300 min", "0.02 g/L"]]
+    made = load_scene("base", [f"{DONOR}={json.dumps(table)}", "substrates.donor.interpolation=linear"])
+    assert made.substrates.donor.supply == Course((0.0, 5.0), (10.0, 20.0), True)
+    assert parse_scene(json.loads(json.dumps(scene_tables(made))), "base", "file") == made
+    assert scene_tables(made)["substrates"]["donor"]["supply"] == [["0.0 h", "10.0 mg/L"], ["5.0 h", "20.0 mg/L"]]
+    assert f"supply = {json.dumps(table)}" in scene_text("base", [f"{DONOR}={json.dumps(table)}"])
+
+
+def test_the_hash_tells_tables_and_their_interpolation_apart():
+    """And is that of before where there is none. Mutants: a default that counts; a key left out of it."""
+    table = f"{DONOR}={json.dumps(STARVED)}"
+    hashes = [scene_hash(load_scene("base", changes)) for changes in (
+        [], [table], [table, "substrates.donor.interpolation=linear"], [f'{DONOR}=[["0 h", "10 mg/L"]]'])]
+    assert len(set(hashes)) == 4
+    plain = scene_tables(load_scene("base"))
+    assert plain["substrates"]["donor"]["interpolation"] == plain["flow"]["interpolation"] == "steps"
+
+
+@pytest.mark.parametrize("table, told", [
+    ("[]", "a table of 1 to 1000 entries is needed"),
+    ('[["1 h", "1 mg/L"]]', 'the time of the first entry of a table must be "0 h"'),
+    ('[["0 h", "1 mg/L"], ["2 h", "1 mg/L"], ["2 h", "0 mg/L"]]', "2 h of entry 3 is not after 2 h"),
+    ('[["0 h", "1 mg/L"], ["2 h", "1 um"]]', "entry 2 of a table must be a time of zero or more and a concentration"),
+    ('[["0 h", "1 mg/L"], ["2 h", "-1 mg/L"]]', "entry 2 of a table must be"),
+    ('[["0 mg/L", "1 h"]]', "entry 1 of a table must be"), ('[["0 h"]]', "entry 1 of a table must be a time and a"),
+    ('["0 h", "1 mg/L"]', "entry 1 of a table must be a time and a value"),
+    ("3", 'or a table such as [["0 h", "10 mg/L"], ["5 h", "10 mg/L"]] (did you mean "3 mg/L"?)')])
+def test_what_is_no_table_is_refused_in_one_line(table, told):
+    """Mutants: an empty table taken, times in any order, a value of any unit."""
+    message = refusal(f"{DONOR}={table}")
+    assert message.startswith(f"base: {DONOR} = ") and told in message and "\n" not in message
+
+
+def test_what_no_run_can_do_is_refused():
+    """Mutants: no value but the first looked at; linear without a table silently taken."""
+    still = refusal('flow.mean_velocity=[["0 h", "1 m/day"], ["2 h", "0 m/day"]]', unset=["flow.head"])
+    assert "flow.mean_velocity = [[" in still and "greater than zero is needed" in still
+    assert "greater than zero" in refusal('flow.head=[["0 h", "1 cm"], ["2 h", "0 cm"]]')
+    both = refusal('flow.mean_velocity=[["0 h", "1 m/day"]]')
+    assert "flow.head (10 um) is given too" in both
+    for key in ("flow", "substrates.acceptor"):
+        assert '"steps" is needed where no table' in refusal(f"{key}.interpolation=linear")
+
+
+@given(st.lists(st.floats(0.01, 10.0), min_size=1, max_size=5), st.lists(st.floats(0.0, 9.0), min_size=6, max_size=6),
+       st.floats(0.0, 60.0))
+def test_a_table_between_its_times(gaps, values, time):
+    """Against numpy's interpolation, and the last value at or before a time. Mutants: the value before a jump at the
+    jump; beyond the last time the last slope."""
+    times = (0.0, *np.cumsum(gaps).tolist())
+    values = tuple(values[: len(times)])
+    assert Course(times, values, True).at(time) == pytest.approx(np.interp(time, times, values), rel=1e-9, abs=1e-12)
+    for number, now in enumerate(times):
+        assert Course(times, values).at(now) == Course(times, values, True).at(now) == values[number]
+    assert Course(times, values).at(time) == values[np.searchsorted(times, time, side="right") - 1]
+
+
+def test_a_scene_at_a_time_is_one_with_numbers():
+    """Mutants: one of the tables left; the first of its corners after a time is that time."""
+    made = load_scene("base", [*SHORT, RISING, "flow.interpolation=linear"])
+    there = made.at(0.2)
+    assert (there.substrates.donor.supply, there.flow.head) == (10.0, pytest.approx(20.0))
+    assert (made.largest.substrates.donor.supply, made.largest.flow.head) == (20.0, 30.0)
+    assert [made.corner(time) for time in (0.0, 0.3, 0.35, 0.4, 0.5)] == [0.3, 0.4, 0.4, 0.5, inf]
+    plain = load_scene("base")
+    assert plain.at(3.0) is plain and plain.largest is plain and plain.corner(0.0) == inf
+
+
+@pytest.mark.parametrize("changes", [(), ('numerics.preset="paper"',), ('numerics.preset="paper"',
+                                                                       'numerics.transport="gear"')])
+def test_steps_end_at_jumps_and_rows_there_show_what_holds_from_then_on(changes):
+    """The effluent of the donor is zero from 0.3 h on and 20 mg/L or less from 0.5 h on; without donor nothing grows,
+    and the biomass between is that of decay. Mutants: the value before the jump; a step over it."""
+    times = 'output.times=["0.29 h", "0.3 h", "0.4 h", "0.5 h", "0.8 h"]'
+    made = load_scene("base", [*SHORT, times, *changes])
+    found = list(simulate(made))
+    ends = [step.end for instant in found for step in instant.ledgers]
+    assert {0.3, 0.5} <= set(ends)
+    donor = [instant.solved.fluxes[1].effluent for instant in found]
+    assert donor[2:4] == pytest.approx([0.0, 0.0], abs=1e-6) and min(donor[:2]) > 9.8 and 19 < min(donor[4:]) < 20
+    mass = np.array([instant.pore.mass for instant in found])
+    rise = np.diff(np.log(mass)) / np.diff([instant.pore.time for instant in found])
+    assert rise[2] == pytest.approx(rise[3], rel=1e-3) and rise[2] < 0 < min(rise[0], rise[4])
+    law = made.kinetics
+    assert rise[2] == pytest.approx(-law.decay_coefficient * law.degradable_fraction * 10 / 11, rel=2e-2)
+
+
+def test_an_even_change_is_of_second_order():
+    """Biomass of base with a supply that falls evenly to a tenth, in steps of 12 to 1.5 min of the paper's: the mean
+    of the supply counts. Mutant: the supply of the step's start."""
+    table = [["0 h", "10 mg/L"], ["0.8 h", "1 mg/L"]]
+    made = load_scene("base", [f"{DONOR}={json.dumps(table)}", "substrates.donor.interpolation=linear",
+                               'growth.end="0.8 h"', 'output.times=["0.8 h"]'])
+    found = []
+    for step in (0.2, 0.1, 0.05, 0.025):
+        (_, last) = simulate(replace(made, growth=replace(made.growth, time_step=step)))
+        found.append(last.pore.mass)
+    apart = np.diff(found)
+    assert (np.abs(np.log2(apart[:-1] / apart[1:]) - 2) < 0.3).all()
+
+
+def test_a_drive_over_time_scales_the_flow():
+    """At t = 0 and later in one geometry the velocity goes as the head. Mutant: the first head at all times."""
+    made = scene(head=[["0 h", "1e-3 cm"], ["2 h", "3e-3 cm"]], growth={"end": "3 h"})
+    now = pore.seeded(made)
+    first, later = (pore.solve(made, replace(now, time=time)).flow.mean_velocity for time in (1.9, 2.0))
+    assert later == pytest.approx(3 * first, rel=1e-12)
+
+
+def test_what_is_judged_is_the_extreme():
+    """Numbers and growth of the largest supply and the fastest flow. Mutants: those of t = 0; one table alone."""
+    made = load_scene("base", [*SHORT, RISING])
+    plain = load_scene("base", [*SHORT[:2], 'flow.head="3e-3 cm"', f"{DONOR}=20 mg/L"])
+    now = pore.seeded(made)
+    found, wanted = (judged(one, Instant(now, pore.solve(one, now), None, (), 0, {})) for one in (made, plain))
+    assert found[0] == plain and [number.start for number in found[1]] == pytest.approx(
+        [number.start for number in wanted[1]], rel=1e-12)
+    told = check(made, "base")
+    assert "0 to 20 mg/L, in steps, the last from 0.5 h" in dict(told.modelled)["substrates"]
+
+
+def test_a_run_over_jumps_is_the_same_from_any_state():
+    """To the last bit. Mutant: the value before a jump after a resume."""
+    made = load_scene("base", SHORT)
+    whole = list(steps(made))
+    for state, _ in whole[1:-1]:
+        assert list(simulate(made, state=state))[-1].pore.mass == whole[-1][1].pore.mass
