@@ -228,7 +228,7 @@ def test_a_run_is_loaded_as_it_was_solved(found, tmp_path):
     for time in found.time:
         fields = loaded.fields(time)
         assert set(fields) == set(found.fields(time))
-        assert all(np.array_equal(fields[name], found.fields(time)[name]) for name in fields)
+        assert all(np.array_equal(fields[name], found.fields(time)[name], equal_nan=True) for name in fields)
     assert loaded._repr_html_() == found._repr_html_()
     (tmp_path / "fields.pvd").unlink()
     assert "<img" not in repro.load_run(tmp_path)._repr_html_()

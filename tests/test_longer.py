@@ -146,3 +146,12 @@ def test_a_step_is_another_one_only_where_the_end_is_near(name):
     assert not near[0] and near[-1]
     for short, long in list(zip(*ways))[: near.index(True) + 1]:
         assert short.pore.time == long.pore.time and short.pace == long.pace
+
+
+def test_rows_that_lie_as_the_end_asks_for_them_are_those_of_the_longer_run(tmp_path):
+    """Rows of the shorter run may lie closer than the longer one's. Mutant: rows that the longer run has not."""
+    whole = [*SCENES["fast"][:-1], "growth.end=20 h"]
+    run(load_scene("base", whole), tmp_path / "whole")
+    run(load_scene("base", [*whole, "growth.end=9.5 h"]), tmp_path / "parts")
+    resume(tmp_path / "parts", overrides=["growth.end=20 h"])
+    assert same(tmp_path / "parts", tmp_path / "whole")

@@ -163,7 +163,7 @@ def steps(scene: Scene, scheme: Scheme,
         try:
             with stopping(now.time):
                 taken, solved, pace, cut = scheme.advance(scene, now, solved, state.pace)
-                balance.refuse(scene, taken.pore, taken.ledger)
+                balance.refuse(scene.largest, taken.pore, taken.ledger)
         except PoreEnd:
             if state.ledgers:  # steps that are not reported yet
                 yield reported(state, now.time), instant(state, now, solved, None)

@@ -49,6 +49,19 @@ def ends_soon(scene: Scene, state: State) -> bool:
     return 2 * state.pace.length > end - state.pore.time
 
 
+def same_rows(one: Scene, other: Scene, time: float) -> bool:
+    """Have runs of two scenes the same rows up to a time (h)?"""
+    first, second = ([row for row in _rows(scene) if row <= time] for scene in (one, other))
+    return first == second
+
+
+def _rows(scene: Scene) -> Sequence[float]:
+    """Times (h) of rows beside the ends of steps."""
+    if scene.output.times is not None:
+        return scene.output.times
+    return stepping.rows(scene) if scene.numerics.time == "midpoint" else ()
+
+
 def steps(scene: Scene, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
     """Every step, t = 0 first: the state from which a run goes on bit for bit, and the Instant if
     one is due."""

@@ -11,31 +11,30 @@ from html import escape
 import numpy as np
 
 from repro.fem.transfer import interpolate
+from repro.results import names
 
 #: Pixels along the meshed part; across the pore at most as many.
 ALONG = 480
-#: Fields of which the first that there is is shown, with what it is called.
-FIELDS = {"acceptor_mg_per_L": "acceptor (mg/L)", "velocity_m_per_d": "velocity (m/day)"}
+#: Fields of which the first that there is is shown.
+FIELDS = ("acceptor_mg_per_L", "velocity_m_per_d")
 #: Colours (red, green, blue) of the least value, of the largest, and between them: viridis.
 COLOURS = np.array([[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]])
 #: Levels of colour; one more is that of the aggregate's boundary.
 LEVELS = 255
-#: What is told of a run, with its unit: the first value and the last.
-FIGURES = {"conductivity_m_per_d": ("conductivity", "m/day"), "thickness_um": ("thickness", "um"),
-           "aggregate_area_um2": ("area of the aggregate", "um2"),
-           "effluent_acceptor_mg_per_L": ("acceptor leaving", "mg/L"),
-           "effluent_donor_mg_per_L": ("donor leaving", "mg/L")}
+#: Columns of which the first value and the last are told.
+FIGURES = ("conductivity_m_per_d", "thickness_um", "aggregate_area_um2",
+           "effluent_acceptor_mg_per_L", "effluent_donor_mg_per_L")
 
 
 def key_figures(columns: Mapping[str, np.ndarray]) -> str:
     """First and last values of a run's columns, and when the aggregate met the opposite wall."""
     time = columns["time_h"]
     told = []
-    for name, (words, unit) in FIGURES.items():
+    for name in FIGURES:
         if name in columns:
             first, last = columns[name][[0, -1]]
             change = f" → {last:.4g}" if len(time) > 1 else ""
-            told.append(f"{words} {first:.4g}{change} {unit}")
+            told.append(f"{names.words(name)} {first:.4g}{change} {names.unit(name)}")
     touching = time[columns["contact"] == 1] if "contact" in columns else time[:0]
     if len(touching):
         told.append(f"contact with the opposite wall from t = {touching[0]:.4g} h on")
@@ -50,7 +49,7 @@ def figure(fields: Mapping[str, np.ndarray], time: float) -> str:
     values = fields[name]
     values = np.linalg.norm(values, axis=1) if values.ndim == 2 else values
     picture = base64.b64encode(png(fields, values)).decode("ascii")
-    told = escape(f"{FIELDS[name]}, {values.min():.4g} (dark) to {values.max():.4g} (light), at "
+    told = escape(f"{names.with_unit(name)}, {values.min():.4g} (dark) to {values.max():.4g} (light), at "
                   f"t = {time:.4g} h; white: boundary of the aggregate")
     return (f'<figure><img alt="{told}" src="data:image/png;base64,{picture}">'
             f"<figcaption>{told}</figcaption></figure>")

@@ -205,6 +205,11 @@ class Recorder:
         self.state = state
         self.record = before
 
+    def forget(self) -> None:
+        """Be as the recorder was before t = 0."""
+        self.state = None
+        self.record = Record()
+
     def drop_later(self) -> None:
         """Remove fields that were written after the state gone on from: they are made again."""
         fields = {name for name in self.own if name.startswith("fields/")}

@@ -20,7 +20,7 @@ from repro.check.numbers import judged
 from repro.check.simplifications import Warned
 from repro.errors import CheckpointError, Interrupted, OutputError, SimulationError
 from repro.march.loop import Instant, PoreEnd, State
-from repro.march.simulation import ends_soon, steps
+from repro.march.simulation import ends_soon, same_rows, steps
 from repro.results.files import is_file
 from repro.run import INTERVAL, checkpoint
 from repro.run.folder import (
@@ -224,6 +224,9 @@ def _lengthened(recorder: Recorder, later: Scene, overrides: Sequence[str], told
     with usable(recorder.folder):
         tidy(recorder.folder)
         restored = _restored(recorder, names, watch)
+    if restored and not same_rows(recorder.scene, later, recorder.time):
+        recorder.forget()  # rows lie as the end asks for them: these would not be the longer run's
+        restored = False
     recorder.record.resumes.append({"time_h": recorder.time, "changed": changed})
     if not restored:
         recorder.scene = later

@@ -167,8 +167,8 @@ def stability(body: Sliding, factor: float) -> float:
     """Least eigenvalue of B K^-1 B^T + factor C against the pressure's mass matrix, at t = 0 (dense)."""
     t, n, area = body.triangles, len(body.reference), areas(body)
     slopes = gradients(body.reference, t)
-    moduli = moduli(np.tile(np.eye(2), (len(t), 1, 1)), np.zeros(len(t)))
-    K = np.einsum("t,tikjl,tak,tbl->taibj", area, moduli, slopes, slopes).reshape(len(t), 6, 6)
+    tangent = moduli(np.tile(np.eye(2), (len(t), 1, 1)), np.zeros(len(t)))
+    K = np.einsum("t,tikjl,tak,tbl->taibj", area, tangent, slopes, slopes).reshape(len(t), 6, 6)
     B = np.repeat((area[:, None, None] * slopes / 3).reshape(len(t), 1, 6), 3, axis=1)
     C = factor * growth.gradient_stabilisation(body.reference, t, np.ones(len(t)))
     M = area[:, None, None] * (np.ones((3, 3)) + np.eye(3)) / 12

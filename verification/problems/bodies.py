@@ -37,9 +37,9 @@ DEGREE, BENT = 6, 0.075
 
 
 def moduli(F: np.ndarray, P: np.ndarray) -> np.ndarray:
-    """(n, i, K, j, L) d S_iK / d F_jL over mu_L of deformations (n, 2, 2) with pressures (n,), S the first Piola stress:
-    read from the element tangents of n unit triangles, the gradients of whose second and third nodal function are the
-    unit vectors, and whose area is one half."""
+    """(n, i, K, j, L) d S_iK / d F_jL over mu_L of deformations (n, 2, 2) with pressures (n,), S the first Piola
+    stress: read from the element tangents of n unit triangles, whose second and third nodal function have unit vectors
+    for gradients, and whose area is one half."""
     count = len(F)
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     shape = growth.Shape(np.arange(3 * count).reshape(count, 3), 3 * count, elements.GRADIENT_DEGREES[1])
