@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 from repro.results import write_json, write_text
-from verification.claims import CLAIMS, EXPECTED, ClaimError, evaluate, record, report
+from verification.claims import CLAIMS, EXPECTED, ClaimError, evaluate, independence, record, report
 from verification.claims.bars import barred
 from verification.claims.evaluate import Found
 from verification.claims.levels import Level
@@ -41,18 +41,32 @@ def main(arguments: list[str] | None = None) -> int:
     rows = judged(tuple(chosen.ids) or EXPECTED)
     print(report.legend())
     print("\n".join(map(report.terminal, rows)))
-    print(report.summary(rows))
     settled = all(row.verdict != NO_VERDICT for row in rows)
-    return 0 if settled and recorded(rows, not chosen.ids, chosen.record) else 1
+    if not chosen.ids:
+        settled = written(rows) and settled
+    print(report.summary(rows))
+    return 0 if recorded(rows, chosen.record) and settled else 1
 
 
-def recorded(rows: list[Row], whole: bool, anew: bool) -> bool:
-    """Do the rows agree with the committed record? Differences are told; all claims are written beside it too."""
-    ours = [record.entry(row) for row in rows if row.verdict != NO_VERDICT]
-    if whole:
-        OUT.mkdir(exist_ok=True)
-        write_text(OUT / "claims.md", report.markdown(rows))
-        write_json(OUT / "claims.json", ours)
+def written(rows: list[Row]) -> bool:
+    """Write all claims, with the independence of base in the paper's scheme; is that independent?"""
+    values = independence.computed()
+    section = report.Independence(independence.comparisons(values), independence.checks(values))
+    print(report.terminal_independence(section))
+    OUT.mkdir(exist_ok=True)
+    write_text(OUT / "claims.md", report.markdown(rows, section))
+    write_json(OUT / "claims.json", entries(rows))
+    return section.kept
+
+
+def entries(rows: list[Row]) -> list[dict]:
+    """The rows with a verdict as plain values."""
+    return [record.entry(row) for row in rows if row.verdict != NO_VERDICT]
+
+
+def recorded(rows: list[Row], anew: bool) -> bool:
+    """Do the rows agree with the committed record? Differences are told."""
+    ours = entries(rows)
     if anew:
         write_json(record.COMMITTED, ours)
         print(f"{record.COMMITTED.name}: written")

@@ -10,7 +10,8 @@ from math import isfinite
 
 from verification import sensitivity
 from verification.claims import CHANGED, FAILS, HOLDS, PREDICTED, REACHES_OVER, REPRODUCED, VERDICTS, Check, Claim
-from verification.claims import WITHIN_ROUNDING, Finding
+from verification.claims import Finding
+from verification.claims.independence import Comparison
 
 WIDTH, INDENT = 120, " " * 5
 HEAD = ("quantity", "paper", "ours", "numerics", "inputs", "scheme of 2001", "accepted", "outcome")
@@ -40,6 +41,30 @@ class Row:
     def reason(self) -> str:
         """Why a check does not hold; empty where all do."""
         return "" if self.verdict in (REPRODUCED, CHANGED) or not self.finding else self.finding.reason
+
+
+@dataclass(frozen=True)
+class Independence:
+    """What does not come from the paper: comparisons of runs of its scheme, and the bounds that they must keep."""
+
+    comparisons: tuple[Comparison, ...]
+    checks: tuple[Check, ...]
+
+    @property
+    def kept(self) -> bool:
+        """Are all bounds kept?"""
+        return all(check.holds for check in self.checks)
+
+
+def moving(values: tuple[float, ...], moved: tuple[float, ...]) -> list[str]:
+    """Values, each but the first with its difference from the one before."""
+    return [number(values[0]), *(f"{number(v)} ({m:+.2f} %)" for v, m in zip(values[1:], moved))]
+
+
+def terminal_independence(section: Independence) -> str:
+    """The bounds as lines."""
+    lines = [INDENT + f"{c.quantity}: {number(c.ours)}, bound {c.paper}" for c in section.checks]
+    return "\n".join(["Mesh and time-step independence of base in the paper's scheme", *lines]) + "\n"
 
 
 def number(value: float) -> str:
@@ -123,13 +148,22 @@ def summary(rows: list[Row]) -> str:
         "Table 1 are not among them."))
 
 
-def markdown(rows: list[Row]) -> str:
+def markdown(rows: list[Row], section: Independence) -> str:
     """The whole report."""
     parts = ["# What the paper claims, judged by computed numbers", "", summary(rows).replace("\n", "\n\n"), "", LEGEND,
              "", *_head(("id", "claim", *HEAD[1:], "verdict"))]
     parts += [_row(row) for row in rows]
     parts += ["", "## Remarks", "", *(_remarks(row) for row in rows if row.finding), ""]
-    return "\n".join(parts) + "\n"
+    return "\n".join(parts + _independence(section)) + "\n"
+
+
+def _independence(section: Independence) -> list[str]:
+    parts = ["## Mesh and time-step independence of base in the paper's scheme", ""]
+    for comparison in section.comparisons:
+        lines = [_cells((name, *moving(values, moved))) for name, values, moved in comparison.lines]
+        parts += [f"### {comparison.title}", "", *_head(("", *comparison.runs)), *lines, ""]
+    bounds = [_cells((c.quantity, c.paper, number(c.ours) + ("" if c.holds else " FAILS"))) for c in section.checks]
+    return [*parts, *_head(("what", "bound", "ours")), *bounds]
 
 
 def _head(titles) -> list[str]:
