@@ -12,7 +12,7 @@ from repro.fem.transfer import interpolate
 from verification.claims import Finding, at_least, at_most, claim
 from verification.claims.levels import WIDE_FINE
 from verification.claims.restored import Body, bodies, body, body_of, in_plane, polygon, stress
-from verification.claims.runs import BASE, WIDE, around_contact, history, scene
+from verification.claims.runs import BASE, WIDE, history, scene
 
 PLOTTED, UPDATE = 19.2, 0.2
 PASCAL = 1e6  # in a MPa

@@ -33,10 +33,10 @@ def oxygen() -> Finding:
               at_least("the smaller of both", "present", min(base.min(), wide.min()), np.finfo(float).tiny, "not zero"))
     hours, last = series(*WIDE)["time_h"], bodies(WIDE)[-1]
     since = hours[wide < 1][0] if (wide < 1).any() else np.inf
-    reason = (f"it holds in base; in wide, whose supply of 10 K_s is assumed, the front takes all the oxygen: behind it C_A falls under "
-              f"K_s at {since:g} h and to {wide.min():.1g} K_s at {hours[wide.argmin()]:g} h, where it is not zero, "
-              f"but {share_under(last, 1.0):.0f} % of the biomass has less than K_s and {share_under(last, 0.1):.0f} % "
-              "less than K_s / 10, and hardly decays any more")
+    reason = ("it holds in base; in wide, whose supply of 10 K_s is assumed, the front takes all the oxygen: behind it "
+              f"C_A falls under K_s at {since:g} h and to {wide.min():.1g} K_s at {hours[wide.argmin()]:g} h, where it "
+              f"is not zero, but {share_under(last, 1.0):.0f} % of the biomass has less than K_s and "
+              f"{share_under(last, 0.1):.0f} % less than K_s / 10, and hardly decays any more")
     lost = 100 * (1 - np.exp(-scene(*WIDE).kinetics.decay_coefficient * max(hours[-1] - since, 0.0)))
     return Finding(checks, reason=reason, note="What that leaves out is small: decay at its full rate b since then "
                    f"would have taken {lost:.1f} % of that biomass, at most.")
@@ -80,8 +80,8 @@ def _until_when() -> str:
     told = ", ".join(f"{bound} K_s until {float(np.interp(-bound, -acceptor, hours)):.1f} h"
                      for bound in (9, 6, 4, 3, 2, 1) if acceptor[-1] < bound)
     even = hours[[evenness(found) >= 0.9 for found in bodies(LONGER)]][-1]
-    return (f"Until when, in a run to {hours[-1]:g} h: the acceptor has at least {told}; in whole hours, uptake is even "
-            f"to a tenth until {even:g} h.")
+    return (f"Until when, in a run to {hours[-1]:g} h: the acceptor has at least {told}; in whole hours, uptake is "
+            f"even to a tenth until {even:g} h.")
 
 
 def evenness(found: Body) -> float:
@@ -119,11 +119,11 @@ def stresses() -> Finding:
                            -100 * FEW, 100 * FEW, FEW_WORDS)]
     uniform = 2.5 ** (-5 / 3) * (2.5 - 1)
     reason = ("it hangs on the modulus: in the plane the stress is minor against mu_L, that of t = 0, and in base also "
-              f"against that of the grown material, mu_L theta^(-2/3); in wide it reaches {found['wide'][2]:.2g} of the "
-              "latter after contact. Across the plane it is minor against neither: plane strain keeps growth from expanding that way, and that "
-              f"alone makes the equivalent stress of uniform growth theta^(-5/3) (theta - 1), {uniform:.3f} at its "
-              "largest, for theta = 2.5. It does no work on the shape, and what the paper concludes from minor "
-              "stresses holds")
+              f"against that of the grown material, mu_L theta^(-2/3); in wide it reaches {found['wide'][2]:.2g} of "
+              "the latter after contact. Across the plane it is minor against neither: plane strain keeps growth from "
+              "expanding that way, and that alone makes the equivalent stress of uniform growth theta^(-5/3) "
+              f"(theta - 1), {uniform:.3f} at its largest, for theta = 2.5. It does no work on the shape, and what the "
+              "paper concludes from minor stresses holds")
     return Finding(tuple(checks), reason=reason)
 
 

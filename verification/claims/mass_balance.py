@@ -198,10 +198,10 @@ def _our_error(drop: np.ndarray) -> str:
         ours, finer = (np.array([flux.effluent for flux in fluxes_around(case, radius)]) for case in (said, fine))
         lost = 100 * carried_by_u(scene("base", *ROUGH), radius) * finer / drop
     error = 100 * np.abs(ours - (4 * finer - ours) / 3) / drop
-    return (f"It is the paper's own error. Ours falls with the uptake: {error[0]:.2g} and {error[1]:.2g} % of the drops "
-            f"of {drop[0]:.3f} and {drop[1]:.3f} K_s; and so does what advection by u loses, with tau = h^2 / (12 nu) "
-            f"and the mesh coarsened to 0.7, {lost[0]:.1f} and {lost[1]:.1f} % of them. So what is needed for a defect "
-            "of 1.6 % at t = 0 is another error than that.")
+    return (f"It is the paper's own error. Ours falls with the uptake: {error[0]:.2g} and {error[1]:.2g} % of the "
+            f"drops of {drop[0]:.3f} and {drop[1]:.3f} K_s; and so does what advection by u loses, with tau = "
+            f"h^2 / (12 nu) and the mesh coarsened to 0.7, {lost[0]:.1f} and {lost[1]:.1f} % of them. So what is "
+            "needed for a defect of 1.6 % at t = 0 is another error than that.")
 
 
 @claim("C15", "4", "a higher influent concentration leaves the amounts consumed about the same")

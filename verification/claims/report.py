@@ -9,8 +9,18 @@ from itertools import zip_longest
 from math import isfinite
 
 from verification import sensitivity
-from verification.claims import CHANGED, FAILS, HOLDS, PREDICTED, REACHES_OVER, REPRODUCED, VERDICTS, Check, Claim
-from verification.claims import Finding
+from verification.claims import (
+    CHANGED,
+    FAILS,
+    HOLDS,
+    PREDICTED,
+    REACHES_OVER,
+    REPRODUCED,
+    VERDICTS,
+    Check,
+    Claim,
+    Finding,
+)
 from verification.claims.independence import Comparison
 
 WIDTH, INDENT = 120, " " * 5

@@ -78,8 +78,8 @@ def temperature_of(diffusivity: float, volume: float) -> float:
     quick=True)
 def diffusivities() -> dict[str, str]:
     """Both diffusivities by the method that the paper names."""
-    rows = [[name, PRINTED[name], f"{hayduk_laudie(20.0, volume):.2f}", f"{temperature_of(PRINTED[name], volume):.0f} C"]
-            for name, volume in MOLAR_VOLUME.items()]
+    rows = [[name, PRINTED[name], f"{hayduk_laudie(20.0, volume):.2f}",
+             f"{temperature_of(PRINTED[name], volume):.0f} C"] for name, volume in MOLAR_VOLUME.items()]
     return {"table": table(["", "printed, cm2/d", "at 20 C, cm2/d", "printed value is that of"], rows)}
 
 
