@@ -1,7 +1,8 @@
 """`python -m verification.claims [--record] [C07 C09 ...]`: judge the paper's claims, all of them by default.
 
 All of them are also written to `verification/claims/out/`, and compared with the committed `claims.json`: where every
-number lies in its recorded interval and every verdict is the same, that file stays as it is. `--record` writes it anew.
+number lies in its recorded interval and every verdict is the same, that file stays as it is. `--record` writes it anew,
+or of it the claims that are named.
 The exit status is 0 when every claim has a verdict, whatever it is, and agrees with the record; 1 when not; 2 for an
 unknown claim.
 """
@@ -35,9 +36,6 @@ def main(arguments: list[str] | None = None) -> int:
         known = f"{EXPECTED[0]} to {EXPECTED[-1]} are accepted"
         print(f"claims: there is no {', '.join(unknown)}; {known}", file=sys.stderr)
         return 2
-    if chosen.record and chosen.ids:
-        print("claims: --record writes all claims; leave the ids out", file=sys.stderr)
-        return 2
     rows = judged(tuple(chosen.ids) or EXPECTED)
     print(report.legend())
     print("\n".join(map(report.terminal, rows)))
@@ -68,7 +66,7 @@ def recorded(rows: list[Row], anew: bool) -> bool:
     """Do the rows agree with the committed record? Differences are told."""
     ours = entries(rows)
     if anew:
-        write_json(record.COMMITTED, ours)
+        write_json(record.COMMITTED, record.replaced(ours))
         print(f"{record.COMMITTED.name}: written")
         return True
     told = record.differences(ours, record.read())

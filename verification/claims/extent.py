@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from verification.claims import OF_SCHEME, Finding, at_most, claim
-from verification.claims.levels import ALONE
+from verification.claims.levels import ALONE, BESIDE
 from verification.claims.runs import BASE, scene
 from verification.claims.states import full_biomass, half_disc, solution
 
 RADII, PARTS = (5.0, 10.0, 20.0, 30.0), (0.25, 0.5, 1.0, 1.5)
 
 
-@claim("C19", "3.1", "meshing to min(5 R, 1 W) from the aggregate suffices", about=OF_SCHEME, steps=ALONE,
+@claim("C19", "3.1", "meshing to min(5 R, 1 W) from the aggregate suffices", about=OF_SCHEME, sizes=BESIDE, steps=ALONE,
        fixed="nothing moves in it")
 def truncation() -> Finding:
     """Conductivity and effluents of half-discs of X_m meshed to parts of min(5 R, W), against the whole pore meshed.

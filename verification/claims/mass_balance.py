@@ -14,7 +14,7 @@ import numpy as np
 from repro.model import pore
 from verification.claims import OF_SCHEME, Finding, at_least, at_most, between, claim, near, without_limit
 from verification.claims.accuracy import FEW, FEW_WORDS
-from verification.claims.levels import ALONE, DEFAULT, at_level
+from verification.claims.levels import ALONE, BESIDE, DEFAULT, at_level
 from verification.claims.runs import BASE, LAST, at, grown, ledger, scene, series
 from verification.claims.states import full_biomass, half_disc, solution
 from verification.uncertainty import Bar
@@ -159,7 +159,7 @@ def carried_by_u(said, radius: float) -> np.ndarray:
 
 
 @claim("C14", "4", "refining the mesh improves the mass balance, also at early times",
-       about=OF_SCHEME)
+       about=OF_SCHEME, sizes=BESIDE)
 def refined_balance() -> Finding:
     """Substrate lost by advection with u itself, on meshes of sizes 2, 1 and 1/2, around the seed and at 19.2 h."""
     radii = {"t = 0": scene(*BASE).aggregate.radius, "19.2 h": at(BASE, PLOTTED)["thickness_um"]}

@@ -16,7 +16,7 @@ from repro.model.transport import Concentrations
 from repro.scene import Scene
 from verification.claims import OF_SCHEME, Finding, at_most, claim, near
 from verification.claims.accuracy import FEW, FEW_WORDS, TRANSPORT, TRANSPORT_WORDS
-from verification.claims.levels import cached
+from verification.claims.levels import BESIDE, cached
 from verification.claims.restored import remeshed, solved_pore
 from verification.claims.runs import BASE, scene
 
@@ -36,7 +36,7 @@ def whole_pore(*changes: str) -> tuple[Scene, Pore, Solved]:
     return said, *remeshed(said, now, solved)
 
 
-@claim("C20", "3.1", "(26) describes the unmeshed part", about=OF_SCHEME)
+@claim("C20", "3.1", "(26) describes the unmeshed part", about=OF_SCHEME, sizes=BESIDE)
 def upstream_profile() -> Finding:
     """Concentrations upstream in the wholly meshed pore of base at 19.2 h against (26), alpha fitted at one section.
 

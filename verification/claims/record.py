@@ -27,6 +27,12 @@ def read() -> list[dict]:
     return json.loads(COMMITTED.read_text(encoding="utf-8")) if COMMITTED.exists() else []
 
 
+def replaced(ours: list[dict]) -> list[dict]:
+    """The record with some claims anew, in order."""
+    known = {each["id"]: each for each in (*read(), *ours)}
+    return [known[id] for id in sorted(known)]
+
+
 def entry(row: Row) -> dict:
     """A judged claim as plain values."""
     claim, finding = row.claim, row.finding

@@ -25,7 +25,7 @@ from verification.claims.independence import Comparison
 
 WIDTH, INDENT = 120, " " * 5
 HEAD = ("quantity", "paper", "ours", "numerics", "inputs", "scheme of 2001", "accepted", "outcome")
-COLUMNS = (30, 13, 10, 17, 17, 17, 17, 12)
+COLUMNS = (24, 11, 10, 15, 15, 15, 14, 11)
 LEGEND = ("paper: as printed. ours: the converged solution, or the scheme where the claim is about that. numerics: the "
           "error bar; inputs: where the number goes as the inputs of Table 1 move within their rounding; scheme of "
           "2001: its range on three meshes. accepted: the interval of the printed digits, or what the words are taken "

@@ -91,6 +91,12 @@ def polygon(outline: Outline) -> shapely.Polygon:
     return shapely.Polygon(np.einsum("qa,eai->eqi", parabola(t), outline.arcs(outline.points)).reshape(-1, 2))
 
 
+def interface_length(found: Body) -> float:
+    """Length (um) of the line between fluid and aggregate."""
+    outline = found.outline
+    return float(outline.edge_lengths()[outline.interface_edges()].sum())
+
+
 def solved_pore(run: tuple[str, ...], time: float) -> tuple[Pore, Solved]:
     """The pore of a run at a time (h) and what is solved in it."""
     found = instant(run, time)

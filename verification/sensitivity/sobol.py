@@ -24,22 +24,29 @@ def moving(elasticities: dict[str, dict[str, dict]]) -> list[Input]:
             if max(abs(elasticities[name][each.name]["elasticity"]) for name in PRINTED) > LEAST]
 
 
+def _moved(known: dict[str, dict]) -> bool:
+    """Does any rounded input move a number?"""
+    return max(abs(known[each.name]["elasticity"]) for each in ROUNDED) > LEAST
+
+
 def indices(runs: Runs, elasticities: dict[str, dict[str, dict]], samples: int) -> dict:
     """First-order and total indices of each printed number, with their intervals."""
-    chosen, names = moving(elasticities), [name for name in PRINTED if name != "consumed"]
+    chosen = moving(elasticities)
+    names = [name for name in PRINTED if name != "consumed" and _moved(elasticities[name])]
 
     def numbers(x: np.ndarray) -> np.ndarray:
         rows = [runs.numbers(scene("base", dict(zip([each.name for each in chosen], column)), *FAST)) for column in x.T]
         return np.array([[row[name] for row in rows] for name in names])
     spread = [uniform(1 - each.rounding, 2 * each.rounding) for each in chosen]
     found = sobol_indices(func=numbers, n=samples, dists=spread, rng=np.random.default_rng(SEED))
-    sure = found.bootstrap(confidence_level=CONFIDENCE, n_resamples=999)
+    with np.errstate(invalid="ignore", divide="ignore"):  # where an input does not move a number at all
+        sure = found.bootstrap(confidence_level=CONFIDENCE, n_resamples=999)
     return {"samples": samples, "inputs": [each.name for each in chosen], "confidence": CONFIDENCE,
             "numbers": {name: {kind: _listed(getattr(found, kind)[row], getattr(sure, kind).confidence_interval, row)
                                for kind in ("first_order", "total_order")} for row, name in enumerate(names)}}
 
 
 def _listed(values: np.ndarray, interval, row: int) -> list[list[float]]:
-    """[index, low, high] of each input."""
-    return [[float(value), float(low), float(high)]
-            for value, low, high in zip(values, interval.low[row], interval.high[row])]
+    """[index, low, high] of each input; an index that no resampling moves is its own interval."""
+    ends = [np.where(np.isfinite(end[row]), end[row], values) for end in (interval.low, interval.high)]
+    return [[float(value), float(low), float(high)] for value, low, high in zip(values, *ends)]
