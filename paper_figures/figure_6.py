@@ -64,7 +64,7 @@ def smooth(rim: np.ndarray, width: float) -> np.ndarray:
     points, wall = np.vstack([points, points[:1]]), np.append(wall, wall[0])
     corners = np.flatnonzero(wall > 0)
     pieces = [points[a:b] if b == a + 1 else _curve(points[a: b + 1]) for a, b in zip(corners, corners[1:])]
-    return np.vstack(pieces)
+    return np.clip(np.vstack(pieces), [-np.inf, 0.0], [np.inf, width])
 
 
 def _curve(points: np.ndarray) -> np.ndarray:

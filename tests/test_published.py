@@ -82,6 +82,14 @@ def test_what_needs_no_solution_is_not_counted_as_a_value_reproduced(told):
     assert replication.filled("{{paper.total}}", told) == str(len(predicted)) == str(total)
 
 
+def test_readme_and_documents_count_no_claims_otherwise(told):
+    """A count of verdicts anywhere is the record's. Mutant: a count that was not updated."""
+    for name in ("README.md", "paper_figures/replication.md", "docs/scope.md", "codecheck.author.yml"):
+        counts = re.findall(r"\b(\d+) (?:claims )?(?:are )?(reproduced|contradicted|undecided)\b", text(name))
+        for count, kind in counts:
+            assert count == replication.filled(f"{{{{claims.{kind}}}}}", told), (name, count, kind)
+
+
 def test_every_erratum_is_in_the_note(told):
     ids = re.findall(r"^## (E\d+)\.", text("reference/ERRATA.md"), re.M)
     listed = re.findall(r"^- \*\*(E\d+)\*\*", replication.filled("{{list.errata}}", told), re.M)

@@ -126,16 +126,15 @@ def test_a_run_is_computed_once_and_kept_at_once(tmp_path, monkeypatch):
 
 def test_sobol_indices_of_a_linear_law():
     """Shares of the variance, e r squared over their sum. Mutants: normal for uniform; rounding not used."""
-    slopes = {"velocity_0": {}, "velocity": {"k": 3.0, "Y": 3.0}, "effluent_acceptor": {"k": 8.0},
-              "effluent_donor": {"K_sD": 0.5}, "consumed": {}}
+    slopes = {"velocity_0": {}, "velocity": {"k": 3.0, "Y": 3.0, "K_sD": 0.02}, "effluent_donor": {},
+              "effluent_acceptor": {"k": 8.0, "Y": 1.0, "K_sD": 0.3}, "consumed": {}}
 
     def law(x):
-        return {name: 1 + sum(e * (x[key] - 1) for key, e in row.items()) + 1e-9 * x["K_sD"]
-                for name, row in slopes.items()}
+        return {name: 1 + sum(e * (x[key] - 1) for key, e in row.items()) for name, row in slopes.items()}
     found = sobol.indices(Law(law), elasticity.elasticities(Law(law), "base"), 64)
     k, y = ((3 * BY_NAME[name].rounding) ** 2 for name in ("k", "Y"))
     total = {name: value for name, (value, *_) in zip(found["inputs"], found["numbers"]["velocity"]["total_order"])}
-    assert set(found["inputs"]) == {"k", "Y", "K_sD"}
+    assert set(found["inputs"]) == {"k", "Y", "K_sD"} and set(found["numbers"]) == {"velocity", "effluent_acceptor"}
     assert total["k"] == pytest.approx(k / (k + y), abs=0.05) and total["Y"] == pytest.approx(y / (k + y), abs=0.05)
 
 

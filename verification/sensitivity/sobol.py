@@ -39,14 +39,13 @@ def indices(runs: Runs, elasticities: dict[str, dict[str, dict]], samples: int) 
         return np.array([[row[name] for row in rows] for name in names])
     spread = [uniform(1 - each.rounding, 2 * each.rounding) for each in chosen]
     found = sobol_indices(func=numbers, n=samples, dists=spread, rng=np.random.default_rng(SEED))
-    with np.errstate(invalid="ignore", divide="ignore"):  # where an input does not move a number at all
-        sure = found.bootstrap(confidence_level=CONFIDENCE, n_resamples=999)
+    sure = found.bootstrap(confidence_level=CONFIDENCE, n_resamples=999)
     return {"samples": samples, "inputs": [each.name for each in chosen], "confidence": CONFIDENCE,
             "numbers": {name: {kind: _listed(getattr(found, kind)[row], getattr(sure, kind).confidence_interval, row)
                                for kind in ("first_order", "total_order")} for row, name in enumerate(names)}}
 
 
 def _listed(values: np.ndarray, interval, row: int) -> list[list[float]]:
-    """[index, low, high] of each input; an index that no resampling moves is its own interval."""
-    ends = [np.where(np.isfinite(end[row]), end[row], values) for end in (interval.low, interval.high)]
-    return [[float(value), float(low), float(high)] for value, low, high in zip(values, *ends)]
+    """[index, low, high] of each input."""
+    return [[float(value), float(low), float(high)]
+            for value, low, high in zip(values, interval.low[row], interval.high[row])]
