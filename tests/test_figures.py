@@ -202,6 +202,9 @@ def test_outlines_are_smooth_between_the_walls_and_keep_their_nodes():
     apart = np.linalg.norm(line[:, None] - outline.points[None], axis=2).min(axis=0)
     assert apart.max() < 1e-9 and len(line) > 4 * len(outline.points)
     assert line[:, 1].min() >= 0 and line[:, 1].max() <= 50 + 1e-9
+    contact = outline.points[outline.wall == TOP, 0].max() if (outline.wall == TOP).any() else 0.0
+    top = line[(np.abs(line[:, 0]) < contact) & (line[:, 1] > 25)]
+    assert contact > 5 and (top[:, 1] == 50).all()
     radius = 51.0
     free = line[(line[:, 1] > 1) & (line[:, 1] < 45)]
     assert np.abs(np.hypot(*free.T) / radius - 1).max() < 1e-3

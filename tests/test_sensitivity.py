@@ -81,15 +81,15 @@ def test_what_differs_by_noise_is_not_resolved():
 def law_of_base(shift):
     """Numbers near those printed, moved by an acceptor effluent that k lowers and one that D_a hardly does."""
     def law(x):
-        return {"velocity_0": 2.9, "velocity": 1.5 * x["k"] ** -3, "consumed": 60 - 5 * (x["F"] - 1),
+        return {"velocity_0": 2.9, "velocity": 1.5 / x["k"], "consumed": 60 - 5 * (x["F"] - 1),
                 "effluent_acceptor": 4.19 * (1 + shift) * x["k"] ** -8, "effluent_donor": 6.13 * x["K_sD"] ** 0.5}
     return law
 
 
-@pytest.mark.parametrize("shift, reached", [(-0.02, True), (-0.2, False)])
+@pytest.mark.parametrize("shift, reached", [(-0.02, True), (-0.06, False), (-0.2, False)])
 def test_one_set_is_found_where_there_is_one_and_the_least_misfit_where_there_is_none(shift, reached):
-    """2 % of the effluent are 0.25 % of k, within its 0.54 %; 20 % are not. Mutants: a set outside of the rounding; the
-    linear program without a run."""
+    """2 % of the effluent are 0.25 % of k, within its 0.54 %; 6 % and 20 % are not. Mutant: a set outside of the
+    rounding."""
     law = Law(law_of_base(shift))
     found = one_set.found(law, elasticity.elasticities(law, "base"))
     factors = factors_of(found["inputs"])

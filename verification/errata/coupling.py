@@ -49,7 +49,7 @@ def density_drift() -> dict[str, str]:
         ours = np.maximum(1 - columns["biomass_density_min"], columns["biomass_density_max"] - 1)
         for name, chosen in (("before contact", columns["contact"] == 0), ("in contact", columns["contact"] == 1)):
             if chosen.any():
-                remeshes = np.count_nonzero(columns["remeshed"][chosen])
+                remeshes = sum(row.remeshes for row, kept in zip(history(*run).instants, chosen) if kept)
                 drifts = [f"{100 * drift[chosen].max():.2g} %" for drift in (ours, as_j)]
                 rows.append([f"{run[0]}, {name}", remeshes, *drifts])
     worst = int(np.argmax(ours))  # of wide, the last
