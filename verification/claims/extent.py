@@ -27,7 +27,8 @@ def truncation() -> Finding:
     told = "; ".join(f"R = {radius:g} um: " + ", ".join(f"{part:g}: {'/'.join(f'{e:.2g}' for e in row)}"
                                                          for part, row in zip(PARTS, found))
                      for radius, found in errors.items())
-    return Finding(checks, note="Errors (%) of conductivity/acceptor effluent/donor effluent at parts of min(5 R, W): "
+    return Finding(checks, reason="what two unrelated meshes differ by is larger than the errors "
+                   "around the smaller half-discs, so that their bars reach over the bound", note="Errors (%) of conductivity/acceptor effluent/donor effluent at parts of min(5 R, W): "
                    f"{told}.")
 
 
