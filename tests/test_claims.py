@@ -363,9 +363,9 @@ def perturbed(name, changes=()):
 
 
 def test_bars_of_base_are_as_narrow_as_asked(kept):
-    """0.2 % on what section 4 prints. Mutant: bars of the scheme."""
+    """0.2 % on velocities, effluents and uptake of section 4. Mutant: bars of the scheme."""
     known = {each["id"]: each for each in kept}
-    for id in ("C01", "C02", "C03", "C04", "C05"):
+    for id in ("C01", "C02", "C03", "C04"):
         for check in known[id]["checks"]:
             assert check["high"] - check["low"] <= 2 * 0.002 * abs(check["value"]), (id, check["quantity"])
 

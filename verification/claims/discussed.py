@@ -61,8 +61,8 @@ def mass_transfer() -> Finding:
     supply to the interface's mean, times thickness over diffusivity in water."""
     early = [found for found in bodies(BASE) if found.pore.time <= 19.2 + 1e-6]
     numbers = np.array([sherwood(found) for found in early])
-    checks = tuple(at_least(f"{name}: largest over smallest Sherwood number, less one (%)", "cannot be set", 100 * change,
-                            100 * FEW, FEW_WORDS, date=NEW)
+    checks = tuple(at_least(f"{name}: largest over smallest Sherwood number, less one (%)", "cannot be set",
+                            100 * change, 100 * FEW, FEW_WORDS, date=NEW)
                    for name, change in zip(("acceptor", "donor"), numbers.max(axis=0) / numbers.min(axis=0) - 1))
     told = ", ".join(f"{a:.3g} and {d:.3g} at {found.pore.time:g} h"
                      for found, (a, d) in list(zip(early, numbers))[::6] + [(early[-1], numbers[-1])])
@@ -82,17 +82,16 @@ def sherwood(found: Body) -> tuple[float, float]:
 
 @claim("C40", "5", "detachment by fracture along the lines of maximum stress could be incorporated", fine=WIDE_FINE)
 def tearing() -> Finding:
-    """Largest principal stress in the aggregate of base and wide: where it would tear first, and whether a stress can be
-    said at all: its bar within a tenth of it."""
+    """Largest principal stress in the aggregate of base and wide: is there tension, and where would it tear first?"""
     peaks = {run[0]: [tension(found) for found in bodies(run)[1:]] for run in (BASE, WIDE)}
     modulus = scene(*BASE).growth.shear_modulus
-    checks = [at_least(f"{name}: largest principal stress over mu_L", "stress is computed", max(peaks[name])[0] / modulus,
-                       0.0, "tension", date=NEW) for name in peaks]
+    checks = [at_least(f"{name}: largest principal stress over mu_L", "stress is computed",
+                       max(peaks[name])[0] / modulus, 0.0, "tension", date=NEW) for name in peaks]
     value, x, y, hours = max(peaks["wide"])
     first = max(peaks["base"])
-    return Finding(tuple(checks), reason="nothing is under tension", note=f"In base it is {first[0] / modulus:.2g} mu_L, "
-                   f"at ({first[1]:.1f}, {first[2]:.1f}) um and {first[3]:g} h; in wide {value / modulus:.2g} mu_L at "
-                   f"({x:.0f}, {y:.0f}) um and {hours:g} h: there it would tear first.")
+    note = (f"In base it is {first[0] / modulus:.2g} mu_L, at ({first[1]:.1f}, {first[2]:.1f}) um and {first[3]:g} h; in "
+            f"wide {value / modulus:.2g} mu_L at ({x:.0f}, {y:.0f}) um and {hours:g} h: there it would tear first.")
+    return Finding(tuple(checks), reason="nothing is under tension", note=note)
 
 
 def tension(found: Body) -> tuple[float, float, float, float]:

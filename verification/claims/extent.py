@@ -28,7 +28,8 @@ def truncation() -> Finding:
                                                          for part, row in zip(PARTS, found))
                      for radius, found in errors.items())
     return Finding(checks, reason="what two unrelated meshes differ by is larger than the errors "
-                   "around the smaller half-discs, so that their bars reach over the bound", note="Errors (%) of conductivity/acceptor effluent/donor effluent at parts of min(5 R, W): "
+                   "around the smaller half-discs, so that their bars reach over the bound",
+                   note="Errors (%) of conductivity/acceptor effluent/donor effluent at parts of min(5 R, W): "
                    f"{told}.")
 
 
