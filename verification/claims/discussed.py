@@ -89,8 +89,8 @@ def tearing() -> Finding:
                        max(peaks[name])[0] / modulus, 0.0, "tension", date=NEW) for name in peaks]
     value, x, y, hours = max(peaks["wide"])
     first = max(peaks["base"])
-    note = (f"In base it is {first[0] / modulus:.2g} mu_L, at ({first[1]:.1f}, {first[2]:.1f}) um and {first[3]:g} h; in "
-            f"wide {value / modulus:.2g} mu_L at ({x:.0f}, {y:.0f}) um and {hours:g} h: there it would tear first.")
+    note = (f"In base it is {first[0] / modulus:.2g} mu_L, at ({first[1]:.1f}, {first[2]:.1f}) um and {first[3]:g} h; "
+            f"in wide {value / modulus:.2g} mu_L at ({x:.0f}, {y:.0f}) um and {hours:g} h: there it would tear first.")
     return Finding(tuple(checks), reason="nothing is under tension", note=note)
 
 

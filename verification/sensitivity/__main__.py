@@ -11,7 +11,7 @@ import sys
 
 from repro.results import write_json, write_text
 from verification import sensitivity
-from verification.sensitivity import elasticity, one_set, picture, sobol
+from verification.sensitivity import elasticity, one_set, picture, sobol, supplies
 from verification.sensitivity.inputs import ROUNDED
 from verification.sensitivity.numbers import Runs, scene
 
@@ -43,6 +43,7 @@ def computed(runs: Runs, only: str | None, samples: int) -> dict:
         made["values"] |= runs.numbers(scene(name, {}))
         made["elasticities"] |= elasticity.elasticities(runs, name)
     made["one_set"] = one_set.found(runs, made["elasticities"]) if only != "wide" else known.get("one_set", {})
+    made["supplies"] = supplies.contacts(runs) if only != "base" else known.get("supplies", {})
     made["sobol"] = sobol.indices(runs, made["elasticities"], samples) if samples else known.get("sobol", {})
     return made
 

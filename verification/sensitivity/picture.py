@@ -46,7 +46,8 @@ def page(record: dict) -> str:
     parts = ["# What the inputs of Table 1 allow", "",
              "Elasticities d ln(number) / d ln(input), by central differences of the converged solution; ± is their "
              "bar, and one that exceeds a tenth of the value is *not resolved*. `make sensitivity` writes this page.",
-             "", "![Tornado diagram](tornado.svg)", "", _table(record), "", *_set(record), *_sobol(record)]
+             "", "![Tornado diagram](tornado.svg)", "", _table(record), "",
+             *_set(record), *_supplies(record), *_sobol(record)]
     return "\n".join(parts) + "\n"
 
 
@@ -77,6 +78,17 @@ def _set(record: dict) -> list[str]:
     numbers = ", ".join(f"{NAMES.get(name, name)} {value:.4f}" for name, value in found["numbers"].items())
     return ["## One set of inputs", "", f"{words} (a share of {found['share_of_the_rounding']:.2f} of the rounding is "
             f"needed). A run with it: {numbers}.", "", "| input | value |", "| --- | --- |", *lines, ""]
+
+
+def _supplies(record: dict) -> list[str]:
+    found = record.get("supplies")
+    if not found:
+        return []
+    rows = [f"| {supply} | {known['contact_time']:.1f} | {known['upstream']:.0f} to {known['downstream']:.0f} | "
+            f"{known['acceptor_min']:.2g} |" for supply, known in found.items()]
+    return ["## The supply of Figure 6, which is not printed", "",
+            "| supply of both (K_s) | contact (h) | ends at contact (um) | least acceptor then (K_s) |",
+            "| --- | --- | --- | --- |", *rows, ""]
 
 
 def _sobol(record: dict) -> list[str]:
