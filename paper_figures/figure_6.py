@@ -50,7 +50,7 @@ def outlines(axes: Axes, folder: Path) -> None:
     high = 0.5 * shown[0].width
     axes.annotate("", (first - 0.2 * MARGIN, high), (first - 0.95 * MARGIN, high), zorder=6,
                   arrowprops={"arrowstyle": "-|>", "color": style.BLUE, "linewidth": 1.4, "shrinkA": 0, "shrinkB": 0})
-    axes.text(first - 0.6 * MARGIN, high + 4, "flow", color=style.BLUE, ha="center", va="bottom", fontsize=7)
+    axes.text(first - 0.9 * MARGIN, high + 4, "flow", color=style.BLUE, ha="left", va="bottom", fontsize=7)
     axes.figure.colorbar(colours, ax=axes, location="bottom", label="time (h)", ticks=[s.time for s in shown],
                          aspect=50, shrink=0.8)
 
