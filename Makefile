@@ -11,7 +11,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help env figures check-manifest claims verify verify-fast mutants test test-thorough lint bench clean
+.PHONY: help env figures check-manifest claims sensitivity verify verify-fast mutants test test-thorough lint bench clean
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1|\2/p' Makefile | awk -F'|' '{ printf "  make %-14s %s\n", $$1, $$2 }'
@@ -27,6 +27,9 @@ check-manifest: $(STAMP) ## compare the data of what make figures has made with 
 claims: $(STAMP) ## judge every claim of the paper by a computed number, and write the replication note
 	@$(BIN) -m verification.claims
 	@$(BIN) -m paper_figures.replication
+
+sensitivity: $(STAMP) ## what the rounding of Table 1 allows: elasticities, one set of inputs; goes on where it was stopped
+	@$(BIN) -m verification.sensitivity
 
 verify: $(STAMP) ## run the verification cases against references that do not use repro
 	@$(BIN) -m verification

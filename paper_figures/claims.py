@@ -1,4 +1,10 @@
-"""The paper's claims that a figure bears on, in a few words; `make claims` judges them by computed numbers."""
+"""The paper's claims that a figure bears on, in a few words, and their verdicts, which `make claims` has recorded."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from verification.claims import record
 
 STATEMENTS = {
     "C01": "Base starts at a mean velocity of 2.9 m/d",
@@ -25,3 +31,14 @@ STATEMENTS = {
     "C33": "Base is fully penetrated by its substrates",
     "C35": "fluid flows around the aggregate, and through it once it spans the pore",
 }
+
+
+@cache
+def verdicts() -> dict[str, str]:
+    """Verdict of each claim in the committed record."""
+    return {each["id"]: each["verdict"] for each in record.read()}
+
+
+def judged(ids: tuple[str, ...]) -> str:
+    """The verdicts of some claims, as a sentence of a caption."""
+    return "Claims: " + "; ".join(f"{id} {verdicts().get(id, 'not judged')}" for id in ids) + "."

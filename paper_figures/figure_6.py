@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
+from scipy.interpolate import CubicSpline
 from shapely import Polygon, box
 
 from paper_figures import runs, states, style
@@ -23,6 +24,8 @@ CLAIMS = ("C12", "C25", "C29", "C31")
 EVERY = 5.0
 #: Channel shown on both sides of the widest one, um.
 MARGIN = 15.0
+#: Points of the drawn line for each edge of the outline.
+PER_EDGE = 8
 
 
 @style.styled
@@ -42,9 +45,33 @@ def outlines(axes: Axes, folder: Path) -> None:
     norm = BoundaryNorm(EVERY * (np.arange(len(shown) + 1) - 0.5), 256)
     colours = ScalarMappable(norm, matplotlib.colormaps["viridis_r"])
     for state in reversed(shown):
-        style.aggregate(axes, state.rim, facecolor=colours.to_rgba(state.time), edgecolor="white", linewidth=0.9)
+        style.aggregate(axes, smooth(state.rim, state.width), facecolor=colours.to_rgba(state.time), edgecolor="white",
+                        linewidth=0.9)
+    high = 0.5 * shown[0].width
+    axes.annotate("", (first - 0.2 * MARGIN, high), (first - 0.95 * MARGIN, high), zorder=6,
+                  arrowprops={"arrowstyle": "-|>", "color": style.BLUE, "linewidth": 1.4, "shrinkA": 0, "shrinkB": 0})
+    axes.text(first - 0.9 * MARGIN, high + 4, "flow", color=style.BLUE, ha="left", va="bottom", fontsize=7)
     axes.figure.colorbar(colours, ax=axes, location="bottom", label="time (h)", ticks=[s.time for s in shown],
                          aspect=50, shrink=0.8)
+
+
+def smooth(rim: np.ndarray, width: float) -> np.ndarray:
+    """(K, 2) the closed outline (M, 2) with a cubic spline through the nodes of each stretch between the walls, which
+    meets the walls at the corners that the outline has there."""
+    wall = np.where(rim[:, 1] <= 0, 1, np.where(rim[:, 1] >= width, 2, 0))
+    start = int(np.flatnonzero((wall > 0) & (np.roll(wall, -1) == 0))[0])
+    points, wall = (np.roll(values, -start, axis=0) for values in (rim, wall))
+    points, wall = np.vstack([points, points[:1]]), np.append(wall, wall[0])
+    corners = np.flatnonzero(wall > 0)
+    pieces = [points[a:b] if b == a + 1 else _curve(points[a: b + 1]) for a, b in zip(corners, corners[1:])]
+    return np.clip(np.vstack(pieces), [-np.inf, 0.0], [np.inf, width])
+
+
+def _curve(points: np.ndarray) -> np.ndarray:
+    """A spline through points (m, 2) by the length of the line between them, the last point left out."""
+    along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    finer = np.interp(np.linspace(0, len(points) - 1, PER_EDGE * (len(points) - 1) + 1), np.arange(len(points)), along)
+    return CubicSpline(along, points)(finer)[:-1]
 
 
 def upstream_share(folder: Path) -> float:
@@ -66,5 +93,6 @@ def caption(folder: Path | None = None) -> str:
             f"{shown[0].width:.0f} µm wide at a constant mean velocity of {table['mean_velocity_m_per_d'][0]:.1f} m/d, "
             f"from left to right. {contact} and spans x from {table['upstream_um'][-1]:.0f} to "
             f"{table['downstream_um'][-1]:.0f} µm at the end. Of the area covered between the last two outlines, "
-            f"{100 * upstream_share(folder):.1f} % lies upstream of the first centre. The run ended at "
+            f"{100 * upstream_share(folder):.1f} % lies upstream of the first centre. Between the walls the outline's "
+            f"nodes are joined by a spline. The run ended at "
             f"{table['time_h'][-1]:g} h: {provenance(folder)['status']}.")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
-from paper_figures.claims import STATEMENTS
+from paper_figures.claims import STATEMENTS, judged, verdicts
 from repro.results import write_text
 
 LOOK = """
@@ -50,7 +50,8 @@ def page(entries: list[Entry], endings: Iterable[str]) -> str:
 <h1>Figures of Dupin, Kitanidis &amp; McCarty (2001), recomputed</h1>
 <p>Pore-scale modeling of biological clogging due to aggregate expansion: a material mechanics approach, Water
 Resources Research, paper 2001WR000306. All numbers on this page are read from the runs behind it. <b>Figure 1</b> of
-the paper is a photograph of an experiment and cannot be regenerated. Claims are judged by <code>make claims</code>.</p>
+the paper is a photograph of an experiment and cannot be regenerated. Claims are judged by <code>make claims</code>,
+with verdicts as recorded in <code>verification/claims/claims.json</code>.</p>
 <nav>{links}</nav>
 <ul class="note">{"".join(f"<li>{escape(ending)}</li>" for ending in endings)}</ul>
 {"".join(map(_section, entries))}</body>
@@ -66,11 +67,12 @@ def _section(entry: Entry) -> str:
     """One figure."""
     name = escape(entry.name)
     run = "\n".join(entry.commands) or "# drawn from the geometry alone"
-    claims = "".join(f"<li><b>{escape(key)}</b> {escape(STATEMENTS[key])}</li>" for key in entry.claims)
+    claims = "".join(f"<li><b>{escape(key)}</b> {escape(STATEMENTS[key])}: "
+                     f"<i>{escape(verdicts().get(key, 'not judged'))}</i></li>" for key in entry.claims)
     return f"""<section id="{name}">
 <h2>{escape(entry.title)}</h2>
 <img src="{name}.png" alt="{escape(entry.title)}"/>
-<p>{escape(entry.caption)} <a href="{name}.pdf">PDF</a></p>
+<p>{escape(entry.caption)} {escape(judged(entry.claims))} <a href="{name}.pdf">PDF</a></p>
 <h3>What was run</h3>
 <pre>{escape(run)}</pre>
 <h3>Claims it bears on</h3>

@@ -1,7 +1,7 @@
 """The replication note, `replication.md`: `replication_template.md` with the numbers that the runs have left.
 
-`python -m paper_figures.replication` takes what `make claims` has left (where it has, into `replication.json`, which is
-committed), the records of `make verify` and `make bench`, the errata and the citation, and fills in the template's
+`python -m paper_figures.replication` takes the committed record of `make claims` (`verification/claims/claims.json`),
+those of `make verify`, `make bench` and `make sensitivity`, the errata and the citation, and fills in the template's
 `{{...}}`. A number is named by its claim and what is counted, `{{C01 | mean velocity at t = 0 (m/d) | .2f}}`, or "off"
 for its difference from the printed one; `{{C15 | contradicted}}` says C15 and is refused where that is not the verdict.
 """
@@ -17,42 +17,52 @@ from pathlib import Path
 
 from paper_figures import FIGURES, manifest
 from paper_figures.claims import STATEMENTS
-from repro.results import write_json, write_text
-from verification import speed
+from repro.results import write_text
+from verification import sensitivity, speed
 from verification.bench import base
 from verification.bench.record import line
+from verification.claims import (
+    CHANGED,
+    CONTRADICTED,
+    FAILS,
+    HOLDS,
+    PREDICTED,
+    REACHES_OVER,
+    REPRODUCED,
+    UNDECIDED,
+    VERDICTS,
+    WITHIN_ROUNDING,
+)
+from verification.claims import record as claims_record
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
-NOTE, TEMPLATE, RECORD = (HERE / name for name in ("replication.md", "replication_template.md", "replication.json"))
-CLAIMS = ROOT / "verification" / "claims" / "out" / "claims.json"
+NOTE, TEMPLATE = (HERE / name for name in ("replication.md", "replication_template.md"))
 REPORT = ROOT / "verification" / "report"
 FIELD = re.compile(r"\{\{(.+?)\}\}")
 WIDTH = 120
-CONTRADICTED, CHANGED, REPRODUCED = "contradicted", "reproduced with a stated change", "reproduced"
-OF_A_CLAIM = ("id", "verdict", "where", "claim", "change", "reason")
-OF_A_CHECK = ("quantity", "paper", "ours", "deviation", "bar_low", "bar_high", "outcome", "against_paper")
 
 
-def record(claims: dict) -> dict:
-    """What the note keeps of the claims' report, with the environment that it was made in."""
-    kept = [{**{key: claim[key] for key in OF_A_CLAIM},
-             "checks": [{key: check[key] for key in OF_A_CHECK} for check in claim["checks"]]}
-            for claim in claims["claims"]]
-    return {"environment": manifest.environment(), "claims": kept}
+def told() -> dict:
+    """What the note is made of: the committed claims, and the environment of the committed figures."""
+    environment = json.loads(manifest.COMMITTED.read_text(encoding="utf-8"))["environment"]
+    return {"environment": environment, "claims": claims_record.read()}
 
 
-def fields(told: dict) -> dict[str, Callable[[], str]]:
+def fields(known: dict) -> dict[str, Callable[[], str]]:
     """What each name of the template without a claim stands for."""
-    claims = told["claims"]
+    claims = known["claims"]
     return {**_about(), **_verdicts(claims), **_bench(), **_errata(),
             "verify": _verified, "audit.defaults": _of_defaults,
             "list.reproduced": lambda: "\n".join(map(_reproduced, _with(claims, REPRODUCED))),
-            "list.changed": lambda: "\n".join(map(_changed, _with(claims, CHANGED))),
-            "list.contradicted": lambda: "\n".join(map(_contradicted, _with(claims, CONTRADICTED))),
+            "list.rounding": lambda: "\n".join(map(_within_rounding, _with(claims, WITHIN_ROUNDING))) or "None.",
+            "list.changed": lambda: "\n".join(map(_changed, _with(claims, CHANGED))) or "None.",
+            "list.contradicted": lambda: "\n".join(map(_contradicted, _with(claims, CONTRADICTED))) or "None.",
+            "list.undecided": lambda: "\n".join(map(_undecided, _with(claims, UNDECIDED))) or "None.",
+            "inputs.share": lambda: f"{100 * sensitivity.record()['one_set']['share_of_the_rounding']:.0f}",
             "table.values": lambda: "\n".join(map(_value, _printed(claims))),
             "table.figures": lambda: "\n".join(map(_figure, FIGURES)),
-            "environment": lambda: _environment(told["environment"])}
+            "environment": lambda: _environment(known["environment"])}
 
 
 def _about() -> dict[str, Callable[[], str]]:
@@ -65,38 +75,56 @@ def _about() -> dict[str, Callable[[], str]]:
 
 
 def _with(claims: list[dict], verdict: str) -> list[dict]:
-    """Claims of a verdict; a bar that reaches over a bound leaves a claim among the reproduced ones."""
-    return [claim for claim in claims if claim["verdict"].partition(", but")[0] == verdict]
+    """Claims of a verdict."""
+    return [claim for claim in claims if claim["verdict"] == verdict]
 
 
 def _verdicts(claims: list[dict]) -> dict[str, Callable[[], str]]:
-    against = [check["against_paper"] for _, check in _printed(claims)]
-    return {"claims.total": lambda: str(len(claims)), "paper.total": lambda: str(len(against)),
-            "claims.reproduced": lambda: str(len(_with(claims, REPRODUCED))),
-            "claims.over": lambda: str(sum(", but" in claim["verdict"] for claim in claims)),
-            "claims.changed": lambda: str(len(_with(claims, CHANGED))),
-            "claims.contradicted": lambda: str(len(_with(claims, CONTRADICTED))),
-            "paper.bar": lambda: str(against.count("inside our bar")),
-            "paper.few": lambda: str(against.count("inside a few percent")),
-            "paper.neither": lambda: str(against.count("neither"))}
+    outcomes = [check["outcome"] for _, check in _predicted(claims)]
+    names = dict(zip(VERDICTS, ("reproduced", "rounding", "changed", "contradicted", "undecided")))
+    counts = {f"claims.{name}": lambda verdict=verdict: str(len(_with(claims, verdict)))
+              for verdict, name in names.items()}
+    return {**counts, "claims.total": lambda: str(len(claims)), "paper.total": lambda: str(len(outcomes)),
+            "paper.within": lambda: str(outcomes.count(HOLDS)), "paper.outside": lambda: str(outcomes.count(FAILS)),
+            "paper.open": lambda: str(outcomes.count(REACHES_OVER))}
 
 
 def _printed(claims: list[dict]) -> list[tuple[dict, dict]]:
     """(claim, check) of every number that the paper prints a value of."""
-    return [(claim, check) for claim in claims for check in claim["checks"] if check["against_paper"]]
+    return [(claim, check) for claim in claims for check in claim["checks"] if check["paper_low"] is not None]
+
+
+def _predicted(claims: list[dict]) -> list[tuple[dict, dict]]:
+    """Those of them that take a solution to know."""
+    return [(claim, check) for claim, check in _printed(claims) if check["rests_on"] == PREDICTED]
 
 
 def _value(pair: tuple[dict, dict]) -> str:
     claim, check = pair
-    over = ", its bar reaches over the tolerance" if check["outcome"] == "bar reaches over" else ""
-    return (f"| {claim['id']} | {check['quantity']} | {check['paper']} | {check['ours']:.4g} | "
-            f"{check['bar_low']:.4g} to {check['bar_high']:.4g} | {check['against_paper']}{over} |")
+    widths = [_span(check["paper_low"], check["paper_high"]), f"{check['value']:.4g}",
+              _span(check["low"], check["high"]), _span(check["input_low"], check["input_high"]),
+              _span(*(check["scheme_2001"] or (None, None)))]
+    rests = "" if check["rests_on"] == PREDICTED else f" ({check['rests_on']})"
+    return " | ".join([f"| {claim['id']}", check["quantity"], f"{check['paper']}: {widths[0]}", *widths[1:],
+                       f"{check['outcome']}{rests} |"])
+
+
+def _span(low: float | None, high: float | None) -> str:
+    return "-" if low is None or high is None else f"{low:.4g} to {high:.4g}"
+
+
+def _within_rounding(claim: dict) -> str:
+    return (f"- **{claim['id']}** ({claim['where']}): {claim['claim']}. *As printed:* {claim['reason'].rstrip('.')}. "
+            f"*Inputs:* {claim['rounding'].rstrip('.')}.")
+
+
+def _undecided(claim: dict) -> str:
+    return f"- **{claim['id']}** ({claim['where']}): {claim['claim']}. *Why:* {claim['reason'].rstrip('.')}."
 
 
 def _reproduced(claim: dict) -> str:
-    check, over = claim["checks"][0], "; a bar reaches over a bound" if ", but" in claim["verdict"] else ""
-    return (f"- **{claim['id']}** ({claim['where']}): {claim['claim']}. Here: {check['quantity']}, "
-            f"{check['ours']:.4g}{over}.")
+    check = claim["checks"][0]
+    return f"- **{claim['id']}** ({claim['where']}): {claim['claim']}. Here: {check['quantity']}, {check['value']:.4g}."
 
 
 def _changed(claim: dict) -> str:
@@ -160,9 +188,9 @@ def _environment(about: dict[str, str]) -> str:
             f"{about['system']} ({about['processor']})")
 
 
-def filled(template: str, told: dict) -> str:
+def filled(template: str, known: dict) -> str:
     """The note. Raises LookupError for a name, a claim or a quantity that there is not, or another verdict."""
-    simple, claims = fields(told), {claim["id"]: claim for claim in told["claims"]}
+    simple, claims = fields(known), {claim["id"]: claim for claim in known["claims"]}
 
     def value(found: re.Match) -> str:
         parts = [part.strip() for part in found[1].split("|")]
@@ -186,21 +214,18 @@ def _wrapped(block: str) -> str:
 def _of_claim(claims: dict[str, dict], id: str, what: str, form: str = "") -> str:
     claim = claims[id]
     if not form:
-        if claim["verdict"].partition(", but")[0] != what:
+        if claim["verdict"] != what:
             raise LookupError(f"{id} is {claim['verdict']}, not {what}")
         return id
     check = {check["quantity"]: check for check in claim["checks"]}[what]
     if form == "off":
-        return f"{100 * abs(check['ours'] / float(check['paper']) - 1):.2g} %"
-    return format(check["ours"], form)
+        return f"{100 * abs(check['value'] / float(check['paper']) - 1):.2g} %"
+    return format(check["value"], form)
 
 
 def main() -> None:
-    """Write the record, where `make claims` has left one, and the note."""
-    if CLAIMS.exists():
-        write_json(RECORD, record(json.loads(CLAIMS.read_text(encoding="utf-8"))))
-    told = json.loads(RECORD.read_text(encoding="utf-8"))
-    write_text(NOTE, filled(TEMPLATE.read_text(encoding="utf-8"), told))
+    """Write the note."""
+    write_text(NOTE, filled(TEMPLATE.read_text(encoding="utf-8"), told()))
     print(f"{NOTE}: written")
 
 

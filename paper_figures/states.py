@@ -105,6 +105,14 @@ def last(folder: Path, kind: str = "fields") -> State:
     return read(*times(folder, kind)[-1])
 
 
+def near(folder: Path, time: float) -> State:
+    """The fields at a time (h). Raises LookupError where there are none."""
+    for written, path in times(folder):
+        if abs(written - time) < 1e-6:
+            return read(written, path)
+    raise LookupError(f"{folder}: no fields at t = {time:g} h")
+
+
 def every(folder: Path, hours: float) -> list[State]:
     """The fields at the multiples of some hours, t = 0 first."""
     return [read(time, path) for time, path in times(folder) if abs(time / hours - round(time / hours)) < 1e-9]

@@ -182,6 +182,45 @@ def test_displacements_survive_a_new_mesh(short):
     assert np.abs(moved - before.points[nodes]).max() > 0.01
 
 
+def test_plate_1_shows_what_has_grown_and_not_what_reprojection_left(short):
+    """What grows in 12 min from the density of before: X_A (e^(F3 t)), even to the growth's own differences. Mutants:
+    the biomass over X_m, whose interface nodes are off by 0.1 %; over the density after it has grown."""
+    plate_1 = MODULES["plate_1"]
+    state = states.last(short["base"], "before_expansion")
+    grown = plate_1.since(short["base"], "active_biomass")[state.body]
+    inert = plate_1.since(short["base"], "inert_biomass")[state.body]
+    rates = np.log(grown + inert) / 0.2
+    assert 0.18 < rates.min() and rates.max() < 0.195 and np.ptp(rates) < 1e-3
+    assert np.ptp(np.log(state.nodes["active_biomass"][state.body]) / 0.2) > np.ptp(np.log(grown) / 0.2)
+
+
+def test_outlines_are_smooth_between_the_walls_and_keep_their_nodes():
+    """A flattened disc: straight on both walls, a spline between them. Mutants: a spline around the contact lines;
+    nodes left out."""
+    outline = figure_2.flattened(50.0)
+    line = figure_6.smooth(outline.points, 50.0)
+    apart = np.linalg.norm(line[:, None] - outline.points[None], axis=2).min(axis=0)
+    assert apart.max() < 1e-9 and len(line) > 4 * len(outline.points)
+    assert line[:, 1].min() >= 0 and line[:, 1].max() <= 50 + 1e-9
+    contact = outline.points[outline.wall == TOP, 0].max() if (outline.wall == TOP).any() else 0.0
+    top = line[(np.abs(line[:, 0]) < contact) & (line[:, 1] > 25)]
+    assert contact > 5 and (top[:, 1] == 50).all()
+    radius = 51.0
+    free = line[(line[:, 1] > 1) & (line[:, 1] < 45)]
+    assert np.abs(np.hypot(*free.T) / radius - 1).max() < 1e-3
+
+
+def test_page_and_captions_tell_the_recorded_verdicts(monkeypatch):
+    """Mutants: a claim without its verdict; verdicts of a run that is not recorded."""
+    known = {"C01": "reproduced", "C02": "undecided"}
+    monkeypatch.setattr(claims, "verdicts", lambda: known)
+    monkeypatch.setattr(page, "verdicts", lambda: known)
+    entry = page.Entry("figure_9", "Figure 9. T", "A caption.", (), ("C01", "C02", "C30"))
+    text = " ".join(ElementTree.fromstring(page.page([entry], [])).itertext())
+    assert "A caption. Claims: C01 reproduced; C02 undecided; C30 not judged." in text
+    assert "by 19.4 h: undecided" in " ".join(text.split())
+
+
 def test_the_upstream_share_of_new_area(short, monkeypatch):
     monkeypatch.setattr(figure_6, "EVERY", 0.2)
     assert figure_6.upstream_share(short["wide"]) == pytest.approx(0.5, abs=0.01)

@@ -1,6 +1,5 @@
 """What a publication needs is there, agrees with itself, and the replication note says what was computed."""
 import copy
-import json
 import re
 import subprocess
 import sys
@@ -13,6 +12,7 @@ import pytest
 
 import paper_figures
 from paper_figures import replication
+from verification.claims import EXPECTED
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -24,7 +24,7 @@ def text(name):
 
 @pytest.fixture(scope="module")
 def told():
-    return json.loads(replication.RECORD.read_text(encoding="utf-8"))
+    return replication.told()
 
 
 def test_the_note_tells_what_was_computed(told):
@@ -37,7 +37,7 @@ def test_a_number_of_the_record_is_a_number_of_the_note(told):
     """Mutant: numbers written into the template."""
     changed = copy.deepcopy(told)
     check = next(c for claim in changed["claims"] for c in claim["checks"] if c["paper"] == "2.9")
-    check["ours"] = 2.9 * 1.0987
+    check["value"] = 2.9 * 1.0987
     assert replication.filled("{{C01 | mean velocity at t = 0 (m/d) | .4f}}", changed) == "3.1862"
     assert replication.filled("{{C01 | mean velocity at t = 0 (m/d) | off}}", changed) == "9.9 %"
     assert "| 3.186 |" in replication.filled("{{table.values}}", changed)
@@ -59,17 +59,36 @@ def test_what_there_is_not_is_refused(told, field):
 
 
 def test_every_claim_has_its_verdict_in_the_note(told):
-    """Each once, among the reproduced, the changed or the contradicted. Mutant: a verdict that no list takes."""
-    lists = ["{{list.reproduced}}", "{{list.changed}}", "{{list.contradicted}}"]
+    """Each once, in the list of its verdict. Mutant: a verdict that no list takes."""
+    kinds = ("reproduced", "rounding", "changed", "contradicted", "undecided")
+    lists = [f"{{{{list.{kind}}}}}" for kind in kinds]
     named = [re.findall(r"^- \*\*(C\d\d)\*\*", replication.filled(one, told), re.M) for one in lists]
-    assert sorted(sum(named, [])) == [f"C{number:02d}" for number in range(1, 38)]
-    counts = replication.filled("{{claims.reproduced}} {{claims.changed}} {{claims.contradicted}}", told)
+    assert sorted(sum(named, [])) == list(EXPECTED)
+    counts = replication.filled(" ".join(f"{{{{claims.{kind}}}}}" for kind in kinds), told)
     assert counts.split() == [str(len(found)) for found in named]
 
 
 def test_every_contradiction_says_why(told):
     """Mutant: a contradicted claim without a reason."""
-    assert all(claim["reason"] for claim in told["claims"] if claim["verdict"] == replication.CONTRADICTED)
+    assert all(claim["reason"] for claim in told["claims"]
+               if claim["verdict"] in (replication.CONTRADICTED, replication.UNDECIDED))
+
+
+def test_what_needs_no_solution_is_not_counted_as_a_value_reproduced(told):
+    """Mutant: every printed value counted, the meshed length of Figure 4 among them."""
+    printed, predicted = replication._printed(told["claims"]), replication._predicted(told["claims"])
+    assert len(predicted) < len(printed)
+    assert {check["rests_on"] for _, check in predicted} == {"a solution"}
+    total = sum(int(replication.filled(f"{{{{paper.{name}}}}}", told)) for name in ("within", "outside", "open"))
+    assert replication.filled("{{paper.total}}", told) == str(len(predicted)) == str(total)
+
+
+def test_readme_and_documents_count_no_claims_otherwise(told):
+    """A count of verdicts anywhere is the record's. Mutant: a count that was not updated."""
+    for name in ("README.md", "paper_figures/replication.md", "docs/scope.md", "codecheck.author.yml"):
+        counts = re.findall(r"\b(\d+) (?:claims )?(?:are )?(reproduced|contradicted|undecided)\b", text(name))
+        for count, kind in counts:
+            assert count == replication.filled(f"{{{{claims.{kind}}}}}", told), (name, count, kind)
 
 
 def test_every_erratum_is_in_the_note(told):

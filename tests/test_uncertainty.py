@@ -10,7 +10,7 @@ from repro.march.updates import schedule
 from repro.scene import load_scene, scene_hash
 from verification import claims, uncertainty
 from verification.claims import Claim, ClaimError, Finding, bars, evaluate, levels, runs
-from verification.claims.levels import ALONE, DEFAULT, Level, at_level
+from verification.claims.levels import ALONE, CONVERGED, DEFAULT, SCHEME, Level, at_level
 from verification.uncertainty import FORMAL, OBSERVED, Bar, Estimate, combined, estimate, spread
 
 BOTH = (1.0, 2.0)
@@ -164,6 +164,7 @@ def test_what_is_kept_is_kept_for_its_level():
     for _ in range(2):
         with at_level(Level(size=0.5)):
             assert (size(2.0), size(2.0)) == (1.0, 1.0)
+        levels.forget(Level(size=0.5))
     assert size(2.0) == 2.0 and levels.current() == DEFAULT
     assert computed == [DEFAULT, DEFAULT, Level(size=0.5), Level(size=0.5)]
 
@@ -174,16 +175,35 @@ def test_a_level_ends_with_its_block_even_by_an_error():
     assert levels.current() == DEFAULT
 
 
+def test_the_converged_solution_is_refined_in_space_and_time_at_once():
+    """Twice as fine: half the elements' size, a fourth of the tolerance, and its rows. Mutants: one of both alone; the
+    preset of the scene; rows where its steps happen to end."""
+    with at_level(Level(CONVERGED, 0.5)):
+        said, wide = runs.scene("base", "numerics.mesh_compressibility=2"), runs.scene("wide")
+    plain = load_scene("base", ['numerics.preset="accurate"'])
+    assert said.numerics.elements == "quadratic" and said.numerics.refinement == 2 * plain.numerics.refinement
+    assert said.numerics.tolerance == plain.numerics.tolerance / 4 and said.output.times[-2:] == (19.2, 19.4)
+    assert wide.output.times == tuple(map(float, range(1, 46)))
+
+
 def test_every_claim_is_computed_on_three_meshes_and_with_three_steps_or_says_why_not():
+    """And a claim about the model with the scheme beside it. Mutant: a claim judged at one level."""
     evaluate.register_all()
     for claim in claims.CLAIMS.values():
-        assert len(claim.sizes) >= 3 and claim.sizes[0] == 1.0, claim.id
-        assert claim.steps[0] == 1.0 and (len(claim.steps) >= 3 or claim.steps == ALONE and claim.fixed), claim.id
+        kinds = [level.kind for level in claim.levels]
+        if claim.about == claims.MODEL:
+            assert kinds.count(CONVERGED) == kinds.count(SCHEME) == 3 and claim.judged == claim.levels[0], claim.id
+            assert claim.judged.size == min(claim.fine), claim.id
+        elif claim.about == claims.OF_SCHEME:
+            assert len(claim.sizes) >= 3 and claim.sizes[0] == claim.steps[0] == 1.0, claim.id
+            assert len(claim.steps) >= 3 or claim.steps == ALONE and claim.fixed, claim.id
+        else:
+            assert claim.about == claims.CLOSED and claim.levels == (DEFAULT,), claim.id
 
 
-def judged(check, value, **levels_):
+def judged(check, value, **fields):
     """A check with its bar, from a function of the level that gives the value."""
-    claim = Claim("C01", "4", "", "", lambda: None, **levels_)
+    claim = Claim("C01", "4", "", lambda: None, **({"about": claims.OF_SCHEME} | fields))
     at = {level: bars.numbers(Finding((claims.replace(check, ours=value(level)),))) for level in claim.levels}
     return bars.barred(claim, Finding((check,)), at).checks[0]
 
@@ -196,6 +216,21 @@ def test_bars_come_from_both_families_of_levels():
     found = judged(SPEED, lambda level: 2.898 + 0.01 * level.size + 0.002 * level.step)
     assert found.bar.mesh.bar == pytest.approx(0.0125) and found.bar.step.bar == pytest.approx(0.0025)
     assert found.bar.high - found.ours == pytest.approx(0.015)
+
+
+def test_the_bar_of_the_converged_solution_has_nothing_of_the_scheme_which_stands_beside_it():
+    """Mutants: the scheme's values in the bar; its range from the converged ones."""
+    found = judged(SPEED, lambda level: (2.9 if level.kind == CONVERGED else 3.0) + 0.01 * level.size,
+                   about=claims.MODEL)
+    assert found.bar.high - found.ours == pytest.approx(1.25 * 0.005)
+    assert found.scheme == pytest.approx((3.0 + 0.01 * 2**-0.5, 3.0 + 0.01 * 2**0.5))
+
+
+def test_a_width_of_printed_digits_is_added_to_the_bar():
+    """Mutant: the bar in its place, or nothing but it."""
+    wide = claims.replace(SPEED, bar=Bar(2.81, 3.11))
+    found = judged(wide, lambda level: 2.9 + 0.01 * level.size, steps=ALONE)
+    assert (found.bar.low, found.bar.high) == pytest.approx((2.81 - 0.0125, 3.11 + 0.0125))
 
 
 def test_what_is_not_varied_gives_no_bar():
@@ -213,7 +248,7 @@ def test_a_number_without_a_limit_has_the_range_of_all_levels():
 
 def test_the_instant_of_an_event_may_differ_between_levels_and_the_quantity_may_not():
     """Mutant: numbers matched by their place alone."""
-    claim = Claim("C01", "4", "", "", lambda: None)
+    claim = Claim("C01", "4", "", lambda: None, about=claims.OF_SCHEME)
     same = {level: (("speed at 34.8 h (m/d)", 2.9, True),) for level in claim.levels}
     assert bars.barred(claim, Finding((SPEED,)), same).checks[0].bar
     for other in ((("area at 34.4 h (um2)", 2.9, True),), ()):

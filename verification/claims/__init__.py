@@ -1,17 +1,22 @@
 """Every claim of the paper, judged by computed numbers: `make claims`, or `python -m verification.claims [C07 ...]`.
 
-A claim is a function without arguments that computes a `Finding`: numbers of ours against the paper's, each with the
-range that is accepted and where that range comes from. It is computed on several meshes and with several time steps
-(`levels`), and every number gets an error bar from them (`bars`). The verdict follows and is written down nowhere:
+A claim is a function without arguments that computes a `Finding`: numbers of ours against the paper's. A number that
+the paper prints is an interval, half a unit of its last digit to both sides; words become a range that says where it
+comes from and when it was set. Beside each number stand three widths: that of the printing, that of the numerics (a bar
+from several levels, see `levels`), and that of the inputs, Table 1 being rounded too (`verification.sensitivity`).
 
-    all checks hold                              reproduced
-    all hold, something was changed              reproduced with a stated change
-    a check fails beyond its bar                 contradicted; the finding says why
-    checks fail, none of them beyond its bar     undecided
+What the paper says of **the model** is judged with a converged solution, the range of its own scheme beside it; what it
+says of **its scheme** with that. A verdict follows from the outcomes of the checks and is written down nowhere:
 
-Where a claim is reproduced, but a bar reaches over the bound of its range, the verdict says so. A failed check without
-a reason is an error, as is a number without a bar, and a claim that nobody computes. The modules of this package
-register their claims by the decorator `claim`; `python -m verification.claims` imports them all.
+    all hold                                                                 reproduced
+    all hold, something was changed against the paper                        reproduced with a stated change
+    some fail beyond their bars, but one set of inputs within the rounding
+    of Table 1 gives every printed number of base at once                    reproduced within the rounding of Table 1
+    some fail beyond their bars                                              contradicted; the finding says why
+    no check fails, but a bar reaches over a bound                           undecided
+
+A number is told apart by what it rests on (`rests_on`): a prediction of a solution, or an input, a rule of construction
+or the arithmetic of Table 1, which no solution is needed for and which is not counted as a number reproduced.
 """
 
 from __future__ import annotations
@@ -19,27 +24,45 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import inf, isfinite, isnan
+from math import inf, isnan
 
-from verification.claims.accuracy import FEW
-from verification.claims.levels import DEFAULT, SIZES, STEPS, Level
+from verification.claims.levels import BESIDE, CONVERGED, DEFAULT, FINE, SCHEME, SIZES, STEPS, Level
 from verification.uncertainty import Bar
 
 #: The rows that must be judged.
-EXPECTED = tuple(f"C{number:02d}" for number in range(1, 38))
+EXPECTED = tuple(f"C{number:02d}" for number in range(1, 41))
 
 REPRODUCED, CHANGED, CONTRADICTED = "reproduced", "reproduced with a stated change", "contradicted"
-UNDECIDED = "undecided: it fails by less than a bar"
-WITHIN_BAR = ", but a bar reaches over a bound"
-#: What comes of a check, and where the paper's value is.
-HOLDS, FAILS, REACHES_OVER = "holds", "FAILS", "bar reaches over"
-INSIDE_BAR, INSIDE_FEW, NEITHER = "inside our bar", "inside a few percent", "neither"
+WITHIN_ROUNDING, UNDECIDED = "reproduced within the rounding of Table 1", "undecided"
+VERDICTS = (REPRODUCED, WITHIN_ROUNDING, CHANGED, CONTRADICTED, UNDECIDED)
+#: What comes of a check.
+HOLDS, FAILS, REACHES_OVER = "holds", "fails", "reaches over"
+#: What a claim is about.
+MODEL, OF_SCHEME, CLOSED = "the model", "the scheme", "closed forms"
+#: What a number rests on.
+PREDICTED, ARITHMETIC, CONSTRUCTION = "a solution", "arithmetic of Table 1", "a rule of construction"
+#: When the ranges of the words were set, and when the printed digits became the ranges of the numbers.
+SET, PRINTED_SET = "2026-11-21", "2026-11-22"
 #: A value that the paper prints: 2.9, or ~60.
-PRINTED = re.compile(r"~?(\d+\.?\d*)")
+PRINTED = re.compile(r"(~?)(\d+)(?:\.(\d+))?")
+DIGITS = "half a unit of the last digit printed"
 
 
 class ClaimError(RuntimeError):
     """A claim has no verdict: nothing was checked, a number is not one or has no bar, or a failure has no reason."""
+
+
+def interval(text: str) -> tuple[float, float] | None:
+    """What a printed number may stand for: 1.5 is 1.45 to 1.55. After a ~ zeros are no digits: ~60 is 55 to 65. None
+    for words."""
+    found = PRINTED.fullmatch(text)
+    if not found:
+        return None
+    about, whole, parts = found[1], found[2], found[3] or ""
+    zeros = len(whole) - len(whole.rstrip("0")) if about and not parts else 0
+    half = 0.5 * 10.0 ** (zeros - len(parts))
+    value = float(f"{whole}.{parts or 0}")
+    return value - half, value + half
 
 
 @dataclass(frozen=True)
@@ -47,10 +70,11 @@ class Check:
     """One computed number against the paper's.
 
     quantity: "mean velocity at t = 0 (m/d)"; paper: what the paper prints, as text: "2.9"; ours: computed by this run;
-    low, high: the accepted range, infinite where it is one-sided; why: where that range comes from; target: the
-    number to be near to, None for a mere range; converges: has the number a limit as mesh and step are refined?
-    bar: where the number lies, None before it is known; held: for a number without a limit, whether it holds in the
-    range of each level.
+    low, high: the accepted range, infinite where it is one-sided; why, date: where that range comes from, and when it
+    was set; converges: has the number a limit as mesh and step are refined? rests_on: what it takes to know it; input:
+    its name in the record of the sensitivities; bar: where the number lies, None before it is known; held: for a number
+    without a limit, whether it holds in the range of each level; scheme: least and largest value with the scheme of
+    2001, None where that is not asked.
     """
 
     quantity: str
@@ -59,10 +83,18 @@ class Check:
     low: float
     high: float
     why: str
-    target: float | None = None
+    date: str = SET
     converges: bool = True
+    rests_on: str = PREDICTED
+    input: str = ""
     bar: Bar | None = None
     held: tuple[bool, ...] = ()
+    scheme: tuple[float, float] | None = None
+
+    @property
+    def printed(self) -> tuple[float, float] | None:
+        """The interval of the value that the paper prints, None where it prints words or a bound."""
+        return interval(self.paper)
 
     @property
     def holds(self) -> bool:
@@ -82,39 +114,6 @@ class Check:
             outside = self.bar.high < self.low or self.high < self.bar.low
         return HOLDS if inside else FAILS if outside else REACHES_OVER
 
-    @property
-    def printed(self) -> float | None:
-        """The value that the paper prints, None where it prints words or a bound."""
-        found = PRINTED.fullmatch(self.paper)
-        return float(found[1]) if found and isfinite(self.low) and isfinite(self.high) else None
-
-    @property
-    def against_paper(self) -> str:
-        """Where the printed value is: in our bar, in the paper's own accuracy, or neither; empty if there is none."""
-        if self.printed is None or self.bar is None:
-            return ""
-        if self.printed in self.bar:
-            return INSIDE_BAR
-        return INSIDE_FEW if abs(self.ours - self.printed) <= FEW * abs(self.printed) else NEITHER
-
-    @property
-    def deviation(self) -> str:
-        """Of the number from its target, or from the range where there is none, in words."""
-        if self.target is not None:
-            apart = self.ours - self.target
-            return f"{100 * apart / abs(self.target):+.2g} %" if self.target else f"{apart:+.2g}"
-        if self.holds:
-            return "within"
-        bound = self.low if self.ours < self.low else self.high
-        return f"{self.ours - bound:+.2g} beyond"
-
-    @property
-    def accepted(self) -> str:
-        """The accepted range in words."""
-        if isfinite(self.low) and isfinite(self.high):
-            return f"{self.low:.4g} to {self.high:.4g}"
-        return f"at least {self.low:.4g}" if isfinite(self.low) else f"at most {self.high:.4g}"
-
 
 Words = str | Callable[[], str]
 
@@ -123,14 +122,16 @@ Words = str | Callable[[], str]
 class Finding:
     """What a claim came to.
 
-    change: what had to be changed against the paper, empty if nothing; reason: used only where a check fails: why the
-    paper's statement does not reproduce; note: further computed numbers worth telling. Words that take runs or time of
-    their own are a function, which is called at the default level alone.
+    change: what had to be changed against the paper, empty if nothing; reason: used only where a check fails or cannot
+    be decided: why; rounding: the set of inputs within the rounding of Table 1 that gives all printed numbers of base
+    at once, empty where none was found; note: further computed numbers worth telling. Words that take runs or time of
+    their own are a function, which is called at the judged level alone.
     """
 
     checks: tuple[Check, ...]
     change: Words = ""
     reason: Words = ""
+    rounding: Words = ""
     note: Words = ""
 
     @property
@@ -138,84 +139,107 @@ class Finding:
         """What follows from the checks and their bars; raises ClaimError where nothing does."""
         if not self.checks:
             raise ClaimError("nothing is checked")
-        outcomes = [check.outcome for check in self.checks]
-        if not all(check.holds for check in self.checks):
-            if not self.reason:
-                raise ClaimError("a check fails and no reason is given: " + self._failed())
-            return CONTRADICTED if FAILS in outcomes else UNDECIDED
-        return (CHANGED if self.change else REPRODUCED) + (WITHIN_BAR if REACHES_OVER in outcomes else "")
+        outcomes = {check.outcome for check in self.checks}
+        if outcomes == {HOLDS}:
+            return CHANGED if self.change else REPRODUCED
+        if not self.reason:
+            raise ClaimError("a check does not hold and no reason is given: " + self._failed())
+        if FAILS not in outcomes:
+            return UNDECIDED
+        return WITHIN_ROUNDING if self.rounding else CONTRADICTED
 
     def told(self) -> Finding:
         """The same, with all words worked out."""
-        words = {name: getattr(self, name) for name in ("change", "reason", "note")}
+        words = {name: getattr(self, name) for name in ("change", "reason", "rounding", "note")}
         return replace(self, **{name: text() if callable(text) else text for name, text in words.items()})
 
     def _failed(self) -> str:
-        return "; ".join(f"{c.quantity} is {c.ours:.4g}, accepted {c.accepted}" for c in self.checks if not c.holds)
+        return "; ".join(f"{c.quantity} is {c.ours:.4g}, accepted {c.low:.4g} to {c.high:.4g}"
+                         for c in self.checks if c.outcome != HOLDS)
 
 
 @dataclass(frozen=True)
 class Claim:
     """A row of the table: the paper's section, what it says, how to compute it, and the function that does.
 
-    scenes: those that the checks need, as ("base", 'growth.end="5 h"', ...), and words: those of which only the words
-    tell; the driver computes them beforehand, those of all claims side by side. sizes, steps: the levels, the default
-    first; fixed: why one of them is not varied.
+    about: MODEL, OF_SCHEME or CLOSED; fine: sizes of the converged solution; sizes, steps: of the scheme; fixed: why
+    one of them is not varied.
     """
 
     id: str
     where: str
     text: str
-    command: str
     function: Callable[[], Finding]
-    scenes: tuple[tuple[str, ...], ...] = ()
-    words: tuple[tuple[str, ...], ...] = ()
+    about: str = MODEL
+    fine: tuple[float, ...] = FINE
     sizes: tuple[float, ...] = SIZES
     steps: tuple[float, ...] = STEPS
     fixed: str = ""
 
     @property
+    def command(self) -> str:
+        """What to type for it alone."""
+        return f"python -m verification.claims {self.id}"
+
+    @property
+    def judged(self) -> Level:
+        """The level whose number is the claim's."""
+        return Level(CONVERGED, self.fine[0]) if self.about == MODEL else DEFAULT
+
+    @property
     def levels(self) -> tuple[Level, ...]:
-        """The levels beside the default."""
-        chosen = (*(Level(size=size) for size in self.sizes), *(Level(step=step) for step in self.steps))
-        return tuple(level for level in chosen if level != DEFAULT)
+        """All levels, the judged one first."""
+        if self.about == CLOSED:
+            return (DEFAULT,)
+        if self.about == OF_SCHEME:
+            more = [Level(SCHEME, size) for size in self.sizes] + [Level(SCHEME, step=step) for step in self.steps]
+            return tuple(dict.fromkeys((DEFAULT, *more)))
+        return (*(Level(CONVERGED, size) for size in self.fine), *(Level(SCHEME, size) for size in BESIDE))
 
 
 CLAIMS: dict[str, Claim] = {}
 
 
-def claim(id: str, where: str, text: str, command: str, scenes: tuple[tuple[str, ...], ...] = (), **levels):
-    """Register the decorated function () -> Finding as the judge of a claim; levels: further fields of `Claim`."""
+def claim(id: str, where: str, text: str, **fields):
+    """Register the decorated function () -> Finding as the judge of a claim; fields: further fields of `Claim`."""
     def register(function: Callable[[], Finding]) -> Callable[[], Finding]:
         if id in CLAIMS:
             raise ValueError(f"{id} is registered twice: {CLAIMS[id].function.__module__}, {function.__module__}")
-        CLAIMS[id] = Claim(id, where, text, command, function, scenes, **levels)
+        CLAIMS[id] = Claim(id, where, text, function, **fields)
         return function
     return register
 
 
+def printed(quantity: str, paper_text: str, ours: float, **more) -> Check:
+    """A number that the paper prints: it must lie in the interval of its digits. Raises ValueError for words."""
+    found = interval(paper_text)
+    if found is None:
+        raise ValueError(f"{quantity}: {paper_text!r} is no printed number")
+    return Check(quantity, paper_text, float(ours), *found, **({"why": DIGITS, "date": PRINTED_SET} | more))
+
+
 def near(quantity: str, paper_text: str, ours: float, target: float, *, relative: float | None = None,
-         absolute: float | None = None, why: str) -> Check:
+         absolute: float | None = None, why: str, **more) -> Check:
     """A number within a relative or an absolute tolerance of its target."""
     if (relative is None) == (absolute is None):
         raise ValueError(f"{quantity}: a relative or an absolute tolerance is needed, one of them")
     apart = absolute if relative is None else relative * abs(target)
-    return Check(quantity, paper_text, float(ours), target - apart, target + apart, why, target)
+    return Check(quantity, paper_text, float(ours), target - apart, target + apart, why, **more)
 
 
-def at_most(quantity: str, paper_text: str, ours: float, bound: float, why: str) -> Check:
+def at_most(quantity: str, paper_text: str, ours: float, bound: float, why: str, **more) -> Check:
     """A number that must not exceed a bound."""
-    return Check(quantity, paper_text, float(ours), -inf, bound, why)
+    return Check(quantity, paper_text, float(ours), -inf, bound, why, **more)
 
 
-def at_least(quantity: str, paper_text: str, ours: float, bound: float, why: str) -> Check:
+def at_least(quantity: str, paper_text: str, ours: float, bound: float, why: str, **more) -> Check:
     """A number that must not be under a bound."""
-    return Check(quantity, paper_text, float(ours), bound, inf, why)
+    return Check(quantity, paper_text, float(ours), bound, inf, why, **more)
 
 
-def between(quantity: str, paper_text: str, ours: float, low: float, high: float, why: str) -> Check:
+def between(quantity: str, paper_text: str, ours: float, low: float, high: float, why: str, **more) -> Check:
     """A number that must lie in a range."""
-    return Check(quantity, paper_text, float(ours), low, high, why)
+    return Check(quantity, paper_text, float(ours), low, high, why, **more)
 
 
 def without_limit(check: Check) -> Check:

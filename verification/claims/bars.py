@@ -1,7 +1,8 @@
 """The error bars of a claim's numbers, from what its function finds at other levels.
 
-Formal orders: every stage is of second order in the mesh but for the head loss and the stresses, which are of first;
-the loop is of first order in the step between shape updates. `make verify` measures all of them.
+Formal orders: every stage of the scheme is of second order in the mesh but for the head loss and the stresses, which
+are of first; its loop is of first order in the step. `make verify` measures all of them. The converged solution is of
+second order or more where nothing is singular, and of first at the least where biomass, water and wall meet.
 
 A number that is itself an error, or a difference of two runs that should be none, may have a bar larger than itself.
 """
@@ -11,9 +12,9 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-from verification.claims import Check, Claim, ClaimError, Finding
-from verification.claims.levels import DEFAULT, Level
-from verification.uncertainty import Estimate, combined, estimate, spread
+from verification.claims import CLOSED, MODEL, OF_SCHEME, Check, Claim, ClaimError, Finding
+from verification.claims.levels import CONVERGED, SCHEME, Level
+from verification.uncertainty import Bar, Estimate, combined, estimate, spread
 
 MESH_ORDERS, STEP_ORDERS = (1.0, 2.0), (1.0, 1.0)
 
@@ -28,27 +29,44 @@ def numbers(finding: Finding) -> Numbers:
 
 def barred(claim: Claim, finding: Finding, others: dict[Level, Numbers]) -> Finding:
     """The finding with a bar on each check. Raises ClaimError where the levels do not speak of the same quantities."""
-    found = {DEFAULT: numbers(finding), **others}
-    said = {tuple(_name(quantity) for quantity, *_ in row) for row in found.values()}
+    found = {claim.judged: numbers(finding), **others}
+    said = {tuple(unnumbered(quantity) for quantity, *_ in row) for row in found.values()}
     if len(said) != 1:
         raise ClaimError(f"the levels tell of different quantities: {sorted(said)}")
-    checks = [_judgeable(claim, check, {level: row[k][1] for level, row in found.items()},
-                         tuple(row[k][2] for row in found.values())) for k, check in enumerate(finding.checks)]
+    checks = [_judgeable(claim, check, {level: row[k][1:] for level, row in found.items()})
+              for k, check in enumerate(finding.checks)]
     return replace(finding, checks=tuple(checks))
 
 
-def _name(quantity: str) -> str:
+def unnumbered(quantity: str) -> str:
     """A quantity without the numbers in it: the instant at which something happens differs between levels."""
     return re.sub(r"\d+(\.\d+)?", "#", quantity)
 
 
-def _judgeable(claim: Claim, check: Check, values: dict[Level, float], held: tuple[bool, ...]) -> Check:
-    """The check with its bar, from its value and whether it holds at each level."""
+def _judgeable(claim: Claim, check: Check, found: dict[Level, tuple[float, bool]]) -> Check:
+    """The check with its bar, from its value and whether it holds at each level; to a width of its own, that of printed
+    digits that it is made of, the bar is added."""
+    values = {level: value for level, (value, _) in found.items()}
+    of_kind = [level for level in found if claim.about != MODEL or level.kind == CONVERGED]
+    scheme = [values[level] for level in values if level.kind == SCHEME]
+    if claim.about == MODEL:
+        check = replace(check, scheme=(min(scheme), max(scheme)) if scheme else None)
     if not check.converges:
-        return replace(check, bar=spread(values.values()), held=held)
-    mesh = _estimate(claim.sizes, [values[Level(size=size)] for size in claim.sizes], MESH_ORDERS)
-    step = _estimate(claim.steps, [values[Level(step=step)] for step in claim.steps], STEP_ORDERS)
-    return replace(check, bar=combined(check.ours, mesh, step))
+        held = tuple(found[level][1] for level in of_kind)
+        return replace(check, bar=spread([values[level] for level in of_kind]), held=held)
+    bar, own = _bar(claim, check.ours, values), check.bar or Bar(check.ours, check.ours)
+    return replace(check, bar=replace(bar, low=bar.low - check.ours + own.low, high=bar.high - check.ours + own.high))
+
+
+def _bar(claim: Claim, value: float, values: dict[Level, float]) -> Bar:
+    if claim.about == CLOSED:
+        return Bar(value, value, Estimate(0.0, float("nan"), 0.0), None)
+    if claim.about == OF_SCHEME:
+        mesh = _estimate(claim.sizes, [values[Level(SCHEME, size)] for size in claim.sizes], MESH_ORDERS)
+        step = _estimate(claim.steps, [values[Level(SCHEME, step=step)] for step in claim.steps], STEP_ORDERS)
+        return combined(value, mesh, step)
+    return combined(value, _estimate(claim.fine, [values[Level(CONVERGED, size)] for size in claim.fine], MESH_ORDERS),
+                    None)
 
 
 def _estimate(sizes: tuple[float, ...], values: list[float], formal: tuple[float, float]) -> Estimate | None:

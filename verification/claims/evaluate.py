@@ -1,4 +1,4 @@
-"""Claims computed at all levels: the runs side by side beforehand, then the numbers of each level in a process."""
+"""Claims computed at all levels: each level in a process of its own, whose runs it keeps while it computes."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ import os
 import pkgutil
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
-from itertools import repeat
 
 import numpy as np
 
 import verification.claims as package
-from repro.run.cache import cached_runs
-from repro.scene import Scene
-from verification.claims import CLAIMS, runs
+from verification.claims import CLAIMS, Finding
 from verification.claims.bars import Numbers, numbers
-from verification.claims.levels import Level, at_level
+from verification.claims.levels import CONVERGED, Level, at_level, forget
+
+#: Of a claim at one level: its numbers, with its finding where the level is the judged one, or the error in words.
+Found = tuple[Numbers, Finding | None] | str
 
 
 def register_all() -> None:
@@ -26,34 +26,18 @@ def register_all() -> None:
             importlib.import_module(f"{package.__name__}.{module.name}")
 
 
-def scenes(ids: Iterable[str]) -> list[Scene]:
-    """What claims run, at every level; what only their words tell of, at the default."""
-    found = []
-    for claim in (CLAIMS[id] for id in ids):
-        found += [runs.scene(*run) for run in (*claim.scenes, *claim.words)]
-        for level in claim.levels:
-            with at_level(level):
-                found += [runs.scene(*run) for run in claim.scenes]
-    return found
-
-
-def compute(wanted: Iterable[Scene]) -> None:
-    """Compute the runs that are not there, side by side, the longest first."""
-    cached_runs(sorted(wanted, key=_effort, reverse=True), runs.CACHE)
-
-
-def _effort(scene: Scene) -> float:
-    """About how long a run takes, in any unit: triangles times steps."""
-    steps = scene.growth.end / scene.growth.time_step if scene.growth else 1.0
-    return steps * scene.numerics.refinement**2 * (5 if scene.numerics.transport == "gear" else 1)
-
-
-def elsewhere(ids: Iterable[str]) -> dict[str, dict[Level, Numbers | str]]:
-    """The numbers of claims at all levels but the default, or the error for which there are none."""
-    levels = sorted({level for id in ids for level in CLAIMS[id].levels}, key=lambda level: level.size * level.step)
+def everywhere(ids: Iterable[str]) -> dict[str, dict[Level, Found]]:
+    """What claims come to at all of their levels, the dearest levels first."""
+    ids = list(ids)
+    levels = sorted({level for id in ids for level in CLAIMS[id].levels}, key=effort, reverse=True)
     wanted = [[id for id in ids if level in CLAIMS[id].levels] for level in levels]
-    found = dict(zip(levels, side_by_side(numbers_at, levels, wanted)))
+    found = dict(zip(levels, side_by_side(found_at, levels, wanted)))
     return {id: {level: rows[id] for level, rows in found.items() if id in rows} for id in ids}
+
+
+def effort(level: Level) -> float:
+    """About how long a level takes, in any unit."""
+    return (4.0 if level.kind == CONVERGED else 2.0) / (level.size**3 * level.step)
 
 
 def side_by_side(function: Callable, *given: list) -> list:
@@ -64,16 +48,20 @@ def side_by_side(function: Callable, *given: list) -> list:
         return list(pool.map(function, *given))
 
 
-def numbers_at(level: Level, ids: list[str]) -> dict[str, Numbers | str]:
-    """The numbers of some claims at one level."""
+def found_at(level: Level, ids: list[str]) -> dict[str, Found]:
+    """What some claims come to at one level; its runs are forgotten afterwards."""
     register_all()
     with at_level(level), np.errstate(all="raise", under="ignore"):
-        return dict(zip(ids, map(_attempt, ids, repeat(level))))
+        found = {id: _attempt(id, level) for id in ids}
+    forget(level)
+    return found
 
 
-def _attempt(id: str, level: Level) -> Numbers | str:
+def _attempt(id: str, level: Level) -> Found:
     """A claim's numbers at the present level, or the error in words."""
     try:
-        return numbers(CLAIMS[id].function())
+        finding = CLAIMS[id].function()
+        judged = finding.told() if level == CLAIMS[id].judged else None
+        return numbers(finding), judged
     except Exception as error:
         return f"at {level}: {type(error).__name__}: {error}"

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from verification.claims import Finding, at_most, claim
-from verification.claims.levels import ALONE
+from verification.claims import OF_SCHEME, Finding, at_most, claim
+from verification.claims.levels import ALONE, BESIDE
 from verification.claims.runs import BASE, scene
 from verification.claims.states import full_biomass, half_disc, solution
 
 RADII, PARTS = (5.0, 10.0, 20.0, 30.0), (0.25, 0.5, 1.0, 1.5)
 
 
-@claim("C19", "3.1", "meshing to min(5 R, 1 W) from the aggregate suffices", "python -m verification.claims C19",
-       steps=ALONE, fixed="nothing moves in it")
+@claim("C19", "3.1", "meshing to min(5 R, 1 W) from the aggregate suffices", about=OF_SCHEME, sizes=BESIDE, steps=ALONE,
+       fixed="nothing moves in it")
 def truncation() -> Finding:
     """Conductivity and effluents of half-discs of X_m meshed to parts of min(5 R, W), against the whole pore meshed.
 
@@ -27,7 +27,9 @@ def truncation() -> Finding:
     told = "; ".join(f"R = {radius:g} um: " + ", ".join(f"{part:g}: {'/'.join(f'{e:.2g}' for e in row)}"
                                                          for part, row in zip(PARTS, found))
                      for radius, found in errors.items())
-    return Finding(checks, note="Errors (%) of conductivity/acceptor effluent/donor effluent at parts of min(5 R, W): "
+    return Finding(checks, reason="what two unrelated meshes differ by is larger than the errors "
+                   "around the smaller half-discs, so that their bars reach over the bound",
+                   note="Errors (%) of conductivity/acceptor effluent/donor effluent at parts of min(5 R, W): "
                    f"{told}.")
 
 

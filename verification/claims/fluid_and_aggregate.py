@@ -10,9 +10,9 @@ import shapely
 from repro.fem.mesh import gradients
 from repro.fem.transfer import interpolate
 from verification.claims import Finding, at_least, at_most, claim
-from verification.claims.levels import WIDE_SIZES
-from verification.claims.restored import Body, body, in_plane, stress
-from verification.claims.runs import BASE, WIDE, at, scene, series
+from verification.claims.levels import WIDE_FINE
+from verification.claims.restored import Body, bodies, body, body_of, in_plane, polygon, stress
+from verification.claims.runs import BASE, WIDE, history, scene
 
 PLOTTED, UPDATE = 19.2, 0.2
 PASCAL = 1e6  # in a MPa
@@ -20,14 +20,10 @@ PASCAL = 1e6  # in a MPa
 SMALL = 0.1
 
 
-def contact_time() -> float:
-    """First time (h) at which wide touches the opposite wall."""
-    return float(series(*WIDE)["time_h"][series(*WIDE)["contact"] == 1][0])
-
-
-def last_film() -> float:
-    """Last time (h) before that: the shape that still leaves a film."""
-    return float(series(*WIDE)["time_h"][series(*WIDE)["contact"] == 0][-1])
+def touching() -> tuple[Body, Body]:
+    """Wide's last state that leaves a film to the opposite wall, and its first in contact."""
+    found = history(*WIDE)
+    return tuple(body_of(found.scene, each) for each in found.contact)
 
 
 @dataclass(frozen=True)
@@ -62,8 +58,7 @@ class Forces:
                 f"{self.growth:.3g}, |P| {self.pressure:.3g}, stiffness {self.stiffness:.3g}")
 
 
-@claim("C26", "2.3.3", "fluid forces are small against the forces of growth", "python -m verification.claims C26",
-       (BASE, WIDE), sizes=WIDE_SIZES)
+@claim("C26", "2.3.3", "fluid forces are small against the forces of growth", fine=WIDE_FINE)
 def fluid_forces() -> Finding:
     """Range of rho g phi plus the largest viscous shear on the interface, against growth's shear stress and stiffness.
 
@@ -71,34 +66,33 @@ def fluid_forces() -> Finding:
     causes P but no shear in the plane [E11], so growth's shear stress in the plane is what to compare with; the
     stiffness tells whether the shape would change.
     """
-    last, before = float(series(*WIDE)["time_h"][-1]), last_film()
-    chosen = {f"{run[0]}, {time:g} h": forces(run, time)
-              for run, time in ((BASE, PLOTTED), (WIDE, before), (WIDE, last))}
+    film, end = touching()[0], bodies(WIDE)[-1]
+    chosen = {"base, 19.2 h": forces(body(BASE, PLOTTED)), f"wide, {film.pore.time:.2f} h, a film left": forces(film),
+              f"wide, {end.pore.time:g} h, a plug": forces(end)}
     checks = [at_most(f"{name}: {what}", "neglected", value, SMALL, "small: a tenth") for name, found in chosen.items()
               for what, value in (("fluid's over growth's stress", found.against_growth),
                                   ("strain that the fluid would cause", found.strain))]
-    end = chosen[f"wide, {last:g} h"]
-    reason = (f"it holds while a film of fluid is left; then the constant mean velocity is driven through the plug by "
-              f"a head of {end.head:.3g} Pa, where growth's shear stress is {end.growth:.3g} Pa and the stiffness has "
-              f"fallen as theta^(-2/3) to {end.stiffness:.3g} Pa")
+    last = list(chosen.values())[-1]
+    reason = (f"it holds in base, and in wide while a film of fluid is left; then the constant mean velocity is driven "
+              f"through the plug by a head of {last.head:.3g} Pa, where growth's shear stress is {last.growth:.3g} Pa "
+              f"and the stiffness has fallen as theta^(-2/3) to {last.stiffness:.3g} Pa")
     return Finding(tuple(checks), reason=reason, note=lambda: _told(chosen))
 
 
 def _told(chosen: dict[str, Forces]) -> str:
-    early, hours = forces(BASE, UPDATE), series(*WIDE)["time_h"]
-    over = next((f"from {time:g} h on" for time in hours[hours >= contact_time()]
-                 if max(forces(WIDE, time).strain, forces(WIDE, time).against_growth) > SMALL), "never")
+    early, touched = forces(body(BASE, UPDATE)), touching()[1].pore.time
+    over = next((f"from {each.pore.time:g} h on" for each in bodies(WIDE) if each.pore.time >= touched
+                 and max(forces(each).strain, forces(each).against_growth) > SMALL), "never")
     return ("In Pa: " + "; ".join(f"{name}: {found.told}" for name, found in chosen.items())
             + f". All of it is small against mu_L = {PASCAL * scene(*BASE).growth.shear_modulus:g} Pa. In base at "
             f"{UPDATE} h, when growth has hardly begun, the first ratio is {early.against_growth:.2g}, but the strain "
-            f"{early.strain:.1g}. In wide one of the two exceeds a tenth {over}.")
+            f"{early.strain:.1g}. In wide, in whole hours, one of the two exceeds a tenth {over}.")
 
 
-def forces(run: tuple[str, ...], time: float) -> Forces:
-    """Of a run at a time (h)."""
-    said, found = scene(*run), body(run, time)
-    head, shear = interface_forces(said.flow, found)
-    modulus = said.growth.shear_modulus
+def forces(found: Body) -> Forces:
+    """Of an aggregate."""
+    head, shear = interface_forces(found.scene.flow, found)
+    modulus = found.scene.growth.shear_modulus
     return Forces(float(np.ptp(head)), float(np.abs(shear).max()),
                   PASCAL * modulus * float(in_plane(stress(found, modulus)).max()),
                   PASCAL * modulus * float((found.cell("J") ** (-2 / 3)).min()),
@@ -121,8 +115,9 @@ def interface_forces(drive, found: Body) -> tuple[np.ndarray, np.ndarray]:
 
 
 def interface(found: Body) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """First and last node (e,) of each interface edge, counterclockwise, and the fluid triangle (e, 3) beyond it."""
-    loop, chosen = found.grid.loop, found.outline.interface_edges()
+    """First and last corner (e,) of each interface edge, counterclockwise, and the corners (e, 3) of the fluid triangle
+    beyond it."""
+    loop, chosen = found.grid.straight.loop, found.outline.corners.interface_edges()
     first, last = loop[chosen], np.roll(loop, -1)[chosen]
     beyond = {}
     for triangle in found.grid.triangles[~found.grid.biomass]:
@@ -131,29 +126,29 @@ def interface(found: Body) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return first, last, np.array([beyond[int(b), int(a)] for a, b in zip(first, last)])
 
 
-@claim("C35", "Fig 5", "the fluid flows around the aggregate, through it once it spans the pore",
-       "python -m verification.claims C35", (BASE, WIDE), sizes=WIDE_SIZES)
+@claim("C35", "Fig 5", "the fluid flows around the aggregate, through it once it spans the pore", fine=WIDE_FINE)
 def crossing() -> Finding:
     """Share of the flux that crosses x = 0 inside the aggregate: base at 19.2 h, wide at its contact and its end."""
-    first, last = contact_time(), float(series(*WIDE)["time_h"][-1])
+    film, touched = touching()
+    last = bodies(WIDE)[-1]
     through = "all of it; 5 % for the flux of u through a plug of stabilised linear triangles"
-    checks = (at_most("base, 19.2 h: share through the aggregate (%)", "around", inside(BASE, PLOTTED), 5,
+    checks = (at_most("base, 19.2 h: share through the aggregate (%)", "around", inside(body(BASE, PLOTTED)), 5,
                       "all but a few percent"),
-              *(at_least(f"wide, {time:g} h: share through the aggregate (%)", "through", inside(WIDE, time), 95,
-                         through) for time in (first, last)))
-    hours = series(*WIDE)["time_h"]
-    half = next(float(time) for time in hours[hours > first - 3] if inside(WIDE, float(time)) > 50)
-    film = scene(*WIDE).pore.width - at(WIDE, half)["thickness_um"]
-    return Finding(checks, note="It does not wait for contact, since lambda is finite: in wide more than half of the "
-                   f"flux crosses the aggregate from {half:g} h on, when a film of {film:.1f} um is left, and "
-                   f"{inside(WIDE, last_film()):.2g} % in the last shape that leaves one.")
+              *(at_least(f"wide, {each.pore.time:.2f} h: share through the aggregate (%)", "through", inside(each), 95,
+                         through) for each in (touched, last)))
+    half = next(each for each in bodies(WIDE) if each.pore.time > touched.pore.time - 5 and inside(each) > 50)
+    left = half.grid.width - half.outline.thickness
+    return Finding(checks, note="It does not wait for contact, since lambda is finite: in wide, in whole hours, more "
+                   f"than half of the flux crosses the aggregate from {half.pore.time:g} h on, when a film of "
+                   f"{max(left, 0.0):.1f} um is left, and {inside(film):.2g} % in the last shape that leaves one.",
+                   reason="at contact some of the flux still goes beside it")
 
 
-def inside(run: tuple[str, ...], time: float) -> float:
+def inside(found: Body) -> float:
     """Flux of u_x over the part of x = 0 that is in the aggregate, in percent of u_ave W."""
-    found, mean, parts = body(run, time), at(run, time)["mean_velocity_m_per_d"], 1000
+    mean, parts = found.solved.flow.mean_velocity * 24e-6, 1000
     line = shapely.LineString([(0.0, -1.0), (0.0, found.grid.width + 1.0)])
-    height = shapely.intersection(shapely.Polygon(found.outline.points), line).length
+    height = shapely.intersection(polygon(found.outline), line).length
     y = (np.arange(parts) + 0.5) / parts * height
     speed = interpolate(found.grid.points, found.triangles, found.node("velocity_m_per_d")[:, :1],
                         np.column_stack([np.zeros(parts), y]))

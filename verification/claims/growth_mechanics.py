@@ -16,8 +16,8 @@ from repro.fem.mesher import generate
 from repro.fem.outline import half_disc as seed
 from repro.fem.sizing import ACROSS_AGGREGATE, Sizing
 from repro.model import growth
-from verification.claims import Finding, at_least, at_most, between, claim, near, without_limit
-from verification.claims.levels import ALONE, WIDE_SIZES, cached, current
+from verification.claims import OF_SCHEME, Finding, at_least, at_most, between, claim, near, without_limit
+from verification.claims.levels import ALONE, WIDE_FINE, cached, current
 from verification.claims.restored import bodies
 from verification.claims.runs import WIDE, series
 from verification.problems.bodies import moduli
@@ -93,7 +93,7 @@ OWN, REGULAR = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8), (4, 8, 12)
 
 
 @claim("C22", "3.4", "P1-P1 with the stabilisation is stable and convergent; without it, it is not",
-       "python -m verification.claims C22", steps=ALONE, fixed="there is no time in it")
+       about=OF_SCHEME, steps=ALONE, fixed="there is no time in it")
 def stabilised() -> Finding:
     """Growth of a half-disc by theta(R) against the closed form: orders of outline and pressure; stability numbers.
 
@@ -112,7 +112,9 @@ def stabilised() -> Finding:
                       "zero: a pressure that nothing sees; round-off"),
               at_most("stability number with the sign of (27), largest", "as printed", max(printed), 0.0,
                       "negative: stationary, but no saddle point [E5]"))
-    return Finding(tuple(map(without_limit, checks)), note=lambda: _told(own, regular, (with_, without, printed)))
+    return Finding(tuple(map(without_limit, checks)), note=lambda: _told(own, regular, (with_, without, printed)),
+                   reason="it converges, and is stable; but the order of the outline scatters between families of "
+                   "unrelated meshes and is in one of them under the bound set")
 
 
 def _told(own, regular, numbers) -> str:
@@ -190,8 +192,7 @@ def dense(elements: np.ndarray, rows: np.ndarray, columns: np.ndarray, height: i
 TOTAL, STEPS = 2000.0, 165
 
 
-@claim("C25", "2.3.1", "expansion by up to 2000, after a couple of days, can be handled",
-       "python -m verification.claims C25", (WIDE,), sizes=WIDE_SIZES)
+@claim("C25", "2.3.1", "expansion by up to 2000, after a couple of days, can be handled", fine=WIDE_FINE)
 def expansion() -> Finding:
     """theta from 1 to 2000 from the configuration of t = 0, in 165 updates of 4.7 %: uniform, and larger at the rim.
 
@@ -202,7 +203,8 @@ def expansion() -> Finding:
     inner, more = TOTAL**0.9, TOTAL - TOTAL**0.9
     rim = float(neo_hookean.cylinder_radius(RADIUS, inner, more, RADIUS))
     largest = np.array([found.cell("theta").max() for found in bodies(WIDE)])
-    reached = series(*WIDE)["time_h"][largest >= TOTAL]
+    hours = series(*WIDE)["time_h"]
+    reached = reaching(hours, largest)
     checks = (at_most("uniform: error of the area", "handled", abs(uniform.area / TOTAL - 1), 1e-9,
                       "exact: J = theta (24)"),
               near("uniform: radius (um)", "handled", uniform.radius, RADIUS * np.sqrt(TOTAL), relative=0.001,
@@ -210,7 +212,7 @@ def expansion() -> Finding:
               near("theta(R): radius (um)", "handled", radial.radius, rim, relative=0.01,
                    why="closed form; 1 %, what refining a mesh may change"),
               at_least("wide: largest expansion", "up to 2000", largest.max(), TOTAL, "as stated"),
-              between("wide: time at which it is 2000 (h)", "a couple of days", min(reached, default=np.inf), 24, 72,
+              between("wide: time at which it is 2000 (h)", "a couple of days", reached, 24, 72,
                       "one to three days"))
     last, area = bodies(WIDE)[-1], series(*WIDE)["aggregate_area_um2"]
     exact = (neo_hookean.free_growth_pressure(TOTAL),
@@ -220,7 +222,16 @@ def expansion() -> Finding:
                         name, found, value in zip(("uniform", "theta(R)"), (uniform, radial), exact))
             + f" [E6]. Wide at its end: theta from {last.cell('theta').min():.0f} to {largest[-1]:.0f}, area "
             f"{area[-1] / area[0]:.0f} times the seed's; there the grown body is remeshed.")
-    return Finding(checks, note=note)
+    return Finding(checks, note=note, reason="the expansion or its time is not decided by these meshes")
+
+
+def reaching(hours: np.ndarray, largest: np.ndarray) -> float:
+    """The time (h) at which the largest expansion of a run's rows is TOTAL, exponential between rows; infinite where it
+    is never."""
+    if largest.max() < TOTAL:
+        return np.inf
+    row = int(np.argmax(largest >= TOTAL))
+    return float(np.interp(np.log(TOTAL), np.log(largest[row - 1: row + 1]), hours[row - 1: row + 1]))
 
 
 @dataclass(frozen=True)

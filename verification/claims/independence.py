@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from verification.claims import Check, at_most
+from verification.claims.evaluate import side_by_side
+from verification.claims.levels import DEFAULT, forget
 from verification.claims.runs import BASE, LAST, at
 
 TIMES = (0.0, 19.2, 19.4)
@@ -37,9 +39,12 @@ class Comparison:
     lines: tuple[tuple[str, tuple[float, ...], tuple[float, ...]], ...]
 
 
-def compare(title: str, runs: dict[str, tuple[str, ...]]) -> Comparison:
+Rows = dict[tuple[str, ...], dict[float, dict[str, float]]]
+
+
+def compare(title: str, runs: dict[str, tuple[str, ...]], rows: Rows) -> Comparison:
     """Every number at every time in every run."""
-    lines = [_line(f"{name}, t = {time:g} h", [at(run, time)[column] for run in runs.values()])
+    lines = [_line(f"{name}, t = {time:g} h", [rows[run][time][column] for run in runs.values()])
              for time in TIMES for name, column in NUMBERS.items()]
     return Comparison(title, tuple(runs), tuple(lines))
 
@@ -49,20 +54,32 @@ def _line(name: str, values: list[float]):
     return name, tuple(values), moved
 
 
-def comparisons() -> tuple[Comparison, ...]:
+def rows_of(run: tuple[str, ...]) -> dict[float, dict[str, float]]:
+    """The rows of a run at TIMES."""
+    found = {time: at(run, time) for time in TIMES}
+    forget(DEFAULT)
+    return found
+
+
+def computed() -> Rows:
+    """The rows of all runs, a run a process."""
+    return dict(zip(RUNS, side_by_side(rows_of, list(RUNS))))
+
+
+def comparisons(rows: Rows) -> tuple[Comparison, ...]:
     """Three mesh sizes, three time steps, and the strict variant against base."""
-    return (compare("Three mesh sizes, in those of base", MESHES),
-            compare("Three steps between shape updates", UPDATES),
-            compare("The strict variant of 2001 (gear, linear transfer, u_ave in (11)) against base", VARIANTS))
+    return (compare("Three mesh sizes, in those of base", MESHES, rows),
+            compare("Three steps between shape updates", UPDATES, rows),
+            compare("The strict variant of 2001 (gear, linear transfer, u_ave in (11)) against base", VARIANTS, rows))
 
 
-def checks() -> tuple[Check, ...]:
+def checks(rows: Rows) -> tuple[Check, ...]:
     """Halving the time step moves the velocity by less than 0.5 %, halving the mesh size by less than 1 %."""
-    return tuple(_halved(what, runs, time, bound) for time in TIMES
+    return tuple(_halved(what, runs, time, bound, rows) for time in TIMES
                  for what, runs, bound in (("time step", UPDATES, 0.5), ("mesh size", MESHES, 1.0)))
 
 
-def _halved(what: str, runs: dict[str, tuple[str, ...]], time: float, bound: float) -> Check:
-    before, after = (at(run, time)["mean_velocity_m_per_d"] for run in list(runs.values())[1:])
+def _halved(what: str, runs: dict[str, tuple[str, ...]], time: float, bound: float, rows: Rows) -> Check:
+    before, after = (rows[run][time]["mean_velocity_m_per_d"] for run in list(runs.values())[1:])
     return at_most(f"halving the {what} moves the velocity at {time:g} h (%)", f"< {bound:g}",
                    100 * abs(after / before - 1), bound, "set beforehand")

@@ -1,14 +1,18 @@
-"""The levels at which every claim is computed: sizes of elements and steps between shape updates, over the default's.
+"""The levels at which every claim is computed.
 
-The default is refinement 1 and 12 min. Three more sizes and three more steps are taken, one of both at a time:
+What the paper claims of **the model** is judged with a converged solution, what it claims of **its scheme** with that.
 
-    sizes   2^(1/2), 2^(-1/2), 1/2    elements twice as large (7 across half a pore) are not asymptotic: with them the
-                                      velocity of base at 19.2 h shows an order of 2.9 to 3.1, without them 2.0
-    steps   2, 3, 4                   19.2 h is a whole number of each; the next one ends at 19.4 h, where base does
+    converged   quadratic elements and the midpoint rule (the preset `accurate`), refined in space and time at once:
+                element sizes and the root of the time tolerance over those of the preset. The finest is judged, the
+                bar comes from all three.
+    scheme      the preset `paper`, at refinement 1 and a shape update every 12 min, and on other meshes and with other
+                steps; beside a claim about the model on three meshes, whose range is `scheme_2001`.
 
-Claims about wide do without the last size, with which it would run longer than all the rest. Instants are those of the
-default at every level: "plotted at 19.4 h" is the shape of 19.2 h, and "before the expansion" is that shape with what
-grows in the 12 min after. The lag of 12 min is the paper's, a part of what is asked, and no error of the step.
+Elements twice as large as those of the preset `paper` (7 across half a pore) are not asymptotic: with them the velocity
+of base at 19.2 h shows an order of 2.9 to 3.1, without them 2.0. Steps 2, 3 and 4 times 12 min have 19.2 h as a whole
+number, and the next one ends at 19.4 h, where base does.
+
+What another solver is to take over the converged solution changes `CONVERGED` and `converged` alone.
 
 A level is a context: a scene that a claim asks for within `at_level` gets that level's elements and steps, and what is
 kept by `cached` is kept for that level.
@@ -22,22 +26,42 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import wraps
 
+from repro.scene.keys import PRESETS
+
+CONVERGED, SCHEME = "converged", "scheme"
+#: Of the converged solution at size 1: its preset.
+PRESET = "accurate"
+
 
 @dataclass(frozen=True)
 class Level:
-    """Sizes of elements and of steps over those that a scene says."""
+    """kind: CONVERGED or SCHEME; sizes of elements, and of steps between shape updates, over those of the preset."""
 
+    kind: str = SCHEME
     size: float = 1.0
     step: float = 1.0
 
 
-DEFAULT = Level()
-#: The default first: the bar is its own.
+def converged(size: float) -> tuple[str, ...]:
+    """Changes of a scene that make it the converged solution with elements and steps of a size: a midpoint step goes as
+    the root of its tolerance."""
+    preset = PRESETS[PRESET]
+    refinement = float(preset["refinement"]) / size
+    tolerance = float(preset["tolerance"]) * size**2
+    return (f'numerics.preset="{PRESET}"', f"numerics.refinement={refinement!r}", f"numerics.tolerance={tolerance!r}")
+
+
+#: Sizes of the converged solution, the one that is judged first; those for claims that read wide.
+FINE = (0.5, 2**-0.5, 1.0)
+WIDE_FINE = (2**-0.5, 1.0, 2**0.5)
+#: Sizes and steps of the scheme, the default first.
 SIZES = (1.0, 2**0.5, 2**-0.5, 0.5)
-WIDE_SIZES = SIZES[:3]
 STEPS = (1.0, 2.0, 3.0, 4.0)
+#: Sizes whose range is the scheme's interval beside a claim about the model.
+BESIDE = SIZES[:3]
 #: What is not varied.
 ALONE = (1.0,)
+DEFAULT = Level()
 
 _current: ContextVar[Level] = ContextVar("level", default=DEFAULT)
 _kept: dict[Level, dict] = {}
@@ -50,14 +74,17 @@ def current() -> Level:
 
 @contextmanager
 def at_level(level: Level) -> Iterator[None]:
-    """Compute at a level; what was kept there is forgotten afterwards, but for the default's."""
+    """Compute at a level."""
     token = _current.set(level)
     try:
         yield
     finally:
         _current.reset(token)
-        if level != DEFAULT:
-            _kept.pop(level, None)
+
+
+def forget(level: Level) -> None:
+    """Drop what is kept of a level."""
+    _kept.pop(level, None)
 
 
 def cached(function: Callable) -> Callable:

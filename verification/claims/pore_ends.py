@@ -14,9 +14,9 @@ from repro.model.kinetics import Sink
 from repro.model.pore import Pore, Solved
 from repro.model.transport import Concentrations
 from repro.scene import Scene
-from verification.claims import Finding, at_most, claim, near
+from verification.claims import OF_SCHEME, Finding, at_most, claim, near
 from verification.claims.accuracy import FEW, FEW_WORDS, TRANSPORT, TRANSPORT_WORDS
-from verification.claims.levels import cached
+from verification.claims.levels import BESIDE, cached
 from verification.claims.restored import remeshed, solved_pore
 from verification.claims.runs import BASE, scene
 
@@ -36,7 +36,7 @@ def whole_pore(*changes: str) -> tuple[Scene, Pore, Solved]:
     return said, *remeshed(said, now, solved)
 
 
-@claim("C20", "3.1", "(26) describes the unmeshed part", "python -m verification.claims C20", (BASE,))
+@claim("C20", "3.1", "(26) describes the unmeshed part", about=OF_SCHEME, sizes=BESIDE)
 def upstream_profile() -> Finding:
     """Concentrations upstream in the wholly meshed pore of base at 19.2 h against (26), alpha fitted at one section.
 
@@ -69,14 +69,15 @@ def sections(now: Pore, field: np.ndarray, x: np.ndarray) -> np.ndarray:
     """(n, PARTS) values of a nodal field at the middles of equal parts of the sections x (n,)."""
     heights = (np.arange(PARTS) + 0.5) / PARTS * now.mesh.width
     where = np.stack(np.meshgrid(x, heights, indexing="ij"), axis=-1).reshape(-1, 2)
-    return interpolate(now.mesh.points, now.mesh.triangles, field[:, None], where).reshape(len(x), PARTS)
+    nodal = now.space.to_mesh(field)[:, None]
+    return interpolate(now.mesh.points, now.mesh.cells, nodal, where).reshape(len(x), PARTS)
 
 
 LENGTHS = (600.0, 900.0, 1200.0)
 
 
 @claim("C36", "2.2", "the flux is not affected by the condition at the downgradient end (12), if the channel is long "
-       "enough", "python -m verification.claims C36", (BASE,))
+       "enough")
 def downgradient_end() -> Finding:
     """What the aggregate of base at 19.2 h takes up, with other places of the outlet and other values held there.
 

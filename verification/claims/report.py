@@ -1,63 +1,109 @@
-"""The report of the claims on the terminal, and what it counts; `written` has it as Markdown and JSON."""
+"""The report of the claims on the terminal and as Markdown, and what it counts."""
 
 from __future__ import annotations
 
 import textwrap
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import zip_longest
+from math import isfinite
 
+from verification import sensitivity
 from verification.claims import (
+    CHANGED,
     FAILS,
     HOLDS,
-    INSIDE_BAR,
-    INSIDE_FEW,
-    NEITHER,
+    PREDICTED,
     REACHES_OVER,
+    REPRODUCED,
+    VERDICTS,
     Check,
     Claim,
     Finding,
 )
-from verification.claims.bars import Numbers
-from verification.claims.cells import HEAD, LEGEND, cells, number
 from verification.claims.independence import Comparison
-from verification.claims.levels import Level
 
 WIDTH, INDENT = 120, " " * 5
-COLUMNS = (28, 13, 10, 10, 9, 9, 15, 14)
-BOUNDS = (60, 12, 12, 24)
+HEAD = ("quantity", "paper", "ours", "numerics", "inputs", "scheme of 2001", "accepted", "outcome")
+COLUMNS = (24, 11, 10, 15, 15, 15, 14, 11)
+LEGEND = ("paper: as printed. ours: the converged solution, or the scheme where the claim is about that. numerics: the "
+          "error bar; inputs: where the number goes as the inputs of Table 1 move within their rounding; scheme of "
+          "2001: its range on three meshes. accepted: the interval of the printed digits, or what the words are taken "
+          "for. An outcome is that of the whole bar.")
 
 
 @dataclass(frozen=True)
 class Row:
-    """A judged claim: its finding and verdict, or the error for which there is none; its numbers at other levels."""
+    """A judged claim: its finding and verdict, or the error for which there is none."""
 
     id: str
     claim: Claim | None
     finding: Finding | None
     verdict: str
     error: str = ""
-    others: dict[Level, Numbers] = field(default_factory=dict)
 
     @property
     def checks(self) -> tuple[Check, ...]:
         """Those that have a bar: none of a claim that came to an error."""
         return tuple(check for check in self.finding.checks if check.bar) if self.finding else ()
 
+    @property
+    def reason(self) -> str:
+        """Why a check does not hold; empty where all do."""
+        return "" if self.verdict in (REPRODUCED, CHANGED) or not self.finding else self.finding.reason
+
 
 @dataclass(frozen=True)
 class Independence:
-    """What does not come from the paper: comparisons of runs, and the bounds that they must keep."""
+    """What does not come from the paper: comparisons of runs of its scheme, and the bounds that they must keep."""
 
     comparisons: tuple[Comparison, ...]
     checks: tuple[Check, ...]
 
+    @property
+    def kept(self) -> bool:
+        """Are all bounds kept?"""
+        return all(check.holds for check in self.checks)
+
+
+def moving(values: tuple[float, ...], moved: tuple[float, ...]) -> list[str]:
+    """Values, each but the first with its difference from the one before."""
+    return [number(values[0]), *(f"{number(v)} ({m:+.2f} %)" for v, m in zip(values[1:], moved))]
+
+
+def terminal_independence(section: Independence) -> str:
+    """The bounds as lines."""
+    lines = [INDENT + f"{c.quantity}: {number(c.ours)}, bound {c.paper}" for c in section.checks]
+    return "\n".join(["Mesh and time-step independence of base in the paper's scheme", *lines]) + "\n"
+
+
+def number(value: float) -> str:
+    """Four digits."""
+    return f"{value:.4g}"
+
+
+def spanned(pair) -> str:
+    """An interval in words; empty where there is none."""
+    if pair is None:
+        return ""
+    low, high = pair
+    if isfinite(low) and isfinite(high):
+        return number(low) if low == high else f"{number(low)} to {number(high)}"
+    return f"at least {number(low)}" if isfinite(low) else f"at most {number(high)}"
+
+
+def cells(check: Check) -> tuple[str, ...]:
+    """A check with its widths, in the order of HEAD."""
+    return (check.quantity, check.paper, number(check.ours), spanned((check.bar.low, check.bar.high)),
+            spanned(sensitivity.interval(check.input, check.ours)), spanned(check.scheme),
+            spanned((check.low, check.high)), check.outcome)
+
 
 def _line(texts, widths: tuple[int, ...]) -> str:
     """Cells side by side, each wrapped in its column."""
-    wrapped = [textwrap.wrap(text, width) or [""] for text, width in zip(texts, widths)]
+    wrapped = [textwrap.wrap(text, width - 1) or [""] for text, width in zip(texts, widths)]
     rows = zip_longest(*wrapped, fillvalue="")
-    return "\n".join(INDENT + " ".join(f"{text:<{width}}" for text, width in zip(row, widths)).rstrip()
+    return "\n".join(INDENT + "".join(f"{text:<{width}}" for text, width in zip(row, widths)).rstrip()
                      for row in rows)
 
 
@@ -71,7 +117,7 @@ def legend() -> str:
 
 
 def terminal(row: Row) -> str:
-    """A claim with its checks, at most WIDTH columns wide."""
+    """A claim with its checks."""
     if row.claim is None:
         return f"{row.id}  {row.verdict.upper()}: {row.error}\n"
     head = textwrap.fill(f"{row.id}  {row.verdict.upper()}: {row.claim.text} (paper: {row.claim.where})", WIDTH,
@@ -86,43 +132,68 @@ def terminal(row: Row) -> str:
 
 
 def remarks(row: Row) -> tuple[tuple[str, str], ...]:
-    """What was changed, why it fails if it does, what is not varied, and what else is worth telling."""
+    """What was changed, why it does not hold if it does not, what is not varied, and what else is worth telling."""
     finding = row.finding
-    failed = not all(check.holds for check in finding.checks)
-    return (("changed: ", finding.change), ("because: ", finding.reason if failed else ""),
-            ("steps are not varied: ", row.claim.fixed), ("", finding.note))
+    return (("about: ", row.claim.about), ("changed: ", finding.change), ("because: ", row.reason),
+            ("inputs: ", finding.rounding), ("steps are not varied: ", row.claim.fixed), ("", finding.note))
 
 
-def terminal_independence(section: Independence) -> str:
-    """The comparisons as tables, and the bounds."""
-    parts = ["Mesh and time-step independence of base", ""]
-    for comparison in section.comparisons:
-        parts += [comparison.title, *_comparison_lines(comparison), ""]
-    parts += [_line(("what", "bound", "ours", "accepted"), BOUNDS)]
-    parts += [_line((c.quantity, c.paper, number(c.ours), c.accepted), BOUNDS) for c in section.checks]
-    return "\n".join(parts) + "\n"
-
-
-def _comparison_lines(comparison: Comparison) -> list[str]:
-    head = INDENT + " " * 36 + "".join(f"{name:>24}" for name in comparison.runs)
-    return [head, *(INDENT + f"{name:<36}" + "".join(f"{text:>24}" for text in moving(values, moved))
-                    for name, values, moved in comparison.lines)]
-
-
-def moving(values: tuple[float, ...], moved: tuple[float, ...]) -> list[str]:
-    """Values, each but the first with its difference from the one before."""
-    return [number(values[0]), *(f"{number(v)} ({m:+.2f} %)" for v, m in zip(values[1:], moved))]
+def predicted(checks) -> list[Check]:
+    """Numbers that the paper prints and a solution predicts: what can be reproduced."""
+    return [check for check in checks if check.printed and check.rests_on == PREDICTED]
 
 
 def summary(rows: list[Row]) -> str:
-    """How many claims have each verdict, what becomes of their numbers, and where the paper's values are."""
+    """How many claims have each verdict, and what becomes of their numbers."""
     verdicts = Counter(row.verdict for row in rows)
     checks = [check for row in rows for check in row.checks]
-    outcomes = Counter(check.outcome for check in checks)
-    against = Counter(check.against_paper for check in checks if check.against_paper)
+    outcomes, values = (Counter(check.outcome for check in chosen) for chosen in (checks, predicted(checks)))
+    named = [*VERDICTS, *(verdict for verdict in verdicts if verdict not in VERDICTS)]
     return "\n".join((
-        f"{len(rows)} claims: " + "; ".join(f"{count} {verdict}" for verdict, count in verdicts.items()) + ".",
+        f"{len(rows)} claims: " + "; ".join(f"{verdicts[verdict]} {verdict}" for verdict in named) + ".",
         f"{len(checks)} numbers with their bars: {outcomes[HOLDS]} hold, {outcomes[FAILS]} fail, the bar of "
         f"{outcomes[REACHES_OVER]} reaches over a bound.",
-        f"{against.total()} values of the paper: {against[INSIDE_BAR]} {INSIDE_BAR}, "
-        f"{against[INSIDE_FEW]} {INSIDE_FEW}, {against[NEITHER]} {NEITHER}."))
+        f"{values.total()} printed values that a solution predicts: {values[HOLDS]} within their printed digits, "
+        f"{values[FAILS]} outside, {values[REACHES_OVER]} not decided. Inputs, rules of construction and arithmetic of "
+        "Table 1 are not among them."))
+
+
+def markdown(rows: list[Row], section: Independence) -> str:
+    """The whole report."""
+    parts = ["# What the paper claims, judged by computed numbers", "", summary(rows).replace("\n", "\n\n"), "", LEGEND,
+             "", *_head(("id", "claim", *HEAD[1:], "verdict"))]
+    parts += [_row(row) for row in rows]
+    parts += ["", "## Remarks", "", *(_remarks(row) for row in rows if row.finding), ""]
+    return "\n".join(parts + _independence(section)) + "\n"
+
+
+def _independence(section: Independence) -> list[str]:
+    parts = ["## Mesh and time-step independence of base in the paper's scheme", ""]
+    for comparison in section.comparisons:
+        lines = [_cells((name, *moving(values, moved))) for name, values, moved in comparison.lines]
+        parts += [f"### {comparison.title}", "", *_head(("", *comparison.runs)), *lines, ""]
+    bounds = [_cells((c.quantity, c.paper, number(c.ours) + ("" if c.holds else " FAILS"))) for c in section.checks]
+    return [*parts, *_head(("what", "bound", "ours")), *bounds]
+
+
+def _head(titles) -> list[str]:
+    return [_cells(titles), _cells(["---"] * len(titles))]
+
+
+def _cells(texts) -> str:
+    return "| " + " | ".join(text.replace("|", "\\|") for text in texts) + " |"
+
+
+def _row(row: Row) -> str:
+    text = row.claim.text if row.claim else ""
+    if not row.checks:
+        return _cells((row.id, text, *[""] * (len(HEAD) - 1), f"**{row.verdict}**: {row.error}"))
+    quantity, paper, *columns = zip(*map(cells, row.checks))
+    paper = [f"{name}: {said}" for name, said in zip(quantity, paper)]
+    return _cells((row.id, text, *("<br>".join(column) for column in (paper, *columns)), f"**{row.verdict}**"))
+
+
+def _remarks(row: Row) -> str:
+    origin = "; ".join(dict.fromkeys(f"{check.why} ({check.date})" for check in row.checks))
+    parts = [f"{label}{text.rstrip('.')}." for label, text in remarks(row) if text]
+    return f"- **{row.id}** (paper: {row.claim.where}). Tolerances: {origin}. " + " ".join(parts)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from repro.model import growth
-from verification.claims import Finding, at_most, claim, near
+from verification.claims import CLOSED, Finding, at_most, claim, near
 from verification.claims.growth_mechanics import listed
 
 #: Sizes of the displacement's gradient.
@@ -13,7 +13,7 @@ STRAINS = np.array([1e-2, 1e-3, 1e-4, 1e-5])
 
 
 @claim("C37", "2.3.1", "neo-Hookean elasticity reduces to the linear one at small strain",
-       "python -m verification.claims C37")
+       about=CLOSED)
 def small_strain() -> Finding:
     """Cauchy stress of F = I + e G against 2 mu_L dev(strain) + P, G random with rotations, e from 1e-2 to 1e-5."""
     generator = np.random.default_rng(2001)

@@ -1,10 +1,9 @@
-"""Geometries and fields that several claims look at: saved ones, and aggregates of a given shape."""
+"""Aggregates of a given shape, and what is solved around them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import meshio
 import numpy as np
 
 from repro.fem import mesher
@@ -12,16 +11,8 @@ from repro.fem.mesh import Mesh
 from repro.fem.outline import half_disc as seed
 from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.fem.space import Space
-from repro.model import biomass, flow, kinetics, pore, transport
+from repro.model import biomass, flow, pore, transport
 from repro.model.kinetics import Sink
-
-
-def saved_mesh(fields: meshio.Mesh, width: float) -> Mesh:
-    """The mesh of saved fields; its loop, which flow and transport do not need, is left empty."""
-    points = np.ascontiguousarray(fields.points[:, :2])
-    inside = fields.cell_data_dict["region"]["triangle"] > 0.5
-    ends = float(points[:, 0].min()), float(points[:, 0].max())
-    return Mesh.of(points, fields.cells_dict["triangle"].astype(np.int64), inside, np.empty(0, int), width, ends)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,11 +57,3 @@ def half_disc(scene, radius: float, reach: float | None) -> Mesh:
     numerics = scene.numerics
     outline = seed(radius, ACROSS_AGGREGATE * numerics.refinement, numerics.geometry)
     return mesher.generate(outline, (-end, end), pore.sized(scene), numerics.geometry)[0]
-
-
-def growth_rate(scene, fields: meshio.Mesh) -> np.ndarray:
-    """(F3 + F4) / X_m (N,), 1/h, zero in the fluid: how fast each place makes biomass."""
-    acceptor, donor = fields.point_data["acceptor_mg_per_L"], fields.point_data["donor_mg_per_L"]
-    growth = kinetics.growth_rate(acceptor, donor, scene.substrates, scene.kinetics)
-    remains = kinetics.inert_rate(acceptor, scene.substrates, scene.kinetics)
-    return fields.point_data["active_biomass"] * (growth + remains)

@@ -2,7 +2,7 @@
 
 Each erratum is a function that computes the numbers of its own text; the text stands above it, in the decorator, with a
 {name} for each number. The program computes them all and rewrites ``reference/ERRATA.md``, so that prose and numbers
-cannot part. Runs of scenes are the cached ones of figures and claims; what a scene cannot say (a wrong sign, an
+cannot part. Runs are those of the claims; what a scene cannot say (a wrong sign, an
 explicit increment) is put together from the stages of `repro`. ``tests/test_errata.py`` computes the quick ones again.
 """
 

@@ -10,8 +10,7 @@ from repro.fem.mesher import generate
 from repro.fem.outline import half_disc as seed
 from repro.fem.sizing import ACROSS_AGGREGATE, Sizing
 from repro.model import mesh_motion
-from repro.results import read_table
-from verification.claims.runs import BASE, folder, scene
+from verification.claims.runs import BASE, ledger, scene
 from verification.claims.states import half_disc
 from verification.errata import LINEAR, erratum, percent, small, table
 
@@ -47,7 +46,7 @@ def transfers() -> dict[str, str]:
 
 def biomass_defects(run) -> np.ndarray:
     """Relative defect of the biomass in each step of a run."""
-    steps = read_table(folder(*run) / "ledger.csv")
+    steps = ledger(*run)
     before, made, after = (steps[f"biomass_{part}_pg_per_m"] for part in ("before", "made", "after"))
     return (after - before - made) / after
 

@@ -1,0 +1,170 @@
+"""What the rounding of Table 1 allows: inputs are those of the scenes, differences right on power laws, runs kept."""
+import json
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from repro.scene import load_scene
+from verification import sensitivity
+from verification.sensitivity import __main__ as driver
+from verification.sensitivity import elasticity, one_set, picture, sobol
+from verification.sensitivity.inputs import BY_NAME, EXACT, ROUNDED, changed, factors_of
+from verification.sensitivity.numbers import Runs, scene
+
+PAPER = {"k": 9.3 / 24, "Y": 0.61, "b": 0.12 / 24, "f_d": 0.8, "d_c": 1.42, "F": 1.52, "K_sA": 1.0, "K_sD": 1.0,
+         "D_a": 2.32e8 / 24, "D_fa": 1.85e8 / 24, "D_d": 1.01e8 / 24, "D_fd": 0.81e8 / 24}
+
+
+def value_of(said, path):
+    for key in path.split("."):
+        said = getattr(said, key)
+    return said
+
+
+def test_the_rounded_inputs_are_those_of_table_1_and_of_the_scenes():
+    """In the package's units. Mutants: a half unit of another digit; a key that holds something else."""
+    said = load_scene("base")
+    assert {each.name for each in ROUNDED} == set(PAPER)
+    for each in ROUNDED:
+        assert value_of(said, each.paths[0]) == pytest.approx(PAPER[each.name], rel=1e-12), each.name
+        digits = len(f"{each.value}".partition(".")[2])
+        assert each.half == pytest.approx(0.5 * 10**-digits), each.name
+    assert all(each.half == 0 for each in EXACT)
+
+
+@pytest.mark.parametrize("each", ROUNDED + tuple(each for each in EXACT if each.only != "wide"),
+                         ids=lambda each: each.name)
+def test_a_factor_moves_its_input_and_nothing_else(each):
+    """Mutants: K_s without the supply that is 10 of it; a factor added."""
+    said = load_scene("base")
+    other = changed(said, {each.name: 2.0})
+    assert all(value_of(other, path) == 2 * value_of(said, path) for path in each.paths)
+    assert changed(other, {each.name: 0.5}) == said
+    if each.name.startswith("K_s"):
+        assert len(each.paths) == 2 and each.paths[1].endswith("supply")
+
+
+def test_an_input_that_a_scene_lacks_is_refused():
+    with pytest.raises(Exception, match="head"):
+        changed(load_scene("wide"), {"head": 1.1})
+
+
+class Law:
+    """Numbers of a law of the inputs in the place of runs."""
+
+    def __init__(self, law):
+        self.law = law
+
+    def numbers(self, said):
+        plain = load_scene(said.name)
+        return self.law({each.name: value_of(said, each.paths[0]) / value_of(plain, each.paths[0])
+                         for each in ROUNDED + EXACT if each.only in ("", said.name)})
+
+
+def test_elasticities_of_a_power_law():
+    """x^3 at 1 %: 3 and a bar that holds the rest. Mutants: one side alone; the distance not divided by."""
+    found = elasticity.elasticities(Law(lambda x: {"n": 7 * x["k"] ** 3 * x["X_m"] ** -0.5}), "base")["n"]
+    assert found["k"]["elasticity"] == pytest.approx(3, abs=1e-3) and found["k"]["resolved"]
+    assert abs(found["k"]["elasticity"] - 3) <= found["k"]["bar"]
+    assert found["X_m"]["by_10_percent"] == pytest.approx([100 * (1.1**-0.5 - 1), 100 * (0.9**-0.5 - 1)])
+    assert found["Y"]["elasticity"] == 0 and "head" in found and "u_ave" not in found
+
+
+def test_what_differs_by_noise_is_not_resolved():
+    """Mutant: no look at the second distance."""
+    noise = {0.99: 1e-3, 1.01: -1e-3, 0.98: -1e-3, 1.02: 1e-3}
+    found = elasticity.elasticities(Law(lambda x: {"n": 1 + noise.get(round(x["k"], 3), 0.0)}), "base")["n"]["k"]
+    assert not found["resolved"] and found["bar"] > abs(found["elasticity"])
+
+
+def law_of_base(shift):
+    """Numbers near those printed, moved by an acceptor effluent that k lowers and one that D_a hardly does."""
+    def law(x):
+        return {"velocity_0": 2.9, "velocity": 1.5 / x["k"], "consumed": 60 - 5 * (x["F"] - 1),
+                "effluent_acceptor": 4.19 * (1 + shift) * x["k"] ** -8, "effluent_donor": 6.13 * x["K_sD"] ** 0.5}
+    return law
+
+
+@pytest.mark.parametrize("shift, reached", [(-0.02, True), (-0.06, False), (-0.2, False)])
+def test_one_set_is_found_where_there_is_one_and_the_least_misfit_where_there_is_none(shift, reached):
+    """2 % of the effluent are 0.25 % of k, within its 0.54 %; 6 % and 20 % are not. Mutant: a set outside of the
+    rounding."""
+    law = Law(law_of_base(shift))
+    found = one_set.found(law, elasticity.elasticities(law, "base"))
+    factors = factors_of(found["inputs"])
+    assert found["reached"] is reached
+    assert all(abs(factor - 1) <= BY_NAME[name].rounding * (1 + 1e-9) for name, factor in factors.items())
+    if reached:
+        assert one_set.reached(found["numbers"]) and found["share_of_the_rounding"] == pytest.approx(0.46, abs=0.06)
+    else:
+        assert factors["k"] == pytest.approx(1 - BY_NAME["k"].rounding, rel=1e-6)
+        assert found["misfit_in_half_intervals"] > 10 and found["share_of_the_rounding"] > 1
+
+
+def test_the_interval_of_a_value_is_the_sum_of_all_roundings(monkeypatch):
+    """Mutants: the root of squares; the largest alone; a quantity that is not known."""
+    content = {"rounding": {"k": 0.01, "Y": 0.02}, "elasticities": {"n": {
+        "k": {"elasticity": -3.0}, "Y": {"elasticity": 2.0}, "X_m": {"elasticity": 99.0}}}}
+    monkeypatch.setattr(sensitivity, "record", lambda: content)
+    assert sensitivity.interval("n", 10.0) == pytest.approx((9.3, 10.7))
+    assert sensitivity.interval("other", 10.0) is None and sensitivity.verified_set() == ""
+
+
+def test_a_run_is_computed_once_and_kept_at_once(tmp_path, monkeypatch):
+    """A second call, or one after a break, goes on from the file. Mutants: kept at the end; computed again; one key for
+    all scenes."""
+    made = []
+    monkeypatch.setitem(Runs.numbers.__globals__["OF"], "base", lambda said: made.append(said) or {"n": len(made)})
+    path = tmp_path / "out" / "runs.json"
+    plain, other = scene("base", {}), scene("base", {"k": 1.01})
+    assert Runs(path).numbers(plain) == {"n": 1} and len(json.loads(path.read_text(encoding="utf-8"))) == 1
+    again = Runs(path)
+    assert (again.numbers(plain), again.numbers(other), again.numbers(other)) == ({"n": 1}, {"n": 2}, {"n": 2})
+    assert made == [plain, other]
+
+
+def test_sobol_indices_of_a_linear_law():
+    """Shares of the variance, e r squared over their sum. Mutants: normal for uniform; rounding not used."""
+    slopes = {"velocity_0": {}, "velocity": {"k": 3.0, "Y": 3.0, "K_sD": 0.02}, "effluent_donor": {},
+              "effluent_acceptor": {"k": 8.0, "Y": 1.0, "K_sD": 0.3}, "consumed": {}}
+
+    def law(x):
+        return {name: 1 + sum(e * (x[key] - 1) for key, e in row.items()) for name, row in slopes.items()}
+    found = sobol.indices(Law(law), elasticity.elasticities(Law(law), "base"), 64)
+    k, y = ((3 * BY_NAME[name].rounding) ** 2 for name in ("k", "Y"))
+    total = {name: value for name, (value, *_) in zip(found["inputs"], found["numbers"]["velocity"]["total_order"])}
+    assert set(found["inputs"]) == {"k", "Y", "K_sD"} and set(found["numbers"]) == {"velocity", "effluent_acceptor"}
+    assert total["k"] == pytest.approx(k / (k + y), abs=0.05) and total["Y"] == pytest.approx(y / (k + y), abs=0.05)
+
+
+@pytest.mark.parametrize("samples", ["-2", "3", "100"])
+def test_a_number_of_samples_is_a_power_of_two(samples, capsys):
+    assert driver.main(["--sobol", samples]) == 2 and "a power of two" in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def kept():
+    return sensitivity.record()
+
+
+def test_the_committed_record_is_whole(kept):
+    """Every rounded input for every number, each with its bar. Mutant: a number that the claims name and the record
+    lacks."""
+    for number, known in kept["elasticities"].items():
+        assert set(known) >= {each.name for each in ROUNDED}, number
+        assert all(one["bar"] >= 0 and isinstance(one["resolved"], bool) for one in known.values()), number
+    assert set(one_set.PRINTED) <= set(kept["elasticities"])
+    assert kept["rounding"] == {each.name: each.rounding for each in ROUNDED}
+
+
+def test_page_and_diagram_are_those_of_the_record(kept, tmp_path):
+    """Mutants: a page edited by hand; a date in the diagram."""
+    page = sensitivity.RECORD.with_suffix(".md").read_text(encoding="utf-8")
+    assert page == picture.page(kept)
+    for name in ("one.svg", "two.svg"):
+        picture.write(kept, tmp_path / name)
+    assert (tmp_path / "one.svg").read_bytes() == (tmp_path / "two.svg").read_bytes()
+    ElementTree.fromstring((tmp_path / "one.svg").read_text(encoding="utf-8"))
+    largest = picture.reaches(kept, "effluent_acceptor")
+    assert np.all(np.diff([abs(value) for _, value in largest]) <= 0)

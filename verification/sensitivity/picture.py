@@ -1,0 +1,104 @@
+"""The record of the sensitivities as a tornado diagram and as a page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+from verification.sensitivity.inputs import INPUTS, ROUNDED
+
+TARGET = Path(__file__).parent / "tornado.svg"
+NAMES = {"velocity_0": "mean velocity, t = 0", "velocity": "mean velocity, 19.2 h",
+         "effluent_acceptor": "effluent acceptor, 19.4 h", "effluent_donor": "effluent donor, 19.4 h",
+         "contact_time": "time of contact (wide)", "conductivity_after": "conductivity 4 h after contact (wide)"}
+UP, DOWN = "#D55E00", "#0072B2"
+
+
+def reaches(record: dict, number: str) -> list[tuple[str, float]]:
+    """Rounded inputs and what half a unit of their last digit makes of a number (%), the largest first."""
+    known = record["elasticities"][number]
+    found = [(each.name, 100 * known[each.name]["elasticity"] * each.rounding) for each in ROUNDED]
+    return sorted(found, key=lambda pair: -abs(pair[1]))
+
+
+def write(record: dict, target: Path = TARGET) -> None:
+    """The diagram: of each number the inputs in their order, an input's printed digit up and down."""
+    shown = [name for name in NAMES if name in record["elasticities"]]
+    made = Figure(figsize=(9, 2.6 * ((len(shown) + 1) // 2)), layout="constrained")
+    FigureCanvasSVG(made)
+    for axes, number in zip(made.subplots((len(shown) + 1) // 2, 2, squeeze=False).ravel(), shown):
+        names, values = zip(*reversed(reaches(record, number)[:8]))
+        axes.barh(names, values, color=UP, height=0.7)
+        axes.barh(names, [-value for value in values], color=DOWN, height=0.7)
+        axes.axvline(0, color="black", linewidth=0.8)
+        axes.set_title(NAMES[number], loc="left", fontsize=10)
+        axes.set_xlabel("change (%)")
+    made.suptitle("Half a unit of the last printed digit of an input: upwards (orange), downwards (blue)", fontsize=10)
+    with matplotlib.rc_context({"svg.hashsalt": "sensitivity", "svg.fonttype": "none"}):
+        made.savefig(target, format="svg", metadata={"Date": None, "Creator": None})
+
+
+def page(record: dict) -> str:
+    """The record in words and tables."""
+    parts = ["# What the inputs of Table 1 allow", "",
+             "Elasticities d ln(number) / d ln(input), by central differences of the converged solution; ± is their "
+             "bar, and one that exceeds a tenth of the value is *not resolved*. `make sensitivity` writes this page.",
+             "", "![Tornado diagram](tornado.svg)", "", _table(record), "",
+             *_set(record), *_supplies(record), *_sobol(record)]
+    return "\n".join(parts) + "\n"
+
+
+def _table(record: dict) -> str:
+    numbers = list(record["elasticities"])
+    head = ["input", "rounding (%)", *(NAMES.get(name, name.replace("_", " ")) for name in numbers)]
+    rows = [[each.name, f"{100 * each.rounding:.2g}" if each.half else "exact",
+             *(_cell(record["elasticities"][name].get(each.name)) for name in numbers)] for each in INPUTS]
+    return "\n".join("| " + " | ".join(line) + " |" for line in (head, ["---"] * len(head), *rows))
+
+
+def _cell(known: dict | None) -> str:
+    if known is None:
+        return "-"
+    word = f"{known['elasticity']:+.3f}" if known["resolved"] else f"{known['elasticity']:+.1g}, not resolved"
+    large = known.get("by_10_percent")
+    told = f"; ± 10 %: {large[0]:+.2g}, {large[1]:+.2g} %" if large else ""
+    return f"{word} (± {known['bar']:.1g}){told}"
+
+
+def _set(record: dict) -> list[str]:
+    found = record.get("one_set")
+    if not found:
+        return []
+    words = ("One set of inputs within the rounding gives all printed numbers of base at once" if found["reached"] else
+             "No set of inputs within the rounding gives all printed numbers of base at once; the nearest")
+    lines = [f"| {name} | {value:.4f} |" for name, value in found["inputs"].items()]
+    numbers = ", ".join(f"{NAMES.get(name, name)} {value:.4f}" for name, value in found["numbers"].items())
+    return ["## One set of inputs", "", f"{words} (a share of {found['share_of_the_rounding']:.2f} of the rounding is "
+            f"needed). A run with it: {numbers}.", "", "| input | value |", "| --- | --- |", *lines, ""]
+
+
+def _supplies(record: dict) -> list[str]:
+    found = record.get("supplies")
+    if not found:
+        return []
+    rows = [f"| {supply} | {known['contact_time']:.1f} | {known['upstream']:.0f} to {known['downstream']:.0f} | "
+            f"{known['acceptor_min']:.2g} |" for supply, known in found.items()]
+    return ["## The supply of Figure 6, which is not printed", "",
+            "| supply of both (K_s) | contact (h) | ends at contact (um) | least acceptor then (K_s) |",
+            "| --- | --- | --- | --- |", *rows, ""]
+
+
+def _sobol(record: dict) -> list[str]:
+    found = record.get("sobol")
+    if not found:
+        return []
+    head = ["number", *found["inputs"]]
+    rows = [[NAMES.get(name, name), *(f"{value:.2f} ({low:.2f} to {high:.2f})" for value, low, high in
+                                      known["total_order"])] for name, known in found["numbers"].items()]
+    lines = ["| " + " | ".join(line) + " |" for line in (head, ["---"] * len(head), *rows)]
+    return ["## Sobol indices of base", "", f"Total indices of {found['samples']} samples in `fast`, with intervals of "
+            f"{100 * found['confidence']:.0f} %: the share of a number's variance within the rounding that goes with "
+            "an input.", "", *lines, ""]
