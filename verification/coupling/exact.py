@@ -9,7 +9,7 @@ from verification.coupling import presets
 
 @case("coupling-exact", kind="cross-code", slow=True, norm="as coupling-presets",
       claim="Each of the eight numbers of base is within 0.01 % with preset exact",
-      mutants=("exact-steps-of-accurate", "cubic-shown-less"))
+      mutants=("exact-steps-of-accurate",))
 def exact() -> Outcome:
     theirs, error = presets._reference()
     apart = presets._apart(presets._listed("exact"), theirs)
