@@ -200,13 +200,14 @@ def test_a_preset_changes_the_defaults(preset):
 
 def test_presets_say_what_they_are():
     """The paper's is the paper's scheme; the others are curved, second in time, the accurate one finer, the exact one
-    cubic with shorter steps. Mutants: fast and accurate exchanged, the exact one with the steps of accurate."""
+    finer still. Mutants: fast and accurate exchanged, the exact one with the steps of accurate."""
     paper, fast, accurate = (numerics(preset=name) for name in ("paper", "fast", "accurate"))
     assert (paper.elements, paper.time, paper.refinement) == ("linear", "updates", 1.0)
     assert fast.elements == accurate.elements == "quadratic" and fast.time == accurate.time == "midpoint"
     assert fast.refinement < accurate.refinement and fast.tolerance > accurate.tolerance
     exact = numerics(preset="exact")
-    assert (exact.elements, exact.time) == ("cubic", "midpoint") and 3 * exact.tolerance < accurate.tolerance
+    assert (exact.elements, exact.time) == ("quadratic", "midpoint") and exact.refinement > accurate.refinement
+    assert 3 * exact.tolerance < accurate.tolerance
 
 
 def test_what_is_written_wins_over_the_preset():

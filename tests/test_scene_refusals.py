@@ -102,7 +102,7 @@ LENGTH = 'a length is needed, such as "100 um" (greater than zero)'
     ("numerics.flow_stabilisation=0", "greater than zero"),
     ("numerics.mesh_compressibility=-1", "greater than zero"),
     # words
-    ("numerics.preset=best", 'numerics.preset = "best": "fast" or "accurate" or "paper" is needed'),
+    ("numerics.preset=best", 'numerics.preset = "best": "fast" or "accurate" or "exact" or "paper" is needed'),
     ("numerics.transport=bdf", '"quasi_steady" or "gear" is needed'),
     ("numerics.transfer=exact", '"conserving" or "linear" or "bounded" is needed'),
     ("numerics.extent=half", '"central" or "full" is needed'),

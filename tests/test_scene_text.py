@@ -110,7 +110,7 @@ def test_a_file_of_ones_own_keeps_its_words(tmp_path, capsys):
 def test_presets_tell_their_defaults():
     text = scene_text("base", ["numerics.preset=accurate"])
     assert '#elements = "quadratic"' in text and "#refinement = 0.45" in text
-    assert "0.2 (fast), 0.45 (accurate), 1.0 (paper)" in text
+    assert "0.2 (fast), 0.45 (accurate), 0.7 (exact), 1.0 (paper)" in text.replace("\n# ", " ")
 
 
 def test_the_name_of_a_file_adds_no_key(tmp_path):

@@ -124,13 +124,14 @@ def test_steps_depend_on_no_row(name):
     assert all(same(states[-1][0], found[0][0][-1][0]) for states, _, _ in found)
 
 
+@pytest.mark.parametrize("step, part", [(-2, 0.5), (0, 1.6)])
 @pytest.mark.parametrize("name", SCENES)
-def test_steps_do_not_depend_on_the_end(name):
+def test_steps_do_not_depend_on_the_end(name, step, part):
     """The ledgers of steps, and the state from which a later end goes on, to the last bit; the step that is cut closes
     its ledger and ends where the run does. Mutants: the last steps shortened to fit, a cut step that is told as one of
     the others."""
     whole, _, later = steps_of(name)
-    end = 0.5 * (later[-2].start + later[-2].end) + 1e-3
+    end = later[step].start + part * (later[step].end - later[step].start) + 1e-3
     found, rows, ledgers = steps_of(name, f'growth.end="{end!r} h"')
     assert ledgers[:-1] == later[:len(ledgers) - 1] and ledgers[-1].end == rows[-1].pore.time == end
     own = [state for state, _ in found if not state.apart][-1]

@@ -348,7 +348,7 @@ PRESETS: dict[str, dict[str, str | float]] = {
              "jacobian": "reused"},
     "accurate": {"elements": "quadratic", "time": "midpoint", "refinement": 0.45,
                  "tolerance": 0.001, "jacobian": "reused"},
-    "exact": {"elements": "cubic", "time": "midpoint", "refinement": 0.3, "tolerance": 0.00025,
+    "exact": {"elements": "quadratic", "time": "midpoint", "refinement": 0.7, "tolerance": 0.00025,
               "jacobian": "reused"},
     "paper": {},
 }

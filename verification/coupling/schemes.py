@@ -210,8 +210,8 @@ def presets(bound: float, *numerics: str):
 
 @case("coupling-exact", kind="cross-code", slow=True, norm="as coupling-presets",
       claim="Each of the eight numbers of base is within 0.01 % with preset exact",
-      mutants=("exact-steps-of-accurate", "cubic-shown-less"), ways="3",
-      because="orders 1 and 2 and the other presets: coupling-presets")
+      mutants=("exact-steps-of-accurate",), ways="2",
+      because="orders 1 and 3 and the other presets: coupling-presets")
 def exact():
     theirs, error = _reference()
     return at_most("the reference itself", error, 5e-5, "half of what is asked"), [
