@@ -272,7 +272,8 @@ def test_a_notebook_shows_key_figures_and_a_picture(found):
     """The picture is a PNG of the whole meshed part, with the aggregate's boundary. Mutants: upside down; the first
     state's."""
     html = found._repr_html_()
-    assert "conductivity 174.1 → 173.8 m/day; thickness 5 → 5.295 um" in html and "at t = 0.6 h" in html
+    told = "conductivity of the pore 174.1 → 173.8 m/day; thickness of the aggregate 5 → 5.295 um"
+    assert told in html and "at t = 0.6 h" in html
     data = base64.b64decode(re.search(r'src="data:image/png;base64,([^"]+)"', html)[1])
     pixels = plt.imread(io.BytesIO(data))
     height, width = pixels.shape[:2]

@@ -71,6 +71,12 @@ def by_stage(results: list[Result]) -> list[tuple[str, list[Result]]]:
     return [(stage, chosen) for stage, chosen in grouped if chosen]
 
 
+#: What is judged elsewhere.
+BESIDES = ((Link("The paper's claims", "../../paper_figures/replication"), "`make claims`"),
+           (Link("Ambiguities and misprints of the paper", "../../reference/ERRATA"), "`python -m verification.errata`"),
+           (Link("What the rounding of Table 1 allows", "../sensitivity/sensitivity"), "`make sensitivity`"))
+
+
 def index(results: list[Result]) -> list[Block]:
     """The first page: stages, and a line a case."""
     stages = [(Link(TITLES[stage], stage), summary(chosen)) for stage, chosen in by_stage(results)]
@@ -79,6 +85,7 @@ def index(results: list[Result]) -> list[Block]:
              "elements and presets"))
     return [Block("text", f"{INTRODUCTION} Written by `make verify`."), Block("text", f"**{summary(results)}**"),
             table(("stage", ""), (*stages, *more)),
+            table(("besides", ""), BESIDES, brief=True),
             table(("case", "kind", "runs with", "numbers", "verdict", "must fall short with"),
                   map(_index_row, results)),
             table(("case", "claim", "measured", "expected", "seconds"), map(_live_row, results), detail=True)]
