@@ -84,8 +84,9 @@ def _bench(record: dict) -> Iterator[Block]:
 
 def _presets(part: dict) -> Iterator[tuple[str, ...]]:
     slow = next(p for p in line(part, base.PRESET_PAPER)["points"] if p["label"] == PAPER_AS_IT_IS)
-    for name, point in (("paper", slow), *((name.split()[1], line(part, name)["points"][0])
-                                           for name in (base.FAST, base.ACCURATE))):
+    found = {name: line(part, name) for name in (base.FAST, base.ACCURATE, base.EXACT)}
+    measured = {name.split()[1]: one["points"][0] for name, one in found.items() if one}
+    for name, point in {"paper": slow, **measured}.items():
         yield (name, f"{point['seconds']:.2f}", f"{slow['seconds'] / point['seconds']:.1f} times",
                _percent(point["error"]), *map(_percent, point["errors"]))
 

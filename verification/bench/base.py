@@ -21,7 +21,7 @@ COLUMNS = """mean_velocity_m_per_d conductivity_m_per_d aggregate_area_um2 thick
 effluent_acceptor_mg_per_L effluent_donor_mg_per_L""".split()
 #: Rings and steps of the reference, extrapolated; those of a check, finer in space and with other steps.
 REFERENCE, CHECK = ((8, 12), (8, 16)), ((10, 15), (10, 16))
-FAST, ACCURATE = "preset fast", "preset accurate"
+FAST, ACCURATE, EXACT = "preset fast", "preset accurate", "preset exact"
 PRESET_PAPER = "preset paper: linear elements, updates"
 #: Refinement and time step (min) of the paper's scheme; those of them at which it is changed in one thing; refinement
 #: and tolerance of the midpoint rule's.
@@ -86,7 +86,7 @@ def jobs(truth: np.ndarray, times, quick: bool) -> dict:
         simulated, truth, times, "numerics.preset=accurate", "numerics.time=updates", f"numerics.refinement={r}")
         for r in UPDATES[:cut]}
     found |= {(name, "as it is"): partial(simulated, truth, times, f"numerics.preset={name.split()[1]}")
-              for name in (FAST, ACCURATE)}
+              for name in (FAST, ACCURATE, EXACT)}
     if not quick:
         found |= {("scikit-fem: quadratic elements, Runge-Kutta", f"{n} rings, {s} steps"): partial(
             _skfem, truth, times, n, s) for n, s in SKFEM}
