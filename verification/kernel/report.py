@@ -73,7 +73,7 @@ def by_stage(results: list[Result]) -> list[tuple[str, list[Result]]]:
 
 #: What is judged elsewhere.
 BESIDES = ((Link("The paper's claims", "../../paper_figures/replication"), "`make claims`"),
-           (Link("Ambiguities and misprints of the paper", "../../reference/ERRATA"), "`python -m verification.errata`"),
+           (Link("Ambiguities and misprints of the paper", "../../reference/ERRATA"), "`verification.errata`"),
            (Link("What the rounding of Table 1 allows", "../sensitivity/sensitivity"), "`make sensitivity`"))
 
 
