@@ -231,7 +231,8 @@ def halfway_meshes(monkeypatch):
         made_anew.append(mesh is None)
         return mesh
 
-    known = SimpleNamespace(followed=followed, remesh=remeshing.remesh, new_mesh=remeshing.new_mesh)
+    known = SimpleNamespace(followed=followed, remesh=remeshing.remesh, new_mesh=remeshing.new_mesh,
+                            resolved=remeshing.resolved)
     monkeypatch.setattr(midpoint, "remeshing", known)
     return made_anew
 
@@ -353,7 +354,7 @@ def test_a_step_that_does_not_balance_ends_the_run_and_keeps_its_files(what, mon
     status, out = run_leaking(monkeypatch, tmp_path, 2, LEAKS[what], *sets)
     (line,) = [line for line in capsys.readouterr().err.splitlines() if "balance" in line]
     table = read_table(out / "timeseries.csv")
-    assert status == 1 and len(table["time_h"]) == 2 and len(list((out / "fields").iterdir())) == 2
+    assert status == 1 and len(table["time_h"]) == len(list((out / "fields").iterdir())) > 1
     assert f"stopped in the step from t = {table['time_h'][-1]:g} h, in its balance: " in line
     assert re.search(rf"x = -\S+ and \S+ um: it lacks (.*, )?-?0\.0\d+ of the {what}.*; try a shorter", line)
     record = json.loads((out / "run.json").read_text())

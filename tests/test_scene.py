@@ -34,6 +34,7 @@ TABLE_1 = {  # worked out by hand: 1 m = 1e6 um, 1 cm2 = 1e8 um2, 1 day = 24 h, 
     "aggregate.position": 0.0,
     "aggregate.smooth": False,
     "aggregate.inert_fraction": 0.0,
+    "flow.biomass": "viscous",
     "flow.viscosity_ratio": 2000.0,
     "flow.kinematic_viscosity": 3.6108e9,
     "flow.gravity": 1.271376e14,
@@ -84,7 +85,7 @@ TABLE_1 = {  # worked out by hand: 1 m = 1e6 um, 1 cm2 = 1e8 um2, 1 day = 24 h, 
     "output.timeseries": "csv",
 }
 GIVEN = {"name", "growth.end", "flow.head", "flow.mean_velocity", "output.times", "aggregate.outline",
-         "kinetics.donor_oxygen_demand"}
+         "flow.permeability", "kinetics.donor_oxygen_demand"}
 
 
 def flat(section, prefix="") -> dict:

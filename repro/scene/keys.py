@@ -425,7 +425,7 @@ class Scene:
 #: Keys that came after hashes of scenes were recorded, with their defaults as tables write them.
 LATER: dict[str, dict[str, object]] = {
     "aggregate": {"position": "0.0 um", "smooth": False, "inert_fraction": 0.0},
-    "flow": {"interpolation": "steps"},
+    "flow": {"interpolation": "steps", "biomass": "viscous"},
     "substrates.acceptor": {"interpolation": "steps"},
     "substrates.donor": {"interpolation": "steps"},
 }
