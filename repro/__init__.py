@@ -9,7 +9,7 @@ Ten lines of use; ``docs/tutorial.md`` of the repository has more:
     print(repro.check(scene))                               # what a run of it will be
     found = repro.solve(scene)                              # rows of timeseries.csv, as arrays
     print(found["conductivity_m_per_d"], found.units["conductivity_m_per_d"], found.fields(5.0))
-    repro.run(scene, "runs/base")                           # the same as files: rows, fields, a page
+    repro.run(scene, "runs/base")                           # the same as files, and a page
     found = repro.load_run("runs/base")                     # ... and back; found.to_pandas()
     repro.sweep(scene, ["pore.width=50 um, 60 um"], "sweep")
 

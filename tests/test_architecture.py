@@ -269,3 +269,10 @@ def test_the_lock_pins_every_direct_dependency_within_its_bounds():
     for requirement in RUNTIME + [r for rs in optional.values() for r in rs] + PROJECT["build-system"]["requires"]:
         lowest = version(re.search(r">=([\d.]+)$", requirement)[1])
         assert min(pins.get(name_of(requirement), [()])) >= lowest, requirement
+
+
+def test_lines_of_the_package_are_short():
+    """At most 100 columns. Mutant: a longer one."""
+    long = [f"{path.name}:{number}" for path in sorted((ROOT / "repro").rglob("*.py"))
+            for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1) if len(line) > 100]
+    assert long == []

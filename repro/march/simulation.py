@@ -19,8 +19,9 @@ Shape = Sequence[tuple[float, float]] | np.ndarray
 WAYS = {"updates": updates.steps, "midpoint": stepping.steps}
 
 
-def simulate(scene: Source, shape: Shape | None = None, state: State | None = None) -> Iterator[Instant]:
-    """Yields an Instant at t = 0 and at each reported time: at ``output.times``, or after every step.
+def simulate(scene: Source, shape: Shape | None = None,
+             state: State | None = None) -> Iterator[Instant]:
+    """Yields an Instant at t = 0 and at each reported time: ``output.times``, or after every step.
 
     scene: one that was loaded, or a file, a packaged name, a dict of tables; shape: the
     aggregate's boundary at t = 0, (x, y) um from its upstream to its downstream end on the lower
@@ -35,9 +36,11 @@ def simulate(scene: Source, shape: Shape | None = None, state: State | None = No
 
 
 def shaped(scene: Scene, shape: Shape) -> Scene:
-    """The scene with another boundary of the aggregate at t = 0, checked as if it stood in its file."""
+    """The scene with another boundary of the aggregate at t = 0, checked as one in its file."""
     tables = scene_tables(scene)
-    seed = {key: value for key, value in tables.get("aggregate", {}).items() if key not in ("radius", "position")}
+    seed = dict(tables.get("aggregate", {}))
+    for key in ("radius", "position"):
+        seed.pop(key, None)
     seed["outline"] = [[f"{float(x)!r} um", f"{float(y)!r} um"] for x, y in shape]
     return parse_scene({**tables, "aggregate": seed}, scene.name, f"{scene.name} with a shape")
 

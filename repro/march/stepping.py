@@ -4,8 +4,8 @@ The midpoint rule carries (9)-(10) over a step with the rates of the shape half 
 would take those of the start: the mean over the aggregate of their difference, times the step, is
 what ``numerics.tolerance`` bounds; the error of the midpoint rule is of higher order, and what a
 tolerance makes of it is measured in ``make bench``. A step ends when the film between the aggregate
-and the opposite wall is first too thin (2.3.3), and at the times of the scene's tables; rows and the
-run's end leave all steps as they are.
+and the opposite wall is first too thin (2.3.3), and at the times of the scene's tables; rows and
+the run's end leave all steps as they are.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def steps(scene: Scene, state: State | None = None) -> Iterator[tuple[State, Ins
 
 
 def rows(scene: Scene) -> tuple[float, ...]:
-    """Times (h) of rows besides the ends of steps: growth.end, and the multiples of growth.time_step
+    """Times (h) of rows besides the ends of steps: growth.end, and multiples of growth.time_step
     times the largest power of two with LEAST of them or more; of itself in a run that has fewer."""
     growth = needed(scene.growth, "[growth]")
     count = round(growth.end / growth.time_step, 9)
@@ -99,7 +99,8 @@ def _accepted(scene: Scene, now: Pore, solved: Solved,
             found = midpoint.attempt(scene, now, solved, duration, most)
             estimate = found.change * duration
             if found.step and (duration <= shortest or not _overshoots(found)):
-                taken, after = _solved(scene, _ending_at(found.step, _end_of(now, duration, corner)))
+                end = _end_of(now, duration, corner)
+                taken, after = _solved(scene, _ending_at(found.step, end))
                 if found.gaps is not None:  # contact alone made the step short
                     return taken, after, asked
                 tried = replace(asked, length=length)

@@ -46,7 +46,8 @@ def index(folder: Path, name: str = "fields.pvd") -> list[tuple[float, Path]]:
             if _FILE.fullmatch(name) and (folder / name).is_file()]
 
 
-def packed(entries: list[tuple[float, Path]], before: list[tuple[float, Path]] | None = None) -> dict:
+def packed(entries: list[tuple[float, Path]],
+           before: list[tuple[float, Path]] | None = None) -> dict:
     """What the script is given: the fields that there are, meshes, and frames; empty without any.
 
     before: those of the same times before the aggregate expanded, each shown ahead of its own.

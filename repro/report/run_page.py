@@ -29,7 +29,8 @@ NESTED = ("Each bar is the time within that stage, calls within calls counted in
           "bars do not add up to the whole.")
 #: Choices of a scene that leave something out, in words; those of [numerics] hold where NEEDED is.
 ASSUMED = {
-    ("growth", "fluid_forces", "neglected"): "the fluid's traction on the aggregate neglected (2.3.3)",
+    ("growth", "fluid_forces", "neglected"):
+        "the fluid's traction on the aggregate neglected (2.3.3)",
     ("growth", "new_biomass", "stressed"): "strain counted from t = 0 (2.3)",
     ("numerics", "transport", "quasi_steady"): "substrates at rest in each shape (quasi-steady)",
     ("numerics", "extent", "central"): "a clean channel outside of the meshed part (3.1)",
@@ -120,7 +121,8 @@ def _assumed(run: Run) -> str:
     """The simplifications that the scene has chosen, in words."""
     tables = _tables(run)
     told = [words for (part, key, value), words in ASSUMED.items()
-            if _table(tables.get(part)).get(key) == value and (part != "numerics" or NEEDED[key] in tables)]
+            if _table(tables.get(part)).get(key) == value
+            and (part != "numerics" or NEEDED[key] in tables)]
     return f"Assumed: {'; '.join(['a pore in the plane, one aggregate, no detachment', *told])}."
 
 
@@ -149,8 +151,8 @@ def _field_note(packed: dict) -> str:
         note = f"A mesh of {packed['nodes']} nodes, shown on a regular grid of triangles"
     noted = sum("note" in frame for frame in packed["frames"])
     note += (f"; {_times_note(len(packed['frames']) - noted, packed['of'])}"
-             f"{', those grown and not yet expanded besides' if noted else ''}. Values are rounded to 1/65534 "
-             "of their range; the .vtu files have every time and digit.")
+             f"{', those grown and not yet expanded besides' if noted else ''}. Values are rounded "
+             "to 1/65534 of their range; the .vtu files have every time and digit.")
     if any(field["body"] for field in packed["fields"]):
         note += " Fields of the aggregate alone leave the fluid grey."
     return note + (" Arrow keys move the slider." if packed["of"] > 1 else "")

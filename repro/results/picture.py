@@ -49,8 +49,8 @@ def figure(fields: Mapping[str, np.ndarray], time: float) -> str:
     values = fields[name]
     values = np.linalg.norm(values, axis=1) if values.ndim == 2 else values
     picture = base64.b64encode(png(fields, values)).decode("ascii")
-    told = escape(f"{names.with_unit(name)}, {values.min():.4g} (dark) to {values.max():.4g} (light), at "
-                  f"t = {time:.4g} h; white: boundary of the aggregate")
+    told = escape(f"{names.with_unit(name)}, {values.min():.4g} (dark) to {values.max():.4g} "
+                  f"(light), at t = {time:.4g} h; white: boundary of the aggregate")
     return (f'<figure><img alt="{told}" src="data:image/png;base64,{picture}">'
             f"<figcaption>{told}</figcaption></figure>")
 

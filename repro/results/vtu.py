@@ -1,6 +1,7 @@
 """Fields as VTK's XML files of unstructured grids (``.vtu``), written and read back.
 
-Arrays are little-endian, compressed by zlib, in base64: what ParaView, PyVista, VTK and meshio read.
+Arrays are little-endian, compressed by zlib, in base64: what ParaView, PyVista, VTK and meshio
+read.
 A grid is laid out as meshio's ``Mesh`` is, which this package has no need to import: that takes
 longer than writing all the fields of a short run.
 """

@@ -94,7 +94,8 @@ ALONE = Watch()
 
 def run(scene: Source, folder: str | Path, progress: Progress = unwatched, watch: Watch = ALONE, *,
         force: bool = False, origin: dict | None = None) -> str:
-    """Run a scene, one that was loaded, or a file, a packaged name, a dict of tables, into a folder.
+    """Run a scene (loaded, a file, a packaged name or a dict of tables) into a folder.
+
     ``progress`` is told each simulated time (h).
 
     A run of the same scene, source and versions that is there is gone on with, or left alone where

@@ -41,6 +41,6 @@ from repro.scene.needed import MissingError, needed
 from repro.scene.units import SceneError
 
 __all__ = ["KEYS", "OURS", "PRESETS", "Acceptor", "Aggregate", "Donor", "Flow", "Growth",
-           "Kinetics", "MissingError", "Numerics", "Output", "Pore", "Scene", "SceneError", "Source",
-           "Substrate", "Substrates", "label", "load_scene", "load_tables", "needed", "packaged_scenes", "parse_scene",
-           "scene_hash", "scene_tables"]
+           "Kinetics", "MissingError", "Numerics", "Output", "Pore", "Scene", "SceneError",
+           "Source", "Substrate", "Substrates", "label", "load_scene", "load_tables", "needed",
+           "packaged_scenes", "parse_scene", "scene_hash", "scene_tables"]

@@ -121,8 +121,8 @@ class Flow:
         about="Between the times of a table of head or mean_velocity: jumps, or an even change")
     biomass: str = choice(
         "viscous", "brinkman", source="2.1; the other one is discussed in 5",
-        about="What slows the water in the aggregate: a viscosity lambda times its own, or the drag "
-        "of a permeable body")
+        about="What slows the water in the aggregate: a viscosity lambda times its own, or the "
+        "drag of a permeable body")
     viscosity_ratio: float | None = number(
         LAMBDA, source="2.1, Table 1", stated="default 2000 with biomass = \"viscous\"",
         default=None, about="lambda, viscosity of the aggregate over that of water")
@@ -360,7 +360,8 @@ class Output:
     every growth.time_step or a power of two of it, 24 times or more."""
 
     times: tuple[float, ...] | None = times(
-        source="Figures 4-6", about="Times of the rows and fields wanted, which change no step; left out: every step, "
+        source="Figures 4-6",
+        about="Times of the rows and fields wanted, which change no step; left out: every step, "
         "with midpoint also every growth.time_step, or 2, 4, 8 ... of it with 24 rows or more")
     timeseries: str = choice(
         "csv", "netcdf", source=OURS,

@@ -182,7 +182,8 @@ def _biomass_rules(scene: "Scene", drive: "Flow") -> Rules:
         "flow.viscosity_ratio": 'flow.biomass = "viscous" is needed with it',
         "flow.biomass": f'"viscous" is needed with flow.viscosity_ratio = {drive.viscosity_ratio}',
     }
-    yield drag and scene.aggregate is None, {"flow.biomass": '"viscous" is needed without [aggregate]'}
+    alone = scene.aggregate is None
+    yield drag and alone, {"flow.biomass": '"viscous" is needed without [aggregate]'}
     wanted = '"quadratic" or "cubic" is needed with flow.biomass = "brinkman"'
     yield drag and scene.numerics.order == 1, {
         "flow.biomass": 'numerics.elements = "quadratic" or "cubic" is needed with it',
