@@ -116,9 +116,9 @@ def headline(result: Result) -> tuple[str, str]:
 def article(result: Result) -> list[Block]:
     """A case: what it says and how, its verdict, what is accepted, and, on pages, every number."""
     case = CASES[result.id]
-    told = (f"**{result.verdict}**. {case.claim} ({case.kind}). Norm: {case.norm}. Must fall short with: "
-            f"{', '.join(case.mutants)}.")
-    blocks = [Block("heading", result.id), Block("text", told)]
+    told = f"**{result.verdict}**. {case.claim} ({case.kind}). Norm: {case.norm}."
+    blocks = [Block("heading", result.id), Block("text", told),
+              Block("text", f"Must fall short with: {', '.join(case.mutants)}.", detail=True)]
     if result.error:
         blocks += [Block("text", "Stopped by an error: " + result.error.strip().splitlines()[-1]),
                    Block("error", result.error, detail=True)]
