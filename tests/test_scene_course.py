@@ -10,8 +10,10 @@ from hypothesis import strategies as st
 
 from repro.check.checked import check
 from repro.check.numbers import judged
+from repro.cli import main
 from repro.march.simulation import simulate, steps
 from repro.model import pore
+from repro.results import read_table
 from repro.scene import SceneError, load_scene, parse_scene, scene_hash, scene_tables
 from repro.scene.course import Course
 from repro.scene.text import scene_text
@@ -158,3 +160,16 @@ def test_a_run_over_jumps_is_the_same_from_any_state():
     whole = list(steps(made))
     for state, _ in whole[1:-1]:
         assert list(simulate(made, state=state))[-1].pore.mass == whole[-1][1].pore.mass
+
+
+def test_commands_take_tables(tmp_path):
+    """What a run expects of the machine, a sweep's processes, a longer run and pages. Mutants: memory expected of the
+    table itself; a table that a sweep's process does not know."""
+    tables = [part for entry in (*SHORT, RISING) for part in ("--set", entry)]
+    assert main(["check", "base", *tables]) == 0
+    assert main(["run", "base", *tables, "--out", str(tmp_path / "run")]) == 0
+    assert main(["run", "--resume", str(tmp_path / "run"), "--set", 'growth.end="1.2 h"']) == 0
+    said = ["--vary", "pore.width=50 um, 60 um", "--out", str(tmp_path / "sweep")]
+    assert main(["sweep", "base", *tables, *said]) == 0
+    assert (tmp_path / "run" / "report.html").exists()
+    assert read_table(tmp_path / "run" / "timeseries.csv")["time_h"][-1] == 1.2

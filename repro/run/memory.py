@@ -44,7 +44,7 @@ def expected_nodes(scene: Scene) -> float:
     sizes = [_seed(scene)]
     if scene.growth:
         with suppress(ArithmeticError):  # then the run itself says what is wrong
-            end = numbers.at_end(scene)
+            end = numbers.at_end(scene.largest)
             sizes.append((end.thickness, end.reach))
     return max(_nodes(scene, *size) for size in sizes)
 

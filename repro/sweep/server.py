@@ -24,6 +24,7 @@ from typing import Any
 from repro import results
 from repro.run.machine import conditions
 from repro.scene import Scene, load_scene
+from repro.scene.course import Course
 from repro.sweep import task
 
 #: For these processes: one thread each; and glibc keeps the memory that a run frees for its next
@@ -94,8 +95,8 @@ def _asked(line: str) -> tuple[Scene, Path, Path]:
 
 
 def _built(kind: Any, values: dict):
-    """The dataclass that `asdict` has taken apart."""
-    parts = {entry.name: entry.metadata.get("section") for entry in fields(kind)}
+    """The dataclass that `asdict` has taken apart; a part that is no section is a table."""
+    parts = {entry.name: entry.metadata.get("section", Course) for entry in fields(kind)}
     return kind(**{name: _built(parts[name], value) if isinstance(value, dict) else _frozen(value)
                    for name, value in values.items()})
 
