@@ -46,8 +46,8 @@ PROMISED = {"meshed_length_um": 0.08, "nodes": 0.15, "inlet_acceptor_mg_per_L": 
 OTHERS_PROMISED = 0.02
 #: Numbers of the last row that are round-off, or tell of the last step alone.
 NOT_PROMISED = ("_balance", "remeshed")
-#: Of a run's files, those without data: they hold times of day, or index the others.
-NOT_DATA = ("run.json", "report.html")
+#: Of a run's files, those without data: they hold times of day, or tell of the others.
+NOT_DATA = ("run.json", "report.html", "checkpoint.last", "fields.sha256")
 
 
 def environment() -> dict[str, str]:
