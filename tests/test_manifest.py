@@ -40,8 +40,8 @@ def drawn(x, label="h", many=()):
 
 
 def test_every_file_with_data_is_listed(folder, told):
-    """Fields by their arrays, so that the hashes of their files are none. Mutants: fields left out, run.json or the page
-    hashed with their times of day."""
+    """Fields by their arrays, so that the hashes of their files are none. Mutants: fields left out, run.json or the
+    page hashed with their times of day."""
     files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     there = files - {"run.json", "report.html", "checkpoint.last", "fields.sha256"}
     assert set(told["runs"]["initial_mesh"]["files"]) == there and "fields/fields_0000.vtu" in there
