@@ -18,8 +18,9 @@ from time import perf_counter
 from typing import TypeAlias
 
 from repro.check import numbers
-from repro.march import stepping, updates
+from repro.march import updates
 from repro.march.loop import Instant, PoreEnd, State
+from repro.march.simulation import row_times
 from repro.march.simulation import steps as steps_of
 from repro.scene import Scene, needed
 
@@ -128,7 +129,7 @@ def rows(scene: Scene) -> int:
     if scene.growth is None or scene.growth.end == 0:
         return 0
     if scene.numerics.time == "midpoint":
-        return len(scene.output.times or stepping.rows(scene))
+        return len(row_times(scene))
     ends, reported = updates.schedule(scene)
     return len(reported.difference(ends))
 

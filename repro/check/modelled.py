@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from repro.march import stepping
+from repro.march.simulation import row_times
 from repro.scene import Flow, Scene
 from repro.scene.course import Course
 
@@ -130,5 +130,5 @@ def _output(scene: Scene) -> Iterator[str]:
 
 def _every_step(scene: Scene) -> str:
     """The rows of a scene without output.times."""
-    rows = stepping.rows(scene) if scene.numerics.time == "midpoint" else ()
+    rows = row_times(scene)
     return "rows and fields of every step" + (f", and every {rows[0]:g} h" if rows else "")

@@ -157,13 +157,14 @@ def steps(scene: Scene, scheme: Scheme,
         yield state, Instant(now, solved, None, (), 0, newton_counts(solved))
     elif now.time > 0:
         refuse_end(scene, now)
-    rows = _rows(scene, scheme)
+    rows = row_times(scene, scheme)
+    largest = scene.largest
     end = scene.growth.end if scene.growth else 0.0
     while end - now.time > SAME_TIME:
         try:
             with stopping(now.time):
                 taken, solved, pace, cut = scheme.advance(scene, now, solved, state.pace)
-                balance.refuse(scene.largest, taken.pore, taken.ledger)
+                balance.refuse(largest, taken.pore, taken.ledger)
         except PoreEnd:
             if state.ledgers:  # steps that are not reported yet
                 yield reported(state, now.time), instant(state, now, solved, None)
@@ -187,7 +188,7 @@ def steps(scene: Scene, scheme: Scheme,
         refuse_end(scene, now)
 
 
-def _rows(scene: Scene, scheme: Scheme) -> tuple[float, ...]:
+def row_times(scene: Scene, scheme: Scheme) -> tuple[float, ...]:
     """Times (h) of rows after t = 0, ascending: ``output.times``, or those of the scheme."""
     if scene.growth is None:
         return ()

@@ -8,15 +8,15 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from repro.fem.linear import Method
-from repro.march import stepping, updates
-from repro.march.loop import Instant, State
+from repro.march import loop, stepping, updates
+from repro.march.loop import Instant, Scheme, State
 from repro.scene import Scene, Source, load_scene, parse_scene, scene_tables
 
 #: Points (x, y), um.
 Shape = Sequence[tuple[float, float]] | np.ndarray
 
 #: Ways to make steps, by the names that scenes have for them.
-WAYS = {"updates": updates.steps, "midpoint": stepping.steps}
+SCHEMES = {"updates": updates.SCHEME, "midpoint": stepping.SCHEME}
 
 
 def simulate(scene: Source, shape: Shape | None = None,
@@ -54,19 +54,21 @@ def ends_soon(scene: Scene, state: State) -> bool:
 
 def same_rows(one: Scene, other: Scene, time: float) -> bool:
     """Have runs of two scenes the same rows up to a time (h)?"""
-    first, second = ([row for row in _rows(scene) if row <= time] for scene in (one, other))
-    return first == second
+    first = [row for row in row_times(one) if row <= time]
+    return first == [row for row in row_times(other) if row <= time]
 
 
-def _rows(scene: Scene) -> Sequence[float]:
-    """Times (h) of rows beside the ends of steps."""
-    if scene.output.times is not None:
-        return scene.output.times
-    return stepping.rows(scene) if scene.numerics.time == "midpoint" else ()
+def row_times(scene: Scene) -> tuple[float, ...]:
+    """Times (h) of rows after t = 0, ascending: :func:`repro.march.loop.row_times`."""
+    return loop.row_times(scene, _scheme(scene))
+
+
+def _scheme(scene: Scene) -> Scheme:
+    return SCHEMES[scene.numerics.time]
 
 
 def steps(scene: Scene, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
     """Every step, t = 0 first: the state from which a run goes on bit for bit, and the Instant if
     one is due."""
     Method(scene.numerics.solver, scene.numerics.ordering).checked()
-    return WAYS[scene.numerics.time](scene, state)
+    return loop.steps(scene, _scheme(scene), state)

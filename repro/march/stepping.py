@@ -11,15 +11,14 @@ the run's end leave all steps as they are.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
 from repro.errors import StageError, Unresolved
-from repro.march import loop, midpoint
-from repro.march.loop import SAME_TIME, Instant, PoreEnd, Scheme, State, Step, laid_out
+from repro.march import midpoint
+from repro.march.loop import SAME_TIME, PoreEnd, Scheme, Step, laid_out
 from repro.march.pace import EXCESS, STRETCH, Pace, allowed, fitted, following
 from repro.model import remeshing
 from repro.model.pore import Pore, Solved
@@ -33,12 +32,6 @@ SHORTEST = 1e-3
 LEAST = 24
 #: Contact is met when the film is no thinner than this part of what it may be.
 LANDED = 0.995
-
-
-def steps(scene: Scene, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
-    """:func:`repro.march.loop.steps` by the midpoint rule; where there are no ``output.times``,
-    every step is reported, and what :func:`rows` says."""
-    return loop.steps(scene, Scheme(_advance, rows, FIRST), state)
 
 
 def rows(scene: Scene) -> tuple[float, ...]:
@@ -155,3 +148,6 @@ def _end_of(now: Pore, duration: float, corner: float) -> float:
 def _ending_at(taken: Step, end: float) -> Step:
     """The step with the time (h) of its end."""
     return replace(taken, pore=laid_out(replace(taken.pore, time=end)))
+
+#: The midpoint rule; where there are no ``output.times``, every step is reported, and :func:`rows`.
+SCHEME = Scheme(_advance, rows, FIRST)

@@ -8,21 +8,18 @@ moves (35) or, by the paper's criteria (3.1, 3.5), is made anew.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from repro.march import loop
 from repro.march.loop import (
     SAME_TIME,
-    Instant,
     Ledger,
     Moment,
     PoreEnd,
     Scheme,
-    State,
     Step,
     laid_out,
     pore_end,
@@ -62,11 +59,6 @@ def next_time(scene: Scene, time: float) -> tuple[float, bool]:
     if update < growth.end - max(SAME_TIME, SAME_TIME * growth.time_step):
         return update, False
     return growth.end, update != growth.end
-
-
-def steps(scene: Scene, state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
-    """:func:`repro.march.loop.steps` of the paper's scheme."""
-    return loop.steps(scene, Scheme(_advance), state)
 
 
 def _advance(scene: Scene, now: Pore, solved: Solved,
@@ -173,3 +165,6 @@ def enlarged(scene: Scene, now: Pore, after: Pore) -> np.ndarray:
     density = needed(scene.kinetics, "[kinetics]").maximum_density
     more = (total - before) / now.space.reaction.dx / density
     return now.theta * (1 + remeshing.spread(now.space, more))
+
+#: The paper's scheme.
+SCHEME = Scheme(_advance)

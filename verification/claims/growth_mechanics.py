@@ -20,22 +20,13 @@ from verification.claims import OF_SCHEME, Finding, at_least, at_most, between, 
 from verification.claims.levels import ALONE, WIDE_FINE, cached, current
 from verification.claims.restored import bodies
 from verification.claims.runs import WIDE, series
-from verification.problems.bodies import moduli
+from verification.problems.bodies import Supported, moduli
 
 RADIUS = 5.0
 
 
-@dataclass(frozen=True, eq=False)
-class Sliding:
-    """A body that slides on the wall y = 0 with its middle fixed (2.3.3); held: (n, 2) where a coordinate is so."""
-
-    body: growth.Body
-    held: np.ndarray
-
-    @property
-    def reference(self) -> np.ndarray:
-        """(n, 2) um, places at t = 0."""
-        return self.body.reference
+class Sliding(Supported):
+    """A body that slides on the wall y = 0 with its middle fixed (2.3.3)."""
 
     @property
     def triangles(self) -> np.ndarray:

@@ -161,8 +161,3 @@ def fields(run: tuple[str, ...], number: int) -> meshio.Mesh:
     """Fields of a run's row: ``number`` counts from 0 (-1: the last)."""
     found = history(*run)
     return results.fields(found.scene, found.instants[number].pore, found.instants[number].solved)
-
-
-def fields_at(run: tuple[str, ...], time: float) -> meshio.Mesh:
-    """Fields of a run in its row at a time (h)."""
-    return fields(run, row_number(run, time))
