@@ -152,7 +152,7 @@ def inverse_transpose(matrix: np.ndarray, det: np.ndarray) -> np.ndarray:
 def jacobian(corners: np.ndarray, bends: np.ndarray) -> np.ndarray:
     """(T, q, 2, 2) d x_i / d (s, t)_k of triangles with nodes (T, g, 2); bends: (q, g, 2), as those
     of a :class:`Table`."""
-    return by_component(np.moveaxis(corners, 2, 0)[:, None] @ bends.transpose(2, 1, 0))
+    return by_component(corners.transpose(2, 0, 1)[:, None] @ bends.transpose(2, 1, 0))
 
 
 @dataclass(frozen=True, eq=False)

@@ -236,27 +236,28 @@ def _constrained_delaunay(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     """(K, 3) counterclockwise triangles between the given nodes of one polygon."""
     pieces = shapely.constrained_delaunay_triangles(shapely.Polygon(points[nodes]))
     corners = shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3]
-    local, _ = _nearest(points[nodes], corners.reshape(-1, 2))
+    given = _complex(points[nodes])
+    ascending = np.argsort(given)
+    local = ascending[np.searchsorted(given[ascending], _complex(corners.reshape(-1, 2)))]
     triangles = nodes[local].reshape(-1, 3)
     turned = triangle_areas(points, triangles) < 0
     triangles[turned] = triangles[turned][:, ::-1]
     return triangles
 
 
+def _complex(points: np.ndarray) -> np.ndarray:
+    """(N,) x + i y of points (N, 2), which have an order."""
+    return np.ascontiguousarray(points).view(complex)[:, 0]
+
+
 def _find(new_points: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Indices of the prescribed points in the new mesh. Raises MeshError where one has moved."""
-    found, distance = _nearest(new_points, points)
+    tree = shapely.STRtree(shapely.points(new_points))
+    (_, found), distance = tree.query_nearest(shapely.points(points), return_distance=True,
+                                              all_matches=False)
     if distance.max() > 1e-9 * np.ptp(points[:, 0]) or len(np.unique(found)) < len(points):
         raise MeshError(f"the mesher moved a boundary node by {distance.max():.3g} um")
     return found
-
-
-def _nearest(points: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(K,) of the points (N, 2) the nearest to each of the places (K, 2), and its distance."""
-    tree = shapely.STRtree(shapely.points(points))
-    (_, found), distance = tree.query_nearest(shapely.points(places), return_distance=True,
-                                              all_matches=False)
-    return found, distance
 
 
 def unlocked(straight: Mesh) -> Mesh:
@@ -275,9 +276,9 @@ def unlocked(straight: Mesh) -> Mesh:
 def _region_edges(triangles: np.ndarray, biomass: np.ndarray) -> np.ndarray:
     """(T, 3) is edge i -> i + 1 on the boundary of the triangle's own region?"""
     edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
-    keys = np.column_stack([edges, np.repeat(biomass, 3)])
-    _, which, counts = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
-    return (counts[which.ravel()] == 1).reshape(-1, 3)
+    keys = (edges[:, 0] * (edges.max() + 1) + edges[:, 1]) * 2 + np.repeat(biomass, 3)
+    _, which, counts = np.unique(keys, return_inverse=True, return_counts=True)
+    return (counts[which] == 1).reshape(-1, 3)
 
 
 def _cornered(triangles: np.ndarray, biomass: np.ndarray) -> np.ndarray:

@@ -104,16 +104,18 @@ class Outline:
     def _extremes(self) -> tuple[float, float, float, float]:
         x, y = self.points.T
         if self.geometry == 2:
-            x, y = np.concatenate([*self._peaks(), self.points]).T
+            x, y = np.concatenate([self._peaks(), self.points]).T
         return float(x.min()), float(x.max()), float(y.max()), float(x[y.argmax()])
 
     def _peaks(self) -> np.ndarray:
-        """(2, arcs, 2) um, where each arc's x and y are stationary, or its start."""
-        nodes = self.arcs(self.points)
-        slope, bend = slopes(nodes)
-        flat = np.abs(bend) <= 1e-12 * np.ptp(self.points)
-        t = np.clip(np.where(flat, 0.0, -slope / np.where(flat, 1.0, bend)), 0.0, 1.0).T[..., None]
-        return nodes[:, 0] + t * (slope + 0.5 * t * bend)
+        """(K, 2) um, where x or y of an arc is stationary within it. From its middle on, t from -1
+        to 1, an arc is m + t (b - a) / 2 + t^2 (a - 2 m + b) / 2."""
+        a, m, b = self.arcs(self.points).transpose(1, 0, 2)
+        along = b - a
+        bend = a - 2 * m + b
+        arc, axis = np.nonzero(np.abs(along) < 2 * np.abs(bend))
+        t = (-0.5 * along[arc, axis] / bend[arc, axis])[:, None]
+        return m[arc] + 0.5 * t * along[arc] + 0.5 * t**2 * bend[arc]
 
 
 def polygon_area(points: np.ndarray) -> float:

@@ -172,6 +172,6 @@ class Space:
 
     def mean_over(self, edges: np.ndarray, field: np.ndarray) -> float:
         """Mean of a field (count,) over an end."""
-        load = self.summed(edges, self.end_loads(edges, np.ones(self.count)))
-        return float(load @ field / load.sum())
+        loads = self.end_loads(edges, np.ones(self.count))
+        return float(np.sum(loads * field[edges]) / loads.sum())
 

@@ -38,6 +38,8 @@ COVER = 1e-9
 OVERSHOOT = 1e-14
 #: Newton's steps to the place in a curved triangle.
 NEWTON_STEPS = 12
+#: The last step of it, after which the error is the square of this, on the unit triangle.
+CLOSE = 1e-8
 #: A triangle's map to t = 0 is taken as folded where its determinant falls under this part of its
 #: largest.
 FOLD = 0.02
@@ -100,7 +102,7 @@ def _inverted(nodes: np.ndarray, where: np.ndarray, geometry: int) -> np.ndarray
         dt = J[:, 0, 0] * apart[:, 1] - J[:, 1, 0] * apart[:, 0]
         step = np.stack([ds, dt], axis=1) / det[:, None]
         local[rest] = np.clip(now - step, -2.0, 3.0)
-        rest = rest[np.abs(step).max(axis=1) >= 1e-12]
+        rest = rest[np.abs(step).max(axis=1) >= CLOSE]
         if len(rest) == 0:
             break
     apart = np.einsum("ka,kai->ki", elements.values(2, local), nodes) - where

@@ -20,7 +20,7 @@ SLOWER = 0.2
 SAFETY = 0.9
 #: An estimate of up to so many tolerances is accepted: a step may exceed its ideal length by the
 #: root of it.
-EXCESS = 1.5
+EXCESS = 2.0
 STRETCH = EXCESS**0.5
 
 

@@ -161,12 +161,13 @@ def unit_flow(velocity: Space, viscosity_ratio: float = 1.0, *, interface: str =
     system = mesh.topology.system(("flow", interface, velocity.order),
                                   lambda: _system(velocity, interface))
     value = prescribed(velocity)
-    found = system.solve(blocks, np.zeros(len(value)), value)
+    load = system.product(blocks, value)
+    found = value + system.solve(blocks, -load)
     n = velocity.count
     u = found[: 2 * n].reshape(2, n).T
     pressure = found[2 * n:]
     if mobility is None:
-        return UnitFlow(u, pressure, None, work(system, blocks, found, value, mesh.width))
+        return UnitFlow(u, pressure, None, work(load, found, mesh.width))
     slope = np.einsum("tai,ta->ti", mesh.gradients, pressure[mesh.triangles])
     correction = np.einsum("tij,tj->ti", mobility, slope)
     return UnitFlow(u, pressure, correction, _drop(pressure_space(velocity), pressure))
@@ -213,11 +214,11 @@ def prescribed(velocity: Space) -> np.ndarray:
     return value
 
 
-def work(system: ElementSystem, blocks: np.ndarray, found: np.ndarray, value: np.ndarray,
-         width: float) -> float:
+def work(load: np.ndarray, found: np.ndarray, width: float) -> float:
     """Loss (1/um) as the work of the inlet per unit flux: (6) where the flow is developed, and of
-    the order of the energy, twice that of the velocity's gradient."""
-    return float(system.product(blocks, value) @ found) / width
+    the order of the energy, twice that of the velocity's gradient. load: (2n + m,), the system's
+    matrix times the prescribed values; found: (2n + m,), its solution."""
+    return float(load @ found) / width
 
 
 def _drop(space: Space, pressure: np.ndarray) -> float:

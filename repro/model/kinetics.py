@@ -107,14 +107,18 @@ def inert_rate(acceptor: Values, substrates: Substrates, kinetics: Kinetics) -> 
     return m_a * kinetics.decay_coefficient * (1 - kinetics.degradable_fraction)
 
 
-def mean_growth(exponent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(e^z - 1) / z, the mean over a step of what grows by e^z in it; and its derivative by z."""
+def mean_growth(exponent: np.ndarray) -> np.ndarray:
+    """(e^z - 1) / z, the mean over a step of what grows by e^z in it."""
     zero = exponent == 0
-    small = np.abs(exponent) < 1e-4
     z = np.where(zero, 1.0, exponent)
-    mean = np.where(zero, 1.0, np.expm1(z) / z)
-    slope = np.where(small, 0.5 + exponent / 3, (np.exp(z) - mean) / z)
-    return mean, slope
+    return np.where(zero, 1.0, np.expm1(z) / z)
+
+
+def mean_growth_slope(exponent: np.ndarray, mean: np.ndarray) -> np.ndarray:
+    """Derivative by z of :func:`mean_growth`, whose value is ``mean``."""
+    small = np.abs(exponent) < 1e-4
+    z = np.where(small, 1.0, exponent)
+    return np.where(small, 0.5 + exponent / 3, (np.exp(z) - mean) / z)
 
 
 def grow(active: np.ndarray, inert: np.ndarray, growth: np.ndarray, remains: np.ndarray,
@@ -124,7 +128,7 @@ def grow(active: np.ndarray, inert: np.ndarray, growth: np.ndarray, remains: np.
     active, inert: X_A, X_I, mg/L, or masses of them; growth, remains: F3/X_A and F4/X_A (1/h).
     Returns the new two.
     """
-    mean = mean_growth(growth * step)[0]
+    mean = mean_growth(growth * step)
     return active * (1 + growth * step * mean), inert + active * mean * remains * step
 
 
@@ -153,7 +157,7 @@ class Sink:
         m_a, m_d = fractions
         mass = self.active
         if self.duration > 0:
-            mass = self.active * mean_growth(self._exponent(fractions, kinetics))[0]
+            mass = self.active * mean_growth(self._exponent(fractions, kinetics))
         return mass[:, None] * np.stack(_of_fractions(m_a, m_d, kinetics), axis=1)
 
     def slopes(self, fractions: np.ndarray, kinetics: Kinetics) -> np.ndarray:
@@ -167,7 +171,9 @@ class Sink:
         if self.duration == 0:
             return self.active * by
         most = k * kinetics.yield_coefficient
-        mean, rise = mean_growth(self._exponent(fractions, kinetics))
+        exponent = self._exponent(fractions, kinetics)
+        mean = mean_growth(exponent)
+        rise = mean_growth_slope(exponent, mean)
         growth = self.duration * np.stack([most * m_d - kinetics.decay_coefficient, most * m_a])
         rates = np.stack(_of_fractions(m_a, m_d, kinetics))
         return self.active * (mean * by + rise * rates[:, None] * growth[None])

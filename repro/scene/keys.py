@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import MISSING, dataclass, replace
 from fractions import Fraction
+from functools import cached_property
 from math import inf
 from pathlib import Path
 
@@ -400,18 +401,23 @@ class Scene:
     numerics: Numerics = section(Numerics, about="How it is solved", source="Section 3")
     output: Output = section(Output, about="What is written", source=OURS)
 
+    @cached_property
+    def courses(self) -> list[Course]:
+        """All its tables over time."""
+        return courses(self)
+
     def at(self, time: float) -> "Scene":
         """With what its tables say at a time (h), after the jump that may be there."""
-        return constant(self, lambda table: table.at(time))
+        return constant(self, lambda table: table.at(time)) if self.courses else self
 
-    @property
+    @cached_property
     def largest(self) -> "Scene":
         """With the largest value of each of its tables."""
         return constant(self, lambda table: table.largest)
 
     def corner(self, time: float) -> float:
         """The first time (h) of its tables after this one; infinite where there is none."""
-        later = [corner for table in courses(self) for corner in table.times if corner > time]
+        later = [corner for table in self.courses for corner in table.times if corner > time]
         return min(later, default=inf)
 
     def __str__(self) -> str:
