@@ -21,8 +21,7 @@ TOLD = ((0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.3, 1.4, 1.5), (1.5, 1.
 
 def row(one: Sample, which: int, unseen: int) -> list:
     """A row of SHAPES; which: of the sample's lambdas."""
-    grown = int(one.source.startswith("Growth"))
-    return [unseen, grown, int(one.spanned), one.ratios[which], one.share, one.lengths[which]]
+    return [unseen, int(one.run is not None), int(one.spanned), one.ratios[which], one.share, one.lengths[which]]
 
 
 def read(unseen: bool) -> dict[str, np.ndarray]:

@@ -60,20 +60,20 @@ class Growth:
 
 @dataclass(frozen=True)
 class Sample:
-    """One aggregate. source: where it is from, all of one run alike; spanned: does it touch both walls? share: A / W^2;
-    ratios, lengths: some lambdas, and r for each."""
+    """One aggregate. run: that has made it, None: drawn; spanned: does it touch both walls? share: A / W^2; ratios,
+    lengths: some lambdas, and r for each."""
 
-    source: str
+    run: Growth | None
     spanned: bool
     share: float
     ratios: tuple[float, ...]
     lengths: tuple[float, ...]
 
 
-def sample(source: str, now: Pore, ratios=RATIOS) -> Sample:
+def sample(now: Pore, ratios: tuple[float, ...] = RATIOS, run: Growth | None = None) -> Sample:
     """The added lengths of an aggregate in its mesh."""
     share = now.boundary.area / now.mesh.width**2
-    return Sample(source, now.contact, share, ratios, tuple(added_length(now.space, ratio) for ratio in ratios))
+    return Sample(run, now.contact, share, ratios, tuple(added_length(now.space, ratio) for ratio in ratios))
 
 
 def added_length(space: Space, ratio: float) -> float:
@@ -131,4 +131,4 @@ def grown(run: Growth, most: float, apart: float, ratios=RATIOS) -> Iterator[Sam
             return
         if share > apart * last:
             last = share
-            yield sample(str(run), instant.pore, ratios)
+            yield sample(instant.pore, ratios, run)

@@ -33,7 +33,7 @@ COLUMNS = ["spanned", "viscosity_ratio", "area_over_width2", "added_length_over_
 
 def half_discs() -> list[Sample]:
     """Of the table."""
-    return [shapes.sample("half-disc", shapes.half_disc(thickness)) for thickness in THICKNESSES]
+    return [shapes.sample(shapes.half_disc(thickness)) for thickness in THICKNESSES]
 
 
 def others() -> Iterator[Sample]:
@@ -42,9 +42,9 @@ def others() -> Iterator[Sample]:
     for radius, thicker, leaning in product(between, (1.0, *shapes.THICKER), (0.0, shapes.LEANING)):
         if radius * thicker <= shapes.THICKEST:
             points = shapes.body(0.5 * np.pi * radius**2, thicker, leaning)
-            yield shapes.sample("drawn body", shapes.drawn(points))
+            yield shapes.sample(shapes.drawn(points))
     for share, ends, upstream in product((2.1, 2.7, 3.2, 3.7, 4.2), shapes.ENDS, (0.5, shapes.UPSTREAM)):
-        yield shapes.sample("drawn plug", shapes.drawn(shapes.plug(share, ends, upstream)))
+        yield shapes.sample(shapes.drawn(shapes.plug(share, ends, upstream)))
     for run in RUNS:
         yield from shapes.grown(run, MOST, APART)
 
@@ -55,7 +55,7 @@ def rows(discs: list[Sample], found: list[Sample]) -> list[list]:
     shares, lengths = np.array([one.share for one in discs]), np.array([one.lengths for one in discs])
     plugs = np.array(PLUGS)
     apart = departures(before, lambda one: law(shares, lengths, one.share))
-    far = departures(after, lambda one: law(plugs, mean_of_runs(after, but=one.source), one.share))
+    far = departures(after, lambda one: law(plugs, mean_of_runs(after, but=one.run), one.share))
     return [*_lines(0, shares, lengths, bounds(shares, before, apart)),
             *_lines(1, plugs, mean_of_runs(after), bounds(plugs, after, far))]
 
@@ -76,14 +76,14 @@ def departures(found: list[Sample], expected: Callable[[Sample], np.ndarray]) ->
     return np.array([np.array(one.lengths) / expected(one) - 1 for one in found])
 
 
-def mean_of_runs(found: list[Sample], but: str = "") -> np.ndarray:
-    """(m, l) geometric mean of r at the areas PLUGS over the runs of the fit that reach them, one of them left out."""
+def mean_of_runs(found: list[Sample], but: Growth | None = None) -> np.ndarray:
+    """(m, l) geometric mean of r at the areas PLUGS over the runs that reach them, one of them left out."""
     curves = []
-    for name in (str(run) for run in RUNS if str(run) != but):
-        run = [one for one in found if one.source == name]
-        place = np.log([one.share for one in run])
+    for run in dict.fromkeys(one.run for one in found if one.run not in (None, but)):
+        made = [one for one in found if one.run == run]
+        place = np.log([one.share for one in made])
         curves.append([np.interp(np.log(PLUGS), place, column, np.nan, np.nan)
-                       for column in np.log([one.lengths for one in run]).T])
+                       for column in np.log([one.lengths for one in made]).T])
     return np.exp(np.nanmean(curves, axis=0)).T
 
 

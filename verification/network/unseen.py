@@ -37,20 +37,19 @@ def drawn(random: np.random.Generator) -> Iterator[Sample]:
         width, ratio = _log(random, *WIDTHS), _ratio(random)
         thickness, position = random.uniform(*THICKNESSES), random.uniform(-1, 1) * width
         now = shapes.half_disc(thickness, width, position, shapes.QUICK)
-        yield shapes.sample("half-disc", now, (ratio,))
+        yield shapes.sample(now, (ratio,))
     for _ in range(BODIES):
         thicker, leaning = random.uniform(*shapes.THICKER), random.uniform(-1, 1) * shapes.LEANING
         radius = random.uniform(THICKNESSES[0], THICKNESSES[1] / max(thicker, 1))
-        yield _outlined("drawn body", shapes.body(0.5 * np.pi * radius**2, thicker, leaning), random)
+        yield _outlined(shapes.body(0.5 * np.pi * radius**2, thicker, leaning), random)
     for _ in range(PLUGS):
         share, ends = random.uniform(*SHARES), random.uniform(*shapes.ENDS)
-        yield _outlined("drawn plug", shapes.plug(share, ends, random.uniform(1 - shapes.UPSTREAM, shapes.UPSTREAM)),
-                        random)
+        yield _outlined(shapes.plug(share, ends, random.uniform(1 - shapes.UPSTREAM, shapes.UPSTREAM)), random)
 
 
-def _outlined(source: str, points: np.ndarray, random: np.random.Generator) -> Sample:
+def _outlined(points: np.ndarray, random: np.random.Generator) -> Sample:
     now, ratio = shapes.drawn(points, _log(random, *WIDTHS)), _ratio(random)
-    return shapes.sample(source, now, (ratio,))
+    return shapes.sample(now, (ratio,))
 
 
 def grown(random: np.random.Generator) -> Iterator[Sample]:
