@@ -53,14 +53,15 @@ def _outlined(points: np.ndarray, random: np.random.Generator) -> Sample:
 
 
 def grown(random: np.random.Generator) -> Iterator[Sample]:
-    """Some shapes of a run that are in the law's range, from the first to the last."""
+    """Shapes of a run that are in the law's range, their areas evenly from the first to the last."""
     width, velocity = random.uniform(40, 150), _log(random, 0.5, 6)
     supply = _log(random, max(shapes.LEAST_SUPPLY * width**2, 4), 20)
     run = Growth(width, velocity, supply, random.uniform(0.05, 0.15) * width, random.uniform(-0.5, 0.5) * width, END)
     ratio = _ratio(random)
     found = [one for one in shapes.grown(run, MOST, APART, (ratio,)) if _known(one)]
-    for k in np.linspace(0, len(found) - 1, OF_EACH).astype(int):
-        yield found[k]
+    shares = np.array([one.share for one in found])
+    for share in np.linspace(shares[0], shares[-1], OF_EACH):
+        yield found[int(np.abs(shares - share).argmin())]
 
 
 def _known(one: Sample) -> bool:
