@@ -51,7 +51,7 @@ def added_resistance(area: ArrayLike, width: ArrayLike, spanned: ArrayLike,
     2.1 and the paper's condition on its surface [E2], 1.5 W or more from the pore's ends.
 
     Raises ValueError where area / width^2, for such an aggregate, or viscosity_ratio is outside
-    the table (0.004 to 1.5 before contact, 1.5 to 4.5 after it, lambda 100 to 10 000): an empty pore
+    the table (0.004 to 1.5 before contact, 1.6 to 4.5 after it, lambda 100 to 10 000): an empty pore
     is not in it.
     """
     share = np.asarray(area, float) / np.square(np.asarray(width, float))

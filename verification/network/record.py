@@ -16,7 +16,7 @@ COLUMNS = ["unseen", "grown", "spanned", "viscosity_ratio", "area_over_width2", 
 #: The lambda of the fit's shapes there: the paper's.
 RATIO = 2000.0
 #: Areas over W^2 that the page tells, before contact and after it.
-TOLD = ((0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.3, 1.4, 1.5), (1.5, 1.75, 2.0, 2.5, 3.0, 4.0, 4.5))
+TOLD = ((0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.3, 1.4, 1.5), (1.6, 1.75, 2.0, 2.5, 3.0, 4.0, 4.5))
 
 
 def row(one: Sample, which: int, unseen: int) -> list:
