@@ -36,8 +36,7 @@ Where the paper is in the code, whose modules name the equations that they solve
     2    coupling, 3.3                      repro.march.updates (the paper's shape updates)
          steps by their error               repro.march.midpoint, .stepping, .pace (not the paper's)
          the loop of both                   repro.march.loop, .simulation
-    4    results                            repro.results, .columns, .arrays, .tables
-    5    a law for networks                 repro.results.network
+    4, 5  results, a law for networks       repro.results, .columns, .arrays, .tables, .network
 
 Where data enters, and what it passes:
 
