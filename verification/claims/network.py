@@ -10,6 +10,9 @@ from verification.claims.levels import WIDE_FINE
 from verification.claims.permeability import clean
 from verification.claims.runs import BASE, WIDE, scene, series
 
+#: From this A / W^2 on, thicknesses of a quarter of W: what less of an aggregate adds is, in the scheme of 2001, under
+#: the error of the empty channel.
+LEAST = 0.1
 INCORPORATED, BOUND = "can be incorporated", "one: the bound of the law, made of other runs and drawn shapes"
 
 
@@ -27,12 +30,12 @@ def for_networks() -> Finding:
 
 
 def beyond(run: tuple[str, ...], spanned: bool) -> np.ndarray:
-    """(n,) ln(r / law's r) of a run's rows in the law's range, over the ln of its bound on that side."""
+    """(n,) ln(r / law's r) of a run's rows in the law's range from LEAST on, over the ln of its bound on that side."""
     said, rows = scene(*run), series(*run)
     width = said.pore.width
     low, high = known(spanned)
     share = rows["aggregate_area_um2"] / width**2
-    here = (rows["contact"] == spanned) & (share >= low) & (share <= high)
+    here = (rows["contact"] == spanned) & (share >= max(low, LEAST)) & (share <= high)
     resisted = 24e-6 * clean(said) / rows["conductivity_m_per_d"][here] - 1
     law, least, most = np.log(added_resistance(share[here], 1.0, spanned, said.flow.viscosity_ratio))
     apart = np.log(resisted * said.pore.length / width) - law
