@@ -114,6 +114,13 @@ def test_what_it_does_not_know_is_refused(area, spanned, ratio, told):
     assert str(error.value).startswith(f"added_resistance: {told}") and "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize("width", [0.0, -50.0, float("nan")])
+def test_a_pore_without_width_is_refused(width):
+    """Mutant: the square of a negative width taken."""
+    with pytest.raises(ValueError, match="^added_resistance: width is not known; more than zero is accepted$"):
+        repro.added_resistance(2500.0, [100.0, width], False)
+
+
 def test_the_ends_of_the_range_are_in_it():
     """Mutant: the ends of the table taken for what is beyond."""
     for spanned in (False, True):

@@ -50,11 +50,14 @@ def added_resistance(area: ArrayLike, width: ArrayLike, spanned: ArrayLike,
     The head loss of a pore is 12 nu u_ave / (g W^2) (L + length W), with the viscous aggregate of
     2.1 and the paper's condition on its surface [E2], 1.5 W or more from the pore's ends.
 
-    Raises ValueError where area / width^2, for such an aggregate, or viscosity_ratio is outside
-    the table (0.004 to 1.5 before contact, 1.6 to 4.5 after it, lambda 100 to 10 000): an empty pore
-    is not in it.
+    Raises ValueError where a width is not above zero, or where area / width^2, for such an
+    aggregate, or viscosity_ratio is outside the table (0.004 to 1.5 before contact, 1.6 to 4.5
+    after it, lambda 100 to 10 000): an empty pore is not in it.
     """
-    share = np.asarray(area, float) / np.square(np.asarray(width, float))
+    width = np.asarray(width, float)
+    if not (width > 0).all():
+        raise ValueError("added_resistance: width is not known; more than zero is accepted")
+    share = np.asarray(area, float) / width**2
     share, spanned = np.broadcast_arrays(share, np.asarray(spanned, bool))
     found = np.empty((3, *share.shape))
     for kind in (False, True):
