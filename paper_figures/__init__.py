@@ -5,5 +5,6 @@
 take the folder of each of those runs, or compute them: `draw() -> Figure` and `caption() -> str`.
 """
 
-#: In the order of the paper; the last one is an addition.
-FIGURES = ("figure_2", "figure_3", "figure_4", "figure_5", "plate_1", "plate_2", "figure_6", "time_series")
+#: In the order of the paper; the last two are additions.
+FIGURES = ("figure_2", "figure_3", "figure_4", "figure_5", "plate_1", "plate_2", "figure_6", "time_series",
+           "network")

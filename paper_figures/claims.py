@@ -30,6 +30,7 @@ STATEMENTS = {
     "C31": "the shape stays a half-disc until growth is limited or the aggregate squeezed",
     "C33": "Base is fully penetrated by its substrates",
     "C35": "fluid flows around the aggregate, and through it once it spans the pore",
+    "C44": "a pore can be incorporated into a network model",
 }
 
 

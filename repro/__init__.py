@@ -36,7 +36,7 @@ Where the paper is in the code, whose modules name the equations that they solve
     2    coupling, 3.3                      repro.march.updates (the paper's shape updates)
          steps by their error               repro.march.midpoint, .stepping, .pace (not the paper's)
          the loop of both                   repro.march.loop, .simulation
-    4    results                            repro.results, .columns, .arrays, .tables
+    4, 5  results, a law for networks       repro.results, .columns, .arrays, .tables, .network
 
 Where data enters, and what it passes:
 
@@ -67,6 +67,7 @@ if TYPE_CHECKING:
     from repro.errors import OutputError, SimulationError
     from repro.march.loop import PoreEnd
     from repro.march.simulation import simulate
+    from repro.results.network import added_resistance
     from repro.results.tables import Results, solve
     from repro.run.loading import load_run
     from repro.run.running import resume, run
@@ -79,9 +80,10 @@ else:
     #: second.
     _MODULES = {"OutputError": "errors", "PoreEnd": "march.loop", "Results": "results.tables",
                 "Scene": "scene", "SceneError": "scene", "SimulationError": "errors",
-                "check": "check.checked", "load_run": "run.loading", "load_scene": "scene",
-                "resume": "run.running", "run": "run.running", "simulate": "march.simulation",
-                "solve": "results.tables", "sweep": "sweep.making"}
+                "added_resistance": "results.network", "check": "check.checked",
+                "load_run": "run.loading", "load_scene": "scene", "resume": "run.running",
+                "run": "run.running", "simulate": "march.simulation", "solve": "results.tables",
+                "sweep": "sweep.making"}
 
     def __getattr__(name: str):
         if name == "__version__":
@@ -103,5 +105,6 @@ else:
 
     sys.modules[__name__].__class__ = _Package
 
-__all__ = ["OutputError", "PoreEnd", "Results", "Scene", "SceneError", "SimulationError", "check",
-           "load_run", "load_scene", "resume", "run", "simulate", "solve", "sweep"]
+__all__ = ["OutputError", "PoreEnd", "Results", "Scene", "SceneError", "SimulationError",
+           "added_resistance", "check", "load_run", "load_scene", "resume", "run", "simulate",
+           "solve", "sweep"]

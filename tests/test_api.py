@@ -134,7 +134,7 @@ OTHERS = {"errors", "files"}
 def test_what_the_package_ships():
     """Mutant: data left out of the wheel."""
     project = (importlib.resources.files("repro") / ".." / "pyproject.toml").read_text(encoding="utf-8")
-    for name in ("py.typed",):
+    for name in ("py.typed", "results/network.csv"):
         assert (importlib.resources.files("repro") / name).is_file() and f'"{name}"' in project
 
 

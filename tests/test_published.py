@@ -157,8 +157,9 @@ def test_wheel_and_source_distribution_hold_what_they_should(tmp_path):
     (wheel,), (source,) = ((tmp_path / "dist").glob(kind) for kind in ("*.whl", "*.tar.gz"))
     inside = zipfile.ZipFile(wheel).namelist()
     data = {f"repro/scene/packaged/{path.name}" for path in (ROOT / "repro" / "scene" / "packaged").glob("*.toml")}
+    data.add("repro/results/network.csv")
     assert {name.partition("/")[0] for name in inside} == {"repro", f"dupin2001_repro-{PROJECT['version']}.dist-info"}
-    assert data <= set(inside) and len(data) >= 4
+    assert data <= set(inside) and len(data) >= 5
     with tarfile.open(source) as archive:
         packed = {name.partition("/")[2] for name in archive.getnames()}
     wanted = {name for name in listed if name.endswith((".py", ".md", ".toml", ".json", ".lock", ".yml", ".cff"))}

@@ -91,16 +91,6 @@ def growth_rate(acceptor: Values, donor: Values, substrates: Substrates,
     return m_a * (most * m_d - kinetics.decay_coefficient)
 
 
-def growth_slopes(acceptor: np.ndarray, donor: np.ndarray, substrates: Substrates,
-                  kinetics: Kinetics) -> tuple[np.ndarray, np.ndarray]:
-    """Its derivatives by C_A and C_D (1/h per mg/L)."""
-    m_a, m_d = fractions(acceptor, donor, substrates)
-    d_a = np.where(acceptor > 0, monod(acceptor, substrates.acceptor.half_saturation)[1], 0.0)
-    d_d = np.where(donor > 0, monod(donor, substrates.donor.half_saturation)[1], 0.0)
-    most = kinetics.maximum_utilization_rate * kinetics.yield_coefficient
-    return d_a * (most * m_d - kinetics.decay_coefficient), m_a * most * d_d
-
-
 def inert_rate(acceptor: Values, substrates: Substrates, kinetics: Kinetics) -> Values:
     """F4 / X_A (1/h), inert remains left by decay (10)."""
     m_a = monod(np.maximum(acceptor, 0.0), substrates.acceptor.half_saturation)[0]

@@ -1,0 +1,134 @@
+"""Aggregates whose added resistance the law is made of: half-discs, bodies drawn alike, and what growth makes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from repro.fem.space import Space
+from repro.march.simulation import simulate
+from repro.model import flow, pore
+from repro.model.pore import Pore
+from repro.scene import load_scene
+
+#: Of the table.
+RATIOS = (100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0, 10000.0)
+#: Length of the pores over their width: growth upstream has room.
+LENGTH = 15.0
+#: Width (um) of the pores of drawn shapes: any other gives the same.
+WIDTH = 100.0
+#: Elements of what the law is, over the whole pore; and of what it is compared with. On half-discs of R / W from 0.05
+#: to 0.96 they differ from the preset `exact` by 0.2 % and by 0.8 % at most.
+FINE = ('numerics.preset="accurate"', 'numerics.extent="full"')
+QUICK = ('numerics.preset="fast"',)
+#: Ranges of drawn bodies, which are those of what growth makes before contact: thickness over that of the half-disc of
+#: the same area; how far the top leans to either side, over its height. Of drawn plugs: length of the contact surface
+#: with the lower wall less that with the upper one, over W, and the larger share of that on one side.
+THICKER, LEANING, ENDS, UPSTREAM = (0.99, 1.03), 0.05, (1.15, 1.4), 0.6
+#: Least supply (mg/L) over W^2 (um2): with less growth is limited by diffusion, and bodies are thicker than that.
+LEAST_SUPPLY = 1 / 2500
+#: A quarter of an ellipse that is cut here meets the upper wall at an angle.
+STEEPEST = np.radians(75.0)
+#: A film is W / 50 at least.
+THICKEST = 0.98
+
+
+@dataclass(frozen=True)
+class Growth:
+    """A run from a half-disc. width: um; velocity: m/d; supply: mg/L of both; radius, position: of the seed, um; end:
+    h, the last of its rows."""
+
+    width: float
+    velocity: float
+    supply: float
+    radius: float
+    position: float
+    end: int
+
+    def scene(self):
+        """In the preset `fast`, a row an hour."""
+        times = ", ".join(f'"{hour} h"' for hour in range(self.end + 1))
+        return load_scene({
+            "pore": {"width": f"{self.width} um", "length": f"{LENGTH * self.width} um"},
+            "aggregate": {"radius": f"{self.radius} um", "position": f"{self.position} um"},
+            "flow": {"mean_velocity": f"{self.velocity} m/d"},
+            "substrates": {name: {"supply": f"{self.supply} mg/L"} for name in ("acceptor", "donor")},
+            "growth": {"end": f"{self.end} h"}}, (*QUICK, f"output.times=[{times}]"))
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One aggregate. run: that has made it, None: drawn; spanned: does it touch both walls? share: A / W^2; ratios,
+    lengths: some lambdas, and r for each."""
+
+    run: Growth | None
+    spanned: bool
+    share: float
+    ratios: tuple[float, ...]
+    lengths: tuple[float, ...]
+
+
+def sample(now: Pore, ratios: tuple[float, ...] = RATIOS, run: Growth | None = None) -> Sample:
+    """The added lengths of an aggregate in its mesh."""
+    share = now.boundary.area / now.mesh.width**2
+    return Sample(run, now.contact, share, ratios, tuple(added_length(now.space, ratio) for ratio in ratios))
+
+
+def added_length(space: Space, ratio: float) -> float:
+    """r: the loss of the meshed part over that of an empty one of length W, less its own length over W."""
+    mesh = space.mesh
+    loss = flow.unit_flow(space, ratio).loss
+    return loss / flow.poiseuille_loss(mesh.width, mesh.width) - (mesh.ends[1] - mesh.ends[0]) / mesh.width
+
+
+def half_disc(thickness: float, width: float = WIDTH, position: float = 0.0, elements=FINE) -> Pore:
+    """On one wall; thickness: over W; position: of its middle (um)."""
+    return _seeded({"radius": f"{thickness * width} um", "position": f"{position} um"}, width, elements)
+
+
+def drawn(points: np.ndarray, width: float = WIDTH, elements=QUICK) -> Pore:
+    """A body with an outline (K, 2), in widths of the pore."""
+    text = [[f"{x!r} um", f"{y!r} um"] for x, y in (width * points).tolist()]
+    return _seeded({"outline": text}, width, elements)
+
+
+def _seeded(aggregate: dict, width: float, elements) -> Pore:
+    tables = {"pore": {"width": f"{width} um", "length": f"{LENGTH * width} um"}, "aggregate": aggregate,
+              "flow": {"mean_velocity": "1 m/d"}}
+    return pore.seeded(load_scene(tables, elements))
+
+
+def body(share: float, thicker: float, leaning: float) -> np.ndarray:
+    """(K, 2) half an ellipse of an area over W^2, `thicker` times as thick as the half-disc, sheared downstream."""
+    radius = np.sqrt(2 * share / np.pi)
+    angle = np.linspace(np.pi, 0.0, 61)
+    y = radius * thicker * np.sin(angle)
+    y[[0, -1]] = 0.0
+    return np.column_stack([radius / thicker * np.cos(angle) + leaning * y, y])
+
+
+def plug(share: float, ends: float, upstream: float) -> np.ndarray:
+    """(K, 2) a plug of an area over W^2 whose ends are quarters of ellipses, cut where they are flat: `ends` long
+    together over W, of which `upstream` is one end's share."""
+    angle = np.linspace(0.0, STEEPEST, 25)
+    x, y = (1 - np.cos(angle)) / (1 - np.cos(STEEPEST)), np.sin(angle) / np.sin(STEEPEST)
+    y[-1] = 1.0
+    beside = ends * float(np.sum(0.5 * (x[1:] + x[:-1]) * np.diff(y)))
+    base = share + beside
+    left = np.column_stack([-base / 2 + upstream * ends * x, y])
+    right = np.column_stack([base / 2 - (1 - upstream) * ends * x, y])
+    return np.vstack([left, right[::-1]])
+
+
+def grown(run: Growth, most: float, apart: float, ratios=RATIOS) -> Iterator[Sample]:
+    """What a run makes, up to an area over W^2, each larger than the one before by a factor `apart` at least."""
+    last = 0.0
+    for instant in simulate(run.scene()):
+        share = instant.pore.boundary.area / run.width**2
+        if share > most:
+            return
+        if share > apart * last:
+            last = share
+            yield sample(instant.pore, ratios, run)
