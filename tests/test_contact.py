@@ -109,6 +109,14 @@ def flat_top(heights, width=20.0):
     return Outline(points, wall, np.arange(len(points)) == 2, points.copy(), 2), 6 + np.arange(count)
 
 
+def test_contact_begins_to_both_sides_of_the_highest_place():
+    """Over the film's least thickness, 2.5 um, though the highest corner alone is too near: nodes are 1 um apart."""
+    x = np.linspace(10.0, -10.0, 21)
+    shape, top = flat_top(17.52 - 0.05 * x**2)
+    joins = contact.closing(shape, 20.0, 2.5, 0.0)
+    assert np.array_equal(np.flatnonzero(joins == TOP), top[8:13])
+
+
 def test_a_middle_never_joins_alone():
     """An arc of which only the middle is too near brings its nearer corner; a middle joins with both corners. Mutants:
     the rule of straight edges on all nodes alike, the farther corner."""

@@ -1,11 +1,20 @@
 """How long the steps of the midpoint rule are."""
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from repro.march.pace import EXCESS, FASTER, SAFETY, SLOWER, STRETCH, Pace, allowed, fitted, following
+from repro.model.biomass import Rates, change
 
 LENGTHS = st.floats(1e-3, 1e3)
+
+
+def test_what_bounds_a_step_is_a_mean_over_the_area():
+    """Of the size of the change: points of 1, 1, 6 and 2 um2 in which the rates change by 1, -1, 0.5 and 0 1/h."""
+    first, second = (Rates(np.array(growth), np.full((2, 2), 0.25))
+                     for growth in ([[0.0, 1.0], [0.5, 2.0]], [[1.0, 0.0], [1.0, 2.0]]))
+    assert change(first, second, np.array([[1.0, 1.0], [6.0, 2.0]])) == pytest.approx(0.5, rel=1e-15)
 
 
 @given(LENGTHS, st.floats(1e-6, 1e3), st.sampled_from([1.0, STRETCH]))

@@ -115,6 +115,17 @@ def test_areas_are_integrated_exactly(meshes, kind, order):
         assert space.reaction.dx.sum() == pytest.approx(mesh.area(), rel=1e-12)
 
 
+@orders
+@kinds
+def test_products_of_two_functions_are_integrated_exactly(meshes, kind, order):
+    """Beside arcs too, where the determinant of the map is not constant: as by a rule of degree 14, to round-off."""
+    mesh = meshes[kind]
+    space, finer = Space(mesh, order), elements.table(order, mesh.geometry, 14)
+    dx = elements.points(mesh.points[mesh.cells], finer).dx
+    exact = np.einsum("tq,qa,qb->tab", dx, finer.values, finer.values)
+    assert np.abs(space.mass(space.at.dx) - exact).max() < 1e-13 * exact.max()
+
+
 @pytest.mark.parametrize("kind, error", [("straight", 2e-2), ("made", 1e-5)])
 def test_the_aggregate_is_the_half_disc(meshes, kind, error):
     """Arcs come closer than chords. Mutant: the area between the corners for that of the arcs."""
