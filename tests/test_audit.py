@@ -13,7 +13,7 @@ from verification.audit.choices import CHOICES
 
 @pytest.mark.parametrize("choice", CHOICES, ids=lambda choice: choice.alternative)
 def test_a_choice_changes_what_it_names_and_nothing_else(choice):
-    """Against the paper's preset. Mutant: a change of the default to itself."""
+    """Against the paper's preset."""
     plain, changed = (scene_tables(measure.scene(*changes)) for changes in ((), choice.changes))
     apart = [f"{name}.{key}" for name, table in plain.items() if isinstance(table, dict) for key in table
              if table[key] != changed[name][key]]

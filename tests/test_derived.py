@@ -421,8 +421,7 @@ def test_every_line_of_every_chart_is_the_column_that_it_names():
 
 def test_counts_are_of_every_step_with_several_a_row_and_over_resumes(tmp_path, monkeypatch):
     """Newton's iterations (of solves that converge) and new meshes, counted where they are made, against run.json of
-    the same run in one piece and of one that is stopped after every step. Mutants: counts of the last step alone, of
-    the last row alone, of t = 0 left out."""
+    the same run in one piece and of one that is stopped after every step."""
     scene = load_scene("base", ["numerics.refinement=0.5", *CONTACT, 'output.times=["0.6 h"]'])
     made = Counter()
     solve, remesh = Newton.solve, remeshing.remesh
