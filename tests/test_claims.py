@@ -40,7 +40,7 @@ from verification.uncertainty import Bar, Estimate
 
 def sure(check, half=0.0):
     """A check with a bar of half a width."""
-    return replace(check, bar=Bar(check.ours - half, check.ours + half))
+    return replace(check, bar=Bar(check.value - half, check.value + half))
 
 
 GOOD = claims.near("speed (m/d)", "2.9", 2.91, 2.9, relative=0.01, why="1 %")
@@ -84,7 +84,7 @@ def test_each_verdict_follows_from_the_checks_and_their_bars(finding, verdict):
     (Finding((HELD, FAILED)), "no reason"),
     (Finding((DOUBTED_FAILURE,)), "no reason"),
     (Finding(()), "nothing is checked"),
-    (Finding((replace(HELD, ours=math.nan),), reason="why"), "not a number"),
+    (Finding((replace(HELD, value=math.nan),), reason="why"), "not a number"),
     (Finding((HELD, GOOD)), "no error bar"),
 ])
 def test_no_verdict_without_numbers_or_bars_or_without_a_reason(finding, said):
@@ -134,8 +134,8 @@ def test_words_are_no_interval(text):
     (claims.between("q", "1 to 2", 0, 1, 2, ""), (1, 2), (0.99, 2.01, math.nan)),
 ])
 def test_a_check_holds_in_its_range_alone(check, inside, outside):
-    assert all(replace(check, ours=value).holds for value in inside)
-    assert not any(replace(check, ours=value).holds for value in outside)
+    assert all(replace(check, value=value).holds for value in inside)
+    assert not any(replace(check, value=value).holds for value in outside)
 
 
 @pytest.mark.parametrize("tolerances", [{}, {"relative": 0.1, "absolute": 0.1}])
@@ -203,7 +203,7 @@ def test_a_level_that_fails_is_told_and_no_verdict(registry, capsys):
 def test_a_bar_that_reaches_over_its_bound_is_undecided(registry, capsys):
     """The speed falls in proportion to the elements: its limit is 0.06 under the value at size 1, the bar 1.25 times
     that."""
-    registered("C01", lambda: Finding((replace(GOOD, ours=2.85 + 0.06 * levels.current().size),), reason="coarse"),
+    registered("C01", lambda: Finding((replace(GOOD, value=2.85 + 0.06 * levels.current().size),), reason="coarse"),
                about=claims.OF_SCHEME)
     driver.main(["C01"])
     out = capsys.readouterr().out
@@ -344,7 +344,7 @@ def test_coordinates_perturbed_by_1e_12_change_no_verdict_and_leave_no_interval(
     known = {each["id"]: each for each in kept}
     for id, finding in found.items():
         for check, recorded in zip(finding.checks, known[id]["checks"], strict=True):
-            assert record.inside(check.ours, recorded["low"], recorded["high"]), (id, check.quantity, check.ours)
+            assert record.inside(check.value, recorded["low"], recorded["high"]), (id, check.quantity, check.value)
             assert check.holds == (recorded["outcome"] == HOLDS), (id, check.quantity)
 
 

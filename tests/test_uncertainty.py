@@ -194,7 +194,7 @@ def test_every_claim_is_computed_on_three_meshes_and_with_three_steps_or_says_wh
 def judged(check, value, **fields):
     """A check with its bar, from a function of the level that gives the value."""
     claim = Claim("C01", "4", "", lambda: None, **({"about": claims.OF_SCHEME} | fields))
-    at = {level: bars.numbers(Finding((claims.replace(check, ours=value(level)),))) for level in claim.levels}
+    at = {level: bars.numbers(Finding((claims.replace(check, value=value(level)),))) for level in claim.levels}
     return bars.barred(claim, Finding((check,)), at).checks[0]
 
 
@@ -205,13 +205,13 @@ def test_bars_come_from_both_families_of_levels():
     """2.9 + 0.01 h with elements, 0.002 steps more with each: errors add up to 0.012, bars to 1.25 times that."""
     found = judged(SPEED, lambda level: 2.898 + 0.01 * level.size + 0.002 * level.step)
     assert found.bar.mesh.bar == pytest.approx(0.0125) and found.bar.step.bar == pytest.approx(0.0025)
-    assert found.bar.high - found.ours == pytest.approx(0.015)
+    assert found.bar.high - found.value == pytest.approx(0.015)
 
 
 def test_the_bar_of_the_converged_solution_has_nothing_of_the_scheme_which_stands_beside_it():
     found = judged(SPEED, lambda level: (2.9 if level.kind == CONVERGED else 3.0) + 0.01 * level.size,
                    about=claims.MODEL)
-    assert found.bar.high - found.ours == pytest.approx(1.25 * 0.005)
+    assert found.bar.high - found.value == pytest.approx(1.25 * 0.005)
     assert found.scheme == pytest.approx((3.0 + 0.01 * 2**-0.5, 3.0 + 0.01 * 2**0.5))
 
 
@@ -223,7 +223,7 @@ def test_a_width_of_printed_digits_is_added_to_the_bar():
 
 def test_what_is_not_varied_gives_no_bar():
     found = judged(SPEED, lambda level: 2.9 + 0.01 * level.size, steps=ALONE)
-    assert found.bar.step is None and found.bar.high - found.ours == pytest.approx(0.0125)
+    assert found.bar.step is None and found.bar.high - found.value == pytest.approx(0.0125)
 
 
 def test_a_number_without_a_limit_has_the_range_of_all_levels():
