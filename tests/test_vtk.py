@@ -1,10 +1,11 @@
-"""The fields as ParaView and PyVista read them: through VTK's own reader, through meshio, and PyVista's where it is."""
+"""The fields as ParaView and PyVista read them: through VTK's own reader, meshio's and PyVista's."""
 from dataclasses import replace
 from xml.etree import ElementTree
 
 import meshio
 import numpy as np
 import pytest
+import pyvista
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import reference
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
@@ -173,7 +174,7 @@ def told_by_meshio(path):
 
 
 def told_by_pyvista(path):
-    found = pytest.importorskip("pyvista").read(path)
+    found = pyvista.read(path)
     told = {name: np.array(found[name]) for name in ALL}
     cells = next(iter(found.cells_dict.values()))
     return np.array(found.points), cells, told, np.array(found.field_data["TimeValue"])
