@@ -173,6 +173,12 @@ def test_the_steps_that_are_expected(preset, least, most):
     assert least * taken <= sum(cost.steps(scene)) <= most * taken
 
 
+@pytest.mark.parametrize("first, longest, duration, count", [(0.1, 0.8, 1.5, 4), (0.1, 0.8, 3.1, 6), (0.1, 0.8, 0.3, 2),
+                                                             (1.0, 1.0, 5.0, 5)])
+def test_the_first_steps_double_until_they_are_the_longest(first, longest, duration, count):
+    assert cost._count(first, longest, duration) == count
+
+
 def test_steps_in_contact_and_none():
     assert cost.steps(load_scene("wide")) == (156, 69)
     assert cost.steps(load_scene("flow_only")) == cost.steps(load_scene("base", ["growth.end=0 h"])) == (0, 0)

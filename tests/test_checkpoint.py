@@ -108,6 +108,21 @@ def test_altered_and_truncated_checkpoints_are_refused(kept, tmp_path_factory, d
         assert refused(kept, new, path)
 
 
+def test_one_bit_of_a_number_is_told(kept, tmp_path):
+    """The last of the first array's first number: all else is as a run's."""
+    content = bytearray(kept[2])
+    content[content.index(b"\n", content.index(b"\n") + 1) + 1] ^= 1
+    assert refused(kept, bytes(content), tmp_path / "altered")
+
+
+def test_an_array_keeps_its_layout():
+    """By rows or by columns, and its numbers in either."""
+    numbers = np.arange(6.0).reshape(2, 3)
+    found = decoded(encoded({}, {"rows": numbers, "columns": np.asfortranarray(numbers)}))[1]
+    assert all(np.array_equal(array, numbers) for array in found.values())
+    assert found["rows"].flags.c_contiguous and found["columns"].flags.f_contiguous
+
+
 JUNK = st.one_of(st.none(), st.booleans(), st.integers(), st.just(10**400),
                  st.floats(allow_nan=False, allow_infinity=False),
                  st.text(max_size=3), st.lists(st.integers(0, 3), max_size=4), st.just({}), st.just([[]]))

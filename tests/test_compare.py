@@ -51,7 +51,7 @@ def test_differences_of_scenes_are_told_key_by_key(fast, paper, flow_only):
                      "numerics.refinement": ["0.2", "1"], "numerics.tolerance": ["0.0075", "0.01"],
                      "numerics.jacobian": ["reused", "fresh"]}
     found = dict((key, values) for key, *values in comparison.differences([read(paper), read(flow_only)]))
-    assert found["growth.end"] == ["1 h", "-"] and found["flow.mean_velocity"] == ["-", "120833 um/h"]
+    assert {"growth.end": ["1 h", "-"], "flow.mean_velocity": ["-", "120833 um/h"]}.items() <= found.items()
     assert comparison.differences([read(fast), read(fast)]) == []
 
 

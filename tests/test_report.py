@@ -85,6 +85,12 @@ def test_what_is_not_modelled_is_left_out(flow_only, fast):
     assert "Not modelled" not in text_of(fast) and '<div class="time">' in text_of(fast)
 
 
+def test_each_frame_is_drawn_on_its_own_mesh(fast, paper):
+    """Of a run with two meshes: triangles of six nodes, and then of three."""
+    packed = fields.packed([*fields.index(fast)[:1], *fields.index(paper)[:1]])
+    assert [packed["meshes"][frame["mesh"]]["per"] for frame in packed["frames"]] == [6, 3]
+
+
 @pytest.mark.parametrize("name", ["fast", "paper"])
 def test_fields_of_the_page_are_those_of_the_files(request, name):
     """Each array to half a step of its 65534, with the mesh's own nodes."""

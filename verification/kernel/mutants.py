@@ -11,7 +11,7 @@ stored results of ``repro``: what it expects comes from theory, from ``reference
 
 What no case exercises (what a user reads: columns, files, pages, tables of sweeps) and what one would notice by luck
 alone has mutants that tests catch: these name their ``tests``, as pytest does, and are run against each of them. A test
-catches by an assertion that fails, or by an error of ``repro.errors``. ``--tests`` hunts these alone.
+catches by an assertion that fails, or by an error that ``repro`` defines. ``--tests`` hunts these alone.
 
 A hunt is of the code that its cases, or its tests, can reach: the stages of verification or the files of the tests, the
 references, and the modules of repro that they import.
@@ -80,7 +80,7 @@ TESTED = ("tests", "pyproject.toml")
 CATCHERS = ("cases", "tests")
 #: A line of the summary of pytest, and how it begins where it is a catch: an assertion, `pytest.raises`, a guard.
 FAILED = re.compile(r"^(?:FAILED|ERROR) .*? - (.*)$", re.M)
-CATCH = ("assert", "AssertionError", "Failed: ", "repro.errors.")
+CATCH = ("assert", "AssertionError", "Failed: ", "repro.")
 #: No case takes a tenth of this; a mutant may make one run for ever.
 LONGEST = 600.0
 
@@ -88,7 +88,7 @@ LONGEST = 600.0
 @dataclass(frozen=True)
 class Mutant:
     """A change to ``file``: ``old``, which occurs there once, becomes ``new``; ``says`` what is wrong then; ``tests``:
-    the tests that catch it, where it is not cases that do: "tests/test_x.py::test_y[1]"."""
+    the tests that catch it, by the names that pytest gives them, where it is not cases that do."""
 
     id: str
     file: str
