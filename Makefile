@@ -37,7 +37,7 @@ verify: $(STAMP) ## run the verification cases against references that do not us
 verify-fast: $(STAMP) ## the quick ones of these cases, which make test runs too
 	@$(BIN) -m verification --fast
 
-mutants: $(STAMP) ## run wrong changes of the code against the cases, each of which must be caught
+mutants: $(STAMP) ## run wrong changes of the code against the cases and tests, each of which must be caught
 	@$(BIN) -m verification.mutants
 
 test: $(STAMP) ## run the tests, a process a core

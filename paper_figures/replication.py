@@ -34,6 +34,7 @@ from verification.claims import (
     WITHIN_ROUNDING,
 )
 from verification.claims import record as claims_record
+from verification.kernel.writing import markdown_row
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
@@ -105,8 +106,8 @@ def _value(pair: tuple[dict, dict]) -> str:
               _span(check["low"], check["high"]), _span(check["input_low"], check["input_high"]),
               _span(*(check["scheme_2001"] or (None, None)))]
     rests = "" if check["rests_on"] == PREDICTED else f" ({check['rests_on']})"
-    return " | ".join([f"| {claim['id']}", check["quantity"], f"{check['paper']}: {widths[0]}", *widths[1:],
-                       f"{check['outcome']}{rests} |"])
+    return markdown_row((claim["id"], check["quantity"], f"{check['paper']}: {widths[0]}", *widths[1:],
+                         f"{check['outcome']}{rests}"))
 
 
 def _span(low: float | None, high: float | None) -> str:
@@ -141,7 +142,7 @@ def _figure(name: str) -> str:
     kind, _, title = module.TITLE.partition(". ")
     what = "; ".join(f"{STATEMENTS[claim]} ({claim})" for claim in module.CLAIMS)
     printed = "not in the paper" if kind == "Addition" else kind
-    return f"| {printed}: {title} | `out/{name}.pdf` | {what} |"
+    return markdown_row((f"{printed}: {title}", f"`out/{name}.pdf`", what))
 
 
 def _kept(name: str) -> dict:

@@ -27,8 +27,7 @@ def run(made):
 @given(between(1e-3, 1e3), between(0.01, 1000.0), st.lists(st.floats(0.0, 1.0), max_size=5))
 def test_steps_are_no_longer_than_asked_and_end_where_they_should(step, count, parts):
     """From 0 to the end, ever later, each at most a time step long, at every output time; at most one step more for
-    each of these than the end needs. Mutant: the end missed, output times only rounded to the grid, a step of twice
-    the length beside an output time."""
+    each of these than the end needs."""
     end = step * min(count, 300.0)
     wanted = sorted({part * end for part in parts})
     more = {"output": {"times": [f"{time!r} h" for time in wanted]}} if wanted else {}
@@ -44,8 +43,7 @@ def test_steps_are_no_longer_than_asked_and_end_where_they_should(step, count, p
 @given(scenes(steps=1, elements=ANY_ORDER))
 def test_the_aggregate_grows_by_the_biomass_made(made):
     """In the first step, where J was one: (28)-(29) and (24) in the mean make its area larger by the biomass made over
-    X_m, to round-off, and shrink it likewise; a film that closes takes no area. Mutant: growth by X_A alone, a sum for
-    the mean in (29), the node with the most for the mean, increments over X_A in place of X_m."""
+    X_m, to round-off, and shrink it likewise; a film that closes takes no area."""
     found = run(made)
     if not found:
         return
@@ -62,8 +60,7 @@ def test_the_aggregate_grows_by_the_biomass_made(made):
 @share(0.4)
 @given(scenes(steps=1, elements=ANY_ORDER), between(1e-3, 1e3))
 def test_the_unit_of_time_does_not_matter(made, unit):
-    """All rates times a factor and all times over it: the same shapes, substrates and biomass. Mutant: a rate or a time
-    written into the code, X_A over the step without its length, D of Table 1 at the new mesh."""
+    """All rates times a factor and all times over it: the same shapes, substrates and biomass."""
     for one, other in zip(run(made), run(faster(made, unit)), strict=True):
         assert other.pore.time * unit == pytest.approx(one.pore.time, rel=1e-12)
         assert other.pore.outline.points == pytest.approx(one.pore.outline.points, abs=1e-7 * made.pore.width)

@@ -33,7 +33,7 @@ def found() -> Results:
 
 
 def test_columns_are_those_of_the_table_of_a_run(found, tmp_path):
-    """To the last bit. Mutants: a column under another's name; rows of every step where times are asked for."""
+    """To the last bit."""
     run(load_scene("base", SHORT), tmp_path)
     table = results.read_table(tmp_path / "timeseries.csv")
     assert list(found) == list(table) == results.COLUMNS
@@ -43,7 +43,7 @@ def test_columns_are_those_of_the_table_of_a_run(found, tmp_path):
 
 
 def test_fields_are_those_of_the_files_of_a_run(tmp_path):
-    """On straight triangles and on curved ones. Mutants: fields of the row before; corners alone."""
+    """On straight triangles and on curved ones."""
     for elements, corners in (("linear", 3), ("quadratic", 6), ("cubic", 6)):
         scene = load_scene("base", ["numerics.preset=fast", f"numerics.elements={elements}", 'growth.end="0.2 h"'])
         run(scene, tmp_path / elements)
@@ -57,7 +57,6 @@ def test_fields_are_those_of_the_files_of_a_run(tmp_path):
 
 
 def test_units_are_what_the_names_end_with(found):
-    """Mutants: um2 read as um; the unit of a velocity as that of a length."""
     assert found.units["conductivity_m_per_d"] == "m/d" and found.units["aggregate_area_um2"] == "um2"
     told = {name: unit(name) for name in results.COLUMNS}
     plain = {name for name, one in told.items() if one == "1"}
@@ -70,7 +69,6 @@ def test_units_are_what_the_names_end_with(found):
 
 
 def test_what_is_not_modelled_is_not_there():
-    """Mutant: columns of not-a-number."""
     (flow,) = [solve(load_scene("flow_only"))]
     assert flow["mean_velocity_m_per_d"] == pytest.approx(2.9) and "donor_balance" not in flow
     assert len(flow.time) == 1 and not any("donor" in name for name in flow.fields(0.0))
@@ -79,7 +77,6 @@ def test_what_is_not_modelled_is_not_there():
 
 
 def test_another_time_is_refused_by_the_nearest(found):
-    """Mutant: the fields of the nearest time without a word."""
     with pytest.raises(KeyError, match=r"0.55 h: not a reported time; the nearest is 0.6"):
         found.fields(0.55)
 
@@ -91,7 +88,6 @@ def test_a_run_to_the_pores_end_says_so():
 
 
 def test_the_table_of_a_notebook_escapes_and_is_short(found):
-    """Mutants: a scene's name as it stands; every row of a long run."""
     rows = [dict.fromkeys(results.COLUMNS) | {"time_h": float(k)} for k in range(40)]
     html = Results("<script>alert(1)</script>&", rows, [{}] * 40, "<b>")._repr_html_()
     assert "<script" not in html and "&lt;script&gt;" in html and "<b>" not in html
@@ -102,7 +98,6 @@ def test_the_table_of_a_notebook_escapes_and_is_short(found):
 
 
 def test_public_names():
-    """Mutant: a name of __all__ that is nowhere."""
     for name in repro.__all__:
         assert getattr(repro, name).__module__.startswith("repro."), name
         assert name in dir(repro)
@@ -110,8 +105,7 @@ def test_public_names():
 
 
 def test_importing_takes_next_to_nothing():
-    """And writing a scene out no more than its units do (pint, which takes others along). Mutant: the
-    solver imported with the package."""
+    """And writing a scene out no more than its units do (pint, which takes others along)."""
     for code, heavy in (("import repro, repro.scene", "numpy pint scipy skfem"),
                         ("from repro.scene.text import scene_text; scene_text('flow_only')", "skfem meshio mmgpy")):
         loaded = f"{code}; import sys; sys.exit(' '.join(name for name in '{heavy}'.split() if name in sys.modules))"
@@ -120,7 +114,6 @@ def test_importing_takes_next_to_nothing():
 
 
 def test_the_map_names_every_module_of_the_package():
-    """Mutant: a module that the docstring of the package does not know."""
     folder = importlib.resources.files("repro")
     modules = {path.name.removesuffix(".py") for path in folder.iterdir() if path.name.endswith(".py")}
     named = set(re.findall(r"repro\.(\w+)", repro.__doc__))
@@ -132,7 +125,6 @@ OTHERS = {"errors", "files"}
 
 
 def test_what_the_package_ships():
-    """Mutant: data left out of the wheel."""
     project = (importlib.resources.files("repro") / ".." / "pyproject.toml").read_text(encoding="utf-8")
     for name in ("py.typed", "results/network.csv"):
         assert (importlib.resources.files("repro") / name).is_file() and f'"{name}"' in project
@@ -157,7 +149,6 @@ from repro import nothing
 
 @pytest.mark.thorough
 def test_users_of_mypy_see_types(tmp_path):
-    """Mutants: no py.typed; names that are Any."""
     pytest.importorskip("mypy")
     (tmp_path / "user.py").write_text(PROGRAM)
     arguments = ["--strict", "--follow-imports=silent", "--no-incremental", "--ignore-missing-imports", "user.py"]
@@ -176,7 +167,7 @@ NARROW = {"pore": {"width": "30 um"}, "aggregate": {"radius": "8 um"}, "flow": {
 
 
 def test_a_scene_may_be_a_dict_a_file_or_a_name(tmp_path):
-    """And one that was loaded; the dict is left as it is. Mutants: changes that are lost; a dict that is changed."""
+    """And one that was loaded; the dict is left as it is."""
     kept = copy.deepcopy(NARROW)
     scene = load_scene(NARROW)
     assert kept == NARROW and scene == load_scene(scene) and scene.name == "scene"
@@ -192,7 +183,7 @@ def test_a_scene_may_be_a_dict_a_file_or_a_name(tmp_path):
 
 
 def test_a_scene_prints_as_its_toml(tmp_path):
-    """Every key, with units, and it reads as an equal scene. Mutants: keys left out; tables before values."""
+    """Every key, with units, and it reads as an equal scene."""
     for name in packaged_scenes():
         scene = load_scene(name)
         assert load_scene(tomllib.loads(str(scene))) == replace(scene, name="scene") and 'width = "' in str(scene)
@@ -200,7 +191,7 @@ def test_a_scene_prints_as_its_toml(tmp_path):
 
 
 def test_representations_are_short(found, tmp_path):
-    """Of ten lines at most. Mutant: arrays in full."""
+    """Of ten lines at most."""
     scene = load_scene("base", SHORT)
     told = [scene, found, repro.check(scene), *repro.simulate(scene)]
     told += [part for instant in told[3:] for part in (instant.pore, instant.solved, instant.pore.mesh,
@@ -209,7 +200,6 @@ def test_representations_are_short(found, tmp_path):
 
 
 def test_check_tells_what_repro_check_does(capsys):
-    """Mutant: the check of another scene."""
     checked = repro.check("wide")
     assert main(["check", "wide"]) == 0
     head = [line for line in str(checked).splitlines() if " s " not in line and "MB" not in line]
@@ -219,7 +209,7 @@ def test_check_tells_what_repro_check_does(capsys):
 
 
 def test_a_run_is_loaded_as_it_was_solved(found, tmp_path):
-    """Rows and fields to the last bit, of a folder without fields too. Mutants: fields of another row; no status."""
+    """Rows and fields to the last bit, of a folder without fields too."""
     repro.run(load_scene("base", SHORT), str(tmp_path))
     loaded = repro.load_run(tmp_path)
     assert list(loaded) == list(found) and loaded.units == found.units and repr(loaded) == repr(found)
@@ -237,7 +227,6 @@ def test_a_run_is_loaded_as_it_was_solved(found, tmp_path):
 
 
 def test_data_frames_and_datasets_have_names_and_units(found):
-    """Mutants: the time as a column; units left out."""
     frame = pytest.importorskip("pandas") and found.to_pandas()
     assert frame.index.name == "time_h" and list(frame) == list(found)[1:]
     assert frame.attrs["units"]["conductivity_m_per_d"] == "m/d" and (frame["nodes"] == found["nodes"]).all()
@@ -254,7 +243,7 @@ def test_an_optional_package_that_is_not_there_is_told_in_one_line(found, monkey
 
 
 def test_a_sweep_from_python(tmp_path):
-    """Runs, labels and tables; a second call makes nothing again. Mutants: runs of one value; a run made twice."""
+    """Runs, labels and tables; a second call makes nothing again."""
     events = []
     asked = NARROW, ["pore.width=30 um, 40 um"], tmp_path / "sweep"
     swept = repro.sweep(*asked, workers=1, tell=events.append)
@@ -269,8 +258,7 @@ def test_a_sweep_from_python(tmp_path):
 
 
 def test_a_notebook_shows_key_figures_and_a_picture(found):
-    """The picture is a PNG of the whole meshed part, with the aggregate's boundary. Mutants: upside down; the first
-    state's."""
+    """The picture is a PNG of the whole meshed part, with the aggregate's boundary."""
     html = found._repr_html_()
     told = "conductivity of the pore 174.1 → 173.8 m/day; thickness of the aggregate 5 → 5.295 um"
     assert told in html and "at t = 0.6 h" in html
@@ -287,7 +275,6 @@ def test_a_notebook_shows_key_figures_and_a_picture(found):
 
 
 def test_help_begins_with_use_and_the_version_is_told(capsys):
-    """Mutants: the map of modules first; a version of its own."""
     lines = repro.__doc__.splitlines()
     assert "Ten lines of use" in lines[2] and sum("repro." in line for line in lines[4:14]) >= 6
     code = "\n".join(line.strip() for line in lines[4:14])

@@ -272,7 +272,7 @@ def test_the_lock_pins_every_direct_dependency_within_its_bounds():
 
 
 def test_lines_of_the_package_are_short():
-    """At most 100 columns. Mutant: a longer one."""
+    """At most 100 columns."""
     long = [f"{path.name}:{number}" for path in sorted((ROOT / "repro").rglob("*.py"))
             for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1) if len(line) > 100]
     assert long == []

@@ -22,7 +22,7 @@ def dense():
 @pytest.mark.parametrize("held", [[], [0, 9], [4]])
 def test_kinds_of_elements_make_one_system(held):
     """Its product, its matrix between free unknowns in elimination order, and its solution are those of the dense
-    matrix. Mutants: the second kind at the first one's places, prescribed unknowns not moved to the right-hand side."""
+    matrix."""
     rank, prescribed = np.random.default_rng(len(held)).permutation(10).astype(float), np.isin(np.arange(10), held)
     system, K = ElementSystem(KINDS, rank, prescribed), dense()
     right, value = np.arange(10.0), np.linspace(1, 2, 10)
@@ -36,15 +36,13 @@ def test_kinds_of_elements_make_one_system(held):
 
 
 def test_a_missing_kind_is_refused():
-    """Mutant: kinds paired as far as they go."""
     system = ElementSystem(KINDS, np.arange(10.0), np.zeros(10, bool))
     with pytest.raises(ValueError):
         system.product(ELEMENTS[:1], np.ones(10))
 
 
 def test_saddle_blocks_with_and_without_coupled_components():
-    """The same from one component's matrix, told once for both, as from the pair; zero is the default below. Mutants:
-    the second component's block at the first one's place, the lower block not turned in sign."""
+    """The same from one component's matrix, told once for both, as from the pair; zero is the default below."""
     random = np.random.default_rng(4)
     one, divergence, lower = (random.standard_normal((4, *shape)) for shape in ((3, 3), (2, 6), (2, 2)))
     pair = np.zeros((4, 6, 6))
@@ -57,8 +55,7 @@ def test_saddle_blocks_with_and_without_coupled_components():
 
 @pytest.mark.parametrize("held", [[], [0, 9], [4]])
 def test_other_unknowns_may_be_prescribed(held):
-    """Of the same elements: as a system made for them; the first one is left as it was. Mutants: what was prescribed
-    before stays so, the first system changed with the second."""
+    """Of the same elements: as a system made for them; the first one is left as it was."""
     rank, prescribed = np.random.default_rng(7).permutation(10).astype(float), np.isin(np.arange(10), held)
     first, fresh = (ElementSystem(KINDS, rank, at) for at in (np.arange(10) == 2, prescribed))
     before, other = first.matrix(ELEMENTS).toarray(), first.holding(prescribed)
@@ -70,7 +67,7 @@ def test_other_unknowns_may_be_prescribed(held):
 
 @pytest.mark.parametrize("held", [[], [4]])
 def test_a_matrix_may_be_filled_from_entries_of_each_kind(held):
-    """What one kind adds is worked out apart. Mutant: entries of the first kind at the second one's places."""
+    """What one kind adds is worked out apart."""
     system = ElementSystem(KINDS, np.arange(10.0)[::-1], np.isin(np.arange(10), held))
     entries = sum(system.entries(which, part) for which, part in enumerate(ELEMENTS))
     assert np.allclose(system.filled(entries).toarray(), system.matrix(ELEMENTS).toarray(), rtol=1e-14)
@@ -79,7 +76,6 @@ def test_a_matrix_may_be_filled_from_entries_of_each_kind(held):
 
 
 def test_a_factorised_system_serves_many_right_hand_sides_and_values():
-    """Mutant: the first values kept."""
     system = ElementSystem(KINDS, np.arange(10.0), np.isin(np.arange(10), [3]))
     factors = system.factored(ELEMENTS)
     for seed in (1, 2):

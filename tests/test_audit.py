@@ -7,13 +7,13 @@ import pytest
 from repro.model import pore
 from repro.scene import load_scene, scene_tables
 from verification.audit import __main__ as audit
-from verification.audit import measure, special
+from verification.audit import choices, measure
 from verification.audit.choices import CHOICES
 
 
 @pytest.mark.parametrize("choice", CHOICES, ids=lambda choice: choice.alternative)
 def test_a_choice_changes_what_it_names_and_nothing_else(choice):
-    """Against the paper's preset. Mutant: a change of the default to itself."""
+    """Against the paper's preset."""
     plain, changed = (scene_tables(measure.scene(*changes)) for changes in ((), choice.changes))
     apart = [f"{name}.{key}" for name, table in plain.items() if isinstance(table, dict) for key in table
              if table[key] != changed[name][key]]
@@ -77,7 +77,7 @@ def test_runs_in_turn_alternate():
 def test_marching_is_the_run(short):
     """The audit's own loop and the package's make the same steps."""
     said = short()
-    found, steps = measure.advance(said, pore.seeded(said), special._step, 0.8)
+    found, steps = measure.advance(said, pore.seeded(said), choices._step, 0.8)
     other = measure.run(said)
     assert {len(column) for column in steps.values()} == {2} and steps["drift"].max() < 0.01
     assert abs(steps["lean"]).max() < 1e-2
@@ -86,7 +86,7 @@ def test_marching_is_the_run(short):
 
 def test_an_uneven_seed_is_one_percent_off():
     said = measure.scene()
-    plain, bulging = pore.seeded(said), special.uneven(said, 0.01)
+    plain, bulging = pore.seeded(said), choices.uneven(said, 0.01)
     assert bulging.outline.downstream == pytest.approx(5.05) and bulging.outline.upstream == pytest.approx(-4.95)
     apart = np.hypot(*(bulging.outline.points[bulging.wall == 0] - [0.05, 0.0]).T) / 5 - 1
     assert np.ptp(apart) > 0.02  # and not a half-disc that has moved

@@ -123,7 +123,7 @@ def test_faster_at_a_tenth_of_a_percent_says_that_it_extrapolates(accurate, hold
 
 
 def test_faster_at_the_error_that_a_preset_has():
-    """0.02 / 0.004 s over 0.9 s. Mutant: the error asked for taken twice."""
+    """0.02 / 0.004 s over 0.9 s."""
     found = [one for one in verdicts.judged({"parts": {"base": base_part(fast=(0.9, 0.004))}})
              if "fast is faster" in one["claim"] and one["claim"].endswith("the error that the preset has")]
     assert [one["holds"] for one in found] == [True] and "5.6 times" in found[0]["measured"]

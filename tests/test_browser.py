@@ -52,7 +52,7 @@ def picture(window):
 @pytest.mark.parametrize("width, dark", [(1200, False), (375, True)])
 @pytest.mark.parametrize("name", ["fast", "paper", "flow", "mesh", "wide", "transport"])
 def test_pages_open_from_disk_without_error(window, runs, name, width, dark):
-    """At a phone's width nothing is cut off. Mutants: a syntax error, a script that the policy stops, fixed widths."""
+    """At a phone's width nothing is cut off."""
     found = show(window, runs[name], width=width, dark=dark)
     assert found["frame"] == str(len(stored(runs[name])["frames"]) - 1) and float(found["filled"]) > 0.9
     charts = int(window.run("document.documentElement.dataset.charts"))
@@ -63,7 +63,7 @@ def test_pages_open_from_disk_without_error(window, runs, name, width, dark):
 
 
 def test_the_slider_shows_other_times(window, runs):
-    """By its keys, and by a click on a chart. Mutants: a slider that draws the last frame always; dead keys."""
+    """By its keys, and by a click on a chart."""
     last = show(window, runs["fast"])
     window.run("document.getElementById('frame').focus()")
     window.press("ArrowLeft")
@@ -84,7 +84,7 @@ def test_the_slider_shows_other_times(window, runs):
 
 
 def test_every_field_has_its_own_picture(window, runs):
-    """As the fragment asks. Mutant: the first field always."""
+    """As the fragment asks."""
     found = {}
     for field in stored(runs["fast"])["fields"]:
         told = show(window, runs["fast"], f"#frame=3&field={field['name']}")
@@ -95,8 +95,7 @@ def test_every_field_has_its_own_picture(window, runs):
 
 @pytest.mark.parametrize("name", ["fast", "paper"])
 def test_the_picture_is_the_field(window, runs, name):
-    """Pixels at the nodes, and the area that is coloured for the aggregate: on curved triangles too. Mutants: sides
-    drawn straight, the middle nodes in another order, y upside down."""
+    """Pixels at the nodes, and the area that is coloured for the aggregate: on curved triangles too."""
     out = runs[name]
     show(window, out, "#field=acceptor_mg_per_L", width=1400)
     _, path = fields.index(out)[-1]
@@ -153,7 +152,7 @@ def test_a_run_that_stops_before_its_first_row(window, tmp_path, monkeypatch):
 
 
 def test_hostile_names_run_nothing(window, tmp_path):
-    """Neither from a scene and its status, nor through the policy. Mutants: text put in as it is; 'unsafe-inline'."""
+    """Neither from a scene and its status, nor through the policy."""
     out = hostile(run(tmp_path, "base", FAST, 'growth.end="1 h"'))
     from repro import report
 
@@ -167,7 +166,7 @@ def test_hostile_names_run_nothing(window, tmp_path):
 
 
 def test_the_policy_lets_nothing_out(window, runs):
-    """A listener on the loopback hears nothing of what a script in the page tries. Mutant: no policy."""
+    """A listener on the loopback hears nothing of what a script in the page tries."""
     heard = []
     with socket.create_server(("127.0.0.1", 0)) as server:
         server.settimeout(2)

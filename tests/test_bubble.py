@@ -33,7 +33,6 @@ def integrated(points, viscosity, interface):
 
 @given(corners, st.floats(0.1, 1e4), st.sampled_from(["laplacian", "traction"]))
 def test_tau_is_that_of_the_integrals(points, viscosity, interface):
-    """Mutant: 20 in the closed form replaced, or the traction form's G left out."""
     found = Bubble().mobility(one_triangle(points), np.array([viscosity]), interface)[0]
     wanted = integrated(points, viscosity, interface)
     assert np.abs(found - wanted).max() < 1e-10 * np.abs(wanted).max()

@@ -32,15 +32,13 @@ def looked_at(name, *overrides, speed=None):
                                              ("base", ("numerics.preset=fast",)),
                                              ("wide", ("numerics.preset=accurate",))])
 def test_the_mesh_is_that_of_the_run(name, overrides):
-    """Mutants: the corners of quadratic triangles counted alone, the mesh of another preset."""
     scene = load_scene(name, overrides)
     found, grid = check(scene, name), next(simulate(scene)).pore.mesh
     assert (found.nodes, found.triangles) == (len(grid.points), len(grid.biomass))
 
 
 def test_the_numbers_of_base_are_those_of_table_1():
-    """In SI units, by hand. Mutants: D of the other substrate or of the water; the density forgotten; a radius for a
-    width."""
+    """In SI units, by hand."""
     found, _ = looked_at("base")
     day, R, W = 86400.0, 5e-6, 50e-6
     u, D_A, D_D = CLEAN / 3600e6, 2.32e-4 / day, 1.01e-4 / day
@@ -73,8 +71,7 @@ def test_only_what_is_modelled_has_numbers():
 
 
 def test_the_bounds_hold_in_base():
-    """The aggregate ends no larger than said, and not much smaller. Mutants: the growth rate halved; a bound without
-    decay; an end that is the start."""
+    """The aggregate ends no larger than said, and not much smaller."""
     scene = load_scene("base", ["numerics.preset=fast", 'output.times=["19.4 h"]'])
     *_, last = simulate(scene)
     bound = numbers.at_end(scene)
@@ -157,8 +154,7 @@ FEW = ("substrates.acceptor.half_saturation=2e-3 mg/L", "substrates.donor.half_s
      ("base", *QUIET, "kinetics.decay_oxygen_demand=1.2")),
 ])
 def test_warnings_are_exactly_where_a_simplification_fails(key, inside, outside):
-    """Either side of the threshold, worked out by hand; nothing else is warned of. Mutants: any of the thresholds
-    doubled or halved; a warning whatever the scheme is."""
+    """Either side of the threshold, worked out by hand; nothing else is warned of."""
     assert key not in looked_at(*inside)[1]
     assert set(looked_at(*outside)[1]) - set(looked_at(*inside)[1]) == {key}
 
@@ -172,10 +168,15 @@ def test_slow_transport_is_followed_in_time_by_gear():
 
 @pytest.mark.parametrize("preset, least, most", [("paper", 1.0, 1.0), ("fast", 0.5, 2.0)])
 def test_the_steps_that_are_expected(preset, least, most):
-    """mutants: no doubling of the first steps."""
     scene = load_scene("base", [f"numerics.preset={preset}", *(['growth.end="2 h"'] if preset == "paper" else [])])
     taken = sum(len(instant.ledgers) for instant in simulate(scene))
     assert least * taken <= sum(cost.steps(scene)) <= most * taken
+
+
+@pytest.mark.parametrize("first, longest, duration, count", [(0.1, 0.8, 1.5, 4), (0.1, 0.8, 3.1, 6), (0.1, 0.8, 0.3, 2),
+                                                             (1.0, 1.0, 5.0, 5)])
+def test_the_first_steps_double_until_they_are_the_longest(first, longest, duration, count):
+    assert cost._count(first, longest, duration) == count
 
 
 def test_steps_in_contact_and_none():
@@ -190,7 +191,6 @@ def test_steps_in_contact_and_none():
 
 
 def test_a_large_mesh_is_not_tried_but_a_coarser_one(monkeypatch):
-    """Mutant: the time of the coarse one taken for that of the fine one."""
     monkeypatch.setattr(cost, "MOST_NODES", 400)
     scene = load_scene("base", ["growth.end=0.2 h"])
     trial = cost.tried(scene, 783)
@@ -223,7 +223,7 @@ def test_what_is_modelled_follows_the_sections():
 
 
 def test_the_report_and_its_exit_status(capsys):
-    """Warnings do not change it. Mutant: exit 1 for a warning."""
+    """Warnings do not change it."""
     assert main(["check", "wide", "--set", "growth.end=1 h", "--set", "growth.time_step=0.6 h"]) == 0
     said = capsys.readouterr()
     assert said.err == "" and "wide: can be run" in said.out and "WARNING growth.time_step: " in said.out
@@ -245,7 +245,6 @@ def test_for_machines(capsys):
     (["numerics.solver=pardiso"], "pypardiso"),
 ])
 def test_what_cannot_be_run_is_refused(overrides, said, capsys, monkeypatch):
-    """Mutants: only the scene is read, nothing is tried; a traceback."""
     from repro.fem import linear
 
     def absent(name):

@@ -55,7 +55,7 @@ def restored(kept, content, path):
 
 
 def test_what_is_written_is_read(kept, tmp_path):
-    """To the last bit, layout and type included. Mutants: a field left out, columns for rows, ints for floats."""
+    """To the last bit, layout and type included."""
     scene, _, content = kept
     found = restored(kept, content, tmp_path / "x")
     plain, arrays = packed(scene, found.state, found.record)
@@ -65,7 +65,6 @@ def test_what_is_written_is_read(kept, tmp_path):
 
 
 def test_every_array_of_a_state_is_kept(kept):
-    """Mutant: a new field of a pore or a mesh that nobody stores."""
     scene, _, content = kept
     plain, arrays = decoded(content)
     state, _ = unpacked(scene, plain, arrays)
@@ -84,7 +83,6 @@ def test_layout_and_type_of_arrays_are_kept():
 
 
 def test_the_one_before_is_kept(tmp_path):
-    """Mutants: one file alone, a part left behind."""
     for content in (b"one", b"two", b"three"):
         checkpoint.write(tmp_path, content)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {NEWEST: b"three", PREVIOUS: b"two"}
@@ -100,8 +98,7 @@ def refused(kept, content, path):
 @EXAMPLES
 @given(st.data())
 def test_altered_and_truncated_checkpoints_are_refused(kept, tmp_path_factory, data):
-    """Bytes changed, cut out, put in, cut off or replaced at random places: told by the checksum. Mutants: a checksum
-    of the arrays alone, or of the header alone."""
+    """Bytes changed, cut out, put in, cut off or replaced at random places: told by the checksum."""
     content, path = kept[2], tmp_path_factory.getbasetemp() / "altered"
     at = data.draw(st.integers(0, len(content) - 1))
     length = data.draw(st.integers(0, 40))
@@ -109,6 +106,21 @@ def test_altered_and_truncated_checkpoints_are_refused(kept, tmp_path_factory, d
         lambda some: content[:at] + some + content[at + length:]), st.binary(max_size=200)))
     if new != content:
         assert refused(kept, new, path)
+
+
+def test_one_bit_of_a_number_is_told(kept, tmp_path):
+    """The last of the first array's first number: all else is as a run's."""
+    content = bytearray(kept[2])
+    content[content.index(b"\n", content.index(b"\n") + 1) + 1] ^= 1
+    assert refused(kept, bytes(content), tmp_path / "altered")
+
+
+def test_an_array_keeps_its_layout():
+    """By rows or by columns, and its numbers in either."""
+    numbers = np.arange(6.0).reshape(2, 3)
+    found = decoded(encoded({}, {"rows": numbers, "columns": np.asfortranarray(numbers)}))[1]
+    assert all(np.array_equal(array, numbers) for array in found.values())
+    assert found["rows"].flags.c_contiguous and found["columns"].flags.f_contiguous
 
 
 JUNK = st.one_of(st.none(), st.booleans(), st.integers(), st.just(10**400),
@@ -137,7 +149,7 @@ def at(value, path):
 def test_signed_nonsense_is_refused_or_harmless(kept, tmp_path_factory, data):
     """A value of another kind, an array of another kind or shape, indices that are no nodes, numbers that are none, all
     under a right checksum: refused, or a state of the same shape as a run's. Nothing but a CheckpointError is raised.
-    Mutants: any of the checks left out."""
+    """
     path = tmp_path_factory.getbasetemp() / "nonsense"
     plain, arrays = copy.deepcopy(decoded(kept[2])[0]), dict(decoded(kept[2])[1])
     data.draw(st.sampled_from([spoil_plain, spoil_array, spoil_numbers, spoil_indices]))(data, plain, arrays)
@@ -182,7 +194,7 @@ def spoilt(data, array, value):
 
 
 def test_numbers_that_are_none_and_indices_that_are_no_nodes_are_refused(kept, tmp_path):
-    """In every array. Mutant: one array that is not looked at."""
+    """In every array."""
     plain, arrays = decoded(kept[2])
     for name, array in arrays.items():
         spoilers = {"f": NEVER, "i": (-1, len(arrays["points"]), 2**40)}.get(array.dtype.kind, ())
@@ -209,8 +221,7 @@ def test_what_makes_no_sense_is_refused(kept, tmp_path, key, value):
     ("donor", -1e300), ("pressure", 1e300), ("points", 1e6), ("reference", -1e6), ("wall", 3), ("cells", 0)])
 def test_amounts_that_cannot_be_are_refused(kept, tmp_path, name, value):
     """Of a number in the middle of an array: masses below zero, expansions and concentrations that nothing has, places
-    outside of the pore, a wall that is none, a triangle whose corners are one node. Mutants: any of the checks left
-    out, or of the first entry alone."""
+    outside of the pore, a wall that is none, a triangle whose corners are one node."""
     plain, arrays = decoded(kept[2])
     changed = arrays[name].copy(order="K")
     changed.flat[changed.size // 2] = value
@@ -222,7 +233,7 @@ def test_amounts_that_cannot_be_are_refused(kept, tmp_path, name, value):
 @pytest.mark.parametrize("name", ["points", "cells", "biomass", "loop", "wall", "fixed", "active", "inert", "theta",
                                   "reference", "pressure", "acceptor", "donor"])
 def test_arrays_of_another_size_are_refused(kept, tmp_path, name):
-    """A row too few, a row twice, and one column too many. Mutant: a size that is taken from what is read."""
+    """A row too few, a row twice, and one column too many."""
     plain, arrays = decoded(kept[2])
     array = arrays[name]
     for wrong in (array[:-1], np.concatenate([array, array[-1:]]), np.column_stack([array, array])):
@@ -231,8 +242,7 @@ def test_arrays_of_another_size_are_refused(kept, tmp_path, name):
 
 
 def test_the_elements_of_another_order_are_refused(kept, tmp_path):
-    """Triangles of a scene of other elements, in a state that says it is of this one. Mutant: the order taken from the
-    arrays."""
+    """Triangles of a scene of other elements, in a state that says it is of this one."""
     scene, _, content = kept
     other = load_scene("base", PRESETS["paper" if scene.numerics.order > 1 else "fast"])
     state, _ = next(steps(other))
@@ -264,7 +274,6 @@ def all_rows(cut):
     {"record.hashes": lambda a: np.zeros_like(a)}, {PENDING: lambda a: a[:0]}, {PENDING: lambda a: a[:, 1:]},
     {PENDING: lambda a: a[0]}])
 def test_rows_that_are_not_those_of_the_state_are_refused(kept, tmp_path, changes):
-    """Mutants: rows of another length or of another time, files that are not those that were written."""
     plain, arrays = decoded(kept[2])
     for name, change in changes.items():
         arrays[name] = np.ascontiguousarray(change(arrays[name]))
@@ -275,8 +284,7 @@ def test_rows_that_are_not_those_of_the_state_are_refused(kept, tmp_path, change
                                    lambda path: path.write_bytes(path.read_bytes().replace(b"0", b"1", 1)),
                                    lambda path: path.rename(path.with_name("x")) and path.symlink_to("x")])
 def test_fields_that_are_not_as_they_were_written_are_refused(kept, tmp_path, spoil):
-    """Cut short, gone, altered with the same length, or moved and linked to. Mutants: a look at names alone, or at
-    sizes."""
+    """Cut short, gone, altered with the same length, or moved and linked to."""
     scene, folder, content = kept
     (tmp_path / "x").write_bytes(content)
     copied = shutil.copytree(folder, tmp_path / "run")
@@ -300,7 +308,7 @@ def signed(header: bytes, data: bytes = b"") -> bytes:
     [["points", "<f8", [0], "C"], ["points", "<f8", [0], "C"]], [["a", "|b1", [8], "C"]],
     [["a", "<f8", [1, 1, 1], "C"]]])
 def test_arrays_that_cannot_be_are_refused_without_memory(arrays):
-    """A header that promises terabytes takes none. Mutant: room made before it is looked at."""
+    """A header that promises terabytes takes none."""
     content = signed(json.dumps({"plain": {}, "arrays": arrays}).encode(), b"\x02" * 8)
     tracemalloc.start()
     with pytest.raises(CheckpointError):
@@ -326,7 +334,6 @@ def test_other_files_are_refused(content):
 
 
 def test_a_checkpoint_of_another_format_is_refused_in_one_line(kept, tmp_path):
-    """Mutant: the old one read as the new one."""
     old = checkpoint.MAGIC.replace(b" 2 ", b" 1 ") + kept[2].removeprefix(checkpoint.MAGIC)
     (tmp_path / "x").write_bytes(old)
     with pytest.raises(CheckpointError, match="^its format is not 2: another version wrote it$"):
@@ -334,7 +341,7 @@ def test_a_checkpoint_of_another_format_is_refused_in_one_line(kept, tmp_path):
 
 
 def test_a_long_header_is_refused_without_memory():
-    """48 MB of empty lists would take 1.3 GB as objects. Mutant: a header of any length read as JSON."""
+    """48 MB of empty lists would take 1.3 GB as objects."""
     content = signed(b'{"plain": {}, "arrays": [' + b"[]," * 16_000_000 + b"[]]}")
     tracemalloc.start()
     with pytest.raises(CheckpointError, match="longer than"):
@@ -344,7 +351,7 @@ def test_a_long_header_is_refused_without_memory():
 
 
 def test_the_header_does_not_grow_with_the_run(kept):
-    """Rows, ledgers and files, reported or not, are arrays. Mutant: a long run whose checkpoints nobody can read."""
+    """Rows, ledgers and files, reported or not, are arrays."""
     plain, arrays = decoded(kept[2])
     header = kept[2].split(b"\n")[1]
     for name in (PENDING, "record.rows", "record.whole", "record.ledgers", "record.sizes", "record.hashes"):
@@ -355,8 +362,7 @@ def test_the_header_does_not_grow_with_the_run(kept):
 @pytest.mark.parametrize("make", [lambda path: os.mkfifo(path), lambda path: path.symlink_to("/dev/zero"),
                                   lambda path: path.symlink_to("good"), lambda path: path.mkdir()])
 def test_nothing_but_a_regular_file_is_read(kept, tmp_path, make):
-    """A pipe that nobody writes to, a device without end, a link to what would be right, a folder. Mutants: a resume
-    that hangs, or takes all memory."""
+    """A pipe that nobody writes to, a device without end, a link to what would be right, a folder."""
     (tmp_path / "good").write_bytes(kept[2])
     make(tmp_path / "x")
     with pytest.raises(CheckpointError, match="cannot be read"):
@@ -364,7 +370,7 @@ def test_nothing_but_a_regular_file_is_read(kept, tmp_path, make):
 
 
 def test_a_file_that_is_too_long_is_not_read(kept, tmp_path):
-    """One of 2 GB with nothing in it. Mutant: read, and refused after that."""
+    """One of 2 GB with nothing in it."""
     with (tmp_path / "x").open("wb") as file:
         file.truncate(2**31)
     tracemalloc.start()
@@ -388,8 +394,7 @@ def test_what_cannot_be_read_is_refused(kept, tmp_path):
 
 @pytest.mark.parametrize("elements", ["linear", "quadratic", "cubic"])
 def test_a_pore_that_is_read_back_goes_on_as_the_one_that_was_written(elements):
-    """The same rows, to the last bit, from every state on. Mutants: the reference's body or the space of another order,
-    a mesh whose derived values are of another one."""
+    """The same rows, to the last bit, from every state on."""
     sets = ("numerics.preset=fast", f"numerics.elements={elements}", 'growth.end="1 h"', 'aggregate.radius="25 um"',
             f"numerics.refinement={0.5 if elements == 'linear' else 0.2}", 'output.times=["0.3 h", "0.6 h", "1 h"]')
     scene = load_scene("base", sets)
@@ -406,7 +411,7 @@ def test_a_pore_that_is_read_back_goes_on_as_the_one_that_was_written(elements):
 
 
 def test_states_of_clean_channels_are_kept():
-    """No aggregate, no substrates. Mutant: empty arrays refused."""
+    """No aggregate, no substrates."""
     for elements in ("linear", "quadratic", "cubic"):
         scene = load_scene("flow_only", (f'numerics.elements="{elements}"',))
         ((state, _),) = steps(scene)

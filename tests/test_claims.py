@@ -40,7 +40,7 @@ from verification.uncertainty import Bar, Estimate
 
 def sure(check, half=0.0):
     """A check with a bar of half a width."""
-    return replace(check, bar=Bar(check.ours - half, check.ours + half))
+    return replace(check, bar=Bar(check.value - half, check.value + half))
 
 
 GOOD = claims.near("speed (m/d)", "2.9", 2.91, 2.9, relative=0.01, why="1 %")
@@ -77,7 +77,6 @@ def registered(id, function, **fields):
     (Finding((HELD, FAILED), reason="it leaks", rounding="k 9.31"), WITHIN_ROUNDING),
 ])
 def test_each_verdict_follows_from_the_checks_and_their_bars(finding, verdict):
-    """Mutants: contradicted within the bar; reproduced although a bar reaches over the bound."""
     assert finding.verdict == verdict and verdict in VERDICTS and len(VERDICTS) == 5
 
 
@@ -85,7 +84,7 @@ def test_each_verdict_follows_from_the_checks_and_their_bars(finding, verdict):
     (Finding((HELD, FAILED)), "no reason"),
     (Finding((DOUBTED_FAILURE,)), "no reason"),
     (Finding(()), "nothing is checked"),
-    (Finding((replace(HELD, ours=math.nan),), reason="why"), "not a number"),
+    (Finding((replace(HELD, value=math.nan),), reason="why"), "not a number"),
     (Finding((HELD, GOOD)), "no error bar"),
 ])
 def test_no_verdict_without_numbers_or_bars_or_without_a_reason(finding, said):
@@ -98,14 +97,14 @@ def test_no_verdict_without_numbers_or_bars_or_without_a_reason(finding, said):
     (2.3, 0.15, REACHES_OVER), (2.3, 0.05, FAILS), (1.5, 0.2, FAILS), (1.5, 0.9, REACHES_OVER),
 ])
 def test_a_check_is_judged_with_the_whole_of_its_bar(ours, half, outcome):
-    """Accepted is 1.8 to 2.2. Mutants: the number alone; one side of the bar."""
+    """Accepted is 1.8 to 2.2."""
     check = claims.between("q", "2", ours, 1.8, 2.2 + 1e-12, "")
     assert sure(check, half).outcome == outcome
 
 
 @pytest.mark.parametrize("held, outcome", [((True,) * 3, HOLDS), ((False,) * 3, FAILS), ((True, False), REACHES_OVER)])
 def test_a_number_without_a_limit_is_judged_at_every_level(held, outcome):
-    """Each level has its own range. Mutant: the default's range for the values of all levels."""
+    """Each level has its own range."""
     check = claims.without_limit(claims.at_most("triangles", "6", 5, 6, ""))
     assert replace(check, bar=Bar(5, 7), held=held).outcome == outcome
 
@@ -114,7 +113,6 @@ def test_a_number_without_a_limit_is_judged_at_every_level(held, outcome):
                                              ("110", 109.5, 110.5), ("~60", 55, 65), ("~7", 6.5, 7.5),
                                              ("~5.8", 5.75, 5.85), ("~3", 2.5, 3.5)])
 def test_a_printed_number_is_an_interval(text, low, high):
-    """Mutants: a unit for half a one; the zero of ~60 a digit; that of 110 none."""
     assert claims.interval(text) == pytest.approx((low, high))
     check = claims.printed("q", text, low)
     assert (check.low, check.high) == pytest.approx((low, high)) and check.printed == pytest.approx((low, high))
@@ -136,8 +134,8 @@ def test_words_are_no_interval(text):
     (claims.between("q", "1 to 2", 0, 1, 2, ""), (1, 2), (0.99, 2.01, math.nan)),
 ])
 def test_a_check_holds_in_its_range_alone(check, inside, outside):
-    assert all(replace(check, ours=value).holds for value in inside)
-    assert not any(replace(check, ours=value).holds for value in outside)
+    assert all(replace(check, value=value).holds for value in inside)
+    assert not any(replace(check, value=value).holds for value in outside)
 
 
 @pytest.mark.parametrize("tolerances", [{}, {"relative": 0.1, "absolute": 0.1}])
@@ -185,7 +183,6 @@ def test_an_unknown_id_is_refused(registry, capsys):
 
 
 def test_words_are_worked_out_at_the_judged_level_alone(registry, capsys):
-    """Mutant: notes at every level, with runs of their own."""
     told = []
     registered("C01", lambda: Finding((GOOD,), note=lambda: told.append(levels.current()) or "told once"))
     driver.main(["C01"])
@@ -193,7 +190,6 @@ def test_words_are_worked_out_at_the_judged_level_alone(registry, capsys):
 
 
 def test_a_level_that_fails_is_told_and_no_verdict(registry, capsys):
-    """Mutant: bars from the levels that are left."""
     def judge():
         if levels.current() == Level(SCHEME, step=2.0):
             raise KeyError("no row at 19.2 h")
@@ -207,7 +203,7 @@ def test_a_level_that_fails_is_told_and_no_verdict(registry, capsys):
 def test_a_bar_that_reaches_over_its_bound_is_undecided(registry, capsys):
     """The speed falls in proportion to the elements: its limit is 0.06 under the value at size 1, the bar 1.25 times
     that."""
-    registered("C01", lambda: Finding((replace(GOOD, ours=2.85 + 0.06 * levels.current().size),), reason="coarse"),
+    registered("C01", lambda: Finding((replace(GOOD, value=2.85 + 0.06 * levels.current().size),), reason="coarse"),
                about=claims.OF_SCHEME)
     driver.main(["C01"])
     out = capsys.readouterr().out
@@ -222,7 +218,7 @@ BOUNDS = [("C01", "2.9", 2.85, 2.95, 0.001), ("C06", "<0.5", -math.inf, 0.5, 0.0
 @pytest.mark.parametrize("end", ["low", "high"])
 def test_a_bound_moved_by_a_bar_flips_no_verdict_unnoticed(id, text, low, high, half, end):
     """A number on a bound is undecided, one a bar inside it holds, one a bar outside it fails: no step of the bound by
-    the bar goes from one verdict to its opposite. Mutant: an outcome from the number alone."""
+    the bar goes from one verdict to its opposite."""
     bound = {"low": low, "high": high}[end]
     if math.isinf(bound):
         return
@@ -233,7 +229,6 @@ def test_a_bound_moved_by_a_bar_flips_no_verdict_unnoticed(id, text, low, high, 
 
 
 def test_the_whole_report_is_written_and_compared(registry, monkeypatch, tmp_path, capsys):
-    """Mutants: the record written anew where it agrees; a difference passed."""
     for id in EXPECTED:
         registered(id, lambda: Finding((GOOD, claims.at_least("a", "|b|", 2, 1, ""))))
     lines = (("speed", (1.0, 2.0, 2.1), (100.0, 5.0)),)
@@ -259,7 +254,6 @@ def test_the_whole_report_is_written_and_compared(registry, monkeypatch, tmp_pat
 
 
 def test_a_number_out_of_its_recorded_interval_is_told(registry, capsys):
-    """Mutants: verdicts alone compared; intervals wider than recorded."""
     registered("C01", lambda: Finding((GOOD,)))
     committed(registry, "C01")
     content = json.loads(record.COMMITTED.read_text(encoding="utf-8"))
@@ -275,7 +269,6 @@ def test_a_number_out_of_its_recorded_interval_is_told(registry, capsys):
 
 
 def test_some_claims_are_recorded_anew_and_the_others_stay(registry):
-    """Mutants: the record cut down to those that are named; nothing written."""
     for id in ("C01", "C02"):
         registered(id, lambda: Finding((GOOD,)))
     assert driver.main(["--record", "C02"]) == 0 and driver.main(["--record", "C01"]) == 0
@@ -309,7 +302,6 @@ def kept():
 
 
 def test_the_record_has_every_claim_in_its_schema(kept):
-    """Mutants: a verdict in other words; a check without its tolerance's date; an interval the wrong way round."""
     assert [each["id"] for each in kept] == list(EXPECTED)
     wanted = {"quantity", "rests_on", "paper", "paper_low", "paper_high", "value", "low", "high", "input_low",
               "input_high", "scheme_2001", "tolerance", "outcome"}
@@ -324,7 +316,7 @@ def test_the_record_has_every_claim_in_its_schema(kept):
 
 
 def test_the_recorded_verdicts_follow_from_the_recorded_numbers(kept):
-    """Computed again from intervals and tolerances alone. Mutant: a verdict edited by hand."""
+    """Computed again from intervals and tolerances alone."""
     for each in kept:
         outcomes = {check["outcome"] for check in each["checks"]}
         for check in each["checks"]:
@@ -343,8 +335,7 @@ QUICK = ("C01", "C02", "C03", "C04", "C05", "C06", "C09", "C15", "C34")
 
 
 def test_coordinates_perturbed_by_1e_12_change_no_verdict_and_leave_no_interval(kept, monkeypatch):
-    """As another machine would: the seed's radius, and with it every node, is moved by 1e-12. Mutant: intervals
-    narrower than what meshes of other bits make."""
+    """As another machine would: the seed's radius, and with it every node, is moved by 1e-12."""
     evaluate.register_all()
     monkeypatch.setattr(runs, "load_scene", perturbed)
     with at_level(Level(CONVERGED, 0.5)):
@@ -353,7 +344,7 @@ def test_coordinates_perturbed_by_1e_12_change_no_verdict_and_leave_no_interval(
     known = {each["id"]: each for each in kept}
     for id, finding in found.items():
         for check, recorded in zip(finding.checks, known[id]["checks"], strict=True):
-            assert record.inside(check.ours, recorded["low"], recorded["high"]), (id, check.quantity, check.ours)
+            assert record.inside(check.value, recorded["low"], recorded["high"]), (id, check.quantity, check.value)
             assert check.holds == (recorded["outcome"] == HOLDS), (id, check.quantity)
 
 
@@ -363,7 +354,7 @@ def perturbed(name, changes=()):
 
 
 def test_bars_of_base_are_as_narrow_as_asked(kept):
-    """0.2 % on velocities, effluents and uptake of section 4. Mutant: bars of the scheme."""
+    """0.2 % on velocities, effluents and uptake of section 4."""
     known = {each["id"]: each for each in kept}
     for id in ("C01", "C02", "C03", "C04"):
         for check in known[id]["checks"]:
@@ -371,8 +362,7 @@ def test_bars_of_base_are_as_narrow_as_asked(kept):
 
 
 def test_one_set_of_inputs_gives_all_printed_numbers_of_base():
-    """A real run with the recorded set, every input within its rounding. Mutant: a set of the linear program alone,
-    0.3 % off."""
+    """A real run with the recorded set, every input within its rounding."""
     found = sensitivity.record()["one_set"]
     factors = factors_of(found["inputs"])
     rounding = sensitivity.record()["rounding"]

@@ -36,7 +36,6 @@ def rows(out):
 
 
 def test_flow_only_is_one_row_without_substrates(tmp_path):
-    """Mutant: assembling transport without [substrates]."""
     out = run(tmp_path, "flow_only")
     (row,) = rows(out)
     assert list(row) == results.COLUMNS
@@ -46,14 +45,13 @@ def test_flow_only_is_one_row_without_substrates(tmp_path):
 
 
 def test_conductivity_velocity_and_head_are_consistent(tmp_path):
-    """K = u L / head loss (2.1). Mutant: the head loss of the meshed part alone."""
+    """K = u L / head loss (2.1)."""
     (row,) = rows(run(tmp_path, "flow_only"))
     speed, loss = float(row["mean_velocity_m_per_d"]), float(row["head_loss_cm"]) / 100
     assert math.isclose(float(row["conductivity_m_per_d"]), speed * 600e-6 / loss, rel_tol=1e-12)
 
 
 def test_rows_and_fields_at_output_times(tmp_path):
-    """Mutants: steps that do not land on output times; a field file that is not the row's."""
     out = run(tmp_path, "base", 'growth.end="0.5 h"', 'output.times=["0.3 h", "0.5 h"]')
     assert [float(row["time_h"]) for row in rows(out)] == [0, 0.3, 0.5]
     sets = ElementTree.parse(out / "fields.pvd").getroot().iter("DataSet")
@@ -74,7 +72,7 @@ def test_rows_and_fields_at_output_times(tmp_path):
 
 
 def test_ledger_closes_and_adds_up(tmp_path):
-    """Each step's biomass follows the last one's, and in = out + consumed. Mutant: a ledger that skips a step."""
+    """Each step's biomass follows the last one's, and in = out + consumed."""
     out = run(tmp_path, "base", 'growth.end="1 h"', 'output.times=["1 h"]')
     with (out / "ledger.csv").open() as file:
         ledger = [{key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
@@ -91,9 +89,9 @@ def test_ledger_closes_and_adds_up(tmp_path):
 
 
 def test_provenance(tmp_path):
-    """Mutant: a run.json that forgets overrides."""
     told = json.loads((run(tmp_path, "flow_only", "flow.viscosity_ratio=500") / "run.json").read_text())
     assert told["status"] == "completed" and told["tables"]["flow"]["viscosity_ratio"] == 500
+    assert told["origin"].get("set") == ["flow.viscosity_ratio=500"]
     assert told["versions"]["scikit-fem"] and told["wall_time_by_stage_s"]["flow"] > 0 and told["remeshes"] == 0
 
 
@@ -106,7 +104,6 @@ def test_wrong_input_is_refused_before_anything_is_written(tmp_path, capsys, ent
 
 
 def test_a_folder_with_other_files_is_left_alone(tmp_path, capsys):
-    """Mutant: clearing whatever is in the output folder."""
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "thesis.tex").write_text("years of work")
     run(tmp_path, "flow_only", status=2)
@@ -115,7 +112,6 @@ def test_a_folder_with_other_files_is_left_alone(tmp_path, capsys):
 
 
 def test_only_a_runs_own_fields_are_replaced(tmp_path, capsys):
-    """Mutant: clearing every .vtu of the folder."""
     out = run(tmp_path, "flow_only")
     (out / "fields" / "mine.vtu").write_text("precious")
     run(tmp_path, "flow_only", status=2)
@@ -123,7 +119,7 @@ def test_only_a_runs_own_fields_are_replaced(tmp_path, capsys):
 
 
 def test_tables_of_somebody_elses_are_left_alone(tmp_path):
-    """A timeseries.csv without a run.json is not a run's. Mutant: taking the name for the proof."""
+    """A timeseries.csv without a run.json is not a run's."""
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "timeseries.csv").write_text("mine")
     run(tmp_path, "flow_only", status=2)
@@ -139,8 +135,7 @@ def test_the_pores_end_ends_a_run_well(tmp_path, capsys):
 
 
 def test_interrupting_a_run_keeps_what_was_computed(tmp_path):
-    """Ctrl-C in the midst of a run, after meshing: status 130, rows and run.json written. Mutant: Mmg's signal handlers
-    left in place."""
+    """Ctrl-C in the midst of a run, after meshing: status 130, rows and run.json written."""
     out = tmp_path / "run"
     code = ("import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
             "from repro.cli import main; sys.exit(main(sys.argv[1:]))")
@@ -161,14 +156,13 @@ def test_a_file_in_the_way_is_refused(tmp_path):
 
 
 def test_a_forced_run_replaces_the_first(tmp_path):
-    """Mutant: fields of an earlier run left beside the new ones."""
     run(tmp_path, "base", 'growth.end="0.4 h"')
     out = run(tmp_path, "flow_only", options=["--force"])
     assert len(list((out / "fields").iterdir())) == 1 and not (out / "ledger.csv").exists()
 
 
 def test_a_failure_says_when_and_where_and_keeps_what_was_done(tmp_path, capsys, monkeypatch):
-    """One iteration is not enough for Newton's method. Mutant: accepting what has not converged."""
+    """One iteration is not enough for Newton's method."""
     monkeypatch.setattr(growth, "MOST_ITERATIONS", 1)
     out = run(tmp_path, "base", 'growth.end="1 h"', status=1)
     message = capsys.readouterr().err
@@ -177,7 +171,7 @@ def test_a_failure_says_when_and_where_and_keeps_what_was_done(tmp_path, capsys,
 
 
 def test_unset_beside_set(capsys):
-    """In the commands that look at a scene. Mutants: an --unset that is not handed on; one that takes one key alone."""
+    """In the commands that look at a scene."""
     changes = ["--unset", "flow.head", "--unset", "growth", "--set", "flow.mean_velocity=1 m/day"]
     assert main(["scene", "base", *changes]) == 0
     text = capsys.readouterr().out
@@ -203,7 +197,7 @@ def process_of(arguments, out):
 
 @pytest.mark.parametrize("arguments", WRITERS)
 def test_nobody_reads_what_is_written(arguments):
-    """As under `| head -1`. Mutants: a traceback, then or when the process ends."""
+    """As under `| head -1`."""
     end, pipe = os.pipe()
     os.close(end)
     process = process_of(arguments, pipe)
@@ -217,7 +211,7 @@ def test_nobody_reads_what_is_written(arguments):
     (["run", "nowhere", "--out", "x", "--json"], "nowhere: neither a file nor a packaged scene"),
 ])
 def test_what_cannot_be_written_is_told_in_a_line(arguments, message):
-    """A full disk is a failure. Mutants: a traceback, then or when the process ends; status 0."""
+    """A full disk is a failure."""
     with open("/dev/full", "w") as full:
         process = process_of(arguments, full)
     assert process.returncode == 2 and process.stderr.count("\n") == 1
@@ -225,8 +219,7 @@ def test_what_cannot_be_written_is_told_in_a_line(arguments, message):
 
 
 def test_closed_ends_with_gears_method_are_a_table_of_numbers(tmp_path):
-    """What is there is stored or consumed, and every field is a number of Python's or empty. Mutants: repr of NumPy's
-    number in a field ("np.float64(0.1)"), what is stored left out of the balance."""
+    """What is there is stored or consumed, and every field is a number of Python's or empty."""
     scene = tmp_path / "closed.toml"
     scene.write_text('[pore]\nwidth = "50 um"\nlength = "600 um"\n[aggregate]\nradius = "5 um"\n[substrates]\n'
                      'boundary = "closed"\n[substrates.acceptor]\nsupply = "10 mg/L"\n[substrates.donor]\n'

@@ -23,7 +23,6 @@ def two(fast, paper, tmp_path):
 
 
 def test_a_comparison_has_a_line_a_run(two, fast, paper):
-    """Mutants: the second run drawn with the first's numbers; a run left out of a chart."""
     figures = [json.loads(html.unescape(text)) for text in re.findall('data-chart="([^"]*)"', two)]
     titles = re.findall("<figcaption>(.*?)<", two)
     # Nothing is stored, no mesh made anew.
@@ -46,19 +45,18 @@ def test_a_comparison_has_a_line_a_run(two, fast, paper):
 
 
 def test_differences_of_scenes_are_told_key_by_key(fast, paper, flow_only):
-    """Mutants: equal keys told; keys of one run alone left out."""
     found = dict((key, values) for key, *values in comparison.differences([read(fast), read(paper)]))
     assert found == {"growth.end": ["3 h", "1 h"], "numerics.preset": ["fast", "paper"],
                      "numerics.elements": ["quadratic", "linear"], "numerics.time": ["midpoint", "updates"],
                      "numerics.refinement": ["0.2", "1"], "numerics.tolerance": ["0.0075", "0.01"],
                      "numerics.jacobian": ["reused", "fresh"]}
     found = dict((key, values) for key, *values in comparison.differences([read(paper), read(flow_only)]))
-    assert found["growth.end"] == ["1 h", "-"] and found["flow.mean_velocity"] == ["-", "120833 um/h"]
+    assert {"growth.end": ["1 h", "-"], "flow.mean_velocity": ["-", "120833 um/h"]}.items() <= found.items()
     assert comparison.differences([read(fast), read(fast)]) == []
 
 
 def test_values_at_the_common_last_time(fast, paper, flow_only, two):
-    """Linear between rows, relative to the first. Mutants: each run's own last row; differences to the last run."""
+    """Linear between rows, relative to the first."""
     runs = [read(fast), read(paper)]
     assert comparison.common_time(runs) == 1.0
     found = comparison.values(runs, 1.0)["aggregate_area_um2"]
@@ -84,7 +82,7 @@ def refused(capsys, *arguments):
 
 
 def test_what_cannot_be_compared_is_refused(fast, tmp_path, capsys):
-    """In one line that says which folder and why, and nothing is written. Mutant: a traceback."""
+    """In one line that says which folder and why, and nothing is written."""
     out = tmp_path / "out.html"
     assert f"{tmp_path}: it holds no run: run.json is missing" in refused(capsys, fast, tmp_path, "--out", out)
     assert "run.json is missing" in refused(capsys, fast, tmp_path / "none", "--out", out)

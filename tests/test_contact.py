@@ -38,22 +38,19 @@ NONE = [FREE] * 6
     ("no fluid is trapped behind a closing node", beside_contact(1.0, 3.0, (18.0, 1.5)), [0, 0, 0, BOTTOM, BOTTOM, 0]),
 ])
 def test_what_closes_beside_a_contact_surface(name, outline, wanted):
-    """Minimum angle 16.7 degrees, minimum film 2 um (Table 1). Mutant: only the film, only the angle, no look
-    behind."""
+    """Minimum angle 16.7 degrees, minimum film 2 um (Table 1)."""
     assert joins(outline) == wanted
     assert joins(mirrored(outline)) == wanted[::-1]
 
 
 @pytest.mark.parametrize("gap, closes", [(2.01, False), (1.99, True), (0.0, True), (-0.5, True)])
 def test_a_film_under_2_um_to_the_opposite_wall_closes(gap, closes):
-    """Mutant: film > gap turned round, all free nodes closed, the width forgotten."""
     outline = beside_contact(5.0, 30.0, (0.0, 100.0 - gap))
     assert joins(outline) == ([0, 0, 0, 0, TOP, 0] if closes else NONE)
 
 
 def test_a_wedge_beside_the_upper_contact_closes():
-    """With contact on top the film alone no longer closes, the wedge rule does. Mutant: the top's wedges not looked
-    at."""
+    """With contact on top the film alone no longer closes, the wedge rule does."""
     outline = plug(100.0, -10.0, 10.0)
     points = np.insert(outline.points, 3, [[12.0, 99.8]], axis=0)
     wall, fixed = np.insert(outline.wall, 3, FREE), np.insert(outline.fixed, 3, False)
@@ -66,14 +63,12 @@ def test_a_wedge_beside_the_upper_contact_closes():
 
 @given(st.floats(5.0, 97.9))
 def test_a_half_disc_with_a_film_closes_nothing(radius):
-    """It meets the wall at 90 degrees. Mutant: an absolute distance to the lower wall closes the nodes beside
-    contact."""
+    """It meets the wall at 90 degrees."""
     assert not contact.closing_nodes(seed(radius), 100.0, FILM, ANGLE).any()
 
 
 @given(attached_aggregates(thickest=1.02))
 def test_closing_is_the_same_in_a_mirror(drawn):
-    """Mutant: the contact line followed in one direction only, the sign of the direction lost."""
     outline, width = drawn
     found = contact.closing_nodes(outline, width, FILM, ANGLE)
     assert contact.closing_nodes(mirrored(outline), width, FILM, ANGLE).tolist() == found[::-1].tolist()
@@ -85,8 +80,7 @@ def test_closing_is_the_same_in_a_mirror(drawn):
 
 @given(attached_aggregates(thickest=1.02, geometry=2))
 def test_closing_of_arcs_is_the_same_in_a_mirror(drawn):
-    """Nothing that is on a wall joins again, and middles join with both corners of their arc on one wall. Mutants: the
-    arc after the contact line for the one before it, the corner after a middle for the nearer one."""
+    """Nothing that is on a wall joins again, and middles join with both corners of their arc on one wall."""
     outline, width = drawn
     found = contact.closing(outline, width, FILM, ANGLE)
     image = contact.closing(mirrored(outline), width, FILM, ANGLE)
@@ -109,9 +103,16 @@ def flat_top(heights, width=20.0):
     return Outline(points, wall, np.arange(len(points)) == 2, points.copy(), 2), 6 + np.arange(count)
 
 
+def test_contact_begins_to_both_sides_of_the_highest_place():
+    """Over the film's least thickness, 2.5 um, though the highest corner alone is too near: nodes are 1 um apart."""
+    x = np.linspace(10.0, -10.0, 21)
+    shape, top = flat_top(17.52 - 0.05 * x**2)
+    joins = contact.closing(shape, 20.0, 2.5, 0.0)
+    assert np.array_equal(np.flatnonzero(joins == TOP), top[8:13])
+
+
 def test_a_middle_never_joins_alone():
-    """An arc of which only the middle is too near brings its nearer corner; a middle joins with both corners. Mutants:
-    the rule of straight edges on all nodes alike, the farther corner."""
+    """An arc of which only the middle is too near brings its nearer corner; a middle joins with both corners."""
     shape, top = flat_top([12.0, 16.0, 17.0, 18.5, 17.5, 16.0, 12.0])
     joins = contact.closing(shape, 20.0, 2.0, 0.0)
     assert np.array_equal(np.flatnonzero(joins == TOP), [top[4]]), "the corner beside it at 17.5, not that at 17"

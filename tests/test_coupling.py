@@ -81,8 +81,7 @@ def touching(request):
     ("19.4 h", "12 min", ["19.2 h"], [round(0.2 * k, 9) for k in range(98)], [0, 19.2]),
 ])
 def test_steps_are_those_of_the_paper_and_land_on_the_end(end, step, times, steps, rows):
-    """Rows are t = 0 and the times asked for, which cut no step; without them every step. Mutant: steps of np.arange
-    (0.6000000000000001), the end missed by half a step, a row at the end that nobody asked for."""
+    """Rows are t = 0 and the times asked for, which cut no step; without them every step."""
     more = {"output": {"times": times}} if times else {}
     made = scene(velocity="2.9 m/day", growth={"end": end, "time_step": step}, **more)
     found, reported = updates.schedule(made)
@@ -92,8 +91,7 @@ def test_steps_are_those_of_the_paper_and_land_on_the_end(end, step, times, step
 
 
 def test_a_run_reports_what_was_asked_for():
-    """Four steps, two rows: each carries the ledgers of all steps that ended since the last one. Mutant: ledgers of the
-    last step alone."""
+    """Four steps, two rows: each carries the ledgers of all steps that ended since the last one."""
     made = scene(velocity="2.9 m/day", growth={"end": "0.7 h"}, output={"times": ["0.3 h", "0.7 h"]})
     found = run(made)
     assert [i.pore.time for i in found] == [0.0, 0.3, 0.7]
@@ -102,8 +100,6 @@ def test_a_run_reports_what_was_asked_for():
 
 
 def test_the_ledgers_of_base_close(base):
-    """Mutant: biomass made from concentrations, uptake from other ones; X_A reprojected with all triangles; the flux
-    of u for w."""
     _, found = base
     assert [i.pore.time for i in found] == pytest.approx([0, 0.2, 0.4, 0.6, 0.8, 1.0])
     assert_ledgers_close(found)
@@ -111,8 +107,7 @@ def test_the_ledgers_of_base_close(base):
 
 def test_the_area_grows_by_the_biomass_made(base):
     """X_m times the new area is the biomass made, as far as the density stays X_m: drift measured 3e-6 in 1 h [E7];
-    theta is the area over that at t = 0. Mutant: growth by X_A alone, increments over the present density, (29) by a
-    sum for a mean."""
+    theta is the area over that at t = 0."""
     made, found = base
     first, last = found[0].pore, found[-1].pore
     grown = (last.outline.area - first.outline.area) * made.kinetics.maximum_density
@@ -128,7 +123,7 @@ def test_the_area_grows_by_the_biomass_made(base):
 
 def test_base_grows_at_the_rate_of_its_concentrations(base):
     """X_A of the whole aggregate after 1 h lies between exponentials at the lowest and highest rate in it, 0.1 %
-    apart. Mutant: one explicit increment a step (0.4 % low), a rate per day, the step's first rate throughout."""
+    apart."""
     made, found = base
     def rate(instant, pick):
         at = (in_body(instant, name) for name in ("acceptor", "donor"))
@@ -142,8 +137,7 @@ def test_base_grows_at_the_rate_of_its_concentrations(base):
 
 
 def test_base_starts_as_the_paper_says(base):
-    """2.90 m/d within 1 % (C01), 110 um meshed (C07), 7 % less fluid velocity never more. Mutant: the head taken in
-    cm as um."""
+    """2.90 m/d within 1 % (C01), 110 um meshed (C07), 7 % less fluid velocity never more."""
     _, found = base
     first = found[0]
     assert first.solved.flow.mean_velocity * 24e-6 == pytest.approx(2.90, rel=1e-2)
@@ -153,8 +147,7 @@ def test_base_starts_as_the_paper_says(base):
 
 
 def test_what_was_before_the_expansion(base):
-    """Plate 1's state [E12]: the shape of the last instant, with the biomass and substrates of this one. Mutant: the
-    grown pore after its expansion, the concentrations at the step's start."""
+    """Plate 1's state [E12]: the shape of the last instant, with the biomass and substrates of this one."""
     _, found = base
     for last, instant in zip(found, found[1:]):
         grown, solution = instant.before
@@ -169,7 +162,7 @@ def test_what_was_before_the_expansion(base):
 @EVERY_ORDER
 def test_decay_alone_follows_its_exponential(order):
     """No donor: X_A + X_I = X_m (0.2 + 0.8 exp(-b m_A t)), m_A between its least and largest value (1e-5 apart), and
-    the aggregate shrinks with it. Mutant: f_d for 1 - f_d, decay without m_A, growth that cannot shrink."""
+    the aggregate shrinks with it."""
     made = scene(head="1e-3 cm", donor="0 mg/L", growth={"end": "6 h", "time_step": "1.5 h"}, output={"times": ["6 h"]},
                  numerics=elements(order))
     first, last = run(made)
@@ -186,7 +179,7 @@ def test_decay_alone_follows_its_exponential(order):
 @EVERY_ORDER
 def test_growth_by_pure_diffusion_is_symmetric(order):
     """Same supply at both ends, no flow: the outline stays its own mirror image to the asymmetry of the mesh
-    (measured 2e-5 of R), though it starves within. Mutant: one end held, the fixed point beside the middle."""
+    (measured 2e-5 of R), though it starves within."""
     made = scene("20 um", acceptor="2 mg/L", growth={"end": "2 h", "time_step": "30 min"}, output={"times": ["2 h"]},
                  numerics=elements(order))
     first, last = run(made)
@@ -200,8 +193,7 @@ def test_growth_by_pure_diffusion_is_symmetric(order):
 
 @EVERY_ORDER
 def test_halving_the_step_changes_little(order):
-    """Second order in time: 0.4 h in one step against four, area within 2e-5; its growth is 8 %. Mutant: rates of the
-    step's start (first order: 1e-4)."""
+    """Second order in time: 0.4 h in one step against four, area within 2e-5; its growth is 8 %."""
     areas = []
     for step in ("24 min", "6 min"):
         made = scene("30 um", velocity="1.4 m/day", growth={"end": "0.4 h", "time_step": step},
@@ -212,8 +204,7 @@ def test_halving_the_step_changes_little(order):
 
 def test_contact_closes_the_film_and_the_run_goes_on(touching):
     """The thickness passes W - 2 um: contact nodes lie on the upper wall to the last bit, the fluid splits in two,
-    flow is forced through the plug, ledgers close across the remeshes. Mutant: the film never closes; contact without
-    a remesh; linear transfer."""
+    flow is forced through the plug, ledgers close across the remeshes."""
     made, found = touching
     states = [i.pore.contact for i in found]
     assert states == sorted(states) and not states[0] and states[-1]
@@ -233,8 +224,7 @@ def test_contact_closes_the_film_and_the_run_goes_on(touching):
 
 def test_contact_surfaces_grow_and_never_detach(touching):
     """From contact on both surfaces widen, no material leaves them, their fixed points keep their x, and the area
-    goes on growing with the biomass made (density after contact is off by 1 %). Mutant: contact found anew at each
-    step; fixed point chosen anew."""
+    goes on growing with the biomass made (density after contact is off by 1 %)."""
     made, found = touching
     for wall in (BOTTOM, TOP):
         there = [i.pore for i in found if (i.pore.wall == wall).any()]
@@ -251,7 +241,7 @@ def test_contact_surfaces_grow_and_never_detach(touching):
 
 def test_a_remesh_carries_everything_over(base):
     """Made anew around the same outline: masses to 1e-12, density within 1e-9 of X_m where it was, places at t = 0
-    and theta as before. Mutant: J from the old mesh's places, theta reset to one, the fixed point lost."""
+    and theta as before."""
     made, found = base
     last = found[-1]
     again, _ = remeshing.remesh(made, last.pore, last.pore, last.solved.flow.mean_velocity)
@@ -268,7 +258,7 @@ def test_a_remesh_carries_everything_over(base):
 
 @EVERY_ORDER
 def test_an_aggregate_at_the_pores_end_stops_the_run(order):
-    """After a last instant. Mutant: the end of the mesh for the end of the pore, one end looked at."""
+    """After a last instant."""
     made = scene("28 um", "60 um", velocity="2.9 m/day", growth={"end": "5 h"}, numerics=elements(order))
     made = replace(made, pore=replace(made.pore, length=66.0))
     seen = []
@@ -303,8 +293,7 @@ def lost_at_the_inlet(instant):
 @pytest.mark.parametrize("name", OPTIONS)
 def test_every_option_works_with_elements_of_every_order(name):
     """From before contact with the opposite wall to after it: order 1, 2 and 3 agree on the area to 1 %, and on the
-    velocity before contact to 3 %; balances close, but for what the printed inlet loses. Mutants: an option that is not
-    heard with one of the orders, forces of the corners alone, a strain counted from t = 0 where it should not."""
+    velocity before contact to 3 %; balances close, but for what the printed inlet loses."""
     changes, bound = OPTIONS[name]
     areas, speeds = [], []
     for order in ORDERS:
@@ -328,7 +317,7 @@ def test_every_option_works_with_elements_of_every_order(name):
 @pytest.mark.parametrize("order", [1, 2, pytest.param(3, marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("name", sorted(OPTIONS.keys() - {"fixed point"}))
 def test_every_option_makes_a_difference(name, order):
-    """In a run through contact. Mutant: an option that elements of one order do not hear."""
+    """In a run through contact."""
     rows = []
     for changes in ((), OPTIONS[name][0]):
         made = load_scene("base", [*sets(order), "numerics.refinement=0.3", 'aggregate.radius="17.9 um"',
@@ -342,7 +331,7 @@ def test_every_option_makes_a_difference(name, order):
 @EVERY_ORDER
 def test_the_fixed_point_is_kept_or_chosen_anew(order):
     """Of an aggregate whose fixed point is beside the middle: "kept" it keeps its x to the last bit, "rechosen" the
-    middle does [E20]. Mutants: the word not heard, a middle of an arc chosen."""
+    middle does [E20]."""
     made = scene("10 um", velocity="2.9 m/day", growth={"end": "1 h"}, numerics=elements(order))
     now = pore.seeded(made)
     x, middle = now.outline.points[:, 0], int(np.flatnonzero(now.fixed)[0])

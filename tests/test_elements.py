@@ -34,7 +34,6 @@ def grid(made):
 
 @ORDERS
 def test_nodes_are_where_they_are_taken_to_be(order):
-    """Mutants: middles in the order 12, 20, 01; nodes of an edge exchanged."""
     assert np.allclose(elements.nodes(order), NODES[order], rtol=0, atol=1e-15)
     along = elements.nodes(order)[elements.ON_EDGE[order]]
     assert np.allclose(along, np.column_stack([np.linspace(0, 1, order + 1), np.zeros(order + 1)]), rtol=0, atol=1e-15)
@@ -42,8 +41,7 @@ def test_nodes_are_where_they_are_taken_to_be(order):
 
 @ORDERS
 def test_nodal_functions(order):
-    """One at their node, zero at the others; their sum is one, the sum of their derivatives zero. Mutants: 2 L for
-    4 L L', nodes of an edge exchanged."""
+    """One at their node, zero at the others; their sum is one, the sum of their derivatives zero."""
     count = (order + 1) * (order + 2) // 2
     assert np.allclose(elements.values(order, elements.nodes(order)), np.eye(count), rtol=0, atol=1e-14)
     N, dN = elements.values(order, WHERE), elements.derivatives(order, WHERE)
@@ -54,7 +52,7 @@ def test_nodal_functions(order):
 @pytest.mark.parametrize("order, step, bound", [(1, 0.25, 1e-13), (2, 0.25, 1e-13), (3, 1e-4, 41e-8)])
 def test_derivatives_are_those_of_the_functions(order, step, bound):
     """Central differences are exact of quadratic functions; of cubic ones they err by the step squared times the third
-    derivative, 81 / 2. Mutants: derivatives by t and s exchanged, L for M in one of them."""
+    derivative, 81 / 2."""
     found = elements.derivatives(order, WHERE)
     for axis in (0, 1):
         move = step * np.eye(2)[axis]
@@ -64,7 +62,7 @@ def test_derivatives_are_those_of_the_functions(order, step, bound):
 
 @pytest.mark.parametrize("order, degree", [*elements.DEGREES.items(), *elements.GRADIENT_DEGREES.items()])
 def test_the_quadrature_is_exact_to_its_degree(order, degree):
-    """Integral of s^a t^b over the unit triangle: a! b! / (a + b + 2)!. Mutant: a rule of one degree less."""
+    """Integral of s^a t^b over the unit triangle: a! b! / (a + b + 2)!."""
     of = elements.table(order, 1, degree)
     s, t = of.linear[:, 1:].T
     for power in range(degree + 1):
@@ -75,8 +73,7 @@ def test_the_quadrature_is_exact_to_its_degree(order, degree):
 
 @ORDERS
 def test_the_quadrature_of_edges_is_exact_to_its_degree(order):
-    """Of products of two functions of the order and a speed of the same; nodes of the edge 01 in turn. Mutants: a rule
-    of one degree less, the nodes near the corners exchanged."""
+    """Of products of two functions of the order and a speed of the same; nodes of the edge 01 in turn."""
     along, weights = elements.edge_table(order)
     s = along @ np.linspace(0, 1, order + 1)
     assert elements.EDGE_DEGREES[order] >= (3 * order if order > 1 else 2)
@@ -87,7 +84,6 @@ def test_the_quadrature_of_edges_is_exact_to_its_degree(order):
 
 @ORDERS
 def test_tables_are_made_once_and_hold_what_they_say(order):
-    """Mutants: the maps' functions for the fields', barycentric coordinates beginning with another corner."""
     for geometry in (1, 2):
         of = elements.table(order, geometry, elements.DEGREES[order])
         assert of is elements.table(order, geometry, elements.DEGREES[order])
@@ -101,8 +97,7 @@ def test_tables_are_made_once_and_hold_what_they_say(order):
 
 
 def test_points_elsewhere_than_in_the_quadrature(grid):
-    """With the derivatives at the nodes, gradients of x and y are the unit vectors there. Mutant: gradients of the
-    quadrature's points used all the same."""
+    """With the derivatives at the nodes, gradients of x and y are the unit vectors there."""
     where = elements.nodes(2)
     parts = (elements.values(2, where), elements.derivatives(2, where)) * 2
     of = elements.Table(np.ones(6), *parts, elements.values(1, where))
@@ -113,7 +108,7 @@ def test_points_elsewhere_than_in_the_quadrature(grid):
 
 
 def test_inverse_and_determinant_of_small_matrices():
-    """Against NumPy's. Mutants: the transpose left out, the diagonal's entries not exchanged."""
+    """Against NumPy's."""
     matrix = np.random.default_rng(6).standard_normal((7, 3, 2, 2)) + 3 * np.eye(2)
     det = elements.determinant(matrix)
     assert np.allclose(det, np.linalg.det(matrix), rtol=1e-13)
@@ -121,8 +116,7 @@ def test_inverse_and_determinant_of_small_matrices():
 
 
 def test_middles_belong_to_one_edge_each():
-    """Two triangles share the node of their edge; those given are on the outline. Mutant: middles by triangle, given
-    middles in another order."""
+    """Two triangles share the node of their edge; those given are on the outline."""
     made = pore.seeded(scene("20 um", numerics={"preset": "fast"}))
     grid = made.mesh
     edges = np.sort(grid.cells[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
@@ -138,7 +132,7 @@ def test_middles_belong_to_one_edge_each():
 
 def test_edges_and_their_numbers(made):
     """Each edge once, the same on a straight mesh as on a curved one of the same triangles but for their order; found
-    again by its ends, in either order. Mutants: an edge's number of another one, edges counted by triangle."""
+    again by its ends, in either order."""
     for topology in (made.topology, made.straight.topology):
         ends = topology.triangles[:, [[0, 1], [1, 2], [2, 0]]]
         assert np.array_equal(np.sort(topology.edges[topology.cell_edges]), np.sort(ends))
@@ -150,8 +144,7 @@ def test_edges_and_their_numbers(made):
 
 
 def test_no_triangle_has_two_edges_on_the_boundary_of_its_region():
-    """Such a corner's pressure would lock it; others stay as they were, and areas too. Mutants: unlocked does nothing,
-    a flip that turns a triangle over."""
+    """Such a corner's pressure would lock it; others stay as they were, and areas too."""
     grid, _ = meshed(seed(20.0, 0.3, 2).corners, refinement=0.3)
     freed = unlocked(grid)
     areas = triangle_areas(freed.points, freed.triangles)
@@ -164,8 +157,7 @@ def test_no_triangle_has_two_edges_on_the_boundary_of_its_region():
 
 
 def test_a_middle_lies_between_the_ends_of_its_edge(grid, made):
-    """``edges`` are in the order of the middles' nodes: a linear field keeps its values at straight middles.
-    Mutants: the edges of a triangle in another order than its middles, middles at one of the ends."""
+    """``edges`` are in the order of the middles' nodes: a linear field keeps its values at straight middles."""
     straight = grid.with_middles(grid.points[: grid.corners])
     inner = np.setdiff1d(np.arange(len(grid.points)), grid.loop)
     assert np.allclose(straight[inner], made.points[inner], rtol=0, atol=1e-12)
@@ -174,7 +166,7 @@ def test_a_middle_lies_between_the_ends_of_its_edge(grid, made):
 
 def test_only_triangles_at_the_aggregate_are_bent(made):
     """In a mesh that was made, the others are straight, which ``acceptable`` stands on; and a bent one that is turned
-    over is found. Mutants: those of the biomass alone, those of the fluid."""
+    over is found."""
     straight, others = made.moved(made.with_middles(made.points[: made.corners])), np.ones(len(made.cells), bool)
     bent = made.topology.bent
     others[bent] = False
@@ -188,7 +180,7 @@ def test_only_triangles_at_the_aggregate_are_bent(made):
 
 
 def test_a_triangle_that_is_turned_over_is_refused(grid):
-    """A middle pulled across its triangle; of a straight mesh, a corner. Mutant: only the corners' area looked at."""
+    """A middle pulled across its triangle; of a straight mesh, a corner."""
     assert not grid.turned_over().any()
     points = grid.points.copy()
     middle = grid.cells[0, 3]
@@ -205,7 +197,6 @@ def test_a_triangle_that_is_turned_over_is_refused(grid):
 
 
 def test_a_clean_channel_has_no_aggregate():
-    """Mutant: an outline of no nodes."""
     made = pore.seeded(scene("20 um", numerics={"preset": "fast"})).mesh
     none = np.zeros(len(made.cells), bool)
     straight = Mesh.of(made.points[: made.corners], made.triangles, none, np.empty(0, int), 50.0, made.ends)

@@ -183,8 +183,7 @@ def test_displacements_survive_a_new_mesh(short):
 
 
 def test_plate_1_shows_what_has_grown_and_not_what_reprojection_left(short):
-    """What grows in 12 min from the density of before: X_A (e^(F3 t)), even to the growth's own differences. Mutants:
-    the biomass over X_m, whose interface nodes are off by 0.1 %; over the density after it has grown."""
+    """What grows in 12 min from the density of before: X_A (e^(F3 t)), even to the growth's own differences."""
     plate_1 = MODULES["plate_1"]
     state = states.last(short["base"], "before_expansion")
     grown = plate_1.since(short["base"], "active_biomass")[state.body]
@@ -195,8 +194,7 @@ def test_plate_1_shows_what_has_grown_and_not_what_reprojection_left(short):
 
 
 def test_outlines_are_smooth_between_the_walls_and_keep_their_nodes():
-    """A flattened disc: straight on both walls, a spline between them. Mutants: a spline around the contact lines;
-    nodes left out."""
+    """A flattened disc: straight on both walls, a spline between them."""
     outline = figure_2.flattened(50.0)
     line = figure_6.smooth(outline.points, 50.0)
     apart = np.linalg.norm(line[:, None] - outline.points[None], axis=2).min(axis=0)
@@ -211,7 +209,6 @@ def test_outlines_are_smooth_between_the_walls_and_keep_their_nodes():
 
 
 def test_page_and_captions_tell_the_recorded_verdicts(monkeypatch):
-    """Mutants: a claim without its verdict; verdicts of a run that is not recorded."""
     known = {"C01": "reproduced", "C02": "undecided"}
     monkeypatch.setattr(claims, "verdicts", lambda: known)
     monkeypatch.setattr(page, "verdicts", lambda: known)

@@ -88,8 +88,7 @@ def test_poiseuille_flow_is_approached_with_its_order():
     both ends the stabilisation has dp/dn = 0 in a layer of one element (0.2 % of the 600 um pore at the default
     mesh).
 
-    Measured orders 2.1, 2.0, 1.0; errors 1.2 % in the loss of 3 W. Mutant: tau = h / c, h_tau a mean edge squared
-    twice, the parabola's flux cut by its chords (the order of u stays, the loss falls by 1/n^2 more). """
+    Measured orders 2.1, 2.0, 1.0; errors 1.2 % in the loss of 3 W."""
     size, speed, slope, loss = np.transpose([poiseuille_errors(r) for r in (1.0, 1.4, 2.0, 3.0)])
     assert 1.7 < fitted_order(size, speed) < 2.4
     assert 1.7 < fitted_order(size, slope) < 2.4
@@ -100,7 +99,7 @@ def test_poiseuille_flow_is_approached_with_its_order():
 
 @pytest.mark.parametrize("order", HIGHER)
 def test_higher_orders_hold_poiseuille_flow_exactly(order):
-    """Round-off. Mutant: a weight of the pressure, the sign of a block, an outlet condition that is not natural."""
+    """Round-off."""
     space, unit = clean(0.5, order)
     ends, loss = space.mesh.ends, poiseuille.head_loss(1.0, WIDTH, 1.0, 1.0)
     assert np.abs(unit.velocity[:, 0] - poiseuille.velocity(space.points[:, 1], WIDTH)).max() < 1e-12
@@ -111,7 +110,7 @@ def test_higher_orders_hold_poiseuille_flow_exactly(order):
 
 @pytest.mark.parametrize("order", ORDERS)
 def test_biomass_as_thin_as_water_is_a_clean_channel(order):
-    """lambda = 1 gives the solution without biomass, bit by bit or nearly. Mutant: lambda + 1, the regions swapped."""
+    """lambda = 1 gives the solution without biomass, bit by bit or nearly."""
     space = around_seed(30.0, order, 1.0 if order == 1 else 0.5)
     none, all_of_it = (Space(relabelled(space.mesh, np.full(len(space.mesh.biomass), what)), order)
                        for what in (False, True))
@@ -127,8 +126,7 @@ def test_biomass_as_thin_as_water_is_a_clean_channel(order):
 @pytest.mark.parametrize("shape, bound", [("seed", 2e-3), ("penetrating", 15e-3), ("plug", 2e-3)])
 def test_the_flux_through_every_section_is_the_inlets(shape, bound, order):
     """Of w to round-off, at lambda = 2000 and through the plug too; of u as measured: 0.09 %, 1.0 % (a film), 0.15 %
-    of linear elements. Mutant: w = u + tau grad p; tau scaled by water's viscosity in the biomass (98 % of u's flux
-    vanishes in the plug)."""
+    of linear elements."""
     refinement = 1.0 if order == 1 else 0.5
     if shape == "plug":
         space = space_of(meshed(plug(WIDTH, -20.0, 15.0, 5.0), refinement=refinement)[0], order)
@@ -143,7 +141,7 @@ def test_the_flux_through_every_section_is_the_inlets(shape, bound, order):
 
 @pytest.mark.parametrize("order", HIGHER)
 def test_water_is_conserved_against_every_function_of_the_pressure(order):
-    """(q, div u) = 0 for each of them. Mutant: the divergence of one component."""
+    """(q, div u) = 0 for each of them."""
     space = around_seed(20.0, order, 0.3)
     unit, rows = flow.unit_flow(space, RATIO), flow.divergence(space)
     u = unit.velocity[space.cells].transpose(0, 2, 1).reshape(len(rows), -1)
@@ -157,9 +155,7 @@ def test_water_is_conserved_against_every_function_of_the_pressure(order):
 def test_a_rectangular_plug_keeps_the_parabola_and_costs_lambda_times_its_length(order):
     """In the Laplacian form Poiseuille flow passes a straight plug unchanged: loss 12 (L - l + lambda l) / W^2,
     exactly at order 2 and 3; linear elements within 0.5 % (measured 0.38 %). The traction form is 8 to 17 % lower [E10]
-    (measured 16.7 %).
-
-    Mutant: a harmonic mean of viscosities, lambda in the wrong region, the options swapped. """
+    (measured 16.7 %)."""
     grid, _ = meshed(plug(WIDTH, -20.0, 15.0))
     exact = 12 * (np.ptp(grid.ends) - 35 + RATIO * 35) / WIDTH**2
     assert flow.unit_flow(space_of(grid, order), RATIO).loss == pytest.approx(exact, rel=5e-3 if order == 1 else 1e-11)
@@ -172,8 +168,7 @@ def test_a_rectangular_plug_keeps_the_parabola_and_costs_lambda_times_its_length
 @pytest.mark.parametrize("order", HIGHER)
 def test_a_layer_of_biomass_along_the_wall(ratio, interface, order):
     """Developed flow over a layer is piecewise quadratic: orders 2 and 3 find profile and gradient but for what is left
-    of the inlet's parabola 6 W downstream (measured 3e-7 at most). Mutant: nu du/dn not continuous, viscosity of the
-    neighbour element."""
+    of the inlet's parabola 6 W downstream (measured 3e-7 at most)."""
     space = space_of(layered(0.3 * WIDTH, 8 * WIDTH), order)
     unit = flow.unit_flow(space, ratio, interface=interface)
     x, y = space.points.T
@@ -190,7 +185,7 @@ def test_a_layer_of_biomass_along_the_wall(ratio, interface, order):
 @pytest.mark.parametrize("order, bound", [(2, 1e-4), (3, 4e-6)])
 def test_a_permeable_layer_along_the_wall(interface, order, bound):
     """The same with Brinkman's drag, whose boundary layers are 10 um thick: to what the elements resolve of these
-    (measured 6.6e-5 and 2.5e-6). Mutants: the drag in the water, or of half the size; a viscosity besides."""
+    (measured 6.6e-5 and 2.5e-6)."""
     space = space_of(layered(0.3 * WIDTH, 8 * WIDTH), order)
     unit = flow.unit_flow(space, interface=interface, permeability=100.0)
     x, y = space.points.T
@@ -202,7 +197,7 @@ def test_a_permeable_layer_along_the_wall(interface, order, bound):
 
 def test_a_run_with_a_permeable_body():
     """A tight body is nearly a wall, as one of 2000 times the viscosity is: the same growth to a few parts in a
-    thousand, and every balance closes. Mutant: no drag (conductivity 27 % larger at the end)."""
+    thousand, and every balance closes."""
     said = ["numerics.preset=fast", "growth.end=15 h", 'output.times=["15 h"]']
     viscous, drag = (list(simulate(load_scene("base", [*said, *more])))[-1] for more in (
         [], ["flow.biomass=brinkman", "flow.permeability=1e-15 m^2"]))
@@ -228,8 +223,7 @@ def layered(layer, length):
 @pytest.mark.parametrize("order, bound", [(1, 4e-3), (2, 2e-4), (3, 2e-4)])
 def test_reversed_flow_loses_the_same_head(order, bound):
     """Stokes flow is reversible: an aggregate that leans, and its mirror image. The ends' conditions differ, so that
-    the losses agree to the error of the mesh (measured 2e-3). Mutant: an advection term; inlet and outlet mean of
-    unequal weight."""
+    the losses agree to the error of the mesh (measured 2e-3)."""
     half = seed(30.0)
     lean = half.points + np.column_stack([0.6 * half.points[:, 1], np.zeros(len(half.points))])
     grid, _ = meshed(Outline(lean, half.wall, half.fixed, lean))
@@ -239,7 +233,7 @@ def test_reversed_flow_loses_the_same_head(order, bound):
 
 @pytest.mark.parametrize("order", HIGHER)
 def test_flow_around_a_curved_aggregate_is_reversible(order):
-    """Stokes: the mirrored aggregate has the same loss. Mutant: something that knows upstream from downstream."""
+    """Stokes: the mirrored aggregate has the same loss."""
     space = around_seed(20.0, order, 0.2)
     mirrored = Space(reversed_mesh(space.mesh), order)
     assert flow.unit_flow(mirrored, RATIO).loss == pytest.approx(flow.unit_flow(space, RATIO).loss, rel=1e-3)
@@ -251,8 +245,7 @@ def scaled(unit, grid, **drive):
 
 @pytest.mark.parametrize("order", ORDERS)
 def test_a_clean_pore_conducts_as_poiseuille_says(order):
-    """K = g W^2 / (12 nu) within the error of the meshed quarter (0.4 %), and exactly with order 2 and 3. Mutant: 8 for
-    12, the whole length as meshed."""
+    """K = g W^2 / (12 nu) within the error of the meshed quarter (0.4 %), and exactly with order 2 and 3."""
     exact = poiseuille.conductivity(WIDTH, 1e-3)
     if order == 1:
         space, unit = clean(1.0)
@@ -265,10 +258,7 @@ def test_a_clean_pore_conducts_as_poiseuille_says(order):
 
 @pytest.mark.parametrize("share, bound", [(0.5, 0.02), (0.7, 0.03), (0.9, 0.06), (0.96, 0.1)])
 def test_conductivity_is_converged_at_the_default_mesh(share, bound):
-    """Against Taylor-Hood on a mesh 1.5 times finer (itself within 0.5 %). Measured: 0.5, 1.5, 0.8 and 0.1 %.
-
-    Mutant: stabilisation 100 times stronger (c = 1), the film not resolved.
-    """
+    """Against Taylor-Hood on a mesh 1.5 times finer (itself within 0.5 %). Measured: 0.5, 1.5, 0.8 and 0.1 %."""
     grid, _ = meshed(seed(share * WIDTH))
     fine = meshed(seed(share * WIDTH, 1.5), refinement=1.5)[0]
     exact = whole_loss(flow.unit_flow(space_of(fine, 2), RATIO), fine)
@@ -277,7 +267,7 @@ def test_conductivity_is_converged_at_the_default_mesh(share, bound):
 
 @pytest.mark.parametrize("share", [0.5, 0.9])
 def test_orders_two_and_three_agree_on_conductivity(share):
-    """On curved triangles, half as many across: to 0.5 %. Mutant: a pressure of the velocity's own order."""
+    """On curved triangles, half as many across: to 0.5 %."""
     spaces = [around_seed(share * WIDTH, order, 0.5) for order in HIGHER]
     quadratic, cubic = (whole_loss(flow.unit_flow(space, RATIO), space.mesh) for space in spaces)
     assert quadratic == pytest.approx(cubic, rel=5e-3)
@@ -286,7 +276,7 @@ def test_orders_two_and_three_agree_on_conductivity(share):
 @pytest.mark.parametrize("order", HIGHER)
 @pytest.mark.parametrize("radius, difference, spread", [(25.0, -0.0005, 0.0001), (35.0, -0.00175, 0.0002)])
 def test_the_two_interface_forms_differ_by_two_parts_in_a_thousand(radius, difference, spread, order):
-    """[E2], [E10] for half-discs; converged on two meshes to 1e-4. Mutant: grad u^T left out, or 2 nu of it."""
+    """[E2], [E10] for half-discs; converged on two meshes to 1e-4."""
     space = space_of(meshed(seed(radius))[0], order)
     one, two = (flow.unit_flow(space, RATIO, interface=form).loss for form in ("laplacian", "traction"))
     assert two / one - 1 == pytest.approx(difference, abs=spread)
@@ -295,8 +285,7 @@ def test_the_two_interface_forms_differ_by_two_parts_in_a_thousand(radius, diffe
 @pytest.mark.parametrize("order", ORDERS)
 def test_nothing_slips_and_the_inlet_is_the_scaled_parabola(order):
     """(3), (5), at all nodes, with the exact discrete flux at the inlet, which is the parabola's own where that is one
-    of the functions. Mutant: one wall free, u_y or inner nodes left free at the inlet, a parabola of mean two thirds.
-    """
+    of the functions."""
     space = around_seed(20.0, order, 0.4)
     unit, inlet = flow.unit_flow(space, RATIO), space.end_nodes(space.dofs.inlet)
     assert (unit.velocity[space.dofs.walls] == 0).all() and (unit.velocity[inlet, 1] == 0).all()
@@ -313,8 +302,7 @@ def test_nothing_slips_and_the_inlet_is_the_scaled_parabola(order):
 @pytest.mark.parametrize("left", [-1 / 3 * 100, -47.123456789012345, -0.1 * 487])
 @pytest.mark.parametrize("order", ORDERS)
 def test_every_inlet_node_takes_part_wherever_the_ends_are(left, order):
-    """The discrete influx is u_ave W to round-off at ends that are no round numbers; what leaves, in the mean of w.
-    Mutant: nodes found on the ends by equality with scikit-fem's places, which round-off moves off them."""
+    """The discrete influx is u_ave W to round-off at ends that are no round numbers; what leaves, in the mean of w."""
     geometry, refinement = min(order, 2), 1.0 if order == 1 else 0.3
     sizing = Sizing(7.123456, refinement, 2.0)
     grid, _ = mesher.generate(seed(1.0, refinement, geometry), (left, 0.7 - left / 7), sizing, geometry)
@@ -330,8 +318,7 @@ def test_every_inlet_node_takes_part_wherever_the_ends_are(left, order):
 @pytest.mark.parametrize("ratio", [1.0, 10.0, 2000.0])
 @pytest.mark.parametrize("order", HIGHER)
 def test_the_loss_is_the_work_of_the_inlet(ratio, order):
-    """It is what viscosity dissipates, and no less than the clean channel's (least dissipation). Mutants: the mean
-    pressure of the inlet, work over the flux twice."""
+    """It is what viscosity dissipates, and no less than the clean channel's (least dissipation)."""
     space = around_seed(20.0, order, 0.2)
     unit = flow.unit_flow(space, ratio)
     K = each(np.where(space.mesh.biomass, ratio, 1.0), space.stiffness)
@@ -344,7 +331,7 @@ def test_the_loss_is_the_work_of_the_inlet(ratio, order):
 
 @pytest.mark.parametrize("order", HIGHER)
 def test_the_loss_is_that_of_the_head_where_the_flow_is_developed(order):
-    """(6): mean head of the inlet less that of the outlet, which is zero (4). Mutant: 12 L / W^2 for the mesh."""
+    """(6): mean head of the inlet less that of the outlet, which is zero (4)."""
     space = around_seed(10.0, order, 0.2)
     unit, pressures = flow.unit_flow(space, RATIO), pressure_space(space)
     ends = [pressures.mean_over(edges, unit.pressure) for edges in (pressures.dofs.inlet, pressures.dofs.outlet)]
@@ -355,8 +342,7 @@ def test_the_loss_is_that_of_the_head_where_the_flow_is_developed(order):
 @pytest.mark.parametrize("velocity, head", [("2.9 m/day", None), (None, "1e-3 cm")])
 @pytest.mark.parametrize("order", ORDERS)
 def test_the_scene_drives_it(velocity, head, order):
-    """By a mean velocity, or by a head over the whole pore; conductivity u L / head either way. Mutants: the head over
-    the mesh alone, viscosity in the velocity and not in the head."""
+    """By a mean velocity, or by a head over the whole pore; conductivity u L / head either way."""
     made = scene("20 um", "50 um", velocity=velocity, head=head,
                  numerics={"elements": ORDERS[order], "refinement": 0.5 if order == 1 else 0.2})
     space = pore.seeded(made).space

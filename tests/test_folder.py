@@ -32,8 +32,7 @@ def may_mount() -> bool:
 
 
 def test_two_runs_in_one_folder(tmp_path):
-    """The second one is refused, whatever it is, and the first goes on; the lock goes with the run. Mutant: a lock
-    that is looked at and not taken."""
+    """The second one is refused, whatever it is, and the first goes on; the lock goes with the run."""
     scene = load_scene("flow_only")
 
     def again(event):
@@ -49,7 +48,7 @@ def test_two_runs_in_one_folder(tmp_path):
 
 def test_a_killed_run_leaves_no_lock_that_counts(tmp_path, capsys):
     """While it runs another process is refused with status 2; after SIGKILL the lock's file is there and says nothing.
-    Mutant: a lock that is a file's being there."""
+    """
     out = tmp_path / "run"
     process = started("base", "--out", out, "--checkpoint", "0")
     wait_for((out / NEWEST).exists, process)
@@ -63,7 +62,7 @@ def test_a_killed_run_leaves_no_lock_that_counts(tmp_path, capsys):
 
 
 def test_a_lock_that_was_removed_is_none(tmp_path):
-    """Who locks a file that is no longer the folder's tries again. Mutant: two holders of two files."""
+    """Who locks a file that is no longer the folder's tries again."""
     with held(tmp_path):
         os.unlink(tmp_path / LOCK)
         with held(tmp_path):
@@ -86,8 +85,7 @@ def cut_off(folder):
 
 
 def test_a_runs_files_are_listed(tmp_path):
-    """All that there is in the end, and nothing else, by name in run.json; the fields' sums are right. Mutants: a file
-    that is not listed, one that is but never was written."""
+    """All that there is in the end, and nothing else, by name in run.json; the fields' sums are right."""
     run(load_scene("base", FAST), tmp_path)
     assert sorted({*files(tmp_path), "run.json", "report.html", LAST}) == told(tmp_path)["files"]
     sums = dict(line.split("  ")[::-1] for line in (tmp_path / SUMS).read_text().splitlines())
@@ -96,7 +94,7 @@ def test_a_runs_files_are_listed(tmp_path):
 
 def test_nothing_is_removed_that_no_run_wrote(tmp_path, capsys):
     """A resume without a good checkpoint starts again, beside what others have put there, names of fields and tables
-    among them. Mutants: the whole of fields/ removed; whatever has a name that a run might give."""
+    among them."""
     out = tmp_path / "run"
     scene = cut_off(out)
     spoil(out)
@@ -114,7 +112,7 @@ def test_nothing_is_removed_that_no_run_wrote(tmp_path, capsys):
 
 
 def test_nothing_is_replaced_that_no_run_wrote(tmp_path, capsys):
-    """A file of the name of the next fields: told in one line, and left as it is. Mutant: written over."""
+    """A file of the name of the next fields: told in one line, and left as it is."""
     cut_off(tmp_path)
     count = len(list((tmp_path / "fields").iterdir()))
     mine = tmp_path / "fields" / f"fields_{count:04d}.vtu"
@@ -130,7 +128,7 @@ def test_nothing_is_replaced_that_no_run_wrote(tmp_path, capsys):
 @pytest.mark.parametrize("name", ["fields", "timeseries.csv", NEWEST, PREVIOUS, "report.html",
                                   "fields/fields_0001.vtu"])
 def test_links_are_refused(tmp_path, capsys, name):
-    """What they lead to stays, whatever it is called. Mutants: files removed, or read, behind a link."""
+    """What they lead to stays, whatever it is called."""
     out = tmp_path / "run"
     cut_off(out)
     spoil(out)
@@ -146,7 +144,7 @@ def test_links_are_refused(tmp_path, capsys, name):
 
 @pytest.mark.parametrize("make", [os.mkfifo, os.mkdir, lambda path: os.symlink("/dev/zero", path)])
 def test_a_checkpoint_that_is_no_file_is_refused(tmp_path, capsys, make):
-    """A pipe, a folder, a device: no hang. Mutant: opened as it is."""
+    """A pipe, a folder, a device: no hang."""
     cut_off(tmp_path)
     (tmp_path / NEWEST).unlink()
     make(tmp_path / NEWEST)
@@ -157,8 +155,7 @@ def test_a_checkpoint_that_is_no_file_is_refused(tmp_path, capsys, make):
 
 @pytest.mark.parametrize("content", [b"", b"<VTKFile", b'<VTKFile type="UnstructuredGrid"/>', b"\xff" * 5000])
 def test_altered_fields_are_told_and_made_again(tmp_path, capsys, content):
-    """The resume starts where all is right, here from t = 0, and ends with the bits of the whole run. Mutants: a
-    traceback of the page that cannot read them, a resume that never works again."""
+    """The resume starts where all is right, here from t = 0, and ends with the bits of the whole run."""
     out = tmp_path / "run"
     scene = cut_off(out)
     (out / "fields" / "fields_0000.vtu").write_bytes(content)
@@ -171,7 +168,7 @@ def test_altered_fields_are_told_and_made_again(tmp_path, capsys, content):
 
 
 def test_a_page_that_cannot_be_made_is_told(tmp_path, capsys):
-    """Of a run that was killed at its very end, and its fields altered. Mutant: a traceback."""
+    """Of a run that was killed at its very end, and its fields altered."""
     run(load_scene("flow_only"), tmp_path)
     (tmp_path / NEWEST).write_bytes(b"left")
     (tmp_path / "fields" / "fields_0000.vtu").write_text("<VTKFile")
@@ -181,8 +178,7 @@ def test_a_page_that_cannot_be_made_is_told(tmp_path, capsys):
 
 
 def test_what_a_killed_run_was_writing_is_removed(tmp_path):
-    """What is in such a folder and no run's stays. Mutants: parts that stay beside the results; a folder removed with
-    whatever is in it."""
+    """What is in such a folder and no run's stays."""
     scene = load_scene("base", FAST)
     with pytest.raises(ZeroDivisionError):
         run(scene, tmp_path / "run", lambda time: 1 / (time < 0.5))
@@ -199,8 +195,7 @@ def test_what_a_killed_run_was_writing_is_removed(tmp_path):
 
 
 def test_no_link_is_written_through(tmp_path):
-    """Whatever a file is written as before it is moved to its place: what the links lead to stays as it is. Mutants: a
-    file of a name that everybody knows, opened as it is; a lock that is a link."""
+    """Whatever a file is written as before it is moved to its place: what the links lead to stays as it is."""
     victim = tmp_path / "thesis.tex"
     victim.write_text("years of work")
 
@@ -220,7 +215,7 @@ def test_no_link_is_written_through(tmp_path):
 @pytest.mark.parametrize("make", [lambda lock, to: lock.symlink_to(to), lambda lock, to: lock.write_text("mine"),
                                   lambda lock, to: os.mkfifo(lock), lambda lock, to: lock.mkdir()])
 def test_a_lock_that_is_somebody_elses_is_left_alone(tmp_path, capsys, make):
-    """A link, a file with content, a pipe, a folder. Mutants: one opened through a link, one that is removed."""
+    """A link, a file with content, a pipe, a folder."""
     make(tmp_path / LOCK, tmp_path / "elsewhere")
     before = (tmp_path / LOCK).lstat()
     assert main(["run", "flow_only", "--out", str(tmp_path)]) == 2
@@ -230,7 +225,7 @@ def test_a_lock_that_is_somebody_elses_is_left_alone(tmp_path, capsys, make):
 
 @LINUX
 def test_a_folder_that_cannot_be_made_is_refused(capsys):
-    """Not even root may make one there. Mutant: a traceback."""
+    """Not even root may make one there."""
     assert main(["run", "flow_only", "--out", "/proc/1/nowhere"]) == 2
     assert "/proc/1/nowhere" in (message := capsys.readouterr().err) and message.count("\n") == 1
 
@@ -238,7 +233,7 @@ def test_a_folder_that_cannot_be_made_is_refused(capsys):
 @pytest.mark.thorough
 @pytest.mark.skipif(not may_mount(), reason="nothing can be mounted here")
 def test_a_read_only_folder_is_refused_at_the_start(tmp_path):
-    """A folder of its own and one of an earlier run. Mutants: a run that fails at its first row."""
+    """A folder of its own and one of an earlier run."""
     for out, arguments in ((tmp_path, "flow_only --out"), (tmp_path, "--resume")):
         (tmp_path / "run.json").write_text('{"status": "running"}')
         command = (f"mount --bind {out} {out} && mount -o remount,ro,bind {out} && "
@@ -258,8 +253,7 @@ def full(*_):
                                                 (checkpoint.os, "fsync", r"fields/fields_\d{4}\.vtu"),
                                                 (checkpoint, "write", NEWEST)])
 def test_no_space_is_told_with_the_file_and_nothing_is_lost(tmp_path, monkeypatch, module, name, file):
-    """The run stops, says which file, leaves none half-written, and goes on when there is room. Mutants: an error that
-    names no file, a part left behind, a checkpoint that is overwritten and not replaced."""
+    """The run stops, says which file, leaves none half-written, and goes on when there is room."""
     scene, out, works = load_scene("base", FAST), tmp_path / "run", getattr(module, name)
 
     def fill(event):
@@ -277,8 +271,7 @@ def test_no_space_is_told_with_the_file_and_nothing_is_lost(tmp_path, monkeypatc
 
 @LINUX
 def test_a_file_that_may_not_grow_ends_a_run_with_status_2(tmp_path):
-    """In a process whose files may be 20 kB long: the fields are longer. Mutants: the signal of that kills, a file cut
-    short that looks whole."""
+    """In a process whose files may be 20 kB long: the fields are longer."""
     import resource
     limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))  # noqa: E731
     status, _, message = shell(*SHORT, "--out", tmp_path / "run", preexec_fn=limit)
@@ -291,8 +284,7 @@ def test_a_file_that_may_not_grow_ends_a_run_with_status_2(tmp_path):
 @pytest.mark.skipif(not may_mount(), reason="nothing can be mounted here")
 def test_a_full_disk(tmp_path):
     """A file system too small for a run and its checkpoints runs full, the run ends with status 2 and a word on the
-    file; with more room it goes on to the bits of the whole run. Mutant: a checkpoint written over the last good one.
-    """
+    file; with more room it goes on to the bits of the whole run."""
     assert shell(*SHORT, "--set", 'growth.end="12 h"', "--set", "numerics.tolerance=0.0003", "--out",
                  tmp_path / "whole")[0] == 0
     disk, room = tmp_path / "disk", sum(map(len, files(tmp_path / "whole").values())) * 3 // 4
@@ -311,8 +303,7 @@ def test_a_full_disk(tmp_path):
 @pytest.mark.parametrize("name", ["../../outside", "/etc/cron.d/x", "a\nb", "\x1b[2J\x1b]0;owned\x07", "..", "<script>",
                                   "x" * 300, "con", "%s{0}"])
 def test_no_name_of_a_scene_is_a_path(tmp_path, capsys, monkeypatch, name):
-    """Whatever a scene is called, its run writes into its folder, and says so on a line. Mutants: files called after
-    the scene, control characters sent to a terminal."""
+    """Whatever a scene is called, its run writes into its folder, and says so on a line."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "inside").mkdir()
     scene = parse_scene(scene_tables(load_scene("flow_only")), name, "scene.toml")
@@ -326,7 +317,6 @@ def test_no_name_of_a_scene_is_a_path(tmp_path, capsys, monkeypatch, name):
 
 
 def test_no_key_of_a_scene_takes_a_path():
-    """Mutant: a key that names a file to read or write: texts are choices among a few words."""
     def texts(tables):
         for value in tables.values():
             yield from texts(value) if isinstance(value, dict) else [value] if isinstance(value, str) else []

@@ -88,7 +88,6 @@ def misshapen(draw):
 @FUZZ
 @given(garbled())
 def test_a_file_of_any_bytes(folder, content):
-    """Mutants: an error of the TOML parser, of UTF-8 or of the stack let through; a line with what it quotes."""
     file = folder / "mine.toml"
     file.write_bytes(content)
     check_judged(lambda: load_scene(file), str(file))
@@ -97,8 +96,7 @@ def test_a_file_of_any_bytes(folder, content):
 @FUZZ
 @given(misshapen())
 def test_tables_of_any_shape(tables):
-    """Wrong types, keys, units, nesting, magnitudes. Mutants: a hint that fails on what it is to help with; a range
-    that lets infinity or not-a-number through."""
+    """Wrong types, keys, units, nesting, magnitudes."""
     check_judged(lambda: parse_scene(tables, "mine", "mine.toml"), "mine.toml")
 
 
@@ -109,7 +107,6 @@ def test_tables_of_any_shape(tables):
                           plain | values.map(lambda value: shown(value)) | st.sampled_from(["fast", "80 um", "1 h"])),
                 min_size=1, max_size=3))
 def test_any_set(entries):
-    """Mutant: a key below a value; a value that is text of a table."""
     check_judged(lambda: load_scene("base", entries), "base")
 
 
@@ -123,8 +120,7 @@ def shown(value: object) -> str:
 @FUZZ
 @given(garbled(), st.sampled_from(["run", "scene", "check"]))
 def test_the_command_line_refuses_in_one_line_and_writes_nothing(folder, content, command):
-    """Exit status 2 and a line, where the file is no scene. Mutants: a traceback; a folder made before the scene is
-    read; something on stdout."""
+    """Exit status 2 and a line, where the file is no scene."""
     file, out = folder / "line.toml", folder / "out"
     file.write_bytes(content)
     try:

@@ -164,8 +164,7 @@ def defects(done, mass):
 @pytest.mark.parametrize("simultaneous, order", [
     (False, 1), (True, 1), pytest.param(False, 2, marks=pytest.mark.thorough)])
 def test_second_order_in_the_step(simultaneous, order):
-    """Concentrations, X_A and X_I converge with order 2 in fixed steps (measured 2.00 to 2.05). Mutants: backward Euler
-    throughout, the donor or X_A at its last value instead of its prediction."""
+    """Concentrations, X_A and X_I converge with order 2 in fixed steps (measured 2.00 to 2.05)."""
     problem, start, duration, expected = smooth_transient(order)
     steps = duration / np.array([16, 32, 64])
     ends = [advanced(problem, start, duration, fixed_step=h, simultaneous=simultaneous)[1] for h in steps]
@@ -176,8 +175,7 @@ def test_second_order_in_the_step(simultaneous, order):
 
 def test_the_control_keeps_a_thousandth():
     """From C_supply everywhere, through a transient of 0.2 s, with steps over two decades: within 0.1 % (3.3.2), the
-    paper's number (measured 1.6e-4). Mutant: TOLERANCE of 0.1.
-    """
+    paper's number (measured 1.6e-4)."""
     now, problem = hasty()
     start = filled(now, problem)
     done, found = advanced(problem, start, 6 * SECOND)
@@ -256,8 +254,7 @@ def test_a_well_mixed_closed_pore_is_four_ordinary_equations(order):
 @pytest.mark.parametrize("velocity, boundary", [("2.9 m/day", "open"), (None, "open"), (None, "closed")])
 def test_the_ledger_closes(velocity, boundary, order):
     """supplied - out - consumed = stored, whatever the step: the formula that integrates C integrates the fluxes.
-    Round-off of the sparse solutions only: 1e-12 of the mass (measured 5e-14). Mutant: fluxes of the end times h.
-    """
+    Round-off of the sparse solutions only: 1e-12 of the mass (measured 5e-14)."""
     now, problem = case("30 um", velocity, boundary, order)
     start, weight = filled(now, problem), storage(problem)
     mass = np.array([field @ weight for field in parts_of(problem, start)[:2]])
@@ -335,9 +332,7 @@ def test_transient_and_quasi_steady_biomass_agree(order):
 @EVERY_ORDER
 def test_substrate_without_flow_falls_by_what_is_consumed(order):
     """Mean velocity zero: nothing enters, C goes on from step to step; and moving the mesh under it makes no more
-    than 1e-4 of what was consumed (measured 1e-6 to 1e-5). Mutant: each step started from C_supply, or from the
-    step's own start.
-    """
+    than 1e-4 of what was consumed (measured 1e-6 to 1e-5)."""
     numerics = {**coarse(order), "extent": "full"}
     still = scene(velocity="0 m/day", growth={"end": "0.6 h"}, numerics=numerics)
     instants = list(simulate(still))
@@ -357,15 +352,14 @@ def transport_mass(instant):
 
 @EVERY_ORDER
 def test_the_midpoint_rule_has_no_transient(order):
-    """Refused in one line. Mutant: the rule left out."""
+    """Refused in one line."""
     with pytest.raises(SceneError, match='"quasi_steady" is needed with numerics.time = "midpoint"') as refused:
         scene(velocity="1 m/day", growth={"end": "1 h"}, numerics={**coarse(order), "time": "midpoint"})
     assert "\n" not in str(refused.value)
 
 
 def test_orders_agree_on_a_transient():
-    """On uptake and biomass made in 6 min from the supply: quadratic and cubic to 1e-3, linear ones to 2 %. Mutant: a
-    mass matrix without its quadrature, biomass of the start."""
+    """On uptake and biomass made in 6 min from the supply: quadratic and cubic to 1e-3, linear ones to 2 %."""
     found = []
     for order in ORDERS:
         now, problem = case("30 um", order=order)

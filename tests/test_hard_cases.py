@@ -53,7 +53,6 @@ def refuse(preset):
     ((FloatingPointError("overflow"),), WRONG), ((KeyError("try"),), WRONG),
 ])
 def test_a_part_is_right_refused_or_wrong(items, verdict):
-    """Mutant: an empty part that is right, any exception as a refusal, a refusal without a reason, nan that holds."""
     assert part(*items).verdict == verdict
 
 
@@ -67,7 +66,6 @@ def test_floating_point_errors_are_no_results():
 
 
 def test_a_part_that_does_not_end_is_stopped():
-    """Mutant: no limit, or one that is not restored."""
     found = judge.run_part("p", lambda preset: sum(1 for _ in count()), "fast", limit=0.2)
     assert found.verdict == WRONG and "not done after 0.2 s" in found.message
     assert part(GOOD).verdict == RIGHT
@@ -87,7 +85,6 @@ def test_a_cell_is_as_its_worst_part(verdicts, worst):
     (WRONG, "fast", {"explained": {"wrong 0": "why"}}, False),
 ])
 def test_what_is_accepted(verdict, preset, more, fine):
-    """Mutant: refusals that any part may have, wrong that is accepted of what may be refused."""
     assert (not judge.run_cell(a_case([verdict], **more), preset).unaccepted) is fine
 
 
@@ -95,7 +92,6 @@ def test_what_is_accepted(verdict, preset, more, fine):
     ([RIGHT], {}, True), ([RIGHT, WRONG], {}, False), ([RIGHT, REFUSED], {}, False),
     ([RIGHT, REFUSED], {"refusable": ("refused 1",)}, True)])
 def test_a_verification_case_holds_if_its_verdicts_are_accepted(verdicts, more, holds):
-    """Mutant: checks of refused or of wrong parts that are left out with their verdict."""
     found = judge.run_case(a_case(verdicts, **more))
     assert Result("hard-99", found, "", 0.0).holds is holds
 
@@ -118,7 +114,6 @@ def test_there_are_twenty_two_and_only_some_may_refuse():
 
 
 def test_the_matrix_is_told_and_written(tmp_path, monkeypatch):
-    """Mutant: a matrix that is written from a part of it; a verdict without its message."""
     cells = [judge.run_cell(a_case([RIGHT, REFUSED]), preset) for preset in PRESETS]
     monkeypatch.setattr(hard_cases, "RECORD", tmp_path / "report" / "hard_cases.json")
     hard_cases.record([Result("hard-99", judge.outcome(cells), "", 0.0), Result("other", judge.Outcome(), "", 0.0)])
@@ -144,8 +139,7 @@ def test_the_exit_status_is_the_verdict(monkeypatch, tmp_path, capsys):
 
 
 def test_a_wrong_run_is_seen():
-    """Numbers that are not finite, balances, concentrations and densities out of bounds. Mutant: the last instant
-    alone."""
+    """Numbers that are not finite, balances, concentrations and densities out of bounds."""
     made = load_scene("wide", ("numerics.preset=fast", 'growth.end="0 h"', 'aggregate.radius="40 um"'))
     found = common.ran(made)
     assert all(check.holds for check in common.sound(found))
@@ -167,7 +161,6 @@ def test_a_cheap_cell_is_what_it_must_be(number, preset):
 
 
 def test_units_scale_and_draws_are_scenes():
-    """Mutant: a key of a scene that has a unit and no power, which leaves it behind when the scene is scaled."""
     made = load_scene("base", ("numerics.preset=fast",))
     there = runs.scaled(runs.scaled(made, 2.0**10, 2.0**-3), 2.0**-10, 2.0**3)
     assert there == made and runs.scaled(made, 2.0, 1.0).pore.width == 100.0
@@ -180,7 +173,7 @@ def test_units_scale_and_draws_are_scenes():
 @settings(max_examples=60)
 @given(st.fixed_dictionaries({key: st.floats(0.0, 1.0) for key in runs.RANGES}), st.sampled_from(PRESETS))
 def test_a_run_of_any_parameters_ends_right_or_refuses(shares, preset):
-    """Case 22 with what hypothesis draws. Mutant: mass that is made or lost, a concentration that is out of bounds."""
+    """Case 22 with what hypothesis draws."""
     found = judge.run_part("drawn", lambda chosen: [runs.run_drawn(shares, chosen)], preset)
     assert found.verdict in (RIGHT, REFUSED), found.message
 
@@ -192,6 +185,5 @@ def test_every_hard_case_is_a_verification_case():
 
 
 def test_every_case_goes_from_process_to_process():
-    """`make verify` runs them side by side: what is sent is the number, and copying goes the same way. Mutant: a case
-    that is sent with its functions."""
+    """`make verify` runs them side by side: what is sent is the number, and copying goes the same way."""
     assert all(copy.copy(case) is case for case in hard_cases.CASES)

@@ -42,7 +42,6 @@ def saturations(made):
 
 @given(LAWS, concentrations, concentrations)
 def test_the_rates_are_those_of_the_paper(made, acceptor, donor):
-    """Mutant: d_f d_b for d_c f_d b, b without m_A, f_d for 1 - f_d, the yield in F2, K_sA for K_sD."""
     F1, F2, F3, F4 = oracles.rates(acceptor, donor, **constants(made))
     q_a, q_d = uptake(acceptor, donor, made)
     assert (-q_a, -q_d) == pytest.approx((F1, F2), rel=1e-13, abs=1e-300)
@@ -52,8 +51,7 @@ def test_the_rates_are_those_of_the_paper(made, acceptor, donor):
 
 @given(LAWS, concentrations, concentrations)
 def test_the_oxygen_demand_of_the_donor_is_spent_or_kept(made, acceptor, donor):
-    """|F1| + d_c (F3 + F4) = (F + Y d_c) |F2| at all concentrations: what decay takes is what the biomass loses.
-    Mutant: d_f d_b for d_c f_d b [E3], f_d for 1 - f_d, decay without m_A in one of the three."""
+    """|F1| + d_c (F3 + F4) = (F + Y d_c) |F2| at all concentrations: what decay takes is what the biomass loses."""
     k = made.kinetics
     q_a, q_d = uptake(acceptor, donor, made)
     kept = k.decay_oxygen_demand * (growth_rate(acceptor, donor, made) + inert_rate(acceptor, made))
@@ -64,8 +62,6 @@ def test_the_oxygen_demand_of_the_donor_is_spent_or_kept(made, acceptor, donor):
 
 def test_the_numbers_of_section_4():
     """At 10 K_s of both the biomass doubles in 3.6 h; decay alone, under plenty of acceptor, halves X_A in 5.8 d (C09).
-
-    Mutant: rates per day taken as per hour.
     """
     doubling = np.log(2) / kinetics.growth_rate(10.0, 10.0, SCENE.substrates, SCENE.kinetics)
     assert doubling == pytest.approx(24 * np.log(2) / (10 / 11 * (9.3 * 0.61 * 10 / 11 - 0.12)), rel=1e-13)
@@ -75,7 +71,6 @@ def test_the_numbers_of_section_4():
 
 @given(st.sampled_from(SATURATIONS), st.floats(0.01, 100.0))
 def test_monod_is_bounded_and_half_at_its_constant(half, concentration):
-    """Mutant: C / (1 + K), a constant of the other substrate."""
     m, slope = kinetics.monod(np.array([0.0, half, concentration]), half)
     assert m[0] == 0 and m[1] == pytest.approx(0.5, rel=1e-15) and 0 < m[2] < 1
     assert slope == pytest.approx((1 - m) ** 2 / half, rel=1e-12)
@@ -84,8 +79,7 @@ def test_monod_is_bounded_and_half_at_its_constant(half, concentration):
 @pytest.mark.parametrize("extended", [False, True])
 @given(LAWS, between(0.01, 100.0), between(0.01, 100.0))
 def test_the_jacobian_is_the_derivative(extended, made, acceptor, donor):
-    """Of F1, F2 and, with Y, F3, by central differences of order 4 in C / (C + K), good to about 1e-12 of the rates.
-    Mutant: rows and columns swapped, K for K^2, F left out of dF1/dC_D, K_sA for K_sD."""
+    """Of F1, F2 and, with Y, F3, by central differences of order 4 in C / (C + K), good to about 1e-12 of the rates."""
     half = saturations(made)
     place = half * [acceptor, donor]
     scale = half + place
@@ -101,8 +95,7 @@ def test_the_jacobian_is_the_derivative(extended, made, acceptor, donor):
 @pytest.mark.parametrize("extended", [False, True])
 @given(LAWS, between(0.01, 100.0), between(0.01, 100.0), st.sampled_from([(-1, 1), (1, -1), (-1, -1)]))
 def test_below_zero_the_slopes_are_the_derivatives_too(extended, made, acceptor, donor, signs):
-    """Of what is taken up there, which is nothing, and of its extension, by central differences. Mutant: a cross slope
-    of the other substrate below zero, where it counts as none."""
+    """Of what is taken up there, which is nothing, and of its extension, by central differences."""
     scale, place = saturations(made), np.array([acceptor, donor]) * signs
     slopes = np.array(uptake_slopes(*(place * scale), made, extended)) * scale
     step = 1e-3 * np.abs(place).min()
@@ -113,8 +106,7 @@ def test_below_zero_the_slopes_are_the_derivatives_too(extended, made, acceptor,
 
 @given(st.floats(-100.0, 100.0), st.floats(-100.0, 100.0), st.floats(0.001, 50.0))
 def test_each_sink_rises_with_its_own_substrate_below_zero_too(acceptor, donor, more):
-    """As the transient scheme linearises it: the uptake of nothing is zero and below zero it is a source. Mutant:
-    C / (C + K) there, positive again below -K, which has a root for Newton's method to fall into."""
+    """As the transient scheme linearises it: the uptake of nothing is zero and below zero it is a source."""
     q_a, q_d = uptake(acceptor, donor, extended=True)
     slopes = uptake_slopes(acceptor, donor, extended=True)
     more_a, more_d = uptake(acceptor + more, donor, extended=True), uptake(acceptor, donor + more, extended=True)
@@ -125,8 +117,7 @@ def test_each_sink_rises_with_its_own_substrate_below_zero_too(acceptor, donor, 
 
 @given(LAWS, st.floats(-100.0, 100.0), st.floats(-100.0, 100.0))
 def test_what_is_below_zero_is_nothing_to_uptake_and_growth(made, acceptor, donor):
-    """Both are functions of max(C, 0), so that what decays, grows and is taken up stay in proportion. Mutant: either of
-    them extended below zero."""
+    """Both are functions of max(C, 0), so that what decays, grows and is taken up stay in proportion."""
     above = max(acceptor, 0.0), max(donor, 0.0)
     assert uptake(acceptor, donor, made) == uptake(*above, made)
     assert growth_rate(acceptor, donor, made) == growth_rate(*above, made)
@@ -136,8 +127,7 @@ def test_what_is_below_zero_is_nothing_to_uptake_and_growth(made, acceptor, dono
 @given(LAWS, concentrations, concentrations, between(1e-3, 50.0))
 def test_more_of_either_substrate_takes_up_more(made, acceptor, donor, more):
     """|F1| and |F2| rise with both substrates, strictly while there is the other one, and never past k F + d_c f_d b
-    and k; F3 rises with the donor, from -b at the least to k Y at the most. Mutant: m_A left out of F2, b times
-    m_D in F3, C / K in place of C / (C + K)."""
+    and k; F3 rises with the donor, from -b at the least to k Y at the most."""
     k = made.kinetics
     q_a, q_d = uptake(acceptor, donor, made)
     by_a, by_d = uptake(acceptor + more, donor, made), uptake(acceptor, donor + more, made)
@@ -155,8 +145,7 @@ def test_more_of_either_substrate_takes_up_more(made, acceptor, donor, more):
 
 @pytest.mark.parametrize("growth, remains", [(0.19, 0.001), (-0.005, 0.001), (0.0, 0.001), (1e-14, 0.001), (-3.0, 0.2)])
 def test_growth_over_a_step_is_the_exact_solution_at_constant_rates(growth, remains):
-    """Against an adaptive Runge-Kutta method of order 8. Mutant: 1 + growth step for its exponential; X_I from the
-    first X_A."""
+    """Against an adaptive Runge-Kutta method of order 8."""
     def right(_, y):
         return [growth * y[0], remains * y[0]]
 
@@ -166,7 +155,7 @@ def test_growth_over_a_step_is_the_exact_solution_at_constant_rates(growth, rema
 
 
 def test_decay_alone_leaves_the_inert_share():
-    """Without donor X_A + X_I falls to 1 - f_d = 0.2 of what was lost. Mutant: inert remains b f_d."""
+    """Without donor X_A + X_I falls to 1 - f_d = 0.2 of what was lost."""
     growth = kinetics.growth_rate(1e6, 0.0, SCENE.substrates, SCENE.kinetics)
     remains = kinetics.inert_rate(1e6, SCENE.substrates, SCENE.kinetics)
     active, inert = kinetics.grow(1.0, 0.0, growth, remains, 1e5)
@@ -175,7 +164,7 @@ def test_decay_alone_leaves_the_inert_share():
 
 @given(st.floats(-3.0, 3.0), st.floats(0.0, 1.0), between(1e-3, 2.0), between(1e-3, 2.0))
 def test_two_steps_at_the_same_rates_are_one(growth, remains, first, second):
-    """And X_A stays positive, X_I never falls. Mutant: 1 + growth step for its exponential, X_I from the first X_A."""
+    """And X_A stays positive, X_I never falls."""
     after = kinetics.grow(1.0, 0.5, growth, remains, first)
     both = kinetics.grow(*after, growth, remains, second)
     assert both == pytest.approx(kinetics.grow(1.0, 0.5, growth, remains, first + second), rel=1e-12)
@@ -185,7 +174,7 @@ def test_two_steps_at_the_same_rates_are_one(growth, remains, first, second):
 @given(st.floats(-3.0, 3.0) | st.floats(-1e-3, 1e-3) | st.just(0.0))
 def test_the_mean_of_what_grows_over_a_step_and_its_slope(z):
     """(e^z - 1) / z is the mean of e^(z s), s from 0 to 1, and the slope that of s e^(z s), by Gauss's rule of 20
-    points. Mutants: e^z, the mean of the ends, a series where it is no longer small."""
+    points."""
     s, weight = np.polynomial.legendre.leggauss(20)
     grown = np.exp(z * (s + 1) / 2)
     mean = kinetics.mean_growth(np.array(z))
@@ -205,7 +194,7 @@ def fractions_of(acceptor, donor, made):
 @given(LAWS, concentrations, concentrations, DURATIONS)
 def test_what_a_sink_takes_up_over_a_step_is_what_the_step_makes(made, acceptor, donor, duration):
     """Y q_D - (q_A - F q_D) / d_c, times the step, is the growth of X_A and X_I at the same concentrations: in every
-    point and to round-off. Mutants: the biomass of the step's start or end, F for COD - Y d_c."""
+    point and to round-off."""
     k, sink = made.kinetics, kinetics.Sink(np.array([[3.0]]), duration)
     q_a, q_d = duration * sink.uptake(fractions_of(acceptor, donor, made), k)[0, :, 0]
     active, inert = kinetics.grow(3.0, 0.5, growth_rate(acceptor, donor, made), inert_rate(acceptor, made), duration)
@@ -216,15 +205,13 @@ def test_what_a_sink_takes_up_over_a_step_is_what_the_step_makes(made, acceptor,
 
 @given(LAWS, concentrations, concentrations)
 def test_a_sink_that_does_not_grow_takes_up_at_the_rates_of_the_law(made, acceptor, donor):
-    """Mutant: donor and acceptor exchanged."""
     found = kinetics.Sink(np.array([[3.0]])).uptake(fractions_of(acceptor, donor, made), made.kinetics)[0, :, 0]
     assert found == pytest.approx(3 * np.array(uptake(acceptor, donor, made)), rel=1e-15)
 
 
 @given(LAWS, st.floats(0.01, 0.99), st.floats(0.01, 0.99), DURATIONS)
 def test_the_slopes_of_a_sink_are_the_derivatives(made, m_a, m_d, duration):
-    """By m_A and m_D, by central differences of order 4, its mean included. Mutants: the growth within a step left out,
-    by the other substrate, of the other sink."""
+    """By m_A and m_D, by central differences of order 4, its mean included."""
     sink, place = kinetics.Sink(np.array([[2.0]]), duration), np.array([m_a, m_d])
 
     def taken(m):

@@ -31,17 +31,16 @@ def loaded(code: str) -> set[str]:
                                        ["scene", "base"], ["run", "base", "--out", "x", "--set", "pore.width=3"],
                                        ["run", "nowhere", "--out", "x"]])
 def test_a_command_that_runs_nothing_imports_no_solver(arguments):
-    """Mutant: a command's module that imports what another one runs."""
     assert loaded(COMMAND.format(arguments)) & (NEVER | SOLVER) == set()
 
 
 def test_importing_the_package_imports_none_of_its_modules():
-    """Nor does telling its public names. Mutant: a public name that is imported with the package."""
+    """Nor does telling its public names."""
     assert {name for name in loaded("import repro\ndir(repro)") if name.startswith("repro.")} == set()
 
 
 def test_a_run_imports_what_it_needs_alone(tmp_path):
-    """With remeshes, fields and its page. Mutants: a spline or a tree of scipy's at the top of a module."""
+    """With remeshes, fields and its page."""
     found = loaded(COMMAND.format(["run", *SHORT, "--set", 'growth.end="3 h"', "--out", str(tmp_path / "run")]))
     assert (tmp_path / "run" / "report.html").exists() and found >= {"numpy", "skfem", "mmgpy", "shapely"}
     assert found & NEVER == set()
@@ -49,7 +48,6 @@ def test_a_run_imports_what_it_needs_alone(tmp_path):
 
 @pytest.mark.parametrize("unit", ["um", "micrometer", "cm", "inch"])
 def test_every_unit_is_accepted_and_the_usual_ones_without_pint(unit):
-    """Mutants: pint loaded for a unit of the packaged scenes; a unit that is refused where pint is not loaded."""
     code = f"from repro.scene import load_scene\nassert load_scene('flow_only', ['pore.width=0.01 {unit}'] if '{unit}' "
     code += f"in ('cm', 'inch') else ['pore.width=80 {unit}']).pore.width > 70"
     assert ("pint" in loaded(code)) == (unit == "inch")

@@ -38,8 +38,7 @@ def same(one, other):
 
 @pytest.mark.parametrize("name, end", [(name, end) for name in SCENES for end in ENDS[name]])
 def test_a_longer_run_is_as_if_that_had_been_asked_for_at_first(tmp_path, name, end):
-    """Bit for bit, twice in a row. Mutants: the last step, cut short at the end, kept; rows and ledgers of the longer
-    run behind those of the shorter one; the scene, the warnings or the counts of the shorter one."""
+    """Bit for bit, twice in a row."""
     whole = scene(name)
     run(whole, tmp_path / "whole")
     run(scene(name, end), tmp_path / "parts")
@@ -51,14 +50,14 @@ def test_a_longer_run_is_as_if_that_had_been_asked_for_at_first(tmp_path, name, 
 
 
 def test_little_is_computed_again(tmp_path):
-    """Of the paper's scheme the last two steps. Mutant: a run from t = 0."""
+    """Of the paper's scheme the last two steps."""
     run(scene("paper", 1.4), tmp_path)
     resume(tmp_path, overrides=["growth.end=2.2 h"])
     assert told(tmp_path)["resumes"][0]["time_h"] >= 1.0 - 1e-9
 
 
 def test_a_run_that_is_not_over_is_made_longer(tmp_path):
-    """Stopped before and after its end was near. Mutant: the newest state, after a step that the end has cut short."""
+    """Stopped before and after its end was near."""
     whole, short = scene("paper, an end within a step"), scene("paper, an end within a step", 1.2)
     run(whole, tmp_path / "whole")
     near = [ends_soon(short, state) for state, _ in steps(short)]
@@ -72,7 +71,6 @@ def test_a_run_that_is_not_over_is_made_longer(tmp_path):
 
 
 def test_a_longer_run_that_was_stopped_goes_on(tmp_path):
-    """Mutants: the shorter run's end; a state of the shorter run that is taken for one of the longer."""
     run(scene("fast"), tmp_path / "whole")
     run(scene("fast", 4.0), tmp_path / "parts")
     left = iter([0, 15])
@@ -83,7 +81,7 @@ def test_a_longer_run_that_was_stopped_goes_on(tmp_path):
 
 
 def test_without_the_state_it_starts_again(tmp_path):
-    """And says so. Mutant: rows of the shorter run before those of the longer."""
+    """And says so."""
     run(scene("fast", 4.0), tmp_path / "parts")
     (tmp_path / "parts" / LAST).unlink()
     with pytest.warns(UserWarning, match="no checkpoint to go on from; it starts again from t = 0"):
@@ -93,7 +91,7 @@ def test_without_the_state_it_starts_again(tmp_path):
 
 
 def test_a_run_that_is_over_keeps_one_checkpoint(tmp_path):
-    """And lists it. Mutants: the others, which nothing reads any more; one of a run in which nothing moves."""
+    """And lists it."""
     run(scene("fast", 4.0), tmp_path / "run")
     assert (tmp_path / "run" / LAST).exists() and LAST in told(tmp_path / "run")["files"]
     assert not any((tmp_path / "run" / name).exists() for name in (NEWEST, PREVIOUS))
@@ -108,7 +106,7 @@ def test_a_run_that_is_over_keeps_one_checkpoint(tmp_path):
     ("pore.width=3 um", "growth.end alone can be changed of a run that has begun"),
 ])
 def test_what_is_no_later_end_is_refused(tmp_path, entry, wanted):
-    """And nothing is changed. Mutants: a run that is cut; another scene in the same folder."""
+    """And nothing is changed."""
     run(scene("fast", 4.0), tmp_path)
     before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
     with pytest.raises(SceneError) as refused:
@@ -139,7 +137,7 @@ def test_the_command(tmp_path, capsys):
 
 @pytest.mark.parametrize("name", ["paper", "fast"])
 def test_a_step_is_another_one_only_where_the_end_is_near(name):
-    """What is kept rests on it. Mutant: half the room."""
+    """What is kept rests on it."""
     end = scene(name).growth.end / 2
     ways = [[state for state, _ in steps(scene(name, end))] for end in (end, None)]
     near = [ends_soon(scene(name, end), state) for state in ways[0]]
@@ -149,7 +147,7 @@ def test_a_step_is_another_one_only_where_the_end_is_near(name):
 
 
 def test_rows_that_lie_as_the_end_asks_for_them_are_those_of_the_longer_run(tmp_path):
-    """Rows of the shorter run may lie closer than the longer one's. Mutant: rows that the longer run has not."""
+    """Rows of the shorter run may lie closer than the longer one's."""
     whole = [*SCENES["fast"][:-1], "growth.end=20 h"]
     run(load_scene("base", whole), tmp_path / "whole")
     run(load_scene("base", [*whole, "growth.end=9.5 h"]), tmp_path / "parts")

@@ -21,7 +21,7 @@ CHOICES = [("numerics.solver=pardiso", "pypardiso"), ("numerics.ordering=metis",
 @pytest.mark.parametrize("command", [["run", "base"], ["sweep", "base", "--vary", "pore.width=50 um, 60 um"]])
 def test_a_package_that_is_not_there_is_told_before_anything_is_written(tmp_path, capsys, monkeypatch, command, entry,
                                                                         package):
-    """One line, status 2, no folder. Mutants: a traceback, a run that fails with files."""
+    """One line, status 2, no folder."""
     monkeypatch.setitem(sys.modules, package, None)
     assert main([*command, "--set", entry, "--out", str(tmp_path / "out")]) == 2
     out, err = capsys.readouterr()
@@ -31,7 +31,6 @@ def test_a_package_that_is_not_there_is_told_before_anything_is_written(tmp_path
 
 
 def test_a_package_that_went_is_told_at_a_resume(tmp_path, monkeypatch):
-    """Mutant: a traceback at the first linear system."""
     scene = load_scene("base", ("numerics.preset=fast", "numerics.ordering=metis"))
     stand_in = SimpleNamespace(CSRAdjacency=lambda starts, others: len(starts) - 1,
                                nested_dissection=lambda nodes: (range(nodes), None))
@@ -51,8 +50,7 @@ def test_a_package_that_went_is_told_at_a_resume(tmp_path, monkeypatch):
     ("base", ["preset=paper", "gradation=0", "refinement=0.4"]), ("base", ["preset=paper", "extent=full"]),
     ("flow_only", ["preset=paper", "refinement=2"]), ("wide", ["preset=accurate"])])
 def test_the_nodes_that_are_expected_are_those_of_the_mesh(name, sets):
-    """At t = 0, within a half. Mutants: corners alone; the small elements around the aggregate left out; the whole pore
-    for the meshed part."""
+    """At t = 0, within a half."""
     end = [] if name == "flow_only" else ["growth.end=0 h"]
     scene = load_scene(name, [*(f"numerics.{entry}" for entry in sets), *end])
     found = len(next(simulate(scene)).pore.mesh.points)
@@ -60,7 +58,7 @@ def test_the_nodes_that_are_expected_are_those_of_the_mesh(name, sets):
 
 
 def test_more_memory_is_expected_of_larger_meshes():
-    """Of those at the end too. Mutant: the mesh at t = 0 for that of the whole run."""
+    """Of those at the end too."""
     base = [memory.expected_nodes(load_scene("base", [f"growth.end={end} h"])) for end in (0, 10, 19.4)]
     assert base == sorted(base) and base[2] > 1.3 * base[0]
     kinds = [load_scene("base", ["numerics.preset=fast", f"numerics.elements={kind}"])
@@ -70,7 +68,7 @@ def test_more_memory_is_expected_of_larger_meshes():
 
 
 def test_a_run_that_needs_more_memory_than_there_is_is_refused(tmp_path, capsys, monkeypatch):
-    """Before anything is written, with both numbers. Mutant: a run that the system kills."""
+    """Before anything is written, with both numbers."""
     monkeypatch.setattr(memory, "free_bytes", lambda: 1e9)
     assert main(["run", "base", "--set", "numerics.refinement=10", "--out", str(tmp_path / "run")]) == 2
     message = capsys.readouterr().err
@@ -79,7 +77,7 @@ def test_a_run_that_needs_more_memory_than_there_is_is_refused(tmp_path, capsys,
 
 
 def test_a_run_that_may_take_more_than_half_of_the_memory_is_warned_of(tmp_path, capsys, monkeypatch):
-    """Under --quiet and --json too, and runs. Mutants: silence; a refusal."""
+    """Under --quiet and --json too, and runs."""
     needed = memory.expected_bytes(load_scene("flow_only"))
     for factor, warned in ((2.1, False), (1.9, True)):
         monkeypatch.setattr(memory, "free_bytes", lambda factor=factor: factor * needed)
@@ -97,7 +95,7 @@ def group(root, path, **content):
 
 def test_what_is_free_is_the_least_that_anything_leaves(tmp_path):
     """Of the system, of the process's control group and of those above it, in both versions, with files in memory that
-    give way. Mutants: the first limit alone; a group's limit without what it uses; kibibytes for bytes."""
+    give way."""
     (tmp_path / "proc/self").mkdir(parents=True)
     assert memory.free_bytes(tmp_path) > 1e15
     (tmp_path / "proc/meminfo").write_text("MemTotal: 9 kB\nMemAvailable:   2000000 kB\n")
@@ -117,7 +115,7 @@ def test_what_is_free_is_the_least_that_anything_leaves(tmp_path):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="for Linux alone")
 def test_a_limit_of_address_space_ends_a_run_in_one_line(tmp_path):
-    """As if there were no more memory. Mutants: a traceback, a limit that only a stage that fails knows of."""
+    """As if there were no more memory."""
     import resource
     limit = lambda: resource.setrlimit(resource.RLIMIT_AS, (1000 << 20,) * 2)  # noqa: E731
     status, _, message = shell("base", "--set", "numerics.refinement=10", "--out", tmp_path / "run", preexec_fn=limit)
@@ -130,8 +128,7 @@ MORE = [pytest.param(size, marks=pytest.mark.thorough) for size in (0, 8_000, 40
 @pytest.mark.skipif(sys.platform != "linux", reason="for Linux alone")
 @pytest.mark.parametrize("most", [500, *MORE])
 def test_a_limit_of_file_sizes_ends_a_run_in_one_line(tmp_path, most):
-    """Whichever file it is that may not grow; with more room the run goes on. Mutant: a traceback of the second file
-    that cannot be written."""
+    """Whichever file it is that may not grow; with more room the run goes on."""
     import resource
     limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))  # noqa: E731
     status, _, message = shell(*SHORT, "--out", tmp_path / "run", "--quiet", preexec_fn=limit)
@@ -141,7 +138,6 @@ def test_a_limit_of_file_sizes_ends_a_run_in_one_line(tmp_path, most):
 
 
 def test_want_of_memory_outside_of_the_steps_is_told_in_one_line(tmp_path, capsys, monkeypatch):
-    """Mutant: a traceback."""
     def none_left(*_):
         raise MemoryError("Unable to allocate 1 GiB")
 

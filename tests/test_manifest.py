@@ -40,23 +40,20 @@ def drawn(x, label="h", many=()):
 
 
 def test_every_file_with_data_is_listed(folder, told):
-    """Fields by their arrays, so that the hashes of their files are none. Mutants: fields left out, run.json or the
-    page hashed with their times of day."""
+    """Fields by their arrays, so that the hashes of their files are none."""
     files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     there = files - {"run.json", "report.html", "checkpoint.last", "fields.sha256"}
     assert set(told["runs"]["initial_mesh"]["files"]) == there and "fields/fields_0000.vtu" in there
 
 
 def test_a_run_again_has_the_same_hashes(folder, told, tmp_path):
-    """Mutant: a time of day, a path or an order of files in the hash."""
     run(load_scene("initial_mesh"), tmp_path / "again")
     assert manifest.of_run(runs.INITIAL_MESH, tmp_path / "again")["files"] == told["runs"]["initial_mesh"]["files"]
 
 
 @pytest.mark.parametrize("packed, factor, same", [(None, 1.0, True), ("zlib", 1.0 + 1e-15, False)])
 def test_fields_are_hashed_as_arrays(folder, tmp_path, packed, factor, same):
-    """Unpacked it is the same data; with the last bit of one place changed it is not. Mutants: the file's bytes, points
-    left out."""
+    """Unpacked it is the same data; with the last bit of one place changed it is not."""
     content = meshio.read(folder / "fields" / "fields_0000.vtu")
     content.points[np.argmax(content.points[:, 0])] *= factor
     content.write(tmp_path / "copy.vtu", file_format="vtu", compression=packed)
@@ -65,7 +62,6 @@ def test_fields_are_hashed_as_arrays(folder, tmp_path, packed, factor, same):
 
 
 def test_one_value_of_a_cell_changes_the_hash(folder, tmp_path):
-    """Mutant: cell data left out."""
     content = meshio.read(folder / "fields" / "fields_0000.vtu")
     content.cell_data["region"][0][0] += 1e-12
     content.write(tmp_path / "copy.vtu", file_format="vtu")
@@ -73,7 +69,6 @@ def test_one_value_of_a_cell_changes_the_hash(folder, tmp_path):
 
 
 def test_a_figure_is_hashed_by_what_it_draws_and_says():
-    """Mutants: collections, labels or the caption left out; a hash that no drawing has twice."""
     first = manifest.figure_hash(drawn(1.0), "c")
     assert first == manifest.figure_hash(drawn(1.0), "c")
     others = [manifest.figure_hash(made, caption) for made, caption in (
@@ -82,7 +77,7 @@ def test_a_figure_is_hashed_by_what_it_draws_and_says():
 
 
 def test_an_altered_file_is_told_as_altered(told):
-    """By name; no environment is blamed. Mutants: only the committed copy compared; a missing file passed."""
+    """By name; no environment is blamed."""
     now = copy.deepcopy(told)
     now["runs"]["initial_mesh"]["files"]["timeseries.csv"] = "0" * 64
     del now["runs"]["initial_mesh"]["files"]["fields.pvd"]
@@ -104,8 +99,7 @@ def another(told, factor=1.0, **environment):
     ({"numpy": "2"}, "numpy: 2 instead of 1"), ({"source": "b"}, "the order of some operations has changed"),
     ({"source": "b", "numpy": "2"}, "numpy: 2 instead of 1"), ({}, "not reproducible bit for bit")])
 def test_other_bits_within_what_is_promised_are_as_committed(told, environment, said):
-    """And the source is not blamed where a version explains it. Mutants: a difference in bits is wrong; the source
-    blamed whenever it differs; differences not told."""
+    """And the source is not blamed where a version explains it."""
     other = another(told, 1.001, **environment)
     wrong, words = manifest.check(other, other, told)
     assert wrong == [] and len(words) == 1 and said in words[0] and "source: b" not in words[0]
@@ -117,7 +111,6 @@ def test_other_bits_within_what_is_promised_are_as_committed(told, environment, 
     ({"source": "b", "numpy": "2"}, "the source of repro has changed what it computes"),
     ({}, "source and environment are the committed ones")])
 def test_numbers_beyond_what_is_promised_are_wrong_and_have_their_cause(told, environment, said):
-    """Mutants: a version blamed where the source differs; a promise ten times as wide."""
     other = another(told, 1.01, **environment)
     wrong, words = manifest.check(other, other, told)
     assert words == [] and len(wrong) == 2 and said in wrong[1]
@@ -125,7 +118,6 @@ def test_numbers_beyond_what_is_promised_are_wrong_and_have_their_cause(told, en
 
 
 def test_another_scene_is_the_cause_before_any_source(told):
-    """Mutant: numbers compared of scenes that are not the same."""
     other = another(told, 1.0, source="b")
     other["runs"]["initial_mesh"]["scene"] = "f" * 16
     wrong, _ = manifest.check(other, other, told)
@@ -133,7 +125,6 @@ def test_another_scene_is_the_cause_before_any_source(told):
 
 
 def test_a_figure_drawn_otherwise_from_the_same_data_is_wrong(told):
-    """Mutant: a figure's hash compared only where its run is the same bits, and then passed."""
     other = copy.deepcopy(told)
     other["figures"]["figure_9"]["data"] = "0" * 64
     wrong, _ = manifest.check(other, other, told)
@@ -141,7 +132,7 @@ def test_a_figure_drawn_otherwise_from_the_same_data_is_wrong(told):
 
 
 def test_round_off_is_not_promised(told):
-    """A balance of 1e-15 may become -3e-15. Mutant: balances compared."""
+    """A balance of 1e-15 may become -3e-15."""
     other = another(told)
     other["runs"]["initial_mesh"]["last_row"]["acceptor_balance"] = 1e-15
     kept = copy.deepcopy(told)
@@ -150,7 +141,6 @@ def test_round_off_is_not_promised(told):
 
 
 def test_times_sizes_and_versions_alone_are_no_difference(told):
-    """Mutant: whole entries compared."""
     other = copy.deepcopy(told)
     other["environment"]["numpy"], other["figures"]["figure_9"]["pictures"]["f.pdf"] = "2", 10
     other["figures"]["figure_9"]["wall_time_s"] = other["runs"]["initial_mesh"]["wall_time_s"] = 99.0
@@ -160,7 +150,6 @@ def test_times_sizes_and_versions_alone_are_no_difference(told):
 @pytest.mark.parametrize("change, status", [(lambda m: m, 0), (lambda m: m["figures"]["figure_9"].update(data="0"), 1),
                                             (lambda m: m["figures"]["figure_9"]["pictures"].clear(), 1)])
 def test_the_exit_status_follows(told, tmp_path, monkeypatch, capsys, change, status):
-    """Mutants: 0 whatever is found; a picture that is gone passed."""
     now = copy.deepcopy(told)
     change(now)
     for name, folder in (("OUT", tmp_path), ("COMMITTED", tmp_path / "committed.json")):
@@ -173,7 +162,6 @@ def test_the_exit_status_follows(told, tmp_path, monkeypatch, capsys, change, st
 
 
 def test_without_figures_the_check_says_what_to_do(tmp_path, monkeypatch, capsys):
-    """Mutant: a check that computes the runs, or passes on nothing."""
     monkeypatch.setattr(runs, "CACHE", tmp_path)
     with pytest.raises(FileNotFoundError, match="make figures"):
         manifest.present()
@@ -183,7 +171,6 @@ def test_without_figures_the_check_says_what_to_do(tmp_path, monkeypatch, capsys
 
 
 def test_the_committed_manifest_is_of_the_present_figures():
-    """Mutants: a figure or a scene that changed since."""
     kept = json.loads(manifest.COMMITTED.read_text(encoding="utf-8"))
     assert list(kept["figures"]) == list(paper_figures.FIGURES)
     assert {name: run["scene"] for name, run in kept["runs"].items()} == {

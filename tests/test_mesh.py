@@ -37,10 +37,7 @@ def bare(points, triangles):
 @pytest.mark.parametrize("radius, width, refinement", [(5, 50, 1), (5, 100, 1), (25, 50, 0.5), (42, 50, 1), (48, 50, 1),
                                                        (27, 50, 2), (98, 100, 1)])
 def test_a_new_mesh_is_good_and_covers_what_it_should(radius, width, refinement, geometry):
-    """Areas of biomass and pore to round-off, no triangle under the criterion (measured: 0.63 and up).
-
-    Mutant: Mmg allowed to move the surface, a triangle of the fluid labelled biomass, Mmg's gradation (hgrad) off.
-    """
+    """Areas of biomass and pore to round-off, no triangle under the criterion (measured: 0.63 and up)."""
     grid, outline = meshed(seed(float(radius), refinement, geometry), float(width), refinement)
     length = grid.ends[1] - grid.ends[0]
     assert grid.areas.min() > 0
@@ -55,10 +52,7 @@ def test_a_new_mesh_is_good_and_covers_what_it_should(radius, width, refinement,
 @settings(max_examples=20)
 @given(attached_aggregates(width=widths) | attached_aggregates(width=widths, geometry=2))
 def test_any_outline_keeps_its_nodes_to_the_last_bit_and_its_edges(drawn):
-    """The loop is the refined outline, bit for bit; every edge of it is an edge of the mesh, biomass on its left.
-
-    Mutant: prescribed points one round-off away (Mmg itself has kept them so far), the loop clockwise, a node
-    inserted on it. """
+    """The loop is the refined outline, bit for bit; every edge of it is an edge of the mesh, biomass on its left."""
     outline, width = drawn
     grid, fine = meshed(outline, width)
     assert (grid.points[grid.loop] == fine.points).all()
@@ -72,7 +66,7 @@ def test_any_outline_keeps_its_nodes_to_the_last_bit_and_its_edges(drawn):
 @settings(max_examples=5)
 @given(widths)
 def test_nothing_of_the_rim_is_beside_its_line(width):
-    """Nodes of walls, inlet and outlet are known by y == 0, y == W, x == end. Mutant: one of them off by round-off."""
+    """Nodes of walls, inlet and outlet are known by y == 0, y == W, x == end."""
     grid, _ = meshed(plug(width, -0.3 * width, 0.2 * width, 0.1 * width), width)
     rim = grid.fem.boundary_nodes()
     ends = grid.topology.inlet, grid.topology.outlet
@@ -84,7 +78,6 @@ def test_nothing_of_the_rim_is_beside_its_line(width):
 
 
 def test_contact_splits_the_fluid_in_two():
-    """Mutant: one polygon around the aggregate on both sides, the upper contact meshed as fluid."""
     grid, outline = meshed(plug(50.0, -20.0, 15.0, 5.0))
     assert fluid_regions(grid) == 2
     assert grid.areas[grid.biomass].sum() == pytest.approx(35 * 50, rel=1e-12)
@@ -94,9 +87,7 @@ def test_contact_splits_the_fluid_in_two():
 @pytest.mark.parametrize("film", [25.0, 10.0, 5.0, 2.0])
 def test_at_least_six_elements_lie_across_the_film(film):
     """Lines across the film cross 11 to 16 triangles (measured), about two in each layer of nodes; none spans a
-    fourth of it.
-
-    Mutant: ACROSS_FILM = 4 (8 triangles), or the film left out of the wanted sizes (2 triangles in 2 um). """
+    fourth of it."""
     grid, _ = meshed(seed(50.0 - film))
     for x in (-0.11, -0.05, 0.0137, 0.07, 0.13):
         pieces = chords(grid, x)
@@ -116,7 +107,6 @@ def chords(grid, x):
 
 @both
 def test_the_same_mesh_twice_is_the_same_bit_for_bit(geometry):
-    """Mutant: a set's or a thread's order gets into the mesh."""
     first, second = (meshed(seed(27.0, 1.0, geometry))[0] for _ in range(2))
     assert first.points.tobytes() == second.points.tobytes()
     assert first.cells.tobytes() == second.cells.tobytes()
@@ -125,16 +115,13 @@ def test_the_same_mesh_twice_is_the_same_bit_for_bit(geometry):
 
 @pytest.mark.parametrize("refinement", [0.5, 1.0, 2.0])
 def test_a_finer_mesh_has_quadratically_more_nodes(refinement):
-    """Element sizes are divided by the refinement. Mutant: it divides the outline's sizes alone."""
+    """Element sizes are divided by the refinement."""
     count = len(meshed(None, refinement=refinement)[0].points)
     assert count == pytest.approx(720 * refinement**2, rel=0.15)
 
 
 def test_quality_and_circumscribed_circle_of_known_triangles():
-    """Equilateral: 1 and 2 a / sqrt(3); right-angled with legs one: sqrt(3)/2 and the hypotenuse (3.4, 3.5).
-
-    Mutant: a mean of edges for the circle's diameter, its radius, 2 sqrt(3) for 4 sqrt(3).
-    """
+    """Equilateral: 1 and 2 a / sqrt(3); right-angled with legs one: sqrt(3)/2 and the hypotenuse (3.4, 3.5)."""
     root = np.sqrt(3)
     grid = bare([[0, 0], [1, 0], [0.5, root / 2], [2, 0], [3, 0], [2, 1]], [[0, 1, 2], [3, 4, 5]])
     assert grid.quality == pytest.approx([1.0, root / 2], rel=1e-14)
@@ -143,7 +130,6 @@ def test_quality_and_circumscribed_circle_of_known_triangles():
 
 
 def test_gradients_differentiate_linear_fields_exactly():
-    """Mutant: opposite edges rolled by one, clockwise normals."""
     grid, _ = meshed(seed(20.0))
     field = 3.0 + 0.7 * grid.points[:, 0] - 1.9 * grid.points[:, 1]
     found = np.einsum("tai,ta->ti", grid.gradients, field[grid.triangles])
@@ -151,7 +137,6 @@ def test_gradients_differentiate_linear_fields_exactly():
 
 
 def test_lumped_areas_add_up():
-    """Mutant: |tau| / 2 at each node, fluid triangles counted at interface nodes."""
     grid, outline = meshed(seed(20.0))
     space = Space(grid, 1)
     assert space.lumped().sum() == pytest.approx(grid.areas.sum(), rel=1e-13)
@@ -163,7 +148,7 @@ def test_lumped_areas_add_up():
 
 @pytest.mark.parametrize("poor, allowed", [(0, True), (6, True), (7, False)])
 def test_seven_poor_triangles_are_one_too_many(poor, allowed):
-    """Quality under 0.6 in more than six triangles (3.5). Mutant: any poor one, or seven allowed."""
+    """Quality under 0.6 in more than six triangles (3.5)."""
     base = np.arange(10.0)[:, None]
     height = np.where(base < poor, 0.2, 0.9)
     corners = np.concatenate([np.hstack([2 * base, 0 * base]), np.hstack([2 * base + 1, 0 * base]),
@@ -174,13 +159,11 @@ def test_seven_poor_triangles_are_one_too_many(poor, allowed):
 
 
 def test_one_triangle_turned_over_is_not_acceptable():
-    """Mutant: the criterion looks at |tau|."""
     assert not bare([[0, 0], [1, 0], [0.5, 0.9]], [[0, 2, 1]]).acceptable()
 
 
 @both
 def test_an_impossible_outline_is_refused_with_its_place(geometry):
-    """Mutant: checks left out: Mmg would return a mesh of something else."""
     start = seed(5.0, 1.0, geometry)
     crossed = start.points.copy()
     crossed[[-3 * geometry, -2 * geometry]] = crossed[[-2 * geometry, -3 * geometry]]

@@ -1,4 +1,9 @@
-"""The verification can fail: mutants apply to the code as it is, and five of them are caught by the cases they name."""
+"""The verification can fail: mutants apply to the code as it is, and five of them are caught by the cases that name
+them, one by the test that it names."""
+import ast
+import re
+from itertools import repeat
+
 import pytest
 
 from verification.kernel import case, driver, mutants, report
@@ -7,8 +12,9 @@ from verification.kernel.mutants import Hunt, Mutant, MutantError, Trial
 
 driver.load()
 KNOWN = mutants.everything()
-#: One of each of five stages, caught by a case of a second or two.
-TRIED = ("saddle-sign", "carried-by-u", "third-power", "linear-transfer", "stale-fluid")
+OF_CASES, OF_TESTS = map(mutants.of, mutants.CATCHERS)
+#: One of each of five stages, caught by a case of a second or two, and one that a test catches.
+TRIED = ("saddle-sign", "carried-by-u", "third-power", "linear-transfer", "stale-fluid", "stresses-exchanged")
 
 
 def a_mutant(**changes):
@@ -24,7 +30,8 @@ def root(tmp_path):
 
 def test_there_are_enough_mutants_of_every_stage():
     assert len(KNOWN) >= 40
-    assert {stage: len(found) >= 5 for stage, found in mutants.load().items()} == dict.fromkeys(case.STAGES, True)
+    assert {stage: len(found) >= 5 for stage, found in mutants.load().items()} == dict.fromkeys(
+        (*case.STAGES, mutants.RESULTS), True)
 
 
 @pytest.mark.parametrize("id", KNOWN)
@@ -34,9 +41,35 @@ def test_a_mutant_applies_to_the_code_says_what_is_wrong_and_is_still_python(id)
     assert chosen.file.startswith("repro/") and len(chosen.says.split()) > 2
 
 
-def test_every_case_names_mutants_that_exist_and_every_mutant_is_named():
-    named = {id for c in case.CASES.values() for id in c.mutants}
-    assert named - set(KNOWN) == set() and set(KNOWN) - named == set()
+def test_every_case_names_mutants_that_exist_and_every_mutant_is_named_or_names_tests():
+    assert {id for c in case.CASES.values() for id in c.mutants} == {*OF_CASES}
+
+
+def functions(path):
+    """{name: docstring} of the functions of a file, "" that of the file."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    found = {node.name: ast.get_docstring(node) or "" for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
+    return found | {"": ast.get_docstring(tree) or ""}
+
+
+TESTS = {path.name: functions(path) for path in sorted((mutants.ROOT / "tests").glob("*.py"))}
+
+
+@pytest.mark.parametrize("id", OF_TESTS)
+def test_the_tests_that_a_mutant_names_are_there(id):
+    for test in KNOWN[id].tests:
+        file, _, name = test.removeprefix("tests/").partition("::")
+        assert name.partition("[")[0] in TESTS[file], test
+
+
+def test_a_docstring_claims_no_mutant_that_is_not_run():
+    """What a test is said to catch is registered, with this test among those that it names."""
+    for file, known in TESTS.items():
+        for name, text in known.items():
+            for said in re.findall(r"[Mm]utants?:\s+([^.]+)", text):
+                for id in said.split(", "):
+                    tests = {test.partition("[")[0] for test in KNOWN[id].tests} if id in KNOWN else ()
+                    assert f"tests/{file}::{name}" in tests, f"{id}: register it, or say what the test holds"
 
 
 def test_an_id_is_used_once(monkeypatch):
@@ -51,7 +84,6 @@ def test_the_change_is_made_where_it_belongs(root):
 
 @pytest.mark.parametrize("changes", [{"old": "x = 5"}, {"old": "y = 3"}, {"new": "x = 1"}])
 def test_text_that_is_gone_or_not_unique_is_an_error(root, changes):
-    """Mutant: `replace` that silently changes nothing, so that the code itself "survives" as a mutant."""
     with pytest.raises(MutantError, match="adapt the mutant"):
         mutants.mutated(a_mutant(**changes), root)
 
@@ -68,8 +100,25 @@ def outcome(value):
     (Result("c", Outcome(), "Traceback\nNameError", 0.0), False),
 ])
 def test_a_number_or_a_guard_catches_and_a_broken_mutant_does_not(result, caught):
-    """Mutant: any exception counts as a catch, so that a typing error in a mutant proves a test."""
     assert mutants.judged(result)[0] is caught
+
+
+@pytest.mark.parametrize("body, caught, how", [
+    ("assert 1 == 2", True, "assert 1 == 2"), ("with pytest.raises(OSError): pass", True, "Failed: DID NOT RAISE"),
+    ("raise MeshError('no')", True, "repro.errors.MeshError: no"), ("wrong", False, "broken: NameError"),
+    ("pass", False, "passes"), ("import nothing_there", False, "broken: ModuleNotFoundError"),
+])
+def test_an_assertion_or_a_guard_catches_and_a_broken_test_does_not(tmp_path, body, caught, how):
+    head = "import pytest\nfrom repro.errors import MeshError\ndef test_b():\n"
+    (tmp_path / "test_a.py").write_text(f"{head}    {body}\n")
+    found = mutants.tested(tmp_path, "test_a.py::test_b")
+    assert found.caught is caught and found.how.startswith(how)
+
+
+def test_a_test_that_is_not_there_catches_nothing(tmp_path):
+    (tmp_path / "test_a.py").write_text("")
+    found = mutants.tested(tmp_path, "test_a.py::test_b")
+    assert not found.caught and "broken" in found.how
 
 
 @pytest.mark.parametrize("trials, fine", [
@@ -96,13 +145,25 @@ def test_named_cases_come_first_and_quick_ones_before_slow_ones():
     assert slow == sorted(slow) and len(named) + len(others) == len(case.CASES)
 
 
+def hunted(ids, name):
+    """Hunts in which all of them are caught at the second trial."""
+    return [Hunt(id, (Trial("flow-plug", False, "passes"), Trial(name, True, "q: 2"))) for id in ids]
+
+
 def test_the_record_is_of_this_code_or_says_that_it_is_not(tmp_path, monkeypatch):
+    """Of what cases catch and of what tests catch, each when all of it was hunted; some alone change nothing."""
     monkeypatch.setattr(mutants, "RECORD", tmp_path / "report" / "mutants.json")
     assert mutants.recorded() == ({}, False)
-    mutants.record([Hunt("saddle-sign", (Trial("flow-poiseuille", True, "q: 2"), Trial("flow-plug", False, "passes")))])
-    assert mutants.recorded() == ({"saddle-sign": ["flow-poiseuille"]}, True)
-    assert f"1 of {len(KNOWN)} mutants caught by `make mutants`, run on this code." == report.mutant_state()
-    monkeypatch.setattr(mutants, "code", lambda: "another")
+    mutants.record(hunted([*OF_CASES][1:], "flow-poiseuille"))
+    assert mutants.recorded() == ({}, False)
+    mutants.record(hunted(OF_CASES, "flow-poiseuille"))
+    caught, fresh = mutants.recorded()
+    assert not fresh and caught == {id: ["flow-poiseuille"] * (id in OF_CASES) for id in KNOWN}
+    mutants.record(hunted(OF_TESTS, "test_a.py::test_b"))
+    caught, fresh = mutants.recorded()
+    assert fresh and {id for id, names in caught.items() if names == ["test_a.py::test_b"]} == {*OF_TESTS}
+    assert f"{len(KNOWN)} of {len(KNOWN)} mutants caught by `make mutants`, run on this code." == report.mutant_state()
+    monkeypatch.setattr(mutants, "code", lambda catchers: "another")
     assert "BEFORE THE LAST CHANGE" in report.mutant_state()
 
 
@@ -113,7 +174,7 @@ def test_an_unknown_mutant_is_refused_by_name(capsys):
 
 @pytest.mark.parametrize("id", TRIED)
 def test_a_mutant_is_caught_by_every_case_that_names_it(id):
-    """In a copy of the code, in a process of its own, as `make mutants` does it for all."""
+    """In a copy of the code, in a process of its own, as `make mutants` does it for all; or by every test it names."""
     found = mutants.hunt(KNOWN[id], every=True)
     assert found.caught_by and not found.missed_by, found
 
@@ -123,3 +184,12 @@ def test_the_code_itself_is_not_caught(monkeypatch, tmp_path):
     monkeypatch.setattr(mutants, "mutated", lambda mutant: (mutants.ROOT / mutant.file).read_text(encoding="utf-8"))
     mutants.copy(KNOWN["third-power"], tmp_path)
     assert mutants.trial(tmp_path, "growth-stress") == Trial("growth-stress", False, "passes")
+
+
+@pytest.mark.thorough
+def test_the_tests_that_mutants_name_pass_without_them(monkeypatch, tmp_path):
+    """In the same copy: that something is missing in it is no catch."""
+    monkeypatch.setattr(mutants, "mutated", lambda mutant: (mutants.ROOT / mutant.file).read_text(encoding="utf-8"))
+    mutants.copy(KNOWN["stresses-exchanged"], tmp_path)
+    named = {test for mutant in OF_TESTS.values() for test in mutant.tests}
+    assert [trial for trial in map(mutants.tested, repeat(tmp_path), sorted(named)) if trial.how != "passes"] == []

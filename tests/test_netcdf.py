@@ -31,7 +31,7 @@ def content(out):
 
 
 def test_it_is_the_table(made):
-    """Every column to the last bit. Mutants: 32 bits; a column under another's name."""
+    """Every column to the last bit."""
     found, table = content(made), results.read_table(made / "timeseries.csv")
     assert set(found.variables) == set(table) == set(results.COLUMNS) and len(table["time_h"]) > 2
     for name, column in table.items():
@@ -40,7 +40,6 @@ def test_it_is_the_table(made):
 
 
 def test_it_says_what_it_is(made):
-    """Mutants: units as in the names, a time that hangs on a date, the hash of another scene."""
     found, loaded = content(made), load_scene("base", SETS)
     assert found.attrs["Conventions"] == "CF-1.11" and found.attrs["scene"] == "base" and found.attrs["title"]
     assert found.attrs["scene_hash"] == scene_hash(loaded)
@@ -76,7 +75,7 @@ def test_a_run_without_rows_has_an_empty_table(tmp_path):
 
 
 def test_it_is_whole_or_not_there(tmp_path, monkeypatch):
-    """The earlier file stays, nothing else does. Mutant: written in its place."""
+    """The earlier file stays, nothing else does."""
     target = tmp_path / "timeseries.nc"
     target.write_text("earlier")
 
@@ -91,7 +90,6 @@ def test_it_is_whole_or_not_there(tmp_path, monkeypatch):
 
 
 def test_without_xarray_it_is_refused_before_the_run(tmp_path, monkeypatch, capsys):
-    """Mutant: an error at the end of the run."""
     monkeypatch.setattr(rules, "find_spec", lambda name: None)
     run(tmp_path / "run", "base", *SETS, status=2)
     (line,) = capsys.readouterr().err.splitlines()

@@ -48,13 +48,11 @@ def visits(reused, defects):
 
 
 def test_fresh_derivatives_are_made_for_every_iterate():
-    """Mutant: the choice ignored."""
     assert visits(False, [1.0, 1e-3, 1e-6]) == [True, True, True]
 
 
 def test_a_derivative_is_used_again_while_it_does_enough():
-    """The first is made, then one wherever the defect has fallen by less than ENOUGH. Mutants: the defect of the first
-    iterate as the measure, never made again, ENOUGH turned round."""
+    """The first is made, then one wherever the defect has fallen by less than ENOUGH."""
     slow, quick = 2 * ENOUGH, ENOUGH / 2
     assert visits(True, [1.0, slow, slow * quick, slow * quick**2, slow**2 * quick**2]) == [
         True, True, False, False, True]
@@ -69,22 +67,20 @@ def test_a_derivative_is_used_again_while_it_does_enough():
     ([1.0, 2.0, 3.0, 4.0], 3, False),
 ])
 def test_when_it_stops(defects, count, converged):
-    """Under the tolerance; or where round-off keeps a defect that is small enough from falling. Mutants: any defect
-    under the second measure, one that does not fall but is not small either, one iteration more."""
+    """Under the tolerance; or where round-off keeps a defect that is small enough from falling."""
     assert STALLED == 0.1
     last, steps, done = run(Script(defects), most=4 if converged else 3)
     assert (last.number, steps, done) == (count, count, converged)
 
 
 def test_constraints_come_first():
-    """However small the defect. Mutant: convergence judged by the residual alone."""
+    """However small the defect."""
     last, steps, done = run(Script([0.0, 0.0, 0.0], incomplete={0, 1}))
     assert (last.number, steps, done) == (2, 2, True)
 
 
 def test_a_root_is_found_quadratically_and_by_the_modified_method_in_more_steps():
-    """x^3 = 2, with its derivative and with that of an earlier iterate. Mutant: the derivative never made again, made
-    again at once."""
+    """x^3 = 2, with its derivative and with that of an earlier iterate."""
     @dataclass(frozen=True)
     class At:
         x: float
@@ -115,6 +111,5 @@ def test_a_root_is_found_quadratically_and_by_the_modified_method_in_more_steps(
 
 
 def test_a_residual_counts_against_the_size_of_its_row():
-    """Mutants: against the largest size of all, no guard where a row is empty."""
     assert relative(np.array([1.0, -4.0, 0.0]), np.array([10.0, 8.0, 0.0])) == 0.5
     assert relative(np.empty(0), np.empty(0)) == 0.0

@@ -13,13 +13,12 @@ ONE_WAY, OTHER_WAY = np.array([[0, 1, 2], [0, 2, 3]]), np.array([[0, 1, 3], [1, 
 
 
 def test_the_oracles_know_nothing_of_repro():
-    """Mutant: an oracle that borrows from what it judges."""
     source = Path(oracles.__file__).read_text(encoding="utf-8")
     assert imported(source) == {"math", "numpy", "shapely"}
 
 
 def test_one_triangle():
-    """The unit right triangle: area, gradients, circle, values. Mutant: an oracle with corners in another order."""
+    """The unit right triangle: area, gradients, circle, values."""
     corners = SQUARE[[0, 1, 3]]
     assert oracles.area(corners) == 0.5 and oracles.area(corners[::-1]) == -0.5
     assert oracles.slopes(corners) == pytest.approx(np.array([[-1, -1], [1, 0], [0, 1]]), abs=1e-15)

@@ -32,8 +32,7 @@ def sampled(shape, per_edge=2000):
 @both
 @pytest.mark.parametrize("refinement", [0.5, 1.0, 2.5])
 def test_the_seed_is_a_half_disc_on_the_wall_centred_at_its_fixed_point(refinement, geometry):
-    """Middles on the arc too; only the middle of the base is fixed. Mutant: an arc of radius R (1 + 1e-3), a base off
-    the wall, a fixed point beside the origin."""
+    """Middles on the arc too; only the middle of the base is fixed."""
     start = seed(5.0, refinement, geometry)
     free = start.wall == FREE
     assert np.hypot(*start.points[free].T) == pytest.approx(5.0, rel=1e-15)
@@ -49,14 +48,13 @@ def test_the_seed_is_a_half_disc_on_the_wall_centred_at_its_fixed_point(refineme
 
 @both
 def test_the_seed_may_lie_elsewhere(geometry):
-    """Mutant: the fixed point left at x = 0."""
     here, there = seed(5.0, 1.0, geometry), of.half_disc(5.0, 10.0, geometry, -30.0)
     assert np.allclose(there.points, here.points + [-30.0, 0.0], rtol=0, atol=1e-13)
     assert there.points[there.fixed].tolist() == [[-30.0, 0.0]] and (there.origin == there.points).all()
 
 
 def test_the_seed_has_the_area_of_the_polygon_inscribed_in_the_half_disc():
-    """n chords cut a half-disc to n R^2 sin(pi/n) / 2. Mutant: clockwise nodes, a node repeated, a node left out."""
+    """n chords cut a half-disc to n R^2 sin(pi/n) / 2."""
     start = seed(5.0)
     chords = int((start.wall == FREE).sum()) + 1
     assert start.area == pytest.approx(chords * 12.5 * np.sin(np.pi / chords), rel=1e-14)
@@ -65,12 +63,11 @@ def test_the_seed_has_the_area_of_the_polygon_inscribed_in_the_half_disc():
 
 @pytest.mark.parametrize("refinement, error", [(0.25, 2e-4), (0.5, 2e-4), (1.0, 1e-5)])
 def test_a_seed_of_arcs_has_the_area_of_the_half_disc(refinement, error):
-    """To (edge / R)^4. Mutants: middles on the chords (area 1 % low), chords for arcs."""
+    """To (edge / R)^4."""
     assert seed(10.0, refinement, 2).area == pytest.approx(np.pi / 2 * 100, rel=error)
 
 
 def test_the_interface_is_what_borders_the_fluid():
-    """Mutant: an edge counted as interface when *either* end is on a wall, or never between two different walls."""
     sides = plug(50.0, -10.0, 10.0)
     assert sides.interface_edges().tolist() == [False, False, True, False, False, True]
     assert (sides.edge_wall != FREE).tolist() == [True, True, False, True, True, False]
@@ -82,8 +79,7 @@ def test_the_interface_is_what_borders_the_fluid():
 
 
 def test_area_and_extremes_are_those_of_the_arcs():
-    """Against a polygon of 2000 points an arc; the largest y is between nodes. Mutants: the polygon of the nodes, two
-    thirds for four thirds of the triangle, extremes of nodes only."""
+    """Against a polygon of 2000 points an arc; the largest y is between nodes."""
     shape = wavy(bend=0.1)
     x = sampled(shape)
     assert shape.area == pytest.approx(of.polygon_area(x), rel=1e-6)
@@ -96,8 +92,7 @@ def test_area_and_extremes_are_those_of_the_arcs():
 
 @given(attached_aggregates(width=widths))
 def test_arcs_with_middles_half_way_are_the_polygon(drawn):
-    """What both kinds of outlines say of the same curve. Mutants: corners and middles exchanged, a wall's middle that
-    is free."""
+    """What both kinds of outlines say of the same curve."""
     straight, _ = drawn
     ends = straight.arcs(straight.points)
     points = ends[:, :2].reshape(-1, 2)
@@ -115,7 +110,6 @@ def test_arcs_with_middles_half_way_are_the_polygon(drawn):
 
 @given(attached_aggregates(width=widths) | attached_aggregates(width=widths, geometry=2))
 def test_a_mirror_keeps_the_measures(drawn):
-    """Mutants: x of the first largest y only, the sign of the area's arcs."""
     outline, _ = drawn
     image = mirrored(outline)
     assert image.area == pytest.approx(outline.area, rel=1e-13)
@@ -125,8 +119,7 @@ def test_a_mirror_keeps_the_measures(drawn):
 
 @pytest.mark.parametrize("refinement", [1.0, 2.0])
 def test_a_split_changes_neither_shape_nor_area(refinement):
-    """New nodes lie on the same parabolas, and so do their places at t = 0. Mutants: middles on chords, origin
-    interpolated linearly."""
+    """New nodes lie on the same parabolas, and so do their places at t = 0."""
     shape = wavy()
     finer = sizing.split(shape, Sizing(50.0, refinement, 2.0))
     assert len(finer.points) > len(shape.points)
@@ -138,7 +131,7 @@ def test_a_split_changes_neither_shape_nor_area(refinement):
 
 
 def test_halved_arcs_are_the_same_curve():
-    """Only those asked for; twice as many nodes there. Mutant: all of them, or the neighbour."""
+    """Only those asked for; twice as many nodes there."""
     shape = wavy()
     which = np.zeros(len(shape.points) // 2, bool)
     which[[2, -1]] = True

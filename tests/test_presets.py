@@ -46,8 +46,7 @@ def contact(request):
 @pytest.mark.parametrize("order, area, radius", [(1, 1e-3, 5e-3), (2, 1e-6, 1e-4), (3, 1e-6, 1e-4)])
 def test_growth_in_plenty_is_exponential_and_round(order, area, radius):
     """Diffusion holds the supply: mass by (9)-(10), a half-disc; the area of linear elements to the density's drift at
-    remeshes [E7]. Mutants: rates of half the step's length, mass lost at the remesh, arcs straightened by the moved
-    mesh."""
+    remeshes [E7]."""
     made = base('growth.end="6 h"', 'output.times=["6 h"]', order=order)
     fast = {name: replace(getattr(made.substrates, name), diffusivity=1e13, diffusivity_in_aggregate=1e13)
             for name in ("acceptor", "donor")}
@@ -63,8 +62,7 @@ def test_growth_in_plenty_is_exponential_and_round(order, area, radius):
 
 
 def test_the_first_guess_at_a_step_s_end():
-    """As much change again as the first half has made; not below zero, nor on another mesh. Mutants: the half's own
-    state, a guess below zero."""
+    """As much change again as the first half has made; not below zero, nor on another mesh."""
     start, half, other = (Concentrations(np.array(a), np.array(b)) for a, b in (
         ([3.0, 2.0], [5.0, 4.0]), ([2.5, 1.5], [5.0, 3.5]), ([1.0], [1.0])))
     spent = replace(half, acceptor=np.array([2.5, 0.5]))
@@ -79,8 +77,7 @@ def test_the_first_guess_at_a_step_s_end():
 def test_density_is_kept(contact):
     """J = theta: (X_A + X_I) / X_m is one but for what the linear pressure cannot see, mass over area exactly on curved
     triangles. On straight ones mass follows the area to the drift [E7], and a film that closes squeezes a few of these
-    coarse triangles (0.63 of X_m; 0.56 a step later, before there is a new mesh). Mutants: J = theta at corners only,
-    the expansion forgotten at a remesh."""
+    coarse triangles (0.63 of X_m; 0.56 a step later, before there is a new mesh)."""
     made, found = contact
     most, drift = made.kinetics.maximum_density, 2e-2 if made.numerics.order == 1 else 1e-9
     bounds = (0.5, 1.2) if made.numerics.order == 1 else (0.9, 1.1)
@@ -94,7 +91,7 @@ def test_density_is_kept(contact):
 
 def test_contact_is_made_and_kept(contact):
     """Nodes and arcs on the upper wall lie on it, middles with their corners; one node there is fixed; the surface
-    grows. Mutants: a middle that joins alone, no fixed point, contact that opens."""
+    grows."""
     made, found = contact
     after = [instant.pore for instant in found if instant.pore.contact]
     assert 2 <= len(after) < len(found)
@@ -114,7 +111,7 @@ def test_contact_is_made_and_kept(contact):
 
 @EVERY_ORDER
 def test_without_flow_both_sides_are_alike(order):
-    """To what an unsymmetric mesh makes of it. Mutant: the fixed point beside the middle."""
+    """To what an unsymmetric mesh makes of it."""
     *_, last = run(replace(base('growth.end="8 h"', 'output.times=["8 h"]', order=order), flow=None))
     shape = last.pore.outline
     assert abs(shape.downstream + shape.upstream) < 2e-4 * shape.downstream
@@ -123,7 +120,7 @@ def test_without_flow_both_sides_are_alike(order):
 
 @EVERY_ORDER
 def test_it_is_the_paper_s_aggregate(order):
-    """Both schemes at 4 h, within the paper's own error of 1 %. Mutant: another law of growth."""
+    """Both schemes at 4 h, within the paper's own error of 1 %."""
     ends = ('growth.end="4 h"', 'output.times=["4 h"]')
     ours, theirs = run(base(*ends, order=order))[-1], run(load_scene("base", ('numerics.preset="paper"', *ends)))[-1]
     for name in ("area", "upstream", "thickness"):
@@ -157,8 +154,7 @@ def carried_back(order, straight):
 @EVERY_ORDER
 def test_rates_are_carried_back_from_a_new_mesh(order):
     """Rates that are linear in the place half way come back as they are there, exactly where edges are straight; along
-    bent ones what is linear within a triangle is not so in the place, to 1 % of the range (measured 0.5 %). Mutants:
-    rates by node number, places of the start."""
+    bent ones what is linear within a triangle is not so in the place, to 1 % of the range (measured 0.5 %)."""
     linear, even = carried_back(order, straight=True)
     assert linear < 1e-6 and even < 1e-12
     linear, even = carried_back(order, straight=False)
@@ -167,7 +163,7 @@ def test_rates_are_carried_back_from_a_new_mesh(order):
 
 def test_fields_are_written(contact, tmp_path):
     """On straight triangles and on curved ones of six nodes, names with units, X_A + X_I = 1 in the aggregate, J and
-    theta alike. Mutants: corners only, heads of the corners at the middles' places."""
+    theta alike."""
     made, found = contact
     now = found[-1].pore
     results.write_fields(tmp_path / "fields.vtu", results.fields(made, now, found[-1].solved))
@@ -194,13 +190,13 @@ def numerics(**given):
 
 @pytest.mark.parametrize("preset", PRESETS)
 def test_a_preset_changes_the_defaults(preset):
-    """All that it names, nothing else. Mutant: a key of one preset left out."""
+    """All that it names, nothing else."""
     assert numerics(preset=preset) == replace(Numerics(), preset=preset, **PRESETS[preset])
 
 
 def test_presets_say_what_they_are():
     """The paper's is the paper's scheme; the others are curved, second in time, the accurate one finer, the exact one
-    finer still. Mutants: fast and accurate exchanged, the exact one with the steps of accurate."""
+    finer still."""
     paper, fast, accurate = (numerics(preset=name) for name in ("paper", "fast", "accurate"))
     assert (paper.elements, paper.time, paper.refinement) == ("linear", "updates", 1.0)
     assert fast.elements == accurate.elements == "quadratic" and fast.time == accurate.time == "midpoint"
@@ -211,14 +207,13 @@ def test_presets_say_what_they_are():
 
 
 def test_what_is_written_wins_over_the_preset():
-    """Mutant: the preset laid over the scene's keys."""
     found = numerics(preset="fast", refinement=0.8, elements="linear", time="updates")
     assert (found.refinement, found.elements, found.time, found.tolerance) == (0.8, "linear", "updates", 0.0075)
 
 
 @pytest.mark.parametrize("preset", PRESETS)
 def test_a_written_scene_is_read_as_the_same(preset):
-    """With the preset and all that it chose spelt out. Mutant: the preset's name lost, or applied again over them."""
+    """With the preset and all that it chose spelt out."""
     made = parse_scene({**TABLES, "numerics": {"preset": preset, "refinement": 0.77}}, "test", "test.toml")
     assert parse_scene(scene_tables(made), "test", "test.toml") == made
 
@@ -226,8 +221,7 @@ def test_a_written_scene_is_read_as_the_same(preset):
 @pytest.mark.parametrize("kind", ["quadratic", "cubic"])
 @pytest.mark.parametrize("key, other", [("transfer", "linear"), ("transfer", "bounded"), ("flow_element", "bubble")])
 def test_what_higher_orders_cannot_do_is_refused(kind, key, other):
-    """In one line, by the key's name, with what there is. Mutant: a row of HIGHER_ORDER left out (it would run as if
-    not written)."""
+    """In one line, by the key's name, with what there is."""
     assert key in HIGHER_ORDER
     wanted = rf'numerics.{key}.*"{HIGHER_ORDER[key]}" is needed with numerics.elements = "{kind}"; "linear" has'
     with pytest.raises(SceneError, match=wanted) as refused:
@@ -240,7 +234,6 @@ def test_what_higher_orders_cannot_do_is_refused(kind, key, other):
 @pytest.mark.parametrize("key, other", [("time", "updates"), ("time", "midpoint"), ("transport", "gear"),
                                         ("interface", "traction"), ("inlet", "mean"), ("fixed_point", "rechosen")])
 def test_what_every_order_can_do_is_accepted(kind, key, other):
-    """Mutant: a row too many in HIGHER_ORDER."""
     assert key not in HIGHER_ORDER
     assert getattr(numerics(preset="paper", elements=kind, **{key: other}), key) == other
 
@@ -253,7 +246,7 @@ def test_every_order_takes_stress_free_biomass_and_fluid_forces(kind):
 
 
 def test_other_combinations_that_are_refused():
-    """Gear with the midpoint rule, a preset that there is not. Mutant: the rule under the wrong key."""
+    """Gear with the midpoint rule, a preset that there is not."""
     with pytest.raises(SceneError, match='numerics.transport.*"quasi_steady" is needed with numerics.time'):
         numerics(preset="paper", time="midpoint", transport="gear")
     for wrong in ("quick", 3, ["fast"]):

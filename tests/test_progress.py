@@ -24,8 +24,7 @@ CONTACT = ["base", "--set", 'numerics.preset="fast"', "--set", 'aggregate.radius
 
 
 def test_json_is_an_object_a_line_and_nothing_else(tmp_path, capsys):
-    """Start, every step, remeshes, contact, checkpoints, end. Mutants: text between, an event that is left out, counts
-    of the last step alone."""
+    """Start, every step, remeshes, contact, checkpoints, end."""
     assert main(["run", *CONTACT, "--out", str(tmp_path / "run"), "--json", "--checkpoint", "0"]) == 0
     out, err = capsys.readouterr()
     events = [json.loads(line) for line in out.splitlines()]
@@ -44,7 +43,7 @@ def test_json_is_an_object_a_line_and_nothing_else(tmp_path, capsys):
 
 @pytest.mark.parametrize("arguments, status", [(["base", "--set", "pore.width=5 s"], 2), (["base"], 1)])
 def test_errors_are_objects_too(tmp_path, capsys, monkeypatch, arguments, status):
-    """With the exit status and the message that people get. Mutant: standard output without a word on the failure."""
+    """With the exit status and the message that people get."""
     monkeypatch.setattr(growth, "MOST_ITERATIONS", 1)
     assert main(["run", *arguments, "--out", str(tmp_path / "run"), "--json"]) == status
     out, err = capsys.readouterr()
@@ -60,7 +59,7 @@ def test_quiet_says_nothing_but_errors(tmp_path, capsys):
 
 
 def test_without_a_terminal_a_line_each_tenth(tmp_path, capsys):
-    """And the end on standard output. Mutant: a bar in a log."""
+    """And the end on standard output."""
     assert main(["run", "base", "--out", str(tmp_path / "run"), "--set", 'growth.end="0.6 h"']) == 0
     out, err = capsys.readouterr()
     assert err.splitlines() == [f"{time} of 0.6 h simulated" for time in ("0.2", "0.4", "0.6")]
@@ -68,8 +67,7 @@ def test_without_a_terminal_a_line_each_tenth(tmp_path, capsys):
 
 
 def test_a_long_step_is_not_silent(capsys, monkeypatch):
-    """Without a terminal lines go on coming while a step takes its time. Mutants: silence until the step's end; lines
-    after the end of the run."""
+    """Without a terminal lines go on coming while a step takes its time."""
     monkeypatch.setattr(progress, "TICK", 0.01)
     monkeypatch.setattr(progress, "SILENCE", 0.02)
     step = {"event": "step", "time_h": 3.5, "end_h": 45.0, "step": 17, "remeshes": 2, "contact": True}
@@ -86,13 +84,13 @@ def test_a_long_step_is_not_silent(capsys, monkeypatch):
 
 
 def test_sixty_columns_are_enough(tmp_path):
-    """For all that is told. Mutant: words cut off at the right."""
+    """For all that is told."""
     last = terminal(tmp_path, 60)[-1]
     assert re.fullmatch(r"base 0\.6/0\.6 h \d\d:\d\d<\d\d:\d\d, step \d+, mesh \d, contact *", last) and len(last) <= 60
 
 
 def test_on_a_terminal_a_bar(tmp_path):
-    """Simulated time, steps, remeshes, contact and the time that is left. Mutants: a bar that counts rows, lines."""
+    """Simulated time, steps, remeshes, contact and the time that is left."""
     last = terminal(tmp_path, 120)[-1]
     assert re.search(r"base 100%\|.*\| 0\.6 of 0\.6 h \[\d\d:\d\d < \d\d:\d\d, step \d+, remeshes \d, contact\]", last)
 
@@ -133,7 +131,7 @@ def test_the_exit_statuses_are_told(capsys):
 
 
 def test_signals_are_noted_and_everything_is_as_before():
-    """Handlers, mask and threads. Mutants: a handler left behind, a thread that takes the signals of later."""
+    """Handlers, mask and threads."""
     before = signal.getsignal(signal.SIGTERM), signal.pthread_sigmask(signal.SIG_BLOCK, ()), threading.active_count()
     with noted() as came:
         assert came() == 0
@@ -148,7 +146,7 @@ def test_signals_are_noted_and_everything_is_as_before():
 
 
 def test_ignored_signals_stay_ignored():
-    """As under nohup. Mutant: a signal that the shell has turned off stops the run."""
+    """As under nohup."""
     kept = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         with noted() as came:
@@ -161,8 +159,7 @@ def test_ignored_signals_stay_ignored():
 
 @pytest.mark.thorough
 def test_a_second_signal_stops_at_once(tmp_path):
-    """Though a step lasts for minutes. Mutants: a second signal that waits for the step, a handler that only runs when
-    compiled code returns."""
+    """Though a step lasts for minutes."""
     process = started("base", "--set", "numerics.refinement=8", "--out", tmp_path / "run")
     wait_for((tmp_path / "run" / "run.json").exists, process)
     time.sleep(1.0)
@@ -178,7 +175,7 @@ def test_a_second_signal_stops_at_once(tmp_path):
 
 @pytest.mark.parametrize("options", [["--json"], []])
 def test_nobody_listens(tmp_path, options):
-    """What reads the output goes away: the run goes on to its end. Mutant: a run that dies of a broken pipe."""
+    """What reads the output goes away: the run goes on to its end."""
     process = started("base", "--set", 'numerics.preset="fast"', "--out", tmp_path / "run", *options)
     process.stdout.close()
     message = process.stderr.read()
@@ -188,7 +185,7 @@ def test_nobody_listens(tmp_path, options):
 
 
 def test_nobody_reads_what_is_said_aside(tmp_path):
-    """As under `2>&1 | head -0`. Mutant: a run that dies of the second line."""
+    """As under `2>&1 | head -0`."""
     process = started("base", "--set", 'numerics.preset="fast"', "--out", tmp_path / "run")
     process.stderr.close()
     assert process.wait(60) == 0 and "completed" in process.stdout.read()

@@ -28,13 +28,11 @@ def told():
 
 
 def test_the_note_tells_what_was_computed(told):
-    """Mutants: a number edited by hand, a record whose numbers were not told."""
     template = replication.TEMPLATE.read_text(encoding="utf-8")
     assert replication.filled(template, told) == replication.NOTE.read_text(encoding="utf-8")
 
 
 def test_a_number_of_the_record_is_a_number_of_the_note(told):
-    """Mutant: numbers written into the template."""
     changed = copy.deepcopy(told)
     check = next(c for claim in changed["claims"] for c in claim["checks"] if c["paper"] == "2.9")
     check["value"] = 2.9 * 1.0987
@@ -44,7 +42,7 @@ def test_a_number_of_the_record_is_a_number_of_the_note(told):
 
 
 def test_the_template_has_no_number_that_a_run_computes():
-    """Decimals outside of references, of the paper's own scenes and of identifiers. Mutant: a result typed in."""
+    """Decimals outside of references, of the paper's own scenes and of identifiers."""
     body = replication.TEMPLATE.read_text(encoding="utf-8").partition("## References")[0]
     plain = re.sub(r"\{\{.*?\}\}|`[^`]*`|\(https?://\S+\)|\[doi:.*?\]", "", body, flags=re.S)
     assert set(re.findall(r"\d+\.\d+", plain)) == {"2.9", "19.2", "19.4"}
@@ -53,13 +51,12 @@ def test_the_template_has_no_number_that_a_run_computes():
 @pytest.mark.parametrize("field", ["{{C99 | contradicted}}", "{{C01 | contradicted}}", "{{C01 | no such | .2f}}",
                                    "{{no.such}}"])
 def test_what_there_is_not_is_refused(told, field):
-    """Mutant: an empty word for what is missing, a verdict that the text asserts and the record does not."""
     with pytest.raises(LookupError):
         replication.filled(field, told)
 
 
 def test_every_claim_has_its_verdict_in_the_note(told):
-    """Each once, in the list of its verdict. Mutant: a verdict that no list takes."""
+    """Each once, in the list of its verdict."""
     kinds = ("reproduced", "rounding", "changed", "contradicted", "undecided")
     lists = [f"{{{{list.{kind}}}}}" for kind in kinds]
     named = [re.findall(r"^- \*\*(C\d\d)\*\*", replication.filled(one, told), re.M) for one in lists]
@@ -69,13 +66,11 @@ def test_every_claim_has_its_verdict_in_the_note(told):
 
 
 def test_every_contradiction_says_why(told):
-    """Mutant: a contradicted claim without a reason."""
     assert all(claim["reason"] for claim in told["claims"]
                if claim["verdict"] in (replication.CONTRADICTED, replication.UNDECIDED))
 
 
 def test_what_needs_no_solution_is_not_counted_as_a_value_reproduced(told):
-    """Mutant: every printed value counted, the meshed length of Figure 4 among them."""
     printed, predicted = replication._printed(told["claims"]), replication._predicted(told["claims"])
     assert len(predicted) < len(printed)
     assert {check["rests_on"] for _, check in predicted} == {"a solution"}
@@ -84,7 +79,7 @@ def test_what_needs_no_solution_is_not_counted_as_a_value_reproduced(told):
 
 
 def test_readme_and_documents_count_no_claims_otherwise(told):
-    """A count of verdicts anywhere is the record's. Mutant: a count that was not updated."""
+    """A count of verdicts anywhere is the record's."""
     for name in ("README.md", "paper_figures/replication.md", "docs/scope.md", "codecheck.author.yml"):
         counts = re.findall(r"\b(\d+) (?:claims )?(?:are )?(reproduced|contradicted|undecided)\b", text(name))
         for count, kind in counts:
@@ -98,7 +93,6 @@ def test_every_erratum_is_in_the_note(told):
 
 
 def test_lines_are_wrapped_and_nothing_else(told):
-    """Mutants: a table wrapped, a word lost."""
     words = "one two " * 40
     found = replication.filled(f"{words}\n\n| {words}|\n", told)
     paragraph, table = found.split("\n\n")
@@ -107,7 +101,6 @@ def test_lines_are_wrapped_and_nothing_else(told):
 
 
 def test_version_licence_and_name_agree():
-    """Mutant: a version raised in one place."""
     citation, licence = text("CITATION.cff"), text("LICENSE")
     assert f"version: {PROJECT['version']}\n" in citation and f"license: {PROJECT['license']}\n" in citation
     assert licence.startswith("BSD 3-Clause License") and PROJECT["license"] == "BSD-3-Clause"
@@ -115,7 +108,6 @@ def test_version_licence_and_name_agree():
 
 
 def test_the_codecheck_lists_what_make_figures_makes():
-    """Mutant: a figure added, and not to be checked."""
     content = text("codecheck.author.yml")
     listed = re.findall(r"^  - file: (\S+)$", content, re.M)
     made = [f"paper_figures/out/{name}.pdf" for name in paper_figures.FIGURES] + ["paper_figures/out/manifest.json"]
@@ -125,7 +117,6 @@ def test_the_codecheck_lists_what_make_figures_makes():
 
 
 def test_what_contributing_names_is_there():
-    """Mutant: a target or a file renamed."""
     content = text("CONTRIBUTING.md")
     targets = set(re.findall(r"(?:`|^    )make ([a-z-]+)", content, re.M))
     assert {"lint", "test", "verify", "mutants", "check-manifest"} <= targets
@@ -137,15 +128,13 @@ def test_what_contributing_names_is_there():
 
 
 def test_the_pythons_that_are_named_are_those_that_are_allowed():
-    """Mutant: a classifier below what is required."""
     named = [label.rpartition(" ")[2] for label in PROJECT["classifiers"] if re.search(r":: 3\.\d+$", label)]
     assert named == ["3.11", "3.12", "3.13"] and PROJECT["requires-python"] == ">=3.11"
 
 
 @pytest.mark.thorough
 def test_wheel_and_source_distribution_hold_what_they_should(tmp_path):
-    """The wheel the solver alone with its scenes; the source distribution the checkout. Mutants: scenes forgotten,
-    `reference` as a package of everybody's, a source distribution that cannot be tested."""
+    """The wheel the solver alone with its scenes; the source distribution the checkout."""
     copied = tmp_path / "checkout"
     told = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     listed = told.split("\n")

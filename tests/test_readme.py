@@ -15,13 +15,12 @@ def of(language: str) -> list[str]:
 
 
 def test_every_block_is_of_a_kind_that_is_executed():
-    """Mutant: a block that no test looks at."""
     assert {block.language for block in BLOCKS} <= {"", "console", "sh", "python", "toml"}
     assert all(is_repro(words) or is_target(words) for block in BLOCKS for words in block.commands)
 
 
 def test_the_commands_run(tmp_path, capsys, monkeypatch):
-    """In the order of the page, in one folder. Mutants: an option that is gone; a scene that is refused."""
+    """In the order of the page, in one folder."""
     monkeypatch.chdir(tmp_path)
     commands = [words for block in BLOCKS for words in block.commands if is_repro(words)]
     assert {"run", "scene", "check"} <= {words[1] for words in commands}
@@ -41,8 +40,7 @@ def test_the_python_examples_run(tmp_path, capsys, monkeypatch):
 
 
 def test_the_page_is_short_and_the_others_show_nothing_that_is_not_executed():
-    """Two commands, a picture and a pore of one's own come first. Mutants: tables of measurements; a block that no test
-    runs."""
+    """Two commands, a picture and a pore of one's own come first."""
     text = PAGE.read_text(encoding="utf-8")
     assert len(text.encode()) < 12_000 and text.index("overview.png") < text.index("make env") < 2_500
     others = [page for page in sorted((ROOT / "docs").glob("*.md")) if page.name != "tutorial.md"]
@@ -50,7 +48,6 @@ def test_the_page_is_short_and_the_others_show_nothing_that_is_not_executed():
 
 
 def test_the_scene_example_is_base():
-    """Mutant: an example that drifts from the packaged scene or names a key that is gone."""
     (text,) = of("toml")
     assert parse_scene(tomllib.loads(text), "base", "README.md") == load_scene("base")
 

@@ -29,7 +29,6 @@ def test_the_cells_have_the_area_of_the_half_ellipse(cells):
 
 
 def test_without_biomass_the_supply_is_everywhere():
-    """Mutant: an outlet that passes nothing, FiPy's own."""
     found = Averaged(pore(density=0.0), *half_ellipse(20.0, 20.0, 20), 40, keeps_shape=True).seed()
     assert np.abs(found.fields - [[10.0], [8.0]]).max() < 1e-11
 
@@ -49,7 +48,6 @@ def test_what_is_taken_up_does_not_leave():
 
 
 def test_a_slab_from_wall_to_wall_is_the_strip_in_plug_flow_to_second_order():
-    """Mutant: D for D_B, a source at the wrong end, fluxes per height."""
     errors = []
     for cells in (10, 20, 40, 80):
         section = Section(pore(), 0.0, np.full(cells, 40.0 / cells), np.full(cells, 50.0), 7 * cells)
@@ -61,7 +59,7 @@ def test_a_slab_from_wall_to_wall_is_the_strip_in_plug_flow_to_second_order():
 
 @pytest.mark.parametrize("keeps_shape", [True, False])
 def test_where_nothing_is_scarce_growth_is_the_closed_form(keeps_shape):
-    """Both kinds of growth stretch alike. Mutant: theta for its root, X_I left out, the mean over cells unweighted."""
+    """Both kinds of growth stretch alike."""
     quick = pore(density=1e-3)
     found = Averaged(quick, *half_ellipse(20.0, 5.0, 10), 20, keeps_shape).run((1.0, 3.0), accuracy=1e-5)
     for moment in found:
@@ -79,7 +77,7 @@ def test_a_starved_strip_grows_towards_its_food_and_a_half_disc_does_not_lean():
 
 
 def test_the_speed_is_what_head_and_loss_make_it():
-    """Under a head the velocity falls as the aggregate grows. Mutant: the loss of the seed kept."""
+    """Under a head the velocity falls as the aggregate grows."""
     seed = Averaged(pore(speed=lambda loss, reach: 3e5 / loss), *half_ellipse(20.0, 20.0, 20), 20, keeps_shape=True)
     first, last = seed.seed(), seed.run((2.0,), accuracy=1e-3)[0]
     assert last.velocity < 0.95 * first.velocity < 0.95 * SPEED
@@ -87,7 +85,7 @@ def test_the_speed_is_what_head_and_loss_make_it():
 
 def test_the_constriction_is_that_of_greens_function_in_closed_form():
     """The sum over n is -ln((1 - 2 e^-c cos(a + b) + e^-2c)(1 - 2 e^-c cos(a - b) + e^-2c)) / (4 pi): by random pairs.
-    Mutant: a mode's wrong weight, the section's mean left in."""
+    """
     random, radius, width = np.random.default_rng(1), 20.0, 50.0
     away, angle = radius * np.sqrt(random.uniform(size=(2, 400_000))), np.pi * random.uniform(size=(2, 400_000))
     (x, far), (a, b) = away * np.cos(angle), np.pi / width * away * np.sin(angle)

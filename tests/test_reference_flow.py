@@ -32,7 +32,6 @@ def assert_stokes(velocity, pressure, viscosity, x, y, force=0.0):
 
 
 def test_poiseuille_flow_solves_its_equation_and_dissipates_what_its_loss_delivers():
-    """Mutant: a mean of 2/3, a loss of 8 nu u L / W^2."""
     y = np.linspace(0.0, 7.0, 2001)
     u = poiseuille.velocity(y, 7.0)
     assert u[[0, -1]] == pytest.approx([0, 0], abs=1e-14) and np.trapezoid(u, y) == pytest.approx(7.0, rel=1e-6)
@@ -45,7 +44,6 @@ def test_poiseuille_flow_solves_its_equation_and_dissipates_what_its_loss_delive
 
 @pytest.mark.parametrize("ratio", [1.0, 10.0, 2000.0, 1e8])
 def test_layers_carry_one_stress_and_a_mean_velocity_of_one(ratio):
-    """Mutant: the stress not continuous, the gradient of the clean channel."""
     y, h = np.linspace(0.0, 50.0, 5001), 0.01
     u, G = layered_channel.velocity(y, 50.0, 12.5, ratio), layered_channel.gradient(50.0, 12.5, ratio)
     assert np.trapezoid(u, y) / 50 == pytest.approx(1.0, rel=1e-6)
@@ -76,7 +74,6 @@ def inclusion(ratio, interface):
 @pytest.mark.parametrize("interface", FORMS)
 @pytest.mark.parametrize("ratio", [0.1, 10.0, 2000.0])
 def test_the_inclusion_solves_stokes_and_its_velocity_and_stress_are_continuous(interface, ratio):
-    """Mutant: lambda + 1 for lambda + 3, a sign in psi, the pressure halved."""
     out, within = inclusion(ratio, interface)
     angle, r = np.random.default_rng(1).uniform([0, 1], [6.28, 3], (40, 2)).T
     assert_stokes(*out, 1.0, r * RADIUS * np.cos(angle), r * RADIUS * np.sin(angle))
@@ -110,7 +107,7 @@ def test_the_inclusion_strains_the_far_fluid_alone_and_is_nothing_if_as_thin(int
 @pytest.mark.parametrize("interface", FORMS)
 @pytest.mark.parametrize("ratio", [10.0, 2000.0])
 def test_the_manufactured_force_is_what_the_strong_form_lacks(interface, ratio):
-    """By differences, on both sides. Mutant: the force of water in the biomass, no gradient of the pressure."""
+    """By differences, on both sides."""
     velocity, pressure, force = manufactured_flow.evaluated(ratio, interface)
     t, c, s = np.linspace(-0.4, 0.4, 9), np.cos(manufactured_flow.ANGLE), np.sin(manufactured_flow.ANGLE)
     for across, viscosity in ((-0.2, 1.0), (0.3, ratio)):
@@ -121,7 +118,7 @@ def test_the_manufactured_force_is_what_the_strong_form_lacks(interface, ratio):
 @pytest.mark.parametrize("interface", FORMS)
 @pytest.mark.parametrize("ratio", [10.0, 2000.0])
 def test_of_manufactured_flow_nothing_but_the_gradient_jumps(interface, ratio):
-    """Velocity, pressure and what the form makes continuous do not. Mutant: -2 nu C = T in both forms."""
+    """Velocity, pressure and what the form makes continuous do not."""
     fluid, biomass = manufactured_flow.phases(ratio, interface)
     c, s = np.cos(manufactured_flow.ANGLE), np.sin(manufactured_flow.ANGLE)
     normal = sympy.Matrix([c, s])
@@ -141,10 +138,7 @@ def half_disc(radius, level, ratio, interface="laplacian", corner=4):
 @pytest.mark.parametrize("radius", [5.0, 25.0, 46.0])
 @pytest.mark.parametrize("interface", FORMS)
 def test_taylor_hood_without_a_jump_is_poiseuille_flow_on_any_of_its_meshes(radius, interface):
-    """But for the curved triangles, on which a quadratic function of y is none. Weights add up to the area.
-
-    Mutant: a mesh that overlaps itself; weights of the corners.
-    """
+    """But for the curved triangles, on which a quadratic function of y is none. Weights add up to the area."""
     found = half_disc(radius, 1, 1.0, interface)
     assert found.areas.sum() == pytest.approx(7500, rel=1e-12)
     assert sum(part.areas.sum() for part in found.pressures) == pytest.approx(7500, rel=1e-12)
@@ -159,7 +153,7 @@ def test_taylor_hood_without_a_jump_is_poiseuille_flow_on_any_of_its_meshes(radi
 @pytest.mark.parametrize("radius", [25.0, 42.0, 46.0])
 def test_taylor_hood_converges_fast_around_thick_aggregates_too(radius):
     """Losses of three levels, lambda = 2000: their differences fall by 5 or more, to 1e-4. A mesh whose film is made
-    without its nodes gave a tenth of the loss at 46 um. Mutant: rings that are cut off below the upper wall."""
+    without its nodes gave a tenth of the loss at 46 um."""
     losses = np.array([half_disc(radius, level, 2000.0).loss for level in (0, 1, 2)])
     first, second = np.abs(np.diff(losses)) / losses[-1]
     assert second < first / 5 and second < 2e-4
@@ -169,7 +163,7 @@ def test_taylor_hood_converges_fast_around_thick_aggregates_too(radius):
 def test_the_three_phase_corner_is_as_singular_as_theory_says(interface):
     """The pressure in biomass held by the wall and free on the side of the water, an angle of 90 degrees: in the
     traction form like r^(z - 1) with cos(z pi / 2) = z (Williams 1952 for an incompressible solid); in the Laplacian
-    form, whose components are harmonic but for the pressure, z = 1: bounded. Mutant: nu for 2 nu of the strain."""
+    form, whose components are harmonic but for the pressure, z = 1: bounded."""
     z = brentq(lambda z: np.cos(z * np.pi / 2) - z, 0.1, 0.9) if interface == "traction" else 1.0
     part = next(part for part in half_disc(25.0, 0, 2000.0, interface, corner=16).pressures if part.biomass)
     distance = np.hypot(part.points[:, 0] + 25, part.points[:, 1])

@@ -26,7 +26,7 @@ def spread(values):
 
 def test_the_cylinder_is_in_equilibrium_and_free_on_its_rim():
     """d sigma_rr / dr = (sigma_tt - sigma_rr) / r, and sigma_rr = 0 where R = R_0, by differences of the closed form's
-    own numbers. Mutant: the integral by dr with R's bounds, P with sigma_tt."""
+    own numbers."""
     R = np.linspace(1.0, 20.0, 400)
     r, P = neo_hookean.cylinder_radius(R, *LAW), neo_hookean.cylinder_pressure(R, *LAW)
     theta, hoop = LAW[0] + LAW[1] * (R / LAW[2]) ** 2, r / R
@@ -45,7 +45,7 @@ def test_the_cylinders_quadrature_is_done():
 
 @pytest.mark.parametrize("theta", [0.5, 2.0, 2000.0])
 def test_free_and_confined_growth_have_no_stress_on_their_free_sides(theta):
-    """From the stress itself. Mutant: theta^(-2/3), the trace without F33 = 1."""
+    """From the stress itself."""
     free = neo_hookean.cauchy(np.sqrt(theta) * np.eye(2), neo_hookean.free_growth_pressure(theta))
     confined = neo_hookean.cauchy(np.diag([1.0, theta]), neo_hookean.confined_growth_pressure(theta))
     assert free[:2, :2] == pytest.approx(np.zeros((2, 2)), abs=1e-13)
@@ -106,7 +106,7 @@ def state(rings, law):
 
 
 def test_the_quadratic_tangent_is_the_derivative_of_its_forces():
-    """Central differences of step 1e-5, in a random direction. Mutant: 2/3 for 5/3, c(G) forgotten, kappa once."""
+    """Central differences of step 1e-5, in a random direction."""
     basis, _, after = state(2, LAW)
     move = np.random.default_rng(5).standard_normal(basis.N)
     plus, minus = (asm(quadratic_growth._force, basis, **after(step * move)) for step in (1e-5, -1e-5))
@@ -155,7 +155,7 @@ def test_the_quadratic_cylinder_approaches_its_closed_form():
 
 
 def test_the_arc_in_contact_lies_on_its_wall_and_the_area_is_that_of_theta():
-    """The places of the contact's nodes are the wall's to the last bit. Mutant: the wall's ends left out."""
+    """The places of the contact's nodes are the wall's to the last bit."""
     contact = Contact(np.pi / 4, 3 * np.pi / 4, 25.0)
     mesh = quadratic_growth.half_disc(20.0, 4)
     found = quadratic_growth.grow(mesh, lambda x, y: 3.0 + 0 * x, 3.0, contact=contact)

@@ -20,7 +20,6 @@ def test_products_of_linear_functions_are_integrated_exactly():
 
 
 def test_the_dense_projection_keeps_linear_fields_and_every_integral():
-    """Mutant: a piece left out, the values of another triangle."""
     random = np.random.default_rng(1)
     rough, plane = random.uniform(0, 1, 4), 1 + SQUARE @ [2.0, -3.0]
     found = galerkin_transfer.project(SQUARE, RISING, np.column_stack([rough, plane]), SQUARE, FALLING)
@@ -31,7 +30,7 @@ def test_the_dense_projection_keeps_linear_fields_and_every_integral():
 
 @pytest.mark.parametrize("gamma", [0.1, 1.0, 10.0])
 def test_sliding_waves_solve_35_and_slide_along_walls_and_end(gamma):
-    """By differences; mutant: 1 + gamma for 1 + 2 gamma."""
+    """By differences."""
     def d(s, y):
         return sliding_waves.displacement(s, y, 20.0, gamma, 20.0)
 
@@ -52,8 +51,6 @@ def test_sliding_waves_solve_35_and_slide_along_walls_and_end(gamma):
 @pytest.mark.parametrize("gamma", [0.1, 1.0, 10.0])
 def test_the_corner_exponent_makes_the_displacement_vanish_on_the_held_side(gamma):
     """kappa s^z - z s conj(s)^(z-1) = B conj(s)^z with a real B; gamma without end: the Laplace operator's pi / (2 w).
-
-    Mutant: the other sign, the modes that are odd along the wall.
     """
     w = np.radians(120)
     z, s = quadratic_mesh_motion.exponent(w, gamma), np.exp(1j * w)
@@ -65,7 +62,7 @@ def test_the_corner_exponent_makes_the_displacement_vanish_on_the_held_side(gamm
 @pytest.mark.parametrize("contact", [np.pi / 2, np.pi / 3])
 def test_the_quadratic_elements_cover_the_fluid_and_converge(contact):
     """Around a half-disc and a segment: area of the fluid; the displacement's square to third order, as quadratic
-    elements do. Mutant: grid not drawn to the corner, middles of edges on the chord."""
+    elements do."""
     def measure(parts):
         found = quadratic_mesh_motion.follow(25.0, contact, 50.0, 50.0, parts, 1.0, lambda x, y: np.array([x, y]))
         return found.weights.sum(), np.sum(found.weights @ found.displacement**2)
@@ -77,7 +74,7 @@ def test_the_quadratic_elements_cover_the_fluid_and_converge(contact):
 
 
 def test_the_quadratic_elements_leave_the_ends_and_walls_on_their_lines():
-    """And the arc moves as it is told. Mutant: components exchanged."""
+    """And the arc moves as it is told."""
     found = quadratic_mesh_motion.follow(25.0, np.pi / 2, 50.0, 50.0, 6, 1.0, lambda x, y: np.array([x, 2 * y]))
     assert found.on_line[0] == pytest.approx(found.line[0] * [1, 2])
     assert found.line[-1] == pytest.approx([50.0, 50.0]) and np.abs(found.on_line[-1]).max() == 0.0

@@ -20,7 +20,7 @@ def derivative(function, x, step=1e-4):
 
 
 def test_uptake_is_dual_monod_and_its_slopes_are_its_derivative():
-    """(7)-(8) written out. Mutant: F on the donor, decay times m_D."""
+    """(7)-(8) written out."""
     q_a, q_d = uptake(3.0, 6.0, RATES)
     assert q_a == pytest.approx(0.75 * (0.4 * 1.5 * 0.75 + 0.006)) and q_d == pytest.approx(0.4 * 0.75 * 0.75)
     fields, load, change = np.array([3.0, 0.5, 6.0, 0.1]), np.array([2.0, 5.0]), 1e-5 * np.array([1.0, -2.0, 3.0, 1.0])
@@ -29,15 +29,14 @@ def test_uptake_is_dual_monod_and_its_slopes_are_its_derivative():
 
 
 def test_below_zero_the_uptake_stays_monotone():
-    """Nothing is given back that could feed the other substrate. Mutant: C / (C + K) below zero."""
+    """Nothing is given back that could feed the other substrate."""
     acceptor = np.linspace(-5.0, 5.0, 101)
     q_a, q_d = uptake(acceptor, 3.0, RATES)
     assert (np.diff(q_a) > 0).all() and (np.diff(q_d) >= 0).all() and (q_d[:50] == 0).all()
 
 
 def test_the_robin_channel_obeys_its_equation_and_its_conditions():
-    """Strip, (26) upstream, flux u C_s at any inlet, flat downstream. Mutant: r and q exchanged, (26) decaying the
-    wrong way."""
+    """Strip, (26) upstream, flux u C_s at any inlet, flat downstream."""
     def c(x):
         return robin_channel.strip(x, 1e5, SUPPLY, WATER, BIOMASS, 2e4, HALF)
     inside, upstream = np.linspace(1.0, 39.0, 20), np.array([-300.0, -30.0, -1.0])
@@ -50,8 +49,7 @@ def test_the_robin_channel_obeys_its_equation_and_its_conditions():
 
 @pytest.mark.parametrize("film", [0.0, 20.0])
 def test_first_order_slab(film):
-    """Equation, held ends, flux through the film, and what is taken up as the integral of kappa C. Mutant: Biot's
-    number upside down."""
+    """Equation, held ends, flux through the film, and what is taken up as the integral of kappa C."""
     kappa = 4 * BIOMASS / HALF**2
     def c(x):
         return slab.first_order(x, SUPPLY, kappa, HALF, BIOMASS, film, WATER)[0]
@@ -76,7 +74,7 @@ def test_first_order_without_films_is_thieles():
 
 @pytest.mark.parametrize("film", [0.0, 20.0])
 def test_zero_order_slab(film):
-    """sqrt(2 D C / s) without films; a parabola that is zero from its depth on. Mutant: 2 dropped."""
+    """sqrt(2 D C / s) without films; a parabola that is zero from its depth on."""
     sink_ = 3e5
     depth = slab.penetration(SUPPLY, sink_, BIOMASS, film, WATER)
     def c(x):
@@ -93,7 +91,6 @@ def test_zero_order_slab(film):
 @pytest.mark.parametrize("film", [0.0, 20.0])
 @pytest.mark.parametrize("half_saturation", [0.1, 0.01])
 def test_the_monod_slab_obeys_its_equation(half_saturation, film):
-    """Mutant: the logarithm's sign, the supply in place of the surface's C."""
     sink_ = 6e5
     found, depth = slab.monod(0.0, SUPPLY, sink_, half_saturation, HALF, BIOMASS, film, WATER)
     def c(x):
@@ -118,7 +115,7 @@ def test_the_monod_slab_has_both_limits():
 
 
 def test_collocation_keeps_the_flux_of_both_substrates():
-    """u C_s enters, and what does not leave is taken up. Mutant: the uptake of one substrate for both."""
+    """u C_s enters, and what does not leave is taken up."""
     found = channel_bvp.solution(*GIVEN)
     x = np.linspace(0.0, 40.0, 8001)
     taken = np.trapezoid(3e4 * np.stack(uptake(*found(x), RATES)), x)
@@ -150,7 +147,6 @@ def test_fipy_and_collocation_differ_by_second_order():
 
 
 def test_fipys_transients_end_at_rest_and_backward_euler_is_of_first_order():
-    """Mutant: storage by another volume, one step less."""
     channel = channel_fipy.Channel(24, (-40.0, 80.0), *GIVEN)
     assert channel.transient([0.1])[-1] == pytest.approx(channel.steady(), rel=1e-6)
     times = (1e-4, 3e-4)
@@ -161,7 +157,7 @@ def test_fipys_transients_end_at_rest_and_backward_euler_is_of_first_order():
 
 def test_backward_euler_is_fipys_transient_term():
     """A supply of 10 mg/L enters water of 4 mg/L, without biomass, which FiPy's own TransientTerm solves in one sweep a
-    step. Mutant: the old state weighed by another step."""
+    step."""
     channel = channel_fipy.Channel(24, (-40.0, 80.0), 1e5, (10.0, 10.0), (1e7, 1e7), (8e6, 8e6), 0.0, RATES, 40.0)
     channel.supply = np.array([4.0, 4.0])
     mesh = Grid1D(nx=24, dx=5.0) + (-40.0,)
@@ -176,8 +172,7 @@ def test_backward_euler_is_fipys_transient_term():
 
 
 def test_pypde_matrix_is_its_laplacian_and_its_solution_the_slab():
-    """A slab from wall to wall that follows the cells: one-dimensional, first order, of second order in the cell.
-    Mutant: neighbours exchanged in the matrix."""
+    """A slab from wall to wall that follows the cells: one-dimensional, first order, of second order in the cell."""
     rates, errors = {"k": 0.0, "F": 1.0, "decay": 1.0, "K_A": 1e9, "K_D": 1.0}, []
     kappa = 4e6 * (2.0 / 8.0) ** 2
     for cells in (8, 16, 32):
@@ -190,7 +185,7 @@ def test_pypde_matrix_is_its_laplacian_and_its_solution_the_slab():
 
 
 def test_pypde_conserves_around_a_half_disc():
-    """What is taken up comes in through both ends. Mutant: no flux through a wall left out."""
+    """What is taken up comes in through both ends."""
     box = diffusion_reaction_pypde.Box(16, 16.0, 16.0, diffusion_reaction_pypde.half_disc(8.0))
     found = box.steady((8e6, 4e6), (10.0, 8.0), 1e6, RATES)
     assert box.part.sum() == pytest.approx(np.pi * 8.0**2 / 2, rel=2e-3)
@@ -211,7 +206,6 @@ def chosen():
 
 
 def test_the_chosen_fields_go_on_through_the_interface_with_their_flux(chosen):
-    """Mutant: D_B / D upside down."""
     angle = np.linspace(0.1, 3.0, 9)
     x, y = 20 * np.cos(angle), 20 * np.sin(angle)
     for k in (0, 1):
@@ -235,7 +229,7 @@ def test_the_chosen_velocity_is_free_of_divergence_and_keeps_to_the_walls():
 
 @pytest.mark.parametrize("side, sample", [("fluid", (30.0, 25.0)), ("biomass", (-6.0, 9.0))])
 def test_the_forcing_is_the_strong_form(chosen, side, sample):
-    """By differences, with the uptake of reference.monod. Mutant: a sign of the strong form, X constant."""
+    """By differences, with the uptake of reference.monod."""
     u, v = (float(manufactured_transport.function(part)(*sample))
             for part in manufactured_transport.velocity(50.0, 1e5))
     active = 3e5 * (1 + sample[0] / 60) if side == "biomass" else 0.0

@@ -38,7 +38,7 @@ def body_points(body):
 
 
 def test_the_defaults_are_table_1():
-    """Each from the units of Table 1. Mutant: days for hours, cm for um."""
+    """Each from the units of Table 1."""
     assert PORE.viscosity * 3600 == pytest.approx(0.01003e-4 / 9.81 * 1e6)  # nu / g is 1.02e-7 m s
     assert [24 * D / 1e8 for D in PORE.diffusivity] == pytest.approx([2.32, 1.01])
     assert [24 * D / 1e8 for D in PORE.in_biomass] == pytest.approx([1.85, 0.81])
@@ -47,7 +47,6 @@ def test_the_defaults_are_table_1():
 
 @pytest.mark.parametrize("radius", [5.0, 30.0])
 def test_triangles_fill_the_channel_and_none_is_folded(radius):
-    """Mutants: a box that does not meet the walls, nodes of the outline beside it."""
     section = half_disc(3, radius)
     assert section.whole.dx.sum() == pytest.approx(WIDTH * (2 * radius + 150), rel=1e-12)
     assert section.body.dx.sum() == pytest.approx(np.pi / 2 * radius**2, rel=1e-5)
@@ -56,7 +55,7 @@ def test_triangles_fill_the_channel_and_none_is_folded(radius):
 
 
 def test_uniform_growth_is_free_of_stress():
-    """Places grow by sqrt(theta), P is the closed form's. Mutants: tr C without F33, J^(-2/3) in both terms."""
+    """Places grow by sqrt(theta), P is the closed form's."""
     body = Body(grid(2), 5.0, ORDER)
     found, pressure = body.grown(np.full(body.dx.shape, 9.0), 2.9 * body.start, np.zeros(body.lower.N))
     start, nodes = body_points(body)
@@ -65,7 +64,7 @@ def test_uniform_growth_is_free_of_stress():
 
 
 def test_the_growing_cylinder_is_met():
-    """theta = 12 + 24 (R / 5)^2: places at third order, P at second. Mutants: a turned c, kappa left out of p."""
+    """theta = 12 + 24 (R / 5)^2: places at third order, P at second."""
     law, errors = (12.0, 24.0, 5.0), []
     for rings in (2, 4):
         body = Body(grid(rings), 5.0, ORDER)
@@ -81,19 +80,19 @@ def test_the_growing_cylinder_is_met():
 
 
 def test_one_viscosity_makes_poiseuille_flow():
-    """12 L / W^2, to what parabolas in curved triangles miss, at third order. Mutant: a parabola of mean 5/6."""
+    """12 L / W^2, to what parabolas in curved triangles miss, at third order."""
     errors = [half_disc(rings).flow(1.0).loss / (12 * 210 / WIDTH**2) - 1 for rings in (3, 6)]
     assert abs(errors[1]) < 1e-4 and abs(errors[0] / errors[1]) > 8
 
 
 def test_the_loss_around_a_half_disc_is_that_of_other_meshes():
-    """Both are within 3e-4 of 3.92504, what 24 rings find. Mutants: half of lambda, the symmetric form."""
+    """Both are within 3e-4 of 3.92504, what 24 rings find."""
     other = taylor_hood.stokes(taylor_hood.half_disc(WIDTH, (-105.0, 105.0), 30.0, 1), PORE.ratio).loss
     assert half_disc(6).flow(PORE.ratio).loss == pytest.approx(other, rel=3e-4)
 
 
 def test_what_is_supplied_is_carried_out_or_taken_up():
-    """The defect over the supply falls at third order or more. Mutants: u_y left out, u_ave at the inlet."""
+    """The defect over the supply falls at third order or more."""
     defects = []
     for rings in (2, 4):
         section = half_disc(rings)
@@ -104,7 +103,7 @@ def test_what_is_supplied_is_carried_out_or_taken_up():
 
 
 def test_fast_diffusion_mixes_the_pore():
-    """u W (C_s - c) = X_m A q(c), from two diffusivities by Richardson. Mutants: 1 % more uptake, 1 % less supplied."""
+    """u W (C_s - c) = X_m A q(c), from two diffusivities by Richardson."""
     section, found = half_disc(2), []
     for D in (2e8, 4e8):
         flow, fields, _ = steady(section, replace(PORE, diffusivity=(D, D), in_biomass=(D, D)), SPEED)
@@ -116,7 +115,7 @@ def test_fast_diffusion_mixes_the_pore():
 
 
 def test_biomass_that_takes_up_nothing_grows_exponentially():
-    """M_A = exp(r t), M_I = s (M_A - 1) / r at C = C_supply. Mutants: decay twice, all that decays is inert."""
+    """M_A = exp(r t), M_I = s (M_A - 1) / r at C = C_supply."""
     run, m = Run(replace(PORE, density=1e-9), 2), 10 / 11
     found = run.numbers(next(run.moments((8.0,), 1)))
     rate, rest = m * (PORE.k * 0.61 * m - PORE.b), m * PORE.b * 0.2
@@ -126,7 +125,7 @@ def test_biomass_that_takes_up_nothing_grows_exponentially():
 
 
 def test_a_step_in_time_is_of_fourth_order():
-    """A step and two halves differ as the fifth power. Mutants: a stage from another one's rate, the last flow's C."""
+    """A step and two halves differ as the fifth power."""
     run = Run(PORE, 2)
     one, half = run.step(run.seed, 4.0), run.step(run.seed, 2.0)
     two, four = run.step(half, 2.0), run.step(run.step(run.seed, 1.0), 1.0)
@@ -135,7 +134,7 @@ def test_a_step_in_time_is_of_fourth_order():
 
 
 def test_three_runs_are_extrapolated(monkeypatch):
-    """Errors 54 / rings^3 and 32 / steps^4 are found. Mutants: a correction's sign, errors of the coarse run."""
+    """Errors 54 / rings^3 and 32 / steps^4 are found."""
     monkeypatch.setattr(whole_run, "numbers", lambda pore, rings, steps, _: 7.0 + 54 / rings**3 + 32 / steps**4)
     found = whole_run.converged(PORE, (), rings=(2, 3), steps=(1, 2))
     assert [found.values, found.space, found.time] == pytest.approx([7.0, -2.0, -2.0])

@@ -52,8 +52,7 @@ def square(body, field):
 @share(0.1)
 @given(remesh_chains(finest=0.5, longest=2), seeds)
 def test_the_projection_is_the_one_integrated_piece_by_piece(chain, seed):
-    """Against shapely's pieces and a dense mass matrix. Mutant: one quadrature point a piece, the lumped mass matrix,
-    pieces of five corners and more cut short, old and new weights exchanged."""
+    """Against shapely's pieces and a dense mass matrix."""
     field = rough(chain[0][0], seed)
     found = projected(chain[0], field, chain[1])
     assert found[:, 0] == pytest.approx(oracles.projected(chain[0], field[:, 0], chain[1]), abs=1e-9)
@@ -62,8 +61,7 @@ def test_the_projection_is_the_one_integrated_piece_by_piece(chain, seed):
 @share(0.4)
 @given(remesh_chains(), seeds)
 def test_a_chain_of_projections_conserves_mass(chain, seed):
-    """To 1e-11, from every mesh to the next (measured: 2e-15). Mutant: interpolation, the middle of a piece
-    counted as its corner, pieces under 0.01 um2 left out."""
+    """To 1e-11, from every mesh to the next (measured: 2e-15)."""
     fields = along(chain, rough(chain[0][0], seed), projected)
     masses = [oracles.mass(*body, field[:, 0]) for body, field in zip(chain, fields)]
     assert masses == pytest.approx([masses[0]] * len(chain), rel=1e-11)
@@ -72,8 +70,7 @@ def test_a_chain_of_projections_conserves_mass(chain, seed):
 @share(0.4)
 @given(remesh_chains())
 def test_a_chain_keeps_constant_and_linear_fields(chain):
-    """To round-off, with either transfer. Mutant: the nearest node's value, the lumped mass matrix, weights of a
-    neighbouring triangle."""
+    """To round-off, with either transfer."""
     for transfer in (projected, interpolated):
         for body, field in zip(chain, along(chain, smooth(chain[0][0]), transfer)):
             exact = smooth(body[0])
@@ -83,8 +80,7 @@ def test_a_chain_keeps_constant_and_linear_fields(chain):
 @share(0.4)
 @given(remesh_chains(), seeds)
 def test_interpolation_stays_within_bounds_and_the_projection_in_energy(chain, seed):
-    """What each promises: no nodal value beyond those of the last mesh; no larger integral of the square. Mutant:
-    weights that add up to more than one, a projection that overshoots by 2 %."""
+    """What each promises: no nodal value beyond those of the last mesh; no larger integral of the square."""
     start = rough(chain[0][0], seed)
     for last, field in pairwise(along(chain, start, interpolated)):
         assert last.min() <= field.min() and field.max() <= last.max()
@@ -95,7 +91,7 @@ def test_interpolation_stays_within_bounds_and_the_projection_in_energy(chain, s
 @share(0.4)
 @given(remesh_chains(longest=2), seeds)
 def test_what_is_carried_to_its_own_mesh_stays(chain, seed):
-    """And so does what has been carried once. Mutant: the lumped mass matrix, a shifted weight, any smoothing."""
+    """And so does what has been carried once."""
     start = rough(chain[0][0], seed)
     for transfer in (projected, interpolated):
         assert transfer(chain[0], start, chain[0]) == pytest.approx(start, abs=1e-11)
@@ -106,8 +102,7 @@ def test_what_is_carried_to_its_own_mesh_stays(chain, seed):
 @share(0.4)
 @given(remesh_chains(longest=3), seeds, angles, st.floats(-1e3, 1e3), st.floats(-1e3, 1e3))
 def test_a_chain_does_not_see_how_it_is_turned_and_where_it_lies(chain, seed, angle, x, y):
-    """Nor how its nodes are numbered. Mutant: an absolute tolerance in um, x and y unlike in the clipping, a node's
-    number taken for its triangle's."""
+    """Nor how its nodes are numbered."""
     start = rough(chain[0][0], seed)
     turned = [(points @ rotation(angle).T + [x, y], triangles) for points, triangles in chain]
     shuffled, old = zip(*(numbered(body, np.random.default_rng(seed + k)) for k, body in enumerate(chain)))
@@ -132,8 +127,7 @@ def numbered(body, rng):
 def test_a_pore_that_is_meshed_again_and_again_keeps_its_biomass(made, seed, refinements):
     """The pore's own remesh, X_A uneven and X_I even: totals to 1e-11 by the conserving transfer, bounds by the
     paper's, X_I even by both; with order 2 and 3, whose masses are X_m all together again, totals of both, and no share
-    below zero; the outline's area, and substrates between nothing and the supply. Mutant: the transfers exchanged, X_I
-    in X_A's place, biomass on nodes of the fluid."""
+    below zero; the outline's area, and substrates between nothing and the supply."""
     now = pore.seeded(made)
     solved = pore.solve(made, now)
     uneven = np.random.default_rng(seed).uniform(0.5, 1.5, now.active.shape)

@@ -21,7 +21,6 @@ from tests.pages import CHARTS, FAST, HOSTILE, LEDGERS, Page, first, hostile, nu
 
 
 def test_every_run_has_a_page_that_needs_nothing_else(fast, paper, flow_only):
-    """Mutants: an image or style sheet from elsewhere, an unclosed tag, a style that the policy stops."""
     for out in (fast, paper, flow_only):
         text = text_of(out)
         found = Page(text)
@@ -35,8 +34,7 @@ def test_every_run_has_a_page_that_needs_nothing_else(fast, paper, flow_only):
 
 
 def test_charts_of_a_whole_run_are_its_columns(fast):
-    """Every line of the page's own data, by its label, to the six digits that a pointer is told. Mutants: a chart that
-    is forgotten, a line of another column."""
+    """Every line of the page's own data, by its label, to the six digits that a pointer is told."""
     text = text_of(fast)
     titles = re.findall("<figcaption>(.*?)<", text)
     assert titles == [kind.title for kind in quantities.KINDS]
@@ -60,7 +58,7 @@ def test_charts_of_a_whole_run_are_its_columns(fast):
 
 
 def test_numbers_are_those_of_the_first_and_the_last_row(fast, paper):
-    """As the page's table has them. Mutants: the second row, the row before the last, a value beside another's name."""
+    """As the page's table has them."""
     for out in (fast, paper):
         panel = first("<h2>Numbers</h2>(.*?)</table>", text_of(out))
         rows = [re.findall("<td.*?>(.*?)</td>", row) for row in re.findall("<tr>(.*?)</tr>", panel)][1:]
@@ -80,7 +78,6 @@ def test_numbers_are_those_of_the_first_and_the_last_row(fast, paper):
 
 
 def test_what_is_not_modelled_is_left_out(flow_only, fast):
-    """Mutants: empty charts, fields of zeros, a slider for one time."""
     text, packed = text_of(flow_only), stored(flow_only)
     assert "Not modelled: substrates, kinetics, growth." in text and "acceptor" not in text.split("<script>")[0]
     assert [field["name"] for field in packed["fields"]] == ["velocity_m_per_d", "head_cm", "region"]
@@ -88,10 +85,15 @@ def test_what_is_not_modelled_is_left_out(flow_only, fast):
     assert "Not modelled" not in text_of(fast) and '<div class="time">' in text_of(fast)
 
 
+def test_each_frame_is_drawn_on_its_own_mesh(fast, paper):
+    """Of a run with two meshes: triangles of six nodes, and then of three."""
+    packed = fields.packed([*fields.index(fast)[:1], *fields.index(paper)[:1]])
+    assert [packed["meshes"][frame["mesh"]]["per"] for frame in packed["frames"]] == [6, 3]
+
+
 @pytest.mark.parametrize("name", ["fast", "paper"])
 def test_fields_of_the_page_are_those_of_the_files(request, name):
-    """Each array to half a step of its 65534, with the mesh's own nodes. Mutants: the wrong frame's mesh, values of all
-    nodes where those of the aggregate are told, a range over all times."""
+    """Each array to half a step of its 65534, with the mesh's own nodes."""
     out = request.getfixturevalue(name)
     packed, entries = stored(out), fields.index(out)
     assert packed["of"] == len(entries) == len(packed["frames"])
@@ -123,7 +125,7 @@ def test_a_value_that_is_not_finite_has_none(tmp_path):
 
 
 def test_many_frames_are_thinned_and_the_page_says_so(paper, tmp_path, monkeypatch):
-    """The first and the last are always shown. Mutants: the last dropped, a count that is not told."""
+    """The first and the last are always shown."""
     monkeypatch.setattr(fields, "MOST_FRAMES", 3)
     copy = shutil.copytree(paper, tmp_path / "run")
     report.write(copy)
@@ -135,7 +137,6 @@ def test_many_frames_are_thinned_and_the_page_says_so(paper, tmp_path, monkeypat
 
 
 def test_fields_are_read_from_the_runs_own_files_alone(paper, tmp_path):
-    """Mutant: any file that the index names is opened."""
     copy = shutil.copytree(paper, tmp_path / "run")
     (tmp_path / "fields").mkdir()
     shutil.copy(copy / "fields/fields_0000.vtu", tmp_path / "fields/fields_0000.vtu")
@@ -145,7 +146,7 @@ def test_fields_are_read_from_the_runs_own_files_alone(paper, tmp_path):
 
 
 def test_nothing_told_by_others_is_markup(fast, tmp_path):
-    """Names, status, keys, values, columns and folders. Mutants: any one of them put in as it is."""
+    """Names, status, keys, values, columns and folders."""
     copy = hostile(shutil.copytree(fast, tmp_path / "<b onclick=pwned=1>"))
     report.write(copy)
     report.compare([copy, fast], tmp_path / "both.html")
@@ -169,19 +170,16 @@ def test_data_cannot_end_its_block():
 
 
 def test_the_same_run_makes_the_same_page(fast):
-    """Mutants: a date in the page, an order that hangs on hashes."""
     before = text_of(fast)
     report.write(fast)
     assert text_of(fast) == before
 
 
 def test_storage_is_drawn_where_there_is_some(paper):
-    """Mutant: four lines of zeros."""
     assert "acceptor_stored_ug_per_m_per_h" not in quantities.series(read(paper))
 
 
 def test_contact_is_marked(tmp_path):
-    """Mutant: the last time of contact instead of the first."""
     out = run(tmp_path, "wide", FAST, 'pore.width="20 um"', 'aggregate.radius="17.9 um"', 'growth.end="1 h"')
     series = results.read_table(out / "timeseries.csv")
     touching = series["time_h"][series["contact"] == 1][0]
@@ -190,7 +188,6 @@ def test_contact_is_marked(tmp_path):
 
 
 def test_a_run_that_stops_has_its_page(tmp_path, monkeypatch, capsys):
-    """Mutants: a page only at a good end; the status left out."""
     from repro.errors import SimulationError
     from repro.run import running
 
@@ -211,7 +208,7 @@ oxygen_demand_balance nodes remeshed contact region theta J active_biomass inert
 
 
 def test_every_name_has_its_unit_or_is_a_pure_number(fast, paper):
-    """Names of columns, ledgers and arrays. Mutant: an array whose name says nothing of its unit."""
+    """Names of columns, ledgers and arrays."""
     arrays = [meshio.vtu.read(fields.index(out)[-1][1]) for out in (fast, paper)]
     told = {name for grid in arrays for name in (*grid.point_data, *grid.cell_data)}
     assert told | {*results.COLUMNS, *results.LEDGER_COLUMNS} == names.KNOWN.keys()
@@ -222,7 +219,6 @@ def test_every_name_has_its_unit_or_is_a_pure_number(fast, paper):
 
 
 def test_the_table_in_docs_is_that_of_the_definitions():
-    """Mutant: a column added, and the table not made again."""
     docs = Path(__file__).parents[1] / "docs"
     made = runpy.run_path(str(docs / "quantities.py"))["text"]()
     assert (docs / "quantities.md").read_text(encoding="utf-8") == made
@@ -247,7 +243,7 @@ def test_broken_fields_are_an_error_and_no_page(paper, tmp_path, content):
 
 
 def test_the_state_before_an_expansion_is_shown_ahead_of_that_after_it(tmp_path):
-    """Both at the same time, and the page says which is which. Mutants: the file of another time; one counted twice."""
+    """Both at the same time, and the page says which is which."""
     folder = run(tmp_path, "base", "growth.end=0.6 h", 'output.times=["0 h", "0.4 h", "0.6 h"]')
     packed = stored(folder)
     told = [(frame["time"], frame.get("note")) for frame in packed["frames"]]
@@ -258,8 +254,7 @@ def test_the_state_before_an_expansion_is_shown_ahead_of_that_after_it(tmp_path)
 
 
 def test_warnings_come_first_and_then_what_is_assumed(tmp_path):
-    """On the first screen, ahead of fields and charts. Mutants: warnings at the end; an assumption of physics that is
-    not there."""
+    """On the first screen, ahead of fields and charts."""
     text = text_of(run(tmp_path / "one", "base", "growth.end=0.2 h", "kinetics.yield_coefficient=0.5"))
     places = [text.index(words) for words in ("kinetics.acceptor_to_donor_ratio</b>", "Assumed: ", "Fields and mesh")]
     assert places == sorted(places) and "traction on the aggregate neglected" in text and "quasi-steady" in text
@@ -277,8 +272,7 @@ def with_middles(points, cells):
 
 @pytest.mark.parametrize("kind, corners", [("triangle", 3), ("triangle6", 6)])
 def test_a_page_of_a_fine_mesh_is_small_and_true(tmp_path, monkeypatch, kind, corners):
-    """1e5 nodes in several times take 3 MB at most; values on the grid are those of the mesh. Mutants: the mesh itself;
-    values of another place."""
+    """1e5 nodes in several times take 3 MB at most; values on the grid are those of the mesh."""
     monkeypatch.setattr(fields, "MOST_NODES", 101_000 if corners == 3 else 26_000)
     points, cells = fields._regular(np.zeros(2), np.array([100.0, 50.0]))
     monkeypatch.undo()

@@ -81,8 +81,7 @@ def in_parts(scene, folder, count):
 
 @pytest.mark.parametrize("name", [*SCENES, *(pytest.param(name, marks=pytest.mark.thorough) for name in MORE)])
 def test_a_run_stopped_after_every_step_is_the_whole_run(tmp_path, name):
-    """Tables, fields, indices, status and counts, and no warning. Mutants: a state after its substrates are solved, the
-    length of the next step or the ledgers of unreported steps forgotten, arrays of another layout, dtype or order."""
+    """Tables, fields, indices, status and counts, and no warning."""
     scene = load_scene("base", {**SCENES, **MORE}[name])
     run(scene, tmp_path / "whole")
     resumes = in_parts(scene, tmp_path / "parts", 1)
@@ -93,7 +92,7 @@ def test_a_run_stopped_after_every_step_is_the_whole_run(tmp_path, name):
 
 
 def test_simulate_goes_on_from_any_state():
-    """The same instants as those of the whole run after it. Mutant: the instant of the state given once more."""
+    """The same instants as those of the whole run after it."""
     scene = load_scene("base", SCENES["fast"])
     whole = list(steps(scene))
     for k in (0, 2, len(whole) - 1):
@@ -104,8 +103,7 @@ def test_simulate_goes_on_from_any_state():
 
 @pytest.mark.parametrize("elements", ["linear", "quadratic", "cubic"])
 def test_states_have_no_strided_arrays(elements):
-    """Sums over strided views may differ in the last bit from those over what a checkpoint gives back. Mutant:
-    laid_out(pore) = pore."""
+    """Sums over strided views may differ in the last bit from those over what a checkpoint gives back."""
     sets = (f"numerics.elements={elements}", "numerics.refinement=0.4", *CONTACT)
     for state, _ in steps(load_scene("base", sets)):
         for data in (state.pore, state.pore.mesh, state.pore.body, state.pore.concentrations):
@@ -114,7 +112,7 @@ def test_states_have_no_strided_arrays(elements):
 
 
 def test_strided_arrays_are_copied():
-    """Of the pore, its mesh and its body at t = 0; what has none is left as it is. Mutant: one not looked at."""
+    """Of the pore, its mesh and its body at t = 0; what has none is left as it is."""
     scene = load_scene("base", ('growth.end="0 h"',))
     ((_, instant),) = steps(scene)
     now = instant.pore
@@ -132,7 +130,7 @@ def test_strided_arrays_are_copied():
 
 
 def test_the_end_of_the_pore_is_an_end_after_a_resume_too(tmp_path):
-    """A run stopped just when it was over does not grow on. Mutant: the end looked at after steps alone."""
+    """A run stopped just when it was over does not grow on."""
     scene = load_scene("wide", ('numerics.preset="fast"', 'aggregate.radius="40 um"', 'pore.length="100 um"',
                                 'growth.end="9 h"'))
     with pytest.raises(PoreEnd):
@@ -147,7 +145,7 @@ def test_the_end_of_the_pore_is_an_end_after_a_resume_too(tmp_path):
 
 
 def test_a_run_that_is_over_is_left_alone(tmp_path, capsys):
-    """Exit 0, says so, changes nothing. Mutant: run again."""
+    """Exit 0, says so, changes nothing."""
     assert main(["run", "flow_only", "--out", str(tmp_path / "run")]) == 0
     before = {path: path.stat().st_mtime_ns for path in (tmp_path / "run").rglob("*.*")}
     assert main(["run", "--resume", str(tmp_path / "run")]) == 0
@@ -160,7 +158,7 @@ def test_a_run_that_is_over_is_left_alone(tmp_path, capsys):
                                      '{"scene": "x", "hash": "0", "tables": {}, "status": "sunning"}',
                                      '{"scene": "x", "hash": "0", "tables": {"pore": 3}, "status": "running"}'])
 def test_a_folder_without_a_run_is_refused(tmp_path, capsys, content):
-    """With status 2 and one line, and nothing is written. Mutants: a traceback, a run from nothing."""
+    """With status 2 and one line, and nothing is written."""
     if content is not None:
         (tmp_path / "run.json").write_text(content)
     assert main(["run", "--resume", str(tmp_path)]) == 2
@@ -170,7 +168,7 @@ def test_a_folder_without_a_run_is_refused(tmp_path, capsys, content):
 
 @pytest.mark.parametrize("status", ["sunning", "", "Completed", "completed ", "failed", "runningly", "interrupted?"])
 def test_a_status_that_no_run_writes_is_none(tmp_path, capsys, status):
-    """Neither finished nor to be gone on with. Mutant: whatever is not known counts as an end."""
+    """Neither finished nor to be gone on with."""
     run(load_scene("flow_only"), tmp_path / "run")
     record = told(tmp_path / "run")
     results.write_json(tmp_path / "run" / "run.json", record | {"status": status})
@@ -189,8 +187,7 @@ def stopped(folder, *sets, after=3):
 
 
 def test_an_altered_checkpoint_is_refused_and_the_one_before_is_used(tmp_path, capsys):
-    """And the result is the same. Mutants: the newest taken as it is, a start from nothing, the good one overwritten by
-    the bad one when the next is written."""
+    """And the result is the same."""
     scene = stopped(tmp_path / "run")
     newest = tmp_path / "run" / NEWEST
     good = newest.read_bytes()
@@ -204,7 +201,6 @@ def test_an_altered_checkpoint_is_refused_and_the_one_before_is_used(tmp_path, c
 
 
 def test_without_a_good_checkpoint_a_run_starts_again_and_says_so(tmp_path, capsys):
-    """Mutant: a resume that gives up, or is silent."""
     scene = stopped(tmp_path / "run")
     for name in (NEWEST, PREVIOUS):
         path = tmp_path / "run" / name
@@ -217,7 +213,6 @@ def test_without_a_good_checkpoint_a_run_starts_again_and_says_so(tmp_path, caps
 
 
 def test_a_checkpoint_without_its_fields_is_refused(tmp_path):
-    """Mutant: an index of fields that are not there."""
     stopped(tmp_path / "run")
     (tmp_path / "run" / "fields" / "fields_0001.vtu").unlink()
     with pytest.warns(UserWarning) as warned:
@@ -226,7 +221,6 @@ def test_a_checkpoint_without_its_fields_is_refused(tmp_path):
 
 
 def test_a_change_of_versions_is_told_and_recorded(tmp_path, monkeypatch):
-    """Mutant: a promise of equal bits that nobody can keep."""
     stopped(tmp_path / "run")
     known = results.version
     monkeypatch.setattr(results, "version", lambda name: "0.0" if name == "scipy" else known(name))
@@ -247,8 +241,7 @@ def test_the_machine_is_recorded_and_threads_are_no_change(tmp_path, monkeypatch
 
 
 def test_a_failure_says_where_the_last_good_state_is(tmp_path, monkeypatch):
-    """Time, stage, why, what to change, and a state from which the run goes on when the cause is gone. Mutants: no
-    checkpoint at a failure, the state of the step that fails."""
+    """Time, stage, why, what to change, and a state from which the run goes on when the cause is gone."""
     scene, most = load_scene("base", ('growth.end="0.8 h"',)), growth.MOST_ITERATIONS
 
     def fail_late(event):
@@ -269,7 +262,7 @@ def test_a_failure_says_where_the_last_good_state_is(tmp_path, monkeypatch):
 
 
 def test_results_reach_the_disk_while_a_run_goes_on(tmp_path):
-    """Tables and run.json at every checkpoint. Mutants: tables at the end alone, a status that is not of the moment."""
+    """Tables and run.json at every checkpoint."""
     seen = []
 
     def look(event):
@@ -284,8 +277,7 @@ def test_results_reach_the_disk_while_a_run_goes_on(tmp_path):
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.thorough)])
 def test_signals_end_a_run_that_goes_on_later(tmp_path, number):
-    """Status 128 + number, one line, results so far; then to the end with the bits of the whole run. Mutants: Mmg's
-    handlers, a signal that is lost, one that cuts a step."""
+    """Status 128 + number, one line, results so far; then to the end with the bits of the whole run."""
     process = started("base", "--set", 'growth.end="1.6 h"', "--out", tmp_path / "run")
     wait_for((tmp_path / "run" / "fields" / "fields_0002.vtu").exists, process)
     process.send_signal(number)
@@ -309,7 +301,7 @@ def whole(tmp_path_factory):
 @pytest.mark.thorough
 def test_killed_at_twenty_moments(tmp_path, whole):
     """SIGKILL at seeded random moments of a run with checkpoints every 0.2 s, from its start to its end, then resumed:
-    the bits of the whole run, each time. Mutants: a checkpoint that is not whole, rows of after it kept."""
+    the bits of the whole run, each time."""
     seconds, draw, gone_on = told(whole)["wall_time_s"], random.Random(5), 0
     for k in range(20):
         out = tmp_path / str(k)
@@ -334,7 +326,7 @@ def written(path):
 
 
 def test_a_run_killed_at_its_very_end_is_tidied(tmp_path):
-    """Its status told, its page and its checkpoints not seen to. Mutant: a completed run that is left as it is."""
+    """Its status told, its page and its checkpoints not seen to."""
     run(load_scene("flow_only"), tmp_path)
     page = (tmp_path / "report.html").read_bytes()
     (tmp_path / "report.html").unlink()
@@ -345,7 +337,7 @@ def test_a_run_killed_at_its_very_end_is_tidied(tmp_path):
 
 @pytest.mark.thorough
 def test_killed_again_and_again(tmp_path, whole):
-    """Each time a little further, until it is done. Mutant: counts that are lost or doubled at the second resume."""
+    """Each time a little further, until it is done."""
     out, draw, status, last = tmp_path / "run", random.Random(7), None, 0
     arguments = [*LONG, "--out", out]
     for _ in range(40):
@@ -366,7 +358,7 @@ def test_killed_again_and_again(tmp_path, whole):
 @pytest.mark.thorough
 @pytest.mark.parametrize("scene", [SHORT, LONG])
 def test_one_thread_or_two(tmp_path, scene):
-    """The same bits. Mutant: a sum whose order depends on the threads."""
+    """The same bits."""
     for threads in ("1", "2"):
         assert shell(*scene, "--out", tmp_path / threads, threads=threads)[0] == 0
     assert files(tmp_path / "1") == files(tmp_path / "2")

@@ -37,7 +37,7 @@ def refused(folder, capsys, *arguments):
 
 
 def test_a_run_that_is_done_is_left_alone(tmp_path, capsys):
-    """The same command again: exit 0, says so, nothing is computed or written. Mutant: run again."""
+    """The same command again: exit 0, says so, nothing is computed or written."""
     arguments = ["run", "base", *SETS, "--out", str(tmp_path / "run")]
     assert main(arguments) == 0
     before = state(tmp_path / "run")
@@ -47,7 +47,7 @@ def test_a_run_that_is_done_is_left_alone(tmp_path, capsys):
 
 
 def test_a_run_that_was_interrupted_is_gone_on_with(tmp_path, capsys):
-    """From its state, to the bits of the whole run. Mutants: begun anew; refused."""
+    """From its state, to the bits of the whole run."""
     interrupted(tmp_path / "run")
     assert main(["run", "base", *SETS, "--out", str(tmp_path / "run")]) == 0
     assert "goes on from t = " in capsys.readouterr().err
@@ -64,7 +64,7 @@ def test_a_run_that_had_no_state_yet_begins_again(tmp_path, capsys):
 
 
 def test_another_scene_is_refused_with_what_differs(tmp_path, capsys):
-    """By key, with both values. Mutants: written over; a run of another scene gone on with."""
+    """By key, with both values."""
     interrupted(tmp_path / "run")
     message = refused(tmp_path / "run", capsys, "base", "--set", FAST[0], "--set", "growth.end=4 h")
     assert "growth.end (3.0 h there, now 4.0 h)" in message and "--force" in message
@@ -74,7 +74,7 @@ def test_another_scene_is_refused_with_what_differs(tmp_path, capsys):
 
 @pytest.mark.parametrize("key", ["source", "versions.scipy"])
 def test_other_versions_are_refused_with_what_differs(tmp_path, capsys, monkeypatch, key):
-    """Of a run that is over, and of one that is not. Mutant: rows of two versions in one table."""
+    """Of a run that is over, and of one that is not."""
     run(load_scene("base", FAST), tmp_path / "done")
     interrupted(tmp_path / "run")
     if key == "source":
@@ -87,8 +87,7 @@ def test_other_versions_are_refused_with_what_differs(tmp_path, capsys, monkeypa
 
 
 def test_a_forced_run_removes_what_is_listed_and_nothing_else(tmp_path):
-    """Files that others have put beside the run's, and what a link leads to, stay. Mutants: the folder emptied; a
-    removal by pattern; a list that leads out of the folder."""
+    """Files that others have put beside the run's, and what a link leads to, stay."""
     out = tmp_path / "run"
     run(load_scene("base", ('numerics.preset="fast"', 'growth.end="6 h"')), out)
     (tmp_path / "victim").write_text("years of work")
@@ -109,7 +108,7 @@ def test_a_forced_run_removes_what_is_listed_and_nothing_else(tmp_path):
 
 
 def test_a_forced_run_computes_again(tmp_path):
-    """What is done, too. Mutant: nothing to do."""
+    """What is done, too."""
     run(load_scene("base", FAST), tmp_path)
     before = (tmp_path / "timeseries.csv").stat().st_mtime_ns
     assert main(["run", "base", *SETS, "--out", str(tmp_path), "--force", "--quiet"]) == 0
@@ -125,7 +124,6 @@ def test_a_forced_run_is_refused_where_others_have_files_of_its_names(tmp_path, 
 
 @pytest.mark.parametrize("content", [None, "{}", '{"scene": "x", "files": ["thesis.tex"]}'])
 def test_a_forced_run_takes_no_folder_without_a_run(tmp_path, capsys, content):
-    """Mutant: --force for whatever there is."""
     (tmp_path / "thesis.tex").write_text("years of work")
     if content:
         (tmp_path / "run.json").write_text(content)
@@ -133,7 +131,7 @@ def test_a_forced_run_takes_no_folder_without_a_run(tmp_path, capsys, content):
 
 
 def test_a_scene_file_that_was_changed_is_told_on_resume(tmp_path, capsys):
-    """With what differs; the run goes on with its own. Mutants: silence; the new scene taken for the old one."""
+    """With what differs; the run goes on with its own."""
     scene = tmp_path / "mine.toml"
     scene.write_text('[pore]\nwidth = "50 um"\n[flow]\nhead = "1e-3 cm"\n')
     assert main(["run", str(scene), "--set", "pore.length=500 um", "--out", str(tmp_path / "run")]) == 0

@@ -234,7 +234,6 @@ def test_set_needs_a_key_and_a_value(override):
 
 
 def test_unset_leaves_keys_and_sections_out():
-    """Mutants: --set read first; a section that stays, empty; only the last of several."""
     base = load_scene("base")
     driven = load_scene("base", ["flow.mean_velocity=1 m/day"], ["flow.head"])
     assert (driven.flow.head, driven.flow.mean_velocity) == (None, pytest.approx(1e6 / 24))

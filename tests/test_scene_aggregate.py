@@ -36,14 +36,12 @@ def toml(points):
 
 @pytest.mark.parametrize("name", packaged_scenes())
 def test_hashes_stand(name):
-    """Mutant: keys that came later are hashed at their defaults."""
     assert scene_hash(load_scene(name)) == HASHES[name]
     assert scene_hash(load_scene(name, ["aggregate.position=0 um", "aggregate.smooth=false"])) == HASHES[name]
     assert scene_hash(load_scene(name, ["aggregate.position=1 um"])) != HASHES[name]
 
 
 def test_a_seed_is_5_um_unless_it_has_an_outline():
-    """Mutants: a radius beside an outline; none without."""
     assert Aggregate() == Aggregate(radius=5.0, position=0.0, outline=None, smooth=False, inert_fraction=0.0)
     seed = outlined(BUMP)
     assert (seed.radius, seed.position, seed.smooth) == (None, 0.0, False)
@@ -61,7 +59,6 @@ def test_position_is_of_either_sign(value, position):
 
 @pytest.mark.parametrize("value", [0.0, 0.3, 0.999999])
 def test_inert_fraction(value):
-    """Mutants: a share that is not hashed, or that only counts where it is not zero."""
     scene = load_scene("base", [f"aggregate.inert_fraction={value}"])
     assert scene.aggregate == Aggregate(inert_fraction=value)
     assert parse_scene(scene_tables(scene), "base", "again") == scene
@@ -69,7 +66,6 @@ def test_inert_fraction(value):
 
 
 def test_inert_fraction_needs_biomass_that_is_modelled():
-    """Mutant: a share that nothing reads is accepted."""
     said = "aggregate.inert_fraction = 0.3: 0 is needed without [substrates]"
     assert said in refusal("flow_only", "aggregate.inert_fraction=0.3")
     assert load_scene("flow_only", ["aggregate.inert_fraction=0.3", "substrates={}"]).aggregate.inert_fraction == 0.3
@@ -78,7 +74,7 @@ def test_inert_fraction_needs_biomass_that_is_modelled():
 @pytest.mark.parametrize("points", [BUMP, PLUG, [["10 um", "0 um"], ["9 um", "1 um"], ["11 um", "0 um"]],
                                     [["-2 um", "0 um"], ["-9 um", "9 um"], ["9 um", "9 um"], ["2 um", "0 um"]]])
 def test_an_outline_is_read_back_from_what_it_writes(points, tmp_path):
-    """From a file, from --set and from its tables: the same scene and hash. Mutants: points sorted, or rounded."""
+    """From a file, from --set and from its tables: the same scene and hash."""
     scene = load_scene(written(tmp_path, toml(points)))
     there = [load_scene("initial_mesh", [f"aggregate={{outline={json.dumps(points)}}}", 'numerics.preset="fast"']),
              parse_scene(scene_tables(scene), "mine", "again"),
@@ -94,7 +90,7 @@ def test_an_outline_is_read_back_from_what_it_writes(points, tmp_path):
 @given(st.lists(st.tuples(st.floats(1.1, 49.9), st.integers(4, 58)), min_size=1, max_size=9,
                 unique_by=lambda point: point[1]), st.floats(-100, 100))
 def test_whatever_is_seen_from_the_wall_is_an_outline(drawn, middle):
-    """Points about a place on the wall, in the order of their angles. Mutant: bounds for a half-disc alone."""
+    """Points about a place on the wall, in the order of their angles."""
     points = [[f"{middle - 60!r} um", "0.0 um"]]
     for size, step in sorted(drawn, key=lambda point: -point[1]):
         points.append([f"{middle + size * math.cos(step / 20)!r} um", f"{size * math.sin(step / 20)!r} um"])
@@ -138,7 +134,7 @@ LIST = "a list of 3 to 1000 points [x, y], each a pair of lengths, is needed, su
     ([BUMP[0], ["-4 um", "50 um"], ["0 um", "9 um"], ["4 um", "50 um"], BUMP[3]], "two points or more in a row"),
 ])
 def test_no_outline(tmp_path, points, said):
-    """In one line that names file, key, value and what is accepted. Mutants: any of the rules left out."""
+    """In one line that names file, key, value and what is accepted."""
     path = written(tmp_path, toml(points))
     message = refusal(path)
     assert message.startswith(f"{path}: aggregate.outline = {json.dumps(points)[:30]}") and said in message
@@ -167,7 +163,6 @@ def test_refused(overrides, said):
 
 
 def test_shapely_is_imported_for_an_outline_alone(tmp_path):
-    """Mutant: the package imported for every scene."""
     path = written(tmp_path, toml(BUMP))
     for source, imported in (("flow_only", False), (str(path), True)):
         script = f"import sys, repro.scene as s; s.load_scene({source!r}); sys.exit('shapely' in sys.modules)"
@@ -176,7 +171,6 @@ def test_shapely_is_imported_for_an_outline_alone(tmp_path):
 
 @pytest.mark.parametrize("points", [BUMP, PLUG])
 def test_repro_scene_writes_an_outline(tmp_path, points):
-    """Mutant: the half-disc's radius active beside the outline."""
     text = scene_text(str(written(tmp_path, toml(points))))
     assert f"\noutline = {json.dumps(points)}\n" in text and '\n#radius = "5 um"\n' in text
     assert "\n#smooth = false\n" in text and '\n#position = "0 um"\n' in text

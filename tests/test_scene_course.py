@@ -32,7 +32,6 @@ def refusal(*entries, unset=()):
 
 
 def test_a_table_is_read_in_units_and_written_back():
-    """Mutants: times in minutes, the interpolation forgotten where a scene is read back."""
     table = [["0 min", "10 mg/L"], ["300 min", "0.02 g/L"]]
     made = load_scene("base", [f"{DONOR}={json.dumps(table)}", "substrates.donor.interpolation=linear"])
     assert made.substrates.donor.supply == Course((0.0, 5.0), (10.0, 20.0), True)
@@ -42,7 +41,7 @@ def test_a_table_is_read_in_units_and_written_back():
 
 
 def test_the_hash_tells_tables_and_their_interpolation_apart():
-    """And is that of before where there is none. Mutants: a default that counts; a key left out of it."""
+    """And is that of before where there is none."""
     table = f"{DONOR}={json.dumps(STARVED)}"
     hashes = [scene_hash(load_scene("base", changes)) for changes in (
         [], [table], [table, "substrates.donor.interpolation=linear"], [f'{DONOR}=[["0 h", "10 mg/L"]]'])]
@@ -61,13 +60,11 @@ def test_the_hash_tells_tables_and_their_interpolation_apart():
     ('["0 h", "1 mg/L"]', "entry 1 of a table must be a time and a value"),
     ("3", 'or a table such as [["0 h", "10 mg/L"], ["5 h", "10 mg/L"]] (did you mean "3 mg/L"?)')])
 def test_what_is_no_table_is_refused_in_one_line(table, told):
-    """Mutants: an empty table taken, times in any order, a value of any unit."""
     message = refusal(f"{DONOR}={table}")
     assert message.startswith(f"base: {DONOR} = ") and told in message and "\n" not in message
 
 
 def test_what_no_run_can_do_is_refused():
-    """Mutants: no value but the first looked at; linear without a table silently taken."""
     still = refusal('flow.mean_velocity=[["0 h", "1 m/day"], ["2 h", "0 m/day"]]', unset=["flow.head"])
     assert "flow.mean_velocity = [[" in still and "greater than zero is needed" in still
     assert "greater than zero" in refusal('flow.head=[["0 h", "1 cm"], ["2 h", "0 cm"]]')
@@ -80,8 +77,7 @@ def test_what_no_run_can_do_is_refused():
 @given(st.lists(st.floats(0.01, 10.0), min_size=1, max_size=5), st.lists(st.floats(0.0, 9.0), min_size=6, max_size=6),
        st.floats(0.0, 60.0))
 def test_a_table_between_its_times(gaps, values, time):
-    """Against numpy's interpolation, and the last value at or before a time. Mutants: the value before a jump at the
-    jump; beyond the last time the last slope."""
+    """Against numpy's interpolation, and the last value at or before a time."""
     times = (0.0, *np.cumsum(gaps).tolist())
     values = tuple(values[: len(times)])
     assert Course(times, values, True).at(time) == pytest.approx(np.interp(time, times, values), rel=1e-9, abs=1e-12)
@@ -91,7 +87,6 @@ def test_a_table_between_its_times(gaps, values, time):
 
 
 def test_a_scene_at_a_time_is_one_with_numbers():
-    """Mutants: one of the tables left; the first of its corners after a time is that time."""
     made = load_scene("base", [*SHORT, RISING, "flow.interpolation=linear"])
     there = made.at(0.2)
     assert (there.substrates.donor.supply, there.flow.head) == (10.0, pytest.approx(20.0))
@@ -105,7 +100,7 @@ def test_a_scene_at_a_time_is_one_with_numbers():
                                                                        'numerics.transport="gear"')])
 def test_steps_end_at_jumps_and_rows_there_show_what_holds_from_then_on(changes):
     """The effluent of the donor is zero from 0.3 h on and 20 mg/L or less from 0.5 h on; without donor nothing grows,
-    and the biomass between is that of decay. Mutants: the value before the jump; a step over it."""
+    and the biomass between is that of decay."""
     times = 'output.times=["0.29 h", "0.3 h", "0.4 h", "0.5 h", "0.8 h"]'
     made = load_scene("base", [*SHORT, times, *changes])
     found = list(simulate(made))
@@ -122,7 +117,7 @@ def test_steps_end_at_jumps_and_rows_there_show_what_holds_from_then_on(changes)
 
 def test_an_even_change_is_of_second_order():
     """Biomass of base with a supply that falls evenly to a tenth, in steps of 12 to 1.5 min of the paper's: the mean
-    of the supply counts. Mutant: the supply of the step's start."""
+    of the supply counts."""
     table = [["0 h", "10 mg/L"], ["0.8 h", "1 mg/L"]]
     made = load_scene("base", [f"{DONOR}={json.dumps(table)}", "substrates.donor.interpolation=linear",
                                'growth.end="0.8 h"', 'output.times=["0.8 h"]'])
@@ -135,7 +130,7 @@ def test_an_even_change_is_of_second_order():
 
 
 def test_a_drive_over_time_scales_the_flow():
-    """At t = 0 and later in one geometry the velocity goes as the head. Mutant: the first head at all times."""
+    """At t = 0 and later in one geometry the velocity goes as the head."""
     made = scene(head=[["0 h", "1e-3 cm"], ["2 h", "3e-3 cm"]], growth={"end": "3 h"})
     now = pore.seeded(made)
     first, later = (pore.solve(made, replace(now, time=time)).flow.mean_velocity for time in (1.9, 2.0))
@@ -143,7 +138,7 @@ def test_a_drive_over_time_scales_the_flow():
 
 
 def test_what_is_judged_is_the_extreme():
-    """Numbers and growth of the largest supply and the fastest flow. Mutants: those of t = 0; one table alone."""
+    """Numbers and growth of the largest supply and the fastest flow."""
     made = load_scene("base", [*SHORT, RISING])
     plain = load_scene("base", [*SHORT[:2], 'flow.head="3e-3 cm"', f"{DONOR}=20 mg/L"])
     now = pore.seeded(made)
@@ -155,7 +150,7 @@ def test_what_is_judged_is_the_extreme():
 
 
 def test_a_run_over_jumps_is_the_same_from_any_state():
-    """To the last bit. Mutant: the value before a jump after a resume."""
+    """To the last bit."""
     made = load_scene("base", SHORT)
     whole = list(steps(made))
     for state, _ in whole[1:-1]:
@@ -163,8 +158,7 @@ def test_a_run_over_jumps_is_the_same_from_any_state():
 
 
 def test_commands_take_tables(tmp_path):
-    """What a run expects of the machine, a sweep's processes, a longer run and pages. Mutants: memory expected of the
-    table itself; a table that a sweep's process does not know."""
+    """What a run expects of the machine, a sweep's processes, a longer run and pages."""
     tables = [part for entry in (*SHORT, RISING) for part in ("--set", entry)]
     assert main(["check", "base", *tables]) == 0
     assert main(["run", "base", *tables, "--out", str(tmp_path / "run")]) == 0

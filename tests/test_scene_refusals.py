@@ -175,7 +175,7 @@ def test_growth_needs_an_aggregate():
 
 
 def test_a_default_that_does_not_fit_is_shown():
-    """In the words, for the key that was set is named. Mutant: a key named that the scene does not have."""
+    """In the words, for the key that was set is named."""
     with pytest.raises(SceneError, match=r'mine.toml: pore.width = "4 um": more than aggregate.radius \(5 um\)'):
         parse_scene({"pore": {"width": "4 um"}, "aggregate": {}}, "mine", "mine.toml")
 
@@ -253,8 +253,7 @@ PAIRS = [
 
 @pytest.mark.parametrize("source, first, second, of_first, of_second", PAIRS)
 def test_the_key_that_was_set_is_named(tmp_path, source, first, second, of_first, of_second):
-    """What the file says is right; what --set says beside it is wrong. Mutants: the same key named whichever was set;
-    the first in the file named."""
+    """What the file says is right; what --set says beside it is wrong."""
     name, _, unset = source.partition(" --unset ")
     for entries, last, said in ((second, first, of_first), (first, second, of_second)):
         path = tmp_path / "mine.toml"
@@ -282,7 +281,6 @@ def inline(value):
 
 
 def test_without_set_the_key_that_the_file_has_is_named(tmp_path):
-    """Mutant: the first key of the rule, which has its default."""
     path = written(tmp_path, '[aggregate]\n[substrates]\n[growth]\nend = "1e9 h"\n')
     assert 'mine.toml: growth.end = "1e9 h": at most 100000 times growth.time_step (0.2 h)' in refusal(path)
     both = written(tmp_path, '[flow]\nhead = "1 cm"\nmean_velocity = "1 m/day"\n')
@@ -308,7 +306,6 @@ def test_without_set_the_key_that_the_file_has_is_named(tmp_path):
     ("kinetics.maximum_utilization_rate=7 mmol/g/day", "; moles need a molar mass"),
 ])
 def test_what_is_not_modelled_is_said(override, said):
-    """Mutants: did you mean, with what is near in letters; a hint that has been lost."""
     message = refusal("base", override)
     assert said in message and "did you mean" not in message
 
@@ -326,7 +323,7 @@ def test_a_second_table_of_an_aggregate_is_refused(tmp_path):
 
 
 def test_the_page_on_scope_is_there():
-    """And speaks of all that messages send there for. Mutant: a page that has moved."""
+    """And speaks of all that messages send there for."""
     page = (ROOT / SCOPE).read_text(encoding="utf-8").casefold()
     words = NOT_MODELLED - {"dimension", "dimensions"} | {"several aggregates", "third dimension", "kinetics", "moles"}
     assert {word for word in words if word not in page} == set()
@@ -383,8 +380,7 @@ outline = [["-5.0 um", "0.0 um"], {POINTS} ["5.0 um", "0.0 um"]]
     ("a = '''\n\"'' '''\n" + f"{DEEP} = 1", 3), (f"a = '#'\n{DEEP}", 2), (".".join("a" * 21) + " = 1", 1),
 ])
 def test_keys_of_many_parts_are_refused_before_they_are_parsed(tmp_path, monkeypatch, text, line):
-    """They take memory as the square of the parts: 1.5 GB here. Mutants: keys in headers, in inline tables, quoted
-    ones, ones with blanks, ones after a string with quotes or a # in it passed over."""
+    """They take memory as the square of the parts: 1.5 GB here."""
     monkeypatch.setattr(tomllib, "loads", None)
     said = f"a key of more than 20 parts (at line {line}); one of a scene has at most 3"
     assert said in refusal(written(tmp_path, text))
@@ -394,7 +390,6 @@ def test_keys_of_many_parts_are_refused_before_they_are_parsed(tmp_path, monkeyp
     (f"{DEEP}=1", "a key of at most 20 parts is needed"), (f"pore={{{DEEP}=1}}", "a table [pore] is needed"),
     (f"pore.width={{{DEEP}=1}}", LENGTH)])
 def test_set_takes_no_key_of_many_parts(monkeypatch, entry, said):
-    """Mutant: the key or the value of --set parsed before it is looked at."""
     read = files.read_tables("base")
     monkeypatch.setattr(tomllib, "loads", None)
     with pytest.raises(SceneError, match=re.escape(said)):
@@ -403,14 +398,14 @@ def test_set_takes_no_key_of_many_parts(monkeypatch, entry, said):
 
 
 def test_dots_that_are_no_keys_are_read(tmp_path):
-    """Dots of comments, texts and numbers; keys of 20 parts. Mutant: dots counted wherever they are."""
+    """Dots of comments, texts and numbers; keys of 20 parts."""
     assert len(load_scene(written(tmp_path, DOTTED)).aggregate.outline) == 82
     assert "there is no such key" in refusal(written(tmp_path, ".".join("a" * 20) + " = 1"))
 
 
 @pytest.mark.parametrize("piece", ["a", '"', '\\"', "'", "a.", "a .", '"a', "#", '"""', "'''", "\\", " ", '"\\'])
 def test_looking_for_deep_keys_takes_no_longer_than_reading(piece):
-    """A file as large as is accepted, made of whatever: linear in its size. Mutant: a pattern that goes back."""
+    """A file as large as is accepted, made of whatever: linear in its size."""
     text = "x = 1\n" + (piece * files.LARGEST)[:files.LARGEST]
     start = time.process_time()
     files.line_of_a_deep_key(text)
@@ -418,7 +413,6 @@ def test_looking_for_deep_keys_takes_no_longer_than_reading(piece):
 
 
 def test_a_large_file_is_refused_unread(tmp_path):
-    """Mutant: the whole file read, or parsed, first."""
     path = tmp_path / "mine.toml"
     path.write_bytes(b"[pore]\n#" + b"x" * (files.LARGEST - 8))
     assert load_scene(path).pore.width == 100
@@ -429,7 +423,6 @@ def test_a_large_file_is_refused_unread(tmp_path):
 
 @pytest.mark.parametrize("text", ["", "# nothing\n", "\ufeff\n\n"])
 def test_an_empty_scene_is_refused(tmp_path, text):
-    """Mutant: Table 1's pore, unasked."""
     path = written(tmp_path, text)
     assert refusal(path).startswith(f"{path}: an empty scene: one section or more is needed of [pore], [aggregate], ")
     assert load_scene(path, ["pore={}"]).pore.width == 100
@@ -438,7 +431,6 @@ def test_an_empty_scene_is_refused(tmp_path, text):
 @pytest.mark.parametrize("given, absent", [("acceptor", "donor"), ("donor", "acceptor")])
 @pytest.mark.parametrize("with_aggregate", [True, False])
 def test_one_substrate_alone_is_refused(tmp_path, given, absent, with_aggregate):
-    """Mutant: Table 1's other substrate, unasked, which may be the one that limits."""
     path = written(tmp_path, f"[substrates.{given}]\nsupply = \"5 mg/L\"\n" + "[aggregate]\n" * with_aggregate)
     message = refusal(path)
     assert f"mine.toml: substrates.{absent} is missing: it is needed beside substrates.{given}; " in message
@@ -468,7 +460,6 @@ def test_what_is_long_is_shortened():
 
 
 def test_what_would_never_end_is_refused():
-    """Mutants: no bound on the number of shape updates, on the size of the seed, on the refinement."""
     for entry in ("growth.time_step=1e-9 h", "aggregate.radius=1e-6 um", "numerics.refinement=1e9"):
         with pytest.raises(SceneError, match=entry.split("=")[0]):
             load_scene("base", [entry])
@@ -495,12 +486,10 @@ def test_what_would_never_end_is_refused():
     ("pore.width.value=5 um", "pore.width"),
 ])
 def test_what_may_have_been_meant(override, meant):
-    """Mutants: no hint; one from the section alone; one that would be refused too."""
     assert refusal("base", override).endswith(f"(did you mean {meant}?)")
 
 
 def test_unset_hints():
-    """Mutants: a key that is not there passed over; a hint of the key itself."""
     said = 'base: --unset "flow.haed": the scene does not set it (did you mean flow.head?)'
     assert refusal("base", unset=["flow.haed"]) == said
     for key in ("flow.mean_velocity", "growth.minimum_film", "", "flow.head.deep", ".", "name", "a" * 9000):
@@ -521,7 +510,6 @@ def test_nothing_is_guessed_where_nothing_is_near(override):
     ("a = 1\nb = " + "x" * 500, "line 2, column 5): b = xxx"),
 ])
 def test_not_toml_shows_the_line(tmp_path, text, said):
-    """Mutants: the line before; a hint of quotes for a line that has them."""
     message = refusal(written(tmp_path, text))
     assert said in message and ("stands in quotes" in message) == ("stands in quotes" in said)
 

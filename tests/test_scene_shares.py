@@ -15,7 +15,7 @@ COD = "kinetics.donor_oxygen_demand"
 
 
 def test_the_ratio_follows_from_the_oxygen_demand():
-    """F = COD - Y d_c, by (7). Mutants: Table 1's F kept; the COD lost; Y or d_c of Table 1 taken."""
+    """F = COD - Y d_c, by (7)."""
     kinetics = load_scene("base", [f"{COD}=2.38"]).kinetics
     assert kinetics.acceptor_to_donor_ratio == pytest.approx(1.5138, rel=1e-15) == kinetics.implied_ratio
     other = load_scene("base", [f"{COD}=3", "kinetics.yield_coefficient=0.5", "kinetics.decay_oxygen_demand=1"])
@@ -29,7 +29,6 @@ def test_without_oxygen_demand_nothing_changes():
 
 
 def test_both_are_kept_so_that_a_difference_can_be_told():
-    """Mutant: F by the COD although it is given."""
     both = load_scene("base", [f"{COD}=2.38", "kinetics.acceptor_to_donor_ratio=1.6"]).kinetics
     assert (both.acceptor_to_donor_ratio, both.donor_oxygen_demand) == (1.6, 2.38)
     assert both.implied_ratio == pytest.approx(1.5138)
@@ -38,7 +37,7 @@ def test_both_are_kept_so_that_a_difference_can_be_told():
 
 @given(st.floats(1e-3, 1e3), st.floats(0.01, 1), st.floats(0.01, 1))
 def test_round_trip_with_an_oxygen_demand(rest, product, part):
-    """From the tables and from the text that `repro scene` writes. Mutants: F rounded on the way; a COD not hashed."""
+    """From the tables and from the text that `repro scene` writes."""
     overrides = [f"{COD}={rest + product * part!r}", f"kinetics.yield_coefficient={part!r}",
                  f"kinetics.decay_oxygen_demand={product!r}"]
     scene = load_scene("base", overrides)
@@ -62,7 +61,6 @@ def test_no_oxygen_demand(overrides, said):
 @pytest.mark.parametrize("entry, key", [("yield_coefficient=1", "decay_oxygen_demand"),
                                         ("decay_oxygen_demand=4", "yield_coefficient")])
 def test_what_is_set_beside_an_oxygen_demand_is_named(tmp_path, entry, key):
-    """Mutant: the COD blamed whichever was set."""
     path = tmp_path / "mine.toml"
     path.write_text("[aggregate]\n[substrates]\n[kinetics]\ndonor_oxygen_demand = 1.2\n")
     message = refusal(path, f"kinetics.{entry}")
@@ -77,7 +75,7 @@ def test_what_is_set_beside_an_oxygen_demand_is_named(tmp_path, entry, key):
 @pytest.mark.parametrize("text, share", [("80 %", Fraction(4, 5)), ("80%", Fraction(4, 5)), ("100.0 %", 1),
                                          ("2.5e1 %", Fraction(1, 4)), ("1e-3 %", Fraction(1, 100_000))])
 def test_a_share_of_the_diffusivity_in_water(text, share):
-    """Rounded once, of the D that the scene says, in either order. Mutants: of Table 1's D; 80 for 0.8."""
+    """Rounded once, of the D that the scene says, in either order."""
     entries = [f"substrates.donor.diffusivity_in_aggregate={text}", "substrates.donor.diffusivity=3 cm^2/day"]
     for overrides in (entries, entries[::-1]):
         scene = load_scene("base", overrides)
@@ -106,7 +104,6 @@ def test_no_share(value):
 
 
 def test_a_share_that_comes_to_nothing_is_refused():
-    """Mutant: a diffusivity of zero."""
     message = refusal("base", "substrates.acceptor.diffusivity_in_aggregate=1e-200 %",
                       "substrates.acceptor.diffusivity=1e-200 um^2/h")
     assert "diffusivity_in_aggregate = \"1e-200 %\": greater than zero is needed" in message

@@ -42,7 +42,6 @@ def uncommented(text, but=()):
 
 @pytest.mark.parametrize("name", packaged_scenes())
 def test_what_is_printed_is_the_scene_and_nothing_else(name, capsys):
-    """Mutants: a default written for what the scene says; a word on stdout that is no TOML."""
     assert main(["scene", name]) == 0
     printed = capsys.readouterr()
     assert parsed(printed.out, name) == load_scene(name) and printed.err == "" and printed.out.isascii()
@@ -50,8 +49,7 @@ def test_what_is_printed_is_the_scene_and_nothing_else(name, capsys):
 
 @pytest.mark.parametrize("name", packaged_scenes())
 def test_defaults_that_are_made_active_change_nothing(name):
-    """Each line alone, in the sections that the scene has. Mutant: a default that is not the one shown; linear
-    elements shown for a preset that has others."""
+    """Each line alone, in the sections that the scene has."""
     for overrides in ((), *([f"numerics.preset={preset}"] for preset in PRESETS)):
         made, text, inside = load_scene(name, overrides), scene_text(name, overrides), True
         lines = text.splitlines()
@@ -64,7 +62,6 @@ def test_defaults_that_are_made_active_change_nothing(name):
 
 @pytest.mark.parametrize("name", packaged_scenes())
 def test_every_key_may_be_made_active_at_once(name):
-    """Mutants: an example that is not accepted, a key in the table of another section."""
     drive = load_scene(name).flow
     excluded = "head" if drive and drive.head is None else "mean_velocity"
     made = parsed(uncommented(scene_text(name), but={excluded, "outline", "permeability"}), name)
@@ -75,7 +72,6 @@ def test_every_key_may_be_made_active_at_once(name):
 
 @pytest.mark.parametrize("name", packaged_scenes())
 def test_every_key_is_there_with_what_it_takes_and_its_source(name):
-    """Mutants: a key left out, or its comment; a section that a scene leaves out forgotten."""
     text = scene_text(name)
     tables, found = re.split(r"^#?\[(.*)\]$", text, flags=re.M)[1:], set()
     for section, body in zip(tables[::2], tables[1::2]):
@@ -89,7 +85,6 @@ def test_every_key_is_there_with_what_it_takes_and_its_source(name):
 
 
 def test_every_key_says_what_it_is_about_and_where_the_paper_has_it():
-    """Mutants: a key without its text, or with one that cites nothing."""
     for key, entry in fields(Scene):
         source = entry.metadata["source"]
         assert len(entry.metadata["about"]) > 4 and (source == OURS or SOURCE.search(source)), key
@@ -98,7 +93,6 @@ def test_every_key_says_what_it_is_about_and_where_the_paper_has_it():
 
 
 def test_a_file_of_ones_own_keeps_its_words(tmp_path, capsys):
-    """Mutant: values written anew in the package's units; --set forgotten."""
     path = tmp_path / "mine.toml"
     path.write_text('# mine\n[pore]\nwidth = "0.08 mm"\n[aggregate]\n[flow]\nmean_velocity = "1 m/day"\n')
     assert main(["scene", str(path), "--set", "flow.viscosity_ratio=500"]) == 0
@@ -114,7 +108,6 @@ def test_presets_tell_their_defaults():
 
 
 def test_the_name_of_a_file_adds_no_key(tmp_path):
-    """Mutant: a file's name written as it stands, line breaks and all."""
     path = tmp_path / 'mine\n[growth]\nend = "1 h"\u00e9.toml'
     path.write_text("[pore]\n")
     text = scene_text(str(path))
@@ -123,7 +116,6 @@ def test_the_name_of_a_file_adds_no_key(tmp_path):
 
 @given(scenes())
 def test_any_scene_is_written_as_it_is(made):
-    """Mutant: numbers shortened."""
     from repro.scene import text as module
     tables = scene_tables(made)
     with pytest.MonkeyPatch.context() as patch:

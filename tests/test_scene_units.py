@@ -31,8 +31,7 @@ def told(convert, given, unit):
 
 @pytest.mark.parametrize("name", sorted(exact.UNITS))
 def test_every_unit_is_pints(name):
-    """To the last digit of an exact fraction, and with its dimensions. Mutants: a prefix off by ten; a month for a
-    minute; pi rounded."""
+    """To the last digit of an exact fraction, and with its dimensions."""
     unit = exact.UNITS[name]
     base = " ".join(f"{symbol}^{power}" for symbol, power in zip(("m", "kg", "s"), unit[1:]) if power) or "rad"
     assert units._by_pint(name, base) == unit.size and isinstance(unit.size, Fraction)
@@ -40,7 +39,7 @@ def test_every_unit_is_pints(name):
 
 @given(PRODUCTS.filter(lambda text: re.fullmatch(units._UNIT, text)), st.sampled_from(sorted(units.NOUNS)))
 def test_products_of_units_are_pints(product, unit):
-    """Bit by bit, or refused by both. Mutants: a / b c with c below; a power of the quotient; 1/ read as nothing."""
+    """Bit by bit, or refused by both."""
     exactly, slowly = told(units._conversion, product, unit), told(units._by_pint, product, unit)
     assert unit == "rad" and exactly == "refused" or exactly == slowly
 
@@ -64,12 +63,11 @@ def alike(name):
     ("2 kmin", "h", 2000 / 60), ("3 Hz", "1/h", 10800.0),
 ])
 def test_units_that_pint_alone_knows_are_accepted(text, unit, value):
-    """Mutant: no unit but those of the table."""
     assert units.to_internal(text, unit) == value
 
 
 def test_packaged_scenes_defaults_and_examples_need_no_pint(monkeypatch):
-    """Nor do their refusals with hints. Mutant: a default in a unit that the table has not."""
+    """Nor do their refusals with hints."""
     monkeypatch.setattr(units, "_registry", None)
     units._conversion.cache_clear()
     for name in packaged_scenes():
@@ -81,7 +79,6 @@ def test_packaged_scenes_defaults_and_examples_need_no_pint(monkeypatch):
 
 
 def test_a_run_of_base_never_makes_the_registry(tmp_path):
-    """Mutant: a stage that converts for itself."""
     script = ("import sys; from repro.cli import main; "
               "status = main(['run', 'base', '--set', 'growth.end=0.2 h', '--out', sys.argv[1], '--quiet']); "
               "sys.exit(status or ('pint' in sys.modules))")

@@ -23,7 +23,7 @@ def value_of(said, path):
 
 
 def test_the_rounded_inputs_are_those_of_table_1_and_of_the_scenes():
-    """In the package's units. Mutants: a half unit of another digit; a key that holds something else."""
+    """In the package's units."""
     said = load_scene("base")
     assert {each.name for each in ROUNDED} == set(PAPER)
     for each in ROUNDED:
@@ -36,7 +36,6 @@ def test_the_rounded_inputs_are_those_of_table_1_and_of_the_scenes():
 @pytest.mark.parametrize("each", ROUNDED + tuple(each for each in EXACT if each.only != "wide"),
                          ids=lambda each: each.name)
 def test_a_factor_moves_its_input_and_nothing_else(each):
-    """Mutants: K_s without the supply that is 10 of it; a factor added."""
     said = load_scene("base")
     other = changed(said, {each.name: 2.0})
     assert all(value_of(other, path) == 2 * value_of(said, path) for path in each.paths)
@@ -63,7 +62,7 @@ class Law:
 
 
 def test_elasticities_of_a_power_law():
-    """x^3 at 1 %: 3 and a bar that holds the rest. Mutants: one side alone; the distance not divided by."""
+    """x^3 at 1 %: 3 and a bar that holds the rest."""
     found = elasticity.elasticities(Law(lambda x: {"n": 7 * x["k"] ** 3 * x["X_m"] ** -0.5}), "base")["n"]
     assert found["k"]["elasticity"] == pytest.approx(3, abs=1e-3) and found["k"]["resolved"]
     assert abs(found["k"]["elasticity"] - 3) <= found["k"]["bar"]
@@ -72,7 +71,6 @@ def test_elasticities_of_a_power_law():
 
 
 def test_what_differs_by_noise_is_not_resolved():
-    """Mutant: no look at the second distance."""
     noise = {0.99: 1e-3, 1.01: -1e-3, 0.98: -1e-3, 1.02: 1e-3}
     found = elasticity.elasticities(Law(lambda x: {"n": 1 + noise.get(round(x["k"], 3), 0.0)}), "base")["n"]["k"]
     assert not found["resolved"] and found["bar"] > abs(found["elasticity"])
@@ -88,8 +86,7 @@ def law_of_base(shift):
 
 @pytest.mark.parametrize("shift, reached", [(-0.02, True), (-0.06, False), (-0.2, False)])
 def test_one_set_is_found_where_there_is_one_and_the_least_misfit_where_there_is_none(shift, reached):
-    """2 % of the effluent are 0.25 % of k, within its 0.54 %; 6 % and 20 % are not. Mutant: a set outside of the
-    rounding."""
+    """2 % of the effluent are 0.25 % of k, within its 0.54 %; 6 % and 20 % are not."""
     law = Law(law_of_base(shift))
     found = one_set.found(law, elasticity.elasticities(law, "base"))
     factors = factors_of(found["inputs"])
@@ -103,7 +100,6 @@ def test_one_set_is_found_where_there_is_one_and_the_least_misfit_where_there_is
 
 
 def test_the_interval_of_a_value_is_the_sum_of_all_roundings(monkeypatch):
-    """Mutants: the root of squares; the largest alone; a quantity that is not known."""
     content = {"rounding": {"k": 0.01, "Y": 0.02}, "elasticities": {"n": {
         "k": {"elasticity": -3.0}, "Y": {"elasticity": 2.0}, "X_m": {"elasticity": 99.0}}}}
     monkeypatch.setattr(sensitivity, "record", lambda: content)
@@ -112,8 +108,7 @@ def test_the_interval_of_a_value_is_the_sum_of_all_roundings(monkeypatch):
 
 
 def test_a_run_is_computed_once_and_kept_at_once(tmp_path, monkeypatch):
-    """A second call, or one after a break, goes on from the file. Mutants: kept at the end; computed again; one key for
-    all scenes."""
+    """A second call, or one after a break, goes on from the file."""
     made = []
     monkeypatch.setitem(Runs.numbers.__globals__["OF"], "base", lambda said: made.append(said) or {"n": len(made)})
     path = tmp_path / "out" / "runs.json"
@@ -125,7 +120,7 @@ def test_a_run_is_computed_once_and_kept_at_once(tmp_path, monkeypatch):
 
 
 def test_sobol_indices_of_a_linear_law():
-    """Shares of the variance, e r squared over their sum. Mutants: normal for uniform; rounding not used."""
+    """Shares of the variance, e r squared over their sum."""
     slopes = {"velocity_0": {}, "velocity": {"k": 3.0, "Y": 3.0, "K_sD": 0.02}, "effluent_donor": {},
               "effluent_acceptor": {"k": 8.0, "Y": 1.0, "K_sD": 0.3}, "consumed": {}}
 
@@ -149,8 +144,7 @@ def kept():
 
 
 def test_the_committed_record_is_whole(kept):
-    """Every rounded input for every number, each with its bar. Mutant: a number that the claims name and the record
-    lacks."""
+    """Every rounded input for every number, each with its bar."""
     for number, known in kept["elasticities"].items():
         assert set(known) >= {each.name for each in ROUNDED}, number
         assert all(one["bar"] >= 0 and isinstance(one["resolved"], bool) for one in known.values()), number
@@ -159,7 +153,6 @@ def test_the_committed_record_is_whole(kept):
 
 
 def test_page_and_diagram_are_those_of_the_record(kept, tmp_path):
-    """Mutants: a page edited by hand; a date in the diagram."""
     page = sensitivity.RECORD.with_suffix(".md").read_text(encoding="utf-8")
     assert page == picture.page(kept)
     for name in ("one.svg", "two.svg"):

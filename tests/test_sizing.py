@@ -33,10 +33,7 @@ either = attached_aggregates(width=widths) | attached_aggregates(width=widths, g
 
 @given(either, refinements)
 def test_refining_an_outline_keeps_its_shape_exactly(drawn, refinement):
-    """Area to round-off; interface nodes, ends of contact and fixed points to the last bit; walls straight.
-
-    Mutant: short interface edges merged, an edge's middle moved onto a smooth curve, the fixed point resampled away.
-    """
+    """Area to round-off; interface nodes, ends of contact and fixed points to the last bit; walls straight."""
     outline, width = drawn
     sizing = Sizing(width, refinement, FILM)
     sizes, corners = of.interface_sizes(outline.corners, sizing), outline.corners
@@ -57,7 +54,7 @@ def test_refining_an_outline_keeps_its_shape_exactly(drawn, refinement):
 @given(st.floats(1.5, 4.0))
 def test_new_nodes_of_a_grown_seed_remember_its_arc(stretch):
     """Between nodes that were on the half-circle at t = 0 the material was on it too; on the wall it was on the wall.
-    Mutant: origins on the chord, or drawn to the arc on the wall as well."""
+    """
     old = seed(5.0, 0.5)
     grown = replace(old, points=old.points * [stretch, 1.1 * stretch])
     fine = of.split(grown, Sizing(100.0, 4.0, FILM, seed=0.0))
@@ -70,7 +67,7 @@ def test_new_nodes_of_a_grown_seed_remember_its_arc(stretch):
 
 @given(widths, st.floats(-20.0, 20.0))
 def test_refining_leaves_contact_nodes_exactly_on_their_wall(width, lean):
-    """Walls are found by y == W: a node one round-off beside it would slip. Mutant: new y (1 - t) a + t b."""
+    """Walls are found by y == W: a node one round-off beside it would slip."""
     outline = plug(width, -0.3 * width, 0.4 * width, lean)
     sizing = Sizing(width, 1.0, FILM)
     fine = of.split(outline, sizing)
@@ -83,8 +80,7 @@ def test_refining_leaves_contact_nodes_exactly_on_their_wall(width, lean):
 @given(either, refinements)
 def test_an_outline_is_too_coarse_where_an_edge_is_twice_what_is_wanted(drawn, refinement):
     """Never as a new mesh has it; of the same outline, from the refinement on at which its longest interface edge is
-    2 x 1.4 times the mean of the sizes wanted at its ends. Mutants: edges on the wall counted too, once for twice, one
-    end's size for the mean."""
+    2 x 1.4 times the mean of the sizes wanted at its ends."""
     outline, width = drawn
     sizing = Sizing(width, refinement, FILM)
     fine = of.split(outline, sizing).corners
@@ -100,8 +96,7 @@ def test_an_outline_is_too_coarse_where_an_edge_is_twice_what_is_wanted(drawn, r
 
 @given(outlines(width=widths), lengths)
 def test_the_meshed_extent_follows_section_3_1(drawn, length):
-    """On each side min(10 R, 1.5 W) of fluid, or all that the pore has, for any aggregate anywhere in it. Mutant: 10 R
-    alone, max for min, one end's cap, the thickness of the other side, the length in place of its half."""
+    """On each side min(10 R, 1.5 W) of fluid, or all that the pore has, for any aggregate anywhere in it."""
     outline, width = drawn
     found = of.meshed_extent(outline, width, length)
     assert found == pytest.approx(oracles.extent(outline.points, width, length), rel=1e-12)
@@ -111,8 +106,7 @@ def test_the_meshed_extent_follows_section_3_1(drawn, length):
 
 @given(outlines(width=widths), lengths, st.floats(0.0, 1.2), st.booleans())
 def test_the_mesh_is_extended_once_the_aggregate_is_too_close_to_its_end(drawn, length, part, right):
-    """Too short under min(7 R, 1.3 W), never as it was made, and never where the pore has no more to mesh. Mutant: only
-    one end looked at, 1.5 W for 1.3 W, the pore's end taken for too short."""
+    """Too short under min(7 R, 1.3 W), never as it was made, and never where the pore has no more to mesh."""
     outline, width = drawn
     ends = list(of.meshed_extent(outline, width, length))
     assert not of.extent_too_short(outline, tuple(ends), width, length)
@@ -128,7 +122,7 @@ def test_the_mesh_is_extended_once_the_aggregate_is_too_close_to_its_end(drawn, 
 @given(scenes(elements=list(ORDERS.values())))
 def test_the_mesh_of_a_run_has_the_extent_of_section_3_1(made):
     """Whenever a mesh is made; and later, however it has moved, never under min(7 R, 1.3 W) where there is pore left.
-    Mutant: a remesh that keeps the old ends, the aggregate's ends of t = 0."""
+    """
     width, length = made.pore.width, made.pore.length
     for instant in simulate(made):
         now, reach = instant.pore, min(7 * instant.pore.outline.thickness, 1.3 * width)
@@ -150,8 +144,7 @@ def test_the_extents_of_the_paper():
 
 @given(attached_aggregates(width=widths), refinements)
 def test_element_sizes_resolve_aggregate_pore_and_film(drawn, refinement):
-    """A tenth of the thickness, a fourteenth of the width, a tenth of the film. Mutant: no film term, film under a
-    plug."""
+    """A tenth of the thickness, a fourteenth of the width, a tenth of the film."""
     outline, width = drawn
     sizing = Sizing(width, refinement, FILM)
     size = of.interface_sizes(outline, sizing) * refinement
@@ -165,8 +158,7 @@ def test_element_sizes_resolve_aggregate_pore_and_film(drawn, refinement):
 
 @given(st.floats(0.05, 5.0), st.floats(0.05, 5.0), st.floats(5.0, 50.0))
 def test_a_graded_line_spaces_its_nodes_as_asked(near, far, length):
-    """From ``near`` at its source up to at most ``far``. Mutant: gradation ignored, ends moved, spacing twice too
-    wide."""
+    """From ``near`` at its source up to at most ``far``."""
     sizing = Sizing(far * of.ACROSS_PORE, 1.0, FILM)
     line = of.graded_line((0.0, 3.0), (length, 3.0), np.array([[0.0, 3.0]]), np.array([near]), sizing)
     assert line[0].tolist() == [0.0, 3.0] and line[-1].tolist() == [length, 3.0] and (line[:, 1] == 3.0).all()

@@ -29,7 +29,6 @@ def told():
 
 @pytest.mark.parametrize("file", [speed.README, speed.PERFORMANCE], ids=lambda file: file.name)
 def test_the_pages_tell_what_was_measured(file):
-    """Mutants: a number edited by hand, a benchmark whose numbers were not told."""
     text = file.read_text(encoding="utf-8")
     section = speed.pages_of(speed.records())[file]
     assert speed.within(text, section) == text and "| accurate |" in section
@@ -38,41 +37,35 @@ def test_the_pages_tell_what_was_measured(file):
 
 
 def test_the_record_has_every_hard_case():
-    """Mutant: a matrix of a part of the cases."""
     rows = [case["number"] for case in speed.records()["hard_cases"]["cases"]]
     assert rows == list(range(1, 23))
 
 
 def test_presets_are_told_with_ratio_and_errors(told):
-    """Mutants: the ratio inverted, errors as fractions."""
     text = speed.markdown(told)
     assert "| fast | 0.50 | 10.0 times | 0.5 % |" in text and "| accurate | 2.00 | 2.5 times |" in text
 
 
 def test_what_does_not_hold_is_told(told):
-    """Mutants: verdicts left out, a wrong cell in the colour of a right one."""
     assert "| fast | 5 times | 2 times | does not hold |" in speed.markdown(told)
     assert speed.page(told).count("class='no'") == 2
 
 
 def test_a_change_is_told_in_percent_with_its_sign(told):
-    """Mutants: the absolute value, the smallest for the largest."""
     assert "| -0.01 % | +0.002 % | +0.03 % | +0.03 % (acceptor leaving) |" in speed.markdown(told)
 
 
 def test_text_is_escaped(told):
-    """Mutants: cells written as they are, into HTML or into a table in Markdown."""
     assert "a &lt;processor&gt;" in speed.page(told) and "too | fast" in speed.page(told)
     assert "| x \\| y |" in speed.markdown([speed.Block("table", rows=(("a",), ("x | y",)))])
 
 
 def test_without_records_nothing_is_told():
-    """Mutant: a section that fails before the first benchmark."""
     assert list(speed.blocks({"bench": {}, "hard_cases": {}, "audit": {}})) == []
 
 
 def test_the_section_replaces_the_one_before():
-    """Text around the marks stays. Mutant: sections that pile up."""
+    """Text around the marks stays."""
     text = f"before\n{speed.BEGIN}\nold\n{speed.END}\nafter\n"
     once = speed.within(text, "new")
     assert "old" not in once and once.startswith("before\n") and once.endswith(f"{speed.END}\nafter\n")

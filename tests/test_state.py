@@ -85,8 +85,7 @@ def test_there_is_something_to_forget():
 
 @geometries
 def test_a_mesh_with_other_points_forgets(geometry):
-    """All that depends on places is worked out anew; what depends on the connections alone stays. Mutant: a copy of the
-    object with its places exchanged."""
+    """All that depends on places is worked out anew; what depends on the connections alone stays."""
     mesh = touched(disc(geometry)[0])
     touched(mesh.topology)
     points = mesh.points * [1.1, 1.0]
@@ -103,7 +102,7 @@ def test_a_mesh_with_other_points_forgets(geometry):
 @geometries
 @pytest.mark.parametrize("what", ["cells", "biomass"])
 def test_a_topology_with_other_cells_or_biomass_forgets(geometry, what):
-    """Nodes of every order, edges, the aggregate's nodes, and the systems. Mutant: a dictionary that goes along."""
+    """Nodes of every order, edges, the aggregate's nodes, and the systems."""
     mesh = disc(geometry)[0]
     old = touched(mesh.topology)
     kept = old.system("a key", lambda: "the old one")
@@ -122,7 +121,7 @@ def test_a_topology_with_other_cells_or_biomass_forgets(geometry, what):
 
 @geometries
 def test_a_topology_with_another_method_orders_anew(geometry, monkeypatch):
-    """Nodes are in the order of the new method, and so are systems. Mutant: the elimination order of the old one."""
+    """Nodes are in the order of the new method, and so are systems."""
     mesh = disc(geometry)[0]
     old = touched(mesh.topology)
     faults.stand_in_package(monkeypatch, "pymetis")
@@ -136,7 +135,7 @@ def test_a_topology_with_another_method_orders_anew(geometry, monkeypatch):
 @orders
 @geometries
 def test_a_space_of_another_mesh_or_order_forgets(geometry, order):
-    """Quadrature points, element matrices, places of nodes, the points of the reaction. Mutant: the first mesh's."""
+    """Quadrature points, element matrices, places of nodes, the points of the reaction."""
     mesh = disc(geometry)[0]
     space = touched(Space(mesh, order))
     moved = mesh.moved(mesh.points * [1.1, 1.0])
@@ -150,8 +149,7 @@ def test_a_space_of_another_mesh_or_order_forgets(geometry, order):
 
 @pytest.mark.parametrize("kind", ORDERS.values())
 def test_a_pore_with_other_places_biomass_or_material_forgets(kind):
-    """Its outline, its mass, its composition, the material's places at t = 0. Mutants: an outline that goes along, a
-    mass that is kept with the pore."""
+    """Its outline, its mass, its composition, the material's places at t = 0."""
     scene = load_scene("base", ['numerics.preset="fast"', f'numerics.elements="{kind}"', "numerics.refinement=0.5"])
     now = touched(pore.seeded(scene))
     mesh, X_m = now.mesh, scene.kinetics.maximum_density
@@ -178,7 +176,6 @@ def remade(now):
 
 @geometries
 def test_a_body_of_another_shape_forgets(geometry):
-    """Mutant: the sparse system of the first cells."""
     mesh, outline = disc(geometry)
     body = body_of(mesh, outline)[0]
     shape = touched(body.shape)
@@ -193,8 +190,7 @@ def test_a_body_of_another_shape_forgets(geometry):
 
 @orders
 def test_what_is_solved_on_a_replaced_mesh_is_that_of_a_fresh_one(order):
-    """To the last bit, after another mesh of the same object has been solved on. Mutant: a sparse system kept beyond
-    its connections."""
+    """To the last bit, after another mesh of the same object has been solved on."""
     mesh = disc(1 if order == 1 else 2)[0]
     mesh = mesh if order == 1 else bent_inside(mesh)
     flow.unit_flow(Space(mesh, order), 100.0)
@@ -224,8 +220,7 @@ def numbers(instant):
 @pytest.mark.parametrize("which", [0, 1], ids=["paper", "fast"])
 def test_runs_in_turns_do_not_see_each_other(which, monkeypatch):
     """Two runs of one scene but for the ordering of its linear systems, step by step in turns in one process: each is
-    what it is alone, to the last bit, and the two differ in the last bits. Mutants: a module that remembers the method,
-    a cache of systems by their number of unknowns."""
+    what it is alone, to the last bit, and the two differ in the last bits."""
     made = faults.stand_in_package(monkeypatch, "pymetis")
     pair = scenes()[which], scenes('numerics.ordering="metis"')[which]
     alone = [[numbers(instant) for instant in simulate(scene)] for scene in pair]
@@ -246,8 +241,7 @@ def test_runs_in_turns_do_not_see_each_other(which, monkeypatch):
 @pytest.mark.parametrize("ordering, solver, package", [("metis", "superlu", "pymetis"),
                                                        ("degree", "pardiso", "pypardiso")])
 def test_the_method_of_a_scene_reaches_every_system(which, ordering, solver, package, monkeypatch):
-    """Of flow, substrates, mesh motion and growth, at t = 0 and on a new mesh. Mutants: a system of the default method,
-    a new mesh without the scene's."""
+    """Of flow, substrates, mesh motion and growth, at t = 0 and on a new mesh."""
     faults.stand_in_package(monkeypatch, package)
     scene = scenes(f'numerics.ordering="{ordering}"', f'numerics.solver="{solver}"')[which]
     wanted = Method(solver, ordering)

@@ -54,8 +54,7 @@ def attempts(monkeypatch):
 
 @EVERY_ORDER
 def test_rows_are_at_the_reported_times_to_the_last_bit(order):
-    """Rows are t = 0 and the times asked for, and nothing else; the ledgers of all steps that ended are in them.
-    Mutants: times that are sums of steps (0.37000000000000005), the end reported too, the last step's ledger alone."""
+    """Rows are t = 0 and the times asked for, and nothing else; the ledgers of all steps that ended are in them."""
     made = base('growth.end="0.9 h"', 'output.times=["0.37 h", "0.5 h", "0.8 h"]', *sets(order),
                 "numerics.tolerance=0.0001", "numerics.refinement=0.3")
     found = run(made)
@@ -68,8 +67,7 @@ def test_rows_are_at_the_reported_times_to_the_last_bit(order):
 
 
 def test_without_times_every_step_is_a_row_and_there_are_25():
-    """And the last one is at the end; a run of less than 24 times 12 min has one every 12 min. Mutants: only targets
-    reported, LEAST = 12, every step alone, rows ever closer in ever shorter runs."""
+    """And the last one is at the end; a run of less than 24 times 12 min has one every 12 min."""
     for end, apart in ((4.8, 0.2), (9.59, 0.2), (9.6, 0.4), (19.4, 0.8), (45.0, 1.6)):
         rows = stepping.rows(base(f'growth.end="{end} h"'))
         assert 24 <= len(rows) <= 49 and rows[-1] == end and rows[0] == apart
@@ -112,8 +110,7 @@ def same(one, two):
 
 @pytest.mark.parametrize("name", SCENES)
 def test_steps_depend_on_no_row(name):
-    """The last state and the ledger of every step, to the last bit, with 1, 5 and 16 rows, and every step's. Mutant: a
-    step that ends at a row."""
+    """The last state and the ledger of every step, to the last bit, with 1, 5 and 16 rows, and every step's."""
     end = float(SCENES[name][1 if "fast" in SCENES[name][0] else 0].split('"')[1].split()[0])
     found = [steps_of(name)]
     for count in (1, 5, 16):
@@ -131,8 +128,7 @@ def test_steps_depend_on_no_row(name):
 @pytest.mark.parametrize("name", SCENES)
 def test_steps_do_not_depend_on_the_end(name, step, part):
     """The ledgers of steps, and the state from which a later end goes on, to the last bit; the step that is cut closes
-    its ledger and ends where the run does. Mutants: the last steps shortened to fit, a cut step that is told as one of
-    the others."""
+    its ledger and ends where the run does."""
     whole, _, later = steps_of(name)
     end = later[step].start + part * (later[step].end - later[step].start) + 1e-3
     found, rows, ledgers = steps_of(name, f'growth.end="{end!r} h"')
@@ -147,8 +143,7 @@ def test_steps_do_not_depend_on_the_end(name, step, part):
 
 @pytest.mark.parametrize("name, most", [("fast", 0.01), ("contact", 0.002)])
 def test_a_row_within_a_step_is_that_of_a_step_that_ends_there(name, most):
-    """Area, tips and effluents, within the preset's tolerance: a step that ends there has an error alike. Mutants: the
-    rates of the start alone, those of half way alone, the masses of the step's end."""
+    """Area, tips and effluents, within the preset's tolerance: a step that ends there has an error alike."""
     _, _, ledgers = steps_of(name)
     longest = max(ledgers, key=lambda row: row.end - row.start)
     time = longest.start + 0.37 * (longest.end - longest.start)
@@ -161,7 +156,7 @@ def test_a_row_within_a_step_is_that_of_a_step_that_ends_there(name, most):
 
 def test_rows_within_steps_are_of_second_order():
     """0.37 of the way through a step the biomass is that of a step that ends there but for a part that goes as the cube
-    of the step, the local error of both. Mutants: the rates of the start alone or of half way alone (the square)."""
+    of the step, the local error of both."""
     made = base()
     now = pore.seeded(made)
     solved = pore.solve(made, now)
@@ -177,7 +172,7 @@ def test_rows_within_steps_are_of_second_order():
 @EVERY_ORDER
 def test_a_step_ends_when_the_film_is_first_too_thin(attempts, order):
     """The film is within 2 % of what it may be, and no thicker, when contact is first made; a longer step was tried
-    and not taken. Mutants: LANDED = 0, the aim beyond the film."""
+    and not taken."""
     made = near_contact(order)
     found = run(made)
     first = next(instant for instant in found if instant.pore.contact)
@@ -193,7 +188,7 @@ def test_a_step_ends_when_the_film_is_first_too_thin(attempts, order):
 @pytest.mark.parametrize("tolerance", [0.002, 0.0005])
 def test_the_change_of_the_rates_in_a_step_is_bounded(attempts, tolerance):
     """At most EXCESS tolerances in each step that is taken, at least half of one in the largest; what errs more has no
-    step. Mutants: tolerance / 10, every step taken, the shape of a refused step found all the same."""
+    step."""
     found = [instant for instant in run(base('growth.end="2 h"', f"numerics.tolerance={tolerance}"))
              if instant.ledgers or instant.pore.time == 0]
     taken = np.diff([instant.pore.time for instant in found])
@@ -205,8 +200,7 @@ def test_the_change_of_the_rates_in_a_step_is_bounded(attempts, tolerance):
 
 
 def test_a_step_that_fails_is_halved_until_it_is_done(monkeypatch):
-    """0.2 h fails down to 0.02 h: 0.1, 0.05, 0.025 h are tried in turn. Mutants: length / 4, a failure that is told at
-    once."""
+    """0.2 h fails down to 0.02 h: 0.1, 0.05, 0.025 h are tried in turn."""
     tried, made = [], base()
 
     def attempt(_, now, solved, duration, most):
@@ -227,8 +221,7 @@ def test_a_step_that_fails_is_halved_until_it_is_done(monkeypatch):
 @pytest.mark.parametrize("error, told", [(GrowthError("no way"), "in growth: no way"),
                                          (FloatingPointError("overflow"), "floating-point error .overflow.")])
 def test_what_fails_at_the_shortest_step_stops_the_run(monkeypatch, error, told):
-    """With the time of the step; not before growth.time_step / 1000 has failed. Mutants: an endless loop, an error
-    without time, SHORTEST = 0.1."""
+    """With the time of the step; not before growth.time_step / 1000 has failed."""
     tried, attempt = [], midpoint.attempt
 
     def fails_later(made, now, solved, duration, most):
@@ -244,8 +237,7 @@ def test_what_fails_at_the_shortest_step_stops_the_run(monkeypatch, error, told)
 
 
 def test_a_step_that_errs_too_much_is_not_taken(monkeypatch):
-    """An estimate of 16 tolerances: the step is tried again at 0.9 / 4 of its length, where it is 16 times smaller.
-    Mutants: the estimate linear in the length, every step taken."""
+    """An estimate of 16 tolerances: the step is tried again at 0.9 / 4 of its length, where it is 16 times smaller."""
     made, tried = base("numerics.tolerance=0.01"), []
     now = pore.seeded(made)
 
@@ -264,7 +256,7 @@ def test_a_step_that_errs_too_much_is_not_taken(monkeypatch):
 @EVERY_ORDER
 def test_ledgers_close(order):
     """Biomass to 1e-10 and both substrates to 1e-8 in every step, remeshes and contact included; each step starts from
-    what the last one left. Mutants: mass lost by (34) or at a remesh, flows of the step's start."""
+    what the last one left."""
     found = run(near_contact(order))
     rows = [row for instant in found for row in instant.ledgers]
     assert sum(instant.remeshes for instant in found) > (order > 1), "else little is tested"
@@ -278,7 +270,7 @@ def test_ledgers_close(order):
 
 @EVERY_ORDER
 def test_a_run_is_the_same_every_time(order):
-    """To the last bit. Mutant: an order that depends on addresses, random numbers without a seed."""
+    """To the last bit."""
     one, two = (run(base('growth.end="1 h"', *sets(order))) for _ in range(2))
     assert [i.pore.time for i in one] == [i.pore.time for i in two]
     assert all((a.pore.mesh.points == b.pore.mesh.points).all() for a, b in zip(one, two))
@@ -286,8 +278,7 @@ def test_a_run_is_the_same_every_time(order):
 
 @EVERY_ORDER
 def test_the_midpoint_rule_is_of_second_order(order):
-    """Halving uniform steps quarters the change of the area and of the upstream tip, on one mesh. Mutant: the rates of
-    the step's start, half a step of a whole one's length."""
+    """Halving uniform steps quarters the change of the area and of the upstream tip, on one mesh."""
     made = base(*sets(order), f"numerics.refinement={0.4 if order < 3 else 0.25}")
     found = np.array([_after(made, steps) for steps in (1, 2, 4)])
     ratio = np.diff(found, axis=0)
@@ -308,7 +299,7 @@ def _after(made, steps):
 
 @EVERY_ORDER
 def test_a_run_ends_where_the_aggregate_reaches_an_end_of_the_pore(order):
-    """The last instant is reported, then PoreEnd. Mutant: the end of the pore not looked at."""
+    """The last instant is reported, then PoreEnd."""
     made = base('pore.length="90 um"', 'growth.end="19 h"', *sets(order))
     found = []
     with pytest.raises(PoreEnd, match="reaches the pore's upstream end"):
@@ -320,14 +311,13 @@ def test_a_run_ends_where_the_aggregate_reaches_an_end_of_the_pore(order):
 
 @pytest.mark.parametrize("before, after", [(1.0, 1.0), (1.0, 1.2), (1.0, 0.9), (3.0, 0.0), (2.01, 1.0)])
 def test_the_part_of_a_step_to_contact_is_bounded(before, after):
-    """Also where the film was too thin from the start and does not thin. Mutant: a division by no change."""
+    """Also where the film was too thin from the start and does not thin."""
     assert 0.02 <= stepping._to_contact((before, after, 2.0)) <= 0.95
 
 
 @EVERY_ORDER
 def test_a_film_too_thin_from_the_start_closes(order):
-    """Though nothing grows: without a supply the aggregate neither grows nor decays. Mutants: a division by no change,
-    a search for the step that ends with the film."""
+    """Though nothing grows: without a supply the aggregate neither grows nor decays."""
     numerics = {"preset": "fast", "elements": ORDERS[order], "refinement": 0.6 if order == 1 else 0.2}
     made = scene("18.5 um", "20 um", acceptor="0 mg/L", donor="0 mg/L", velocity="2.9 m/day", growth={"end": "0.1 h"},
                  numerics=numerics)

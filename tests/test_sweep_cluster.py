@@ -23,7 +23,6 @@ VARY = ["--vary", "pore.width=48:52 um:linear:6", "--set", "numerics.preset=fast
 
 @pytest.mark.parametrize("package", ["distributed", "dask"])
 def test_without_the_package_the_message_says_what_to_install(tmp_path, capsys, monkeypatch, package):
-    """Mutant: what is needed looked for when the folder is made."""
     monkeypatch.delitem(sys.modules, "distributed", raising=False)
     monkeypatch.setitem(sys.modules, package, None)
     assert main(["sweep", "base", *VARY, "--out", str(tmp_path / "sweep"), "--scheduler", "tcp://127.0.0.1:1"]) == 2
@@ -38,8 +37,7 @@ ADDRESSES = ["nonsense", "tcp://", "tcp://127.0.0.1:99999", "tcp://[::1", "tcp:/
 
 @pytest.mark.parametrize("address", ADDRESSES)
 def test_a_bad_address_is_refused_within_five_seconds(address):
-    """Where nobody listens, where nobody answers, where there is no such host, where it is no address. Mutants: ten
-    seconds for each try; an answer that is waited for for ever."""
+    """Where nobody listens, where nobody answers, where there is no such host, where it is no address."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         where = address.format(closed=free_port(), silent=server.getsockname()[1])
         pytest.importorskip("distributed")
@@ -51,7 +49,6 @@ def test_a_bad_address_is_refused_within_five_seconds(address):
 
 
 def test_what_greets_otherwise_is_no_scheduler():
-    """Mutant: the banner of another server taken for a length, and as much memory."""
     def greet():
         with server.accept()[0] as connection:
             connection.sendall(b"SSH-2.0-OpenSSH_9.9\r\n")
@@ -64,7 +61,7 @@ def test_what_greets_otherwise_is_no_scheduler():
 
 
 def test_a_bad_address_writes_nothing(tmp_path):
-    """In one line, with status 2. Mutants: the folder made first; a traceback of the package."""
+    """In one line, with status 2."""
     process = on_cluster(f"tcp://127.0.0.1:{free_port()}", tmp_path / "sweep")
     message = process.communicate(timeout=60)[1]
     assert process.returncode == 2 and message.startswith("repro: --scheduler") and message.count("\n") == 1, message
@@ -72,7 +69,7 @@ def test_a_bad_address_writes_nothing(tmp_path):
 
 
 def test_a_worker_with_other_code_makes_nothing(tmp_path):
-    """One that joins a sweep at work is not asked before. Mutant: its run taken."""
+    """One that joins a sweep at work is not asked before."""
     assert "failed: a worker that joined has version" in cluster.attempt("{}", "0.0.1-abc")
 
 
@@ -121,8 +118,7 @@ def on_cluster(address, out, *arguments):
 
 @pytest.mark.thorough
 def test_no_run_is_lost_or_there_twice_where_a_worker_is_killed(workers, tmp_path):
-    """Six runs, two workers, one of them killed while it has a run at work; then as without a cluster. Mutants: a run
-    that dies with its worker; two attempts in one folder; runs that differ from those of this machine."""
+    """Six runs, two workers, one of them killed while it has a run at work; then as without a cluster."""
     address, start = workers
     first, _ = start("one"), start("two")
     out = tmp_path / "sweep"
@@ -159,7 +155,7 @@ def test_a_sweep_that_lost_its_cluster_is_gone_on_with_here(workers, tmp_path):
 
 @pytest.mark.thorough
 def test_a_cluster_that_cannot_be_used_is_refused(workers, tmp_path, capsys, monkeypatch):
-    """No workers, workers with another version. Mutant: waiting for ever."""
+    """No workers, workers with another version."""
     address, start = workers
     monkeypatch.setattr(cluster, "PATIENCE", 2)
 

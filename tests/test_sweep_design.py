@@ -42,7 +42,7 @@ def test_what_is_neither_is_refused_in_one_line(text):
 
 @given(RANGES, SPACINGS, st.integers(2, 50))
 def test_levels_go_evenly_from_end_to_end(ends, spacing, count):
-    """But for the 12 digits that they have. Mutants: an end left out; equal steps where the range is logarithmic."""
+    """But for the 12 digits that they have."""
     found = levels(Factor("pore.width", "um", ends, spacing, count))
     assert len(found) == count and (found[0], found[-1]) == ends
     scale = [math.log(value) for value in found] if spacing == "log" else found
@@ -70,7 +70,6 @@ def test_a_grid_needs_counts_and_has_a_largest_size():
 
 @given(st.lists(st.tuples(RANGES, SPACINGS), min_size=1, max_size=4), st.integers(1, 60), st.integers(0, 2**32))
 def test_each_stratum_of_each_range_has_one_value(ranges, samples, seed):
-    """Mutants: independent random numbers; strata of the values where the range is logarithmic."""
     factors = [Factor(f"key{k}", "um", ends, spacing) for k, (ends, spacing) in enumerate(ranges)]
     for factor, drawn in zip(factors, zip(*latin(factors, samples, seed))):
         low, high = factor.values
@@ -87,7 +86,6 @@ def test_each_stratum_of_each_range_has_one_value(ranges, samples, seed):
 
 @given(st.integers(1, 12), st.integers(1, 5), st.integers(0, 1000))
 def test_a_list_is_drawn_evenly(words, times, seed):
-    """Mutant: each value drawn by itself."""
     factor = Factor("numerics.preset", "", tuple(f"word{k}" for k in range(words)))
     drawn = [values[0] for values in latin([factor], words * times, seed)]
     assert {word: drawn.count(word) for word in factor.values} == dict.fromkeys(factor.values, times)
@@ -117,7 +115,7 @@ def made(*varied, sets=(), source="base"):
 
 
 def test_varying_one_of_the_pair_replaces_the_other_and_keeps_the_rest():
-    """base has a head. Mutant: the whole section replaced."""
+    """base has a head."""
     (point,) = made("flow.mean_velocity=2 m/day", sets=["flow.viscosity_ratio=7"])
     told = scene_tables(point.scene)["flow"]
     assert "head" not in told and told["viscosity_ratio"] == 7
@@ -127,7 +125,6 @@ def test_varying_one_of_the_pair_replaces_the_other_and_keeps_the_rest():
 
 
 def test_a_varied_preset_brings_its_defaults():
-    """Mutant: varying a scene whose defaults are spelt out already."""
     fast, paper = made("numerics.preset=fast, paper")
     assert (fast.scene.numerics.elements, paper.scene.numerics.elements) == ("quadratic", "linear")
     assert fast.name[:5] == "0001-" and paper.name[:5] == "0002-" and len({fast.name[5:], paper.name[5:]}) == 2

@@ -7,7 +7,6 @@ from verification import throughput
 
 @pytest.mark.parametrize("ratios, status", [((0.99, 0.2, 0.96), 0), ((0.94, 0.99, 0.85), 1)])
 def test_the_median_is_judged(monkeypatch, capsys, ratios, status):
-    """Mutants: the best or the last repeat judged; the other preset; always zero."""
     found = {throughput.JUDGED: iter(ratios), throughput.TOLD: iter([0.9 if status else 0.1] * 3)}
     monkeypatch.setattr(throughput, "measure", lambda preset, count: next(found[preset]))
     monkeypatch.setattr(throughput, "commands", lambda: {})
@@ -17,7 +16,7 @@ def test_the_median_is_judged(monkeypatch, capsys, ratios, status):
 
 @pytest.mark.parametrize("slow, status", [(1.0, 0), (1.35, 1)])
 def test_a_command_that_costs_too_much_is_told(monkeypatch, capsys, slow, status):
-    """By its time over that of the imports and of a warm run. Mutants: the worst of five; never judged."""
+    """By its time over that of the imports and of a warm run."""
     monkeypatch.setattr(throughput, "measure", lambda preset, count: 0.99)
     monkeypatch.setattr(throughput, "warm", lambda preset, folder: 0.3)
     taken = {"-m": {"--help": 0.1, "run": 0.6 * slow}, "-c": {"numpy": 0.08, "all": 0.3}}

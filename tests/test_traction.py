@@ -25,7 +25,7 @@ def base(*changes, order=1):
 
 @pytest.mark.parametrize("elements", ORDERS.values())
 def test_refused_with_stress_free_biomass(elements):
-    """Which would yield at every update, on elements of any order. Mutant: the rule left out."""
+    """Which would yield at every update, on elements of any order."""
     with pytest.raises(SceneError, match="growth.fluid_forces") as caught:
         load_scene("base", ['numerics.preset="paper"', 'growth.fluid_forces="included"',
                             f"numerics.elements={elements}", "growth.new_biomass=stress_free"])
@@ -50,7 +50,7 @@ def test_the_paper_neglects_them():
 
 
 def test_the_unit_is_that_of_water_pressure():
-    """A column of 1 cm of water is 97.9 Pa. Mutant: density taken for kg/m3."""
+    """A column of 1 cm of water is 97.9 Pa."""
     drive = base().flow
     centimetre = 1e4 * traction.MPA_PER_UM * drive.density * drive.gravity
     assert centimetre == pytest.approx(998 * 9.81 * 0.01 * 1e-6, rel=1e-12)
@@ -58,7 +58,7 @@ def test_the_unit_is_that_of_water_pressure():
 
 @EVERY_ORDER
 def test_an_even_head_pushes_along_the_normals(order):
-    """On a seed: the sum over all nodes of the interface is the head times its width, downwards. Mutant: sign."""
+    """On a seed: the sum over all nodes of the interface is the head times its width, downwards."""
     now = pore.seeded(base(order=order))
     count = pressure_space(now.space).count
     still = Flow(0.0, np.zeros((now.space.count, 2)), np.full(count, 3.0), None, 0.0, 0.0, 0.0)
@@ -74,8 +74,7 @@ def test_an_even_head_pushes_along_the_normals(order):
 
 @EVERY_ORDER
 def test_the_forces_of_the_fluid_add_up_to_nothing(order):
-    """On the aggregate, the walls and the ends, in x: the flow's own equations, summed. Mutants: forces of all
-    triangles, a stress of another form than the flow's."""
+    """On the aggregate, the walls and the ends, in x: the flow's own equations, summed."""
     for interface in ("laplacian", "traction"):
         said = base(f"numerics.interface={interface}", order=order)
         now = pore.seeded(said)
@@ -139,8 +138,7 @@ def test_a_run_with_them_is_pushed_downstream_and_counts_its_rounds(order):
 
 
 def test_all_orders_are_pushed_as_far():
-    """Linear elements to 20 % (measured 15 %) of what quadratic and cubic ones agree on to 1 % (0.04 %). Mutant: forces
-    of corners alone, or twice on the middles."""
+    """Linear elements to 20 % (measured 15 %) of what quadratic and cubic ones agree on to 1 % (0.04 %)."""
     far = []
     for order in ORDERS:
         (plain, _), (moved, _) = pushed(order)
@@ -180,8 +178,7 @@ def test_a_shape_with_its_own_mesh_needs_no_other(order):
 
 @pytest.mark.parametrize("order", [2, 3])
 def test_forces_on_curved_triangles_are_those_of_straight_ones(order):
-    """The drag on a seed, all that pushes its boundary downstream, to 5 %. Mutant: gradients of the flow's functions
-    for those of the mesh's."""
+    """The drag on a seed, all that pushes its boundary downstream, to 5 %."""
     said = base("numerics.refinement=1", order=1)
     now = pore.seeded(said)
     curved_pore = pore.seeded(base("numerics.refinement=1", order=order))

@@ -78,8 +78,7 @@ def point_areas(mesh, order):
 @given(meshes(clean=False), bends, seeds)
 def test_34_keeps_the_mass_of_every_point_in_a_body_that_grows_unevenly(order, grid, bend, seed):
     """X S before is X' S' after, in each point in which the reaction is taken; with linear functions node by node
-    against a loop, over biomass triangles alone, and nothing lies in the fluid. Nothing is negative. Mutant: S' / S,
-    all triangles at a node, one factor for the body."""
+    against a loop, over biomass triangles alone, and nothing lies in the fluid. Nothing is negative."""
     now, field = filled(grid, order, np.random.default_rng(seed))
     moved = now.moved(bent(now.mesh.points, bend))
     assume(not moved.mesh.turned_over().any())
@@ -105,8 +104,7 @@ def bent(points, bend):
 @pytest.mark.parametrize("order", ORDERS)
 @given(meshes(clean=False), between(0.3, 3.0), between(0.3, 3.0), st.floats(-1.0, 1.0))
 def test_34_keeps_a_constant_exactly_where_all_areas_grow_alike(order, grid, along, across, shear):
-    """Under any linear map: X over its determinant, at every point; and not where they do not. Mutant: a square root, a
-    mean over neighbours, the areas' ratio of one triangle."""
+    """Under any linear map: X over its determinant, at every point; and not where they do not."""
     now, _ = filled(grid, order, 3.0)
 
     def found(points):
@@ -120,7 +118,7 @@ def test_34_keeps_a_constant_exactly_where_all_areas_grow_alike(order, grid, alo
 
 def test_projection_is_the_best_approximation():
     """(X_new - X_old, N) = 0 for all N: no other nodal field is nearer in L2, not the interpolation either; and onto
-    its own mesh it changes nothing. Mutant: interpolation in its place, a lumped mass matrix."""
+    its own mesh it changes nothing."""
     old, new = MESHES[0], MESHES[6]
     assert transfer.project(*new, steep(new[0]), *new) == pytest.approx(steep(new[0]), abs=1e-12)
     projected = transfer.project(*old, steep(old[0]), *new)
@@ -145,8 +143,7 @@ def distance(old, field, new, found):
 
 
 def test_the_common_pieces_cover_both_meshes_once():
-    """Each triangle, old or new, is the sum of its pieces, and each piece lies in both. Mutant: fans of pieces with
-    more than four corners cut short, pieces of touching triangles counted."""
+    """Each triangle, old or new, is the sum of its pieces, and each piece lies in both."""
     old, new = MESHES[1], MESHES[7]
     corners, of_old, of_new = transfer.supermesh(*old, *new)
     edge = corners[:, 1:] - corners[:, :1]
@@ -159,15 +156,13 @@ def test_the_common_pieces_cover_both_meshes_once():
 
 
 def test_projection_refuses_meshes_of_different_shapes():
-    """Mutant: COVER widened: mass would be lost in silence."""
     points, triangles = MESHES[0]
     with pytest.raises(TransferError, match="common pieces"):
         transfer.project(points, triangles, linear(points), points * [1.0, 1.001], triangles)
 
 
 def test_interpolation_keeps_linear_fields_and_bounds():
-    """To round-off, at any point inside; bounds also a little outside. Mutant: the nearest node's value; weights of
-    another triangle."""
+    """To round-off, at any point inside; bounds also a little outside."""
     points, triangles = MESHES[0]
     where = np.random.default_rng(5).uniform([-10, 0.5], [10, 14], (300, 2))
     assert transfer.interpolate(points, triangles, linear(points), where) == pytest.approx(linear(where), abs=1e-12)
@@ -177,10 +172,7 @@ def test_interpolation_keeps_linear_fields_and_bounds():
 
 
 def test_ten_remeshes_conserve_by_projection_and_drift_by_interpolation():
-    """A steep field, eleven unrelated meshes: 1e-11 against -28 % (measured) with the paper's transfer [E8].
-
-    Mutant: the two transfers exchanged.
-    """
+    """A steep field, eleven unrelated meshes: 1e-11 against -28 % (measured) with the paper's transfer [E8]."""
     kept = sampled = steep(MESHES[0][0])
     mass = total(*MESHES[0], kept[:, 0])
     for old, new in zip(MESHES, MESHES[1:]):
@@ -191,7 +183,7 @@ def test_ten_remeshes_conserve_by_projection_and_drift_by_interpolation():
 
 def test_a_corner_on_a_side_of_the_window_loses_no_piece():
     """Corners of these two lie on each other's sides to round-off, where signs change more than twice. Found by
-    hypothesis. Mutant: room for one corner more a side."""
+    hypothesis."""
     one = np.array([[-16.24426155716945, 130.84127738448933], [-23.300536940563543, 128.28843621984055],
                     [-19.58595858772013, 122.50332319928634]])
     two = np.array([[-15.886283307711276, 128.7760213767805], [-21.144224195959378, 132.13499549379594],
@@ -215,8 +207,7 @@ def around():
 
 @pytest.mark.parametrize("kind", ["arcs", "flat", "straight"])
 def test_a_place_is_found_in_its_triangle(around, kind):
-    """By Newton's method on the curved map, to 1e-9 of the size. Mutants: the straight triangle's coordinates, the
-    first candidate taken."""
+    """By Newton's method on the curved map, to 1e-9 of the size."""
     mesh = around[kind]
     random, nodes = np.random.default_rng(8), mesh.points[mesh.cells]
     local = random.dirichlet([1, 1, 1], len(nodes))[:, 1:]
@@ -235,8 +226,7 @@ def drawn_places():
 
 
 def test_fields_of_the_maps_own_functions_are_carried_exactly(around):
-    """x(s, t)^2 is none of them on a curved triangle; places themselves are. Mutants: linear interpolation, nodes of
-    another triangle."""
+    """x(s, t)^2 is none of them on a curved triangle; places themselves are."""
     where = drawn_places()
     for mesh in around.values():
         body = mesh.cells[mesh.biomass]
@@ -246,7 +236,7 @@ def test_fields_of_the_maps_own_functions_are_carried_exactly(around):
 @pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("kind", ["flat", "straight"])
 def test_polynomials_of_the_order_are_carried_exactly(around, order, kind):
-    """On straight edges, whatever carries the map. Mutants: linear interpolation, nodes of another triangle."""
+    """On straight edges, whatever carries the map."""
     mesh, where = around[kind], drawn_places()
     space = Space(mesh, order)
 
@@ -262,7 +252,7 @@ def test_polynomials_of_the_order_are_carried_exactly(around, order, kind):
 
 
 def test_a_place_a_little_outside_is_moved_to_the_edge(around):
-    """A chord cuts an arc: what is between them is outside of the chord's triangle. Mutants: extrapolated, refused."""
+    """A chord cuts an arc: what is between them is outside of the chord's triangle."""
     for mesh in around.values():
         places = np.column_stack([[-5.0, 5.0], np.full(2, -1e-3)])
         at = transfer.located(mesh.points, mesh.cells, places)
@@ -273,7 +263,6 @@ def test_a_place_a_little_outside_is_moved_to_the_edge(around):
 
 @pytest.mark.parametrize("kind", ["arcs", "straight"])
 def test_a_place_far_outside_is_refused(around, kind):
-    """Mutant: the nearest triangle, however far."""
     mesh = around[kind]
     with pytest.raises(TransferError, match="of the new mesh is not in the old one"):
         transfer.located(mesh.points, mesh.cells, np.array([[0.0, 5.0], [500.0, 5.0]]))
@@ -281,7 +270,7 @@ def test_a_place_far_outside_is_refused(around, kind):
 
 def test_places_at_the_start_are_unfolded(around):
     """A middle whose place at t = 0 turns its triangle over goes half way between its corners; others stay. Corners
-    that fold are refused, of straight triangles too. Mutants: nothing done, all middles straightened, corners moved."""
+    that fold are refused, of straight triangles too."""
     mesh = around["arcs"]
     assert transfer.unfolded(mesh, mesh.points) is mesh.points
     body, origin = mesh.cells[mesh.biomass], mesh.points.copy()
@@ -302,7 +291,7 @@ def test_places_at_the_start_are_unfolded(around):
 def test_a_remesh_keeps_mass_and_composition(kind):
     """Of both kinds of biomass, to round-off where the transfer conserves them; with order 2 and 3 the mass is X_m
     times the area, before and after; the share of X_I stays within what it was; places at t = 0 are those of the same
-    material. Mutants: the expansion not restarted, shares beyond their bounds, origin of the mesh's own places."""
+    material."""
     made = load_scene("base", ('numerics.preset="fast"', f'numerics.elements="{kind}"', "numerics.refinement=0.5",
                                'aggregate.radius="20 um"'))
     X_m, now = made.kinetics.maximum_density, pore.seeded(made)
@@ -352,7 +341,7 @@ def random_field(seed: int, share: float) -> np.ndarray:
 
 @given(st.integers(0, 10**6), st.floats(0.02, 0.98), st.floats(1e-6, 1e6), st.floats(-1.0, 1.0))
 def test_a_bounded_transfer_keeps_mass_and_bounds(seed, share, scale, level):
-    """For rough fields of any size and level. Mutant: fluxes limited on one side, or not at all."""
+    """For rough fields of any size and level."""
     before = scale * (random_field(seed, share) + level)
     after = transfer.project_bounded(*OLD, before[:, None], *NEW)[:, 0]
     assert after.min() >= before.min() and after.max() <= before.max()

@@ -18,7 +18,6 @@ def folder(tmp_path_factory):
 
 
 def test_the_tutorial_works_from_its_first_line_to_its_last(folder, capsys, monkeypatch):
-    """Mutants: an example that is refused; a name in its Python that is not exported; a message that has changed."""
     monkeypatch.chdir(folder)
     names, printed, statuses = {}, [], []
     for block in blocks(PAGE):

@@ -21,7 +21,6 @@ SIZES = np.array([1.0, 2**0.5, 2**-0.5, 0.5])
                                            (2.0, (2.0, 2.0))])
 @pytest.mark.parametrize("sizes", [SIZES, (1.0, 2.0, 3.0, 4.0), (1.0, 1.5, 2.0), (0.7, 0.3, 1.1), (2.0, 3.0, 1.0)])
 def test_a_power_law_has_its_order_and_a_bar_of_its_error_times_125(sizes, order, formal):
-    """Mutants: the error of the finest size and not of the first one; another factor; unequal ratios taken as equal."""
     found = estimate(sizes, [7.0 - 0.3 * h**order for h in sizes], formal)
     assert found.order == pytest.approx(order, abs=1e-5)
     assert found.bar == pytest.approx(OBSERVED * 0.3 * sizes[0] ** order, rel=1e-4)
@@ -36,7 +35,6 @@ def test_the_example_of_celik_et_al():
 
 
 def test_the_bar_is_roaches_formula_on_the_two_finest_of_three():
-    """Mutant: r - 1 for r^p - 1."""
     found = estimate([1.0, 2.0, 4.0], [3.0, 3.1, 3.4], (2.0, 2.0))
     assert found.bar == pytest.approx(OBSERVED * 0.1 / (2**found.order - 1), rel=1e-6)
     assert found.order == pytest.approx(math.log2(3), abs=1e-6)
@@ -44,7 +42,7 @@ def test_the_bar_is_roaches_formula_on_the_two_finest_of_three():
 
 @pytest.mark.parametrize("order", [1.3, 2.0, 2.4])
 def test_an_order_over_the_lowest_formal_one_is_not_made_use_of(order):
-    """It is reasonable, and fitted as 1. Mutant: use it, which makes the bar smaller."""
+    """It is reasonable, and fitted as 1."""
     found = estimate(SIZES, SIZES**order, BOTH)
     assert found.order == pytest.approx(order, abs=1e-4) and found.factor == OBSERVED
     slope, apart = uncertainty.fit(SIZES, SIZES**order, 1.0)
@@ -54,7 +52,6 @@ def test_an_order_over_the_lowest_formal_one_is_not_made_use_of(order):
 
 @pytest.mark.parametrize("formal, order", [(BOTH, 0.3), (BOTH, 2.8), (BOTH, 6.0), ((1.0, 1.0), 0.4), ((1.0, 1.0), 1.8)])
 def test_an_unreasonable_order_gets_three_and_the_formal_order(formal, order):
-    """Mutants: 1.25 with it; a band that has no end."""
     found = estimate(SIZES, SIZES**order, formal)
     assert found.order == pytest.approx(order, abs=1e-3) and found.factor == FORMAL
     assert found.bar == pytest.approx(FORMAL * np.ptp(SIZES**order) / (2**0.5 - 0.5))
@@ -63,13 +60,12 @@ def test_an_unreasonable_order_gets_three_and_the_formal_order(formal, order):
 @pytest.mark.parametrize("values", [(1.0, 1.1, 1.0, 1.1), (1.0, 1.1, 1.1, 1.0), (1.0, 1.0, 1.0, 1.1),
                                     (1.05, 1.1, 1.0, 1.08)])
 def test_oscillation_is_covered_by_three_times_the_range(values):
-    """Steps of 1 to 4 at the formal order of one: the range itself, times 3 / (4 - 1). Mutant: neighbours alone."""
+    """Steps of 1 to 4 at the formal order of one: the range itself, times 3 / (4 - 1)."""
     found = estimate([1.0, 2.0, 3.0, 4.0], values, (1.0, 1.0))
     assert found.factor == FORMAL and found.bar == pytest.approx(max(values) - min(values))
 
 
 def test_a_law_that_drowns_in_scatter_is_not_believed():
-    """Mutant: no look at the scatter; the least-squares order alone is 1.4."""
     h = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
     f = h**1.4 + np.array([0.0, 5.0, -5.0, 5.0, -5.0, 0.0])
     order = uncertainty.observed_order(h, f)
@@ -80,7 +76,7 @@ def test_a_law_that_drowns_in_scatter_is_not_believed():
 @pytest.mark.parametrize("noise", [0.02, 0.1, 0.5])
 @pytest.mark.parametrize("order", [1.0, 1.5, 2.0])
 def test_the_bar_covers_the_error_of_noisy_values(noise, order):
-    """At least 19 of 20, Roache's aim, for noise of a part of the error. Mutant: the bar with the observed order."""
+    """At least 19 of 20, Roache's aim, for noise of a part of the error."""
     generator = np.random.default_rng(2001)
     covered = 0
     for _ in range(200):
@@ -91,7 +87,6 @@ def test_the_bar_covers_the_error_of_noisy_values(noise, order):
 
 @pytest.mark.parametrize("values", [(5.0, 5.0, 5.0), (0.0, 0.0, 0.0), (5.0, 5.0 + 1e-13, 5.0 - 1e-13)])
 def test_what_is_the_same_on_all_sizes_has_no_error(values):
-    """Mutant: round-off taken for a difference, which has any order."""
     found = estimate([1.0, 2.0, 4.0], values, BOTH)
     assert found.bar == 0 and found.factor == 0 and math.isnan(found.order)
 
@@ -99,7 +94,7 @@ def test_what_is_the_same_on_all_sizes_has_no_error(values):
 @given(st.floats(-3, 3).filter(lambda c: abs(c) > 0.01), st.floats(-2, 2), st.floats(0.1, 10),
        st.permutations((1, 2, 3)))
 def test_units_and_the_order_of_the_other_sizes_do_not_matter(scale, shift, unit, others):
-    """Bars are in the number's unit, sizes in any. Mutant: a bar relative to the value."""
+    """Bars are in the number's unit, sizes in any."""
     f = np.array([1.0, 1.13, 0.94, 0.91])
     found = estimate(SIZES, f, BOTH)
     keep = [0, *others]
@@ -116,7 +111,6 @@ def test_fewer_than_three_sizes_and_no_numbers_are_refused(sizes, values):
 
 
 def test_the_bars_of_mesh_and_step_add_up():
-    """Mutant: the root of the sum of squares."""
     mesh, step = Estimate(0.3, 2.0, OBSERVED), Estimate(0.4, 1.0, OBSERVED)
     assert (combined(5.0, mesh, step).low, combined(5.0, mesh, step).high) == pytest.approx((4.3, 5.7))
     assert combined(5.0, mesh, None).high == pytest.approx(5.3)
@@ -127,13 +121,11 @@ def test_a_spread_goes_from_the_least_to_the_largest_value():
 
 
 def test_a_value_on_the_edge_of_a_bar_is_in_it_to_round_off():
-    """Mutant: strictly inside, where 110 um computed with round-off is not 110 um."""
     assert 110.0 in combined(110.0 * (1 + 1e-15), Estimate(0.0, math.nan, 0.0), None)
     assert 110.0 not in combined(110.001, Estimate(0.0, math.nan, 0.0), None)
 
 
 def test_a_scene_is_that_of_the_level():
-    """Mutants: the default's mesh or step at all levels; another hash of the default, which the figures share."""
     assert scene_hash(runs.scene("base")) == scene_hash(load_scene("base"))
     with at_level(Level(size=0.5, step=3.0)):
         said, still = runs.scene("base", "numerics.refinement=0.7"), runs.scene("flow_only")
@@ -143,7 +135,7 @@ def test_a_scene_is_that_of_the_level():
 
 @pytest.mark.parametrize("step", levels.STEPS)
 def test_every_step_lands_on_the_instants_of_section_4(step):
-    """19.2 h, then 19.4 h, 12 min later. Mutant: steps of 60 min, which have 19 h before."""
+    """19.2 h, then 19.4 h, 12 min later."""
     with at_level(Level(step=step)):
         times, reported = schedule(runs.scene(*runs.BASE))
         last, _ = schedule(runs.scene(*runs.PLATES))
@@ -152,7 +144,6 @@ def test_every_step_lands_on_the_instants_of_section_4(step):
 
 
 def test_what_is_kept_is_kept_for_its_level():
-    """Mutants: the default's value at all levels; nothing kept; what is kept of a level never forgotten."""
     computed = []
 
     @levels.cached
@@ -176,8 +167,7 @@ def test_a_level_ends_with_its_block_even_by_an_error():
 
 
 def test_the_converged_solution_is_refined_in_space_and_time_at_once():
-    """Twice as fine: half the elements' size, a fourth of the tolerance, and its rows. Mutants: one of both alone; the
-    preset of the scene; rows where its steps happen to end."""
+    """Twice as fine: half the elements' size, a fourth of the tolerance, and its rows."""
     with at_level(Level(CONVERGED, 0.5)):
         said, wide = runs.scene("base", "numerics.mesh_compressibility=2"), runs.scene("wide")
     plain = load_scene("base", ['numerics.preset="accurate"'])
@@ -187,7 +177,7 @@ def test_the_converged_solution_is_refined_in_space_and_time_at_once():
 
 
 def test_every_claim_is_computed_on_three_meshes_and_with_three_steps_or_says_why_not():
-    """And a claim about the model with the scheme beside it. Mutant: a claim judged at one level."""
+    """And a claim about the model with the scheme beside it."""
     evaluate.register_all()
     for claim in claims.CLAIMS.values():
         kinds = [level.kind for level in claim.levels]
@@ -204,7 +194,7 @@ def test_every_claim_is_computed_on_three_meshes_and_with_three_steps_or_says_wh
 def judged(check, value, **fields):
     """A check with its bar, from a function of the level that gives the value."""
     claim = Claim("C01", "4", "", lambda: None, **({"about": claims.OF_SCHEME} | fields))
-    at = {level: bars.numbers(Finding((claims.replace(check, ours=value(level)),))) for level in claim.levels}
+    at = {level: bars.numbers(Finding((claims.replace(check, value=value(level)),))) for level in claim.levels}
     return bars.barred(claim, Finding((check,)), at).checks[0]
 
 
@@ -215,19 +205,17 @@ def test_bars_come_from_both_families_of_levels():
     """2.9 + 0.01 h with elements, 0.002 steps more with each: errors add up to 0.012, bars to 1.25 times that."""
     found = judged(SPEED, lambda level: 2.898 + 0.01 * level.size + 0.002 * level.step)
     assert found.bar.mesh.bar == pytest.approx(0.0125) and found.bar.step.bar == pytest.approx(0.0025)
-    assert found.bar.high - found.ours == pytest.approx(0.015)
+    assert found.bar.high - found.value == pytest.approx(0.015)
 
 
 def test_the_bar_of_the_converged_solution_has_nothing_of_the_scheme_which_stands_beside_it():
-    """Mutants: the scheme's values in the bar; its range from the converged ones."""
     found = judged(SPEED, lambda level: (2.9 if level.kind == CONVERGED else 3.0) + 0.01 * level.size,
                    about=claims.MODEL)
-    assert found.bar.high - found.ours == pytest.approx(1.25 * 0.005)
+    assert found.bar.high - found.value == pytest.approx(1.25 * 0.005)
     assert found.scheme == pytest.approx((3.0 + 0.01 * 2**-0.5, 3.0 + 0.01 * 2**0.5))
 
 
 def test_a_width_of_printed_digits_is_added_to_the_bar():
-    """Mutant: the bar in its place, or nothing but it."""
     wide = claims.replace(SPEED, bar=Bar(2.81, 3.11))
     found = judged(wide, lambda level: 2.9 + 0.01 * level.size, steps=ALONE)
     assert (found.bar.low, found.bar.high) == pytest.approx((2.81 - 0.0125, 3.11 + 0.0125))
@@ -235,11 +223,10 @@ def test_a_width_of_printed_digits_is_added_to_the_bar():
 
 def test_what_is_not_varied_gives_no_bar():
     found = judged(SPEED, lambda level: 2.9 + 0.01 * level.size, steps=ALONE)
-    assert found.bar.step is None and found.bar.high - found.ours == pytest.approx(0.0125)
+    assert found.bar.step is None and found.bar.high - found.value == pytest.approx(0.0125)
 
 
 def test_a_number_without_a_limit_has_the_range_of_all_levels():
-    """Mutant: a Grid Convergence Index of a count."""
     count = claims.without_limit(claims.at_most("triangles", "6", 5, 6, ""))
     found = judged(count, lambda level: 9 if level.size == 0.5 else 5)
     assert (found.bar.low, found.bar.high, found.bar.mesh) == (5, 9, None)
@@ -247,7 +234,6 @@ def test_a_number_without_a_limit_has_the_range_of_all_levels():
 
 
 def test_the_instant_of_an_event_may_differ_between_levels_and_the_quantity_may_not():
-    """Mutant: numbers matched by their place alone."""
     claim = Claim("C01", "4", "", lambda: None, about=claims.OF_SCHEME)
     same = {level: (("speed at 34.8 h (m/d)", 2.9, True),) for level in claim.levels}
     assert bars.barred(claim, Finding((SPEED,)), same).checks[0].bar

@@ -26,12 +26,10 @@ def result(*checks, studies=(), error=""):
     (Check("x", math.nan, 0.0, 1.0, ""), False), (at_most("x", math.inf, 1.0, ""), False),
 ])
 def test_a_number_holds_in_its_range_alone(check, holds):
-    """Mutant: `not (value > high)`, which not-a-number passes; one side unchecked."""
     assert check.holds is holds
 
 
 def test_a_case_passes_only_if_it_measures_something_and_all_of_it_holds():
-    """Mutant: any for all; an empty outcome, or one stopped by an error, that passes."""
     good, bad = at_most("good", 0.5, 1.0, ""), at_most("bad", 2.0, 1.0, "")
     assert result(good).verdict == case.PASSES
     for short in (result(good, bad), result(), result(good, error="ValueError"), result(studies=(_of_order(3.0),))):
@@ -45,7 +43,6 @@ def _of_order(order, ceiling=math.inf):
 @pytest.mark.parametrize("order, holds", [(2.0, True), (2.2, True), (1.8, True), (1.0, False), (3.0, False),
                                           (1.6, False), (2.4, False), (0.0, False)])
 def test_a_wrong_order_is_caught_on_both_sides(order, holds):
-    """Mutant: `orders >= low` alone; the mean of the orders for each of them."""
     assert _of_order(order).holds is holds
 
 
@@ -74,7 +71,6 @@ def test_a_study_takes_four_falling_sizes(sizes):
     (math.nan, 0.1, "nan"),
 ])
 def test_numbers_are_told_to_their_tolerance(value, quantum, text):
-    """Mutant: all digits, so that REPORT.md changes with every run."""
     assert case.rounded(value, quantum) == text
 
 
@@ -97,7 +93,6 @@ def test_every_stage_has_cases_and_each_says_what_must_break_it():
 
 
 def test_a_case_is_called_for_each_of_its_variants_whose_label_ends_its_names():
-    """Mutants: the first variant alone; names without their labels; a list within a list that is left out."""
     curve = case.Profile("picture", "x", "y", ())
     chosen = case.Case("x", "flow", "c", "exact", "n", ("m",), False,
                        lambda value: ([at_most("q", value, 1.5, "")], _of_order(2.0), (curve for _ in range(2))),
@@ -124,7 +119,6 @@ def test_a_way_that_is_none_is_refused():
 
 @pytest.mark.parametrize("id", ["flow-sections", "growth-homogeneous", "reprojection-mass", "coupling-stiffness"])
 def test_a_case_runs_with_the_orders_that_it_says(id, monkeypatch):
-    """Mutant: an order that is said and not run."""
     driver.load()
     orders, made = set(), Space.__init__
 
@@ -146,8 +140,7 @@ def _forget():
 
 
 def test_what_is_verified_by_what_has_no_orphan_and_is_written():
-    """Every case, mutant, reference and claim stands in a line of the modules, and no line is without cases. Mutants: a
-    module of the table without cases; a reference that none uses; a page that was not written anew."""
+    """Every case, mutant, reference and claim stands in a line of the modules, and no line is without cases."""
     driver.load()
     assert matrix.orphans() == [] and matrix.unexplained() == []
     assert matrix.FILE.read_text(encoding="utf-8") == matrix.text()
@@ -161,7 +154,6 @@ def test_an_orphan_is_told(monkeypatch):
 
 
 def test_what_is_round_off_or_another_machines_is_not_committed():
-    """Mutants: all digits; the value of a number that is round-off."""
     assert at_most("x", 3e-13, 1e-9, "").told == "" and at_most("x", 0.012345, 0.1, "").told == "0.01"
     assert between("x", 1.0, 0.123456, 2.0, "").accepted == "0.123 to 2"
     assert _of_order(2.0).told == "order 2.0, 2.0, 2.0"
@@ -214,7 +206,6 @@ def _wrong_cauchy(F, P, S):
 
 
 def test_the_exit_status_is_the_verdict(monkeypatch, capsys):
-    """Mutant: exit 0 whatever fails; exit 0 of a run without cases."""
     driver.load()
     for checks, status in (((at_most("q", 0.5, 1.0, ""),), 0), ((at_most("q", 2.0, 1.0, ""),), 1)):
         monkeypatch.setattr(driver, "run_all", lambda ids, jobs, found=checks: [result(*found)])

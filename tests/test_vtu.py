@@ -27,14 +27,13 @@ def same(one, other):
 
 @pytest.mark.parametrize("kind", ["triangle", "triangle6"])
 def test_what_is_written_is_read(tmp_path, kind):
-    """Mutants: vectors read as numbers; columns for rows; another type of cells."""
     made = grid(kind)
     vtu.write(tmp_path / "one.vtu", made)
     assert same(vtu.read(tmp_path / "one.vtu"), made) and same(meshio.read(tmp_path / "one.vtu"), made)
 
 
 def test_what_meshio_has_written_is_read(tmp_path):
-    """Runs of earlier versions, in blocks of 32 kB. Mutant: the first block alone."""
+    """Runs of earlier versions, in blocks of 32 kB."""
     made = grid("triangle6")
     long = np.random.default_rng(5).normal(size=(20_000, 3))
     meshio.Mesh(long, [("triangle6", made.cells[0].data)], {"head_cm": long[:, 1]}).write(tmp_path / "one.vtu")

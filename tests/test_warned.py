@@ -33,7 +33,7 @@ def checked(capsys):
 @pytest.mark.parametrize("options", [[], ["--quiet"], ["--json"]])
 def test_a_run_warns_of_what_check_warns_of(tmp_path, capsys, checked, options):
     """The same keys and words, once each, however it is told what happens, and the exit status is that of a run
-    without. Mutants: silence under --quiet; warnings on standard output; numbers of another velocity."""
+    without."""
     assert main(["run", *COMMAND, "--out", str(tmp_path / "run"), *options]) == 0
     out, err = capsys.readouterr()
     lines = [line for line in err.splitlines() if "warning" in line]
@@ -44,7 +44,7 @@ def test_a_run_warns_of_what_check_warns_of(tmp_path, capsys, checked, options):
 
 
 def test_the_page_tells_them_at_its_head(tmp_path, checked):
-    """Before the fields. Mutants: at the end of the page; a dictionary as it is printed."""
+    """Before the fields."""
     run(load_scene("wide", SETS), tmp_path)
     text = text_of(tmp_path)
     head = text[: text.index("</header>")]
@@ -61,7 +61,7 @@ def test_a_run_without_any_has_an_empty_list(tmp_path, capsys):
 
 
 def test_a_resume_keeps_them(tmp_path, checked):
-    """Without working them out again. Mutant: a list that is empty after a resume, or twice as long."""
+    """Without working them out again."""
     left = iter([0, 15])
     with pytest.raises(Interrupted):
         run(load_scene("wide", SETS), tmp_path / "parts", watch=Watch(stop=lambda: next(left, 0)))
@@ -72,13 +72,12 @@ def test_a_resume_keeps_them(tmp_path, checked):
 
 
 def test_a_script_is_not_warned(tmp_path, recwarn):
-    """Of the scene's simplifications: they are in run.json. Mutant: a Python warning a run."""
+    """Of the scene's simplifications: they are in run.json."""
     run(load_scene("wide", SETS), tmp_path)
     assert not recwarn.list
 
 
 def test_numbers_that_cannot_be_worked_out_end_no_run(monkeypatch):
-    """Mutant: a traceback after the first state is solved."""
     def fails(*_):
         raise OverflowError("math range error")
 

@@ -1,4 +1,4 @@
-"""Wrong changes that cases must catch: ``python -m verification.mutants``, see :mod:`verification.kernel.mutants`."""
+"""Wrong changes that cases or tests must catch: ``python -m verification.mutants``, of verification.kernel.mutants."""
 
 import sys
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from verification.audit import measure, special
+from verification.audit import choices, measure
 from verification.audit.choices import CHOICES, Choice
 from verification.bench.record import machine, save
 
@@ -20,8 +20,8 @@ METHOD = (f"base, preset paper, to {measure.END:g} h in steps of {60 * measure.S
 
 def main() -> int:
     """Entry point."""
-    noise = special.meshes()
-    rows = [noise, *map(named, CHOICES), special.midpoint(), special.drift(), *special.symmetry()]
+    noise = choices.meshes()
+    rows = [noise, *map(named, CHOICES), choices.midpoint(), choices.drift(), *choices.symmetry()]
     rows = [{**row, "resolved": resolved(row["effect"], noise[row.pop("noise", "effect")])} for row in rows]
     save({"machine": machine(), "method": METHOD, "rows": rows}, RECORD)
     print("\n".join(table(rows)))
@@ -36,7 +36,7 @@ def named(choice: Choice) -> dict:
     effects = compare(other, default, found)
     state = measure.one_state(said, other, default) if choice.state else {}
     print(f"{choice.choice}: {choice.alternative}", file=sys.stderr, flush=True)
-    row = special.row(choice.choice, choice.default, choice.alternative, ratio, effects, choice.note)
+    row = choices.row(choice.choice, choice.default, choice.alternative, ratio, effects, choice.note)
     return {**row, "one_state": state, "noise": "effect" if choice.meshes else "two_meshes"}
 
 

@@ -12,7 +12,7 @@ from repro import timing
 from repro.march.simulation import simulate
 from repro.results import row
 from repro.scene import load_scene
-from verification.bench import options, record
+from verification.bench import record
 from verification.bench.clock import measured
 
 REPEATS = 3
@@ -56,13 +56,11 @@ def jobs(truth: np.ndarray, times, quick: bool) -> dict:
     found = {(PRESET_PAPER, f"refinement {r:g}, {m} min"): partial(
         simulated, truth, times, "numerics.preset=paper", f"numerics.refinement={r}", f"growth.time_step={m} min")
         for r, m in PAPER[:cut]}
-    alone = [("midpoint alone", ())]
-    if options.known("flow_element"):
-        alone.append(("midpoint and bubble", ("numerics.flow_element=bubble",)))
-        found |= {("bubble alone", f"refinement {r:g}, {m} min"): partial(
-            simulated, truth, times, "numerics.preset=paper", f"numerics.refinement={r}", f"growth.time_step={m} min",
-            "numerics.flow_element=bubble") for r, m in CHANGED[:cut]}
-    for name, more in alone:
+    found |= {("bubble alone", f"refinement {r:g}, {m} min"): partial(
+        simulated, truth, times, "numerics.preset=paper", f"numerics.refinement={r}", f"growth.time_step={m} min",
+        "numerics.flow_element=bubble") for r, m in CHANGED[:cut]}
+    alone = {"midpoint alone": (), "midpoint and bubble": ("numerics.flow_element=bubble",)}
+    for name, more in alone.items():
         found |= {(name, f"refinement {r:g}, tolerance {t:g}"): partial(
             simulated, truth, times, "numerics.preset=paper", "numerics.time=midpoint", f"numerics.refinement={r}",
             f"numerics.tolerance={t}", *more) for r, t in (MIDPOINT[2:5] if more else MIDPOINT)[:cut]}

@@ -13,7 +13,7 @@ from skfem.helpers import dot, grad
 
 from reference import diffusion_reaction_pypde as pypde
 from reference.monod import NUDGE, uptake
-from verification.bench import options, pores, ribbons, users
+from verification.bench import pores, users
 from verification.bench.clock import measured
 
 REPEATS = 3
@@ -28,8 +28,8 @@ def run(quick: bool) -> dict:
     linear, quadratic, skfem, cells, stepped, reference = ((8, 16), (2, 4), (4,), (8,), (), (8, 16)) if quick else (
         LINEAR, QUADRATIC, SKFEM, CELLS, STEPPED, REFERENCE)
     coarse, truth = converged(reference[0]), converged(reference[1])
-    given, repeats = ribbons.scene(), 1 if quick else REPEATS
-    jobs = {(options.PAPER, f"{n} cells"): partial(_ours, truth, given, n, 1) for n in linear}
+    given, repeats = users.scene(), 1 if quick else REPEATS
+    jobs = {(pores.PAPER, f"{n} cells"): partial(_ours, truth, given, n, 1) for n in linear}
     jobs |= {("order 2 (fast, accurate)", f"{n} cells"): partial(_ours, truth, given, n, 2) for n in quadratic}
     jobs |= {("order 3", f"{n} cells"): partial(_ours, truth, given, n, 3) for n in quadratic}
     jobs |= {("scikit-fem: quadratic elements", f"{n} cells"): partial(_skfem, truth, n) for n in skfem}
@@ -54,7 +54,7 @@ def compile_times(lines: list[dict]) -> list[dict]:
 def problem() -> users.Problem:
     """The same, as other codes take it."""
     given = pores.constants()
-    return users.Problem((-HALF, HALF), WIDTH, _inside, ribbons.DENSITY, given.supply, ribbons.DIFFUSIVITY, given.rates)
+    return users.Problem((-HALF, HALF), WIDTH, _inside, users.DENSITY, given.supply, users.DIFFUSIVITY, given.rates)
 
 
 def _inside(x, y):
@@ -66,8 +66,8 @@ def _judged(truth, found) -> dict:
 
 
 def _ours(truth, given, cells: int, order: int) -> dict:
-    grid = ribbons.straight((-HALF, HALF), WIDTH, (2 * cells, cells), _inside)
-    return _judged(truth, [flux.consumed for flux in ribbons.solved(given, grid, order)])
+    grid = users.straight((-HALF, HALF), WIDTH, (2 * cells, cells), _inside)
+    return _judged(truth, [flux.consumed for flux in users.solved(given, grid, order)])
 
 
 def _fipy(truth, cells: int) -> dict:

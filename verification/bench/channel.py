@@ -10,7 +10,7 @@ from functools import cache, partial
 import numpy as np
 
 from reference import channel_bvp
-from verification.bench import options, pores, ribbons, users
+from verification.bench import pores, users
 from verification.bench.box import compile_times
 from verification.bench.clock import measured
 
@@ -24,9 +24,9 @@ LINEAR, QUADRATIC, CELLS, STEPPED = (15, 30, 60, 120, 240, 480), (6, 12, 24, 48,
 def run(quick: bool) -> dict:
     """The part."""
     linear, quadratic, cells, stepped = ((15, 30), (6, 12), (30,), ()) if quick else (LINEAR, QUADRATIC, CELLS, STEPPED)
-    given, repeats = ribbons.scene(), 1 if quick else REPEATS
+    given, repeats = users.scene(), 1 if quick else REPEATS
     coarse, truth = reference(1e-7), reference(1e-9)
-    jobs = {(options.PAPER, f"{n} cells"): partial(_ours, truth, given, n, 1) for n in linear}
+    jobs = {(pores.PAPER, f"{n} cells"): partial(_ours, truth, given, n, 1) for n in linear}
     jobs |= {("order 2 (fast, accurate)", f"{n} cells"): partial(_ours, truth, given, n, 2) for n in quadratic}
     jobs |= {("order 3", f"{n} cells"): partial(_ours, truth, given, n, 3) for n in quadratic}
     jobs |= {("fipy", f"{n} cells"): partial(_fipy, truth, n) for n in cells}
@@ -52,8 +52,8 @@ def reference(tolerance: float) -> np.ndarray:
 def problem() -> users.Problem:
     """The channel, as other codes take it."""
     given = pores.constants()
-    return users.Problem(ENDS, None, lambda x: (x > 0) & (x < STRIP), ribbons.DENSITY, given.supply,
-                         ribbons.DIFFUSIVITY, given.rates, SPEED)
+    return users.Problem(ENDS, None, lambda x: (x > 0) & (x < STRIP), users.DENSITY, given.supply,
+                         users.DIFFUSIVITY, given.rates, SPEED)
 
 
 def _supply() -> np.ndarray:
@@ -62,8 +62,8 @@ def _supply() -> np.ndarray:
 
 def _ours(truth, given, cells: int, order: int) -> dict:
     size = (ENDS[1] - ENDS[0]) / cells
-    grid = ribbons.straight(ENDS, size, (cells, 1), lambda x, y: (x > 0) & (x < STRIP))
-    found = ribbons.solved(given, grid, order, SPEED)
+    grid = users.straight(ENDS, size, (cells, 1), lambda x, y: (x > 0) & (x < STRIP))
+    found = users.solved(given, grid, order, SPEED)
     return {"error": pores.largest([flux.effluent for flux in found], truth, _supply())}
 
 

@@ -7,7 +7,7 @@ from functools import cache, partial
 from reference import taylor_hood
 from repro.fem.space import Space
 from repro.model import flow, pore
-from verification.bench import options, pores
+from verification.bench import pores
 from verification.bench.clock import measured
 
 REPEATS = 3
@@ -23,7 +23,7 @@ def run(quick: bool) -> dict:
         ((6, 9), (0.35, 0.7), (0.25, 0.45), (0,), (3,)) if quick else (RINGS, LINEAR, QUADRATIC, SKFEM, SECTIONS))
     coarse, truth = reference(rings[-2]), reference(rings[-1])
     jobs = {}
-    for interface, element in options.flow_elements():
+    for interface, element in pores.FLOW_ELEMENTS.items():
         for r in linear:
             jobs[interface, f"refinement {r:g}"] = partial(_linear, truth, r, **element)
     for r in linear[: len(linear) - 2]:

@@ -13,7 +13,7 @@ from reference import neo_hookean, quadratic_growth
 from repro.fem.outline import FREE
 from repro.model import growth, pore
 from repro.model.contact import constrained
-from verification.bench import options, pores
+from verification.bench import pores
 from verification.bench.clock import measured
 
 REPEATS = 5
@@ -25,7 +25,7 @@ LINEAR, QUADRATIC, RINGS = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8), (0.15, 0.25, 0.45, 0.
 def run(quick: bool) -> dict:
     """The part."""
     linear, quadratic, rings = ((0.5, 1.0), (0.25, 0.45), (4,)) if quick else (LINEAR, QUADRATIC, RINGS)
-    jobs = {(options.PAPER, f"refinement {r:g}"): partial(_ours, "paper", r) for r in linear}
+    jobs = {(pores.PAPER, f"refinement {r:g}"): partial(_ours, "paper", r) for r in linear}
     jobs |= {("order 2 on curved triangles (fast, accurate)", f"refinement {r:g}"): partial(_ours, "accurate", r)
              for r in quadratic}
     jobs |= {("scikit-fem: quadratic elements", f"{n} rings"): partial(_skfem, n) for n in rings}

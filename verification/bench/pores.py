@@ -1,4 +1,5 @@
-"""The pore of the flow and transport parts: a half-disc of biomass that leaves a film of 10 um, and scenes of it."""
+"""The pore of the flow and transport parts: a half-disc of biomass that leaves a film of 10 um, and scenes of it; and
+what linear elements are called, with the [numerics] of those of the flow."""
 
 from __future__ import annotations
 
@@ -12,6 +13,8 @@ from reference.whole_run_pore import Section
 from repro.scene import parse_scene
 
 WIDTH, LENGTH, RADIUS, RATIO = 50.0, 600.0, 40.0, 2000.0
+PAPER = "linear elements (paper)"
+FLOW_ELEMENTS = {PAPER: {"preset": "paper"}, "linear with a bubble": {"preset": "paper", "flow_element": "bubble"}}
 #: The meshed part ends 1.5 W from the aggregate (3.1), for all methods; m/d.
 ENDS, SPEED = (-RADIUS - 1.5 * WIDTH, RADIUS + 1.5 * WIDTH), 2.9
 

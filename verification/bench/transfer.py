@@ -12,7 +12,7 @@ import numpy as np
 from repro.fem import transfer
 from repro.fem.mesh import curved
 from repro.fem.space import Space
-from verification.bench import options
+from verification.bench import pores
 from verification.bench.clock import measured
 from verification.problems import meshes, norms
 
@@ -27,7 +27,7 @@ def run(quick: bool) -> dict:
     count, sizes, quadratic = (3, (4.0, 2.8), (5.6,)) if quick else (REMESHES, SIZES, QUADRATIC)
     ways = {"conserving projection": transfer.project,
             "bounded conserving projection": transfer.project_bounded,
-            f"linear interpolation, {options.PAPER}": transfer.interpolated}
+            f"linear interpolation, {pores.PAPER}": transfer.interpolated}
     jobs = {(name, f"{size:g} um"): partial(_linear, size, count, way) for name, way in ways.items() for size in sizes}
     jobs |= {("quadratic interpolation (fast, accurate)", f"{size:g} um"): partial(_quadratic, size, count)
              for size in quadratic}

@@ -14,7 +14,7 @@ import numpy as np
 from repro.fem.space import Space
 from repro.model import pore, transport
 from repro.model.kinetics import Sink
-from verification.bench import options, pores
+from verification.bench import pores
 from verification.bench.clock import measured
 
 REPEATS = 5
@@ -29,7 +29,7 @@ def run(quick: bool) -> dict:
         RINGS, LINEAR, QUADRATIC, SECTIONS)
     coarse, truth = reference(rings[0]), reference(rings[1])
     jobs = {}
-    for name, element in options.flow_elements():
+    for name, element in pores.FLOW_ELEMENTS.items():
         jobs |= {(name, f"refinement {r:g}"): _ours(truth, 1, refinement=r, **element) for r in linear}
     for order, name in ((2, "order 2 on curved triangles (fast, accurate)"), (3, "order 3 on curved triangles")):
         jobs |= {(name, f"refinement {r:g}"): _ours(truth, order, preset="accurate", refinement=r) for r in quadratic}

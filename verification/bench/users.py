@@ -5,7 +5,8 @@
 with u = 0 and the supply held at both ends, or with (11)-(12) there. FiPy takes both equations coupled, the uptake
 linearised as its manual advises (Newton's method) and a direct solver. py-pde integrates in time to rest, compiled by
 numba, by Euler's explicit steps (its adaptive Runge-Kutta took longer); and, as one who knows it well would
-do, its Laplacian's matrix is read off for Newton's method (:mod:`reference.diffusion_reaction_pypde`).
+do, its Laplacian's matrix is read off for Newton's method (:mod:`reference.diffusion_reaction_pypde`). This package's
+transport is solved on right triangles that halve the square cells of their grids.
 """
 
 from __future__ import annotations
@@ -26,7 +27,15 @@ from fipy import (
 from pde import PDE, CallbackTracker, CartesianGrid, Controller, EulerSolver, FieldCollection, ScalarField
 
 from reference.monod import uptake
+from repro.fem.mesh import Mesh, curved
+from repro.fem.space import Space
+from repro.model import transport
+from repro.model.flow import Flow
+from repro.model.kinetics import Sink
+from repro.scene import parse_scene
 
+#: um2/h of acceptor and donor, in fluid and biomass alike; mg/L.
+DIFFUSIVITY, DENSITY = (8e6, 4e6), 3e4
 #: Newton's method of FiPy stops at this change over the supply; its direct solver refines to this residual (its own
 #: default, 1e-5, leaves an error of 1e-3 on fine grids).
 REST, MOST, EXACT = 1e-8, 40, 1e-14
@@ -173,3 +182,37 @@ def _pde_ends(problem: Problem, k: int) -> dict:
         share = problem.speed / spread
         ends = {"x-": {"type": "mixed", "value": share, "const": share * supply}, "x+": {"derivative": 0.0}}
     return ends if problem.width is None else {**ends, "y": {"derivative": 0.0}}
+
+
+def scene():
+    """Substrates and kinetics of Table 1, but for the diffusivities."""
+    kinds = {name: {"diffusivity": f"{d} um^2/h", "diffusivity_in_aggregate": f"{d} um^2/h"}
+             for name, d in zip(("acceptor", "donor"), DIFFUSIVITY)}
+    return parse_scene({"substrates": kinds, "aggregate": {}}, "ribbon", "ribbon.toml")
+
+
+def straight(ends, width: float, cells: tuple[int, int], inside) -> Mesh:
+    """cells (along, across) halved; ``inside(x, y)`` of the triangles' middles is biomass."""
+    x, y = np.meshgrid(np.linspace(*ends, cells[0] + 1), np.linspace(0.0, width, cells[1] + 1), indexing="ij")
+    number = np.arange(x.size).reshape(x.shape)
+    a, b, c, d = (part.ravel() for part in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
+    triangles = np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    points = np.column_stack([x.ravel(), y.ravel()])
+    biomass = inside(*points[triangles].mean(axis=1).T)
+    return Mesh.of(points, triangles, biomass, np.empty(0, int), width, ends)
+
+
+def solved(given, grid: Mesh, order: int, speed: float = 0.0):
+    """(acceptor's, donor's) fluxes by linear (order 1), quadratic or cubic elements, in plug flow (um/h) or at rest."""
+    space = Space(grid if order == 1 else curved(grid, None), order)
+    flow = plug_flow(space, speed) if speed else None
+    problem = transport.problem(space, flow, given.substrates, given.kinetics)
+    sink = Sink(DENSITY * space.reaction.dx)
+    return transport.fluxes(problem, sink, transport.steady(problem, sink))
+
+
+def plug_flow(space: Space, speed: float) -> Flow:
+    """The same speed (um/h) everywhere, without loss."""
+    correction = np.zeros((len(space.cells), 2)) if space.order == 1 else None
+    velocity = np.tile([speed, 0.0], (space.count, 1))
+    return Flow(speed, velocity, np.zeros(space.mesh.corners), correction, 0.0, 0.0, 1.0)

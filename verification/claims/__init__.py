@@ -27,6 +27,7 @@ from dataclasses import dataclass, replace
 from math import inf, isnan
 
 from verification.claims.levels import BESIDE, CONVERGED, DEFAULT, FINE, SCHEME, SIZES, STEPS, Level
+from verification.kernel.case import Check
 from verification.uncertainty import Bar
 
 #: The rows that must be judged.
@@ -66,23 +67,17 @@ def interval(text: str) -> tuple[float, float] | None:
 
 
 @dataclass(frozen=True)
-class Check:
-    """One computed number against the paper's.
+class PaperCheck(Check):
+    """A check of a number against the paper's, whatever its bar.
 
-    quantity: "mean velocity at t = 0 (m/d)"; paper: what the paper prints, as text: "2.9"; ours: computed by this run;
-    low, high: the accepted range, infinite where it is one-sided; why, date: where that range comes from, and when it
-    was set; converges: has the number a limit as mesh and step are refined? rests_on: what it takes to know it; input:
-    its name in the record of the sensitivities; bar: where the number lies, None before it is known; held: for a number
-    without a limit, whether it holds in the range of each level; scheme: least and largest value with the scheme of
-    2001, None where that is not asked.
+    paper: what the paper prints, as text: "2.9"; date: when the accepted range was set; converges: has the number a
+    limit as mesh and step are refined? rests_on: what it takes to know it; input: its name in the record of the
+    sensitivities; bar: where the number lies, None before it is known; held: for a number without a limit, whether it
+    holds in the range of each level; scheme: least and largest value with the scheme of 2001, None where that is not
+    asked.
     """
 
-    quantity: str
     paper: str
-    ours: float
-    low: float
-    high: float
-    why: str
     date: str = SET
     converges: bool = True
     rests_on: str = PREDICTED
@@ -97,14 +92,9 @@ class Check:
         return interval(self.paper)
 
     @property
-    def holds(self) -> bool:
-        """Is the number, whatever its bar, in the accepted range? Not-a-number never is."""
-        return bool(self.low <= self.ours <= self.high)
-
-    @property
     def outcome(self) -> str:
         """HOLDS or FAILS with the whole bar, or REACHES_OVER. Raises ClaimError without a bar or a number."""
-        if isnan(self.ours):
+        if isnan(self.value):
             raise ClaimError(f"{self.quantity}: not a number")
         if self.bar is None:
             raise ClaimError(f"{self.quantity}: no error bar")
@@ -128,7 +118,7 @@ class Finding:
     their own are a function, which is called at the judged level alone.
     """
 
-    checks: tuple[Check, ...]
+    checks: tuple[PaperCheck, ...]
     change: Words = ""
     reason: Words = ""
     rounding: Words = ""
@@ -154,7 +144,7 @@ class Finding:
         return replace(self, **{name: text() if callable(text) else text for name, text in words.items()})
 
     def _failed(self) -> str:
-        return "; ".join(f"{c.quantity} is {c.ours:.4g}, accepted {c.low:.4g} to {c.high:.4g}"
+        return "; ".join(f"{c.quantity} is {c.value:.4g}, accepted {c.low:.4g} to {c.high:.4g}"
                          for c in self.checks if c.outcome != HOLDS)
 
 
@@ -210,39 +200,40 @@ def claim(id: str, where: str, text: str, **fields):
     return register
 
 
-def printed(quantity: str, paper_text: str, ours: float, **more) -> Check:
+def printed(quantity: str, paper_text: str, ours: float, why: str = DIGITS, date: str = PRINTED_SET,
+            **more) -> PaperCheck:
     """A number that the paper prints: it must lie in the interval of its digits. Raises ValueError for words."""
     found = interval(paper_text)
     if found is None:
         raise ValueError(f"{quantity}: {paper_text!r} is no printed number")
-    return Check(quantity, paper_text, float(ours), *found, **({"why": DIGITS, "date": PRINTED_SET} | more))
+    return between(quantity, paper_text, ours, *found, why, date=date, **more)
 
 
 def near(quantity: str, paper_text: str, ours: float, target: float, *, relative: float | None = None,
-         absolute: float | None = None, why: str, **more) -> Check:
+         absolute: float | None = None, why: str, **more) -> PaperCheck:
     """A number within a relative or an absolute tolerance of its target."""
     if (relative is None) == (absolute is None):
         raise ValueError(f"{quantity}: a relative or an absolute tolerance is needed, one of them")
     apart = absolute if relative is None else relative * abs(target)
-    return Check(quantity, paper_text, float(ours), target - apart, target + apart, why, **more)
+    return between(quantity, paper_text, ours, target - apart, target + apart, why, **more)
 
 
-def at_most(quantity: str, paper_text: str, ours: float, bound: float, why: str, **more) -> Check:
+def at_most(quantity: str, paper_text: str, ours: float, bound: float, why: str, **more) -> PaperCheck:
     """A number that must not exceed a bound."""
-    return Check(quantity, paper_text, float(ours), -inf, bound, why, **more)
+    return between(quantity, paper_text, ours, -inf, bound, why, **more)
 
 
-def at_least(quantity: str, paper_text: str, ours: float, bound: float, why: str, **more) -> Check:
+def at_least(quantity: str, paper_text: str, ours: float, bound: float, why: str, **more) -> PaperCheck:
     """A number that must not be under a bound."""
-    return Check(quantity, paper_text, float(ours), bound, inf, why, **more)
+    return between(quantity, paper_text, ours, bound, inf, why, **more)
 
 
-def between(quantity: str, paper_text: str, ours: float, low: float, high: float, why: str, **more) -> Check:
+def between(quantity: str, paper_text: str, ours: float, low: float, high: float, why: str, **more) -> PaperCheck:
     """A number that must lie in a range."""
-    return Check(quantity, paper_text, float(ours), low, high, why, **more)
+    return PaperCheck(quantity, float(ours), low, high, why, paper_text, **more)
 
 
-def without_limit(check: Check) -> Check:
+def without_limit(check: PaperCheck) -> PaperCheck:
     """A count, or a number that belongs to its mesh or step: its bar goes from the least to the largest of all levels,
     and it holds where it does at every level."""
     return replace(check, converges=False)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-from verification.claims import CLOSED, MODEL, OF_SCHEME, Check, Claim, ClaimError, Finding
+from verification.claims import CLOSED, MODEL, OF_SCHEME, Claim, ClaimError, Finding, PaperCheck
 from verification.claims.levels import CONVERGED, SCHEME, Level
 from verification.uncertainty import Bar, Estimate, combined, estimate, spread
 
@@ -24,7 +24,7 @@ Numbers = tuple[tuple[str, float, bool], ...]
 
 def numbers(finding: Finding) -> Numbers:
     """What a finding says at one level."""
-    return tuple((check.quantity, check.ours, check.holds) for check in finding.checks)
+    return tuple((check.quantity, check.value, check.holds) for check in finding.checks)
 
 
 def barred(claim: Claim, finding: Finding, others: dict[Level, Numbers]) -> Finding:
@@ -43,7 +43,7 @@ def unnumbered(quantity: str) -> str:
     return re.sub(r"\d+(\.\d+)?", "#", quantity)
 
 
-def _judgeable(claim: Claim, check: Check, found: dict[Level, tuple[float, bool]]) -> Check:
+def _judgeable(claim: Claim, check: PaperCheck, found: dict[Level, tuple[float, bool]]) -> PaperCheck:
     """The check with its bar, from its value and whether it holds at each level; to a width of its own, that of printed
     digits that it is made of, the bar is added."""
     values = {level: value for level, (value, _) in found.items()}
@@ -54,8 +54,8 @@ def _judgeable(claim: Claim, check: Check, found: dict[Level, tuple[float, bool]
     if not check.converges:
         held = tuple(found[level][1] for level in of_kind)
         return replace(check, bar=spread([values[level] for level in of_kind]), held=held)
-    bar, own = _bar(claim, check.ours, values), check.bar or Bar(check.ours, check.ours)
-    return replace(check, bar=replace(bar, low=bar.low - check.ours + own.low, high=bar.high - check.ours + own.high))
+    bar, own = _bar(claim, check.value, values), check.bar or Bar(check.value, check.value)
+    return replace(check, bar=replace(bar, low=bar.low - check.value + own.low, high=bar.high - check.value + own.high))
 
 
 def _bar(claim: Claim, value: float, values: dict[Level, float]) -> Bar:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from verification.claims import Check, at_most
+from verification.claims import PaperCheck, at_most
 from verification.claims.evaluate import side_by_side
 from verification.claims.levels import DEFAULT, forget
 from verification.claims.runs import BASE, LAST, at
@@ -73,13 +73,13 @@ def comparisons(rows: Rows) -> tuple[Comparison, ...]:
             compare("The strict variant of 2001 (gear, linear transfer, u_ave in (11)) against base", VARIANTS, rows))
 
 
-def checks(rows: Rows) -> tuple[Check, ...]:
+def checks(rows: Rows) -> tuple[PaperCheck, ...]:
     """Halving the time step moves the velocity by less than 0.5 %, halving the mesh size by less than 1 %."""
     return tuple(_halved(what, runs, time, bound, rows) for time in TIMES
                  for what, runs, bound in (("time step", UPDATES, 0.5), ("mesh size", MESHES, 1.0)))
 
 
-def _halved(what: str, runs: dict[str, tuple[str, ...]], time: float, bound: float, rows: Rows) -> Check:
+def _halved(what: str, runs: dict[str, tuple[str, ...]], time: float, bound: float, rows: Rows) -> PaperCheck:
     before, after = (rows[run][time]["mean_velocity_m_per_d"] for run in list(runs.values())[1:])
     return at_most(f"halving the {what} moves the velocity at {time:g} h (%)", f"< {bound:g}",
                    100 * abs(after / before - 1), bound, "set beforehand")

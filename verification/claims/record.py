@@ -13,7 +13,7 @@ from math import isfinite
 from pathlib import Path
 
 from verification import sensitivity
-from verification.claims import OF_SCHEME, Check
+from verification.claims import OF_SCHEME, PaperCheck
 from verification.claims.bars import unnumbered
 from verification.claims.report import Row
 
@@ -41,15 +41,15 @@ def entry(row: Row) -> dict:
             "fixed": claim.fixed, "checks": [_check(check, claim.about) for check in row.checks]}
 
 
-def _check(check: Check, about: str) -> dict:
-    paper, inputs = check.printed or (None, None), sensitivity.interval(check.input, check.ours)
+def _check(check: PaperCheck, about: str) -> dict:
+    paper, inputs = check.printed or (None, None), sensitivity.interval(check.input, check.value)
     scheme = (check.bar.low, check.bar.high) if about == OF_SCHEME else check.scheme
     return {"quantity": check.quantity, "rests_on": check.rests_on, "paper": check.paper,
-            "paper_low": paper[0], "paper_high": paper[1], "value": _finite(check.ours),
+            "paper_low": paper[0], "paper_high": paper[1], "value": _finite(check.value),
             "low": _finite(check.bar.low), "high": _finite(check.bar.high),
             "input_low": inputs and inputs[0], "input_high": inputs and inputs[1],
             "scheme_2001": scheme and [_finite(value) for value in scheme],
-            "tolerance": {"low": _finite(check.low), "high": _finite(check.high), "origin": check.why,
+            "tolerance": {"low": _finite(check.low), "high": _finite(check.high), "origin": check.origin,
                           "date": check.date}, "outcome": check.outcome}
 
 

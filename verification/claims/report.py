@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import zip_longest
 from math import isfinite
@@ -17,11 +18,13 @@ from verification.claims import (
     REACHES_OVER,
     REPRODUCED,
     VERDICTS,
-    Check,
     Claim,
     Finding,
+    PaperCheck,
 )
 from verification.claims.independence import Comparison
+from verification.kernel import writing
+from verification.kernel.writing import Block, table
 
 WIDTH, INDENT = 120, " " * 5
 HEAD = ("quantity", "paper", "ours", "numerics", "inputs", "scheme of 2001", "accepted", "outcome")
@@ -43,7 +46,7 @@ class Row:
     error: str = ""
 
     @property
-    def checks(self) -> tuple[Check, ...]:
+    def checks(self) -> tuple[PaperCheck, ...]:
         """Those that have a bar: none of a claim that came to an error."""
         return tuple(check for check in self.finding.checks if check.bar) if self.finding else ()
 
@@ -58,7 +61,7 @@ class Independence:
     """What does not come from the paper: comparisons of runs of its scheme, and the bounds that they must keep."""
 
     comparisons: tuple[Comparison, ...]
-    checks: tuple[Check, ...]
+    checks: tuple[PaperCheck, ...]
 
     @property
     def kept(self) -> bool:
@@ -73,7 +76,7 @@ def moving(values: tuple[float, ...], moved: tuple[float, ...]) -> list[str]:
 
 def terminal_independence(section: Independence) -> str:
     """The bounds as lines."""
-    lines = [INDENT + f"{c.quantity}: {number(c.ours)}, bound {c.paper}" for c in section.checks]
+    lines = [INDENT + f"{c.quantity}: {number(c.value)}, bound {c.paper}" for c in section.checks]
     return "\n".join(["Mesh and time-step independence of base in the paper's scheme", *lines]) + "\n"
 
 
@@ -92,10 +95,10 @@ def spanned(pair) -> str:
     return f"at least {number(low)}" if isfinite(low) else f"at most {number(high)}"
 
 
-def cells(check: Check) -> tuple[str, ...]:
+def cells(check: PaperCheck) -> tuple[str, ...]:
     """A check with its widths, in the order of HEAD."""
-    return (check.quantity, check.paper, number(check.ours), spanned((check.bar.low, check.bar.high)),
-            spanned(sensitivity.interval(check.input, check.ours)), spanned(check.scheme),
+    return (check.quantity, check.paper, number(check.value), spanned((check.bar.low, check.bar.high)),
+            spanned(sensitivity.interval(check.input, check.value)), spanned(check.scheme),
             spanned((check.low, check.high)), check.outcome)
 
 
@@ -138,7 +141,7 @@ def remarks(row: Row) -> tuple[tuple[str, str], ...]:
             ("inputs: ", finding.rounding), ("steps are not varied: ", row.claim.fixed), ("", finding.note))
 
 
-def predicted(checks) -> list[Check]:
+def predicted(checks) -> list[PaperCheck]:
     """Numbers that the paper prints and a solution predicts: what can be reproduced."""
     return [check for check in checks if check.printed and check.rests_on == PREDICTED]
 
@@ -160,40 +163,32 @@ def summary(rows: list[Row]) -> str:
 
 def markdown(rows: list[Row], section: Independence) -> str:
     """The whole report."""
-    parts = ["# What the paper claims, judged by computed numbers", "", summary(rows).replace("\n", "\n\n"), "", LEGEND,
-             "", *_head(("id", "claim", *HEAD[1:], "verdict"))]
-    parts += [_row(row) for row in rows]
-    parts += ["", "## Remarks", "", *(_remarks(row) for row in rows if row.finding), ""]
-    return "\n".join(parts + _independence(section)) + "\n"
+    blocks = [Block("text", summary(rows).replace("\n", "\n\n")), Block("text", LEGEND),
+              table(("id", "claim", *HEAD[1:], "verdict"), map(_row, rows)), Block("heading", "Remarks"),
+              Block("text", "\n".join(_remarks(row) for row in rows if row.finding)), *_independence(section)]
+    return f"# What the paper claims, judged by computed numbers\n\n{writing.markdown(blocks, 2)}\n"
 
 
-def _independence(section: Independence) -> list[str]:
-    parts = ["## Mesh and time-step independence of base in the paper's scheme", ""]
+def _independence(section: Independence) -> Iterator[Block]:
+    yield Block("heading", "Mesh and time-step independence of base in the paper's scheme")
     for comparison in section.comparisons:
-        lines = [_cells((name, *moving(values, moved))) for name, values, moved in comparison.lines]
-        parts += [f"### {comparison.title}", "", *_head(("", *comparison.runs)), *lines, ""]
-    bounds = [_cells((c.quantity, c.paper, number(c.ours) + ("" if c.holds else " FAILS"))) for c in section.checks]
-    return [*parts, *_head(("what", "bound", "ours")), *bounds]
+        yield Block("text", f"### {comparison.title}")
+        yield table(("", *comparison.runs),
+                    ((name, *moving(values, moved)) for name, values, moved in comparison.lines))
+    yield table(("what", "bound", "ours"), ((c.quantity, c.paper, number(c.value) + ("" if c.holds else " FAILS"))
+                                            for c in section.checks))
 
 
-def _head(titles) -> list[str]:
-    return [_cells(titles), _cells(["---"] * len(titles))]
-
-
-def _cells(texts) -> str:
-    return "| " + " | ".join(text.replace("|", "\\|") for text in texts) + " |"
-
-
-def _row(row: Row) -> str:
+def _row(row: Row) -> tuple[str, ...]:
     text = row.claim.text if row.claim else ""
     if not row.checks:
-        return _cells((row.id, text, *[""] * (len(HEAD) - 1), f"**{row.verdict}**: {row.error}"))
+        return row.id, text, *[""] * (len(HEAD) - 1), f"**{row.verdict}**: {row.error}"
     quantity, paper, *columns = zip(*map(cells, row.checks))
     paper = [f"{name}: {said}" for name, said in zip(quantity, paper)]
-    return _cells((row.id, text, *("<br>".join(column) for column in (paper, *columns)), f"**{row.verdict}**"))
+    return row.id, text, *("<br>".join(column) for column in (paper, *columns)), f"**{row.verdict}**"
 
 
 def _remarks(row: Row) -> str:
-    origin = "; ".join(dict.fromkeys(f"{check.why} ({check.date})" for check in row.checks))
+    origin = "; ".join(dict.fromkeys(f"{check.origin} ({check.date})" for check in row.checks))
     parts = [f"{label}{text.rstrip('.')}." for label, text in remarks(row) if text]
     return f"- **{row.id}** (paper: {row.claim.where}). Tolerances: {origin}. " + " ".join(parts)

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from inspect import cleandoc
 
 from verification.claims.runs import BASE, LAST, at
+from verification.kernel import writing
 
 PLOTTED, END = 19.2, 19.4  # h; the geometry that the paper plots [E12], and the end of base
 SUPPLY = 10.0
@@ -77,8 +78,7 @@ def filled(text: str) -> str:
 
 def table(head: list[str], rows: list[list]) -> str:
     """A Markdown table."""
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines)
+    return writing.markdown([writing.table(head, (map(str, row) for row in rows))])
 
 
 def percent(ratio: float, digits: int = 2) -> str:

@@ -9,8 +9,12 @@ A case catches by a number out of its range, or by an error of ``repro.errors`` 
 Whatever else stops a case, an ``AttributeError`` for instance, shows a broken mutant and catches nothing. No case knows
 stored results of ``repro``: what it expects comes from theory, from ``reference/`` or from a conserved quantity.
 
-A hunt is of the code that cases can reach: the stages of verification, the references, and the modules of repro that
-they import. Commands, pages, checkpoints and sweeps are not in it: no case exercises them, the tests do.
+What no case exercises (what a user reads: columns, files, pages, tables of sweeps) and what one would notice by luck
+alone has mutants that tests catch: these name their ``tests``, as pytest does, and are run against each of them. A test
+catches by an assertion that fails, or by an error that ``repro`` defines. ``--tests`` hunts these alone.
+
+A hunt is of the code that its cases, or its tests, can reach: the stages of verification or the files of the tests, the
+references, and the modules of repro that they import.
 """
 
 from __future__ import annotations
@@ -20,6 +24,7 @@ import ast
 import hashlib
 import json
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterable, Iterator
@@ -27,7 +32,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from shutil import copytree, ignore_patterns
+from shutil import copy2, copytree, ignore_patterns
 from tempfile import TemporaryDirectory
 
 from verification.kernel.case import CASES, STAGES, Result
@@ -37,11 +42,15 @@ ROOT = Path(__file__).parents[2]
 API = ROOT / "repro" / "__init__.py"
 
 
-def reached(folders: list[Path]) -> set[Path]:
-    """The files of folders, and all of this project that these import, directly or not, but for what the kernel does:
-    it runs cases, and no case depends on it."""
+def _files(folders: Iterable[Path]) -> list[Path]:
+    return [path for folder in folders for path in folder.rglob("*.py")]
+
+
+def reached(files: Iterable[Path]) -> set[Path]:
+    """Files, and all of this project that these import, directly or not, but for what the kernel does: it runs cases,
+    and no case depends on it."""
     found: set[Path] = set()
-    waiting = [path for folder in folders for path in folder.rglob("*.py")]
+    waiting = list(files)
     while waiting:
         path = waiting.pop()
         if path not in found:
@@ -63,19 +72,30 @@ def imported(path: Path) -> Iterator[Path]:
 
 RECORD = ROOT / "verification" / "report" / "mutants.json"
 COPIED = ("repro", "reference", "verification")
+#: Mutants of what users read, which tests catch.
+RESULTS = "results"
+#: What tests need besides.
+TESTED = ("tests", "pyproject.toml")
+#: What of the mutants catches them.
+CATCHERS = ("cases", "tests")
+#: A line of the summary of pytest, and how it begins where it is a catch: an assertion, `pytest.raises`, a guard.
+FAILED = re.compile(r"^(?:FAILED|ERROR) .*? - (.*)$", re.M)
+CATCH = ("assert", "AssertionError", "Failed: ", "repro.")
 #: No case takes a tenth of this; a mutant may make one run for ever.
 LONGEST = 600.0
 
 
 @dataclass(frozen=True)
 class Mutant:
-    """A change to ``file``: ``old``, which occurs there once, becomes ``new``; ``says`` what is wrong then."""
+    """A change to ``file``: ``old``, which occurs there once, becomes ``new``; ``says`` what is wrong then; ``tests``:
+    the tests that catch it, by the names that pytest gives them, where it is not cases that do."""
 
     id: str
     file: str
     says: str
     old: str
     new: str
+    tests: tuple[str, ...] = ()
 
 
 class MutantError(RuntimeError):
@@ -84,7 +104,7 @@ class MutantError(RuntimeError):
 
 @dataclass(frozen=True)
 class Trial:
-    """A case run with a mutant: ``how`` it was caught, or why that is no catch."""
+    """A case, or a test, run with a mutant: ``how`` it was caught, or why that is no catch."""
 
     case: str
     caught: bool
@@ -100,18 +120,19 @@ class Hunt:
 
     @property
     def caught_by(self) -> tuple[str, ...]:
-        """Ids of the cases that fell short."""
+        """Ids of the cases that fell short, or of the tests that failed."""
         return tuple(trial.case for trial in self.trials if trial.caught)
 
     @property
     def missed_by(self) -> tuple[str, ...]:
-        """Ids of the cases that name this mutant and pass with it."""
-        return tuple(t.case for t in self.trials if not t.caught and self.mutant in CASES[t.case].mutants)
+        """Ids of the cases that name this mutant and pass with it, and of the tests that it names and that do."""
+        return tuple(t.case for t in self.trials
+                     if not t.caught and (t.case not in CASES or self.mutant in CASES[t.case].mutants))
 
 
 def load() -> dict[str, dict[str, Mutant]]:
     """Mutants by id, by stage. Raises MutantError where an id is used twice."""
-    found = {stage: import_module(f"verification.{stage}.mutants").MUTANTS for stage in STAGES}
+    found = {stage: import_module(f"verification.{stage}.mutants").MUTANTS for stage in (*STAGES, RESULTS)}
     ids = [mutant.id for mutants in found.values() for mutant in mutants]
     twice = {id for id in ids if ids.count(id) > 1}
     if twice:
@@ -122,6 +143,11 @@ def load() -> dict[str, dict[str, Mutant]]:
 def everything() -> dict[str, Mutant]:
     """Mutants of all stages by id."""
     return {id: mutant for mutants in load().values() for id, mutant in mutants.items()}
+
+
+def of(catchers: str) -> dict[str, Mutant]:
+    """Those of CATCHERS "cases" or "tests", by id."""
+    return {id: mutant for id, mutant in everything().items() if bool(mutant.tests) == (catchers == "tests")}
 
 
 def mutated(mutant: Mutant, root: Path = ROOT) -> str:
@@ -135,7 +161,9 @@ def mutated(mutant: Mutant, root: Path = ROOT) -> str:
 
 
 def plan(mutant: Mutant) -> tuple[list[str], list[str]]:
-    """(cases that name the mutant, all others), the quick ones first."""
+    """(cases that name the mutant, all others), the quick ones first; of one that tests catch these, and no others."""
+    if mutant.tests:
+        return list(mutant.tests), []
     quick_first = sorted(CASES.values(), key=lambda case: case.slow)
     named = [case.id for case in quick_first if mutant.id in case.mutants]
     return named, [case.id for case in quick_first if case.id not in named]
@@ -150,17 +178,20 @@ def hunt(mutant: Mutant, every: bool = False) -> Hunt:
         copy(mutant, Path(folder))
         for case in named + others:
             caught = any(trial.caught for trial in trials)
-            if caught and not (every and case in named):
+            if caught and not ((every or mutant.tests) and case in named):
                 break
-            trials.append(trial(Path(folder), case))
+            trials.append((tested if mutant.tests else trial)(Path(folder), case))
     return Hunt(mutant.id, tuple(trials))
 
 
 def copy(mutant: Mutant, folder: Path) -> None:
     """The code with the mutant in it."""
     text = mutated(mutant)
-    for name in COPIED:
-        copytree(ROOT / name, folder / name, ignore=ignore_patterns("__pycache__", "report", "out"))
+    for name in COPIED + (TESTED if mutant.tests else ()):
+        if (ROOT / name).is_file():
+            copy2(ROOT / name, folder)
+        else:
+            copytree(ROOT / name, folder / name, ignore=ignore_patterns("__pycache__", "out", "live", "pictures"))
     (folder / mutant.file).write_text(text, encoding="utf-8")
 
 
@@ -175,6 +206,22 @@ def trial(folder: Path, case: str) -> Trial:
     if done.returncode:
         return Trial(case, False, "broken: " + (done.stderr.strip().splitlines() or ["no message"])[-1])
     return Trial(case, *json.loads(done.stdout.splitlines()[-1]))
+
+
+def tested(folder: Path, test: str) -> Trial:
+    """Run one test in the copy, in a process of its own."""
+    command = [sys.executable, "-m", "pytest", "-x", "-p", "no:cacheprovider", "-rfE", test]
+    try:
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=LONGEST,
+                              env={**os.environ, "PYTHONPATH": str(folder), "COLUMNS": "500"})
+    except subprocess.TimeoutExpired:
+        return Trial(test, False, f"not done after {LONGEST:g} s")
+    if done.returncode == 0:
+        return Trial(test, False, "passes")
+    found = FAILED.search(done.stdout)
+    why = found[1] if found else (done.stdout + done.stderr).strip().splitlines()[-1]
+    caught = done.returncode == 1 and why.startswith(CATCH)
+    return Trial(test, caught, why if caught else f"broken: {why}")
 
 
 def examine(id: str) -> None:
@@ -208,9 +255,9 @@ def main(arguments: list[str] | None = None) -> int:
     if unknown:
         print(f"mutants: there is no {', '.join(unknown)}; there are {', '.join(everything())}", file=sys.stderr)
         return 2
-    hunts = hunt_all(chosen.ids or everything(), chosen.jobs, chosen.every)
-    if not chosen.ids:
-        record(hunts)
+    ids = chosen.ids or (of("tests") if chosen.tests else everything())
+    hunts = hunt_all(ids, chosen.jobs, chosen.every)
+    record(hunts)
     return 0 if judge(hunts) else 1
 
 
@@ -218,6 +265,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m verification.mutants", description=__doc__.splitlines()[0])
     parser.add_argument("ids", nargs="*", metavar="MUTANT", help="all by default")
     parser.add_argument("--every", action="store_true", help="against every case that names it, not to the first catch")
+    parser.add_argument("--tests", action="store_true", help="those alone that tests catch, not cases")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes; one a core by default")
     return parser
 
@@ -249,28 +297,43 @@ def judge(hunts: list[Hunt]) -> bool:
 
 
 def record(hunts: list[Hunt]) -> None:
-    """Write which cases caught which mutant, for the report; and how, which is another machine's to tell, beside it."""
+    """Write what caught which mutant, for the report, where all that cases or all that tests catch were hunted; and
+    how, which is another machine's to tell, beside it."""
     caught = {found.mutant: list(found.caught_by) for found in hunts}
+    whole = [catchers for catchers in CATCHERS if of(catchers).keys() <= caught.keys()]
+    if not whole:
+        return
+    before = _read()
+    new = {id: caught.get(id, before["caught"].get(id, [])) for id in everything()}
+    codes = {**before["code"], **{catchers: code(catchers) for catchers in whole}}
     how = {found.mutant: {trial.case: trial.how for trial in found.trials} for found in hunts}
-    for file, rows in ((RECORD, {"code": code(), "caught": caught}), (RECORD.parent / "live" / RECORD.name, how)):
+    for file, rows in ((RECORD, {"code": codes, "caught": new}), (RECORD.parent / "live" / RECORD.name, how)):
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
 
 
+def _read() -> dict[str, dict]:
+    """The record: {"code": {"cases": digits, "tests": digits}, "caught": {mutant: [case or test, ...]}}."""
+    return json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.exists() else {"code": {}, "caught": {}}
+
+
 def recorded() -> tuple[dict[str, list[str]], bool]:
-    """({mutant: [case, ...]} of the last whole hunt, whether the code is still the same)."""
-    if not RECORD.exists():
-        return {}, False
-    found = json.loads(RECORD.read_text(encoding="utf-8"))
-    return found["caught"], found["code"] == code()
+    """({mutant: [case or test, ...]} of the last whole hunts, whether the code is still the same)."""
+    found = _read()
+    return found["caught"], found["code"] == {catchers: code(catchers) for catchers in CATCHERS}
 
 
-def code() -> str:
-    """16 hexadecimal digits that stand for the cases, the references, and what they reach of the code."""
+def code(catchers: str) -> str:
+    """16 hexadecimal digits that stand for the cases and the references, or for the files of the tests that mutants
+    name, and for what they reach of the code."""
     digest = hashlib.sha256()
-    cases = [ROOT / "reference", *(ROOT / "verification" / stage for stage in STAGES)]
-    known = (ROOT / "repro", ROOT / "verification" / "problems", *cases)
-    for path in sorted(path for path in reached(cases) if any(folder in path.parents for folder in known)):
+    if catchers == "tests":
+        named = {ROOT / test.partition("::")[0] for mutant in of("tests").values() for test in mutant.tests}
+        found, known = reached(named), (ROOT / "repro", ROOT / "tests")
+    else:
+        cases = [ROOT / "reference", *(ROOT / "verification" / stage for stage in STAGES)]
+        found, known = reached(_files(cases)), (ROOT / "repro", ROOT / "verification" / "problems", *cases)
+    for path in sorted(path for path in found if any(folder in path.parents for folder in known)):
         digest.update(path.relative_to(ROOT).as_posix().encode() + path.read_bytes())
     return digest.hexdigest()[:16]
 

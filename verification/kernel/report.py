@@ -25,7 +25,7 @@ INTRODUCTION = (
     "Each case compares the implementation with a closed form, with a manufactured solution, with an independent code, "
     "or with what must be conserved. Verdicts follow from the numbers; orders are judged two-sidedly, between "
     "neighbours of a series of unrelated meshes. Each case names changes of the code (mutants) with which it must fall "
-    "short; `make mutants` runs each of these until a case catches it.")
+    "short; `make mutants` runs each of these until a case catches it, and those that tests must catch against these.")
 PACKAGES = ("numpy", "scipy", "scikit-fem", "shapely", "mmgpy", "fipy", "py-pde", "matplotlib")
 
 
@@ -151,7 +151,7 @@ def _word(holds: bool) -> str:
 
 
 def mutant_rows() -> list[tuple[str, str, str, str]]:
-    """(mutant, stage, what is wrong with it, cases that caught it in the last whole hunt)."""
+    """(mutant, stage, what is wrong with it, cases or tests that caught it in the last whole hunt)."""
     caught, _ = mutants.recorded()
     return [(mutant.id, stage, mutant.says, ", ".join(caught.get(mutant.id, [])) or "not caught")
             for stage, chosen in mutants.load().items() for mutant in chosen.values()]

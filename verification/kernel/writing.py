@@ -61,8 +61,12 @@ def _markdown(block: Block, level: int, pictures: str) -> str:
     if block.kind != "table":
         return block.text
     head, *rows = block.rows
-    lines = (head, ("---",) * len(head), *rows)
-    return "\n".join("| " + " | ".join(map(_markdown_cell, row)) + " |" for row in lines)
+    return "\n".join(map(markdown_row, (head, ("---",) * len(head), *rows)))
+
+
+def markdown_row(row: Row) -> str:
+    """A row of a table."""
+    return "| " + " | ".join(map(_markdown_cell, row)) + " |"
 
 
 def _markdown_cell(cell: Cell) -> str:

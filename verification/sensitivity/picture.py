@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import matplotlib
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
+from verification.kernel.writing import Block, markdown, table
 from verification.sensitivity.inputs import INPUTS, ROUNDED
 
 TARGET = Path(__file__).parent / "tornado.svg"
@@ -43,20 +45,19 @@ def write(record: dict, target: Path = TARGET) -> None:
 
 def page(record: dict) -> str:
     """The record in words and tables."""
-    parts = ["# What the inputs of Table 1 allow", "",
-             "Elasticities d ln(number) / d ln(input), by central differences of the converged solution; ± is their "
-             "bar, and one that exceeds a tenth of the value is *not resolved*. `make sensitivity` writes this page.",
-             "", "![Tornado diagram](tornado.svg)", "", _table(record), "",
-             *_set(record), *_supplies(record), *_sobol(record)]
-    return "\n".join(parts) + "\n"
+    words = ("Elasticities d ln(number) / d ln(input), by central differences of the converged solution; ± is their "
+             "bar, and one that exceeds a tenth of the value is *not resolved*. `make sensitivity` writes this page.")
+    blocks = [Block("text", words), Block("text", f"![Tornado diagram]({TARGET.name})"), _table(record),
+              *_set(record), *_supplies(record), *_sobol(record)]
+    return f"# What the inputs of Table 1 allow\n\n{markdown(blocks, 2)}\n\n"
 
 
-def _table(record: dict) -> str:
+def _table(record: dict) -> Block:
     numbers = list(record["elasticities"])
-    head = ["input", "rounding (%)", *(NAMES.get(name, name.replace("_", " ")) for name in numbers)]
-    rows = [[each.name, f"{100 * each.rounding:.2g}" if each.half else "exact",
-             *(_cell(record["elasticities"][name].get(each.name)) for name in numbers)] for each in INPUTS]
-    return "\n".join("| " + " | ".join(line) + " |" for line in (head, ["---"] * len(head), *rows))
+    head = ("input", "rounding (%)", *(NAMES.get(name, name.replace("_", " ")) for name in numbers))
+    return table(head, ((each.name, f"{100 * each.rounding:.2g}" if each.half else "exact",
+                         *(_cell(record["elasticities"][name].get(each.name)) for name in numbers))
+                        for each in INPUTS))
 
 
 def _cell(known: dict | None) -> str:
@@ -68,37 +69,37 @@ def _cell(known: dict | None) -> str:
     return f"{word} (± {known['bar']:.1g}){told}"
 
 
-def _set(record: dict) -> list[str]:
+def _set(record: dict) -> Iterator[Block]:
     found = record.get("one_set")
     if not found:
-        return []
+        return
     words = ("One set of inputs within the rounding gives all printed numbers of base at once" if found["reached"] else
              "No set of inputs within the rounding gives all printed numbers of base at once; the nearest")
-    lines = [f"| {name} | {value:.4f} |" for name, value in found["inputs"].items()]
     numbers = ", ".join(f"{NAMES.get(name, name)} {value:.4f}" for name, value in found["numbers"].items())
-    return ["## One set of inputs", "", f"{words} (a share of {found['share_of_the_rounding']:.2f} of the rounding is "
-            f"needed). A run with it: {numbers}.", "", "| input | value |", "| --- | --- |", *lines, ""]
+    yield Block("heading", "One set of inputs")
+    yield Block("text", f"{words} (a share of {found['share_of_the_rounding']:.2f} of the rounding is needed). A run "
+                        f"with it: {numbers}.")
+    yield table(("input", "value"), ((name, f"{value:.4f}") for name, value in found["inputs"].items()))
 
 
-def _supplies(record: dict) -> list[str]:
+def _supplies(record: dict) -> Iterator[Block]:
     found = record.get("supplies")
     if not found:
-        return []
-    rows = [f"| {supply} | {known['contact_time']:.1f} | {known['upstream']:.0f} to {known['downstream']:.0f} | "
-            f"{known['acceptor_min']:.2g} |" for supply, known in found.items()]
-    return ["## The supply of Figure 6, which is not printed", "",
-            "| supply of both (K_s) | contact (h) | ends at contact (um) | least acceptor then (K_s) |",
-            "| --- | --- | --- | --- |", *rows, ""]
+        return
+    yield Block("heading", "The supply of Figure 6, which is not printed")
+    yield table(("supply of both (K_s)", "contact (h)", "ends at contact (um)", "least acceptor then (K_s)"), (
+        (supply, f"{known['contact_time']:.1f}", f"{known['upstream']:.0f} to {known['downstream']:.0f}",
+         f"{known['acceptor_min']:.2g}") for supply, known in found.items()))
 
 
-def _sobol(record: dict) -> list[str]:
+def _sobol(record: dict) -> Iterator[Block]:
     found = record.get("sobol")
     if not found:
-        return []
-    head = ["number", *found["inputs"]]
-    rows = [[NAMES.get(name, name), *(f"{value:.2f} ({low:.2f} to {high:.2f})" for value, low, high in
-                                      known["total_order"])] for name, known in found["numbers"].items()]
-    lines = ["| " + " | ".join(line) + " |" for line in (head, ["---"] * len(head), *rows)]
-    return ["## Sobol indices of base", "", f"Total indices of {found['samples']} samples in `fast`, with intervals of "
-            f"{100 * found['confidence']:.0f} %: the share of a number's variance within the rounding that goes with "
-            "an input.", "", *lines, ""]
+        return
+    yield Block("heading", "Sobol indices of base")
+    yield Block("text", f"Total indices of {found['samples']} samples in `fast`, with intervals of "
+                        f"{100 * found['confidence']:.0f} %: the share of a number's variance within the rounding that "
+                        "goes with an input.")
+    yield table(("number", *found["inputs"]), (
+        (NAMES.get(name, name), *(f"{value:.2f} ({low:.2f} to {high:.2f})" for value, low, high in
+                                  known["total_order"])) for name, known in found["numbers"].items()))

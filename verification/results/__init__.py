@@ -1,0 +1,1 @@
+"""What users read, verified by tests: the wrong changes that these must catch."""
