@@ -30,7 +30,7 @@ from verification.claims.levels import BESIDE, CONVERGED, DEFAULT, FINE, SCHEME,
 from verification.uncertainty import Bar
 
 #: The rows that must be judged.
-EXPECTED = tuple(f"C{number:02d}" for number in (*range(1, 44), 45))
+EXPECTED = tuple(f"C{number:02d}" for number in (*range(1, 44), 45, 46))
 
 REPRODUCED, CHANGED, CONTRADICTED = "reproduced", "reproduced with a stated change", "contradicted"
 WITHIN_ROUNDING, UNDECIDED = "reproduced within the rounding of Table 1", "undecided"
