@@ -1,4 +1,5 @@
-"""Less biomass plugs a pore as an aggregate than as layers: conductivity and uptake against biomass. Not in the paper."""
+"""Less biomass plugs a pore as an aggregate than as layers: conductivity and uptake against biomass. Not in the "
+  "paper."""
 
 from __future__ import annotations
 
@@ -68,9 +69,12 @@ def caption(folder: Path | None = None) -> str:
     part, scene = float(filled(table)[-1]), runs.WIDE.load()
     falls = table["conductivity_m_per_d"][0] / table["conductivity_m_per_d"][-1]
     layers = 1 / layered_share(scene.flow.viscosity_ratio, part, 1)
-    return (f"The aggregate of Wide (red) from 0 to {table['time_h'][-1]:g} h, and layers of uniform thickness over the "
+    return (f"The aggregate of Wide (red) from 0 to {table['time_h'][-1]:g} h, and layers of uniform thickness over "
+            "the "
             "whole pore (blue; parallel flow in closed form, uptake by a reference that is averaged over the section "
             f"and does not tell one layer from two), against the biomass. At its end the aggregate fills "
-            f"{100 * part:.1f} % of the pore and has made it {falls:.3g} times less conductive; a layer of that biomass "
-            f"makes it {layers:.2g} times less. Porosity does not determine permeability. (b) At the same mean velocity "
+            f"{100 * part:.1f} % of the pore and has made it {falls:.3g} times less conductive; a layer of that "
+            "biomass "
+            f"makes it {layers:.2g} times less. Porosity does not determine permeability. (b) At the same mean "
+            "velocity "
             f"and supply, the aggregate takes up {100 * uptake.shares(table)[-1]:.0f} % of the acceptor in the end.")

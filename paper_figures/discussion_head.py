@@ -29,9 +29,9 @@ def draw(closing: Path | None = None, wide: Path | None = None) -> Figure:
     _outlines(panels["outlines"], closing)
     _fall(panels["fall"], closing, wide)
     _restricted(panels["restricted"], closing)
-    for name in ("fall", "restricted"):
+    for name, corner in (("fall", "lower left"), ("restricted", "upper right")):
         panels[name].grid(alpha=0.25, linewidth=0.4)
-        panels[name].legend()
+        panels[name].legend(loc=corner)
     style.number_panels(*panels.values())
     return made
 
@@ -43,7 +43,8 @@ def _outlines(axes: Axes, closing: Path) -> None:
 
 
 def _fall(axes: Axes, closing: Path, wide: Path) -> None:
-    for folder, name, colour in ((closing, "Base, constant head", style.BLUE), (wide, "Wide, constant velocity", style.RED)):
+    named = ((closing, "Base, constant head", style.BLUE), (wide, "Wide, constant velocity", style.RED))
+    for folder, name, colour in named:
         table, meets = states.series(folder), contact(folder)
         axes.plot(table["time_h"], table["conductivity_m_per_d"] / table["conductivity_m_per_d"][0], color=colour,
                   label=name)
@@ -77,7 +78,9 @@ def caption(closing: Path | None = None, wide: Path | None = None) -> str:
     touched = (f"The opposite wall is touched at {meets:g} h" if np.isfinite(meets)
                else "The opposite wall is not touched")
     return (f"Base carried on to {table['time_h'][-1]:g} h. {touched}, when the velocity has fallen from "
-            f"{velocity[0]:.3g} to {velocity[-1]:.2g} m/d. (a) Outlines every {EVERY:g} h; (b) conductivity, beside that "
-            "of Wide, whose velocity is kept up, with the times of contact dotted; (c) velocity, acceptor taken up, and "
+            f"{velocity[0]:.3g} to {velocity[-1]:.2g} m/d. (a) Outlines every {EVERY:g} h; (b) conductivity, beside "
+            "that "
+            "of Wide, whose velocity is kept up, with the times of contact dotted; (c) velocity, acceptor taken up, "
+            "and "
             f"growth rate of the area, which falls from {rate[0]:.2g} to {rate[-1]:.2g} 1/h: the head drives ever less "
             "water through, so that the aggregate starves before it plugs the pore.")

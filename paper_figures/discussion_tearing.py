@@ -1,4 +1,5 @@
-"""Where the aggregate would tear: the largest principal stress over time, its place, and the fluid. Not in the paper."""
+"""Where the aggregate would tear: the largest principal stress over time, its place, and the fluid. Not in the "
+  "paper."""
 
 from __future__ import annotations
 
@@ -63,7 +64,7 @@ def draw() -> Figure:
 
 
 def _sizes(axes: Axes) -> None:
-    for run, name, colour in zip(COURSES, NAMES, COLOURS):
+    for run, colour in zip(COURSES, COLOURS):
         for forced, look in ((False, "-"), (True, "--")):
             size, _, _, hours = course(run, forced).T
             axes.plot(hours, size, look, color=colour)
@@ -77,7 +78,7 @@ def _sizes(axes: Axes) -> None:
 
 def _places(axes: Axes, colours: ScalarMappable, forced: bool) -> None:
     """Outlines every EVERY hours, and where the stress is largest in every row."""
-    shown = [found for found in bodies(COURSES[1]) if abs(found.pore.time / EVERY - round(found.pore.time / EVERY)) < 1e-9]
+    shown = [found for found in bodies(COURSES[1]) if found.pore.time % EVERY == 0]
     reach = np.concatenate([found.outline.points[:, 0] for found in shown])
     ends, width = (reach.min() - figure_6.MARGIN, reach.max() + figure_6.MARGIN), shown[0].grid.width
     style.channel(axes, ends, width, 2.5)
@@ -102,9 +103,12 @@ def caption() -> str:
     told = "; ".join(f"{name} {size:.3g} Pa at ({x:.0f}, {y:.0f}) µm and {hours:g} h"
                      for name, (size, x, y, hours) in zip(NAMES, ends))
     size, x, y, hours = forced[-1]
-    until = ("" if hours == last else " Later the head that drives the constant velocity through the plug bends it so far "
+    until = ("" if hours == last else " Later the head that drives the constant velocity through the plug bends it so "
+                                      "far "
              "that shape and flow do not agree.")
-    return (f"(a) Largest principal stress in the aggregate, of a modulus of {modulus:g} Pa: {told}. (b) Where it is in "
+    return (f"(a) Largest principal stress in the aggregate, of a modulus of {modulus:g} Pa: {told}. (b) Where it is "
+            "in "
             f"Wide, between outlines every {EVERY:g} h: in the middle first, then near the lower wall. "
-            f"(c) The same aggregates at rest under the fluid's forces: {size:.3g} Pa instead of {without[0]:.3g} Pa at "
+            f"(c) The same aggregates at rest under the fluid's forces: {size:.3g} Pa instead of {without[0]:.3g} Pa "
+            "at "
             f"{hours:g} h, at ({x:.0f}, {y:.0f}) µm instead of ({without[1]:.0f}, {without[2]:.0f}) µm.{until}")

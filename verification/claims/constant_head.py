@@ -25,7 +25,8 @@ NEW = "2026-11-22"
 ORDER = "an order of magnitude"
 
 
-@claim("C43", "1, 4", "as biomass grows, permeability falls, which restricts flow and supply; once the pore is spanned, "
+@claim("C43", "1, 4", "as biomass grows, permeability falls, which restricts flow and supply; once the pore is "
+                      "spanned, "
        "growth is on the upgradient side and the conductivity falls sharply: under constant head too", fine=PAIRED,
        beside=())
 def throttled() -> Finding:
@@ -99,7 +100,8 @@ def _reason(rows: dict[str, np.ndarray], upgradient: float) -> str:
     share = rows["mean_velocity_m_per_d"] / rows["mean_velocity_m_per_d"][0]
     tenth = float(np.interp(-0.1, -share, rows["time_h"]))
     return (f"flow and supply are restricted long before the pore is spanned: a tenth of the velocity is left at "
-            f"{tenth:.1f} h, and from then on the aggregate starves. The last film closes at {touched:.1f} h only, and the "
+            f"{tenth:.1f} h, and from then on the aggregate starves. The last film closes at {touched:.1f} h only, "
+            "and the "
             f"velocity falls in the 5 h before from {closed * fall():.3g} to {closed:.3g} m/d, of which a factor of "
             f"{film / closed:.2g} is the film that closes at once (2.3.3): the sharp fall of C16 needs the velocity to "
             f"be kept up. Most of the growth, but not all, is upgradient: {upgradient:.0f} %. Decay never balances it, "

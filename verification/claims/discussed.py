@@ -40,7 +40,8 @@ def less_biomass() -> Finding:
                    for walls, layer in zip((1, 2), layers)]
         told.append(f"{reduced:g}: {100 * ours:.1f} % against {100 * layers[0]:.0f} and {100 * layers[1]:.0f} %")
     same = filled_at(SAME)
-    checks += [at_least(f"the part filled with which the aggregate has K / K_clean = {SAME:g}: that of layers on {walls} "
+    checks += [at_least(f"the part filled with which the aggregate has K / K_clean = {SAME:g}: that of layers on "
+                        f"{walls} "
                         f"wall{'s' * (walls - 1)} over it", "crucial to model permeability reduction",
                         layered_share(said.flow.viscosity_ratio, same, walls) / SAME, 1 + FEW,
                         f"porosity does not determine it: more than {FEW_WORDS}", date=NEW) for walls in (1, 2)]
@@ -95,18 +96,21 @@ def mass_transfer() -> Finding:
                      for found, (a, d) in list(zip(early, numbers))[::6] + [(early[-1], numbers[-1])])
     shapes = "; ".join(f"{a:.3g} and {d:.3g} with supplies of {supply:g} K_s and {faster:g} k"
                        for (supply, faster), (a, d) in zip(SINKS, sinks))
-    reason = ("it cannot be set a priori, since it follows shape and flow; but from a sink of first order to one at the "
+    reason = ("it cannot be set a priori, since it follows shape and flow; but from a sink of first order to one at "
+              "the "
               f"surface alone it moves by {100 * (sinks[:, 0].max() / sinks[:, 0].min() - 1):.1f} and "
-              f"{100 * (sinks[:, 1].max() / sinks[:, 1].min() - 1):.1f} % only, acceptor and donor: most of the drop is "
+              f"{100 * (sinks[:, 1].max() / sinks[:, 1].min() - 1):.1f} % only, acceptor and donor: most of the drop "
+              "is "
               "in the water upstream, which does not see how the biomass takes up what arrives")
-    return Finding(tuple(checks), reason=reason, note=f"Sherwood numbers of acceptor and donor: {told}; Leveque's at 19.2 h "
+    return Finding(tuple(checks), reason=reason, note=f"Sherwood numbers of acceptor and donor: {told}; Leveque's at "
+                                                      "19.2 h "
                    f"{textbook[0]:.3g} and {textbook[1]:.3g}. A half-disc of {RADIUS:g} um in the flow of 1e-3 cm: "
                    f"{shapes}. While it is penetrated, the sink is as even of first order as of zero order, and the "
                    "number that of shape and flow.")
 
 
-#: Supplies of both (K_s) and rates over that of Table 1 of three sinks: nearly of first order, of zero order, and at the
-#: surface; and the half-disc's radius (um).
+#: Supplies of both (K_s) and rates over that of Table 1 of three sinks: nearly of first order, of zero order, and at
+#: the surface; and the half-disc's radius (um).
 SINKS, RADIUS = ((1.0, 1.0), (100.0, 1.0), (1.0, 100.0)), 25.0
 
 
@@ -144,8 +148,8 @@ def leveque(shear: float, length: float, diffusivity: float) -> float:
 
 @claim("C40", "5", "detachment by fracture along the lines of maximum stress could be incorporated", fine=WIDE_FINE)
 def tearing() -> Finding:
-    """Largest principal stress in the aggregate of base and wide: is there tension, where would it tear first, and how do
-    size and place change with time?"""
+    """Largest principal stress in the aggregate of base and wide: is there tension, where would it tear first, and
+    how do size and place change with time?"""
     courses = {run[0]: course(run) for run in (BASE, WIDE)}
     modulus = scene(*BASE).growth.shear_modulus
     checks = [at_least(f"{name}: largest principal stress over mu_L", "stress is computed",
@@ -172,7 +176,7 @@ def _listed(peaks: list[tuple[float, float, float, float]], modulus: float) -> s
 @claim("C46", "5", "the stress could link fluid flow, growth and detachment: the fluid changes the stress of which the "
        "aggregate would tear", fine=WIDE_FINE)
 def torn_by_the_fluid() -> Finding:
-    """Largest principal stress of wide at 40 h, a plug under constant velocity, with the forces of the fluid and without;
+    """Largest principal stress of wide at 40 h, a plug under constant velocity, with the fluid's forces and without;
     and of base at 19.4 h and of wide at 30 h, with a film left."""
     cases = [[tension(found) for found in (body(run, hour), pressed(body(run, hour)))]
              for run, hour in ((BASE, 19.4), (WIDE, 30.0), (WIDE, 40.0))]

@@ -1,9 +1,9 @@
 """C42: a permeable body, with Brinkman's drag, in place of the pseudoviscosity: aggregate, film and plug.
 
 Section 5 calls the raised viscosity artificial, names a porous material as another approach, says that it may make a
-difference depending on the conditions, and does not evaluate it. Both laws are run here from the seed on. A pore that is
-filled over its length conducts K_clean / lambda with the one and K_clean 12 k / W^2 with the other, so that lambda = 2000
-is a permeability of W^2 / (12 lambda), which is no property of the biomass: it goes as the square of the pore's width.
+difference depending on the conditions, and does not evaluate it. Both laws are run here from the seed on. A pore that
+is filled over its length conducts K_clean / lambda with the one and K_clean 12 k / W^2 with the other, so that lambda =
+2000 is a permeability of W^2 / (12 lambda), no property of the biomass: it goes as the square of the pore's width.
 """
 
 from __future__ import annotations
@@ -33,7 +33,8 @@ def equivalent(run: tuple[str, ...]) -> float:
     return said.pore.width**2 / 12 / said.flow.viscosity_ratio
 
 
-@claim("C42", "5", "a porous material instead of a raised viscosity may lead to differences, depending on the conditions",
+@claim("C42", "5", "a porous material instead of a raised viscosity may lead to differences, depending on the "
+                   "conditions",
        fine=PAIRED, beside=())
 def drag_or_viscosity() -> Finding:
     """Conductivity with Brinkman's drag of a permeability of 1e-15 m2 over that with lambda = 2000: base at 19.2 h, an
@@ -44,8 +45,8 @@ def drag_or_viscosity() -> Finding:
                       abs(changes["aggregate"]), 100 * FEW, f"no difference: {FEW_WORDS}", date=NEW),
               at_least("film, wide before contact: conductivity changes by (%)", "differences", abs(changes["film"]),
                        100 * FEW, FEW_WORDS, date=NEW),
-              at_least("plug, wide at 40 h: conductivity changes by (%)", "differences", abs(changes["plug"]), 100 * FEW,
-                       FEW_WORDS, date=NEW),
+              at_least("plug, wide at 40 h: conductivity changes by (%)", "differences", abs(changes["plug"]),
+                       100 * FEW, FEW_WORDS, date=NEW),
               at_most("wide: time of contact changes by (%)", "depending on the conditions", abs(changes["contact"]),
                       100 * FEW, f"no difference: {FEW_WORDS}", date=NEW))
     return Finding(checks, reason="it makes a difference elsewhere", note=lambda: _told(ours, other))
@@ -66,5 +67,6 @@ def _told(ours: dict[str, float], other: dict[str, float]) -> str:
     clean = scene(*AGGREGATE).pore.width ** 2 / 12 / PERMEABILITY
     return (f"Conductivity with lambda = 2000, with 1e-15 m2, and with W^2 / (12 lambda), that is "
             f"{1e-12 * equivalent(AGGREGATE):.2g} m2 in base and {1e-12 * equivalent(PLUG):.2g} m2 in wide: {rows}. "
-            f"Contact comes at {ours['contact']:.2f}, {other['contact']:.2f} and {same['contact']:.2f} h. With 1e-15 m2 "
+            f"Contact comes at {ours['contact']:.2f}, {other['contact']:.2f} and {same['contact']:.2f} h. With 1e-15 "
+            "m2 "
             f"a filled pore of 50 um conducts {clean:.2g} times less than a clean one, where lambda allows 2000 (C17).")

@@ -1,7 +1,7 @@
 """C45: what an aggregate takes up, beside layers that have its biomass.
 
-A layer of uniform thickness covers a wall of the whole pore, or both of them half each. A section then mixes faster than
-it is passed, W^2 / D against L / u, and the layer is thin, X q h^2 < D C, so that concentrations depend on x alone, and
+A layer of uniform thickness covers a wall of the whole pore, or both of them half each. A section then mixes faster
+than it is passed, W^2 / D against L / u, and the layer is thin, X q h^2 < D C, so that concentrations hang on x alone:
 
     u C' = D_mean C'' - X f q(C_A, C_D),     D_mean = (1 - f) D + f D_B,     f the share of the pore that is biomass
 
@@ -18,7 +18,7 @@ import numpy as np
 from reference import channel_bvp
 from repro.march import simulation
 from repro.scene import Scene
-from verification.claims import Finding, at_most, between, claim
+from verification.claims import Finding, between, claim
 from verification.claims.accuracy import FEW, FEW_WORDS
 from verification.claims.discussed import REDUCED, filled_at
 from verification.claims.levels import WIDE_FINE
