@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from paper_figures import runs, states, style
@@ -58,8 +57,7 @@ def caption(*folders: Path) -> str:
     told = "; ".join(f"{', '.join(f'{value:.3g}' for value in row)} m/d at {hours:g} h"
                      for hours, row in zip(MOMENTS, columns))
     return ("Wide with the raised viscosity of the paper (black), with Brinkman's drag of a permeability of "
-            f"{runs.PERMEABILITIES[0]:.2g} m² (red), and of W²/(12 λ) = {runs.PERMEABILITIES[1]:.2g} m² (blue, dashed), "
+            f"{runs.PERMEABILITIES[0]:.2g} m² (red), and of W²/(12 λ) = {runs.PERMEABILITIES[1]:.2g} m² (dashed), "
             "with which a pore that is filled over its length conducts as with the viscosity. (a) Conductivity: "
-            f"{told}. (b) The same over that with the viscosity. While the pore is open the water goes around and the law "
-            "does not matter; film and plug conduct what the biomass lets through. The dotted line is contact with the "
-            "opposite wall.")
+            f"{told}. (b) The same over that with the viscosity. While the pore is open the water goes around and the "
+            "law does not matter; film and plug conduct what the biomass lets through. Dotted: contact.")

@@ -49,10 +49,11 @@ def _conductivity(axes: Axes, folders: tuple[Path, ...]) -> None:
         table = states.series(folder)
         axes.plot(table["time_h"], table["conductivity_m_per_d"], "-" if number == 0 else "--", color=colour,
                   label=label, linewidth=2.0 if number == 0 else 1.1, zorder=1 if number == 0 else 2)
-    time = states.series(folders[0])["time_h"]
-    meets = contact(folders[0])
+    table = states.series(folders[0])
+    meets = min(contact(folders[0]), float(table["time_h"][-1]))
+    shown = table["conductivity_m_per_d"][np.abs(table["time_h"] - meets) <= AROUND]
     axes.set(title="hydraulic conductivity of the pore", xlabel="time (h)", ylabel="m/d", yscale="log",
-             xlim=(max(meets - AROUND, 0.0), min(meets + AROUND, time[-1])) if np.isfinite(meets) else (0, time[-1]))
+             xlim=(meets - AROUND, meets + AROUND), ylim=(0.7 * shown.min(), 1.4 * shown.max()))
     axes.grid(alpha=0.25, linewidth=0.4)
 
 
