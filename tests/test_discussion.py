@@ -40,8 +40,8 @@ def test_a_claim_may_leave_the_scheme_out():
 
 
 def test_layers_conduct_as_parallel_flow():
-    """None; all of the pore; and one layer as the solver of this package has it. Mutants: lambda for its inverse; the
-    loss of one layer for that of two."""
+    """None; all of the pore; as viscous as water; and so viscous that the open middle alone conducts. Mutants:
+    lambda for its inverse; the middle too wide."""
     for walls in (1, 2):
         assert discussed.layered_share(2000.0, 1e-9, walls) == pytest.approx(1.0, rel=1e-6)
         assert discussed.layered_share(2000.0, 1.0, walls) == pytest.approx(1 / 2000, rel=1e-9)
@@ -59,8 +59,8 @@ def test_leveque_is_the_similarity_solution():
 
 
 def test_little_biomass_takes_up_as_much_as_the_supply_lets_it():
-    """X f q(C_s) L / (u C_s), as far as C falls. Mutants: the part that is open for that which is filled; a supply of
-    the donor."""
+    """X f q(C_s) L / (u C_s), as far as C falls. Mutants: the part that is open for that which is filled; the
+    donor's effluent."""
     said, part = scene("wide"), 1e-4
     law, flow = said.kinetics, 2.9e6 / 24
     m = 10 / 11
@@ -90,7 +90,8 @@ def test_decay_over_synthesis_at_rest():
 
 
 def test_the_fall_up_to_contact_and_the_fastest_decline(monkeypatch):
-    """Of a velocity exp(-t / 10) that drops to a third at contact. Mutants: the 5 h after contact; the mean rate."""
+    """Of a velocity exp(-t / 10) that drops to a third at contact. Mutants: the 5 h after contact; the rate
+    in the middle of the time."""
     time = np.linspace(0.0, 60.0, 61)
     velocity = np.exp(-time / 10) * np.where(time > 50, 1 / 3, 1.0)
     rows = {"time_h": time, "mean_velocity_m_per_d": velocity, "conductivity_m_per_d": velocity}
@@ -119,8 +120,8 @@ def test_a_permeable_run_has_the_drag_and_nothing_of_the_viscosity():
 
 
 def test_what_a_variant_changes_is_measured_against_the_paper(monkeypatch):
-    """Nothing for the paper's own run; the area that only one covers for another one. Mutants: the union; a change of
-    sign lost in the contact time's."""
+    """Nothing for the paper's own run; the area that only one covers for another one. Mutants: the union; a decrease
+    that holds because it is negative."""
     monkeypatch.setattr(rheology, "WHOLE", HOUR)
     assert rheology.apart(HOUR) == 0 and rheology.conductivity_change(HOUR) == 0
     bigger = ("base", 'growth.end="2 h"', 'output.times=["2 h"]')
@@ -143,8 +144,7 @@ def test_every_variant_changes_one_key_of_the_scene():
 
 
 def test_forces_put_on_at_the_end_are_those_of_a_run_with_them():
-    """An elastic body forgets the way; what is left is what the forces changed of its growth. Mutants: no forces; those
-    of the pore at t = 0."""
+    """An elastic body forgets the way; what is left is what the forces changed of its growth. Mutant: no forces."""
     found = bodies(HOUR)[-1]
     along = bodies((*HOUR, 'growth.fluid_forces="included"'))[-1]
     free, forced, run_ = (discussed.tension(each)[0] for each in (found, discussed.pressed(found), along))
@@ -153,7 +153,7 @@ def test_forces_put_on_at_the_end_are_those_of_a_run_with_them():
 
 
 def test_the_largest_tension_is_told_with_its_place():
-    """Mutants: the largest modulus; the first triangle's place."""
+    """Mutants: the least stress; the first triangle's place."""
     found = bodies(HOUR)[-1]
     values = found.cell("largest_principal_stress_MPa")
     size, x, y, hours = discussed.tension(found)

@@ -158,7 +158,7 @@ def tearing() -> Finding:
     first = max(courses["base"])
     note = (f"In base it is {first[0] / modulus:.2g} mu_L, at ({first[1]:.1f}, {first[2]:.1f}) um and {first[3]:g} h; "
             f"in wide {value / modulus:.2g} mu_L at ({x:.0f}, {y:.0f}) um and {hours:g} h: there it would tear first. "
-            f"Over time, in wide: {_listed(courses['wide'][4::5], modulus)}.")
+            + " ".join(f"Over time, in {name}: {_listed(peaks[4::5], modulus)}." for name, peaks in courses.items()))
     return Finding(tuple(checks), reason="nothing is under tension", note=note)
 
 
