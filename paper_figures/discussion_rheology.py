@@ -38,9 +38,9 @@ def _outlines(axes: Axes, folders: tuple[Path, ...]) -> None:
     first, last = min(s.rim[:, 0].min() for s in shown), max(s.rim[:, 0].max() for s in shown)
     style.channel(axes, (first - figure_6.MARGIN, last + figure_6.MARGIN), shown[0].width, 2.5)
     style.fluid(axes, (first - figure_6.MARGIN, last + figure_6.MARGIN), shown[0].width)
-    for number, (state, colour) in reversed(list(enumerate(zip(shown, COLOURS)))):
+    for number, (state, colour) in enumerate(zip(shown, COLOURS)):
         style.aggregate(axes, figure_6.smooth(state.rim, state.width), filled=number == 0, edgecolor=colour,
-                        linewidth=1.0, zorder=3 - 0.1 * number)
+                        linewidth=1.0, zorder=2 + 0.1 * number)
     axes.set_title(f"outlines at {shown[0].time:g} h")
 
 

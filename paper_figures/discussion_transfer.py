@@ -35,24 +35,24 @@ NAMES, COLOURS = ("acceptor", "donor"), (style.BLUE, style.RED)
 def draw() -> Figure:
     """Over time, in one shape by velocity and by supply, by shape; and what the aggregate pulls from upstream."""
     made = style.figure(4.6)
-    panels = made.subplot_mosaic([["time"] * 3 + ["pull"] * 3, ["speed"] * 2 + ["supply"] * 2 + ["shape"] * 2])
+    panels = made.subplot_mosaic([["time"] * 3 + ["pull"] * 3, ["velocity"] * 2 + ["supply"] * 2 + ["shape"] * 2])
     with at_level(LEVEL):
         _over_time(panels["time"])
         _pull(panels["pull"])
         driven = [in_one_shape(head=float(head)) for head in HEADS]
         speeds = [24e-6 * found.solved.flow.mean_velocity for found in driven]
-        _panel(panels["speed"], speeds, driven, "mean velocity (m/d)", True)
+        _panel(panels["velocity"], speeds, driven, "mean velocity (m/d)", True)
         supplied = [in_one_shape(supply=float(each)) for each in SUPPLIES]
         _panel(panels["supply"], SUPPLIES, supplied, "supply (K$_s$)", True)
         _panel(panels["shape"], RADII, [in_one_shape(radius=float(each)) for each in RADII], "radius (µm)", False)
     for name, axes in panels.items():
         axes.grid(alpha=0.25, linewidth=0.4)
-        if name in ("speed", "supply", "shape"):
+        if name in ("velocity", "supply", "shape"):
             axes.set(ylim=(0, None), title=f"half-disc at rest, by {name if name != 'shape' else 'radius'}")
-    panels["speed"].set_ylabel("Sherwood number")
+    panels["velocity"].set_ylabel("Sherwood number")
     panels["time"].legend(ncols=2, loc="upper left")
     panels["pull"].legend()
-    style.number_panels(*(panels[name] for name in ("time", "pull", "speed", "supply", "shape")))
+    style.number_panels(*(panels[name] for name in ("time", "pull", "velocity", "supply", "shape")))
     return made
 
 

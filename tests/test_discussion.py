@@ -1,6 +1,7 @@
 """What the paper discusses and does not compute: the claims C38-C46 and their figures, piece by piece."""
 from dataclasses import replace
 from importlib import import_module
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -132,6 +133,16 @@ def test_what_a_variant_changes_is_measured_against_the_paper(monkeypatch):
     monkeypatch.setattr(rheology, "contact", lambda run: times[run])
     checks = rheology._changes("x", bigger)
     assert checks[1].ours == pytest.approx(10.0) and not checks[1].holds
+
+
+def test_an_outline_that_has_slid_is_moved_back(monkeypatch):
+    """By 8 um downstream. Mutants: moved on instead of back; upstream."""
+    here = bodies(HOUR)[-1].outline
+    there = replace(here, points=here.points + [8.0, 0.0])
+    outlines = {rheology.WHOLE: here, HOUR: there}
+    monkeypatch.setattr(rheology, "bodies", lambda run: [SimpleNamespace(outline=outlines[run])])
+    assert rheology.slid(HOUR) == pytest.approx((8.0, 0.0), abs=1e-6)
+    assert rheology.apart(HOUR) > 10
 
 
 def test_every_variant_changes_one_key_of_the_scene():

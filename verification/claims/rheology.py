@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from shapely.affinity import translate
+
 from verification.claims import Check, Finding, at_most, claim
 from verification.claims.accuracy import FEW, FEW_WORDS
 from verification.claims.levels import PAIRED
@@ -19,10 +21,11 @@ from verification.claims.runs import around_contact, scene, series
 #: Hours: in all variants the opposite wall has then been touched for 5 h.
 END = 40
 WHOLE = ("wide", f'growth.end="{END} h"')
+RECHOSEN = "middles rechosen"
 #: One choice each, in words and as changes of the scene.
 VARIANTS = {
     "born stress-free": 'growth.new_biomass="stress_free"',
-    "middles rechosen": 'numerics.fixed_point="rechosen"',
+    RECHOSEN: 'numerics.fixed_point="rechosen"',
     "film halved": 'growth.minimum_film="1 um"',
     "film doubled": 'growth.minimum_film="4 um"',
     "angle halved": 'growth.minimum_contact_angle="8.35 deg"',
@@ -36,10 +39,12 @@ def other_rheology() -> Finding:
     """Wide to 40 h with one choice changed at a time: area that only one of the two outlines covers, shift of the time
     of contact, and change of the conductivity at the end."""
     checks = tuple(check for name, change in VARIANTS.items() for check in _changes(name, (*WHOLE, change)))
-    worst = {check.quantity: abs(check.ours) for check in checks if not check.holds}
-    told = "; ".join(f"{name} {value:.3g}" for name, value in worst.items())
-    reason = ("outlines and contact hardly move. What moves is the conductivity of the young plug, which still falls "
-              "steeply, so that an earlier or later contact shows in it: " + (told or "its bar reaches over a bound"))
+    worst = "; ".join(f"{check.quantity} {check.ours:.3g}" for check in checks if not check.holds)
+    moved, left = slid((*WHOLE, VARIANTS[RECHOSEN]))
+    reason = (f"what changes by more than a few percent: {worst or 'nothing, but a bar reaches over the bound'}. With "
+              f"its middles rechosen the aggregate slides {moved:.1f} um downstream as it grows on the other side, "
+              f"with the same shape: moved back, the outlines are {left:.2g} % apart, and its conductivity is the same. The "
+              "conclusions stand, the place of the aggregate is the fixed point's")
     return Finding(checks, reason=reason, note=_told)
 
 
@@ -56,6 +61,14 @@ def apart(run: tuple[str, ...]) -> float:
     """Area that only one of the last outlines of a run and of WHOLE covers, in percent of the area."""
     ours, other = (polygon(bodies(chosen)[-1].outline) for chosen in (WHOLE, run))
     return 100 * float(ours.symmetric_difference(other).area / ours.area)
+
+
+def slid(run: tuple[str, ...]) -> tuple[float, float]:
+    """How far downstream (um) of that of WHOLE the middle of a run's last outline lies, and what is left between the
+    outlines (% of the area) when it is moved back by that."""
+    ours, other = (polygon(bodies(chosen)[-1].outline) for chosen in (WHOLE, run))
+    moved = other.centroid.x - ours.centroid.x
+    return moved, 100 * float(ours.symmetric_difference(translate(other, -moved)).area / ours.area)
 
 
 def contact(run: tuple[str, ...]) -> float:
