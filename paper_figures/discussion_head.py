@@ -29,9 +29,9 @@ def draw(closing: Path | None = None, wide: Path | None = None) -> Figure:
     _outlines(panels["outlines"], closing)
     _fall(panels["fall"], closing, wide)
     _restricted(panels["restricted"], closing)
-    for name, corner in (("fall", "lower left"), ("restricted", "upper right")):
+    for name in ("fall", "restricted"):
         panels[name].grid(alpha=0.25, linewidth=0.4)
-        panels[name].legend(loc=corner)
+        panels[name].legend(loc="upper right", bbox_to_anchor=(0.93, 1.0))
     style.number_panels(*panels.values())
     return made
 
@@ -43,7 +43,7 @@ def _outlines(axes: Axes, closing: Path) -> None:
 
 
 def _fall(axes: Axes, closing: Path, wide: Path) -> None:
-    named = ((closing, "Base, constant head", style.BLUE), (wide, "Wide, constant velocity", style.RED))
+    named = ((closing, "Base (head)", style.BLUE), (wide, "Wide (velocity)", style.RED))
     for folder, name, colour in named:
         table, meets = states.series(folder), contact(folder)
         axes.plot(table["time_h"], table["conductivity_m_per_d"] / table["conductivity_m_per_d"][0], color=colour,

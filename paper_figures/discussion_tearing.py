@@ -48,8 +48,8 @@ def course(run: tuple[str, ...], forced: bool) -> np.ndarray:
 @style.styled
 def draw() -> Figure:
     """Size over time of both runs, and the places in Wide without and with the fluid's forces."""
-    made = style.figure(5.0)
-    panels = made.subplot_mosaic([["size"], ["without"], ["with"]], height_ratios=[1.5, 1, 1])
+    made = style.figure(5.6)
+    panels = made.subplot_mosaic([["size"], ["without"], ["with"]], height_ratios=[1.2, 1, 1])
     with at_level(LEVEL):
         _sizes(panels["size"])
         norm = Normalize(0, bodies(COURSES[1])[-1].pore.time)
@@ -83,6 +83,7 @@ def _places(axes: Axes, colours: ScalarMappable, forced: bool) -> None:
     ends, width = (reach.min() - figure_6.MARGIN, reach.max() + figure_6.MARGIN), shown[0].grid.width
     style.channel(axes, ends, width, 2.5)
     style.fluid(axes, ends, width)
+    axes.set_anchor("W")
     for found in shown:
         style.aggregate(axes, _rim(found), filled=False, edgecolor=colours.to_rgba(found.pore.time), linewidth=0.7)
     _, x, y, hours = course(COURSES[1], forced).T

@@ -43,7 +43,7 @@ def other_rheology() -> Finding:
     moved, left = slid((*WHOLE, VARIANTS[RECHOSEN]))
     reason = (f"what changes by more than a few percent: {worst or 'nothing, but a bar reaches over the bound'}. With "
               f"its middles rechosen the aggregate slides {moved:.1f} um downstream as it grows on the other side, "
-              f"with the same shape: moved back, the outlines are {left:.2g} % apart, and its conductivity is the same. "
+              f"with the same shape: moved back, the outlines are {left:.2g} % apart; its conductivity is the same. "
               "The conclusions stand, the place of the aggregate is the fixed point's")
     return Finding(checks, reason=reason, note=_told)
 
