@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from paper_figures import figure_6, runs, states, style
 from paper_figures.discussion_rheology import contact
-from verification.claims.constant_head import consumed
+from verification.claims.constant_head import consumed, specific_growth
 
 TITLE = "Addition. Clogging under a constant head"
 RUNS = (runs.CLOSING, runs.WIDE)
@@ -55,7 +55,7 @@ def _fall(axes: Axes, closing: Path, wide: Path) -> None:
 
 def _restricted(axes: Axes, closing: Path) -> None:
     table = states.series(closing)
-    taken, rate = consumed(table), growth(table)
+    taken, rate = consumed(table), specific_growth(table)
     middles = 0.5 * (table["time_h"][1:] + table["time_h"][:-1])
     axes.plot(table["time_h"], table["mean_velocity_m_per_d"] / table["mean_velocity_m_per_d"].max(), color=style.BLUE,
               label="velocity")
@@ -64,17 +64,12 @@ def _restricted(axes: Axes, closing: Path) -> None:
     axes.set(title="Base, over the largest", xlabel="time (h)", yscale="log", xlim=(0, None))
 
 
-def growth(table: dict[str, np.ndarray]) -> np.ndarray:
-    """(n - 1,) growth rate of the aggregate's area (1/h) between rows."""
-    return np.diff(np.log(table["aggregate_area_um2"])) / np.diff(table["time_h"])
-
-
 def caption(closing: Path | None = None, wide: Path | None = None) -> str:
     """What is seen, with the velocities and the time of contact."""
     closing = closing or runs.folders([runs.CLOSING])[0]
     table, meets = states.series(closing), contact(closing)
     velocity = table["mean_velocity_m_per_d"]
-    rate = growth(table)
+    rate = specific_growth(table)
     touched = (f"The opposite wall is touched at {meets:g} h" if np.isfinite(meets)
                else "The opposite wall is not touched")
     return (f"Base carried on to {table['time_h'][-1]:g} h. {touched}, when the velocity has fallen from "
