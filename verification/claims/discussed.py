@@ -186,8 +186,9 @@ def torn_by_the_fluid() -> Finding:
     modulus = scene(*BASE).growth.shear_modulus
     told = "; ".join(f"{name} {_listed(pair, modulus)}, {change:.2g} % apart"
                      for name, pair, change in zip(("base,", "wide,", "wide,"), cases, changes))
-    return Finding((check,), reason="its change hardly exceeds a few percent even in the plug",
-                   note=f"Without and with the fluid's forces: {told}.")
+    reason = ("in the plug two places bear nearly the same stress, over the lower wall and at the upper contact line, "
+              "so that which of them bears the most, and by how much, hangs on the mesh as on the fluid")
+    return Finding((check,), reason=reason, note=f"Without and with the fluid's forces: {told}.")
 
 
 def pressed(found: Body) -> Body:
