@@ -20,10 +20,10 @@ def main() -> None:
     found = _computed(requests)
     told = {name: _drawn(name, module, found) for name, module in modules.items()}
     entries = [entry for entry, _ in told.values()]
-    page.write(entries, [f"{request.scene}: {provenance(folder)['status']}" for request, folder in found.items()], OUT)
+    page.write(entries, [f"{request.name}: {provenance(folder)['status']}" for request, folder in found.items()], OUT)
     write_json(OUT / manifest.NAME, {
         "environment": manifest.environment(),
-        "runs": {request.scene: manifest.of_run(request, folder) for request, folder in found.items()},
+        "runs": {request.name: manifest.of_run(request, folder) for request, folder in found.items()},
         "figures": {name: figure for name, (_, figure) in told.items()}})
     print(f"{OUT / 'index.html'}: all of them with captions; {manifest.NAME}: hashes of their data", flush=True)
 
@@ -31,7 +31,7 @@ def main() -> None:
 def _computed(requests: list[runs.Request]) -> dict[runs.Request, Path]:
     """Results folder of each request."""
     start = perf_counter()
-    print(f"runs: {', '.join(request.scene for request in requests)} ...", end=" ", flush=True)
+    print(f"runs: {', '.join(request.name for request in requests)} ...", end=" ", flush=True)
     found = dict(zip(requests, runs.folders(requests)))
     print(f"ready after {perf_counter() - start:.0f} s", flush=True)
     return found
@@ -44,7 +44,7 @@ def _drawn(name: str, module, found: dict[runs.Request, Path]) -> tuple[page.Ent
     data = manifest.figure_hash(made, caption)
     style.save(made, OUT, name)
     print(f"{name}: {module.TITLE}", flush=True)
-    commands = tuple(request.command() for request in module.RUNS)
+    commands = (*(request.command() for request in module.RUNS), *page.also(module))
     return (page.Entry(name, module.TITLE, caption, commands, module.CLAIMS),
             manifest.of_figure(module, data, perf_counter() - start, OUT.glob(f"{name}.*")))
 

@@ -30,7 +30,15 @@ STATEMENTS = {
     "C31": "the shape stays a half-disc until growth is limited or the aggregate squeezed",
     "C33": "Base is fully penetrated by its substrates",
     "C35": "fluid flows around the aggregate, and through it once it spans the pore",
+    "C38": "it takes less biomass to plug a pore as an aggregate than as a biofilm",
+    "C39": "a mass transfer coefficient cannot be set a priori, since it depends on the sink",
+    "C40": "detachment by fracture where the stress is largest could be incorporated",
+    "C41": "another rheology and other conditions at the walls hardly affect the conclusions",
+    "C42": "a porous material instead of a raised viscosity may make a difference",
+    "C43": "clogging restricts flow and supply, and then falls sharply, under constant head too",
     "C44": "a pore can be incorporated into a network model",
+    "C45": "aggregate or layer, the distinction is not crucial for the consumption of substrates",
+    "C46": "the stress could link fluid flow, growth and detachment",
 }
 
 

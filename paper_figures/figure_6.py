@@ -36,13 +36,15 @@ def draw(folder: Path | None = None) -> Figure:
     return made
 
 
-def outlines(axes: Axes, folder: Path) -> None:
-    """The channel with the outlines of a run, the latest at the back, and a scale of their times."""
-    shown = states.every(folder, EVERY)
+def outlines(axes: Axes, folder: Path, hours: float | None = None) -> None:
+    """The channel with the outlines of a run every so many hours, EVERY by default, the latest at the back, and a scale
+    of their times."""
+    hours = hours or EVERY
+    shown = states.every(folder, hours)
     first, last = min(s.rim[:, 0].min() for s in shown), max(s.rim[:, 0].max() for s in shown)
     style.channel(axes, (first - MARGIN, last + MARGIN), shown[0].width, 2.5)
     style.fluid(axes, (first - MARGIN, last + MARGIN), shown[0].width)
-    norm = BoundaryNorm(EVERY * (np.arange(len(shown) + 1) - 0.5), 256)
+    norm = BoundaryNorm(hours * (np.arange(len(shown) + 1) - 0.5), 256)
     colours = ScalarMappable(norm, matplotlib.colormaps["viridis_r"])
     for state in reversed(shown):
         style.aggregate(axes, smooth(state.rim, state.width), facecolor=colours.to_rgba(state.time), edgecolor="white",

@@ -112,7 +112,7 @@ def of_run(request: runs.Request, folder: Path) -> dict:
 
 def of_figure(module, data: str, seconds: float, pictures: Iterable[Path]) -> dict:
     """What is told of a figure: what it is drawn from, what it draws, how long that took, its pictures (bytes)."""
-    return {"title": module.TITLE, "runs": [request.scene for request in module.RUNS], "data": data,
+    return {"title": module.TITLE, "runs": [request.name for request in module.RUNS], "data": data,
             "wall_time_s": seconds, "pictures": {path.name: path.stat().st_size for path in sorted(pictures)}}
 
 
@@ -171,7 +171,7 @@ def present() -> dict:
         if not (folder / "run.json").exists():
             raise FileNotFoundError(f"{folder}: no such run of the present source; `make figures` computes it")
     return {"environment": environment(),
-            "runs": {request.scene: of_run(request, folder) for request, folder in found.items()},
+            "runs": {request.name: of_run(request, folder) for request, folder in found.items()},
             "figures": {name: _present_figure(name, module, [found[request] for request in module.RUNS])
                         for name, module in modules.items()}}
 

@@ -59,8 +59,15 @@ with verdicts as recorded in <code>verification/claims/claims.json</code>.</p>
 """
 
 
+def also(module) -> tuple[str, ...]:
+    """What to type for the numbers that a figure computes with the functions of its claims, COMPUTED of them."""
+    return tuple(f"python -m verification.claims {id}" for id in getattr(module, "COMPUTED", ()))
+
+
 def _short(entry: Entry) -> str:
-    return entry.title.partition(". ")[0]
+    """Number of a figure of the paper, or what an addition shows."""
+    kind, _, title = entry.title.partition(". ")
+    return title if kind == "Addition" else kind
 
 
 def _section(entry: Entry) -> str:

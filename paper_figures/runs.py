@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -9,16 +10,24 @@ from pathlib import Path
 
 from repro import Scene, load_scene
 from repro.run.cache import cached_run, cached_runs
+from verification.claims import permeable, rheology
 
 CACHE = Path(__file__).parent / "cache"
 
 
 @dataclass(frozen=True)
 class Request:
-    """A packaged scene with what `--set` changes in it."""
+    """A packaged scene with what `--set` changes in it; `label`: what it is called where one scene is run in several
+    ways, the scene's name by default."""
 
     scene: str
     overrides: tuple[str, ...] = ()
+    label: str = ""
+
+    @property
+    def name(self) -> str:
+        """Which run it is."""
+        return self.label or self.scene
 
     def load(self) -> Scene:
         """The scene, read and checked."""
@@ -27,7 +36,7 @@ class Request:
     def command(self) -> str:
         """What to type for the same run."""
         changes = [part for change in self.overrides for part in ("--set", change)]
-        return shlex.join(["repro", "run", self.scene, "--out", f"runs/{self.scene}", *changes])
+        return shlex.join(["repro", "run", self.scene, "--out", f"runs/{self.name}", *changes])
 
 
 def _times(*hours: float) -> str:
@@ -40,6 +49,20 @@ BASE = Request("base", (_times(*range(1, 20), 19.2, 19.4),))
 WIDE = Request("wide")
 #: Figure 4, geometry and mesh only.
 INITIAL_MESH = Request("initial_mesh")
+
+#: What the discussion speaks of, in the preset "fast". Base carried on through contact; wide, and wide with one choice
+#: of the rheology changed, or with a permeable body.
+FAST = 'numerics.preset="fast"'
+CLOSING = Request("base", (FAST, 'growth.end="76 h"', _times(*range(1, 73), *(72.5 + 0.25 * k for k in range(15)))),
+                  "base_closing")
+_UNTIL = (FAST, f'growth.end="{rheology.END} h"',
+          _times(*range(1, 33), *(32.5 + 0.25 * k for k in range(18)), *range(37, rheology.END + 1)))
+WIDE_FAST = Request("wide", _UNTIL, "wide_fast")
+VARIANTS = {name: Request("wide", (*_UNTIL, change), "wide_" + re.sub(r"\W", "_", name))
+            for name, change in rheology.VARIANTS.items()}
+PERMEABILITIES = (1e-12 * permeable.PERMEABILITY, 1e-12 * 100.0**2 / 12 / 2000)
+PERMEABLE = tuple(Request("wide", (*_UNTIL, 'flow.biomass="brinkman"', f'flow.permeability="{value:.3g} m^2"'),
+                          f"wide_permeable_{value:.0e}") for value in PERMEABILITIES)
 
 
 def base_run() -> Path:

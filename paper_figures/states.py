@@ -14,6 +14,9 @@ from matplotlib.tri import Triangulation
 from repro.fem.transfer import interpolate
 from repro.results import read_table
 
+#: Straight triangles of which one of a type is drawn: a curved one in four, by the middles of its arcs.
+QUARTERS = {"triangle": np.array([[0, 1, 2]]), "triangle6": np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])}
+
 
 @dataclass(frozen=True, eq=False)
 class State:
@@ -90,8 +93,9 @@ def times(folder: Path, kind: str = "fields") -> list[tuple[float, Path]]:
 def read(time: float, path: Path) -> State:
     """One file of fields."""
     content = meshio.read(path)
-    cells = {name: values[0] for name, values in content.cell_data.items()}
-    return State(time, content.points[:, :2], content.cells_dict["triangle"], cells["region"] > 0.5,
+    block, parts = content.cells[0], QUARTERS[content.cells[0].type]
+    cells = {name: np.repeat(values[0], len(parts), axis=0) for name, values in content.cell_data.items()}
+    return State(time, content.points[:, :2], block.data[:, parts].reshape(-1, 3), cells["region"] > 0.5,
                  dict(content.point_data), cells)
 
 

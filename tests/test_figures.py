@@ -32,8 +32,24 @@ def short(tmp_path_factory):
     return folders
 
 
+#: The same for the figures that compute numbers of their own.
+HALF_AN_HOUR = [(name, f'growth.end="{hours} h"', f'output.times=["{hours} h"]')
+                for name, hours in (("base", 0.4), ("wide", 0.4))]
+
+
 @pytest.fixture
-def quick(short, monkeypatch, tmp_path):
+def brief(monkeypatch):
+    """Figures that compute numbers of their own do so for short runs and few points."""
+    transfer, tearing = MODULES["discussion_transfer"], MODULES["discussion_tearing"]
+    monkeypatch.setattr(transfer, "RUN", HALF_AN_HOUR[0])
+    monkeypatch.setattr(tearing, "COURSES", tuple(HALF_AN_HOUR))
+    monkeypatch.setattr(tearing, "EVERY", 0.2)
+    for points in ("HEADS", "SUPPLIES", "RADII"):
+        monkeypatch.setattr(transfer, points, getattr(transfer, points)[[0, -1]])
+
+
+@pytest.fixture
+def quick(short, brief, monkeypatch, tmp_path):
     """`python -m paper_figures` on the short runs, in coarse pictures, into a temporary folder."""
     monkeypatch.setattr(runs, "folders", lambda requests: [short[request.scene] for request in requests])
     monkeypatch.setattr(figures, "OUT", tmp_path / "out")
@@ -58,11 +74,19 @@ def test_a_figure_says_what_it_is(name):
 
 
 def test_every_figure_of_the_folder_is_drawn():
-    there = {path.stem for pattern in ("figure_*.py", "plate_*.py") for path in figures.OUT.parent.glob(pattern)}
+    kinds = ("figure", "plate", "discussion")
+    there = {path.stem for kind in kinds for path in figures.OUT.parent.glob(f"{kind}_*.py")}
     assert there == set(paper_figures.FIGURES) - {"time_series", "network"}
 
 
-@pytest.mark.parametrize("request_", [runs.BASE, runs.WIDE, runs.INITIAL_MESH], ids=lambda request: request.scene)
+REQUESTS = list(dict.fromkeys(request for module in MODULES.values() for request in module.RUNS))
+
+
+def test_no_two_runs_have_one_name():
+    assert len({request.name for request in REQUESTS}) == len(REQUESTS) >= 13
+
+
+@pytest.mark.parametrize("request_", REQUESTS, ids=lambda request: request.name)
 def test_the_command_told_is_the_run_that_is_drawn(request_):
     chosen = cli._parser().parse_args(shlex.split(request_.command())[1:])
     assert scene_hash(load_scene(chosen.scene, chosen.set)) == scene_hash(request_.load())
@@ -78,6 +102,7 @@ def test_everything_is_drawn_and_told(quick, capsys):
     text = " ".join(root.itertext())
     assert all(module.TITLE in text for module in MODULES.values())
     assert all(request.command() in text for module in MODULES.values() for request in module.RUNS)
+    assert all(f"python -m verification.claims {id}" in text for id in ("C39", "C40", "C46"))
     assert "Figure 1" in text and "base: completed" in text
     assert all(element.get(key, "").partition(":")[0] not in ("http", "https") for element in root.iter()
                for key in ("src", "href"))

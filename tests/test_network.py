@@ -29,8 +29,7 @@ def scene(width, position=0.0, drive=("mean_velocity", "1 m/d"), thickness=0.6):
 
 
 def test_velocity_head_width_and_place_drop_out():
-    """To rounding but for the place, where the mesh is another. Mutants: the empty loss over W in place of W^2; a
-    conductivity that depends on the drive."""
+    """To rounding but for the place, where the mesh is another."""
     one = added(scene(100.0))
     assert one == pytest.approx(12.2, rel=0.01)
     for other in (scene(100.0, drive=("mean_velocity", "30 m/d")), scene(100.0, drive=("head", "1e-3 cm")),
@@ -44,7 +43,7 @@ def test_velocity_head_width_and_place_drop_out():
 @pytest.mark.parametrize("thickness", [0.05, 0.4, 0.8])
 def test_the_table_has_half_discs_of_the_present_code(thickness):
     """As in `network.csv`. Meshes of another machine may differ in rounding, by which Mmg makes other triangles: within
-    what the elements err by. Mutant: half-discs of the preset `fast` in the table."""
+    what the elements err by."""
     now = shapes.half_disc(thickness)
     columns = read_table(TABLE)
     for ratio in (RATIOS[0], LAMBDA, RATIOS[-1]):
@@ -56,8 +55,7 @@ def test_the_table_has_half_discs_of_the_present_code(thickness):
 
 
 def test_fifty_shapes_that_the_fit_has_not_seen_are_within_the_bounds():
-    """Half-discs, drawn bodies and plugs, and what three runs make, each at a lambda of its own. Mutants: the law of
-    lambda = 2000 for all; bounds that are half as wide."""
+    """Half-discs, drawn bodies and plugs, and what three runs make, each at a lambda of its own."""
     found = list(unseen.every())
     columns = {name: np.array(values, float) for name, values in
                zip(record.COLUMNS, zip(*(record.row(one, 0, 1) for one in found)))}
@@ -70,7 +68,7 @@ def test_fifty_shapes_that_the_fit_has_not_seen_are_within_the_bounds():
 
 
 def test_it_grows_with_area_and_lambda_and_lies_within_its_bounds():
-    """Also between the rows of the table. Mutant: the law of one lambda for all."""
+    """Also between the rows of the table."""
     for spanned in (False, True):
         share = np.geomspace(*known(spanned), 200)
         laws = [repro.added_resistance(share, 1.0, spanned, ratio) for ratio in np.geomspace(100, 10000, 12)]
@@ -89,7 +87,7 @@ def test_a_plug_resists_as_one_with_straight_ends_less_what_its_ends_let_pass():
 
 
 def test_arrays_of_pores_and_numbers():
-    """Each pore its own, whatever its unit of length. Mutants: kinds exchanged; the width not squared."""
+    """Each pore its own, whatever its unit of length."""
     area, width, spanned = np.array([[500.0, 5000.0, 25000.0]]), np.array([[50.0], [100.0]]), np.array([[0], [1]])
     with pytest.raises(ValueError, match="spanned=False"):
         repro.added_resistance(area, width, spanned)
@@ -108,7 +106,7 @@ def test_arrays_of_pores_and_numbers():
     (1.0, False, 99.0, "viscosity_ratio = 99 is not known for an aggregate; 100 to 1e+04 is accepted"),
     (1.0, False, 1.1e4, "viscosity_ratio = 11000 "), (1.0, False, float("nan"), "viscosity_ratio = nan ")])
 def test_what_it_does_not_know_is_refused(area, spanned, ratio, told):
-    """In one line. Mutant: not-a-number let pass."""
+    """In one line."""
     with pytest.raises(ValueError) as error:
         repro.added_resistance([area, 1.0 + spanned], 1.0, spanned, ratio)
     assert str(error.value).startswith(f"added_resistance: {told}") and "\n" not in str(error.value)
@@ -116,13 +114,11 @@ def test_what_it_does_not_know_is_refused(area, spanned, ratio, told):
 
 @pytest.mark.parametrize("width", [0.0, -50.0, float("nan")])
 def test_a_pore_without_width_is_refused(width):
-    """Mutant: the square of a negative width taken."""
     with pytest.raises(ValueError, match="^added_resistance: width is not known; more than zero is accepted$"):
         repro.added_resistance(2500.0, [100.0, width], False)
 
 
 def test_the_ends_of_the_range_are_in_it():
-    """Mutant: the ends of the table taken for what is beyond."""
     for spanned in (False, True):
         for share in known(spanned):
             for ratio in (RATIOS[0], RATIOS[-1]):
@@ -134,8 +130,7 @@ def _plugs(run, factor, shares):
 
 
 def test_the_mean_of_runs_leaves_one_out_and_what_a_run_does_not_reach():
-    """Of r = c (A / W^2)^2: the geometric mean of c over the runs that are there. Mutants: the run itself among those
-    that it is compared with; a run taken to be constant beyond its last shape."""
+    """Of r = c (A / W^2)^2: the geometric mean of c over the runs that are there."""
     first, second, third = table.RUNS[:3]
     found = _plugs(first, 1.0, np.geomspace(1.4, 5, 60)) + _plugs(second, 4.0, np.geomspace(1.4, 5, 60))
     found += _plugs(third, 16.0, np.geomspace(1.4, 2.4, 60))
@@ -146,7 +141,6 @@ def test_the_mean_of_runs_leaves_one_out_and_what_a_run_does_not_reach():
 
 
 def test_bounds_are_the_farthest_of_the_shapes_nearby():
-    """Mutants: one neighbour for two; the bound of one side for the other."""
     shares = np.arange(1.0, 8.0)
     found = [Sample(None, False, share, (LAMBDA,), (1.0,)) for share in (1.0, 2.9, 4.5, 7.0)]
     least, most = table.bounds(shares, found, np.array([[0.1], [-0.2], [0.3], [0.0]]))[:, :, 0]
@@ -156,7 +150,7 @@ def test_bounds_are_the_farthest_of_the_shapes_nearby():
 
 
 def test_drawn_shapes_have_the_area_that_is_asked_for():
-    """And lean, or rise, as far as they are to. Mutants: a thicker body as long as the half-disc; ends exchanged."""
+    """And lean, or rise, as far as they are to."""
     for share, thicker, leaning in ((0.1, 1.03, 0.05), (1.2, 0.99, -0.05)):
         points = shapes.body(share, thicker, leaning)
         now = shapes.drawn(points)
@@ -171,7 +165,7 @@ def test_drawn_shapes_have_the_area_that_is_asked_for():
 
 
 def test_the_command_writes_table_shapes_and_page(tmp_path, monkeypatch, capsys):
-    """Of few shapes; exit status 1 where one of those unseen is outside. Mutant: always 0."""
+    """Of few shapes; exit status 1 where one of those unseen is outside."""
     discs = [Sample(None, False, share, RATIOS, (8 * share,) * 7) for share in np.geomspace(0.1, 1.4, 6)]
     plugs = [Sample(run, True, share, RATIOS, tuple(np.multiply(RATIOS, share)))
              for run in table.RUNS[:2] for share in np.geomspace(1.4, 4.7, 30)]
@@ -191,7 +185,6 @@ def test_the_command_writes_table_shapes_and_page(tmp_path, monkeypatch, capsys)
 
 
 def test_the_page_tells_the_present_table():
-    """Mutant: a table made anew, and the page not."""
     found = record.judged(record.read(unseen=True))
     assert command.PAGE.read_text(encoding="utf-8") == record.page(record.read(unseen=False), found)
     assert found.count == 50 and found.inside == 50

@@ -31,7 +31,7 @@ from verification.kernel.case import Check
 from verification.uncertainty import Bar
 
 #: The rows that must be judged.
-EXPECTED = (*(f"C{number:02d}" for number in range(1, 41)), "C44")
+EXPECTED = tuple(f"C{number:02d}" for number in range(1, 47))
 
 REPRODUCED, CHANGED, CONTRADICTED = "reproduced", "reproduced with a stated change", "contradicted"
 WITHIN_ROUNDING, UNDECIDED = "reproduced within the rounding of Table 1", "undecided"
@@ -152,8 +152,8 @@ class Finding:
 class Claim:
     """A row of the table: the paper's section, what it says, how to compute it, and the function that does.
 
-    about: MODEL, OF_SCHEME or CLOSED; fine: sizes of the converged solution; sizes, steps: of the scheme; fixed: why
-    one of them is not varied.
+    about: MODEL, OF_SCHEME or CLOSED; fine: sizes of the converged solution; beside: those of the scheme whose range
+    stands beside it; sizes, steps: of the scheme; fixed: why one of them is not varied.
     """
 
     id: str
@@ -162,6 +162,7 @@ class Claim:
     function: Callable[[], Finding]
     about: str = MODEL
     fine: tuple[float, ...] = FINE
+    beside: tuple[float, ...] = BESIDE
     sizes: tuple[float, ...] = SIZES
     steps: tuple[float, ...] = STEPS
     fixed: str = ""
@@ -184,7 +185,7 @@ class Claim:
         if self.about == OF_SCHEME:
             more = [Level(SCHEME, size) for size in self.sizes] + [Level(SCHEME, step=step) for step in self.steps]
             return tuple(dict.fromkeys((DEFAULT, *more)))
-        return (*(Level(CONVERGED, size) for size in self.fine), *(Level(SCHEME, size) for size in BESIDE))
+        return (*(Level(CONVERGED, size) for size in self.fine), *(Level(SCHEME, size) for size in self.beside))
 
 
 CLAIMS: dict[str, Claim] = {}

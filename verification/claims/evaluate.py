@@ -13,10 +13,13 @@ import numpy as np
 import verification.claims as package
 from verification.claims import CLAIMS, Finding
 from verification.claims.bars import Numbers, numbers
-from verification.claims.levels import CONVERGED, Level, at_level, forget
+from verification.claims.levels import CONVERGED, PAIRED, Level, at_level, forget
 
 #: Of a claim at one level: its numbers, with its finding where the level is the judged one, or the error in words.
 Found = tuple[Numbers, Finding | None] | str
+
+#: How many runs more than the others the levels of claims have that compare several.
+RUNS_OF_PAIRED = 10.0
 
 
 def register_all() -> None:
@@ -37,7 +40,8 @@ def everywhere(ids: Iterable[str]) -> dict[str, dict[Level, Found]]:
 
 def effort(level: Level) -> float:
     """About how long a level takes, in any unit."""
-    return (4.0 if level.kind == CONVERGED else 2.0) / (level.size**3 * level.step)
+    several = RUNS_OF_PAIRED if level.kind == CONVERGED and level.size in PAIRED else 1.0
+    return several * (4.0 if level.kind == CONVERGED else 2.0) / (level.size**3 * level.step)
 
 
 def side_by_side(function: Callable, *given: list) -> list:

@@ -51,9 +51,12 @@ def converged(size: float) -> tuple[str, ...]:
     return (f'numerics.preset="{PRESET}"', f"numerics.refinement={refinement!r}", f"numerics.tolerance={tolerance!r}")
 
 
-#: Sizes of the converged solution, the one that is judged first; those for claims that read wide.
+#: Sizes of the converged solution, the one that is judged first; those for claims that read wide, and those for claims
+#: that compare several runs of their own, around the preset "fast", which is 2.25: an error that both runs of a pair
+#: have is not in their difference.
 FINE = (0.5, 2**-0.5, 1.0)
 WIDE_FINE = (2**-0.5, 1.0, 2**0.5)
+PAIRED = tuple(2.25 * 2 ** (third / 3) for third in (-1, 0, 1))
 #: Sizes and steps of the scheme, the default first.
 SIZES = (1.0, 2**0.5, 2**-0.5, 0.5)
 STEPS = (1.0, 2.0, 3.0, 4.0)

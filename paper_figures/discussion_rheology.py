@@ -1,0 +1,76 @@
+"""Wide with one choice of its rheology, or of its contact with the walls, changed at a time. Not in the paper."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from paper_figures import figure_6, runs, states, style
+
+TITLE = "Addition. Another rheology and other conditions at the walls"
+RUNS = (runs.WIDE_FAST, *runs.VARIANTS.values())
+CLAIMS = ("C41",)
+
+COLOURS = ("#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+LABELS = ("as in the paper", *runs.VARIANTS)
+#: The curves are drawn this many hours to both sides of the first contact.
+AROUND = 4.0
+
+
+@style.styled
+def draw(*folders: Path) -> Figure:
+    """The last outlines, and the conductivity around contact, a colour a run."""
+    folders = folders or tuple(runs.folders(RUNS))
+    made = style.figure(4.9)
+    panels = made.subplot_mosaic([["outlines"], ["conductivity"]], height_ratios=[1, 1.1])
+    _outlines(panels["outlines"], folders)
+    _conductivity(panels["conductivity"], folders)
+    panels["conductivity"].legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    style.number_panels(*panels.values())
+    return made
+
+
+def _outlines(axes: Axes, folders: tuple[Path, ...]) -> None:
+    shown = [states.last(folder) for folder in folders]
+    first, last = min(s.rim[:, 0].min() for s in shown), max(s.rim[:, 0].max() for s in shown)
+    style.channel(axes, (first - figure_6.MARGIN, last + figure_6.MARGIN), shown[0].width, 2.5)
+    style.fluid(axes, (first - figure_6.MARGIN, last + figure_6.MARGIN), shown[0].width)
+    for number, (state, colour) in enumerate(zip(shown, COLOURS)):
+        style.aggregate(axes, figure_6.smooth(state.rim, state.width), filled=number == 0, edgecolor=colour,
+                        linewidth=1.0, zorder=2 + 0.1 * number)
+    axes.set_title(f"outlines at {shown[0].time:g} h")
+
+
+def _conductivity(axes: Axes, folders: tuple[Path, ...]) -> None:
+    for number, (folder, label, colour) in enumerate(zip(folders, LABELS, COLOURS)):
+        table = states.series(folder)
+        axes.plot(table["time_h"], table["conductivity_m_per_d"], "-" if number == 0 else "--", color=colour,
+                  label=label, linewidth=2.0 if number == 0 else 1.1, zorder=1 if number == 0 else 2)
+    table = states.series(folders[0])
+    meets = min(contact(folders[0]), float(table["time_h"][-1]))
+    shown = table["conductivity_m_per_d"][np.abs(table["time_h"] - meets) <= AROUND]
+    axes.set(title="hydraulic conductivity of the pore", xlabel="time (h)", ylabel="m/d", yscale="log",
+             xlim=(meets - AROUND, meets + AROUND), ylim=(0.7 * shown.min(), 1.4 * shown.max()))
+    axes.grid(alpha=0.25, linewidth=0.4)
+
+
+def contact(folder: Path) -> float:
+    """Time (h) of the first row in contact with the opposite wall; infinite where there is none."""
+    table = states.series(folder)
+    touching = table["time_h"][table["contact"] > 0]
+    return float(touching[0]) if len(touching) else float("inf")
+
+
+def caption(*folders: Path) -> str:
+    """What is seen, with the first rows in contact and the last conductivities."""
+    folders = folders or tuple(runs.folders(RUNS))
+    tables = [states.series(folder) for folder in folders]
+    told = "; ".join(f"{label}: {contact(folder):g} h and {table['conductivity_m_per_d'][-1]:.3g} m/d"
+                     for label, folder, table in zip(LABELS, folders, tables))
+    return (f"Wide to {tables[0]['time_h'][-1]:g} h with one choice changed at a time: new biomass born stress-free "
+            "(section 5), the fixed middles of the contact surfaces rechosen at every update, and the least film and "
+            "contact angle of 2.3.3 halved and doubled. (a) The last outlines; (b) the conductivity around contact. "
+            f"First row in contact, and conductivity at the end: {told}.")

@@ -1,0 +1,234 @@
+"""What the paper discusses and does not compute: the claims C38-C46 and their figures, piece by piece."""
+from dataclasses import replace
+from importlib import import_module
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from paper_figures import page, runs, states
+from repro import load_scene, run
+from repro.fem.outline import polygon_area
+from repro.model.kinetics import growth_rate
+from verification import claims
+from verification.claims import constant_head, discussed, levels, permeable, rheology, uptake
+from verification.claims.bars import barred
+from verification.claims.levels import CONVERGED, SCHEME, Level, at_level
+from verification.claims.restored import Body, bodies
+from verification.claims.runs import scene
+
+COARSE = Level(CONVERGED, 4.0)
+HOUR = ("base", 'growth.end="1 h"', 'output.times=["1 h"]')
+
+
+@pytest.fixture(scope="module", autouse=True)
+def coarse():
+    """A level that costs little; what is kept of it is dropped."""
+    with at_level(COARSE):
+        yield
+    levels.forget(COARSE)
+
+
+def test_a_claim_may_leave_the_scheme_out():
+    """And its checks then have no range of it."""
+    claim = claims.Claim("C99", "5", "t", lambda: None, beside=())
+    assert {level.kind for level in claim.levels} == {CONVERGED}
+    assert SCHEME in {level.kind for level in replace(claim, beside=(1.0,)).levels}
+    check = claims.at_most("q", "small", 1.0, 2.0, "")
+    found = barred(claim, claims.Finding((check,)), {level: (("q", 1.0, True),) for level in claim.levels[1:]})
+    assert found.checks[0].scheme is None and found.verdict == claims.REPRODUCED
+
+
+def test_layers_conduct_as_parallel_flow():
+    """None; all of the pore; as viscous as water; and so viscous that the open middle alone conducts."""
+    for walls in (1, 2):
+        assert discussed.layered_share(2000.0, 1e-9, walls) == pytest.approx(1.0, rel=1e-6)
+        assert discussed.layered_share(2000.0, 1.0, walls) == pytest.approx(1 / 2000, rel=1e-9)
+        assert discussed.layered_share(1.0, 0.3, walls) == pytest.approx(1.0, rel=1e-9)
+    assert discussed.layered_share(1e12, 0.4, 2) == pytest.approx(0.6**3, rel=1e-6)
+
+
+def test_leveque_is_the_similarity_solution():
+    """Of shear y G over a wall, theta'' + 3 eta^2 theta' = 0: the mean flux is 3/2 of that at the end."""
+    slope = 1 / quad(lambda eta: np.exp(-eta**3), 0.0, np.inf)[0]
+    assert discussed.leveque(9.0, 1.0, 1.0) == pytest.approx(1.5 * slope, rel=1e-9)
+    assert discussed.leveque(1.0, 1.0, 1.0) == pytest.approx(0.807, abs=1e-3)
+    assert discussed.leveque(8.0, 3.0, 0.7) == pytest.approx(2 * discussed.leveque(1.0, 3.0, 0.7), rel=1e-12)
+
+
+def test_little_biomass_takes_up_as_much_as_the_supply_lets_it():
+    """X f q(C_s) L / (u C_s), as far as C falls."""
+    said, part = scene("wide"), 1e-4
+    law, flow = said.kinetics, 2.9e6 / 24
+    m = 10 / 11
+    rate = m * (law.maximum_utilization_rate * law.acceptor_to_donor_ratio * m
+                + law.decay_oxygen_demand * law.degradable_fraction * law.decay_coefficient)
+    expected = part * law.maximum_density * rate * said.pore.length / (flow * 10.0)
+    assert uptake.layers_share(said, part) == pytest.approx(expected, rel=2 * expected)
+    assert uptake.layers_share(said, 0.2) > 0.9 > uptake.layers_share(said, 0.2, 10 * flow)
+
+
+def test_a_layer_in_the_model_takes_up_what_the_reference_says():
+    """To what the layer's own gradients leave out."""
+    part = 0.03
+    assert uptake.in_the_model(part) == pytest.approx(uptake.layers_share(scene("wide"), part), rel=0.03)
+
+
+def test_decay_over_synthesis_at_rest():
+    """b / (k Y m_D), with m_D between those of the aggregate's extremes."""
+    found = bodies(HOUR)[0]
+    law = found.scene.kinetics
+    donor = found.node("donor_mg_per_L")[found.grid.body]
+    most, least = (law.decay_coefficient / (law.maximum_utilization_rate * law.yield_coefficient * d / (d + 1.0))
+                   for d in (donor.min(), donor.max()))
+    assert least * (1 - 1e-9) <= constant_head.decay_share(found) <= most * (1 + 1e-9)
+    assert growth_rate(10.0, 10.0, found.scene.substrates, law) > 0
+
+
+def test_the_fall_up_to_contact_and_the_fastest_decline(monkeypatch):
+    """Of a velocity exp(-t / 10) that drops to a third at contact."""
+    time = np.linspace(0.0, 60.0, 61)
+    velocity = np.exp(-time / 10) * np.where(time > 50, 1 / 3, 1.0)
+    rows = {"time_h": time, "mean_velocity_m_per_d": velocity, "conductivity_m_per_d": velocity}
+    monkeypatch.setattr(constant_head, "series", lambda *run: rows)
+    monkeypatch.setattr(constant_head, "contact", lambda: (np.exp(-5.0), np.exp(-5.0) / 3, 50.01))
+    assert constant_head.fall() == pytest.approx(3 * np.exp(0.499), rel=1e-6)
+    rate, when = constant_head.fastest(rows)
+    assert rate == pytest.approx(0.1 + np.log(3)) and when == 50.5
+
+
+def test_growth_and_uptake_of_rows():
+    rows = {"time_h": np.array([0.0, 2.0, 4.0]), "aggregate_area_um2": np.exp([0.0, 0.4, 0.6]),
+            "mean_velocity_m_per_d": np.array([2.0, 1.0, 0.5]),
+            "effluent_acceptor_mg_per_L": np.array([9.0, 6.0, 2.0])}
+    assert constant_head.specific_growth(rows) == pytest.approx([0.2, 0.1])
+    assert constant_head.consumed(rows) == pytest.approx([2.0, 4.0, 4.0])
+
+
+def test_a_permeable_run_has_the_drag_and_nothing_of_the_viscosity():
+    said = scene(*permeable.permeable(permeable.AGGREGATE, 0.25))
+    assert said.flow.biomass == "brinkman" and said.flow.viscosity_ratio is None
+    assert said.flow.permeability == pytest.approx(0.25, rel=1e-6)
+    assert permeable.equivalent(permeable.AGGREGATE) == pytest.approx(50.0**2 / 12 / 2000)
+    assert runs.PERMEABILITIES[1] == pytest.approx(1e-12 * permeable.equivalent(permeable.PLUG))
+
+
+def test_what_a_variant_changes_is_measured_against_the_paper(monkeypatch):
+    """Nothing for the paper's own run; the area that only one covers for another one."""
+    monkeypatch.setattr(rheology, "WHOLE", HOUR)
+    assert rheology.apart(HOUR) == 0 and rheology.conductivity_change(HOUR) == 0
+    bigger = ("base", 'growth.end="2 h"', 'output.times=["2 h"]')
+    areas = [polygon_area(bodies(chosen)[-1].outline.points) for chosen in (HOUR, bigger)]
+    assert rheology.apart(bigger) == pytest.approx(100 * (areas[1] / areas[0] - 1), rel=0.02)
+    assert rheology.conductivity_change(bigger) < 0
+    times = {HOUR: 10.0, bigger: 9.0}
+    monkeypatch.setattr(rheology, "contact", lambda run: times[run])
+    checks = rheology._changes("x", bigger)
+    assert checks[1].ours == pytest.approx(10.0) and not checks[1].holds
+
+
+def test_an_outline_that_has_slid_is_moved_back(monkeypatch):
+    """By 8 um downstream."""
+    here = bodies(HOUR)[-1].outline
+    there = replace(here, points=here.points + [8.0, 0.0])
+    outlines = {rheology.WHOLE: here, HOUR: there}
+    monkeypatch.setattr(rheology, "bodies", lambda run: [SimpleNamespace(outline=outlines[run])])
+    assert rheology.slid(HOUR) == pytest.approx((8.0, 0.0), abs=1e-6)
+    assert rheology.apart(HOUR) > 10
+
+
+def test_every_variant_changes_one_key_of_the_scene():
+    base = scene(*rheology.WHOLE)
+    for change in rheology.VARIANTS.values():
+        said = scene(*rheology.WHOLE, change)
+        changed = [key for part in ("growth", "numerics") for key in vars(getattr(said, part))
+                   if getattr(getattr(said, part), key) != getattr(getattr(base, part), key)]
+        assert len(changed) == 1, change
+
+
+def test_forces_put_on_at_the_end_are_those_of_a_run_with_them():
+    """An elastic body forgets the way; what is left is what the forces changed of its growth."""
+    found = bodies(HOUR)[-1]
+    along = bodies((*HOUR, 'growth.fluid_forces="included"'))[-1]
+    free, forced, run_ = (discussed.tension(each)[0] for each in (found, discussed.pressed(found), along))
+    assert abs(forced / free - 1) > 0.02 and forced == pytest.approx(run_, rel=2e-3)
+    assert discussed.pressed(found).pore.time == found.pore.time
+
+
+def test_the_largest_tension_is_told_with_its_place():
+    found = bodies(HOUR)[-1]
+    values = found.cell("largest_principal_stress_MPa")
+    size, x, y, hours = discussed.tension(found)
+    assert size == values.max() and hours == 1.0
+    corners = found.grid.points[found.triangles[int(np.argmax(values))]]
+    assert corners[:, 0].min() < x < corners[:, 0].max() and corners[:, 1].min() < y < corners[:, 1].max()
+
+
+def test_sherwood_numbers_follow_the_flow_and_hardly_the_supply():
+    """From ten K_s to one, nearly of first order, by less than the few percent of C39."""
+    usual, faster, poorer = (np.array(discussed.sherwood(discussed.in_one_shape(**given)))
+                             for given in ({}, {"head": 1e-2}, {"supply": 1.0}))
+    assert (faster > 2 * usual).all() and poorer == pytest.approx(usual, rel=0.05)
+
+
+# The figures.
+@pytest.fixture(scope="module")
+def curved(tmp_path_factory):
+    """A short run of wide with curved triangles."""
+    folder = tmp_path_factory.mktemp("runs") / "wide"
+    run(load_scene("wide", ['numerics.preset="fast"', 'growth.end="1 h"', 'output.times=["1 h"]']), folder)
+    return folder
+
+
+def test_curved_triangles_are_drawn_in_four_straight_ones(curved):
+    """All counterclockwise, the aggregate's area to the bulge of its arcs, its rim through their middles: 16
+    chords of a half-circle leave 0.64 % out, the 8 between corners 2.6 %."""
+    state, row = states.last(curved), states.row(curved, 1.0)
+    corners = state.points[state.triangles]
+    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    assert (first[:, 0] * second[:, 1] > first[:, 1] * second[:, 0]).all()
+    assert polygon_area(state.rim) == pytest.approx(row["aggregate_area_um2"], rel=1e-2)
+    assert set(np.unique(state.triangles)) == set(range(len(state.points)))
+    assert len(state.cells["theta"]) == len(state.triangles) == len(state.biomass)
+
+
+def test_contact_is_read_from_the_rows(curved, monkeypatch):
+    module = import_module("paper_figures.discussion_rheology")
+    assert module.contact(curved) == np.inf
+    rows = {"time_h": np.array([0.0, 1.0, 2.0]), "contact": np.array([0.0, 1.0, 1.0])}
+    monkeypatch.setattr(states, "series", lambda folder: rows)
+    assert module.contact(curved) == 1.0
+
+
+def test_conductivities_between_rows_go_in_proportion():
+    module = import_module("paper_figures.discussion_permeable")
+    table = {"time_h": np.array([0.0, 2.0]), "conductivity_m_per_d": np.array([4.0, 1.0])}
+    assert module.at(table, (0.0, 1.0, 2.0)) == pytest.approx([4.0, 2.0, 1.0])
+
+
+def test_the_page_names_additions_and_what_they_compute():
+    entries = [page.Entry(name, title, "c", (), ("C38",)) for name, title in
+               (("figure_2", "Figure 2. The pore"), ("discussion_x", "Addition. Tearing"))]
+    text = page.page(entries, [])
+    assert '<a href="#figure_2">Figure 2</a>' in text and '<a href="#discussion_x">Tearing</a>' in text
+    module = import_module("paper_figures.discussion_tearing")
+    assert page.also(module) == tuple(f"python -m verification.claims {id}" for id in ("C40", "C46"))
+    assert page.also(import_module("paper_figures.figure_2")) == ()
+
+
+def test_the_place_of_a_course_ends_where_shape_and_flow_do_not_agree(monkeypatch):
+    module = import_module("paper_figures.discussion_tearing")
+    rows = [Body(None, type("P", (), {"time": float(k)})(), None) for k in range(4)]
+    monkeypatch.setattr(module, "bodies", lambda run: rows)
+    monkeypatch.setattr(module, "tension", lambda found: (1e-6 * found.pore.time, 1.0, 2.0, found.pore.time))
+
+    def pressed(found):
+        if found.pore.time == 2.0:
+            raise module.GrowthError("too soft")
+        return found
+    monkeypatch.setattr(module, "pressed", pressed)
+    with at_level(Level(CONVERGED, 9.0)):
+        assert module.course(("x",), False).T.tolist() == [[1.0, 2.0, 3.0], [1.0] * 3, [2.0] * 3, [1.0, 2.0, 3.0]]
+        assert module.course(("x",), True)[:, 3].tolist() == [1.0]
+    levels.forget(Level(CONVERGED, 9.0))

@@ -1,0 +1,89 @@
+"""C41: what hangs on the rheology and the conditions of contact that the paper chose: new biomass born stress-free (5),
+fixed points elsewhere, and film and contact angle halved and doubled (2.3.3).
+
+The paper calls its rheology open to argument, and the boundary conditions debatable and reasonable, and expects no
+substantial effect on what it concludes: an outline as in Figure 6, contact after a day and a half, and a conductivity
+that falls when it comes. Each choice is changed alone in wide, which has all of them at work.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from shapely.affinity import translate
+
+from verification.claims import Finding, PaperCheck, at_most, claim
+from verification.claims.accuracy import FEW, FEW_WORDS
+from verification.claims.levels import PAIRED
+from verification.claims.restored import bodies, polygon
+from verification.claims.runs import around_contact, scene, series
+
+#: Hours: in all variants the opposite wall has then been touched for 5 h.
+END = 40
+WHOLE = ("wide", f'growth.end="{END} h"')
+RECHOSEN = "middles rechosen"
+#: One choice each, in words and as changes of the scene.
+VARIANTS = {
+    "born stress-free": 'growth.new_biomass="stress_free"',
+    RECHOSEN: 'numerics.fixed_point="rechosen"',
+    "film halved": 'growth.minimum_film="1 um"',
+    "film doubled": 'growth.minimum_film="4 um"',
+    "angle halved": 'growth.minimum_contact_angle="8.35 deg"',
+    "angle doubled": 'growth.minimum_contact_angle="33.4 deg"'}
+NEW = "2026-11-22"
+
+
+@claim("C41", "5, 2.3.3", "another rheology, and other conditions where the aggregate meets the walls, are unlikely to "
+       "affect the conclusions substantially", fine=PAIRED, beside=())
+def other_rheology() -> Finding:
+    """Wide to 40 h with one choice changed at a time: area that only one of the two outlines covers, shift of the time
+    of contact, and change of the conductivity at the end."""
+    checks = tuple(check for name, change in VARIANTS.items() for check in _changes(name, (*WHOLE, change)))
+    worst = "; ".join(f"{check.quantity} {check.value:.3g}" for check in checks if not check.holds)
+    moved, left = slid((*WHOLE, VARIANTS[RECHOSEN]))
+    reason = (f"what changes by more than a few percent: {worst or 'nothing, but a bar reaches over the bound'}. With "
+              f"its middles rechosen the aggregate slides {moved:.1f} um downstream as it grows on the other side, "
+              f"with the same shape: moved back, the outlines are {left:.2g} % apart; its conductivity is the same. "
+              "The conclusions stand, the place of the aggregate is the fixed point's")
+    return Finding(checks, reason=reason, note=_told)
+
+
+def _changes(name: str, run: tuple[str, ...]) -> tuple[PaperCheck, ...]:
+    """What a variant of WHOLE changes."""
+    quantities: dict[str, Callable] = {f"outlines apart at {END} h (% of the area)": apart,
+                                       "time of contact (%)": lambda run: 100 * (contact(run) / contact(WHOLE) - 1),
+                                       f"conductivity at {END} h (%)": conductivity_change}
+    return tuple(at_most(f"{name}: {what}", "not substantially", abs(change(run)), 100 * FEW, FEW_WORDS, date=NEW)
+                 for what, change in quantities.items())
+
+
+def apart(run: tuple[str, ...]) -> float:
+    """Area that only one of the last outlines of a run and of WHOLE covers, in percent of the area."""
+    ours, other = (polygon(bodies(chosen)[-1].outline) for chosen in (WHOLE, run))
+    return 100 * float(ours.symmetric_difference(other).area / ours.area)
+
+
+def slid(run: tuple[str, ...]) -> tuple[float, float]:
+    """How far downstream (um) of that of WHOLE the middle of a run's last outline lies, and what is left between the
+    outlines (% of the area) when it is moved back by that."""
+    ours, other = (polygon(bodies(chosen)[-1].outline) for chosen in (WHOLE, run))
+    moved = other.centroid.x - ours.centroid.x
+    return moved, 100 * float(ours.symmetric_difference(translate(other, -moved)).area / ours.area)
+
+
+def contact(run: tuple[str, ...]) -> float:
+    """When (h) a run touches the opposite wall."""
+    return float(around_contact(*run)["time_h"][1])
+
+
+def conductivity_change(run: tuple[str, ...]) -> float:
+    """Of the last row, against WHOLE, in percent."""
+    ours, other = (float(series(*chosen)["conductivity_m_per_d"][-1]) for chosen in (WHOLE, run))
+    return 100 * (other / ours - 1)
+
+
+def _told() -> str:
+    rows = "; ".join(f"{name} at {contact((*WHOLE, change)):.2f} h" for name, change in VARIANTS.items())
+    film = scene(*WHOLE).growth.minimum_film
+    return (f"Contact comes at {contact(WHOLE):.2f} h with a film of {film:g} um and 16.7 deg; {rows}. Until the "
+            "aggregate is near the opposite wall its angle is that of a half-disc and no choice but the first matters.")
