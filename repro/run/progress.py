@@ -84,7 +84,7 @@ def _warning(event: dict) -> str:
 @contextmanager
 def in_lines() -> Iterator[Tell]:
     """A line each tenth of the simulated time, where SILENCE s have passed without one, and at the
-    end. Up to LONGEST s may pass, a fiftieth of the time since the start, so that a log stays short.
+    end; up to LONGEST s may pass, a fiftieth of the time since the start, so that a log is short.
     """
     begun = said = monotonic()
     reached = 0
