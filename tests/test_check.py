@@ -189,6 +189,22 @@ def test_steps_in_contact_and_none():
     assert sum(cost.steps(strict)) > 4 * sum(cost.steps(fast))  # a hundredth of the tolerance: a tenth of the step
 
 
+def test_a_trial_takes_few_steps_however_short_they_are(monkeypatch):
+    """A tolerance that asks for thousands of steps does not make `repro check` slow. Mutant: all steps of three times
+    growth.time_step."""
+    made = []
+
+    def counted(scene):
+        for one in steps(scene):
+            made.append(one)
+            yield one
+
+    steps = cost.steps_of
+    monkeypatch.setattr(cost, "steps_of", counted)
+    trial = cost.tried(load_scene("base", ["numerics.preset=fast", "numerics.tolerance=1e-7"]), 458)
+    assert len(made) == 1 + cost.MOST_STEPS and 0 < trial.step < np.inf
+
+
 def test_a_large_mesh_is_not_tried_but_a_coarser_one(monkeypatch):
     """Mutant: the time of the coarse one taken for that of the fine one."""
     monkeypatch.setattr(cost, "MOST_NODES", 400)

@@ -146,6 +146,18 @@ def test_arguments_that_do_not_go_together_are_refused(capsys, arguments):
     assert refused.value.code == 2 and "usage: repro run" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("arguments", [["run", "base", "--out", ""], ["run", "--resume", ""],
+                                       ["sweep", "base", "--vary", "pore.width=40 um, 50 um", "--out", ""],
+                                       ["compare", "a", "", "--out", "b.html"], ["compare", "a", "b", "--out", ""]])
+def test_an_empty_path_is_not_the_present_folder(tmp_path, monkeypatch, capsys, arguments):
+    """As of a shell's variable that is not set: the results would lie among what is there. Mutant: any path taken."""
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as refused:
+        main(arguments)
+    assert refused.value.code == 2 and "a path is needed, this one is empty" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_the_exit_statuses_are_told(capsys):
     with pytest.raises(SystemExit):
         main(["run", "--help"])
