@@ -23,6 +23,7 @@ from repro.march import updates
 from repro.march.loop import Instant, PoreEnd, State
 from repro.march.simulation import row_times
 from repro.march.simulation import steps as steps_of
+from repro.march.stepping import SHORTEST
 from repro.scene import Scene, needed
 
 #: What a step leaves.
@@ -142,7 +143,8 @@ def longest_step(scene: Scene) -> float:
         return scene.growth.time_step
     rate = abs(numbers.fastest_growth(scene.largest))
     allowed = ALLOWED * math.sqrt(scene.numerics.tolerance / 0.01)
-    return min(scene.growth.end, allowed / rate if rate else math.inf)
+    kept = max(allowed / rate, SHORTEST * scene.growth.time_step) if rate else math.inf
+    return min(scene.growth.end, kept)
 
 
 def _count(first: float, longest: float, duration: float) -> int:
