@@ -138,7 +138,7 @@ def test_a_pointer_is_told_values(window, runs):
 @pytest.mark.parametrize("name", ["fast", "paper", "wide"])
 def test_what_is_drawn_is_the_column_that_its_label_names(window, runs, name, width):
     """The lines as the browser has them, measured by the ticks beside them; the table "Numbers" as a reader sees it.
-    Mutants: a line of another column; an axis upside down; the row before the last in "Numbers"."""
+    Mutants: a line of another column; a tick beside another value; the row before the last in "Numbers"."""
     show(window, runs[name], width=width)
     series, book = (results.read_table(runs[name] / f"{kind}.csv") for kind in ("timeseries", "ledger"))
     hours = book["end_h"] - book["start_h"]
