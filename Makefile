@@ -3,6 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin/python
 STAMP := $(VENV)/.installed
+CRATE := build/crate/.installed
 PIP := $(BIN) -m pip install -q --disable-pip-version-check
 
 export MPLBACKEND := Agg
@@ -11,7 +12,7 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help env figures check-manifest claims sensitivity verify verify-fast mutants test test-thorough lint bench clean
+.PHONY: help env figures check-manifest claims sensitivity verify verify-fast mutants test test-thorough lint bench crate clean
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1|\2/p' Makefile | awk -F'|' '{ printf "  make %-14s %s\n", $$1, $$2 }'
@@ -57,6 +58,10 @@ bench: $(STAMP) ## time against error, cost against size, and what each assumpti
 	@$(BIN) -m verification.speed
 	@$(BIN) -m paper_figures.replication
 
+crate: $(STAMP) $(CRATE) ## pack scenes, code, environment, figures and claims as a Workflow Run RO-Crate, and validate it
+	@$(BIN) -m paper_figures.crate
+	@$(dir $(CRATE))bin/python .ci/crate_check.py paper_figures/out/crate
+
 clean: ## remove .venv and everything generated; nothing that is committed
 	@rm -rf $(VENV) paper_figures/out paper_figures/cache build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis
 	@find . -name .git -prune -o -type d -name __pycache__ -prune -exec rm -rf {} +
@@ -71,4 +76,11 @@ $(STAMP): requirements.lock pyproject.toml
 	@"$(PYTHON)" -m venv --clear $(VENV)
 	@$(PIP) --require-hashes --only-binary :all: -r requirements.lock
 	@$(PIP) --no-deps --no-build-isolation -e .
+	@touch $@
+
+# The validator's packages stand apart from the package's own, and are installed for `make crate` alone.
+$(CRATE): .ci/crate.lock
+	@rm -f $@
+	@"$(PYTHON)" -m venv --clear $(@D)
+	@$(@D)/bin/python -m pip install -q --disable-pip-version-check --require-hashes --only-binary :all: -r .ci/crate.lock
 	@touch $@

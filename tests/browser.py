@@ -90,9 +90,29 @@ class Browser:
 
     def press(self, key: str) -> None:
         """A key, pressed and released, as ArrowLeft."""
-        codes = {"ArrowLeft": 37, "ArrowRight": 39, "Home": 36, "End": 35}
-        for kind in ("rawKeyDown", "keyUp"):
-            self.call("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=codes[key])
+        codes = {"ArrowLeft": 37, "ArrowRight": 39, "ArrowDown": 40, "Home": 36, "End": 35, "Tab": 9, " ": 32}
+        typed = {"text": key} if key == " " else {}
+        for kind in ("keyDown" if typed else "rawKeyDown", "keyUp"):
+            self.call("Input.dispatchKeyEvent", type=kind, key=key, code="Space" if typed else key,
+                      windowsVirtualKeyCode=codes[key], **typed)
+
+    def box(self, selector: str) -> dict:
+        """{x, y, width, height} of an element in the window (CSS pixels), which is scrolled into view."""
+        found = f"document.querySelector({json.dumps(selector)})"
+        self.run(f"{found}.scrollIntoView({{block: 'center', behavior: 'instant'}})")
+        return json.loads(self.run(f"JSON.stringify({found}.getBoundingClientRect())"))
+
+    def click(self, selector: str) -> None:
+        """The middle of an element, with the mouse."""
+        self.drag(selector, 0.5, 0.5)
+
+    def drag(self, selector: str, start: float, end: float) -> None:
+        """The mouse, pressed at a part of an element's width and let go at another one."""
+        box = self.box(selector)
+        y = box["y"] + box["height"] / 2
+        for kind, part in (("mousePressed", start), ("mouseMoved", end), ("mouseReleased", end)):
+            self.call("Input.dispatchMouseEvent", type=kind, x=box["x"] + part * box["width"], y=y, button="left",
+                      buttons=int(kind != "mouseReleased"), clickCount=1)
 
     def point(self, x: float, y: float, kind: str = "mouseMoved") -> None:
         """The pointer at a place of the window (CSS pixels)."""

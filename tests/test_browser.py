@@ -1,19 +1,22 @@
 """The pages in a real browser: the scripts run, the slider and its keys change the picture, nothing is asked for."""
 
+import csv
 import json
 import re
 import socket
 import threading
+import time
 
 import meshio
 import numpy as np
 import pytest
 
-from repro import results
+from repro import report, results
 from repro.cli import main
 from repro.report import fields
+from repro.results import names
 from tests import browser
-from tests.pages import FAST, hostile, run, stored
+from tests.pages import CHARTS, FAST, LEDGERS, hostile, run, stored
 
 pytestmark = [pytest.mark.thorough,
               pytest.mark.skipif(browser.CHROMIUM is None, reason="there is no Chromium here to look at pages with")]
@@ -49,7 +52,7 @@ def picture(window):
     return json.loads(window.run("JSON.stringify({...(document.getElementById('picture') ?? {dataset: {}}).dataset})"))
 
 
-@pytest.mark.parametrize("width, dark", [(1200, False), (375, True)])
+@pytest.mark.parametrize("width, dark", [(1200, False), (390, False), (375, True)])
 @pytest.mark.parametrize("name", ["fast", "paper", "flow", "mesh", "wide", "transport"])
 def test_pages_open_from_disk_without_error(window, runs, name, width, dark):
     """At a phone's width nothing is cut off."""
@@ -123,10 +126,194 @@ def test_a_pointer_is_told_values(window, runs):
     assert re.fullmatch(r"x = -?[\d.]+ um, y = [\d.]+ um: Velocity \(magnitude\) [\d.]+ m/day", told)
     window.run("document.querySelector('figure > svg').scrollIntoView()")
     box = json.loads(window.run("JSON.stringify(document.querySelector('figure > svg').getBoundingClientRect())"))
-    window.point(box["x"] + 0.95 * box["width"], box["y"] + 80)
-    told = window.run("document.querySelector('figure output').textContent")
-    last = results.read_table(runs["fast"] / "timeseries.csv")["conductivity_m_per_d"][-1]
-    assert told == f"19.4 h: {last:.5g}"
+    series = results.read_table(runs["fast"] / "timeseries.csv")
+    for part, row in ((0.205, 0), (0.97, -1)):
+        window.point(box["x"] + part * box["width"], box["y"] + 80)
+        told = window.run("document.querySelector('figure output').textContent")
+        assert told == f"{series['time_h'][row]:g} h: {series['conductivity_m_per_d'][row]:.5g}"
+
+
+@pytest.mark.parametrize("width", [1200, 390])
+@pytest.mark.parametrize("name", ["fast", "paper", "wide"])
+def test_what_is_drawn_is_the_column_that_its_label_names(window, runs, name, width):
+    """The lines as the browser has them, measured by the ticks beside them; the table "Numbers" as a reader sees it.
+    Mutants: a line of another column; a tick beside another value; the row before the last in "Numbers"."""
+    show(window, runs[name], width=width)
+    series, book = (results.read_table(runs[name] / f"{kind}.csv") for kind in ("timeseries", "ledger"))
+    hours = book["end_h"] - book["start_h"]
+    held = {"held": 1e-6 * book["biomass_after_pg_per_m"], "made since t = 0": np.cumsum(1e-6 *
+            book["biomass_made_pg_per_m"])}
+    seen = 0
+    for chart in json.loads(window.run(DRAWN)):
+        title = chart["title"]
+        labels = chart["labels"] or [*CHARTS[title]][:1]
+        assert len(labels) == len(chart["lines"]), chart
+        for label, drawn in zip(labels, chart["lines"], strict=True):
+            if label == "made anew":
+                rows = series["remeshed"] == 1
+                times, wanted = series["time_h"][rows], series["nodes"][rows]
+            elif title == "Ledger: biomass":
+                times, wanted = book["end_h"], held[label]
+            elif title in LEDGERS:
+                times, wanted = book["end_h"] - hours / 2, 1e-6 * book[LEDGERS[title][label]] / hours
+            else:
+                times, wanted = series["time_h"], series[CHARTS[title][label]]
+            close = {"rel": 0.01} if chart["log"] else {"abs": 0.002 * (chart["top"] - chart["bottom"])}
+            assert [x for x, _ in drawn] == pytest.approx(times.tolist(), abs=0.002 * np.ptp(series["time_h"]))
+            assert [y for _, y in drawn] == pytest.approx(wanted.tolist(), **close), (title, label)
+            seen += 1
+    assert seen > 20
+    table = json.loads(window.run("JSON.stringify([...[...document.querySelectorAll('section')].find(each => "
+                                  "each.innerText.startsWith('Numbers')).querySelectorAll('tr')].map(row => "
+                                  "[...row.cells].map(cell => cell.innerText)))"))
+    assert [float(text.split()[2]) for text in table[0][1:]] == pytest.approx(series["time_h"][[0, -1]], rel=1e-5)
+    told = {label: values for label, *values in table[1:]}
+    assert len(told) == len(series) - 1
+    for column, values in series.items():
+        if column not in ("time_h", "remeshed", "contact"):
+            shown = [float(text) for text in told[names.with_unit(column)]]
+            assert shown == pytest.approx(values[[0, -1]], rel=5.1e-4), column  # four digits of small numbers
+
+
+#: What the browser has drawn, measured by the ticks: lines as points (h, value) in each chart's axes.
+DRAWN = """(() => {
+  const scale = (marks, log) => {
+    const even = log ? Math.log : value => value, back = log ? Math.exp : value => value;
+    const [[a, v], [b, w]] = [marks[0], marks[marks.length - 1]];
+    return place => back(even(v) + (place - a) / (b - a) * (even(w) - even(v)));
+  };
+  const number = text => Number(text.textContent);
+  return JSON.stringify([...document.querySelectorAll('figure.chart')].map(figure => {
+    const svg = figure.querySelector(':scope > svg'), log = svg.textContent.includes('(log scale)');
+    const ticks = [...svg.querySelectorAll('line.tick')].filter(({ x1, x2 }) => x1.baseVal.value === x2.baseVal.value);
+    const across = [...svg.querySelectorAll('text.x')].map((text, k) => [ticks[k].x1.baseVal.value, number(text)]);
+    const upward = [...svg.querySelectorAll('text.y')].map((text, k) =>
+      [svg.querySelectorAll('line.grid')[k].y1.baseVal.value, number(text)]);
+    const x = scale(across, false), y = scale(upward, log), lines = [];
+    for (const shape of svg.querySelectorAll('polyline, circle')) {
+      const found = Number(shape.className.baseVal.slice(-1)), dot = shape.tagName === 'circle';
+      const points = dot ? [[shape.cx.baseVal.value, shape.cy.baseVal.value]] : [...shape.points].map(p => [p.x, p.y]);
+      (lines[found] ??= []).push(...points.map(([a, b]) => [x(a), y(b)]));
+    }
+    const values = upward.map(([, value]) => value);
+    return { title: figure.querySelector('figcaption').firstChild.textContent, log, lines,
+      labels: [...figure.querySelectorAll('.legend > span')].map(each => each.textContent),
+      bottom: Math.min(...values), top: Math.max(...values) };
+  }));
+})()"""
+
+
+@pytest.mark.parametrize("width", [1200, 390])
+def test_the_mouse_moves_every_control(window, runs, width):
+    """Mutants: a slider, a switch or a button that nothing listens to."""
+    last = show(window, runs["fast"], "#field=theta", width=width)
+    window.drag("#frame", 0.99, 0.01)
+    assert picture(window)["frame"] == "0"
+    values = "[...document.querySelectorAll('figure.chart > output')].map(each => each.textContent).join()"
+    first = window.run(values)
+    window.drag("#frame", 0.01, 0.5)
+    assert 0 < int(picture(window)["frame"]) < int(last["frame"]) and window.run(values) != first
+    image = "document.getElementById('picture').toDataURL()"
+    for switch in ("lines", "outline", "fixed", "whole"):
+        before = window.run(image)
+        window.click(f"label:has(#{switch})")
+        assert window.run(image) != before, switch
+        window.click(f"#{switch}")
+        assert window.run(image) == before, switch
+    window.click("#play")
+    assert window.run("document.getElementById('play').textContent") == "Pause"
+    start, deadline = picture(window)["frame"], time.monotonic() + 20
+    while picture(window)["frame"] == start:
+        assert time.monotonic() < deadline, "nothing plays"
+        time.sleep(0.05)
+    window.click("#play")
+    rests = picture(window)
+    time.sleep(0.6)
+    assert picture(window) == rests and window.run("document.getElementById('play').textContent") == "Play"
+    window.click("summary")
+    assert window.run("document.querySelector('details').open")
+
+
+def test_the_keyboard_alone_is_enough(window, runs):
+    """Tab comes to every control, which shows it; keys work it. Mutants: a control that is passed by; no outline."""
+    show(window, runs["fast"])
+    came = []
+    active = "document.activeElement.id || document.activeElement.localName"
+    while (came or [""])[-1] != "summary" and len(came) < 20:
+        window.press("Tab")
+        came.append(window.run(active))
+        assert window.run("getComputedStyle(document.activeElement).outlineStyle") == "solid", came
+        if came[-1] == "field":
+            before = picture(window)["field"]
+            window.press("ArrowDown")
+            assert picture(window)["field"] != before
+        elif came[-1] == "lines":
+            image = "document.getElementById('picture').toDataURL()"
+            before = window.run(image)
+            window.press(" ")
+            assert window.run(image) != before
+        elif came[-1] == "play":
+            window.press(" ")
+            assert window.run("document.getElementById('play').textContent") == "Pause"
+            window.press(" ")
+        elif came[-1] == "frame":
+            window.press("Home")
+            assert picture(window)["frame"] == "0"
+    assert came == ["field", "lines", "outline", "fixed", "whole", "play", "frame", "summary"]
+    window.press(" ")
+    assert window.run("document.querySelector('details').open")
+
+
+def test_texts_of_the_colour_bar_keep_apart(window, runs):
+    """Of every field at every time, by where they are written. Mutant: a tick at each round value between the ends."""
+    show(window, runs["wide"], width=390)
+    window.run("""(() => {
+      const write = CanvasRenderingContext2D.prototype.fillText;
+      window.written = [];
+      CanvasRenderingContext2D.prototype.fillText = function(text, x, y) {
+        const wide = this.measureText(text).width, part = {left: 0, center: 0.5, right: 1}[this.textAlign];
+        window.written.push([y, x - part * wide, x + (1 - part) * wide, text]);
+        write.call(this, text, x, y);
+      };
+      document.getElementById('fixed').checked = false;
+    })()""")
+    count, clash = 0, []
+    for field in stored(runs["wide"])["fields"]:
+        for frame in range(len(stored(runs["wide"])["frames"])):
+            window.run(f"window.written = []; part.field.value = '{field['name']}'; part.frame.value = {frame}; draw()")
+            rows = json.loads(window.run("JSON.stringify(window.written)"))
+            for k, (height, left, right, text) in enumerate(rows):
+                beside = [each for each in rows[k + 1:] if each[0] == height and each[1] < right and left < each[2]]
+                clash += [(field["name"], frame, text, each) for each in beside if height]
+            count += len(rows)
+    assert clash == [] and count > 500
+
+
+@pytest.mark.parametrize("width", [1200, 390])
+def test_a_sweep_has_its_page(window, tmp_path, width):
+    """Nothing is cut off or asked for; the table is runs.csv, and its links are the runs. Mutants: a table as wide as
+    it likes; a link beside the run."""
+    out = tmp_path / "sweep"
+    assert main(["sweep", "base", "--vary", "pore.width=30 um,50 um", "--vary", "aggregate.radius=4 um,5 um",
+                 "--set", FAST, "--set", "growth.end=1 h", "--out", str(out), "--quiet"]) == 0
+    page = out / "summary.html"
+    window.show(page, width=width)
+    assert window.requests == [page.resolve().as_uri()]
+    assert window.run("document.documentElement.scrollWidth") <= width
+    assert window.run("document.querySelectorAll('figure > svg').length") == 4
+    rows = json.loads(window.run("JSON.stringify([...document.querySelectorAll('tbody tr')].map(row => "
+                                 "[row.querySelector('a').href, ...[...row.cells].map(cell => cell.innerText)]))"))
+    with open(out / "runs.csv", newline="") as file:
+        wanted = list(csv.DictReader(file))
+    assert len(rows) == len(wanted) == 4
+    for (link, index, wide, radius, end, *_, status), run_ in zip(rows, wanted, strict=True):
+        assert link.startswith((out / "runs").resolve().as_uri()) and index == run_["run"]
+        assert (float(wide.split()[0]), float(radius.split()[0])) == (float(run_["pore.width_um"]),
+                                                                     float(run_["aggregate.radius_um"]))
+        assert float(end) == float(run_["end_h"]) and status == run_["status"] == "completed"
+    inside = "(() => { const table = document.querySelector('.wide'); table.scrollLeft = 1e4; const box = " \
+             "document.querySelector('tbody td').getBoundingClientRect(); return box.left })()"
+    assert window.run(inside) >= 0  # the run's number stays in sight
 
 
 def test_mesh_lines_and_scales_are_switches(window, runs):
@@ -139,23 +326,20 @@ def test_mesh_lines_and_scales_are_switches(window, runs):
     assert float(picture(window)["high"]) < float(told["high"])
 
 
-def test_a_run_that_stops_before_its_first_row(window, tmp_path, monkeypatch):
-    from repro.errors import SimulationError
-    from repro.run import running
-
-    def stops(scene, state=None):
-        raise SimulationError("no")
-        yield
-
-    monkeypatch.setattr(running, "steps", stops)
-    assert show(window, run(tmp_path, "base", status=1)) == {}
+def test_a_run_that_stops_before_its_first_row(window, tmp_path, runs):
+    """As one killed there leaves it: what it is made of, and no table."""
+    record = json.loads((runs["fast"] / "run.json").read_text())
+    results.write_json(tmp_path / "run.json", record | {"status": "running", "rows": 0, "files": ["run.json"]})
+    for name in ("timeseries.csv", "ledger.csv"):
+        (tmp_path / name).write_text((runs["fast"] / name).read_text().partition("\n")[0] + "\n")
+    report.write(tmp_path)
+    assert show(window, tmp_path) == {}
+    assert "The run has no row" in window.run("document.body.innerText")
 
 
 def test_hostile_names_run_nothing(window, tmp_path):
     """Neither from a scene and its status, nor through the policy."""
     out = hostile(run(tmp_path, "base", FAST, 'growth.end="1 h"'))
-    from repro import report
-
     report.write(out)
     report.compare([out, out], tmp_path / "both.html")
     for page in (out, tmp_path / "both.html"):
@@ -189,7 +373,7 @@ def _accepted(server):
         return False
 
 
-@pytest.mark.parametrize("width", [1200, 375])
+@pytest.mark.parametrize("width", [1200, 390])
 def test_a_comparison_opens(window, runs, tmp_path, width):
     target = tmp_path / "both.html"
     assert main(["compare", *map(str, (runs["fast"], runs["paper"], runs["flow"])), "--out", str(target)]) == 0
@@ -197,3 +381,16 @@ def test_a_comparison_opens(window, runs, tmp_path, width):
     assert int(window.run("document.documentElement.dataset.charts")) > 20
     assert window.run("document.documentElement.scrollWidth") <= width
     assert window.run("document.querySelectorAll('figure:first-of-type .legend > span').length") == 3
+    box = window.box("figure > svg")
+    fast, paper = (results.read_table(runs[name] / "timeseries.csv") for name in ("fast", "paper"))
+    labels = window.run("[...document.querySelectorAll('.runs b')].map(each => each.textContent).join()").split(",")
+    for asked in (0, 0.2, 0.6, 10):
+        window.point(box["x"] + (0.2 + 0.7722 * asked / fast["time_h"][-1]) * box["width"], box["y"] + 80)
+        told = window.run("document.querySelector('figure output').textContent")
+        time = min([*fast["time_h"], *paper["time_h"]], key=lambda own: abs(own - asked))
+        wanted = [np.interp(time, each["time_h"], each["conductivity_m_per_d"], right=np.nan) for each in (fast, paper)]
+        shown = [f"{label} {'none' if np.isnan(value) else format(value, '.5g')}"
+                 for label, value in zip(labels, wanted)]
+        assert told == f"{time:.5g} h: {', '.join(shown)}"
+    window.point(2, 2)
+    assert window.run("document.querySelector('figure output').textContent") == "\u00a0"

@@ -188,6 +188,24 @@ def test_steps_in_contact_and_none():
     assert cost.rows(load_scene("base", ["output.times=" + str(["0.4 h", "0.5 h"])])) == 1
     strict = load_scene("base", ["numerics.preset=fast", "numerics.tolerance=1e-4"])
     assert sum(cost.steps(strict)) > 4 * sum(cost.steps(fast))  # a hundredth of the tolerance: a tenth of the step
+    beyond = load_scene("base", ["numerics.preset=fast", "numerics.tolerance=1e-300", "growth.end=1 h"])
+    assert sum(cost.steps(beyond)) == 5000  # steps are a thousandth of growth.time_step at least
+
+
+def test_a_trial_takes_few_steps_however_short_they_are(monkeypatch):
+    """A tolerance that asks for thousands of steps does not make `repro check` slow. Mutant: all steps of three times
+    growth.time_step."""
+    made = []
+
+    def counted(scene):
+        for one in steps(scene):
+            made.append(one)
+            yield one
+
+    steps = cost.steps_of
+    monkeypatch.setattr(cost, "steps_of", counted)
+    trial = cost.tried(load_scene("base", ["numerics.preset=fast", "numerics.tolerance=1e-7"]), 458)
+    assert len(made) == 1 + cost.MOST_STEPS and 0 < trial.step < np.inf
 
 
 def test_a_large_mesh_is_not_tried_but_a_coarser_one(monkeypatch):

@@ -10,6 +10,7 @@ import struct
 import termios
 import threading
 import time
+from contextlib import nullcontext
 
 import pytest
 
@@ -83,6 +84,25 @@ def test_a_long_step_is_not_silent(capsys, monkeypatch):
     assert capsys.readouterr() == ("", "")
 
 
+def test_after_hours_no_step_is_silent_for_longer_than_two_seconds(capsys, monkeypatch):
+    """With the tick that looks for it. Mutant: silences that grow with the time since the start."""
+    assert progress.LONGEST + progress.TICK <= 2.0
+    clock = iter(range(10_000))
+    monkeypatch.setattr(progress, "monotonic", lambda: 0.01 * next(clock) + (3600.0 if ticks else 0.0))
+    ticks: list = []
+    monkeypatch.setattr(progress, "_ticking", lambda tick: nullcontext(ticks.append(tick)))
+    with progress.in_lines() as tell:
+        tell({"event": "step", "time_h": 3.5, "end_h": 45.0, "step": 17, "remeshes": 2, "contact": True})
+        ticks[0]()
+        assert capsys.readouterr().err  # from here on
+        silences = 0
+        while not capsys.readouterr().err:
+            ticks[0]()
+            silences += 1
+            assert silences < 200
+    assert silences * 0.02 <= progress.LONGEST + 0.1
+
+
 def test_sixty_columns_are_enough(tmp_path):
     """For all that is told."""
     last = terminal(tmp_path, 60)[-1]
@@ -122,6 +142,18 @@ def test_arguments_that_do_not_go_together_are_refused(capsys, arguments):
     with pytest.raises(SystemExit) as refused:
         main(["run", *arguments])
     assert refused.value.code == 2 and "usage: repro run" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("arguments", [["run", "base", "--out", ""], ["run", "--resume", ""],
+                                       ["sweep", "base", "--vary", "pore.width=40 um, 50 um", "--out", ""],
+                                       ["compare", "a", "", "--out", "b.html"], ["compare", "a", "b", "--out", ""]])
+def test_an_empty_path_is_not_the_present_folder(tmp_path, monkeypatch, capsys, arguments):
+    """As of a shell's variable that is not set: the results would lie among what is there. Mutant: any path taken."""
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as refused:
+        main(arguments)
+    assert refused.value.code == 2 and "a path is needed, this one is empty" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_exit_statuses_are_told(capsys):

@@ -301,3 +301,31 @@ def test_a_page_of_a_fine_mesh_is_small_and_true(tmp_path, monkeypatch, kind, co
     inside = numbers(mesh["body"], "<u1") == 1
     clear = np.abs(np.hypot(shown[:, 0] - 50, shown[:, 1]) - 20) > 1
     assert (inside == (np.hypot(shown[:, 0] - 50, shown[:, 1]) < 20))[clear].all()
+
+
+def test_a_page_of_many_rows_and_frames_is_small(fast, tmp_path, monkeypatch):
+    """A thousand rows and steps of forty meshes that are shown as they are: 3 MB at most with its charts, which
+    take a third. Mutant: frames that leave no room for charts."""
+    copy = shutil.copytree(fast, tmp_path / "run")
+    digits = np.random.default_rng(0)
+    for name, times in (("timeseries", ["time_h"]), ("ledger", ["start_h", "end_h"])):
+        table = results.read_table(copy / f"{name}.csv")
+        rows = {column: digits.uniform(0.1, 1.0, 1500) for column in table}
+        rows |= {column: np.linspace(0, 30, 1500) + 0.01 * k for k, column in enumerate(times)}
+        results.write_table(copy / f"{name}.csv", list(rows), np.column_stack(list(rows.values())).tolist())
+    monkeypatch.setattr(fields, "MOST_NODES", 2500)
+    points, cells = fields._regular(np.zeros(2), np.array([100.0, 50.0]))
+    monkeypatch.undo()
+    region = (points[cells[:, 0], 0] > 50).astype(float)
+    nodal = {name: digits.uniform(size=len(points)) for name in fields.SHOWN[1:6]}
+    for k in range(40):  # each mesh is another one
+        celled = {name: [np.roll(region, k)] for name in ("region", "theta", "J")}
+        grid = meshio.Mesh(np.column_stack([points, 0 * points[:, :1]]), [("triangle", np.roll(cells, k, 0))], nodal,
+                           celled)
+        meshio.vtu.write(copy / f"fields/fields_{k:04d}.vtu", grid)
+    results.write_index(copy / "fields.pvd", [(float(k), f"fields/fields_{k:04d}.vtu") for k in range(40)])
+    report.write(copy)
+    packed = stored(copy)
+    assert packed["nodes"] == len(points) and 5 < len(packed["frames"]) < 20
+    assert 2e6 < (copy / "report.html").stat().st_size <= 3e6
+    assert len(re.findall('data-chart="', text_of(copy))) == len(quantities.KINDS)

@@ -12,14 +12,16 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import repro
 from repro import load_scene, results
 from repro.cli import main
-from repro.sweep import page, server, table
+from repro.sweep import page, pool, server, table
 from repro.sweep.design import grid, parse, points
 from repro.sweep.server import Server, ask
 from repro.sweep.state import Sweep
@@ -324,6 +326,22 @@ def test_sigterm_ends_a_sweep_quietly(tmp_path):
     said = process.communicate(timeout=60)[1]
     assert process.returncode == 143 and said.startswith("repro: terminated") and said.count("\n") == 1, said
     assert (out / "table.csv").exists() and (out / "summary.html").exists() and not any(map(alive, family))
+
+
+@pytest.mark.parametrize("asked, started", [(None, 2), (400, 2), (1, 1)])
+def test_there_are_no_more_processes_than_runs(tmp_path, monkeypatch, asked, started):
+    """Mutant: as many as are asked for, each of which loads everything."""
+    seen = []
+
+    @contextmanager
+    def ready(workers):
+        seen.append(workers)
+        yield lambda points, folder: iter([(point, "failed: not made") for point in points])
+
+    monkeypatch.setattr(pool, "ready", ready)
+    monkeypatch.setattr(pool, "cores", lambda: 64)
+    done = repro.sweep("base", ["pore.width=48 um, 50 um"], tmp_path / "sweep", workers=asked)
+    assert seen == [started] and len(done.runs) == 2
 
 
 def test_nobody_reads_what_a_sweep_says(tmp_path):

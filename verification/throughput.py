@@ -1,46 +1,53 @@
 """Rate of a sweep against that of single runs: ``python -m verification.throughput [--runs N] [--repeats N]``.
 
 A single run's rate is that of the same runs, one after the other in one process that has imported everything (the
-median of several); the sweep's is that of 200 short runs on all cores, from an empty folder to the page, starting of
-processes included. Wanted: 0.95 times the number of cores, judged with base in `accurate`, a second or two a run; in
-`fast` a run takes less than half a second, of which the second that processes take to start is a part that is told and
-not judged. Control: a process a core, each with runs in a loop and
-nothing between them, which is what this machine, its memory and its other users leave to be had. Exit status 1 where
-the sweep falls short, or a command costs more than it may: `repro --help` twice the import of NumPy, and a run of base
-1.3 times the import of the packages that it needs and the same run in a process that has imported them, each the best
-of five.
+median of several, before and after the sweep); the sweep's is that of 200 short runs on all cores, from an empty folder
+to the page, starting of processes included. Wanted: 0.95 times the number of cores, judged with base in `fast`, less
+than half a second a run; in `accurate`, a second or two a run, a fifth as many runs are made, which is told and not
+judged. Controls: processor time of single runs over that of a run in the sweep, which what others do on the machine
+changes little, and a process a core, each with runs in a loop and nothing between them, which is what this machine, its
+memory and its other users leave to be had. Exit status 1 where the sweep falls short, or a command costs more than it
+may: `repro --help` twice the import of NumPy, and a run of base 1.3 times the import of the packages that it needs and
+the same run in a process that has imported them, each the best of five. Under four minutes on two free cores.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import resource
 import subprocess
 import sys
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
-from time import perf_counter
+from time import perf_counter, process_time
 
 from repro import load_scene, run
 from repro.cli import main as repro
 from repro.sweep.pool import cores
 
 WANTED = 0.95
-JUDGED, TOLD = "accurate", "fast"
+JUDGED, TOLD = "fast", "accurate"
+SINGLE = 10  # runs before the sweep, and after it
 PACKAGES = "numpy, scipy.sparse.linalg, skfem, mmgpy, shapely"  # that a run needs
 WIDTHS = "48:52 um"  # nearly the same run each time
 
 
 def single(preset: str, count: int, folder: Path) -> float:
     """Runs a second in this process, one after the other: of the median run."""
-    seconds = []
+    return 1 / median(wall for wall, _ in runs(preset, count, folder))
+
+
+def runs(preset: str, count: int, folder: Path) -> list[tuple[float, float]]:
+    """(seconds, processor time) of every run in this process, one after the other, into a folder that is not there."""
+    found = []
     for k in range(count):
         scene = load_scene("base", [f"numerics.preset={preset}", f"pore.width={48 + 4 * k / max(count - 1, 1)!r} um"])
-        start = perf_counter()
+        start, spent = perf_counter(), process_time()
         run(scene, folder / f"{k}")
-        seconds.append(perf_counter() - start)
-    return 1 / median(seconds)
+        found.append((perf_counter() - start, process_time() - spent))
+    return found
 
 
 def bare(preset: str, count: int) -> float:
@@ -53,34 +60,43 @@ def bare(preset: str, count: int) -> float:
 def loop(preset: str, count: int) -> None:
     """Print this process's rate, the mean of all its runs but the first, which loads what is loaded when used."""
     with TemporaryDirectory() as folder:
-        single(preset, 1, Path(folder))
+        single(preset, 1, Path(folder, "first"))
         start = perf_counter()
-        single(preset, count, Path(folder))
+        single(preset, count, Path(folder, "counted"))
         print(count / (perf_counter() - start))
 
 
-def swept(preset: str, count: int, folder: Path) -> float:
-    """Runs a second of a sweep."""
-    start = perf_counter()
+def processors() -> float:
+    """Processor time (s) of this process, and of those that it has waited for."""
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(each.ru_utime + each.ru_stime for each in used)
+
+
+def swept(preset: str, count: int, folder: Path) -> tuple[float, float]:
+    """Runs a second of a sweep, and runs a second of processor time."""
+    start, spent = perf_counter(), processors()
     status = repro(["sweep", "base", "--vary", f"pore.width={WIDTHS}:linear:{count}", "--quiet",
                     "--set", f"numerics.preset={preset}", "--out", str(folder / "sweep")])
     if status:
         raise RuntimeError(f"the sweep ended with status {status}")
-    return count / (perf_counter() - start)
+    return count / (perf_counter() - start), count / (processors() - spent)
 
 
 def measure(preset: str, count: int) -> float:
     """The sweep's rate over cores times a single run's rate."""
     with TemporaryDirectory() as folder:
-        single(preset, 1, Path(folder))
-        before = single(preset, 5, Path(folder))
-        rate = swept(preset, count, Path(folder))
-        after = single(preset, 5, Path(folder))
-        control = bare(preset, max(count // cores(), 1))
-    one = cores() * (before + after) / 2
-    print(f"{preset}, {cores()} cores; single {before:.3f} and {after:.3f} runs/s (before, after); sweep of {count} "
-          f"{rate:.3f}; bare processes {control:.3f}; sweep {rate / one:.3f}, bare {control / one:.3f} times cores "
-          f"times single; sweep over bare {rate / control:.3f}", flush=True)
+        runs(preset, 1, Path(folder, "first"))
+        before = runs(preset, SINGLE, Path(folder, "before"))
+        rate, spent = swept(preset, count, Path(folder))
+        after = runs(preset, SINGLE, Path(folder, "after"))
+        control = bare(preset, max(count // (4 * cores()), 1))
+    wall, processor = (median(times) for times in zip(*before, *after))
+    one = cores() / wall
+    print(f"{preset}, {cores()} cores; single {1 / median(wall for wall, _ in before):.3f} and "
+          f"{1 / median(wall for wall, _ in after):.3f} runs/s (before, after); sweep of {count} {rate:.3f}; bare "
+          f"processes {control:.3f}; sweep {rate / one:.3f}, bare {control / one:.3f} times cores times single; sweep "
+          f"over bare {rate / control:.3f}; processor time of single runs {spent * processor:.3f} of that in the sweep",
+          flush=True)
     return rate / one
 
 
@@ -115,13 +131,14 @@ def main(arguments: list[str] | None = None) -> int:
     """Measure and judge the median of the repeats."""
     parser = argparse.ArgumentParser(prog="python -m verification.throughput", description=__doc__.partition(":")[0])
     parser.add_argument("--runs", type=int, default=200)
-    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--repeats", type=int, default=1)
     parser.add_argument("--loop", help=argparse.SUPPRESS)
     chosen = parser.parse_args(arguments)
     if chosen.loop:
         loop(chosen.loop, chosen.runs)
         return 0
-    found = {preset: median(measure(preset, chosen.runs) for _ in range(chosen.repeats)) for preset in (TOLD, JUDGED)}
+    counts = {JUDGED: chosen.runs, TOLD: max(chosen.runs // 5, 1)}
+    found = {preset: median(measure(preset, count) for _ in range(chosen.repeats)) for preset, count in counts.items()}
     holds = found[JUDGED] >= WANTED
     costs = commands()
     for command, (ratio, most) in costs.items():

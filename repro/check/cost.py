@@ -14,6 +14,7 @@ import math
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import islice
 from time import perf_counter
 from typing import TypeAlias
 
@@ -22,6 +23,7 @@ from repro.march import updates
 from repro.march.loop import Instant, PoreEnd, State
 from repro.march.simulation import row_times
 from repro.march.simulation import steps as steps_of
+from repro.march.stepping import SHORTEST
 from repro.scene import Scene, needed
 
 #: What a step leaves.
@@ -39,6 +41,7 @@ ALLOWED = 0.5
 #: The first steps are taken over so many growth.time_step; the first of all is slow, the fastest
 #: one counts.
 FIRST_STEPS = 3
+MOST_STEPS = 9  # where these are shorter
 #: Larger meshes are not tried: a coarser one is, and its time grows with the nodes to this power.
 MOST_NODES = 5000
 POWER = 1.2
@@ -84,7 +87,7 @@ def tried(scene: Scene, nodes: int) -> Trial:
     run = _until_the_end(steps_of(scene))
     first = needed(next(run)[1], "the first row")
     clock.append(perf_counter())
-    clock += [perf_counter() for _ in run]
+    clock += [perf_counter() for _ in islice(run, MOST_STEPS)]
     spent = [b - a for a, b in zip(clock, clock[1:])]
     peak = _memory()
     memory = (before, peak) if before is not None and peak is not None else None
@@ -140,7 +143,8 @@ def longest_step(scene: Scene) -> float:
         return scene.growth.time_step
     rate = abs(numbers.fastest_growth(scene.largest))
     allowed = ALLOWED * math.sqrt(scene.numerics.tolerance / 0.01)
-    return min(scene.growth.end, allowed / rate if rate else math.inf)
+    kept = max(allowed / rate, SHORTEST * scene.growth.time_step) if rate else math.inf
+    return min(scene.growth.end, kept)
 
 
 def _count(first: float, longest: float, duration: float) -> int:

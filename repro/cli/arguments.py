@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import argparse
+from pathlib import Path
+
 from repro.scene import packaged_scenes
 
 
@@ -10,6 +13,13 @@ def add_scene(command, nargs: str | None = None) -> None:
     command.add_argument("scene", metavar="SCENE", nargs=nargs,
                          help=f"a TOML file, or a packaged scene: {', '.join(packaged_scenes())}")
     add_changes(command)
+
+
+def path(text: str) -> Path:
+    """A path; an empty text, as of a shell's variable that is not set, is none."""
+    if not text:
+        raise argparse.ArgumentTypeError("a path is needed, this one is empty")
+    return Path(text)
 
 
 def add_changes(command) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from repro.cli.arguments import path
 from repro.errors import OutputError
 from repro.run.progress import say
 
@@ -14,9 +15,9 @@ def add(commands) -> None:
         "compare", help="lay runs over each other in one page",
         description="Make a page with the charts of several runs, what differs in their scenes, "
         "and last values.")
-    command.add_argument("runs", metavar="RUN", type=Path, nargs="+",
+    command.add_argument("runs", metavar="RUN", type=path, nargs="+",
                          help="folder of a run; the first is what the others are compared with")
-    command.add_argument("--out", metavar="FILE.html", type=Path, required=True,
+    command.add_argument("--out", metavar="FILE.html", type=path, required=True,
                          help="the page to write")
     command.set_defaults(call=call)
 

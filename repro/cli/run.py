@@ -8,10 +8,9 @@ from __future__ import annotations
 import argparse
 import math
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from repro.cli.arguments import add_scene
+from repro.cli.arguments import add_scene, path
 from repro.errors import SimulationError
 from repro.run import INTERVAL, interrupts, progress
 from repro.scene import Scene, load_scene, packaged_scenes
@@ -42,8 +41,8 @@ def add(commands) -> None:
         "run", help="run a scene, or go on with a run", description=DESCRIPTION, epilog=STATUS,
         formatter_class=argparse.RawDescriptionHelpFormatter)
     add_scene(command, nargs="?")
-    command.add_argument("--out", metavar="DIR", type=Path, help="folder for the results")
-    command.add_argument("--resume", metavar="DIR", type=Path,
+    command.add_argument("--out", metavar="DIR", type=path, help="folder for the results")
+    command.add_argument("--resume", metavar="DIR", type=path,
                          help="go on with the run in this folder")
     command.add_argument("--force", action="store_true",
                          help="remove the files of the run in DIR, as its run.json lists them, and "

@@ -10,10 +10,9 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from repro.cli.arguments import add_scene
+from repro.cli.arguments import add_scene, path
 from repro.errors import Interrupted
 from repro.run.progress import say
 
@@ -44,7 +43,7 @@ def add(commands) -> None:
                          help="a Latin hypercube of N runs instead of a grid")
     command.add_argument("--seed", metavar="S", type=_whole, default=0,
                          help="of the Latin hypercube (0)")
-    command.add_argument("--out", metavar="DIR", type=Path, required=True,
+    command.add_argument("--out", metavar="DIR", type=path, required=True,
                          help="folder for runs, table and page")
     command.add_argument("--workers", metavar="N", type=_count, help="runs at a time (all cores)")
     command.add_argument("--scheduler", metavar="tcp://HOST:PORT",

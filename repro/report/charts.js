@@ -1,4 +1,4 @@
-// What a pointer is told on a chart, and the present time of the fields in every chart.
+// What a chart tells: values where the pointer is, else those at the present time of the fields.
 "use strict";
 const charts = [...document.querySelectorAll("figure[data-chart]")].map(figure => {
   const told = JSON.parse(figure.dataset.chart), [low, high, start, end] = told.axis;
@@ -21,11 +21,18 @@ function nearest(times, time) {
   return best;
 }
 
+// Linear between a line's own times; null before the first, after the last and beside a gap.
+function valueAt(line, time) {
+  const k = line.t.findIndex(own => own >= time);
+  if (k < 0 || line.t[k] === time) return k < 0 ? null : line.y[k];
+  if (k === 0 || line.y[k] === null || line.y[k - 1] === null) return null;
+  return line.y[k - 1] + (time - line.t[k - 1]) / (line.t[k] - line.t[k - 1]) * (line.y[k] - line.y[k - 1]);
+}
+
 function mark(chart, time) {
-  const place = chart.place(time), seen = time >= chart.told.axis[0] && time <= chart.told.axis[1];
-  chart.now.setAttribute("x1", place);
-  chart.now.setAttribute("x2", place);
-  chart.now.setAttribute("visibility", seen ? "visible" : "hidden");
+  chart.now.setAttribute("x1", chart.place(time));
+  chart.now.setAttribute("x2", chart.place(time));
+  chart.now.setAttribute("visibility", "visible");
 }
 
 function timeUnder(chart, event) {
@@ -33,27 +40,28 @@ function timeUnder(chart, event) {
   return chart.time((event.clientX - box.left) / box.width * chart.drawing.viewBox.baseVal.width);
 }
 
-function tell(chart, event) {
-  const time = timeUnder(chart, event);
+// The values at the time, of those that any line has a value for, that is nearest to this one.
+function tell(chart, time) {
   const lines = chart.told.lines.filter(line => line.t.length && line.y.some(y => y !== null));
-  const found = lines.map(line => [line, nearest(line.t, time)]);
-  const at = found.reduce((best, [line, k]) => Math.abs(line.t[k] - time) < Math.abs(best - time) ? line.t[k] : best,
-    found[0][0].t[found[0][1]]);
-  chart.output.textContent = `${rounded(at)} h: ` + found.map(([line, k]) =>
-    (lines.length > 1 ? line.label + " " : "") + rounded(line.y[k])).join(", ");
+  const times = lines.map(line => line.t[nearest(line.t, time)]), at = times[nearest(times, time)];
+  chart.output.textContent = `${rounded(at)} h: ` + lines.map(line =>
+    (lines.length > 1 ? line.label + " " : "") + rounded(valueAt(line, at))).join(", ");
   mark(chart, at);
 }
 
 let present = null; // the time of the fields shown, h
-function markAll(time) {
+function tellAll(time) {
   present = time;
-  for (const chart of charts) mark(chart, time);
+  for (const chart of charts) tell(chart, time);
+}
+function tellNothing(chart) {
+  chart.output.textContent = "\u00a0";
+  chart.now.setAttribute("visibility", "hidden");
 }
 for (const chart of charts) {
-  chart.drawing.addEventListener("pointermove", event => tell(chart, event));
+  chart.drawing.addEventListener("pointermove", event => tell(chart, timeUnder(chart, event)));
   chart.drawing.addEventListener("pointerleave", () => {
-    chart.output.textContent = "\u00a0";
-    if (present === null) chart.now.setAttribute("visibility", "hidden"); else mark(chart, present);
+    if (present === null) tellNothing(chart); else tell(chart, present);
   });
   chart.drawing.addEventListener("click", event => {
     document.dispatchEvent(new CustomEvent("timechosen", { detail: timeUnder(chart, event) }));

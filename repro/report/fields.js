@@ -124,13 +124,16 @@ function bar(pen, field, low, high, left, top, width) {
     pen.fillRect(left + k, top, 1.5, 12);
   }
   pen.fillStyle = ink("--text");
-  const far = 45 / width * (high - low); // from the ends, which are told exactly
-  const between = roundTicks(low, high, 4).filter(value => value - low > far && high - value > far);
+  const text = value => rounded(Math.abs(value) < 1e-12 * (high - low) ? 0 : value);
+  const wide = value => pen.measureText(text(value)).width, place = value => left + (value - low) / (high - low) * width;
+  const first = left + wide(low) + 8, last = left + width - wide(high) - 8; // the ends are told exactly
+  const between = roundTicks(low, high, 4).filter(value =>
+    place(value) - wide(value) / 2 > first && place(value) + wide(value) / 2 < last);
   for (const value of [low, ...between, high]) {
-    const x = left + (value - low) / (high - low) * width;
+    const x = place(value);
     pen.textAlign = value === low ? "left" : value === high ? "right" : "center";
     pen.fillRect(Math.min(x, left + width - 1), top + 12, 1, 4);
-    pen.fillText(rounded(Math.abs(value) < 1e-12 * (high - low) ? 0 : value), x, top + 17);
+    pen.fillText(text(value), x, top + 17);
   }
   pen.textAlign = "left"; pen.fillText(name, left, top + 32);
 }
@@ -147,7 +150,7 @@ function told(frame, field, low, high) {
   Object.assign(part.picture.dataset, { frame: part.frame.value, field: field.name, low, high,
     seen: shown.all.reduce(hashed, 7),
     filled: shown.all.reduce((sum, value) => sum + !isNaN(value), 0) / shown.all.length });
-  markAll(frame.time);
+  tellAll(frame.time);
 }
 
 function probe(event) {

@@ -20,7 +20,7 @@ from repro.results.arrays import ARRAYS
 from repro.results.vtu import Cells, Grid
 
 MOST_FRAMES = 40
-MOST_BYTES = 2_600_000  # of all frames in the page; two frames are always shown
+MOST_BYTES = 2_600_000  # of all frames and charts in the page; two frames are always shown
 MOST_NODES = 10_000  # of a frame; a finer mesh is shown on a regular grid of so many points
 #: What is told of a frame of the grown aggregate that has not expanded yet (Plate 1).
 BEFORE = "before the expansion"
@@ -47,15 +47,16 @@ def index(folder: Path, name: str = "fields.pvd") -> list[tuple[float, Path]]:
 
 
 def packed(entries: list[tuple[float, Path]],
-           before: list[tuple[float, Path]] | None = None) -> dict:
+           before: list[tuple[float, Path]] | None = None, spent: int = 0) -> dict:
     """What the script is given: the fields that there are, meshes, and frames; empty without any.
 
-    before: those of the same times before the aggregate expanded, each shown ahead of its own.
+    before: those of the same times before the aggregate expanded, each shown ahead of its own;
+    spent: bytes that the rest of the page takes of MOST_BYTES.
     """
     if not entries:
         return {}
     last = vtu.read(entries[-1][1])
-    chosen = _chosen(entries, dict(before or []), _shown(last))
+    chosen = _chosen(entries, dict(before or []), _shown(last), MOST_BYTES - spent)
     grids = [_shown(vtu.read(path)) for _, path, _ in chosen]
     low = np.min([grid.points.min(0) for grid in grids], 0)
     high = np.max([grid.points.max(0) for grid in grids], 0)
@@ -72,16 +73,16 @@ def _in_any(frames: list[dict], name: str) -> bool:
     return any(name in frame["values"] for frame in frames)
 
 
-def _chosen(entries: list[tuple[float, Path]],
-            before: dict[float, Path], grid: Grid) -> list[tuple[float, Path, str]]:
+def _chosen(entries: list[tuple[float, Path]], before: dict[float, Path], grid: Grid,
+            most: int) -> list[tuple[float, Path, str]]:
     """Evenly chosen frames, the first and last among them, as many as the page may hold, and what
     is told of them; those before an expansion where there is room for all of them.
 
-    grid: the last one, which is taken for the largest.
+    grid: the last one, which is taken for the largest; most: bytes of all frames.
     """
     size = 8 / 3 * (len(grid.points) * (2 + len(grid.point_data)) + 2 * grid.cells[0].data.size
                     + len(grid.cells[0].data) * len(grid.cell_data))
-    room = int(MOST_BYTES / size)
+    room = int(most / size)
     count = min(len(entries), MOST_FRAMES, max(2, room))
     evenly = np.linspace(0, len(entries) - 1, count).round().astype(int)
     found: list[tuple[float, Path, str]] = []

@@ -54,8 +54,9 @@ CONTROLS = """<div class="controls"><label>Field <select id="field"></select></l
 
 def build(run: Run) -> str:
     """The page's text. Raises ValueError where a file of fields cannot be read."""
-    drawn, packed = quantities.charts_of(run), _packed(run)
-    body = (_head(run) + _fields(run, packed) + _charts(run, drawn)
+    drawn = _charts(run, quantities.charts_of(run))
+    packed = _packed(run, len(drawn))
+    body = (_head(run) + _fields(run, packed) + drawn
             + f'<div class="pair">{_numbers(run)}{_cost(run)}</div>' + _modelled(run)
             + _others(run))
     more = page.data("fields", packed) if packed else ""
@@ -63,11 +64,11 @@ def build(run: Run) -> str:
                      ["charts.js", *(["mesh.js", "fields.js"] if packed else [])])
 
 
-def _packed(run: Run) -> dict:
+def _packed(run: Run, spent: int) -> dict:
     try:
         own = "before_expansion.pvd" in _list(run.record.get("files"))
         before = fields.index(run.folder, "before_expansion.pvd") if own else []
-        return fields.packed(fields.index(run.folder), before)
+        return fields.packed(fields.index(run.folder), before, spent)
     except (ParseError, ValueError, LookupError, TypeError, zlib.error) as error:
         raise ValueError(f"{run.folder}: the fields cannot be read: {error!r}") from error
 

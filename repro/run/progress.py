@@ -20,8 +20,8 @@ from typing import TextIO
 from repro.errors import OutputError
 
 Tell = Callable[[dict], None]
-#: Seconds between signs of life on a terminal, and without a word elsewhere.
-TICK, SILENCE = 0.5, 1.0
+#: Seconds between signs of life on a terminal, and without a word elsewhere: at first, and at most.
+TICK, SILENCE, LONGEST = 0.5, 1.0, 1.5
 #: The bar, and what takes its place on a terminal with fewer columns.
 WIDE = ("{desc} {percentage:3.0f}%|{bar}| {n:.1f} of {total:.1f} h "
         "[{elapsed} < {remaining}{postfix}]")
@@ -84,7 +84,7 @@ def _warning(event: dict) -> str:
 @contextmanager
 def in_lines() -> Iterator[Tell]:
     """A line each tenth of the simulated time, where SILENCE s have passed without one, and at the
-    end. A line comes later than a fiftieth of the time since the start, so that a log stays short.
+    end; up to LONGEST s may pass, a fiftieth of the time since the start, so that a log is short.
     """
     begun = said = monotonic()
     reached = 0
@@ -107,7 +107,7 @@ def in_lines() -> Iterator[Tell]:
                 line()
 
     def tick() -> None:
-        if now and monotonic() - said > max(SILENCE, (monotonic() - begun) / 50):
+        if now and monotonic() - said > min(LONGEST, max(SILENCE, (monotonic() - begun) / 50)):
             contact = ", contact" if now["contact"] else ""
             line(f", step {now['step']}{contact}, {monotonic() - begun:.0f} s")
 

@@ -121,7 +121,9 @@ def override(tables: dict, entry: str, file: str, known: tuple[str, ...]) -> Non
     equals, text = entry.partition("=")[1:]
     path = key_of(entry).split(".")
     if not equals or not all(path):
-        hint = did_you_mean(elsewhere(".".join(part for part in path if part)[:60], known))
+        typed = ".".join(part for part in path if part)[:60]
+        near = elsewhere(typed, known)
+        hint = did_you_mean("" if near == typed else near)
         raise SceneError(f"{file}: --set {shown(entry)}: KEY=VALUE is needed, such as "
                          f'pore.width="50 um"{hint}')
     if len(path) > MOST_PARTS:

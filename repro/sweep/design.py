@@ -12,6 +12,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -82,10 +83,15 @@ class Point:
     values: tuple[float | str, ...]
     scene: Scene
 
+    @cached_property
+    def hash(self) -> str:
+        """What names its scene."""
+        return scene_hash(self.scene)
+
     @property
     def name(self) -> str:
         """The name of its folder."""
-        return f"{self.index:04d}-{scene_hash(self.scene)}"
+        return f"{self.index:04d}-{self.hash}"
 
 
 def parse(text: str) -> Factor:

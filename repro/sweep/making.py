@@ -67,9 +67,10 @@ def sweep(source: Source, vary: Sequence[str], folder: str | Path, overrides: Se
     scene is not accepted, OutputError where the folder cannot be used.
     """
     ended: dict[int, str] = {}
-    with _ready(scheduler, workers) as each:
-        factors = [design.parse(text) for text in vary]
-        points = _points(source, factors, overrides, unset, samples, seed)
+    factors = [design.parse(text) for text in vary]
+    found = design.grid(factors) if samples is None else design.latin(factors, samples, seed)
+    with _ready(scheduler, min(workers or pool.cores(), len(found))) as each:
+        points = design.points(source, list(overrides), factors, found, unset)
         for point in points if scheduler is None else ():
             require_packages(point.scene)
         wanted = Sweep(Path(folder), label(source), factors, points)
@@ -81,19 +82,9 @@ def sweep(source: Source, vary: Sequence[str], folder: str | Path, overrides: Se
     return Swept(wanted.source, wanted.folder, factors, told)
 
 
-def _ready(scheduler: str | None, workers: int | None) -> AbstractContextManager[pool.Each]:
+def _ready(scheduler: str | None, workers: int) -> AbstractContextManager[pool.Each]:
     """What makes the runs: processes here, which load what they need meanwhile, or a cluster."""
-    return cluster.ready(scheduler) if scheduler else pool.ready(workers or pool.cores())
-
-
-def _points(source: Source, factors: list[design.Factor], overrides: Sequence[str],
-            unset: Sequence[str], samples: int | None, seed: int) -> list[design.Point]:
-    """The runs of a sweep, each of them checked."""
-    if samples is None:
-        found = design.grid(factors)
-    else:
-        found = design.latin(factors, samples, seed)
-    return design.points(source, list(overrides), factors, found, unset)
+    return cluster.ready(scheduler) if scheduler else pool.ready(workers)
 
 
 def _make(wanted: Sweep, each: pool.Each, ended: dict[int, str], tell: Tell) -> None:

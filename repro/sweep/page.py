@@ -54,6 +54,7 @@ svg text { fill: var(--ink); font-size: 13px; }
        font-size: .9rem; }
 .key svg { display: inline-block; width: 1.6rem; height: .7rem; margin-right: .35rem; }
 .wide { overflow-x: auto; }
+.wide td:first-child { position: sticky; left: 0; background: var(--page); }
 table { border-collapse: collapse; font-size: .9rem; font-variant-numeric: tabular-nums; }
 th, td { text-align: right; padding: .25rem .6rem; border-bottom: 1px solid var(--line);
          overflow-wrap: normal; }

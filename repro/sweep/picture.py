@@ -71,8 +71,9 @@ def around(label: str, values: Sequence[float], log: bool, zero: bool = False) -
     if log:
         margin = (high / low) ** 0.06 if high > low else 2.0
         return Axis(label, low / margin, high * margin, True)
+    low = 0.0 if zero else low
     margin = 0.06 * (high - low) or 0.5 * abs(high) or 1.0
-    return Axis(label, 0.0 if zero else low - margin, high + margin)
+    return Axis(label, low if zero else low - margin, high + margin)
 
 
 def at(x: Axis, y: Axis, point: tuple[float, float]) -> tuple[float, float]:

@@ -16,7 +16,6 @@ from pathlib import Path
 from repro.results import write_json
 from repro.results.files import open_lock, whole
 from repro.run.running import OutputError
-from repro.scene import scene_hash
 from repro.sweep import task
 from repro.sweep.design import Factor, Point
 
@@ -77,7 +76,7 @@ def usable(folder: Path):
 
 
 def _as_json(sweep: Sweep) -> dict:
-    points = [{"run": point.index, "folder": f"runs/{point.name}", "hash": scene_hash(point.scene),
+    points = [{"run": point.index, "folder": f"runs/{point.name}", "hash": point.hash,
                "values": list(point.values)} for point in sweep.points]
     factors = [{**asdict(factor), "values": list(factor.values)} for factor in sweep.factors]
     return {"scene": sweep.source, "code": task.code(), "varied": factors, "points": points}
