@@ -1,8 +1,8 @@
 """C19: how far from the aggregate the pore must be meshed (3.1).
 
-The meshes are nested: one core around the aggregate, and beyond it columns of right-angled triangles, of which a shorter
-mesh is the longer one's part. What two of them differ by is then what the missing columns do, and not what two unrelated
-meshes differ by, which is ten times as much.
+What is cut off is a matter of the equations and not of the elements, so the converged solution judges it. The meshes are
+nested: a core around the aggregate, and beyond it columns of triangles, of which those of a shorter mesh are a part of
+the longer one's. What two of them differ by is what the missing columns do; two unrelated meshes differ by more.
 """
 
 from __future__ import annotations
@@ -37,7 +37,8 @@ def truncation() -> Finding:
                      for radius, found in errors.items())
     return Finding(checks, reason="what is cut off matters by more than that",
                    note="Errors (%) of conductivity/acceptor effluent/donor effluent at parts of min(5 R, W): "
-                   f"{told}.")
+                   f"{told}. In the scheme of 2001 meshing all of the pore adds the error of linear elements in its "
+                   "clean part, which is no truncation; that is its range.")
 
 
 def _errors(said, radius: float) -> np.ndarray:
