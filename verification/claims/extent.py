@@ -1,8 +1,8 @@
 """C19: how far from the aggregate the pore must be meshed (3.1).
 
-What is cut off is a matter of the equations and not of the elements, so the converged solution judges it. The meshes are
-nested: a core around the aggregate, and beyond it columns of triangles, of which those of a shorter mesh are a part of
-the longer one's. What two of them differ by is what the missing columns do; two unrelated meshes differ by more.
+What is cut off is a matter of the equations and not of the elements, so the converged solution judges it. The meshes
+are nested: a core around the aggregate, and beyond it columns of triangles, of which those of a shorter mesh are a part
+of the longer one's. What two of them differ by is what the missing columns do; two unrelated meshes differ by more.
 """
 
 from __future__ import annotations
