@@ -1,17 +1,34 @@
-"""Figure 6 rests on a supply that the paper does not print: when wide makes contact with 5 to 40 K_s of both."""
+"""Figure 6 rests on a supply that the paper does not print: what 5 to 40 K_s of both make of it.
+
+For each supply: when contact comes, outlines every 5 h until as long after contact as Figure 6 goes on, and which of
+the claims about wide hold then. Those are the functions of `verification.claims` themselves, with the converged solution
+at one size, so that a number has no bar here; a claim holds where all of its checks about wide do.
+"""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from math import floor
+
+import numpy as np
+import shapely
 
 from repro.march import simulation
-from verification.claims.levels import converged
+from verification.claims import CLAIMS, Finding, evaluate
+from verification.claims.levels import CONVERGED, Level, at_level, converged, forget
+from verification.claims.restored import bodies, polygon
+from verification.claims.runs import WIDE, series
 from verification.sensitivity.numbers import OF, Runs, scene
 
 #: Supplies over K_s, and the size of the converged solution's elements and steps.
 SUPPLIES, SIZE = (5.0, 10.0, 20.0, 40.0), 2**0.5
 #: Hours by which all of them have made contact.
 END = 120.0
+#: Whole hours that wide goes on after contact: 45 h for Figure 6's own 10 K_s.
+AFTER = 11
+#: The claims about wide; hours between outlines; um to which these are kept.
+OF_WIDE = ("C12", "C16", "C25", "C26", "C29", "C30", "C31", "C32", "C35", "C38", "C40")
+EVERY, FINE = 5, 0.1
 
 
 def of_contact(said) -> dict[str, float]:
@@ -26,11 +43,46 @@ def of_contact(said) -> dict[str, float]:
 OF["contact"] = of_contact
 
 
-def contacts(runs: Runs) -> dict[str, dict[str, float]]:
-    """What `of_contact` tells, by the supply over K_s."""
-    found = {}
-    for supply in SUPPLIES:
-        factors = {"supply of acceptor": supply / 10, "supply of donor": supply / 10}
-        said = replace(scene("wide", factors, *converged(SIZE)), name="contact")
-        found[f"{supply:g}"] = runs.numbers(said)
+def contacts(runs: Runs) -> dict[str, dict]:
+    """By the supply over K_s: what `of_contact` tells, outlines, and which claims about wide hold."""
+    evaluate.register_all()
+    return {f"{supply:g}": _of_supply(runs, supply) for supply in SUPPLIES}
+
+
+def _of_supply(runs: Runs, supply: float) -> dict:
+    print(f"wide: a supply of {supply:g} K_s", flush=True)
+    factors = {"supply of acceptor": supply / 10, "supply of donor": supply / 10}
+    contact = runs.numbers(replace(scene("wide", factors, *converged(SIZE)), name="contact"))
+    level = supplied(supply, floor(contact["contact_time"]) + AFTER)
+    with at_level(level), np.errstate(all="raise", under="ignore"):
+        found = {**contact, "outlines": _outlines(), "claims": {id: holding(CLAIMS[id].function()) for id in OF_WIDE}}
+    forget(level)
     return found
+
+
+def supplied(supply: float, end: float) -> Level:
+    """The level at which wide has a supply (K_s) and an end (h)."""
+    changes = [f'substrates.{name}.supply="{supply:g} mg/L"' for name in ("acceptor", "donor")]
+    return Level(CONVERGED, SIZE, wide=(*changes, f'growth.end="{end:g} h"'))
+
+
+def holding(finding: Finding) -> dict[str, bool]:
+    """Whether each check holds that is not about base, by its quantity."""
+    return {check.quantity: check.holds for check in finding.checks if not check.quantity.startswith("base")}
+
+
+def _outlines() -> dict[str, str]:
+    """Outlines by their hour: places "x,y x,y ..." to FINE (um), without those that lie on a straight line."""
+    return {f"{time:g}": " ".join(f"{x:.1f},{y:.1f}" for x, y in _places(found))
+            for time, found in zip(series(*WIDE)["time_h"], bodies(WIDE)) if time % EVERY == 0}
+
+
+def _places(found) -> np.ndarray:
+    return shapely.get_coordinates(shapely.simplify(polygon(found.outline), FINE))
+
+
+def verdicts(found: dict[str, dict]) -> tuple[list[str], list[str], list[str]]:
+    """Claims that hold with all supplies, with some, and with none."""
+    held = {id: [all(known["claims"][id].values()) for known in found.values()] for id in OF_WIDE}
+    return ([id for id in OF_WIDE if all(held[id])], [id for id in OF_WIDE if any(held[id]) and not all(held[id])],
+            [id for id in OF_WIDE if not any(held[id])])
