@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Callable
 
 from repro.results import write_json, write_text
 from verification import sensitivity
@@ -18,14 +19,12 @@ from verification.sensitivity import after_contact, elasticity, one_set, picture
 from verification.sensitivity.inputs import ROUNDED
 from verification.sensitivity.numbers import Runs, scene
 
-PARTS = ("base", "wide", "after_contact", "supplies")
-
 
 def main(arguments: list[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     parser = argparse.ArgumentParser(prog="python -m verification.sensitivity", description=__doc__.split("\n")[0])
     parser.add_argument("--sobol", type=int, metavar="N", default=0, help="samples of the indices, a power of two")
-    parser.add_argument("--only", choices=PARTS, help="one part alone; the record of the others stays")
+    parser.add_argument("--only", choices=tuple(PARTS), help="one part alone; the record of the others stays")
     chosen = parser.parse_args(arguments)
     if chosen.sobol < 0 or chosen.sobol & (chosen.sobol - 1):
         print(f"sensitivity: --sobol {chosen.sobol}: a power of two is accepted, or 0 for none", file=sys.stderr)
@@ -35,23 +34,38 @@ def main(arguments: list[str] | None = None) -> int:
     sensitivity.record.cache_clear()
     picture.write(made)
     write_text(sensitivity.RECORD.with_suffix(".md"), picture.page(made))
-    print(f"{sensitivity.RECORD.name}, its page and tornado.svg: written")
+    print(f"{sensitivity.RECORD.name}, its page, tornado.svg and supplies.svg: written")
     return 0
 
 
 def computed(runs: Runs, only: str | None, samples: int) -> dict:
-    """The record, what is not asked for as it was."""
-    known, asked = dict(sensitivity.record()), PARTS if only is None else (only,)
-    made = {"rounding": {each.name: each.rounding for each in ROUNDED},
-            "values": dict(known.get("values", {})), "elasticities": dict(known.get("elasticities", {}))}
-    for name in [part for part in asked if part in ("base", "wide")]:
-        made["values"] |= runs.numbers(scene(name, {}))
-        made["elasticities"] |= elasticity.elasticities(runs, name)
-    made["one_set"] = one_set.found(runs, made["elasticities"]) if "base" in asked else known.get("one_set", {})
-    made["after_contact"] = after_contact.known(runs) if "after_contact" in asked else known.get("after_contact", [])
-    made["supplies"] = supplies.contacts(runs) if "supplies" in asked else known.get("supplies", {})
-    made["sobol"] = sobol.indices(runs, made["elasticities"], samples) if samples else known.get("sobol", {})
+    """The record, what is not asked for as it is when that is there."""
+    asked = PARTS if only is None else (only,)
+    new = [PARTS[part](runs) for part in asked]
+    sensitivity.record.cache_clear()
+    made = {"values": {}, "elasticities": {}, **sensitivity.record()}
+    made["rounding"] = {each.name: each.rounding for each in ROUNDED}
+    for part in new:
+        joined = {key: made[key] | part[key] for key in ("values", "elasticities") if key in part}
+        made |= {**part, **joined}
+    if samples:
+        made["sobol"] = sobol.indices(runs, made["elasticities"], samples)
     return made
+
+
+def _of_scene(runs: Runs, name: str) -> dict:
+    return {"values": runs.numbers(scene(name, {})), "elasticities": elasticity.elasticities(runs, name)}
+
+
+def _of_base(runs: Runs) -> dict:
+    found = _of_scene(runs, "base")
+    return {**found, "one_set": one_set.found(runs, found["elasticities"])}
+
+
+PARTS: dict[str, Callable[[Runs], dict]] = {
+    "base": _of_base, "wide": lambda runs: _of_scene(runs, "wide"),
+    "after_contact": lambda runs: {"after_contact": after_contact.known(runs)},
+    "supplies": lambda runs: {"supplies": supplies.contacts(runs)}}
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
 """Figure 6 rests on a supply that the paper does not print: what 5 to 40 K_s of both make of it.
 
 For each supply: when contact comes, outlines every 5 h until as long after contact as Figure 6 goes on, and which of
-the claims about wide hold then. Those are the functions of `verification.claims` themselves, with the converged solution
-at one size, so that a number has no bar here; a claim holds where all of its checks about wide do.
+the claims about wide hold then. Those are the functions of `verification.claims` themselves, with the converged
+solution at one size, so that a number has no bar here; a claim holds where all of its checks about wide do.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import shapely
 
 from repro.march import simulation
 from verification.claims import CLAIMS, Finding, evaluate
+from verification.claims.bars import unnumbered
 from verification.claims.levels import CONVERGED, Level, at_level, converged, forget
 from verification.claims.restored import bodies, polygon
 from verification.claims.runs import WIDE, series
@@ -67,8 +68,13 @@ def supplied(supply: float, end: float) -> Level:
 
 
 def holding(finding: Finding) -> dict[str, bool]:
-    """Whether each check holds that is not about base, by its quantity."""
-    return {check.quantity: check.holds for check in finding.checks if not check.quantity.startswith("base")}
+    """Whether each check holds that is not about base, by its quantity without numbers, whose instants differ."""
+    found: dict[str, bool] = {}
+    for check in finding.checks:
+        name = unnumbered(check.quantity)
+        if not name.startswith("base"):
+            found[name] = check.holds and found.get(name, True)
+    return found
 
 
 def _outlines() -> dict[str, str]:
@@ -86,3 +92,10 @@ def verdicts(found: dict[str, dict]) -> tuple[list[str], list[str], list[str]]:
     held = {id: [all(known["claims"][id].values()) for known in found.values()] for id in OF_WIDE}
     return ([id for id in OF_WIDE if all(held[id])], [id for id in OF_WIDE if any(held[id]) and not all(held[id])],
             [id for id in OF_WIDE if not any(held[id])])
+
+
+def moving(found: dict[str, dict]) -> list[tuple[str, str]]:
+    """(claim, quantity) of the checks that hold with some supplies and not with all."""
+    first = next(iter(found.values()))["claims"]
+    return [(id, name) for id, held in first.items() for name in held
+            if len({known["claims"][id][name] for known in found.values()}) > 1]
