@@ -56,7 +56,8 @@ def _numbers(said, grid: Mesh) -> list[float]:
 
 def nested(said, radius: float, reaches: list[float]) -> list[Mesh]:
     """Meshes around a half-disc to ascending distances (um) from it, and to the pore's ends, each part of the next."""
-    numerics, sizes = said.numerics, sized(said)
+    numerics = said.numerics
+    sizes = sized(said)
     ends = [radius + reach for reach in reaches]
     first = seed(radius, ACROSS_AGGREGATE * numerics.refinement, numerics.geometry)
     core, outline = mesher.generate(first, (-ends[0], ends[0]), sizes, numerics.geometry)
@@ -77,13 +78,15 @@ def lengthened(mesh: Mesh, end: float, size: float) -> Mesh:
 def _with_columns(mesh: Mesh, line: np.ndarray, places: np.ndarray) -> Mesh:
     """With columns from a line of nodes to each of the places x in turn. No triangle has an edge on an end and one on a
     wall: diagonals run from the outer node nearer to the middle of the pore."""
-    y, count, many = mesh.points[line, 1], len(mesh.points), len(line)
-    columns = np.vstack([line, count + np.arange(many * len(places)).reshape(len(places), many)])
-    new = np.column_stack([np.repeat(places, many), np.tile(y, len(places))])
-    a, d, b, c = (side[:, part].ravel() for side in (columns[:-1], columns[1:]) for part in (slice(-1), slice(1, None)))
+    y = mesh.points[line, 1]
+    new = np.column_stack([np.repeat(places, len(line)), np.tile(y, len(places))])
+    numbers = len(mesh.points) + np.arange(len(new)).reshape(len(places), len(line))
+    columns = np.vstack([line, numbers])
+    near, far = columns[:-1], columns[1:]
+    a, d = near[:, :-1].ravel(), near[:, 1:].ravel()
+    b, c = far[:, :-1].ravel(), far[:, 1:].ravel()
     low = np.tile(y[:-1] + y[1:] < mesh.width, len(places))
-    first, second = np.where(low, [a, b, d], [a, b, c]), np.where(low, [b, c, d], [a, c, d])
-    cells = np.hstack([first, second]).T
+    cells = np.hstack([np.where(low, [a, b, d], [a, b, c]), np.where(low, [b, c, d], [a, c, d])]).T
     if places[0] < mesh.points[line[0], 0]:
         cells = cells[:, ::-1]
     topology = replace(mesh.topology, cells=np.vstack([mesh.cells, cells]),
