@@ -115,20 +115,18 @@ def flips(entry: dict) -> list[Flip]:
 
 
 def _moved(check: dict) -> list[tuple[float, float]]:
-    """The bounds of a check, one of them moved by the bar."""
+    """The bounds of a check, one of them moved by the bar; none where that has no end."""
+    if check["low"] is None or check["high"] is None:
+        return []
     low, high = (-inf if check["tolerance"]["low"] is None else check["tolerance"]["low"],
                  inf if check["tolerance"]["high"] is None else check["tolerance"]["high"])
-    first, last = _bar(check)
-    half = 0.5 * (last - first) if isfinite(last - first) else 0.0
+    half = 0.5 * (check["high"] - check["low"])
     return [(low - half, high), (low + half, high), (low, high - half), (low, high + half)]
-
-
-def _bar(check: dict) -> tuple[float, float]:
-    return (-inf if check["low"] is None else check["low"], inf if check["high"] is None else check["high"])
 
 
 def _verdict_with(entry: dict, number: int, bounds: tuple[float, float]) -> str:
     """The verdict with other bounds of one check."""
     outcomes = [check["outcome"] for check in entry["checks"]]
-    outcomes[number] = outcome_of(_bar(entry["checks"][number]), bounds)
+    moved = entry["checks"][number]
+    outcomes[number] = outcome_of((moved["low"], moved["high"]), bounds)
     return verdict_of(set(outcomes), bool(entry["change"]), bool(entry["rounding"]))

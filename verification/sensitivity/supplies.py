@@ -15,6 +15,7 @@ import shapely
 
 from repro.march import simulation
 from verification.claims import CLAIMS, Finding, evaluate
+from verification.claims.after_contact import OF_WIDE
 from verification.claims.bars import unnumbered
 from verification.claims.levels import CONVERGED, Level, at_level, converged, forget
 from verification.claims.restored import bodies, polygon
@@ -27,8 +28,7 @@ SUPPLIES, SIZE = (5.0, 10.0, 20.0, 40.0), 2**0.5
 END = 120.0
 #: Whole hours that wide goes on after contact: 45 h for Figure 6's own 10 K_s.
 AFTER = 11
-#: The claims about wide; hours between outlines; um to which these are kept.
-OF_WIDE = ("C12", "C16", "C25", "C26", "C29", "C30", "C31", "C32", "C35", "C38", "C40")
+#: Hours between outlines; um to which these are kept.
 EVERY, FINE = 5, 0.1
 
 
@@ -89,9 +89,10 @@ def _places(found) -> np.ndarray:
 
 def verdicts(found: dict[str, dict]) -> tuple[list[str], list[str], list[str]]:
     """Claims that hold with all supplies, with some, and with none."""
-    held = {id: [all(known["claims"][id].values()) for known in found.values()] for id in OF_WIDE}
-    return ([id for id in OF_WIDE if all(held[id])], [id for id in OF_WIDE if any(held[id]) and not all(held[id])],
-            [id for id in OF_WIDE if not any(held[id])])
+    ids = list(next(iter(found.values()))["claims"])
+    held = {id: [all(known["claims"][id].values()) for known in found.values()] for id in ids}
+    return ([id for id in ids if all(held[id])], [id for id in ids if any(held[id]) and not all(held[id])],
+            [id for id in ids if not any(held[id])])
 
 
 def moving(found: dict[str, dict]) -> list[tuple[str, str]]:
