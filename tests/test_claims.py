@@ -380,6 +380,8 @@ def test_bars_after_contact_are_listed(kept):
     """Those of every claim about wide, the widest first. Mutants: a claim left out; the whole width for its half."""
     found = after_contact.known(kept)
     assert {each.id for each in found} == set(after_contact.OF_WIDE) - {"C38"}
+    evaluate.register_all()
+    assert set(after_contact.OF_WIDE) == {id for id, one in claims.CLAIMS.items() if one.fine == levels.WIDE_FINE}
     assert [each.percent for each in found] == sorted((each.percent for each in found), reverse=True)
     check = {"low": 9.0, "high": 11.0, "value": 10.0}
     assert after_contact.percent(check) == 10.0 and after_contact.percent({**check, "value": 0.0}) == math.inf

@@ -167,7 +167,7 @@ def check_of(quantity, ours):
 
 def test_claims_with_other_supplies_are_told_apart():
     """Mutants: checks about base among them; one number of a kind for all; an instant in the name another number."""
-    findings = [{"C12": [0.0], "C16": [0.0, 2.0], "C25": [2.0]}, {"C12": [0.5], "C16": [0.0, 0.0], "C25": [3.0]}]
+    findings = [{"C12": [0.0], "C16": [2.0, 0.0], "C25": [2.0]}, {"C12": [0.5], "C16": [0.0, 0.0], "C25": [3.0]}]
     found = {}
     for supply, by_id in zip(("5", "10"), findings):
         held = {id: supplies.holding(claims.Finding((check_of("base, 19.2 h", 9.0), *(

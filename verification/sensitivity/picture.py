@@ -138,9 +138,9 @@ def _held(found: dict[str, dict]) -> list[str]:
     table = ["Numbers that hold with some supplies and not with all:", "",
              f"| claim | {' | '.join(f'{supply} K_s' for supply in found)} |", f"| --- |{' --- |' * len(found)}", *rows,
              ""]
-    return [f"Of the claims about this run, each judged anew to {supplies.AFTER} h after contact, with the converged "
-            f"solution at one size, these hold with all supplies: {every}; with some: {some}; with none: {none}.", "",
-            *(table if rows else [])]
+    return [f"Of the claims about this run, each judged anew with the converged solution at one size, to "
+            f"{supplies.AFTER} h after contact or until the aggregate reaches an end of the pore, these hold with all "
+            f"supplies: {every}; with some: {some}; with none: {none}.", "", *(table if rows else [])]
 
 
 def _after_contact(record: dict) -> list[str]:
