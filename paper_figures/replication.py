@@ -95,7 +95,7 @@ def _flips(claims: list[dict]) -> str:
 def _after_contact(claims: list[dict]) -> str:
     """How well numbers after contact are known."""
     means = [known for known in sensitivity.record()["after_contact"] if known["quantity"].startswith("mean")]
-    told = "; ".join(f"{known['quantity'].partition(' (')[0]} to {known['bar_percent']:.1g} % "
+    told = "; ".join(f"{known['quantity'].partition(' (')[0]} to {known['bar_percent']:.2g} % "
                      f"({known['asked_percent']:g} % asked)" for known in means)
     found = after_contact.known(claims)
     over = [each for each in found if each.percent > after_contact.WIDE_BAR]
