@@ -30,6 +30,8 @@ SUPPLIES, SIZE = (5.0, 10.0, 20.0, 40.0), 2**0.5
 END = 120.0
 #: Claims that are judged anew: C32 compares two ways to be born, not what Figure 6 shows.
 JUDGED = tuple(id for id in OF_WIDE if id != "C32")
+#: Hours before it reaches an end of the pore at which an aggregate is still clear of it.
+MARGIN = 0.1
 #: Whole hours that wide goes on after contact: 45 h for Figure 6's own 10 K_s.
 AFTER = 11
 #: Hours between outlines; um to which these are kept.
@@ -49,13 +51,13 @@ def of_contact(said) -> dict[str, float]:
 
 
 def reached(said, state: State) -> float:
-    """The time (h) to which a run goes on from a state: its end, or when the aggregate reaches an end of the pore."""
+    """The time (h) to which a run goes on from a state: its end, or MARGIN before the aggregate reaches the pore's."""
     time = state.pore.time
     try:
         for now, _ in simulation.steps(replace(said, output=replace(said.output, times=(said.growth.end,))), state):
             time = now.pore.time
     except PoreEnd:
-        return time - 1e-6
+        return time - MARGIN
     return said.growth.end
 
 
