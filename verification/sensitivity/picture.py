@@ -54,6 +54,7 @@ def of_supplies(found: dict[str, dict], target: Path) -> None:
         axes.set_aspect("equal")
         axes.set_title(f"{supply} K_s: every 5 h to {last:g} h; contact at {known['contact_time']:.1f} h", loc="left",
                        fontsize=10)
+    axes.set_xlabel("x (um); the fluid comes from the left")
     _saved(made, target)
 
 
