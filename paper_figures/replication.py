@@ -32,9 +32,11 @@ from verification.claims import (
     UNDECIDED,
     VERDICTS,
     WITHIN_ROUNDING,
+    after_contact,
 )
 from verification.claims import record as claims_record
 from verification.kernel.writing import markdown_row
+from verification.sensitivity.supplies import verdicts
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
@@ -59,11 +61,49 @@ def fields(known: dict) -> dict[str, Callable[[], str]]:
             "list.rounding": lambda: "\n".join(map(_within_rounding, _with(claims, WITHIN_ROUNDING))) or "None.",
             "list.changed": lambda: "\n".join(map(_changed, _with(claims, CHANGED))) or "None.",
             "list.contradicted": lambda: "\n".join(map(_contradicted, _with(claims, CONTRADICTED))) or "None.",
+            **_supplies(), "list.flips": lambda: _flips(claims), "after.contact": lambda: _after_contact(claims),
             "list.undecided": lambda: "\n".join(map(_undecided, _with(claims, UNDECIDED))) or "None.",
             "inputs.share": lambda: f"{100 * sensitivity.record()['one_set']['share_of_the_rounding']:.0f}",
             "table.values": lambda: "\n".join(map(_value, _printed(claims))),
             "table.figures": lambda: "\n".join(map(_figure, FIGURES)),
             "environment": lambda: _environment(known["environment"])}
+
+
+def _supplies() -> dict[str, Callable[[], str]]:
+    """What other supplies make of Figure 6."""
+    found = sensitivity.record()["supplies"]
+    supplies, times = list(map(float, found)), [known["contact_time"] for known in found.values()]
+    every, some, none = verdicts(found)
+    return {"supplies.range": lambda: f"{min(supplies):g} to {max(supplies):g}",
+            "supplies.contact": lambda: f"{max(times):.0f} to {min(times):.0f}",
+            "supplies.total": lambda: str(len(every + some + none)), "supplies.all": lambda: str(len(every)),
+            "supplies.some": lambda: str(len(some)), "supplies.none": lambda: str(len(none)),
+            "list.supplies": lambda: _which(every, some, none)}
+
+
+def _which(every: list[str], some: list[str], none: list[str]) -> str:
+    return "\n".join(f"- with {what}: {', '.join(ids) or 'none'}." for what, ids in
+                     (("all of these supplies", every), ("some", some), ("none, as with 10 K_s", none)))
+
+
+def _flips(claims: list[dict]) -> str:
+    """Verdicts that a bound moved by its bar changes."""
+    found = [(claim, flip) for claim in claims for flip in claims_record.flips(claim)]
+    return "\n".join(f"- **{flip.id}**, {flip.quantity}: {claim['verdict']}, and {flip.verdict} with a bound moved."
+                     for claim, flip in found) or "None."
+
+
+def _after_contact(claims: list[dict]) -> str:
+    """How well numbers after contact are known."""
+    means = [known for known in sensitivity.record()["after_contact"] if known["quantity"].startswith("mean")]
+    told = "; ".join(f"{known['quantity'].partition(' (')[0]} to {known['bar_percent']:.2g} % "
+                     f"({known['asked_percent']:g} % asked)" for known in means)
+    found = after_contact.known(claims)
+    over = [each for each in found if each.percent > after_contact.WIDE_BAR]
+    listed = "; ".join(f"{each.id}, {each.quantity}, {each.percent:.2g} %" for each in over)
+    return (f"After contact wide is known, from contact to its end: {told}. Of the {len(found)} numbers after contact "
+            f"that claims are judged by, the bars of {len(over)} exceed {after_contact.WIDE_BAR:g} % of the number: "
+            f"{listed}.")
 
 
 def _about() -> dict[str, Callable[[], str]]:

@@ -136,8 +136,7 @@ def test_a_pointer_is_told_values(window, runs):
 @pytest.mark.parametrize("width", [1200, 390])
 @pytest.mark.parametrize("name", ["fast", "paper", "wide"])
 def test_what_is_drawn_is_the_column_that_its_label_names(window, runs, name, width):
-    """The lines as the browser has them, measured by the ticks beside them; the table "Numbers" as a reader sees it.
-    Mutants: a line of another column; a tick beside another value; the row before the last in "Numbers"."""
+    """The lines as the browser has them, measured by the ticks beside them; the table "Numbers" as a reader sees it."""
     show(window, runs[name], width=width)
     series, book = (results.read_table(runs[name] / f"{kind}.csv") for kind in ("timeseries", "ledger"))
     hours = book["end_h"] - book["start_h"]
@@ -205,7 +204,6 @@ DRAWN = """(() => {
 
 @pytest.mark.parametrize("width", [1200, 390])
 def test_the_mouse_moves_every_control(window, runs, width):
-    """Mutants: a slider, a switch or a button that nothing listens to."""
     last = show(window, runs["fast"], "#field=theta", width=width)
     window.drag("#frame", 0.99, 0.01)
     assert picture(window)["frame"] == "0"
@@ -235,7 +233,7 @@ def test_the_mouse_moves_every_control(window, runs, width):
 
 
 def test_the_keyboard_alone_is_enough(window, runs):
-    """Tab comes to every control, which shows it; keys work it. Mutants: a control that is passed by; no outline."""
+    """Tab comes to every control, which shows it; keys work it."""
     show(window, runs["fast"])
     came = []
     active = "document.activeElement.id || document.activeElement.localName"
@@ -265,7 +263,7 @@ def test_the_keyboard_alone_is_enough(window, runs):
 
 
 def test_texts_of_the_colour_bar_keep_apart(window, runs):
-    """Of every field at every time, by where they are written. Mutant: a tick at each round value between the ends."""
+    """Of every field at every time, by where they are written."""
     show(window, runs["wide"], width=390)
     window.run("""(() => {
       const write = CanvasRenderingContext2D.prototype.fillText;
@@ -291,8 +289,7 @@ def test_texts_of_the_colour_bar_keep_apart(window, runs):
 
 @pytest.mark.parametrize("width", [1200, 390])
 def test_a_sweep_has_its_page(window, tmp_path, width):
-    """Nothing is cut off or asked for; the table is runs.csv, and its links are the runs. Mutants: a table as wide as
-    it likes; a link beside the run."""
+    """Nothing is cut off or asked for; the table is runs.csv, and its links are the runs."""
     out = tmp_path / "sweep"
     assert main(["sweep", "base", "--vary", "pore.width=30 um,50 um", "--vary", "aggregate.radius=4 um,5 um",
                  "--set", FAST, "--set", "growth.end=1 h", "--out", str(out), "--quiet"]) == 0

@@ -193,8 +193,7 @@ def test_steps_in_contact_and_none():
 
 
 def test_a_trial_takes_few_steps_however_short_they_are(monkeypatch):
-    """A tolerance that asks for thousands of steps does not make `repro check` slow. Mutant: all steps of three times
-    growth.time_step."""
+    """A tolerance that asks for thousands of steps does not make `repro check` slow."""
     made = []
 
     def counted(scene):

@@ -21,6 +21,7 @@ from verification.claims import (
     WITHIN_ROUNDING,
     ClaimError,
     Finding,
+    after_contact,
     evaluate,
     independence,
     levels,
@@ -228,6 +229,33 @@ def test_a_bound_moved_by_a_bar_flips_no_verdict_unnoticed(id, text, low, high, 
     assert outcomes == [HOLDS, REACHES_OVER, FAILS]
 
 
+def recorded_claim(low, high, bar, change="", rounding="", others=()):
+    """An entry of the record with one check, and the outcomes of others that no bound is moved of."""
+    checks = [(bar, (low, high), claims.outcome_of(bar, (low, high)))]
+    checks += [((None, None), (None, None), outcome) for outcome in others]
+    rows = [{"quantity": f"q{number}", "low": bar[0], "high": bar[1], "outcome": outcome,
+             "tolerance": {"low": bounds[0], "high": bounds[1]}}
+            for number, (bar, bounds, outcome) in enumerate(checks)]
+    verdict = claims.verdict_of({row["outcome"] for row in rows}, bool(change), bool(rounding))
+    return {"id": "C01", "verdict": verdict, "change": change, "rounding": rounding, "checks": rows}
+
+
+@pytest.mark.parametrize("bar, flipped", [
+    ((4.0, 6.0), []), ((0.5, 2.5), [UNDECIDED]), ((-0.5, 1.5), [REPRODUCED]),
+    ((-1.5, -0.5), [UNDECIDED]), ((-4.0, -3.0), []), ((1.0, 1.0), []), ((8.0, 9.9), [UNDECIDED])])
+def test_verdicts_that_a_bound_moved_by_its_bar_changes_are_listed(bar, flipped):
+    """Accepted is 0 to 10."""
+    assert [flip.verdict for flip in record.flips(recorded_claim(0.0, 10.0, bar))] == flipped
+
+
+def test_a_flip_is_that_of_the_whole_claim():
+    assert record.flips(recorded_claim(0.0, 10.0, (0.5, 2.5), others=[FAILS])) == []
+    within = recorded_claim(0.0, 10.0, (-2.5, -0.5), rounding="k 9.3", others=[HOLDS])
+    assert [flip.verdict for flip in record.flips(within)] == [UNDECIDED]
+    changed = recorded_claim(0.0, 10.0, (-0.5, 1.5), change="at saturation")
+    assert [flip.verdict for flip in record.flips(changed)] == [CHANGED]
+
+
 def test_the_whole_report_is_written_and_compared(registry, monkeypatch, tmp_path, capsys):
     for id in EXPECTED:
         registered(id, lambda: Finding((GOOD, claims.at_least("a", "|b|", 2, 1, ""))))
@@ -328,6 +356,27 @@ def test_the_recorded_verdicts_follow_from_the_recorded_numbers(kept):
         if outcomes == {HOLDS}:
             expected = CHANGED if each["change"] else REPRODUCED
         assert each["verdict"] == expected, each["id"]
+
+
+def test_no_recorded_verdict_flips_to_its_opposite(kept):
+    """With a bound moved by the bar of its number a verdict comes to be open at most, and no more than a tenth of them
+    does."""
+    verdicts = {each["id"]: each["verdict"] for each in kept}
+    found = [flip for each in kept for flip in record.flips(each)]
+    assert all(UNDECIDED in (flip.verdict, verdicts[flip.id]) for flip in found), found
+    assert len({flip.id for flip in found}) <= len(kept) // 10
+
+
+def test_bars_after_contact_are_listed(kept):
+    """Those of every claim about wide, the widest first."""
+    found = after_contact.known(kept)
+    assert {each.id for each in found} == set(after_contact.OF_WIDE) - {"C38"}
+    evaluate.register_all()
+    assert set(after_contact.OF_WIDE) == {id for id, one in claims.CLAIMS.items() if one.fine == levels.WIDE_FINE}
+    assert [each.percent for each in found] == sorted((each.percent for each in found), reverse=True)
+    check = {"low": 9.0, "high": 11.0, "value": 10.0}
+    assert after_contact.percent(check) == 10.0 and after_contact.percent({**check, "value": 0.0}) == math.inf
+    assert after_contact.percent({"low": 0.0, "high": 0.0, "value": 0.0}) == 0
 
 
 #: Claims about base whose numbers a test can compute in seconds.

@@ -45,7 +45,7 @@ def refers(entity, key):
 
 
 def test_every_file_is_told_as_it_is(made):
-    """And none that is not there. Mutants: a size of the checkout's file, a hash of another, a file left out."""
+    """And none that is not there."""
     told = {name: entity for name, entity in entities(made).items() if "File" in kinds(entity)}
     there = {path.relative_to(made).as_posix() for path in made.rglob("*") if path.is_file()} - {crate.METADATA}
     assert told.keys() == there and len(there) > 300
@@ -56,7 +56,7 @@ def test_every_file_is_told_as_it_is(made):
 
 
 def test_what_is_referred_to_is_told(made):
-    """Every reference, and every file from the root. Mutants: a folder without its files; a profile left out."""
+    """Every reference, and every file from the root."""
     found = entities(made)
     texts = [value for entity in found.values() for key, value in entity.items() if key != "@id"]
     pointed = {one["@id"] for value in texts for one in (value if isinstance(value, list) else [value])
@@ -71,8 +71,7 @@ def test_what_is_referred_to_is_told(made):
 
 
 def test_the_run_is_that_of_the_figures(made):
-    """Scenes and locks in, every picture out, by the workflow that is the crate's main entity. Mutants: a figure left
-    out; another instrument."""
+    """Scenes and locks in, every picture out, by the workflow that is the crate's main entity."""
     found = entities(made)
     assert refers(found["./"], "mainEntity") == refers(found["#figures"], "instrument") == [crate.WORKFLOW]
     used, drawn = refers(found["#figures"], "object"), refers(found["#figures"], "result")
@@ -83,7 +82,7 @@ def test_the_run_is_that_of_the_figures(made):
 
 
 def test_there_is_no_crate_without_figures_of_this_source(out, tmp_path, monkeypatch, capsys):
-    """One line, status 2, nothing written. Mutant: whatever pictures are there."""
+    """One line, status 2, nothing written."""
     monkeypatch.setattr(manifest, "OUT", tmp_path)
     assert crate.main() == 2 and list(tmp_path.iterdir()) == []
     assert "there are no figures; `make figures` makes them" in capsys.readouterr().err

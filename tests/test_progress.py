@@ -85,7 +85,7 @@ def test_a_long_step_is_not_silent(capsys, monkeypatch):
 
 
 def test_after_hours_no_step_is_silent_for_longer_than_two_seconds(capsys, monkeypatch):
-    """With the tick that looks for it. Mutant: silences that grow with the time since the start."""
+    """With the tick that looks for it."""
     assert progress.LONGEST + progress.TICK <= 2.0
     clock = iter(range(10_000))
     monkeypatch.setattr(progress, "monotonic", lambda: 0.01 * next(clock) + (3600.0 if ticks else 0.0))
@@ -148,7 +148,7 @@ def test_arguments_that_do_not_go_together_are_refused(capsys, arguments):
                                        ["sweep", "base", "--vary", "pore.width=40 um, 50 um", "--out", ""],
                                        ["compare", "a", "", "--out", "b.html"], ["compare", "a", "b", "--out", ""]])
 def test_an_empty_path_is_not_the_present_folder(tmp_path, monkeypatch, capsys, arguments):
-    """As of a shell's variable that is not set: the results would lie among what is there. Mutant: any path taken."""
+    """As of a shell's variable that is not set: the results would lie among what is there."""
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit) as refused:
         main(arguments)

@@ -305,7 +305,7 @@ def test_a_page_of_a_fine_mesh_is_small_and_true(tmp_path, monkeypatch, kind, co
 
 def test_a_page_of_many_rows_and_frames_is_small(fast, tmp_path, monkeypatch):
     """A thousand rows and steps of forty meshes that are shown as they are: 3 MB at most with its charts, which
-    take a third. Mutant: frames that leave no room for charts."""
+    take a third."""
     copy = shutil.copytree(fast, tmp_path / "run")
     digits = np.random.default_rng(0)
     for name, times in (("timeseries", ["time_h"]), ("ledger", ["start_h", "end_h"])):

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from repro.scene import load_scene
-from verification import sensitivity
+from verification import claims, sensitivity
+from verification.claims import runs
+from verification.claims.levels import at_level
 from verification.sensitivity import __main__ as driver
-from verification.sensitivity import elasticity, one_set, picture, sobol
+from verification.sensitivity import after_contact, elasticity, one_set, picture, sobol, supplies
 from verification.sensitivity.inputs import BY_NAME, EXACT, ROUNDED, changed, factors_of
 from verification.sensitivity.numbers import Runs, scene
 
@@ -138,6 +140,52 @@ def test_a_number_of_samples_is_a_power_of_two(samples, capsys):
     assert driver.main(["--sobol", samples]) == 2 and "a power of two" in capsys.readouterr().err
 
 
+def test_a_part_is_joined_to_the_record_that_is_there_at_its_end(tmp_path, monkeypatch):
+    path = tmp_path / "sensitivity.json"
+    monkeypatch.setattr(sensitivity, "RECORD", path)
+
+    def of_wide(runs):
+        path.write_text(json.dumps({"values": {"a": 1}, "elasticities": {"a": {}}, "one_set": {"reached": True}}))
+        return {"values": {"b": 2}, "elasticities": {"b": {}}}
+    monkeypatch.setitem(driver.PARTS, "wide", of_wide)
+    sensitivity.record.cache_clear()
+    made = driver.computed(None, "wide", 0)
+    sensitivity.record.cache_clear()
+    assert made["values"] == {"a": 1, "b": 2} and set(made["elasticities"]) == {"a", "b"}
+    assert made["one_set"] == {"reached": True} and made["rounding"]["k"] == BY_NAME["k"].rounding
+
+
+def check_of(quantity, ours):
+    return claims.at_most(quantity, "", ours, 1.0, "")
+
+
+def test_claims_with_other_supplies_are_told_apart():
+    findings = [{"C12": [0.0], "C16": [2.0, 0.0], "C25": [2.0]}, {"C12": [0.5], "C16": [0.0, 0.0], "C25": [3.0]}]
+    found = {}
+    for supply, by_id in zip(("5", "10"), findings):
+        held = {id: supplies.holding(claims.Finding((check_of("base, 19.2 h", 9.0), *(
+            check_of(f"wide, {supply} h: {number}", value) for number, value in enumerate(values)))))
+            for id, values in by_id.items()}
+        found[supply] = {"claims": held}
+    assert supplies.verdicts(found) == (["C12"], ["C16"], ["C25"])
+    assert supplies.moving(found) == [("C16", "wide, # h: #")]
+
+
+def test_a_level_changes_wide_alone():
+    with at_level(supplies.supplied(5.0, 59.0)):
+        base, wide = runs.scene("base"), runs.scene("wide")
+    assert base.substrates.acceptor.supply == 10.0 and wide.substrates.donor.supply == 5.0
+    assert wide.growth.end == 59.0 and wide.output.times[-1] == 59.0 and base.growth.end == pytest.approx(19.4)
+
+
+def test_a_number_after_contact_is_kept_where_its_bar_is_what_is_asked():
+    """Of second order, 0.125 % off on the finest size."""
+    values = [2.0 * (1 + 0.005 * size**2) for size in after_contact.SIZES]
+    told = after_contact.told("mean of x", values, 1.0)
+    assert 0.125 < told["bar_percent"] < 1.0 and told["kept"] and told["values"] == values
+    assert not after_contact.told("mean of x", values, 0.1)["kept"]
+
+
 @pytest.fixture(scope="module")
 def kept():
     return sensitivity.record()
@@ -155,9 +203,12 @@ def test_the_committed_record_is_whole(kept):
 def test_page_and_diagram_are_those_of_the_record(kept, tmp_path):
     page = sensitivity.RECORD.with_suffix(".md").read_text(encoding="utf-8")
     assert page == picture.page(kept)
-    for name in ("one.svg", "two.svg"):
-        picture.write(kept, tmp_path / name)
-    assert (tmp_path / "one.svg").read_bytes() == (tmp_path / "two.svg").read_bytes()
-    ElementTree.fromstring((tmp_path / "one.svg").read_text(encoding="utf-8"))
+    committed = picture.TARGET, picture.OUTLINES
+    for name in ("one", "two"):
+        picture.write(kept, tmp_path / f"{name}.svg", tmp_path / f"{name}-outlines.svg")
+    for kind, there in zip(("", "-outlines"), committed):
+        one, two = (tmp_path / f"{name}{kind}.svg" for name in ("one", "two"))
+        assert one.read_bytes() == two.read_bytes() == there.read_bytes()
+        ElementTree.fromstring(one.read_text(encoding="utf-8"))
     largest = picture.reaches(kept, "effluent_acceptor")
     assert np.all(np.diff([abs(value) for _, value in largest]) <= 0)

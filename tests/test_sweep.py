@@ -330,7 +330,6 @@ def test_sigterm_ends_a_sweep_quietly(tmp_path):
 
 @pytest.mark.parametrize("asked, started", [(None, 2), (400, 2), (1, 1)])
 def test_there_are_no_more_processes_than_runs(tmp_path, monkeypatch, asked, started):
-    """Mutant: as many as are asked for, each of which loads everything."""
     seen = []
 
     @contextmanager

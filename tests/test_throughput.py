@@ -35,7 +35,7 @@ def test_a_command_that_costs_too_much_is_told(monkeypatch, capsys, slow, status
 
 def test_every_run_is_made(monkeypatch, tmp_path):
     """Those before, after and beside the sweep too, each in a folder of its own: a run that is there is not made again.
-    Mutants: the same folders after the sweep as before it; for the loop's first run and the others."""
+    """
     made = []
     monkeypatch.setattr(throughput, "run", lambda scene, folder: made.append(folder))
     monkeypatch.setattr(throughput, "swept", lambda preset, count, folder: (1.0, 1.0))

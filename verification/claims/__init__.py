@@ -66,6 +66,22 @@ def interval(text: str) -> tuple[float, float] | None:
     return value - half, value + half
 
 
+def outcome_of(bar: tuple[float, float], bounds: tuple[float, float]) -> str:
+    """HOLDS or FAILS with the whole bar between the bounds, or REACHES_OVER."""
+    (first, last), (low, high) = bar, bounds
+    return HOLDS if low <= first and last <= high else FAILS if last < low or high < first else REACHES_OVER
+
+
+def verdict_of(outcomes: set[str], changed: bool, rounding: bool) -> str:
+    """What follows from the outcomes of all checks; changed: was something, against the paper? rounding: does one set
+    of inputs within it give all printed numbers?"""
+    if outcomes == {HOLDS}:
+        return CHANGED if changed else REPRODUCED
+    if FAILS not in outcomes:
+        return UNDECIDED
+    return WITHIN_ROUNDING if rounding else CONTRADICTED
+
+
 @dataclass(frozen=True)
 class PaperCheck(Check):
     """A check of a number against the paper's, whatever its bar.
@@ -98,11 +114,9 @@ class PaperCheck(Check):
             raise ClaimError(f"{self.quantity}: not a number")
         if self.bar is None:
             raise ClaimError(f"{self.quantity}: no error bar")
-        inside, outside = all(self.held), not any(self.held)
         if self.converges:
-            inside = self.low <= self.bar.low and self.bar.high <= self.high
-            outside = self.bar.high < self.low or self.high < self.bar.low
-        return HOLDS if inside else FAILS if outside else REACHES_OVER
+            return outcome_of((self.bar.low, self.bar.high), (self.low, self.high))
+        return HOLDS if all(self.held) else FAILS if not any(self.held) else REACHES_OVER
 
 
 Words = str | Callable[[], str]
@@ -130,13 +144,9 @@ class Finding:
         if not self.checks:
             raise ClaimError("nothing is checked")
         outcomes = {check.outcome for check in self.checks}
-        if outcomes == {HOLDS}:
-            return CHANGED if self.change else REPRODUCED
-        if not self.reason:
+        if outcomes != {HOLDS} and not self.reason:
             raise ClaimError("a check does not hold and no reason is given: " + self._failed())
-        if FAILS not in outcomes:
-            return UNDECIDED
-        return WITHIN_ROUNDING if self.rounding else CONTRADICTED
+        return verdict_of(outcomes, bool(self.change), bool(self.rounding))
 
     def told(self) -> Finding:
         """The same, with all words worked out."""

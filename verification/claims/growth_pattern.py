@@ -13,7 +13,7 @@ from verification.claims.levels import WIDE_FINE
 from verification.claims.restored import Body, bodies, body, polygon, solved_pore
 from verification.claims.runs import BASE, WIDE, around_contact, at, grown, scene
 
-PLOTTED, END, LATE = 19.2, 19.4, 40.0
+PLOTTED, END, LAST_HOURS = 19.2, 19.4, 5.0
 
 
 def growth_rates(now: Pore, solved: Solved) -> np.ndarray:
@@ -91,7 +91,7 @@ def upgradient_only() -> Finding:
     last, end = bodies(WIDE)[-1], float(bodies(WIDE)[-1].pore.time)
     contact = float(around_contact(*WIDE)["time_h"][1])
     spanned = next(each for each in bodies(WIDE) if each.pore.time >= contact)
-    late, since = (upgradient_share(first, last) for first in (body(WIDE, LATE), spanned))
+    late, since = (upgradient_share(first, last) for first in (body(WIDE, end - LAST_HOURS), spanned))
     up, down = made(last, growth_rates(*solved_pore(WIDE, end)))
     bound = "95 %, set beforehand"
     checks = (at_least("new area upgradient, last 5 h (%)", "only upgradient", 100 * late, 95, bound),

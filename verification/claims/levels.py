@@ -35,11 +35,13 @@ PRESET = "accurate"
 
 @dataclass(frozen=True)
 class Level:
-    """kind: CONVERGED or SCHEME; sizes of elements, and of steps between shape updates, over those of the preset."""
+    """kind: CONVERGED or SCHEME; size of elements, and of steps between shape updates, over those of the preset; wide:
+    KEY=VALUE by which the scene wide differs from that of Figure 6."""
 
     kind: str = SCHEME
     size: float = 1.0
     step: float = 1.0
+    wide: tuple[str, ...] = ()
 
 
 def converged(size: float) -> tuple[str, ...]:

@@ -9,11 +9,12 @@ paper's scheme gives on three meshes, for a claim about the scheme that of all i
 from __future__ import annotations
 
 import json
-from math import isfinite
+from dataclasses import dataclass
+from math import inf, isfinite
 from pathlib import Path
 
 from verification import sensitivity
-from verification.claims import OF_SCHEME, PaperCheck
+from verification.claims import OF_SCHEME, PaperCheck, outcome_of, verdict_of
 from verification.claims.bars import unnumbered
 from verification.claims.report import Row
 
@@ -91,3 +92,41 @@ def inside(value: float | None, low: float | None, high: float | None) -> bool:
         return value is None and (low is None or high is None)
     near = LAST_DIGITS * max(abs(low), abs(high)) + ROUND_OFF
     return low - near <= value <= high + near
+
+
+@dataclass(frozen=True)
+class Flip:
+    """A recorded verdict that is another one with a bound moved by the bar of its number.
+
+    id: the claim; quantity: of the check; verdict: with the moved bound.
+    """
+
+    id: str
+    quantity: str
+    verdict: str
+
+
+def flips(entry: dict) -> list[Flip]:
+    """What moving one bound by half the width of its number's bar, to either side, makes of a recorded claim; each
+    check and verdict once."""
+    found = [Flip(entry["id"], check["quantity"], _verdict_with(entry, number, bounds))
+             for number, check in enumerate(entry["checks"]) for bounds in _moved(check)]
+    return [flip for flip in dict.fromkeys(found) if flip.verdict != entry["verdict"]]
+
+
+def _moved(check: dict) -> list[tuple[float, float]]:
+    """The bounds of a check, one of them moved by the bar; none where that has no end."""
+    if check["low"] is None or check["high"] is None:
+        return []
+    low, high = (-inf if check["tolerance"]["low"] is None else check["tolerance"]["low"],
+                 inf if check["tolerance"]["high"] is None else check["tolerance"]["high"])
+    half = 0.5 * (check["high"] - check["low"])
+    return [(low - half, high), (low + half, high), (low, high - half), (low, high + half)]
+
+
+def _verdict_with(entry: dict, number: int, bounds: tuple[float, float]) -> str:
+    """The verdict with other bounds of one check."""
+    outcomes = [check["outcome"] for check in entry["checks"]]
+    moved = entry["checks"][number]
+    outcomes[number] = outcome_of((moved["low"], moved["high"]), bounds)
+    return verdict_of(set(outcomes), bool(entry["change"]), bool(entry["rounding"]))

@@ -27,7 +27,7 @@ LAST = 'output.times=["19.2 h", "19.4 h"]'
 #: Section 4, where only the last two shapes are asked for.
 PLATES = (*BASE, LAST)
 #: Hours of the rows of a packaged scene.
-ROWS = {"base": (0.2, *map(float, range(1, 20)), 19.2, 19.4), "wide": tuple(map(float, range(1, 46)))}
+ROWS = {"base": (0.2, *map(float, range(1, 20)), 19.2, 19.4), "wide": tuple(map(float, range(1, 121)))}
 #: How long (h) before contact the last shape with a film is looked at: 18 s.
 FILM = 0.005
 #: A shape update (h), whatever the level.
@@ -37,6 +37,7 @@ UPDATE = 0.2
 def scene(name: str, *changes: str) -> Scene:
     """A packaged scene with the KEY=VALUE of --set, in the elements and steps of the present level."""
     level = current()
+    changes = (*level.wide, *changes) if name == "wide" else changes
     if level.kind == CONVERGED:
         return _with_rows(load_scene(name, (*converged(level.size), *changes)), always=True)
     said = load_scene(name, changes)

@@ -6,17 +6,21 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import matplotlib
+import numpy as np
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from verification.kernel.writing import Block, markdown, table
+from verification.sensitivity import supplies
 from verification.sensitivity.inputs import INPUTS, ROUNDED
 
-TARGET = Path(__file__).parent / "tornado.svg"
+TARGET, OUTLINES = (Path(__file__).parent / name for name in ("tornado.svg", "supplies.svg"))
 NAMES = {"velocity_0": "mean velocity, t = 0", "velocity": "mean velocity, 19.2 h",
          "effluent_acceptor": "effluent acceptor, 19.4 h", "effluent_donor": "effluent donor, 19.4 h",
          "contact_time": "time of contact (wide)", "conductivity_after": "conductivity 4 h after contact (wide)"}
 UP, DOWN = "#D55E00", "#0072B2"
+#: Width of wide (um).
+WIDTH = 100.0
 
 
 def reaches(record: dict, number: str) -> list[tuple[str, float]]:
@@ -26,7 +30,42 @@ def reaches(record: dict, number: str) -> list[tuple[str, float]]:
     return sorted(found, key=lambda pair: -abs(pair[1]))
 
 
-def write(record: dict, target: Path = TARGET) -> None:
+def write(record: dict, target: Path = TARGET, outlines: Path = OUTLINES) -> None:
+    """Both pictures, the second where the record tells of supplies."""
+    tornado(record, target)
+    if record.get("supplies"):
+        of_supplies(record["supplies"], outlines)
+
+
+def _saved(made: Figure, target: Path) -> None:
+    """The same bytes for the same record."""
+    with matplotlib.rc_context({"svg.hashsalt": "sensitivity", "svg.fonttype": "none"}):
+        made.savefig(target, format="svg", metadata={"Date": None, "Creator": None})
+
+
+def of_supplies(found: dict[str, dict], target: Path) -> None:
+    """Outlines of wide every 5 h, a supply a row, the latest at the back."""
+    made = Figure(figsize=(9, 1.7 * len(found)), layout="constrained")
+    FigureCanvasSVG(made)
+    for axes, (supply, known) in zip(made.subplots(len(found), 1, sharex=True, squeeze=False).ravel(), found.items()):
+        shown = [(float(time), _places(text)) for time, text in known["outlines"].items()]
+        last = max(time for time, _ in shown)
+        for time, places in reversed(shown):
+            axes.fill(*places.T, facecolor=matplotlib.colormaps["viridis_r"](time / last), edgecolor="white")
+        axes.set_ylim(0, WIDTH)
+        axes.set_aspect("equal")
+        axes.set_title(f"{supply} K_s: every 5 h to {last:g} h; contact at {known['contact_time']:.1f} h", loc="left",
+                       fontsize=10)
+    axes.set_xlabel("x (um); the fluid comes from the left")
+    _saved(made, target)
+
+
+def _places(text: str) -> np.ndarray:
+    """(M, 2) um."""
+    return np.array([[float(value) for value in pair.split(",")] for pair in text.split()])
+
+
+def tornado(record: dict, target: Path) -> None:
     """The diagram: of each number the inputs in their order, an input's printed digit up and down."""
     shown = [name for name in NAMES if name in record["elasticities"]]
     made = Figure(figsize=(9, 2.6 * ((len(shown) + 1) // 2)), layout="constrained")
@@ -39,8 +78,7 @@ def write(record: dict, target: Path = TARGET) -> None:
         axes.set_title(NAMES[number], loc="left", fontsize=10)
         axes.set_xlabel("change (%)")
     made.suptitle("Half a unit of the last printed digit of an input: upwards (orange), downwards (blue)", fontsize=10)
-    with matplotlib.rc_context({"svg.hashsalt": "sensitivity", "svg.fonttype": "none"}):
-        made.savefig(target, format="svg", metadata={"Date": None, "Creator": None})
+    _saved(made, target)
 
 
 def page(record: dict) -> str:
@@ -48,7 +86,7 @@ def page(record: dict) -> str:
     words = ("Elasticities d ln(number) / d ln(input), by central differences of the converged solution; ± is their "
              "bar, and one that exceeds a tenth of the value is *not resolved*. `make sensitivity` writes this page.")
     blocks = [Block("text", words), Block("text", f"![Tornado diagram]({TARGET.name})"), _table(record),
-              *_set(record), *_supplies(record), *_sobol(record)]
+              *_set(record), *_after_contact(record), *_supplies(record), *_sobol(record)]
     return f"# What the inputs of Table 1 allow\n\n{markdown(blocks, 2)}\n\n"
 
 
@@ -90,16 +128,45 @@ def _supplies(record: dict) -> Iterator[Block]:
     yield table(("supply of both (K_s)", "contact (h)", "ends at contact (um)", "least acceptor then (K_s)"), (
         (supply, f"{known['contact_time']:.1f}", f"{known['upstream']:.0f} to {known['downstream']:.0f}",
          f"{known['acceptor_min']:.2g}") for supply, known in found.items()))
+    yield Block("text", f"![Outlines with each supply]({OUTLINES.name})")
+    yield from _held(found)
+
+
+def _held(found: dict[str, dict]) -> Iterator[Block]:
+    """Which claims about wide hold with which supplies."""
+    every, some, none = (", ".join(ids) or "none" for ids in supplies.verdicts(found))
+    yield Block("text", "Of the claims about this run, each judged anew with the converged solution at one size, to "
+                f"{supplies.AFTER} h after contact or until the aggregate reaches an end of the pore, these hold with "
+                f"all supplies: {every}; with some: {some}; with none: {none}.")
+    rows = [(f"{id}, {quantity}", *("yes" if known["claims"][id].get(quantity) else "no" for known in found.values()))
+            for id, quantity in supplies.moving(found)]
+    if rows:
+        yield Block("text", "Numbers that hold with some supplies and not with all:")
+        yield table(("claim", *(f"{supply} K_s" for supply in found)), rows)
+
+
+def _after_contact(record: dict) -> Iterator[Block]:
+    found = record.get("after_contact")
+    if not found:
+        return
+    yield Block("heading", "How well wide is known after contact")
+    yield Block("text", "Values from the finest size to the coarsest; means are over whole hours from contact to 45 h. "
+                "A single row jumps as one more edge of the outline comes to rest on the wall.")
+    yield table(("number", "values", "bar (%)", "asked (%)", "kept"), (
+        (known["quantity"], ", ".join(f"{value:.4g}" for value in known["values"]), f"{known['bar_percent']:.2g}",
+         f"{known['asked_percent']:g}", "yes" if known["kept"] else "no") for known in found))
 
 
 def _sobol(record: dict) -> Iterator[Block]:
     found = record.get("sobol")
     if not found:
         return
+    widest = max(0.5 * (high - low) for known in found["numbers"].values() for _, low, high in known["total_order"])
     yield Block("heading", "Sobol indices of base")
     yield Block("text", f"Total indices of {found['samples']} samples in `fast`, with intervals of "
-                        f"{100 * found['confidence']:.0f} %: the share of a number's variance within the rounding that "
-                        "goes with an input.")
+                f"{100 * found['confidence']:.0f} %: the share of a number's variance within the rounding that goes "
+                f"with an input. The widest of the intervals is {widest:.2f} to either side; more samples "
+                "(`--sobol N`) narrow them as the root of their number.")
     yield table(("number", *found["inputs"]), (
         (NAMES.get(name, name), *(f"{value:.2f} ({low:.2f} to {high:.2f})" for value, low, high in
                                   known["total_order"])) for name, known in found["numbers"].items()))

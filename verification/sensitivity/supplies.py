@@ -1,36 +1,122 @@
-"""Figure 6 rests on a supply that the paper does not print: when wide makes contact with 5 to 40 K_s of both."""
+"""Figure 6 rests on a supply that the paper does not print: what 5 to 40 K_s of both make of it.
+
+For each supply: when contact comes, outlines every 5 h until as long after contact as Figure 6 goes on, or until the
+aggregate reaches an end of the pore, and which of the claims about wide hold then. Those are the functions of
+`verification.claims` themselves, with the converged solution at one size, so that a number has no bar here; a claim
+holds where all of its checks about wide do.
+"""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from math import floor
+
+import numpy as np
+import shapely
 
 from repro.march import simulation
-from verification.claims.levels import converged
+from repro.march.loop import PoreEnd, State
+from verification.claims import CLAIMS, Finding, evaluate
+from verification.claims.after_contact import OF_WIDE
+from verification.claims.bars import unnumbered
+from verification.claims.levels import CONVERGED, Level, at_level, converged, forget
+from verification.claims.restored import bodies, polygon
+from verification.claims.runs import WIDE, series
 from verification.sensitivity.numbers import OF, Runs, scene
 
 #: Supplies over K_s, and the size of the converged solution's elements and steps.
 SUPPLIES, SIZE = (5.0, 10.0, 20.0, 40.0), 2**0.5
 #: Hours by which all of them have made contact.
 END = 120.0
+#: Claims that are judged anew: C32 compares two ways to be born, not what Figure 6 shows.
+JUDGED = tuple(id for id in OF_WIDE if id != "C32")
+#: Hours before it reaches an end of the pore at which an aggregate is still clear of it.
+MARGIN = 0.1
+#: Whole hours that wide goes on after contact: 45 h for Figure 6's own 10 K_s.
+AFTER = 11
+#: Hours between outlines; um to which these are kept.
+EVERY, FINE = 5, 0.1
 
 
 def of_contact(said) -> dict[str, float]:
-    """Time of contact (h), the state's ends (um) and the smallest acceptor in it (K_s)."""
+    """Time of contact (h), the state's ends (um), the smallest acceptor in it (K_s), and the whole hour, AFTER contact
+    at the latest, that a run comes to before the aggregate reaches an end of the pore."""
     said = replace(said, output=replace(said.output, times=(END,)), growth=replace(said.growth, end=END))
     state = next(state for state, _ in simulation.steps(said) if state.pore.contact)
+    last = float(floor(state.pore.time) + AFTER)
     outline, acceptor = state.pore.boundary, state.pore.concentrations.acceptor
     return {"contact_time": state.pore.time, "upstream": outline.upstream, "downstream": outline.downstream,
-            "acceptor_min": float(acceptor.min()) / said.substrates.acceptor.half_saturation}
+            "acceptor_min": float(acceptor.min()) / said.substrates.acceptor.half_saturation,
+            "end": float(floor(reached(replace(said, growth=replace(said.growth, end=last)), state)))}
+
+
+def reached(said, state: State) -> float:
+    """The time (h) to which a run goes on from a state: its end, or MARGIN before the aggregate reaches the pore's."""
+    time = state.pore.time
+    try:
+        for now, _ in simulation.steps(replace(said, output=replace(said.output, times=(said.growth.end,))), state):
+            time = now.pore.time
+    except PoreEnd:
+        return time - MARGIN
+    return said.growth.end
 
 
 OF["contact"] = of_contact
 
 
-def contacts(runs: Runs) -> dict[str, dict[str, float]]:
-    """What `of_contact` tells, by the supply over K_s."""
-    found = {}
-    for supply in SUPPLIES:
-        factors = {"supply of acceptor": supply / 10, "supply of donor": supply / 10}
-        said = replace(scene("wide", factors, *converged(SIZE)), name="contact")
-        found[f"{supply:g}"] = runs.numbers(said)
+def contacts(runs: Runs) -> dict[str, dict]:
+    """By the supply over K_s: what `of_contact` tells, outlines, and which claims about wide hold."""
+    evaluate.register_all()
+    return {f"{supply:g}": _of_supply(runs, supply) for supply in SUPPLIES}
+
+
+def _of_supply(runs: Runs, supply: float) -> dict:
+    print(f"wide: a supply of {supply:g} K_s", flush=True)
+    factors = {"supply of acceptor": supply / 10, "supply of donor": supply / 10}
+    contact = runs.numbers(replace(scene("wide", factors, *converged(SIZE)), name="contact"))
+    level = supplied(supply, contact["end"])
+    with at_level(level), np.errstate(all="raise", under="ignore"):
+        found = {**contact, "outlines": _outlines(), "claims": {id: holding(CLAIMS[id].function()) for id in JUDGED}}
+    forget(level)
     return found
+
+
+def supplied(supply: float, end: float) -> Level:
+    """The level at which wide has a supply (K_s) and an end (h)."""
+    changes = [f'substrates.{name}.supply="{supply:g} mg/L"' for name in ("acceptor", "donor")]
+    return Level(CONVERGED, SIZE, wide=(*changes, f'growth.end="{end:g} h"'))
+
+
+def holding(finding: Finding) -> dict[str, bool]:
+    """Whether each check holds that is not about base, by its quantity without numbers, whose instants differ."""
+    found: dict[str, bool] = {}
+    for check in finding.checks:
+        name = unnumbered(check.quantity)
+        if not name.startswith("base"):
+            found[name] = check.holds and found.get(name, True)
+    return found
+
+
+def _outlines() -> dict[str, str]:
+    """Outlines by their hour: places "x,y x,y ..." to FINE (um), without those that lie on a straight line."""
+    return {f"{time:g}": " ".join(f"{x:.1f},{y:.1f}" for x, y in _places(found))
+            for time, found in zip(series(*WIDE)["time_h"], bodies(WIDE)) if time % EVERY == 0}
+
+
+def _places(found) -> np.ndarray:
+    return shapely.get_coordinates(shapely.simplify(polygon(found.outline), FINE))
+
+
+def verdicts(found: dict[str, dict]) -> tuple[list[str], list[str], list[str]]:
+    """Claims that hold with all supplies, with some, and with none."""
+    ids = list(next(iter(found.values()))["claims"])
+    held = {id: [all(known["claims"][id].values()) for known in found.values()] for id in ids}
+    return ([id for id in ids if all(held[id])], [id for id in ids if any(held[id]) and not all(held[id])],
+            [id for id in ids if not any(held[id])])
+
+
+def moving(found: dict[str, dict]) -> list[tuple[str, str]]:
+    """(claim, quantity) of the checks that hold with some supplies and not with all."""
+    first = next(iter(found.values()))["claims"]
+    return [(id, name) for id, held in first.items() for name in held
+            if len({known["claims"][id][name] for known in found.values()}) > 1]
