@@ -87,11 +87,13 @@ def _at_rest(scene: Scene, grown: Pore, theta: np.ndarray, start: Pore,
 
 def _strained_from(keys: Growth, grown: Pore, theta: np.ndarray) -> tuple[growth.Body, np.ndarray]:
     """The configuration from which strain counts, that of t = 0 or the present one (section 5), and
-    the expansion since then."""
+    the expansion since then: over J, so that what the constraint has left of J - theta is worked
+    off, and the area does not drift away from the mass."""
     if keys.new_biomass == "stressed":
         return grown.body, theta
-    present = replace(grown.body, reference=grown.mesh.points[grown.mesh.body])
-    return present, theta / grown.theta
+    position = grown.mesh.points[grown.mesh.body]
+    present = replace(grown.body, reference=position)
+    return present, theta / grown.body.strained(position).J
 
 
 def _placed(grown: Pore, found: Pore, rest: growth.Equilibrium) -> Pore:
