@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from repro import results
+from repro.fem import sizing
 from repro.fem.outline import TOP
 from repro.march import midpoint, simulation
 from repro.model import pore, remeshing
@@ -87,6 +88,22 @@ def test_density_is_kept(contact):
         assert bounds[0] < least <= largest < bounds[1]
     shares = [instant.pore.composition(1.0)[0] for instant in found]
     assert (np.diff(shares) > 0).all() and 0 < shares[-1] < 0.1
+
+
+@pytest.mark.parametrize("across", [0.0, 8.0])
+def test_elements_beside_contact_lines_are_as_small_as_asked(across):
+    """The edges beside the upper contact lines of a new mesh, against the least film over their number; without, as
+    large as elsewhere."""
+    made = scene("17.9 um", "20 um", velocity="2.9 m/day", growth={"end": "0.4 h"},
+                 numerics={**elements(2), "contact_elements": across})
+    film = made.growth.minimum_film
+    last = next(instant.pore for instant in reversed(run(made)) if instant.remeshes)
+    outline = last.outline.corners
+    top = outline.wall == TOP
+    beside = np.flatnonzero(outline.interface_edges() & (top | np.roll(top, -1)))
+    assert len(beside) == 2
+    sizes = outline.edge_lengths()[beside]
+    assert (sizes <= sizing.SPLIT * 1.35 * (film / 8 + sizing.GRADATION * sizes)).all() == (across == 8)
 
 
 def test_contact_is_made_and_kept(contact):
@@ -204,6 +221,7 @@ def test_presets_say_what_they_are():
     exact = numerics(preset="exact")
     assert (exact.elements, exact.time) == ("quadratic", "midpoint") and exact.refinement > accurate.refinement
     assert 3 * exact.tolerance < accurate.tolerance
+    assert [numerics(preset=name).contact_elements for name in PRESETS] == [0, 0, 2, 0]
 
 
 def test_what_is_written_wins_over_the_preset():

@@ -6,6 +6,7 @@ Lengths in um.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,7 +31,8 @@ class Sizing:
     width: of the pore (um); refinement: what sizes are divided by; film: the thinnest that is
     resolved (um); gradation: growth of the size with the distance from where it is prescribed;
     front: what sizes at the aggregate are divided by besides, for a front of the substrates in it;
-    seed: x (um) of the middle of the half-disc that the aggregate was at t = 0, None if it was
+    contact: the size beside the contact lines with the opposite wall (um), infinite if that is none
+    of its own; seed: x (um) of the middle of the half-disc that the aggregate was at t = 0, None if it was
     none.
     """
 
@@ -39,6 +41,7 @@ class Sizing:
     film: float
     gradation: float = GRADATION
     front: float = 1.0
+    contact: float = inf
     seed: float | None = None
 
     @property
@@ -74,12 +77,23 @@ def extent_too_short(outline: Outline, ends: tuple[float, float], width: float,
 def interface_sizes(outline: Outline, sizing: Sizing) -> np.ndarray:
     """(M,) wanted element size (um) at each node of the outline.
 
-    A tenth of the aggregate's thickness, a fourteenth of the pore's width, and for free nodes the
-    film's size.
+    A tenth of the aggregate's thickness, a fourteenth of the pore's width, for free nodes the
+    film's size, and what is asked for beside the contact lines with the opposite wall.
     """
     across = min(outline.thickness / ACROSS_AGGREGATE / sizing.refinement, sizing.largest)
     size = np.full(len(outline.points), across / sizing.front)
+    size = np.minimum(size, _contact_sizes(outline, sizing))
     return np.where(outline.wall == FREE, np.minimum(size, film_sizes(outline, sizing)), size)
+
+
+def _contact_sizes(outline: Outline, sizing: Sizing) -> np.ndarray | float:
+    """(M,) um, growing from that of the contact lines with the opposite wall; infinite without."""
+    top = outline.wall == TOP
+    if sizing.contact == inf or not top.any():
+        return inf
+    lines = outline.points[top & ~(np.roll(top, 1) & np.roll(top, -1))]
+    distance = np.linalg.norm(outline.points[:, None] - lines, axis=2).min(axis=1)
+    return sizing.contact + GRADATION * distance
 
 
 def too_coarse(outline: Outline, sizing: Sizing) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import inf
 
 import numpy as np
 
@@ -143,8 +144,10 @@ def sized(scene: Scene, front: float = 1.0) -> Sizing:
     """How large the elements of its meshes are to be; front: as :class:`Pore`'s."""
     seed = scene.aggregate
     middle = seed.position if seed and seed.outline is None else None
-    return Sizing(scene.pore.width, resolution(scene), film(scene), scene.numerics.gradation, front,
-                  middle)
+    least = film(scene)
+    across = scene.numerics.contact_elements
+    return Sizing(scene.pore.width, resolution(scene), least, scene.numerics.gradation, front,
+                  least / across if across else inf, middle)
 
 
 def generate(scene: Scene, outline: Outline | None,

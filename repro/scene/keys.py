@@ -30,6 +30,7 @@ from repro.scene.units import (
     NON_NEGATIVE,
     POSITIVE_FRACTION,
     UP_TO_1,
+    UP_TO_10,
     UP_TO_20,
     SceneError,
     choice,
@@ -319,6 +320,10 @@ class Numerics:
     gradation: float = number(
         0.25, FRACTION, source="3.1 [E13]",
         about="Growth of element sizes with distance from the aggregate; 0: one size everywhere")
+    contact_elements: float = number(
+        0.0, UP_TO_10, source=OURS,
+        about="Elements to growth.minimum_film beside the contact lines with the opposite wall; "
+              "0: as large as elsewhere on the interface")
     jacobian: str = choice(
         "fresh", "reused", source=OURS,
         about="Newton's derivative: of every iterate, or one while it does enough")
@@ -350,7 +355,7 @@ PRESETS: dict[str, dict[str, str | float]] = {
     "accurate": {"elements": "quadratic", "time": "midpoint", "refinement": 0.45,
                  "tolerance": 0.001, "jacobian": "reused"},
     "exact": {"elements": "quadratic", "time": "midpoint", "refinement": 0.7, "tolerance": 0.00025,
-              "jacobian": "reused"},
+              "contact_elements": 2.0, "jacobian": "reused"},
     "paper": {},
 }
 
@@ -433,6 +438,7 @@ class Scene:
 LATER: dict[str, dict[str, object]] = {
     "aggregate": {"position": "0.0 um", "smooth": False, "inert_fraction": 0.0},
     "flow": {"interpolation": "steps", "biomass": "viscous"},
+    "numerics": {"contact_elements": 0.0},
     "substrates.acceptor": {"interpolation": "steps"},
     "substrates.donor": {"interpolation": "steps"},
 }
