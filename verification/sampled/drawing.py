@@ -1,9 +1,9 @@
 """The sample: mutants drawn from all that cosmic-ray's operators can make of ``repro/``, spread over modules by size.
 
 A module gives as many as it has statements, in proportion, and one at least. Of a module, places are drawn first (an
-operator, a number, a condition, a loop) and then one change of each: eleven ways to replace a "+" are not eleven chances.
-What is drawn follows from the seed and from the text of a line alone, so that a change of the code elsewhere leaves a
-mutant as it is.
+operator, a number, a condition, a loop) and then one change of each: the ways to replace a "+" are not so many chances.
+What is drawn follows from the seed and from the text of a line and its neighbours alone, so that a change of the code
+elsewhere leaves a mutant as it is.
 
 Left out is what no test can tell or every test does: annotations, imports for types, and changes that leave no value at
 all ("a @ b" to "a >> b"), which would only make the share that is caught look better. Docstrings, ``__all__`` and the
@@ -15,7 +15,6 @@ from __future__ import annotations
 import ast
 import hashlib
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path

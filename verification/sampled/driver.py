@@ -32,8 +32,8 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m verification.sampled",
-                                     description="Mutants made by machine, drawn from all of repro/, against the tests.")
+    about = "Mutants made by machine, a sample of them from all of repro/, against the tests that reach them."
+    parser = argparse.ArgumentParser(prog="python -m verification.sampled", description=about)
     parser.add_argument("--whole", action="store_true",
                         help=f"survivors against all tests that reach them too, for {HOURS:g} h at most")
     parser.add_argument("--reach", action="store_true", help="measure anew which tests reach what")

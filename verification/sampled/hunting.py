@@ -100,8 +100,8 @@ def _write(row: Row) -> None:
     LIVE.mkdir(parents=True, exist_ok=True)
     with KEPT.open("a", encoding="utf-8") as file:
         file.write(json.dumps(asdict(row)) + "\n")
-    print(f"{row.verdict:9} {row.file}:{row.line} {row.new!r}  {row.test} {row.tried}/{row.reached} {row.seconds:.0f} s",
-          flush=True)
+    counted = f"{row.tried} of {row.reached} tests, {row.seconds:.0f} s"
+    print(f"{row.verdict:9} {row.file}:{row.line} {row.new!r} {row.test} ({counted})", flush=True)
 
 
 def tried(mutant: Mutant, there: Path, reach: Reach, limit: float = LIMIT) -> Row:
@@ -138,7 +138,7 @@ _PASSED: set[str] = set()
 
 
 def _passes(test: str, there: Path) -> bool:
-    """Does a test pass without the mutant, in the same place? An import that fails is no test, and stands for itself."""
+    """Does a test pass without the mutant, in the same place? An import that fails stands for itself."""
     if "::" not in test or test in _PASSED:
         return True
     found = run(there, [test], 10 * LIMIT)

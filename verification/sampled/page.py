@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections import Counter
 from dataclasses import asdict
 
 from verification.kernel.writing import Block, markdown, table
@@ -80,10 +79,10 @@ def text(rows: list[Row], count: int) -> str:
 
 
 INTRODUCTION = (
-    "`make mutants-sampled` draws them from all that cosmic-ray's operators can make of `repro/`, spread over its modules "
-    f"by size, and runs each for at most {LIMIT:g} s of processor time against the tests that call the function it is in, "
-    "the cheapest first; with `--whole`, survivors against all of these. A timeout is a mutant that makes a test run "
-    "without end, and is not counted as caught.")
+    "`make mutants-sampled` draws them from all that cosmic-ray's operators can make of `repro/`, spread over its "
+    f"modules by size, and runs each for at most {LIMIT:g} s of processor time against the tests that call the "
+    "function it is in, the cheapest first; with `--whole`, survivors against all of these. A timeout is a "
+    "mutant that makes a test run without end, and is not counted as caught.")
 
 
 def _operator(row: Row) -> str:
@@ -107,8 +106,3 @@ def _equivalent(found: dict[str, list[Row]]) -> list[Block]:
     rows = [(f"{row.file}:{row.line}", f"`{row.old}`", f"`{row.new}`", EQUIVALENT[key(row)])
             for row in found["equivalent"]]
     return [Block("heading", "Shown equivalent"), table(("where", "was", "is", "why"), rows)] if rows else []
-
-
-def modules(rows: list[Row]) -> Counter[str]:
-    """How many mutants there are of each module."""
-    return Counter(row.file for row in rows)

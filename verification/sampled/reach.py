@@ -1,7 +1,7 @@
 """Which tests call which functions of ``repro/``, and what each test costs: measured once, file by file of tests.
 
-A map of a file of tests is kept until the file changes; a change of ``repro/`` moves lines but few calls, so functions are
-known by name. All are measured anew with ``--reach``.
+A map of a file of tests is kept until the file changes; a change of ``repro/`` moves lines but few calls, so functions
+are known by name. All are measured anew with ``--reach``.
 """
 
 from __future__ import annotations
@@ -80,7 +80,8 @@ def defined(source: str, line: int) -> set[str]:
         if first <= line <= node.end_lineno:
             if isinstance(node, ast.FunctionDef | ast.ClassDef):
                 return {node.name}
-            return {part.id for part in ast.walk(node) if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Store)}
+            names = [part for part in ast.walk(node) if isinstance(part, ast.Name)]
+            return {part.id for part in names if isinstance(part.ctx, ast.Store)}
     return set()
 
 
@@ -112,7 +113,8 @@ def _names(node: ast.AST, prefix: str) -> Iterator[tuple[str, set[str]]]:
 def measured(anew: bool = False) -> Reach:
     """The map, with those files of tests run that have changed since, or all."""
     kept = {} if anew else _kept()
-    wanted = {path.name: _digest(path) for path in sorted((ROOT / "tests").glob("test_*.py")) if path.name not in OF_TEXT}
+    paths = [path for path in sorted((ROOT / "tests").glob("test_*.py")) if path.name not in OF_TEXT]
+    wanted = {path.name: _digest(path) for path in paths}
     due = [name for name, digest in wanted.items() if kept.get(name, {}).get("digest") != digest]
     if due:
         with copied() as there:

@@ -1,8 +1,8 @@
 """Writes which functions of the code a test calls, in the process of the test and in those that it starts.
 
-Python imports this module at its start where its folder is on PYTHONPATH. It writes lines "test, file, first line, name"
-to the file REACH_FILE, each once a process, as soon as it happens: a process that is killed has written what it called.
-Nothing is traced but calls, so that a test takes little longer.
+Python imports this module at its start where its folder is on PYTHONPATH. It writes lines "test, file, first line,
+name" to the file REACH_FILE, each once a process, as soon as it happens: a process that is killed has written what it
+called. Nothing is traced but calls, so that a test takes little longer.
 """
 
 import os
