@@ -27,8 +27,13 @@ def main(arguments: list[str] | None = None) -> int:
     if chosen.whole:
         left = hunting.due(sample, hunting.kept(), known, True)
         hunting.hunt(left, known, chosen.jobs, True, time.time() + 3600 * HOURS)
+    hunting.confirm(_of(sample))
+    return page.record(_of(sample), len(sample))
+
+
+def _of(sample: list[drawing.Mutant]) -> list[hunting.Row]:
     rows = hunting.kept()
-    return page.record([rows[mutant.name] for mutant in sample if mutant.name in rows], len(sample))
+    return [rows[mutant.name] for mutant in sample if mutant.name in rows]
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from verification.sampled import trying
 from verification.sampled.drawing import Mutant, digest, mutated, sources
-from verification.sampled.reach import LIVE, Reach, Test
+from verification.sampled.reach import LIVE, Measured, Reach
 from verification.sampled.trying import ROOT, Ran, copied, run, told
 
 KEPT = LIVE / "sampled.jsonl"
@@ -46,6 +46,8 @@ class Row:
     reached: int = 0
     tests: str = ""
     seconds: float = 0.0
+    #: Does the test that caught it pass without it, in the same place?
+    sure: bool = False
 
 
 def kept() -> dict[str, Row]:
@@ -69,7 +71,7 @@ def _stands(row: Row | None, mutant: Mutant, text: str, reach: Reach, whole: boo
     return row.tests == _names(tests) and not (whole and row.tried < row.reached)
 
 
-def _names(tests: list[Test]) -> str:
+def _names(tests: list[Measured]) -> str:
     return digest(*sorted(test.id for test in tests))
 
 
@@ -119,9 +121,7 @@ def tried(mutant: Mutant, there: Path, reach: Reach, limit: float = LIMIT) -> Ro
 
 def _verdict(row: Row, found: Ran, usual: dict[str, float], there: Path) -> Row:
     if found.failed:
-        if _passes(found.failed, there):
-            return replace(row, verdict="caught", test=found.failed, how=_short(found.how))
-        return replace(row, verdict="survivor", how=f"{found.failed} fails without the mutant too")
+        return replace(row, verdict="caught", test=found.failed, how=_short(found.how))
     if found.stopped:
         long = LONGER * usual.get(found.stopped, 0.0) + BESIDES
         return replace(row, verdict="timeout" if found.after > long else "survivor", test=found.stopped,
@@ -134,17 +134,17 @@ def ended(rows: list[dict]) -> set[str]:
     return {row["test"] for row in rows if row.get("outcome")}
 
 
-_PASSED: set[str] = set()
-
-
-def _passes(test: str, there: Path) -> bool:
-    """Does a test pass without the mutant, in the same place? An import that fails stands for itself."""
-    if "::" not in test or test in _PASSED:
-        return True
-    found = run(there, [test], 10 * LIMIT)
-    if not found.failed and not found.stopped:
-        _PASSED.add(test)
-    return test in _PASSED
+def confirm(rows: list[Row]) -> None:
+    """Run the tests that caught mutants once more without any: one that fails now has caught nothing."""
+    unsure = [row for row in rows if row.verdict == "caught" and not row.sure]
+    tests = sorted({row.test for row in unsure if "::" in row.test})
+    if tests:
+        with copied() as there:
+            run(there, tests, WHOLE, every=True)
+            failed = {row["test"] for row in told(there.parent / "told") if row.get("outcome") == "failed"}
+        for row in unsure:
+            how = f"{row.test} fails without the mutant too"
+            _write(replace(row, verdict="survivor", how=how) if row.test in failed else replace(row, sure=True))
 
 
 def _short(how: str) -> str:
@@ -153,7 +153,7 @@ def _short(how: str) -> str:
     return (lines or [""])[-1].removeprefix("E ").strip()[-160:]
 
 
-def within(tests: list[Test], limit: float) -> list[Test]:
+def within(tests: list[Measured], limit: float) -> list[Measured]:
     """The cheapest tests that together take no longer than a limit; one at least."""
     total, chosen = 0.0, []
     for test in tests:

@@ -25,7 +25,7 @@ LONGEST = 900
 
 
 @dataclass(frozen=True)
-class Test:
+class Measured:
     """A test: its file and name, seconds with the fixtures that it shares, (file, function) that it calls."""
 
     id: str
@@ -37,18 +37,18 @@ class Test:
 class Reach:
     """All tests that pass, the cheapest first."""
 
-    tests: tuple[Test, ...]
+    tests: tuple[Measured, ...]
 
     @cached_property
-    def by_function(self) -> dict[tuple[str, str], list[Test]]:
+    def by_function(self) -> dict[tuple[str, str], list[Measured]]:
         """Tests by the (file, function) that they call."""
-        found: dict[tuple[str, str], list[Test]] = {}
+        found: dict[tuple[str, str], list[Measured]] = {}
         for test in self.tests:
             for call in test.calls:
                 found.setdefault(call, []).append(test)
         return found
 
-    def of(self, file: str, source: str, line: int) -> list[Test]:
+    def of(self, file: str, source: str, line: int) -> list[Measured]:
         """Tests that a change in a line can be seen by, the cheapest first: those that call the function it is in; of
         what runs at import, those that call what is defined there, or a function that names it; else all."""
         inside = set(functions(source, line))
@@ -139,17 +139,17 @@ def _digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
 
 
-def _tests(rows) -> Iterator[Test]:
+def _tests(rows) -> Iterator[Measured]:
     for row in rows:
         for id, (seconds, calls) in row["tests"].items():
-            yield Test(id, seconds, frozenset(map(tuple, calls)))
+            yield Measured(id, seconds, frozenset(map(tuple, calls)))
 
 
 def _measure(there: Path, name: str) -> dict[str, tuple[float, list]]:
     """{test: (seconds, [(file, function), ...])} of the tests of a file that pass, by a run of it."""
     calls_file = there.parent / "calls"
     calls_file.unlink(missing_ok=True)
-    run(there, [f"tests/{name}"], LONGEST, calls_file)
+    run(there, [f"tests/{name}"], LONGEST, calls_file, every=True)
     rows = told(there.parent / "told")
     calls: dict[str, set] = {}
     for line in calls_file.read_text(encoding="utf-8").splitlines() if calls_file.exists() else []:

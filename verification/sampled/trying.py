@@ -67,27 +67,27 @@ def prepare() -> None:
             import_module(name)
 
 
-def run(there: Path, tests: list[str], limit: float, reach: Path | None = None) -> Ran:
-    """Run tests in the copy ``there``, in the order given, to the first that fails; ``limit``: seconds of processor
-    time. With ``reach`` all are run, and that file gets the functions which they call."""
+def run(there: Path, tests: list[str], limit: float, reach: Path | None = None, every: bool = False) -> Ran:
+    """Run tests in the copy ``there``, in the order given, to the first that fails, or ``every`` one; ``limit``:
+    seconds of processor time. With ``reach`` that file gets the functions which they call."""
     told = there.parent / "told"
     told.unlink(missing_ok=True)
     began = time.monotonic()
     child = os.fork()
     if not child:
-        _in_child(there, tests, limit, told, reach)
+        _in_child(there, tests, limit, told, reach, every)
     status = _waited(child, limit * PATIENCE)
     return _judged(told, status, time.monotonic() - began)
 
 
-def _in_child(there: Path, tests: list[str], limit: float, told: Path, reach: Path | None) -> None:
+def _in_child(there: Path, tests: list[str], limit: float, told: Path, reach: Path | None, every: bool) -> None:
     code = 70
     try:
         os.setsid()
         resource.setrlimit(resource.RLIMIT_CPU, (int(limit), int(limit) + 5))
         signal.signal(signal.SIGXCPU, signal.SIG_DFL)
         _enter(there, reach)
-        code = _tested(tests, _Teller(told), bool(reach))
+        code = _tested(tests, _Teller(told), bool(reach), every)
     except BaseException:
         traceback.print_exc()
     finally:
@@ -106,16 +106,18 @@ def _enter(there: Path, reach: Path | None) -> None:
     outside = [path for path in os.environ.get("PYTHONPATH", "").split(os.pathsep) if path and Path(path) != ROOT]
     sys.path[:] = [str(there), *(path for path in sys.path if path not in ("", str(ROOT), str(there)))]
     os.environ.update(PYTHONPATH=os.pathsep.join([str(there), *outside]), HOME=str(there.parent))
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # the copy keeps what is compiled
+    sys.dont_write_bytecode = False
     if reach:
         os.environ.update(PYTHONPATH=os.pathsep.join([str(TRACER), str(there), *outside]), REACH_FILE=str(reach),
                           REACH_ROOT=str(there / "repro"), REACH_TEST="")
 
 
-def _tested(tests: list[str], teller: _Teller, reach: bool) -> int:
+def _tested(tests: list[str], teller: _Teller, reach: bool, every: bool) -> int:
     plugins: list[object] = [teller]
     if reach:
         plugins.append(_Marker(runpy.run_path(str(TRACER / "sitecustomize.py"))["note"].__globals__))
-    stop = [] if reach else ["-x"]
+    stop = [] if every else ["-x"]
     return int(pytest.main([*stop, "-q", "-n0", "-p", "no:cacheprovider", "--tb=line", *tests], plugins))
 
 
