@@ -126,6 +126,7 @@ class _Teller:
 
     def __init__(self, path: Path) -> None:
         self._file = path.open("w", encoding="utf-8")
+        self._spent = _processor()
 
     def _tell(self, **what: object) -> None:
         self._file.write(json.dumps(what) + "\n")
@@ -140,7 +141,8 @@ class _Teller:
 
     def pytest_runtest_logreport(self, report) -> None:
         how = str(getattr(report, "longreprtext", ""))
-        self._tell(test=report.nodeid, outcome=report.outcome, seconds=report.duration, how=how[-400:])
+        before, self._spent = self._spent, _processor()
+        self._tell(test=report.nodeid, outcome=report.outcome, seconds=self._spent - before, how=how[-400:])
 
     def pytest_collectreport(self, report) -> None:
         if report.failed:
@@ -148,6 +150,11 @@ class _Teller:
 
     def pytest_sessionfinish(self, exitstatus: int) -> None:
         self._tell(ends=int(exitstatus), at=time.time())
+
+
+def _processor() -> float:
+    """Seconds of processor time of this process, and of its children that have ended."""
+    return sum(os.times()[:4])
 
 
 def _wide(item) -> list[str]:

@@ -1,0 +1,68 @@
+"""Behaviour that no other test saw: what mutants made by machine changed, and nobody noticed."""
+import dataclasses
+import importlib
+import pkgutil
+from pathlib import Path
+
+import pytest
+
+import repro
+from repro.check import cost, numbers, simplifications
+from repro.cli import sweep
+from repro.scene import load_scene
+
+STATUS = Path("/proc/self/status")
+
+
+def classes():
+    """{name: class} of every dataclass of the package."""
+    names = [found.name for found in pkgutil.walk_packages(repro.__path__, "repro.") if "__main__" not in found.name]
+    every = [each for name in names for each in vars(importlib.import_module(name)).values() if isinstance(each, type)]
+    return {f"{each.__module__}.{each.__name__}": each for each in every
+            if each.__module__.startswith("repro.") and "__dataclass_params__" in vars(each)}
+
+
+def test_states_are_made_and_not_changed():
+    """What a cache derives from never changes. Mutant: frozen=False."""
+    loose = {name for name, each in classes().items() if not each.__dataclass_params__.frozen}
+    assert loose == {"repro.run.record.Record"}
+
+
+def test_what_holds_arrays_is_the_same_where_it_is_the_same_object():
+    """Arrays have no one truth to compare them by. Mutant: eq=True."""
+    holding = {name for name, each in classes().items() if each.__dataclass_params__.eq
+               and any("ndarray" in str(part.type) for part in dataclasses.fields(each))}
+    assert holding == set() and len(classes()) > 50
+
+
+@pytest.mark.skipif(not STATUS.exists(), reason="the system tells the memory of a process there")
+def test_memory_is_in_megabytes():
+    """As the kernel tells it, in kB. Mutant: the unit of another system."""
+    told = {name: value for name, value in (line.split(":", 1) for line in STATUS.read_text().splitlines())}
+    assert cost._memory() == pytest.approx(int(told["VmHWM"].split()[0]) / 1024, rel=0.02)
+
+
+def test_a_seed_at_both_walls_is_in_contact_from_the_start():
+    """Mutant: one hour later."""
+    scene = load_scene("base", ["aggregate.radius=49.9 um"])
+    assert numbers.at_start(scene).contact == 0.0
+    assert numbers.at_start(load_scene("base")).contact is None
+
+
+@pytest.mark.parametrize("half, kind", [("0.02 mg/L", "zero-order front"), ("20 mg/L", "layer of first-order uptake")])
+def test_a_layer_too_thin_is_told_by_its_kind(half, kind):
+    """Of zero order where the supply is above the half saturation. Mutant: the other way round."""
+    scene = load_scene("wide", [f'substrates.donor.half_saturation="{half}"', 'kinetics.maximum_density="3000000 mg/L"',
+                                "numerics.refinement=0.1"])
+    found = numbers.numbers(scene, scene.flow.mean_velocity or 1e4)
+    told = [w.text for w in simplifications.warnings(scene, found) if "donor is used up" in w.text]
+    assert len(told) == 1 and f"in a {kind} " in told[0]
+
+
+def test_a_hypercube_without_a_seed_is_that_of_seed_0():
+    """As the help says. Mutant: another default."""
+    import argparse
+    parser = argparse.ArgumentParser()
+    sweep.add(parser.add_subparsers())
+    chosen = parser.parse_args(["sweep", "base", "--vary", "pore.width=1:2 um:log", "--out", "x"])
+    assert chosen.seed == 0
