@@ -2,13 +2,17 @@
 import dataclasses
 import importlib
 import pkgutil
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import repro
 from repro.check import cost, numbers, simplifications
 from repro.cli import sweep
+from repro.fem.brief import brief
+from repro.report import charts
 from repro.scene import load_scene
 
 STATUS = Path("/proc/self/status")
@@ -66,3 +70,24 @@ def test_a_hypercube_without_a_seed_is_that_of_seed_0():
     sweep.add(parser.add_subparsers())
     chosen = parser.parse_args(["sweep", "base", "--vary", "pore.width=1:2 um:log", "--out", "x"])
     assert chosen.seed == 0
+
+
+def test_a_brief_form_tells_what_is_public():
+    """Mutant: what begins with an underscore, and that alone."""
+    @brief
+    @dataclasses.dataclass(frozen=True, eq=False)
+    class Field:
+        order: int
+        values: np.ndarray
+        _cache: dict
+
+    assert repr(Field(2, np.zeros((3, 2)), {})) == "Field(order=2, values=float64[3, 2])"
+
+
+def test_the_name_of_what_is_drawn_stands_in_the_middle_of_its_axis():
+    """Mutant: below the picture."""
+    line = charts.Line("area", np.array([0.0, 1.0]), np.array([1.0, 2.0]))
+    drawn = charts.svg(charts.Chart("Area", "area (um²)", [line]))
+    top, bottom = map(float, re.search(r'class="now" x1="0" x2="0" y1="([0-9.]+)" y2="([0-9.]+)"', drawn).groups())
+    named = float(re.search(r'class="name" transform="translate\(10 ([0-9.]+)\)', drawn)[1])
+    assert named == (top + bottom) / 2

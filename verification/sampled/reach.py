@@ -9,7 +9,7 @@ from __future__ import annotations
 import ast
 import hashlib
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -24,13 +24,17 @@ OF_TEXT = {"test_mutants.py", "test_architecture.py", "test_mentions.py", "test_
 LONGEST = 900
 
 
+#: A function: the file in repro/ and its qualified name.
+Call = tuple[str, str]
+
+
 @dataclass(frozen=True)
 class Measured:
     """A test: its file and name, seconds with the fixtures that it shares, (file, function) that it calls."""
 
     id: str
     seconds: float
-    calls: frozenset[tuple[str, str]] = field(repr=False)
+    calls: frozenset[Call] = field(repr=False)
 
 
 @dataclass(frozen=True)
@@ -40,9 +44,9 @@ class Reach:
     tests: tuple[Measured, ...]
 
     @cached_property
-    def by_function(self) -> dict[tuple[str, str], list[Measured]]:
+    def by_function(self) -> dict[Call, list[Measured]]:
         """Tests by the (file, function) that they call."""
-        found: dict[tuple[str, str], list[Measured]] = {}
+        found: dict[Call, list[Measured]] = {}
         for test in self.tests:
             for call in test.calls:
                 found.setdefault(call, []).append(test)
@@ -55,7 +59,7 @@ class Reach:
         calls = {(file, name) for name in inside} if inside else self._naming(file, defined(source, line))
         return [test for test in self.tests if test.calls & calls] or list(self.tests)
 
-    def _naming(self, file: str, names: set[str]) -> set[tuple[str, str]]:
+    def _naming(self, file: str, names: set[str]) -> set[Call]:
         """Functions of the code defined in, or naming, one of some names of a file."""
         return {call for call in self.by_function
                 if (call[0] == file and call[1].split(".")[0] in names) or names & mentioned(*call)}
@@ -119,7 +123,7 @@ def measured(anew: bool = False) -> Reach:
     if due:
         with copied() as there:
             for name in due:
-                kept[name] = {"file": name, "digest": wanted[name], "tests": _measure(there, name)}
+                kept[name] = {"file": name, "digest": wanted[name], **packed(_measure(there, name))}
                 _append(kept[name])
                 print(f"reach: {name}: {len(kept[name]['tests'])} tests", flush=True)
     return Reach(tuple(sorted(_tests(kept[name] for name in wanted), key=lambda test: test.seconds)))
@@ -139,13 +143,22 @@ def _digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
 
 
-def _tests(rows) -> Iterator[Measured]:
+def packed(tests: dict[str, tuple[float, list[Call]]]) -> dict:
+    """Tests as they are kept: functions once, and by their number."""
+    every = sorted({call for _, calls in tests.values() for call in calls})
+    numbers = {call: number for number, call in enumerate(every)}
+    return {"functions": every, "tests": {id: (seconds, [numbers[call] for call in calls])
+                                          for id, (seconds, calls) in tests.items()}}
+
+
+def _tests(rows: Iterable[dict]) -> Iterator[Measured]:
     for row in rows:
-        for id, (seconds, calls) in row["tests"].items():
-            yield Measured(id, seconds, frozenset(map(tuple, calls)))
+        every = [tuple(call) for call in row["functions"]]
+        for id, (seconds, numbers) in row["tests"].items():
+            yield Measured(id, seconds, frozenset(every[number] for number in numbers))
 
 
-def _measure(there: Path, name: str) -> dict[str, tuple[float, list]]:
+def _measure(there: Path, name: str) -> dict[str, tuple[float, list[Call]]]:
     """{test: (seconds, [(file, function), ...])} of the tests of a file that pass, by a run of it."""
     calls_file = there.parent / "calls"
     calls_file.unlink(missing_ok=True)
