@@ -12,6 +12,7 @@ import repro
 from repro.check import cost, numbers, simplifications
 from repro.cli import sweep
 from repro.fem.brief import brief
+from repro.march.simulation import steps
 from repro.report import charts
 from repro.scene import load_scene
 
@@ -91,3 +92,9 @@ def test_the_name_of_what_is_drawn_stands_in_the_middle_of_its_axis():
     top, bottom = map(float, re.search(r'class="now" x1="0" x2="0" y1="([0-9.]+)" y2="([0-9.]+)"', drawn).groups())
     named = float(re.search(r'class="name" transform="translate\(10 ([0-9.]+)\)', drawn)[1])
     assert named == (top + bottom) / 2
+
+
+def test_a_run_to_a_later_end_may_go_on_from_the_seed():
+    """It is of no step that growth.end cuts. Mutant: it is told to be."""
+    state, instant = next(steps(load_scene("base", ["numerics.preset=fast"])))
+    assert state.time == 0 and instant is not None and state.apart is False
