@@ -12,7 +12,10 @@ import repro
 from repro.check import cost, numbers, simplifications
 from repro.cli import sweep
 from repro.fem.brief import brief
+from repro.fem.outline import BOTTOM
 from repro.march.simulation import steps
+from repro.model.contact import middle_of
+from repro.model.pore import initial_outline
 from repro.report import charts
 from repro.scene import load_scene
 
@@ -98,3 +101,11 @@ def test_a_run_to_a_later_end_may_go_on_from_the_seed():
     """It is of no step that growth.end cuts. Mutant: it is told to be."""
     state, instant = next(steps(load_scene("base", ["numerics.preset=fast"])))
     assert state.time == 0 and instant is not None and state.apart is False
+
+
+def test_the_middle_of_a_contact_surface_is_that_of_a_seed_anywhere():
+    """Mutant: another multiple of the sum of its ends, which is zero in the middle of the pore."""
+    outline = initial_outline(load_scene("base", ["aggregate.position=40 um"]))
+    on = outline.points[outline.wall == BOTTOM, 0]
+    chosen = outline.points[middle_of(outline, BOTTOM), 0]
+    assert len(chosen) == 1 and abs(chosen[0] - 40) == np.abs(on - 40).min() < 0.1 * np.ptp(on)
