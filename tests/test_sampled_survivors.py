@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 import repro
+from repro import timing
 from repro.check import cost, numbers, simplifications
 from repro.cli import sweep
+from repro.fem import linear
 from repro.fem.brief import brief
 from repro.fem.outline import BOTTOM
-from repro.march.simulation import steps
-from repro.model.contact import middle_of
+from repro.march.simulation import simulate, steps
+from repro.model.contact import contact_lines, middle_of
 from repro.model.pore import initial_outline
 from repro.report import charts
 from repro.scene import load_scene
@@ -109,3 +111,25 @@ def test_the_middle_of_a_contact_surface_is_that_of_a_seed_anywhere():
     on = outline.points[outline.wall == BOTTOM, 0]
     chosen = outline.points[middle_of(outline, BOTTOM), 0]
     assert len(chosen) == 1 and abs(chosen[0] - 40) == np.abs(on - 40).min() < 0.1 * np.ptp(on)
+
+
+def test_contact_lines_are_where_they_are_whatever_node_is_the_first():
+    """Nodes of a ring: with the numbers shifted, the same places are found. Mutant: the neighbour before the first node
+    is the second."""
+    outline = initial_outline(load_scene("base"))
+    count = len(outline.wall)
+    known = sorted(contact_lines(outline, BOTTOM))
+    assert len(known) == 2 and {step for _, step in known} == {-1, 1}
+    for shift in range(1, count):
+        parts = {name: np.roll(getattr(outline, name), shift, axis=0) for name in ("points", "wall", "fixed")}
+        moved = contact_lines(dataclasses.replace(outline, **parts), BOTTOM)
+        assert sorted(((node - shift) % count, step) for node, step in moved) == known
+
+
+def test_every_stage_of_a_step_is_timed():
+    """What a run tells its cost by. Mutant: a stage without its decorator."""
+    timing.reset()
+    *_, last = simulate(load_scene("base", ["growth.end=0.2 h", "numerics.refinement=0.5"]))
+    assert last.pore.time == 0.2
+    assert {"flow", "transport", "growth", "mesh motion", "meshing", linear.FLOOR} <= set(timing.seconds)
+    assert min(timing.seconds.values()) > 0
