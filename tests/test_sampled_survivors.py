@@ -133,3 +133,20 @@ def test_every_stage_of_a_step_is_timed():
     assert last.pore.time == 0.2
     assert {"flow", "transport", "growth", "mesh motion", "meshing", linear.FLOOR} <= set(timing.seconds)
     assert min(timing.seconds.values()) > 0
+
+
+def test_a_function_that_is_timed_is_told_by_its_own_name_and_docstring():
+    """In help and in tracebacks. Mutant: the wrapper's."""
+    @timing.timed("stage")
+    def counted(numbers):
+        """How many there are."""
+        return len(numbers)
+
+    assert (counted.__name__, counted.__doc__) == ("counted", "How many there are.") and counted("abc") == 3
+
+
+@pytest.mark.parametrize("low, high, begins", [(1.0, 10.0, 0.0), (4.9, 10.0, 0.0), (5.1, 10.0, 4.0), (9.0, 10.0, 9.0)])
+def test_an_axis_begins_at_zero_where_that_is_near(low, high, begins):
+    """Mutants: never; elsewhere."""
+    found = charts._roomy(low, high)
+    assert found[0] == begins and found[1] >= high

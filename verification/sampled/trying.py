@@ -41,7 +41,7 @@ class Ran:
     failed: str = ""
     how: str = ""
     stopped: str = ""
-    #: Seconds that the test had taken until it was stopped.
+    #: Seconds of processor time that the test had taken until it was stopped.
     after: float = 0.0
     #: Seconds on the clock of all.
     seconds: float = 0.0
@@ -77,7 +77,7 @@ def run(there: Path, tests: list[str], limit: float, reach: Path | None = None, 
     if not child:
         _in_child(there, tests, limit, told, reach, every)
     status = _waited(child, limit * PATIENCE)
-    return _judged(told, status, time.monotonic() - began)
+    return _judged(told, status, time.monotonic() - began, limit)
 
 
 def _in_child(there: Path, tests: list[str], limit: float, told: Path, reach: Path | None, every: bool) -> None:
@@ -137,7 +137,7 @@ class _Teller:
         self._tell(collected={test: names for test, names in wide.items()})
 
     def pytest_runtest_logstart(self, nodeid: str) -> None:
-        self._tell(starts=nodeid, at=time.time())
+        self._tell(starts=nodeid, spent=_processor())
 
     def pytest_runtest_logreport(self, report) -> None:
         how = str(getattr(report, "longreprtext", ""))
@@ -149,7 +149,7 @@ class _Teller:
             self._tell(test=report.nodeid, outcome="failed", seconds=0.0, how=str(report.longreprtext)[-400:])
 
     def pytest_sessionfinish(self, exitstatus: int) -> None:
-        self._tell(ends=int(exitstatus), at=time.time())
+        self._tell(ends=int(exitstatus))
 
 
 def _processor() -> float:
@@ -214,7 +214,7 @@ def told(path: Path) -> list[dict]:
     return rows
 
 
-def _judged(path: Path, status: int, seconds: float) -> Ran:
+def _judged(path: Path, status: int, seconds: float, limit: float) -> Ran:
     rows = told(path)
     failed = [row for row in rows if row.get("outcome") == "failed"]
     if failed:
@@ -225,7 +225,7 @@ def _judged(path: Path, status: int, seconds: float) -> Ran:
         return Ran("pytest", f"exit status {rows[-1]['ends']}", seconds=seconds)
     started = [row for row in rows if "starts" in row]
     where = started[-1]["starts"] if started else "collection"
-    after = time.time() - started[-1]["at"] if started else seconds
+    after = max(limit - started[-1]["spent"], 0.0) if started else limit
     if os.WIFSIGNALED(status) and os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGKILL):
         return Ran(stopped=where, after=after, seconds=seconds)
     return Ran(where, f"the process ended with status {status}", seconds=seconds)
