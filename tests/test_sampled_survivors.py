@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray
 
 import repro
-from repro import timing
+from repro import results, timing
 from repro.check import cost, numbers, simplifications
 from repro.cli import sweep
 from repro.fem import linear
@@ -18,8 +19,12 @@ from repro.fem.outline import BOTTOM
 from repro.march.simulation import simulate, steps
 from repro.model.contact import contact_lines, middle_of
 from repro.model.pore import initial_outline
-from repro.report import charts
+from repro.report import charts, fields
+from repro.results import netcdf
 from repro.scene import load_scene
+from repro.sweep import page, table
+from repro.sweep.design import parse
+from repro.sweep.picture import LEVELS, Axis
 
 STATUS = Path("/proc/self/status")
 
@@ -150,3 +155,52 @@ def test_an_axis_begins_at_zero_where_that_is_near(low, high, begins):
     """Mutants: never; elsewhere."""
     found = charts._roomy(low, high)
     assert found[0] == begins and found[1] >= high
+
+
+def test_ticks_of_an_axis_are_round_and_within():
+    """Mutant: other numbers."""
+    assert Axis("x", 0.0, 10.0).ticks() == pytest.approx([0, 2, 4, 6, 8, 10])
+    assert Axis("x", 0.31, 0.58).ticks() == pytest.approx([0.4, 0.5])
+
+
+def test_words_stand_in_the_middle_of_equal_parts_of_an_axis():
+    """Mutant: the first one at the edge."""
+    factor = parse('numerics.preset="fast", "accurate", "exact"')
+    axis = page._across(factor, [])
+    assert [axis.part(place) for place in axis.ticks()] == pytest.approx([1 / 6, 3 / 6, 5 / 6])
+
+
+@pytest.mark.parametrize("touches, value", [((False, True), 2.0), ((True, True), 1.0), ((False, False), np.nan)])
+def test_what_holds_at_contact_is_of_the_first_row_with_it(touches, value):
+    """Mutant: of the second one."""
+    rows = np.array([0.0, 1.0])
+    course = table.Course(rows, rows, rows, np.array(touches), 1.0, 0.1)
+    assert np.array_equal(course.at_contact(np.array([1.0, 2.0])), value, equal_nan=True)
+
+
+def test_time_has_no_value_for_what_is_missing_in_a_file_and_columns_have(tmp_path):
+    """As CF wants it of coordinates. Mutant: the other way round."""
+    scene = load_scene("flow_only")
+    netcdf.write(tmp_path / "timeseries.nc", scene, [[0.0] * len(results.COLUMNS)])
+    with xarray.open_dataset(tmp_path / "timeseries.nc", engine="scipy", decode_cf=False) as found:
+        filled = {name for name in found.variables if "_FillValue" in found[name].attrs}
+    assert filled == set(results.COLUMNS) - {"time_h"}
+
+
+def test_colours_of_values_go_from_the_first_to_the_last():
+    """Mutant: all are the first."""
+    factor = parse("pore.width=40 um, 50 um, 60 um")
+    assert [page._level(factor, value) for value in factor.values] == [0, (LEVELS - 1) // 2, LEVELS - 1]
+    alone = parse("pore.width=40 um")
+    assert page._level(alone, alone.values[0]) == 0
+
+
+def test_fields_are_a_run_s_own_files_that_are_there(tmp_path):
+    """Mutant: any file that is there, or any name of the right form."""
+    (tmp_path / "fields").mkdir()
+    for name in ("fields/fields_0000.vtu", "other.vtu"):
+        (tmp_path / name).write_text("")
+    named = "".join(f'<DataSet timestep="{k}" file="{name}"/>' for k, name in
+                    enumerate(("fields/fields_0000.vtu", "fields/fields_0001.vtu", "other.vtu")))
+    (tmp_path / "fields.pvd").write_text(f"<VTKFile><Collection>{named}</Collection></VTKFile>")
+    assert fields.index(tmp_path) == [(0.0, tmp_path / "fields/fields_0000.vtu")]
