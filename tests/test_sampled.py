@@ -114,6 +114,7 @@ def test_tests_are_those_that_call_the_function_the_cheapest_first(monkeypatch):
     assert known.of("m.py", CODE, 10) == [quick, slow] == known.of("m.py", CODE, 4)
     assert known.of("m.py", CODE, 14) == [box] == known.of("m.py", CODE, 17)
     assert known.of("m.py", CODE, 2) == [quick, box, slow]
+    assert hunting.alike("tests/test_sweep_design.py::test_x", "sweep/design.py") == 2
     assert hunting.within([quick, box, slow], 5.0) == [quick, box] and hunting.within([slow], 5.0) == [slow]
 
 

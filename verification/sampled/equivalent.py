@@ -31,6 +31,15 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
     ("model/transport.py", "return state.reshape(2, -1)[:, pieces.cells] @ pieces.values.T",
      "return state.reshape(2, - 2)[:, pieces.cells] @ pieces.values.T"):
         "numpy takes any negative length of one axis for the one that is left.",
+    ("report/quantities.py", 'made = run.series.get("remeshed", run.times * np.nan) == 1',
+     'made = run.series.get("remeshed", run.times * np.nan) >= 1'):
+        "The column is 0 or 1, and NaN is neither.",
+    ("results/__init__.py", 'write_text(path, json.dumps(content, indent=2, allow_nan=False) + "\\n")',
+     'write_text(path, json.dumps(content, indent= 1, allow_nan=False) + "\\n")'):
+        "The same JSON to every reader; there is a blank less at the start of lines.",
+    ("results/arrays.py", 'kind = "triangle" if pore.mesh.geometry == 1 else "triangle6"',
+     'kind = "triangle" if pore.mesh.geometry <= 1 else "triangle6"'):
+        "A mesh has geometry 1 or 2.",
 }
 
 #: (effect, why no test)

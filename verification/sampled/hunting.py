@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import json
 import os
+import re
 import time
 import traceback
 from dataclasses import asdict, dataclass, replace
@@ -92,7 +93,7 @@ def _forked(mutants: list[Mutant], reach: Reach, whole: bool, ends: float) -> in
             with copied() as there:
                 for mutant in mutants:
                     if time.time() < ends:
-                        _write(tried(mutant, there, reach, WHOLE if whole else LIMIT))
+                        _write(tried(mutant, there, reach, whole))
         except BaseException:
             traceback.print_exc()
         finally:
@@ -108,11 +109,13 @@ def _write(row: Row) -> None:
     print(f"{row.verdict:9} {row.file}:{row.line} {row.new!r} {row.test} ({counted})", flush=True)
 
 
-def tried(mutant: Mutant, there: Path, reach: Reach, limit: float = LIMIT) -> Row:
-    """Run a mutant in the copy ``there`` against the tests that reach it, as many as take ``limit`` seconds."""
+def tried(mutant: Mutant, there: Path, reach: Reach, whole: bool = False) -> Row:
+    """Run a mutant in the copy ``there`` against the tests that reach it: as many of the cheapest as take no more than
+    LIMIT; or all, for WHOLE, those that are named as its module is at first."""
+    limit = WHOLE if whole else LIMIT
     path, text = there / "repro" / mutant.file, (ROOT / "repro" / mutant.file).read_text(encoding="utf-8")
     tests = reach.of(mutant.file, text, mutant.line)
-    chosen = within(tests, limit)
+    chosen = sorted(tests, key=lambda test: -alike(test.id, mutant.file)) if whole else within(tests, limit)
     put(path, mutated(text, mutant))
     first = nearest(chosen)
     found = run(there, [test.id for test in first], limit / 3)
@@ -156,6 +159,13 @@ def _short(how: str) -> str:
     """The last line of a failure that tells something."""
     lines = [line.strip() for line in how.splitlines() if line.strip()]
     return (lines or [""])[-1].removeprefix("E ").strip()[-160:]
+
+
+def alike(test: str, file: str) -> int:
+    """How many words the names of a test's file and of a module have in common."""
+    names = (Path(test.partition("::")[0]).stem, Path(file).with_suffix("").as_posix())
+    one, other = ({word.rstrip("s") for word in re.split(r"[/_]", name)} for name in names)
+    return len(one & other)
 
 
 def nearest(tests: list[Measured]) -> list[Measured]:
