@@ -1,4 +1,5 @@
 """Behaviour that no other test saw: what mutants made by machine changed, and nobody noticed."""
+import contextlib
 import dataclasses
 import importlib
 import pkgutil
@@ -13,12 +14,14 @@ import repro
 from repro import results, timing
 from repro.check import cost, numbers, simplifications
 from repro.cli import sweep
+from repro.errors import Unresolved
 from repro.fem import linear
 from repro.fem.brief import brief
 from repro.fem.outline import BOTTOM
 from repro.march.simulation import simulate, steps
+from repro.model import remeshing
 from repro.model.contact import contact_lines, middle_of
-from repro.model.pore import initial_outline
+from repro.model.pore import initial_outline, seeded, solve
 from repro.report import charts, fields
 from repro.results import netcdf
 from repro.scene import load_scene
@@ -204,3 +207,16 @@ def test_fields_are_a_run_s_own_files_that_are_there(tmp_path):
                     enumerate(("fields/fields_0000.vtu", "fields/fields_0001.vtu", "other.vtu")))
     (tmp_path / "fields.pvd").write_text(f"<VTKFile><Collection>{named}</Collection></VTKFile>")
     assert fields.index(tmp_path) == [(0.0, tmp_path / "fields/fields_0000.vtu")]
+
+
+def test_a_refinement_that_is_advised_resolves_and_smaller_ones_do_not():
+    """A front in a seed that is fed little. Mutant: an attempt that fails ends the search."""
+    scene = load_scene("base", ["numerics.preset=fast", "aggregate.radius=20 um", "numerics.refinement=0.1", *(
+        f'substrates.{name}.{key}="{value} mg/L"' for name in ("donor", "acceptor")
+        for key, value in (("supply", 0.3), ("half_saturation", 1e-3)))])
+    found = str(remeshing.advised(scene, seeded(scene), Unresolved("refused")))
+    wanted = float(re.fullmatch(r"refused; numerics\.refinement = ([0-9.]+) resolves this state", found)[1])
+    for refinement, holds in ((wanted, True), (wanted / 1.4, False)):
+        finer = dataclasses.replace(scene, numerics=dataclasses.replace(scene.numerics, refinement=refinement))
+        with contextlib.nullcontext() if holds else pytest.raises(Unresolved):
+            solve(finer, seeded(finer))
