@@ -4,6 +4,9 @@ import dataclasses
 import importlib
 import pkgutil
 import re
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +27,7 @@ from repro.model.contact import contact_lines, middle_of
 from repro.model.pore import initial_outline, seeded, solve
 from repro.report import charts, fields
 from repro.results import netcdf
-from repro.scene import load_scene
+from repro.scene import SceneError, load_scene
 from repro.sweep import page, table
 from repro.sweep.design import parse
 from repro.sweep.picture import LEVELS, Axis
@@ -220,3 +223,24 @@ def test_a_refinement_that_is_advised_resolves_and_smaller_ones_do_not():
         finer = dataclasses.replace(scene, numerics=dataclasses.replace(scene.numerics, refinement=refinement))
         with contextlib.nullcontext() if holds else pytest.raises(Unresolved):
             solve(finer, seeded(finer))
+
+
+@pytest.mark.parametrize("value, holds", [("1", True), ("1e-9", True), ("0", False), ("-0.5", False), ("1.1", False)])
+def test_a_tolerance_is_above_zero_and_at_most_one(value, holds):
+    """Mutant: zero and less."""
+    with contextlib.nullcontext() if holds else pytest.raises(SceneError, match="greater than zero, at most 1"):
+        assert load_scene("base", [f"numerics.tolerance={value}"]).numerics.tolerance == float(value)
+
+
+@pytest.mark.parametrize("length", ["50 um", "50 micron", "50 microns", "50 micrometers", "0.05 mm", "5e-5 m"])
+def test_a_length_is_the_same_by_any_name(length):
+    """Mutant: a micron of another size."""
+    assert load_scene("base", [f'pore.width="{length}"']).pore.width == pytest.approx(50, rel=1e-14)
+
+
+def test_a_second_signal_ends_the_process_with_the_signal_s_status():
+    """128 and its number, as shells tell it. Mutant: 127."""
+    code = ("import os, signal, time\nfrom repro.run.interrupts import SAME, noted\n"
+            "with noted():\n    for _ in range(2):\n        os.kill(os.getpid(), signal.SIGTERM)\n"
+            "        time.sleep(SAME + 0.2)")
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 128 + signal.SIGTERM

@@ -42,6 +42,10 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         "A mesh has geometry 1 or 2.",
     ("model/growth.py", "MOST_ITERATIONS = 25", "MOST_ITERATIONS = 24"):
         "Identical outputs of base in the three presets, whose equilibria take 5, 5 and 3 iterations at most.",
+    ("results/vtu.py",
+     """components = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else \"\"""",
+     """components = f' NumberOfComponents="{values.shape[1]}"' if values.ndim >= 2 else \"\""""):
+        "Arrays of a file have one or two axes.",
 }
 
 #: (effect, why no test)
@@ -54,4 +58,11 @@ LEFT: dict[tuple[str, str, str], tuple[str, str]] = {
      "d_a = np.where(acceptor >= 0, monod(acceptor, substrates.acceptor.half_saturation)[1], 0.0)"):
         ("The derivative of growth where there is no acceptor at all is that right of the kink, not left of it.",
          "Nothing in repro/ asks for it: the function is called by a test alone."),
+    ("run/__init__.py", "INTERVAL = 60.0", "INTERVAL = 59.0"):
+        ("Checkpoints are written every 59 s, and the help says so.",
+         "It is a choice; what a run makes does not depend on it."),
+    ("scene/files.py", 'hint = did_you_mean(elsewhere(".".join(part for part in path if part)[:60], known))',
+     'hint = did_you_mean(elsewhere(".".join(part for part in path if part)[: 59], known))'):
+        ("Of a key of sixty characters and more that is misspelt, one less is compared with those that there are.",
+         "No key is nearly as long; the bound only keeps the comparison short."),
 }
