@@ -50,14 +50,6 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
 
 #: (effect, why no test)
 LEFT: dict[tuple[str, str, str], tuple[str, str]] = {
-    ("march/stepping.py", "FIRST = 8.0", "FIRST = 9.0"):
-        ("The first step that is tried is longer by an eighth; what is made stays within the tolerance, to which the "
-         "control of steps keeps it.", "It is a choice that only cost depends on; nothing follows from its value."),
-    ("model/kinetics.py",
-     "d_a = np.where(acceptor > 0, monod(acceptor, substrates.acceptor.half_saturation)[1], 0.0)",
-     "d_a = np.where(acceptor >= 0, monod(acceptor, substrates.acceptor.half_saturation)[1], 0.0)"):
-        ("The derivative of growth where there is no acceptor at all is that right of the kink, not left of it.",
-         "Nothing in repro/ asks for it: the function is called by a test alone."),
     ("run/__init__.py", "INTERVAL = 60.0", "INTERVAL = 59.0"):
         ("Checkpoints are written every 59 s, and the help says so.",
          "It is a choice; what a run makes does not depend on it."),

@@ -114,7 +114,7 @@ def tried(mutant: Mutant, there: Path, reach: Reach, whole: bool = False) -> Row
     LIMIT; or all, for WHOLE, those that are named as its module is at first."""
     limit = WHOLE if whole else LIMIT
     path, text = there / "repro" / mutant.file, (ROOT / "repro" / mutant.file).read_text(encoding="utf-8")
-    tests = reach.of(mutant.file, text, mutant.line)
+    tests = reach.of(mutant.file, text, mutant.line, whole)
     chosen = sorted(tests, key=lambda test: -alike(test.id, mutant.file)) if whole else within(tests, limit)
     put(path, mutated(text, mutant))
     first = nearest(chosen)
@@ -123,7 +123,8 @@ def tried(mutant: Mutant, there: Path, reach: Reach, whole: bool = False) -> Row
         found = run(there, [test.id for test in chosen[len(first):]], 2 * limit / 3)
     put(path, text)
     row = Row(mutant.name, mutant.file, mutant.line, mutant.operator, mutant.old, mutant.new, digest(text), "survivor",
-              reached=len(tests), tests=_names(tests), tried=len(chosen), seconds=round(found.seconds, 1))
+              reached=len(tests), tests=_names(reach.of(mutant.file, text, mutant.line)), tried=len(chosen),
+              seconds=round(found.seconds, 1))
     return _verdict(row, found, {test.id: test.seconds for test in tests}, there)
 
 

@@ -52,10 +52,13 @@ class Reach:
                 found.setdefault(call, []).append(test)
         return found
 
-    def of(self, file: str, source: str, line: int) -> list[Measured]:
+    def of(self, file: str, source: str, line: int, whole: bool = False) -> list[Measured]:
         """Tests that a change in a line can be seen by, the cheapest first: those that call the function it is in; of
-        what runs at import, those that call what is defined there, or a function that names it; else all."""
+        what runs at import, those that call what is defined there, or a function that names it; else all. ``whole``:
+        of what runs at import, all."""
         inside = set(functions(source, line))
+        if whole and not inside:
+            return list(self.tests)
         calls = {(file, name) for name in inside} if inside else self._naming(file, defined(source, line))
         return [test for test in self.tests if test.calls & calls] or list(self.tests)
 
