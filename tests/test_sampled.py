@@ -45,19 +45,19 @@ def test_waits():
 #: A project of its own, tried as it is and with two mutants: what is caught, what is not, what does not end.
 TRIED = '''
 import json, pathlib, sys
-from verification.sampled import reach, trying
+from verification.sampled import hunting, reach, trying
 there = pathlib.Path(sys.argv[1]).resolve()
 module = there / "repro" / "m.py"
 code = module.read_text()
 import repro  # of the checkout, where there is no m
 def run(tests, old="", new="", limit=30.0):
-    module.write_text(code.replace(old, new))
+    hunting.put(module, code.replace(old, new))
     found = trying.run(there, ["tests/test_m.py::" + name for name in tests], limit)
     return [found.failed, found.stopped]
 small, waits = ["test_small"], ["test_waits"]
 told = {"sound": run(["test_waits", "test_box", "test_small"]), "caught": run(small, "< LIMIT", "> LIMIT"),
         "survivor": run(small, "least < given", "least <= given"), "endless": run(waits, "< LIMIT", "<= LIMIT", 2.0)}
-module.write_text(code)
+hunting.put(module, code)
 told["reach"] = {id: calls for id, (_, calls) in reach._measure(there, "test_m.py").items()}
 print(json.dumps(told))
 '''
@@ -120,7 +120,7 @@ def test_tests_are_those_that_call_the_function_the_cheapest_first(monkeypatch):
 
 def test_mutants_are_caught_survive_or_do_not_end_and_calls_are_seen(tmp_path):
     """In processes of their own, and in those which tests start. Mutants: sys.modules not cleared, PYTHONPATH of the
-    checkout."""
+    checkout, a module written without a time of its own."""
     project = tmp_path / "project"
     for name, text in {"repro/__init__.py": "", "repro/m.py": CODE, "tests/__init__.py": "", "tests/test_m.py": TESTS,
                        "pytest.ini": "[pytest]\n"}.items():
