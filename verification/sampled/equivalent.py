@@ -57,4 +57,12 @@ LEFT: dict[tuple[str, str, str], tuple[str, str]] = {
      'hint = did_you_mean(elsewhere(".".join(part for part in path if part)[: 59], known))'):
         ("Of a key of sixty characters and more that is misspelt, one less is compared with those that there are.",
          "No key is nearly as long; the bound only keeps the comparison short."),
+    ("model/transport.py", "woken = (iterate.fractions <= 0) & (predicted <= 0) & (there > 0)",
+     "woken = (iterate.fractions <= 0) & (predicted != 0) & (there > 0)"):
+        ("Newton's method goes on from another fraction where one was zero and another is predicted; what it ends at "
+         "is the same to its tolerance.", "It takes more or fewer iterations in starved pores, which nothing bounds."),
+    ("report/charts.py", "digits = max(0, -math.floor(math.log10(step) + 1e-9))",
+     "digits = max(0, -math.floor(math.log10(step) // 1e-9))"):
+        ("Ticks get as many digits as there is memory for.",
+         "The first test that draws a chart never ends, which is told as a timeout."),
 }

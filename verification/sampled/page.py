@@ -19,8 +19,7 @@ def judged(rows: list[Row]) -> dict[str, list[Row]]:
     """Rows by verdict: caught, timeout, survivor, equivalent."""
     found: dict[str, list[Row]] = {"caught": [], "timeout": [], "survivor": [], "equivalent": []}
     for row in rows:
-        excused = row.verdict == "survivor" and key(row) in EQUIVALENT
-        found["equivalent" if excused else row.verdict].append(row)
+        found[_word(row)].append(row)
     return found
 
 
@@ -90,7 +89,7 @@ def _operator(row: Row) -> str:
 
 
 def _word(row: Row) -> str:
-    return "equivalent" if row.verdict == "survivor" and key(row) in EQUIVALENT else row.verdict
+    return "equivalent" if row.verdict != "caught" and key(row) in EQUIVALENT else row.verdict
 
 
 def _survivors(found: dict[str, list[Row]]) -> list[Block]:
