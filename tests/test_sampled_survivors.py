@@ -25,12 +25,13 @@ from repro.march.simulation import simulate, steps
 from repro.model import kinetics, remeshing
 from repro.model.contact import contact_lines, middle_of
 from repro.model.pore import initial_outline, seeded, solve
-from repro.report import charts, fields
-from repro.results import netcdf
+from repro.report import charts, fields, run_page
+from repro.results import names, netcdf, vtu
 from repro.scene import SceneError, load_scene
 from repro.sweep import page, table
 from repro.sweep.design import parse
 from repro.sweep.picture import LEVELS, Axis
+from tests import pages
 
 STATUS = Path("/proc/self/status")
 
@@ -253,3 +254,29 @@ def test_growth_does_not_change_with_a_substrate_that_is_not_there():
     assert not np.any(kinetics.growth_slopes(none, none, scene.substrates, scene.kinetics))
     by_acceptor, by_donor = kinetics.growth_slopes(none, none + 5.0, scene.substrates, scene.kinetics)
     assert not by_acceptor.any() and not by_donor.any()
+
+
+def test_a_label_has_the_unit_where_there_is_one():
+    """Mutant: where there is none."""
+    assert names.with_unit("mean_velocity_m_per_d") == "mean velocity (m/day)"
+    assert names.with_unit("nodes") == names.words("nodes") and "(" not in names.with_unit("nodes")
+
+
+def test_what_is_modelled_is_told():
+    """Mutant: the other way round."""
+    assert run_page._sentence(["flow", "growth"]) == "Modelled: flow; growth."
+    assert run_page._sentence([]) == "Modelled: the geometry and its mesh."
+
+
+def test_fields_of_the_aggregate_alone_are_those_that_the_fluid_has_not(tmp_path):
+    """Read from a file of a run: NaN in every node or triangle of the fluid, and biomass, of which it has none. Mutant:
+    none of them."""
+    out = pages.run(tmp_path, "base", pages.FAST, 'growth.end="0 h"')
+    grid = vtu.read(fields.index(out)[-1][1])
+    region = grid.cell_data["region"][0] > 0.5
+    outside = np.setdiff1d(np.arange(len(grid.points)), grid.cells[0].data[region])
+    parts = {name: values[outside] for name, values in grid.point_data.items()}
+    parts |= {name: values[0][~region] for name, values in grid.cell_data.items()}
+    absent = {name for name, values in parts.items() if name in fields.SHOWN and np.isnan(values).all()}
+    assert len(absent) > 5 and fields.OF_AGGREGATE & set(parts) & set(fields.SHOWN) == absent | {
+        "active_biomass", "inert_biomass"}

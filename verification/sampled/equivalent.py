@@ -46,6 +46,8 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
      """components = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else \"\"""",
      """components = f' NumberOfComponents="{values.shape[1]}"' if values.ndim >= 2 else \"\""""):
         "Arrays of a file have one or two axes.",
+    ("report/run_page.py", 'several=hidden[packed["of"] > 1])', 'several=hidden[packed["of"] != 1])'):
+        "There is one frame or more: without any, nothing is packed, and nothing shown.",
 }
 
 #: (effect, why no test)
@@ -65,4 +67,7 @@ LEFT: dict[tuple[str, str, str], tuple[str, str]] = {
      "digits = max(0, -math.floor(math.log10(step) // 1e-9))"):
         ("Ticks get as many digits as there is memory for.",
          "The first test that draws a chart never ends, which is told as a timeout."),
+    ("run/cache.py", "if len(missing) > 1:", "if len(missing) == 1:"):
+        ("Several runs are made one after the other and not side by side; they are the same.",
+         "It takes as many cores as it saves time for, which no test can count on."),
 }
