@@ -15,6 +15,7 @@ CODE = '''"""A module."""
 from os import path
 
 LIMIT = 3
+SQUARES = {k * k for k in range(LIMIT)}
 
 
 def small(value: int | float, *, least=0) -> bool | None:
@@ -93,7 +94,7 @@ def test_what_is_drawn_is_python_and_no_annotation():
         assert text != CODE and "int | float" in text and "bool | None" in text and '"""Is it 1 or 2?"""' in text
     places = {(mutant.line, mutant.column) for mutant in found}
     assert len(places) == len(found) == len(set(changed.values()))
-    assert {mutant.line for mutant in found} == {4, 7, 9, 10, 14, 17}
+    assert {mutant.line for mutant in found} == {4, 5, 8, 10, 11, 15, 18}
 
 
 def test_a_line_is_in_functions_or_defines_names():
@@ -101,6 +102,7 @@ def test_a_line_is_in_functions_or_defines_names():
     loop = numbers["        return [2 * k for k in range(self.size)]"]
     assert set(reach.functions(CODE, loop)) == {"Box.twice", "Box.twice.<locals>.<listcomp>"}
     assert set(reach.functions(CODE, numbers["LIMIT = 3"])) == set()
+    assert set(reach.functions(CODE, numbers["SQUARES = {k * k for k in range(LIMIT)}"])) == set()
     assert set(reach.functions(CODE, numbers["    size = LIMIT + 1"])) == set()
     assert reach.defined(CODE, numbers["LIMIT = 3"]) == {"LIMIT"}
     assert reach.defined(CODE, numbers["    size = LIMIT + 1"]) == {"Box"}
@@ -111,8 +113,9 @@ def test_tests_are_those_that_call_the_function_the_cheapest_first(monkeypatch):
     quick, slow = (Measured(name, cost, frozenset({("m.py", "small")})) for name, cost in (("q", 0.1), ("s", 9.0)))
     box = Measured("b", 1.0, frozenset({("m.py", "Box.twice")}))
     known = Reach((quick, box, slow))
-    assert known.of("m.py", CODE, 10) == [quick, slow] == known.of("m.py", CODE, 4)
-    assert known.of("m.py", CODE, 14) == [box] == known.of("m.py", CODE, 17)
+    assert known.of("m.py", CODE, 11) == [quick, slow] == known.of("m.py", CODE, 4)
+    assert known.of("m.py", CODE, 15) == [box] == known.of("m.py", CODE, 18)
+    assert known.of("m.py", CODE, 11, True) == [quick, slow] and known.of("m.py", CODE, 4, True) == [quick, box, slow]
     assert known.of("m.py", CODE, 2) == [quick, box, slow]
     assert hunting.alike("tests/test_sweep_design.py::test_x", "sweep/design.py") == 2
     assert hunting.within([quick, box, slow], 5.0) == [quick, box] and hunting.within([slow], 5.0) == [slow]

@@ -20,6 +20,7 @@ LIVE = ROOT / "verification" / "report" / "live"
 MAP = LIVE / "sampled-reach.jsonl"
 #: Tests of what the code's text is, not of what it does: any change of it is one to them.
 OF_TEXT = {"test_mutants.py", "test_architecture.py", "test_mentions.py", "test_published.py"}
+AT_IMPORT = {"<listcomp>", "<setcomp>", "<dictcomp>", "<genexpr>"}
 #: Seconds of processor time that one file of tests may take, traced.
 LONGEST = 900
 
@@ -69,12 +70,14 @@ class Reach:
 
 
 def functions(source: str, line: int) -> Iterator[str]:
-    """Qualified names of the functions, comprehensions and lambdas that execute something in a line."""
+    """Qualified names of the functions, comprehensions and lambdas that execute something in a line; a comprehension of
+    a module runs at import."""
     def walk(code) -> Iterator[str]:
         for inner in code.co_consts:
             if hasattr(inner, "co_lines"):
                 is_class = not inner.co_flags & 2
-                if not is_class and any(number == line for *_, number in list(inner.co_lines())[1:]):
+                at_import = is_class or inner.co_qualname in AT_IMPORT
+                if not at_import and any(number == line for *_, number in list(inner.co_lines())[1:]):
                     yield inner.co_qualname
                 yield from walk(inner)
     return walk(compile(source, "", "exec"))
