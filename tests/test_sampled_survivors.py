@@ -17,7 +17,7 @@ import repro
 from repro import results, timing
 from repro.check import cost, numbers, simplifications
 from repro.cli import sweep
-from repro.errors import Unresolved
+from repro.errors import CheckpointError, Unresolved
 from repro.fem import linear
 from repro.fem.brief import brief
 from repro.fem.outline import BOTTOM
@@ -27,10 +27,12 @@ from repro.model.contact import contact_lines, middle_of
 from repro.model.pore import initial_outline, seeded, solve
 from repro.report import charts, fields, run_page
 from repro.results import names, netcdf, vtu
+from repro.run import checkpoint, stored
 from repro.scene import SceneError, load_scene
 from repro.sweep import page, table
-from repro.sweep.design import parse
+from repro.sweep.design import Point, parse
 from repro.sweep.picture import LEVELS, Axis
+from repro.sweep.state import Sweep
 from tests import pages
 
 STATUS = Path("/proc/self/status")
@@ -280,3 +282,42 @@ def test_fields_of_the_aggregate_alone_are_those_that_the_fluid_has_not(tmp_path
     absent = {name for name, values in parts.items() if name in fields.SHOWN and np.isnan(values).all()}
     assert len(absent) > 5 and fields.OF_AGGREGATE & set(parts) & set(fields.SHOWN) == absent | {
         "active_biomass", "inert_biomass"}
+
+
+@pytest.mark.parametrize("status, told", [("failed: TransportError: at t = 3 h", "failed"), ("completed", "completed"),
+                                          ("not run", "not run")])
+def test_the_table_of_a_sweep_tells_how_a_run_ended(status, told):
+    """In a word; the reason is in the run's own folder. Mutant: a colon."""
+    factor = parse("pore.width=40 um, 50 um")
+    point = Point(1, ("40 um",), load_scene("flow_only"))
+    none = np.zeros(0)
+    row = page._row(Sweep(Path("s"), "base", (factor,), (point,)), table.Told(
+        point, status, none, none, none, dict.fromkeys(table.COLUMNS)))
+    assert re.search(r'<td class="text[ a-z]*">([^<]*)</td></tr>$', row)[1] == told
+
+
+def test_bytes_after_the_last_array_are_refused():
+    """Mutant: they are left."""
+    one = [["a", "<f8", [1], "C"]]
+    assert checkpoint._arrays(one, memoryview(bytes(8)))["a"] == [0.0]
+    for size in (7, 9, 16):
+        with pytest.raises(CheckpointError):
+            checkpoint._arrays(one, memoryview(bytes(size)))
+
+
+@pytest.mark.parametrize("cells, loop, holds", [([0, 1, 2, 3, 4, 5], [0, 3, 1, 4, 2, 5], True),
+                                                ([0, 1, 2, 4, 5, 6], [0, 4, 1, 5, 2, 6], False),
+                                                ([0, 1, 2, 3, 4, 5], [0, 3, 1], False)])
+def test_corners_come_first_and_a_boundary_has_as_many_middles(cells, loop, holds):
+    """Mutant: refused only where both are wrong."""
+    with contextlib.nullcontext() if holds else pytest.raises(CheckpointError, match="order"):
+        stored._check_order(np.array([cells]), np.array(loop))
+
+
+def test_a_pore_without_an_aggregate_is_kept_and_read():
+    """Mutant: a state without an aggregate's nodes is taken for one with some."""
+    scene = load_scene("flow_only", unset=["aggregate"])
+    state, _ = next(steps(scene))
+    assert scene.aggregate is None and state.pore.outline is None
+    again = stored.unpacked(scene, *stored.packed(scene, state))
+    assert np.array_equal(again.pore.mesh.points, state.pore.mesh.points)
