@@ -70,4 +70,7 @@ LEFT: dict[tuple[str, str, str], tuple[str, str]] = {
     ("run/cache.py", "if len(missing) > 1:", "if len(missing) == 1:"):
         ("Several runs are made one after the other and not side by side; they are the same.",
          "It takes as many cores as it saves time for, which no test can count on."),
+    ("sweep/cluster.py", "except TimeoutError:", "except CosmicRayTestingException:"):
+        ("A scheduler that does not answer is told of by another error than the one line that names it.",
+         "Tests with a cluster run in make test-thorough alone."),
 }
