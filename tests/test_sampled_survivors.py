@@ -321,3 +321,10 @@ def test_a_pore_without_an_aggregate_is_kept_and_read():
     assert scene.aggregate is None and state.pore.outline is None
     again = stored.unpacked(scene, *stored.packed(scene, state))
     assert np.array_equal(again.pore.mesh.points, state.pore.mesh.points)
+
+
+@pytest.mark.skipif(not STATUS.exists(), reason="the system tells the memory of a process there")
+def test_a_trial_tells_the_memory_before_and_at_its_peak():
+    """Mutant: neither."""
+    before, peak = cost.tried(load_scene("base", ["numerics.preset=fast"]), 300).memory
+    assert 10 < before <= peak
