@@ -12,10 +12,10 @@ export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
-.PHONY: help env figures check-manifest claims sensitivity verify verify-fast mutants test test-thorough lint bench crate clean
+.PHONY: help env figures check-manifest claims sensitivity verify verify-fast mutants mutants-sampled test test-thorough lint bench crate clean
 
 help:
-	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1|\2/p' Makefile | awk -F'|' '{ printf "  make %-14s %s\n", $$1, $$2 }'
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/\1|\2/p' Makefile | awk -F'|' '{ printf "  make %-16s %s\n", $$1, $$2 }'
 
 env: $(STAMP) ## make .venv from requirements.lock, with this package in it (PYTHON=python3.12 ...)
 
@@ -40,6 +40,10 @@ verify-fast: $(STAMP) ## the quick ones of these cases, which make test runs too
 
 mutants: $(STAMP) ## run wrong changes of the code against the cases and tests, each of which must be caught
 	@$(BIN) -m verification.mutants
+
+mutants-sampled: $(STAMP) ## mutants made by machine, a sample of them from all of repro/, against the tests; goes on where it was stopped
+	@$(PIP) --require-hashes --no-deps --only-binary :all: -r verification/sampled/requirements.lock
+	@$(BIN) -m verification.sampled
 
 test: $(STAMP) ## run the tests, a process a core
 	@$(BIN) -m pytest -n logical --dist worksteal

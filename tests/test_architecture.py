@@ -265,10 +265,20 @@ def test_the_lock_pins_every_direct_dependency_within_its_bounds():
     pins = {}
     for name, pinned in PIN.findall(LOCK):
         pins.setdefault(name, []).append(version(pinned))
-    optional = {name: needed for name, needed in EXTRAS.items() if name != "fast"}  # which `make env` leaves out
+    left_out = ("fast", "mutation")  # by `make env`
+    optional = {name: needed for name, needed in EXTRAS.items() if name not in left_out}
     for requirement in RUNTIME + [r for rs in optional.values() for r in rs] + PROJECT["build-system"]["requires"]:
         lowest = version(re.search(r">=([\d.]+)$", requirement)[1])
         assert min(pins.get(name_of(requirement), [()])) >= lowest, requirement
+
+
+def test_the_lock_of_mutants_made_by_machine_is_as_strict():
+    lock = (ROOT / "verification" / "sampled" / "requirements.lock").read_text(encoding="utf-8")
+    assert faults(lock) == []
+    pins = {name: version(pinned) for name, pinned in PIN.findall(lock)}
+    assert lock.count("--hash=sha256:") >= len(pins) > 1
+    for requirement in EXTRAS["mutation"]:
+        assert pins[name_of(requirement)] >= version(re.search(r">=([\d.]+)$", requirement)[1])
 
 
 def test_lines_of_the_package_are_short():

@@ -69,7 +69,7 @@ NUMBERS = (
 COLUMNS = [each.name for each in NUMBERS]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Told:
     """A run as a sweep tells it.
 

@@ -1,0 +1,200 @@
+"""The sample: mutants drawn from all that cosmic-ray's operators can make of ``repro/``, spread over modules by size.
+
+A module gives as many as it has statements, in proportion, and one at least. Of a module, places are drawn first (an
+operator, a number, a condition, a loop) and then one change of each: the ways to replace a "+" are not so many chances.
+What is drawn follows from the seed and from the text of a line and its neighbours alone, so that a change of the code
+elsewhere leaves a mutant as it is.
+
+Left out is what no test can tell or every test does: annotations, imports for types, and changes that leave no value at
+all ("a @ b" to "a >> b"), which would only make the share that is caught look better. Docstrings, ``__all__`` and the
+texts of messages are strings, which no operator changes.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import re
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+
+from verification.sampled.trying import ROOT
+
+SEED = 2001
+COUNT = 210
+_ARITHMETIC = {"Add", "Sub", "Mul", "Div", "FloorDiv", "Mod", "Pow"}
+_ORDER = {"Eq", "NotEq", "Lt", "LtE", "Gt", "GtE"}
+_SETS = {"BitOr", "BitAnd", "BitXor"}
+#: Replacements that are made, of "X" by "Y"; by cosmic-ray's names.
+_ALIKE = (_ARITHMETIC, _ORDER, _SETS, {"Is", "IsNot"})
+_ALONE = {"AddNot", "ReplaceTrueWithFalse", "ReplaceFalseWithTrue", "ReplaceAndWithOr", "ReplaceOrWithAnd",
+          "ReplaceBreakWithContinue", "ReplaceContinueWithBreak", "ExceptionReplacer", "NumberReplacer",
+          "RemoveDecorator", "ZeroIterationForLoop", "ReplaceUnaryOperator_Delete_USub",
+          "ReplaceUnaryOperator_Delete_Not", "ReplaceUnaryOperator_Delete_Invert",
+          "ReplaceBinaryOperator_MatMult_Mul"}
+_PAIR = re.compile(r"Replace(?:Binary|Comparison)Operator_([A-Za-z]+)_([A-Za-z]+)")
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """The ``occurrence``-th change that an operator can make of a file of ``repro/``, from ``old`` to ``new``."""
+
+    file: str
+    line: int
+    column: int
+    operator: str
+    occurrence: int
+    old: str = ""
+    new: str = ""
+
+    @property
+    def name(self) -> str:
+        """16 hexadecimal digits that stand for the file, what is changed and what it becomes."""
+        return digest(self.file, self.old, self.new, self.column, self.operator)
+
+
+def digest(*parts: object) -> str:
+    """16 hexadecimal digits that stand for some parts."""
+    return hashlib.sha256("|".join(map(str, parts)).encode()).hexdigest()[:16]
+
+
+def sources(root: Path = ROOT) -> dict[str, str]:
+    """Texts of the modules of repro/ by file."""
+    return {path.relative_to(root / "repro").as_posix(): path.read_text(encoding="utf-8")
+            for path in sorted((root / "repro").rglob("*.py"))}
+
+
+def sample(texts: dict[str, str], count: int = COUNT, seed: int = SEED) -> list[Mutant]:
+    """``count`` mutants of the modules."""
+    places = {file: _places(file, text) for file, text in texts.items() if text.strip()}
+    places = {file: found for file, found in places.items() if found}
+    sizes = {file: min(statements(texts[file]), len(places[file])) for file in places}
+    shares = shared(sizes, {file: len(found) for file, found in places.items()}, count)
+    return [mutant for file, share in shares.items() for mutant in _drawn(places[file], texts[file], share, seed)]
+
+
+def statements(text: str) -> int:
+    """Statements of a module, docstrings not counted."""
+    nodes = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.stmt)]
+    return sum(not (isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)) for node in nodes)
+
+
+def shared(sizes: dict[str, int], most: dict[str, int], count: int) -> dict[str, int]:
+    """``count`` in proportion to sizes, one at least and no more than there are, by largest remainders."""
+    shares = dict.fromkeys(sizes, 1)
+    for _ in range(count - len(shares)):
+        free = [name for name in shares if shares[name] < most[name]]
+        if not free:
+            break
+        shares[max(free, key=lambda name: sizes[name] / (shares[name] + 0.5))] += 1
+    return shares
+
+
+def _places(file: str, text: str) -> dict[tuple[int, int], list[Mutant]]:
+    """Changes of a module by the (line, column) that they are made at."""
+    hidden = _hidden(text)
+    found: dict[tuple[int, int], list[Mutant]] = {}
+    for name in _operators():
+        for occurrence, (line, column) in enumerate(_positions(text, name)):
+            if not any(first <= (line, column) < last for first, last in hidden):
+                found.setdefault((line, column), []).append(Mutant(file, line, column, name, occurrence))
+    return found
+
+
+def _operators() -> list[str]:
+    from cosmic_ray.operators.provider import OperatorProvider
+    return sorted(name for name in OperatorProvider() if name in _ALONE or _alike(name))
+
+
+def _alike(name: str) -> bool:
+    pair = _PAIR.fullmatch(name)
+    return bool(pair) and any({*pair.groups()} <= alike for alike in _ALIKE)
+
+
+def _hidden(text: str) -> list[tuple[tuple[int, int], tuple[int, int]]]:
+    """From where to where annotations and blocks of imports for types go."""
+    hidden: list[ast.AST] = []
+    for node in ast.walk(ast.parse(text)):
+        hidden += [part for part in (getattr(node, "annotation", None), getattr(node, "returns", None)) if part]
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            hidden.append(node)
+    return [((part.lineno, part.col_offset), (part.end_lineno, part.end_col_offset)) for part in hidden]
+
+
+@cache
+def _parsed(text: str):
+    from cosmic_ray.ast import ast_nodes, get_ast
+    return list(ast_nodes(get_ast(text)))
+
+
+def _operator(name: str):
+    from cosmic_ray.operators.provider import OperatorProvider
+    return OperatorProvider()[name]()
+
+
+def _positions(text: str, name: str) -> list[tuple[int, int]]:
+    operator = _operator(name)
+    return [start for node in _parsed(text) for start, _ in operator.mutation_positions(node)]
+
+
+def _drawn(places: dict[tuple[int, int], list[Mutant]], text: str, share: int, seed: int) -> list[Mutant]:
+    """``share`` mutants of a module, at as many places, in the order of the text."""
+    lines = text.splitlines()
+
+    def rank(mutant: Mutant, *more: object) -> str:
+        near = [line.strip() for line in lines[max(mutant.line - 2, 0):mutant.line + 1]]
+        return digest(seed, mutant.file, *near, *more)
+
+    drawn: list[Mutant] = []
+    for place in sorted(places, key=lambda place: (rank(places[place][0], place[1]), place)):
+        least = min(places[place], key=lambda mutant: rank(mutant, mutant.operator, place[1], mutant.occurrence % 2))
+        if len(drawn) == share:
+            break
+        if _is_python(mutated(text, least)):
+            drawn.append(made(text, least))
+    return sorted(drawn, key=lambda mutant: (mutant.line, mutant.column))
+
+
+def _is_python(text: str) -> bool:
+    """cosmic-ray takes the stars of "**given" and of "*, name" for operators."""
+    try:
+        compile(text, "", "exec")
+    except SyntaxError:
+        return False
+    return True
+
+
+def made(text: str, mutant: Mutant) -> Mutant:
+    """The mutant with the lines that it changes; of a decorator with the line that follows."""
+    if mutant.operator == "RemoveDecorator":
+        old, new = text.splitlines()[mutant.line - 1:mutant.line + 1]
+        return replace(mutant, old=f"{old.strip()} {new.strip()}", new=new.strip())
+    before, after = text.splitlines(), mutated(text, mutant).splitlines()
+    while before and after and before[0] == after[0]:
+        del before[0], after[0]
+    while before and after and before[-1] == after[-1]:
+        del before[-1], after[-1]
+    old, new = ("\n".join(line.strip() for line in lines) for lines in (before, after))
+    return replace(mutant, old=old, new=new)
+
+
+def mutated(text: str, mutant: Mutant) -> str:
+    """The whole changed text of the module."""
+    from cosmic_ray.ast import Visitor, get_ast
+
+    class Change(Visitor):
+        """Changes the one node that has the occurrence."""
+
+        left = mutant.occurrence
+        operator = _operator(mutant.operator)
+
+        def visit(self, node):
+            """The node, changed if its turn has come."""
+            for index, _ in enumerate(self.operator.mutation_positions(node)):
+                self.left -= 1
+                if self.left == -1:
+                    return self.operator.mutate(node, index)
+            return node
+
+    return Change().walk(get_ast(text)).get_code()
