@@ -76,7 +76,6 @@ def test_a_module_gives_as_many_as_its_size_and_one_at_least():
 
 
 def test_a_sample_follows_from_its_seed_and_from_the_lines_around_alone():
-    """Mutant: the number of a line in what ranks it."""
     texts = {"a.py": CODE, "b.py": CODE.replace("LIMIT", "MOST")}
     first = drawn(texts)
     assert first == drawn(texts) and len(first) == 12 and {mutant.file for mutant in first} == set(texts)
@@ -86,7 +85,7 @@ def test_a_sample_follows_from_its_seed_and_from_the_lines_around_alone():
 
 
 def test_what_is_drawn_is_python_and_no_annotation():
-    """All that there is is drawn. Mutants: hidden places not left out; no compilation."""
+    """All that there is is drawn."""
     found = drawn({"a.py": CODE}, 1000)
     changed = {mutant: drawing.mutated(CODE, mutant) for mutant in found}
     for mutant, text in changed.items():
@@ -122,8 +121,7 @@ def test_tests_are_those_that_call_the_function_the_cheapest_first(monkeypatch):
 
 
 def test_mutants_are_caught_survive_or_do_not_end_and_calls_are_seen(tmp_path):
-    """In processes of their own, and in those which tests start. Mutants: sys.modules not cleared, PYTHONPATH of the
-    checkout, a module written without a time of its own."""
+    """In processes of their own, and in those which tests start."""
     project = tmp_path / "project"
     for name, text in {"repro/__init__.py": "", "repro/m.py": CODE, "tests/__init__.py": "", "tests/test_m.py": TESTS,
                        "pytest.ini": "[pytest]\n"}.items():
@@ -181,7 +179,6 @@ def rows(**counts):
     ({}, False),
 ])
 def test_the_share_is_that_of_the_caught(counts, holds):
-    """Mutant: what does not end counted as caught."""
     assert page.holds(page.judged(rows(**counts))) is holds
 
 

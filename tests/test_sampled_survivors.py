@@ -47,13 +47,13 @@ def classes():
 
 
 def test_states_are_made_and_not_changed():
-    """What a cache derives from never changes. Mutant: frozen=False."""
+    """What a cache derives from never changes."""
     loose = {name for name, each in classes().items() if not each.__dataclass_params__.frozen}
     assert loose == {"repro.run.record.Record"}
 
 
 def test_what_holds_arrays_is_the_same_where_it_is_the_same_object():
-    """Arrays have no one truth to compare them by. Mutant: eq=True."""
+    """Arrays have no one truth to compare them by."""
     holding = {name for name, each in classes().items() if each.__dataclass_params__.eq
                and any("ndarray" in str(part.type) for part in dataclasses.fields(each))}
     assert holding == set() and len(classes()) > 50
@@ -61,13 +61,12 @@ def test_what_holds_arrays_is_the_same_where_it_is_the_same_object():
 
 @pytest.mark.skipif(not STATUS.exists(), reason="the system tells the memory of a process there")
 def test_memory_is_in_megabytes():
-    """As the kernel tells it, in kB. Mutant: the unit of another system."""
+    """As the kernel tells it, in kB."""
     told = {name: value for name, value in (line.split(":", 1) for line in STATUS.read_text().splitlines())}
     assert cost._memory() == pytest.approx(int(told["VmHWM"].split()[0]) / 1024, rel=0.02)
 
 
 def test_a_seed_at_both_walls_is_in_contact_from_the_start():
-    """Mutant: one hour later."""
     scene = load_scene("base", ["aggregate.radius=49.9 um"])
     assert numbers.at_start(scene).contact == 0.0
     assert numbers.at_start(load_scene("base")).contact is None
@@ -75,7 +74,7 @@ def test_a_seed_at_both_walls_is_in_contact_from_the_start():
 
 @pytest.mark.parametrize("half, kind", [("0.02 mg/L", "zero-order front"), ("20 mg/L", "layer of first-order uptake")])
 def test_a_layer_too_thin_is_told_by_its_kind(half, kind):
-    """Of zero order where the supply is above the half saturation. Mutant: the other way round."""
+    """Of zero order where the supply is above the half saturation."""
     scene = load_scene("wide", [f'substrates.donor.half_saturation="{half}"', 'kinetics.maximum_density="3000000 mg/L"',
                                 "numerics.refinement=0.1"])
     found = numbers.numbers(scene, scene.flow.mean_velocity or 1e4)
@@ -84,7 +83,7 @@ def test_a_layer_too_thin_is_told_by_its_kind(half, kind):
 
 
 def test_a_hypercube_without_a_seed_is_that_of_seed_0():
-    """As the help says. Mutant: another default."""
+    """As the help says."""
     import argparse
     parser = argparse.ArgumentParser()
     sweep.add(parser.add_subparsers())
@@ -93,7 +92,6 @@ def test_a_hypercube_without_a_seed_is_that_of_seed_0():
 
 
 def test_a_brief_form_tells_what_is_public():
-    """Mutant: what begins with an underscore, and that alone."""
     @brief
     @dataclasses.dataclass(frozen=True, eq=False)
     class Field:
@@ -105,7 +103,6 @@ def test_a_brief_form_tells_what_is_public():
 
 
 def test_the_name_of_what_is_drawn_stands_in_the_middle_of_its_axis():
-    """Mutant: below the picture."""
     line = charts.Line("area", np.array([0.0, 1.0]), np.array([1.0, 2.0]))
     drawn = charts.svg(charts.Chart("Area", "area (um²)", [line]))
     top, bottom = map(float, re.search(r'class="now" x1="0" x2="0" y1="([0-9.]+)" y2="([0-9.]+)"', drawn).groups())
@@ -114,13 +111,12 @@ def test_the_name_of_what_is_drawn_stands_in_the_middle_of_its_axis():
 
 
 def test_a_run_to_a_later_end_may_go_on_from_the_seed():
-    """It is of no step that growth.end cuts. Mutant: it is told to be."""
+    """It is of no step that growth.end cuts."""
     state, instant = next(steps(load_scene("base", ["numerics.preset=fast"])))
     assert state.time == 0 and instant is not None and state.apart is False
 
 
 def test_the_middle_of_a_contact_surface_is_that_of_a_seed_anywhere():
-    """Mutant: another multiple of the sum of its ends, which is zero in the middle of the pore."""
     outline = initial_outline(load_scene("base", ["aggregate.position=40 um"]))
     on = outline.points[outline.wall == BOTTOM, 0]
     chosen = outline.points[middle_of(outline, BOTTOM), 0]
@@ -128,8 +124,7 @@ def test_the_middle_of_a_contact_surface_is_that_of_a_seed_anywhere():
 
 
 def test_contact_lines_are_where_they_are_whatever_node_is_the_first():
-    """Nodes of a ring: with the numbers shifted, the same places are found. Mutant: the neighbour before the first node
-    is the second."""
+    """Nodes of a ring: with the numbers shifted, the same places are found."""
     outline = initial_outline(load_scene("base"))
     count = len(outline.wall)
     known = sorted(contact_lines(outline, BOTTOM))
@@ -141,7 +136,7 @@ def test_contact_lines_are_where_they_are_whatever_node_is_the_first():
 
 
 def test_every_stage_of_a_step_is_timed():
-    """What a run tells its cost by. Mutant: a stage without its decorator."""
+    """What a run tells its cost by."""
     timing.reset()
     *_, last = simulate(load_scene("base", ["growth.end=0.2 h", "numerics.refinement=0.5"]))
     assert last.pore.time == 0.2
@@ -150,7 +145,7 @@ def test_every_stage_of_a_step_is_timed():
 
 
 def test_a_function_that_is_timed_is_told_by_its_own_name_and_docstring():
-    """In help and in tracebacks. Mutant: the wrapper's."""
+    """In help and in tracebacks."""
     @timing.timed("stage")
     def counted(numbers):
         """How many there are."""
@@ -161,19 +156,16 @@ def test_a_function_that_is_timed_is_told_by_its_own_name_and_docstring():
 
 @pytest.mark.parametrize("low, high, begins", [(1.0, 10.0, 0.0), (4.9, 10.0, 0.0), (5.1, 10.0, 4.0), (9.0, 10.0, 9.0)])
 def test_an_axis_begins_at_zero_where_that_is_near(low, high, begins):
-    """Mutants: never; elsewhere."""
     found = charts._roomy(low, high)
     assert found[0] == begins and found[1] >= high
 
 
 def test_ticks_of_an_axis_are_round_and_within():
-    """Mutant: other numbers."""
     assert Axis("x", 0.0, 10.0).ticks() == pytest.approx([0, 2, 4, 6, 8, 10])
     assert Axis("x", 0.31, 0.58).ticks() == pytest.approx([0.4, 0.5])
 
 
 def test_words_stand_in_the_middle_of_equal_parts_of_an_axis():
-    """Mutant: the first one at the edge."""
     factor = parse('numerics.preset="fast", "accurate", "exact"')
     axis = page._across(factor, [])
     assert [axis.part(place) for place in axis.ticks()] == pytest.approx([1 / 6, 3 / 6, 5 / 6])
@@ -181,14 +173,13 @@ def test_words_stand_in_the_middle_of_equal_parts_of_an_axis():
 
 @pytest.mark.parametrize("touches, value", [((False, True), 2.0), ((True, True), 1.0), ((False, False), np.nan)])
 def test_what_holds_at_contact_is_of_the_first_row_with_it(touches, value):
-    """Mutant: of the second one."""
     rows = np.array([0.0, 1.0])
     course = table.Course(rows, rows, rows, np.array(touches), 1.0, 0.1)
     assert np.array_equal(course.at_contact(np.array([1.0, 2.0])), value, equal_nan=True)
 
 
 def test_time_has_no_value_for_what_is_missing_in_a_file_and_columns_have(tmp_path):
-    """As CF wants it of coordinates. Mutant: the other way round."""
+    """As CF wants it of coordinates."""
     scene = load_scene("flow_only")
     netcdf.write(tmp_path / "timeseries.nc", scene, [[0.0] * len(results.COLUMNS)])
     with xarray.open_dataset(tmp_path / "timeseries.nc", engine="scipy", decode_cf=False) as found:
@@ -197,7 +188,6 @@ def test_time_has_no_value_for_what_is_missing_in_a_file_and_columns_have(tmp_pa
 
 
 def test_colours_of_values_go_from_the_first_to_the_last():
-    """Mutant: all are the first."""
     factor = parse("pore.width=40 um, 50 um, 60 um")
     assert [page._level(factor, value) for value in factor.values] == [0, (LEVELS - 1) // 2, LEVELS - 1]
     alone = parse("pore.width=40 um")
@@ -205,7 +195,6 @@ def test_colours_of_values_go_from_the_first_to_the_last():
 
 
 def test_fields_are_a_run_s_own_files_that_are_there(tmp_path):
-    """Mutant: any file that is there, or any name of the right form."""
     (tmp_path / "fields").mkdir()
     for name in ("fields/fields_0000.vtu", "other.vtu"):
         (tmp_path / name).write_text("")
@@ -216,7 +205,7 @@ def test_fields_are_a_run_s_own_files_that_are_there(tmp_path):
 
 
 def test_a_refinement_that_is_advised_resolves_and_smaller_ones_do_not():
-    """A front in a seed that is fed little. Mutant: an attempt that fails ends the search."""
+    """A front in a seed that is fed little."""
     scene = load_scene("base", ["numerics.preset=fast", "aggregate.radius=20 um", "numerics.refinement=0.1", *(
         f'substrates.{name}.{key}="{value} mg/L"' for name in ("donor", "acceptor")
         for key, value in (("supply", 0.3), ("half_saturation", 1e-3)))])
@@ -230,19 +219,17 @@ def test_a_refinement_that_is_advised_resolves_and_smaller_ones_do_not():
 
 @pytest.mark.parametrize("value, holds", [("1", True), ("1e-9", True), ("0", False), ("-0.5", False), ("1.1", False)])
 def test_a_tolerance_is_above_zero_and_at_most_one(value, holds):
-    """Mutant: zero and less."""
     with contextlib.nullcontext() if holds else pytest.raises(SceneError, match="greater than zero, at most 1"):
         assert load_scene("base", [f"numerics.tolerance={value}"]).numerics.tolerance == float(value)
 
 
 @pytest.mark.parametrize("length", ["50 um", "50 micron", "50 microns", "50 micrometers", "0.05 mm", "5e-5 m"])
 def test_a_length_is_the_same_by_any_name(length):
-    """Mutant: a micron of another size."""
     assert load_scene("base", [f'pore.width="{length}"']).pore.width == pytest.approx(50, rel=1e-14)
 
 
 def test_a_second_signal_ends_the_process_with_the_signal_s_status():
-    """128 and its number, as shells tell it. Mutant: 127."""
+    """128 and its number, as shells tell it."""
     code = ("import os, signal, time\nfrom repro.run.interrupts import SAME, noted\n"
             "with noted():\n    for _ in range(2):\n        os.kill(os.getpid(), signal.SIGTERM)\n"
             "        time.sleep(SAME + 0.2)")
@@ -250,7 +237,7 @@ def test_a_second_signal_ends_the_process_with_the_signal_s_status():
 
 
 def test_growth_does_not_change_with_a_substrate_that_is_not_there():
-    """It is a function of max(C, 0), at zero as below it. Mutant: at zero it is that above it."""
+    """It is a function of max(C, 0), at zero as below it."""
     scene = load_scene("base")
     none = np.array([0.0, -1.0])
     assert not np.any(kinetics.growth_slopes(none, none, scene.substrates, scene.kinetics))
@@ -259,20 +246,17 @@ def test_growth_does_not_change_with_a_substrate_that_is_not_there():
 
 
 def test_a_label_has_the_unit_where_there_is_one():
-    """Mutant: where there is none."""
     assert names.with_unit("mean_velocity_m_per_d") == "mean velocity (m/day)"
     assert names.with_unit("nodes") == names.words("nodes") and "(" not in names.with_unit("nodes")
 
 
 def test_what_is_modelled_is_told():
-    """Mutant: the other way round."""
     assert run_page._sentence(["flow", "growth"]) == "Modelled: flow; growth."
     assert run_page._sentence([]) == "Modelled: the geometry and its mesh."
 
 
 def test_fields_of_the_aggregate_alone_are_those_that_the_fluid_has_not(tmp_path):
-    """Read from a file of a run: NaN in every node or triangle of the fluid, and biomass, of which it has none. Mutant:
-    none of them."""
+    """Read from a file of a run: NaN in every node or triangle of the fluid, and biomass, of which it has none."""
     out = pages.run(tmp_path, "base", pages.FAST, 'growth.end="0 h"')
     grid = vtu.read(fields.index(out)[-1][1])
     region = grid.cell_data["region"][0] > 0.5
@@ -287,7 +271,7 @@ def test_fields_of_the_aggregate_alone_are_those_that_the_fluid_has_not(tmp_path
 @pytest.mark.parametrize("status, told", [("failed: TransportError: at t = 3 h", "failed"), ("completed", "completed"),
                                           ("not run", "not run")])
 def test_the_table_of_a_sweep_tells_how_a_run_ended(status, told):
-    """In a word; the reason is in the run's own folder. Mutant: a colon."""
+    """In a word; the reason is in the run's own folder."""
     factor = parse("pore.width=40 um, 50 um")
     point = Point(1, ("40 um",), load_scene("flow_only"))
     none = np.zeros(0)
@@ -297,7 +281,6 @@ def test_the_table_of_a_sweep_tells_how_a_run_ended(status, told):
 
 
 def test_bytes_after_the_last_array_are_refused():
-    """Mutant: they are left."""
     one = [["a", "<f8", [1], "C"]]
     assert checkpoint._arrays(one, memoryview(bytes(8)))["a"] == [0.0]
     for size in (7, 9, 16):
@@ -309,13 +292,11 @@ def test_bytes_after_the_last_array_are_refused():
                                                 ([0, 1, 2, 4, 5, 6], [0, 4, 1, 5, 2, 6], False),
                                                 ([0, 1, 2, 3, 4, 5], [0, 3, 1], False)])
 def test_corners_come_first_and_a_boundary_has_as_many_middles(cells, loop, holds):
-    """Mutant: refused only where both are wrong."""
     with contextlib.nullcontext() if holds else pytest.raises(CheckpointError, match="order"):
         stored._check_order(np.array([cells]), np.array(loop))
 
 
 def test_a_pore_without_an_aggregate_is_kept_and_read():
-    """Mutant: a state without an aggregate's nodes is taken for one with some."""
     scene = load_scene("flow_only", unset=["aggregate"])
     state, _ = next(steps(scene))
     assert scene.aggregate is None and state.pore.outline is None
@@ -325,6 +306,5 @@ def test_a_pore_without_an_aggregate_is_kept_and_read():
 
 @pytest.mark.skipif(not STATUS.exists(), reason="the system tells the memory of a process there")
 def test_a_trial_tells_the_memory_before_and_at_its_peak():
-    """Mutant: neither."""
     before, peak = cost.tried(load_scene("base", ["numerics.preset=fast"]), 300).memory
     assert 10 < before <= peak
