@@ -31,7 +31,7 @@ def computed(ids: tuple[str, ...] = QUICK, factor: float = 1.0) -> Numbers:
     plain, runs.load_scene = runs.load_scene, lambda name, changes=(): moved(name, changes, factor)
     try:
         with at_level(JUDGED), np.errstate(all="raise", under="ignore"):
-            return {id: [(check.quantity, check.ours, check.holds) for check in CLAIMS[id].function().checks]
+            return {id: [(check.quantity, check.value, check.holds) for check in CLAIMS[id].function().checks]
                     for id in ids}
     finally:
         runs.load_scene = plain

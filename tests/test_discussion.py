@@ -125,7 +125,7 @@ def test_what_a_variant_changes_is_measured_against_the_paper(monkeypatch):
     times = {HOUR: 10.0, bigger: 9.0}
     monkeypatch.setattr(rheology, "contact", lambda run: times[run])
     checks = rheology._changes("x", bigger)
-    assert checks[1].ours == pytest.approx(10.0) and not checks[1].holds
+    assert checks[1].value == pytest.approx(10.0) and not checks[1].holds
 
 
 def test_an_outline_that_has_slid_is_moved_back(monkeypatch):

@@ -14,7 +14,8 @@ KINDS = (".py", ".md", ".toml")
 NOT_OURS = {".venv", ".git", "out", "cache", "runs", "__pycache__", ".hypothesis"}
 #: What commands make; names in tests of what is not there, and words that stand for any name of their kind.
 MADE = {"claims.md", "codecheck.yml", "paper_figures/out/manifest.json"}
-EXAMPLES = {"repro/a.py", "repro.utils", "C38", "C99"}
+EXAMPLES = {"repro/a.py", "repro.utils", "C38", "C99", "repro/m.py", "tests/__init__.py", "tests/test_m.py",
+            "tests/test_gone.py"}
 PLACEHOLDER = re.compile(r"(?<![A-Za-z])(NAME|STAGE|N|ID)(?![A-Za-z])")
 ENDINGS = r"(?:py|md|toml|json|yml|yaml|cff|lock|css|js|svg)"
 #: A file by its place in the repository, or any page of text by its name.

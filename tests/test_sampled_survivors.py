@@ -22,7 +22,7 @@ from repro.fem import linear
 from repro.fem.brief import brief
 from repro.fem.outline import BOTTOM
 from repro.march.simulation import simulate, steps
-from repro.model import kinetics, remeshing
+from repro.model import remeshing
 from repro.model.contact import contact_lines, middle_of
 from repro.model.pore import initial_outline, seeded, solve
 from repro.report import charts, fields, run_page
@@ -234,15 +234,6 @@ def test_a_second_signal_ends_the_process_with_the_signal_s_status():
             "with noted():\n    for _ in range(2):\n        os.kill(os.getpid(), signal.SIGTERM)\n"
             "        time.sleep(SAME + 0.2)")
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 128 + signal.SIGTERM
-
-
-def test_growth_does_not_change_with_a_substrate_that_is_not_there():
-    """It is a function of max(C, 0), at zero as below it."""
-    scene = load_scene("base")
-    none = np.array([0.0, -1.0])
-    assert not np.any(kinetics.growth_slopes(none, none, scene.substrates, scene.kinetics))
-    by_acceptor, by_donor = kinetics.growth_slopes(none, none + 5.0, scene.substrates, scene.kinetics)
-    assert not by_acceptor.any() and not by_donor.any()
 
 
 def test_a_label_has_the_unit_where_there_is_one():

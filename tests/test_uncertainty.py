@@ -176,13 +176,20 @@ def test_the_converged_solution_is_refined_in_space_and_time_at_once():
     assert wide.output.times == tuple(map(float, range(1, 46)))
 
 
+#: Claims that the scheme of 2001 does not stand beside: linear elements have no permeable body (C42), and comparisons of
+#: many runs that it would take minutes to make (C41, C43).
+WITHOUT_SCHEME = ("C41", "C42", "C43")
+
+
 def test_every_claim_is_computed_on_three_meshes_and_with_three_steps_or_says_why_not():
     """And a claim about the model with the scheme beside it."""
     evaluate.register_all()
     for claim in claims.CLAIMS.values():
         kinds = [level.kind for level in claim.levels]
         if claim.about == claims.MODEL:
-            assert kinds.count(CONVERGED) == kinds.count(SCHEME) == 3 and claim.judged == claim.levels[0], claim.id
+            scheme = 0 if claim.id in WITHOUT_SCHEME else 3
+            assert kinds.count(CONVERGED) == 3 and kinds.count(SCHEME) == scheme, claim.id
+            assert claim.judged == claim.levels[0], claim.id
             assert claim.judged.size == min(claim.fine), claim.id
         elif claim.about == claims.OF_SCHEME:
             assert len(claim.sizes) >= 3 and claim.sizes[0] == claim.steps[0] == 1.0, claim.id

@@ -165,7 +165,8 @@ def test_what_is_round_off_or_another_machines_is_not_committed():
 def test_committed_pages_are_short():
     """An index, and a page a stage that a browser shows whole."""
     sizes = {path.name: path.stat().st_size for path in report.FOLDER.glob("*.md")}
-    assert {f"{stage}.md" for stage in case.STAGES} | {"REPORT.md", "mutants.md", "matrix.md"} == {*sizes}
+    assert {f"{stage}.md" for stage in case.STAGES} | {"REPORT.md", "mutants.md", "matrix.md",
+                                                          "sampled.md"} == {*sizes}
     assert sizes.pop("REPORT.md") <= 60_000 and max(sizes.values()) <= 40_000
 
 

@@ -32,8 +32,8 @@ class Sizing:
     resolved (um); gradation: growth of the size with the distance from where it is prescribed;
     front: what sizes at the aggregate are divided by besides, for a front of the substrates in it;
     contact: the size beside the contact lines with the opposite wall (um), infinite if that is none
-    of its own; seed: x (um) of the middle of the half-disc that the aggregate was at t = 0, None if it was
-    none.
+    of its own; seed: x (um) of the middle of the half-disc that the aggregate was at t = 0, None
+    if it was none.
     """
 
     width: float

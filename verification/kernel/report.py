@@ -74,7 +74,9 @@ def by_stage(results: list[Result]) -> list[tuple[str, list[Result]]]:
 #: What is judged elsewhere.
 BESIDES = ((Link("The paper's claims", "../../paper_figures/replication"), "`make claims`"),
            (Link("Ambiguities and misprints of the paper", "../../reference/ERRATA"), "`verification.errata`"),
-           (Link("What the rounding of Table 1 allows", "../sensitivity/sensitivity"), "`make sensitivity`"))
+           (Link("What the rounding of Table 1 allows", "../sensitivity/sensitivity"), "`make sensitivity`"),
+           (Link("The law for networks", "../../docs/network"), "`python -m verification.network`"),
+           (Link("Mutants made by machine", "sampled"), "`make mutants-sampled`"))
 
 
 def index(results: list[Result]) -> list[Block]:

@@ -55,10 +55,6 @@ LEFT: dict[tuple[str, str, str], tuple[str, str]] = {
     ("run/__init__.py", "INTERVAL = 60.0", "INTERVAL = 59.0"):
         ("Checkpoints are written every 59 s, and the help says so.",
          "It is a choice; what a run makes does not depend on it."),
-    ("scene/files.py", 'hint = did_you_mean(elsewhere(".".join(part for part in path if part)[:60], known))',
-     'hint = did_you_mean(elsewhere(".".join(part for part in path if part)[: 59], known))'):
-        ("Of a key of sixty characters and more that is misspelt, one less is compared with those that there are.",
-         "No key is nearly as long; the bound only keeps the comparison short."),
     ("model/transport.py", "woken = (iterate.fractions <= 0) & (predicted <= 0) & (there > 0)",
      "woken = (iterate.fractions <= 0) & (predicted != 0) & (there > 0)"):
         ("Newton's method goes on from another fraction where one was zero and another is predicted; what it ends at "

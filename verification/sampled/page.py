@@ -70,22 +70,24 @@ def text(rows: list[Row], count: int) -> str:
     """The page."""
     found = judged(rows)
     blocks = [Block("text", INTRODUCTION), Block("text", told(found, count)), *_survivors(found), *_equivalent(found)]
-    every = [(f"{row.file}:{row.line}", _operator(row), f"`{row.old}`", f"`{row.new}`", _word(row), row.test)
-             for row in rows]
-    heads = ("where", "operator", "was", "is", "verdict", "test")
-    return "# Mutants made by machine\n\n" + markdown([*blocks, Block("heading", "All mutants"), table(heads, every)],
-                                                      level=2) + "\n"
+    by_module = table(("module", "mutants", "caught"), _counts(rows))
+    whole = markdown([*blocks, Block("heading", "By module"), by_module], level=2)
+    return f"# Mutants made by machine\n\n{whole}\n"
+
+
+def _counts(rows: list[Row]) -> list[tuple[str, str, str]]:
+    """How many of each module are drawn, and caught; each is in the record."""
+    files = sorted({row.file for row in rows})
+    verdicts = {file: [row.verdict for row in rows if row.file == file] for file in files}
+    return [(file, str(len(found)), str(found.count("caught"))) for file, found in verdicts.items()]
 
 
 INTRODUCTION = (
     "`make mutants-sampled` draws them from all that cosmic-ray's operators can make of `repro/`, spread over its "
     f"modules by size, and runs each for at most {LIMIT:g} s of processor time against the tests that call the "
     "function it is in, the cheapest first; with `--whole`, survivors against all of these. A timeout is a "
-    "mutant that makes a test run without end, and is not counted as caught.")
-
-
-def _operator(row: Row) -> str:
-    return row.operator.removeprefix("Replace").replace("Operator_", " ").replace("_", " ")
+    "mutant that makes a test run without end, and is not counted as caught. Each mutant with the test that catches it "
+    "is in `sampled.json`.")
 
 
 def _word(row: Row) -> str:

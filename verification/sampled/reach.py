@@ -149,12 +149,12 @@ def _digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
 
 
-def packed(tests: dict[str, tuple[float, list[Call]]]) -> dict:
+def packed(measured: dict[str, tuple[float, list[Call]]]) -> dict:
     """Tests as they are kept: functions once, and by their number."""
-    every = sorted({call for _, calls in tests.values() for call in calls})
+    every = sorted({call for _, calls in measured.values() for call in calls})
     numbers = {call: number for number, call in enumerate(every)}
     return {"functions": every, "tests": {id: (seconds, [numbers[call] for call in calls])
-                                          for id, (seconds, calls) in tests.items()}}
+                                          for id, (seconds, calls) in measured.items()}}
 
 
 def _tests(rows: Iterable[dict]) -> Iterator[Measured]:
