@@ -176,8 +176,8 @@ def test_the_converged_solution_is_refined_in_space_and_time_at_once():
     assert wide.output.times == tuple(map(float, range(1, 46)))
 
 
-#: Claims that the scheme of 2001 does not stand beside: linear elements have no permeable body (C42), and comparisons of
-#: many runs that it would take minutes to make (C41, C43).
+#: Claims that the scheme of 2001 does not stand beside: linear elements have no permeable body (C42), and comparisons
+#: of many runs would take minutes (C41, C43).
 WITHOUT_SCHEME = ("C41", "C42", "C43")
 
 
