@@ -359,18 +359,18 @@ def test_the_recorded_verdicts_follow_from_the_recorded_numbers(kept):
 
 
 def test_no_recorded_verdict_flips_to_its_opposite(kept):
-    """With a bound moved by the bar of its number a verdict comes to be open at most, and no more than a tenth of them
-    does."""
+    """With a bound moved by the bar of its number a verdict comes to be open at most, or an open one decided; of the
+    decided ones no more than a tenth comes to be open."""
     verdicts = {each["id"]: each["verdict"] for each in kept}
     found = [flip for each in kept for flip in record.flips(each)]
     assert all(UNDECIDED in (flip.verdict, verdicts[flip.id]) for flip in found), found
-    assert len({flip.id for flip in found}) <= len(kept) // 10
+    assert len({flip.id for flip in found if verdicts[flip.id] != UNDECIDED}) <= len(kept) // 10
 
 
 def test_bars_after_contact_are_listed(kept):
     """Those of every claim about wide, the widest first."""
     found = after_contact.known(kept)
-    assert {each.id for each in found} == set(after_contact.OF_WIDE) - {"C38"}
+    assert {each.id for each in found} == set(after_contact.OF_WIDE) - {"C38", "C45"}
     evaluate.register_all()
     assert set(after_contact.OF_WIDE) == {id for id, one in claims.CLAIMS.items() if one.fine == levels.WIDE_FINE}
     assert [each.percent for each in found] == sorted((each.percent for each in found), reverse=True)

@@ -84,9 +84,9 @@ def test_without_times_every_step_is_a_row_and_there_are_25():
 
 #: A run through contact and new meshes, and rows on both sides of them.
 CONTACT = ('aggregate.radius="17.8 um"', 'pore.width="20 um"', 'flow.head="1 mm"', "numerics.tolerance=0.001")
-SCENES = {"fast": (FAST, 'growth.end="9.7 h"'), "contact": (FAST, 'growth.end="1.3 h"', *CONTACT),
-          "paper": ('growth.end="1.3 h"', *CONTACT), "gear": ('growth.end="0.7 h"', 'numerics.transport="gear"'),
-          "stress-free": (FAST, 'growth.end="1.3 h"', 'growth.new_biomass="stress_free"', *CONTACT)}
+SCENES = {"fast": (FAST, 'growth.end="9.7 h"'), "contact": (FAST, 'growth.end="0.8 h"', *CONTACT),
+          "paper": ('growth.end="0.8 h"', *CONTACT), "gear": ('growth.end="0.7 h"', 'numerics.transport="gear"'),
+          "stress-free": (FAST, 'growth.end="0.8 h"', 'growth.new_biomass="stress_free"', *CONTACT)}
 
 
 def steps_of(name, *changes):

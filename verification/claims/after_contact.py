@@ -16,7 +16,8 @@ from verification.claims import record
 
 #: The claims about wide, and what their numbers about other things or earlier instants are called.
 OF_WIDE = ("C12", "C16", "C25", "C26", "C29", "C30", "C31", "C32", "C35", "C38", "C40", "C44", "C45", "C46")
-OTHER = re.compile(r"^base|before contact|a film left|^K / K_clean =|in the 5 h before$|^uniform|^theta\(R\)")
+OTHER = re.compile(r"^base|before contact|a film left|^K / K_clean =|^the part filled|^layer|^wide, 30 h|"
+                   r"in the 5 h before$|^uniform|^theta\(R\)")
 #: Percent above which a bar is told.
 WIDE_BAR = 2.0
 
