@@ -38,7 +38,8 @@ def differing(found):
 
 
 @pytest.mark.parametrize("kernel, feature, threads, factor", [
-    KERNELS[0], *(pytest.param(*row, marks=pytest.mark.thorough) for row in KERNELS[1:])], ids=[row[0] for row in KERNELS])
+    KERNELS[0], *(pytest.param(*row, marks=pytest.mark.thorough) for row in KERNELS[1:])],
+    ids=[row[0] for row in KERNELS])
 def test_other_kernels_threads_and_coordinates_change_no_verdict(kernel, feature, threads, factor):
     """In a process of its own each."""
     if not features.get(feature):
