@@ -21,7 +21,9 @@ from repro.errors import OutputError
 
 Tell = Callable[[dict], None]
 #: Seconds between signs of life on a terminal, and without a word elsewhere: at first, and at most.
-TICK, SILENCE, LONGEST = 0.5, 1.0, 1.5
+TICK = 0.5
+SILENCE = 1.0
+LONGEST = 1.5
 #: The bar, and what takes its place on a terminal with fewer columns.
 WIDE = ("{desc} {percentage:3.0f}%|{bar}| {n:.1f} of {total:.1f} h "
         "[{elapsed} < {remaining}{postfix}]")
