@@ -66,18 +66,29 @@ def test_rows_are_at_the_reported_times_to_the_last_bit(order):
     assert all(max(now, default=0.0) <= instant.pore.time for now, instant in zip(ends, found))
 
 
-def test_without_times_every_step_is_a_row_and_there_are_25():
-    """And the last one is at the end; a run of less than 24 times 12 min has one every 12 min."""
-    for end, apart in ((4.8, 0.2), (9.59, 0.2), (9.6, 0.4), (19.4, 0.8), (45.0, 1.6)):
-        rows = stepping.rows(base(f'growth.end="{end} h"'))
-        assert 24 <= len(rows) <= 49 and rows[-1] == end and rows[0] == apart
-        assert np.diff(rows[:-1]) == pytest.approx(apart, abs=1e-9) and rows[-1] - rows[-2] <= apart * 1.0001
-    assert stepping.rows(base('growth.end="0.5 h"')) == (0.2, 0.4, 0.5)
-    assert stepping.rows(base('growth.end="0 h"')) == ()
+@pytest.mark.parametrize("end, apart", [
+    (0.001, 0.2 / 2**13), (0.01, 0.2 / 2**9), (0.5, 0.0125), (1.0, 0.025), (2.0, 0.05), (2.4, 0.1), (4.79, 0.1),
+    (4.8, 0.2), (9.59, 0.2), (9.6, 0.4), (19.4, 0.8), (45.0, 1.6)])
+def test_without_times_there_are_25_rows_at_round_times_in_a_run_of_any_length(end, apart):
+    """And the last one is at the end."""
+    rows = stepping.rows(base(f'growth.end="{end} h"'))
+    assert 24 <= len(rows) <= 49 and rows[-1] == end and rows[0] == pytest.approx(apart, abs=1e-9)
+    assert np.diff(rows[:-1]) == pytest.approx(apart, abs=2e-9) and 0 < rows[-1] - rows[-2] <= apart * 1.0001
+
+
+@pytest.mark.parametrize("end, step", [("0 h", "12 min"), ("1e-9 h", "12 min"), ("1e-8 h", "100 h"), ("1 h", "1000 h"),
+                                       ("3e-7 h", "1e-6 h")])
+def test_rows_of_runs_shorter_than_times_are_told_apart_do_not_coincide(end, step):
+    made = base(f'growth.end="{end}"', f'growth.time_step="{step}"')
+    rows = stepping.rows(made)
+    assert bool(rows) == (made.growth.end > 1e-9) and all(np.diff((0.0, *rows)) >= 0.99e-9)
+
+
+def test_without_times_every_step_is_a_row():
     found = run(base('growth.end="0.5 h"', "numerics.tolerance=0.0001"))
     steps = [row.end for instant in found for row in instant.ledgers]
     times = [instant.pore.time for instant in found]
-    assert times[-1] == steps[-1] == 0.5 and len(steps) > 2 and len(found) >= 6
+    assert times[-1] == steps[-1] == 0.5 and len(steps) > 2 and len(found) >= 25
     assert set(steps) | set(stepping.rows(base('growth.end="0.5 h"'))) == set(times[1:])
     assert all(len(instant.ledgers) == (instant.pore.time in steps) for instant in found)
 

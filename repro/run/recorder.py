@@ -206,9 +206,9 @@ class Recorder:
         self.record = before
 
     def forget(self) -> None:
-        """Be as the recorder was before t = 0."""
+        """Be as the recorder was before t = 0, but for how often the run was gone on with."""
         self.state = None
-        self.record = Record()
+        self.record = Record(resumes=self.record.resumes)
 
     def drop_later(self) -> None:
         """Remove fields that were written after the state gone on from: they are made again."""

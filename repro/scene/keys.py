@@ -363,12 +363,13 @@ PRESETS: dict[str, dict[str, str | float]] = {
 @dataclass(frozen=True)
 class Output:
     """Times (h) of the rows and fields wanted, ascending; None: every step and, with midpoint,
-    every growth.time_step or a power of two of it, 24 times or more."""
+    every growth.time_step times a power of two, such that there are 24 or more."""
 
     times: tuple[float, ...] | None = times(
         source="Figures 4-6",
         about="Times of the rows and fields wanted, which change no step; left out: every step, "
-        "with midpoint also every growth.time_step, or 2, 4, 8 ... of it with 24 rows or more")
+        "with midpoint also every 1/4, 1/2, 1, 2, 4 ... growth.time_step, so that there are 24 or "
+        "more after t = 0")
     timeseries: str = choice(
         "csv", "netcdf", source=OURS,
         about="timeseries.csv alone, or timeseries.nc besides, which needs the package xarray")
