@@ -21,6 +21,7 @@ from typing import TypeAlias
 from repro.check import numbers
 from repro.march import updates
 from repro.march.loop import Instant, PoreEnd, State
+from repro.march.pace import missed
 from repro.march.simulation import row_times
 from repro.march.simulation import steps as steps_of
 from repro.march.stepping import SHORTEST
@@ -52,13 +53,15 @@ COARSER = 0.9
 class Trial:
     """What was made for real: the first state; seconds that it and a step took (0 where there is
     none); nodes of the mesh that was tried; memory (MB) before and at its peak, None where the
-    system does not tell."""
+    system does not tell; the largest estimate of steps that miss the tolerance, 0 where none does.
+    """
 
     first: Instant
     start: float
     step: float
     nodes: int
     memory: tuple[float, float] | None
+    worst: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -87,11 +90,16 @@ def tried(scene: Scene, nodes: int) -> Trial:
     run = _until_the_end(steps_of(scene))
     first = needed(next(run)[1], "the first row")
     clock.append(perf_counter())
-    clock += [perf_counter() for _ in islice(run, MOST_STEPS)]
+    worst = 0.0
+    for state, _ in islice(run, MOST_STEPS):
+        clock.append(perf_counter())
+        if missed(state.pace, scene.numerics.tolerance):
+            worst = max(worst, state.pace.estimate)
     spent = [b - a for a, b in zip(clock, clock[1:])]
     peak = _memory()
     memory = (before, peak) if before is not None and peak is not None else None
-    return Trial(first, spent[0], min(spent[1:], default=0.0), len(first.pore.mesh.points), memory)
+    return Trial(first, spent[0], min(spent[1:], default=0.0), len(first.pore.mesh.points), memory,
+                 worst)
 
 
 def _until_the_end(run: Iterator[Made]) -> Iterator[Made]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from repro.check import numbers
 from repro.check.numbers import Number
 from repro.fem import sizing
+from repro.march.stepping import SHORTEST
 from repro.model.pore import film, resolution
 from repro.model.remeshing import MOST_REFINED
 from repro.scene import Kinetics, Scene
@@ -168,6 +169,15 @@ def _steps(scene: Scene) -> Iterator[Warned]:
         yield Warned("growth.time_step", f"the aggregate grows by {100 * grown:.2g} % in a shape "
                      f"update, above {100 * GROWTH_IN_A_STEP:g} %: its rates are those of the "
                      'shape before; shorten it, or take numerics.time = "midpoint"')
+
+
+def unmet(scene: Scene, worst: float, count: str = "") -> Iterator[Warned]:
+    """A tolerance that the shortest step exceeds by its estimate, ``worst``; zero where none does.
+    count: of how many steps."""
+    if worst:
+        yield Warned("numerics.tolerance", f"{scene.numerics.tolerance:g} was not met{count}: the "
+                     f"smallest allowed step, growth.time_step / {1 / SHORTEST:g}, errs by "
+                     f"{worst:.2g} (estimate)")
 
 
 def _contact(scene: Scene) -> Iterator[Warned]:

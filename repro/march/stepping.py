@@ -98,11 +98,12 @@ def _accepted(scene: Scene, now: Pore, solved: Solved,
                 if found.gaps is not None:  # contact alone made the step short
                     return taken, after, asked
                 tried = replace(asked, length=length)
-                return taken, after, following(tried, duration, estimate, tolerance)
+                pace = following(tried, duration, estimate, tolerance)
+                return taken, after, replace(pace, length=max(pace.length, shortest))
             if found.step and found.gaps:
                 length = duration * _to_contact(found.gaps)
             else:
-                length = duration * allowed(estimate, tolerance)
+                length = max(duration * allowed(estimate, tolerance), shortest)
         except Unresolved as error:
             finer = remeshing.graded(scene, now)
             if finer is None and duration <= time_step:

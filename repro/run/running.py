@@ -375,6 +375,7 @@ def _recorded(recorder: Recorder, made: Made, progress: Progress, watch: Watch) 
 
 def _end(recorder: Recorder, status: str, watch: Watch) -> str:
     recorder.finish(status)
+    _tell_warnings(recorder.unmet(), watch)
     watch.tell({"event": "end", "scene": recorder.scene.name, "status": status,
                 "folder": str(recorder.folder), "time_h": recorder.time, "step": recorder.steps,
                 "rows": len(recorder.record.rows), "changed": True})
@@ -419,10 +420,14 @@ def _record_steps(recorder: Recorder, made: Made, progress: Progress, watch: Wat
 
 def _warn(recorder: Recorder, scene: Scene, velocity: float | None, watch: Watch) -> None:
     """Tell and record which simplifications do not hold, as ``repro check`` finds them."""
-    recorder.record.warnings = [asdict(each) for each in warned(scene, velocity)]
-    for each in recorder.record.warnings:
-        watch.tell({"event": "warning", "key": each["key"],
-                    "message": f"{each['key']}: {each['text']}"})
+    found = warned(scene, velocity)
+    recorder.record.warnings = [asdict(each) for each in found]
+    _tell_warnings(found, watch)
+
+
+def _tell_warnings(found: list[Warned], watch: Watch) -> None:
+    for each in found:
+        watch.tell({"event": "warning", "key": each.key, "message": f"{each.key}: {each.text}"})
 
 
 def warned(scene: Scene, velocity: float | None) -> list[Warned]:

@@ -13,6 +13,8 @@ LOSS = f"{DERIVED}what_a_new_mesh_loses_is_not_taken_for_made"
 DENSITY = f"{DERIVED}a_density_over_the_largest_reads_as_it_is"
 CHARTS = f"{DERIVED}every_line_of_every_chart_is_the_column_that_it_names"
 SWEEP = "tests/test_sweep.py::test_rows_have_the_values_that_their_runs_were_made_with"
+STEPPING = "tests/test_stepping.py::test_"
+NOT_MET = "tests/test_warned.py::test_a_tolerance_that_no_step_can_meet_is_told_with_what_is_reached"
 
 MUTANTS = (
     Mutant("upstream-for-downstream", COLUMNS,
@@ -324,4 +326,24 @@ MUTANTS = (
            old="    del table[last]",
            new="    table.get(last)",
            tests=("tests/test_scene.py::test_unset_leaves_keys_and_sections_out",)),
+    Mutant("rows-of-short-runs", "repro/march/stepping.py",
+           says="Rows of the midpoint rule lie no closer than growth.time_step, however short the run is.",
+           old="growth.time_step * 2.0**power",
+           new="growth.time_step * 2.0**max(0, power)",
+           tests=(f"{STEPPING}without_times_there_are_25_rows_at_round_times_in_a_run_of_any_length[1.0-0.025]",)),
+    Mutant("missed-tolerance-is-met", "repro/march/pace.py",
+           says="A tolerance counts as met until steps err by a thousand times of it.",
+           old="EXCESS * tolerance * (1 + 1e-9)",
+           new="1000 * tolerance",
+           tests=(f"{NOT_MET}[options0]",)),
+    Mutant("missed-steps-are-not-counted", "repro/run/recorder.py",
+           says="Of the steps that miss the tolerance the first alone is counted.",
+           old="self.record.missed += 1",
+           new="self.record.missed = 1",
+           tests=(f"{NOT_MET}[options0]",)),
+    Mutant("shorter-than-the-shortest", "repro/march/stepping.py",
+           says="Steps get shorter than the shortest, for a tolerance that it does not meet.",
+           old="length=max(pace.length, shortest)",
+           new="length=pace.length",
+           tests=(f"{NOT_MET}[options0]",)),
 )
