@@ -96,6 +96,7 @@ def test_what_is_warned_of_in_the_packaged_scenes(name, overrides, keys):
 
 QUIET = ("numerics.preset=paper", "growth.end=5 h", "pore.length=2000 um")
 QUIET_FAST = ("numerics.preset=fast", "growth.end=5 h", "pore.length=2000 um")
+PERMEABLE = ("aggregate.radius=20 um", "flow.biomass=brinkman", "numerics.elements=quadratic")
 FEW = ("substrates.acceptor.half_saturation=2e-3 mg/L", "substrates.donor.half_saturation=2e-3 mg/L")
 
 
@@ -139,6 +140,11 @@ FEW = ("substrates.acceptor.half_saturation=2e-3 mg/L", "substrates.donor.half_s
     # contact from 31.2 h on
     ("growth.end", ("wide", "pore.length=3000 um", "growth.end=37 h"),
      ("wide", "pore.length=3000 um", "growth.end=38 h")),
+    # elements at the interface of a seed of 20 um are 2 um, five times the root of 1.6e-13 m2; half of it where finer
+    ("flow.permeability", ("flow_only", *PERMEABLE, "flow.permeability=1.7e-13 m^2"),
+     ("flow_only", *PERMEABLE, "flow.permeability=1.5e-13 m^2")),
+    ("flow.permeability", ("flow_only", *PERMEABLE, "flow.permeability=4.2e-14 m^2", "numerics.refinement=2"),
+     ("flow_only", *PERMEABLE, "flow.permeability=3.9e-14 m^2", "numerics.refinement=2")),
     # a diffusivity of Table 1 is changed, and its partner in the aggregate too or not; F = COD - Y d_c
     ("substrates.donor.diffusivity_in_aggregate",
      ("base", *QUIET, "substrates.donor.diffusivity=2 cm^2/day", "substrates.donor.diffusivity_in_aggregate=80 %"),

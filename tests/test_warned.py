@@ -89,7 +89,8 @@ def test_numbers_that_cannot_be_worked_out_end_no_run(monkeypatch):
 
 
 #: The shortest step, 1 h / 1000, errs by 4e-11. The last step is cut, and rows lie within steps.
-STRICT = ("numerics.preset=fast", "growth.end=0.0205 h", "growth.time_step=1 h", 'output.times=["4.2e-3 h", "0.0205 h"]')
+STRICT = ("numerics.preset=fast", "growth.end=0.0205 h", "growth.time_step=1 h",
+          'output.times=["4.2e-3 h", "0.0205 h"]')
 TOLERANCES = {"missed": "numerics.tolerance=1e-12", "met": "numerics.tolerance=1e-4"}
 
 
@@ -104,7 +105,8 @@ def test_a_tolerance_that_no_step_can_meet_is_told_with_what_is_reached(tmp_path
     assert main(["run", "base", *sets, "--out", str(tmp_path), *options]) == 0
     (one,) = not_met(told(tmp_path)["warnings"])
     (line,) = [line for line in capsys.readouterr().err.splitlines() if "tolerance" in line]
-    assert line == f"repro: warning: numerics.tolerance: {one['text']}" and html.escape(one["text"]) in text_of(tmp_path)
+    assert line == f"repro: warning: numerics.tolerance: {one['text']}"
+    assert html.escape(one["text"]) in text_of(tmp_path)
     said = re.fullmatch(r"1e-12 was not met in (\d+) of (\d+) steps: the smallest allowed step, growth.time_step / "
                         r"1000, errs by (\S+) \(estimate\)", one["text"])
     states = [state for state, _ in steps(load_scene("base", (*STRICT, TOLERANCES["missed"])))]
@@ -129,7 +131,8 @@ def test_a_run_that_goes_on_counts_the_steps_before(tmp_path):
     (before,) = not_met(told(tmp_path / "parts")["warnings"])
     resume(tmp_path / "parts")
     run(scene, tmp_path / "whole")
-    assert lasting(tmp_path / "parts") == lasting(tmp_path / "whole") and before not in told(tmp_path / "parts")["warnings"]
+    assert lasting(tmp_path / "parts") == lasting(tmp_path / "whole")
+    assert before not in told(tmp_path / "parts")["warnings"]
 
 
 @pytest.mark.parametrize("tolerance, count", [("missed", 1), ("met", 0)])

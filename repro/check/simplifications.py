@@ -32,6 +32,9 @@ AFTER_CONTACT = 1.2
 #: Distances between nodes across a film, under which its flow (the cube of its thickness) is a
 #: matter of the mesh.
 ACROSS_FILM = 4.0
+#: The flow into a permeable body, exp(-y / k^1/2), turns back at nodes of elements more than 6.3
+#: (quadratic) or 5.1 (cubic) times k^1/2 across.
+DRAG_LAYER = 5.0
 
 
 @dataclass(frozen=True)
@@ -47,7 +50,7 @@ def warnings(scene: Scene, found: list[Number]) -> list[Warned]:
     value = {number.name: number.start for number in found}
     checks = [_inertia(value), _cells(scene, value), _diffusivities(scene)]
     if scene.aggregate:
-        checks += [_seed_film(scene), _ends(scene)]
+        checks += [_seed_film(scene), _ends(scene), _drag_layer(scene)]
     if scene.kinetics:
         checks += [_fronts(scene), _demand(scene.kinetics)]
     if scene.growth:
@@ -117,8 +120,7 @@ def _forces(scene: Scene, found: list[Number]) -> Iterator[Warned]:
 
 def _fronts(scene: Scene) -> Iterator[Warned]:
     thickness = numbers.at_end(scene).thickness
-    size = min(thickness / sizing.ACROSS_AGGREGATE, scene.pore.width / sizing.ACROSS_PORE)
-    nodes = size / resolution(scene) / scene.numerics.order
+    nodes = _interface_size(scene) / scene.numerics.order
     for name, s, rate in numbers.uptakes(scene):
         layer = math.inf
         if rate and s.supply:
@@ -130,6 +132,32 @@ def _fronts(scene: Scene) -> Iterator[Warned]:
                          f"(D K_s / (q X_m))^1/2 = {layer:.2g} um thick, thinner than the "
                          f"{nodes:.2g} um between nodes in the aggregate; "
                          + _resolving(resolution(scene) * nodes / layer))
+
+
+def _interface_size(scene: Scene) -> float:
+    """The size (um) of elements at the interface, where they are largest."""
+    thickness = numbers.at_end(scene).thickness
+    size = min(thickness / sizing.ACROSS_AGGREGATE, scene.pore.width / sizing.ACROSS_PORE)
+    return size / resolution(scene)
+
+
+def _drag_layer(scene: Scene) -> Iterator[Warned]:
+    permeability = scene.flow.permeability if scene.flow else None
+    layer = math.inf if permeability is None else math.sqrt(permeability)
+    size = _interface_size(scene)
+    if size > DRAG_LAYER * layer:
+        wanted = resolution(scene) * size / (DRAG_LAYER * layer)
+        yield Warned("flow.permeability", f"the flow into the aggregate fades over its root, "
+                     f"{layer:.2g} um, thinner than a fifth of the elements at the interface, "
+                     f"{size:.2g} um: velocities in the aggregate wiggle within a few elements of "
+                     "it, while conductivity, head and flow are those of finer meshes"
+                     + _finer(wanted))
+
+
+def _finer(refinement: float) -> str:
+    """What resolves a thin layer, if any refinement does that is accepted."""
+    known = refinement <= MOST_REFINED
+    return f"; numerics.refinement = {refinement:.2g} would resolve it" if known else ""
 
 
 def _resolving(refinement: float) -> str:

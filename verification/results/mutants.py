@@ -346,4 +346,9 @@ MUTANTS = (
            old="length=max(pace.length, shortest)",
            new="length=pace.length",
            tests=(f"{NOT_MET}[options0]",)),
+    Mutant("thin-drag-layers-untold", "repro/check/simplifications.py",
+           says="The layer in which a permeable body slows the water is warned of only where it is a hundred times thinner.",
+           old="size > DRAG_LAYER * layer",
+           new="size > 100 * DRAG_LAYER * layer",
+           tests=("tests/test_flow.py::test_thin_layers_of_a_permeable_body_make_its_velocities_wiggle_and_are_warned_of",)),
 )
