@@ -122,12 +122,23 @@ def test_a_forced_run_is_refused_where_others_have_files_of_its_names(tmp_path, 
     assert f"{name}: no run has written it" in refused(tmp_path, capsys, "base", *SETS, "--force")
 
 
-@pytest.mark.parametrize("content", [None, "{}", '{"scene": "x", "files": ["thesis.tex"]}'])
-def test_a_forced_run_takes_no_folder_without_a_run(tmp_path, capsys, content):
+@pytest.mark.parametrize("content, why", [
+    (None, "it holds 'thesis.tex', which is not of a run; a new or empty folder"),
+    ("", "run.json: cannot be read"), ("[" * 9999, "run.json: cannot be read"),
+    ("{}", "run.json: it has no scene or no status"),
+    ('{"scene": "x", "files": ["thesis.tex"]}', "run.json: it has no scene or no status"),
+    ('{"scene": "x", "hash": "x", "tables": {}, "status": "x", "files": ["thesis.tex"]}', "run.json: its status 'x'")])
+def test_a_forced_run_takes_no_folder_without_a_run(tmp_path, capsys, content, why):
+    """Nor one whose run.json cannot be read: one line says what is there and what to do, and nothing is changed."""
     (tmp_path / "thesis.tex").write_text("years of work")
-    if content:
+    if content is not None:
         (tmp_path / "run.json").write_text(content)
-    refused(tmp_path, capsys, "base", *SETS, "--force")
+    message = refused(tmp_path, capsys, "base", *SETS, "--force")
+    assert why in message and message.count("\n") == 1
+    assert content is None or "move the folder away, or name another" in message
+    assert (tmp_path / "thesis.tex").read_text() == "years of work"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["run.json", "thesis.tex"][content is None:]
+    assert content is None or (tmp_path / "run.json").read_text() == content
 
 
 def test_a_scene_file_that_was_changed_is_told_on_resume(tmp_path, capsys):

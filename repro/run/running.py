@@ -56,6 +56,9 @@ __all__ = ["OutputError", "Recorder", "Watch", "prepare", "resume", "run"]
 Made = Iterator[tuple[State, Instant | None]]
 #: Of what differs so many keys are told.
 MOST_SHOWN = 4
+#: What a folder of results needs, and what to do without.
+LISTED = ("it lists which files there a run has written, without which nothing is overwritten or "
+          "removed, by --force neither: move the folder away, or name another")
 #: What alone can be changed of a run that has begun.
 END = "growth.end"
 
@@ -116,7 +119,7 @@ def run(scene: Source, folder: str | Path, progress: Progress = unwatched, watch
         if not is_file(folder / PROVENANCE):
             prepare(folder)
             return _from_the_start(recorder, progress, watch)
-        told = _told(folder / PROVENANCE)
+        told = _told(folder / PROVENANCE, LISTED)
         recorder.own = listed(folder, told)
         refuse_links(folder, recorder.own)
         if force:
@@ -280,17 +283,19 @@ def _left_alone(recorder: Recorder, status: str, watch: Watch) -> str:
     return status
 
 
-def _told(path: Path) -> dict:
-    """What ``run.json`` says. Raises OutputError where it is none of a run."""
+def _told(path: Path, wanted: str = "the run.json of a run is needed") -> dict:
+    """What ``run.json`` says. Raises OutputError, with what is wanted, where it is none of a run.
+    """
     try:
         told = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         why = f"cannot be read ({error})"
-        raise OutputError(f"{path}: {why}; the run.json of a run is needed") from None
+        raise OutputError(f"{path}: {why}; {wanted}") from None
     if not _is_record(told):
-        raise OutputError(f"{path}: it has no scene or no status; the run.json of a run is needed")
+        raise OutputError(f"{path}: it has no scene or no status; {wanted}")
     if not (done(told["status"]) or undone(told["status"])):
-        raise OutputError(f"{path}: its status {told['status']!r} is none that a run writes")
+        raise OutputError(f"{path}: its status {told['status']!r} is none that a run writes; "
+                          f"{wanted}")
     return told
 
 
