@@ -103,7 +103,9 @@ def test_a_tolerance_that_no_step_can_meet_is_told_with_what_is_reached(tmp_path
     """Once, aside, in run.json and on the page: in how many of the run's steps, and the largest of their estimates."""
     sets = [part for entry in (*STRICT, TOLERANCES["missed"]) for part in ("--set", entry)]
     assert main(["run", "base", *sets, "--out", str(tmp_path), *options]) == 0
-    (one,) = not_met(told(tmp_path)["warnings"])
+    found = not_met(told(tmp_path)["warnings"])
+    assert len(found) == 1
+    (one,) = found
     (line,) = [line for line in capsys.readouterr().err.splitlines() if "tolerance" in line]
     assert line == f"repro: warning: numerics.tolerance: {one['text']}"
     assert html.escape(one["text"]) in text_of(tmp_path)

@@ -141,12 +141,12 @@ class Recorder:
     def tell(self, status: str) -> None:
         """Write ``run.json``."""
         now = self._now()
+        warnings = now.warnings + [asdict(each) for each in self.unmet()]
         self._write("run.json", results.write_json, {
             **results.provenance(self.scene), "conditions": self.conditions, "status": status,
             "files": self._files(done(status)),
             **{each.name: each.value(now) for each in record.COUNTS},
-            "resumes": now.resumes, "origin": self.origin,
-            "warnings": now.warnings + [asdict(each) for each in self.unmet()]})
+            "resumes": now.resumes, "warnings": warnings, "origin": self.origin})
 
     def _files(self, over: bool) -> list[str]:
         """The names of the run's files: those there are, or may come while it is not over."""

@@ -13,6 +13,7 @@ LOSS = f"{DERIVED}what_a_new_mesh_loses_is_not_taken_for_made"
 DENSITY = f"{DERIVED}a_density_over_the_largest_reads_as_it_is"
 CHARTS = f"{DERIVED}every_line_of_every_chart_is_the_column_that_it_names"
 SWEEP = "tests/test_sweep.py::test_rows_have_the_values_that_their_runs_were_made_with"
+LAW, NETWORK = "repro/results/network.py", "tests/test_network.py::test_"
 STEPPING = "tests/test_stepping.py::test_"
 NOT_MET = "tests/test_warned.py::test_a_tolerance_that_no_step_can_meet_is_told_with_what_is_reached"
 
@@ -347,8 +348,33 @@ MUTANTS = (
            new="length=pace.length",
            tests=(f"{NOT_MET}[options0]",)),
     Mutant("thin-drag-layers-untold", "repro/check/simplifications.py",
-           says="The layer in which a permeable body slows the water is warned of only where it is a hundred times thinner.",
+           says="The layer in which a permeable body slows the water is warned of where it is a hundred times thinner.",
            old="size > DRAG_LAYER * layer",
            new="size > 100 * DRAG_LAYER * layer",
            tests=("tests/test_flow.py::test_thin_layers_of_a_permeable_body_make_its_velocities_wiggle_and_are_warned_of",)),
+    Mutant("network-range-unchecked", LAW,
+           says="The law for networks refuses neither what is above its table nor what is no number.",
+           old="~((values >= known[0]) & (values <= known[-1]))",
+           new="values < known[0]",
+           tests=(f"{NETWORK}what_it_does_not_know_is_refused",)),
+    Mutant("network-width-for-its-square", LAW,
+           says="The law for networks divides the area by the width.",
+           old="np.asarray(area, float) / width**2",
+           new="np.asarray(area, float) / width",
+           tests=(f"{NETWORK}a_pore_twice_as_wide_takes_four_times_the_area",)),
+    Mutant("network-lambda-ignored", LAW,
+           says="The law for networks is that of lambda = 2000 for any other.",
+           old="axis=1)(np.log(ratio))",
+           new="axis=1)(np.log(2000.0))",
+           tests=(f"{NETWORK}it_grows_with_area_and_lambda_and_lies_within_its_bounds",)),
+    Mutant("network-bounds-left-out", LAW,
+           says="The bounds of the law for networks are the law.",
+           old="*(found + np.interp(place, nodes, bound) for bound in bounds)",
+           new="*(found for _ in bounds)",
+           tests=(f"{NETWORK}it_grows_with_area_and_lambda_and_lies_within_its_bounds",)),
+    Mutant("network-another-exponent", LAW,
+           says="The law for networks is read at the area to the power 1.1.",
+           old="place, nodes = np.log(share), np.log(shares)",
+           new="place, nodes = 1.1 * np.log(share), np.log(shares)",
+           tests=(f"{NETWORK}a_plug_resists_as_one_with_straight_ends_less_what_its_ends_let_pass",)),
 )
