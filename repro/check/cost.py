@@ -19,10 +19,9 @@ from time import perf_counter
 from typing import TypeAlias
 
 from repro.check import numbers
-from repro.march import updates
 from repro.march.loop import Instant, PoreEnd, State
 from repro.march.pace import missed
-from repro.march.simulation import row_times
+from repro.march.simulation import rows_within
 from repro.march.simulation import steps as steps_of
 from repro.march.stepping import SHORTEST
 from repro.scene import Scene, needed
@@ -114,7 +113,7 @@ def expected(scene: Scene, trial: Trial, nodes: int) -> Cost:
     """Of the whole run, from its trial and the nodes of its first mesh."""
     free, touching = steps(scene)
     larger = nodes / trial.nodes
-    factor = (free + IN_CONTACT * touching + ROW * rows(scene)) * REMESHING
+    factor = (free + IN_CONTACT * touching + ROW * len(rows_within(scene))) * REMESHING
     memory = None
     if trial.memory:
         before, peak = trial.memory
@@ -133,16 +132,6 @@ def steps(scene: Scene) -> tuple[int, int]:
     total = _count(min(scene.growth.time_step, longest), longest, end)
     touching = min(total, math.ceil((end - free) / longest - 1e-9))
     return total - touching, touching
-
-
-def rows(scene: Scene) -> int:
-    """Rows that are likely to lie within steps."""
-    if scene.growth is None or scene.growth.end == 0:
-        return 0
-    if scene.numerics.time == "midpoint":
-        return len(row_times(scene))
-    ends, reported = updates.schedule(scene)
-    return len(reported.difference(ends))
 
 
 def longest_step(scene: Scene) -> float:

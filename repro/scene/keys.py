@@ -27,10 +27,10 @@ from repro.scene.units import (
     BELOW_1,
     EITHER_SIGN,
     FRACTION,
+    FROM_0_TO_10,
     NON_NEGATIVE,
     POSITIVE_FRACTION,
     UP_TO_1,
-    UP_TO_10,
     UP_TO_20,
     SceneError,
     choice,
@@ -321,7 +321,7 @@ class Numerics:
         0.25, FRACTION, source="3.1 [E13]",
         about="Growth of element sizes with distance from the aggregate; 0: one size everywhere")
     contact_elements: float = number(
-        0.0, UP_TO_10, source=OURS,
+        0.0, FROM_0_TO_10, source=OURS,
         about="Elements to growth.minimum_film beside the contact lines with the opposite wall; "
               "0: as large as elsewhere on the interface")
     jacobian: str = choice(
