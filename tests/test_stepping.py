@@ -10,7 +10,7 @@ from repro.fem.sizing import ACROSS_PORE
 from repro.march import midpoint, pace, simulation, stepping
 from repro.march.loop import PoreEnd
 from repro.march.midpoint import Attempt
-from repro.model import growth, pore
+from repro.model import pore
 from repro.scene import load_scene
 from tests.strategies import ORDERS, scene
 
@@ -334,19 +334,3 @@ def test_a_film_too_thin_from_the_start_closes(order):
                  numerics=numerics)
     found = run(made)
     assert found[-1].pore.contact and found[-1].pore.mass == pytest.approx(found[0].pore.mass, rel=1e-9)
-
-
-@pytest.mark.parametrize("elements, told", [(0, True), (1.5, True), (2, False)])
-def test_a_shape_that_is_not_found_after_contact_names_contact_elements(monkeypatch, elements, told):
-    """Unless there are as many as are advised; before contact it is not named."""
-    asked = (FAST, 'growth.end="0.8 h"', *CONTACT, f"numerics.contact_elements={elements}")
-    made = load_scene("base", asked)
-    found = [state for state, _ in simulation.steps(made)]
-    before, after = found[0], next(state for state in found if state.pore.contact and not state.apart)
-    monkeypatch.setattr(growth, "MOST_ITERATIONS", 1)
-    messages = []
-    for state in (before, after):
-        with pytest.raises(SimulationError, match="in growth: .*; try a shorter growth.time_step") as error:
-            list(simulation.steps(made, state))
-        messages.append(str(error.value))
-    assert ["numerics.contact_elements = 2" in message for message in messages] == [False, told]

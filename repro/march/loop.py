@@ -16,7 +16,7 @@ from typing import ClassVar, Protocol, TypeVar
 
 import numpy as np
 
-from repro.errors import GrowthError, MeshError, SimulationError, StageError
+from repro.errors import SimulationError, StageError
 from repro.fem.brief import brief
 from repro.fem.sizing import ACROSS_PORE
 from repro.march import balance
@@ -36,8 +36,6 @@ Data = TypeVar("Data", bound=Dataclass)
 
 #: A step of the grid this close (h) to a reported time is that time.
 SAME_TIME = 1e-9
-#: With so many elements to growth.minimum_film beside the contact lines wide pores go on.
-CONTACT_ELEMENTS = 2.0
 
 
 @dataclass(frozen=True)
@@ -166,7 +164,7 @@ def steps(scene: Scene, scheme: Scheme,
     end = scene.growth.end if scene.growth else 0.0
     while end - now.time > SAME_TIME:
         try:
-            with stopping(now.time, in_contact(scene, now)):
+            with stopping(now.time):
                 taken, solved, pace, cut = scheme.advance(scene, now, solved, state.pace)
                 balance.refuse(largest, taken.pore, taken.ledger)
         except PoreEnd:
@@ -175,7 +173,7 @@ def steps(scene: Scene, scheme: Scheme,
             raise
         for time in rows:
             if state.time + SAME_TIME < time < taken.pore.time - SAME_TIME:
-                with stopping(now.time, in_contact(scene, now)):
+                with stopping(now.time):
                     there = needed(taken.within, "a step's interior")(time)
                 found = instant(state, there.pore, there.solved, there.before)
                 state = replace(reported(state, time), apart=cut)
@@ -242,26 +240,16 @@ def _flat(data: Data) -> Data:
     return replace(data, **strided) if strided else data
 
 
-def in_contact(scene: Scene, now: Pore) -> str:
-    """What to try besides where a step after contact fails: elements that resolve the films beside
-    the contact lines."""
-    if not now.contact or scene.numerics.contact_elements >= CONTACT_ELEMENTS:
-        return ""
-    return (f"; after contact numerics.contact_elements = {CONTACT_ELEMENTS:g} may be enough, "
-            "finer elements beside the contact lines alone")
-
-
 @contextmanager
-def stopping(time: float, advice: str = "") -> Iterator[None]:
+def stopping(time: float) -> Iterator[None]:
     """Floating-point errors and lack of memory stop the run; a failure is told with the simulated
-    time of its step; advice: told besides where no shape or no mesh was found."""
+    time of its step."""
     stopped = f"stopped in the step from t = {time:g} h"
     try:
         with np.errstate(all="raise", under="ignore"):
             yield
     except StageError as error:
-        more = advice if isinstance(error, GrowthError | MeshError) else ""
-        raise SimulationError(f"{stopped}, in {error.stage}: {error}{more}") from error
+        raise SimulationError(f"{stopped}, in {error.stage}: {error}") from error
     except FloatingPointError as error:
         raise SimulationError(f"{stopped} by a floating-point error ({error}); try a shorter "
                               "growth.time_step or a larger numerics.refinement") from error
