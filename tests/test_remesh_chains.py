@@ -49,15 +49,6 @@ def square(body, field):
     return np.sum(areas * (np.sum(corners**2, axis=1) + np.sum(corners, axis=1) ** 2)) / 12
 
 
-@share(0.1)
-@given(remesh_chains(finest=0.5, longest=2), seeds)
-def test_the_projection_is_the_one_integrated_piece_by_piece(chain, seed):
-    """Against shapely's pieces and a dense mass matrix."""
-    field = rough(chain[0][0], seed)
-    found = projected(chain[0], field, chain[1])
-    assert found[:, 0] == pytest.approx(oracles.projected(chain[0], field[:, 0], chain[1]), abs=1e-9)
-
-
 @share(0.4)
 @given(remesh_chains(), seeds)
 def test_a_chain_of_projections_conserves_mass(chain, seed):
