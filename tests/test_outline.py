@@ -8,7 +8,6 @@ from hypothesis import given
 from repro.fem import outline as of
 from repro.fem import sizing
 from repro.fem.outline import BOTTOM, FREE, Outline
-from repro.fem.sizing import Sizing
 from tests.strategies import attached_aggregates, mirrored, plug, seed, widths
 
 both = pytest.mark.parametrize("geometry", [1, 2])
@@ -115,19 +114,6 @@ def test_a_mirror_keeps_the_measures(drawn):
     assert image.area == pytest.approx(outline.area, rel=1e-13)
     found = image.upstream, image.downstream, image.thickness
     assert found == pytest.approx((-outline.downstream, -outline.upstream, outline.thickness), rel=1e-13)
-
-
-@pytest.mark.parametrize("refinement", [1.0, 2.0])
-def test_a_split_changes_neither_shape_nor_area(refinement):
-    """New nodes lie on the same parabolas, and so do their places at t = 0."""
-    shape = wavy()
-    finer = sizing.split(shape, Sizing(50.0, refinement, 2.0))
-    assert len(finer.points) > len(shape.points)
-    assert finer.area == pytest.approx(shape.area, rel=1e-13)
-    assert (finer.thickness, finer.upstream) == pytest.approx((shape.thickness, shape.upstream), rel=1e-13)
-    at_start = [of.polygon_area(sampled(replace(s, points=s.origin), 1000)) for s in (shape, finer)]
-    assert at_start[1] == pytest.approx(at_start[0], rel=1e-6)
-    assert np.array_equal(finer.points[finer.fixed], shape.points[shape.fixed])
 
 
 def test_halved_arcs_are_the_same_curve():

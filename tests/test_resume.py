@@ -10,7 +10,7 @@ import pytest
 
 from repro import results
 from repro.cli import main
-from repro.errors import Interrupted, OutputError, SimulationError
+from repro.errors import Interrupted, SimulationError
 from repro.march import loop
 from repro.march.loop import PoreEnd
 from repro.march.simulation import simulate, steps
@@ -26,6 +26,8 @@ SCENES = {
     "paper, unreported steps": ('growth.end="1 h"', 'output.times=["0.3 h", "1 h"]'),
     "fast": ('numerics.preset="fast"', "numerics.tolerance=0.0005", 'aggregate.radius="25 um"', 'growth.end="3 h"'),
     "fast, rows within steps": ('numerics.preset="fast"', 'growth.end="9.7 h"'),
+    "fast, jumps": ('numerics.preset="fast"', 'growth.end="0.8 h"', 'substrates.donor.supply='
+                    '[["0 h", "10 mg/L"], ["0.3 h", "0 mg/L"], ["0.5 h", "20 mg/L"]]'),
     "paper, rows within steps": ('growth.end="0.7 h"', 'output.times=["0.05 h", "0.1 h", "0.4 h", "0.47 h"]'),
     "fast, unreported steps, contact": ('numerics.preset="fast"', "numerics.tolerance=0.0001", *CONTACT,
                                         'output.times=["0.6 h"]'),
@@ -144,26 +146,19 @@ def test_the_end_of_the_pore_is_an_end_after_a_resume_too(tmp_path):
     assert lasting(tmp_path / "parts") == lasting(tmp_path / "whole")
 
 
-def test_a_run_that_is_over_is_left_alone(tmp_path, capsys):
-    """Exit 0, says so, changes nothing."""
-    assert main(["run", "flow_only", "--out", str(tmp_path / "run")]) == 0
-    before = {path: path.stat().st_mtime_ns for path in (tmp_path / "run").rglob("*.*")}
-    assert main(["run", "--resume", str(tmp_path / "run")]) == 0
-    assert "completed, before this: nothing to do" in capsys.readouterr().out
-    assert {path: path.stat().st_mtime_ns for path in (tmp_path / "run").rglob("*.*")} == before
-
-
 @pytest.mark.parametrize("content", [None, "{", "[]", "null", '{"scene": "x"}', "[" * 100_000,
                                      '{"scene": "x", "hash": "0", "tables": {}, "status": "running"}',
                                      '{"scene": "x", "hash": "0", "tables": {}, "status": "sunning"}',
                                      '{"scene": "x", "hash": "0", "tables": {"pore": 3}, "status": "running"}'])
 def test_a_folder_without_a_run_is_refused(tmp_path, capsys, content):
     """With status 2 and one line, and nothing is written."""
+    folder = tmp_path / "nowhere" if content is None else tmp_path
     if content is not None:
         (tmp_path / "run.json").write_text(content)
-    assert main(["run", "--resume", str(tmp_path)]) == 2
-    assert "run.json" in (message := capsys.readouterr().err) and message.count("\n") == 1
-    assert files(tmp_path) == {}
+    assert main(["run", "--resume", str(folder)]) == 2
+    message = capsys.readouterr().err
+    assert ("there is no run.json" if content is None else "run.json") in message and message.count("\n") == 1
+    assert files(tmp_path) == {} and not (tmp_path / "nowhere").exists()
 
 
 @pytest.mark.parametrize("status", ["sunning", "", "Completed", "completed ", "failed", "runningly", "interrupted?"])
@@ -363,9 +358,3 @@ def test_one_thread_or_two(tmp_path, scene):
         assert shell(*scene, "--out", tmp_path / threads, threads=threads)[0] == 0
     assert files(tmp_path / "1") == files(tmp_path / "2")
     assert told(tmp_path / "2")["conditions"]["threads"]["OMP_NUM_THREADS"] == "2"
-
-
-def test_nothing_but_a_folder_is_needed(tmp_path):
-    with pytest.raises(OutputError, match="there is no run.json"):
-        resume(tmp_path / "nowhere")
-    assert not (tmp_path / "nowhere").exists()

@@ -37,13 +37,14 @@ def refused(folder, capsys, *arguments):
 
 
 def test_a_run_that_is_done_is_left_alone(tmp_path, capsys):
-    """The same command again: exit 0, says so, nothing is computed or written."""
+    """The same command again, or a resume: exit 0, says so, nothing is computed or written."""
     arguments = ["run", "base", *SETS, "--out", str(tmp_path / "run")]
     assert main(arguments) == 0
     before = state(tmp_path / "run")
-    capsys.readouterr()
-    assert main(arguments) == 0
-    assert "completed, before this: nothing to do" in capsys.readouterr().out and state(tmp_path / "run") == before
+    for again in (arguments, ["run", "--resume", str(tmp_path / "run")]):
+        capsys.readouterr()
+        assert main(again) == 0
+        assert "completed, before this: nothing to do" in capsys.readouterr().out and state(tmp_path / "run") == before
 
 
 def test_a_run_that_was_interrupted_is_gone_on_with(tmp_path, capsys):

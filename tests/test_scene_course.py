@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from repro.check.checked import check
 from repro.check.numbers import judged
 from repro.cli import main
-from repro.march.simulation import simulate, steps
+from repro.march.simulation import simulate
 from repro.model import pore
 from repro.results import read_table
 from repro.scene import SceneError, load_scene, parse_scene, scene_hash, scene_tables
@@ -147,14 +147,6 @@ def test_what_is_judged_is_the_extreme():
         [number.start for number in wanted[1]], rel=1e-12)
     told = check(made, "base")
     assert "0 to 20 mg/L, in steps, the last from 0.5 h" in dict(told.modelled)["substrates"]
-
-
-def test_a_run_over_jumps_is_the_same_from_any_state():
-    """To the last bit."""
-    made = load_scene("base", SHORT)
-    whole = list(steps(made))
-    for state, _ in whole[1:-1]:
-        assert list(simulate(made, state=state))[-1].pore.mass == whole[-1][1].pore.mass
 
 
 def test_commands_take_tables(tmp_path):

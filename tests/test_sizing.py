@@ -33,13 +33,18 @@ either = attached_aggregates(width=widths) | attached_aggregates(width=widths, g
 
 @given(either, refinements)
 def test_refining_an_outline_keeps_its_shape_exactly(drawn, refinement):
-    """Area to round-off; interface nodes, ends of contact and fixed points to the last bit; walls straight."""
+    """Area, extremes and places at t = 0 to round-off; interface nodes, ends of contact and fixed points to the last
+    bit; walls straight."""
     outline, width = drawn
+    outline = replace(outline, origin=outline.points * [0.5, 0.7])
     sizing = Sizing(width, refinement, FILM)
     sizes, corners = of.interface_sizes(outline.corners, sizing), outline.corners
     fine = of.split(outline, sizing)
     assert fine.area == pytest.approx(outline.area, rel=1e-13)
     assert fine.geometry == outline.geometry
+    assert fine.origin == pytest.approx(fine.points * [0.5, 0.7], rel=1e-12, abs=1e-12)
+    found, wanted = ((one.upstream, one.downstream, one.thickness) for one in (fine, outline))
+    assert found == pytest.approx(wanted, rel=1e-13)
     kept = {tuple(p) for p in fine.corners.points}
     assert {tuple(p) for p in corners.points[corners.wall == FREE]} <= kept
     assert {tuple(p) for p in corners.points[[0, 10]]} <= kept
@@ -49,20 +54,6 @@ def test_refining_an_outline_keeps_its_shape_exactly(drawn, refinement):
     edge = np.linalg.norm(np.roll(fine.points, -1, axis=0) - fine.points, axis=1)[fine.interface_edges()]
     unequal = 1.0 if outline.geometry == 1 else 1.35  # parts of an arc are equal in t
     assert edge.max() <= unequal * of.SPLIT * sizes.max() * (1 + 1e-12)
-
-
-@given(st.floats(1.5, 4.0))
-def test_new_nodes_of_a_grown_seed_remember_its_arc(stretch):
-    """Between nodes that were on the half-circle at t = 0 the material was on it too; on the wall it was on the wall.
-    """
-    old = seed(5.0, 0.5)
-    grown = replace(old, points=old.points * [stretch, 1.1 * stretch])
-    fine = of.split(grown, Sizing(100.0, 4.0, FILM, seed=0.0))
-    free = fine.wall == FREE
-    assert free.sum() > (old.wall == FREE).sum()
-    assert np.hypot(*fine.origin[free].T) == pytest.approx(5.0, rel=1e-9)
-    assert fine.origin[~free] * [stretch, 1.0] == pytest.approx(fine.points[~free], abs=1e-12)
-    assert fine.area == pytest.approx(grown.area, rel=1e-13)
 
 
 @given(widths, st.floats(-20.0, 20.0))

@@ -86,17 +86,6 @@ def test_vtk_reads_what_was_computed(made):
         assert value.dtype == np.float64 and np.array_equal(value, computed.cell_data[name][0], equal_nan=True), name
 
 
-def test_meshio_reads_the_same(made):
-    folder, kind, computed = made
-    found = meshio.read(entries(folder)[1.0])
-    assert [block.type for block in found.cells] == [KINDS[kind][1]]
-    assert (found.points == computed.points).all() and (found.cells[0].data == computed.cells[0].data).all()
-    for name in (*NODES, *AGGREGATE, "region"):
-        one, other = (content.point_data.get(name, content.cell_data.get(name, [None])[0])
-                      for content in (found, computed))
-        assert np.array_equal(one, other, equal_nan=True), name
-
-
 def test_middle_nodes_are_where_vtk_expects_them(made):
     """VTK's interpolation at the middle of each side is the middle node."""
     folder, kind, _ = made

@@ -24,7 +24,7 @@ from skfem import (
 from skfem.helpers import ddot, div, dot, grad, transpose
 
 from repro.fem import elements
-from repro.fem.assembly import ElementSystem, local
+from repro.fem.assembly import ElementSystem
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
 from repro.model import flow, growth, pore, transport
@@ -360,20 +360,6 @@ def test_linear_advection_by_the_divergence_free_velocity(grid, seed):
     theirs = carried.assemble(basis, u_x=w[0], u_y=w[1]) + sp.diags_array(lumped)
     ours = assembled(space.cells, transport.advection(space, given, velocity[:, 0]), space.count)
     assert same(ours, theirs[nodes][:, nodes])
-
-
-@given(meshes())
-def test_linear_forms_on_any_mesh(grid):
-    """Element by element."""
-    space, basis = Space(grid, 1), Basis(grid.fem, ElementTriP1(), intorder=2)
-    assert same(space.stiffness, local(stiffness, basis))
-    for axis in (0, 1):
-        theirs = local(BilinearForm(lambda u, q, w, axis=axis: grad(u)[axis] * q), basis)
-        assert same(flow.divergence(space)[:, :, 3 * axis: 3 * axis + 3], theirs)
-    tau = constant(basis, np.array([oracles.diameter(grid.points[t]) for t in grid.triangles]) ** 2)
-    mobility = flow.Stabilised(1.0).mobility(grid, np.ones(len(grid.triangles)), "laplacian")
-    lower = flow.stokes(space, np.ones(len(grid.triangles)), "laplacian", mobility)[:, 6:, 6:]
-    assert same(-lower, local(pressure_laplacian, basis, tau=tau))
 
 
 def test_scikit_fem_keeps_the_order_of_the_nodes():
