@@ -19,7 +19,8 @@ from repro.run.checkpoint import NEWEST, PREVIOUS
 from repro.run.running import Watch, resume, run
 from repro.scene import load_scene
 from repro.sweep import task
-from tests.shell import LONG, SHORT, files, lasting, shell, started, told, wait_for
+from tests import faults
+from tests.shell import LONG, SHORT, every, files, lasting, shell, started, stopped, told, wait_for
 
 CONTACT = ('aggregate.radius="17.98 um"', 'pore.width="20 um"', 'growth.end="0.6 h"')
 SCENES = {
@@ -54,15 +55,7 @@ MORE = {
 }
 
 
-def every(count):
-    """Says stop at each so-manieth step."""
-    calls = 0
-
-    def stop():
-        nonlocal calls
-        calls += 1
-        return signal.SIGTERM if calls % count == 0 else 0
-    return stop
+THREE_HOURS = load_scene("base", ('numerics.preset="fast"', 'growth.end="3 h"'))
 
 
 def in_parts(scene, folder, count):
@@ -173,42 +166,34 @@ def test_a_status_that_no_run_writes_is_none(tmp_path, capsys, status):
     assert message.count("\n") == 1 and files(tmp_path / "run") == before and not task.finished(tmp_path / "run")
 
 
-def stopped(folder, *sets, after=3):
-    """A run of `base` that was stopped after so many steps; its scene."""
-    scene = load_scene("base", ('numerics.preset="fast"', 'growth.end="3 h"', *sets))
-    with pytest.raises(Interrupted):
-        run(scene, folder, watch=Watch(stop=every(after), interval=0.0))
-    return scene
-
-
 def test_an_altered_checkpoint_is_refused_and_the_one_before_is_used(tmp_path, capsys):
     """And the result is the same."""
-    scene = stopped(tmp_path / "run")
+    stopped(THREE_HOURS, tmp_path / "run")
     newest = tmp_path / "run" / NEWEST
     good = newest.read_bytes()
     newest.write_bytes(good[:-1] + bytes([good[-1] ^ 1]))
     assert main(["run", "--resume", str(tmp_path / "run"), "--quiet"]) == 0
     message = capsys.readouterr().err
     assert f"{NEWEST}: refused: its checksum is wrong" in message and "t = 0" not in message
-    run(scene, tmp_path / "whole")
+    run(THREE_HOURS, tmp_path / "whole")
     assert files(tmp_path / "run") == files(tmp_path / "whole")
     assert told(tmp_path / "run")["resumes"][0]["time_h"] > 0
 
 
 def test_without_a_good_checkpoint_a_run_starts_again_and_says_so(tmp_path, capsys):
-    scene = stopped(tmp_path / "run")
+    stopped(THREE_HOURS, tmp_path / "run")
     for name in (NEWEST, PREVIOUS):
         path = tmp_path / "run" / name
         path.write_bytes(path.read_bytes()[:1000])
     assert main(["run", "--resume", str(tmp_path / "run"), "--quiet"]) == 0
     message = capsys.readouterr().err
     assert message.count("refused: its checksum is wrong") == 2 and "starts again from t = 0" in message
-    run(scene, tmp_path / "whole")
+    run(THREE_HOURS, tmp_path / "whole")
     assert files(tmp_path / "run") == files(tmp_path / "whole")
 
 
 def test_a_checkpoint_without_its_fields_is_refused(tmp_path):
-    stopped(tmp_path / "run")
+    stopped(THREE_HOURS, tmp_path / "run")
     (tmp_path / "run" / "fields" / "fields_0001.vtu").unlink()
     with pytest.warns(UserWarning) as warned:
         resume(tmp_path / "run")
@@ -216,9 +201,8 @@ def test_a_checkpoint_without_its_fields_is_refused(tmp_path):
 
 
 def test_a_change_of_versions_is_told_and_recorded(tmp_path, monkeypatch):
-    stopped(tmp_path / "run")
-    known = results.version
-    monkeypatch.setattr(results, "version", lambda name: "0.0" if name == "scipy" else known(name))
+    stopped(THREE_HOURS, tmp_path / "run")
+    faults.another_version(monkeypatch, "scipy")
     with pytest.warns(UserWarning, match="versions.scipy .* now 0.0.; .* to the last bit"):
         resume(tmp_path / "run")
     (once,) = told(tmp_path / "run")["resumes"]
@@ -226,7 +210,7 @@ def test_a_change_of_versions_is_told_and_recorded(tmp_path, monkeypatch):
 
 
 def test_the_machine_is_recorded_and_threads_are_no_change(tmp_path, monkeypatch, recwarn):
-    stopped(tmp_path / "run")
+    stopped(THREE_HOURS, tmp_path / "run")
     found = told(tmp_path / "run")["conditions"]
     assert found["machine"] and found["blas"] and len(found["source"]) == 8
     assert found["threads"].get("OMP_NUM_THREADS") != "7"

@@ -17,6 +17,7 @@ from repro.results import read_table
 from repro.scene import SceneError, load_scene, parse_scene, scene_hash, scene_tables
 from repro.scene.course import Course
 from repro.scene.text import scene_text
+from tests.shell import flags
 from tests.strategies import scene
 
 DONOR = "substrates.donor.supply"
@@ -151,7 +152,7 @@ def test_what_is_judged_is_the_extreme():
 
 def test_commands_take_tables(tmp_path):
     """What a run expects of the machine, a sweep's processes, a longer run and pages."""
-    tables = [part for entry in (*SHORT, RISING) for part in ("--set", entry)]
+    tables = flags(*SHORT, RISING)
     assert main(["check", "base", *tables]) == 0
     assert main(["run", "base", *tables, "--out", str(tmp_path / "run")]) == 0
     assert main(["run", "--resume", str(tmp_path / "run"), "--set", 'growth.end="1.2 h"']) == 0

@@ -8,17 +8,16 @@ import pytest
 
 from repro.check import simplifications
 from repro.cli import main
-from repro.errors import Interrupted
 from repro.march.simulation import simulate
 from repro.run import running
-from repro.run.running import Watch, resume, run
+from repro.run.running import resume, run
 from repro.scene import load_scene
 from tests.pages import Page, text_of
-from tests.shell import lasting, told
+from tests.shell import flags, lasting, stopped, told
 
 SETS = ("numerics.preset=fast", "growth.time_step=0.6 h", "growth.end=1 h", "pore.length=100 um",
         "aggregate.radius=16 um")
-COMMAND = ["wide", *(part for entry in SETS for part in ("--set", entry))]
+COMMAND = ["wide", *flags(*SETS)]
 
 
 @pytest.fixture
@@ -62,9 +61,7 @@ def test_a_run_without_any_has_an_empty_list(tmp_path, capsys):
 
 def test_a_resume_keeps_them(tmp_path, checked):
     """Without working them out again."""
-    left = iter([0, 15])
-    with pytest.raises(Interrupted):
-        run(load_scene("wide", SETS), tmp_path / "parts", watch=Watch(stop=lambda: next(left, 0)))
+    stopped(load_scene("wide", SETS), tmp_path / "parts", after=2)
     resume(tmp_path / "parts")
     run(load_scene("wide", SETS), tmp_path / "whole")
     assert told(tmp_path / "parts")["warnings"] == checked

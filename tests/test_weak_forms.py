@@ -11,7 +11,6 @@ from scipy.spatial import cKDTree
 from skfem import (
     Basis,
     BilinearForm,
-    ElementTriMini,
     ElementTriP1,
     ElementTriP2,
     ElementTriP3,
@@ -246,28 +245,6 @@ def test_stabilised_stokes(counterparts, interface):
     mobility = flow.Stabilised(80.0).mobility(of.ours, viscosity, interface)
     theirs = stokes(of, space, interface, of.diameters**2 / (80.0 * viscosity))
     assert same(our_stokes(space, interface, mobility)[1], theirs)
-
-
-@interfaces
-def test_stokes_with_condensed_bubbles(counterparts, interface):
-    """scikit-fem's MINI element, its bubbles eliminated by a Schur complement."""
-    of = counterparts["straight"]
-    space, viscosity = Space(of.ours, 1), np.where(of.ours.biomass, RATIO, 1.0)
-    velocity = Basis(of.mesh, ElementVector(ElementTriMini()), intorder=6)
-    pressure = velocity.with_element(ElementTriP1())
-    A = viscous(interface).assemble(velocity, nu=constant(velocity, viscosity)).toarray()
-    B = continuity.assemble(velocity, pressure).toarray()
-    K = np.block([[A, -B.T], [-B, np.zeros(2 * (pressure.N,))]])
-    bubbles = velocity.interior_dofs.ravel()
-    rest = np.setdiff1d(np.arange(len(K)), bubbles)
-    coupling = K[np.ix_(rest, bubbles)]
-    condensed = np.zeros_like(K)
-    condensed[np.ix_(rest, rest)] = K[np.ix_(rest, rest)] - coupling @ np.linalg.solve(
-        K[np.ix_(bubbles, bubbles)], coupling.T)
-    nodes = of.nodes(space)
-    numbers = np.concatenate([velocity.nodal_dofs[0, nodes], velocity.nodal_dofs[1, nodes], velocity.N + nodes])
-    mobility = flow.Bubble().mobility(of.ours, viscosity, interface)
-    assert same(our_stokes(space, interface, mobility)[1], condensed[np.ix_(numbers, numbers)])
 
 
 @pytest.mark.parametrize("shape, order", [("straight", 1), ("straight", 2), ("straight", 3), ("curved", 2),
