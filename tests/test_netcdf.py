@@ -6,7 +6,7 @@ import pytest
 import xarray
 
 from repro import results
-from repro.results import names, netcdf
+from repro.results import netcdf
 from repro.scene import load_scene, rules, scene_hash, scene_tables
 from tests.pages import run
 
@@ -49,13 +49,6 @@ def test_what_is_not_modelled_is_not_a_number(tmp_path):
     run(tmp_path, "flow_only", SETS[-1])
     found = content(tmp_path / "run")
     assert np.isnan(found.effluent_acceptor_mg_per_L).all() and found.mean_velocity_m_per_d[0] == pytest.approx(2.9)
-
-
-def test_units_are_those_of_the_names():
-    assert {name: names.udunits(name) for name in ("conductivity_m_per_d", "head_loss_cm", "aggregate_area_um2",
-                                                   "thickness_um", "nodes", "acceptor_supplied_pg_per_m")} == {
-        "conductivity_m_per_d": "m d-1", "head_loss_cm": "cm", "aggregate_area_um2": "um2", "thickness_um": "um",
-        "nodes": "1", "acceptor_supplied_pg_per_m": "pg m-1"}
 
 
 def test_a_table_alone_is_the_default(tmp_path):

@@ -215,19 +215,3 @@ def test_what_higher_orders_cannot_do_is_refused(kind, key, other):
         numerics(preset="paper", elements=kind, **{key: other})
     assert "\n" not in str(refused.value)
     assert getattr(numerics(preset="paper", elements="linear", **{key: other}), key) == other
-
-
-@pytest.mark.parametrize("kind", ORDERS.values())
-@pytest.mark.parametrize("key, other", [("time", "updates"), ("time", "midpoint"), ("transport", "gear"),
-                                        ("interface", "traction"), ("inlet", "mean"), ("fixed_point", "rechosen")])
-def test_what_every_order_can_do_is_accepted(kind, key, other):
-    assert key not in HIGHER_ORDER
-    assert getattr(numerics(preset="paper", elements=kind, **{key: other}), key) == other
-
-
-@pytest.mark.parametrize("kind", ORDERS.values())
-def test_every_order_takes_stress_free_biomass_and_fluid_forces(kind):
-    for key, value in (("new_biomass", "stress_free"), ("fluid_forces", "included")):
-        said = EVERYTHING | {"growth": {"end": "1 h", key: value}, "numerics": {"elements": kind}}
-        made = parse_scene(said, "test", "test.toml")
-        assert getattr(made.growth, key) == value

@@ -208,7 +208,9 @@ def test_every_name_has_its_unit_or_is_a_pure_number(fast, paper):
     for name, each in names.KNOWN.items():
         assert bool(names.unit(name)) != (name in PURE) and each.formula and names.words(name) != name or name == "J"
     assert (names.unit("mean_velocity_m_per_d"), names.unit("thickness_um")) == ("m/day", "um")
-    assert (names.udunits("donor_min_mg_per_L"), names.udunits("aggregate_area_um2")) == ("mg L-1", "um2")
+    units = {"conductivity_m_per_d": "m d-1", "head_loss_cm": "cm", "aggregate_area_um2": "um2", "thickness_um": "um",
+             "nodes": "1", "acceptor_supplied_pg_per_m": "pg m-1", "donor_min_mg_per_L": "mg L-1"}
+    assert {name: names.udunits(name) for name in units} == units
 
 
 def test_the_table_in_docs_is_that_of_the_definitions():

@@ -281,7 +281,8 @@ def whole(tmp_path_factory):
 def test_killed_at_twenty_moments(tmp_path, whole):
     """SIGKILL at seeded random moments of a run with checkpoints every 0.2 s, from its start to its end, then resumed:
     the bits of the whole run, each time."""
-    seconds, draw, gone_on = told(whole)["wall_time_s"], random.Random(5), 0
+    seconds, gone_on = told(whole)["wall_time_s"], 0
+    draw = random.Random(5)
     for k in range(20):
         out = tmp_path / str(k)
         process = started(*LONG, "--out", out, "--checkpoint", "0.2")
@@ -317,7 +318,8 @@ def test_a_run_killed_at_its_very_end_is_tidied(tmp_path):
 @pytest.mark.thorough
 def test_killed_again_and_again(tmp_path, whole):
     """Each time a little further, until it is done."""
-    out, draw, status, last = tmp_path / "run", random.Random(7), None, 0
+    out, draw = tmp_path / "run", random.Random(7)
+    status, last = None, 0
     arguments = [*LONG, "--out", out]
     for _ in range(40):
         process = started(*arguments, "--checkpoint", "0.1")

@@ -21,7 +21,6 @@ from tests.strategies import (
     plug,
     refinements,
     scenes,
-    seed,
     share,
     widths,
 )
@@ -93,6 +92,7 @@ def test_the_meshed_extent_follows_section_3_1(drawn, length):
     assert found == pytest.approx(oracles.extent(outline.points, width, length), rel=1e-12)
     assert -length / 2 <= found[0] and found[1] <= length / 2
     assert of.meshed_extent(outline, width, length, whole=True) == (-length / 2, length / 2)
+    assert np.ptp(of.meshed_extent(None, width, length)) == pytest.approx(min(3 * width, length), rel=1e-15)
 
 
 @given(outlines(width=widths), lengths, st.floats(0.0, 1.2), st.booleans())
@@ -122,15 +122,6 @@ def test_the_mesh_of_a_run_has_the_extent_of_section_3_1(made):
         again = remeshing.remesh(made, now, now, 0.0)[0].mesh
         assert again.ends == pytest.approx(oracles.extent(now.outline.points, width, length), rel=1e-12)
         assert (again.points[:, 0].min(), again.points[:, 0].max()) == again.ends
-
-
-def test_the_extents_of_the_paper():
-    """110 um at first (C07), 2 (30 + 75) = 210 um with a half-width of 30 um (C08), the whole pore, 3 W without
-    biomass."""
-    assert np.ptp(of.meshed_extent(seed(5.0), 50.0, 600.0)) == 110.0
-    assert np.ptp(of.meshed_extent(seed(30.0), 50.0, 600.0)) == 210.0
-    assert of.meshed_extent(seed(5.0), 50.0, 80.0) == (-40.0, 40.0)
-    assert np.ptp(of.meshed_extent(None, 50.0, 600.0)) == 150.0
 
 
 @given(attached_aggregates(width=widths), refinements)

@@ -62,21 +62,6 @@ def test_a_polynomial_of_the_order_is_its_own_interpolant(meshes, kind, order):
 
 
 @orders
-def test_three_nodes_and_six_on_the_same_edges_are_the_same_functions(meshes, order):
-    """Stiffness, mass, load and places of the nodes."""
-    three, six = (Space(meshes[kind], order) for kind in ("straight", "flat"))
-    assert three.count == six.count and np.array_equal(np.sort(three.cells[:, :3]), np.sort(six.cells[:, :3]))
-    here, there = (space.points[space.cells] for space in (three, six))
-    assert np.allclose(here, there, rtol=0, atol=1e-12)
-    assert np.allclose(three.stiffness, six.stiffness, rtol=0, atol=1e-11)
-    masses = [space.mass(space.at.dx) for space in (three, six)]
-    assert np.allclose(*masses, rtol=0, atol=1e-12 * np.abs(masses[0]).max())
-    along = [space.at.dx * at_quadrature(space.mesh, space.table)[0] for space in (three, six)]
-    loads = [space.load(weight) for space, weight in zip((three, six), along)]
-    assert np.allclose(*loads, rtol=0, atol=1e-12 * np.abs(loads[0]).max())
-
-
-@orders
 @kinds
 def test_linear_and_constant_fields_are_exact_on_any_triangle(meshes, kind, order):
     """A curved map holds places themselves where the order is the geometry's or more; with linear functions on curved
@@ -97,16 +82,13 @@ def test_linear_and_constant_fields_are_exact_on_any_triangle(meshes, kind, orde
 @kinds
 def test_areas_are_integrated_exactly(meshes, kind, order):
     """The channel is ends x width whatever lies inside; the aggregate is a half-disc as its arcs are, or the polygon of
-    its corners; functions add up to it, and gradients of constants to nothing."""
+    its corners. Loads, masses and stiffness are scikit-fem's in `test_weak_forms.py`."""
     mesh = meshes[kind]
     space = Space(mesh, order)
     channel = np.ptp(mesh.ends) * mesh.width
     for dx in (space.at.dx, space.gradients_at.dx):
         assert dx.min() > 0 and dx.sum() == pytest.approx(channel, rel=1e-13)
         assert dx[mesh.biomass].sum() == pytest.approx(mesh.area(), rel=1e-12)
-    assert space.load(space.at.dx).sum() == pytest.approx(channel, rel=1e-13)
-    assert space.mass(space.at.dx).sum() == pytest.approx(channel, rel=1e-12)
-    assert np.abs(space.stiffness.sum(axis=2)).max() < 1e-11
     if order > 1 or mesh.geometry == 1:
         assert space.reaction.dx.sum() == pytest.approx(mesh.area(), rel=1e-12)
 
