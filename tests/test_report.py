@@ -84,13 +84,24 @@ def test_each_frame_is_drawn_on_its_own_mesh(fast, paper):
     assert [packed["meshes"][frame["mesh"]]["per"] for frame in packed["frames"]] == [6, 3]
 
 
+def places(packed, frame):
+    """(N, 2) um of the nodes of a frame, and the sides of the box that holds all."""
+    low, high = np.array(packed["box"]).reshape(2, 2).T
+    return low + values((0.0, 1.0, frame["points"])).reshape(-1, 2) * (high - low), high - low
+
+
+def values(told):
+    """Of the least, the largest and the levels of an array."""
+    low, high, text = told
+    return low + numbers(text, "<u2") / 65534 * (high - low)
+
+
 @pytest.mark.parametrize("name", ["fast", "paper"])
 def test_fields_of_the_page_are_those_of_the_files(request, name):
     """Each array to half a step of its 65534, with the mesh's own nodes."""
     out = request.getfixturevalue(name)
     packed, entries = stored(out), fields.index(out)
     assert packed["of"] == len(entries) == len(packed["frames"])
-    box = np.array(packed["box"]).reshape(2, 2)
     for frame, (time, path) in zip(packed["frames"], entries):
         grid, mesh = meshio.vtu.read(path), packed["meshes"][frame["mesh"]]
         cells = grid.cells[0].data
@@ -98,18 +109,18 @@ def test_fields_of_the_page_are_those_of_the_files(request, name):
         assert (numbers(mesh["cells"], "<u4").reshape(cells.shape) == cells).all()
         region = numbers(mesh["body"], "<u1") == 1
         assert (region == grid.cell_data["region"][0]).all() and region.any() and not region.all()
-        points = box[:, 0] + numbers(frame["points"], "<u2").reshape(-1, 2) / 65534 * (box[:, 1] - box[:, 0])
-        assert np.abs(points - grid.points[:, :2]).max() <= 0.51 / 65534 * (box[:, 1] - box[:, 0]).max()
+        points, box = places(packed, frame)
+        assert np.abs(points - grid.points[:, :2]).max() <= 0.51 / 65534 * box.max()
         nodes = np.unique(cells[region])
         for field in packed["fields"]:
-            low, high, text = frame["values"][field["name"]]
+            told = frame["values"][field["name"]]
+            low, high = told[:2]
             node = field["at"] == "node"
             value = grid.point_data[field["name"]] if node else grid.cell_data[field["name"]][0]
             value = np.linalg.norm(value, axis=1) if value.ndim == 2 else value
             value = value[nodes if node else region] if field["body"] else value
-            told = low + numbers(text, "<u2") / 65534 * (high - low)
             assert (low, high) == (value.min(), value.max())
-            assert np.abs(told - value).max() <= 0.51 / 65534 * (high - low)
+            assert np.abs(values(told) - value).max() <= 0.51 / 65534 * (high - low)
 
 
 def test_a_value_that_is_not_finite_has_none(tmp_path):
@@ -257,6 +268,13 @@ def test_warnings_come_first_and_then_what_is_assumed(tmp_path):
     assert "quasi-steady" not in text and "traction" not in text and "Assumed: a pore in the plane" in text
 
 
+def regular(monkeypatch, most):
+    """Points and triangles of the page's own grid over 100 um by 50 um, of about so many nodes."""
+    with monkeypatch.context() as patch:
+        patch.setattr(fields, "MOST_NODES", most)
+        return fields._regular(np.zeros(2), np.array([100.0, 50.0]))
+
+
 def with_middles(points, cells):
     """Straight six-node triangles from those of three."""
     edges = np.sort(cells[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
@@ -268,9 +286,7 @@ def with_middles(points, cells):
 @pytest.mark.parametrize("kind, corners", [("triangle", 3), ("triangle6", 6)])
 def test_a_page_of_a_fine_mesh_is_small_and_true(tmp_path, monkeypatch, kind, corners):
     """1e5 nodes in several times take 3 MB at most; values on the grid are those of the mesh."""
-    monkeypatch.setattr(fields, "MOST_NODES", 101_000 if corners == 3 else 26_000)
-    points, cells = fields._regular(np.zeros(2), np.array([100.0, 50.0]))
-    monkeypatch.undo()
+    points, cells = regular(monkeypatch, 101_000 if corners == 3 else 26_000)
     if corners == 6:
         points, cells = with_middles(points, cells)
     x, y = points.T
@@ -287,12 +303,9 @@ def test_a_page_of_a_fine_mesh_is_small_and_true(tmp_path, monkeypatch, kind, co
     assert len(json.dumps(packed)) < 3e6 - 200e3 and packed["nodes"] == len(points) >= 1e5
     frame, mesh = packed["frames"][-1], packed["meshes"][0]
     assert len(packed["frames"]) >= 2 and mesh["per"] == 3
-    box = np.array(packed["box"]).reshape(2, 2)
-    places = box[:, 0] + numbers(frame["points"], "<u2").reshape(-1, 2) / 65534 * (box[:, 1] - box[:, 0])
-    low, high, text = frame["values"]["head_cm"]
-    told = low + numbers(text, "<u2") / 65534 * (high - low)
-    assert np.abs(told - (3 * places[:, 0] - 2 * places[:, 1])).max() < 0.02
-    shown = places[numbers(mesh["cells"], "<u4").reshape(-1, 3)].mean(axis=1)
+    there = places(packed, frame)[0]
+    assert np.abs(values(frame["values"]["head_cm"]) - there @ [3, -2]).max() < 0.02
+    shown = there[numbers(mesh["cells"], "<u4").reshape(-1, 3)].mean(axis=1)
     inside = numbers(mesh["body"], "<u1") == 1
     clear = np.abs(np.hypot(shown[:, 0] - 50, shown[:, 1]) - 20) > 1
     assert (inside == (np.hypot(shown[:, 0] - 50, shown[:, 1]) < 20))[clear].all()
@@ -308,9 +321,7 @@ def test_a_page_of_many_rows_and_frames_is_small(fast, tmp_path, monkeypatch):
         rows = {column: digits.uniform(0.1, 1.0, 1500) for column in table}
         rows |= {column: np.linspace(0, 30, 1500) + 0.01 * k for k, column in enumerate(times)}
         results.write_table(copy / f"{name}.csv", list(rows), np.column_stack(list(rows.values())).tolist())
-    monkeypatch.setattr(fields, "MOST_NODES", 2500)
-    points, cells = fields._regular(np.zeros(2), np.array([100.0, 50.0]))
-    monkeypatch.undo()
+    points, cells = regular(monkeypatch, 2500)
     region = (points[cells[:, 0], 0] > 50).astype(float)
     nodal = {name: digits.uniform(size=len(points)) for name in fields.SHOWN[1:6]}
     for k in range(40):  # each mesh is another one
