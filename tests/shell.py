@@ -87,3 +87,9 @@ def stopped(scene, folder: Path, after: int = 3) -> None:
     """A run that was stopped after so many steps, with a checkpoint of every one."""
     with pytest.raises(Interrupted):
         run(scene, folder, watch=Watch(stop=every(after), interval=0.0))
+
+
+def as_whole(scene, folder: Path) -> bool:
+    """Are the files of a folder those of the scene's run without an interruption, which is made beside it?"""
+    run(scene, folder.with_name("whole"))
+    return files(folder) == files(folder.with_name("whole"))

@@ -20,7 +20,7 @@ from repro.run.running import Watch, resume, run
 from repro.scene import load_scene
 from repro.sweep import task
 from tests import faults
-from tests.shell import LONG, SHORT, every, files, lasting, shell, started, stopped, told, wait_for
+from tests.shell import LONG, SHORT, as_whole, every, files, lasting, shell, started, stopped, told, wait_for
 
 CONTACT = ('aggregate.radius="17.98 um"', 'pore.width="20 um"', 'growth.end="0.6 h"')
 SCENES = {
@@ -175,8 +175,7 @@ def test_an_altered_checkpoint_is_refused_and_the_one_before_is_used(tmp_path, c
     assert main(["run", "--resume", str(tmp_path / "run"), "--quiet"]) == 0
     message = capsys.readouterr().err
     assert f"{NEWEST}: refused: its checksum is wrong" in message and "t = 0" not in message
-    run(THREE_HOURS, tmp_path / "whole")
-    assert files(tmp_path / "run") == files(tmp_path / "whole")
+    assert as_whole(THREE_HOURS, tmp_path / "run")
     assert told(tmp_path / "run")["resumes"][0]["time_h"] > 0
 
 
@@ -188,8 +187,7 @@ def test_without_a_good_checkpoint_a_run_starts_again_and_says_so(tmp_path, caps
     assert main(["run", "--resume", str(tmp_path / "run"), "--quiet"]) == 0
     message = capsys.readouterr().err
     assert message.count("refused: its checksum is wrong") == 2 and "starts again from t = 0" in message
-    run(THREE_HOURS, tmp_path / "whole")
-    assert files(tmp_path / "run") == files(tmp_path / "whole")
+    assert as_whole(THREE_HOURS, tmp_path / "run")
 
 
 def test_a_checkpoint_without_its_fields_is_refused(tmp_path):
@@ -236,8 +234,7 @@ def test_a_failure_says_where_the_last_good_state_is(tmp_path, monkeypatch):
     assert told(tmp_path / "run")["status"] == f"failed: {message}"
     monkeypatch.setattr(growth, "MOST_ITERATIONS", most)
     assert resume(tmp_path / "run") == "completed"
-    run(scene, tmp_path / "whole")
-    assert files(tmp_path / "run") == files(tmp_path / "whole")
+    assert as_whole(scene, tmp_path / "run")
 
 
 def test_results_reach_the_disk_while_a_run_goes_on(tmp_path):
@@ -265,8 +262,7 @@ def test_signals_end_a_run_that_goes_on_later(tmp_path, number):
     assert "Traceback" not in message and told(tmp_path / "run")["status"] == "interrupted"
     assert len((tmp_path / "run" / "timeseries.csv").read_text().splitlines()) > 3
     assert resume(tmp_path / "run") == "completed"
-    run(load_scene("base", ('growth.end="1.6 h"',)), tmp_path / "whole")
-    assert files(tmp_path / "run") == files(tmp_path / "whole")
+    assert as_whole(load_scene("base", ('growth.end="1.6 h"',)), tmp_path / "run")
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from repro.run.checkpoint import NEWEST, PREVIOUS
 from repro.run.running import run
 from repro.scene import load_scene
 from tests import faults
-from tests.shell import files, flags, lasting, state, stopped, told
+from tests.shell import as_whole, files, flags, lasting, state, stopped, told
 
 FAST = ('numerics.preset="fast"', 'growth.end="3 h"')
 SETS, SCENE = flags(*FAST), load_scene("base", FAST)
@@ -40,8 +40,7 @@ def test_a_run_that_was_interrupted_is_gone_on_with(tmp_path, capsys):
     stopped(SCENE, tmp_path / "run")
     assert main(["run", "base", *SETS, "--out", str(tmp_path / "run")]) == 0
     assert "goes on from t = " in capsys.readouterr().err
-    run(SCENE, tmp_path / "whole")
-    assert files(tmp_path / "run") == files(tmp_path / "whole")
+    assert as_whole(SCENE, tmp_path / "run")
     assert told(tmp_path / "run")["resumes"][0]["time_h"] > 0
 
 

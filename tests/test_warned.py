@@ -42,9 +42,10 @@ def test_a_run_warns_of_what_check_warns_of(tmp_path, capsys, checked, options):
     assert [one["key"] for one in events if one["event"] == "warning"] == [one["key"] for one in checked if events]
 
 
-def test_the_page_tells_them_at_its_head(tmp_path, checked):
-    """Before the fields."""
+def test_the_page_tells_them_at_its_head(tmp_path, checked, recwarn):
+    """Before the fields; a script is not warned of the scene's simplifications, which are in run.json."""
     run(load_scene("wide", SETS), tmp_path)
+    assert not recwarn.list
     text = text_of(tmp_path)
     head = text[: text.index("</header>")]
     shown = [html.unescape(re.sub("<.*?>", "", item)) for item in re.findall("<li>(.*?)</li>", head)]
@@ -66,12 +67,6 @@ def test_a_resume_keeps_them(tmp_path, checked):
     run(load_scene("wide", SETS), tmp_path / "whole")
     assert told(tmp_path / "parts")["warnings"] == checked
     assert lasting(tmp_path / "parts") == lasting(tmp_path / "whole")
-
-
-def test_a_script_is_not_warned(tmp_path, recwarn):
-    """Of the scene's simplifications: they are in run.json."""
-    run(load_scene("wide", SETS), tmp_path)
-    assert not recwarn.list
 
 
 def test_numbers_that_cannot_be_worked_out_end_no_run(monkeypatch):
