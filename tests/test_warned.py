@@ -15,11 +15,11 @@ from repro.run import running
 from repro.run.running import Watch, resume, run
 from repro.scene import load_scene
 from tests.pages import Page, text_of
-from tests.shell import lasting, told
+from tests.shell import flags, lasting, stopped, told
 
 SETS = ("numerics.preset=fast", "growth.time_step=0.6 h", "growth.end=1 h", "pore.length=100 um",
         "aggregate.radius=16 um")
-COMMAND = ["wide", *(part for entry in SETS for part in ("--set", entry))]
+COMMAND = ["wide", *flags(*SETS)]
 
 
 @pytest.fixture
@@ -44,9 +44,10 @@ def test_a_run_warns_of_what_check_warns_of(tmp_path, capsys, checked, options):
     assert [one["key"] for one in events if one["event"] == "warning"] == [one["key"] for one in checked if events]
 
 
-def test_the_page_tells_them_at_its_head(tmp_path, checked):
-    """Before the fields."""
+def test_the_page_tells_them_at_its_head(tmp_path, checked, recwarn):
+    """Before the fields; a script is not warned of the scene's simplifications, which are in run.json."""
     run(load_scene("wide", SETS), tmp_path)
+    assert not recwarn.list
     text = text_of(tmp_path)
     head = text[: text.index("</header>")]
     shown = [html.unescape(re.sub("<.*?>", "", item)) for item in re.findall("<li>(.*?)</li>", head)]
@@ -63,19 +64,11 @@ def test_a_run_without_any_has_an_empty_list(tmp_path, capsys):
 
 def test_a_resume_keeps_them(tmp_path, checked):
     """Without working them out again."""
-    left = iter([0, 15])
-    with pytest.raises(Interrupted):
-        run(load_scene("wide", SETS), tmp_path / "parts", watch=Watch(stop=lambda: next(left, 0)))
+    stopped(load_scene("wide", SETS), tmp_path / "parts", after=2)
     resume(tmp_path / "parts")
     run(load_scene("wide", SETS), tmp_path / "whole")
     assert told(tmp_path / "parts")["warnings"] == checked
     assert lasting(tmp_path / "parts") == lasting(tmp_path / "whole")
-
-
-def test_a_script_is_not_warned(tmp_path, recwarn):
-    """Of the scene's simplifications: they are in run.json."""
-    run(load_scene("wide", SETS), tmp_path)
-    assert not recwarn.list
 
 
 def test_numbers_that_cannot_be_worked_out_end_no_run(monkeypatch):
