@@ -13,10 +13,6 @@ from verification.claims.mass_balance import PAPER_CORRECTION, bookkeeping, exce
 from verification.claims.restored import solved_pore
 from verification.claims.runs import BASE, PLATES, at, grown, scene, series
 from verification.errata import (
-    MEAN_INLET,
-    NO_D_C,
-    PLOTTED,
-    SHORT_F,
     STATE_HEAD,
     consumed_ratio,
     erratum,
@@ -26,7 +22,9 @@ from verification.errata import (
     state_row,
     table,
 )
+from verification.switches import CHOICES, PLOTTED
 
+SHORT_F, NO_D_C, MEAN_INLET = (CHOICES[name].run for name in ("exact F", "decay", "mean inlet"))
 COD = 2.38  # of phenol, Table 1; it enters through F alone
 
 
@@ -38,8 +36,7 @@ COD = 2.38  # of phenol, Table 1; it enters through F alone
         COD - Y d_c = {value}. In base at 19.2 h it would change what follows (the converged solution, so that no
         difference of meshes is in it); acceptor over donor consumed would be {ratio} instead of {ours}.
 
-        {table}""",
-    scenes=(BASE, SHORT_F))
+        {table}""")
 def ratio_of_substrates() -> dict[str, str]:
     """Base with F as defined."""
     said = scene(*BASE).kinetics
@@ -65,8 +62,7 @@ def ratio_of_substrates() -> dict[str, str]:
         {table}
 
         Base at 19.2 h with f_d b for d_c f_d b: velocity {velocity}, acceptor effluent {acceptor}, donor
-        effluent {donor} against ours.""",
-    scenes=(BASE, PLATES, NO_D_C))
+        effluent {donor} against ours.""")
 def decay_demand() -> dict[str, str]:
     """Size of the term, electron balance of the readings, and base with d_c left out."""
     said = scene(*BASE)
@@ -121,8 +117,7 @@ def electron_defect(law, demand: float | None = None) -> float:
     consequence="""
         Base; the balance defect is (supplied - out - consumed) / supplied, with the flow-weighted effluent:
 
-        {table}""",
-    scenes=(BASE, MEAN_INLET))
+        {table}""")
 def inlet_condition() -> dict[str, str]:
     """Base with both forms of (11)."""
     columns, rows = [f"{end}_{name}_mg_per_L" for end in ("inlet", "effluent") for name in ("acceptor", "donor")], []
@@ -147,8 +142,7 @@ def inlet_condition() -> dict[str, str]:
         Base at 19.4 h before the expansion (E12), flow-weighted over the section, upstream of the aggregate (our
         meshed inlet is {distance} um from it):
 
-        {table}""",
-    scenes=(BASE,))
+        {table}""")
 def meshed_inlet() -> dict[str, str]:
     """Both substrates at the distances in question."""
     now, solved = grown(BASE, PLOTTED)
@@ -167,8 +161,7 @@ def meshed_inlet() -> dict[str, str]:
         Acceptor over donor consumed: {printed} from the printed effluents, less than F = 1.52, which is
         impossible where both K_s are equal; {corrected} with the paper's 1.6 % on both, within 1 % of {ours}, F and
         the decay, in base at 19.4 h before the expansion. To an acceptor effluent of 4.19 belongs a donor effluent
-        of {donor}: {apart} of the printed one.""",
-    scenes=(BASE,))
+        of {donor}: {apart} of the printed one.""")
 def printed_effluents() -> dict[str, str]:
     """Stoichiometry of the printed numbers and of ours."""
     ours = consumed_ratio(*(flux.effluent for flux in grown(BASE, PLOTTED)[1].fluxes))
@@ -192,8 +185,7 @@ def printed_effluents() -> dict[str, str]:
         Our own ledger closes to round-off, so these are the formula's errors, and of the size of the few
         percent that the paper corrects. Its correction, "throughout the whole numerical simulation", cannot have been
         one of all effluents: raised by 1.6 %, one of them (the donor's, the longer) exceeds its supply until
-        {until} h.""",
-    scenes=(BASE,))
+        {until} h.""")
 def balance_formula() -> dict[str, str]:
     """The paper's dM_C over the integrals of F1 and F2, in some steps of base."""
     book, columns = bookkeeping(BASE), series(*BASE)
