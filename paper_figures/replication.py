@@ -36,7 +36,7 @@ from verification.claims import (
 )
 from verification.claims import record as claims_record
 from verification.kernel.writing import markdown_row
-from verification.sensitivity.supplies import verdicts
+from verification.sensitivity.wide import verdicts
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
