@@ -174,7 +174,7 @@ def test_a_level_changes_wide_alone():
     with at_level(wide.supplied(5.0, 59.0)):
         base, of_wide = runs.scene("base"), runs.scene("wide")
     assert base.substrates.acceptor.supply == 10.0 and of_wide.substrates.donor.supply == 5.0
-    assert wide.growth.end == 59.0 and wide.output.times[-1] == 59.0 and base.growth.end == pytest.approx(19.4)
+    assert of_wide.growth.end == 59.0 and of_wide.output.times[-1] == 59.0 and base.growth.end == pytest.approx(19.4)
 
 
 def test_a_number_after_contact_is_kept_where_its_bar_is_what_is_asked():
