@@ -72,8 +72,9 @@ def test_it_grows_with_area_and_lambda_and_lies_within_its_bounds():
     for spanned in (False, True):
         share = np.geomspace(*known(spanned), 200)
         laws = [repro.added_resistance(share, 1.0, spanned, ratio) for ratio in np.geomspace(100, 10000, 12)]
-        for law in laws:
-            assert (np.diff(law.length) > 0).all() and (law.least < law.length).all() and (law.length < law.most).all()
+        for each in laws:
+            assert (np.diff(each.length) > 0).all()
+            assert (each.least < each.length).all() and (each.length < each.most).all()
         assert all((after.length > before.length).all() for before, after in zip(laws, laws[1:]))
 
 
