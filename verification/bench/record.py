@@ -45,6 +45,8 @@ from time import perf_counter, process_time
 
 import numpy as np
 
+from repro.results import write_text
+
 FOLDER = Path(__file__).parents[1] / "report"
 FILE = FOLDER / "bench.json"
 PACKAGES = ("numpy", "scipy", "scikit-fem", "shapely", "mmgpy", "fipy", "py-pde", "numba")
@@ -68,9 +70,7 @@ def load(file: Path = FILE) -> dict:
 def save(record: dict, file: Path = FILE) -> None:
     """Write a record whole or not at all; ValueError where it holds not-a-number."""
     file.parent.mkdir(parents=True, exist_ok=True)
-    beside = file.with_name(f".{file.name}.part")
-    beside.write_text(json.dumps(record, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-    os.replace(beside, file)
+    write_text(file, json.dumps(record, indent=1, allow_nan=False) + "\n")
 
 
 def machine() -> dict:

@@ -326,7 +326,7 @@ def transfer_part(quick: bool) -> dict:
     ways = {"conserving projection": transfer.project,
             "bounded conserving projection": transfer.project_bounded,
             f"linear interpolation, {PAPER}": transfer.interpolated}
-    jobs = {(name, f"{size:g} um"): partial(_transfer_linear, size, count, way)
+    jobs = {(name, f"{size:g} um"): partial(_linear, size, count, way)
             for name, way in ways.items() for size in sizes}
     jobs |= {("quadratic interpolation (fast, accurate)", f"{size:g} um"): partial(_quadratic, size, count)
              for size in quadratic}
@@ -360,35 +360,38 @@ def _total() -> float:
     return float(weight @ transfer_exact(x[:, None], y) @ weight) * 0.25 * TRANSFER_ENDS[1] * TRANSFER_WIDTH
 
 
-def _transfer_linear(size: float, count: int, project):
-    old = _transfer_meshed(size, 0)
-    field = transfer_exact(*old[0].T)[:, None]
-    start = _integral(*old, field)
+def _linear(size: float, count: int, project):
+    return _carried(count, partial(_transfer_meshed, size), lambda mesh: mesh[0],
+                    lambda old, field, new: project(*old, field, *new), lambda mesh, field: _integral(*mesh, field),
+                    lambda mesh, field: norms.l2_error(*mesh, field[:, 0], transfer_exact))
+
+
+def _quadratic(size: float, count: int):
+    return _carried(count, partial(_curved, size), lambda space: space.points, _interpolated, _weighed, _transfer_apart)
+
+
+def _interpolated(old: Space, field: np.ndarray, new: Space) -> np.ndarray:
+    return transfer.interpolate(old.mesh.points, old.mesh.cells, field, new.points)
+
+
+def _carried(count: int, meshed, points, carry, weighed, error):
+    """The field through ``meshed(which)``, by ``carry(old, field, new)``; ``weighed`` and ``error`` of a mesh and the
+    field on it."""
+    old = meshed(0)
+    field = transfer_exact(*points(old).T)[:, None]
+    start = weighed(old, field)
     for which in range(1, count + 1):
-        new = _transfer_meshed(size, which)
-        field = project(*old, field, *new)
+        new = meshed(which)
+        field = carry(old, field, new)
         old = new
-    return lambda: {"error": norms.l2_error(*old, field[:, 0], transfer_exact), "nodes": len(old[0]),
-                    "drift": abs(_integral(*old, field) - start) / _total(),
+    return lambda: {"error": error(old, field), "nodes": len(points(old)),
+                    "drift": abs(weighed(old, field) - start) / _total(),
                     "beyond": float(max(1.0 - field.min(), field.max() - 2.0, 0.0))}
 
 
 def _integral(points, triangles, field) -> float:
     _, weight, shape = norms.quadrature(points, triangles)
     return float(np.sum(weight * (field[triangles, 0] @ shape.T)))
-
-
-def _quadratic(size: float, count: int):
-    old = _curved(size, 0)
-    field = transfer_exact(*old.points.T)[:, None]
-    start = _weighed(old, field)
-    for which in range(1, count + 1):
-        new = _curved(size, which)
-        field = transfer.interpolate(old.mesh.points, old.mesh.cells, field, new.points)
-        old = new
-    return lambda: {"error": _transfer_apart(old, field), "nodes": old.count,
-                    "drift": abs(_weighed(old, field) - start) / _total(),
-                    "beyond": float(max(1.0 - field.min(), field.max() - 2.0, 0.0))}
 
 
 def _weighed(space, field) -> float:

@@ -13,6 +13,7 @@ from scipy.interpolate import PchipInterpolator
 
 from repro.results import read_table
 from repro.results.network import added_resistance, known
+from verification.kernel.writing import markdown, table
 from verification.network import shapes
 from verification.network.shapes import RATIOS, Growth, Sample
 
@@ -202,8 +203,6 @@ def _range(spanned: bool) -> str:
 def _told(spanned: bool) -> str:
     """A table in Markdown."""
     shares = np.array(TOLD[spanned])
-    lines = [f"| A / W^2, {'touching both walls' if spanned else 'before contact'} | r | least | most |",
-             "|---|---|---|---|"]
-    for share, *values in zip(shares, *added_resistance(shares, 1.0, spanned, RATIO)):
-        lines.append(f"| {share:g} | {' | '.join(f'{value:.3g}' for value in values)} |")
-    return "\n".join(lines)
+    head = (f"A / W^2, {'touching both walls' if spanned else 'before contact'}", "r", "least", "most")
+    rows = zip(shares, *added_resistance(shares, 1.0, spanned, RATIO))
+    return markdown([table(head, ([f"{share:g}", *(f"{value:.3g}" for value in values)] for share, *values in rows))])

@@ -95,8 +95,9 @@ def page(record: dict) -> str:
     """The record in words and tables."""
     words = ("Elasticities d ln(number) / d ln(input), by central differences of the converged solution; ± is their "
              "bar, and one that exceeds a tenth of the value is *not resolved*. `make sensitivity` writes this page.")
-    blocks = [Block("text", words), Block("text", f"![Tornado diagram]({TARGET.name})"), _table(record),
-              *_set(record), *_after_contact(record), *_supplies(record), *_sobol(record)]
+    blocks = [Block("text", words), Block("text", f"![Tornado diagram]({TARGET.name})"), _table(record)]
+    for part, section in SECTIONS.items():
+        blocks += section(record[part]) if record.get(part) else ()
     return f"# What the inputs of Table 1 allow\n\n{markdown(blocks, 2)}\n\n"
 
 
@@ -117,10 +118,7 @@ def _cell(known: dict | None) -> str:
     return f"{word} (± {known['bar']:.1g}){told}"
 
 
-def _set(record: dict) -> Iterator[Block]:
-    found = record.get("one_set")
-    if not found:
-        return
+def _set(found: dict) -> Iterator[Block]:
     words = ("One set of inputs within the rounding gives all printed numbers of base at once" if found["reached"] else
              "No set of inputs within the rounding gives all printed numbers of base at once; the nearest")
     numbers = ", ".join(f"{NAMES.get(name, name)} {value:.4f}" for name, value in found["numbers"].items())
@@ -130,10 +128,7 @@ def _set(record: dict) -> Iterator[Block]:
     yield table(("input", "value"), ((name, f"{value:.4f}") for name, value in found["inputs"].items()))
 
 
-def _supplies(record: dict) -> Iterator[Block]:
-    found = record.get("supplies")
-    if not found:
-        return
+def _supplies(found: dict) -> Iterator[Block]:
     yield Block("heading", "The supply of Figure 6, which is not printed")
     yield table(("supply of both (K_s)", "contact (h)", "ends at contact (um)", "least acceptor then (K_s)"), (
         (supply, f"{known['contact_time']:.1f}", f"{known['upstream']:.0f} to {known['downstream']:.0f}",
@@ -155,10 +150,7 @@ def _held(found: dict[str, dict]) -> Iterator[Block]:
         yield table(("claim", *(f"{supply} K_s" for supply in found)), rows)
 
 
-def _after_contact(record: dict) -> Iterator[Block]:
-    found = record.get("after_contact")
-    if not found:
-        return
+def _after_contact(found: list[dict]) -> Iterator[Block]:
     yield Block("heading", "How well wide is known after contact")
     yield Block("text", "Values from the finest size to the coarsest; means are over whole hours from contact to 45 h. "
                 "A single row jumps as one more edge of the outline comes to rest on the wall.")
@@ -167,10 +159,7 @@ def _after_contact(record: dict) -> Iterator[Block]:
          f"{known['asked_percent']:g}", "yes" if known["kept"] else "no") for known in found))
 
 
-def _sobol(record: dict) -> Iterator[Block]:
-    found = record.get("sobol")
-    if not found:
-        return
+def _sobol(found: dict) -> Iterator[Block]:
     widest = max(0.5 * (high - low) for known in found["numbers"].values() for _, low, high in known["total_order"])
     yield Block("heading", "Sobol indices of base")
     yield Block("text", f"Total indices of {found['samples']} samples in `fast`, with intervals of "
@@ -180,6 +169,11 @@ def _sobol(record: dict) -> Iterator[Block]:
     yield table(("number", *found["inputs"]), (
         (NAMES.get(name, name), *(f"{value:.2f} ({low:.2f} to {high:.2f})" for value, low, high in
                                   known["total_order"])) for name, known in found["numbers"].items()))
+
+
+#: What is told of the parts of the record that are there, in this order.
+SECTIONS: dict[str, Callable[..., Iterator[Block]]] = {
+    "one_set": _set, "after_contact": _after_contact, "supplies": _supplies, "sobol": _sobol}
 
 
 def main(arguments: list[str] | None = None) -> int:
