@@ -66,6 +66,22 @@ def test_errata_and_audit_read_one_run(counted):
     assert counted == {BASE: 1, switch.run: 1, WIDE: 1, (*WIDE, switch.change): 1}
 
 
+def test_errata_and_audit_march_once_where_no_scene_can_say_it(counted, monkeypatch):
+    """What a restart as J drifts by, of two steps. Mutant: an audit that marches for itself."""
+    marches, march = Counter(), switches._march
+
+    def counting(said, step, now):
+        marches[step.__name__] += 1
+        return march(said, step, now)
+
+    monkeypatch.setattr(switches, "_march", counting)
+    monkeypatch.setattr(runs, "scene", lambda *run: load_scene("base", ["numerics.refinement=0.5", "growth.end=0.4 h"]))
+    told = audit.drift()
+    line = re.search(r"^\| base, before contact \|(.*)\|$", entry("E7"), re.M)[1]
+    assert line.split("|")[-1].strip() == f"{100 * told['drift']['alternative']:.2g} %" != "0 %"
+    assert marches == {"restarting_as_j": 2}  # of base and of wide
+
+
 SHORT = (*BASE, "numerics.refinement=0.5", 'aggregate.radius="15 um"', 'growth.end="0.8 h"', 'growth.time_step="0.4 h"')
 
 
