@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from paper_figures import style
 from repro import added_resistance
 from repro.results.network import known
-from verification.network import record, unseen
-from verification.network.record import RATIO
+from verification.network import unseen
+from verification.network.law import RATIO, judged, read
 
 TITLE = "Addition. A law for networks: the resistance that an aggregate adds to its pore"
 RUNS = ()
@@ -43,7 +43,7 @@ def _law(axes: Axes) -> None:
             axes.plot(share, found.length, color=colour, linestyle="--" if spanned else "-", label=label)
             if ratio == RATIO:
                 axes.fill_between(share, found.least, found.most, color=colour, alpha=0.2, linewidth=0)
-    seen = record.read(unseen=False)
+    seen = read(unseen=False)
     axes.plot(seen["area_over_width2"], seen["added_length_over_width"], ".", color=style.BLACK, markersize=1.5)
     axes.set(xscale="log", yscale="log", xlabel=r"area of the aggregate, $A / W^2$",
              ylabel=r"added length of empty pore, $r$ (of $W$)", title="half-discs (full) and plugs (dashed)")
@@ -52,8 +52,8 @@ def _law(axes: Axes) -> None:
 
 def _new(axes: Axes) -> None:
     """Shapes that the fit has not seen: where they lie between the law, 0, and its bounds, 1 and -1."""
-    columns = record.read(unseen=True)
-    found = record.judged(columns)
+    columns = read(unseen=True)
+    found = judged(columns)
     side = np.sign(found.apart) * found.beyond
     for grown, label, colour in ((0, "drawn", style.BLUE), (1, "grown", style.RED)):
         chosen = columns["grown"] == grown
@@ -67,7 +67,7 @@ def _new(axes: Axes) -> None:
 
 def caption() -> str:
     """What is seen, and how many of the unseen shapes the law's bounds hold."""
-    seen, found = record.read(unseen=False), record.judged(record.read(unseen=True))
+    seen, found = read(unseen=False), judged(read(unseen=True))
     worst = 100 * np.expm1(np.abs(found.apart))
     return (f"(a) The length of empty pore that resists as much as an aggregate adds, against its area: half-discs on "
             f"one wall (full lines) and bodies that span the pore (dashed), for viscosity ratios of {RATIOS[0]:g}, "

@@ -19,7 +19,7 @@ from paper_figures import FIGURES, manifest
 from paper_figures.claims import STATEMENTS
 from repro.results import write_text
 from verification import sensitivity, speed
-from verification.bench import base
+from verification.bench import runs
 from verification.bench.record import line
 from verification.claims import (
     CHANGED,
@@ -36,7 +36,7 @@ from verification.claims import (
 )
 from verification.claims import record as claims_record
 from verification.kernel.writing import markdown_row
-from verification.sensitivity.supplies import verdicts
+from verification.sensitivity.wide import verdicts
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
@@ -207,8 +207,8 @@ def _bench() -> dict[str, Callable[[], str]]:
     bench = _kept("bench.json")
     failed = [one for one in bench["verdicts"] if one["holds"] is not True]
     part = bench["parts"]["base"]
-    fast = line(part, base.FAST)["points"][0]
-    slow = next(point for point in line(part, base.PRESET_PAPER)["points"] if point["label"] == speed.PAPER_AS_IT_IS)
+    fast = line(part, runs.FAST)["points"][0]
+    slow = next(point for point in line(part, runs.PRESET_PAPER)["points"] if point["label"] == speed.PAPER_AS_IT_IS)
     return {"bench.processor": lambda: f"one core ({bench['machine']['processor']})",
             "bench.paper": lambda: f"{slow['seconds']:.1f}", "bench.fast": lambda: f"{fast['seconds']:.1f}",
             "bench.error": lambda: f"{100 * fast['error']:.1f}", "bench.total": lambda: str(len(bench["verdicts"])),

@@ -1,93 +1,154 @@
-"""The audit: every choice is a scene that differs in what it says, and a row tells what it measures."""
+"""Switches, measured once, and the audit, one of their two readers: every choice is a scene that differs in what it
+says, and a row tells what it measures."""
 import json
+import re
+from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from repro.march.loop import Instant
 from repro.model import pore
 from repro.scene import load_scene, scene_tables
-from verification.audit import __main__ as audit
-from verification.audit import choices, measure
-from verification.audit.choices import CHOICES
+from verification import audit, switches
+from verification.claims import levels, runs
+from verification.claims.runs import BASE, PLATES, WIDE
+from verification.errata import percent
+from verification.errata.__main__ import entry
+from verification.switches import CHOICES, NUMBERS
 
 
-@pytest.mark.parametrize("choice", CHOICES, ids=lambda choice: choice.alternative)
-def test_a_choice_changes_what_it_names_and_nothing_else(choice):
+@pytest.mark.parametrize("switch", [*CHOICES.values(), *NUMBERS], ids=lambda switch: switch.change)
+def test_a_choice_changes_what_it_names_and_nothing_else(switch):
     """Against the paper's preset."""
-    plain, changed = (scene_tables(measure.scene(*changes)) for changes in ((), choice.changes))
+    plain, changed = (scene_tables(runs.scene(*run)) for run in (PLATES, switch.run))
     apart = [f"{name}.{key}" for name, table in plain.items() if isinstance(table, dict) for key in table
              if table[key] != changed[name][key]]
-    assert apart == [choice.changes[0].partition("=")[0]]
+    assert apart == [switch.change.partition("=")[0]]
 
 
 def test_the_default_is_the_papers():
-    said = measure.scene()
-    assert said.numerics == load_scene("base", ['numerics.preset="paper"']).numerics and said.growth.end == 19.2
+    said = runs.scene(*PLATES)
+    assert said.numerics == load_scene("base", ['numerics.preset="paper"']).numerics and said.growth.time_step == 0.2
 
 
-@pytest.fixture(scope="module")
-def short():
-    """Base for two steps on a coarse mesh."""
-    changes = ("numerics.refinement=0.5", 'aggregate.radius="15 um"')
-    return lambda *more: measure.scene(*changes, *more, end=0.8)
+@pytest.fixture()
+def counted(monkeypatch):
+    """Runs that are made up: the seed, larger in the run with the change; how often each is computed."""
+    calls = Counter()
+
+    @levels.cached
+    def history(*run):
+        calls[run] += 1
+        said = load_scene("base", [f"aggregate.radius={11 if run[1:] else 10} um"])
+        now = pore.seeded(said)
+        solved = pore.solve(said, now)
+        times = (0.0, switches.PLOTTED, 45.0)
+        return runs.History(said, tuple(Instant(replace(now, time=time), solved, None, (), 0, {}) for time in times),
+                            (), None)
+
+    levels.forget(levels.DEFAULT)
+    monkeypatch.setattr(runs, "history", history)
+    yield calls
+    levels.forget(levels.DEFAULT)
 
 
-def test_effects_are_relative_and_effluents_over_the_supply(short):
-    said = short()
-    default = dict.fromkeys((*measure.RELATIVE, *measure.EFFLUENTS), 4.0)
-    found = measure.effect(said, default, {name: 5.0 for name in default})
-    assert found == {**dict.fromkeys(measure.RELATIVE, 0.25), **dict.fromkeys(measure.EFFLUENTS, 0.1)}
-    assert measure.largest({"a": -2.0, "b": 1.0}) == "a" and measure.largest({}) == ""
+def test_errata_and_audit_read_one_run(counted):
+    """Both tell the same difference, of runs that are computed once. Mutants: an audit that simulates its scenes by
+    itself; one that asks for base under another name."""
+    switch = CHOICES["rechosen"]
+    told = audit.measured(switch, 1.0)["effect"]
+    line = re.search(r"^\| base, 19.2 h, rechosen \|(.*)\|$", entry("E20"), re.M)[1]
+    assert percent(1 + told["area"], 1) in line.split("|")[-1]
+    assert told["area"] == pytest.approx(0.21, rel=1e-3) and told["upstream"] == pytest.approx(0.1, rel=1e-3)
+    assert percent(1 + told["upstream"], 1) in line.split("|")[2]
+    assert counted == {BASE: 1, switch.run: 1, WIDE: 1, (*WIDE, switch.change): 1}
 
 
-def test_one_state_tells_two_scenes_apart_on_one_mesh(short):
+def test_errata_and_audit_march_once_where_no_scene_can_say_it(counted, monkeypatch):
+    """What a restart as J drifts by, of two steps. Mutant: an audit that marches for itself."""
+    marches, march = Counter(), switches._march
+
+    def counting(said, step, now):
+        marches[step.__name__] += 1
+        return march(said, step, now)
+
+    monkeypatch.setattr(switches, "_march", counting)
+    monkeypatch.setattr(runs, "scene", lambda *run: load_scene("base", ["numerics.refinement=0.5", "growth.end=0.4 h"]))
+    told = audit.drift()
+    line = re.search(r"^\| base, before contact \|(.*)\|$", entry("E7"), re.M)[1]
+    assert line.split("|")[-1].strip() == f"{100 * told['drift']['alternative']:.2g} %" != "0 %"
+    assert marches == {"restarting_as_j": 2}  # of base and of wide
+
+
+SHORT = (*BASE, "numerics.refinement=0.5", 'aggregate.radius="15 um"', 'growth.end="0.8 h"', 'growth.time_step="0.4 h"')
+
+
+def short(*changes):
+    """Base after two steps on a coarse mesh."""
+    return switches.state((*SHORT, *changes), 0.8)
+
+
+def test_effects_are_relative_and_effluents_over_the_supply():
+    said = runs.scene(*SHORT)
+    relative = ("velocity", "conductivity", "area", "thickness", "upstream", "downstream")
+    default = dict.fromkeys((*relative, *switches.EFFLUENTS), 4.0)
+    found = switches.effect(said, default, {name: 5.0 for name in default})
+    assert found == {**dict.fromkeys(relative, 0.25), **dict.fromkeys(switches.EFFLUENTS, 0.1)}
+    assert audit.largest({"a": -2.0, "b": 1.0}) == "a" and audit.largest({}) == ""
+
+
+def test_one_state_tells_two_scenes_apart_on_one_mesh():
     """No difference to itself to the last bit; F changes the acceptor, fluid forces the shape alone."""
-    said = short()
-    found = measure.run(said)
-    assert set(measure.one_state(said, said, found).values()) == {0.0}
-    fluid = measure.one_state(said, short('growth.fluid_forces="included"'), found)
+    found = short()
+    assert set(switches.one_state(found, found.scene).values()) == {0.0}
+    fluid = switches.one_state(found, runs.scene(*SHORT, 'growth.fluid_forces="included"'))
     assert fluid["velocity"] == fluid["acceptor leaving"] == 0 and 0 < abs(fluid["upstream"]) < 1e-4
-    exact = measure.one_state(said, short("kinetics.acceptor_to_donor_ratio=1.5138"), found)
+    exact = switches.one_state(found, runs.scene(*SHORT, "kinetics.acceptor_to_donor_ratio=1.5138"))
     assert 1e-5 < exact["acceptor leaving"] < 1e-2 and exact["velocity"] == 0
 
 
-def test_reshaping_to_its_own_outline_changes_nothing_and_to_a_finer_one_hardly_anything(short):
+def test_reshaping_to_its_own_outline_changes_nothing_and_to_a_finer_one_hardly_anything():
     """The mesh stays the default's; the flow is that of the other shape: a larger aggregate of the same shape."""
-    default, finer = measure.run(short()), measure.run(short("numerics.refinement=0.52"))
-    assert np.array_equal(measure.reshaped(default.pore, default.pore.outline).mesh.points, default.pore.mesh.points)
-    one, two = (each(short(), default, finer) for each in (measure.whole_run, measure.two_meshes))
+    default, finer = short(), short("numerics.refinement=0.52")
+    own = switches.reshaped(default.pore, default.pore.outline)
+    assert np.array_equal(own.mesh.points, default.pore.mesh.points)
+    one, two = (each(default, finer) for each in (switches.whole_run, switches.two_meshes))
     assert abs(one["velocity"]) < 0.3 * abs(two["velocity"]) and one["area"] == two["area"]
-    wide = measure.run(short('aggregate.radius="15.15 um"'))
+    wide = short('aggregate.radius="15.15 um"')
     radius = wide.pore.outline.thickness / default.pore.outline.thickness
-    there = measure.reshaped(default.pore, wide.pore.outline)
+    there = switches.reshaped(default.pore, wide.pore.outline)
     assert there.outline.area / default.pore.outline.area == pytest.approx(radius**2, rel=1e-4)
-    assert measure.whole_run(short(), default, wide)["velocity"] < -1e-3
+    assert switches.whole_run(default, wide)["velocity"] < -1e-3
 
 
 def test_runs_in_turn_alternate():
     order = []
 
     def make(name, seconds):
-        return lambda: order.append(name) or measure.Run(seconds, None, None)
+        return lambda: order.append(name) or seconds
 
-    *_, ratio = measure.in_turn((make("a", 2.0), make("b", 3.0)), 2)
+    ratio = audit.in_turn((make("a", 2.0), make("b", 3.0)), 2)
     assert order == ["a", "b", "a", "b"] and ratio == 1.5
 
 
-def test_marching_is_the_run(short):
-    """The audit's own loop and the package's make the same steps."""
-    said = short()
-    found, steps = measure.advance(said, pore.seeded(said), choices._step, 0.8)
-    other = measure.run(said)
-    assert {len(column) for column in steps.values()} == {2} and steps["drift"].max() < 0.01
-    assert abs(steps["lean"]).max() < 1e-2
-    assert measure.quantities(found.pore, found.solved) == measure.quantities(other.pore, other.solved)
+def test_marching_is_the_run():
+    """Our own loop and the package's make the same steps, and tell the same of them."""
+    found, rows = switches.course(SHORT, switches.as_it_is), switches.columns(SHORT)
+    assert {len(column) for column in found.columns.values()} == {3} and found.columns["drift"].max() < 0.01
+    assert abs(found.columns["lean"]).max() < 1e-2 and found.seconds > 0
+    assert found.plotted.quantities == short().quantities
+    for name, column in found.columns.items():
+        assert rows[name] == pytest.approx(column, rel=1e-12, abs=1e-12)
+    assert switches.near(rows, "time", [0.79, 0.0]) == pytest.approx([0.8, 0.0])
 
 
 def test_an_uneven_seed_is_one_percent_off():
-    said = measure.scene()
-    plain, bulging = pore.seeded(said), choices.uneven(said, 0.01)
+    said = runs.scene(*BASE)
+    plain, bulging, other = pore.seeded(said), switches.longer_downstream(said), switches.longer_upstream(said)
     assert bulging.outline.downstream == pytest.approx(5.05) and bulging.outline.upstream == pytest.approx(-4.95)
+    assert other.outline.downstream == pytest.approx(4.95) and other.outline.upstream == pytest.approx(-5.05)
     apart = np.hypot(*(bulging.outline.points[bulging.wall == 0] - [0.05, 0.0]).T) / 5 - 1
     assert np.ptp(apart) > 0.02  # and not a half-disc that has moved
     assert bulging.outline.area == pytest.approx(plain.outline.area, rel=1e-4)

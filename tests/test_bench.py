@@ -5,8 +5,8 @@ from math import inf, nan
 import pytest
 
 from verification.bench import __main__ as bench
-from verification.bench import base, clock, drawn, memory, record, size, tables, verdicts
-from verification.bench.envelope import envelope, exponent, reading, slope
+from verification.bench import record, runs, told
+from verification.bench.record import envelope, exponent, reading, slope
 
 
 def point(seconds, error, **more):
@@ -55,12 +55,12 @@ def jobs_told(jobs, repeats):
     """Lines, and the order in which the jobs ran."""
     order = []
 
-    def told(key, job):
+    def noted(key, job):
         def run():
             order.append(key[1])
             return job()
         return run
-    return clock.measured({key: told(key, job) for key, job in jobs.items()}, repeats), order
+    return record.measured({key: noted(key, job) for key, job in jobs.items()}, repeats), order
 
 
 def test_methods_take_turns_and_the_first_run_only_warms_up():
@@ -72,8 +72,8 @@ def test_methods_take_turns_and_the_first_run_only_warms_up():
 
 @pytest.mark.parametrize("long, runs", [(0.0, 2), (1e9, 6)])
 def test_long_jobs_run_a_third_as_often_and_their_first_run_counts(monkeypatch, long, runs):
-    monkeypatch.setattr(clock, "SHORT", 0.0)
-    monkeypatch.setattr(clock, "LONG", long)
+    monkeypatch.setattr(record, "SHORT", 0.0)
+    monkeypatch.setattr(record, "LONG", long)
     lines, order = jobs_told({("a", "1"): lambda: {"error": 0.1}}, 6)
     assert len(order) == lines[0]["points"][0]["repeats"] == runs
 
@@ -88,22 +88,22 @@ def test_what_fails_is_listed_and_not_run_again():
 
 
 def test_time_apart_is_taken_off():
-    told = clock.measured({("a", "1"): lambda: {"error": 0.1, "apart_seconds": 100.0, "apart_cpu": 200.0}}, 1)
-    found = told[0]["points"][0]
+    lines = record.measured({("a", "1"): lambda: {"error": 0.1, "apart_seconds": 100.0, "apart_cpu": 200.0}}, 1)
+    found = lines[0]["points"][0]
     assert -100 <= found["seconds"] < 0 and -200 <= found["cpu"] < -100
 
 
 def base_part(fast=(0.5, 0.008), accurate=(1.5, 0.0009), wide=9.0):
     """Paper: 0.02 / error s, that is 2 s at 1 % and 20 s at 0.1 %."""
-    lines = [{"method": base.PRESET_PAPER, "points": law([0.04, 0.02, 0.005], 0.02, -1.0), "failed": []},
-             {"method": base.FAST, "points": [point(*fast)], "failed": []},
-             {"method": base.ACCURATE, "points": [point(*accurate)], "failed": []}]
+    lines = [{"method": runs.PRESET_PAPER, "points": law([0.04, 0.02, 0.005], 0.02, -1.0), "failed": []},
+             {"method": runs.FAST, "points": [point(*fast)], "failed": []},
+             {"method": runs.ACCURATE, "points": [point(*accurate)], "failed": []}]
     run = {"preset": "fast", "seconds": wide, "cpu": wide, "steps": 100, "end": 45.0, "nodes": 700}
     return {"title": "t", "error": "e", "lines": lines, "wide": [run]}
 
 
 def verdict_of(parts, words):
-    found = [one for one in verdicts.judged({"parts": parts}) if words in one["claim"]]
+    found = [one for one in told.judged({"parts": parts}) if words in one["claim"]]
     assert len(found) == 1
     return found[0]
 
@@ -124,7 +124,7 @@ def test_faster_at_a_tenth_of_a_percent_says_that_it_extrapolates(accurate, hold
 
 def test_faster_at_the_error_that_a_preset_has():
     """0.02 / 0.004 s over 0.9 s."""
-    found = [one for one in verdicts.judged({"parts": {"base": base_part(fast=(0.9, 0.004))}})
+    found = [one for one in told.judged({"parts": {"base": base_part(fast=(0.9, 0.004))}})
              if "fast is faster" in one["claim"] and one["claim"].endswith("the error that the preset has")]
     assert [one["holds"] for one in found] == [True] and "5.6 times" in found[0]["measured"]
 
@@ -153,7 +153,7 @@ def test_other_codes_at_equal_error(times, holds):
 def test_steps_against_their_floor(ratio, small, holds):
     points = [{"nodes": 600, "ratio": small}, {"nodes": 2500, "ratio": ratio}, {"nodes": 9000, "ratio": 1.1}]
     part = {"lines": [{"method": "preset paper", "points": points, "failed": []}]}
-    found = [one["holds"] for one in verdicts.judged({"parts": {"size": part}}) if "preset paper, " in one["claim"]]
+    found = [one["holds"] for one in told.judged({"parts": {"size": part}}) if "preset paper, " in one["claim"]]
     assert found == list(holds)
 
 
@@ -171,22 +171,22 @@ def test_scenes_cost_their_own_stages(seconds, unneeded, holds):
 
 
 def test_memory_that_grows_is_seen():
-    assert memory.slope([100 + 7 * k for k in range(50)]) == pytest.approx(7)
-    assert memory.slope([100 + (4000 if k == 30 else 0) for k in range(50)]) == 0
+    assert runs.slope([100 + 7 * k for k in range(50)]) == pytest.approx(7)
+    assert runs.slope([100 + (4000 if k == 30 else 0) for k in range(50)]) == 0
     row = {"method": "preset paper", "steps": 50, "slope": 500.0, "bound": 400.0}
     assert verdict_of({"memory": {"rows": [row]}}, "preset paper: live")["holds"] is False
     assert verdict_of({"memory": {"rows": [{**row, "slope": 300.0}]}}, "preset paper: live")["holds"] is True
 
 
 def test_what_was_not_measured_is_said():
-    found = verdicts.judged(record.empty())
-    assert found and all(one["holds"] is None and one["measured"] == verdicts.NOT_MEASURED for one in found)
+    found = told.judged(record.empty())
+    assert found and all(one["holds"] is None and one["measured"] == told.NOT_MEASURED for one in found)
 
 
 def test_the_record_is_read_back(tmp_path):
     part = base_part()
     merged = record.merged(record.empty(), {"base": part}, {"base": 3}, {"fipy": 0.5})
-    merged["verdicts"] = verdicts.judged(merged)
+    merged["verdicts"] = told.judged(merged)
     file = tmp_path / "deep" / "bench.json"
     record.save(merged, file)
     assert record.load(file) == merged
@@ -204,22 +204,22 @@ def test_not_a_number_is_never_recorded(tmp_path, value):
 
 
 def test_the_processor_has_its_own_name(tmp_path):
-    told = tmp_path / "cpuinfo"
-    told.write_text("processor : 0\nmodel name\t: Some CPU @ 3 GHz\nmodel name\t: Some CPU @ 3 GHz\n")
-    assert record.processor(told) == "Some CPU @ 3 GHz"
+    file = tmp_path / "cpuinfo"
+    file.write_text("processor : 0\nmodel name\t: Some CPU @ 3 GHz\nmodel name\t: Some CPU @ 3 GHz\n")
+    assert record.processor(file) == "Some CPU @ 3 GHz"
 
 
 def test_errors_are_relative_but_effluents_over_the_supply():
     truth = [[2.0, 80.0, 1000.0, 30.0, -30.0, 30.0, 4.0, 6.0]]
     found = [[2.02, 80.0, 1000.0, 30.0, -30.6, 30.0, 4.5, 6.0]]
-    assert base.apart(*map(base.np.array, (found, truth)))[0] == pytest.approx([0.01, 0, 0, 0, 0.02, 0, 0.05, 0])
+    assert runs.apart(*map(runs.np.array, (found, truth)))[0] == pytest.approx([0.01, 0, 0, 0, 0.02, 0, 0.05, 0])
 
 
 def test_exponents_by_stage():
-    points = [{"nodes": n, "seconds": n**1.5, "memory_MB": n, "stages": {"flow": n**1.2, size.FLOOR: n**1.4}}
+    points = [{"nodes": n, "seconds": n**1.5, "memory_MB": n, "stages": {"flow": n**1.2, runs.FLOOR: n**1.4}}
               for n in (600, 2500)]
-    found = size.exponents(points)
-    assert (found["step"], found["memory"], found["flow"], found[size.FLOOR]) == pytest.approx((1.5, 1.0, 1.2, 1.4))
+    found = runs.exponents(points)
+    assert (found["step"], found["memory"], found["flow"], found[runs.FLOOR]) == pytest.approx((1.5, 1.0, 1.2, 1.4))
     assert found["growth"] is None
 
 
@@ -237,8 +237,8 @@ def test_a_small_version_of_every_part_runs(name, tmp_path, capsys):
     failed = [failed for line in part.get("lines", ()) for failed in line["failed"]]
     assert len(failed) <= 2, failed
     json.dumps(found, allow_nan=False)
-    assert all(path.stat().st_size > 1000 for path in drawn.draw(found["parts"], tmp_path))
-    assert tables.verdicts(found["verdicts"])
+    assert all(path.stat().st_size > 1000 for path in told.draw(found["parts"], tmp_path))
+    assert told.verdicts(found["verdicts"])
     assert before == (record.FILE.read_bytes() if record.FILE.exists() else None)
 
 

@@ -32,10 +32,9 @@ from verification.claims import (
 from verification.claims import __main__ as driver
 from verification.claims.levels import CONVERGED, SCHEME, Level, at_level
 from verification.claims.mass_balance import Bookkeeping
-from verification.sensitivity import one_set
-from verification.sensitivity.inputs import factors_of
-from verification.sensitivity.numbers import of_base
+from verification.sensitivity.numbers import factors_of, of_base
 from verification.sensitivity.numbers import scene as scene_of
+from verification.sensitivity.rounding import reached
 from verification.uncertainty import Bar, Estimate
 
 
@@ -417,7 +416,7 @@ def test_one_set_of_inputs_gives_all_printed_numbers_of_base():
     rounding = sensitivity.record()["rounding"]
     assert found["reached"] and all(abs(factor - 1) <= rounding[name] + 1e-12 for name, factor in factors.items())
     numbers = of_base(scene_of("base", factors))
-    assert one_set.reached(numbers)
+    assert reached(numbers)
 
 
 def test_the_papers_bookkeeping_is_exact_for_a_steady_consumption_and_sees_a_growing_one():

@@ -8,7 +8,7 @@ import repro
 from repro.results import read_table
 from repro.results.network import TABLE, known
 from verification.network import __main__ as command
-from verification.network import record, shapes, table, unseen
+from verification.network import law, shapes, unseen
 from verification.network.shapes import RATIOS, Sample
 
 LAMBDA = 2000.0
@@ -35,7 +35,7 @@ def test_velocity_head_width_and_place_drop_out():
     for other in (scene(100.0, drive=("mean_velocity", "30 m/d")), scene(100.0, drive=("head", "1e-3 cm")),
                   scene(50.0), scene(400.0)):
         assert added(other) == pytest.approx(one, rel=1e-9)
-    assert added(scene(100.0, position=1.7)) == pytest.approx(one, rel=table.NUMERICS)
+    assert added(scene(100.0, position=1.7)) == pytest.approx(one, rel=law.NUMERICS)
     now = shapes.half_disc(0.6, elements=shapes.QUICK)
     assert shapes.added_length(now.space, LAMBDA) == pytest.approx(one, rel=1e-9)
 
@@ -51,19 +51,19 @@ def test_the_table_has_half_discs_of_the_present_code(thickness):
         row = int(np.abs(columns["area_over_width2"][rows] - now.boundary.area / now.mesh.width**2).argmin())
         assert columns["area_over_width2"][rows][row] == pytest.approx(now.boundary.area / now.mesh.width**2, rel=1e-4)
         found = columns["added_length_over_width"][rows][row]
-        assert found == pytest.approx(shapes.added_length(now.space, ratio), rel=table.NUMERICS / 4)
+        assert found == pytest.approx(shapes.added_length(now.space, ratio), rel=law.NUMERICS / 4)
 
 
 def test_fifty_shapes_that_the_fit_has_not_seen_are_within_the_bounds():
     """Half-discs, drawn bodies and plugs, and what three runs make, each at a lambda of its own."""
     found = list(unseen.every())
     columns = {name: np.array(values, float) for name, values in
-               zip(record.COLUMNS, zip(*(record.row(one, 0, 1) for one in found)))}
-    judged = record.judged(columns)
+               zip(law.COLUMNS, zip(*(law.shape_row(one, 0, 1) for one in found)))}
+    judged = law.judged(columns)
     outside = [(one, float(beyond)) for one, beyond in zip(found, judged.beyond) if beyond > 1]
     assert judged.count == 50 and outside == []
     assert 20 <= columns["grown"].sum() and 8 <= columns["spanned"].sum() <= 30
-    assert {one.run for one in found}.isdisjoint(table.RUNS)
+    assert {one.run for one in found}.isdisjoint(law.RUNS)
     assert np.median(np.abs(judged.apart)) < 0.02
 
 
@@ -72,8 +72,9 @@ def test_it_grows_with_area_and_lambda_and_lies_within_its_bounds():
     for spanned in (False, True):
         share = np.geomspace(*known(spanned), 200)
         laws = [repro.added_resistance(share, 1.0, spanned, ratio) for ratio in np.geomspace(100, 10000, 12)]
-        for law in laws:
-            assert (np.diff(law.length) > 0).all() and (law.least < law.length).all() and (law.length < law.most).all()
+        for each in laws:
+            assert (np.diff(each.length) > 0).all()
+            assert (each.least < each.length).all() and (each.length < each.most).all()
         assert all((after.length > before.length).all() for before, after in zip(laws, laws[1:]))
 
 
@@ -136,19 +137,19 @@ def _plugs(run, factor, shares):
 
 def test_the_mean_of_runs_leaves_one_out_and_what_a_run_does_not_reach():
     """Of r = c (A / W^2)^2: the geometric mean of c over the runs that are there."""
-    first, second, third = table.RUNS[:3]
+    first, second, third = law.RUNS[:3]
     found = _plugs(first, 1.0, np.geomspace(1.4, 5, 60)) + _plugs(second, 4.0, np.geomspace(1.4, 5, 60))
     found += _plugs(third, 16.0, np.geomspace(1.4, 2.4, 60))
-    shares = np.array(table.PLUGS)
-    assert table.mean_of_runs(found)[:, 0] / shares**2 == pytest.approx(np.where(shares < 2.4, 4.0, 2.0), rel=1e-3)
-    assert table.mean_of_runs(found, but=second)[:, 0] / shares**2 == pytest.approx(
+    shares = np.array(law.PLUGS)
+    assert law.mean_of_runs(found)[:, 0] / shares**2 == pytest.approx(np.where(shares < 2.4, 4.0, 2.0), rel=1e-3)
+    assert law.mean_of_runs(found, but=second)[:, 0] / shares**2 == pytest.approx(
         np.where(shares < 2.4, 4.0, 1.0), rel=1e-3)
 
 
 def test_bounds_are_the_farthest_of_the_shapes_nearby():
     shares = np.arange(1.0, 8.0)
     found = [Sample(None, False, share, (LAMBDA,), (1.0,)) for share in (1.0, 2.9, 4.5, 7.0)]
-    least, most = table.bounds(shares, found, np.array([[0.1], [-0.2], [0.3], [0.0]]))[:, :, 0]
+    least, most = law.bounds(shares, found, np.array([[0.1], [-0.2], [0.3], [0.0]]))[:, :, 0]
     assert least == pytest.approx(1 - np.array([0.2, 0.2, 0.2, 0.2, 0.0, 0.0, 0.0]) * [1, 1, 1, 1, 0, 0, 0]
                                   - 0.008)
     assert most == pytest.approx(np.array([1.1, 1.1, 1.3, 1.3, 1.3, 1.3, 1.0]) + 0.008)
@@ -173,23 +174,23 @@ def test_the_command_writes_table_shapes_and_page(tmp_path, monkeypatch, capsys)
     """Of few shapes; exit status 1 where one of those unseen is outside."""
     discs = [Sample(None, False, share, RATIOS, (8 * share,) * 7) for share in np.geomspace(0.1, 1.4, 6)]
     plugs = [Sample(run, True, share, RATIOS, tuple(np.multiply(RATIOS, share)))
-             for run in table.RUNS[:2] for share in np.geomspace(1.4, 4.7, 30)]
+             for run in law.RUNS[:2] for share in np.geomspace(1.4, 4.7, 30)]
     new = [Sample(None, False, 0.5, (LAMBDA,), (float(repro.added_resistance(0.5, 1, False).length),))]
-    monkeypatch.setattr(command.table, "half_discs", lambda: discs)
-    monkeypatch.setattr(command.table, "others", lambda: iter([*discs, *plugs]))
+    monkeypatch.setattr(command.law, "half_discs", lambda: discs)
+    monkeypatch.setattr(command.law, "others", lambda: iter([*discs, *plugs]))
     monkeypatch.setattr(command.unseen, "every", lambda: iter(new))
     monkeypatch.setattr(command, "TABLE", tmp_path / "network.csv")
     monkeypatch.setattr(command, "PAGE", tmp_path / "network.md")
-    monkeypatch.setattr(record, "SHAPES", tmp_path / "shapes.csv")
+    monkeypatch.setattr(law, "SHAPES", tmp_path / "shapes.csv")
     assert command.main() == 0 and "1 of 1 shapes" in capsys.readouterr().out
     written = read_table(tmp_path / "network.csv")
-    assert list(written) == table.COLUMNS and len(written["most"]) == 7 * (len(discs) + len(table.PLUGS))
+    assert list(written) == law.TABLE_COLUMNS and len(written["most"]) == 7 * (len(discs) + len(law.PLUGS))
     assert len(read_table(tmp_path / "shapes.csv")["grown"]) == 2 * len(discs) + len(plugs) + 1
     new[0] = Sample(None, False, 0.5, (LAMBDA,), (100.0,))
     assert command.main() == 1 and "0 of 1 shapes" in capsys.readouterr().out
 
 
 def test_the_page_tells_the_present_table():
-    found = record.judged(record.read(unseen=True))
-    assert command.PAGE.read_text(encoding="utf-8") == record.page(record.read(unseen=False), found)
+    found = law.judged(law.read(unseen=True))
+    assert command.PAGE.read_text(encoding="utf-8") == law.page(law.read(unseen=False), found)
     assert found.count == 50 and found.inside == 50

@@ -2,6 +2,8 @@
 import json
 import subprocess
 import sys
+import time
+from contextlib import nullcontext
 from dataclasses import replace
 
 import pytest
@@ -10,6 +12,7 @@ from verification.sampled import drawing, hunting, page, reach
 from verification.sampled.drawing import Mutant
 from verification.sampled.hunting import Row
 from verification.sampled.reach import Measured, Reach
+from verification.sampled.trying import Ran
 
 CODE = '''"""A module."""
 from os import path
@@ -158,6 +161,37 @@ def test_a_row_stands_as_long_as_what_it_rests_on(changes, stands):
     row = replace(ROW, name=mutant.name, **changes)
     assert hunting.due([mutant], {mutant.name: row}, known, False) == ([] if stands else [mutant])
     assert hunting.due([mutant], {}, known, False) == [mutant]
+
+
+@pytest.mark.parametrize("verdict, last, catches, runs", [
+    ("caught", "slow", "slow", [["slow"]]),
+    ("caught", "slow", "quick", [["slow"], ["quick", "slow"]]),
+    ("caught", "gone", "quick", [["quick", "slow"]]),
+    ("timeout", "slow", "quick", [["quick", "slow"]]),
+])
+def test_the_test_that_caught_a_mutant_before_is_the_first(tmp_path, monkeypatch, verdict, last, catches, runs):
+    """Alone; the others follow if it lets the mutant pass, or is no more. Mutants: what was caught is not handed on;
+    a test that is gone is run; a mutant that it lets pass meets no other."""
+    called = frozenset({("timing.py", "timed")})
+    known = Reach((Measured("quick", 0.1, called), Measured("slow", 70.0, called)))
+    mutant = Mutant("timing.py", 33, 0, "o", 0, "x = 1", "x = 2")
+    (tmp_path / "repro").mkdir()
+
+    def run(there, tests, limit):
+        with (there / "runs").open("a") as file:
+            file.write(json.dumps(tests) + "\n")
+        return Ran(catches if catches in tests else "", seconds=1.0)
+
+    for name, value in {"kept": lambda: {mutant.name: replace(ROW, verdict=verdict, test=last)}, "run": run,
+                        "mutated": lambda text, mutant: text, "LIVE": tmp_path, "KEPT": tmp_path / "kept",
+                        "copied": lambda: nullcontext(tmp_path), "LIMIT": 100.0}.items():
+        monkeypatch.setattr(hunting, name, value)
+    monkeypatch.setattr(hunting.trying, "prepare", lambda: None)
+    hunting.hunt([mutant], known, 1, False, time.time() + 60)
+    row = json.loads((tmp_path / "kept").read_text())
+    assert (row["verdict"], row["test"], row["tried"]) == ("caught", catches, 2)
+    assert [json.loads(line) for line in (tmp_path / "runs").read_text().splitlines()] == runs
+    assert (tmp_path / "repro" / "timing.py").read_text() == drawing.sources()["timing.py"]
 
 
 def test_survivors_that_tests_were_left_for_are_due_for_the_second_round():

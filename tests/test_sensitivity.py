@@ -10,9 +10,8 @@ from verification import claims, sensitivity
 from verification.claims import runs
 from verification.claims.levels import at_level
 from verification.sensitivity import __main__ as driver
-from verification.sensitivity import after_contact, elasticity, one_set, picture, sobol, supplies
-from verification.sensitivity.inputs import BY_NAME, EXACT, ROUNDED, changed, factors_of
-from verification.sensitivity.numbers import Runs, scene
+from verification.sensitivity import rounding, wide
+from verification.sensitivity.numbers import BY_NAME, EXACT, ROUNDED, Runs, changed, factors_of, scene
 
 PAPER = {"k": 9.3 / 24, "Y": 0.61, "b": 0.12 / 24, "f_d": 0.8, "d_c": 1.42, "F": 1.52, "K_sA": 1.0, "K_sD": 1.0,
          "D_a": 2.32e8 / 24, "D_fa": 1.85e8 / 24, "D_d": 1.01e8 / 24, "D_fd": 0.81e8 / 24}
@@ -65,7 +64,7 @@ class Law:
 
 def test_elasticities_of_a_power_law():
     """x^3 at 1 %: 3 and a bar that holds the rest."""
-    found = elasticity.elasticities(Law(lambda x: {"n": 7 * x["k"] ** 3 * x["X_m"] ** -0.5}), "base")["n"]
+    found = rounding.elasticities(Law(lambda x: {"n": 7 * x["k"] ** 3 * x["X_m"] ** -0.5}), "base")["n"]
     assert found["k"]["elasticity"] == pytest.approx(3, abs=1e-3) and found["k"]["resolved"]
     assert abs(found["k"]["elasticity"] - 3) <= found["k"]["bar"]
     assert found["X_m"]["by_10_percent"] == pytest.approx([100 * (1.1**-0.5 - 1), 100 * (0.9**-0.5 - 1)])
@@ -74,7 +73,7 @@ def test_elasticities_of_a_power_law():
 
 def test_what_differs_by_noise_is_not_resolved():
     noise = {0.99: 1e-3, 1.01: -1e-3, 0.98: -1e-3, 1.02: 1e-3}
-    found = elasticity.elasticities(Law(lambda x: {"n": 1 + noise.get(round(x["k"], 3), 0.0)}), "base")["n"]["k"]
+    found = rounding.elasticities(Law(lambda x: {"n": 1 + noise.get(round(x["k"], 3), 0.0)}), "base")["n"]["k"]
     assert not found["resolved"] and found["bar"] > abs(found["elasticity"])
 
 
@@ -90,12 +89,12 @@ def law_of_base(shift):
 def test_one_set_is_found_where_there_is_one_and_the_least_misfit_where_there_is_none(shift, reached):
     """2 % of the effluent are 0.25 % of k, within its 0.54 %; 6 % and 20 % are not."""
     law = Law(law_of_base(shift))
-    found = one_set.found(law, elasticity.elasticities(law, "base"))
+    found = rounding.one_set(law, rounding.elasticities(law, "base"))
     factors = factors_of(found["inputs"])
     assert found["reached"] is reached
     assert all(abs(factor - 1) <= BY_NAME[name].rounding * (1 + 1e-9) for name, factor in factors.items())
     if reached:
-        assert one_set.reached(found["numbers"]) and found["share_of_the_rounding"] == pytest.approx(0.46, abs=0.06)
+        assert rounding.reached(found["numbers"]) and found["share_of_the_rounding"] == pytest.approx(0.46, abs=0.06)
     else:
         assert factors["k"] == pytest.approx(1 - BY_NAME["k"].rounding, rel=1e-6)
         assert found["misfit_in_half_intervals"] > 10 and found["share_of_the_rounding"] > 1
@@ -128,7 +127,7 @@ def test_sobol_indices_of_a_linear_law():
 
     def law(x):
         return {name: 1 + sum(e * (x[key] - 1) for key, e in row.items()) for name, row in slopes.items()}
-    found = sobol.indices(Law(law), elasticity.elasticities(Law(law), "base"), 64)
+    found = rounding.sobol(Law(law), rounding.elasticities(Law(law), "base"), 64)
     k, y = ((3 * BY_NAME[name].rounding) ** 2 for name in ("k", "Y"))
     total = {name: value for name, (value, *_) in zip(found["inputs"], found["numbers"]["velocity"]["total_order"])}
     assert set(found["inputs"]) == {"k", "Y", "K_sD"} and set(found["numbers"]) == {"velocity", "effluent_acceptor"}
@@ -163,27 +162,27 @@ def test_claims_with_other_supplies_are_told_apart():
     findings = [{"C12": [0.0], "C16": [2.0, 0.0], "C25": [2.0]}, {"C12": [0.5], "C16": [0.0, 0.0], "C25": [3.0]}]
     found = {}
     for supply, by_id in zip(("5", "10"), findings):
-        held = {id: supplies.holding(claims.Finding((check_of("base, 19.2 h", 9.0), *(
+        held = {id: wide.holding(claims.Finding((check_of("base, 19.2 h", 9.0), *(
             check_of(f"wide, {supply} h: {number}", value) for number, value in enumerate(values)))))
             for id, values in by_id.items()}
         found[supply] = {"claims": held}
-    assert supplies.verdicts(found) == (["C12"], ["C16"], ["C25"])
-    assert supplies.moving(found) == [("C16", "wide, # h: #")]
+    assert wide.verdicts(found) == (["C12"], ["C16"], ["C25"])
+    assert wide.moving(found) == [("C16", "wide, # h: #")]
 
 
 def test_a_level_changes_wide_alone():
-    with at_level(supplies.supplied(5.0, 59.0)):
-        base, wide = runs.scene("base"), runs.scene("wide")
-    assert base.substrates.acceptor.supply == 10.0 and wide.substrates.donor.supply == 5.0
-    assert wide.growth.end == 59.0 and wide.output.times[-1] == 59.0 and base.growth.end == pytest.approx(19.4)
+    with at_level(wide.supplied(5.0, 59.0)):
+        base, of_wide = runs.scene("base"), runs.scene("wide")
+    assert base.substrates.acceptor.supply == 10.0 and of_wide.substrates.donor.supply == 5.0
+    assert of_wide.growth.end == 59.0 and of_wide.output.times[-1] == 59.0 and base.growth.end == pytest.approx(19.4)
 
 
 def test_a_number_after_contact_is_kept_where_its_bar_is_what_is_asked():
     """Of second order, 0.125 % off on the finest size."""
-    values = [2.0 * (1 + 0.005 * size**2) for size in after_contact.SIZES]
-    told = after_contact.told("mean of x", values, 1.0)
+    values = [2.0 * (1 + 0.005 * size**2) for size in wide.SIZES]
+    told = wide.bar_of("mean of x", values, 1.0)
     assert 0.125 < told["bar_percent"] < 1.0 and told["kept"] and told["values"] == values
-    assert not after_contact.told("mean of x", values, 0.1)["kept"]
+    assert not wide.bar_of("mean of x", values, 0.1)["kept"]
 
 
 @pytest.fixture(scope="module")
@@ -196,19 +195,19 @@ def test_the_committed_record_is_whole(kept):
     for number, known in kept["elasticities"].items():
         assert set(known) >= {each.name for each in ROUNDED}, number
         assert all(one["bar"] >= 0 and isinstance(one["resolved"], bool) for one in known.values()), number
-    assert set(one_set.PRINTED) <= set(kept["elasticities"])
+    assert set(rounding.PRINTED) <= set(kept["elasticities"])
     assert kept["rounding"] == {each.name: each.rounding for each in ROUNDED}
 
 
 def test_page_and_diagram_are_those_of_the_record(kept, tmp_path):
     page = sensitivity.RECORD.with_suffix(".md").read_text(encoding="utf-8")
-    assert page == picture.page(kept)
-    committed = picture.TARGET, picture.OUTLINES
+    assert page == driver.page(kept)
+    committed = driver.TARGET, driver.OUTLINES
     for name in ("one", "two"):
-        picture.write(kept, tmp_path / f"{name}.svg", tmp_path / f"{name}-outlines.svg")
+        driver.write(kept, tmp_path / f"{name}.svg", tmp_path / f"{name}-outlines.svg")
     for kind, there in zip(("", "-outlines"), committed):
         one, two = (tmp_path / f"{name}{kind}.svg" for name in ("one", "two"))
         assert one.read_bytes() == two.read_bytes() == there.read_bytes()
         ElementTree.fromstring(one.read_text(encoding="utf-8"))
-    largest = picture.reaches(kept, "effluent_acceptor")
+    largest = driver.reaches(kept, "effluent_acceptor")
     assert np.all(np.diff([abs(value) for _, value in largest]) <= 0)

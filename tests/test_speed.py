@@ -9,9 +9,9 @@ POINT = {"label": "as it is", "seconds": 0.5, "cpu": 0.5, "error": 0.005, "error
 PAPER = {**POINT, "label": speed.PAPER_AS_IT_IS, "seconds": 5.0}
 BENCH = {"machine": {"cores": 2, "processor": "a <processor>", "python": "3.11"},
          "parts": {"base": {"title": "base", "error": "largest", "reference": "another code", "lines": [
-             {"method": speed.base.PRESET_PAPER, "points": [PAPER], "failed": []},
-             {"method": speed.base.FAST, "points": [POINT], "failed": []},
-             {"method": speed.base.ACCURATE, "points": [{**POINT, "seconds": 2.0}], "failed": []}]}},
+             {"method": speed.runs.PRESET_PAPER, "points": [PAPER], "failed": []},
+             {"method": speed.runs.FAST, "points": [POINT], "failed": []},
+             {"method": speed.runs.ACCURATE, "points": [{**POINT, "seconds": 2.0}], "failed": []}]}},
          "verdicts": [{"claim": "fast", "wanted": "5 times", "measured": "2 times", "holds": False}]}
 HARD = {"cases": [{"number": 4, "title": "Fast", "right_is": "the balance", "cells": {
     name: {"verdict": verdict, "message": "too | fast" if verdict != "right" else "", "checks": []}

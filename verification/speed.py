@@ -12,7 +12,7 @@ import json
 from collections.abc import Iterator
 from pathlib import Path
 
-from verification.bench import base
+from verification.bench import runs
 from verification.bench.record import line
 from verification.kernel import writing
 from verification.kernel.writing import Block, Link, markdown, table
@@ -83,8 +83,8 @@ def _bench(record: dict) -> Iterator[Block]:
 
 
 def _presets(part: dict) -> Iterator[tuple[str, ...]]:
-    slow = next(p for p in line(part, base.PRESET_PAPER)["points"] if p["label"] == PAPER_AS_IT_IS)
-    found = {name: line(part, name) for name in (base.FAST, base.ACCURATE, base.EXACT)}
+    slow = next(p for p in line(part, runs.PRESET_PAPER)["points"] if p["label"] == PAPER_AS_IT_IS)
+    found = {name: line(part, name) for name in (runs.FAST, runs.ACCURATE, runs.EXACT)}
     measured = {name.split()[1]: one["points"][0] for name, one in found.items() if one}
     for name, point in {"paper": slow, **measured}.items():
         yield (name, f"{point['seconds']:.2f}", f"{slow['seconds'] / point['seconds']:.1f} times",

@@ -9,9 +9,11 @@ import argparse
 from importlib import import_module
 from time import perf_counter
 
-from verification.bench import drawn, record, tables, verdicts
+from verification.bench import record, told
 
-PARTS = ("flow", "transport", "box", "channel", "growth", "transfer", "base", "size", "scenes", "memory")
+#: Modules of the parts; that of other codes is imported for its own alone.
+PARTS = {"flow": "stages", "transport": "stages", "box": "users", "channel": "users", "growth": "stages",
+         "transfer": "stages", "base": "runs", "size": "runs", "scenes": "runs", "memory": "runs"}
 
 
 def main(arguments: list[str] | None = None) -> dict:
@@ -29,19 +31,19 @@ def measure(names, quick: bool) -> dict:
     """Run parts one after the other; each is recorded as soon as it is there."""
     found = record.empty() if quick else record.load()
     imports = None if quick else record.import_seconds()
-    print(tables.machine({**record.machine(), "import_seconds": imports or {}}))
+    print(told.machine({**record.machine(), "import_seconds": imports or {}}))
     for name in names:
         start = perf_counter()
-        part = import_module(f"verification.bench.{name}").run(quick)
+        part = getattr(import_module(f"verification.bench.{PARTS[name]}"), f"{name}_part")(quick)
         part["took_seconds"] = perf_counter() - start
         found = record.merged(found, {name: part}, {name: part.get("repeats", 1)}, imports)
-        found["verdicts"] = verdicts.judged(found)
-        print(tables.part(name, part), flush=True)
+        found["verdicts"] = told.judged(found)
+        print(told.part_lines(name, part), flush=True)
         if not quick:
             record.save(found)
     if not quick:
-        drawn.draw(found["parts"], record.FOLDER)
-    print(tables.verdicts(found["verdicts"]))
+        told.draw(found["parts"], record.FOLDER)
+    print(told.verdicts(found["verdicts"]))
     return found
 
 

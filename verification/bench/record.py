@@ -20,20 +20,32 @@ to the next, "reference_values" [time][number]; size, whose points have no error
 "memory_MB" of each, and "fits" {method: {stage: exponent}}; scenes "rows" [{"scene", "method", "seconds", "cpu",
 "stages": {stage: s}, ...}] and "steps" [{"method", "seconds", "hours"}]; memory "rows" [{"method", "steps", "slope",
 "bound", ...}]. A part that was not run again keeps what it had. Not-a-number is never written.
+
+How it is measured: jobs are timed side by side, each round runs all of them once, so that whatever else the machine
+does hits all alike. How it is read: the best speed of a method is the lower envelope of its points, between and beyond
+them on logarithmic axes.
 """
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import platform
 import subprocess
 import sys
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from datetime import date
 from importlib.metadata import version
+from math import exp, isfinite, log
 from pathlib import Path
 from statistics import median
-from time import perf_counter
+from time import perf_counter, process_time
+
+import numpy as np
+
+from repro.results import write_text
 
 FOLDER = Path(__file__).parents[1] / "report"
 FILE = FOLDER / "bench.json"
@@ -58,9 +70,7 @@ def load(file: Path = FILE) -> dict:
 def save(record: dict, file: Path = FILE) -> None:
     """Write a record whole or not at all; ValueError where it holds not-a-number."""
     file.parent.mkdir(parents=True, exist_ok=True)
-    beside = file.with_name(f".{file.name}.part")
-    beside.write_text(json.dumps(record, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-    os.replace(beside, file)
+    write_text(file, json.dumps(record, indent=1, allow_nan=False) + "\n")
 
 
 def machine() -> dict:
@@ -104,3 +114,145 @@ def merged(record: dict, parts: dict, repeats: dict, imports: dict | None = None
 def line(part: dict, method: str) -> dict | None:
     """The line of a method in a part, None where it has none."""
     return next((found for found in part.get("lines", ()) if found["method"] == method), None)
+
+
+#: The first run of a job only warms up where it takes less than this (s); a job that takes longer than that is run a
+#: third as often.
+SHORT, LONG = 0.3, 4.0
+
+
+@dataclass
+class Timed:
+    """What a job took, run by run, and what it returned last: a dictionary with its "error" and whatever else; took:
+    the wall time of its last run, whatever is left out of it."""
+
+    seconds: list[float] = field(default_factory=list)
+    cpu: list[float] = field(default_factory=list)
+    found: dict = field(default_factory=dict)
+    reason: str = ""
+    took: float = 0.0
+
+    def run(self, job: Callable[[], dict]) -> None:
+        """Once more; a job that fails says why, and is not run again."""
+        gc.collect()
+        wall, spent = perf_counter(), process_time()
+        try:
+            found = job()
+        except Exception as error:
+            self.reason = f"{type(error).__name__}: {error}"
+            return
+        wall, spent = perf_counter() - wall, process_time() - spent
+        self.took = wall
+        self.found = found() if callable(found) else found
+        self.seconds.append(wall - self.found.get("apart_seconds", 0.0))
+        self.cpu.append(spent - self.found.get("apart_cpu", 0.0))
+        if not isfinite(self.found.get("error", 0.0)):
+            self.reason = "its error is not a number"
+
+
+Jobs = Mapping[tuple[str, str], Callable[[], dict]]
+
+
+def measured(jobs: Jobs, repeats: int) -> list[dict]:
+    """Lines of a part from jobs {(method, label): job}, in the order in which methods first come.
+
+    A job returns {"error": ..., ...}, or a function that returns it and is not timed; "apart_seconds" and
+    "apart_cpu" of it are taken off.
+    """
+    times = {key: Timed() for key in jobs}
+    for key, job in jobs.items():
+        times[key].run(job)
+    wanted = {key: _often(timed, repeats) for key, timed in times.items()}
+    for _ in range(repeats):
+        for key, job in jobs.items():
+            if not times[key].reason and len(times[key].seconds) < wanted[key]:
+                times[key].run(job)
+    return _lines(times)
+
+
+def _often(timed: Timed, repeats: int) -> int:
+    """How many runs are to be counted; that of a short job is forgotten."""
+    if timed.reason:
+        return 0
+    if timed.took < SHORT:
+        timed.seconds.clear()
+        timed.cpu.clear()
+    return repeats if timed.took < LONG else -(-repeats // 3)
+
+
+def _lines(times: Mapping[tuple[str, str], Timed]) -> list[dict]:
+    lines: dict[str, dict] = {}
+    for (method, label), timed in times.items():
+        line = lines.setdefault(method, {"method": method, "points": [], "failed": []})
+        if timed.reason:
+            line["failed"].append({"label": label, "reason": timed.reason})
+        else:
+            line["points"].append({"label": label, "seconds": median(timed.seconds), "cpu": median(timed.cpu),
+                                   "repeats": len(timed.seconds), **timed.found})
+    return list(lines.values())
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Seconds and processor seconds that a method needs for an error; how: "measured", "between points" or
+    "extrapolated"; slope: of log time by log error there, 0 where a point is taken as it is."""
+
+    seconds: float
+    cpu: float
+    how: str
+    slope: float
+
+
+def envelope(points: Iterable[Mapping]) -> list[Mapping]:
+    """The points that no other beats in both time and error, by falling error."""
+    kept, best = [], np.inf
+    for point in sorted(points, key=lambda p: (p["seconds"], p["error"])):
+        if 0 < point["error"] < best:
+            kept.append(point)
+            best = point["error"]
+    return kept
+
+
+def slope(points: Iterable[Mapping], key: str = "seconds") -> float:
+    """Least-squares slope of log time by log error over an envelope."""
+    points = list(points)
+    return exponent([p["error"] for p in points], [p[key] for p in points])
+
+
+def exponent(sizes, values) -> float:
+    """Least-squares p of values = c sizes^p; values that are zero are left out, not-a-number where under two remain."""
+    pairs = [(log(s), log(v)) for s, v in zip(sizes, values) if s > 0 and v > 0]
+    if len({x for x, _ in pairs}) < 2:
+        return float("nan")
+    x, y = np.array(pairs).T
+    return float(np.polyfit(x, y, 1)[0])
+
+
+def reading(points: Iterable[Mapping], error: float) -> Reading | None:
+    """The least time for an error, by the envelope; None where nothing can be said.
+
+    Between two points of the envelope: on the straight line between their logarithms. An error above the largest
+    takes the fastest point. Below the least error: on from the last point with the fitted slope of the envelope, which
+    needs two points and must fall. Where overheads make its coarse end flatter, that is too little time, not too much.
+    """
+    kept = envelope(points)
+    if not kept:
+        return None
+    if error >= kept[0]["error"]:
+        return Reading(kept[0]["seconds"], kept[0]["cpu"], "measured", 0.0)
+    for coarse, fine in zip(kept, kept[1:]):
+        if fine["error"] <= error:
+            return _between(coarse, fine, error)
+    slopes = [slope(kept, key) for key in ("seconds", "cpu")]
+    if not all(s < 0 for s in slopes):
+        return None
+    last, ratio = kept[-1], log(error / kept[-1]["error"])
+    return Reading(*(last[key] * exp(s * ratio) for key, s in zip(("seconds", "cpu"), slopes)), "extrapolated",
+                   slopes[0])
+
+
+def _between(coarse: Mapping, fine: Mapping, error: float) -> Reading:
+    width = log(fine["error"] / coarse["error"])
+    part = log(error / coarse["error"]) / width
+    values = [exp((1 - part) * log(coarse[key]) + part * log(fine[key])) for key in ("seconds", "cpu")]
+    return Reading(*values, "between points", log(fine["seconds"] / coarse["seconds"]) / width)

@@ -12,6 +12,7 @@ transport is solved on right triangles that halve the square cells of their grid
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache, partial
 from time import perf_counter, process_time
 
 import numpy as np
@@ -25,14 +26,22 @@ from fipy import (
     LinearLUSolver,
 )
 from pde import PDE, CallbackTracker, CartesianGrid, Controller, EulerSolver, FieldCollection, ScalarField
+from scipy.sparse import block_array
+from scipy.sparse.linalg import splu
+from skfem import Basis, BilinearForm, ElementTriP2, LinearForm, MeshTri, asm
+from skfem.helpers import dot, grad
 
-from reference.monod import uptake
+from reference import channel_bvp
+from reference import diffusion_reaction_pypde as pypde
+from reference.monod import NUDGE, uptake
 from repro.fem.mesh import Mesh, curved
 from repro.fem.space import Space
 from repro.model import transport
 from repro.model.flow import Flow
 from repro.model.kinetics import Sink
 from repro.scene import parse_scene
+from verification.bench import stages
+from verification.bench.record import measured
 
 #: um2/h of acceptor and donor, in fluid and biomass alike; mg/L.
 DIFFUSIVITY, DENSITY = (8e6, 4e6), 3e4
@@ -43,7 +52,6 @@ REST, MOST, EXACT = 1e-8, 40, 1e-14
 #: than exp(-pi^2 TIMES) or exp(-pi^2 TIMES_OPEN / 4) is left of the start, in steps of this part of h^2 / D and
 #: dimension, of which a half is stable; watched in so many parts.
 TIMES, TIMES_OPEN, STABLE, PARTS = 1.5, 6.0, 0.4, 100
-NUDGE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -117,11 +125,16 @@ def _fipy_ends(problem: Problem, mesh, field, k: int):
     return first * problem.supply[k] - CentralDifferenceConvectionTerm(coeff=(problem.speed,), var=field)
 
 
+def _columns(both, rates) -> list[np.ndarray]:
+    """Derivatives of the uptake (2, ...) by C_A and by C_D, by central differences."""
+    nudges = NUDGE * np.eye(2).reshape(2, 2, *[1] * (both.ndim - 1))
+    return [(np.array(uptake(*(both + d), rates)) - np.array(uptake(*(both - d), rates))) / (2 * NUDGE) for d in nudges]
+
+
 def _linearise(problem: Problem, now, constants, slopes) -> None:
     """q = constant + sum of slopes times C at the present C; slopes by central differences."""
     rate = np.array(uptake(*now, problem.rates))
-    columns = [(np.array(uptake(*(now + d), problem.rates)) - np.array(uptake(*(now - d), problem.rates))) / (2 * NUDGE)
-               for d in NUDGE * np.eye(2)[:, :, None]]
+    columns = _columns(now, problem.rates)
     for k in (0, 1):
         constants[k].setValue(rate[k] - sum(column[k] * c for column, c in zip(columns, now)))
         for j in (0, 1):
@@ -184,7 +197,7 @@ def _pde_ends(problem: Problem, k: int) -> dict:
     return ends if problem.width is None else {**ends, "y": {"derivative": 0.0}}
 
 
-def scene():
+def ribbon():
     """Substrates and kinetics of Table 1, but for the diffusivities."""
     kinds = {name: {"diffusivity": f"{d} um^2/h", "diffusivity_in_aggregate": f"{d} um^2/h"}
              for name, d in zip(("acceptor", "donor"), DIFFUSIVITY)}
@@ -216,3 +229,208 @@ def plug_flow(space: Space, speed: float) -> Flow:
     correction = np.zeros((len(space.cells), 2)) if space.order == 1 else None
     velocity = np.tile([speed, 0.0], (space.count, 1))
     return Flow(speed, velocity, np.zeros(space.mesh.corners), correction, 0.0, 0.0, 1.0)
+
+
+#: Methods of this package, by the order of their elements.
+COMPILED = "py-pde, compiled"
+OURS = {1: stages.PAPER, 2: "order 2 (fast, accurate)", 3: "order 3"}
+
+
+def _ours(job, linear, quadratic) -> dict:
+    """Jobs of this package; ``job(cells, order)``."""
+    return {(method, f"{n} cells"): partial(job, n, order)
+            for order, method in OURS.items() for n in (linear if order == 1 else quadratic)}
+
+
+def _theirs(method: str, job, cells) -> dict:
+    return {(method, f"{n} cells"): partial(job, n) for n in cells}
+
+
+def compile_times(lines: list[dict]) -> list[dict]:
+    """What numba took, which no point includes."""
+    return [{"what": f"{line['method']}, {point['label']}: compilation", "seconds": point["apart_seconds"]}
+            for line in lines for point in line["points"] if point.get("apart_seconds")]
+
+
+BOX_REPEATS = 3
+HALF, WIDTH, SIDE = 64.0, 64.0, 32.0
+#: Cells across the box: linear, of higher order, scikit-fem's, those of other codes, of compiled ones, and of the
+#: reference; of the part, and of its quick version.
+BOX_SIZES = ((8, 16, 32, 64, 96), (2, 4, 8, 16, 24), (4, 8, 16), (8, 16, 32, 64), (16,), (32, 64)), (
+    (8, 16), (2, 4), (4,), (8,), (), (8, 16))
+
+
+def box_part(quick: bool) -> dict:
+    """Diffusion and dual Monod uptake in a box with a block of biomass, whose sides follow the cells: what FiPy and
+    py-pde can do as well; error of what is taken up.
+
+    py-pde's compiled run comes once a grid: numba compiles for longer than it runs.
+    """
+    linear, quadratic, skfem, cells, stepped, reference = BOX_SIZES[quick]
+    coarse, truth = converged(reference[0]), converged(reference[1])
+    repeats = 1 if quick else BOX_REPEATS
+    jobs = {**_ours(partial(_box_ours, truth, ribbon()), linear, quadratic),
+            **_theirs(stages.QUADRATIC, partial(_skfem, truth), skfem),
+            **_theirs("fipy", partial(_box_fipy, truth), cells),
+            **_theirs("py-pde's Laplacian, Newton by scipy", partial(_newton, truth), cells)}
+    lines = measured(jobs, repeats) + measured(_theirs(COMPILED, partial(_box_stepped, truth), stepped), 1)
+    change = stages.largest(coarse, truth, truth)
+    return {"title": "Uptake without flow: a block of 64 by 32 um in a box of 128 by 64 um; grid, assembly, solution",
+            "error": "what is taken up of each substrate, relative, the larger error", "repeats": repeats,
+            "lines": lines, "apart": compile_times(lines), "reference_change": change,
+            "reference": f"quadratic elements of scikit-fem, {reference[1]} cells across: {truth[0]:.9g} and "
+                         f"{truth[1]:.9g} um2 mg/L/h; from {reference[0]} cells on they change by {change:.1e}"}
+
+
+def box_problem() -> Problem:
+    """The same, as other codes take it."""
+    given = stages.constants()
+    return Problem((-HALF, HALF), WIDTH, _inside, DENSITY, given.supply, DIFFUSIVITY, given.rates)
+
+
+def _inside(x, y):
+    return (np.abs(x) < SIDE) & (y < SIDE)
+
+
+def _judged(truth, found) -> dict:
+    return {"error": stages.largest(found, truth, truth)}
+
+
+def _box_ours(truth, given, cells: int, order: int) -> dict:
+    grid = straight((-HALF, HALF), WIDTH, (2 * cells, cells), _inside)
+    return _judged(truth, [flux.consumed for flux in solved(given, grid, order)])
+
+
+def _box_fipy(truth, cells: int) -> dict:
+    return _judged(truth, fipy(box_problem(), cells)[0])
+
+
+def _box_stepped(truth, cells: int) -> dict:
+    found, _, compiled = py_pde(box_problem(), cells)
+    return {**_judged(truth, found), **compiled}
+
+
+def _newton(truth, cells: int) -> dict:
+    given, box = box_problem(), pypde.Box(cells, HALF, WIDTH, pypde.block(SIDE, SIDE))
+    fields = box.steady(given.diffusivity, given.supply, given.density, given.rates)
+    return _judged(truth, given.amounts(fields, given.density * box.part * (WIDTH / cells) ** 2))
+
+
+def _skfem(truth, cells: int) -> dict:
+    return _judged(truth, quadratic(cells))
+
+
+@cache
+def converged(cells: int) -> np.ndarray:
+    """(2,) what is taken up, by the finest meshes."""
+    return quadratic(cells)
+
+
+def quadratic(cells: int) -> np.ndarray:
+    """(2,) what is taken up, by scikit-fem's quadratic elements and Newton's method."""
+    given = box_problem()
+    mesh = MeshTri.init_tensor(np.linspace(-HALF, HALF, 2 * cells + 1), np.linspace(0.0, WIDTH, cells + 1))
+    whole = Basis(mesh, ElementTriP2(), intorder=6)
+    body = Basis(mesh, ElementTriP2(), intorder=6, elements=np.flatnonzero(_inside(*mesh.p[:, mesh.t].mean(axis=1))))
+    laplace = asm(_laplace, whole)
+    fields = np.outer(given.supply, np.ones(whole.N))
+    inner = np.flatnonzero(np.abs(whole.doflocs[0]) < HALF * (1 - 1e-9))
+    step = np.inf
+    while np.abs(step).max() > 1e-10:
+        here = np.array([body.interpolate(field) for field in fields])
+        residual = [d * (laplace @ field) + asm(_load, body, value=given.density * q)
+                    for d, field, q in zip(given.diffusivity, fields, uptake(*here, given.rates))]
+        blocks = _slopes(body, here, given)
+        for k, d in enumerate(given.diffusivity):
+            blocks[k][k] = blocks[k][k] + d * laplace
+        blocks = [[block.tocsr()[inner][:, inner] for block in row] for row in blocks]
+        right = np.concatenate([part[inner] for part in residual])
+        step = -splu(block_array(blocks, format="csc")).solve(right).reshape(2, -1)
+        fields[:, inner] += step
+    here = np.array([body.interpolate(field) for field in fields])
+    return np.array([np.sum(given.density * q * body.dx) for q in uptake(*here, given.rates)])
+
+
+def _slopes(body, here, given) -> list[list]:
+    """Matrices of the uptake's derivatives, by central differences."""
+    columns = _columns(here, given.rates)
+    return [[asm(_mass, body, value=given.density * column[k]) for column in columns] for k in (0, 1)]
+
+
+@BilinearForm
+def _laplace(u, v, w):
+    return dot(grad(u), grad(v))
+
+
+@BilinearForm
+def _mass(u, v, w):
+    return w["value"] * u * v
+
+
+@LinearForm
+def _load(v, w):
+    return w["value"] * v
+
+
+CHANNEL_REPEATS = 3
+#: um; um/h.
+ENDS, STRIP, SPEED = (-40.0, 80.0), 40.0, 1e5
+#: Cells along the channel, multiples of three: faces lie on both ends of the strip.
+CHANNEL_SIZES = ((15, 30, 60, 120, 240, 480), (6, 12, 24, 48, 96), (30, 60, 120, 240, 480), (60,)), (
+    (15, 30), (6, 12), (30,), ())
+
+
+def channel_part(quick: bool) -> dict:
+    """Plug flow through a strip of biomass with dual Monod uptake, one-dimensional: error of the effluents.
+
+    Other codes solve it in one dimension; here it is a ribbon of one cell across, which costs twice the unknowns and
+    more.
+    """
+    linear, quadratic, cells, stepped = CHANNEL_SIZES[quick]
+    coarse, truth = reference(1e-7), reference(1e-9)
+    repeats = 1 if quick else CHANNEL_REPEATS
+    jobs = {**_ours(partial(_channel_ours, truth, ribbon()), linear, quadratic),
+            **_theirs("fipy", partial(_channel_fipy, truth), cells)}
+    lines = measured(jobs, repeats) + measured(_theirs(COMPILED, partial(_channel_stepped, truth), stepped), 1)
+    change = stages.largest(coarse, truth, _supply())
+    return {"title": "Uptake in plug flow through a strip, one-dimensional; grid, assembly and solution",
+            "error": "effluents over the supply, the larger error", "repeats": repeats, "lines": lines,
+            "apart": compile_times(lines), "reference_change": change,
+            "reference": f"scipy's solve_bvp, tolerance 1e-9: {truth[0]:.9f} and {truth[1]:.9f} mg/L; from 1e-7 on "
+                         f"they change by {change:.1e} of the supply"}
+
+
+@cache
+def reference(tolerance: float) -> np.ndarray:
+    """(2,) effluents, mg/L."""
+    given = channel_problem()
+    found = channel_bvp.solution(SPEED, given.supply, given.diffusivity, given.diffusivity, given.density, given.rates,
+                                 STRIP, tolerance)
+    return found(np.array([STRIP]))[:, 0]
+
+
+def channel_problem() -> Problem:
+    """The channel, as other codes take it."""
+    given = stages.constants()
+    return Problem(ENDS, None, lambda x: (x > 0) & (x < STRIP), DENSITY, given.supply, DIFFUSIVITY,
+                   given.rates, SPEED)
+
+
+def _supply() -> np.ndarray:
+    return np.array(stages.constants().supply)
+
+
+def _channel_ours(truth, given, cells: int, order: int) -> dict:
+    size = (ENDS[1] - ENDS[0]) / cells
+    grid = straight(ENDS, size, (cells, 1), lambda x, y: (x > 0) & (x < STRIP))
+    found = solved(given, grid, order, SPEED)
+    return {"error": stages.largest([flux.effluent for flux in found], truth, _supply())}
+
+
+def _channel_fipy(truth, cells: int) -> dict:
+    return {"error": stages.largest(fipy(channel_problem(), cells)[1], truth, _supply())}
+
+
+def _channel_stepped(truth, cells: int) -> dict:
+    _, found, compiled = py_pde(channel_problem(), cells)
+    return {"error": stages.largest(found, truth, _supply()), **compiled}

@@ -2,7 +2,7 @@
 
 Lists every number of the committed record about wide after its contact with the opposite wall, with half the width of
 its bar over its value, the widest first. Asked are 1 % of conductivities and tips and 2 % of lengths of contact, which
-`verification.sensitivity.after_contact` measures. Ratios of peaks are known less well: a peak sits beside the ends of
+`verification.sensitivity.wide` measures. Ratios of peaks are known less well: a peak sits beside the ends of
 the contact surface, where stresses have no limit. A change of nearly nothing has a bar larger than itself.
 """
 

@@ -13,32 +13,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from inspect import cleandoc
 
-from verification.claims.runs import BASE, LAST, at
+from verification.claims.runs import BASE, at
 from verification.kernel import writing
+from verification.switches import PLOTTED
 
-PLOTTED, END = 19.2, 19.4  # h; the geometry that the paper plots [E12], and the end of base
+END = 19.4  # h, of base
 SUPPLY = 10.0
-
-
-def changed(change: str) -> tuple[str, ...]:
-    """Base with one change, of which the rows of t = 0 and of the last two shapes are kept."""
-    return (*BASE, change, LAST)
-
-
-SHORT_F = changed("kinetics.acceptor_to_donor_ratio=1.5138")
-NO_D_C = changed("kinetics.decay_oxygen_demand=1.0")
-MEAN_INLET = changed('numerics.inlet="mean"')
-LINEAR = changed('numerics.transfer="linear"')
-TRACTION = changed('numerics.interface="traction"')
-HALF_STEP = changed('growth.time_step="6 min"')
-CHOSEN = {"flow_stabilisation": (25, 50, 200, 400), "mesh_compressibility": (0.1, 10), "refinement": (0.7, 1.4)}
-SENSITIVITY = {(key, value): changed(f"numerics.{key}={value}") for key, values in CHOSEN.items() for value in values}
 
 
 @dataclass(frozen=True)
 class Erratum:
-    """An entry: its text, the function that computes the numbers in ``consequence``, the runs that it reads, and
-    whether it takes less than about two seconds and no run. An empty part is left out."""
+    """An entry: its text, the function that computes the numbers in ``consequence``, and whether it takes less than
+    about two seconds and no run. An empty part is left out."""
 
     id: str
     title: str
@@ -46,7 +32,6 @@ class Erratum:
     reading: str
     consequence: str
     function: Callable[[], dict[str, str]]
-    scenes: tuple[tuple[str, ...], ...]
     quick: bool
 
     def markdown(self) -> str:
@@ -60,11 +45,11 @@ class Erratum:
 ERRATA: dict[str, Erratum] = {}
 
 
-def erratum(id: str, title: str, *, consequence: str, printed: str = "", reading: str = "", scenes=(),
+def erratum(id: str, title: str, *, consequence: str, printed: str = "", reading: str = "",
             quick: bool = False):
     """Register the decorated function () -> {name: number as text} as the measurement of an erratum."""
     def register(function: Callable[[], dict[str, str]]) -> Callable[[], dict[str, str]]:
-        ERRATA[id] = Erratum(id, title, printed, reading, consequence, function, tuple(scenes), quick)
+        ERRATA[id] = Erratum(id, title, printed, reading, consequence, function, quick)
         return function
     return register
 

@@ -1,8 +1,10 @@
-"""E1, E3, E4, E9, E14, E18: what is consumed, supplied and balanced."""
+"""E1, E3, E4, E9, E14, E18: what is consumed, supplied and balanced; E19, E21-E23: what can be checked of Table 1 and
+of the text without computing anything large."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from math import atan, cbrt, degrees, exp, log, log10
 
 import numpy as np
 
@@ -13,10 +15,6 @@ from verification.claims.mass_balance import PAPER_CORRECTION, bookkeeping, exce
 from verification.claims.restored import solved_pore
 from verification.claims.runs import BASE, PLATES, at, grown, scene, series
 from verification.errata import (
-    MEAN_INLET,
-    NO_D_C,
-    PLOTTED,
-    SHORT_F,
     STATE_HEAD,
     consumed_ratio,
     erratum,
@@ -26,7 +24,9 @@ from verification.errata import (
     state_row,
     table,
 )
+from verification.switches import CHOICES, PLOTTED
 
+SHORT_F, NO_D_C, MEAN_INLET = (CHOICES[name].run for name in ("exact F", "decay", "mean inlet"))
 COD = 2.38  # of phenol, Table 1; it enters through F alone
 
 
@@ -38,8 +38,7 @@ COD = 2.38  # of phenol, Table 1; it enters through F alone
         COD - Y d_c = {value}. In base at 19.2 h it would change what follows (the converged solution, so that no
         difference of meshes is in it); acceptor over donor consumed would be {ratio} instead of {ours}.
 
-        {table}""",
-    scenes=(BASE, SHORT_F))
+        {table}""")
 def ratio_of_substrates() -> dict[str, str]:
     """Base with F as defined."""
     said = scene(*BASE).kinetics
@@ -65,8 +64,7 @@ def ratio_of_substrates() -> dict[str, str]:
         {table}
 
         Base at 19.2 h with f_d b for d_c f_d b: velocity {velocity}, acceptor effluent {acceptor}, donor
-        effluent {donor} against ours.""",
-    scenes=(BASE, PLATES, NO_D_C))
+        effluent {donor} against ours.""")
 def decay_demand() -> dict[str, str]:
     """Size of the term, electron balance of the readings, and base with d_c left out."""
     said = scene(*BASE)
@@ -121,8 +119,7 @@ def electron_defect(law, demand: float | None = None) -> float:
     consequence="""
         Base; the balance defect is (supplied - out - consumed) / supplied, with the flow-weighted effluent:
 
-        {table}""",
-    scenes=(BASE, MEAN_INLET))
+        {table}""")
 def inlet_condition() -> dict[str, str]:
     """Base with both forms of (11)."""
     columns, rows = [f"{end}_{name}_mg_per_L" for end in ("inlet", "effluent") for name in ("acceptor", "donor")], []
@@ -147,8 +144,7 @@ def inlet_condition() -> dict[str, str]:
         Base at 19.4 h before the expansion (E12), flow-weighted over the section, upstream of the aggregate (our
         meshed inlet is {distance} um from it):
 
-        {table}""",
-    scenes=(BASE,))
+        {table}""")
 def meshed_inlet() -> dict[str, str]:
     """Both substrates at the distances in question."""
     now, solved = grown(BASE, PLOTTED)
@@ -167,8 +163,7 @@ def meshed_inlet() -> dict[str, str]:
         Acceptor over donor consumed: {printed} from the printed effluents, less than F = 1.52, which is
         impossible where both K_s are equal; {corrected} with the paper's 1.6 % on both, within 1 % of {ours}, F and
         the decay, in base at 19.4 h before the expansion. To an acceptor effluent of 4.19 belongs a donor effluent
-        of {donor}: {apart} of the printed one.""",
-    scenes=(BASE,))
+        of {donor}: {apart} of the printed one.""")
 def printed_effluents() -> dict[str, str]:
     """Stoichiometry of the printed numbers and of ours."""
     ours = consumed_ratio(*(flux.effluent for flux in grown(BASE, PLOTTED)[1].fluxes))
@@ -192,8 +187,7 @@ def printed_effluents() -> dict[str, str]:
         Our own ledger closes to round-off, so these are the formula's errors, and of the size of the few
         percent that the paper corrects. Its correction, "throughout the whole numerical simulation", cannot have been
         one of all effluents: raised by 1.6 %, one of them (the donor's, the longer) exceeds its supply until
-        {until} h.""",
-    scenes=(BASE,))
+        {until} h.""")
 def balance_formula() -> dict[str, str]:
     """The paper's dM_C over the integrals of F1 and F2, in some steps of base."""
     book, columns = bookkeeping(BASE), series(*BASE)
@@ -204,3 +198,114 @@ def balance_formula() -> dict[str, str]:
     rows = [[f"{time:g} h", *(percent(ratio, 1) for ratio in ratios[:, step])] for time, step in steps]
     head = ["step ending at", *(f"{name}, effluent {kind}" for kind in kinds for name in ("acceptor", "donor"))]
     return {"table": table(head, rows), "width": f"{scene(*BASE).pore.width:g}", "until": f"{exceeding(book):.1f}"}
+
+
+@erratum(
+    "E19", "smaller points",
+    consequence="""
+        What Table 1 and the text say against each other:
+
+        {table}""",
+    quick=True)
+def smaller_points() -> dict[str, str]:
+    """Numbers of Table 1 and of the text that can be checked against each other."""
+    said = scene("base")
+    crossing = said.pore.length / (2.9 / 24e-6) * 3600
+    linear = cbrt(36.0) - 1
+    rows = [
+        ["Table 1", "density of water, 998 mg cm-3",
+         f"right, {998 / 1000:.3f} g cm-3; with the pressure as a head, (1)-(6) do not need it, and it takes no part"],
+        ["2.1", "the head is once called theta", "phi; theta is the expansion"],
+        ["2.3.1, Table 1", "mu_L is a Lame coefficient", "the shear modulus; without tractions it moves nothing"],
+        ["2.3.2", "(20) has body forces f_0, (22) and (27) have none", "neglected, as the text says"],
+        ["(18)", "alpha is the volumetric coefficient, yet 1 + alpha (T - T_0) is cubed, as with a linear one",
+         "an analogy for (19) and no more: theta = 36 would be "
+         f"alpha (T - T_0) = {linear:.2f} with a linear coefficient, {36 - 1} with a volumetric one"],
+        ["2.3.3, Table 1", "minimum angle 17 deg, 16.7 deg, tangent 0.3",
+         f"arctan 0.3 = {degrees(atan(0.3)):.2f} deg; we take 16.7"],
+        ["1", "advection through a 600 um pore takes a few seconds",
+         f"{crossing:.0f} s at 2.9 m/d, {crossing * 2.9 / 1.5:.0f} s at 1.5 m/d"],
+        ["4", "about 60 % of the acceptor is consumed", f"{100 - 10 * 4.19:.1f} % by the printed effluent of 4.19 K_s"],
+        ["Table 1, 4", "pore width typically 100 um; 50 um in section 4", "base takes 50 um, wide 100 um"],
+    ]
+    return {"table": table(["where", "printed", "our reading, consequence"], rows)}
+
+
+#: Molar volumes at the boiling point, cm3/mol, with which the method of Hayduk & Laudie is used (LeBas).
+MOLAR_VOLUME = {"oxygen": 25.6, "phenol": 103.4}
+PRINTED = {"oxygen": 2.32, "phenol": 1.01}
+ZERO_C = 273.15
+
+
+def viscosity(celsius: float) -> float:
+    """Of water, cP: Vogel's law, 2.414e-2 10^(247.8 / (T - 140 K)), within 2.5 % from 0 to 370 C."""
+    return 2.414e-2 * 10 ** (247.8 / (celsius + ZERO_C - 140))
+
+
+def hayduk_laudie(celsius: float, volume: float) -> float:
+    """Diffusivity in water, cm2/d: 13.26e-5 mu^-1.14 V^-0.589 cm2/s (1974), mu in cP."""
+    return 86400 * 13.26e-5 * viscosity(celsius) ** -1.14 * volume**-0.589
+
+
+def temperature_of(diffusivity: float, volume: float) -> float:
+    """The temperature (C) at which Hayduk & Laudie give a diffusivity (cm2/d)."""
+    wanted = (86400 * 13.26e-5 * volume**-0.589 / diffusivity) ** (1 / 1.14)
+    return 140 + 247.8 / log10(wanted / 2.414e-2) - ZERO_C
+
+
+@erratum(
+    "E21", "the diffusivities of Table 1 are not those of 20 C",
+    printed="""Temperature 20 C; D of oxygen 2.32 and of phenol 1.01 cm2/d in water, "estimated using the method of
+        Hayduk and Laudie [1974]"; the viscosity of water is that of 20 C.""",
+    reading="We keep the printed values.",
+    consequence="""
+        The method at 20 C, and the temperature at which it gives the printed values, water's viscosity by Vogel's
+        law:
+
+        {table}
+
+        Both are those of one and the same warmer water. What the printed digits leave open of them moves the
+        effluents of base by less than their last digits (`verification/sensitivity`).""",
+    quick=True)
+def diffusivities() -> dict[str, str]:
+    """Both diffusivities by the method that the paper names."""
+    rows = [[name, PRINTED[name], f"{hayduk_laudie(20.0, volume):.2f}",
+             f"{temperature_of(PRINTED[name], volume):.0f} C"] for name, volume in MOLAR_VOLUME.items()]
+    return {"table": table(["", "printed, cm2/d", "at 20 C, cm2/d", "printed value is that of"], rows)}
+
+
+def oxygen_saturation(celsius: float) -> float:
+    """Of water under air of 1 atm, mg/L (Benson & Krause 1984, without salt)."""
+    T = celsius + ZERO_C
+    return exp(-139.34411 + 1.575701e5 / T - 6.642308e7 / T**2 + 1.243800e10 / T**3 - 8.621949e11 / T**4)
+
+
+@erratum(
+    "E22", "more oxygen is supplied than air dissolves",
+    printed="Supply of 10 K_s with K_s = 1.0 mg/L of oxygen at 20 C.",
+    reading="10 mg/L, as printed: the medium may be enriched.",
+    consequence="""
+        Water under air of 1 atm holds {saturation} mg/L at 20 C and 10 mg/L at {temperature} C or less.""",
+    quick=True)
+def oxygen_supplied() -> dict[str, str]:
+    """Saturation at 20 C, and the temperature of 10 mg/L by bisection."""
+    low, high = 0.0, 20.0
+    while high - low > 1e-6:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if oxygen_saturation(middle) > 10 else (low, middle)
+    return {"saturation": f"{oxygen_saturation(20.0):.2f}", "temperature": f"{low:.1f}"}
+
+
+@erratum(
+    "E23", "the doubling time of 3 hours is that at saturation",
+    printed='"The doubling time is ~3 hours" (4).',
+    reading="That of C >> K_s, which base does not have (C09, C33).",
+    consequence="""
+        ln 2 over the net growth rate k Y m_A m_D - b m_A: {saturated} h at saturation, {supplied} h at 10 K_s of both,
+        the most that anything in base sees.""",
+    quick=True)
+def doubling_time() -> dict[str, str]:
+    """At saturation and at the supply."""
+    said = scene("base")
+    rates = [float(kinetics.growth_rate(value, value, said.substrates, said.kinetics)) for value in (1e12, 10.0)]
+    return dict(zip(("saturated", "supplied"), (f"{log(2) / rate:.2f}" for rate in rates)))

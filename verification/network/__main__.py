@@ -12,7 +12,7 @@ from pathlib import Path
 
 from repro.results import write_table, write_text
 from repro.results.network import TABLE
-from verification.network import record, table, unseen
+from verification.network import law, unseen
 from verification.network.shapes import RATIOS
 
 PAGE = Path(__file__).parents[2] / "docs" / "network.md"
@@ -20,14 +20,14 @@ PAGE = Path(__file__).parents[2] / "docs" / "network.md"
 
 def main() -> int:
     """Entry point; returns the exit status."""
-    discs, others = table.half_discs(), list(table.others())
-    write_table(TABLE, table.COLUMNS, table.rows(discs, others))
+    discs, others = law.half_discs(), list(law.others())
+    write_table(TABLE, law.TABLE_COLUMNS, law.table_rows(discs, others))
     print(f"{TABLE.name}: made of {len(discs)} half-discs and {len(others)} other shapes", flush=True)
-    seen = [record.row(one, RATIOS.index(record.RATIO), 0) for one in (*discs, *others)]
-    new = [record.row(one, 0, 1) for one in unseen.every()]
-    write_table(record.SHAPES, record.COLUMNS, seen + new)
-    found = record.judged(record.read(unseen=True))
-    write_text(PAGE, record.page(record.read(unseen=False), found))
+    seen = [law.shape_row(one, RATIOS.index(law.RATIO), 0) for one in (*discs, *others)]
+    new = [law.shape_row(one, 0, 1) for one in unseen.every()]
+    write_table(law.SHAPES, law.COLUMNS, seen + new)
+    found = law.judged(law.read(unseen=True))
+    write_text(PAGE, law.page(law.read(unseen=False), found))
     print(f"{found.inside} of {found.count} shapes that the fit has not seen are within the law's bounds")
     return int(found.inside < found.count)
 

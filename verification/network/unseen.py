@@ -8,13 +8,13 @@ from collections.abc import Iterator
 import numpy as np
 
 from repro.results.network import known
-from verification.network import shapes, table
+from verification.network import law, shapes
 from verification.network.shapes import Growth, Sample
 
 SEED = 20261123
 HALF_DISCS, BODIES, PLUGS = 10, 8, 8
 #: Of half-discs, over W.
-THICKNESSES = (table.THICKNESSES[0], table.THICKNESSES[-1])
+THICKNESSES = (law.THICKNESSES[0], law.THICKNESSES[-1])
 #: Of plugs, areas over W^2; of half-discs and bodies, widths of the pore (um), on which nothing may depend.
 SHARES, WIDTHS = (2.1, 4.2), (20.0, 300.0)
 #: Runs, and shapes of each: no larger than this area over W^2, each larger than the one before by 5 % at least.

@@ -1,7 +1,8 @@
 """The hunt for mutants that no test sees, and what is kept of it.
 
 A mutant's row is written when it is done, and kept as long as its module, its line and the tests that reach it are the
-same: a hunt that was interrupted goes on, and after a change of the tests survivors alone are tried again.
+same: a hunt that was interrupted goes on, and after a change of the tests survivors alone are tried again. A mutant of
+a changed module meets the test that caught it before, alone, and all others only if that one lets it pass.
 """
 
 from __future__ import annotations
@@ -81,19 +82,20 @@ def _names(tests: list[Measured]) -> str:
 def hunt(mutants: list[Mutant], reach: Reach, jobs: int, whole: bool, ends: float) -> None:
     """Try mutants, several side by side, and write a row for each; none is begun after the time ``ends``."""
     trying.prepare()
-    workers = [pid for number in range(jobs) if (pid := _forked(mutants[number::jobs], reach, whole, ends))]
+    before = {name: row.test for name, row in kept().items() if row.verdict == "caught"}
+    workers = [pid for number in range(jobs) if (pid := _forked(mutants[number::jobs], reach, whole, ends, before))]
     for worker in workers:
         os.waitpid(worker, 0)
 
 
-def _forked(mutants: list[Mutant], reach: Reach, whole: bool, ends: float) -> int:
+def _forked(mutants: list[Mutant], reach: Reach, whole: bool, ends: float, before: dict[str, str]) -> int:
     worker = os.fork()
     if not worker:
         try:
             with copied() as there:
                 for mutant in mutants:
                     if time.time() < ends:
-                        _write(tried(mutant, there, reach, whole))
+                        _write(tried(mutant, there, reach, whole, before.get(mutant.name, "")))
         except BaseException:
             traceback.print_exc()
         finally:
@@ -109,23 +111,32 @@ def _write(row: Row) -> None:
     print(f"{row.verdict:9} {row.file}:{row.line} {row.new!r} {row.test} ({counted})", flush=True)
 
 
-def tried(mutant: Mutant, there: Path, reach: Reach, whole: bool = False) -> Row:
-    """Run a mutant in the copy ``there`` against the tests that reach it: as many of the cheapest as take no more than
-    LIMIT; or all, for WHOLE, those that are named as its module is at first."""
+def tried(mutant: Mutant, there: Path, reach: Reach, whole: bool = False, before: str = "") -> Row:
+    """Run a mutant in the copy ``there`` against the tests that reach it: the one that caught it ``before`` first, then
+    as many of the cheapest as take no more than LIMIT; or all, for WHOLE, those that are named as its module is at
+    first."""
     limit = WHOLE if whole else LIMIT
     path, text = there / "repro" / mutant.file, (ROOT / "repro" / mutant.file).read_text(encoding="utf-8")
     tests = reach.of(mutant.file, text, mutant.line, whole)
     chosen = sorted(tests, key=lambda test: -alike(test.id, mutant.file)) if whole else within(tests, limit)
     put(path, mutated(text, mutant))
-    first = nearest(chosen)
-    found = run(there, [test.id for test in first], limit / 3)
-    if found == Ran(seconds=found.seconds) and len(chosen) > len(first):
-        found = run(there, [test.id for test in chosen[len(first):]], 2 * limit / 3)
+    found = run(there, [before], limit) if before in {test.id for test in tests} else Ran()
+    if not found.failed:
+        found = _met(there, chosen, limit)
     put(path, text)
     row = Row(mutant.name, mutant.file, mutant.line, mutant.operator, mutant.old, mutant.new, digest(text), "survivor",
               reached=len(tests), tests=_names(reach.of(mutant.file, text, mutant.line)), tried=len(chosen),
               seconds=round(found.seconds, 1))
     return _verdict(row, found, {test.id: test.seconds for test in tests}, there)
+
+
+def _met(there: Path, chosen: list[Measured], limit: float) -> Ran:
+    """What comes of some tests, the nearest first."""
+    first = nearest(chosen)
+    found = run(there, [test.id for test in first], limit / 3)
+    if found == Ran(seconds=found.seconds) and len(chosen) > len(first):
+        found = run(there, [test.id for test in chosen[len(first):]], 2 * limit / 3)
+    return found
 
 
 def _verdict(row: Row, found: Ran, usual: dict[str, float], there: Path) -> Row:

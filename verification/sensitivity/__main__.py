@@ -1,23 +1,179 @@
-"""`python -m verification.sensitivity [--only PART] [--sobol N]`: what the inputs allow, with its pictures.
+"""`python -m verification.sensitivity [--only PART] [--sobol N]`: what the inputs allow, with pictures and a page.
 
 Its parts are base and wide, their elasticities and the one set of inputs; after_contact, how well wide is known after
 contact; and supplies, which of the claims about wide hold with other supplies.
 
 Every run is kept in `out/runs.json` as it is computed, and a second call goes on from there. `--sobol N` computes Sobol
-indices of base too, N a power of two.
-"""
+indices of base too, N a power of two."""
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
 
 from repro.results import write_json, write_text
 from verification import sensitivity
-from verification.sensitivity import after_contact, elasticity, one_set, picture, sobol, supplies
-from verification.sensitivity.inputs import ROUNDED
-from verification.sensitivity.numbers import Runs, scene
+from verification.kernel.writing import Block, markdown, table
+from verification.sensitivity import rounding, wide
+from verification.sensitivity.numbers import INPUTS, ROUNDED, Runs, scene
+
+TARGET, OUTLINES = (Path(__file__).parent / name for name in ("tornado.svg", "supplies.svg"))
+NAMES = {"velocity_0": "mean velocity, t = 0", "velocity": "mean velocity, 19.2 h",
+         "effluent_acceptor": "effluent acceptor, 19.4 h", "effluent_donor": "effluent donor, 19.4 h",
+         "contact_time": "time of contact (wide)", "conductivity_after": "conductivity 4 h after contact (wide)"}
+UP, DOWN = "#D55E00", "#0072B2"
+#: Width of wide (um).
+WIDTH = 100.0
+
+
+def reaches(record: dict, number: str) -> list[tuple[str, float]]:
+    """Rounded inputs and what half a unit of their last digit makes of a number (%), the largest first."""
+    known = record["elasticities"][number]
+    found = [(each.name, 100 * known[each.name]["elasticity"] * each.rounding) for each in ROUNDED]
+    return sorted(found, key=lambda pair: -abs(pair[1]))
+
+
+def write(record: dict, target: Path = TARGET, outlines: Path = OUTLINES) -> None:
+    """Both pictures, the second where the record tells of supplies."""
+    tornado(record, target)
+    if record.get("supplies"):
+        of_supplies(record["supplies"], outlines)
+
+
+def _saved(made: Figure, target: Path) -> None:
+    """The same bytes for the same record."""
+    with matplotlib.rc_context({"svg.hashsalt": "sensitivity", "svg.fonttype": "none"}):
+        made.savefig(target, format="svg", metadata={"Date": None, "Creator": None})
+
+
+def of_supplies(found: dict[str, dict], target: Path) -> None:
+    """Outlines of wide every 5 h, a supply a row, the latest at the back."""
+    made = Figure(figsize=(9, 1.7 * len(found)), layout="constrained")
+    FigureCanvasSVG(made)
+    for axes, (supply, known) in zip(made.subplots(len(found), 1, sharex=True, squeeze=False).ravel(), found.items()):
+        shown = [(float(time), _places(text)) for time, text in known["outlines"].items()]
+        last = max(time for time, _ in shown)
+        for time, places in reversed(shown):
+            axes.fill(*places.T, facecolor=matplotlib.colormaps["viridis_r"](time / last), edgecolor="white")
+        axes.set_ylim(0, WIDTH)
+        axes.set_aspect("equal")
+        axes.set_title(f"{supply} K_s: every 5 h to {last:g} h; contact at {known['contact_time']:.1f} h", loc="left",
+                       fontsize=10)
+    axes.set_xlabel("x (um); the fluid comes from the left")
+    _saved(made, target)
+
+
+def _places(text: str) -> np.ndarray:
+    """(M, 2) um."""
+    return np.array([[float(value) for value in pair.split(",")] for pair in text.split()])
+
+
+def tornado(record: dict, target: Path) -> None:
+    """The diagram: of each number the inputs in their order, an input's printed digit up and down."""
+    shown = [name for name in NAMES if name in record["elasticities"]]
+    made = Figure(figsize=(9, 2.6 * ((len(shown) + 1) // 2)), layout="constrained")
+    FigureCanvasSVG(made)
+    for axes, number in zip(made.subplots((len(shown) + 1) // 2, 2, squeeze=False).ravel(), shown):
+        names, values = zip(*reversed(reaches(record, number)[:8]))
+        axes.barh(names, values, color=UP, height=0.7)
+        axes.barh(names, [-value for value in values], color=DOWN, height=0.7)
+        axes.axvline(0, color="black", linewidth=0.8)
+        axes.set_title(NAMES[number], loc="left", fontsize=10)
+        axes.set_xlabel("change (%)")
+    made.suptitle("Half a unit of the last printed digit of an input: upwards (orange), downwards (blue)", fontsize=10)
+    _saved(made, target)
+
+
+def page(record: dict) -> str:
+    """The record in words and tables."""
+    words = ("Elasticities d ln(number) / d ln(input), by central differences of the converged solution; ± is their "
+             "bar, and one that exceeds a tenth of the value is *not resolved*. `make sensitivity` writes this page.")
+    blocks = [Block("text", words), Block("text", f"![Tornado diagram]({TARGET.name})"), _table(record)]
+    for part, section in SECTIONS.items():
+        blocks += section(record[part]) if record.get(part) else ()
+    return f"# What the inputs of Table 1 allow\n\n{markdown(blocks, 2)}\n\n"
+
+
+def _table(record: dict) -> Block:
+    numbers = list(record["elasticities"])
+    head = ("input", "rounding (%)", *(NAMES.get(name, name.replace("_", " ")) for name in numbers))
+    return table(head, ((each.name, f"{100 * each.rounding:.2g}" if each.half else "exact",
+                         *(_cell(record["elasticities"][name].get(each.name)) for name in numbers))
+                        for each in INPUTS))
+
+
+def _cell(known: dict | None) -> str:
+    if known is None:
+        return "-"
+    word = f"{known['elasticity']:+.3f}" if known["resolved"] else f"{known['elasticity']:+.1g}, not resolved"
+    large = known.get("by_10_percent")
+    told = f"; ± 10 %: {large[0]:+.2g}, {large[1]:+.2g} %" if large else ""
+    return f"{word} (± {known['bar']:.1g}){told}"
+
+
+def _set(found: dict) -> Iterator[Block]:
+    words = ("One set of inputs within the rounding gives all printed numbers of base at once" if found["reached"] else
+             "No set of inputs within the rounding gives all printed numbers of base at once; the nearest")
+    numbers = ", ".join(f"{NAMES.get(name, name)} {value:.4f}" for name, value in found["numbers"].items())
+    yield Block("heading", "One set of inputs")
+    yield Block("text", f"{words} (a share of {found['share_of_the_rounding']:.2f} of the rounding is needed). A run "
+                        f"with it: {numbers}.")
+    yield table(("input", "value"), ((name, f"{value:.4f}") for name, value in found["inputs"].items()))
+
+
+def _supplies(found: dict) -> Iterator[Block]:
+    yield Block("heading", "The supply of Figure 6, which is not printed")
+    yield table(("supply of both (K_s)", "contact (h)", "ends at contact (um)", "least acceptor then (K_s)"), (
+        (supply, f"{known['contact_time']:.1f}", f"{known['upstream']:.0f} to {known['downstream']:.0f}",
+         f"{known['acceptor_min']:.2g}") for supply, known in found.items()))
+    yield Block("text", f"![Outlines with each supply]({OUTLINES.name})")
+    yield from _held(found)
+
+
+def _held(found: dict[str, dict]) -> Iterator[Block]:
+    """Which claims about wide hold with which supplies."""
+    every, some, none = (", ".join(ids) or "none" for ids in wide.verdicts(found))
+    yield Block("text", "Of the claims about this run, each judged anew with the converged solution at one size, to "
+                f"{wide.AFTER} h after contact or until the aggregate reaches an end of the pore, these hold with "
+                f"all supplies: {every}; with some: {some}; with none: {none}.")
+    rows = [(f"{id}, {quantity}", *("yes" if known["claims"][id].get(quantity) else "no" for known in found.values()))
+            for id, quantity in wide.moving(found)]
+    if rows:
+        yield Block("text", "Numbers that hold with some supplies and not with all:")
+        yield table(("claim", *(f"{supply} K_s" for supply in found)), rows)
+
+
+def _after_contact(found: list[dict]) -> Iterator[Block]:
+    yield Block("heading", "How well wide is known after contact")
+    yield Block("text", "Values from the finest size to the coarsest; means are over whole hours from contact to 45 h. "
+                "A single row jumps as one more edge of the outline comes to rest on the wall.")
+    yield table(("number", "values", "bar (%)", "asked (%)", "kept"), (
+        (known["quantity"], ", ".join(f"{value:.4g}" for value in known["values"]), f"{known['bar_percent']:.2g}",
+         f"{known['asked_percent']:g}", "yes" if known["kept"] else "no") for known in found))
+
+
+def _sobol(found: dict) -> Iterator[Block]:
+    widest = max(0.5 * (high - low) for known in found["numbers"].values() for _, low, high in known["total_order"])
+    yield Block("heading", "Sobol indices of base")
+    yield Block("text", f"Total indices of {found['samples']} samples in `fast`, with intervals of "
+                f"{100 * found['confidence']:.0f} %: the share of a number's variance within the rounding that goes "
+                f"with an input. The widest of the intervals is {widest:.2f} to either side; more samples "
+                "(`--sobol N`) narrow them as the root of their number.")
+    yield table(("number", *found["inputs"]), (
+        (NAMES.get(name, name), *(f"{value:.2f} ({low:.2f} to {high:.2f})" for value, low, high in
+                                  known["total_order"])) for name, known in found["numbers"].items()))
+
+
+#: What is told of the parts of the record that are there, in this order.
+SECTIONS: dict[str, Callable[..., Iterator[Block]]] = {
+    "one_set": _set, "after_contact": _after_contact, "supplies": _supplies, "sobol": _sobol}
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -32,8 +188,8 @@ def main(arguments: list[str] | None = None) -> int:
     made = computed(Runs(), chosen.only, chosen.sobol)
     write_json(sensitivity.RECORD, made)
     sensitivity.record.cache_clear()
-    picture.write(made)
-    write_text(sensitivity.RECORD.with_suffix(".md"), picture.page(made))
+    write(made)
+    write_text(sensitivity.RECORD.with_suffix(".md"), page(made))
     print(f"{sensitivity.RECORD.name}, its page, tornado.svg and supplies.svg: written")
     return 0
 
@@ -49,23 +205,23 @@ def computed(runs: Runs, only: str | None, samples: int) -> dict:
         joined = {key: made[key] | part[key] for key in ("values", "elasticities") if key in part}
         made |= {**part, **joined}
     if samples:
-        made["sobol"] = sobol.indices(runs, made["elasticities"], samples)
+        made["sobol"] = rounding.sobol(runs, made["elasticities"], samples)
     return made
 
 
 def _of_scene(runs: Runs, name: str) -> dict:
-    return {"values": runs.numbers(scene(name, {})), "elasticities": elasticity.elasticities(runs, name)}
+    return {"values": runs.numbers(scene(name, {})), "elasticities": rounding.elasticities(runs, name)}
 
 
 def _of_base(runs: Runs) -> dict:
     found = _of_scene(runs, "base")
-    return {**found, "one_set": one_set.found(runs, found["elasticities"])}
+    return {**found, "one_set": rounding.one_set(runs, found["elasticities"])}
 
 
 PARTS: dict[str, Callable[[Runs], dict]] = {
     "base": _of_base, "wide": lambda runs: _of_scene(runs, "wide"),
-    "after_contact": lambda runs: {"after_contact": after_contact.known(runs)},
-    "supplies": lambda runs: {"supplies": supplies.contacts(runs)}}
+    "after_contact": lambda runs: {"after_contact": wide.after_contact(runs)},
+    "supplies": lambda runs: {"supplies": wide.contacts(runs)}}
 
 
 if __name__ == "__main__":

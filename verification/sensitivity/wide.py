@@ -1,10 +1,15 @@
-"""Figure 6 rests on a supply that the paper does not print: what 5 to 40 K_s of both make of it.
+"""Wide, whose supply the paper does not print: how well it is known after its contact with the opposite wall, and what
+5 to 40 K_s of both substrates make of it.
 
-For each supply: when contact comes, outlines every 5 h until as long after contact as Figure 6 goes on, or until the
-aggregate reaches an end of the pore, and which of the claims about wide hold then. Those are the functions of
+**After contact**: conductivity, tips, and length of contact. A contact surface grows by whole edges of the outline, so
+that a single row jumps, by an edge or two, with whatever moves the instant at which a node joins. Its mean over the
+whole hours from contact to the end of Figure 6 does not. The bar is that of `verification.uncertainty` from the
+converged solution on four sizes of elements and steps.
+
+**Supplies**: for each, when contact comes, outlines every 5 h until as long after contact as Figure 6 goes on, or until
+the aggregate reaches an end of the pore, and which of the claims about wide hold then. Those are the functions of
 `verification.claims` themselves, with the converged solution at one size, so that a number has no bar here; a claim
-holds where all of its checks about wide do.
-"""
+holds where all of its checks about wide do."""
 
 from __future__ import annotations
 
@@ -14,15 +19,65 @@ from math import floor
 import numpy as np
 import shapely
 
+from repro.fem.outline import TOP
 from repro.march import simulation
-from repro.march.loop import PoreEnd, State
+from repro.march.loop import Instant, PoreEnd, State
+from repro.results import M_PER_D
 from verification.claims import CLAIMS, Finding, evaluate
 from verification.claims.after_contact import OF_WIDE
-from verification.claims.bars import unnumbered
+from verification.claims.bars import MESH_ORDERS, unnumbered
 from verification.claims.levels import CONVERGED, Level, at_level, converged, forget
 from verification.claims.restored import bodies, polygon
 from verification.claims.runs import WIDE, series
-from verification.sensitivity.numbers import OF, Runs, scene
+from verification.claims.shapes import contact_length
+from verification.sensitivity.numbers import OF, Numbers, Runs, scene
+from verification.uncertainty import estimate
+
+SIZES = (0.5, 2**-0.5, 1.0, 2**0.5)
+#: Whole hours (h) after contact, which comes at 34.3 h.
+HOURS = tuple(map(float, range(35, 46)))
+#: What is asked of the bars, in percent of the number.
+ASKED = {"conductivity (m/d)": 1.0, "upstream tip (um)": 1.0, "downstream tip (um)": 1.0, "length of contact (um)": 2.0}
+
+
+def of_after(said) -> Numbers:
+    """Means over HOURS (geometric, of magnitudes) and values at the last of them. Raises LookupError where one of the
+    hours is before contact."""
+    rows = [instant for _, instant in simulation.steps(said) if instant and instant.pore.contact]
+    if len(rows) != len(HOURS):
+        raise LookupError(f"{len(rows)} of {len(HOURS)} rows are after contact")
+    table = np.array([_row(each) for each in rows])
+    means = np.exp(np.log(np.abs(table)).mean(axis=0))
+    found = {f"mean of {name}": float(value) for name, value in zip(ASKED, means)}
+    return found | {f"last {name}": float(abs(value)) for name, value in zip(ASKED, table[-1])}
+
+
+def _row(now: Instant) -> list[float]:
+    """In the order of ASKED."""
+    outline = now.pore.boundary
+    return [M_PER_D * now.solved.flow.conductivity, outline.upstream, outline.downstream, contact_length(outline, TOP)]
+
+
+OF["after contact"] = of_after
+
+
+def after_contact(runs: Runs) -> list[dict]:
+    """Each number on all sizes, its bar (%), and whether that is what is asked."""
+    sizes = [runs.numbers(_on_size(size)) for size in SIZES]
+    return [bar_of(f"{kind} {name}", [row[f"{kind} {name}"] for row in sizes], asked)
+            for kind in ("mean of", "last") for name, asked in ASKED.items()]
+
+
+def _on_size(size: float):
+    said = scene("wide", {}, *converged(size))
+    return replace(said, name="after contact", output=replace(said.output, times=HOURS))
+
+
+def bar_of(quantity: str, values: list[float], asked: float) -> dict:
+    """A number from its values on SIZES."""
+    bar = 100 * estimate(SIZES, values, MESH_ORDERS).bar / abs(values[0])
+    return {"quantity": quantity, "values": values, "bar_percent": bar, "asked_percent": asked, "kept": bar <= asked}
+
 
 #: Supplies over K_s, and the size of the converged solution's elements and steps.
 SUPPLIES, SIZE = (5.0, 10.0, 20.0, 40.0), 2**0.5

@@ -1,0 +1,167 @@
+"""What each choice costs and what it changes: ``python -m verification.audit`` prints the table and writes
+``verification/report/audit.json``.
+
+The paper's modelling and numerical choices (:mod:`verification.switches`), one changed at a time: base in the paper's
+preset at 19.2 h against the same run with the change, at the same element size and step. ``effect`` is the difference
+of two whole runs. Two runs that remesh at different moments differ by what two meshes differ by, in velocity ten times
+more than in shape: so the other run's last shape is solved in on the default's mesh, brought to that shape. What is
+left of two meshes is the row "mesh"; ``resolved`` names the quantities that change by more than twice that.
+``one_state`` is free of it: both choices in the state of the default at 19.2 h, flow and substrates solved in it and
+the shape of one step more. ``cost_ratio`` is of processor time, the median of runs in turn, made for that alone.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median
+from time import process_time
+
+from repro.march.simulation import simulate
+from verification import switches
+from verification.bench.record import machine, save
+from verification.claims import runs
+from verification.claims.runs import BASE, PLATES, UPDATE
+from verification.switches import CHOICES, NOT_AUDITED, PLOTTED, Course, Switch, state
+
+RECORD = Path(__file__).parent / "report" / "audit.json"
+#: Runs in turn of which the processor times are the medians.
+REPEATS = 3
+#: Times (h) at which the lean of an uneven seed is told.
+TIMES = (0.4, 4.8, 9.6, 14.4, PLOTTED)
+LABELS = [f"{time:g} h" for time in TIMES]
+METHOD = (f"base, preset paper, at {PLOTTED:g} h in steps of {60 * UPDATE:g} min; "
+          "effect: difference of two whole runs, relative, effluents over the supply, flow and substrates of both last "
+          "shapes on the default's mesh (extent: each on its own); one_state: both choices in the default's last "
+          "state, with the shape of one step more; resolved: changes by more than twice what meshes of the same "
+          f"fineness do; cost_ratio: processor time, median of {REPEATS} runs in turn (mesh, theta after a "
+          "remesh, symmetry: one run each)")
+
+
+def main() -> int:
+    """Entry point."""
+    noise = mesh()
+    chosen = [switch for name, switch in CHOICES.items() if name not in NOT_AUDITED]
+    rows = [noise, *map(named, chosen), drift(), *symmetry()]
+    rows = [{**row, "resolved": resolved(row["effect"], noise[row.pop("noise", "effect")])} for row in rows]
+    save({"machine": machine(), "method": METHOD, "rows": rows}, RECORD)
+    print("\n".join(table(rows)))
+    return 0
+
+
+def mesh() -> dict:
+    """What runs differ by on meshes of the same fineness to 2.5 %: the largest of each quantity."""
+    others = [state(switch.run) for switch in switches.FINENESS]
+    one, two = (_worst([each(state(BASE), other) for other in others])
+                for each in (switches.whole_run, switches.two_meshes))
+    told = row("mesh", "refinement 1", "refinement 0.975 to 0.995", cost(switches.FINENESS[-1].run, 1), one,
+               "no choice: what runs on meshes of the same fineness differ by; less than twice that is not resolved")
+    return {**told, "two_meshes": two}
+
+
+def _worst(effects: list[dict[str, float]]) -> dict[str, float]:
+    return {name: max((each[name] for each in effects), key=abs) for name in effects[0]}
+
+
+def named(switch: Switch) -> dict:
+    """The row of a choice that a scene can name."""
+    told = measured(switch, cost(switch.run))
+    print(f"{switch.choice}: {switch.alternative}", file=sys.stderr, flush=True)
+    return told
+
+
+def measured(switch: Switch, ratio: float) -> dict:
+    """Its row but for the cost."""
+    default, other = state(BASE), state(switch.run)
+    compare = switches.whole_run if switch.meshes else switches.two_meshes
+    told = row(switch.choice, switch.default, switch.alternative, ratio, compare(default, other), switch.note)
+    in_one = switches.one_state(default, other.scene) if switch.state else {}
+    return {**told, "one_state": in_one, "noise": "effect" if switch.meshes else "two_meshes"}
+
+
+def cost(run: tuple[str, ...], repeats: int = REPEATS) -> float:
+    """The ratio of the processor times of a run and of base."""
+    return in_turn((lambda: seconds(PLATES), lambda: seconds(run)), repeats)
+
+
+def seconds(run: tuple[str, ...]) -> float:
+    """Processor time of a run."""
+    said, start = runs.scene(*run), process_time()
+    for _ in simulate(said):
+        pass
+    return process_time() - start
+
+
+def in_turn(both: tuple[Callable[[], float], Callable[[], float]], repeats: int) -> float:
+    """The ratio of the median times of the alternative and of the default."""
+    rows = [[spent() for spent in both] for _ in range(repeats)]
+    default, other = (median(row[k] for row in rows) for k in (0, 1))
+    return other / default
+
+
+def drift() -> dict:
+    """theta restarting at a remesh as J X / X_m against J: the drift of (28) [E7]."""
+    other = switches.course(BASE, switches.restarting_as_j)
+    drifts = {name: float(found["drift"].max()) for name, found in
+              (("default", switches.columns(BASE)), ("alternative", other.columns))}
+    told = _marched("theta after a remesh (28)", "J X / X_m", "J", other, "drift, max |X / X_m - 1| over the "
+                    f"run: {drifts['default']:.2g} against {drifts['alternative']:.2g} [E7]")
+    return {**told, "drift": drifts}
+
+
+def symmetry() -> list[dict]:
+    """A half-disc against one whose downstream tip, or upstream tip, reaches out by 1 %, the other tip less by that."""
+    plain, rows = switches.columns(BASE), []
+    for word, seed in (("upstream", switches.longer_upstream), ("downstream", switches.longer_downstream)):
+        other = switches.course(BASE, switches.as_it_is, seed)
+        leans, speeds = ([switches.near(found, name, TIMES) for found in (plain, other.columns)]
+                         for name in ("lean", "velocity"))
+        lean = dict(zip(LABELS, map(float, leans[1] - leans[0])))
+        told = _marched("symmetry of the seed", "half-disc", f"1 % longer {word}", other,
+                        "R (1 + 0.01 cos 3 phi), area as before; the middle between the tips is off by "
+                        + ", ".join(f"{100 * value:+.2f} % at {time}" for time, value in lean.items()))
+        apart = dict(zip(LABELS, map(float, speeds[1] / speeds[0] - 1)))
+        rows.append({**told, "lean_over_time": lean, "velocity_over_time": apart})
+    return rows
+
+
+def _marched(choice: str, default: str, alternative: str, other: Course, note: str) -> dict:
+    return row(choice, default, alternative, other.seconds / seconds(PLATES),
+               switches.whole_run(state(BASE), other.plotted), note)
+
+
+def row(choice: str, default: str, alternative: str, ratio: float, effects: dict[str, float], note: str) -> dict:
+    """A row of the record."""
+    return {"choice": choice, "default": default, "alternative": alternative, "cost_ratio": ratio, "effect": effects,
+            "one_state": {}, "largest": largest(effects), "note": note}
+
+
+def largest(effects: dict[str, float]) -> str:
+    """The quantity that changes most; an empty word where there is none."""
+    return max(effects, key=lambda name: abs(effects[name]), default="")
+
+
+def resolved(effects: dict[str, float], noise: dict[str, float]) -> list[str]:
+    """Names of the quantities that change by more than twice what meshes of the same fineness make of them."""
+    return [name for name, value in effects.items() if abs(value) > 2 * abs(noise[name])]
+
+
+def table(rows: list[dict]) -> list[str]:
+    """Lines: a choice each, its cost, its largest effects over the runs and in one state, and that on the velocity."""
+    lines = [f"{'choice':<26} {'default':<22} {'alternative':<26} {'cost':>5}  {'velocity':>9} {'area':>9}  "
+             f"{'largest':<28} {'in one state':<28}"]
+    for row in rows:
+        lines.append(f"{row['choice']:<26} {row['default']:<22} {row['alternative']:<26} {row['cost_ratio']:5.2f}  "
+                     f"{row['effect']['velocity']:+9.1e} {row['effect']['area']:+9.1e}  {_told(row['effect']):<28} "
+                     f"{_told(row['one_state']):<28}".rstrip())
+    return lines
+
+
+def _told(effects: dict[str, float]) -> str:
+    name = largest(effects)
+    return f"{effects[name]:+.1e} {name}" if name else "-"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,393 @@
+"""Whole runs and single steps: error against time of base, what a scene does not need, live memory over many
+steps, and cost against size."""
+
+from __future__ import annotations
+
+import gc
+import json
+import resource
+import subprocess
+import sys
+import tracemalloc
+from dataclasses import replace
+from functools import partial
+from itertools import islice
+from pathlib import Path
+from statistics import median
+from time import perf_counter, process_time
+
+import numpy as np
+
+from reference import whole_run
+from repro import timing
+from repro.march import midpoint, updates
+from repro.march.simulation import simulate
+from repro.model import pore
+from repro.results import row
+from repro.scene import load_scene, parse_scene
+from verification.bench import record
+from verification.bench.record import exponent, measured
+
+BASE_REPEATS = 3
+TIMES = (19.2, 19.4)
+COLUMNS = """mean_velocity_m_per_d conductivity_m_per_d aggregate_area_um2 thickness_um upstream_um downstream_um
+effluent_acceptor_mg_per_L effluent_donor_mg_per_L""".split()
+#: Rings and steps of the reference, extrapolated; those of a check, finer in space and with other steps.
+REFERENCE, CHECK = ((8, 12), (8, 16)), ((10, 15), (10, 16))
+FAST, ACCURATE, EXACT = "preset fast", "preset accurate", "preset exact"
+PRESET_PAPER = "preset paper: linear elements, updates"
+#: Refinement and time step (min) of the paper's scheme; those of them at which it is changed in one thing; refinement
+#: and tolerance of the midpoint rule's.
+PAPER = ((0.25, 60), (0.35, 48), (0.5, 48), (0.7, 96), (0.7, 48), (0.7, 24), (1.0, 120), (1.0, 96), (1.0, 48),
+         (1.0, 12), (1.4, 96), (1.4, 48), (1.4, 24), (1.4, 12), (1.4, 6), (2.0, 6), (2.8, 12), (2.8, 6))
+CHANGED = ((0.7, 24), (1.0, 48), (1.0, 12))
+MIDPOINT = ((0.35, 0.03), (0.5, 0.03), (0.7, 0.01), (1.0, 0.01), (1.4, 0.003), (2.0, 0.002))
+QUADRATIC = ((0.15, 0.02), (0.15, 0.01), (0.2, 0.01), (0.3, 0.005), (0.45, 0.002), (0.45, 0.001), (0.6, 0.0005),
+             (0.8, 0.0002))
+CUBIC = ((0.1, 0.01), (0.2, 0.0075), (0.3, 0.005), (0.45, 0.001))
+#: Refinements of order 2 in the paper's updates of 12 min.
+UPDATES = ((0.15,), (0.3,), (0.45,))
+#: How sizes are labelled, and the keys of the scene that they are of.
+BY_MINUTES = ("refinement {:g}, {} min", "numerics.refinement={}", "growth.time_step={} min")
+BY_TOLERANCE = ("refinement {:g}, tolerance {:g}", "numerics.refinement={}", "numerics.tolerance={}")
+OF_PAPER, OF_ACCURATE = ("numerics.preset=paper",), ("numerics.preset=accurate",)
+BUBBLE, MIDPOINT_RULE = "numerics.flow_element=bubble", "numerics.time=midpoint"
+#: Method, labels and keys, sizes, and what else the scene says.
+METHODS_OF_BASE = (
+    (PRESET_PAPER, BY_MINUTES, PAPER, OF_PAPER),
+    ("bubble alone", BY_MINUTES, CHANGED, (*OF_PAPER, BUBBLE)),
+    ("midpoint alone", BY_TOLERANCE, MIDPOINT, (*OF_PAPER, MIDPOINT_RULE)),
+    ("midpoint and bubble", BY_TOLERANCE, MIDPOINT[2:5], (*OF_PAPER, MIDPOINT_RULE, BUBBLE)),
+    ("bounded transfer alone", BY_MINUTES, CHANGED[::2], (*OF_PAPER, "numerics.transfer=bounded")),
+    ("order 2, midpoint", BY_TOLERANCE, QUADRATIC, OF_ACCURATE),
+    ("order 2, midpoint, fresh derivatives", BY_TOLERANCE, QUADRATIC[1:6:2], (*OF_ACCURATE, "numerics.jacobian=fresh")),
+    ("order 3, midpoint", BY_TOLERANCE, CUBIC, (*OF_ACCURATE, "numerics.elements=cubic")),
+    ("order 2, midpoint, one element size everywhere", BY_TOLERANCE, QUADRATIC[1:4],
+     (*OF_ACCURATE, "numerics.gradation=0")),
+    ("order 2 in updates of 12 min", ("refinement {:g}", "numerics.refinement={}"), UPDATES,
+     (*OF_ACCURATE, "numerics.time=updates")))
+#: Rings and steps to 19.2 h of scikit-fem's run.
+SKFEM = ((3, 4), (4, 4), (4, 8), (6, 8))
+
+
+def base_part(quick: bool) -> dict:
+    """The whole base run to 19.4 h: the largest error of eight numbers at 19.2 and 19.4 h; and how long ``wide`` takes.
+
+    ``quick``: to 2 h, against the finest of its own runs.
+    """
+    times = (1.8, 2.0) if quick else TIMES
+    truth, about = _short(times) if quick else reference(times)
+    repeats = 1 if quick else BASE_REPEATS
+    lines = measured(jobs(np.array(truth), times, quick), repeats)
+    found = {"title": f"Base to {times[1]:g} h, nothing written", "repeats": repeats, "lines": lines,
+             "error": f"largest of eight numbers at {times[0]:g} and {times[1]:g} h: velocity, conductivity, area, "
+                      "thickness, upstream, downstream relative, effluents over the supply", **about}
+    return found if quick else {**found, "wide": wide()}
+
+
+def jobs(truth: np.ndarray, times, quick: bool) -> dict:
+    """{(method, label): job}."""
+    cut, found = 2 if quick else None, {}
+    for method, (label, *keys), sizes, changes in METHODS_OF_BASE:
+        for size in sizes[:cut]:
+            sized_as = (key.format(value) for key, value in zip(keys, size))
+            found[method, label.format(*size)] = partial(simulated, truth, times, *changes, *sized_as)
+    for name in (FAST, ACCURATE, EXACT):
+        found[name, "as it is"] = partial(simulated, truth, times, f"numerics.preset={name.split()[1]}")
+    if not quick:
+        found |= {("scikit-fem: quadratic elements, Runge-Kutta", f"{n} rings, {s} steps"): partial(
+            _skfem, truth, times, n, s) for n, s in SKFEM}
+    return found
+
+
+def simulated(truth, times, *overrides: str):
+    """Run base; the error of the last rows."""
+    shown = ", ".join(f'"{time} h"' for time in times)
+    timing.reset()
+    rows = rows_of(load_scene("base", [*overrides, f'growth.end="{times[-1]} h"', f"output.times=[{shown}]"]))
+    return {"error": error(values(rows), truth), "nodes": rows[-1]["nodes"], "stages": dict(timing.seconds),
+            "errors": [float(e) for e in apart(values(rows), truth).max(axis=0)]}
+
+
+def rows_of(scene) -> list[dict]:
+    """Rows of the table that a run writes."""
+    return [row(scene, instant) for instant in simulate(scene)][-len(scene.output.times):]
+
+
+def values(rows: list[dict]) -> np.ndarray:
+    """(times, 8) of COLUMNS."""
+    return np.array([[line[name] for name in COLUMNS] for line in rows])
+
+
+def apart(found, truth) -> np.ndarray:
+    """(times, 8) errors: relative, effluents over the supply."""
+    scale = np.abs(truth).copy()
+    scale[:, 6:] = whole_run.Pore().supply
+    return np.abs(found - truth) / scale
+
+
+def error(found, truth) -> float:
+    """The largest."""
+    return float(apart(found, truth).max())
+
+
+def reference(times) -> tuple[list, dict]:
+    """Values of the independent run and what is told of it; worked out once and kept in the record."""
+    kept = record.load()["parts"].get("base", {})
+    if kept.get("reference_times") == list(times):
+        return kept["reference_values"], {key: value for key, value in kept.items() if key.startswith("reference")}
+    start = process_time()
+    found, check = (whole_run.converged(whole_run.Pore(), times, *size).values for size in (REFERENCE, CHECK))
+    change = error(found, check)
+    return check.tolist(), {
+        "reference": f"scikit-fem's quadratic elements in moving coordinates, Runge-Kutta in time, extrapolated from "
+                     f"{CHECK[0]} rings and {CHECK[1]} steps; from {REFERENCE[0]} and {REFERENCE[1]} they differ by "
+                     f"{change:.1e}",
+        "reference_change": change, "reference_times": list(times), "reference_values": check.tolist(),
+        "reference_seconds": process_time() - start}
+
+
+def _short(times) -> tuple[list, dict]:
+    shown = ", ".join(f'"{time} h"' for time in times)
+    scene = load_scene("base", ["numerics.preset=accurate", f'growth.end="{times[-1]} h"', f"output.times=[{shown}]"])
+    return values(rows_of(scene)).tolist(), {"reference": "preset accurate: a quick look, no reference"}
+
+
+def _skfem(truth, times, rings: int, steps: int):
+    return {"error": error(whole_run.numbers(whole_run.Pore(), rings, steps, times), truth)}
+
+
+def wide() -> list[dict]:
+    """Seconds of wide in preset fast, to 45 h, one run."""
+    wall, spent = perf_counter(), process_time()
+    try:
+        instants = [(instant.pore.time, len(instant.pore.mesh.points)) for instant in simulate(
+            load_scene("wide", ["numerics.preset=fast"]))]
+    except Exception as failure:
+        return [{"preset": "fast", "failed": f"{type(failure).__name__}: {failure}"}]
+    return [{"preset": "fast", "seconds": perf_counter() - wall, "cpu": process_time() - spent,
+             "steps": len(instants) - 1, "end": instants[-1][0], "nodes": instants[-1][1]}]
+
+
+SCENES_REPEATS = 31
+SUBSTRATES = {"substrates": {}}
+GROWTH = {"growth": {"end": "2.4 h"}}
+FLOW = {"flow": {"head": "1e-3 cm"}}
+#: Sections of each scene; the stages that it needs, of those that are timed.
+SCENES = {"whole": ({**FLOW, **SUBSTRATES, **GROWTH}, {"flow", "transport"}),
+          "frozen shape": ({**FLOW, **SUBSTRATES}, {"flow", "transport"}),
+          "flow only": (FLOW, {"flow"}), "transport only": (SUBSTRATES, {"transport"})}
+SCENE_PRESETS = ("paper", "fast", "accurate")
+FEW_STEPS = 3
+
+
+def scenes_part(quick: bool) -> dict:
+    """What a scene does not need costs nothing: its own stages, and no more, take time.
+
+    Base with a seed of 20 um as it is, and without growth (its shape is frozen), without flow, and without substrates:
+    the time of a first solution, mesh included, of each, and of a step of the whole.
+    """
+    repeats = 3 if quick else SCENES_REPEATS
+    jobs = {(preset, name): partial(first, preset, name) for preset in SCENE_PRESETS for name in SCENES}
+    rows = [{"scene": point["label"], "method": f"preset {line['method']}", **point}
+            for line in measured(jobs, repeats) for point in line["points"]]
+    steps = [step(preset) for preset in SCENE_PRESETS]
+    return {"title": "What a scene does not need: seconds of a first solution, mesh included, and of a growth step",
+            "rows": rows, "steps": steps, "repeats": repeats}
+
+
+def scene_of(preset: str, name: str):
+    """One of SCENES."""
+    tables = {"pore": {"width": "50 um"}, "aggregate": {"radius": "20 um"}, "numerics": {"preset": preset}}
+    return parse_scene({**tables, **SCENES[name][0]}, name, f"{name}.toml")
+
+
+def first(preset: str, name: str) -> dict:
+    """The first instant of a run: mesh and solution."""
+    timing.reset()
+    start = perf_counter()
+    instant = next(iter(simulate(scene_of(preset, name))))
+    took = perf_counter() - start
+    stages = {stage: timing.seconds[stage] for stage in STAGES if timing.seconds.get(stage, 0.0) > 0}
+    return {"stages": stages, "took": took, "nodes": len(instant.pore.mesh.points),
+            "unneeded": sorted(set(stages) - SCENES[name][1] - {"meshing"})}
+
+
+def step(preset: str) -> dict:
+    """Median seconds of a step of the whole, as long as the preset makes it."""
+    marks, times = [], []
+    for instant in islice(simulate(scene_of(preset, "whole")), FEW_STEPS + 1):
+        marks.append(perf_counter())
+        times.append(instant.pore.time)
+    lengths = [b - a for a, b in zip(times, times[1:])]
+    return {"method": f"preset {preset}", "seconds": median(b - a for a, b in zip(marks, marks[1:])),
+            "hours": median(lengths)}
+
+
+#: Steps, the length of one (h), and the part of them that is not looked at.
+MANY_STEPS, QUICK_STEPS, LENGTH, WARM = 180, 16, 0.001, 0.25
+PART = 0.1
+MEMORY_PRESETS = {"paper": 0.4, "accurate": 0.25}
+
+
+def memory_part(quick: bool) -> dict:
+    """No allocation that grows with the number of steps: live memory of a long run of an aggregate that hardly grows.
+
+    The slope of the memory that Python's allocator knows (tracemalloc, numpy's arrays included) against the step, after
+    the first ones. To keep one nodal field a step would be 8 bytes a node and step: the bound is a tenth of that.
+    """
+    steps = QUICK_STEPS if quick else MANY_STEPS
+    rows = [grown(preset, refinement, steps) for preset, refinement in MEMORY_PRESETS.items()]
+    return {"title": "Live memory against the number of steps, after the first quarter", "rows": rows, "repeats": 1}
+
+
+def grown(preset: str, refinement: float, steps: int) -> dict:
+    """The slope of a run of so many steps, bytes a step."""
+    times = [round((k + 1) * LENGTH, 9) for k in range(steps)]
+    shown = ", ".join(f'"{time} h"' for time in times)
+    scene = load_scene("base", [f"numerics.preset={preset}", f"numerics.refinement={refinement}",
+                                "aggregate.radius=20 um", f"growth.time_step={LENGTH} h",
+                                f'growth.end="{times[-1]} h"', f"output.times=[{shown}]"])
+    live, nodes = np.zeros(steps + 1), 0
+    tracemalloc.start()
+    try:
+        for count, instant in enumerate(simulate(scene)):
+            nodes = len(instant.pore.mesh.points)
+            del instant
+            gc.collect()
+            live[count] = tracemalloc.get_traced_memory()[0]
+    finally:
+        tracemalloc.stop()
+    return {"method": f"preset {preset}", "steps": count, "nodes": nodes, "live_MB": float(live[-1]) / 2**20,
+            "slope": slope(live[round(WARM * steps):]), "bound": PART * 8 * nodes}
+
+
+def slope(live) -> float:
+    """Bytes a step: the median of the slopes between all pairs (Theil and Sen), which single jumps do not move."""
+    k, values = np.arange(len(live)), np.asarray(live, float)
+    i, j = np.triu_indices(len(live), 1)
+    return float(np.median((values[j] - values[i]) / (k[j] - k[i])))
+
+
+#: Nodes wanted, and how many steps are timed after the first; none: the first is, with its orderings.
+SIZES = {600: 5, 2500: 3, 10_000: 2, 40_000: 1, 160_000: 0}
+QUICK = {300: 1, 600: 1}
+#: Preset, and derivatives of Newton's methods: those used again make the floor lower, and the step.
+METHODS = {"preset paper": "paper fresh", "order 2, midpoint (accurate)": "accurate reused",
+           "order 2, midpoint, fresh derivatives": "accurate fresh"}
+STAGES = ("flow", "transport", "growth", "mesh motion", "meshing", "transfer")
+FLOOR = "factorise and solve"
+RADIUS, STEP, LIMIT = 20.0, 0.2, 240.0
+#: The first guess of the refinement for so many nodes: c nodes^p, fitted to a few of them.
+FIRST = {"paper": (0.0265, 0.526), "accurate": (0.0109, 0.544)}
+
+
+def size_part(quick: bool) -> dict:
+    """Cost against size: one growth step of 12 min of an aggregate of 20 um, by stage, and the memory that it takes.
+
+    Each size runs in a process of its own, with a limit of time; the first step, which orders the nodes, is left out
+    unless it is the only one. The floor of a step is what factorising and solving its linear systems takes.
+    """
+    lines, fits = [], {}
+    for method, kind in METHODS.items():
+        points, failed = [], []
+        for nodes, steps in (QUICK if quick else SIZES).items():
+            found = in_a_process(kind, nodes, steps)
+            (failed if "reason" in found else points).append(found)
+        lines.append({"method": method, "points": points, "failed": failed})
+        fits[method] = exponents(points)
+    return {"title": f"Cost of a growth step of 12 min, aggregate of {RADIUS:g} um in a pore of 50 um", "lines": lines,
+            "fits": fits, "repeats": "median of 5 steps (600 nodes) to 1; 160 000 nodes: the first step"}
+
+
+def exponents(points: list[dict]) -> dict[str, float | None]:
+    """Exponents in the number of nodes of the whole, of each stage, and of the memory above that of the start."""
+    sizes = [point["nodes"] for point in points]
+    rows = {"step": [point["seconds"] for point in points], "memory": [point["memory_MB"] for point in points],
+            **{stage: [point["stages"].get(stage, 0.0) for point in points] for stage in (*STAGES, FLOOR)}}
+    found = {name: exponent(sizes, values) for name, values in rows.items()}
+    return {name: None if value != value else value for name, value in found.items()}
+
+
+def in_a_process(kind: str, nodes: int, steps: int) -> dict:
+    """:func:`measure` in a process of its own."""
+    label = f"{nodes} nodes"
+    try:
+        done = subprocess.run([sys.executable, "-m", __name__, kind, str(nodes), str(steps)], capture_output=True,
+                              text=True, timeout=LIMIT)
+    except subprocess.TimeoutExpired:
+        return {"label": label, "reason": f"more than {LIMIT:g} s"}
+    if done.returncode:
+        return {"label": label, "reason": (done.stderr.strip().splitlines() or ["no message"])[-1]}
+    return {"label": label, **json.loads(done.stdout)}
+
+
+def larger_seed(kind: str, refinement: float):
+    """Base with a larger seed."""
+    preset, jacobian = kind.split()
+    return load_scene("base", [f"numerics.preset={preset}", f"numerics.refinement={refinement}",
+                               f"numerics.jacobian={jacobian}", f"aggregate.radius={RADIUS} um"])
+
+
+def sized(kind: str, nodes: int):
+    """(scene, pore) of about so many nodes."""
+    factor, power = FIRST[kind.split()[0]]
+    refinement = factor * nodes**power
+    for _ in range(3):
+        given = larger_seed(kind, refinement)
+        now = pore.seeded(given)
+        count = len(now.mesh.points)
+        if abs(count / nodes - 1) < 0.1:
+            break
+        refinement *= (nodes / count) ** 0.5
+    return given, now
+
+
+#: A step of a length (h), by the scene's ``numerics.time``.
+STEP_BY = {"updates": updates.step, "midpoint": lambda *given: midpoint.attempt(*given).step}
+
+
+def measure(kind: str, nodes: int, steps: int) -> dict:
+    """Seconds of a step and of its stages, their floor, and memory."""
+    before = _resident()
+    given, now = sized(kind, nodes)
+    solved = pore.solve(given, now)
+    now = replace(now, concentrations=solved.concentrations)
+    rows = []
+    for _ in range(steps + 1):
+        timing.reset()
+        wall, spent = perf_counter(), process_time()
+        taken = STEP_BY[given.numerics.time](given, now, solved, STEP)
+        after = replace(taken.pore, time=now.time + STEP)
+        solved = pore.solve(given, after)
+        now = replace(after, concentrations=solved.concentrations)
+        rows.append((perf_counter() - wall, process_time() - spent, dict(timing.seconds), taken.remeshed))
+    rows = rows[1:] or rows
+    usual = [row for row in rows if not row[3]] or rows
+    stages = {name: median(row[2].get(name, 0.0) for row in usual) for name in (*STAGES, FLOOR)}
+    seconds = median(row[0] for row in usual)
+    return {"seconds": seconds, "cpu": median(row[1] for row in usual), "nodes": len(now.mesh.points),
+            "stages": stages, "ratio": seconds / stages[FLOOR], "memory_MB": _peak() - before, "peak_MB": _peak(),
+            "repeats": len(usual), "remeshed": sum(row[3] for row in rows)}
+
+
+def _peak() -> float:
+    """Peak of the resident memory of this process so far, MB, as Linux tells it; elsewhere as getrusage does, which
+    on Linux counts what the process was forked from."""
+    try:
+        lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
+        return int(next(line for line in lines if line.startswith("VmHWM")).split()[1]) / 1024
+    except (OSError, StopIteration):
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
+def _resident() -> float:
+    """Resident memory now, MB, as Linux tells it; else its peak so far."""
+    try:
+        return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1]) * resource.getpagesize() / 2**20
+    except OSError:
+        return _peak()
+
+
+if __name__ == "__main__":
+    print(json.dumps(measure(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]))))

@@ -1,0 +1,405 @@
+"""Flow, transport, growth and transfer, each alone: error against time.
+
+The pore of flow and transport is a half-disc of biomass that leaves a film of 10 um.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache, partial
+
+import numpy as np
+
+from reference import neo_hookean, quadratic_growth, taylor_hood
+from reference.whole_run import Pore as Constants
+from reference.whole_run_grid import grid
+from reference.whole_run_pore import Section
+from repro.fem import transfer
+from repro.fem.mesh import curved
+from repro.fem.outline import FREE
+from repro.fem.space import Space
+from repro.model import flow, growth, pore, transport
+from repro.model.contact import constrained
+from repro.model.kinetics import Sink
+from repro.scene import parse_scene
+from verification.bench.record import measured
+from verification.problems import meshes, norms
+
+WIDTH, LENGTH, RADIUS, RATIO = 50.0, 600.0, 40.0, 2000.0
+PAPER = "linear elements (paper)"
+ORDER_2, QUADRATIC = "order 2 on curved triangles (fast, accurate)", "scikit-fem: quadratic elements"
+#: Orders of the elements of curved triangles.
+CURVED = {ORDER_2: 2, "order 3 on curved triangles": 3}
+FLOW_ELEMENTS = {PAPER: {"preset": "paper"}, "linear with a bubble": {"preset": "paper", "flow_element": "bubble"}}
+#: The meshed part ends 1.5 W from the aggregate (3.1), for all methods; m/d.
+ENDS, SPEED = (-RADIUS - 1.5 * WIDTH, RADIUS + 1.5 * WIDTH), 2.9
+
+
+def half_disc(**numerics):
+    """The pore with Table 1's substrates and a mean velocity, solved as ``numerics`` say."""
+    tables = {"pore": {"width": f"{WIDTH} um", "length": f"{LENGTH} um"}, "aggregate": {"radius": f"{RADIUS} um"},
+              "flow": {"mean_velocity": f"{SPEED} m/day", "viscosity_ratio": RATIO}, "substrates": {},
+              "numerics": numerics}
+    return parse_scene(tables, "half disc", "half_disc.toml")
+
+
+def constants() -> Constants:
+    """Table 1, as the references take it."""
+    return Constants(width=WIDTH, length=LENGTH, radius=RADIUS, ratio=RATIO)
+
+
+def curved_mesh(rings: int) -> Section:
+    """The reference's curved mesh of the half-disc."""
+    made = topology(rings)
+    return Section(made, made.around(RADIUS * made.seed, WIDTH, ENDS), WIDTH, ENDS)
+
+
+@cache
+def topology(rings: int):
+    """The reference's triangles, which know no place."""
+    return grid(rings)
+
+
+def outside_loss() -> float:
+    """Loss (1/um) of the pore beyond the mesh, at mean velocity one: 12 L / W^2."""
+    return 12 * (LENGTH - (ENDS[1] - ENDS[0])) / WIDTH**2
+
+
+def largest(found, wanted, scale) -> float:
+    """Largest difference over the scale."""
+    return float(np.max(np.abs(np.asarray(found) - wanted) / scale))
+
+
+FLOW_REPEATS = 3
+#: Rings of the reference, the last one being it; refinements of linear and of curved elements; of scikit-fem's; rings.
+#: Here as below: of the part, and of its quick version.
+FLOW_SIZES = ((16, 24), (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8), (0.15, 0.25, 0.45, 0.7, 1.0, 1.6), (0, 1, 2),
+              (3, 4, 6, 8)), ((6, 9), (0.35, 0.7), (0.25, 0.45), (0,), (3,))
+
+
+def flow_part(quick: bool) -> dict:
+    """Flow around a half-disc of 40 um in a pore of 50 um, lambda = 2000: error of the head loss of the whole pore."""
+    rings, linear, quadratic, skfem, sections = FLOW_SIZES[quick]
+    coarse, truth = flow_reference(rings[-2]), flow_reference(rings[-1])
+    jobs = {}
+    for interface, element in FLOW_ELEMENTS.items():
+        for r in linear:
+            jobs[interface, f"refinement {r:g}"] = partial(_flow_linear, truth, r, **element)
+    for r in linear[: len(linear) - 2]:
+        jobs["order 2 on straight triangles", f"refinement {r:g}"] = partial(_of_order, truth, r, "paper", 2)
+    for name, order in CURVED.items():
+        for r in quadratic:
+            jobs[name, f"refinement {r:g}"] = partial(_of_order, truth, r, "accurate", order)
+    for k in skfem:
+        jobs["scikit-fem: Taylor-Hood, two pressures", f"{k} refinements"] = partial(_taylor_hood, truth, k)
+    for n in sections:
+        jobs["scikit-fem: Taylor-Hood, rings", f"{n} rings"] = partial(_flow_section, truth, n)
+    lines = measured(jobs, 1 if quick else FLOW_REPEATS)
+    for name in ("fipy", "py-pde"):
+        lines.append({"method": name, "points": [], "failed": [{"label": "Stokes flow with a jump of viscosity",
+                                                                "reason": "has no incompressible flow of this kind"}]})
+    return {"title": "Flow: half-disc of 40 um in a pore of 50 um, lambda = 2000; mesh, assembly and solution",
+            "error": "head loss of the whole pore, relative", "repeats": 1 if quick else FLOW_REPEATS, "lines": lines,
+            "reference": f"Taylor-Hood on curved triangles, {rings[-1]} rings: {truth:.9g} 1/um; from {rings[-2]} to "
+                         f"{rings[-1]} rings it changes by {abs(coarse / truth - 1):.1e}",
+            "reference_change": abs(coarse / truth - 1)}
+
+
+@cache
+def flow_reference(rings: int) -> float:
+    """Head loss at mean velocity one, 1/um: pressures of their own on both sides of the interface."""
+    return curved_mesh(rings).flow(RATIO).loss + outside_loss()
+
+
+def _flow_linear(truth: float, refinement: float, **element) -> dict:
+    scene = half_disc(refinement=refinement, **element)
+    mesh = pore.seeded(scene).mesh
+    found = pore.solve_flow(scene, Space(mesh, 1))
+    return _flow_judged(truth, found.head_loss / scene.flow.mean_velocity / _nu(scene), mesh)
+
+
+def _nu(scene) -> float:
+    return scene.flow.kinematic_viscosity / scene.flow.gravity
+
+
+def _of_order(truth: float, refinement: float, preset: str, order: int) -> dict:
+    mesh = pore.seeded(half_disc(preset=preset, refinement=refinement)).mesh
+    return _flow_judged(truth, flow.unit_flow(Space(mesh, order), RATIO).loss + outside_loss(), mesh)
+
+
+def _taylor_hood(truth: float, refinements: int) -> dict:
+    return {"error": abs(_stokes(refinements) / truth - 1)}
+
+
+def _stokes(refinements: int) -> float:
+    channel = taylor_hood.half_disc(WIDTH, ENDS, RADIUS, refinements, corner=2 + refinements)
+    return taylor_hood.stokes(channel, RATIO).loss + outside_loss()
+
+
+def _flow_section(truth: float, rings: int) -> dict:
+    return {"error": abs(flow_reference.__wrapped__(rings) / truth - 1)}
+
+
+def _flow_judged(truth: float, loss: float, mesh) -> dict:
+    return {"error": abs(loss / truth - 1), "nodes": len(mesh.points)}
+
+
+TRANSPORT_REPEATS = 5
+#: Rings of the reference; refinements; rings.
+TRANSPORT_SIZES = ((16, 24), (0.5, 0.7, 1.0, 1.4, 2.0, 2.8), (0.15, 0.25, 0.45, 0.7, 1.0), (3, 4, 6, 8)), (
+    (6, 9), (0.5, 0.7), (0.25,), (3,))
+
+
+def transport_part(quick: bool) -> dict:
+    """Both substrates around the half-disc of the flow part, dual Monod uptake: error of the effluents over the supply.
+
+    Flow of the same elements on the same mesh is found beforehand, and neither it nor the mesh is counted: error is of
+    both flow and transport, time of transport alone.
+    """
+    rings, linear, quadratic, sections = TRANSPORT_SIZES[quick]
+    coarse, truth = transport_reference(rings[0]), transport_reference(rings[1])
+    jobs = {}
+    for name, element in FLOW_ELEMENTS.items():
+        jobs |= {(name, f"refinement {r:g}"): _transport_ours(truth, 1, refinement=r, **element) for r in linear}
+    for name, order in CURVED.items():
+        jobs |= {(name, f"refinement {r:g}"): _transport_ours(truth, order, preset="accurate", refinement=r)
+                 for r in quadratic}
+    jobs |= {(QUADRATIC, f"{n} rings"): partial(_transport_section, truth, *prepared(n)) for n in sections}
+    repeats, change = 1 if quick else TRANSPORT_REPEATS, largest(coarse, truth, supply())
+    return {"title": "Transport: dual Monod uptake around a half-disc of 40 um in a pore of 50 um, 2.9 m/d; assembly "
+                     "and solution", "error": "effluents over the supply, the larger error",
+            "repeats": repeats, "lines": measured(jobs, repeats),
+            "reference": f"quadratic elements on curved triangles, {rings[1]} rings: {truth[0]:.8f} and "
+                         f"{truth[1]:.8f} mg/L; from {rings[0]} rings on they change by {change:.1e} of the supply",
+            "reference_change": change}
+
+
+def supply() -> np.ndarray:
+    """(2,) mg/L."""
+    return np.array(constants().supply)
+
+
+def prepared(rings: int):
+    """(section, its flow)."""
+    section = curved_mesh(rings)
+    return section, section.flow(RATIO)
+
+
+@cache
+def transport_reference(rings: int) -> np.ndarray:
+    """(2,) effluents, mg/L."""
+    return _effluents(*prepared(rings))
+
+
+def _effluents(section, flow) -> np.ndarray:
+    given = constants()
+    operators = section.operators(given, SPEED / 24e-6, flow)
+    start = np.multiply.outer(given.supply, np.ones(section.whole.N))
+    fields = section.steady(operators, np.full(section.body.dx.shape, given.density), given.rates, start)
+    return section.effluents(flow, fields)
+
+
+def _transport_section(truth, section, flow) -> dict:
+    return {"error": largest(_effluents(section, flow), truth, supply())}
+
+
+def _transport_ours(truth, order: int, **numerics):
+    scene = half_disc(**numerics)
+    now = pore.seeded(scene)
+    space = Space(now.mesh, order)
+    return partial(_solved, truth, scene, space, pore.solve_flow(scene, space))
+
+
+def _solved(truth, scene, space, flow) -> dict:
+    space = Space(replace(space.mesh, topology=replace(space.mesh.topology)), space.order)  # nothing is known of it
+    problem = transport.problem(space, flow, scene.substrates, scene.kinetics)
+    sink = Sink(scene.kinetics.maximum_density * space.reaction.dx)
+    found = transport.fluxes(problem, sink, transport.steady(problem, sink))
+    return {"error": largest([flux.effluent for flux in found], truth, supply()), "nodes": len(space.mesh.points)}
+
+
+GROWTH_REPEATS = 5
+#: um; a and c at the end of the step; theta at its start over theta at its end.
+GROWTH_RADIUS, THETA, BEFORE = 20.0, (12.0, 24.0), 2 / 3
+#: Refinements, and rings.
+GROWTH_SIZES = ((0.5, 0.7, 1.0, 1.4, 2.0, 2.8), (0.15, 0.25, 0.45, 0.7, 1.0, 1.6), (2, 4, 8, 16)), (
+    (0.5, 1.0), (0.25, 0.45), (4,))
+
+
+def growth_part(quick: bool) -> dict:
+    """One growth step: a half-disc that slides on a wall goes from one uneven theta(R) to a half more, in closed form.
+
+    theta = a + c (R / R_0)^2 from 12 to 36; every method starts from the exact places and pressure under two thirds of
+    it.
+    """
+    linear, quadratic, rings = GROWTH_SIZES[quick]
+    jobs = {(PAPER, f"refinement {r:g}"): partial(_growth_ours, "paper", r) for r in linear}
+    jobs |= {(ORDER_2, f"refinement {r:g}"): partial(_growth_ours, "accurate", r) for r in quadratic}
+    jobs |= {(QUADRATIC, f"{n} rings"): partial(_skfem, n) for n in rings}
+    repeats = 1 if quick else GROWTH_REPEATS
+    return {"title": "Growth: a step of an aggregate with theta from 12 to 36; assembly and solution",
+            "error": "places of the outline over the radius, the largest error", "repeats": repeats,
+            "reference": "closed form of the growing half-cylinder", "lines": measured(jobs, repeats)}
+
+
+def growth_exact(points: np.ndarray, part: float = 1.0) -> np.ndarray:
+    """(n, 2) places under ``part`` of theta of the material that was at points (n, 2)."""
+    R = np.maximum(np.hypot(*points.T), 1e-12)
+    return points * (neo_hookean.cylinder_radius(R, *(part * t for t in THETA), GROWTH_RADIUS) / R)[:, None]
+
+
+def pressure(points: np.ndarray, part: float) -> np.ndarray:
+    """(n,) P / mu_L there; the middle takes what is beside it."""
+    R = np.maximum(np.hypot(*points.T), 1e-6 * GROWTH_RADIUS)
+    return neo_hookean.cylinder_pressure(R, *(part * t for t in THETA), GROWTH_RADIUS)
+
+
+def theta(x, y):
+    """The expansion at the end of the step."""
+    return THETA[0] + THETA[1] * (x**2 + y**2) / GROWTH_RADIUS**2
+
+
+def _growth_apart(found: np.ndarray, rim: np.ndarray) -> float:
+    """Largest distance of the outline (m, 2) from where its nodes (m, 2) of t = 0 should be, over the radius."""
+    wanted = growth_exact(rim)
+    return float(np.hypot(*(found - wanted).T).max() / np.hypot(*wanted.T).max())
+
+
+@cache
+def _seeded(refinement: float, preset: str):
+    now = pore.seeded(half_disc(preset=preset, refinement=refinement))
+    return now, constrained(len(now.mesh.body), now.mesh.topology.body_loop, now.wall, now.fixed)
+
+
+def _growth_ours(preset: str, refinement: float):
+    now, held = _seeded(refinement, preset)
+    points = now.mesh.points[now.mesh.body] * GROWTH_RADIUS / RADIUS
+    body = growth.Body(now.body.shape, points)
+    whole = theta(*(body.shape.table.values @ points[body.shape.cells]).transpose(2, 0, 1))
+    start = growth_exact(points, BEFORE)
+    found = growth.equilibrium(body, whole, start, pressure(points[: body.shape.corners], BEFORE), held, start)
+    return partial(_growth_judged, now, points, found.position)
+
+
+def _growth_judged(now, points, found) -> dict:
+    rim = now.mesh.topology.body_loop
+    rim = rim[now.wall == FREE]
+    return {"error": _growth_apart(found[rim], points[rim]), "nodes": len(points)}
+
+
+@cache
+def _growth_meshed(rings: int):
+    return quadratic_growth.half_disc(GROWTH_RADIUS, rings)
+
+
+class _Start:
+    """The exact state at the start of the step, asked for as that of a solution on another mesh is."""
+
+    @staticmethod
+    def at(x, y):
+        """Places (n, 2) and pressure (n,)."""
+        points = np.column_stack([x, y])
+        return growth_exact(points, BEFORE), pressure(points, BEFORE)
+
+
+def _skfem(rings: int):
+    mesh = _growth_meshed(rings)
+    found = quadratic_growth.grow(mesh, theta, sum(THETA), start=_Start)
+    points = mesh.doflocs.T
+    rim = np.isclose(np.hypot(*points.T), GROWTH_RADIUS, rtol=1e-9)
+    return lambda: {"error": _growth_apart(found.place.T[rim], points[rim]), "nodes": len(points)}
+
+
+TRANSFER_REPEATS = 3
+#: um; the front's place along x and its width.
+TRANSFER_ENDS, TRANSFER_WIDTH, FRONT, STEEP = (0.0, 40.0), 25.0, 20.0, 3.0
+#: Remeshes; um.
+TRANSFER_SIZES = (20, (4.0, 2.8, 2.0, 1.4, 1.0), (8.0, 5.6, 4.0, 2.8, 2.0)), (3, (4.0, 2.8), (5.6,))
+
+
+def transfer_part(quick: bool) -> dict:
+    """A field with a front, carried through twenty unrelated meshes of one rectangle: its error, and its total's drift.
+
+    Meshes and what is worked out once for them are made beforehand; a time is of all twenty transfers.
+    """
+    count, sizes, quadratic = TRANSFER_SIZES[quick]
+    ways = {"conserving projection": transfer.project,
+            "bounded conserving projection": transfer.project_bounded,
+            f"linear interpolation, {PAPER}": transfer.interpolated}
+    jobs = {(name, f"{size:g} um"): partial(_linear, size, count, way)
+            for name, way in ways.items() for size in sizes}
+    jobs |= {("quadratic interpolation (fast, accurate)", f"{size:g} um"): partial(_quadratic, size, count)
+             for size in quadratic}
+    repeats = 1 if quick else TRANSFER_REPEATS
+    return {"title": f"Transfer: a front through {count} remeshes", "repeats": repeats,
+            "error": "L2 of the field in the end, relative; drift: of its total, relative",
+            "reference": "the field itself", "lines": measured(jobs, repeats)}
+
+
+def transfer_exact(x, y):
+    """From 1 to 2 across a slanted front."""
+    return 1.5 + 0.5 * np.tanh((x + 0.3 * y - FRONT) / STEEP)
+
+
+@cache
+def _transfer_meshed(size: float, which: int):
+    return meshes.rectangle(TRANSFER_ENDS, TRANSFER_WIDTH, size, seed=which)
+
+
+@cache
+def _curved(size: float, which: int):
+    straight = meshes.channel(TRANSFER_ENDS, TRANSFER_WIDTH, size, lambda x, y: x < np.inf, seed=which)
+    return Space(curved(straight, None), 2)
+
+
+@cache
+def _total() -> float:
+    """Integral of the field, by Gauss's quadrature."""
+    node, weight = np.polynomial.legendre.leggauss(60)
+    x, y = 0.5 * TRANSFER_ENDS[1] * (1 + node), 0.5 * TRANSFER_WIDTH * (1 + node)
+    return float(weight @ transfer_exact(x[:, None], y) @ weight) * 0.25 * TRANSFER_ENDS[1] * TRANSFER_WIDTH
+
+
+def _linear(size: float, count: int, project):
+    return _carried(count, partial(_transfer_meshed, size), lambda mesh: mesh[0],
+                    lambda old, field, new: project(*old, field, *new), lambda mesh, field: _integral(*mesh, field),
+                    lambda mesh, field: norms.l2_error(*mesh, field[:, 0], transfer_exact))
+
+
+def _quadratic(size: float, count: int):
+    return _carried(count, partial(_curved, size), lambda space: space.points, _interpolated, _weighed, _transfer_apart)
+
+
+def _interpolated(old: Space, field: np.ndarray, new: Space) -> np.ndarray:
+    return transfer.interpolate(old.mesh.points, old.mesh.cells, field, new.points)
+
+
+def _carried(count: int, meshed, points, carry, weighed, error):
+    """The field through ``meshed(which)``, by ``carry(old, field, new)``; ``weighed`` and ``error`` of a mesh and the
+    field on it."""
+    old = meshed(0)
+    field = transfer_exact(*points(old).T)[:, None]
+    start = weighed(old, field)
+    for which in range(1, count + 1):
+        new = meshed(which)
+        field = carry(old, field, new)
+        old = new
+    return lambda: {"error": error(old, field), "nodes": len(points(old)),
+                    "drift": abs(weighed(old, field) - start) / _total(),
+                    "beyond": float(max(1.0 - field.min(), field.max() - 2.0, 0.0))}
+
+
+def _integral(points, triangles, field) -> float:
+    _, weight, shape = norms.quadrature(points, triangles)
+    return float(np.sum(weight * (field[triangles, 0] @ shape.T)))
+
+
+def _weighed(space, field) -> float:
+    return float(np.sum(space.at.dx * space.at_points(field[:, 0])))
+
+
+def _transfer_apart(space, field) -> float:
+    """L2 of a quadratic field less the exact one, relative."""
+    truth = transfer_exact(*space.at_points(space.points.T))
+    gap = space.at_points(field[:, 0]) - truth
+    return float(np.sqrt(np.sum(space.at.dx * gap**2) / np.sum(space.at.dx * truth**2)))

@@ -1,0 +1,166 @@
+"""What the rounding of Table 1 allows in base and wide: elasticities, one set of inputs for all printed numbers of
+base, and Sobol indices.
+
+**Elasticities** d ln(number) / d ln(input), by central differences. Two runs on either side at two distances give two
+estimates; the nearer one counts, and their difference is its bar: it holds what the larger distance adds to the error
+of the difference, and what two runs on unrelated meshes differ by. An elasticity is resolved where its bar is at most a
+tenth of it.
+
+**One set** within the rounding: a linear program, then real runs. With relative changes x_i of the inputs, r_i their
+rounding and e_ni the elasticities, the program is
+
+    minimise t    such that    |x_i| <= t r_i    and    low_n <= f_n (1 + sum_i e_ni x_i) <= high_n
+
+so that t <= 1 is a set within the rounding. A run with it moves f_n by what is not linear, and the program is solved
+again from there. Where t > 1 the misfit that is left at t = 1 is minimised instead.
+
+**Sobol indices** of base: how much of the variance of each printed number an input's rounding accounts for. Inputs are
+independent and uniform within their rounding; those whose elasticity moves no printed number by half a percent a
+percent are left where they are. `scipy.stats.sobol_indices` (Saltelli 2010) with N (d + 2) runs in the preset "fast",
+and its bootstrap's intervals."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import linprog
+from scipy.stats import sobol_indices, uniform
+
+from verification.claims import interval
+from verification.sensitivity.numbers import INPUTS, ROUNDED, Input, Numbers, Runs, scene
+
+#: Relative distances of an input from its printed value; the larger one of an input that is taken as exact.
+NEAR, FAR, LARGE = 0.01, 0.02, 0.1
+RESOLVED = 0.1
+
+
+def elasticities(runs: Runs, name: str) -> dict[str, dict[str, dict]]:
+    """{number: {input: elasticity, bar, resolved, and the changes (%) that +-10 % of an exact input make}}."""
+    plain, found = runs.numbers(scene(name, {})), {}
+    for each in INPUTS:
+        if each.only not in ("", name):
+            continue
+        print(f"{name}: {each.name}", flush=True)
+        for number, value in _of_input(runs, name, each, plain).items():
+            found.setdefault(number, {})[each.name] = value
+    return found
+
+
+def _of_input(runs: Runs, name: str, each: Input, plain: Numbers) -> dict[str, dict]:
+    pairs = {d: [runs.numbers(scene(name, {each.name: 1 + sign * d})) for sign in (1, -1)]
+             for d in ((NEAR, FAR) if each.half else (NEAR, FAR, LARGE))}
+    return {number: _told(number, value, pairs) for number, value in plain.items()}
+
+
+def _told(number: str, value: float, pairs: dict[float, list[Numbers]]) -> dict:
+    near, far = (difference(*(pair[number] for pair in pairs[d]), value, d) for d in (NEAR, FAR))
+    bar = abs(far - near)
+    told = {"elasticity": near, "bar": bar, "resolved": bar <= RESOLVED * abs(near)}
+    if LARGE in pairs:
+        told["by_10_percent"] = [100 * (found[number] / value - 1) for found in pairs[LARGE]]
+    return told
+
+
+def difference(above: float, below: float, value: float, distance: float) -> float:
+    """The central difference of ln f over ln x."""
+    return (above - below) / (2 * distance * value)
+
+
+#: What section 4 prints: C01-C04.
+PRINTED = {"velocity_0": "2.9", "velocity": "1.5", "effluent_acceptor": "4.19", "effluent_donor": "6.13",
+           "consumed": "~60"}
+#: Of a printed interval the middle part that is aimed at: the rest is for the bars.
+AIMED = 0.4
+ROUNDS = 6
+
+
+def targets() -> dict[str, tuple[float, float]]:
+    """The intervals of the printed numbers."""
+    return {name: interval(text) for name, text in PRINTED.items()}
+
+
+def reached(numbers: Numbers, part: float = 1.0) -> bool:
+    """Do all numbers lie in (the middle part of) their intervals?"""
+    return all(abs(numbers[name] - 0.5 * (low + high)) <= 0.5 * part * (high - low)
+               for name, (low, high) in targets().items())
+
+
+def one_set(runs: Runs, elasticities: dict[str, dict[str, dict]]) -> dict:
+    """The set, what a run with it gives, the share t of the rounding that it takes, and whether it is reached."""
+    plain = runs.numbers(scene("base", {}))
+    slopes = np.array([[plain[name] * elasticities[name][each.name]["elasticity"] for each in ROUNDED]
+                       for name in PRINTED])
+    start, x, t = np.array([plain[name] for name in PRINTED]), np.zeros(len(ROUNDED)), 0.0
+    for _ in range(ROUNDS):
+        x, t = program(start, slopes)
+        numbers = runs.numbers(scene("base", {each.name: 1 + value for each, value in zip(ROUNDED, x)}))
+        if reached(numbers, 0.5):
+            break
+        start = np.array([numbers[name] for name in PRINTED]) - slopes @ x
+    inside = bool(t <= 1 + 1e-9 and reached(numbers))
+    middle = {name: 0.5 * sum(pair) for name, pair in targets().items()}
+    misfit = max(abs(numbers[name] - middle[name]) / (pair[1] - middle[name]) for name, pair in targets().items())
+    return {"reached": inside, "share_of_the_rounding": t, "misfit_in_half_intervals": misfit,
+            "inputs": {each.name: each.value * (1 + value) for each, value in zip(ROUNDED, x)},
+            "numbers": {name: numbers[name] for name in PRINTED}}
+
+
+def program(start: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, float]:
+    """Relative changes and the share of the rounding that they take; within it, with the least misfit, where the
+    intervals are out of reach."""
+    middle, half = (np.array([weight @ pair for pair in targets().values()])
+                    for weight in (np.array([0.5, 0.5]), AIMED * np.array([-0.5, 0.5])))
+    rounding = np.array([each.rounding for each in ROUNDED])
+    A, column = slopes * rounding, np.ones((len(start), 1))
+    box, ones = np.vstack([np.eye(len(rounding)), -np.eye(len(rounding))]), np.ones((2 * len(rounding), 1))
+    inside = np.concatenate([middle + half - start, start - middle + half])
+    tight = np.hstack([np.vstack([np.vstack([A, -A]), box]), np.vstack([0 * column, 0 * column, -ones])])
+    best = _solved(tight, np.concatenate([inside, np.zeros(2 * len(rounding))]), None)
+    if best is not None and best[-1] <= 1:
+        return best[:-1] * rounding, float(best[-1])
+    loose = np.hstack([np.vstack([A, -A]), -np.vstack([half[:, None], half[:, None]]) / AIMED])
+    least = _solved(loose, np.concatenate([middle - start, start - middle]), 1.0)
+    return least[:-1] * rounding, float(best[-1]) if best is not None else float("inf")
+
+
+def _solved(A: np.ndarray, b: np.ndarray, box: float | None) -> np.ndarray | None:
+    """Minimise the last unknown; the others within +-box."""
+    bounds = [(None if box is None else -box, box)] * (A.shape[1] - 1) + [(0, None)]
+    answer = linprog(np.append(np.zeros(A.shape[1] - 1), 1.0), A, b, bounds=bounds)
+    return answer.x if answer.success else None
+
+
+LEAST, SEED, CONFIDENCE = 0.005, 2001, 0.95
+FAST = ('numerics.preset="fast"',)
+
+
+def moving(elasticities: dict[str, dict[str, dict]]) -> list[Input]:
+    """Rounded inputs with an elasticity above LEAST of any printed number."""
+    return [each for each in ROUNDED
+            if max(abs(elasticities[name][each.name]["elasticity"]) for name in PRINTED) > LEAST]
+
+
+def _moved(known: dict[str, dict]) -> bool:
+    """Does any rounded input move a number?"""
+    return max(abs(known[each.name]["elasticity"]) for each in ROUNDED) > LEAST
+
+
+def sobol(runs: Runs, elasticities: dict[str, dict[str, dict]], samples: int) -> dict:
+    """First-order and total indices of each printed number, with their intervals."""
+    chosen = moving(elasticities)
+    names = [name for name in PRINTED if name != "consumed" and _moved(elasticities[name])]
+
+    def numbers(x: np.ndarray) -> np.ndarray:
+        rows = [runs.numbers(scene("base", dict(zip([each.name for each in chosen], column)), *FAST)) for column in x.T]
+        return np.array([[row[name] for row in rows] for name in names])
+    spread = [uniform(1 - each.rounding, 2 * each.rounding) for each in chosen]
+    found = sobol_indices(func=numbers, n=samples, dists=spread, rng=np.random.default_rng(SEED))
+    sure = found.bootstrap(confidence_level=CONFIDENCE, n_resamples=999)
+    return {"samples": samples, "inputs": [each.name for each in chosen], "confidence": CONFIDENCE,
+            "numbers": {name: {kind: _listed(getattr(found, kind)[row], getattr(sure, kind).confidence_interval, row)
+                               for kind in ("first_order", "total_order")} for row, name in enumerate(names)}}
+
+
+def _listed(values: np.ndarray, interval, row: int) -> list[list[float]]:
+    """[index, low, high] of each input."""
+    return [[float(value), float(low), float(high)]
+            for value, low, high in zip(values, interval.low[row], interval.high[row])]

@@ -1,0 +1,284 @@
+"""Switches: what the paper does and what else may be done, base with one thing changed. Measured once, read by two.
+
+A switch is a run of the claims (:mod:`verification.claims.runs`), computed once in a process, at the paper's 12 min.
+The errata tell its rows, the audit how far it is from base and what it costs. What no scene can say (what (28) restarts
+from, an explicit increment, a seed that leans) is a step or a seed of its own, marched once likewise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from time import process_time
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from repro.errors import StageError
+from repro.fem.outline import Outline, half_disc
+from repro.fem.sizing import ACROSS_AGGREGATE
+from repro.fem.space import Space
+from repro.march import updates
+from repro.model import contact, mesh_motion, pore, remeshing
+from repro.model.pore import Pore, Solved
+from repro.scene import Scene
+from verification.claims import runs
+from verification.claims.levels import cached
+from verification.claims.runs import BASE, LAST, UPDATE
+
+#: The time (h) of the geometry that the paper plots [E12].
+PLOTTED = 19.2
+
+
+@dataclass(frozen=True)
+class Switch:
+    """choice: what is chosen; default, alternative: in words; change: KEY=VALUE of the alternative; state: can both be
+    compared in one state; note: what the reader must know; meshes: are the default's meshes good for both."""
+
+    choice: str
+    default: str
+    alternative: str
+    change: str
+    state: bool = True
+    note: str = ""
+    meshes: bool = True
+
+    @property
+    def run(self) -> tuple[str, ...]:
+        """Base with the change, of which the rows of t = 0 and of the last two shapes are kept."""
+        return (*BASE, self.change, LAST)
+
+
+F_EXACT = "COD - Y d_c = 2.38 - 0.61 x 1.42; Table 1 prints 1.52 [E1]"
+CHOICES = {
+    "transient": Switch("transport in time", "quasi-steady", "transient (Gear)", 'numerics.transport="gear"',
+                        note="3.3"),
+    "full pore": Switch("extent", "central part (3.1)", "full pore", 'numerics.extent="full"', False,
+                        "the inlet and the outlet 1.5 W away or less, against the pore's ends; on two meshes", False),
+    "traction": Switch("interface", "Laplacian form", "traction form", 'numerics.interface="traction"', note="[E2]"),
+    "fluid forces": Switch("fluid forces", "neglected", "included", 'growth.fluid_forces="included"',
+                           note="(20), (22), C26"),
+    "mean inlet": Switch("inlet condition (11)", "u_x(y)", "u_ave", 'numerics.inlet="mean"', note="[E4]"),
+    "exact F": Switch("acceptor to donor ratio F", "1.52", "1.5138", "kinetics.acceptor_to_donor_ratio=1.5138",
+                      note=F_EXACT),
+    "linear transfer": Switch("transfer at a remesh", "conserving", "linear", 'numerics.transfer="linear"', False,
+                              "[E8]"),
+    "bounded transfer": Switch("transfer at a remesh", "conserving", "bounded", 'numerics.transfer="bounded"', False,
+                               "the projection limited by flux-corrected transport"),
+    "stress-free": Switch("new biomass", "stressed", "stress-free", 'growth.new_biomass="stress_free"',
+                          note="section 5"),
+    "bubble": Switch("flow element", "stabilised (c = 100)", "bubble (MINI)", 'numerics.flow_element="bubble"',
+                     note="the same unknowns; tau is the same to 7 % where triangles are equilateral"),
+    "rechosen": Switch("fixed point", "kept", "rechosen", 'numerics.fixed_point="rechosen"',
+                       note="2.3.3; the same node throughout base, whose contact surface stays even about it"),
+    "midpoint": Switch("steps in time", "updates of 12 min", "midpoint, tolerance 0.01", 'numerics.time="midpoint"',
+                       False, "first order in the step against second"),
+    "decay": Switch("oxygen demand of decay (7)", "d_c f_d b", "f_d b", "kinetics.decay_oxygen_demand=1.0"),
+    "half step": Switch("steps in time", "updates of 12 min", "updates of 6 min", 'growth.time_step="6 min"', False),
+}
+#: What the errata alone tell.
+NOT_AUDITED = ("decay", "half step")
+#: Numbers that are not printed [E13]: {key: (the paper's symbol or our word, ours, others)}.
+_NUMBERS = {"flow_stabilisation": ("c", 100, (25, 50, 200, 400)), "mesh_compressibility": ("gamma", 1, (0.1, 10)),
+            "refinement": ("refinement", 1, (0.7, 1.4))}
+NUMBERS = [Switch(word, f"{ours:g}", f"{value:g}", f"numerics.{key}={value}", False)
+           for key, (word, ours, values) in _NUMBERS.items() for value in values]
+#: Element sizes of runs that differ from the default in nothing else: the seed's nodes stay as many.
+FINENESS = [Switch("mesh", "refinement 1", f"refinement {value}", f"numerics.refinement={value}", False)
+            for value in (0.975, 0.98, 0.985, 0.99, 0.995)]
+
+
+EFFLUENTS = ("acceptor leaving", "donor leaving")
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """The pore of a scene at a time, and what is solved in it."""
+
+    scene: Scene
+    pore: Pore
+    solved: Solved
+
+    @property
+    def quantities(self) -> dict[str, float]:
+        """What it comes to: um/h, mg/L, um2, um."""
+        return {**_flow_quantities(self.solved), **_shape(self.pore.outline)}
+
+
+def state(run: tuple[str, ...], time: float = PLOTTED) -> State:
+    """That of a run's row at a time (h)."""
+    instant = runs.instant(run, time)
+    return State(runs.history(*run).scene, instant.pore, instant.solved)
+
+
+def _flow_quantities(solved: Solved) -> dict[str, float]:
+    return {"velocity": solved.flow.mean_velocity, "conductivity": solved.flow.conductivity,
+            **{name: flux.effluent for name, flux in zip(EFFLUENTS, solved.fluxes)}}
+
+
+def _shape(outline: Outline) -> dict[str, float]:
+    return {"area": outline.area, "thickness": outline.thickness, "upstream": outline.upstream,
+            "downstream": outline.downstream}
+
+
+def effect(said: Scene, default: dict[str, float], other: dict[str, float]) -> dict[str, float]:
+    """The other over the default, less 1; effluents: their difference over the supply."""
+    supply = dict(zip(EFFLUENTS, (said.substrates.acceptor.supply, said.substrates.donor.supply)))
+    return {name: float((other[name] - value) / supply.get(name, value)) for name, value in default.items()}
+
+
+def whole_run(default: State, other: State) -> dict[str, float]:
+    """The effect of two whole runs, flow and substrates of the other's shape solved on the default's mesh, so that it
+    does not tell how two meshes differ."""
+    there = reshaped(default.pore, other.pore.outline)
+    found = {**other.quantities, **_flow_quantities(pore.solve(other.scene, there))}
+    return effect(other.scene, default.quantities, found)
+
+
+def two_meshes(default: State, other: State) -> dict[str, float]:
+    """The effect of two whole runs as they are, each on its own mesh."""
+    return effect(other.scene, default.quantities, other.quantities)
+
+
+def reshaped(now: Pore, outline: Outline) -> Pore:
+    """The pore with its aggregate brought to another outline ray by ray, the fluid's nodes following (both star-shaped
+    about the origin, on the lower wall alone)."""
+    places = now.mesh.points[now.mesh.body]
+    angle = np.arctan2(places[:, 1], places[:, 0])
+    factor = _radius(outline)(angle) / _radius(now.outline)(angle)
+    return now.moved(mesh_motion.move(now.mesh, places * factor[:, None], 1.0, 100.0))
+
+
+def _radius(outline: Outline) -> CubicSpline:
+    """Distance of the interface from the origin over the angle from downstream, smooth between its nodes."""
+    edges = outline.interface_edges()
+    x, y = outline.points[edges | np.roll(edges, 1)].T
+    angle = np.arctan2(y, x)
+    order = np.argsort(angle)
+    return CubicSpline(angle[order], np.hypot(x, y)[order])
+
+
+def one_state(found: State, changed: Scene) -> dict[str, float]:
+    """The effect in one state: flow and substrates solved in it, and the shape of the next step, by either scene."""
+    rows = []
+    for said in (found.scene, changed):
+        solved = pore.solve(said, found.pore)
+        grown, _, _ = updates.make_biomass(said, found.pore, solved, UPDATE)
+        outline = contact.expand(said, grown, updates.enlarged(said, found.pore, grown))[0].outline
+        rows.append({**_flow_quantities(solved), **_shape(outline)})
+    return effect(found.scene, *rows)
+
+
+def columns(run: tuple[str, ...]) -> dict[str, np.ndarray]:
+    """Of a run's rows: "time" h, "velocity" m/d, "area" um2, "drift", largest |(X_A + X_I) / X_m - 1|, and "lean", the
+    middle between the tips over half their distance."""
+    rows = runs.series(*run)
+    return {"time": rows["time_h"], "velocity": rows["mean_velocity_m_per_d"], "area": rows["aggregate_area_um2"],
+            "drift": np.maximum(1 - rows["biomass_density_min"], rows["biomass_density_max"] - 1),
+            "lean": _lean(rows["upstream_um"], rows["downstream_um"])}
+
+
+def _lean(upstream, downstream):
+    return (upstream + downstream) / (downstream - upstream)
+
+
+def near(found: dict[str, np.ndarray], name: str, times) -> np.ndarray:
+    """A column at times (h)."""
+    return found[name][np.abs(found["time"] - np.asarray(times)[..., None]).argmin(axis=-1)]
+
+
+Step = Callable[[Scene, Pore, Solved, float], Pore]
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """A run of steps or a seed of its own. seconds: of processor time; columns: those of :func:`columns`, of t = 0 and
+    each update; plotted: the state at 19.2 h, or the last before."""
+
+    seconds: float
+    columns: dict[str, np.ndarray]
+    plotted: State
+
+
+@cached
+def course(run: tuple[str, ...], step: Step, seeded: Callable[[Scene], Pore] = pore.seeded) -> Course:
+    """March a run's scene from a seed by ``step(said, now, solved, hours)`` -> pore, in the paper's updates."""
+    said, rows, start = runs.scene(*run), [], process_time()
+    try:
+        for now, solved in _march(said, step, seeded(said)):
+            rows.append(_row(said, now, solved))
+            if now.time < PLOTTED + 1e-6:
+                plotted = State(said, now, solved)
+    except StageError as error:
+        raise RuntimeError(f"a run by {step.__name__} fails after {len(rows) - 1} steps") from error
+    found = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    return Course(process_time() - start, found, plotted)
+
+
+def _march(said: Scene, step: Step, now: Pore) -> Iterator[tuple[Pore, Solved]]:
+    solved = pore.solve(said, now)
+    yield now, solved
+    for time in updates.schedule(said)[0][1:]:
+        now = replace(now, concentrations=solved.concentrations)
+        now = replace(step(said, now, solved, time - now.time), time=time)
+        solved = pore.solve(said, now)
+        yield now, solved
+
+
+def _row(said: Scene, now: Pore, solved: Solved) -> dict[str, float]:
+    least, most = now.composition(said.kinetics.maximum_density)[1:]
+    tips = now.boundary.upstream, now.boundary.downstream
+    return {"time": now.time, "velocity": 24e-6 * solved.flow.mean_velocity, "area": now.boundary.area,
+            "drift": max(1 - least, most - 1), "lean": _lean(*tips)}
+
+
+def as_it_is(said: Scene, now: Pore, solved: Solved, hours: float) -> Pore:
+    """The pore after one step."""
+    return updates.step(said, now, solved, hours).pore
+
+
+def restarting_as_j(said: Scene, now: Pore, solved: Solved, hours: float) -> Pore:
+    """The pore after one step; after a remesh theta = J [E7]."""
+    done = updates.step(said, now, solved, hours)
+    if not done.remeshed:
+        return done.pore
+    after = done.pore
+    return replace(after, theta=after.body.strained(after.mesh.points[after.mesh.body]).J)
+
+
+def explicit(said: Scene, now: Pore, solved: Solved, hours: float) -> Pore:
+    """The pore after one step with dX_A = dt F_3 and dX_I = dt F_4 at the rates of its beginning, (28)-(29) [E16]."""
+    rates = updates.rates_of(said, now, solved.concentrations)
+    gain, remains = (now.active * hours * rate for rate in (rates.growth, rates.remains))
+    grown = replace(now, active=now.active + gain, inert=now.inert + remains)
+    expanded, *_ = contact.expand(said, grown, updates.enlarged(said, now, grown))
+    return remeshing.new_mesh(said, now, expanded, solved.flow.mean_velocity)[0]
+
+
+#: The seed's radius is R (1 + BULGE cos 3 phi) or R (1 - BULGE cos 3 phi): area as before to second order. With cos phi
+#: it would be a half-disc again, moved.
+BULGE = 0.01
+
+
+def longer_downstream(said: Scene) -> Pore:
+    """At t = 0, the downstream tip further out by 1 % and the upstream tip less by that."""
+    return uneven(said, BULGE)
+
+
+def longer_upstream(said: Scene) -> Pore:
+    """The other way round."""
+    return uneven(said, -BULGE)
+
+
+def uneven(said: Scene, bulge: float) -> Pore:
+    """The pore at t = 0 with a seed of radius R (1 + bulge cos 3 phi), phi from downstream."""
+    numerics = said.numerics
+    seed = half_disc(said.aggregate.radius, ACROSS_AGGREGATE * numerics.refinement, numerics.geometry)
+    points = seed.points * (1 + bulge * np.cos(3 * np.arctan2(*seed.points.T[::-1])))[:, None]
+    grid, outline = pore.generate(said, replace(seed, points=points, origin=points.copy()))
+    space = Space(grid, numerics.order)
+    body = pore.material(space, grid.points[grid.body])
+    active = said.kinetics.maximum_density * space.reaction.dx
+    return replace(pore.seeded(said), space=space, wall=outline.wall, fixed=outline.fixed, active=active,
+                   inert=np.zeros_like(active), body=body, theta=np.ones_like(body.at.dx),
+                   pressure=np.zeros(grid.corners))
