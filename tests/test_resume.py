@@ -4,6 +4,8 @@ import random
 import signal
 from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
+from shutil import copytree
 from subprocess import TimeoutExpired
 
 import pytest
@@ -80,14 +82,13 @@ def in_parts(scene, folder, count):
 
 
 @pytest.mark.parametrize("name", [*SCENES, *(pytest.param(name, marks=pytest.mark.thorough) for name in MORE)])
-def test_a_run_stopped_after_every_step_is_the_whole_run(tmp_path, name):
+def test_a_run_stopped_after_every_step_is_the_whole_run(tmp_path, whole_of, name):
     """Tables, fields, indices, status and counts, and no warning."""
     scene = load_scene("base", {**SCENES, **MORE}[name])
-    run(scene, tmp_path / "whole")
     resumes = in_parts(scene, tmp_path / "parts", 1)
     assert resumes == len(told(tmp_path / "parts")["resumes"]) >= 3
-    assert files(tmp_path / "parts") == files(tmp_path / "whole")
-    assert lasting(tmp_path / "parts") == lasting(tmp_path / "whole")
+    assert files(tmp_path / "parts") == files(whole_of(scene))
+    assert lasting(tmp_path / "parts") == lasting(whole_of(scene))
     assert not {NEWEST, PREVIOUS, ".lock"} & files(tmp_path / "parts").keys()
 
 
@@ -178,66 +179,71 @@ def test_a_status_that_no_run_writes_is_none(tmp_path, capsys, status):
     assert message.count("\n") == 1 and files(tmp_path / "run") == before and not task.finished(tmp_path / "run")
 
 
-def stopped(folder, *sets, after=3):
-    """A run of `base` that was stopped after so many steps; its scene."""
-    scene = load_scene("base", ('numerics.preset="fast"', 'growth.end="3 h"', *sets))
+@pytest.fixture(scope="module")
+def scene():
+    return load_scene("base", ('numerics.preset="fast"', 'growth.end="3 h"'))
+
+
+@pytest.fixture(scope="module")
+def third(scene, tmp_path_factory):
+    """A run that was stopped after three steps."""
+    folder = tmp_path_factory.mktemp("third") / "run"
     with pytest.raises(Interrupted):
-        run(scene, folder, watch=Watch(stop=every(after), interval=0.0))
-    return scene
+        run(scene, folder, watch=Watch(stop=every(3), interval=0.0))
+    return folder
 
 
-def test_an_altered_checkpoint_is_refused_and_the_one_before_is_used(tmp_path, capsys):
+@pytest.fixture
+def stopped(third, tmp_path):
+    """A copy of it."""
+    return Path(copytree(third, tmp_path / "run"))
+
+
+def test_an_altered_checkpoint_is_refused_and_the_one_before_is_used(stopped, scene, whole_of, capsys):
     """And the result is the same."""
-    scene = stopped(tmp_path / "run")
-    newest = tmp_path / "run" / NEWEST
+    newest = stopped / NEWEST
     good = newest.read_bytes()
     newest.write_bytes(good[:-1] + bytes([good[-1] ^ 1]))
-    assert main(["run", "--resume", str(tmp_path / "run"), "--quiet"]) == 0
+    assert main(["run", "--resume", str(stopped), "--quiet"]) == 0
     message = capsys.readouterr().err
     assert f"{NEWEST}: refused: its checksum is wrong" in message and "t = 0" not in message
-    run(scene, tmp_path / "whole")
-    assert files(tmp_path / "run") == files(tmp_path / "whole")
-    assert told(tmp_path / "run")["resumes"][0]["time_h"] > 0
+    assert files(stopped) == files(whole_of(scene))
+    assert told(stopped)["resumes"][0]["time_h"] > 0
 
 
-def test_without_a_good_checkpoint_a_run_starts_again_and_says_so(tmp_path, capsys):
-    scene = stopped(tmp_path / "run")
+def test_without_a_good_checkpoint_a_run_starts_again_and_says_so(stopped, scene, whole_of, capsys):
     for name in (NEWEST, PREVIOUS):
-        path = tmp_path / "run" / name
+        path = stopped / name
         path.write_bytes(path.read_bytes()[:1000])
-    assert main(["run", "--resume", str(tmp_path / "run"), "--quiet"]) == 0
+    assert main(["run", "--resume", str(stopped), "--quiet"]) == 0
     message = capsys.readouterr().err
     assert message.count("refused: its checksum is wrong") == 2 and "starts again from t = 0" in message
-    run(scene, tmp_path / "whole")
-    assert files(tmp_path / "run") == files(tmp_path / "whole")
+    assert files(stopped) == files(whole_of(scene))
 
 
-def test_a_checkpoint_without_its_fields_is_refused(tmp_path):
-    stopped(tmp_path / "run")
-    (tmp_path / "run" / "fields" / "fields_0001.vtu").unlink()
+def test_a_checkpoint_without_its_fields_is_refused(stopped):
+    (stopped / "fields" / "fields_0001.vtu").unlink()
     with pytest.warns(UserWarning) as warned:
-        resume(tmp_path / "run")
+        resume(stopped)
     assert ["fields_0001.vtu is not as it was written" in str(w.message) for w in warned] == [True, True, False]
 
 
-def test_a_change_of_versions_is_told_and_recorded(tmp_path, monkeypatch):
-    stopped(tmp_path / "run")
+def test_a_change_of_versions_is_told_and_recorded(stopped, monkeypatch):
     known = results.version
     monkeypatch.setattr(results, "version", lambda name: "0.0" if name == "scipy" else known(name))
     with pytest.warns(UserWarning, match="versions.scipy .* now 0.0.; .* to the last bit"):
-        resume(tmp_path / "run")
-    (once,) = told(tmp_path / "run")["resumes"]
+        resume(stopped)
+    (once,) = told(stopped)["resumes"]
     assert once["changed"]["versions.scipy"][1] == "0.0" and len(once["changed"]) == 1
 
 
-def test_the_machine_is_recorded_and_threads_are_no_change(tmp_path, monkeypatch, recwarn):
-    stopped(tmp_path / "run")
-    found = told(tmp_path / "run")["conditions"]
+def test_the_machine_is_recorded_and_threads_are_no_change(stopped, monkeypatch, recwarn):
+    found = told(stopped)["conditions"]
     assert found["machine"] and found["blas"] and len(found["source"]) == 8
     assert found["threads"].get("OMP_NUM_THREADS") != "7"
     monkeypatch.setenv("OMP_NUM_THREADS", "7")
-    resume(tmp_path / "run")
-    assert told(tmp_path / "run")["conditions"]["threads"]["OMP_NUM_THREADS"] == "7" and not recwarn.list
+    resume(stopped)
+    assert told(stopped)["conditions"]["threads"]["OMP_NUM_THREADS"] == "7" and not recwarn.list
 
 
 def test_a_failure_says_where_the_last_good_state_is(tmp_path, monkeypatch):
