@@ -7,8 +7,6 @@ import numpy
 import pytest
 from hypothesis import HealthCheck, settings
 
-from repro.run.running import run
-from repro.scene import scene_hash
 from tests import pages
 
 matplotlib.use("Agg")
@@ -17,20 +15,6 @@ settings.register_profile("ci", derandomize=True, max_examples=20, **SLOW_MACHIN
 settings.register_profile("thorough", print_blob=True, max_examples=200, **SLOW_MACHINES_MAY)
 signal.signal(signal.SIGINT, signal.default_int_handler)  # in the background it is ignored, by children too
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
-
-
-@pytest.fixture(scope="session")
-def whole_of(tmp_path_factory):
-    """``whole_of(scene)``: the folder of its run, made once. Whoever changes it copies it."""
-    made = {}
-
-    def folder(scene):
-        key = scene.name, scene_hash(scene)
-        if key not in made:
-            made[key] = tmp_path_factory.mktemp("whole") / "run"
-            run(scene, made[key])
-        return made[key]
-    return folder
 
 
 @pytest.fixture(scope="module")

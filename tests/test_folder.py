@@ -20,6 +20,7 @@ from repro.run.checkpoint import LAST, NEWEST, PREVIOUS
 from repro.run.folder import LOCK, SUMS, held, prepare
 from repro.run.running import Watch, resume, run
 from repro.scene import load_scene, parse_scene, scene_tables
+from tests.pages import whole_of
 from tests.shell import SHORT, files, shell, started, told, wait_for
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="for Linux alone")
@@ -97,7 +98,7 @@ def out(cut, tmp_path):
     return Path(shutil.copytree(cut, tmp_path / "run"))
 
 
-def test_a_runs_files_are_listed(short, whole_of):
+def test_a_runs_files_are_listed(short):
     """All that there is in the end, and nothing else, by name in run.json; the fields' sums are right."""
     out = whole_of(short)
     assert sorted({*files(out), "run.json", "report.html", LAST}) == told(out)["files"]
@@ -105,7 +106,7 @@ def test_a_runs_files_are_listed(short, whole_of):
     assert sums == {name: sha256(content).hexdigest() for name, content in files(out).items() if "vtu" in name}
 
 
-def test_nothing_is_removed_that_no_run_wrote(out, short, whole_of, capsys):
+def test_nothing_is_removed_that_no_run_wrote(out, short, capsys):
     """A resume without a good checkpoint starts again, beside what others have put there, names of fields and tables
     among them."""
     spoil(out)
@@ -160,7 +161,7 @@ def test_a_checkpoint_that_is_no_file_is_refused(out, capsys, make):
 
 
 @pytest.mark.parametrize("content", [b"", b"<VTKFile", b'<VTKFile type="UnstructuredGrid"/>', b"\xff" * 5000])
-def test_altered_fields_are_told_and_made_again(out, short, whole_of, capsys, content):
+def test_altered_fields_are_told_and_made_again(out, short, capsys, content):
     """The resume starts where all is right, here from t = 0, and ends with the bits of the whole run."""
     (out / "fields" / "fields_0000.vtu").write_bytes(content)
     assert main(["run", "--resume", str(out), "--quiet"]) == 0
@@ -180,7 +181,7 @@ def test_a_page_that_cannot_be_made_is_told(tmp_path, capsys):
     assert "report.html: it cannot be made" in message and message.count("\n") == 1
 
 
-def test_what_a_killed_run_was_writing_is_removed(short, whole_of, tmp_path):
+def test_what_a_killed_run_was_writing_is_removed(short, tmp_path):
     """What is in such a folder and no run's stays."""
     with pytest.raises(ZeroDivisionError):
         run(short, tmp_path / "run", lambda time: 1 / (time < 0.5))
@@ -253,7 +254,7 @@ def full(*_):
                                                 (results.os, "replace", r"fields/fields_\d{4}\.vtu"),
                                                 (checkpoint.os, "fsync", r"fields/fields_\d{4}\.vtu"),
                                                 (checkpoint, "write", NEWEST)])
-def test_no_space_is_told_with_the_file_and_nothing_is_lost(short, whole_of, tmp_path, monkeypatch, module, name, file):
+def test_no_space_is_told_with_the_file_and_nothing_is_lost(short, tmp_path, monkeypatch, module, name, file):
     """The run stops, says which file, leaves none half-written, and goes on when there is room."""
     out, works = tmp_path / "run", getattr(module, name)
 

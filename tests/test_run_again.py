@@ -1,8 +1,5 @@
 """A run into a folder that holds one already: gone on with, left alone, refused, or replaced where it is asked for."""
 
-from pathlib import Path
-from shutil import copytree
-
 import pytest
 
 from repro import results
@@ -49,12 +46,13 @@ def test_a_run_that_is_done_is_left_alone(tmp_path, capsys):
     assert "completed, before this: nothing to do" in capsys.readouterr().out and state(tmp_path / "run") == before
 
 
-def test_a_run_that_was_interrupted_is_gone_on_with(tmp_path, whole_of, capsys):
+def test_a_run_that_was_interrupted_is_gone_on_with(tmp_path, capsys):
     """From its state, to the bits of the whole run."""
     interrupted(tmp_path / "run")
     assert main(["run", "base", *SETS, "--out", str(tmp_path / "run")]) == 0
     assert "goes on from t = " in capsys.readouterr().err
-    assert files(tmp_path / "run") == files(whole_of(load_scene("base", FAST)))
+    run(load_scene("base", FAST), tmp_path / "whole")
+    assert files(tmp_path / "run") == files(tmp_path / "whole")
     assert told(tmp_path / "run")["resumes"][0]["time_h"] > 0
 
 
@@ -75,9 +73,9 @@ def test_another_scene_is_refused_with_what_differs(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("key", ["source", "versions.scipy"])
-def test_other_versions_are_refused_with_what_differs(tmp_path, whole_of, capsys, monkeypatch, key):
+def test_other_versions_are_refused_with_what_differs(tmp_path, capsys, monkeypatch, key):
     """Of a run that is over, and of one that is not."""
-    copytree(whole_of(load_scene("base", FAST)), tmp_path / "done")
+    run(load_scene("base", FAST), tmp_path / "done")
     interrupted(tmp_path / "run")
     if key == "source":
         monkeypatch.setattr(machine, "source_hash", lambda: "01234567")
@@ -88,7 +86,7 @@ def test_other_versions_are_refused_with_what_differs(tmp_path, whole_of, capsys
         assert f"the run there is another one: {key} (" in refused(tmp_path / name, capsys, "base", *SETS)
 
 
-def test_a_forced_run_removes_what_is_listed_and_nothing_else(tmp_path, whole_of):
+def test_a_forced_run_removes_what_is_listed_and_nothing_else(tmp_path):
     """Files that others have put beside the run's, and what a link leads to, stay."""
     out = tmp_path / "run"
     run(load_scene("base", ('numerics.preset="fast"', 'growth.end="6 h"')), out)
@@ -102,26 +100,26 @@ def test_a_forced_run_removes_what_is_listed_and_nothing_else(tmp_path, whole_of
     assert main(["run", "base", *SETS, "--out", str(out), "--force"]) == 0
     assert (out / "link.txt").is_symlink() and (tmp_path / "victim").read_text() == "years of work"
     assert [(out / name).read_text() for name in mine] == ["years of work"] * len(mine)
-    whole = whole_of(load_scene("base", FAST))
+    run(load_scene("base", FAST), tmp_path / "whole")
     left = {name: content for name, content in files(out).items() if name not in (*mine, "link.txt")}
-    assert left == files(whole)
+    assert left == files(tmp_path / "whole")
     kept = {key: value for key, value in lasting(out).items() if key != "origin"}
-    assert kept == {key: value for key, value in lasting(whole).items() if key != "origin"}
+    assert kept == {key: value for key, value in lasting(tmp_path / "whole").items() if key != "origin"}
 
 
-def test_a_forced_run_computes_again(tmp_path, whole_of):
+def test_a_forced_run_computes_again(tmp_path):
     """What is done, too."""
-    out = Path(copytree(whole_of(load_scene("base", FAST)), tmp_path / "run"))
-    before = (out / "timeseries.csv").stat().st_mtime_ns
-    assert main(["run", "base", *SETS, "--out", str(out), "--force", "--quiet"]) == 0
-    assert (out / "timeseries.csv").stat().st_mtime_ns > before and told(out)["resumes"] == []
+    run(load_scene("base", FAST), tmp_path)
+    before = (tmp_path / "timeseries.csv").stat().st_mtime_ns
+    assert main(["run", "base", *SETS, "--out", str(tmp_path), "--force", "--quiet"]) == 0
+    assert (tmp_path / "timeseries.csv").stat().st_mtime_ns > before and told(tmp_path)["resumes"] == []
 
 
 @pytest.mark.parametrize("name", ["timeseries.nc", "fields/fields_0077.vtu"])
-def test_a_forced_run_is_refused_where_others_have_files_of_its_names(tmp_path, whole_of, capsys, name):
-    out = Path(copytree(whole_of(load_scene("base", FAST)), tmp_path / "run"))
-    (out / name).write_text("years of work")
-    assert f"{name}: no run has written it" in refused(out, capsys, "base", *SETS, "--force")
+def test_a_forced_run_is_refused_where_others_have_files_of_its_names(tmp_path, capsys, name):
+    run(load_scene("base", FAST), tmp_path)
+    (tmp_path / name).write_text("years of work")
+    assert f"{name}: no run has written it" in refused(tmp_path, capsys, "base", *SETS, "--force")
 
 
 @pytest.mark.parametrize("content", [None, "{}", '{"scene": "x", "files": ["thesis.tex"]}'])
