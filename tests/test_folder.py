@@ -270,17 +270,6 @@ def test_no_space_is_told_with_the_file_and_nothing_is_lost(short, tmp_path, mon
     assert files(out) == files(whole_of(short))
 
 
-@LINUX
-def test_a_file_that_may_not_grow_ends_a_run_with_status_2(tmp_path):
-    """In a process whose files may be 20 kB long: the fields are longer."""
-    import resource
-    limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))  # noqa: E731
-    status, _, message = shell(*SHORT, "--out", tmp_path / "run", preexec_fn=limit)
-    assert status == 2 and "fields_0000.vtu: File too large" in message and message.count("\n") == 1
-    assert not [name for name in files(tmp_path / "run") if "vtu" in name or "part" in name]
-    assert shell("--resume", tmp_path / "run")[0] == 0
-
-
 @pytest.mark.thorough
 @pytest.mark.skipif(not may_mount(), reason="nothing can be mounted here")
 def test_a_full_disk(tmp_path):
