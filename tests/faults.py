@@ -7,10 +7,18 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import splu
 
+from repro import results
+
 
 def absent_package(monkeypatch, name):
     """Importing a package fails as where it is not installed."""
     monkeypatch.setitem(sys.modules, name, None)
+
+
+def another_version(monkeypatch, name):
+    """A package says that it is of version 0.0."""
+    known = results.version
+    monkeypatch.setattr(results, "version", lambda asked: "0.0" if asked == name else known(asked))
 
 
 def stand_in_package(monkeypatch, name):

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
 
+import pytest
+
+from repro.errors import Interrupted
 from repro.run.checkpoint import LAST
+from repro.run.running import Watch, run
+from tests.pages import whole_of
 
 #: A scene of a second or so, with remeshes, and one of several seconds.
 SHORT = ("base", "--set", 'numerics.preset="fast"')
@@ -54,3 +60,36 @@ def told(folder: Path) -> dict:
 def lasting(folder: Path) -> dict:
     """What run.json says but for times and counts of resumes."""
     return {key: value for key, value in told(folder).items() if not key.startswith("wall_time") and key != "resumes"}
+
+
+def flags(*entries) -> list[str]:
+    """Each entry as the command line has it: --set ENTRY."""
+    return [part for entry in entries for part in ("--set", entry)]
+
+
+def state(folder: Path) -> dict[Path, tuple[int, bytes]]:
+    """Every file of a folder, with the time at which it was written and its content; nothing of a folder that is not
+    there."""
+    return {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in folder.rglob("*") if path.is_file()}
+
+
+def every(count: int):
+    """Says stop at each so-manieth step."""
+    calls = 0
+
+    def stop():
+        nonlocal calls
+        calls += 1
+        return signal.SIGTERM if calls % count == 0 else 0
+    return stop
+
+
+def stopped(scene, folder: Path, after: int = 3) -> None:
+    """A run that was stopped after so many steps, with a checkpoint of every one."""
+    with pytest.raises(Interrupted):
+        run(scene, folder, watch=Watch(stop=every(after), interval=0.0))
+
+
+def as_whole(scene, folder: Path) -> bool:
+    """Are the files of a folder those of the scene's run without an interruption?"""
+    return files(folder) == files(whole_of(scene))

@@ -24,7 +24,7 @@ from repro.results.tables import SHOWN, Results, solve, unit
 from repro.run.running import run
 from repro.scene import SceneError, load_scene, packaged_scenes
 
-SHORT = ["numerics.preset=fast", 'growth.end="0.6 h"']
+SHORT = ["numerics.preset=fast", 'growth.end="0.6 h"', 'output.times=["0.2 h", "0.4 h", "0.6 h"]']
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +45,8 @@ def test_columns_are_those_of_the_table_of_a_run(found, tmp_path):
 def test_fields_are_those_of_the_files_of_a_run(tmp_path):
     """On straight triangles and on curved ones."""
     for elements, corners in (("linear", 3), ("quadratic", 6), ("cubic", 6)):
-        scene = load_scene("base", ["numerics.preset=fast", f"numerics.elements={elements}", 'growth.end="0.2 h"'])
+        scene = load_scene("base", ["numerics.preset=fast", f"numerics.elements={elements}", 'growth.end="0.2 h"',
+                                    'output.times=["0.2 h"]'])
         run(scene, tmp_path / elements)
         fields, written = solve(scene).fields(0.2), meshio.read(tmp_path / elements / "fields/fields_0001.vtu")
         assert np.array_equal(fields["places_um"], written.points[:, :2])

@@ -254,7 +254,8 @@ def test_the_elements_of_another_order_are_refused(kept, tmp_path):
 @pytest.mark.parametrize("change", [
     lambda record: record.pop("remeshes"), lambda record: record.update(index=[]),
     lambda record: record.update(seconds=-1.0), lambda record: record.update(stages=[]),
-    lambda record: record.update(iterations=[]), lambda record: record.update(resumes=[1])])
+    lambda record: record.update(iterations=[]), lambda record: record.update(resumes=[1]),
+    lambda record: record.update(missed=-1), lambda record: record.update(worst=-1.0)])
 def test_counts_that_are_none_are_refused(kept, tmp_path, change):
     plain, arrays = copy.deepcopy(decoded(kept[2])[0]), decoded(kept[2])[1]
     change(plain["record"])

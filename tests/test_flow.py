@@ -16,6 +16,7 @@ from repro.fem.transfer import located
 from repro.march.simulation import simulate
 from repro.model import flow, pore
 from repro.model.flow import poiseuille_loss, pressure_space
+from repro.run.running import warned
 from repro.scene import Flow, load_scene
 from tests.strategies import (
     LENGTH,
@@ -193,6 +194,29 @@ def test_a_permeable_layer_along_the_wall(interface, order, bound):
     exact = brinkman_channel.velocity(y[section], WIDTH, 0.3 * WIDTH, 100.0)
     assert exact[y[section] <= 0.3 * WIDTH].max() > 0.9, "else nothing flows through the layer"
     assert unit.velocity[section, 0] == pytest.approx(exact, abs=bound)
+
+
+def in_a_permeable_body(permeability, refinement):
+    """Conductivity, the least velocity along the pore in a half-disc of 20 um and 1 um or more from its interface, over
+    the mean, and is that warned of?"""
+    said = ["numerics.preset=fast", "aggregate.radius=20 um", "flow.biomass=brinkman", "growth.end=0 h",
+            f"flow.permeability={permeability} m^2", f"numerics.refinement={refinement}"]
+    scene = load_scene("base", said)
+    first = next(simulate(scene))
+    found = first.solved.flow
+    inside = np.hypot(*first.pore.space.points.T) < 19.0
+    keys = [each.key for each in warned(scene, found.mean_velocity)]
+    return found.conductivity, found.velocity[inside, 0].min() / found.mean_velocity, "flow.permeability" in keys
+
+
+def test_thin_layers_of_a_permeable_body_make_its_velocities_wiggle_and_are_warned_of():
+    """The flow in the body turns back at nodes where (k)^1/2 = 0.1 um is resolved by elements of 4.4 um, and nowhere
+    where 2 um is; conductivity is that of elements half as large to 0.1 % (measured 5e-4)."""
+    conductivity, backward, told = in_a_permeable_body(1e-14, 0.45)
+    assert backward < -1e-3 and told
+    assert conductivity == pytest.approx(in_a_permeable_body(1e-14, 0.9)[0], rel=1e-3)
+    _, backward, told = in_a_permeable_body(4e-12, 0.45)
+    assert backward >= 0 and not told
 
 
 def test_a_run_with_a_permeable_body():

@@ -6,23 +6,17 @@ import pytest
 import xarray
 
 from repro import results
-from repro.cli import main
-from repro.results import names, netcdf
+from repro.results import netcdf
 from repro.scene import load_scene, rules, scene_hash, scene_tables
+from tests.pages import run
 
 SETS = ['numerics.preset="fast"', 'growth.end="1 h"', 'growth.time_step="1 min"', 'output.timeseries="netcdf"']
 UNITS = {"m d-1", "mg L-1", "um2", "um", "cm", "h", "1"}
 
 
-def run(out, scene, *sets, status=0):
-    assert main(["run", str(scene), "--out", str(out), *(part for one in sets for part in ("--set", one))]) == status
-
-
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    out = tmp_path_factory.mktemp("netcdf") / "run"
-    run(out, "base", *SETS)
-    return out
+    return run(tmp_path_factory.mktemp("netcdf"), "base", *SETS)
 
 
 def content(out):
@@ -52,21 +46,9 @@ def test_it_says_what_it_is(made):
 
 
 def test_what_is_not_modelled_is_not_a_number(tmp_path):
-    run(tmp_path / "run", "flow_only", SETS[-1])
+    run(tmp_path, "flow_only", SETS[-1])
     found = content(tmp_path / "run")
     assert np.isnan(found.effluent_acceptor_mg_per_L).all() and found.mean_velocity_m_per_d[0] == pytest.approx(2.9)
-
-
-def test_units_are_those_of_the_names():
-    assert {name: names.udunits(name) for name in ("conductivity_m_per_d", "head_loss_cm", "aggregate_area_um2",
-                                                   "thickness_um", "nodes", "acceptor_supplied_pg_per_m")} == {
-        "conductivity_m_per_d": "m d-1", "head_loss_cm": "cm", "aggregate_area_um2": "um2", "thickness_um": "um",
-        "nodes": "1", "acceptor_supplied_pg_per_m": "pg m-1"}
-
-
-def test_a_table_alone_is_the_default(tmp_path):
-    run(tmp_path / "run", "flow_only")
-    assert not (tmp_path / "run/timeseries.nc").exists() and (tmp_path / "run/timeseries.csv").exists()
 
 
 def test_a_run_without_rows_has_an_empty_table(tmp_path):
@@ -91,8 +73,8 @@ def test_it_is_whole_or_not_there(tmp_path, monkeypatch):
 
 def test_without_xarray_it_is_refused_before_the_run(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(rules, "find_spec", lambda name: None)
-    run(tmp_path / "run", "base", *SETS, status=2)
+    run(tmp_path, "base", *SETS, status=2)
     (line,) = capsys.readouterr().err.splitlines()
     assert 'output.timeseries = "netcdf"' in line and "pip install xarray" in line
     assert list(tmp_path.iterdir()) == []
-    run(tmp_path / "run", "flow_only")
+    assert not (run(tmp_path, "flow_only") / "timeseries.nc").exists()

@@ -98,6 +98,11 @@ def test_arrays_of_pores_and_numbers():
         assert np.shape(one.length) == () and [values[index] for values in found] == pytest.approx(one, rel=1e-12)
 
 
+def test_a_pore_twice_as_wide_takes_four_times_the_area():
+    """For the same resistance."""
+    assert repro.added_resistance(1.2, 2.0, False) == pytest.approx(repro.added_resistance(0.3, 1.0, False), rel=1e-12)
+
+
 @pytest.mark.parametrize("area, spanned, ratio, told", [
     (0.0, False, LAMBDA, "area / width^2 = 0 is not known for a half-disc before contact (spanned=False); 0.003927 "),
     (1.6, False, LAMBDA, "area / width^2 = 1.6 is not known for a half-disc"),

@@ -7,9 +7,8 @@ from hypothesis import given
 
 from repro.fem import outline as of
 from repro.fem import sizing
-from repro.fem.outline import BOTTOM, FREE, Outline
-from repro.fem.sizing import Sizing
-from tests.strategies import attached_aggregates, mirrored, plug, seed, widths
+from repro.fem.outline import BOTTOM, FREE
+from tests.strategies import attached_aggregates, mirrored, plug, seed, widths, with_arcs
 
 both = pytest.mark.parametrize("geometry", [1, 2])
 
@@ -94,18 +93,14 @@ def test_area_and_extremes_are_those_of_the_arcs():
 def test_arcs_with_middles_half_way_are_the_polygon(drawn):
     """What both kinds of outlines say of the same curve."""
     straight, _ = drawn
-    ends = straight.arcs(straight.points)
-    points = ends[:, :2].reshape(-1, 2)
-    wall = np.column_stack([straight.wall, straight.edge_wall]).ravel()
-    fixed = np.column_stack([straight.fixed, np.zeros_like(straight.fixed)]).ravel()
-    arcs = Outline(points, wall, fixed, points, 2)
+    arcs = with_arcs(straight)
     assert arcs.area == pytest.approx(straight.area, rel=1e-13)
     for name in ("upstream", "downstream", "thickness"):
         assert getattr(arcs, name) == pytest.approx(getattr(straight, name), rel=1e-13)
     assert np.array_equal(arcs.edge_wall, straight.edge_wall)
     assert np.array_equal(arcs.corners.points, straight.points) and arcs.corners.geometry == 1
     assert straight.corners is straight
-    assert np.allclose(arcs.arcs(arcs.points), ends, rtol=0, atol=1e-13)
+    assert np.allclose(arcs.arcs(arcs.points), straight.arcs(straight.points), rtol=0, atol=1e-13)
 
 
 @given(attached_aggregates(width=widths) | attached_aggregates(width=widths, geometry=2))
@@ -115,19 +110,6 @@ def test_a_mirror_keeps_the_measures(drawn):
     assert image.area == pytest.approx(outline.area, rel=1e-13)
     found = image.upstream, image.downstream, image.thickness
     assert found == pytest.approx((-outline.downstream, -outline.upstream, outline.thickness), rel=1e-13)
-
-
-@pytest.mark.parametrize("refinement", [1.0, 2.0])
-def test_a_split_changes_neither_shape_nor_area(refinement):
-    """New nodes lie on the same parabolas, and so do their places at t = 0."""
-    shape = wavy()
-    finer = sizing.split(shape, Sizing(50.0, refinement, 2.0))
-    assert len(finer.points) > len(shape.points)
-    assert finer.area == pytest.approx(shape.area, rel=1e-13)
-    assert (finer.thickness, finer.upstream) == pytest.approx((shape.thickness, shape.upstream), rel=1e-13)
-    at_start = [of.polygon_area(sampled(replace(s, points=s.origin), 1000)) for s in (shape, finer)]
-    assert at_start[1] == pytest.approx(at_start[0], rel=1e-6)
-    assert np.array_equal(finer.points[finer.fixed], shape.points[shape.fixed])
 
 
 def test_halved_arcs_are_the_same_curve():

@@ -36,7 +36,8 @@ def test_a_step_that_is_refused_is_shorter_the_next_time(left, excess):
 def test_steps_under_a_steady_rise_meet_the_tolerance(start, step, rise):
     """Where c of the estimate c h^2 rises by the same factor from step to step, the third step and all later ones have
     an estimate of SAFETY^2 tolerances and are taken."""
-    pace, c, estimates = Pace(step), start, []
+    pace, c = Pace(step), start
+    estimates = []
     for _ in range(8):
         duration = pace.length
         estimates.append(c * duration**2)

@@ -1,11 +1,9 @@
 """Runs of the presets and of every order of the elements, and what scenes say of both."""
 from dataclasses import replace
 
-import meshio
 import numpy as np
 import pytest
 
-from repro import results
 from repro.fem import sizing
 from repro.fem.outline import TOP
 from repro.march import midpoint, simulation
@@ -14,10 +12,11 @@ from repro.model.biomass import Rates
 from repro.model.kinetics import growth_rate, inert_rate
 from repro.model.pore import Solved
 from repro.model.transport import Concentrations
-from repro.scene import PRESETS, Numerics, load_scene, parse_scene, scene_tables
+from repro.scene import PRESETS, Numerics, load_scene, parse_scene
 from repro.scene.rules import HIGHER_ORDER
 from repro.scene.units import SceneError
 from tests.strategies import ORDERS, scene
+from tests.test_scene import EVERYTHING
 
 EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
 
@@ -178,31 +177,8 @@ def test_rates_are_carried_back_from_a_new_mesh(order):
     assert linear < (1e-6 if order == 1 else 0.01 * 88) and even < 1e-12
 
 
-def test_fields_are_written(contact, tmp_path):
-    """On straight triangles and on curved ones of six nodes, names with units, X_A + X_I = 1 in the aggregate, J and
-    theta alike."""
-    made, found = contact
-    now = found[-1].pore
-    results.write_fields(tmp_path / "fields.vtu", results.fields(made, now, found[-1].solved))
-    read, curved = meshio.read(tmp_path / "fields.vtu"), made.numerics.order > 1
-    assert read.cells[0].type == ("triangle6" if curved else "triangle") and len(read.points) == len(now.mesh.points)
-    total = read.point_data["active_biomass"] + read.point_data["inert_biomass"]
-    assert np.allclose(total[now.mesh.body], 1.0, rtol=1e-5 if curved else 0.2)
-    assert np.allclose(read.cell_data["theta"][0], read.cell_data["J"][0], rtol=0.05 if curved else 0.4,
-                       equal_nan=True)
-    assert (read.cell_data["theta"][0][now.mesh.biomass] > 1).all()
-    cells, head = now.mesh.cells, read.point_data["head_cm"]
-    if made.numerics.order == 2:  # a linear head; that of order 3 has values of its own there
-        assert np.allclose(head[cells[:, 3]], 0.5 * (head[cells[:, 0]] + head[cells[:, 1]]))
-    assert head[now.mesh.topology.inlet].mean() > 0
-    assert now.body.strained(now.mesh.points[now.mesh.body]).J.min() > 0
-
-
-TABLES = {"aggregate": {}, "flow": {"head": "1e-3 cm"}, "substrates": {}, "growth": {"end": "1 h"}}
-
-
 def numerics(**given):
-    return parse_scene({**TABLES, "numerics": given}, "test", "test.toml").numerics
+    return parse_scene(EVERYTHING | {"numerics": given}, "test", "test.toml").numerics
 
 
 @pytest.mark.parametrize("preset", PRESETS)
@@ -229,13 +205,6 @@ def test_what_is_written_wins_over_the_preset():
     assert (found.refinement, found.elements, found.time, found.tolerance) == (0.8, "linear", "updates", 0.0075)
 
 
-@pytest.mark.parametrize("preset", PRESETS)
-def test_a_written_scene_is_read_as_the_same(preset):
-    """With the preset and all that it chose spelt out."""
-    made = parse_scene({**TABLES, "numerics": {"preset": preset, "refinement": 0.77}}, "test", "test.toml")
-    assert parse_scene(scene_tables(made), "test", "test.toml") == made
-
-
 @pytest.mark.parametrize("kind", ["quadratic", "cubic"])
 @pytest.mark.parametrize("key, other", [("transfer", "linear"), ("transfer", "bounded"), ("flow_element", "bubble")])
 def test_what_higher_orders_cannot_do_is_refused(kind, key, other):
@@ -246,27 +215,3 @@ def test_what_higher_orders_cannot_do_is_refused(kind, key, other):
         numerics(preset="paper", elements=kind, **{key: other})
     assert "\n" not in str(refused.value)
     assert getattr(numerics(preset="paper", elements="linear", **{key: other}), key) == other
-
-
-@pytest.mark.parametrize("kind", ORDERS.values())
-@pytest.mark.parametrize("key, other", [("time", "updates"), ("time", "midpoint"), ("transport", "gear"),
-                                        ("interface", "traction"), ("inlet", "mean"), ("fixed_point", "rechosen")])
-def test_what_every_order_can_do_is_accepted(kind, key, other):
-    assert key not in HIGHER_ORDER
-    assert getattr(numerics(preset="paper", elements=kind, **{key: other}), key) == other
-
-
-@pytest.mark.parametrize("kind", ORDERS.values())
-def test_every_order_takes_stress_free_biomass_and_fluid_forces(kind):
-    for key, value in (("new_biomass", "stress_free"), ("fluid_forces", "included")):
-        made = parse_scene({**TABLES, "growth": {"end": "1 h", key: value}, "numerics": {"elements": kind}}, "t", "t")
-        assert getattr(made.growth, key) == value
-
-
-def test_other_combinations_that_are_refused():
-    """Gear with the midpoint rule, a preset that there is not."""
-    with pytest.raises(SceneError, match='numerics.transport.*"quasi_steady" is needed with numerics.time'):
-        numerics(preset="paper", time="midpoint", transport="gear")
-    for wrong in ("quick", 3, ["fast"]):
-        with pytest.raises(SceneError, match="numerics.preset"):
-            numerics(preset=wrong)

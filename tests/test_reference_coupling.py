@@ -86,7 +86,8 @@ def test_the_speed_is_what_head_and_loss_make_it():
 def test_the_constriction_is_that_of_greens_function_in_closed_form():
     """The sum over n is -ln((1 - 2 e^-c cos(a + b) + e^-2c)(1 - 2 e^-c cos(a - b) + e^-2c)) / (4 pi): by random pairs.
     """
-    random, radius, width = np.random.default_rng(1), 20.0, 50.0
+    random = np.random.default_rng(1)
+    radius, width = 20.0, 50.0
     away, angle = radius * np.sqrt(random.uniform(size=(2, 400_000))), np.pi * random.uniform(size=(2, 400_000))
     (x, far), (a, b) = away * np.cos(angle), np.pi / width * away * np.sin(angle)
     fall = np.exp(-np.pi * np.abs(x - far) / width)

@@ -142,7 +142,8 @@ def test_uniform_growth_is_exact_and_the_modulus_drops_out():
 
 def test_the_quadratic_cylinder_approaches_its_closed_form():
     """Order 3 in places and 2 in pressure, between five and ten rings; from the coarser solution as from t = 0."""
-    (x, y), errors, coarse = places(), [], None
+    (x, y), coarse = places(), None
+    errors = []
     R = np.hypot(x, y)
     exact = np.stack([x, y], axis=-1) * (neo_hookean.cylinder_radius(R, *LAW) / R)[:, None]
     for rings in (5, 10):

@@ -13,7 +13,8 @@ from reference.whole_run_body import Body
 from reference.whole_run_grid import grid
 from reference.whole_run_pore import ORDER, Section
 
-WIDTH, PORE, SPEED = 50.0, Pore(), 61_000.0
+WIDTH, SPEED = 50.0, 61_000.0
+PORE = Pore()
 
 
 def half_disc(rings, radius=30.0):

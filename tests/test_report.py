@@ -17,7 +17,7 @@ from repro import report, results
 from repro.report import fields, page, quantities
 from repro.report.reading import NoRun, read
 from repro.results import names
-from tests.pages import CHARTS, FAST, HOSTILE, LEDGERS, Page, first, hostile, numbers, run, stored, text_of
+from tests.pages import FAST, HOSTILE, Page, first, hostile, numbers, run, stored, text_of
 
 
 def test_every_run_has_a_page_that_needs_nothing_else(fast, paper, flow_only):
@@ -34,25 +34,18 @@ def test_every_run_has_a_page_that_needs_nothing_else(fast, paper, flow_only):
 
 
 def test_charts_of_a_whole_run_are_its_columns(fast):
-    """Every line of the page's own data, by its label, to the six digits that a pointer is told."""
-    text = text_of(fast)
+    """Every line of the page's own data, by its label, to the six digits that a pointer is told. That the lines of
+    charts are the columns that they name is in `test_derived.py`."""
+    text, charts = text_of(fast), quantities.charts_of(read(fast))
     titles = re.findall("<figcaption>(.*?)<", text)
-    assert titles == [kind.title for kind in quantities.KINDS]
-    assert {*CHARTS, *LEDGERS, "Ledger: biomass"} == {*titles}
+    assert titles == [chart.title for chart in charts] == [kind.title for kind in quantities.KINDS]
     data = [json.loads(html.unescape(one))["lines"] for one in re.findall('data-chart="([^"]*)"', text)]
-    series, book = (results.read_table(fast / f"{name}.csv") for name in ("timeseries", "ledger"))
-    hours = book["end_h"] - book["start_h"]
-    drawn = 0
-    for title, lines in zip(titles, data, strict=True):
-        for line in lines:
-            name = CHARTS.get(title, LEDGERS.get(title, {})).get(line["label"])
-            if title in LEDGERS:
-                assert line["y"] == pytest.approx((1e-6 * book[name] / hours).tolist(), rel=1e-5)
-            elif name and name != "remeshed":
-                assert line["t"] == pytest.approx(series["time_h"].tolist(), rel=1e-5)
-                assert line["y"] == pytest.approx(series[name].tolist(), rel=1e-5), (title, line["label"])
-            drawn += 1
-    assert drawn >= 28
+    for lines, chart in zip(data, charts, strict=True):
+        for drawn, line in zip(lines, chart.lines, strict=True):
+            known = np.isfinite(line.values)
+            assert drawn["label"] == line.label
+            assert drawn["t"] == pytest.approx(line.times[known].tolist(), rel=1e-5)
+            assert drawn["y"] == pytest.approx(line.values[known].tolist(), rel=1e-5), line.label
     for word in ("factorise and solve", "Newton iterations, transport", "scene hash", "numpy", "kinematic_viscosity"):
         assert word in text
 
@@ -91,13 +84,24 @@ def test_each_frame_is_drawn_on_its_own_mesh(fast, paper):
     assert [packed["meshes"][frame["mesh"]]["per"] for frame in packed["frames"]] == [6, 3]
 
 
+def places(packed, frame):
+    """(N, 2) um of the nodes of a frame, and the sides of the box that holds all."""
+    low, high = np.array(packed["box"]).reshape(2, 2).T
+    return low + values((0.0, 1.0, frame["points"])).reshape(-1, 2) * (high - low), high - low
+
+
+def values(told):
+    """Of the least, the largest and the levels of an array."""
+    low, high, text = told
+    return low + numbers(text, "<u2") / 65534 * (high - low)
+
+
 @pytest.mark.parametrize("name", ["fast", "paper"])
 def test_fields_of_the_page_are_those_of_the_files(request, name):
     """Each array to half a step of its 65534, with the mesh's own nodes."""
     out = request.getfixturevalue(name)
     packed, entries = stored(out), fields.index(out)
     assert packed["of"] == len(entries) == len(packed["frames"])
-    box = np.array(packed["box"]).reshape(2, 2)
     for frame, (time, path) in zip(packed["frames"], entries):
         grid, mesh = meshio.vtu.read(path), packed["meshes"][frame["mesh"]]
         cells = grid.cells[0].data
@@ -105,18 +109,18 @@ def test_fields_of_the_page_are_those_of_the_files(request, name):
         assert (numbers(mesh["cells"], "<u4").reshape(cells.shape) == cells).all()
         region = numbers(mesh["body"], "<u1") == 1
         assert (region == grid.cell_data["region"][0]).all() and region.any() and not region.all()
-        points = box[:, 0] + numbers(frame["points"], "<u2").reshape(-1, 2) / 65534 * (box[:, 1] - box[:, 0])
-        assert np.abs(points - grid.points[:, :2]).max() <= 0.51 / 65534 * (box[:, 1] - box[:, 0]).max()
+        points, box = places(packed, frame)
+        assert np.abs(points - grid.points[:, :2]).max() <= 0.51 / 65534 * box.max()
         nodes = np.unique(cells[region])
         for field in packed["fields"]:
-            low, high, text = frame["values"][field["name"]]
+            told = frame["values"][field["name"]]
+            low, high = told[:2]
             node = field["at"] == "node"
             value = grid.point_data[field["name"]] if node else grid.cell_data[field["name"]][0]
             value = np.linalg.norm(value, axis=1) if value.ndim == 2 else value
             value = value[nodes if node else region] if field["body"] else value
-            told = low + numbers(text, "<u2") / 65534 * (high - low)
             assert (low, high) == (value.min(), value.max())
-            assert np.abs(told - value).max() <= 0.51 / 65534 * (high - low)
+            assert np.abs(values(told) - value).max() <= 0.51 / 65534 * (high - low)
 
 
 def test_a_value_that_is_not_finite_has_none(tmp_path):
@@ -215,7 +219,9 @@ def test_every_name_has_its_unit_or_is_a_pure_number(fast, paper):
     for name, each in names.KNOWN.items():
         assert bool(names.unit(name)) != (name in PURE) and each.formula and names.words(name) != name or name == "J"
     assert (names.unit("mean_velocity_m_per_d"), names.unit("thickness_um")) == ("m/day", "um")
-    assert (names.udunits("donor_min_mg_per_L"), names.udunits("aggregate_area_um2")) == ("mg L-1", "um2")
+    units = {"conductivity_m_per_d": "m d-1", "head_loss_cm": "cm", "aggregate_area_um2": "um2", "thickness_um": "um",
+             "nodes": "1", "acceptor_supplied_pg_per_m": "pg m-1", "donor_min_mg_per_L": "mg L-1"}
+    assert {name: names.udunits(name) for name in units} == units
 
 
 def test_the_table_in_docs_is_that_of_the_definitions():
@@ -262,6 +268,13 @@ def test_warnings_come_first_and_then_what_is_assumed(tmp_path):
     assert "quasi-steady" not in text and "traction" not in text and "Assumed: a pore in the plane" in text
 
 
+def regular(monkeypatch, most):
+    """Points and triangles of the page's own grid over 100 um by 50 um, of about so many nodes."""
+    with monkeypatch.context() as patch:
+        patch.setattr(fields, "MOST_NODES", most)
+        return fields._regular(np.zeros(2), np.array([100.0, 50.0]))
+
+
 def with_middles(points, cells):
     """Straight six-node triangles from those of three."""
     edges = np.sort(cells[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
@@ -273,9 +286,7 @@ def with_middles(points, cells):
 @pytest.mark.parametrize("kind, corners", [("triangle", 3), ("triangle6", 6)])
 def test_a_page_of_a_fine_mesh_is_small_and_true(tmp_path, monkeypatch, kind, corners):
     """1e5 nodes in several times take 3 MB at most; values on the grid are those of the mesh."""
-    monkeypatch.setattr(fields, "MOST_NODES", 101_000 if corners == 3 else 26_000)
-    points, cells = fields._regular(np.zeros(2), np.array([100.0, 50.0]))
-    monkeypatch.undo()
+    points, cells = regular(monkeypatch, 101_000 if corners == 3 else 26_000)
     if corners == 6:
         points, cells = with_middles(points, cells)
     x, y = points.T
@@ -293,12 +304,9 @@ def test_a_page_of_a_fine_mesh_is_small_and_true(tmp_path, monkeypatch, kind, co
     assert len(json.dumps(packed)) < 3e6 - 200e3 and packed["nodes"] == len(points) >= 1e5
     frame, mesh = packed["frames"][-1], packed["meshes"][0]
     assert len(packed["frames"]) >= 2 and mesh["per"] == 3
-    box = np.array(packed["box"]).reshape(2, 2)
-    places = box[:, 0] + numbers(frame["points"], "<u2").reshape(-1, 2) / 65534 * (box[:, 1] - box[:, 0])
-    low, high, text = frame["values"]["head_cm"]
-    told = low + numbers(text, "<u2") / 65534 * (high - low)
-    assert np.abs(told - (3 * places[:, 0] - 2 * places[:, 1])).max() < 0.02
-    shown = places[numbers(mesh["cells"], "<u4").reshape(-1, 3)].mean(axis=1)
+    there = places(packed, frame)[0]
+    assert np.abs(values(frame["values"]["head_cm"]) - there @ [3, -2]).max() < 0.02
+    shown = there[numbers(mesh["cells"], "<u4").reshape(-1, 3)].mean(axis=1)
     inside = numbers(mesh["body"], "<u1") == 1
     clear = np.abs(np.hypot(shown[:, 0] - 50, shown[:, 1]) - 20) > 1
     assert (inside == (np.hypot(shown[:, 0] - 50, shown[:, 1]) < 20))[clear].all()
@@ -314,9 +322,7 @@ def test_a_page_of_many_rows_and_frames_is_small(fast, tmp_path, monkeypatch):
         rows = {column: digits.uniform(0.1, 1.0, 1500) for column in table}
         rows |= {column: np.linspace(0, 30, 1500) + 0.01 * k for k, column in enumerate(times)}
         results.write_table(copy / f"{name}.csv", list(rows), np.column_stack(list(rows.values())).tolist())
-    monkeypatch.setattr(fields, "MOST_NODES", 2500)
-    points, cells = fields._regular(np.zeros(2), np.array([100.0, 50.0]))
-    monkeypatch.undo()
+    points, cells = regular(monkeypatch, 2500)
     region = (points[cells[:, 0], 0] > 50).astype(float)
     nodal = {name: digits.uniform(size=len(points)) for name in fields.SHOWN[1:6]}
     for k in range(40):  # each mesh is another one

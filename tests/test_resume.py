@@ -10,7 +10,7 @@ import pytest
 
 from repro import results
 from repro.cli import main
-from repro.errors import Interrupted, OutputError, SimulationError
+from repro.errors import Interrupted, SimulationError
 from repro.march import loop
 from repro.march.loop import PoreEnd
 from repro.march.simulation import simulate, steps
@@ -19,13 +19,16 @@ from repro.run.checkpoint import NEWEST, PREVIOUS
 from repro.run.running import Watch, resume, run
 from repro.scene import load_scene
 from repro.sweep import task
-from tests.shell import LONG, SHORT, files, lasting, shell, started, told, wait_for
+from tests import faults
+from tests.shell import LONG, SHORT, as_whole, every, files, lasting, shell, started, stopped, told, wait_for
 
 CONTACT = ('aggregate.radius="17.98 um"', 'pore.width="20 um"', 'growth.end="0.6 h"')
 SCENES = {
     "paper, unreported steps": ('growth.end="1 h"', 'output.times=["0.3 h", "1 h"]'),
     "fast": ('numerics.preset="fast"', "numerics.tolerance=0.0005", 'aggregate.radius="25 um"', 'growth.end="3 h"'),
     "fast, rows within steps": ('numerics.preset="fast"', 'growth.end="9.7 h"'),
+    "fast, jumps": ('numerics.preset="fast"', 'growth.end="0.8 h"', 'substrates.donor.supply='
+                    '[["0 h", "10 mg/L"], ["0.3 h", "0 mg/L"], ["0.5 h", "20 mg/L"]]'),
     "paper, rows within steps": ('growth.end="0.7 h"', 'output.times=["0.05 h", "0.1 h", "0.4 h", "0.47 h"]'),
     "fast, unreported steps, contact": ('numerics.preset="fast"', "numerics.tolerance=0.0001", *CONTACT,
                                         'output.times=["0.6 h"]'),
@@ -52,15 +55,7 @@ MORE = {
 }
 
 
-def every(count):
-    """Says stop at each so-manieth step."""
-    calls = 0
-
-    def stop():
-        nonlocal calls
-        calls += 1
-        return signal.SIGTERM if calls % count == 0 else 0
-    return stop
+THREE_HOURS = load_scene("base", ('numerics.preset="fast"', 'growth.end="3 h"'))
 
 
 def in_parts(scene, folder, count):
@@ -144,26 +139,19 @@ def test_the_end_of_the_pore_is_an_end_after_a_resume_too(tmp_path):
     assert lasting(tmp_path / "parts") == lasting(tmp_path / "whole")
 
 
-def test_a_run_that_is_over_is_left_alone(tmp_path, capsys):
-    """Exit 0, says so, changes nothing."""
-    assert main(["run", "flow_only", "--out", str(tmp_path / "run")]) == 0
-    before = {path: path.stat().st_mtime_ns for path in (tmp_path / "run").rglob("*.*")}
-    assert main(["run", "--resume", str(tmp_path / "run")]) == 0
-    assert "completed, before this: nothing to do" in capsys.readouterr().out
-    assert {path: path.stat().st_mtime_ns for path in (tmp_path / "run").rglob("*.*")} == before
-
-
 @pytest.mark.parametrize("content", [None, "{", "[]", "null", '{"scene": "x"}', "[" * 100_000,
                                      '{"scene": "x", "hash": "0", "tables": {}, "status": "running"}',
                                      '{"scene": "x", "hash": "0", "tables": {}, "status": "sunning"}',
                                      '{"scene": "x", "hash": "0", "tables": {"pore": 3}, "status": "running"}'])
 def test_a_folder_without_a_run_is_refused(tmp_path, capsys, content):
     """With status 2 and one line, and nothing is written."""
+    folder = tmp_path / "nowhere" if content is None else tmp_path
     if content is not None:
         (tmp_path / "run.json").write_text(content)
-    assert main(["run", "--resume", str(tmp_path)]) == 2
-    assert "run.json" in (message := capsys.readouterr().err) and message.count("\n") == 1
-    assert files(tmp_path) == {}
+    assert main(["run", "--resume", str(folder)]) == 2
+    message = capsys.readouterr().err
+    assert ("there is no run.json" if content is None else "run.json") in message and message.count("\n") == 1
+    assert files(tmp_path) == {} and not (tmp_path / "nowhere").exists()
 
 
 @pytest.mark.parametrize("status", ["sunning", "", "Completed", "completed ", "failed", "runningly", "interrupted?"])
@@ -178,42 +166,32 @@ def test_a_status_that_no_run_writes_is_none(tmp_path, capsys, status):
     assert message.count("\n") == 1 and files(tmp_path / "run") == before and not task.finished(tmp_path / "run")
 
 
-def stopped(folder, *sets, after=3):
-    """A run of `base` that was stopped after so many steps; its scene."""
-    scene = load_scene("base", ('numerics.preset="fast"', 'growth.end="3 h"', *sets))
-    with pytest.raises(Interrupted):
-        run(scene, folder, watch=Watch(stop=every(after), interval=0.0))
-    return scene
-
-
 def test_an_altered_checkpoint_is_refused_and_the_one_before_is_used(tmp_path, capsys):
     """And the result is the same."""
-    scene = stopped(tmp_path / "run")
+    stopped(THREE_HOURS, tmp_path / "run")
     newest = tmp_path / "run" / NEWEST
     good = newest.read_bytes()
     newest.write_bytes(good[:-1] + bytes([good[-1] ^ 1]))
     assert main(["run", "--resume", str(tmp_path / "run"), "--quiet"]) == 0
     message = capsys.readouterr().err
     assert f"{NEWEST}: refused: its checksum is wrong" in message and "t = 0" not in message
-    run(scene, tmp_path / "whole")
-    assert files(tmp_path / "run") == files(tmp_path / "whole")
+    assert as_whole(THREE_HOURS, tmp_path / "run")
     assert told(tmp_path / "run")["resumes"][0]["time_h"] > 0
 
 
 def test_without_a_good_checkpoint_a_run_starts_again_and_says_so(tmp_path, capsys):
-    scene = stopped(tmp_path / "run")
+    stopped(THREE_HOURS, tmp_path / "run")
     for name in (NEWEST, PREVIOUS):
         path = tmp_path / "run" / name
         path.write_bytes(path.read_bytes()[:1000])
     assert main(["run", "--resume", str(tmp_path / "run"), "--quiet"]) == 0
     message = capsys.readouterr().err
     assert message.count("refused: its checksum is wrong") == 2 and "starts again from t = 0" in message
-    run(scene, tmp_path / "whole")
-    assert files(tmp_path / "run") == files(tmp_path / "whole")
+    assert as_whole(THREE_HOURS, tmp_path / "run")
 
 
 def test_a_checkpoint_without_its_fields_is_refused(tmp_path):
-    stopped(tmp_path / "run")
+    stopped(THREE_HOURS, tmp_path / "run")
     (tmp_path / "run" / "fields" / "fields_0001.vtu").unlink()
     with pytest.warns(UserWarning) as warned:
         resume(tmp_path / "run")
@@ -221,9 +199,8 @@ def test_a_checkpoint_without_its_fields_is_refused(tmp_path):
 
 
 def test_a_change_of_versions_is_told_and_recorded(tmp_path, monkeypatch):
-    stopped(tmp_path / "run")
-    known = results.version
-    monkeypatch.setattr(results, "version", lambda name: "0.0" if name == "scipy" else known(name))
+    stopped(THREE_HOURS, tmp_path / "run")
+    faults.another_version(monkeypatch, "scipy")
     with pytest.warns(UserWarning, match="versions.scipy .* now 0.0.; .* to the last bit"):
         resume(tmp_path / "run")
     (once,) = told(tmp_path / "run")["resumes"]
@@ -231,7 +208,7 @@ def test_a_change_of_versions_is_told_and_recorded(tmp_path, monkeypatch):
 
 
 def test_the_machine_is_recorded_and_threads_are_no_change(tmp_path, monkeypatch, recwarn):
-    stopped(tmp_path / "run")
+    stopped(THREE_HOURS, tmp_path / "run")
     found = told(tmp_path / "run")["conditions"]
     assert found["machine"] and found["blas"] and len(found["source"]) == 8
     assert found["threads"].get("OMP_NUM_THREADS") != "7"
@@ -257,8 +234,7 @@ def test_a_failure_says_where_the_last_good_state_is(tmp_path, monkeypatch):
     assert told(tmp_path / "run")["status"] == f"failed: {message}"
     monkeypatch.setattr(growth, "MOST_ITERATIONS", most)
     assert resume(tmp_path / "run") == "completed"
-    run(scene, tmp_path / "whole")
-    assert files(tmp_path / "run") == files(tmp_path / "whole")
+    assert as_whole(scene, tmp_path / "run")
 
 
 def test_results_reach_the_disk_while_a_run_goes_on(tmp_path):
@@ -286,8 +262,7 @@ def test_signals_end_a_run_that_goes_on_later(tmp_path, number):
     assert "Traceback" not in message and told(tmp_path / "run")["status"] == "interrupted"
     assert len((tmp_path / "run" / "timeseries.csv").read_text().splitlines()) > 3
     assert resume(tmp_path / "run") == "completed"
-    run(load_scene("base", ('growth.end="1.6 h"',)), tmp_path / "whole")
-    assert files(tmp_path / "run") == files(tmp_path / "whole")
+    assert as_whole(load_scene("base", ('growth.end="1.6 h"',)), tmp_path / "run")
 
 
 @pytest.fixture(scope="module")
@@ -302,7 +277,8 @@ def whole(tmp_path_factory):
 def test_killed_at_twenty_moments(tmp_path, whole):
     """SIGKILL at seeded random moments of a run with checkpoints every 0.2 s, from its start to its end, then resumed:
     the bits of the whole run, each time."""
-    seconds, draw, gone_on = told(whole)["wall_time_s"], random.Random(5), 0
+    seconds, gone_on = told(whole)["wall_time_s"], 0
+    draw = random.Random(5)
     for k in range(20):
         out = tmp_path / str(k)
         process = started(*LONG, "--out", out, "--checkpoint", "0.2")
@@ -338,7 +314,8 @@ def test_a_run_killed_at_its_very_end_is_tidied(tmp_path):
 @pytest.mark.thorough
 def test_killed_again_and_again(tmp_path, whole):
     """Each time a little further, until it is done."""
-    out, draw, status, last = tmp_path / "run", random.Random(7), None, 0
+    out, draw = tmp_path / "run", random.Random(7)
+    status, last = None, 0
     arguments = [*LONG, "--out", out]
     for _ in range(40):
         process = started(*arguments, "--checkpoint", "0.1")
@@ -363,9 +340,3 @@ def test_one_thread_or_two(tmp_path, scene):
         assert shell(*scene, "--out", tmp_path / threads, threads=threads)[0] == 0
     assert files(tmp_path / "1") == files(tmp_path / "2")
     assert told(tmp_path / "2")["conditions"]["threads"]["OMP_NUM_THREADS"] == "2"
-
-
-def test_nothing_but_a_folder_is_needed(tmp_path):
-    with pytest.raises(OutputError, match="there is no run.json"):
-        resume(tmp_path / "nowhere")
-    assert not (tmp_path / "nowhere").exists()

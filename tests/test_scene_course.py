@@ -11,12 +11,13 @@ from hypothesis import strategies as st
 from repro.check.checked import check
 from repro.check.numbers import judged
 from repro.cli import main
-from repro.march.simulation import simulate, steps
+from repro.march.simulation import simulate
 from repro.model import pore
 from repro.results import read_table
 from repro.scene import SceneError, load_scene, parse_scene, scene_hash, scene_tables
 from repro.scene.course import Course
 from repro.scene.text import scene_text
+from tests.shell import flags
 from tests.strategies import scene
 
 DONOR = "substrates.donor.supply"
@@ -149,17 +150,9 @@ def test_what_is_judged_is_the_extreme():
     assert "0 to 20 mg/L, in steps, the last from 0.5 h" in dict(told.modelled)["substrates"]
 
 
-def test_a_run_over_jumps_is_the_same_from_any_state():
-    """To the last bit."""
-    made = load_scene("base", SHORT)
-    whole = list(steps(made))
-    for state, _ in whole[1:-1]:
-        assert list(simulate(made, state=state))[-1].pore.mass == whole[-1][1].pore.mass
-
-
 def test_commands_take_tables(tmp_path):
     """What a run expects of the machine, a sweep's processes, a longer run and pages."""
-    tables = [part for entry in (*SHORT, RISING) for part in ("--set", entry)]
+    tables = flags(*SHORT, RISING)
     assert main(["check", "base", *tables]) == 0
     assert main(["run", "base", *tables, "--out", str(tmp_path / "run")]) == 0
     assert main(["run", "--resume", str(tmp_path / "run"), "--set", 'growth.end="1.2 h"']) == 0

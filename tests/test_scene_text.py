@@ -51,8 +51,8 @@ def test_what_is_printed_is_the_scene_and_nothing_else(name, capsys):
 def test_defaults_that_are_made_active_change_nothing(name):
     """Each line alone, in the sections that the scene has."""
     for overrides in ((), *([f"numerics.preset={preset}"] for preset in PRESETS)):
-        made, text, inside = load_scene(name, overrides), scene_text(name, overrides), True
-        lines = text.splitlines()
+        made, inside = load_scene(name, overrides), True
+        lines = scene_text(name, overrides).splitlines()
         for number, line in enumerate(lines):
             inside = line.startswith("[") if re.match(r"#?\[", line) else inside
             key = line[1:].partition(" ")[0]

@@ -21,7 +21,6 @@ from tests.strategies import (
     plug,
     refinements,
     scenes,
-    seed,
     share,
     widths,
 )
@@ -33,13 +32,18 @@ either = attached_aggregates(width=widths) | attached_aggregates(width=widths, g
 
 @given(either, refinements)
 def test_refining_an_outline_keeps_its_shape_exactly(drawn, refinement):
-    """Area to round-off; interface nodes, ends of contact and fixed points to the last bit; walls straight."""
+    """Area, extremes and places at t = 0 to round-off; interface nodes, ends of contact and fixed points to the last
+    bit; walls straight."""
     outline, width = drawn
+    outline = replace(outline, origin=outline.points * [0.5, 0.7])
     sizing = Sizing(width, refinement, FILM)
     sizes, corners = of.interface_sizes(outline.corners, sizing), outline.corners
     fine = of.split(outline, sizing)
     assert fine.area == pytest.approx(outline.area, rel=1e-13)
     assert fine.geometry == outline.geometry
+    assert fine.origin == pytest.approx(fine.points * [0.5, 0.7], rel=1e-12, abs=1e-12)
+    found, wanted = ((one.upstream, one.downstream, one.thickness) for one in (fine, outline))
+    assert found == pytest.approx(wanted, rel=1e-13)
     kept = {tuple(p) for p in fine.corners.points}
     assert {tuple(p) for p in corners.points[corners.wall == FREE]} <= kept
     assert {tuple(p) for p in corners.points[[0, 10]]} <= kept
@@ -49,20 +53,6 @@ def test_refining_an_outline_keeps_its_shape_exactly(drawn, refinement):
     edge = np.linalg.norm(np.roll(fine.points, -1, axis=0) - fine.points, axis=1)[fine.interface_edges()]
     unequal = 1.0 if outline.geometry == 1 else 1.35  # parts of an arc are equal in t
     assert edge.max() <= unequal * of.SPLIT * sizes.max() * (1 + 1e-12)
-
-
-@given(st.floats(1.5, 4.0))
-def test_new_nodes_of_a_grown_seed_remember_its_arc(stretch):
-    """Between nodes that were on the half-circle at t = 0 the material was on it too; on the wall it was on the wall.
-    """
-    old = seed(5.0, 0.5)
-    grown = replace(old, points=old.points * [stretch, 1.1 * stretch])
-    fine = of.split(grown, Sizing(100.0, 4.0, FILM, seed=0.0))
-    free = fine.wall == FREE
-    assert free.sum() > (old.wall == FREE).sum()
-    assert np.hypot(*fine.origin[free].T) == pytest.approx(5.0, rel=1e-9)
-    assert fine.origin[~free] * [stretch, 1.0] == pytest.approx(fine.points[~free], abs=1e-12)
-    assert fine.area == pytest.approx(grown.area, rel=1e-13)
 
 
 @given(widths, st.floats(-20.0, 20.0))
@@ -102,6 +92,7 @@ def test_the_meshed_extent_follows_section_3_1(drawn, length):
     assert found == pytest.approx(oracles.extent(outline.points, width, length), rel=1e-12)
     assert -length / 2 <= found[0] and found[1] <= length / 2
     assert of.meshed_extent(outline, width, length, whole=True) == (-length / 2, length / 2)
+    assert np.ptp(of.meshed_extent(None, width, length)) == pytest.approx(min(3 * width, length), rel=1e-15)
 
 
 @given(outlines(width=widths), lengths, st.floats(0.0, 1.2), st.booleans())
@@ -131,15 +122,6 @@ def test_the_mesh_of_a_run_has_the_extent_of_section_3_1(made):
         again = remeshing.remesh(made, now, now, 0.0)[0].mesh
         assert again.ends == pytest.approx(oracles.extent(now.outline.points, width, length), rel=1e-12)
         assert (again.points[:, 0].min(), again.points[:, 0].max()) == again.ends
-
-
-def test_the_extents_of_the_paper():
-    """110 um at first (C07), 2 (30 + 75) = 210 um with a half-width of 30 um (C08), the whole pore, 3 W without
-    biomass."""
-    assert np.ptp(of.meshed_extent(seed(5.0), 50.0, 600.0)) == 110.0
-    assert np.ptp(of.meshed_extent(seed(30.0), 50.0, 600.0)) == 210.0
-    assert of.meshed_extent(seed(5.0), 50.0, 80.0) == (-40.0, 40.0)
-    assert np.ptp(of.meshed_extent(None, 50.0, 600.0)) == 150.0
 
 
 @given(attached_aggregates(width=widths), refinements)

@@ -5,9 +5,8 @@ import pytest
 from repro.fem import elements
 from repro.fem.mesh import Mesh, curved
 from repro.fem.space import Space
-from repro.march.simulation import simulate
 from repro.model import pore
-from repro.scene import SceneError, load_scene
+from repro.scene import load_scene
 from tests.strategies import bent_inside, meshed, plug
 
 #: Triangles with three nodes; with six on straight edges; as a scene makes them; and with all inner edges bent.
@@ -63,21 +62,6 @@ def test_a_polynomial_of_the_order_is_its_own_interpolant(meshes, kind, order):
 
 
 @orders
-def test_three_nodes_and_six_on_the_same_edges_are_the_same_functions(meshes, order):
-    """Stiffness, mass, load and places of the nodes."""
-    three, six = (Space(meshes[kind], order) for kind in ("straight", "flat"))
-    assert three.count == six.count and np.array_equal(np.sort(three.cells[:, :3]), np.sort(six.cells[:, :3]))
-    here, there = (space.points[space.cells] for space in (three, six))
-    assert np.allclose(here, there, rtol=0, atol=1e-12)
-    assert np.allclose(three.stiffness, six.stiffness, rtol=0, atol=1e-11)
-    masses = [space.mass(space.at.dx) for space in (three, six)]
-    assert np.allclose(*masses, rtol=0, atol=1e-12 * np.abs(masses[0]).max())
-    along = [space.at.dx * at_quadrature(space.mesh, space.table)[0] for space in (three, six)]
-    loads = [space.load(weight) for space, weight in zip((three, six), along)]
-    assert np.allclose(*loads, rtol=0, atol=1e-12 * np.abs(loads[0]).max())
-
-
-@orders
 @kinds
 def test_linear_and_constant_fields_are_exact_on_any_triangle(meshes, kind, order):
     """A curved map holds places themselves where the order is the geometry's or more; with linear functions on curved
@@ -98,16 +82,13 @@ def test_linear_and_constant_fields_are_exact_on_any_triangle(meshes, kind, orde
 @kinds
 def test_areas_are_integrated_exactly(meshes, kind, order):
     """The channel is ends x width whatever lies inside; the aggregate is a half-disc as its arcs are, or the polygon of
-    its corners; functions add up to it, and gradients of constants to nothing."""
+    its corners. Loads, masses and stiffness are scikit-fem's in `test_weak_forms.py`."""
     mesh = meshes[kind]
     space = Space(mesh, order)
     channel = np.ptp(mesh.ends) * mesh.width
     for dx in (space.at.dx, space.gradients_at.dx):
         assert dx.min() > 0 and dx.sum() == pytest.approx(channel, rel=1e-13)
         assert dx[mesh.biomass].sum() == pytest.approx(mesh.area(), rel=1e-12)
-    assert space.load(space.at.dx).sum() == pytest.approx(channel, rel=1e-13)
-    assert space.mass(space.at.dx).sum() == pytest.approx(channel, rel=1e-12)
-    assert np.abs(space.stiffness.sum(axis=2)).max() < 1e-11
     if order > 1 or mesh.geometry == 1:
         assert space.reaction.dx.sum() == pytest.approx(mesh.area(), rel=1e-12)
 
@@ -150,24 +131,16 @@ def test_nodes_of_the_boundary_lie_on_it(meshes, kind, order):
 
 @orders
 @kinds
-def test_loads_masses_and_means_of_an_end(meshes, kind, order):
-    """Of a parabola where the order holds it (else of a straight line), times functions that add up to one, and to y:
-    flux, its first moment, and the mean."""
+def test_means_of_an_end(meshes, kind, order):
+    """Of a parabola that leans to a wall, where the order holds it (else of a straight line). Loads and masses of ends
+    are scikit-fem's in `test_weak_forms.py`."""
     mesh = meshes[kind]
     space, W = Space(mesh, order), mesh.width
     y = space.points[:, 1]
-    speed, flux, moment = (y, W**2 / 2, W**3 / 3) if order == 1 else (y * (W - y), W**3 / 6, W**4 / 12)
+    speed, mean = (y, W / 2) if order == 1 else (y * (2 * W - y), 2 * W**2 / 3)
     for edges in (space.dofs.inlet, space.dofs.outlet):
         assert space.end_lengths(edges).sum() == pytest.approx(W, rel=1e-13)
-        load = space.summed(edges, space.end_loads(edges, speed))
-        assert load.sum() == pytest.approx(flux, rel=1e-12)
-        assert load @ y == pytest.approx(moment, rel=1e-12)
-        mass = space.end_masses(edges, speed)
-        assert np.allclose(mass.sum(axis=2), space.end_loads(edges, speed), rtol=0, atol=1e-12 * np.abs(load).max())
-        assert np.allclose(mass, np.swapaxes(mass, 1, 2), rtol=0, atol=1e-13 * np.abs(mass).max())
-        assert space.mean_over(edges, speed) == pytest.approx(flux / W, rel=1e-12)
-        away = np.setdiff1d(np.arange(space.count), edges)
-        assert not load[away].any()
+        assert space.mean_over(edges, speed) == pytest.approx(mean, rel=1e-12)
 
 
 @orders
@@ -196,32 +169,18 @@ def test_ends_and_walls_of_one_edge_each(order):
         assert sorted(space.dofs.walls) == np.flatnonzero((y < 1e-12) | (y > 1 - 1e-12)).tolist()
 
 
-@pytest.mark.parametrize("order", [2, 3])
-@pytest.mark.parametrize("kind", KINDS[1:])
-def test_quadratic_fields_come_back(meshes, kind, order):
-    """Of numbers and of vectors."""
+@orders
+@kinds
+def test_fields_of_the_mesh_come_back(meshes, kind, order):
+    """Of numbers and of vectors, where the order holds what the mesh's nodes say."""
     mesh = meshes[kind]
+    if order < mesh.geometry:
+        return
     space, field = Space(mesh, order), np.random.default_rng(5).normal(size=(len(mesh.points), 2))
     for given in (field, field[:, 0]):
         there = space.of_mesh(given)
         assert there.shape == (space.count, *given.shape[1:])
         assert np.allclose(space.to_mesh(there), given, rtol=0, atol=1e-13)
-
-
-@orders
-def test_linear_fields_come_back_from_every_order(meshes, order):
-    """On triangles of three nodes."""
-    mesh = meshes["straight"]
-    field = np.random.default_rng(6).normal(size=(len(mesh.points), 2))
-    space = Space(mesh, order)
-    assert np.allclose(space.to_mesh(space.of_mesh(field)), field, rtol=0, atol=1e-14)
-
-
-@kinds
-def test_the_same_area_by_all_rules(meshes, kind):
-    """Areas of curved triangles are integrals of polynomials that all rules have exactly."""
-    linear, quadratic, cubic = (Space(meshes[kind], order).at.dx.sum(axis=1) for order in (1, 2, 3))
-    assert np.allclose(cubic, quadratic, rtol=1e-12) and np.allclose(linear, quadratic, rtol=1e-12)
 
 
 def test_points_for_gradients_are_those_for_products_where_rules_agree(meshes):
@@ -266,25 +225,6 @@ def test_a_plug_from_wall_to_wall_has_its_nodes_on_both(geometry):
         inside = np.intersect1d(space.dofs.walls, space.cells[mesh.biomass])
         y = space.points[inside, 1]
         assert np.abs(y).min() < 1e-9 and np.abs(y - 50).min() < 1e-9 and len(inside) > 10 * order
-
-
-def test_a_run_with_cubic_fields():
-    """Its rows have what quadratic ones have, and nearly the same."""
-    found = {}
-    for kind in ("quadratic", "cubic"):
-        scene = load_scene("base", ['numerics.preset="fast"', f'numerics.elements="{kind}"', 'growth.end="2 h"',
-                                    'output.times=["2 h"]'])
-        *_, last = simulate(scene)
-        count = last.pore.space.count
-        assert len(last.solved.concentrations.acceptor) == len(last.solved.flow.velocity) == count
-        found[kind] = np.array([last.solved.flow.head_loss, last.pore.outline.area])
-    apart = np.abs(found["cubic"] / found["quadratic"] - 1)
-    assert (apart > 1e-9).any() and (apart < 1e-2).all()
-
-
-def test_what_cubic_elements_have_one_way_of_is_refused_by_their_name():
-    with pytest.raises(SceneError, match='numerics.elements = "cubic"'):
-        load_scene("base", ['numerics.preset="fast"', 'numerics.elements="cubic"', 'numerics.transfer="linear"'])
 
 
 def test_degrees_that_are_integrated():

@@ -223,11 +223,11 @@ def test_runs_in_turns_do_not_see_each_other(which, monkeypatch):
     what it is alone, to the last bit, and the two differ in the last bits."""
     made = faults.stand_in_package(monkeypatch, "pymetis")
     pair = scenes()[which], scenes('numerics.ordering="metis"')[which]
-    alone = [[numbers(instant) for instant in simulate(scene)] for scene in pair]
+    alone = [list(map(numbers, simulate(scene))) for scene in pair]
     called = len(made.calls)
     runs, together = [simulate(scene) for scene in pair], ([], [])
     for instants in zip(*runs):
-        for found, instant in zip(together, instants):
+        for found, instant in zip(together, instants, strict=True):
             found.append(numbers(instant))
     assert len(alone[0]) == len(alone[1]) == len(together[0]) >= 3
     assert alike(tuple(alone[0]), tuple(together[0])) and alike(tuple(alone[1]), tuple(together[1]))

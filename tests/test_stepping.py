@@ -1,6 +1,10 @@
-"""Steps of the midpoint rule: where they end, which are taken, what they conserve, and their order."""
+"""Steps of the midpoint rule: where they end, which are taken, and what depends on rows and ends.
+
+That they are of second order is the case coupling-midpoint-order; that their ledgers close is in `test_balances.py`.
+"""
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -62,23 +66,36 @@ def test_rows_are_at_the_reported_times_to_the_last_bit(order):
     assert [instant.pore.time for instant in found] == [0.0, 0.37, 0.5, 0.8]
     rows = [row for instant in found for row in instant.ledgers]
     assert len(rows) > 3 and rows[0].start == 0.0 and 0.5 < rows[-1].end <= 0.8
-    assert all(two.start == pytest.approx(one.end, abs=1e-12) for one, two in zip(rows, rows[1:]))
-    ends = [[row.end for row in instant.ledgers] for instant in found]
-    assert all(max(now, default=0.0) <= instant.pore.time for now, instant in zip(ends, found))
+    for one, two in pairwise(rows):
+        assert two.start == pytest.approx(one.end, abs=1e-12)
+        assert two.biomass_before == pytest.approx(one.biomass_after, rel=1e-12)
+    for instant in found:
+        assert max((row.end for row in instant.ledgers), default=0.0) <= instant.pore.time
 
 
-def test_without_times_every_step_is_a_row_and_there_are_25():
-    """And the last one is at the end; a run of less than 24 times 12 min has one every 12 min."""
-    for end, apart in ((4.8, 0.2), (9.59, 0.2), (9.6, 0.4), (19.4, 0.8), (45.0, 1.6)):
-        rows = stepping.rows(base(f'growth.end="{end} h"'))
-        assert 24 <= len(rows) <= 49 and rows[-1] == end and rows[0] == apart
-        assert np.diff(rows[:-1]) == pytest.approx(apart, abs=1e-9) and rows[-1] - rows[-2] <= apart * 1.0001
-    assert stepping.rows(base('growth.end="0.5 h"')) == (0.2, 0.4, 0.5)
-    assert stepping.rows(base('growth.end="0 h"')) == ()
+@pytest.mark.parametrize("end, apart", [
+    (0.001, 0.2 / 2**13), (0.01, 0.2 / 2**9), (0.5, 0.0125), (1.0, 0.025), (2.0, 0.05), (2.4, 0.1), (4.79, 0.1),
+    (4.8, 0.2), (9.59, 0.2), (9.6, 0.4), (19.4, 0.8), (45.0, 1.6)])
+def test_without_times_there_are_25_rows_at_round_times_in_a_run_of_any_length(end, apart):
+    """And the last one is at the end."""
+    rows = stepping.rows(base(f'growth.end="{end} h"'))
+    assert 24 <= len(rows) <= 49 and rows[-1] == end and rows[0] == pytest.approx(apart, abs=1e-9)
+    assert np.diff(rows[:-1]) == pytest.approx(apart, abs=2e-9) and 0 < rows[-1] - rows[-2] <= apart * 1.0001
+
+
+@pytest.mark.parametrize("end, step", [("0 h", "12 min"), ("1e-9 h", "12 min"), ("1e-8 h", "100 h"), ("1 h", "1000 h"),
+                                       ("3e-7 h", "1e-6 h")])
+def test_rows_of_runs_shorter_than_times_are_told_apart_do_not_coincide(end, step):
+    made = base(f'growth.end="{end}"', f'growth.time_step="{step}"')
+    rows = stepping.rows(made)
+    assert bool(rows) == (made.growth.end > 1e-9) and all(np.diff((0.0, *rows)) >= 0.99e-9)
+
+
+def test_without_times_every_step_is_a_row():
     found = run(base('growth.end="0.5 h"', "numerics.tolerance=0.0001"))
     steps = [row.end for instant in found for row in instant.ledgers]
     times = [instant.pore.time for instant in found]
-    assert times[-1] == steps[-1] == 0.5 and len(steps) > 2 and len(found) >= 6
+    assert times[-1] == steps[-1] == 0.5 and len(steps) > 2 and len(found) >= 25
     assert set(steps) | set(stepping.rows(base('growth.end="0.5 h"'))) == set(times[1:])
     assert all(len(instant.ledgers) == (instant.pore.time in steps) for instant in found)
 
@@ -102,12 +119,14 @@ def steps_of(name, *changes):
 
 def same(one, two):
     """Are two states the same to the last bit, rows aside?"""
-    names = ("active", "inert", "theta", "wall", "fixed", "pressure")
-    arrays = [[state.pore.mesh.points, *(getattr(state.pore, key) for key in names),
-               *(getattr(state.pore.concentrations, key, np.zeros(1)) for key in ("acceptor", "donor"))]
-              for state in (one, two)]
-    alike = all(a.shape == b.shape and (a == b).all() for a, b in zip(*arrays))
+    alike = all(map(np.array_equal, arrays(one.pore), arrays(two.pore)))
     return alike and one.pore.time == two.pore.time and one.pace == two.pace
+
+
+def arrays(now):
+    names = ("active", "inert", "theta", "wall", "fixed", "pressure")
+    return [now.mesh.points, *(getattr(now, key) for key in names),
+            *(getattr(now.concentrations, key, None) for key in ("acceptor", "donor"))]
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -253,50 +272,6 @@ def test_a_step_that_errs_too_much_is_not_taken(monkeypatch):
     assert tried == pytest.approx([0.2, 0.9 / 4 * 0.2])
     assert after.length == pytest.approx(0.9 / 0.9 * tried[-1])
     assert (after.duration, after.estimate) == pytest.approx((tried[-1], 16 * 0.01 / 0.2**2 * tried[-1] ** 2))
-
-
-@EVERY_ORDER
-def test_ledgers_close(order):
-    """Biomass to 1e-10 and both substrates to 1e-8 in every step, remeshes and contact included; each step starts from
-    what the last one left."""
-    found = run(near_contact(order))
-    rows = [row for instant in found for row in instant.ledgers]
-    assert sum(instant.remeshes for instant in found) > (order > 1), "else little is tested"
-    for row in rows:
-        assert abs(row.biomass_before + row.biomass_made - row.biomass_after) < 1e-10 * row.biomass_after
-        for supplied, out, consumed in zip(row.supplied, row.out, row.consumed):
-            assert abs(supplied - out - consumed) <= 1e-8 * supplied
-    for one, two in zip(rows, rows[1:]):
-        assert two.biomass_before == pytest.approx(one.biomass_after, rel=1e-12)
-
-
-@EVERY_ORDER
-def test_a_run_is_the_same_every_time(order):
-    """To the last bit."""
-    one, two = (run(base('growth.end="1 h"', *sets(order))) for _ in range(2))
-    assert [i.pore.time for i in one] == [i.pore.time for i in two]
-    assert all((a.pore.mesh.points == b.pore.mesh.points).all() for a, b in zip(one, two))
-
-
-@EVERY_ORDER
-def test_the_midpoint_rule_is_of_second_order(order):
-    """Halving uniform steps quarters the change of the area and of the upstream tip, on one mesh."""
-    made = base(*sets(order), f"numerics.refinement={0.4 if order < 3 else 0.25}")
-    found = np.array([_after(made, steps) for steps in (1, 2, 4)])
-    ratio = np.diff(found, axis=0)
-    assert (np.abs(np.log2(ratio[0] / ratio[1]) - 2) < 0.25).all()
-
-
-def _after(made, steps):
-    """Area and upstream tip after 2 h in equal steps."""
-    now, solved = pore.seeded(made), None
-    for _ in range(steps):
-        solved = pore.solve(made, now)
-        now = replace(now, concentrations=solved.concentrations)
-        step = midpoint.attempt(made, now, solved, 2.0 / steps).step
-        assert not step.remeshed
-        now = step.pore
-    return now.outline.area, now.outline.upstream
 
 
 @EVERY_ORDER

@@ -75,10 +75,10 @@ def test_each_stratum_of_each_range_has_one_value(ranges, samples, seed):
         low, high = factor.values
         parts = [math.log(v / low) / math.log(high / low) if factor.spacing == "log" else (v - low) / (high - low)
                  for v in drawn]
-        low_strata, high_strata = ([int(samples * part + nudge) for part in parts] for nudge in (-1e-6, 1e-6))
         assert all(low <= v <= high for v in drawn)
         # A value within round-off of a border is counted on the side that leaves each stratum one.
-        certain = sorted(a for a, b in zip(low_strata, high_strata) if a == b)
+        certain = sorted(int(samples * part) for part in parts
+                         if int(samples * part - 1e-6) == int(samples * part + 1e-6))
         assert len(set(certain)) == len(certain)
         if len(certain) == samples:
             assert certain == list(range(samples))

@@ -1,5 +1,9 @@
-"""Substrates (7)-(13), quasi-steady, with elements of every order: closed forms, the balance, stoichiometry, starved
-pores and sharp fronts, scaling, the printed inlet [E4], and what Newton's method is told."""
+"""Substrates (7)-(13), quasi-steady, with elements of every order: closed forms, sharp fronts, scaling, the printed
+inlet [E4], what is refused, and what Newton's method is told.
+
+The balance, starved pores and the mean biomass of a step are the cases transport-balance, transport-starved and
+transport-mean-biomass; that uptake is what the rates make of the concentrations is in `test_balances.py`.
+"""
 from dataclasses import replace
 from functools import cache
 
@@ -11,7 +15,7 @@ from skfem import MeshTri
 from reference import robin_channel
 from repro.errors import TransportError, Unresolved
 from repro.fem.mesh import Mesh, triangle_areas
-from repro.model import biomass, kinetics, pore, remeshing, transport
+from repro.model import pore, remeshing, transport
 from repro.model.flow import Flow
 from repro.model.kinetics import Sink
 from repro.model.transport import Balance, Concentrations
@@ -30,9 +34,6 @@ from tests.strategies import (
 
 VELOCITY = 2.9e6 / 24  # um/h
 EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
-HIGHER = pytest.mark.parametrize("order", [2, 3])
-
-
 @cache
 def solved(radius="5 um", width="50 um", acceptor="10 mg/L", donor="10 mg/L", velocity="2.9 m/day", inlet="local",
            extent="central", order=1):
@@ -47,10 +48,10 @@ def sink_of(now):
     return Sink(now.active)
 
 
-def everywhere(now, acceptor, donor=None):
-    """Concentrations that are the same at all nodes."""
-    ones = np.ones(now.space.count)
-    return Concentrations(acceptor * ones, (acceptor if donor is None else donor) * ones)
+def everywhere(now, value):
+    """Both concentrations, the same at all nodes."""
+    same = np.full(now.space.count, value)
+    return Concentrations(same, same)
 
 
 def defects(now, found):
@@ -80,28 +81,23 @@ def linear_uptake(rate, space, velocity):
 
 
 def strip_error(rate, refinement, order=1):
-    """(h, largest error, C) with uptake in a strip from 0 to 40 um."""
+    """(h, largest error, range of C) with uptake in a strip from 0 to 40 um."""
     grid, _ = meshed(plug(50.0, 0.0, 40.0), refinement=refinement, ends=(-75.0, 115.0))
     space = space_of(grid, order)
     found, acceptor = linear_uptake(rate, space, "2.9 m/day")
     water, inside = acceptor.diffusivity, acceptor.diffusivity_in_aggregate
     exact = robin_channel.strip(space.points[:, 0], VELOCITY, 10.0, water, inside, rate, 40.0)
-    return len(grid.points) ** -0.5, np.abs(found - exact).max(), exact
+    return len(grid.points) ** -0.5, np.abs(found - exact).max(), np.ptp(exact)
 
 
-def test_first_order_uptake_in_a_strip_follows_the_closed_form():
-    """(7), (11), (12), (26), with D of water and of biomass: 10 mg/L down to 1.9; second order (measured 2.0), 6e-3
-    mg/L at the default size."""
-    size, error, exact = zip(*(strip_error(1e4, r) for r in (0.6, 1.0, 1.5)))
-    assert exact[1].min() < 2.0 and exact[1].max() > 7.0
-    assert error[1] < 8e-3 and 1.6 < fitted_order(size, error) < 2.5
-    assert strip_error(1e3, 1.0)[1] < 2e-3
-
-
-@pytest.mark.parametrize("order, most, orders", [(2, 2e-3, (2.5, 3.6)), (3, 1e-4, (3.5, 4.7))])
-def test_higher_orders_approach_the_strip_with_their_order(order, most, orders):
-    """On meshes of 0.3 to 0.8 of the default size."""
-    size, error, _ = zip(*(strip_error(1e4, r, order) for r in (0.3, 0.5, 0.8)))
+@pytest.mark.parametrize("order, refinements, most, orders", [
+    (1, (0.6, 1.0, 1.5), 8e-3, (1.6, 2.5)), (2, (0.3, 0.5, 0.8), 2e-3, (2.5, 3.6)),
+    (3, (0.3, 0.5, 0.8), 1e-4, (3.5, 4.7))])
+def test_first_order_uptake_in_a_strip_follows_the_closed_form(order, refinements, most, orders):
+    """(7), (11), (12), (26), with D of water and of biomass: 10 mg/L down to 1.9, with the order of the elements
+    (measured 2.0 for linear ones)."""
+    size, error, fall = zip(*(strip_error(1e4, r, order) for r in refinements))
+    assert min(fall) > 5.0, "else little is tested"
     assert error[1] < most and orders[0] < fitted_order(size, error) < orders[1]
 
 
@@ -109,82 +105,38 @@ def test_higher_orders_approach_the_strip_with_their_order(order, most, orders):
 @pytest.mark.parametrize("inlet", ["local", "mean"])
 def test_a_constant_supply_stays_constant_without_biomass(inlet, order):
     """Around an obstacle and for both forms of (11): to round-off with linear elements, whose w is divergence-free;
-    with the others to what is left of div u within an element."""
+    with the others to what is left of div u within an element. Newton's method needs a step, from nothing at all."""
     _, now, found = solved("30 um", inlet=inlet, order=order)
-    alone = transport.steady(found.problem, None, everywhere(now, 3.0))
+    alone = transport.steady(found.problem, None, everywhere(now, 0.0))
+    assert alone.iterations <= 2
     bound = 1e-10 if order == 1 else 3e-2
     assert alone.acceptor == pytest.approx(np.full(len(alone.acceptor), 10.0), abs=bound)
     assert alone.donor == pytest.approx(np.full(len(alone.donor), 10.0), abs=bound)
 
 
-STARVED = [("27 um", "0.15 mg/L", "0.15 mg/L"), ("42 um", "0.15 mg/L", "0.15 mg/L"), ("42 um", "0.15 mg/L", "10 mg/L"),
-           ("42 um", "10 mg/L", "0.15 mg/L"), ("42 um", "10 mg/L", "10 mg/L")]
-
-
 @EVERY_ORDER
-@pytest.mark.parametrize("radius, acceptor, donor", STARVED)
-def test_the_balance_closes_and_nothing_is_negative_in_starved_pores(radius, acceptor, donor, order):
-    """0.35 m/d, aggregates of 27 and 42 um in 50 um. The rows are solved to 1e-13 of their terms, some 1e3 times the
-    supply: 1e-9 at the worst, 1.1e-10 measured."""
-    _, now, found = solved(radius, acceptor=acceptor, donor=donor, velocity="0.35 m/day", order=order)
-    assert np.abs(defects(now, found)).max() < 1e-9
-    for field, substrate in ((found.concentrations.acceptor, acceptor), (found.concentrations.donor, donor)):
-        most = float(substrate.split()[0])
-        assert 0 < field.min() and field.max() <= most * (1 + (1e-12 if order == 1 else 1e-3))
+def test_newton_does_not_fall_into_a_negative_root(order):
+    """From less than nothing. Undamped, with C / (C + K) below zero too, Newton's method "converges" to -70 mg/L
+    (measured): uptake is a function of max(C, 0)."""
+    _, now, found = solved("42 um", acceptor="0.15 mg/L", donor="0.15 mg/L", velocity="0.35 m/day", order=order)
+    again = transport.steady(found.problem, sink_of(now), everywhere(now, -10.0))
+    assert again.acceptor == pytest.approx(found.concentrations.acceptor, rel=1e-7)
+    assert again.donor == pytest.approx(found.concentrations.donor, rel=1e-7)
+    assert again.acceptor.min() > 0
 
 
-@EVERY_ORDER
-@pytest.mark.parametrize("radius", ["27 um", "42 um"])
-def test_newton_does_not_fall_into_a_negative_root(radius, order):
-    """From first iterates of 10 mg/L over a supply of 0.15, and of less than nothing. Undamped, with C / (C + K) below
-    zero too, Newton's method "converges" to -31 and -70 mg/L (measured): uptake is a function of max(C, 0)."""
-    made, now, found = solved(radius, acceptor="0.15 mg/L", donor="0.15 mg/L", velocity="0.35 m/day", order=order)
-    for start in (10.0, -10.0):
-        again = transport.steady(found.problem, sink_of(now), everywhere(now, start))
-        assert again.acceptor == pytest.approx(found.concentrations.acceptor, rel=1e-7)
-        assert again.donor == pytest.approx(found.concentrations.donor, rel=1e-7)
-        assert again.acceptor.min() > 0
-
-
-@EVERY_ORDER
-def test_the_answer_does_not_depend_on_the_first_iterate(order):
-    """Random first iterates: one steady state."""
-    _, now, found = solved("42 um", velocity="0.35 m/day", order=order)
-    rng = np.random.default_rng(1)
-    for scale in (0.1, 30.0):
-        guess = Concentrations(*rng.uniform(0.0, scale, (2, now.space.count)))
-        again = transport.steady(found.problem, sink_of(now), guess)
-        assert again.acceptor == pytest.approx(found.concentrations.acceptor, rel=1e-7)
-
-
-@EVERY_ORDER
-def test_the_printed_inlet_condition_loses_what_E4_says(order):
-    """u_ave in (11): defect exactly sum of (u_ave - u_x) C over the inlet, and nothing but inlet rows changes."""
-    _, now, local = solved("30 um", velocity="0.35 m/day", order=order)
-    _, _, mean = solved("30 um", velocity="0.35 m/day", inlet="mean", order=order)
-    assert np.abs(defects(now, local)).max() < 1e-9
-    one, two, count = local.problem, mean.problem, now.space.count
-    change = (two.operator - one.operator).tocoo()
-    assert set(change.row[np.abs(change.data) > 0] % count) <= set(now.space.end_nodes(now.space.dofs.inlet))
-    told = defects(now, mean)
-    for k, key in enumerate(("acceptor", "donor")):
-        robin = np.split(two.source, 2)[k] / two.both[k].supply
-        assert robin.sum() == pytest.approx(one.inflow.sum(), rel=1e-12)
-        lost = (robin - two.inflow) @ getattr(mean.concentrations, key) / mean.fluxes[k].supplied
-        assert told[k] == pytest.approx(lost, abs=1e-9)
-        assert 1e-6 < abs(lost) < 1e-3
-    acceptors = [now.space.to_mesh(found.concentrations.acceptor)[now.mesh.body] for found in (mean, local)]
-    assert acceptors[0] == pytest.approx(acceptors[1], rel=1e-3)
-
-
-@EVERY_ORDER
-def test_the_printed_inlet_loses_as_much_with_every_order(order):
-    """Against linear elements to 5 %."""
-    found = []
-    for each in (1, order):
-        _, now, mean = solved("30 um", velocity="0.35 m/day", inlet="mean", order=each)
-        found.append(defects(now, mean))
-    assert found[1] == pytest.approx(found[0], rel=0.05)
+def test_the_printed_inlet_loses_as_much_with_every_order():
+    """u_ave in (11) [E4]: a ten thousandth or so of each supply, to 5 % what it is with linear elements; in the biomass
+    the acceptor is that of the local velocity to a thousandth."""
+    lost = []
+    for order in ORDERS:
+        (_, now, mean), (_, _, local) = (solved("30 um", velocity="0.35 m/day", inlet=inlet, order=order)
+                                         for inlet in ("mean", "local"))
+        lost.append(defects(now, mean))
+        one, two = (now.space.to_mesh(found.concentrations.acceptor)[now.mesh.body] for found in (mean, local))
+        assert one == pytest.approx(two, rel=1e-3)
+    assert (1e-6 < np.abs(lost)).all() and (np.abs(lost) < 1e-3).all()
+    assert lost == pytest.approx(np.array([lost[0]] * 3), rel=0.05)
 
 
 @EVERY_ORDER
@@ -194,7 +146,7 @@ def test_without_flow_the_supply_is_held_at_both_ends(order):
     field = found.concentrations.acceptor
     assert (field[transport.both_ends(now.space)] == 10.0).all() and field.min() < 9.9
     assert (found.concentrations.donor[transport.both_ends(now.space)] == 10.0).all()
-    assert np.abs(defects(now, found)).max() < 1e-9 and min(flux.consumed for flux in found.fluxes) > 0
+    assert min(flux.consumed for flux in found.fluxes) > 0
     alone = transport.steady(found.problem, Sink(0 * now.active))
     assert alone.acceptor == pytest.approx(np.full(len(field), 10.0), rel=1e-12)
 
@@ -249,18 +201,6 @@ def test_the_meshed_part_stands_for_the_whole_pore(order):
     assert part.concentrations.acceptor.min() == pytest.approx(whole.concentrations.acceptor.min(), abs=1e-2)
 
 
-@EVERY_ORDER
-def test_uptake_is_stoichiometric(order):
-    """Acceptor taken up over donor taken up: F + d_c f_d b m_A X / (k m_A m_D X), between F and that at the smallest
-    m_D."""
-    _, now, found = solved("20 um", order=order)
-    acceptor, donor = found.fluxes
-    extra = 1.42 * 0.8 * 0.12 / 9.3
-    donor_m = [c / (c + 1) for c in (found.concentrations.donor.min(), 10.0)]
-    assert 1.52 + extra / donor_m[1] <= acceptor.consumed / donor.consumed <= 1.52 + extra / donor_m[0]
-    assert now.space.reaction.dx.sum() == pytest.approx(now.outline.area, rel=1e-12)
-
-
 def right_triangles():
     """A structured mesh of 40 x 20 um, biomass from x = 10 to 20 um."""
     fem = MeshTri.init_tensor(np.linspace(0.0, 40.0, 9), np.linspace(0.0, 20.0, 5))
@@ -307,32 +247,6 @@ def lack(made, fluxes):
     """(what each substrate's effluent lacks of its supply), mg/L."""
     both = (made.substrates.acceptor, made.substrates.donor)
     return np.array([s.supply - flux.effluent for s, flux in zip(both, fluxes)])
-
-
-@EVERY_ORDER
-@pytest.mark.parametrize("velocity", ["0.29 m/day", "2.9 m/day", "29 m/day"])
-def test_supply_is_effluent_and_uptake(velocity, order):
-    """The sum of all equations is the balance: to Newton's 1e-12, of terms that diffusion makes larger than the supply.
-    """
-    made = thick(velocity, order)
-    for flux in at_start(made)[1].fluxes:
-        assert abs(flux.supplied - flux.out - flux.consumed) < 1e-11 * flux.supplied
-        assert flux.consumed > 1e-3 * flux.supplied
-
-
-@EVERY_ORDER
-def test_the_demand_of_decay_is_that_of_its_rate(order):
-    """consumed_A = F consumed_D + d_c f_d b (X_A m_A integrated)."""
-    made = thick("2.9 m/day", order)
-    now, found = at_start(made)
-    law, at_nodes = made.kinetics, now.space.to_mesh(found.concentrations.acceptor)
-    assert np.ptp(at_nodes[now.mesh.body]) > 2.5, "else nothing is tested"
-    acceptor = at_nodes[now.mesh.cells[now.mesh.biomass]].mean(axis=1)
-    decay = law.decay_oxygen_demand * law.degradable_fraction * law.decay_coefficient * law.maximum_density
-    fraction = acceptor / (acceptor + made.substrates.acceptor.half_saturation)
-    by_decay = decay * now.space.at.dx[now.mesh.biomass].sum(axis=1) @ fraction
-    left = found.fluxes[0].consumed - law.acceptor_to_donor_ratio * found.fluxes[1].consumed
-    assert left == pytest.approx(by_decay, rel=5e-3)
 
 
 def resolved(made):
@@ -411,7 +325,7 @@ def test_too_slow_a_flow_is_refused(order):
         assert np.isfinite(at_start(thick("1e-9 m/day", order))[1].fluxes[0].effluent)
 
 
-@HIGHER
+@pytest.mark.parametrize("order", [2, 3])
 def test_too_coarse_a_mesh_is_refused(monkeypatch, order):
     """Without elements for the boundary layer the concentration oscillates upstream: more than 2 % over the supply."""
     monkeypatch.setattr(pore, "BOUNDARY_LAYER", 0.0)
@@ -471,49 +385,11 @@ def test_substrates_are_coupled_in_the_biomass_alone(order):
     assert pairs.any() and np.isin(rows[pairs] % count, now.space.reaction.cells).all()
 
 
-@EVERY_ORDER
-def test_without_biomass_a_step_of_newtons_method_is_the_linear_solution(order):
-    """From nothing at all."""
-    now, found = at_start(thick("2.9 m/day", order))
-    alone = transport.steady(found.problem, None, everywhere(now, 0.0))
-    assert alone.iterations <= 2
-    for field, substrate in zip((alone.acceptor, alone.donor), found.problem.both):
-        assert np.allclose(field, substrate.supply, rtol=0.01)
-
-
-@EVERY_ORDER
-def test_the_first_guess_does_not_matter(order):
-    """From the supply or from its own solution, one answer."""
-    now, found = at_start(thick("2.9 m/day", order))
-    other = replace(found.concentrations, acceptor=0.3 + 0 * found.concentrations.acceptor)
-    again = transport.steady(found.problem, sink_of(now), other)
-    assert np.allclose(again.acceptor, found.concentrations.acceptor, atol=1e-9)
-    assert np.allclose(again.donor, found.concentrations.donor, atol=1e-9)
-
-
-@EVERY_ORDER
+@pytest.mark.parametrize("order", [1, 2])
 def test_all_orders_agree(order):
     """On effluents and uptake, to 1 % of what is taken up."""
-    made, now, found = solved("30 um", velocity="0.35 m/day", order=order)
+    _, _, found = solved("30 um", velocity="0.35 m/day", order=order)
     wanted = solved("30 um", velocity="0.35 m/day", order=3)[2].fluxes
     for one, two in zip(found.fluxes, wanted):
         assert one.consumed == pytest.approx(two.consumed, rel=1e-2)
         assert one.effluent == pytest.approx(two.effluent, abs=1e-2 * two.consumed / two.supplied * 10)
-
-
-@EVERY_ORDER
-def test_the_mean_biomass_of_a_step_takes_up_between_that_of_its_ends(order):
-    """And what it takes up is what the rates make of it, to round-off."""
-    made, now, found = solved("30 um", velocity="0.35 m/day", order=order)
-    over = pore.solve(made, now, 2.0)
-    rates = biomass.rates(now.space, over.concentrations, made.substrates, made.kinetics)
-    made_of = sum((end - start).sum() for start, end in zip((now.active, now.inert), grown(now, rates, 2.0)))
-    k, (a, d) = made.kinetics, (2.0 * flux.consumed for flux in over.fluxes)
-    demand = k.yield_coefficient * d - (a - k.acceptor_to_donor_ratio * d) / k.decay_oxygen_demand
-    assert made_of == pytest.approx(demand, rel=1e-11)
-    assert found.fluxes[1].consumed < over.fluxes[1].consumed
-
-
-def grown(now, rates, duration):
-    """X_A and X_I after a step at constant rates."""
-    return kinetics.grow(now.active, now.inert, rates.growth, rates.remains, duration)

@@ -19,7 +19,8 @@ def folder(tmp_path_factory):
 
 def test_the_tutorial_works_from_its_first_line_to_its_last(folder, capsys, monkeypatch):
     monkeypatch.chdir(folder)
-    names, printed, statuses = {}, [], []
+    printed, statuses = [], []
+    names: dict = {}
     for block in blocks(PAGE):
         if block.language == "toml":
             Path(re.match(r"# (\S+)\n", block.text)[1]).write_text(block.text)

@@ -10,7 +10,7 @@ from repro.check import cost
 from repro.check.cost import Cost
 from repro.check.modelled import modelled
 from repro.check.numbers import Number, judged
-from repro.check.simplifications import Warned, warnings
+from repro.check.simplifications import Warned, unmet, warnings
 from repro.errors import SimulationError
 from repro.fem.linear import Method
 from repro.march.loop import stopping
@@ -58,8 +58,9 @@ def check(scene: Source, file: str = "") -> Checked:
         trial = cost.tried(scene, len(mesh.points))
         flow = trial.first.solved.flow
         most, found = judged(scene, flow.mean_velocity if flow else None)
+        told = [*warnings(most, found), *unmet(scene, trial.worst, " in the first steps")]
         return Checked(scene.name, modelled(scene), len(mesh.points), len(mesh.biomass), found,
-                       warnings(most, found), cost.expected(scene, trial, len(mesh.points)))
+                       told, cost.expected(scene, trial, len(mesh.points)))
     except (SimulationError, ArithmeticError) as error:
         raise SceneError(f"{file}: it cannot be run: {error}") from error
 

@@ -19,9 +19,9 @@ from time import perf_counter
 from typing import TypeAlias
 
 from repro.check import numbers
-from repro.march import updates
 from repro.march.loop import Instant, PoreEnd, State
-from repro.march.simulation import row_times
+from repro.march.pace import missed
+from repro.march.simulation import rows_within
 from repro.march.simulation import steps as steps_of
 from repro.march.stepping import SHORTEST
 from repro.scene import Scene, needed
@@ -52,13 +52,15 @@ COARSER = 0.9
 class Trial:
     """What was made for real: the first state; seconds that it and a step took (0 where there is
     none); nodes of the mesh that was tried; memory (MB) before and at its peak, None where the
-    system does not tell."""
+    system does not tell; the largest estimate of steps that miss the tolerance, 0 where none does.
+    """
 
     first: Instant
     start: float
     step: float
     nodes: int
     memory: tuple[float, float] | None
+    worst: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -87,11 +89,16 @@ def tried(scene: Scene, nodes: int) -> Trial:
     run = _until_the_end(steps_of(scene))
     first = needed(next(run)[1], "the first row")
     clock.append(perf_counter())
-    clock += [perf_counter() for _ in islice(run, MOST_STEPS)]
+    worst = 0.0
+    for state, _ in islice(run, MOST_STEPS):
+        clock.append(perf_counter())
+        if missed(state.pace, scene.numerics.tolerance):
+            worst = max(worst, state.pace.estimate)
     spent = [b - a for a, b in zip(clock, clock[1:])]
     peak = _memory()
     memory = (before, peak) if before is not None and peak is not None else None
-    return Trial(first, spent[0], min(spent[1:], default=0.0), len(first.pore.mesh.points), memory)
+    return Trial(first, spent[0], min(spent[1:], default=0.0), len(first.pore.mesh.points), memory,
+                 worst)
 
 
 def _until_the_end(run: Iterator[Made]) -> Iterator[Made]:
@@ -106,7 +113,7 @@ def expected(scene: Scene, trial: Trial, nodes: int) -> Cost:
     """Of the whole run, from its trial and the nodes of its first mesh."""
     free, touching = steps(scene)
     larger = nodes / trial.nodes
-    factor = (free + IN_CONTACT * touching + ROW * rows(scene)) * REMESHING
+    factor = (free + IN_CONTACT * touching + ROW * len(rows_within(scene))) * REMESHING
     memory = None
     if trial.memory:
         before, peak = trial.memory
@@ -125,16 +132,6 @@ def steps(scene: Scene) -> tuple[int, int]:
     total = _count(min(scene.growth.time_step, longest), longest, end)
     touching = min(total, math.ceil((end - free) / longest - 1e-9))
     return total - touching, touching
-
-
-def rows(scene: Scene) -> int:
-    """Rows that are likely to lie within steps."""
-    if scene.growth is None or scene.growth.end == 0:
-        return 0
-    if scene.numerics.time == "midpoint":
-        return len(row_times(scene))
-    ends, reported = updates.schedule(scene)
-    return len(reported.difference(ends))
 
 
 def longest_step(scene: Scene) -> float:

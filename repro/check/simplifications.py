@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from repro.check import numbers
 from repro.check.numbers import Number
 from repro.fem import sizing
+from repro.march.stepping import SHORTEST
 from repro.model.pore import film, resolution
 from repro.model.remeshing import MOST_REFINED
 from repro.scene import Kinetics, Scene
@@ -31,6 +32,9 @@ AFTER_CONTACT = 1.2
 #: Distances between nodes across a film, under which its flow (the cube of its thickness) is a
 #: matter of the mesh.
 ACROSS_FILM = 4.0
+#: The flow into a permeable body, exp(-y / k^1/2), turns back at nodes of elements more than 6.3
+#: (quadratic) or 5.1 (cubic) times k^1/2 across.
+DRAG_LAYER = 5.0
 
 
 @dataclass(frozen=True)
@@ -46,7 +50,7 @@ def warnings(scene: Scene, found: list[Number]) -> list[Warned]:
     value = {number.name: number.start for number in found}
     checks = [_inertia(value), _cells(scene, value), _diffusivities(scene)]
     if scene.aggregate:
-        checks += [_seed_film(scene), _ends(scene)]
+        checks += [_seed_film(scene), _ends(scene), _drag_layer(scene)]
     if scene.kinetics:
         checks += [_fronts(scene), _demand(scene.kinetics)]
     if scene.growth:
@@ -116,8 +120,7 @@ def _forces(scene: Scene, found: list[Number]) -> Iterator[Warned]:
 
 def _fronts(scene: Scene) -> Iterator[Warned]:
     thickness = numbers.at_end(scene).thickness
-    size = min(thickness / sizing.ACROSS_AGGREGATE, scene.pore.width / sizing.ACROSS_PORE)
-    nodes = size / resolution(scene) / scene.numerics.order
+    nodes = _interface_size(scene) / scene.numerics.order
     for name, s, rate in numbers.uptakes(scene):
         layer = math.inf
         if rate and s.supply:
@@ -129,6 +132,32 @@ def _fronts(scene: Scene) -> Iterator[Warned]:
                          f"(D K_s / (q X_m))^1/2 = {layer:.2g} um thick, thinner than the "
                          f"{nodes:.2g} um between nodes in the aggregate; "
                          + _resolving(resolution(scene) * nodes / layer))
+
+
+def _interface_size(scene: Scene) -> float:
+    """The size (um) of elements at the interface, where they are largest."""
+    thickness = numbers.at_end(scene).thickness
+    size = min(thickness / sizing.ACROSS_AGGREGATE, scene.pore.width / sizing.ACROSS_PORE)
+    return size / resolution(scene)
+
+
+def _drag_layer(scene: Scene) -> Iterator[Warned]:
+    permeability = scene.flow.permeability if scene.flow else None
+    layer = math.inf if permeability is None else math.sqrt(permeability)
+    size = _interface_size(scene)
+    if size > DRAG_LAYER * layer:
+        wanted = resolution(scene) * size / (DRAG_LAYER * layer)
+        yield Warned("flow.permeability", f"the flow into the aggregate fades over its root, "
+                     f"{layer:.2g} um, thinner than a fifth of the elements at the interface, "
+                     f"{size:.2g} um: velocities in the aggregate wiggle within a few elements of "
+                     "it, while conductivity, head and flow are those of finer meshes"
+                     + _finer(wanted))
+
+
+def _finer(refinement: float) -> str:
+    """What resolves a thin layer, if any refinement does that is accepted."""
+    known = refinement <= MOST_REFINED
+    return f"; numerics.refinement = {refinement:.2g} would resolve it" if known else ""
 
 
 def _resolving(refinement: float) -> str:
@@ -168,6 +197,15 @@ def _steps(scene: Scene) -> Iterator[Warned]:
         yield Warned("growth.time_step", f"the aggregate grows by {100 * grown:.2g} % in a shape "
                      f"update, above {100 * GROWTH_IN_A_STEP:g} %: its rates are those of the "
                      'shape before; shorten it, or take numerics.time = "midpoint"')
+
+
+def unmet(scene: Scene, worst: float, count: str = "") -> Iterator[Warned]:
+    """A tolerance that the shortest step exceeds by its estimate, ``worst``; zero where none does.
+    count: of how many steps."""
+    if worst:
+        yield Warned("numerics.tolerance", f"{scene.numerics.tolerance:g} was not met{count}: the "
+                     f"smallest allowed step, growth.time_step / {1 / SHORTEST:g}, errs by "
+                     f"{worst:.2g} (estimate)")
 
 
 def _contact(scene: Scene) -> Iterator[Warned]:

@@ -9,7 +9,7 @@ others: its ledger closes like theirs, and a run to a later end goes on from the
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import Field, dataclass, field, fields, replace
 from typing import ClassVar, Protocol, TypeVar
@@ -126,12 +126,14 @@ class Scheme:
     advance(scene, pore, solved, pace): one step that growth.end has no part in, nor have rows, or
     the one that is cut there, as (Step, what is solved after it, pace of the next, is it cut?);
     rows(scene): times (h) of rows where there are no ``output.times``, beside the ends of steps;
-    first: length of the first step that is tried, in parts of growth.time_step.
+    first: length of the first step that is tried, in parts of growth.time_step; ends(scene): times
+    (h) at which steps end, those that are known beforehand.
     """
 
     advance: Callable[[Scene, Pore, Solved, Pace], tuple[Step, Solved, Pace, bool]]
     rows: Callable[[Scene], tuple[float, ...]] = lambda _: ()
     first: float = 1.0
+    ends: Callable[[Scene], Iterable[float]] = lambda _: ()
 
 
 class PoreEnd(Exception):

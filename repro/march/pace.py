@@ -49,6 +49,11 @@ def allowed(estimate: float, tolerance: float, most: float = FASTER) -> float:
     return min(most, max(SLOWER, SAFETY * (tolerance / estimate) ** 0.5))
 
 
+def missed(pace: Pace, tolerance: float) -> bool:
+    """Does the last step err by more than is accepted? The shortest one is taken all the same."""
+    return pace.estimate > EXCESS * tolerance * (1 + 1e-9)
+
+
 def following(pace: Pace, duration: float, estimate: float, tolerance: float) -> Pace:
     """After a step that was taken: longer by FASTER at most, or as long as what was asked for and
     cut short to end at a reported time."""

@@ -63,6 +63,11 @@ def row_times(scene: Scene) -> tuple[float, ...]:
     return loop.row_times(scene, _scheme(scene))
 
 
+def rows_within(scene: Scene) -> set[float]:
+    """Times (h) of rows that may lie within steps, not at an end that is known beforehand."""
+    return set(row_times(scene)) - {0.0, *_scheme(scene).ends(scene)}
+
+
 def _scheme(scene: Scene) -> Scheme:
     return SCHEMES[scene.numerics.time]
 

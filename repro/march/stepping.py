@@ -26,9 +26,10 @@ from repro.scene import Scene, needed
 
 #: The first step that is tried, in parts of growth.time_step.
 FIRST = 8.0
-#: A step that fails or errs too much is tried again, shorter, until it is this part of it.
+#: A step that fails or errs too much is tried again, shorter, until it is this part of it; one of
+#: this length may err by more than the tolerance, which is counted and told.
 SHORTEST = 1e-3
-#: Rows after t = 0 where there are no ``output.times``.
+#: Rows after t = 0 where there are no ``output.times``, at least.
 LEAST = 24
 #: Contact is met when the film is no thinner than this part of what it may be.
 LANDED = 0.995
@@ -36,12 +37,12 @@ LANDED = 0.995
 
 def rows(scene: Scene) -> tuple[float, ...]:
     """Times (h) of rows besides the ends of steps: growth.end, and multiples of growth.time_step
-    times the largest power of two with LEAST of them or more; of itself in a run that has fewer."""
+    times a power of two, the largest (1/4, 1/2, 1, 2 ...) with LEAST of them or more."""
     growth = needed(scene.growth, "[growth]")
-    count = round(growth.end / growth.time_step, 9)
-    if count == 0:
+    if growth.end <= SAME_TIME:
         return ()
-    apart = growth.time_step * 2.0 ** max(0, math.floor(math.log2(count / LEAST)))
+    power = math.floor(math.log2(growth.end / (LEAST * growth.time_step)) + 1e-9)
+    apart = max(growth.time_step * 2.0**power, 2 * SAME_TIME)
     times = [round(k * apart, 9) for k in range(1, int(growth.end / apart) + 1)]
     return (*(time for time in times if growth.end - time > SAME_TIME), growth.end)
 
@@ -97,11 +98,12 @@ def _accepted(scene: Scene, now: Pore, solved: Solved,
                 if found.gaps is not None:  # contact alone made the step short
                     return taken, after, asked
                 tried = replace(asked, length=length)
-                return taken, after, following(tried, duration, estimate, tolerance)
+                pace = following(tried, duration, estimate, tolerance)
+                return taken, after, replace(pace, length=max(pace.length, shortest))
             if found.step and found.gaps:
                 length = duration * _to_contact(found.gaps)
             else:
-                length = duration * allowed(estimate, tolerance)
+                length = max(duration * allowed(estimate, tolerance), shortest)
         except Unresolved as error:
             finer = remeshing.graded(scene, now)
             if finer is None and duration <= time_step:

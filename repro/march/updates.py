@@ -167,4 +167,4 @@ def enlarged(scene: Scene, now: Pore, after: Pore) -> np.ndarray:
     return now.theta * (1 + remeshing.spread(now.space, more))
 
 #: The paper's scheme.
-SCHEME = Scheme(_advance)
+SCHEME = Scheme(_advance, ends=lambda scene: schedule(scene)[0])

@@ -1,6 +1,6 @@
 """Checkpoint files: plain data under a checksum, whole or not at all, the one before kept.
 
-    dupin2001-repro checkpoint 2 SHA-256 of all that follows this line
+    dupin2001-repro checkpoint 3 SHA-256 of all that follows this line
     {"plain": ..., "arrays": [[name, dtype, shape, "C" or "F"], ...]}        one line of JSON
     the arrays' bytes, one after the other, little-endian
 
@@ -31,7 +31,7 @@ NEWEST = "checkpoint.state"
 PREVIOUS = "checkpoint.previous"
 REFUSED = "checkpoint.refused"
 LAST = "checkpoint.last"
-KIND, FORMAT = b"dupin2001-repro checkpoint ", b"2"
+KIND, FORMAT = b"dupin2001-repro checkpoint ", b"3"
 MAGIC = KIND + FORMAT + b" "
 DTYPES = ("<f8", "<i8", "<i4", "|b1", "|u1")
 #: Bytes that a file and its line of JSON may have. A mesh of a million nodes takes a quarter.

@@ -23,7 +23,8 @@ from repro.run.stored import counted, counts, in_range
 
 #: How the arrays of a record are called in a checkpoint.
 PREFIX = "record."
-PLAIN = {"remeshes", "iterations", "seconds", "stages", "resumes", "warnings"}
+PLAIN = {"remeshes", "iterations", "seconds", "stages", "resumes", "warnings", "missed",
+         "worst"}
 #: {array: (kind of its numbers, shape)}; a letter is the same number wherever it stands.
 ARRAYS = {"rows": ("f", "R", len(results.COLUMNS)), "whole": ("b", "R", len(results.COLUMNS)),
           "ledgers": ("f", "L", len(results.LEDGER_COLUMNS)), "before_h": ("f", "B"),
@@ -55,7 +56,8 @@ class Record:
     """Rows of the tables, ``(time in h, file)`` of the fields, their marks, and counts.
 
     seconds: of wall time, all together; stages: by stage; resumes: when the run was gone on with;
-    warnings: ``key`` of the scene and ``text`` of each simplification that does not hold.
+    warnings: ``key`` of the scene and ``text`` of each simplification that does not hold; missed:
+    steps that do not meet the tolerance, the largest of their estimates is ``worst``.
     """
 
     rows: Table = field(default_factory=list)
@@ -69,6 +71,8 @@ class Record:
     stages: dict[str, float] = field(default_factory=dict)
     resumes: list[dict] = field(default_factory=list)
     warnings: list[dict[str, str]] = field(default_factory=list)
+    missed: int = 0
+    worst: float = 0.0
 
     @property
     def fields(self) -> list[str]:
@@ -163,6 +167,7 @@ def _is_plain(plain: dict) -> bool:
     """Do the counts and times make sense?"""
     stages = plain["stages"]
     return (counted(plain["remeshes"]) and counts(plain["iterations"])
+            and counted(plain["missed"]) and in_range(plain["worst"], 0.0, math.inf)
             and in_range(plain["seconds"], 0.0, math.inf) and isinstance(plain["resumes"], list)
             and all(isinstance(resume, dict) for resume in plain["resumes"])
             and isinstance(plain["warnings"], list) and all(map(_is_warning, plain["warnings"]))

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 
 from repro import report, results, timing
+from repro.check.simplifications import Warned, unmet
 from repro.errors import CheckpointError, Interrupted, OutputError
 from repro.march.loop import Instant, State, added
+from repro.march.pace import Pace, missed
 from repro.results import netcdf
 from repro.results.files import is_file, whole
 from repro.run import checkpoint, record, stored
@@ -87,7 +89,20 @@ class Recorder:
                                     for ledger in instant.ledgers]
             self.record.remeshes += int(instant.remeshes)
             self.record.iterations = added(self.record.iterations, instant.iterations)
+        if self.state and state.pace != self.state.pace:
+            self._judge(state.pace)
         self.state = state
+
+    def _judge(self, pace: Pace) -> None:
+        """Count the last step if it misses the tolerance."""
+        if missed(pace, self.scene.numerics.tolerance):
+            self.record.missed += 1
+            self.record.worst = max(self.record.worst, pace.estimate)
+
+    def unmet(self) -> list[Warned]:
+        """What is to be said of the tolerance so far, if anything is."""
+        count = f" in {self.record.missed} of {self.steps} steps"
+        return list(unmet(self.scene, self.record.worst, count))
 
     def _add_fields(self, instant: Instant) -> None:
         self._write_fields(self.record.index, "fields", instant.pore, instant.solved)
@@ -126,11 +141,12 @@ class Recorder:
     def tell(self, status: str) -> None:
         """Write ``run.json``."""
         now = self._now()
+        warnings = now.warnings + [asdict(each) for each in self.unmet()]
         self._write("run.json", results.write_json, {
             **results.provenance(self.scene), "conditions": self.conditions, "status": status,
             "files": self._files(done(status)),
             **{each.name: each.value(now) for each in record.COUNTS},
-            "resumes": now.resumes, "warnings": now.warnings, "origin": self.origin})
+            "resumes": now.resumes, "warnings": warnings, "origin": self.origin})
 
     def _files(self, over: bool) -> list[str]:
         """The names of the run's files: those there are, or may come while it is not over."""
@@ -206,9 +222,9 @@ class Recorder:
         self.record = before
 
     def forget(self) -> None:
-        """Be as the recorder was before t = 0."""
+        """Be as the recorder was before t = 0, but for how often the run was gone on with."""
         self.state = None
-        self.record = Record()
+        self.record = Record(resumes=self.record.resumes)
 
     def drop_later(self) -> None:
         """Remove fields that were written after the state gone on from: they are made again."""

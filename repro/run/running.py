@@ -56,6 +56,9 @@ __all__ = ["OutputError", "Recorder", "Watch", "prepare", "resume", "run"]
 Made = Iterator[tuple[State, Instant | None]]
 #: Of what differs so many keys are told.
 MOST_SHOWN = 4
+#: What a folder of results needs, and what to do without.
+LISTED = ("it lists which files there a run has written, without which nothing is overwritten or "
+          "removed, by --force neither: move the folder away, or name another")
 #: What alone can be changed of a run that has begun.
 END = "growth.end"
 
@@ -116,7 +119,7 @@ def run(scene: Source, folder: str | Path, progress: Progress = unwatched, watch
         if not is_file(folder / PROVENANCE):
             prepare(folder)
             return _from_the_start(recorder, progress, watch)
-        told = _told(folder / PROVENANCE)
+        told = _told(folder / PROVENANCE, LISTED)
         recorder.own = listed(folder, told)
         refuse_links(folder, recorder.own)
         if force:
@@ -280,17 +283,19 @@ def _left_alone(recorder: Recorder, status: str, watch: Watch) -> str:
     return status
 
 
-def _told(path: Path) -> dict:
-    """What ``run.json`` says. Raises OutputError where it is none of a run."""
+def _told(path: Path, wanted: str = "the run.json of a run is needed") -> dict:
+    """What ``run.json`` says. Raises OutputError, with what is wanted, where it is none of a run.
+    """
     try:
         told = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         why = f"cannot be read ({error})"
-        raise OutputError(f"{path}: {why}; the run.json of a run is needed") from None
+        raise OutputError(f"{path}: {why}; {wanted}") from None
     if not _is_record(told):
-        raise OutputError(f"{path}: it has no scene or no status; the run.json of a run is needed")
+        raise OutputError(f"{path}: it has no scene or no status; {wanted}")
     if not (done(told["status"]) or undone(told["status"])):
-        raise OutputError(f"{path}: its status {told['status']!r} is none that a run writes")
+        raise OutputError(f"{path}: its status {told['status']!r} is none that a run writes; "
+                          f"{wanted}")
     return told
 
 
@@ -375,6 +380,7 @@ def _recorded(recorder: Recorder, made: Made, progress: Progress, watch: Watch) 
 
 def _end(recorder: Recorder, status: str, watch: Watch) -> str:
     recorder.finish(status)
+    _tell_warnings(recorder.unmet(), watch)
     watch.tell({"event": "end", "scene": recorder.scene.name, "status": status,
                 "folder": str(recorder.folder), "time_h": recorder.time, "step": recorder.steps,
                 "rows": len(recorder.record.rows), "changed": True})
@@ -419,10 +425,14 @@ def _record_steps(recorder: Recorder, made: Made, progress: Progress, watch: Wat
 
 def _warn(recorder: Recorder, scene: Scene, velocity: float | None, watch: Watch) -> None:
     """Tell and record which simplifications do not hold, as ``repro check`` finds them."""
-    recorder.record.warnings = [asdict(each) for each in warned(scene, velocity)]
-    for each in recorder.record.warnings:
-        watch.tell({"event": "warning", "key": each["key"],
-                    "message": f"{each['key']}: {each['text']}"})
+    found = warned(scene, velocity)
+    recorder.record.warnings = [asdict(each) for each in found]
+    _tell_warnings(found, watch)
+
+
+def _tell_warnings(found: list[Warned], watch: Watch) -> None:
+    for each in found:
+        watch.tell({"event": "warning", "key": each.key, "message": f"{each.key}: {each.text}"})
 
 
 def warned(scene: Scene, velocity: float | None) -> list[Warned]:

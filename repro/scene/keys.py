@@ -27,10 +27,10 @@ from repro.scene.units import (
     BELOW_1,
     EITHER_SIGN,
     FRACTION,
+    FROM_0_TO_10,
     NON_NEGATIVE,
     POSITIVE_FRACTION,
     UP_TO_1,
-    UP_TO_10,
     UP_TO_20,
     SceneError,
     choice,
@@ -321,7 +321,7 @@ class Numerics:
         0.25, FRACTION, source="3.1 [E13]",
         about="Growth of element sizes with distance from the aggregate; 0: one size everywhere")
     contact_elements: float = number(
-        0.0, UP_TO_10, source=OURS,
+        0.0, FROM_0_TO_10, source=OURS,
         about="Elements to growth.minimum_film beside the contact lines with the opposite wall; "
               "0: as large as elsewhere on the interface")
     jacobian: str = choice(
@@ -363,12 +363,13 @@ PRESETS: dict[str, dict[str, str | float]] = {
 @dataclass(frozen=True)
 class Output:
     """Times (h) of the rows and fields wanted, ascending; None: every step and, with midpoint,
-    every growth.time_step or a power of two of it, 24 times or more."""
+    every growth.time_step times a power of two, such that there are 24 or more."""
 
     times: tuple[float, ...] | None = times(
         source="Figures 4-6",
         about="Times of the rows and fields wanted, which change no step; left out: every step, "
-        "with midpoint also every growth.time_step, or 2, 4, 8 ... of it with 24 rows or more")
+        "with midpoint also every 1/4, 1/2, 1, 2, 4 ... growth.time_step, so that there are 24 or "
+        "more after t = 0")
     timeseries: str = choice(
         "csv", "netcdf", source=OURS,
         about="timeseries.csv alone, or timeseries.nc besides, which needs the package xarray")
