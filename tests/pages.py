@@ -4,11 +4,15 @@ import base64
 import json
 import re
 from html.parser import HTMLParser
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from repro import results
 from repro.cli import main
+from repro.run import running
+from repro.scene import scene_hash
 
 VOID = {"meta", "input", "br", "link", "img", "hr"}
 FAST = 'numerics.preset="fast"'
@@ -37,6 +41,18 @@ AXES = {"Conductivity": "(m/day)", "Mean velocity": "(m/day)", "Head loss": "(cm
 LEDGERS = {f"Ledger: {name}": {label: f"{name}_{part}_pg_per_m" for label, part in
                                {"supplied": "supplied", "leaving": "out", "taken up": "consumed",
                                 "stored": "stored"}.items()} for name in ("acceptor", "donor")}
+
+
+#: Whole runs of scenes that several tests ask for.
+WHOLE = TemporaryDirectory(prefix="whole-")
+
+
+def whole_of(scene):
+    """The folder of a scene's run, made once: whoever changes it copies it."""
+    folder = Path(WHOLE.name) / f"{scene.name}-{scene_hash(scene)}"
+    if not folder.exists():
+        running.run(scene, folder)
+    return folder
 
 
 class Page(HTMLParser):

@@ -15,6 +15,7 @@ import pytest
 from repro.errors import Interrupted
 from repro.run.checkpoint import LAST
 from repro.run.running import Watch, run
+from tests.pages import whole_of
 
 #: A scene of a second or so, with remeshes, and one of several seconds.
 SHORT = ("base", "--set", 'numerics.preset="fast"')
@@ -90,6 +91,5 @@ def stopped(scene, folder: Path, after: int = 3) -> None:
 
 
 def as_whole(scene, folder: Path) -> bool:
-    """Are the files of a folder those of the scene's run without an interruption, which is made beside it?"""
-    run(scene, folder.with_name("whole"))
-    return files(folder) == files(folder.with_name("whole"))
+    """Are the files of a folder those of the scene's run without an interruption?"""
+    return files(folder) == files(whole_of(scene))

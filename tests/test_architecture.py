@@ -12,6 +12,8 @@ import pytest
 
 ROOT = pathlib.Path(__file__).parents[1]
 FOLDERS = ("repro", "reference", "verification", "paper_figures", "tests")
+#: Names of folders that commands make: what is in them may be a copy of all this, or of an earlier state.
+MADE = {"__pycache__", "out", "cache", "live", "pictures", "runs", "build", "dist", ".venv", ".git", ".hypothesis"}
 PROVIDED = cache(packages_distributions)
 FORBIDDEN = {
     "repro": {"reference", "verification", "paper_figures", "tests", "pickle"},
@@ -49,9 +51,15 @@ def imported(source):
     return {name.split(".")[0] for name in names}
 
 
-def imports(folder):
+def own(folder, pattern="*.py", root=ROOT):
+    """Files of a folder of the repository, in order, but for what commands have made there."""
+    found = sorted((root / folder).rglob(pattern))
+    return [path for path in found if path.is_file() and not MADE.intersection(path.relative_to(root).parts)]
+
+
+def imports(folder, root=ROOT):
     """{path: imported names} of every Python file of a folder."""
-    return {path: imported(path.read_text(encoding="utf-8")) for path in sorted((ROOT / folder).rglob("*.py"))}
+    return {path: imported(path.read_text(encoding="utf-8")) for path in own(folder, root=root)}
 
 
 def trespasses(folder, names):
@@ -66,7 +74,7 @@ def module_of(path):
 
 def modules():
     """{dotted name: source} of every module of `repro`."""
-    return {module_of(path): path.read_text(encoding="utf-8") for path in sorted((ROOT / "repro").rglob("*.py"))}
+    return {module_of(path): path.read_text(encoding="utf-8") for path in own("repro")}
 
 
 def asked_for(node, name, known):
@@ -178,6 +186,18 @@ def test_the_rules_see_a_trespass(folder, source):
     assert len(trespasses(folder, imported(source))) == 1
 
 
+@pytest.mark.parametrize("made", [
+    "paper_figures/out/crate/tests", "paper_figures/cache", "verification/report/live", "verification/claims/out",
+    "verification/report/pictures", "repro/__pycache__"])
+def test_what_commands_make_is_not_judged(made, tmp_path):
+    """A file beside it is."""
+    folder = made.partition("/")[0]
+    for place in (made, folder):
+        (tmp_path / place).mkdir(parents=True, exist_ok=True)
+        (tmp_path / place / "one.py").write_text("import pickle, hypothesis")
+    assert [*imports(folder, tmp_path)] == [tmp_path / folder / "one.py"]
+
+
 def test_relative_imports_are_ones_own():
     assert imported("from . import reference\nfrom .tests import x\nimport numpy.linalg") == {"numpy"}
 
@@ -283,6 +303,6 @@ def test_the_lock_of_mutants_made_by_machine_is_as_strict():
 
 def test_lines_of_the_package_are_short():
     """At most 100 columns."""
-    long = [f"{path.name}:{number}" for path in sorted((ROOT / "repro").rglob("*.py"))
+    long = [f"{path.name}:{number}" for path in own("repro")
             for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1) if len(line) > 100]
     assert long == []

@@ -18,7 +18,6 @@ import pytest
 from repro import results
 from repro.cli import main
 from repro.model import growth
-from repro.run.running import OutputError, prepare
 
 
 def run(tmp_path, scene, *sets, status=0, options=()):
@@ -147,12 +146,6 @@ def test_interrupting_a_run_keeps_what_was_computed(tmp_path):
     message = process.communicate(timeout=60)[1].decode()
     assert process.returncode == 130 and "interrupted" in message and "Traceback" not in message
     assert len(rows(out)) >= 3 and json.loads((out / "run.json").read_text())["status"] == "interrupted"
-
-
-def test_a_file_in_the_way_is_refused(tmp_path):
-    (tmp_path / "run").write_text("not a folder")
-    with pytest.raises(OutputError, match="folder"):
-        prepare(tmp_path / "run")
 
 
 def test_a_forced_run_replaces_the_first(tmp_path):

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from contextlib import suppress
 from hashlib import sha256
+from pathlib import Path
 
 import pytest
 
@@ -19,6 +20,7 @@ from repro.run.checkpoint import LAST, NEWEST, PREVIOUS
 from repro.run.folder import LOCK, SUMS, held, prepare
 from repro.run.running import Watch, resume, run
 from repro.scene import load_scene, parse_scene, scene_tables
+from tests.pages import whole_of
 from tests.shell import SHORT, files, shell, started, told, wait_for
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="for Linux alone")
@@ -76,27 +78,37 @@ def spoil(folder):
         (folder / name).write_bytes((folder / name).read_bytes()[:1000])
 
 
-def cut_off(folder):
-    """A run with two checkpoints that was cut off; its scene."""
-    scene = load_scene("base", FAST)
+@pytest.fixture(scope="module")
+def short():
+    return load_scene("base", FAST)
+
+
+@pytest.fixture(scope="module")
+def cut(short, tmp_path_factory):
+    """A run with two checkpoints that was cut off: whoever changes it copies it."""
+    folder = tmp_path_factory.mktemp("cut") / "run"
     with pytest.raises(ZeroDivisionError):
-        run(scene, folder, lambda time: 1 / (time < 0.5), watch=Watch(interval=0.0))
-    return scene
+        run(short, folder, lambda time: 1 / (time < 0.5), watch=Watch(interval=0.0))
+    return folder
 
 
-def test_a_runs_files_are_listed(tmp_path):
+@pytest.fixture
+def out(cut, tmp_path):
+    """A copy of it."""
+    return Path(shutil.copytree(cut, tmp_path / "run"))
+
+
+def test_a_runs_files_are_listed(short):
     """All that there is in the end, and nothing else, by name in run.json; the fields' sums are right."""
-    run(load_scene("base", FAST), tmp_path)
-    assert sorted({*files(tmp_path), "run.json", "report.html", LAST}) == told(tmp_path)["files"]
-    sums = dict(line.split("  ")[::-1] for line in (tmp_path / SUMS).read_text().splitlines())
-    assert sums == {name: sha256(content).hexdigest() for name, content in files(tmp_path).items() if "vtu" in name}
+    out = whole_of(short)
+    assert sorted({*files(out), "run.json", "report.html", LAST}) == told(out)["files"]
+    sums = dict(line.split("  ")[::-1] for line in (out / SUMS).read_text().splitlines())
+    assert sums == {name: sha256(content).hexdigest() for name, content in files(out).items() if "vtu" in name}
 
 
-def test_nothing_is_removed_that_no_run_wrote(tmp_path, capsys):
+def test_nothing_is_removed_that_no_run_wrote(out, short, capsys):
     """A resume without a good checkpoint starts again, beside what others have put there, names of fields and tables
     among them."""
-    out = tmp_path / "run"
-    scene = cut_off(out)
     spoil(out)
     mine = ["thesis.tex", "timeseries.nc", "fields/mine.vtu", "fields/fields_0099.vtu", "fields/notes/a.txt",
             "before_expansion.pvd"]
@@ -106,31 +118,27 @@ def test_nothing_is_removed_that_no_run_wrote(tmp_path, capsys):
     assert main(["run", "--resume", str(out), "--quiet"]) == 0
     assert "starts again from t = 0" in capsys.readouterr().err
     assert [(out / name).read_text() for name in mine] == ["years of work"] * len(mine)
-    run(scene, tmp_path / "whole")
-    assert {name: content for name, content in files(out).items() if name not in mine} == files(tmp_path / "whole")
+    assert {name: content for name, content in files(out).items() if name not in mine} == files(whole_of(short))
     assert not {*mine} & {*told(out)["files"]}
 
 
-def test_nothing_is_replaced_that_no_run_wrote(tmp_path, capsys):
+def test_nothing_is_replaced_that_no_run_wrote(out, capsys):
     """A file of the name of the next fields: told in one line, and left as it is."""
-    cut_off(tmp_path)
-    count = len(list((tmp_path / "fields").iterdir()))
-    mine = tmp_path / "fields" / f"fields_{count:04d}.vtu"
+    count = len(list((out / "fields").iterdir()))
+    mine = out / "fields" / f"fields_{count:04d}.vtu"
     mine.write_text("years of work")
-    assert main(["run", "--resume", str(tmp_path), "--quiet"]) == 2
+    assert main(["run", "--resume", str(out), "--quiet"]) == 2
     message = capsys.readouterr().err
     assert f"{mine}: it is there, and this run has not written it" in message and message.count("\n") == 1
     assert mine.read_text() == "years of work"
     mine.unlink()
-    assert main(["run", "--resume", str(tmp_path), "--quiet"]) == 0
+    assert main(["run", "--resume", str(out), "--quiet"]) == 0
 
 
 @pytest.mark.parametrize("name", ["fields", "timeseries.csv", NEWEST, PREVIOUS, "report.html",
                                   "fields/fields_0001.vtu"])
-def test_links_are_refused(tmp_path, capsys, name):
+def test_links_are_refused(out, tmp_path, capsys, name):
     """What they lead to stays, whatever it is called."""
-    out = tmp_path / "run"
-    cut_off(out)
     spoil(out)
     (out / "report.html").touch()
     (out / name).rename(tmp_path / "elsewhere")
@@ -143,28 +151,24 @@ def test_links_are_refused(tmp_path, capsys, name):
 
 
 @pytest.mark.parametrize("make", [os.mkfifo, os.mkdir, lambda path: os.symlink("/dev/zero", path)])
-def test_a_checkpoint_that_is_no_file_is_refused(tmp_path, capsys, make):
+def test_a_checkpoint_that_is_no_file_is_refused(out, capsys, make):
     """A pipe, a folder, a device: no hang."""
-    cut_off(tmp_path)
-    (tmp_path / NEWEST).unlink()
-    make(tmp_path / NEWEST)
-    assert main(["run", "--resume", str(tmp_path), "--quiet"]) == 2
+    (out / NEWEST).unlink()
+    make(out / NEWEST)
+    assert main(["run", "--resume", str(out), "--quiet"]) == 2
     message = capsys.readouterr().err
-    assert f"{tmp_path / NEWEST}: it is a link, or no regular file" in message and message.count("\n") == 1
+    assert f"{out / NEWEST}: it is a link, or no regular file" in message and message.count("\n") == 1
 
 
 @pytest.mark.parametrize("content", [b"", b"<VTKFile", b'<VTKFile type="UnstructuredGrid"/>', b"\xff" * 5000])
-def test_altered_fields_are_told_and_made_again(tmp_path, capsys, content):
+def test_altered_fields_are_told_and_made_again(out, short, capsys, content):
     """The resume starts where all is right, here from t = 0, and ends with the bits of the whole run."""
-    out = tmp_path / "run"
-    scene = cut_off(out)
     (out / "fields" / "fields_0000.vtu").write_bytes(content)
     assert main(["run", "--resume", str(out), "--quiet"]) == 0
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 3 and "starts again from t = 0" in lines[-1]
     assert all("fields_0000.vtu is not as it was written" in line for line in lines[:-1])
-    run(scene, tmp_path / "whole")
-    assert files(out) == files(tmp_path / "whole")
+    assert files(out) == files(whole_of(short))
 
 
 def test_a_page_that_cannot_be_made_is_told(tmp_path, capsys):
@@ -177,11 +181,10 @@ def test_a_page_that_cannot_be_made_is_told(tmp_path, capsys):
     assert "report.html: it cannot be made" in message and message.count("\n") == 1
 
 
-def test_what_a_killed_run_was_writing_is_removed(tmp_path):
+def test_what_a_killed_run_was_writing_is_removed(short, tmp_path):
     """What is in such a folder and no run's stays."""
-    scene = load_scene("base", FAST)
     with pytest.raises(ZeroDivisionError):
-        run(scene, tmp_path / "run", lambda time: 1 / (time < 0.5))
+        run(short, tmp_path / "run", lambda time: 1 / (time < 0.5))
     for part in (f".writing-abcdefgh/{NEWEST}", ".writing-01234567/.timeseries.csv.part",
                  "fields/.writing-_1234567/.part-fields_0001.vtu", ".writing-thesis00/thesis.tex"):
         (tmp_path / "run" / part).parent.mkdir()
@@ -189,8 +192,7 @@ def test_what_a_killed_run_was_writing_is_removed(tmp_path):
     assert resume(tmp_path / "run") == "completed"
     assert (tmp_path / "run" / ".writing-thesis00" / "thesis.tex").read_text() == "half"
     shutil.rmtree(tmp_path / "run" / ".writing-thesis00")
-    run(scene, tmp_path / "whole")
-    assert files(tmp_path / "run") == files(tmp_path / "whole")
+    assert files(tmp_path / "run") == files(whole_of(short))
     assert not list((tmp_path / "run").rglob(".writing-*"))
 
 
@@ -252,32 +254,20 @@ def full(*_):
                                                 (results.os, "replace", r"fields/fields_\d{4}\.vtu"),
                                                 (checkpoint.os, "fsync", r"fields/fields_\d{4}\.vtu"),
                                                 (checkpoint, "write", NEWEST)])
-def test_no_space_is_told_with_the_file_and_nothing_is_lost(tmp_path, monkeypatch, module, name, file):
+def test_no_space_is_told_with_the_file_and_nothing_is_lost(short, tmp_path, monkeypatch, module, name, file):
     """The run stops, says which file, leaves none half-written, and goes on when there is room."""
-    scene, out, works = load_scene("base", FAST), tmp_path / "run", getattr(module, name)
+    out, works = tmp_path / "run", getattr(module, name)
 
     def fill(event):
         if event["event"] == "checkpoint" and event["time_h"] > 0.5:
             monkeypatch.setattr(module, name, full)
 
     with pytest.raises(OutputError, match=f"{file}: No space left on device; .* go on with --resume"):
-        run(scene, out, watch=Watch(tell=fill, interval=0.0))
+        run(short, out, watch=Watch(tell=fill, interval=0.0))
     assert not [path for path in out.rglob("*") if "part" in path.name] and not (out / LOCK).exists()
     monkeypatch.setattr(module, name, works)
     assert resume(out) == "completed" and told(out)["resumes"][0]["time_h"] > 0.5
-    run(scene, tmp_path / "whole")
-    assert files(out) == files(tmp_path / "whole")
-
-
-@LINUX
-def test_a_file_that_may_not_grow_ends_a_run_with_status_2(tmp_path):
-    """In a process whose files may be 20 kB long: the fields are longer."""
-    import resource
-    limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))  # noqa: E731
-    status, _, message = shell(*SHORT, "--out", tmp_path / "run", preexec_fn=limit)
-    assert status == 2 and "fields_0000.vtu: File too large" in message and message.count("\n") == 1
-    assert not [name for name in files(tmp_path / "run") if "vtu" in name or "part" in name]
-    assert shell("--resume", tmp_path / "run")[0] == 0
+    assert files(out) == files(whole_of(short))
 
 
 @pytest.mark.thorough

@@ -1,5 +1,7 @@
 """A run that is made longer: `repro run --resume DIR --set growth.end=LATER`."""
 
+from shutil import copytree
+
 import pytest
 
 from repro.cli import main
@@ -8,6 +10,7 @@ from repro.march.simulation import ends_soon, steps
 from repro.run.checkpoint import LAST, NEWEST, PREVIOUS
 from repro.run.running import Watch, resume, run
 from repro.scene import SceneError, load_scene
+from tests.pages import whole_of
 from tests.shell import files, lasting, told
 
 SCENES = {
@@ -40,11 +43,10 @@ def same(one, other):
 def test_a_longer_run_is_as_if_that_had_been_asked_for_at_first(tmp_path, name, end):
     """Bit for bit, twice in a row."""
     whole = scene(name)
-    run(whole, tmp_path / "whole")
-    run(scene(name, end), tmp_path / "parts")
+    copytree(whole_of(scene(name, end)), tmp_path / "parts")
     for later in (0.5 * (end + whole.growth.end), whole.growth.end):
         resume(tmp_path / "parts", overrides=[f"growth.end={later} h"])
-    assert same(tmp_path / "parts", tmp_path / "whole")
+    assert same(tmp_path / "parts", whole_of(whole))
     resumes = told(tmp_path / "parts")["resumes"]
     before = [end, 0.5 * (end + whole.growth.end)]
     assert [one["changed"]["growth.end"][0] for one in resumes] == [f"{time:g} h" for time in before]
@@ -52,15 +54,14 @@ def test_a_longer_run_is_as_if_that_had_been_asked_for_at_first(tmp_path, name, 
 
 def test_little_is_computed_again(tmp_path):
     """Of the paper's scheme the last two steps."""
-    run(scene("paper", 1.4), tmp_path)
-    resume(tmp_path, overrides=["growth.end=2.2 h"])
-    assert told(tmp_path)["resumes"][0]["time_h"] >= 1.0 - 1e-9
+    copytree(whole_of(scene("paper", 1.4)), tmp_path / "run")
+    resume(tmp_path / "run", overrides=["growth.end=2.2 h"])
+    assert told(tmp_path / "run")["resumes"][0]["time_h"] >= 1.0 - 1e-9
 
 
 def test_a_run_that_is_not_over_is_made_longer(tmp_path):
     """Stopped before and after its end was near."""
     whole, short = scene("paper, an end within a step"), scene("paper, an end within a step", 1.2)
-    run(whole, tmp_path / "whole")
     near = [ends_soon(short, state) for state, _ in steps(short)]
     assert not near[1] and near[-2]
     for stop in (1, len(near) - 1):
@@ -68,36 +69,33 @@ def test_a_run_that_is_not_over_is_made_longer(tmp_path):
         with pytest.raises(Interrupted):
             run(short, tmp_path / str(stop), watch=Watch(stop=lambda left=left: next(left)))
         resume(tmp_path / str(stop), overrides=["growth.end=2.2 h"])
-        assert same(tmp_path / str(stop), tmp_path / "whole")
+        assert same(tmp_path / str(stop), whole_of(whole))
 
 
 def test_a_longer_run_that_was_stopped_goes_on(tmp_path):
-    run(scene("fast"), tmp_path / "whole")
-    run(scene("fast", 5.0), tmp_path / "parts")
+    copytree(whole_of(scene("fast", 5.0)), tmp_path / "parts")
     left = iter([0, 15])
     with pytest.raises(Interrupted):
         resume(tmp_path / "parts", overrides=["growth.end=9 h"], watch=Watch(stop=lambda: next(left)))
     assert told(tmp_path / "parts")["tables"]["growth"]["end"] == "9.0 h"
-    assert resume(tmp_path / "parts") == "completed" and same(tmp_path / "parts", tmp_path / "whole")
+    assert resume(tmp_path / "parts") == "completed" and same(tmp_path / "parts", whole_of(scene("fast")))
 
 
 def test_without_the_state_it_starts_again(tmp_path):
     """And says so."""
-    run(scene("fast", 5.0), tmp_path / "parts")
+    copytree(whole_of(scene("fast", 5.0)), tmp_path / "parts")
     (tmp_path / "parts" / LAST).unlink()
     with pytest.warns(UserWarning, match="no checkpoint to go on from; it starts again from t = 0"):
         resume(tmp_path / "parts", overrides=["growth.end=9 h"])
-    run(scene("fast"), tmp_path / "whole")
-    assert same(tmp_path / "parts", tmp_path / "whole")
+    assert same(tmp_path / "parts", whole_of(scene("fast")))
 
 
-def test_a_run_that_is_over_keeps_one_checkpoint(tmp_path):
+def test_a_run_that_is_over_keeps_one_checkpoint():
     """And lists it."""
-    run(scene("fast", 5.0), tmp_path / "run")
-    assert (tmp_path / "run" / LAST).exists() and LAST in told(tmp_path / "run")["files"]
-    assert not any((tmp_path / "run" / name).exists() for name in (NEWEST, PREVIOUS))
-    run(load_scene("flow_only"), tmp_path / "still")
-    assert not (tmp_path / "still" / LAST).exists() and LAST not in told(tmp_path / "still")["files"]
+    grown, still = whole_of(scene("fast", 5.0)), whole_of(load_scene("flow_only"))
+    assert (grown / LAST).exists() and LAST in told(grown)["files"]
+    assert not any((grown / name).exists() for name in (NEWEST, PREVIOUS))
+    assert not (still / LAST).exists() and LAST not in told(still)["files"]
 
 
 @pytest.mark.parametrize("entry, wanted", [
@@ -108,10 +106,10 @@ def test_a_run_that_is_over_keeps_one_checkpoint(tmp_path):
 ])
 def test_what_is_no_later_end_is_refused(tmp_path, entry, wanted):
     """And nothing is changed."""
-    run(scene("fast", 5.0), tmp_path)
+    out = copytree(whole_of(scene("fast", 5.0)), tmp_path / "run")
     before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
     with pytest.raises(SceneError) as refused:
-        resume(tmp_path, overrides=[entry])
+        resume(out, overrides=[entry])
     assert wanted in str(refused.value)
     assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
 
@@ -149,8 +147,7 @@ def test_a_step_is_another_one_only_where_the_end_is_near(name):
 
 def test_rows_that_lie_as_the_end_asks_for_them_are_those_of_the_longer_run(tmp_path):
     """Rows of the shorter run may lie closer than the longer one's."""
-    whole = [*SCENES["fast"][:-1], "growth.end=20 h"]
-    run(load_scene("base", whole), tmp_path / "whole")
-    run(load_scene("base", [*whole, "growth.end=9.5 h"]), tmp_path / "parts")
-    resume(tmp_path / "parts", overrides=["growth.end=20 h"])
-    assert same(tmp_path / "parts", tmp_path / "whole")
+    whole = ["numerics.preset=fast", "numerics.tolerance=0.001", "growth.time_step=6 min", "growth.end=10 h"]
+    run(load_scene("base", [*whole, "growth.end=4.75 h"]), tmp_path / "parts")
+    resume(tmp_path / "parts", overrides=["growth.end=10 h"])
+    assert same(tmp_path / "parts", whole_of(load_scene("base", whole)))

@@ -122,19 +122,22 @@ def test_a_limit_of_address_space_ends_a_run_in_one_line(tmp_path):
     assert status == 2 and "MB are free" in message and message.count("\n") == 1
 
 
-MORE = [pytest.param(size, marks=pytest.mark.thorough) for size in (0, 8_000, 40_000)]
+MORE = [pytest.param(size, "", marks=pytest.mark.thorough) for size in (0, 8_000, 40_000)]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="for Linux alone")
-@pytest.mark.parametrize("most", [500, *MORE])
-def test_a_limit_of_file_sizes_ends_a_run_in_one_line(tmp_path, most):
-    """Whichever file it is that may not grow; with more room the run goes on."""
+@pytest.mark.parametrize("most, which", [(500, ""), (20_000, "fields_0000.vtu: "), *MORE])
+def test_a_limit_of_file_sizes_ends_a_run_in_one_line(tmp_path, most, which):
+    """Whichever file it is that may not grow, the first to be longer than 20 kB fields; with more room the run goes on,
+    which is asked for in either way."""
     import resource
     limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))  # noqa: E731
-    status, _, message = shell(*SHORT, "--out", tmp_path / "run", "--quiet", preexec_fn=limit)
-    assert status == 2 and "File too large" in message and message.count("\n") == 1, message
-    assert not [name for name in files(tmp_path / "run") if "writing" in name]
-    assert shell(*SHORT, "--out", tmp_path / "run", "--quiet")[0] == 0
+    asked = [*SHORT, "--set", 'growth.end="0.4 h"', "--out", str(tmp_path / "run"), "--quiet"]
+    status, _, message = shell(*asked, preexec_fn=limit)
+    assert status == 2 and f"{which}File too large" in message and message.count("\n") == 1, message
+    left = files(tmp_path / "run")
+    assert not [name for name in left if "writing" in name or "part" in name or which and "vtu" in name]
+    assert main(["run", *(["--resume", str(tmp_path / "run"), "--quiet"] if which else asked)]) == 0
 
 
 def test_want_of_memory_outside_of_the_steps_is_told_in_one_line(tmp_path, capsys, monkeypatch):

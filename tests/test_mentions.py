@@ -6,12 +6,11 @@ from pathlib import Path
 import pytest
 
 from tests.blocks import ROOT
+from tests.test_architecture import own
 
 FOLDERS = ("repro", "reference", "verification", "tests", "docs", "paper_figures")
 PAGES = ("README.md", "CONTRIBUTING.md", "Makefile", "codecheck.author.yml", "CITATION.cff", "MANIFEST.in")
 KINDS = (".py", ".md", ".toml")
-#: Folders that are made, or that are not of the repository.
-NOT_OURS = {".venv", ".git", "out", "cache", "runs", "__pycache__", ".hypothesis"}
 #: What commands make; names in tests of what is not there, and words that stand for any name of their kind.
 MADE = {"claims.md", "codecheck.yml", "paper_figures/out/manifest.json"}
 EXAMPLES = {"repro/a.py", "repro.utils", "C38", "C99", "repro/m.py", "tests/__init__.py", "tests/test_m.py",
@@ -31,8 +30,7 @@ ELSEWHERE = re.compile(r"\b(?:traps?|issues?|tickets?|themes?|lessons?)\b[ #]*\d
 @cache
 def held():
     """Paths of all files."""
-    inside = [path for folder in FOLDERS for path in (ROOT / folder).rglob("*") if path.is_file()]
-    found = {str(path.relative_to(ROOT)) for path in inside if not NOT_OURS & set(path.relative_to(ROOT).parts)}
+    found = {str(path.relative_to(ROOT)) for folder in FOLDERS for path in own(folder, "*")}
     return found | {path.name for path in ROOT.iterdir() if path.is_file()}
 
 
