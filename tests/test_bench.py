@@ -226,7 +226,7 @@ def test_exponents_by_stage():
 @pytest.mark.parametrize("name", bench.PARTS)
 def test_a_small_version_of_every_part_runs(name, tmp_path, capsys, monkeypatch):
     """It measures something, of every method, is told, drawn and can be recorded; what is on record is not touched."""
-    monkeypatch.setattr(clock, "SHORT", 0.0)  # no run warms up
+    monkeypatch.setattr(record, "SHORT", 0.0)  # no run warms up
     before = record.FILE.read_bytes() if record.FILE.exists() else None
     found = bench.main(["--quick", name])
     part = found["parts"][name]
