@@ -1,2 +1,13 @@
 """The coupled loop: the whole run against its averaged pore, special cases with a known answer, what is conserved, the
 order in the time step, and what must not matter."""
+
+from verification.problems import runs
+
+#: Why a case of the paper's updates runs with no other preset.
+UPDATES = "fast, accurate: the midpoint rule has no updates"
+
+
+def every(refinement: float, linear: float = 1.0) -> dict[str, tuple[str, ...]]:
+    """Changes of a scene, by label: every kind of elements with the paper's scheme, refined so, and the presets."""
+    kinds = {kind: (runs.of(kind), runs.coarser(kind, refinement, linear)) for kind in runs.ELEMENTS}
+    return {**kinds, **{preset: (runs.by(preset),) for preset in runs.PRESETS[1:]}}
