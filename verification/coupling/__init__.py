@@ -3,11 +3,15 @@ order in the time step, and what must not matter."""
 
 from verification.problems import runs
 
-#: Why a case of the paper's updates runs with no other preset.
-UPDATES = "fast, accurate: the midpoint rule has no updates"
+#: Changes of a scene, by label: the presets, and fast with cubic elements.
+PRESETS = {**{preset: (runs.by(preset),) for preset in runs.PRESETS}, "cubic": (runs.by("fast"), runs.of("cubic"))}
+
+
+def kinds(refinement: float, linear: float = 1.0) -> dict[str, tuple[str, ...]]:
+    """Changes of a scene, by label: every kind of elements with the paper's scheme, refined so."""
+    return {kind: (runs.of(kind), runs.coarser(kind, refinement, linear)) for kind in runs.ELEMENTS}
 
 
 def every(refinement: float, linear: float = 1.0) -> dict[str, tuple[str, ...]]:
-    """Changes of a scene, by label: every kind of elements with the paper's scheme, refined so, and the presets."""
-    kinds = {kind: (runs.of(kind), runs.coarser(kind, refinement, linear)) for kind in runs.ELEMENTS}
-    return {**kinds, **{preset: (runs.by(preset),) for preset in runs.PRESETS[1:]}}
+    """The same, and the presets."""
+    return {**kinds(refinement, linear), **{preset: (runs.by(preset),) for preset in runs.PRESETS[1:]}}

@@ -18,7 +18,7 @@ from repro.fem.space import Space
 from repro.march.simulation import shaped, simulate
 from repro.model import flow, pore
 from repro.scene import load_scene
-from verification.coupling import every
+from verification.coupling import PRESETS, every
 from verification.kernel.case import Profile, at_least, at_most, case, study
 from verification.problems import pairs, runs
 
@@ -217,9 +217,7 @@ FOREIGN = ('pore.width="0.05 mm"', 'pore.length="0.06 cm"', 'aggregate.radius="5
 
 @case("coupling-foreign-units", kind="property", norm="largest difference of any node's place (um), and of C, at 1 h",
       claim="A scene written in other units is the same scene, bit for bit",
-      mutants=("rounded-twice",),
-      over={**{preset: (runs.by(preset),) for preset in runs.PRESETS}, "cubic": (runs.by("fast"), runs.of("cubic"))},
-      ways="1 2")
+      mutants=("rounded-twice",), over=PRESETS, ways="1 2")
 def foreign_units(*changes: str):
     ours, theirs = (runs.last(runs.base(end, *changes, *units)) for end, units in (("1 h", ()), ("60 min", FOREIGN)))
     apart = np.abs(ours.pore.mesh.points - theirs.pore.mesh.points).max()
