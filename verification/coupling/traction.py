@@ -369,6 +369,10 @@ def _defects(factor: float, *changes: str) -> tuple[float, float]:
     return tuple(defects)
 
 
+#: The least refinement at which the mesh of a seed that followed is not fine enough.
+ANEW = 1.35
+
+
 @case("coupling-traction-remeshed", kind="property",
       norm="sum along x and moment of the forces on an outline's nodes against those on the nodes of a new mesh around "
            "it, and the sum against that on the mesh that followed; relative",
@@ -377,7 +381,7 @@ def _defects(factor: float, *changes: str) -> tuple[float, float]:
 def remeshed(*changes: str):
     now, found, _ = _moved(0.0, *changes)
     coarse = loaded_scene(*changes)
-    fine = loaded_scene(*changes, f"numerics.refinement={3 * coarse.numerics.refinement}")
+    fine = loaded_scene(*changes, f"numerics.refinement={max(ANEW, 3 * coarse.numerics.refinement)}")
     mesh, _ = pore.generate(fine, found.outline)
     on = nodal(fine, Space(mesh, found.space.order))[0]
     scale = traction.MPA_PER_UM * fine.flow.density * fine.flow.gravity / fine.growth.shear_modulus
