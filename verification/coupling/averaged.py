@@ -47,8 +47,7 @@ def base(*changes: str):
     scene = runs.base("19.4 h", *changes, times=", ".join(f'"{time} h"' for time in TIMES))
     instants = averaged.ours(scene)
     thin, own = _clogged(changes[0])
-    first, second = ([averaged.apart(scene, *pair) for pair in zip(instants, moments)] for moments in (thin, own))
-    flow, rest = averaged.worst(first), averaged.worst(second)
+    flow, rest = (_apart(scene, instants, moments) for moments in (thin, own))
     checks = [between("velocity, lubrication", flow["velocity"], 0.09, 0.12,
                       "lubrication loses 11.3 % of the loss around a half-disc of 30 um, by Taylor-Hood; less what its "
                       "aggregate, 2 % larger, gains"),
@@ -60,6 +59,11 @@ def base(*changes: str):
     checks += [at_most(f"{name}, a half-disc's loss", rest[name], bound, SQUARE_LAW)
                for name, bound in (("area", 0.013), ("effluents", 0.02), ("C along the pore", 0.02))]
     return checks, _histories(scene, instants, thin, own), averaged.profiles(instants[5::2], own[5::2])
+
+
+def _apart(scene, instants, moments) -> dict[str, float]:
+    """The largest of each difference at the reported times."""
+    return averaged.worst([averaged.apart(scene, *pair) for pair in zip(instants, moments)])
 
 
 @cache
@@ -200,8 +204,7 @@ def _whole(preset: str, factor: float):
     scene = _base(preset, factor)
     instants = averaged.ours(scene)
     moments = averaged.half_disc(scene).run(MIXING_TIMES, accuracy=1e-6)
-    rows = [averaged.apart(scene, *pair) for pair in zip(instants, moments)]
-    return averaged.worst(rows), averaged.profiles(instants, moments)
+    return _apart(scene, instants, moments), averaged.profiles(instants, moments)
 
 
 #: Refinement of our mesh, our time step (min), and cells of the averaged pore: as in the whole run, and twice as fine.
@@ -270,10 +273,9 @@ def _strip(elements: str, aspect: float):
     given = shaped(thin_scene(elements, aspect), half_ellipse(elements, aspect))
     area, instants = pore.seeded(given).outline.area, averaged.ours(given)
     moments = strip_of(given, area, 2 * averaged.CELLS).run(given.output.times)
-    rows = [averaged.apart(given, *pair) for pair in zip(instants, moments)]
     ends = np.array([(instants[-1].pore.outline.upstream, instants[-1].pore.outline.downstream), moments[-1].ends])
     ours, theirs = -ends[:, 0] / ends[:, 1] - 1
-    return (averaged.worst(rows), np.abs(ends[0] / ends[1] - 1).max(), ours / theirs,
+    return (_apart(given, instants, moments), np.abs(ends[0] / ends[1] - 1).max(), ours / theirs,
             averaged.profiles(instants, moments))
 
 
@@ -414,7 +416,7 @@ def supply(how: str, bound: float, origin: str, *changes: str):
     made = supplied(how, *changes)
     instants = averaged.ours(made)
     moments = _fed(how, changes[0])
-    worst = averaged.worst([averaged.apart(made, *pair) for pair in zip(instants, moments)])
+    worst = _apart(made, instants, moments)
     yield [at_most(name, worst[name], bound, origin) for name in ("area", "effluents", "C along the pore")]
     areas = [moment.area for moment in moments]
     if how == "steps":

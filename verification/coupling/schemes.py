@@ -18,7 +18,7 @@ from repro.march.simulation import simulate
 from repro.model import pore
 from repro.scene import load_scene
 from verification.coupling import every, kinds
-from verification.kernel.case import Profile, at_most, case, study
+from verification.kernel.case import Profile, Study, at_most, case, study
 from verification.problems import averaged, runs
 
 STEPS = (0.8, 0.4, 0.2, 0.1, 0.05)
@@ -33,14 +33,18 @@ def time_step(*changes: str):
     """Remeshes, and the orders."""
     instants = [runs.last(runs.base("3.2 h", 'aggregate.radius="25 um"', f'growth.time_step="{step} h"', *changes))
                 for step in STEPS]
-    numbers, studies = [runs.numbers(instant) for instant in instants], []
-    for name in numbers[0]:
-        values = np.array([row[name] for row in numbers])
-        apart = np.abs(np.diff(values) / values[-1])
-        studies.append(study(f"{name}", STEPS[:-1], apart, 1, "frozen geometry: first order", ceiling=1e-3,
-                             band=0.15))
+    numbers = [runs.numbers(instant) for instant in instants]
+    values = np.array([[*row.values()] for row in numbers])
     remeshes = sum(instant.remeshes for instant in instants)
-    return at_most("remeshes, all runs", remeshes, 0.0, "one mesh: the error in space is common"), studies
+    yield at_most("remeshes, all runs", remeshes, 0.0, "one mesh: the error in space is common")
+    yield _in_time(numbers[0], STEPS, values, 1, "frozen geometry: first order", 1e-3)
+
+
+def _in_time(names, steps, values: np.ndarray, order: float, why: str, ceiling: float) -> list[Study]:
+    """Studies of each column of values (k + 1, n): what half the step changes, over the last value."""
+    apart = np.abs(np.diff(values, axis=0) / values[-1])
+    return [study(name, steps[:-1], column, order, why, ceiling=ceiling, band=0.15)
+            for name, column in zip(names, apart.T)]
 
 
 SLOWER = (16.0, 8.0, 4.0, 2.0)
@@ -140,9 +144,7 @@ def order_in_time(elements: str):
     scene = load_scene("base", (runs.by("fast"), runs.of(elements), "numerics.refinement=0.5",
                                 'aggregate.radius="25 um"'))
     values = np.array([_equal_steps(scene, steps) for steps in RULE_STEPS])
-    apart = np.abs(np.diff(values, axis=0) / values[-1])
-    return [study(quantity, 2 / np.array(RULE_STEPS[:-1]), apart[:, k], 2, "midpoint rule", ceiling=2e-5, band=0.15)
-            for k, quantity in enumerate(("area", "upstream tip"))]
+    return _in_time(("area", "upstream tip"), 2 / np.array(RULE_STEPS), values, 2, "midpoint rule", 2e-5)
 
 
 @case("coupling-midpoint-limit", kind="property", slow=True,

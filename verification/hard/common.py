@@ -124,6 +124,13 @@ def reference(name: str, *changes: str, refinement: float = 1.0) -> Run:
     return run(name, "accurate", *changes, f"numerics.refinement={refinement}", "numerics.tolerance=0.0005")
 
 
+def against(name: str, preset: str, changes: Sequence[str], *columns: str, refinement: float = 1.0,
+            **how) -> tuple[Run, Run, list]:
+    """A run, a finer one, and the checks of the first with what it must share with the other; how: of :class:`Run`."""
+    found, fine = run(name, preset, *changes, **how), reference(name, *changes, refinement=refinement)
+    return found, fine, [found, *close(found, fine, preset, *columns)]
+
+
 def midpoint_step(made: Scene, now: Pore, solved: Solved, duration: float) -> Step:
     """A step (h) of the midpoint rule, whatever its estimate."""
     return midpoint.attempt(made, now, solved, duration).step

@@ -198,10 +198,9 @@ def tight(preset: str, radius: float, end: str) -> list:
     """Base with a seed nearly as wide as its pore of 50 um."""
     changes = (f'aggregate.radius="{radius} um"', f'growth.end="{end}"', f'output.times=["{end}"]')
     found = common.run("base", preset, *changes, density=CLOSING)
-    frozen, fine = (run("base", *more, *FIXED, f'aggregate.radius="{radius} um"') for run, more in (
-        (common.run, (preset,)), (common.reference, ())))
+    frozen, _, checks = common.against("base", preset, (*FIXED, changes[0]), *DRIVE, *EFFLUENTS)
     clean = poiseuille.conductivity(50.0, found.scene.flow.kinematic_viscosity / found.scene.flow.gravity) * M_PER_D
-    return [found, frozen, *common.close(frozen, fine, preset, *DRIVE, *EFFLUENTS),
+    return [found, *checks,
             between("conductivity over that of the clean pore", found.last[DRIVE[0]] / clean, 1e-5,
                     frozen.last[DRIVE[0]] / clean, "falls as the aggregate grows, and lambda is 2000")]
 
