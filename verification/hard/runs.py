@@ -22,7 +22,7 @@ from repro.results import row
 from repro.scene import Scene, parse_scene, scene_tables
 from verification.hard import common
 from verification.hard.common import DRIVE, EFFLUENTS, SHAPE, TOLERANCE, HardCase, Run
-from verification.hard.contact import CLOSING
+from verification.hard.mechanics import CLOSING
 from verification.hard.stages import exponential
 from verification.kernel.case import Check, at_least, at_most
 
