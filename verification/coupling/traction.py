@@ -28,9 +28,8 @@ from verification.kernel.case import at_least, at_most, between, case, refine, s
 from verification.problems import meshes, runs
 
 FORMS = ("laplacian", "traction")
-#: Changes of a scene, by label: every kind of elements on the paper's mesh, and the presets.
-DEFAULT = {**{kind: (runs.of(kind),) for kind in runs.ELEMENTS}, **{preset: (runs.by(preset),) for preset in
-                                                                     runs.PRESETS[1:]}}
+#: Every kind of elements on the paper's mesh, and the presets on theirs.
+DEFAULT = every(1.0)
 BOTH_ENDS = "the momentum balance of the solver's own equations: round-off"
 REFINEMENTS = (1.0, 1.4, 2.0, 2.8)
 
