@@ -14,23 +14,22 @@ from repro.errors import SimulationError, TransportError
 from repro.scene import load_scene
 from repro.scene.units import SceneError
 from verification import hard_cases
-from verification.hard import common, judge, runs
-from verification.hard.common import PRESETS, HardCase
-from verification.hard.judge import REFUSED, RIGHT, WRONG
-from verification.kernel.case import Check, Result, at_least, at_most, between
+from verification.hard import common, runs
+from verification.hard.common import PRESETS, REFUSED, RIGHT, WRONG, HardCase
+from verification.kernel.case import Check, Outcome, Result, at_least, at_most, between
 
 GOOD, BAD = at_most("good", 0.5, 1.0, ""), at_most("bad", 2.0, 1.0, "")
 KNOWN = {case.number: case for case in hard_cases.CASES}
 MAY_REFUSE = {3, 4, 5, 15, 17, 19, 22}
 
 
-def part(*items, limit=judge.LIMIT):
+def part(*items, limit=common.LIMIT):
     """The verdict of a part that returns items, or raises the first where it is an error."""
     def function(preset):
         if items and isinstance(items[0], Exception):
             raise items[0]
         return list(items)
-    return judge.run_part("a part", function, "fast", limit)
+    return common.run_part("a part", function, "fast", limit)
 
 
 def a_case(verdicts, **more):
@@ -62,11 +61,11 @@ def test_a_message_says_what_fell_short():
 
 
 def test_floating_point_errors_are_no_results():
-    assert judge.run_part("p", lambda preset: [at_most("q", np.zeros(1) / 0, 1.0, "")], "fast").verdict == WRONG
+    assert common.run_part("p", lambda preset: [at_most("q", np.zeros(1) / 0, 1.0, "")], "fast").verdict == WRONG
 
 
 def test_a_part_that_does_not_end_is_stopped():
-    found = judge.run_part("p", lambda preset: sum(1 for _ in count()), "fast", limit=0.2)
+    found = common.run_part("p", lambda preset: sum(1 for _ in count()), "fast", limit=0.2)
     assert found.verdict == WRONG and "not done after 0.2 s" in found.message
     assert part(GOOD).verdict == RIGHT
 
@@ -74,7 +73,7 @@ def test_a_part_that_does_not_end_is_stopped():
 @pytest.mark.parametrize("verdicts, worst", [([RIGHT], RIGHT), ([RIGHT, REFUSED], REFUSED), ([REFUSED, WRONG], WRONG),
                                              ([WRONG, RIGHT], WRONG), ([], WRONG)])
 def test_a_cell_is_as_its_worst_part(verdicts, worst):
-    assert judge.run_cell(a_case(verdicts), "fast").verdict == worst
+    assert common.run_cell(a_case(verdicts), "fast").verdict == worst
 
 
 @pytest.mark.parametrize("verdict, preset, more, fine", [
@@ -85,14 +84,14 @@ def test_a_cell_is_as_its_worst_part(verdicts, worst):
     (WRONG, "fast", {"explained": {"wrong 0": "why"}}, False),
 ])
 def test_what_is_accepted(verdict, preset, more, fine):
-    assert (not judge.run_cell(a_case([verdict], **more), preset).unaccepted) is fine
+    assert (not common.run_cell(a_case([verdict], **more), preset).unaccepted) is fine
 
 
 @pytest.mark.parametrize("verdicts, more, holds", [
     ([RIGHT], {}, True), ([RIGHT, WRONG], {}, False), ([RIGHT, REFUSED], {}, False),
     ([RIGHT, REFUSED], {"refusable": ("refused 1",)}, True)])
 def test_a_verification_case_holds_if_its_verdicts_are_accepted(verdicts, more, holds):
-    found = judge.run_case(a_case(verdicts, **more))
+    found = common.run_case(a_case(verdicts, **more))
     assert Result("hard-99", found, "", 0.0).holds is holds
 
 
@@ -101,7 +100,7 @@ def test_a_verification_case_holds_if_its_verdicts_are_accepted(verdicts, more, 
     (at_least("q", 3.0, -1.0, ""), 0.0), (between("q", 1.25, 1.0, 2.0, ""), 0.5), (at_most("q", 0, 0, ""), 0.0),
     (at_most("q", 3.0, 2.0, ""), math.inf), (Check("q", math.nan, 0.0, 1.0, ""), math.inf)])
 def test_what_a_check_uses_of_its_tolerance(check, value):
-    assert judge.used(check) == pytest.approx(value)
+    assert common.used(check) == pytest.approx(value)
 
 
 def test_there_are_twenty_two_and_only_some_may_refuse():
@@ -114,9 +113,9 @@ def test_there_are_twenty_two_and_only_some_may_refuse():
 
 
 def test_the_matrix_is_told_and_written(tmp_path, monkeypatch):
-    cells = [judge.run_cell(a_case([RIGHT, REFUSED]), preset) for preset in PRESETS]
+    cells = [common.run_cell(a_case([RIGHT, REFUSED]), preset) for preset in PRESETS]
     monkeypatch.setattr(hard_cases, "RECORD", tmp_path / "report" / "hard_cases.json")
-    hard_cases.record([Result("hard-99", judge.outcome(cells), "", 0.0), Result("other", judge.Outcome(), "", 0.0)])
+    hard_cases.record([Result("hard-99", common.outcome(cells), "", 0.0), Result("other", Outcome(), "", 0.0)])
     kept, live = (json.loads((hard_cases.RECORD.parent / folder / hard_cases.RECORD.name).read_text())
                   for folder in (".", "live"))
     (line,), (measured,) = kept["cases"], live["cases"]
@@ -156,7 +155,7 @@ def test_a_wrong_run_is_seen():
     (1, "fast"), (2, "fast"), (5, "fast"), (6, "fast"), (9, "paper"), (10, "fast"), (12, "accurate"), (18, "paper"),
     (19, "fast")])
 def test_a_cheap_cell_is_what_it_must_be(number, preset):
-    cell = judge.run_cell(KNOWN[number], preset)
+    cell = common.run_cell(KNOWN[number], preset)
     assert not cell.unaccepted, cell.message
 
 
@@ -174,14 +173,14 @@ def test_units_scale_and_draws_are_scenes():
 @given(st.fixed_dictionaries({key: st.floats(0.0, 1.0) for key in runs.RANGES}), st.sampled_from(PRESETS))
 def test_a_run_of_any_parameters_ends_right_or_refuses(shares, preset):
     """Case 22 with what hypothesis draws."""
-    found = judge.run_part("drawn", lambda chosen: [runs.run_drawn(shares, chosen)], preset)
+    found = common.run_part("drawn", lambda chosen: [runs.run_drawn(shares, chosen)], preset)
     assert found.verdict in (RIGHT, REFUSED), found.message
 
 
 def test_every_hard_case_is_a_verification_case():
     from verification.kernel import case
     assert {one.full_id for one in hard_cases.CASES} == {id for id, c in case.CASES.items() if c.stage == "hard"}
-    assert "presets" in judge.NORM
+    assert "presets" in common.NORM
 
 
 def test_every_case_goes_from_process_to_process():

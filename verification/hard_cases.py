@@ -1,7 +1,7 @@
 """Twenty-two hard cases with every preset: ``python -m verification.hard_cases [--case N ...] [--preset P ...]``.
 
 "cubic" is the preset fast with cubic elements. Each cell of the matrix, a case with a preset, is right, refused or
-wrong, see :mod:`verification.hard.judge`. Refusing is accepted in the parts that a case names, and with ``paper``;
+wrong, see :mod:`verification.hard.common`. Refusing is accepted in the parts that a case names, and with ``paper``;
 wrong is never. The matrix is printed; a whole one is written to ``verification/report/hard_cases.json`` too, its
 numbers and seconds to ``live/`` beside it. Exit status 1 if a cell is what it may not be.
 """
@@ -16,8 +16,7 @@ from pathlib import Path
 
 from verification.bench.record import save
 from verification.hard import CASES
-from verification.hard.common import PRESETS
-from verification.hard.judge import Cell, Verdicts, run_cell
+from verification.hard.common import PRESETS, Cell, Verdicts, run_cell
 
 RECORD = Path(__file__).parent / "report" / "hard_cases.json"
 

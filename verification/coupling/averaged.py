@@ -5,10 +5,13 @@ Fast diffusion, where averaging over sections is exact: the disagreement falls a
 Aggregates that are long against the pore's width, where averaging over sections is exact.
 
 Flow, transport and uptake around thin aggregates at t = 0: Peclet by uptake, from hardly touched to starved.
+
+Supplies that change over time: starvation and recovery of an aggregate.
 """
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from functools import cache
 
@@ -24,7 +27,8 @@ from repro.fem.space import Space
 from repro.march.simulation import shaped, simulate
 from repro.model import flow, pore
 from repro.scene import Scene
-from verification.kernel.case import Profile, at_most, between, case, study
+from verification.coupling import PRESETS, every
+from verification.kernel.case import Profile, at_least, at_most, between, case, study
 from verification.problems import averaged, runs
 
 TIMES = (2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0, 19.4)
@@ -37,26 +41,37 @@ RADII, REACH = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 33.0), 75.0
            "relative, effluents and section means of C along the mesh over the supply",
       claim="Under its head base clogs as its averaged pore (FiPy, solve_ivp) does, up to what lubrication and section "
             "means are worth: a velocity 11 % too high, of which 1 % is left with a half-disc's own loss",
-      mutants=("stale-flow", "conductivity-for-velocity"), over=runs.PRESETS,
-      ways="1 2", because="order 3: coupling-averaged-refined")
-def base(preset: str):
-    """Checks and pictures of one preset."""
-    scene = runs.base("19.4 h", runs.by(preset), times=", ".join(f'"{time} h"' for time in TIMES))
+      mutants=("stale-flow", "conductivity-for-velocity"),
+      over=PRESETS, ways="1 2")
+def base(*changes: str):
+    scene = runs.base("19.4 h", *changes, times=", ".join(f'"{time} h"' for time in TIMES))
     instants = averaged.ours(scene)
-    thin, own = (averaged.half_disc(scene, speed).run(TIMES) for speed in speeds(scene))
-    first, second = ([averaged.apart(scene, *pair) for pair in zip(instants, moments)] for moments in (thin, own))
-    flow, rest = averaged.worst(first), averaged.worst(second)
+    thin, own = _clogged(changes[0])
+    flow, rest = (_apart(scene, instants, moments) for moments in (thin, own))
     checks = [between("velocity, lubrication", flow["velocity"], 0.09, 0.12,
                       "lubrication loses 11.3 % of the loss around a half-disc of 30 um, by Taylor-Hood; less what its "
                       "aggregate, 2 % larger, gains"),
               at_most("velocity, the loss of a half-disc of our area", _at_our_area(scene, instants), 0.01,
                       "linear elements: 0.3 % at the ends of the mesh, 0.5 % around the aggregate")]
-    if preset == "paper":  # without linear elements' error, which is of the other sign, 1.6 % with the averaged area
+    if scene.numerics.preset == "paper":  # the others: 1.6 % with the averaged area, without linear elements' error
         checks.append(at_most("velocity, a half-disc's loss", rest["velocity"], 0.01,
                               "linear elements: 0.3 % at the ends of the mesh, 0.5 % around the aggregate"))
     checks += [at_most(f"{name}, a half-disc's loss", rest[name], bound, SQUARE_LAW)
                for name, bound in (("area", 0.013), ("effluents", 0.02), ("C along the pore", 0.02))]
     return checks, _histories(scene, instants, thin, own), averaged.profiles(instants[5::2], own[5::2])
+
+
+def _apart(scene, instants, moments) -> dict[str, float]:
+    """The largest of each difference at the reported times."""
+    return averaged.worst([averaged.apart(scene, *pair) for pair in zip(instants, moments)])
+
+
+@cache
+def _clogged(preset: str) -> tuple[list, list]:
+    """The averaged pore's moments at TIMES under both losses, from the seed of a preset."""
+    scene = runs.base("19.4 h", preset)
+    thin, own = (averaged.half_disc(scene, speed).run(TIMES) for speed in speeds(scene))
+    return thin, own
 
 
 def _at_our_area(scene, instants) -> float:
@@ -122,10 +137,9 @@ FASTER = (4.0, 16.0, 64.0, 256.0)
            "fluid and biomass and times 4 to 256",
       claim="What averaging over sections costs in the effluents is, as diffusion becomes fast, the constriction of a "
             "half-disc in a strip, in closed form",
-      mutants=("effluent-at-the-inlet", "inlet-held", "seed-too-thin"), over=runs.ELEMENTS, ways="paper")
-def mixing(elements: str):
-    """Checks and studies with one kind of elements."""
-    scene = runs.base("0 h", 'aggregate.radius="20 um"', runs.of(elements), runs.coarser(elements, 0.5, 1.5))
+      mutants=("effluent-at-the-inlet", "inlet-held", "seed-too-thin"), over=every(0.5, 1.5), ways="paper")
+def mixing(*changes: str):
+    scene = runs.base("0 h", 'aggregate.radius="20 um"', *changes)
     scene = runs.at_velocity(scene, runs.SPEED)
     found = [_leaving(scene, factor) for factor in FASTER]
     sizes = [thiele(scene, factor) for factor in FASTER]
@@ -190,8 +204,7 @@ def _whole(preset: str, factor: float):
     scene = _base(preset, factor)
     instants = averaged.ours(scene)
     moments = averaged.half_disc(scene).run(MIXING_TIMES, accuracy=1e-6)
-    rows = [averaged.apart(scene, *pair) for pair in zip(instants, moments)]
-    return averaged.worst(rows), averaged.profiles(instants, moments)
+    return _apart(scene, instants, moments), averaged.profiles(instants, moments)
 
 
 #: Refinement of our mesh, our time step (min), and cells of the averaged pore: as in the whole run, and twice as fine.
@@ -234,8 +247,7 @@ THIN_SQUARE = "regular perturbation: the square of the aspect ratio"
            "pore starts alike",
       claim="Thin aggregates grow as the averaged pore (FiPy, solve_ivp) with the stress-free strip says, starved "
             "downstream, up to the square of the aspect ratio",
-      mutants=("growth-spread-evenly",), over=("linear", "quadratic"),
-      ways="paper", because="order 3: coupling-averaged-refined")
+      mutants=("growth-spread-evenly",), over=runs.ELEMENTS, ways="paper")
 def strip(elements: str):
     found = [_strip(elements, aspect) for aspect in ASPECTS]
     studies = [study(name, ASPECTS, [rows[name] for rows, *_ in found], 2, THIN_SQUARE, ceiling=4e-4)
@@ -261,10 +273,9 @@ def _strip(elements: str, aspect: float):
     given = shaped(thin_scene(elements, aspect), half_ellipse(elements, aspect))
     area, instants = pore.seeded(given).outline.area, averaged.ours(given)
     moments = strip_of(given, area, 2 * averaged.CELLS).run(given.output.times)
-    rows = [averaged.apart(given, *pair) for pair in zip(instants, moments)]
     ends = np.array([(instants[-1].pore.outline.upstream, instants[-1].pore.outline.downstream), moments[-1].ends])
     ours, theirs = -ends[:, 0] / ends[:, 1] - 1
-    return (averaged.worst(rows), np.abs(ends[0] / ends[1] - 1).max(), ours / theirs,
+    return (_apart(given, instants, moments), np.abs(ends[0] / ends[1] - 1).max(), ours / theirs,
             averaged.profiles(instants, moments))
 
 
@@ -336,8 +347,7 @@ PECLETS, DENSITIES = (0.1, 1.0, 5.0), (1e6, 3e6, 1e7)
            "high, thickness over half length 1/5 to 1/40 (FiPy's cells: its inverse, u: as it, X_m: as its square)",
       claim="Around thin aggregates C is the averaged pore's (FiPy) up to the square of the aspect ratio, at Peclet "
             "0.1, 1, 5 and three densities, from 99 % to 1 % of the acceptor leaving",
-      mutants=("inlet-held", "seed-too-thin"), over=("linear", "quadratic"),
-      ways="paper", because="order 3: coupling-averaged-refined")
+      mutants=("inlet-held", "seed-too-thin"), over=runs.ELEMENTS, ways="paper")
 def uptake(elements: str):
     found = [_around(elements, aspect) for aspect in UPTAKE_ASPECTS]
     studies = [study(f"Pe = {peclet:g}, X = {density:g} mg/L", UPTAKE_ASPECTS,
@@ -370,3 +380,69 @@ def _compared(elements: str, aspect: float, now: pore.Pore, peclet: float, densi
               for name, field in zip(("C_A", "C_D") if kind == "ours" else ("averaged", "averaged"), both)]
     return (float(np.abs(ours - theirs).max()) / 10.0,
             Profile(f"Pe = {peclet:g}, X = {density:g} mg/L", "x (um)", "C (mg/L)", tuple(curves)))
+
+
+#: Diffusivities are so many times those of the paper: the averaged pore's own error falls as their inverse.
+QUICK = 64.0
+#: (end (h), supply of the donor (mg/L) at the start of the piece, and at its end), as steps and as slopes.
+COURSES = {"steps": ((2.0, 10.0, 10.0), (4.5, 0.0, 0.0), (7.0, 10.0, 10.0)),
+           "linear": ((2.0, 10.0, 10.0), (4.5, 10.0, 0.0), (7.0, 0.0, 10.0))}
+#: Rows: while it is fed, at the jump or the bend, starved, at the next one, fed again.
+ROWS = (1.0, 2.0, 3.3, 4.5, 5.7, 7.0)
+ACCEPTOR = 10.0
+#: Cells of the averaged pore, and its accuracy: C is nearly even here. Twice as many cells change the area by 7e-6.
+CELLS, FLUID, ACCURACY = 16, 48, 1e-5
+THIELE = "the square of the transverse Thiele number: 1.2 % of the area of base over 64; and as much for the elements"
+#: Bounds where the supply jumps, and where it changes evenly, by preset; cubic: fast with cubic elements.
+HALF = "half of the {} that the preset may err by"
+SUPPLIED = {"steps": {preset: (4e-4, THIELE) for preset in PRESETS},
+            "linear": {"paper": (1e-3, "second order in 12 min: a quarter of it with 6 min"),
+                       "fast": (5e-3, HALF.format("1 %")), "accurate": (5e-4, HALF.format("0.1 %")),
+                       "cubic": (5e-3, HALF.format("1 %"))}}
+
+
+@case("coupling-averaged-supply", kind="cross-code",
+      norm="largest difference at six times in 7 h, rows at jumps and within steps among them: area relative, "
+           "effluents and section means of C along the mesh over the acceptor's supply; a seed of 20 um in base at "
+           "2.9 m/d, diffusivities times 64",
+      claim="An aggregate whose donor is taken away for 2.5 h and given back, at once or evenly, starves and recovers "
+            "as its averaged pore (FiPy, solve_ivp) does",
+      mutants=("supply-of-the-start", "supply-half-way-of-the-start", "supply-a-step-late", "supply-not-yet",
+               "row-of-the-end"), slow=True,
+      over={f"{how}, {preset}": (how, *bound, *PRESETS[preset])
+            for how, bounds in SUPPLIED.items() for preset, bound in bounds.items()}, ways="1 2")
+def supply(how: str, bound: float, origin: str, *changes: str):
+    """Checks and a picture of one course of the donor's supply."""
+    made = supplied(how, *changes)
+    instants = averaged.ours(made)
+    moments = _fed(how, changes[0])
+    worst = _apart(made, instants, moments)
+    yield [at_most(name, worst[name], bound, origin) for name in ("area", "effluents", "C along the pore")]
+    areas = [moment.area for moment in moments]
+    if how == "steps":
+        yield at_least("area at 2 h over that at 4.5 h", areas[1] / areas[3], 1.005,
+                       "decay over 2.5 h: else nothing is starved")
+    ours = np.array([instant.pore.outline.area for instant in instants])
+    yield Profile("supply", "time (h)", "area (um2)", (("ours", "ours", np.array(ROWS), ours),
+                                                       ("averaged", "reference", np.array(ROWS), np.array(areas))))
+
+
+@cache
+def _fed(how: str, preset: str) -> list:
+    """The averaged pore's moments, from the seed of a preset."""
+    both = [(end, (ACCEPTOR, first), (ACCEPTOR, last)) for end, first, last in COURSES[how]]
+    made = supplied(how, preset).at(0.0)
+    return averaged.half_disc(made, cells=CELLS, fluid=FLUID).run_through(both, ROWS, ACCURACY)
+
+
+def supplied(how: str, *changes: str) -> Scene:
+    """Base with a donor whose supply changes."""
+    pieces = COURSES[how]
+    table = [["0 h", f"{pieces[0][1]} mg/L"]]
+    for (end, _, _), (_, first, _) in zip(pieces, pieces[1:]):
+        table.append([f"{end} h", f"{first} mg/L"])
+    table += [[f"{pieces[-1][0]} h", f"{pieces[-1][2]} mg/L"]]
+    made = runs.base("7 h", *changes, 'aggregate.radius="20 um"', f"substrates.donor.supply={json.dumps(table)}",
+                     f"substrates.donor.interpolation={how}", times=", ".join(f'"{time} h"' for time in ROWS))
+    made = runs.with_diffusivities(made, lambda water, biomass: (QUICK * water, QUICK * biomass))
+    return runs.at_velocity(made, runs.SPEED)

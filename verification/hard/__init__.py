@@ -3,8 +3,8 @@
 Each is run with every preset; see :mod:`verification.hard_cases` for the matrix.
 """
 
-from verification.hard import contact, growth, judge, runs, stages
+from verification.hard import common, mechanics, runs, stages
 
-CASES = tuple(sorted((*stages.SUBSTRATES, *stages.FLOWS, *contact.CASES, *growth.CASES, *runs.MESHES, *runs.RUNS),
+CASES = tuple(sorted((*stages.SUBSTRATES, *stages.FLOWS, *mechanics.CASES, *runs.MESHES, *runs.RUNS),
                      key=lambda case: case.number))
-judge.register(CASES)
+common.register(CASES)

@@ -22,7 +22,7 @@ from repro.results import row
 from repro.scene import Scene, parse_scene, scene_tables
 from verification.hard import common
 from verification.hard.common import DRIVE, EFFLUENTS, SHAPE, TOLERANCE, HardCase, Run
-from verification.hard.contact import CLOSING
+from verification.hard.mechanics import CLOSING
 from verification.hard.stages import exponential
 from verification.kernel.case import Check, at_least, at_most
 
@@ -310,8 +310,8 @@ RANDOM = HardCase(
 def seeded(preset: str, name: str, radius: float, end: str) -> list:
     """Growth from a seed between the exponentials at its least concentrations and at the supply."""
     changes = (f'aggregate.radius="{radius} um"', f'growth.end="{end}"', f'output.times=["{end}"]')
-    found, fine = common.run(name, preset, *changes), common.reference(name, *changes)
-    return [found, *exponential(found), *common.close(found, fine, preset, *SHAPE, *DRIVE)]
+    found, _, checks = common.against(name, preset, changes, *SHAPE, *DRIVE)
+    return [*checks, *exponential(found)]
 
 
 SEEDS = HardCase(

@@ -54,8 +54,8 @@ def same_root(found: Run) -> list[Check]:
 def starved(*changes: str):
     """A part: a starved half-disc."""
     def part(preset: str) -> list:
-        found, fine = common.run("wide", preset, *changes), common.reference("wide", *changes)
-        return [found, *common.close(found, fine, preset, *EFFLUENTS), *same_root(found)]
+        found, _, checks = common.against("wide", preset, changes, *EFFLUENTS)
+        return [*checks, *same_root(found)]
     return part
 
 
@@ -114,9 +114,7 @@ def front(radius: float, *more: str):
     """A part: half saturations of a millionth of the supply."""
     def part(preset: str) -> list:
         changes = disc(radius, *(f'substrates.{name}.half_saturation="1e-5 mg/L"' for name in BOTH), *more)
-        found = common.run("wide", preset, *changes)
-        fine = common.reference("wide", *changes, refinement=0.8)
-        return [found, *common.close(found, fine, preset, *EFFLUENTS)]
+        return common.against("wide", preset, changes, *EFFLUENTS, refinement=0.8)[2]
     return part
 
 
@@ -199,16 +197,11 @@ def speed(factor: float) -> str:
 
 def fast_flow(preset: str, factor: float) -> list:
     """A half-disc of 60 um that does not grow, and the same at a tenth of the velocity."""
-    found = common.run("wide", preset, *disc(60, speed(factor)))
     slower = common.run("wide", preset, *disc(60, speed(factor / 10)))
-    return [found, *_more_than(found, slower, preset), *_finer(found, preset, factor)]
-
-
-def _finer(found: Run, preset: str, factor: float) -> list[Check]:
-    """Against a finer run: what leaves, the flow, and what is taken up, over itself."""
-    fine = common.reference("wide", *disc(60, speed(factor)), refinement=FINER[factor])
+    found, fine, checks = common.against("wide", preset, disc(60, speed(factor)), *EFFLUENTS, *DRIVE,
+                                         refinement=FINER[factor])
     ours, theirs = (run.instants[-1].solved.fluxes[0].consumed for run in (found, fine))
-    return [*common.close(found, fine, preset, *EFFLUENTS, *DRIVE),
+    return [*checks, *_more_than(found, slower, preset),
             at_most("acceptor taken up, against a finer run", abs(ours / theirs - 1), 2 * TOLERANCE[preset],
                     "that of concentrations at the aggregate, area and rate: twice the preset's")]
 
@@ -230,8 +223,7 @@ def _more_than(found: Run, slower: Run, preset: str) -> list[Check]:
 def fast_growth(preset: str, factor: float) -> list:
     """Two hours of growth from 40 um at a high velocity."""
     changes = ('aggregate.radius="40 um"', 'growth.end="2 h"', 'output.times=["2 h"]', speed(factor))
-    found, fine = common.run("wide", preset, *changes), common.reference("wide", *changes, refinement=FINER[factor])
-    return [found, *common.close(found, fine, preset, *SHAPE, *DRIVE)]
+    return common.against("wide", preset, changes, *SHAPE, *DRIVE, refinement=FINER[factor])[2]
 
 
 FAST = HardCase(
@@ -298,8 +290,7 @@ STILL = HardCase(
 def viscous(preset: str, ratio: float) -> list:
     """A half-disc of 80 um: conductivity against a finer run, at lambda = 1 against Poiseuille's."""
     changes = disc(80, f"flow.viscosity_ratio={ratio!r}")
-    found, fine = common.run("wide", preset, *changes), common.reference("wide", *changes)
-    checks = [found, *common.close(found, fine, preset, *DRIVE, *EFFLUENTS)]
+    found, _, checks = common.against("wide", preset, changes, *DRIVE, *EFFLUENTS)
     if ratio == 1:
         drive = found.scene.flow
         exact = poiseuille.conductivity(found.scene.pore.width, drive.kinematic_viscosity / drive.gravity)

@@ -13,7 +13,7 @@ from reference import galerkin_transfer
 from repro.fem import transfer
 from repro.fem.mesh import Mesh, triangle_areas
 from repro.fem.space import Space
-from verification.kernel.case import Outcome, Profile, at_least, at_most, between, case, refine, study
+from verification.kernel.case import Profile, at_least, at_most, between, case, refine, study
 from verification.problems import norms, pairs
 
 SIZES, SEEDS = (5.0, 2.5, 1.25, 0.625), range(3)
@@ -30,57 +30,59 @@ def steep(x, y):
     return np.exp(-((x - 18) ** 2 + (y - 10) ** 2) / 6)
 
 
+#: Why what is carried as a field of linear elements has no other orders.
+MASSES = "orders 2 and 3 carry masses, not fields: reprojection-growing"
+
+
 def sampled(points, triangles, fields, new_points, new_triangles):
     """The paper's transfer, with the arguments of the projection."""
     return transfer.interpolate(points, triangles, fields, new_points)
 
 
 CARRIERS = {"projection": transfer.project, "interpolation": sampled}
+#: Errors on the finest mesh may reach this, by the order of the field.
+LOCATED = {1: 4e-3, 2: 1e-4, 3: 2e-6}
 
 
 @case("reprojection-order", kind="manufactured",
       norm="L2 of a smooth field, interpolated on one mesh and carried to another, mean of three pairs a size; root "
            "mean square error at a thousand places of fields of order 1, 2 and 3, mean of three meshes a size",
       claim="Neither transfer loses the accuracy of linear elements, and fields of each order are found to their order",
-      mutants=("corners-for-middles", "nearest-corner"), ways="1 2 3")
-def order() -> Outcome:
-    errors = refine(_carried_errors, SIZES)
-    studies = [study(name, SIZES, errors[name], 2, "linear elements: second order", ceiling=ceiling)
-               for name, ceiling in (("projection", 2e-3), ("interpolation", 4e-3))]
-    located = refine(_located_errors, SIZES)
-    studies += [study(f"fields of order {k}", SIZES, located[f"{k}"], k + 1, "interpolation: one order more than the "
-                      "elements'", ceiling=ceiling) for k, ceiling in LOCATED.items()]
-    return Outcome(studies=tuple(studies), profiles=(_across_the_hill(),))
+      mutants=("corners-for-middles", "nearest-corner"),
+      over={**{f"{name}, order 1": (name, 2, 4e-3 if name == "interpolation" else 2e-3) for name in CARRIERS},
+            **{f"fields of order {k}, order {k}": (k, k + 1, ceiling) for k, ceiling in LOCATED.items()}})
+def order(carrier: str | int, expected: int, ceiling: float):
+    if isinstance(carrier, int):
+        yield study("located", SIZES, refine(_located_errors, SIZES, carrier)["located"], expected,
+                    "interpolation: one order more than the elements'", ceiling=ceiling)
+        return
+    yield study("carried", SIZES, refine(_carried_errors, SIZES, CARRIERS[carrier])["carried"], expected,
+                "linear elements: second order", ceiling=ceiling)
+    if carrier == "projection":
+        yield _across_the_hill()
 
 
-#: Errors on the finest mesh may reach this, by the order of the field.
-LOCATED = {1: 4e-3, 2: 1e-4, 3: 2e-6}
-
-
-def _located_errors(size: float) -> dict[str, float]:
-    """Mean over meshes of the error of the field interpolated by each order."""
+def _located_errors(size: float, order: int) -> dict[str, float]:
+    """Mean over meshes of the error of the field interpolated by an order."""
     where = np.random.default_rng(8).uniform((0.0, 0.0), (pairs.ENDS[1], pairs.WIDTH), (1000, 2))
-    errors = {f"{k}": [] for k in LOCATED}
+    errors = []
     for seed in SEEDS:
         points, triangles = pairs.grid(size, seed)
         mesh = Mesh.of(points, triangles, np.zeros(len(triangles), bool), np.empty(0, int), pairs.WIDTH, pairs.ENDS)
-        at = transfer.located(points, triangles, where)
-        for k in LOCATED:
-            space = Space(mesh, k)
-            found = at.field(smooth(*space.points.T), space.cells, k)
-            errors[f"{k}"].append(np.sqrt(np.mean((found - smooth(*where.T)) ** 2)))
-    return {name: float(np.mean(row)) for name, row in errors.items()}
+        space = Space(mesh, order)
+        found = transfer.located(points, triangles, where).field(smooth(*space.points.T), space.cells, order)
+        errors.append(np.sqrt(np.mean((found - smooth(*where.T)) ** 2)))
+    return {"located": float(np.mean(errors))}
 
 
-def _carried_errors(size: float) -> dict[str, float]:
-    """Mean error of each transfer."""
-    errors = {name: [] for name in CARRIERS}
+def _carried_errors(size: float, carry) -> dict[str, float]:
+    """Mean error of a transfer."""
+    errors = []
     for seed in SEEDS:
         old, new = pairs.grid(size, 2 * seed), pairs.grid(0.9 * size, 2 * seed + 1)
-        for name, carry in CARRIERS.items():
-            found = carry(*old, smooth(*old[0].T)[:, None], *new)
-            errors[name].append(norms.l2_error(*new, found[:, 0], smooth))
-    return {name: float(np.mean(row)) for name, row in errors.items()}
+        found = carry(*old, smooth(*old[0].T)[:, None], *new)
+        errors.append(norms.l2_error(*new, found[:, 0], smooth))
+    return {"carried": float(np.mean(errors))}
 
 
 def _across_the_hill() -> Profile:
@@ -101,39 +103,50 @@ def _across_the_hill() -> Profile:
            "and least nodal value",
       claim="Forty remeshes of a steep field keep its integral to round-off and never raise its square by projection; "
             "by linear interpolation they stay within its bounds and change what it integrates to",
-      mutants=("linear-transfer",), ways="1", because="orders 2 and 3 carry masses, not fields: reprojection-growing")
-def chain() -> Outcome:
-    kept, paper = (_remeshed(carry) for carry in CARRIERS.values())
-    count = np.arange(REMESHES + 1)
-    profile = Profile("integral of a hill", "remeshes", "over that at the start",
-                      (("projection", "ours", count, kept["integral"]),
-                       ("interpolation", "ours", count, paper["integral"]),
-                       ("kept", "exact", count, np.ones(len(count)))))
+      mutants=("linear-transfer",), ways="1", because=MASSES)
+def chain():
+    kept, paper = (_remeshed(carry, steep) for carry in CARRIERS.values())
     rise = (kept["square"][1:] / kept["square"][:-1]).max()
-    return Outcome((at_most("integral by projection", np.abs(kept["integral"] - 1).max(), 1e-12, "round-off"),
-                    at_most("square by projection, after over before", rise, 1.0, "a projection makes nothing longer"),
-                    at_most("largest value by interpolation", paper["largest"].max(), paper["largest"][0],
-                            "weights between 0 and 1"),
-                    at_least("least value by interpolation", paper["least"].min(), paper["least"][0],
-                             "weights between 0 and 1"),
-                    at_least("integral by interpolation, change", abs(paper["integral"][-1] - 1), 0.02,
-                             "not conserving: the case would see it")), (), (profile,))
+    yield at_most("integral by projection", np.abs(kept["integral"] - 1).max(), 1e-12, "round-off")
+    yield at_most("square by projection, after over before", rise, 1.0, "a projection makes nothing longer")
+    yield at_most("largest value by interpolation", paper["largest"].max(), paper["largest"][0],
+                  "weights between 0 and 1")
+    yield at_least("least value by interpolation", paper["least"].min(), paper["least"][0], "weights between 0 and 1")
+    yield at_least("integral by interpolation, change", abs(paper["integral"][-1] - 1), 0.02,
+                   "not conserving: the case would see it")
+    yield _over_remeshes("integral of a hill", "over that at the start", 1.0,
+                         {"projection": kept["integral"], "interpolation": paper["integral"]})
 
 
-def _remeshed(carry) -> dict[str, np.ndarray]:
-    """Integral (over the first), square, least and largest value (k + 1,) of the hill before and after each remesh."""
-    grids_in_turn = [pairs.grid(2.0, 1), pairs.grid(2.0, 2), pairs.grid(2.4, 3)]
-    mesh, rows = grids_in_turn[0], []
-    field = steep(*mesh[0].T)[:, None]
+def _over_remeshes(title: str, label: str, exact: float, ours: dict[str, np.ndarray]) -> Profile:
+    count = np.arange(REMESHES + 1)
+    return Profile(title, "remeshes", label, (*((name, "ours", count, values) for name, values in ours.items()),
+                                              ("exact", "exact", count, np.full(len(count), exact))))
+
+
+def _remeshed(carry, field) -> dict[str, np.ndarray]:
+    """Of a field before and after each remesh (k + 1,): its integral over the first, its square, least and largest
+    value, the excess of its first range over that range, and its L2 error."""
+    grids = [pairs.grid(2.0, 1), pairs.grid(2.0, 2), pairs.grid(2.4, 3)]
+    mesh, rows = grids[0], []
+    values = field(*mesh[0].T)[:, None]
     for k in range(REMESHES + 1):
-        rows.append((pairs.integral(mesh, field[:, 0]), pairs.square(mesh, field[:, 0]), field.min(), field.max()))
-        new = grids_in_turn[(k + 1) % 3]
-        mesh, field = new, carry(*mesh, field, *new)
-    found = dict(zip(("integral", "square", "least", "largest"), np.array(rows).T))
-    return {**found, "integral": found["integral"] / found["integral"][0]}
+        rows.append((pairs.integral(mesh, values[:, 0]), pairs.square(mesh, values[:, 0]), values.min(), values.max(),
+                     norms.l2_error(*mesh, values[:, 0], field)))
+        new = grids[(k + 1) % 3]
+        mesh, values = new, carry(*mesh, values, *new)
+    integral, square, least, largest, error = np.array(rows).T
+    outside = np.maximum(0.0, np.maximum(least[0] - least, largest - largest[0])) / (largest[0] - least[0])
+    return {"integral": integral / integral[0], "square": square, "least": least, "largest": largest,
+            "outside": outside, "error": error}
 
 
-FIELDS = {"hill": steep, "cylinder": lambda x, y: 1.0 * (np.hypot(x - 18, y - 10) < 6)}
+def cylinder(x, y):
+    """A jump from 0 to 1."""
+    return 1.0 * (np.hypot(x - 18, y - 10) < 6)
+
+
+FIELDS = {"hill": (steep,), "cylinder": (cylinder,)}
 BOUNDED_CARRIERS = {"bounded": transfer.project_bounded, "projection": transfer.project}
 
 
@@ -142,39 +155,16 @@ BOUNDED_CARRIERS = {"bounded": transfer.project_bounded, "projection": transfer.
            "much values leave their range, over it; L2 error over that of the unlimited projection",
       claim="Forty remeshes of a steep field keep its integral to round-off and every value in the range of the first; "
             "the unlimited projection leaves it, and is hardly more accurate",
-      mutants=("bounded-lumped", "bounded-unlimited", "bounded-one-sided"),
-      ways="1", because="orders 2 and 3 carry masses, not fields: reprojection-growing")
-def bounded_chain() -> Outcome:
-    checks, profiles = [], []
-    for name, field in FIELDS.items():
-        ours, free = (_bounded_remeshed(carry, field) for carry in BOUNDED_CARRIERS.values())
-        checks += [at_most(f"integral, {name}", np.abs(ours["integral"] - 1).max(), 1e-12, "round-off"),
-                   at_most(f"outside the range, {name}", ours["outside"].max(), 1e-14, "Zalesak's limiter: round-off"),
-                   between(f"error over the projection's, {name}", ours["error"][-1] / free["error"][-1], 0.9, 1.15,
-                           "limited at few nodes; the lumped projection alone: over 2"),
-                   at_least(f"outside the range by projection, {name}", free["outside"].max(), 0.02,
-                            "else there is nothing to limit")]
-        count = np.arange(REMESHES + 1)
-        profiles.append(Profile(f"values outside their range, {name}", "remeshes", "over the range",
-                                (("bounded", "ours", count, ours["outside"]),
-                                 ("projection", "ours", count, free["outside"]),
-                                 ("none", "exact", count, np.zeros(len(count))))))
-    return Outcome(tuple(checks), (), tuple(profiles))
-
-
-def _bounded_remeshed(carry, field) -> dict[str, np.ndarray]:
-    """Integral (over the first), excess of the range (over it) and L2 error (k + 1,) before and after each remesh."""
-    meshes = [pairs.grid(2.0, 1), pairs.grid(2.0, 2), pairs.grid(2.4, 3)]
-    mesh, rows = meshes[0], []
-    values = field(*mesh[0].T)[:, None]
-    least, most = values.min(), values.max()
-    for k in range(REMESHES + 1):
-        rows.append((pairs.integral(mesh, values[:, 0]), max(0.0, least - values.min(), values.max() - most),
-                     norms.l2_error(*mesh, values[:, 0], field)))
-        new = meshes[(k + 1) % 3]
-        mesh, values = new, carry(*mesh, values, *new)
-    integral, outside, error = np.array(rows).T
-    return {"integral": integral / integral[0], "outside": outside / (most - least), "error": error}
+      mutants=("bounded-lumped", "bounded-unlimited", "bounded-one-sided"), over=FIELDS, ways="1", because=MASSES)
+def bounded_chain(field):
+    ours, free = (_remeshed(carry, field) for carry in BOUNDED_CARRIERS.values())
+    yield at_most("integral", np.abs(ours["integral"] - 1).max(), 1e-12, "round-off")
+    yield at_most("outside the range", ours["outside"].max(), 1e-14, "Zalesak's limiter: round-off")
+    yield between("error over the projection's", ours["error"][-1] / free["error"][-1], 0.9, 1.15,
+                  "limited at few nodes; the lumped projection alone: over 2")
+    yield at_least("outside the range by projection", free["outside"].max(), 0.02, "else there is nothing to limit")
+    yield _over_remeshes("values outside their range", "over the range", 0.0,
+                         {"bounded": ours["outside"], "projection": free["outside"]})
 
 
 @case("reprojection-bounded-order", kind="manufactured",
@@ -182,22 +172,12 @@ def _bounded_remeshed(carry, field) -> dict[str, np.ndarray]:
            "error of a linear field over nine pairs of meshes, over its range",
       claim="The limiter leaves linear fields alone, and a smooth one its second order",
       mutants=("bounded-lumped", "bounds-of-one-piece"),
-      ways="1", because="orders 2 and 3 carry masses, not fields: reprojection-growing")
-def bounded_order() -> Outcome:
-    errors = refine(_carried, SIZES)
+      ways="1", because=MASSES)
+def bounded_order():
+    errors = refine(_carried_errors, SIZES, transfer.project_bounded)["carried"]
+    yield study("smooth field", SIZES, errors, 2, "linear elements: second order", ceiling=2e-3)
     linear = max(_linear(old, new) for _, old, new in pairs.pairs())
-    return Outcome((at_most("linear field", linear, 1e-12, "within its bounds at every node: round-off"),),
-                   (study("smooth field", SIZES, errors["bounded"], 2, "linear elements: second order",
-                          ceiling=2e-3),))
-
-
-def _carried(size: float) -> dict[str, float]:
-    errors = []
-    for seed in SEEDS:
-        old, new = pairs.grid(size, 2 * seed), pairs.grid(0.9 * size, 2 * seed + 1)
-        found = transfer.project_bounded(*old, smooth(*old[0].T)[:, None], *new)
-        errors.append(norms.l2_error(*new, found[:, 0], smooth))
-    return {"bounded": float(np.mean(errors))}
+    yield at_most("linear field", linear, 1e-12, "within its bounds at every node: round-off")
 
 
 def _linear(old: pairs.Grid, new: pairs.Grid) -> float:
@@ -217,14 +197,14 @@ DEGREE = 6
       claim="The common pieces of two meshes are shapely's, cover every triangle of both once, and integrate "
             "polynomials exactly, for unrelated meshes, shared nodes and edges, equal meshes and slivers",
       mutants=("clip-two-sides", "fans-cut-short"),
-      ways="1", because="orders 2 and 3 carry masses, not fields: reprojection-growing")
-def supermesh() -> Outcome:
+      ways="1", because=MASSES)
+def supermesh():
     return _worst([_pieces(old, new) for _, old, new in pairs.pairs()], 1e-12)
 
 
-def _worst(rows: list[dict[str, float]], bound: float) -> Outcome:
+def _worst(rows: list[dict[str, float]], bound: float) -> list:
     """The largest of each number over all pairs of meshes."""
-    return Outcome(tuple(at_most(name, max(row[name] for row in rows), bound, ROUND_OFF) for name in rows[0]))
+    return [at_most(name, max(row[name] for row in rows), bound, ROUND_OFF) for name in rows[0]]
 
 
 def _pieces(old: pairs.Grid, new: pairs.Grid) -> dict[str, float]:
@@ -256,8 +236,8 @@ def _polynomials(pieces: pairs.Grid) -> float:
       claim="The projection of a random field is that of a dense code on shapely's pieces; it keeps linear fields, "
             "the field's integral and centre, and what it takes from the square is the square of the difference",
       mutants=("lumped-mass", "corners-for-middles", "contributions-lost"),
-      ways="1", because="orders 2 and 3 carry masses, not fields: reprojection-growing")
-def projection() -> Outcome:
+      ways="1", because=MASSES)
+def projection():
     random = np.random.default_rng(6)
     return _worst([_projected(old, new, random.uniform(0.0, 1.0, len(old[0]))) for _, old, new in pairs.pairs()], 1e-11)
 
