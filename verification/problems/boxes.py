@@ -16,6 +16,7 @@ from repro.fem.assembly import ElementSystem, saddle_system
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
 from repro.model import flow
+from verification.kernel.case import Profile, compared
 from verification.problems import norms
 
 
@@ -45,6 +46,12 @@ def errors(grid: Mesh, problem: Problem) -> dict[str, float]:
     return {"velocity": np.sqrt(np.sum(weight[..., None] * (found - truth) ** 2)
                                 / np.sum(weight[..., None] * truth**2)),
             "pressure": np.sqrt(np.sum(weight * apart**2) / np.sum(weight * _centred(level, weight) ** 2))}
+
+
+def profile(grid: Mesh, problem: Problem, s: np.ndarray, where: np.ndarray, along: np.ndarray, x_label: str) -> Profile:
+    """The component ``along`` of the velocity at places (K, 2), drawn over s (K,)."""
+    ours = norms.sample(grid.points, grid.triangles, solve(grid, problem)[0], where)
+    return compared("velocity", x_label, "its component", s, ours @ along, problem.exact(*where.T)[0] @ along)
 
 
 def _centred(values, weight):

@@ -18,7 +18,8 @@ from repro.fem.space import Space
 from repro.model import flow, transport
 from repro.model.kinetics import Sink
 from repro.scene import load_scene
-from verification.problems import meshes
+from verification.kernel.case import Profile
+from verification.problems import meshes, norms
 
 SCENE = load_scene("base")
 WIDTH, SLAB = 10.0, 40.0
@@ -28,13 +29,12 @@ CROSSED, FILM = (-20.0, 60.0), 20.0
 #: The same with more fluid at both ends, for order 2 and 3.
 WIDE = (-40.0, 80.0)
 #: Sizes of elements (um), and how many meshes of each: the coarse ones cost nothing and scatter most.
-SIZES = (4.0, 2.0, 1.0, 0.5)
 SAMPLES = {4.0: 12, 2.0: 6, 1.0: 3, 0.5: 1}
+FINEST = min(SAMPLES)
 SECOND = "linear elements, lumped reaction: second order"
-ORDERS = (1, 2, 3)
 WORDS = {1: "linear", 2: "quadratic", 3: "cubic"}
 #: Every order, by its word.
-EVERY = {word: (order,) for order, word in WORDS.items()}
+ORDERS = {word: order for order, word in WORDS.items()}
 #: Of concentrations of an order in L2, and why; of what leaves or is taken up, twice the order of the gradient.
 EXPECTED = {1: (2, SECOND), 2: (3, "quadratic elements: third order in L2"),
             3: (4, "cubic elements: fourth order in L2")}
@@ -131,6 +131,11 @@ def speed_of(peclet: float) -> float:
     return peclet * SCENE.substrates.acceptor.diffusivity / SLAB
 
 
+def length(space: Space, size: float) -> float:
+    """What errors are studied by: the nominal size of linear elements, the mean one of others."""
+    return size if space.order == 1 else norms.mean_size(space.mesh)
+
+
 def both(state: transport.Concentrations) -> np.ndarray:
     """(2, n) C_A and C_D."""
     return np.stack([state.acceptor, state.donor])
@@ -153,20 +158,13 @@ def apart(space: Space, fields: np.ndarray, exact) -> tuple[np.ndarray, np.ndarr
 
 def relative(space: Space, field: np.ndarray, exact) -> float:
     """L2 over the mesh of one field (n,) less exact(x) over that of exact."""
-    gap, size = apart(space, field[None], lambda x, y: exact(x)[None])
-    return float(gap[0] / size[0])
+    return float(distance(space, field[None], lambda x: exact(x)[None])[0])
 
 
 def distance(space: Space, fields: np.ndarray, exact) -> np.ndarray:
-    """(2,) L2 over the mesh of fields (2, n) less exact(x) (2, ...), acceptor and donor, over that of exact."""
+    """(m,) L2 over the mesh of fields (m, n) less exact(x) (m, ...) over that of exact."""
     gap, size = apart(space, fields, lambda x, y: exact(x))
     return gap / size
-
-
-def averaged(measure, size: float, *given, samples=SAMPLES) -> dict[str, float]:
-    """Root mean square of what ``measure(size, sample, *given)`` gives on each mesh of a size, name by name."""
-    rows = [measure(size, sample, *given) for sample in range(samples[size])]
-    return {name: float(np.sqrt(np.mean([row[name] ** 2 for row in rows]))) for name in rows[0]}
 
 
 def sample(space: Space, fields: np.ndarray, where: np.ndarray) -> np.ndarray:
@@ -185,3 +183,12 @@ def at_heights(space: Space, fields: np.ndarray, x, heights: int = 5) -> np.ndar
     y = WIDTH * (np.arange(heights) + 0.5) / heights
     where = np.column_stack([np.tile(x, heights), np.repeat(y, len(x))])
     return sample(space, fields, where).reshape(2, heights, -1)
+
+
+def pictured(title: str, x_label: str, x: np.ndarray, ours: np.ndarray, *others) -> Profile:
+    """Both substrates: ours (2, n) at x, and of others (name, kind, x, C (2, m))."""
+    curves = []
+    for k, name in enumerate(NAMES):
+        curves += [(name, "ours", x, ours[k]), *((f"{name}, {other}", kind, at, theirs[k])
+                                                 for other, kind, at, theirs in others)]
+    return Profile(title, x_label, "C (mg/L)", tuple(curves))
