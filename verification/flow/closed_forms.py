@@ -90,11 +90,12 @@ def _clean_mesh(refinement: float) -> Mesh:
 
 def _clean(refinement: float, interface: str) -> dict[str, float]:
     grid = _clean_mesh(refinement)
-    unit = flow.unit_flow(Space(grid, 1), 1.0, interface=interface)
+    space = Space(grid, 1)
+    unit = flow.unit_flow(space, 1.0, interface=interface)
     found = flow.scaled(unit, grid, LENGTH, drive(mean_velocity=2.0))
     exact = poiseuille.head_loss(ENDS[1] - ENDS[0], WIDTH, 2.0, VISCOSITY)
-    velocity = norms.l2_error(grid.points, grid.triangles, found.velocity, lambda x, y: 2 * _velocity(x, y))
-    return {"size": norms.mean_size(grid), "velocity": velocity, "head loss": abs(found.meshed_loss / exact - 1),
+    return {"size": norms.mean_size(grid), "head loss": abs(found.meshed_loss / exact - 1),
+            "velocity": norms.field_error(space, found.velocity, lambda x, y: 2 * _velocity(x, y)),
             "conductivity": abs(found.conductivity / poiseuille.conductivity(WIDTH, VISCOSITY) - 1)}
 
 
@@ -123,20 +124,19 @@ def _plugged(size: float, draw: int) -> Mesh:
 
 
 def _plug_errors(size: float, draw: int) -> dict[str, float]:
-    grid = _plugged(size, draw)
-    found, length = flow.unit_flow(Space(grid, 1), RATIO), 2 * PLUG
+    space = Space(_plugged(size, draw), 1)
+    found, length = flow.unit_flow(space, RATIO), 2 * PLUG
     exact = sum(poiseuille.head_loss(part, WIDTH, 1.0, viscosity)
                 for part, viscosity in ((ENDS[1] - ENDS[0] - length, 1.0), (length, RATIO)))
-    return {"velocity": norms.l2_error(grid.points, grid.triangles, found.velocity, _velocity),
+    return {"velocity": norms.field_error(space, found.velocity, _velocity),
             "head loss": abs(found.loss / exact - 1)}
 
 
 def _across(title: str, grid: Mesh, ratio: float, exact, *given: float) -> Profile:
     """u_x on the line x = 0, and exact(y, *given)."""
-    y = np.linspace(0.0, WIDTH, 101)
-    ours = norms.sample(grid.points, grid.triangles, flow.unit_flow(Space(grid, 1), ratio).velocity[:, 0],
-                        np.column_stack([np.zeros_like(y), y]))
-    return compared(title, "y (um)", "u_x / u_ave", y, ours, exact(y, *given))
+    space, y = Space(grid, 1), np.linspace(0.0, WIDTH, 101)
+    ours = norms.field_at(space, flow.unit_flow(space, ratio).velocity, np.column_stack([0 * y, y]))
+    return compared(title, "y (um)", "u_x / u_ave", y, ours[:, 0], exact(y, *given))
 
 
 #: Half length of the plug (um) on curved meshes, whose ends are not alike.

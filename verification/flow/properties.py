@@ -24,15 +24,13 @@ REFINED = {1: 1.0, 2: 0.5, 3: 0.4}
 #: What the elements of scenes with a preset are, with the form of [E2] that is theirs.
 PRESETS = {preset: ({"preset": preset}, "laplacian") for preset in ("paper", "fast", "accurate")}
 #: Every order with both forms, and the presets.
-EVERY = combined(ORDERS, FORMS)
-WITH_PRESETS = {**EVERY, **PRESETS}
+EVERY = {**combined(ORDERS, FORMS), **PRESETS}
 
 
 @cache
-def _half_disc(radius: float, order: int = 1, lean: float = 0.0, reach: float = 75.0) -> Space:
+def _half_disc(radius: float, order: int, refinement: float, lean: float = 0.0, reach: float = 75.0) -> Space:
     """Functions of an order on the mesh around a half-disc that is sheared by ``lean``."""
-    return Space(meshes.half_disc(radius, REFINED[order], (-reach, reach), WIDTH, geometry=min(order, 2), lean=lean),
-                 order)
+    return Space(meshes.half_disc(radius, refinement, (-reach, reach), WIDTH, geometry=min(order, 2), lean=lean), order)
 
 
 def _scene(radius: float, numerics: dict):
@@ -44,7 +42,17 @@ def _scene(radius: float, numerics: dict):
 
 def _around(radius: float, made: int | dict) -> Space:
     """Around a half-disc: functions of an order, or as scenes with some numerics have them."""
-    return _half_disc(radius, made) if isinstance(made, int) else pore.seeded(_scene(radius, made)).space
+    if isinstance(made, int):
+        return _half_disc(radius, made, REFINED[made])
+    return pore.seeded(_scene(radius, made)).space
+
+
+def _leaning(made: int | dict) -> Space:
+    """The same around one that leans."""
+    if isinstance(made, int):
+        return _half_disc(25.0, made, REFINED[made], 0.6, 150.0)
+    numerics = _scene(25.0, made).numerics
+    return _half_disc(25.0, numerics.order, numerics.refinement, 0.6, 150.0)
 
 
 @cache
@@ -60,7 +68,7 @@ DISCS, DROP = {40.0: 0.012, 46.0: 0.008}, 0.003
       claim="The same flux passes every section of a pore, plugged or not: to round-off for w = u - tau grad p of "
             "linear elements and for u itself of quadratic and cubic ones, in both forms",
       mutants=("tau-of-water", "carried-by-u-plus", "inlet-not-scaled", "curved-straight-divergence",
-               "inlet-parabola"), over=WITH_PRESETS)
+               "inlet-parabola"), over=EVERY)
 def sections(made: int | dict, interface: str):
     if isinstance(made, int):
         yield _carried(_plugged(made), interface, "plug", DROP)
@@ -99,7 +107,7 @@ def flux_error(space: Space, carried: np.ndarray) -> float:
 @case("flow-energy", kind="property", norm="relative difference",
       claim="The work of the inlet is what viscosity and stabilisation dissipate, of order 2 and 3 the head loss times "
             "the flux, and the flow is linear in its drive",
-      mutants=("correction-not-scaled", "loss-per-width"), over=WITH_PRESETS)
+      mutants=("correction-not-scaled", "loss-per-width"), over=EVERY)
 def energy(made: int | dict, interface: str):
     space = _around(25.0, made)
     unit = flow.unit_flow(space, RATIO, interface=interface)
@@ -140,9 +148,9 @@ def _power(space: Space, unit: flow.UnitFlow, interface: str) -> tuple[float, fl
 @case("flow-reversed", kind="property", norm="L2 of the difference of both velocities, in the middle and everywhere",
       claim="Flow through a leaning aggregate is its mirror image's flow mirrored, since Stokes flow is reversible",
       mutants=("outlet-free",), over=EVERY)
-def reversed_flow(order: int, interface: str):
-    space = _half_disc(25.0, order, lean=0.6, reach=150.0)
-    mirror = Space(_mirrored(space.mesh), order)
+def reversed_flow(made: int | dict, interface: str):
+    space = _leaning(made)
+    mirror = Space(_mirrored(space.mesh), space.order)
     there, back = (flow.unit_flow(way, RATIO, interface=interface).velocity for way in (space, mirror))
     near = np.abs(space.mesh.points[space.mesh.triangles, 0]).max(axis=1) < 40
     for where, chosen, bound, why in (
@@ -170,7 +178,7 @@ RATIOS = np.array([1.0, 2.0, 10.0, 100.0, 2000.0, 1e5])
 
 @case("flow-obstacle", kind="property", norm="head losses for six lambda, over that of the clean channel",
       claim="Viscous biomass never raises the conductivity: the loss rises with lambda, ever more slowly, and with R",
-      mutants=("thin-biomass",), over=WITH_PRESETS)
+      mutants=("thin-biomass",), over=EVERY)
 def obstacle(made: int | dict, interface: str):
     """Losses of four half-discs."""
     spaces = [_around(radius, made) for radius in (5.0, 25.0, 40.0, 46.0)]

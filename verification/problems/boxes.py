@@ -42,15 +42,13 @@ def errors(grid: Mesh, problem: Problem) -> dict[str, float]:
     truth, level = problem.exact(x, y)
     found = np.einsum("qa,tai->tqi", shape, u[space.cells])
     heads = p[pressures.cells] @ norms.fine(pressures)[2].T
-    apart = _centred(heads - level, weight)
-    return {"velocity": np.sqrt(np.sum(weight[..., None] * (found - truth) ** 2)
-                                / np.sum(weight[..., None] * truth**2)),
-            "pressure": np.sqrt(np.sum(weight * apart**2) / np.sum(weight * _centred(level, weight) ** 2))}
+    return {"velocity": norms.relative(found, truth, weight),
+            "pressure": norms.relative(_centred(heads, weight), _centred(level, weight), weight)}
 
 
 def profile(grid: Mesh, problem: Problem, s: np.ndarray, where: np.ndarray, along: np.ndarray, x_label: str) -> Profile:
     """The component ``along`` of the velocity at places (K, 2), drawn over s (K,)."""
-    ours = norms.sample(grid.points, grid.triangles, solve(grid, problem)[0], where)
+    ours = norms.field_at(Space(grid, problem.order), solve(grid, problem)[0], where)
     return compared("velocity", x_label, "its component", s, ours @ along, problem.exact(*where.T)[0] @ along)
 
 

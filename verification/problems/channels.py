@@ -12,7 +12,6 @@ from functools import cache
 
 import numpy as np
 
-from repro.fem import elements, transfer
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
 from repro.model import flow, transport
@@ -143,9 +142,7 @@ def both(state: transport.Concentrations) -> np.ndarray:
 
 def in_points(space: Space) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Where errors are integrated: places (T, q, 2) um, weights (T, q) um2 and functions (q, k)."""
-    of = elements.table(space.order, space.mesh.geometry, DEGREES[space.order])
-    nodes = space.mesh.points[space.mesh.cells]
-    return np.einsum("qg,tgi->tqi", of.shape, nodes), elements.weights(nodes, of), of.values
+    return norms.fine(space, degree=DEGREES[space.order])
 
 
 def apart(space: Space, fields: np.ndarray, exact) -> tuple[np.ndarray, np.ndarray]:
@@ -169,13 +166,12 @@ def distance(space: Space, fields: np.ndarray, exact) -> np.ndarray:
 
 def sample(space: Space, fields: np.ndarray, where: np.ndarray) -> np.ndarray:
     """(m, K) fields (m, n) at places (K, 2)."""
-    at = transfer.located(space.mesh.points, space.mesh.cells, where)
-    return at.field(fields.T, space.cells, space.order).T
+    return norms.field_at(space, fields.T, where).T
 
 
-def along(space: Space, field: np.ndarray, x) -> np.ndarray:
-    """A field (n,) along the middle of the channel."""
-    return sample(space, field[None], np.column_stack([x, np.full(len(x), WIDTH / 2)]))[0]
+def along(space: Space, fields: np.ndarray, x) -> np.ndarray:
+    """(K,) or (m, K) a field (n,), or fields (m, n), along the middle of the channel."""
+    return norms.field_at(space, fields.T, np.column_stack([x, np.full(len(x), WIDTH / 2)])).T
 
 
 def at_heights(space: Space, fields: np.ndarray, x, heights: int = 5) -> np.ndarray:

@@ -33,10 +33,15 @@ def rectangle(ends, width: float, size: float, *, across=(), along=(), seed: int
     rim = [np.column_stack([xs, np.full(len(xs), y)]) for y in y_lines]
     rim += [np.column_stack([np.full(len(ys), x), ys]) for x in x_lines]
     points = np.vstack([np.unique(np.vstack(rim), axis=0), _inside(x_lines, y_lines, size, random)])
+    return points, _triangles(points, size)
+
+
+def _triangles(points: np.ndarray, size: float) -> np.ndarray:
+    """Delaunay's, counterclockwise, without those that round-off makes flat along the rim."""
     triangles = Delaunay(points).simplices
     areas = triangle_areas(points, triangles)
     triangles[areas < 0] = triangles[areas < 0][:, ::-1]
-    return points, triangles[np.abs(areas) > 1e-9 * size**2]
+    return triangles[np.abs(areas) > 1e-9 * size**2]
 
 
 def _stations(lines: np.ndarray, size: float) -> np.ndarray:
@@ -61,8 +66,7 @@ def _inside(x_lines, y_lines, size: float, random) -> np.ndarray:
 def channel(ends, width: float, size: float, is_biomass, *, across=(), along=(), seed: int = 0) -> Mesh:
     """A straight mesh of a rectangle; ``is_biomass(x, y)`` says which triangles, by their middles, are biomass."""
     points, triangles = rectangle(ends, width, size, across=across, along=along, seed=seed)
-    middle = points[triangles].mean(axis=1)
-    return Mesh.of(points, triangles, is_biomass(*middle.T), np.empty(0, int), width, tuple(map(float, ends)))
+    return _meshed(points, triangles, is_biomass, ends, width)
 
 
 def plug(ends, width: float, half: float, size: float, make=channel, seed: int = 0) -> Mesh:
@@ -136,15 +140,16 @@ def round_disc(ends, width: float, size: float, centre, radius: float, seed: int
 
 
 def _delaunay(points, beside, size: float, is_biomass, ends, width: float, loop=()) -> Mesh:
-    """Delaunay's triangles, counterclockwise, without those that round-off makes flat along the rim; ``beside(points)``
-    (N, k) are distances from the curves, of one sign on each side. Raises ValueError where a triangle lies across."""
-    triangles = Delaunay(points).simplices
-    areas = triangle_areas(points, triangles)
-    triangles[areas < 0] = triangles[areas < 0][:, ::-1]
-    triangles = triangles[np.abs(areas) > 1e-9 * size**2]
+    """A mesh of Delaunay's triangles; ``beside(points)`` (N, k) are distances from the curves, of one sign on each
+    side. Raises ValueError where a triangle lies across."""
+    triangles = _triangles(points, size)
     sides = beside(points)[triangles]
     if ((sides.min(axis=1) < -1e-9 * size) & (sides.max(axis=1) > 1e-9 * size)).any():
         raise ValueError("a triangle lies across the curve between fluid and biomass")
+    return _meshed(points, triangles, is_biomass, ends, width, loop)
+
+
+def _meshed(points, triangles, is_biomass, ends, width: float, loop=()) -> Mesh:
     biomass = is_biomass(*points[triangles].mean(axis=1).T)
     return Mesh.of(points, triangles, biomass, np.array(loop, int), width, tuple(map(float, ends)))
 

@@ -1,12 +1,8 @@
-"""Norms of the error of fields of order 1, 2 or 3 on triangles, and what they are at points.
-
-Values of linear fields at many points: matplotlib's trapezoid map finds the triangle of each in logarithmic time.
-"""
+"""Norms of the error of fields of order 1, 2 or 3 on triangles, and what they are at points."""
 
 from __future__ import annotations
 
 import numpy as np
-from matplotlib.tri import Triangulation
 from skfem import Basis, ElementTriP1, MeshTri
 from skfem.quadrature import get_quadrature_tri
 
@@ -29,19 +25,23 @@ def quadrature(points: np.ndarray, triangles: np.ndarray):
     return np.einsum("qa,tai->tqi", shape, corner), double[:, None] * weight, shape
 
 
+def relative(found: np.ndarray, exact: np.ndarray, weight: np.ndarray) -> float:
+    """L2 of values less exact (t, q) or (t, q, m), with weights (t, q), over that of exact."""
+    weight = weight.reshape(weight.shape + (1,) * (exact.ndim - weight.ndim))
+    return float(np.sqrt(np.sum(weight * (found - exact) ** 2) / np.sum(weight * exact**2)))
+
+
 def l2_error(points, triangles, values, exact) -> float:
     """L2 norm of a nodal field (N,) or (N, m) less exact(x, y), over that of exact(x, y)."""
     where, weight, shape = quadrature(points, triangles)
-    truth = exact(where[..., 0], where[..., 1])
     found = np.einsum("qa,ta...->tq...", shape, np.asarray(values)[triangles])
-    weight = weight.reshape(weight.shape + (1,) * (truth.ndim - 2))
-    return float(np.sqrt(np.sum(weight * (found - truth) ** 2) / np.sum(weight * truth**2)))
+    return relative(found, exact(where[..., 0], where[..., 1]), weight)
 
 
-def fine(space: Space, chosen=slice(None)):
-    """Points (t, q, 2) um, weights (t, q) um2 and functions (q, k) of a space, of a rule of degree ten on the triangles
+def fine(space: Space, chosen=slice(None), degree: int = FINE):
+    """Points (t, q, 2) um, weights (t, q) um2 and functions (q, k) of a space, of a rule of a degree on the triangles
     ``chosen``, straight or curved."""
-    mesh, of = space.mesh, elements.table(space.order, space.mesh.geometry, FINE)
+    mesh, of = space.mesh, elements.table(space.order, space.mesh.geometry, degree)
     nodes = mesh.points[mesh.cells[chosen]]
     return np.einsum("qa,tai->tqi", of.shape, nodes), elements.weights(nodes, of), of.values
 
@@ -49,10 +49,8 @@ def fine(space: Space, chosen=slice(None)):
 def field_error(space: Space, values: np.ndarray, exact, chosen=slice(None)) -> float:
     """As :func:`l2_error` of values (count,) or (count, m) at the nodes of a space, over the triangles ``chosen``."""
     where, weight, shape = fine(space, chosen)
-    truth = exact(where[..., 0], where[..., 1])
     found = np.einsum("qa,ta...->tq...", shape, values[space.cells[chosen]])
-    weight = weight.reshape(weight.shape + (1,) * (truth.ndim - 2))
-    return float(np.sqrt(np.sum(weight * (found - truth) ** 2) / np.sum(weight * truth**2)))
+    return relative(found, exact(where[..., 0], where[..., 1]), weight)
 
 
 def field_at(space: Space, values: np.ndarray, where: np.ndarray) -> np.ndarray:
@@ -69,16 +67,3 @@ def sample(points, triangles, values, where) -> np.ndarray:
 def mean_size(mesh: Mesh) -> float:
     """Side of the square of mean triangle area twice over: the spacing of a lattice of as many nodes, um."""
     return float(np.sqrt(2 * mesh.areas.mean()))
-
-
-def sampled(grid: Mesh, values: np.ndarray, where: np.ndarray) -> np.ndarray:
-    """A nodal field (N,) or (N, m) at points (K, 2) of the mesh; points that round-off puts outside are moved in."""
-    near = 1e-9 * grid.width
-    inside = np.clip(where, grid.points.min(axis=0) + near, grid.points.max(axis=0) - near)
-    triangle = Triangulation(*grid.points.T, grid.triangles).get_trifinder()(*inside.T)
-    if triangle.min() < 0:
-        raise ValueError("a point is in no triangle of the mesh")
-    first = grid.triangles[triangle, 0]
-    rest = np.einsum("kai,ki->ka", grid.gradients[triangle, 1:], inside - grid.points[first])
-    weights = np.column_stack([1 - rest.sum(axis=1), rest])
-    return np.einsum("ka,ka...->k...", weights, np.asarray(values)[grid.triangles[triangle]])

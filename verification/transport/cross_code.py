@@ -48,7 +48,6 @@ from verification.problems import meshes
 from verification.problems.channels import (
     CROSSED,
     EXPECTED,
-    FINEST,
     NAMES,
     ORDERS,
     SAMPLES,
@@ -79,9 +78,9 @@ PECLETS = {f"Pe = {peclet:g}": peclet for peclet in (0.1, 1.0, 5.0)}
 DENSITIES = {f"X = {density:g} mg/L": density for density in (3e3, 3e4, 3e5)}
 #: Peclet number and density of the starved slab, and of the one that FiPy's cells and elements of order 2 and 3 share.
 STARVED, SHARED = (0.1, 3e5), (1.0, 3e4)
-#: Last errors of a density X of both substrates: ours, ours less FiPy's, and less FiPy's in time.
-CEILINGS = {3e3: (1e-6, 1e-6, 3e-6), 3e4: (3e-5, 6e-6, 3e-5), 3e5: (4e-4, 5e-5, 3e-4)}
-BOTH = "both codes are of second order"
+ITSELF_STARVED = "C_A in the starved slab over itself"
+#: Last errors of linear elements, of a density X.
+CEILINGS = {3e3: 1e-6, 3e4: 3e-5, 3e5: 4e-4}
 
 
 def given(peclet: float, density: float):
@@ -107,19 +106,6 @@ def exact(peclet: float, density: float, tolerance: float = 1e-8):
     return channel_bvp.solution(*given(peclet, density), tolerance=tolerance)
 
 
-@cache
-def _channel(size: float, peclet: float, density: float) -> channel_fipy.Channel:
-    """FiPy's, its cells half as long as our edges."""
-    return channel_fipy.Channel(round(2 * (CROSSED[1] - CROSSED[0]) / size), CROSSED, *given(peclet, density))
-
-
-@cache
-def fipy(size: float, peclet: float, density: float):
-    """(x, C (2, n)) at the centres of FiPy's cells."""
-    channel = _channel(size, peclet, density)
-    return channel.x, channel.steady()
-
-
 #: Random meshes of each size (um), and solve_bvp's tolerance, which takes no less at Peclet 5: cubic elements are
 #: judged at Peclet 1, on coarser meshes, as solve_bvp is good to 1e-11 or so; the last error.
 FINER = {2: ({3.2: 12, 1.6: 6, 0.8: 3, 0.4: 1}, 1e-10, 1e-7), 3: ({6.4: 12, 3.2: 8, 1.6: 4, 0.8: 2}, 1e-12, 1e-9)}
@@ -142,20 +128,15 @@ FINER = {2: ({3.2: 12, 1.6: 6, 0.8: 3, 0.4: 1}, 1e-10, 1e-7), 3: ({6.4: 12, 3.2:
 def collocation(order: int, peclet: float, density: float):
     if order == 1:
         errors = refine(_distances, SAMPLES, peclet, density)
-        yield studies(errors, each(*EXPECTED[1], CEILINGS[density][0]))
+        yield studies(errors, each(*EXPECTED[1], CEILINGS[density]))
         if (peclet, density) == STARVED:
-            yield studies(errors, {"C_A in the starved slab over itself": (*EXPECTED[1], 6e-4)})
+            yield studies(errors, {ITSELF_STARVED: (*EXPECTED[1], 6e-4)})
     else:
         samples, _, ceiling = FINER[order]
         yield studies(refine(_root_mean_square, samples, order, peclet, density), {"C": (*EXPECTED[order], ceiling)})
         truth, ours, x = exact(peclet, density), found(1.6, 0, peclet, density, order, WIDE), np.linspace(*WIDE, 121)
-        yield pictured("along the channel", "x (um)", x, sample_along(spaced(1.6, 0, order, WIDE), ours, x),
+        yield pictured("along the channel", "x (um)", x, along(spaced(1.6, 0, order, WIDE), ours, x),
                        ("solve_bvp", "exact", x[::6], truth(x[::6])))
-
-
-def sample_along(space: Space, fields: np.ndarray, x) -> np.ndarray:
-    """(2, K) fields (2, n) along the middle of the channel."""
-    return np.stack([along(space, field, x) for field in fields])
 
 
 def _distances(size: float, number: int, peclet: float, density: float) -> dict[str, float]:
@@ -164,7 +145,7 @@ def _distances(size: float, number: int, peclet: float, density: float) -> dict[
     nodes = pieces.cells[:, 0]
     ratio = ours[0, nodes] / truth(space.points[nodes, 0])[0]
     return {**dict(zip(NAMES, distance(space, ours, truth))),
-            "C_A in the starved slab over itself": np.sqrt(np.average((ratio - 1) ** 2, weights=pieces.dx[:, 0]))}
+            ITSELF_STARVED: np.sqrt(np.average((ratio - 1) ** 2, weights=pieces.dx[:, 0]))}
 
 
 def _root_mean_square(size: float, number: int, order: int, peclet: float, density: float) -> dict[str, float]:
@@ -172,50 +153,6 @@ def _root_mean_square(size: float, number: int, order: int, peclet: float, densi
     space, truth = spaced(size, number, order, WIDE), exact(peclet, density, FINER[order][1])
     gaps, _ = apart(space, found(size, number, peclet, density, order, WIDE), lambda x, y: truth(x))
     return {"size": length(space, size), "C": float(np.hypot(*gaps)) / pair("supply")[0]}
-
-
-#: FiPy's cells (um), half as long as these, and the elements of order 2 and 3 that they are compared with, whose error
-#: is less than a tenth of theirs.
-CELLS, FINE = (4.0, 2.5, 5 / 3, 1.0), {2: 1.0, 3: 5 / 3}
-
-
-@case("transport-monod-fipy", kind="cross-code",
-      norm="root mean square over FiPy's cells, at five heights, of each substrate over its supply, and in the starved "
-           "slab over its own value; several meshes a size",
-      claim="Dual Monod uptake under plug flow is FiPy's, both codes refined together, at Peclet 0.1, 1, 5 times "
-            "Thiele numbers 0.6, 1.9, 6, from barely touched to starved; that of quadratic and cubic elements, on one "
-            "mesh, is what FiPy's cells come to",
-      mutants=("decay-demand", "no-inlet-flux"), slow=True,
-      over={**combined(LINEAR, PECLETS, DENSITIES), **combined(HIGHER, {"Pe = 1": 1.0}, {"X = 30000 mg/L": 3e4})})
-def finite_volumes(order: int, peclet: float, density: float):
-    if order > 1:
-        errors = refine(_to_fipy, CELLS, order, peclet, density)
-        yield studies(errors, each(2, "FiPy's second order", CEILINGS[density][1]), " of FiPy less ours")
-        return
-    errors = refine(_from_fipy, SAMPLES, peclet, density)
-    yield studies(errors, each(2, BOTH, CEILINGS[density][1]))
-    if (peclet, density) == STARVED:
-        yield studies(errors, {"C_A in the starved slab over itself": (2, BOTH, 6e-4)})
-    (x, theirs), truth = fipy(FINEST, peclet, density), exact(peclet, density)
-    yield pictured("along the channel", "x (um)", x,
-                   sample_along(spaced(FINEST, 0), found(FINEST, 0, peclet, density), x),
-                   ("FiPy", "reference", x, theirs), ("solve_bvp", "exact", x[::12], truth(x[::12])))
-
-
-def _from_fipy(size: float, number: int, peclet: float, density: float) -> dict[str, float]:
-    """Both codes refined together."""
-    x, theirs = fipy(size, peclet, density)
-    ours = at_heights(spaced(size, number), found(size, number, peclet, density), x)
-    ratio = (ours[0] / theirs[0])[:, (x > 0) & (x < SLAB)]
-    return {**_over_the_supply(ours - theirs[:, None]),
-            "C_A in the starved slab over itself": np.sqrt(np.mean((ratio - 1) ** 2))}
-
-
-def _to_fipy(cells: float, order: int, peclet: float, density: float) -> dict[str, float]:
-    """FiPy's cells against one mesh of quadratic or cubic elements."""
-    x, theirs = fipy(cells, peclet, density)
-    ours = at_heights(spaced(FINE[order], 0, order), found(FINE[order], 0, peclet, density, order), x)
-    return {"size": cells, **_over_the_supply(ours - theirs[:, None])}
 
 
 def _over_the_supply(gap: np.ndarray) -> dict[str, float]:
@@ -333,9 +270,17 @@ def _across(shape: str, cell: float, density: float) -> Profile:
 LAW = replace(SCENE.kinetics, yield_coefficient=1e-12)
 #: h: 0.07, 0.2 and 0.7 s. Water diffuses across the slab in 0.6 s, and crosses it in 0.1 to 6 s.
 TIMES = (2e-5, 6e-5, 2e-4)
-#: Steps of each of the three intervals; elements of FiPy's sizes (um), and how many meshes of each.
+#: Steps of each of the three intervals.
 STEPS = (16, 32, 64, 128)
-IN_SPACE = dict(zip(CELLS, (4, 3, 2, 1)))
+#: FiPy's cells (um), half as long as these, and the elements of order 2 and 3 that they are compared with, whose error
+#: is less than a tenth of theirs.
+CELLS, FINE = (4.0, 2.5, 5 / 3, 1.0), {2: 1.0, 3: 5 / 3}
+#: Steady and in time: elements (um) with how many meshes of each, why orders are of second order, the last error of a
+#: density of linear elements, and that of FiPy's cells less those of order 2 and 3.
+AGAINST_FIPY = {
+    False: (SAMPLES, "both codes are of second order", {3e3: 1e-6, 3e4: 6e-6, 3e5: 5e-5}, 6e-6),
+    True: (dict(zip(CELLS, (4, 3, 2, 1))), "both codes are of second order; the error in time is a tenth",
+           {3e3: 3e-6, 3e4: 3e-5, 3e5: 3e-4}, 1e-5)}
 
 
 @cache
@@ -430,65 +375,95 @@ def in_time(order: int, peclet: float, density: float, size: float, ceiling: flo
         _ours(size, 0, peclet, density, steps, order) - trusted)}, STEPS)
     return studies(errors, each(2, "BDF2 after a first step of backward Euler", ceiling))
 
+@cache
+def _channel(size: float, peclet: float, density: float) -> channel_fipy.Channel:
+    """FiPy's, its cells half as long as our edges."""
+    return channel_fipy.Channel(round(2 * (CROSSED[1] - CROSSED[0]) / size), CROSSED, *given(peclet, density))
+
 
 @cache
-def _fipy_in_time(size: float, peclet: float, density: float) -> np.ndarray:
-    return _channel(size, peclet, density).transient(TIMES)
+def _fipy(size: float, peclet: float, density: float, timed: bool) -> np.ndarray:
+    """(times, 2, n) at the centres of its cells."""
+    channel = _channel(size, peclet, density)
+    return channel.transient(TIMES) if timed else channel.steady()[None]
 
 
-def _at_cells(size: float, number: int, peclet: float, density: float, steps: int, x, order: int = 1) -> np.ndarray:
-    """(times, 2, 5, n) ours at x, at five heights."""
-    states = _ours(size, number, peclet, density, steps, order)
+def _at_cells(x, size: float, number: int, order: int, peclet: float, density: float, steps: float) -> np.ndarray:
+    """(times, 2, 5, n) ours at x, at five heights, in so many steps; steady where there are none."""
+    if steps:
+        states = _ours(size, number, peclet, density, round(steps), order)
+    else:
+        states = found(size, number, peclet, density, order)[None]
     return np.stack([at_heights(spaced(size, number, order), state, x) for state in states])
 
 
+def _rows(timed: bool) -> dict[str, tuple]:
+    rows = {**combined(LINEAR, PECLETS, DENSITIES), **combined(HIGHER, {"Pe = 1": 1.0}, {"X = 30000 mg/L": 3e4})}
+    return {label: (timed, *row) for label, row in rows.items()}
+
+
+@case("transport-monod-fipy", kind="cross-code",
+      norm="root mean square over FiPy's cells, at five heights, of each substrate over its supply, and in the starved "
+           "slab over its own value; several meshes a size",
+      claim="Dual Monod uptake under plug flow is FiPy's, both codes refined together, at Peclet 0.1, 1, 5 times "
+            "Thiele numbers 0.6, 1.9, 6, from barely touched to starved; that of quadratic and cubic elements, on one "
+            "mesh, is what FiPy's cells come to",
+      mutants=("decay-demand", "no-inlet-flux"), slow=True, over=_rows(False))
 @case("transport-gear-fipy", kind="cross-code",
       norm="largest over three times of the root mean square over FiPy's cells, at five heights, over the supply; "
            "several meshes a size",
       claim="Transient profiles of both substrates are FiPy's, both codes refined together in space, at Peclet 0.1, 1, "
             "5 times Thiele numbers 0.6, 1.9, 6; and refined in time, where FiPy's own scheme is of first order; those "
             "of quadratic and cubic elements, on one mesh, are what FiPy's cells come to",
-      mutants=("storage-of-the-biomass-alone", "storage-diagonal"), slow=True,
-      over={**combined(LINEAR, PECLETS, DENSITIES), **combined(HIGHER, {"Pe = 1": 1.0}, {"X = 30000 mg/L": 3e4})})
-def in_space(order: int, peclet: float, density: float):
+      mutants=("storage-of-the-biomass-alone", "storage-diagonal"), slow=True, over=_rows(True))
+def finite_volumes(timed: bool, order: int, peclet: float, density: float):
+    samples, why, ceilings, closest = AGAINST_FIPY[timed]
     if order > 1:
-        errors = refine(_to_fipy_in_time, CELLS, order, peclet, density)
-        yield studies(errors, each(2, "FiPy's second order", 1e-5), " of FiPy less ours")
+        errors = refine(_to_fipy, CELLS, order, peclet, density, timed)
+        yield studies(errors, each(2, "FiPy's second order", closest), " of FiPy less ours")
         return
-    errors = refine(_from_fipy_in_time, IN_SPACE, peclet, density)
-    yield studies(errors, each(2, "both codes are of second order; the error in time is a tenth", CEILINGS[density][2]))
-    if (peclet, density) == SHARED:
+    errors = refine(_from_fipy, samples, peclet, density, timed)
+    yield studies(errors, each(2, why, ceilings[density]))
+    if not timed and (peclet, density) == STARVED:
+        yield studies(errors, {ITSELF_STARVED: (2, why, 6e-4)})
+    if timed and (peclet, density) == SHARED:
         errors = refine(_from_backward_euler, STEPS, peclet, density)
         yield studies(errors, each(1, "the lower of the two: FiPy's TransientTerm is backward Euler", 3e-4),
                       " less FiPy's in as many steps")
-    yield _course(peclet, density)
+    yield _course(min(samples), peclet, density, timed)
 
 
-def _from_fipy_in_time(size: float, number: int, peclet: float, density: float) -> dict[str, float]:
-    x = _channel(size, peclet, density).x
-    ours = _at_cells(size, number, peclet, density, round(STEPS[-1] / size), x)
-    return _largest(ours - _fipy_in_time(size, peclet, density)[:, :, None])
+def _from_fipy(size: float, number: int, peclet: float, density: float, timed: bool) -> dict[str, float]:
+    """Both codes refined together; in the starved slab C_A over itself."""
+    x, theirs = _channel(size, peclet, density).x, _fipy(size, peclet, density, timed)
+    ours, inside = _at_cells(x, size, number, 1, peclet, density, timed * STEPS[-1] / size), (x > 0) & (x < SLAB)
+    ratio = ours[-1, 0][:, inside] / theirs[-1, 0, inside]
+    return {**_largest(ours - theirs[:, :, None]), ITSELF_STARVED: np.sqrt(np.mean((ratio - 1) ** 2))}
 
 
-def _to_fipy_in_time(cells: float, order: int, peclet: float, density: float) -> dict[str, float]:
-    x = _channel(cells, peclet, density).x
-    ours = _at_cells(FINE[order], 0, peclet, density, STEPS[-1], x, order)
-    return {"size": cells, **_largest(ours - _fipy_in_time(cells, peclet, density)[:, :, None])}
+def _to_fipy(cells: float, order: int, peclet: float, density: float, timed: bool) -> dict[str, float]:
+    """FiPy's cells against one mesh of quadratic or cubic elements."""
+    x, theirs = _channel(cells, peclet, density).x, _fipy(cells, peclet, density, timed)
+    ours = _at_cells(x, FINE[order], 0, order, peclet, density, timed * STEPS[-1])
+    return {"size": cells, **_largest(ours - theirs[:, :, None])}
 
 
 def _from_backward_euler(steps: int, peclet: float, density: float) -> dict[str, float]:
-    channel = _channel(CELLS[-1], peclet, density)
-    ours = _at_cells(CELLS[-1], 0, peclet, density, steps, channel.x)
+    size = CELLS[-1]
+    channel = _channel(size, peclet, density)
+    ours = _at_cells(channel.x, size, 0, 1, peclet, density, steps)
     return {"size": TIMES[0] / steps, **_largest(ours - channel.backward_euler(TIMES, steps)[:, :, None])}
 
 
-def _course(peclet: float, density: float) -> Profile:
-    size, curves = CELLS[-1], []
-    x, space = _channel(size, peclet, density).x, spaced(size, 0)
-    pairs = zip(TIMES, _ours(size, 0, peclet, density, STEPS[-1]), _fipy_in_time(size, peclet, density))
-    for time, ours, theirs in pairs:
-        curves += pictured("", "", x, sample_along(space, ours, x),
-                           (f"FiPy, {3600 * time:.2g} s", "reference", x, theirs)).curves
+def _course(size: float, peclet: float, density: float, timed: bool) -> Profile:
+    """Along the channel, at each time; steady with what solve_bvp finds."""
+    x, curves = _channel(size, peclet, density).x, []
+    ours = _at_cells(x, size, 0, 1, peclet, density, timed * STEPS[-1])[:, :, 2]
+    for one, theirs in zip(ours, _fipy(size, peclet, density, timed)):
+        curves += pictured("", "", x, one, ("FiPy", "reference", x, theirs)).curves
+    if not timed:
+        truth = exact(peclet, density)(x[::12])
+        curves += [(f"{name}, solve_bvp", "exact", x[::12], part) for name, part in zip(NAMES, truth)]
     return Profile("along the channel", "x (um)", "C (mg/L)", tuple(curves))
 
 
