@@ -9,7 +9,19 @@ import pytest
 from reference import channel_bvp, channel_fipy, taylor_hood
 from repro.fem.space import Space
 from verification.kernel import case, driver, matrix, report
-from verification.kernel.case import Check, Outcome, Result, Study, at_least, at_most, between, study
+from verification.kernel.case import (
+    Check,
+    Outcome,
+    Result,
+    Study,
+    at_least,
+    at_most,
+    between,
+    combined,
+    refine,
+    studies,
+    study,
+)
 from verification.problems import meshes, norms
 
 SIZES = 0.5 ** np.arange(4)
@@ -103,6 +115,38 @@ def test_a_case_is_called_for_each_of_its_variants_whose_label_ends_its_names():
     assert [part.title for part in found.profiles] == ["picture, one", "picture, one", "picture, two", "picture, two"]
 
 
+def test_a_variant_that_stops_hides_no_other_and_is_named():
+    def reciprocal(value):
+        yield at_most("q", 1 / value, 1.0, "")
+
+    chosen = case.Case("x", "flow", "c", "exact", "n", ("m",), False, reciprocal,
+                       {"none": (0,), "two": (2,), "half": (0.5,), "also none": (0,)})
+    found = case.run(chosen)
+    assert [(part.quantity, part.holds) for part in found.outcome.checks] == [("q, two", True), ("q, half", False)]
+    assert found.error.startswith("none: Traceback") and "\nalso none: Traceback" in found.error
+    assert found.error.count("ZeroDivisionError") == 2 and not found.holds
+
+
+def test_what_a_case_runs_over_is_every_combination_with_its_label():
+    found = combined({"order 2": 2, "order 3": 3}, {"lambda = 1": 1.0})
+    assert found == {"order 2, lambda = 1": (2, 1.0), "order 3, lambda = 1": (3, 1.0)}
+
+
+def test_errors_of_unrelated_meshes_are_averaged_and_studied_by_their_own_size():
+    """Root mean squares of what every mesh of a size gives; nominal sizes where none are measured."""
+    errors = refine(lambda size, mesh, factor: {"error": factor * size * (1 + 6 * mesh)}, {2.0: 2, 1.0: 1}, 3.0)
+    assert errors["size"].tolist() == [2.0, 1.0] and errors["error"].tolist() == [30.0, 3.0]
+    measured = refine(lambda size, mesh: {"size": size + mesh, "error": 1.0}, {4.0: 1, 1.0: 2})
+    assert measured["size"] == pytest.approx([4.0, np.sqrt(2.5)])
+
+
+def test_studies_are_rows_of_a_table():
+    errors = {"size": SIZES, "a": SIZES**2, "b": SIZES**1.2, "c": SIZES}
+    found = studies(errors, {"a": (2, "theory", 0.02), "b": ((1.0, 1.1), "seen", 1.0)}, " of all")
+    assert [(one.quantity, one.low, one.high, one.ceiling, one.origin, one.holds) for one in found] == [
+        ("a of all", 1.7, 2.3, 0.02, "theory", True), ("b of all", 1.0, 1.1, 1.0, "seen", False)]
+
+
 @pytest.mark.parametrize("labels, more, ways", [
     (("linear", "cubic"), "", ("1", "3")), (("order 2, traction",), "", ("2",)),
     (("straight", "curved"), "3", ("1", "2", "3")), (("R = 5 um, quadratic",), "paper", ("2", "paper")),
@@ -117,7 +161,8 @@ def test_a_way_that_is_none_is_refused():
         case._ways("x", (), "4")
 
 
-@pytest.mark.parametrize("id", ["flow-sections", "growth-homogeneous", "reprojection-mass", "coupling-stiffness"])
+@pytest.mark.parametrize("id", ["flow-sections", "transport-mean-biomass", "growth-homogeneous", "reprojection-mass",
+                                "coupling-stiffness"])
 def test_a_case_runs_with_the_orders_that_it_says(id, monkeypatch):
     driver.load()
     orders, made = set(), Space.__init__
