@@ -46,8 +46,8 @@ from repro.fem.space import Space
 from repro.model import flow
 from repro.scene import Flow as Drive
 from verification.kernel.case import Profile, around, at_most, case, combined, compared, refine, studies
-from verification.problems import boxes, meshes, norms
-from verification.problems.boxes import Problem
+from verification.problems import meshes, norms
+from verification.problems.channels import Box, box_errors, box_profile
 
 WIDTH, ENDS, RATIO = 50.0, (-75.0, 75.0), 2000.0
 #: What cases run over: both forms of [E2], orders of the elements, and (by :func:`viscous`) ratios of viscosities.
@@ -369,22 +369,22 @@ def _disc_grid(size: float, draw: int, kind=meshes.disc) -> Mesh:
     return kind(DISC_ENDS, WIDTH, size, CENTRE, DISC_RADIUS, seed=int(1000 * size) + draw)
 
 
-def _disc_problem(ratio: float, interface: str, order: int) -> Problem:
+def _disc_problem(ratio: float, interface: str, order: int) -> Box:
     def exact(x, y):
         return viscous_inclusion.fields(x - CENTRE[0], y - CENTRE[1], DISC_RADIUS, ratio, interface, ANGLE)
 
-    return Problem(ratio, interface, order, exact)
+    return Box(ratio, interface, order, exact)
 
 
-def _disc_errors(size: float, draw: int, problem: Problem, kind) -> dict[str, float]:
-    return boxes.errors(_disc_grid(size, draw, kind), problem)
+def _disc_errors(size: float, draw: int, problem: Box, kind) -> dict[str, float]:
+    return box_errors(_disc_grid(size, draw, kind), problem)
 
 
-def _through_the_disc(problem: Problem) -> Profile:
+def _through_the_disc(problem: Box) -> Profile:
     """The velocity along y on a slanting line through the disc."""
     s = np.linspace(-24.0, 24.0, 97)
     where = CENTRE + np.column_stack([0.9 * s, 0.5 * s])
-    return boxes.profile(_disc_grid(1.2, 0), problem, s, where, np.array([0.0, 1.0]),
+    return box_profile(_disc_grid(1.2, 0), problem, s, where, np.array([0.0, 1.0]),
                          "u_y along a line through it (um)")
 
 
@@ -430,8 +430,8 @@ def manufactured(made: tuple, ratio: float, interface: str):
         yield _through_the_interface(problem)
 
 
-def _made_errors(size: float, draw: int, bend: float, problem: Problem) -> dict[str, float]:
-    return boxes.errors(_box_grid(size, draw, bend), problem)
+def _made_errors(size: float, draw: int, bend: float, problem: Box) -> dict[str, float]:
+    return box_errors(_box_grid(size, draw, bend), problem)
 
 
 @cache
@@ -448,13 +448,13 @@ def _box_grid(size: float, draw: int, bend: float) -> Mesh:
 
 
 @cache
-def _made_problem(ratio: float, interface: str, order: int) -> Problem:
+def _made_problem(ratio: float, interface: str, order: int) -> Box:
     velocity, pressure, force = manufactured_flow.evaluated(ratio, interface)
-    return Problem(ratio, interface, order, lambda x, y: (velocity(x, y), pressure(x, y)), force)
+    return Box(ratio, interface, order, lambda x, y: (velocity(x, y), pressure(x, y)), force)
 
 
-def _through_the_interface(problem: Problem) -> Profile:
+def _through_the_interface(problem: Box) -> Profile:
     """The velocity along the interface, on a line across it."""
     s, turn = np.linspace(-0.5, 0.45, 96), manufactured_flow.ANGLE
     where, along = np.column_stack([np.cos(turn) * s, np.sin(turn) * s]), np.array([-np.sin(turn), np.cos(turn)])
-    return boxes.profile(_box_grid(0.07, 0, STRAIGHT), problem, s, where, along, "across the interface")
+    return box_profile(_box_grid(0.07, 0, STRAIGHT), problem, s, where, along, "across the interface")
