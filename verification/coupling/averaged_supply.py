@@ -7,7 +7,7 @@ import json
 import numpy as np
 
 from verification.kernel.case import Outcome, Profile, at_least, at_most, case
-from verification.problems import averaged, runs
+from verification.problems import runs
 
 #: Diffusivities are so many times those of the paper: the averaged pore's own error falls as their inverse.
 FASTER = 64.0
@@ -48,10 +48,10 @@ def supply() -> Outcome:
 def _compared(preset: str, how: str, pieces, bound: float, origin: str) -> tuple[list, list[Profile]]:
     """Checks and pictures of one preset and one course of the donor's supply."""
     made = scene(preset, how, pieces)
-    instants = averaged.ours(made)
+    instants = runs.ours(made)
     moments = reference(made, pieces)
-    rows = [averaged.apart(made, *pair) for pair in zip(instants, moments)]
-    worst = averaged.worst(rows)
+    rows = [runs.apart(made, *pair) for pair in zip(instants, moments)]
+    worst = runs.worst(rows)
     checks = [at_most(f"{name}, {how}, {preset}", worst[name], bound, origin)
               for name in ("area", "effluents", "C along the pore")]
     areas = [moment.area for moment in moments]
@@ -79,4 +79,4 @@ def scene(preset: str, how: str, pieces):
 def reference(made, pieces) -> list:
     """The averaged pore's moments at the reported times."""
     both = [(end, (ACCEPTOR, first), (ACCEPTOR, last)) for end, first, last in pieces]
-    return averaged.half_disc(made.at(0.0), cells=CELLS, fluid=FLUID).run_through(both, TIMES, ACCURACY)
+    return runs.half_disc(made.at(0.0), cells=CELLS, fluid=FLUID).run_through(both, TIMES, ACCURACY)

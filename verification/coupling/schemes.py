@@ -19,7 +19,7 @@ from repro.march.simulation import simulate
 from repro.model import pore
 from repro.scene import load_scene
 from verification.kernel.case import Profile, at_most, case, study
-from verification.problems import averaged, runs
+from verification.problems import runs
 
 STEPS = (0.8, 0.4, 0.2, 0.1, 0.05)
 
@@ -107,7 +107,7 @@ def _solved(radius: str, elements: str, extent: str):
     solved = pore.solve(scene, now)
     leaving = solved.fluxes
     reach = min(10 * scene.aggregate.radius, 1.5 * scene.pore.width) + scene.aggregate.radius
-    x = np.linspace(-reach, reach, averaged.PLACES)
+    x = np.linspace(-reach, reach, runs.PLACES)
     return ({"conductivity": solved.flow.conductivity, "effluent acceptor": leaving[0].effluent,
              "effluent donor": leaving[1].effluent}, x, runs.section_means(now, solved, x))
 
