@@ -22,7 +22,7 @@ from verification.kernel.case import (
     studies,
     study,
 )
-from verification.problems import meshes, norms
+from verification.problems import meshes
 
 SIZES = 0.5 ** np.arange(4)
 
@@ -274,8 +274,8 @@ def test_random_meshes_cover_their_rectangle_and_follow_their_lines():
     grid = meshes.channel((-10.0, 20.0), 8.0, 1.1, lambda x, y: (x > 0) & (y < 3), across=(0.0,), along=(3.0,), seed=3)
     assert grid.areas.min() > 0 and grid.areas.sum() == pytest.approx(240.0, rel=1e-13)
     assert grid.areas[grid.biomass].sum() == pytest.approx(60.0, rel=1e-13)
-    assert norms.l2_error(grid.points, grid.triangles, grid.points[:, 0], lambda x, y: x) < 1e-14
-    assert norms.sample(grid.points, grid.triangles, grid.points, np.array([[1.5, 2.5]])) == pytest.approx(
+    assert meshes.l2_error(grid.points, grid.triangles, grid.points[:, 0], lambda x, y: x) < 1e-14
+    assert meshes.sample(grid.points, grid.triangles, grid.points, np.array([[1.5, 2.5]])) == pytest.approx(
         np.array([[1.5, 2.5]]))
 
 

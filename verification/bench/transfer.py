@@ -14,7 +14,7 @@ from repro.fem.mesh import curved
 from repro.fem.space import Space
 from verification.bench import pores
 from verification.bench.clock import measured
-from verification.problems import meshes, norms
+from verification.problems import meshes
 
 REPEATS = 3
 #: um; the front's place along x and its width.
@@ -69,13 +69,13 @@ def _linear(size: float, count: int, project):
         new = _meshed(size, which)
         field = project(*old, field, *new)
         old = new
-    return lambda: {"error": norms.l2_error(*old, field[:, 0], exact), "nodes": len(old[0]),
+    return lambda: {"error": meshes.l2_error(*old, field[:, 0], exact), "nodes": len(old[0]),
                     "drift": abs(_integral(*old, field) - start) / _total(),
                     "beyond": float(max(1.0 - field.min(), field.max() - 2.0, 0.0))}
 
 
 def _integral(points, triangles, field) -> float:
-    _, weight, shape = norms.quadrature(points, triangles)
+    _, weight, shape = meshes.quadrature(points, triangles)
     return float(np.sum(weight * (field[triangles, 0] @ shape.T)))
 
 

@@ -46,7 +46,7 @@ from repro.fem.space import Space
 from repro.model import flow
 from repro.scene import Flow as Drive
 from verification.kernel.case import Profile, around, at_most, case, combined, compared, refine, studies
-from verification.problems import meshes, norms
+from verification.problems import meshes
 from verification.problems.channels import Box, box_errors, box_profile
 
 WIDTH, ENDS, RATIO = 50.0, (-75.0, 75.0), 2000.0
@@ -94,8 +94,8 @@ def _clean(refinement: float, interface: str) -> dict[str, float]:
     unit = flow.unit_flow(space, 1.0, interface=interface)
     found = flow.scaled(unit, grid, LENGTH, drive(mean_velocity=2.0))
     exact = poiseuille.head_loss(ENDS[1] - ENDS[0], WIDTH, 2.0, VISCOSITY)
-    return {"size": norms.mean_size(grid), "head loss": abs(found.meshed_loss / exact - 1),
-            "velocity": norms.field_error(space, found.velocity, lambda x, y: 2 * _velocity(x, y)),
+    return {"size": meshes.mean_size(grid), "head loss": abs(found.meshed_loss / exact - 1),
+            "velocity": meshes.field_error(space, found.velocity, lambda x, y: 2 * _velocity(x, y)),
             "conductivity": abs(found.conductivity / poiseuille.conductivity(WIDTH, VISCOSITY) - 1)}
 
 
@@ -128,14 +128,14 @@ def _plug_errors(size: float, draw: int) -> dict[str, float]:
     found, length = flow.unit_flow(space, RATIO), 2 * PLUG
     exact = sum(poiseuille.head_loss(part, WIDTH, 1.0, viscosity)
                 for part, viscosity in ((ENDS[1] - ENDS[0] - length, 1.0), (length, RATIO)))
-    return {"velocity": norms.field_error(space, found.velocity, _velocity),
+    return {"velocity": meshes.field_error(space, found.velocity, _velocity),
             "head loss": abs(found.loss / exact - 1)}
 
 
 def _across(title: str, grid: Mesh, ratio: float, exact, *given: float) -> Profile:
     """u_x on the line x = 0, and exact(y, *given)."""
     space, y = Space(grid, 1), np.linspace(0.0, WIDTH, 101)
-    ours = norms.field_at(space, flow.unit_flow(space, ratio).velocity, np.column_stack([0 * y, y]))
+    ours = meshes.field_at(space, flow.unit_flow(space, ratio).velocity, np.column_stack([0 * y, y]))
     return compared(title, "y (um)", "u_x / u_ave", y, ours[:, 0], exact(y, *given))
 
 
@@ -240,14 +240,14 @@ def _in_the_middle(space: Space, found: flow.UnitFlow, reference: ModuleType, pa
         return np.stack([reference.velocity(y, WIDTH, LAYER, parameter), 0 * y], axis=-1)
 
     gradient = reference.gradient(WIDTH, LAYER, parameter)
-    return {"velocity": norms.field_error(space, found.velocity, exact, middle),
-            "velocity in the layer": norms.field_error(space, found.velocity, exact, middle & grid.biomass),
+    return {"velocity": meshes.field_error(space, found.velocity, exact, middle),
+            "velocity in the layer": meshes.field_error(space, found.velocity, exact, middle & grid.biomass),
             "gradient": abs(slope(flow.pressure_space(space), found.pressure, middle) / gradient - 1)}
 
 
 def slope(space: Space, pressure: np.ndarray, chosen: np.ndarray) -> float:
     """-dp/dx by least squares over some triangles."""
-    where, weight, shape = norms.fine(space, chosen)
+    where, weight, shape = meshes.fine(space, chosen)
     x, p = where[..., 0], pressure[space.cells[chosen]] @ shape.T
     x = x - np.sum(weight * x) / weight.sum()
     return float(-np.sum(weight * p * x) / np.sum(weight * x**2))
@@ -319,9 +319,9 @@ def _rise_error(refinement: float, draw: int, interface: str, order: int) -> dic
     grid = _rise_grid(refinement * meshes.SPREAD[draw], min(order, 2))
     space = Space(grid, order)
     below, above = (flow.unit_flow(space, 1 + step, interface=interface).loss for step in (-STEP, STEP))
-    where, weight, _ = norms.fine(space, grid.biomass)
+    where, weight, _ = meshes.fine(space, grid.biomass)
     exact = np.sum(weight * poiseuille.dissipation(where[..., 1], WIDTH)) / WIDTH
-    return {"size": norms.mean_size(grid), "rise": abs((above - below) / (2 * STEP) / exact - 1)}
+    return {"size": meshes.mean_size(grid), "rise": abs((above - below) / (2 * STEP) / exact - 1)}
 
 
 DISC_ENDS = (-25.0, 25.0)

@@ -40,7 +40,7 @@ from repro.scene import parse_scene
 from verification.flow import closed_forms, properties
 from verification.flow.closed_forms import ENDS_FIRST, FORMS, HIGHER, LAYER, RATIO, SECOND, SIZES, viscous
 from verification.kernel.case import Profile, at_least, at_most, between, case, combined, compared, refine, studies
-from verification.problems import meshes, norms
+from verification.problems import meshes
 
 WIDTH, ENDS, CORNER = 50.0, (-75.0, 75.0), 4
 #: Refinement of our mesh on each level, where Taylor-Hood's is halved again, and how many meshes are drawn (see
@@ -121,7 +121,7 @@ def _chords(refinement: float, draw: int, order: int) -> dict[str, float]:
     trusted = _trusted(25.0, RATIO, "laplacian", 2).loss
     grid = _grid(25.0, refinement * meshes.SPREAD[draw])
     found = flow.unit_flow(Space(grid, order), RATIO)
-    return {"size": norms.mean_size(grid), "head loss": abs(found.loss / trusted - 1)}
+    return {"size": meshes.mean_size(grid), "head loss": abs(found.loss / trusted - 1)}
 
 
 @cache
@@ -140,7 +140,7 @@ def _level(level: int, draw: int, refinements, radius: float, ratio: float, inte
     theirs = _trusted(radius, ratio, interface, level)
     found, clean = (flow.unit_flow(space, each, interface=interface) for each in (ratio, 1.0))
     ends = clean.loss - poiseuille.head_loss(ENDS[1] - ENDS[0], WIDTH, 1.0, 1.0)
-    return {"size": norms.mean_size(space.mesh), **_apart(space, found, theirs),
+    return {"size": meshes.mean_size(space.mesh), **_apart(space, found, theirs),
             "excess of the head loss": abs((found.loss - ends) / theirs.loss - 1)}
 
 
@@ -148,10 +148,11 @@ def _apart(space: Space, found: flow.UnitFlow, theirs: taylor_hood.Stokes) -> di
     """Differences of our flow from Taylor-Hood's at the middles of its edges, weighed by their areas."""
     pressures = flow.pressure_space(space)
     apart = {"head loss": abs(found.loss / theirs.loss - 1),
-             "velocity": _relative(norms.field_at(space, found.velocity, theirs.points), theirs.velocity, theirs.areas)}
+             "velocity": _relative(meshes.field_at(space, found.velocity, theirs.points), theirs.velocity,
+                                   theirs.areas)}
     for part in theirs.pressures:
         apart[f"pressure in the {'biomass' if part.biomass else 'fluid'}"] = _relative(
-            norms.field_at(pressures, found.pressure, part.points)[:, None], part.values[:, None], part.areas)
+            meshes.field_at(pressures, found.pressure, part.points)[:, None], part.values[:, None], part.areas)
     return apart
 
 
@@ -169,13 +170,13 @@ def _profiles(radius: float, ratio: float, interface: str) -> tuple[Profile, ...
     wall = fluid.points[:, 1] > WIDTH * (1 - 1e-9)
     return (_above_the_middle(space, found, theirs),
             _profile("x along the upper wall (um)", "p g / (nu u_ave) (1/um)", fluid.points[wall], 0,
-                     norms.field_at(space, found.pressure, fluid.points[wall]), fluid.values[wall]))
+                     meshes.field_at(space, found.pressure, fluid.points[wall]), fluid.values[wall]))
 
 
 def _above_the_middle(space: Space, found: flow.UnitFlow, theirs: taylor_hood.Stokes) -> Profile:
     line = np.abs(theirs.points[:, 0]) < 1e-6
     return _profile("y at x = 0 (um)", "u_x / u_ave", theirs.points[line], 1,
-                    norms.field_at(space, found.velocity, theirs.points[line])[:, 0], theirs.velocity[line, 0])
+                    meshes.field_at(space, found.velocity, theirs.points[line])[:, 0], theirs.velocity[line, 0])
 
 
 def _profile(x_label: str, y_label: str, where, axis: int, ours, theirs) -> Profile:
@@ -341,7 +342,7 @@ def _layered(grid: Mesh, element: flow.Stabilised | flow.Bubble, half: float) ->
     found = flow.unit_flow(space, RATIO, element=element)
     middle = np.abs(grid.points[grid.triangles, 0].mean(axis=1)) < half
     gradient = layered_channel.gradient(WIDTH, LAYER, RATIO)
-    return {"velocity": norms.field_error(space, found.velocity, _exact, middle),
+    return {"velocity": meshes.field_error(space, found.velocity, _exact, middle),
             "pressure gradient": abs(closed_forms.slope(space, found.pressure, middle) / gradient - 1),
             "velocity's gradient": _slope_error(grid, found.velocity[:, 0], middle)}
 
@@ -352,7 +353,7 @@ def _exact(x, y):
 
 def _slope_error(grid: Mesh, speed: np.ndarray, chosen: np.ndarray) -> float:
     """Relative L2 error of grad u_x over some triangles, exact slopes by differences of the exact velocity."""
-    where, weight, _ = norms.quadrature(grid.points, grid.triangles[chosen])
+    where, weight, _ = meshes.quadrature(grid.points, grid.triangles[chosen])
     ours = np.einsum("tai,ta->ti", grid.gradients[chosen], speed[grid.triangles[chosen]])
     y, step = where[..., 1], 1e-4
     exact = (_exact(0 * y, y + step) - _exact(0 * y, y - step))[..., 0] / (2 * step)

@@ -17,7 +17,7 @@ from repro.model import flow, pore
 from repro.scene import parse_scene
 from verification.flow.closed_forms import ENDS, FORMS, HIGHER, LENGTH, ORDERS, RATIO, WIDTH, drive
 from verification.kernel.case import at_least, at_most, between, case, combined
-from verification.problems import meshes, norms
+from verification.problems import meshes
 
 #: Refinement of the meshes of each order.
 REFINED = {1: 1.0, 2: 0.5, 3: 0.4}
@@ -79,7 +79,7 @@ def sections(made: int | dict, interface: str):
 def _carried(space: Space, interface: str, name: str, drop: float):
     """Errors of the flux of what carries the substrates; of linear elements of u itself besides."""
     found = flow.unit_flow(space, RATIO, interface=interface)
-    _, _, shape = norms.fine(space)
+    _, _, shape = meshes.fine(space)
     u = np.einsum("qa,tai->tqi", shape, found.velocity[space.cells])
     why = "(2) tested with linear ramps, round-off"
     if found.correction is None:
@@ -91,12 +91,12 @@ def _carried(space: Space, interface: str, name: str, drop: float):
 
 
 def flux_error(space: Space, carried: np.ndarray) -> float:
-    """Largest error of the flux through 25 sections of a field (T, q, 2) in the points of :func:`norms.fine`, or
+    """Largest error of the flux through 25 sections of a field (T, q, 2) in the points of :func:`meshes.fine`, or
     (T, 1, 2): tested with functions of the corners that fall from one at the inlet to zero at the outlet, each a ramp.
     """
     grid, worst = space.mesh, 0.0
-    _, weight, _ = norms.fine(space)
-    slopes = elements.points(grid.points[grid.cells], elements.table(1, grid.geometry, norms.FINE)).slopes
+    _, weight, _ = meshes.fine(space)
+    slopes = elements.points(grid.points[grid.cells], elements.table(1, grid.geometry, meshes.FINE)).slopes
     carries = np.einsum("tqi,tqia->ta", weight[..., None] * carried, slopes)
     for x in np.linspace(-65.0, 65.0, 25):
         ramp = np.clip((x + 5.0 - grid.points[: grid.corners, 0]) / 10.0, 0.0, 1.0)
@@ -168,7 +168,7 @@ def _mirrored(grid: Mesh) -> Mesh:
 
 def _size(space: Space, field: np.ndarray, chosen: np.ndarray) -> float:
     """L2 norm of a field (n, 2) over the triangles ``chosen``."""
-    _, weight, shape = norms.fine(space, chosen)
+    _, weight, shape = meshes.fine(space, chosen)
     at = np.einsum("qa,tai->tqi", shape, field[space.cells[chosen]])
     return float(np.sqrt(np.sum(weight[..., None] * at**2)))
 
@@ -209,7 +209,7 @@ def curved_flux(order: int, interface: str):
     out = space.end_lengths(space.dofs.outlet) @ velocity[space.dofs.outlet, 0] @ SIMPSON[order] / WIDTH
     yield _whole("outlet", out, 1e-11, "q = 1: round-off")
     for x in (-40.0, -20.0, -7.0, 0.0, 13.0, 33.0):
-        through = norms.field_at(space, velocity, np.column_stack([np.full(len(y), x), y]))[:, 0].mean()
+        through = meshes.field_at(space, velocity, np.column_stack([np.full(len(y), x), y]))[:, 0].mean()
         yield _whole(f"x = {x:g} um", through, 1e-4,
                      "div u vanishes in the mean only of each test function: third order")
 

@@ -11,7 +11,7 @@ from repro.fem.mesh import Mesh, curved
 from repro.fem.space import Space
 from verification.kernel.case import Outcome, Profile, at_least, at_most, case, study
 from verification.mesh_motion.closed_forms import EITHER, moved
-from verification.problems import meshes, norms
+from verification.problems import meshes
 
 WIDTH, ENDS = 50.0, (-75.0, 75.0)
 #: Radius of the half-disc (um), by which factor it grows, and how far it slides over its radius.
@@ -66,7 +66,7 @@ def _kept(name: str, first: Mesh, last: Mesh) -> list:
 
 def _area(grid: Mesh) -> float:
     """Of all triangles, bent edges included, um2."""
-    return float(norms.fine(Space(grid, grid.geometry))[1].sum())
+    return float(meshes.fine(Space(grid, grid.geometry))[1].sum())
 
 
 STRIDES = (0.08, 0.04, 0.02, 0.01)

@@ -22,7 +22,7 @@ from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.fem.space import Space
 from repro.model import growth, pore
 from verification.problems import meshes
-from verification.problems.norms import relative
+from verification.problems.meshes import relative
 
 #: Radius of the half-discs (um), and the factor by which theta is raised at a time.
 RADIUS, FACTOR = 20.0, 1.5

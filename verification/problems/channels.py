@@ -27,7 +27,7 @@ from repro.model import flow, transport
 from repro.model.kinetics import Sink
 from repro.scene import load_scene
 from verification.kernel.case import Profile, compared
-from verification.problems import meshes, norms
+from verification.problems import meshes
 
 SCENE = load_scene("base")
 WIDTH, SLAB = 10.0, 40.0
@@ -141,7 +141,7 @@ def speed_of(peclet: float) -> float:
 
 def length(space: Space, size: float) -> float:
     """What errors are studied by: the nominal size of linear elements, the mean one of others."""
-    return size if space.order == 1 else norms.mean_size(space.mesh)
+    return size if space.order == 1 else meshes.mean_size(space.mesh)
 
 
 def both(state: transport.Concentrations) -> np.ndarray:
@@ -151,7 +151,7 @@ def both(state: transport.Concentrations) -> np.ndarray:
 
 def in_points(space: Space) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Where errors are integrated: places (T, q, 2) um, weights (T, q) um2 and functions (q, k)."""
-    return norms.fine(space, degree=DEGREES[space.order])
+    return meshes.fine(space, degree=DEGREES[space.order])
 
 
 def apart(space: Space, fields: np.ndarray, exact) -> tuple[np.ndarray, np.ndarray]:
@@ -175,12 +175,12 @@ def distance(space: Space, fields: np.ndarray, exact) -> np.ndarray:
 
 def sample(space: Space, fields: np.ndarray, where: np.ndarray) -> np.ndarray:
     """(m, K) fields (m, n) at places (K, 2)."""
-    return norms.field_at(space, fields.T, where).T
+    return meshes.field_at(space, fields.T, where).T
 
 
 def along(space: Space, fields: np.ndarray, x) -> np.ndarray:
     """(K,) or (m, K) a field (n,), or fields (m, n), along the middle of the channel."""
-    return norms.field_at(space, fields.T, np.column_stack([x, np.full(len(x), WIDTH / 2)])).T
+    return meshes.field_at(space, fields.T, np.column_stack([x, np.full(len(x), WIDTH / 2)])).T
 
 
 def at_heights(space: Space, fields: np.ndarray, x, heights: int = 5) -> np.ndarray:
@@ -216,18 +216,18 @@ def box_errors(grid: Mesh, problem: Box) -> dict[str, float]:
     u, p = box_flow(grid, problem)
     space = Space(grid, problem.order)
     pressures = flow.pressure_space(space)
-    where, weight, shape = norms.fine(space)
+    where, weight, shape = meshes.fine(space)
     x, y = np.moveaxis(where, -1, 0)
     truth, level = problem.exact(x, y)
     found = np.einsum("qa,tai->tqi", shape, u[space.cells])
-    heads = p[pressures.cells] @ norms.fine(pressures)[2].T
-    return {"velocity": norms.relative(found, truth, weight),
-            "pressure": norms.relative(_centred(heads, weight), _centred(level, weight), weight)}
+    heads = p[pressures.cells] @ meshes.fine(pressures)[2].T
+    return {"velocity": meshes.relative(found, truth, weight),
+            "pressure": meshes.relative(_centred(heads, weight), _centred(level, weight), weight)}
 
 
 def box_profile(grid: Mesh, problem: Box, s: np.ndarray, where: np.ndarray, along: np.ndarray, x_label: str) -> Profile:
     """The component ``along`` of the velocity at places (K, 2), drawn over s (K,)."""
-    ours = norms.field_at(Space(grid, problem.order), box_flow(grid, problem)[0], where)
+    ours = meshes.field_at(Space(grid, problem.order), box_flow(grid, problem)[0], where)
     return compared("velocity", x_label, "its component", s, ours @ along, problem.exact(*where.T)[0] @ along)
 
 
@@ -286,7 +286,7 @@ def _without_flux(space: Space, velocity: np.ndarray) -> np.ndarray:
 
 def _load(space: Space, force: Callable) -> np.ndarray:
     """(n, 2) integrals of the force times each nodal function."""
-    where, weight, shape = norms.fine(space)
+    where, weight, shape = meshes.fine(space)
     at = force(*np.moveaxis(where, -1, 0))
     load = np.zeros((space.count, 2))
     np.add.at(load, space.cells, np.einsum("tq,tqi,qa->tai", weight, at, shape))
