@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from reference import channel_bvp, channel_fipy, taylor_hood
+from repro.errors import LinearError
 from repro.fem.space import Space
-from verification.kernel import case, driver, matrix, report
+from verification.kernel import case, driver, matrix, mutants, report
 from verification.kernel.case import (
     Check,
     Outcome,
@@ -125,6 +126,19 @@ def test_a_variant_that_stops_hides_no_other_and_is_named():
     assert [(part.quantity, part.holds) for part in found.outcome.checks] == [("q, two", True), ("q, half", False)]
     assert found.error.startswith("none: Traceback") and "\nalso none: Traceback" in found.error
     assert found.error.count("ZeroDivisionError") == 2 and not found.holds
+
+
+@pytest.mark.parametrize("errors, caught, how", [
+    ((LinearError("no flow"), ValueError("x")), True, "LinearError: no flow"),
+    ((ValueError("x"), LinearError("no flow")), True, "LinearError: no flow"),
+    ((ValueError("x"), KeyError("y")), False, "KeyError: 'y'"),
+])
+def test_a_guard_that_stops_any_variant_catches_a_mutant(errors, caught, how):
+    def stopped(error):
+        raise error
+
+    chosen = case.Case("x", "flow", "c", "exact", "n", ("m",), False, stopped, {str(e): (e,) for e in errors})
+    assert mutants.judged(case.run(chosen)) == (caught, how)
 
 
 def test_what_a_case_runs_over_is_every_combination_with_its_label():

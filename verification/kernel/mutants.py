@@ -81,6 +81,8 @@ CATCHERS = ("cases", "tests")
 #: A line of the summary of pytest, and how it begins where it is a catch: an assertion, `pytest.raises`, a guard.
 FAILED = re.compile(r"^(?:FAILED|ERROR) .*? - (.*)$", re.M)
 CATCH = ("assert", "AssertionError", "Failed: ", "repro.")
+#: The guard that stops a variant of a case, the last of them or one before another's traceback.
+GUARD = re.compile(r"^repro\.errors\.(\w+: .*)$(?=\n?\Z|\n.*Traceback )", re.M)
 #: No case takes a tenth of this; a mutant may make one run for ever.
 LONGEST = 600.0
 
@@ -239,8 +241,8 @@ def examine(id: str) -> None:
 def judged(result: Result) -> tuple[bool, str]:
     """(caught, how) of a case that has run with a mutant."""
     if result.error:
-        kind, _, message = result.error.strip().splitlines()[-1].partition(": ")
-        return kind.startswith("repro.errors."), f"{kind.rpartition('.')[2]}: {message}"
+        guard = GUARD.search(result.error)
+        return bool(guard), guard[1] if guard else result.error.strip().splitlines()[-1]
     short = [part for part in result.outcome.measured if not part.holds]
     if not short:
         return False, "passes"
