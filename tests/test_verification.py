@@ -7,10 +7,23 @@ import numpy as np
 import pytest
 
 from reference import channel_bvp, channel_fipy, taylor_hood
+from repro.errors import LinearError
 from repro.fem.space import Space
-from verification.kernel import case, driver, matrix, report
-from verification.kernel.case import Check, Outcome, Result, Study, at_least, at_most, between, study
-from verification.problems import meshes, norms
+from verification.kernel import case, driver, matrix, mutants, report
+from verification.kernel.case import (
+    Check,
+    Outcome,
+    Result,
+    Study,
+    at_least,
+    at_most,
+    between,
+    combined,
+    refine,
+    studies,
+    study,
+)
+from verification.problems import meshes
 
 SIZES = 0.5 ** np.arange(4)
 
@@ -103,6 +116,51 @@ def test_a_case_is_called_for_each_of_its_variants_whose_label_ends_its_names():
     assert [part.title for part in found.profiles] == ["picture, one", "picture, one", "picture, two", "picture, two"]
 
 
+def test_a_variant_that_stops_hides_no_other_and_is_named():
+    def reciprocal(value):
+        yield at_most("q", 1 / value, 1.0, "")
+
+    chosen = case.Case("x", "flow", "c", "exact", "n", ("m",), False, reciprocal,
+                       {"none": (0,), "two": (2,), "half": (0.5,), "also none": (0,)})
+    found = case.run(chosen)
+    assert [(part.quantity, part.holds) for part in found.outcome.checks] == [("q, two", True), ("q, half", False)]
+    assert found.error.startswith("none: Traceback") and "\nalso none: Traceback" in found.error
+    assert found.error.count("ZeroDivisionError") == 2 and not found.holds
+
+
+@pytest.mark.parametrize("errors, caught, how", [
+    ((LinearError("no flow"), ValueError("x")), True, "LinearError: no flow"),
+    ((ValueError("x"), LinearError("no flow")), True, "LinearError: no flow"),
+    ((ValueError("x"), KeyError("y")), False, "KeyError: 'y'"),
+])
+def test_a_guard_that_stops_any_variant_catches_a_mutant(errors, caught, how):
+    def stopped(error):
+        raise error
+
+    chosen = case.Case("x", "flow", "c", "exact", "n", ("m",), False, stopped, {str(e): (e,) for e in errors})
+    assert mutants.judged(case.run(chosen)) == (caught, how)
+
+
+def test_what_a_case_runs_over_is_every_combination_with_its_label():
+    found = combined({"order 2": 2, "order 3": 3}, {"lambda = 1": 1.0})
+    assert found == {"order 2, lambda = 1": (2, 1.0), "order 3, lambda = 1": (3, 1.0)}
+
+
+def test_errors_of_unrelated_meshes_are_averaged_and_studied_by_their_own_size():
+    """Root mean squares of what every mesh of a size gives; nominal sizes where none are measured."""
+    errors = refine(lambda size, mesh, factor: {"error": factor * size * (1 + 6 * mesh)}, {2.0: 2, 1.0: 1}, 3.0)
+    assert errors["size"].tolist() == [2.0, 1.0] and errors["error"].tolist() == [30.0, 3.0]
+    measured = refine(lambda size, mesh: {"size": size + mesh, "error": 1.0}, {4.0: 1, 1.0: 2})
+    assert measured["size"] == pytest.approx([4.0, np.sqrt(2.5)])
+
+
+def test_studies_are_rows_of_a_table():
+    errors = {"size": SIZES, "a": SIZES**2, "b": SIZES**1.2, "c": SIZES}
+    found = studies(errors, {"a": (2, "theory", 0.02), "b": ((1.0, 1.1), "seen", 1.0)}, " of all")
+    assert [(one.quantity, one.low, one.high, one.ceiling, one.origin, one.holds) for one in found] == [
+        ("a of all", 1.7, 2.3, 0.02, "theory", True), ("b of all", 1.0, 1.1, 1.0, "seen", False)]
+
+
 @pytest.mark.parametrize("labels, more, ways", [
     (("linear", "cubic"), "", ("1", "3")), (("order 2, traction",), "", ("2",)),
     (("straight", "curved"), "3", ("1", "2", "3")), (("R = 5 um, quadratic",), "paper", ("2", "paper")),
@@ -117,7 +175,8 @@ def test_a_way_that_is_none_is_refused():
         case._ways("x", (), "4")
 
 
-@pytest.mark.parametrize("id", ["flow-sections", "growth-homogeneous", "reprojection-mass", "coupling-stiffness"])
+@pytest.mark.parametrize("id", ["flow-sections", "transport-mean-biomass", "growth-homogeneous", "reprojection-mass",
+                                "coupling-stiffness"])
 def test_a_case_runs_with_the_orders_that_it_says(id, monkeypatch):
     driver.load()
     orders, made = set(), Space.__init__
@@ -229,8 +288,8 @@ def test_random_meshes_cover_their_rectangle_and_follow_their_lines():
     grid = meshes.channel((-10.0, 20.0), 8.0, 1.1, lambda x, y: (x > 0) & (y < 3), across=(0.0,), along=(3.0,), seed=3)
     assert grid.areas.min() > 0 and grid.areas.sum() == pytest.approx(240.0, rel=1e-13)
     assert grid.areas[grid.biomass].sum() == pytest.approx(60.0, rel=1e-13)
-    assert norms.l2_error(grid.points, grid.triangles, grid.points[:, 0], lambda x, y: x) < 1e-14
-    assert norms.sample(grid.points, grid.triangles, grid.points, np.array([[1.5, 2.5]])) == pytest.approx(
+    assert meshes.l2_error(grid.points, grid.triangles, grid.points[:, 0], lambda x, y: x) < 1e-14
+    assert meshes.sample(grid.points, grid.triangles, grid.points, np.array([[1.5, 2.5]])) == pytest.approx(
         np.array([[1.5, 2.5]]))
 
 

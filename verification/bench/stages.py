@@ -23,7 +23,7 @@ from repro.model.contact import constrained
 from repro.model.kinetics import Sink
 from repro.scene import parse_scene
 from verification.bench.record import measured
-from verification.problems import meshes, norms
+from verification.problems import meshes
 
 WIDTH, LENGTH, RADIUS, RATIO = 50.0, 600.0, 40.0, 2000.0
 PAPER = "linear elements (paper)"
@@ -363,7 +363,7 @@ def _total() -> float:
 def _linear(size: float, count: int, project):
     return _carried(count, partial(_transfer_meshed, size), lambda mesh: mesh[0],
                     lambda old, field, new: project(*old, field, *new), lambda mesh, field: _integral(*mesh, field),
-                    lambda mesh, field: norms.l2_error(*mesh, field[:, 0], transfer_exact))
+                    lambda mesh, field: meshes.l2_error(*mesh, field[:, 0], transfer_exact))
 
 
 def _quadratic(size: float, count: int):
@@ -390,7 +390,7 @@ def _carried(count: int, meshed, points, carry, weighed, error):
 
 
 def _integral(points, triangles, field) -> float:
-    _, weight, shape = norms.quadrature(points, triangles)
+    _, weight, shape = meshes.quadrature(points, triangles)
     return float(np.sum(weight * (field[triangles, 0] @ shape.T)))
 
 

@@ -29,7 +29,7 @@ from repro.model import flow, pore
 from repro.scene import Scene
 from verification.coupling import PRESETS, every
 from verification.kernel.case import Profile, at_least, at_most, between, case, study
-from verification.problems import averaged, runs
+from verification.problems import runs
 
 TIMES = (2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0, 19.4)
 #: Radii (um) at which Taylor-Hood elements give a half-disc's loss, and the reach of their meshes beyond it.
@@ -45,7 +45,7 @@ RADII, REACH = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 33.0), 75.0
       over=PRESETS, ways="1 2")
 def base(*changes: str):
     scene = runs.base("19.4 h", *changes, times=", ".join(f'"{time} h"' for time in TIMES))
-    instants = averaged.ours(scene)
+    instants = runs.ours(scene)
     thin, own = _clogged(changes[0])
     flow, rest = (_apart(scene, instants, moments) for moments in (thin, own))
     checks = [between("velocity, lubrication", flow["velocity"], 0.09, 0.12,
@@ -58,26 +58,26 @@ def base(*changes: str):
                               "linear elements: 0.3 % at the ends of the mesh, 0.5 % around the aggregate"))
     checks += [at_most(f"{name}, a half-disc's loss", rest[name], bound, SQUARE_LAW)
                for name, bound in (("area", 0.013), ("effluents", 0.02), ("C along the pore", 0.02))]
-    return checks, _histories(scene, instants, thin, own), averaged.profiles(instants[5::2], own[5::2])
+    return checks, _histories(scene, instants, thin, own), runs.profiles(instants[5::2], own[5::2])
 
 
 def _apart(scene, instants, moments) -> dict[str, float]:
     """The largest of each difference at the reported times."""
-    return averaged.worst([averaged.apart(scene, *pair) for pair in zip(instants, moments)])
+    return runs.worst([runs.apart(scene, *pair) for pair in zip(instants, moments)])
 
 
 @cache
 def _clogged(preset: str) -> tuple[list, list]:
     """The averaged pore's moments at TIMES under both losses, from the seed of a preset."""
     scene = runs.base("19.4 h", preset)
-    thin, own = (averaged.half_disc(scene, speed).run(TIMES) for speed in speeds(scene))
+    thin, own = (runs.half_disc(scene, speed).run(TIMES) for speed in speeds(scene))
     return thin, own
 
 
 def _at_our_area(scene, instants) -> float:
     """Largest relative difference of the velocity from that under the loss of a half-disc of the same area."""
     _, own = speeds(scene)
-    ours = [(instant.solved.flow.mean_velocity, averaged.half_disc_radius(instant.pore.outline.area))
+    ours = [(instant.solved.flow.mean_velocity, runs.half_disc_radius(instant.pore.outline.area))
             for instant in instants]
     return max(abs(speed / own(None, radius) - 1) for speed, radius in ours)
 
@@ -108,7 +108,7 @@ def half_disc_loss(width: float, length: float, ratio: float) -> CubicSpline:
 def _histories(scene, instants, thin, own) -> list[Profile]:
     """Velocity, acceptor leaving and area against time."""
     rows, times = [results.row(scene, instant) for instant in instants], np.array(TIMES)
-    quantities = (("velocity (m/d)", "mean_velocity_m_per_d", lambda m: averaged.M_PER_D * m.velocity),
+    quantities = (("velocity (m/d)", "mean_velocity_m_per_d", lambda m: runs.M_PER_D * m.velocity),
                   ("acceptor leaving (mg/L)", "effluent_acceptor_mg_per_L", lambda m: m.fields[0, -1]),
                   ("area (um2)", "aggregate_area_um2", lambda m: m.area))
     return [Profile(label, "time (h)", label, (
@@ -159,9 +159,9 @@ def _leaving(scene, factor: float):
     scene = runs.with_diffusivities(scene, lambda water, _: (factor * water, factor * water))
     row = results.row(scene, next(simulate(scene)))
     ours = [row["effluent_acceptor_mg_per_L"], row["effluent_donor_mg_per_L"]]
-    reference = averaged.half_disc(scene).seed()
-    radius = averaged.half_disc_radius(row["aggregate_area_um2"])
-    return np.array(ours), reference.fields[:, -1], averaged_pore.excess(averaged.pore_of(scene), radius, runs.SPEED)
+    reference = runs.half_disc(scene).seed()
+    radius = runs.half_disc_radius(row["aggregate_area_um2"])
+    return np.array(ours), reference.fields[:, -1], averaged_pore.excess(runs.pore_of(scene), radius, runs.SPEED)
 
 
 SLOWER = (8.0, 16.0, 32.0, 64.0)
@@ -202,9 +202,9 @@ def _base(preset: str, factor: float):
 def _whole(preset: str, factor: float):
     """(largest differences, profiles) of one run."""
     scene = _base(preset, factor)
-    instants = averaged.ours(scene)
-    moments = averaged.half_disc(scene).run(MIXING_TIMES, accuracy=1e-6)
-    return _apart(scene, instants, moments), averaged.profiles(instants, moments)
+    instants = runs.ours(scene)
+    moments = runs.half_disc(scene).run(MIXING_TIMES, accuracy=1e-6)
+    return _apart(scene, instants, moments), runs.profiles(instants, moments)
 
 
 #: Refinement of our mesh, our time step (min), and cells of the averaged pore: as in the whole run, and twice as fine.
@@ -229,9 +229,9 @@ def _piece(elements: str, refinement: float, minutes: float, finer: int):
                       runs.coarser(elements, 0.45 * refinement, refinement),
                       f'growth.time_step="{minutes} min"')
     scene = runs.at_velocity(scene, runs.SPEED)
-    instants = averaged.ours(scene)
-    moments = averaged.half_disc(scene, cells=finer * averaged.CELLS, fluid=finer * averaged.FLUID).run((2.0,))
-    return averaged.apart(scene, instants[-1], moments[-1]), averaged.profiles(instants, moments)
+    instants = runs.ours(scene)
+    moments = runs.half_disc(scene, cells=finer * runs.CELLS, fluid=finer * runs.FLUID).run((2.0,))
+    return runs.apart(scene, instants[-1], moments[-1]), runs.profiles(instants, moments)
 
 
 WIDTH, THICKNESS = 20.0, 5.0
@@ -271,18 +271,18 @@ def _strip(elements: str, aspect: float):
     """Largest differences; of the ends, relative; (upstream over downstream length - 1) over the averaged one's;
     profiles."""
     given = shaped(thin_scene(elements, aspect), half_ellipse(elements, aspect))
-    area, instants = pore.seeded(given).outline.area, averaged.ours(given)
-    moments = strip_of(given, area, 2 * averaged.CELLS).run(given.output.times)
+    area, instants = pore.seeded(given).outline.area, runs.ours(given)
+    moments = strip_of(given, area, 2 * runs.CELLS).run(given.output.times)
     ends = np.array([(instants[-1].pore.outline.upstream, instants[-1].pore.outline.downstream), moments[-1].ends])
     ours, theirs = -ends[:, 0] / ends[:, 1] - 1
     return (_apart(given, instants, moments), np.abs(ends[0] / ends[1] - 1).max(), ours / theirs,
-            averaged.profiles(instants, moments))
+            runs.profiles(instants, moments))
 
 
 def strip_of(given: Scene, area: float, cells: int) -> averaged_pore.Averaged:
     """The averaged run of a strip that has the area of the meshed seed."""
     lengths, heights = averaged_pore.half_ellipse(2 * area / (np.pi * THICKNESS), THICKNESS, cells)
-    return averaged_pore.Averaged(averaged.pore_of(given), lengths, heights, 4 * cells, keeps_shape=False)
+    return averaged_pore.Averaged(runs.pore_of(given), lengths, heights, 4 * cells, keeps_shape=False)
 
 
 def half_ellipse(elements: str, aspect: float) -> np.ndarray:
@@ -372,7 +372,7 @@ def _compared(elements: str, aspect: float, now: pore.Pore, peclet: float, densi
     dense = replace(scene.kinetics, maximum_density=density * aspect**2)
     scene = runs.at_velocity(replace(scene, kinetics=dense), speed)
     now = replace(now, active=now.active * density / DENSITY)
-    x = np.linspace(*now.mesh.ends, averaged.PLACES)
+    x = np.linspace(*now.mesh.ends, runs.PLACES)
     ours = runs.section_means(now, pore.solve(scene, now), x)
     moment = strip_of(scene, now.outline.area, round(16 / aspect)).seed()
     theirs = np.stack([np.interp(x, moment.x, field) for field in moment.fields])
@@ -414,7 +414,7 @@ SUPPLIED = {"steps": {preset: (4e-4, THIELE) for preset in PRESETS},
 def supply(how: str, bound: float, origin: str, *changes: str):
     """Checks and a picture of one course of the donor's supply."""
     made = supplied(how, *changes)
-    instants = averaged.ours(made)
+    instants = runs.ours(made)
     moments = _fed(how, changes[0])
     worst = _apart(made, instants, moments)
     yield [at_most(name, worst[name], bound, origin) for name in ("area", "effluents", "C along the pore")]
@@ -432,7 +432,7 @@ def _fed(how: str, preset: str) -> list:
     """The averaged pore's moments, from the seed of a preset."""
     both = [(end, (ACCEPTOR, first), (ACCEPTOR, last)) for end, first, last in COURSES[how]]
     made = supplied(how, preset).at(0.0)
-    return averaged.half_disc(made, cells=CELLS, fluid=FLUID).run_through(both, ROWS, ACCURACY)
+    return runs.half_disc(made, cells=CELLS, fluid=FLUID).run_through(both, ROWS, ACCURACY)
 
 
 def supplied(how: str, *changes: str) -> Scene:

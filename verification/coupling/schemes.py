@@ -19,7 +19,7 @@ from repro.model import pore
 from repro.scene import load_scene
 from verification.coupling import every, kinds
 from verification.kernel.case import Profile, Study, at_most, case, study
-from verification.problems import averaged, runs
+from verification.problems import runs
 
 STEPS = (0.8, 0.4, 0.2, 0.1, 0.05)
 
@@ -114,7 +114,7 @@ def _solved(*changes: str):
     solved = pore.solve(scene, now)
     leaving = solved.fluxes
     reach = min(10 * scene.aggregate.radius, 1.5 * scene.pore.width) + scene.aggregate.radius
-    x = np.linspace(-reach, reach, averaged.PLACES)
+    x = np.linspace(-reach, reach, runs.PLACES)
     return ({"conductivity": solved.flow.conductivity, "effluent acceptor": leaving[0].effluent,
              "effluent donor": leaving[1].effluent}, x, runs.section_means(now, solved, x))
 

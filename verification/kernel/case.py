@@ -3,8 +3,9 @@
 A case is a function that gives checks (a number in an accepted range), studies (errors on at least four unrelated
 meshes or steps; orders between neighbours, judged two-sidedly: one above its band fails like one below it, as a
 surprise has to be explained before it is expected) and profiles, which are drawn. It is called once for each of the
-ways (orders of elements, presets) that it says it runs ``over``. It passes if it measures something and all of it
-holds; an exception, a not-a-number or an empty outcome is a failure.
+variants (orders of elements, presets, rows of its table) that it says it runs ``over``, and one that stops hides no
+other. It passes if it measures something and all of it holds; an exception, a not-a-number or an empty outcome is a
+failure.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from __future__ import annotations
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import product
 from math import floor, inf, isfinite, log10
 from time import perf_counter
 
@@ -180,17 +182,41 @@ class Study:
         return self.expected
 
 
+def around(order: float, band: float = BAND) -> tuple[float, float]:
+    """The lowest and the highest order that are expected about one."""
+    return order - band, order + band
+
+
 def study(quantity: str, sizes, errors, order: float, origin: str, *, ceiling: float = inf,
           band: float = BAND) -> Study:
     """A study whose orders are expected within ``band`` of ``order``."""
-    return Study(quantity, np.asarray(sizes, float), np.asarray(errors, float), order - band, order + band, origin,
-                 ceiling)
+    return Study(quantity, np.asarray(sizes, float), np.asarray(errors, float), *around(order, band), origin, ceiling)
 
 
-def refine(measure: Callable[..., dict[str, float]], sizes, *given) -> dict[str, np.ndarray]:
-    """Errors of each field on each size: ``measure(size, *given)`` gives {field: error}."""
-    rows = [measure(size, *given) for size in sizes]
+def studies(errors: Mapping[str, np.ndarray], rows: Mapping[str, tuple], told: str = "") -> list[Study]:
+    """Studies of some fields of what :func:`refine` gives, {field: (order, or the lowest and the highest; where it
+    comes from; what the last error must not exceed)}; told: what ends their names."""
+    bands = {name: row[0] if isinstance(row[0], tuple) else around(row[0]) for name, row in rows.items()}
+    return [Study(name + told, errors["size"], errors[name], *bands[name], *row[1:]) for name, row in rows.items()]
+
+
+def refine(measure: Callable[..., dict[str, float]], sizes: Iterable[float] | Mapping[float, int],
+           *given) -> dict[str, np.ndarray]:
+    """Errors (k,) of each field on each size: ``measure(size, *given)`` gives {field: error}.
+
+    sizes: {size: how many unrelated meshes of it}: root mean squares of ``measure(size, number, *given)`` over these,
+    with the "size" of each unless that is measured too.
+    """
+    if isinstance(sizes, Mapping):
+        rows = [{"size": size, **_averaged(measure, size, count, given)} for size, count in sizes.items()]
+    else:
+        rows = [measure(size, *given) for size in sizes]
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
+
+
+def _averaged(measure: Callable, size: float, count: int, given: tuple) -> dict[str, float]:
+    found = [measure(size, number, *given) for number in range(count)]
+    return {name: float(np.sqrt(np.mean([one[name] ** 2 for one in found]))) for name in found[0]}
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,6 +231,12 @@ class Profile:
     def labelled(self, label: str) -> Profile:
         """The same picture of one variant of its case."""
         return replace(self, title=f"{self.title}, {label}")
+
+
+def compared(title: str, x_label: str, y_label: str, x, ours, theirs, name: str = "exact",
+             kind: str = "exact") -> Profile:
+    """A picture of ours and of what it should be, which has a name and a kind."""
+    return Profile(title, x_label, y_label, (("ours", "ours", x, ours), (name, kind, x, theirs)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,15 +293,12 @@ class Case:
     ways: tuple[str, ...] = ()
     because: str = ""
 
-    def measure(self) -> Outcome:
-        """Run the function, for every variant, whose label then ends the names of what it has measured."""
-        if not self.over:
-            return outcome(self.function())
-        parts: list = []
-        for label, arguments in self.over.items():
-            found = outcome(self.function(*arguments))
-            parts += [part.labelled(label) for part in (*found.measured, *found.profiles)]
-        return outcome(parts)
+    def measure(self, label: str = "", *arguments) -> Outcome:
+        """What the function gives for a variant, whose label ends the names of what it has measured."""
+        found = outcome(self.function(*arguments))
+        if not label:
+            return found
+        return outcome(part.labelled(label) for part in (*found.measured, *found.profiles))
 
 
 @dataclass(frozen=True, eq=False)
@@ -293,6 +322,12 @@ class Result:
 
 
 CASES: dict[str, Case] = {}
+
+
+def combined(*axes: Mapping[str, object]) -> dict[str, tuple]:
+    """{label: arguments} of every combination of some axes {label: argument}: what a case may run ``over``."""
+    rows = [list(zip(*chosen)) for chosen in product(*(axis.items() for axis in axes))]
+    return {", ".join(labels): arguments for labels, arguments in rows}
 
 
 def case(id: str, *, claim: str, kind: str, norm: str, mutants: tuple[str, ...], slow: bool = False,
@@ -320,11 +355,13 @@ def _ways(id: str, variants: Iterable[str], more: str) -> tuple[str, ...]:
 
 
 def run(chosen: Case) -> Result:
-    """Run one case; floating-point errors raise."""
-    start = perf_counter()
-    try:
-        with np.errstate(all="raise", under="ignore"):
-            found, error = chosen.measure(), ""
-    except Exception:
-        found, error = Outcome(), traceback.format_exc(limit=-3)
-    return Result(chosen.id, found, error, perf_counter() - start)
+    """Run every variant of a case, whether others stop or not; floating-point errors raise."""
+    start, found, errors = perf_counter(), [], []
+    for label, arguments in (chosen.over or {"": ()}).items():
+        try:
+            with np.errstate(all="raise", under="ignore"):
+                found.append(chosen.measure(label, *arguments))
+        except Exception:
+            errors.append(f"{label}{': ' * bool(label)}{traceback.format_exc(limit=-3)}")
+    whole = found[0] if len(found) == 1 else outcome((*one.measured, *one.profiles) for one in found)
+    return Result(chosen.id, whole, "".join(errors), perf_counter() - start)

@@ -81,6 +81,8 @@ CATCHERS = ("cases", "tests")
 #: A line of the summary of pytest, and how it begins where it is a catch: an assertion, `pytest.raises`, a guard.
 FAILED = re.compile(r"^(?:FAILED|ERROR) .*? - (.*)$", re.M)
 CATCH = ("assert", "AssertionError", "Failed: ", "repro.")
+#: The guard that stops a variant of a case, the last of them or one before another's traceback.
+GUARD = re.compile(r"^repro\.errors\.(\w+: .*)$(?=\n?\Z|\n.*Traceback )", re.M)
 #: No case takes a tenth of this; a mutant may make one run for ever.
 LONGEST = 600.0
 
@@ -197,12 +199,9 @@ def copy(mutant: Mutant, folder: Path) -> None:
 
 def trial(folder: Path, case: str) -> Trial:
     """Run one case in the copy, in a process of its own."""
-    command = [sys.executable, "-c", f"from verification.kernel import mutants; mutants.examine({case!r})"]
-    try:
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=LONGEST,
-                              env={**os.environ, "PYTHONPATH": str(folder)})
-    except subprocess.TimeoutExpired:
-        return Trial(case, False, f"not done after {LONGEST:g} s")
+    done = _run(folder, "-c", f"from verification.kernel import mutants; mutants.examine({case!r})")
+    if isinstance(done, str):
+        return Trial(case, False, done)
     if done.returncode:
         return Trial(case, False, "broken: " + (done.stderr.strip().splitlines() or ["no message"])[-1])
     return Trial(case, *json.loads(done.stdout.splitlines()[-1]))
@@ -210,18 +209,22 @@ def trial(folder: Path, case: str) -> Trial:
 
 def tested(folder: Path, test: str) -> Trial:
     """Run one test in the copy, in a process of its own."""
-    command = [sys.executable, "-m", "pytest", "-x", "-p", "no:cacheprovider", "-rfE", test]
-    try:
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=LONGEST,
-                              env={**os.environ, "PYTHONPATH": str(folder), "COLUMNS": "500"})
-    except subprocess.TimeoutExpired:
-        return Trial(test, False, f"not done after {LONGEST:g} s")
-    if done.returncode == 0:
-        return Trial(test, False, "passes")
+    done = _run(folder, "-m", "pytest", "-x", "-p", "no:cacheprovider", "-rfE", test)
+    if isinstance(done, str) or done.returncode == 0:
+        return Trial(test, False, done if isinstance(done, str) else "passes")
     found = FAILED.search(done.stdout)
     why = found[1] if found else (done.stdout + done.stderr).strip().splitlines()[-1]
     caught = done.returncode == 1 and why.startswith(CATCH)
     return Trial(test, caught, why if caught else f"broken: {why}")
+
+
+def _run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str] | str:
+    """Python in the copy; that it was not done in time."""
+    try:
+        return subprocess.run([sys.executable, *arguments], cwd=folder, capture_output=True, text=True,
+                              timeout=LONGEST, env={**os.environ, "PYTHONPATH": str(folder), "COLUMNS": "500"})
+    except subprocess.TimeoutExpired:
+        return f"not done after {LONGEST:g} s"
 
 
 def examine(id: str) -> None:
@@ -238,8 +241,8 @@ def examine(id: str) -> None:
 def judged(result: Result) -> tuple[bool, str]:
     """(caught, how) of a case that has run with a mutant."""
     if result.error:
-        kind, _, message = result.error.strip().splitlines()[-1].partition(": ")
-        return kind.startswith("repro.errors."), f"{kind.rpartition('.')[2]}: {message}"
+        guard = GUARD.search(result.error)
+        return bool(guard), guard[1] if guard else result.error.strip().splitlines()[-1]
     short = [part for part in result.outcome.measured if not part.holds]
     if not short:
         return False, "passes"

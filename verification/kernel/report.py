@@ -2,7 +2,8 @@
 
 What is committed (``REPORT.md``, a page a stage, ``mutants.md``, ``matrix.md``) holds verdicts, orders and accepted
 ranges, and numbers to half of their tolerance: a run on another machine writes the same files. Digits and times are in
-``live/`` and on the pages, which are not committed.
+``live/`` and on the pages, which are not committed. Pictures of a case: errors against size with a slope triangle;
+profiles, ours solid, reference dashed, exact dots.
 """
 
 from __future__ import annotations
@@ -10,11 +11,15 @@ from __future__ import annotations
 import json
 import platform
 import shutil
+from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 
-from verification.kernel import matrix, mutants, pictures
-from verification.kernel.case import CASES, STAGES, WAYS, Outcome, Result
+import matplotlib
+import numpy as np
+
+from verification.kernel import matrix, mutants
+from verification.kernel.case import CASES, STAGES, WAYS, Outcome, Profile, Result, Study
 from verification.kernel.writing import Block, Link, markdown, page, table
 
 FOLDER = Path(__file__).parents[1] / "report"
@@ -26,7 +31,14 @@ INTRODUCTION = (
     "or with what must be conserved. Verdicts follow from the numbers; orders are judged two-sidedly, between "
     "neighbours of a series of unrelated meshes. Each case names changes of the code (mutants) with which it must fall "
     "short; `make mutants` runs each of these until a case catches it, and those that tests must catch against these.")
+#: How curves are drawn, and how many panels side by side.
+STYLES = {"ours": {"ls": "-"}, "reference": {"ls": "--", "color": "k"},
+          "exact": {"ls": "", "marker": ".", "ms": 4, "color": "0.35"},
+          "points": {"ls": "", "marker": ".", "ms": 2}}
+COLUMNS = 3
 PACKAGES = ("numpy", "scipy", "scikit-fem", "shapely", "mmgpy", "fipy", "py-pde", "matplotlib")
+
+matplotlib.use("Agg")
 
 
 def terminal(results: list[Result]) -> str:
@@ -58,7 +70,7 @@ def write(results: list[Result], folder: Path = FOLDER) -> Path:
 def texts(results: list[Result]) -> dict[str, str]:
     """What is committed: {file: Markdown}."""
     found = {"REPORT.md": ("Verification", index(results)), "mutants.md": ("Mutants", mutant_blocks()),
-             "matrix.md": ("What is verified by what, with which elements and presets", matrix.blocks())}
+             "matrix.md": (matrix.TITLE, matrix.blocks())}
     for stage, chosen in by_stage(results):
         parts = [Block("text", summary(chosen)), *(block for result in chosen for block in article(result))]
         found[f"{stage}.md"] = TITLES[stage], parts
@@ -127,7 +139,7 @@ def article(result: Result) -> list[Block]:
     rows = [(p.quantity, p.measured, p.expected, p.origin, _word(p.holds)) for p in result.outcome.measured]
     return [*blocks, *judged(result.outcome),
             table(("quantity", "measured", "expected", "origin", "holds"), rows, detail=True),
-            *(Block("picture", f"pictures/{name}", detail=True) for name in pictures.names(result))]
+            *(Block("picture", f"pictures/{name}", detail=True) for name in pictures(result))]
 
 
 def judged(found: Outcome) -> list[Block]:
@@ -150,6 +162,59 @@ def shared(names: list[str]) -> str:
 
 def _word(holds: bool) -> str:
     return "yes" if holds else "NO"
+
+
+def pictures(result: Result) -> dict[str, tuple[Callable, tuple]]:
+    """{file name: (what draws a panel, a part for each)} of a case."""
+    kinds = {"orders": (_study, result.outcome.studies), "profiles": (_profile, result.outcome.profiles)}
+    return {f"{result.id}-{kind}.svg": found for kind, found in kinds.items() if found[1]}
+
+
+def draw(result: Result, folder: Path) -> None:
+    """Draw all of them."""
+    from matplotlib import pyplot
+    with np.errstate(all="ignore"):
+        for name, (panel, parts) in pictures(result).items():
+            figure, axes = _panels(pyplot, len(parts))
+            for axis, part in zip(axes, parts):
+                panel(axis, part)
+            figure.savefig(folder / name)
+            pyplot.close(figure)
+
+
+def _panels(pyplot, count: int):
+    """A figure with ``count`` axes; the rest of the grid hidden."""
+    columns = min(COLUMNS, count)
+    rows = -(-count // columns)
+    figure, grid = pyplot.subplots(rows, columns, figsize=(3.9 * columns, 3.1 * rows), layout="constrained",
+                                   squeeze=False)
+    for axis in grid.ravel()[count:]:
+        axis.axis("off")
+    return figure, grid.ravel()[:count]
+
+
+def _study(axis, study: Study) -> None:
+    axis.loglog(study.sizes, study.errors, "o-", ms=4)
+    order = (study.low + study.high) / 2
+    x = study.sizes[-1] * np.array([1.0, 1.6])
+    y = 0.5 * study.errors[-1] * (x / x[0]) ** order
+    axis.loglog([x[0], x[1], x[1], x[0]], [y[0], y[0], y[1], y[0]], "k-", lw=0.8)
+    axis.text(x[1] * 1.03, np.sqrt(y[0] * y[1]), f"{order:.3g}", fontsize=8, va="center")
+    _labelled(axis, study.quantity, "size of element or step", "error")
+
+
+def _profile(axis, profile: Profile) -> None:
+    for name, kind, x, y in profile.curves:
+        axis.plot(x, y, label=name, **STYLES[kind])
+    _labelled(axis, profile.title, profile.x_label, profile.y_label)
+    axis.legend(fontsize=6)
+
+
+def _labelled(axis, title: str, x_label: str, y_label: str) -> None:
+    axis.set_title(title, fontsize=9)
+    axis.set_xlabel(x_label, fontsize=8)
+    axis.set_ylabel(y_label, fontsize=8)
+    axis.tick_params(labelsize=7, which="both")
 
 
 def mutant_rows() -> list[tuple[str, str, str, str]]:
@@ -187,7 +252,7 @@ def _write_pages(results: list[Result], folder: Path) -> Path:
     shutil.rmtree(folder / "pictures", ignore_errors=True)
     (folder / "pictures").mkdir(parents=True)
     for result in results:
-        pictures.draw(result, folder / "pictures")
+        draw(result, folder / "pictures")
     about, back = Block("text", environment()), table((Link("All cases", "index"),), ())
     found = {stage: (TITLES[stage], [back, *(block for result in chosen for block in article(result))])
              for stage, chosen in by_stage(results)}

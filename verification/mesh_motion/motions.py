@@ -22,7 +22,7 @@ from repro.fem.sizing import ACROSS_AGGREGATE, Sizing
 from repro.fem.space import Space
 from repro.model import mesh_motion
 from verification.kernel.case import Outcome, Profile, at_least, at_most, case, refine, study
-from verification.problems import meshes, norms
+from verification.problems import meshes
 
 #: gamma of (35) and c of the stabilisation as scenes have them, and the gammas that cases compare (E13).
 GAMMA, STABILISATION = 1.0, 100.0
@@ -39,7 +39,7 @@ def moved(grid: Mesh, points: np.ndarray, gamma: float = GAMMA) -> np.ndarray:
 
 def sample(grid: Mesh, field: np.ndarray, where: np.ndarray) -> np.ndarray:
     """A field (N, m) at the mesh's own nodes, at points (K, 2)."""
-    return norms.field_at(Space(grid, grid.geometry), field, where)
+    return meshes.field_at(Space(grid, grid.geometry), field, where)
 
 
 WIDTH, ENDS, HALF = 30.0, (-60.0, 60.0), 20.0
@@ -137,7 +137,7 @@ def _wave_error(size: float, gamma: float, geometry: int) -> dict[str, float]:
     errors = []
     for seed in SEEDS:
         grid = _bent(size, 10 * seed + round(size), geometry)
-        errors.append(norms.field_error(Space(grid, geometry), _waved(grid, gamma), lambda x, y: _wave(x, y, gamma),
+        errors.append(meshes.field_error(Space(grid, geometry), _waved(grid, gamma), lambda x, y: _wave(x, y, gamma),
                                         ~grid.biomass))
     return {"displacement": float(np.mean(errors))}
 
@@ -196,7 +196,8 @@ def _compared(geometry: int, contact: float, levels, motion: str, gamma: float, 
     """The study of one motion."""
     grids = [_segment(contact, refinement, geometry) for refinement, _ in levels]
     errors = [_apart(grid, contact, parts, gamma, motion) for grid, (_, parts) in zip(grids, levels)]
-    return study(f"{name}gamma = {gamma:g}", [norms.mean_size(grid) for grid in grids], errors, order, f"{why}; {BOTH}",
+    sizes = [meshes.mean_size(grid) for grid in grids]
+    return study(f"{name}gamma = {gamma:g}", sizes, errors, order, f"{why}; {BOTH}",
                  ceiling=1e-3)
 
 
@@ -309,7 +310,7 @@ def _kept(name: str, first: Mesh, last: Mesh) -> list:
 
 def _area(grid: Mesh) -> float:
     """Of all triangles, bent edges included, um2."""
-    return float(norms.fine(Space(grid, grid.geometry))[1].sum())
+    return float(meshes.fine(Space(grid, grid.geometry))[1].sum())
 
 
 STRIDES = (0.08, 0.04, 0.02, 0.01)

@@ -22,6 +22,7 @@ from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.fem.space import Space
 from repro.model import growth, pore
 from verification.problems import meshes
+from verification.problems.meshes import relative
 
 #: Radius of the half-discs (um), and the factor by which theta is raised at a time.
 RADIUS, FACTOR = 20.0, 1.5
@@ -202,7 +203,7 @@ def place_error(held: Supported, position: np.ndarray, exact: Callable) -> float
     """L2 over the body at t = 0 of places (n, 2) less exact(X, Y) (..., 2), over that of exact."""
     where, weight, of = integrated(held)
     truth = exact(*where)
-    return relative(np.einsum("qa,tai->tqi", of.values, position[held.cells]), truth, weight[..., None])
+    return relative(np.einsum("qa,tai->tqi", of.values, position[held.cells]), truth, weight)
 
 
 def pressure_error(held: Supported, pressure: np.ndarray, exact: Callable, chosen=slice(None)) -> float:
@@ -210,11 +211,6 @@ def pressure_error(held: Supported, pressure: np.ndarray, exact: Callable, chose
     where, weight, of = integrated(held)
     found = pressure[held.cells[:, :3]] @ of.linear.T
     return relative(found[chosen], exact(*where[:, chosen]), weight[chosen])
-
-
-def relative(values: np.ndarray, exact: np.ndarray, weight: np.ndarray) -> float:
-    """L2 of values less exact over that of exact."""
-    return float(np.sqrt(np.sum(weight * (values - exact) ** 2) / np.sum(weight * exact**2)))
 
 
 def equilibrium(held: Supported, theta: np.ndarray, forces: np.ndarray, start: np.ndarray) -> growth.Equilibrium:

@@ -1,23 +1,32 @@
-"""What the one-dimensional cases share: narrow channels, meshed at random, with biomass from wall to wall in a slab.
+"""Problems that are simpler than the paper's: narrow channels for substrates, boxes for flow.
+
+What the one-dimensional cases share: narrow channels, meshed at random, with biomass from wall to wall in a slab.
 
 Their references know nothing of y. Each size has several unrelated meshes, whose errors are averaged: in a channel of a
 few elements' width those of a single mesh scatter by a factor of 2. Linear concentrations are on straight triangles,
 those of order 2 and 3 on curved ones, as in the package's own runs.
+
+Boxes: Stokes flow with the exact velocity prescribed all around, for exact solutions without inlet and outlet. The
+element matrices of every form and order, the stabilisation, the assembly and the solver are those of ``repro``; only
+the boundary conditions of :mod:`repro.model.flow` are replaced, and a force may act. One pressure is prescribed in the
+place of the constant that the velocity leaves open, and the mean of the pressure is not compared.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 
-from repro.fem import elements, transfer
+from repro.fem.assembly import ElementSystem, saddle_system
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
 from repro.model import flow, transport
 from repro.model.kinetics import Sink
 from repro.scene import load_scene
+from verification.kernel.case import Profile, compared
 from verification.problems import meshes
 
 SCENE = load_scene("base")
@@ -28,13 +37,12 @@ CROSSED, FILM = (-20.0, 60.0), 20.0
 #: The same with more fluid at both ends, for order 2 and 3.
 WIDE = (-40.0, 80.0)
 #: Sizes of elements (um), and how many meshes of each: the coarse ones cost nothing and scatter most.
-SIZES = (4.0, 2.0, 1.0, 0.5)
 SAMPLES = {4.0: 12, 2.0: 6, 1.0: 3, 0.5: 1}
+FINEST = min(SAMPLES)
 SECOND = "linear elements, lumped reaction: second order"
-ORDERS = (1, 2, 3)
 WORDS = {1: "linear", 2: "quadratic", 3: "cubic"}
 #: Every order, by its word.
-EVERY = {word: (order,) for order, word in WORDS.items()}
+ORDERS = {word: order for order, word in WORDS.items()}
 #: Of concentrations of an order in L2, and why; of what leaves or is taken up, twice the order of the gradient.
 EXPECTED = {1: (2, SECOND), 2: (3, "quadratic elements: third order in L2"),
             3: (4, "cubic elements: fourth order in L2")}
@@ -131,6 +139,11 @@ def speed_of(peclet: float) -> float:
     return peclet * SCENE.substrates.acceptor.diffusivity / SLAB
 
 
+def length(space: Space, size: float) -> float:
+    """What errors are studied by: the nominal size of linear elements, the mean one of others."""
+    return size if space.order == 1 else meshes.mean_size(space.mesh)
+
+
 def both(state: transport.Concentrations) -> np.ndarray:
     """(2, n) C_A and C_D."""
     return np.stack([state.acceptor, state.donor])
@@ -138,9 +151,7 @@ def both(state: transport.Concentrations) -> np.ndarray:
 
 def in_points(space: Space) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Where errors are integrated: places (T, q, 2) um, weights (T, q) um2 and functions (q, k)."""
-    of = elements.table(space.order, space.mesh.geometry, DEGREES[space.order])
-    nodes = space.mesh.points[space.mesh.cells]
-    return np.einsum("qg,tgi->tqi", of.shape, nodes), elements.weights(nodes, of), of.values
+    return meshes.fine(space, degree=DEGREES[space.order])
 
 
 def apart(space: Space, fields: np.ndarray, exact) -> tuple[np.ndarray, np.ndarray]:
@@ -153,31 +164,23 @@ def apart(space: Space, fields: np.ndarray, exact) -> tuple[np.ndarray, np.ndarr
 
 def relative(space: Space, field: np.ndarray, exact) -> float:
     """L2 over the mesh of one field (n,) less exact(x) over that of exact."""
-    gap, size = apart(space, field[None], lambda x, y: exact(x)[None])
-    return float(gap[0] / size[0])
+    return float(distance(space, field[None], lambda x: exact(x)[None])[0])
 
 
 def distance(space: Space, fields: np.ndarray, exact) -> np.ndarray:
-    """(2,) L2 over the mesh of fields (2, n) less exact(x) (2, ...), acceptor and donor, over that of exact."""
+    """(m,) L2 over the mesh of fields (m, n) less exact(x) (m, ...) over that of exact."""
     gap, size = apart(space, fields, lambda x, y: exact(x))
     return gap / size
 
 
-def averaged(measure, size: float, *given, samples=SAMPLES) -> dict[str, float]:
-    """Root mean square of what ``measure(size, sample, *given)`` gives on each mesh of a size, name by name."""
-    rows = [measure(size, sample, *given) for sample in range(samples[size])]
-    return {name: float(np.sqrt(np.mean([row[name] ** 2 for row in rows]))) for name in rows[0]}
-
-
 def sample(space: Space, fields: np.ndarray, where: np.ndarray) -> np.ndarray:
     """(m, K) fields (m, n) at places (K, 2)."""
-    at = transfer.located(space.mesh.points, space.mesh.cells, where)
-    return at.field(fields.T, space.cells, space.order).T
+    return meshes.field_at(space, fields.T, where).T
 
 
-def along(space: Space, field: np.ndarray, x) -> np.ndarray:
-    """A field (n,) along the middle of the channel."""
-    return sample(space, field[None], np.column_stack([x, np.full(len(x), WIDTH / 2)]))[0]
+def along(space: Space, fields: np.ndarray, x) -> np.ndarray:
+    """(K,) or (m, K) a field (n,), or fields (m, n), along the middle of the channel."""
+    return meshes.field_at(space, fields.T, np.column_stack([x, np.full(len(x), WIDTH / 2)])).T
 
 
 def at_heights(space: Space, fields: np.ndarray, x, heights: int = 5) -> np.ndarray:
@@ -185,3 +188,106 @@ def at_heights(space: Space, fields: np.ndarray, x, heights: int = 5) -> np.ndar
     y = WIDTH * (np.arange(heights) + 0.5) / heights
     where = np.column_stack([np.tile(x, heights), np.repeat(y, len(x))])
     return sample(space, fields, where).reshape(2, heights, -1)
+
+
+def pictured(title: str, x_label: str, x: np.ndarray, ours: np.ndarray, *others) -> Profile:
+    """Both substrates: ours (2, n) at x, and of others (name, kind, x, C (2, m))."""
+    curves = []
+    for k, name in enumerate(NAMES):
+        curves += [(name, "ours", x, ours[k]), *((f"{name}, {other}", kind, at, theirs[k])
+                                                 for other, kind, at, theirs in others)]
+    return Profile(title, x_label, "C (mg/L)", tuple(curves))
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """Viscosity ratio, form of the interface and order of the velocity; exact(x, y) gives (velocity (..., 2), pressure
+    (...)), force(x, y) (..., 2), all without unit."""
+
+    ratio: float
+    interface: str
+    order: int
+    exact: Callable
+    force: Callable | None = None
+
+
+def box_errors(grid: Mesh, problem: Box) -> dict[str, float]:
+    """Relative L2 errors of the velocity and, without its mean, of the pressure."""
+    u, p = box_flow(grid, problem)
+    space = Space(grid, problem.order)
+    pressures = flow.pressure_space(space)
+    where, weight, shape = meshes.fine(space)
+    x, y = np.moveaxis(where, -1, 0)
+    truth, level = problem.exact(x, y)
+    found = np.einsum("qa,tai->tqi", shape, u[space.cells])
+    heads = p[pressures.cells] @ meshes.fine(pressures)[2].T
+    return {"velocity": meshes.relative(found, truth, weight),
+            "pressure": meshes.relative(_centred(heads, weight), _centred(level, weight), weight)}
+
+
+def box_profile(grid: Mesh, problem: Box, s: np.ndarray, where: np.ndarray, along: np.ndarray, x_label: str) -> Profile:
+    """The component ``along`` of the velocity at places (K, 2), drawn over s (K,)."""
+    ours = meshes.field_at(Space(grid, problem.order), box_flow(grid, problem)[0], where)
+    return compared("velocity", x_label, "its component", s, ours @ along, problem.exact(*where.T)[0] @ along)
+
+
+def _centred(values, weight):
+    return values - np.sum(weight * values) / np.sum(weight)
+
+
+def box_flow(grid: Mesh, problem: Box) -> tuple[np.ndarray, np.ndarray]:
+    """Velocity (n, 2) and pressure (m,), both at the nodes of their orders."""
+    space = Space(grid, problem.order)
+    viscosity = np.where(grid.biomass, problem.ratio, 1.0)
+    stabilised = problem.order == 1
+    mobility = flow.Stabilised().mobility(grid, viscosity, problem.interface) if stabilised else None
+    blocks = flow.stokes(space, viscosity, problem.interface, mobility)
+    system = grid.topology.system(("box", problem.order), lambda: _rim_held(space))
+    right, value = np.zeros(len(system.held)), np.zeros(len(system.held))
+    n = space.count
+    velocity, _ = problem.exact(*space.points.T)
+    value[: 2 * n] = _without_flux(space, velocity).T.ravel()
+    if problem.force is not None:
+        right[: 2 * n] = _load(space, problem.force).T.ravel()
+    solution = system.solve(blocks, right, value)
+    return solution[: 2 * n].reshape(2, n).T, solution[2 * n:]
+
+
+def _rim(space: Space) -> np.ndarray:
+    """(n,) True at the velocity's nodes on the boundary."""
+    dofs, on = space.dofs, np.zeros(space.count, bool)
+    for nodes in (dofs.walls, dofs.inlet, dofs.outlet):
+        on[nodes] = True
+    return on
+
+
+def _rim_held(space: Space) -> ElementSystem:
+    """All velocities of the rim and the first pressure prescribed."""
+    rim = _rim(space)
+    system = saddle_system(space.cells, flow.pressure_space(space).cells, np.column_stack([rim, rim]))
+    held = system.held.copy()
+    held[2 * len(rim)] = True
+    return system.holding(held)
+
+
+def _without_flux(space: Space, velocity: np.ndarray) -> np.ndarray:
+    """The rim's velocity (n, 2) less the part c (x, y), in the fluid, of what the interpolated values would pump in: a
+    discrete incompressible flow can have none. c is of the order of the interpolation's error."""
+    cells, rim, divergence = space.cells, _rim(space), flow.divergence(space)
+
+    def flux(field):
+        return np.einsum("tbi,ti->", divergence, np.concatenate([field[cells, 0], field[cells, 1]], axis=1))
+
+    values = np.where(rim[:, None], velocity, 0.0)
+    rim[cells[space.mesh.biomass]] = False
+    outwards = np.where(rim[:, None], space.points, 0.0)
+    return values - flux(values) / flux(outwards) * outwards
+
+
+def _load(space: Space, force: Callable) -> np.ndarray:
+    """(n, 2) integrals of the force times each nodal function."""
+    where, weight, shape = meshes.fine(space)
+    at = force(*np.moveaxis(where, -1, 0))
+    load = np.zeros((space.count, 2))
+    np.add.at(load, space.cells, np.einsum("tq,tqi,qa->tai", weight, at, shape))
+    return load

@@ -7,6 +7,8 @@ Random meshes whose edges follow lines or a circle between fluid and biomass, un
 
 An edge between neighbours on such a curve is Delaunay's if no other node lies in the circle around it: nodes nearer to
 the curve than CLEARANCE are left out. That no triangle lies across it is checked.
+
+Norms of the error of fields of order 1, 2 or 3 on triangles, and what they are at points.
 """
 
 from __future__ import annotations
@@ -15,8 +17,10 @@ from collections.abc import Callable
 
 import numpy as np
 from scipy.spatial import Delaunay
+from skfem import Basis, ElementTriP1, MeshTri
+from skfem.quadrature import get_quadrature_tri
 
-from repro.fem import mesher, outline, sizing
+from repro.fem import elements, mesher, outline, sizing, transfer
 from repro.fem.mesh import Mesh, curved, triangle_areas
 from repro.fem.space import Space
 
@@ -33,10 +37,15 @@ def rectangle(ends, width: float, size: float, *, across=(), along=(), seed: int
     rim = [np.column_stack([xs, np.full(len(xs), y)]) for y in y_lines]
     rim += [np.column_stack([np.full(len(ys), x), ys]) for x in x_lines]
     points = np.vstack([np.unique(np.vstack(rim), axis=0), _inside(x_lines, y_lines, size, random)])
+    return points, _triangles(points, size)
+
+
+def _triangles(points: np.ndarray, size: float) -> np.ndarray:
+    """Delaunay's, counterclockwise, without those that round-off makes flat along the rim."""
     triangles = Delaunay(points).simplices
     areas = triangle_areas(points, triangles)
     triangles[areas < 0] = triangles[areas < 0][:, ::-1]
-    return points, triangles[np.abs(areas) > 1e-9 * size**2]
+    return triangles[np.abs(areas) > 1e-9 * size**2]
 
 
 def _stations(lines: np.ndarray, size: float) -> np.ndarray:
@@ -61,8 +70,7 @@ def _inside(x_lines, y_lines, size: float, random) -> np.ndarray:
 def channel(ends, width: float, size: float, is_biomass, *, across=(), along=(), seed: int = 0) -> Mesh:
     """A straight mesh of a rectangle; ``is_biomass(x, y)`` says which triangles, by their middles, are biomass."""
     points, triangles = rectangle(ends, width, size, across=across, along=along, seed=seed)
-    middle = points[triangles].mean(axis=1)
-    return Mesh.of(points, triangles, is_biomass(*middle.T), np.empty(0, int), width, tuple(map(float, ends)))
+    return _meshed(points, triangles, is_biomass, ends, width)
 
 
 def plug(ends, width: float, half: float, size: float, make=channel, seed: int = 0) -> Mesh:
@@ -136,15 +144,16 @@ def round_disc(ends, width: float, size: float, centre, radius: float, seed: int
 
 
 def _delaunay(points, beside, size: float, is_biomass, ends, width: float, loop=()) -> Mesh:
-    """Delaunay's triangles, counterclockwise, without those that round-off makes flat along the rim; ``beside(points)``
-    (N, k) are distances from the curves, of one sign on each side. Raises ValueError where a triangle lies across."""
-    triangles = Delaunay(points).simplices
-    areas = triangle_areas(points, triangles)
-    triangles[areas < 0] = triangles[areas < 0][:, ::-1]
-    triangles = triangles[np.abs(areas) > 1e-9 * size**2]
+    """A mesh of Delaunay's triangles; ``beside(points)`` (N, k) are distances from the curves, of one sign on each
+    side. Raises ValueError where a triangle lies across."""
+    triangles = _triangles(points, size)
     sides = beside(points)[triangles]
     if ((sides.min(axis=1) < -1e-9 * size) & (sides.max(axis=1) > 1e-9 * size)).any():
         raise ValueError("a triangle lies across the curve between fluid and biomass")
+    return _meshed(points, triangles, is_biomass, ends, width, loop)
+
+
+def _meshed(points, triangles, is_biomass, ends, width: float, loop=()) -> Mesh:
     biomass = is_biomass(*points[triangles].mean(axis=1).T)
     return Mesh.of(points, triangles, biomass, np.array(loop, int), width, tuple(map(float, ends)))
 
@@ -153,3 +162,62 @@ def root_mean_square(measure: Callable[[int], dict[str, float]], draws: int) -> 
     """Each error over several random meshes of one size: ``measure(draw)`` gives {field: error}."""
     rows = [measure(draw) for draw in range(draws)]
     return {name: float(np.sqrt(np.mean([row[name] ** 2 for row in rows]))) for name in rows[0]}
+
+
+WEIGHTS = get_quadrature_tri(6)
+#: Degree of the rule for fields of any order: products of two cubic ones, and places on curved triangles.
+FINE = 10
+
+
+def quadrature(points: np.ndarray, triangles: np.ndarray):
+    """Points (t, q, 2), weights (t, q) and nodal functions (q, 3) of a rule of degree six."""
+    (s, t), weight = WEIGHTS
+    shape = np.column_stack([1 - s - t, s, t])
+    corner = points[triangles]
+    a, b = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    double = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+    return np.einsum("qa,tai->tqi", shape, corner), double[:, None] * weight, shape
+
+
+def relative(found: np.ndarray, exact: np.ndarray, weight: np.ndarray) -> float:
+    """L2 of values less exact (t, q) or (t, q, m), with weights (t, q), over that of exact."""
+    weight = weight.reshape(weight.shape + (1,) * (exact.ndim - weight.ndim))
+    return float(np.sqrt(np.sum(weight * (found - exact) ** 2) / np.sum(weight * exact**2)))
+
+
+def l2_error(points, triangles, values, exact) -> float:
+    """L2 norm of a nodal field (N,) or (N, m) less exact(x, y), over that of exact(x, y)."""
+    where, weight, shape = quadrature(points, triangles)
+    found = np.einsum("qa,ta...->tq...", shape, np.asarray(values)[triangles])
+    return relative(found, exact(where[..., 0], where[..., 1]), weight)
+
+
+def fine(space: Space, chosen=slice(None), degree: int = FINE):
+    """Points (t, q, 2) um, weights (t, q) um2 and functions (q, k) of a space, of a rule of a degree on the triangles
+    ``chosen``, straight or curved."""
+    mesh, of = space.mesh, elements.table(space.order, space.mesh.geometry, degree)
+    nodes = mesh.points[mesh.cells[chosen]]
+    return np.einsum("qa,tai->tqi", of.shape, nodes), elements.weights(nodes, of), of.values
+
+
+def field_error(space: Space, values: np.ndarray, exact, chosen=slice(None)) -> float:
+    """As :func:`l2_error` of values (count,) or (count, m) at the nodes of a space, over the triangles ``chosen``."""
+    where, weight, shape = fine(space, chosen)
+    found = np.einsum("qa,ta...->tq...", shape, values[space.cells[chosen]])
+    return relative(found, exact(where[..., 0], where[..., 1]), weight)
+
+
+def field_at(space: Space, values: np.ndarray, where: np.ndarray) -> np.ndarray:
+    """Values (count,) or (count, m) of a space at points (K, 2); those that round-off puts outside are moved in."""
+    return transfer.located(space.mesh.points, space.mesh.cells, where).field(values, space.cells, space.order)
+
+
+def sample(points, triangles, values, where) -> np.ndarray:
+    """A nodal field (N,) or (N, m) at points (K, 2) of the mesh, by scikit-fem's search for the triangle of each."""
+    weights = Basis(MeshTri(points.T.copy(), triangles.T.copy()), ElementTriP1()).probes(where.T)
+    return weights @ np.asarray(values)
+
+
+def mean_size(mesh: Mesh) -> float:
+    """Side of the square of mean triangle area twice over: the spacing of a lattice of as many nodes, um."""
+    return float(np.sqrt(2 * mesh.areas.mean()))

@@ -11,7 +11,7 @@ from skfem import ElementTriP1, ElementTriP2, ElementTriP3, MeshTri, MeshTri2
 
 from repro.fem.mesh import Mesh, triangle_areas
 from repro.fem.space import Space
-from verification.problems import meshes, norms
+from verification.problems import meshes
 
 ENDS, WIDTH = (0.0, 40.0), 25.0
 AREA = (ENDS[1] - ENDS[0]) * WIDTH
@@ -73,14 +73,14 @@ def slivers(seed: int) -> Grid:
 
 def integral(mesh: Grid, field: np.ndarray, weight=lambda x, y: 1 + 0 * x) -> float:
     """Integral of a nodal field (N,) times weight(x, y), exact where the weight is a polynomial of degree five."""
-    where, area, shape = norms.quadrature(*mesh)
+    where, area, shape = meshes.quadrature(*mesh)
     values = np.einsum("qa,ta->tq", shape, field[mesh[1]])
     return float(np.sum(area * values * weight(where[..., 0], where[..., 1])))
 
 
 def square(mesh: Grid, field: np.ndarray) -> float:
     """Integral of the square of a nodal field (N,)."""
-    _, area, shape = norms.quadrature(*mesh)
+    _, area, shape = meshes.quadrature(*mesh)
     return float(np.sum(area * np.einsum("qa,ta->tq", shape, field[mesh[1]]) ** 2))
 
 

@@ -18,7 +18,7 @@ from repro.fem.outline import FREE
 from repro.model import remeshing
 from repro.model.transport import Concentrations
 from verification.kernel.case import Outcome, Profile, at_least, at_most, case, refine, study
-from verification.problems import aggregates, norms, pairs
+from verification.problems import aggregates, meshes, pairs
 
 #: The seed's radius (um), the increase of the biomass in an update, and how many of them: the area grows eightfold.
 RADIUS, INCREASE, UPDATES = 5.0, 0.08, 27
@@ -322,7 +322,7 @@ def _errors_of_a_pair(refinement: float, old: float) -> dict[str, float]:
     """Errors after the remesh, and after the update that follows it."""
     _, new = _before_and_after(refinement, old)
     after, area = aggregates.expanded(aggregates.scene(), new, 0.0), new.mass / aggregates.DENSITY
-    return {"carried": norms.l2_error(*_body(new), _density(new), _hump), "restored": _off(after),
+    return {"carried": meshes.l2_error(*_body(new), _density(new), _hump), "restored": _off(after),
             "before": _off(new), "area": abs(after.outline.area / area - 1),
             "size": np.sqrt(2 * new.mesh.areas[new.mesh.biomass].mean())}
 
@@ -339,7 +339,7 @@ def _density(now) -> np.ndarray:
 
 def _off(now) -> float:
     """L2 of the density over X_m less one."""
-    return norms.l2_error(*_body(now), _density(now), lambda x, y: aggregates.DENSITY + 0 * x)
+    return meshes.l2_error(*_body(now), _density(now), lambda x, y: aggregates.DENSITY + 0 * x)
 
 
 def _along_the_wall() -> Profile:
@@ -347,7 +347,7 @@ def _along_the_wall() -> Profile:
     old, new = _before_and_after(1.0, 0.8)
     last, x = aggregates.expanded(aggregates.scene(), new, 0.0), np.linspace(-19.0, 19.0, 191)
     line, dots = np.column_stack([x, 0 * x + 1e-6]), x[::10]
-    curves = [(name, "ours", x, norms.sample(*_body(now), _density(now) / aggregates.DENSITY, line))
+    curves = [(name, "ours", x, meshes.sample(*_body(now), _density(now) / aggregates.DENSITY, line))
               for name, now in (("before", old), ("remeshed", new), ("updated", last))]
     return Profile("density along the wall", "x (um)", "X_A / X_m",
                    (*curves, ("exact before", "exact", dots, _hump(dots, 0 * dots) / aggregates.DENSITY),

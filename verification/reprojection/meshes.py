@@ -14,7 +14,7 @@ from repro.fem import transfer
 from repro.fem.mesh import Mesh, triangle_areas
 from repro.fem.space import Space
 from verification.kernel.case import Profile, at_least, at_most, between, case, refine, study
-from verification.problems import norms, pairs
+from verification.problems import meshes, pairs
 
 SIZES, SEEDS = (5.0, 2.5, 1.25, 0.625), range(3)
 REMESHES = 40
@@ -81,7 +81,7 @@ def _carried_errors(size: float, carry) -> dict[str, float]:
     for seed in SEEDS:
         old, new = pairs.grid(size, 2 * seed), pairs.grid(0.9 * size, 2 * seed + 1)
         found = carry(*old, smooth(*old[0].T)[:, None], *new)
-        errors.append(norms.l2_error(*new, found[:, 0], smooth))
+        errors.append(meshes.l2_error(*new, found[:, 0], smooth))
     return {"carried": float(np.mean(errors))}
 
 
@@ -90,12 +90,12 @@ def _across_the_hill() -> Profile:
     old, new = pairs.grid(5.0, 1), pairs.grid(4.0, 2)
     field, x = steep(*old[0].T)[:, None], np.linspace(*pairs.ENDS, 201)[1:-1]
     line = np.column_stack([x, 0 * x + 10.0])
-    curves = [(name, "ours", x, norms.sample(*new, carry(*old, field, *new)[:, 0], line))
+    curves = [(name, "ours", x, meshes.sample(*new, carry(*old, field, *new)[:, 0], line))
               for name, carry in CARRIERS.items()]
-    dense = norms.sample(*new, galerkin_transfer.project(*old, field, *new)[:, 0], line)
+    dense = meshes.sample(*new, galerkin_transfer.project(*old, field, *new)[:, 0], line)
     return Profile("a hill carried to another mesh", "x (um)", "field",
                    (*curves, ("dense code", "reference", x, dense),
-                    ("before", "exact", x, norms.sample(*old, field[:, 0], line))))
+                    ("before", "exact", x, meshes.sample(*old, field[:, 0], line))))
 
 
 @case("reprojection-chain", kind="property",
@@ -132,7 +132,7 @@ def _remeshed(carry, field) -> dict[str, np.ndarray]:
     values = field(*mesh[0].T)[:, None]
     for k in range(REMESHES + 1):
         rows.append((pairs.integral(mesh, values[:, 0]), pairs.square(mesh, values[:, 0]), values.min(), values.max(),
-                     norms.l2_error(*mesh, values[:, 0], field)))
+                     meshes.l2_error(*mesh, values[:, 0], field)))
         new = grids[(k + 1) % 3]
         mesh, values = new, carry(*mesh, values, *new)
     integral, square, least, largest, error = np.array(rows).T
@@ -187,7 +187,7 @@ def _linear(old: pairs.Grid, new: pairs.Grid) -> float:
 
 
 ROUND_OFF = "round-off; over eight pairs of meshes"
-#: Degree of the polynomials that the pieces must integrate: that of the rule in :mod:`verification.problems.norms`.
+#: Degree of the polynomials that the pieces must integrate: that of the rule in :mod:`verification.problems.meshes`.
 DEGREE = 6
 
 
@@ -221,7 +221,7 @@ def _pieces(old: pairs.Grid, new: pairs.Grid) -> dict[str, float]:
 
 def _polynomials(pieces: pairs.Grid) -> float:
     """Largest relative error of the integrals of monomials over the rectangle."""
-    where, weight, _ = norms.quadrature(*pieces)
+    where, weight, _ = meshes.quadrature(*pieces)
     length, errors = pairs.ENDS[1], []
     for a in range(DEGREE + 1):
         for b in range(DEGREE + 1 - a):

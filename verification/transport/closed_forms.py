@@ -1,4 +1,10 @@
-"""Substrates in slabs of biomass against closed forms: (26) with the Robin channel, and Monod's two limits at rest."""
+"""Substrates with a known answer: in slabs of biomass, and concentrations that are chosen beforehand.
+
+Slabs: (26) with the Robin channel, and Monod's two limits at rest.
+
+Chosen concentrations: the full nonlinear equations, flow that bends, D that jumps at a half-disc. The forcing, and the
+flux through the mesh's sides, are added to the operators' sources; all else is the code's.
+"""
 
 from __future__ import annotations
 
@@ -7,63 +13,94 @@ from functools import cache
 
 import numpy as np
 
-from reference import robin_channel, slab
+from reference import manufactured_transport, robin_channel, slab
+from repro.fem import elements
+from repro.fem.sizing import ACROSS_PORE
 from repro.fem.space import Space
-from repro.model import transport
+from repro.model import flow, transport
 from repro.model.kinetics import Sink
-from verification.kernel.case import BAND, Outcome, Profile, at_most, case, refine, study
-from verification.problems import norms
+from verification.kernel.case import BAND, Profile, around, at_most, case, compared, refine, studies
+from verification.problems import meshes
 from verification.problems.channels import (
     CROSSED,
     EXPECTED,
     FILM,
+    FINEST,
     FUNCTIONAL,
+    NAMES,
     SAMPLES,
     SCENE,
-    SECOND,
-    SIZES,
     SLAB,
     WIDE,
-    WIDTH,
     WORDS,
     along,
     apart,
-    averaged,
+    both,
+    carrying,
     changed,
     decay_demand,
     filled,
+    in_points,
+    length,
+    pair,
+    pictured,
     problem,
+    rates,
     relative,
+    sample,
     spaced,
     steady,
 )
+from verification.problems.channels import WIDTH as CHANNEL
 
 LARGE = 1e13
 ACCEPTOR, DONOR = SCENE.substrates.acceptor, SCENE.substrates.donor
 #: No growth: the acceptor is taken up by decay alone, d_c f_d b X m_A, whatever the donor.
 DECAY_ALONE = replace(SCENE.kinetics, maximum_utilization_rate=0.0)
 UPTAKE = 2e4
+#: Random meshes of each size over which errors are averaged: those of few triangles differ by a third.
+SIZED = {1: SAMPLES, 2: {3.2: 12, 1.6: 6, 0.8: 3, 0.4: 1}, 3: {3.2: 12, 1.6: 8, 0.8: 4, 0.4: 1}}
+#: Order, Peclet number, ends (um), and the last error of C.
+ROBIN = {"Pe = 0.1": (1, 0.1, CROSSED, 2e-4), "Pe = 1": (1, 1.0, CROSSED, 2e-4), "Pe = 10": (1, 10.0, CROSSED, 5e-5),
+         "Pe = 1, inlet 4 um from the slab": (1, 1.0, (-4.0, 60.0), 2e-4)}
+ROBIN_HIGHER = {"Pe = 0.1, quadratic": (2, 0.1, WIDE, 3e-9), "Pe = 1, quadratic": (2, 1.0, WIDE, 1.5e-8),
+                "Pe = 10, quadratic": (2, 10.0, WIDE, 1e-7), "Pe = 1, cubic": (3, 1.0, WIDE, 2e-11),
+                "Pe = 10, cubic": (3, 10.0, WIDE, 1e-9)}
+#: Where and how large the error of C leaving may be, for each order.
+LEAVING = {2: (-1, 6e-9), 3: (1, 1e-11)}
 
 
 @case("transport-robin-channel", kind="exact", norm="L2 of C over the mesh, relative; several meshes a size",
       claim="First-order uptake in a slab under plug flow follows its closed form, (26) upstream included, at Peclet "
             "0.1, 1, 10, wherever the inlet is put",
       mutants=("fluid-diffusivity", "half-of-the-advection", "no-inlet-flux", "weights-of-the-ends"),
-      ways="1", because="orders 2, 3: transport-robin-higher")
-def robin() -> Outcome:
-    studies = [study(f"C, Pe = {peclet:g}", SIZES, _robin(peclet, CROSSED), 2, SECOND, ceiling=ceiling)
-               for peclet, ceiling in ((0.1, 2e-4), (1.0, 2e-4), (10.0, 5e-5))]
-    near = study("C, Pe = 1, inlet 4 um from the slab", SIZES, _robin(1.0, (-4.0, 60.0)), 2, SECOND, ceiling=2e-4)
-    return Outcome(studies=(*studies, near), profiles=tuple(_robin_profile(peclet) for peclet in (0.1, 1.0, 10.0)))
+      over=ROBIN, ways="1", because="orders 2, 3: transport-robin-higher")
+@case("transport-robin-higher", kind="exact", slow=True,
+      norm="root mean square of C over the mesh, and C leaving, over the supply",
+      claim="Quadratic and cubic concentrations follow the closed form of first-order uptake in a slab to third and "
+            "fourth order, the inlet's (11) included, at Peclet 0.1, 1, 10 (cubic: 1, 10)",
+      mutants=("outlet-forgotten", "fluid-diffusivity", "reaction-evenly-weighted"),
+      over=ROBIN_HIGHER, because="order 1: transport-robin-channel")
+def robin(order: int, peclet: float, ends, ceiling: float):
+    errors = refine(_robin_errors, SIZED[order], order, peclet, ends)
+    yield studies(errors, {"C": (*EXPECTED[order], ceiling)})
+    if order > 1:
+        at, bound = LEAVING[order]
+        yield at_most("C leaving", errors["leaving"][at], bound, FUNCTIONAL[order][1])
+    else:
+        x, space = np.linspace(*CROSSED, 81), spaced(FINEST, 0)
+        yield _curves(x, along(space, _robin_found(space, peclet)[1].donor, x), _robin_exact(peclet)(x))
 
 
-def _robin(peclet: float, ends) -> np.ndarray:
-    return refine(lambda size: averaged(_robin_errors, size, peclet, ends), SIZES)["C"]
-
-
-def _robin_errors(size: float, sample: int, peclet: float, ends) -> dict[str, float]:
-    space, exact = spaced(size, sample, 1, ends), _robin_exact(peclet)
-    return {"C": relative(space, _robin_found(space, peclet)[1].donor, exact)}
+def _robin_errors(size: float, number: int, order: int, peclet: float, ends) -> dict[str, float]:
+    """Size of the elements; root mean square of C, over that of the exact one with linear elements, else over the
+    supply; C leaving over the supply."""
+    space, exact = spaced(size, number, order, ends), _robin_exact(peclet)
+    made, state = _robin_found(space, peclet)
+    gap, truth = apart(space, state.donor[None], lambda x, y: exact(x)[None])
+    leaving = transport.fluxes(made, Sink(filled(space, UPTAKE)), state)[1].effluent
+    return {"size": length(space, size), "C": float(gap[0] / (truth[0] if order == 1 else DONOR.supply)),
+            "leaving": abs(leaving - float(exact(SLAB))) / DONOR.supply}
 
 
 def _robin_found(space: Space, peclet: float):
@@ -83,60 +120,17 @@ def _robin_exact(peclet: float):
                                          DONOR.diffusivity_in_aggregate, UPTAKE, SLAB)
 
 
-def _robin_profile(peclet: float) -> Profile:
-    x, space = np.linspace(*CROSSED, 81), spaced(SIZES[-1], 0)
-    found = _robin_found(space, peclet)[1].donor
-    return _curves(f"Pe = {peclet:g}", x, along(space, found, x), _robin_exact(peclet)(x))
-
-
-def _curves(title: str, x, ours, exact) -> Profile:
-    return Profile(title, "x (um)", "C (mg/L)", (("ours", "ours", x, ours), ("closed form", "exact", x, exact)))
-
-
-#: Random meshes of each size over which errors are averaged: those of few triangles differ by a third.
-FEWER = {2: {3.2: 12, 1.6: 6, 0.8: 3, 0.4: 1}, 3: {3.2: 12, 1.6: 8, 0.8: 4, 0.4: 1}}
-
-
-def higher_errors(size: float, sample: int, order: int, peclet: float) -> dict[str, float]:
-    """Mean size of the elements; root mean square of C, and C leaving, both over the supply."""
-    space, exact = spaced(size, sample, order, WIDE), _robin_exact(peclet)
-    made, state = _robin_found(space, peclet)
-    gap, _ = apart(space, state.donor[None], lambda x, y: exact(x)[None])
-    leaving = transport.fluxes(made, Sink(filled(space, UPTAKE)), state)[1].effluent
-    return {"size": norms.mean_size(space.mesh), "C": float(gap[0]) / DONOR.supply,
-            "out": abs(leaving - float(exact(SLAB))) / DONOR.supply}
-
-
-def _higher(order: int, peclet: float) -> dict[str, np.ndarray]:
-    samples = FEWER[order]
-    return refine(lambda size: averaged(higher_errors, size, order, peclet, samples=samples), samples)
-
-
-#: Peclet numbers with the last error of C, where and how large that of C leaving may be, for each order.
-ROBIN = {2: (((0.1, 3e-9), (1.0, 1.5e-8), (10.0, 1e-7)), -1, 6e-9), 3: (((1.0, 2e-11), (10.0, 1e-9)), 1, 1e-11)}
-
-
-@case("transport-robin-higher", kind="exact", slow=True,
-      norm="root mean square of C over the mesh, and C leaving, over the supply",
-      claim="Quadratic and cubic concentrations follow the closed form of first-order uptake in a slab to third and "
-            "fourth order, the inlet's (11) included, at Peclet 0.1, 1, 10 (cubic: 1, 10)",
-      mutants=("outlet-forgotten", "fluid-diffusivity", "reaction-evenly-weighted"),
-      over={WORDS[order]: (order,) for order in ROBIN}, because="order 1: transport-robin-channel")
-def robin_of_higher_order(order: int):
-    peclets, at, bound = ROBIN[order]
-    for peclet, ceiling in peclets:
-        errors = _higher(order, peclet)
-        yield study(f"C, Pe = {peclet:g}", errors["size"], errors["C"], *EXPECTED[order], ceiling=ceiling)
-        yield at_most(f"C leaving, Pe = {peclet:g}", errors["out"][at], bound, FUNCTIONAL[order][1])
+def _curves(x, ours, exact) -> Profile:
+    return compared("along the channel", "x (um)", "C (mg/L)", x, ours, exact, "closed form")
 
 
 @cache
-def _at_rest(size: float, sample: int, sink: float, half_saturation: float, film: float, order: int = 1):
+def _at_rest(size: float, number: int, sink: float, half_saturation: float, film: float, order: int = 1):
     """Space, C_A and its fluxes in a slab without flow, the supply held at both ends.
 
     sink: largest uptake, d_c f_d b X (mg/L/h); half_saturation: K (mg/L).
     """
-    space = spaced(size, sample, order, (-SLAB - film, SLAB + film), (-SLAB, SLAB))
+    space = spaced(size, number, order, (-SLAB - film, SLAB + film), (-SLAB, SLAB))
     given = problem(space, None, changed("acceptor", half_saturation=half_saturation), DECAY_ALONE)
     density = sink / decay_demand(DECAY_ALONE)
     state = steady(given, density)
@@ -149,55 +143,47 @@ def _sides(film: float) -> dict[str, float]:
             "diffusivity": ACCEPTOR.diffusivity}
 
 
+def _filmed(told: str, film: float) -> str:
+    return told + (f", films of {film:g} um" if film else "")
+
+
 #: Thiele's modulus, film (um), and the last errors of C and of what is taken up, for each order.
 THIELE = {1: ((0.1, 0.0, 3e-7, 3e-7), (1.0, 0.0, 4e-5, 4e-5), (10.0, 0.0, 4e-3, 4e-3), (1.0, FILM, 3e-5, 3e-5)),
           2: ((0.1, 0.0, 1e-12, 3e-12), (1.0, 0.0, 1e-8, 1e-11), (10.0, 0.0, 2e-5, 3e-7), (1.0, FILM, 7e-9, 1e-11)),
           3: ((1.0, 0.0, 2e-11, 3e-12), (10.0, 0.0, 2e-7, 1e-10), (1.0, FILM, 2e-11, 3e-12))}
 #: Elements (um), and how many meshes of each.
 THIELE_MESHES = {1: SAMPLES, 2: {4.0: 8, 2.0: 4, 1.0: 2, 0.5: 1}, 3: SAMPLES}
-
-
 NORM = "L2 of C over the mesh, relative; what is taken up, relative; several meshes a size"
+
+
+def _thiele(*orders: int) -> dict[str, tuple]:
+    return {f"{_filmed(f'phi = {row[0]:g}', row[1])}, {WORDS[order]}": (order, *row)
+            for order in orders for row in THIELE[order]}
 
 
 @case("transport-first-order-slab", kind="exact", norm=NORM,
       claim="A slab that takes up kappa C has the profile cosh(phi x / l) and the effectiveness tanh(phi) / phi of "
             "Thiele's modulus 0.1, 1, 10, and those of its films where it has some",
       mutants=("decay-demand", "one-supply-held", "quarter-of-a-triangle", "fluid-diffusivity"),
-      ways="1", because="orders 2, 3: transport-first-order-slab-higher")
-def first_order():
-    return _first_orders(1), [_first_order_profile(*row[:2]) for row in THIELE[1]]
-
-
+      over=_thiele(1), because="orders 2, 3: transport-first-order-slab-higher")
 @case("transport-first-order-slab-higher", kind="exact", norm=NORM, slow=True,
       claim="With quadratic and cubic elements the slab that takes up kappa C has its profile to third and fourth "
             "order, and its effectiveness to fourth and sixth",
-      mutants=("reaction-evenly-weighted", "one-supply-held", "fluid-diffusivity"), ways="2 3",
+      mutants=("reaction-evenly-weighted", "one-supply-held", "fluid-diffusivity"), over=_thiele(2, 3),
       because="order 1: transport-first-order-slab")
-def first_order_of_higher_order():
-    return _first_orders(2), _first_orders(3)
-
-
-def _first_orders(order: int) -> list:
-    """Checks and studies of one order of the elements."""
-    return [_first_order(order, modulus, film, ceilings) for modulus, film, *ceilings in THIELE[order]]
-
-
-def _first_order(order: int, modulus: float, film: float, ceilings) -> list:
-    samples = THIELE_MESHES[order]
-    errors = refine(lambda size: averaged(_first_order_errors, size, modulus, film, order, samples=samples), samples)
-    told = f"{_titled(modulus, film)}, {WORDS[order]}"
-    found = [study(f"C, {told}", errors["size"], errors["C"], *EXPECTED[order], ceiling=ceilings[0])]
+def first_order(order: int, modulus: float, film: float, ceiling: float, taken: float):
+    errors = refine(_first_order_errors, THIELE_MESHES[order], modulus, film, order)
+    yield studies(errors, {"C": (*EXPECTED[order], ceiling)})
+    expected, why = FUNCTIONAL[order]
     if order == 1 or (order == 2 and modulus > 1):
-        taken = study(f"taken up, {told}", errors["size"], errors["taken up"], *FUNCTIONAL[order], ceiling=ceilings[1],
-                      band=order * BAND)
+        yield studies(errors, {"taken up": (around(expected, order * BAND), why, taken)})
     else:  # soon at round-off
-        taken = at_most(f"taken up, {told}", errors["taken up"][-1], ceilings[1], FUNCTIONAL[order][1])
-    return [*found, taken]
-
-
-def _titled(modulus: float, film: float) -> str:
-    return f"phi = {modulus:g}" + (f", films of {film:g} um" if film else "")
+        yield at_most("taken up", errors["taken up"][-1], taken, why)
+    if order == 1:
+        space, field, _ = _at_rest(FINEST, 0, _kappa(modulus) * LARGE, LARGE, film)
+        x = np.linspace(-SLAB - film, SLAB + film, 121)
+        yield _curves(x, along(space, field, x), slab.first_order(x, ACCEPTOR.supply, _kappa(modulus),
+                                                                  **_sides(film))[0])
 
 
 def _kappa(modulus: float) -> float:
@@ -205,39 +191,45 @@ def _kappa(modulus: float) -> float:
     return ACCEPTOR.diffusivity_in_aggregate * (modulus / SLAB) ** 2
 
 
-def _first_order_errors(size: float, sample: int, modulus: float, film: float, order: int) -> dict[str, float]:
+def _first_order_errors(size: float, number: int, modulus: float, film: float, order: int) -> dict[str, float]:
     kappa = _kappa(modulus)
-    space, field, flux = _at_rest(size, sample, kappa * LARGE, LARGE, film, order)
-    effectiveness = slab.first_order(0.0, ACCEPTOR.supply, kappa, **_sides(film))[1]
-    taken = flux.consumed / (kappa * ACCEPTOR.supply * 2 * SLAB * WIDTH)
-    gap = relative(space, field, lambda x: slab.first_order(x, ACCEPTOR.supply, kappa, **_sides(film))[0])
-    return {"size": size if order == 1 else norms.mean_size(space.mesh), "C": gap,
-            "taken up": abs(taken / effectiveness - 1)}
+    space, field, flux = _at_rest(size, number, kappa * LARGE, LARGE, film, order)
 
+    def exact(x):
+        return slab.first_order(x, ACCEPTOR.supply, kappa, **_sides(film))
 
-def _first_order_profile(modulus: float, film: float) -> Profile:
-    space, field, _ = _at_rest(SIZES[-1], 0, _kappa(modulus) * LARGE, LARGE, film)
-    x = np.linspace(-SLAB - film, SLAB + film, 121)
-    exact = slab.first_order(x, ACCEPTOR.supply, _kappa(modulus), **_sides(film))[0]
-    return _curves(_titled(modulus, film), x, along(space, field, x), exact)
+    taken = flux.consumed / (kappa * ACCEPTOR.supply * 2 * SLAB * CHANNEL)
+    return {"size": length(space, size), "C": relative(space, field, lambda x: exact(x)[0]),
+            "taken up": abs(taken / exact(0.0)[1] - 1)}
 
 
 DEPTH, LIMIT, LEAST = 20.0, (0.3, 0.1, 0.03, 0.01), 1e-3
+#: Order, K (mg/L), film (um), elements (um) with how many meshes of each, and the last errors of C and of the depth;
+#: of orders 2 and 3 without films: with more of K what is left in the middle shows.
+MONOD = {"K = 0.1 mg/L, linear": (1, 0.1, 0.0, SAMPLES, 3e-4, 4e-5),
+         "K = 0.03 mg/L, linear": (1, 0.03, 0.0, SAMPLES, 4e-4, 4e-5),
+         f"K = 0.01 mg/L, films of {FILM:g} um, linear": (1, 0.01, FILM, SAMPLES, 1e-4, 3e-5),
+         "K = 0.1 mg/L, quadratic": (2, 0.1, 0.0, {4.0: 6, 2.0: 4, 1.0: 2, 0.5: 1}, 6e-7, 2e-10),
+         "K = 0.1 mg/L, cubic": (3, 0.1, 0.0, {5.6: 10, 2.8: 6, 1.4: 3, 0.75: 3}, 4e-8, 1e-11)}
 
 
-@case("transport-zero-order-slab", kind="exact",
-      norm="L2 of C over the mesh, relative; depth = what enters a side over s, relative; several meshes a size",
-      claim="Where half saturation is small against the supply, uptake s goes on at its full rate down to the depth of "
-            "penetration sqrt(2 D C_s / s), or that of its films, and nothing is left beyond; on the way there the "
-            "slab follows Monod's first integral",
-      mutants=("reaction-in-the-fluid", "decay-demand"), slow=True, ways="1 2 3")
-def zero_order() -> Outcome:
-    rows = [(0.1, 0.0, 3e-4, 4e-5), (0.03, 0.0, 4e-4, 4e-5), (0.01, FILM, 1e-4, 3e-5)]
-    studies = [part for half_saturation, film, *ceilings in rows for part in _monod(half_saturation, film, ceilings)]
-    higher = [_higher_monod(order) for order in HIGHER]
-    checks = (*_exhausted(0.0), *_exhausted(FILM), *(check for check, _ in higher))
-    return Outcome(checks, (*studies, *_limit(), *(part for _, part in higher)),
-                   tuple(_depth_profile(film) for film in (0.0, FILM)))
+def _monod(order: int, half_saturation: float, film: float, samples: dict, ceiling: float, depth: float):
+    errors = refine(_monod_errors, samples, half_saturation, film, order)
+    yield studies(errors, {"C": (*EXPECTED[order], ceiling)})
+    if order == 1:
+        yield studies(errors, {"depth": (*FUNCTIONAL[order], depth)})
+    else:
+        yield at_most("depth", errors["depth"][-1], depth, FUNCTIONAL[order][1])
+
+
+def _monod_errors(size: float, number: int, half_saturation: float, film: float, order: int) -> dict[str, float]:
+    space, field, flux = _at_rest(size, number, _sink(film), half_saturation, film, order)
+
+    def exact(x):
+        return slab.monod(x, ACCEPTOR.supply, _sink(film), half_saturation, **_sides(film))
+
+    return {"size": length(space, size), "C": relative(space, field, lambda x: exact(x)[0]),
+            "depth": abs(_depth(flux, _sink(film)) / exact(0.0)[1] - 1)}
 
 
 def _sink(film: float) -> float:
@@ -247,71 +239,231 @@ def _sink(film: float) -> float:
 
 
 def _depth(flux, sink: float) -> float:
-    return flux.consumed / (2 * WIDTH * sink)
-
-
-def _monod(half_saturation: float, film: float, ceilings):
-    errors = refine(lambda size: averaged(_monod_errors, size, half_saturation, film), SIZES)
-    title = f"K = {half_saturation:g} mg/L" + (f", films of {film:g} um" if film else "")
-    return [study(f"{name}, {title}", SIZES, errors[name], 2, SECOND, ceiling=ceiling)
-            for name, ceiling in zip(("C", "depth"), ceilings)]
-
-
-#: Elements (um) of order 2 and 3 with how many meshes of each, and the last errors of C and of the depth.
-HIGHER = {2: ({4.0: 6, 2.0: 4, 1.0: 2, 0.5: 1}, 6e-7, 2e-10), 3: ({5.6: 10, 2.8: 6, 1.4: 3, 0.75: 3}, 4e-8, 1e-11)}
-
-
-def _higher_monod(order: int):
-    """The depth and a study of C with K = 0.1 mg/L, no films: with more of it what is left in the middle shows."""
-    samples, ceiling, depth = HIGHER[order]
-    errors = refine(lambda size: averaged(_monod_errors, size, 0.1, 0.0, order, samples=samples), samples)
-    told = f"K = 0.1 mg/L, {WORDS[order]}"
-    return (at_most(f"depth, {told}", errors["depth"][-1], depth, FUNCTIONAL[order][1]),
-            study(f"C, {told}", errors["size"], errors["C"], *EXPECTED[order], ceiling=ceiling))
-
-
-def _monod_errors(size: float, sample: int, half_saturation: float, film: float, order: int = 1) -> dict[str, float]:
-    space, field, flux = _at_rest(size, sample, _sink(film), half_saturation, film, order)
-
-    def exact(x):
-        return slab.monod(x, ACCEPTOR.supply, _sink(film), half_saturation, **_sides(film))
-
-    return {"size": norms.mean_size(space.mesh), "C": relative(space, field, lambda x: exact(x)[0]),
-            "depth": abs(_depth(flux, _sink(film)) / exact(0.0)[1] - 1)}
+    return flux.consumed / (2 * CHANNEL * sink)
 
 
 def _limit():
     """How the slab without films goes to zero order as its half saturation does to zero, on one fine mesh."""
-    rows = [_from_zero_order(half_saturation) for half_saturation in LIMIT]
-    origin = "C_s / K large: K / (2 C_s) ln(1 + C_s / K) for the depth; the mesh's error is 30 times smaller"
-    return [study(f"{name} less zero order's, K = {LIMIT[0]:g} to {LIMIT[-1]:g} mg/L", LIMIT, [row[k] for row in rows],
-                  0.8, origin, band=0.1, ceiling=ceiling)
-            for k, (name, ceiling) in enumerate((("C", 1e-2), ("depth", 4e-3)))]
+    why = "C_s / K large: K / (2 C_s) ln(1 + C_s / K) for the depth; the mesh's error is 30 times smaller"
+    errors = refine(_from_zero_order, LIMIT)
+    return studies(errors, {"C": (around(0.8, 0.1), why, 1e-2), "depth": (around(0.8, 0.1), why, 4e-3)},
+                   " less zero order's")
 
 
-def _from_zero_order(half_saturation: float) -> tuple[float, float]:
+def _from_zero_order(half_saturation: float) -> dict[str, float]:
     sink = _sink(0.0)
-    space, field, flux = _at_rest(SIZES[-1], 0, sink, half_saturation, 0.0)
+    space, field, flux = _at_rest(FINEST, 0, sink, half_saturation, 0.0)
     depth = slab.penetration(ACCEPTOR.supply, sink, ACCEPTOR.diffusivity_in_aggregate)
-    return (relative(space, field, lambda x: slab.zero_order(x, ACCEPTOR.supply, sink, **_sides(0.0))),
-            abs(_depth(flux, sink) / depth - 1))
+    gap = relative(space, field, lambda x: slab.zero_order(x, ACCEPTOR.supply, sink, **_sides(0.0)))
+    return {"size": half_saturation, "C": gap, "depth": abs(_depth(flux, sink) / depth - 1)}
 
 
 def _exhausted(film: float):
     """What is left beyond the depth of penetration."""
-    space, field, _ = _at_rest(SIZES[-2], 0, _sink(film), LEAST, film)
-    beyond = np.abs(space.points[:, 0]) < SLAB - DEPTH - 4 * SIZES[-2]
-    title = f"K = {LEAST:g} mg/L, " + (f"films of {film:g} um" if film else "no films")
-    return [at_most(f"C beyond the depth of penetration, {title}, over the supply",
-                    field[beyond].max() / ACCEPTOR.supply, 1e-8, "falls by h^2 s / (D K), 20 or more, an element"),
-            at_most(f"least C, {title}, over the supply", field.min() / ACCEPTOR.supply, 1e-8, "C >= 0")]
-
-
-def _depth_profile(film: float) -> Profile:
-    space, field, _ = _at_rest(SIZES[-1], 0, _sink(film), LIMIT[-1], film)
+    size = sorted(SAMPLES)[1]
+    space, field, _ = _at_rest(size, 0, _sink(film), LEAST, film)
+    beyond = np.abs(space.points[:, 0]) < SLAB - DEPTH - 4 * size
+    yield at_most("C beyond the depth of penetration, over the supply", field[beyond].max() / ACCEPTOR.supply, 1e-8,
+                  "falls by h^2 s / (D K), 20 or more, an element")
+    yield at_most("least C, over the supply", field.min() / ACCEPTOR.supply, 1e-8, "C >= 0")
+    space, field, _ = _at_rest(FINEST, 0, _sink(film), LIMIT[-1], film)
     x = np.linspace(-SLAB - film, SLAB + film, 121)
     given = {"x": x, "supply": ACCEPTOR.supply, "sink": _sink(film), **_sides(film)}
     curves = (("ours", "ours", x, along(space, field, x)),
               ("Monod, closed form", "reference", x, slab.monod(half_saturation=LIMIT[-1], **given)[0]),
               ("zero order", "exact", x, slab.zero_order(**given)))
-    return Profile(f"K = {LIMIT[-1]:g} mg/L" + (", films" if film else ""), "x (um)", "C (mg/L)", curves)
+    yield Profile(f"K = {LIMIT[-1]:g} mg/L", "x (um)", "C (mg/L)", curves)
+
+
+@case("transport-zero-order-slab", kind="exact",
+      norm="L2 of C over the mesh, relative; depth = what enters a side over s, relative; several meshes a size",
+      claim="Where half saturation is small against the supply, uptake s goes on at its full rate down to the depth of "
+            "penetration sqrt(2 D C_s / s), or that of its films, and nothing is left beyond; on the way there the "
+            "slab follows Monod's first integral",
+      mutants=("reaction-in-the-fluid", "decay-demand"), slow=True,
+      over={**{label: (_monod, *row) for label, row in MONOD.items()},
+            f"K = {LIMIT[0]:g} to {LIMIT[-1]:g} mg/L, linear": (_limit,),
+            **{f"K = {LEAST:g} mg/L, {told}, linear": (_exhausted, film)
+               for told, film in (("no films", 0.0), (f"films of {FILM:g} um", FILM))}})
+def zero_order(judge, *row):
+    return judge(*row)
+
+
+WIDTH, RADIUS, ENDS, LARGEST = 50.0, 20.0, (-65.0, 65.0), 3e5
+SUBSTRATES = replace(SCENE.substrates, donor=replace(SCENE.substrates.donor, half_saturation=3.0))
+#: Refinements of each order, and how many unrelated meshes about each: the refinement is NEAR times the last one's, up
+#: and down.
+REFINEMENTS = {1: {0.4: 5, 0.8: 3, 1.6: 2, 3.2: 1}, 2: {0.4: 5, 0.8: 3, 1.6: 2, 2.4: 1},
+               3: {0.4: 6, 0.8: 4, 1.4: 3, 2.2: 1}}
+NEAR = 1.03
+#: u_ave W / D_A, and the last errors of acceptor and donor, of each order.
+PECLETS = {1: {0.1: (3e-4, 9e-4), 1.0: (1.2e-3, 2.5e-3), 10.0: (2.5e-3, 3.5e-3), 100.0: (4e-3, 5e-3)},
+           2: {0.1: (1e-6, 1.5e-6), 1.0: (1e-6, 1.5e-6), 100.0: (8e-6, 1.7e-5)},
+           3: {0.1: (8e-9, 1.1e-8), 10.0: (1.6e-7, 3e-7)}}
+#: The last errors with u_ave for the inlet's u_x, at Pe = 10.
+PRINTED = {1: (3e-4, 3e-4), 2: (1.5e-6, 3e-6), 3: (1.6e-7, 3e-7)}
+
+
+def _made(*orders: int) -> dict[str, tuple]:
+    found = {f"pore's Pe = {peclet:g}, {WORDS[order]}": (order, peclet, "local", ceilings)
+             for order in orders for peclet, ceilings in PECLETS[order].items()}
+    return found | {f"pore's Pe = 10, {WORDS[order]}, printed inlet": (order, 10.0, "mean", PRINTED[order])
+                    for order in orders}
+
+
+def _expected(order: int, peclet: float) -> tuple:
+    """Order in L2, or the lowest and the highest, and why."""
+    if order == 1:
+        return 2, "linear elements, lumped reaction, chords for arcs: second order"
+    if order == 3:
+        return around(4, 0.4), "cubic elements, parabolas for arcs: fourth order"
+    if peclet > 1:
+        return 4, "quadratic elements: fourth order of advection, which is all that is seen at a large Peclet number"
+    if peclet == 1:
+        return around(3.3, 0.45), "quadratic elements: between fourth order of advection and third"
+    return 3, "quadratic elements, parabolas for arcs: third order"
+
+
+@cache
+def _spaced(refinement: float, number: int, order: int) -> Space:
+    about = refinement * NEAR ** (number - REFINEMENTS[order][refinement] // 2)
+    return meshes.half_disc_space(RADIUS, about, ENDS, WIDTH, order)
+
+
+@cache
+def _chosen(peclet: float):
+    """The mean velocity (um/h), and the chosen fields by side."""
+    spreads = (pair("diffusivity", SUBSTRATES), pair("diffusivity_in_aggregate", SUBSTRATES))
+    mean = peclet * spreads[0][0] / WIDTH
+    law = rates(SCENE.kinetics, SUBSTRATES)
+    return mean, manufactured_transport.fields(WIDTH, RADIUS, mean, *spreads, LARGEST, law)
+
+
+@cache
+def _solved(refinement: float, number: int, order: int, peclet: float, inlet: str):
+    """(space, C (2, n))."""
+    space, (mean, sides) = _spaced(refinement, number, order), _chosen(peclet)
+    made = transport.problem(space, _flow(space, mean), SUBSTRATES, SCENE.kinetics, inlet)
+    added = [_added(space, mean, pair("supply", SUBSTRATES)[k], _of(sides, k), inlet) for k in (0, 1)]
+    made = replace(made, source=made.source + np.concatenate(added))
+    where = _reaction_points(space)
+    active = _density()(where[..., 0], where[..., 1]) * space.reaction.dx
+    return space, both(transport.steady(made, Sink(active)))
+
+
+def _reaction_points(space: Space) -> np.ndarray:
+    """(r, q, 2) um, where the reaction is taken."""
+    if space.order == 1:
+        return space.points[space.reaction.cells]
+    nodes = space.mesh.points[space.mesh.cells[space.mesh.biomass]]
+    return np.einsum("qg,tgi->tqi", space.table.shape, nodes)
+
+
+@cache
+def _density():
+    """X as a function of x and y."""
+    return manufactured_transport.function(manufactured_transport.density(RADIUS, LARGEST))
+
+
+def _of(sides, k: int):
+    """The field of one substrate by side."""
+    return {side: found[k] for side, found in sides.items()}
+
+
+@cache
+def _velocity(mean: float):
+    """u_x and u_y as functions of x and y."""
+    return [manufactured_transport.function(part) for part in manufactured_transport.velocity(WIDTH, mean)]
+
+
+def _flow(space: Space, mean: float) -> flow.Flow:
+    return carrying(space, np.column_stack([part(*space.points.T) for part in _velocity(mean)]), mean)
+
+
+def _added(space: Space, mean: float, supply: float, chosen, inlet: str) -> np.ndarray:
+    """(n,) the forcing and what enters through the sides; chosen: the field by side."""
+    where, weight, values = in_points(space)
+    forcing = weight * _by_side(space.mesh.biomass, chosen, "forcing", where[..., 0], where[..., 1])
+    found = np.bincount(space.cells.ravel(), (forcing @ values).ravel(), space.count)
+    for nodes, owner, ends in _edges(space):
+        found += _through(space, nodes, owner, ends, mean, supply, chosen, inlet)
+    return found
+
+
+def _by_side(biomass, chosen, name: str, x, y) -> np.ndarray:
+    """A function of the chosen field on the side of each element (K,), at x and y (K, q)."""
+    return np.where(biomass[:, None], *(getattr(chosen[side], name)(x, y) for side in ("biomass", "fluid")))
+
+
+def _edges(space: Space):
+    """The mesh's rim: nodes (E, e), triangles (E,) and ends (E, 2) um of the edges 01, 12 and 20 that have one
+    triangle alone; nodes from the first end to the second."""
+    topology, order = space.mesh.topology, space.order
+    alone = np.bincount(topology.cell_edges.ravel(), minlength=len(topology.edges)) == 1
+    parameters = np.linspace(0, 1, order + 1)
+    for k in range(3):
+        owner = np.flatnonzero(alone[topology.cell_edges[:, k]])
+        corners = np.array([[0, 0], [1, 0], [0, 1]])[[k, (k + 1) % 3]]
+        places = corners[0] + parameters[:, None] * (corners[1] - corners[0])
+        local = [int(np.argmin(np.abs(elements.nodes(order) - place).sum(axis=1))) for place in places]
+        ends = space.mesh.points[space.mesh.triangles[owner][:, [k, (k + 1) % 3]]]
+        yield space.cells[owner][:, local], owner, ends
+
+
+def _through(space: Space, nodes, owner, ends, mean: float, supply: float, chosen, inlet: str) -> np.ndarray:
+    """(n,) of what enters through edges: D dC/dn; and at the inlet, where the code has it leave, u_x (C - C_s), or with
+    the printed condition u_ave (C - C_s) [E4]."""
+    points, weights = np.polynomial.legendre.leggauss(6)
+    along = (points + 1) / 2
+    start, along_edge = ends[:, 0], ends[:, 1] - ends[:, 0]
+    x, y = np.moveaxis(start[:, None] + along[:, None] * along_edge[:, None], 2, 0)
+    biomass, length = space.mesh.biomass[owner], np.hypot(*along_edge.T)[:, None]
+    flux = _by_side(biomass, chosen, "flux", x, y)
+    passed = flux[0] * along_edge[:, 1, None] - flux[1] * along_edge[:, 0, None]
+    enters = _velocity(mean)[0](x, y) if inlet == "local" else mean
+    over = enters * (_by_side(biomass, chosen, "value", x, y) - supply) * length
+    passed = passed + np.where(np.isclose(x, ENDS[0]), over, 0.0)
+    values = elements.values(space.order, np.column_stack([along, 0 * along]))[:, elements.ON_EDGE[space.order]]
+    return np.bincount(nodes.ravel(), ((passed * weights / 2) @ values).ravel(), space.count)
+
+
+@case("transport-manufactured", kind="manufactured", norm="L2 of each substrate over the mesh, relative",
+      claim="Chosen concentrations around a half-disc come out of the full equations with second order, at Peclet "
+            "numbers of the pore from 0.1 to 100 and of the elements from 0.002 to 18, with either inlet condition",
+      mutants=("cross-flow-sign", "exchanged-half-saturation", "fluid-diffusivity", "ratio-on-the-donor-only",
+               "quarter-of-a-triangle"), over=_made(1), because="orders 2, 3: transport-manufactured-higher")
+@case("transport-manufactured-higher", kind="manufactured", slow=True,
+      norm="L2 of each substrate over the mesh, relative",
+      claim="The same with quadratic and cubic elements on curved triangles, at Peclet numbers from 0.1 to 100, with "
+            "either inlet condition: third order, of advection alone fourth; and fourth order",
+      mutants=("printed-inlet-forgotten", "conserving-cross-flow", "exchanged-half-saturation", "fluid-diffusivity"),
+      over=_made(2, 3), because="order 1: transport-manufactured")
+def chosen_concentrations(order: int, peclet: float, inlet: str, ceilings: tuple[float, float]):
+    errors = refine(_chosen_errors, REFINEMENTS[order], order, peclet, inlet)
+    cells = " to ".join(f"{peclet * size / WIDTH:.1g}" for size in errors["size"][[-1, 0]])
+    yield studies(errors, {name: (*_expected(order, peclet), ceiling) for name, ceiling in zip(NAMES, ceilings)},
+                  f", elements' {cells}")
+    if order == 1 and inlet == "local":
+        yield _chosen_profile(peclet)
+
+
+def _chosen_errors(refinement: float, number: int, order: int, peclet: float, inlet: str) -> dict[str, float]:
+    """Size of the elements, nominal for linear ones; L2 of both substrates, on each element less the chosen field of
+    its side."""
+    (space, found), (_, sides) = _solved(refinement, number, order, peclet, inlet), _chosen(peclet)
+
+    def truth(x, y):
+        return [_by_side(space.mesh.biomass, _of(sides, k), "value", x, y) for k in (0, 1)]
+
+    gap, size = apart(space, found, truth)
+    return {"size": length(space, WIDTH / ACROSS_PORE / refinement), **dict(zip(NAMES, gap / size))}
+
+
+def _chosen_profile(peclet: float) -> Profile:
+    """Along the pore, a tenth of its width above the lower wall."""
+    (space, found), (_, sides) = _solved(max(REFINEMENTS[1]), 0, 1, peclet, "local"), _chosen(peclet)
+    x = np.linspace(ENDS[0], ENDS[1], 66)
+    where = np.column_stack([x, np.full(len(x), WIDTH / 10)])
+    inside = np.hypot(*where.T) < RADIUS
+    chosen = np.array([_by_side(inside, _of(sides, k), "value", *where.T[:, :, None])[:, 0] for k in (0, 1)])
+    return pictured(f"y = {WIDTH / 10:g} um", "x (um)", x, sample(space, found, where), ("chosen", "exact", x, chosen))

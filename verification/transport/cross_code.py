@@ -1,50 +1,69 @@
-"""Dual Monod uptake in a slab under plug flow, steady: against scipy's collocation, and against FiPy's finite volumes.
+"""Substrates against other codes: steady and in time, in slabs, around biomass, and in a box that is well mixed.
 
+Dual Monod uptake in a slab under plug flow, steady: against scipy's collocation, and against FiPy's finite volumes.
 Peclet numbers u l / D_A are 0.1, 1 and 5. Thiele's modulus l sqrt(k F X / (K_A D_A)) is 0.6, 1.9 and 6; the last slab,
 at Peclet number 0.1, is starved: three ten-thousandths of the acceptor's supply leave it.
 
-Diffusion into biomass in two dimensions, without flow, against py-pde's finite differences.
+Diffusion into biomass in two dimensions, without flow, against py-pde's finite differences. A box whose ends hold the
+supply; D is the same in fluid and biomass, as py-pde's Laplacian has it. Both codes are refined together, elements as
+long as cells: around a block whose sides follow the cells, and around the paper's half-disc, which cuts them. Thiele's
+modulus is SIDE sqrt(k F X / (K_A D_A)); at 7 the donor is used up, at 4.3 a few percent of it are left.
 
-A box whose ends hold the supply; D is the same in fluid and biomass, as py-pde's Laplacian has it. Both codes are
-refined together, elements as long as cells: around a block whose sides follow the cells, and around the paper's
-half-disc, which cuts them. Thiele's modulus is SIDE sqrt(k F X / (K_A D_A)); at 7 the donor is used up, at 4.3 a few
-percent of it are left.
+The modified Gear scheme (3.3): from the supply everywhere towards the steady profiles of the slab. X_A does not change
+(no yield, and less than 1e-5 of it decays). In time the scheme is compared with an integrator that makes no error of
+its own, on the same mesh; in space with FiPy, whose cells are integrated without an error in time; and in time with
+FiPy's own scheme, which is of first order.
+
+Closed pores in which diffusion evens out every concentration: (7)-(10) are four ordinary equations. A seed in a closed
+box whose diffusivities are so large that C_A and C_D are uniform to 1e-6; X_A and X_I then are too. With ``share`` of
+the box biomass,
+
+    dC_A/dt = -share X_A m_A (k F m_D + d_c f_d b)        dX_A/dt = X_A m_A (k Y m_D - b)
+    dC_D/dt = -share X_A k m_A m_D                        dX_I/dt = X_A m_A b (1 - f_d)
+
+are integrated by scipy to 1e-11. The box is followed for five days, by when half of the acceptor is gone.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from itertools import product
 
 import numpy as np
+import scipy.sparse as sp
+from scipy.integrate import solve_ivp
+from scipy.spatial import cKDTree
+from skfem import Basis, BilinearForm, ElementTriP2, ElementTriP3, MeshTri
 
 from reference import channel_bvp, channel_fipy
 from reference import diffusion_reaction_pypde as pypde
+from reference.monod import sink, slopes, uptake
+from repro.fem import outline
+from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.fem.space import Space
-from repro.model import gear, transport
+from repro.model import gear, kinetics, transport
 from repro.model.kinetics import Sink
-from verification.kernel.case import Check, Outcome, Profile, at_most, case, refine, study
-from verification.problems import meshes, norms
+from verification.kernel.case import Profile, at_most, case, combined, refine, studies
+from verification.problems import meshes
 from verification.problems.channels import (
     CROSSED,
     EXPECTED,
     NAMES,
+    ORDERS,
+    SAMPLES,
     SCENE,
-    SECOND,
-    SIZES,
     SLAB,
     WIDE,
-    WORDS,
     along,
     apart,
     at_heights,
-    averaged,
     both,
     distance,
     filled,
     following,
+    length,
     pair,
+    pictured,
     problem,
     rates,
     sample,
@@ -53,11 +72,15 @@ from verification.problems.channels import (
     steady,
 )
 
-PECLETS, DENSITIES = (0.1, 1.0, 5.0), (3e3, 3e4, 3e5)
-#: Errors of a density X of both substrates: ours, and ours less FiPy's.
-CEILINGS = {3e3: (1e-6, 1e-6), 3e4: (3e-5, 6e-6), 3e5: (4e-4, 5e-5)}
-STARVED = (PECLETS[0], DENSITIES[-1])
-COMBINATIONS = tuple((peclet, density) for peclet in PECLETS for density in DENSITIES)
+LINEAR = {"linear": 1}
+HIGHER = {word: order for word, order in ORDERS.items() if order > 1}
+PECLETS = {f"Pe = {peclet:g}": peclet for peclet in (0.1, 1.0, 5.0)}
+DENSITIES = {f"X = {density:g} mg/L": density for density in (3e3, 3e4, 3e5)}
+#: Peclet number and density of the starved slab, and of the one that FiPy's cells and elements of order 2 and 3 share.
+STARVED, SHARED = (0.1, 3e5), (1.0, 3e4)
+ITSELF_STARVED = "C_A in the starved slab over itself"
+#: Last errors of linear elements, of a density X.
+CEILINGS = {3e3: 1e-6, 3e4: 3e-5, 3e5: 4e-4}
 
 
 def given(peclet: float, density: float):
@@ -66,15 +89,15 @@ def given(peclet: float, density: float):
             rates(SCENE.kinetics), SLAB)
 
 
-def titled(peclet: float, density: float) -> str:
-    """The combination in words."""
-    return f"Pe = {peclet:g}, X = {density:g} mg/L"
+def each(expected: int, why: str, ceiling: float, names=NAMES) -> dict[str, tuple]:
+    """The same row for several fields."""
+    return dict.fromkeys(names, (expected, why, ceiling))
 
 
 @cache
-def found(size: float, sample: int, peclet: float, density: float, order: int = 1, ends=CROSSED) -> np.ndarray:
+def found(size: float, number: int, peclet: float, density: float, order: int = 1, ends=CROSSED) -> np.ndarray:
     """(2, n) C_A and C_D on one of the meshes of a size."""
-    return both(steady(problem(spaced(size, sample, order, ends), speed_of(peclet)), density))
+    return both(steady(problem(spaced(size, number, order, ends), speed_of(peclet)), density))
 
 
 @cache
@@ -83,11 +106,9 @@ def exact(peclet: float, density: float, tolerance: float = 1e-8):
     return channel_bvp.solution(*given(peclet, density), tolerance=tolerance)
 
 
-@cache
-def fipy(size: float, peclet: float, density: float):
-    """(x, C (2, n)) at the centres of FiPy's cells, half as long as our edges."""
-    channel = channel_fipy.Channel(round(2 * (CROSSED[1] - CROSSED[0]) / size), CROSSED, *given(peclet, density))
-    return channel.x, channel.steady()
+#: Random meshes of each size (um), and solve_bvp's tolerance, which takes no less at Peclet 5: cubic elements are
+#: judged at Peclet 1, on coarser meshes, as solve_bvp is good to 1e-11 or so; the last error.
+FINER = {2: ({3.2: 12, 1.6: 6, 0.8: 3, 0.4: 1}, 1e-10, 1e-7), 3: ({6.4: 12, 3.2: 8, 1.6: 4, 0.8: 2}, 1e-12, 1e-9)}
 
 
 @case("transport-monod-collocation", kind="cross-code",
@@ -96,141 +117,103 @@ def fipy(size: float, peclet: float, density: float):
       claim="Dual Monod uptake under plug flow is solve_bvp's at Peclet 0.1, 1, 5 times Thiele numbers 0.6, 1.9, 6, "
             "from barely touched to starved",
       mutants=("decay-demand", "ratio-on-the-donor-only", "reaction-in-the-fluid", "exchanged-substrates"),
-      ways="1", because="orders 2, 3: transport-monod-higher")
-def collocation() -> Outcome:
-    studies = [part for combination in COMBINATIONS for part in _collocation(*combination)]
-    errors = refine(lambda size: averaged(_relative_error, size, *STARVED), SIZES)["acceptor"]
-    studies.append(study(f"C_A in the starved slab over itself, {titled(*STARVED)}", SIZES, errors, 2, SECOND,
-                         ceiling=6e-4))
-    return Outcome(studies=tuple(studies))
-
-
-def _collocation(peclet: float, density: float):
-    errors = refine(lambda size: averaged(_distances, size, peclet, density), SIZES)
-    return [study(f"{name}, {titled(peclet, density)}", SIZES, errors[name], 2, SECOND, ceiling=CEILINGS[density][0])
-            for name in NAMES]
-
-
-def _distances(size: float, sample: int, peclet: float, density: float) -> dict[str, float]:
-    gaps = distance(spaced(size, sample), found(size, sample, peclet, density), exact(peclet, density))
-    return dict(zip(NAMES, gaps))
-
-
-def _relative_error(size: float, sample: int, peclet: float, density: float) -> dict[str, float]:
-    pieces = spaced(size, sample).reaction
-    nodes = pieces.cells[:, 0]
-    there = spaced(size, sample).points[nodes, 0]
-    ratio = found(size, sample, peclet, density)[0, nodes] / exact(peclet, density)(there)[0]
-    return {"acceptor": np.sqrt(np.average((ratio - 1) ** 2, weights=pieces.dx[:, 0]))}
-
-
-#: Peclet numbers of order 2; random meshes of each size (um), and solve_bvp's tolerance, which takes no less at Peclet
-#: 5: cubic elements are judged at Peclet 1, on coarser meshes, as solve_bvp is good to 1e-11 or so.
-FASTER = (0.5, 1.0, 5.0)
-HIGHER = {2: ({3.2: 12, 1.6: 6, 0.8: 3, 0.4: 1}, 1e-10), 3: ({6.4: 12, 3.2: 8, 1.6: 4, 0.8: 2}, 1e-12)}
-
-
-def higher_errors(size: float, sample: int, order: int, peclet: float, density: float) -> dict[str, float]:
-    """Mean size of the elements, and root mean square of both substrates over the larger supply."""
-    space, truth = spaced(size, sample, order, WIDE), exact(peclet, density, HIGHER[order][1])
-    gaps, _ = apart(space, found(size, sample, peclet, density, order, WIDE), lambda x, y: truth(x))
-    return {"size": norms.mean_size(space.mesh), "C": float(np.hypot(*gaps)) / pair("supply")[0]}
-
-
-def _higher(order: int, peclet: float, density: float, ceiling: float):
-    samples = HIGHER[order][0]
-    errors = refine(lambda size: averaged(higher_errors, size, order, peclet, density, samples=samples), samples)
-    return study(titled(peclet, density), errors["size"], errors["C"], *EXPECTED[order], ceiling=ceiling)
-
-
-#: Peclet numbers and the last error, for each order.
-FAST_MONOD = {2: (FASTER, 1e-7), 3: ((1.0,), 1e-9)}
-
-
+      over=combined(LINEAR, PECLETS, DENSITIES), because="orders 2, 3: transport-monod-higher")
 @case("transport-monod-higher", kind="cross-code", slow=True,
       norm="root mean square over the mesh of both substrates less solve_bvp, over the supply",
       claim="Dual Monod uptake under plug flow on quadratic and cubic triangles is solve_bvp's, to third and fourth "
             "order, at Peclet 0.5, 1, 5 (cubic: 1) times Thiele numbers 0.6, 1.9, 6, from barely touched to starved",
       mutants=("uptake-without-decay", "fluid-diffusivity", "reaction-evenly-weighted"),
-      over={WORDS[order]: (order,) for order in FAST_MONOD}, because="order 1: transport-monod-collocation")
-def higher(order: int):
-    peclets, ceiling = FAST_MONOD[order]
-    for peclet, density in product(peclets, DENSITIES):
-        yield _higher(order, peclet, density, ceiling)
-        if order == 2:
-            yield _quadratic_profile(peclet, density)
+      over={**combined({"quadratic": 2}, {"Pe = 0.5": 0.5, "Pe = 1": 1.0, "Pe = 5": 5.0}, DENSITIES),
+            **combined({"cubic": 3}, {"Pe = 1": 1.0}, DENSITIES)}, because="order 1: transport-monod-collocation")
+def collocation(order: int, peclet: float, density: float):
+    if order == 1:
+        errors = refine(_distances, SAMPLES, peclet, density)
+        yield studies(errors, each(*EXPECTED[1], CEILINGS[density]))
+        if (peclet, density) == STARVED:
+            yield studies(errors, {ITSELF_STARVED: (*EXPECTED[1], 6e-4)})
+    else:
+        samples, _, ceiling = FINER[order]
+        yield studies(refine(_root_mean_square, samples, order, peclet, density), {"C": (*EXPECTED[order], ceiling)})
+        truth, ours, x = exact(peclet, density), found(1.6, 0, peclet, density, order, WIDE), np.linspace(*WIDE, 121)
+        yield pictured("along the channel", "x (um)", x, along(spaced(1.6, 0, order, WIDE), ours, x),
+                       ("solve_bvp", "exact", x[::6], truth(x[::6])))
 
 
-def _quadratic_profile(peclet: float, density: float) -> Profile:
-    space, truth = spaced(1.6, 0, 2, WIDE), exact(peclet, density)
-    ours, x, curves = found(1.6, 0, peclet, density, 2, WIDE), np.linspace(*WIDE, 121), []
-    for k, name in enumerate(NAMES):
-        curves += [(name, "ours", x, along(space, ours[k], x)),
-                   (f"{name}, solve_bvp", "exact", x[::6], truth(x[::6])[k])]
-    return Profile(titled(peclet, density), "x (um)", "C (mg/L)", tuple(curves))
+def _distances(size: float, number: int, peclet: float, density: float) -> dict[str, float]:
+    space, truth = spaced(size, number), exact(peclet, density)
+    ours, pieces = found(size, number, peclet, density), space.reaction
+    nodes = pieces.cells[:, 0]
+    ratio = ours[0, nodes] / truth(space.points[nodes, 0])[0]
+    return {**dict(zip(NAMES, distance(space, ours, truth))),
+            ITSELF_STARVED: np.sqrt(np.average((ratio - 1) ** 2, weights=pieces.dx[:, 0]))}
 
 
-@case("transport-monod-fipy", kind="cross-code",
-      norm="root mean square over FiPy's cells, at five heights, of each substrate over its supply, and in the starved "
-           "slab over its own value; several meshes a size",
-      claim="Dual Monod uptake under plug flow is FiPy's, both codes refined together, at Peclet 0.1, 1, 5 times "
-            "Thiele numbers 0.6, 1.9, 6, from barely touched to starved",
-      mutants=("decay-demand", "no-inlet-flux"), slow=True, ways="1", because="orders 2, 3: transport-monod-higher")
-def finite_volumes() -> Outcome:
-    studies = [part for combination in COMBINATIONS for part in _finite_volumes(*combination)]
-    errors = refine(lambda size: averaged(_relative_to_fipy, size, *STARVED), SIZES)["acceptor"]
-    studies.append(study(f"C_A in the starved slab over itself, {titled(*STARVED)}", SIZES, errors, 2, BOTH,
-                         ceiling=6e-4))
-    return Outcome(studies=tuple(studies), profiles=tuple(profile(*combination) for combination in COMBINATIONS))
+def _root_mean_square(size: float, number: int, order: int, peclet: float, density: float) -> dict[str, float]:
+    """Of both substrates over the larger supply."""
+    space, truth = spaced(size, number, order, WIDE), exact(peclet, density, FINER[order][1])
+    gaps, _ = apart(space, found(size, number, peclet, density, order, WIDE), lambda x, y: truth(x))
+    return {"size": length(space, size), "C": float(np.hypot(*gaps)) / pair("supply")[0]}
 
 
-BOTH = "both codes are of second order"
-
-
-def _finite_volumes(peclet: float, density: float):
-    errors = refine(lambda size: averaged(_from_fipy, size, peclet, density), SIZES)
-    return [study(f"{name} less FiPy's, {titled(peclet, density)}", SIZES, errors[name], 2, BOTH,
-                  ceiling=CEILINGS[density][1])
-            for name in NAMES]
-
-
-def _from_fipy(size: float, sample: int, peclet: float, density: float) -> dict[str, float]:
-    x, theirs = fipy(size, peclet, density)
-    gap = _at_cells(size, sample, peclet, density, x) - theirs[:, None]
-    return {name: np.sqrt(np.mean(gap[k] ** 2)) / pair("supply")[k] for k, name in enumerate(NAMES)}
-
-
-def _at_cells(size: float, sample: int, peclet: float, density: float, x) -> np.ndarray:
-    return at_heights(spaced(size, sample), found(size, sample, peclet, density), x)
-
-
-def _relative_to_fipy(size: float, sample: int, peclet: float, density: float) -> dict[str, float]:
-    x, theirs = fipy(size, peclet, density)
-    inside = (x > 0) & (x < SLAB)
-    ratio = _at_cells(size, sample, peclet, density, x[inside])[0] / theirs[0, inside]
-    return {"acceptor": np.sqrt(np.mean((ratio - 1) ** 2))}
-
-
-def profile(peclet: float, density: float) -> Profile:
-    """Along the channel: ours, FiPy's and solve_bvp's."""
-    (x, theirs), trusted = fipy(SIZES[-1], peclet, density), exact(peclet, density)
-    space, ours, curves = spaced(SIZES[-1], 0), found(SIZES[-1], 0, peclet, density), []
-    for k, name in enumerate(NAMES):
-        curves += [(name, "ours", x, along(space, ours[k], x)), (f"{name}, FiPy", "reference", x, theirs[k]),
-                   (f"{name}, solve_bvp", "exact", x[::12], trusted(x[::12])[k])]
-    return Profile(titled(peclet, density), "x (um)", "C (mg/L)", tuple(curves))
+def _over_the_supply(gap: np.ndarray) -> dict[str, float]:
+    """Of each substrate the root mean square over the places (2, ...), over its supply."""
+    return dict(zip(NAMES, np.sqrt(np.mean(gap**2, axis=tuple(range(1, gap.ndim)))) / pair("supply")))
 
 
 BOX, SIDE = 16.0, 8.0
 SUBSTRATES = replace(SCENE.substrates, **{
     name: replace(getattr(SCENE.substrates, name), diffusivity=spread, diffusivity_in_aggregate=spread)
     for name, spread in zip(NAMES, (8e6, 4e6))})
+ITSELF = "donor in the biomass, over itself"
 #: Cells (um), and how many meshes of elements as long around the block.
 BLOCK = {2.0: 6, 1.0: 4, 0.5: 2, 0.25: 1}
 #: Elements (um) of order 2 and 3 around either, which err less than a tenth as much as the finest cells.
-FINE = {"block": {2: 0.5, 3: 1.0}, "half-disc": {2: 1 / 3, 3: 2 / 3}}
+FINE_AROUND = {"block": {2: 0.5, 3: 1.0}, "half-disc": {2: 1 / 3, 3: 2 / 3}}
 #: Cells (um), and the refinement that makes elements twice as long on average around the half-disc.
 DISC = {4 / 3: 0.35, 2 / 3: 0.77, 1 / 3: 1.55, 1 / 6: 3.1}
+CUT = ("second order: what the cut cells of py-pde take up is right, its place is off now to one side, now to "
+       "the other (with whole cells in or out it is 0.8 to 1.9)")
+#: Shape, order, density (mg/L), and the last errors of both substrates, and of the donor in the biomass.
+BLOCKS = {"X = 1e+05 mg/L, linear": ("block", 1, 1e5, 2e-5, 2e-5, 3e-5),
+          "X = 1e+06 mg/L, linear": ("block", 1, 1e6, 1e-4, 1e-4, 3e-4),
+          "X = 4e+06 mg/L, linear": ("block", 1, 4e6, 2e-4, 2e-4, 1e-3),
+          "X = 1e+06 mg/L, quadratic": ("block", 2, 1e6, 1e-4, 1e-4, 3e-4),
+          "X = 1e+06 mg/L, cubic": ("block", 3, 1e6, 1e-4, 1e-4, 3e-4)}
+HALF_DISCS = {"X = 1e+05 mg/L, linear": ("half-disc", 1, 1e5, 2e-5, 2e-5, 3e-5),
+              "X = 1e+06 mg/L, linear": ("half-disc", 1, 1e6, 1e-4, 1e-4, 4e-4),
+              "X = 1e+07 mg/L, linear": ("half-disc", 1, 1e7, 3e-4, 3e-4, 1e-2),
+              "X = 1e+06 mg/L, quadratic": ("half-disc", 2, 1e6, 1e-5, 1.5e-5, 4e-5),
+              "X = 1e+06 mg/L, cubic": ("half-disc", 3, 1e6, 1e-5, 1.5e-5, 4e-5)}
+
+
+@case("transport-block", kind="cross-code",
+      norm="root mean square over py-pde's cells over the supply; that of C_D in the biomass over itself; "
+           "several meshes a size",
+      claim="Diffusion into a block of biomass on a wall is py-pde's, both codes refined together, at Thiele numbers "
+            "0.7, 2.2 and 4.3; with quadratic and cubic elements the transient scheme comes to rest in what py-pde's "
+            "cells come to",
+      mutants=("one-supply-held", "reaction-in-the-fluid"), slow=True, over=BLOCKS)
+@case("transport-half-disc", kind="cross-code",
+      norm="root mean square over py-pde's cells over the supply; that of C_D in the biomass over itself",
+      claim="Diffusion into a half-disc is py-pde's, both codes refined together, at Thiele numbers 0.7, 2.2 and 7; "
+            "with quadratic and cubic elements the transient scheme comes to rest in what py-pde's cells come to",
+      mutants=("ratio-on-the-donor-only",), slow=True, over=HALF_DISCS)
+def finite_differences(shape: str, order: int, density: float, *ceilings: float):
+    """Around the half-disc py-pde's finest cells alone are compared with elements of order 2 and 3: one after the other
+    they are off to one side or to the other, by no steady order."""
+    names = (*NAMES, ITSELF)
+    if order == 1:
+        samples, why = (BLOCK, "both of second order") if shape == "block" else (dict.fromkeys(DISC, 1), CUT)
+        rows = {name: (2, why, ceiling) for name, ceiling in zip(names, ceilings)}
+        yield studies(refine(_as_long, samples, density, shape), rows)
+        yield _across(shape, min(samples), density)
+    elif shape == "block":
+        rows = {name: (2, "py-pde's second order", ceiling) for name, ceiling in zip(names, ceilings)}
+        yield studies(refine(_at_rest, BLOCK, density, shape, order), rows, ", of py-pde less ours")
+    else:
+        errors = _at_rest(min(DISC), 0, density, shape, order)
+        for name, ceiling in zip(names, ceilings):
+            yield at_most(f"{name}, of py-pde less ours", errors[name], ceiling, "py-pde's error")
 
 
 @cache
@@ -251,99 +234,343 @@ def _spaced(cell: float, number: int, shape: str, order: int = 1) -> Space:
     return meshes.half_disc_space(SIDE, DISC[cell], (-BOX, BOX), BOX, order)
 
 
-def _ours(space: Space, density: float, where: np.ndarray, transient: bool = False) -> np.ndarray:
-    """(2, n) at places (n, 2); transient: by the transient scheme, where it comes to rest."""
-    made, sink = transport.problem(space, None, SUBSTRATES, SCENE.kinetics), Sink(filled(space, density))
-    found = gear.settle(made, sink, None) if transient else transport.steady(made, sink)
-    return sample(space, both(found), where)
+def _as_long(cell: float, number: int, density: float, shape: str) -> dict[str, float]:
+    """Differences of linear elements as long as py-pde's cells."""
+    made, sink_ = _diffusing(_spaced(cell, number, shape), density)
+    return _less(made.space, transport.steady(made, sink_), cell, density, shape)
 
 
-def _apart(cell: float, number: int, density: float, shape: str) -> dict[str, float]:
-    """Ours on elements as long as py-pde's cells."""
-    return _less(_ours(_spaced(cell, number, shape), density, _pypde(cell, density, shape)[0]), cell, density, shape)
+def _at_rest(cell: float, number: int, density: float, shape: str, order: int) -> dict[str, float]:
+    """Differences of elements of another order and size, by the transient scheme, where it comes to rest."""
+    made, sink_ = _diffusing(_spaced(FINE_AROUND[shape][order], 0, shape, order), density)
+    return _less(made.space, gear.settle(made, sink_, None), cell, density, shape)
 
 
-def _less(ours: np.ndarray, cell: float, density: float, shape: str) -> dict[str, float]:
+def _diffusing(space: Space, density: float) -> tuple[transport.Problem, Sink]:
+    return transport.problem(space, None, SUBSTRATES, SCENE.kinetics), Sink(filled(space, density))
+
+
+def _less(space: Space, state: transport.Concentrations, cell: float, density: float, shape: str) -> dict[str, float]:
     """Differences of both substrates over their supply, and of the donor in the biomass, the scarcer, over itself."""
-    _, theirs, part = _pypde(cell, density, shape)
-    over = np.sqrt(np.mean((ours - theirs) ** 2, axis=1)) / pair("supply")
+    points, theirs, part = _pypde(cell, density, shape)
+    ours = sample(space, both(state), points)
     ratio = (ours / theirs)[1, part == 1] - 1
-    return {**dict(zip(NAMES, over)), "donor in the biomass, over itself": np.sqrt(np.mean(ratio**2))}
+    return {**_over_the_supply(ours - theirs), ITSELF: np.sqrt(np.mean(ratio**2))}
 
 
-def _studies(shape: str, samples: dict[float, int], density: float, origin: str, ceilings) -> list:
-    errors = refine(lambda cell: averaged(_apart, cell, density, shape, samples=samples), samples)
-    return [study(f"{name}, X = {density:g} mg/L", list(samples), errors[name], 2, origin, ceiling=ceiling)
-            for name, ceiling in zip(errors, (ceilings[0], *ceilings))]
-
-
-def _still_higher(density: float, ceilings) -> list:
-    """py-pde's cells around the block against one mesh of quadratic, one of cubic elements, which err less than a tenth
-    as much; by the transient scheme, at rest."""
-    studies = []
-    for order, size in FINE["block"].items():
-        errors = refine(_at_rest, BLOCK, size, density, "block", order)
-        studies += [study(f"{name}, of py-pde less {WORDS[order]} elements', X = {density:g} mg/L", list(BLOCK),
-                          errors[name], 2, "py-pde's second order", ceiling=ceiling)
-                    for name, ceiling in zip(errors, (ceilings[0], *ceilings))]
-    return studies
-
-
-def _cut_cells(cell: float, density: float, ceilings) -> tuple[Check, ...]:
-    """The same around the half-disc, on the finest cells alone: one after the other they are off to one side or to the
-    other, by no steady order."""
-    checks = []
-    for order, size in FINE["half-disc"].items():
-        errors = _at_rest(cell, size, density, "half-disc", order)
-        checks += [at_most(f"{name}, of py-pde less {WORDS[order]} elements', X = {density:g} mg/L", errors[name],
-                           ceiling, "py-pde's error") for name, ceiling in zip(errors, ceilings)]
-    return tuple(checks)
-
-
-def _at_rest(cell: float, size: float, density: float, shape: str, order: int) -> dict[str, float]:
-    """Differences to py-pde's cells of elements of another size, by the transient scheme."""
-    where = _pypde(cell, density, shape)[0]
-    return _less(_ours(_spaced(size, 0, shape, order), density, where, True), cell, density, shape)
-
-
-@case("transport-block", kind="cross-code",
-      norm="root mean square over py-pde's cells over the supply; that of C_D in the biomass over itself; "
-           "several meshes a size",
-      claim="Diffusion into a block of biomass on a wall is py-pde's, both codes refined together, at Thiele numbers "
-            "0.7, 2.2 and 4.3; with quadratic and cubic elements the transient scheme comes to rest in what py-pde's "
-            "cells come to",
-      mutants=("one-supply-held", "reaction-in-the-fluid"), slow=True, ways="1 2 3")
-def block() -> Outcome:
-    rows, studies = {1e5: (2e-5, 3e-5), 1e6: (1e-4, 3e-4), 4e6: (2e-4, 1e-3)}, []
-    for density, ceilings in rows.items():
-        studies += _studies("block", BLOCK, density, "both of second order", ceilings)
-    studies += _still_higher(1e6, (1e-4, 3e-4))
-    return Outcome(studies=tuple(studies),
-                   profiles=tuple(_profile("block", min(BLOCK), density) for density in rows))
-
-
-@case("transport-half-disc", kind="cross-code",
-      norm="root mean square over py-pde's cells over the supply; that of C_D in the biomass over itself",
-      claim="Diffusion into a half-disc is py-pde's, both codes refined together, at Thiele numbers 0.7, 2.2 and 7; "
-            "with quadratic and cubic elements the transient scheme comes to rest in what py-pde's cells come to",
-      mutants=("ratio-on-the-donor-only",), slow=True, ways="1 2 3")
-def half_disc() -> Outcome:
-    rows, studies = {1e5: (2e-5, 3e-5), 1e6: (1e-4, 4e-4), 1e7: (3e-4, 1e-2)}, []
-    origin = ("second order: what the cut cells of py-pde take up is right, its place is off now to one side, now to "
-              "the other (with whole cells in or out it is 0.8 to 1.9)")
-    samples = dict.fromkeys(DISC, 1)
-    for density, ceilings in rows.items():
-        studies += _studies("half-disc", samples, density, origin, ceilings)
-    profiles = tuple(_profile("half-disc", min(DISC), density) for density in rows)
-    return Outcome(_cut_cells(min(DISC), 1e6, (1e-5, 1.5e-5, 4e-5)), tuple(studies), profiles)
-
-
-def _profile(shape: str, cell: float, density: float) -> Profile:
+def _across(shape: str, cell: float, density: float) -> Profile:
     """Across the box, over the middle of the biomass."""
     points, theirs, _ = _pypde(cell, density, shape)
-    ours = _ours(_spaced(cell, 0, shape), density, points)
-    on, curves = points[:, 0] == points[points[:, 0] > 0, 0].min(), []
-    for k, name in enumerate(NAMES):
-        curves += [(name, "ours", points[on, 1], ours[k, on]),
-                   (f"{name}, py-pde", "reference", points[on, 1], theirs[k, on])]
-    return Profile(f"{shape}, X = {density:g} mg/L, x = 0", "y (um)", "C (mg/L)", tuple(curves))
+    made, sink_ = _diffusing(_spaced(cell, 0, shape), density)
+    on = points[:, 0] == points[points[:, 0] > 0, 0].min()
+    ours, y = sample(made.space, both(transport.steady(made, sink_)), points[on]), points[on, 1]
+    return pictured("x = 0", "y (um)", y, ours, ("py-pde", "reference", y, theirs[:, on]))
+
+
+LAW = replace(SCENE.kinetics, yield_coefficient=1e-12)
+#: h: 0.07, 0.2 and 0.7 s. Water diffuses across the slab in 0.6 s, and crosses it in 0.1 to 6 s.
+TIMES = (2e-5, 6e-5, 2e-4)
+#: Steps of each of the three intervals.
+STEPS = (16, 32, 64, 128)
+#: FiPy's cells (um), half as long as these, and the elements of order 2 and 3 that they are compared with, whose error
+#: is less than a tenth of theirs.
+CELLS, FINE = (4.0, 2.5, 5 / 3, 1.0), {2: 1.0, 3: 5 / 3}
+#: Steady and in time: elements (um) with how many meshes of each, why orders are of second order, the last error of a
+#: density of linear elements, and that of FiPy's cells less those of order 2 and 3.
+AGAINST_FIPY = {
+    False: (SAMPLES, "both codes are of second order", {3e3: 1e-6, 3e4: 6e-6, 3e5: 5e-5}, 6e-6),
+    True: (dict(zip(CELLS, (4, 3, 2, 1))), "both codes are of second order; the error in time is a tenth",
+           {3e3: 3e-6, 3e4: 3e-5, 3e5: 3e-4}, 1e-5)}
+
+
+@cache
+def _assembled(size: float, number: int, peclet: float, order: int = 1) -> transport.Problem:
+    return problem(spaced(size, number, order), speed_of(peclet), law=LAW)
+
+
+@cache
+def _ours(size: float, number: int, peclet: float, density: float, steps: int, order: int = 1) -> np.ndarray:
+    """(times, 2, n): each interval in equal steps, started anew from the end of the last."""
+    made, states, last = _assembled(size, number, peclet, order), [], 0.0
+    active = filled(made.space, density)
+    now = transport.supplied_everywhere(made)
+    for time in TIMES:
+        interval, last = time - last, time
+        now = gear.advance(made, active, 0 * active, now, interval, fixed_step=interval / steps).concentrations
+        states.append(both(now))
+    return np.array(states)
+
+
+@BilinearForm
+def product(u, v, w):
+    """(u, v)."""
+    return u * v
+
+
+def mass(space: Space) -> np.ndarray:
+    """(n, n) um2, the mass matrix on a straight mesh by scikit-fem; of linear functions lumped."""
+    if space.order == 1:
+        return np.diag(space.lumped())
+    straight = space.mesh.straight
+    grid = MeshTri(straight.points.T.copy(), straight.triangles.T.copy())
+    basis = Basis(grid, {2: ElementTriP2(), 3: ElementTriP3()}[space.order], intorder=8)
+    apart, same = cKDTree(basis.doflocs.T).query(space.points)
+    if apart.max() > 1e-9:
+        raise ValueError("scikit-fem has its nodes elsewhere")
+    return product.assemble(basis).toarray()[np.ix_(same, same)]
+
+
+def _reading(space: Space) -> sp.csr_array:
+    """(points, n) concentrations in the points of the reaction from those at the nodes."""
+    pieces = space.reaction
+    count, k = pieces.dx.shape[1], pieces.cells.shape[1]
+    rows = np.repeat(np.arange(pieces.dx.size), k)
+    columns = np.repeat(pieces.cells, count, axis=0)
+    values = np.tile(pieces.values, (len(pieces.cells), 1))
+    return sp.csr_array((values.ravel(), (rows, columns.ravel())), shape=(pieces.dx.size, space.count))
+
+
+@cache
+def _exact_in_time(size: float, number: int, peclet: float, density: float, order: int) -> np.ndarray:
+    """(times, 2, n): the same equations in space, M dC/dt = b - L C - X q in the points of the reaction, by scipy's
+    integrator to 1e-8."""
+    made, law = _assembled(size, number, peclet, order), rates(LAW)
+    back = np.kron(np.eye(2), np.linalg.inv(mass(made.space)))
+    read = sp.block_diag([_reading(made.space)] * 2, "csr")
+    load = filled(made.space, density).ravel()
+
+    def rise(_, y):
+        return back @ (made.source - made.operator @ y - read.T @ sink(read @ y, load, law))
+
+    def slope(_, y):
+        return back @ -(made.operator + read.T @ slopes(read @ y, load, law) @ read).toarray()
+
+    start = np.repeat(pair("supply"), made.space.count)
+    found = solve_ivp(rise, (0.0, TIMES[-1]), start, jac=slope, method="BDF", t_eval=TIMES, rtol=1e-8, atol=1e-8)
+    return found.y.T.reshape(len(TIMES), 2, -1)
+
+
+def _largest(gap: np.ndarray) -> dict[str, float]:
+    """The largest over the times of differences (times, 2, ...)."""
+    rows = [_over_the_supply(part) for part in gap]
+    return {name: max(row[name] for row in rows) for name in NAMES}
+
+
+#: Order, Peclet number and density of what is studied in time, elements (um), and the last error.
+IN_TIME = {f"Pe = {peclet:g}, X = {density:g} mg/L, {word}": (ORDERS[word], peclet, density, size, ceiling)
+           for word, size, peclet, density, ceiling in (
+               ("linear", CELLS[0], 0.1, 3e5, 2e-5), ("linear", CELLS[0], 1.0, 3e4, 3e-6),
+               ("linear", CELLS[0], 5.0, 3e5, 1e-5), ("quadratic", CELLS[0], 1.0, 3e4, 3e-6),
+               ("quadratic", CELLS[0], 5.0, 3e5, 1e-5), ("cubic", 5.0, 1.0, 3e4, 3e-6), ("cubic", 5.0, 5.0, 3e5, 1e-5))}
+
+
+@case("transport-gear-in-time", kind="cross-code",
+      norm="largest over three times of the root mean square over the nodes, over the supply",
+      claim="On a given mesh the modified Gear scheme's concentrations, linear, quadratic and cubic, are those of "
+            "scipy's integrator with scikit-fem's mass matrix, with an error of second order in the step",
+      mutants=("carry-of-bdf2", "backward-euler", "storage-of-the-biomass-alone", "storage-diagonal"), over=IN_TIME)
+def in_time(order: int, peclet: float, density: float, size: float, ceiling: float):
+    trusted = _exact_in_time(size, 0, peclet, density, order)
+    errors = refine(lambda steps: {"size": TIMES[0] / steps, **_largest(
+        _ours(size, 0, peclet, density, steps, order) - trusted)}, STEPS)
+    return studies(errors, each(2, "BDF2 after a first step of backward Euler", ceiling))
+
+@cache
+def _channel(size: float, peclet: float, density: float) -> channel_fipy.Channel:
+    """FiPy's, its cells half as long as our edges."""
+    return channel_fipy.Channel(round(2 * (CROSSED[1] - CROSSED[0]) / size), CROSSED, *given(peclet, density))
+
+
+@cache
+def _fipy(size: float, peclet: float, density: float, timed: bool) -> np.ndarray:
+    """(times, 2, n) at the centres of its cells."""
+    channel = _channel(size, peclet, density)
+    return channel.transient(TIMES) if timed else channel.steady()[None]
+
+
+def _at_cells(x, size: float, number: int, order: int, peclet: float, density: float, steps: float) -> np.ndarray:
+    """(times, 2, 5, n) ours at x, at five heights, in so many steps; steady where there are none."""
+    if steps:
+        states = _ours(size, number, peclet, density, round(steps), order)
+    else:
+        states = found(size, number, peclet, density, order)[None]
+    return np.stack([at_heights(spaced(size, number, order), state, x) for state in states])
+
+
+def _rows(timed: bool) -> dict[str, tuple]:
+    rows = {**combined(LINEAR, PECLETS, DENSITIES), **combined(HIGHER, {"Pe = 1": 1.0}, {"X = 30000 mg/L": 3e4})}
+    return {label: (timed, *row) for label, row in rows.items()}
+
+
+@case("transport-monod-fipy", kind="cross-code",
+      norm="root mean square over FiPy's cells, at five heights, of each substrate over its supply, and in the starved "
+           "slab over its own value; several meshes a size",
+      claim="Dual Monod uptake under plug flow is FiPy's, both codes refined together, at Peclet 0.1, 1, 5 times "
+            "Thiele numbers 0.6, 1.9, 6, from barely touched to starved; that of quadratic and cubic elements, on one "
+            "mesh, is what FiPy's cells come to",
+      mutants=("decay-demand", "no-inlet-flux"), slow=True, over=_rows(False))
+@case("transport-gear-fipy", kind="cross-code",
+      norm="largest over three times of the root mean square over FiPy's cells, at five heights, over the supply; "
+           "several meshes a size",
+      claim="Transient profiles of both substrates are FiPy's, both codes refined together in space, at Peclet 0.1, 1, "
+            "5 times Thiele numbers 0.6, 1.9, 6; and refined in time, where FiPy's own scheme is of first order; those "
+            "of quadratic and cubic elements, on one mesh, are what FiPy's cells come to",
+      mutants=("storage-of-the-biomass-alone", "storage-diagonal"), slow=True, over=_rows(True))
+def finite_volumes(timed: bool, order: int, peclet: float, density: float):
+    samples, why, ceilings, closest = AGAINST_FIPY[timed]
+    if order > 1:
+        errors = refine(_to_fipy, CELLS, order, peclet, density, timed)
+        yield studies(errors, each(2, "FiPy's second order", closest), " of FiPy less ours")
+        return
+    errors = refine(_from_fipy, samples, peclet, density, timed)
+    yield studies(errors, each(2, why, ceilings[density]))
+    if not timed and (peclet, density) == STARVED:
+        yield studies(errors, {ITSELF_STARVED: (2, why, 6e-4)})
+    if timed and (peclet, density) == SHARED:
+        errors = refine(_from_backward_euler, STEPS, peclet, density)
+        yield studies(errors, each(1, "the lower of the two: FiPy's TransientTerm is backward Euler", 3e-4),
+                      " less FiPy's in as many steps")
+    yield _course(min(samples), peclet, density, timed)
+
+
+def _from_fipy(size: float, number: int, peclet: float, density: float, timed: bool) -> dict[str, float]:
+    """Both codes refined together; in the starved slab C_A over itself."""
+    x, theirs = _channel(size, peclet, density).x, _fipy(size, peclet, density, timed)
+    ours, inside = _at_cells(x, size, number, 1, peclet, density, timed * STEPS[-1] / size), (x > 0) & (x < SLAB)
+    ratio = ours[-1, 0][:, inside] / theirs[-1, 0, inside]
+    return {**_largest(ours - theirs[:, :, None]), ITSELF_STARVED: np.sqrt(np.mean((ratio - 1) ** 2))}
+
+
+def _to_fipy(cells: float, order: int, peclet: float, density: float, timed: bool) -> dict[str, float]:
+    """FiPy's cells against one mesh of quadratic or cubic elements."""
+    x, theirs = _channel(cells, peclet, density).x, _fipy(cells, peclet, density, timed)
+    ours = _at_cells(x, FINE[order], 0, order, peclet, density, timed * STEPS[-1])
+    return {"size": cells, **_largest(ours - theirs[:, :, None])}
+
+
+def _from_backward_euler(steps: int, peclet: float, density: float) -> dict[str, float]:
+    size = CELLS[-1]
+    channel = _channel(size, peclet, density)
+    ours = _at_cells(channel.x, size, 0, 1, peclet, density, steps)
+    return {"size": TIMES[0] / steps, **_largest(ours - channel.backward_euler(TIMES, steps)[:, :, None])}
+
+
+def _course(size: float, peclet: float, density: float, timed: bool) -> Profile:
+    """Along the channel, at each time; steady with what solve_bvp finds."""
+    x, curves = _channel(size, peclet, density).x, []
+    ours = _at_cells(x, size, 0, 1, peclet, density, timed * STEPS[-1])[:, :, 2]
+    for one, theirs in zip(ours, _fipy(size, peclet, density, timed)):
+        curves += pictured("", "", x, one, ("FiPy", "reference", x, theirs)).curves
+    if not timed:
+        truth = exact(peclet, density)(x[::12])
+        curves += [(f"{name}, solve_bvp", "exact", x[::12], part) for name, part in zip(NAMES, truth)]
+    return Profile("along the channel", "x (um)", "C (mg/L)", tuple(curves))
+
+
+WELL_MIXED, RADIUS = 24.0, 8.0
+SUPPLY, SEEDED = 1000.0, 300.0
+#: Times (h) at which both are compared; the transient scheme starts anew at each.
+HALF_DAYS = 12.0 * np.arange(1, 11)
+MIXED_STEPS = (2.0, 1.0, 0.5, 0.25)
+#: Last errors.
+MIXED = {"C_A": 4e-5, "C_D": 1.5e-5, "X_A": 6e-5, "X_I": 1e-4}
+#: Kinetics five times slower than the paper's, and half saturations of the supply's size: C falls for days.
+SLOW_LAW = replace(SCENE.kinetics, maximum_utilization_rate=SCENE.kinetics.maximum_utilization_rate / 5)
+EVEN = {"diffusivity": 1e8, "diffusivity_in_aggregate": 1e8, "supply": SUPPLY}
+CLOSED = replace(SCENE.substrates, boundary="closed",
+                 acceptor=replace(SCENE.substrates.acceptor, half_saturation=300.0, **EVEN),
+                 donor=replace(SCENE.substrates.donor, half_saturation=600.0, **EVEN))
+MIXED_NORM = "largest relative difference, twice a day for five days"
+
+
+def growing(acceptor, donor, active):
+    """dX_A/dt and dX_I/dt, (9)-(10), written down anew."""
+    m_a = acceptor / (acceptor + CLOSED.acceptor.half_saturation)
+    m_d = donor / (donor + CLOSED.donor.half_saturation)
+    b, f_d = SLOW_LAW.decay_coefficient, SLOW_LAW.degradable_fraction
+    growth = SLOW_LAW.maximum_utilization_rate * SLOW_LAW.yield_coefficient * m_d - b
+    return active * m_a * growth, active * m_a * b * (1 - f_d)
+
+
+@cache
+def box_around(order: int) -> Space:
+    """A box with a seed on its lower wall."""
+    seed = outline.half_disc(RADIUS, ACROSS_AGGREGATE * 0.5, min(order, 2))
+    return Space(meshes.around(seed, 0.3, (-WELL_MIXED, WELL_MIXED), WELL_MIXED)[0], order)
+
+
+@cache
+def _mixed_ours(step: float, order: int) -> np.ndarray:
+    """(times, 4, 2): mean and range of C_A and C_D over the nodes, of X_A and X_I over the points of the reaction, in
+    steps of so many hours."""
+    made = transport.problem(box_around(order), None, CLOSED, SLOW_LAW)
+    weight = made.space.reaction.dx
+    active = SEEDED * weight
+    inert, now, rows = 0 * active, transport.supplied_everywhere(made), []
+    for interval in np.diff([0.0, *HALF_DAYS]):
+        done = gear.advance(made, active, inert, now, interval, fixed_step=step)
+        active, inert, now = done.active, done.inert, done.concentrations
+        fields = (now.acceptor, now.donor, active / weight, inert / weight)
+        rows.append([(field.mean(), np.ptp(field)) for field in fields])
+    return np.array(rows)
+
+
+def _theirs(times, order: int) -> np.ndarray:
+    """(times, 4) by scipy."""
+    space, law = box_around(order), rates(SLOW_LAW, CLOSED)
+    share = space.reaction.dx.sum() / space.at.dx.sum()
+
+    def right(_, y):
+        sinks = uptake(y[0], y[1], law)
+        return [-share * y[2] * sinks[0], -share * y[2] * sinks[1], *growing(*y[:3])]
+
+    return solve_ivp(right, (0, times[-1]), [SUPPLY, SUPPLY, SEEDED, 0.0], t_eval=times, rtol=1e-11, atol=1e-10,
+                     method="DOP853").y.T
+
+
+@case("transport-well-mixed", kind="cross-code", norm=f"{MIXED_NORM}; X at constant C: relative, after five days",
+      claim="In a closed, well-mixed pore C_A, C_D, X_A and X_I follow the four ordinary equations over days, with an "
+            "error of second order in the step; at constant C the shape updates integrate X_A and X_I exactly",
+      mutants=("inert-fraction", "yield-dropped", "remains-of-the-start", "growth-in-one-increment"),
+      over=combined(LINEAR), because="orders 2, 3: transport-well-mixed-higher")
+@case("transport-well-mixed-higher", kind="cross-code", norm=MIXED_NORM, slow=True,
+      claim="With quadratic and cubic concentrations C_A, C_D, X_A and X_I of the well-mixed pore follow the four "
+            "ordinary equations alike",
+      mutants=("storage-diagonal", "inert-fraction", "remains-of-the-start"), over=combined(HIGHER),
+      because="order 1: transport-well-mixed")
+def followed(order: int):
+    """How even the box is, and studies of the four."""
+    trusted = _theirs(HALF_DAYS, order)
+    uneven = (_mixed_ours(MIXED_STEPS[-1], order)[:, :, 1] / trusted).max()
+    yield at_most("unevenness in the box", uneven, 1e-6, "L^2 / D over the time in which the supply lasts")
+    errors = refine(lambda step: {"size": step, **dict(zip(
+        MIXED, np.abs(_mixed_ours(step, order)[:, :, 0] / trusted - 1).max(axis=0)))}, MIXED_STEPS)
+    yield studies(errors, {name: (2, "BDF2, started anew ten times", ceiling) for name, ceiling in MIXED.items()})
+    if order == 1:
+        yield at_most("X at constant C, 12 min steps", _constant_supply(), 1e-9,
+                      "(9)-(10) are integrated exactly: round-off of 600 steps, and scipy's 1e-11")
+        yield _days("substrates", "C (mg/L)", (0, 1))
+        yield _days("biomass", "X (mg/L)", (2, 3))
+
+
+def _constant_supply() -> float:
+    """X_A and X_I as the quasi-steady scheme integrates them, over five days of 12 min updates."""
+    acceptor, donor = 400.0, 900.0
+    growth = kinetics.growth_rate(acceptor, donor, CLOSED, SLOW_LAW)
+    remains = kinetics.inert_rate(acceptor, CLOSED, SLOW_LAW)
+    active, inert = 3e4, 0.0
+    for _ in range(600):
+        active, inert = kinetics.grow(active, inert, growth, remains, 0.2)
+    found = solve_ivp(lambda t, y: growing(acceptor, donor, y[0]), (0, HALF_DAYS[-1]), [3e4, 0.0], rtol=1e-12,
+                      atol=1e-8, method="DOP853").y[:, -1]
+    return float(np.abs(np.array([active, inert]) / found - 1).max())
+
+
+def _days(title: str, label: str, chosen: tuple[int, int]) -> Profile:
+    """Two of the four against time."""
+    times, names = np.linspace(0.5, HALF_DAYS[-1], 121), [*MIXED]
+    trusted, ours, curves = _theirs(times, 1), _mixed_ours(MIXED_STEPS[-1], 1)[:, :, 0], []
+    for k in chosen:
+        curves += [(names[k], "ours", HALF_DAYS, ours[:, k]),
+                   (f"{names[k]}, solve_ivp", "reference", times, trusted[:, k])]
+    return Profile(title, "time (h)", label, tuple(curves))

@@ -1,6 +1,9 @@
 """What must hold whatever the solution is: the balance closes, nothing is negative, and there is one steady state.
 
 Substrates around a half-disc as scenes have them, sharp fronts and fast water among them, against finer meshes.
+
+A step of the midpoint rule takes up substrates with the mean biomass of the step, at concentrations at rest: with C_A
+and C_D constant over the step that is what (7)-(10) say, and what is made then balances what is taken up.
 """
 
 from __future__ import annotations
@@ -8,32 +11,39 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from functools import cache
+from itertools import product
 
 import numpy as np
+from scipy.integrate import solve_ivp
 
+from reference.monod import uptake
 from repro.errors import Unresolved
-from repro.model import gear, pore, remeshing, transport
+from repro.model import biomass, gear, kinetics, pore, remeshing, transport
 from repro.model.kinetics import Sink
+from repro.model.transport import Balance, Concentrations
 from repro.scene import load_scene, parse_scene
-from verification.kernel.case import Check, Outcome, at_most, case
-from verification.problems.channels import NAMES, ORDERS, WORDS, both
+from verification.kernel.case import Check, Study, at_most, case, combined, study
+from verification.problems.channels import NAMES, ORDERS, SCENE, both, rates
+from verification.transport.cross_code import box_around
 
 SLOW = 0.35e6 / 24
 #: Radius (um), supplies of acceptor and donor (mg/L): pores under 0.35 m/d whose biomass could take up far more.
 STARVED = [(radius, *supplies) for radius in (27.0, 42.0)
            for supplies in ((0.15, 0.15), (0.15, 10.0), (10.0, 0.15), (10.0, 10.0))]
-#: Refinements of each order: less than the paper's where elements are curved.
-REFINED = {1: 1.0, 2: 0.5, 3: 0.4}
+#: Changes of the scene base, which has the preset paper: elements of each order, curved ones coarser; and presets.
+KINDS = {"linear, paper": ('numerics.elements="linear"',),
+         "quadratic": ('numerics.elements="quadratic"', "numerics.refinement=0.5"),
+         "cubic": ('numerics.elements="cubic"', "numerics.refinement=0.4"),
+         "fast": ('numerics.preset="fast"',), "accurate": ('numerics.preset="accurate"',)}
 ROUND_OFF = "the sum of the weak form over its test functions; rows are solved to 1e-13 of terms 1e3 times the supply"
 
 
 @cache
-def _solved(radius: float, acceptor: float = 10.0, donor: float = 10.0, speed: float | None = 2.9e6 / 24,
-            inlet: str = "local", order: int = 1):
+def _solved(kind: tuple[str, ...], radius: float, acceptor: float = 10.0, donor: float = 10.0,
+            speed: float | None = 2.9e6 / 24, inlet: str = "local"):
     """(Pore, Solved); speed: um/h, None: no flow."""
     scene = load_scene("base", [f'aggregate.radius="{radius} um"', f'substrates.acceptor.supply="{acceptor} mg/L"',
-                                f'substrates.donor.supply="{donor} mg/L"', f'numerics.inlet="{inlet}"',
-                                f'numerics.elements="{WORDS[order]}"', f"numerics.refinement={REFINED[order]}"])
+                                f'substrates.donor.supply="{donor} mg/L"', f'numerics.inlet="{inlet}"', *kind])
     carried = None if speed is None else replace(scene.flow, head=None, mean_velocity=speed)
     scene = replace(scene, flow=carried)
     now = pore.seeded(scene)
@@ -42,8 +52,12 @@ def _solved(radius: float, acceptor: float = 10.0, donor: float = 10.0, speed: f
 
 def _defects(now, solved) -> list[float]:
     """(supplied - out - consumed) / supplied of both substrates."""
-    both_fluxes = transport.fluxes(solved.problem, Sink(now.active), solved.concentrations)
-    return [(flux.supplied - flux.out - flux.consumed) / flux.supplied for flux in both_fluxes]
+    fluxes = transport.fluxes(solved.problem, Sink(now.active), solved.concentrations)
+    return [_defect(flux) for flux in fluxes]
+
+
+def _defect(flux) -> float:
+    return (flux.supplied - flux.out - flux.consumed) / flux.supplied
 
 
 @case("transport-balance", kind="property",
@@ -52,40 +66,38 @@ def _defects(now, solved) -> list[float]:
             "(u_ave - u_x) C is counted [E4]; and supply in = out + consumed + stored in the transient scheme; with "
             "linear, quadratic and cubic elements",
       mutants=("carried-by-u", "weights-of-the-ends", "ledger-of-backward-euler", "printed-inlet-forgotten",
-               "outlet-forgotten"), ways="1 2 3")
-def balance() -> Outcome:
-    checks = []
-    for order in ORDERS:
-        rows = [("R = 5 um", _solved(5.0, order=order)), ("R = 40 um", _solved(40.0, order=order)),
-                ("R = 20 um, no flow", _solved(20.0, speed=None, order=order))]
-        for title, found in rows:
-            checks += [at_most(f"{name}, {title}, {WORDS[order]}", abs(defect), 1e-9, ROUND_OFF)
-                       for name, defect in zip(NAMES, _defects(*found))]
-        checks += [*_printed_inlet(order), *_in_time(_solved(5.0, order=order), order),
-                   *_in_time(_solved(20.0, speed=None, order=order), order)]
-    return Outcome((*checks, *_in_time(_solved(42.0, 10.0, 0.15, SLOW), 1)))
+               "outlet-forgotten"), over={label: (kind,) for label, kind in KINDS.items()})
+def balance(kind: tuple[str, ...]):
+    pores = {"R = 5 um": _solved(kind, 5.0), "R = 40 um": _solved(kind, 40.0),
+             "R = 20 um, no flow": _solved(kind, 20.0, speed=None)}
+    defects = {title: _defects(*found) for title, found in pores.items()}
+    printed = _solved(kind, 30.0, speed=SLOW, inlet="mean")
+    defects["R = 30 um, printed inlet"] = np.subtract(_defects(*printed), _by_the_printed_inlet(*printed))
+    for title, both_defects in defects.items():
+        for name, defect in zip(NAMES, both_defects):
+            yield at_most(f"{name}, {title}", abs(defect), 1e-9, ROUND_OFF)
+    timed = [pores["R = 5 um"], pores["R = 20 um, no flow"]]
+    if printed[0].space.order == 1:
+        timed.append(_solved(kind, 42.0, 10.0, 0.15, SLOW))
+    yield [_in_time(*found) for found in timed]
 
 
-def _printed_inlet(order: int):
-    """What enters is u_ave C_s less (u_ave - u_x) C of what is at the inlet, (u_ave - u_x) C_h counted as the weak form
-    has it: lumped at the nodes with linear elements."""
-    now, solved = _solved(30.0, speed=SLOW, inlet="mean", order=order)
-    made, space = solved.problem, now.space
+def _by_the_printed_inlet(now, solved) -> list[float]:
+    """(u_ave - u_x) C of what is at the inlet, over the supply, of both substrates, as the weak form has it: lumped at
+    the nodes with linear elements. What enters is u_ave C_s less that."""
+    space = now.space
     edges = space.dofs.inlet
     apart = solved.flow.mean_velocity - solved.flow.velocity[:, 0]
     weight = space.summed(edges, space.end_loads(edges, apart))
-    lost = [weight @ field / supplied for field, supplied in
-            zip(both(solved.concentrations), made.source.reshape(2, -1).sum(axis=1))]
-    return [at_most(f"{name}, R = 30 um, printed inlet, {WORDS[order]}", abs(defect - part), 1e-9, ROUND_OFF)
-            for name, defect, part in zip(NAMES, _defects(now, solved), lost)]
+    supplied = solved.problem.source.reshape(2, -1).sum(axis=1)
+    return [weight @ field / given for field, given in zip(both(solved.concentrations), supplied)]
 
 
-def _in_time(found, order: int):
+def _in_time(now, solved):
     """From the supply everywhere, over 36 s in controlled steps."""
-    now, solved = found
     start = transport.supplied_everywhere(solved.problem)
     done = gear.advance(solved.problem, now.active, now.inert, start, 0.01)
-    told = f"R = {now.outline.thickness:.0f} um, in time, " + ("" if solved.flow else "no flow, ") + WORDS[order]
+    told = f"R = {now.outline.thickness:.0f} um, in time" + ("" if solved.flow else ", no flow")
     return [at_most(f"{name}, {told}", abs(supplied - out - consumed - stored) / supplied, 3e-12,
                     "fluxes are integrated by the formula of the concentrations: round-off")
             for name, (supplied, out, consumed, stored) in zip(NAMES, zip(*done.flows))]
@@ -96,30 +108,21 @@ def _in_time(found, order: int):
       claim="Starved pores (0.35 m/d, radius 27 and 42 um, supplies of 0.15 and 10 mg/L) have one steady state, "
             "C >= 0, that closes the balance to round-off, whatever Newton's method starts from; the transient scheme "
             "comes to rest in it; with quadratic and cubic elements C is no more below zero than is let pass",
-      mutants=("newton-in-concentrations", "newton-stopped-early"), ways="1 2 3")
-def starved() -> Outcome:
-    checks = [check for row in STARVED for check in _starved(*row)]
-    for order in (2, 3):
-        checks += [check for row in STARVED for check in _starved(*row, order=order)]
-    return Outcome((*checks, *(_at_rest(*row) for row in STARVED[:4])))
-
-
-def _titled(radius: float, acceptor: float, donor: float, order: int) -> str:
-    return f"R = {radius:g} um, supplies {acceptor:g}, {donor:g} mg/L, {WORDS[order]}"
-
-
-#: How far C may be below zero over the supply, and why; how alike ways to the steady state end up.
-BELOW = {1: (0.0, "C >= 0"), 2: (1e-3, "what is let pass as resolved"), 3: (1e-3, "what is let pass")}
-
-
-def _starved(radius: float, *supplies: float, order: int = 1):
-    now, solved = _solved(radius, *supplies, SLOW, order=order)
-    title, (bound, why) = _titled(radius, *supplies, order), BELOW[order]
-    found = both(solved.concentrations)
+      mutants=("newton-in-concentrations", "newton-stopped-early"),
+      over={f"R = {row[0]:g} um, supplies {row[1]:g}, {row[2]:g} mg/L, {label}": (kind, *row)
+            for (label, kind), row in product(KINDS.items(), STARVED)})
+def starved(kind: tuple[str, ...], radius: float, *supplies: float):
+    now, solved = _solved(kind, radius, *supplies, SLOW)
+    found, linear = both(solved.concentrations), now.space.order == 1
     least = max(-(field.min() / supply) for field, supply in zip(found, supplies))
-    return (at_most(f"least C below zero, {title}", max(least, 0.0), bound, why),
-            at_most(f"balance, {title}", np.abs(_defects(now, solved)).max(), 1e-9, ROUND_OFF),
-            at_most(f"from other first iterates, {title}", _spread(now, solved, found), 1e-8, "one steady state"))
+    bound, why = (0.0, "C >= 0") if linear else (1e-3, "what is let pass as resolved")
+    yield at_most("least C below zero", max(least, 0.0), bound, why)
+    yield at_most("balance", np.abs(_defects(now, solved)).max(), 1e-9, ROUND_OFF)
+    yield at_most("from other first iterates", _spread(now, solved, found), 1e-8, "one steady state")
+    if linear and radius == STARVED[0][0]:
+        again = both(gear.settle(solved.problem, Sink(now.active), None))
+        yield at_most("the transient scheme at rest", np.abs(again / found - 1).max(), 1e-7,
+                      "it stops when 1e-9 of the supply is left to come")
 
 
 def _spread(now, solved, found) -> float:
@@ -128,70 +131,59 @@ def _spread(now, solved, found) -> float:
     random = np.random.default_rng(1)
     guesses = [np.full_like(found, 30.0), random.uniform(0, 30.0, found.shape), random.uniform(0, 0.1, found.shape)]
     size = found if now.space.order == 1 else solved.problem.supply.reshape(2, -1)
-    again = [both(transport.steady(solved.problem, Sink(now.active), transport.Concentrations(*guess)))
-             for guess in guesses]
+    again = [both(transport.steady(solved.problem, Sink(now.active), Concentrations(*guess))) for guess in guesses]
     return max(float(np.abs((one - found) / size).max()) for one in again)
 
 
-def _at_rest(radius: float, *supplies: float):
-    now, solved = _solved(radius, *supplies, SLOW)
-    again, found = both(gear.settle(solved.problem, Sink(now.active), None)), both(solved.concentrations)
-    return at_most(f"the transient scheme at rest, {_titled(radius, *supplies, 1)}", np.abs(again / found - 1).max(),
-                   1e-7, "it stops when 1e-9 of the supply is left to come")
-
-
-SCENE = load_scene("base")
 SUPPLY = SCENE.substrates.acceptor.supply
-PRESETS_NAMES = ("acceptor", "donor")
-#: What the front is solved with: a scene's [numerics], and how far its effluents may be from those far away.
-SOLVED = {"fast": ({"preset": "fast", "refinement": 0.25}, 1e-2),
-          "accurate": ({"preset": "fast", "refinement": 0.45}, 1e-3),
-          "linear": ({"preset": "paper"}, 1e-2)}
-CUBIC = {"preset": "fast", "elements": "cubic", "refinement": 0.45}
+#: What fronts are solved with, and how far its effluents may be from those far away.
+SOLVED = {"fast": (("fast", ("refinement", 0.25)), 1e-2), "accurate": (("fast", ("refinement", 0.45)), 1e-3),
+          "linear": (("paper",), 1e-2)}
+CUBIC = {"cubic": (("fast", ("elements", "cubic"), ("refinement", 0.45)), 1e-3)}
+#: Half saturations, and the least, at which cubic elements would take minutes.
+HALVES = {f"K_s = {half}": half for half in ("1e-2 mg/L", "1e-3 mg/L")}
+LEAST = {"K_s = 1e-5 mg/L": "1e-5 mg/L"}
 
 
 @case("transport-proportion", kind="property", norm="consumed acceptor over F times consumed donor, less one",
       claim="Behind a front where the donor is used up, at half saturations of a hundredth of its supply, both are "
             "taken up in their proportion, with linear, quadratic and cubic elements",
-      mutants=("unpaired",), ways="1 2 3 paper fast accurate")
-def proportion() -> Outcome:
-    half = "1e-2 mg/L"
-    kinds = {**{name: numerics for name, (numerics, _) in SOLVED.items()}, "cubic": CUBIC}
-    return Outcome(tuple(_in_proportion(_front(half, numerics), name, half) for name, numerics in kinds.items()))
+      mutants=("unpaired",), over=combined({"K_s = 1e-2 mg/L": "1e-2 mg/L"}, {**SOLVED, **CUBIC}),
+      ways="2 paper")
+def proportion(half: str, solved: tuple[tuple, float]):
+    return [_in_proportion(_front(half, *solved[0]))]
 
 
-def _in_proportion(found, name: str, half: str) -> Check:
+def _in_proportion(found) -> Check:
     ratio = found[0].consumed / found[1].consumed / SCENE.kinetics.acceptor_to_donor_ratio
-    return at_most(f"proportion, {name}, K_s = {half}", abs(ratio - 1), 1e-9,
-                   "one rate for both: exact but for where Newton's method stops")
+    return at_most("proportion", abs(ratio - 1), 1e-9, "one rate for both: exact but for where Newton's method stops")
 
 
 @case("transport-curved-front", kind="property", slow=True,
       norm="consumed acceptor over F times consumed donor, less one; difference of effluents over the larger supply, "
            "to a mesh of refinement 1.3",
       claim="Behind a front where the donor is used up, to half saturations of a millionth of the supply, both are "
-            "taken up in their proportion, with linear and quadratic elements, and what leaves is within the "
-            "presets' accuracy; where a mesh is refused, with the refinement that the refusal names",
-      mutants=("unpaired",), ways="1 2 paper fast accurate", because="order 3: transport-proportion")
-def front() -> Outcome:
-    checks = []
-    for half in ("1e-2 mg/L", "1e-3 mg/L", "1e-5 mg/L"):
-        far = _front(half, {"preset": "fast", "refinement": 1.3})
-        for name, (numerics, bound) in SOLVED.items():
-            found = _front(half, numerics)
-            apart = max(abs(a.effluent - b.effluent) for a, b in zip(found, far)) / SUPPLY
-            checks += [_in_proportion(found, name, half),
-                       at_most(f"effluents, {name}, K_s = {half}", apart, bound, "what the preset is for")]
-    return Outcome(tuple(checks))
+            "taken up in their proportion, with linear and quadratic elements (cubic: a ten-thousandth), and what "
+            "leaves is within the presets' accuracy; where a mesh is refused, with the refinement that it names",
+      mutants=("unpaired",), over=combined(HALVES, {**SOLVED, **CUBIC}) | combined(LEAST, SOLVED), ways="2 paper")
+def front(half: str, solved: tuple[tuple, float]):
+    numerics, bound = solved
+    found, far = _front(half, *numerics), _far_front(half)
+    apart = max(abs(a.effluent - b.effluent) for a, b in zip(found, far)) / SUPPLY
+    return [_in_proportion(found), at_most("effluents", apart, bound, "what the preset is for")]
 
 
-def _front(half: str, numerics: dict):
+@cache
+def _far_front(half: str):
+    return _front(half, "fast", ("refinement", 1.3))
+
+
+def _front(half: str, *numerics):
     """Ledgers of a thick half-disc that the donor, 1 mg/L, does not pass, without decay; on elements that are graded to
     the front, and if these are refused, with the refinement that is then advised."""
     both = {"acceptor": {"half_saturation": half}, "donor": {"supply": "1 mg/L", "half_saturation": half}}
-    tables = {"pore": {"width": "100 um"}, "aggregate": {"radius": "60 um"}, "flow": {"mean_velocity": "0.29 m/day"},
-              "substrates": both, "kinetics": {"decay_coefficient": "0 1/day"}, "numerics": numerics}
-    scene = _scene(tables)
+    scene = _half_disc(100.0, 60.0, "0.29 m/day", *numerics, substrates=both,
+                       kinetics={"decay_coefficient": "0 1/day"})
     try:
         return remeshing.resolved(scene, pore.seeded(scene))[1].fluxes
     except Unresolved as refusal:
@@ -202,65 +194,141 @@ def _front(half: str, numerics: dict):
     return remeshing.resolved(scene, pore.seeded(scene))[1].fluxes
 
 
-def _scene(tables: dict):
+def _half_disc(width: float, radius: float, speed: str, preset: str, *numerics: tuple[str, object], **sections: dict):
+    """A scene of a half-disc."""
+    tables = {"pore": {"width": f"{width} um"}, "aggregate": {"radius": f"{radius} um"},
+              "flow": {"mean_velocity": speed}, "substrates": {}, **sections,
+              "numerics": {"preset": preset, **dict(numerics)}}
     return parse_scene(tables, "half disc", "half_disc.toml")
 
 
-def _fluxes(tables: dict):
-    """Ledgers of a scene at t = 0, on the first mesh that is made."""
-    scene = _scene(tables)
+@cache
+def _carried(*given):
+    """Ledgers of a half-disc at t = 0, on the first mesh that is made."""
+    scene = _half_disc(*given)
     return pore.solve(scene, pore.seeded(scene)).fluxes
 
 
-FAR, WITHIN = 2.5, "0.1 %, what preset accurate is for"
+#: A preset and its elements, what effluents and consumption may err by, and why.
+WITHIN = "0.1 %, what preset accurate is for"
+FASTEST = {"quadratic, accurate": ("accurate", "quadratic", 1e-3, WITHIN),
+           "cubic": ("accurate", "cubic", 1e-3, WITHIN),
+           "fast": ("fast", "quadratic", 1e-3, "a tenth of what preset fast is for: its elements there are accurate's")}
 
 
 @case("transport-curved-peclet", kind="property", slow=True,
       norm="difference of effluents, over the supply, and of consumption, relative, to a mesh of refinement 2.5",
-      claim="In fast water (u W / D to 3e4) the boundary layers that preset accurate makes its elements for are "
-            "resolved to 0.1 %, with quadratic and with cubic elements",
-      mutants=("layers-ignored",),
-      ways="2 3 accurate", because="paper, fast: elements for boundary layers are accurate's")
-def peclet() -> Outcome:
-    checks = []
-    for speed in ("2.9 m/day", "29 m/day", "290 m/day"):
-        far = _carried(speed, FAR, "quadratic")
-        for kind in ("quadratic", "cubic"):
-            for name, ours, trusted in zip(PRESETS_NAMES, _carried(speed, 0.45, kind), far):
-                told = f"{name}, {speed}, {kind}"
-                checks += [at_most(f"effluent {told}", abs(ours.effluent - trusted.effluent) / SUPPLY, 1e-3, WITHIN),
-                           at_most(f"consumed {told}", abs(ours.consumed / trusted.consumed - 1), 1e-3, WITHIN)]
-    return Outcome(tuple(checks))
+      claim="In fast water (u W / D to 3e4) the boundary layers that the presets make their elements for are resolved "
+            "to 0.1 %, by accurate with quadratic and with cubic elements, and by fast",
+      mutants=("layers-ignored",), over=combined(
+          {speed: speed for speed in ("2.9 m/day", "29 m/day", "290 m/day")}, FASTEST),
+      because="order 1 and paper: linear elements are not made for boundary layers")
+def peclet(speed: str, made: tuple):
+    preset, elements, bound, why = made
+    far = _carried(100.0, 60.0, speed, "accurate", ("refinement", 2.5))
+    near = (("refinement", 0.45),) if preset == "accurate" else ()
+    for name, ours, trusted in zip(NAMES, _carried(100.0, 60.0, speed, preset, ("elements", elements), *near), far):
+        yield at_most(f"effluent {name}", abs(ours.effluent - trusted.effluent) / SUPPLY, bound, why)
+        yield at_most(f"consumed {name}", abs(ours.consumed / trusted.consumed - 1), bound, why)
 
 
-@cache
-def _carried(speed: str, refinement: float, kind: str):
-    """Ledgers of a thick half-disc in a pore of 100 um."""
-    return _fluxes({"pore": {"width": "100 um"}, "aggregate": {"radius": "60 um"}, "flow": {"mean_velocity": speed},
-                    "substrates": {},
-                    "numerics": {"preset": "accurate", "refinement": refinement, "elements": kind}})
+#: Numerics, the balance's round-off, and how far effluents may be from those of quadratic elements twice finer.
+LUMPED = (1e-9, ROUND_OFF)
+CONSERVES = (1e-11, "round-off: the form conserves")
+HALF_DISCS = {
+    "cubic": ("accurate", (("elements", "cubic"),), CONSERVES, 1e-5, "a hundredth of what preset accurate is for"),
+    "quadratic": ("accurate", (("refinement", 0.9),), CONSERVES, 0.0, "itself what the others are compared with"),
+    "linear, paper": ("paper", (), LUMPED, 1e-2, "1 %, what preset paper is for"),
+    "fast": ("fast", (), CONSERVES, 1e-3, "a tenth of what preset fast is for"),
+    "accurate": ("accurate", (), CONSERVES, 1e-4, "a tenth of what preset accurate is for")}
 
 
 @case("transport-cubic-half-disc", kind="property",
       norm="(in - out - consumed) over what comes in; difference over the supply to quadratic concentrations",
       claim="Around a half-disc, under the flow of cubic velocities, each substrate is in balance to round-off, and "
-            "the effluents are those of quadratic elements on a mesh twice finer",
-      mutants=("cubic-edge-nodes", "outlet-forgotten"),
-      ways="2 3 accurate", because="order 1 and the others: transport-balance")
-def half_disc() -> Outcome:
-    checks = []
-    for name, ours, theirs in zip(PRESETS_NAMES, _around("cubic", 0.45), _around("quadratic", 0.9)):
-        for kind, flux in (("cubic", ours), ("quadratic", theirs)):
-            defect = flux.supplied - flux.out - flux.consumed
-            checks.append(at_most(f"balance, {name}, {kind}", abs(defect / flux.supplied), 1e-11,
-                                  "round-off: the form conserves"))
-        checks.append(at_most(f"effluent, {name}", abs(ours.effluent - theirs.effluent) / SUPPLY, 1e-5,
-                              "a hundredth of what preset accurate is for"))
-    return Outcome(tuple(checks))
+            "the effluents are those of quadratic elements on a mesh twice finer; so are those of the presets, to what "
+            "they are for",
+      mutants=("cubic-edge-nodes", "outlet-forgotten"), over=HALF_DISCS)
+def half_disc(preset: str, numerics: tuple, round_off: tuple[float, str], bound: float, why: str):
+    far = _carried(50.0, 40.0, "2.9 m/day", "accurate", ("refinement", 0.9))
+    for name, ours, theirs in zip(NAMES, _carried(50.0, 40.0, "2.9 m/day", preset, *numerics), far):
+        yield at_most(f"balance, {name}", abs(_defect(ours)), *round_off)
+        if bound:
+            yield at_most(f"effluent, {name}", abs(ours.effluent - theirs.effluent) / SUPPLY, bound, why)
 
 
-def _around(kind: str, refinement: float):
-    """Ledgers around a half-disc of 40 um in a pore of 50 um."""
-    return _fluxes({"pore": {"width": "50 um"}, "aggregate": {"radius": "40 um"},
-                    "flow": {"mean_velocity": "2.9 m/day"}, "substrates": {},
-                    "numerics": {"preset": "accurate", "refinement": refinement, "elements": kind}})
+#: Lengths of a step (h); X_A more than doubles in the last.
+HOURS = (0.2, 2.0, 8.0)
+#: The paper's kinetics and diffusivities, the supply held at both ends: both substrates fall towards the wall.
+OPEN = replace(SCENE.substrates, acceptor=replace(SCENE.substrates.acceptor, supply=1.0))
+#: Elements of each order on a mesh of their own, and those of presets.
+MEAN: dict[str, int | str] = {**ORDERS, "paper": "paper", "fast": "fast", "accurate": "accurate"}
+
+
+@cache
+def _open(made: int | str) -> transport.Problem:
+    """Around a half-disc: of an order, or with the elements of a preset."""
+    if isinstance(made, int):
+        space = box_around(made)
+    else:
+        space = pore.seeded(_half_disc(50.0, 20.0, "2.9 m/day", made)).space
+    return transport.problem(space, None, OPEN, SCENE.kinetics)
+
+
+@case("transport-mean-biomass", kind="exact",
+      norm="biomass made less Y donor - (acceptor - F donor) / d_c, over what is made; uptake at constant C, relative; "
+           "remainder of a first-order Taylor expansion",
+      claim="With the mean biomass of a step of hours, biomass made is Y donor - (acceptor - F donor) / d_c of what is "
+            "taken up, to round-off, wherever concentrations are; at constant ones the uptake is the integral of "
+            "(7)-(10) over the step; and the tangent is the uptake's derivative",
+      mutants=("biomass-of-the-start", "biomass-half-way", "mean-biomass-constant-in-c"),
+      over=combined(MEAN))
+def mean_biomass(made: int | str):
+    for hours in HOURS:
+        yield _balanced(made, hours)
+        yield _integrated(made, hours)
+    yield _tangent(made, HOURS[-1])
+
+
+def _balanced(made: int | str, hours: float) -> Check:
+    """Biomass made against uptake, at the steady concentrations of a step."""
+    problem, law = _open(made), SCENE.kinetics
+    active = law.maximum_density * problem.space.reaction.dx
+    sink = Sink(active, hours)
+    state = transport.steady(problem, sink)
+    acceptor, donor = (hours * flux.consumed for flux in transport.fluxes(problem, sink, state))
+    found = biomass.rates(problem.space, state, OPEN, law)
+    after = kinetics.grow(active, 0 * active, found.growth, found.remains, hours)
+    grown = float(np.sum(after[0] - active) + np.sum(after[1]))
+    F, d_c = law.acceptor_to_donor_ratio, law.decay_oxygen_demand
+    asked = law.yield_coefficient * donor - (acceptor - F * donor) / d_c
+    return at_most(f"biomass made, {hours:g} h", abs(grown - asked) / grown, 1e-12,
+                   "one integral of growth and uptake in each point: round-off")
+
+
+def _integrated(made: int | str, hours: float) -> Check:
+    """Uptake at constant concentrations against scipy's integral of (7)-(10) over the step."""
+    problem, law = _open(made), rates(SCENE.kinetics, OPEN)
+    acceptor, donor, seeded = 0.7, 4.0, 300.0
+    everywhere = Concentrations(np.full(problem.space.count, acceptor), np.full(problem.space.count, donor))
+    ours = transport.fluxes(problem, Sink(seeded * problem.space.reaction.dx, hours), everywhere)
+    sinks = uptake(acceptor, donor, law)
+    yielded, decay = SCENE.kinetics.yield_coefficient, SCENE.kinetics.decay_coefficient
+    m_a = acceptor / (acceptor + law["K_A"])
+    growth = yielded * sinks[1] - decay * m_a
+    found = solve_ivp(lambda t, y: [growth * y[0], y[0] * sinks[0], y[0] * sinks[1]], (0, hours), [seeded, 0.0, 0.0],
+                      rtol=1e-12, atol=1e-9, method="DOP853").y[1:, -1]
+    taken = hours * np.array([flux.consumed for flux in ours]) / problem.space.reaction.dx.sum()
+    return at_most(f"uptake at constant C, {hours:g} h", np.abs(taken / found - 1).max(), 1e-10,
+                   "scipy's 1e-12, in a few steps")
+
+
+def _tangent(made: int | str, hours: float) -> Study:
+    """Remainders of the residual along a direction."""
+    problem, random = _open(made), np.random.default_rng(13)
+    balance = Balance(problem, Sink(SCENE.kinetics.maximum_density * problem.space.reaction.dx, hours))
+    state, along = random.uniform(0.5, 1.0, (2, 2 * problem.space.count))
+    steps = 0.05 * 0.5 ** np.arange(4)
+    linear, start = problem.system.product(balance.tangent(state), along), balance.residual(state)
+    left = [np.abs(balance.residual(state + s * along) - start - s * linear).max() for s in steps]
+    return study(f"tangent, {hours:g} h", steps, left, 2, "Taylor's theorem: second order")
