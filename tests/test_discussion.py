@@ -12,10 +12,11 @@ from repro import load_scene, run
 from repro.fem.outline import polygon_area
 from repro.model.kinetics import growth_rate
 from verification import claims
-from verification.claims import constant_head, discussed, levels, permeable, rheology, uptake
+from verification.claims import constant_head, discussed, levels, permeable, rheology, tearing, uptake
 from verification.claims.bars import barred
 from verification.claims.levels import CONVERGED, SCHEME, Level, at_level
 from verification.claims.restored import Body, bodies
+from verification.claims.restored import stress as restored_stress
 from verification.claims.runs import scene
 
 COARSE = Level(CONVERGED, 4.0)
@@ -151,18 +152,62 @@ def test_forces_put_on_at_the_end_are_those_of_a_run_with_them():
     """An elastic body forgets the way; what is left is what the forces changed of its growth."""
     found = bodies(HOUR)[-1]
     along = bodies((*HOUR, 'growth.fluid_forces="included"'))[-1]
-    free, forced, run_ = (discussed.tension(each)[0] for each in (found, discussed.pressed(found), along))
+    free, forced, run_ = (tearing.tension(each)[0] for each in (found, tearing.pressed(found), along))
     assert abs(forced / free - 1) > 0.02 and forced == pytest.approx(run_, rel=2e-3)
-    assert discussed.pressed(found).pore.time == found.pore.time
+    assert tearing.pressed(found).pore.time == found.pore.time
 
 
 def test_the_largest_tension_is_told_with_its_place():
     found = bodies(HOUR)[-1]
     values = found.cell("largest_principal_stress_MPa")
-    size, x, y, hours = discussed.tension(found)
+    size, x, y, hours = tearing.tension(found)
     assert size == values.max() and hours == 1.0
     corners = found.grid.points[found.triangles[int(np.argmax(values))]]
     assert corners[:, 0].min() < x < corners[:, 0].max() and corners[:, 1].min() < y < corners[:, 1].max()
+
+
+def test_the_mean_of_a_stress_is_over_area_and_distance():
+    """Of a field linear in x: its value at a place about which the points lie alike, whatever weighs there; the mean by
+    area where all is near."""
+    points = np.array([[-1.0, 0.0], [1.0, 0.0], [9.0, 0.0]])
+    field = tearing.Stress(points, np.array([2.0, 2.0, 1.0]), np.repeat(points[:, :1], 4, axis=1))
+    assert field.within(2.0, np.array([[0.0, 0.0], [8.5, 0.0]]))[:, 0] == pytest.approx([0.0, 9.0], abs=1e-12)
+    assert field.within(20.0, np.zeros((1, 2)))[0] == pytest.approx(9.0 / 5.0)
+
+
+def test_a_stress_is_that_of_the_fields_and_stands_for_all_of_the_aggregate():
+    """The mean over all of it is that of the triangles' means, which are over the areas of t = 0."""
+    found = bodies(HOUR)[-1]
+    stress, areas = tearing.stress_of(found), found.areas[found.grid.biomass]
+    cells = restored_stress(found, found.scene.growth.shear_modulus)
+    assert stress.areas.sum() == pytest.approx(areas.sum(), rel=1e-9)
+    whole = stress.within(100.0, np.zeros((1, 2)))[0]
+    assert whole == pytest.approx(areas @ cells / areas.sum(), abs=0.01 * np.abs(cells).max())
+    assert np.ptp(cells[:, 3]) < 1.5 * np.ptp(stress.values[:, 3])
+
+
+def test_the_peak_is_taken_at_places_of_its_own_in_the_aggregate():
+    """Of a lattice through the origin, on the wall too; the mean over more is less than a triangle's largest."""
+    found = bodies(HOUR)[-1]
+    places = tearing.lattice(found, 0.5)
+    assert np.allclose(places, 0.5 * np.round(places / 0.5)) and places[:, 1].min() == 0
+    assert len(places) == pytest.approx(polygon_area(found.outline.points) / 0.25, rel=0.2)
+    most = tearing.peak(found)
+    assert 0 < most.value <= tearing.tension(found)[0] / found.scene.growth.shear_modulus
+    assert most.value < tearing.peak(found, 0.05).value * 1.01
+
+
+def test_the_exponent_is_that_of_the_stress_that_is_added(monkeypatch):
+    """1 / r about a place, on top of any other stress."""
+    found = bodies(HOUR)[-1]
+    plane = np.random.default_rng(1).uniform(-50, 50, (200_000, 2))
+    place = np.array([3.0, 0.0])
+    shear = np.zeros((len(plane), 4))
+    shear[:, 3] = 1 / np.hypot(*(plane - place).T)
+    fields = iter((tearing.Stress(plane, np.ones(len(plane)), 0 * shear + 5.0),
+                   tearing.Stress(plane, np.ones(len(plane)), shear + 5.0)) * 2)
+    monkeypatch.setattr(tearing, "stress_of", lambda body: next(fields))
+    assert tearing.exponent(found, found, place) == pytest.approx(-1.0, abs=0.02)
 
 
 def test_sherwood_numbers_follow_the_flow_and_hardly_the_supply():

@@ -1,19 +1,17 @@
-"""C38-C40, C46: what the paper says in its introduction and discussion, and does not compute."""
+"""C38, C39: what the paper says in its introduction and discussion, and does not compute."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import gamma
 
 import numpy as np
 
 from reference import layered_channel
-from repro.model import contact
 from verification.claims import Finding, at_least, claim
 from verification.claims.accuracy import FEW, FEW_WORDS
 from verification.claims.levels import WIDE_FINE
 from verification.claims.permeability import clean
-from verification.claims.restored import Body, bodies, body, interface_length
+from verification.claims.restored import Body, bodies, interface_length
 from verification.claims.runs import BASE, WIDE, scene, series
 
 #: Conductivities over the clean channel's at which the biomass is compared.
@@ -144,66 +142,3 @@ def leveque(shear: float, length: float, diffusivity: float) -> float:
     """Mean Sherwood number, by its length, of a patch on a wall with constant concentration in a shear flow, at large
     Peclet numbers: 3/2 (G l^2 / D)^(1/3) / (9^(1/3) Gamma(4/3)), that is 0.807 (G l^2 / D)^(1/3)."""
     return 1.5 * (shear * length**2 / diffusivity / 9) ** (1 / 3) / gamma(4 / 3)
-
-
-@claim("C40", "5", "detachment by fracture along the lines of maximum stress could be incorporated", fine=WIDE_FINE)
-def tearing() -> Finding:
-    """Largest principal stress in the aggregate of base and wide: is there tension, where would it tear first, and
-    how do size and place change with time?"""
-    courses = {run[0]: course(run) for run in (BASE, WIDE)}
-    modulus = scene(*BASE).growth.shear_modulus
-    checks = [at_least(f"{name}: largest principal stress over mu_L", "stress is computed",
-                       max(peaks)[0] / modulus, 0.0, "tension", date=NEW) for name, peaks in courses.items()]
-    value, x, y, hours = max(courses["wide"])
-    first = max(courses["base"])
-    note = (f"In base it is {first[0] / modulus:.2g} mu_L, at ({first[1]:.1f}, {first[2]:.1f}) um and {first[3]:g} h; "
-            f"in wide {value / modulus:.2g} mu_L at ({x:.0f}, {y:.0f}) um and {hours:g} h: there it would tear first. "
-            + " ".join(f"Over time, in {name}: {_listed(peaks[4::5], modulus)}." for name, peaks in courses.items()))
-    return Finding(tuple(checks), reason="nothing is under tension", note=note)
-
-
-def course(run: tuple[str, ...]) -> list[tuple[float, float, float, float]]:
-    """Largest principal stress (MPa), its place (um) and time (h) of every row but that of t = 0."""
-    return [tension(found) for found in bodies(run)[1:]]
-
-
-def _listed(peaks: list[tuple[float, float, float, float]], modulus: float) -> str:
-    """In words."""
-    return ", ".join(f"{value / modulus:.2g} mu_L at ({x:.0f}, {y:.0f}) um and {hours:g} h"
-                     for value, x, y, hours in peaks)
-
-
-@claim("C46", "5", "the stress could link fluid flow, growth and detachment: the fluid changes the stress of which the "
-       "aggregate would tear", fine=WIDE_FINE)
-def torn_by_the_fluid() -> Finding:
-    """Largest principal stress of wide at 40 h, a plug under constant velocity, with the fluid's forces and without;
-    and of base at 19.4 h and of wide at 30 h, with a film left."""
-    cases = [[tension(found) for found in (body(run, hour), pressed(body(run, hour)))]
-             for run, hour in ((BASE, 19.4), (WIDE, 30.0), (WIDE, 40.0))]
-    changes = [100 * abs(forced[0] / without[0] - 1) for without, forced in cases]
-    names = ("base, 19.4 h", "wide, 30 h", "wide, 40 h")
-    checks = tuple(at_least(f"{name}: largest principal stress changed by the fluid (%)", "link", change, 100 * FEW,
-                            f"more than {FEW_WORDS}", date=NEW) for name, change in zip(names, changes))
-    modulus = scene(*BASE).growth.shear_modulus
-    told = "; ".join(f"{name} {_listed(pair, modulus)}, {change:.2g} % apart"
-                     for name, pair, change in zip(("base,", "wide,", "wide,"), cases, changes))
-    reason = ("while a film is left the fluid hardly changes the stress; in the plug two places bear nearly the same, "
-              "over the lower wall and at the upper contact line, so that which of them bears the most, and by how "
-              "much, hangs on the mesh as on the fluid")
-    return Finding(checks, reason=reason, note=f"Without and with the fluid's forces: {told}.")
-
-
-def pressed(found: Body) -> Body:
-    """The same aggregate at rest under the fluid's forces. It is elastic, so that this does not hang on the way there,
-    but for what the forces would have changed of its growth. Raises GrowthError where shape and flow do not agree."""
-    forced = replace(found.scene, growth=replace(found.scene.growth, fluid_forces="included"))
-    now, _, _ = contact.expand(forced, found.pore, found.pore.theta)
-    return Body(forced, now, found.solved)
-
-
-def tension(found: Body) -> tuple[float, float, float, float]:
-    """Largest principal stress (MPa), its place (um) and time (h)."""
-    values = found.cell("largest_principal_stress_MPa")
-    worst = int(values.argmax())
-    x, y = found.grid.points[found.triangles[worst]].mean(axis=0)
-    return float(values[worst]), float(x), float(y), round(found.pore.time, 9)
