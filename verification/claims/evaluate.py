@@ -13,7 +13,7 @@ import numpy as np
 import verification.claims as package
 from verification.claims import CLAIMS, Finding
 from verification.claims.bars import Numbers, numbers
-from verification.claims.levels import CONVERGED, PAIRED, Level, at_level, forget
+from verification.claims.levels import COMPARED, CONVERGED, PAIRED, Level, at_level, forget
 
 #: Of a claim at one level: its numbers, with its finding where the level is the judged one, or the error in words.
 Found = tuple[Numbers, Finding | None] | str
@@ -40,7 +40,7 @@ def everywhere(ids: Iterable[str]) -> dict[str, dict[Level, Found]]:
 
 def effort(level: Level) -> float:
     """About how long a level takes, in any unit."""
-    several = RUNS_OF_PAIRED if level.kind == CONVERGED and level.size in PAIRED else 1.0
+    several = RUNS_OF_PAIRED if level.kind == CONVERGED and level.size in (*PAIRED, *COMPARED) else 1.0
     return several * (4.0 if level.kind == CONVERGED else 2.0) / (level.size**3 * level.step)
 
 

@@ -126,12 +126,12 @@ def undecidable(expected: float, own: tuple[float, float]) -> str:
     (low_a, high_a), (low_d, high_d) = PRINTED_EFFLUENTS
     plain = printed_errors(expected, 1.0)
     within = 100 * share_within(expected, PAPER_CORRECTION, 1.0)
-    return (f"no computation decides it. The paper's own effluents are printed as 4.19 and 6.13: {high_a:.3f} and "
-            f"{low_d:.3f} print so and make the ratio {own[0]:.2f} % off, {low_a:.3f} and {high_d:.3f} print so too "
-            f"and make it {own[1]:.2f} %; of all pairs that do, {within:.0f} % are within 1 %. The ratio that is "
-            f"expected, F1 over F2, is {expected:.4f} on every mesh. Without a correction the printed effluents are "
-            f"{plain[0]:.1f} to {plain[1]:.1f} % off, so that one is needed. The two other ratios need the paper's own "
-            "increments of area, which are not printed")
+    return ("no computation decides it, since effluents that print as the paper's own, 4.19 and 6.13, lie on both "
+            f"sides of 1 %. {high_a:.3f} and {low_d:.3f} print so and make the ratio {own[0]:.2f} % off, {low_a:.3f} "
+            f"and {high_d:.3f} print so too and make it {own[1]:.2f} %; of all pairs that do, {within:.0f} % are "
+            f"within 1 %. The ratio that is expected, F1 over F2, is {expected:.4f} on every mesh. Without a "
+            f"correction the printed effluents are {plain[0]:.1f} to {plain[1]:.1f} % off, so that one is needed. The "
+            "two other ratios need the paper's own increments of area, which are not printed")
 
 
 def _time_lag(book: Bookkeeping) -> str:

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from verification.claims import Finding, at_least, at_most, claim
 from verification.claims.accuracy import FEW, FEW_WORDS
-from verification.claims.levels import PAIRED
+from verification.claims.levels import COMPARED
+from verification.claims.rheology import WHOLE
 from verification.claims.runs import around_contact, at, scene, series
 
 PLOTTED = 19.2
@@ -19,7 +20,7 @@ PERMEABILITY = 1e-3
 NEW = "2026-11-22"
 #: A pore as base to the shape that section 4 plots, and wide until its plug is 5 h old.
 AGGREGATE = ("base", f'growth.end="{PLOTTED} h"', f'output.times=["{PLOTTED} h"]')
-PLUG = ("wide", 'growth.end="40 h"')
+PLUG = WHOLE
 
 
 def permeable(run: tuple[str, ...], permeability: float = PERMEABILITY) -> tuple[str, ...]:
@@ -35,7 +36,7 @@ def equivalent(run: tuple[str, ...]) -> float:
 
 @claim("C42", "5", "a porous material instead of a raised viscosity may lead to differences, depending on the "
                    "conditions",
-       fine=PAIRED, beside=())
+       fine=COMPARED, beside=())
 def drag_or_viscosity() -> Finding:
     """Conductivity with Brinkman's drag of a permeability of 1e-15 m2 over that with lambda = 2000: base at 19.2 h, an
     aggregate; wide just before contact, a film; and 5 h after it, a plug; and the times of contact."""

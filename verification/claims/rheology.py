@@ -4,6 +4,11 @@ fixed points elsewhere, and film and contact angle halved and doubled (2.3.3).
 The paper calls its rheology open to argument, and the boundary conditions debatable and reasonable, and expects no
 substantial effect on what it concludes: an outline as in Figure 6, contact after a day and a half, and a conductivity
 that falls when it comes. Each choice is changed alone in wide, which has all of them at work.
+
+How far the aggregate slides where its middles are rechosen has no limit in a mesh. A middle is the node nearest to it,
+and the elements on the wall are 5 to 24 um long there. And two points of no size hold an elastic plane: what each of
+them bears vanishes, as one over the logarithm of the elements, so that the meshes around both decide whose slide it is.
+The lower wall's alone, followed with the material, is 11.1 um from size 2 to 1.4, the upper wall's 1.2 um.
 """
 
 from __future__ import annotations
@@ -12,15 +17,15 @@ from collections.abc import Callable
 
 from shapely.affinity import translate
 
-from verification.claims import Finding, PaperCheck, at_most, claim
+from verification.claims import Finding, PaperCheck, at_most, claim, without_limit
 from verification.claims.accuracy import FEW, FEW_WORDS
-from verification.claims.levels import PAIRED
+from verification.claims.levels import BESIDE_COMPARED, COMPARED
 from verification.claims.restored import bodies, polygon
 from verification.claims.runs import around_contact, scene, series
 
 #: Hours: in all variants the opposite wall has then been touched for 5 h.
 END = 40
-WHOLE = ("wide", f'growth.end="{END} h"')
+WHOLE = ("wide", f'growth.end="{END} h"', f'output.times=["{END} h"]')
 RECHOSEN = "middles rechosen"
 #: One choice each, in words and as changes of the scene.
 VARIANTS = {
@@ -34,7 +39,7 @@ NEW = "2026-11-22"
 
 
 @claim("C41", "5, 2.3.3", "another rheology, and other conditions where the aggregate meets the walls, are unlikely to "
-       "affect the conclusions substantially", fine=PAIRED, beside=())
+       "affect the conclusions substantially", fine=COMPARED, beside=BESIDE_COMPARED)
 def other_rheology() -> Finding:
     """Wide to 40 h with one choice changed at a time: area that only one of the two outlines covers, shift of the time
     of contact, and change of the conductivity at the end."""
@@ -53,8 +58,11 @@ def _changes(name: str, run: tuple[str, ...]) -> tuple[PaperCheck, ...]:
     quantities: dict[str, Callable] = {f"outlines apart at {END} h (% of the area)": apart,
                                        "time of contact (%)": lambda run: 100 * (contact(run) / contact(WHOLE) - 1),
                                        f"conductivity at {END} h (%)": conductivity_change}
-    return tuple(at_most(f"{name}: {what}", "not substantially", abs(change(run)), 100 * FEW, FEW_WORDS, date=NEW)
-                 for what, change in quantities.items())
+    checks = [at_most(f"{name}: {what}", "not substantially", abs(change(run)), 100 * FEW, FEW_WORDS, date=NEW)
+              for what, change in quantities.items()]
+    if name == RECHOSEN:
+        checks[0] = without_limit(checks[0])
+    return tuple(checks)
 
 
 def apart(run: tuple[str, ...]) -> float:
