@@ -379,6 +379,24 @@ def test_bars_after_contact_are_listed(kept):
     assert after_contact.percent({"low": 0.0, "high": 0.0, "value": 0.0}) == 0
 
 
+def test_exact_is_told_by_its_distance_from_the_finest_and_their_bar():
+    """0.5 % is shown where both together are less; of what 2 % are asked, nothing is said."""
+    row = {"quantity": "q", "values": [2.0, 2.1], "bar_percent": 0.3, "asked_percent": 1.0}
+    assert after_contact.distance(row, 1.997) == "q: 2, 2.1, bar 0.3 %; exact 1.997, -0.15 %; 0.5 % shown"
+    assert after_contact.distance(row, 2.005).endswith("+0.25 %; 0.5 % not shown")
+    assert after_contact.distance({**row, "asked_percent": 2.0}, 1.997).endswith("-0.15 %")
+
+
+def test_the_distance_of_exact_is_of_every_recorded_number(monkeypatch, capsys):
+    rows = after_contact.sensitivity.record()["after_contact"]
+    ours = {row["quantity"]: row["values"][0] for row in rows}
+    monkeypatch.setattr(after_contact, "exact", lambda: (ours, 12.0))
+    after_contact.main()
+    told = capsys.readouterr().out
+    assert told.count("+0 %") == len(rows) == 8 and "took 12 s of processor time, 60 s are asked" in told
+    assert told.count("0.5 % shown") + told.count("0.5 % not shown") == 6
+
+
 #: Claims about base whose numbers a test can compute in seconds.
 QUICK = ("C01", "C02", "C03", "C04", "C05", "C06", "C09", "C15", "C34")
 

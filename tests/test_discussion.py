@@ -127,6 +127,8 @@ def test_what_a_variant_changes_is_measured_against_the_paper(monkeypatch):
     monkeypatch.setattr(rheology, "contact", lambda run: times[run])
     checks = rheology._changes("x", bigger)
     assert checks[1].value == pytest.approx(10.0) and not checks[1].holds
+    assert all(check.converges for check in checks)
+    assert [each.converges for each in rheology._changes(rheology.RECHOSEN, bigger)] == [False, True, True]
 
 
 def test_an_outline_that_has_slid_is_moved_back(monkeypatch):

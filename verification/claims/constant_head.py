@@ -12,7 +12,7 @@ import numpy as np
 from repro.model import biomass
 from verification.claims import Finding, at_least, at_most, claim
 from verification.claims.growth_pattern import growth_rates, made
-from verification.claims.levels import PAIRED
+from verification.claims.levels import BESIDE_PAIRED, PAIRED
 from verification.claims.restored import Body, bodies
 from verification.claims.runs import WIDE, around_contact, series
 
@@ -28,7 +28,7 @@ ORDER = "an order of magnitude"
 @claim("C43", "1, 4", "as biomass grows, permeability falls, which restricts flow and supply; once the pore is "
                       "spanned, "
        "growth is on the upgradient side and the conductivity falls sharply: under constant head too", fine=PAIRED,
-       beside=())
+       beside=BESIDE_PAIRED)
 def throttled() -> Finding:
     """Base to 76 h: flow, uptake and growth at the end over their first or largest values; where it grows; decay of
     active biomass over its synthesis; and the fall of the conductivity in the 5 h up to contact, as in C16."""

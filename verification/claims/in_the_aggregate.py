@@ -6,7 +6,7 @@ import numpy as np
 
 from verification.claims import Finding, at_least, at_most, between, claim
 from verification.claims.accuracy import FEW, FEW_WORDS
-from verification.claims.levels import WIDE_FINE
+from verification.claims.levels import TOLD, WIDE_FINE, at_level
 from verification.claims.restored import Body, bodies, body, equivalent, in_plane, polygon, stress
 from verification.claims.runs import BASE, WIDE, at, scene, series
 
@@ -76,10 +76,11 @@ def penetrated() -> Finding:
 
 def _until_when() -> str:
     """Penetration of the longer run, in words."""
-    hours, acceptor = series(*LONGER)["time_h"], least(LONGER, "acceptor")
+    with at_level(TOLD):
+        hours, acceptor = series(*LONGER)["time_h"], least(LONGER, "acceptor")
+        even = hours[[evenness(found) >= 0.9 for found in bodies(LONGER)]][-1]
     told = ", ".join(f"{bound} K_s until {float(np.interp(-bound, -acceptor, hours)):.1f} h"
                      for bound in (9, 6, 4, 3, 2, 1) if acceptor[-1] < bound)
-    even = hours[[evenness(found) >= 0.9 for found in bodies(LONGER)]][-1]
     return (f"Until when, in a run to {hours[-1]:g} h: the acceptor has at least {told}; in whole hours, uptake is "
             f"even to a tenth until {even:g} h.")
 

@@ -14,8 +14,8 @@ import numpy as np
 from repro.model import pore
 from verification.claims import OF_SCHEME, Finding, at_least, at_most, between, claim, interval, near, without_limit
 from verification.claims.accuracy import FEW, FEW_WORDS
-from verification.claims.levels import ALONE, BESIDE, DEFAULT, at_level
-from verification.claims.runs import BASE, LAST, at, grown, ledger, scene, series
+from verification.claims.levels import ALONE, BESIDE, DEFAULT, TOLD, at_level
+from verification.claims.runs import BASE, LAST, PLATES, at, grown, ledger, scene, series
 from verification.claims.states import full_biomass, half_disc, solution
 from verification.uncertainty import Bar
 
@@ -248,7 +248,8 @@ def richer_supply() -> Finding:
 def _richer() -> str:
     """What more supply does besides, in words."""
     rich, richest = (plotted_fluxes(supplied(value))[0].consumed for value in ("20 mg/L", "40 mg/L"))
-    larger = at(RICH, PLOTTED)["aggregate_area_um2"] / at(BASE, PLOTTED)["aggregate_area_um2"]
+    with at_level(TOLD):
+        larger = at(RICH, PLOTTED)["aggregate_area_um2"] / at(PLATES, PLOTTED)["aggregate_area_um2"]
     return (f"From 20 to 40 K_s: {100 * (richest / rich - 1):+.1f} % for the acceptor. With 20 K_s from t = 0 the "
             f"aggregate of 19.2 h is {larger:.2f} times as large, having grown faster all along.")
 
