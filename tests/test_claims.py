@@ -22,16 +22,15 @@ from verification.claims import (
     ClaimError,
     Finding,
     after_contact,
+    base_run,
     evaluate,
-    independence,
     levels,
-    record,
     report,
     runs,
 )
 from verification.claims import __main__ as driver
 from verification.claims.levels import CONVERGED, SCHEME, Level, at_level
-from verification.claims.mass_balance import Bookkeeping
+from verification.claims.scheme import Bookkeeping
 from verification.sensitivity import one_set
 from verification.sensitivity.inputs import factors_of
 from verification.sensitivity.numbers import of_base
@@ -57,7 +56,7 @@ def registry(monkeypatch, tmp_path):
         monkeypatch.setattr(module, "CLAIMS", claims.CLAIMS)
     monkeypatch.setattr(evaluate, "register_all", lambda: None)
     monkeypatch.setattr(evaluate, "side_by_side", lambda function, *given: list(map(function, *given)))
-    monkeypatch.setattr(record, "COMMITTED", tmp_path / "claims.json")
+    monkeypatch.setattr(report, "COMMITTED", tmp_path / "claims.json")
     return claims.CLAIMS
 
 
@@ -161,7 +160,7 @@ def test_a_claim_that_nobody_computes_is_a_failure(registry, capsys):
 
 def committed(registry, *ids):
     """What the claims come to now, as the committed record."""
-    record.COMMITTED.write_text(json.dumps([record.entry(row) for row in driver.judged(ids)]), encoding="utf-8")
+    report.COMMITTED.write_text(json.dumps([report.entry(row) for row in driver.judged(ids)]), encoding="utf-8")
 
 
 @pytest.mark.parametrize("function", [lambda: Finding((BAD,)), lambda: Finding(()), lambda: 1 / 0])
@@ -245,30 +244,30 @@ def recorded_claim(low, high, bar, change="", rounding="", others=()):
     ((-1.5, -0.5), [UNDECIDED]), ((-4.0, -3.0), []), ((1.0, 1.0), []), ((8.0, 9.9), [UNDECIDED])])
 def test_verdicts_that_a_bound_moved_by_its_bar_changes_are_listed(bar, flipped):
     """Accepted is 0 to 10."""
-    assert [flip.verdict for flip in record.flips(recorded_claim(0.0, 10.0, bar))] == flipped
+    assert [flip.verdict for flip in report.flips(recorded_claim(0.0, 10.0, bar))] == flipped
 
 
 def test_a_flip_is_that_of_the_whole_claim():
-    assert record.flips(recorded_claim(0.0, 10.0, (0.5, 2.5), others=[FAILS])) == []
+    assert report.flips(recorded_claim(0.0, 10.0, (0.5, 2.5), others=[FAILS])) == []
     within = recorded_claim(0.0, 10.0, (-2.5, -0.5), rounding="k 9.3", others=[HOLDS])
-    assert [flip.verdict for flip in record.flips(within)] == [UNDECIDED]
+    assert [flip.verdict for flip in report.flips(within)] == [UNDECIDED]
     changed = recorded_claim(0.0, 10.0, (-0.5, 1.5), change="at saturation")
-    assert [flip.verdict for flip in record.flips(changed)] == [CHANGED]
+    assert [flip.verdict for flip in report.flips(changed)] == [CHANGED]
 
 
 def test_the_whole_report_is_written_and_compared(registry, monkeypatch, tmp_path, capsys):
     for id in EXPECTED:
         registered(id, lambda: Finding((GOOD, claims.at_least("a", "|b|", 2, 1, ""))))
     lines = (("speed", (1.0, 2.0, 2.1), (100.0, 5.0)),)
-    compared = independence.Comparison("three sizes", ("coarse", "base", "fine"), lines)
-    monkeypatch.setattr(independence, "computed", dict)
-    monkeypatch.setattr(independence, "comparisons", lambda rows: (compared,))
-    monkeypatch.setattr(independence, "checks", lambda rows: (GOOD,))
+    compared = base_run.Comparison("three sizes", ("coarse", "base", "fine"), lines)
+    monkeypatch.setattr(base_run, "computed", dict)
+    monkeypatch.setattr(base_run, "comparisons", lambda rows: (compared,))
+    monkeypatch.setattr(base_run, "checks", lambda rows: (GOOD,))
     monkeypatch.setattr(driver, "OUT", tmp_path / "out")
     assert driver.main([]) == 1 and "C01: not in the record" in capsys.readouterr().out
     assert driver.main(["--record"]) == 0
-    kept = record.COMMITTED.read_bytes()
-    assert driver.main([]) == 0 and record.COMMITTED.read_bytes() == kept
+    kept = report.COMMITTED.read_bytes()
+    assert driver.main([]) == 0 and report.COMMITTED.read_bytes() == kept
     assert f"{len(EXPECTED)} claims as recorded in claims.json" in capsys.readouterr().out
     written = json.loads((tmp_path / "out" / "claims.json").read_text(encoding="utf-8"))
     assert written == json.loads(kept) and [row["id"] for row in written] == list(EXPECTED)
@@ -277,21 +276,21 @@ def test_the_whole_report_is_written_and_compared(registry, monkeypatch, tmp_pat
     assert near["low"] == near["high"] == 2.91 and near["scheme_2001"] == [2.91, 2.91]
     table = (tmp_path / "out" / "claims.md").read_text(encoding="utf-8")
     assert "2.1 (+5.00 %)" in table and "| 2.91<br>2 | 2.91<br>2 |" in table
-    monkeypatch.setattr(independence, "checks", lambda rows: (BAD,))
+    monkeypatch.setattr(base_run, "checks", lambda rows: (BAD,))
     assert driver.main([]) == 1
 
 
 def test_a_number_out_of_its_recorded_interval_is_told(registry, capsys):
     registered("C01", lambda: Finding((GOOD,)))
     committed(registry, "C01")
-    content = json.loads(record.COMMITTED.read_text(encoding="utf-8"))
+    content = json.loads(report.COMMITTED.read_text(encoding="utf-8"))
     content[0]["checks"][0] |= {"low": 2.92, "high": 2.93}
-    record.COMMITTED.write_text(json.dumps(content), encoding="utf-8")
+    report.COMMITTED.write_text(json.dumps(content), encoding="utf-8")
     assert driver.main(["C01"]) == 1
     assert "C01: speed (m/d) is 2.91, recorded as 2.92 to 2.93" in capsys.readouterr().out
     content[0]["checks"][0] |= {"low": 2.91 * (1 - 1e-12), "high": 2.92}
     content[0]["verdict"] = CONTRADICTED
-    record.COMMITTED.write_text(json.dumps(content), encoding="utf-8")
+    report.COMMITTED.write_text(json.dumps(content), encoding="utf-8")
     assert driver.main(["C01"]) == 1
     assert "C01: reproduced, recorded as contradicted" in capsys.readouterr().out
 
@@ -300,11 +299,11 @@ def test_some_claims_are_recorded_anew_and_the_others_stay(registry):
     for id in ("C01", "C02"):
         registered(id, lambda: Finding((GOOD,)))
     assert driver.main(["--record", "C02"]) == 0 and driver.main(["--record", "C01"]) == 0
-    assert [each["id"] for each in record.read()] == ["C01", "C02"]
+    assert [each["id"] for each in report.read()] == ["C01", "C02"]
     claims.CLAIMS.pop("C01")
     registered("C01", lambda: Finding((BAD,), reason="it leaks"))
     assert driver.main(["C01"]) == 1 and driver.main(["--record", "C01"]) == 0
-    assert [each["verdict"] for each in record.read()] == [CONTRADICTED, REPRODUCED]
+    assert [each["verdict"] for each in report.read()] == [CONTRADICTED, REPRODUCED]
 
 
 def test_the_terminal_table_fits(registry):
@@ -326,7 +325,7 @@ def test_every_row_of_the_paper_has_its_judge():
 # The committed record.
 @pytest.fixture(scope="module")
 def kept():
-    return record.read()
+    return report.read()
 
 
 def test_the_record_has_every_claim_in_its_schema(kept):
@@ -362,7 +361,7 @@ def test_no_recorded_verdict_flips_to_its_opposite(kept):
     """With a bound moved by the bar of its number a verdict comes to be open at most, or an open one decided; of the
     decided ones no more than a tenth comes to be open."""
     verdicts = {each["id"]: each["verdict"] for each in kept}
-    found = [flip for each in kept for flip in record.flips(each)]
+    found = [flip for each in kept for flip in report.flips(each)]
     assert all(UNDECIDED in (flip.verdict, verdicts[flip.id]) for flip in found), found
     assert len({flip.id for flip in found if verdicts[flip.id] != UNDECIDED}) <= len(kept) // 10
 
@@ -411,7 +410,7 @@ def test_coordinates_perturbed_by_1e_12_change_no_verdict_and_leave_no_interval(
     known = {each["id"]: each for each in kept}
     for id, finding in found.items():
         for check, recorded in zip(finding.checks, known[id]["checks"], strict=True):
-            assert record.inside(check.value, recorded["low"], recorded["high"]), (id, check.quantity, check.value)
+            assert report.inside(check.value, recorded["low"], recorded["high"]), (id, check.quantity, check.value)
             assert check.holds == (recorded["outcome"] == HOLDS), (id, check.quantity)
 
 

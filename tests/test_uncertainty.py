@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from repro.march.updates import schedule
 from repro.scene import load_scene, scene_hash
 from verification import claims, uncertainty
-from verification.claims import Claim, ClaimError, Finding, bars, evaluate, levels, runs
+from verification.claims import Claim, ClaimError, Finding, evaluate, levels, runs
 from verification.claims.levels import ALONE, CONVERGED, DEFAULT, SCHEME, Level, at_level
 from verification.uncertainty import FORMAL, OBSERVED, Bar, Estimate, combined, estimate, spread
 
@@ -201,8 +201,8 @@ def test_every_claim_is_computed_on_three_meshes_and_with_three_steps_or_says_wh
 def judged(check, value, **fields):
     """A check with its bar, from a function of the level that gives the value."""
     claim = Claim("C01", "4", "", lambda: None, **({"about": claims.OF_SCHEME} | fields))
-    at = {level: bars.numbers(Finding((claims.replace(check, value=value(level)),))) for level in claim.levels}
-    return bars.barred(claim, Finding((check,)), at).checks[0]
+    at = {level: evaluate.numbers(Finding((claims.replace(check, value=value(level)),))) for level in claim.levels}
+    return evaluate.barred(claim, Finding((check,)), at).checks[0]
 
 
 SPEED = claims.near("speed at 34.4 h (m/d)", "2.9", 2.91, 2.9, relative=0.1, why="")
@@ -243,7 +243,7 @@ def test_a_number_without_a_limit_has_the_range_of_all_levels():
 def test_the_instant_of_an_event_may_differ_between_levels_and_the_quantity_may_not():
     claim = Claim("C01", "4", "", lambda: None, about=claims.OF_SCHEME)
     same = {level: (("speed at 34.8 h (m/d)", 2.9, True),) for level in claim.levels}
-    assert bars.barred(claim, Finding((SPEED,)), same).checks[0].bar
+    assert evaluate.barred(claim, Finding((SPEED,)), same).checks[0].bar
     for other in ((("area at 34.4 h (um2)", 2.9, True),), ()):
         with pytest.raises(ClaimError, match="different quantities"):
-            bars.barred(claim, Finding((SPEED,)), same | {Level(size=0.5): other})
+            evaluate.barred(claim, Finding((SPEED,)), same | {Level(size=0.5): other})

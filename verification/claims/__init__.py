@@ -47,6 +47,13 @@ SET, PRINTED_SET = "2026-11-21", "2026-11-22"
 #: A value that the paper prints: 2.9, or ~60.
 PRINTED = re.compile(r"(~?)(\d+)(?:\.(\d+))?")
 DIGITS = "half a unit of the last digit printed"
+#: The accuracy that the paper states of its own numbers. Section 4: mass balance "is generally satisfied within a few
+#: percentage points, which was deemed satisfactory considering numerical inaccuracies from time and spatial
+#: discretization"; errors "of the order of a few percent" are "less than the error due to discretization". A few is
+#: taken as up to five.
+FEW, FEW_WORDS = 0.05, "a few percent: up to five"
+#: Section 3.3.2: the transient, to 0.1 %.
+TRANSPORT, TRANSPORT_WORDS = 0.001, "0.1 %, the paper's accuracy of transport"
 
 
 class ClaimError(RuntimeError):

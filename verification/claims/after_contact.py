@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from math import inf
 
 from verification import sensitivity
-from verification.claims import record
+from verification.claims import report
 from verification.sensitivity import after_contact
 from verification.sensitivity.numbers import scene
 
@@ -76,7 +76,7 @@ def distance(row: dict, value: float) -> str:
 
 def main() -> None:
     """Print the list, and the distance of `exact`."""
-    found = known(record.read())
+    found = known(report.read())
     for each in found:
         print(f"{each.percent:8.2g} %  {each.id}  {each.quantity}")
     over = sum(each.percent > WIDE_BAR for each in found)

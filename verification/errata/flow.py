@@ -10,8 +10,7 @@ from repro.fem.mesher import generate
 from repro.fem.outline import BOTTOM, TOP, Outline
 from repro.fem.space import Space
 from repro.model import flow, pore
-from verification.claims.runs import BASE, scene
-from verification.claims.states import half_disc
+from verification.claims.runs import BASE, half_disc, scene
 from verification.errata import TRACTION, erratum, percent, state, table
 
 

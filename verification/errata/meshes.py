@@ -10,8 +10,7 @@ from repro.fem.mesher import generate
 from repro.fem.outline import half_disc as seed
 from repro.fem.sizing import ACROSS_AGGREGATE, Sizing
 from repro.model import mesh_motion
-from verification.claims.runs import BASE, ledger, scene
-from verification.claims.states import half_disc
+from verification.claims.runs import BASE, half_disc, ledger, scene
 from verification.errata import LINEAR, erratum, percent, small, table
 
 

@@ -15,9 +15,9 @@ from repro.fem.outline import TOP
 from repro.march import simulation
 from repro.march.loop import Instant
 from repro.results import M_PER_D
-from verification.claims.bars import MESH_ORDERS
+from verification.claims.evaluate import MESH_ORDERS
+from verification.claims.growth_pattern import contact_length
 from verification.claims.levels import converged
-from verification.claims.shapes import contact_length
 from verification.sensitivity.numbers import OF, Numbers, Runs, scene
 from verification.uncertainty import estimate
 

@@ -18,10 +18,9 @@ from repro.march import simulation
 from repro.march.loop import PoreEnd, State
 from verification.claims import CLAIMS, Finding, evaluate
 from verification.claims.after_contact import OF_WIDE
-from verification.claims.bars import unnumbered
+from verification.claims.evaluate import unnumbered
 from verification.claims.levels import CONVERGED, Level, at_level, converged, forget
-from verification.claims.restored import bodies, polygon
-from verification.claims.runs import WIDE, series
+from verification.claims.runs import WIDE, bodies, polygon, series
 from verification.sensitivity.numbers import OF, Runs, scene
 
 #: Supplies over K_s, and the size of the converged solution's elements and steps.
