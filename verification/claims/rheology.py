@@ -24,7 +24,7 @@ from collections.abc import Callable
 
 from shapely.affinity import translate
 
-from repro.errors import SceneError
+from repro.scene import SceneError
 from verification.claims import FEW, FEW_WORDS, Finding, PaperCheck, at_least, at_most, claim, without_limit
 from verification.claims.levels import BESIDE_COMPARED, COMPARED, DEFAULT, at_level
 from verification.claims.runs import around_contact, at, bodies, polygon, scene, series
