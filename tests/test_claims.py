@@ -331,7 +331,7 @@ def kept():
 def test_the_record_has_every_claim_in_its_schema(kept):
     assert [each["id"] for each in kept] == list(EXPECTED)
     wanted = {"quantity", "rests_on", "paper", "paper_low", "paper_high", "value", "low", "high", "input_low",
-              "input_high", "scheme_2001", "tolerance", "outcome"}
+              "input_high", "scheme_2001", "on_sizes", "order", "tolerance", "outcome"}
     for each in kept:
         assert each["verdict"] in VERDICTS and each["claim"] and each["checks"], each["id"]
         for check in each["checks"]:
@@ -376,6 +376,15 @@ def test_bars_after_contact_are_listed(kept):
     check = {"low": 9.0, "high": 11.0, "value": 10.0}
     assert after_contact.percent(check) == 10.0 and after_contact.percent({**check, "value": 0.0}) == math.inf
     assert after_contact.percent({"low": 0.0, "high": 0.0, "value": 0.0}) == 0
+
+
+def test_a_bar_after_contact_is_told_with_its_convergence():
+    """Of a record that has the values on the sizes; without an order where none fits."""
+    check = {"quantity": "q", "low": 0.9, "high": 1.1, "value": 1.0, "on_sizes": [1.0, 1.1, 1.2], "order": 1.04}
+    entry = {"id": after_contact.OF_WIDE[0], "checks": [check, {**check, "quantity": "p", "order": None}]}
+    told = [each.told for each in after_contact.known([entry])]
+    assert told == ["      10 %  C12  q: 1, 1.1, 1.2, order 1.0", "      10 %  C12  p: 1, 1.1, 1.2, no order"]
+    assert after_contact.Known("C12", "q", 3.0).told == "       3 %  C12  q"
 
 
 def test_exact_is_told_by_its_distance_from_the_finest_and_their_bar():

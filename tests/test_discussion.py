@@ -39,6 +39,7 @@ def test_a_claim_may_leave_the_scheme_out():
     check = claims.at_most("q", "small", 1.0, 2.0, "")
     found = barred(claim, claims.Finding((check,)), {level: (("q", 1.0, True),) for level in claim.levels[1:]})
     assert found.checks[0].scheme is None and found.verdict == claims.REPRODUCED
+    assert found.checks[0].on_sizes == (1.0, 1.0, 1.0)
 
 
 def test_layers_conduct_as_parallel_flow():

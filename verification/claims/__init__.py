@@ -97,7 +97,8 @@ class PaperCheck(Check):
     limit as mesh and step are refined? rests_on: what it takes to know it; input: its name in the record of the
     sensitivities; bar: where the number lies, None before it is known; held: for a number without a limit, whether it
     holds in the range of each level; scheme: least and largest value with the scheme of 2001, None where that is not
-    asked.
+    asked; on_sizes: of a claim about the model, its values on the sizes of the converged solution, the judged one
+    first.
     """
 
     paper: str
@@ -108,6 +109,7 @@ class PaperCheck(Check):
     bar: Bar | None = None
     held: tuple[bool, ...] = ()
     scheme: tuple[float, float] | None = None
+    on_sizes: tuple[float, ...] = ()
 
     @property
     def printed(self) -> tuple[float, float] | None:

@@ -1,9 +1,11 @@
 """How well the claims' numbers after contact are known: `python -m verification.claims.after_contact`.
 
 Lists every number of the committed record about wide after its contact with the opposite wall, with half the width of
-its bar over its value, the widest first. Asked are 1 % of conductivities and tips and 2 % of lengths of contact, which
-`verification.sensitivity.after_contact` measures. Ratios of peaks are known less well: a peak sits beside the ends of
-the contact surface, where stresses have no limit. A change of nearly nothing has a bar larger than itself.
+its bar over its value, its values on the three sizes and the observed order, the widest bar first. Asked are 1 % of
+conductivities and tips and 2 % of lengths of contact, which `verification.sensitivity.after_contact` measures. Known
+less well are the conductivity of the very first shape in contact, which closes by whole edges of the outline, and what
+is made of it, and ratios of peaks: a peak sits beside the ends of the contact surface, where stresses have no limit. A
+change of nearly nothing has a bar larger than itself.
 
 Then wide is run with the preset `exact`: how far it is from the finest of the recorded sizes, of which the bars are
 told with the values of all, and whether conductivities and tips are shown to be within 0.5 % in 60 s of processor time:
@@ -34,16 +36,27 @@ EXACT, SECONDS = 0.5, 60.0
 
 @dataclass(frozen=True)
 class Known:
-    """id: of the claim; quantity: of the check; percent: half the width of its bar over its value."""
+    """id: of the claim; quantity: of the check; percent: half the width of its bar over its value; on_sizes: its
+    values, the judged one first; order: observed on them, None where none fits."""
 
     id: str
     quantity: str
     percent: float
+    on_sizes: tuple[float, ...] = ()
+    order: float | None = None
+
+    @property
+    def told(self) -> str:
+        """In words."""
+        values = ", ".join(f"{each:.4g}" for each in self.on_sizes)
+        observed = "no order" if self.order is None else f"order {self.order:.1f}"
+        return f"{self.percent:8.2g} %  {self.id}  {self.quantity}" + (f": {values}, {observed}" if values else "")
 
 
 def known(entries: list[dict]) -> list[Known]:
     """The numbers after contact of a record, the one with the widest bar first."""
-    found = [Known(entry["id"], check["quantity"], percent(check)) for entry in entries if entry["id"] in OF_WIDE
+    found = [Known(entry["id"], check["quantity"], percent(check), tuple(check.get("on_sizes", ())), check.get("order"))
+             for entry in entries if entry["id"] in OF_WIDE
              for check in entry["checks"] if not OTHER.search(check["quantity"])]
     return sorted(found, key=lambda each: -each.percent)
 
@@ -78,7 +91,7 @@ def main() -> None:
     """Print the list, and the distance of `exact`."""
     found = known(report.read())
     for each in found:
-        print(f"{each.percent:8.2g} %  {each.id}  {each.quantity}")
+        print(each.told)
     over = sum(each.percent > WIDE_BAR for each in found)
     print(f"{over} of {len(found)} bars exceed {WIDE_BAR:g} %")
     sizes = ", ".join(f"{size:.3g}" for size in after_contact.SIZES)

@@ -60,7 +60,8 @@ def _judgeable(claim: Claim, check: PaperCheck, found: dict[Level, tuple[float, 
     of_kind = [level for level in found if claim.about != MODEL or level.kind == CONVERGED]
     scheme = [values[level] for level in values if level.kind == SCHEME]
     if claim.about == MODEL:
-        check = replace(check, scheme=(min(scheme), max(scheme)) if scheme else None)
+        check = replace(check, scheme=(min(scheme), max(scheme)) if scheme else None,
+                        on_sizes=tuple(values[level] for level in of_kind))
     if not check.converges:
         held = tuple(found[level][1] for level in of_kind)
         return replace(check, bar=spread([values[level] for level in of_kind]), held=held)

@@ -34,7 +34,9 @@ def clean(said) -> float:
 
 @claim("C16", "4, 2.1", "conductivity falls sharply when the aggregate spans the pore", fine=WIDE_FINE)
 def spanning() -> Finding:
-    """Conductivity of `wide` up to its contact, at it and after it."""
+    """Conductivity of `wide` up to its contact, at it and after it. At contact it is that of the first shape in which a
+    film has closed, by whole edges of the outline: it is known to first order in their length, to several percent,
+    where the conductivity of later hours is known to less than one."""
     rows, touching = series(*WIDE), around_contact(*WIDE)
     whole = 24e-6 * clean(scene(*WIDE))
     time, share = rows["time_h"], rows["conductivity_m_per_d"] / whole

@@ -5,7 +5,9 @@ The committed record of the claims, `claims.json`: intervals and verdicts that a
 A check's `value` lies in `low` to `high` (numerics), the paper's in `paper_low` to `paper_high` (printing, null for
 words), and `input_low` to `input_high` is where the value goes as the inputs of Table 1 move within their rounding
 (from the committed record of the sensitivities, null where that does not tell). `scheme_2001` is the range that the
-paper's scheme gives on three meshes, for a claim about the scheme that of all its levels.
+paper's scheme gives on three meshes, for a claim about the scheme that of all its levels. `on_sizes` are the values on
+the sizes of the converged solution, the judged one first, and `order` is that which is observed on them, or on the
+meshes of the scheme; null where none fits.
 """
 
 from __future__ import annotations
@@ -240,6 +242,8 @@ def _check(check: PaperCheck, about: str) -> dict:
             "low": _finite(check.bar.low), "high": _finite(check.bar.high),
             "input_low": inputs and inputs[0], "input_high": inputs and inputs[1],
             "scheme_2001": scheme and [_finite(value) for value in scheme],
+            "on_sizes": [_finite(value) for value in check.on_sizes],
+            "order": _finite(check.bar.mesh.order) if check.bar.mesh else None,
             "tolerance": {"low": _finite(check.low), "high": _finite(check.high), "origin": check.origin,
                           "date": check.date}, "outcome": check.outcome}
 
