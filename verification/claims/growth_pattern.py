@@ -14,7 +14,7 @@ from repro.fem.outline import BOTTOM, FREE, TOP, Outline
 from repro.model import biomass
 from repro.model.pore import Pore, Solved
 from verification.claims import FEW, FEW_WORDS, Finding, at_least, at_most, between, claim, without_limit
-from verification.claims.levels import TOLD, WIDE_FINE, at_level
+from verification.claims.levels import BESIDE_PAIRED, TOLD, WIDE_FINE, at_level
 from verification.claims.runs import (
     BASE,
     WIDE,
@@ -283,7 +283,8 @@ def evenness(found: Body) -> float:
 STRESS_FREE = 'growth.new_biomass="stress_free"'
 
 
-@claim("C32", "5", "minor deformation stresses, so that how new biomass is born hardly matters", fine=WIDE_FINE)
+@claim("C32", "5", "minor deformation stresses, so that how new biomass is born hardly matters", fine=WIDE_FINE,
+       beside=BESIDE_PAIRED)
 def stresses() -> Finding:
     """Largest stresses over mu_L in every row of base and wide; both with stress-free new biomass.
 
