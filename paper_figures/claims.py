@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from verification.claims import record
+from verification.claims import report
 
 STATEMENTS = {
     "C01": "Base starts at a mean velocity of 2.9 m/d",
@@ -45,7 +45,7 @@ STATEMENTS = {
 @cache
 def verdicts() -> dict[str, str]:
     """Verdict of each claim in the committed record."""
-    return {each["id"]: each["verdict"] for each in record.read()}
+    return {each["id"]: each["verdict"] for each in report.read()}
 
 
 def judged(ids: tuple[str, ...]) -> str:

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from paper_figures import runs, states, style
-from verification.claims import uptake
+from verification.claims import discussed
 from verification.claims.discussed import LAYERS, layered_share
 from verification.claims.permeability import clean
 
@@ -50,9 +50,9 @@ def _conductivity(axes: Axes, folder: Path) -> None:
 
 def _uptake(axes: Axes, folder: Path) -> None:
     scene, table = runs.WIDE.load(), states.series(folder)
-    axes.plot(filled(table), uptake.shares(table), color=style.RED, label="aggregate")
+    axes.plot(filled(table), discussed.shares(table), color=style.RED, label="aggregate")
     parts = [float(part) for part in TAKEN_UP[1:]]
-    axes.plot([0.0, *parts], [0.0, *(uptake.layers_share(scene, part) for part in parts)], color=style.BLUE,
+    axes.plot([0.0, *parts], [0.0, *(discussed.layers_share(scene, part) for part in parts)], color=style.BLUE,
               label="layers")
     axes.set(title="part of the acceptor that is taken up", xlim=(0, TAKEN_UP[-1]), ylim=(0, 1.03))
 
@@ -77,4 +77,4 @@ def caption(folder: Path | None = None) -> str:
             "biomass "
             f"makes it {layers:.2g} times less. Porosity does not determine permeability. (b) At the same mean "
             "velocity "
-            f"and supply, the aggregate takes up {100 * uptake.shares(table)[-1]:.0f} % of the acceptor in the end.")
+            f"and supply, the aggregate takes up {100 * discussed.shares(table)[-1]:.0f} % of the acceptor in the end.")

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from paper_figures import figure_6, runs, states, style
 from paper_figures.discussion_rheology import contact
-from verification.claims.constant_head import consumed, specific_growth
+from verification.claims.permeability import consumed, specific_growth
 
 TITLE = "Addition. Clogging under a constant head"
 RUNS = (runs.CLOSING, runs.WIDE)

@@ -13,10 +13,9 @@ from matplotlib.lines import Line2D
 
 from paper_figures import figure_6, style
 from repro.errors import GrowthError
-from verification.claims.discussed import pressed, tension
+from verification.claims.fluid_and_aggregate import pressed, tension
 from verification.claims.levels import CONVERGED, PAIRED, Level, at_level, cached
-from verification.claims.restored import Body, bodies
-from verification.claims.runs import BASE, WIDE, scene
+from verification.claims.runs import BASE, WIDE, Body, bodies, scene
 
 TITLE = "Addition. Where the aggregate would tear"
 RUNS = ()

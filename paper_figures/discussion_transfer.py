@@ -10,8 +10,7 @@ from paper_figures import style
 from verification.claims.base_run import upstream_means
 from verification.claims.discussed import RADIUS, in_one_shape, sherwood, textbooks
 from verification.claims.levels import CONVERGED, PAIRED, Level, at_level, cached
-from verification.claims.restored import Body, bodies
-from verification.claims.runs import BASE
+from verification.claims.runs import BASE, Body, bodies
 
 TITLE = "Addition. Mass transfer to the growing aggregate"
 RUNS = ()

@@ -34,7 +34,7 @@ from verification.claims import (
     WITHIN_ROUNDING,
     after_contact,
 )
-from verification.claims import record as claims_record
+from verification.claims import report as claims_record
 from verification.kernel.writing import markdown_row
 from verification.sensitivity.wide import verdicts
 

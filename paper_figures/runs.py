@@ -10,7 +10,7 @@ from pathlib import Path
 
 from repro import Scene, load_scene
 from repro.run.cache import cached_run, cached_runs
-from verification.claims import permeable, rheology
+from verification.claims import rheology
 
 CACHE = Path(__file__).parent / "cache"
 
@@ -60,7 +60,7 @@ _UNTIL = (FAST, f'growth.end="{rheology.END} h"',
 WIDE_FAST = Request("wide", _UNTIL, "wide_fast")
 VARIANTS = {name: Request("wide", (*_UNTIL, change), "wide_" + re.sub(r"\W", "_", name))
             for name, change in rheology.VARIANTS.items()}
-PERMEABILITIES = (1e-12 * permeable.PERMEABILITY, 1e-12 * 100.0**2 / 12 / 2000)
+PERMEABILITIES = (1e-12 * rheology.PERMEABILITY, 1e-12 * 100.0**2 / 12 / 2000)
 PERMEABLE = tuple(Request("wide", (*_UNTIL, 'flow.biomass="brinkman"', f'flow.permeability="{value:.3g} m^2"'),
                           f"wide_permeable_{value:.0e}") for value in PERMEABILITIES)
 

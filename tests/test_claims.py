@@ -22,16 +22,15 @@ from verification.claims import (
     ClaimError,
     Finding,
     after_contact,
+    base_run,
     evaluate,
-    independence,
     levels,
-    record,
     report,
     runs,
 )
 from verification.claims import __main__ as driver
 from verification.claims.levels import CONVERGED, SCHEME, Level, at_level
-from verification.claims.mass_balance import Bookkeeping
+from verification.claims.scheme import Bookkeeping
 from verification.sensitivity.numbers import factors_of, of_base
 from verification.sensitivity.numbers import scene as scene_of
 from verification.sensitivity.rounding import reached
@@ -56,7 +55,7 @@ def registry(monkeypatch, tmp_path):
         monkeypatch.setattr(module, "CLAIMS", claims.CLAIMS)
     monkeypatch.setattr(evaluate, "register_all", lambda: None)
     monkeypatch.setattr(evaluate, "side_by_side", lambda function, *given: list(map(function, *given)))
-    monkeypatch.setattr(record, "COMMITTED", tmp_path / "claims.json")
+    monkeypatch.setattr(report, "COMMITTED", tmp_path / "claims.json")
     return claims.CLAIMS
 
 
@@ -160,7 +159,7 @@ def test_a_claim_that_nobody_computes_is_a_failure(registry, capsys):
 
 def committed(registry, *ids):
     """What the claims come to now, as the committed record."""
-    record.COMMITTED.write_text(json.dumps([record.entry(row) for row in driver.judged(ids)]), encoding="utf-8")
+    report.COMMITTED.write_text(json.dumps([report.entry(row) for row in driver.judged(ids)]), encoding="utf-8")
 
 
 @pytest.mark.parametrize("function", [lambda: Finding((BAD,)), lambda: Finding(()), lambda: 1 / 0])
@@ -244,30 +243,30 @@ def recorded_claim(low, high, bar, change="", rounding="", others=()):
     ((-1.5, -0.5), [UNDECIDED]), ((-4.0, -3.0), []), ((1.0, 1.0), []), ((8.0, 9.9), [UNDECIDED])])
 def test_verdicts_that_a_bound_moved_by_its_bar_changes_are_listed(bar, flipped):
     """Accepted is 0 to 10."""
-    assert [flip.verdict for flip in record.flips(recorded_claim(0.0, 10.0, bar))] == flipped
+    assert [flip.verdict for flip in report.flips(recorded_claim(0.0, 10.0, bar))] == flipped
 
 
 def test_a_flip_is_that_of_the_whole_claim():
-    assert record.flips(recorded_claim(0.0, 10.0, (0.5, 2.5), others=[FAILS])) == []
+    assert report.flips(recorded_claim(0.0, 10.0, (0.5, 2.5), others=[FAILS])) == []
     within = recorded_claim(0.0, 10.0, (-2.5, -0.5), rounding="k 9.3", others=[HOLDS])
-    assert [flip.verdict for flip in record.flips(within)] == [UNDECIDED]
+    assert [flip.verdict for flip in report.flips(within)] == [UNDECIDED]
     changed = recorded_claim(0.0, 10.0, (-0.5, 1.5), change="at saturation")
-    assert [flip.verdict for flip in record.flips(changed)] == [CHANGED]
+    assert [flip.verdict for flip in report.flips(changed)] == [CHANGED]
 
 
 def test_the_whole_report_is_written_and_compared(registry, monkeypatch, tmp_path, capsys):
     for id in EXPECTED:
         registered(id, lambda: Finding((GOOD, claims.at_least("a", "|b|", 2, 1, ""))))
     lines = (("speed", (1.0, 2.0, 2.1), (100.0, 5.0)),)
-    compared = independence.Comparison("three sizes", ("coarse", "base", "fine"), lines)
-    monkeypatch.setattr(independence, "computed", dict)
-    monkeypatch.setattr(independence, "comparisons", lambda rows: (compared,))
-    monkeypatch.setattr(independence, "checks", lambda rows: (GOOD,))
+    compared = base_run.Comparison("three sizes", ("coarse", "base", "fine"), lines)
+    monkeypatch.setattr(base_run, "computed", dict)
+    monkeypatch.setattr(base_run, "comparisons", lambda rows: (compared,))
+    monkeypatch.setattr(base_run, "checks", lambda rows: (GOOD,))
     monkeypatch.setattr(driver, "OUT", tmp_path / "out")
     assert driver.main([]) == 1 and "C01: not in the record" in capsys.readouterr().out
     assert driver.main(["--record"]) == 0
-    kept = record.COMMITTED.read_bytes()
-    assert driver.main([]) == 0 and record.COMMITTED.read_bytes() == kept
+    kept = report.COMMITTED.read_bytes()
+    assert driver.main([]) == 0 and report.COMMITTED.read_bytes() == kept
     assert f"{len(EXPECTED)} claims as recorded in claims.json" in capsys.readouterr().out
     written = json.loads((tmp_path / "out" / "claims.json").read_text(encoding="utf-8"))
     assert written == json.loads(kept) and [row["id"] for row in written] == list(EXPECTED)
@@ -276,21 +275,21 @@ def test_the_whole_report_is_written_and_compared(registry, monkeypatch, tmp_pat
     assert near["low"] == near["high"] == 2.91 and near["scheme_2001"] == [2.91, 2.91]
     table = (tmp_path / "out" / "claims.md").read_text(encoding="utf-8")
     assert "2.1 (+5.00 %)" in table and "| 2.91<br>2 | 2.91<br>2 |" in table
-    monkeypatch.setattr(independence, "checks", lambda rows: (BAD,))
+    monkeypatch.setattr(base_run, "checks", lambda rows: (BAD,))
     assert driver.main([]) == 1
 
 
 def test_a_number_out_of_its_recorded_interval_is_told(registry, capsys):
     registered("C01", lambda: Finding((GOOD,)))
     committed(registry, "C01")
-    content = json.loads(record.COMMITTED.read_text(encoding="utf-8"))
+    content = json.loads(report.COMMITTED.read_text(encoding="utf-8"))
     content[0]["checks"][0] |= {"low": 2.92, "high": 2.93}
-    record.COMMITTED.write_text(json.dumps(content), encoding="utf-8")
+    report.COMMITTED.write_text(json.dumps(content), encoding="utf-8")
     assert driver.main(["C01"]) == 1
     assert "C01: speed (m/d) is 2.91, recorded as 2.92 to 2.93" in capsys.readouterr().out
     content[0]["checks"][0] |= {"low": 2.91 * (1 - 1e-12), "high": 2.92}
     content[0]["verdict"] = CONTRADICTED
-    record.COMMITTED.write_text(json.dumps(content), encoding="utf-8")
+    report.COMMITTED.write_text(json.dumps(content), encoding="utf-8")
     assert driver.main(["C01"]) == 1
     assert "C01: reproduced, recorded as contradicted" in capsys.readouterr().out
 
@@ -299,11 +298,11 @@ def test_some_claims_are_recorded_anew_and_the_others_stay(registry):
     for id in ("C01", "C02"):
         registered(id, lambda: Finding((GOOD,)))
     assert driver.main(["--record", "C02"]) == 0 and driver.main(["--record", "C01"]) == 0
-    assert [each["id"] for each in record.read()] == ["C01", "C02"]
+    assert [each["id"] for each in report.read()] == ["C01", "C02"]
     claims.CLAIMS.pop("C01")
     registered("C01", lambda: Finding((BAD,), reason="it leaks"))
     assert driver.main(["C01"]) == 1 and driver.main(["--record", "C01"]) == 0
-    assert [each["verdict"] for each in record.read()] == [CONTRADICTED, REPRODUCED]
+    assert [each["verdict"] for each in report.read()] == [CONTRADICTED, REPRODUCED]
 
 
 def test_the_terminal_table_fits(registry):
@@ -325,13 +324,13 @@ def test_every_row_of_the_paper_has_its_judge():
 # The committed record.
 @pytest.fixture(scope="module")
 def kept():
-    return record.read()
+    return report.read()
 
 
 def test_the_record_has_every_claim_in_its_schema(kept):
     assert [each["id"] for each in kept] == list(EXPECTED)
     wanted = {"quantity", "rests_on", "paper", "paper_low", "paper_high", "value", "low", "high", "input_low",
-              "input_high", "scheme_2001", "tolerance", "outcome"}
+              "input_high", "scheme_2001", "on_sizes", "order", "tolerance", "outcome"}
     for each in kept:
         assert each["verdict"] in VERDICTS and each["claim"] and each["checks"], each["id"]
         for check in each["checks"]:
@@ -361,7 +360,7 @@ def test_no_recorded_verdict_flips_to_its_opposite(kept):
     """With a bound moved by the bar of its number a verdict comes to be open at most, or an open one decided; of the
     decided ones no more than a tenth comes to be open."""
     verdicts = {each["id"]: each["verdict"] for each in kept}
-    found = [flip for each in kept for flip in record.flips(each)]
+    found = [flip for each in kept for flip in report.flips(each)]
     assert all(UNDECIDED in (flip.verdict, verdicts[flip.id]) for flip in found), found
     assert len({flip.id for flip in found if verdicts[flip.id] != UNDECIDED}) <= len(kept) // 10
 
@@ -378,6 +377,33 @@ def test_bars_after_contact_are_listed(kept):
     assert after_contact.percent({"low": 0.0, "high": 0.0, "value": 0.0}) == 0
 
 
+def test_a_bar_after_contact_is_told_with_its_convergence():
+    """Of a record that has the values on the sizes; without an order where none fits."""
+    check = {"quantity": "q", "low": 0.9, "high": 1.1, "value": 1.0, "on_sizes": [1.0, 1.1, 1.2], "order": 1.04}
+    entry = {"id": after_contact.OF_WIDE[0], "checks": [check, {**check, "quantity": "p", "order": None}]}
+    told = [each.told for each in after_contact.known([entry])]
+    assert told == ["      10 %  C12  q: 1, 1.1, 1.2, order 1.0", "      10 %  C12  p: 1, 1.1, 1.2, no order"]
+    assert after_contact.Known("C12", "q", 3.0).told == "       3 %  C12  q"
+
+
+def test_exact_is_told_by_its_distance_from_the_finest_and_their_bar():
+    """0.5 % is shown where both together are less; of what 2 % are asked, nothing is said."""
+    row = {"quantity": "q", "values": [2.0, 2.1], "bar_percent": 0.3, "asked_percent": 1.0}
+    assert after_contact.distance(row, 1.997) == "q: 2, 2.1, bar 0.3 %; exact 1.997, -0.15 %; 0.5 % shown"
+    assert after_contact.distance(row, 2.005).endswith("+0.25 %; 0.5 % not shown")
+    assert after_contact.distance({**row, "asked_percent": 2.0}, 1.997).endswith("-0.15 %")
+
+
+def test_the_distance_of_exact_is_of_every_recorded_number(monkeypatch, capsys):
+    rows = after_contact.sensitivity.record()["after_contact"]
+    ours = {row["quantity"]: row["values"][0] for row in rows}
+    monkeypatch.setattr(after_contact, "exact", lambda: (ours, 12.0))
+    after_contact.main()
+    told = capsys.readouterr().out
+    assert told.count("+0 %") == len(rows) == 8 and "took 12 s of processor time, 60 s are asked" in told
+    assert told.count("0.5 % shown") + told.count("0.5 % not shown") == 6
+
+
 #: Claims about base whose numbers a test can compute in seconds.
 QUICK = ("C01", "C02", "C03", "C04", "C05", "C06", "C09", "C15", "C34")
 
@@ -392,7 +418,7 @@ def test_coordinates_perturbed_by_1e_12_change_no_verdict_and_leave_no_interval(
     known = {each["id"]: each for each in kept}
     for id, finding in found.items():
         for check, recorded in zip(finding.checks, known[id]["checks"], strict=True):
-            assert record.inside(check.value, recorded["low"], recorded["high"]), (id, check.quantity, check.value)
+            assert report.inside(check.value, recorded["low"], recorded["high"]), (id, check.quantity, check.value)
             assert check.holds == (recorded["outcome"] == HOLDS), (id, check.quantity)
 
 

@@ -10,7 +10,7 @@ import pytest
 from numpy._core._multiarray_umath import __cpu_features__ as features
 
 from tests import again
-from verification.claims import HOLDS, record
+from verification.claims import HOLDS, report
 
 ROOT = Path(__file__).parents[1]
 #: Kernels of OpenBLAS, what they need of the processor, and with how many threads and which coordinates each runs.
@@ -31,10 +31,10 @@ def computed(python=sys.executable, factor=1.0, threads="1", **environment):
 
 def differing(found):
     """Numbers outside of their recorded intervals, and outcomes that are not the recorded ones."""
-    known = {each["id"]: each["checks"] for each in record.read()}
+    known = {each["id"]: each["checks"] for each in report.read()}
     return [(id, quantity, value) for id, rows in found.items()
             for (quantity, value, holds), one in zip(rows, known[id], strict=True)
-            if not record.inside(value, one["low"], one["high"]) or holds != (one["outcome"] == HOLDS)]
+            if not report.inside(value, one["low"], one["high"]) or holds != (one["outcome"] == HOLDS)]
 
 
 @pytest.mark.parametrize("kernel, feature, threads, factor", [
@@ -76,4 +76,4 @@ def test_a_number_outside_of_its_interval_is_seen():
 
 
 def _checks(id):
-    return next(each["checks"] for each in record.read() if each["id"] == id)
+    return next(each["checks"] for each in report.read() if each["id"] == id)

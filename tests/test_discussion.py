@@ -10,13 +10,14 @@ from scipy.integrate import quad
 from paper_figures import page, runs, states
 from repro import load_scene, run
 from repro.fem.outline import polygon_area
+from repro.model.growth import largest_principal
 from repro.model.kinetics import growth_rate
 from verification import claims
-from verification.claims import constant_head, discussed, levels, permeable, rheology, uptake
-from verification.claims.bars import barred
+from verification.claims import discussed, fluid_and_aggregate, levels, permeability, rheology
+from verification.claims.evaluate import barred
 from verification.claims.levels import CONVERGED, SCHEME, Level, at_level
-from verification.claims.restored import Body, bodies
-from verification.claims.runs import scene
+from verification.claims.runs import Body, bodies, scene
+from verification.claims.runs import stress as restored_stress
 
 COARSE = Level(CONVERGED, 4.0)
 HOUR = ("base", 'growth.end="1 h"', 'output.times=["1 h"]')
@@ -38,6 +39,7 @@ def test_a_claim_may_leave_the_scheme_out():
     check = claims.at_most("q", "small", 1.0, 2.0, "")
     found = barred(claim, claims.Finding((check,)), {level: (("q", 1.0, True),) for level in claim.levels[1:]})
     assert found.checks[0].scheme is None and found.verdict == claims.REPRODUCED
+    assert found.checks[0].on_sizes == (1.0, 1.0, 1.0)
 
 
 def test_layers_conduct_as_parallel_flow():
@@ -65,14 +67,14 @@ def test_little_biomass_takes_up_as_much_as_the_supply_lets_it():
     rate = m * (law.maximum_utilization_rate * law.acceptor_to_donor_ratio * m
                 + law.decay_oxygen_demand * law.degradable_fraction * law.decay_coefficient)
     expected = part * law.maximum_density * rate * said.pore.length / (flow * 10.0)
-    assert uptake.layers_share(said, part) == pytest.approx(expected, rel=2 * expected)
-    assert uptake.layers_share(said, 0.2) > 0.9 > uptake.layers_share(said, 0.2, 10 * flow)
+    assert discussed.layers_share(said, part) == pytest.approx(expected, rel=2 * expected)
+    assert discussed.layers_share(said, 0.2) > 0.9 > discussed.layers_share(said, 0.2, 10 * flow)
 
 
 def test_a_layer_in_the_model_takes_up_what_the_reference_says():
     """To what the layer's own gradients leave out."""
     part = 0.03
-    assert uptake.in_the_model(part) == pytest.approx(uptake.layers_share(scene("wide"), part), rel=0.03)
+    assert discussed.in_the_model(part) == pytest.approx(discussed.layers_share(scene("wide"), part), rel=0.03)
 
 
 def test_decay_over_synthesis_at_rest():
@@ -82,7 +84,7 @@ def test_decay_over_synthesis_at_rest():
     donor = found.node("donor_mg_per_L")[found.grid.body]
     most, least = (law.decay_coefficient / (law.maximum_utilization_rate * law.yield_coefficient * d / (d + 1.0))
                    for d in (donor.min(), donor.max()))
-    assert least * (1 - 1e-9) <= constant_head.decay_share(found) <= most * (1 + 1e-9)
+    assert least * (1 - 1e-9) <= permeability.decay_share(found) <= most * (1 + 1e-9)
     assert growth_rate(10.0, 10.0, found.scene.substrates, law) > 0
 
 
@@ -91,10 +93,10 @@ def test_the_fall_up_to_contact_and_the_fastest_decline(monkeypatch):
     time = np.linspace(0.0, 60.0, 61)
     velocity = np.exp(-time / 10) * np.where(time > 50, 1 / 3, 1.0)
     rows = {"time_h": time, "mean_velocity_m_per_d": velocity, "conductivity_m_per_d": velocity}
-    monkeypatch.setattr(constant_head, "series", lambda *run: rows)
-    monkeypatch.setattr(constant_head, "contact", lambda: (np.exp(-5.0), np.exp(-5.0) / 3, 50.01))
-    assert constant_head.fall() == pytest.approx(3 * np.exp(0.499), rel=1e-6)
-    rate, when = constant_head.fastest(rows)
+    monkeypatch.setattr(permeability, "series", lambda *run: rows)
+    monkeypatch.setattr(permeability, "contact", lambda: (np.exp(-5.0), np.exp(-5.0) / 3, 50.01))
+    assert permeability.fall() == pytest.approx(3 * np.exp(0.499), rel=1e-6)
+    rate, when = permeability.fastest(rows)
     assert rate == pytest.approx(0.1 + np.log(3)) and when == 50.5
 
 
@@ -102,16 +104,17 @@ def test_growth_and_uptake_of_rows():
     rows = {"time_h": np.array([0.0, 2.0, 4.0]), "aggregate_area_um2": np.exp([0.0, 0.4, 0.6]),
             "mean_velocity_m_per_d": np.array([2.0, 1.0, 0.5]),
             "effluent_acceptor_mg_per_L": np.array([9.0, 6.0, 2.0])}
-    assert constant_head.specific_growth(rows) == pytest.approx([0.2, 0.1])
-    assert constant_head.consumed(rows) == pytest.approx([2.0, 4.0, 4.0])
+    assert permeability.specific_growth(rows) == pytest.approx([0.2, 0.1])
+    assert permeability.consumed(rows) == pytest.approx([2.0, 4.0, 4.0])
 
 
 def test_a_permeable_run_has_the_drag_and_nothing_of_the_viscosity():
-    said = scene(*permeable.permeable(permeable.AGGREGATE, 0.25))
+    said = scene(*rheology.permeable(rheology.AGGREGATE, 0.25))
     assert said.flow.biomass == "brinkman" and said.flow.viscosity_ratio is None
     assert said.flow.permeability == pytest.approx(0.25, rel=1e-6)
-    assert permeable.equivalent(permeable.AGGREGATE) == pytest.approx(50.0**2 / 12 / 2000)
-    assert runs.PERMEABILITIES[1] == pytest.approx(1e-12 * permeable.equivalent(permeable.PLUG))
+    assert 'numerics.elements = "quadratic"' in rheology.refused()
+    assert rheology.equivalent(rheology.AGGREGATE) == pytest.approx(50.0**2 / 12 / 2000)
+    assert runs.PERMEABILITIES[1] == pytest.approx(1e-12 * rheology.equivalent(rheology.PLUG))
 
 
 def test_what_a_variant_changes_is_measured_against_the_paper(monkeypatch):
@@ -126,6 +129,8 @@ def test_what_a_variant_changes_is_measured_against_the_paper(monkeypatch):
     monkeypatch.setattr(rheology, "contact", lambda run: times[run])
     checks = rheology._changes("x", bigger)
     assert checks[1].value == pytest.approx(10.0) and not checks[1].holds
+    assert all(check.converges for check in checks)
+    assert [each.converges for each in rheology._changes(rheology.RECHOSEN, bigger)] == [False, True, True]
 
 
 def test_an_outline_that_has_slid_is_moved_back(monkeypatch):
@@ -151,18 +156,65 @@ def test_forces_put_on_at_the_end_are_those_of_a_run_with_them():
     """An elastic body forgets the way; what is left is what the forces changed of its growth."""
     found = bodies(HOUR)[-1]
     along = bodies((*HOUR, 'growth.fluid_forces="included"'))[-1]
-    free, forced, run_ = (discussed.tension(each)[0] for each in (found, discussed.pressed(found), along))
+    later = fluid_and_aggregate.pressed(found)
+    free, forced, run_ = (fluid_and_aggregate.tension(each)[0] for each in (found, later, along))
     assert abs(forced / free - 1) > 0.02 and forced == pytest.approx(run_, rel=2e-3)
-    assert discussed.pressed(found).pore.time == found.pore.time
+    assert later.pore.time == found.pore.time
 
 
 def test_the_largest_tension_is_told_with_its_place():
     found = bodies(HOUR)[-1]
     values = found.cell("largest_principal_stress_MPa")
-    size, x, y, hours = discussed.tension(found)
+    size, x, y, hours = fluid_and_aggregate.tension(found)
     assert size == values.max() and hours == 1.0
     corners = found.grid.points[found.triangles[int(np.argmax(values))]]
     assert corners[:, 0].min() < x < corners[:, 0].max() and corners[:, 1].min() < y < corners[:, 1].max()
+
+
+def test_the_mean_of_a_stress_is_over_area_and_distance():
+    """Of a field linear in x: its value at a place about which the points lie alike, whatever weighs there; the mean by
+    area where all is near."""
+    points = np.array([[-1.0, 0.0], [1.0, 0.0], [9.0, 0.0]])
+    field = fluid_and_aggregate.Stress(points, np.array([2.0, 2.0, 1.0]), np.repeat(points[:, :1], 4, axis=1))
+    assert field.within(2.0, np.array([[0.0, 0.0], [8.5, 0.0]]))[:, 0] == pytest.approx([0.0, 9.0], abs=1e-12)
+    assert field.within(20.0, np.zeros((1, 2)))[0] == pytest.approx(9.0 / 5.0)
+
+
+def test_a_stress_is_that_of_the_fields_and_stands_for_all_of_the_aggregate():
+    """The mean over all of it is that of the triangles' means, which are over the areas of t = 0."""
+    found = bodies(HOUR)[-1]
+    stress, areas = fluid_and_aggregate.stress_of(found), found.areas[found.grid.biomass]
+    cells = restored_stress(found, found.scene.growth.shear_modulus)
+    assert stress.areas.sum() == pytest.approx(areas.sum(), rel=1e-9)
+    whole = stress.within(100.0, np.zeros((1, 2)))[0]
+    assert whole == pytest.approx(areas @ cells / areas.sum(), abs=0.01 * np.abs(cells).max())
+    assert np.ptp(cells[:, 3]) < 1.5 * np.ptp(stress.values[:, 3])
+
+
+def test_the_peak_is_taken_at_places_of_its_own_in_the_aggregate():
+    """Of a lattice through the origin, on the wall too; the mean over more is less than a triangle's largest."""
+    found = bodies(HOUR)[-1]
+    places = fluid_and_aggregate.lattice(found, 0.5)
+    assert np.allclose(places, 0.5 * np.round(places / 0.5)) and places[:, 1].min() == 0
+    assert len(places) == pytest.approx(polygon_area(found.outline.points) / 0.25, rel=0.2)
+    most = fluid_and_aggregate.peak(found)
+    assert 0 < most.value <= fluid_and_aggregate.tension(found)[0] / found.scene.growth.shear_modulus
+    mean = fluid_and_aggregate.stress_of(found).within(100.0, np.zeros((1, 2)))[0]
+    assert fluid_and_aggregate.peak(found, 2.0).value == pytest.approx(float(largest_principal(mean)), rel=1e-9)
+    assert most.value > 1.2 * fluid_and_aggregate.peak(found, 2.0).value
+
+
+def test_the_exponent_is_that_of_the_stress_that_is_added(monkeypatch):
+    """1 / r about a place, on top of any other stress."""
+    found = bodies(HOUR)[-1]
+    plane = np.random.default_rng(1).uniform(-50, 50, (200_000, 2))
+    place = np.array([3.0, 0.0])
+    shear = np.zeros((len(plane), 4))
+    shear[:, 3] = 1 / np.hypot(*(plane - place).T)
+    fields = iter((fluid_and_aggregate.Stress(plane, np.ones(len(plane)), 0 * shear + 5.0),
+                   fluid_and_aggregate.Stress(plane, np.ones(len(plane)), shear + 5.0)) * 2)
+    monkeypatch.setattr(fluid_and_aggregate, "stress_of", lambda body: next(fields))
+    assert fluid_and_aggregate.exponent(found, found, place) == pytest.approx(-1.0, abs=0.02)
 
 
 def test_sherwood_numbers_follow_the_flow_and_hardly_the_supply():

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from repro.march.updates import schedule
 from repro.scene import load_scene, scene_hash
 from verification import claims, uncertainty
-from verification.claims import Claim, ClaimError, Finding, bars, evaluate, levels, runs
+from verification.claims import Claim, ClaimError, Finding, evaluate, levels, runs
 from verification.claims.levels import ALONE, CONVERGED, DEFAULT, SCHEME, Level, at_level
 from verification.uncertainty import FORMAL, OBSERVED, Bar, Estimate, combined, estimate, spread
 
@@ -176,9 +176,9 @@ def test_the_converged_solution_is_refined_in_space_and_time_at_once():
     assert wide.output.times == tuple(map(float, range(1, 46)))
 
 
-#: Claims that the scheme of 2001 does not stand beside: linear elements have no permeable body (C42), and comparisons
-#: of many runs would take minutes (C41, C43).
-WITHOUT_SCHEME = ("C41", "C42", "C43")
+#: Sizes of the scheme of 2001 beside claims where they are fewer than three: linear elements have no permeable body
+#: (C42), and comparisons of many, or of long, runs would take minutes (C32, C41, C43).
+FEWER_OF_SCHEME = {"C32": 2, "C41": 1, "C42": 0, "C43": 2}
 
 
 def test_every_claim_is_computed_on_three_meshes_and_with_three_steps_or_says_why_not():
@@ -187,7 +187,7 @@ def test_every_claim_is_computed_on_three_meshes_and_with_three_steps_or_says_wh
     for claim in claims.CLAIMS.values():
         kinds = [level.kind for level in claim.levels]
         if claim.about == claims.MODEL:
-            scheme = 0 if claim.id in WITHOUT_SCHEME else 3
+            scheme = FEWER_OF_SCHEME.get(claim.id, 3)
             assert kinds.count(CONVERGED) == 3 and kinds.count(SCHEME) == scheme, claim.id
             assert claim.judged == claim.levels[0], claim.id
             assert claim.judged.size == min(claim.fine), claim.id
@@ -201,8 +201,8 @@ def test_every_claim_is_computed_on_three_meshes_and_with_three_steps_or_says_wh
 def judged(check, value, **fields):
     """A check with its bar, from a function of the level that gives the value."""
     claim = Claim("C01", "4", "", lambda: None, **({"about": claims.OF_SCHEME} | fields))
-    at = {level: bars.numbers(Finding((claims.replace(check, value=value(level)),))) for level in claim.levels}
-    return bars.barred(claim, Finding((check,)), at).checks[0]
+    at = {level: evaluate.numbers(Finding((claims.replace(check, value=value(level)),))) for level in claim.levels}
+    return evaluate.barred(claim, Finding((check,)), at).checks[0]
 
 
 SPEED = claims.near("speed at 34.4 h (m/d)", "2.9", 2.91, 2.9, relative=0.1, why="")
@@ -243,7 +243,7 @@ def test_a_number_without_a_limit_has_the_range_of_all_levels():
 def test_the_instant_of_an_event_may_differ_between_levels_and_the_quantity_may_not():
     claim = Claim("C01", "4", "", lambda: None, about=claims.OF_SCHEME)
     same = {level: (("speed at 34.8 h (m/d)", 2.9, True),) for level in claim.levels}
-    assert bars.barred(claim, Finding((SPEED,)), same).checks[0].bar
+    assert evaluate.barred(claim, Finding((SPEED,)), same).checks[0].bar
     for other in ((("area at 34.4 h (um2)", 2.9, True),), ()):
         with pytest.raises(ClaimError, match="different quantities"):
-            bars.barred(claim, Finding((SPEED,)), same | {Level(size=0.5): other})
+            evaluate.barred(claim, Finding((SPEED,)), same | {Level(size=0.5): other})

@@ -47,6 +47,13 @@ SET, PRINTED_SET = "2026-11-21", "2026-11-22"
 #: A value that the paper prints: 2.9, or ~60.
 PRINTED = re.compile(r"(~?)(\d+)(?:\.(\d+))?")
 DIGITS = "half a unit of the last digit printed"
+#: The accuracy that the paper states of its own numbers. Section 4: mass balance "is generally satisfied within a few
+#: percentage points, which was deemed satisfactory considering numerical inaccuracies from time and spatial
+#: discretization"; errors "of the order of a few percent" are "less than the error due to discretization". A few is
+#: taken as up to five.
+FEW, FEW_WORDS = 0.05, "a few percent: up to five"
+#: Section 3.3.2: the transient, to 0.1 %.
+TRANSPORT, TRANSPORT_WORDS = 0.001, "0.1 %, the paper's accuracy of transport"
 
 
 class ClaimError(RuntimeError):
@@ -90,7 +97,8 @@ class PaperCheck(Check):
     limit as mesh and step are refined? rests_on: what it takes to know it; input: its name in the record of the
     sensitivities; bar: where the number lies, None before it is known; held: for a number without a limit, whether it
     holds in the range of each level; scheme: least and largest value with the scheme of 2001, None where that is not
-    asked.
+    asked; on_sizes: of a claim about the model, its values on the sizes of the converged solution, the judged one
+    first.
     """
 
     paper: str
@@ -101,6 +109,7 @@ class PaperCheck(Check):
     bar: Bar | None = None
     held: tuple[bool, ...] = ()
     scheme: tuple[float, float] | None = None
+    on_sizes: tuple[float, ...] = ()
 
     @property
     def printed(self) -> tuple[float, float] | None:

@@ -14,9 +14,8 @@ import sys
 from pathlib import Path
 
 from repro.results import write_json, write_text
-from verification.claims import CLAIMS, EXPECTED, ClaimError, evaluate, independence, record, report
-from verification.claims.bars import barred
-from verification.claims.evaluate import Found
+from verification.claims import CLAIMS, EXPECTED, ClaimError, base_run, evaluate, report
+from verification.claims.evaluate import Found, barred
 from verification.claims.levels import Level
 from verification.claims.report import Row
 
@@ -48,8 +47,8 @@ def main(arguments: list[str] | None = None) -> int:
 
 def written(rows: list[Row]) -> bool:
     """Write all claims, with the independence of base in the paper's scheme; is that independent?"""
-    values = independence.computed()
-    section = report.Independence(independence.comparisons(values), independence.checks(values))
+    values = base_run.computed()
+    section = report.Independence(base_run.comparisons(values), base_run.checks(values))
     print(report.terminal_independence(section))
     OUT.mkdir(exist_ok=True)
     write_text(OUT / "claims.md", report.markdown(rows, section))
@@ -59,18 +58,18 @@ def written(rows: list[Row]) -> bool:
 
 def entries(rows: list[Row]) -> list[dict]:
     """The rows with a verdict as plain values."""
-    return [record.entry(row) for row in rows if row.verdict != NO_VERDICT]
+    return [report.entry(row) for row in rows if row.verdict != NO_VERDICT]
 
 
 def recorded(rows: list[Row], anew: bool) -> bool:
     """Do the rows agree with the committed record? Differences are told."""
     ours = entries(rows)
     if anew:
-        write_json(record.COMMITTED, record.replaced(ours))
-        print(f"{record.COMMITTED.name}: written")
+        write_json(report.COMMITTED, report.replaced(ours))
+        print(f"{report.COMMITTED.name}: written")
         return True
-    told = record.differences(ours, record.read())
-    print("\n".join(told) if told else f"{len(ours)} claims as recorded in {record.COMMITTED.name}, which stays")
+    told = report.differences(ours, report.read())
+    print("\n".join(told) if told else f"{len(ours)} claims as recorded in {report.COMMITTED.name}, which stays")
     return not told
 
 

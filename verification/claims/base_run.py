@@ -2,26 +2,44 @@
 
 What it prints of effluents, uptake and inlet at 19.4 h is "before the aggregate expands" (Plate 1): the shape made at
 19.2 h with what has grown in it since [E12]. The velocity, which does not see the density, is that of the same shape.
+
+C27, C28: the concentrations' scale, and what Table 1 says of F and of the diffusivities.
+
+C09, C18: times that follow from Table 1 alone, and those of the run.
+
+Mesh and time-step independence of `base`, and the strict variant of 2001 beside it.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+from math import log
+
 import numpy as np
 
 from repro.fem.transfer import interpolate
+from repro.model import transport
+from repro.model.kinetics import Sink, growth_rate
 from repro.model.pore import Pore, Solved
 from verification import sensitivity
 from verification.claims import (
+    ARITHMETIC,
+    CLOSED,
     CONSTRUCTION,
     OF_SCHEME,
     Finding,
+    PaperCheck,
     at_least,
     at_most,
+    between,
     claim,
+    interval,
     printed,
     without_limit,
 )
-from verification.claims.runs import BASE, at, grown, scene, series
+from verification.claims.evaluate import side_by_side
+from verification.claims.levels import DEFAULT, forget
+from verification.claims.runs import BASE, LAST, at, grown, scene, series, solved_pore
 
 PLOTTED, END = 19.2, 19.4
 SUPPLY = 10.0
@@ -129,3 +147,244 @@ def last_length() -> Finding:
                        "generated at 1.5 W from the aggregate", rests_on=CONSTRUCTION))
     return Finding(tuple(map(without_limit, checks)), note=note, reason="not on every mesh, with every step")
 
+
+#: Base to 10 h in the preset "fast": the identity to show does not depend on mesh and step.
+SHORT = ("base", 'numerics.preset="fast"', "numerics.tolerance=0.0075", "numerics.refinement=0.2", 'growth.end="10 h"',
+         'output.times=["2 h", "4 h", "6 h", "8 h", "10 h"]')
+
+
+def scaled(acceptor: float, donor: float) -> tuple[str, ...]:
+    """Changes that multiply the supply, 10 mg/L, and K_s, 1 mg/L, of each substrate."""
+    return tuple(f'substrates.{name}.{key}="{value * factor!r} mg/L"'
+                 for name, factor in zip(SUBSTRATES, (acceptor, donor))
+                 for key, value in (("supply", 10.0), ("half_saturation", 1.0)))
+
+
+#: Everything in mg/L times 8; each substrate by its own factor, with k, Y, F and d_c, which turn one into the other in
+#: (7)-(9); C and K_s alone. Powers of two are exact in floating point: with others, round-off can decide a remesh.
+ALL_BY_8 = (*SHORT, *scaled(8.0, 8.0), 'kinetics.maximum_density="240000 mg/L"')
+EACH = (*SHORT, *scaled(8.0, 4.0), 'kinetics.maximum_utilization_rate="37.2 1/day"',
+        f"kinetics.yield_coefficient={0.61 / 4!r}", f"kinetics.acceptor_to_donor_ratio={1.52 * 2!r}",
+        f"kinetics.decay_oxygen_demand={1.42 * 8!r}")
+ALONE = (*SHORT, *scaled(8.0, 8.0))
+COMPARED = ("mean_velocity_m_per_d", "aggregate_area_um2", "upstream_um", "downstream_um", "inert_fraction")
+
+
+@claim("C27", "2.2", "only the ratios C/K_s matter when K_s is set to 1", about=CLOSED)
+def ratios() -> Finding:
+    """Base to 10 h with supply and K_s, and what is needed besides, multiplied, against itself.
+
+    Compared in every row: velocity, area, ends, inert fraction, and C / K_s of effluents and at the meshed inlet.
+    """
+    why = "exact; 1e-8 for the round-off of 50 updates with remeshes"
+    checks = (at_most("C, K_s and X_m times 8: largest relative change", "none", change(ALL_BY_8, 8.0, 8.0), 1e-8, why),
+              at_most("C and K_s times 8 and 4, with k, Y, F, d_c: largest relative change", "none",
+                      change(EACH, 8.0, 4.0), 1e-8, why))
+    return Finding(checks, change="the ratios C/K_s are not all: (7)-(8) also hold X_m/K_sA and X_m/K_sD, so that X_m "
+                   "must be scaled too, or k, Y, F and d_c where the two K_s differ",
+                   note=_alone)
+
+
+def _alone() -> str:
+    """What C and K_s do without X_m, in words."""
+    plain, alone = (at(run, 10.0)["effluent_acceptor_mg_per_L"] for run in (SHORT, ALONE))
+    return (f"With C and K_s times 8 and nothing else, the acceptor leaves at 10 h with {alone / 8:.3f} K_s instead of "
+            f"{plain:.3f}.")
+
+
+def change(run: tuple[str, ...], acceptor: float, donor: float) -> float:
+    """Largest difference of a compared column from the run that is not scaled, in any row, over its largest."""
+    ours, plain = series(*run), series(*SHORT)
+    factors = dict.fromkeys(COMPARED, 1.0) | {f"{where}_{name}_mg_per_L": factor for where in ("inlet", "effluent")
+                                              for name, factor in zip(SUBSTRATES, (acceptor, donor))}
+    return max(float(np.abs(ours[key] / factor - plain[key]).max() / np.abs(plain[key]).max())
+               for key, factor in factors.items())
+
+
+#: COD of phenol as printed (it is in no scene), half a last digit of what Table 1 prints, atomic weights.
+COD, HALF_DIGIT = 2.38, 0.005
+WEIGHT = {"C": 12.011, "H": 1.008, "O": 15.999, "N": 14.007}
+#: F from the entries of Table 1.
+F_COMPUTED = COD - 0.61 * 1.42
+F_OTHER = ("base", f"kinetics.acceptor_to_donor_ratio={F_COMPUTED!r}", f'growth.end="{PLOTTED} h"',
+           f'output.times=["{PLOTTED} h"]')
+
+
+@claim("C28", "Table 1", "F = COD - Y d_c; diffusivity in the aggregate 80 % of that in water", about=CLOSED)
+def table_1() -> Finding:
+    """F from Table 1's own entries and from chemical formulas; ratios of diffusivities; what F's error does to base."""
+    said = scene(*BASE)
+    law, paper = said.kinetics, said.kinetics.acceptor_to_donor_ratio
+    y, d_c = law.yield_coefficient, law.decay_oxygen_demand
+    value, from_formulas = COD - y * d_c, oxygen_demand(6, 6, 1, 0, 7) - y * oxygen_demand(5, 7, 2, 1, 5)
+    checks = [printed("COD - Y d_c from the printed values (mg/mg)", f"{paper}", value, rests_on=ARITHMETIC,
+                      input="acceptor_to_donor_ratio")]
+    for name in SUBSTRATES:
+        substrate = getattr(said.substrates, name)
+        ratio = substrate.diffusivity_in_aggregate / substrate.diffusivity
+        checks.append(printed(f"{name}: diffusivity, aggregate over water (%)", "80", 100 * ratio, rests_on=ARITHMETIC))
+    near = (COD + HALF_DIGIT, y, d_c - HALF_DIGIT)
+    rounding = (f"COD {near[0]:.3f}, Y {near[1]:.3f} and d_c {near[2]:.3f} round to the printed ones and give "
+                f"{near[0] - near[1] * near[2]:.4f}")
+    low, high = interval(f"{paper}")
+    note = (f"Table 1's entries give {value:.4f} [E1]; with C6H6O + 7 O2 and C5H7O2N + 5 O2 for COD and d_c it is "
+            f"{from_formulas:.4f}. ")
+    return Finding(tuple(checks), reason=f"Table 1's own COD, Y and d_c give {value:.4f} [E1]",
+                   rounding=rounding if low <= near[0] - near[1] * near[2] <= high else "",
+                   note=lambda: note + effect_of_f())
+
+
+def oxygen_demand(carbon: int, hydrogen: int, oxygen: int, nitrogen: int, molecules: int) -> float:
+    """mg of O2 that oxidise a mg of a compound, a molecule of which takes so many molecules of O2."""
+    mass = sum(count * WEIGHT[atom] for atom, count in zip("CHON", (carbon, hydrogen, oxygen, nitrogen)))
+    return molecules * 2 * WEIGHT["O"] / mass
+
+
+def effect_of_f() -> str:
+    """Base at 19.2 h with F as computed: a run of its own, and the effluents in one and the same geometry."""
+    ours, other = at(BASE, PLOTTED), at(F_OTHER, PLOTTED)
+    told = ", ".join(f"{name} {100 * (other[key] / ours[key] - 1):+.2f} %" for name, key in
+                     (("velocity", "mean_velocity_m_per_d"), ("area", "aggregate_area_um2"),
+                      *((f"effluent {name}", f"effluent_{name}_mg_per_L") for name in SUBSTRATES)))
+    now, solved = solved_pore(BASE, PLOTTED)
+    kinetics = replace(scene(*BASE).kinetics, acceptor_to_donor_ratio=F_COMPUTED)
+    problem = replace(solved.problem, kinetics=kinetics)
+    sink = Sink(now.active)
+    state = transport.steady(problem, sink, solved.concentrations)
+    pairs = zip(solved.fluxes, transport.fluxes(problem, sink, state))
+    alone = ", ".join(f"{name} {100 * (b.effluent / a.effluent - 1):+.2f} %" for name, (a, b) in zip(SUBSTRATES, pairs))
+    return f"Base at {PLOTTED} h with {F_COMPUTED:.4f}: {told}; in one and the same geometry the effluents: {alone}."
+
+
+SECONDS = 3600.0
+#: Concentration that stands for saturation, mg/L.
+ENDLESS = 1e12
+
+
+@claim("C09", "4", "doubling time about 3 h; decay half-time about 5.8 d")
+def doubling() -> Finding:
+    """Doubling time of base's aggregate, mean over 19.2 h, and of a seed at the supply; ln 2 / b."""
+    said, row = scene(*BASE), at(BASE, 19.2)
+    supply, half = said.substrates.acceptor.supply, log(2) / said.kinetics.decay_coefficient / 24
+    mean = row["time_h"] * log(2) / log(row["aggregate_area_um2"] / at(BASE, 0.0)["aggregate_area_um2"])
+    fastest, endless = (_doubling_time(said, value, value) for value in (supply, ENDLESS))
+    checks = (printed("doubling time of base's aggregate, mean to 19.2 h (h)", "~3", mean, input="doubling"),
+              printed("doubling time at the supply of 10 K_s (h)", "~3", fastest, rests_on=ARITHMETIC,
+                      input="doubling_at_supply"),
+              printed("decay half-time (d)", "~5.8", half, rests_on=ARITHMETIC))
+    reason = (f"{endless:.2f} h is the doubling time at saturation, C without bound; at the supply of 10 K_s, which "
+              f"nothing in base exceeds, it is {fastest:.2f} h, and base doubles every {mean:.2f} h")
+    return Finding(checks, reason=reason)
+
+
+def _doubling_time(said, acceptor: float, donor: float) -> float:
+    """ln 2 / (F3 / X_A), h."""
+    return log(2) / float(growth_rate(acceptor, donor, said.substrates, said.kinetics))
+
+
+@claim("C18", "1", "within a 600 um pore: flow << 1 s, advection a few seconds, diffusion of the order of minutes, "
+       "growth hours")
+def time_scales() -> Finding:
+    """W^2 / nu, L / u_ave, L^2 / D of both substrates, and the doubling time at the supply."""
+    said = scene(*BASE)
+    viscous, advection, diffusion, growth = _scales(said)
+    apart = min(advection / viscous, growth * 60 / max(diffusion))
+    tenfold = "of the order: one to ten of the unit"
+    checks = (at_most("flow, W^2 / nu (s)", "<< 1", viscous, 0.1, "much less: a tenth"),
+              between("advection, L / u_ave at t = 0 (s)", "a few", advection, 2, 10, "a few: two to ten"),
+              *(between(f"diffusion of the {name}, L^2 / D (min)", "order of minutes", value, 1, 10, tenfold)
+                for name, value in zip(("acceptor", "donor"), diffusion)),
+              between("growth, doubling time at the supply (h)", "hours", growth, 1, 10, tenfold),
+              at_least("substrates over flow, growth over substrates (times)", "sequential", apart, 10,
+                       "an order of magnitude, of both ratios"))
+    slow = advection * at(BASE, 0.0)["mean_velocity_m_per_d"] / at(BASE, 19.2)["mean_velocity_m_per_d"]
+    reason = (f"over 600 um at the paper's own 2.9 m/d it is {advection:.0f} s, {advection / 1.5:.0f} s on the axis of "
+              f"the pore, and {slow:.0f} s at the velocity of 19.2 h; {advection / 6:.0f} s are what it takes over 100 "
+              f"um. The order of the scales, which the sequential coupling needs, holds")
+    across = SECONDS * said.pore.width**2 / said.substrates.donor.diffusivity
+    return Finding(checks, reason=reason, note=f"Diffusion across the pore, W^2 / D of the donor: {across:.1f} s.")
+
+
+def _scales(said) -> tuple[float, float, tuple[float, float], float]:
+    """Flow (s), advection at t = 0 (s), diffusion of acceptor and donor (min), growth at the supply (h)."""
+    kinds = said.substrates.acceptor, said.substrates.donor
+    speed = at(BASE, 0.0)["mean_velocity_m_per_d"] / 24e-6
+    diffusion = tuple(60 * said.pore.length**2 / s.diffusivity for s in kinds)
+    return (SECONDS * said.pore.width**2 / said.flow.kinematic_viscosity, SECONDS * said.pore.length / speed, diffusion,
+            _doubling_time(said, *(s.supply for s in kinds)))
+
+
+TIMES = (0.0, 19.2, 19.4)
+NUMBERS = {"mean velocity (m/d)": "mean_velocity_m_per_d", "effluent acceptor (mg/L)": "effluent_acceptor_mg_per_L",
+           "effluent donor (mg/L)": "effluent_donor_mg_per_L", "inlet acceptor (mg/L)": "inlet_acceptor_mg_per_L",
+           "area (um2)": "aggregate_area_um2", "thickness (um)": "thickness_um", "inert fraction": "inert_fraction",
+           "meshed length (um)": "meshed_length_um"}
+
+
+def _changed(*changes: str) -> tuple[str, ...]:
+    return (*BASE, *changes, LAST)
+
+
+#: Element sizes twice, once and half those of base; steps likewise; the scheme of 2001.
+MESHES = {"size 2": _changed("numerics.refinement=0.5"), "size 1": BASE, "size 1/2": _changed("numerics.refinement=2")}
+UPDATES = {"24 min": _changed('growth.time_step="24 min"'), "12 min": BASE,
+           "6 min": _changed('growth.time_step="6 min"')}
+STRICT = _changed('numerics.transport="gear"', 'numerics.transfer="linear"', 'numerics.inlet="mean"')
+VARIANTS = {"base": BASE, "strict": STRICT}
+RUNS = tuple(dict.fromkeys([STRICT, *reversed(MESHES.values()), *UPDATES.values()]))
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Base's numbers in several runs: names of the runs, and lines (quantity, their values, differences in percent of
+    each value from the one before)."""
+
+    title: str
+    runs: tuple[str, ...]
+    lines: tuple[tuple[str, tuple[float, ...], tuple[float, ...]], ...]
+
+
+Rows = dict[tuple[str, ...], dict[float, dict[str, float]]]
+
+
+def compare(title: str, runs: dict[str, tuple[str, ...]], rows: Rows) -> Comparison:
+    """Every number at every time in every run."""
+    lines = [_line(f"{name}, t = {time:g} h", [rows[run][time][column] for run in runs.values()])
+             for time in TIMES for name, column in NUMBERS.items()]
+    return Comparison(title, tuple(runs), tuple(lines))
+
+
+def _line(name: str, values: list[float]):
+    moved = tuple(100 * (b / a - 1) if a else 0.0 for a, b in zip(values, values[1:]))
+    return name, tuple(values), moved
+
+
+def rows_of(run: tuple[str, ...]) -> dict[float, dict[str, float]]:
+    """The rows of a run at TIMES."""
+    found = {time: at(run, time) for time in TIMES}
+    forget(DEFAULT)
+    return found
+
+
+def computed() -> Rows:
+    """The rows of all runs, a run a process."""
+    return dict(zip(RUNS, side_by_side(rows_of, list(RUNS))))
+
+
+def comparisons(rows: Rows) -> tuple[Comparison, ...]:
+    """Three mesh sizes, three time steps, and the strict variant against base."""
+    return (compare("Three mesh sizes, in those of base", MESHES, rows),
+            compare("Three steps between shape updates", UPDATES, rows),
+            compare("The strict variant of 2001 (gear, linear transfer, u_ave in (11)) against base", VARIANTS, rows))
+
+
+def checks(rows: Rows) -> tuple[PaperCheck, ...]:
+    """Halving the time step moves the velocity by less than 0.5 %, halving the mesh size by less than 1 %."""
+    return tuple(_halved(what, runs, time, bound, rows) for time in TIMES
+                 for what, runs, bound in (("time step", UPDATES, 0.5), ("mesh size", MESHES, 1.0)))
+
+
+def _halved(what: str, runs: dict[str, tuple[str, ...]], time: float, bound: float, rows: Rows) -> PaperCheck:
+    before, after = (rows[run][time]["mean_velocity_m_per_d"] for run in list(runs.values())[1:])
+    return at_most(f"halving the {what} moves the velocity at {time:g} h (%)", f"< {bound:g}",
+                   100 * abs(after / before - 1), bound, "set beforehand")

@@ -1,19 +1,89 @@
-"""Claims computed at all levels: each level in a process of its own, whose runs it keeps while it computes."""
+"""Claims computed at all levels: each level in a process of its own, whose runs it keeps while it computes.
+
+The error bars of a claim's numbers, from what its function finds at other levels.
+
+Formal orders: every stage of the scheme is of second order in the mesh but for the head loss and the stresses, which
+are of first; its loop is of first order in the step. `make verify` measures all of them. The converged solution is of
+second order or more where nothing is singular, and of first at the least where biomass, water and wall meet.
+
+A number that is itself an error, or a difference of two runs that should be none, may have a bar larger than itself.
+"""
 
 from __future__ import annotations
 
 import importlib
 import os
 import pkgutil
+import re
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 
 import verification.claims as package
-from verification.claims import CLAIMS, Finding
-from verification.claims.bars import Numbers, numbers
-from verification.claims.levels import CONVERGED, PAIRED, Level, at_level, forget
+from verification.claims import CLAIMS, CLOSED, MODEL, OF_SCHEME, Claim, ClaimError, Finding, PaperCheck
+from verification.claims.levels import COMPARED, CONVERGED, PAIRED, SCHEME, Level, at_level, forget
+from verification.uncertainty import Bar, Estimate, combined, estimate, spread
+
+MESH_ORDERS, STEP_ORDERS = (1.0, 2.0), (1.0, 1.0)
+
+#: Name and value of each check of a claim, and whether it holds.
+Numbers = tuple[tuple[str, float, bool], ...]
+
+
+def numbers(finding: Finding) -> Numbers:
+    """What a finding says at one level."""
+    return tuple((check.quantity, check.value, check.holds) for check in finding.checks)
+
+
+def barred(claim: Claim, finding: Finding, others: dict[Level, Numbers]) -> Finding:
+    """The finding with a bar on each check. Raises ClaimError where the levels do not speak of the same quantities."""
+    found = {claim.judged: numbers(finding), **others}
+    said = {tuple(unnumbered(quantity) for quantity, *_ in row) for row in found.values()}
+    if len(said) != 1:
+        raise ClaimError(f"the levels tell of different quantities: {sorted(said)}")
+    checks = [_judgeable(claim, check, {level: row[k][1:] for level, row in found.items()})
+              for k, check in enumerate(finding.checks)]
+    return replace(finding, checks=tuple(checks))
+
+
+def unnumbered(quantity: str) -> str:
+    """A quantity without the numbers in it: the instant at which something happens differs between levels."""
+    return re.sub(r"\d+(\.\d+)?", "#", quantity)
+
+
+def _judgeable(claim: Claim, check: PaperCheck, found: dict[Level, tuple[float, bool]]) -> PaperCheck:
+    """The check with its bar, from its value and whether it holds at each level; to a width of its own, that of printed
+    digits that it is made of, the bar is added."""
+    values = {level: value for level, (value, _) in found.items()}
+    of_kind = [level for level in found if claim.about != MODEL or level.kind == CONVERGED]
+    scheme = [values[level] for level in values if level.kind == SCHEME]
+    if claim.about == MODEL:
+        check = replace(check, scheme=(min(scheme), max(scheme)) if scheme else None,
+                        on_sizes=tuple(values[level] for level in of_kind))
+    if not check.converges:
+        held = tuple(found[level][1] for level in of_kind)
+        return replace(check, bar=spread([values[level] for level in of_kind]), held=held)
+    bar, own = _bar(claim, check.value, values), check.bar or Bar(check.value, check.value)
+    return replace(check, bar=replace(bar, low=bar.low - check.value + own.low, high=bar.high - check.value + own.high))
+
+
+def _bar(claim: Claim, value: float, values: dict[Level, float]) -> Bar:
+    if claim.about == CLOSED:
+        return Bar(value, value, Estimate(0.0, float("nan"), 0.0), None)
+    if claim.about == OF_SCHEME:
+        mesh = _estimate(claim.sizes, [values[Level(SCHEME, size)] for size in claim.sizes], MESH_ORDERS)
+        step = _estimate(claim.steps, [values[Level(SCHEME, step=step)] for step in claim.steps], STEP_ORDERS)
+        return combined(value, mesh, step)
+    return combined(value, _estimate(claim.fine, [values[Level(CONVERGED, size)] for size in claim.fine], MESH_ORDERS),
+                    None)
+
+
+def _estimate(sizes: tuple[float, ...], values: list[float], formal: tuple[float, float]) -> Estimate | None:
+    """None where the size is not varied."""
+    return estimate(sizes, values, formal) if len(sizes) > 1 else None
+
 
 #: Of a claim at one level: its numbers, with its finding where the level is the judged one, or the error in words.
 Found = tuple[Numbers, Finding | None] | str
@@ -40,7 +110,7 @@ def everywhere(ids: Iterable[str]) -> dict[str, dict[Level, Found]]:
 
 def effort(level: Level) -> float:
     """About how long a level takes, in any unit."""
-    several = RUNS_OF_PAIRED if level.kind == CONVERGED and level.size in PAIRED else 1.0
+    several = RUNS_OF_PAIRED if level.kind == CONVERGED and level.size in (*PAIRED, *COMPARED) else 1.0
     return several * (4.0 if level.kind == CONVERGED else 2.0) / (level.size**3 * level.step)
 
 

@@ -1,18 +1,29 @@
-"""C26, C35: what the fluid does to the aggregate, and how much of it goes through."""
+"""C26, C35: what the fluid does to the aggregate, and how much of it goes through.
+
+C40, C46: stress, flow, growth and detachment, which section 5 would link.
+
+The stress has no largest value: the aggregate slides on the walls and is kept in place at one point of each contact
+surface (2.3.3), which bears all that the fluid pulls, and what the other wall pulls; in two dimensions the stress
+around a force at a point goes as one over the distance. What tears is not a point, so that the stress is taken in the
+mean over what of the aggregate lies within a tenth of the pore's width of a place, and told for half and twice that.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse as sp
 import shapely
+from scipy.spatial import KDTree
 
+from repro.fem import elements
 from repro.fem.mesh import gradients
 from repro.fem.transfer import interpolate
-from verification.claims import Finding, at_least, at_most, claim
+from repro.model import contact, growth
+from verification.claims import FEW, FEW_WORDS, Finding, at_least, at_most, claim
 from verification.claims.levels import WIDE_FINE
-from verification.claims.restored import Body, bodies, body, body_of, in_plane, polygon, stress
-from verification.claims.runs import BASE, WIDE, history, scene
+from verification.claims.runs import BASE, WIDE, Body, bodies, body, body_of, history, in_plane, polygon, scene, stress
 
 PLOTTED, UPDATE = 19.2, 0.2
 PASCAL = 1e6  # in a MPa
@@ -153,3 +164,170 @@ def inside(found: Body) -> float:
     speed = interpolate(found.grid.points, found.triangles, found.node("velocity_m_per_d")[:, :1],
                         np.column_stack([np.zeros(parts), y]))
     return 100 * float(speed.mean() * height) / (mean * found.grid.width)
+
+
+NEW = "2026-11-22"
+#: The distance over which the stress is averaged, over the pore's width; half and twice that.
+APART, OTHER = 0.1, (0.05, 0.2)
+#: Places at which the mean is taken, in a distance; degree of the quadrature of the stress.
+PLACES, DEGREE = 4, 8
+#: Ends of the rings, over the pore's width, between which the exponent of the stress is measured.
+RINGS = ((0.08, 0.16), (0.16, 0.32))
+#: Of C46: run and hour.
+STATES = ((BASE, 19.4), (WIDE, 30.0), (WIDE, 40.0))
+
+
+@dataclass(frozen=True)
+class Peak:
+    """value: over mu_L; x, y: its place (um)."""
+
+    value: float
+    x: float
+    y: float
+
+    @property
+    def told(self) -> str:
+        """In words."""
+        return f"{self.value:.3g} mu_L at ({self.x:.0f}, {self.y:.0f}) um"
+
+
+@dataclass(frozen=True, eq=False)
+class Stress:
+    """Cauchy stress of an aggregate: points (K, 2) um, areas (K,) um2 for which they stand, values (K, 4) over mu_L."""
+
+    points: np.ndarray
+    areas: np.ndarray
+    values: np.ndarray
+
+    def within(self, distance: float, places: np.ndarray) -> np.ndarray:
+        """(p, 4) means over what of the aggregate is within a distance (um) of places (p, 2)."""
+        apart = KDTree(places).sparse_distance_matrix(KDTree(self.points), distance, output_type="coo_matrix")
+        weights = sp.csr_array((self.areas[apart.col], (apart.row, apart.col)), shape=apart.shape)
+        return (weights @ self.values) / (weights @ np.ones(len(self.points)))[:, None]
+
+
+def stress_of(found: Body) -> Stress:
+    """In quadrature points."""
+    mesh, kept = found.grid, found.pore.body
+    shape = growth.Shape(kept.shape.cells, kept.shape.corners, DEGREE)
+    position = mesh.points[mesh.body]
+    nodes = position[shape.cells]
+    pressure = found.pore.pressure[mesh.triangles[mesh.biomass]] @ shape.table.linear.T
+    values = growth.cauchy(growth.Body(shape, kept.reference).strained(position).F, pressure)
+    return Stress(np.einsum("qa,tai->tqi", shape.table.values, nodes).reshape(-1, 2),
+                  elements.weights(nodes, shape.table).ravel(), values.reshape(-1, 4))
+
+
+def peak(found: Body, part: float = APART) -> Peak:
+    """Largest principal value of the stress in the mean over a part of the pore's width, and where."""
+    distance = part * found.grid.width
+    places = lattice(found, distance / PLACES)
+    values = growth.largest_principal(stress_of(found).within(distance, places))
+    worst = int(values.argmax())
+    return Peak(float(values[worst]), *map(float, places[worst]))
+
+
+def lattice(found: Body, spacing: float) -> np.ndarray:
+    """(p, 2) um: the points of a square lattice through the origin that are in the aggregate, whatever its mesh is."""
+    outline = found.outline
+    x = spacing * np.arange(np.ceil(outline.upstream / spacing), np.floor(outline.downstream / spacing) + 1)
+    y = spacing * np.arange(np.floor(found.grid.width / spacing + 1e-9) + 1)
+    places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    return places[shapely.intersects_xy(polygon(outline), *places.T)]
+
+
+def exponent(without: Body, forced: Body, place: np.ndarray) -> float:
+    """p of r^p, of what the fluid adds to the in-plane shear stress at the distance r from a place (2,) um."""
+    width = without.grid.width
+    sizes = [added(without, forced, place, (first * width, last * width)) for first, last in RINGS]
+    return float(np.log2(sizes[1] / sizes[0]))
+
+
+def added(without: Body, forced: Body, place: np.ndarray, ring: tuple[float, float]) -> float:
+    """Root of the mean square over a ring (um) of the in-plane shear stress that the fluid adds, over mu_L."""
+    before, after = stress_of(without), stress_of(forced)
+    distance = np.hypot(*(before.points - place).T)
+    within = (ring[0] <= distance) & (distance < ring[1])
+    xx, yy, _, xy = (after.values - before.values)[within].T
+    return float(np.sqrt(np.average(0.25 * (xx - yy) ** 2 + xy**2, weights=before.areas[within])))
+
+
+@claim("C40", "5", "detachment by fracture along the lines of maximum stress could be incorporated", fine=WIDE_FINE)
+def tearing() -> Finding:
+    """Largest principal stress in the aggregate of base and wide: is there tension, where would it tear first, and
+    how do size and place change with time?"""
+    courses = {run[0]: course(run) for run in (BASE, WIDE)}
+    worst = {run[0]: peak(bodies(run)[1 + int(np.argmax([each[0] for each in courses[run[0]]]))])
+             for run in (BASE, WIDE)}
+    checks = [at_least(f"{name}: largest principal stress over mu_L, in the mean over W / 10", "stress is computed",
+                       found.value, 0.0, "tension", date=NEW) for name, found in worst.items()]
+    modulus = scene(*BASE).growth.shear_modulus
+    note = (f"In base it is {worst['base'].told} and {max(courses['base'])[3]:g} h; in wide {worst['wide'].told} and "
+            f"{max(courses['wide'])[3]:g} h: there it would tear first. "
+            + " ".join(f"Over time, of triangles in {name}: {_listed(peaks[4::5], modulus)}."
+                       for name, peaks in courses.items()))
+    return Finding(tuple(checks), reason="nothing is under tension", note=note)
+
+
+def course(run: tuple[str, ...]) -> list[tuple[float, float, float, float]]:
+    """Largest principal stress (MPa), its place (um) and time (h) of every row but that of t = 0."""
+    return [tension(found) for found in bodies(run)[1:]]
+
+
+def _listed(peaks: list[tuple[float, float, float, float]], modulus: float) -> str:
+    """In words."""
+    return ", ".join(f"{value / modulus:.2g} mu_L at ({x:.0f}, {y:.0f}) um and {hours:g} h"
+                     for value, x, y, hours in peaks)
+
+
+@claim("C46", "5", "the stress could link fluid flow, growth and detachment: the fluid changes the stress of which the "
+       "aggregate would tear", fine=WIDE_FINE)
+def torn_by_the_fluid() -> Finding:
+    """Largest principal stress, in the mean over a tenth of the pore's width, of wide at 40 h, a plug under constant
+    velocity, with the fluid's forces and without; and of base at 19.4 h and of wide at 30 h, with a film left."""
+    pairs = {f"{run[0]}, {hour:g} h": (body(run, hour), pressed(body(run, hour))) for run, hour in STATES}
+    checks = tuple(at_least(f"{name}: largest principal stress, in the mean over W / 10, changed by the fluid (%)",
+                            "link", abs(changed(pair)), 100 * FEW, f"more than {FEW_WORDS}", date=NEW)
+                   for name, pair in pairs.items())
+    reason = ("while a film is left the fluid changes the stress by a few percent at most; the head that drives the "
+              "constant velocity through the plug changes it by more")
+    return Finding(checks, reason=reason, note=lambda: _told_of_the_fluid(pairs))
+
+
+def changed(pair: tuple[Body, Body], part: float = APART) -> float:
+    """By how many percent the fluid changes the largest principal stress."""
+    without, forced = (peak(found, part).value for found in pair)
+    return 100 * (forced / without - 1)
+
+
+def _told_of_the_fluid(pairs: dict[str, tuple[Body, Body]]) -> str:
+    peaks = "; ".join(f"{name} {peak(without).told} and {peak(forced).told}"
+                      for name, (without, forced) in pairs.items())
+    others = "; ".join(f"{name} " + ", ".join(f"{changed(pair, part):.2g}" for part in (OTHER[0], APART, OTHER[1]))
+                       for name, pair in pairs.items())
+    exponents = "; ".join(f"{name} " + " and ".join(f"{exponent(*pair, place):.2f}" for place in fixed(pair[0]))
+                          for name, pair in pairs.items())
+    return (f"Without and with the fluid's forces: {peaks}. In the mean over W / 20, W / 10 and W / 5 it changes by, "
+            f"in percent: {others}. A largest value in a point does not exist: around a fixed point what the fluid "
+            f"adds goes as a power of the distance of {exponents} (-1 for a force in a point).")
+
+
+def fixed(found: Body) -> np.ndarray:
+    """(k, 2) um, the fixed points."""
+    return found.outline.points[found.outline.fixed]
+
+
+def pressed(found: Body) -> Body:
+    """The same aggregate at rest under the fluid's forces. It is elastic, so that this does not hang on the way there,
+    but for what the forces would have changed of its growth. Raises GrowthError where shape and flow do not agree."""
+    forced = replace(found.scene, growth=replace(found.scene.growth, fluid_forces="included"))
+    now, _, _ = contact.expand(forced, found.pore, found.pore.theta)
+    return Body(forced, now, found.solved)
+
+
+def tension(found: Body) -> tuple[float, float, float, float]:
+    """Largest principal stress (MPa) of a triangle, its place (um) and time (h)."""
+    values = found.cell("largest_principal_stress_MPa")
+    worst = int(values.argmax())
+    x, y = found.grid.points[found.triangles[worst]].mean(axis=0)
+    return float(values[worst]), float(x), float(y), round(found.pore.time, 9)

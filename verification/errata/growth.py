@@ -18,8 +18,7 @@ from repro.fem.outline import half_disc as seed
 from repro.fem.sizing import ACROSS_AGGREGATE, Sizing
 from repro.model import growth, mesh_motion
 from verification.claims.growth_mechanics import Sliding, sliding
-from verification.claims.runs import BASE, ledger, scene
-from verification.claims.states import half_disc
+from verification.claims.runs import BASE, half_disc, ledger, scene
 from verification.errata import erratum, percent, small, table
 from verification.switches import CHOICES
 

@@ -12,8 +12,7 @@ from repro.fem.outline import BOTTOM, TOP, Outline
 from repro.fem.space import Space
 from repro.model import flow, pore
 from verification import switches
-from verification.claims.runs import BASE, WIDE, at, grown, history, scene, series
-from verification.claims.states import half_disc
+from verification.claims.runs import BASE, WIDE, at, grown, half_disc, history, scene, series
 from verification.errata import (
     END,
     STATE_HEAD,

@@ -11,9 +11,8 @@ import numpy as np
 from repro.model import kinetics
 from verification.claims.base_run import upstream_means
 from verification.claims.levels import CONVERGED, Level, at_level
-from verification.claims.mass_balance import PAPER_CORRECTION, bookkeeping, exceeding
-from verification.claims.restored import solved_pore
-from verification.claims.runs import BASE, PLATES, at, grown, scene, series
+from verification.claims.runs import BASE, PLATES, at, grown, scene, series, solved_pore
+from verification.claims.scheme import PAPER_CORRECTION, bookkeeping, exceeding
 from verification.errata import (
     STATE_HEAD,
     consumed_ratio,

@@ -24,12 +24,10 @@ from repro.march import simulation
 from repro.march.loop import Instant, PoreEnd, State
 from repro.results import M_PER_D
 from verification.claims import CLAIMS, Finding, evaluate
-from verification.claims.after_contact import OF_WIDE
-from verification.claims.bars import MESH_ORDERS, unnumbered
-from verification.claims.levels import CONVERGED, Level, at_level, converged, forget
-from verification.claims.restored import bodies, polygon
-from verification.claims.runs import WIDE, series
-from verification.claims.shapes import contact_length
+from verification.claims.evaluate import MESH_ORDERS, unnumbered
+from verification.claims.growth_pattern import contact_length
+from verification.claims.levels import CONVERGED, OF_WIDE, Level, at_level, converged, forget
+from verification.claims.runs import WIDE, bodies, polygon, series
 from verification.sensitivity.numbers import OF, Numbers, Runs, scene
 from verification.uncertainty import estimate
 
