@@ -55,8 +55,7 @@ def counted(monkeypatch):
 
 
 def test_errata_and_audit_read_one_run(counted):
-    """Both tell the same difference, of runs that are computed once. Mutants: an audit that simulates its scenes by
-    itself; one that asks for base under another name."""
+    """Both tell the same difference, of runs that are computed once."""
     switch = CHOICES["rechosen"]
     told = audit.measured(switch, 1.0)["effect"]
     line = re.search(r"^\| base, 19.2 h, rechosen \|(.*)\|$", entry("E20"), re.M)[1]
@@ -67,7 +66,7 @@ def test_errata_and_audit_read_one_run(counted):
 
 
 def test_errata_and_audit_march_once_where_no_scene_can_say_it(counted, monkeypatch):
-    """What a restart as J drifts by, of two steps. Mutant: an audit that marches for itself."""
+    """What a restart as J drifts by, of two steps."""
     marches, march = Counter(), switches._march
 
     def counting(said, step, now):

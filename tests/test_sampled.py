@@ -170,8 +170,7 @@ def test_a_row_stands_as_long_as_what_it_rests_on(changes, stands):
     ("timeout", "slow", "quick", [["quick", "slow"]]),
 ])
 def test_the_test_that_caught_a_mutant_before_is_the_first(tmp_path, monkeypatch, verdict, last, catches, runs):
-    """Alone; the others follow if it lets the mutant pass, or is no more. Mutants: what was caught is not handed on;
-    a test that is gone is run; a mutant that it lets pass meets no other."""
+    """Alone; the others follow if it lets the mutant pass, or is no more."""
     called = frozenset({("timing.py", "timed")})
     known = Reach((Measured("quick", 0.1, called), Measured("slow", 70.0, called)))
     mutant = Mutant("timing.py", 33, 0, "o", 0, "x = 1", "x = 2")
