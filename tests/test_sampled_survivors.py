@@ -15,25 +15,27 @@ import xarray
 
 import repro
 from repro import results, timing
-from repro.check import cost, numbers, simplifications
+from repro.check import checked, cost, numbers, simplifications
 from repro.cli import sweep
 from repro.errors import CheckpointError, Unresolved
-from repro.fem import linear
+from repro.fem import linear, sizing
 from repro.fem.brief import brief
-from repro.fem.outline import BOTTOM
-from repro.march.simulation import simulate, steps
+from repro.fem.mesh import Mesh, triangle_areas
+from repro.fem.mesher import unlocked
+from repro.fem.outline import BOTTOM, TOP
+from repro.march.simulation import rows_within, simulate, steps
 from repro.model import remeshing
 from repro.model.contact import contact_lines, middle_of
 from repro.model.pore import initial_outline, seeded, solve
 from repro.report import charts, fields, run_page
 from repro.results import names, netcdf, vtu
-from repro.run import checkpoint, stored
+from repro.run import checkpoint, running, stored
 from repro.scene import SceneError, load_scene
 from repro.sweep import page, table
 from repro.sweep.design import Point, parse
 from repro.sweep.picture import LEVELS, Axis
 from repro.sweep.state import Sweep
-from tests import pages
+from tests import pages, strategies
 
 STATUS = Path("/proc/self/status")
 
@@ -299,3 +301,68 @@ def test_a_pore_without_an_aggregate_is_kept_and_read():
 def test_a_trial_tells_the_memory_before_and_at_its_peak():
     before, peak = cost.tried(load_scene("base", ["numerics.preset=fast"]), 300).memory
     assert 10 < before <= peak
+
+
+@pytest.mark.parametrize("biomass", [False, True])
+@pytest.mark.parametrize("first", [0, 1, 2])
+def test_cornered_triangles_are_freed_in_either_region_whichever_node_is_their_first(biomass, first):
+    """Two of the four corners of a square are cut off by one triangle alone."""
+    points = np.array([[x, y] for y in range(3) for x in range(3)], float)
+    lower = [[k, k + 1, k + 4] for k in (0, 1, 3, 4)]
+    upper = [[k, k + 4, k + 3] for k in (0, 1, 3, 4)]
+    triangles = np.roll(np.array(lower + upper), first, axis=1)
+    grid = Mesh.of(points, triangles, np.full(8, biomass), np.empty(0, int), 2.0, (0.0, 2.0))
+    assert sorted(on_the_boundary(grid.triangles)) == [0, 0, 1, 1, 1, 1, 2, 2]
+    freed = unlocked(grid)
+    assert sorted(on_the_boundary(freed.triangles)) == [1] * 8
+    assert triangle_areas(points, freed.triangles) == pytest.approx(np.full(8, 0.5))
+
+
+def on_the_boundary(triangles):
+    """Of each triangle, how many of its edges no other one has."""
+    edges = [frozenset(pair) for a, b, c in triangles.tolist() for pair in ((a, b), (b, c), (c, a))]
+    return [sum(edges.count(edge) == 1 for edge in edges[k: k + 3]) for k in range(0, len(edges), 3)]
+
+
+def test_elements_are_small_beside_the_upper_wall_s_contact_lines_alone():
+    """And grow from there."""
+    across = strategies.plug(50.0, -20.0, 15.0, 3.0)
+    sizes = sizing.interface_sizes(across, sizing.Sizing(50.0, 1.0, 1.0, contact=0.1))
+    lower, upper = across.wall == BOTTOM, across.wall == TOP
+    ends = np.array([15.0 + 3.0, -20.0 + 3.0])
+    distance = np.abs(across.points[upper, :1] - ends).min(axis=1)
+    assert sizes[upper] == pytest.approx(np.minimum(50.0 / 14, 0.1 + sizing.GRADATION * distance))
+    assert sizes[upper].min() == 0.1 and (sizes[lower] == 50.0 / 14).all()
+
+
+@pytest.mark.parametrize("count", [1, 7])
+def test_rows_within_steps_are_counted_as_parts_of_steps(count):
+    """What a run is expected to take grows with its rows as it does with its steps."""
+    times = str([f"{round(0.31 * k, 2)} h" for k in range(count + 1)]).replace("'", '"')
+    scene = load_scene("base", ["numerics.preset=fast", "growth.end=3 h", f"output.times={times}"])
+    assert rows_within(scene) == {round(0.31 * k, 2) for k in range(1, count + 1)}
+    free, touching = cost.steps(scene)
+    trial = cost.Trial(None, 5.0, 2.0, 100, None)
+    wanted = 5.0 + 2.0 * cost.REMESHING * (free + cost.IN_CONTACT * touching + cost.ROW * count)
+    assert cost.expected(scene, trial, 100).seconds == pytest.approx(wanted, rel=1e-12)
+
+
+@pytest.mark.parametrize("permeability, wanted", [("1e-13 m^2", True), ("1e-17 m^2", False)])
+def test_a_refinement_that_resolves_a_drag_layer_is_told_where_one_is_accepted(permeability, wanted):
+    scene = load_scene("flow_only", ["aggregate.radius=20 um", "numerics.elements=quadratic", "flow.biomass=brinkman",
+                                     f"flow.permeability={permeability}"])
+    (warned,) = [one for one in simplifications.warnings(scene, []) if one.key == "flow.permeability"]
+    assert ("numerics.refinement = " in warned.text) == wanted
+
+
+def test_of_what_differs_the_first_four_are_told():
+    differing = {f"tables.growth.{name}": [1.0, 2.0] for name in "abcdef"}
+    told = running._shown(differing)
+    assert told.count("there, now") == 4 and told.startswith("growth.a") and told.endswith(" and 2 more")
+    assert running._shown(dict(list(differing.items())[:4])).count("there, now") == 4
+
+
+def test_a_warning_is_as_wide_as_the_other_lines():
+    """A hundred and ten columns, indented by two."""
+    lines = checked._warnings([simplifications.Warned("k", "x " * 200)])
+    assert max(map(len, lines)) == 112
