@@ -55,7 +55,9 @@ def other_rheology() -> Finding:
     reason = (f"what changes by more than a few percent: {worst or 'nothing, but a bar reaches over the bound'}. With "
               f"its middles rechosen the aggregate slides {moved:.1f} um downstream as it grows on the other side, "
               f"with the same shape: moved back, the outlines are {left:.2g} % apart; its conductivity is the same. "
-              "The conclusions stand, the place of the aggregate is the fixed point's")
+              "The conclusions stand, the place of the aggregate is the fixed point's. How far it slides has no limit "
+              "in a mesh: judged is that it is too far on each one, where the bar of a number with a limit would leave "
+              "it open")
     return Finding(checks, reason=reason, note=_told)
 
 
