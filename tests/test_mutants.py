@@ -99,6 +99,8 @@ def outcome(value):
     (Result("c", Outcome(), "Traceback\nrepro.errors.LinearError: residual 1e-2", 0.0), True),
     (Result("c", Outcome(), "Traceback\nAttributeError: no such thing", 0.0), False),
     (Result("c", Outcome(), "Traceback\nNameError", 0.0), False),
+    (Result("c", outcome(2.0), "fast: Traceback\nTypeError: of another variant", 0.0), True),
+    (Result("c", outcome(0.5), "fast: Traceback\nTypeError: of another variant", 0.0), False),
 ])
 def test_a_number_or_a_guard_catches_and_a_broken_mutant_does_not(result, caught):
     assert mutants.judged(result)[0] is caught

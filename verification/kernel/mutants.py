@@ -240,13 +240,13 @@ def examine(id: str) -> None:
 
 def judged(result: Result) -> tuple[bool, str]:
     """(caught, how) of a case that has run with a mutant."""
-    if result.error:
-        guard = GUARD.search(result.error)
-        return bool(guard), guard[1] if guard else result.error.strip().splitlines()[-1]
+    guard = GUARD.search(result.error)
     short = [part for part in result.outcome.measured if not part.holds]
-    if not short:
-        return False, "passes"
-    return True, f"{short[0].quantity}: {short[0].measured} (expected {short[0].expected})"
+    if guard:
+        return True, guard[1]
+    if short:
+        return True, f"{short[0].quantity}: {short[0].measured} (expected {short[0].expected})"
+    return False, result.error.strip().splitlines()[-1] if result.error else "passes"
 
 
 def main(arguments: list[str] | None = None) -> int:
