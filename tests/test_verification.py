@@ -306,3 +306,11 @@ def test_finite_volumes_and_collocation_agree_and_conserve():
     assert np.abs(ours - theirs).max() < 1e-3
     taken = 3e4 * channel_bvp.uptake(*ours, rates)[0][fine.density > 0].sum()
     assert taken == pytest.approx(1e5 * (10 - ours[0, -1]), rel=1e-8)
+
+
+def test_names_that_begin_and_end_alike_are_told_together():
+    """No name is lost, and what is told of one is not told of another."""
+    names = ["C, R = 5, fast (order 2.0)", "C, R = 7, fast (order 2.0)", "C, R = 9, fast (order 1.9)", "P, a", "P, b",
+             "Q, a", "Q, b", "u, 1, slow", "u, 2, slow", "u, 3, slow", "alone, x"]
+    assert report.shared(names) == ("C: R = 5, fast; R = 7, fast (each order 2.0); R = 9, fast (order 1.9) / "
+                                    "P, Q: a; b / u: 1; 2; 3, each slow / alone, x")

@@ -13,6 +13,7 @@ import platform
 import shutil
 from collections.abc import Callable
 from importlib.metadata import version
+from itertools import groupby
 from pathlib import Path
 
 import matplotlib
@@ -152,12 +153,41 @@ def judged(found: Outcome) -> list[Block]:
 
 
 def shared(names: list[str]) -> str:
-    """Names in a list, those that begin alike up to a comma together: "C, linear; C, cubic" is "C: linear; cubic"."""
+    """Names in a list, those that begin alike up to a comma together: "C, linear; C, cubic" is "C: linear; cubic", and
+    beginnings with the same list too."""
     begins: dict[str, list[str]] = {}
     for name in names:
         begins.setdefault(name.partition(", ")[0], []).append(name)
-    return " / ".join(alike[0] if len(alike) == 1 else f"{first}: {'; '.join(name[len(first) + 2:] for name in alike)}"
-                      for first, alike in begins.items())
+    lists: dict[str, list[str]] = {}
+    for first, alike in begins.items():
+        single = len(alike) == 1
+        rest = "" if single else listed([name[len(first) + 2:] for name in alike])
+        lists.setdefault(rest, []).append(alike[0] if single else first)
+    return " / ".join(f"{', '.join(firsts)}: {rest}" if rest else " / ".join(firsts) for rest, firsts in lists.items())
+
+
+def listed(labels: list[str]) -> str:
+    """Labels in a row; what several that follow each other tell alike at their ends, in brackets, once, and the parts
+    after a comma that three or more end with too."""
+    split = [label.rpartition(" (") if label.endswith(")") else (label, "", "") for label in labels]
+    rows = []
+    for told, group in groupby(split, key=lambda parts: parts[2]):
+        names = [parts[0] for parts in group]
+        rows.append(_ended_alike(names) + (f" ({'each ' * (len(names) > 1)}{told}" if told else ""))
+    return "; ".join(rows)
+
+
+def _ended_alike(names: list[str]) -> str:
+    rows = []
+    for _, group in groupby(names, key=lambda name: name.rpartition(", ")[2]):
+        alike = [name.split(", ") for name in group]
+        most = min(map(len, alike)) - 1 if len(alike) > 2 else 0
+        count = 0
+        while count < most and len({tuple(parts[-count - 1:]) for parts in alike}) == 1:
+            count += 1
+        heads = [", ".join(parts[:len(parts) - count]) for parts in alike]
+        rows.append("; ".join(heads) + (f", each {', '.join(alike[0][-count:])}" if count else ""))
+    return "; ".join(rows)
 
 
 def _word(holds: bool) -> str:
