@@ -159,7 +159,7 @@ def test_a_claim_that_nobody_computes_is_a_failure(registry, capsys):
 
 def committed(registry, *ids):
     """What the claims come to now, as the committed record."""
-    report.COMMITTED.write_text(json.dumps([report.entry(row) for row in driver.judged(ids)]), encoding="utf-8")
+    report.COMMITTED.write_text(json.dumps([report.entry(row) for row in driver.judged(ids)[0]]), encoding="utf-8")
 
 
 @pytest.mark.parametrize("function", [lambda: Finding((BAD,)), lambda: Finding(()), lambda: 1 / 0])
@@ -259,7 +259,7 @@ def test_the_whole_report_is_written_and_compared(registry, monkeypatch, tmp_pat
         registered(id, lambda: Finding((GOOD, claims.at_least("a", "|b|", 2, 1, ""))))
     lines = (("speed", (1.0, 2.0, 2.1), (100.0, 5.0)),)
     compared = base_run.Comparison("three sizes", ("coarse", "base", "fine"), lines)
-    monkeypatch.setattr(base_run, "computed", dict)
+    monkeypatch.setattr(base_run, "LEVELS", ())
     monkeypatch.setattr(base_run, "comparisons", lambda rows: (compared,))
     monkeypatch.setattr(base_run, "checks", lambda rows: (GOOD,))
     monkeypatch.setattr(driver, "OUT", tmp_path / "out")
@@ -277,6 +277,33 @@ def test_the_whole_report_is_written_and_compared(registry, monkeypatch, tmp_pat
     assert "2.1 (+5.00 %)" in table and "| 2.91<br>2 | 2.91<br>2 |" in table
     monkeypatch.setattr(base_run, "checks", lambda rows: (BAD,))
     assert driver.main([]) == 1
+
+
+def test_levels_are_computed_dearest_first_with_what_else_is_asked_of_them(registry, monkeypatch):
+    """Base alone, then with wide on top; what a function returns is that of its level, of which no claim need be."""
+    registered("C01", lambda: Finding((GOOD,)), fine=(0.5, 0.7, 1.0), beside=())
+    registered("C41", lambda: Finding((GOOD,)), fine=(1.0, 1.2, 1.4), beside=(1.4,))
+    order = []
+
+    def in_turn(function, levels, *given):
+        order.extend(levels)
+        return list(map(function, levels, *given))
+    monkeypatch.setattr(evaluate, "side_by_side", in_turn)
+    half = Level(size=0.5)
+    found, besides = evaluate.everywhere(["C01", "C41"], {half: levels.current})
+    assert besides == {half: half} and found["C41"].keys() == set(claims.CLAIMS["C41"].levels)
+    assert [(level.kind, level.size) for level in order] == [
+        ("converged", 1.0), ("converged", 1.2), ("converged", 1.4), ("scheme", 1.4), ("scheme", 0.5),
+        ("converged", 0.5), ("converged", 0.7)]
+
+
+def test_independence_is_of_base_in_the_papers_elements_and_steps():
+    """The levels are those of scenes with the same keys changed."""
+    changes = {"size 2": "numerics.refinement=0.5", "size 1/2": "numerics.refinement=2",
+               "24 min": 'growth.time_step="24 min"', "6 min": 'growth.time_step="6 min"'}
+    for name, change in changes.items():
+        with at_level({**base_run.MESHES, **base_run.UPDATES}[name]):
+            assert runs.scene(*base_run.BASE) == load_scene("base", [change])
 
 
 def test_a_number_out_of_its_recorded_interval_is_told(registry, capsys):

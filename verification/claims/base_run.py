@@ -37,8 +37,7 @@ from verification.claims import (
     printed,
     without_limit,
 )
-from verification.claims.evaluate import side_by_side
-from verification.claims.levels import DEFAULT, forget
+from verification.claims.levels import DEFAULT, Level, current
 from verification.claims.runs import BASE, LAST, at, grown, scene, series, solved_pore
 
 PLOTTED, END = 19.2, 19.4
@@ -321,17 +320,12 @@ NUMBERS = {"mean velocity (m/d)": "mean_velocity_m_per_d", "effluent acceptor (m
            "meshed length (um)": "meshed_length_um"}
 
 
-def _changed(*changes: str) -> tuple[str, ...]:
-    return (*BASE, *changes, LAST)
-
-
-#: Element sizes twice, once and half those of base; steps likewise; the scheme of 2001.
-MESHES = {"size 2": _changed("numerics.refinement=0.5"), "size 1": BASE, "size 1/2": _changed("numerics.refinement=2")}
-UPDATES = {"24 min": _changed('growth.time_step="24 min"'), "12 min": BASE,
-           "6 min": _changed('growth.time_step="6 min"')}
-STRICT = _changed('numerics.transport="gear"', 'numerics.transfer="linear"', 'numerics.inlet="mean"')
-VARIANTS = {"base": BASE, "strict": STRICT}
-RUNS = tuple(dict.fromkeys([STRICT, *reversed(MESHES.values()), *UPDATES.values()]))
+#: Base in the paper's scheme with element sizes twice, once and half its own, and steps likewise.
+MESHES = {"size 2": Level(size=2.0), "size 1": DEFAULT, "size 1/2": Level(size=0.5)}
+UPDATES = {"24 min": Level(step=2.0), "12 min": DEFAULT, "6 min": Level(step=0.5)}
+LEVELS = tuple(dict.fromkeys((*MESHES.values(), *UPDATES.values())))
+#: The scheme of 2001, at the default level.
+STRICT = (*BASE, 'numerics.transport="gear"', 'numerics.transfer="linear"', 'numerics.inlet="mean"', LAST)
 
 
 @dataclass(frozen=True)
@@ -344,12 +338,21 @@ class Comparison:
     lines: tuple[tuple[str, tuple[float, ...], tuple[float, ...]], ...]
 
 
-Rows = dict[tuple[str, ...], dict[float, dict[str, float]]]
+#: Of a run: its rows at TIMES.
+Rows = dict[float, dict[str, float]]
+#: By level and "base" or "strict".
+Found = dict[Level, dict[str, Rows]]
 
 
-def compare(title: str, runs: dict[str, tuple[str, ...]], rows: Rows) -> Comparison:
+def rows_here() -> dict[str, Rows]:
+    """Of base at the present level, and of the strict variant at the default one."""
+    runs = {"base": BASE, "strict": STRICT} if current() == DEFAULT else {"base": BASE}
+    return {name: {time: at(run, time) for time in TIMES} for name, run in runs.items()}
+
+
+def compare(title: str, runs: dict[str, Rows]) -> Comparison:
     """Every number at every time in every run."""
-    lines = [_line(f"{name}, t = {time:g} h", [rows[run][time][column] for run in runs.values()])
+    lines = [_line(f"{name}, t = {time:g} h", [rows[time][column] for rows in runs.values()])
              for time in TIMES for name, column in NUMBERS.items()]
     return Comparison(title, tuple(runs), tuple(lines))
 
@@ -359,32 +362,24 @@ def _line(name: str, values: list[float]):
     return name, tuple(values), moved
 
 
-def rows_of(run: tuple[str, ...]) -> dict[float, dict[str, float]]:
-    """The rows of a run at TIMES."""
-    found = {time: at(run, time) for time in TIMES}
-    forget(DEFAULT)
-    return found
-
-
-def computed() -> Rows:
-    """The rows of all runs, a run a process."""
-    return dict(zip(RUNS, side_by_side(rows_of, list(RUNS))))
-
-
-def comparisons(rows: Rows) -> tuple[Comparison, ...]:
+def comparisons(found: Found) -> tuple[Comparison, ...]:
     """Three mesh sizes, three time steps, and the strict variant against base."""
-    return (compare("Three mesh sizes, in those of base", MESHES, rows),
-            compare("Three steps between shape updates", UPDATES, rows),
-            compare("The strict variant of 2001 (gear, linear transfer, u_ave in (11)) against base", VARIANTS, rows))
+    return (compare("Three mesh sizes, in those of base", _of_base(MESHES, found)),
+            compare("Three steps between shape updates", _of_base(UPDATES, found)),
+            compare("The strict variant of 2001 (gear, linear transfer, u_ave in (11)) against base", found[DEFAULT]))
 
 
-def checks(rows: Rows) -> tuple[PaperCheck, ...]:
+def _of_base(levels: dict[str, Level], found: Found) -> dict[str, Rows]:
+    return {name: found[level]["base"] for name, level in levels.items()}
+
+
+def checks(found: Found) -> tuple[PaperCheck, ...]:
     """Halving the time step moves the velocity by less than 0.5 %, halving the mesh size by less than 1 %."""
-    return tuple(_halved(what, runs, time, bound, rows) for time in TIMES
-                 for what, runs, bound in (("time step", UPDATES, 0.5), ("mesh size", MESHES, 1.0)))
+    return tuple(_halved(what, _of_base(levels, found), time, bound) for time in TIMES
+                 for what, levels, bound in (("time step", UPDATES, 0.5), ("mesh size", MESHES, 1.0)))
 
 
-def _halved(what: str, runs: dict[str, tuple[str, ...]], time: float, bound: float, rows: Rows) -> PaperCheck:
-    before, after = (rows[run][time]["mean_velocity_m_per_d"] for run in list(runs.values())[1:])
+def _halved(what: str, runs: dict[str, Rows], time: float, bound: float) -> PaperCheck:
+    before, after = (rows[time]["mean_velocity_m_per_d"] for rows in list(runs.values())[1:])
     return at_most(f"halving the {what} moves the velocity at {time:g} h (%)", f"< {bound:g}",
                    100 * abs(after / before - 1), bound, "set beforehand")

@@ -23,7 +23,7 @@ import numpy as np
 
 import verification.claims as package
 from verification.claims import CLAIMS, CLOSED, MODEL, OF_SCHEME, Claim, ClaimError, Finding, PaperCheck
-from verification.claims.levels import COMPARED, CONVERGED, PAIRED, SCHEME, Level, at_level, forget
+from verification.claims.levels import CONVERGED, OF_WIDE, SCHEME, Level, at_level, forget
 from verification.uncertainty import Bar, Estimate, combined, estimate, spread
 
 MESH_ORDERS, STEP_ORDERS = (1.0, 2.0), (1.0, 1.0)
@@ -88,8 +88,10 @@ def _estimate(sizes: tuple[float, ...], values: list[float], formal: tuple[float
 #: Of a claim at one level: its numbers, with its finding where the level is the judged one, or the error in words.
 Found = tuple[Numbers, Finding | None] | str
 
-#: How many runs more than the others the levels of claims have that compare several.
-RUNS_OF_PAIRED = 10.0
+#: Runs as long as that of wide which a claim makes of its own at each of its levels.
+RUNS = {"C32": 1, "C41": 7, "C42": 2, "C43": 2}
+#: The run of base over that of wide.
+OF_BASE = 0.1
 
 
 def register_all() -> None:
@@ -99,19 +101,25 @@ def register_all() -> None:
             importlib.import_module(f"{package.__name__}.{module.name}")
 
 
-def everywhere(ids: Iterable[str]) -> dict[str, dict[Level, Found]]:
-    """What claims come to at all of their levels, the dearest levels first."""
-    ids = list(ids)
-    levels = sorted({level for id in ids for level in CLAIMS[id].levels}, key=effort, reverse=True)
-    wanted = [[id for id in ids if level in CLAIMS[id].levels] for level in levels]
-    found = dict(zip(levels, side_by_side(found_at, levels, wanted)))
-    return {id: {level: rows[id] for level, rows in found.items() if id in rows} for id in ids}
+def everywhere(ids: Iterable[str], besides: dict[Level, Callable] | None = None
+               ) -> tuple[dict[str, dict[Level, Found]], dict[Level, object]]:
+    """What claims come to at all of their levels, the dearest levels first, and what functions return at theirs."""
+    ids, besides = list(ids), besides or {}
+    wanted = {level: [id for id in ids if level in CLAIMS[id].levels]
+              for level in (*besides, *(level for id in ids for level in CLAIMS[id].levels))}
+    levels = sorted(wanted, key=lambda level: effort(level, wanted[level]), reverse=True)
+    found = dict(zip(levels, side_by_side(found_at, levels, [wanted[level] for level in levels],
+                                          [besides.get(level) for level in levels])))
+    return ({id: {level: rows[id] for level, (rows, _) in found.items() if id in rows} for id in ids},
+            {level: found[level][1] for level in besides})
 
 
-def effort(level: Level) -> float:
-    """About how long a level takes, in any unit."""
-    several = RUNS_OF_PAIRED if level.kind == CONVERGED and level.size in (*PAIRED, *COMPARED) else 1.0
-    return several * (4.0 if level.kind == CONVERGED else 2.0) / (level.size**3 * level.step)
+def effort(level: Level, ids: Iterable[str]) -> float:
+    """About how long claims take at a level, in runs of wide at size 1: a run takes as many elements and steps as go in
+    a size, to the power of two and more."""
+    ids = set(ids)
+    runs = OF_BASE + bool(ids & set(OF_WIDE)) + sum(RUNS.get(id, 0) for id in ids)
+    return runs / (level.size**2.5 * level.step)
 
 
 def side_by_side(function: Callable, *given: list) -> list:
@@ -122,11 +130,11 @@ def side_by_side(function: Callable, *given: list) -> list:
         return list(pool.map(function, *given))
 
 
-def found_at(level: Level, ids: list[str]) -> dict[str, Found]:
-    """What some claims come to at one level; its runs are forgotten afterwards."""
+def found_at(level: Level, ids: list[str], beside: Callable | None = None) -> tuple[dict[str, Found], object]:
+    """What some claims come to at one level, and what a function returns; its runs are forgotten afterwards."""
     register_all()
     with at_level(level), np.errstate(all="raise", under="ignore"):
-        found = {id: _attempt(id, level) for id in ids}
+        found = {id: _attempt(id, level) for id in ids}, beside and beside()
     forget(level)
     return found
 
