@@ -120,17 +120,16 @@ def test_a_permeable_run_has_the_drag_and_nothing_of_the_viscosity():
 def test_what_a_variant_changes_is_measured_against_the_paper(monkeypatch):
     """Nothing for the paper's own run; the area that only one covers for another one."""
     monkeypatch.setattr(rheology, "WHOLE", HOUR)
-    assert rheology.apart(HOUR) == 0 and rheology.conductivity_change(HOUR) == 0
+    assert rheology.slid(HOUR) == (0, 0, 0) and rheology.conductivity_change(HOUR) == 0
     bigger = ("base", 'growth.end="2 h"', 'output.times=["2 h"]')
     areas = [polygon_area(bodies(chosen)[-1].outline.points) for chosen in (HOUR, bigger)]
-    assert rheology.apart(bigger) == pytest.approx(100 * (areas[1] / areas[0] - 1), rel=0.02)
+    assert rheology.slid(bigger)[1] == pytest.approx(100 * (areas[1] / areas[0] - 1), rel=0.02)
     assert rheology.conductivity_change(bigger) < 0
     times = {HOUR: 10.0, bigger: 9.0}
     monkeypatch.setattr(rheology, "contact", lambda run: times[run])
     checks = rheology._changes("x", bigger)
     assert checks[1].value == pytest.approx(10.0) and not checks[1].holds
     assert all(check.converges for check in checks)
-    assert [each.converges for each in rheology._changes(rheology.RECHOSEN, bigger)] == [False, True, True]
 
 
 def test_an_outline_that_has_slid_is_moved_back(monkeypatch):
@@ -139,8 +138,19 @@ def test_an_outline_that_has_slid_is_moved_back(monkeypatch):
     there = replace(here, points=here.points + [8.0, 0.0])
     outlines = {rheology.WHOLE: here, HOUR: there}
     monkeypatch.setattr(rheology, "bodies", lambda run: [SimpleNamespace(outline=outlines[run])])
-    assert rheology.slid(HOUR) == pytest.approx((8.0, 0.0), abs=1e-6)
-    assert rheology.apart(HOUR) > 10
+    moved, where, left = rheology.slid(HOUR)
+    assert (moved, left) == pytest.approx((8.0, 0.0), abs=1e-6) and where > 10
+    monkeypatch.setattr(rheology, "contact", lambda run: 1.0)
+    assert rheology._changes("x", HOUR)[0].value == left
+
+
+def test_the_conductivity_after_contact_is_the_geometric_mean_of_its_rows(monkeypatch):
+    """The row of t = 0 is left out: 2 and 8 are 4, twice 1 and 4."""
+    found = {rheology.WHOLE: [9.0, 1.0, 4.0], HOUR: [9.0, 2.0, 8.0]}
+    monkeypatch.setattr(rheology, "series", lambda *run: {"conductivity_m_per_d": np.array(found[run])})
+    assert rheology.conductivity_change(HOUR) == pytest.approx(100.0)
+    times = scene(*rheology.WHOLE).output.times
+    assert times == rheology.AFTER and (times[0], times[-1]) == (35.0, rheology.END)
 
 
 def test_every_variant_changes_one_key_of_the_scene():
