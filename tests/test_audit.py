@@ -4,6 +4,7 @@ import json
 import re
 from collections import Counter
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -120,6 +121,23 @@ def test_reshaping_to_its_own_outline_changes_nothing_and_to_a_finer_one_hardly_
     there = switches.reshaped(default.pore, wide.pore.outline)
     assert there.outline.area / default.pore.outline.area == pytest.approx(radius**2, rel=1e-4)
     assert switches.whole_run(default, wide)["velocity"] < -1e-3
+
+
+def test_what_two_meshes_differ_by_is_no_effect_of_the_extent(monkeypatch):
+    """Of the full pore the velocity is 1e-5 more, and on coarser meshes 1e-3 and 2e-3 of their size: not resolved."""
+    said = runs.scene(*SHORT)
+
+    def state(run):
+        size, full = levels.current().size, any("extent" in change for change in run)
+        return SimpleNamespace(scene=said, quantities={"velocity": 100 * (1 + full * (1e-5 + 2e-3 * (size - 0.5))),
+                                                       "area": 1 + 1e-4 * full})
+
+    monkeypatch.setattr(switches, "state", state)
+    monkeypatch.setattr(audit, "state", None)
+    told = audit.measured(CHOICES["full pore"], 3.0)
+    assert told["effect"] == pytest.approx({"velocity": 1e-5, "area": 1e-4}, rel=1e-6)
+    assert told["noise"] == pytest.approx({"velocity": 1e-3, "area": 0.0}, rel=1e-6, abs=1e-12)
+    assert audit.resolved(told["effect"], told["noise"]) == ["area"] and told["one_state"] == {}
 
 
 def test_runs_in_turn_alternate():

@@ -18,6 +18,7 @@ from verification.claims.evaluate import barred
 from verification.claims.levels import CONVERGED, SCHEME, Level, at_level
 from verification.claims.runs import Body, bodies, scene
 from verification.claims.runs import stress as restored_stress
+from verification.sensitivity import wide
 
 COARSE = Level(CONVERGED, 4.0)
 HOUR = ("base", 'growth.end="1 h"', 'output.times=["1 h"]')
@@ -119,38 +120,42 @@ def test_a_permeable_run_has_the_drag_and_nothing_of_the_viscosity():
 
 def test_what_a_variant_changes_is_measured_against_the_paper(monkeypatch):
     """Nothing for the paper's own run; the area that only one covers for another one."""
-    monkeypatch.setattr(rheology, "WHOLE", HOUR)
-    assert rheology.slid(HOUR) == (0, 0, 0) and rheology.conductivity_change(HOUR) == 0
-    bigger = ("base", 'growth.end="2 h"', 'output.times=["2 h"]')
-    areas = [polygon_area(bodies(chosen)[-1].outline.points) for chosen in (HOUR, bigger)]
+    ours, bigger = HOUR, ("base", 'aggregate.radius="6 um"', *HOUR[1:])
+    monkeypatch.setattr(rheology, "WHOLE", ours)
+    monkeypatch.setattr(rheology, "END", 1.0)
+    assert rheology.slid(ours) == (0, 0, 0) and rheology.conductivity_change(ours, (1.0,)) == 0
+    areas = [polygon_area(bodies(chosen)[-1].outline.points) for chosen in (ours, bigger)]
     assert rheology.slid(bigger)[1] == pytest.approx(100 * (areas[1] / areas[0] - 1), rel=0.02)
-    assert rheology.conductivity_change(bigger) < 0
-    times = {HOUR: 10.0, bigger: 9.0}
+    assert rheology.conductivity_change(bigger, (1.0,)) < 0
+    times = {ours: 10.0, bigger: 9.0}
     monkeypatch.setattr(rheology, "contact", lambda run: times[run])
+    monkeypatch.setattr(rheology, "conductivity_change", lambda run: -6.0)
     checks = rheology._changes("x", bigger)
-    assert checks[1].value == pytest.approx(10.0) and not checks[1].holds
-    assert all(check.converges for check in checks)
+    assert [check.value for check in checks[1:]] == pytest.approx([10.0, 6.0])
+    assert not any(check.holds for check in checks) and all(check.converges for check in checks)
 
 
 def test_an_outline_that_has_slid_is_moved_back(monkeypatch):
-    """By 8 um downstream."""
+    """By 8 um downstream: what is judged is what is left."""
     here = bodies(HOUR)[-1].outline
     there = replace(here, points=here.points + [8.0, 0.0])
     outlines = {rheology.WHOLE: here, HOUR: there}
-    monkeypatch.setattr(rheology, "bodies", lambda run: [SimpleNamespace(outline=outlines[run])])
+    monkeypatch.setattr(rheology, "body", lambda run, time: SimpleNamespace(outline=outlines[run]))
     moved, where, left = rheology.slid(HOUR)
     assert (moved, left) == pytest.approx((8.0, 0.0), abs=1e-6) and where > 10
     monkeypatch.setattr(rheology, "contact", lambda run: 1.0)
+    monkeypatch.setattr(rheology, "conductivity_change", lambda run: 1.0)
     assert rheology._changes("x", HOUR)[0].value == left
 
 
-def test_the_conductivity_after_contact_is_the_geometric_mean_of_its_rows(monkeypatch):
-    """The row of t = 0 is left out: 2 and 8 are 4, twice 1 and 4."""
-    found = {rheology.WHOLE: [9.0, 1.0, 4.0], HOUR: [9.0, 2.0, 8.0]}
-    monkeypatch.setattr(rheology, "series", lambda *run: {"conductivity_m_per_d": np.array(found[run])})
-    assert rheology.conductivity_change(HOUR) == pytest.approx(100.0)
-    times = scene(*rheology.WHOLE).output.times
-    assert times == rheology.AFTER and (times[0], times[-1]) == (35.0, rheology.END)
+def test_the_conductivity_after_contact_is_a_geometric_mean(monkeypatch):
+    """2 and 18 are 6, three times 1 and 4; hours are those of the sensitivities, to the end of wide."""
+    found = {(rheology.WHOLE, 35.0): 1.0, (rheology.WHOLE, 45.0): 4.0, (HOUR, 35.0): 2.0, (HOUR, 45.0): 18.0}
+    monkeypatch.setattr(rheology, "at", lambda run, hour: {"conductivity_m_per_d": found[run, hour]})
+    assert rheology.conductivity_change(HOUR, (35.0, 45.0)) == pytest.approx(200.0)
+    said = scene(*rheology.WHOLE)
+    assert {*rheology.AFTER, rheology.END} == set(said.output.times)
+    assert (rheology.AFTER[0], rheology.AFTER[-1]) == (wide.HOURS[0], wide.HOURS[-1]) == (35.0, said.growth.end)
 
 
 def test_every_variant_changes_one_key_of_the_scene():
