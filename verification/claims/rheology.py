@@ -30,7 +30,7 @@ from shapely.affinity import translate
 
 from repro.scene import SceneError
 from verification.claims import FEW, FEW_WORDS, Finding, PaperCheck, at_least, at_most, claim
-from verification.claims.levels import BESIDE_COMPARED, DEFAULT, PAIRED, at_level
+from verification.claims.levels import BESIDE_COMPARED, COMPARED, DEFAULT, at_level
 from verification.claims.runs import UPDATE, around_contact, at, body, polygon, scene
 
 #: Hours at which outlines are compared: in all variants the opposite wall has then been touched for 5 h.
@@ -52,7 +52,7 @@ NEW = "2026-11-22"
 
 
 @claim("C41", "5, 2.3.3", "another rheology, and other conditions where the aggregate meets the walls, are unlikely to "
-       "affect the conclusions substantially", fine=PAIRED, beside=BESIDE_COMPARED)
+       "affect the conclusions substantially", fine=COMPARED, beside=BESIDE_COMPARED)
 def other_rheology() -> Finding:
     """Wide with one choice changed at a time: area that only one of the two outlines covers at 40 h, one moved along
     the pore onto the other; shift of the time of contact; and change of the conductivity after it."""
@@ -133,7 +133,7 @@ def equivalent(run: tuple[str, ...]) -> float:
 
 @claim("C42", "5", "a porous material instead of a raised viscosity may lead to differences, depending on the "
                    "conditions",
-       fine=PAIRED, beside=())
+       fine=COMPARED, beside=())
 def drag_or_viscosity() -> Finding:
     """Conductivity with Brinkman's drag of a permeability of 1e-15 m2 over that with lambda = 2000: base at 19.2 h, an
     aggregate; wide just before contact, a film; and 5 h after it, a plug; and the times of contact."""
