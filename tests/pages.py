@@ -1,6 +1,7 @@
 """Runs into folders, and their pages as a strict parser sees them."""
 
 import base64
+import hashlib
 import json
 import re
 from html.parser import HTMLParser
@@ -86,6 +87,20 @@ class Page(HTMLParser):
 
     def attribute(self, tag, name):
         return [given[name] for each, given in self.tags if each == tag and name in given]
+
+
+def check_alone(text):
+    """The Page of a text that asks for nothing else, and whose policy lets in what is in it alone."""
+    found = Page(text)
+    assert not re.search(r"@import|url\(|://", text)
+    policy = next(each for each in found.attribute("meta", "content") if "-src" in each)
+    assert policy.startswith("default-src 'none'; ") and "unsafe" not in policy
+    assert policy.endswith("; base-uri 'none'; form-action 'none'")
+    for kind, given, content in found.scripts:
+        digest = base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()
+        (allowed,) = re.findall(f"{kind}-src ([^;]*)", policy)
+        assert given.get("type") == "application/json" or f"'sha256-{digest}'" in allowed.split()
+    return found
 
 
 def run(tmp_path, scene, *sets, status=0):
