@@ -103,9 +103,11 @@ def check_alone(text):
     return found
 
 
-def run(tmp_path, scene, *sets, status=0):
+def run(tmp_path, scene, *sets, status=0, options=()):
+    """The folder of `repro run SCENE` with --set of each and further options, which ends with a status."""
     out = tmp_path / "run"
-    assert main(["run", str(scene), "--out", str(out), *(part for one in sets for part in ("--set", one))]) == status
+    assert main(["run", str(scene), "--out", str(out), *(part for one in sets for part in ("--set", one)),
+                 *options]) == status
     return out
 
 
