@@ -282,10 +282,9 @@ def test_the_command_line_refuses_in_one_line_and_writes_nothing(folder, content
         assert sorted(folder.iterdir()) == before
 
 
-@pytest.mark.parametrize("content", [b"\xff\xfe", b"[pore]\nwidth = 50 um\n", b'[pore]\nwidth = "\\u001b[2J\\u00b5"\n'])
-def test_a_process_of_its_own_says_the_same(tmp_path, content):
+def test_a_process_of_its_own_says_the_same(tmp_path):
     """With the bytes of its stderr: one line, printable in ASCII where the terminal knows no more."""
-    (tmp_path / "mine.toml").write_bytes(content)
+    (tmp_path / "mine.toml").write_bytes(b'[pore]\nwidth = "\\u001b[2J\\u00b5"\n')
     environment = {**os.environ, "PYTHONIOENCODING": "ascii:backslashreplace", "PYTHONPATH": str(ROOT)}
     done = subprocess.run([sys.executable, "-m", "repro", "run", "mine.toml", "--out", "out"], cwd=tmp_path,
                           capture_output=True, env=environment, check=False)
