@@ -12,7 +12,6 @@ import pytest
 
 from repro import results
 from repro.cli import main
-from repro.model import growth
 from repro.report import fields
 from tests.pages import run
 from tests.shell import told
@@ -59,14 +58,6 @@ def test_provenance(tmp_path):
     assert record["versions"]["scikit-fem"] and record["wall_time_by_stage_s"]["flow"] > 0
 
 
-@pytest.mark.parametrize("entry", ['pore.width="50 s"', "aggregate.radius=80 um", "pore.widht=5 um", "growth.end=soon",
-                                   'flow.mean_velocity="1 m/day"', "numerics.preset=best"])
-def test_wrong_input_is_refused_before_anything_is_written(tmp_path, capsys, entry):
-    out = run(tmp_path, "base", entry, status=2)
-    message = capsys.readouterr().err
-    assert entry.split("=")[0].split(".")[1] in message and message.count("\n") == 1 and not out.exists()
-
-
 @pytest.mark.parametrize("before, name", [((), "thesis.tex"), ((), "timeseries.csv"),
                                           (["flow_only"], "fields/mine.vtu")])
 def test_a_folder_with_other_files_is_left_alone(tmp_path, capsys, before, name):
@@ -88,15 +79,6 @@ def test_the_pores_end_ends_a_run_well(tmp_path, capsys):
               'growth.end="4 h"', 'output.times=["4 h"]')
     assert "reaches the pore's" in capsys.readouterr().out
     assert "reaches the pore's" in told(out)["status"] and len(rows(out)) == 1
-
-
-def test_a_failure_says_when_and_where_and_keeps_what_was_done(tmp_path, capsys, monkeypatch):
-    """One iteration is not enough for Newton's method."""
-    monkeypatch.setattr(growth, "MOST_ITERATIONS", 1)
-    out = run(tmp_path, "base", 'growth.end="1 h"', status=1)
-    message = capsys.readouterr().err
-    assert "t = 0 h, in growth" in message and "try" in message and message.count("\n") == 1
-    assert len(rows(out)) == 1 and told(out)["status"].startswith("failed")
 
 
 def test_unset_beside_set(capsys):

@@ -180,9 +180,7 @@ def test_conversion_is_rounded_once(override, value):
 
 
 @pytest.mark.parametrize("quoted, bare", [
-    ('growth.end="5 h"', "growth.end=5 h"),
     ("growth.end='5 h'", " growth.end = 5 h "),
-    ('aggregate.radius="20 um"', "aggregate.radius=20 um"),
     ('numerics.transport="gear"', "numerics.transport=gear"),
     ('substrates.acceptor.supply="0 mg/L"', "substrates.acceptor.supply=0 mg/L"),
 ])

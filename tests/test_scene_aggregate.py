@@ -124,25 +124,3 @@ def test_no_outline(tmp_path, points, said):
     path = written(tmp_path, toml(points))
     message = refusal(path)
     assert message.startswith(f"{path}: aggregate.outline = {json.dumps(points)[:30]}") and said in message
-
-
-@pytest.mark.parametrize("overrides, said", [
-    (["aggregate.position=295 um"], 'aggregate.position = "295 um": less than half of pore.length (600 um) less '
-     "aggregate.radius (5 um), upstream or downstream, is needed"),
-    (["aggregate.position=-1 m"], "upstream or downstream, is needed"),
-    (["aggregate.position=20"], 'a length is needed, such as "0 um" (of either sign) (did you mean "20 um"?)'),
-    (["aggregate.position=5 h"], "a length is needed"),
-    (["aggregate.position=inf um"], "a length is needed"),
-    (["aggregate.smooth=true"], "aggregate.smooth = true: true is accepted with aggregate.outline alone"),
-    (['aggregate.smooth="true"'], "true or false is needed, without quotes (did you mean true?)"),
-    (["aggregate.inert_fraction=1"], "a plain number is needed, such as 0 (zero or more, less than 1)"),
-    (["aggregate.inert_fraction=-0.1"], "zero or more, less than 1"),
-    (["aggregate.inert_fraction=nan"], "zero or more, less than 1"),
-    (['aggregate.inert_fraction="0.3"'], "(did you mean 0.3?)"),
-    (["aggregate.smooth=1"], "aggregate.smooth = 1: true or false is needed"),
-    ([f"aggregate.outline={json.dumps(BUMP)}"], "one of them is accepted, not both"),
-    ([f"aggregate={{outline={json.dumps(BUMP)}, position=\"2 um\"}}"],
-     'aggregate.position = "2 um": 0 um is needed with aggregate.outline'),
-])
-def test_refused(overrides, said):
-    assert said in refusal("base", *overrides)

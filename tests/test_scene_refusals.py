@@ -11,6 +11,7 @@ from repro.scene import SceneError, Substrates, files, load_scene, load_tables, 
 from repro.scene.reading import NOT_MODELLED, SCOPE
 from tests.blocks import ROOT
 from tests.test_scene import refusal, written
+from tests.test_scene_aggregate import BUMP
 
 LENGTH = 'a length is needed, such as "100 um" (greater than zero)'
 
@@ -80,6 +81,21 @@ REFUSED = {
     "numerics.transport = 1": ["numerics.transport=1"],
     '"open" or "closed" is needed': ["substrates.boundary=shut"],
     '"stressed" or "stress_free" is needed': ["growth.new_biomass=none"],
+    # the aggregate
+    'aggregate.position = "295 um": less than half of pore.length (600 um) less aggregate.radius (5 um), upstream or '
+    "downstream, is needed": ["aggregate.position=295 um"],
+    "upstream or downstream, is needed": ["aggregate.position=-1 m"],
+    'a length is needed, such as "0 um" (of either sign) (did you mean "20 um"?)': ["aggregate.position=20"],
+    'a length is needed, such as "0 um" (of either sign)': ["aggregate.position=5 h", "aggregate.position=inf um"],
+    "aggregate.smooth = true: true is accepted with aggregate.outline alone": ["aggregate.smooth=true"],
+    "true or false is needed, without quotes (did you mean true?)": ['aggregate.smooth="true"'],
+    "aggregate.smooth = 1: true or false is needed": ["aggregate.smooth=1"],
+    "a plain number is needed, such as 0 (zero or more, less than 1)": ["aggregate.inert_fraction=1"],
+    "zero or more, less than 1": ["aggregate.inert_fraction=-0.1", "aggregate.inert_fraction=nan"],
+    "(did you mean 0.3?)": ['aggregate.inert_fraction="0.3"'],
+    "one of them is accepted, not both": [f"aggregate.outline={json.dumps(BUMP)}"],
+    'aggregate.position = "2 um": 0 um is needed with aggregate.outline': [
+        f"aggregate={{outline={json.dumps(BUMP)}, position=\"2 um\"}}"],
     # several keys, see PAIRS; here with the value as it was written
     'aggregate.radius = "80 um": less than pore.width (50 um)': ['aggregate.radius="80 um"'],
     "aggregate.radius": ["aggregate.radius=50 um"],
@@ -390,11 +406,6 @@ def test_both_substrates_unsaid_are_table_1():
 
 def test_not_utf_8_is_refused(tmp_path):
     assert "not UTF-8 text (at byte 3)" in refusal(written(tmp_path, "# µ", "latin-1"))
-
-
-def test_control_characters_do_not_break_the_line(tmp_path):
-    assert "there is no such key" in refusal(written(tmp_path, '[pore]\n"wid\\nth\\u001b[31m" = "5\\n um"'))
-    assert "\\n" in refusal(written(tmp_path, '[pore]\nwidth = "5\\n um"'))
 
 
 def test_what_is_long_is_shortened():
