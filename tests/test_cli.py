@@ -3,6 +3,7 @@
 import csv
 import math
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -14,7 +15,7 @@ from repro import results
 from repro.cli import main
 from repro.report import fields
 from tests.pages import run
-from tests.shell import told
+from tests.shell import started, told, wait_for
 
 
 def rows(out, name="timeseries"):
@@ -79,6 +80,17 @@ def test_the_pores_end_ends_a_run_well(tmp_path, capsys):
               'growth.end="4 h"', 'output.times=["4 h"]')
     assert "reaches the pore's" in capsys.readouterr().out
     assert "reaches the pore's" in told(out)["status"] and len(rows(out)) == 1
+
+
+def test_interrupting_a_run_keeps_what_was_computed(tmp_path):
+    """Ctrl-C in the midst of a run, after meshing: status 130, rows and run.json written."""
+    out = tmp_path / "run"
+    process = started("base", "--out", out)
+    wait_for((out / "fields" / "fields_0002.vtu").exists, process)
+    process.send_signal(signal.SIGINT)
+    message = process.communicate(timeout=60)[1]
+    assert process.returncode == 130 and "interrupted" in message and "Traceback" not in message
+    assert len(rows(out)) >= 3 and told(out)["status"] == "interrupted"
 
 
 def test_unset_beside_set(capsys):
