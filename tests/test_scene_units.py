@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from repro.scene import (
     Donor,
     Kinetics,
+    Scene,
     exact,
     load_scene,
     packaged_scenes,
@@ -21,7 +22,7 @@ from repro.scene import (
 )
 from repro.scene.text import scene_text
 from tests.test_scene import refusal
-from tests.test_scene_text import parsed
+from tests.test_scene_text import fields, parsed
 
 #: Units that pint knows and the table does not, and words that are no unit.
 OTHERS = ["inch", "ft", "angstrom", "lb", "psi", "atm", "dyn", "month", "ppm", "percent", "mol", "K", "Hz", "cc",
@@ -88,6 +89,13 @@ def test_packaged_scenes_defaults_and_examples_need_no_pint(monkeypatch):
     for entry in ("pore.width=50", "pore.width=50 s", "growth.end=5 um", "substrates.donor.supply=1 m"):
         with pytest.raises(units.SceneError, match="is needed, such as"):
             load_scene("base", [entry])
+
+
+def test_what_a_key_accepts_cannot_be_changed():
+    """Of any kind: one object tells every scene what a key takes."""
+    kinds = {type(entry.metadata["kind"]) for _, entry in fields(Scene) if "kind" in entry.metadata}
+    assert units.Points in kinds and len(kinds) >= 7
+    assert {kind.__name__ for kind in kinds if not kind.__dataclass_params__.frozen} == set()
 
 
 # ---------------------------------------------------------------- F by the oxygen demand
