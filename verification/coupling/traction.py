@@ -13,9 +13,8 @@ from scipy.integrate import simpson
 from skfem.quadrature import get_quadrature_tri
 
 from reference import layered_channel
-from repro.fem import elements
 from repro.fem.elements import derivatives, values
-from repro.fem.mesh import Mesh, curved
+from repro.fem.mesh import Mesh
 from repro.fem.newton import relative
 from repro.fem.outline import FREE, Outline, slopes
 from repro.fem.space import Space
@@ -200,44 +199,6 @@ def _move_in_base(hours: int, *changes: str) -> float:
         grown, _, _ = updates.make_biomass(scene, found.pore, found.solved, 0.4)
         shapes.append(contact.expand(scene, grown, updates.enlarged(scene, found.pore, grown))[0])
     return float(np.abs(shapes[1].mesh.points - shapes[0].mesh.points).max() / shapes[0].outline.thickness)
-
-
-@case("coupling-traction-stretch", kind="exact", norm="relative error of positions; of P over mu_L",
-      claim="A block on a wall that is pulled at both sides stretches as a neo-Hookean body does, a - a^-3 = T / mu_L, "
-            "and keeps its area, on any mesh",
-      mutants=("forces-pushed", "forces-halved"),
-      over={f"a = {a:g}, order {order}": (order, a) for order in (1, 2, 3) for a in (0.8, 1.01, 1.5)})
-def stretch(order: int, factor: float):
-    """Checks of a block of linear or quadratic displacements: those of order 3 are integrated further."""
-    points, triangles = meshes.rectangle((-20.0, 20.0), 15.0, 4.0, seed=2)
-    points[np.argmin(np.hypot(*points.T)), 0] = 0.0
-    mesh = Mesh.of(points, triangles, np.ones(len(triangles), bool), np.empty(0, int), 15.0, (-20.0, 20.0))
-    mesh = mesh if order == 1 else curved(mesh, None)
-    where = mesh.points
-    held = np.zeros((len(where), 2), bool)
-    held[where[:, 1] == 0, 1] = True
-    held[np.flatnonzero((where == 0).all(axis=1)), 0] = True
-    body = growth.Body(growth.Shape(mesh.cells, mesh.corners, elements.GRADIENT_DEGREES[order]), where)
-    forces = (factor - factor**-3) * (_ends(mesh, 20.0) - _ends(mesh, -20.0))
-    found = growth.equilibrium(body, np.ones_like(body.at.dx), where, np.zeros(mesh.corners), held, where,
-                               forces=forces)
-    apart = np.abs(found.position - where * [factor, 1 / factor]).max() / 20.0
-    pressure = (factor**2 + factor**-2 + 1) / 3 - factor**-2
-    return [at_most("places", apart, 1e-9, "linear displacement: Newton's tolerance"),
-            at_most("P", np.abs(found.pressure - pressure).max(), 1e-9, "even: as before")]
-
-
-def _ends(mesh: Mesh, side: float) -> np.ndarray:
-    """(N, 2): lengths of a side's edges shared between their nodes, along x: halves, or a sixth, two thirds and a sixth
-    where there are middles."""
-    share = np.zeros_like(mesh.points)
-    nodes = np.flatnonzero(mesh.points[:, 0] == side)
-    nodes = nodes[np.argsort(mesh.points[nodes, 1])]
-    part = np.array([0.5, 0.5]) if mesh.geometry == 1 else np.array([1.0, 4.0, 1.0]) / 6
-    for first in range(0, len(nodes) - 1, mesh.geometry):
-        edge = nodes[first: first + mesh.geometry + 1]
-        share[edge, 0] += part * np.ptp(mesh.points[edge, 1])
-    return share
 
 
 @case("coupling-traction-even", kind="exact",

@@ -54,7 +54,6 @@ from verification.problems.channels import (
     SCENE,
     SLAB,
     WIDE,
-    along,
     apart,
     at_heights,
     both,
@@ -63,7 +62,6 @@ from verification.problems.channels import (
     following,
     length,
     pair,
-    pictured,
     problem,
     rates,
     sample,
@@ -134,9 +132,6 @@ def collocation(order: int, peclet: float, density: float):
     else:
         samples, _, ceiling = FINER[order]
         yield studies(refine(_root_mean_square, samples, order, peclet, density), {"C": (*EXPECTED[order], ceiling)})
-        truth, ours, x = exact(peclet, density), found(1.6, 0, peclet, density, order, WIDE), np.linspace(*WIDE, 121)
-        yield pictured("along the channel", "x (um)", x, along(spaced(1.6, 0, order, WIDE), ours, x),
-                       ("solve_bvp", "exact", x[::6], truth(x[::6])))
 
 
 def _distances(size: float, number: int, peclet: float, density: float) -> dict[str, float]:
@@ -206,7 +201,6 @@ def finite_differences(shape: str, order: int, density: float, *ceilings: float)
         samples, why = (BLOCK, "both of second order") if shape == "block" else (dict.fromkeys(DISC, 1), CUT)
         rows = {name: (2, why, ceiling) for name, ceiling in zip(names, ceilings)}
         yield studies(refine(_as_long, samples, density, shape), rows)
-        yield _across(shape, min(samples), density)
     elif shape == "block":
         rows = {name: (2, "py-pde's second order", ceiling) for name, ceiling in zip(names, ceilings)}
         yield studies(refine(_at_rest, BLOCK, density, shape, order), rows, ", of py-pde less ours")
@@ -256,15 +250,6 @@ def _less(space: Space, state: transport.Concentrations, cell: float, density: f
     ours = sample(space, both(state), points)
     ratio = (ours / theirs)[1, part == 1] - 1
     return {**_over_the_supply(ours - theirs), ITSELF: np.sqrt(np.mean(ratio**2))}
-
-
-def _across(shape: str, cell: float, density: float) -> Profile:
-    """Across the box, over the middle of the biomass."""
-    points, theirs, _ = _pypde(cell, density, shape)
-    made, sink_ = _diffusing(_spaced(cell, 0, shape), density)
-    on = points[:, 0] == points[points[:, 0] > 0, 0].min()
-    ours, y = sample(made.space, both(transport.steady(made, sink_)), points[on]), points[on, 1]
-    return pictured("x = 0", "y (um)", y, ours, ("py-pde", "reference", y, theirs[:, on]))
 
 
 LAW = replace(SCENE.kinetics, yield_coefficient=1e-12)
@@ -456,14 +441,12 @@ def _from_backward_euler(steps: int, peclet: float, density: float) -> dict[str,
 
 
 def _course(size: float, peclet: float, density: float, timed: bool) -> Profile:
-    """Along the channel, at each time; steady with what solve_bvp finds."""
+    """Along the channel, at each time."""
     x, curves = _channel(size, peclet, density).x, []
     ours = _at_cells(x, size, 0, 1, peclet, density, timed * STEPS[-1])[:, :, 2]
     for one, theirs in zip(ours, _fipy(size, peclet, density, timed)):
-        curves += pictured("", "", x, one, ("FiPy", "reference", x, theirs)).curves
-    if not timed:
-        truth = exact(peclet, density)(x[::12])
-        curves += [(f"{name}, solve_bvp", "exact", x[::12], part) for name, part in zip(NAMES, truth)]
+        for k, name in enumerate(NAMES):
+            curves += [(name, "ours", x, one[k]), (f"{name}, FiPy", "reference", x, theirs[k])]
     return Profile("along the channel", "x (um)", "C (mg/L)", tuple(curves))
 
 
@@ -549,8 +532,6 @@ def followed(order: int):
     if order == 1:
         yield at_most("X at constant C, 12 min steps", _constant_supply(), 1e-9,
                       "(9)-(10) are integrated exactly: round-off of 600 steps, and scipy's 1e-11")
-        yield _days("substrates", "C (mg/L)", (0, 1))
-        yield _days("biomass", "X (mg/L)", (2, 3))
 
 
 def _constant_supply() -> float:
@@ -564,13 +545,3 @@ def _constant_supply() -> float:
     found = solve_ivp(lambda t, y: growing(acceptor, donor, y[0]), (0, HALF_DAYS[-1]), [3e4, 0.0], rtol=1e-12,
                       atol=1e-8, method="DOP853").y[:, -1]
     return float(np.abs(np.array([active, inert]) / found - 1).max())
-
-
-def _days(title: str, label: str, chosen: tuple[int, int]) -> Profile:
-    """Two of the four against time."""
-    times, names = np.linspace(0.5, HALF_DAYS[-1], 121), [*MIXED]
-    trusted, ours, curves = _theirs(times, 1), _mixed_ours(MIXED_STEPS[-1], 1)[:, :, 0], []
-    for k in chosen:
-        curves += [(names[k], "ours", HALF_DAYS, ours[:, k]),
-                   (f"{names[k]}, solve_ivp", "reference", times, trusted[:, k])]
-    return Profile(title, "time (h)", label, tuple(curves))

@@ -168,16 +168,12 @@ def _in_proportion(found) -> Check:
       mutants=("unpaired",), over=combined(HALVES, {**SOLVED, **CUBIC}) | combined(LEAST, SOLVED), ways="2 paper")
 def front(half: str, solved: tuple[tuple, float]):
     numerics, bound = solved
-    found, far = _front(half, *numerics), _far_front(half)
+    found, far = _front(half, *numerics), _front(half, "fast", ("refinement", 1.3))
     apart = max(abs(a.effluent - b.effluent) for a, b in zip(found, far)) / SUPPLY
     return [_in_proportion(found), at_most("effluents", apart, bound, "what the preset is for")]
 
 
 @cache
-def _far_front(half: str):
-    return _front(half, "fast", ("refinement", 1.3))
-
-
 def _front(half: str, *numerics):
     """Ledgers of a thick half-disc that the donor, 1 mg/L, does not pass, without decay; on elements that are graded to
     the front, and if these are refused, with the refinement that is then advised."""
