@@ -18,7 +18,7 @@ from repro.march.simulation import simulate
 from repro.model import pore
 from repro.scene import load_scene
 from verification.coupling import every, kinds
-from verification.kernel.case import Profile, Study, at_most, case, study
+from verification.kernel.case import Study, at_most, case, refine, study
 from verification.problems import runs
 
 STEPS = (0.8, 0.4, 0.2, 0.1, 0.05)
@@ -58,10 +58,9 @@ SLOWER = (16.0, 8.0, 4.0, 2.0)
       mutants=("rates-two-percent-low",), over=kinds(0.4), ways="paper",
       because="fast, accurate: the transient scheme goes with updates")
 def quasi_steady(*changes: str):
-    rows = [_lag(factor, *changes) for factor in SLOWER]
-    return [study(f"{name}", SLOWER, [row[name] for row in rows], 1,
-                  "lag: first order in storage over reaction, 2e-4 for base", ceiling=3e-6, band=0.15)
-            for name in rows[0]]
+    errors = refine(_lag, SLOWER, *changes)
+    return [study(name, SLOWER, values, 1, "lag: first order in storage over reaction, 2e-4 for base", ceiling=3e-6,
+                  band=0.15) for name, values in errors.items()]
 
 
 def _lag(factor: float, *changes: str) -> dict[str, float]:
@@ -88,15 +87,10 @@ def _slower(factor: float, transport_scheme: str, *changes: str):
             for radius, labelled in (("5 um", kinds(0.6, 2.0)), ("25 um", every(0.6, 2.0)))
             for label, changes in labelled.items()}, ways="paper")
 def extent(*changes: str):
-    (central, x, near), (full, _, far) = (_solved(f'numerics.extent="{name}"', *changes)
-                                          for name in ("central", "full"))
-    curves = tuple(curve for k, name in enumerate(("C_A", "C_D"))
-                   for curve in ((f"{name}, central", "ours", x, near[k]),
-                                 (f"{name}, whole pore", "reference", x, far[k])))
-    checks = [at_most(name, abs(central[name] / full[name] - 1), bound, origin)
-              for name, (bound, origin) in BOUNDS.items()]
-    return (checks, at_most("C", np.abs(near - far).max() / 10.0, *APART.get(changes[1:], (4e-4, IN_SPACE))),
-            Profile("section means", "x (um)", "C (mg/L)", curves))
+    (central, near), (full, far) = (_solved(f'numerics.extent="{name}"', *changes) for name in ("central", "full"))
+    for name, (bound, origin) in BOUNDS.items():
+        yield at_most(name, abs(central[name] / full[name] - 1), bound, origin)
+    yield at_most("C", np.abs(near - far).max() / 10.0, *APART.get(changes[1:], (4e-4, IN_SPACE)))
 
 
 IN_SPACE = "error in space, 0.1 % at refinement 1, a quarter of that here"
@@ -108,7 +102,7 @@ BOUNDS = {"conductivity": (1e-3, "of first order in the mesh: 0.17 % in a clean 
 
 
 def _solved(*changes: str):
-    """Conductivity and effluents of base at t = 0; x along its central mesh, and the section means there."""
+    """Conductivity and effluents of base at t = 0, and the section means along its central mesh."""
     scene = load_scene("base", changes)
     now = pore.seeded(scene)
     solved = pore.solve(scene, now)
@@ -116,7 +110,7 @@ def _solved(*changes: str):
     reach = min(10 * scene.aggregate.radius, 1.5 * scene.pore.width) + scene.aggregate.radius
     x = np.linspace(-reach, reach, runs.PLACES)
     return ({"conductivity": solved.flow.conductivity, "effluent acceptor": leaving[0].effluent,
-             "effluent donor": leaving[1].effluent}, x, runs.section_means(now, solved, x))
+             "effluent donor": leaving[1].effluent}, runs.section_means(now, solved, x))
 
 
 RULE_STEPS = (1, 2, 4, 8, 16)
@@ -154,16 +148,14 @@ def order_in_time(elements: str):
       because="fast, accurate: their own tolerances would be seen")
 def limit(*changes: str):
     middle = _at_the_end(*changes, 'numerics.time="midpoint"', "numerics.tolerance=0.00003")
-    apart = np.array([np.abs(_at_the_end(*changes, f'growth.time_step="{step} h"') / middle - 1)
-                      for step in STEPS[:-1]])
-    return [study(name, STEPS[:-1], apart[:, k], 1, "shape updates: first order", ceiling=2e-3)
-            for k, name in enumerate(("area", "upstream tip"))]
+    rows = [_at_the_end(*changes, f'growth.time_step="{step} h"') for step in STEPS[:-1]]
+    return [study(name, STEPS[:-1], [abs(row[name] / middle[name] - 1) for row in rows], 1,
+                  "shape updates: first order", ceiling=2e-3) for name in ("area", "upstream tip")]
 
 
-def _at_the_end(*changes: str) -> np.ndarray:
-    """Area and upstream tip at 3.2 h."""
-    outline = runs.last(runs.base("3.2 h", 'aggregate.radius="25 um"', *changes)).pore.outline
-    return np.array([outline.area, outline.upstream])
+def _at_the_end(*changes: str) -> dict[str, float]:
+    """Numbers at 3.2 h."""
+    return runs.numbers(runs.last(runs.base("3.2 h", 'aggregate.radius="25 um"', *changes)))
 
 
 TIMES = (19.2, 19.4)

@@ -15,12 +15,14 @@ from reference import poiseuille
 from repro.fem.mesh import Mesh
 from repro.fem.outline import FREE
 from repro.fem.space import Space
+from repro.march.loop import Instant
 from repro.march.simulation import shaped, simulate
 from repro.model import flow, pore
-from repro.scene import load_scene
+from repro.scene import Scene, load_scene
 from verification.coupling import PRESETS, every
-from verification.kernel.case import Profile, at_least, at_most, case, study
+from verification.kernel.case import at_least, at_most, case, study
 from verification.problems import pairs, runs
+from verification.problems.channels import both
 
 
 @case("coupling-no-growth", kind="property",
@@ -34,12 +36,20 @@ def no_growth(*changes: str):
     pairs = [(one.pore.mesh.points, one.pore.theta, one.pore.inert, one.solved.flow.velocity, one.solved.flow.head,
               one.solved.concentrations.acceptor, one.solved.concentrations.donor) for one in (first, last)]
     moved = sum(not np.array_equal(a, b) for a, b in zip(*pairs))
-    state = last.solved.concentrations
-    left = max(np.abs(c / 10.0 - 1).max() for c in (state.acceptor, state.donor))
-    drift = runs.density_drift(scene, last)
     return [at_most("arrays moved", moved, 0.0, "nothing acts on them: bit for bit"),
-            at_most("X_A", drift, 1e-14, "(34) multiplies and divides by the same areas"),
-            at_most("C over the supply, less 1", left, *(EVEN if scene.numerics.order == 1 else UNEVEN))]
+            at_most("X_A", runs.density_drift(scene, last), 1e-14, "(34) multiplies and divides by the same areas"),
+            at_most("C over the supply, less 1", _lack(last), *(EVEN if scene.numerics.order == 1 else UNEVEN))]
+
+
+def _lack(instant: Instant) -> float:
+    """Largest |C / supply - 1|."""
+    return float(np.abs(both(instant.solved.concentrations) / 10.0 - 1).max())
+
+
+def _poiseuille(scene: Scene) -> float:
+    """Mean velocity (um/h) of the clean channel under the scene's head."""
+    viscosity = scene.flow.kinematic_viscosity / scene.flow.gravity
+    return scene.flow.head / poiseuille.head_loss(scene.pore.length, scene.pore.width, 1.0, viscosity)
 
 
 #: How far C may be from the supply. w is divergence-free for the very functions that carry C where these are linear;
@@ -75,10 +85,7 @@ def _clean(*changes: str) -> tuple[float, float]:
     """Relative error of the mean velocity; largest |C / supply - 1|."""
     scene = load_scene("base", changes)
     now = next(simulate(replace(scene, aggregate=None, kinetics=None, growth=None)))
-    viscosity, state = scene.flow.kinematic_viscosity / scene.flow.gravity, now.solved.concentrations
-    exact = scene.flow.head / poiseuille.head_loss(scene.pore.length, scene.pore.width, 1.0, viscosity)
-    lack = max(np.abs(c / 10.0 - 1).max() for c in (state.acceptor, state.donor))
-    return abs(now.solved.flow.mean_velocity / exact - 1), float(lack)
+    return abs(now.solved.flow.mean_velocity / _poiseuille(scene) - 1), _lack(now)
 
 
 @case("coupling-equal-viscosities", kind="property",
@@ -92,11 +99,9 @@ def equal_viscosities(*changes: str):
     grid, found = last.pore.mesh, last.solved.flow
     bare = Mesh.of(grid.points, grid.cells, np.zeros_like(grid.biomass), np.empty(0, int), grid.width, grid.ends)
     empty = flow.unit_flow(Space(bare, last.pore.space.order), 7.0)
-    viscosity = scene.flow.kinematic_viscosity / scene.flow.gravity
-    exact = scene.flow.head / poiseuille.head_loss(scene.pore.length, scene.pore.width, 1.0, viscosity)
     return [at_most("u", np.abs(found.velocity / found.mean_velocity - empty.velocity).max(), 1e-13,
                     runs.ROUND_OFF),
-            at_most("mean velocity", abs(found.mean_velocity / exact - 1), 5e-3,
+            at_most("mean velocity", abs(found.mean_velocity / _poiseuille(scene) - 1), 5e-3,
                     "linear elements: first order in the mesh, 0.3 % as in coupling-clean-channel"),
             at_least("growth of the area", last.pore.outline.area / first.pore.outline.area, 1.1,
                      "else nothing is tested")]
@@ -114,36 +119,45 @@ def stiffness(*changes: str):
             at_least("growth of the area", soft.outline.area / seed, 1.1, "else nothing is tested")]
 
 
-TIMES = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
-
-
 def _everywhere(scene):
     """The scene without flow, diffusion a million times D_A and more."""
     return runs.with_diffusivities(runs.without_flow(scene), lambda water, biomass: (1e13, 1e13))
 
 
+EVERY_HOUR = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+OF_UPDATES = 1e-8, "J = theta to the stabilisation, and C to 1e-8 of the supply: D is a million times D_A"
+OF_LONG_STEPS = 1e-6, "J = theta, and C to 1e-7 of the supply"
+#: Changes of a scene, by label, whose steps are those of a preset.
+LONG = {**{kind: (runs.by("fast"), runs.of(kind), runs.coarser(kind, 0.2)) for kind in runs.ELEMENTS},
+        "accurate": (runs.by("accurate"),)}
+
+
 @case("coupling-uniform-growth", kind="exact",
-      norm="largest relative error of the area, every hour to 6 h; largest deviation of the outline from a half-disc",
+      norm="largest relative error of area and mass, every hour to 6 h; largest deviation of the outline from a "
+           "half-disc",
       claim="Where diffusion holds the supply everywhere the aggregate stays a half-disc of exactly exp-growing mass, "
             "through a remesh",
       mutants=("growth-three-percent-low", "euler-biomass", "inert-not-in-the-area", "theta-anew-at-a-remesh",
-               "geometry-of-the-step-before"), over=every(0.3), ways="paper")
-def uniform_growth(*changes: str):
-    """Checks and a picture of a run with rows every hour."""
-    times = ", ".join(f'"{time} h"' for time in TIMES)
-    scene = _everywhere(runs.base("6 h", *changes, times=times))
-    seed, instants = pore.seeded(scene).outline, list(simulate(scene))[1:]
-    areas = np.array([instant.pore.outline.area for instant in instants])
-    expected = seed.area * np.array([runs.mass_after(scene, time) for time in TIMES])
-    profile = Profile("area", "time (h)", "area (um2)",
-                      (("ours", "ours", np.array(TIMES), areas),
-                       ("closed form", "exact", np.array(TIMES), expected)))
-    bound, origin = _roundness(scene, seed)
-    checks = [at_most("area", np.abs(areas / expected - 1).max(), 1e-8,
-                      "J = theta to the stabilisation, and C to 1e-8 of the supply: D is a million times D_A"),
-              at_most("outline", _unround(instants[-1], expected[-1]), bound, origin),
-              at_least("remeshes", sum(i.remeshes for i in instants), 1.0, "else that is not tested")]
-    return checks, profile
+               "geometry-of-the-step-before"),
+      over={kind: (EVERY_HOUR, *OF_UPDATES, *changes) for kind, changes in every(0.3).items()}, ways="paper")
+@case("coupling-curved-uniform-growth", kind="exact",
+      norm="relative error of area and mass; largest deviation of the outline from a half-disc",
+      claim="Where diffusion holds the supply everywhere the midpoint rule keeps a half-disc of exactly exp-growing "
+            "mass through remeshes, in few long steps",
+      mutants=("theta-power", "curved-mass-lost", "curved-half-of-the-half"),
+      over={kind: ((9.0,), *OF_LONG_STEPS, *changes) for kind, changes in LONG.items()}, ways="fast",
+      because="paper: coupling-uniform-growth")
+def uniform_growth(hours: tuple[float, ...], most: float, why: str, *changes: str):
+    """Checks of a run to the last of some hours, with rows at these."""
+    scene = _everywhere(runs.base(f"{hours[-1]} h", *changes, times=", ".join(f'"{hour} h"' for hour in hours)))
+    seed, instants = pore.seeded(scene).outline, runs.ours(scene)
+    expected = seed.area * np.array([runs.mass_after(scene, hour) for hour in hours])
+    sizes = {"area": [instant.pore.outline.area for instant in instants],
+             "mass": [instant.pore.mass / scene.kinetics.maximum_density for instant in instants]}
+    for name, size in sizes.items():
+        yield at_most(name, np.abs(size / expected - 1).max(), most, why)
+    yield at_most("outline", _unround(instants[-1], expected[-1]), *_roundness(scene, seed))
+    yield at_least("remeshes", sum(i.remeshes for i in instants), 1.0, "else that is not tested")
 
 
 def _roundness(scene, seed) -> tuple[float, str]:
@@ -159,26 +173,6 @@ def _unround(instant, area: float) -> float:
     outline = instant.pore.outline
     radius = np.hypot(*outline.points[outline.wall == FREE].T)
     return float(np.abs(radius / np.sqrt(2 * area / np.pi) - 1).max())
-
-
-@case("coupling-curved-uniform-growth", kind="exact",
-      norm="relative error of area and mass; largest deviation of the outline from a half-disc",
-      claim="Where diffusion holds the supply everywhere the midpoint rule keeps a half-disc of exactly exp-growing "
-            "mass through remeshes, in few long steps",
-      mutants=("theta-power", "curved-mass-lost", "curved-half-of-the-half"),
-      over={**{kind: (runs.by("fast"), runs.of(kind), runs.coarser(kind, 0.2)) for kind in runs.ELEMENTS},
-            "accurate": (runs.by("accurate"),)}, ways="fast", because="paper: coupling-uniform-growth")
-def long_steps(*changes: str):
-    """Checks of a run to 9 h with the steps of a preset."""
-    scene = _everywhere(runs.base("9 h", *changes))
-    first, last = simulate(scene)
-    wanted = first.pore.outline.area * runs.mass_after(scene, 9.0)
-    bound, origin = _roundness(scene, first.pore.outline)
-    mass = last.pore.mass / scene.kinetics.maximum_density
-    return [at_most("mass", abs(mass / wanted - 1), 1e-6, "C to 1e-7 of the supply"),
-            at_most("area", abs(last.pore.outline.area / wanted - 1), 1e-6, "J = theta"),
-            at_most("outline", _unround(last, wanted), bound, origin),
-            at_least("remeshes", last.remeshes, 1.0, "else less is tested")]
 
 
 @case("coupling-units", kind="property", norm="relative difference at 2 h",
@@ -220,10 +214,9 @@ FOREIGN = ('pore.width="0.05 mm"', 'pore.length="0.06 cm"', 'aggregate.radius="5
       mutants=("rounded-twice",), over=PRESETS, ways="1 2")
 def foreign_units(*changes: str):
     ours, theirs = (runs.last(runs.base(end, *changes, *units)) for end, units in (("1 h", ()), ("60 min", FOREIGN)))
-    apart = np.abs(ours.pore.mesh.points - theirs.pore.mesh.points).max()
-    fields = np.abs(ours.solved.concentrations.acceptor - theirs.solved.concentrations.acceptor).max()
-    return [at_most("places", apart, 0.0, "the same numbers after reading"),
-            at_most("C_A", fields, 0.0, "the same numbers after reading")]
+    pairs = {"places": (ours.pore.mesh.points, theirs.pore.mesh.points),
+             "C_A": (ours.solved.concentrations.acceptor, theirs.solved.concentrations.acceptor)}
+    return [at_most(name, np.abs(a - b).max(), 0.0, "the same numbers after reading") for name, (a, b) in pairs.items()]
 
 
 @case("coupling-mirror", kind="property",
@@ -237,15 +230,9 @@ def mirror(*changes: str):
     x = np.linspace(1.0, 70.0, 70)
     sides = [pairs.sample(space, last.solved.concentrations.acceptor, np.column_stack([s * x, 0.3 + 0 * x]))
              for s in (-1, 1)]
-    profile = Profile("C_A along the lower wall, 8 h", "|x| (um)", "C_A (mg/L)",
-                      (("upstream", "ours", x, sides[0]), ("downstream", "reference", x, sides[1])))
-    checks = [at_most("tips", tips, 3e-6, "unsymmetric mesh: the error of C_A, of which growth feels a "
-                      "tenth"),
-              at_most("C_A", np.abs(sides[0] - sides[1]).max() / 10.0, 1e-4,
-                      "unsymmetric mesh: error in space"),
-              at_least("it has grown (area over the seed's)", outline.area / 39.27, 2.0,
-                       "else nothing is tested")]
-    return checks, profile
+    return [at_most("tips", tips, 3e-6, "unsymmetric mesh: the error of C_A, of which growth feels a tenth"),
+            at_most("C_A", np.abs(np.subtract(*sides)).max() / 10.0, 1e-4, "unsymmetric mesh: error in space"),
+            at_least("it has grown (area over the seed's)", outline.area / 39.27, 2.0, "else nothing is tested")]
 
 
 @case("coupling-reversed", kind="property",

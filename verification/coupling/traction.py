@@ -23,8 +23,8 @@ from repro.model import contact, flow, growth, mesh_motion, pore, traction
 from repro.model.flow import Flow
 from verification.coupling import every
 from verification.flow import closed_forms
-from verification.kernel.case import at_least, at_most, between, case, refine, study
-from verification.problems import meshes, runs
+from verification.kernel.case import at_least, at_most, between, case, refine, studies, study
+from verification.problems import runs
 
 FORMS = ("laplacian", "traction")
 #: Every kind of elements on the paper's mesh, and the presets on theirs.
@@ -140,17 +140,16 @@ def layer(order: int):
     if order > 1:
         return at_most("shear", abs(_shear(Space(closed_forms._long_layer(), order))), 1e-5,
                        "both parabolas are held; what is left of the layer's ends")
-    errors = refine(lambda level: meshes.root_mean_square(lambda draw: {"shear": _shear_error(level, draw)},
-                                                          LAYER_DRAWS[level]), range(len(closed_forms.SIZES)))
-    return study("shear", closed_forms.SIZES, errors["shear"], 2, "forces as residuals of linear elements: second "
-                 "order, as the flux", ceiling=1e-3)
+    return studies(refine(_shear_error, LAYER_DRAWS), {
+        "shear": (2, "forces as residuals of linear elements: second order, as the flux", 1e-3)})
 
 
-LAYER_DRAWS = (16, 12, 6, 2)
+#: How many meshes of each level.
+LAYER_DRAWS = dict(enumerate((16, 12, 6, 2)))
 
 
-def _shear_error(level: int, draw: int) -> float:
-    return _shear(Space(closed_forms._grid(level, draw), 1))
+def _shear_error(level: int, draw: int) -> dict[str, float]:
+    return {"size": closed_forms.SIZES[level], "shear": _shear(Space(closed_forms._grid(level, draw), 1))}
 
 
 def _shear(space: Space) -> float:
