@@ -162,7 +162,9 @@ def growth_errors(body: Sliding, factor: float) -> tuple[float, float]:
 
 def stability(body: Sliding, factor: float) -> float:
     """Least eigenvalue of B K^-1 B^T + factor C against the pressure's mass matrix, at t = 0 (dense)."""
-    t, n, area = body.triangles, len(body.reference), areas(body)
+    t = body.triangles
+    n = len(body.reference)
+    area = areas(body)
     slopes = gradients(body.reference, t)
     tangent = moduli(np.tile(np.eye(2), (len(t), 1, 1)), np.zeros(len(t)))
     K = np.einsum("t,tikjl,tak,tbl->taibj", area, tangent, slopes, slopes).reshape(len(t), 6, 6)
@@ -249,7 +251,9 @@ def expanded(exponent: float) -> Expanded:
     for t in TOTAL ** (np.arange(1, steps + 1) / steps):
         theta = radial_theta(body, t**exponent, t - t**exponent)
         found = growth.equilibrium(body.body, theta, position, pressure, body.held, body.reference)
-        position, pressure, iterations = found.position, found.pressure, iterations + found.iterations
+        position = found.position
+        pressure = found.pressure
+        iterations = iterations + found.iterations
     R = np.hypot(*body.reference.T)
     area = triangle_areas(position, body.triangles).sum() / areas(body).sum()
     return Expanded(float(np.hypot(*position[R > (1 - 1e-9) * RADIUS].T).mean()), area, float(pressure[np.argmin(R)]),

@@ -33,7 +33,9 @@ from verification.claims.runs import (
     stress,
 )
 
-PLOTTED, END, LAST_HOURS = 19.2, 19.4, 5.0
+PLOTTED = 19.2
+END = 19.4
+LAST_HOURS = 5.0
 
 
 def growth_rates(now: Pore, solved: Solved) -> np.ndarray:
@@ -211,7 +213,9 @@ def oxygen() -> Finding:
     The paper says it of decay, which (9)-(10) let go on in proportion to m_A = C_A / (C_A + K_s). Present is so taken
     as m_A >= 1/2, that is C_A >= K_s: decay then has at least half of the rate that it has with plenty of oxygen.
     """
-    base, wide, why = least(BASE, "acceptor"), least(WIDE, "acceptor"), "m_A >= 1/2: decay at half its rate, at least"
+    base = least(BASE, "acceptor")
+    wide = least(WIDE, "acceptor")
+    why = "m_A >= 1/2: decay at half its rate, at least"
     checks = (at_least("base: smallest C_A / K_s", "present", base.min(), 1.0, why),
               at_least("wide: smallest C_A / K_s", "present", wide.min(), 1.0, why),
               at_least("the smaller of both", "present", min(base.min(), wide.min()), np.finfo(float).tiny, "not zero"))

@@ -57,7 +57,9 @@ PAPER_CORRECTION = 1.016
 SUBSTRATES, RATIOS = ("acceptor", "donor"), ("dM_X/dM_CA", "dM_X/dM_CD", "dM_CA/dM_CD")
 PLOTTED = 19.2
 #: K_s; the effluents that the paper prints, as intervals; and how many of each are tried.
-SUPPLY, PRINTED_EFFLUENTS, PAIRS = 10.0, (interval("4.19"), interval("6.13")), 400
+SUPPLY = 10.0
+PRINTED_EFFLUENTS = (interval("4.19"), interval("6.13"))
+PAIRS = 400
 
 
 def supplied(value: str) -> tuple[str, ...]:
@@ -106,7 +108,9 @@ def bookkeeping(run) -> Bookkeeping:
     The ledger holds the mean of the outflows at both ends of a step, so that the one at its end, before the expansion,
     follows from the one at its beginning.
     """
-    steps, rows, said = ledger(*run), series(*run), scene(*run)
+    steps = ledger(*run)
+    rows = series(*run)
+    said = scene(*run)
     supply = np.array([[said.substrates.acceptor.supply], [said.substrates.donor.supply]])
     volume = steps["acceptor_supplied_pg_per_m"] / supply[0]
     out, consumed = (np.array([steps[f"{name}_{part}_pg_per_m"] for name in SUBSTRATES])
@@ -408,7 +412,9 @@ def step_control() -> Finding:
     """
     ours = update(PLOTTED, gear.TOLERANCE)
     error = max(deviation(time, gear.TOLERANCE) for time in (FIRST, PLOTTED))
-    alone, alike, growth = deviation(PLOTTED, None, UPDATE), equal_steps(), growth_of_a_disturbance(UPDATE, True)
+    alone = deviation(PLOTTED, None, UPDATE)
+    alike = equal_steps()
+    growth = growth_of_a_disturbance(UPDATE, True)
     checks = (at_most("error with the control (%)", "0.1", 100 * error, 0.1, "as stated"),
               without_limit(at_least("growth of a disturbance in a step of 12 min, both substrates predicted",
                                      "not stable", growth, 1.0, "it grows", date="2026-11-22")),

@@ -286,7 +286,10 @@ def bump(half_length: float, shape, edges: int) -> np.ndarray:
     return np.column_stack([half_length * np.cos(angle), runs.on_wall(shape(np.cos(angle)))])
 
 
-LOW, LONG, RATIO, LENGTH = 8.0, 40.0, 2000.0, 600.0
+LOW = 8.0
+LONG = 40.0
+RATIO = 2000.0
+LENGTH = 600.0
 SLENDER = (0.25, 0.177, 0.125, 0.0884)
 
 
@@ -376,7 +379,9 @@ COURSES = {"steps": ((2.0, 10.0, 10.0), (4.5, 0.0, 0.0), (7.0, 10.0, 10.0)),
 ROWS = (1.0, 2.0, 3.3, 4.5, 5.7, 7.0)
 ACCEPTOR = 10.0
 #: Cells of the averaged pore, and its accuracy: C is nearly even here. Twice as many cells change the area by 7e-6.
-CELLS, FLUID, ACCURACY = 16, 48, 1e-5
+CELLS = 16
+FLUID = 48
+ACCURACY = 1e-5
 THIELE = "the square of the transverse Thiele number: 1.2 % of the area of base over 64; and as much for the elements"
 #: Bounds where the supply jumps, and where it changes evenly, by preset; cubic: fast with cubic elements.
 HALF = "half of the {} that the preset may err by"

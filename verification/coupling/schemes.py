@@ -181,7 +181,9 @@ def _listed(preset: str, *changes: str) -> np.ndarray:
     _, *found = simulate(load_scene("base", (runs.by(preset), f"output.times=[{times}]", *changes)))
     rows = []
     for instant in found:
-        flow, outline, fluxes = instant.solved.flow, instant.pore.outline, instant.solved.fluxes
+        flow = instant.solved.flow
+        outline = instant.pore.outline
+        fluxes = instant.solved.fluxes
         rows.append([whole_run.M_PER_D * flow.mean_velocity, whole_run.M_PER_D * flow.conductivity, outline.area,
                      outline.thickness, outline.upstream, outline.downstream, *(flux.effluent for flux in fluxes)])
     return np.array(rows)

@@ -77,7 +77,9 @@ def balance(*changes: str):
 def _by_biomass(scene, now: pore.Pore, found: Flow) -> np.ndarray:
     """(N, 2) um2 of head: forces of the biomass' triangles, lambda times as viscous, triangle by triangle."""
     viscosity = scene.flow.viscosity_ratio * scene.flow.kinematic_viscosity / scene.flow.gravity
-    mesh, space, pressure = now.mesh, now.space, flow.pressure_space(now.space)
+    mesh = now.mesh
+    space = now.space
+    pressure = flow.pressure_space(now.space)
     total = np.zeros_like(mesh.points)
     for cell in np.flatnonzero(mesh.biomass):
         nodes = mesh.cells[cell]
@@ -154,7 +156,9 @@ def _shear_error(level: int, draw: int) -> dict[str, float]:
 
 def _shear(space: Space) -> float:
     """Relative error of the mean shear on the middle of the layer."""
-    mesh, ratio, half = space.mesh, 2000.0, 40.0
+    mesh = space.mesh
+    ratio = 2000.0
+    half = 40.0
     found = flow.unit_flow(space, ratio)
     as_flow = Flow(1.0, found.velocity, found.pressure, found.correction, 1.0, 1.0, 1.0)
     on = traction.nodal(space, as_flow, 1.0, "laplacian")

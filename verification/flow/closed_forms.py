@@ -49,7 +49,9 @@ from verification.kernel.case import around, at_most, case, combined, refine, st
 from verification.problems import meshes
 from verification.problems.channels import Box, box_errors
 
-WIDTH, ENDS, RATIO = 50.0, (-75.0, 75.0), 2000.0
+WIDTH = 50.0
+ENDS = (-75.0, 75.0)
+RATIO = 2000.0
 #: What cases run over: both forms of [E2], orders of the elements, and (by :func:`viscous`) ratios of viscosities.
 FORMS = {form: form for form in ("laplacian", "traction")}
 ORDERS = {f"order {order}": order for order in (1, 2, 3)}
@@ -163,7 +165,10 @@ def _curved_plug() -> Mesh:
 
 
 #: Height and half length of the layer, clean water beyond its ends, and what is compared: |x| < MIDDLE; um.
-LAYER, LAYER_END, BEYOND, MIDDLE = 12.5, 125.0, 15.0, 25.0
+LAYER = 12.5
+LAYER_END = 125.0
+BEYOND = 15.0
+MIDDLE = 25.0
 RATIOS = viscous(1.0, 10.0, 100.0, RATIO, 1e5, 1e8)
 SIZES, DRAWS = LAYER / np.array([1.5, 3.0, 6.0, 12.0]), dict(enumerate((16, 12, 6, 1)))
 #: Orders of linear elements, and what the errors of the finest meshes may reach; in the traction form what is left of
@@ -315,7 +320,9 @@ def _rise_error(refinement: float, draw: int, interface: str, order: int) -> dic
 
 
 DISC_ENDS = (-25.0, 25.0)
-CENTRE, DISC_RADIUS, ANGLE = np.array([2.0, 24.0]), 15.0, 0.4
+CENTRE = np.array([2.0, 24.0])
+DISC_RADIUS = 15.0
+ANGLE = 0.4
 SOFT_AND_STIFF = viscous(10.0, RATIO)
 JUMP = "1/2, from above: a continuous pressure cannot jump, the smooth part of the error falls faster"
 STIFF = JUMP + "; more so where lambda multiplies the error of the disc's strain"

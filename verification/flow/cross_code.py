@@ -42,7 +42,9 @@ from verification.flow.closed_forms import ENDS_FIRST, FORMS, HIGHER, LAYER, RAT
 from verification.kernel.case import Profile, at_least, at_most, between, case, combined, compared, refine, studies
 from verification.problems import meshes
 
-WIDTH, ENDS, CORNER = 50.0, (-75.0, 75.0), 4
+WIDTH = 50.0
+ENDS = (-75.0, 75.0)
+CORNER = 4
 #: Refinement of our mesh on each level, where Taylor-Hood's is halved again, and how many meshes are drawn (see
 #: meshes.SPREAD).
 REFINEMENTS, DRAWS = (0.65, 1.3, 2.6, 5.2), dict(enumerate((3, 3, 3, 1)))

@@ -129,7 +129,9 @@ def _off_twice(once: flow.Flow, twice: flow.Flow) -> float:
 
 def _power(space: Space, unit: flow.UnitFlow, interface: str) -> tuple[float, float]:
     """Work of the inlet's forces on the unit flow, and a(u, u) + (tau grad p, grad p)."""
-    grid, cells, pressure = space.mesh, space.cells, flow.pressure_space(space).cells
+    grid = space.mesh
+    cells = space.cells
+    pressure = flow.pressure_space(space).cells
     viscosity, count = np.where(grid.biomass, RATIO, 1.0), space.cells.shape[1]
     blocks = saddle_blocks(flow.viscous(space, viscosity, interface), flow.divergence(space))
     local = np.concatenate([unit.velocity[cells, 0], unit.velocity[cells, 1], unit.pressure[pressure]], axis=1)

@@ -31,7 +31,9 @@ from verification.problems.bodies import Supported
 #: Ours, by refinement; the reference on each level, by rings. 90 and 135 degrees have a node on all of them. Curved
 #: triangles of ours, whose refinements are the second ones, are compared with the last level alone.
 REFINEMENTS, RINGS = {1: (0.75, 1.35, 2.4, 4.05), 2: (0.3, 0.5, 0.8, 1.3)}, (4, 7, 12, 20)
-MODULUS, FRONT, CONTRAST = 0.01, 36.0, 10.0
+MODULUS = 0.01
+FRONT = 36.0
+CONTRAST = 10.0
 #: The upper wall (um), and how often the reference is refined towards the ends of the contact.
 CONTACT, TOWARDS = Contact(np.pi / 2, 3 * np.pi / 4, 65.0), 3
 PLACE = "the lower of the two orders: linear elements, second order (quadratic ones: third)"
@@ -168,8 +170,8 @@ def compared(kind: int, problem: str, ceilings: dict[int, tuple[float, float]], 
 def quadratic_cylinder(kind: int):
     yield compared(kind, "half-cylinder", {1: (6e-4, 6e-3), 2: (6e-5, 6e-3)})
     if kind == 1:
-        yield studies(refine(_own, range(len(RINGS))), {"places": (3, "quadratic elements", 5e-6),
-                                                        "pressure": (2, "linear elements", 1.2e-3)}, " of the reference")
+        rows = {"places": (3, "quadratic elements", 5e-6), "pressure": (2, "linear elements", 1.2e-3)}
+        yield studies(refine(_own, range(len(RINGS))), rows, " of the reference")
 
 
 def _own(level: int) -> dict[str, float]:

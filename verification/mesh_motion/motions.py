@@ -42,7 +42,9 @@ def sample(grid: Mesh, field: np.ndarray, where: np.ndarray) -> np.ndarray:
     return meshes.field_at(Space(grid, grid.geometry), field, where)
 
 
-WIDTH, ENDS, HALF = 30.0, (-60.0, 60.0), 20.0
+WIDTH = 30.0
+ENDS = (-60.0, 60.0)
+HALF = 20.0
 LINEAR = "the field is linear: round-off"
 
 
@@ -104,7 +106,9 @@ def _around_a_pocket(x, y):
 
 SIZES, SEEDS = (5.0, 2.5, 1.25, 0.625), range(3)
 #: Half length of the strip, of the plug in it, and the width (um).
-END, FACE, NARROW = 30.0, 10.0, 20.0
+END = 30.0
+FACE = 10.0
+NARROW = 20.0
 #: Every gamma of the waves, nearly incompressible the first, with the most that the last error may be.
 CEILINGS = {0.01: 3e-3, 0.1: 3e-3, 1.0: 2e-3, 10.0: 1.2e-3}
 
@@ -145,7 +149,10 @@ def _waved(grid: Mesh, gamma: float) -> np.ndarray:
     return moved(grid, grid.points + _wave(*grid.points.T, gamma), gamma) - grid.points
 
 
-RADIUS, SEGMENT_WIDTH, SEGMENT_END, FILM = 25.0, 50.0, 50.0, 2.0
+RADIUS = 25.0
+SEGMENT_WIDTH = 50.0
+SEGMENT_END = 50.0
+FILM = 2.0
 #: Refinements of our meshes with the parts a side of theirs: both codes are refined.
 LEVELS = ((0.7, 6), (1.1, 8), (1.9, 12), (3.3, 16))
 CORNER_LEVELS = ((0.7, 8), (1.3, 12), (2.4, 16), (4.4, 24))

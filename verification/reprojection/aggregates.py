@@ -22,7 +22,9 @@ from verification.problems import aggregates, meshes, pairs
 from verification.problems.channels import NAMES, both
 
 #: The seed's radius (um), the increase of the biomass in an update, and how many of them: the area grows eightfold.
-RADIUS, INCREASE, UPDATES = 5.0, 0.08, 27
+RADIUS = 5.0
+INCREASE = 0.08
+UPDATES = 27
 
 
 @case("reprojection-mass", kind="exact",
@@ -59,7 +61,10 @@ def node_mass(order: int):
       over=aggregates.EVERY)
 def half_disc(order: int):
     """Checks of 27 updates with elements of an order."""
-    given, now, rows, renewed = aggregates.scene(order=order), aggregates.seed(RADIUS, order=order), [], []
+    given = aggregates.scene(order=order)
+    now = aggregates.seed(RADIUS, order=order)
+    rows = []
+    renewed = []
     first = now.mass
     for update in range(1, UPDATES + 1):
         now, anew = aggregates.updated(given, now, INCREASE)
@@ -87,7 +92,10 @@ def _errors(now, theta: float, first: float) -> dict[str, float]:
 
 GROWING_UPDATES, SEED = 30, 8.0
 #: Remesh where more than six triangles are under 0.6 (3.5), or nearer to an end than min(7 R, 1.3 W) (3.1).
-POOR, ALLOWED, REACH, WIDEST = 0.6, 6, 7.0, 1.3
+POOR = 0.6
+ALLOWED = 6
+REACH = 7.0
+WIDEST = 1.3
 
 
 @case("reprojection-growing", kind="property",

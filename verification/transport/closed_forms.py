@@ -188,7 +188,9 @@ def _first_order_errors(size: float, number: int, modulus: float, film: float, o
             "taken up": abs(taken / exact(0.0)[1] - 1)}
 
 
-DEPTH, LIMIT, LEAST = 20.0, (0.3, 0.1, 0.03, 0.01), 1e-3
+DEPTH = 20.0
+LIMIT = (0.3, 0.1, 0.03, 0.01)
+LEAST = 1e-3
 #: Order, K (mg/L), film (um), elements (um) with how many meshes of each, and the last errors of C and of the depth;
 #: of orders 2 and 3 without films: with more of K what is left in the middle shows.
 MONOD = {"K = 0.1 mg/L, linear": (1, 0.1, 0.0, SAMPLES, 3e-4, 4e-5),
@@ -267,7 +269,10 @@ def zero_order(judge, *row):
     return judge(*row)
 
 
-WIDTH, RADIUS, ENDS, LARGEST = 50.0, 20.0, (-65.0, 65.0), 3e5
+WIDTH = 50.0
+RADIUS = 20.0
+ENDS = (-65.0, 65.0)
+LARGEST = 3e5
 SUBSTRATES = replace(SCENE.substrates, donor=replace(SCENE.substrates.donor, half_saturation=3.0))
 #: Refinements of each order, and how many unrelated meshes about each: the refinement is NEAR times the last one's, up
 #: and down.

@@ -116,7 +116,8 @@ FINER = {2: ({3.2: 12, 1.6: 6, 0.8: 3, 0.4: 1}, 1e-10, 1e-7), 3: ({6.4: 12, 3.2:
       claim="Dual Monod uptake under plug flow is solve_bvp's at Peclet 0.1, 1, 5 times Thiele numbers 0.6, 1.9, 6, "
             "from barely touched to starved",
       mutants=("decay-demand", "no-inlet-flux", "ratio-on-the-donor-only", "reaction-in-the-fluid",
-               "exchanged-substrates"), over=combined(LINEAR, PECLETS, DENSITIES), because="orders 2, 3: transport-monod-higher")
+               "exchanged-substrates"), over=combined(LINEAR, PECLETS, DENSITIES),
+      because="orders 2, 3: transport-monod-higher")
 @case("transport-monod-higher", kind="cross-code", slow=True,
       norm="root mean square over the mesh of both substrates less solve_bvp, over the supply",
       claim="Dual Monod uptake under plug flow on quadratic and cubic triangles is solve_bvp's, to third and fourth "
@@ -273,7 +274,9 @@ def _assembled(size: float, number: int, peclet: float, order: int = 1) -> trans
 @cache
 def _ours(size: float, number: int, peclet: float, density: float, steps: int, order: int = 1) -> np.ndarray:
     """(times, 2, n): each interval in equal steps, started anew from the end of the last."""
-    made, states, last = _assembled(size, number, peclet, order), [], 0.0
+    made = _assembled(size, number, peclet, order)
+    states = []
+    last = 0.0
     active = filled(made.space, density)
     now = transport.supplied_everywhere(made)
     for time in TIMES:
@@ -466,10 +469,14 @@ def _mixed_ours(step: float, order: int) -> np.ndarray:
     made = transport.problem(box_around(order), None, CLOSED, SLOW_LAW)
     weight = made.space.reaction.dx
     active = SEEDED * weight
-    inert, now, rows = 0 * active, transport.supplied_everywhere(made), []
+    inert = 0 * active
+    now = transport.supplied_everywhere(made)
+    rows = []
     for interval in np.diff([0.0, *HALF_DAYS]):
         done = gear.advance(made, active, inert, now, interval, fixed_step=step)
-        active, inert, now = done.active, done.inert, done.concentrations
+        active = done.active
+        inert = done.inert
+        now = done.concentrations
         fields = (now.acceptor, now.donor, active / weight, inert / weight)
         rows.append([(field.mean(), np.ptp(field)) for field in fields])
     return np.array(rows)

@@ -305,7 +305,9 @@ def _balanced(made: int | str, hours: float) -> Check:
 def _integrated(made: int | str, hours: float) -> Check:
     """Uptake at constant concentrations against scipy's integral of (7)-(10) over the step."""
     problem, law = _open(made), rates(SCENE.kinetics, OPEN)
-    acceptor, donor, seeded = 0.7, 4.0, 300.0
+    acceptor = 0.7
+    donor = 4.0
+    seeded = 300.0
     everywhere = Concentrations(np.full(problem.space.count, acceptor), np.full(problem.space.count, donor))
     ours = transport.fluxes(problem, Sink(seeded * problem.space.reaction.dx, hours), everywhere)
     sinks = uptake(acceptor, donor, law)
