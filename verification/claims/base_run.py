@@ -69,9 +69,8 @@ def effluents() -> Finding:
     found = [flux.effluent for flux in grown(BASE, PLOTTED)[1].fluxes]
     checks = tuple(printed(f"effluent {name} (K_s)", text, value, input=f"effluent_{name}")
                    for name, text, value in zip(SUBSTRATES, ("4.19", "6.13"), found))
-    plain, last = at(BASE, PLOTTED), at(BASE, END)
-    told = "; ".join("{}: {} and {}".format(when, *(f"{row[f'effluent_{name}_mg_per_L']:.3f}" for name in SUBSTRATES))
-                     for when, row in (("at 19.2 h", plain), ("after the expansion at 19.4 h", last)))
+    pair = "{effluent_acceptor_mg_per_L:.3f} and {effluent_donor_mg_per_L:.3f}".format
+    told = f"at 19.2 h: {pair(**at(BASE, PLOTTED))}; after the expansion at 19.4 h: {pair(**at(BASE, END))}"
     ratio = (SUPPLY - found[0]) / (SUPPLY - found[1])
     reason = (f"with the printed inputs {found[0]:.3f} and {found[1]:.3f} leave; acceptor over donor consumed is "
               f"{ratio:.3f}, the printed effluents make it {(SUPPLY - 4.19) / (SUPPLY - 6.13):.3f}, less than F [E14]")
@@ -243,9 +242,9 @@ def oxygen_demand(carbon: int, hydrogen: int, oxygen: int, nitrogen: int, molecu
 def effect_of_f() -> str:
     """Base at 19.2 h with F as computed: a run of its own, and the effluents in one and the same geometry."""
     ours, other = at(BASE, PLOTTED), at(F_OTHER, PLOTTED)
-    told = ", ".join(f"{name} {100 * (other[key] / ours[key] - 1):+.2f} %" for name, key in
-                     (("velocity", "mean_velocity_m_per_d"), ("area", "aggregate_area_um2"),
-                      *((f"effluent {name}", f"effluent_{name}_mg_per_L") for name in SUBSTRATES)))
+    columns = {"velocity": "mean_velocity_m_per_d", "area": "aggregate_area_um2",
+               "effluent acceptor": "effluent_acceptor_mg_per_L", "effluent donor": "effluent_donor_mg_per_L"}
+    told = ", ".join(f"{name} {100 * (other[key] / ours[key] - 1):+.2f} %" for name, key in columns.items())
     now, solved = solved_pore(BASE, PLOTTED)
     kinetics = replace(scene(*BASE).kinetics, acceptor_to_donor_ratio=F_COMPUTED)
     problem = replace(solved.problem, kinetics=kinetics)

@@ -98,8 +98,9 @@ def stabilised() -> Finding:
     the scheme sees of the pressure that it sees least. Without the stabilisation C = 0; with the sign of (27), -C.
     """
     own, regular = [half_disc(refinement) for refinement in OWN], [regular_half_disc(parts) for parts in REGULAR]
-    outline, pressure = (order(own, errors) for errors in zip(*(growth_errors(body, 1.0) for body in own)))
-    with_, without, printed = ([stability(body, factor) for body in regular] for factor in (1.0, 0.0, -1.0))
+    errors = np.array([growth_errors(body, 1.0) for body in own])
+    outline, pressure = (order(own, column) for column in errors.T)
+    with_, without, printed = (stabilities(regular, factor) for factor in (1.0, 0.0, -1.0))
     checks = (at_least("order of the outline", "convergent", outline, 1.7, "2 in theory; 1.7 for unrelated meshes"),
               at_least("order of the pressure", "convergent", pressure, 1.0, "1 in theory, in the mean square"),
               at_least("stability number, finest over coarsest mesh", "stable", with_[-1] / with_[0], 0.8,
@@ -120,7 +121,7 @@ def _told(own, regular, numbers) -> str:
     return (f"Stability numbers on regular meshes of {', '.join(str(len(body.reference)) for body in regular)} nodes: "
             f"with it {with_}, without {without}, with the sign of (27) {printed}. Growth on the second: without it "
             f"{attempt(regular[1], 0.0)}; with that sign {attempt(regular[1], -1.0)}. The package's unstructured "
-            f"meshes hide it: stability numbers {listed(stability(body, 0.0) for body in own[:3])} without it, errors "
+            f"meshes hide it: stability numbers {listed(stabilities(own[:3], 0.0))} without it, errors "
             f"of the pressure of {irregular}.")
 
 
@@ -158,6 +159,11 @@ def growth_errors(body: Sliding, factor: float) -> tuple[float, float]:
     outline = np.hypot(*found.position[rim].T) / radius[rim] - 1
     return (float(np.sqrt(np.mean(outline**2))),
             float(np.sqrt(weight @ (found.pressure - pressure) ** 2 / (weight @ pressure**2))))
+
+
+def stabilities(family: list[Sliding], factor: float) -> list[float]:
+    """The stability numbers of some bodies."""
+    return [stability(body, factor) for body in family]
 
 
 def stability(body: Sliding, factor: float) -> float:

@@ -104,9 +104,8 @@ def cells(check: PaperCheck) -> tuple[str, ...]:
 def _line(texts, widths: tuple[int, ...]) -> str:
     """Cells side by side, each wrapped in its column."""
     wrapped = [textwrap.wrap(text, width - 1) or [""] for text, width in zip(texts, widths)]
-    rows = zip_longest(*wrapped, fillvalue="")
-    return "\n".join(INDENT + "".join(f"{text:<{width}}" for text, width in zip(row, widths)).rstrip()
-                     for row in rows)
+    form = INDENT + "".join(f"{{:<{width}}}" for width in widths)
+    return "\n".join(form.format(*row).rstrip() for row in zip_longest(*wrapped, fillvalue=""))
 
 
 def _paragraph(label: str, text: str) -> str:
@@ -149,7 +148,8 @@ def summary(rows: list[Row]) -> str:
     """How many claims have each verdict, and what becomes of their numbers."""
     verdicts = Counter(row.verdict for row in rows)
     checks = [check for row in rows for check in row.checks]
-    outcomes, values = (Counter(check.outcome for check in chosen) for chosen in (checks, predicted(checks)))
+    outcomes = Counter(check.outcome for check in checks)
+    values = Counter(check.outcome for check in predicted(checks))
     named = [*VERDICTS, *(verdict for verdict in verdicts if verdict not in VERDICTS)]
     return "\n".join((
         f"{len(rows)} claims: " + "; ".join(f"{verdicts[verdict]} {verdict}" for verdict in named) + ".",
@@ -239,10 +239,13 @@ def _of_claim(ours: dict, known: dict | None) -> list[str]:
     if known is None:
         return [f"{id}: not in the record"]
     told = [f"{id}: {ours['verdict']}, recorded as {known['verdict']}"] if ours["verdict"] != known["verdict"] else []
-    names = [[unnumbered(check["quantity"]) for check in each["checks"]] for each in (ours, known)]
-    if names[0] != names[1]:
+    if _quantities(ours) != _quantities(known):
         return [*told, f"{id}: other quantities than recorded"]
     return told + [line for pair in zip(ours["checks"], known["checks"]) for line in _of_check(id, *pair)]
+
+
+def _quantities(entry: dict) -> list[str]:
+    return [unnumbered(check["quantity"]) for check in entry["checks"]]
 
 
 def _of_check(id: str, ours: dict, known: dict) -> list[str]:

@@ -12,6 +12,7 @@ Supplies that change over time: starvation and recovery of an aggregate.
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from itertools import product
@@ -110,17 +111,17 @@ def half_disc_loss(width: float, length: float, ratio: float) -> CubicSpline:
     return CubicSpline([0.0, *RADII], found)
 
 
-def _histories(scene, instants, thin, own) -> list[Profile]:
+def _histories(scene, instants, thin, own) -> Iterator[Profile]:
     """Velocity, acceptor leaving and area against time."""
     rows, times = [results.row(scene, instant) for instant in instants], np.array(TIMES)
     quantities = (("velocity (m/d)", "mean_velocity_m_per_d", lambda m: runs.M_PER_D * m.velocity),
                   ("acceptor leaving (mg/L)", "effluent_acceptor_mg_per_L", lambda m: m.fields[0, -1]),
                   ("area (um2)", "aggregate_area_um2", lambda m: m.area))
-    return [Profile(label, "time (h)", label, (
-        ("ours", "ours", times, np.array([row[column] for row in rows])),
-        ("averaged, lubrication", "exact", times, np.array([pick(m) for m in thin])),
-        ("averaged, a half-disc's loss", "reference", times, np.array([pick(m) for m in own]))))
-        for label, column, pick in quantities]
+    for label, column, pick in quantities:
+        yield Profile(label, "time (h)", label, (
+            ("ours", "ours", times, np.array([row[column] for row in rows])),
+            ("averaged, lubrication", "exact", times, np.array([*map(pick, thin)])),
+            ("averaged, a half-disc's loss", "reference", times, np.array([*map(pick, own)]))))
 
 
 SQUARE = "regular perturbation in 1 / D: the square of the transverse Thiele number"

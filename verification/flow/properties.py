@@ -6,6 +6,7 @@ Element sizes that grow with the distance from the aggregate, against one size e
 from __future__ import annotations
 
 from functools import cache
+from itertools import product
 
 import numpy as np
 
@@ -184,8 +185,8 @@ RATIOS = np.array([1.0, 2.0, 10.0, 100.0, 2000.0, 1e5])
 def obstacle(made: int | dict, interface: str):
     """Losses of four half-discs."""
     spaces = [_around(radius, made) for radius in (5.0, 25.0, 40.0, 46.0)]
-    losses = np.array([[flow.unit_flow(space, ratio, interface=interface).loss for ratio in RATIOS]
-                       for space in spaces])
+    losses = np.array([flow.unit_flow(space, ratio, interface=interface).loss
+                       for space, ratio in product(spaces, RATIOS)]).reshape(len(spaces), -1)
     slopes = np.diff(losses, axis=1) / np.diff(RATIOS)
     why = "least dissipation (Helmholtz): the loss is the least of functions that are linear in lambda"
     return [at_least("least rise with lambda, over the loss",
