@@ -303,7 +303,7 @@ def _anew(refinement: float, before):
 def _density_errors(refinement: float) -> dict[str, float]:
     """Mean errors of one size."""
     rows = [_errors_of_a_pair(refinement, old) for old in OLD]
-    return {name: float(np.mean([row[name] for row in rows])) for name in rows[0]}
+    return dict(zip(rows[0], np.mean([[*row.values()] for row in rows], axis=0)))
 
 
 def _errors_of_a_pair(refinement: float, old: float) -> dict[str, float]:

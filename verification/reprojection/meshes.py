@@ -14,7 +14,7 @@ from repro.fem import transfer
 from repro.fem.mesh import Mesh, triangle_areas
 from repro.fem.space import Space
 from verification.kernel.case import Profile, at_least, at_most, between, case, refine, study
-from verification.problems import meshes, pairs
+from verification.problems import meshes, pairs, runs
 
 SIZES, SEEDS = (5.0, 2.5, 1.25, 0.625), range(3)
 REMESHES = 40
@@ -179,7 +179,7 @@ def supermesh():
 
 def _worst(rows: list[dict[str, float]], bound: float) -> list:
     """The largest of each number over all pairs of meshes."""
-    return [at_most(name, max(row[name] for row in rows), bound, ROUND_OFF) for name in rows[0]]
+    return [at_most(name, value, bound, ROUND_OFF) for name, value in runs.worst(rows).items()]
 
 
 def _pieces(old: pairs.Grid, new: pairs.Grid) -> dict[str, float]:

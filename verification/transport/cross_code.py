@@ -45,7 +45,7 @@ from repro.fem.space import Space
 from repro.model import gear, kinetics, transport
 from repro.model.kinetics import Sink
 from verification.kernel.case import Profile, at_most, case, combined, refine, studies
-from verification.problems import meshes
+from verification.problems import meshes, runs
 from verification.problems.channels import (
     CROSSED,
     EXPECTED,
@@ -337,8 +337,7 @@ def _exact_in_time(size: float, number: int, peclet: float, density: float, orde
 
 def _largest(gap: np.ndarray) -> dict[str, float]:
     """The largest over the times of differences (times, 2, ...)."""
-    rows = [_over_the_supply(part) for part in gap]
-    return {name: max(row[name] for row in rows) for name in NAMES}
+    return runs.worst([_over_the_supply(part) for part in gap])
 
 
 #: Order, Peclet number and density of what is studied in time, elements (um), and the last error.
