@@ -14,7 +14,7 @@ from skfem import MeshTri
 from reference import neo_hookean
 from repro.errors import StageError
 from repro.fem.elements import GRADIENT_DEGREES
-from repro.fem.mesh import gradients, triangle_areas
+from repro.fem.mesh import triangle_areas
 from repro.fem.mesher import generate
 from repro.fem.outline import half_disc as seed
 from repro.fem.sizing import ACROSS_AGGREGATE, GRADATION, Sizing
@@ -22,7 +22,7 @@ from repro.model import growth
 from verification.claims import CLOSED, OF_SCHEME, Finding, at_least, at_most, between, claim, near, without_limit
 from verification.claims.levels import ALONE, WIDE_FINE, cached, current
 from verification.claims.runs import WIDE, bodies, series
-from verification.problems.bodies import Supported, moduli
+from verification.problems.bodies import Supported
 
 RADIUS = 5.0
 
@@ -148,9 +148,7 @@ def growth_errors(body: Sliding, factor: float) -> tuple[float, float]:
     """Mean-square errors, relative, of the outline's radius and of the pressure, the stabilisation times a factor."""
     start = growth.Equilibrium(body.reference, np.zeros(len(body.reference)), 0)
     theta = radial_theta(body, INNER, MORE)
-    stabilising = factor * growth.gradient_stabilisation(body.reference, body.triangles, np.ones(len(body.triangles)))
-    system = growth.System(body.body, body.held, stabilising=stabilising)
-    found = growth.reach(system, np.ones_like(theta), theta, start, body.reference)
+    found = growth.reach(stabilised_by(body, factor), np.ones_like(theta), theta, start, body.reference)
     R = np.minimum(np.hypot(*body.reference.T), RADIUS)
     rim = R > (1 - 1e-9) * RADIUS
     radius, pressure = (exact(R, INNER, MORE, RADIUS) for exact in (neo_hookean.cylinder_radius,
@@ -168,26 +166,25 @@ def stabilities(family: list[Sliding], factor: float) -> list[float]:
 
 def stability(body: Sliding, factor: float) -> float:
     """Least eigenvalue of B K^-1 B^T + factor C against the pressure's mass matrix, at t = 0 (dense)."""
-    t = body.triangles
-    n = len(body.reference)
-    area = areas(body)
-    slopes = gradients(body.reference, t)
-    tangent = moduli(np.tile(np.eye(2), (len(t), 1, 1)), np.zeros(len(t)))
-    K = np.einsum("t,tikjl,tak,tbl->taibj", area, tangent, slopes, slopes).reshape(len(t), 6, 6)
-    B = np.repeat((area[:, None, None] * slopes / 3).reshape(len(t), 1, 6), 3, axis=1)
-    C = factor * growth.gradient_stabilisation(body.reference, t, np.ones(len(t)))
-    M = area[:, None, None] * (np.ones((3, 3)) + np.eye(3)) / 12
-    places, free = np.stack([2 * t, 2 * t + 1], axis=2).reshape(len(t), 6), ~body.held.ravel()
-    stiffness = dense(K, places, places, 2 * n, 2 * n)[free][:, free]
-    divergence = dense(B, t, places, n, 2 * n)[:, free]
-    schur = divergence @ np.linalg.solve(stiffness, divergence.T) + dense(C, t, t, n, n)
-    return float(eigh(0.5 * (schur + schur.T), dense(M, t, t, n, n), eigvals_only=True, subset_by_index=[0, 0])[0])
+    n, of = len(body.reference), stabilised_by(body, factor)
+    whole = dense(of.tangent(body.reference, np.zeros(n)), of.unknowns)
+    M = dense(areas(body)[:, None, None] * (np.ones((3, 3)) + np.eye(3)) / 12, body.triangles)
+    free = ~body.held.T.ravel()
+    stiffness, divergence = whole[: 2 * n, : 2 * n][free][:, free], whole[2 * n:, : 2 * n][:, free]
+    schur = divergence @ np.linalg.solve(stiffness, divergence.T) - whole[2 * n:, 2 * n:]
+    return float(eigh(0.5 * (schur + schur.T), M, eigvals_only=True, subset_by_index=[0, 0])[0])
 
 
-def dense(elements: np.ndarray, rows: np.ndarray, columns: np.ndarray, height: int, width: int) -> np.ndarray:
-    """Sum of element matrices (t, a, b)."""
-    whole = np.zeros((height, width))
-    np.add.at(whole, (rows[:, :, None], columns[:, None, :]), elements)
+def stabilised_by(body: Sliding, factor: float) -> growth.System:
+    """The equations of a body whose stabilisation at t = 0 is multiplied by a factor."""
+    plain = growth.gradient_stabilisation(body.reference, body.triangles, np.ones(len(body.triangles)))
+    return growth.System(body.body, body.held, stabilising=factor * plain)
+
+
+def dense(elements: np.ndarray, unknowns: np.ndarray) -> np.ndarray:
+    """Sum of element matrices (t, a, a) of unknowns (t, a)."""
+    whole = np.zeros((unknowns.max() + 1,) * 2)
+    np.add.at(whole, (unknowns[:, :, None], unknowns[:, None, :]), elements)
     return whole
 
 
