@@ -13,7 +13,7 @@ from scipy.integrate import simpson
 from skfem.quadrature import get_quadrature_tri
 
 from reference import layered_channel
-from repro.fem.elements import derivatives, values
+from repro.fem.elements import ON_EDGE, derivatives, values
 from repro.fem.mesh import Mesh
 from repro.fem.newton import relative
 from repro.fem.outline import FREE, Outline, slopes
@@ -250,7 +250,7 @@ def _normals(outline: Outline) -> np.ndarray:
     t, weight = 0.5 * (1 + t), 0.5 * weight
     tangent = first[:, None] + t[:, None] * bend[:, None]
     normal = np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1) * weight[:, None]
-    share = _shares(outline.geometry, t)
+    share = values(outline.geometry, np.column_stack([t, 0 * t]))[:, ON_EDGE[outline.geometry]]
     local = np.einsum("qa,mqi->mai", share, normal)
     count, step = len(outline.points), outline.geometry
     total = np.zeros((count, 2))
@@ -258,13 +258,6 @@ def _normals(outline: Outline) -> np.ndarray:
     for edge in np.flatnonzero(wet):
         total[(step * edge + np.arange(step + 1)) % count] += local[edge]
     return total
-
-
-def _shares(geometry: int, t: np.ndarray) -> np.ndarray:
-    """(q, geometry + 1) the functions of an edge's nodes at t."""
-    if geometry == 1:
-        return np.column_stack([1 - t, t])
-    return np.column_stack([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)])
 
 
 FACTORS = (800.0, 400.0, 200.0, 100.0)

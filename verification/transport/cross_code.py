@@ -34,7 +34,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.integrate import solve_ivp
 from scipy.spatial import cKDTree
-from skfem import Basis, BilinearForm, ElementTriP2, ElementTriP3, MeshTri
+from skfem import Basis, BilinearForm
 
 from reference import channel_bvp, channel_fipy
 from reference import diffusion_reaction_pypde as pypde
@@ -70,6 +70,7 @@ from verification.problems.channels import (
     speed_of,
     steady,
 )
+from verification.problems.pairs import ELEMENTS
 
 LINEAR = {"linear": 1}
 HIGHER = {word: order for word, order in ORDERS.items() if order > 1}
@@ -296,9 +297,7 @@ def mass(space: Space) -> np.ndarray:
     """(n, n) um2, the mass matrix on a straight mesh by scikit-fem; of linear functions lumped."""
     if space.order == 1:
         return np.diag(space.lumped())
-    straight = space.mesh.straight
-    grid = MeshTri(straight.points.T.copy(), straight.triangles.T.copy())
-    basis = Basis(grid, {2: ElementTriP2(), 3: ElementTriP3()}[space.order], intorder=8)
+    basis = Basis(space.mesh.fem, ELEMENTS[space.order], intorder=8)
     apart, same = cKDTree(basis.doflocs.T).query(space.points)
     if apart.max() > 1e-9:
         raise ValueError("scikit-fem has its nodes elsewhere")
