@@ -108,23 +108,6 @@ def film(order: int, interface: str):
              for name, ratio in ratios.items()])
 
 
-@case("flow-half-disc-quadratic", kind="cross-code", norm=NORM,
-      claim="The same forms with quadratic and cubic velocities on straight triangles give Taylor-Hood's head loss to "
-            "0.1 %",
-      mutants=("quadratic-stabilised",), over=combined(HIGHER), because="order 1: flow-half-disc")
-def half_disc_quadratic(order: int):
-    errors = refine(_chords, {0.3: 3, 0.6: 3, 1.2: 3, 2.4: 1}, order)
-    return studies(errors, {"head loss": (2, "the chords of the arc: second order", 1e-3)})
-
-
-def _chords(refinement: float, draw: int, order: int) -> dict[str, float]:
-    """Difference of the head loss on straight triangles."""
-    trusted = _trusted(25.0, RATIO, "laplacian", 2).loss
-    grid = _grid(25.0, refinement * meshes.SPREAD[draw])
-    found = flow.unit_flow(Space(grid, order), RATIO)
-    return {"size": meshes.mean_size(grid), "head loss": abs(found.loss / trusted - 1)}
-
-
 @cache
 def _trusted(radius: float, ratio: float, interface: str, level: int) -> taylor_hood.Stokes:
     return taylor_hood.stokes(taylor_hood.half_disc(WIDTH, ENDS, radius, level, CORNER), ratio, interface)
