@@ -140,7 +140,8 @@ PARABOLAS = {f"lambda = {ratio:g}, {form}": (ratio, form)
             "times the viscosity have the parabola at every node and the loss (6) of each part, on any mesh; the work "
             "of the inlet is that loss",
       mutants=("viscosity-swapped", "loss-per-width", "inlet-parabola", "whole-pore-twice", "outlet-free",
-               "cubic-edge-crossed", "quadratic-stabilised"), over=combined(HIGHER, PARABOLAS), because="order 1: flow-poiseuille, flow-plug")
+               "cubic-edge-crossed", "quadratic-stabilised"), over=combined(HIGHER, PARABOLAS),
+      because="order 1: flow-poiseuille, flow-plug")
 def channels(order: int, given: tuple[float, str]):
     """On six-node triangles with biomass from wall to wall."""
     ratio, interface = given
