@@ -289,8 +289,6 @@ def test_random_meshes_cover_their_rectangle_and_follow_their_lines():
     assert grid.areas.min() > 0 and grid.areas.sum() == pytest.approx(240.0, rel=1e-13)
     assert grid.areas[grid.biomass].sum() == pytest.approx(60.0, rel=1e-13)
     assert meshes.l2_error(grid.points, grid.triangles, grid.points[:, 0], lambda x, y: x) < 1e-14
-    assert meshes.sample(grid.points, grid.triangles, grid.points, np.array([[1.5, 2.5]])) == pytest.approx(
-        np.array([[1.5, 2.5]]))
 
 
 def test_taylor_hood_holds_poiseuille_and_the_plug_exactly():

@@ -7,12 +7,12 @@ C27, C28: the concentrations' scale, and what Table 1 says of F and of the diffu
 
 C09, C18: times that follow from Table 1 alone, and those of the run.
 
-Mesh and time-step independence of `base`, and the strict variant of 2001 beside it.
+Mesh and time-step independence of `base`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import log
 
 import numpy as np
@@ -69,9 +69,8 @@ def effluents() -> Finding:
     found = [flux.effluent for flux in grown(BASE, PLOTTED)[1].fluxes]
     checks = tuple(printed(f"effluent {name} (K_s)", text, value, input=f"effluent_{name}")
                    for name, text, value in zip(SUBSTRATES, ("4.19", "6.13"), found))
-    plain, last = at(BASE, PLOTTED), at(BASE, END)
-    told = "; ".join("{}: {} and {}".format(when, *(f"{row[f'effluent_{name}_mg_per_L']:.3f}" for name in SUBSTRATES))
-                     for when, row in (("at 19.2 h", plain), ("after the expansion at 19.4 h", last)))
+    pair = "{effluent_acceptor_mg_per_L:.3f} and {effluent_donor_mg_per_L:.3f}".format
+    told = f"at 19.2 h: {pair(**at(BASE, PLOTTED))}; after the expansion at 19.4 h: {pair(**at(BASE, END))}"
     ratio = (SUPPLY - found[0]) / (SUPPLY - found[1])
     reason = (f"with the printed inputs {found[0]:.3f} and {found[1]:.3f} leave; acceptor over donor consumed is "
               f"{ratio:.3f}, the printed effluents make it {(SUPPLY - 4.19) / (SUPPLY - 6.13):.3f}, less than F [E14]")
@@ -243,9 +242,9 @@ def oxygen_demand(carbon: int, hydrogen: int, oxygen: int, nitrogen: int, molecu
 def effect_of_f() -> str:
     """Base at 19.2 h with F as computed: a run of its own, and the effluents in one and the same geometry."""
     ours, other = at(BASE, PLOTTED), at(F_OTHER, PLOTTED)
-    told = ", ".join(f"{name} {100 * (other[key] / ours[key] - 1):+.2f} %" for name, key in
-                     (("velocity", "mean_velocity_m_per_d"), ("area", "aggregate_area_um2"),
-                      *((f"effluent {name}", f"effluent_{name}_mg_per_L") for name in SUBSTRATES)))
+    columns = {"velocity": "mean_velocity_m_per_d", "area": "aggregate_area_um2",
+               "effluent acceptor": "effluent_acceptor_mg_per_L", "effluent donor": "effluent_donor_mg_per_L"}
+    told = ", ".join(f"{name} {100 * (other[key] / ours[key] - 1):+.2f} %" for name, key in columns.items())
     now, solved = solved_pore(BASE, PLOTTED)
     kinetics = replace(scene(*BASE).kinetics, acceptor_to_donor_ratio=F_COMPUTED)
     problem = replace(solved.problem, kinetics=kinetics)
@@ -315,76 +314,22 @@ def _scales(said) -> tuple[float, float, tuple[float, float], float]:
 
 
 TIMES = (0.0, 19.2, 19.4)
-NUMBERS = {"mean velocity (m/d)": "mean_velocity_m_per_d", "effluent acceptor (mg/L)": "effluent_acceptor_mg_per_L",
-           "effluent donor (mg/L)": "effluent_donor_mg_per_L", "inlet acceptor (mg/L)": "inlet_acceptor_mg_per_L",
-           "area (um2)": "aggregate_area_um2", "thickness (um)": "thickness_um", "inert fraction": "inert_fraction",
-           "meshed length (um)": "meshed_length_um"}
+#: What is halved of base in the paper's scheme, and by how many percent its velocity may then move.
+HALVED = {"time step": ('growth.time_step="6 min"', 0.5), "mesh size": ("numerics.refinement=2", 1.0)}
 
 
-def _changed(*changes: str) -> tuple[str, ...]:
-    return (*BASE, *changes, LAST)
-
-
-#: Element sizes twice, once and half those of base; steps likewise; the scheme of 2001.
-MESHES = {"size 2": _changed("numerics.refinement=0.5"), "size 1": BASE, "size 1/2": _changed("numerics.refinement=2")}
-UPDATES = {"24 min": _changed('growth.time_step="24 min"'), "12 min": BASE,
-           "6 min": _changed('growth.time_step="6 min"')}
-STRICT = _changed('numerics.transport="gear"', 'numerics.transfer="linear"', 'numerics.inlet="mean"')
-VARIANTS = {"base": BASE, "strict": STRICT}
-RUNS = tuple(dict.fromkeys([STRICT, *reversed(MESHES.values()), *UPDATES.values()]))
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """Base's numbers in several runs: names of the runs, and lines (quantity, their values, differences in percent of
-    each value from the one before)."""
-
-    title: str
-    runs: tuple[str, ...]
-    lines: tuple[tuple[str, tuple[float, ...], tuple[float, ...]], ...]
-
-
-Rows = dict[tuple[str, ...], dict[float, dict[str, float]]]
-
-
-def compare(title: str, runs: dict[str, tuple[str, ...]], rows: Rows) -> Comparison:
-    """Every number at every time in every run."""
-    lines = [_line(f"{name}, t = {time:g} h", [rows[run][time][column] for run in runs.values()])
-             for time in TIMES for name, column in NUMBERS.items()]
-    return Comparison(title, tuple(runs), tuple(lines))
-
-
-def _line(name: str, values: list[float]):
-    moved = tuple(100 * (b / a - 1) if a else 0.0 for a, b in zip(values, values[1:]))
-    return name, tuple(values), moved
-
-
-def rows_of(run: tuple[str, ...]) -> dict[float, dict[str, float]]:
-    """The rows of a run at TIMES."""
-    found = {time: at(run, time) for time in TIMES}
+def velocities(run: tuple[str, ...]) -> list[float]:
+    """Mean velocities (m/d) of a run at TIMES."""
+    found = [at(run, time)["mean_velocity_m_per_d"] for time in TIMES]
     forget(DEFAULT)
     return found
 
 
-def computed() -> Rows:
-    """The rows of all runs, a run a process."""
-    return dict(zip(RUNS, side_by_side(rows_of, list(RUNS))))
-
-
-def comparisons(rows: Rows) -> tuple[Comparison, ...]:
-    """Three mesh sizes, three time steps, and the strict variant against base."""
-    return (compare("Three mesh sizes, in those of base", MESHES, rows),
-            compare("Three steps between shape updates", UPDATES, rows),
-            compare("The strict variant of 2001 (gear, linear transfer, u_ave in (11)) against base", VARIANTS, rows))
-
-
-def checks(rows: Rows) -> tuple[PaperCheck, ...]:
-    """Halving the time step moves the velocity by less than 0.5 %, halving the mesh size by less than 1 %."""
-    return tuple(_halved(what, runs, time, bound, rows) for time in TIMES
-                 for what, runs, bound in (("time step", UPDATES, 0.5), ("mesh size", MESHES, 1.0)))
-
-
-def _halved(what: str, runs: dict[str, tuple[str, ...]], time: float, bound: float, rows: Rows) -> PaperCheck:
-    before, after = (rows[run][time]["mean_velocity_m_per_d"] for run in list(runs.values())[1:])
-    return at_most(f"halving the {what} moves the velocity at {time:g} h (%)", f"< {bound:g}",
-                   100 * abs(after / before - 1), bound, "set beforehand")
+def independence() -> tuple[PaperCheck, ...]:
+    """Halving the time step moves the velocity by less than 0.5 %, halving the mesh size by less than 1 %; a run a
+    process."""
+    before, *halved = side_by_side(velocities, [BASE, *((*BASE, change, LAST) for change, _ in HALVED.values())])
+    return tuple(at_most(f"halving the {what} moves the velocity at {time:g} h (%)", f"< {bound:g}",
+                         100 * abs(new / old - 1), bound, "set beforehand")
+                 for (what, (_, bound)), after in zip(HALVED.items(), halved)
+                 for time, old, new in zip(TIMES, before, after))

@@ -100,6 +100,11 @@ class Mutant:
     tests: tuple[str, ...] = ()
 
 
+def changes(file: str, *rows: tuple) -> tuple[Mutant, ...]:
+    """Mutants of one file, a row each: id, what is wrong then, the old text, the new one, and tests that catch it."""
+    return tuple(Mutant(id, file, *rest) for id, *rest in rows)
+
+
 class MutantError(RuntimeError):
     """A mutant cannot be applied, or what it does is no result."""
 

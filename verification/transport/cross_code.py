@@ -1,6 +1,7 @@
 """Substrates against other codes: steady and in time, in slabs, around biomass, and in a box that is well mixed.
 
-Dual Monod uptake in a slab under plug flow, steady: against scipy's collocation, and against FiPy's finite volumes.
+Dual Monod uptake in a slab under plug flow, steady: against scipy's collocation, which FiPy's steady profiles are
+judged by in the tests of the references.
 Peclet numbers u l / D_A are 0.1, 1 and 5. Thiele's modulus l sqrt(k F X / (K_A D_A)) is 0.6, 1.9 and 6; the last slab,
 at Peclet number 0.1, is starved: three ten-thousandths of the acceptor's supply leave it.
 
@@ -33,7 +34,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.integrate import solve_ivp
 from scipy.spatial import cKDTree
-from skfem import Basis, BilinearForm, ElementTriP2, ElementTriP3, MeshTri
+from skfem import Basis, BilinearForm, MeshTri
 
 from reference import channel_bvp, channel_fipy
 from reference import diffusion_reaction_pypde as pypde
@@ -44,7 +45,7 @@ from repro.fem.space import Space
 from repro.model import gear, kinetics, transport
 from repro.model.kinetics import Sink
 from verification.kernel.case import Profile, at_most, case, combined, refine, studies
-from verification.problems import meshes
+from verification.problems import meshes, runs
 from verification.problems.channels import (
     CROSSED,
     EXPECTED,
@@ -54,7 +55,6 @@ from verification.problems.channels import (
     SCENE,
     SLAB,
     WIDE,
-    along,
     apart,
     at_heights,
     both,
@@ -63,7 +63,6 @@ from verification.problems.channels import (
     following,
     length,
     pair,
-    pictured,
     problem,
     rates,
     sample,
@@ -71,6 +70,7 @@ from verification.problems.channels import (
     speed_of,
     steady,
 )
+from verification.problems.pairs import ELEMENTS
 
 LINEAR = {"linear": 1}
 HIGHER = {word: order for word, order in ORDERS.items() if order > 1}
@@ -116,8 +116,9 @@ FINER = {2: ({3.2: 12, 1.6: 6, 0.8: 3, 0.4: 1}, 1e-10, 1e-7), 3: ({6.4: 12, 3.2:
            "value; several meshes a size",
       claim="Dual Monod uptake under plug flow is solve_bvp's at Peclet 0.1, 1, 5 times Thiele numbers 0.6, 1.9, 6, "
             "from barely touched to starved",
-      mutants=("decay-demand", "ratio-on-the-donor-only", "reaction-in-the-fluid", "exchanged-substrates"),
-      over=combined(LINEAR, PECLETS, DENSITIES), because="orders 2, 3: transport-monod-higher")
+      mutants=("decay-demand", "no-inlet-flux", "ratio-on-the-donor-only", "reaction-in-the-fluid",
+               "exchanged-substrates"), over=combined(LINEAR, PECLETS, DENSITIES),
+      because="orders 2, 3: transport-monod-higher")
 @case("transport-monod-higher", kind="cross-code", slow=True,
       norm="root mean square over the mesh of both substrates less solve_bvp, over the supply",
       claim="Dual Monod uptake under plug flow on quadratic and cubic triangles is solve_bvp's, to third and fourth "
@@ -134,9 +135,6 @@ def collocation(order: int, peclet: float, density: float):
     else:
         samples, _, ceiling = FINER[order]
         yield studies(refine(_root_mean_square, samples, order, peclet, density), {"C": (*EXPECTED[order], ceiling)})
-        truth, ours, x = exact(peclet, density), found(1.6, 0, peclet, density, order, WIDE), np.linspace(*WIDE, 121)
-        yield pictured("along the channel", "x (um)", x, along(spaced(1.6, 0, order, WIDE), ours, x),
-                       ("solve_bvp", "exact", x[::6], truth(x[::6])))
 
 
 def _distances(size: float, number: int, peclet: float, density: float) -> dict[str, float]:
@@ -206,7 +204,6 @@ def finite_differences(shape: str, order: int, density: float, *ceilings: float)
         samples, why = (BLOCK, "both of second order") if shape == "block" else (dict.fromkeys(DISC, 1), CUT)
         rows = {name: (2, why, ceiling) for name, ceiling in zip(names, ceilings)}
         yield studies(refine(_as_long, samples, density, shape), rows)
-        yield _across(shape, min(samples), density)
     elif shape == "block":
         rows = {name: (2, "py-pde's second order", ceiling) for name, ceiling in zip(names, ceilings)}
         yield studies(refine(_at_rest, BLOCK, density, shape, order), rows, ", of py-pde less ours")
@@ -258,15 +255,6 @@ def _less(space: Space, state: transport.Concentrations, cell: float, density: f
     return {**_over_the_supply(ours - theirs), ITSELF: np.sqrt(np.mean(ratio**2))}
 
 
-def _across(shape: str, cell: float, density: float) -> Profile:
-    """Across the box, over the middle of the biomass."""
-    points, theirs, _ = _pypde(cell, density, shape)
-    made, sink_ = _diffusing(_spaced(cell, 0, shape), density)
-    on = points[:, 0] == points[points[:, 0] > 0, 0].min()
-    ours, y = sample(made.space, both(transport.steady(made, sink_)), points[on]), points[on, 1]
-    return pictured("x = 0", "y (um)", y, ours, ("py-pde", "reference", y, theirs[:, on]))
-
-
 LAW = replace(SCENE.kinetics, yield_coefficient=1e-12)
 #: h: 0.07, 0.2 and 0.7 s. Water diffuses across the slab in 0.6 s, and crosses it in 0.1 to 6 s.
 TIMES = (2e-5, 6e-5, 2e-4)
@@ -275,12 +263,8 @@ STEPS = (16, 32, 64, 128)
 #: FiPy's cells (um), half as long as these, and the elements of order 2 and 3 that they are compared with, whose error
 #: is less than a tenth of theirs.
 CELLS, FINE = (4.0, 2.5, 5 / 3, 1.0), {2: 1.0, 3: 5 / 3}
-#: Steady and in time: elements (um) with how many meshes of each, why orders are of second order, the last error of a
-#: density of linear elements, and that of FiPy's cells less those of order 2 and 3.
-AGAINST_FIPY = {
-    False: (SAMPLES, "both codes are of second order", {3e3: 1e-6, 3e4: 6e-6, 3e5: 5e-5}, 6e-6),
-    True: (dict(zip(CELLS, (4, 3, 2, 1))), "both codes are of second order; the error in time is a tenth",
-           {3e3: 3e-6, 3e4: 3e-5, 3e5: 3e-4}, 1e-5)}
+#: How many meshes of elements as long as FiPy's cells, and the last error of a density of linear elements.
+IN_SPACE, LAST = dict(zip(CELLS, (4, 3, 2, 1))), {3e3: 3e-6, 3e4: 3e-5, 3e5: 3e-4}
 
 
 @cache
@@ -291,7 +275,9 @@ def _assembled(size: float, number: int, peclet: float, order: int = 1) -> trans
 @cache
 def _ours(size: float, number: int, peclet: float, density: float, steps: int, order: int = 1) -> np.ndarray:
     """(times, 2, n): each interval in equal steps, started anew from the end of the last."""
-    made, states, last = _assembled(size, number, peclet, order), [], 0.0
+    made = _assembled(size, number, peclet, order)
+    states = []
+    last = 0.0
     active = filled(made.space, density)
     now = transport.supplied_everywhere(made)
     for time in TIMES:
@@ -312,8 +298,8 @@ def mass(space: Space) -> np.ndarray:
     if space.order == 1:
         return np.diag(space.lumped())
     straight = space.mesh.straight
-    grid = MeshTri(straight.points.T.copy(), straight.triangles.T.copy())
-    basis = Basis(grid, {2: ElementTriP2(), 3: ElementTriP3()}[space.order], intorder=8)
+    grid = MeshTri(straight.points.T.copy(), straight.triangles.T.copy())  # sorted, as edges of order 3 must be
+    basis = Basis(grid, ELEMENTS[space.order], intorder=8)
     apart, same = cKDTree(basis.doflocs.T).query(space.points)
     if apart.max() > 1e-9:
         raise ValueError("scikit-fem has its nodes elsewhere")
@@ -352,8 +338,7 @@ def _exact_in_time(size: float, number: int, peclet: float, density: float, orde
 
 def _largest(gap: np.ndarray) -> dict[str, float]:
     """The largest over the times of differences (times, 2, ...)."""
-    rows = [_over_the_supply(part) for part in gap]
-    return {name: max(row[name] for row in rows) for name in NAMES}
+    return runs.worst([_over_the_supply(part) for part in gap])
 
 
 #: Order, Peclet number and density of what is studied in time, elements (um), and the last error.
@@ -382,69 +367,49 @@ def _channel(size: float, peclet: float, density: float) -> channel_fipy.Channel
 
 
 @cache
-def _fipy(size: float, peclet: float, density: float, timed: bool) -> np.ndarray:
+def _fipy(size: float, peclet: float, density: float) -> np.ndarray:
     """(times, 2, n) at the centres of its cells."""
-    channel = _channel(size, peclet, density)
-    return channel.transient(TIMES) if timed else channel.steady()[None]
+    return _channel(size, peclet, density).transient(TIMES)
 
 
 def _at_cells(x, size: float, number: int, order: int, peclet: float, density: float, steps: float) -> np.ndarray:
-    """(times, 2, 5, n) ours at x, at five heights, in so many steps; steady where there are none."""
-    if steps:
-        states = _ours(size, number, peclet, density, round(steps), order)
-    else:
-        states = found(size, number, peclet, density, order)[None]
+    """(times, 2, 5, n) ours at x, at five heights, in so many steps."""
+    states = _ours(size, number, peclet, density, round(steps), order)
     return np.stack([at_heights(spaced(size, number, order), state, x) for state in states])
 
 
-def _rows(timed: bool) -> dict[str, tuple]:
-    rows = {**combined(LINEAR, PECLETS, DENSITIES), **combined(HIGHER, {"Pe = 1": 1.0}, {"X = 30000 mg/L": 3e4})}
-    return {label: (timed, *row) for label, row in rows.items()}
-
-
-@case("transport-monod-fipy", kind="cross-code",
-      norm="root mean square over FiPy's cells, at five heights, of each substrate over its supply, and in the starved "
-           "slab over its own value; several meshes a size",
-      claim="Dual Monod uptake under plug flow is FiPy's, both codes refined together, at Peclet 0.1, 1, 5 times "
-            "Thiele numbers 0.6, 1.9, 6, from barely touched to starved; that of quadratic and cubic elements, on one "
-            "mesh, is what FiPy's cells come to",
-      mutants=("decay-demand", "no-inlet-flux"), slow=True, over=_rows(False))
 @case("transport-gear-fipy", kind="cross-code",
       norm="largest over three times of the root mean square over FiPy's cells, at five heights, over the supply; "
            "several meshes a size",
       claim="Transient profiles of both substrates are FiPy's, both codes refined together in space, at Peclet 0.1, 1, "
             "5 times Thiele numbers 0.6, 1.9, 6; and refined in time, where FiPy's own scheme is of first order; those "
             "of quadratic and cubic elements, on one mesh, are what FiPy's cells come to",
-      mutants=("storage-of-the-biomass-alone", "storage-diagonal"), slow=True, over=_rows(True))
-def finite_volumes(timed: bool, order: int, peclet: float, density: float):
-    samples, why, ceilings, closest = AGAINST_FIPY[timed]
+      mutants=("storage-of-the-biomass-alone", "storage-diagonal"), slow=True,
+      over={**combined(LINEAR, PECLETS, DENSITIES), **combined(HIGHER, {"Pe = 1": 1.0}, {"X = 30000 mg/L": 3e4})})
+def finite_volumes(order: int, peclet: float, density: float):
     if order > 1:
-        errors = refine(_to_fipy, CELLS, order, peclet, density, timed)
-        yield studies(errors, each(2, "FiPy's second order", closest), " of FiPy less ours")
+        errors = refine(_to_fipy, CELLS, order, peclet, density)
+        yield studies(errors, each(2, "FiPy's second order", 1e-5), " of FiPy less ours")
         return
-    errors = refine(_from_fipy, samples, peclet, density, timed)
-    yield studies(errors, each(2, why, ceilings[density]))
-    if not timed and (peclet, density) == STARVED:
-        yield studies(errors, {ITSELF_STARVED: (2, why, 6e-4)})
-    if timed and (peclet, density) == SHARED:
+    yield studies(refine(_from_fipy, IN_SPACE, peclet, density),
+                  each(2, "both codes are of second order; the error in time is a tenth", LAST[density]))
+    if (peclet, density) == SHARED:
         errors = refine(_from_backward_euler, STEPS, peclet, density)
         yield studies(errors, each(1, "the lower of the two: FiPy's TransientTerm is backward Euler", 3e-4),
                       " less FiPy's in as many steps")
-    yield _course(min(samples), peclet, density, timed)
+        yield _course(CELLS[-1], peclet, density)
 
 
-def _from_fipy(size: float, number: int, peclet: float, density: float, timed: bool) -> dict[str, float]:
-    """Both codes refined together; in the starved slab C_A over itself."""
-    x, theirs = _channel(size, peclet, density).x, _fipy(size, peclet, density, timed)
-    ours, inside = _at_cells(x, size, number, 1, peclet, density, timed * STEPS[-1] / size), (x > 0) & (x < SLAB)
-    ratio = ours[-1, 0][:, inside] / theirs[-1, 0, inside]
-    return {**_largest(ours - theirs[:, :, None]), ITSELF_STARVED: np.sqrt(np.mean((ratio - 1) ** 2))}
+def _from_fipy(size: float, number: int, peclet: float, density: float) -> dict[str, float]:
+    """Both codes refined together."""
+    x, theirs = _channel(size, peclet, density).x, _fipy(size, peclet, density)
+    return _largest(_at_cells(x, size, number, 1, peclet, density, STEPS[-1] / size) - theirs[:, :, None])
 
 
-def _to_fipy(cells: float, order: int, peclet: float, density: float, timed: bool) -> dict[str, float]:
+def _to_fipy(cells: float, order: int, peclet: float, density: float) -> dict[str, float]:
     """FiPy's cells against one mesh of quadratic or cubic elements."""
-    x, theirs = _channel(cells, peclet, density).x, _fipy(cells, peclet, density, timed)
-    ours = _at_cells(x, FINE[order], 0, order, peclet, density, timed * STEPS[-1])
+    x, theirs = _channel(cells, peclet, density).x, _fipy(cells, peclet, density)
+    ours = _at_cells(x, FINE[order], 0, order, peclet, density, STEPS[-1])
     return {"size": cells, **_largest(ours - theirs[:, :, None])}
 
 
@@ -455,15 +420,13 @@ def _from_backward_euler(steps: int, peclet: float, density: float) -> dict[str,
     return {"size": TIMES[0] / steps, **_largest(ours - channel.backward_euler(TIMES, steps)[:, :, None])}
 
 
-def _course(size: float, peclet: float, density: float, timed: bool) -> Profile:
-    """Along the channel, at each time; steady with what solve_bvp finds."""
+def _course(size: float, peclet: float, density: float) -> Profile:
+    """Along the channel, at each time."""
     x, curves = _channel(size, peclet, density).x, []
-    ours = _at_cells(x, size, 0, 1, peclet, density, timed * STEPS[-1])[:, :, 2]
-    for one, theirs in zip(ours, _fipy(size, peclet, density, timed)):
-        curves += pictured("", "", x, one, ("FiPy", "reference", x, theirs)).curves
-    if not timed:
-        truth = exact(peclet, density)(x[::12])
-        curves += [(f"{name}, solve_bvp", "exact", x[::12], part) for name, part in zip(NAMES, truth)]
+    ours = _at_cells(x, size, 0, 1, peclet, density, STEPS[-1])[:, :, 2]
+    for one, theirs in zip(ours, _fipy(size, peclet, density)):
+        for k, name in enumerate(NAMES):
+            curves += [(name, "ours", x, one[k]), (f"{name}, FiPy", "reference", x, theirs[k])]
     return Profile("along the channel", "x (um)", "C (mg/L)", tuple(curves))
 
 
@@ -506,10 +469,14 @@ def _mixed_ours(step: float, order: int) -> np.ndarray:
     made = transport.problem(box_around(order), None, CLOSED, SLOW_LAW)
     weight = made.space.reaction.dx
     active = SEEDED * weight
-    inert, now, rows = 0 * active, transport.supplied_everywhere(made), []
+    inert = 0 * active
+    now = transport.supplied_everywhere(made)
+    rows = []
     for interval in np.diff([0.0, *HALF_DAYS]):
         done = gear.advance(made, active, inert, now, interval, fixed_step=step)
-        active, inert, now = done.active, done.inert, done.concentrations
+        active = done.active
+        inert = done.inert
+        now = done.concentrations
         fields = (now.acceptor, now.donor, active / weight, inert / weight)
         rows.append([(field.mean(), np.ptp(field)) for field in fields])
     return np.array(rows)
@@ -549,8 +516,6 @@ def followed(order: int):
     if order == 1:
         yield at_most("X at constant C, 12 min steps", _constant_supply(), 1e-9,
                       "(9)-(10) are integrated exactly: round-off of 600 steps, and scipy's 1e-11")
-        yield _days("substrates", "C (mg/L)", (0, 1))
-        yield _days("biomass", "X (mg/L)", (2, 3))
 
 
 def _constant_supply() -> float:
@@ -564,13 +529,3 @@ def _constant_supply() -> float:
     found = solve_ivp(lambda t, y: growing(acceptor, donor, y[0]), (0, HALF_DAYS[-1]), [3e4, 0.0], rtol=1e-12,
                       atol=1e-8, method="DOP853").y[:, -1]
     return float(np.abs(np.array([active, inert]) / found - 1).max())
-
-
-def _days(title: str, label: str, chosen: tuple[int, int]) -> Profile:
-    """Two of the four against time."""
-    times, names = np.linspace(0.5, HALF_DAYS[-1], 121), [*MIXED]
-    trusted, ours, curves = _theirs(times, 1), _mixed_ours(MIXED_STEPS[-1], 1)[:, :, 0], []
-    for k in chosen:
-        curves += [(names[k], "ours", HALF_DAYS, ours[:, k]),
-                   (f"{names[k]}, solve_ivp", "reference", times, trusted[:, k])]
-    return Profile(title, "time (h)", label, tuple(curves))
