@@ -1,7 +1,6 @@
 """Substrates against other codes: steady and in time, in slabs, around biomass, and in a box that is well mixed.
 
-Dual Monod uptake in a slab under plug flow, steady: against scipy's collocation, which FiPy's steady profiles are
-judged by in the tests of the references.
+Dual Monod uptake in a slab under plug flow, steady: against scipy's collocation, and against FiPy's finite volumes.
 Peclet numbers u l / D_A are 0.1, 1 and 5. Thiele's modulus l sqrt(k F X / (K_A D_A)) is 0.6, 1.9 and 6; the last slab,
 at Peclet number 0.1, is starved: three ten-thousandths of the acceptor's supply leave it.
 
@@ -263,8 +262,12 @@ STEPS = (16, 32, 64, 128)
 #: FiPy's cells (um), half as long as these, and the elements of order 2 and 3 that they are compared with, whose error
 #: is less than a tenth of theirs.
 CELLS, FINE = (4.0, 2.5, 5 / 3, 1.0), {2: 1.0, 3: 5 / 3}
-#: How many meshes of elements as long as FiPy's cells, and the last error of a density of linear elements.
-IN_SPACE, LAST = dict(zip(CELLS, (4, 3, 2, 1))), {3e3: 3e-6, 3e4: 3e-5, 3e5: 3e-4}
+#: Steady and in time: elements (um) with how many meshes of each, why orders are of second order, the last error of a
+#: density of linear elements, and that of FiPy's cells less those of order 2 and 3.
+AGAINST_FIPY = {
+    False: (SAMPLES, "both codes are of second order", {3e3: 1e-6, 3e4: 6e-6, 3e5: 5e-5}, 6e-6),
+    True: (dict(zip(CELLS, (4, 3, 2, 1))), "both codes are of second order; the error in time is a tenth",
+           {3e3: 3e-6, 3e4: 3e-5, 3e5: 3e-4}, 1e-5)}
 
 
 @cache
@@ -367,49 +370,69 @@ def _channel(size: float, peclet: float, density: float) -> channel_fipy.Channel
 
 
 @cache
-def _fipy(size: float, peclet: float, density: float) -> np.ndarray:
+def _fipy(size: float, peclet: float, density: float, timed: bool) -> np.ndarray:
     """(times, 2, n) at the centres of its cells."""
-    return _channel(size, peclet, density).transient(TIMES)
+    channel = _channel(size, peclet, density)
+    return channel.transient(TIMES) if timed else channel.steady()[None]
 
 
 def _at_cells(x, size: float, number: int, order: int, peclet: float, density: float, steps: float) -> np.ndarray:
-    """(times, 2, 5, n) ours at x, at five heights, in so many steps."""
-    states = _ours(size, number, peclet, density, round(steps), order)
+    """(times, 2, 5, n) ours at x, at five heights, in so many steps; steady where there are none."""
+    if steps:
+        states = _ours(size, number, peclet, density, round(steps), order)
+    else:
+        states = found(size, number, peclet, density, order)[None]
     return np.stack([at_heights(spaced(size, number, order), state, x) for state in states])
 
 
+def _rows(timed: bool) -> dict[str, tuple]:
+    rows = {**combined(LINEAR, PECLETS, DENSITIES), **combined(HIGHER, {"Pe = 1": 1.0}, {"X = 30000 mg/L": 3e4})}
+    return {label: (timed, *row) for label, row in rows.items()}
+
+
+@case("transport-monod-fipy", kind="cross-code",
+      norm="root mean square over FiPy's cells, at five heights, of each substrate over its supply, and in the starved "
+           "slab over its own value; several meshes a size",
+      claim="Dual Monod uptake under plug flow is FiPy's, both codes refined together, at Peclet 0.1, 1, 5 times "
+            "Thiele numbers 0.6, 1.9, 6, from barely touched to starved; that of quadratic and cubic elements, on one "
+            "mesh, is what FiPy's cells come to",
+      mutants=("decay-demand", "no-inlet-flux"), slow=True, over=_rows(False))
 @case("transport-gear-fipy", kind="cross-code",
       norm="largest over three times of the root mean square over FiPy's cells, at five heights, over the supply; "
            "several meshes a size",
       claim="Transient profiles of both substrates are FiPy's, both codes refined together in space, at Peclet 0.1, 1, "
             "5 times Thiele numbers 0.6, 1.9, 6; and refined in time, where FiPy's own scheme is of first order; those "
             "of quadratic and cubic elements, on one mesh, are what FiPy's cells come to",
-      mutants=("storage-of-the-biomass-alone", "storage-diagonal"), slow=True,
-      over={**combined(LINEAR, PECLETS, DENSITIES), **combined(HIGHER, {"Pe = 1": 1.0}, {"X = 30000 mg/L": 3e4})})
-def finite_volumes(order: int, peclet: float, density: float):
+      mutants=("storage-of-the-biomass-alone", "storage-diagonal"), slow=True, over=_rows(True))
+def finite_volumes(timed: bool, order: int, peclet: float, density: float):
+    samples, why, ceilings, closest = AGAINST_FIPY[timed]
     if order > 1:
-        errors = refine(_to_fipy, CELLS, order, peclet, density)
-        yield studies(errors, each(2, "FiPy's second order", 1e-5), " of FiPy less ours")
+        errors = refine(_to_fipy, CELLS, order, peclet, density, timed)
+        yield studies(errors, each(2, "FiPy's second order", closest), " of FiPy less ours")
         return
-    yield studies(refine(_from_fipy, IN_SPACE, peclet, density),
-                  each(2, "both codes are of second order; the error in time is a tenth", LAST[density]))
-    if (peclet, density) == SHARED:
+    errors = refine(_from_fipy, samples, peclet, density, timed)
+    yield studies(errors, each(2, why, ceilings[density]))
+    if not timed and (peclet, density) == STARVED:
+        yield studies(errors, {ITSELF_STARVED: (2, why, 6e-4)})
+    if timed and (peclet, density) == SHARED:
         errors = refine(_from_backward_euler, STEPS, peclet, density)
         yield studies(errors, each(1, "the lower of the two: FiPy's TransientTerm is backward Euler", 3e-4),
                       " less FiPy's in as many steps")
-        yield _course(CELLS[-1], peclet, density)
+    yield _course(min(samples), peclet, density, timed)
 
 
-def _from_fipy(size: float, number: int, peclet: float, density: float) -> dict[str, float]:
-    """Both codes refined together."""
-    x, theirs = _channel(size, peclet, density).x, _fipy(size, peclet, density)
-    return _largest(_at_cells(x, size, number, 1, peclet, density, STEPS[-1] / size) - theirs[:, :, None])
+def _from_fipy(size: float, number: int, peclet: float, density: float, timed: bool) -> dict[str, float]:
+    """Both codes refined together; in the starved slab C_A over itself."""
+    x, theirs = _channel(size, peclet, density).x, _fipy(size, peclet, density, timed)
+    ours, inside = _at_cells(x, size, number, 1, peclet, density, timed * STEPS[-1] / size), (x > 0) & (x < SLAB)
+    ratio = ours[-1, 0][:, inside] / theirs[-1, 0, inside]
+    return {**_largest(ours - theirs[:, :, None]), ITSELF_STARVED: np.sqrt(np.mean((ratio - 1) ** 2))}
 
 
-def _to_fipy(cells: float, order: int, peclet: float, density: float) -> dict[str, float]:
+def _to_fipy(cells: float, order: int, peclet: float, density: float, timed: bool) -> dict[str, float]:
     """FiPy's cells against one mesh of quadratic or cubic elements."""
-    x, theirs = _channel(cells, peclet, density).x, _fipy(cells, peclet, density)
-    ours = _at_cells(x, FINE[order], 0, order, peclet, density, STEPS[-1])
+    x, theirs = _channel(cells, peclet, density).x, _fipy(cells, peclet, density, timed)
+    ours = _at_cells(x, FINE[order], 0, order, peclet, density, timed * STEPS[-1])
     return {"size": cells, **_largest(ours - theirs[:, :, None])}
 
 
@@ -420,11 +443,11 @@ def _from_backward_euler(steps: int, peclet: float, density: float) -> dict[str,
     return {"size": TIMES[0] / steps, **_largest(ours - channel.backward_euler(TIMES, steps)[:, :, None])}
 
 
-def _course(size: float, peclet: float, density: float) -> Profile:
+def _course(size: float, peclet: float, density: float, timed: bool) -> Profile:
     """Along the channel, at each time."""
     x, curves = _channel(size, peclet, density).x, []
-    ours = _at_cells(x, size, 0, 1, peclet, density, STEPS[-1])[:, :, 2]
-    for one, theirs in zip(ours, _fipy(size, peclet, density)):
+    ours = _at_cells(x, size, 0, 1, peclet, density, timed * STEPS[-1])[:, :, 2]
+    for one, theirs in zip(ours, _fipy(size, peclet, density, timed)):
         for k, name in enumerate(NAMES):
             curves += [(name, "ours", x, one[k]), (f"{name}, FiPy", "reference", x, theirs[k])]
     return Profile("along the channel", "x (um)", "C (mg/L)", tuple(curves))
