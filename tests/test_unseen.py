@@ -5,46 +5,55 @@ import io
 import json
 import re
 import shutil
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
 import matplotlib.pyplot as plt
 import numpy as np
-import pint
 import pytest
 from scipy.spatial import Delaunay
 
 import repro
-from repro import results
+from repro import results, timing
 from repro.check import cost, numbers
 from repro.check.modelled import modelled
 from repro.errors import BalanceError, Unresolved
-from repro.fem.space import Space
 from repro.march import balance, stepping, updates
 from repro.march.loop import Instant, Ledger
-from repro.model.pore import Solved, resolution, seeded, solve
 from repro.model import gear, mesh_motion, remeshing, traction, transport
+from repro.model.pore import Solved, resolution, seeded, solve
 from repro.model.transport import Fluxes
 from repro.report import comparison, quantities
 from repro.report.reading import Run
 from repro.results import picture
-from repro.results.quantities import UNITS
+from repro.run import running
+from repro.run.recorder import Recorder
 from repro.scene import load_scene
+from repro.sweep import page, table
+from repro.sweep.design import grid, parse, points
+from repro.sweep.state import Sweep
 from tests import oracles
 from tests.pages import whole_of
 from tests.strategies import ORDERS, constants
 from tests.test_derived import EVERY_ORDER, arcs, over_end, places_of
 
 NOTHING = Solved(None, None, None)
-#: A step whose substrates and biomass balance, and its two substrates differ.
+#: A step whose substrates balance; they differ.
 EVEN = Ledger(0.0, 1.0, (5.0, 3.0), (1.0, 1.5), (4.0, 1.5), (0.0, 0.0), 70.0, 10.0, 80.0)
+UNLIKE = ['substrates.acceptor.supply="9 mg/L"', 'substrates.donor.supply="4 mg/L"', "numerics.refinement=0.3"]
+
+
+def base(order, *changes, unset=()):
+    """(scene, its seed) with coarse elements of an order, and supplies that differ."""
+    scene = load_scene("base", [*UNLIKE, f"numerics.elements={ORDERS[order]}", *changes], unset)
+    return scene, seeded(scene)
 
 
 def bulging(order):
     """The seed of base, swollen and leaning downstream, so that neither its ends nor its top are at nodes."""
-    scene = load_scene("base", [f"numerics.elements={ORDERS[order]}", "numerics.refinement=0.5"])
-    now = seeded(scene)
+    scene, now = base(order, "numerics.refinement=0.5")
     x, y = now.mesh.points.T
     near = np.exp(-(x**2 + y**2) / 100)
     return scene, now.moved(np.column_stack([(x * (1 + 0.2 * y) + 0.1 * y) * near + x * (1 - near),
@@ -83,14 +92,10 @@ def test_biomass_is_told_of_a_scene_that_does_not_grow():
     assert told == pytest.approx([0.3, 1.0, 1.0], rel=1e-12) and row["biomass_balance"] is None
 
 
-UNLIKE = ['substrates.acceptor.supply="9 mg/L"', 'substrates.donor.supply="4 mg/L"', "numerics.refinement=0.3"]
-
-
 @pytest.mark.parametrize("k, name", [(0, "acceptor"), (1, "donor")])
 def test_each_substrates_defect_is_over_its_own_terms(k, name):
     """Of a row's own fluxes without a step, and with Gear over what the meshed part holds at the supply."""
-    scene = load_scene("base", UNLIKE)
-    now = seeded(scene)
+    scene, now = base(1)
     solved = solve(scene, now)
     fluxes = [Fluxes(5.0, 1.0, 4.0, 9.0, 8.0), Fluxes(3.0, 1.5, 1.5, 4.0, 3.0)]
     fluxes[k] = replace(fluxes[k], out=fluxes[k].out - 0.06)
@@ -98,13 +103,10 @@ def test_each_substrates_defect_is_over_its_own_terms(k, name):
     row = results.row(scene, Instant(now, replace(solved, fluxes=tuple(fluxes)), None, (), 0, {}))
     wanted = lacking | {f"{name}_balance": 0.06 / fluxes[k].supplied}
     assert {key: row[key] for key in wanted} == pytest.approx(wanted, rel=1e-9, abs=1e-12)
-
-    gear_scene = load_scene("base", [*UNLIKE, "numerics.transport=gear"])
-    stored = [0.0, 0.0]
-    stored[k] = -7.0
-    row = results.row(gear_scene, Instant(now, solved, None, (replace(EVEN, stored=tuple(stored)),), 0, {}))
-    first, last = now.mesh.ends
-    held = getattr(gear_scene.substrates, name).supply * (last - first) * gear_scene.pore.width
+    scene = load_scene("base", [*UNLIKE, "numerics.transport=gear"])
+    step = replace(EVEN, stored=tuple(-7.0 * (each == k) for each in (0, 1)))
+    row = results.row(scene, Instant(now, solved, None, (step,), 0, {}))
+    held = getattr(scene.substrates, name).supply * np.ptp(now.mesh.ends) * scene.pore.width
     wanted = lacking | {f"{name}_balance": 7.0 / held}
     assert {key: row[key] for key in wanted} == pytest.approx(wanted, rel=1e-9, abs=1e-12)
 
@@ -114,11 +116,8 @@ def test_stress_is_told_only_of_strain_since_the_start(order):
     """New biomass that is born stress-free has none to tell; what is known besides stays."""
     found = {}
     for born in ("stressed", "stress_free"):
-        scene = load_scene("base", [f"numerics.elements={ORDERS[order]}", f"growth.new_biomass={born}",
-                                    "numerics.refinement=0.3"])
-        now = seeded(scene)
-        grid = results.fields(scene, now, NOTHING)
-        found[born] = {*grid.point_data, *grid.cell_data}
+        made = results.fields(*base(order, f"growth.new_biomass={born}"), NOTHING)
+        found[born] = {*made.point_data, *made.cell_data}
     of_stress = {name for name in found["stressed"] if name.endswith("_MPa")}
     assert len(of_stress) == 6 and found["stress_free"] == found["stressed"] - of_stress
     assert {"theta", "J", "displacement_um"} <= found["stress_free"]
@@ -136,22 +135,6 @@ def test_times_of_fields_keep_every_digit(time, tmp_path):
     assert entry.get("Name") == "TimeValue" and float(entry.text) == time
 
 
-#: What the package's own units are of the units that names end in.
-OWN = {"_m_per_d": "um/h", "_mg_per_L": "mg/L", "_pg_per_m": "pg/m", "_ug_per_m": "pg/m", "_ug_per_m_per_h": "pg/m/h",
-       "_um2": "um^2", "_um": "um", "_cm": "um", "_h": "h", "_s": "s", "_MPa": "MPa"}
-
-
-def test_units_are_what_their_factors_make_of_the_packages_own():
-    """By pint: as UDUNITS writes them, "m d-1", and as a reader does."""
-    registry = pint.UnitRegistry()
-    assert OWN.keys() == UNITS.keys()
-    for ending, own in OWN.items():
-        of = UNITS[ending]
-        powers = re.sub(r"([a-zA-Z])(-?[0-9])", r"\1**\2", of.udunits).replace(" ", "*")
-        for text in (powers, of.shown.replace("²", "**2")):
-            assert registry.Quantity(1, own).to(text).magnitude == pytest.approx(of.factor, rel=1e-12), ending
-
-
 LEAKY = {"acceptor": ("out", 0), "donor": ("out", 1), "biomass": ("biomass_after", None)}
 
 
@@ -159,21 +142,17 @@ LEAKY = {"acceptor": ("out", 0), "donor": ("out", 1), "biomass": ("biomass_after
 @pytest.mark.parametrize("transfer", ["conserving", "bounded"])
 def test_a_step_that_lacks_a_millionth_stops_the_run(transfer, part):
     """Whichever transfer conserves; the linear one's loss of biomass alone is stated [E8]."""
-    scene = load_scene("base", [f"numerics.transfer={transfer}"])
+    scene, now = base(1, f"numerics.transfer={transfer}")
     law = scene.kinetics
     grown = law.yield_coefficient * EVEN.consumed[1]
     spent = (EVEN.consumed[0] - law.acceptor_to_donor_ratio * EVEN.consumed[1]) / law.decay_oxygen_demand
     even = replace(EVEN, biomass_made=grown - spent, biomass_after=EVEN.biomass_before + grown - spent)
-    balance.refuse(scene, None, even)
+    balance.refuse(scene, now, even)
     key, k = LEAKY[part]
     value = getattr(even, key)
     more = value * (1 + 2e-5) if k is None else tuple(one + 1e2 * (i == k) for i, one in enumerate(value))
     with pytest.raises(BalanceError, match=f"of the {part}"):
-        balance.refuse(scene, now_of(scene), replace(even, **{key: more}))
-
-
-def now_of(scene):
-    return seeded(replace(scene, numerics=replace(scene.numerics, refinement=0.3)))
+        balance.refuse(scene, now, replace(even, **{key: more}))
 
 
 def test_a_picture_has_upstream_on_the_left_and_the_upper_wall_above():
@@ -185,9 +164,8 @@ def test_a_picture_has_upstream_on_the_left_and_the_upper_wall_above():
              "region": ((middle[:, 0] < 0) & (middle[:, 1] < 10)).astype(float)}
     pixels = plt.imread(io.BytesIO(picture.png(shown, x + 3 * y)))[..., :3]
     bright = pixels.sum(axis=2)
-    corners = {"below upstream": bright[-1, 0], "below downstream": bright[-1, -1], "above upstream": bright[0, 0],
-               "above downstream": bright[0, -1]}
-    assert list(corners.values()) == sorted(corners.values())
+    below, above = (bright[row, [0, -1]].tolist() for row in (-1, 0))
+    assert below + above == sorted(below + above)
     rows, columns = np.argwhere((pixels == 1).all(axis=2)).T
     height, width = bright.shape
     assert rows.min() > 0.45 * height and rows.max() == height - 1
@@ -205,9 +183,7 @@ def test_key_figures_tell_first_and_last_values_and_the_first_contact():
 @EVERY_ORDER
 def test_without_flow_the_ends_are_means_over_their_height(order):
     """Of fields that are no plane, inlet and outlet apart, by Gauss's rule along each end."""
-    closed = ["numerics.transport=gear", "substrates.boundary=closed", f"numerics.elements={ORDERS[order]}"]
-    scene = load_scene("base", [*UNLIKE, *closed], unset=["flow"])
-    now = seeded(scene)
+    scene, now = base(order, "numerics.transport=gear", "substrates.boundary=closed", unset=["flow"])
     x, y = places_of(now.space).T
     fields = [2 + np.sin(y / 7) + 0.01 * x, 5 + np.cos(y / 9) - 0.02 * x]
     made = transport.problem(now.space, None, scene.substrates, scene.kinetics)
@@ -221,18 +197,16 @@ def test_without_flow_the_ends_are_means_over_their_height(order):
 def test_a_concentration_may_leave_its_bounds_by_as_much_as_is_said(order):
     """Steady or with Gear's method: below zero by a thousandth of the supply, above it, with curved elements, by a
     fiftieth; each substrate by its own."""
-    scene = load_scene("base", [*UNLIKE, f"numerics.elements={ORDERS[order]}"])
-    made = transport.problem(Space(seeded(scene).mesh, order), None, scene.substrates, scene.kinetics)
-    assert gear._lowest(made) == pytest.approx(0.0 if order == 1 else -9e-3, rel=1e-12)
+    scene, now = base(order)
+    made = transport.problem(now.space, None, scene.substrates, scene.kinetics)
+    assert gear._lowest(made)[:, 0] == pytest.approx([0.0, 0.0] if order == 1 else [-9e-3, -4e-3], rel=1e-12)
     for k, supply in enumerate((9.0, 4.0)):
         for part, accepted in ((-9e-4, True), (-1.1e-3, False), (1.019, True), (1.021, order == 1)):
             state = made.supply.copy()
             state[k * made.space.count + 7] = part * supply
-            if accepted:
+            refused = pytest.raises(Unresolved, match=("acceptor", "donor")[k])
+            with nullcontext() if accepted else refused:
                 transport._checked(made, state, 1)
-            else:
-                with pytest.raises(Unresolved, match=("acceptor", "donor")[k]):
-                    transport._checked(made, state, 1)
 
 
 @pytest.mark.parametrize("status", ["interrupted", "failed: out of memory", "the aggregate reaches the pore's end"])
@@ -255,8 +229,7 @@ def test_memory_and_time_are_expected_to_grow_with_the_mesh():
 @pytest.mark.parametrize("start", [0.1, 0.3, 0.7, 1.1, 2.3, 19.1])
 def test_a_step_ends_at_a_jump_to_the_last_bit(start):
     """Wherever it began, so that what holds after it is the new value."""
-    scene = load_scene("base", ["numerics.preset=fast", "numerics.refinement=0.1"])
-    now = replace(seeded(scene), time=start)
+    now = replace(base(1)[1], time=start)
     rounded = 0
     for corner in start + np.arange(1, 50) / 7:
         for left in (corner - start) * np.array([1 - 4e-16, 1.0, 1 + 4e-16]):
@@ -266,10 +239,9 @@ def test_a_step_ends_at_a_jump_to_the_last_bit(start):
     assert rounded, "else nothing is put right"
 
 
-def uneven(order, *changes):
+def uneven(order):
     """(scene, pore, what is solved) with masses that differ from X_m from point to point."""
-    scene = load_scene("base", [*UNLIKE, f"numerics.elements={ORDERS[order]}", *changes])
-    now = seeded(scene)
+    scene, now = base(order)
     part = np.random.default_rng(order).uniform(0.7, 1.2, now.active.shape)
     now = replace(now, active=0.6 * part * now.active, inert=0.3 * now.active, theta=1.5 * now.theta)
     return scene, now, solve(scene, now)
@@ -321,9 +293,8 @@ def test_the_expansion_grows_with_the_mass_there_is(order):
 def test_beyond_the_old_mesh_there_is_what_flows_or_diffuses_there(speed, order):
     """Upstream the decay of (26) with each substrate's own diffusivity, downstream what leaves; without flow the supply
     at either end."""
-    scene = load_scene("base", [*UNLIKE, f"numerics.elements={ORDERS[order]}"])
-    old = seeded(scene).space
-    new = seeded(load_scene("base", [*UNLIKE, f"numerics.elements={ORDERS[order]}", "numerics.extent=full"])).space
+    scene, old = base(order)[0], base(order)[1].space
+    new = base(order, "numerics.extent=full")[1].space
     state = transport.Concentrations(3 + 0.01 * places_of(old)[:, 0], 2 - 0.02 * places_of(old)[:, 0])
     found = remeshing.carried_substrates(scene, old, new, state, speed)
     x, (first, last) = places_of(new)[:, 0], old.mesh.ends
@@ -385,8 +356,8 @@ def test_runs_are_compared_under_their_own_names_with_signs():
         assert [line.label for line in chart.lines] == labels, chart.title
         last = [line.values[-1] for line in chart.lines if len(line.values)]
         assert not last or np.isnan(last).any() or np.abs(np.divide(last, last[0]) - [1, 1.5, 0.5]).max() < 1e-9
-    page = comparison.build(runs)
-    (row,) = re.findall("<tr><td>upstream end of the aggregate.*?</tr>", page)
+    made = comparison.build(runs)
+    (row,) = re.findall("<tr><td>upstream end of the aggregate.*?</tr>", made)
     assert re.findall('class="value">([^<]*)<', row) == ["-8", "-12", "-50 %", "-4", "+50 %"]
 
 
@@ -400,22 +371,20 @@ def test_the_mesh_moves_with_the_scenes_own_constants(order, monkeypatch):
         return move(*given, **named)
 
     monkeypatch.setattr(mesh_motion, "move", noted)
-    scene = load_scene("base", [f"numerics.elements={ORDERS[order]}", "numerics.mesh_compressibility=3",
-                                "numerics.refinement=0.3", "numerics.flow_stabilisation=40"])
-    now = seeded(scene)
-    points = now.mesh.points.copy()
-    points[now.mesh.body] *= 1.01
-    assert remeshing.followed(scene, now, now.moved(points)) is not None
-    traction.forces(scene, traction.surroundings(scene, now, now), now.moved(points))
+    scene, now = base(order, "numerics.mesh_compressibility=3", "numerics.flow_stabilisation=40")
+    places = now.mesh.points.copy()
+    places[now.mesh.body] *= 1.01
+    assert remeshing.followed(scene, now, now.moved(places)) is not None
+    traction.forces(scene, traction.surroundings(scene, now, now), now.moved(places))
     assert [(one["compressibility"], one["stabilisation"]) for one in seen] == [(3.0, 40.0)] * 2
 
 
 @EVERY_ORDER
 def test_a_mesh_is_left_where_its_edges_are_too_long_for_a_film(order):
     """The same shape, over which a film of 2.5 um is left, on a mesh made for elements three times as large."""
-    wanted = [f"numerics.elements={ORDERS[order]}", 'pore.width="20 um"', 'aggregate.radius="17.5 um"']
-    coarse, fine = (load_scene("base", [*wanted, f"numerics.refinement={part}"]) for part in (0.6, 1.8))
-    now = seeded(coarse)
+    narrow = ('pore.width="20 um"', 'aggregate.radius="17.5 um"')
+    coarse, now = base(order, *narrow, "numerics.refinement=0.6")
+    fine = replace(coarse, numerics=replace(coarse.numerics, refinement=1.8))
     assert now.mesh.acceptable() and remeshing.followed(coarse, now, now) is not None
     assert remeshing.followed(fine, now, now) is None
 
@@ -423,10 +392,8 @@ def test_a_mesh_is_left_where_its_edges_are_too_long_for_a_film(order):
 @EVERY_ORDER
 def test_the_fluid_pushes_as_its_drive_does_at_the_time(order):
     """Forces go as the head of a table at the pore's time, after a jump as in a slope."""
-    table = '[["0 h", "1e-3 cm"], ["1 h", "4e-3 cm"], ["3 h", "2e-3 cm"]]'
-    scene = load_scene("base", [f"numerics.elements={ORDERS[order]}", "numerics.refinement=0.3",
-                                f"flow.head={table}", "flow.interpolation=linear"])
-    now = seeded(scene)
+    course = '[["0 h", "1e-3 cm"], ["1 h", "4e-3 cm"], ["3 h", "2e-3 cm"]]'
+    scene, now = base(order, f"flow.head={course}", "flow.interpolation=linear")
     around = traction.surroundings(scene, now, now)
     pushes = [traction.forces(scene, around, replace(now, time=time)) for time in (0.0, 1.0, 2.0, 5.0)]
     assert np.abs(pushes[0]).max() > 0
@@ -447,8 +414,58 @@ def test_what_slows_the_water_is_told_in_the_units_of_the_scene():
 def test_meshes_are_fine_enough_for_the_fastest_flow_to_come(key, values):
     """Those of curved elements, under a table as under its largest value from the start."""
     sets = ["numerics.preset=fast", "numerics.refinement=0.05"]
-    table = json.dumps([[f"{k} h", value] for k, value in enumerate(values)])
-    made = load_scene("base", [*sets, f"flow.{key}={table}"], unset=["flow.head"])
-    steady, slow = (load_scene("base", [*sets, f'flow.{key}="{value}"'], unset=["flow.head"])
-                    for value in (values[1], values[0]))
-    assert resolution(made) == resolution(steady) > 1.5 * resolution(slow)
+    course = json.dumps([[f"{k} h", value] for k, value in enumerate(values)])
+    slow, fast, over_time = (resolution(load_scene("base", [*sets, f"flow.{key}={value}"], unset=["flow.head"]))
+                             for value in (*values[:2], course))
+    assert over_time == fast > 1.5 * slow
+
+
+def test_clogged_runs_are_dots_at_their_time_and_others_stand_at_their_end(tmp_path):
+    """Of two runs over 8 h the first has clogged at 5 h."""
+    factors = [parse("pore.width=40 um, 50 um")]
+    found = points("flow_only", [], factors, grid(factors))
+    numbers_of = [{**dict.fromkeys(table.COLUMNS), "clogging_time_h": time} for time in (5.0, None)]
+    times, course = np.array([0.0, 8.0]), np.array([1.0, 0.2])
+    told = [table.Told(point, "completed", times, course, course, each) for point, each in zip(found, numbers_of)]
+    made = page.page(Sweep(tmp_path, "base", factors, found), told, 0.1)
+    (dot,) = re.findall("<circle [^>]*><title>([^<]*)", made)
+    (hollow,) = re.findall("<polygon [^>]*><title>([^<]*)", made)
+    assert dot.startswith("run 1") and dot.endswith(": 5 h")
+    assert hollow.startswith("run 2") and hollow.endswith(": after 8 h")
+
+
+def recorder_of(scene, folder):
+    folder.mkdir()
+    return Recorder(scene, folder)
+
+
+def test_times_by_stage_are_those_before_a_resume_and_since(tmp_path, monkeypatch):
+    monkeypatch.setattr(timing, "seconds", {"growth": 2.0, "transfer": 4.0})
+    one = recorder_of(load_scene("base"), tmp_path / "run")
+    one.record.stages, one.record.seconds = {"flow": 8.0, "growth": 16.0}, 1000.0
+    one.tell("running")
+    record = json.loads((tmp_path / "run" / "run.json").read_text())
+    assert record["wall_time_by_stage_s"] == {"flow": 8.0, "growth": 18.0, "transfer": 4.0}
+    assert 1000 < record["wall_time_s"] < 1100
+
+
+def test_a_longer_run_is_judged_by_its_first_velocity(tmp_path):
+    """Under a head the velocity falls as the pore clogs, and with it the numbers that are warned of."""
+    one = recorder_of(load_scene("base"), tmp_path / "run")
+    at = results.COLUMNS.index("mean_velocity_m_per_d")
+    one.record.rows = [[None] * at + [speed] for speed in (24.0, 2.4, 0.024)]
+    assert one.first_velocity == pytest.approx(1e6, rel=1e-12)
+
+
+@pytest.mark.parametrize("key", ["blas", "libc", "geos", "machine", "system", "source"])
+def test_a_resume_elsewhere_is_told(key, tmp_path, monkeypatch, recwarn):
+    """Whatever could change the numbers, but for threads, which do not."""
+    one = recorder_of(load_scene("flow_only"), tmp_path / "run")
+    one.tell("running")
+    before = json.loads((tmp_path / "run" / "run.json").read_text())
+    now = {**before["conditions"], "threads": {"OMP_NUM_THREADS": "7"}}
+    monkeypatch.setattr(running, "conditions", lambda: now)
+    assert running._changed(before, one, running.ALONE) == {} and not recwarn.list
+    now[key] = "another"
+    with pytest.warns(UserWarning, match=f"conditions.{key} .*now another"):
+        running._changed(before, one, running.ALONE)
