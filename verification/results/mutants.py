@@ -432,7 +432,7 @@ MUTANTS = (
            says="Meshes are as fine as the flow at t = 0 asks for, whatever a table says of later.",
            old='needed(scene.largest.flow, "[flow]")',
            new='needed(scene.at(0.0).flow, "[flow]")',
-           tests=(f"{UNSEEN}meshes_are_fine_enough_for_the_fastest_flow_to_come[head-values1]",)),
+           tests=(f"{UNSEEN}meshes_are_fine_enough_for_the_fastest_flow_to_come[head-um]",)),
     Mutant("floor-of-the-larger-supply", "repro/model/gear.py",
            says="Gear's method accepts less than nothing of a substrate by the larger of both supplies.",
            old="np.array([[-part * s.supply] for s in problem.both])",
