@@ -31,7 +31,7 @@ from repro.model.pore import initial_outline, seeded, solve
 from repro.report import charts, fields, run_page
 from repro.results import names, netcdf, vtu
 from repro.run import checkpoint, running, stored
-from repro.scene import load_scene
+from repro.scene import SceneError, load_scene
 from repro.sweep import page, table
 from repro.sweep.design import Point, parse
 from repro.sweep.picture import LEVELS, Axis
@@ -60,9 +60,11 @@ def test_states_are_made_and_not_changed():
 
 @pytest.mark.skipif(not STATUS.exists(), reason="the system tells the memory of a process there")
 def test_memory_is_in_megabytes():
-    """As the kernel tells it, in kB."""
+    """As the kernel tells it, in kB; of a trial before and at its peak."""
     peak = re.search(r"VmHWM:\s+(\d+) kB", STATUS.read_text())[1]
     assert cost._memory() == pytest.approx(int(peak) / 1024, rel=0.02)
+    before, most = cost.tried(load_scene("base", ["numerics.preset=fast"]), 300).memory
+    assert 10 < before <= most
 
 
 def test_a_seed_at_both_walls_is_in_contact_from_the_start():
@@ -212,6 +214,13 @@ def test_a_refinement_that_is_advised_resolves_and_smaller_ones_do_not():
         finer = dataclasses.replace(scene, numerics=dataclasses.replace(scene.numerics, refinement=refinement))
         with contextlib.nullcontext() if holds else pytest.raises(Unresolved):
             solve(finer, seeded(finer))
+
+
+@pytest.mark.parametrize("value", ["0", "-0.5", "1.1"])
+def test_a_tolerance_is_above_zero_and_at_most_one(value):
+    assert load_scene("base", ["numerics.tolerance=1"]).numerics.tolerance == 1
+    with pytest.raises(SceneError, match="greater than zero, at most 1"):
+        load_scene("base", [f"numerics.tolerance={value}"])
 
 
 @pytest.mark.parametrize("length", ["50 um", "50 micron", "50 microns", "50 micrometers", "0.05 mm", "5e-5 m"])
