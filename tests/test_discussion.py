@@ -7,16 +7,14 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from paper_figures import page, runs, states
+from paper_figures import runs, states
 from repro import load_scene, run
 from repro.fem.mesh import triangle_areas
 from repro.fem.outline import polygon_area
 from repro.model.growth import largest_principal
-from verification import claims
 from verification.claims import discussed, fluid_and_aggregate, levels, permeability, rheology
-from verification.claims.evaluate import barred
-from verification.claims.levels import CONVERGED, SCHEME, Level, at_level
-from verification.claims.runs import Body, bodies, scene
+from verification.claims.levels import CONVERGED, Level, at_level
+from verification.claims.runs import bodies, scene
 from verification.claims.runs import stress as restored_stress
 
 COARSE = Level(CONVERGED, 4.0)
@@ -29,16 +27,6 @@ def coarse():
     with at_level(COARSE):
         yield
     levels.forget(COARSE)
-
-
-def test_a_claim_may_leave_the_scheme_out():
-    """And its checks then have no range of it."""
-    claim = claims.Claim("C99", "5", "t", lambda: None, beside=())
-    assert {level.kind for level in claim.levels} == {CONVERGED}
-    assert SCHEME in {level.kind for level in replace(claim, beside=(1.0,)).levels}
-    check = claims.at_most("q", "small", 1.0, 2.0, "")
-    found = barred(claim, claims.Finding((check,)), {level: (("q", 1.0, True),) for level in claim.levels[1:]})
-    assert found.checks[0].scheme is None and found.verdict == claims.REPRODUCED
 
 
 @pytest.mark.parametrize("ratio, part, share", [(2000.0, 1e-9, 1.0), (2000.0, 1.0, 1 / 2000), (1.0, 0.3, 1.0)])
@@ -238,30 +226,3 @@ def test_contact_is_read_from_the_rows(curved, monkeypatch):
     rows = {"time_h": np.array([0.0, 1.0, 2.0]), "contact": np.array([0.0, 1.0, 1.0])}
     monkeypatch.setattr(states, "series", lambda folder: rows)
     assert module.contact(curved) == 1.0
-
-
-def test_the_page_names_additions_and_what_they_compute():
-    entries = [page.Entry(name, title, "c", (), ("C38",)) for name, title in
-               (("figure_2", "Figure 2. The pore"), ("discussion_x", "Addition. Tearing"))]
-    text = page.page(entries, [])
-    assert '<a href="#figure_2">Figure 2</a>' in text and '<a href="#discussion_x">Tearing</a>' in text
-    module = import_module("paper_figures.discussion_tearing")
-    assert page.also(module) == tuple(f"python -m verification.claims {id}" for id in ("C40", "C46"))
-    assert page.also(import_module("paper_figures.figure_2")) == ()
-
-
-def test_the_place_of_a_course_ends_where_shape_and_flow_do_not_agree(monkeypatch):
-    module = import_module("paper_figures.discussion_tearing")
-    rows = [Body(None, SimpleNamespace(time=float(k)), None) for k in range(4)]
-
-    def pressed(found):
-        if found.pore.time == 2.0:
-            raise module.GrowthError("too soft")
-        return found
-
-    for name, value in {"bodies": lambda run: rows, "pressed": pressed,
-                        "tension": lambda found: (1e-6 * found.pore.time, 1.0, 2.0, found.pore.time)}.items():
-        monkeypatch.setattr(module, name, value)
-    with at_level(Level(CONVERGED, 9.0)):
-        assert [module.course(("x",), forces)[:, 3].tolist() for forces in (False, True)] == [[1.0, 2.0, 3.0], [1.0]]
-    levels.forget(Level(CONVERGED, 9.0))

@@ -13,8 +13,7 @@ import paper_figures
 from paper_figures import __main__ as figures
 from paper_figures import claims, overview, page, runs, states, style
 from repro import cli, load_scene, run
-from repro.fem.outline import FREE, TOP, polygon_area
-from repro.model.contact import closing_nodes
+from repro.fem.outline import TOP, polygon_area
 from repro.scene import scene_hash
 
 MODULES = {name: import_module(f"paper_figures.{name}") for name in paper_figures.FIGURES}
@@ -134,14 +133,6 @@ def test_the_schematics_follow_the_model(changes, told, drawn):
     assert told in figure_3.caption(said)
     assert drawn in {text.get_text() for axes in figure_3.draw(said).axes for text in axes.texts}
     assert "110 µm around the seed" in figure_3.caption() and "16.7°" in figure_2.caption()
-
-
-def test_the_flattened_aggregate_closes_beside_its_contact():
-    outline = figure_2.flattened(50.0)
-    joins = closing_nodes(outline, 50.0, 2.0, np.radians(16.7)) == TOP
-    assert outline.points[:, 1].max() == 50
-    gaps = 50 - outline.points[joins, 1]
-    assert 0 < np.count_nonzero(joins) and gaps.max() < 2 and (outline.wall[joins] == FREE).all()
 
 
 def test_figure_4_shows_every_triangle(short):

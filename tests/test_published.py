@@ -124,11 +124,8 @@ def test_the_pythons_that_are_named_are_those_that_are_allowed():
 def test_wheel_and_source_distribution_hold_what_they_should(tmp_path):
     """The wheel the solver alone with its scenes; the source distribution the checkout."""
     copied = tmp_path / "checkout"
-    told = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    listed = told.split("\n")
-    for name in filter(None, listed):
-        (copied / name).parent.mkdir(parents=True, exist_ok=True)
-        (copied / name).write_bytes((ROOT / name).read_bytes())
+    subprocess.run(["git", "checkout-index", "--all", f"--prefix={copied}/"], cwd=ROOT, check=True)
+    listed = [str(path.relative_to(copied)) for path in copied.rglob("*")]
     subprocess.run([sys.executable, "-m", "build", "--no-isolation", "--outdir", tmp_path / "dist", copied],
                    capture_output=True, check=True)
     (wheel,), (source,) = ((tmp_path / "dist").glob(kind) for kind in ("*.whl", "*.tar.gz"))

@@ -95,14 +95,6 @@ def test_what_is_drawn_is_python_and_no_annotation():
     assert {mutant.line for mutant in found} == {4, 5, 8, 10, 11, 15, 18}
 
 
-@pytest.mark.parametrize("text, functions, names", [
-    ("        return [2 * k for k in range(self.size)]", {"Box.twice", "Box.twice.<locals>.<listcomp>"}, None),
-    ("LIMIT = 3", set(), {"LIMIT"}), ("    size = LIMIT + 1", set(), {"Box"})])
-def test_a_line_is_in_functions_or_defines_names(text, functions, names):
-    line = CODE.splitlines().index(text) + 1
-    assert set(reach.functions(CODE, line)) == functions and (names is None or reach.defined(CODE, line) == names)
-
-
 def test_tests_are_those_that_call_the_function_the_cheapest_first(monkeypatch):
     """A name's are those that call a function that names it; of what has no name, all."""
     monkeypatch.setitem(reach._MENTIONED, "m.py", {"small": {"LIMIT"}, "Box.twice": {"size"}})

@@ -131,21 +131,6 @@ def test_a_number_of_samples_is_a_power_of_two(samples, capsys):
     assert driver.main(["--sobol", samples]) == 2 and "a power of two" in capsys.readouterr().err
 
 
-def test_a_part_is_joined_to_the_record_that_is_there_at_its_end(tmp_path, monkeypatch):
-    monkeypatch.setattr(sensitivity, "RECORD", tmp_path / "sensitivity.json")
-
-    def of_wide(runs):
-        before = {"values": {"a": 1}, "elasticities": {"a": {}}, "one_set": {"reached": True}}
-        sensitivity.RECORD.write_text(json.dumps(before))
-        return {"values": {"b": 2}, "elasticities": {"b": {}}}
-    monkeypatch.setitem(driver.PARTS, "wide", of_wide)
-    sensitivity.record.cache_clear()
-    made = driver.computed(None, "wide", 0)
-    sensitivity.record.cache_clear()
-    assert made["values"] == {"a": 1, "b": 2} and set(made["elasticities"]) == {"a", "b"}
-    assert made["one_set"] == {"reached": True} and made["rounding"]["k"] == BY_NAME["k"].rounding
-
-
 def test_claims_with_other_supplies_are_told_apart():
     found = {}
     for supply, by_id in (("5", {"C12": [0.0], "C16": [2.0, 0.0], "C25": [2.0]}),

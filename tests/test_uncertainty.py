@@ -117,8 +117,7 @@ def test_a_scene_is_that_of_the_level():
 def test_every_step_lands_on_the_instants_of_section_4(step):
     """19.2 h, then 19.4 h, 12 min later."""
     with at_level(Level(step=step)):
-        times, reported = schedule(runs.scene(*runs.BASE))
-        last, _ = schedule(runs.scene(*runs.PLATES))
+        (times, reported), (last, _) = (schedule(runs.scene(*run)) for run in (runs.BASE, runs.PLATES))
     assert times[-2:] == last[-2:] == [19.2, 19.4] and {19.2, 19.4} <= reported
     assert np.diff(times[:-1]) == pytest.approx(0.2 * step)
 
@@ -202,6 +201,8 @@ def test_the_scheme_stands_beside_the_converged_solution_whose_bar_has_nothing_o
     found = judged(SPEED, lambda level: of_size(level) + (level.kind == SCHEME), about=claims.MODEL)
     assert found.bar.high - found.value == pytest.approx(1.25 * 0.005)
     assert found.scheme == pytest.approx((3.9 + 0.01 * 2**-0.5, 3.9 + 0.01 * 2**0.5))
+    alone = judged(SPEED, of_size, about=claims.MODEL, beside=())
+    assert alone.scheme is None and alone.outcome == claims.HOLDS and len(alone.on_sizes) == 3
 
 
 @pytest.mark.parametrize("large, outcome", [((), claims.HOLDS), ((0.5,), claims.REACHES_OVER),

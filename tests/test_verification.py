@@ -18,7 +18,6 @@ from verification.kernel.case import (
     at_least,
     at_most,
     between,
-    combined,
     refine,
     studies,
     study,
@@ -113,11 +112,6 @@ def test_a_guard_that_stops_any_variant_catches_a_mutant(errors, caught, how):
     assert mutants.judged(case.run(chosen)) == (caught, how)
 
 
-def test_what_a_case_runs_over_is_every_combination_with_its_label():
-    found = combined({"order 2": 2, "order 3": 3}, {"lambda = 1": 1.0})
-    assert found == {"order 2, lambda = 1": (2, 1.0), "order 3, lambda = 1": (3, 1.0)}
-
-
 def test_errors_of_unrelated_meshes_are_averaged_and_studied_by_their_own_size():
     """Root mean squares of what every mesh of a size gives; nominal sizes where none are measured."""
     errors = refine(lambda size, mesh, factor: {"error": factor * size * (1 + 6 * mesh)}, {2.0: 2, 1.0: 1}, 3.0)
@@ -171,11 +165,11 @@ def test_an_orphan_is_told(monkeypatch):
 
 
 def test_what_is_round_off_or_another_machines_is_not_committed():
-    assert at_most("x", 0.012345, 0.1, "").told == "0.01" and at_most("x", 2.0, 1.0, "").measured == "2"
-    assert between("x", 1.0, 0.123456, 2.0, "").accepted == "0.123 to 2"
-    assert study("error", SIZES, SIZES**2, 2, "").told == "order 2.0, 2.0, 2.0"
     (line,) = result(at_most("x", 3e-13, 1e-9, "why")).outcome.lines()
     assert line == ("x", "at most 1e-09", "why", True)
+    found = at_most("x", 0.012345, 0.1, ""), study("error", SIZES, SIZES**2, 2, "")
+    assert [one.told for one in found] == ["0.01", "order 2.0, 2.0, 2.0"]
+    assert between("x", 1.0, 0.123456, 2.0, "").accepted == "0.123 to 2"
 
 
 def test_committed_pages_are_short():
@@ -229,11 +223,3 @@ def test_random_meshes_cover_their_rectangle_and_follow_their_lines():
     grid = meshes.channel((-10.0, 20.0), 8.0, 1.1, lambda x, y: (x > 0) & (y < 3), across=(0.0,), along=(3.0,), seed=3)
     assert grid.areas.min() > 0 and grid.areas.sum() == pytest.approx(240.0, rel=1e-13)
     assert grid.areas[grid.biomass].sum() == pytest.approx(60.0, rel=1e-13)
-
-
-def test_names_that_begin_and_end_alike_are_told_together():
-    """No name is lost, and what is told of one is not told of another."""
-    names = ["C, R = 5, fast (order 2.0)", "C, R = 7, fast (order 2.0)", "C, R = 9, fast (order 1.9)", "P, a", "P, b",
-             "Q, a", "Q, b", "u, 1, slow", "u, 2, slow", "u, 3, slow", "alone, x"]
-    assert report.shared(names) == ("C: R = 5, fast; R = 7, fast (each order 2.0); R = 9, fast (order 1.9) / "
-                                    "P, Q: a; b / u: 1; 2; 3, each slow / alone, x")
