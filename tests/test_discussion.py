@@ -92,9 +92,8 @@ def test_growth_and_uptake_of_rows():
 
 
 def test_a_permeable_run_has_the_drag_and_nothing_of_the_viscosity():
-    said = scene(*rheology.permeable(rheology.AGGREGATE, 0.25))
-    assert said.flow.biomass == "brinkman" and said.flow.viscosity_ratio is None
-    assert said.flow.permeability == pytest.approx(0.25, rel=1e-6)
+    flow = scene(*rheology.permeable(rheology.AGGREGATE, 0.25)).flow
+    assert (flow.biomass, flow.viscosity_ratio, flow.permeability) == ("brinkman", None, pytest.approx(0.25, rel=1e-6))
     assert 'numerics.elements = "quadratic"' in rheology.refused()
     assert rheology.equivalent(rheology.AGGREGATE) == pytest.approx(50.0**2 / 12 / 2000)
     assert runs.PERMEABILITIES[1] == pytest.approx(1e-12 * rheology.equivalent(rheology.PLUG))

@@ -152,15 +152,13 @@ def test_one_state_tells_two_scenes_apart_on_one_mesh():
 
 def test_reshaping_to_its_own_outline_changes_nothing_and_to_a_finer_one_hardly_anything():
     """The mesh stays the default's; the flow is that of the other shape: a larger aggregate of the same shape."""
-    default, finer = short(), short("numerics.refinement=0.52")
+    default, finer, wide = short(), short("numerics.refinement=0.52"), short('aggregate.radius="15.15 um"')
     own = switches.reshaped(default.pore, default.pore.outline)
     assert np.array_equal(own.mesh.points, default.pore.mesh.points)
     one, two = (each(default, finer) for each in (switches.whole_run, switches.two_meshes))
     assert abs(one["velocity"]) < 0.3 * abs(two["velocity"]) and one["area"] == two["area"]
-    wide = short('aggregate.radius="15.15 um"')
-    radius = wide.pore.outline.thickness / default.pore.outline.thickness
-    there = switches.reshaped(default.pore, wide.pore.outline)
-    assert there.outline.area / default.pore.outline.area == pytest.approx(radius**2, rel=1e-4)
+    before, after = default.pore.outline, switches.reshaped(default.pore, wide.pore.outline).outline
+    assert after.area / before.area == pytest.approx((wide.pore.outline.thickness / before.thickness) ** 2, rel=1e-4)
     assert switches.whole_run(default, wide)["velocity"] < -1e-3
 
 

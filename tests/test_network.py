@@ -143,11 +143,9 @@ def test_the_mean_of_runs_leaves_one_out_and_what_a_run_does_not_reach():
 
 
 def test_bounds_are_the_farthest_of_the_shapes_nearby():
-    shares = np.arange(1.0, 8.0)
     found = [Sample(None, False, share, (LAMBDA,), (1.0,)) for share in (1.0, 2.9, 4.5, 7.0)]
-    least, most = law.bounds(shares, found, np.array([[0.1], [-0.2], [0.3], [0.0]]))[:, :, 0]
-    assert least == pytest.approx(1 - np.array([0.2, 0.2, 0.2, 0.2, 0.0, 0.0, 0.0]) * [1, 1, 1, 1, 0, 0, 0]
-                                  - 0.008)
+    least, most = law.bounds(np.arange(1.0, 8.0), found, np.array([[0.1], [-0.2], [0.3], [0.0]]))[:, :, 0]
+    assert least == pytest.approx(np.array([0.8] * 4 + [1.0] * 3) - 0.008)
     assert most == pytest.approx(np.array([1.1, 1.1, 1.3, 1.3, 1.3, 1.3, 1.0]) + 0.008)
 
 
