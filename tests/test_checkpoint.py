@@ -338,7 +338,7 @@ def test_a_checkpoint_of_another_format_is_refused_in_one_line(kept, tmp_path):
     old = checkpoint.KIND + b"2 " + kept[2].removeprefix(checkpoint.MAGIC)
     assert old != kept[2]
     (tmp_path / "x").write_bytes(old)
-    with pytest.raises(CheckpointError, match="^its format is not 3: another version wrote it$"):
+    with pytest.raises(CheckpointError, match="^its format is not 4: another version wrote it$"):
         Recorder(kept[0], kept[1]).restore(tmp_path / "x")
 
 
