@@ -26,7 +26,7 @@ def on_their_lines(grid, points):
 
 
 def test_edges_of_the_fluid_stay_straight_but_at_the_interface():
-    """Corners move as those of the straight triangles do."""
+    """Corners move as those of the straight triangles do, those of the walls along them."""
     grid = meshed(seed(20.0, 1.0, 2))[0]
     body = grid.points[grid.body] * [1.05, 1.02]
     points = move(grid, body)
@@ -36,6 +36,8 @@ def test_edges_of_the_fluid_stay_straight_but_at_the_interface():
     inside = grid.body < grid.corners
     assert np.allclose(points[: grid.corners], move(straight, body[inside]), rtol=0, atol=1e-12)
     assert (points[grid.body] == body).all() and grid.moved(points).acceptable()
+    sliding = np.setdiff1d(grid.topology.walls, grid.body)
+    assert np.abs(points - grid.points)[sliding, 0].max() > 0.5
 
 
 @given(with_aggregate, growths)
