@@ -16,7 +16,7 @@ from pathlib import Path
 
 from verification.bench.record import save
 from verification.hard import CASES
-from verification.hard.common import PRESETS, Cell, Verdicts, run_cell
+from verification.hard.common import PRESETS, Cell, run_cell
 
 RECORD = Path(__file__).parent / "report" / "hard_cases.json"
 
@@ -30,7 +30,7 @@ def as_json(cells: Iterable[Cell], live: bool = False) -> dict:
         row = rows.setdefault(case.number, {"number": case.number, "id": case.full_id,
                                             "title": case.title, "right_is": case.right_is,
                                             "failure_is": case.failure_is, "may_refuse": list(case.refusable),
-                                            "explained": case.explained, "cells": {}})
+                                            "cells": {}})
         row["cells"][cell.preset] = {"verdict": cell.verdict, "accepted": not cell.unaccepted,
                                      **(_digits(cell) if live else {})}
     return {"cases": [rows[number] for number in sorted(rows)], **({"machine": machine()} if live else {})}
@@ -48,7 +48,7 @@ def _checks(cell: Cell) -> list[dict]:
 
 def record(results: Iterable) -> None:
     """Write the matrix from the results of a whole verification run, which has run every cell already."""
-    write(cell for result in results if isinstance(result.outcome, Verdicts) for cell in result.outcome.cells)
+    write(cell for result in results for cell in result.outcome.notes if isinstance(cell, Cell))
 
 
 def write(cells: Iterable[Cell]) -> None:

@@ -15,6 +15,7 @@ from repro.fem import sizing, transfer
 from repro.fem.mesh import POOR, POOR_ALLOWED, Mesh
 from repro.fem.outline import FREE, Outline, half_disc
 from repro.fem.space import Space
+from repro.march import midpoint
 from repro.march.loop import Instant, Step
 from repro.model import biomass, flow, pore, remeshing
 from repro.model.pore import Pore
@@ -25,6 +26,7 @@ from verification.hard.common import DRIVE, EFFLUENTS, SHAPE, TOLERANCE, HardCas
 from verification.hard.mechanics import CLOSING
 from verification.hard.stages import exponential
 from verification.kernel.case import Check, at_least, at_most
+from verification.problems import runs as problems
 
 FIFTY = 50
 
@@ -67,7 +69,7 @@ def _step_after(preset: str, made: Scene, first: Pore, now: Pore) -> list[Check]
 
 def _step(made: Scene, now: Pore):
     """A step of 12 min."""
-    return common.midpoint_step(made, *common.solved_in(made, now), 0.2)
+    return midpoint.attempt(made, *common.solved_in(made, now), 0.2).step
 
 
 NAMES = ("area", "thickness", "upstream tip", "conductivity")
@@ -338,7 +340,7 @@ def _first_step(preset: str, *changes: str) -> tuple[Run, Step]:
     """What is solved in the seed of 15 um as a Run, and one step of 6 min from it."""
     made = common.scene("base", preset, 'aggregate.radius="15 um"', *changes)
     now, solved = common.seeded(made)
-    step = common.STEP[made.numerics.time](made, now, solved, 0.1)
+    step = problems.step(made, now, solved, 0.1)
     start = Instant(now, solved, None, (), 0, {})
     return Run(made, [start], [row(made, start)]), step
 

@@ -8,7 +8,8 @@ import numpy as np
 
 from reference import averaged_pore
 from repro import results
-from repro.march.loop import Instant
+from repro.march import midpoint, updates
+from repro.march.loop import Instant, Step
 from repro.march.simulation import simulate
 from repro.model import pore
 from repro.model.pore import Pore, Solved
@@ -56,6 +57,13 @@ def every_step(end: str, *changes: str) -> Scene:
 def on_wall(heights: np.ndarray) -> np.ndarray:
     """Heights (n,) of a shape's points with the first and the last on the lower wall to the last bit."""
     return np.concatenate([[0.0], heights[1:-1], [0.0]])
+
+
+def step(scene: Scene, now: Pore, solved: Solved, hours: float) -> Step:
+    """A step by the scene's ``numerics.time``; of the midpoint rule, whatever its estimate."""
+    if scene.numerics.time == "updates":
+        return updates.step(scene, now, solved, hours)
+    return midpoint.attempt(scene, now, solved, hours).step
 
 
 def last(scene: Scene) -> Instant:
