@@ -16,6 +16,7 @@ from verification.claims import levels, runs
 from verification.claims.runs import BASE, PLATES, WIDE
 from verification.errata import percent
 from verification.errata.__main__ import entry
+from verification.kernel.writing import markdown
 from verification.switches import CHOICES, NUMBERS
 
 
@@ -160,8 +161,8 @@ def test_the_record_is_written_whole_and_the_table_names_every_row(tmp_path):
            "effect": {"velocity": -0.01, "area": 0.001}, "one_state": {}, "note": ""}
     audit.save({"machine": {}, "rows": [row]}, tmp_path / "report" / "audit.json")
     assert json.loads((tmp_path / "report" / "audit.json").read_text())["rows"] == [row]
-    head, line = audit.table([row])
-    assert "extent" in line and "2.50" in line and "-1.0e-02 velocity" in line and "cost" in head
+    text = markdown(audit.blocks({"method": "one changed at a time", "rows": [row]}))
+    assert "| extent | central | full | 2.50 | -1 % | +0.1 % |  | -1 % (velocity) |  |  |" in text
     assert audit.resolved(row["effect"], {"velocity": 0.0049, "area": -0.0006}) == ["velocity"]
     with pytest.raises(ValueError):
         audit.save({"rows": [float("nan")]}, tmp_path / "audit.json")

@@ -7,6 +7,7 @@ import pytest
 from verification.bench import __main__ as bench
 from verification.bench import record, runs, told
 from verification.bench.record import envelope, exponent, reading, slope
+from verification.kernel import writing
 
 
 def point(seconds, error, **more):
@@ -188,7 +189,7 @@ def test_the_record_is_read_back(tmp_path):
     merged = record.merged(record.empty(), {"base": part}, {"base": 3}, {"fipy": 0.5})
     merged["verdicts"] = told.judged(merged)
     file = tmp_path / "deep" / "bench.json"
-    record.save(merged, file)
+    writing.save(merged, file)
     assert record.load(file) == merged
     assert record.load(tmp_path / "none.json") == record.empty()
     assert {"platform", "processor", "python", "versions", "repeats", "import_seconds"} <= set(merged["machine"])
@@ -200,7 +201,7 @@ def test_the_record_is_read_back(tmp_path):
 @pytest.mark.parametrize("value", [nan, inf])
 def test_not_a_number_is_never_recorded(tmp_path, value):
     with pytest.raises(ValueError):
-        record.save({"parts": {"a": value}}, tmp_path / "bench.json")
+        writing.save({"parts": {"a": value}}, tmp_path / "bench.json")
 
 
 def test_the_processor_has_its_own_name(tmp_path):

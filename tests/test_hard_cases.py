@@ -17,6 +17,7 @@ from verification import hard_cases
 from verification.hard import common, runs
 from verification.hard.common import PRESETS, REFUSED, RIGHT, WRONG, HardCase
 from verification.kernel.case import Check, Outcome, Result, at_least, at_most, between, outcome
+from verification.kernel.writing import plain
 
 GOOD, BAD = at_most("good", 0.5, 1.0, ""), at_most("bad", 2.0, 1.0, "")
 KNOWN = {case.number: case for case in hard_cases.CASES}
@@ -121,8 +122,8 @@ def test_the_matrix_is_told_and_written(tmp_path, monkeypatch):
     assert line["cells"]["fast"] == {"verdict": REFUSED, "accepted": False} and "machine" not in kept
     assert line["cells"]["paper"]["accepted"] and "try another mesh" in measured["cells"]["paper"]["message"]
     assert measured["cells"]["fast"]["checks"][0]["quantity"] == "good"
-    told = hard_cases.matrix(cells)
-    assert "refused!" in told and "99 fast: refused 1: try another mesh" in told
+    told = plain(hard_cases.blocks(live))
+    assert "refused!" in told and "99    fast      refused 1: try another mesh" in told
 
 
 def test_the_exit_status_is_the_verdict(monkeypatch, tmp_path, capsys):

@@ -29,7 +29,6 @@ them on logarithmic axes.
 from __future__ import annotations
 
 import gc
-import json
 import os
 import platform
 import subprocess
@@ -45,7 +44,7 @@ from time import perf_counter, process_time
 
 import numpy as np
 
-from repro.results import write_text
+from verification.kernel import writing
 
 FOLDER = Path(__file__).parents[1] / "report"
 FILE = FOLDER / "bench.json"
@@ -62,15 +61,7 @@ def empty() -> dict:
 
 def load(file: Path = FILE) -> dict:
     """The record of the last benchmark, an empty one where there is none."""
-    if not file.exists():
-        return empty()
-    return json.loads(file.read_text(encoding="utf-8"))
-
-
-def save(record: dict, file: Path = FILE) -> None:
-    """Write a record whole or not at all; ValueError where it holds not-a-number."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    write_text(file, json.dumps(record, indent=1, allow_nan=False) + "\n")
+    return writing.load(file, empty())
 
 
 def machine() -> dict:

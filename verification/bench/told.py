@@ -1,4 +1,4 @@
-"""What the benchmark has measured, told: verdicts, lines for a terminal, pictures.
+"""What the benchmark has measured, told: verdicts, tables, pictures.
 
 What is claimed of speed and accuracy is judged here by the numbers of a record; the verdicts are written nowhere else.
 Ratios are of wall times of one run; those of processor times, which other users of the machine disturb less, are told
@@ -14,6 +14,7 @@ from pathlib import Path
 from verification.bench import runs
 from verification.bench.record import envelope, reading
 from verification.bench.record import line as line_of
+from verification.kernel.writing import Block, table
 
 #: (error, least ratio, aim) of the paper's scheme at its own best speed over a preset.
 FASTER = {runs.FAST: (0.01, 5.0, 10.0), runs.ACCURATE: (0.001, 20.0, 20.0)}
@@ -155,71 +156,63 @@ def _memory(part: dict) -> Iterator[dict]:
             row["slope"] <= row["bound"])
 
 
-def part_lines(name: str, found: dict) -> str:
-    """The table of a part."""
-    head = [f"\n{name}: {found['title']}"]
-    head += [f"  {key}: {found[key]}" for key in ("error", "reference") if key in found]
-    head.append(f"  repeats: {found.get('repeats', 1)}")
-    rows = _size_lines(found) if name == "size" else _lines(found) if "lines" in found else _rows(found)
-    return "\n".join([*head, *rows])
+#: Of a table of points.
+HEAD = ("method", "", "wall (s)", "processor (s)", "error, or what it costs")
+WORDS = {True: "holds", False: "does not hold", None: NOT_MEASURED}
 
 
-def _lines(found: dict) -> Iterator[str]:
-    for line in found["lines"]:
-        yield f"  {line['method']}"
-        for point in line["points"]:
-            more = "".join(f"  {key} {point[key]:.1e}" for key in ("drift", "beyond") if key in point)
-            yield (f"    {point['label']:<32} {point['seconds']:9.4f} s  {point['cpu']:9.4f} s (processor)  "
-                   f"error {point['error']:.1e}{more}")
-        for failed in line["failed"]:
-            yield f"    {failed['label']:<32} FAILED: {failed['reason']}"
-    for row in found.get("apart", ()):
-        yield f"  apart: {row['what']}: {row['seconds']:.1f} s"
-    for run in found.get("wide", ()):
-        told = run.get("failed") or f"{run['seconds']:.2f} s, {run['steps']} steps to {run['end']:g} h"
-        yield f"  wide, preset {run['preset']}: {told}"
-
-
-def _size_lines(found: dict) -> Iterator[str]:
-    names = (*runs.STAGES, runs.FLOOR)
-    for line in found["lines"]:
-        yield f"  {line['method']}: milliseconds"
-        yield "     nodes     step " + "".join(f"{name:>20}" for name in names) + "   ratio   memory (MB)"
-        for point in line["points"]:
-            stages = "".join(f"{1e3 * point['stages'][name]:20.1f}" for name in names)
-            yield (f"    {point['nodes']:6d} {1e3 * point['seconds']:8.1f} {stages}  {point['ratio']:6.2f}   "
-                   f"{point['memory_MB']:.0f}")
-        fits = found["fits"].get(line["method"], {})
-        yield "    exponents: " + ", ".join(f"{name} {value:.2f}" for name, value in fits.items() if value is not None)
-        for failed in line["failed"]:
-            yield f"    {failed['label']} FAILED: {failed['reason']}"
-
-
-def _rows(found: dict) -> Iterator[str]:
-    for row in found["rows"]:
-        if "slope" in row:
-            yield (f"  {row['method']:<16} {row['steps']} steps, {row['nodes']} nodes: {row['slope']:.0f} bytes a "
-                   f"step, {row['bound']:.0f} allowed; {row['live_MB']:.1f} MB live")
-        else:
-            stages = ", ".join(f"{name} {1e3 * seconds:.1f}" for name, seconds in row["stages"].items())
-            yield (f"  {row['method']:<16} {row['scene']:<15} {1e3 * row['seconds']:8.1f} ms  "
-                   f"{1e3 * row['cpu']:8.1f} ms (processor)  {stages}")
-    for step in found.get("steps", ()):
-        yield f"  {step['method']:<16} {'a step':<15} {1e3 * step['seconds']:8.1f} ms  of {60 * step['hours']:.0f} min"
-
-
-def verdicts(found: list[dict]) -> str:
-    """A line each."""
-    words = {True: "holds", False: "DOES NOT HOLD", None: "not measured"}
-    return "\n".join(["\nVerdicts"] + [f"  {words[one['holds']]:<14} {one['claim']}: {one['measured']}; wanted "
-                                       f"{one['wanted']}" for one in found])
-
-
-def machine(about: dict) -> str:
+def machine(about: dict) -> Block:
     """What the times are of."""
-    imports = ", ".join(f"{name} {seconds:.2f} s" for name, seconds in about.get("import_seconds", {}).items())
-    return (f"{about['processor']}, {about['cores']} cores, {about['threads']} thread(s); {about['platform']}; "
-            f"Python {about['python']}\nimporting, in no time below: {imports or 'not measured'}")
+    return Block("text", f"Measured by `make bench` on {about['cores']} cores of {about['processor']}, one thread, "
+                         f"Python {about['python']}; importing the packages is not counted. Times of another machine "
+                         "differ, ratios less.")
+
+
+def verdicts(found: list[dict]) -> Block:
+    """A table."""
+    return table(("claim", "wanted", "measured", ""), (
+        (one["claim"], one["wanted"], one["measured"], WORDS[one["holds"]]) for one in found))
+
+
+def blocks(name: str, part: dict) -> list[Block]:
+    """A part with all its points, and its picture: on pages alone, and for a terminal."""
+    told = "; ".join(f"{key}: {part[key]}" for key in ("error", "reference", "repeats") if key in part)
+    picture = [Block("picture", f"bench_{name}.svg: {part['title']}", detail=True)] if part.get("lines") else []
+    return [Block("heading", part["title"], detail=True), Block("text", told, detail=True), *picture,
+            table(HEAD, _points(part), detail=True)]
+
+
+def _points(part: dict) -> Iterator[tuple[str, ...]]:
+    for line in part.get("lines", ()):
+        for point in line["points"]:
+            yield line["method"], point["label"], *_times(point), _cost(point)
+        for failed in line["failed"]:
+            yield line["method"], failed["label"], "failed", "", failed["reason"]
+    for method, fits in part.get("fits", {}).items():
+        found = ", ".join(f"{name} {value:.2f}" for name, value in fits.items() if value is not None)
+        yield method, "exponents", "", "", found
+    for row in (*part.get("rows", ()), *part.get("steps", ())):
+        yield row["method"], row.get("scene", "a step" if "hours" in row else ""), *_times(row), _cost(row)
+    for row in part.get("apart", ()):
+        yield row["what"], "apart", *_times(row), ""
+    for run in part.get("wide", ()):
+        yield f"wide, preset {run['preset']}", "", *_times(run), run.get("failed") or _cost(run)
+
+
+def _times(point: dict) -> tuple[str, ...]:
+    return tuple(f"{point[key]:.3g}" if key in point else "" for key in ("seconds", "cpu"))
+
+
+#: What a point may have besides its times.
+COSTS = {"error": "{:.1e}", "drift": "drift {:.1e}", "beyond": "beyond the bounds {:.1e}",
+         "ratio": "{:.2f} times its linear systems", "memory_MB": "{:.0f} MB", "steps": "{} steps",
+         "hours": "of {:g} h", "slope": "{:.0f} bytes a step", "bound": "{:.0f} allowed", "live_MB": "{:.1f} MB live"}
+
+
+def _cost(point: dict) -> str:
+    told = [words.format(point[key]) for key, words in COSTS.items() if key in point]
+    stages = {} if "error" in point else point.get("stages", {})
+    return ", ".join([*told, *(f"{name} {1e3 * seconds:.1f} ms" for name, seconds in stages.items())])
 
 
 MARKS = "os^vDP*X<>hd"
