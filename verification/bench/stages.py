@@ -7,10 +7,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache, partial
+from types import SimpleNamespace
 
 import numpy as np
 
-from reference import neo_hookean, quadratic_growth, taylor_hood
+from reference import quadratic_growth, taylor_hood
 from reference.whole_run import Pore as Constants
 from reference.whole_run_grid import grid
 from reference.whole_run_pore import Section
@@ -23,7 +24,8 @@ from repro.model.contact import constrained
 from repro.model.kinetics import Sink
 from repro.scene import parse_scene
 from verification.bench.record import measured
-from verification.problems import meshes
+from verification.problems import bodies, meshes
+from verification.problems.bodies import HalfCylinder
 
 WIDTH, LENGTH, RADIUS, RATIO = 50.0, 600.0, 40.0, 2000.0
 PAPER = "linear elements (paper)"
@@ -219,8 +221,8 @@ def _solved(truth, scene, space, flow) -> dict:
 
 
 GROWTH_REPEATS = 5
-#: um; a and c at the end of the step; theta at its start over theta at its end.
-GROWTH_RADIUS, THETA, BEFORE = 20.0, (12.0, 24.0), 2 / 3
+#: The body at the start of the step, and at its end.
+BEFORE, AFTER = HalfCylinder(8.0, 24.0), HalfCylinder(12.0, 36.0)
 #: Refinements, and rings.
 GROWTH_SIZES = ((0.5, 0.7, 1.0, 1.4, 2.0, 2.8), (0.15, 0.25, 0.45, 0.7, 1.0, 1.6), (2, 4, 8, 16)), (
     (0.5, 1.0), (0.25, 0.45), (4,))
@@ -242,26 +244,9 @@ def growth_part(quick: bool) -> dict:
             "reference": "closed form of the growing half-cylinder", "lines": measured(jobs, repeats)}
 
 
-def growth_exact(points: np.ndarray, part: float = 1.0) -> np.ndarray:
-    """(n, 2) places under ``part`` of theta of the material that was at points (n, 2)."""
-    R = np.maximum(np.hypot(*points.T), 1e-12)
-    return points * (neo_hookean.cylinder_radius(R, *(part * t for t in THETA), GROWTH_RADIUS) / R)[:, None]
-
-
-def pressure(points: np.ndarray, part: float) -> np.ndarray:
-    """(n,) P / mu_L there; the middle takes what is beside it."""
-    R = np.maximum(np.hypot(*points.T), 1e-6 * GROWTH_RADIUS)
-    return neo_hookean.cylinder_pressure(R, *(part * t for t in THETA), GROWTH_RADIUS)
-
-
-def theta(x, y):
-    """The expansion at the end of the step."""
-    return THETA[0] + THETA[1] * (x**2 + y**2) / GROWTH_RADIUS**2
-
-
 def _growth_apart(found: np.ndarray, rim: np.ndarray) -> float:
     """Largest distance of the outline (m, 2) from where its nodes (m, 2) of t = 0 should be, over the radius."""
-    wanted = growth_exact(rim)
+    wanted = AFTER.place(*rim.T)
     return float(np.hypot(*(found - wanted).T).max() / np.hypot(*wanted.T).max())
 
 
@@ -273,11 +258,11 @@ def _seeded(refinement: float, preset: str):
 
 def _growth_ours(preset: str, refinement: float):
     now, held = _seeded(refinement, preset)
-    points = now.mesh.points[now.mesh.body] * GROWTH_RADIUS / RADIUS
+    points = now.mesh.points[now.mesh.body] * bodies.RADIUS / RADIUS
     body = growth.Body(now.body.shape, points)
-    whole = theta(*(body.shape.table.values @ points[body.shape.cells]).transpose(2, 0, 1))
-    start = growth_exact(points, BEFORE)
-    found = growth.equilibrium(body, whole, start, pressure(points[: body.shape.corners], BEFORE), held, start)
+    whole = AFTER.theta(*(body.shape.table.values @ points[body.shape.cells]).transpose(2, 0, 1))
+    start, push = BEFORE.place(*points.T), BEFORE.pressure(*points[: body.shape.corners].T)
+    found = growth.equilibrium(body, whole, start, push, held, start)
     return partial(_growth_judged, now, points, found.position)
 
 
@@ -289,24 +274,18 @@ def _growth_judged(now, points, found) -> dict:
 
 @cache
 def _growth_meshed(rings: int):
-    return quadratic_growth.half_disc(GROWTH_RADIUS, rings)
+    return quadratic_growth.half_disc(bodies.RADIUS, rings)
 
 
-class _Start:
-    """The exact state at the start of the step, asked for as that of a solution on another mesh is."""
-
-    @staticmethod
-    def at(x, y):
-        """Places (n, 2) and pressure (n,)."""
-        points = np.column_stack([x, y])
-        return growth_exact(points, BEFORE), pressure(points, BEFORE)
+#: The exact state at the start of the step, asked for as that of a solution on another mesh is.
+START = SimpleNamespace(at=lambda x, y: (BEFORE.place(x, y), BEFORE.pressure(x, y)))
 
 
 def _skfem(rings: int):
     mesh = _growth_meshed(rings)
-    found = quadratic_growth.grow(mesh, theta, sum(THETA), start=_Start)
+    found = quadratic_growth.grow(mesh, AFTER.theta, AFTER.outer, start=START)
     points = mesh.doflocs.T
-    rim = np.isclose(np.hypot(*points.T), GROWTH_RADIUS, rtol=1e-9)
+    rim = np.isclose(np.hypot(*points.T), bodies.RADIUS, rtol=1e-9)
     return lambda: {"error": _growth_apart(found.place.T[rim], points[rim]), "nodes": len(points)}
 
 

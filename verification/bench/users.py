@@ -26,22 +26,20 @@ from fipy import (
     LinearLUSolver,
 )
 from pde import PDE, CallbackTracker, CartesianGrid, Controller, EulerSolver, FieldCollection, ScalarField
-from scipy.sparse import block_array
-from scipy.sparse.linalg import splu
-from skfem import Basis, BilinearForm, ElementTriP2, LinearForm, MeshTri, asm
-from skfem.helpers import dot, grad
+from skfem import Basis, ElementTriP2, MeshTri, asm
 
 from reference import channel_bvp
 from reference import diffusion_reaction_pypde as pypde
 from reference.monod import NUDGE, uptake
+from reference.whole_run_pore import steady, stiffness
 from repro.fem.mesh import Mesh, curved
 from repro.fem.space import Space
 from repro.model import transport
-from repro.model.flow import Flow
 from repro.model.kinetics import Sink
 from repro.scene import parse_scene
 from verification.bench import stages
 from verification.bench.record import measured
+from verification.problems import channels
 
 #: um2/h of acceptor and donor, in fluid and biomass alike; mg/L.
 DIFFUSIVITY, DENSITY = (8e6, 4e6), 3e4
@@ -125,16 +123,11 @@ def _fipy_ends(problem: Problem, mesh, field, k: int):
     return first * problem.supply[k] - CentralDifferenceConvectionTerm(coeff=(problem.speed,), var=field)
 
 
-def _columns(both, rates) -> list[np.ndarray]:
-    """Derivatives of the uptake (2, ...) by C_A and by C_D, by central differences."""
-    nudges = NUDGE * np.eye(2).reshape(2, 2, *[1] * (both.ndim - 1))
-    return [(np.array(uptake(*(both + d), rates)) - np.array(uptake(*(both - d), rates))) / (2 * NUDGE) for d in nudges]
-
-
 def _linearise(problem: Problem, now, constants, slopes) -> None:
     """q = constant + sum of slopes times C at the present C; slopes by central differences."""
     rate = np.array(uptake(*now, problem.rates))
-    columns = _columns(now, problem.rates)
+    columns = [(np.array(uptake(*(now + d), problem.rates)) - np.array(uptake(*(now - d), problem.rates))) / (2 * NUDGE)
+               for d in NUDGE * np.eye(2)[:, :, None]]
     for k in (0, 1):
         constants[k].setValue(rate[k] - sum(column[k] * c for column, c in zip(columns, now)))
         for j in (0, 1):
@@ -218,17 +211,9 @@ def straight(ends, width: float, cells: tuple[int, int], inside) -> Mesh:
 def solved(given, grid: Mesh, order: int, speed: float = 0.0):
     """(acceptor's, donor's) fluxes by linear (order 1), quadratic or cubic elements, in plug flow (um/h) or at rest."""
     space = Space(grid if order == 1 else curved(grid, None), order)
-    flow = plug_flow(space, speed) if speed else None
-    problem = transport.problem(space, flow, given.substrates, given.kinetics)
+    problem = channels.problem(space, speed or None, given.substrates, given.kinetics)
     sink = Sink(DENSITY * space.reaction.dx)
     return transport.fluxes(problem, sink, transport.steady(problem, sink))
-
-
-def plug_flow(space: Space, speed: float) -> Flow:
-    """The same speed (um/h) everywhere, without loss."""
-    correction = np.zeros((len(space.cells), 2)) if space.order == 1 else None
-    velocity = np.tile([speed, 0.0], (space.count, 1))
-    return Flow(speed, velocity, np.zeros(space.mesh.corners), correction, 0.0, 0.0, 1.0)
 
 
 #: Methods of this package, by the order of their elements.
@@ -332,44 +317,12 @@ def quadratic(cells: int) -> np.ndarray:
     mesh = MeshTri.init_tensor(np.linspace(-HALF, HALF, 2 * cells + 1), np.linspace(0.0, WIDTH, cells + 1))
     whole = Basis(mesh, ElementTriP2(), intorder=6)
     body = Basis(mesh, ElementTriP2(), intorder=6, elements=np.flatnonzero(_inside(*mesh.p[:, mesh.t].mean(axis=1))))
-    laplace = asm(_laplace, whole)
-    fields = np.outer(given.supply, np.ones(whole.N))
+    laplace = asm(stiffness, whole)
     inner = np.flatnonzero(np.abs(whole.doflocs[0]) < HALF * (1 - 1e-9))
-    step = np.inf
-    while np.abs(step).max() > 1e-10:
-        here = np.array([body.interpolate(field) for field in fields])
-        residual = [d * (laplace @ field) + asm(_load, body, value=given.density * q)
-                    for d, field, q in zip(given.diffusivity, fields, uptake(*here, given.rates))]
-        blocks = _slopes(body, here, given)
-        for k, d in enumerate(given.diffusivity):
-            blocks[k][k] = blocks[k][k] + d * laplace
-        blocks = [[block.tocsr()[inner][:, inner] for block in row] for row in blocks]
-        right = np.concatenate([part[inner] for part in residual])
-        step = -splu(block_array(blocks, format="csc")).solve(right).reshape(2, -1)
-        fields[:, inner] += step
-    here = np.array([body.interpolate(field) for field in fields])
+    fields = steady(body, [(d * laplace, 0.0) for d in given.diffusivity], given.density, given.rates,
+                    np.outer(given.supply, np.ones(whole.N)), inner)
+    here = [body.interpolate(field) for field in fields]
     return np.array([np.sum(given.density * q * body.dx) for q in uptake(*here, given.rates)])
-
-
-def _slopes(body, here, given) -> list[list]:
-    """Matrices of the uptake's derivatives, by central differences."""
-    columns = _columns(here, given.rates)
-    return [[asm(_mass, body, value=given.density * column[k]) for column in columns] for k in (0, 1)]
-
-
-@BilinearForm
-def _laplace(u, v, w):
-    return dot(grad(u), grad(v))
-
-
-@BilinearForm
-def _mass(u, v, w):
-    return w["value"] * u * v
-
-
-@LinearForm
-def _load(v, w):
-    return w["value"] * v
 
 
 CHANNEL_REPEATS = 3

@@ -159,8 +159,8 @@ class HalfCylinder:
         return np.stack([x, y], axis=-1) * (self.radius(R) / R)[..., None]
 
     def pressure(self, x, y) -> np.ndarray:
-        """P over mu_L."""
-        R = np.hypot(x, y)
+        """P over mu_L; the middle takes what is beside it."""
+        R = np.maximum(np.hypot(x, y), 1e-6 * RADIUS)
         flat = neo_hookean.cylinder_pressure(R.ravel(), self.inner, self.outer - self.inner, RADIUS)
         return flat.reshape(np.shape(R))
 
