@@ -8,7 +8,7 @@ import repro
 from repro.results import read_table
 from repro.results.network import TABLE, known
 from verification.network import __main__ as command
-from verification.network import law, shapes, unseen
+from verification.network import law, shapes
 from verification.network.shapes import RATIOS, Sample
 
 LAMBDA = 2000.0
@@ -56,7 +56,7 @@ def test_the_table_has_half_discs_of_the_present_code(thickness):
 
 def test_fifty_shapes_that_the_fit_has_not_seen_are_within_the_bounds():
     """Half-discs, drawn bodies and plugs, and what three runs make, each at a lambda of its own."""
-    found = list(unseen.every())
+    found = list(law.new_shapes())
     columns = {name: np.array(values, float) for name, values in
                zip(law.COLUMNS, zip(*(law.shape_row(one, 0, 1) for one in found)))}
     judged = law.judged(columns)
@@ -178,7 +178,7 @@ def test_the_command_writes_table_shapes_and_page(tmp_path, monkeypatch, capsys)
     new = [Sample(None, False, 0.5, (LAMBDA,), (float(repro.added_resistance(0.5, 1, False).length),))]
     monkeypatch.setattr(command.law, "half_discs", lambda: discs)
     monkeypatch.setattr(command.law, "others", lambda: iter([*discs, *plugs]))
-    monkeypatch.setattr(command.unseen, "every", lambda: iter(new))
+    monkeypatch.setattr(command.law, "new_shapes", lambda: iter(new))
     monkeypatch.setattr(command, "TABLE", tmp_path / "network.csv")
     monkeypatch.setattr(command, "PAGE", tmp_path / "network.md")
     monkeypatch.setattr(law, "SHAPES", tmp_path / "shapes.csv")

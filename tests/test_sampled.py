@@ -8,11 +8,10 @@ from dataclasses import replace
 
 import pytest
 
-from verification.sampled import drawing, hunting, page, reach
+from verification.sampled import drawing, hunting, trying
 from verification.sampled.drawing import Mutant
 from verification.sampled.hunting import Row
-from verification.sampled.reach import Measured, Reach
-from verification.sampled.trying import Ran
+from verification.sampled.trying import Measured, Ran, Reach
 
 CODE = '''"""A module."""
 from os import path
@@ -49,7 +48,7 @@ def test_waits():
 #: A project of its own, tried as it is and with two mutants: what is caught, what is not, what does not end.
 TRIED = '''
 import json, pathlib, sys
-from verification.sampled import hunting, reach, trying
+from verification.sampled import hunting, trying
 there = pathlib.Path(sys.argv[1]).resolve()
 module = there / "repro" / "m.py"
 code = module.read_text()
@@ -62,7 +61,7 @@ small, waits = ["test_small"], ["test_waits"]
 told = {"sound": run(["test_waits", "test_box", "test_small"]), "caught": run(small, "< LIMIT", "> LIMIT"),
         "survivor": run(small, "least < given", "least <= given"), "endless": run(waits, "< LIMIT", "<= LIMIT", 2.0)}
 hunting.put(module, code)
-told["reach"] = {id: calls for id, (_, calls) in reach._measure(there, "test_m.py").items()}
+told["reach"] = {id: calls for id, (_, calls) in trying._measure(there, "test_m.py").items()}
 print(json.dumps(told))
 '''
 
@@ -102,16 +101,16 @@ def test_what_is_drawn_is_python_and_no_annotation():
 def test_a_line_is_in_functions_or_defines_names():
     numbers = {line: number for number, line in enumerate(CODE.splitlines(), 1)}
     loop = numbers["        return [2 * k for k in range(self.size)]"]
-    assert set(reach.functions(CODE, loop)) == {"Box.twice", "Box.twice.<locals>.<listcomp>"}
-    assert set(reach.functions(CODE, numbers["LIMIT = 3"])) == set()
-    assert set(reach.functions(CODE, numbers["SQUARES = {k * k for k in range(LIMIT)}"])) == set()
-    assert set(reach.functions(CODE, numbers["    size = LIMIT + 1"])) == set()
-    assert reach.defined(CODE, numbers["LIMIT = 3"]) == {"LIMIT"}
-    assert reach.defined(CODE, numbers["    size = LIMIT + 1"]) == {"Box"}
+    assert set(trying.functions(CODE, loop)) == {"Box.twice", "Box.twice.<locals>.<listcomp>"}
+    assert set(trying.functions(CODE, numbers["LIMIT = 3"])) == set()
+    assert set(trying.functions(CODE, numbers["SQUARES = {k * k for k in range(LIMIT)}"])) == set()
+    assert set(trying.functions(CODE, numbers["    size = LIMIT + 1"])) == set()
+    assert trying.defined(CODE, numbers["LIMIT = 3"]) == {"LIMIT"}
+    assert trying.defined(CODE, numbers["    size = LIMIT + 1"]) == {"Box"}
 
 
 def test_tests_are_those_that_call_the_function_the_cheapest_first(monkeypatch):
-    monkeypatch.setitem(reach._MENTIONED, "m.py", {"small": {"LIMIT"}, "Box.twice": {"size"}})
+    monkeypatch.setitem(trying._MENTIONED, "m.py", {"small": {"LIMIT"}, "Box.twice": {"size"}})
     quick, slow = (Measured(name, cost, frozenset({("m.py", "small")})) for name, cost in (("q", 0.1), ("s", 9.0)))
     box = Measured("b", 1.0, frozenset({("m.py", "Box.twice")}))
     known = Reach((quick, box, slow))
@@ -212,22 +211,22 @@ def rows(**counts):
     ({}, False),
 ])
 def test_the_share_is_that_of_the_caught(counts, holds):
-    assert page.holds(page.judged(rows(**counts))) is holds
+    assert hunting.holds(hunting.judged(rows(**counts))) is holds
 
 
 @pytest.mark.parametrize("equal, holds", [(10, True), (11, False)])
 def test_equivalent_mutants_are_not_counted_but_few(monkeypatch, equal, holds):
     given = rows(caught=100 - equal, survivor=equal)
-    assert not page.holds(page.judged(given))
-    monkeypatch.setitem(page.EQUIVALENT, page.key(given[-1]), "it is the same")
-    found = page.judged(given)
-    assert len(found["equivalent"]) == equal and page.holds(found) is holds
+    assert not hunting.holds(hunting.judged(given))
+    monkeypatch.setitem(hunting.EQUIVALENT, hunting.key(given[-1]), "it is the same")
+    found = hunting.judged(given)
+    assert len(found["equivalent"]) == equal and hunting.holds(found) is holds
 
 
 def test_the_page_tells_every_mutant_and_the_numbers(monkeypatch):
     given = rows(caught=19, survivor=1)
-    monkeypatch.setitem(page.LEFT, page.key(given[-1]), ("nothing moves", "it is seldom"))
-    text = page.text(given, 20)
+    monkeypatch.setitem(hunting.LEFT, hunting.key(given[-1]), ("nothing moves", "it is seldom"))
+    text = hunting.text(given, 20)
     assert "20 of 20 mutants tried" in text and "95.0 %" in text and text.count("timing.py:1 |") == 1
     assert "| timing.py | 20 | 19 |" in text
     assert "| nothing moves | it is seldom |" in text
@@ -235,5 +234,5 @@ def test_the_page_tells_every_mutant_and_the_numbers(monkeypatch):
 
 def test_reasons_are_given_for_lines_that_are_there():
     texts = drawing.sources()
-    for file, old, new in {**page.EQUIVALENT, **page.LEFT}:
+    for file, old, new in {**hunting.EQUIVALENT, **hunting.LEFT}:
         assert old != new and all(line in " ".join(texts[file].split()) for line in old.splitlines()), (file, old)

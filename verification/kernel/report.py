@@ -8,7 +8,6 @@ profiles, ours solid, reference dashed, exact dots.
 
 from __future__ import annotations
 
-import json
 import platform
 import shutil
 from collections.abc import Callable
@@ -21,7 +20,7 @@ import numpy as np
 
 from verification.kernel import matrix, mutants
 from verification.kernel.case import CASES, STAGES, WAYS, Outcome, Profile, Result, Study
-from verification.kernel.writing import Block, Link, markdown, page, table
+from verification.kernel.writing import Block, Link, markdown, page, save, table
 
 FOLDER = Path(__file__).parents[1] / "report"
 TITLES = {"flow": "Flow (2.1, 3.2)", "transport": "Substrates (2.2, 3.3)", "growth": "Growth mechanics (2.3, 3.4)",
@@ -270,11 +269,9 @@ def mutant_blocks() -> list[Block]:
 
 def _write_live(results: list[Result], folder: Path) -> None:
     """Every number with all its digits, and the seconds of this machine."""
-    folder.mkdir(exist_ok=True)
     cases = {result.id: {"verdict": result.verdict, "seconds": round(result.seconds, 2), "measured": {
         part.quantity: part.measured for part in result.outcome.measured}} for result in results}
-    text = json.dumps({"environment": environment(), "cases": cases}, indent=1)
-    (folder / "measured.json").write_text(text + "\n", encoding="utf-8")
+    save({"environment": environment(), "cases": cases}, folder / "measured.json")
 
 
 def _write_pages(results: list[Result], folder: Path) -> Path:
