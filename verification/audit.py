@@ -44,7 +44,7 @@ def main() -> int:
     """Entry point."""
     noise = mesh()
     chosen = [switch for name, switch in CHOICES.items() if name not in NOT_AUDITED]
-    rows = [noise, *map(named, chosen), drift(), *symmetry()]
+    rows = [noise, *(measured(switch, cost(switch.run)) for switch in chosen), drift(), *symmetry()]
     rows = [{**row, "resolved": resolved(row["effect"], noise[row.pop("noise", "effect")])} for row in rows]
     record = {"machine": machine(), "method": METHOD, "rows": rows}
     save(record, RECORD)
@@ -66,15 +66,9 @@ def _worst(effects: list[dict[str, float]]) -> dict[str, float]:
     return {name: max((each[name] for each in effects), key=abs) for name in effects[0]}
 
 
-def named(switch: Switch) -> dict:
-    """The row of a choice that a scene can name."""
-    told = measured(switch, cost(switch.run))
-    print(f"{switch.choice}: {switch.alternative}", file=sys.stderr, flush=True)
-    return told
-
-
 def measured(switch: Switch, ratio: float) -> dict:
-    """Its row but for the cost."""
+    """The row of a choice that a scene can name, at a cost."""
+    print(f"{switch.choice}: {switch.alternative}", file=sys.stderr, flush=True)
     default, other = state(BASE), state(switch.run)
     compare = switches.whole_run if switch.meshes else switches.two_meshes
     told = row(switch.choice, switch.default, switch.alternative, ratio, compare(default, other), switch.note)

@@ -9,7 +9,6 @@ numbers and seconds to ``live/`` beside it. Exit status 1 if a cell is what it m
 from __future__ import annotations
 
 import argparse
-import platform
 import sys
 from collections.abc import Iterable, Iterator
 from itertools import product
@@ -17,6 +16,7 @@ from pathlib import Path
 
 from verification.hard import CASES
 from verification.hard.common import PRESETS, Cell, run_cell
+from verification.kernel.report import environment
 from verification.kernel.writing import Block, plain, save, table
 
 RECORD = Path(__file__).parent / "report" / "hard_cases.json"
@@ -34,7 +34,7 @@ def as_json(cells: Iterable[Cell], live: bool = False) -> dict:
                                             "cells": {}})
         row["cells"][cell.preset] = {"verdict": cell.verdict, "accepted": not cell.unaccepted,
                                      **(_digits(cell) if live else {})}
-    return {"cases": [rows[number] for number in sorted(rows)], **({"machine": machine()} if live else {})}
+    return {"cases": [rows[number] for number in sorted(rows)], **({"machine": environment()} if live else {})}
 
 
 def _digits(cell: Cell) -> dict:
@@ -57,11 +57,6 @@ def write(cells: Iterable[Cell]) -> None:
     found = list(cells)
     save(as_json(found), RECORD)
     save(as_json(found, live=True), RECORD.parent / "live" / RECORD.name)
-
-
-def machine() -> str:
-    """What the seconds were measured on."""
-    return f"{platform.machine()}, {platform.system()}, Python {platform.python_version()}, one core"
 
 
 def blocks(record: dict) -> Iterator[Block]:

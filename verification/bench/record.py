@@ -36,6 +36,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import date
+from functools import partial
 from importlib.metadata import version
 from math import exp, isfinite, log
 from pathlib import Path
@@ -159,6 +160,17 @@ def measured(jobs: Jobs, repeats: int) -> list[dict]:
             if not times[key].reason and len(times[key].seconds) < wanted[key]:
                 times[key].run(job)
     return _lines(times)
+
+
+def series(method: str, label: str, sizes: Iterable, job: Callable, **how) -> Jobs:
+    """Jobs ``job(size, **how)`` of a method, one a size."""
+    return {(method, label.format(size)): partial(job, size, **how) for size in sizes}
+
+
+def part(title: str, error: str, reference: str, jobs: Jobs, repeats: int, once: Jobs | None = None, **more) -> dict:
+    """A part, measured; once: jobs that are run once; more: what else is told of it."""
+    lines = measured(jobs, repeats) + measured(once or {}, 1)
+    return {"title": title, "error": error, "reference": reference, "repeats": repeats, "lines": lines, **more}
 
 
 def _often(timed: Timed, repeats: int) -> int:

@@ -16,6 +16,7 @@ from pathlib import Path
 from verification.bench import runs
 from verification.bench.record import Reading, envelope, reading
 from verification.bench.record import line as line_of
+from verification.kernel.report import labelled
 from verification.kernel.writing import Block, table
 
 #: (error, least ratio, aim) of the paper's scheme at its own best speed over a preset.
@@ -267,11 +268,8 @@ def _precision(pyplot, part: dict):
         best = envelope(points)
         axis.loglog([p["seconds"] for p in best], [p["error"] for p in best], f"-{mark}", ms=4, color=color,
                     label=label)
-    axis.set_title(part["title"], fontsize=9)
-    axis.set_xlabel("wall time (s)", fontsize=8)
-    axis.set_ylabel(part["error"] if len(part["error"]) < 60 else "largest error", fontsize=8)
+    labelled(axis, part["title"], "wall time (s)", part["error"] if len(part["error"]) < 60 else "largest error")
     axis.grid(which="major", lw=0.3)
-    axis.tick_params(labelsize=7, which="both")
     figure.legend(fontsize=6, loc="outside right upper")
     return figure
 
@@ -289,12 +287,8 @@ def _size_picture(pyplot, part: dict):
                 axis.loglog(nodes, [v or nan for v in values], "--" if name == runs.FLOOR else "-", label=name)
         more = [p for p in line["points"] if p["memory_MB"] > 0]
         axes[-1].loglog([p["nodes"] for p in more], [p["memory_MB"] for p in more], "-o", ms=4, label=line["method"])
-        axis.set_title(line["method"], fontsize=9)
-        axis.set_ylabel("seconds a growth step", fontsize=8)
-    axes[-1].set_title("memory above the start's", fontsize=9)
-    axes[-1].set_ylabel("MB", fontsize=8)
+        labelled(axis, line["method"], "nodes", "seconds a growth step")
+    labelled(axes[-1], "memory above the start's", "nodes", "MB")
     for axis in axes:
-        axis.set_xlabel("nodes", fontsize=8)
-        axis.tick_params(labelsize=7, which="both")
         axis.legend(fontsize=6)
     return figure

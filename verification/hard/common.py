@@ -145,6 +145,12 @@ def close(found: Run, trusted: Run, preset: str, *columns: str, allowed: float =
     return checks
 
 
+def alike(told: str, names: Sequence[str], ours: Sequence[float], theirs: Sequence[float], preset: str) -> list[Check]:
+    """Numbers against others that may differ by what the preset promises, relative."""
+    apart = np.abs(np.array(ours) / theirs - 1)
+    return [at_most(f"{name} {told}", value, TOLERANCE[preset], PROMISED[preset]) for name, value in zip(names, apart)]
+
+
 def _supply(made: Scene, column: str) -> float:
     return (made.substrates.acceptor if "acceptor" in column else made.substrates.donor).supply
 

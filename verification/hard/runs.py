@@ -61,10 +61,8 @@ def _shares(now: Pore) -> np.ndarray:
 
 def _step_after(preset: str, made: Scene, first: Pore, now: Pore) -> list[Check]:
     """A step of 12 min from before and from after the remeshes."""
-    shapes = [_numbers(made, _step(made, start).pore) for start in (first, now)]
-    apart = np.abs(np.array(shapes[1]) / shapes[0] - 1)
-    return [at_most(f"{name} after a step more, with and without them", value, TOLERANCE[preset],
-                    common.PROMISED[preset]) for name, value in zip(NAMES, apart)]
+    without, found = (_numbers(made, _step(made, start).pore) for start in (first, now))
+    return common.alike("after a step more, with and without them", NAMES, found, without, preset)
 
 
 def _step(made: Scene, now: Pore):
@@ -154,20 +152,14 @@ def poor(preset: str) -> list:
     made = common.scene("base", preset, 'aggregate.radius="20 um"')
     good, _ = common.seeded(made)
     bad, count = _spoilt(good)
-    ends, fresh = [], []
+    ends = []
     for start in (good, bad):
-        now, remeshed = start, []
-        for _ in range(2):
-            step = _step(made, now)
-            now = step.pore
-            remeshed.append(step.remeshed)
-        ends.append(_numbers(made, now))
-        fresh.append(any(remeshed))
-    apart = np.abs(np.array(ends[1]) / ends[0] - 1)
+        first = _step(made, start)
+        second = _step(made, first.pore)
+        ends.append(_numbers(made, second.pore))
     return [at_least("poor triangles at the start", count, POOR_ALLOWED + 1, "else less is tested"),
-            at_least("remeshed on the way", fresh[1], 1, "3.5"),
-            *(at_most(f"{name} after two steps", value, TOLERANCE[preset], common.PROMISED[preset])
-              for name, value in zip(NAMES, apart))]
+            at_least("remeshed on the way", first.remeshed or second.remeshed, 1, "3.5"),
+            *common.alike("after two steps", NAMES, ends[1], ends[0], preset)]
 
 
 def _spoilt(now: Pore) -> tuple[Pore, int]:
@@ -352,15 +344,13 @@ def huge(preset: str) -> list:
     missing = far.ledger.biomass_after - far.ledger.biomass_before - far.ledger.biomass_made
     taken = [abs(1 - (far.ledger.out[k] + far.ledger.consumed[k]) / far.ledger.supplied[k]) for k in (0, 1)]
     shapes = [(step.pore.outline.area, step.pore.outline.thickness, step.pore.outline.upstream) for step in (near, far)]
-    apart = np.abs(np.array(shapes[0]) / shapes[1] - 1)
     return [fine, own, at_least("nodes", fine.instants[0].pore.space.count, 1e5, "else less is tested"),
             at_most("in - out - consumed over the step, over in", max(taken), 1e-12 * fine.last["nodes"],
                     "Newton's tolerance of 1e-12 a row, times the rows"),
             at_most("biomass after - before - made, over after", abs(missing) / far.ledger.biomass_after,
                     common.BALANCE, common.MEAN),
             *common.close(own, fine, preset, *DRIVE, *EFFLUENTS),
-            *(at_most(f"{name} after the step, own mesh", value, TOLERANCE[preset], common.PROMISED[preset])
-              for name, value in zip(("area", "thickness", "upstream tip"), apart))]
+            *common.alike("after the step, own mesh", NAMES, *shapes, preset)]
 
 
 LARGE = HardCase(

@@ -229,17 +229,18 @@ def _study(axis, study: Study) -> None:
     y = 0.5 * study.errors[-1] * (x / x[0]) ** order
     axis.loglog([x[0], x[1], x[1], x[0]], [y[0], y[0], y[1], y[0]], "k-", lw=0.8)
     axis.text(x[1] * 1.03, np.sqrt(y[0] * y[1]), f"{order:.3g}", fontsize=8, va="center")
-    _labelled(axis, study.quantity, "size of element or step", "error")
+    labelled(axis, study.quantity, "size of element or step", "error")
 
 
 def _profile(axis, profile: Profile) -> None:
     for name, kind, x, y in profile.curves:
         axis.plot(x, y, label=name, **STYLES[kind])
-    _labelled(axis, profile.title, profile.x_label, profile.y_label)
+    labelled(axis, profile.title, profile.x_label, profile.y_label)
     axis.legend(fontsize=6)
 
 
-def _labelled(axis, title: str, x_label: str, y_label: str) -> None:
+def labelled(axis, title: str, x_label: str, y_label: str) -> None:
+    """Title and labels of axes, small."""
     axis.set_title(title, fontsize=9)
     axis.set_xlabel(x_label, fontsize=8)
     axis.set_ylabel(y_label, fontsize=8)

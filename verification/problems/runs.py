@@ -15,7 +15,7 @@ from repro.model import pore
 from repro.model.pore import Pore, Solved
 from repro.scene import Scene, load_scene
 from verification.kernel.case import Profile
-from verification.problems import pairs
+from verification.problems import channels, pairs
 
 ROUND_OFF = "round-off"
 #: The velocity of base at t = 0, 2.9 m/d, in um/h.
@@ -144,17 +144,11 @@ PLACES = 81
 def pore_of(scene: Scene, speed=None) -> averaged_pore.Pore:
     """The scene's numbers; speed: (loss, half length) -> u, the scene's mean velocity if none."""
     law, both, drive = scene.kinetics, scene.substrates, scene.flow
-    rates = {"k": law.maximum_utilization_rate, "F": law.acceptor_to_donor_ratio, "Y": law.yield_coefficient,
-             "b": law.decay_coefficient, "remains": law.decay_coefficient * (1 - law.degradable_fraction),
-             "decay": law.decay_oxygen_demand * law.degradable_fraction * law.decay_coefficient,
-             "K_A": both.acceptor.half_saturation, "K_D": both.donor.half_saturation}
-
-    def pair(name):
-        return getattr(both.acceptor, name), getattr(both.donor, name)
-
-    return averaged_pore.Pore(scene.pore.width, scene.pore.length, drive.viscosity_ratio, pair("supply"),
-                              pair("diffusivity"), pair("diffusivity_in_aggregate"), law.maximum_density, rates,
-                              speed or (lambda loss, reach: drive.mean_velocity))
+    rates = {**channels.rates(law, both), "Y": law.yield_coefficient, "b": law.decay_coefficient,
+             "remains": law.decay_coefficient * (1 - law.degradable_fraction)}
+    both_of = (channels.pair(name, both) for name in ("supply", "diffusivity", "diffusivity_in_aggregate"))
+    return averaged_pore.Pore(scene.pore.width, scene.pore.length, drive.viscosity_ratio, *both_of, law.maximum_density,
+                              rates, speed or (lambda loss, reach: drive.mean_velocity))
 
 
 def half_disc_radius(area: float) -> float:
