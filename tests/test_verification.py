@@ -9,7 +9,7 @@ import pytest
 from reference import channel_bvp, channel_fipy, taylor_hood
 from repro.errors import LinearError
 from repro.fem.space import Space
-from verification.kernel import case, driver, matrix, mutants, report
+from verification.kernel import case, driver, matrix, mutants, report, writing
 from verification.kernel.case import (
     Check,
     Outcome,
@@ -314,3 +314,31 @@ def test_names_that_begin_and_end_alike_are_told_together():
              "Q, a", "Q, b", "u, 1, slow", "u, 2, slow", "u, 3, slow", "alone, x"]
     assert report.shared(names) == ("C: R = 5, fast; R = 7, fast (each order 2.0); R = 9, fast (order 1.9) / "
                                     "P, Q: a; b / u: 1; 2; 3, each slow / alone, x")
+
+
+def test_what_a_case_keeps_besides_tells_its_page():
+    """In the place of its numbers, which are judged all the same."""
+    class Kept(case.Note):
+        def lines(self, every):
+            return [("kept", f"{len(every)}", "why", True)]
+
+    chosen = case.Case("x", "flow", "c", "exact", "n", ("m",), False,
+                       lambda value: (at_most("q", value, 1.5, ""), Kept()), {"one": (1.0,), "two": (2.0,)})
+    found = case.run(chosen)
+    assert found.outcome.lines() == [("kept", "2", "why", True)] and len(found.outcome.checks) == 2 and not found.holds
+
+
+def test_tables_for_a_terminal_are_in_columns():
+    """What Markdown has alone is left out, what pages have is told."""
+    blocks = [writing.Block("heading", "H"), writing.table(("a", "long"), (("xyz", writing.Link("1", "flow")),)),
+              writing.table(("b",), (), brief=True), writing.table(("c",), (("d",),), detail=True)]
+    assert writing.plain(blocks) == "H\na    long\nxyz  1\nc\nd"
+
+
+def test_rows_that_were_appended_are_read_but_for_one_that_was_cut(tmp_path):
+    file = tmp_path / "deep" / "rows.jsonl"
+    assert writing.lines(file) == []
+    writing.append({"a": 1}, file)
+    with file.open("a", encoding="utf-8") as opened:
+        opened.write('{"a": 2')
+    assert writing.lines(file) == [{"a": 1}]
