@@ -2,8 +2,8 @@
 import json
 import math
 import os
-import pickle
 from itertools import count
+from multiprocessing.reduction import ForkingPickler
 
 import numpy as np
 import pytest
@@ -185,5 +185,5 @@ def test_every_hard_case_is_a_verification_case():
 def test_every_case_goes_from_process_to_process():
     """`make verify` runs them side by side."""
     for one in hard_cases.CASES:
-        again = pickle.loads(pickle.dumps(one))
+        again = ForkingPickler.loads(ForkingPickler.dumps(one))
         assert again.full_id == one.full_id and again.parts.keys() == one.parts.keys()
