@@ -16,6 +16,7 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 from math import floor, inf, isfinite, log10
 from time import perf_counter
+from typing import Self
 
 import numpy as np
 
@@ -32,10 +33,20 @@ ROUND_OFF = 1e-6
 
 
 @dataclass(frozen=True)
-class Check:
-    """One number in its accepted range; ``origin`` says where that range comes from."""
+class Quantity:
+    """What is judged, in words."""
 
     quantity: str
+
+    def labelled(self, label: str) -> Self:
+        """The same of one variant of its case."""
+        return replace(self, quantity=f"{self.quantity}, {label}")
+
+
+@dataclass(frozen=True)
+class Check(Quantity):
+    """One number in its accepted range; ``origin`` says where that range comes from."""
+
     value: float
     low: float
     high: float
@@ -61,10 +72,6 @@ class Check:
         if isfinite(self.low) and isfinite(self.high) and self.low != 0:
             return (self.high - self.low) / 2
         return abs(self.high if isfinite(self.high) else self.low)
-
-    def labelled(self, label: str) -> Check:
-        """The same number of one variant of its case."""
-        return replace(self, quantity=f"{self.quantity}, {label}")
 
     @property
     def used(self) -> float:
@@ -129,13 +136,12 @@ BAND = 0.3
 
 
 @dataclass(frozen=True, eq=False)
-class Study:
+class Study(Quantity):
     """Errors (k,) on a series of sizes (k,), falling: orders between neighbours must lie from low to high.
 
     ceiling: the last error must not exceed it; origin: where the expected order comes from.
     """
 
-    quantity: str
     sizes: np.ndarray
     errors: np.ndarray
     low: float
@@ -171,10 +177,6 @@ class Study:
     def told(self) -> str:
         """Orders to a tenth: what another machine finds too."""
         return f"order {', '.join(f'{order:.1f}' for order in self.orders)}"
-
-    def labelled(self, label: str) -> Study:
-        """The same study of one variant of its case."""
-        return replace(self, quantity=f"{self.quantity}, {label}")
 
     @property
     def _last(self) -> str:

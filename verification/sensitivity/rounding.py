@@ -267,14 +267,15 @@ def program(start: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, float]:
     middle, half = (np.array([weight @ pair for pair in targets().values()])
                     for weight in (np.array([0.5, 0.5]), AIMED * np.array([-0.5, 0.5])))
     rounding = np.array([each.rounding for each in ROUNDED])
-    A, column = slopes * rounding, np.ones((len(start), 1))
-    box, ones = np.vstack([np.eye(len(rounding)), -np.eye(len(rounding))]), np.ones((2 * len(rounding), 1))
-    inside = np.concatenate([middle + half - start, start - middle + half])
-    tight = np.hstack([np.vstack([np.vstack([A, -A]), box]), np.vstack([0 * column, 0 * column, -ones])])
-    best = _solved(tight, np.concatenate([inside, np.zeros(2 * len(rounding))]), None)
+    A, unit = slopes * rounding, np.eye(len(rounding))
+    none, ones = np.zeros((len(start), 1)), np.ones((len(rounding), 1))
+    tight = np.block([[A, none], [-A, none], [unit, -ones], [-unit, -ones]])
+    inside = np.concatenate([middle + half - start, start - middle + half, np.zeros(2 * len(rounding))])
+    best = _solved(tight, inside, None)
     if best is not None and best[-1] <= 1:
         return best[:-1] * rounding, float(best[-1])
-    loose = np.hstack([np.vstack([A, -A]), -np.vstack([half[:, None], half[:, None]]) / AIMED])
+    reach = half[:, None] / AIMED
+    loose = np.block([[A, -reach], [-A, -reach]])
     least = _solved(loose, np.concatenate([middle - start, start - middle]), 1.0)
     return least[:-1] * rounding, float(best[-1]) if best is not None else float("inf")
 
@@ -292,19 +293,19 @@ FAST = ('numerics.preset="fast"',)
 
 def moving(elasticities: dict[str, dict[str, dict]]) -> list[Input]:
     """Rounded inputs with an elasticity above LEAST of any printed number."""
-    return [each for each in ROUNDED
-            if max(abs(elasticities[name][each.name]["elasticity"]) for name in PRINTED) > LEAST]
+    return [each for each in ROUNDED if any(_moves(each, elasticities[name]) for name in PRINTED)]
 
 
-def _moved(known: dict[str, dict]) -> bool:
-    """Does any rounded input move a number?"""
-    return max(abs(known[each.name]["elasticity"]) for each in ROUNDED) > LEAST
+def _moves(each: Input, known: dict[str, dict]) -> bool:
+    """Does an input move a number?"""
+    return abs(known[each.name]["elasticity"]) > LEAST
 
 
 def sobol(runs: Runs, elasticities: dict[str, dict[str, dict]], samples: int) -> dict:
     """First-order and total indices of each printed number, with their intervals."""
     chosen = moving(elasticities)
-    names = [name for name in PRINTED if name != "consumed" and _moved(elasticities[name])]
+    names = [name for name in PRINTED
+             if name != "consumed" and any(_moves(each, elasticities[name]) for each in ROUNDED)]
 
     def numbers(x: np.ndarray) -> np.ndarray:
         rows = [runs.numbers(scene("base", dict(zip([each.name for each in chosen], column)), *FAST)) for column in x.T]
