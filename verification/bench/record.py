@@ -82,17 +82,19 @@ def processor(file: Path = Path("/proc/cpuinfo")) -> str:
     return names[0] if names else platform.processor() or "unknown"
 
 
-def import_seconds(times: int = IMPORTS) -> dict[str, float]:
+def import_seconds() -> dict[str, float]:
     """Median seconds that a new process takes to import each package, less what it takes to import nothing."""
-    bare = median(_started("pass") for _ in range(times))
-    return {name: max(0.0, median(_started(f"import {module}") for _ in range(times)) - bare)
-            for name, module in IMPORTED.items()}
+    bare = _started("pass")
+    return {name: max(0.0, _started(f"import {module}") - bare) for name, module in IMPORTED.items()}
 
 
 def _started(statement: str) -> float:
-    start = perf_counter()
-    subprocess.run([sys.executable, "-c", statement], check=True, capture_output=True)
-    return perf_counter() - start
+    seconds = []
+    for _ in range(IMPORTS):
+        start = perf_counter()
+        subprocess.run([sys.executable, "-c", statement], check=True, capture_output=True)
+        seconds.append(perf_counter() - start)
+    return median(seconds)
 
 
 def merged(record: dict, parts: dict, repeats: dict, imports: dict | None = None) -> dict:

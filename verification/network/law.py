@@ -224,9 +224,9 @@ NEW_RUNS, OF_EACH, LARGEST, FURTHER = 3, 8, 3.0, 1.05
 END = 50
 
 
-def new_shapes(seed: int = SEED) -> Iterator[Sample]:
+def new_shapes() -> Iterator[Sample]:
     """All fifty, each at a lambda of its own, or of its run."""
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(SEED)
     yield from _drawn(random)
     for _ in range(NEW_RUNS):
         yield from _grown(random)

@@ -21,6 +21,8 @@ ROUND_OFF = "round-off"
 #: The velocity of base at t = 0, 2.9 m/d, in um/h.
 SPEED = 2.9e6 / 24
 PRESETS = ("paper", "fast", "accurate")
+#: Of a section, at which a mean is taken.
+POINTS = 16
 #: Kinds of elements, by the names that scenes have for them: of order 1, 2 and 3.
 ELEMENTS = ("linear", "quadratic", "cubic")
 
@@ -106,14 +108,14 @@ def density_drift(scene: Scene, instant: Instant) -> float:
     return float(np.abs(density / scene.kinetics.maximum_density - 1).max())
 
 
-def section_means(now: Pore, solved: Solved, x: np.ndarray, points: int = 16) -> np.ndarray:
+def section_means(now: Pore, solved: Solved, x: np.ndarray) -> np.ndarray:
     """(2, K) means of C_A and C_D over the sections x (K,) of the mesh."""
     found = solved.concentrations
-    place, weight = np.polynomial.legendre.leggauss(points)
+    place, weight = np.polynomial.legendre.leggauss(POINTS)
     y = 0.5 * now.mesh.width * (1 + place)
-    where = np.column_stack([np.repeat(x, points), np.tile(y, len(x))])
+    where = np.column_stack([np.repeat(x, POINTS), np.tile(y, len(x))])
     values = pairs.sample(now.space, np.column_stack([found.acceptor, found.donor]), where)
-    return np.einsum("kpm,p->mk", values.reshape(len(x), points, 2), 0.5 * weight)
+    return np.einsum("kpm,p->mk", values.reshape(len(x), POINTS, 2), 0.5 * weight)
 
 
 def growth_rates(scene: Scene, acceptor: float | None = None, donor: float | None = None) -> tuple[float, float]:
