@@ -41,9 +41,8 @@ from verification.claims import (
 )
 from verification.claims import __main__ as driver
 from verification.claims.levels import CONVERGED, SCHEME, Level, at_level
-from verification.sensitivity.numbers import factors_of, of_base
-from verification.sensitivity.numbers import scene as scene_of
-from verification.sensitivity.rounding import reached
+from verification.sensitivity.rounding import factors_of, of_base, reached
+from verification.sensitivity.rounding import scene as scene_of
 from verification.uncertainty import Bar
 
 ROOT = Path(__file__).parents[1]

@@ -15,6 +15,7 @@ from verification.claims import levels, runs
 from verification.claims.runs import BASE, PLATES, WIDE
 from verification.errata import ERRATA, percent
 from verification.errata.__main__ import REPORT, entry, load
+from verification.kernel.writing import markdown
 from verification.switches import CHOICES, NUMBERS
 
 IDS = load()
@@ -189,7 +190,7 @@ def test_an_uneven_seed_is_one_percent_off(seed, downstream, upstream):
 
 def test_the_table_names_every_row_and_what_is_resolved():
     row = {"choice": "extent", "default": "central", "alternative": "full", "cost_ratio": 2.5,
-           "effect": {"velocity": -0.01, "area": 0.001}, "one_state": {}}
-    head, line = audit.table([row])
-    assert "cost" in head and all(word in line for word in ("extent", "2.50", "-1.0e-02 velocity"))
+           "effect": {"velocity": -0.01, "area": 0.001}, "one_state": {}, "note": ""}
+    text = markdown(audit.blocks({"method": "one changed at a time", "rows": [row]}))
+    assert "| extent | central | full | 2.50 | -1 % | +0.1 % |  | -1 % (velocity) |  |  |" in text
     assert audit.resolved(row["effect"], {"velocity": 0.0049, "area": -0.0006}) == ["velocity"]

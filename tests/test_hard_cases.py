@@ -1,8 +1,8 @@
 """Hard cases: a cell is right, refused or wrong for the right reason, and a few of the real ones are right."""
-import copy
 import json
 import math
 from itertools import count
+from multiprocessing.reduction import ForkingPickler
 
 import numpy as np
 import pytest
@@ -13,7 +13,8 @@ from verification import hard_cases
 from verification.hard import common, runs
 from verification.hard.common import PRESETS, REFUSED, RIGHT, WRONG, HardCase
 from verification.kernel import case
-from verification.kernel.case import Check, Outcome, Result, at_least, at_most, between
+from verification.kernel.case import Check, Outcome, Result, at_least, at_most, between, outcome
+from verification.kernel.writing import plain
 
 GOOD, BAD = at_most("good", 0.5, 1.0, ""), at_most("bad", 2.0, 1.0, "")
 KNOWN = {case.number: case for case in hard_cases.CASES}
@@ -61,15 +62,16 @@ def test_a_cell_is_as_its_worst_part(verdicts, worst):
 @pytest.mark.parametrize("verdict, preset, more, fine", [
     (RIGHT, "fast", {}, True), (REFUSED, "fast", {}, False), (REFUSED, "paper", {}, True), (WRONG, "paper", {}, False),
     (WRONG, "fast", {"refusable": ("wrong 0",)}, False), (REFUSED, "fast", {"refusable": ("refused 0",)}, True),
-    (REFUSED, "fast", {"refusable": ("refused 1",)}, False), (WRONG, "paper", {"explained": {"wrong 0": "why"}}, True),
-    (WRONG, "fast", {"explained": {"wrong 0": "why"}}, False),
+    (REFUSED, "fast", {"refusable": ("refused 1",)}, False),
 ])
 def test_what_is_accepted(verdict, preset, more, fine):
     """A verification case holds if it is so with all presets."""
     chosen = a_case([verdict, RIGHT], **more)
-    accepted = {name: not common.run_cell(chosen, name).unaccepted for name in PRESETS}
+    cells = {name: common.run_cell(chosen, name) for name in PRESETS}
+    accepted = {name: not cell.unaccepted for name, cell in cells.items()}
     assert accepted[preset] is fine
-    assert Result("hard-99", common.run_case(chosen), "", 0.0).holds is all(accepted.values())
+    found = outcome(common.measured(cell) for cell in cells.values())
+    assert Result("hard-99", found, "", 0.0).holds is all(accepted.values()) and len(found.notes) == len(PRESETS)
 
 
 @pytest.mark.parametrize("check, value", [
@@ -77,7 +79,7 @@ def test_what_is_accepted(verdict, preset, more, fine):
     (between("q", 1.25, 1.0, 2.0, ""), 0.5), (at_most("q", 3.0, 2.0, ""), math.inf),
     (Check("q", math.nan, 0.0, 1.0, ""), math.inf)])
 def test_what_a_check_uses_of_its_tolerance(check, value):
-    assert common.used(check) == pytest.approx(value)
+    assert check.used == pytest.approx(value)
 
 
 def test_there_are_twenty_two_verification_cases_and_only_some_may_refuse():
@@ -85,15 +87,17 @@ def test_there_are_twenty_two_verification_cases_and_only_some_may_refuse():
     assert {number for number, one in KNOWN.items() if one.refusable} <= {3, 4, 5, 15, 17, 19, 22}
     assert {one.full_id for one in KNOWN.values()} == {id for id, c in case.CASES.items() if c.stage == "hard"}
     for one in KNOWN.values():
-        assert set(one.refusable) | set(one.explained) <= set(one.parts)
+        assert set(one.refusable) <= set(one.parts)
         assert one.mutants and one.title and one.right_is and one.failure_is
-        assert copy.copy(one) is one  # as it goes from process to process: by its number
+        assert {*case.CASES[one.full_id].over} == {*PRESETS}
+        again = ForkingPickler.loads(ForkingPickler.dumps(one))  # as it goes from process to process
+        assert again.full_id == one.full_id and again.parts.keys() == one.parts.keys()
 
 
 def test_the_matrix_is_told_and_written(tmp_path, monkeypatch):
     cells = [common.run_cell(a_case([RIGHT, REFUSED]), preset) for preset in PRESETS]
     monkeypatch.setattr(hard_cases, "RECORD", tmp_path / "report" / "hard_cases.json")
-    hard_cases.record([Result("hard-99", common.outcome(cells), "", 0.0), Result("other", Outcome(), "", 0.0)])
+    hard_cases.record([Result("hard-99", Outcome(notes=tuple(cells)), "", 0.0), Result("other", Outcome(), "", 0.0)])
     kept, live = (json.loads((hard_cases.RECORD.parent / folder / hard_cases.RECORD.name).read_text())
                   for folder in (".", "live"))
     assert [line["number"] for line in kept["cases"]] == [99] and live["machine"] and "machine" not in kept
@@ -101,8 +105,8 @@ def test_the_matrix_is_told_and_written(tmp_path, monkeypatch):
     assert set(verdicts) == set(PRESETS) and verdicts["paper"]["accepted"]
     assert verdicts["fast"] == {"verdict": REFUSED, "accepted": False}
     assert "try another mesh" in measured["paper"]["message"] and measured["fast"]["checks"][0]["quantity"] == "good"
-    told = hard_cases.matrix(cells)
-    assert "refused!" in told and "99 fast: refused 1: try another mesh" in told
+    told = plain(hard_cases.blocks(live))
+    assert "refused!" in told and "99    fast      refused 1: try another mesh" in told
 
 
 @pytest.mark.parametrize("verdict, arguments, status", [(RIGHT, ["--preset", "fast"], 0), (WRONG, [], 1)])

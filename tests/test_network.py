@@ -8,7 +8,7 @@ import repro
 from repro.results import read_table
 from repro.results.network import TABLE, known
 from verification.network import __main__ as command
-from verification.network import law, shapes, unseen
+from verification.network import law, shapes
 from verification.network.shapes import RATIOS, Sample
 
 LAMBDA = 2000.0
@@ -56,7 +56,7 @@ def test_the_table_has_half_discs_of_the_present_code(thickness):
 
 def test_fifty_shapes_that_the_fit_has_not_seen_are_within_the_bounds():
     """Half-discs, drawn bodies and plugs, and what three runs make, each at a lambda of its own."""
-    found = list(unseen.every())
+    found = list(law.new_shapes())
     columns = {name: np.array(values, float) for name, values in
                zip(law.COLUMNS, zip(*(law.shape_row(one, 0, 1) for one in found)))}
     judged = law.judged(columns)
@@ -171,7 +171,7 @@ def test_the_command_writes_table_shapes_and_page(tmp_path, monkeypatch, capsys,
              for run in law.RUNS[:2] for share in np.geomspace(1.4, 4.7, 30)]
     new = Sample(None, False, 0.5, (LAMBDA,), (length or float(repro.added_resistance(0.5, 1, False).length),))
     for room, name, value in ((law, "half_discs", lambda: discs), (law, "others", lambda: iter([*discs, *plugs])),
-                              (unseen, "every", lambda: iter([new])), (law, "SHAPES", tmp_path / "shapes.csv"),
+                              (law, "new_shapes", lambda: iter([new])), (law, "SHAPES", tmp_path / "shapes.csv"),
                               (command, "TABLE", tmp_path / "network.csv"), (command, "PAGE", tmp_path / "network.md")):
         monkeypatch.setattr(room, name, value)
     assert command.main() == 1 - inside and f"{inside} of 1 shapes" in capsys.readouterr().out

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from verification.sampled import drawing, hunting, page, reach
+from verification.sampled import drawing, hunting, trying
 from verification.sampled.drawing import Mutant
 from verification.sampled.hunting import Row
-from verification.sampled.reach import Measured, Reach
+from verification.sampled.trying import Measured, Reach
 
 CODE = '''"""A module."""
 from os import path
@@ -46,7 +46,7 @@ def test_waits():
 #: A project of its own, tried as it is and with two mutants: what is caught, what is not, what does not end.
 TRIED = '''
 import json, pathlib, sys
-from verification.sampled import hunting, reach, trying
+from verification.sampled import hunting, trying
 there = pathlib.Path(sys.argv[1]).resolve()
 module = there / "repro" / "m.py"
 code = module.read_text()
@@ -59,7 +59,7 @@ small, waits = ["test_small"], ["test_waits"]
 told = {"sound": run(["test_waits", "test_box", "test_small"]), "caught": run(small, "< LIMIT", "> LIMIT"),
         "survivor": run(small, "least < given", "least <= given"), "endless": run(waits, "< LIMIT", "<= LIMIT", 2.0)}
 hunting.put(module, code)
-told["reach"] = {id: calls for id, (_, calls) in reach._measure(there, "test_m.py").items()}
+told["reach"] = {id: calls for id, (_, calls) in trying._measure(there, "test_m.py").items()}
 print(json.dumps(told))
 '''
 
@@ -97,7 +97,7 @@ def test_what_is_drawn_is_python_and_no_annotation():
 
 def test_tests_are_those_that_call_the_function_the_cheapest_first(monkeypatch):
     """A name's are those that call a function that names it; of what has no name, all."""
-    monkeypatch.setitem(reach._MENTIONED, "m.py", {"small": {"LIMIT"}, "Box.twice": {"size"}})
+    monkeypatch.setitem(trying._MENTIONED, "m.py", {"small": {"LIMIT"}, "Box.twice": {"size"}})
     quick, slow = (Measured(name, cost, frozenset({("m.py", "small")})) for name, cost in (("q", 0.1), ("s", 9.0)))
     box = Measured("b", 1.0, frozenset({("m.py", "Box.twice")}))
     known = Reach((quick, box, slow))
@@ -161,15 +161,15 @@ def rows(**counts):
 def test_the_share_is_that_of_the_caught_without_few_equivalent_ones(monkeypatch, counts, equal, holds):
     given = rows(**counts)
     if equal:
-        monkeypatch.setitem(page.EQUIVALENT, page.key(given[-1]), "it is the same")
-    found = page.judged(given)
-    assert len(found["equivalent"]) == equal and page.holds(found) is holds
+        monkeypatch.setitem(hunting.EQUIVALENT, hunting.key(given[-1]), "it is the same")
+    found = hunting.judged(given)
+    assert len(found["equivalent"]) == equal and hunting.holds(found) is holds
 
 
 def test_the_page_tells_every_mutant_and_the_numbers(monkeypatch):
     given = rows(caught=19, survivor=1)
-    monkeypatch.setitem(page.LEFT, page.key(given[-1]), ("nothing moves", "it is seldom"))
-    text = page.text(given, 20)
+    monkeypatch.setitem(hunting.LEFT, hunting.key(given[-1]), ("nothing moves", "it is seldom"))
+    text = hunting.text(given, 20)
     assert "20 of 20 mutants tried" in text and "95.0 %" in text and text.count("timing.py:1 |") == 1
     assert "| timing.py | 20 | 19 |" in text
     assert "| nothing moves | it is seldom |" in text
@@ -177,5 +177,5 @@ def test_the_page_tells_every_mutant_and_the_numbers(monkeypatch):
 
 def test_reasons_are_given_for_lines_that_are_there():
     texts = drawing.sources()
-    for file, old, new in {**page.EQUIVALENT, **page.LEFT}:
+    for file, old, new in {**hunting.EQUIVALENT, **hunting.LEFT}:
         assert old != new and all(line in " ".join(texts[file].split()) for line in old.splitlines()), (file, old)

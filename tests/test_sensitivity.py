@@ -9,7 +9,7 @@ from verification.claims import runs
 from verification.claims.levels import at_level
 from verification.sensitivity import __main__ as driver
 from verification.sensitivity import rounding, wide
-from verification.sensitivity.numbers import BY_NAME, EXACT, OF, ROUNDED, Runs, changed, factors_of, scene
+from verification.sensitivity.rounding import BY_NAME, EXACT, OF, ROUNDED, Runs, changed, factors_of, scene
 
 PAPER = {"k": 9.3 / 24, "Y": 0.61, "b": 0.12 / 24, "f_d": 0.8, "d_c": 1.42, "F": 1.52, "K_sA": 1.0, "K_sD": 1.0,
          "D_a": 2.32e8 / 24, "D_fa": 1.85e8 / 24, "D_d": 1.01e8 / 24, "D_fd": 0.81e8 / 24}

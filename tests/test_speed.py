@@ -11,6 +11,7 @@ from verification import speed
 from verification.bench import __main__ as bench
 from verification.bench import record, runs, told
 from verification.bench.record import reading
+from verification.kernel import writing
 
 
 def point(seconds, error, **more):
@@ -115,14 +116,14 @@ def test_memory_that_grows_is_seen():
 def test_the_record_is_read_back_and_keeps_what_was_not_measured_again(tmp_path):
     file = tmp_path / "deep" / "bench.json"
     first = record.merged(record.empty(), base(), {"base": 3}, {"fipy": 0.5})
-    record.save(first, file)
+    writing.save(first, file)
     assert record.load(file) == first and record.load(tmp_path / "none.json") == record.empty()
     again = record.merged(first, {"flow": {"title": "t"}}, {"flow": 5})
     assert set(again["parts"]) == {"base", "flow"} and again["machine"]["repeats"] == {"base": 3, "flow": 5}
     assert again["machine"]["import_seconds"] == {"fipy": 0.5}
     for value in (nan, inf):
         with pytest.raises(ValueError):
-            record.save({"parts": {"a": value}}, file)
+            writing.save({"parts": {"a": value}}, file)
     assert record.load(file) == first
 
 

@@ -223,3 +223,31 @@ def test_random_meshes_cover_their_rectangle_and_follow_their_lines():
     grid = meshes.channel((-10.0, 20.0), 8.0, 1.1, lambda x, y: (x > 0) & (y < 3), across=(0.0,), along=(3.0,), seed=3)
     assert grid.areas.min() > 0 and grid.areas.sum() == pytest.approx(240.0, rel=1e-13)
     assert grid.areas[grid.biomass].sum() == pytest.approx(60.0, rel=1e-13)
+
+
+def test_what_a_case_keeps_besides_tells_its_page():
+    """In the place of its numbers, which are judged all the same."""
+    class Kept(case.Note):
+        def lines(self, every):
+            return [("kept", f"{len(every)}", "why", True)]
+
+    chosen = case.Case("x", "flow", "c", "exact", "n", ("m",), False,
+                       lambda value: (at_most("q", value, 1.5, ""), Kept()), {"one": (1.0,), "two": (2.0,)})
+    found = case.run(chosen)
+    assert found.outcome.lines() == [("kept", "2", "why", True)] and len(found.outcome.checks) == 2 and not found.holds
+
+
+def test_tables_for_a_terminal_are_in_columns():
+    """What Markdown has alone is left out, what pages have is told."""
+    blocks = [writing.Block("heading", "H"), writing.table(("a", "long"), (("xyz", writing.Link("1", "flow")),)),
+              writing.table(("b",), (), brief=True), writing.table(("c",), (("d",),), detail=True)]
+    assert writing.plain(blocks) == "H\na    long\nxyz  1\nc\nd"
+
+
+def test_rows_that_were_appended_are_read_but_for_one_that_was_cut(tmp_path):
+    file = tmp_path / "deep" / "rows.jsonl"
+    assert writing.lines(file) == []
+    writing.append({"a": 1}, file)
+    with file.open("a", encoding="utf-8") as opened:
+        opened.write('{"a": 2')
+    assert writing.lines(file) == [{"a": 1}]

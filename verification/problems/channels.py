@@ -31,6 +31,7 @@ from verification.problems import meshes
 SCENE = load_scene("base")
 WIDTH, SLAB = 10.0, 40.0
 NAMES = ("acceptor", "donor")
+HEIGHTS = 5
 #: Under plug flow the slab is 0 < x < SLAB; without flow |x| < SLAB, between films of fluid of thickness FILM or none.
 CROSSED, FILM = (-20.0, 60.0), 20.0
 #: The same with more fluid at both ends, for order 2 and 3.
@@ -177,11 +178,11 @@ def sample(space: Space, fields: np.ndarray, where: np.ndarray) -> np.ndarray:
     return meshes.field_at(space, fields.T, where).T
 
 
-def at_heights(space: Space, fields: np.ndarray, x, heights: int = 5) -> np.ndarray:
-    """(2, heights, n) fields (2, n) at x (n,), at so many heights."""
-    y = WIDTH * (np.arange(heights) + 0.5) / heights
-    where = np.column_stack([np.tile(x, heights), np.repeat(y, len(x))])
-    return sample(space, fields, where).reshape(2, heights, -1)
+def at_heights(space: Space, fields: np.ndarray, x) -> np.ndarray:
+    """(2, HEIGHTS, n) fields (2, n) at x (n,), at so many heights."""
+    y = WIDTH * (np.arange(HEIGHTS) + 0.5) / HEIGHTS
+    where = np.column_stack([np.tile(x, HEIGHTS), np.repeat(y, len(x))])
+    return sample(space, fields, where).reshape(2, HEIGHTS, -1)
 
 
 @dataclass(frozen=True, eq=False)
