@@ -90,8 +90,9 @@ def test_contact_closes_the_film_and_the_run_goes_on(touching):
         assert (outline.points[outline.wall == BOTTOM, 1] == 0.0).all()
         assert outline.thickness == pytest.approx(20.0, rel=1e-15 if outline.geometry == 1 else 1e-14)
         assert outline.fixed[top].sum() == 1 and not instant.pore.mesh.turned_over().any()
-        assert instant.solved.flow.conductivity < 0.3 * found[0].solved.flow.conductivity
         assert instant.solved.concentrations.acceptor.min() > 0
+        if made.numerics.time == "updates":
+            assert instant.solved.flow.conductivity < 0.3 * found[0].solved.flow.conductivity
         if outline.geometry == 2:
             middles = np.flatnonzero(top[1::2]) * 2 + 1
             assert not outline.fixed[1::2].any()
