@@ -313,35 +313,47 @@ def test_a_density_over_the_largest_reads_as_it_is():
     assert shown.max() == pytest.approx(1.2, rel=1e-12)
 
 
-LEAKS = {"acceptor_balance": ("supplied", 0), "donor_balance": ("supplied", 1), "biomass_balance": ("biomass_after", 0)}
+#: What a leak changes, and of which substrate.
+LEAKS = {"acceptor_balance": ("supplied", 0), "donor_balance": ("supplied", 1), "biomass_balance": ("biomass_after", 0),
+         "oxygen_demand_balance": ("biomass_made", 0)}
 
 
 def leaky(column, leak):
-    """(scene, Instant) after three steps of which the middle one supplies, or holds, so much too much."""
+    """(scene, Instant) after three steps of which the middle one supplies, holds, or makes, so much too much."""
     scene, at = late(2)
-    name, k = LEAKS[column]
+    k = scene.kinetics
+    grown, decayed = 2 * k.yield_coefficient, (4 - 2 * k.acceptor_to_donor_ratio) / k.decay_oxygen_demand
     even = replace(at.ledgers[0], supplied=(5.0, 3.0), out=(1.0, 1.0), consumed=(4.0, 2.0), stored=(0.0, 0.0),
-                   biomass_before=70.0, biomass_made=10.0, biomass_after=80.0)
+                   biomass_before=70.0, biomass_made=grown - decayed, biomass_after=70.0 + grown - decayed)
+    name, which = LEAKS[column]
     if name == "supplied":
         # Of a defect over what is supplied: x = (s - s0) / s, so s = s0 / (1 - x).
         supplied = [5.0, 3.0]
-        supplied[k] /= 1 - leak
+        supplied[which] /= 1 - leak
         middle = replace(even, supplied=tuple(supplied))
-    else:
-        middle = replace(even, biomass_after=80.0 / (1 - leak))
+    elif name == "biomass_after":
+        middle = replace(even, biomass_after=even.biomass_after / (1 - leak))
+    else:  # over the larger of what grows and what decays
+        more = leak * max(abs(grown), abs(decayed))
+        middle = replace(even, biomass_made=even.biomass_made + more, biomass_after=even.biomass_after + more)
     return scene, replace(at, ledgers=(even, middle, even))
 
 
 @pytest.mark.parametrize("leak", [0.01, -0.01])
 @pytest.mark.parametrize("column", LEAKS)
 def test_a_leak_in_the_middle_of_three_steps_is_read_with_its_sign(column, leak):
+    """In timeseries.csv and on the page, and of the oxygen demand in ledger.csv."""
     scene, at = leaky(column, leak)
     row = results.row(scene, at)
     assert row[column] == pytest.approx(leak, rel=1e-9)
     assert max(abs(row[name]) for name in LEAKS if name != column) < 1e-6
+    steps = [dict(zip(results.LEDGER_COLUMNS, results.ledger_row(scene, ledger))) for ledger in at.ledgers]
+    wanted = [0.0, leak if column == "oxygen_demand_balance" else 0.0, 0.0]
+    assert [step["oxygen_demand_balance"] for step in steps] == pytest.approx(wanted, rel=1e-9, abs=1e-12)
     table = {name: np.array([0.0, value]) for name, value in row.items()}
     (chart,) = [one for one in quantities.charts_of(Run(None, {}, table, {})) if "balances" in one.title]
-    (line,) = [one for one in chart.lines if one.label == column.removesuffix("_balance")]
+    label = column.removesuffix("_balance").replace("_", " ")
+    (line,) = [one for one in chart.lines if one.label == label]
     assert line.values[-1] == pytest.approx(leak, rel=1e-9) and "relative defect" in chart.axis
 
 
