@@ -284,6 +284,13 @@ def test_a_run_killed_at_its_very_end_is_tidied(tmp_path):
     assert (tmp_path / "report.html").read_bytes() == page and not (tmp_path / PREVIOUS).exists()
 
 
+def written(path):
+    """When a file was written, in ns; zero where there is none."""
+    with suppress(FileNotFoundError):
+        return path.stat().st_mtime_ns
+    return 0
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("seed", range(6))
 def test_killed_again_and_again(tmp_path, seed):
@@ -292,19 +299,19 @@ def test_killed_again_and_again(tmp_path, seed):
     whole = whole_of(load_scene("base", ["growth.end=4 h"]))
     out = tmp_path / "run"
     arguments = [*LONG, "--out", out]
-    most = 0.7 * told(whole)["wall_time_s"]
+    awaited = out / "run.json"
     draw = random.Random(seed)
-    least = 0.0
     status = None
     while status is None:
+        last = written(awaited)
         process = started(*arguments, "--checkpoint", "0.1")
-        wait_for((out / "run.json").exists, process)
+        wait_for(lambda awaited=awaited, last=last: written(awaited) > last, process)
         with suppress(TimeoutExpired):
-            status = process.wait(least + draw.uniform(0, most))
+            status = process.wait(draw.uniform(0, 0.5 * told(whole)["wall_time_s"]))
         process.kill()
         process.communicate()
         arguments = ["--resume", out]
-        least = 1.0  # what it takes to start
+        awaited = out / NEWEST
     assert status == 0 and len(told(out)["resumes"]) > 0
     assert files(out) == files(whole) and lasting(out) == lasting(whole)
 
