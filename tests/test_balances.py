@@ -11,7 +11,6 @@ from hypothesis import assume, event, example, given
 from hypothesis import strategies as st
 
 from repro.errors import SimulationError, TransportError, Unresolved
-from repro.fem import elements
 from repro.march import midpoint, updates
 from repro.march.balance import oxygen_demand
 from repro.march.loop import Ledger
@@ -21,7 +20,8 @@ from repro.model.kinetics import Sink
 from repro.results import read_table, row
 from repro.scene import load_scene
 from tests import oracles, pages, shell
-from tests.strategies import ORDERS, between, constants, scene, scenes, share
+from tests.strategies import ORDERS, between, scene, scenes, share
+from tests.test_derived import over_end, taken_up
 
 ANY_ORDER = tuple(ORDERS.values())
 EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
@@ -43,30 +43,6 @@ def substrate_fields(state):
 
 def supplies(made):
     return made.substrates.acceptor.supply, made.substrates.donor.supply
-
-
-def consumed(made, now, state):
-    """[acceptor, donor] taken up in an instant (um2 mg/L/h): point by point, X times -F1 and -F2 over X; on linear
-    elements node by node."""
-    pieces, sums = now.space.reaction, [0.0, 0.0]
-    for nodes, masses in zip(pieces.cells, now.active):
-        for N, X in zip(pieces.values, masses):
-            at = [max(N @ field[nodes], 0.0) for field in substrate_fields(state)]
-            for substrate in (0, 1):
-                sums[substrate] -= X * oracles.rates(*at, **constants(made))[substrate]
-    return sums
-
-
-def carried_out(now, flow, field):
-    """Flux of u_x C through the outlet (um2 mg/L/h), side by side, by Gauss's rule of as many points as make it exact.
-    """
-    total, (place, weight) = 0.0, np.polynomial.legendre.leggauss(now.space.order + 2)
-    t = (place + 1) / 2
-    along = elements.values(now.space.order, np.column_stack([t, 0 * t]))[:, elements.ON_EDGE[now.space.order]]
-    for nodes in now.space.dofs.outlet:
-        length = now.mesh.points[nodes[-1], 1] - now.mesh.points[nodes[0], 1]
-        total += length / 2 * weight @ ((along @ flow.velocity[nodes, 0]) * (along @ field[nodes]))
-    return total
 
 
 def round_off(problem, field, k):
@@ -126,10 +102,10 @@ def assert_supplied_leaves_or_is_taken_up(made, found):
     for instant in found:
         now, solved = instant.pore, instant.solved
         both = transport.fluxes(solved.problem, Sink(now.active), solved.concentrations)
-        taken = consumed(made, now, solved.concentrations)
+        taken = taken_up(made, now, solved.concentrations)
         for k, (flux, field, supply) in enumerate(zip(both, substrate_fields(solved.concentrations), supplies(made))):
             bound = round_off(solved.problem, field, k)
-            out = carried_out(now, solved.flow, field) if solved.flow else 0.0
+            out = over_end(now.space, now.mesh.ends[1], solved.flow.velocity[:, 0], field) if solved.flow else 0.0
             assert flux.consumed == pytest.approx(taken[k], rel=1e-11, abs=1e-300)
             assert flux.out == pytest.approx(out, rel=1e-12, abs=1e-300)
             assert abs(flux.supplied - out - taken[k]) <= bound
