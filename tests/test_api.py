@@ -97,17 +97,6 @@ def test_public_names():
     assert not hasattr(repro, "nothing")
 
 
-def test_the_map_names_every_module_of_the_package():
-    folder = importlib.resources.files("repro")
-    modules = {path.name.removesuffix(".py") for path in folder.iterdir() if path.name.endswith(".py")}
-    named = set(re.findall(r"repro\.(\w+)", repro.__doc__))
-    assert modules - {"__init__", "__main__"} - named - OTHERS == set()
-
-
-#: Modules that hold nothing but a few words, and need no place on the map.
-OTHERS = {"errors", "files"}
-
-
 def test_what_the_package_ships():
     project = (importlib.resources.files("repro") / ".." / "pyproject.toml").read_text(encoding="utf-8")
     for name in ("py.typed", "results/network.csv"):

@@ -19,6 +19,9 @@ SCENES = {
     "fast": ["numerics.preset=fast", "numerics.tolerance=0.001", "growth.end=9 h"],
     "fast, long steps": ["numerics.preset=fast", "growth.end=9 h"],
     "fast, rows at times": ["numerics.preset=fast", "growth.end=9 h", 'output.times=["0 h", "2 h", "3 h"]'],
+    "fast, contact": ["numerics.preset=fast", "growth.end=0.8 h", "aggregate.radius=17.8 um", "pore.width=20 um",
+                      "flow.head=1 mm", "numerics.tolerance=0.001", "growth.new_biomass=stress_free"],
+    "gear": ["growth.end=0.7 h", "numerics.transport=gear"],
     "to the pore's end": ["aggregate.radius=40 um", "pore.length=90 um", "growth.time_step=2 h", "growth.end=9 h",
                           "numerics.refinement=0.5"],
     "fast, rows closer than those of the longer run": [
@@ -27,7 +30,7 @@ SCENES = {
 #: Ends of the shorter runs (h): within the longer one's first step, within a later one, and near its own last.
 ENDS = {"paper": (0.1, 1.4, 2.1), "paper, an end within a step": (1.0,), "fast": (0.3, 5.0, 8.9),
         "fast, long steps": (5.0,),
-        "fast, rows at times": (4.0,), "to the pore's end": (8.0,),
+        "fast, rows at times": (4.0,), "to the pore's end": (8.0,), "fast, contact": (0.5,), "gear": (0.5,),
         "fast, rows closer than those of the longer run": (4.75,)}
 
 

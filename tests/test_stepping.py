@@ -1,9 +1,9 @@
 """Steps of the midpoint rule: where they end, which are taken, and what depends on rows and ends.
 
-That they are of second order is the case coupling-midpoint-order; that their ledgers close is in `test_balances.py`.
+That they are of second order is the case coupling-midpoint-order; that their ledgers close is in `test_balances.py`,
+that the end changes none of them in `test_longer.py`.
 """
 from dataclasses import replace
-from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -107,14 +107,13 @@ SCENES = {"fast": (FAST, 'growth.end="9.7 h"'), "contact": (FAST, 'growth.end="0
           "stress-free": (FAST, 'growth.end="0.8 h"', 'growth.new_biomass="stress_free"', *CONTACT)}
 
 
-@cache
 def steps_of(name, *changes):
-    """States, instants and ledgers of all steps of a scene, reported or not."""
+    """The last state, the instants, and the ledgers of all steps of a scene, reported or not."""
     made = load_scene("base", (*SCENES[name], *changes))
     found = list(simulation.steps(made))
     rows = [instant for _, instant in found if instant]
     last = found[-1][0]
-    return found, rows, [*(row for instant in rows for row in instant.ledgers), *last.ledgers]
+    return last, rows, [*(row for instant in rows for row in instant.ledgers), *last.ledgers]
 
 
 def same(one, two):
@@ -142,24 +141,7 @@ def test_steps_depend_on_no_row(name):
     if CONTACT[0] in SCENES[name]:
         rows = found[0][1]
         assert not rows[0].pore.contact and rows[-1].pore.contact and sum(instant.remeshes for instant in rows) > 1
-    assert all(same(states[-1][0], found[0][0][-1][0]) for states, _, _ in found)
-
-
-@pytest.mark.parametrize("step, part", [(-2, 0.5), (0, 1.6)])
-@pytest.mark.parametrize("name", SCENES)
-def test_steps_do_not_depend_on_the_end(name, step, part):
-    """The ledgers of steps, and the state from which a later end goes on, to the last bit; the step that is cut closes
-    its ledger and ends where the run does."""
-    whole, _, later = steps_of(name)
-    end = later[step].start + part * (later[step].end - later[step].start) + 1e-3
-    found, rows, ledgers = steps_of(name, f'growth.end="{end!r} h"')
-    assert ledgers[:-1] == later[:len(ledgers) - 1] and ledgers[-1].end == rows[-1].pore.time == end
-    own = [state for state, _ in found if not state.apart][-1]
-    (twin,) = [state for state, instant in whole if state.pore.time == own.pore.time == state.time]
-    assert found[-1][0].apart and own.pore.time == ledgers[-1].start and same(own, twin)
-    last = ledgers[-1]
-    assert abs(last.biomass_before + last.biomass_made - last.biomass_after) < 1e-10 * last.biomass_after
-    assert last.biomass_after == pytest.approx(rows[-1].pore.mass, rel=1e-12)
+    assert all(same(last, found[0][0]) for last, _, _ in found)
 
 
 def test_rows_within_steps_are_of_second_order():
