@@ -22,7 +22,9 @@ from repro.cli import main
 from repro.errors import OutputError
 from repro.results.tables import SHOWN, Results, solve
 from repro.scene import SceneError, load_scene, packaged_scenes
+from tests import faults
 from tests.pages import whole_of
+from tests.strategies import arrays_of, same_arrays
 
 SHORT = ["numerics.preset=fast", 'growth.end="0.6 h"', 'output.times=["0.2 h", "0.4 h", "0.6 h"]']
 
@@ -32,21 +34,14 @@ def found() -> Results:
     return solve(load_scene("base", SHORT))
 
 
-def same(one, other):
-    """Have two sets of arrays the same names and the same numbers?"""
-    return set(one) == set(other) and all(np.array_equal(one[name], other[name], equal_nan=True) for name in one)
-
-
 @pytest.mark.parametrize("elements, corners", [("linear", 3), ("quadratic", 6), ("cubic", 6)])
 def test_fields_are_those_of_the_files_of_a_run(elements, corners):
     """On straight triangles and on curved ones."""
     scene = load_scene("base", ["numerics.preset=fast", f"numerics.elements={elements}", 'growth.end="0.2 h"',
                                 'output.times=["0.2 h"]'])
-    fields, written = solve(scene).fields(0.2), meshio.read(whole_of(scene) / "fields/fields_0001.vtu")
-    celled = {name: values for name, (values,) in written.cell_data.items()}
-    assert fields["triangles"].shape[1] == corners
-    assert same(fields, {"places_um": written.points[:, :2], "triangles": written.cells[0].data,
-                         **written.point_data, **celled})
+    fields, written = solve(scene).fields(0.2), arrays_of(meshio.read(whole_of(scene) / "fields/fields_0001.vtu"))
+    written |= {"places_um": written.pop("points")[:, :2], "triangles": written.pop("cells")}
+    assert same_arrays(fields, written) and fields["triangles"].shape[1] == corners
 
 
 def test_units_are_what_the_names_end_with(found):
@@ -189,8 +184,8 @@ def test_a_run_is_loaded_as_it_was_solved(found, tmp_path):
     assert list(loaded) == list(found) == list(table) == results.COLUMNS and loaded.units == found.units
     assert repr(loaded) == repr(found) and found.status == "completed"
     assert np.array_equal(found.time, found["time_h"]) and found.time[-1] == 0.6
-    assert same(loaded, found) and same(table, found)
-    assert all(same(loaded.fields(time), found.fields(time)) for time in found.time)
+    assert same_arrays(loaded, found) and same_arrays(table, found)
+    assert all(same_arrays(loaded.fields(time), found.fields(time)) for time in found.time)
     assert loaded._repr_html_() == found._repr_html_()
     (tmp_path / "fields.pvd").unlink()
     assert "<img" not in repro.load_run(tmp_path)._repr_html_()
@@ -209,7 +204,7 @@ def test_data_frames_and_datasets_have_names_and_units(found):
 
 @pytest.mark.parametrize("package, make", [("pandas", Results.to_pandas), ("xarray", Results.to_xarray)])
 def test_an_optional_package_that_is_not_there_is_told_in_one_line(found, monkeypatch, package, make):
-    monkeypatch.setitem(sys.modules, package, None)
+    faults.absent_package(monkeypatch, package)
     with pytest.raises(ImportError, match=f"^the package {package} is not installed; pip install {package}$"):
         make(found)
 

@@ -21,7 +21,7 @@ from repro.scene import load_scene
 from tests import oracles
 from tests.pages import AXES, CHARTS, LEDGERS
 from tests.shell import told
-from tests.strategies import ORDERS, constants
+from tests.strategies import ORDERS, arrays_of, constants
 from tests.test_resume import CONTACT, in_parts
 
 EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
@@ -280,8 +280,8 @@ def test_every_array_is_what_its_name_says(order):
     """To round-off: all of it is a rearrangement, or sums of few terms, of numbers of size one."""
     scene, at = late(order)
     content, wanted = results.fields(scene, at.pore, at.solved), derived_arrays(scene, at)
-    told = content.point_data | {name: values for name, (values,) in content.cell_data.items()}
-    assert told.keys() == wanted.keys()
+    told = arrays_of(content)
+    assert told.keys() == {"points", "cells", *wanted}
     for name, value in wanted.items():
         size = np.nanmax(np.abs(value))
         assert told[name] == pytest.approx(value, rel=1e-9, abs=1e-9 * size, nan_ok=True), name

@@ -3,17 +3,16 @@
 import json
 import re
 import sys
-from types import SimpleNamespace
 
 import pytest
 
 from repro.cli import main
-from repro.errors import Interrupted
 from repro.march.simulation import simulate
 from repro.run import machine, memory, running
-from repro.run.running import Watch, resume, run
+from repro.run.running import resume
 from repro.scene import SceneError, load_scene
-from tests.shell import SHORT, files, shell
+from tests import faults
+from tests.shell import SHORT, files, shell, stopped
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="for Linux alone")
 CHOICES = [("numerics.solver=pardiso", "pypardiso"), ("numerics.ordering=metis", "pymetis")]
@@ -24,7 +23,7 @@ CHOICES = [("numerics.solver=pardiso", "pypardiso"), ("numerics.ordering=metis",
 def test_a_package_that_is_not_there_is_told_before_anything_is_written(tmp_path, capsys, monkeypatch, command, entry,
                                                                         package):
     """One line, status 2, no folder."""
-    monkeypatch.setitem(sys.modules, package, None)
+    faults.absent_package(monkeypatch, package)
     assert main([*command, "--set", entry, "--out", str(tmp_path / "out")]) == 2
     out, err = capsys.readouterr()
     key, _, choice = entry.partition("=")
@@ -34,14 +33,11 @@ def test_a_package_that_is_not_there_is_told_before_anything_is_written(tmp_path
 
 def test_a_package_that_went_is_told_at_a_resume(tmp_path, monkeypatch):
     scene = load_scene("base", ("numerics.preset=fast", "numerics.ordering=metis"))
-    stand_in = SimpleNamespace(CSRAdjacency=lambda starts, others: len(starts) - 1,
-                               nested_dissection=lambda nodes: (range(nodes), None))
     with monkeypatch.context() as there:
         there.setattr(machine, "find_spec", lambda name: name)
-        there.setitem(sys.modules, "pymetis", stand_in)
-        with pytest.raises(Interrupted):
-            run(scene, tmp_path, watch=Watch(stop=lambda: 15))
-    monkeypatch.setitem(sys.modules, "pymetis", None)
+        faults.stand_in_package(there, "pymetis")
+        stopped(scene, tmp_path, after=1)
+    faults.absent_package(monkeypatch, "pymetis")
     with pytest.raises(SceneError, match="pymetis is not installed"):
         resume(tmp_path)
 

@@ -11,13 +11,12 @@ from repro.fem.linear import DEFAULT, Method
 from repro.fem.mesh import Mesh, Topology
 from repro.fem.space import Space
 from repro.march.simulation import simulate
-from repro.model import contact, flow, mesh_motion, pore, remeshing
+from repro.model import contact, pore, remeshing
 from repro.scene import load_scene
 from tests import faults
-from tests.strategies import ORDERS, bent_inside, meshed, seed
+from tests.strategies import ORDERS, meshed, seed
 
 geometries = pytest.mark.parametrize("geometry", [1, 2])
-orders = pytest.mark.parametrize("order", ORDERS)
 
 
 def remembered(cls):
@@ -64,11 +63,6 @@ def again(mesh, **changes):
     return Mesh.of(**parts)
 
 
-def less_biomass(mesh):
-    """What a mesh is made of without what of its aggregate lies to the right of the middle."""
-    return {"biomass": mesh.biomass & (mesh.points[mesh.triangles].mean(axis=1)[:, 0] < 0), "loop": np.empty(0, int)}
-
-
 @pytest.mark.parametrize("kind", ORDERS.values())
 def test_what_is_replaced_remembers_nothing(kind):
     """Of each object that works things out once: its fields alone go to the other, and nothing that it has kept."""
@@ -99,20 +93,6 @@ def test_a_mesh_with_other_points_forgets(geometry):
         assert alike(moved.topology.dofs(order), fresh.topology.dofs(order))
         assert differences(Space(moved, order), Space(fresh, order)) == []
     assert mesh.moved(points).points is points
-
-
-@orders
-def test_what_is_solved_on_a_replaced_mesh_is_that_of_a_fresh_one(order):
-    """To the last bit, after another mesh of the same object has been solved on."""
-    mesh = disc(1 if order == 1 else 2)[0]
-    mesh = mesh if order == 1 else bent_inside(mesh)
-    flow.unit_flow(Space(mesh, order), 100.0)
-    changes = less_biomass(mesh)
-    less, fresh = replace(mesh, topology=replace(mesh.topology, **changes)), again(mesh, **changes)
-    found, exact = (flow.unit_flow(Space(grid, order), 100.0) for grid in (less, fresh))
-    assert alike(found, exact)
-    body = mesh.points[less.body] * [1.02, 1.0]
-    assert np.array_equal(mesh_motion.move(less, body, 1.0, 100.0), mesh_motion.move(fresh, body, 1.0, 100.0))
 
 
 def scenes(*changes):

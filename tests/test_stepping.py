@@ -74,8 +74,7 @@ def test_rows_are_at_the_reported_times_to_the_last_bit(order):
 
 
 @pytest.mark.parametrize("end, apart", [
-    (0.001, 0.2 / 2**13), (0.01, 0.2 / 2**9), (0.5, 0.0125), (1.0, 0.025), (2.0, 0.05), (2.4, 0.1), (4.79, 0.1),
-    (4.8, 0.2), (9.59, 0.2), (9.6, 0.4), (19.4, 0.8), (45.0, 1.6)])
+    (0.001, 0.2 / 2**13), (0.01, 0.2 / 2**9), (1.0, 0.025), (4.79, 0.1), (4.8, 0.2), (19.4, 0.8), (45.0, 1.6)])
 def test_without_times_there_are_25_rows_at_round_times_in_a_run_of_any_length(end, apart):
     """And the last one is at the end."""
     rows = stepping.rows(base(f'growth.end="{end} h"'))
