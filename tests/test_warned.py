@@ -94,7 +94,9 @@ def not_met(told):
 def test_a_tolerance_that_no_step_can_meet_is_told_with_what_is_reached(tmp_path, capsys, options):
     """Once, aside, in run.json and on the page: in how many of the run's steps, and the largest of their estimates."""
     assert main(["run", "base", *flags(*MISSED), "--out", str(tmp_path), *options]) == 0
-    (text,) = not_met(told(tmp_path))
+    found = not_met(told(tmp_path))
+    assert len(found) == 1
+    (text,) = found
     (line,) = [line for line in capsys.readouterr().err.splitlines() if "tolerance" in line]
     assert line == f"repro: warning: numerics.tolerance: {text}"
     assert html.escape(text) in text_of(tmp_path)
