@@ -9,8 +9,7 @@ from matplotlib.figure import Figure
 from paper_figures import style
 from repro import added_resistance
 from repro.results.network import known
-from verification.network import unseen
-from verification.network.law import RATIO, judged, read
+from verification.network.law import RATIO, SEED, judged, read
 
 TITLE = "Addition. A law for networks: the resistance that an aggregate adds to its pore"
 RUNS = ()
@@ -73,5 +72,5 @@ def caption() -> str:
             f"one wall (full lines) and bodies that span the pore (dashed), for viscosity ratios of {RATIOS[0]:g}, "
             f"{RATIOS[1]:g} and {RATIOS[2]:g}, with the law's bounds and the {len(seen['grown'])} shapes of its fit at "
             f"{RATIO:g}. Velocity and width of the pore drop out. (b) {found.count} shapes that the fit has not seen, "
-            f"drawn at random (seed {unseen.SEED}), between the law (0) and its bounds (1 and -1): {found.inside} are "
+            f"drawn at random (seed {SEED}), between the law (0) and its bounds (1 and -1): {found.inside} are "
             f"within, half of them within {np.median(worst):.1f} % of the law, the worst {worst.max():.0f} % from it.")

@@ -56,7 +56,7 @@ class Section:
         self.whole = Basis(mesh, ElementTriP2(), intorder=ORDER)
         self.body, self.fluid = (Basis(mesh, ElementTriP2(), elements=np.flatnonzero(where), intorder=ORDER)
                                  for where in (grid.body, ~grid.body))
-        self.spread = [asm(_stiffness, basis) for basis in (self.fluid, self.body)]
+        self.spread = [asm(stiffness, basis) for basis in (self.fluid, self.body)]
         (x, y), near = self.whole.doflocs, 1e-9 * width
         facets = mesh.boundary_facets()
         self.ends = [FacetBasis(mesh, ElementTriP2(), intorder=END_ORDER,
@@ -94,42 +94,56 @@ class Section:
                 for water, biomass, supply in zip(pore.diffusivity, pore.in_biomass, pore.supply)]
 
     def steady(self, operators, active, rates, fields):
-        """C_A and C_D (2, K), where X_A is ``active`` (t, Q) at the aggregate's points of quadrature, from a start.
-
-        Raises RuntimeError where Newton's method does not converge or a concentration is negative.
-        """
-        for _ in range(MOST):
-            step = self._step(operators, active, rates, fields)
-            fields = fields + step
-            if np.abs(step).max() < SMALL * np.abs(fields).max():
-                break
-        else:
-            raise RuntimeError(f"the substrates still change by {np.abs(step).max():.2g} mg/L after {MOST} iterations")
-        if fields.min() < 0:
-            raise RuntimeError(f"a concentration is negative: {fields.min():.2g} mg/L")
-        return fields
-
-    def _step(self, operators, active, rates, fields):
-        """Newton's step (2, K) of both substrates; slopes of the uptake by central differences."""
-        here, nudges = self.inside(fields), NUDGE * np.eye(2)[:, :, None, None]
-        residual = [matrix @ field - source + asm(_load, self.body, value=active * rate)
-                    for (matrix, source), field, rate in zip(operators, fields, uptake(*here, rates))]
-        columns = [(np.array(uptake(*(here + d), rates)) - np.array(uptake(*(here - d), rates))) / (2 * NUDGE)
-                   for d in nudges]
-        blocks = [[asm(_mass, self.body, value=active * column[k]) for column in columns] for k in (0, 1)]
-        for k, (matrix, _) in enumerate(operators):
-            blocks[k][k] = blocks[k][k] + matrix
-        return -splu(sp.block_array(blocks, format="csc")).solve(np.concatenate(residual)).reshape(2, -1)
+        """:func:`steady` in the aggregate, where X_A is ``active`` (t, Q)."""
+        return steady(self.body, operators, active, rates, fields)
 
     def inside(self, fields):
         """(2, t, Q) fields (2, K) at the aggregate's points of quadrature."""
-        return np.array([self.body.interpolate(field) for field in fields])
+        return _inside(self.body, fields)
 
     def effluents(self, flow, fields):
         """(2,) flow-weighted means over the outlet, mg/L."""
         end = self.ends[1]
         speed = end.interpolate(flow.velocity[0])
         return np.array([asm(_integral, end, value=speed * end.interpolate(field)) for field in fields]) / self.width
+
+
+def steady(body, operators, active, rates, fields, free=slice(None)):
+    """C_A and C_D (2, K) from a start, with ``operators`` [(matrix, source)] for all but the uptake, where X_A is
+    ``active`` (t, Q), or one number, at the points of quadrature of ``body``; free: the nodes that may change.
+
+    Raises RuntimeError where Newton's method does not converge or a concentration is negative.
+    """
+    for _ in range(MOST):
+        step = np.zeros_like(fields)
+        step[:, free] = _step(body, operators, active, rates, fields, free)
+        fields = fields + step
+        if np.abs(step).max() < SMALL * np.abs(fields).max():
+            break
+    else:
+        raise RuntimeError(f"the substrates still change by {np.abs(step).max():.2g} mg/L after {MOST} iterations")
+    if fields.min() < 0:
+        raise RuntimeError(f"a concentration is negative: {fields.min():.2g} mg/L")
+    return fields
+
+
+def _inside(body, fields):
+    """(2, t, Q) fields (2, K) at the points of quadrature."""
+    return np.array([body.interpolate(field) for field in fields])
+
+
+def _step(body, operators, active, rates, fields, free):
+    """Newton's step (2, free) of both substrates; slopes of the uptake by central differences."""
+    here, nudges = _inside(body, fields), NUDGE * np.eye(2)[:, :, None, None]
+    residual = [(matrix @ field - source + asm(_load, body, value=active * rate))[free]
+                for (matrix, source), field, rate in zip(operators, fields, uptake(*here, rates))]
+    columns = [(np.array(uptake(*(here + d), rates)) - np.array(uptake(*(here - d), rates))) / (2 * NUDGE)
+               for d in nudges]
+    blocks = [[asm(_mass, body, value=active * column[k]) for column in columns] for k in (0, 1)]
+    for k, (matrix, _) in enumerate(operators):
+        blocks[k][k] = blocks[k][k] + matrix
+    blocks = [[block.tocsr()[free][:, free] for block in row] for row in blocks]
+    return -splu(sp.block_array(blocks, format="csc")).solve(np.concatenate(residual)).reshape(2, -1)
 
 
 def _divergence(basis):
@@ -140,7 +154,8 @@ def _divergence(basis):
 
 
 @BilinearForm
-def _stiffness(u, v, w):
+def stiffness(u, v, w):
+    """(grad u, grad v)."""
     return dot(grad(u), grad(v))
 
 

@@ -90,11 +90,9 @@ class Browser:
 
     def press(self, key: str) -> None:
         """A key, pressed and released, as ArrowLeft."""
-        codes = {"ArrowLeft": 37, "ArrowRight": 39, "ArrowDown": 40, "Home": 36, "End": 35, "Tab": 9, " ": 32}
-        typed = {"text": key} if key == " " else {}
-        for kind in ("keyDown" if typed else "rawKeyDown", "keyUp"):
-            self.call("Input.dispatchKeyEvent", type=kind, key=key, code="Space" if typed else key,
-                      windowsVirtualKeyCode=codes[key], **typed)
+        codes = {"ArrowLeft": 37, "Home": 36, "End": 35, "Tab": 9}
+        for kind in ("rawKeyDown", "keyUp"):
+            self.call("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=codes[key])
 
     def box(self, selector: str) -> dict:
         """{x, y, width, height} of an element in the window (CSS pixels), which is scrolled into view."""

@@ -58,39 +58,9 @@ def extent(places, width, length):
     return (left if left > -length / 2 else -length / 2), (right if right < length / 2 else length / 2)
 
 
-def stokes(points, triangles, viscosity, tau, one, two, traction=False):
-    """The stabilised Stokes form of two fields (u, p) and (v, q) of linear triangles, summed triangle by triangle:
-
-        nu grad u : grad v - p div v - q div u - tau grad p . grad q
-
-    with grad u + grad u^T in place of grad u for ``traction``; viscosity and tau are of each triangle.
-    """
-    (u, p), (v, q), total = one, two, 0.0
-    for nodes, nu, t in zip(triangles, viscosity, tau):
-        G = slopes(points[nodes])
-        grad_u, grad_v, grad_p, grad_q = (field[nodes].T @ G for field in (u, v, p, q))
-        strain = grad_u + grad_u.T if traction else grad_u
-        density = nu * np.sum(strain * grad_v) - t * grad_p @ grad_q
-        density -= p[nodes].mean() * np.trace(grad_v) + q[nodes].mean() * np.trace(grad_u)
-        total += area(points[nodes]) * density
-    return total
-
-
 def energy(F, P, theta):
     """(17) with (21): 1/2 (J^(-2/3) tr C - 3) + P (J - theta), mu_L = 1, of the whole deformation with F33 = 1."""
     whole = np.zeros((3, 3))
     whole[:2, :2], whole[2, 2] = F, 1.0
     J, trace = np.linalg.det(whole), np.trace(whole.T @ whole)
     return (J ** (-2 / 3) * trace - 3) / 2 + P * (J - theta)
-
-
-#: Places of the six nodes of a curved triangle on the unit triangle: corners, then middles of the edges 01, 12, 20.
-SIX = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])
-
-
-def quadratic(s, t):
-    """(6,) derivatives by s, and by t, of the functions of the six nodes: each is a polynomial of degree two that is
-    one at its own node and zero at the others."""
-    monomials = np.column_stack([np.ones(6), SIX[:, 0], SIX[:, 1], SIX[:, 0] ** 2, SIX.prod(axis=1), SIX[:, 1] ** 2])
-    coefficients = np.linalg.inv(monomials)
-    return np.array([0, 1, 0, 2 * s, t, 0]) @ coefficients, np.array([0, 0, 1, 0, s, 2 * t]) @ coefficients

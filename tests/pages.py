@@ -1,6 +1,8 @@
 """Runs into folders, and their pages as a strict parser sees them."""
 
 import base64
+import hashlib
+import html
 import json
 import re
 from html.parser import HTMLParser
@@ -8,6 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+import pytest
 
 from repro import results
 from repro.cli import main
@@ -88,9 +91,25 @@ class Page(HTMLParser):
         return [given[name] for each, given in self.tags if each == tag and name in given]
 
 
-def run(tmp_path, scene, *sets, status=0):
+def check_alone(text):
+    """The Page of a text that asks for nothing else, and whose policy lets in what is in it alone."""
+    found = Page(text)
+    assert not re.search(r"@import|url\(|://", text)
+    policy = next(each for each in found.attribute("meta", "content") if "-src" in each)
+    assert policy.startswith("default-src 'none'; ") and "unsafe" not in policy
+    assert policy.endswith("; base-uri 'none'; form-action 'none'")
+    for kind, given, content in found.scripts:
+        digest = base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()
+        (allowed,) = re.findall(f"{kind}-src ([^;]*)", policy)
+        assert given.get("type") == "application/json" or f"'sha256-{digest}'" in allowed.split()
+    return found
+
+
+def run(tmp_path, scene, *sets, status=0, options=()):
+    """The folder of `repro run SCENE` with --set of each and further options, which ends with a status."""
     out = tmp_path / "run"
-    assert main(["run", str(scene), "--out", str(out), *(part for one in sets for part in ("--set", one))]) == status
+    assert main(["run", str(scene), "--out", str(out), *(part for one in sets for part in ("--set", one)),
+                 *options]) == status
     return out
 
 
@@ -108,6 +127,18 @@ def first(pattern, text):
 def stored(out):
     """What the page gives its script."""
     return json.loads(first('<script type="application/json" id="fields">(.*?)</script>', text_of(out)))
+
+
+def check_drawn(text, wanted):
+    """Are the charts of a page those of {title: lines (label, times, values)}, to the six digits that a pointer is
+    told?"""
+    told = [json.loads(html.unescape(one))["lines"] for one in re.findall('data-chart="([^"]*)"', text)]
+    assert re.findall("<figcaption>(.*?)<", text) == list(wanted)
+    for drawn, lines in zip(told, wanted.values(), strict=True):
+        for one, line in zip(drawn, lines, strict=True):
+            known = np.isfinite(line.values)
+            assert one["label"] == line.label and one["t"] == pytest.approx(line.times[known].tolist(), rel=1e-5)
+            assert one["y"] == pytest.approx(line.values[known].tolist(), rel=1e-5), line.label
 
 
 def numbers(text, kind):

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from repro.cli import main
 from repro.errors import Interrupted
 from repro.run.checkpoint import LAST
 from repro.run.running import Watch, run
@@ -71,6 +72,15 @@ def state(folder: Path) -> dict[Path, tuple[int, bytes]]:
     """Every file of a folder, with the time at which it was written and its content; nothing of a folder that is not
     there."""
     return {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in folder.rglob("*") if path.is_file()}
+
+
+def refused(folder: Path, capsys, *arguments: str) -> str:
+    """What is said of `repro run ARGUMENTS` that is refused, with status 2 and one line, and changes nothing there."""
+    before = state(folder)
+    assert main(["run", *arguments]) == 2
+    message = capsys.readouterr().err
+    assert message.count("\n") == 1 and state(folder) == before
+    return message
 
 
 def every(count: int):

@@ -279,6 +279,17 @@ def fitted_order(sizes, errors):
     return np.polyfit(np.log(sizes), np.log(errors), 1)[0]
 
 
+def same_arrays(one, other):
+    """Have two tables of arrays the same names, shapes and numbers, to the last bit?"""
+    return one.keys() == other.keys() and all(np.array_equal(one[name], other[name], equal_nan=True) for name in one)
+
+
+def arrays_of(grid):
+    """{name: array} of a grid as this package or meshio has it: places, cells and what is known of them."""
+    celled = {name: values for name, (values,) in grid.cell_data.items()}
+    return {"points": grid.points, "cells": grid.cells[0].data, **grid.point_data, **celled}
+
+
 def scene(radius="5 um", width="50 um", acceptor="10 mg/L", donor="10 mg/L", velocity=None, head=None, growth=None,
           **more):
     """A scene of [pore], [aggregate], [substrates] and, where asked for, [flow] and [growth]."""

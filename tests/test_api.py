@@ -20,9 +20,11 @@ import repro
 from repro import results
 from repro.cli import main
 from repro.errors import OutputError
-from repro.results.tables import SHOWN, Results, solve, unit
-from repro.run.running import run
+from repro.results.tables import SHOWN, Results, solve
 from repro.scene import SceneError, load_scene, packaged_scenes
+from tests import faults
+from tests.pages import whole_of
+from tests.strategies import arrays_of, same_arrays
 
 SHORT = ["numerics.preset=fast", 'growth.end="0.6 h"', 'output.times=["0.2 h", "0.4 h", "0.6 h"]']
 
@@ -32,41 +34,26 @@ def found() -> Results:
     return solve(load_scene("base", SHORT))
 
 
-def test_columns_are_those_of_the_table_of_a_run(found, tmp_path):
-    """To the last bit."""
-    run(load_scene("base", SHORT), tmp_path)
-    table = results.read_table(tmp_path / "timeseries.csv")
-    assert list(found) == list(table) == results.COLUMNS
-    for name, column in table.items():
-        assert np.array_equal(found[name], column, equal_nan=True), name
-    assert np.array_equal(found.time, found["time_h"]) and found.time[-1] == 0.6 and found.status == "completed"
-
-
-def test_fields_are_those_of_the_files_of_a_run(tmp_path):
+@pytest.mark.parametrize("elements, corners", [("linear", 3), ("quadratic", 6), ("cubic", 6)])
+def test_fields_are_those_of_the_files_of_a_run(elements, corners):
     """On straight triangles and on curved ones."""
-    for elements, corners in (("linear", 3), ("quadratic", 6), ("cubic", 6)):
-        scene = load_scene("base", ["numerics.preset=fast", f"numerics.elements={elements}", 'growth.end="0.2 h"',
-                                    'output.times=["0.2 h"]'])
-        run(scene, tmp_path / elements)
-        fields, written = solve(scene).fields(0.2), meshio.read(tmp_path / elements / "fields/fields_0001.vtu")
-        assert np.array_equal(fields["places_um"], written.points[:, :2])
-        assert np.array_equal(fields["triangles"], written.cells[0].data) and fields["triangles"].shape[1] == corners
-        named = {**written.point_data, **{name: values for name, (values,) in written.cell_data.items()}}
-        assert set(fields) == {"places_um", "triangles", *named}
-        for name, values in named.items():
-            assert np.array_equal(fields[name], values, equal_nan=True), name
+    scene = load_scene("base", ["numerics.preset=fast", f"numerics.elements={elements}", 'growth.end="0.2 h"',
+                                'output.times=["0.2 h"]'])
+    fields, written = solve(scene).fields(0.2), arrays_of(meshio.read(whole_of(scene) / "fields/fields_0001.vtu"))
+    written |= {"places_um": written.pop("points")[:, :2], "triangles": written.pop("cells")}
+    assert same_arrays(fields, written) and fields["triangles"].shape[1] == corners
 
 
 def test_units_are_what_the_names_end_with(found):
-    assert found.units["conductivity_m_per_d"] == "m/d" and found.units["aggregate_area_um2"] == "um2"
-    told = {name: unit(name) for name in results.COLUMNS}
-    plain = {name for name, one in told.items() if one == "1"}
+    """Of columns and fields; "1" for pure numbers."""
+    assert set(found.units) == {*found, *found.fields(0.0)}
+    wanted = {"conductivity_m_per_d": "m/d", "aggregate_area_um2": "um2", "head_loss_cm": "cm", "time_h": "h",
+              "inlet_donor_mg_per_L": "mg/L", "upstream_um": "um", "head_cm": "cm", "stress_xx_MPa": "MPa",
+              "theta": "1"}
+    assert {name: found.units[name] for name in wanted} == wanted
+    plain = {name for name in found if found.units[name] == "1"}
     assert plain == {"inert_fraction", "biomass_density_min", "biomass_density_max", "acceptor_balance",
                      "donor_balance", "biomass_balance", "oxygen_demand_balance", "nodes", "remeshed", "contact"}
-    assert {one for name, one in told.items() if name.endswith("mg_per_L")} == {"mg/L"}
-    assert (unit("head_loss_cm"), unit("time_h"), unit("upstream_um"), unit("stress_xx_MPa"), unit("theta")) == (
-        "cm", "h", "um", "MPa", "1")
-    assert set(found.units) == {*found, *found.fields(0.0)} and found.units["head_cm"] == "cm"
 
 
 def test_what_is_not_modelled_is_not_there():
@@ -103,26 +90,6 @@ def test_public_names():
         assert getattr(repro, name).__module__.startswith("repro."), name
         assert name in dir(repro)
     assert not hasattr(repro, "nothing")
-
-
-def test_importing_takes_next_to_nothing():
-    """And writing a scene out no more than its units do (pint, which takes others along)."""
-    for code, heavy in (("import repro, repro.scene", "numpy pint scipy skfem"),
-                        ("from repro.scene.text import scene_text; scene_text('flow_only')", "skfem meshio mmgpy")):
-        loaded = f"{code}; import sys; sys.exit(' '.join(name for name in '{heavy}'.split() if name in sys.modules))"
-        done = subprocess.run([sys.executable, "-c", loaded], capture_output=True, text=True, check=False)
-        assert done.stderr.strip() == ""
-
-
-def test_the_map_names_every_module_of_the_package():
-    folder = importlib.resources.files("repro")
-    modules = {path.name.removesuffix(".py") for path in folder.iterdir() if path.name.endswith(".py")}
-    named = set(re.findall(r"repro\.(\w+)", repro.__doc__))
-    assert modules - {"__init__", "__main__"} - named - OTHERS == set()
-
-
-#: Modules that hold nothing but a few words, and need no place on the map.
-OTHERS = {"errors", "files"}
 
 
 def test_what_the_package_ships():
@@ -211,16 +178,14 @@ def test_check_tells_what_repro_check_does(capsys):
 
 
 def test_a_run_is_loaded_as_it_was_solved(found, tmp_path):
-    """Rows and fields to the last bit, of a folder without fields too."""
+    """Rows, those of its table, and fields to the last bit, of a folder without fields too."""
     repro.run(load_scene("base", SHORT), str(tmp_path))
-    loaded = repro.load_run(tmp_path)
-    assert list(loaded) == list(found) and loaded.units == found.units and repr(loaded) == repr(found)
-    for name in found:
-        assert np.array_equal(loaded[name], found[name], equal_nan=True), name
-    for time in found.time:
-        fields = loaded.fields(time)
-        assert set(fields) == set(found.fields(time))
-        assert all(np.array_equal(fields[name], found.fields(time)[name], equal_nan=True) for name in fields)
+    loaded, table = repro.load_run(tmp_path), results.read_table(tmp_path / "timeseries.csv")
+    assert list(loaded) == list(found) == list(table) == results.COLUMNS and loaded.units == found.units
+    assert repr(loaded) == repr(found) and found.status == "completed"
+    assert np.array_equal(found.time, found["time_h"]) and found.time[-1] == 0.6
+    assert same_arrays(loaded, found) and same_arrays(table, found)
+    assert all(same_arrays(loaded.fields(time), found.fields(time)) for time in found.time)
     assert loaded._repr_html_() == found._repr_html_()
     (tmp_path / "fields.pvd").unlink()
     assert "<img" not in repro.load_run(tmp_path)._repr_html_()
@@ -239,7 +204,7 @@ def test_data_frames_and_datasets_have_names_and_units(found):
 
 @pytest.mark.parametrize("package, make", [("pandas", Results.to_pandas), ("xarray", Results.to_xarray)])
 def test_an_optional_package_that_is_not_there_is_told_in_one_line(found, monkeypatch, package, make):
-    monkeypatch.setitem(sys.modules, package, None)
+    faults.absent_package(monkeypatch, package)
     with pytest.raises(ImportError, match=f"^the package {package} is not installed; pip install {package}$"):
         make(found)
 

@@ -3,6 +3,7 @@
 import re
 
 import numpy as np
+import pytest
 
 from repro.report import charts
 from tests.pages import first
@@ -21,24 +22,32 @@ def chart(values, times=None, **more):
     return charts.Chart("title", "axis", [charts.Line("one", times, np.asarray(values, float), **more)])
 
 
-def test_a_line_is_where_its_numbers_and_the_ticks_say():
-    """Places between two labelled ticks are linear in the value."""
-    values, times = np.array([2.0, 5.0, 3.5, 9.0]), np.array([0.0, 1.0, 4.0, 10.0])
+@pytest.mark.parametrize("values, log", [([2.0, 5.0, 3.5, 9.0], False), ([0.0, 10.0, 500.0, 1000.0], False),
+                                         ([1.0, 10.0, 50.0, 1000.0], True)])
+def test_a_line_is_where_its_numbers_and_the_ticks_say(values, log):
+    """Places between two labelled ticks are linear in the value, or in its logarithm where the range is wide."""
+    values, times = np.array(values), np.array([0.0, 1.0, 4.0, 10.0])
     made = chart(values, times)
-    ticks = re.findall('<text class="y" x="[^"]*" y="([^"]*)">([^<]*)<', charts.svg(made))
+    text, even = charts.svg(made), np.log if log else np.array
+    ticks = re.findall('<text class="y" x="[^"]*" y="([^"]*)">([^<]*)<', text)
     heights, told = np.array([float(y) - 3.5 for y, _ in ticks]), np.array([float(text) for _, text in ticks])
     assert len(told) >= 3 and told.min() <= values.min() and told.max() >= values.max() - np.diff(told)[0]
+    assert ("axis (log scale)" in text) == log and ("log" in text) == log
     order = np.argsort(told)
     assert (np.diff(heights[order]) < 0).all()  # a drawing's y grows downwards
-    assert np.allclose(drawn(made)[:, 1], np.interp(values, told[order], heights[order]), atol=ROUNDED)
+    assert np.allclose(drawn(made)[:, 1], np.interp(even(values), even(told[order]), heights[order]), atol=ROUNDED)
     across = drawn(made)[:, 0]
     assert np.allclose((across - across[0]) / (across[-1] - across[0]), times / 10, atol=1e-3)
+    hours = [(float(x), float(time)) for x, time in re.findall('<text class="x" x="([^"]*)" y="[^"]*">([^<]*)<', text)]
+    assert np.allclose(across, np.interp(times, *np.array(hours).T[::-1]), atol=ROUNDED) and len(hours) >= 3
 
 
-def test_a_wide_range_is_logarithmic():
-    made = chart([1.0, 10.0, 100.0, 1000.0])
-    assert np.allclose(np.diff(drawn(made)[:, 1]), np.diff(drawn(made)[:, 1])[0], atol=ROUNDED)
-    assert "axis (log scale)" in charts.svg(made) and "log scale" not in charts.svg(chart([0.0, 10.0, 1000.0]))
+def test_a_legend_names_each_line_by_its_colour():
+    lines = [charts.Line(name, np.arange(2.0), np.full(2, value)) for name, value in (("one", 1.0), ("two", 4.0))]
+    text = charts.svg(charts.Chart("title", "axis", lines))
+    assert re.findall(r'class="line(\d)" points="0,5 24,5"/></svg>(\w+)</span>', text) == [("0", "one"), ("1", "two")]
+    places = re.findall(r'class="line(\d)" points="\S+,(\S+) \d', text)[2:]
+    assert [number for number, _ in places] == ["0", "1"] and float(places[0][1]) > float(places[1][1])
 
 
 def test_gaps_constants_and_single_points():

@@ -14,6 +14,7 @@ from repro.check.modelled import modelled
 from repro.cli import main
 from repro.march.simulation import rows_within, simulate
 from repro.scene import load_scene, packaged_scenes
+from tests import faults
 
 #: Mean velocity of the clean channel of base: (1e-3 cm / 600 um) g W^2 / (12 nu), um/h.
 CLEAN = 1e-5 / 600e-6 * 9.81 * (50e-6) ** 2 / (12 * 1.003e-6) * 3600e6
@@ -96,6 +97,7 @@ def test_what_is_warned_of_in_the_packaged_scenes(name, overrides, keys):
 
 QUIET = ("numerics.preset=paper", "growth.end=5 h", "pore.length=2000 um")
 QUIET_FAST = ("numerics.preset=fast", "growth.end=5 h", "pore.length=2000 um")
+QUICK = (*QUIET, "kinetics.maximum_density=30 mg/L", "growth.time_step=1e-4 h", "growth.end=1e-3 h")
 PERMEABLE = ("aggregate.radius=20 um", "flow.biomass=brinkman", "numerics.elements=quadratic")
 FEW = ("substrates.acceptor.half_saturation=2e-3 mg/L", "substrates.donor.half_saturation=2e-3 mg/L")
 
@@ -115,11 +117,10 @@ FEW = ("substrates.acceptor.half_saturation=2e-3 mg/L", "substrates.donor.half_s
     ("numerics.refinement", ("base", *QUIET, *FEW, "numerics.refinement=2"),
      ("base", *QUIET, *FEW, "numerics.refinement=1")),
     # W^2 / D over the time of growth is 1.4e-4 in 50 um
-    ("numerics.transport", ("base", *QUIET, "kinetics.maximum_density=30 mg/L",
-                            "kinetics.maximum_utilization_rate=3200 1/day", "growth.time_step=1e-4 h",
-                            "growth.end=1e-3 h"),
-     ("base", *QUIET, "kinetics.maximum_density=30 mg/L", "kinetics.maximum_utilization_rate=3400 1/day",
-      "growth.time_step=1e-4 h", "growth.end=1e-3 h")),
+    ("numerics.transport", ("base", *QUICK, "kinetics.maximum_utilization_rate=3200 1/day"),
+     ("base", *QUICK, "kinetics.maximum_utilization_rate=3400 1/day")),
+    ("numerics.transport", ("base", *QUICK, "kinetics.maximum_utilization_rate=3400 1/day", "numerics.transport=gear"),
+     ("base", *QUICK, "kinetics.maximum_utilization_rate=3400 1/day")),
     # the head's pressure over mu_L: 0.01 at 0.0979 Pa / 9.79 Pa, all of it lost over the aggregate in contact
     ("growth.fluid_forces", ("base", *QUIET, "growth.end=24 h", "growth.shear_modulus=9.9 Pa"),
      ("base", *QUIET, "growth.end=24 h", "growth.shear_modulus=9.6 Pa")),
@@ -163,13 +164,6 @@ def test_warnings_are_exactly_where_a_simplification_fails(key, inside, outside)
     """Either side of the threshold, worked out by hand; nothing else is warned of."""
     assert key not in looked_at(*inside)[1]
     assert set(looked_at(*outside)[1]) - set(looked_at(*inside)[1]) == {key}
-
-
-def test_slow_transport_is_followed_in_time_by_gear():
-    changes = ("kinetics.maximum_density=30 mg/L", "kinetics.maximum_utilization_rate=3400 1/day",
-               "growth.time_step=1e-4 h", "growth.end=1e-3 h")
-    assert "numerics.transport" in looked_at("base", *QUIET, *changes)[1]
-    assert "numerics.transport" not in looked_at("base", *QUIET, *changes, "numerics.transport=gear")[1]
 
 
 @pytest.mark.parametrize("preset, least, most", [("paper", 1.0, 1.0), ("fast", 0.5, 2.0)])
@@ -263,19 +257,13 @@ def test_for_machines(capsys):
     assert told["numbers"][0]["name"] == "Reynolds" and "growth" in told["modelled"]
 
 
-@pytest.mark.parametrize("overrides, said", [
-    (["pore.widht=5 um"], "did you mean width?"),
-    (["flow.head=1e-300 um"], "base: it cannot be run: stopped in the step from t = 0 h, in transport"),
-    (["numerics.solver=pardiso"], "pypardiso"),
+@pytest.mark.parametrize("override, said", [
+    ("pore.widht=5 um", "did you mean width?"),
+    ("flow.head=1e-300 um", "base: it cannot be run: stopped in the step from t = 0 h, in transport"),
+    ("numerics.solver=pardiso", "pypardiso"),
 ])
-def test_what_cannot_be_run_is_refused(overrides, said, capsys, monkeypatch):
-    from repro.fem import linear
-
-    def absent(name):
-        raise linear.LinearError(f"the package {name} is not installed")
-
-    monkeypatch.setattr(linear, "_package", absent)
-    arguments = [entry for override in overrides for entry in ("--set", override)]
-    assert main(["check", "base", *arguments]) == 2
+def test_what_cannot_be_run_is_refused(override, said, capsys, monkeypatch):
+    faults.absent_package(monkeypatch, "pypardiso")
+    assert main(["check", "base", "--set", override]) == 2
     told = capsys.readouterr()
     assert said in told.err and told.out == "" and told.err.count("\n") == 1

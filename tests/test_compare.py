@@ -1,8 +1,5 @@
 """Runs laid over each other: what is drawn, what is told to differ, and what is refused."""
 
-import html
-import json
-import re
 import shutil
 
 import numpy as np
@@ -10,9 +7,9 @@ import pytest
 
 from repro import results
 from repro.cli import main
-from repro.report import comparison, quantities
+from repro.report import charts, comparison, quantities
 from repro.report.reading import read
-from tests.pages import CHARTS, Page
+from tests.pages import Page, check_drawn
 
 
 @pytest.fixture
@@ -23,24 +20,14 @@ def two(fast, paper, tmp_path):
 
 
 def test_a_comparison_has_a_line_a_run(two, fast, paper):
-    figures = [json.loads(html.unescape(text)) for text in re.findall('data-chart="([^"]*)"', two)]
-    titles = re.findall("<figcaption>(.*?)<", two)
-    # Nothing is stored, no mesh made anew.
-    quiet = {"acceptor_stored_ug_per_m_per_h", "donor_stored_ug_per_m_per_h", "remeshed_nodes"}
-    known = [name for kind in quantities.KINDS for name in kind.drawn if name not in quiet]
-    assert len(figures) == len(titles) == len(known)
-    drawn = 0
-    for title, figure in zip(titles, figures):
-        chart, _, label = title.partition(": ")
-        names = CHARTS.get(chart, {})
-        column = names.get(label, next(iter(names.values()), None)) if label or len(names) == 1 else None
-        if column not in (None, "remeshed"):
-            drawn += 1
-            for line, out in zip(figure["lines"], (fast, paper), strict=True):
-                series = results.read_table(out / "timeseries.csv")
-                assert line["t"] == pytest.approx(series["time_h"].tolist(), rel=1e-5)
-                assert line["y"] == pytest.approx(series[column].tolist(), rel=1e-5), title
-    assert drawn == sum(map(len, CHARTS.values())) - 1
+    """In a chart of each quantity: the lines of their own pages, by the runs' names."""
+    wanted, alone = {}, {kind.title for kind in quantities.KINDS if len(kind.drawn) == 1}
+    for out in (fast, paper):
+        for chart in quantities.charts_of(read(out)):
+            for line in chart.lines:
+                title = chart.title if chart.title in alone else f"{chart.title}: {line.label}"
+                wanted.setdefault(title, []).append(charts.Line(str(out), line.times, line.values))
+    check_drawn(two, wanted)
     assert Page(two).outside == []
 
 

@@ -1,4 +1,5 @@
-"""Sparse solves: right answers, a known order, and an error where there is no answer."""
+"""Sparse systems: from element matrices of one kind or several, some unknowns prescribed; right answers, a known order,
+and an error where there is no answer."""
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -7,9 +8,68 @@ from hypothesis import strategies as st
 
 from repro.errors import LinearError
 from repro.fem import linear
+from repro.fem.assembly import ElementSystem, saddle_blocks
 from repro.fem.linear import DEFAULT, Method
 from tests import faults
 from tests.strategies import meshed
+
+LINE = np.column_stack([np.arange(9), np.arange(1, 10)])
+#: Of the first kind all pieces of a line, of the second one piece with another far away.
+KINDS = LINE, np.column_stack([LINE[:4], LINE[5:]])
+ELEMENTS = tuple(part @ np.swapaxes(part, 1, 2) + np.eye(part.shape[1]) for part in (
+    np.random.default_rng(3).standard_normal((len(k), k.shape[1], k.shape[1])) for k in KINDS))
+
+
+def dense():
+    found = np.zeros((10, 10))
+    for kind, elements in zip(KINDS, ELEMENTS):
+        for unknowns, element in zip(kind, elements):
+            found[np.ix_(unknowns, unknowns)] += element
+    return found
+
+
+@pytest.mark.parametrize("held", [[], [0, 9], [4]])
+def test_kinds_of_elements_make_one_system(held):
+    """Its product, its matrix between free unknowns in elimination order, also filled from entries of each kind, and
+    its solutions, of one factorisation, are those of the dense matrix; the same of a system made for other prescribed
+    unknowns, which is left as it was."""
+    rank, prescribed = np.random.default_rng(len(held)).permutation(10).astype(float), np.isin(np.arange(10), held)
+    fresh, first, K = ElementSystem(KINDS, rank, prescribed), ElementSystem(KINDS, rank, np.arange(10) == 2), dense()
+    before = first.matrix(ELEMENTS).toarray()
+    order = [i for i in np.argsort(rank) if i not in held]
+    for system in (fresh, first.holding(prescribed)):
+        entries = [system.entries(which, part) for which, part in enumerate(ELEMENTS)]
+        for matrix in (system.matrix(ELEMENTS), system.filled(sum(entries))):
+            assert np.allclose(matrix.toarray(), K[np.ix_(order, order)], rtol=1e-13, atol=0)
+        alone = system.matrix((ELEMENTS[0], 0 * ELEMENTS[1])).toarray()
+        assert np.allclose(system.filled(entries[0]).toarray(), alone, rtol=1e-14)
+        factors = system.factored(ELEMENTS)
+        for right, value in np.random.default_rng(1).standard_normal((2, 2, 10)):
+            found = factors.solve(right, value)
+            assert np.allclose(system.product(ELEMENTS, right), K @ right, rtol=1e-13)
+            assert np.array_equal(found[held], value[held]) and np.allclose((K @ found - right)[order], 0, atol=1e-11)
+            assert np.array_equal(system.solve(ELEMENTS, right, value), found)
+            assert np.array_equal(system.solve(ELEMENTS, right), factors.solve(right, 0 * value))
+    assert np.array_equal(first.matrix(ELEMENTS).toarray(), before)
+
+
+def test_a_missing_kind_is_refused():
+    system = ElementSystem(KINDS, np.arange(10.0), np.zeros(10, bool))
+    with pytest.raises(ValueError):
+        system.product(ELEMENTS[:1], np.ones(10))
+
+
+def test_saddle_blocks_with_and_without_coupled_components():
+    """The same from one component's matrix, told once for both, as from the pair; zero is the default below."""
+    random = np.random.default_rng(4)
+    one, divergence, lower = (random.standard_normal((4, *shape)) for shape in ((3, 3), (2, 6), (2, 2)))
+    pair = np.zeros((4, 6, 6))
+    pair[:, :3, :3] = pair[:, 3:, 3:] = one
+    found = saddle_blocks(one, divergence, lower)
+    assert np.array_equal(found, saddle_blocks(pair, divergence, lower))
+    assert np.array_equal(found[:, 6:, 6:], -lower) and np.array_equal(found[:, 6:, :6], -divergence)
+    assert not saddle_blocks(one, divergence)[:, 6:, 6:].any()
+
 
 METIS, PARDISO = Method("superlu", "metis"), Method("pardiso", "degree")
 OPTIONAL = pytest.mark.parametrize("method, package", [(PARDISO, "pypardiso"), (METIS, "pymetis")])
@@ -30,20 +90,14 @@ def saddle(size, seed):
 
 @given(st.integers(4, 40), st.integers(0, 1000))
 def test_a_saddle_point_system_is_solved(size, seed):
-    """Against the dense solution."""
-    matrix = saddle(size, seed)
-    right = np.random.default_rng(seed).normal(size=matrix.shape[0])
-    dense = matrix.toarray()
-    bound = 1e-13 * np.linalg.cond(dense) * max(1.0, np.abs(np.linalg.solve(dense, right)).max())
-    assert solve(matrix, right) == pytest.approx(np.linalg.solve(dense, right), rel=1e-9, abs=bound)
-
-
-def test_one_factorisation_serves_many_right_hand_sides():
-    matrix = saddle(30, 5)
-    solver = linear.Solver(matrix)
-    for seed in range(3):
-        exact = np.random.default_rng(seed).normal(size=45)
-        assert solver.solve(matrix @ exact) == pytest.approx(exact, abs=1e-8)
+    """Against the dense solution; one factorisation serves many right-hand sides."""
+    matrix, rng = saddle(size, seed), np.random.default_rng(seed)
+    solver, dense = linear.factorised(matrix, DEFAULT), matrix.toarray()
+    for _ in range(2):
+        right = rng.normal(size=len(dense))
+        exact = np.linalg.solve(dense, right)
+        bound = 1e-13 * np.linalg.cond(dense) * max(1.0, np.abs(exact).max())
+        assert solver.solve(right) == pytest.approx(exact, rel=1e-9, abs=bound)
 
 
 def test_a_zero_pivot_is_got_round():
@@ -71,52 +125,22 @@ def test_a_singular_system_is_refused(matrix):
         solve(sp.csc_array(np.array(matrix)), np.arange(1.0, len(matrix) + 1))
 
 
-def test_a_node_order_is_a_permutation_that_saves_fill():
-    """Every node once; the factor of a Laplacian has under half of the entries that the mesher's order gives."""
-    grid, _ = meshed(None)
-    count = len(grid.points)
-    order = linear.node_order(count, grid.triangles)
-    assert np.sort(order).tolist() == list(range(count))
-    pairs = np.repeat(grid.triangles, 3, axis=1).ravel(), np.tile(grid.triangles, (1, 3)).ravel()
-    graph = sp.csc_array((np.ones(len(pairs[0])), pairs), shape=(count, count)) + sp.diags_array(np.full(count, 20.0))
-    fills = [fill(graph[p][:, p]) for p in (order, np.argsort(order), np.arange(count))]
-    assert fills[0] < 0.5 * min(fills[1:])
-
-
-def fill(matrix):
+def fill(grid, order):
+    """Entries of the factor of the mesh's Laplacian, its nodes in this order, which is one of all of them."""
+    assert np.sort(order).tolist() == list(range(len(grid.points)))
+    places = tuple(part.ravel() for part in linear.pairs(grid.triangles))
+    graph = sp.csc_array((np.ones(len(places[0])), places))
+    matrix = (graph + sp.diags_array(graph.sum(axis=0) + 1.0))[order][:, order]
     return sp.linalg.splu(sp.csc_matrix(matrix), permc_spec="NATURAL", diag_pivot_thresh=0.0,
                           options={"SymmetricMode": True}).nnz
 
 
-def check_alike(method):
-    """A method gives the default's solution to round-off, and orders nodes nearly as well."""
-    grid = meshed(None, 50.0, 0.6)[0]
-    matrix, right = saddle(40, 3), np.ones(60)
-    assert solve(matrix, right, method) == pytest.approx(solve(matrix, right), rel=1e-9, abs=1e-9)
-    orders = [linear.node_order(len(grid.points), grid.triangles, m) for m in (DEFAULT, method)]
-    assert np.sort(orders[1]).tolist() == list(range(len(grid.points)))
-    fills = [_fill(grid, order) for order in orders]
-    assert fills[1] <= 1.3 * fills[0]
-
-
-def _fill(grid, order):
-    """Entries of the factor of the mesh's Laplacian, its nodes in this order."""
-    rows, columns = np.repeat(grid.triangles, 3, axis=1).ravel(), np.tile(grid.triangles, (1, 3)).ravel()
-    graph = sp.csc_array((np.ones(len(rows)), (rows, columns)), shape=2 * (len(grid.points),))
-    return fill((graph + sp.diags_array(graph.sum(axis=0) + 1.0))[order][:, order])
-
-
-@OPTIONAL
-def test_optional_packages_give_the_same_or_are_named(method, package):
-    """The same solution by both, to round-off; one clear error where the package is not there."""
-    try:
-        __import__(package)
-    except ImportError:
-        with pytest.raises(LinearError, match=f"package {package} is not installed"):
-            method.checked()
-        return
-    assert method.checked() is method
-    check_alike(method)
+def test_a_node_order_saves_fill():
+    """The factor of a Laplacian has under half of the entries that the mesher's order, or the inverse, gives."""
+    grid, _ = meshed(None)
+    order = linear.node_order(len(grid.points), grid.triangles)
+    ours, *others = (fill(grid, each) for each in (order, np.argsort(order), np.arange(len(order))))
+    assert ours < 0.5 * min(others)
 
 
 @OPTIONAL
@@ -133,19 +157,21 @@ def test_an_absent_package_is_named_wherever_it_is_asked_for(method, package, mo
 
 
 @OPTIONAL
-def test_what_a_package_does_is_used_as_it_is_meant(method, package, monkeypatch):
-    """With a stand-in that does what the package says: it is called, orders are permutations from new to old, and the
-    solution is the same."""
-    made = faults.stand_in_package(monkeypatch, package)
-    matrix, right = saddle(40, 3), np.ones(60)
+@pytest.mark.parametrize("installed", [False, True])
+def test_what_a_package_does_is_used_as_it_is_meant(method, package, installed, monkeypatch):
+    """It is called, orders are permutations from new to old, and the solution is the same: with a stand-in that does
+    what the package says, and with the package where it is installed."""
+    made = pytest.importorskip(package) if installed else faults.stand_in_package(monkeypatch, package)
+    matrix, right, grid = saddle(40, 3), np.ones(60), meshed(None, 50.0, 0.6)[0]
     assert method.checked() is method
     assert solve(matrix, right, method) == pytest.approx(solve(matrix, right), rel=1e-9, abs=1e-9)
-    grid = meshed(None, 50.0, 0.6)[0]
-    order = linear.node_order(len(grid.points), grid.triangles, method)
-    assert np.sort(order).tolist() == list(range(len(grid.points))) and len(made.calls) == 1
+    ours, order = (linear.node_order(len(grid.points), grid.triangles, each) for each in (DEFAULT, method))
+    if installed:
+        assert fill(grid, order) <= 1.3 * fill(grid, ours)
+        return
+    assert fill(grid, order) < 0.8 * fill(grid, np.random.default_rng(1).permutation(order)) and len(made.calls) == 1
     if package == "pymetis":
         graph, = made.calls
         rows = np.repeat(np.arange(len(grid.points)), np.diff(graph.indptr))
         assert (rows != graph.indices).all() and len(rows) == 2 * len(grid.topology.edges)
-        assert _fill(grid, order) < 0.8 * _fill(grid, np.random.default_rng(1).permutation(order))
         assert np.array_equal(order, np.asarray(made.nested_dissection(graph)[0]))

@@ -1,19 +1,20 @@
 """What a run needs of the machine that it is on: packages, memory."""
 
 import json
+import re
 import sys
-from types import SimpleNamespace
 
 import pytest
 
 from repro.cli import main
-from repro.errors import Interrupted
 from repro.march.simulation import simulate
 from repro.run import machine, memory, running
-from repro.run.running import Watch, resume, run
+from repro.run.running import resume
 from repro.scene import SceneError, load_scene
-from tests.shell import SHORT, files, shell
+from tests import faults
+from tests.shell import SHORT, files, shell, stopped
 
+LINUX = pytest.mark.skipif(sys.platform != "linux", reason="for Linux alone")
 CHOICES = [("numerics.solver=pardiso", "pypardiso"), ("numerics.ordering=metis", "pymetis")]
 
 
@@ -22,7 +23,7 @@ CHOICES = [("numerics.solver=pardiso", "pypardiso"), ("numerics.ordering=metis",
 def test_a_package_that_is_not_there_is_told_before_anything_is_written(tmp_path, capsys, monkeypatch, command, entry,
                                                                         package):
     """One line, status 2, no folder."""
-    monkeypatch.setitem(sys.modules, package, None)
+    faults.absent_package(monkeypatch, package)
     assert main([*command, "--set", entry, "--out", str(tmp_path / "out")]) == 2
     out, err = capsys.readouterr()
     key, _, choice = entry.partition("=")
@@ -32,14 +33,11 @@ def test_a_package_that_is_not_there_is_told_before_anything_is_written(tmp_path
 
 def test_a_package_that_went_is_told_at_a_resume(tmp_path, monkeypatch):
     scene = load_scene("base", ("numerics.preset=fast", "numerics.ordering=metis"))
-    stand_in = SimpleNamespace(CSRAdjacency=lambda starts, others: len(starts) - 1,
-                               nested_dissection=lambda nodes: (range(nodes), None))
     with monkeypatch.context() as there:
         there.setattr(machine, "find_spec", lambda name: name)
-        there.setitem(sys.modules, "pymetis", stand_in)
-        with pytest.raises(Interrupted):
-            run(scene, tmp_path, watch=Watch(stop=lambda: 15))
-    monkeypatch.setitem(sys.modules, "pymetis", None)
+        faults.stand_in_package(there, "pymetis")
+        stopped(scene, tmp_path, after=1)
+    faults.absent_package(monkeypatch, "pymetis")
     with pytest.raises(SceneError, match="pymetis is not installed"):
         resume(tmp_path)
 
@@ -65,15 +63,6 @@ def test_more_memory_is_expected_of_larger_meshes():
              for kind in ("linear", "quadratic", "cubic")]
     linear, quadratic, cubic = map(memory.expected_bytes, kinds)
     assert linear < quadratic < cubic
-
-
-def test_a_run_that_needs_more_memory_than_there_is_is_refused(tmp_path, capsys, monkeypatch):
-    """Before anything is written, with both numbers."""
-    monkeypatch.setattr(memory, "free_bytes", lambda: 1e9)
-    assert main(["run", "base", "--set", "numerics.refinement=10", "--out", str(tmp_path / "run")]) == 2
-    message = capsys.readouterr().err
-    assert "MB of memory are needed" in message and "1000 MB are free" in message and message.count("\n") == 1
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_run_that_may_take_more_than_half_of_the_memory_is_warned_of(tmp_path, capsys, monkeypatch):
@@ -113,27 +102,33 @@ def test_what_is_free_is_the_least_that_anything_leaves(tmp_path):
     assert memory.free_bytes(tmp_path) == 0
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="for Linux alone")
+def limited(kind, most, *arguments):
+    """Exit status and standard error of `repro run ARGUMENTS` where the system allows so much."""
+    resource = pytest.importorskip("resource", reason="a system with limits is needed")
+    limit = lambda: resource.setrlimit(getattr(resource, kind), (most, most))  # noqa: E731
+    status, _, message = shell(*arguments, preexec_fn=limit)
+    return status, message
+
+
+@LINUX
 def test_a_limit_of_address_space_ends_a_run_in_one_line(tmp_path):
-    """As if there were no more memory."""
-    import resource
-    limit = lambda: resource.setrlimit(resource.RLIMIT_AS, (1000 << 20,) * 2)  # noqa: E731
-    status, _, message = shell("base", "--set", "numerics.refinement=10", "--out", tmp_path / "run", preexec_fn=limit)
-    assert status == 2 and "MB are free" in message and message.count("\n") == 1
+    """As if there were no more memory: before anything is written, with both numbers."""
+    status, message = limited("RLIMIT_AS", 1000 << 20, "base", "--set", "numerics.refinement=10", "--out",
+                              tmp_path / "run")
+    assert status == 2 and message.count("\n") == 1 and list(tmp_path.iterdir()) == []
+    assert re.search(r"about \d+ MB of memory are needed.* \d+ MB are free", message), message
 
 
 MORE = [pytest.param(size, "", marks=pytest.mark.thorough) for size in (0, 8_000, 40_000)]
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="for Linux alone")
+@LINUX
 @pytest.mark.parametrize("most, which", [(500, ""), (20_000, "fields_0000.vtu: "), *MORE])
 def test_a_limit_of_file_sizes_ends_a_run_in_one_line(tmp_path, most, which):
     """Whichever file it is that may not grow, the first to be longer than 20 kB fields; with more room the run goes on,
     which is asked for in either way."""
-    import resource
-    limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))  # noqa: E731
     asked = [*SHORT, "--set", 'growth.end="0.4 h"', "--out", str(tmp_path / "run"), "--quiet"]
-    status, _, message = shell(*asked, preexec_fn=limit)
+    status, message = limited("RLIMIT_FSIZE", most, *asked)
     assert status == 2 and f"{which}File too large" in message and message.count("\n") == 1, message
     left = files(tmp_path / "run")
     assert not [name for name in left if "writing" in name or "part" in name or which and "vtu" in name]

@@ -1,4 +1,5 @@
-"""The triangulation (3.1): what it covers, how fine and how good it is, and that prescribed nodes stay."""
+"""The triangulation (3.1): what it covers, how fine and how good it is, that prescribed nodes stay; and the curved
+mesh, whose middles are nodes of its own. When a mesh is acceptable is the case mesh_motion-criterion."""
 from dataclasses import replace
 
 import numpy as np
@@ -9,10 +10,11 @@ from scipy.sparse.csgraph import connected_components
 
 from repro.errors import MeshError
 from repro.fem import mesh
-from repro.fem.mesh import Mesh
+from repro.fem.mesh import Mesh, curved, triangle_areas
+from repro.fem.mesher import unlocked
 from repro.fem.outline import TOP
-from repro.fem.space import Space
-from tests.strategies import LENGTH, attached_aggregates, meshed, plug, seed, widths
+from repro.model import pore
+from tests.strategies import LENGTH, attached_aggregates, bent_inside, meshed, plug, scene, seed, widths
 
 both = pytest.mark.parametrize("geometry", [1, 2])
 
@@ -27,24 +29,14 @@ def fluid_regions(grid):
     return connected_components(link @ link.T)[0]
 
 
-def bare(points, triangles):
-    """A mesh of some triangles, all fluid."""
-    points, triangles = np.asarray(points, float), np.asarray(triangles)
-    return Mesh.of(points, triangles, np.zeros(len(triangles), bool), np.empty(0, int), 1.0, (0.0, 1.0))
-
-
 @both
 @pytest.mark.parametrize("radius, width, refinement", [(5, 50, 1), (5, 100, 1), (25, 50, 0.5), (42, 50, 1), (48, 50, 1),
                                                        (27, 50, 2), (98, 100, 1)])
-def test_a_new_mesh_is_good_and_covers_what_it_should(radius, width, refinement, geometry):
-    """Areas of biomass and pore to round-off, no triangle under the criterion (measured: 0.63 and up)."""
+def test_a_new_mesh_is_good(radius, width, refinement, geometry):
+    """No triangle under the criterion (measured: 0.63 and up), one piece of fluid, and no node to spare."""
     grid, outline = meshed(seed(float(radius), refinement, geometry), float(width), refinement)
-    length = grid.ends[1] - grid.ends[0]
-    assert grid.areas.min() > 0
-    assert grid.areas.sum() == pytest.approx(length * width, rel=1e-12)
-    assert grid.area() == pytest.approx(outline.area, rel=1e-12)
+    assert grid.areas.min() > 0 and grid.quality.min() >= mesh.POOR and grid.acceptable()
     assert grid.areas[grid.biomass].sum() == pytest.approx(outline.corners.area, rel=1e-12)
-    assert grid.quality.min() >= mesh.POOR and grid.acceptable()
     assert fluid_regions(grid) == 1
     assert len(np.unique(grid.triangles)) == grid.corners and len(np.unique(grid.cells)) == len(grid.points)
 
@@ -120,48 +112,6 @@ def test_a_finer_mesh_has_quadratically_more_nodes(refinement):
     assert count == pytest.approx(720 * refinement**2, rel=0.15)
 
 
-def test_quality_and_circumscribed_circle_of_known_triangles():
-    """Equilateral: 1 and 2 a / sqrt(3); right-angled with legs one: sqrt(3)/2 and the hypotenuse (3.4, 3.5)."""
-    root = np.sqrt(3)
-    grid = bare([[0, 0], [1, 0], [0.5, root / 2], [2, 0], [3, 0], [2, 1]], [[0, 1, 2], [3, 4, 5]])
-    assert grid.quality == pytest.approx([1.0, root / 2], rel=1e-14)
-    assert grid.circumdiameter == pytest.approx([2 / root, np.sqrt(2)], rel=1e-14)
-    assert grid.areas == pytest.approx([root / 4, 0.5], rel=1e-14)
-
-
-def test_gradients_differentiate_linear_fields_exactly():
-    grid, _ = meshed(seed(20.0))
-    field = 3.0 + 0.7 * grid.points[:, 0] - 1.9 * grid.points[:, 1]
-    found = np.einsum("tai,ta->ti", grid.gradients, field[grid.triangles])
-    assert np.abs(found - [0.7, -1.9]).max() < 1e-11
-
-
-def test_lumped_areas_add_up():
-    grid, outline = meshed(seed(20.0))
-    space = Space(grid, 1)
-    assert space.lumped().sum() == pytest.approx(grid.areas.sum(), rel=1e-13)
-    body = space.lumped(grid.biomass)
-    assert body.sum() == pytest.approx(outline.area, rel=1e-12)
-    assert (np.flatnonzero(body) == grid.body).all()
-    assert np.array_equal(space.reaction.dx[:, 0], body[grid.body])
-
-
-@pytest.mark.parametrize("poor, allowed", [(0, True), (6, True), (7, False)])
-def test_seven_poor_triangles_are_one_too_many(poor, allowed):
-    """Quality under 0.6 in more than six triangles (3.5)."""
-    base = np.arange(10.0)[:, None]
-    height = np.where(base < poor, 0.2, 0.9)
-    corners = np.concatenate([np.hstack([2 * base, 0 * base]), np.hstack([2 * base + 1, 0 * base]),
-                              np.hstack([2 * base + 0.5, height])])
-    grid = bare(corners, np.arange(30).reshape(3, 10).T)
-    assert (grid.quality < 0.6).sum() == poor
-    assert grid.acceptable() == allowed
-
-
-def test_one_triangle_turned_over_is_not_acceptable():
-    assert not bare([[0, 0], [1, 0], [0.5, 0.9]], [[0, 2, 1]]).acceptable()
-
-
 @both
 def test_an_impossible_outline_is_refused_with_its_place(geometry):
     start = seed(5.0, 1.0, geometry)
@@ -173,3 +123,104 @@ def test_an_impossible_outline_is_refused_with_its_place(geometry):
         meshed(start, ends=(-4.0, 50.0))
     with pytest.raises(MeshError, match="leaves the meshed part"):
         meshed(start, width=4.9, ends=(-LENGTH / 2, LENGTH / 2))
+
+
+@pytest.fixture(scope="module")
+def made():
+    """Around a half-disc, as a scene makes it."""
+    return pore.seeded(scene("20 um", numerics={"preset": "fast"})).mesh
+
+
+@pytest.fixture(scope="module")
+def grid(made):
+    """The same, its inner edges bent too."""
+    return bent_inside(made)
+
+
+def test_middles_belong_to_one_edge_each():
+    """Two triangles share the node of their edge; those given are on the outline."""
+    now = pore.seeded(scene("20 um", numerics={"preset": "fast"}))
+    grid = now.mesh
+    edges = np.sort(grid.cells[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    owner = {}
+    for pair, node in zip(map(tuple, edges), grid.cells[:, 3:].ravel()):
+        assert owner.setdefault(pair, node) == node
+    assert len(set(owner.values())) == len(owner) == len(grid.points) - grid.corners
+    free = now.wall == 0
+    assert np.allclose(np.hypot(*grid.points[grid.loop][free].T), 20.0, rtol=1e-13)
+    ends = 0.5 * (grid.points[grid.loop[::2]] + grid.points[np.roll(grid.loop, -2)[::2]])
+    assert (np.hypot(*(grid.points[grid.loop[1::2]] - ends).T) < 1.0).all()
+
+
+def test_edges_and_their_numbers(made):
+    """Each edge once, the same on a straight mesh as on a curved one of the same triangles but for their order; found
+    again by its ends, in either order."""
+    for topology in (made.topology, made.straight.topology):
+        ends = topology.triangles[:, [[0, 1], [1, 2], [2, 0]]]
+        assert np.array_equal(np.sort(topology.edges[topology.cell_edges]), np.sort(ends))
+        a, b = topology.edges.T
+        for first, second in ((a, b), (b, a)):
+            assert np.array_equal(topology.edge_numbers(first, second), np.arange(len(topology.edges)))
+    both = (np.unique(np.sort(t.edges), axis=0) for t in (made.topology, made.straight.topology))
+    assert np.array_equal(*both)
+
+
+def test_no_triangle_has_two_edges_on_the_boundary_of_its_region():
+    """Such a corner's pressure would lock it; others stay as they were, and areas too."""
+    grid, _ = meshed(seed(20.0, 0.3, 2).corners, refinement=0.3)
+    freed = unlocked(grid)
+    areas = triangle_areas(freed.points, freed.triangles)
+    assert areas.min() > 0 and areas.sum() == pytest.approx(triangle_areas(grid.points, grid.triangles).sum())
+    assert areas[freed.biomass].sum() == pytest.approx(triangle_areas(grid.points, grid.triangles)[grid.biomass].sum())
+    edges = np.sort(freed.triangles[:, [[0, 1], [1, 2], [2, 0]]], axis=2)
+    keys = [(tuple(edge), bool(b)) for three, b in zip(edges, freed.biomass) for edge in three]
+    alone = np.array([keys.count(key) == 1 for key in keys]).reshape(-1, 3).sum(axis=1)
+    assert (alone < 2).all()
+
+
+def test_a_middle_lies_between_the_ends_of_its_edge(grid, made):
+    """``edges`` are in the order of the middles' nodes: a linear field keeps its values at straight middles."""
+    straight = grid.with_middles(grid.points[: grid.corners])
+    inner = np.setdiff1d(np.arange(len(grid.points)), grid.loop)
+    assert np.allclose(straight[inner], made.points[inner], rtol=0, atol=1e-12)
+    assert np.allclose(grid.with_middles(straight[: grid.corners] @ [2.0, -3.0]), straight @ [2.0, -3.0])
+
+
+def test_only_triangles_at_the_aggregate_are_bent(made):
+    """In a mesh that was made, the others are straight, which ``acceptable`` stands on; and a bent one that is turned
+    over is found."""
+    straight, others = made.moved(made.with_middles(made.points[: made.corners])), np.ones(len(made.cells), bool)
+    bent = made.topology.bent
+    others[bent] = False
+    assert np.allclose(made.points[made.cells[others]], straight.points[made.cells[others]], rtol=0, atol=1e-12)
+    apart = np.abs(made.points[made.cells] - straight.points[made.cells]).max(axis=(1, 2))
+    assert not made.biomass[bent[apart[bent] > 0.01]].all() and made.acceptable()
+    points = made.points.copy()
+    middle = made.loop[np.flatnonzero(points[made.loop, 1] > 10)[0] // 2 * 2 + 1]
+    points[middle, 1] += 10.0
+    assert not made.moved(points).acceptable()
+
+
+def test_a_triangle_that_is_turned_over_is_refused(grid):
+    """A middle pulled across its triangle; of a straight mesh, a corner."""
+    assert not grid.turned_over().any()
+    points = grid.points.copy()
+    middle = grid.cells[0, 3]
+    points[middle] = points[grid.cells[0, 2]]
+    with pytest.raises(MeshError, match="a triangle near .* is turned over"):
+        grid.moved(points).checked()
+    assert triangle_areas(points, grid.cells[:, :3]).min() > 0
+    straight = grid.straight.points.copy()
+    a, b, c = grid.triangles[0]
+    straight[c] = straight[a] + straight[b] - straight[c]
+    assert grid.straight.checked() is grid.straight
+    with pytest.raises(MeshError, match="a triangle near .* is turned over"):
+        grid.straight.moved(straight).checked()
+
+
+def test_a_clean_channel_has_no_aggregate():
+    made = pore.seeded(scene("20 um", numerics={"preset": "fast"})).mesh
+    none = np.zeros(len(made.cells), bool)
+    straight = Mesh.of(made.points[: made.corners], made.triangles, none, np.empty(0, int), 50.0, made.ends)
+    for bare in (straight, curved(straight, None)):
+        assert bare.area() == 0 and len(bare.body) == 0 and len(bare.loop) == 0

@@ -8,7 +8,7 @@ import repro
 from repro.results import read_table
 from repro.results.network import TABLE, known
 from verification.network import __main__ as command
-from verification.network import law, shapes, unseen
+from verification.network import law, shapes
 from verification.network.shapes import RATIOS, Sample
 
 LAMBDA = 2000.0
@@ -44,19 +44,19 @@ def test_velocity_head_width_and_place_drop_out():
 def test_the_table_has_half_discs_of_the_present_code(thickness):
     """As in `network.csv`. Meshes of another machine may differ in rounding, by which Mmg makes other triangles: within
     what the elements err by."""
-    now = shapes.half_disc(thickness)
-    columns = read_table(TABLE)
+    now, table = shapes.half_disc(thickness), read_table(TABLE)
+    share = now.boundary.area / now.mesh.width**2
     for ratio in (RATIOS[0], LAMBDA, RATIOS[-1]):
-        rows = (columns["spanned"] == 0) & (columns["viscosity_ratio"] == ratio)
-        row = int(np.abs(columns["area_over_width2"][rows] - now.boundary.area / now.mesh.width**2).argmin())
-        assert columns["area_over_width2"][rows][row] == pytest.approx(now.boundary.area / now.mesh.width**2, rel=1e-4)
-        found = columns["added_length_over_width"][rows][row]
+        apart = np.abs(table["area_over_width2"] - share)
+        row = np.where((table["spanned"] == 0) & (table["viscosity_ratio"] == ratio), apart, np.inf).argmin()
+        assert apart[row] <= 1e-4 * share
+        found = table["added_length_over_width"][row]
         assert found == pytest.approx(shapes.added_length(now.space, ratio), rel=law.NUMERICS / 4)
 
 
 def test_fifty_shapes_that_the_fit_has_not_seen_are_within_the_bounds():
     """Half-discs, drawn bodies and plugs, and what three runs make, each at a lambda of its own."""
-    found = list(unseen.every())
+    found = list(law.new_shapes())
     columns = {name: np.array(values, float) for name, values in
                zip(law.COLUMNS, zip(*(law.shape_row(one, 0, 1) for one in found)))}
     judged = law.judged(columns)
@@ -89,9 +89,9 @@ def test_a_plug_resists_as_one_with_straight_ends_less_what_its_ends_let_pass():
 
 def test_arrays_of_pores_and_numbers():
     """Each pore its own, whatever its unit of length."""
-    area, width, spanned = np.array([[500.0, 5000.0, 25000.0]]), np.array([[50.0], [100.0]]), np.array([[0], [1]])
+    width, spanned = np.array([[50.0], [100.0]]), np.array([[0], [1]])
     with pytest.raises(ValueError, match="spanned=False"):
-        repro.added_resistance(area, width, spanned)
+        repro.added_resistance(25000.0, width, spanned)
     area = np.array([[500.0, 2000.0, 3500.0], [17000.0, 25000.0, 44000.0]])
     found = repro.added_resistance(area, width, spanned)
     for index, share in np.ndenumerate(area / width**2):
@@ -131,38 +131,31 @@ def test_the_ends_of_the_range_are_in_it():
                 assert repro.added_resistance(share, 1.0, spanned, ratio).length > 0
 
 
-def _plugs(run, factor, shares):
-    return [Sample(run, True, float(share), (LAMBDA,), (float(factor * share**2),)) for share in shares]
-
-
 def test_the_mean_of_runs_leaves_one_out_and_what_a_run_does_not_reach():
     """Of r = c (A / W^2)^2: the geometric mean of c over the runs that are there."""
-    first, second, third = law.RUNS[:3]
-    found = _plugs(first, 1.0, np.geomspace(1.4, 5, 60)) + _plugs(second, 4.0, np.geomspace(1.4, 5, 60))
-    found += _plugs(third, 16.0, np.geomspace(1.4, 2.4, 60))
+    found = [Sample(run, True, share, (LAMBDA,), (factor * share**2,))
+             for run, factor, most in zip(law.RUNS, (1.0, 4.0, 16.0), (5, 5, 2.4))
+             for share in map(float, np.geomspace(1.4, most, 60))]
     shares = np.array(law.PLUGS)
-    assert law.mean_of_runs(found)[:, 0] / shares**2 == pytest.approx(np.where(shares < 2.4, 4.0, 2.0), rel=1e-3)
-    assert law.mean_of_runs(found, but=second)[:, 0] / shares**2 == pytest.approx(
-        np.where(shares < 2.4, 4.0, 1.0), rel=1e-3)
+    for but, near in ((None, 2.0), (law.RUNS[1], 1.0)):
+        expected = np.where(shares < 2.4, 4.0, near) * shares**2
+        assert law.mean_of_runs(found, but=but)[:, 0] == pytest.approx(expected, rel=1e-3)
 
 
 def test_bounds_are_the_farthest_of_the_shapes_nearby():
-    shares = np.arange(1.0, 8.0)
     found = [Sample(None, False, share, (LAMBDA,), (1.0,)) for share in (1.0, 2.9, 4.5, 7.0)]
-    least, most = law.bounds(shares, found, np.array([[0.1], [-0.2], [0.3], [0.0]]))[:, :, 0]
-    assert least == pytest.approx(1 - np.array([0.2, 0.2, 0.2, 0.2, 0.0, 0.0, 0.0]) * [1, 1, 1, 1, 0, 0, 0]
-                                  - 0.008)
+    least, most = law.bounds(np.arange(1.0, 8.0), found, np.array([[0.1], [-0.2], [0.3], [0.0]]))[:, :, 0]
+    assert least == pytest.approx(np.array([0.8] * 4 + [1.0] * 3) - 0.008)
     assert most == pytest.approx(np.array([1.1, 1.1, 1.3, 1.3, 1.3, 1.3, 1.0]) + 0.008)
 
 
-def test_drawn_shapes_have_the_area_that_is_asked_for():
+@pytest.mark.parametrize("share, thicker, leaning", [(0.1, 1.03, 0.05), (1.2, 0.99, -0.05)])
+def test_drawn_shapes_have_the_area_that_is_asked_for(share, thicker, leaning):
     """And lean, or rise, as far as they are to."""
-    for share, thicker, leaning in ((0.1, 1.03, 0.05), (1.2, 0.99, -0.05)):
-        points = shapes.body(share, thicker, leaning)
-        now = shapes.drawn(points)
-        assert now.boundary.area / shapes.WIDTH**2 == pytest.approx(share, rel=1e-3)
-        assert points[:, 1].max() == pytest.approx(thicker * np.sqrt(2 * share / np.pi))
-        assert points[points[:, 1].argmax(), 0] == pytest.approx(leaning * points[:, 1].max())
+    points = shapes.body(share, thicker, leaning)
+    assert shapes.drawn(points).boundary.area / shapes.WIDTH**2 == pytest.approx(share, rel=1e-3)
+    highest = points[points[:, 1].argmax()]
+    assert highest == pytest.approx(thicker * np.sqrt(2 * share / np.pi) * np.array([leaning, 1.0]))
     points = shapes.plug(3.0, 1.2, 0.6)
     now = shapes.drawn(points)
     assert now.contact and now.boundary.area / shapes.WIDTH**2 == pytest.approx(3.0, rel=1e-6)
@@ -170,27 +163,24 @@ def test_drawn_shapes_have_the_area_that_is_asked_for():
     assert (top.min() - points[0, 0], points[-1, 0] - top.max()) == pytest.approx((0.72, 0.48))
 
 
-def test_the_command_writes_table_shapes_and_page(tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize("length, inside", [(None, 1), (100.0, 0)])
+def test_the_command_writes_table_shapes_and_page(tmp_path, monkeypatch, capsys, length, inside):
     """Of few shapes; exit status 1 where one of those unseen is outside."""
     discs = [Sample(None, False, share, RATIOS, (8 * share,) * 7) for share in np.geomspace(0.1, 1.4, 6)]
     plugs = [Sample(run, True, share, RATIOS, tuple(np.multiply(RATIOS, share)))
              for run in law.RUNS[:2] for share in np.geomspace(1.4, 4.7, 30)]
-    new = [Sample(None, False, 0.5, (LAMBDA,), (float(repro.added_resistance(0.5, 1, False).length),))]
-    monkeypatch.setattr(command.law, "half_discs", lambda: discs)
-    monkeypatch.setattr(command.law, "others", lambda: iter([*discs, *plugs]))
-    monkeypatch.setattr(command.unseen, "every", lambda: iter(new))
-    monkeypatch.setattr(command, "TABLE", tmp_path / "network.csv")
-    monkeypatch.setattr(command, "PAGE", tmp_path / "network.md")
-    monkeypatch.setattr(law, "SHAPES", tmp_path / "shapes.csv")
-    assert command.main() == 0 and "1 of 1 shapes" in capsys.readouterr().out
-    written = read_table(tmp_path / "network.csv")
+    new = Sample(None, False, 0.5, (LAMBDA,), (length or float(repro.added_resistance(0.5, 1, False).length),))
+    for room, name, value in ((law, "half_discs", lambda: discs), (law, "others", lambda: iter([*discs, *plugs])),
+                              (law, "new_shapes", lambda: iter([new])), (law, "SHAPES", tmp_path / "shapes.csv"),
+                              (command, "TABLE", tmp_path / "network.csv"), (command, "PAGE", tmp_path / "network.md")):
+        monkeypatch.setattr(room, name, value)
+    assert command.main() == 1 - inside and f"{inside} of 1 shapes" in capsys.readouterr().out
+    written = read_table(command.TABLE)
     assert list(written) == law.TABLE_COLUMNS and len(written["most"]) == 7 * (len(discs) + len(law.PLUGS))
-    assert len(read_table(tmp_path / "shapes.csv")["grown"]) == 2 * len(discs) + len(plugs) + 1
-    new[0] = Sample(None, False, 0.5, (LAMBDA,), (100.0,))
-    assert command.main() == 1 and "0 of 1 shapes" in capsys.readouterr().out
+    assert len(read_table(law.SHAPES)["grown"]) == 2 * len(discs) + len(plugs) + 1
 
 
 def test_the_page_tells_the_present_table():
     found = law.judged(law.read(unseen=True))
     assert command.PAGE.read_text(encoding="utf-8") == law.page(law.read(unseen=False), found)
-    assert found.count == 50 and found.inside == 50
+    assert (found.count, found.inside) == (50, 50)

@@ -2,38 +2,15 @@
 import math
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from tests import oracles
 from tests.test_architecture import imported
 
-SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-ONE_WAY = np.array([[0, 1, 2], [0, 2, 3]])
-
 
 def test_the_oracles_know_nothing_of_repro():
     source = Path(oracles.__file__).read_text(encoding="utf-8")
     assert imported(source) == {"math", "numpy"}
-
-
-def test_one_triangle():
-    """The unit right triangle: area, gradients, circle."""
-    corners = SQUARE[[0, 1, 3]]
-    assert oracles.area(corners) == 0.5 and oracles.area(corners[::-1]) == -0.5
-    assert oracles.slopes(corners) == pytest.approx(np.array([[-1, -1], [1, 0], [0, 1]]), abs=1e-15)
-    assert oracles.diameter(corners) == pytest.approx(math.sqrt(2), rel=1e-15)
-
-
-def test_a_square_of_two_triangles():
-    assert oracles.mass(SQUARE, ONE_WAY, [1.0, 2.0, 3.0, 4.0]) == pytest.approx(2 + 1 / 3, rel=1e-15)
-
-
-def test_a_derivative_by_hand():
-    """Of x . A x: (A + A^T) x; of x itself: the identity. Exact for polynomials of degree 4, up to 1e-16 / step."""
-    A, x = np.array([[1.0, 2.0], [5.0, -3.0]]), np.array([0.7, -1.1])
-    assert oracles.derivative(lambda y: y @ A @ y, x, 1e-2) == pytest.approx((A + A.T) @ x, rel=1e-12)
-    assert oracles.derivative(lambda y: y, x, 1e-2) == pytest.approx(np.eye(2), abs=1e-12)
 
 
 def test_rates_and_extent_of_the_paper():

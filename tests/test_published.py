@@ -56,18 +56,14 @@ def test_what_there_is_not_is_refused(told, field):
 
 
 def test_every_claim_has_its_verdict_in_the_note(told):
-    """Each once, in the list of its verdict."""
+    """Each once, in the list of its verdict; a contradiction, or what is undecided, with its reason."""
     kinds = ("reproduced", "rounding", "changed", "contradicted", "undecided")
     lists = [f"{{{{list.{kind}}}}}" for kind in kinds]
     named = [re.findall(r"^- \*\*(C\d\d)\*\*", replication.filled(one, told), re.M) for one in lists]
     assert sorted(sum(named, [])) == list(EXPECTED)
+    assert all(claim["reason"] for claim in told["claims"] if claim["id"] in named[3] + named[4])
     counts = replication.filled(" ".join(f"{{{{claims.{kind}}}}}" for kind in kinds), told)
     assert counts.split() == [str(len(found)) for found in named]
-
-
-def test_every_contradiction_says_why(told):
-    assert all(claim["reason"] for claim in told["claims"]
-               if claim["verdict"] in (replication.CONTRADICTED, replication.UNDECIDED))
 
 
 def test_what_needs_no_solution_is_not_counted_as_a_value_reproduced(told):
@@ -90,14 +86,6 @@ def test_every_erratum_is_in_the_note(told):
     ids = re.findall(r"^## (E\d+)\.", text("reference/ERRATA.md"), re.M)
     listed = re.findall(r"^- \*\*(E\d+)\*\*", replication.filled("{{list.errata}}", told), re.M)
     assert listed == ids and len(ids) >= 20
-
-
-def test_lines_are_wrapped_and_nothing_else(told):
-    words = "one two " * 40
-    found = replication.filled(f"{words}\n\n| {words}|\n", told)
-    paragraph, table = found.split("\n\n")
-    assert paragraph.split() == words.split() and max(map(len, paragraph.splitlines())) <= 120
-    assert table == f"| {words}|\n"
 
 
 def test_version_licence_and_name_agree():
@@ -136,11 +124,8 @@ def test_the_pythons_that_are_named_are_those_that_are_allowed():
 def test_wheel_and_source_distribution_hold_what_they_should(tmp_path):
     """The wheel the solver alone with its scenes; the source distribution the checkout."""
     copied = tmp_path / "checkout"
-    told = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    listed = told.split("\n")
-    for name in filter(None, listed):
-        (copied / name).parent.mkdir(parents=True, exist_ok=True)
-        (copied / name).write_bytes((ROOT / name).read_bytes())
+    subprocess.run(["git", "checkout-index", "--all", f"--prefix={copied}/"], cwd=ROOT, check=True)
+    listed = [str(path.relative_to(copied)) for path in copied.rglob("*")]
     subprocess.run([sys.executable, "-m", "build", "--no-isolation", "--outdir", tmp_path / "dist", copied],
                    capture_output=True, check=True)
     (wheel,), (source,) = ((tmp_path / "dist").glob(kind) for kind in ("*.whl", "*.tar.gz"))

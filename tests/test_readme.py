@@ -1,12 +1,16 @@
-"""What the README shows works as it stands: every block of commands, of TOML and of Python."""
+"""What the README and the tutorial show works as it stands: every block of commands, of TOML and of Python."""
 
 import re
 import tomllib
+from pathlib import Path
+
+import matplotlib.pyplot as plt
 
 from repro.scene import load_scene, parse_scene
-from tests.blocks import ROOT, blocks, execute, is_repro, is_target
+from tests.blocks import ROOT, blocks, execute, is_repro, is_target, told
 
 PAGE = ROOT / "README.md"
+TUTORIAL = ROOT / "docs" / "tutorial.md"
 BLOCKS = blocks(PAGE)
 
 
@@ -43,7 +47,7 @@ def test_the_page_is_short_and_the_others_show_nothing_that_is_not_executed():
     """Two commands, a picture and a pore of one's own come first."""
     text = PAGE.read_text(encoding="utf-8")
     assert len(text.encode()) < 12_000 and text.index("overview.png") < text.index("make env") < 2_500
-    others = [page for page in sorted((ROOT / "docs").glob("*.md")) if page.name != "tutorial.md"]
+    others = [page for page in sorted((ROOT / "docs").glob("*.md")) if page != TUTORIAL]
     assert len(others) >= 3 and [page.name for page in others if "```" in page.read_text(encoding="utf-8")] == []
 
 
@@ -56,3 +60,27 @@ def test_the_commands_are_targets_of_the_makefile():
     commands = set(re.findall(r"`make ([\w-]+)`", PAGE.read_text(encoding="utf-8")))
     assert {"figures", "test", "claims", "verify", "bench"} <= commands
     assert all(is_target(["make", command]) for command in commands)
+
+
+def test_the_tutorial_works_from_its_first_line_to_its_last(tmp_path, capsys, monkeypatch):
+    """Its commands, its scene and its Python, one after the other in one folder."""
+    monkeypatch.chdir(tmp_path)
+    printed, statuses = [], []
+    names: dict = {}
+    for block in blocks(TUTORIAL):
+        if block.language == "toml":
+            Path(re.match(r"# (\S+)\n", block.text)[1]).write_text(block.text)
+        elif block.language == "python":
+            exec(compile(block.text, str(TUTORIAL), "exec"), names)
+        for words in block.commands:
+            assert is_repro(words), words
+            status, out, err = execute(words, capsys)
+            printed.append(out)
+            statuses.append(status)
+            assert [err.strip()] == told(block) if status else told(block) == [], err
+    plt.close("all")
+    assert statuses == [0, 0, 0, 0, 0, 0, 2, 0, 0, 0, 0]
+    assert load_scene("mine.toml").pore == load_scene("base").pore
+    assert (tmp_path / "runs" / "narrow" / "timeseries.csv").exists()
+    assert (tmp_path / "oxygen.png").stat().st_size > 1000
+    assert "WARNING" not in printed[3] and "WARNING growth.end" in printed[4]

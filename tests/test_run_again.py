@@ -5,23 +5,14 @@ import pytest
 from repro import results
 from repro.cli import main
 from repro.run import machine, running
-from repro.run.checkpoint import NEWEST, PREVIOUS
 from repro.run.running import run
 from repro.scene import load_scene
 from tests import faults
-from tests.shell import as_whole, files, flags, lasting, state, stopped, told
+from tests.pages import whole_of
+from tests.shell import as_whole, files, flags, lasting, refused, state, stopped, told
 
 FAST = ('numerics.preset="fast"', 'growth.end="3 h"')
 SETS, SCENE = flags(*FAST), load_scene("base", FAST)
-
-
-def refused(folder, capsys, *arguments):
-    """What is said of a run that is refused, with status 2 and one line, and changes nothing."""
-    before = state(folder)
-    assert main(["run", *arguments, "--out", str(folder)]) == 2
-    message = capsys.readouterr().err
-    assert message.count("\n") == 1 and state(folder) == before
-    return message
 
 
 def test_a_run_that_is_done_is_left_alone(tmp_path, capsys):
@@ -44,21 +35,14 @@ def test_a_run_that_was_interrupted_is_gone_on_with(tmp_path, capsys):
     assert told(tmp_path / "run")["resumes"][0]["time_h"] > 0
 
 
-def test_a_run_that_had_no_state_yet_begins_again(tmp_path, capsys):
-    stopped(SCENE, tmp_path / "run")
-    for name in (NEWEST, PREVIOUS):
-        (tmp_path / "run" / name).unlink()
-    assert main(["run", "base", *SETS, "--out", str(tmp_path / "run")]) == 0
-    assert "it starts again from t = 0" in capsys.readouterr().err
-
-
 def test_another_scene_is_refused_with_what_differs(tmp_path, capsys):
     """By key, with both values."""
-    stopped(SCENE, tmp_path / "run")
-    message = refused(tmp_path / "run", capsys, "base", "--set", FAST[0], "--set", "growth.end=4 h")
+    out = tmp_path / "run"
+    stopped(SCENE, out)
+    message = refused(tmp_path, capsys, "base", *flags(FAST[0], "growth.end=4 h"), "--out", str(out))
     assert "growth.end (3.0 h there, now 4.0 h)" in message and "--force" in message
-    assert "flow.mean_velocity (not set there" in refused(tmp_path / "run", capsys, "flow_only")
-    assert "growth (a section there, now not set)" in refused(tmp_path / "run", capsys, "flow_only")
+    message = refused(tmp_path, capsys, "flow_only", "--out", str(out))
+    assert "flow.mean_velocity (not set there" in message and "growth (a section there, now not set)" in message
 
 
 @pytest.mark.parametrize("key", ["source", "versions.scipy"])
@@ -71,62 +55,34 @@ def test_other_versions_are_refused_with_what_differs(tmp_path, capsys, monkeypa
     else:
         faults.another_version(monkeypatch, "scipy")
     for name in ("run", "done"):
-        assert f"the run there is another one: {key} (" in refused(tmp_path / name, capsys, "base", *SETS)
+        assert f"the run there is another one: {key} (" in refused(
+            tmp_path, capsys, "base", *SETS, "--out", str(tmp_path / name))
 
 
 def test_a_forced_run_removes_what_is_listed_and_nothing_else(tmp_path):
-    """Files that others have put beside the run's, and what a link leads to, stay."""
+    """And computes again. Files that others have put beside the run's, and what a link leads to, stay."""
     out = tmp_path / "run"
+    whole = whole_of(SCENE)
     run(load_scene("base", ('numerics.preset="fast"', 'growth.end="6 h"')), out)
-    (tmp_path / "victim").write_text("years of work")
+    mine = {name: b"years of work" for name in ("notes.txt", "fields/mine.vtu", "fields/fields_mine.vtu",
+                                                "timeseries.csv.bak", "../victim", "link.txt")}
+    (out / "link.txt").symlink_to(tmp_path / "victim")
+    for name, content in mine.items():
+        (out / name).write_bytes(content)
     record = told(out)
     results.write_json(out / "run.json", record | {"files": [*record["files"], "../victim", "link.txt", "notes.txt"]})
-    (out / "link.txt").symlink_to(tmp_path / "victim")
-    mine = ["notes.txt", "fields/mine.vtu", "fields/fields_mine.vtu", "timeseries.csv.bak"]
-    for name in mine:
-        (out / name).write_text("years of work")
     assert main(["run", "base", *SETS, "--out", str(out), "--force"]) == 0
-    assert (out / "link.txt").is_symlink() and (tmp_path / "victim").read_text() == "years of work"
-    assert [(out / name).read_text() for name in mine] == ["years of work"] * len(mine)
-    run(SCENE, tmp_path / "whole")
-    left = {name: content for name, content in files(out).items() if name not in (*mine, "link.txt")}
-    assert left == files(tmp_path / "whole")
-    kept = {key: value for key, value in lasting(out).items() if key != "origin"}
-    assert kept == {key: value for key, value in lasting(tmp_path / "whole").items() if key != "origin"}
-
-
-def test_a_forced_run_computes_again(tmp_path):
-    """What is done, too."""
-    run(SCENE, tmp_path)
-    before = (tmp_path / "timeseries.csv").stat().st_mtime_ns
-    assert main(["run", "base", *SETS, "--out", str(tmp_path), "--force", "--quiet"]) == 0
-    assert (tmp_path / "timeseries.csv").stat().st_mtime_ns > before and told(tmp_path)["resumes"] == []
+    assert (out / "link.txt").is_symlink() and {name: (out / name).read_bytes() for name in mine} == mine
+    assert {name: content for name, content in files(out).items() if name not in mine} == files(whole)
+    assert lasting(out) | {"origin": None} == lasting(whole) | {"origin": None} and told(out)["resumes"] == []
 
 
 @pytest.mark.parametrize("name", ["timeseries.nc", "fields/fields_0077.vtu"])
 def test_a_forced_run_is_refused_where_others_have_files_of_its_names(tmp_path, capsys, name):
     run(SCENE, tmp_path)
     (tmp_path / name).write_text("years of work")
-    assert f"{name}: no run has written it" in refused(tmp_path, capsys, "base", *SETS, "--force")
-
-
-@pytest.mark.parametrize("content, why", [
-    (None, "it holds 'thesis.tex', which is not of a run; a new or empty folder"),
-    ("", "run.json: cannot be read"), ("[" * 9999, "run.json: cannot be read"),
-    ("{}", "run.json: it has no scene or no status"),
-    ('{"scene": "x", "files": ["thesis.tex"]}', "run.json: it has no scene or no status"),
-    ('{"scene": "x", "hash": "x", "tables": {}, "status": "x", "files": ["thesis.tex"]}', "run.json: its status 'x'")])
-def test_a_forced_run_takes_no_folder_without_a_run(tmp_path, capsys, content, why):
-    """Nor one whose run.json cannot be read: one line says what is there and what to do, and nothing is changed."""
-    (tmp_path / "thesis.tex").write_text("years of work")
-    if content is not None:
-        (tmp_path / "run.json").write_text(content)
-    message = refused(tmp_path, capsys, "base", *SETS, "--force")
-    assert why in message and message.count("\n") == 1
-    assert content is None or "move the folder away, or name another" in message
-    assert (tmp_path / "thesis.tex").read_text() == "years of work"
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["run.json", "thesis.tex"][content is None:]
-    assert content is None or (tmp_path / "run.json").read_text() == content
+    assert f"{name}: no run has written it" in refused(
+        tmp_path, capsys, "base", *SETS, "--force", "--out", str(tmp_path))
 
 
 def test_a_scene_file_that_was_changed_is_told_on_resume(tmp_path, capsys):

@@ -1,15 +1,28 @@
-"""Units of scenes: the table of exact fractions says what pint says, and pint is asked for the rest alone."""
+"""Units of scenes: the table of exact fractions says what pint says, and pint is asked for the rest alone; and what is
+said by other keys: F by the oxygen demand, D in the aggregate by that in water."""
 import re
-import subprocess
-import sys
+from dataclasses import replace
 from fractions import Fraction
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from repro.scene import exact, load_scene, packaged_scenes, units
+from repro.scene import (
+    Donor,
+    Kinetics,
+    Scene,
+    exact,
+    load_scene,
+    packaged_scenes,
+    parse_scene,
+    scene_hash,
+    scene_tables,
+    units,
+)
 from repro.scene.text import scene_text
+from tests.test_scene import refusal
+from tests.test_scene_text import fields, parsed
 
 #: Units that pint knows and the table does not, and words that are no unit.
 OTHERS = ["inch", "ft", "angstrom", "lb", "psi", "atm", "dyn", "month", "ppm", "percent", "mol", "K", "Hz", "cc",
@@ -78,8 +91,98 @@ def test_packaged_scenes_defaults_and_examples_need_no_pint(monkeypatch):
             load_scene("base", [entry])
 
 
-def test_a_run_of_base_never_makes_the_registry(tmp_path):
-    script = ("import sys; from repro.cli import main; "
-              "status = main(['run', 'base', '--set', 'growth.end=0.2 h', '--out', sys.argv[1], '--quiet']); "
-              "sys.exit(status or ('pint' in sys.modules))")
-    assert subprocess.run([sys.executable, "-c", script, tmp_path / "out"], check=False).returncode == 0
+def test_what_a_key_accepts_cannot_be_changed():
+    """Of any kind: one object tells every scene what a key takes."""
+    kinds = {type(entry.metadata["kind"]) for _, entry in fields(Scene) if "kind" in entry.metadata}
+    assert units.Points in kinds and len(kinds) >= 7
+    assert {kind.__name__ for kind in kinds if not kind.__dataclass_params__.frozen} == set()
+
+
+# ---------------------------------------------------------------- F by the oxygen demand
+
+COD = "kinetics.donor_oxygen_demand"
+
+
+def test_the_ratio_follows_from_the_oxygen_demand():
+    """F = COD - Y d_c, by (7); both are kept, so that a difference can be told."""
+    kinetics = load_scene("base", [f"{COD}=2.38"]).kinetics
+    assert kinetics.acceptor_to_donor_ratio == pytest.approx(1.5138, rel=1e-15) == kinetics.implied_ratio
+    other = load_scene("base", [f"{COD}=3", "kinetics.yield_coefficient=0.5", "kinetics.decay_oxygen_demand=1"])
+    assert other.kinetics.acceptor_to_donor_ratio == 2.5
+    both = load_scene("base", [f"{COD}=2.38", "kinetics.acceptor_to_donor_ratio=1.6"]).kinetics
+    assert (both.acceptor_to_donor_ratio, both.donor_oxygen_demand) == (1.6, 2.38)
+    assert both.implied_ratio == pytest.approx(1.5138) and Kinetics().implied_ratio is None
+
+
+@given(st.floats(1e-3, 1e3), st.floats(0.01, 1), st.floats(0.01, 1))
+def test_round_trip_with_an_oxygen_demand(rest, product, part):
+    """From the tables and from the text that `repro scene` writes."""
+    overrides = [f"{COD}={rest + product * part!r}", f"kinetics.yield_coefficient={part!r}",
+                 f"kinetics.decay_oxygen_demand={product!r}"]
+    scene = load_scene("base", overrides)
+    assert parse_scene(scene_tables(scene), "base", "again") == scene
+    assert parsed(scene_text("base", overrides), "base") == scene
+    without = replace(scene, kinetics=replace(scene.kinetics, donor_oxygen_demand=None))
+    assert scene_hash(scene) != scene_hash(without)
+
+
+@pytest.mark.parametrize("overrides, said", [
+    ([f"{COD}=0.8"], "kinetics.donor_oxygen_demand = 0.8: more than Y d_c (0.8662) is needed: F is the rest"),
+    ([f"{COD}=0.8", "kinetics.acceptor_to_donor_ratio=1.52"], "more than Y d_c (0.8662) is needed"),
+    ([f"{COD}=0"], "a plain number is needed, such as 2.38 (greater than zero)"),
+    ([f"{COD}=2 mg/mg"], "a plain number is needed, such as 2.38"),
+    ([f"{COD}=nan"], "a plain number is needed"),
+])
+def test_no_oxygen_demand(overrides, said):
+    assert said in refusal("base", *overrides)
+
+
+@pytest.mark.parametrize("entry, key", [("yield_coefficient=1", "decay_oxygen_demand"),
+                                        ("decay_oxygen_demand=4", "yield_coefficient")])
+def test_what_is_set_beside_an_oxygen_demand_is_named(tmp_path, entry, key):
+    path = tmp_path / "mine.toml"
+    path.write_text("[aggregate]\n[substrates]\n[kinetics]\ndonor_oxygen_demand = 1.2\n")
+    message = refusal(path, f"kinetics.{entry}")
+    name, _, value = entry.partition("=")
+    assert f"kinetics.{name} = {value}: less than kinetics.donor_oxygen_demand (1.2) is needed of Y d_c (" in message
+    assert message.endswith(f"its product with {key}")
+
+
+# ---------------------------------------------------------------- shares
+
+
+@pytest.mark.parametrize("text, share", [("80 %", Fraction(4, 5)), ("80%", Fraction(4, 5)), ("100.0 %", 1),
+                                         ("2.5e1 %", Fraction(1, 4)), ("1e-3 %", Fraction(1, 100_000))])
+def test_a_share_of_the_diffusivity_in_water(text, share):
+    """Rounded once, of the D that the scene says, in either order."""
+    entries = [f"substrates.donor.diffusivity_in_aggregate={text}", "substrates.donor.diffusivity=3 cm^2/day"]
+    for overrides in (entries, entries[::-1]):
+        scene = load_scene("base", overrides)
+        donor = scene.substrates.donor
+        assert donor.diffusivity_in_aggregate == float(share * Fraction(donor.diffusivity))
+        assert parse_scene(scene_tables(scene), "base", "again") == scene
+    default = load_scene("base", [f"substrates.acceptor.diffusivity_in_aggregate={text}"]).substrates.acceptor
+    assert default.diffusivity_in_aggregate == float(share * Fraction(default.diffusivity))
+
+
+def test_a_share_is_hashed_as_what_it_comes_to_and_written_as_it_stands():
+    said, meant = ([f"substrates.donor.diffusivity_in_aggregate={value}", "substrates.donor.diffusivity=3 cm^2/day"]
+                   for value in ("80 %", "2.4 cm^2/day"))
+    assert scene_hash(load_scene("base", said)) == scene_hash(load_scene("base", meant))
+    text = scene_text("base", said)
+    assert '\ndiffusivity_in_aggregate = "80 %"\n' in text and parsed(text, "base") == load_scene("base", said)
+    assert Donor(diffusivity=10.0, diffusivity_in_aggregate=Fraction(1, 2)).diffusivity_in_aggregate == 5.0
+
+
+@pytest.mark.parametrize("value", ["0 %", "-5 %", "100.1 %", "%", "nan %", "1e999999999 %", "1e-999999999 %", "80 %%",
+                                   "80 % um^2/h", "0.8", "eighty %", "9" * 100 + " %"])
+def test_no_share(value):
+    message = refusal("base", f'substrates.acceptor.diffusivity_in_aggregate="{value}"')
+    assert ('a diffusivity or kinematic viscosity is needed, such as "1.85 cm^2/day" (greater than zero), '
+            'or a share of diffusivity up to "100 %"') in message
+
+
+def test_a_share_that_comes_to_nothing_is_refused():
+    message = refusal("base", "substrates.acceptor.diffusivity_in_aggregate=1e-200 %",
+                      "substrates.acceptor.diffusivity=1e-200 um^2/h")
+    assert "diffusivity_in_aggregate = \"1e-200 %\": greater than zero is needed" in message

@@ -1,9 +1,10 @@
 """Steps of the midpoint rule: where they end, which are taken, and what depends on rows and ends.
 
-That they are of second order is the case coupling-midpoint-order; that their ledgers close is in `test_balances.py`.
+That they are of second order is the case coupling-midpoint-order; that their ledgers close is in `test_balances.py`,
+that the end changes none of them in `test_longer.py`.
 """
+import json
 from dataclasses import replace
-from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -74,8 +75,7 @@ def test_rows_are_at_the_reported_times_to_the_last_bit(order):
 
 
 @pytest.mark.parametrize("end, apart", [
-    (0.001, 0.2 / 2**13), (0.01, 0.2 / 2**9), (0.5, 0.0125), (1.0, 0.025), (2.0, 0.05), (2.4, 0.1), (4.79, 0.1),
-    (4.8, 0.2), (9.59, 0.2), (9.6, 0.4), (19.4, 0.8), (45.0, 1.6)])
+    (0.001, 0.2 / 2**13), (0.01, 0.2 / 2**9), (1.0, 0.025), (4.79, 0.1), (4.8, 0.2), (19.4, 0.8), (45.0, 1.6)])
 def test_without_times_there_are_25_rows_at_round_times_in_a_run_of_any_length(end, apart):
     """And the last one is at the end."""
     rows = stepping.rows(base(f'growth.end="{end} h"'))
@@ -107,14 +107,13 @@ SCENES = {"fast": (FAST, 'growth.end="9.7 h"'), "contact": (FAST, 'growth.end="0
           "stress-free": (FAST, 'growth.end="0.8 h"', 'growth.new_biomass="stress_free"', *CONTACT)}
 
 
-@cache
 def steps_of(name, *changes):
-    """States, instants and ledgers of all steps of a scene, reported or not."""
+    """The last state, the instants, and the ledgers of all steps of a scene, reported or not."""
     made = load_scene("base", (*SCENES[name], *changes))
     found = list(simulation.steps(made))
     rows = [instant for _, instant in found if instant]
     last = found[-1][0]
-    return found, rows, [*(row for instant in rows for row in instant.ledgers), *last.ledgers]
+    return last, rows, [*(row for instant in rows for row in instant.ledgers), *last.ledgers]
 
 
 def same(one, two):
@@ -132,62 +131,34 @@ def arrays(now):
 @pytest.mark.parametrize("name", SCENES)
 def test_steps_depend_on_no_row(name):
     """The last state and the ledger of every step, to the last bit, with 1 and 16 rows, and every step's."""
-    end = float(SCENES[name][1 if "fast" in SCENES[name][0] else 0].split('"')[1].split()[0])
-    found = [steps_of(name)]
+    last, rows, ledgers = steps_of(name)
     for count in (1, 16):
-        times = [f"{time!r} h" for time in np.linspace(0, end, count + 1)[1:].tolist()]
-        found.append(steps_of(name, f"output.times={times}".replace("'", '"')))
-        assert len(found[-1][1]) == count + 1
-    assert len(found[0][2]) > 1 and all(ledgers == found[0][2] for _, _, ledgers in found)
+        times = np.linspace(0, last.pore.time, count + 1)[1:].tolist()
+        other, found, its = steps_of(name, f"output.times={json.dumps([f'{time!r} h' for time in times])}")
+        assert len(found) == count + 1 and its == ledgers and same(other, last)
+    assert len(ledgers) > 1
     if CONTACT[0] in SCENES[name]:
-        rows = found[0][1]
         assert not rows[0].pore.contact and rows[-1].pore.contact and sum(instant.remeshes for instant in rows) > 1
-    assert all(same(states[-1][0], found[0][0][-1][0]) for states, _, _ in found)
-
-
-@pytest.mark.parametrize("step, part", [(-2, 0.5), (0, 1.6)])
-@pytest.mark.parametrize("name", SCENES)
-def test_steps_do_not_depend_on_the_end(name, step, part):
-    """The ledgers of steps, and the state from which a later end goes on, to the last bit; the step that is cut closes
-    its ledger and ends where the run does."""
-    whole, _, later = steps_of(name)
-    end = later[step].start + part * (later[step].end - later[step].start) + 1e-3
-    found, rows, ledgers = steps_of(name, f'growth.end="{end!r} h"')
-    assert ledgers[:-1] == later[:len(ledgers) - 1] and ledgers[-1].end == rows[-1].pore.time == end
-    own = [state for state, _ in found if not state.apart][-1]
-    (twin,) = [state for state, instant in whole if state.pore.time == own.pore.time == state.time]
-    assert found[-1][0].apart and own.pore.time == ledgers[-1].start and same(own, twin)
-    last = ledgers[-1]
-    assert abs(last.biomass_before + last.biomass_made - last.biomass_after) < 1e-10 * last.biomass_after
-    assert last.biomass_after == pytest.approx(rows[-1].pore.mass, rel=1e-12)
-
-
-@pytest.mark.parametrize("name, most", [("fast", 0.01), ("contact", 0.002)])
-def test_a_row_within_a_step_is_that_of_a_step_that_ends_there(name, most):
-    """Area, tips and effluents, within the preset's tolerance: a step that ends there has an error alike."""
-    _, _, ledgers = steps_of(name)
-    longest = max(ledgers, key=lambda row: row.end - row.start)
-    time = longest.start + 0.37 * (longest.end - longest.start)
-    row = steps_of(name, f'output.times=["{time!r} h"]')[1][1]
-    step = steps_of(name, f'growth.end="{time!r} h"')[1][-1]
-    for number in (lambda i: i.pore.outline.area, lambda i: i.pore.outline.upstream,
-                   lambda i: i.solved.fluxes[0].effluent, lambda i: i.solved.flow.conductivity):
-        assert number(row) == pytest.approx(number(step), rel=most)
 
 
 def test_rows_within_steps_are_of_second_order():
-    """0.37 of the way through a step the biomass is that of a step that ends there but for a part that goes as the cube
-    of the step, the local error of both."""
+    """0.37 of the way through a step biomass, area, tip and effluent are those of a step that ends there but for a part
+    that goes as the cube of the step, the local error of both."""
     made = base()
     now = pore.seeded(made)
     solved = pore.solve(made, now)
     now = replace(now, concentrations=solved.concentrations)
     apart = []
     for hours in (1.0, 0.5, 0.25):
-        taken = midpoint.attempt(made, now, solved, hours).step
-        there = midpoint.attempt(made, now, solved, 0.37 * hours).step
-        apart.append(taken.within(0.37 * hours).pore.mass - there.pore.mass)
-    assert (np.abs(np.log2(np.divide(apart[:-1], apart[1:])) - 3) < 0.35).all()
+        row = midpoint.attempt(made, now, solved, hours).step.within(0.37 * hours)
+        there = midpoint.attempt(made, now, solved, 0.37 * hours).step.pore
+        apart.append(numbers(row.pore, row.solved) - numbers(there, pore.solve(made, there)))
+    assert np.abs(np.log2(np.divide(apart[:-1], apart[1:])) - 3).max() < 0.35
+
+
+def numbers(now, solved):
+    """Biomass, area, upstream tip, effluent of the acceptor."""
+    return np.array([now.mass, now.outline.area, now.outline.upstream, solved.fluxes[0].effluent])
 
 
 @EVERY_ORDER
@@ -220,23 +191,42 @@ def test_the_change_of_the_rates_in_a_step_is_bounded(attempts, tolerance):
     assert all((a.change * duration > most) == (a.step is None) for duration, a in attempts)
 
 
+def advanced(made, attempt, monkeypatch):
+    """(what a step of 0.2 h comes to, durations that are tried) of a scene where ``attempt`` (duration, most) says
+    whether a step is good (else it fails), and by how much its rates change."""
+    now, tried = pore.seeded(made), []
+
+    def told(_, __, ___, duration, most):
+        tried.append(duration)
+        good, change = attempt(duration, most)
+        return Attempt(stepping.Step(now, None, None, False, 0) if good else None, change, None)
+
+    monkeypatch.setattr(midpoint, "attempt", told)
+    return stepping._advance(made, now, None, pace.Pace(0.2)), tried
+
+
 def test_a_step_that_fails_is_halved_until_it_is_done(monkeypatch):
     """0.2 h fails down to 0.02 h: 0.1, 0.05, 0.025 h are tried in turn."""
-    tried, made = [], base()
-
-    def attempt(_, now, solved, duration, most):
-        tried.append(duration)
+    def attempt(duration, most):
         if duration > 0.02:
             raise GrowthError("too long")
-        return Attempt(stepping.Step(near, None, None, False, 0), 1e-9, None)
+        return True, 1e-9
 
-    near = pore.seeded(made)
-    monkeypatch.setattr(midpoint, "attempt", attempt)
-    taken, solved, after, cut = stepping._advance(made, near, None, pace.Pace(0.2))
-    assert not cut
+    (taken, _, after), tried = advanced(base(), attempt, monkeypatch)
     assert tried == [0.2, 0.1, 0.05, 0.025, 0.0125]
     assert taken.pore.time == 0.0125 and after.length == pytest.approx(pace.FASTER * 0.0125)
-    assert (solved.concentrations.acceptor == pore.solve(made, near).concentrations.acceptor).all()
+
+
+def test_a_step_that_errs_too_much_is_not_taken(monkeypatch):
+    """An estimate of 16 tolerances: the step is tried again at 0.9 / 4 of its length, where it is 16 times smaller."""
+    def attempt(duration, most):
+        change = 16 * 0.01 / 0.2**2 * duration
+        return change <= most, change
+
+    (_, _, after), tried = advanced(base("numerics.tolerance=0.01"), attempt, monkeypatch)
+    assert tried == pytest.approx([0.2, 0.9 / 4 * 0.2])
+    assert after.length == pytest.approx(0.9 / 0.9 * tried[-1])
+    assert (after.duration, after.estimate) == pytest.approx((tried[-1], 16 * 0.01 / 0.2**2 * tried[-1] ** 2))
 
 
 @pytest.mark.parametrize("error, told", [(GrowthError("no way"), "in growth: no way"),
@@ -255,23 +245,6 @@ def test_what_fails_at_the_shortest_step_stops_the_run(monkeypatch, error, told)
     with pytest.raises(SimulationError, match=rf"stopped in the step from t = 0.4 h.*{told}"):
         run(base('growth.end="1 h"', 'growth.time_step="0.05 h"'))
     assert 2.5e-5 < tried[-1] <= 5e-5 and len(tried) < 20  # to the end, then 2 h 2^-16
-
-
-def test_a_step_that_errs_too_much_is_not_taken(monkeypatch):
-    """An estimate of 16 tolerances: the step is tried again at 0.9 / 4 of its length, where it is 16 times smaller."""
-    made, tried = base("numerics.tolerance=0.01"), []
-    now = pore.seeded(made)
-
-    def attempt(_, __, ___, duration, most):
-        tried.append(duration)
-        change = 16 * 0.01 / 0.2**2 * duration
-        return Attempt(stepping.Step(now, None, None, False, 0) if change <= most else None, change, None)
-
-    monkeypatch.setattr(midpoint, "attempt", attempt)
-    _, _, after, _ = stepping._advance(made, now, None, pace.Pace(0.2))
-    assert tried == pytest.approx([0.2, 0.9 / 4 * 0.2])
-    assert after.length == pytest.approx(0.9 / 0.9 * tried[-1])
-    assert (after.duration, after.estimate) == pytest.approx((tried[-1], 16 * 0.01 / 0.2**2 * tried[-1] ** 2))
 
 
 @EVERY_ORDER

@@ -1,9 +1,10 @@
-"""A sweep on a Dask cluster: a real scheduler and workers, in processes of their own on the loopback."""
+"""A sweep on a Dask cluster: a real scheduler and workers, in processes of their own on the loopback; where it is what
+they answer that matters, a stand-in for them."""
 
+import contextlib
 import csv
 import json
 import os
-import re
 import shutil
 import signal
 import socket
@@ -11,41 +12,46 @@ import subprocess
 import sys
 import threading
 import time
+from types import SimpleNamespace
 
 import pytest
 
 from repro.cli import main
 from repro.sweep import cluster, task
-from repro.sweep.state import SweepError
 
 VARY = ["--vary", "pore.width=48:52 um:linear:6", "--set", "numerics.preset=fast"]
+
+
+def command(out, *arguments):
+    return ["sweep", "base", *VARY, "--out", str(out), *arguments]
+
+
+def refused(out, address, capsys):
+    """What is said, in one line and with status 2, of the scheduler at an address."""
+    assert main(command(out, "--scheduler", address)) == 2
+    message = capsys.readouterr().err
+    assert message.startswith(f"repro: --scheduler {address}: ") and message.count("\n") == 1
+    return message
 
 
 @pytest.mark.parametrize("package", ["distributed", "dask"])
 def test_without_the_package_the_message_says_what_to_install(tmp_path, capsys, monkeypatch, package):
     monkeypatch.delitem(sys.modules, "distributed", raising=False)
     monkeypatch.setitem(sys.modules, package, None)
-    assert main(["sweep", "base", *VARY, "--out", str(tmp_path / "sweep"), "--scheduler", "tcp://127.0.0.1:1"]) == 2
-    message = capsys.readouterr().err
-    assert "pip install 'dupin2001-repro[dask]'" in message and message.count("\n") == 1
+    assert "pip install 'dupin2001-repro[dask]'" in refused(tmp_path / "sweep", "tcp://127.0.0.1:1", capsys)
     assert list(tmp_path.iterdir()) == []
 
 
-ADDRESSES = ["nonsense", "tcp://", "tcp://127.0.0.1:99999", "tcp://[::1", "tcp://127.0.0.1:{closed}",
-             "127.0.0.1:{silent}", "tcp://host.invalid:8786"]
-
-
-@pytest.mark.parametrize("address", ADDRESSES)
-def test_a_bad_address_is_refused_within_five_seconds(address):
+@pytest.mark.parametrize("address", ["nonsense", "tcp://", "tcp://127.0.0.1:99999", "tcp://[::1",
+                                     "tcp://127.0.0.1:{closed}", "127.0.0.1:{silent}", "tcp://host.invalid:8786"])
+def test_a_bad_address_is_refused_within_five_seconds_and_nothing_is_written(tmp_path, capsys, address):
     """Where nobody listens, where nobody answers, where there is no such host, where it is no address."""
+    pytest.importorskip("distributed")
     with socket.create_server(("127.0.0.1", 0)) as server:
         where = address.format(closed=free_port(), silent=server.getsockname()[1])
-        pytest.importorskip("distributed")
         start = time.monotonic()
-        with pytest.raises(SweepError, match=f"--scheduler {re.escape(where)}: no Dask scheduler answers there"):
-            with cluster.ready(where):
-                pass
-        assert time.monotonic() - start < 5
+        assert "no Dask scheduler answers there" in refused(tmp_path / "sweep", where, capsys)
+        assert time.monotonic() - start < 5 and list(tmp_path.iterdir()) == []
 
 
 def test_what_greets_otherwise_is_no_scheduler():
@@ -60,15 +66,32 @@ def test_what_greets_otherwise_is_no_scheduler():
         thread.join()
 
 
-def test_a_bad_address_writes_nothing(tmp_path):
-    """In one line, with status 2."""
-    process = on_cluster(f"tcp://127.0.0.1:{free_port()}", tmp_path / "sweep")
-    message = process.communicate(timeout=60)[1]
-    assert process.returncode == 2 and message.startswith("repro: --scheduler") and message.count("\n") == 1, message
-    assert list(tmp_path.iterdir()) == []
+@pytest.mark.parametrize("trouble, answer, said", [
+    (TimeoutError(), None, "it has no workers"),
+    (None, ImportError("no module repro"), "a worker lacks this package (no module repro)"),
+    (None, ("0.0.1-abc", True), "the worker tcp://b:1 has version 0.0.1-abc of this package, this is "),
+    (None, (None, False), "the worker tcp://b:1 does not see "),
+])
+def test_workers_that_cannot_be_used_are_told(tmp_path, capsys, monkeypatch, trouble, answer, said):
+    """By the scheduler's name: none in time, no package, another version, another file system."""
+    def wait_for_workers(count, timeout):
+        if trouble:
+            raise trouble
+
+    def run(function, path):
+        if isinstance(answer, ImportError):
+            raise answer
+        version, shared = answer
+        return {"tcp://a:1": function(path), "tcp://b:1": (version or task.code(), shared)}
+
+    client = contextlib.ExitStack()
+    client.wait_for_workers, client.run = wait_for_workers, run
+    monkeypatch.setattr(cluster, "_package", lambda address: SimpleNamespace(Client=lambda *at, **options: client))
+    monkeypatch.setattr(cluster, "_is_open", lambda address: True)
+    assert said in refused(tmp_path / "sweep", "tcp://host:8786", capsys)
 
 
-def test_a_worker_with_other_code_makes_nothing(tmp_path):
+def test_a_worker_with_other_code_makes_nothing():
     """One that joins a sweep at work is not asked before."""
     assert "failed: a worker that joined has version" in cluster.attempt("{}", "0.0.1-abc")
 
@@ -77,12 +100,6 @@ def free_port():
     with socket.socket() as found:
         found.bind(("127.0.0.1", 0))
         return found.getsockname()[1]
-
-
-def begin(folder, name, *arguments):
-    with (folder / f"{name}.log").open("w") as log:
-        command = [sys.executable, "-m", *arguments, "--no-dashboard"]
-        return subprocess.Popen(command, cwd=folder, stdout=log, stderr=log)
 
 
 def until(told, seconds=60):
@@ -97,23 +114,28 @@ def workers(tmp_path):
     """A scheduler's address, and a function that starts a worker."""
     address, processes = f"tcp://127.0.0.1:{free_port()}", []
 
-    def start(name):
-        processes.append(begin(tmp_path, name, "distributed.cli.dask_worker", address, "--no-nanny", "--nthreads", "1",
-                               "--name", name))
-        until(lambda: "Registered to" in (tmp_path / f"{name}.log").read_text())
+    def begin(name, ready, *arguments):
+        with (tmp_path / f"{name}.log").open("w") as log:
+            started = [sys.executable, "-m", *arguments, "--no-dashboard"]
+            processes.append(subprocess.Popen(started, cwd=tmp_path, stdout=log, stderr=log))
+        until(lambda: ready in (tmp_path / f"{name}.log").read_text())
         return processes[-1]
 
-    processes.append(begin(tmp_path, "scheduler", "distributed.cli.dask_scheduler", "--host", address, "--no-show"))
-    until(lambda: "Scheduler at" in (tmp_path / "scheduler.log").read_text())
+    def start(name):
+        return begin(name, "Registered to", "distributed.cli.dask_worker", address, "--no-nanny", "--nthreads", "1",
+                     "--name", name)
+
+    begin("scheduler", "Scheduler at", "distributed.cli.dask_scheduler", "--host", address, "--no-show")
     yield address, start
     for process in reversed(processes):
         process.terminate()
         process.wait(30)
 
 
-def on_cluster(address, out, *arguments):
-    command = [sys.executable, "-m", "repro", "sweep", "base", *VARY, "--out", str(out), "--scheduler", address]
-    return subprocess.Popen([*command, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+def on_cluster(address, out):
+    """A sweep in a process of its own."""
+    arguments = [sys.executable, "-m", "repro", *command(out, "--scheduler", address)]
+    return subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
 @pytest.mark.thorough
@@ -121,7 +143,7 @@ def test_no_run_is_lost_or_there_twice_where_a_worker_is_killed(workers, tmp_pat
     """Six runs, two workers, one of them killed while it has a run at work; then as without a cluster."""
     address, start = workers
     first, _ = start("one"), start("two")
-    out = tmp_path / "sweep"
+    out, here = tmp_path / "sweep", tmp_path / "here"
     process = on_cluster(address, out)
     until(lambda: list(out.glob("runs/0*")) and len(list(out.glob("runs/.part-*"))) == 2)
     first.send_signal(signal.SIGKILL)
@@ -129,43 +151,28 @@ def test_no_run_is_lost_or_there_twice_where_a_worker_is_killed(workers, tmp_pat
     assert process.returncode == 0 and "6 of 6 runs done, 0 failed" in said[0], said
     told = json.loads((out / "sweep.json").read_text())["points"]
     assert sorted(os.listdir(out / "runs")) == sorted(point["folder"].removeprefix("runs/") for point in told)
-    here = tmp_path / "here"
-    assert main(["sweep", "base", *VARY, "--out", str(here), "--quiet"]) == 0
+    assert main(command(here, "--quiet")) == 0
     assert (out / "table.csv").read_bytes() == (here / "table.csv").read_bytes()
     with (out / "runs.csv").open() as lines:
         assert [row["status"] for row in csv.DictReader(lines)] == ["completed"] * 6
 
 
 @pytest.mark.thorough
-def test_a_sweep_that_lost_its_cluster_is_gone_on_with_here(workers, tmp_path):
-    """Interrupted while a run is at work; the same command without a scheduler makes the rest."""
+def test_a_sweep_that_lost_its_cluster_is_gone_on_with_here(workers, tmp_path, capsys, monkeypatch):
+    """Refused while there is no worker; interrupted while a run is at work; the same command without a scheduler makes
+    the rest."""
     address, start = workers
-    start("one")
     out = tmp_path / "sweep"
+    monkeypatch.setattr(cluster, "PATIENCE", 2)
+    assert "has no workers" in refused(out, address, capsys)
+    shutil.rmtree(out)
+    start("one")
     process = on_cluster(address, out)
     until(lambda: list(out.glob("runs/0*")) and list(out.glob("runs/.part-*")))
     process.send_signal(signal.SIGINT)
     said = process.communicate(timeout=60)[1]
     assert process.returncode == 130 and "Traceback" not in said, said
     kept = {path: (path / "run.json").stat().st_mtime_ns for path in out.glob("runs/0*")}
-    assert main(["sweep", "base", *VARY, "--out", str(out), "--quiet"]) == 0
+    assert main(command(out, "--quiet")) == 0
     assert len(list(out.glob("runs/0*"))) == 6
     assert kept and kept == {path: (path / "run.json").stat().st_mtime_ns for path in kept}
-
-
-@pytest.mark.thorough
-def test_a_cluster_that_cannot_be_used_is_refused(workers, tmp_path, capsys, monkeypatch):
-    """No workers, workers with another version."""
-    address, start = workers
-    monkeypatch.setattr(cluster, "PATIENCE", 2)
-
-    def refused(where):
-        assert main(["sweep", "base", *VARY, "--out", str(tmp_path / "sweep"), "--scheduler", where]) == 2
-        message = capsys.readouterr().err
-        assert message.count("\n") == 1 and message.startswith(f"repro: --scheduler {where}: ")
-        return message
-    assert "has no workers" in refused(address)
-    start("one")
-    monkeypatch.setattr(task, "code", lambda: "0.0.1-abc")
-    shutil.rmtree(tmp_path / "sweep")
-    assert "has version" in refused(address)

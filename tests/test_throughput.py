@@ -33,18 +33,6 @@ def test_a_command_that_costs_too_much_is_told(monkeypatch, capsys, slow, status
     assert "repro --help: 1.25 times" in out
 
 
-def test_every_run_is_made(monkeypatch, tmp_path):
-    """Those before, after and beside the sweep too, each in a folder of its own: a run that is there is not made again.
-    """
-    made = []
-    monkeypatch.setattr(throughput, "run", lambda scene, folder: made.append(folder))
-    monkeypatch.setattr(throughput, "swept", lambda preset, count, folder: (1.0, 1.0))
-    monkeypatch.setattr(throughput, "bare", lambda preset, count: 1.0)
-    throughput.measure("fast", 8)
-    throughput.loop("fast", 3)
-    assert len(set(made)) == len(made) == 1 + 2 * throughput.SINGLE + 1 + 3
-
-
 def test_a_sweep_that_fails_has_no_rate(monkeypatch, tmp_path):
     monkeypatch.setattr(throughput, "repro", lambda arguments: 3)
     with pytest.raises(RuntimeError, match="status 3"):

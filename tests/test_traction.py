@@ -1,4 +1,5 @@
-"""The fluid's forces on the aggregate: what they are, and when shape and flow do not agree."""
+"""The fluid's forces on the aggregate: their unit, runs with them, and when shape and flow do not agree; what they are
+is in the cases coupling-traction."""
 from dataclasses import replace
 from functools import cache
 
@@ -6,10 +7,8 @@ import numpy as np
 import pytest
 
 from repro.errors import GrowthError, StageError
-from repro.fem.space import Space
 from repro.march.simulation import simulate
-from repro.model import contact, growth, pore, traction
-from repro.model.flow import Flow, pressure_space
+from repro.model import contact, pore, traction
 from repro.results import row
 from repro.scene import load_scene
 from tests.strategies import ORDERS
@@ -32,50 +31,17 @@ def test_the_unit_is_that_of_water_pressure():
 
 
 @EVERY_ORDER
-def test_an_even_head_pushes_along_the_normals(order):
-    """On a seed: the sum over all nodes of the interface is the head times its width, downwards."""
-    now = pore.seeded(base(order=order))
-    count = pressure_space(now.space).count
-    still = Flow(0.0, np.zeros((now.space.count, 2)), np.full(count, 3.0), None, 0.0, 0.0, 0.0)
-    on = traction.nodal(now.space, still, 1.0, "laplacian")
-    free, outline = now.mesh.loop[now.wall == 0], now.outline
-    first = outline.arcs(outline.points)[np.flatnonzero(outline.edge_wall == 0)[0]]
-    on_line = [0.5, 0, -0.5] if order == 1 else [0.5, -2 / 3, 1 / 6]  # integrals of N_0 N_a' along an edge or an arc
-    width = 2 * (5.0 - first[:, 0] @ on_line)  # what is left of it pushes the contact lines
-    assert on[free, 1].sum() == pytest.approx(-3.0 * width, rel=1e-12)
-    assert abs(on[free, 0].sum()) < 1e-12 * 3 * width
-    assert (on[free, 1] < 0).all()
-
-
-@EVERY_ORDER
-def test_without_forces_the_same_bits(order):
-    """forces = None and no argument are one path."""
-    now = pore.seeded(base(order=order))
-    start = now.mesh.points[now.mesh.body]
-    held = contact.constrained(len(start), now.mesh.topology.body_loop, now.wall, now.fixed)
-    push = np.zeros(now.body.shape.corners)
-    found = [growth.equilibrium(now.body, 1.2 * now.theta, start, push, held, start, **given)
-             for given in ({}, {"forces": None}, {"forces": np.zeros_like(start)})]
-    assert np.array_equal(found[0].position, found[1].position)
-    assert np.abs(found[0].position - found[2].position).max() < 1e-12
-
-
-@EVERY_ORDER
-def test_water_that_is_far_too_heavy_is_refused(order):
-    """Its pressure is a thousand times the stiffness: an error that says what to do, neither a hang nor a shape."""
-    said = base('flow.density="1e9 mg/cm^3"', order=order)
-    now = pore.seeded(said)
-    with pytest.raises(StageError, match="try a"):
-        contact.expand(said, now, 1.1 * now.theta)
-
-
-@EVERY_ORDER
-def test_rounds_that_do_not_end_are_an_error(monkeypatch, order):
-    monkeypatch.setattr(contact, "FORCE_ROUNDS", 1)
-    said = base(order=order)
-    now = pore.seeded(said)
-    with pytest.raises(GrowthError, match="do not agree after 1 rounds, a node still moves by .* um: .*try a shorter"):
-        contact.expand(said, now, 1.1 * now.theta)
+@pytest.mark.parametrize("density, rounds, error, said", [
+    ("1e9 mg/cm^3", contact.FORCE_ROUNDS, StageError, "try a"),
+    ("998 mg/cm^3", 1, GrowthError, "do not agree after 1 rounds, a node still moves by .* um: .*try a shorter")])
+def test_a_shape_that_the_forces_do_not_let_rest_is_refused(monkeypatch, density, rounds, error, said, order):
+    """In water whose pressure is a thousand times the stiffness, or where rounds do not end: an error that says what to
+    do, neither a hang nor a shape."""
+    monkeypatch.setattr(contact, "FORCE_ROUNDS", rounds)
+    made = base(f'flow.density="{density}"', order=order)
+    now = pore.seeded(made)
+    with pytest.raises(error, match=said):
+        contact.expand(made, now, 1.1 * now.theta)
 
 
 @cache
@@ -129,17 +95,3 @@ def test_a_shape_with_its_own_mesh_needs_no_other(order):
     pascal = 9.81 * 1e-3 * drive.density * 1e-6  # of a head of 1 um; 1 mg/L is 1e-3 kg/m3
     wanted = on[now.mesh.body] * pascal * 1e-6 / said.growth.shear_modulus
     assert one == pytest.approx(wanted, rel=1e-3, abs=1e-3 * np.abs(wanted).max())
-
-
-@pytest.mark.parametrize("order", [2, 3])
-def test_forces_on_curved_triangles_are_those_of_straight_ones(order):
-    """The drag on a seed, all that pushes its boundary downstream, to 5 %."""
-    said = base("numerics.refinement=1", order=1)
-    now = pore.seeded(said)
-    curved_pore = pore.seeded(base("numerics.refinement=1", order=order))
-    drive, total = said.flow, []
-    for space in (now.space, curved_pore.space):
-        found = pore.solve_flow(said, Space(space.mesh, space.order))
-        on = traction.nodal(space, found, drive.kinematic_viscosity / drive.gravity, "laplacian")
-        total.append(on[space.mesh.loop, 0].sum())
-    assert total[0] == pytest.approx(total[1], rel=0.05)

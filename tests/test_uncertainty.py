@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 
 from repro.march.updates import schedule
 from repro.scene import load_scene, scene_hash
-from verification import claims, uncertainty
+from verification import claims
 from verification.claims import Claim, ClaimError, Finding, evaluate, levels, runs
 from verification.claims.levels import ALONE, CONVERGED, DEFAULT, SCHEME, Level, at_level
-from verification.uncertainty import FORMAL, OBSERVED, Bar, Estimate, combined, estimate, spread
+from verification.uncertainty import FORMAL, OBSERVED, Bar, Estimate, combined, estimate, observed_order
 
 BOTH = (1.0, 2.0)
 SIZES = np.array([1.0, 2**0.5, 2**-0.5, 0.5])
@@ -34,43 +34,27 @@ def test_the_example_of_celik_et_al():
     assert 100 * found.bar / 6.063 == pytest.approx(2.2, abs=0.05)
 
 
-def test_the_bar_is_roaches_formula_on_the_two_finest_of_three():
-    found = estimate([1.0, 2.0, 4.0], [3.0, 3.1, 3.4], (2.0, 2.0))
-    assert found.bar == pytest.approx(OBSERVED * 0.1 / (2**found.order - 1), rel=1e-6)
-    assert found.order == pytest.approx(math.log2(3), abs=1e-6)
+@pytest.mark.parametrize("values, formal", [
+    (SIZES**0.3, BOTH), (SIZES**2.8, BOTH), (SIZES**6.0, BOTH), (SIZES**0.4, (1.0, 1.0)), (SIZES**1.8, (1.0, 1.0)),
+    ((1.0, 1.1, 1.1, 1.0), (1.0, 1.0)), ((1.0, 1.0, 1.0, 1.1), (1.0, 1.0)), ((1.05, 1.1, 1.0, 1.08), (1.0, 1.0))])
+def test_an_unreasonable_order_and_oscillation_get_three_and_the_formal_order(values, formal):
+    """3 times the range over that of the sizes at the lowest formal order, one."""
+    found = estimate(SIZES, values, formal)
+    assert found.factor == FORMAL
+    assert found.bar == pytest.approx(FORMAL * np.ptp(values) / (2**0.5 - 0.5))
 
 
-@pytest.mark.parametrize("order", [1.3, 2.0, 2.4])
-def test_an_order_over_the_lowest_formal_one_is_not_made_use_of(order):
-    """It is reasonable, and fitted as 1."""
-    found = estimate(SIZES, SIZES**order, BOTH)
-    assert found.order == pytest.approx(order, abs=1e-4) and found.factor == OBSERVED
-    slope, apart = uncertainty.fit(SIZES, SIZES**order, 1.0)
+def test_an_order_over_the_lowest_formal_one_is_fitted_as_that_with_its_scatter():
+    found = estimate(SIZES, SIZES**2, BOTH)
+    slope, intercept = np.polyfit(SIZES, SIZES**2, 1)
+    apart = SIZES**2 - slope * SIZES - intercept
     assert found.bar == pytest.approx(OBSERVED * slope + math.sqrt(apart @ apart) + abs(apart[0]))
-    assert found.bar > OBSERVED
-
-
-@pytest.mark.parametrize("formal, order", [(BOTH, 0.3), (BOTH, 2.8), (BOTH, 6.0), ((1.0, 1.0), 0.4), ((1.0, 1.0), 1.8)])
-def test_an_unreasonable_order_gets_three_and_the_formal_order(formal, order):
-    found = estimate(SIZES, SIZES**order, formal)
-    assert found.order == pytest.approx(order, abs=1e-3) and found.factor == FORMAL
-    assert found.bar == pytest.approx(FORMAL * np.ptp(SIZES**order) / (2**0.5 - 0.5))
-
-
-@pytest.mark.parametrize("values", [(1.0, 1.1, 1.0, 1.1), (1.0, 1.1, 1.1, 1.0), (1.0, 1.0, 1.0, 1.1),
-                                    (1.05, 1.1, 1.0, 1.08)])
-def test_oscillation_is_covered_by_three_times_the_range(values):
-    """Steps of 1 to 4 at the formal order of one: the range itself, times 3 / (4 - 1)."""
-    found = estimate([1.0, 2.0, 3.0, 4.0], values, (1.0, 1.0))
-    assert found.factor == FORMAL and found.bar == pytest.approx(max(values) - min(values))
 
 
 def test_a_law_that_drowns_in_scatter_is_not_believed():
-    h = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
-    f = h**1.4 + np.array([0.0, 5.0, -5.0, 5.0, -5.0, 0.0])
-    order = uncertainty.observed_order(h, f)
-    assert 0.5 < order < 2.5
-    assert estimate(h, f, BOTH).factor == FORMAL
+    sizes = np.arange(1.0, 7.0)
+    values = sizes**1.4 + [0.0, 5.0, -5.0, 5.0, -5.0, 0.0]
+    assert 0.5 < observed_order(sizes, values) < 2.5 and estimate(sizes, values, BOTH).factor == FORMAL
 
 
 @pytest.mark.parametrize("noise", [0.02, 0.1, 0.5])
@@ -85,65 +69,61 @@ def test_the_bar_covers_the_error_of_noisy_values(noise, order):
     assert covered >= 190
 
 
-@pytest.mark.parametrize("values", [(5.0, 5.0, 5.0), (0.0, 0.0, 0.0), (5.0, 5.0 + 1e-13, 5.0 - 1e-13)])
-def test_what_is_the_same_on_all_sizes_has_no_error(values):
-    found = estimate([1.0, 2.0, 4.0], values, BOTH)
-    assert found.bar == 0 and found.factor == 0 and math.isnan(found.order)
+@pytest.mark.parametrize("value, noise", [(5.0, 0.0), (0.0, 0.0), (5.0, 1e-13)])
+def test_what_is_the_same_on_all_sizes_has_no_error(value, noise):
+    found = estimate([1.0, 2.0, 4.0], [value, value + noise, value - noise], BOTH)
+    assert (found.bar, found.factor) == (0, 0) and math.isnan(found.order)
 
 
-@given(st.floats(-3, 3).filter(lambda c: abs(c) > 0.01), st.floats(-2, 2), st.floats(0.1, 10),
-       st.permutations((1, 2, 3)))
+@given(st.floats(0.01, 3) | st.floats(-3, -0.01), st.floats(-2, 2), st.floats(0.1, 10), st.permutations((1, 2, 3)))
 def test_units_and_the_order_of_the_other_sizes_do_not_matter(scale, shift, unit, others):
     """Bars are in the number's unit, sizes in any."""
-    f = np.array([1.0, 1.13, 0.94, 0.91])
-    found = estimate(SIZES, f, BOTH)
-    keep = [0, *others]
-    other = estimate(unit * SIZES[keep], scale * f[keep] + shift, BOTH)
+    values = np.array([1.0, 1.13, 0.94, 0.91])
+    found, keep = estimate(SIZES, values, BOTH), [0, *others]
+    other = estimate(unit * SIZES[keep], scale * values[keep] + shift, BOTH)
     assert other.bar == pytest.approx(abs(scale) * found.bar, rel=1e-4) and other.factor == found.factor
 
 
 @pytest.mark.parametrize("sizes, values", [((1, 2), (1, 2)), ((1, 2, 2), (1, 2, 3)), ((1, 2, 4), (1, 2)),
-                                           ((1, 2, 4), (1, 2, math.nan)), ((1, 2, 4), (1, 2, math.inf)),
-                                           ((0, 1, 2), (1, 2, 3))])
+                                           ((1, 2, 4), (1, 2, math.nan)), ((0, 1, 2), (1, 2, 3))])
 def test_fewer_than_three_sizes_and_no_numbers_are_refused(sizes, values):
     with pytest.raises(ValueError, match="3 or more"):
         estimate(sizes, values, BOTH)
 
 
-def test_the_bars_of_mesh_and_step_add_up():
+def test_the_bars_of_mesh_and_step_add_up_and_a_value_on_the_edge_is_inside_to_round_off():
     mesh, step = Estimate(0.3, 2.0, OBSERVED), Estimate(0.4, 1.0, OBSERVED)
-    assert (combined(5.0, mesh, step).low, combined(5.0, mesh, step).high) == pytest.approx((4.3, 5.7))
-    assert combined(5.0, mesh, None).high == pytest.approx(5.3)
-
-
-def test_a_spread_goes_from_the_least_to_the_largest_value():
-    assert spread([3.0, 7.0, 2.0]) == Bar(2.0, 7.0)
-
-
-def test_a_value_on_the_edge_of_a_bar_is_in_it_to_round_off():
-    assert 110.0 in combined(110.0 * (1 + 1e-15), Estimate(0.0, math.nan, 0.0), None)
-    assert 110.0 not in combined(110.001, Estimate(0.0, math.nan, 0.0), None)
+    both, one = combined(5.0, mesh, step), combined(5.0, mesh, None)
+    assert (both.low, both.high, one.high) == pytest.approx((4.3, 5.7, 5.3))
+    assert 5.3 * (1 + 1e-15) in one and 5.3001 not in one
 
 
 def test_a_scene_is_that_of_the_level():
+    """The converged solution is refined in space and time at once: half the elements, a fourth of the tolerance."""
     assert scene_hash(runs.scene("base")) == scene_hash(load_scene("base"))
     with at_level(Level(size=0.5, step=3.0)):
         said, still = runs.scene("base", "numerics.refinement=0.7"), runs.scene("flow_only")
     assert said.numerics.refinement == pytest.approx(1.4) and said.growth.time_step == 0.6
     assert still.growth is None and still.numerics.refinement == 2.0
+    with at_level(Level(CONVERGED, 0.5)):
+        fine, wide = runs.scene("base", "numerics.mesh_compressibility=2"), runs.scene("wide")
+    plain = load_scene("base", ['numerics.preset="accurate"']).numerics
+    assert (fine.numerics.refinement, fine.numerics.tolerance) == (2 * plain.refinement, plain.tolerance / 4)
+    assert fine.numerics.elements == "quadratic" and fine.output.times[-2:] == (19.2, 19.4)
+    assert wide.output.times == tuple(map(float, range(1, 46)))
 
 
 @pytest.mark.parametrize("step", levels.STEPS)
 def test_every_step_lands_on_the_instants_of_section_4(step):
     """19.2 h, then 19.4 h, 12 min later."""
     with at_level(Level(step=step)):
-        times, reported = schedule(runs.scene(*runs.BASE))
-        last, _ = schedule(runs.scene(*runs.PLATES))
+        (times, reported), (last, _) = (schedule(runs.scene(*run)) for run in (runs.BASE, runs.PLATES))
     assert times[-2:] == last[-2:] == [19.2, 19.4] and {19.2, 19.4} <= reported
     assert np.diff(times[:-1]) == pytest.approx(0.2 * step)
 
 
 def test_what_is_kept_is_kept_for_its_level():
+    """A level ends with its block even by an error."""
     computed = []
 
     @levels.cached
@@ -151,29 +131,14 @@ def test_what_is_kept_is_kept_for_its_level():
         computed.append(levels.current())
         return factor * levels.current().size
 
+    other = Level(size=0.5)
     assert (size(2.0), size(2.0), size(3.0)) == (2.0, 2.0, 3.0)
     for _ in range(2):
-        with at_level(Level(size=0.5)):
+        with pytest.raises(KeyError), at_level(other):
             assert (size(2.0), size(2.0)) == (1.0, 1.0)
-        levels.forget(Level(size=0.5))
-    assert size(2.0) == 2.0 and levels.current() == DEFAULT
-    assert computed == [DEFAULT, DEFAULT, Level(size=0.5), Level(size=0.5)]
-
-
-def test_a_level_ends_with_its_block_even_by_an_error():
-    with pytest.raises(KeyError), at_level(Level(step=2.0)):
-        raise KeyError
-    assert levels.current() == DEFAULT
-
-
-def test_the_converged_solution_is_refined_in_space_and_time_at_once():
-    """Twice as fine: half the elements' size, a fourth of the tolerance, and its rows."""
-    with at_level(Level(CONVERGED, 0.5)):
-        said, wide = runs.scene("base", "numerics.mesh_compressibility=2"), runs.scene("wide")
-    plain = load_scene("base", ['numerics.preset="accurate"'])
-    assert said.numerics.elements == "quadratic" and said.numerics.refinement == 2 * plain.numerics.refinement
-    assert said.numerics.tolerance == plain.numerics.tolerance / 4 and said.output.times[-2:] == (19.2, 19.4)
-    assert wide.output.times == tuple(map(float, range(1, 46)))
+            raise KeyError
+        levels.forget(other)
+    assert size(2.0) == 2.0 and computed == [DEFAULT, DEFAULT, other, other]
 
 
 #: Sizes of the scheme of 2001 beside claims where they are fewer than three: linear elements have no permeable body
@@ -208,36 +173,46 @@ def judged(check, value, **fields):
 SPEED = claims.near("speed at 34.4 h (m/d)", "2.9", 2.91, 2.9, relative=0.1, why="")
 
 
-def test_bars_come_from_both_families_of_levels():
-    """2.9 + 0.01 h with elements, 0.002 steps more with each: errors add up to 0.012, bars to 1.25 times that."""
-    found = judged(SPEED, lambda level: 2.898 + 0.01 * level.size + 0.002 * level.step)
-    assert found.bar.mesh.bar == pytest.approx(0.0125) and found.bar.step.bar == pytest.approx(0.0025)
-    assert found.bar.high - found.value == pytest.approx(0.015)
+def of_size(level):
+    return 2.9 + 0.01 * level.size
 
 
-def test_the_bar_of_the_converged_solution_has_nothing_of_the_scheme_which_stands_beside_it():
-    found = judged(SPEED, lambda level: (2.9 if level.kind == CONVERGED else 3.0) + 0.01 * level.size,
-                   about=claims.MODEL)
+def of_size_and_step(level):
+    return of_size(level) + 0.002 * (level.step - 1)
+
+
+WIDE = claims.replace(SPEED, bar=Bar(2.81, 3.11))
+
+
+@pytest.mark.parametrize("check, value, fields, below, above", [
+    (SPEED, of_size_and_step, {}, 0.0125 + 0.0025, 0.0125 + 0.0025),
+    (SPEED, of_size_and_step, {"steps": ALONE}, 0.0125, 0.0125),
+    (SPEED, of_size, {"about": claims.MODEL}, 0.00625, 0.00625),
+    (WIDE, of_size, {"steps": ALONE}, 0.1 + 0.0125, 0.2 + 0.0125),
+])
+def test_a_bar_is_that_of_elements_and_steps_and_of_printed_digits(check, value, fields, below, above):
+    """1.25 times the errors; of the converged solution on its own sizes; what is not varied gives none."""
+    found = judged(check, value, **fields)
+    assert (2.91 - found.bar.low, found.bar.high - 2.91) == pytest.approx((below, above))
+    assert (found.bar.step is None) == bool(fields)
+
+
+def test_the_scheme_stands_beside_the_converged_solution_whose_bar_has_nothing_of_it():
+    found = judged(SPEED, lambda level: of_size(level) + (level.kind == SCHEME), about=claims.MODEL)
     assert found.bar.high - found.value == pytest.approx(1.25 * 0.005)
-    assert found.scheme == pytest.approx((3.0 + 0.01 * 2**-0.5, 3.0 + 0.01 * 2**0.5))
+    assert found.scheme == pytest.approx((3.9 + 0.01 * 2**-0.5, 3.9 + 0.01 * 2**0.5))
+    alone = judged(SPEED, of_size, about=claims.MODEL, beside=())
+    assert alone.scheme is None and alone.outcome == claims.HOLDS and len(alone.on_sizes) == 3
 
 
-def test_a_width_of_printed_digits_is_added_to_the_bar():
-    wide = claims.replace(SPEED, bar=Bar(2.81, 3.11))
-    found = judged(wide, lambda level: 2.9 + 0.01 * level.size, steps=ALONE)
-    assert (found.bar.low, found.bar.high) == pytest.approx((2.81 - 0.0125, 3.11 + 0.0125))
-
-
-def test_what_is_not_varied_gives_no_bar():
-    found = judged(SPEED, lambda level: 2.9 + 0.01 * level.size, steps=ALONE)
-    assert found.bar.step is None and found.bar.high - found.value == pytest.approx(0.0125)
-
-
-def test_a_number_without_a_limit_has_the_range_of_all_levels():
+@pytest.mark.parametrize("large, outcome", [((), claims.HOLDS), ((0.5,), claims.REACHES_OVER),
+                                            (levels.SIZES, claims.FAILS)])
+def test_a_number_without_a_limit_has_the_range_of_all_levels(large, outcome):
+    """It is judged at every one of them."""
     count = claims.without_limit(claims.at_most("triangles", "6", 5, 6, ""))
-    found = judged(count, lambda level: 9 if level.size == 0.5 else 5)
-    assert (found.bar.low, found.bar.high, found.bar.mesh) == (5, 9, None)
-    assert found.held.count(False) == 1 and len(found.held) == 7
+    found = judged(count, lambda level: 9 if level.size in large else 5, steps=ALONE)
+    assert (found.bar.high, found.bar.mesh) == (5 + 4 * bool(large), None)
+    assert found.outcome == outcome and len(found.held) == len(levels.SIZES)
 
 
 def test_the_instant_of_an_event_may_differ_between_levels_and_the_quantity_may_not():

@@ -8,13 +8,12 @@ import pytest
 
 from repro.check import simplifications
 from repro.cli import main
-from repro.errors import Interrupted
 from repro.march.simulation import simulate, steps
 from repro.results import read_table
 from repro.run import running
-from repro.run.running import Watch, resume, run
+from repro.run.running import resume, run
 from repro.scene import load_scene
-from tests.pages import Page, text_of
+from tests.pages import Page, text_of, whole_of
 from tests.shell import flags, lasting, stopped, told
 
 SETS = ("numerics.preset=fast", "growth.time_step=0.6 h", "growth.end=1 h", "pore.length=100 um",
@@ -49,11 +48,11 @@ def test_the_page_tells_them_at_its_head(tmp_path, checked, recwarn):
     run(load_scene("wide", SETS), tmp_path)
     assert not recwarn.list
     text = text_of(tmp_path)
-    head = text[: text.index("</header>")]
+    Page(text)
+    head, rest = text.split("</header>")
     shown = [html.unescape(re.sub("<.*?>", "", item)) for item in re.findall("<li>(.*?)</li>", head)]
     assert shown == [f"Warning: {one['key']}: {one['text']}" for one in checked]
-    Page(text)
-    assert "Also recorded" not in text or "warnings" not in text[text.index("Also recorded"):]
+    assert "warnings" not in rest.partition("Also recorded")[2]
 
 
 def test_a_run_without_any_has_an_empty_list(tmp_path, capsys):
@@ -64,11 +63,10 @@ def test_a_run_without_any_has_an_empty_list(tmp_path, capsys):
 
 def test_a_resume_keeps_them(tmp_path, checked):
     """Without working them out again."""
-    stopped(load_scene("wide", SETS), tmp_path / "parts", after=2)
-    resume(tmp_path / "parts")
-    run(load_scene("wide", SETS), tmp_path / "whole")
-    assert told(tmp_path / "parts")["warnings"] == checked
-    assert lasting(tmp_path / "parts") == lasting(tmp_path / "whole")
+    scene = load_scene("wide", SETS)
+    stopped(scene, tmp_path, after=2)
+    resume(tmp_path)
+    assert told(tmp_path)["warnings"] == checked and lasting(tmp_path) == lasting(whole_of(scene))
 
 
 def test_numbers_that_cannot_be_worked_out_end_no_run(monkeypatch):
@@ -84,27 +82,27 @@ def test_numbers_that_cannot_be_worked_out_end_no_run(monkeypatch):
 #: The shortest step, 1 h / 1000, errs by 4e-11. The last step is cut, and rows lie within steps.
 STRICT = ("numerics.preset=fast", "growth.end=0.0205 h", "growth.time_step=1 h",
           'output.times=["4.2e-3 h", "0.0205 h"]')
-TOLERANCES = {"missed": "numerics.tolerance=1e-12", "met": "numerics.tolerance=1e-4"}
+MISSED, MET = (*STRICT, "numerics.tolerance=1e-12"), (*STRICT, "numerics.tolerance=1e-4")
 
 
-def not_met(found):
-    return [one for one in found if one["key"] == "numerics.tolerance"]
+def not_met(told):
+    """What the warnings of run.json, or of `repro check`, say of the tolerance."""
+    return [one["text"] for one in told["warnings"] if one["key"] == "numerics.tolerance"]
 
 
 @pytest.mark.parametrize("options", [[], ["--json"], ["--quiet"]])
 def test_a_tolerance_that_no_step_can_meet_is_told_with_what_is_reached(tmp_path, capsys, options):
     """Once, aside, in run.json and on the page: in how many of the run's steps, and the largest of their estimates."""
-    sets = [part for entry in (*STRICT, TOLERANCES["missed"]) for part in ("--set", entry)]
-    assert main(["run", "base", *sets, "--out", str(tmp_path), *options]) == 0
-    found = not_met(told(tmp_path)["warnings"])
+    assert main(["run", "base", *flags(*MISSED), "--out", str(tmp_path), *options]) == 0
+    found = not_met(told(tmp_path))
     assert len(found) == 1
-    (one,) = found
+    (text,) = found
     (line,) = [line for line in capsys.readouterr().err.splitlines() if "tolerance" in line]
-    assert line == f"repro: warning: numerics.tolerance: {one['text']}"
-    assert html.escape(one["text"]) in text_of(tmp_path)
+    assert line == f"repro: warning: numerics.tolerance: {text}"
+    assert html.escape(text) in text_of(tmp_path)
     said = re.fullmatch(r"1e-12 was not met in (\d+) of (\d+) steps: the smallest allowed step, growth.time_step / "
-                        r"1000, errs by (\S+) \(estimate\)", one["text"])
-    states = [state for state, _ in steps(load_scene("base", (*STRICT, TOLERANCES["missed"])))]
+                        r"1000, errs by (\S+) \(estimate\)", text)
+    states = [state for state, _ in steps(load_scene("base", MISSED))]
     ends = {state.pore.time: state.pace for state in states if not state.apart and state.pace.duration}
     short = [pace.estimate for pace in ends.values() if pace.duration <= 1e-3 * 1.0001]
     made = len(read_table(tmp_path / "ledger.csv")["start_h"])
@@ -113,27 +111,21 @@ def test_a_tolerance_that_no_step_can_meet_is_told_with_what_is_reached(tmp_path
     assert float(said[3]) == pytest.approx(max(short), rel=0.06)
 
 
-def test_a_tolerance_that_is_met_is_not_told_of(tmp_path):
-    run(load_scene("base", (*STRICT, TOLERANCES["met"])), tmp_path)
-    assert not_met(told(tmp_path)["warnings"]) == []
-
-
 def test_a_run_that_goes_on_counts_the_steps_before(tmp_path):
-    scene = load_scene("base", (*STRICT, TOLERANCES["missed"]))
-    left = iter([0] * 8 + [15])
-    with pytest.raises(Interrupted):
-        run(scene, tmp_path / "parts", watch=Watch(stop=lambda: next(left, 0)))
-    (before,) = not_met(told(tmp_path / "parts")["warnings"])
-    resume(tmp_path / "parts")
-    run(scene, tmp_path / "whole")
-    assert lasting(tmp_path / "parts") == lasting(tmp_path / "whole")
-    assert before not in told(tmp_path / "parts")["warnings"]
+    scene = load_scene("base", MISSED)
+    stopped(scene, tmp_path, after=9)
+    before = not_met(told(tmp_path))
+    resume(tmp_path)
+    assert lasting(tmp_path) == lasting(whole_of(scene)) and before not in ([], not_met(told(tmp_path)))
 
 
-@pytest.mark.parametrize("tolerance, count", [("missed", 1), ("met", 0)])
-def test_check_tells_where_the_first_steps_cannot_meet_the_tolerance(capsys, tolerance, count):
-    sets = [part for entry in (*STRICT, TOLERANCES[tolerance]) for part in ("--set", entry)]
-    assert main(["check", "base", *sets, "--json"]) == 0
-    found = not_met(json.loads(capsys.readouterr().out)["warnings"])
+def test_a_tolerance_that_is_met_is_not_told_of():
+    assert not_met(told(whole_of(load_scene("base", MET)))) == []
+
+
+@pytest.mark.parametrize("sets, count", [(MISSED, 1), (MET, 0)])
+def test_check_tells_where_the_first_steps_cannot_meet_the_tolerance(capsys, sets, count):
+    assert main(["check", "base", *flags(*sets), "--json"]) == 0
+    found = not_met(json.loads(capsys.readouterr().out))
     assert len(found) == count
-    assert all(one["text"].startswith("1e-12 was not met in the first steps: the smallest") for one in found)
+    assert all(text.startswith("1e-12 was not met in the first steps: the smallest") for text in found)

@@ -15,16 +15,17 @@ the shape of one step more. ``cost_ratio`` is of processor time, the median of r
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from statistics import median
 from time import process_time
 
 from repro.march.simulation import simulate
 from verification import switches
-from verification.bench.record import machine, save
+from verification.bench.record import machine
 from verification.claims import runs
 from verification.claims.runs import BASE, PLATES, UPDATE
+from verification.kernel.writing import Block, plain, save, table
 from verification.switches import CHOICES, NOT_AUDITED, PLOTTED, Course, Switch, state
 
 RECORD = Path(__file__).parent / "report" / "audit.json"
@@ -45,10 +46,11 @@ def main() -> int:
     """Entry point."""
     noise = mesh()
     chosen = [switch for name, switch in CHOICES.items() if name not in NOT_AUDITED]
-    rows = [noise, *map(named, chosen), drift(), *symmetry()]
+    rows = [noise, *(measured(switch, cost(switch.run)) for switch in chosen), drift(), *symmetry()]
     rows = [{**row, "resolved": resolved(row["effect"], row.get("noise", noise["effect"]))} for row in rows]
-    save({"machine": machine(), "method": METHOD, "rows": rows}, RECORD)
-    print("\n".join(table(rows)))
+    record = {"machine": machine(), "method": METHOD, "rows": rows}
+    save(record, RECORD)
+    print(plain(blocks(record)))
     return 0
 
 
@@ -63,15 +65,9 @@ def _worst(effects: list[dict[str, float]]) -> dict[str, float]:
     return {name: max((each[name] for each in effects), key=abs) for name in effects[0]}
 
 
-def named(switch: Switch) -> dict:
-    """The row of a choice that a scene can name."""
-    told = measured(switch, cost(switch.run))
-    print(f"{switch.choice}: {switch.alternative}", file=sys.stderr, flush=True)
-    return told
-
-
 def measured(switch: Switch, ratio: float) -> dict:
-    """Its row but for the cost."""
+    """The row of a choice that a scene can name, at a cost."""
+    print(f"{switch.choice}: {switch.alternative}", file=sys.stderr, flush=True)
     if not switch.meshes:
         effects, noise = switches.converged(switch)
         return {**row(switch.choice, switch.default, switch.alternative, ratio, effects, switch.note), "noise": noise}
@@ -148,20 +144,32 @@ def resolved(effects: dict[str, float], noise: dict[str, float]) -> list[str]:
     return [name for name, value in effects.items() if abs(value) > 2 * abs(noise[name])]
 
 
-def table(rows: list[dict]) -> list[str]:
-    """Lines: a choice each, its cost, its largest effects over the runs and in one state, and that on the velocity."""
-    lines = [f"{'choice':<26} {'default':<22} {'alternative':<26} {'cost':>5}  {'velocity':>9} {'area':>9}  "
-             f"{'largest':<28} {'in one state':<28}"]
-    for row in rows:
-        lines.append(f"{row['choice']:<26} {row['default']:<22} {row['alternative']:<26} {row['cost_ratio']:5.2f}  "
-                     f"{row['effect']['velocity']:+9.1e} {row['effect']['area']:+9.1e}  {_told(row['effect']):<28} "
-                     f"{_told(row['one_state']):<28}".rstrip())
-    return lines
+#: Of the table.
+HEAD = ("choice", "default", "alternative", "cost", "velocity", "area", "acceptor out", "largest change",
+        "in one state", "note")
+
+
+def blocks(record: dict) -> Iterator[Block]:
+    """A choice a line: its cost, its effects over the runs, and the largest there and in one state."""
+    yield Block("heading", "What the paper's choices cost and change")
+    yield Block("text", f"{record['method']}.")
+    yield table(HEAD, map(_choice, record["rows"]))
+
+
+def _choice(row: dict) -> tuple[str, ...]:
+    effect = row["effect"]
+    changes = (_change(effect[name]) if name in effect else "" for name in ("velocity", "area", "acceptor leaving"))
+    return (row["choice"], row["default"], row["alternative"], f"{row['cost_ratio']:.2f}", *changes, _told(effect),
+            _told(row["one_state"]), row["note"])
 
 
 def _told(effects: dict[str, float]) -> str:
     name = largest(effects)
-    return f"{effects[name]:+.1e} {name}" if name else "-"
+    return f"{_change(effects[name])} ({name})" if name else ""
+
+
+def _change(value: float) -> str:
+    return f"{100 * value:+.2g} %"
 
 
 if __name__ == "__main__":

@@ -9,14 +9,15 @@ numbers and seconds to ``live/`` beside it. Exit status 1 if a cell is what it m
 from __future__ import annotations
 
 import argparse
-import platform
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from itertools import product
 from pathlib import Path
 
-from verification.bench.record import save
 from verification.hard import CASES
-from verification.hard.common import PRESETS, Cell, Verdicts, run_cell
+from verification.hard.common import PRESETS, Cell, run_cell
+from verification.kernel.report import environment
+from verification.kernel.writing import Block, plain, save, table
 
 RECORD = Path(__file__).parent / "report" / "hard_cases.json"
 
@@ -30,10 +31,10 @@ def as_json(cells: Iterable[Cell], live: bool = False) -> dict:
         row = rows.setdefault(case.number, {"number": case.number, "id": case.full_id,
                                             "title": case.title, "right_is": case.right_is,
                                             "failure_is": case.failure_is, "may_refuse": list(case.refusable),
-                                            "explained": case.explained, "cells": {}})
+                                            "cells": {}})
         row["cells"][cell.preset] = {"verdict": cell.verdict, "accepted": not cell.unaccepted,
                                      **(_digits(cell) if live else {})}
-    return {"cases": [rows[number] for number in sorted(rows)], **({"machine": machine()} if live else {})}
+    return {"cases": [rows[number] for number in sorted(rows)], **({"machine": environment()} if live else {})}
 
 
 def _digits(cell: Cell) -> dict:
@@ -48,7 +49,7 @@ def _checks(cell: Cell) -> list[dict]:
 
 def record(results: Iterable) -> None:
     """Write the matrix from the results of a whole verification run, which has run every cell already."""
-    write(cell for result in results if isinstance(result.outcome, Verdicts) for cell in result.outcome.cells)
+    write(cell for result in results for cell in result.outcome.notes if isinstance(cell, Cell))
 
 
 def write(cells: Iterable[Cell]) -> None:
@@ -58,28 +59,32 @@ def write(cells: Iterable[Cell]) -> None:
     save(as_json(found, live=True), RECORD.parent / "live" / RECORD.name)
 
 
-def machine() -> str:
-    """What the seconds were measured on."""
-    return f"{platform.machine()}, {platform.system()}, Python {platform.python_version()}, one core"
+def blocks(record: dict) -> Iterator[Block]:
+    """The matrix; why cells are not right, and every number."""
+    cells = [(case, preset, cell) for case in record["cases"] for preset, cell in case["cells"].items()]
+    presets = tuple(record["cases"][0]["cells"])
+    yield Block("heading", "Hard cases")
+    yield Block("text", "Right: the exact value, bound or conserved quantity of the case is met, and so are the "
+                        "balances; refused: an error says which bound was met; wrong: anything else. `make verify` "
+                        "runs them all; `python -m verification.hard_cases` shows the numbers.")
+    yield table(("", "case", "right is", *presets), (
+        (str(case["number"]), case["title"], case["right_is"], *(_shown(case["cells"].get(name)) for name in presets))
+        for case in record["cases"]))
+    yield table(("case", "preset", "why it is not right"), (
+        (str(case["number"]), preset, cell["message"]) for case, preset, cell in cells if cell.get("message")),
+        detail=True)
+    yield table(("case", "preset", "part", "quantity", "measured", "expected", "origin"), (
+        (str(case["number"]), preset, *(check[key] for key in CHECK)) for case, preset, cell in cells
+        for check in cell.get("checks", ())), detail=True)
 
 
-def matrix(cells: Iterable[Cell]) -> str:
-    """The matrix in plain text, and why cells are not right."""
-    cells = list(cells)
-    lines, notes = [f"{'':48}" + "".join(f"{preset:>16}" for preset in PRESETS)], []
-    for number in sorted({cell.case.number for cell in cells}):
-        row = {cell.preset: cell for cell in cells if cell.case.number == number}
-        title = next(iter(row.values())).case.title
-        lines.append(f"{number:2d} {title[:44]:45}" + "".join(_shown(row.get(preset)) for preset in PRESETS))
-        notes += [f"{number:2d} {preset}: {cell.message}" for preset, cell in row.items() if cell.message]
-    return "\n".join(lines + notes)
+#: Of a check in the record.
+CHECK = ("part", "quantity", "measured", "expected", "origin")
 
 
-def _shown(cell: Cell | None) -> str:
-    if cell is None:
-        return f"{'':16}"
-    mark = "" if not cell.unaccepted else "!"
-    return f"{cell.verdict + mark:>9}{cell.seconds:5.1f} s"
+def _shown(cell: dict | None) -> str:
+    """The verdict, with a mark where it is none that it may be."""
+    return "" if cell is None else cell["verdict"] + "!" * (not cell.get("accepted", True))
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -89,12 +94,12 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--preset", action="append", choices=PRESETS)
     chosen = parser.parse_args(arguments)
     cells = []
-    for case in sorted(CASES, key=lambda case: case.number):
-        for preset in chosen.preset or PRESETS:
-            if not chosen.case or case.number in chosen.case:
-                cells.append(run_cell(case, preset))
-                print(f"{case.number:2d} {preset:9} {_shown(cells[-1])}", file=sys.stderr, flush=True)
-    print(matrix(cells))
+    for case, preset in product(sorted(CASES, key=lambda case: case.number), chosen.preset or PRESETS):
+        if not chosen.case or case.number in chosen.case:
+            cells.append(run_cell(case, preset))
+            print(f"{case.number:2d} {preset:9} {cells[-1].verdict:8}{cells[-1].seconds:6.1f} s", file=sys.stderr,
+                  flush=True)
+    print(plain(blocks(as_json(cells, live=True))))
     if not (chosen.case or chosen.preset):
         write(cells)
     return 1 if any(cell.unaccepted for cell in cells) else 0

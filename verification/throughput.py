@@ -34,11 +34,6 @@ PACKAGES = "numpy, scipy.sparse.linalg, skfem, mmgpy, shapely"  # that a run nee
 WIDTHS = "48:52 um"  # nearly the same run each time
 
 
-def single(preset: str, count: int, folder: Path) -> float:
-    """Runs a second in this process, one after the other: of the median run."""
-    return 1 / median(wall for wall, _ in runs(preset, count, folder))
-
-
 def runs(preset: str, count: int, folder: Path) -> list[tuple[float, float]]:
     """(seconds, processor time) of every run in this process, one after the other, into a folder that is not there."""
     found = []
@@ -60,9 +55,9 @@ def bare(preset: str, count: int) -> float:
 def loop(preset: str, count: int) -> None:
     """Print this process's rate, the mean of all its runs but the first, which loads what is loaded when used."""
     with TemporaryDirectory() as folder:
-        single(preset, 1, Path(folder, "first"))
+        runs(preset, 1, Path(folder, "first"))
         start = perf_counter()
-        single(preset, count, Path(folder, "counted"))
+        runs(preset, count, Path(folder, "counted"))
         print(count / (perf_counter() - start))
 
 
@@ -112,7 +107,7 @@ def fresh(*arguments: str) -> float:
 
 def warm(preset: str, folder: Path) -> float:
     """Seconds of a run of base in this process, files and page included: the best of five."""
-    return 1 / max(single(preset, 1, folder / f"{k}") for k in range(5))
+    return min(runs(preset, 1, folder / f"{k}")[0][0] for k in range(5))
 
 
 def commands() -> dict[str, tuple[float, float]]:

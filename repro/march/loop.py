@@ -100,9 +100,7 @@ class State:
 
     pore: as the step left it, with the guess from which its substrates are solved; pace: of the
     step to try next; ledgers, remeshes, iterations: of the steps since the last Instant; row: time
-    (h) of that Instant, later than the pore's where it lies within the step that follows; apart: is
-    the pore, or an Instant after it, of a step that growth.end cuts? A run to a later end goes on
-    from the last state that is not.
+    (h) of that Instant, later than the pore's where it lies within the step that follows.
     """
 
     pore: Pore
@@ -111,7 +109,6 @@ class State:
     remeshes: int = 0
     iterations: dict[str, int] = field(default_factory=dict)
     row: float = 0.0
-    apart: bool = False
 
     @property
     def time(self) -> float:
@@ -124,13 +121,13 @@ class Scheme:
     """What the loop needs of a way to make steps.
 
     advance(scene, pore, solved, pace): one step that growth.end has no part in, nor have rows, or
-    the one that is cut there, as (Step, what is solved after it, pace of the next, is it cut?);
+    the one that is cut there, as (Step, what is solved after it, pace of the next);
     rows(scene): times (h) of rows where there are no ``output.times``, beside the ends of steps;
     first: length of the first step that is tried, in parts of growth.time_step; ends(scene): times
     (h) at which steps end, those that are known beforehand.
     """
 
-    advance: Callable[[Scene, Pore, Solved, Pace], tuple[Step, Solved, Pace, bool]]
+    advance: Callable[[Scene, Pore, Solved, Pace], tuple[Step, Solved, Pace]]
     rows: Callable[[Scene], tuple[float, ...]] = lambda _: ()
     first: float = 1.0
     ends: Callable[[Scene], Iterable[float]] = lambda _: ()
@@ -165,7 +162,7 @@ def steps(scene: Scene, scheme: Scheme,
     while end - now.time > SAME_TIME:
         try:
             with stopping(now.time):
-                taken, solved, pace, cut = scheme.advance(scene, now, solved, state.pace)
+                taken, solved, pace = scheme.advance(scene, now, solved, state.pace)
                 balance.refuse(largest, taken.pore, taken.ledger)
         except PoreEnd:
             if state.ledgers:  # steps that are not reported yet
@@ -176,9 +173,9 @@ def steps(scene: Scene, scheme: Scheme,
                 with stopping(now.time):
                     there = needed(taken.within, "a step's interior")(time)
                 found = instant(state, there.pore, there.solved, there.before)
-                state = replace(reported(state, time), apart=cut)
+                state = reported(state, time)
                 yield state, found
-        state = replace(_after(state, taken, solved, pace), apart=cut)
+        state = _after(state, taken, solved, pace)
         now = replace(state.pore, concentrations=solved.concentrations)
         asked = _asked(rows, now.time)
         if scene.output.times is None or asked is not None or pore_end(scene, now, 1.0):
@@ -217,7 +214,7 @@ def instant(state: State, now: Pore, solved: Solved, before: tuple[Pore, Solved]
 
 def reported(state: State, time: float) -> State:
     """The state with nothing to report, after a row at a time (h)."""
-    return State(state.pore, state.pace, row=time, apart=state.apart)
+    return State(state.pore, state.pace, row=time)
 
 
 def laid_out(pore: Pore) -> Pore:

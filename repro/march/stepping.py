@@ -47,8 +47,7 @@ def rows(scene: Scene) -> tuple[float, ...]:
     return (*(time for time in times if growth.end - time > SAME_TIME), growth.end)
 
 
-def _advance(scene: Scene, now: Pore, solved: Solved,
-             asked: Pace) -> tuple[Step, Solved, Pace, bool]:
+def _advance(scene: Scene, now: Pore, solved: Solved, asked: Pace) -> tuple[Step, Solved, Pace]:
     """One step, without the state before it: the next one, or where growth.end lies within that, or
     it would be nearly the last, one to growth.end."""
     end = needed(scene.growth, "[growth]").end
@@ -57,12 +56,12 @@ def _advance(scene: Scene, now: Pore, solved: Solved,
         most = EXCESS * scene.numerics.tolerance / left
         with suppress(PoreEnd, StageError, FloatingPointError):
             if last := _cut(scene, now, solved, left, most):
-                return *last, asked, True
+                return *last, asked
     taken, after, pace = _accepted(scene, now, solved, asked)
     if taken.pore.time - end > SAME_TIME:
         taken, after = needed(_cut(scene, now, solved, left, np.inf), "a shorter step")
-        return taken, after, asked, True
-    return replace(taken, before=None), after, pace, False
+        return taken, after, asked
+    return replace(taken, before=None), after, pace
 
 
 def _cut(scene: Scene, now: Pore, solved: Solved, left: float,

@@ -45,30 +45,28 @@ def schedule(scene: Scene) -> tuple[list[float], set[float]]:
     end = scene.growth.end
     ends = [0.0]
     while end - ends[-1] > SAME_TIME:
-        ends.append(next_time(scene, ends[-1])[0])
+        ends.append(next_time(scene, ends[-1]))
     return ends, {0.0, *(scene.output.times or ends)}
 
 
-def next_time(scene: Scene, time: float) -> tuple[float, bool]:
+def next_time(scene: Scene, time: float) -> float:
     """The time (h) at which a step ends: the next multiple of growth.time_step, rounded, or of a
-    table's times; or growth.end, where that comes first or is as good as there. And is it cut so?
-    """
+    table's times; or growth.end, where that comes first or is as good as there."""
     growth = needed(scene.growth, "[growth]")
     count = math.floor(time / growth.time_step + ON_GRID) + 1
     update = min(round(count * growth.time_step, 9), scene.corner(time))
     if update < growth.end - max(SAME_TIME, SAME_TIME * growth.time_step):
-        return update, False
-    return growth.end, update != growth.end
+        return update
+    return growth.end
 
 
-def _advance(scene: Scene, now: Pore, solved: Solved,
-             pace: Pace) -> tuple[Step, Solved, Pace, bool]:
+def _advance(scene: Scene, now: Pore, solved: Solved, pace: Pace) -> tuple[Step, Solved, Pace]:
     """The step to the next update, or to growth.end."""
-    time, cut = next_time(scene, now.time)
+    time = next_time(scene, now.time)
     done = step(scene, now, solved, time - now.time)
     after = laid_out(replace(done.pore, time=time))
     within = partial(_within, scene, now, solved)
-    return replace(done, pore=after, within=within), pore.solve(scene, after), pace, cut
+    return replace(done, pore=after, within=within), pore.solve(scene, after), pace
 
 
 def _within(scene: Scene, now: Pore, solved: Solved, time: float) -> Moment:

@@ -286,28 +286,30 @@ def _accepted(system: System, now: Level, step: float, tolerance: float, when: s
     while step >= SHORTEST:
         new, difference = _tried(system, now, step, floor)
         size = float(np.max(difference[:, system.watched], initial=0.0))
-        if new.fields.min() >= floor and size <= tolerance:
+        if (new.fields >= floor).all() and size <= tolerance:
             return new, size
         step *= max(least, min(0.5, _factor(tolerance, size)))
     raise _too_short(system, new, difference, when)
 
 
-def _tried(system: System, now: Level, step: float, floor: float) -> tuple[Level, np.ndarray]:
+def _tried(system: System, now: Level, step: float,
+           floor: np.ndarray) -> tuple[Level, np.ndarray]:
     """One step, and its difference from the prediction; with the positive sink where a
     concentration would fall below zero and that prevents it, or below the least that is accepted.
     """
     plain = _corrected(system, now, step, positive=False)
-    least = plain[0].fields.min()
-    if least >= 0:
+    fields = plain[0].fields
+    if fields.min() >= 0:
         return plain
     positive = _corrected(system, now, step, positive=True)
-    return positive if positive[0].fields.min() >= 0 or least < floor else plain
+    return positive if positive[0].fields.min() >= 0 or (fields < floor).any() else plain
 
 
-def _lowest(problem: Problem) -> float:
-    """The least concentration (mg/L) that is accepted: the lumped reaction of linear elements keeps
-    them positive."""
-    return 0.0 if problem.space.order == 1 else -UNRESOLVED * max(s.supply for s in problem.both)
+def _lowest(problem: Problem) -> np.ndarray:
+    """(2, 1) the least concentrations (mg/L) that are accepted: the lumped reaction of linear
+    elements keeps them positive."""
+    part = 0.0 if problem.space.order == 1 else UNRESOLVED
+    return np.array([[-part * s.supply] for s in problem.both])
 
 
 def _factor(tolerance: float, size: float) -> float:
@@ -316,8 +318,9 @@ def _factor(tolerance: float, size: float) -> float:
 
 
 def _too_short(system: System, new: Level, difference: np.ndarray, when: str) -> TransportError:
-    negative = new.fields.min() < _lowest(system.problem)
-    wrong = new.fields if negative else -difference * system.watched
+    room = new.fields - _lowest(system.problem)
+    negative = room.min() < 0
+    wrong = room if negative else -difference * system.watched
     species, node = divmod(int(np.argmin(wrong)), system.space.count)
     x, y = system.space.points[node]
     why = "becomes negative" if negative else "does not follow its prediction"

@@ -31,7 +31,7 @@ NEWEST = "checkpoint.state"
 PREVIOUS = "checkpoint.previous"
 REFUSED = "checkpoint.refused"
 LAST = "checkpoint.last"
-KIND, FORMAT = b"dupin2001-repro checkpoint ", b"3"
+KIND, FORMAT = b"dupin2001-repro checkpoint ", b"4"
 MAGIC = KIND + FORMAT + b" "
 DTYPES = ("<f8", "<i8", "<i4", "|b1", "|u1")
 #: Bytes that a file and its line of JSON may have. A mesh of a million nodes takes a quarter.

@@ -33,7 +33,7 @@ ARRAYS: dict[str, tuple[str, Shape]] = {
 LARGEST = 1e9
 GUESS: dict[str, tuple[str, Shape]] = {"acceptor": ("f", ("D",)), "donor": ("f", ("D",))}
 PLAIN = {"scene", "time_h", "pace", "ends_um", "front", "guess", "ledgers", "remeshes",
-         "iterations", "row_h", "apart"}
+         "iterations", "row_h"}
 
 
 def packed(scene: Scene, state: State) -> tuple[dict, dict[str, np.ndarray]]:
@@ -50,7 +50,7 @@ def packed(scene: Scene, state: State) -> tuple[dict, dict[str, np.ndarray]]:
              "guess": guess.iterations if guess else None,
              "ledgers": [_numbers(ledger) for ledger in state.ledgers],
              "remeshes": int(state.remeshes), "iterations": state.iterations,
-             "row_h": float(state.row), "apart": bool(state.apart)}
+             "row_h": float(state.row)}
     return plain, arrays
 
 
@@ -66,14 +66,13 @@ def unpacked(scene: Scene, plain: dict, arrays: dict[str, np.ndarray]) -> State:
         raise CheckpointError("it is of another scene")
     end = scene.growth.end if scene.growth else 0.0
     _refuse(not all(in_range(plain[key], 0.0, end) for key in ("time_h", "row_h")), "its time")
-    _refuse(type(plain["apart"]) is not bool, "its last step")
     _refuse(not (counted(plain["remeshes"]) and counts(plain["iterations"])), "its counts")
     _refuse(plain["guess"] is not None and not counted(plain["guess"]), "its counts")
     _refuse(not in_range(plain["front"], 1.0, MOST_GRADED), "its element sizes")
     _check(scene, plain, arrays)
     pore = _pore(scene, plain, arrays)
     return State(pore, _pace(plain["pace"]), _ledgers(plain["ledgers"]), plain["remeshes"],
-                 plain["iterations"], plain["row_h"], plain["apart"])
+                 plain["iterations"], plain["row_h"])
 
 
 def _refuse(wrong: bool, what: str) -> None:

@@ -10,6 +10,7 @@ from importlib import import_module
 from time import perf_counter
 
 from verification.bench import record, told
+from verification.kernel.writing import plain, save
 
 #: Modules of the parts; that of other codes is imported for its own alone.
 PARTS = {"flow": "stages", "transport": "stages", "box": "users", "channel": "users", "growth": "stages",
@@ -31,19 +32,19 @@ def measure(names, quick: bool) -> dict:
     """Run parts one after the other; each is recorded as soon as it is there."""
     found = record.empty() if quick else record.load()
     imports = None if quick else record.import_seconds()
-    print(told.machine({**record.machine(), "import_seconds": imports or {}}))
+    print(plain([told.machine(record.machine())]))
     for name in names:
         start = perf_counter()
         part = getattr(import_module(f"verification.bench.{PARTS[name]}"), f"{name}_part")(quick)
         part["took_seconds"] = perf_counter() - start
         found = record.merged(found, {name: part}, {name: part.get("repeats", 1)}, imports)
         found["verdicts"] = told.judged(found)
-        print(told.part_lines(name, part), flush=True)
+        print(plain(told.blocks(name, part)), flush=True)
         if not quick:
-            record.save(found)
+            save(found, record.FILE)
     if not quick:
         told.draw(found["parts"], record.FOLDER)
-    print(told.verdicts(found["verdicts"]))
+    print(plain([told.verdicts(found["verdicts"])]))
     return found
 
 

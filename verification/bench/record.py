@@ -29,7 +29,6 @@ them on logarithmic axes.
 from __future__ import annotations
 
 import gc
-import json
 import os
 import platform
 import subprocess
@@ -37,6 +36,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import date
+from functools import partial
 from importlib.metadata import version
 from math import exp, isfinite, log
 from pathlib import Path
@@ -45,7 +45,7 @@ from time import perf_counter, process_time
 
 import numpy as np
 
-from repro.results import write_text
+from verification.kernel import writing
 
 FOLDER = Path(__file__).parents[1] / "report"
 FILE = FOLDER / "bench.json"
@@ -62,15 +62,7 @@ def empty() -> dict:
 
 def load(file: Path = FILE) -> dict:
     """The record of the last benchmark, an empty one where there is none."""
-    if not file.exists():
-        return empty()
-    return json.loads(file.read_text(encoding="utf-8"))
-
-
-def save(record: dict, file: Path = FILE) -> None:
-    """Write a record whole or not at all; ValueError where it holds not-a-number."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    write_text(file, json.dumps(record, indent=1, allow_nan=False) + "\n")
+    return writing.load(file, empty())
 
 
 def machine() -> dict:
@@ -90,17 +82,19 @@ def processor(file: Path = Path("/proc/cpuinfo")) -> str:
     return names[0] if names else platform.processor() or "unknown"
 
 
-def import_seconds(times: int = IMPORTS) -> dict[str, float]:
+def import_seconds() -> dict[str, float]:
     """Median seconds that a new process takes to import each package, less what it takes to import nothing."""
-    bare = median(_started("pass") for _ in range(times))
-    return {name: max(0.0, median(_started(f"import {module}") for _ in range(times)) - bare)
-            for name, module in IMPORTED.items()}
+    bare = _started("pass")
+    return {name: max(0.0, _started(f"import {module}") - bare) for name, module in IMPORTED.items()}
 
 
 def _started(statement: str) -> float:
-    start = perf_counter()
-    subprocess.run([sys.executable, "-c", statement], check=True, capture_output=True)
-    return perf_counter() - start
+    seconds = []
+    for _ in range(IMPORTS):
+        start = perf_counter()
+        subprocess.run([sys.executable, "-c", statement], check=True, capture_output=True)
+        seconds.append(perf_counter() - start)
+    return median(seconds)
 
 
 def merged(record: dict, parts: dict, repeats: dict, imports: dict | None = None) -> dict:
@@ -168,6 +162,17 @@ def measured(jobs: Jobs, repeats: int) -> list[dict]:
             if not times[key].reason and len(times[key].seconds) < wanted[key]:
                 times[key].run(job)
     return _lines(times)
+
+
+def series(method: str, label: str, sizes: Iterable, job: Callable, **how) -> Jobs:
+    """Jobs ``job(size, **how)`` of a method, one a size."""
+    return {(method, label.format(size)): partial(job, size, **how) for size in sizes}
+
+
+def part(title: str, error: str, reference: str, jobs: Jobs, repeats: int, once: Jobs | None = None, **more) -> dict:
+    """A part, measured; once: jobs that are run once; more: what else is told of it."""
+    lines = measured(jobs, repeats) + measured(once or {}, 1)
+    return {"title": title, "error": error, "reference": reference, "repeats": repeats, "lines": lines, **more}
 
 
 def _often(timed: Timed, repeats: int) -> int:

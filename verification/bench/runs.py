@@ -20,13 +20,13 @@ import numpy as np
 
 from reference import whole_run
 from repro import timing
-from repro.march import midpoint, updates
 from repro.march.simulation import simulate
 from repro.model import pore
 from repro.results import row
 from repro.scene import load_scene, parse_scene
 from verification.bench import record
 from verification.bench.record import exponent, measured
+from verification.problems import runs as problems
 
 BASE_REPEATS = 3
 TIMES = (19.2, 19.4)
@@ -343,10 +343,6 @@ def sized(kind: str, nodes: int):
     return given, now
 
 
-#: A step of a length (h), by the scene's ``numerics.time``.
-STEP_BY = {"updates": updates.step, "midpoint": lambda *given: midpoint.attempt(*given).step}
-
-
 def measure(kind: str, nodes: int, steps: int) -> dict:
     """Seconds of a step and of its stages, their floor, and memory."""
     before = _resident()
@@ -357,7 +353,7 @@ def measure(kind: str, nodes: int, steps: int) -> dict:
     for _ in range(steps + 1):
         timing.reset()
         wall, spent = perf_counter(), process_time()
-        taken = STEP_BY[given.numerics.time](given, now, solved, STEP)
+        taken = problems.step(given, now, solved, STEP)
         after = replace(taken.pore, time=now.time + STEP)
         solved = pore.solve(given, after)
         now = replace(after, concentrations=solved.concentrations)

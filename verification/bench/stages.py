@@ -7,10 +7,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache, partial
+from types import SimpleNamespace
 
 import numpy as np
 
-from reference import neo_hookean, quadratic_growth, taylor_hood
+from reference import quadratic_growth, taylor_hood
 from reference.whole_run import Pore as Constants
 from reference.whole_run_grid import grid
 from reference.whole_run_pore import Section
@@ -22,8 +23,9 @@ from repro.model import flow, growth, pore, transport
 from repro.model.contact import constrained
 from repro.model.kinetics import Sink
 from repro.scene import parse_scene
-from verification.bench.record import measured
-from verification.problems import meshes
+from verification.bench.record import part, series
+from verification.problems import bodies, meshes, pairs
+from verification.problems.bodies import HalfCylinder
 
 WIDTH, LENGTH, RADIUS, RATIO = 50.0, 600.0, 40.0, 2000.0
 PAPER = "linear elements (paper)"
@@ -70,7 +72,9 @@ def largest(found, wanted, scale) -> float:
     return float(np.max(np.abs(np.asarray(found) - wanted) / scale))
 
 
-FLOW_REPEATS = 3
+#: Runs of a job that count.
+FLOW_REPEATS, TRANSPORT_REPEATS, GROWTH_REPEATS, TRANSFER_REPEATS = (3, 1), (5, 1), (5, 1), (3, 1)
+REFINEMENT, RINGS = "refinement {:g}", "{} rings"
 #: Rings of the reference, the last one being it; refinements of linear and of curved elements; of scikit-fem's; rings.
 #: Here as below: of the part, and of its quick version.
 FLOW_SIZES = ((16, 24), (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8), (0.15, 0.25, 0.45, 0.7, 1.0, 1.6), (0, 1, 2),
@@ -80,29 +84,25 @@ FLOW_SIZES = ((16, 24), (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8), (0.15, 0.25, 0.45,
 def flow_part(quick: bool) -> dict:
     """Flow around a half-disc of 40 um in a pore of 50 um, lambda = 2000: error of the head loss of the whole pore."""
     rings, linear, quadratic, skfem, sections = FLOW_SIZES[quick]
-    coarse, truth = flow_reference(rings[-2]), flow_reference(rings[-1])
+    coarse, truth = map(flow_reference, rings)
     jobs = {}
-    for interface, element in FLOW_ELEMENTS.items():
-        for r in linear:
-            jobs[interface, f"refinement {r:g}"] = partial(_flow_linear, truth, r, **element)
-    for r in linear[: len(linear) - 2]:
-        jobs["order 2 on straight triangles", f"refinement {r:g}"] = partial(_of_order, truth, r, "paper", 2)
+    for name, element in FLOW_ELEMENTS.items():
+        jobs |= series(name, REFINEMENT, linear, _flow_linear, truth=truth, **element)
+    jobs |= series("order 2 on straight triangles", REFINEMENT, linear[:-2], _of_order, truth=truth, preset="paper",
+                   order=2)
     for name, order in CURVED.items():
-        for r in quadratic:
-            jobs[name, f"refinement {r:g}"] = partial(_of_order, truth, r, "accurate", order)
-    for k in skfem:
-        jobs["scikit-fem: Taylor-Hood, two pressures", f"{k} refinements"] = partial(_taylor_hood, truth, k)
-    for n in sections:
-        jobs["scikit-fem: Taylor-Hood, rings", f"{n} rings"] = partial(_flow_section, truth, n)
-    lines = measured(jobs, 1 if quick else FLOW_REPEATS)
-    for name in ("fipy", "py-pde"):
-        lines.append({"method": name, "points": [], "failed": [{"label": "Stokes flow with a jump of viscosity",
-                                                                "reason": "has no incompressible flow of this kind"}]})
-    return {"title": "Flow: half-disc of 40 um in a pore of 50 um, lambda = 2000; mesh, assembly and solution",
-            "error": "head loss of the whole pore, relative", "repeats": 1 if quick else FLOW_REPEATS, "lines": lines,
-            "reference": f"Taylor-Hood on curved triangles, {rings[-1]} rings: {truth:.9g} 1/um; from {rings[-2]} to "
-                         f"{rings[-1]} rings it changes by {abs(coarse / truth - 1):.1e}",
-            "reference_change": abs(coarse / truth - 1)}
+        jobs |= series(name, REFINEMENT, quadratic, _of_order, truth=truth, preset="accurate", order=order)
+    jobs |= series("scikit-fem: Taylor-Hood, two pressures", "{} refinements", skfem, _taylor_hood, truth=truth)
+    jobs |= series("scikit-fem: Taylor-Hood, rings", RINGS, sections, _flow_section, truth=truth)
+    change = abs(coarse / truth - 1)
+    found = part("Flow: half-disc of 40 um in a pore of 50 um, lambda = 2000; mesh, assembly and solution",
+                 "head loss of the whole pore, relative",
+                 f"Taylor-Hood on curved triangles, {rings[1]} rings: {truth:.9g} 1/um; from {rings[0]} to {rings[1]} "
+                 f"rings it changes by {change:.1e}", jobs, FLOW_REPEATS[quick], reference_change=change)
+    found["lines"] += [{"method": name, "points": [], "failed": [{
+        "label": "Stokes flow with a jump of viscosity", "reason": "has no incompressible flow of this kind"}]}
+        for name in ("fipy", "py-pde")]
+    return found
 
 
 @cache
@@ -111,7 +111,7 @@ def flow_reference(rings: int) -> float:
     return curved_mesh(rings).flow(RATIO).loss + outside_loss()
 
 
-def _flow_linear(truth: float, refinement: float, **element) -> dict:
+def _flow_linear(refinement: float, truth: float, **element) -> dict:
     scene = half_disc(refinement=refinement, **element)
     mesh = pore.seeded(scene).mesh
     found = pore.solve_flow(scene, Space(mesh, 1))
@@ -122,21 +122,17 @@ def _nu(scene) -> float:
     return scene.flow.kinematic_viscosity / scene.flow.gravity
 
 
-def _of_order(truth: float, refinement: float, preset: str, order: int) -> dict:
+def _of_order(refinement: float, truth: float, preset: str, order: int) -> dict:
     mesh = pore.seeded(half_disc(preset=preset, refinement=refinement)).mesh
     return _flow_judged(truth, flow.unit_flow(Space(mesh, order), RATIO).loss + outside_loss(), mesh)
 
 
-def _taylor_hood(truth: float, refinements: int) -> dict:
-    return {"error": abs(_stokes(refinements) / truth - 1)}
-
-
-def _stokes(refinements: int) -> float:
+def _taylor_hood(refinements: int, truth: float) -> dict:
     channel = taylor_hood.half_disc(WIDTH, ENDS, RADIUS, refinements, corner=2 + refinements)
-    return taylor_hood.stokes(channel, RATIO).loss + outside_loss()
+    return {"error": abs((taylor_hood.stokes(channel, RATIO).loss + outside_loss()) / truth - 1)}
 
 
-def _flow_section(truth: float, rings: int) -> dict:
+def _flow_section(rings: int, truth: float) -> dict:
     return {"error": abs(flow_reference.__wrapped__(rings) / truth - 1)}
 
 
@@ -144,7 +140,6 @@ def _flow_judged(truth: float, loss: float, mesh) -> dict:
     return {"error": abs(loss / truth - 1), "nodes": len(mesh.points)}
 
 
-TRANSPORT_REPEATS = 5
 #: Rings of the reference; refinements; rings.
 TRANSPORT_SIZES = ((16, 24), (0.5, 0.7, 1.0, 1.4, 2.0, 2.8), (0.15, 0.25, 0.45, 0.7, 1.0), (3, 4, 6, 8)), (
     (6, 9), (0.5, 0.7), (0.25,), (3,))
@@ -157,21 +152,19 @@ def transport_part(quick: bool) -> dict:
     both flow and transport, time of transport alone.
     """
     rings, linear, quadratic, sections = TRANSPORT_SIZES[quick]
-    coarse, truth = transport_reference(rings[0]), transport_reference(rings[1])
-    jobs = {}
-    for name, element in FLOW_ELEMENTS.items():
-        jobs |= {(name, f"refinement {r:g}"): _transport_ours(truth, 1, refinement=r, **element) for r in linear}
-    for name, order in CURVED.items():
-        jobs |= {(name, f"refinement {r:g}"): _transport_ours(truth, order, preset="accurate", refinement=r)
-                 for r in quadratic}
-    jobs |= {(QUADRATIC, f"{n} rings"): partial(_transport_section, truth, *prepared(n)) for n in sections}
-    repeats, change = 1 if quick else TRANSPORT_REPEATS, largest(coarse, truth, supply())
-    return {"title": "Transport: dual Monod uptake around a half-disc of 40 um in a pore of 50 um, 2.9 m/d; assembly "
-                     "and solution", "error": "effluents over the supply, the larger error",
-            "repeats": repeats, "lines": measured(jobs, repeats),
-            "reference": f"quadratic elements on curved triangles, {rings[1]} rings: {truth[0]:.8f} and "
-                         f"{truth[1]:.8f} mg/L; from {rings[0]} rings on they change by {change:.1e} of the supply",
-            "reference_change": change}
+    coarse, truth = map(transport_reference, rings)
+    made = [(name, REFINEMENT, linear, partial(_transport_ours, truth, 1, **element))
+            for name, element in FLOW_ELEMENTS.items()]
+    made += [(name, REFINEMENT, quadratic, partial(_transport_ours, truth, order, preset="accurate"))
+             for name, order in CURVED.items()]
+    made.append((QUADRATIC, RINGS, sections, partial(_transport_section, truth)))
+    jobs = {(name, label.format(size)): make(size) for name, label, sizes, make in made for size in sizes}
+    change = largest(coarse, truth, supply())
+    return part("Transport: dual Monod uptake around a half-disc of 40 um in a pore of 50 um, 2.9 m/d; assembly and "
+                "solution", "effluents over the supply, the larger error",
+                f"quadratic elements on curved triangles, {rings[1]} rings: {truth[0]:.8f} and {truth[1]:.8f} mg/L; "
+                f"from {rings[0]} rings on they change by {change:.1e} of the supply", jobs, TRANSPORT_REPEATS[quick],
+                reference_change=change)
 
 
 def supply() -> np.ndarray:
@@ -199,12 +192,18 @@ def _effluents(section, flow) -> np.ndarray:
     return section.effluents(flow, fields)
 
 
-def _transport_section(truth, section, flow) -> dict:
+def _transport_section(truth, rings: int):
+    """A job whose section and flow are there."""
+    return partial(_carried_by, truth, *prepared(rings))
+
+
+def _carried_by(truth, section, flow) -> dict:
     return {"error": largest(_effluents(section, flow), truth, supply())}
 
 
-def _transport_ours(truth, order: int, **numerics):
-    scene = half_disc(**numerics)
+def _transport_ours(truth, order: int, refinement: float, **numerics):
+    """A job whose mesh and flow are there."""
+    scene = half_disc(refinement=refinement, **numerics)
     now = pore.seeded(scene)
     space = Space(now.mesh, order)
     return partial(_solved, truth, scene, space, pore.solve_flow(scene, space))
@@ -218,9 +217,8 @@ def _solved(truth, scene, space, flow) -> dict:
     return {"error": largest([flux.effluent for flux in found], truth, supply()), "nodes": len(space.mesh.points)}
 
 
-GROWTH_REPEATS = 5
-#: um; a and c at the end of the step; theta at its start over theta at its end.
-GROWTH_RADIUS, THETA, BEFORE = 20.0, (12.0, 24.0), 2 / 3
+#: The body at the start of the step, and at its end.
+BEFORE, AFTER = HalfCylinder(8.0, 24.0), HalfCylinder(12.0, 36.0)
 #: Refinements, and rings.
 GROWTH_SIZES = ((0.5, 0.7, 1.0, 1.4, 2.0, 2.8), (0.15, 0.25, 0.45, 0.7, 1.0, 1.6), (2, 4, 8, 16)), (
     (0.5, 1.0), (0.25, 0.45), (4,))
@@ -233,35 +231,17 @@ def growth_part(quick: bool) -> dict:
     it.
     """
     linear, quadratic, rings = GROWTH_SIZES[quick]
-    jobs = {(PAPER, f"refinement {r:g}"): partial(_growth_ours, "paper", r) for r in linear}
-    jobs |= {(ORDER_2, f"refinement {r:g}"): partial(_growth_ours, "accurate", r) for r in quadratic}
-    jobs |= {(QUADRATIC, f"{n} rings"): partial(_skfem, n) for n in rings}
-    repeats = 1 if quick else GROWTH_REPEATS
-    return {"title": "Growth: a step of an aggregate with theta from 12 to 36; assembly and solution",
-            "error": "places of the outline over the radius, the largest error", "repeats": repeats,
-            "reference": "closed form of the growing half-cylinder", "lines": measured(jobs, repeats)}
-
-
-def growth_exact(points: np.ndarray, part: float = 1.0) -> np.ndarray:
-    """(n, 2) places under ``part`` of theta of the material that was at points (n, 2)."""
-    R = np.maximum(np.hypot(*points.T), 1e-12)
-    return points * (neo_hookean.cylinder_radius(R, *(part * t for t in THETA), GROWTH_RADIUS) / R)[:, None]
-
-
-def pressure(points: np.ndarray, part: float) -> np.ndarray:
-    """(n,) P / mu_L there; the middle takes what is beside it."""
-    R = np.maximum(np.hypot(*points.T), 1e-6 * GROWTH_RADIUS)
-    return neo_hookean.cylinder_pressure(R, *(part * t for t in THETA), GROWTH_RADIUS)
-
-
-def theta(x, y):
-    """The expansion at the end of the step."""
-    return THETA[0] + THETA[1] * (x**2 + y**2) / GROWTH_RADIUS**2
+    jobs = {**series(PAPER, REFINEMENT, linear, _growth_ours, preset="paper"),
+            **series(ORDER_2, REFINEMENT, quadratic, _growth_ours, preset="accurate"),
+            **series(QUADRATIC, RINGS, rings, _skfem)}
+    return part("Growth: a step of an aggregate with theta from 12 to 36; assembly and solution",
+                "places of the outline over the radius, the largest error",
+                "closed form of the growing half-cylinder", jobs, GROWTH_REPEATS[quick])
 
 
 def _growth_apart(found: np.ndarray, rim: np.ndarray) -> float:
     """Largest distance of the outline (m, 2) from where its nodes (m, 2) of t = 0 should be, over the radius."""
-    wanted = growth_exact(rim)
+    wanted = AFTER.place(*rim.T)
     return float(np.hypot(*(found - wanted).T).max() / np.hypot(*wanted.T).max())
 
 
@@ -271,13 +251,13 @@ def _seeded(refinement: float, preset: str):
     return now, constrained(len(now.mesh.body), now.mesh.topology.body_loop, now.wall, now.fixed)
 
 
-def _growth_ours(preset: str, refinement: float):
+def _growth_ours(refinement: float, preset: str):
     now, held = _seeded(refinement, preset)
-    points = now.mesh.points[now.mesh.body] * GROWTH_RADIUS / RADIUS
+    points = now.mesh.points[now.mesh.body] * bodies.RADIUS / RADIUS
     body = growth.Body(now.body.shape, points)
-    whole = theta(*(body.shape.table.values @ points[body.shape.cells]).transpose(2, 0, 1))
-    start = growth_exact(points, BEFORE)
-    found = growth.equilibrium(body, whole, start, pressure(points[: body.shape.corners], BEFORE), held, start)
+    whole = AFTER.theta(*(body.shape.table.values @ points[body.shape.cells]).transpose(2, 0, 1))
+    start, push = BEFORE.place(*points.T), BEFORE.pressure(*points[: body.shape.corners].T)
+    found = growth.equilibrium(body, whole, start, push, held, start)
     return partial(_growth_judged, now, points, found.position)
 
 
@@ -289,28 +269,21 @@ def _growth_judged(now, points, found) -> dict:
 
 @cache
 def _growth_meshed(rings: int):
-    return quadratic_growth.half_disc(GROWTH_RADIUS, rings)
+    return quadratic_growth.half_disc(bodies.RADIUS, rings)
 
 
-class _Start:
-    """The exact state at the start of the step, asked for as that of a solution on another mesh is."""
-
-    @staticmethod
-    def at(x, y):
-        """Places (n, 2) and pressure (n,)."""
-        points = np.column_stack([x, y])
-        return growth_exact(points, BEFORE), pressure(points, BEFORE)
+#: The exact state at the start of the step, asked for as that of a solution on another mesh is.
+START = SimpleNamespace(at=lambda x, y: (BEFORE.place(x, y), BEFORE.pressure(x, y)))
 
 
 def _skfem(rings: int):
     mesh = _growth_meshed(rings)
-    found = quadratic_growth.grow(mesh, theta, sum(THETA), start=_Start)
+    found = quadratic_growth.grow(mesh, AFTER.theta, AFTER.outer, start=START)
     points = mesh.doflocs.T
-    rim = np.isclose(np.hypot(*points.T), GROWTH_RADIUS, rtol=1e-9)
+    rim = np.isclose(np.hypot(*points.T), bodies.RADIUS, rtol=1e-9)
     return lambda: {"error": _growth_apart(found.place.T[rim], points[rim]), "nodes": len(points)}
 
 
-TRANSFER_REPEATS = 3
 #: um; the front's place along x and its width.
 TRANSFER_ENDS, TRANSFER_WIDTH, FRONT, STEEP = (0.0, 40.0), 25.0, 20.0, 3.0
 #: Remeshes; um.
@@ -326,14 +299,15 @@ def transfer_part(quick: bool) -> dict:
     ways = {"conserving projection": transfer.project,
             "bounded conserving projection": transfer.project_bounded,
             f"linear interpolation, {PAPER}": transfer.interpolated}
-    jobs = {(name, f"{size:g} um"): partial(_linear, size, count, way)
-            for name, way in ways.items() for size in sizes}
-    jobs |= {("quadratic interpolation (fast, accurate)", f"{size:g} um"): partial(_quadratic, size, count)
-             for size in quadratic}
-    repeats = 1 if quick else TRANSFER_REPEATS
-    return {"title": f"Transfer: a front through {count} remeshes", "repeats": repeats,
-            "error": "L2 of the field in the end, relative; drift: of its total, relative",
-            "reference": "the field itself", "lines": measured(jobs, repeats)}
+    jobs = series("quadratic interpolation (fast, accurate)", SIZE, quadratic, _quadratic, count=count)
+    for name, way in ways.items():
+        jobs |= series(name, SIZE, sizes, _linear, count=count, project=way)
+    return part(f"Transfer: a front through {count} remeshes",
+                "L2 of the field in the end, relative; drift: of its total, relative", "the field itself", jobs,
+                TRANSFER_REPEATS[quick])
+
+
+SIZE = "{:g} um"
 
 
 def transfer_exact(x, y):
@@ -362,7 +336,8 @@ def _total() -> float:
 
 def _linear(size: float, count: int, project):
     return _carried(count, partial(_transfer_meshed, size), lambda mesh: mesh[0],
-                    lambda old, field, new: project(*old, field, *new), lambda mesh, field: _integral(*mesh, field),
+                    lambda old, field, new: project(*old, field, *new),
+                    lambda mesh, field: pairs.integral(mesh, field[:, 0]),
                     lambda mesh, field: meshes.l2_error(*mesh, field[:, 0], transfer_exact))
 
 
@@ -387,11 +362,6 @@ def _carried(count: int, meshed, points, carry, weighed, error):
     return lambda: {"error": error(old, field), "nodes": len(points(old)),
                     "drift": abs(weighed(old, field) - start) / _total(),
                     "beyond": float(max(1.0 - field.min(), field.max() - 2.0, 0.0))}
-
-
-def _integral(points, triangles, field) -> float:
-    _, weight, shape = meshes.quadrature(points, triangles)
-    return float(np.sum(weight * (field[triangles, 0] @ shape.T)))
 
 
 def _weighed(space, field) -> float:

@@ -12,7 +12,7 @@ transport is solved on right triangles that halve the square cells of their grid
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache
 from time import perf_counter, process_time
 
 import numpy as np
@@ -26,22 +26,20 @@ from fipy import (
     LinearLUSolver,
 )
 from pde import PDE, CallbackTracker, CartesianGrid, Controller, EulerSolver, FieldCollection, ScalarField
-from scipy.sparse import block_array
-from scipy.sparse.linalg import splu
-from skfem import Basis, BilinearForm, ElementTriP2, LinearForm, MeshTri, asm
-from skfem.helpers import dot, grad
+from skfem import Basis, ElementTriP2, MeshTri, asm
 
 from reference import channel_bvp
 from reference import diffusion_reaction_pypde as pypde
 from reference.monod import NUDGE, uptake
+from reference.whole_run_pore import steady, stiffness
 from repro.fem.mesh import Mesh, curved
 from repro.fem.space import Space
 from repro.model import transport
-from repro.model.flow import Flow
 from repro.model.kinetics import Sink
 from repro.scene import parse_scene
 from verification.bench import stages
-from verification.bench.record import measured
+from verification.bench.record import Jobs, part, series
+from verification.problems import channels
 
 #: um2/h of acceptor and donor, in fluid and biomass alike; mg/L.
 DIFFUSIVITY, DENSITY = (8e6, 4e6), 3e4
@@ -125,16 +123,11 @@ def _fipy_ends(problem: Problem, mesh, field, k: int):
     return first * problem.supply[k] - CentralDifferenceConvectionTerm(coeff=(problem.speed,), var=field)
 
 
-def _columns(both, rates) -> list[np.ndarray]:
-    """Derivatives of the uptake (2, ...) by C_A and by C_D, by central differences."""
-    nudges = NUDGE * np.eye(2).reshape(2, 2, *[1] * (both.ndim - 1))
-    return [(np.array(uptake(*(both + d), rates)) - np.array(uptake(*(both - d), rates))) / (2 * NUDGE) for d in nudges]
-
-
 def _linearise(problem: Problem, now, constants, slopes) -> None:
     """q = constant + sum of slopes times C at the present C; slopes by central differences."""
     rate = np.array(uptake(*now, problem.rates))
-    columns = _columns(now, problem.rates)
+    columns = [(np.array(uptake(*(now + d), problem.rates)) - np.array(uptake(*(now - d), problem.rates))) / (2 * NUDGE)
+               for d in NUDGE * np.eye(2)[:, :, None]]
     for k in (0, 1):
         constants[k].setValue(rate[k] - sum(column[k] * c for column, c in zip(columns, now)))
         for j in (0, 1):
@@ -197,6 +190,7 @@ def _pde_ends(problem: Problem, k: int) -> dict:
     return ends if problem.width is None else {**ends, "y": {"derivative": 0.0}}
 
 
+@cache
 def ribbon():
     """Substrates and kinetics of Table 1, but for the diffusivities."""
     kinds = {name: {"diffusivity": f"{d} um^2/h", "diffusivity_in_aggregate": f"{d} um^2/h"}
@@ -218,32 +212,22 @@ def straight(ends, width: float, cells: tuple[int, int], inside) -> Mesh:
 def solved(given, grid: Mesh, order: int, speed: float = 0.0):
     """(acceptor's, donor's) fluxes by linear (order 1), quadratic or cubic elements, in plug flow (um/h) or at rest."""
     space = Space(grid if order == 1 else curved(grid, None), order)
-    flow = plug_flow(space, speed) if speed else None
-    problem = transport.problem(space, flow, given.substrates, given.kinetics)
+    problem = channels.problem(space, speed or None, given.substrates, given.kinetics)
     sink = Sink(DENSITY * space.reaction.dx)
     return transport.fluxes(problem, sink, transport.steady(problem, sink))
 
 
-def plug_flow(space: Space, speed: float) -> Flow:
-    """The same speed (um/h) everywhere, without loss."""
-    correction = np.zeros((len(space.cells), 2)) if space.order == 1 else None
-    velocity = np.tile([speed, 0.0], (space.count, 1))
-    return Flow(speed, velocity, np.zeros(space.mesh.corners), correction, 0.0, 0.0, 1.0)
-
-
 #: Methods of this package, by the order of their elements.
 COMPILED = "py-pde, compiled"
+CELLS = "{} cells"
 OURS = {1: stages.PAPER, 2: "order 2 (fast, accurate)", 3: "order 3"}
 
 
-def _ours(job, linear, quadratic) -> dict:
+def _ours(job, linear, quadratic, truth) -> Jobs:
     """Jobs of this package; ``job(cells, order)``."""
-    return {(method, f"{n} cells"): partial(job, n, order)
-            for order, method in OURS.items() for n in (linear if order == 1 else quadratic)}
-
-
-def _theirs(method: str, job, cells) -> dict:
-    return {(method, f"{n} cells"): partial(job, n) for n in cells}
+    found = [series(method, CELLS, linear if order == 1 else quadratic, job, order=order, truth=truth)
+             for order, method in OURS.items()]
+    return {label: job for jobs in found for label, job in jobs.items()}
 
 
 def compile_times(lines: list[dict]) -> list[dict]:
@@ -252,7 +236,8 @@ def compile_times(lines: list[dict]) -> list[dict]:
             for line in lines for point in line["points"] if point.get("apart_seconds")]
 
 
-BOX_REPEATS = 3
+#: Runs of a job that count.
+REPEATS = 3, 1
 HALF, WIDTH, SIDE = 64.0, 64.0, 32.0
 #: Cells across the box: linear, of higher order, scikit-fem's, those of other codes, of compiled ones, and of the
 #: reference; of the part, and of its quick version.
@@ -267,19 +252,17 @@ def box_part(quick: bool) -> dict:
     py-pde's compiled run comes once a grid: numba compiles for longer than it runs.
     """
     linear, quadratic, skfem, cells, stepped, reference = BOX_SIZES[quick]
-    coarse, truth = converged(reference[0]), converged(reference[1])
-    repeats = 1 if quick else BOX_REPEATS
-    jobs = {**_ours(partial(_box_ours, truth, ribbon()), linear, quadratic),
-            **_theirs(stages.QUADRATIC, partial(_skfem, truth), skfem),
-            **_theirs("fipy", partial(_box_fipy, truth), cells),
-            **_theirs("py-pde's Laplacian, Newton by scipy", partial(_newton, truth), cells)}
-    lines = measured(jobs, repeats) + measured(_theirs(COMPILED, partial(_box_stepped, truth), stepped), 1)
+    coarse, truth = map(converged, reference)
+    jobs = {**_ours(_box_ours, linear, quadratic, truth), **series(stages.QUADRATIC, CELLS, skfem, _skfem, truth=truth),
+            **series("fipy", CELLS, cells, _box_fipy, truth=truth),
+            **series("py-pde's Laplacian, Newton by scipy", CELLS, cells, _newton, truth=truth)}
     change = stages.largest(coarse, truth, truth)
-    return {"title": "Uptake without flow: a block of 64 by 32 um in a box of 128 by 64 um; grid, assembly, solution",
-            "error": "what is taken up of each substrate, relative, the larger error", "repeats": repeats,
-            "lines": lines, "apart": compile_times(lines), "reference_change": change,
-            "reference": f"quadratic elements of scikit-fem, {reference[1]} cells across: {truth[0]:.9g} and "
-                         f"{truth[1]:.9g} um2 mg/L/h; from {reference[0]} cells on they change by {change:.1e}"}
+    found = part("Uptake without flow: a block of 64 by 32 um in a box of 128 by 64 um; grid, assembly, solution",
+                 "what is taken up of each substrate, relative, the larger error",
+                 f"quadratic elements of scikit-fem, {reference[1]} cells across: {truth[0]:.9g} and {truth[1]:.9g} "
+                 f"um2 mg/L/h; from {reference[0]} cells on they change by {change:.1e}", jobs, REPEATS[quick],
+                 series(COMPILED, CELLS, stepped, _box_stepped, truth=truth), reference_change=change)
+    return {**found, "apart": compile_times(found["lines"])}
 
 
 def box_problem() -> Problem:
@@ -296,27 +279,27 @@ def _judged(truth, found) -> dict:
     return {"error": stages.largest(found, truth, truth)}
 
 
-def _box_ours(truth, given, cells: int, order: int) -> dict:
+def _box_ours(cells: int, order: int, truth) -> dict:
     grid = straight((-HALF, HALF), WIDTH, (2 * cells, cells), _inside)
-    return _judged(truth, [flux.consumed for flux in solved(given, grid, order)])
+    return _judged(truth, [flux.consumed for flux in solved(ribbon(), grid, order)])
 
 
-def _box_fipy(truth, cells: int) -> dict:
+def _box_fipy(cells: int, truth) -> dict:
     return _judged(truth, fipy(box_problem(), cells)[0])
 
 
-def _box_stepped(truth, cells: int) -> dict:
+def _box_stepped(cells: int, truth) -> dict:
     found, _, compiled = py_pde(box_problem(), cells)
     return {**_judged(truth, found), **compiled}
 
 
-def _newton(truth, cells: int) -> dict:
+def _newton(cells: int, truth) -> dict:
     given, box = box_problem(), pypde.Box(cells, HALF, WIDTH, pypde.block(SIDE, SIDE))
     fields = box.steady(given.diffusivity, given.supply, given.density, given.rates)
     return _judged(truth, given.amounts(fields, given.density * box.part * (WIDTH / cells) ** 2))
 
 
-def _skfem(truth, cells: int) -> dict:
+def _skfem(cells: int, truth) -> dict:
     return _judged(truth, quadratic(cells))
 
 
@@ -332,47 +315,14 @@ def quadratic(cells: int) -> np.ndarray:
     mesh = MeshTri.init_tensor(np.linspace(-HALF, HALF, 2 * cells + 1), np.linspace(0.0, WIDTH, cells + 1))
     whole = Basis(mesh, ElementTriP2(), intorder=6)
     body = Basis(mesh, ElementTriP2(), intorder=6, elements=np.flatnonzero(_inside(*mesh.p[:, mesh.t].mean(axis=1))))
-    laplace = asm(_laplace, whole)
-    fields = np.outer(given.supply, np.ones(whole.N))
+    laplace = asm(stiffness, whole)
     inner = np.flatnonzero(np.abs(whole.doflocs[0]) < HALF * (1 - 1e-9))
-    step = np.inf
-    while np.abs(step).max() > 1e-10:
-        here = np.array([body.interpolate(field) for field in fields])
-        residual = [d * (laplace @ field) + asm(_load, body, value=given.density * q)
-                    for d, field, q in zip(given.diffusivity, fields, uptake(*here, given.rates))]
-        blocks = _slopes(body, here, given)
-        for k, d in enumerate(given.diffusivity):
-            blocks[k][k] = blocks[k][k] + d * laplace
-        blocks = [[block.tocsr()[inner][:, inner] for block in row] for row in blocks]
-        right = np.concatenate([part[inner] for part in residual])
-        step = -splu(block_array(blocks, format="csc")).solve(right).reshape(2, -1)
-        fields[:, inner] += step
-    here = np.array([body.interpolate(field) for field in fields])
+    fields = steady(body, [(d * laplace, 0.0) for d in given.diffusivity], given.density, given.rates,
+                    np.outer(given.supply, np.ones(whole.N)), inner)
+    here = [body.interpolate(field) for field in fields]
     return np.array([np.sum(given.density * q * body.dx) for q in uptake(*here, given.rates)])
 
 
-def _slopes(body, here, given) -> list[list]:
-    """Matrices of the uptake's derivatives, by central differences."""
-    columns = _columns(here, given.rates)
-    return [[asm(_mass, body, value=given.density * column[k]) for column in columns] for k in (0, 1)]
-
-
-@BilinearForm
-def _laplace(u, v, w):
-    return dot(grad(u), grad(v))
-
-
-@BilinearForm
-def _mass(u, v, w):
-    return w["value"] * u * v
-
-
-@LinearForm
-def _load(v, w):
-    return w["value"] * v
-
-
-CHANNEL_REPEATS = 3
 #: um; um/h.
 ENDS, STRIP, SPEED = (-40.0, 80.0), 40.0, 1e5
 #: Cells along the channel, multiples of three: faces lie on both ends of the strip.
@@ -388,16 +338,15 @@ def channel_part(quick: bool) -> dict:
     """
     linear, quadratic, cells, stepped = CHANNEL_SIZES[quick]
     coarse, truth = reference(1e-7), reference(1e-9)
-    repeats = 1 if quick else CHANNEL_REPEATS
-    jobs = {**_ours(partial(_channel_ours, truth, ribbon()), linear, quadratic),
-            **_theirs("fipy", partial(_channel_fipy, truth), cells)}
-    lines = measured(jobs, repeats) + measured(_theirs(COMPILED, partial(_channel_stepped, truth), stepped), 1)
+    jobs = {**_ours(_channel_ours, linear, quadratic, truth),
+            **series("fipy", CELLS, cells, _channel_fipy, truth=truth)}
     change = stages.largest(coarse, truth, _supply())
-    return {"title": "Uptake in plug flow through a strip, one-dimensional; grid, assembly and solution",
-            "error": "effluents over the supply, the larger error", "repeats": repeats, "lines": lines,
-            "apart": compile_times(lines), "reference_change": change,
-            "reference": f"scipy's solve_bvp, tolerance 1e-9: {truth[0]:.9f} and {truth[1]:.9f} mg/L; from 1e-7 on "
-                         f"they change by {change:.1e} of the supply"}
+    found = part("Uptake in plug flow through a strip, one-dimensional; grid, assembly and solution",
+                 "effluents over the supply, the larger error",
+                 f"scipy's solve_bvp, tolerance 1e-9: {truth[0]:.9f} and {truth[1]:.9f} mg/L; from 1e-7 on they change "
+                 f"by {change:.1e} of the supply", jobs, REPEATS[quick],
+                 series(COMPILED, CELLS, stepped, _channel_stepped, truth=truth), reference_change=change)
+    return {**found, "apart": compile_times(found["lines"])}
 
 
 @cache
@@ -420,17 +369,17 @@ def _supply() -> np.ndarray:
     return np.array(stages.constants().supply)
 
 
-def _channel_ours(truth, given, cells: int, order: int) -> dict:
+def _channel_ours(cells: int, order: int, truth) -> dict:
     size = (ENDS[1] - ENDS[0]) / cells
     grid = straight(ENDS, size, (cells, 1), lambda x, y: (x > 0) & (x < STRIP))
-    found = solved(given, grid, order, SPEED)
+    found = solved(ribbon(), grid, order, SPEED)
     return {"error": stages.largest([flux.effluent for flux in found], truth, _supply())}
 
 
-def _channel_fipy(truth, cells: int) -> dict:
+def _channel_fipy(cells: int, truth) -> dict:
     return {"error": stages.largest(fipy(channel_problem(), cells)[1], truth, _supply())}
 
 
-def _channel_stepped(truth, cells: int) -> dict:
+def _channel_stepped(cells: int, truth) -> dict:
     _, found, compiled = py_pde(channel_problem(), cells)
     return {"error": stages.largest(found, truth, _supply()), **compiled}

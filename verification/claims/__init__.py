@@ -33,15 +33,23 @@ from verification.uncertainty import Bar
 #: The rows that must be judged.
 EXPECTED = tuple(f"C{number:02d}" for number in range(1, 47))
 
-REPRODUCED, CHANGED, CONTRADICTED = "reproduced", "reproduced with a stated change", "contradicted"
+REPRODUCED = "reproduced"
+CHANGED = "reproduced with a stated change"
+CONTRADICTED = "contradicted"
 WITHIN_ROUNDING, UNDECIDED = "reproduced within the rounding of Table 1", "undecided"
 VERDICTS = (REPRODUCED, WITHIN_ROUNDING, CHANGED, CONTRADICTED, UNDECIDED)
 #: What comes of a check.
-HOLDS, FAILS, REACHES_OVER = "holds", "fails", "reaches over"
+HOLDS = "holds"
+FAILS = "fails"
+REACHES_OVER = "reaches over"
 #: What a claim is about.
-MODEL, OF_SCHEME, CLOSED = "the model", "the scheme", "closed forms"
+MODEL = "the model"
+OF_SCHEME = "the scheme"
+CLOSED = "closed forms"
 #: What a number rests on.
-PREDICTED, ARITHMETIC, CONSTRUCTION = "a solution", "arithmetic of Table 1", "a rule of construction"
+PREDICTED = "a solution"
+ARITHMETIC = "arithmetic of Table 1"
+CONSTRUCTION = "a rule of construction"
 #: When the ranges of the words were set, and when the printed digits became the ranges of the numbers.
 SET, PRINTED_SET = "2026-11-21", "2026-11-22"
 #: A value that the paper prints: 2.9, or ~60.
@@ -66,7 +74,9 @@ def interval(text: str) -> tuple[float, float] | None:
     found = PRINTED.fullmatch(text)
     if not found:
         return None
-    about, whole, parts = found[1], found[2], found[3] or ""
+    about = found[1]
+    whole = found[2]
+    parts = found[3] or ""
     zeros = len(whole) - len(whole.rstrip("0")) if about and not parts else 0
     half = 0.5 * 10.0 ** (zeros - len(parts))
     value = float(f"{whole}.{parts or 0}")

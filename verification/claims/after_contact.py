@@ -23,7 +23,7 @@ from verification import sensitivity
 from verification.claims import report
 from verification.claims.levels import OF_WIDE
 from verification.sensitivity import wide
-from verification.sensitivity.numbers import scene
+from verification.sensitivity.rounding import scene
 
 #: What numbers of claims about wide are called that are about other things or earlier instants.
 OTHER = re.compile(r"^base|before contact|a film left|^K / K_clean =|^the part filled|^layer|^wide, 30 h|"

@@ -257,8 +257,7 @@ def tearing() -> Finding:
     """Largest principal stress in the aggregate of base and wide: is there tension, where would it tear first, and
     how do size and place change with time?"""
     courses = {run[0]: course(run) for run in (BASE, WIDE)}
-    worst = {run[0]: peak(bodies(run)[1 + int(np.argmax([each[0] for each in courses[run[0]]]))])
-             for run in (BASE, WIDE)}
+    worst = {run[0]: peak(bodies(run)[1 + courses[run[0]].index(max(courses[run[0]]))]) for run in (BASE, WIDE)}
     checks = [at_least(f"{name}: largest principal stress over mu_L, in the mean over W / 10", "stress is computed",
                        found.value, 0.0, "tension", date=NEW) for name, found in worst.items()]
     modulus = scene(*BASE).growth.shear_modulus
@@ -303,18 +302,22 @@ def changed(pair: tuple[Body, Body], part: float = APART) -> float:
 def _told_of_the_fluid(pairs: dict[str, tuple[Body, Body]]) -> str:
     peaks = "; ".join(f"{name} {peak(without).told} and {peak(forced).told}"
                       for name, (without, forced) in pairs.items())
-    others = "; ".join(f"{name} " + ", ".join(f"{changed(pair, part):.2g}" for part in (OTHER[0], APART, OTHER[1]))
-                       for name, pair in pairs.items())
-    exponents = "; ".join(f"{name} " + " and ".join(f"{exponent(*pair, place):.2f}" for place in fixed(pair[0]))
-                          for name, pair in pairs.items())
+    others = "; ".join(f"{name} {_changes(pair)}" for name, pair in pairs.items())
+    exponents = "; ".join(f"{name} {_exponents(pair)}" for name, pair in pairs.items())
     return (f"Without and with the fluid's forces: {peaks}. In the mean over W / 20, W / 10 and W / 5 it changes by, "
             f"in percent: {others}. A largest value in a point does not exist: around a fixed point what the fluid "
             f"adds goes as a power of the distance of {exponents} (-1 for a force in a point).")
 
 
-def fixed(found: Body) -> np.ndarray:
-    """(k, 2) um, the fixed points."""
-    return found.outline.points[found.outline.fixed]
+def _changes(pair: tuple[Body, Body]) -> str:
+    """By how many percent the fluid changes the stress, in means over half of, over, and over twice the distance."""
+    return ", ".join(f"{changed(pair, part):.2g}" for part in (OTHER[0], APART, OTHER[1]))
+
+
+def _exponents(pair: tuple[Body, Body]) -> str:
+    """Around the fixed points."""
+    outline = pair[0].outline
+    return " and ".join(f"{exponent(*pair, place):.2f}" for place in outline.points[outline.fixed])
 
 
 def pressed(found: Body) -> Body:

@@ -14,7 +14,7 @@ from skfem import MeshTri
 from reference import neo_hookean
 from repro.errors import StageError
 from repro.fem.elements import GRADIENT_DEGREES
-from repro.fem.mesh import gradients, triangle_areas
+from repro.fem.mesh import triangle_areas
 from repro.fem.mesher import generate
 from repro.fem.outline import half_disc as seed
 from repro.fem.sizing import ACROSS_AGGREGATE, GRADATION, Sizing
@@ -22,7 +22,7 @@ from repro.model import growth
 from verification.claims import CLOSED, OF_SCHEME, Finding, at_least, at_most, between, claim, near, without_limit
 from verification.claims.levels import ALONE, WIDE_FINE, cached, current
 from verification.claims.runs import WIDE, bodies, series
-from verification.problems.bodies import Supported, moduli
+from verification.problems.bodies import Supported
 
 RADIUS = 5.0
 
@@ -98,8 +98,9 @@ def stabilised() -> Finding:
     the scheme sees of the pressure that it sees least. Without the stabilisation C = 0; with the sign of (27), -C.
     """
     own, regular = [half_disc(refinement) for refinement in OWN], [regular_half_disc(parts) for parts in REGULAR]
-    outline, pressure = (order(own, errors) for errors in zip(*(growth_errors(body, 1.0) for body in own)))
-    with_, without, printed = ([stability(body, factor) for body in regular] for factor in (1.0, 0.0, -1.0))
+    errors = np.array([growth_errors(body, 1.0) for body in own])
+    outline, pressure = (order(own, column) for column in errors.T)
+    with_, without, printed = (stabilities(regular, factor) for factor in (1.0, 0.0, -1.0))
     checks = (at_least("order of the outline", "convergent", outline, 1.7, "2 in theory; 1.7 for unrelated meshes"),
               at_least("order of the pressure", "convergent", pressure, 1.0, "1 in theory, in the mean square"),
               at_least("stability number, finest over coarsest mesh", "stable", with_[-1] / with_[0], 0.8,
@@ -120,7 +121,7 @@ def _told(own, regular, numbers) -> str:
     return (f"Stability numbers on regular meshes of {', '.join(str(len(body.reference)) for body in regular)} nodes: "
             f"with it {with_}, without {without}, with the sign of (27) {printed}. Growth on the second: without it "
             f"{attempt(regular[1], 0.0)}; with that sign {attempt(regular[1], -1.0)}. The package's unstructured "
-            f"meshes hide it: stability numbers {listed(stability(body, 0.0) for body in own[:3])} without it, errors "
+            f"meshes hide it: stability numbers {listed(stabilities(own[:3], 0.0))} without it, errors "
             f"of the pressure of {irregular}.")
 
 
@@ -147,9 +148,7 @@ def growth_errors(body: Sliding, factor: float) -> tuple[float, float]:
     """Mean-square errors, relative, of the outline's radius and of the pressure, the stabilisation times a factor."""
     start = growth.Equilibrium(body.reference, np.zeros(len(body.reference)), 0)
     theta = radial_theta(body, INNER, MORE)
-    stabilising = factor * growth.gradient_stabilisation(body.reference, body.triangles, np.ones(len(body.triangles)))
-    system = growth.System(body.body, body.held, stabilising=stabilising)
-    found = growth.reach(system, np.ones_like(theta), theta, start, body.reference)
+    found = growth.reach(stabilised_by(body, factor), np.ones_like(theta), theta, start, body.reference)
     R = np.minimum(np.hypot(*body.reference.T), RADIUS)
     rim = R > (1 - 1e-9) * RADIUS
     radius, pressure = (exact(R, INNER, MORE, RADIUS) for exact in (neo_hookean.cylinder_radius,
@@ -160,26 +159,32 @@ def growth_errors(body: Sliding, factor: float) -> tuple[float, float]:
             float(np.sqrt(weight @ (found.pressure - pressure) ** 2 / (weight @ pressure**2))))
 
 
+def stabilities(family: list[Sliding], factor: float) -> list[float]:
+    """The stability numbers of some bodies."""
+    return [stability(body, factor) for body in family]
+
+
 def stability(body: Sliding, factor: float) -> float:
     """Least eigenvalue of B K^-1 B^T + factor C against the pressure's mass matrix, at t = 0 (dense)."""
-    t, n, area = body.triangles, len(body.reference), areas(body)
-    slopes = gradients(body.reference, t)
-    tangent = moduli(np.tile(np.eye(2), (len(t), 1, 1)), np.zeros(len(t)))
-    K = np.einsum("t,tikjl,tak,tbl->taibj", area, tangent, slopes, slopes).reshape(len(t), 6, 6)
-    B = np.repeat((area[:, None, None] * slopes / 3).reshape(len(t), 1, 6), 3, axis=1)
-    C = factor * growth.gradient_stabilisation(body.reference, t, np.ones(len(t)))
-    M = area[:, None, None] * (np.ones((3, 3)) + np.eye(3)) / 12
-    places, free = np.stack([2 * t, 2 * t + 1], axis=2).reshape(len(t), 6), ~body.held.ravel()
-    stiffness = dense(K, places, places, 2 * n, 2 * n)[free][:, free]
-    divergence = dense(B, t, places, n, 2 * n)[:, free]
-    schur = divergence @ np.linalg.solve(stiffness, divergence.T) + dense(C, t, t, n, n)
-    return float(eigh(0.5 * (schur + schur.T), dense(M, t, t, n, n), eigvals_only=True, subset_by_index=[0, 0])[0])
+    n, of = len(body.reference), stabilised_by(body, factor)
+    whole = dense(of.tangent(body.reference, np.zeros(n)), of.unknowns)
+    M = dense(areas(body)[:, None, None] * (np.ones((3, 3)) + np.eye(3)) / 12, body.triangles)
+    free = ~body.held.T.ravel()
+    stiffness, divergence = whole[: 2 * n, : 2 * n][free][:, free], whole[2 * n:, : 2 * n][:, free]
+    schur = divergence @ np.linalg.solve(stiffness, divergence.T) - whole[2 * n:, 2 * n:]
+    return float(eigh(0.5 * (schur + schur.T), M, eigvals_only=True, subset_by_index=[0, 0])[0])
 
 
-def dense(elements: np.ndarray, rows: np.ndarray, columns: np.ndarray, height: int, width: int) -> np.ndarray:
-    """Sum of element matrices (t, a, b)."""
-    whole = np.zeros((height, width))
-    np.add.at(whole, (rows[:, :, None], columns[:, None, :]), elements)
+def stabilised_by(body: Sliding, factor: float) -> growth.System:
+    """The equations of a body whose stabilisation at t = 0 is multiplied by a factor."""
+    plain = growth.gradient_stabilisation(body.reference, body.triangles, np.ones(len(body.triangles)))
+    return growth.System(body.body, body.held, stabilising=factor * plain)
+
+
+def dense(elements: np.ndarray, unknowns: np.ndarray) -> np.ndarray:
+    """Sum of element matrices (t, a, a) of unknowns (t, a)."""
+    whole = np.zeros((unknowns.max() + 1,) * 2)
+    np.add.at(whole, (unknowns[:, :, None], unknowns[:, None, :]), elements)
     return whole
 
 
@@ -249,7 +254,9 @@ def expanded(exponent: float) -> Expanded:
     for t in TOTAL ** (np.arange(1, steps + 1) / steps):
         theta = radial_theta(body, t**exponent, t - t**exponent)
         found = growth.equilibrium(body.body, theta, position, pressure, body.held, body.reference)
-        position, pressure, iterations = found.position, found.pressure, iterations + found.iterations
+        position = found.position
+        pressure = found.pressure
+        iterations = iterations + found.iterations
     R = np.hypot(*body.reference.T)
     area = triangle_areas(position, body.triangles).sum() / areas(body).sum()
     return Expanded(float(np.hypot(*position[R > (1 - 1e-9) * RADIUS].T).mean()), area, float(pressure[np.argmin(R)]),

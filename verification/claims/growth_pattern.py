@@ -33,7 +33,9 @@ from verification.claims.runs import (
     stress,
 )
 
-PLOTTED, END, LAST_HOURS = 19.2, 19.4, 5.0
+PLOTTED = 19.2
+END = 19.4
+LAST_HOURS = 5.0
 
 
 def growth_rates(now: Pore, solved: Solved) -> np.ndarray:
@@ -143,7 +145,7 @@ def squeezed() -> Finding:
     outlines, after = [found.outline for found in bodies(WIDE)], rows["contact"] == 1
     beyond = max(max(0.0 - o.points[:, 1].min(), o.points[:, 1].max() - width) for o in outlines)
     slender = np.array([(o.downstream - o.upstream) / o.thickness for o in outlines])
-    surfaces = np.array([[contact_length(o, wall) for wall in (BOTTOM, TOP)] for o in outlines])
+    surfaces = np.array([(contact_length(o, BOTTOM), contact_length(o, TOP)) for o in outlines])
     rates = np.diff(surfaces[after], axis=0) / np.diff(rows["time_h"][after])[:, None]
     checks = (at_most("how far an outline leaves the channel (um)", "between the walls", beyond, 1e-9, "none"),
               at_most("largest length over thickness before contact", "half-disc: 2", slender[~after].max(),
@@ -169,7 +171,7 @@ def contact_length(outline: Outline, wall: int) -> float:
        fine=WIDE_FINE)
 def stays_half_disc() -> Finding:
     """Largest deviation of the interface from a half-disc of the same area around the middle of its base."""
-    base, wide = (np.array([100 * deviation(found.outline) for found in bodies(run)]) for run in (BASE, WIDE))
+    base, wide = (100 * np.array([*map(deviation, bodies(run))]) for run in (BASE, WIDE))
     rows, few = series(*WIDE), 100 * FEW
     before = rows["contact"] == 0
     checks = (at_most("base: largest deviation (% of R)", "half-disc", base.max(), few, "a few percent"),
@@ -188,8 +190,9 @@ def stays_half_disc() -> Finding:
                    reason="the deviation is not decided by these meshes")
 
 
-def deviation(outline: Outline) -> float:
+def deviation(found: Body) -> float:
     """Largest | r / R - 1 | over the free nodes, r from the lower contact surface's middle, R = (2 area / pi)^(1/2)."""
+    outline = found.outline
     low = outline.points[outline.wall == BOTTOM, 0]
     free = outline.points[outline.wall == FREE] - [0.5 * (low.min() + low.max()), 0.0]
     return float(np.abs(np.hypot(*free.T) / np.sqrt(2 * outline.area / np.pi) - 1).max())
@@ -211,7 +214,9 @@ def oxygen() -> Finding:
     The paper says it of decay, which (9)-(10) let go on in proportion to m_A = C_A / (C_A + K_s). Present is so taken
     as m_A >= 1/2, that is C_A >= K_s: decay then has at least half of the rate that it has with plenty of oxygen.
     """
-    base, wide, why = least(BASE, "acceptor"), least(WIDE, "acceptor"), "m_A >= 1/2: decay at half its rate, at least"
+    base = least(BASE, "acceptor")
+    wide = least(WIDE, "acceptor")
+    why = "m_A >= 1/2: decay at half its rate, at least"
     checks = (at_least("base: smallest C_A / K_s", "present", base.min(), 1.0, why),
               at_least("wide: smallest C_A / K_s", "present", wide.min(), 1.0, why),
               at_least("the smaller of both", "present", min(base.min(), wide.min()), np.finfo(float).tiny, "not zero"))
@@ -337,5 +342,6 @@ def after_contact() -> tuple[float, ...]:
 
 def conductivity_change(run: tuple[str, ...], times: tuple[float, ...]) -> float:
     """Change (%) of the conductivity when new biomass is born stress-free: geometric mean at some times (h)."""
-    ours, other = ([at((*run, *more), time)["conductivity_m_per_d"] for time in times] for more in ((), (STRESS_FREE,)))
-    return 100 * float(np.exp(np.mean(np.log(other) - np.log(ours))) - 1)
+    ratios = [at((*run, STRESS_FREE), time)["conductivity_m_per_d"] / at(run, time)["conductivity_m_per_d"]
+              for time in times]
+    return 100 * float(np.exp(np.mean(np.log(ratios))) - 1)

@@ -155,13 +155,16 @@ def truncation() -> Finding:
     checks = tuple(at_most(f"largest error at min(5 R, W), R = {radius:g} um (%)", "suffices",
                            found[REACHES.index(1.0)].max(), 0.5, "0.5 %: as little as the time step is to matter")
                    for radius, found in errors.items())
-    told = "; ".join(f"R = {radius:g} um: " + ", ".join(f"{part:g}: {'/'.join(f'{e:.2g}' for e in row)}"
-                                                         for part, row in zip(REACHES, found))
-                     for radius, found in errors.items())
+    told = "; ".join(f"R = {radius:g} um: {_listed(found)}" for radius, found in errors.items())
     return Finding(checks, reason="what is cut off matters by more than that",
                    note="Errors (%) of conductivity/acceptor effluent/donor effluent at parts of min(5 R, W): "
                    f"{told}. In the scheme of 2001 meshing all of the pore adds the error of linear elements in its "
                    "clean part, which is no truncation; that is its range.")
+
+
+def _listed(errors: np.ndarray) -> str:
+    """The three errors at each distance, in words."""
+    return ", ".join("{:g}: {:.2g}/{:.2g}/{:.2g}".format(part, *row) for part, row in zip(REACHES, errors))
 
 
 def _errors(said, radius: float) -> np.ndarray:

@@ -15,7 +15,6 @@ from __future__ import annotations
 import json
 import textwrap
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import zip_longest
 from math import inf, isfinite
@@ -37,7 +36,6 @@ from verification.claims import (
     outcome_of,
     verdict_of,
 )
-from verification.claims.base_run import Comparison
 from verification.claims.evaluate import unnumbered
 from verification.kernel import writing
 from verification.kernel.writing import Block, table
@@ -49,6 +47,9 @@ LEGEND = ("paper: as printed. ours: the converged solution, or the scheme where 
           "error bar; inputs: where the number goes as the inputs of Table 1 move within their rounding; scheme of "
           "2001: its range on three meshes. accepted: the interval of the printed digits, or what the words are taken "
           "for. An outcome is that of the whole bar.")
+
+
+INDEPENDENCE = "Mesh and time-step independence of base in the paper's scheme"
 
 
 @dataclass(frozen=True)
@@ -72,28 +73,10 @@ class Row:
         return "" if self.verdict in (REPRODUCED, CHANGED) or not self.finding else self.finding.reason
 
 
-@dataclass(frozen=True)
-class Independence:
-    """What does not come from the paper: comparisons of runs of its scheme, and the bounds that they must keep."""
-
-    comparisons: tuple[Comparison, ...]
-    checks: tuple[PaperCheck, ...]
-
-    @property
-    def kept(self) -> bool:
-        """Are all bounds kept?"""
-        return all(check.holds for check in self.checks)
-
-
-def moving(values: tuple[float, ...], moved: tuple[float, ...]) -> list[str]:
-    """Values, each but the first with its difference from the one before."""
-    return [number(values[0]), *(f"{number(v)} ({m:+.2f} %)" for v, m in zip(values[1:], moved))]
-
-
-def terminal_independence(section: Independence) -> str:
+def terminal_independence(checks: tuple[PaperCheck, ...]) -> str:
     """The bounds as lines."""
-    lines = [INDENT + f"{c.quantity}: {number(c.value)}, bound {c.paper}" for c in section.checks]
-    return "\n".join(["Mesh and time-step independence of base in the paper's scheme", *lines]) + "\n"
+    lines = [INDENT + f"{c.quantity}: {number(c.value)}, bound {c.paper}" for c in checks]
+    return "\n".join([INDEPENDENCE, *lines]) + "\n"
 
 
 def number(value: float) -> str:
@@ -121,9 +104,8 @@ def cells(check: PaperCheck) -> tuple[str, ...]:
 def _line(texts, widths: tuple[int, ...]) -> str:
     """Cells side by side, each wrapped in its column."""
     wrapped = [textwrap.wrap(text, width - 1) or [""] for text, width in zip(texts, widths)]
-    rows = zip_longest(*wrapped, fillvalue="")
-    return "\n".join(INDENT + "".join(f"{text:<{width}}" for text, width in zip(row, widths)).rstrip()
-                     for row in rows)
+    form = INDENT + "".join(f"{{:<{width}}}" for width in widths)
+    return "\n".join(form.format(*row).rstrip() for row in zip_longest(*wrapped, fillvalue=""))
 
 
 def _paragraph(label: str, text: str) -> str:
@@ -166,7 +148,8 @@ def summary(rows: list[Row]) -> str:
     """How many claims have each verdict, and what becomes of their numbers."""
     verdicts = Counter(row.verdict for row in rows)
     checks = [check for row in rows for check in row.checks]
-    outcomes, values = (Counter(check.outcome for check in chosen) for chosen in (checks, predicted(checks)))
+    outcomes = Counter(check.outcome for check in checks)
+    values = Counter(check.outcome for check in predicted(checks))
     named = [*VERDICTS, *(verdict for verdict in verdicts if verdict not in VERDICTS)]
     return "\n".join((
         f"{len(rows)} claims: " + "; ".join(f"{verdicts[verdict]} {verdict}" for verdict in named) + ".",
@@ -177,22 +160,14 @@ def summary(rows: list[Row]) -> str:
         "Table 1 are not among them."))
 
 
-def markdown(rows: list[Row], section: Independence) -> str:
-    """The whole report."""
+def markdown(rows: list[Row], checks: tuple[PaperCheck, ...]) -> str:
+    """The whole report; checks: of what does not come from the paper, that base does not hang on mesh and step."""
+    independence = ((c.quantity, c.paper, number(c.value) + ("" if c.holds else " FAILS")) for c in checks)
     blocks = [Block("text", summary(rows).replace("\n", "\n\n")), Block("text", LEGEND),
               table(("id", "claim", *HEAD[1:], "verdict"), map(_row, rows)), Block("heading", "Remarks"),
-              Block("text", "\n".join(_remarks(row) for row in rows if row.finding)), *_independence(section)]
+              Block("text", "\n".join(_remarks(row) for row in rows if row.finding)),
+              Block("heading", INDEPENDENCE), table(("what", "bound", "ours"), independence)]
     return f"# What the paper claims, judged by computed numbers\n\n{writing.markdown(blocks, 2)}\n"
-
-
-def _independence(section: Independence) -> Iterator[Block]:
-    yield Block("heading", "Mesh and time-step independence of base in the paper's scheme")
-    for comparison in section.comparisons:
-        yield Block("text", f"### {comparison.title}")
-        yield table(("", *comparison.runs),
-                    ((name, *moving(values, moved)) for name, values, moved in comparison.lines))
-    yield table(("what", "bound", "ours"), ((c.quantity, c.paper, number(c.value) + ("" if c.holds else " FAILS"))
-                                            for c in section.checks))
 
 
 def _row(row: Row) -> tuple[str, ...]:
@@ -264,10 +239,13 @@ def _of_claim(ours: dict, known: dict | None) -> list[str]:
     if known is None:
         return [f"{id}: not in the record"]
     told = [f"{id}: {ours['verdict']}, recorded as {known['verdict']}"] if ours["verdict"] != known["verdict"] else []
-    names = [[unnumbered(check["quantity"]) for check in each["checks"]] for each in (ours, known)]
-    if names[0] != names[1]:
+    if _quantities(ours) != _quantities(known):
         return [*told, f"{id}: other quantities than recorded"]
     return told + [line for pair in zip(ours["checks"], known["checks"]) for line in _of_check(id, *pair)]
+
+
+def _quantities(entry: dict) -> list[str]:
+    return [unnumbered(check["quantity"]) for check in entry["checks"]]
 
 
 def _of_check(id: str, ours: dict, known: dict) -> list[str]:

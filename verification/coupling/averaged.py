@@ -12,8 +12,10 @@ Supplies that change over time: starvation and recovery of an aggregate.
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
+from itertools import product
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -28,7 +30,7 @@ from repro.march.simulation import shaped, simulate
 from repro.model import flow, pore
 from repro.scene import Scene
 from verification.coupling import PRESETS, every
-from verification.kernel.case import Profile, at_least, at_most, between, case, study
+from verification.kernel.case import Profile, at_least, at_most, between, case, refine, studies, study
 from verification.problems import runs
 
 TIMES = (2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0, 19.4)
@@ -59,6 +61,10 @@ def base(*changes: str):
     checks += [at_most(f"{name}, a half-disc's loss", rest[name], bound, SQUARE_LAW)
                for name, bound in (("area", 0.013), ("effluents", 0.02), ("C along the pore", 0.02))]
     return checks, _histories(scene, instants, thin, own), runs.profiles(instants[5::2], own[5::2])
+
+
+#: What is compared of a run and its averaged pore.
+APART = ("area", "effluents", "C along the pore")
 
 
 def _apart(scene, instants, moments) -> dict[str, float]:
@@ -105,17 +111,17 @@ def half_disc_loss(width: float, length: float, ratio: float) -> CubicSpline:
     return CubicSpline([0.0, *RADII], found)
 
 
-def _histories(scene, instants, thin, own) -> list[Profile]:
+def _histories(scene, instants, thin, own) -> Iterator[Profile]:
     """Velocity, acceptor leaving and area against time."""
     rows, times = [results.row(scene, instant) for instant in instants], np.array(TIMES)
     quantities = (("velocity (m/d)", "mean_velocity_m_per_d", lambda m: runs.M_PER_D * m.velocity),
                   ("acceptor leaving (mg/L)", "effluent_acceptor_mg_per_L", lambda m: m.fields[0, -1]),
                   ("area (um2)", "aggregate_area_um2", lambda m: m.area))
-    return [Profile(label, "time (h)", label, (
-        ("ours", "ours", times, np.array([row[column] for row in rows])),
-        ("averaged, lubrication", "exact", times, np.array([pick(m) for m in thin])),
-        ("averaged, a half-disc's loss", "reference", times, np.array([pick(m) for m in own]))))
-        for label, column, pick in quantities]
+    for label, column, pick in quantities:
+        yield Profile(label, "time (h)", label, (
+            ("ours", "ours", times, np.array([row[column] for row in rows])),
+            ("averaged, lubrication", "exact", times, np.array([*map(pick, thin)])),
+            ("averaged, a half-disc's loss", "reference", times, np.array([*map(pick, own)]))))
 
 
 SQUARE = "regular perturbation in 1 / D: the square of the transverse Thiele number"
@@ -141,27 +147,23 @@ FASTER = (4.0, 16.0, 64.0, 256.0)
 def mixing(*changes: str):
     scene = runs.base("0 h", 'aggregate.radius="20 um"', *changes)
     scene = runs.at_velocity(scene, runs.SPEED)
-    found = [_leaving(scene, factor) for factor in FASTER]
-    sizes = [thiele(scene, factor) for factor in FASTER]
-    studies, checks = [], []
-    for k, name in enumerate(("acceptor", "donor")):
-        gaps = np.array([(ours - reference)[k] for ours, reference, _ in found])
-        theory = np.array([first[k] for _, _, first in found])
-        studies.append(study(f"effluent {name} (mg/L)", sizes, np.abs(gaps), 2, SQUARE, ceiling=2.5e-5))
-        checks.append(between(f"{name}: disagreement over first-order theory", gaps[-1] / theory[-1],
-                              0.995, 1.005, "the next order: 0.2 %, a quarter of that at D times 64; mesh: 0.7 % at "
-                              "refinement 1 of linear elements, less than half of that here"))
-    return checks, studies
+    gaps, theory = np.array([_leaving(scene, factor) for factor in FASTER]).transpose(1, 2, 0)
+    for name, gap, first in zip(("acceptor", "donor"), gaps, theory):
+        yield study(f"effluent {name} (mg/L)", [thiele(scene, factor) for factor in FASTER], np.abs(gap), 2, SQUARE,
+                    ceiling=2.5e-5)
+        yield between(f"{name}: disagreement over first-order theory", gap[-1] / first[-1], 0.995, 1.005,
+                      "the next order: 0.2 %, a quarter of that at D times 64; mesh: 0.7 % at refinement 1 of linear "
+                      "elements, less than half of that here")
 
 
 def _leaving(scene, factor: float):
-    """Effluents (2,) mg/L: ours, the averaged pore's, and the first-order difference."""
+    """(2, 2) mg/L: effluents, ours less the averaged pore's, and what they are to first order."""
     scene = runs.with_diffusivities(scene, lambda water, _: (factor * water, factor * water))
     row = results.row(scene, next(simulate(scene)))
     ours = [row["effluent_acceptor_mg_per_L"], row["effluent_donor_mg_per_L"]]
-    reference = runs.half_disc(scene).seed()
     radius = runs.half_disc_radius(row["aggregate_area_um2"])
-    return np.array(ours), reference.fields[:, -1], averaged_pore.excess(runs.pore_of(scene), radius, runs.SPEED)
+    return ours - runs.half_disc(scene).seed().fields[:, -1], averaged_pore.excess(runs.pore_of(scene), radius,
+                                                                                  runs.SPEED)
 
 
 SLOWER = (8.0, 16.0, 32.0, 64.0)
@@ -177,19 +179,12 @@ MIXING_TIMES = (5.0, 10.0, 15.0, 19.4)
       mutants=("rates-two-percent-low",), over=("paper", "accurate"),
       ways="1 2", because="fast: its own error in time would be seen; order 3: coupling-averaged-refined")
 def whole_run(preset: str):
-    """Checks, studies and pictures of one preset."""
-    found = {factor: _whole(preset, factor) for factor in (1.0, *SLOWER)}
-    scene, studies, checks = _base(preset, 1.0), [], []
-    sizes = [thiele(scene, factor) for factor in SLOWER]
-    for name in ("area", "effluents", "C along the pore"):
-        errors = [found[factor][0][name] for factor in SLOWER]
-        studies.append(study(f"{name}", sizes, errors, 2, SQUARE, ceiling=3e-4))
-        if name == "C along the pore":
-            continue
-        checks.append(between(f"base, {name}: over the square law through the first of these",
-                              found[1.0][0][name] / (SLOWER[0] * errors[0]), 1.0, 2.0,
-                              "terms of fourth order"))
-    return checks, studies, tuple(found[1.0][1])
+    """Checks and studies of one preset."""
+    errors, base = refine(_whole, SLOWER, preset), _whole(1.0, preset)
+    yield studies(errors, dict.fromkeys(APART, (2, SQUARE, 3e-4)))
+    for name in APART[:2]:
+        yield between(f"base, {name}: over the square law through the first of these",
+                      base[name] / (SLOWER[0] * errors[name][0]), 1.0, 2.0, "terms of fourth order")
 
 
 def _base(preset: str, factor: float):
@@ -199,12 +194,11 @@ def _base(preset: str, factor: float):
     return runs.at_velocity(scene, runs.SPEED)
 
 
-def _whole(preset: str, factor: float):
-    """(largest differences, profiles) of one run."""
+def _whole(factor: float, preset: str) -> dict[str, float]:
+    """Thiele number and largest differences of one run."""
     scene = _base(preset, factor)
-    instants = runs.ours(scene)
     moments = runs.half_disc(scene).run(MIXING_TIMES, accuracy=1e-6)
-    return _apart(scene, instants, moments), runs.profiles(instants, moments)
+    return {"size": thiele(_base(preset, 1.0), factor), **_apart(scene, runs.ours(scene), moments)}
 
 
 #: Refinement of our mesh, our time step (min), and cells of the averaged pore: as in the whole run, and twice as fine.
@@ -217,21 +211,19 @@ COARSE, FINE = (1.0, 12.0, 1), (2.0, 6.0, 2)
       claim="The disagreement with the averaged pore is that of the models: it stays when both codes are refined",
       mutants=("rates-at-the-start",), over=runs.ELEMENTS, ways="paper")
 def refined(elements: str):
-    (coarse, _), (fine, pictures) = (_piece(elements, *level) for level in (COARSE, FINE))
-    return pictures, [at_most(name, abs(fine[name] / coarse[name] - 1), 0.01,
-                              "error in space 0.1 % of what is lost, in time 0.2 % of an hour's growth")
-                      for name in ("area", "effluents", "C along the pore")]
+    coarse, fine = (_piece(elements, *level) for level in (COARSE, FINE))
+    return [at_most(name, abs(fine[name] / coarse[name] - 1), 0.01,
+                    "error in space 0.1 % of what is lost, in time 0.2 % of an hour's growth") for name in APART]
 
 
-def _piece(elements: str, refinement: float, minutes: float, finer: int):
-    """(differences, profiles) after 2 h."""
+def _piece(elements: str, refinement: float, minutes: float, finer: int) -> dict[str, float]:
+    """Differences after 2 h."""
     scene = runs.base("2 h", 'aggregate.radius="20 um"', runs.of(elements),
                       runs.coarser(elements, 0.45 * refinement, refinement),
                       f'growth.time_step="{minutes} min"')
     scene = runs.at_velocity(scene, runs.SPEED)
-    instants = runs.ours(scene)
     moments = runs.half_disc(scene, cells=finer * runs.CELLS, fluid=finer * runs.FLUID).run((2.0,))
-    return runs.apart(scene, instants[-1], moments[-1]), runs.profiles(instants, moments)
+    return runs.apart(scene, runs.last(scene), moments[-1])
 
 
 WIDTH, THICKNESS = 20.0, 5.0
@@ -249,14 +241,12 @@ THIN_SQUARE = "regular perturbation: the square of the aspect ratio"
             "downstream, up to the square of the aspect ratio",
       mutants=("growth-spread-evenly",), over=runs.ELEMENTS, ways="paper")
 def strip(elements: str):
-    found = [_strip(elements, aspect) for aspect in ASPECTS]
-    studies = [study(name, ASPECTS, [rows[name] for rows, *_ in found], 2, THIN_SQUARE, ceiling=4e-4)
-               for name in ("area", "effluents", "C along the pore")]
-    tips, lean, pictures = found[-1][1:]
-    return studies, pictures, [
-        at_most("ends of the thinnest, relative", tips, 1.5e-4, "stretches: as the square of the aspect ratio"),
-        between("how far it leans upstream, over the averaged pore's 0.27 %", lean, 0.97, 1.03,
-                "the same: 0.4 %, and as much for the step in time")]
+    errors = refine(_strip, ASPECTS, elements)
+    return (studies(errors, dict.fromkeys(APART, (2, THIN_SQUARE, 4e-4))),
+            at_most("ends of the thinnest, relative", errors["ends"][-1], 1.5e-4,
+                    "stretches: as the square of the aspect ratio"),
+            between("how far it leans upstream, over the averaged pore's 0.27 %", errors["lean"][-1], 0.97, 1.03,
+                    "the same: 0.4 %, and as much for the step in time"))
 
 
 def thin_scene(elements: str, aspect: float) -> Scene:
@@ -267,16 +257,16 @@ def thin_scene(elements: str, aspect: float) -> Scene:
     return replace(found, kinetics=replace(found.kinetics, maximum_density=DENSITY * aspect**2))
 
 
-def _strip(elements: str, aspect: float):
-    """Largest differences; of the ends, relative; (upstream over downstream length - 1) over the averaged one's;
-    profiles."""
+def _strip(aspect: float, elements: str) -> dict[str, float]:
+    """Aspect ratio; largest differences; of the ends, relative; (upstream over downstream length - 1) over the averaged
+    one's."""
     given = shaped(thin_scene(elements, aspect), half_ellipse(elements, aspect))
     area, instants = pore.seeded(given).outline.area, runs.ours(given)
     moments = strip_of(given, area, 2 * runs.CELLS).run(given.output.times)
     ends = np.array([(instants[-1].pore.outline.upstream, instants[-1].pore.outline.downstream), moments[-1].ends])
     ours, theirs = -ends[:, 0] / ends[:, 1] - 1
-    return (_apart(given, instants, moments), np.abs(ends[0] / ends[1] - 1).max(), ours / theirs,
-            runs.profiles(instants, moments))
+    return {"size": aspect, **_apart(given, instants, moments), "ends": np.abs(ends[0] / ends[1] - 1).max(),
+            "lean": ours / theirs}
 
 
 def strip_of(given: Scene, area: float, cells: int) -> averaged_pore.Averaged:
@@ -297,7 +287,10 @@ def bump(half_length: float, shape, edges: int) -> np.ndarray:
     return np.column_stack([half_length * np.cos(angle), runs.on_wall(shape(np.cos(angle)))])
 
 
-LOW, LONG, RATIO, LENGTH = 8.0, 40.0, 2000.0, 600.0
+LOW = 8.0
+LONG = 40.0
+RATIO = 2000.0
+LENGTH = 600.0
 SLENDER = (0.25, 0.177, 0.125, 0.0884)
 
 
@@ -349,25 +342,24 @@ PECLETS, DENSITIES = (0.1, 1.0, 5.0), (1e6, 3e6, 1e7)
             "0.1, 1, 5 and three densities, from 99 % to 1 % of the acceptor leaving",
       mutants=("inlet-held", "seed-too-thin"), over=runs.ELEMENTS, ways="paper")
 def uptake(elements: str):
-    found = [_around(elements, aspect) for aspect in UPTAKE_ASPECTS]
-    studies = [study(f"Pe = {peclet:g}, X = {density:g} mg/L", UPTAKE_ASPECTS,
-                     [rows[peclet, density][0] for rows in found], 2, THIN_SQUARE, ceiling=1e-3)
-               for peclet, density in found[0]]
-    thinnest = [profile for _, profile in found[-1].values()]
-    left = min(profile.curves[0][3][-1] for profile in thinnest) / 10.0
-    starved = at_most("acceptor leaving the starved one, over the supply", left, 0.02, "else none is starved")
-    return studies, thinnest, starved
+    errors = refine(_around, UPTAKE_ASPECTS, elements)
+    left = errors.pop("left")[-1]
+    return (studies(errors, {name: (2, THIN_SQUARE, 1e-3) for name in errors if name != "size"}),
+            at_most("acceptor leaving the starved one, over the supply", left, 0.02, "else none is starved"))
 
 
-def _around(elements: str, aspect: float) -> dict:
-    """{(Peclet, density): (largest difference, profile)} on one mesh."""
+def _around(aspect: float, elements: str) -> dict[str, float]:
+    """The largest difference for each Peclet number and density on one mesh, and the least acceptor left."""
     now = pore.seeded(shaped(thin_scene(elements, aspect), half_ellipse(elements, aspect)))
-    return {(peclet, density): _compared(elements, aspect, now, peclet, density)
-            for peclet in PECLETS for density in DENSITIES}
+    found = {f"Pe = {peclet:g}, X = {density:g} mg/L": _compared(thin_scene(elements, aspect), aspect, now, peclet,
+                                                                  density)
+             for peclet, density in product(PECLETS, DENSITIES)}
+    return {"size": aspect, **{name: gap for name, (gap, _) in found.items()},
+            "left": min(left for _, left in found.values())}
 
 
-def _compared(elements: str, aspect: float, now: pore.Pore, peclet: float, density: float) -> tuple[float, Profile]:
-    scene = thin_scene(elements, aspect)
+def _compared(scene: Scene, aspect: float, now: pore.Pore, peclet: float, density: float) -> tuple[float, float]:
+    """The largest difference, and the acceptor left at the end of the mesh, over the supply."""
     speed = peclet * scene.substrates.acceptor.diffusivity * aspect / THICKNESS
     dense = replace(scene.kinetics, maximum_density=density * aspect**2)
     scene = runs.at_velocity(replace(scene, kinetics=dense), speed)
@@ -376,10 +368,7 @@ def _compared(elements: str, aspect: float, now: pore.Pore, peclet: float, densi
     ours = runs.section_means(now, pore.solve(scene, now), x)
     moment = strip_of(scene, now.outline.area, round(16 / aspect)).seed()
     theirs = np.stack([np.interp(x, moment.x, field) for field in moment.fields])
-    curves = [(name, kind, x, field) for kind, both in (("ours", ours), ("reference", theirs))
-              for name, field in zip(("C_A", "C_D") if kind == "ours" else ("averaged", "averaged"), both)]
-    return (float(np.abs(ours - theirs).max()) / 10.0,
-            Profile(f"Pe = {peclet:g}, X = {density:g} mg/L", "x (um)", "C (mg/L)", tuple(curves)))
+    return float(np.abs(ours - theirs).max()) / 10.0, float(ours[0, -1]) / 10.0
 
 
 #: Diffusivities are so many times those of the paper: the averaged pore's own error falls as their inverse.
@@ -391,7 +380,9 @@ COURSES = {"steps": ((2.0, 10.0, 10.0), (4.5, 0.0, 0.0), (7.0, 10.0, 10.0)),
 ROWS = (1.0, 2.0, 3.3, 4.5, 5.7, 7.0)
 ACCEPTOR = 10.0
 #: Cells of the averaged pore, and its accuracy: C is nearly even here. Twice as many cells change the area by 7e-6.
-CELLS, FLUID, ACCURACY = 16, 48, 1e-5
+CELLS = 16
+FLUID = 48
+ACCURACY = 1e-5
 THIELE = "the square of the transverse Thiele number: 1.2 % of the area of base over 64; and as much for the elements"
 #: Bounds where the supply jumps, and where it changes evenly, by preset; cubic: fast with cubic elements.
 HALF = "half of the {} that the preset may err by"
@@ -417,7 +408,7 @@ def supply(how: str, bound: float, origin: str, *changes: str):
     instants = runs.ours(made)
     moments = _fed(how, changes[0])
     worst = _apart(made, instants, moments)
-    yield [at_most(name, worst[name], bound, origin) for name in ("area", "effluents", "C along the pore")]
+    yield [at_most(name, worst[name], bound, origin) for name in APART]
     areas = [moment.area for moment in moments]
     if how == "steps":
         yield at_least("area at 2 h over that at 4.5 h", areas[1] / areas[3], 1.005,

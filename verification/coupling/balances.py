@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -25,8 +26,8 @@ from repro.march.loop import Instant, Ledger
 from repro.march.simulation import simulate
 from repro.model import pore, remeshing
 from repro.scene import Kinetics, Scene
-from verification.coupling import every, kinds
-from verification.kernel.case import Profile, Study, at_least, at_most, between, case, study
+from verification.coupling import every
+from verification.kernel.case import Check, Study, at_least, at_most, between, case, study
 from verification.problems import aggregates, runs
 
 #: Steps twice as long as the paper's.
@@ -49,9 +50,7 @@ def ledger(area: float, density: float, remeshes: float, *changes: str):
     rows, last = instants[-1].ledgers, instants[-1].pore
     made = sum(row.biomass_made for row in rows)
     total = scene.kinetics.maximum_density * last.outline.area
-    return [at_most("substrates", substrates(rows), 1e-10, "Newton's tolerance, 1e-13 of the largest term of "
-                    "each row, over all rows"),
-            at_most("biomass, worst step", biomass(rows), 1e-10, runs.ROUND_OFF),
+    return [_steps(rows, "Newton's tolerance, 1e-13 of the largest term of each row, over all rows"),
             at_most("biomass, whole run", abs((rows[0].biomass_before + made) / rows[-1].biomass_after - 1),
                     1e-10, runs.ROUND_OFF),
             at_most("X_m times the area", abs(total / rows[-1].biomass_after - 1), area,
@@ -61,50 +60,20 @@ def ledger(area: float, density: float, remeshes: float, *changes: str):
             at_least("remeshes", instants[-1].remeshes, remeshes, "else they are not tested")]
 
 
-def substrates(rows) -> float:
-    """The worst of in - out - consumed over in."""
-    return max(abs(s - out - used) / s for row in rows for s, out, used in zip(row.supplied, row.out, row.consumed))
-
-
-def biomass(rows) -> float:
-    """The worst of before + made - after over after, and of one step's end against the next one's start."""
-    steps = [abs((row.biomass_before + row.biomass_made) / row.biomass_after - 1) for row in rows]
-    return max(steps + [abs(two.biomass_before / one.biomass_after - 1) for one, two in zip(rows, rows[1:])])
+def _steps(rows: list[Ledger], why: str) -> list[Check]:
+    """The worst of both substrates; of the biomass, and of one step's end against the next one's start."""
+    biomass = [_biomass(row) for row in rows]
+    biomass += [abs(two.biomass_before / one.biomass_after - 1) for one, two in pairwise(rows)]
+    return [at_most("substrates", max(map(_substrates, rows)), 1e-10, why),
+            at_most("biomass, worst step", max(biomass), 1e-10, runs.ROUND_OFF)]
 
 
 STEPS = (0.8, 0.4, 0.2, 0.1)
 
 
-@case("coupling-yield", kind="property",
-      norm="biomass made over the yield of the substrates, less 1; base from 20 um to 1.6 h, steps of 0.8 to 0.1 h",
-      claim="The biomass made is Y times the donor consumed, less f_d of what decays, which the acceptor's demand "
-            "beyond F times the donor tells: the ledgers agree to second order in the step",
-      mutants=("euler-biomass", "rates-at-the-start", "rates-two-percent-low", "decay-leaves-all"),
-      over=kinds(0.3), ways="paper", because="fast, accurate: to round-off, coupling-one-balance")
-def yields(*changes: str):
-    """The size of the defect, and its order."""
-    defects = [_yield_defect(step, *changes) for step in STEPS]
-    return (between("at 0.1 h, over (a step's growth)^2 / 12", defects[-1] / _trapezoid(STEPS[-1]), 0.7,
-                    1.3, "the trapezoidal rule on an exponential; its rate falls by 30 % as the pore clogs"),
-            study("yield", STEPS, np.abs(defects), 2, "Heun's method, and the trapezoidal rule on what is "
-                  "consumed: second order", ceiling=4e-5, band=0.1))
-
-
-def _scene(step: float, *changes: str) -> Scene:
-    return runs.base("1.6 h", 'aggregate.radius="20 um"', f'growth.time_step="{step} h"', *changes)
-
-
-def _yield_defect(step: float, *changes: str) -> float:
-    scene = _scene(step, *changes)
-    law, rows = scene.kinetics, runs.last(scene).ledgers
-    acceptor, donor = np.sum([row.consumed for row in rows], axis=0)
-    decayed = (acceptor - law.acceptor_to_donor_ratio * donor) / law.decay_oxygen_demand
-    return float(1 - sum(row.biomass_made for row in rows) / (law.yield_coefficient * donor - decayed))
-
-
 def _trapezoid(step: float) -> float:
     """(r step)^2 / 12 at the supply's rate of growth r."""
-    return (runs.growth_rates(_scene(step))[0] * step) ** 2 / 12
+    return (runs.growth_rates(runs.base("1.6 h"))[0] * step) ** 2 / 12
 
 
 REFINEMENTS = (0.7, 1.0, 1.4, 2.0)
@@ -154,27 +123,6 @@ def _restored(*changes: str) -> tuple[float, float]:
 CLOSED, CLOSES = 1e-9, "identities of the discrete equations: round-off and Newton's tolerance, with room"
 #: How long (h) a run goes on after contact.
 PAST = 2.0
-
-
-#: The runs that are judged: base and a narrow pore by preset, a short run by scheme and elements.
-BALANCED = {**{f"base, {preset}": ("base", preset) for preset in runs.PRESETS},
-            **{f"40 um, {preset}": ("narrow", preset) for preset in runs.PRESETS},
-            **{f"{told}, {kind}": (way, kind) for kind in runs.ELEMENTS
-               for told, way in (("midpoint rule", "midpoint"), ("gear", "gear"), ("updates", "updates"))},
-            "updates of base, paper": ("order", "paper")}
-
-
-@case("coupling-one-balance", kind="property", slow=True,
-      norm="worst ledger step, all at once: |supplied - out - consumed - stored| over supplied, |after - before - "
-           "made| over after, |made - (Y donor - (acceptor - F donor) / d_c)| over the larger of its two terms; base, "
-           "and a pore of 40 um at 2.9 m/d from a seed to 2 h past contact",
-      claim="In every step what is supplied leaves, is consumed or stored, what is there is what was and what is made, "
-            "and what is made is what the substrates taken up are worth: to round-off by the midpoint rule, to second "
-            "order by the paper's updates, in whole base to 2e-4 in a step of 12 min",
-      mutants=("biomass-of-the-start-takes-up", "remesh-half-way-unmatched", "masses-of-the-start-kept",
-               "flows-of-the-start"), over=BALANCED)
-def one_balance(which: str, preset_or_elements: str):
-    return JUDGED[which](preset_or_elements)
 
 
 def defects(law: Kinetics, ledgers: Iterable[Ledger]) -> np.ndarray:
@@ -262,14 +210,9 @@ def _short(elements: str, *changes: str) -> Scene:
     return runs.base("1.6 h", runs.of(elements), 'aggregate.radius="20 um"', *changes, "numerics.refinement=0.5")
 
 
-def _of_midpoints(elements: str) -> list:
-    scene = _short(elements, runs.by("fast"))
-    return _closed(scene, _ledgers(simulate(scene)))
-
-
-def _of_gear(elements: str) -> list:
-    """Checks of the paper's transient scheme."""
-    scene = _short(elements, 'numerics.transport="gear"')
+def _of_short(elements: str, change: str) -> list:
+    """Checks of the midpoint rule, or of the paper's transient scheme."""
+    scene = _short(elements, change)
     return _closed(scene, _ledgers(simulate(scene)))
 
 
@@ -285,8 +228,29 @@ def _order(found: Iterable[tuple[Scene, list[Ledger]]]) -> Study:
     return study("made against taken up", STEPS, errors, 2, HEUN, ceiling=4e-5, band=0.15)
 
 
-JUDGED = {"base": _of_base, "narrow": _of_narrow, "midpoint": _of_midpoints, "gear": _of_gear, "updates": _of_updates,
-          "order": _of_updates_of_base}
+#: The runs that are judged: base and a narrow pore by preset, a short run by scheme and elements.
+BALANCED = {**{f"base, {preset}": (_of_base, preset) for preset in runs.PRESETS},
+            **{f"40 um, {preset}": (_of_narrow, preset) for preset in runs.PRESETS},
+            **{f"{told}, {kind}": (judge, kind, *change) for kind in runs.ELEMENTS
+               for told, judge, *change in (("midpoint rule", _of_short, runs.by("fast")),
+                                            ("gear", _of_short, 'numerics.transport="gear"'),
+                                            ("updates", _of_updates))},
+            "updates of base, paper": (_of_updates_of_base, "paper")}
+
+
+@case("coupling-one-balance", kind="property", slow=True,
+      norm="worst ledger step, all at once: |supplied - out - consumed - stored| over supplied, |after - before - "
+           "made| over after, |made - (Y donor - (acceptor - F donor) / d_c)| over the larger of its two terms; base, "
+           "and a pore of 40 um at 2.9 m/d from a seed to 2 h past contact",
+      claim="In every step what is supplied leaves, is consumed or stored, what is there is what was and what is made, "
+            "and what is made is what the substrates taken up are worth: to round-off by the midpoint rule, to second "
+            "order by the paper's updates, in whole base to 2e-4 in a step of 12 min",
+      mutants=("biomass-of-the-start-takes-up", "remesh-half-way-unmatched", "masses-of-the-start-kept",
+               "flows-of-the-start", "euler-biomass", "rates-at-the-start", "rates-two-percent-low",
+               "decay-leaves-all"), over=BALANCED)
+def one_balance(judge, *given: str):
+    return judge(*given)
+
 
 #: What the presets are for, in all; three times that in a single step.
 RIGHT = {"fast": 1e-2, "accurate": 1e-3}
@@ -304,21 +268,18 @@ IN_A_STEP = 3.0
                                                           for kind in ("linear", "cubic")}},
       ways="2", because="paper has no tolerance of its steps")
 def amounts(preset: str, *changes: str):
-    """Checks and a picture of one preset."""
+    """Checks of one preset."""
     scene = runs.base("19.4 h", runs.by(preset), *changes)
     shorter = runs.base("19.4 h", runs.by(preset), *changes, f"numerics.tolerance={scene.numerics.tolerance / 100}")
     (times, ours), (fine, theirs) = (_cumulated(one) for one in (scene, shorter))
     there = CubicSpline(fine, theirs)(times)
     in_all, in_a_step = np.abs(ours[-1] / there[-1] - 1), np.abs(np.diff(ours, axis=0) / np.diff(there, axis=0) - 1)
-    checks, bound = [], RIGHT[preset]
     for k, name in enumerate(("acceptor", "donor")):
-        checks += [at_most(f"{name} in all", in_all[k], bound, "what the preset is for"),
-                   at_most(f"{name} in a step", in_a_step[:, k].max(), IN_A_STEP * bound,
-                           "three times what the preset is for")]
-    checks.append(at_least("steps, of the other run over these", len(fine) / len(times), 6.0,
-                           "tolerance to the power 1/2, ten; fewer where a step ends with the run"))
-    return checks, Profile("acceptor consumed", "time (h)", "um2 mg/L",
-                           (("ours", "ours", times, ours[:, 0]), ("shorter steps", "reference", fine, theirs[:, 0])))
+        yield at_most(f"{name} in all", in_all[k], RIGHT[preset], "what the preset is for")
+        yield at_most(f"{name} in a step", in_a_step[:, k].max(), IN_A_STEP * RIGHT[preset],
+                      "three times what the preset is for")
+    yield at_least("steps, of the other run over these", len(fine) / len(times), 6.0,
+                   "tolerance to the power 1/2, ten; fewer where a step ends with the run")
 
 
 def _cumulated(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
@@ -326,9 +287,6 @@ def _cumulated(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     ledgers = _ledgers(simulate(scene))
     consumed = np.cumsum([step.consumed for step in ledgers], axis=0)
     return np.array([0.0, *(step.end for step in ledgers)]), np.vstack([np.zeros(2), consumed])
-
-
-AREA = "J = theta to the stabilisation"
 
 
 @case("coupling-contact", kind="property",
@@ -340,16 +298,17 @@ def contact(*changes: str):
     scene = runs.base("0.6 h", 'pore.width="20 um"', 'aggregate.radius="17.9 um"', *changes,
                       times='"0.2 h", "0.4 h", "0.6 h"')
     instants = list(simulate(runs.at_velocity(scene, runs.SPEED)))
-    rows = [row for instant in instants for row in instant.ledgers]
-    last = instants[-1].pore
-    total = scene.kinetics.maximum_density * last.outline.area
-    checks = [at_most("substrates", substrates(rows), 1e-10, "Newton's tolerance"),
-              at_most("biomass, worst step", biomass(rows), 1e-10, runs.ROUND_OFF),
-              at_most("X_m times the area", abs(total / rows[-1].biomass_after - 1), 3e-6, AREA),
-              at_least("narrowest gap over the least allowed", _narrowest(scene, last, TOP), 1 - 1e-9,
-                       "2 um, or 16.7 degrees beside contact"),
-              between("parts of the fluid", _parts(last.mesh), 1.9, 2.1, "a plug")]
-    return checks, _outlines(instants)
+    rows, last = _ledgers(instants), instants[-1].pore
+    return [_steps(rows, "Newton's tolerance"), _area(scene, instants[-1]),
+            at_least("narrowest gap over the least allowed", _narrowest(scene, last, TOP), 1 - 1e-9,
+                     "2 um, or 16.7 degrees beside contact"),
+            between("parts of the fluid", _parts(last.mesh), 1.9, 2.1, "a plug")]
+
+
+def _area(scene: Scene, last: Instant) -> Check:
+    total = scene.kinetics.maximum_density * last.pore.outline.area
+    return at_most("X_m times the area", abs(total / last.ledgers[-1].biomass_after - 1), 3e-6,
+                   "J = theta to the stabilisation")
 
 
 @case("coupling-wedge", kind="property",
@@ -360,13 +319,9 @@ def wedge(*changes: str):
     scene = runs.base("0.2 h", *changes)
     instants = list(simulate(scene, _disc(20.0, 19.8, 60 * scene.numerics.geometry)))
     gaps = [_narrowest(scene, instant.pore, BOTTOM) for instant in instants]
-    total = scene.kinetics.maximum_density * instants[-1].pore.outline.area
-    checks = [at_most("narrowest gap over the least allowed, seed", gaps[0], 0.9,
-                      "8 degrees are under 16.7"),
-              at_least("the same after a step", gaps[1], 1 - 1e-9, "2 um, or 16.7 degrees beside contact"),
-              at_most("X_m times the area", abs(total / instants[-1].ledgers[-1].biomass_after - 1), 3e-6,
-                      AREA)]
-    return checks, _outlines(instants)
+    return [at_most("narrowest gap over the least allowed, seed", gaps[0], 0.9, "8 degrees are under 16.7"),
+            at_least("the same after a step", gaps[1], 1 - 1e-9, "2 um, or 16.7 degrees beside contact"),
+            _area(scene, instants[-1])]
 
 
 def _disc(radius: float, height: float, edges: int) -> np.ndarray:
@@ -395,10 +350,3 @@ def _parts(mesh) -> int:
     links = (np.ones(corners.size), (corners.ravel(), np.roll(corners, 1, axis=1).ravel()))
     labels = connected_components(coo_array(links, shape=2 * (len(mesh.points),)), directed=False)[1]
     return len(np.unique(labels[mesh.topology.fluid]))
-
-
-def _outlines(instants) -> Profile:
-    """The outlines, closed."""
-    loops = [(instant.pore.time, instant.pore.outline.points) for instant in instants]
-    return Profile("outlines", "x (um)", "y (um)", tuple(
-        (f"{time:g} h", "ours", *np.vstack([loop, loop[:1]]).T) for time, loop in loops))

@@ -13,9 +13,8 @@ from scipy.integrate import simpson
 from skfem.quadrature import get_quadrature_tri
 
 from reference import layered_channel
-from repro.fem import elements
-from repro.fem.elements import derivatives, values
-from repro.fem.mesh import Mesh, curved
+from repro.fem.elements import ON_EDGE, derivatives, values
+from repro.fem.mesh import Mesh
 from repro.fem.newton import relative
 from repro.fem.outline import FREE, Outline, slopes
 from repro.fem.space import Space
@@ -24,8 +23,8 @@ from repro.model import contact, flow, growth, mesh_motion, pore, traction
 from repro.model.flow import Flow
 from verification.coupling import every
 from verification.flow import closed_forms
-from verification.kernel.case import at_least, at_most, between, case, refine, study
-from verification.problems import meshes, runs
+from verification.kernel.case import at_least, at_most, between, case, refine, studies, study
+from verification.problems import runs
 
 FORMS = ("laplacian", "traction")
 #: Every kind of elements on the paper's mesh, and the presets on theirs.
@@ -78,7 +77,9 @@ def balance(*changes: str):
 def _by_biomass(scene, now: pore.Pore, found: Flow) -> np.ndarray:
     """(N, 2) um2 of head: forces of the biomass' triangles, lambda times as viscous, triangle by triangle."""
     viscosity = scene.flow.viscosity_ratio * scene.flow.kinematic_viscosity / scene.flow.gravity
-    mesh, space, pressure = now.mesh, now.space, flow.pressure_space(now.space)
+    mesh = now.mesh
+    space = now.space
+    pressure = flow.pressure_space(now.space)
     total = np.zeros_like(mesh.points)
     for cell in np.flatnonzero(mesh.biomass):
         nodes = mesh.cells[cell]
@@ -141,22 +142,23 @@ def layer(order: int):
     if order > 1:
         return at_most("shear", abs(_shear(Space(closed_forms._long_layer(), order))), 1e-5,
                        "both parabolas are held; what is left of the layer's ends")
-    errors = refine(lambda level: meshes.root_mean_square(lambda draw: {"shear": _shear_error(level, draw)},
-                                                          LAYER_DRAWS[level]), range(len(closed_forms.SIZES)))
-    return study("shear", closed_forms.SIZES, errors["shear"], 2, "forces as residuals of linear elements: second "
-                 "order, as the flux", ceiling=1e-3)
+    return studies(refine(_shear_error, LAYER_DRAWS), {
+        "shear": (2, "forces as residuals of linear elements: second order, as the flux", 1e-3)})
 
 
-LAYER_DRAWS = (16, 12, 6, 2)
+#: How many meshes of each level.
+LAYER_DRAWS = dict(enumerate((16, 12, 6, 2)))
 
 
-def _shear_error(level: int, draw: int) -> float:
-    return _shear(Space(closed_forms._grid(level, draw), 1))
+def _shear_error(level: int, draw: int) -> dict[str, float]:
+    return {"size": closed_forms.SIZES[level], "shear": _shear(Space(closed_forms._grid(level, draw), 1))}
 
 
 def _shear(space: Space) -> float:
     """Relative error of the mean shear on the middle of the layer."""
-    mesh, ratio, half = space.mesh, 2000.0, 40.0
+    mesh = space.mesh
+    ratio = 2000.0
+    half = 40.0
     found = flow.unit_flow(space, ratio)
     as_flow = Flow(1.0, found.velocity, found.pressure, found.correction, 1.0, 1.0, 1.0)
     on = traction.nodal(space, as_flow, 1.0, "laplacian")
@@ -200,44 +202,6 @@ def _move_in_base(hours: int, *changes: str) -> float:
         grown, _, _ = updates.make_biomass(scene, found.pore, found.solved, 0.4)
         shapes.append(contact.expand(scene, grown, updates.enlarged(scene, found.pore, grown))[0])
     return float(np.abs(shapes[1].mesh.points - shapes[0].mesh.points).max() / shapes[0].outline.thickness)
-
-
-@case("coupling-traction-stretch", kind="exact", norm="relative error of positions; of P over mu_L",
-      claim="A block on a wall that is pulled at both sides stretches as a neo-Hookean body does, a - a^-3 = T / mu_L, "
-            "and keeps its area, on any mesh",
-      mutants=("forces-pushed", "forces-halved"),
-      over={f"a = {a:g}, order {order}": (order, a) for order in (1, 2, 3) for a in (0.8, 1.01, 1.5)})
-def stretch(order: int, factor: float):
-    """Checks of a block of linear or quadratic displacements: those of order 3 are integrated further."""
-    points, triangles = meshes.rectangle((-20.0, 20.0), 15.0, 4.0, seed=2)
-    points[np.argmin(np.hypot(*points.T)), 0] = 0.0
-    mesh = Mesh.of(points, triangles, np.ones(len(triangles), bool), np.empty(0, int), 15.0, (-20.0, 20.0))
-    mesh = mesh if order == 1 else curved(mesh, None)
-    where = mesh.points
-    held = np.zeros((len(where), 2), bool)
-    held[where[:, 1] == 0, 1] = True
-    held[np.flatnonzero((where == 0).all(axis=1)), 0] = True
-    body = growth.Body(growth.Shape(mesh.cells, mesh.corners, elements.GRADIENT_DEGREES[order]), where)
-    forces = (factor - factor**-3) * (_ends(mesh, 20.0) - _ends(mesh, -20.0))
-    found = growth.equilibrium(body, np.ones_like(body.at.dx), where, np.zeros(mesh.corners), held, where,
-                               forces=forces)
-    apart = np.abs(found.position - where * [factor, 1 / factor]).max() / 20.0
-    pressure = (factor**2 + factor**-2 + 1) / 3 - factor**-2
-    return [at_most("places", apart, 1e-9, "linear displacement: Newton's tolerance"),
-            at_most("P", np.abs(found.pressure - pressure).max(), 1e-9, "even: as before")]
-
-
-def _ends(mesh: Mesh, side: float) -> np.ndarray:
-    """(N, 2): lengths of a side's edges shared between their nodes, along x: halves, or a sixth, two thirds and a sixth
-    where there are middles."""
-    share = np.zeros_like(mesh.points)
-    nodes = np.flatnonzero(mesh.points[:, 0] == side)
-    nodes = nodes[np.argsort(mesh.points[nodes, 1])]
-    part = np.array([0.5, 0.5]) if mesh.geometry == 1 else np.array([1.0, 4.0, 1.0]) / 6
-    for first in range(0, len(nodes) - 1, mesh.geometry):
-        edge = nodes[first: first + mesh.geometry + 1]
-        share[edge, 0] += part * np.ptp(mesh.points[edge, 1])
-    return share
 
 
 @case("coupling-traction-even", kind="exact",
@@ -286,7 +250,7 @@ def _normals(outline: Outline) -> np.ndarray:
     t, weight = 0.5 * (1 + t), 0.5 * weight
     tangent = first[:, None] + t[:, None] * bend[:, None]
     normal = np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1) * weight[:, None]
-    share = _shares(outline.geometry, t)
+    share = values(outline.geometry, np.column_stack([t, 0 * t]))[:, ON_EDGE[outline.geometry]]
     local = np.einsum("qa,mqi->mai", share, normal)
     count, step = len(outline.points), outline.geometry
     total = np.zeros((count, 2))
@@ -294,13 +258,6 @@ def _normals(outline: Outline) -> np.ndarray:
     for edge in np.flatnonzero(wet):
         total[(step * edge + np.arange(step + 1)) % count] += local[edge]
     return total
-
-
-def _shares(geometry: int, t: np.ndarray) -> np.ndarray:
-    """(q, geometry + 1) the functions of an edge's nodes at t."""
-    if geometry == 1:
-        return np.column_stack([1 - t, t])
-    return np.column_stack([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)])
 
 
 FACTORS = (800.0, 400.0, 200.0, 100.0)

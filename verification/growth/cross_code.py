@@ -22,17 +22,18 @@ import numpy as np
 
 from reference import manufactured_growth, quadratic_growth
 from reference.quadratic_growth import Contact
-from repro.fem import transfer
 from repro.model import growth
 from verification.growth import closed_forms
-from verification.kernel.case import BAND, Check, Profile, Study, at_most, between, case, refine, study
+from verification.kernel.case import BAND, Check, Profile, at_most, between, case, refine, studies, study
 from verification.problems import bodies
 from verification.problems.bodies import Supported
 
 #: Ours, by refinement; the reference on each level, by rings. 90 and 135 degrees have a node on all of them. Curved
 #: triangles of ours, whose refinements are the second ones, are compared with the last level alone.
 REFINEMENTS, RINGS = {1: (0.75, 1.35, 2.4, 4.05), 2: (0.3, 0.5, 0.8, 1.3)}, (4, 7, 12, 20)
-MODULUS, FRONT, CONTRAST = 0.01, 36.0, 10.0
+MODULUS = 0.01
+FRONT = 36.0
+CONTRAST = 10.0
 #: The upper wall (um), and how often the reference is refined towards the ends of the contact.
 CONTACT, TOWARDS = Contact(np.pi / 2, 3 * np.pi / 4, 65.0), 3
 PLACE = "the lower of the two orders: linear elements, second order (quadratic ones: third)"
@@ -126,68 +127,40 @@ def _points():
     return where, weight
 
 
-def _study(found: dict, field: str, ceiling: float) -> Study:
-    order, why = (2, PLACE) if field == "place" else (1.75, PRESSURE)
-    return study(field, found["size"], found[field], order, why, ceiling=ceiling)
-
-
-@dataclass(frozen=True)
-class Compared:
-    """A problem, its field of pressures that has an order, and by kind the most that the last differences may be."""
-
-    problem: str
-    pressure: str
-    ceilings: dict[int, tuple[float, float]]
-
-
-def _curved(found: dict, of: Compared):
+def _curved(found: dict, problem: str, pressure: str, ceilings: tuple[float, float]):
     """Curved triangles of ours against the last level of the reference: the last differences, and, without a contact's
     ends, the orders over all refinements, as between two meshes of few triangles they scatter."""
-    for field, order, ceiling in zip(("place", of.pressure), (3, 2), of.ceilings[2]):
+    for field, order, ceiling in zip(("place", pressure), (3, 2), ceilings):
         slope = np.log(found[field][0] / found[field][-1]) / np.log(found["size"][0] / found["size"][-1])
-        if not PROBLEMS[of.problem].contact:
+        if not PROBLEMS[problem].contact:
             yield between(f"order of the {field}", slope, order - 0.5, order + 0.5,
                           "quadratic places, linear pressure: third and second order")
         yield at_most(field, found[field][-1], ceiling, "the reference's elements are finer")
 
 
-def _profiles(name: str) -> tuple[Profile, ...]:
-    """Outline, pressure on it and across the body, of ours on the third level and of the reference on the last."""
+def _outline(name: str) -> Profile:
+    """Of ours on the third level and of the reference on the last."""
     (body, rim, found), exact = ours(name, 2), trusted(name, len(RINGS) - 1)
-    angle = np.arctan2(*body.reference[rim].T[::-1])
-    rim, turn = rim[np.argsort(angle)], np.linspace(0, np.pi, 200)
-    place, pressure = exact.at(bodies.RADIUS * np.cos(turn), bodies.RADIUS * np.sin(turn))
-    outline = (("ours", "ours", *found.position[rim].T), ("quadratic elements", "reference", *place.T))
-    on_it = (("ours", "ours", np.degrees(np.sort(angle)), found.pressure[rim]),
-             ("quadratic elements", "reference", np.degrees(turn), pressure / MODULUS))
-    x = bodies.RADIUS * np.linspace(-0.95, 0.95, 100)
-    line = np.column_stack([x, np.full(len(x), bodies.RADIUS / 4)])
-    pushed = transfer.interpolate(body.reference, body.cells, found.pressure[:, None], line)[:, 0]
-    across = (("ours", "ours", x, pushed),
-              ("quadratic elements", "reference", x, exact.at(*line.T)[1] / MODULUS))
-    return (Profile(f"outline, {name}", "x (um)", "y (um)", outline),
-            Profile(f"pressure at Y = R_0 / 4, {name}", "X (um)", "P / mu_L", across),
-            Profile(f"pressure on the arc, {name}", "angle at t = 0 (degrees)", "P / mu_L", on_it))
+    rim, turn = rim[np.argsort(body.reference[rim, 0])], np.linspace(0, np.pi, 200)
+    place, _ = exact.at(bodies.RADIUS * np.cos(turn), bodies.RADIUS * np.sin(turn))
+    return Profile(f"outline, {name}", "x (um)", "y (um)", (("ours", "ours", *found.position[rim].T),
+                                                            ("quadratic elements", "reference", *place.T)))
 
 
 NORM = "L2 over the body at t = 0 of the difference to the reference on the same level, relative: places; pressure"
 
 
-CYLINDER = Compared("half-cylinder", "pressure", {1: (6e-4, 6e-3), 2: (6e-5, 6e-3)})
-UNLIKE = Compared("uneven", "pressure", {1: (6e-4, 6e-3), 2: (2e-5, 2.5e-3)})
-WALLED = Compared("between walls", "pressure away", {1: (1e-3, 6e-3), 2: (1e-3, 6e-3)})
-
-
-def compared(of: Compared, kind: int):
-    """Differences of the two codes with one kind of triangles; with straight ones that the reference is the finer."""
-    found = refine(gaps, range(len(RINGS)), of.problem, kind)
+def compared(kind: int, problem: str, ceilings: dict[int, tuple[float, float]], pressure: str = "pressure"):
+    """Differences of the two codes with one kind of triangles; with straight ones that the reference is the finer.
+    ceilings: by kind, of the last differences of places and of the pressure; pressure: the one that has an order."""
+    found = refine(gaps, range(len(RINGS)), problem, kind)
     if kind > 1:
-        yield _curved(found, of)
+        yield _curved(found, problem, pressure, ceilings[2])
         return
-    for field, ceiling in zip(("place", of.pressure), of.ceilings[1]):
-        yield _study(found, field, ceiling)
-    yield _settled(of.problem, found["place"][-1])
-    yield _profiles(of.problem)
+    place, last = ceilings[1]
+    yield studies(found, {"place": (2, PLACE, place), pressure: (1.75, PRESSURE, last)})
+    yield _settled(problem, found["place"][-1])
+    yield _outline(problem)
 
 
 @case("growth-quadratic-cylinder", kind="cross-code", norm=f"{NORM}; the same of the reference to the closed form",
@@ -195,11 +168,10 @@ def compared(of: Compared, kind: int):
             "elements of scikit-fem, which have their orders 3 and 2 against the closed form",
       mutants=("stabilisation-power", "stabilisation-of-rest"), slow=True, over=bodies.EVERY)
 def quadratic_cylinder(kind: int):
-    yield compared(CYLINDER, kind)
+    yield compared(kind, "half-cylinder", {1: (6e-4, 6e-3), 2: (6e-5, 6e-3)})
     if kind == 1:
-        own = refine(_own, range(len(RINGS)))
-        yield study("places of the reference", own["size"], own["place"], 3, "quadratic elements", ceiling=5e-6)
-        yield study("pressure of the reference", own["size"], own["pressure"], 2, "linear elements", ceiling=1.2e-3)
+        rows = {"places": (3, "quadratic elements", 5e-6), "pressure": (2, "linear elements", 1.2e-3)}
+        yield studies(refine(_own, range(len(RINGS))), rows, " of the reference")
 
 
 def _own(level: int) -> dict[str, float]:
@@ -208,7 +180,7 @@ def _own(level: int) -> dict[str, float]:
     place, pressure = trusted("half-cylinder", level).at(*where)
     known = closed_forms.exact(2000.0)
     exact, level_of = known.place(*where), known.pressure(*where)
-    return {"size": bodies.RADIUS / RINGS[level], "place": bodies.relative(place, exact, weight[..., None]),
+    return {"size": bodies.RADIUS / RINGS[level], "places": bodies.relative(place, exact, weight[..., None]),
             "pressure": bodies.relative(pressure / MODULUS, level_of, weight)}
 
 
@@ -217,7 +189,7 @@ def _own(level: int) -> dict[str, float]:
             "agrees with quadratic elements, whatever mu_L is, on straight and on curved triangles",
       mutants=("theta-power", "third-power", "stabilisation-sign"), over=bodies.EVERY)
 def uneven(kind: int):
-    return compared(UNLIKE, kind)
+    return compared(kind, "uneven", {1: (6e-4, 6e-3), 2: (2e-5, 2.5e-3)})
 
 
 @case("growth-between-walls", kind="cross-code",
@@ -225,13 +197,13 @@ def uneven(kind: int):
       claim="The same half-disc, its arc held at the upper wall on which it slides, agrees with quadratic elements",
       mutants=("held-short", "theta-power"), slow=True, over=bodies.EVERY)
 def between_walls(kind: int):
-    yield compared(WALLED, kind)
+    yield compared(kind, "between walls", {1: (1e-3, 6e-3), 2: (1e-3, 6e-3)}, "pressure away")
     last = gaps(len(RINGS) - 1, "between walls", kind)["pressure"]
     yield at_most("pressure, with the ends of the contact", last, 1e-2, SINGULAR)
 
 
 #: Elements of straight and of curved triangles, and of how many random meshes of each size errors are averaged.
-SIZES, DRAWS = {1: (0.2, 0.1, 0.05, 0.025), 2: (0.2, 0.1, 0.05, 0.03)}, {1: 3, 2: 6}
+SIZES = {1: dict.fromkeys((0.2, 0.1, 0.05, 0.025), 3), 2: dict.fromkeys((0.2, 0.1, 0.05, 0.03), 6)}
 LAYER = "3/2 from a layer of one element at the rim, where the stabilisation wants dP/dn = 0"
 UNEVEN = "no layer where dP/dn = 0: between 2, linear elements, and 3/2, for an h that jumps between triangles"
 TAYLOR_HOOD = "quadratic places: third order; linear pressure: second"
@@ -253,14 +225,11 @@ def _solved(size: float, seed: int, kind: int, exact) -> tuple[Supported, growth
     return body, bodies.equilibrium(body, body.field(exact.theta), forces, exact.place(*grid.points.T))
 
 
-def _errors(size: float, kind: int, exact) -> dict[str, float]:
-    """Root mean square over DRAWS random meshes of the relative L2 errors."""
-    rows = []
-    for seed in range(DRAWS[min(kind, 2)]):
-        body, found = _solved(size, round(1 / size) + seed, kind, exact)
-        rows.append((bodies.size(body), bodies.place_error(body, found.position, exact.place),
-                     bodies.pressure_error(body, found.pressure, exact.pressure)))
-    return dict(zip(("size", "place", "pressure"), np.sqrt(np.mean(np.square(rows), axis=0))))
+def _errors(size: float, seed: int, kind: int, exact) -> dict[str, float]:
+    """Relative L2 errors on one random mesh."""
+    body, found = _solved(size, round(1 / size) + seed, kind, exact)
+    return {"size": bodies.size(body), "place": bodies.place_error(body, found.position, exact.place),
+            "pressure": bodies.pressure_error(body, found.pressure, exact.pressure)}
 
 
 @case("growth-manufactured", kind="manufactured", norm="L2 of places and pressure over the body at t = 0, relative, "
@@ -278,15 +247,3 @@ def manufactured(kind: int):
         yield study(f"place, {name}", found["size"], found["place"], *PLACES[geometry], ceiling=place,
                     band=BANDS[geometry])
         yield study(f"pressure, {name}", found["size"], found["pressure"], order, why, ceiling=pressure)
-        if kind == 1:
-            yield _profile(name, exact)
-
-
-def _profile(name: str, exact) -> Profile:
-    """The pressure along Y = 1/2."""
-    body, found = _solved(SIZES[1][2], 0, 1, exact)
-    x = np.linspace(0, 1, 60)
-    line = np.column_stack([x, np.full(len(x), 0.5)])
-    ours = transfer.interpolate(body.reference, body.cells, found.pressure[:, None], line)[:, 0]
-    return Profile(f"P at Y = 1/2, {name}", "X", "P / mu_L",
-                   (("ours", "ours", x, ours), ("exact", "exact", x, exact.pressure(*line.T))))

@@ -6,7 +6,7 @@ right     all checks of its parts hold, and so does what must hold in every run 
 refused   a part has stopped with an error of ``repro``, which says what bound was met or what to change;
 wrong     a check fails, another exception is raised, nothing is measured, or a part takes longer than LIMIT.
 
-Every hard case as a verification case, with all presets.
+Every hard case is a verification case whose variants are the presets.
 """
 
 from __future__ import annotations
@@ -15,32 +15,27 @@ import re
 import signal
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache
-from math import inf, isfinite
 from time import process_time
 
 import numpy as np
 
 from repro.errors import SimulationError, StageError
-from repro.fem.mesh import Mesh
-from repro.fem.space import Space
-from repro.march import midpoint, updates
-from repro.march.loop import Instant, Ledger, PoreEnd, Step
+from repro.march.loop import Instant, Ledger, PoreEnd
 from repro.march.simulation import simulate
 from repro.model import biomass, pore, transport
 from repro.model.pore import Pore, Solved, peclet
 from repro.results import row
 from repro.scene import Kinetics, Scene, load_scene
 from repro.scene.units import SceneError
-from verification.kernel.case import Check, Outcome, at_least, at_most, between, case
-from verification.problems import meshes
+from verification.kernel.case import Check, Line, Note, at_least, at_most, between, case
 
 #: The presets, and fast with cubic elements: [numerics] of each.
 NUMERICS = {"paper": {"preset": "paper"}, "fast": {"preset": "fast"}, "accurate": {"preset": "accurate"},
             "cubic": {"preset": "fast", "elements": "cubic"}}
 PRESETS = tuple(NUMERICS)
-#: With the paper's scheme any part may be refused, and an error that is explained is accepted.
+#: With the paper's scheme any part may be refused.
 LENIENT = ("paper",)
 #: Relative error that a preset stands for, in velocity, conductivity, area, thickness and tips, and of effluents over
 #: the supply. The paper names none: linear triangles of its sizes were measured 1 to 4 % off in the head loss.
@@ -81,8 +76,7 @@ class HardCase:
     """One of the twenty-two: ``parts`` name -> function of the preset, which returns Checks and Runs.
 
     refusable: names of the parts that may be refused with ``fast`` and ``accurate``, and with ``paper`` all may;
-    explained: why a part is wrong with the paper's scheme, where it is; mutants: ids of wrong changes that it catches;
-    slow: left out by ``make verify-fast``.
+    mutants: ids of wrong changes that it catches.
     """
 
     number: int
@@ -92,25 +86,16 @@ class HardCase:
     failure_is: str
     parts: dict[str, Callable[[str], list]]
     refusable: tuple[str, ...] = ()
-    explained: dict[str, str] = field(default_factory=dict)
     mutants: tuple[str, ...] = ()
-    slow: bool = True
 
     @property
     def full_id(self) -> str:
         """That of its verification case."""
         return f"hard-{self.number:02d}-{self.id}"
 
-    def __reduce__(self):
-        """From process to process a case goes by its number: its parts may be functions within functions."""
-        return numbered, (self.number,)
-
-
-def numbered(number: int) -> HardCase:
-    """The case of a number."""
-    from verification.hard import CASES  # which imports this module
-
-    return next(case for case in CASES if case.number == number)
+    def accepts(self, part: Part, preset: str) -> bool:
+        """Right always; refused where the case says so, and with the paper's scheme."""
+        return part.verdict == RIGHT or part.verdict == REFUSED and (preset in LENIENT or part.name in self.refusable)
 
 
 def scene(name: str, preset: str, *changes: str) -> Scene:
@@ -147,15 +132,6 @@ def against(name: str, preset: str, changes: Sequence[str], *columns: str, refin
     return found, fine, [found, *close(found, fine, preset, *columns)]
 
 
-def midpoint_step(made: Scene, now: Pore, solved: Solved, duration: float) -> Step:
-    """A step (h) of the midpoint rule, whatever its estimate."""
-    return midpoint.attempt(made, now, solved, duration).step
-
-
-#: A step of a length (h), by the scene's ``numerics.time``.
-STEP = {"updates": updates.step, "midpoint": midpoint_step}
-
-
 def close(found: Run, trusted: Run, preset: str, *columns: str, allowed: float = 0.0) -> list[Check]:
     """Columns of the last rows against each other, as the presets promise them: relative, effluents over the supply;
     ``allowed``: where a case has more to allow for."""
@@ -167,6 +143,12 @@ def close(found: Run, trusted: Run, preset: str, *columns: str, allowed: float =
         size = _supply(found.scene, column) if "mg_per_L" in column else abs(theirs)
         checks.append(at_most(f"{column} against a finer run", abs(ours - theirs) / size, bound, origin))
     return checks
+
+
+def alike(told: str, names: Sequence[str], ours: Sequence[float], theirs: Sequence[float], preset: str) -> list[Check]:
+    """Numbers against others that may differ by what the preset promises, relative."""
+    apart = np.abs(np.array(ours) / theirs - 1)
+    return [at_most(f"{name} {told}", value, TOLERANCE[preset], PROMISED[preset]) for name, value in zip(names, apart)]
 
 
 def _supply(made: Scene, column: str) -> float:
@@ -280,11 +262,6 @@ def steady(found: Run, acceptor: float, donor: float) -> transport.Concentration
     return transport.steady(problem, biomass.sink(now.active), transport.Concentrations(acceptor * ones, donor * ones))
 
 
-def space_on(straight: Mesh, made: Scene) -> Space:
-    """The scene's functions on a mesh of straight triangles, or on the same with middles."""
-    return meshes.space_on(straight, made.numerics.order)
-
-
 def seeded(made: Scene) -> tuple[Pore, Solved]:
     """The pore at t = 0 and what is solved in it."""
     return solved_in(made, pore.seeded(made))
@@ -319,8 +296,8 @@ class Part:
 
 
 @dataclass(frozen=True, eq=False)
-class Cell:
-    """A case with a preset; accepted: is its verdict one that it may have?"""
+class Cell(Note):
+    """A case with a preset."""
 
     case: HardCase
     preset: str
@@ -340,15 +317,25 @@ class Cell:
     @property
     def unaccepted(self) -> tuple[Part, ...]:
         """Parts whose verdict is not one that they may have."""
-        return tuple(part for part in self.parts if not accepted(self.case, self.preset, part))
+        return tuple(part for part in self.parts if not self.case.accepts(part, self.preset))
+
+    def lines(self, every: Sequence[Cell]) -> list[Line]:
+        """Verdicts of the parts by preset; then what the right parts were judged by, by preset where that differs."""
+        presets = ", ".join(cell.preset for cell in every)
+        found = [(f"verdict of {parts[0].name}", ", ".join(part.verdict for part in parts), presets,
+                  not any(part in cell.unaccepted for cell, part in zip(every, parts)))
+                 for parts in zip(*(cell.parts for cell in every))]
+        bounds: dict[str, list[Check]] = {}
+        for part in (part for cell in every for part in cell.parts if part.verdict == RIGHT):
+            for check in part.checks:
+                bounds.setdefault(f"{part.name}, {check.quantity}", []).append(check)
+        return found + [(name, _each(check.accepted for check in of), _each(check.origin for check in of), True)
+                        for name, of in bounds.items()]
 
 
-def accepted(case: HardCase, preset: str, part: Part) -> bool:
-    """Right always is; refused where the case says so, and with the paper's scheme; wrong where that scheme's error is
-    explained."""
-    if part.verdict == REFUSED:
-        return preset in LENIENT or part.name in case.refusable
-    return part.verdict == RIGHT or (preset in LENIENT and part.name in case.explained)
+def _each(words: Iterable[str]) -> str:
+    """Once if all presets have the same."""
+    return "; ".join(dict.fromkeys(words))
 
 
 def run_cell(case: HardCase, preset: str) -> Cell:
@@ -401,81 +388,32 @@ def _limited(seconds: float):
         signal.signal(signal.SIGPROF, before)
 
 
-def used(check: Check) -> float:
-    """How much of its tolerance a check uses: 0 to 1 where it holds."""
-    if not check.holds:
-        return inf
-    if isfinite(check.low) and isfinite(check.high) and check.low != 0:
-        half = (check.high - check.low) / 2
-        return abs(check.value - check.low - half) / half
-    if isfinite(check.high):
-        return check.value / check.high if check.high else 0.0
-    return max(0.0, check.value / check.low) if check.low < 0 else check.low / check.value if check.value else 0.0
-
-
-@dataclass(frozen=True, eq=False)
-class Verdicts(Outcome):
-    """What a verification case of this stage has measured, with the cells that it comes from."""
-
-    cells: tuple[Cell, ...] = ()
-
-    def lines(self) -> list[tuple[str, str, str, bool]]:
-        """Verdicts of the parts by preset; then what the right parts were judged by, by preset where bounds differ."""
-        presets = ", ".join(cell.preset for cell in self.cells)
-        found = [(f"verdict of {parts[0].name}", ", ".join(part.verdict for part in parts), presets,
-                  not any(part in cell.unaccepted for cell, part in zip(self.cells, parts)))
-                 for parts in zip(*(cell.parts for cell in self.cells))]
-        bounds: dict[tuple[str, str], dict[str, dict[str, str]]] = {}
-        for cell in self.cells:
-            for part in cell.parts:
-                for check in part.checks if part.verdict == RIGHT else ():
-                    of = bounds.setdefault((check.quantity, part.name), {})
-                    of[cell.preset] = {"expected": check.accepted, "origin": check.origin}
-        return found + [(f"{name}, {quantity}", *_said(of), True) for (quantity, name), of in bounds.items()]
-
-
-def _said(of: dict[str, dict[str, str]]) -> tuple[str, str]:
-    """Bound and origin, once if all presets have the same."""
-    both = []
-    for key in ("expected", "origin"):
-        words = [one[key] for one in of.values()]
-        both.append(words[0] if len({*words}) == 1 else "; ".join(dict.fromkeys(words)))
-    return both[0], both[1]
-
-
-def outcome(cells: Iterable[Cell]) -> Verdicts:
-    """All own checks of the parts that are right; what must hold in every run, folded into one number a preset; and how
-    many parts have a verdict that they may not have."""
-    cells, checks = tuple(cells), []
-    for cell in cells:
-        right = [part for part in cell.parts if part.verdict == RIGHT]
-        checks += [Check(f"{cell.preset}, {part.name}: {c.quantity}", c.value, c.low, c.high, c.origin)
-                   for part in right for c in part.checks]
-        always = [used(check) for part in right for check in part.always]
-        checks.append(at_most(f"{cell.preset}: of what must hold in every run, largest part of a tolerance",
-                              max(always, default=0.0), 1.0, "balances, bounds of C, density, area, finite numbers"))
-        told = f": {cell.message[:300]}" if cell.unaccepted else ""
-        checks.append(at_most(f"{cell.preset}: parts that are wrong, or refused where they may not be{told}",
-                              len(cell.unaccepted), 0, "the verdict of the matrix"))
-    return Verdicts(tuple(checks), cells=cells)
-
-
-def run_case(case: HardCase) -> Verdicts:
-    """A case with every preset."""
-    return outcome(run_cell(case, preset) for preset in PRESETS)
+def measured(cell: Cell) -> Iterator[Check | Cell]:
+    """All own checks of the parts that are right; what must hold in every run, folded into one number; how many parts
+    have a verdict that they may not have; and the cell."""
+    right = [part for part in cell.parts if part.verdict == RIGHT]
+    for part in right:
+        yield from (replace(check, quantity=f"{part.name}, {check.quantity}") for check in part.checks)
+    always = [check.used for part in right for check in part.always]
+    yield at_most("of what must hold in every run, largest part of a tolerance", max(always, default=0.0), 1.0,
+                  "balances, bounds of C, density, area, finite numbers")
+    told = f": {cell.message[:300]}" if cell.unaccepted else ""
+    yield at_most(f"parts that are wrong, or refused where they may not be{told}", len(cell.unaccepted), 0,
+                  "the verdict of the matrix")
+    yield cell
 
 
 def register(cases: Iterable[HardCase]) -> None:
-    """Make them known to ``python -m verification``."""
+    """Make them known to ``python -m verification``, a variant a preset."""
     for one in cases:
         _register(one)
 
 
 def _register(one: HardCase) -> None:
     @case(one.full_id, kind="property", claim=f"{one.title}: {_sentence(one.right_is)}", norm=NORM, mutants=one.mutants,
-          slow=one.slow, ways="1 2 3 paper fast accurate")
-    def run() -> Verdicts:
-        return run_case(one)
+          slow=True, over=PRESETS, ways="1 2")
+    def run(preset: str) -> Iterator[Check | Cell]:
+        return measured(run_cell(one, preset))
 
 
 NORM = "numbers of each part with all presets, and with fast on cubic elements; refused parts are left out"

@@ -12,21 +12,20 @@ from functools import partial
 import numpy as np
 
 from reference import neo_hookean, poiseuille
-from repro.fem import elements
 from repro.fem.outline import BOTTOM, FREE, TOP, Outline
 from repro.fem.sizing import ACROSS_FILM
 from repro.fem.space import Space
 from repro.march import midpoint, simulation, stepping
 from repro.march.loop import Instant
-from repro.model import contact, flow, growth, pore, remeshing
+from repro.model import contact, flow, pore, remeshing
 from repro.model.contact import constrained
 from repro.results import M_PER_D
 from repro.scene import Scene
 from verification.hard import common
 from verification.hard.common import DRIVE, EFFLUENTS, FIXED, SHAPE, TOLERANCE, HardCase, Run
 from verification.kernel.case import Check, at_least, at_most, between
-from verification.problems import runs
-from verification.problems.bodies import RADIUS, HalfCylinder
+from verification.problems import bodies, runs
+from verification.problems.bodies import RADIUS, HalfCylinder, Supported
 
 #: A film that closes at once takes a seventh of the elements' height under it, and their biomass aside.
 CLOSING = 0.3
@@ -244,10 +243,10 @@ END = HardCase(
 
 @dataclass(frozen=True, eq=False)
 class Grown:
-    """A half-disc that has grown: the aggregate as it was at t = 0; places of its nodes now (n, 2), P / mu_L of its
-    corners; nodes of the free rim; and theta in the points of an integral over t = 0 (t, q)."""
+    """A half-disc that has grown: what it is made of, places of its nodes now (n, 2), P / mu_L of its corners; nodes of
+    the free rim; and theta in the points of an integral over t = 0 (t, q)."""
 
-    body: growth.Body
+    held: Supported
     position: np.ndarray
     pressure: np.ndarray
     rim: np.ndarray
@@ -256,7 +255,7 @@ class Grown:
     @property
     def start(self) -> np.ndarray:
         """(n, 2) um, places at t = 0."""
-        return self.body.reference
+        return self.held.reference
 
 
 #: The paper's stabilisation is that of the last known shape [E6]: theta goes to where it is asked to be by this factor
@@ -268,15 +267,10 @@ def grown(preset: str, theta: Callable[[np.ndarray, np.ndarray], np.ndarray]) ->
     """A half-disc of 20 um on a wall under theta(X, Y); on straight triangles the mean of their corners."""
     now = pore.seeded(common.scene("wide", preset, f'aggregate.radius="{RADIUS} um"'))
     rim, shape, body = now.mesh.topology.body_loop, now.outline, now.body
-    held = constrained(len(body.reference), rim, shape.wall, shape.fixed)
-    nodal = theta(*body.reference.T)
-    whole = nodal[body.shape.cells] @ body.shape.table.values.T
-    place, push = body.reference, now.pressure[now.mesh.topology.body_corners]
-    parts = max(1, int(np.ceil(np.abs(np.log(whole)).max() / np.log(UPDATE[now.mesh.geometry]))))
-    for part in np.arange(1, parts + 1) / parts:
-        found = growth.equilibrium(body, whole**part, place, push, held, body.reference)
-        place, push = found.position, found.pressure
-    return Grown(body, place, push, rim[shape.wall == FREE], whole)
+    held = Supported(body, constrained(len(body.reference), rim, shape.wall, shape.fixed))
+    whole = theta(*body.reference.T)[held.cells] @ body.shape.table.values.T
+    found = bodies.grown(held, whole, factor=UPDATE[held.geometry])
+    return Grown(held, found.position, found.pressure, rim[shape.wall == FREE], whole)
 
 
 def even(preset: str, theta: float) -> list[Check]:
@@ -304,10 +298,10 @@ def _places(found: Grown, exact: HalfCylinder) -> list[Check]:
     inner, outer = exact.inner, exact.outer
     size, contrast = exact.radius(RADIUS), max(inner / outer, outer / inner)
     places, interpolated = _errors(found, exact)
-    bound = CEA[found.body.shape.geometry] * contrast ** (1 / 3) * interpolated / size
+    bound = CEA[found.held.geometry] * contrast ** (1 / 3) * interpolated / size
     rim = np.abs(np.hypot(*found.position[found.rim].T) / size - 1).max()
-    weight = found.body.at.dx
-    area = np.sum(weight * found.body.strained(found.position).J) / np.sum(weight * found.theta) - 1
+    body = found.held.body
+    area = np.sum(body.at.dx * body.strained(found.position).J) / np.sum(body.at.dx * found.theta) - 1
     told, origin = f"theta from {inner:.3g} to {outer:.3g}", "Cea: that of interpolation, times contrast^(1/3)"
     return [at_most(f"area against the integral of theta, {told}", abs(area), 1e-8, "J = theta in the mean"),
             at_most(f"places in the mean over the radius, {told}", places / size, bound, origin),
@@ -316,20 +310,17 @@ def _places(found: Grown, exact: HalfCylinder) -> list[Check]:
 
 def _errors(found: Grown, exact: HalfCylinder) -> tuple[float, float]:
     """Root mean squares (um) over t = 0 of the places' error, and of the closed form's own interpolation."""
-    cells, geometry = found.body.shape.cells, found.body.shape.geometry
-    of = elements.table(geometry, geometry, 6)
-    X, ours, best = (np.einsum("qa,tai->tqi", of.values, field[cells]) for field in (
-        found.start, found.position, exact.place(*found.start.T)))
-    weight, true = elements.weights(found.start[cells], of), exact.place(X[..., 0], X[..., 1])
-    return tuple(float(np.sqrt(np.sum(weight[..., None] * (field - true) ** 2) / weight.sum()))
-                 for field in (ours, best))
+    where, weight, of = bodies.integrated(found.held)
+    true = exact.place(*where)
+    gaps = (of.values @ field[found.held.cells] - true for field in (found.position, exact.place(*found.start.T)))
+    return tuple(float(np.sqrt(np.sum(weight[..., None] * gap**2) / weight.sum())) for gap in gaps)
 
 
 def pushed(preset: str, inner: float, outer: float) -> list[Check]:
     """The pressure too, outside of the middle quarter, where linear functions of R meet."""
     exact = HalfCylinder(inner, outer)
     found = grown(preset, exact.theta)
-    corners = found.start[: found.body.shape.corners]
+    corners = found.start[: found.held.corners]
     far = np.hypot(*corners.T) > RADIUS / 4
     push = exact.pressure(*corners[far].T)
     wrong = np.sqrt(np.mean((found.pressure[far] - push) ** 2) / np.mean(push**2))

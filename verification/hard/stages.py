@@ -51,22 +51,23 @@ def same_root(found: Run) -> list[Check]:
                     "uptake is monotone: one solution; Newton's tolerance, times the system's condition")]
 
 
-def starved(*changes: str):
-    """A part: a starved half-disc."""
-    def part(preset: str) -> list:
-        found, _, checks = common.against("wide", preset, changes, *EFFLUENTS)
-        return [*checks, *same_root(found)]
-    return part
+def starved(preset: str, changes: tuple[str, ...]) -> list:
+    """A starved half-disc."""
+    found, _, checks = common.against("wide", preset, changes, *EFFLUENTS)
+    return [*checks, *same_root(found)]
+
+
+#: Half-discs that are starved.
+HUNGRY = {"0.35 m/d, R = 27 um": disc(27, SLOW, 'pore.width="50 um"'),
+          "0.35 m/d, R = 42 um": disc(42, SLOW, 'pore.width="50 um"'),
+          "supply 0.15 mg/L": disc(40, *supply(0.15, 0.15)), "supply 0.02 K_s": disc(40, *supply(0.02, 0.02))}
 
 
 STARVED = HardCase(
     1, "starved", "Starved pore",
     "One solution from every start, nowhere under zero, with the effluents of a finer run",
     "A negative root of the Monod terms (C_A = -76 mg/L with a closed balance was seen)",
-    {"0.35 m/d, R = 27 um": starved(*disc(27, SLOW, 'pore.width="50 um"')),
-     "0.35 m/d, R = 42 um": starved(*disc(42, SLOW, 'pore.width="50 um"')),
-     "supply 0.15 mg/L": starved(*disc(40, *supply(0.15, 0.15))),
-     "supply 0.02 K_s": starved(*disc(40, *supply(0.02, 0.02)))},
+    {name: partial(starved, changes=changes) for name, changes in HUNGRY.items()},
     mutants=("hard-newton-too-soon",))
 
 
@@ -110,12 +111,10 @@ EXHAUSTED = HardCase(
     mutants=("hard-decay-unlimited",))
 
 
-def front(radius: float, *more: str):
-    """A part: half saturations of a millionth of the supply."""
-    def part(preset: str) -> list:
-        changes = disc(radius, *(f'substrates.{name}.half_saturation="1e-5 mg/L"' for name in BOTH), *more)
-        return common.against("wide", preset, changes, *EFFLUENTS, refinement=0.8)[2]
-    return part
+def front(preset: str, radius: float, more: tuple[str, ...] = ()) -> list:
+    """Half saturations of a millionth of the supply."""
+    changes = disc(radius, *(f'substrates.{name}.half_saturation="1e-5 mg/L"' for name in BOTH), *more)
+    return common.against("wide", preset, changes, *EFFLUENTS, refinement=0.8)[2]
 
 
 #: Half thickness and films of the slab, um; its penetration depth over the half thickness.
@@ -126,14 +125,14 @@ def slab_front(preset: str) -> list:
     """The stage alone: a slab between films of still water, in which the donor is used up at 0.6 of the way in."""
     size, bound, origin = FRONT[preset]
     end, width = HALF + FILM, 1.5 * size
-    grid = meshes.channel((-end, end), width, size, lambda x, y: np.abs(x) < HALF, across=(-HALF, HALF), seed=1)
+    grid = meshes.plug((-end, end), width, HALF, size, seed=1)
     made = common.scene("wide", preset)
     donor = replace(made.substrates.donor, half_saturation=1e-6 * made.substrates.donor.supply)
     acceptor = replace(made.substrates.acceptor, half_saturation=1e-6 * made.substrates.acceptor.supply)
     depth, ratio = DEPTH * HALF, donor.diffusivity_in_aggregate / donor.diffusivity
     sink = donor.supply * donor.diffusivity_in_aggregate / (depth**2 / 2 + FILM * ratio * depth)
     law = replace(made.kinetics, decay_coefficient=0.0, acceptor_to_donor_ratio=1e-9)
-    space = common.space_on(grid, made)
+    space = meshes.space_on(grid, made.numerics.order)
     problem = transport.problem(space, None, replace(made.substrates, acceptor=acceptor, donor=donor), law)
     active = Sink(sink / law.maximum_utilization_rate * space.reaction.dx)
     state = transport.steady(problem, active)
@@ -155,7 +154,8 @@ ZERO_ORDER = HardCase(
     3, "zero-order", "Half saturations of a millionth of the supply: fronts of zero order",
     "The closed form of zero-order uptake in a slab, and the effluents of a finer run around half-discs",
     "Newton's method that cycles at the front, or concentrations under zero behind it",
-    {"slab": slab_front, "R = 60 um": front(60), "R = 80 um": front(80), "0.35 m/d, R = 40 um": front(40, SLOW)},
+    {"slab": slab_front, "R = 60 um": partial(front, radius=60), "R = 80 um": partial(front, radius=80),
+     "0.35 m/d, R = 40 um": partial(front, radius=40, more=(SLOW,))},
     refusable=("slab",),
     mutants=("hard-front-smoothed", "hard-newton-unshortened"))
 
@@ -251,12 +251,14 @@ def still(preset: str) -> list:
     return [runs[0], *common.close(*runs, preset, *EFFLUENTS)]
 
 
-def trickle(velocity: str, balance: float):
-    """A part: so little flow that C is uniform and one substrate is used up: a closed form."""
-    def part(preset: str) -> list:
-        found = common.run("wide", preset, *disc(60, f'flow.mean_velocity="{velocity} m/day"'), balance=balance)
-        return [found, *_used_up(found)]
-    return part
+def trickle(preset: str, velocity: str, balance: float) -> list:
+    """So little flow that C is uniform and one substrate is used up: a closed form."""
+    found = common.run("wide", preset, *disc(60, f'flow.mean_velocity="{velocity} m/day"'), balance=balance)
+    return [found, *_used_up(found)]
+
+
+#: Velocities (m/d), and what the substrates' balances may miss.
+TRICKLES = {"1e-4": 1e-8, "1e-6": 1e-6, "1e-12": 1e-6}
 
 
 def _used_up(found: Run) -> list[Check]:
@@ -281,8 +283,8 @@ STILL = HardCase(
     5, "still", "No flow, and flow so small that the inlet's condition degenerates",
     "The closed form of a pore in which diffusion is everything, or a refusal that names the Peclet number",
     "A singular system that is solved all the same; concentrations above the supply",
-    {"velocity 0": no_flow, "without [flow]": still, "1e-4 m/d": trickle("1e-4", 1e-8),
-     "1e-6 m/d": trickle("1e-6", 1e-6), "1e-12 m/d": trickle("1e-12", 1e-6)},
+    {"velocity 0": no_flow, "without [flow]": still,
+     **{f"{slow} m/d": partial(trickle, velocity=slow, balance=missing) for slow, missing in TRICKLES.items()}},
     refusable=("velocity 0", "1e-4 m/d", "1e-6 m/d", "1e-12 m/d"),
     mutants=("decay-demand",))
 
@@ -331,7 +333,7 @@ def plugged(preset: str, size: float) -> list:
     """The stage alone: biomass from wall to wall, lambda = 2000, elements of W / 4 and W / 7."""
     grid = meshes.plug(ENDS, WIDTH, PLUG, size, seed=3)
     exact = 12 / WIDTH**2 * (ENDS[1] - ENDS[0] + 1999 * 2 * PLUG)
-    space = common.space_on(grid, common.scene("wide", preset))
+    space = meshes.space_on(grid, common.scene("wide", preset).numerics.order)
     found = flow.unit_flow(space, 2000.0)
     flux = _fluxes(lambda where: located(space.mesh.points, space.mesh.cells, where).field(
         found.velocity, space.cells, space.order))

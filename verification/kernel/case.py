@@ -11,11 +11,12 @@ failure.
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from math import floor, inf, isfinite, log10
 from time import perf_counter
+from typing import Self
 
 import numpy as np
 
@@ -32,10 +33,20 @@ ROUND_OFF = 1e-6
 
 
 @dataclass(frozen=True)
-class Check:
-    """One number in its accepted range; ``origin`` says where that range comes from."""
+class Quantity:
+    """What is judged, in words."""
 
     quantity: str
+
+    def labelled(self, label: str) -> Self:
+        """The same of one variant of its case."""
+        return replace(self, quantity=f"{self.quantity}, {label}")
+
+
+@dataclass(frozen=True)
+class Check(Quantity):
+    """One number in its accepted range; ``origin`` says where that range comes from."""
+
     value: float
     low: float
     high: float
@@ -62,9 +73,18 @@ class Check:
             return (self.high - self.low) / 2
         return abs(self.high if isfinite(self.high) else self.low)
 
-    def labelled(self, label: str) -> Check:
-        """The same number of one variant of its case."""
-        return replace(self, quantity=f"{self.quantity}, {label}")
+    @property
+    def used(self) -> float:
+        """How much of its tolerance it uses: 0 to 1 where it holds, more than anything where it does not."""
+        if not self.holds:
+            return inf
+        if isfinite(self.low) and isfinite(self.high) and self.low != 0:
+            return abs(self.value - self.low - self._tolerance) / self._tolerance
+        if isfinite(self.high):
+            return self.value / self.high if self.high else 0.0
+        if self.low < 0:
+            return max(0.0, self.value / self.low)
+        return self.low / self.value if self.value else 0.0
 
     @property
     def expected(self) -> str:
@@ -116,13 +136,12 @@ BAND = 0.3
 
 
 @dataclass(frozen=True, eq=False)
-class Study:
+class Study(Quantity):
     """Errors (k,) on a series of sizes (k,), falling: orders between neighbours must lie from low to high.
 
     ceiling: the last error must not exceed it; origin: where the expected order comes from.
     """
 
-    quantity: str
     sizes: np.ndarray
     errors: np.ndarray
     low: float
@@ -158,10 +177,6 @@ class Study:
     def told(self) -> str:
         """Orders to a tenth: what another machine finds too."""
         return f"order {', '.join(f'{order:.1f}' for order in self.orders)}"
-
-    def labelled(self, label: str) -> Study:
-        """The same study of one variant of its case."""
-        return replace(self, quantity=f"{self.quantity}, {label}")
 
     @property
     def _last(self) -> str:
@@ -239,6 +254,21 @@ def compared(title: str, x_label: str, y_label: str, x, ours, theirs, name: str 
     return Profile(title, x_label, y_label, (("ours", "ours", x, ours), (name, kind, x, theirs)))
 
 
+Line = tuple[str, str, str, bool]
+
+
+class Note:
+    """What a variant of a case keeps besides, for those who write of it: nothing judges it."""
+
+    def labelled(self, label: str) -> Note:
+        """It knows its variant."""
+        return self
+
+    def lines(self, every: Sequence) -> list[Line]:
+        """What a page tells of a case with such notes, in the place of its numbers: as of an Outcome."""
+        raise NotImplementedError
+
+
 @dataclass(frozen=True, eq=False)
 class Outcome:
     """What a case has measured."""
@@ -246,28 +276,37 @@ class Outcome:
     checks: tuple = ()
     studies: tuple = ()
     profiles: tuple[Profile, ...] = ()
+    notes: tuple[Note, ...] = ()
+
+    @property
+    def parts(self) -> tuple:
+        """All of it."""
+        return (*self.measured, *self.profiles, *self.notes)
 
     @property
     def measured(self) -> tuple:
         """All that must hold: studies first."""
         return (*self.studies, *self.checks)
 
-    def lines(self) -> list[tuple[str, str, str, bool]]:
+    def lines(self) -> list[Line]:
         """(quantity and what it is, expected, origin, holds) of each, as another machine finds them too."""
+        if self.notes:
+            return self.notes[0].lines(self.notes)
         return [(part.quantity + (f" ({part.told})" if part.told else ""), part.accepted, part.origin, part.holds)
                 for part in self.measured]
 
 
 def outcome(found: Outcome | Iterable) -> Outcome:
-    """What a function of a case gives, as an Outcome: checks, studies and profiles in any order, or lists of them."""
+    """What a function of a case gives, as an Outcome: checks, studies, profiles and notes in any order, or lists of
+    them."""
     if isinstance(found, Outcome):
         return found
     parts = tuple(_flat(found))
-    return Outcome(*(tuple(part for part in parts if isinstance(part, kind)) for kind in (Check, Study, Profile)))
+    return Outcome(*(tuple(part for part in parts if isinstance(part, kind)) for kind in (Check, Study, Profile, Note)))
 
 
 def _flat(found) -> Iterator:
-    if isinstance(found, Check | Study | Profile):
+    if isinstance(found, Check | Study | Profile | Note):
         yield found
     else:
         for part in found:
@@ -298,7 +337,7 @@ class Case:
         found = outcome(self.function(*arguments))
         if not label:
             return found
-        return outcome(part.labelled(label) for part in (*found.measured, *found.profiles))
+        return outcome(part.labelled(label) for part in found.parts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -363,5 +402,5 @@ def run(chosen: Case) -> Result:
                 found.append(chosen.measure(label, *arguments))
         except Exception:
             errors.append(f"{label}{': ' * bool(label)}{traceback.format_exc(limit=-3)}")
-    whole = found[0] if len(found) == 1 else outcome((*one.measured, *one.profiles) for one in found)
+    whole = found[0] if len(found) == 1 else outcome(one.parts for one in found)
     return Result(chosen.id, whole, "".join(errors), perf_counter() - start)

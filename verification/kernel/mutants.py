@@ -35,6 +35,7 @@ from pathlib import Path
 from shutil import copy2, copytree, ignore_patterns
 from tempfile import TemporaryDirectory
 
+from verification.kernel import writing
 from verification.kernel.case import CASES, STAGES, Result
 
 ROOT = Path(__file__).parents[2]
@@ -100,6 +101,11 @@ class Mutant:
     tests: tuple[str, ...] = ()
 
 
+def changes(file: str, *rows: tuple) -> tuple[Mutant, ...]:
+    """Mutants of one file, a row each: id, what is wrong then, the old text, the new one, and tests that catch it."""
+    return tuple(Mutant(id, file, *rest) for id, *rest in rows)
+
+
 class MutantError(RuntimeError):
     """A mutant cannot be applied, or what it does is no result."""
 
@@ -134,7 +140,8 @@ class Hunt:
 
 def load() -> dict[str, dict[str, Mutant]]:
     """Mutants by id, by stage. Raises MutantError where an id is used twice."""
-    found = {stage: import_module(f"verification.{stage}.mutants").MUTANTS for stage in (*STAGES, RESULTS)}
+    modules = {**{stage: f"verification.{stage}.mutants" for stage in STAGES}, RESULTS: "verification.mutants"}
+    found = {stage: import_module(module).MUTANTS for stage, module in modules.items()}
     ids = [mutant.id for mutants in found.values() for mutant in mutants]
     twice = {id for id in ids if ids.count(id) > 1}
     if twice:
@@ -310,14 +317,13 @@ def record(hunts: list[Hunt]) -> None:
     new = {id: caught.get(id, before["caught"].get(id, [])) for id in everything()}
     codes = {**before["code"], **{catchers: code(catchers) for catchers in whole}}
     how = {found.mutant: {trial.case: trial.how for trial in found.trials} for found in hunts}
-    for file, rows in ((RECORD, {"code": codes, "caught": new}), (RECORD.parent / "live" / RECORD.name, how)):
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+    writing.save({"code": codes, "caught": new}, RECORD)
+    writing.save(how, RECORD.parent / "live" / RECORD.name)
 
 
 def _read() -> dict[str, dict]:
     """The record: {"code": {"cases": digits, "tests": digits}, "caught": {mutant: [case or test, ...]}}."""
-    return json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.exists() else {"code": {}, "caught": {}}
+    return writing.load(RECORD, {"code": {}, "caught": {}})
 
 
 def recorded() -> tuple[dict[str, list[str]], bool]:

@@ -8,7 +8,6 @@ profiles, ours solid, reference dashed, exact dots.
 
 from __future__ import annotations
 
-import json
 import platform
 import shutil
 from collections.abc import Callable
@@ -21,7 +20,7 @@ import numpy as np
 
 from verification.kernel import matrix, mutants
 from verification.kernel.case import CASES, STAGES, WAYS, Outcome, Profile, Result, Study
-from verification.kernel.writing import Block, Link, markdown, page, table
+from verification.kernel.writing import Block, Link, markdown, page, save, table
 
 FOLDER = Path(__file__).parents[1] / "report"
 TITLES = {"flow": "Flow (2.1, 3.2)", "transport": "Substrates (2.2, 3.3)", "growth": "Growth mechanics (2.3, 3.4)",
@@ -230,17 +229,18 @@ def _study(axis, study: Study) -> None:
     y = 0.5 * study.errors[-1] * (x / x[0]) ** order
     axis.loglog([x[0], x[1], x[1], x[0]], [y[0], y[0], y[1], y[0]], "k-", lw=0.8)
     axis.text(x[1] * 1.03, np.sqrt(y[0] * y[1]), f"{order:.3g}", fontsize=8, va="center")
-    _labelled(axis, study.quantity, "size of element or step", "error")
+    labelled(axis, study.quantity, "size of element or step", "error")
 
 
 def _profile(axis, profile: Profile) -> None:
     for name, kind, x, y in profile.curves:
         axis.plot(x, y, label=name, **STYLES[kind])
-    _labelled(axis, profile.title, profile.x_label, profile.y_label)
+    labelled(axis, profile.title, profile.x_label, profile.y_label)
     axis.legend(fontsize=6)
 
 
-def _labelled(axis, title: str, x_label: str, y_label: str) -> None:
+def labelled(axis, title: str, x_label: str, y_label: str) -> None:
+    """Title and labels of axes, small."""
     axis.set_title(title, fontsize=9)
     axis.set_xlabel(x_label, fontsize=8)
     axis.set_ylabel(y_label, fontsize=8)
@@ -270,11 +270,9 @@ def mutant_blocks() -> list[Block]:
 
 def _write_live(results: list[Result], folder: Path) -> None:
     """Every number with all its digits, and the seconds of this machine."""
-    folder.mkdir(exist_ok=True)
     cases = {result.id: {"verdict": result.verdict, "seconds": round(result.seconds, 2), "measured": {
         part.quantity: part.measured for part in result.outcome.measured}} for result in results}
-    text = json.dumps({"environment": environment(), "cases": cases}, indent=1)
-    (folder / "measured.json").write_text(text + "\n", encoding="utf-8")
+    save({"environment": environment(), "cases": cases}, folder / "measured.json")
 
 
 def _write_pages(results: list[Result], folder: Path) -> Path:

@@ -1,10 +1,16 @@
-"""One writer: blocks of text, pictures and tables, as Markdown and as pages."""
+"""One writer: blocks of text, pictures and tables, as Markdown, as pages and for a terminal; and records in JSON."""
 
 from __future__ import annotations
 
 import html
+import json
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from repro.results import write_text
 
 STYLE = """body {font: 15px/1.5 sans-serif; max-width: 1200px; margin: 2em auto; padding: 0 1em; color: #222}
 table {border-collapse: collapse; font-size: 13px; margin: 1em 0} .no {background: #fbe3e0} img {max-width: 100%}
@@ -75,6 +81,19 @@ def _markdown_cell(cell: Cell) -> str:
     return cell.replace("|", "\\|")
 
 
+def plain(blocks: Iterable[Block]) -> str:
+    """For a terminal: tables in columns."""
+    return "\n".join(line for block in blocks if not block.brief for line in _plain(block))
+
+
+def _plain(block: Block) -> list[str]:
+    if block.kind != "table":
+        return [block.text]
+    rows = [[cell.text if isinstance(cell, Link) else cell for cell in row] for row in block.rows]
+    widths = [max(map(len, column)) for column in zip(*rows)]
+    return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
+
+
 def page(title: str, blocks: Iterable[Block]) -> str:
     """A whole page."""
     body = "".join(_html(block) for block in blocks if not block.brief)
@@ -107,3 +126,31 @@ def _html_cell(cell: Cell) -> str:
 
 def _safe(text: str) -> str:
     return html.escape(text)
+
+
+def load(file: Path, empty: Any = None) -> Any:
+    """A record; ``empty`` where there is none."""
+    return json.loads(file.read_text(encoding="utf-8")) if file.exists() else empty
+
+
+def save(record: Any, file: Path) -> None:
+    """Write a record whole or not at all; ValueError where it holds not-a-number."""
+    text = json.dumps(record, indent=1, allow_nan=False)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    write_text(file, text + "\n")
+
+
+def lines(file: Path) -> list[dict]:
+    """Rows that were appended to a file; the last one may be cut."""
+    rows = []
+    for line in file.read_text(encoding="utf-8").splitlines() if file.exists() else []:
+        with suppress(json.JSONDecodeError):
+            rows.append(json.loads(line))
+    return rows
+
+
+def append(row: dict, file: Path) -> None:
+    """Add a row to a file, so that a break loses one at most."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with file.open("a", encoding="utf-8") as opened:
+        opened.write(json.dumps(row) + "\n")

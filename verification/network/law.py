@@ -1,5 +1,9 @@
 """The law: its table of half-discs and of the mean of the plugs that growth makes, how far all other shapes are from
-them, how it is judged by shapes that it has not seen, and the page that tells it."""
+them, how it is judged by shapes that it has not seen, and the page that tells it.
+
+Fifty shapes that the fit of the law has not seen: half-discs, drawn bodies and plugs, and what growth makes, of
+sizes, positions, pores, velocities and lambdas drawn at random.
+"""
 
 from __future__ import annotations
 
@@ -114,9 +118,9 @@ RATIO = 2000.0
 TOLD = ((0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.3, 1.4, 1.5), (1.6, 1.75, 2.0, 2.5, 3.0, 4.0, 4.5))
 
 
-def shape_row(one: Sample, which: int, unseen: int) -> list:
+def shape_row(one: Sample, which: int, new: int) -> list:
     """A row of SHAPES; which: of the sample's lambdas."""
-    return [unseen, int(one.run is not None), int(one.spanned), one.ratios[which], one.share, one.lengths[which]]
+    return [new, int(one.run is not None), int(one.spanned), one.ratios[which], one.share, one.lengths[which]]
 
 
 def read(unseen: bool) -> dict[str, np.ndarray]:
@@ -206,3 +210,70 @@ def _told(spanned: bool) -> str:
     head = (f"A / W^2, {'touching both walls' if spanned else 'before contact'}", "r", "least", "most")
     rows = zip(shares, *added_resistance(shares, 1.0, spanned, RATIO))
     return markdown([table(head, ([f"{share:g}", *(f"{value:.3g}" for value in values)] for share, *values in rows))])
+
+
+SEED = 20261123
+HALF_DISCS, DRAWN_BODIES, DRAWN_PLUGS = 10, 8, 8
+#: Of half-discs, over W.
+DRAWN = (THICKNESSES[0], THICKNESSES[-1])
+#: Of plugs, areas over W^2; of half-discs and bodies, widths of the pore (um), on which nothing may depend.
+SHARES, WIDTHS = (2.1, 4.2), (20.0, 300.0)
+#: Runs, and shapes of each: no larger than this area over W^2, each larger than the one before by 5 % at least.
+NEW_RUNS, OF_EACH, LARGEST, FURTHER = 3, 8, 3.0, 1.05
+#: Hours that a run may take to become so large.
+END = 50
+
+
+def new_shapes() -> Iterator[Sample]:
+    """All fifty, each at a lambda of its own, or of its run."""
+    random = np.random.default_rng(SEED)
+    yield from _drawn(random)
+    for _ in range(NEW_RUNS):
+        yield from _grown(random)
+
+
+def _drawn(random: np.random.Generator) -> Iterator[Sample]:
+    """Half-discs in other pores and places, and drawn bodies and plugs."""
+    for _ in range(HALF_DISCS):
+        width, ratio = _log(random, *WIDTHS), _ratio(random)
+        thickness, position = random.uniform(*DRAWN), random.uniform(-1, 1) * width
+        now = shapes.half_disc(thickness, width, position, shapes.QUICK)
+        yield shapes.sample(now, (ratio,))
+    for _ in range(DRAWN_BODIES):
+        thicker, leaning = random.uniform(*shapes.THICKER), random.uniform(-1, 1) * shapes.LEANING
+        radius = random.uniform(DRAWN[0], DRAWN[1] / max(thicker, 1))
+        yield _outlined(shapes.body(0.5 * np.pi * radius**2, thicker, leaning), random)
+    for _ in range(DRAWN_PLUGS):
+        share, ends = random.uniform(*SHARES), random.uniform(*shapes.ENDS)
+        yield _outlined(shapes.plug(share, ends, random.uniform(1 - shapes.UPSTREAM, shapes.UPSTREAM)), random)
+
+
+def _outlined(points: np.ndarray, random: np.random.Generator) -> Sample:
+    now, ratio = shapes.drawn(points, _log(random, *WIDTHS)), _ratio(random)
+    return shapes.sample(now, (ratio,))
+
+
+def _grown(random: np.random.Generator) -> Iterator[Sample]:
+    """Shapes of a run that are in the law's range, their areas evenly from the first to the last."""
+    width, velocity = random.uniform(40, 150), _log(random, 0.5, 6)
+    supply = _log(random, max(shapes.LEAST_SUPPLY * width**2, 4), 20)
+    run = Growth(width, velocity, supply, random.uniform(0.05, 0.15) * width, random.uniform(-0.5, 0.5) * width, END)
+    ratio = _ratio(random)
+    found = [one for one in shapes.grown(run, LARGEST, FURTHER, (ratio,)) if _known(one)]
+    shares = np.array([one.share for one in found])
+    for share in np.linspace(shares[0], shares[-1], OF_EACH):
+        yield found[int(np.abs(shares - share).argmin())]
+
+
+def _known(one: Sample) -> bool:
+    low, high = known(one.spanned)
+    return low <= one.share <= high
+
+
+def _log(random: np.random.Generator, low: float, high: float) -> float:
+    """Between two values, evenly in the logarithm."""
+    return float(np.exp(random.uniform(np.log(low), np.log(high))))
+
+
+def _ratio(random: np.random.Generator) -> float:
+    return _log(random, shapes.RATIOS[0], shapes.RATIOS[-1])

@@ -159,8 +159,8 @@ class HalfCylinder:
         return np.stack([x, y], axis=-1) * (self.radius(R) / R)[..., None]
 
     def pressure(self, x, y) -> np.ndarray:
-        """P over mu_L."""
-        R = np.hypot(x, y)
+        """P over mu_L; the middle takes what is beside it."""
+        R = np.maximum(np.hypot(x, y), 1e-6 * RADIUS)
         flat = neo_hookean.cylinder_pressure(R.ravel(), self.inner, self.outer - self.inner, RADIUS)
         return flat.reshape(np.shape(R))
 
@@ -170,11 +170,12 @@ def size(held: Supported) -> float:
     return float(np.sqrt(2 * held.body.at.dx.sum() / len(held.cells)))
 
 
-def grown(held: Supported, theta: np.ndarray, path: Callable | None = None) -> growth.Equilibrium:
-    """Equilibrium under theta (t, q), raised by FACTOR at a time; ``path(part)`` are the prescribed places (n, 2) under
-    theta^part, those of t = 0 if there is none."""
+def grown(held: Supported, theta: np.ndarray, path: Callable | None = None, factor: float = FACTOR
+          ) -> growth.Equilibrium:
+    """Equilibrium under theta (t, q), raised by a factor at a time; ``path(part)`` are the prescribed places (n, 2)
+    under theta^part, those of t = 0 if there is none."""
     position, pressure = held.reference, held.resting
-    parts = int(np.ceil(np.log(max(theta.max(), 1 / theta.min())) / np.log(FACTOR)))
+    parts = max(1, int(np.ceil(np.log(max(theta.max(), 1 / theta.min())) / np.log(factor))))
     for part in np.arange(1, parts + 1) / parts:
         prescribed = path(part) if path else held.reference
         found = growth.equilibrium(held.body, theta**part, position, pressure, held.held, prescribed)

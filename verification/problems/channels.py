@@ -26,12 +26,12 @@ from repro.fem.space import Space
 from repro.model import flow, transport
 from repro.model.kinetics import Sink
 from repro.scene import load_scene
-from verification.kernel.case import Profile, compared
 from verification.problems import meshes
 
 SCENE = load_scene("base")
 WIDTH, SLAB = 10.0, 40.0
 NAMES = ("acceptor", "donor")
+HEIGHTS = 5
 #: Under plug flow the slab is 0 < x < SLAB; without flow |x| < SLAB, between films of fluid of thickness FILM or none.
 CROSSED, FILM = (-20.0, 60.0), 20.0
 #: The same with more fluid at both ends, for order 2 and 3.
@@ -178,25 +178,11 @@ def sample(space: Space, fields: np.ndarray, where: np.ndarray) -> np.ndarray:
     return meshes.field_at(space, fields.T, where).T
 
 
-def along(space: Space, fields: np.ndarray, x) -> np.ndarray:
-    """(K,) or (m, K) a field (n,), or fields (m, n), along the middle of the channel."""
-    return meshes.field_at(space, fields.T, np.column_stack([x, np.full(len(x), WIDTH / 2)])).T
-
-
-def at_heights(space: Space, fields: np.ndarray, x, heights: int = 5) -> np.ndarray:
-    """(2, heights, n) fields (2, n) at x (n,), at so many heights."""
-    y = WIDTH * (np.arange(heights) + 0.5) / heights
-    where = np.column_stack([np.tile(x, heights), np.repeat(y, len(x))])
-    return sample(space, fields, where).reshape(2, heights, -1)
-
-
-def pictured(title: str, x_label: str, x: np.ndarray, ours: np.ndarray, *others) -> Profile:
-    """Both substrates: ours (2, n) at x, and of others (name, kind, x, C (2, m))."""
-    curves = []
-    for k, name in enumerate(NAMES):
-        curves += [(name, "ours", x, ours[k]), *((f"{name}, {other}", kind, at, theirs[k])
-                                                 for other, kind, at, theirs in others)]
-    return Profile(title, x_label, "C (mg/L)", tuple(curves))
+def at_heights(space: Space, fields: np.ndarray, x) -> np.ndarray:
+    """(2, HEIGHTS, n) fields (2, n) at x (n,), at so many heights."""
+    y = WIDTH * (np.arange(HEIGHTS) + 0.5) / HEIGHTS
+    where = np.column_stack([np.tile(x, HEIGHTS), np.repeat(y, len(x))])
+    return sample(space, fields, where).reshape(2, HEIGHTS, -1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,12 +209,6 @@ def box_errors(grid: Mesh, problem: Box) -> dict[str, float]:
     heads = p[pressures.cells] @ meshes.fine(pressures)[2].T
     return {"velocity": meshes.relative(found, truth, weight),
             "pressure": meshes.relative(_centred(heads, weight), _centred(level, weight), weight)}
-
-
-def box_profile(grid: Mesh, problem: Box, s: np.ndarray, where: np.ndarray, along: np.ndarray, x_label: str) -> Profile:
-    """The component ``along`` of the velocity at places (K, 2), drawn over s (K,)."""
-    ours = meshes.field_at(Space(grid, problem.order), box_flow(grid, problem)[0], where)
-    return compared("velocity", x_label, "its component", s, ours @ along, problem.exact(*where.T)[0] @ along)
 
 
 def _centred(values, weight):

@@ -13,11 +13,8 @@ Norms of the error of fields of order 1, 2 or 3 on triangles, and what they are 
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from scipy.spatial import Delaunay
-from skfem import Basis, ElementTriP1, MeshTri
 from skfem.quadrature import get_quadrature_tri
 
 from repro.fem import elements, mesher, outline, sizing, transfer
@@ -158,12 +155,6 @@ def _meshed(points, triangles, is_biomass, ends, width: float, loop=()) -> Mesh:
     return Mesh.of(points, triangles, biomass, np.array(loop, int), width, tuple(map(float, ends)))
 
 
-def root_mean_square(measure: Callable[[int], dict[str, float]], draws: int) -> dict[str, float]:
-    """Each error over several random meshes of one size: ``measure(draw)`` gives {field: error}."""
-    rows = [measure(draw) for draw in range(draws)]
-    return {name: float(np.sqrt(np.mean([row[name] ** 2 for row in rows]))) for name in rows[0]}
-
-
 WEIGHTS = get_quadrature_tri(6)
 #: Degree of the rule for fields of any order: products of two cubic ones, and places on curved triangles.
 FINE = 10
@@ -210,12 +201,6 @@ def field_error(space: Space, values: np.ndarray, exact, chosen=slice(None)) -> 
 def field_at(space: Space, values: np.ndarray, where: np.ndarray) -> np.ndarray:
     """Values (count,) or (count, m) of a space at points (K, 2); those that round-off puts outside are moved in."""
     return transfer.located(space.mesh.points, space.mesh.cells, where).field(values, space.cells, space.order)
-
-
-def sample(points, triangles, values, where) -> np.ndarray:
-    """A nodal field (N,) or (N, m) at points (K, 2) of the mesh, by scikit-fem's search for the triangle of each."""
-    weights = Basis(MeshTri(points.T.copy(), triangles.T.copy()), ElementTriP1()).probes(where.T)
-    return weights @ np.asarray(values)
 
 
 def mean_size(mesh: Mesh) -> float:

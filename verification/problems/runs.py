@@ -8,18 +8,21 @@ import numpy as np
 
 from reference import averaged_pore
 from repro import results
-from repro.march.loop import Instant
+from repro.march import midpoint, updates
+from repro.march.loop import Instant, Step
 from repro.march.simulation import simulate
 from repro.model import pore
 from repro.model.pore import Pore, Solved
 from repro.scene import Scene, load_scene
 from verification.kernel.case import Profile
-from verification.problems import pairs
+from verification.problems import channels, pairs
 
 ROUND_OFF = "round-off"
 #: The velocity of base at t = 0, 2.9 m/d, in um/h.
 SPEED = 2.9e6 / 24
 PRESETS = ("paper", "fast", "accurate")
+#: Of a section, at which a mean is taken.
+POINTS = 16
 #: Kinds of elements, by the names that scenes have for them: of order 1, 2 and 3.
 ELEMENTS = ("linear", "quadratic", "cubic")
 
@@ -56,6 +59,13 @@ def every_step(end: str, *changes: str) -> Scene:
 def on_wall(heights: np.ndarray) -> np.ndarray:
     """Heights (n,) of a shape's points with the first and the last on the lower wall to the last bit."""
     return np.concatenate([[0.0], heights[1:-1], [0.0]])
+
+
+def step(scene: Scene, now: Pore, solved: Solved, hours: float) -> Step:
+    """A step by the scene's ``numerics.time``; of the midpoint rule, whatever its estimate."""
+    if scene.numerics.time == "updates":
+        return updates.step(scene, now, solved, hours)
+    return midpoint.attempt(scene, now, solved, hours).step
 
 
 def last(scene: Scene) -> Instant:
@@ -98,14 +108,14 @@ def density_drift(scene: Scene, instant: Instant) -> float:
     return float(np.abs(density / scene.kinetics.maximum_density - 1).max())
 
 
-def section_means(now: Pore, solved: Solved, x: np.ndarray, points: int = 16) -> np.ndarray:
+def section_means(now: Pore, solved: Solved, x: np.ndarray) -> np.ndarray:
     """(2, K) means of C_A and C_D over the sections x (K,) of the mesh."""
     found = solved.concentrations
-    place, weight = np.polynomial.legendre.leggauss(points)
+    place, weight = np.polynomial.legendre.leggauss(POINTS)
     y = 0.5 * now.mesh.width * (1 + place)
-    where = np.column_stack([np.repeat(x, points), np.tile(y, len(x))])
+    where = np.column_stack([np.repeat(x, POINTS), np.tile(y, len(x))])
     values = pairs.sample(now.space, np.column_stack([found.acceptor, found.donor]), where)
-    return np.einsum("kpm,p->mk", values.reshape(len(x), points, 2), 0.5 * weight)
+    return np.einsum("kpm,p->mk", values.reshape(len(x), POINTS, 2), 0.5 * weight)
 
 
 def growth_rates(scene: Scene, acceptor: float | None = None, donor: float | None = None) -> tuple[float, float]:
@@ -136,17 +146,11 @@ PLACES = 81
 def pore_of(scene: Scene, speed=None) -> averaged_pore.Pore:
     """The scene's numbers; speed: (loss, half length) -> u, the scene's mean velocity if none."""
     law, both, drive = scene.kinetics, scene.substrates, scene.flow
-    rates = {"k": law.maximum_utilization_rate, "F": law.acceptor_to_donor_ratio, "Y": law.yield_coefficient,
-             "b": law.decay_coefficient, "remains": law.decay_coefficient * (1 - law.degradable_fraction),
-             "decay": law.decay_oxygen_demand * law.degradable_fraction * law.decay_coefficient,
-             "K_A": both.acceptor.half_saturation, "K_D": both.donor.half_saturation}
-
-    def pair(name):
-        return getattr(both.acceptor, name), getattr(both.donor, name)
-
-    return averaged_pore.Pore(scene.pore.width, scene.pore.length, drive.viscosity_ratio, pair("supply"),
-                              pair("diffusivity"), pair("diffusivity_in_aggregate"), law.maximum_density, rates,
-                              speed or (lambda loss, reach: drive.mean_velocity))
+    rates = {**channels.rates(law, both), "Y": law.yield_coefficient, "b": law.decay_coefficient,
+             "remains": law.decay_coefficient * (1 - law.degradable_fraction)}
+    both_of = (channels.pair(name, both) for name in ("supply", "diffusivity", "diffusivity_in_aggregate"))
+    return averaged_pore.Pore(scene.pore.width, scene.pore.length, drive.viscosity_ratio, *both_of, law.maximum_density,
+                              rates, speed or (lambda loss, reach: drive.mean_velocity))
 
 
 def half_disc_radius(area: float) -> float:

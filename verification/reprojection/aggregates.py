@@ -17,11 +17,14 @@ from repro.fem.mesh import triangle_areas
 from repro.fem.outline import FREE
 from repro.model import remeshing
 from repro.model.transport import Concentrations
-from verification.kernel.case import Outcome, Profile, at_least, at_most, case, refine, study
+from verification.kernel.case import at_least, at_most, case, refine, study
 from verification.problems import aggregates, meshes, pairs
+from verification.problems.channels import NAMES, both
 
 #: The seed's radius (um), the increase of the biomass in an update, and how many of them: the area grows eightfold.
-RADIUS, INCREASE, UPDATES = 5.0, 0.08, 27
+RADIUS = 5.0
+INCREASE = 0.08
+UPDATES = 27
 
 
 @case("reprojection-mass", kind="exact",
@@ -44,8 +47,7 @@ def node_mass(order: int):
     dx = after.space.reaction.dx
     kept = {"X_A": ratio * (after.active / dx) / (density(x, y) * (1 + made)),
             "X_I": ratio * (after.inert / dx) / (50 + y)}
-    return [*(at_most(f"{kind}", np.abs(found - 1).max(), 1e-12, "(34): round-off")
-              for kind, found in kept.items()),
+    return [[at_most(kind, np.abs(found - 1).max(), 1e-12, "(34): round-off") for kind, found in kept.items()],
             at_most("weights", np.abs(dx - aggregates.areas(after)).max() / dx.max(), 1e-12,
                     "biomass triangles only: round-off"),
             at_least("spread of the ratios of areas", np.ptp(ratio), 0.05, "else nothing is tested")]
@@ -59,21 +61,24 @@ def node_mass(order: int):
       over=aggregates.EVERY)
 def half_disc(order: int):
     """Checks of 27 updates with elements of an order."""
-    given, now, rows, renewed = aggregates.scene(order=order), aggregates.seed(RADIUS, order=order), [], []
+    given = aggregates.scene(order=order)
+    now = aggregates.seed(RADIUS, order=order)
+    rows = []
+    renewed = []
     first = now.mass
     for update in range(1, UPDATES + 1):
         now, anew = aggregates.updated(given, now, INCREASE)
         renewed += [update] if anew else []
         rows.append(_errors(now, (1 + INCREASE) ** update, first))
-    round_off = 1e-12, "closed form: round-off"
-    bounds = {quantity: round_off for quantity in rows[0]}
+    bounds = dict.fromkeys(rows[0], (1e-12, "closed form: round-off"))
     if order > 1:
         bounds["radius"] = 1e-4, "arcs that are parabolas: (edge / R)^4 / 100"
-    checks = [at_most(f"{quantity}", max(row[quantity] for row in rows), *bound)
-              for quantity, bound in bounds.items()]
-    return [*checks, at_least("remeshes", len(renewed), 2.0, "else the transfer is not tested"),
-            at_most("first remesh, updates from (3.1)'s", abs(renewed[0] - _first_remesh()), 0.0,
-                    "meshed to 11 R_0, remade beyond 8 R")]
+    for quantity, bound in bounds.items():
+        yield at_most(quantity, max(row[quantity] for row in rows), *bound)
+    yield at_least("remeshes", len(renewed), 2.0, "else the transfer is not tested")
+    first = np.ceil(2 * np.log(11 / 8) / np.log(1 + INCREASE))  # 8 R_0 sqrt(theta) > 11 R_0
+    yield at_most("first remesh, updates from (3.1)'s", abs(renewed[0] - first), 0.0,
+                  "meshed to 11 R_0, remade beyond 8 R")
 
 
 def _errors(now, theta: float, first: float) -> dict[str, float]:
@@ -85,14 +90,12 @@ def _errors(now, theta: float, first: float) -> dict[str, float]:
             "theta": np.abs(now.theta / theta - 1).max(), "mass": abs(now.mass / first / theta - 1)}
 
 
-def _first_remesh() -> int:
-    """The first update after which 8 R_0 sqrt(theta) > 11 R_0."""
-    return int(np.ceil(2 * np.log(11 / 8) / np.log(1 + INCREASE)))
-
-
 GROWING_UPDATES, SEED = 30, 8.0
 #: Remesh where more than six triangles are under 0.6 (3.5), or nearer to an end than min(7 R, 1.3 W) (3.1).
-POOR, ALLOWED, REACH, WIDEST = 0.6, 6, 7.0, 1.3
+POOR = 0.6
+ALLOWED = 6
+REACH = 7.0
+WIDEST = 1.3
 
 
 @case("reprojection-growing", kind="property",
@@ -110,17 +113,9 @@ def growing(order: int):
     yield at_most("missing reach (um)", rows["missing"].max(), 1e-9, "remesh criterion (3.1)")
     yield at_least("remeshes", np.count_nonzero(rows["anew"]), 3, "else nothing is tested")
     if order == 1:
-        paper = _growing_grown("linear", 1)["drift"]
-        yield at_least("drift of the biomass by the paper's transfer", np.abs(paper).max(), 1e-4,
+        yield at_least("drift of the biomass by the paper's transfer",
+                       np.abs(_growing_grown("linear", 1)["drift"]).max(), 1e-4,
                        "not conserving [E8]: the case would see it")
-        yield _drifts(rows["drift"], paper)
-
-
-def _drifts(kept: np.ndarray, paper: np.ndarray) -> Profile:
-    update = np.arange(1, GROWING_UPDATES + 1)
-    return Profile("biomass less what was made", "update", "relative",
-                   (("conserving", "ours", update, kept), ("linear", "ours", update, paper),
-                    ("exact", "exact", update, 0.0 * update)))
 
 
 def _growing_grown(transfer: str, order: int) -> dict[str, np.ndarray]:
@@ -262,7 +257,6 @@ def order(order: int):
     yield at_most("area after the update, over biomass / X_m", rows["area"].max(), 1e-12,
                   "theta sums to the biomass: round-off")
     yield at_least("density over X_m less one, before it", rows["before"].min(), 0.03, "else nothing is restored")
-    yield _along_the_wall()
 
 
 #: Refinements of curved meshes.
@@ -295,12 +289,6 @@ def _hump(x, y):
     return aggregates.DENSITY * (1 + 0.05 * np.cos(np.pi * np.hypot(x, y) / ROUND))
 
 
-def _before_and_after(refinement: float, old: float):
-    """A half-disc with that density, and the same after a remesh."""
-    before = _round(refinement, old, _hump)
-    return before, _anew(refinement, before)
-
-
 def _round(refinement: float, old: float, density, order: int = 1):
     """A half-disc with a density (x, y) on a mesh coarser than the one to come."""
     seed = aggregates.half_disc(ROUND, refinement, order)
@@ -315,12 +303,12 @@ def _anew(refinement: float, before):
 def _density_errors(refinement: float) -> dict[str, float]:
     """Mean errors of one size."""
     rows = [_errors_of_a_pair(refinement, old) for old in OLD]
-    return {name: float(np.mean([row[name] for row in rows])) for name in rows[0]}
+    return dict(zip(rows[0], np.mean([[*row.values()] for row in rows], axis=0)))
 
 
 def _errors_of_a_pair(refinement: float, old: float) -> dict[str, float]:
     """Errors after the remesh, and after the update that follows it."""
-    _, new = _before_and_after(refinement, old)
+    new = _anew(refinement, _round(refinement, old, _hump))
     after, area = aggregates.expanded(aggregates.scene(), new, 0.0), new.mass / aggregates.DENSITY
     return {"carried": meshes.l2_error(*_body(new), _density(new), _hump), "restored": _off(after),
             "before": _off(new), "area": abs(after.outline.area / area - 1),
@@ -342,24 +330,12 @@ def _off(now) -> float:
     return meshes.l2_error(*_body(now), _density(now), lambda x, y: aggregates.DENSITY + 0 * x)
 
 
-def _along_the_wall() -> Profile:
-    """Density along the wall: before the remesh, after it, after the update."""
-    old, new = _before_and_after(1.0, 0.8)
-    last, x = aggregates.expanded(aggregates.scene(), new, 0.0), np.linspace(-19.0, 19.0, 191)
-    line, dots = np.column_stack([x, 0 * x + 1e-6]), x[::10]
-    curves = [(name, "ours", x, meshes.sample(*_body(now), _density(now) / aggregates.DENSITY, line))
-              for name, now in (("before", old), ("remeshed", new), ("updated", last))]
-    return Profile("density along the wall", "x (um)", "X_A / X_m",
-                   (*curves, ("exact before", "exact", dots, _hump(dots, 0 * dots) / aggregates.DENSITY),
-                    ("X_m", "reference", x, np.ones(len(x)))))
-
-
 @case("reprojection-remesh-arc", kind="exact",
       norm="largest relative difference; distance of the interface's nodes from a circle, over that before the update",
       claim="Where a remesh splits edges of what was the seed's arc, the new nodes were on it at t = 0, the polygon "
             "stays what it is, and the next update rounds it",
       mutants=("origin-on-the-chord",), ways="1", because="orders 2, 3 have arcs, which lie on it")
-def arc() -> Outcome:
+def arc():
     coarse, fine = (aggregates.scene('aggregate.radius="10 um"', f"numerics.refinement={r}") for r in (0.5, 1.0))
     grown = aggregates.expanded(coarse, aggregates.seed(10.0, 0.5), 3.0)
     new = aggregates.remeshed(fine, grown)
@@ -367,11 +343,11 @@ def arc() -> Outcome:
     free = new.wall == FREE
     added = np.count_nonzero(free) / np.count_nonzero(grown.wall == FREE)
     beside = np.abs(np.hypot(*new.outline.origin[free].T) / 10 - 1).max()
-    return Outcome((at_most("beside the arc at t = 0", beside, 1e-12, "the seed's arc: round-off"),
-                    at_most("area of the polygon", abs(new.outline.area / grown.outline.area - 1), 1e-12, "round-off"),
-                    at_most("unroundness left", _unround(after) / _unround(new), 0.25,
-                            "edges half as long: a quarter of the sag"),
-                    at_least("interface nodes, after over before", added, 1.9, "split, else nothing is tested")))
+    return [at_most("beside the arc at t = 0", beside, 1e-12, "the seed's arc: round-off"),
+            at_most("area of the polygon", abs(new.outline.area / grown.outline.area - 1), 1e-12, "round-off"),
+            at_most("unroundness left", _unround(after) / _unround(new), 0.25,
+                    "edges half as long: a quarter of the sag"),
+            at_least("interface nodes, after over before", added, 1.9, "split, else nothing is tested")]
 
 
 def _unround(now) -> float:
@@ -393,11 +369,17 @@ def beyond_the_ends(order: int):
     old = _exact(np.clip(now.space.points[:, 0], *ENDS))
     flowing, still = (_carried(now, old, speed) for speed in (SPEED, 0.0))
     x = flowing.space.points[:, 0]
-    for column, name in enumerate(("acceptor", "donor")):
-        yield _ends_judged(name, now, old[column], flowing, still, column)
+    outside = (x < ENDS[0]) | (x > ENDS[1])
+    fields = [both(new.concentrations) for new in (flowing, still)]
+    for name, substrate, before, exact, found, resting in zip(NAMES, _substrates(), old, _exact(x), *fields):
+        between = pairs.sample(now.space, before, flowing.space.points[~outside])
+        gaps = {"beyond the ends": (found - exact)[outside], "between": found[~outside] - between,
+                "beyond the ends, no flow": resting[outside] - substrate.supply,
+                "between, no flow": resting[~outside] - between}
+        for where, gap in gaps.items():
+            yield at_most(f"{name} {where}", np.abs(gap).max() / substrate.supply, 1e-12, "closed form: round-off")
     yield at_least("reach beyond both ends (um)", min(ENDS[0] - x.min(), x.max() - ENDS[1]), 20.0,
                    "else nothing is tested")
-    yield _along(flowing)
 
 
 def _substrates():
@@ -414,30 +396,3 @@ def _carried(now, old, speed: float):
     """The pore on its new mesh; the whole of what the flow says there is its mean velocity."""
     filled = replace(now, concentrations=Concentrations(*old))
     return remeshing.remesh(aggregates.scene(order=now.space.order), filled, filled, speed)[0]
-
-
-def _ends_judged(name: str, now, old: np.ndarray, flowing, still, column: int) -> list:
-    """Checks of one substrate."""
-    supply, x = _substrates()[column].supply, flowing.space.points[:, 0]
-    found, resting = (_fields(new)[column] for new in (flowing, still))
-    outside, inside = (x < ENDS[0]) | (x > ENDS[1]), (x >= ENDS[0]) & (x <= ENDS[1])
-    between = pairs.sample(now.space, old, flowing.space.points[inside])
-    gaps = {"beyond the ends": (found - _exact(x)[column])[outside], "between": found[inside] - between,
-            "beyond the ends, no flow": resting[outside] - supply, "between, no flow": resting[inside] - between}
-    return [at_most(f"{name} {where}", np.abs(gap).max() / supply, 1e-12, "closed form: round-off")
-            for where, gap in gaps.items()]
-
-
-def _fields(new):
-    return new.concentrations.acceptor, new.concentrations.donor
-
-
-def _along(new) -> Profile:
-    """Both concentrations along the lower wall of the new mesh."""
-    places = new.space.points
-    wall = np.flatnonzero(places[:, 1] == 0)
-    wall = wall[np.argsort(places[wall, 0])]
-    x, curves = places[wall, 0], []
-    for substrate, found, exact in zip(("acceptor", "donor"), _fields(new), _exact(x)):
-        curves += [(substrate, "ours", x, found[wall]), (f"{substrate}, closed form", "exact", x, exact)]
-    return Profile("carried to a longer mesh (old: -40 to 30 um)", "x (um)", "C (mg/L)", tuple(curves))

@@ -7,7 +7,7 @@ import importlib.util
 import sys
 import time
 
-from verification.sampled import drawing, hunting, page, reach
+from verification.sampled import drawing, hunting, trying
 
 #: Hours that the second round may take, at a release.
 HOURS = 4.0
@@ -22,13 +22,13 @@ def main(arguments: list[str] | None = None) -> int:
         return 2
     began = time.time()
     sample = drawing.sample(drawing.sources())
-    known = reach.measured(chosen.reach)
+    known = trying.measured(chosen.reach)
     hunting.hunt(hunting.due(sample, hunting.kept(), known, False), known, chosen.jobs, False, began + 3600 * HOURS)
     if chosen.whole:
         left = hunting.due(sample, hunting.kept(), known, True)
         hunting.hunt(left, known, chosen.jobs, True, time.time() + 3600 * HOURS)
     hunting.confirm(_of(sample))
-    return page.record(_of(sample), len(sample))
+    return hunting.record(_of(sample), len(sample))
 
 
 def _of(sample: list[drawing.Mutant]) -> list[hunting.Row]:

@@ -8,9 +8,10 @@ rounding that comes nearest to all printed numbers of base at once. The claims r
 
 from __future__ import annotations
 
-import json
 from functools import cache
 from pathlib import Path
+
+from verification.kernel.writing import load
 
 RECORD = Path(__file__).parent / "sensitivity.json"
 
@@ -18,7 +19,7 @@ RECORD = Path(__file__).parent / "sensitivity.json"
 @cache
 def record() -> dict:
     """The committed record; empty where there is none."""
-    return json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.exists() else {}
+    return load(RECORD, {})
 
 
 def interval(quantity: str, value: float) -> tuple[float, float] | None:

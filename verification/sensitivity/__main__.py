@@ -22,7 +22,7 @@ from repro.results import write_json, write_text
 from verification import sensitivity
 from verification.kernel.writing import Block, markdown, table
 from verification.sensitivity import rounding, wide
-from verification.sensitivity.numbers import INPUTS, ROUNDED, Runs, scene
+from verification.sensitivity.rounding import INPUTS, ROUNDED, Runs, scene
 
 TARGET, OUTLINES = (Path(__file__).parent / name for name in ("tornado.svg", "supplies.svg"))
 NAMES = {"velocity_0": "mean velocity, t = 0", "velocity": "mean velocity, 19.2 h",

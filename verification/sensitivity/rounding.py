@@ -1,4 +1,7 @@
-"""What the rounding of Table 1 allows in base and wide: elasticities, one set of inputs for all printed numbers of
+"""The inputs of base and wide, those that Table 1 prints with so many digits and those that are taken as exact; and the
+numbers that a run comes to, each run computed once and kept on the disk.
+
+What the rounding of Table 1 allows in base and wide: elasticities, one set of inputs for all printed numbers of
 base, and Sobol indices.
 
 **Elasticities** d ln(number) / d ln(input), by central differences. Two runs on either side at two distances give two
@@ -17,16 +20,170 @@ again from there. Where t > 1 the misfit that is left at t = 1 is minimised inst
 **Sobol indices** of base: how much of the variance of each printed number an input's rounding accounts for. Inputs are
 independent and uniform within their rounding; those whose elasticity moves no printed number by half a percent a
 percent are left where they are. `scipy.stats.sobol_indices` (Saltelli 2010) with N (d + 2) runs in the preset "fast",
-and its bootstrap's intervals."""
+and its bootstrap's intervals.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import log
+from pathlib import Path
 
 import numpy as np
 from scipy.optimize import linprog
 from scipy.stats import sobol_indices, uniform
 
+from repro.march import simulation, updates
+from repro.model import kinetics, pore
+from repro.results import M_PER_D, write_json
+from repro.run.machine import source_hash
+from repro.scene import Scene, load_scene, needed, scene_hash
 from verification.claims import interval
-from verification.sensitivity.numbers import INPUTS, ROUNDED, Input, Numbers, Runs, scene
+from verification.claims.base_run import DISTANCES, END, upstream_means
+from verification.claims.levels import converged
+from verification.kernel.writing import load
+
+
+@dataclass(frozen=True)
+class Input:
+    """name: as the paper has it; paths: keys of the scene that go with it, in proportion; value: as printed; half: half
+    a unit of its last digit, zero where it is taken as exact; only: the scene it belongs to, where not to both."""
+
+    name: str
+    paths: tuple[str, ...]
+    value: float
+    half: float = 0.0
+    only: str = ""
+
+    @property
+    def rounding(self) -> float:
+        """The half unit over the value."""
+        return self.half / self.value
+
+
+def _of(substrate: str, *keys: str) -> tuple[str, ...]:
+    return tuple(f"substrates.{substrate}.{key}" for key in keys)
+
+
+#: The supply is printed as 10 K_s, and goes with K_s.
+ROUNDED = (
+    Input("k", ("kinetics.maximum_utilization_rate",), 9.3, 0.05),
+    Input("Y", ("kinetics.yield_coefficient",), 0.61, 0.005),
+    Input("b", ("kinetics.decay_coefficient",), 0.12, 0.005),
+    Input("f_d", ("kinetics.degradable_fraction",), 0.8, 0.05),
+    Input("d_c", ("kinetics.decay_oxygen_demand",), 1.42, 0.005),
+    Input("F", ("kinetics.acceptor_to_donor_ratio",), 1.52, 0.005),
+    Input("K_sA", _of("acceptor", "half_saturation", "supply"), 1.0, 0.05),
+    Input("K_sD", _of("donor", "half_saturation", "supply"), 1.0, 0.05),
+    Input("D_a", _of("acceptor", "diffusivity"), 2.32, 0.005),
+    Input("D_fa", _of("acceptor", "diffusivity_in_aggregate"), 1.85, 0.005),
+    Input("D_d", _of("donor", "diffusivity"), 1.01, 0.005),
+    Input("D_fd", _of("donor", "diffusivity_in_aggregate"), 0.81, 0.005),
+)
+EXACT = (
+    Input("X_m", ("kinetics.maximum_density",), 30000.0),
+    Input("R_0", ("aggregate.radius",), 5.0),
+    Input("W_pore", ("pore.width",), 50.0),
+    Input("L_pore", ("pore.length",), 600.0),
+    Input("head", ("flow.head",), 1e-3, only="base"),
+    Input("u_ave", ("flow.mean_velocity",), 2.9, only="wide"),
+    Input("supply of acceptor", _of("acceptor", "supply"), 10.0),
+    Input("supply of donor", _of("donor", "supply"), 10.0),
+    Input("lambda", ("flow.viscosity_ratio",), 2000.0),
+    Input("mu_L", ("growth.shear_modulus",), 0.01),
+    Input("film", ("growth.minimum_film",), 2.0),
+    Input("contact angle", ("growth.minimum_contact_angle",), 16.7),
+    Input("time step", ("growth.time_step",), 12.0),
+)
+INPUTS = ROUNDED + EXACT
+BY_NAME = {each.name: each for each in INPUTS}
+
+
+def changed(said: Scene, factors: dict[str, float]) -> Scene:
+    """A scene with some inputs, by name, times factors."""
+    for name, factor in factors.items():
+        for path in BY_NAME[name].paths:
+            said = _scaled(said, path.split("."), factor)
+    return said
+
+
+def _scaled(node, keys: list[str], factor: float):
+    first, *rest = keys
+    part = needed(getattr(node, first), ".".join(keys))
+    return replace(node, **{first: _scaled(part, rest, factor) if rest else factor * part})
+
+
+def factors_of(values: dict[str, float]) -> dict[str, float]:
+    """Values of inputs, in the paper's units, over those printed."""
+    return {name: value / BY_NAME[name].value for name, value in values.items()}
+
+
+KEPT = Path(__file__).parent / "out" / "runs.json"
+#: Conductivity is asked for so long after contact, h.
+AFTER = 4.0
+
+Numbers = dict[str, float]
+
+
+def scene(name: str, factors: dict[str, float], *changes: str) -> Scene:
+    """Base or wide in the converged solution's preset, or with other numerics, with inputs times factors."""
+    return changed(load_scene(name, changes or converged(1.0)), factors)
+
+
+def of_base(said: Scene) -> Numbers:
+    """What section 4 prints, concentrations in K_s; "before the aggregate expands" is the shape a time step before
+    19.4 h with what grows in it [E12]."""
+    plotted = END - said.growth.time_step
+    said = replace(said, growth=replace(said.growth, end=END), output=replace(said.output, times=(plotted, END)))
+    first, shaped, last = simulation.simulate(said)
+    grown, _, _ = updates.make_biomass(said, shaped.pore, shaped.solved, said.growth.time_step)
+    found = pore.solve(said, grown)
+    halves = [each.half_saturation for each in found.problem.both]
+    acceptor, donor = (flux.effluent / half for flux, half in zip(found.fluxes, halves))
+    supply = [each.supply for each in found.problem.both]
+    rate = float(kinetics.growth_rate(*supply, said.substrates, said.kinetics))
+    return {"velocity_0": M_PER_D * first.solved.flow.mean_velocity,
+            "velocity": M_PER_D * shaped.solved.flow.mean_velocity,
+            "effluent_acceptor": acceptor, "effluent_donor": donor,
+            "consumed": 100 * (1 - acceptor * halves[0] / supply[0]),
+            **{f"acceptor_at_{d:g}": upstream_means(grown, found, d)[0] / halves[0] for d in DISTANCES},
+            "inert": 100 * last.pore.composition(said.kinetics.maximum_density)[0],
+            "area": shaped.pore.boundary.area,
+            "doubling": plotted * log(2) / log(shaped.pore.boundary.area / first.pore.boundary.area),
+            "doubling_at_supply": log(2) / rate}
+
+
+def of_wide(said: Scene) -> Numbers:
+    """Contact with the opposite wall (h), and the conductivity (m/d) some hours after it."""
+    said = replace(said, output=replace(said.output, times=(said.growth.end,)))
+    touching = next(state for state, _ in simulation.steps(said) if state.pore.contact)
+    end = touching.pore.time + AFTER
+    later = replace(said, growth=replace(said.growth, end=end), output=replace(said.output, times=(end,)))
+    *_, (_, last) = simulation.steps(later, touching)
+    return {"contact_time": touching.pore.time, "conductivity_after": M_PER_D * last.solved.flow.conductivity}
+
+
+OF: dict[str, Callable[[Scene], Numbers]] = {"base": of_base, "wide": of_wide}
+
+
+class Runs:
+    """Runs that have been computed with this source; each new one is kept at once, so that a break loses one run."""
+
+    def __init__(self, path: Path = KEPT) -> None:
+        self.path = path
+        self.known: dict[str, Numbers] = load(path, {})
+
+    def numbers(self, said: Scene) -> Numbers:
+        """What a scene's run comes to."""
+        key = f"{said.name}-{scene_hash(said)}-{source_hash()}"
+        if key not in self.known:
+            with np.errstate(all="raise", under="ignore"):
+                self.known[key] = {name: float(value) for name, value in OF[said.name](said).items()}
+            self.path.parent.mkdir(exist_ok=True)
+            write_json(self.path, self.known)
+        return self.known[key]
+
 
 #: Relative distances of an input from its printed value; the larger one of an input that is taken as exact.
 NEAR, FAR, LARGE = 0.01, 0.02, 0.1
@@ -110,14 +267,15 @@ def program(start: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, float]:
     middle, half = (np.array([weight @ pair for pair in targets().values()])
                     for weight in (np.array([0.5, 0.5]), AIMED * np.array([-0.5, 0.5])))
     rounding = np.array([each.rounding for each in ROUNDED])
-    A, column = slopes * rounding, np.ones((len(start), 1))
-    box, ones = np.vstack([np.eye(len(rounding)), -np.eye(len(rounding))]), np.ones((2 * len(rounding), 1))
-    inside = np.concatenate([middle + half - start, start - middle + half])
-    tight = np.hstack([np.vstack([np.vstack([A, -A]), box]), np.vstack([0 * column, 0 * column, -ones])])
-    best = _solved(tight, np.concatenate([inside, np.zeros(2 * len(rounding))]), None)
+    A, unit = slopes * rounding, np.eye(len(rounding))
+    none, ones = np.zeros((len(start), 1)), np.ones((len(rounding), 1))
+    tight = np.block([[A, none], [-A, none], [unit, -ones], [-unit, -ones]])
+    inside = np.concatenate([middle + half - start, start - middle + half, np.zeros(2 * len(rounding))])
+    best = _solved(tight, inside, None)
     if best is not None and best[-1] <= 1:
         return best[:-1] * rounding, float(best[-1])
-    loose = np.hstack([np.vstack([A, -A]), -np.vstack([half[:, None], half[:, None]]) / AIMED])
+    reach = half[:, None] / AIMED
+    loose = np.block([[A, -reach], [-A, -reach]])
     least = _solved(loose, np.concatenate([middle - start, start - middle]), 1.0)
     return least[:-1] * rounding, float(best[-1]) if best is not None else float("inf")
 
@@ -135,19 +293,19 @@ FAST = ('numerics.preset="fast"',)
 
 def moving(elasticities: dict[str, dict[str, dict]]) -> list[Input]:
     """Rounded inputs with an elasticity above LEAST of any printed number."""
-    return [each for each in ROUNDED
-            if max(abs(elasticities[name][each.name]["elasticity"]) for name in PRINTED) > LEAST]
+    return [each for each in ROUNDED if any(_moves(each, elasticities[name]) for name in PRINTED)]
 
 
-def _moved(known: dict[str, dict]) -> bool:
-    """Does any rounded input move a number?"""
-    return max(abs(known[each.name]["elasticity"]) for each in ROUNDED) > LEAST
+def _moves(each: Input, known: dict[str, dict]) -> bool:
+    """Does an input move a number?"""
+    return abs(known[each.name]["elasticity"]) > LEAST
 
 
 def sobol(runs: Runs, elasticities: dict[str, dict[str, dict]], samples: int) -> dict:
     """First-order and total indices of each printed number, with their intervals."""
     chosen = moving(elasticities)
-    names = [name for name in PRINTED if name != "consumed" and _moved(elasticities[name])]
+    names = [name for name in PRINTED
+             if name != "consumed" and any(_moves(each, elasticities[name]) for each in ROUNDED)]
 
     def numbers(x: np.ndarray) -> np.ndarray:
         rows = [runs.numbers(scene("base", dict(zip([each.name for each in chosen], column)), *FAST)) for column in x.T]

@@ -28,7 +28,7 @@ from verification.claims.evaluate import MESH_ORDERS, unnumbered
 from verification.claims.growth_pattern import contact_length
 from verification.claims.levels import CONVERGED, OF_WIDE, Level, at_level, converged, forget
 from verification.claims.runs import WIDE, bodies, polygon, series
-from verification.sensitivity.numbers import OF, Numbers, Runs, scene
+from verification.sensitivity.rounding import OF, Numbers, Runs, scene
 from verification.uncertainty import estimate
 
 SIZES = (0.5, 2**-0.5, 1.0, 2**0.5)

@@ -19,7 +19,7 @@ from repro.fem.sizing import ACROSS_PORE
 from repro.fem.space import Space
 from repro.model import flow, transport
 from repro.model.kinetics import Sink
-from verification.kernel.case import BAND, Profile, around, at_most, case, compared, refine, studies
+from verification.kernel.case import BAND, around, at_most, case, refine, studies
 from verification.problems import meshes
 from verification.problems.channels import (
     CROSSED,
@@ -33,7 +33,6 @@ from verification.problems.channels import (
     SLAB,
     WIDE,
     WORDS,
-    along,
     apart,
     both,
     carrying,
@@ -43,11 +42,9 @@ from verification.problems.channels import (
     in_points,
     length,
     pair,
-    pictured,
     problem,
     rates,
     relative,
-    sample,
     spaced,
     steady,
 )
@@ -87,9 +84,6 @@ def robin(order: int, peclet: float, ends, ceiling: float):
     if order > 1:
         at, bound = LEAVING[order]
         yield at_most("C leaving", errors["leaving"][at], bound, FUNCTIONAL[order][1])
-    else:
-        x, space = np.linspace(*CROSSED, 81), spaced(FINEST, 0)
-        yield _curves(x, along(space, _robin_found(space, peclet)[1].donor, x), _robin_exact(peclet)(x))
 
 
 def _robin_errors(size: float, number: int, order: int, peclet: float, ends) -> dict[str, float]:
@@ -118,10 +112,6 @@ def _robin_speed(peclet: float) -> float:
 def _robin_exact(peclet: float):
     return lambda x: robin_channel.strip(x, _robin_speed(peclet), DONOR.supply, DONOR.diffusivity,
                                          DONOR.diffusivity_in_aggregate, UPTAKE, SLAB)
-
-
-def _curves(x, ours, exact) -> Profile:
-    return compared("along the channel", "x (um)", "C (mg/L)", x, ours, exact, "closed form")
 
 
 @cache
@@ -179,11 +169,6 @@ def first_order(order: int, modulus: float, film: float, ceiling: float, taken: 
         yield studies(errors, {"taken up": (around(expected, order * BAND), why, taken)})
     else:  # soon at round-off
         yield at_most("taken up", errors["taken up"][-1], taken, why)
-    if order == 1:
-        space, field, _ = _at_rest(FINEST, 0, _kappa(modulus) * LARGE, LARGE, film)
-        x = np.linspace(-SLAB - film, SLAB + film, 121)
-        yield _curves(x, along(space, field, x), slab.first_order(x, ACCEPTOR.supply, _kappa(modulus),
-                                                                  **_sides(film))[0])
 
 
 def _kappa(modulus: float) -> float:
@@ -203,7 +188,9 @@ def _first_order_errors(size: float, number: int, modulus: float, film: float, o
             "taken up": abs(taken / exact(0.0)[1] - 1)}
 
 
-DEPTH, LIMIT, LEAST = 20.0, (0.3, 0.1, 0.03, 0.01), 1e-3
+DEPTH = 20.0
+LIMIT = (0.3, 0.1, 0.03, 0.01)
+LEAST = 1e-3
 #: Order, K (mg/L), film (um), elements (um) with how many meshes of each, and the last errors of C and of the depth;
 #: of orders 2 and 3 without films: with more of K what is left in the middle shows.
 MONOD = {"K = 0.1 mg/L, linear": (1, 0.1, 0.0, SAMPLES, 3e-4, 4e-5),
@@ -214,12 +201,12 @@ MONOD = {"K = 0.1 mg/L, linear": (1, 0.1, 0.0, SAMPLES, 3e-4, 4e-5),
 
 
 def _monod(order: int, half_saturation: float, film: float, samples: dict, ceiling: float, depth: float):
-    errors = refine(_monod_errors, samples, half_saturation, film, order)
-    yield studies(errors, {"C": (*EXPECTED[order], ceiling)})
+    errors, rows = refine(_monod_errors, samples, half_saturation, film, order), {"C": (*EXPECTED[order], ceiling)}
     if order == 1:
-        yield studies(errors, {"depth": (*FUNCTIONAL[order], depth)})
+        rows["depth"] = (*FUNCTIONAL[order], depth)
     else:
         yield at_most("depth", errors["depth"][-1], depth, FUNCTIONAL[order][1])
+    yield studies(errors, rows)
 
 
 def _monod_errors(size: float, number: int, half_saturation: float, film: float, order: int) -> dict[str, float]:
@@ -266,13 +253,6 @@ def _exhausted(film: float):
     yield at_most("C beyond the depth of penetration, over the supply", field[beyond].max() / ACCEPTOR.supply, 1e-8,
                   "falls by h^2 s / (D K), 20 or more, an element")
     yield at_most("least C, over the supply", field.min() / ACCEPTOR.supply, 1e-8, "C >= 0")
-    space, field, _ = _at_rest(FINEST, 0, _sink(film), LIMIT[-1], film)
-    x = np.linspace(-SLAB - film, SLAB + film, 121)
-    given = {"x": x, "supply": ACCEPTOR.supply, "sink": _sink(film), **_sides(film)}
-    curves = (("ours", "ours", x, along(space, field, x)),
-              ("Monod, closed form", "reference", x, slab.monod(half_saturation=LIMIT[-1], **given)[0]),
-              ("zero order", "exact", x, slab.zero_order(**given)))
-    yield Profile(f"K = {LIMIT[-1]:g} mg/L", "x (um)", "C (mg/L)", curves)
 
 
 @case("transport-zero-order-slab", kind="exact",
@@ -289,7 +269,10 @@ def zero_order(judge, *row):
     return judge(*row)
 
 
-WIDTH, RADIUS, ENDS, LARGEST = 50.0, 20.0, (-65.0, 65.0), 3e5
+WIDTH = 50.0
+RADIUS = 20.0
+ENDS = (-65.0, 65.0)
+LARGEST = 3e5
 SUBSTRATES = replace(SCENE.substrates, donor=replace(SCENE.substrates.donor, half_saturation=3.0))
 #: Refinements of each order, and how many unrelated meshes about each: the refinement is NEAR times the last one's, up
 #: and down.
@@ -441,10 +424,8 @@ def _through(space: Space, nodes, owner, ends, mean: float, supply: float, chose
 def chosen_concentrations(order: int, peclet: float, inlet: str, ceilings: tuple[float, float]):
     errors = refine(_chosen_errors, REFINEMENTS[order], order, peclet, inlet)
     cells = " to ".join(f"{peclet * size / WIDTH:.1g}" for size in errors["size"][[-1, 0]])
-    yield studies(errors, {name: (*_expected(order, peclet), ceiling) for name, ceiling in zip(NAMES, ceilings)},
-                  f", elements' {cells}")
-    if order == 1 and inlet == "local":
-        yield _chosen_profile(peclet)
+    return studies(errors, {name: (*_expected(order, peclet), ceiling) for name, ceiling in zip(NAMES, ceilings)},
+                   f", elements' {cells}")
 
 
 def _chosen_errors(refinement: float, number: int, order: int, peclet: float, inlet: str) -> dict[str, float]:
@@ -457,13 +438,3 @@ def _chosen_errors(refinement: float, number: int, order: int, peclet: float, in
 
     gap, size = apart(space, found, truth)
     return {"size": length(space, WIDTH / ACROSS_PORE / refinement), **dict(zip(NAMES, gap / size))}
-
-
-def _chosen_profile(peclet: float) -> Profile:
-    """Along the pore, a tenth of its width above the lower wall."""
-    (space, found), (_, sides) = _solved(max(REFINEMENTS[1]), 0, 1, peclet, "local"), _chosen(peclet)
-    x = np.linspace(ENDS[0], ENDS[1], 66)
-    where = np.column_stack([x, np.full(len(x), WIDTH / 10)])
-    inside = np.hypot(*where.T) < RADIUS
-    chosen = np.array([_by_side(inside, _of(sides, k), "value", *where.T[:, :, None])[:, 0] for k in (0, 1)])
-    return pictured(f"y = {WIDTH / 10:g} um", "x (um)", x, sample(space, found, where), ("chosen", "exact", x, chosen))

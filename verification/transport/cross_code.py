@@ -33,7 +33,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.integrate import solve_ivp
 from scipy.spatial import cKDTree
-from skfem import Basis, BilinearForm, ElementTriP2, ElementTriP3, MeshTri
+from skfem import Basis, BilinearForm, MeshTri
 
 from reference import channel_bvp, channel_fipy
 from reference import diffusion_reaction_pypde as pypde
@@ -44,7 +44,7 @@ from repro.fem.space import Space
 from repro.model import gear, kinetics, transport
 from repro.model.kinetics import Sink
 from verification.kernel.case import Profile, at_most, case, combined, refine, studies
-from verification.problems import meshes
+from verification.problems import meshes, runs
 from verification.problems.channels import (
     CROSSED,
     EXPECTED,
@@ -54,7 +54,6 @@ from verification.problems.channels import (
     SCENE,
     SLAB,
     WIDE,
-    along,
     apart,
     at_heights,
     both,
@@ -63,7 +62,6 @@ from verification.problems.channels import (
     following,
     length,
     pair,
-    pictured,
     problem,
     rates,
     sample,
@@ -71,6 +69,7 @@ from verification.problems.channels import (
     speed_of,
     steady,
 )
+from verification.problems.pairs import ELEMENTS
 
 LINEAR = {"linear": 1}
 HIGHER = {word: order for word, order in ORDERS.items() if order > 1}
@@ -116,8 +115,9 @@ FINER = {2: ({3.2: 12, 1.6: 6, 0.8: 3, 0.4: 1}, 1e-10, 1e-7), 3: ({6.4: 12, 3.2:
            "value; several meshes a size",
       claim="Dual Monod uptake under plug flow is solve_bvp's at Peclet 0.1, 1, 5 times Thiele numbers 0.6, 1.9, 6, "
             "from barely touched to starved",
-      mutants=("decay-demand", "ratio-on-the-donor-only", "reaction-in-the-fluid", "exchanged-substrates"),
-      over=combined(LINEAR, PECLETS, DENSITIES), because="orders 2, 3: transport-monod-higher")
+      mutants=("decay-demand", "no-inlet-flux", "ratio-on-the-donor-only", "reaction-in-the-fluid",
+               "exchanged-substrates"), over=combined(LINEAR, PECLETS, DENSITIES),
+      because="orders 2, 3: transport-monod-higher")
 @case("transport-monod-higher", kind="cross-code", slow=True,
       norm="root mean square over the mesh of both substrates less solve_bvp, over the supply",
       claim="Dual Monod uptake under plug flow on quadratic and cubic triangles is solve_bvp's, to third and fourth "
@@ -134,9 +134,6 @@ def collocation(order: int, peclet: float, density: float):
     else:
         samples, _, ceiling = FINER[order]
         yield studies(refine(_root_mean_square, samples, order, peclet, density), {"C": (*EXPECTED[order], ceiling)})
-        truth, ours, x = exact(peclet, density), found(1.6, 0, peclet, density, order, WIDE), np.linspace(*WIDE, 121)
-        yield pictured("along the channel", "x (um)", x, along(spaced(1.6, 0, order, WIDE), ours, x),
-                       ("solve_bvp", "exact", x[::6], truth(x[::6])))
 
 
 def _distances(size: float, number: int, peclet: float, density: float) -> dict[str, float]:
@@ -206,7 +203,6 @@ def finite_differences(shape: str, order: int, density: float, *ceilings: float)
         samples, why = (BLOCK, "both of second order") if shape == "block" else (dict.fromkeys(DISC, 1), CUT)
         rows = {name: (2, why, ceiling) for name, ceiling in zip(names, ceilings)}
         yield studies(refine(_as_long, samples, density, shape), rows)
-        yield _across(shape, min(samples), density)
     elif shape == "block":
         rows = {name: (2, "py-pde's second order", ceiling) for name, ceiling in zip(names, ceilings)}
         yield studies(refine(_at_rest, BLOCK, density, shape, order), rows, ", of py-pde less ours")
@@ -258,15 +254,6 @@ def _less(space: Space, state: transport.Concentrations, cell: float, density: f
     return {**_over_the_supply(ours - theirs), ITSELF: np.sqrt(np.mean(ratio**2))}
 
 
-def _across(shape: str, cell: float, density: float) -> Profile:
-    """Across the box, over the middle of the biomass."""
-    points, theirs, _ = _pypde(cell, density, shape)
-    made, sink_ = _diffusing(_spaced(cell, 0, shape), density)
-    on = points[:, 0] == points[points[:, 0] > 0, 0].min()
-    ours, y = sample(made.space, both(transport.steady(made, sink_)), points[on]), points[on, 1]
-    return pictured("x = 0", "y (um)", y, ours, ("py-pde", "reference", y, theirs[:, on]))
-
-
 LAW = replace(SCENE.kinetics, yield_coefficient=1e-12)
 #: h: 0.07, 0.2 and 0.7 s. Water diffuses across the slab in 0.6 s, and crosses it in 0.1 to 6 s.
 TIMES = (2e-5, 6e-5, 2e-4)
@@ -291,7 +278,9 @@ def _assembled(size: float, number: int, peclet: float, order: int = 1) -> trans
 @cache
 def _ours(size: float, number: int, peclet: float, density: float, steps: int, order: int = 1) -> np.ndarray:
     """(times, 2, n): each interval in equal steps, started anew from the end of the last."""
-    made, states, last = _assembled(size, number, peclet, order), [], 0.0
+    made = _assembled(size, number, peclet, order)
+    states = []
+    last = 0.0
     active = filled(made.space, density)
     now = transport.supplied_everywhere(made)
     for time in TIMES:
@@ -312,8 +301,8 @@ def mass(space: Space) -> np.ndarray:
     if space.order == 1:
         return np.diag(space.lumped())
     straight = space.mesh.straight
-    grid = MeshTri(straight.points.T.copy(), straight.triangles.T.copy())
-    basis = Basis(grid, {2: ElementTriP2(), 3: ElementTriP3()}[space.order], intorder=8)
+    grid = MeshTri(straight.points.T.copy(), straight.triangles.T.copy())  # sorted, as edges of order 3 must be
+    basis = Basis(grid, ELEMENTS[space.order], intorder=8)
     apart, same = cKDTree(basis.doflocs.T).query(space.points)
     if apart.max() > 1e-9:
         raise ValueError("scikit-fem has its nodes elsewhere")
@@ -352,8 +341,7 @@ def _exact_in_time(size: float, number: int, peclet: float, density: float, orde
 
 def _largest(gap: np.ndarray) -> dict[str, float]:
     """The largest over the times of differences (times, 2, ...)."""
-    rows = [_over_the_supply(part) for part in gap]
-    return {name: max(row[name] for row in rows) for name in NAMES}
+    return runs.worst([_over_the_supply(part) for part in gap])
 
 
 #: Order, Peclet number and density of what is studied in time, elements (um), and the last error.
@@ -456,14 +444,12 @@ def _from_backward_euler(steps: int, peclet: float, density: float) -> dict[str,
 
 
 def _course(size: float, peclet: float, density: float, timed: bool) -> Profile:
-    """Along the channel, at each time; steady with what solve_bvp finds."""
+    """Along the channel, at each time."""
     x, curves = _channel(size, peclet, density).x, []
     ours = _at_cells(x, size, 0, 1, peclet, density, timed * STEPS[-1])[:, :, 2]
     for one, theirs in zip(ours, _fipy(size, peclet, density, timed)):
-        curves += pictured("", "", x, one, ("FiPy", "reference", x, theirs)).curves
-    if not timed:
-        truth = exact(peclet, density)(x[::12])
-        curves += [(f"{name}, solve_bvp", "exact", x[::12], part) for name, part in zip(NAMES, truth)]
+        for k, name in enumerate(NAMES):
+            curves += [(name, "ours", x, one[k]), (f"{name}, FiPy", "reference", x, theirs[k])]
     return Profile("along the channel", "x (um)", "C (mg/L)", tuple(curves))
 
 
@@ -506,10 +492,14 @@ def _mixed_ours(step: float, order: int) -> np.ndarray:
     made = transport.problem(box_around(order), None, CLOSED, SLOW_LAW)
     weight = made.space.reaction.dx
     active = SEEDED * weight
-    inert, now, rows = 0 * active, transport.supplied_everywhere(made), []
+    inert = 0 * active
+    now = transport.supplied_everywhere(made)
+    rows = []
     for interval in np.diff([0.0, *HALF_DAYS]):
         done = gear.advance(made, active, inert, now, interval, fixed_step=step)
-        active, inert, now = done.active, done.inert, done.concentrations
+        active = done.active
+        inert = done.inert
+        now = done.concentrations
         fields = (now.acceptor, now.donor, active / weight, inert / weight)
         rows.append([(field.mean(), np.ptp(field)) for field in fields])
     return np.array(rows)
@@ -549,8 +539,6 @@ def followed(order: int):
     if order == 1:
         yield at_most("X at constant C, 12 min steps", _constant_supply(), 1e-9,
                       "(9)-(10) are integrated exactly: round-off of 600 steps, and scipy's 1e-11")
-        yield _days("substrates", "C (mg/L)", (0, 1))
-        yield _days("biomass", "X (mg/L)", (2, 3))
 
 
 def _constant_supply() -> float:
@@ -564,13 +552,3 @@ def _constant_supply() -> float:
     found = solve_ivp(lambda t, y: growing(acceptor, donor, y[0]), (0, HALF_DAYS[-1]), [3e4, 0.0], rtol=1e-12,
                       atol=1e-8, method="DOP853").y[:, -1]
     return float(np.abs(np.array([active, inert]) / found - 1).max())
-
-
-def _days(title: str, label: str, chosen: tuple[int, int]) -> Profile:
-    """Two of the four against time."""
-    times, names = np.linspace(0.5, HALF_DAYS[-1], 121), [*MIXED]
-    trusted, ours, curves = _theirs(times, 1), _mixed_ours(MIXED_STEPS[-1], 1)[:, :, 0], []
-    for k in chosen:
-        curves += [(names[k], "ours", HALF_DAYS, ours[:, k]),
-                   (f"{names[k]}, solve_ivp", "reference", times, trusted[:, k])]
-    return Profile(title, "time (h)", label, tuple(curves))

@@ -1,0 +1,400 @@
+"""What wrong changes would alter unseen, derived anew: each side, substrate, axis and row apart."""
+import io
+import re
+from contextlib import nullcontext
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+from xml.etree import ElementTree
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from scipy.spatial import Delaunay
+
+import repro
+from repro import results, timing
+from repro.check import cost, modelled, numbers
+from repro.errors import BalanceError, TransportError, Unresolved
+from repro.march import balance, simulation, stepping, updates
+from repro.march.loop import Instant, Ledger
+from repro.model import contact, gear, mesh_motion, remeshing, traction, transport
+from repro.model.pore import Solved, resolution, seeded, solve
+from repro.report import comparison, quantities
+from repro.report.reading import Run
+from repro.results import picture
+from repro.run import running
+from repro.scene import load_scene
+from repro.sweep import page, table
+from repro.sweep.design import grid, parse, points
+from repro.sweep.state import Sweep
+from tests import oracles
+from tests.shell import told
+from tests.strategies import ORDERS, constants
+from tests.test_derived import EVERY_ORDER, arcs, over_end, places_of
+from tests.test_gear import case, storage
+
+NOTHING = Solved(None, None, None)
+EVEN = Ledger(0.0, 1.0, (5.0, 3.0), (1.0, 1.5), (4.0, 1.5), (0.0, 0.0), 70.0, 10.0, 80.0)
+UNLIKE = ['substrates.acceptor.supply="9 mg/L"', 'substrates.donor.supply="4 mg/L"', "numerics.refinement=0.3"]
+
+
+def base(order, *changes, unset=()):
+    """(scene, its seed) with coarse elements of an order, and supplies that differ."""
+    scene = load_scene("base", [*UNLIKE, f"numerics.elements={ORDERS[order]}", *changes], unset)
+    return scene, seeded(scene)
+
+
+def row_of(scene, now, solved=NOTHING, ledgers=(), remeshes=0):
+    return results.row(scene, Instant(now, solved, None, ledgers, remeshes, {}))
+
+
+@EVERY_ORDER
+def test_ends_and_top_are_those_of_the_boundary_between_its_nodes(order):
+    """Of a swollen seed that leans, of arcs sampled to 1e-6; the nodes alone are off by 4e-4 um or more."""
+    scene, now = base(order, "numerics.refinement=0.5")
+    x, y = now.mesh.points.T
+    near = np.exp(-(x**2 + y**2) / 100)
+    now = now.moved(np.column_stack([x + (0.2 * x * y + 0.1 * y) * near, y * (1 + 0.05 * x * near)]))
+    row = row_of(scene, now)
+    x, y = arcs(now).T
+    ends = np.array([row[name] for name in ("upstream_um", "downstream_um", "thickness_um")])
+    assert ends == pytest.approx([x.min(), x.max(), y.max()], rel=1e-6)
+    x, y = now.mesh.points[now.mesh.loop].T
+    apart = np.abs(ends - [x.min(), x.max(), y.max()])
+    assert apart.min() > 2e-4 if order > 1 else apart.max() == 0
+
+
+def test_a_row_says_whether_any_of_its_steps_made_a_mesh():
+    scene, now = base(1)
+    assert [row_of(scene, now, remeshes=count)["remeshed"] for count in (0, 1, 2, 7)] == [0, 1, 1, 1]
+
+
+def test_biomass_is_told_of_a_scene_that_does_not_grow():
+    scene = load_scene("initial_mesh", ["substrates={}", "aggregate.inert_fraction=0.3"])
+    row = row_of(scene, seeded(scene))
+    known = [row[name] for name in ("inert_fraction", "biomass_density_min", "biomass_density_max")]
+    assert known == pytest.approx([0.3, 1.0, 1.0], rel=1e-12) and row["biomass_balance"] is None
+
+
+@pytest.mark.parametrize("k, name", [(0, "acceptor"), (1, "donor")])
+def test_each_substrates_defect_is_over_its_own_terms(k, name):
+    """Of a row's own fluxes without a step, and with Gear over what the meshed part holds at the supply."""
+    scene, now = base(1)
+    solved = solve(scene, now)
+    fluxes = [transport.Fluxes(5.0, 1.0, 4.0, 9.0, 8.0), transport.Fluxes(3.0, 1.5, 1.5, 4.0, 3.0)]
+    fluxes[k] = replace(fluxes[k], out=fluxes[k].out - 0.06)
+    row = row_of(scene, now, replace(solved, fluxes=tuple(fluxes)))
+    wanted = [(each == k) * 0.06 / fluxes[k].supplied for each in (0, 1)]
+    assert [row["acceptor_balance"], row["donor_balance"]] == pytest.approx(wanted, rel=1e-9, abs=1e-12)
+    scene = load_scene("base", [*UNLIKE, "numerics.transport=gear"])
+    row = row_of(scene, now, solved, (replace(EVEN, stored=tuple(-7.0 * (each == k) for each in (0, 1))),))
+    held = getattr(scene.substrates, name).supply * np.ptp(now.mesh.ends) * scene.pore.width
+    wanted = [(each == k) * 7.0 / held for each in (0, 1)]
+    assert [row["acceptor_balance"], row["donor_balance"]] == pytest.approx(wanted, rel=1e-9, abs=1e-12)
+
+
+@EVERY_ORDER
+def test_stress_is_told_only_of_strain_since_the_start(order):
+    both = [results.fields(*base(order, f"growth.new_biomass={born}"), NOTHING) for born in ("stressed", "stress_free")]
+    stressed, free = ({*found.point_data, *found.cell_data} for found in both)
+    of_stress = {name for name in stressed if name.endswith("_MPa")}
+    assert len(of_stress) == 6 and free == stressed - of_stress
+
+
+def test_times_of_fields_keep_every_digit(tmp_path):
+    results.write_index(tmp_path / "fields.pvd", [(100 / 3, "b.vtu")])
+    (entry,) = ElementTree.parse(tmp_path / "fields.pvd").iter("DataSet")
+    scene, now = base(1)
+    results.write_fields(tmp_path / "b.vtu", results.fields(scene, replace(now, time=100 / 3), NOTHING))
+    (told_there,) = ElementTree.parse(tmp_path / "b.vtu").findall(".//FieldData/DataArray")
+    assert float(entry.get("timestep")) == float(told_there.text) == 100 / 3
+
+
+@pytest.mark.parametrize("transfer", ["conserving", "bounded"])
+def test_a_step_that_loses_two_millionths_of_its_biomass_stops_the_run(transfer):
+    """Whichever transfer conserves; the linear one's loss is stated [E8]."""
+    scene, now = base(1, f"numerics.transfer={transfer}")
+    made = np.subtract(*balance.demand_terms(scene.kinetics, EVEN))
+    even = replace(EVEN, biomass_made=made, biomass_after=EVEN.biomass_before + made)
+    balance.refuse(scene, now, even)
+    with pytest.raises(BalanceError, match="of the biomass"):
+        balance.refuse(scene, now, replace(even, biomass_after=even.biomass_after * (1 - 2e-6)))
+
+
+def test_a_picture_has_upstream_on_the_left_and_the_upper_wall_above():
+    """A field that rises along x and y: dark below upstream, light above downstream, the aggregate upstream below."""
+    places = np.array(list(product(np.linspace(-10, 30, 9), np.linspace(0, 20, 5))))
+    cells = Delaunay(places).simplices
+    shown = {"places_um": places, "triangles": cells, "region": (places[cells].mean(axis=1) < [0, 10]).all(axis=1)}
+    pixels = plt.imread(io.BytesIO(picture.png(shown, places @ [1, 3])))[..., :3]
+    assert (np.diff(pixels[[-1, -1, 0, 0], [0, -1, 0, -1]].sum(axis=1)) > 0).all()
+    rows, columns = np.argwhere((pixels == 1).all(axis=2)).T / len(pixels)  # the width is two heights
+    assert 0.45 < rows.min() and 0.99 < rows.max() and columns.min() == 0 and columns.max() < 0.52
+
+
+def test_key_figures_tell_first_and_last_values_and_the_first_contact():
+    columns = {"time_h": [0.0, 1.5, 2.5, 7.0], "thickness_um": [5.0, 19.0, 20.0, 21.0], "contact": [0, 0, 1, 1]}
+    said = picture.key_figures({name: np.array(values) for name, values in columns.items()})
+    assert "thickness of the aggregate 5 → 21 um" in said and "wall from t = 2.5 h on" in said
+
+
+@EVERY_ORDER
+def test_without_flow_the_ends_are_means_over_their_height(order):
+    """Of fields that are no plane, inlet and outlet apart, by Gauss's rule along each end."""
+    scene, now = base(order, "numerics.transport=gear", "substrates.boundary=closed", unset=["flow"])
+    x, y = places_of(now.space).T
+    fields = [2 + np.sin(y / 7) + 0.01 * x, 5 + np.cos(y / 9) - 0.02 * x]
+    made = transport.problem(now.space, None, scene.substrates, scene.kinetics)
+    found = transport.fluxes(made, None, transport.Concentrations(*fields))
+    for one, field in zip(found, fields):
+        means = [over_end(now.space, end, field) / scene.pore.width for end in now.mesh.ends]
+        assert [one.inlet, one.effluent] == pytest.approx(means, rel=1e-9) and abs(means[0] - means[1]) > 0.5
+
+
+@EVERY_ORDER
+def test_a_concentration_may_leave_its_bounds_by_as_much_as_is_said(order):
+    """Below zero by a thousandth of its own supply; above that, with curved elements, by a fiftieth."""
+    scene, now = base(order)
+    made = transport.problem(now.space, None, scene.substrates, scene.kinetics)
+    for k, (part, accepted) in product((0, 1), ((-9e-4, True), (-1.1e-3, False), (1.019, True), (1.021, order == 1))):
+        state = made.supply
+        state[k * made.space.count + 7] *= part
+        with nullcontext() if accepted else pytest.raises(Unresolved, match=("acceptor", "donor")[k]):
+            transport._checked(made, state, 1)
+
+
+def test_a_run_that_is_loaded_says_how_it_ended(tmp_path):
+    running.Recorder(load_scene("flow_only"), tmp_path).tell("failed: out of memory")
+    results.write_table(tmp_path / "timeseries.csv", results.COLUMNS, [[0.0] * len(results.COLUMNS)])
+    assert repro.load_run(tmp_path).status == "failed: out of memory"
+
+
+def test_memory_and_time_are_expected_to_grow_with_the_mesh():
+    found = cost.expected(load_scene("flow_only"), cost.Trial(None, 2.0, 0.5, 1000, (100.0, 180.0)), 4000)
+    assert [found.memory, found.seconds] == pytest.approx([100 + 4 * 80 * cost.REMESHING, 2 * 4**1.2], rel=1e-12)
+
+
+def test_a_step_ends_at_a_jump_to_the_last_bit():
+    """Wherever it began, so that what holds after it is the new value; one a microhour shorter ends where it does."""
+    _, now = base(1)
+    for start, k, off in product((0.1, 0.7, 2.3, 19.1), range(1, 50), (1 - 4e-16, 1.0, 1 + 4e-16)):
+        left = k / 7 * off
+        assert stepping._end_of(replace(now, time=start), left, start + k / 7) == start + k / 7
+        assert stepping._end_of(replace(now, time=start), left - 1e-6, start + k / 7) == start + (left - 1e-6)
+
+
+def uneven(order):
+    """(scene, pore, what is solved) with masses that differ from X_m from point to point."""
+    scene, now = base(order)
+    part = np.random.default_rng(order).uniform(0.7, 1.2, now.active.shape)
+    now = replace(now, active=0.6 * part * now.active, inert=0.3 * now.active, theta=1.5 * now.theta)
+    return scene, now, solve(scene, now)
+
+
+@EVERY_ORDER
+def test_an_update_takes_the_mean_of_the_rates_at_its_ends(order):
+    """Active and inert biomass apart, by (9) and (10) as printed at the concentrations of both ends, to round-off."""
+    scene, now, solved = uneven(order)
+    after, end, _ = updates.make_biomass(scene, now, solved, 2.0)
+    pieces, rates = now.space.reaction, []
+    for state in (solved.concentrations, end):
+        both = (field[pieces.cells] @ pieces.values.T for field in (state.acceptor, state.donor))
+        rates.append(np.array(oracles.rates(*both, **constants(scene))[2:]))
+    growth, remains = np.mean(rates, axis=0)
+    assert np.abs(rates[0] / rates[1] - 1).max(axis=(1, 2)).min() > 1e-4, "else the start would do"
+    assert after.active == pytest.approx(now.active * np.exp(2 * growth), rel=1e-12)
+    made = now.active * np.expm1(2 * growth) / growth * remains
+    assert after.inert - now.inert == pytest.approx(made, rel=1e-9)
+
+
+@EVERY_ORDER
+def test_the_expansion_grows_with_the_mass_there_is(order):
+    """Over X_m, in the mean of a straight triangle's corners (28)-(29); on curved ones over what each point has."""
+    scene, now, _ = uneven(order)
+    grown = replace(now, active=1.3 * now.active, inert=now.inert + 0.1 * now.active)
+    found = updates.enlarged(scene, now, grown)
+    before = now.active + now.inert
+    more = grown.active + grown.inert - before
+    wanted = 1.5 * (1 + more / before)
+    if order == 1:
+        of_node = np.full(len(now.mesh.points), np.nan)
+        of_node[now.space.reaction.cells] = more / now.space.reaction.dx / scene.kinetics.maximum_density
+        wanted = 1.5 * (1 + of_node[now.mesh.triangles[now.mesh.biomass]].mean(axis=1, keepdims=True))
+    assert found == pytest.approx(wanted, rel=1e-12)
+
+
+@EVERY_ORDER
+@pytest.mark.parametrize("speed", [0.0, 2e5])
+def test_beyond_the_old_mesh_there_is_what_flows_or_diffuses_there(speed, order):
+    """Upstream (26) with each substrate's own diffusivity, downstream what leaves; without flow the supply."""
+    scene, now = base(order)
+    new = base(order, "numerics.extent=full")[1].space
+    x = places_of(now.space)[:, 0]
+    state = transport.Concentrations(3 + 0.01 * x, 2 - 0.02 * x)
+    found = remeshing.carried_substrates(scene, now.space, new, state, speed)
+    x = places_of(new)[:, 0]
+    first, last = now.mesh.ends
+    for name, slope, start in (("acceptor", 0.01, 3), ("donor", -0.02, 2)):
+        kind = getattr(scene.substrates, name)
+        wanted = start + slope * np.clip(x, first, last)
+        faded = np.exp(speed * np.minimum(x - first, 0) / kind.diffusivity)
+        faded[(x < first) | (x > last)] *= speed > 0
+        wanted = kind.supply - (kind.supply - wanted) * faded
+        apart = np.abs([x - first, x - last]).min(axis=0) > 1e-9
+        assert getattr(found, name)[apart] == pytest.approx(wanted[apart], rel=1e-9) and apart.sum() > 0.9 * len(x)
+
+
+@EVERY_ORDER
+def test_every_amount_that_is_carried_keeps_its_own_sum(order):
+    """Active and inert biomass, and two more of the same material: rough ones, to 1e-12."""
+    scene, now, _ = uneven(order)
+    full = scene.kinetics.maximum_density * now.space.reaction.dx
+    inert, *others = full * np.random.default_rng(3).uniform(0.0, 0.3, (3, *full.shape))
+    now = replace(now, active=full - inert, inert=inert)
+    finer = replace(scene, numerics=replace(scene.numerics, refinement=0.47))
+    after, carried = remeshing.remesh(finer, now, now, 0.0, tuple(others))
+    sums = [inert.sum(), *(one.sum() for one in others)]
+    assert [after.inert.sum(), *(one.sum() for one in carried)] == pytest.approx(sums, rel=1e-12)
+    assert after.mass == pytest.approx(now.mass, rel=1e-12 if order == 1 else 1e-9)
+
+
+def test_a_plug_ends_in_quarter_discs_and_its_pressure_drops_over_its_whole_length():
+    scene = load_scene("wide", ['flow.mean_velocity="2.9 m/day"', 'growth.end="45 h"'])
+    width = scene.pore.width
+    for area in (1.6 * width**2, 4 * width**2):
+        reach = numbers.sizes(scene, area).reach
+        assert 2 * (reach - width) * width + np.pi / 2 * width**2 == pytest.approx(area, rel=1e-12)
+    drop = 12 * 2000 * 998 * 1.003e-6 * 2.9 / 86400 / (width * 1e-6) ** 2 * 2 * numbers.at_end(scene).reach * 1e-6 / 1e4
+    assert numbers.stresses(scene, scene.flow.mean_velocity)[1] == pytest.approx(drop, rel=1e-12)
+
+
+def test_runs_are_compared_under_their_own_names_with_signs():
+    """The first run need not be the first by name; a tip further upstream, at a smaller x, is a fall."""
+    runs = []
+    for name, scale in (("zeta", 1.0), ("alpha", 1.5), ("mu", 0.5)):
+        series = {column: scale * (1.0 + k + np.array([0.1, 0.4])) for k, column in enumerate(results.COLUMNS)}
+        series |= {"time_h": np.array([0.0, 3.0]), "upstream_um": scale * np.array([-5.0, -8.0])}
+        runs.append(Run(Path("runs") / name, {"scene": name}, series, {}))
+    labels = comparison.short([run.folder for run in runs])
+    for chart in quantities.overlaid(runs, labels):
+        assert [line.label for line in chart.lines] == labels, chart.title
+        if chart.title != "Mesh: made anew":
+            assert [line.values[-1] / chart.lines[0].values[-1] for line in chart.lines] == pytest.approx([1, 1.5, 0.5])
+    (row,) = re.findall("<tr><td>upstream end of the aggregate.*?</tr>", comparison.build(runs))
+    assert re.findall('class="value">([^<]*)<', row) == ["-8", "-12", "-50 %", "-4", "+50 %"]
+
+
+@EVERY_ORDER
+def test_a_mesh_follows_by_the_scenes_constants_or_is_left_where_it_is_too_coarse(order):
+    """gamma of (35) and c of its stabilisation; edges three times as long as a film of 2.5 um asks for."""
+    coarse, now = base(order, 'pore.width="20 um"', 'aggregate.radius="17.5 um"', "numerics.refinement=0.6",
+                       "numerics.mesh_compressibility=3", "numerics.flow_stabilisation=40")
+    places = now.mesh.points.copy()
+    places[now.mesh.body] *= 1.001
+    wanted = mesh_motion.move(now.mesh, places[now.mesh.body], compressibility=3.0, stabilisation=40.0)
+    assert np.array_equal(remeshing.followed(coarse, now, now.moved(places)).points, wanted)
+    assert remeshing.followed(replace(coarse, numerics=replace(coarse.numerics, refinement=1.8)), now, now) is None
+
+
+@EVERY_ORDER
+def test_the_fluid_pushes_as_its_drive_does_at_the_time(order):
+    course = '[["0 h", "1e-3 cm"], ["1 h", "4e-3 cm"], ["3 h", "2e-3 cm"]]'
+    scene, now = base(order, f"flow.head={course}", "flow.interpolation=linear")
+    around = traction.surroundings(scene, now, now)
+    first, *later = (traction.forces(scene, around, replace(now, time=time)) for time in (0.0, 1.0, 2.0, 5.0))
+    for push, factor in zip(later, (4.0, 3.0, 2.0)):
+        assert push == pytest.approx(factor * first, rel=1e-9, abs=1e-12 * np.abs(first).max())
+
+
+def test_what_slows_the_water_is_told_in_the_units_of_the_scene():
+    said = dict(modelled.modelled(base(2, "flow.biomass=brinkman", 'flow.permeability="2.5e-15 m^2"')[0]))
+    assert "an aggregate with a permeability of 2.5e-15 m2" in said["flow"]
+
+
+@pytest.mark.parametrize("key, unit", [("mean_velocity", "m/day"), ("head", "um")])
+def test_meshes_are_fine_enough_for_the_fastest_flow_to_come(key, unit):
+    """Those of curved elements, under a table as under its largest value from the start."""
+    course = f'[["0 h", "2 {unit}"], ["1 h", "160 {unit}"], ["2 h", "3 {unit}"]]'
+    changes = [["numerics.preset=fast", f"flow.{key}={value}"] for value in (f"2 {unit}", f"160 {unit}", course)]
+    slow, fast, over_time = (resolution(load_scene("base", each, ["flow.head"])) for each in changes)
+    assert over_time == fast > 1.5 * slow
+
+
+def sweep_of(folder, widths):
+    factors = [parse(f"pore.width={widths}")]
+    return Sweep(folder, "flow_only", factors, points("flow_only", [], factors, grid(factors)))
+
+
+def test_what_has_not_come_to_its_end_is_made_again(tmp_path):
+    swept = sweep_of(tmp_path, "40 um, 50 um, 60 um, 70 um, 80 um")
+    for point, status in zip(swept.points, ("completed", "failed: x", "interrupted", "the aggregate reaches an end")):
+        (swept.runs / point.name).mkdir(parents=True)
+        running.Recorder(point.scene, swept.runs / point.name).tell(status)
+    assert [point.index for point in swept.missing()] == [2, 3, 5]
+
+
+def test_clogged_runs_are_dots_at_their_time_and_others_stand_at_their_end(tmp_path):
+    swept = sweep_of(tmp_path, "40 um, 50 um")
+    course = np.array([1.0, 8.0])
+    numbers_of = [dict.fromkeys(table.COLUMNS) | {"clogging_time_h": time} for time in (5.0, None)]
+    runs = [table.Told(one, "completed", course, course, course, each) for one, each in zip(swept.points, numbers_of)]
+    mark = "<(circle|polygon) [^>]*><title>(run .)[^<]*?([^:<]*)</title>"
+    marks = re.findall(mark, page.page(swept, runs, 0.1))
+    assert marks == [("circle", "run 1", " 5 h"), ("polygon", "run 2", " after 8 h")]
+
+
+def test_times_by_stage_are_those_before_a_resume_and_since(tmp_path, monkeypatch):
+    monkeypatch.setattr(timing, "seconds", {"growth": 2.0, "transfer": 4.0})
+    one = running.Recorder(load_scene("base"), tmp_path)
+    one.record.stages, one.record.seconds = {"flow": 8.0, "growth": 16.0}, 1000.0
+    one.tell("running")
+    assert told(tmp_path)["wall_time_by_stage_s"] == {"flow": 8.0, "growth": 18.0, "transfer": 4.0}
+    assert 1000 < told(tmp_path)["wall_time_s"] < 1100
+
+
+def test_a_longer_run_is_judged_by_its_first_velocity(tmp_path):
+    one = running.Recorder(load_scene("base"), tmp_path)
+    at = results.COLUMNS.index("mean_velocity_m_per_d")
+    one.record.rows = [[None] * at + [speed] for speed in (24.0, 0.024)]
+    assert one.first_velocity == pytest.approx(1e6, rel=1e-12)
+
+
+@pytest.mark.parametrize("key", ["blas", "libc", "geos", "machine", "system", "source"])
+def test_a_resume_elsewhere_is_told(key, tmp_path, monkeypatch, recwarn):
+    """Whatever could change the numbers, but for threads, which do not."""
+    one = running.Recorder(load_scene("flow_only"), tmp_path)
+    one.tell("running")
+    before = told(tmp_path)
+    now = {**before["conditions"], "threads": {"OMP_NUM_THREADS": "7"}}
+    monkeypatch.setattr(running, "conditions", lambda: now)
+    assert running._changed(before, one, running.ALONE) == {} and not recwarn.list
+    now[key] = "another"
+    with pytest.warns(UserWarning, match=f"conditions.{key} .*now another"):
+        running._changed(before, one, running.ALONE)
+
+
+@EVERY_ORDER
+@pytest.mark.parametrize("fixed_point", ["kept", "rechosen"])
+def test_each_contact_surface_has_its_own_fixed_point(fixed_point, order):
+    """The corners nearest to the middles of both, -2 and -1 um, whichever was fixed before."""
+    leaning = [(-21, 0), (-19, 9), (-12, 17), (-6, 20), (4, 20), (12, 12), (17, 0)]
+    scene = simulation.shaped(base(order, 'pore.width="20 um"', f"numerics.fixed_point={fixed_point}")[0], leaning)
+    now = seeded(scene)
+    now = replace(now, fixed=np.roll(now.fixed, 2 * (fixed_point == "rechosen")))
+    x, y = now.mesh.points[now.mesh.loop][contact._fixed_points(scene, now)].T
+    assert y.tolist() == [0.0, 20.0] and x == pytest.approx([-2.0, -1.0], abs=0.3)
+
+
+@pytest.mark.parametrize("order", [2, 3])
+def test_gears_method_takes_less_than_nothing_by_each_substrates_own_supply(order):
+    """A drain takes the acceptor, of 10 mg/L, and 5e-4 or 5e-3 of it too much, beside a donor of 1000 mg/L."""
+    now, problem = case.__wrapped__(velocity=None, boundary="closed", order=order,
+                                    substrates={"donor": {"supply": "1000 mg/L"}})
+    drained = replace(problem, source=np.concatenate([-1e6 * storage(problem), np.zeros(problem.space.count)]))
+    nothing = np.zeros_like(now.active)
+    start = transport.supplied_everywhere(problem)
+    taken = gear.advance(drained, nothing, nothing, start, 10.005e-6).concentrations.acceptor
+    assert [taken.min(), taken.max()] == pytest.approx([-5e-3, -5e-3], rel=1e-6)
+    with pytest.raises(TransportError, match="the acceptor becomes negative"):
+        gear.advance(drained, nothing, nothing, start, 10.05e-6)

@@ -1,1 +1,0 @@
-"""What users read, verified by tests: the wrong changes that these must catch."""
