@@ -110,12 +110,6 @@ def test_the_name_of_what_is_drawn_stands_in_the_middle_of_its_axis():
     assert named == (top + bottom) / 2
 
 
-def test_a_run_to_a_later_end_may_go_on_from_the_seed():
-    """It is of no step that growth.end cuts."""
-    state, instant = next(steps(load_scene("base", ["numerics.preset=fast"])))
-    assert state.time == 0 and instant is not None and state.apart is False
-
-
 def test_the_middle_of_a_contact_surface_is_that_of_a_seed_anywhere():
     outline = initial_outline(load_scene("base", ["aggregate.position=40 um"]))
     (chosen,) = outline.points[middle_of(outline, BOTTOM), 0]
