@@ -55,18 +55,20 @@ def unnumbered(quantity: str) -> str:
 
 def _judgeable(claim: Claim, check: PaperCheck, found: dict[Level, tuple[float, bool]]) -> PaperCheck:
     """The check with its bar, from its value and whether it holds at each level; to a width of its own, that of printed
-    digits that it is made of, the bar is added."""
+    digits that it is made of or of the mesh around a place, the bar is added."""
     values = {level: value for level, (value, _) in found.items()}
     of_kind = [level for level in found if claim.about != MODEL or level.kind == CONVERGED]
     scheme = [values[level] for level in values if level.kind == SCHEME]
     if claim.about == MODEL:
         check = replace(check, scheme=(min(scheme), max(scheme)) if scheme else None,
                         on_sizes=tuple(values[level] for level in of_kind))
-    if not check.converges:
-        held = tuple(found[level][1] for level in of_kind)
-        return replace(check, bar=spread([values[level] for level in of_kind]), held=held)
-    bar, own = _bar(claim, check.value, values), check.bar or Bar(check.value, check.value)
-    return replace(check, bar=replace(bar, low=bar.low - check.value + own.low, high=bar.high - check.value + own.high))
+    if check.converges:
+        bar, held = _bar(claim, check.value, values), ()
+    else:
+        bar, held = spread([values[level] for level in of_kind]), tuple(found[level][1] for level in of_kind)
+    own = check.bar or Bar(check.value, check.value)
+    bar = replace(bar, low=bar.low - check.value + own.low, high=bar.high - check.value + own.high)
+    return replace(check, bar=bar, held=held)
 
 
 def _bar(claim: Claim, value: float, values: dict[Level, float]) -> Bar:

@@ -38,6 +38,7 @@ END = 40
 #: Hours after contact of which conductivities are means: those of `verification.sensitivity.wide`, to the end of Figure
 #: 6, every second shape update of the paper.
 AFTER = tuple(round(35 + 2 * UPDATE * number, 1) for number in range(26))
+FIRST_HOURS = AFTER[:13]
 WHOLE = ("wide", f"output.times={[f'{hour:g} h' for hour in sorted({*AFTER, END})]}".replace("'", '"'))
 RECHOSEN = "middles rechosen"
 #: One choice each, in words and as changes of the scene.
@@ -100,15 +101,19 @@ def conductivity_change(run: tuple[str, ...], hours: tuple[float, ...] = AFTER) 
     return 100 * float(np.exp(np.mean(np.log(other) - np.log(ours))) - 1)
 
 
+def _of_angles(hours: tuple[float, ...]) -> str:
+    changes = [conductivity_change((*WHOLE, VARIANTS[f"angle {word}"]), hours) for word in ("halved", "doubled")]
+    return " and ".join(f"{change:+.2g} %" for change in changes)
+
+
 def _told() -> str:
     rows = "; ".join(f"{name} at {contact((*WHOLE, change)):.2f} h" for name, change in VARIANTS.items())
-    angles = " and ".join(f"{conductivity_change((*WHOLE, VARIANTS[f'angle {word}']), AFTER[:1]):+.2g} %"
-                          for word in ("halved", "doubled"))
     film = scene(*WHOLE).growth.minimum_film
     return (f"Contact comes at {contact(WHOLE):.2f} h with a film of {film:g} um and 16.7 deg; {rows}. Until the "
             "aggregate is near the opposite wall its angle is that of a half-disc and no choice but the first matters. "
             f"Then it says how much of the narrow wedges beside the contact is filled: at {AFTER[0]:g} h the "
-            f"conductivity changes by {angles} with the angle halved and doubled, and ever less. The paper expects no "
+            f"conductivity changes by {_of_angles(AFTER[:1])} with the angle halved and doubled, in the mean to "
+            f"{FIRST_HOURS[-1]:g} h by {_of_angles(FIRST_HOURS)}, and ever less. The paper expects no "
             "effect of the rheology; the conditions at the walls it calls debatable and reasonable.")
 
 

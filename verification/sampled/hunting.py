@@ -269,15 +269,6 @@ LEFT: dict[tuple[str, str, str], tuple[str, str]] = {
      "digits = max(0, -math.floor(math.log10(step) // 1e-9))"):
         ("Ticks get as many digits as there is memory for.",
          "The first test that draws a chart never ends, which is told as a timeout."),
-    ("run/cache.py", "if len(missing) > 1:", "if len(missing) == 1:"):
-        ("Several runs are made one after the other and not side by side; they are the same.",
-         "It takes as many cores as it saves time for, which no test can count on."),
-    ("scene/units.py", "@dataclass(frozen=True)", "@dataclass(frozen=False)"):
-        ("What a key accepts could be changed after it was made.",
-         "test_states_are_made_and_not_changed fails with it, but cheaper tests take the 60 s before its turn."),
-    ("sweep/cluster.py", "except TimeoutError:", "except CosmicRayTestingException:"):
-        ("A scheduler that does not answer is told of by another error than the one line that names it.",
-         "Tests with a cluster run in make test-thorough alone."),
 }
 
 
