@@ -20,7 +20,7 @@ from repro.model import biomass
 from repro.model.pore import sized
 from verification.claims import CLOSED, Finding, at_least, at_most, claim, near
 from verification.claims.growth_pattern import growth_rates, made
-from verification.claims.levels import BESIDE_PAIRED, DEFAULT, PAIRED, WIDE_FINE, at_level
+from verification.claims.levels import BESIDE_OWN, DEFAULT, PAIRED, WIDE_FINE, at_level
 from verification.claims.runs import WIDE, Body, around_contact, bodies, flow_in, half_disc, scene, series
 
 #: Thicknesses over the pore's width: the last leaves a film of 2 um in a pore of 50 um.
@@ -131,7 +131,7 @@ ORDER = "an order of magnitude"
 @claim("C43", "1, 4", "as biomass grows, permeability falls, which restricts flow and supply; once the pore is "
                       "spanned, "
        "growth is on the upgradient side and the conductivity falls sharply: under constant head too", fine=PAIRED,
-       beside=BESIDE_PAIRED)
+       beside=BESIDE_OWN)
 def throttled() -> Finding:
     """Base to 76 h: flow, uptake and growth at the end over their first or largest values; where it grows; decay of
     active biomass over its synthesis; and the fall of the conductivity in the 5 h up to contact, as in C16."""
