@@ -25,7 +25,7 @@ from repro.march import simulation
 from repro.results.network import added_resistance, known
 from repro.scene import Scene
 from verification.claims import FEW, FEW_WORDS, Finding, at_least, at_most, between, claim
-from verification.claims.levels import WIDE_FINE
+from verification.claims.levels import ABOUT_WIDE
 from verification.claims.permeability import clean
 from verification.claims.runs import BASE, WIDE, Body, bodies, interface_length, scene, series
 from verification.problems.channels import pair, rates
@@ -40,7 +40,7 @@ NEW = "2026-11-22"
 
 
 @claim("C38", "1", "it takes less biomass to plug a pore if it forms aggregates than if it forms a continuous biofilm",
-       fine=WIDE_FINE)
+       **ABOUT_WIDE)
 def less_biomass() -> Finding:
     """Biomass of a uniform layer on the lower wall, and of two layers on both, over that of the growing aggregate of
     wide, at equal conductivity of the 600 um pore: parallel flow in closed form."""
@@ -167,7 +167,7 @@ MARGIN = 2.0
 
 
 @claim("C45", "1", "continuous or patchy, the distinction is not crucial in modelling the consumption of substrates",
-       fine=WIDE_FINE)
+       **ABOUT_WIDE)
 def not_crucial() -> Finding:
     """Acceptor taken up by the aggregate of wide over that of layers with its biomass, at the same mean velocity and
     supply, when it has reduced the conductivity to given parts; and of one layer in the model over the reference."""
@@ -226,7 +226,7 @@ LEAST = 0.1
 INCORPORATED, BOUND = "can be incorporated", "one: the bound of the law, made of other runs and drawn shapes"
 
 
-@claim("C44", "5", "the model of a pore can be incorporated into a network model", fine=WIDE_FINE)
+@claim("C44", "5", "the model of a pore can be incorporated into a network model", **ABOUT_WIDE)
 def for_networks() -> Finding:
     """Added resistance of the aggregates of base and wide, which the law for networks has not seen, against it."""
     film, spanned = (beyond(WIDE, kind) for kind in (False, True))

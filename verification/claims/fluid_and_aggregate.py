@@ -22,7 +22,7 @@ from repro.fem.mesh import gradients
 from repro.fem.transfer import interpolate
 from repro.model import contact, growth
 from verification.claims import FEW, FEW_WORDS, Finding, at_least, at_most, claim
-from verification.claims.levels import WIDE_FINE
+from verification.claims.levels import ABOUT_WIDE
 from verification.claims.runs import BASE, WIDE, Body, bodies, body, body_of, history, in_plane, polygon, scene, stress
 
 PLOTTED, UPDATE = 19.2, 0.2
@@ -69,7 +69,7 @@ class Forces:
                 f"{self.growth:.3g}, |P| {self.pressure:.3g}, stiffness {self.stiffness:.3g}")
 
 
-@claim("C26", "2.3.3", "fluid forces are small against the forces of growth", fine=WIDE_FINE)
+@claim("C26", "2.3.3", "fluid forces are small against the forces of growth", **ABOUT_WIDE)
 def fluid_forces() -> Finding:
     """Range of rho g phi plus the largest viscous shear on the interface, against growth's shear stress and stiffness.
 
@@ -137,7 +137,7 @@ def interface(found: Body) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return first, last, np.array([beyond[int(b), int(a)] for a, b in zip(first, last)])
 
 
-@claim("C35", "Fig 5", "the fluid flows around the aggregate, through it once it spans the pore", fine=WIDE_FINE)
+@claim("C35", "Fig 5", "the fluid flows around the aggregate, through it once it spans the pore", **ABOUT_WIDE)
 def crossing() -> Finding:
     """Share of the flux that crosses x = 0 inside the aggregate: base at 19.2 h, wide at its contact and its end."""
     film, touched = touching()
@@ -252,7 +252,7 @@ def added(without: Body, forced: Body, place: np.ndarray, ring: tuple[float, flo
     return float(np.sqrt(np.average(0.25 * (xx - yy) ** 2 + xy**2, weights=before.areas[within])))
 
 
-@claim("C40", "5", "detachment by fracture along the lines of maximum stress could be incorporated", fine=WIDE_FINE)
+@claim("C40", "5", "detachment by fracture along the lines of maximum stress could be incorporated", **ABOUT_WIDE)
 def tearing() -> Finding:
     """Largest principal stress in the aggregate of base and wide: is there tension, where would it tear first, and
     how do size and place change with time?"""
@@ -280,7 +280,7 @@ def _listed(peaks: list[tuple[float, float, float, float]], modulus: float) -> s
 
 
 @claim("C46", "5", "the stress could link fluid flow, growth and detachment: the fluid changes the stress of which the "
-       "aggregate would tear", fine=WIDE_FINE)
+       "aggregate would tear", **ABOUT_WIDE)
 def torn_by_the_fluid() -> Finding:
     """Largest principal stress, in the mean over a tenth of the pore's width, of wide at 40 h, a plug under constant
     velocity, with the fluid's forces and without; and of base at 19.4 h and of wide at 30 h, with a film left."""

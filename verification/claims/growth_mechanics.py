@@ -20,7 +20,7 @@ from repro.fem.outline import half_disc as seed
 from repro.fem.sizing import ACROSS_AGGREGATE, GRADATION, Sizing
 from repro.model import growth
 from verification.claims import CLOSED, OF_SCHEME, Finding, at_least, at_most, between, claim, near, without_limit
-from verification.claims.levels import ALONE, WIDE_FINE, cached, current
+from verification.claims.levels import ABOUT_WIDE, ALONE, cached, current
 from verification.claims.runs import WIDE, bodies, series
 from verification.problems.bodies import Supported
 
@@ -192,7 +192,7 @@ def dense(elements: np.ndarray, unknowns: np.ndarray) -> np.ndarray:
 TOTAL, STEPS = 2000.0, 165
 
 
-@claim("C25", "2.3.1", "expansion by up to 2000, after a couple of days, can be handled", fine=WIDE_FINE)
+@claim("C25", "2.3.1", "expansion by up to 2000, after a couple of days, can be handled", **ABOUT_WIDE)
 def expansion() -> Finding:
     """theta from 1 to 2000 from the configuration of t = 0, in 165 updates of 4.7 %: uniform, and larger at the rim.
 

@@ -17,7 +17,7 @@ from repro.fem.outline import BOTTOM, FREE, TOP, Outline
 from repro.model import biomass
 from repro.model.pore import Pore, Solved
 from verification.claims import FEW, FEW_WORDS, Finding, at_least, at_most, between, claim, without_limit
-from verification.claims.levels import BESIDE_OWN, TOLD, WIDE_FINE, WIDE_PAIRED, at_level
+from verification.claims.levels import ABOUT_WIDE, BESIDE_OWN, TOLD, WIDE_PAIRED, at_level
 from verification.claims.runs import (
     BASE,
     WIDE,
@@ -120,7 +120,7 @@ def expansion(found: Body, half: np.ndarray) -> float:
 
 
 @claim("C12", "4, Fig 6", "after the pore is spanned, growth is strongly asymmetric, on the upgradient side only",
-       fine=WIDE_FINE)
+       **ABOUT_WIDE)
 def upgradient_only() -> Finding:
     """Share of the new area, and of the biomass made, upgradient of the seed's centre, at the end of `wide`."""
     last, end = bodies(WIDE)[-1], float(bodies(WIDE)[-1].pore.time)
@@ -148,7 +148,7 @@ ROWS_TOLD = 5
 
 
 @claim("C29", "Fig 6", "the aggregate is squeezed between the walls as it grows",
-       fine=WIDE_FINE)
+       **ABOUT_WIDE)
 def squeezed() -> Finding:
     """Outlines of wide: inside the channel; length over thickness; lengths of both contact surfaces.
 
@@ -181,7 +181,7 @@ def contact_length(outline: Outline, wall: int) -> float:
 
 
 @claim("C31", "2.3.3, 4", "the shape stays a half-disc until it is limited or squeezed",
-       fine=WIDE_FINE)
+       **ABOUT_WIDE)
 def stays_half_disc() -> Finding:
     """Largest deviation of the interface from a half-disc of the same area around the middle of its base."""
     base, wide = (100 * np.array([*map(deviation, bodies(run))]) for run in (BASE, WIDE))
@@ -220,7 +220,7 @@ def least(run: tuple[str, ...], name: str) -> np.ndarray:
     return np.array([found.node(f"{name}_mg_per_L")[found.grid.body].min() for found in bodies(run)]) / half
 
 
-@claim("C30", "2.2", "oxygen is always present", fine=WIDE_FINE)
+@claim("C30", "2.2", "oxygen is always present", **ABOUT_WIDE)
 def oxygen() -> Finding:
     """Smallest C_A in the aggregate over K_s, in every row of base and wide.
 

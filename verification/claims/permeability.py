@@ -20,7 +20,7 @@ from repro.model import biomass
 from repro.model.pore import sized
 from verification.claims import CLOSED, Finding, at_least, at_most, claim, near
 from verification.claims.growth_pattern import growth_rates, made
-from verification.claims.levels import BESIDE_OWN, DEFAULT, PAIRED, WIDE_FINE, at_level
+from verification.claims.levels import ABOUT_WIDE, BESIDE_OWN, DEFAULT, PAIRED, at_level
 from verification.claims.runs import WIDE, Body, around_contact, bodies, flow_in, half_disc, scene, series
 
 #: Thicknesses over the pore's width: the last leaves a film of 2 um in a pore of 50 um.
@@ -32,7 +32,7 @@ def clean(said) -> float:
     return said.flow.gravity * said.pore.width**2 / (12 * said.flow.kinematic_viscosity)
 
 
-@claim("C16", "4, 2.1", "conductivity falls sharply when the aggregate spans the pore", fine=WIDE_FINE)
+@claim("C16", "4, 2.1", "conductivity falls sharply when the aggregate spans the pore", **ABOUT_WIDE)
 def spanning() -> Finding:
     """Conductivity of `wide` up to its contact, at it and after it. At contact it is that of the first shape in which a
     film has closed, by whole edges of the outline: it is known to first order in their length, to several percent,

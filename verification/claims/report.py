@@ -5,9 +5,9 @@ The committed record of the claims, `claims.json`: intervals and verdicts that a
 A check's `value` lies in `low` to `high` (numerics), the paper's in `paper_low` to `paper_high` (printing, null for
 words), and `input_low` to `input_high` is where the value goes as the inputs of Table 1 move within their rounding
 (from the committed record of the sensitivities, null where that does not tell). `scheme_2001` is the range that the
-paper's scheme gives on three meshes, for a claim about the scheme that of all its levels. `on_sizes` are the values on
-the sizes of the converged solution, the judged one first, and `order` is that which is observed on them, or on the
-meshes of the scheme; null where none fits.
+paper's scheme gives on one to three meshes, for a claim about the scheme that of all its levels. `on_sizes` are the
+values on the sizes of the converged solution, the judged one first, and `order` is that which is observed on them, or
+on the meshes of the scheme; null where none fits.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ HEAD = ("quantity", "paper", "ours", "numerics", "inputs", "scheme of 2001", "ac
 COLUMNS = (24, 11, 10, 15, 15, 15, 14, 11)
 LEGEND = ("paper: as printed. ours: the converged solution, or the scheme where the claim is about that. numerics: the "
           "error bar; inputs: where the number goes as the inputs of Table 1 move within their rounding; scheme of "
-          "2001: its range on three meshes. accepted: the interval of the printed digits, or what the words are taken "
-          "for. An outcome is that of the whole bar.")
+          "2001: its range on one to three meshes. accepted: the interval of the printed digits, or what the words are "
+          "taken for. An outcome is that of the whole bar.")
 
 
 INDEPENDENCE = "Mesh and time-step independence of base in the paper's scheme"
