@@ -77,7 +77,7 @@ BESIDE_OWN = (2**0.5,)
 #: Sizes and steps of the scheme, the default first.
 SIZES = (1.0, 2**0.5, 2**-0.5, 0.5)
 STEPS = (1.0, 2.0, 3.0, 4.0)
-#: Sizes whose range is the scheme's interval beside a claim about the model; all sizes of one about wide, which is dear.
+#: Sizes whose range is the scheme's interval beside a claim about the model, and beside one about wide, which is dear.
 BESIDE = SIZES[:3]
 ABOUT_WIDE = {"fine": WIDE_FINE, "beside": SIZES[:2]}
 #: What is not varied.
