@@ -97,3 +97,11 @@ def test_halved_arcs_are_the_same_curve():
     assert len(cut.points) == len(shape.points) + 4 and cut.area == pytest.approx(shape.area, rel=1e-13)
     kept = (shape.points[:, None] == cut.points[None]).all(axis=2).any(axis=1)
     assert kept.all()
+
+
+def test_slopes_of_arcs_are_those_of_their_parabolas():
+    """An arc is its value, slope and second derivative at its start, to round-off, at every t."""
+    nodes = np.random.default_rng(7).uniform(-9.0, 9.0, (5, 3, 2))
+    first, second = of.slopes(nodes)
+    for t in (0.3, 0.5, 1.0):
+        assert nodes[:, 0] + t * first + 0.5 * t**2 * second == pytest.approx(of.parabola(t) @ nodes, abs=1e-12)
