@@ -269,6 +269,9 @@ LEFT: dict[tuple[str, str, str], tuple[str, str]] = {
      "digits = max(0, -math.floor(math.log10(step) // 1e-9))"):
         ("Ticks get as many digits as there is memory for.",
          "The first test that draws a chart never ends, which is told as a timeout."),
+    ("model/traction.py", "@dataclass(frozen=True, eq=False)", "@dataclass(frozen=True, eq=True)"):
+        ("Meshes around a body could be compared by their arrays, which have no one truth.",
+         "test_states_are_made_and_not_changed fails with it, but reads the class and calls nothing of the module."),
 }
 
 
