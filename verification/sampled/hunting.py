@@ -272,6 +272,9 @@ LEFT: dict[tuple[str, str, str], tuple[str, str]] = {
     ("model/traction.py", "@dataclass(frozen=True, eq=False)", "@dataclass(frozen=True, eq=True)"):
         ("Meshes around a body could be compared by their arrays, which have no one truth.",
          "test_states_are_made_and_not_changed fails with it, but reads the class and calls nothing of the module."),
+    ("scene/units.py", "@dataclass(frozen=True)", "@dataclass(frozen=False)"):
+        ("What a key accepts could be changed after it was made.",
+         "test_what_a_key_accepts_cannot_be_changed fails with it, but cheaper tests take the 60 s before its turn."),
 }
 
 
