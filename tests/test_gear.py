@@ -13,6 +13,7 @@ from repro.march.simulation import simulate
 from repro.model import gear, kinetics, pore, transport
 from repro.model.kinetics import Sink
 from repro.model.transport import Balance, Concentrations
+from repro.scene import load_scene
 from tests.strategies import ORDERS, fitted_order, scene
 
 SECOND = 1 / 3600
@@ -226,8 +227,7 @@ def test_only_the_aggregate_controls_the_step(order):
 def test_substrate_without_flow_falls_by_what_is_consumed(order):
     """Mean velocity zero: nothing enters, C goes on from step to step; and moving the mesh under it makes no more
     than 1e-4 of what was consumed (measured 1e-6 to 1e-5)."""
-    numerics = {**coarse(order), "extent": "full"}
-    still = scene(velocity="0 m/day", growth={"end": "0.6 h"}, numerics=numerics)
+    still = scene(velocity="0 m/day", growth={"end": "0.6 h"}, numerics=coarse(order))
     instants = list(simulate(still))
     mass = [transport_mass(instant) for instant in instants]
     for before, after, instant in zip(mass, mass[1:], instants[1:]):
@@ -235,6 +235,43 @@ def test_substrate_without_flow_falls_by_what_is_consumed(order):
         assert ledger.supplied == ledger.out == (0.0, 0.0)
         assert ledger.stored == pytest.approx(-np.array(ledger.consumed), rel=1e-9)
         assert after - before == pytest.approx(-np.array(ledger.consumed), rel=1e-4)
+
+
+PRESETS = pytest.mark.parametrize("preset", ["fast", "accurate", "paper"])
+STILL = ('aggregate.radius="20 um"', "numerics.time=updates", 'growth.end="0.2 h"')
+
+
+@PRESETS
+@pytest.mark.parametrize("method", ["quasi_steady", "gear"])
+def test_without_flow_the_ends_of_the_pore_hold_the_supply(preset, method):
+    """Beside the aggregate diffusion is one-dimensional: C falls evenly from the end of the pore, 300 um away, where
+    half of what is taken up comes in. 1.5 W away the profile across has faded to exp(-1.5 pi) of a drop of 1 mg/L."""
+    said = load_scene("base", [*STILL, f"numerics.preset={preset}", f"numerics.transport={method}"], ["flow"])
+    first = next(simulate(said))
+    state, space = first.solved.concentrations, first.pore.space
+    x = np.abs(space.points[:, 0])
+    far = x >= 95
+    assert first.pore.mesh.ends == (-300, 300) and far.sum() > 20
+    for field, flux, kind in zip((state.acceptor, state.donor), first.solved.fluxes, first.solved.problem.both):
+        fall = flux.consumed / 2 / (kind.diffusivity * said.pore.width)
+        assert field[far] == pytest.approx(kind.supply - fall * (300 - x[far]), abs=np.exp(-1.5 * np.pi))
+        assert fall * 200 > 1
+
+
+@PRESETS
+@pytest.mark.parametrize("closed", [{"unset": ["flow"], "overrides": ["substrates.boundary=closed"]},
+                                    {"unset": ["flow.head"], "overrides": ['flow.mean_velocity="0 m/day"']}])
+def test_a_closed_pore_is_used_up_as_a_whole(preset, closed):
+    """What is left at its end is what its whole volume held less what was taken up, but for the fall q L / (8 D W) that
+    brings q to the middle."""
+    numerics = [f"numerics.preset={preset}", "numerics.transport=gear"]
+    said = load_scene("base", [*STILL, *numerics, *closed["overrides"]], closed["unset"])
+    *_, last = simulate(said)
+    volume = said.pore.length * said.pore.width
+    for flux, consumed, kind in zip(last.solved.fluxes, last.ledgers[0].consumed, last.solved.problem.both):
+        fall = consumed / 0.2 * said.pore.length / (8 * kind.diffusivity * said.pore.width)
+        assert flux.effluent == pytest.approx(kind.supply - consumed / volume, abs=fall)
+        assert fall < 0.5 and consumed / volume > 1
 
 
 def transport_mass(instant):

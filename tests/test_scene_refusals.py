@@ -206,6 +206,8 @@ PAIRS = [
      'substrates.boundary = "open" is needed with it'),
     ("initial_mesh", "substrates.boundary=closed", "numerics.transport=quasi_steady",
      '"open" is needed, or numerics.transport = "gear"', '"gear" is needed with substrates.boundary = "closed"'),
+    ("initial_mesh", "flow.mean_velocity=0 m/day", "substrates={}; numerics.extent=central; numerics.transport=gear",
+     'numerics.extent = "full" is needed with 0 m/day', '"full" is needed where substrates are there and nothing flo'),
     ("base", "growth.time_step=1e-4 h", "growth.end=11 h", "growth.end (11 h) over 100000 or more is needed",
      "at most 100000 times growth.time_step (0.0001 h) is needed"),
     ("base", "growth.minimum_film=30 um", "pore.width=20 um", "less than pore.width (20 um) is needed",

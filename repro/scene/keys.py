@@ -303,8 +303,11 @@ class Numerics:
         about="Substrates at rest in each shape, or the transient predictor-corrector scheme")
     transfer: str = choice("conserving", "linear", "bounded", source="3.5 is linear [E8]",
                            about="How X_A and X_I go to a new mesh")
-    extent: str = choice("central", "full", source="3.1",
-                         about="Mesh the part around the aggregate, or the whole pore")
+    extent: str | None = choice(
+        "central", "full", source="3.1",
+        stated='default "central", or "full" where there are substrates and nothing flows, at times '
+               'or ever: (26) and (12), which stand for the rest of the pore, need a flow',
+        about="Mesh the part around the aggregate, or the whole pore")
     interface: str = choice("laplacian", "traction", source="(1) [E2]",
                             about="What of the flow is continuous across the interface")
     inlet: str = choice(
@@ -406,6 +409,19 @@ class Scene:
               "alone")
     numerics: Numerics = section(Numerics, about="How it is solved", source="Section 3")
     output: Output = section(Output, about="What is written", source=OURS)
+
+    def __post_init__(self) -> None:
+        if self.numerics.extent is None:
+            extent = "full" if self.stagnant else "central"
+            object.__setattr__(self, "numerics", replace(self.numerics, extent=extent))
+
+    @property
+    def stagnant(self) -> bool:
+        """Are there substrates that no flow carries, at times or ever?"""
+        if self.substrates is None or self.flow is None:
+            return self.substrates is not None
+        velocity = self.flow.mean_velocity
+        return 0 in velocity.values if isinstance(velocity, Course) else velocity == 0
 
     @cached_property
     def courses(self) -> list[Course]:

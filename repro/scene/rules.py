@@ -161,8 +161,7 @@ def _flow_rules(scene: "Scene", head: Driven, velocity: Driven) -> Rules:
         "flow.head": _not_both("flow.mean_velocity", _in_words(velocity, "m/day", 24e-6)),
     }
     yield from _table_rules("flow", scene.flow, (head, velocity))
-    still = 0 in velocity.values if isinstance(velocity, Course) else velocity == 0
-    yield still and scene.substrates is not None and _steady(scene), {
+    yield scene.stagnant and _steady(scene), {
         "flow.mean_velocity": f"greater than zero is needed{_UNSTEADY}",
         "numerics.transport": f'"gear" is needed with flow.mean_velocity = 0: {_NO_STATE}',
     }
@@ -286,6 +285,10 @@ def _element_keys(wanted: str) -> dict[str, str]:
 
 
 def _numerics_rules(scene: "Scene") -> Rules:
+    yield scene.stagnant and scene.numerics.extent == "central", {
+        "numerics.extent": '"full" is needed where substrates are there and nothing flows',
+        "flow.mean_velocity": 'numerics.extent = "full" is needed with 0 m/day',
+    }
     if scene.numerics.order > 1:
         yield from _higher_order_rules(scene)
     yield scene.numerics.time == "midpoint" and scene.numerics.transport == "gear", {

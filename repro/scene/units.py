@@ -362,9 +362,10 @@ def number(example: float, accepts: Range = POSITIVE, *, about: str, source: str
     return _told(Number(example, accepts), about, source, stated, **default)
 
 
-def choice(*words: str, about: str, source: str):
-    """One of the words, the first by default."""
-    return _told(Choice(words), about, source, default=words[0])
+def choice(*words: str, about: str, source: str, stated: str = ""):
+    """One of the words, the first by default; stated: what the default follows from, where it is
+    not known before the whole scene is."""
+    return _told(Choice(words), about, source, stated, default=None if stated else words[0])
 
 
 def times(*, about: str, source: str):
