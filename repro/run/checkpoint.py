@@ -1,6 +1,6 @@
 """Checkpoint files: plain data under a checksum, whole or not at all, the one before kept.
 
-    dupin2001-repro checkpoint 3 SHA-256 of all that follows this line
+    dupin2001-repro checkpoint 4 SHA-256 of all that follows this line
     {"plain": ..., "arrays": [[name, dtype, shape, "C" or "F"], ...]}        one line of JSON
     the arrays' bytes, one after the other, little-endian
 

@@ -16,10 +16,12 @@ import numpy as np
 from repro import results
 from repro.errors import CheckpointError
 from repro.march.loop import State
+from repro.model.transport import OVERSHOOT
 from repro.results.files import is_file
 from repro.results.quantities import Quantity
 from repro.run.checkpoint import Arrays
-from repro.run.stored import counted, counts, in_range
+from repro.run.stored import LARGEST, counted, counts, in_range
+from repro.scene import Scene
 
 #: How the arrays of a record are called in a checkpoint.
 PREFIX = "record."
@@ -29,6 +31,10 @@ PLAIN = {"remeshes", "iterations", "seconds", "stages", "resumes", "warnings", "
 ARRAYS = {"rows": ("f", "R", len(results.COLUMNS)), "whole": ("b", "R", len(results.COLUMNS)),
           "ledgers": ("f", "L", len(results.LEDGER_COLUMNS)), "before_h": ("f", "B"),
           "sizes": ("i", "F"), "hashes": ("u", "F", hashlib.sha256().digest_size)}
+#: A pore a metre wide and long holds 3e16 pg/m of biomass: no number of a table is as large.
+MOST = 1e18
+#: How columns of places and of defects end, which may be negative.
+SIGNED = ("stream_um", "_balance")
 #: Rows of a table, each a list of numbers, None where there is none.
 Table = list[list]
 
@@ -127,10 +133,11 @@ def _integers(rows: Table, columns: list[str]) -> np.ndarray:
     return np.array(flat, dtype=bool).reshape(len(rows), len(columns))
 
 
-def unpacked(plain, arrays: Arrays) -> Record:
+def unpacked(scene: Scene, plain, arrays: Arrays) -> Record:
     """What :func:`packed` was given. Raises CheckpointError where it makes no sense."""
     right = isinstance(plain, dict) and set(plain) == PLAIN and _shaped(arrays)
-    if not right or not _is_plain(plain) or not _is_numbers(arrays):
+    right = right and _is_plain(plain) and _is_numbers(arrays) and _is_possible(scene, arrays)
+    if not right:
         raise CheckpointError("its rows or fields are not those of a run")
     rows = _table(arrays["rows"], arrays["whole"])
     ledgers = _table(arrays["ledgers"], np.zeros_like(arrays["ledgers"], dtype=bool))
@@ -167,12 +174,12 @@ def _is_plain(plain: dict) -> bool:
     """Do the counts and times make sense?"""
     stages = plain["stages"]
     return (counted(plain["remeshes"]) and counts(plain["iterations"])
-            and counted(plain["missed"]) and in_range(plain["worst"], 0.0, math.inf)
-            and in_range(plain["seconds"], 0.0, math.inf) and isinstance(plain["resumes"], list)
+            and counted(plain["missed"]) and in_range(plain["worst"], 0.0, LARGEST)
+            and in_range(plain["seconds"], 0.0, LARGEST) and isinstance(plain["resumes"], list)
             and all(isinstance(resume, dict) for resume in plain["resumes"])
             and isinstance(plain["warnings"], list) and all(map(_is_warning, plain["warnings"]))
             and isinstance(stages, dict)
-            and all(in_range(value, 0.0, math.inf) for value in stages.values()))
+            and all(in_range(value, 0.0, LARGEST) for value in stages.values()))
 
 
 def _is_warning(value) -> bool:
@@ -181,13 +188,32 @@ def _is_warning(value) -> bool:
 
 
 def _is_numbers(arrays: Arrays) -> bool:
-    """Are all numbers finite, but for rows that leave some out, and the integers counts?"""
+    """Are all numbers finite, but for columns that all rows leave out, and the integers counts?"""
     rows, whole = arrays["rows"], arrays["whole"]
     counted_ones = rows[whole]
     finite = (arrays["ledgers"], arrays["before_h"], counted_ones, rows[:, :1])
-    return (not np.isinf(rows).any() and all(bool(np.isfinite(one).all()) for one in finite)
+    empty = np.isnan(rows)
+    return (not np.isinf(rows).any() and bool((empty.any(axis=0) == empty.all(axis=0)).all())
+            and all(bool(np.isfinite(one).all()) for one in finite)
             and bool(((counted_ones >= 0) & (counted_ones < 2**53)).all())
             and bool((counted_ones == np.floor(counted_ones)).all()))
+
+
+def _is_possible(scene: Scene, arrays: Arrays) -> bool:
+    """Are no numbers of the tables beyond MOST, and no rows under what is possible?"""
+    rows = np.nan_to_num(arrays["rows"])
+    least = [_least(scene, name) for name in results.COLUMNS]
+    beyond = any(bool((np.abs(one) > MOST).any()) for one in (rows, arrays["ledgers"]))
+    return not beyond and bool((rows >= least).all())
+
+
+def _least(scene: Scene, column: str) -> float:
+    """The least that a column may hold; of concentrations what is refused of nodes, and more
+    between them."""
+    if column.endswith("_mg_per_L") and scene.largest.substrates:
+        both = scene.largest.substrates
+        return -OVERSHOOT * max(both.acceptor.supply, both.donor.supply)
+    return -MOST if column.endswith(SIGNED) else 0.0
 
 
 def _table(numbers: np.ndarray, whole: np.ndarray) -> Table:
@@ -211,6 +237,9 @@ def check(folder: Path, state: State, record: Record) -> None:
     last = record.rows[-1][0] if record.rows else math.inf
     if apart or abs(last - state.row) > 1e-6 or last < ends[len(record.ledgers)] - 1e-6:
         raise CheckpointError("its rows do not end where its state is")
+    steps = len(spans)
+    if max(record.remeshes + state.remeshes, record.missed) > steps:
+        raise CheckpointError("it counts more steps than it made")
     for name, written in record.marks.items():
         if not _is_as_written(folder / name, written):
             raise CheckpointError(f"{name} is not as it was written: missing, cut short or altered")

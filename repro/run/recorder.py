@@ -11,7 +11,7 @@ import numpy as np
 
 from repro import report, results, timing
 from repro.check.simplifications import Warned, unmet
-from repro.errors import CheckpointError, Interrupted, OutputError
+from repro.errors import CheckpointError, Interrupted, OutputError, StageError
 from repro.march.loop import Instant, State, added
 from repro.march.pace import Pace, missed
 from repro.results import netcdf
@@ -216,7 +216,13 @@ class Recorder:
         Raises CheckpointError where it cannot be gone on from.
         """
         plain, arrays = checkpoint.decoded(checkpoint.read(path))
-        state, before = unpacked(self.scene, plain, arrays)
+        try:
+            with np.errstate(all="raise", under="ignore"):
+                state, before = unpacked(self.scene, plain, arrays)
+        except CheckpointError:
+            raise
+        except (ArithmeticError, LookupError, ValueError, StageError) as error:
+            raise CheckpointError(f"it makes no sense ({error})") from error
         record.check(self.folder, state, before)
         self.state = state
         self.record = before
@@ -271,7 +277,7 @@ def unpacked(scene: Scene, plain: dict, arrays: Arrays) -> tuple[State, Record]:
     if not right or pending.ndim != 2 or pending.dtype.kind != "f" or "ledgers" in told:
         raise CheckpointError("it does not hold what it should")
     state = stored.unpacked(scene, {**told, "ledgers": pending.tolist()}, own)
-    return state, record.unpacked(plain["record"], tables)
+    return state, record.unpacked(scene, plain["record"], tables)
 
 
 def _never(scene: Scene) -> set[str]:

@@ -13,7 +13,8 @@ from repro.fem.mesh import Mesh, triangle_areas
 from repro.fem.outline import BOTTOM, FREE, TOP
 from repro.fem.space import Space
 from repro.march.loop import Ledger, State
-from repro.march.pace import Pace
+from repro.march.pace import FASTER, Pace
+from repro.march.stepping import FIRST, SHORTEST
 from repro.model.pore import Pore, material
 from repro.model.remeshing import MOST_GRADED
 from repro.model.transport import Concentrations
@@ -29,8 +30,14 @@ ARRAYS: dict[str, tuple[str, Shape]] = {
     "loop": ("i", ("M",)), "wall": ("i", ("M",)), "fixed": ("b", ("M",)),
     "active": ("f", ("R", "P")), "inert": ("f", ("R", "P")), "theta": ("f", ("B", "Q")),
     "reference": ("f", ("n", 2)), "pressure": ("f", ("C",))}
-#: No expansion, concentration or other number of a state is as large.
+#: No expansion, concentration, wall time (s) or other number of a state is as large.
 LARGEST = 1e9
+#: {order: what the mass over X_m, the area and the integral of theta may differ by}, (28)-(29). With
+#: curved elements they are one number to round-off (measured 1e-11); with linear ones, where theta
+#: grows by means of nodes, to 1e-4 in updates of half an hour.
+BALANCED = {1: 0.1, 2: 1e-3, 3: 1e-3}
+#: By what factor J and theta, or the density and X_m, differ in a point: measured up to 4.
+APART = 100.0
 GUESS: dict[str, tuple[str, Shape]] = {"acceptor": ("f", ("D",)), "donor": ("f", ("D",))}
 PLAIN = {"scene", "time_h", "pace", "ends_um", "front", "guess", "ledgers", "remeshes",
          "iterations", "row_h"}
@@ -71,7 +78,7 @@ def unpacked(scene: Scene, plain: dict, arrays: dict[str, np.ndarray]) -> State:
     _refuse(not in_range(plain["front"], 1.0, MOST_GRADED), "its element sizes")
     _check(scene, plain, arrays)
     pore = _pore(scene, plain, arrays)
-    return State(pore, _pace(plain["pace"]), _ledgers(plain["ledgers"]), plain["remeshes"],
+    return State(pore, _pace(scene, plain["pace"]), _ledgers(plain["ledgers"]), plain["remeshes"],
                  plain["iterations"], plain["row_h"])
 
 
@@ -95,10 +102,15 @@ def counts(value) -> bool:
     return isinstance(value, dict) and all(counted(number) for number in value.values())
 
 
-def _pace(told) -> Pace:
-    """A pace from its numbers in the order of its fields."""
+def _pace(scene: Scene, told) -> Pace:
+    """A pace from its numbers in the order of its fields. Its length is the first one's of a
+    scheme, or follows a step within the run."""
     right = isinstance(told, list) and len(told) == 3
-    _refuse(not right or not all(in_range(value, 0.0, np.inf) for value in told), "its step")
+    _refuse(not right or not all(in_range(value, 0.0, LARGEST) for value in told), "its step")
+    if scene.growth:
+        step = scene.growth.time_step
+        longest = max(FIRST * step, FASTER * scene.growth.end)
+        _refuse(not SHORTEST * step <= told[0] <= longest, "its step")
     return Pace(*told)
 
 
@@ -152,7 +164,8 @@ def _check_places(scene: Scene, ends, arrays: dict[str, np.ndarray]) -> None:
     slack = 0.01 * width
     right = isinstance(ends, list) and len(ends) == 2
     _refuse(not right or not all(in_range(x, -half, half) for x in ends), "its extent")
-    _refuse(ends[0] >= ends[1], "its extent")
+    x = arrays["points"][:, 0]
+    _refuse(ends != [x.min(), x.max()], "its extent")
     for name in ("points", "reference"):
         x, y = arrays[name].T
         _refuse(bool(np.abs(x).max(initial=0.0) > half + slack), f"array {name!r}")
@@ -178,9 +191,34 @@ def _pore(scene: Scene, plain: dict, arrays: dict[str, np.ndarray]) -> Pore:
     _refuse(arrays["theta"].shape[1] != len(body.shape.table.weights), "array 'theta'")
     if mesh.biomass.any():
         _refuse(not body.at.dx.min() > 0, "a triangle's place at t = 0")
+    _check_walls(scene, arrays["points"][loop, 1], arrays["wall"], arrays["fixed"])
     own = {name: arrays[name] for name in ("wall", "fixed", "active", "inert", "theta", "pressure")}
-    return Pore(time=plain["time_h"], space=space, body=body, **own,
-                concentrations=_guess(plain, arrays), front=plain["front"])
+    found = Pore(time=plain["time_h"], space=space, body=body, **own,
+                 concentrations=_guess(plain, arrays), front=plain["front"])
+    if scene.kinetics:
+        _check_biomass(found, scene.kinetics.maximum_density)
+    return found
+
+
+def _check_walls(scene: Scene, y: np.ndarray, wall: np.ndarray, fixed: np.ndarray) -> None:
+    """A node of the boundary is held on a wall if it is there to the last bit (y, um), and one node
+    of each contact surface is fixed (2.3.3)."""
+    there = np.where(y == 0, BOTTOM, np.where(y == scene.pore.width, TOP, FREE))
+    _refuse(bool((wall != there).any()), "array 'wall'")
+    held = wall[fixed].tolist()
+    _refuse(sorted(held) != sorted(set(wall.tolist()) - {FREE}), "array 'fixed'")
+
+
+def _check_biomass(now: Pore, density: float) -> None:
+    """Mass, area and the integral of theta are of one aggregate, of maximum density (mg/L), and
+    none of them is far from it in any point."""
+    J = now.body.strained(now.mesh.points[now.mesh.body]).J
+    part = (now.active + now.inert) / now.space.reaction.dx / density
+    for ratio in (J / now.theta, part):
+        _refuse(not 1 / APART <= ratio.min() <= ratio.max() <= APART, "its biomass")
+    area = now.mass / density
+    for other in (now.boundary.area, float((now.theta * now.body.at.dx).sum())):
+        _refuse(not abs(area - other) <= BALANCED[now.space.order] * other, "its biomass")
 
 
 def _check_order(cells: np.ndarray, loop: np.ndarray) -> None:
