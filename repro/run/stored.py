@@ -34,8 +34,8 @@ ARRAYS: dict[str, tuple[str, Shape]] = {
 LARGEST = 1e9
 #: {order: what the mass over X_m, the area and the integral of theta may differ by}, (28)-(29). With
 #: curved elements they are one number to round-off (measured 1e-11); with linear ones, where theta
-#: grows by means of nodes, to 1e-4 in updates of half an hour.
-BALANCED = {1: 0.1, 2: 1e-3, 3: 1e-3}
+#: grows by means of nodes, to 1e-4 in updates of half an hour, 1e-3 of four hours.
+BALANCED = {1: 2e-2, 2: 1e-3, 3: 1e-3}
 #: By what factor J and theta, or the density and X_m, differ in a point: measured up to 4.
 APART = 100.0
 GUESS: dict[str, tuple[str, Shape]] = {"acceptor": ("f", ("D",)), "donor": ("f", ("D",))}
