@@ -32,9 +32,9 @@ ARRAYS: dict[str, tuple[str, Shape]] = {
     "reference": ("f", ("n", 2)), "pressure": ("f", ("C",))}
 #: No expansion, concentration, wall time (s) or other number of a state is as large.
 LARGEST = 1e9
-#: {order: what the mass over X_m, the area and the integral of theta may differ by}, (28)-(29). With
-#: curved elements they are one number to round-off (measured 1e-11); with linear ones, where theta
-#: grows by means of nodes, to 1e-4 in updates of half an hour, 1e-3 of four hours.
+#: {order: what the mass over X_m, the area and the integral of theta may differ by}, (28)-(29).
+#: With curved elements they are one number to round-off (measured 1e-11); with linear ones, where
+#: theta grows by means of nodes, to 1e-4 in updates of half an hour, 1e-3 in those of four hours.
 BALANCED = {1: 2e-2, 2: 1e-3, 3: 1e-3}
 #: By what factor J and theta, or the density and X_m, differ in a point: measured up to 4.
 APART = 100.0

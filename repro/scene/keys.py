@@ -305,8 +305,8 @@ class Numerics:
                            about="How X_A and X_I go to a new mesh")
     extent: str | None = choice(
         "central", "full", source="3.1",
-        stated='default "central", or "full" where there are substrates and nothing flows, at times '
-               'or ever: (26) and (12), which stand for the rest of the pore, need a flow',
+        stated='default "central", or "full" where there are substrates and nothing flows, at '
+               'times or ever: (26) and (12), which stand for the rest of the pore, need a flow',
         about="Mesh the part around the aggregate, or the whole pore")
     interface: str = choice("laplacian", "traction", source="(1) [E2]",
                             about="What of the flow is continuous across the interface")
