@@ -42,7 +42,7 @@ from verification.claims import (
 )
 from verification.claims import __main__ as driver
 from verification.claims.levels import CONVERGED, SCHEME, Level, at_level
-from verification.sensitivity.rounding import factors_of, of_base, reached
+from verification.sensitivity.rounding import factors_of, misfit, of_base, targets
 from verification.sensitivity.rounding import scene as scene_of
 from verification.uncertainty import Bar
 
@@ -295,13 +295,17 @@ def test_the_record_has_every_claim_in_its_schema(kept):
             assert check["paper_low"] is None or check["paper_low"] < check["paper_high"], each["id"]
 
 
+def ends_of(told):
+    """The interval of an entry of the record, in which an open end is null."""
+    return tuple(math.inf * sign if told[end] is None else told[end] for end, sign in (("low", -1), ("high", 1)))
+
+
 def test_the_recorded_verdicts_follow_from_the_recorded_numbers(kept):
-    """Computed again from intervals and tolerances alone."""
+    """Computed again from intervals and tolerances alone: every outcome, and the verdict."""
     for each in kept:
         for check in each["checks"]:
-            low, high = (math.inf * sign if check["tolerance"][end] is None else check["tolerance"][end]
-                         for end, sign in (("low", -1), ("high", 1)))
-            assert low <= check["value"] <= high or check["outcome"] != HOLDS, each["id"]
+            bounds = ends_of(check["tolerance"])
+            assert claims.outcome_of(ends_of(check), bounds) == check["outcome"], (each["id"], check["quantity"])
         outcomes = {check["outcome"] for check in each["checks"]}
         assert each["verdict"] == claims.verdict_of(outcomes, bool(each["change"]), bool(each["rounding"])), each["id"]
 
@@ -342,12 +346,15 @@ def test_bars_of_base_are_as_narrow_as_asked(kept):
 
 
 def test_one_set_of_inputs_gives_all_printed_numbers_of_base():
-    """A real run with the recorded set, every input within its rounding."""
+    """With the whole of their bars, every input within its rounding; and so does a real run of the preset."""
     found = sensitivity.record()["one_set"]
-    factors = factors_of(found["inputs"])
+    factors, bars, numbers = factors_of(found["inputs"]), found["bars"], found["numbers"]
     rounding = sensitivity.record()["rounding"]
     assert found["reached"] and all(abs(factor - 1) <= rounding[name] + 1e-12 for name, factor in factors.items())
-    assert reached(of_base(scene_of("base", factors)))
+    assert all(low <= numbers[name] - bars[name] and numbers[name] + bars[name] <= high
+               for name, (low, high) in targets().items()) and misfit(numbers, bars) <= 1
+    ours = of_base(scene_of("base", factors))
+    assert misfit(ours, {}) <= 1
 
 
 def test_the_papers_bookkeeping_is_exact_for_a_steady_consumption_and_sees_a_growing_one():

@@ -26,6 +26,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import inf, isnan
 
+from verification import sensitivity
 from verification.claims.levels import BESIDE, CONVERGED, DEFAULT, FINE, SCHEME, SIZES, STEPS, Level
 from verification.kernel.case import Check
 from verification.uncertainty import Bar
@@ -116,6 +117,7 @@ class PaperCheck(Check):
     converges: bool = True
     rests_on: str = PREDICTED
     input: str = ""
+    within: tuple[float, float] | None = None
     bar: Bar | None = None
     held: tuple[bool, ...] = ()
     scheme: tuple[float, float] | None = None
@@ -125,6 +127,11 @@ class PaperCheck(Check):
     def printed(self) -> tuple[float, float] | None:
         """The interval of the value that the paper prints, None where it prints words or a bound."""
         return interval(self.paper)
+
+    @property
+    def inputs(self) -> tuple[float, float] | None:
+        """Where the number goes as the inputs of Table 1 move within their rounding; None where that is not known."""
+        return self.within or sensitivity.interval(self.input, self.value)
 
     @property
     def outcome(self) -> str:

@@ -163,11 +163,15 @@ def nearest(run: tuple[str, ...], time: float) -> float:
 
 
 @cached
-def grown(run: tuple[str, ...], time: float) -> tuple[Pore, Solved]:
+def grown(run: tuple[str, ...], time: float, anew: bool = False) -> tuple[Pore, Solved]:
     """The shape of a run at a time (h) with what grows in it in the next 12 min, and what is solved then: the state
-    "before the aggregate expands" [E12]."""
-    said, start = scene(*run), instant(run, time)
-    made, _, _ = updates.make_biomass(said, start.pore, start.solved, UPDATE)
+    "before the aggregate expands" [E12].
+
+    anew: in a mesh made now, whose ends are 1.5 W from the aggregate (3.1) at every level. Those of the run's own mesh
+    hang on when that was last made.
+    """
+    said, start = scene(*run), solved_pore(run, time)
+    made, _, _ = updates.make_biomass(said, *(remeshed(said, *start) if anew else start), UPDATE)
     return made, pore.solve(said, made)
 
 

@@ -84,11 +84,11 @@ def by_stage(results: list[Result]) -> list[tuple[str, list[Result]]]:
 
 
 #: What is judged elsewhere.
-BESIDES = ((Link("The paper's claims", "../../paper_figures/replication"), "`make claims`"),
-           (Link("Ambiguities and misprints of the paper", "../../reference/ERRATA"), "`verification.errata`"),
-           (Link("What the rounding of Table 1 allows", "../sensitivity/sensitivity"), "`make sensitivity`"),
-           (Link("The law for networks", "../../docs/network"), "`python -m verification.network`"),
-           (Link("Mutants made by machine", "sampled"), "`make mutants-sampled`"))
+BESIDES = ((Link("The paper's claims", "../../paper_figures/replication.md"), "`make claims`"),
+           (Link("Ambiguities and misprints of the paper", "../../reference/ERRATA.md"), "`verification.errata`"),
+           (Link("What the rounding of Table 1 allows", "../sensitivity/sensitivity.md"), "`make sensitivity`"),
+           (Link("The law for networks", "../../docs/network.md"), "`python -m verification.network`"),
+           (Link("Mutants made by machine", "sampled.md"), "`make mutants-sampled`"))
 
 
 def index(results: list[Result]) -> list[Block]:
@@ -99,7 +99,7 @@ def index(results: list[Result]) -> list[Block]:
              "elements and presets"))
     return [Block("text", f"{INTRODUCTION} Written by `make verify`."), Block("text", f"**{summary(results)}**"),
             table(("stage", ""), (*stages, *more)),
-            table(("besides", ""), BESIDES, brief=True),
+            table(("besides", ""), BESIDES),
             table(("case", "kind", "runs with", "numbers", "verdict", "must fall short with"),
                   map(_index_row, results)),
             table(("case", "claim", "measured", "expected", "seconds"), map(_live_row, results), detail=True)]

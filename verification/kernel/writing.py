@@ -21,7 +21,8 @@ BAD = {"wrong", "does not hold", "FALLS SHORT", "NO", "not caught"}
 
 @dataclass(frozen=True)
 class Link:
-    """A cell that leads to a place on a page: page "flow", place "flow-plug" or ""."""
+    """A cell that leads to a place on a page: page "flow", place "flow-plug" or ""; or to a file that is there in
+    Markdown alone: page "../../docs/network.md"."""
 
     text: str
     page: str
@@ -29,7 +30,8 @@ class Link:
 
     def to(self, ending: str) -> str:
         """The address, with the ending of the pages' files."""
-        return f"{self.page}.{ending}" + (f"#{self.place}" if self.place else "")
+        name = self.page if self.page.endswith(".md") else f"{self.page}.{ending}"
+        return name + (f"#{self.place}" if self.place else "")
 
 
 Cell = str | Link

@@ -121,10 +121,15 @@ def _cell(known: dict | None) -> str:
 def _set(found: dict) -> Iterator[Block]:
     words = ("One set of inputs within the rounding gives all printed numbers of base at once" if found["reached"] else
              "No set of inputs within the rounding gives all printed numbers of base at once; the nearest")
-    numbers = ", ".join(f"{NAMES.get(name, name)} {value:.4f}" for name, value in found["numbers"].items())
+    sizes = ", ".join(f"{size:.3g}" for size in found["sizes"])
     yield Block("heading", "One set of inputs")
-    yield Block("text", f"{words} (a share of {found['share_of_the_rounding']:.2f} of the rounding is needed). A run "
-                        f"with it: {numbers}.")
+    yield Block("text", f"{words} (a share of {found['share_of_the_rounding']:.2f} of the rounding is needed). It was "
+                        f"run on sizes {sizes} of elements and steps, over those of `accurate`; the bar is from all of "
+                        "them, and a set counts where the whole bar lies in the interval of the printed digits.")
+    yield table(("number", "printed", "a run with the set", "bar", "on these sizes"), (
+        (NAMES.get(name, name), "{:g} to {:g}".format(*rounding.targets()[name]), f"{value:.4f}",
+         f"{found['bars'][name]:.1g}", ", ".join(f"{each:.4f}" for each in found["on_sizes"][name]))
+        for name, value in found["numbers"].items()))
     yield table(("input", "value"), ((name, f"{value:.4f}") for name, value in found["inputs"].items()))
 
 

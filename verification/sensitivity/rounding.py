@@ -15,7 +15,9 @@ rounding and e_ni the elasticities, the program is
     minimise t    such that    |x_i| <= t r_i    and    low_n <= f_n (1 + sum_i e_ni x_i) <= high_n
 
 so that t <= 1 is a set within the rounding. A run with it moves f_n by what is not linear, and the program is solved
-again from there. Where t > 1 the misfit that is left at t = 1 is minimised instead.
+again from there. Where t > 1 the misfit that is left at t = 1 is minimised instead. The runs are made on SET_SIZES, and
+low_n and high_n are the ends of the printed interval moved inwards by the numerical bar of f_n from all of them, so
+that a set is reached where f_n lies in the interval with the whole of its bar.
 
 **Sobol indices** of base: how much of the variance of each printed number an input's rounding accounts for. Inputs are
 independent and uniform within their rounding; those whose elasticity moves no printed number by half a percent a
@@ -41,8 +43,10 @@ from repro.run.machine import source_hash
 from repro.scene import Scene, load_scene, needed, scene_hash
 from verification.claims import interval
 from verification.claims.base_run import DISTANCES, END, upstream_means
+from verification.claims.evaluate import MESH_ORDERS
 from verification.claims.levels import converged
 from verification.kernel.writing import load
+from verification.uncertainty import estimate
 
 
 @dataclass(frozen=True)
@@ -225,8 +229,12 @@ def difference(above: float, below: float, value: float, distance: float) -> flo
 #: What section 4 prints: C01-C04.
 PRINTED = {"velocity_0": "2.9", "velocity": "1.5", "effluent_acceptor": "4.19", "effluent_donor": "6.13",
            "consumed": "~60"}
-#: Of a printed interval the middle part that is aimed at: the rest is for the bars.
-AIMED = 0.4
+#: Sizes of elements and steps of the runs that make the set, the one that counts first: on 0.5, 2**-0.5 and 1 the bar
+#: of the acceptor effluent, 0.005, is as wide as what its digits leave to either side.
+SET_SIZES = (2**-1.5, 0.5, 2**-0.5)
+#: How many bars a number is kept inside its interval, and the part of this around its middle that is aimed at; the rest
+#: is for what is not linear, of which AIMED to ENOUGH is let be.
+KEPT_INSIDE, AIMED, ENOUGH = 1.5, 0.4, 0.5
 ROUNDS = 6
 
 
@@ -235,37 +243,53 @@ def targets() -> dict[str, tuple[float, float]]:
     return {name: interval(text) for name, text in PRINTED.items()}
 
 
-def reached(numbers: Numbers, part: float = 1.0) -> bool:
-    """Do all numbers lie in (the middle part of) their intervals?"""
-    return all(abs(numbers[name] - 0.5 * (low + high)) <= 0.5 * part * (high - low)
+def misfit(numbers: Numbers, bars: Numbers) -> float:
+    """How far the numbers, with bars if there are any, are from the middles of their intervals, in half widths; the
+    largest."""
+    return max((abs(numbers[name] - 0.5 * (low + high)) + bars.get(name, 0.0)) / (0.5 * (high - low))
                for name, (low, high) in targets().items())
 
 
 def one_set(runs: Runs, elasticities: dict[str, dict[str, dict]]) -> dict:
-    """The set, what a run with it gives, the share t of the rounding that it takes, and whether it is reached."""
-    plain = runs.numbers(scene("base", {}))
-    slopes = np.array([[plain[name] * elasticities[name][each.name]["elasticity"] for each in ROUNDED]
-                       for name in PRINTED])
-    start, x, t = np.array([plain[name] for name in PRINTED]), np.zeros(len(ROUNDED)), 0.0
+    """The set, what runs with it give and how well that is known, the share t of the rounding that it takes, and
+    whether it is reached."""
+    rows = _on_sizes(runs, {})
+    plain, bars = np.array([rows[0][name] for name in PRINTED]), _bars(rows)
+    slopes = np.array([[value * elasticities[name][each.name]["elasticity"] for each in ROUNDED]
+                       for name, value in zip(PRINTED, plain)])
+    start, kept = plain, np.array([bars[name] for name in PRINTED])
     for _ in range(ROUNDS):
-        x, t = program(start, slopes)
-        numbers = runs.numbers(scene("base", {each.name: 1 + value for each, value in zip(ROUNDED, x)}))
-        if reached(numbers, 0.5):
+        x, t = program(start, slopes, kept)
+        factors = {each.name: 1 + value for each, value in zip(ROUNDED, x)}
+        numbers = runs.numbers(scene("base", factors, *converged(SET_SIZES[0])))
+        if misfit(numbers, {}) <= ENOUGH and misfit(numbers, bars) <= 1:
             break
         start = np.array([numbers[name] for name in PRINTED]) - slopes @ x
-    inside = bool(t <= 1 + 1e-9 and reached(numbers))
-    middle = {name: 0.5 * sum(pair) for name, pair in targets().items()}
-    misfit = max(abs(numbers[name] - middle[name]) / (pair[1] - middle[name]) for name, pair in targets().items())
-    return {"reached": inside, "share_of_the_rounding": t, "misfit_in_half_intervals": misfit,
-            "inputs": {each.name: each.value * (1 + value) for each, value in zip(ROUNDED, x)},
-            "numbers": {name: numbers[name] for name in PRINTED}}
+    rows = _on_sizes(runs, factors)
+    bars = _bars(rows)
+    left = misfit(numbers, bars)
+    return {"reached": bool(t <= 1 + 1e-9 and left <= 1), "share_of_the_rounding": t, "misfit_in_half_intervals": left,
+            "inputs": {name: BY_NAME[name].value * factor for name, factor in factors.items()},
+            "numbers": {name: numbers[name] for name in PRINTED}, "bars": bars, "sizes": list(SET_SIZES),
+            "on_sizes": {name: [row[name] for row in rows] for name in PRINTED}}
 
 
-def program(start: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, float]:
+def _on_sizes(runs: Runs, factors: dict[str, float]) -> list[Numbers]:
+    """Numbers of base on SET_SIZES."""
+    return [runs.numbers(scene("base", factors, *converged(size))) for size in SET_SIZES]
+
+
+def _bars(rows: list[Numbers]) -> Numbers:
+    """Of each printed number."""
+    return {name: estimate(SET_SIZES, [row[name] for row in rows], MESH_ORDERS).bar for name in PRINTED}
+
+
+def program(start: np.ndarray, slopes: np.ndarray, bars: np.ndarray) -> tuple[np.ndarray, float]:
     """Relative changes and the share of the rounding that they take; within it, with the least misfit, where the
-    intervals are out of reach."""
-    middle, half = (np.array([weight @ pair for pair in targets().values()])
-                    for weight in (np.array([0.5, 0.5]), AIMED * np.array([-0.5, 0.5])))
+    intervals, less the bars, are out of reach."""
+    middle, reach = (np.array([weight @ pair for pair in targets().values()])
+                     for weight in (np.array([0.5, 0.5]), np.array([-0.5, 0.5])))
+    half = np.minimum(reach - KEPT_INSIDE * bars, AIMED * reach)
     rounding = np.array([each.rounding for each in ROUNDED])
     A, unit = slopes * rounding, np.eye(len(rounding))
     none, ones = np.zeros((len(start), 1)), np.ones((len(rounding), 1))
@@ -274,8 +298,7 @@ def program(start: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, float]:
     best = _solved(tight, inside, None)
     if best is not None and best[-1] <= 1:
         return best[:-1] * rounding, float(best[-1])
-    reach = half[:, None] / AIMED
-    loose = np.block([[A, -reach], [-A, -reach]])
+    loose = np.block([[A, -reach[:, None]], [-A, -reach[:, None]]])
     least = _solved(loose, np.concatenate([middle - start, start - middle]), 1.0)
     return least[:-1] * rounding, float(best[-1]) if best is not None else float("inf")
 
