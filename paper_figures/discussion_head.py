@@ -37,9 +37,15 @@ def draw(closing: Path | None = None, wide: Path | None = None) -> Figure:
 
 
 def _outlines(axes: Axes, closing: Path) -> None:
-    """As in Figure 6."""
+    """As in Figure 6, and the first in contact with the opposite wall."""
     figure_6.outlines(axes, closing, EVERY)
     axes.set_title("outlines of Base")
+    meets = contact(closing)
+    if np.isfinite(meets):
+        state = states.near(closing, meets)
+        style.aggregate(axes, figure_6.smooth(state.rim, state.width), filled=False, edgecolor=style.RED, zorder=5,
+                        linestyle="--", label=f"in contact, {meets:g} h")
+        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
 def _fall(axes: Axes, closing: Path, wide: Path) -> None:
@@ -70,10 +76,11 @@ def caption(closing: Path | None = None, wide: Path | None = None) -> str:
     table, meets = states.series(closing), contact(closing)
     velocity = table["mean_velocity_m_per_d"]
     rate = specific_growth(table)
-    touched = (f"The opposite wall is touched at {meets:g} h" if np.isfinite(meets)
+    touched = (f"The first row in contact with the opposite wall is that of {meets:g} h" if np.isfinite(meets)
                else "The opposite wall is not touched")
-    return (f"Base carried on to {table['time_h'][-1]:g} h. {touched}, when the velocity has fallen from "
-            f"{velocity[0]:.3g} to {velocity[-1]:.2g} m/d. (a) Outlines every {EVERY:g} h; (b) conductivity, beside "
+    return (f"Base carried on to {table['time_h'][-1]:g} h (preset `fast`). {touched}; the velocity falls from "
+            f"{velocity[0]:.3g} to {velocity[-1]:.2g} m/d. (a) Outlines every {EVERY:g} h, and dashed the "
+            "first in contact; (b) conductivity, beside "
             "that "
             "of Wide, whose velocity is kept up, with the times of contact dotted; (c) velocity, acceptor taken up, "
             "and "

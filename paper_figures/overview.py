@@ -16,6 +16,7 @@ from matplotlib.image import imsave
 from paper_figures import figure_6, runs, states, style
 from paper_figures.states import State
 
+CLAIMS = ("C35", *figure_6.CLAIMS)
 TARGET = Path(__file__).parent / "overview.png"
 PIXELS_WIDE, STREAMLINES, SHADES = 1600, 10, 31
 
@@ -23,7 +24,7 @@ PIXELS_WIDE, STREAMLINES, SHADES = 1600, 10, 31
 @style.styled
 def draw(base: Path | None = None, wide: Path | None = None) -> Figure:
     """Substrate and streamlines around the aggregate of Base, and how the aggregate of Wide fills its pore."""
-    base, wide = base or runs.base_run(), wide or runs.wide_run()
+    base, wide = base or runs.base_run(), wide or runs.folders(figure_6.RUNS)[0]
     made = style.figure(5.5)
     above, below = made.subplots(2, 1, height_ratios=[1, 1.08])
     state, (shaped, _) = states.last(base, "before_expansion"), states.last_step(base)

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
-from paper_figures import FIGURES, manifest
+from paper_figures import FIGURES, manifest, overview
 from paper_figures.claims import STATEMENTS
 from repro.results import write_text
 from verification import sensitivity, speed
@@ -36,7 +36,7 @@ from verification.claims import (
 )
 from verification.claims import report as claims_record
 from verification.kernel.writing import markdown_row
-from verification.sensitivity.wide import verdicts
+from verification.sensitivity.wide import LEFT_OUT, verdicts
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
@@ -62,9 +62,12 @@ def fields(known: dict) -> dict[str, Callable[[], str]]:
             "list.changed": lambda: "\n".join(map(_changed, _with(claims, CHANGED))) or "None.",
             "list.contradicted": lambda: "\n".join(map(_contradicted, _with(claims, CONTRADICTED))) or "None.",
             **_supplies(), "list.flips": lambda: _flips(claims), "after.contact": lambda: _after_contact(claims),
+            "base.bars": lambda: _bars_of_base(claims),
             "list.undecided": lambda: "\n".join(map(_undecided, _with(claims, UNDECIDED))) or "None.",
             "inputs.share": lambda: f"{100 * sensitivity.record()['one_set']['share_of_the_rounding']:.0f}",
             "table.values": lambda: "\n".join(map(_value, _printed(claims))),
+            "overview.claims": lambda: "; ".join(f"{claim['id']} {claim['verdict']}" for claim in claims
+                                                 if claim["id"] in overview.CLAIMS),
             "table.figures": lambda: "\n".join(map(_figure, FIGURES)),
             "environment": lambda: _environment(known["environment"])}
 
@@ -78,6 +81,7 @@ def _supplies() -> dict[str, Callable[[], str]]:
             "supplies.contact": lambda: f"{max(times):.0f} to {min(times):.0f}",
             "supplies.total": lambda: str(len(every + some + none)), "supplies.all": lambda: str(len(every)),
             "supplies.some": lambda: str(len(some)), "supplies.none": lambda: str(len(none)),
+            "supplies.left_out": lambda: "; ".join(f"{id}, which {why}" for id, why in LEFT_OUT.items()),
             "list.supplies": lambda: _which(every, some, none)}
 
 
@@ -104,6 +108,14 @@ def _after_contact(claims: list[dict]) -> str:
     return (f"After contact wide is known, from contact to its end: {told}. Of the {len(found)} numbers after contact "
             f"that claims are judged by, the bars of {len(over)} exceed {after_contact.WIDE_BAR:g} % of the number: "
             f"{listed}.")
+
+
+def _bars_of_base(claims: list[dict]) -> str:
+    """Which numbers of base are known less well than its velocities and effluents, and why."""
+    kinds = "; ".join(f"{why} ({', '.join(dict.fromkeys(each.id for each in those))})"
+                      for why, those in after_contact.wide_bars_of_base(claims).items())
+    return (f"Velocities, effluents, uptake and concentrations of Base are known to {after_contact.BASE_BAR:g} % or "
+            f"better. Wider are the bars of numbers of other kinds: {kinds}.")
 
 
 def _about() -> dict[str, Callable[[], str]]:

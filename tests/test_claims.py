@@ -329,6 +329,57 @@ def test_bars_after_contact_are_listed(kept):
     assert after_contact.percent({"low": 9.0, "high": 11.0, "value": 10.0}) == 10.0
 
 
+def test_wide_bars_of_base_are_listed_with_the_reason_of_their_kind(kept):
+    """Each of them, the widest first, and no velocity, effluent or concentration; what has no reason is told apart."""
+    found = after_contact.wide_bars_of_base(kept)
+    listed = {each.id for those in found.values() for each in those}
+    assert "" not in found and listed >= {"C11", "C26", "C31", "C32", "C35", "C40", "C43", "C46"}
+    assert listed.isdisjoint({"C01", "C02", "C03", "C04", "C05", "C06", "C09", "C15", "C30", "C33"})
+    for those in found.values():
+        assert [each.percent for each in those] == sorted((each.percent for each in those), reverse=True)
+        assert all(each.percent > after_contact.BASE_BAR for each in those)
+    broad = {"id": "C02", "about": claims.MODEL, "checks": [{"quantity": "velocity", "value": 1.0, "low": 0.99,
+                                                             "high": 1.01}]}
+    assert [each.id for each in after_contact.wide_bars_of_base([*kept, broad])[""]] == ["C02"]
+    assert "" not in after_contact.wide_bars_of_base([*kept, {**broad, "about": claims.OF_SCHEME}])
+
+
+def test_numbers_that_closed_forms_tell_have_the_width_of_their_inputs(kept):
+    """b from 0.115 to 0.125 1/d; COD, Y, d_c and the diffusivities to half a last digit; of all that the paper prints
+    what has none is a length by rule of the seed, the bound that lambda sets, and numbers of the scheme."""
+    known = {(each["id"], check["quantity"]): (check["input_low"], check["input_high"])
+             for each in kept for check in each["checks"]}
+    assert known["C09", "decay half-time (d)"] == pytest.approx((math.log(2) / 0.125, math.log(2) / 0.115))
+    assert known["C28", "COD - Y d_c from the printed values (mg/mg)"] == pytest.approx((1.498625, 1.528925))
+    assert known["C28", "acceptor: diffusivity, aggregate over water (%)"] == pytest.approx((184.5 / 2.325,
+                                                                                             185.5 / 2.315))
+    without = {id for each in kept for check in each["checks"] if check["paper_low"] is not None
+               for id in [each["id"]] if check["input_low"] is None}
+    assert without <= {"C07", "C17", "C21", "C24"}
+
+
+def test_the_longest_mesh_goes_with_the_root_of_the_area_of_the_aggregate(kept):
+    """By the elasticity of its area, the aggregate being a half-disc; the extent of 3.1 around it is exact."""
+    checks = next(each["checks"] for each in kept if each["id"] == "C08")
+    for check, factor in zip(checks, (1.3, 1.5), strict=True):
+        span = check["value"] - 100 * factor
+        half = 0.5 * (check["input_high"] - check["input_low"])
+        assert half / span == pytest.approx(0.5 * sensitivity.reach("area")) and 0.01 < half / span < 0.05
+
+
+def test_where_the_meshed_part_ends_is_the_same_at_every_level():
+    """Ten thicknesses from a small aggregate (3.1), wherever the run's own mesh ends; flow and effluents of the grown
+    state are the run's to what the meshes differ by."""
+    short = ("base", 'growth.end="0.4 h"', 'output.times=["0.4 h"]')
+    for level in (Level(CONVERGED, 2.0), Level(SCHEME, 2.0)):
+        with at_level(level):
+            own, anew = runs.grown(short, 0.4), runs.grown_anew(short, 0.4)
+        reaches = [now.boundary.upstream - now.mesh.ends[0] for now, _ in (own, anew)]
+        assert reaches[1] == pytest.approx(10 * anew[0].boundary.thickness) and abs(reaches[0] - reaches[1]) > 0.5
+        for number in (lambda found: found.flow.mean_velocity, lambda found: 10 - found.fluxes[0].effluent):
+            assert number(anew[1]) == pytest.approx(number(own[1]), rel=5e-3)
+
+
 def test_exact_is_told_by_its_distance_from_the_finest_and_their_bar():
     """0.5 % is shown where both together are less; of what 2 % are asked, nothing is said."""
     row = {"quantity": "q", "values": [2.0, 2.1], "bar_percent": 0.3, "asked_percent": 1.0}
@@ -338,9 +389,9 @@ def test_exact_is_told_by_its_distance_from_the_finest_and_their_bar():
 
 
 def test_bars_of_base_are_as_narrow_as_asked(kept):
-    """0.2 % on velocities, effluents and uptake of section 4."""
+    """0.2 % on velocities, effluents, uptake and concentrations of section 4."""
     known = {each["id"]: each for each in kept}
-    for id in ("C01", "C02", "C03", "C04"):
+    for id in ("C01", "C02", "C03", "C04", "C05"):
         for check in known[id]["checks"]:
             assert check["high"] - check["low"] <= 2 * 0.002 * abs(check["value"]), (id, check["quantity"])
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import paper_figures
-from paper_figures import replication
+from paper_figures import overview, replication
 from verification.claims import EXPECTED
 
 ROOT = Path(__file__).parents[1]
@@ -64,6 +64,13 @@ def test_every_claim_has_its_verdict_in_the_note(told):
     assert all(claim["reason"] for claim in told["claims"] if claim["id"] in named[3] + named[4])
     counts = replication.filled(" ".join(f"{{{{claims.{kind}}}}}" for kind in kinds), told)
     assert counts.split() == [str(len(found)) for found in named]
+
+
+def test_the_picture_of_the_note_has_verdicts_in_its_caption(told):
+    caption = replication.filled("{{overview.claims}}", told)
+    verdicts = {each["id"]: each["verdict"] for each in told["claims"]}
+    assert caption.replace("\n", " ") == "; ".join(f"{id} {verdicts[id]}" for id in sorted(overview.CLAIMS))
+    assert caption.splitlines()[-1] in text("paper_figures/replication.md")
 
 
 def test_what_needs_no_solution_is_not_counted_as_a_value_reproduced(told):

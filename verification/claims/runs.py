@@ -163,15 +163,21 @@ def nearest(run: tuple[str, ...], time: float) -> float:
 
 
 @cached
-def grown(run: tuple[str, ...], time: float, anew: bool = False) -> tuple[Pore, Solved]:
+def grown(run: tuple[str, ...], time: float) -> tuple[Pore, Solved]:
     """The shape of a run at a time (h) with what grows in it in the next 12 min, and what is solved then: the state
-    "before the aggregate expands" [E12].
+    "before the aggregate expands" [E12]."""
+    return _grown(scene(*run), *solved_pore(run, time))
 
-    anew: in a mesh made now, whose ends are 1.5 W from the aggregate (3.1) at every level. Those of the run's own mesh
-    hang on when that was last made.
-    """
-    said, start = scene(*run), solved_pore(run, time)
-    made, _, _ = updates.make_biomass(said, *(remeshed(said, *start) if anew else start), UPDATE)
+
+@cached
+def grown_anew(run: tuple[str, ...], time: float) -> tuple[Pore, Solved]:
+    """The same in a mesh made at that time, whose ends are 1.5 W from the aggregate (3.1) at every level. Those of the
+    run's own mesh hang on when that was last made."""
+    return _grown(scene(*run), *remeshed(scene(*run), *solved_pore(run, time)))
+
+
+def _grown(said: Scene, now: Pore, solved: Solved) -> tuple[Pore, Solved]:
+    made, _, _ = updates.make_biomass(said, now, solved, UPDATE)
     return made, pore.solve(said, made)
 
 
