@@ -251,3 +251,13 @@ def test_rows_that_were_appended_are_read_but_for_one_that_was_cut(tmp_path):
     with file.open("a", encoding="utf-8") as opened:
         opened.write('{"a": 2')
     assert writing.lines(file) == [{"a": 1}]
+
+
+def test_the_first_page_and_its_text_lead_to_what_is_judged_elsewhere():
+    """Claims, errata, sensitivity and the law for networks, at files that are there."""
+    blocks = report.index([])
+    pages, text = writing.page("Verification", blocks), writing.markdown(blocks, 2)
+    for link in ("../../paper_figures/replication.md", "../../reference/ERRATA.md", "../sensitivity/sensitivity.md",
+                 "../../docs/network.md", "sampled.md"):
+        assert f"<a href='{link}'>" in pages and f"]({link})" in text and (report.FOLDER / link).resolve().is_file()
+    assert "<a href='mutants.html'>" in pages and "](mutants.md)" in text
