@@ -3,7 +3,6 @@
 import csv
 import math
 import os
-import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -13,9 +12,8 @@ import pytest
 
 from repro import results
 from repro.cli import main
-from repro.report import fields
 from tests.pages import run
-from tests.shell import started, told, wait_for
+from tests.shell import told
 
 
 def rows(out, name="timeseries"):
@@ -29,11 +27,6 @@ def test_flow_only_is_one_row_without_substrates(tmp_path):
     empty = {name for name in results.COLUMNS if "acceptor" in name or "donor" in name}
     assert {name for name, value in row.items() if value == ""} == empty | {
         "biomass_balance", "oxygen_demand_balance", "inert_fraction", "biomass_density_min", "biomass_density_max"}
-
-
-def test_rows_and_fields_at_output_times(tmp_path):
-    out = run(tmp_path, "base", 'growth.end="0.5 h"', 'output.times=["0.3 h", "0.5 h"]')
-    assert [float(row["time_h"]) for row in rows(out)] == [time for time, _ in fields.index(out)] == [0, 0.3, 0.5]
 
 
 def test_ledger_closes_and_adds_up(tmp_path):
@@ -80,17 +73,6 @@ def test_the_pores_end_ends_a_run_well(tmp_path, capsys):
               'growth.end="4 h"', 'output.times=["4 h"]')
     assert "reaches the pore's" in capsys.readouterr().out
     assert "reaches the pore's" in told(out)["status"] and len(rows(out)) == 1
-
-
-def test_interrupting_a_run_keeps_what_was_computed(tmp_path):
-    """Ctrl-C in the midst of a run, after meshing: status 130, rows and run.json written."""
-    out = tmp_path / "run"
-    process = started("base", "--out", out)
-    wait_for((out / "fields" / "fields_0002.vtu").exists, process)
-    process.send_signal(signal.SIGINT)
-    message = process.communicate(timeout=60)[1]
-    assert process.returncode == 130 and "interrupted" in message and "Traceback" not in message
-    assert len(rows(out)) >= 3 and told(out)["status"] == "interrupted"
 
 
 def test_unset_beside_set(capsys):

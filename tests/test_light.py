@@ -44,10 +44,3 @@ def test_a_run_imports_what_it_needs_alone(tmp_path):
     found = loaded(COMMAND.format(["run", *SHORT, "--set", 'growth.end="3 h"', "--out", str(tmp_path / "run")]))
     assert (tmp_path / "run" / "report.html").exists() and found >= {"numpy", "skfem", "mmgpy", "shapely"}
     assert found & NEVER == set()
-
-
-@pytest.mark.parametrize("unit", ["um", "micrometer", "cm", "inch"])
-def test_every_unit_is_accepted_and_the_usual_ones_without_pint(unit):
-    code = f"from repro.scene import load_scene\nassert load_scene('flow_only', ['pore.width=0.01 {unit}'] if '{unit}' "
-    code += f"in ('cm', 'inch') else ['pore.width=80 {unit}']).pore.width > 70"
-    assert ("pint" in loaded(code)) == (unit == "inch")

@@ -157,12 +157,6 @@ def test_data_cannot_end_its_block():
     assert text.count("<") == 2 and json.loads(Page(text).scripts[0][2]) == {"a": "</script><!--<script>"}
 
 
-def test_the_same_run_makes_the_same_page(fast):
-    before = text_of(fast)
-    report.write(fast)
-    assert text_of(fast) == before
-
-
 def test_storage_is_drawn_where_there_is_some(paper):
     assert "acceptor_stored_ug_per_m_per_h" not in quantities.series(read(paper))
 

@@ -111,13 +111,6 @@ def test_defaults_are_table_1(everything):
         assert values[key] == (value if isinstance(value, str) else pytest.approx(value, rel=1e-15)), key
 
 
-def test_units_give_the_papers_velocity_in_a_clean_channel():
-    scene = load_scene("base")
-    conductivity = scene.flow.gravity * scene.pore.width**2 / (12 * scene.flow.kinematic_viscosity)
-    velocity = conductivity * scene.flow.head / scene.pore.length
-    assert velocity * 24e-6 == pytest.approx(2.934, abs=0.001)  # m/day
-
-
 # ---------------------------------------------------------------- packaged scenes and sections
 
 
@@ -129,18 +122,6 @@ def test_packaged_scenes(name, width, end, head, velocity):
     assert packaged_scenes() == ("base", "flow_only", "initial_mesh", "wide")
     assert (scene.pore.width, scene.pore.length, scene.aggregate.radius, scene.growth.end) == (width, 600, 5, end)
     assert (scene.flow.head, scene.flow.mean_velocity) == (head, velocity)
-
-
-@pytest.mark.parametrize("name, absent", [
-    ("base", set()),
-    ("wide", set()),
-    ("initial_mesh", {"flow", "substrates", "kinetics", "growth"}),
-    ("flow_only", {"substrates", "kinetics", "growth"}),
-])
-def test_an_absent_section_is_none(name, absent):
-    scene = load_scene(name)
-    assert scene.name == name
-    assert {f.name for f in dataclasses.fields(scene) if getattr(scene, f.name) is None} == absent
 
 
 def test_kinetics_come_with_substrates_and_aggregate():

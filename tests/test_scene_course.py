@@ -42,8 +42,6 @@ def test_the_hash_tells_tables_and_their_interpolation_apart():
     hashes = [scene_hash(load_scene("base", changes)) for changes in (
         [], [table], [table, "substrates.donor.interpolation=linear"], [f'{DONOR}=[["0 h", "10 mg/L"]]'])]
     assert len(set(hashes)) == 4
-    plain = scene_tables(load_scene("base"))
-    assert plain["substrates"]["donor"]["interpolation"] == plain["flow"]["interpolation"] == "steps"
 
 
 @pytest.mark.parametrize("table, told", [

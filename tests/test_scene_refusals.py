@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from repro.scene import SceneError, Substrates, files, load_scene, load_tables, parse_scene, scene_tables
+from repro.scene import SceneError, files, load_scene, load_tables, parse_scene, scene_tables
 from repro.scene.reading import NOT_MODELLED, SCOPE
 from tests.blocks import ROOT
 from tests.test_scene import refusal, written
@@ -398,10 +398,6 @@ def test_one_substrate_alone_is_refused(tmp_path, given, absent, with_aggregate)
     assert "not to limit is supplied at many times its half_saturation" in message
     for other in (f"substrates.{absent}={{}}", f"substrates.{absent}.supply=1000 mg/L"):
         assert load_scene(path, [other]).substrates is not None
-
-
-def test_both_substrates_unsaid_are_table_1():
-    assert load_scene("initial_mesh", ["substrates={}"]).substrates == Substrates()
 
 
 def test_not_utf_8_is_refused(tmp_path):

@@ -84,7 +84,7 @@ def test_packaged_scenes_defaults_and_examples_need_no_pint(monkeypatch):
     monkeypatch.setattr(units, "_registry", None)
     units._conversion.cache_clear()
     for name in packaged_scenes():
-        load_scene(name)
+        load_scene(name, ["pore.width=0.08 mm", "pore.length=800 micrometers"])
         scene_text(name)
     for entry in ("pore.width=50", "pore.width=50 s", "growth.end=5 um", "substrates.donor.supply=1 m"):
         with pytest.raises(units.SceneError, match="is needed, such as"):
