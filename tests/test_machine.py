@@ -12,7 +12,8 @@ from repro.run import machine, memory, running
 from repro.run.running import resume
 from repro.scene import SceneError, load_scene
 from tests import faults
-from tests.shell import SHORT, files, shell, stopped
+from tests.pages import run
+from tests.shell import SHORT, files, refused, shell, stopped
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="for Linux alone")
 CHOICES = [("numerics.solver=pardiso", "pypardiso"), ("numerics.ordering=metis", "pymetis")]
@@ -24,11 +25,9 @@ def test_a_package_that_is_not_there_is_told_before_anything_is_written(tmp_path
                                                                         package):
     """One line, status 2, no folder."""
     faults.absent_package(monkeypatch, package)
-    assert main([*command, "--set", entry, "--out", str(tmp_path / "out")]) == 2
-    out, err = capsys.readouterr()
     key, _, choice = entry.partition("=")
-    assert f'base: {key} = "{choice}": the package {package} is not installed; pip install {package}' in err
-    assert err.count("\n") == 1 and out == "" and list(tmp_path.iterdir()) == []
+    said = f'base: {key} = "{choice}": the package {package} is not installed; pip install {package}'
+    assert said in refused(tmp_path, capsys, *command, "--set", entry, "--out", tmp_path / "out")
 
 
 def test_a_package_that_went_is_told_at_a_resume(tmp_path, monkeypatch):
@@ -70,7 +69,7 @@ def test_a_run_that_may_take_more_than_half_of_the_memory_is_warned_of(tmp_path,
     needed = memory.expected_bytes(load_scene("flow_only"))
     for factor, warned in ((2.1, False), (1.9, True)):
         monkeypatch.setattr(memory, "free_bytes", lambda factor=factor: factor * needed)
-        assert main(["run", "flow_only", "--out", str(tmp_path / str(factor)), "--json"]) == 0
+        run(tmp_path / str(factor), "flow_only", options=["--json"])
         out, err = capsys.readouterr()
         events = [json.loads(line) for line in out.splitlines()]
         assert (err.startswith("repro: warning: flow_only: about ")) == warned == (events[0]["event"] == "warning")
@@ -140,6 +139,6 @@ def test_want_of_memory_outside_of_the_steps_is_told_in_one_line(tmp_path, capsy
         raise MemoryError("Unable to allocate 1 GiB")
 
     monkeypatch.setattr(running, "run", lambda *_, **__: none_left())
-    assert main(["run", "flow_only", "--out", str(tmp_path / "run")]) == 1
+    run(tmp_path, "flow_only", status=1)
     assert capsys.readouterr().err == ("repro: out of memory (Unable to allocate 1 GiB); try a smaller "
                                        "numerics.refinement\n")

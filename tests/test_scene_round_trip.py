@@ -4,7 +4,6 @@ Malformed scenes are refused in a printable line, and nothing is written: 2000 o
 quarter of it a kind.
 """
 import dataclasses
-import io
 import json
 import math
 import os
@@ -12,17 +11,16 @@ import string
 import subprocess
 import sys
 import tomllib
-from contextlib import redirect_stderr, redirect_stdout
 from decimal import Decimal, localcontext
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from repro.cli import main
 from repro.scene import KEYS, PRESETS, SceneError, load_scene, packaged_scenes, parse_scene, scene_hash, scene_tables
 from repro.scene.text import scene_text
 from tests.blocks import ROOT
+from tests.shell import refused as refused_by_command
 from tests.strategies import scenes
 from tests.test_scene import EVERYTHING
 
@@ -261,18 +259,15 @@ def shown(value: object) -> str:
 
 @FUZZ
 @given(garbled(), st.sampled_from(["run", "scene", "check"]))
-def test_the_command_line_refuses_in_one_line_and_writes_nothing(folder, content, command):
-    """Exit status 2 and a line, where the file is no scene."""
-    file, out, err = folder / "line.toml", io.StringIO(), io.StringIO()
+def test_the_command_line_refuses_in_one_line_and_writes_nothing(capsys, folder, content, command):
+    """Where the file is no scene."""
+    file = folder / "line.toml"
     file.write_bytes(content)
     try:
         load_scene(file)
     except SceneError as error:
-        before = sorted(folder.iterdir())
-        with redirect_stdout(out), redirect_stderr(err):
-            assert main([command, str(file), *(["--out", str(folder / "out")] if command == "run" else [])]) == 2
-        assert (out.getvalue(), err.getvalue()) == ("", f"repro: {error}\n") and err.getvalue().count("\n") == 1
-        assert sorted(folder.iterdir()) == before
+        target = ["--out", folder / "out"] if command == "run" else []
+        assert refused_by_command(folder, capsys, command, file, *target) == f"repro: {error}\n"
 
 
 def test_a_process_of_its_own_says_the_same(tmp_path):
