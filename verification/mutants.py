@@ -134,7 +134,7 @@ MUTANTS = (
            says="A vector of a .vtu file is read as numbers one after the other.",
            old="values.reshape(-1, count) if count > 1 else values",
            new="values",
-           tests=("tests/test_vtk.py::test_what_is_written_is_read",)),
+           tests=("tests/test_vtu.py::test_what_is_written_is_read",)),
     Mutant("fields-of-the-row-before", "repro/results/tables.py",
            says="The fields of a time are those of the row before it.",
            old="return self._fields[row]",
