@@ -11,7 +11,6 @@ from repro.scene import SceneError, files, load_scene, load_tables, parse_scene,
 from repro.scene.reading import NOT_MODELLED, SCOPE
 from tests.blocks import ROOT
 from tests.test_scene import refusal, written
-from tests.test_scene_aggregate import BUMP
 
 LENGTH = 'a length is needed, such as "100 um" (greater than zero)'
 
@@ -93,9 +92,6 @@ REFUSED = {
     "a plain number is needed, such as 0 (zero or more, less than 1)": ["aggregate.inert_fraction=1"],
     "zero or more, less than 1": ["aggregate.inert_fraction=-0.1", "aggregate.inert_fraction=nan"],
     "(did you mean 0.3?)": ['aggregate.inert_fraction="0.3"'],
-    "one of them is accepted, not both": [f"aggregate.outline={json.dumps(BUMP)}"],
-    'aggregate.position = "2 um": 0 um is needed with aggregate.outline': [
-        f"aggregate={{outline={json.dumps(BUMP)}, position=\"2 um\"}}"],
     # several keys, see PAIRS; here with the value as it was written
     'aggregate.radius = "80 um": less than pore.width (50 um)': ['aggregate.radius="80 um"'],
     "aggregate.radius": ["aggregate.radius=50 um"],
@@ -116,8 +112,6 @@ def test_refused(override, said):
 
 @pytest.mark.parametrize("source, overrides, said", [
     ("wide", ["flow.mean_velocity=-1 m/day"], "a velocity is needed"),
-    ("wide", ["flow.head=1 cm"], 'flow.head = "1 cm": flow.mean_velocity (2.9 m/day) is given too; one of them is '
-     "accepted, not both (--unset flow.mean_velocity leaves that out)"),
     ("initial_mesh", ["flow.viscosity_ratio=5"], "flow.head is missing: it or flow.mean_velocity is needed"),
     ("base", ["flow.permeability=1e-15 m^2"], 'flow.biomass = "brinkman" is needed with it'),
     ("base", ["flow.biomass=brinkman"], 'flow.permeability is needed with "brinkman", such as "1e-15 m^2"'),
