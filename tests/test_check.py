@@ -96,8 +96,7 @@ def test_what_is_warned_of_in_the_packaged_scenes(name, overrides, keys):
     assert looked_at(name, *overrides)[1] == keys
 
 
-LONG = "pore.length=2000 um"
-QUIET = ("base", "numerics.preset=paper", "growth.end=5 h", LONG)
+QUIET = ("base", "numerics.preset=paper", "growth.end=5 h", "pore.length=2000 um")
 QUIET_WIDE = ("wide", *QUIET[1:])
 QUICK = (*QUIET, "kinetics.maximum_density=30 mg/L", "growth.time_step=1e-4 h", "growth.end=1e-3 h")
 FASTER = "kinetics.maximum_utilization_rate=3400 1/day"

@@ -69,6 +69,16 @@ REFUSED = {
     "greater than zero, at most 20": ["numerics.refinement=20.1", "numerics.refinement=1e9"],
     "1e-06 h or more is needed": ["growth.time_step=9e-7 h"],
     "between 0 and 90 deg": ["growth.minimum_contact_angle=0 deg", "growth.minimum_contact_angle=90 deg"],
+    # shares, and F by the oxygen demand
+    'a diffusivity or kinematic viscosity is needed, such as "1.85 cm^2/day" (greater than zero), or a share of '
+    'diffusivity up to "100 %"': [
+        f'substrates.acceptor.diffusivity_in_aggregate="{value}"' for value in (
+            "0 %", "-5 %", "100.1 %", "%", "nan %", "1e999999999 %", "1e-999999999 %", "80 %%", "80 % um^2/h", "0.8",
+            "eighty %", "9" * 100 + " %")],
+    "kinetics.donor_oxygen_demand = 0.8: more than Y d_c (0.8662) is needed: F is the rest": [
+        "kinetics.donor_oxygen_demand=0.8"],
+    "a plain number is needed, such as 2.38 (greater than zero)": [
+        f"kinetics.donor_oxygen_demand={value}" for value in ("0", "2 mg/mg", "nan")],
     # words
     'numerics.preset = "best": "fast" or "accurate" or "exact" or "paper" is needed': ["numerics.preset=best"],
     '"quasi_steady" or "gear" is needed': ["numerics.transport=bdf"],
@@ -121,6 +131,10 @@ def test_refused(override, said):
      'flow.biomass = "brinkman": numerics.elements = "quadratic" or "cubic" is needed'),
     ("base", ["numerics.preset=fast", "flow.biomass=brinkman", "flow.permeability=1e-15 m^2",
               "growth.fluid_forces=included"], '"neglected" is needed with flow.biomass = "brinkman"'),
+    ("base", ["kinetics.donor_oxygen_demand=0.8", "kinetics.acceptor_to_donor_ratio=1.52"],
+     "more than Y d_c (0.8662) is needed"),
+    ("base", ["substrates.acceptor.diffusivity_in_aggregate=1e-200 %", "substrates.acceptor.diffusivity=1e-200 um^2/h"],
+     'diffusivity_in_aggregate = "1e-200 %": greater than zero is needed'),
     ("base", ["flow.permeability=0 m^2"], "a permeability"),
     ("flow_only", ["growth.end=1 h"], "growth = "),
     ("flow_only", ["substrates={}", "growth.time_step=1 h"], 'growth.end is missing: a time is needed'),

@@ -126,17 +126,6 @@ def test_round_trip_with_an_oxygen_demand(rest, product, part):
     assert scene_hash(scene) != scene_hash(without)
 
 
-@pytest.mark.parametrize("overrides, said", [
-    ([f"{COD}=0.8"], "kinetics.donor_oxygen_demand = 0.8: more than Y d_c (0.8662) is needed: F is the rest"),
-    ([f"{COD}=0.8", "kinetics.acceptor_to_donor_ratio=1.52"], "more than Y d_c (0.8662) is needed"),
-    ([f"{COD}=0"], "a plain number is needed, such as 2.38 (greater than zero)"),
-    ([f"{COD}=2 mg/mg"], "a plain number is needed, such as 2.38"),
-    ([f"{COD}=nan"], "a plain number is needed"),
-])
-def test_no_oxygen_demand(overrides, said):
-    assert said in refusal("base", *overrides)
-
-
 @pytest.mark.parametrize("entry, key", [("yield_coefficient=1", "decay_oxygen_demand"),
                                         ("decay_oxygen_demand=4", "yield_coefficient")])
 def test_what_is_set_beside_an_oxygen_demand_is_named(tmp_path, entry, key):
@@ -174,15 +163,3 @@ def test_a_share_is_hashed_as_what_it_comes_to_and_written_as_it_stands():
     assert Donor(diffusivity=10.0, diffusivity_in_aggregate=Fraction(1, 2)).diffusivity_in_aggregate == 5.0
 
 
-@pytest.mark.parametrize("value", ["0 %", "-5 %", "100.1 %", "%", "nan %", "1e999999999 %", "1e-999999999 %", "80 %%",
-                                   "80 % um^2/h", "0.8", "eighty %", "9" * 100 + " %"])
-def test_no_share(value):
-    message = refusal("base", f'substrates.acceptor.diffusivity_in_aggregate="{value}"')
-    assert ('a diffusivity or kinematic viscosity is needed, such as "1.85 cm^2/day" (greater than zero), '
-            'or a share of diffusivity up to "100 %"') in message
-
-
-def test_a_share_that_comes_to_nothing_is_refused():
-    message = refusal("base", "substrates.acceptor.diffusivity_in_aggregate=1e-200 %",
-                      "substrates.acceptor.diffusivity=1e-200 um^2/h")
-    assert "diffusivity_in_aggregate = \"1e-200 %\": greater than zero is needed" in message

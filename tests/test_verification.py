@@ -224,8 +224,8 @@ def test_what_a_case_keeps_besides_tells_its_page():
         def lines(self, every):
             return [("kept", f"{len(every)}", "why", True)]
 
-    chosen = case.Case("x", "flow", "c", "exact", "n", ("m",), False,
-                       lambda value: (at_most("q", value, 1.5, ""), Kept()), {"one": (1.0,), "two": (2.0,)})
+    chosen = replace(A_CASE, function=lambda value: (at_most("q", value, 1.5, ""), Kept()),
+                     over={"one": (1.0,), "two": (2.0,)})
     found = case.run(chosen)
     assert found.outcome.lines() == [("kept", "2", "why", True)] and len(found.outcome.checks) == 2 and not found.holds
 
