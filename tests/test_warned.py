@@ -93,7 +93,9 @@ def not_met(told):
 def test_a_tolerance_that_no_step_can_meet_is_told_with_what_is_reached(tmp_path, capsys, options):
     """Once, aside, in run.json and on the page: in how many of the run's steps, and the largest of their estimates."""
     folder = pages.run(tmp_path, "base", *MISSED, options=options)
-    (text,) = not_met(told(folder))
+    found = not_met(told(folder))
+    assert len(found) == 1
+    (text,) = found
     (line,) = [line for line in capsys.readouterr().err.splitlines() if "tolerance" in line]
     assert line == f"repro: warning: numerics.tolerance: {text}"
     assert html.escape(text) in text_of(folder)
