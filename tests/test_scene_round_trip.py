@@ -25,7 +25,7 @@ from tests.strategies import scenes
 from tests.test_scene import EVERYTHING
 
 #: How many of another unit an internal unit is, an exact decimal, worked out by hand; units one by one are in
-#: tests/test_scene_units.py.
+#: tests/test_scene.py.
 OTHER_UNITS = {"um": "1e-4 cm", "h": "3600 s", "um/h": "24e-6 m/day", "um^2/h": "24e-6 mm**2 / day",
                "um/h^2": "576e-6 m/day^2", "1/h": "24 day^-1", "mg/L": "1e-3 kg/m^3", "MPa": "1e3 kPa",
                "rad": "1 radian"}
