@@ -23,7 +23,7 @@ import numpy as np
 
 import verification.claims as package
 from verification.claims import CLAIMS, CLOSED, MODEL, OF_SCHEME, Claim, ClaimError, Finding, PaperCheck
-from verification.claims.levels import CONVERGED, OF_WIDE, SCHEME, Level, at_level, forget
+from verification.claims.levels import CONVERGED, SCHEME, Level, at_level, forget
 from verification.uncertainty import Bar, Estimate, combined, estimate, spread
 
 MESH_ORDERS, STEP_ORDERS = (1.0, 2.0), (1.0, 1.0)
@@ -68,7 +68,7 @@ def _judgeable(claim: Claim, check: PaperCheck, found: dict[Level, tuple[float, 
         bar, held = spread([values[level] for level in of_kind]), tuple(found[level][1] for level in of_kind)
     own = check.bar or Bar(check.value, check.value)
     bar = replace(bar, low=bar.low - check.value + own.low, high=bar.high - check.value + own.high)
-    return replace(check, bar=bar, held=held)
+    return replace(check, bar=bar, held=held, date=check.date or claim.date)
 
 
 def _bar(claim: Claim, value: float, values: dict[Level, float]) -> Bar:
@@ -119,8 +119,8 @@ def everywhere(ids: Iterable[str], besides: dict[Level, Callable] | None = None
 def effort(level: Level, ids: Iterable[str]) -> float:
     """About how long claims take at a level, in runs of wide at size 1: a run takes as many elements and steps as go in
     a size, to the power of two and more."""
-    ids = set(ids)
-    runs = OF_BASE + bool(ids & set(OF_WIDE)) + sum(RUNS.get(id, 0) for id in ids)
+    ids = list(ids)
+    runs = OF_BASE + any(CLAIMS[id].of_wide for id in ids) + sum(RUNS.get(id, 0) for id in ids)
     return runs / (level.size**2.5 * level.step)
 
 

@@ -8,13 +8,11 @@ import numpy as np
 from repro.fem.assembly import saddle_system
 from repro.fem.mesh import Mesh
 from repro.fem.mesher import generate
-from repro.fem.outline import BOTTOM, TOP, Outline
 from repro.fem.space import Space
 from repro.model import flow, pore
 from verification import switches
-from verification.claims.runs import BASE, WIDE, at, grown, half_disc, history, scene, series
+from verification.claims.runs import BASE, END, WIDE, at, grown, half_disc, history, plug, scene, series
 from verification.errata import (
-    END,
     STATE_HEAD,
     consumed_ratio,
     erratum,
@@ -48,16 +46,15 @@ TRACTION = CHOICES["traction"].run
         19.2 h: velocity {velocity} m/d with traction, {deviation} against ours.""")
 def interface_forms() -> dict[str, str]:
     """Both forms around half-discs and through plugs of the pore's whole width."""
-    discs, plugs, width = (0.1, 0.3, 0.5, 0.7, 0.9), (0.25, 0.5, 1.0, 2.0), 50.0
+    width, rows = 50.0, []
     said = [scene("flow_only", f"numerics.refinement={r}") for r in (1, 2)]
-    rows = []
-    for part in discs:
+    for part in (0.1, 0.3, 0.5, 0.7, 0.9):
         grids = [half_disc(s, part * width, min(10 * part, 1.5) * width) for s in said]
         rows.append([f"half-disc, R / W = {part}", *map(interface_difference, grids)])
-    for part in plugs:
-        rows.append([f"plug, length / W = {part}", *(interface_difference(plug(s, part * width)) for s in said)])
-    fine = plug(said[1], width)
-    laplacian, traction = (losses(fine)[form] for form in ("laplacian", "traction"))
+    for part in (0.25, 0.5, 1.0, 2.0):
+        grids = [plug(s, -part * width / 2, part * width / 2) for s in said]
+        rows.append([f"plug, length / W = {part}", *map(interface_difference, grids)])
+    laplacian, traction = losses(plug(said[1], -width / 2, width / 2)).values()
     exact = flow.poiseuille_loss(600 + 1999 * width, width)
     saved = (laplacian - traction) / flow.poiseuille_loss(2000.0, width)
     return {"table": table(["", "default mesh", "twice finer"], rows), "exact": "12 nu u_ave (L + 1999 l) / (g W^2)",
@@ -76,16 +73,6 @@ def interface_difference(grid: Mesh) -> str:
     """Traction against laplacian head loss."""
     found = losses(grid)
     return percent(found["traction"] / found["laplacian"])
-
-
-def plug(said, length: float) -> Mesh:
-    """Biomass over the pore's whole width and a length (um), meshed to 1.5 W on both sides."""
-    half, width = length / 2, said.pore.width
-    points = np.array([[-half, 0.0], [half, 0.0], [half, width], [-half, width]])
-    wall = np.repeat([BOTTOM, TOP], 2)
-    outline = Outline(points, wall, np.zeros(4, bool), points)
-    ends = -half - 1.5 * width, half + 1.5 * width
-    return generate(outline, ends, pore.sized(said))[0]
 
 
 @erratum(

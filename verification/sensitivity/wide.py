@@ -26,7 +26,7 @@ from repro.results import M_PER_D
 from verification.claims import CLAIMS, Finding, evaluate
 from verification.claims.evaluate import MESH_ORDERS, unnumbered
 from verification.claims.growth_pattern import contact_length
-from verification.claims.levels import CONVERGED, OF_WIDE, Level, at_level, converged, forget
+from verification.claims.levels import CONVERGED, Level, at_level, converged, forget
 from verification.claims.runs import WIDE, bodies, polygon, series
 from verification.sensitivity.rounding import OF, Numbers, Runs, scene
 from verification.uncertainty import estimate
@@ -81,9 +81,9 @@ def bar_of(quantity: str, values: list[float], asked: float) -> dict:
 SUPPLIES, SIZE = (5.0, 10.0, 20.0, 40.0), 2**0.5
 #: Hours by which all of them have made contact.
 END = 120.0
-#: Claims that are judged anew: those about what Figure 6 shows. C32 compares two ways to be born, C44 a law with its
-#: own runs, C45 shapes with layers, C46 states with and without the fluid's forces.
-JUDGED = tuple(id for id in OF_WIDE if id not in ("C32", "C44", "C45", "C46"))
+#: Claims about wide that are not judged anew, being about more than Figure 6 shows: C32 compares two ways to be born,
+#: C44 a law with its own runs, C45 shapes with layers, C46 states with and without the fluid's forces.
+LEFT_OUT = ("C32", "C44", "C45", "C46")
 #: Hours before it reaches an end of the pore at which an aggregate is still clear of it.
 MARGIN = 0.1
 #: Whole hours that wide goes on after contact: 45 h for Figure 6's own 10 K_s.
@@ -130,7 +130,9 @@ def _of_supply(runs: Runs, supply: float) -> dict:
     contact = runs.numbers(replace(scene("wide", factors, *converged(SIZE)), name="contact"))
     level = supplied(supply, contact["end"])
     with at_level(level), np.errstate(all="raise", under="ignore"):
-        found = {**contact, "outlines": _outlines(), "claims": {id: holding(CLAIMS[id].function()) for id in JUDGED}}
+        judged = {id: holding(CLAIMS[id].function()) for id in sorted(CLAIMS)
+                  if CLAIMS[id].of_wide and id not in LEFT_OUT}
+        found = {**contact, "outlines": _outlines(), "claims": judged}
     forget(level)
     return found
 
