@@ -178,7 +178,7 @@ def plotted_state() -> dict[str, str]:
     before = [flux.effluent for flux in grown(BASE, PLOTTED)[1].fluxes]
     rows = [["19.2 h", *state(BASE)], ["19.4 h, before the expansion", state(BASE)[0], *before],
             ["19.4 h, after it", *state(BASE, END)]]
-    told = [[name, *(f"{value:.3f}" for value in (*values, consumed_ratio(*values[1:])))] for name, *values in rows]
+    told = [[name, *map("{:.3f}".format, (*values, consumed_ratio(*values[1:])))] for name, *values in rows]
     return {"table": table([*STATE_HEAD, "acceptor / donor consumed"], told),
             "fall": f"{100 * (1 - state(BASE, END)[0] / state(BASE)[0]):.1f} %"}
 
@@ -223,14 +223,14 @@ def sensitivity() -> dict[str, str]:
 def explicit_increment() -> dict[str, str]:
     """Base with one explicit Euler increment a shape update, against ours with both steps."""
     found = course(BASE, explicit).columns
-    keys, rows = ("mean_velocity_m_per_d", "aggregate_area_um2"), []
+    rows = []
     for time in (PLOTTED, END):
-        ours, half = ([at(run, time)[key] for key in keys] for run in (BASE, HALF_STEP))
-        increment = [near(found, name, time) for name in ("velocity", "area")]
-        rows += [[f"{time:g} h", "integrated, 12 min (ours)", f"{ours[0]:.3f}", f"{ours[1]:.0f}"]]
+        ours, half, increment = ([near(columns, name, time) for name in ("velocity", "area")]
+                                 for columns in (switches.columns(BASE), switches.columns(HALF_STEP), found))
+        rows.append([f"{time:g} h", "integrated, 12 min (ours)", f"{ours[0]:.3f}", f"{ours[1]:.0f}"])
         for name, (u, area) in (("integrated, 6 min", half), ("one explicit increment, 12 min", increment)):
-            deviations = [percent(value / our, 1) for value, our in zip((u, area), ours)]
-            rows += [[f"{time:g} h", name, f"{u:.3f} ({deviations[0]})", f"{area:.0f} ({deviations[1]})"]]
+            rows.append([f"{time:g} h", name, f"{u:.3f} ({percent(u / ours[0], 1)})",
+                         f"{area:.0f} ({percent(area / ours[1], 1)})"])
     return {"table": table(["", "", "mean velocity, m/d", "area, um2"], rows)}
 
 
