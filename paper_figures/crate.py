@@ -95,7 +95,7 @@ def figures(out: Path) -> dict[str, list[Path]]:
     if told["environment"]["source"] != source_hash():
         raise FileNotFoundError(f"{out / manifest.NAME}: the figures are those of another source; {asked} anew")
     found = {name: [out / picture for picture in sorted(told["figures"][name]["pictures"])] for name in FIGURES}
-    for path in (path for paths in found.values() for path in paths):
+    for path in sum(found.values(), []):
         if not path.is_file():
             raise FileNotFoundError(f"{path}: a figure is missing; {asked} anew")
     return found

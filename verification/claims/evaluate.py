@@ -40,12 +40,17 @@ def numbers(finding: Finding) -> Numbers:
 def barred(claim: Claim, finding: Finding, others: dict[Level, Numbers]) -> Finding:
     """The finding with a bar on each check. Raises ClaimError where the levels do not speak of the same quantities."""
     found = {claim.judged: numbers(finding), **others}
-    said = {tuple(unnumbered(quantity) for quantity, *_ in row) for row in found.values()}
+    said = {quantities(row) for row in found.values()}
     if len(said) != 1:
         raise ClaimError(f"the levels tell of different quantities: {sorted(said)}")
-    checks = [_judgeable(claim, check, {level: row[k][1:] for level, row in found.items()})
-              for k, check in enumerate(finding.checks)]
-    return replace(finding, checks=tuple(checks))
+    columns = zip(*found.values())
+    return replace(finding, checks=tuple(_judgeable(claim, check, dict(zip(found, column)))
+                                         for check, column in zip(finding.checks, columns)))
+
+
+def quantities(row: Numbers) -> tuple[str, ...]:
+    """What a finding speaks of at one level, whatever the instants are."""
+    return tuple(unnumbered(quantity) for quantity, *_ in row)
 
 
 def unnumbered(quantity: str) -> str:
@@ -53,10 +58,10 @@ def unnumbered(quantity: str) -> str:
     return re.sub(r"\d+(\.\d+)?", "#", quantity)
 
 
-def _judgeable(claim: Claim, check: PaperCheck, found: dict[Level, tuple[float, bool]]) -> PaperCheck:
+def _judgeable(claim: Claim, check: PaperCheck, found: dict[Level, tuple[str, float, bool]]) -> PaperCheck:
     """The check with its bar, from its value and whether it holds at each level; to a width of its own, that of printed
     digits that it is made of or of the mesh around a place, the bar is added."""
-    values = {level: value for level, (value, _) in found.items()}
+    values = {level: value for level, (_, value, _) in found.items()}
     of_kind = [level for level in found if claim.about != MODEL or level.kind == CONVERGED]
     scheme = [values[level] for level in values if level.kind == SCHEME]
     if claim.about == MODEL:
@@ -65,7 +70,7 @@ def _judgeable(claim: Claim, check: PaperCheck, found: dict[Level, tuple[float, 
     if check.converges:
         bar, held = _bar(claim, check.value, values), ()
     else:
-        bar, held = spread([values[level] for level in of_kind]), tuple(found[level][1] for level in of_kind)
+        bar, held = spread([values[level] for level in of_kind]), tuple(found[level][2] for level in of_kind)
     own = check.bar or Bar(check.value, check.value)
     bar = replace(bar, low=bar.low - check.value + own.low, high=bar.high - check.value + own.high)
     return replace(check, bar=bar, held=held, date=check.date or claim.date)
