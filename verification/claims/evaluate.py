@@ -18,6 +18,7 @@ import re
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from types import ModuleType
 
 import numpy as np
 
@@ -103,6 +104,11 @@ OF_BASE = 0.1
 
 def register_all() -> None:
     """Import every module of this package: each registers its claims."""
+    import_all(package)
+
+
+def import_all(package: ModuleType) -> None:
+    """Import every module of a package but its program."""
     for module in pkgutil.iter_modules(package.__path__):
         if module.name != "__main__":
             importlib.import_module(f"{package.__name__}.{module.name}")

@@ -61,7 +61,8 @@ def others() -> Iterator[Sample]:
 
 def table_rows(discs: list[Sample], found: list[Sample]) -> list[list]:
     """The table, a row a shape and lambda; `discs` are of the table, `found` all others."""
-    before, after = ([one for one in found if one.spanned == kind] for kind in (False, True))
+    before = [one for one in found if not one.spanned]
+    after = [one for one in found if one.spanned]
     shares, lengths = np.array([one.share for one in discs]), np.array([one.lengths for one in discs])
     plugs = np.array(PLUGS)
     apart = departures(before, lambda one: law(shares, lengths, one.share))

@@ -12,6 +12,7 @@ from repro.march.simulation import simulate
 from repro.model import flow, pore
 from repro.model.pore import Pore
 from repro.scene import load_scene
+from verification.claims.runs import until
 
 #: Of the table.
 RATIOS = (100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0, 10000.0)
@@ -49,13 +50,12 @@ class Growth:
 
     def scene(self):
         """In the preset `fast`, a row an hour."""
-        times = ", ".join(f'"{hour} h"' for hour in range(self.end + 1))
         return load_scene({
             "pore": {"width": f"{self.width} um", "length": f"{LENGTH * self.width} um"},
             "aggregate": {"radius": f"{self.radius} um", "position": f"{self.position} um"},
             "flow": {"mean_velocity": f"{self.velocity} m/d"},
             "substrates": {name: {"supply": f"{self.supply} mg/L"} for name in ("acceptor", "donor")},
-            "growth": {"end": f"{self.end} h"}}, (*QUICK, f"output.times=[{times}]"))
+            "growth": {}}, (*QUICK, *until(*range(self.end + 1))))
 
 
 @dataclass(frozen=True)

@@ -165,10 +165,13 @@ def _places(found) -> np.ndarray:
 
 def verdicts(found: dict[str, dict]) -> tuple[list[str], list[str], list[str]]:
     """Claims that hold with all supplies, with some, and with none."""
-    ids = list(next(iter(found.values()))["claims"])
-    held = {id: [all(known["claims"][id].values()) for known in found.values()] for id in ids}
-    return ([id for id in ids if all(held[id])], [id for id in ids if any(held[id]) and not all(held[id])],
-            [id for id in ids if not any(held[id])])
+    every: list[str] = []
+    some: list[str] = []
+    none: list[str] = []
+    for id in next(iter(found.values()))["claims"]:
+        held = [all(known["claims"][id].values()) for known in found.values()]
+        (every if all(held) else some if any(held) else none).append(id)
+    return every, some, none
 
 
 def moving(found: dict[str, dict]) -> list[tuple[str, str]]:
