@@ -81,7 +81,8 @@ def upstream_share(folder: Path) -> float:
 
 def caption(folder: Path) -> str:
     """What is seen, when contact came, and how the run ended."""
-    table, shown, meets = states.series(folder), states.every(folder, EVERY), states.contact(folder)
+    table, shown = states.series(folder), states.every(folder, EVERY)
+    meets = states.contact(folder)
     contact = (f"It touches the opposite wall from {meets:g} h on" if np.isfinite(meets) else
                "It does not reach the opposite wall")
     return (f"The aggregate of Wide every {EVERY:g} h from 0 to {shown[-1].time:g} h, between the walls of a pore "

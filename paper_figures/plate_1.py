@@ -69,7 +69,8 @@ def caption(folder: Path) -> str:
     """What is seen, with the extremes and what enters and leaves."""
     shaped, end = states.last_step(folder)
     state = states.last(folder, "before_expansion")
-    acceptor, donor = ([state.carried(f"{name}_mg_per_L", side) for side in (0, 1)] for name in ("acceptor", "donor"))
+    acceptor = [state.carried("acceptor_mg_per_L", side) for side in (0, 1)]
+    donor = [state.carried("donor_mg_per_L", side) for side in (0, 1)]
     active, inert = (since(folder, f"{name}_biomass")[state.body] for name in ("active", "inert"))
     return (f"Base at t = {end:g} h before the aggregate expands: the shape is that of {shaped:g} h and carries what "
             "has grown since. (a, b) The substrates in the meshed part, flow from left to right; flow-weighted, the "

@@ -20,8 +20,11 @@ RESOLUTION = 250
 LAYOUT_PASSES = 2
 
 #: Okabe and Ito's colours by what they stand for.
-BLUE, RED, SKY, BLACK = "#0072B2", "#D55E00", "#56B4E9", "#000000"
-FLUID, BIOMASS, RIM, WALL, FAINT = "#E6F1F9", "#F3D08B", "#7A4A00", "#555555", "#9A9A9A"
+BLUE, RED = "#0072B2", "#D55E00"
+SKY, BLACK = "#56B4E9", "#000000"
+FLUID, WALL = "#E6F1F9", "#555555"
+BIOMASS, RIM = "#F3D08B", "#7A4A00"
+FAINT = "#9A9A9A"
 MAP = "viridis"
 
 X_LABEL, Y_LABEL = "x (µm)", "y (µm)"

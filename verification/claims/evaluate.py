@@ -118,13 +118,18 @@ def everywhere(ids: Iterable[str], besides: dict[Level, Callable] | None = None
                ) -> tuple[dict[str, dict[Level, Found]], dict[Level, object]]:
     """What claims come to at all of their levels, the dearest levels first, and what functions return at theirs."""
     ids, besides = list(ids), besides or {}
-    wanted = {level: [id for id in ids if level in CLAIMS[id].levels]
-              for level in (*besides, *(level for id in ids for level in CLAIMS[id].levels))}
+    wanted: dict[Level, list[str]] = {level: [] for level in besides}
+    for id in ids:
+        for level in CLAIMS[id].levels:
+            wanted.setdefault(level, []).append(id)
     levels = sorted(wanted, key=lambda level: effort(level, wanted[level]), reverse=True)
     found = dict(zip(levels, side_by_side(found_at, levels, [wanted[level] for level in levels],
                                           [besides.get(level) for level in levels])))
-    return ({id: {level: rows[id] for level, (rows, _) in found.items() if id in rows} for id in ids},
-            {level: found[level][1] for level in besides})
+    by_claim: dict[str, dict[Level, Found]] = {id: {} for id in ids}
+    for level, (rows, _) in found.items():
+        for id in rows:
+            by_claim[id][level] = rows[id]
+    return by_claim, {level: found[level][1] for level in besides}
 
 
 def effort(level: Level, ids: Iterable[str]) -> float:

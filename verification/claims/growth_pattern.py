@@ -351,6 +351,5 @@ def after_contact() -> tuple[float, ...]:
 
 def conductivity_change(run: tuple[str, ...], times: tuple[float, ...]) -> float:
     """Change (%) of the conductivity when new biomass is born stress-free: geometric mean at some times (h)."""
-    ours, other = ([at((*run, *more), time)["conductivity_m_per_d"] for time in times]
-                   for more in ((), (STRESS_FREE,)))
-    return mean_change(ours, other)
+    ours = [at(run, time)["conductivity_m_per_d"] for time in times]
+    return mean_change(ours, [at((*run, STRESS_FREE), time)["conductivity_m_per_d"] for time in times])

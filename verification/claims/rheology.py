@@ -103,8 +103,8 @@ def contact(run: tuple[str, ...]) -> float:
 
 def conductivity_change(run: tuple[str, ...], hours: tuple[float, ...] = AFTER) -> float:
     """Geometric mean of the conductivity in rows at some hours, against that of WHOLE, in percent."""
-    ours, other = ([at(chosen, hour)["conductivity_m_per_d"] for hour in hours] for chosen in (WHOLE, run))
-    return mean_change(ours, other)
+    ours = [at(WHOLE, hour)["conductivity_m_per_d"] for hour in hours]
+    return mean_change(ours, [at(run, hour)["conductivity_m_per_d"] for hour in hours])
 
 
 def _of_angles(hours: tuple[float, ...]) -> str:

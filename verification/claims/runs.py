@@ -142,8 +142,8 @@ def around_contact(*run: str) -> dict[str, np.ndarray]:
 
 
 def _columns(said: Scene, instants: tuple[Instant, ...]) -> dict[str, np.ndarray]:
-    found = [results.row(said, instant) for instant in instants]
-    return {name: np.array([row[name] for row in found], float) for name in results.COLUMNS}
+    found = np.array([[*results.row(said, instant).values()] for instant in instants], float)
+    return dict(zip(results.COLUMNS, found.T))
 
 
 @cached

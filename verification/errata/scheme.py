@@ -108,7 +108,8 @@ def outlet() -> dict[str, str]:
 
 def free_outlet(grid: Mesh) -> tuple[np.ndarray, float]:
     """Velocity and loss of unit flow in a clean channel, traction form, nothing prescribed at the outlet."""
-    space, count, topology = Space(grid, 1), len(grid.points), grid.topology
+    space, count = Space(grid, 1), len(grid.points)
+    topology = grid.topology
     held = np.zeros((count, 2), bool)
     held[topology.walls] = held[topology.inlet] = True
     viscosity = np.ones(len(grid.triangles))
@@ -225,7 +226,7 @@ def explicit_increment() -> dict[str, str]:
     found = course(BASE, explicit).columns
     rows = []
     for time in (PLOTTED, END):
-        ours, half, increment = ([near(columns, name, time) for name in ("velocity", "area")]
+        ours, half, increment = ((near(columns, "velocity", time), near(columns, "area", time))
                                  for columns in (switches.columns(BASE), switches.columns(HALF_STEP), found))
         rows.append([f"{time:g} h", "integrated, 12 min (ours)", f"{ours[0]:.3f}", f"{ours[1]:.0f}"])
         for name, (u, area) in (("integrated, 6 min", half), ("one explicit increment, 12 min", increment)):

@@ -27,7 +27,8 @@ QUICK = ('numerics.preset="fast"',)
 #: Ranges of drawn bodies, which are those of what growth makes before contact: thickness over that of the half-disc of
 #: the same area; how far the top leans to either side, over its height. Of drawn plugs: length of the contact surface
 #: with the lower wall less that with the upper one, over W, and the larger share of that on one side.
-THICKER, LEANING, ENDS, UPSTREAM = (0.99, 1.03), 0.05, (1.15, 1.4), 0.6
+THICKER, LEANING = (0.99, 1.03), 0.05
+ENDS, UPSTREAM = (1.15, 1.4), 0.6
 #: Least supply (mg/L) over W^2 (um2): with less growth is limited by diffusion, and bodies are thicker than that.
 LEAST_SUPPLY = 1 / 2500
 #: A quarter of an ellipse that is cut here meets the upper wall at an angle.

@@ -28,6 +28,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import log
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
@@ -186,7 +187,8 @@ class Runs:
 
 
 #: Relative distances of an input from its printed value; the larger one of an input that is taken as exact.
-NEAR, FAR, LARGE = 0.01, 0.02, 0.1
+NEAR, FAR = 0.01, 0.02
+LARGE = 0.1
 RESOLVED = 0.1
 
 
@@ -209,7 +211,7 @@ def _of_input(runs: Runs, name: str, each: Input, plain: Numbers) -> dict[str, d
 
 
 def _told(number: str, value: float, pairs: dict[float, list[Numbers]]) -> dict:
-    near, far = (difference(*(pair[number] for pair in pairs[d]), value, d) for d in (NEAR, FAR))
+    near, far = (difference(pairs[d][0][number], pairs[d][1][number], value, d) for d in (NEAR, FAR))
     bar = abs(far - near)
     told = {"elasticity": near, "bar": bar, "resolved": bar <= RESOLVED * abs(near)}
     if LARGE in pairs:
@@ -294,7 +296,8 @@ def _solved(A: np.ndarray, b: np.ndarray, box: float | None) -> np.ndarray | Non
     return answer.x if answer.success else None
 
 
-LEAST, SEED, CONFIDENCE = 0.005, 2001, 0.95
+LEAST, CONFIDENCE = 0.005, 0.95
+SEED = 2001
 FAST = ('numerics.preset="fast"',)
 
 
@@ -311,16 +314,17 @@ def _moves(each: Input, known: dict[str, dict]) -> bool:
 def sobol(runs: Runs, elasticities: dict[str, dict[str, dict]], samples: int) -> dict:
     """First-order and total indices of each printed number, with their intervals."""
     chosen = moving(elasticities)
+    inputs = [each.name for each in chosen]
     names = [name for name in PRINTED
              if name != "consumed" and any(_moves(each, elasticities[name]) for each in ROUNDED)]
 
     def numbers(x: np.ndarray) -> np.ndarray:
-        rows = [runs.numbers(scene("base", dict(zip([each.name for each in chosen], column)), *FAST)) for column in x.T]
-        return np.array([[row[name] for row in rows] for name in names])
+        rows = [runs.numbers(scene("base", dict(zip(inputs, column)), *FAST)) for column in x.T]
+        return np.array([itemgetter(*names)(row) for row in rows]).T
     spread = [uniform(1 - each.rounding, 2 * each.rounding) for each in chosen]
     found = sobol_indices(func=numbers, n=samples, dists=spread, rng=np.random.default_rng(SEED))
     sure = found.bootstrap(confidence_level=CONFIDENCE, n_resamples=999)
-    return {"samples": samples, "inputs": [each.name for each in chosen], "confidence": CONFIDENCE,
+    return {"samples": samples, "inputs": inputs, "confidence": CONFIDENCE,
             "numbers": {name: {kind: _listed(getattr(found, kind)[row], getattr(sure, kind).confidence_interval, row)
                                for kind in ("first_order", "total_order")} for row, name in enumerate(names)}}
 

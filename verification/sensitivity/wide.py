@@ -155,12 +155,13 @@ def holding(finding: Finding) -> dict[str, bool]:
 
 def _outlines() -> dict[str, str]:
     """Outlines by their hour: places "x,y x,y ..." to FINE (um), without those that lie on a straight line."""
-    return {f"{time:g}": " ".join(f"{x:.1f},{y:.1f}" for x, y in _places(found))
-            for time, found in zip(series(*WIDE)["time_h"], bodies(WIDE)) if time % EVERY == 0}
+    return {f"{time:g}": _places(found) for time, found in zip(series(*WIDE)["time_h"], bodies(WIDE))
+            if time % EVERY == 0}
 
 
-def _places(found) -> np.ndarray:
-    return shapely.get_coordinates(shapely.simplify(polygon(found.outline), FINE))
+def _places(found) -> str:
+    places = shapely.get_coordinates(shapely.simplify(polygon(found.outline), FINE))
+    return " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
 
 
 def verdicts(found: dict[str, dict]) -> tuple[list[str], list[str], list[str]]:
