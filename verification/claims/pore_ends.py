@@ -175,8 +175,8 @@ def _errors(said, radius: float) -> np.ndarray:
 
 def _numbers(said, grid: Mesh) -> list[float]:
     """Conductivity and both effluents."""
-    found = solution(said, grid, full_biomass(said, grid))
-    return [found.flow.conductivity, *(flux.effluent for flux in found.fluxes)]
+    flow, fluxes = solution(said, grid, full_biomass(said, grid))
+    return [flow.conductivity, *(flux.effluent for flux in fluxes)]
 
 
 def nested(said, radius: float, reaches: list[float]) -> list[Mesh]:

@@ -295,16 +295,11 @@ def equivalent(stresses: np.ndarray) -> np.ndarray:
     return np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3 * xy**2)
 
 
-@dataclass(frozen=True, eq=False)
-class Solution:
-    """Flow in one geometry, with the ledger and the end values of both substrates."""
-
-    flow: flow.Flow
-    fluxes: tuple[transport.Fluxes, transport.Fluxes]
+Both = tuple[transport.Fluxes, transport.Fluxes]
 
 
-def solution(scene, grid: Mesh, active: np.ndarray, carried_by_u: bool = False) -> Solution:
-    """Flow under the scene's drive, then steady substrates over X_A (N,) mg/L.
+def solution(scene, grid: Mesh, active: np.ndarray, carried_by_u: bool = False) -> tuple[flow.Flow, Both]:
+    """Flow under the scene's drive, then the ledger of both steady substrates over X_A (N,) mg/L.
 
     carried_by_u: advect with u itself, as the paper writes it, and not with the divergence-free w = u - tau grad p.
     """
@@ -314,7 +309,7 @@ def solution(scene, grid: Mesh, active: np.ndarray, carried_by_u: bool = False) 
     problem = transport.problem(space, carrier, scene.substrates, scene.kinetics, scene.numerics.inlet)
     sink = Sink(biomass.at_points(space, active) * space.reaction.dx)
     state = transport.steady(problem, sink)
-    return Solution(found, transport.fluxes(problem, sink, state))
+    return found, transport.fluxes(problem, sink, state)
 
 
 def flow_in(scene, grid: Mesh) -> flow.Flow:

@@ -213,7 +213,7 @@ def exceeding(book: Bookkeeping) -> float:
 def fluxes_around(said, radius: float, carried_by_u: bool = False):
     """Ledger of both substrates around a half-disc of X_m, meshed by 3.1."""
     grid = half_disc(said, radius, min(10 * radius, 1.5 * said.pore.width))
-    return solution(said, grid, full_biomass(said, grid), carried_by_u).fluxes
+    return solution(said, grid, full_biomass(said, grid), carried_by_u)[1]
 
 
 def effluents_around(said, radius: float) -> np.ndarray:
