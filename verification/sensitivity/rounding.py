@@ -27,6 +27,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
+from hashlib import sha256
 from math import log
 from operator import itemgetter
 from pathlib import Path
@@ -38,7 +40,6 @@ from scipy.stats import sobol_indices, uniform
 from repro.march import simulation, updates
 from repro.model import kinetics, pore
 from repro.results import M_PER_D, write_json
-from repro.run.machine import source_hash
 from repro.scene import Scene, load_scene, needed, scene_hash
 from verification.claims import interval
 from verification.claims.base_run import DISTANCES, END, upstream_means
@@ -168,16 +169,31 @@ def of_wide(said: Scene) -> Numbers:
 OF: dict[str, Callable[[Scene], Numbers]] = {"base": of_base, "wide": of_wide}
 
 
+#: Rooms of `repro` whose source makes these numbers: that of a scene is in its hash.
+ROOMS = ("fem", "model", "march", "results")
+
+
+@cache
+def source() -> str:
+    """8 hexadecimal digits that stand for the source of ROOMS."""
+    digest = sha256()
+    package = Path(simulation.__file__).parents[1]
+    for path in sorted(path for room in ROOMS for path in (package / room).rglob("*.py")):
+        digest.update(path.name.encode() + path.read_bytes())
+    return digest.hexdigest()[:8]
+
+
 class Runs:
     """Runs that have been computed with this source; each new one is kept at once, so that a break loses one run."""
 
     def __init__(self, path: Path = KEPT) -> None:
         self.path = path
-        self.known: dict[str, Numbers] = load(path, {})
+        kept: dict[str, Numbers] = load(path, {})
+        self.known = {key: numbers for key, numbers in kept.items() if key.endswith(source())}
 
     def numbers(self, said: Scene) -> Numbers:
         """What a scene's run comes to."""
-        key = f"{said.name}-{scene_hash(said)}-{source_hash()}"
+        key = f"{said.name}-{scene_hash(said)}-{source()}"
         if key not in self.known:
             with np.errstate(all="raise", under="ignore"):
                 self.known[key] = {name: float(value) for name, value in OF[said.name](said).items()}

@@ -4,7 +4,7 @@
 **After contact**: conductivity, tips, and length of contact. A contact surface grows by whole edges of the outline, so
 that a single row jumps, by an edge or two, with whatever moves the instant at which a node joins. Its mean over the
 whole hours from contact to the end of Figure 6 does not. The bar is that of `verification.uncertainty` from the
-converged solution on four sizes of elements and steps.
+converged solution on six sizes of elements and steps.
 
 **Supplies**: for each, when contact comes, outlines every 5 h until as long after contact as Figure 6 goes on, or until
 the aggregate reaches an end of the pore, and which of the claims about wide hold then. Those are the functions of
@@ -31,7 +31,7 @@ from verification.claims.runs import WIDE, bodies, polygon, series
 from verification.sensitivity.rounding import OF, Numbers, Runs, scene
 from verification.uncertainty import estimate
 
-SIZES = (0.5, 2**-0.5, 1.0, 2**0.5)
+SIZES = (0.25, 2**-1.5, 0.5, 2**-0.5, 1.0, 2**0.5)
 #: Whole hours (h) after contact, which comes at 34.3 h.
 HOURS = tuple(map(float, range(35, 46)))
 #: What is asked of the bars, in percent of the number.
