@@ -25,8 +25,7 @@ from dataclasses import dataclass, replace
 from math import inf
 
 from verification import sensitivity
-from verification.claims import MODEL, report
-from verification.claims.levels import OF_WIDE
+from verification.claims import CLAIMS, MODEL, evaluate, report
 from verification.sensitivity import wide
 from verification.sensitivity.rounding import scene
 
@@ -35,8 +34,8 @@ OTHER = re.compile(r"^base|before contact|a film left|^K / K_clean =|^the part f
                    r"in the 5 h before$|^uniform|^theta\(R\)")
 #: Percent above which a bar is told, after contact and of base.
 WIDE_BAR, BASE_BAR = 2.0, 0.2
-#: Claims about the model that base has no part in: what is cut off a half-disc's pore, and wide in other ways.
-NOT_OF_BASE = ("C19", "C41", *OF_WIDE)
+#: Claims about the model that are neither about wide nor base: what is cut off a half-disc's pore, wide in other ways.
+NOT_OF_BASE = ("C19", "C41")
 #: Why a bar of base exceeds BASE_BAR, by the kind of number: what its claim or its name begins with.
 KINDS = {
     "a place, known to the element in which it is": r"C10",
@@ -73,13 +72,15 @@ class Known:
 
 def known(entries: list[dict]) -> list[Known]:
     """The numbers after contact of a record, the one with the widest bar first."""
-    return _known(entries, lambda entry, quantity: entry["id"] in OF_WIDE and not OTHER.search(quantity))
+    evaluate.register_all()
+    return _known(entries, lambda entry, quantity: CLAIMS[entry["id"]].of_wide and not OTHER.search(quantity))
 
 
 def of_base(entries: list[dict]) -> list[Known]:
     """The numbers of base in a record that the model is claimed to have, the one with the widest bar first."""
-    return _known(entries, lambda entry, quantity: entry["about"] == MODEL and (
-        quantity.startswith("base") or entry["id"] not in NOT_OF_BASE and not quantity.startswith("wide")))
+    evaluate.register_all()
+    return _known(entries, lambda entry, quantity: entry["about"] == MODEL and (quantity.startswith("base") or not (
+        CLAIMS[entry["id"]].of_wide or entry["id"] in NOT_OF_BASE or quantity.startswith("wide"))))
 
 
 def _known(entries: list[dict], chosen: Callable[[dict, str], bool]) -> list[Known]:

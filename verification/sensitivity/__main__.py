@@ -21,6 +21,7 @@ from matplotlib.figure import Figure
 
 from repro.results import write_json, write_text
 from verification import sensitivity
+from verification.claims import interval
 from verification.kernel.writing import Block, markdown, table
 from verification.sensitivity import rounding, wide
 from verification.sensitivity.rounding import INPUTS, ROUNDED, Runs, scene
@@ -144,7 +145,7 @@ def _set(found: dict) -> Iterator[Block]:
                         f"run on sizes {sizes} of elements and steps, over those of `accurate`; the bar is from all of "
                         "them, and a set counts where the whole bar lies in the interval of the printed digits.")
     yield table(("number", "printed", "a run with the set", "bar", "on these sizes"), (
-        (NAMES.get(name, name), "{:g} to {:g}".format(*rounding.targets()[name]), f"{value:.4f}",
+        (NAMES.get(name, name), "{:g} to {:g}".format(*interval(rounding.PRINTED[name])), f"{value:.4f}",
          f"{found['bars'][name]:.1g}", ", ".join(f"{each:.4f}" for each in found["on_sizes"][name]))
         for name, value in found["numbers"].items()))
     yield table(("input", "value"), ((name, f"{value:.4f}") for name, value in found["inputs"].items()))
