@@ -36,10 +36,20 @@ from reference import layered_channel, poiseuille, taylor_hood
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
 from repro.model import flow, pore
-from repro.scene import parse_scene
 from verification.flow import closed_forms, properties
 from verification.flow.closed_forms import ENDS_FIRST, FORMS, HIGHER, LAYER, RATIO, SECOND, SIZES, viscous
-from verification.kernel.case import Profile, at_least, at_most, between, case, combined, compared, refine, studies
+from verification.kernel.case import (
+    Profile,
+    at_least,
+    at_most,
+    between,
+    case,
+    combined,
+    compared,
+    each_at_most,
+    refine,
+    studies,
+)
 from verification.problems import meshes
 
 WIDTH = 50.0
@@ -52,6 +62,7 @@ FILM_REFINEMENTS, FILM_DRAWS = (0.9, 1.8, 3.6, 7.2), dict(enumerate((3, 3, 2, 1)
 #: Radius of the half-disc that leaves a film (um), the refinement of its curved mesh, and what is compared there.
 FILM, FILM_CURVED = 41.0, 1.6
 IN_THE_FILM = ("velocity", "pressure in the fluid", "head loss")
+CODES = "0.1 % (cross-code)"
 NORM = ("root mean square over meshes of a size: L2 of the difference over that of Taylor-Hood's field, in the region; "
         "relative difference of the head loss")
 JUMP = "1/2: the pressure jumps at the interface, a continuous one cannot"
@@ -99,13 +110,12 @@ def film(order: int, interface: str):
         space = Space(meshes.half_disc(FILM, FILM_CURVED, ENDS, WIDTH, geometry=2), order)
         found = flow.unit_flow(space, RATIO, interface=interface)
         apart = _apart(space, found, _trusted(FILM, RATIO, interface, [*DRAWS][-1]))
-        return [at_most(name, apart[name], 1e-3, "0.1 % (cross-code)") for name in IN_THE_FILM]
+        return each_at_most({name: apart[name] for name in IN_THE_FILM}, 1e-3, CODES)
     errors = refine(_level, FILM_DRAWS, FILM_REFINEMENTS, FILM, RATIO, interface)
     ratios = {name: (errors[name][1:] / errors[name][:-1]).max() for name in IN_THE_FILM}
-    return ([at_most(f"{name}, finest meshes", errors[name][-1], 1e-3, "0.1 % (cross-code)") for name in IN_THE_FILM],
-            [at_most(f"{name}, largest ratio of neighbours", ratio, 0.6,
-                     "both codes refined twofold: half is of first order, the film's elements are refined later")
-             for name, ratio in ratios.items()])
+    return (each_at_most({name: errors[name][-1] for name in IN_THE_FILM}, 1e-3, CODES, ", finest meshes"),
+            each_at_most(ratios, 0.6, "both codes refined twofold: half is of first order, the film's elements are "
+                         "refined later", ", largest ratio of neighbours"))
 
 
 @cache
@@ -188,9 +198,8 @@ def round_half_disc(ratio: float, order: int, interface: str):
 @cache
 def _round(refinement: float) -> Mesh:
     """The mesh of a scene."""
-    tables = {"pore": {"width": f"{WIDTH} um"}, "aggregate": {"radius": f"{ROUND} um"}, "flow": {"head": "1e-3 cm"},
-              "numerics": {"preset": "accurate", "refinement": refinement}}
-    return pore.seeded(parse_scene(tables, "half disc", "half_disc.toml")).mesh
+    refined = f"numerics.refinement={refinement}"
+    return pore.seeded(properties.around(ROUND, properties.ACCURATE, refined)).mesh
 
 
 @cache
