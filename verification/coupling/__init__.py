@@ -3,9 +3,6 @@ order in the time step, and what must not matter."""
 
 from verification.problems import runs
 
-#: Changes of a scene, by label: the presets, and fast with cubic elements.
-PRESETS = {**{preset: (runs.by(preset),) for preset in runs.PRESETS}, "cubic": (runs.by("fast"), runs.of("cubic"))}
-
 
 def kinds(refinement: float, linear: float = 1.0) -> dict[str, tuple[str, ...]]:
     """Changes of a scene, by label: every kind of elements with the paper's scheme, refined so."""

@@ -21,7 +21,6 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from repro.fem.outline import BOTTOM, FREE, TOP
-from repro.march import midpoint, updates
 from repro.march.loop import Instant, Ledger
 from repro.march.simulation import simulate
 from repro.model import pore, remeshing
@@ -99,10 +98,6 @@ def density_restored(*changes: str):
     yield at_most("X_m times the area", area, 1e-11, runs.ROUND_OFF)
 
 
-#: A step of so many hours, by the scheme: an update, or a step of the midpoint rule whatever its estimate.
-STEP = {"updates": updates.step, "midpoint": lambda *given: midpoint.attempt(*given).step}
-
-
 def _restored(*changes: str) -> tuple[float, float]:
     """L2 of the density's error, and X_m times the area over the biomass, less 1."""
     scene = runs.base("1 h", 'kinetics.decay_coefficient="0 1/d"', 'kinetics.maximum_utilization_rate="0 1/d"',
@@ -112,7 +107,7 @@ def _restored(*changes: str) -> tuple[float, float]:
     now = replace(now, active=now.active * (1 + 0.1 * x / scene.aggregate.radius))
     solved = pore.solve(scene, now)
     anew = remeshing.remesh(scene, now, now, solved.flow.mean_velocity)[0]
-    after = STEP[scene.numerics.time](scene, anew, pore.solve(scene, anew), 0.2).pore
+    after = runs.step(scene, anew, pore.solve(scene, anew), 0.2).pore
     weight = after.space.reaction.dx
     density = (after.active + after.inert) / weight / scene.kinetics.maximum_density
     error = np.sqrt(np.vdot(weight, (density - 1) ** 2) / weight.sum())
@@ -296,7 +291,7 @@ def _cumulated(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
       mutants=("films-stay-open", "reprojection-left-out"), over=runs.EVERY, ways="paper")
 def contact(*changes: str):
     scene = runs.base("0.6 h", 'pore.width="20 um"', 'aggregate.radius="17.9 um"', *changes,
-                      times='"0.2 h", "0.4 h", "0.6 h"')
+                      times=(0.2, 0.4, 0.6))
     instants = list(simulate(runs.at_velocity(scene, runs.SPEED)))
     rows, last = _ledgers(instants), instants[-1].pore
     return [_steps(rows, "Newton's tolerance"), _area(scene, instants[-1]),

@@ -27,8 +27,8 @@ from repro.march.loop import Instant
 from repro.march.simulation import shaped, simulate
 from repro.model import flow, pore
 from repro.scene import Scene, load_scene
-from verification.coupling import PRESETS, every, kinds
-from verification.kernel.case import at_least, at_most, case, refine, study
+from verification.coupling import every, kinds
+from verification.kernel.case import at_least, at_most, case, each_at_most, refine, study
 from verification.problems import pairs, runs
 from verification.problems.channels import both
 
@@ -157,7 +157,7 @@ LONG = {**{kind: (runs.by("fast"), runs.of(kind), runs.coarser(kind, 0.2)) for k
       because="paper: coupling-uniform-growth")
 def uniform_growth(hours: tuple[float, ...], most: float, why: str, *changes: str):
     """Checks of a run to the last of some hours, with rows at these."""
-    scene = _everywhere(runs.base(f"{hours[-1]} h", *changes, times=", ".join(f'"{hour} h"' for hour in hours)))
+    scene = _everywhere(runs.base(f"{hours[-1]} h", *changes, times=hours))
     seed, instants = pore.seeded(scene).outline, runs.ours(scene)
     expected = seed.area * np.array([runs.mass_after(scene, hour) for hour in hours])
     sizes = {"area": [instant.pore.outline.area for instant in instants],
@@ -183,30 +183,22 @@ def _unround(instant, area: float) -> float:
     return float(np.abs(radius / np.sqrt(2 * area / np.pi) - 1).max())
 
 
+#: Of the length in the unit of each number.
+POWERS = {"area": 2, "upstream tip": 1, "conductivity": 1}
+
+
 @case("coupling-units", kind="property", norm="relative difference at 2 h",
       claim="A pore eight times larger or smaller, with transport to match, grows alike to the last bits: nothing has "
             "a scale of its own",
       mutants=("length-scale",), over=runs.EVERY, ways="paper")
 def units(*changes: str):
-    scene, checks = runs.base("2 h", *changes), []
-    speed = next(simulate(scene)).solved.flow.mean_velocity
-    own = runs.numbers(runs.last(_scaled(scene, 1.0, speed)))
+    scene = runs.base("2 h", *changes)
+    own = runs.numbers(runs.last(scene))
     for factor in (8.0, 0.125):
-        other = runs.numbers(runs.last(_scaled(scene, factor, speed)))
-        for quantity, power in (("area", 2), ("upstream tip", 1), ("conductivity", 2)):
-            checks.append(at_most(f"{quantity}, lengths times {factor:g}",
-                                  abs(other[quantity] / own[quantity] / factor**power - 1), 1e-14,
-                                  "powers of two are exact: even the mesher does the same"))
-    return checks
-
-
-def _scaled(scene, factor: float, speed: float):
-    """The scene with lengths times a factor, diffusivities times its square, times as they are."""
-    scene = runs.with_diffusivities(runs.at_velocity(scene, factor * speed),
-                                    lambda water, biomass: (factor**2 * water, factor**2 * biomass))
-    return replace(scene, pore=replace(scene.pore, width=factor * scene.pore.width, length=factor * scene.pore.length),
-                   aggregate=replace(scene.aggregate, radius=factor * scene.aggregate.radius),
-                   growth=replace(scene.growth, minimum_film=factor * scene.growth.minimum_film))
+        other = runs.numbers(runs.last(runs.scaled(scene, factor, 1.0)))
+        apart = {name: abs(other[name] / value / factor ** POWERS[name] - 1) for name, value in own.items()}
+        yield each_at_most(apart, 1e-14, "powers of two are exact: even the mesher does the same",
+                           f", lengths times {factor:g}")
 
 
 #: Base to 1 h in other units.
@@ -219,7 +211,7 @@ FOREIGN = ('pore.width="0.05 mm"', 'pore.length="0.06 cm"', 'aggregate.radius="5
 
 @case("coupling-foreign-units", kind="property", norm="largest difference of any node's place (um), and of C, at 1 h",
       claim="A scene written in other units is the same scene, bit for bit",
-      mutants=("rounded-twice",), over=PRESETS, ways="1 2")
+      mutants=("rounded-twice",), over=runs.NUMERICS, ways="1 2")
 def foreign_units(*changes: str):
     ours, theirs = (runs.last(runs.base(end, *changes, *units)) for end, units in (("1 h", ()), ("60 min", FOREIGN)))
     pairs = {"places": (ours.pore.mesh.points, theirs.pore.mesh.points),
@@ -422,10 +414,8 @@ def _apart(ours: np.ndarray, theirs: np.ndarray) -> np.ndarray:
 
 def _listed(preset: str, *changes: str) -> np.ndarray:
     """(2, 8) of base at TIMES, as whole_run.NAMES lists them."""
-    times = ", ".join(f'"{time} h"' for time in TIMES)
-    _, *found = simulate(load_scene("base", (runs.by(preset), f"output.times=[{times}]", *changes)))
     rows = []
-    for instant in found:
+    for instant in runs.ours(runs.base("19.4 h", runs.by(preset), *changes, times=TIMES)):
         flow = instant.solved.flow
         outline = instant.pore.outline
         fluxes = instant.solved.fluxes

@@ -23,7 +23,7 @@ from repro.model import contact, flow, growth, mesh_motion, pore, traction
 from repro.model.flow import Flow
 from verification.coupling import every
 from verification.flow import closed_forms
-from verification.kernel.case import at_least, at_most, between, case, refine, studies, study
+from verification.kernel.case import at_least, at_most, between, case, each_at_most, refine, studies, study
 from verification.problems import runs
 
 FORMS = ("laplacian", "traction")
@@ -66,8 +66,8 @@ def balance(*changes: str):
     free = mesh.loop[now.wall == FREE]
     largest = np.abs(on[free]).max()
     apart = on[free] + _by_biomass(scene, now, found)[free]
-    yield at_most("force within the fluid", np.abs(on[~rim]).max() / largest, 1e-9, BOTH_ENDS)
-    yield at_most("action and reaction", np.abs(apart).max() / largest, 1e-9, BOTH_ENDS)
+    yield each_at_most({"force within the fluid": np.abs(on[~rim]).max() / largest,
+                        "action and reaction": np.abs(apart).max() / largest}, 1e-9, BOTH_ENDS)
     if now.space.order == 1 and scene.numerics.interface == FORMS[0]:
         errors = refine(_drag_error, REFINEMENTS)
         yield study("drag", 1 / np.array(REFINEMENTS), errors["drag"], 1,

@@ -118,7 +118,9 @@ def front(preset: str, radius: float, more: tuple[str, ...] = ()) -> list:
 
 
 #: Half thickness and films of the slab, um; its penetration depth over the half thickness.
-HALF, FILM, DEPTH = 40.0, 20.0, 0.6
+HALF = 40.0
+FILM = 20.0
+DEPTH = 0.6
 
 
 def slab_front(preset: str) -> list:
@@ -170,8 +172,7 @@ def saturated(preset: str) -> list:
 def exponential(found: Run) -> list[Check]:
     """Biomass over that at the start against (9)-(10) at the supply, and at the least concentrations of the run."""
     time = found.last["time_h"]
-    least, _ = runs.growth_rates(found.scene, *(min(line[f"{name}_min_mg_per_L"] for line in found.rows)
-                                                for name in BOTH))
+    least, _ = runs.growth_rates(found.scene, *(found.column(f"{name}_min_mg_per_L").min() for name in BOTH))
     most = runs.mass_after(found.scene, time)
     grown = found.last["aggregate_area_um2"] / found.rows[0]["aggregate_area_um2"]
     return [between("area over that of the seed", grown, np.exp(least * time), most,
@@ -325,7 +326,9 @@ def _inside(found: Run) -> np.ndarray:
     return np.setdiff1d(grid.body, grid.loop)
 
 
-WIDTH, ENDS, PLUG = 50.0, (-60.0, 70.0), 20.0
+WIDTH = 50.0
+ENDS = (-60.0, 70.0)
+PLUG = 20.0
 SECTIONS = np.array([-55.0, -30.0, -21.0, -19.0, -10.0, 0.0, 7.0, 19.0, 21.0, 40.0, 65.0])
 
 

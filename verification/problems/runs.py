@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterable
+from dataclasses import fields, is_dataclass, replace
 
 import numpy as np
 
@@ -14,13 +15,12 @@ from repro.march.simulation import simulate
 from repro.model import pore
 from repro.model.pore import Pore, Solved
 from repro.scene import Scene, load_scene
-from verification.kernel.case import Profile
+from verification.kernel.case import Profile, columns
 from verification.problems import channels, pairs
 
 ROUND_OFF = "round-off"
 #: The velocity of base at t = 0, 2.9 m/d, in um/h.
 SPEED = 2.9e6 / 24
-PRESETS = ("paper", "fast", "accurate")
 #: Of a section, at which a mean is taken.
 POINTS = 16
 #: Kinds of elements, by the names that scenes have for them: of order 1, 2 and 3.
@@ -42,13 +42,17 @@ def by(preset: str) -> str:
     return f'numerics.preset="{preset}"'
 
 
+PRESETS = ("paper", "fast", "accurate")
+#: Changes of a scene, by label: the presets, and fast with cubic elements.
+NUMERICS = {**{preset: (by(preset),) for preset in PRESETS}, "cubic": (by("fast"), of("cubic"))}
 #: Changes of a scene, by label: every kind of elements with the paper's scheme, and the presets.
 EVERY = {**{kind: (of(kind), coarser(kind, 0.4)) for kind in ELEMENTS}, **{kind: (by(kind),) for kind in PRESETS[1:]}}
 
 
-def base(end: str, *changes: str, times: str = "") -> Scene:
-    """The paper's scene to a time ("6 h"), reported at its end, or at ``times`` ('"3 h", "6 h"')."""
-    return load_scene("base", (f'growth.end="{end}"', f'output.times=[{times or repr(end)}]', *changes))
+def base(end: str, *changes: str, times: Iterable[float] = ()) -> Scene:
+    """The paper's scene to a time ("6 h"), reported at its end, or at ``times`` (h)."""
+    rows = [f"{time} h" for time in times] or [end]
+    return load_scene("base", (f'growth.end="{end}"', f"output.times={rows}", *changes))
 
 
 def every_step(end: str, *changes: str) -> Scene:
@@ -101,6 +105,30 @@ def with_diffusivities(scene: Scene, change) -> Scene:
     return replace(scene, substrates=replace(scene.substrates, **changed))
 
 
+#: Powers of length and time in the unit of each key that has one.
+POWERS = {
+    "width": (1, 0), "length": (1, 0), "radius": (1, 0), "head": (1, 0), "mean_velocity": (1, -1),
+    "kinematic_viscosity": (2, -1), "gravity": (1, -2), "diffusivity": (2, -1), "diffusivity_in_aggregate": (2, -1),
+    "maximum_utilization_rate": (0, -1), "decay_coefficient": (0, -1), "end": (0, 1), "time_step": (0, 1),
+    "minimum_film": (1, 0),
+}
+
+
+def scaled(section, length: float, time: float):
+    """A scene, or a section of it, with its unit of length and of time so many times larger."""
+    changes = {}
+    for key in fields(section):
+        value = getattr(section, key.name)
+        if is_dataclass(value):
+            changes[key.name] = scaled(value, length, time)
+        elif key.name == "times" and value:
+            changes[key.name] = tuple(time * t for t in value)
+        elif key.name in POWERS and value is not None:
+            along, during = POWERS[key.name]
+            changes[key.name] = value * length**along * time**during
+    return replace(section, **changes)
+
+
 def density_drift(scene: Scene, instant: Instant) -> float:
     """Largest |(X_A + X_I) / X_m - 1| in the aggregate."""
     now = instant.pore
@@ -145,7 +173,9 @@ PLACES = 81
 
 def pore_of(scene: Scene, speed=None) -> averaged_pore.Pore:
     """The scene's numbers; speed: (loss, half length) -> u, the scene's mean velocity if none."""
-    law, both, drive = scene.kinetics, scene.substrates, scene.flow
+    law = scene.kinetics
+    both = scene.substrates
+    drive = scene.flow
     rates = {**channels.rates(law, both), "Y": law.yield_coefficient, "b": law.decay_coefficient,
              "remains": law.decay_coefficient * (1 - law.degradable_fraction)}
     both_of = (channels.pair(name, both) for name in ("supply", "diffusivity", "diffusivity_in_aggregate"))
@@ -191,7 +221,7 @@ def profile(instant: Instant) -> tuple[np.ndarray, np.ndarray]:
 
 def worst(rows: list[dict[str, float]]) -> dict[str, float]:
     """The largest size of each number."""
-    return {name: max(abs(row[name]) for row in rows) for name in rows[0]}
+    return {name: float(np.abs(values).max()) for name, values in columns(rows).items()}
 
 
 def profiles(instants: list[Instant], moments) -> tuple[Profile, ...]:
