@@ -167,7 +167,7 @@ class Averaged:
                           rtol=accuracy, atol=accuracy)
         return [self._moment(time, state) for time, state in zip(found.t, found.y.T)]
 
-    def run_through(self, pieces, times, accuracy=1e-6):
+    def run_through(self, pieces, times, accuracy):
         """The moments at ``times``, ascending, while the supply changes: pieces (end, supply at the piece's start and
         at its end), ascending, evenly in between; the last ends with the last time. A moment at a piece's end is one
         of the next piece's start."""

@@ -29,7 +29,6 @@ from repro.fem.space import Space
 from repro.march.simulation import shaped, simulate
 from repro.model import flow, pore
 from repro.scene import Scene
-from verification.coupling import every
 from verification.kernel.case import Profile, at_least, at_most, between, case, refine, studies, study
 from verification.problems import runs
 
@@ -143,7 +142,7 @@ FASTER = (4.0, 16.0, 64.0, 256.0)
            "fluid and biomass and times 4 to 256",
       claim="What averaging over sections costs in the effluents is, as diffusion becomes fast, the constriction of a "
             "half-disc in a strip, in closed form",
-      mutants=("effluent-at-the-inlet", "inlet-held", "seed-too-thin"), over=every(0.5, 1.5), ways="paper")
+      mutants=("effluent-at-the-inlet", "inlet-held", "seed-too-thin"), over=runs.every(0.5, 1.5), ways="paper")
 def mixing(*changes: str):
     scene = runs.base("0 h", 'aggregate.radius="20 um"', *changes)
     scene = runs.at_velocity(scene, runs.SPEED)

@@ -25,7 +25,6 @@ from repro.march.loop import Instant, Ledger
 from repro.march.simulation import simulate
 from repro.model import pore, remeshing
 from repro.scene import Kinetics, Scene
-from verification.coupling import every
 from verification.kernel.case import Check, Study, at_least, at_most, between, case, study
 from verification.problems import aggregates, runs
 
@@ -82,7 +81,7 @@ REFINEMENTS = (0.7, 1.0, 1.4, 2.0)
       norm="a half-disc of 20 um whose density is X_m (1 + 0.1 x / R), remeshed, one step without uptake or decay: L2 "
            "of (X_A + X_I) / X_m - 1 over it; X_m times the area over the biomass, less 1",
       claim="What a density has of error at a remesh is gone after the next update [E7]: the shape takes up X_m again",
-      mutants=("density-not-worked-off", "theta-anew-at-a-remesh"), over=every(0.5), ways="paper")
+      mutants=("density-not-worked-off", "theta-anew-at-a-remesh"), over=runs.every(0.5), ways="paper")
 def density_restored(*changes: str):
     """The order of linear elements; that the others are exact."""
     if runs.base("1 h", *changes).numerics.order > 1:
@@ -309,7 +308,7 @@ def _area(scene: Scene, last: Instant) -> Check:
 @case("coupling-wedge", kind="property",
       norm="one step from a disc of 20 um that stands on a chord, the fluid under it at 8 degrees",
       claim="Wedges of fluid beside a contact surface close until they have the least contact angle",
-      mutants=("no-wedge-closes", "films-stay-open"), over=every(0.6), ways="paper")
+      mutants=("no-wedge-closes", "films-stay-open"), over=runs.every(0.6), ways="paper")
 def wedge(*changes: str):
     scene = runs.base("0.2 h", *changes)
     instants = list(simulate(scene, _disc(20.0, 19.8, 60 * scene.numerics.geometry)))

@@ -27,7 +27,6 @@ from repro.march.loop import Instant
 from repro.march.simulation import shaped, simulate
 from repro.model import flow, pore
 from repro.scene import Scene, load_scene
-from verification.coupling import every, kinds
 from verification.kernel.case import at_least, at_most, case, each_at_most, refine, study
 from verification.problems import pairs, runs
 from verification.problems.channels import both
@@ -76,7 +75,7 @@ PARABOLA = "elements hold the parabola: round-off"
       norm="refinement 1 to 2.8: mean velocity under the head relative to Poiseuille's; largest |C / supply - 1|",
       claim="A scene without an aggregate is a clean channel: Poiseuille's flow under the head, and C the supply "
             "everywhere",
-      mutants=("extent-not-subtracted", "head-on-the-mesh-alone"), over=every(0.3), ways="paper")
+      mutants=("extent-not-subtracted", "head-on-the-mesh-alone"), over=runs.every(0.3), ways="paper")
 def clean_channel(*changes: str):
     """The order of linear elements; what the others hold."""
     if load_scene("base", changes).numerics.order > 1:
@@ -147,7 +146,7 @@ LONG = {**{kind: (runs.by("fast"), runs.of(kind), runs.coarser(kind, 0.2)) for k
             "through a remesh",
       mutants=("growth-three-percent-low", "euler-biomass", "inert-not-in-the-area", "theta-anew-at-a-remesh",
                "geometry-of-the-step-before"),
-      over={kind: (EVERY_HOUR, *OF_UPDATES, *changes) for kind, changes in every(0.3).items()}, ways="paper")
+      over={kind: (EVERY_HOUR, *OF_UPDATES, *changes) for kind, changes in runs.every(0.3).items()}, ways="paper")
 @case("coupling-curved-uniform-growth", kind="exact",
       norm="relative error of area and mass; largest deviation of the outline from a half-disc",
       claim="Where diffusion holds the supply everywhere the midpoint rule keeps a half-disc of exactly exp-growing "
@@ -222,7 +221,7 @@ def foreign_units(*changes: str):
 @case("coupling-mirror", kind="property",
       norm="difference of the tips' distances from the origin, and of C_A left and right, relative",
       claim="Without flow an aggregate grows alike to both sides",
-      mutants=("one-supply-held", "fixed-beside-the-middle"), over=every(0.5), ways="paper")
+      mutants=("one-supply-held", "fixed-beside-the-middle"), over=runs.every(0.5), ways="paper")
 def mirror(*changes: str):
     last = runs.last(runs.without_flow(runs.base("8 h", *changes)))
     outline, space = last.pore.outline, last.pore.space
@@ -239,7 +238,7 @@ def mirror(*changes: str):
       norm="relative difference between a lopsided aggregate and its mirror image, refinement 2, t = 0",
       claim="Flow from the other side meets the same resistance (Stokes flow is reversible) and, where uptake is of "
             "first order, loses as much of its substrate (reciprocity of (7), (11) and (12))",
-      mutants=("inlet-held",), over=every(0.6, 2.0), ways="paper")
+      mutants=("inlet-held",), over=runs.every(0.6, 2.0), ways="paper")
 def reversed_flow(*changes: str):
     ours, theirs = (_lopsided(sign, *changes) for sign in (1.0, -1.0))
     apart = {name: abs(ours[name] / theirs[name] - 1) for name in ours}
@@ -286,7 +285,7 @@ SLOWER = (16.0, 8.0, 4.0, 2.0)
            "with D, u and X_m over 16 to 2: steady states and growth stay, substrates are 16 to 2 times slower",
       claim="The paper's transient scheme and quasi-steady substrates make the same aggregate, up to the substrates' "
             "lag, which is as their storage",
-      mutants=("rates-two-percent-low",), over=kinds(0.4), ways="paper",
+      mutants=("rates-two-percent-low",), over=runs.kinds(0.4), ways="paper",
       because="fast, accurate: the transient scheme goes with updates")
 def quasi_steady(*changes: str):
     errors = refine(_lag, SLOWER, *changes)
@@ -315,7 +314,7 @@ def _slower(factor: float, transport_scheme: str, *changes: str):
       claim="The central mesh with (6) and (26) beyond it is worth the whole pore",
       mutants=("extent-not-subtracted", "inlet-held", "head-on-the-mesh-alone"),
       over={f"R = {radius}, {label}": (f'aggregate.radius="{radius}"', *changes)
-            for radius, labelled in (("5 um", kinds(0.6, 2.0)), ("25 um", every(0.6, 2.0)))
+            for radius, labelled in (("5 um", runs.kinds(0.6, 2.0)), ("25 um", runs.every(0.6, 2.0)))
             for label, changes in labelled.items()}, ways="paper")
 def extent(*changes: str):
     (central, near), (full, far) = (_solved(f'numerics.extent="{name}"', *changes) for name in ("central", "full"))
@@ -379,7 +378,8 @@ def order_in_time(elements: str):
       claim="With short steps the paper's shape updates and the midpoint rule come to the same, on the same triangles: "
             "the loop of updates is of first order in the step, as the geometry is frozen within it and the rates are "
             "not",
-      mutants=("midpoint-rates-of-the-start", "rates-at-the-start", "stale-flow"), over=kinds(0.3, 0.6), ways="paper",
+      mutants=("midpoint-rates-of-the-start", "rates-at-the-start", "stale-flow"), over=runs.kinds(0.3, 0.6),
+      ways="paper",
       because="fast, accurate: coupling-midpoint-order; their own tolerances would be seen")
 def limit(*changes: str):
     """Remeshes, and the orders."""

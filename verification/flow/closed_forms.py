@@ -222,7 +222,7 @@ def _viscous_layer(space: Space, ratio: float, interface: str) -> dict[str, floa
     return in_the_middle(space, flow.unit_flow(space, ratio, interface=interface), layered_channel, ratio)
 
 
-def middle_of(grid: Mesh, half: float = MIDDLE) -> np.ndarray:
+def middle_of(grid: Mesh, half: float) -> np.ndarray:
     """(T,) triangles with |x| < half (um)."""
     return np.abs(grid.points[grid.triangles, 0].mean(axis=1)) < half
 

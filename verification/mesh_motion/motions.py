@@ -125,7 +125,7 @@ def waves(geometry: int):
                       {told: (2, "linear elements: second order", ceiling)})
 
 
-def _bent(size: float, seed: int, geometry: int = 1) -> Mesh:
+def _bent(size: float, seed: int, geometry: int) -> Mesh:
     return _nodes(meshes.plug((-END, END), NARROW, FACE, size, seed=seed), geometry)
 
 

@@ -45,8 +45,19 @@ def by(preset: str) -> str:
 PRESETS = ("paper", "fast", "accurate")
 #: Changes of a scene, by label: the presets, and fast with cubic elements.
 NUMERICS = {**{preset: (by(preset),) for preset in PRESETS}, "cubic": (by("fast"), of("cubic"))}
-#: Changes of a scene, by label: every kind of elements with the paper's scheme, and the presets.
-EVERY = {**{kind: (of(kind), coarser(kind, 0.4)) for kind in ELEMENTS}, **{kind: (by(kind),) for kind in PRESETS[1:]}}
+
+
+def kinds(refinement: float, linear: float = 1.0) -> dict[str, tuple[str, ...]]:
+    """Changes of a scene, by label: every kind of elements with the paper's scheme, refined so."""
+    return {kind: (of(kind), coarser(kind, refinement, linear)) for kind in ELEMENTS}
+
+
+def every(refinement: float, linear: float = 1.0) -> dict[str, tuple[str, ...]]:
+    """The same, and the presets."""
+    return {**kinds(refinement, linear), **{preset: (by(preset),) for preset in PRESETS[1:]}}
+
+
+EVERY = every(0.4)
 
 
 def base(end: str, *changes: str, times: Iterable[float] = ()) -> Scene:
