@@ -199,7 +199,7 @@ def round_half_disc(ratio: float, order: int, interface: str):
 def _round(refinement: float) -> Mesh:
     """The mesh of a scene."""
     refined = f"numerics.refinement={refinement}"
-    return pore.seeded(properties.around(ROUND, properties.ACCURATE, refined)).mesh
+    return pore.seeded(properties.scene_around(ROUND, properties.ACCURATE, refined)).mesh
 
 
 @cache

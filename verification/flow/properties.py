@@ -34,7 +34,7 @@ def _half_disc(radius: float, order: int, refinement: float, lean: float = 0.0, 
     return Space(meshes.half_disc(radius, refinement, (-reach, reach), WIDTH, geometry=min(order, 2), lean=lean), order)
 
 
-def around(radius: float, *numerics: str) -> Scene:
+def scene_around(radius: float, *numerics: str) -> Scene:
     """Flow alone, around a half-disc."""
     return load_scene("flow_only", (f'aggregate.radius="{radius} um"', *numerics))
 
@@ -43,14 +43,14 @@ def _around(radius: float, made: int | str) -> Space:
     """Around a half-disc: functions of an order, or as scenes with a preset have them."""
     if isinstance(made, int):
         return _half_disc(radius, made, REFINED[made])
-    return pore.seeded(around(radius, made)).space
+    return pore.seeded(scene_around(radius, made)).space
 
 
 def _leaning(made: int | str) -> Space:
     """The same around one that leans."""
     if isinstance(made, int):
         return _half_disc(25.0, made, REFINED[made], 0.6, 150.0)
-    numerics = around(25.0, made).numerics
+    numerics = scene_around(25.0, made).numerics
     return _half_disc(25.0, numerics.order, numerics.refinement, 0.6, 150.0)
 
 
@@ -221,6 +221,6 @@ def graded(bound: float, *numerics: str):
 
 def _graded(*numerics: str) -> tuple[float, int]:
     """Loss of the pore and nodes of its mesh."""
-    scene = around(10.0, *numerics)
+    scene = scene_around(10.0, *numerics)
     now = pore.seeded(scene)
     return pore.solve(scene, now).flow.head_loss, len(now.mesh.points)
