@@ -45,7 +45,6 @@ from verification.kernel.case import (
     between,
     case,
     combined,
-    compared,
     each_at_most,
     refine,
     studies,
@@ -154,8 +153,9 @@ def _above_the_middle(space: Space, found: flow.UnitFlow, theirs: taylor_hood.St
     line = np.abs(theirs.points[:, 0]) < 1e-6
     line = np.flatnonzero(line)[np.argsort(theirs.points[line, 1])]
     ours = meshes.field_at(space, found.velocity, theirs.points[line])
-    return compared("half-disc", "y at x = 0 (um)", "u_x / u_ave", theirs.points[line, 1], ours[:, 0],
-                    theirs.velocity[line, 0], "Taylor-Hood", "reference")
+    y = theirs.points[line, 1]
+    return Profile("half-disc", "y at x = 0 (um)", "u_x / u_ave", (
+        ("ours", "ours", y, ours[:, 0]), ("Taylor-Hood", "reference", y, theirs.velocity[line, 0])))
 
 
 #: Radius of the half-disc (um) on curved triangles, and refinements of its mesh: on coarser ones what is smooth, of

@@ -258,12 +258,6 @@ class Profile:
         return replace(self, title=f"{self.title}, {label}")
 
 
-def compared(title: str, x_label: str, y_label: str, x, ours, theirs, name: str = "exact",
-             kind: str = "exact") -> Profile:
-    """A picture of ours and of what it should be, which has a name and a kind."""
-    return Profile(title, x_label, y_label, (("ours", "ours", x, ours), (name, kind, x, theirs)))
-
-
 Line = tuple[str, str, str, bool]
 
 
