@@ -24,7 +24,7 @@ from repro.fem.outline import BOTTOM, FREE, TOP
 from repro.march.loop import Instant, Ledger
 from repro.march.simulation import simulate
 from repro.model import pore, remeshing
-from repro.scene import Kinetics, Scene
+from repro.scene import Kinetics, Scene, load_scene
 from verification.kernel.case import Check, Study, at_least, at_most, between, case, study
 from verification.problems import aggregates, runs
 
@@ -67,11 +67,6 @@ def _steps(rows: list[Ledger], why: str) -> list[Check]:
 
 
 STEPS = (0.8, 0.4, 0.2, 0.1)
-
-
-def _trapezoid(step: float) -> float:
-    """(r step)^2 / 12 at the supply's rate of growth r."""
-    return (runs.growth_rates(runs.base("1.6 h"))[0] * step) ** 2 / 12
 
 
 REFINEMENTS = (0.7, 1.0, 1.4, 2.0)
@@ -135,10 +130,8 @@ def _biomass(step: Ledger) -> float:
 
 
 def _worth(law: Kinetics, step: Ledger) -> float:
-    """Biomass made, against Y times the donor less what decays: the acceptor beyond F times the donor, over d_c."""
-    acceptor, donor = step.consumed
-    grown = law.yield_coefficient * donor
-    decayed = (acceptor - law.acceptor_to_donor_ratio * donor) / law.decay_oxygen_demand
+    """Biomass made, against what is grown less what decays."""
+    grown, decayed = runs.worth(law, step)
     return abs(step.biomass_made - (grown - decayed)) / max(abs(grown), abs(decayed))
 
 
@@ -163,7 +156,8 @@ def _of_base(preset: str):
     yield _closed(scene, ledgers)
     if scene.numerics.time == "updates":
         worst = defects(scene.kinetics, ledgers)[:, 2].max()
-        yield between("made against taken up, over (r step)^2 / 12", worst / _trapezoid(STEPS[2]), 0.95, 1.0,
+        theirs = (runs.growth_rates(scene)[0] * STEPS[2]) ** 2 / 12
+        yield between("made against taken up, over (r step)^2 / 12", worst / theirs, 0.95, 1.0,
                       "r at the supply; that of the seed is 1 % lower, and falls as the pore clogs")
     yield at_least("remeshes", remeshes, 1.0, "else they are not tested")
 
@@ -183,7 +177,7 @@ def _of_updates_of_base(preset: str) -> Study:
 
 def _of_narrow(preset: str):
     """Checks of a pore of 40 um through contact."""
-    scene = runs.every_step("25 h", runs.by(preset), 'pore.width="40 um"')
+    scene = load_scene("base", ('growth.end="25 h"', runs.by(preset), 'pore.width="40 um"'))
     scene = runs.at_velocity(scene, runs.SPEED)
     instants, touched = [], np.inf
     for instant in simulate(scene):

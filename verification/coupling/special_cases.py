@@ -126,11 +126,6 @@ def stiffness(*changes: str):
             at_least("growth of the area", soft.outline.area / seed, 1.1, "else nothing is tested")]
 
 
-def _everywhere(scene):
-    """The scene without flow, diffusion a million times D_A and more."""
-    return runs.with_diffusivities(runs.without_flow(scene), lambda water, biomass: (1e13, 1e13))
-
-
 EVERY_HOUR = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 OF_UPDATES = 1e-8, "J = theta to the stabilisation, and C to 1e-8 of the supply: D is a million times D_A"
 OF_LONG_STEPS = 1e-6, "J = theta, and C to 1e-7 of the supply"
@@ -156,7 +151,7 @@ LONG = {**{kind: (runs.by("fast"), runs.of(kind), runs.coarser(kind, 0.2)) for k
       because="paper: coupling-uniform-growth")
 def uniform_growth(hours: tuple[float, ...], most: float, why: str, *changes: str):
     """Checks of a run to the last of some hours, with rows at these."""
-    scene = _everywhere(runs.base(f"{hours[-1]} h", *changes, times=hours))
+    scene = runs.supplied_everywhere(runs.base(f"{hours[-1]} h", *changes, times=hours))
     seed, instants = pore.seeded(scene).outline, runs.ours(scene)
     expected = seed.area * np.array([runs.mass_after(scene, hour) for hour in hours])
     sizes = {"area": [instant.pore.outline.area for instant in instants],

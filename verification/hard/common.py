@@ -30,7 +30,7 @@ from repro.results import row
 from repro.scene import Kinetics, Scene, load_scene
 from repro.scene.units import SceneError
 from verification.kernel.case import Check, Line, Note, at_least, at_most, between, case
-from verification.problems.runs import NUMERICS
+from verification.problems.runs import NUMERICS, worth
 
 PRESETS = tuple(NUMERICS)
 #: With the paper's scheme any part may be refused.
@@ -243,9 +243,8 @@ def _oxygen_demand(found: Run) -> list[Check]:
 
 
 def _unaccounted(law: Kinetics, ledger: Ledger) -> float:
-    acceptor, donor = ledger.consumed
-    decayed = (acceptor - law.acceptor_to_donor_ratio * donor) / law.decay_oxygen_demand
-    return abs(ledger.biomass_made - law.yield_coefficient * donor + decayed) / ledger.biomass_after
+    grown, decayed = worth(law, ledger)
+    return abs(ledger.biomass_made - grown + decayed) / ledger.biomass_after
 
 
 MEAN = "J = theta in the mean; Newton's tolerance"

@@ -357,9 +357,7 @@ def still_water(preset: str, *changes: str) -> Run:
     """A run in which diffusion holds the supply everywhere; what enters is then a small difference of large fluxes, and
     its balance says nothing."""
     made = common.scene("wide", preset, 'aggregate.radius="20 um"', *changes)
-    quick = {name: replace(getattr(made.substrates, name), diffusivity=1e13, diffusivity_in_aggregate=1e13)
-             for name in ("acceptor", "donor")}
-    return common.ran(replace(made, flow=None, substrates=replace(made.substrates, **quick)), balance=None)
+    return common.ran(runs.supplied_everywhere(made), balance=None)
 
 
 def _half_disc(found: Run) -> list[Check]:

@@ -19,7 +19,7 @@ from repro.results import M_PER_D
 from verification.hard import common
 from verification.hard.common import DRIVE, EFFLUENTS, FIXED, SHAPE, TOLERANCE, HardCase, Run
 from verification.kernel.case import Check, at_least, at_most, between
-from verification.problems import meshes, runs
+from verification.problems import channels, meshes, runs
 
 BOTH = ("acceptor", "donor")
 
@@ -91,8 +91,7 @@ def _stoichiometry(found: Run) -> list[Check]:
     """(7) less F times (8) is what decay takes, d_c f_d b X m_A, whatever the concentrations."""
     law, both = found.scene.kinetics, found.scene.substrates
     acceptor, donor = (flux.consumed for flux in found.instants[-1].solved.fluxes)
-    decay = law.decay_oxygen_demand * law.degradable_fraction * law.decay_coefficient * law.maximum_density
-    decay *= found.last["aggregate_area_um2"]
+    decay = channels.decay_demand(law) * law.maximum_density * found.last["aggregate_area_um2"]
     C = found.instants[-1].solved.concentrations.acceptor
     ends = np.array([max(C.min(), 0.0), C.max()])
     m = ends / (ends + both.acceptor.half_saturation)
@@ -265,7 +264,7 @@ TRICKLES = {"1e-4": 1e-8, "1e-6": 1e-6, "1e-12": 1e-6}
 def _used_up(found: Run) -> list[Check]:
     """With C_A -> 0 and C_D uniform, (7) and (8) are taken up in the ratio F + d_c f_d b / (k m_D), which gives C_D."""
     law, both = found.scene.kinetics, found.scene.substrates
-    decay = law.decay_oxygen_demand * law.degradable_fraction * law.decay_coefficient
+    decay = channels.decay_demand(law)
     K, supply = both.donor.half_saturation, both.donor.supply
 
     def missing(c):

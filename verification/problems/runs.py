@@ -10,11 +10,11 @@ import numpy as np
 from reference import averaged_pore
 from repro import results
 from repro.march import midpoint, updates
-from repro.march.loop import Instant, Step
+from repro.march.loop import Instant, Ledger, Step
 from repro.march.simulation import simulate
 from repro.model import pore
 from repro.model.pore import Pore, Solved
-from repro.scene import Scene, load_scene
+from repro.scene import Kinetics, Scene, load_scene
 from verification.kernel.case import Profile, columns
 from verification.problems import channels, pairs
 
@@ -66,11 +66,6 @@ def base(end: str, *changes: str, times: Iterable[float] = ()) -> Scene:
     return load_scene("base", (f'growth.end="{end}"', f"output.times={rows}", *changes))
 
 
-def every_step(end: str, *changes: str) -> Scene:
-    """The paper's scene to a time, reported after every step."""
-    return load_scene("base", (f'growth.end="{end}"', *changes))
-
-
 def on_wall(heights: np.ndarray) -> np.ndarray:
     """Heights (n,) of a shape's points with the first and the last on the lower wall to the last bit."""
     return np.concatenate([[0.0], heights[1:-1], [0.0]])
@@ -114,6 +109,11 @@ def with_diffusivities(scene: Scene, change) -> Scene:
         water, biomass = change(one.diffusivity, one.diffusivity_in_aggregate)
         changed[name] = replace(one, diffusivity=water, diffusivity_in_aggregate=biomass)
     return replace(scene, substrates=replace(scene.substrates, **changed))
+
+
+def supplied_everywhere(scene: Scene) -> Scene:
+    """The scene without flow, diffusion a million times D_A and more: the supply everywhere."""
+    return with_diffusivities(without_flow(scene), lambda water, biomass: (1e13, 1e13))
 
 
 #: Powers of length and time in the unit of each key that has one.
@@ -166,6 +166,13 @@ def growth_rates(scene: Scene, acceptor: float | None = None, donor: float | Non
     m_a, m_d = (value / (value + half) for value, half in given)
     return (m_a * (law.maximum_utilization_rate * law.yield_coefficient * m_d - law.decay_coefficient),
             m_a * law.decay_coefficient * (1 - law.degradable_fraction))
+
+
+def worth(law: Kinetics, step: Ledger) -> tuple[float, float]:
+    """What the substrates taken up in a step are worth in biomass: Y times the donor, and what decays, the acceptor
+    beyond F times the donor, over d_c."""
+    acceptor, donor = step.consumed
+    return law.yield_coefficient * donor, (acceptor - law.acceptor_to_donor_ratio * donor) / law.decay_oxygen_demand
 
 
 def mass_after(scene: Scene, time: float) -> float:
