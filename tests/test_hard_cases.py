@@ -10,11 +10,12 @@ import pytest
 from repro.errors import SimulationError, TransportError
 from repro.scene import load_scene
 from verification import hard_cases
-from verification.hard import common, runs
+from verification.hard import common
 from verification.hard.common import PRESETS, REFUSED, RIGHT, WRONG, HardCase
 from verification.kernel import case
 from verification.kernel.case import Check, Outcome, Result, at_least, at_most, between, outcome
 from verification.kernel.writing import plain
+from verification.problems import runs as problems
 
 GOOD, BAD = at_most("good", 0.5, 1.0, ""), at_most("bad", 2.0, 1.0, "")
 KNOWN = {case.number: case for case in hard_cases.CASES}
@@ -141,6 +142,6 @@ def test_a_cheap_cell_is_what_it_must_be(number, preset):
 
 def test_units_scale():
     made = load_scene("base", ("numerics.preset=fast",))
-    there = runs.scaled(runs.scaled(made, 2.0**10, 2.0**-3), 2.0**-10, 2.0**3)
-    assert there == made and runs.scaled(made, 2.0, 1.0).pore.width == 100.0
-    assert runs.scaled(made, 1.0, 2.0).kinetics.decay_coefficient == made.kinetics.decay_coefficient / 2
+    there = problems.scaled(problems.scaled(made, 2.0**10, 2.0**-3), 2.0**-10, 2.0**3)
+    assert there == made and problems.scaled(made, 2.0, 1.0).pore.width == 100.0
+    assert problems.scaled(made, 1.0, 2.0).kinetics.decay_coefficient == made.kinetics.decay_coefficient / 2
