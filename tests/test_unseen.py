@@ -14,7 +14,7 @@ from scipy.spatial import Delaunay
 
 import repro
 from repro import results, timing
-from repro.check import cost, modelled, numbers
+from repro.check import cost, modelled, numbers, simplifications
 from repro.errors import BalanceError, TransportError, Unresolved
 from repro.fem.outline import FREE, half_disc, polygon
 from repro.fem.sizing import Sizing, split
@@ -542,3 +542,43 @@ def test_frames_before_an_expansion_stand_before_it_and_are_not_counted_as_times
     frames = [{"note": note} if note else {} for *_, note in chosen]
     said = run_page._field_note({"meshes": [{"per": 3}], "nodes": 3, "frames": frames, "of": 50, "fields": []})
     assert "; 40 of 50 times shown, those grown and not yet expanded besides." in said
+
+
+THIN = {"front": ["numerics.preset=fast", 'substrates.acceptor.half_saturation="1e-3 mg/L"', 'flow.mean_velocity="1 m/day"'],
+        "layer of drag": ["numerics.preset=fast", "flow.biomass=brinkman", 'flow.permeability="2e-14 m^2"',
+                          'flow.mean_velocity="1 m/day"'],
+        "cells": ["numerics.preset=paper", 'flow.mean_velocity="60 m/day"']}
+
+
+@pytest.mark.parametrize("layer", THIN)
+def test_a_refinement_that_is_advised_silences_its_warning_and_a_smaller_one_does_not(layer):
+    def advice(*more):
+        scene = load_scene("base", [*THIN[layer], 'growth.end="2 h"', *more], ["flow.head"])
+        found = simplifications.warnings(scene, numbers.numbers(scene, scene.flow.mean_velocity))
+        return [each.text for each in found if " would " in each.text]
+
+    (told_there,) = advice()
+    wanted = float(re.search("([0-9.]+) would (do|resolve it)", told_there)[1])
+    assert not advice(f"numerics.refinement={1.06 * wanted}") and advice(f"numerics.refinement={0.94 * wanted}")
+
+
+def test_the_worst_of_the_steps_that_miss_the_tolerance_is_told(tmp_path):
+    one = running.Recorder(load_scene("base", ["numerics.tolerance=0.01"]), tmp_path)
+    for estimate in (0.03, 0.5, 0.04, 0.001):
+        one._judge(Pace(1.0, 1.0, estimate))
+    assert one.record.missed == 3 and "errs by 0.5 (estimate)" in one.unmet()[0].text
+
+
+def test_rows_at_times_are_counted_with_that_at_zero():
+    for asked in ('["5 h", "18 h"]', '["0 h", "5 h", "18 h"]'):
+        assert "rows and fields at 3 times" in dict(modelled.modelled(base(2, f"output.times={asked}")[0]))["output"]
+
+
+def test_a_run_without_a_row_says_what_its_folder_does_before_and_after_it_was_made(tmp_path):
+    """It has failed before t = 0; one without a folder says what the attempt said, or that there was none."""
+    swept = sweep_of(tmp_path, "40 um, 50 um, 60 um")
+    point = swept.points[0]
+    (swept.runs / point.name).mkdir(parents=True)
+    running.Recorder(point.scene, swept.runs / point.name).tell("failed: x")
+    said = [[one.status for one in table.tell(swept, ended, 0.1)] for ended in ({}, {1: "failed: y", 2: "failed: z"})]
+    assert said == [["failed: x", "not run", "not run"], ["failed: x", "failed: z", "not run"]]
