@@ -85,11 +85,13 @@ def test_a_forced_run_is_refused_where_others_have_files_of_its_names(tmp_path, 
         tmp_path, capsys, "base", *SETS, "--force", "--out", str(tmp_path))
 
 
-def test_a_scene_file_that_was_changed_is_told_on_resume(tmp_path, capsys):
-    """With what differs; the run goes on with its own."""
+def test_a_scene_file_that_was_changed_is_told_on_resume(tmp_path, capsys, monkeypatch):
+    """With what differs, from wherever that is asked for; the run goes on with its own."""
     scene = tmp_path / "mine.toml"
+    monkeypatch.chdir(tmp_path)
     scene.write_text('[pore]\nwidth = "50 um"\n[flow]\nhead = "1e-3 cm"\n')
-    assert main(["run", str(scene), "--set", "pore.length=500 um", "--out", str(tmp_path / "run")]) == 0
+    assert main(["run", "mine.toml", "--set", "pore.length=500 um", "--out", str(tmp_path / "run")]) == 0
+    monkeypatch.chdir(tmp_path / "run")
     assert main(["run", "--resume", str(tmp_path / "run")]) == 0
     assert capsys.readouterr().err == ""
     scene.write_text(scene.read_text().replace("50 um", "60 um"))

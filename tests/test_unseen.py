@@ -10,7 +10,9 @@ from xml.etree import ElementTree
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+import tqdm
 from scipy.spatial import Delaunay
+from tqdm import tqdm as Bar
 
 import repro
 from repro import results, timing
@@ -28,9 +30,9 @@ from repro.report.reading import Run
 from repro.results import picture
 from repro.results.tables import Results
 from repro.results.vtu import Cells, Grid
-from repro.run import running
+from repro.run import progress, running
 from repro.scene import load_scene
-from repro.sweep import page, table
+from repro.sweep import making, page, table
 from repro.sweep.design import grid, parse, points
 from repro.sweep.state import Sweep
 from tests import oracles
@@ -575,10 +577,45 @@ def test_rows_at_times_are_counted_with_that_at_zero():
 
 
 def test_a_run_without_a_row_says_what_its_folder_does_before_and_after_it_was_made(tmp_path):
-    """It has failed before t = 0; one without a folder says what the attempt said, or that there was none."""
+    """Failed before t = 0, say; one without a folder says what the attempt at it said, or that there was none."""
     swept = sweep_of(tmp_path, "40 um, 50 um, 60 um")
     point = swept.points[0]
     (swept.runs / point.name).mkdir(parents=True)
     running.Recorder(point.scene, swept.runs / point.name).tell("failed: x")
     said = [[one.status for one in table.tell(swept, ended, 0.1)] for ended in ({}, {1: "failed: y", 2: "failed: z"})]
     assert said == [["failed: x", "not run", "not run"], ["failed: x", "failed: z", "not run"]]
+
+
+def test_marks_of_the_page_have_the_colour_that_the_key_below_them_names(tmp_path):
+    """Of the other factor, where two are varied by different parts: each figure with its own key."""
+    factors = [parse("pore.width=40 um, 50 um"), parse("flow.viscosity_ratio=100, 400, 1000")]
+    found = points("flow_only", [], factors, grid(factors))
+    course = np.array([1.0, 8.0])
+    runs = [table.Told(one, "completed", course, course, course, dict.fromkeys(table.COLUMNS) | {"clogging_time_h": 5.0})
+            for one in found]
+    times = page.page(Sweep(tmp_path, "flow_only", factors, found), runs, 0.1).split("<h2>Clogging time")[1]
+    figures = re.findall("<figure>.*?</figure>", times, re.S)
+    for figure, key in zip(figures, ("flow.viscosity_ratio", "pore.width"), strict=True):
+        named = dict(re.findall(r'class="line level(.)"/></svg>([^<]*)</li>', figure))
+        shown = re.findall(rf'class="dot level(.)"[^>]*><title>run [^<]*?{key} = ([^,:]*)', figure)
+        assert len(shown) == 6 and {named[level] == value for level, value in shown} == {True}
+
+
+def test_a_sweep_that_goes_on_counts_what_was_there(tmp_path):
+    swept = sweep_of(tmp_path, "40 um, 50 um, 60 um")
+    (swept.runs / swept.points[1].name).mkdir(parents=True)
+    running.Recorder(swept.points[1].scene, swept.runs / swept.points[1].name).tell("completed")
+    events = []
+    making._make(swept, lambda missing, folder: ((one, "completed") for one in missing), {}, events.append)
+    assert [(each["done"], each["total"], each.get("run")) for each in events] == [(1, 3, None), (2, 3, 1), (3, 3, 3)]
+
+
+def test_the_time_that_is_left_is_that_of_the_pace_since_a_resume(monkeypatch):
+    """From 18 of 20 h on, 1 h in 10 s leaves 10 s."""
+    monkeypatch.setattr(progress, "_fit", lambda bar, event: None)
+    bars = []
+    monkeypatch.setattr(tqdm, "tqdm", lambda **asked: bars.append(Bar(**asked)) or bars[0])
+    with progress.on_a_terminal() as tell:
+        tell({"event": "start", "scene": "base", "from_h": 18.0, "end_h": 20.0, "step": 90})
+        tell({"event": "step", "time_h": 19.0})
+        assert Bar.format_meter(**bars[0].format_dict | {"elapsed": 10.0, "rate": None}).endswith("[00:10 < 00:10]")
