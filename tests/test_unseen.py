@@ -288,7 +288,10 @@ def test_runs_are_compared_under_their_own_names_with_signs():
         assert [line.label for line in chart.lines] == labels, chart.title
         if chart.title != "Mesh: made anew":
             assert [line.values[-1] / chart.lines[0].values[-1] for line in chart.lines] == pytest.approx([1, 1.5, 0.5])
-    (row,) = re.findall("<tr><td>upstream end of the aggregate.*?</tr>", comparison.build(runs))
+    made = comparison.build(runs)
+    heads = re.findall('<th scope="col" class="value">([^<]*)', made[made.index("Values at the common last time"):])
+    assert heads == ["zeta", "alpha", "difference", "mu", "difference"]
+    (row,) = re.findall("<tr><td>upstream end of the aggregate.*?</tr>", made)
     assert re.findall('class="value">([^<]*)<', row) == ["-8", "-12", "-50 %", "-4", "+50 %"]
 
 
@@ -546,7 +549,8 @@ def test_frames_before_an_expansion_stand_before_it_and_are_not_counted_as_times
     assert "; 40 of 50 times shown, those grown and not yet expanded besides." in said
 
 
-THIN = {"front": ["numerics.preset=fast", 'substrates.acceptor.half_saturation="1e-3 mg/L"', 'flow.mean_velocity="1 m/day"'],
+THIN = {"front": ["numerics.preset=fast", 'substrates.acceptor.half_saturation="1e-3 mg/L"',
+                  'flow.mean_velocity="1 m/day"'],
         "layer of drag": ["numerics.preset=fast", "flow.biomass=brinkman", 'flow.permeability="2e-14 m^2"',
                           'flow.mean_velocity="1 m/day"'],
         "cells": ["numerics.preset=paper", 'flow.mean_velocity="60 m/day"']}
@@ -591,8 +595,8 @@ def test_marks_of_the_page_have_the_colour_that_the_key_below_them_names(tmp_pat
     factors = [parse("pore.width=40 um, 50 um"), parse("flow.viscosity_ratio=100, 400, 1000")]
     found = points("flow_only", [], factors, grid(factors))
     course = np.array([1.0, 8.0])
-    runs = [table.Told(one, "completed", course, course, course, dict.fromkeys(table.COLUMNS) | {"clogging_time_h": 5.0})
-            for one in found]
+    clogged = dict.fromkeys(table.COLUMNS) | {"clogging_time_h": 5.0}
+    runs = [table.Told(one, "completed", course, course, course, clogged) for one in found]
     times = page.page(Sweep(tmp_path, "flow_only", factors, found), runs, 0.1).split("<h2>Clogging time")[1]
     figures = re.findall("<figure>.*?</figure>", times, re.S)
     for figure, key in zip(figures, ("flow.viscosity_ratio", "pore.width"), strict=True):
@@ -619,3 +623,32 @@ def test_the_time_that_is_left_is_that_of_the_pace_since_a_resume(monkeypatch):
         tell({"event": "start", "scene": "base", "from_h": 18.0, "end_h": 20.0, "step": 90})
         tell({"event": "step", "time_h": 19.0})
         assert Bar.format_meter(**bars[0].format_dict | {"elapsed": 10.0, "rate": None}).endswith("[00:10 < 00:10]")
+
+
+@pytest.mark.parametrize("value, said", [(0.00123457, "0.00123457"), (1234.56, "1234.56"), (True, "yes"), (False, "no"),
+                                         (None, "none"), ("1234.56789 um", "1234.57 um"), ("a b", "a b"), (7, "7"),
+                                         ([1.5, "2.0 h"], "1.5, 2 h"), ([], "none"), ("0.1 m/day", "0.1 m/day")])
+def test_a_value_is_shown_with_six_digits_and_its_unit(value, said):
+    assert run_page.page.shown(value) == said
+
+
+def test_gears_steps_are_controlled_by_what_is_there_or_supplied():
+    """After a fall of the acceptor's supply, and under a rise of the donor's."""
+    _, problem = case.__wrapped__()
+    start = transport.supplied_everywhere(problem)
+    start = replace(start, acceptor=3 * start.acceptor, donor=start.donor / 2)
+    nothing = np.zeros_like(problem.space.reaction.dx)
+    scale = gear._started(problem, nothing, nothing, start)[0].scale
+    assert scale.ravel().tolist() == [3 * problem.both[0].supply, problem.both[1].supply]
+
+
+@EVERY_ORDER
+def test_an_update_under_a_table_begins_with_what_gear_has_in_the_pore(order):
+    """By the supply half way, and not with profiles that have come to rest under it."""
+    table_of = 'substrates.acceptor.supply=[["0 h", "9 mg/L"], ["1 h", "29 mg/L"]]'
+    scene, now = base(order, "numerics.transport=gear", table_of, "substrates.acceptor.interpolation=linear")
+    solved = solve(scene, now)
+    there = updates._midway(scene, now, solved, 0.2)
+    assert there.concentrations is solved.concentrations and there.problem.both[0].supply == pytest.approx(11.0)
+    risen = updates.step(scene, now, solved, 0.2).ledger.stored[0] / (scene.pore.width * np.ptp(now.mesh.ends))
+    assert risen == pytest.approx(2.0, rel=0.05)
