@@ -24,10 +24,7 @@ from repro.model.pore import Pore, Solved
 from repro.scene import Scene
 from verification.claims import runs
 from verification.claims.levels import CONVERGED, FINE, Level, at_level, cached, forget
-from verification.claims.runs import BASE, LAST, UPDATE
-
-#: The time (h) of the geometry that the paper plots [E12].
-PLOTTED = 19.2
+from verification.claims.runs import BASE, LAST, PLOTTED, UPDATE
 
 
 @dataclass(frozen=True)
