@@ -42,19 +42,6 @@ def test_where_nothing_is_scarce_growth_is_the_closed_form(keeps_shape):
     assert [moment.time for moment in found] == [1.0, 3.0]
 
 
-def test_the_constriction_is_that_of_greens_function_in_closed_form():
-    """The sum over n is -ln((1 - 2 e^-c cos(a + b) + e^-2c)(1 - 2 e^-c cos(a - b) + e^-2c)) / (4 pi): by random pairs.
-    """
-    random = np.random.default_rng(1)
-    radius, width = 20.0, 50.0
-    away, angle = radius * np.sqrt(random.uniform(size=(2, 400_000))), np.pi * random.uniform(size=(2, 400_000))
-    (x, far), (a, b) = away * np.cos(angle), np.pi / width * away * np.sin(angle)
-    fall = np.exp(-np.pi * np.abs(x - far) / width)
-    kernel = sum(np.log(1 - 2 * fall * np.cos(s) + fall**2) for s in (a + b, a - b)) / (-4 * np.pi)
-    expected = kernel.mean() * np.pi / 2 * radius**2
-    assert averaged_pore.constriction(radius, width) == pytest.approx(expected, rel=5e-3)
-
-
 def test_an_iteration_that_does_not_rest_is_an_error(monkeypatch):
     monkeypatch.setattr(averaged_pore, "MOST", 1)
     with pytest.raises(RuntimeError, match="do not come to rest"):
