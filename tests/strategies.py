@@ -199,6 +199,13 @@ def bent_inside(grid, by=0.2):
     return grid.moved(points).checked()
 
 
+def on_the_boundary(triangles):
+    """Of each triangle, how many of its edges no other one has, sorted."""
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2))
+    _, which, count = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    return sorted((count[which] == 1).reshape(-1, 3).sum(axis=1))
+
+
 def body_of(grid, around, order=None):
     """(growth.Body, held (n, 2), rim (M,)): the aggregate at rest, what 2.3.3 prescribes of it, y on the walls and x at
     fixed points, and its boundary in its own numbering. order: that of the concentrations, the mesh's by default."""

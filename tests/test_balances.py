@@ -3,7 +3,6 @@ paper; when its steps end; no matter what an hour is."""
 import re
 from dataclasses import replace
 from itertools import pairwise
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +14,7 @@ from repro.march import midpoint, updates
 from repro.march.balance import oxygen_demand
 from repro.march.loop import Ledger
 from repro.march.simulation import simulate
-from repro.model import pore, remeshing, transport
+from repro.model import pore, transport
 from repro.model.kinetics import Sink
 from repro.results import read_table, row
 from repro.scene import load_scene
@@ -175,39 +174,6 @@ def assert_demand(kinetics, ledger, part):
     decayed = (acceptor - kinetics.acceptor_to_donor_ratio * donor) / kinetics.decay_oxygen_demand
     left = ledger.biomass_made - (grown - decayed)
     assert abs(left) <= part * max(abs(grown), abs(decayed)) + 4e-16 * ledger.biomass_before
-
-
-@pytest.fixture
-def halfway_meshes(monkeypatch):
-    """[was a new mesh made?] for each half of a step, every second time whether it is due or not."""
-    made_anew = []
-
-    def followed(made, now, expanded):
-        mesh = None if len(made_anew) % 2 else remeshing.followed(made, now, expanded)
-        made_anew.append(mesh is None)
-        return mesh
-
-    monkeypatch.setattr(midpoint, "remeshing", SimpleNamespace(**{**vars(remeshing), "followed": followed}))
-    return made_anew
-
-
-@EVERY_ORDER
-def test_every_step_of_the_midpoint_rule_balances(order, halfway_meshes):
-    """Oxygen demand, substrates and biomass to 1e-9, through contact and with new meshes half way through steps."""
-    refinement = 0.5 if order == 1 else 0.25
-    made = load_scene("base", [f"numerics.elements={ORDERS[order]}", f"numerics.refinement={refinement}",
-                               "numerics.time=midpoint", "aggregate.radius=17 um", "pore.width=20 um", "growth.end=6 h",
-                               "flow.head=1e-2 cm", 'output.times=["3 h", "6 h"]'])
-    found = list(simulate(made))
-    rows = [ledger for instant in found for ledger in instant.ledgers]
-    assert sum(halfway_meshes) > 2 and len(rows) > 3 and found[-1].pore.contact, "else little is tested"
-    for ledger in rows:
-        assert_demand(made.kinetics, ledger, 1e-9)
-        for supplied, out, taken in zip(ledger.supplied, ledger.out, ledger.consumed):
-            assert supplied == pytest.approx(out + taken, rel=1e-9)
-        assert ledger.biomass_after == pytest.approx(ledger.biomass_before + ledger.biomass_made, rel=1e-9)
-    for instant in found:
-        assert abs(row(made, instant)["oxygen_demand_balance"]) <= 1e-9
 
 
 @pytest.mark.parametrize("born", ["stressed", "stress_free"])

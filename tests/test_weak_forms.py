@@ -31,6 +31,7 @@ from repro.model.kinetics import Sink
 from repro.scene import load_scene
 from tests import oracles
 from tests.strategies import ORDERS, bent_inside, constants, meshed, meshes, seed
+from verification.problems import aggregates
 
 TOLERANCE = 1e-12
 THEIRS = {1: ElementTriP1(), 2: ElementTriP2(), 3: ElementTriP3()}
@@ -114,11 +115,6 @@ def assembled(unknowns, matrices, count):
     return ElementSystem(unknowns, np.arange(count), np.zeros(count, bool)).matrix(matrices)
 
 
-def summed(space, loads):
-    """(n,) of loads (T, k)."""
-    return np.bincount(space.cells.ravel(), loads.ravel(), space.count)
-
-
 def places(space, table):
     """(T, q) x and y of the points of a table."""
     where = np.einsum("qa,tai->tqi", table.shape, space.mesh.points[space.mesh.cells])
@@ -151,7 +147,7 @@ def test_mass_stiffness_and_load(counterparts, shape, order):
     x, _ = places(space, space.table)
     ours = assembled(space.cells, space.mass(x * space.at.dx), space.count)
     assert same(ours, weighted_mass.assemble(basis)[nodes][:, nodes])
-    assert same(summed(space, space.load(x * space.at.dx)), weighted_load.assemble(basis)[nodes])
+    assert same(space.summed(space.cells, space.load(x * space.at.dx)), weighted_load.assemble(basis)[nodes])
     assert same(space.at.dx.sum(axis=1), basis.dx.sum(axis=1))
     theirs = stiffness.assemble(of.basis(order, max(2, space.gradient_degree)))
     assert same(assembled(space.cells, space.stiffness, space.count), theirs[nodes][:, nodes])
@@ -299,6 +295,11 @@ def on_end(of, order, x):
     return FacetBasis(of.mesh, THEIRS[order], facets=facets, intorder=elements.EDGE_DEGREES[order])
 
 
+def carrying(velocity, correction=None):
+    """A flow of any velocity (n, 2), of linear elements less a correction (T, 2)."""
+    return flow.Flow(1.0, velocity, np.zeros(len(velocity)), correction, 0.0, 0.0, 1.0)
+
+
 @orders
 @shapes
 def test_advection_in_the_form_that_conserves(counterparts, shape, order):
@@ -307,7 +308,7 @@ def test_advection_in_the_form_that_conserves(counterparts, shape, order):
     space, random = Space(of.ours, order), np.random.default_rng(order)
     nodes, velocity = of.nodes(space), random.standard_normal((space.count, 2))
     enters = random.standard_normal(space.count)
-    given = flow.Flow(1.0, velocity, np.zeros(space.count), None, 0.0, 0.0, 1.0)
+    given = carrying(velocity)
     basis = of.basis(order, degree_of(space))
     u_x, u_y, other = (of.field(part, nodes) for part in (velocity[:, 0], velocity[:, 1], enters))
     inside = conserving.assemble(basis, u_x=basis.interpolate(u_x), u_y=basis.interpolate(u_y))
@@ -341,7 +342,7 @@ def test_linear_advection_by_the_divergence_free_velocity(grid, seed):
     of, random = Counterpart(grid), np.random.default_rng(seed)
     space = Space(grid, 1)
     velocity, correction = (random.standard_normal((len(part), 2)) for part in (grid.points, grid.triangles))
-    given = flow.Flow(1.0, velocity, np.zeros(len(grid.points)), correction, 0.0, 0.0, 1.0)
+    given = carrying(velocity, correction)
     nodes, basis = of.nodes(space), of.basis(1, 2)
     inlet = on_end(of, 1, grid.ends[0])
     u_x, u_y = (of.field(velocity[:, i], nodes) for i in (0, 1))
@@ -390,9 +391,7 @@ def test_uptake_and_its_derivative(counterparts, shape, order, duration):
     space, random = Space(of.ours, order), np.random.default_rng(order)
     both, nodes = random.uniform(4.0, 7.0, (2, space.count)), of.nodes(space)
     pieces = space.reaction
-    where = (space.points[pieces.cells].T if order == 1 else
-             [part[of.ours.biomass].T for part in places(space, space.table)])
-    active = density(*(np.asarray(part).reshape(pieces.dx.T.shape).T for part in where)) * pieces.dx
+    active = density(*aggregates.places(space)) * pieces.dx
     basis = reaction_basis(of, order, degree_of(space))
     A, D = (basis.interpolate(of.field(field, nodes)) for field in both)
     X = density(*basis.global_coordinates())
@@ -429,7 +428,7 @@ def test_the_operator_of_both_substrates(counterparts, shape, order):
     space, random = Space(of.ours, order), np.random.default_rng(order)
     velocity = random.standard_normal((space.count, 2))
     correction = np.zeros((len(of.ours.cells), 2)) if order == 1 and shape == "straight" else None
-    given = flow.Flow(1.0, velocity, np.zeros(space.count), correction, 0.0, 0.0, 1.0)
+    given = carrying(velocity, correction)
     problem = transport.problem(space, given, SCENE.substrates, SCENE.kinetics)
     nodes, n = of.nodes(space), space.count
     basis = of.basis(order, max(2, space.gradient_degree))
