@@ -134,9 +134,15 @@ def test_an_impossible_outline_is_refused_with_its_place(geometry):
 
 
 @pytest.fixture(scope="module")
-def made():
+def made(seeded):
     """Around a half-disc, as a scene makes it."""
-    return pore.seeded(scene("20 um", numerics={"preset": "fast"})).mesh
+    return seeded.mesh
+
+
+@pytest.fixture(scope="module")
+def seeded():
+    """Its pore."""
+    return pore.seeded(scene("20 um", numerics={"preset": "fast"}))
 
 
 @pytest.fixture(scope="module")
@@ -145,15 +151,14 @@ def grid(made):
     return bent_inside(made)
 
 
-def test_middles_belong_to_one_edge_each():
+def test_middles_belong_to_one_edge_each(seeded):
     """Two triangles share the node of their edge; those given are on the outline."""
-    now = pore.seeded(scene("20 um", numerics={"preset": "fast"}))
-    grid = now.mesh
+    grid = seeded.mesh
     edges = np.sort(grid.cells[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     owned = np.unique(np.column_stack([edges, grid.cells[:, 3:].ravel()]), axis=0)
     for columns in (owned[:, :2], owned[:, 2]):
         assert len(np.unique(columns, axis=0)) == len(owned) == len(grid.points) - grid.corners
-    free = now.wall == 0
+    free = seeded.wall == 0
     assert np.allclose(np.hypot(*grid.points[grid.loop][free].T), 20.0, rtol=1e-13)
     ends = 0.5 * (grid.points[grid.loop[::2]] + grid.points[np.roll(grid.loop, -2)[::2]])
     assert (np.hypot(*(grid.points[grid.loop[1::2]] - ends).T) < 1.0).all()
@@ -223,8 +228,7 @@ def test_a_triangle_that_is_turned_over_is_refused(grid):
         grid.straight.moved(straight).checked()
 
 
-def test_a_clean_channel_has_no_aggregate():
-    made = pore.seeded(scene("20 um", numerics={"preset": "fast"})).mesh
+def test_a_clean_channel_has_no_aggregate(made):
     none = np.zeros(len(made.cells), bool)
     straight = Mesh.of(made.points[: made.corners], made.triangles, none, np.empty(0, int), 50.0, made.ends)
     for bare in (straight, curved(straight, None)):

@@ -1,5 +1,5 @@
-"""The references of whole runs, against what is known without them: the averaged pore, and the
-independent solver of base.
+"""The references of whole runs, against what is known without them: the averaged pore, and the independent
+solver of base.
 
 Their flow and transport are judged by the cases that compare them with ours, to 1e-4 in coupling-exact.
 """
