@@ -283,6 +283,12 @@ def through(C, v, w):
     return w.u_x * C * v
 
 
+@LinearForm
+def entering(v, w):
+    """u_x v over an end."""
+    return w.u_x * v
+
+
 @BilinearForm
 def carried(C, v, w):
     """(w . grad C, v)."""
@@ -297,43 +303,7 @@ def on_end(of, order, x):
 
 def carrying(velocity, correction=None):
     """A flow of any velocity (n, 2), of linear elements less a correction (T, 2)."""
-    return flow.Flow(1.0, velocity, np.zeros(len(velocity)), correction, 0.0, 0.0, 1.0)
-
-
-@orders
-@shapes
-def test_advection_in_the_form_that_conserves(counterparts, shape, order):
-    """Any velocity, also with another speed at the inlet (11)."""
-    of = counterparts[shape]
-    space, random = Space(of.ours, order), np.random.default_rng(order)
-    nodes, velocity = of.nodes(space), random.standard_normal((space.count, 2))
-    enters = random.standard_normal(space.count)
-    given = carrying(velocity)
-    basis = of.basis(order, degree_of(space))
-    u_x, u_y, other = (of.field(part, nodes) for part in (velocity[:, 0], velocity[:, 1], enters))
-    inside = conserving.assemble(basis, u_x=basis.interpolate(u_x), u_y=basis.interpolate(u_y))
-    inlet, outlet = (on_end(of, order, x) for x in of.ours.ends)
-    theirs = inside + through.assemble(outlet, u_x=outlet.interpolate(u_x))
-    for speed, more in ((velocity[:, 0], 0 * theirs),
-                        (enters, through.assemble(inlet, u_x=inlet.interpolate(other - u_x)))):
-        ours = assembled(space.cells, transport.advection(space, given, speed), space.count)
-        assert same(ours, (theirs + more)[nodes][:, nodes])
-
-
-@orders
-@shapes
-def test_loads_and_masses_of_the_ends(counterparts, shape, order):
-    """Of both ends."""
-    of = counterparts[shape]
-    space, random = Space(of.ours, order), np.random.default_rng(order)
-    nodes, speed = of.nodes(space), random.standard_normal(space.count)
-    for edges, x in zip((space.dofs.inlet, space.dofs.outlet), of.ours.ends):
-        basis = on_end(of, order, x)
-        u_x = basis.interpolate(of.field(speed, nodes))
-        theirs = LinearForm(lambda v, w: w.u_x * v).assemble(basis, u_x=u_x)
-        assert same(space.summed(edges, space.end_loads(edges, speed)), theirs[nodes])
-        ours = assembled(edges, space.end_masses(edges, speed), space.count)
-        assert same(ours, through.assemble(basis, u_x=u_x)[nodes][:, nodes])
+    return flow.Flow(7e5, velocity, np.zeros(len(velocity)), correction, 0.0, 0.0, 1.0)
 
 
 @given(meshes(), st.integers(0, 1000))
@@ -347,7 +317,7 @@ def test_linear_advection_by_the_divergence_free_velocity(grid, seed):
     inlet = on_end(of, 1, grid.ends[0])
     u_x, u_y = (of.field(velocity[:, i], nodes) for i in (0, 1))
     w = [np.asarray(basis.interpolate(u)) - correction[:, i][:, None] for i, u in enumerate((u_x, u_y))]
-    lumped = LinearForm(lambda v, w: w.u_x * v).assemble(inlet, u_x=inlet.interpolate(u_x))
+    lumped = entering.assemble(inlet, u_x=inlet.interpolate(u_x))
     theirs = carried.assemble(basis, u_x=w[0], u_y=w[1]) + sp.diags_array(lumped)
     ours = assembled(space.cells, transport.advection(space, given, velocity[:, 0]), space.count)
     assert same(ours, theirs[nodes][:, nodes])
@@ -422,26 +392,29 @@ def check_tangent(of, space, ours, basis, fields, duration, nodes):
 
 @orders
 @shapes
-def test_the_operator_of_both_substrates(counterparts, shape, order):
-    """Diffusion, slower in the aggregate, and what the flow carries, with its supply."""
+@pytest.mark.parametrize("inlet", ["local", "mean"])
+def test_the_operator_of_both_substrates(counterparts, shape, order, inlet):
+    """Diffusion, slower in the aggregate, and what any velocity carries in the form that conserves, with the supply and
+    what flows in and out, with either speed at the inlet (11)."""
     of = counterparts[shape]
     space, random = Space(of.ours, order), np.random.default_rng(order)
-    velocity = random.standard_normal((space.count, 2))
-    correction = np.zeros((len(of.ours.cells), 2)) if order == 1 and shape == "straight" else None
-    given = carrying(velocity, correction)
-    problem = transport.problem(space, given, SCENE.substrates, SCENE.kinetics)
-    nodes, n = of.nodes(space), space.count
-    basis = of.basis(order, max(2, space.gradient_degree))
-    advection = assembled(space.cells, transport.advection(space, given, velocity[:, 0]), n)
+    nodes, n, given = of.nodes(space), space.count, carrying(1e6 * random.standard_normal((space.count, 2)))
+    problem = transport.problem(space, given, SCENE.substrates, SCENE.kinetics, inlet)
+    u_x, u_y = (of.field(part, nodes) for part in given.velocity.T)
+    first, last = (on_end(of, order, x) for x in of.ours.ends)
+    inflow, outflow = (end.interpolate(u_x) for end in (first, last))
+    speed = inflow if inlet == "local" else 0 * inflow + given.mean_velocity
+    basis, coarser = of.basis(order, degree_of(space)), of.basis(order, max(2, space.gradient_degree))
+    inside = conserving.assemble(basis, u_x=basis.interpolate(u_x), u_y=basis.interpolate(u_y))
+    carried = inside + through.assemble(last, u_x=outflow) + through.assemble(first, u_x=speed - inflow)
+    assert same(problem.inflow, entering.assemble(first, u_x=inflow)[nodes])
+    assert same(problem.outflow, entering.assemble(last, u_x=outflow)[nodes])
     for k, kind in enumerate((SCENE.substrates.acceptor, SCENE.substrates.donor)):
         D = np.where(of.ours.biomass, kind.diffusivity_in_aggregate, kind.diffusivity)
-        spread = BilinearForm(lambda u, v, w: w.D * dot(grad(u), grad(v))).assemble(basis, D=constant(basis, D))
+        spread = BilinearForm(lambda u, v, w: w.D * dot(grad(u), grad(v))).assemble(coarser, D=constant(coarser, D))
         part = slice(k * n, k * n + n)
-        assert same(problem.operator[part, part], spread[nodes][:, nodes] + advection)
-        inlet = on_end(of, order, of.ours.ends[0])
-        u_x = inlet.interpolate(of.field(velocity[:, 0], nodes))
-        supply = LinearForm(lambda v, w, C=kind.supply: C * w.u_x * v).assemble(inlet, u_x=u_x)
-        assert same(problem.source[part], supply[nodes])
+        assert same(problem.operator[part, part], (spread + carried)[nodes][:, nodes])
+        assert same(problem.source[part], kind.supply * entering.assemble(first, u_x=speed)[nodes])
     assert problem.operator[:n, n:].nnz == 0 and problem.operator[n:, :n].nnz == 0
 
 
