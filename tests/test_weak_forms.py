@@ -110,6 +110,18 @@ def counterparts():
             "curved": Counterpart(bent_inside(curved))}
 
 
+@pytest.fixture
+def of(counterparts, shape):
+    """That of a shape."""
+    return counterparts[shape]
+
+
+@pytest.fixture
+def space(of, order):
+    """Our functions of an order on it."""
+    return Space(of.ours, order)
+
+
 def assembled(unknowns, matrices, count):
     """(count, count) sum of element matrices, as every system of `repro` sums them."""
     return ElementSystem(unknowns, np.arange(count), np.zeros(count, bool)).matrix(matrices)
@@ -138,10 +150,8 @@ def weighted_load(v, w):
 
 @orders
 @shapes
-def test_mass_stiffness_and_load(counterparts, shape, order):
+def test_mass_stiffness_and_load(of, space, order):
     """With a coefficient that varies."""
-    of = counterparts[shape]
-    space = Space(of.ours, order)
     nodes, degree = of.nodes(space), degree_of(space)
     basis = of.basis(order, degree)
     x, _ = places(space, space.table)
@@ -220,11 +230,9 @@ def our_stokes(space, interface, mobility):
 @orders
 @shapes
 @interfaces
-def test_stokes(counterparts, shape, order, interface):
+def test_stokes(of, space, order, interface):
     """Velocity and pressure of the order less one (linear both, not stabilised, for order 1): all of the matrix, and
     what is left of it in elimination order where the boundary's velocities are prescribed."""
-    of = counterparts[shape]
-    space = Space(of.ours, order)
     theirs = stokes(of, space, interface)
     blocks, ours = our_stokes(space, interface, None)
     assert same(ours, theirs)
@@ -257,11 +265,10 @@ def test_stabilised_stokes(counterparts, interface):
     ("straight", 1, None), *((shape, order, k) for shape in ("straight", "curved") for order in (2, 3)
                              for k in (None, 3.0))])
 @interfaces
-def test_the_flow_solves_scikit_fems_system(counterparts, shape, order, permeability, interface):
+def test_the_flow_solves_scikit_fems_system(of, space, order, permeability, interface):
     """What `unit_flow` finds, put into it, with a permeable body too; the stabilisation of linear functions is of
     straight triangles."""
-    of = counterparts[shape]
-    space, viscosity = Space(of.ours, order), np.where(of.ours.biomass, RATIO, 1.0)
+    viscosity = np.where(of.ours.biomass, RATIO, 1.0)
     found = flow.unit_flow(space, RATIO, interface=interface, permeability=permeability)
     tau = of.diameters**2 / (100.0 * viscosity) if order == 1 else None
     theirs = stokes(of, space, interface, tau, permeability or np.inf)
@@ -354,11 +361,10 @@ def reaction_basis(of, order, degree):
 @orders
 @shapes
 @pytest.mark.parametrize("duration", [0.0, 0.3])
-def test_uptake_and_its_derivative(counterparts, shape, order, duration):
+def test_uptake_and_its_derivative(of, space, order, duration):
     """(q(C) X_A, v) of the biomass as it is, and of its mean over a time in which it grows; linear functions lumped at
     the nodes. The law is the paper's, its derivative that of complex numbers."""
-    of = counterparts[shape]
-    space, random = Space(of.ours, order), np.random.default_rng(order)
+    random = np.random.default_rng(order)
     both, nodes = random.uniform(4.0, 7.0, (2, space.count)), of.nodes(space)
     pieces = space.reaction
     active = density(*aggregates.places(space)) * pieces.dx
@@ -393,11 +399,10 @@ def check_tangent(of, space, ours, basis, fields, duration, nodes):
 @orders
 @shapes
 @pytest.mark.parametrize("inlet", ["local", "mean"])
-def test_the_operator_of_both_substrates(counterparts, shape, order, inlet):
+def test_the_operator_of_both_substrates(of, space, order, inlet):
     """Diffusion, slower in the aggregate, and what any velocity carries in the form that conserves, with the supply and
     what flows in and out, with either speed at the inlet (11)."""
-    of = counterparts[shape]
-    space, random = Space(of.ours, order), np.random.default_rng(order)
+    random = np.random.default_rng(order)
     nodes, n, given = of.nodes(space), space.count, carrying(1e6 * random.standard_normal((space.count, 2)))
     problem = transport.problem(space, given, SCENE.substrates, SCENE.kinetics, inlet)
     u_x, u_y = (of.field(part, nodes) for part in given.velocity.T)
