@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
@@ -97,12 +98,9 @@ def test_at_least_six_elements_lie_across_the_film(film):
 
 def chords(grid, x):
     """Lengths of the pieces that the triangles of the fluid hold of the vertical line at x."""
-    corner = grid.points[grid.triangles[~grid.biomass]]
-    after = np.roll(corner, -1, axis=1)
-    crosses = (corner[..., 0] - x) * (after[..., 0] - x) < 0
-    share = (x - corner[..., 0]) / np.where(crosses, after[..., 0] - corner[..., 0], 1.0)
-    y = np.where(crosses, corner[..., 1] + share * (after[..., 1] - corner[..., 1]), np.nan)[crosses.any(axis=1)]
-    return np.nanmax(y, axis=1) - np.nanmin(y, axis=1)
+    fluid = shapely.polygons(grid.points[grid.triangles[~grid.biomass]])
+    pieces = shapely.length(shapely.intersection(fluid, shapely.LineString([(x, 0.0), (x, grid.width)])))
+    return pieces[pieces > 0]
 
 
 @both

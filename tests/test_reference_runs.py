@@ -6,7 +6,7 @@ Their flow and transport are judged by the cases that compare them with ours, to
 import numpy as np
 import pytest
 
-from reference import averaged_pore, whole_run
+from reference import whole_run
 from reference.averaged_pore import Averaged, Pore, half_ellipse
 from reference.whole_run import Run
 
@@ -35,12 +35,6 @@ def test_where_nothing_is_scarce_growth_is_the_closed_form(keeps_shape):
         assert moment.area == pytest.approx(np.pi / 2 * 100 * grown(moment.time), rel=1e-5)
         assert moment.ends == pytest.approx((-right, right), rel=1e-5)
     assert [moment.time for moment in found] == [1.0, 3.0]
-
-
-def test_an_iteration_that_does_not_rest_is_an_error(monkeypatch):
-    monkeypatch.setattr(averaged_pore, "MOST", 1)
-    with pytest.raises(RuntimeError, match="do not come to rest"):
-        Averaged(pore(), *half_ellipse(20.0, 20.0, 20), 40, keeps_shape=True).seed()
 
 
 def test_the_defaults_are_table_1():

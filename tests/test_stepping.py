@@ -33,10 +33,10 @@ def run(made):
     return list(simulation.simulate(made))
 
 
-def near_contact(order=2):
-    """An aggregate 0.1 um short of the film that closes."""
+def narrow(order, radius, end, **supplies):
+    """An aggregate in a pore of 20 um: with a radius of 17.9 um it is 0.1 um short of the film that closes."""
     numerics = {"preset": "fast", "elements": ORDERS[order], "refinement": 0.6 if order == 1 else 0.2}
-    return scene("17.9 um", "20 um", velocity="2.9 m/day", growth={"end": "0.6 h"}, numerics=numerics)
+    return scene(radius, "20 um", velocity="2.9 m/day", growth={"end": end}, numerics=numerics, **supplies)
 
 
 def sets(order):
@@ -154,7 +154,7 @@ def numbers(now, solved):
 def test_a_step_ends_when_the_film_is_first_too_thin(attempts, order):
     """The film is within 2 % of what it may be, and no thicker, when contact is first made; a longer step was tried
     and not taken."""
-    made = near_contact(order)
+    made = narrow(order, "17.9 um", "0.6 h")
     found = run(made)
     first = next(instant for instant in found if instant.pore.contact)
     (gaps,) = [a.gaps for _, a in attempts if a.gaps and a.step and a.step.pore.mesh is first.pore.mesh]
@@ -254,8 +254,5 @@ def test_the_part_of_a_step_to_contact_is_bounded(before, after):
 @EVERY_ORDER
 def test_a_film_too_thin_from_the_start_closes(order):
     """Though nothing grows: without a supply the aggregate neither grows nor decays."""
-    numerics = {"preset": "fast", "elements": ORDERS[order], "refinement": 0.6 if order == 1 else 0.2}
-    made = scene("18.5 um", "20 um", acceptor="0 mg/L", donor="0 mg/L", velocity="2.9 m/day", growth={"end": "0.1 h"},
-                 numerics=numerics)
-    found = run(made)
+    found = run(narrow(order, "18.5 um", "0.1 h", acceptor="0 mg/L", donor="0 mg/L"))
     assert found[-1].pore.contact and found[-1].pore.mass == pytest.approx(found[0].pore.mass, rel=1e-9)
