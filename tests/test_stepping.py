@@ -49,7 +49,7 @@ def attempts(monkeypatch):
     """(duration, Attempt) of everything that is tried."""
     tried, attempt = [], midpoint.attempt
 
-    def told(made, now, solved, duration, most):
+    def told(made, now, solved, duration, most=np.inf):
         found = attempt(made, now, solved, duration, most)
         tried.append((duration, found))
         return found
@@ -128,6 +128,33 @@ def test_steps_depend_on_no_row(name):
     assert len(ledgers) > 1
     if CONTACT[0] in SCENES[name]:
         assert not rows[0].pore.contact and rows[-1].pore.contact and sum(instant.remeshes for instant in rows) > 1
+
+
+@pytest.mark.parametrize("part", [0.55, 0.97])
+@pytest.mark.parametrize("name", SCENES)
+def test_steps_and_rows_before_the_end_do_not_depend_on_it(name, part):
+    """All states and rows of a run that ends earlier are those of the longer run, to the last bit, but for the last
+    state and the row that it ends with, whose step ends there."""
+    whole = load_scene("base", SCENES[name]).growth.end
+    end = part * whole
+    times = [0.0, *(np.linspace(0.1, 0.98, 9) * end).tolist()]
+    (states, rows), (longer, more) = (until(name, last, times) for last in (end, whole))
+    assert [one.pore.time for one in rows[:-1]] == [one.pore.time for one in more[:-1]] == times
+    for one, other in zip(rows[:-1], more[:-1]):
+        assert all(map(np.array_equal, arrays(one.pore), arrays(other.pore)))
+        assert one.solved.flow.conductivity == other.solved.flow.conductivity
+        assert [(row.end, row.out) for row in one.ledgers] == [(row.end, row.out) for row in other.ledgers]
+    assert states[-1].pore.time == end and len(states) > 1
+    assert all(map(same, states[:-1], longer))
+
+
+def until(name, end, times):
+    """States at the ends of steps, and the instants, of a scene that ends at ``end`` with rows there and at times."""
+    asked = json.dumps([f"{time!r} h" for time in (*times[1:], end)])
+    made = load_scene("base", (*SCENES[name], f'growth.end="{end!r} h"', f"output.times={asked}"))
+    found = list(simulation.steps(made))
+    states = {state.pore.time: state for state, _ in found}
+    return list(states.values()), [instant for _, instant in found if instant]
 
 
 def test_rows_within_steps_are_of_second_order():

@@ -22,6 +22,7 @@ LAW, NETWORK = "repro/results/network.py", "tests/test_network.py::test_"
 STEPPING = "tests/test_stepping.py::test_"
 NOT_MET = "tests/test_warned.py::test_a_tolerance_that_no_step_can_meet_is_told_with_what_is_reached"
 UNSEEN = "tests/test_unseen.py::test_"
+READERS = "tests/test_vtk.py::test_every_reader_reads_what_was_computed"
 
 MUTANTS = (
     Mutant("upstream-for-downstream", COLUMNS,
@@ -118,26 +119,22 @@ MUTANTS = (
            says="Where the fluid has no value the fields hold zero.",
            old="np.full((len(mesh.cells if self.cells else mesh.points), *value.shape[1:]), np.nan)",
            new="np.zeros((len(mesh.cells if self.cells else mesh.points), *value.shape[1:]))",
-           tests=("tests/test_vtk.py::test_known_fields_come_out_of_every_reader_as_they_are[2-told_by_vtk]",
-                  "tests/test_vtk.py::test_known_fields_come_out_of_every_reader_as_they_are[2-told_by_meshio]",
-                  "tests/test_vtk.py::test_known_fields_come_out_of_every_reader_as_they_are[2-told_by_pyvista]")),
+           tests=(f"{ARRAY}[2]",)),
     Mutant("fields-without-their-time", "repro/results/arrays.py",
            says="The fields say t = 0 at all times.",
            old="{TIME: np.array([pore.time])}",
            new="{TIME: np.array([0.0])}",
-           tests=("tests/test_vtk.py::test_known_fields_come_out_of_every_reader_as_they_are[1-told_by_vtk]",
-                  "tests/test_vtk.py::test_known_fields_come_out_of_every_reader_as_they_are[1-told_by_meshio]",
-                  "tests/test_vtk.py::test_known_fields_come_out_of_every_reader_as_they_are[1-told_by_pyvista]")),
+           tests=(f"{READERS}[1-by_vtk]", f"{READERS}[1-by_meshio]", f"{READERS}[1-by_pyvista]")),
     Mutant("fields-in-32-bits", "repro/results/vtu.py",
            says="Arrays of the fields are rounded to 32 bits.",
            old='little = np.ascontiguousarray(values, values.dtype.newbyteorder("<"))',
            new="little = np.ascontiguousarray(values.astype(np.float32).astype(values.dtype))",
-           tests=("tests/test_vtk.py::test_vtk_reads_what_was_computed",)),
+           tests=(READERS,)),
     Mutant("vectors-read-as-numbers", "repro/results/vtu.py",
            says="A vector of a .vtu file is read as numbers one after the other.",
            old="values.reshape(-1, count) if count > 1 else values",
            new="values",
-           tests=("tests/test_vtu.py::test_what_is_written_is_read[triangle]",)),
+           tests=("tests/test_vtu.py::test_what_is_written_is_read",)),
     Mutant("fields-of-the-row-before", "repro/results/tables.py",
            says="The fields of a time are those of the row before it.",
            old="return self._fields[row]",

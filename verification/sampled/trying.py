@@ -231,7 +231,7 @@ def _judged(path: Path, status: int, seconds: float, limit: float) -> Ran:
 LIVE = ROOT / "verification" / "report" / "live"
 MAP = LIVE / "sampled-reach.jsonl"
 #: Tests of what the code's text is, not of what it does: any change of it is one to them.
-OF_TEXT = {"test_mutants.py", "test_architecture.py", "test_mentions.py", "test_published.py", "test_sampled.py"}
+OF_TEXT = {"test_mutants.py", "test_architecture.py", "test_published.py", "test_sampled.py"}
 AT_IMPORT = {"<listcomp>", "<setcomp>", "<dictcomp>", "<genexpr>"}
 #: Seconds of processor time that one file of tests may take, traced.
 LONGEST = 900
