@@ -21,7 +21,7 @@ from repro.scene import load_scene
 from tests import oracles, pages, shell
 from tests.strategies import ORDERS, between, scene, scenes, share
 from tests.test_derived import over_end, taken_up
-from verification.hard.runs import scaled
+from verification.problems.runs import scaled
 
 ANY_ORDER = tuple(ORDERS.values())
 EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)

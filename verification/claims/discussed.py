@@ -24,10 +24,21 @@ from reference import channel_bvp, layered_channel
 from repro.march import simulation
 from repro.results.network import added_resistance, known
 from repro.scene import Scene
-from verification.claims import FEW, FEW_WORDS, Finding, at_least, at_most, between, claim
+from verification.claims import FEW, FEW_WORDS, LATER, Finding, at_least, at_most, between, claim
 from verification.claims.levels import ABOUT_WIDE
 from verification.claims.permeability import clean
-from verification.claims.runs import BASE, WIDE, Body, bodies, interface_length, scene, series
+from verification.claims.runs import (
+    BASE,
+    PLOTTED,
+    SUBSTRATES,
+    WIDE,
+    Body,
+    bodies,
+    interface_length,
+    scene,
+    series,
+    until,
+)
 from verification.problems.channels import pair, rates
 
 #: Conductivities over the clean channel's at which the biomass is compared.
@@ -36,11 +47,10 @@ REDUCED = (0.5, 0.1, 0.01)
 SAME = 0.1
 #: Thicknesses of a layer over the width that is left to it.
 LAYERS = np.linspace(1e-4, 1.0, 4001)
-NEW = "2026-11-22"
 
 
 @claim("C38", "1", "it takes less biomass to plug a pore if it forms aggregates than if it forms a continuous biofilm",
-       **ABOUT_WIDE)
+       date=LATER, **ABOUT_WIDE)
 def less_biomass() -> Finding:
     """Biomass of a uniform layer on the lower wall, and of two layers on both, over that of the growing aggregate of
     wide, at equal conductivity of the 600 um pore: parallel flow in closed form."""
@@ -50,15 +60,14 @@ def less_biomass() -> Finding:
         ours = filled_at(reduced)
         layers = [filled(said.flow.viscosity_ratio, reduced, walls) for walls in (1, 2)]
         checks += [at_least(f"K / K_clean = {reduced:g}: biomass of layers on {walls} wall{'s' * (walls - 1)} over the "
-                            "aggregate's", "less", layer / ours, 1.0, "the words", date=NEW)
+                            "aggregate's", "less", layer / ours, 1.0, "the words")
                    for walls, layer in zip((1, 2), layers)]
         told.append(f"{reduced:g}: {100 * ours:.1f} % against {100 * layers[0]:.0f} and {100 * layers[1]:.0f} %")
     same = filled_at(SAME)
     checks += [at_least(f"the part filled with which the aggregate has K / K_clean = {SAME:g}: that of layers on "
-                        f"{walls} "
-                        f"wall{'s' * (walls - 1)} over it", "crucial to model permeability reduction",
+                        f"{walls} wall{'s' * (walls - 1)} over it", "crucial to model permeability reduction",
                         layered_share(said.flow.viscosity_ratio, same, walls) / SAME, 1 + FEW,
-                        f"porosity does not determine it: more than {FEW_WORDS}", date=NEW) for walls in (1, 2)]
+                        f"porosity does not determine it: more than {FEW_WORDS}") for walls in (1, 2)]
     return Finding(tuple(checks), reason="a layer plugs with less, or porosity determines the permeability",
                    note=f"Share of the pore that is filled, aggregate against layers on one and on both walls, at "
                    f"K / K_clean = {'; '.join(told)}.")
@@ -87,40 +96,40 @@ def layered_share(ratio: float, part: float, walls: int) -> float:
     return open_**3 + (1.0 - open_**3) / ratio
 
 
-@claim("C39", "5", "a mass transfer coefficient cannot be set a priori: it depends on the sink in the solid")
+@claim("C39", "5", "a mass transfer coefficient cannot be set a priori: it depends on the sink in the solid",
+       date=LATER)
 def mass_transfer() -> Finding:
     """Sherwood numbers of base from t = 0 to 19.2 h: uptake over interface and drop of the concentration from the
     supply to the interface's mean, times thickness over diffusivity in water. Beside them a textbook's, that of a flat
     patch as long as the aggregate; and those of one shape in one flow with little and with much supply, whose sinks are
     nearly of first and of zero order."""
-    early = [found for found in bodies(BASE) if found.pore.time <= 19.2 + 1e-6]
-    numbers = np.array([sherwood(found) for found in early])
-    names, textbook = ("acceptor", "donor"), textbooks(early[-1])
-    checks = [at_least(f"{name}: largest over smallest Sherwood number, less one (%)", "cannot be set",
-                       100 * change, 100 * FEW, FEW_WORDS, date=NEW)
-              for name, change in zip(names, numbers.max(axis=0) / numbers.min(axis=0) - 1)]
-    checks += [at_least(f"{name}, 19.2 h: Leveque's number over ours, less one, either way (%)", "cannot be set",
-                        100 * abs(given / ours - 1), 100 * FEW, FEW_WORDS, date=NEW)
-               for name, given, ours in zip(names, textbook, numbers[-1])]
+    early = [found for found in bodies(BASE) if found.pore.time <= PLOTTED + 1e-6]
+    numbers, textbook = np.array([sherwood(found) for found in early]), textbooks(early[-1])
     sinks = np.array([sherwood(in_one_shape(supply=supply, faster=faster)) for supply, faster in SINKS])
-    checks += [at_least(f"{name}, one shape and flow: Sherwood numbers of three sinks, largest over smallest less one "
-                        "(%)", "depends on the sink in the solid", 100 * change, 100 * FEW, FEW_WORDS, date=NEW)
-               for name, change in zip(names, sinks.max(axis=0) / sinks.min(axis=0) - 1)]
+    by_sink = differing(sinks)
+    rows = {"{}: largest over smallest Sherwood number, less one (%)": ("cannot be set", differing(numbers)),
+            "{}, 19.2 h: Leveque's number over ours, less one, either way (%)":
+                ("cannot be set", 100 * np.abs(textbook / numbers[-1] - 1)),
+            "{}, one shape and flow: Sherwood numbers of three sinks, largest over smallest less one (%)":
+                ("depends on the sink in the solid", by_sink)}
+    checks = tuple(at_least(quantity.format(name), said, value, 100 * FEW, FEW_WORDS)
+                   for quantity, (said, values) in rows.items() for name, value in zip(SUBSTRATES, values))
     told = ", ".join(f"{a:.3g} and {d:.3g} at {found.pore.time:g} h"
-                     for found, (a, d) in list(zip(early, numbers))[::6] + [(early[-1], numbers[-1])])
+                     for found, (a, d) in [*list(zip(early, numbers))[::6], (early[-1], numbers[-1])])
     shapes = "; ".join(f"{a:.3g} and {d:.3g} with supplies of {supply:g} K_s and {faster:g} k"
                        for (supply, faster), (a, d) in zip(SINKS, sinks))
     reason = ("it cannot be set a priori, since it follows shape and flow; but from a sink of first order to one at "
-              "the "
-              f"surface alone it moves by {100 * (sinks[:, 0].max() / sinks[:, 0].min() - 1):.1f} and "
-              f"{100 * (sinks[:, 1].max() / sinks[:, 1].min() - 1):.1f} % only, acceptor and donor: most of the drop "
-              "is "
-              "in the water upstream, which does not see how the biomass takes up what arrives")
-    return Finding(tuple(checks), reason=reason, note=f"Sherwood numbers of acceptor and donor: {told}; Leveque's at "
-                                                      "19.2 h "
-                   f"{textbook[0]:.3g} and {textbook[1]:.3g}. A half-disc of {RADIUS:g} um in the flow of 1e-3 cm: "
-                   f"{shapes}. While it is penetrated, the sink is as even of first order as of zero order, and the "
-                   "number that of shape and flow.")
+              f"the surface alone it moves by {by_sink[0]:.1f} and {by_sink[1]:.1f} % only, acceptor and donor: most "
+              "of the drop is in the water upstream, which does not see how the biomass takes up what arrives")
+    note = (f"Sherwood numbers of acceptor and donor: {told}; Leveque's at 19.2 h {textbook[0]:.3g} and "
+            f"{textbook[1]:.3g}. A half-disc of {RADIUS:g} um in the flow of 1e-3 cm: {shapes}. While it is "
+            "penetrated, the sink is as even of first order as of zero order, and the number that of shape and flow.")
+    return Finding(checks, reason=reason, note=note)
+
+
+def differing(numbers: np.ndarray) -> np.ndarray:
+    """(2,) largest over smallest of the numbers (n, 2) of both substrates, less one, in percent."""
+    return 100 * (numbers.max(axis=0) / numbers.min(axis=0) - 1)
 
 
 #: Supplies of both (K_s) and rates over that of Table 1 of three sinks: nearly of first order, of zero order, and at
@@ -131,7 +140,7 @@ SINKS, RADIUS = ((1.0, 1.0), (100.0, 1.0), (1.0, 100.0)), 25.0
 def in_one_shape(radius: float = RADIUS, supply: float = 10.0, head: float = 1e-3, faster: float = 1.0) -> Body:
     """A half-disc of a radius (um) in the pore of base at rest, under a head (cm), with both supplies (mg/L) and a
     maximum rate over that of Table 1."""
-    supplies = (f'substrates.{name}.supply="{supply!r} mg/L"' for name in ("acceptor", "donor"))
+    supplies = (f'substrates.{name}.supply="{supply!r} mg/L"' for name in SUBSTRATES)
     return bodies(("base", 'growth.end="0 h"', f'aggregate.radius="{radius!r} um"', f'flow.head="{head!r} cm"',
                    f'kinetics.maximum_utilization_rate="{9.3 * faster!r} 1/day"', *supplies))[0]
 
@@ -140,18 +149,18 @@ def sherwood(found: Body) -> tuple[float, float]:
     """Of both substrates."""
     length, values = interface_length(found), []
     nodes = found.grid.loop[found.outline.interface_edges()]
-    for name, flux, substrate in zip(("acceptor", "donor"), found.solved.fluxes, found.solved.problem.both):
+    for name, flux, substrate in zip(SUBSTRATES, found.solved.fluxes, found.solved.problem.both):
         drop = substrate.supply - float(found.node(f"{name}_mg_per_L")[nodes].mean())
         values.append(flux.consumed / (length * drop) * found.outline.thickness / substrate.diffusivity)
     return tuple(values)
 
 
-def textbooks(found: Body) -> tuple[float, float]:
+def textbooks(found: Body) -> np.ndarray:
     """The same of a flat patch on the wall, as long as the aggregate (Leveque), with the aggregate's thickness."""
     outline, shear = found.outline, 6 * found.solved.flow.mean_velocity / found.grid.width
     patch = outline.downstream - outline.upstream
-    return tuple(leveque(shear, patch, each.diffusivity) * outline.thickness / patch
-                 for each in found.solved.problem.both)
+    numbers = [leveque(shear, patch, each.diffusivity) for each in found.solved.problem.both]
+    return np.array(numbers) * outline.thickness / patch
 
 
 def leveque(shear: float, length: float, diffusivity: float) -> float:
@@ -167,7 +176,7 @@ MARGIN = 2.0
 
 
 @claim("C45", "1", "continuous or patchy, the distinction is not crucial in modelling the consumption of substrates",
-       **ABOUT_WIDE)
+       date=LATER, **ABOUT_WIDE)
 def not_crucial() -> Finding:
     """Acceptor taken up by the aggregate of wide over that of layers with its biomass, at the same mean velocity and
     supply, when it has reduced the conductivity to given parts; and of one layer in the model over the reference."""
@@ -177,11 +186,11 @@ def not_crucial() -> Finding:
         part = filled_at(reduced)
         ours, other = aggregates_share(part), layers_share(said, part)
         checks.append(between(f"K / K_clean = {reduced:g}: acceptor taken up over that of layers", "not crucial",
-                              ours / other, 1 - NOT_CRUCIAL, 1 + NOT_CRUCIAL, "not crucial: within a tenth", date=NEW))
+                              ours / other, 1 - NOT_CRUCIAL, 1 + NOT_CRUCIAL, "not crucial: within a tenth"))
         told.append(f"{100 * ours:.0f} % against {100 * other:.0f} % of the supply with {100 * part:.1f} % filled")
     part = filled_at(REDUCED[0])
     checks.append(between("layer on one wall, acceptor taken up in the model over the reference", "the same",
-                          in_the_model(part) / layers_share(said, part), 1 - FEW, 1 + FEW, FEW_WORDS, date=NEW))
+                          in_the_model(part) / layers_share(said, part), 1 - FEW, 1 + FEW, FEW_WORDS))
     reason = "an aggregate lets more of the supply pass than layers of the same biomass do: " + "; ".join(told)
     return Finding(tuple(checks), reason=reason, note="Acceptor taken up, the aggregate against layers: "
                    f"{'; '.join(told)}. At the end of wide the aggregate takes up "
@@ -202,7 +211,7 @@ def aggregates_share(part: float) -> float:
 @cache
 def layers_share(said: Scene, part: float, velocity: float = 2.9e6 / 24) -> float:
     """Part of the acceptor supplied that layers take up which fill a part of the pore, at a mean velocity (um/h)."""
-    supply = tuple(each.supply for each in (said.substrates.acceptor, said.substrates.donor))
+    supply = pair("supply", said.substrates)
     water, inside = (np.array(pair(name, said.substrates)) for name in ("diffusivity", "diffusivity_in_aggregate"))
     mean = (1 - part) * water + part * inside
     found = channel_bvp.solution(velocity, supply, mean, mean, part * said.kinetics.maximum_density,
@@ -215,7 +224,7 @@ def in_the_model(part: float) -> float:
     said = scene(*WIDE)
     height, end = part * said.pore.width, 0.5 * said.pore.length - MARGIN
     corners = ((-end, 0.0), (-end + MARGIN, height), (end - MARGIN, height), (end, 0.0))
-    layer = simulation.shaped(scene(*WIDE, 'growth.end="0 h"', 'output.times=["0 h"]'), corners)
+    layer = simulation.shaped(scene(*WIDE, *until(0)), corners)
     found = next(simulation.simulate(layer))
     return 1 - found.solved.fluxes[0].effluent / said.substrates.acceptor.supply
 

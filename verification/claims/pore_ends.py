@@ -27,9 +27,8 @@ from repro.model.transport import Concentrations
 from repro.scene import Scene
 from verification.claims import FEW, FEW_WORDS, OF_SCHEME, TRANSPORT, TRANSPORT_WORDS, Finding, at_most, claim, near
 from verification.claims.levels import BESIDE, cached
-from verification.claims.runs import BASE, full_biomass, remeshed, scene, solution, solved_pore
+from verification.claims.runs import BASE, PLOTTED, SUBSTRATES, full_biomass, remeshed, scene, solution, solved_pore
 
-PLOTTED = 19.2
 PARTS = 64
 
 
@@ -55,7 +54,7 @@ def upstream_profile() -> Finding:
     said, now, solved = whole_pore()
     x = np.linspace(now.outline.upstream - said.pore.width, -said.pore.length / 2, 40)
     checks, parts = [], []
-    for name in ("acceptor", "donor"):
+    for name in SUBSTRATES:
         substrate, field = getattr(said.substrates, name), getattr(solved.concentrations, name)
         across = 100 * sections(now, field, x) / substrate.supply
         law = law_26(x, across[0].mean(), solved.flow.mean_velocity / substrate.diffusivity)
@@ -176,8 +175,8 @@ def _errors(said, radius: float) -> np.ndarray:
 
 def _numbers(said, grid: Mesh) -> list[float]:
     """Conductivity and both effluents."""
-    found = solution(said, grid, full_biomass(said, grid))
-    return [found.flow.conductivity, *(flux.effluent for flux in found.fluxes)]
+    flow, fluxes = solution(said, grid, full_biomass(said, grid))
+    return [flow.conductivity, *(flux.effluent for flux in fluxes)]
 
 
 def nested(said, radius: float, reaches: list[float]) -> list[Mesh]:

@@ -359,8 +359,8 @@ def packed(measured: dict[str, tuple[float, list[Call]]]) -> dict:
     """Tests as they are kept: functions once, and by their number."""
     every = sorted({call for _, calls in measured.values() for call in calls})
     numbers = {call: number for number, call in enumerate(every)}
-    return {"functions": every, "tests": {id: (seconds, [numbers[call] for call in calls])
-                                          for id, (seconds, calls) in measured.items()}}
+    tests = {id: (seconds, list(map(numbers.get, calls))) for id, (seconds, calls) in measured.items()}
+    return {"functions": every, "tests": tests}
 
 
 def _tests(rows: Iterable[dict]) -> Iterator[Measured]:
