@@ -15,7 +15,6 @@ from verification.hard.common import PRESETS, REFUSED, RIGHT, WRONG, HardCase
 from verification.kernel import case
 from verification.kernel.case import Check, Outcome, Result, at_least, at_most, between, outcome
 from verification.kernel.writing import plain
-from verification.problems import runs as problems
 
 GOOD, BAD = at_most("good", 0.5, 1.0, ""), at_most("bad", 2.0, 1.0, "")
 KNOWN = {case.number: case for case in hard_cases.CASES}
@@ -138,10 +137,3 @@ def test_a_wrong_run_is_seen():
 def test_a_cheap_cell_is_what_it_must_be(number, preset):
     cell = common.run_cell(KNOWN[number], preset)
     assert not cell.unaccepted, cell.message
-
-
-def test_units_scale():
-    made = load_scene("base", ("numerics.preset=fast",))
-    there = problems.scaled(problems.scaled(made, 2.0**10, 2.0**-3), 2.0**-10, 2.0**3)
-    assert there == made and problems.scaled(made, 2.0, 1.0).pore.width == 100.0
-    assert problems.scaled(made, 1.0, 2.0).kinetics.decay_coefficient == made.kinetics.decay_coefficient / 2
