@@ -57,12 +57,6 @@ def test_little_biomass_takes_up_as_much_as_the_supply_lets_it():
     assert discussed.layers_share(said, 0.2) > 0.9 > discussed.layers_share(said, 0.2, 10 * flow)
 
 
-def test_a_layer_in_the_model_takes_up_what_the_reference_says():
-    """To what the layer's own gradients leave out."""
-    part = 0.03
-    assert discussed.in_the_model(part) == pytest.approx(discussed.layers_share(scene("wide"), part), rel=0.03)
-
-
 def test_decay_over_synthesis_at_rest():
     """b / (k Y m_D), with m_D between those of the aggregate's extremes."""
     found = bodies(HOUR)[0]

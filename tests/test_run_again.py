@@ -85,11 +85,13 @@ def test_a_forced_run_is_refused_where_others_have_files_of_its_names(tmp_path, 
         tmp_path, capsys, "run", "base", *SETS, "--force", "--out", tmp_path)
 
 
-def test_a_scene_file_that_was_changed_is_told_on_resume(tmp_path, capsys):
-    """With what differs; the run goes on with its own."""
+def test_a_scene_file_that_was_changed_is_told_on_resume(tmp_path, capsys, monkeypatch):
+    """With what differs, from wherever that is asked for; the run goes on with its own."""
     scene = tmp_path / "mine.toml"
+    monkeypatch.chdir(tmp_path)
     scene.write_text('[pore]\nwidth = "50 um"\n[flow]\nhead = "1e-3 cm"\n')
-    out = pages.run(tmp_path, scene, "pore.length=500 um")
+    out = pages.run(tmp_path, "mine.toml", "pore.length=500 um")
+    monkeypatch.chdir(out)
     text = scene.read_text()
     differs = f"{scene}: it is not the scene of the run any more: pore.width (50.0 um there, now 60.0 um)"
     for content, said in ((text, ""), (text.replace("50 um", "60 um"), differs), ("not toml", ""), (None, "")):
