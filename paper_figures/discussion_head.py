@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from paper_figures import figure_6, runs, states, style
-from paper_figures.discussion_rheology import contact
+from paper_figures.states import contact
 from verification.claims.permeability import consumed, specific_growth
 
 TITLE = "Addition. Clogging under a constant head"
@@ -21,16 +21,15 @@ EVERY = 10.0
 
 
 @style.styled
-def draw(closing: Path | None = None, wide: Path | None = None) -> Figure:
+def draw(closing: Path, wide: Path) -> Figure:
     """Outlines, conductivities of both runs, and flow, uptake and growth of base over their largest."""
-    closing, wide = closing or runs.folders([runs.CLOSING])[0], wide or runs.wide_run()
     made = style.figure(5.0)
     panels = made.subplot_mosaic([["outlines", "outlines"], ["fall", "restricted"]], height_ratios=[1, 1.1])
     _outlines(panels["outlines"], closing)
     _fall(panels["fall"], closing, wide)
     _restricted(panels["restricted"], closing)
     for name in ("fall", "restricted"):
-        panels[name].grid(alpha=0.25, linewidth=0.4)
+        style.grid(panels[name])
         panels[name].legend(loc="upper right", bbox_to_anchor=(0.93, 1.0))
     style.number_panels(*panels.values())
     return made
@@ -64,9 +63,8 @@ def _restricted(axes: Axes, closing: Path) -> None:
     axes.set(title="Base, over the largest", xlabel="time (h)", yscale="log", xlim=(0, None))
 
 
-def caption(closing: Path | None = None, wide: Path | None = None) -> str:
+def caption(closing: Path, wide: Path) -> str:
     """What is seen, with the velocities and the time of contact."""
-    closing = closing or runs.folders([runs.CLOSING])[0]
     table, meets = states.series(closing), contact(closing)
     velocity = table["mean_velocity_m_per_d"]
     rate = specific_growth(table)
@@ -74,8 +72,6 @@ def caption(closing: Path | None = None, wide: Path | None = None) -> str:
                else "The opposite wall is not touched")
     return (f"Base carried on to {table['time_h'][-1]:g} h. {touched}, when the velocity has fallen from "
             f"{velocity[0]:.3g} to {velocity[-1]:.2g} m/d. (a) Outlines every {EVERY:g} h; (b) conductivity, beside "
-            "that "
-            "of Wide, whose velocity is kept up, with the times of contact dotted; (c) velocity, acceptor taken up, "
-            "and "
-            f"growth rate of the area, which falls from {rate[0]:.2g} to {rate[-1]:.2g} 1/h: the head drives ever less "
-            "water through, so that the aggregate starves before it plugs the pore.")
+            "that of Wide, whose velocity is kept up, with the times of contact dotted; (c) velocity, acceptor taken "
+            f"up, and growth rate of the area, which falls from {rate[0]:.2g} to {rate[-1]:.2g} 1/h: the head drives "
+            "ever less water through, so that the aggregate starves before it plugs the pore.")

@@ -45,7 +45,7 @@ def draw() -> Figure:
         _panel(panels["supply"], SUPPLIES, supplied, "supply (K$_s$)", True)
         _panel(panels["shape"], RADII, [in_one_shape(radius=float(each)) for each in RADII], "radius (µm)", False)
     for name, axes in panels.items():
-        axes.grid(alpha=0.25, linewidth=0.4)
+        style.grid(axes)
         if name in ("velocity", "supply", "shape"):
             axes.set(ylim=(0, None), title=f"half-disc at rest, by {name if name != 'shape' else 'radius'}")
     panels["velocity"].set_ylabel("Sherwood number")
@@ -97,14 +97,11 @@ def caption() -> str:
         given, hours = textbooks(early()[-1]), early()[-1].pore.time
         slow, fast = (sherwood(in_one_shape(head=float(head))) for head in (HEADS[0], HEADS[-1]))
         poor, rich = (sherwood(in_one_shape(supply=float(each))) for each in (SUPPLIES[0], SUPPLIES[-1]))
-    return (f"Sherwood numbers: uptake over interface and drop from the supply, times thickness over diffusivity "
-            "(full), "
-            f"and those of a flat patch as long as the aggregate in the same shear flow (dashed; Lévêque). (a) Base "
-            "from "
-            f"0 to {hours:g} h: acceptor {first[0]:.3g} to {last[0]:.3g}, donor {first[1]:.3g} to {last[1]:.3g}, where "
-            f"the textbook says {given[0]:.2g} and {given[1]:.2g}. (b) Concentrations upstream of the aggregate, where "
-            f"its uptake has steepened them. (c)-(e) A half-disc at rest, of {RADIUS:g} µm in (c) and (d): from "
-            f"{slow[0]:.2g} to {fast[0]:.2g} (acceptor) with velocity, but {poor[0]:.3g} to {rich[0]:.3g} from a "
-            "supply "
-            f"of {SUPPLIES[0]:.1g} to one of {SUPPLIES[-1]:.0f} K_s: the number follows shape and flow, and hardly the "
-            "sink, while the aggregate is penetrated.")
+    return ("Sherwood numbers: uptake over interface and drop from the supply, times thickness over diffusivity "
+            "(full), and those of a flat patch as long as the aggregate in the same shear flow (dashed; Lévêque). (a) "
+            f"Base from 0 to {hours:g} h: acceptor {first[0]:.3g} to {last[0]:.3g}, donor {first[1]:.3g} to "
+            f"{last[1]:.3g}, where the textbook says {given[0]:.2g} and {given[1]:.2g}. (b) Concentrations upstream of "
+            f"the aggregate, where its uptake has steepened them. (c)-(e) A half-disc at rest, of {RADIUS:g} µm in (c) "
+            f"and (d): from {slow[0]:.2g} to {fast[0]:.2g} (acceptor) with velocity, but {poor[0]:.3g} to "
+            f"{rich[0]:.3g} from a supply of {SUPPLIES[0]:.1g} to one of {SUPPLIES[-1]:.0f} K_s: the number follows "
+            "shape and flow, and hardly the sink, while the aggregate is penetrated.")

@@ -43,6 +43,10 @@ ROOT = HERE.parent
 NOTE, TEMPLATE = (HERE / name for name in ("replication.md", "replication_template.md"))
 REPORT = ROOT / "verification" / "report"
 FIELD = re.compile(r"\{\{(.+?)\}\}")
+#: What verdicts are called in the template; and what is told of a claim that has one.
+NAMES = dict(zip(VERDICTS, ("reproduced", "rounding", "changed", "contradicted", "undecided")))
+WHY = {WITHIN_ROUNDING: (("As printed", "reason"), ("Inputs", "rounding")), CHANGED: (("Changed", "change"),),
+       CONTRADICTED: (("Why not", "reason"),), UNDECIDED: (("Why", "reason"),)}
 WIDTH = 120
 
 
@@ -56,13 +60,8 @@ def fields(known: dict) -> dict[str, Callable[[], str]]:
     """What each name of the template without a claim stands for."""
     claims = known["claims"]
     return {**_about(), **_verdicts(claims), **_bench(), **_errata(),
-            "verify": _verified, "audit.defaults": _of_defaults,
-            "list.reproduced": lambda: "\n".join(map(_reproduced, _with(claims, REPRODUCED))),
-            "list.rounding": lambda: "\n".join(map(_within_rounding, _with(claims, WITHIN_ROUNDING))) or "None.",
-            "list.changed": lambda: "\n".join(map(_changed, _with(claims, CHANGED))) or "None.",
-            "list.contradicted": lambda: "\n".join(map(_contradicted, _with(claims, CONTRADICTED))) or "None.",
-            **_supplies(), "list.flips": lambda: _flips(claims), "after.contact": lambda: _after_contact(claims),
-            "list.undecided": lambda: "\n".join(map(_undecided, _with(claims, UNDECIDED))) or "None.",
+            "verify": _verified, "audit.defaults": _of_defaults, **_supplies(),
+            "list.flips": lambda: _flips(claims), "after.contact": lambda: _after_contact(claims),
             "inputs.share": lambda: f"{100 * sensitivity.record()['one_set']['share_of_the_rounding']:.0f}",
             "table.values": lambda: "\n".join(map(_value, _printed(claims))),
             "table.figures": lambda: "\n".join(map(_figure, FIGURES)),
@@ -122,10 +121,11 @@ def _with(claims: list[dict], verdict: str) -> list[dict]:
 
 def _verdicts(claims: list[dict]) -> dict[str, Callable[[], str]]:
     outcomes = [check["outcome"] for _, check in _predicted(claims)]
-    names = dict(zip(VERDICTS, ("reproduced", "rounding", "changed", "contradicted", "undecided")))
     counts = {f"claims.{name}": lambda verdict=verdict: str(len(_with(claims, verdict)))
-              for verdict, name in names.items()}
-    return {**counts, "claims.total": lambda: str(len(claims)), "paper.total": lambda: str(len(outcomes)),
+              for verdict, name in NAMES.items()}
+    lists = {f"list.{name}": lambda verdict=verdict: "\n".join(map(_entry, _with(claims, verdict))) or "None."
+             for verdict, name in NAMES.items()}
+    return {**counts, **lists, "claims.total": lambda: str(len(claims)), "paper.total": lambda: str(len(outcomes)),
             "paper.within": lambda: str(outcomes.count(HOLDS)), "paper.outside": lambda: str(outcomes.count(FAILS)),
             "paper.open": lambda: str(outcomes.count(REACHES_OVER))}
 
@@ -154,26 +154,12 @@ def _span(low: float | None, high: float | None) -> str:
     return "-" if low is None or high is None else f"{low:.4g} to {high:.4g}"
 
 
-def _within_rounding(claim: dict) -> str:
-    return (f"- **{claim['id']}** ({claim['where']}): {claim['claim']}. *As printed:* {claim['reason'].rstrip('.')}. "
-            f"*Inputs:* {claim['rounding'].rstrip('.')}.")
-
-
-def _undecided(claim: dict) -> str:
-    return f"- **{claim['id']}** ({claim['where']}): {claim['claim']}. *Why:* {claim['reason'].rstrip('.')}."
-
-
-def _reproduced(claim: dict) -> str:
+def _entry(claim: dict) -> str:
+    """A claim in the list of its verdict, with what is told of that."""
     check = claim["checks"][0]
-    return f"- **{claim['id']}** ({claim['where']}): {claim['claim']}. Here: {check['quantity']}, {check['value']:.4g}."
-
-
-def _changed(claim: dict) -> str:
-    return f"- **{claim['id']}** ({claim['where']}): {claim['claim']}. *Changed:* {claim['change'].rstrip('.')}."
-
-
-def _contradicted(claim: dict) -> str:
-    return f"- **{claim['id']}** ({claim['where']}): {claim['claim']}. *Why not:* {claim['reason'].rstrip('.')}."
+    words = ([f"Here: {check['quantity']}, {check['value']:.4g}"] if claim["verdict"] == REPRODUCED else
+             [f"*{word}:* {claim[key].rstrip('.')}" for word, key in WHY[claim["verdict"]]])
+    return ". ".join((f"- **{claim['id']}** ({claim['where']}): {claim['claim']}", *words)) + "."
 
 
 def _figure(name: str) -> str:

@@ -1,4 +1,5 @@
 """What the rounding of Table 1 allows: inputs are those of the scenes, differences right on power laws, runs kept."""
+import json
 from xml.etree import ElementTree
 
 import pytest
@@ -109,6 +110,18 @@ def test_a_run_is_computed_once_and_kept_at_once(tmp_path, monkeypatch):
     for said, number in ((plain, 1), (plain, 1), (other, 2), (other, 2)):
         assert Runs(tmp_path / "out" / "runs.json").numbers(said) == {"n": number}
     assert made == [plain, other]
+
+
+def test_a_run_of_another_source_is_computed_anew(tmp_path, monkeypatch):
+    """And forgotten; the rooms that tell of a run are not part of it."""
+    monkeypatch.setitem(OF, "base", lambda said: {"n": 1})
+    kept = tmp_path / "out" / "runs.json"
+    Runs(kept).numbers(scene("base", {}))
+    monkeypatch.setattr(rounding, "source", lambda: "another!")
+    assert Runs(kept).known == {}
+    Runs(kept).numbers(scene("base", {}))
+    assert [key[-8:] for key in json.loads(kept.read_text())] == ["another!"]
+    assert {"fem", "model", "march"} <= set(rounding.ROOMS) and "report" not in rounding.ROOMS
 
 
 def test_sobol_indices_of_a_linear_law():

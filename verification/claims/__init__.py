@@ -29,7 +29,18 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import inf, isnan
 
-from verification.claims.levels import BESIDE, CONVERGED, DEFAULT, FINE, SCHEME, SIZES, STEPS, Level
+from verification.claims.levels import (
+    BESIDE,
+    CONVERGED,
+    DEFAULT,
+    FINE,
+    SCHEME,
+    SIZES,
+    STEPS,
+    WIDE_FINE,
+    WIDE_PAIRED,
+    Level,
+)
 from verification.kernel.case import Check
 from verification.uncertainty import Bar
 
@@ -53,8 +64,9 @@ CLOSED = "closed forms"
 PREDICTED = "a solution"
 ARITHMETIC = "arithmetic of Table 1"
 CONSTRUCTION = "a rule of construction"
-#: When the ranges of the words were set, and when the printed digits became the ranges of the numbers.
-SET, PRINTED_SET = "2026-11-21", "2026-11-22"
+#: When the ranges of the words were set; and when those of later claims, and the printed digits became the ranges of
+#: the numbers.
+SET, LATER = "2026-11-21", "2026-11-22"
 #: A value that the paper prints: 2.9, or ~60.
 PRINTED = re.compile(r"(~?)(\d+)(?:\.(\d+))?")
 DIGITS = "half a unit of the last digit printed"
@@ -106,7 +118,8 @@ def verdict_of(outcomes: set[str], changed: bool, rounding: bool) -> str:
 class PaperCheck(Check):
     """A check of a number against the paper's, whatever its bar.
 
-    paper: what the paper prints, as text: "2.9"; date: when the accepted range was set; converges: has the number a
+    paper: what the paper prints, as text: "2.9"; date: when the accepted range was set, that of the claim where none is
+    given; converges: has the number a
     limit as mesh and step are refined? rests_on: what it takes to know it; input: its name in the record of the
     sensitivities; bar: where the number lies, None before it is known; held: for a number without a limit, whether it
     holds in the range of each level; scheme: least and largest value with the scheme of 2001, None where that is not
@@ -115,7 +128,7 @@ class PaperCheck(Check):
     """
 
     paper: str
-    date: str = SET
+    date: str = ""
     converges: bool = True
     rests_on: str = PREDICTED
     input: str = ""
@@ -185,7 +198,7 @@ class Claim:
     """A row of the table: the paper's section, what it says, how to compute it, and the function that does.
 
     about: MODEL, OF_SCHEME or CLOSED; fine: sizes of the converged solution; beside: those of the scheme whose range
-    stands beside it; sizes, steps: of the scheme; fixed: why one of them is not varied.
+    stands beside it; sizes, steps: of the scheme; fixed: why one of them is not varied; date: when its ranges were set.
     """
 
     id: str
@@ -198,6 +211,12 @@ class Claim:
     sizes: tuple[float, ...] = SIZES
     steps: tuple[float, ...] = STEPS
     fixed: str = ""
+    date: str = SET
+
+    @property
+    def of_wide(self) -> bool:
+        """Is it about wide? It is judged on the sizes for that then."""
+        return self.fine in (WIDE_FINE, WIDE_PAIRED)
 
     @property
     def command(self) -> str:
@@ -233,13 +252,12 @@ def claim(id: str, where: str, text: str, **fields):
     return register
 
 
-def printed(quantity: str, paper_text: str, ours: float, why: str = DIGITS, date: str = PRINTED_SET,
-            **more) -> PaperCheck:
+def printed(quantity: str, paper_text: str, ours: float, why: str = DIGITS, **more) -> PaperCheck:
     """A number that the paper prints: it must lie in the interval of its digits. Raises ValueError for words."""
     found = interval(paper_text)
     if found is None:
         raise ValueError(f"{quantity}: {paper_text!r} is no printed number")
-    return between(quantity, paper_text, ours, *found, why, date=date, **more)
+    return between(quantity, paper_text, ours, *found, why, date=LATER, **more)
 
 
 def near(quantity: str, paper_text: str, ours: float, target: float, *, relative: float | None = None,

@@ -20,8 +20,7 @@ from dataclasses import dataclass, replace
 from math import inf
 
 from verification import sensitivity
-from verification.claims import report
-from verification.claims.levels import OF_WIDE
+from verification.claims import CLAIMS, evaluate, report
 from verification.sensitivity import wide
 from verification.sensitivity.rounding import scene
 
@@ -55,8 +54,9 @@ class Known:
 
 def known(entries: list[dict]) -> list[Known]:
     """The numbers after contact of a record, the one with the widest bar first."""
+    evaluate.register_all()
     found = [Known(entry["id"], check["quantity"], percent(check), tuple(check.get("on_sizes", ())), check.get("order"))
-             for entry in entries if entry["id"] in OF_WIDE
+             for entry in entries if CLAIMS[entry["id"]].of_wide
              for check in entry["checks"] if not OTHER.search(check["quantity"])]
     return sorted(found, key=lambda each: -each.percent)
 

@@ -38,11 +38,9 @@ from verification.claims import (
     without_limit,
 )
 from verification.claims.levels import DEFAULT, Level
-from verification.claims.runs import BASE, at, grown, scene, series, solved_pore
+from verification.claims.runs import BASE, END, PLOTTED, SUBSTRATES, at, grown, scene, series, solved_pore, until
 
-PLOTTED, END = 19.2, 19.4
 SUPPLY = 10.0
-SUBSTRATES = ("acceptor", "donor")
 #: The paper's distances of the meshed inlet from the aggregate (um): its words; the least of 3.1; that of 210 um [E13].
 DISTANCES = (60.0, 65.0, 75.0)
 
@@ -149,8 +147,8 @@ def last_length() -> Finding:
 
 
 #: Base to 10 h in the preset "fast": the identity to show does not depend on mesh and step.
-SHORT = ("base", 'numerics.preset="fast"', "numerics.tolerance=0.0075", "numerics.refinement=0.2", 'growth.end="10 h"',
-         'output.times=["2 h", "4 h", "6 h", "8 h", "10 h"]')
+SHORT = ("base", 'numerics.preset="fast"', "numerics.tolerance=0.0075", "numerics.refinement=0.2",
+         *until(2, 4, 6, 8, 10))
 
 
 def scaled(acceptor: float, donor: float) -> tuple[str, ...]:
@@ -206,8 +204,7 @@ COD, HALF_DIGIT = 2.38, 0.005
 WEIGHT = {"C": 12.011, "H": 1.008, "O": 15.999, "N": 14.007}
 #: F from the entries of Table 1.
 F_COMPUTED = COD - 0.61 * 1.42
-F_OTHER = ("base", f"kinetics.acceptor_to_donor_ratio={F_COMPUTED!r}", f'growth.end="{PLOTTED} h"',
-           f'output.times=["{PLOTTED} h"]')
+F_OTHER = ("base", f"kinetics.acceptor_to_donor_ratio={F_COMPUTED!r}", *until(PLOTTED))
 
 
 @claim("C28", "Table 1", "F = COD - Y d_c; diffusivity in the aggregate 80 % of that in water", about=CLOSED)
@@ -264,7 +261,7 @@ ENDLESS = 1e12
 @claim("C09", "4", "doubling time about 3 h; decay half-time about 5.8 d")
 def doubling() -> Finding:
     """Doubling time of base's aggregate, mean over 19.2 h, and of a seed at the supply; ln 2 / b."""
-    said, row = scene(*BASE), at(BASE, 19.2)
+    said, row = scene(*BASE), at(BASE, PLOTTED)
     supply, half = said.substrates.acceptor.supply, log(2) / said.kinetics.decay_coefficient / 24
     mean = row["time_h"] * log(2) / log(row["aggregate_area_um2"] / at(BASE, 0.0)["aggregate_area_um2"])
     fastest, endless = (_doubling_time(said, value, value) for value in (supply, ENDLESS))
@@ -295,13 +292,12 @@ def time_scales() -> Finding:
                       rests_on=ARITHMETIC),
               between("advection, L / u_ave at t = 0 (s)", "a few", advection, 2, 10, "a few: two to ten"),
               *(between(f"diffusion of the {name}, L^2 / D (min)", "order of minutes", value, 1, 10, tenfold,
-                        rests_on=ARITHMETIC)
-                for name, value in zip(("acceptor", "donor"), diffusion)),
+                        rests_on=ARITHMETIC) for name, value in zip(SUBSTRATES, diffusion)),
               between("growth, doubling time at the supply (h)", "hours", growth, 1, 10, tenfold,
                       rests_on=ARITHMETIC),
               at_least("substrates over flow, growth over substrates (times)", "sequential", apart, 10,
                        "an order of magnitude, of both ratios", rests_on=ARITHMETIC))
-    slow = advection * at(BASE, 0.0)["mean_velocity_m_per_d"] / at(BASE, 19.2)["mean_velocity_m_per_d"]
+    slow = advection * at(BASE, 0.0)["mean_velocity_m_per_d"] / at(BASE, PLOTTED)["mean_velocity_m_per_d"]
     reason = (f"over 600 um at the paper's own 2.9 m/d it is {advection:.0f} s, {advection / 1.5:.0f} s on the axis of "
               f"the pore, and {slow:.0f} s at the velocity of 19.2 h; {advection / 6:.0f} s are what it takes over 100 "
               f"um. The order of the scales, which the sequential coupling needs, holds")
@@ -318,7 +314,7 @@ def _scales(said) -> tuple[float, float, tuple[float, float], float]:
             _doubling_time(said, *(s.supply for s in kinds)))
 
 
-TIMES = (0.0, 19.2, 19.4)
+TIMES = (0.0, PLOTTED, END)
 #: What is halved of base in the paper's scheme: its level, and by how many percent its velocity may then move.
 HALVED = {"time step": (Level(step=0.5), 0.5), "mesh size": (Level(size=0.5), 1.0)}
 LEVELS = (DEFAULT, *(level for level, _ in HALVED.values()))

@@ -29,9 +29,18 @@ from repro.scene import Scene
 from verification.claims import FEW, FEW_WORDS, OF_SCHEME, TRANSPORT, TRANSPORT_WORDS, Finding, at_most, claim, near
 from verification.claims.levels import ALONE, BESIDE, Level, at_level, cached
 from verification.claims.permeability import clean
-from verification.claims.runs import BASE, flow_in, full_biomass, remeshed, scene, solution, solved_pore
+from verification.claims.runs import (
+    BASE,
+    PLOTTED,
+    SUBSTRATES,
+    flow_in,
+    full_biomass,
+    remeshed,
+    scene,
+    solution,
+    solved_pore,
+)
 
-PLOTTED = 19.2
 PARTS = 64
 
 
@@ -57,7 +66,7 @@ def upstream_profile() -> Finding:
     said, now, solved = whole_pore()
     x = np.linspace(now.outline.upstream - said.pore.width, -said.pore.length / 2, 40)
     checks, parts = [], []
-    for name in ("acceptor", "donor"):
+    for name in SUBSTRATES:
         substrate, field = getattr(said.substrates, name), getattr(solved.concentrations, name)
         across = 100 * sections(now, field, x) / substrate.supply
         law = law_26(x, across[0].mean(), solved.flow.mean_velocity / substrate.diffusivity)
@@ -190,9 +199,9 @@ def _errors(said, radius: float) -> np.ndarray:
 def _numbers(said, grid: Mesh) -> list[float]:
     """Conductivity with an exact clean part, to which the aggregate adds what it adds to this mesh without biomass; and
     both effluents."""
-    found = solution(said, grid, full_biomass(said, grid))
-    added = 1 / found.flow.conductivity - 1 / flow_in(said, emptied(grid)).conductivity
-    return [1 / (added + 1 / clean(said)), *(flux.effluent for flux in found.fluxes)]
+    flow, fluxes = solution(said, grid, full_biomass(said, grid))
+    added = 1 / flow.conductivity - 1 / flow_in(said, emptied(grid)).conductivity
+    return [1 / (added + 1 / clean(said)), *(flux.effluent for flux in fluxes)]
 
 
 def reached(said, radius: float) -> list[float]:

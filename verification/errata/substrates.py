@@ -147,7 +147,7 @@ def inlet_condition() -> dict[str, str]:
 def meshed_inlet() -> dict[str, str]:
     """Both substrates at the distances in question."""
     now, solved = grown(BASE, PLOTTED)
-    rows = [[f"{d} um", *(f"{mean:.2f}" for mean in upstream_means(now, solved, float(d)))] for d in (60, 65, 75)]
+    rows = [[f"{d} um", *map("{:.2f}".format, upstream_means(now, solved, float(d)))] for d in (60, 65, 75)]
     distance = now.boundary.upstream - now.mesh.ends[0]
     return {"table": table(["distance", "acceptor", "donor"], rows), "distance": f"{distance:.0f}"}
 

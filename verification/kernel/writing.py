@@ -89,9 +89,13 @@ def plain(blocks: Iterable[Block]) -> str:
 def _plain(block: Block) -> list[str]:
     if block.kind != "table":
         return [block.text]
-    rows = [[cell.text if isinstance(cell, Link) else cell for cell in row] for row in block.rows]
+    rows = [[*map(_words, row)] for row in block.rows]
     widths = [max(map(len, column)) for column in zip(*rows)]
     return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
+
+
+def _words(cell: Cell) -> str:
+    return cell.text if isinstance(cell, Link) else cell
 
 
 def page(title: str, blocks: Iterable[Block]) -> str:
