@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 
 from paper_figures import figure_6, style
 from repro.errors import GrowthError
-from verification.claims.fluid_and_aggregate import pressed, tension
+from verification.claims.fluid_and_aggregate import peak, pressed, tension
 from verification.claims.levels import CONVERGED, PAIRED, Level, at_level, cached
 from verification.claims.runs import BASE, WIDE, Body, bodies, scene
 
@@ -95,16 +95,18 @@ def _rim(found: Body) -> np.ndarray:
 def caption() -> str:
     """What is seen: size and place at the end of both runs, and how far the fluid's forces go."""
     with at_level(LEVEL):
-        ends = [course(run, False)[-1] for run in COURSES]
+        ends = [(bodies(run)[-1].pore.time, peak(bodies(run)[-1])) for run in COURSES]
         forced = course(COURSES[1], True)
         without = course(COURSES[1], False)[len(forced) - 1]
         modulus, last = PASCAL * scene(*COURSES[0]).growth.shear_modulus, bodies(COURSES[1])[-1].pore.time
-    told = "; ".join(f"{name} {size:.3g} Pa at ({x:.0f}, {y:.0f}) µm and {hours:g} h"
-                     for name, (size, x, y, hours) in zip(NAMES, ends))
+    told = "; ".join(f"{name} {modulus * most.value:.3g} Pa at ({most.x:.0f}, {most.y:.0f}) µm and {hours:g} h"
+                     for name, (hours, most) in zip(NAMES, ends))
     size, x, y, hours = forced[-1]
     until = ("" if hours == last else " Later the head that drives the constant velocity through the plug bends it so "
                                       "far that shape and flow do not agree.")
-    return (f"(a) Largest principal stress in the aggregate, of a modulus of {modulus:g} Pa: {told}. (b) Where it is "
-            f"in Wide, between outlines every {EVERY:g} h: in the middle first, then near the lower wall. (c) The same "
-            f"aggregates at rest under the fluid's forces: {size:.3g} Pa instead of {without[0]:.3g} Pa at {hours:g} "
-            f"h, at ({x:.0f}, {y:.0f}) µm instead of ({without[1]:.0f}, {without[2]:.0f}) µm.{until}")
+    return (f"(a) Largest principal stress of a triangle of the aggregate, of a modulus of {modulus:g} Pa. In the mean "
+            f"over a tenth of the pore's width, on this mesh: {told}; C40 tells how far the place hangs on the mesh. "
+            f"(b) Where it is in Wide, between outlines every {EVERY:g} h: in the middle first, then near the lower "
+            f"wall. (c) The same aggregates at rest under the fluid's forces: {size:.3g} Pa instead of "
+            f"{without[0]:.3g} Pa at {hours:g} h, at ({x:.0f}, {y:.0f}) µm instead of ({without[1]:.0f}, "
+            f"{without[2]:.0f}) µm.{until}")

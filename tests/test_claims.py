@@ -3,6 +3,7 @@ and none is another on another machine."""
 import json
 import math
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -310,6 +311,20 @@ def test_the_recorded_verdicts_follow_from_the_recorded_numbers(kept):
         assert each["verdict"] == claims.verdict_of(outcomes, bool(each["change"]), bool(each["rounding"])), each["id"]
 
 
+def test_a_printed_number_holds_where_its_interval_has_the_bar(kept):
+    """What has another tolerance is no printed number, but words."""
+    for each in kept:
+        for check in each["checks"]:
+            if check["paper_low"] is not None:
+                within = check["paper_low"] <= check["low"] and check["high"] <= check["paper_high"]
+                assert (check["outcome"] == HOLDS) == within, (each["id"], check["quantity"])
+
+
+def test_no_recorded_words_tell_what_is_not_a_number(kept):
+    words = [each[key] for each in kept for key in ("change", "reason", "rounding", "note")]
+    assert [text for text in words if re.search(r"\bnan\b|\binf\b", text)] == []
+
+
 def test_no_recorded_verdict_flips_to_its_opposite(kept):
     """With a bound moved by the bar of its number a verdict comes to be open at most, or an open one decided; of the
     decided ones no more than a tenth comes to be open."""
@@ -455,6 +470,48 @@ def test_printed_digits_leave_the_papers_own_balance_open():
     assert scheme.share_within(ratio, 1.016, 1.0) == pytest.approx((np.abs(tried) <= 1).mean(), abs=0.05)
     assert (scheme.share_within(ratio, 1.016, -high - 1e-9), scheme.share_within(ratio, 1.016, -low)) == (0, 1)
     assert "4.19 and 6.13, lie on both sides of" in scheme.undecidable(ratio, (low, high))
+
+
+def test_what_does_not_move_with_the_velocity_is_arithmetic(monkeypatch):
+    """Of the times of section 1 a solution gives the velocity alone."""
+    def rests_at(velocity):
+        monkeypatch.setattr(base_run, "at", lambda *run: {"mean_velocity_m_per_d": velocity})
+        return {check.quantity: (check.value, check.rests_on) for check in base_run.time_scales().checks}
+    slow, fast = rests_at(2.8), rests_at(2.9)
+    for quantity, (value, rests_on) in slow.items():
+        assert rests_on == (claims.ARITHMETIC if value == fast[quantity][0] else claims.PREDICTED), quantity
+
+
+def test_a_length_that_is_not_the_papers_is_a_stated_change(monkeypatch):
+    """210 um is allowed around an aggregate of 61 um, ours is 201 um long."""
+    row = {"upstream_um": -30.4, "downstream_um": 30.4, "meshed_length_um": 201.3}
+    rows = {"meshed_length_um": np.array([110.0, 201.3, 201.3]), "time_h": np.array([0.0, 17.4, 19.4])}
+    monkeypatch.setattr(base_run, "at", lambda *run: row)
+    monkeypatch.setattr(base_run, "series", lambda *run: rows)
+    found = base_run.last_length()
+    assert all(check.holds and check.printed is None for check in found.checks)
+    assert "201 um long" in found.change and "17.4 h" in found.change
+
+
+def test_too_many_poor_triangles_are_not_acceptable(monkeypatch):
+    """Whatever the smallest quality is."""
+    for poor, holds in ((6, True), (7, False)):
+        monkeypatch.setattr(scheme, "quality", lambda run, poor=poor: scheme.Quality(0.5, poor, 0.02, 4, 21))
+        acceptable = [check for check in scheme.mesh_quality().checks if check.paper.startswith("acceptable")]
+        assert [check.holds for check in acceptable] == [holds]
+
+
+def test_what_elements_of_the_clean_part_add_is_no_truncation():
+    """On coarse meshes of the scheme the conductivity alone moves by more than 0.5 %, and the effluents under one head
+    by 0.04 %; what is cut off is under 0.01 %."""
+    with at_level(Level(SCHEME, 2.0)):
+        said = runs.scene(*runs.BASE)
+        short, _, whole = meshes = pore_ends.nested(said, 10.0, [50.0, 75.0])
+        plain = [runs.flow_in(said, grid).conductivity for grid in (short, whole)]
+        errors = pore_ends._errors(said, 10.0)[pore_ends.REACHES.index(1.0)]
+        assert 100 * abs(plain[0] / plain[1] - 1) > 0.5 and errors.max() < 0.01
+        bare = [pore_ends.emptied(grid) for grid in meshes]
+    assert not any(grid.biomass.any() for grid in bare) and all(a.points is b.points for a, b in zip(bare, meshes))
 
 
 # On other machines.

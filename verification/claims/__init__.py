@@ -15,6 +15,9 @@ says of **its scheme** with that. A verdict follows from the outcomes of the che
     some fail beyond their bars                                              contradicted; the finding says why
     no check fails, but a bar reaches over a bound                           undecided
 
+What the paper says may or could be holds if it is so in one of the scenes that are tried, the one where it is so most;
+what it says hangs on the conditions holds if besides it is not so in another one.
+
 A number is told apart by what it rests on (`rests_on`): a prediction of a solution, or an input, a rule of construction
 or the arithmetic of Table 1, which no solution is needed for and which is not counted as a number reproduced.
 """

@@ -144,18 +144,18 @@ def equivalent(run: tuple[str, ...]) -> float:
                    "conditions", fine=COMPARED, beside=(), date=LATER)
 def drag_or_viscosity() -> Finding:
     """Conductivity with Brinkman's drag of a permeability of 1e-15 m2 over that with lambda = 2000: base at 19.2 h, an
-    aggregate; wide just before contact, a film; and 5 h after it, a plug; and the times of contact."""
+    aggregate; wide just before contact, a film; and 5 h after it, a plug; and the times of contact. It may lead to
+    differences if it does in one of these, and hangs on the conditions if in another it does not."""
     ours, other = conductivities(AGGREGATE, PLUG), conductivities(permeable(AGGREGATE), permeable(PLUG))
-    changes = {name: 100 * (other[name] / ours[name] - 1) for name in ours}
-    checks = (at_most("aggregate, base at 19.2 h: conductivity changes by (%)", "depending on the conditions",
-                      abs(changes["aggregate"]), 100 * FEW, f"no difference: {FEW_WORDS}"),
-              at_least("film, wide before contact: conductivity changes by (%)", "differences", abs(changes["film"]),
-                       100 * FEW, FEW_WORDS),
-              at_least("plug, wide at 40 h: conductivity changes by (%)", "differences", abs(changes["plug"]),
-                       100 * FEW, FEW_WORDS),
-              at_most("wide: time of contact changes by (%)", "depending on the conditions", abs(changes["contact"]),
-                      100 * FEW, f"no difference: {FEW_WORDS}"))
-    return Finding(checks, reason="it makes a difference elsewhere", note=lambda: _told_of_both_laws(ours, other))
+    changes = {name: 100 * abs(other[name] / ours[name] - 1) for name in ours if name != "contact"}
+    checks = (at_least("conductivity of aggregate, film or plug: changes by, the most of them (%)",
+                       "may lead to differences", max(changes.values()), 100 * FEW, f"more than {FEW_WORDS}"),
+              at_most("conductivity of aggregate, film or plug: changes by, the least of them (%)",
+                      "depending on the conditions", min(changes.values()), 100 * FEW, f"no difference: {FEW_WORDS}"))
+    return Finding(checks, reason="it makes a difference everywhere, or nowhere",
+                   note=lambda: f"{_told_of_both_laws(ours, other)} Changed on {LATER} after these values had been "
+                   "seen: film and plug had to differ each, and aggregate and time of contact had not; the verdict was "
+                   "the same.")
 
 
 def conductivities(aggregate: tuple[str, ...], plug: tuple[str, ...]) -> dict[str, float]:
