@@ -2,7 +2,7 @@
 
 `python -m paper_figures` leaves all of them and a page about them in `paper_figures/out`. Each module named in
 `FIGURES` has TITLE, RUNS (the requests of `paper_figures.runs` that it reads), CLAIMS (ids), and two functions that
-take the folder of each of those runs, or compute them: `draw() -> Figure` and `caption() -> str`. One that computes
+take the folder of each of those runs: `draw() -> Figure` and `caption() -> str`. One that computes
 numbers of its own, with the functions of its claims, names these in COMPUTED.
 """
 

@@ -32,7 +32,7 @@ NAME = "dupin2001-repro"
 WORKFLOW = "paper_figures/__main__.py"
 JUDGE = "verification/claims/__main__.py"
 ENVIRONMENT = ("pyproject.toml", "requirements.lock")
-CLAIMS = ("paper_figures/replication.json", "paper_figures/replication.md", "verification/claims/claims.json")
+CLAIMS = ("paper_figures/replication.md", "verification/claims/claims.json")
 PAPER = "https://doi.org/10.1029/2001WR000306"
 LICENSE = "https://spdx.org/licenses/BSD-3-Clause"
 BIOSCHEMAS = "https://bioschemas.org/profiles"
@@ -64,18 +64,22 @@ def write(out: Path, crate: Path) -> Path:
     part = crate.with_name(f".part-{crate.name}")
     shutil.rmtree(part, ignore_errors=True)
     inside = {path.relative_to(ROOT).as_posix(): path for path in checkout()}
-    inside |= {f"paper_figures/out/{path.name}": path for paths in made.values() for path in paths}
-    inside[f"paper_figures/out/{manifest.NAME}"] = out / manifest.NAME
+    inside |= {_drawn(path): path for path in [*sum(made.values(), []), out / manifest.NAME]}
     for name, path in inside.items():
         (part / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(path, part / name)
     ended = datetime.fromtimestamp((out / manifest.NAME).stat().st_mtime, UTC)
-    told = {name: [f"paper_figures/out/{path.name}" for path in paths] for name, paths in made.items()}
+    told = {name: list(map(_drawn, paths)) for name, paths in made.items()}
     content = {"@context": CONTEXT, "@graph": graph(part, sorted(inside), told, ended.isoformat(timespec="seconds"))}
     (part / METADATA).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
     shutil.rmtree(crate, ignore_errors=True)
     part.rename(crate)
     return crate
+
+
+def _drawn(path: Path) -> str:
+    """Where what `make figures` has made is in the crate."""
+    return f"paper_figures/out/{path.name}"
 
 
 def checkout() -> list[Path]:
@@ -94,8 +98,8 @@ def figures(out: Path) -> dict[str, list[Path]]:
     told = json.loads((out / manifest.NAME).read_text(encoding="utf-8"))
     if told["environment"]["source"] != source_hash():
         raise FileNotFoundError(f"{out / manifest.NAME}: the figures are those of another source; {asked} anew")
-    found = {name: [out / picture for picture in sorted(told["figures"][name]["pictures"])] for name in FIGURES}
-    for path in (path for paths in found.values() for path in paths):
+    found = {name: list(map(out.joinpath, sorted(told["figures"][name]["pictures"]))) for name in FIGURES}
+    for path in sum(found.values(), []):
         if not path.is_file():
             raise FileNotFoundError(f"{path}: a figure is missing; {asked} anew")
     return found
@@ -116,7 +120,7 @@ def graph(crate: Path, names: list[str], pictures: dict[str, list[str]], ended: 
         "input": _refer(inputs), "output": _refer(outputs),
         "conformsTo": {"@id": f"{BIOSCHEMAS}/ComputationalWorkflow/1.0-RELEASE"}}
     files[JUDGE] |= _program("The paper's statements, judged")
-    drawn = [*(name for paths in pictures.values() for name in paths), f"paper_figures/out/{manifest.NAME}"]
+    drawn = [*sum(pictures.values(), []), _drawn(manifest.OUT / manifest.NAME)]
     actions = [_action("#figures", "make figures", "Run the scenes and draw the figures of the paper", WORKFLOW,
                        [*scenes, *ENVIRONMENT], drawn) | {"endTime": ended},
                _action("#claims", "make claims", "Judge the statements of the paper by computed numbers", JUDGE,
@@ -155,8 +159,12 @@ def _folders(names: list[str]) -> list[Entity]:
     about = {"docs": "Documentation", "paper_figures": "What draws the figures, and these",
              "reference": "References that do not use the solver", "repro": "The solver", "tests": "The tests",
              "verification": "Verification cases, claims and benchmarks"}
-    return [{"@id": f"{folder}/", "@type": "Dataset", "name": folder, "description": about[folder],
-             "hasPart": _refer(name for name in names if name.startswith(f"{folder}/"))} for folder in FOLDERS]
+    found: list[Entity] = []
+    for folder in FOLDERS:
+        inside = _refer(name for name in names if name.startswith(f"{folder}/"))
+        found.append({"@id": f"{folder}/", "@type": "Dataset", "name": folder, "description": about[folder],
+                      "hasPart": inside})
+    return found
 
 
 def _file(crate: Path, name: str) -> Entity:

@@ -1,5 +1,5 @@
-"""Less biomass plugs a pore as an aggregate than as layers: conductivity and uptake against biomass. Not in the "
-  "paper."""
+"""Less biomass plugs a pore as an aggregate than as layers: conductivity and uptake against biomass. Not in the
+paper."""
 
 from __future__ import annotations
 
@@ -24,16 +24,15 @@ LABELS = ("layer on one wall", "layers on both walls")
 
 
 @style.styled
-def draw(folder: Path | None = None) -> Figure:
+def draw(folder: Path) -> Figure:
     """Conductivity and uptake over the part of the pore that is filled."""
-    folder = folder or runs.wide_run()
     made = style.figure(2.6)
     panels = made.subplots(1, 2)
     _conductivity(panels[0], folder)
     _uptake(panels[1], folder)
     for axes in panels:
         axes.set_xlabel("part of the pore that is biomass")
-        axes.grid(alpha=0.25, linewidth=0.4)
+        style.grid(axes)
         axes.legend()
     style.number_panels(*panels)
     return made
@@ -63,18 +62,16 @@ def filled(table: dict[str, np.ndarray]) -> np.ndarray:
     return table["aggregate_area_um2"] / (scene.pore.width * scene.pore.length)
 
 
-def caption(folder: Path | None = None) -> str:
+def caption(folder: Path) -> str:
     """What is seen, with the parts at the end of the run."""
-    table = states.series(folder or runs.wide_run())
+    table = states.series(folder)
     part, scene = float(filled(table)[-1]), runs.WIDE.load()
     falls = table["conductivity_m_per_d"][0] / table["conductivity_m_per_d"][-1]
     layers = 1 / layered_share(scene.flow.viscosity_ratio, part, 1)
     return (f"The aggregate of Wide (red) from 0 to {table['time_h'][-1]:g} h, and layers of uniform thickness over "
-            "the "
-            "whole pore (blue; parallel flow in closed form, uptake by a reference that is averaged over the section "
-            f"and does not tell one layer from two), against the biomass. At its end the aggregate fills "
+            "the whole pore (blue; parallel flow in closed form, uptake by a reference that is averaged over the "
+            "section and does not tell one layer from two), against the biomass. At its end the aggregate fills "
             f"{100 * part:.1f} % of the pore and has made it {falls:.3g} times less conductive; a layer of that "
-            "biomass "
-            f"makes it {layers:.2g} times less. Porosity does not determine permeability. (b) At the same mean "
-            "velocity "
-            f"and supply, the aggregate takes up {100 * discussed.shares(table)[-1]:.0f} % of the acceptor in the end.")
+            f"biomass makes it {layers:.2g} times less. Porosity does not determine permeability. (b) At the same mean "
+            f"velocity and supply, the aggregate takes up {100 * discussed.shares(table)[-1]:.0f} % of the acceptor in "
+            "the end.")

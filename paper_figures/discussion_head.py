@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from paper_figures import figure_6, runs, states, style
-from paper_figures.discussion_rheology import contact
+from paper_figures.states import contact
 from verification.claims.permeability import consumed, specific_growth
 
 TITLE = "Addition. Clogging under a constant head"
@@ -21,25 +21,30 @@ EVERY = 10.0
 
 
 @style.styled
-def draw(closing: Path | None = None, wide: Path | None = None) -> Figure:
+def draw(closing: Path, wide: Path) -> Figure:
     """Outlines, conductivities of both runs, and flow, uptake and growth of base over their largest."""
-    closing, wide = closing or runs.folders([runs.CLOSING])[0], wide or runs.wide_run()
     made = style.figure(5.0)
     panels = made.subplot_mosaic([["outlines", "outlines"], ["fall", "restricted"]], height_ratios=[1, 1.1])
     _outlines(panels["outlines"], closing)
     _fall(panels["fall"], closing, wide)
     _restricted(panels["restricted"], closing)
     for name in ("fall", "restricted"):
-        panels[name].grid(alpha=0.25, linewidth=0.4)
+        style.grid(panels[name])
         panels[name].legend(loc="upper right", bbox_to_anchor=(0.93, 1.0))
     style.number_panels(*panels.values())
     return made
 
 
 def _outlines(axes: Axes, closing: Path) -> None:
-    """As in Figure 6."""
+    """As in Figure 6, and the first in contact with the opposite wall."""
     figure_6.outlines(axes, closing, EVERY)
     axes.set_title("outlines of Base")
+    meets = contact(closing)
+    if np.isfinite(meets):
+        state = states.near(closing, meets)
+        style.aggregate(axes, figure_6.smooth(state.rim, state.width), filled=False, edgecolor=style.RED, zorder=5,
+                        linestyle="--", label=f"in contact, {meets:g} h")
+        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
 def _fall(axes: Axes, closing: Path, wide: Path) -> None:
@@ -64,18 +69,16 @@ def _restricted(axes: Axes, closing: Path) -> None:
     axes.set(title="Base, over the largest", xlabel="time (h)", yscale="log", xlim=(0, None))
 
 
-def caption(closing: Path | None = None, wide: Path | None = None) -> str:
+def caption(closing: Path, wide: Path) -> str:
     """What is seen, with the velocities and the time of contact."""
-    closing = closing or runs.folders([runs.CLOSING])[0]
     table, meets = states.series(closing), contact(closing)
     velocity = table["mean_velocity_m_per_d"]
     rate = specific_growth(table)
-    touched = (f"The opposite wall is touched at {meets:g} h" if np.isfinite(meets)
+    touched = (f"The first row in contact with the opposite wall is that of {meets:g} h" if np.isfinite(meets)
                else "The opposite wall is not touched")
-    return (f"Base carried on to {table['time_h'][-1]:g} h. {touched}, when the velocity has fallen from "
-            f"{velocity[0]:.3g} to {velocity[-1]:.2g} m/d. (a) Outlines every {EVERY:g} h; (b) conductivity, beside "
-            "that "
-            "of Wide, whose velocity is kept up, with the times of contact dotted; (c) velocity, acceptor taken up, "
-            "and "
-            f"growth rate of the area, which falls from {rate[0]:.2g} to {rate[-1]:.2g} 1/h: the head drives ever less "
-            "water through, so that the aggregate starves before it plugs the pore.")
+    return (f"Base carried on to {table['time_h'][-1]:g} h (preset `fast`). {touched}; the velocity falls from "
+            f"{velocity[0]:.3g} to {velocity[-1]:.2g} m/d. (a) Outlines every {EVERY:g} h, and dashed the first in "
+            "contact; (b) conductivity, beside "
+            "that of Wide, whose velocity is kept up, with the times of contact dotted; (c) velocity, acceptor taken "
+            f"up, and growth rate of the area, which falls from {rate[0]:.2g} to {rate[-1]:.2g} 1/h: the head drives "
+            "ever less water through, so that the aggregate starves before it plugs the pore.")

@@ -25,7 +25,6 @@ MOMENTS = (20.0, 34.0, 40.0)
 @style.styled
 def draw(*folders: Path) -> Figure:
     """Conductivity over time, and over that with the pseudoviscosity."""
-    folders = folders or tuple(runs.folders(RUNS))
     made = style.figure(2.7)
     panels = made.subplots(1, 2)
     first = states.series(folders[0])
@@ -38,9 +37,8 @@ def draw(*folders: Path) -> Figure:
     panels[1].set(title="over that with the viscosity ratio")
     for axes in panels:
         axes.set(xlabel="time (h)", yscale="log", xlim=(0, None))
-        axes.grid(alpha=0.25, linewidth=0.4)
-        for hours in first["time_h"][first["contact"] > 0][:1]:
-            axes.axvline(hours, color=style.FAINT, linewidth=0.8, linestyle=":")
+        style.grid(axes)
+        axes.axvline(states.contact(folders[0]), color=style.FAINT, linewidth=0.8, linestyle=":")
     style.number_panels(*panels)
     return made
 
@@ -52,10 +50,8 @@ def at(table: dict[str, np.ndarray], hours: np.ndarray | tuple[float, ...]) -> n
 
 def caption(*folders: Path) -> str:
     """What is seen, with the conductivities of an aggregate, with a film left, and of a plug."""
-    folders = folders or tuple(runs.folders(RUNS))
-    columns = np.transpose([at(states.series(folder), MOMENTS) for folder in folders])
-    told = "; ".join(f"{', '.join(f'{value:.3g}' for value in row)} m/d at {hours:g} h"
-                     for hours, row in zip(MOMENTS, columns))
+    columns = [at(states.series(folder), MOMENTS) for folder in folders]
+    told = "; ".join("{:.3g}, {:.3g}, {:.3g} m/d at {:g} h".format(*row) for row in zip(*columns, MOMENTS))
     return ("Wide with the raised viscosity of the paper (black), with Brinkman's drag of a permeability of "
             f"{runs.PERMEABILITIES[0]:.2g} m² (red), and of W²/(12 λ) = {runs.PERMEABILITIES[1]:.2g} m² (dashed), "
             "with which a pore that is filled over its length conducts as with the viscosity. (a) Conductivity: "

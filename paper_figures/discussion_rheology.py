@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from paper_figures import figure_6, runs, states, style
+from paper_figures.states import contact
 
 TITLE = "Addition. Another rheology and other conditions at the walls"
 RUNS = (runs.WIDE_FAST, *runs.VARIANTS.values())
@@ -23,7 +24,6 @@ AROUND = 4.0
 @style.styled
 def draw(*folders: Path) -> Figure:
     """The last outlines, and the conductivity around contact, a colour a run."""
-    folders = folders or tuple(runs.folders(RUNS))
     made = style.figure(4.9)
     panels = made.subplot_mosaic([["outlines"], ["conductivity"]], height_ratios=[1, 1.1])
     _outlines(panels["outlines"], folders)
@@ -36,8 +36,7 @@ def draw(*folders: Path) -> Figure:
 def _outlines(axes: Axes, folders: tuple[Path, ...]) -> None:
     shown = [states.last(folder) for folder in folders]
     first, last = min(s.rim[:, 0].min() for s in shown), max(s.rim[:, 0].max() for s in shown)
-    style.channel(axes, (first - figure_6.MARGIN, last + figure_6.MARGIN), shown[0].width, 2.5)
-    style.fluid(axes, (first - figure_6.MARGIN, last + figure_6.MARGIN), shown[0].width)
+    style.pore(axes, (first - figure_6.MARGIN, last + figure_6.MARGIN), shown[0].width, 2.5)
     for number, (state, colour) in enumerate(zip(shown, COLOURS)):
         style.aggregate(axes, figure_6.smooth(state.rim, state.width), filled=number == 0, edgecolor=colour,
                         linewidth=1.0, zorder=2 + 0.1 * number)
@@ -54,19 +53,11 @@ def _conductivity(axes: Axes, folders: tuple[Path, ...]) -> None:
     shown = table["conductivity_m_per_d"][np.abs(table["time_h"] - meets) <= AROUND]
     axes.set(title="hydraulic conductivity of the pore", xlabel="time (h)", ylabel="m/d", yscale="log",
              xlim=(meets - AROUND, meets + AROUND), ylim=(0.7 * shown.min(), 1.4 * shown.max()))
-    axes.grid(alpha=0.25, linewidth=0.4)
-
-
-def contact(folder: Path) -> float:
-    """Time (h) of the first row in contact with the opposite wall; infinite where there is none."""
-    table = states.series(folder)
-    touching = table["time_h"][table["contact"] > 0]
-    return float(touching[0]) if len(touching) else float("inf")
+    style.grid(axes)
 
 
 def caption(*folders: Path) -> str:
     """What is seen, with the first rows in contact and the last conductivities."""
-    folders = folders or tuple(runs.folders(RUNS))
     tables = [states.series(folder) for folder in folders]
     told = "; ".join(f"{label}: {contact(folder):g} h and {table['conductivity_m_per_d'][-1]:.3g} m/d"
                      for label, folder, table in zip(LABELS, folders, tables))

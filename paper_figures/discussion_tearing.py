@@ -1,5 +1,5 @@
-"""Where the aggregate would tear: the largest principal stress over time, its place, and the fluid. Not in the "
-  "paper."""
+"""Where the aggregate would tear: the largest principal stress over time, its place, and the fluid. Not in the
+paper."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 
 from paper_figures import figure_6, style
 from repro.errors import GrowthError
-from verification.claims.fluid_and_aggregate import pressed, tension
+from verification.claims.fluid_and_aggregate import peak, pressed, tension
 from verification.claims.levels import CONVERGED, PAIRED, Level, at_level, cached
 from verification.claims.runs import BASE, WIDE, Body, bodies, scene
 
@@ -72,7 +72,7 @@ def _sizes(axes: Axes) -> None:
                 for look, label in (("-", "growth alone"), ("--", "with the fluid's forces"))]
     axes.legend(handles=handles, loc="upper left")
     axes.set(title="largest principal stress", xlabel="time (h)", ylabel="Pa", yscale="log", xlim=(0, None))
-    axes.grid(alpha=0.25, linewidth=0.4)
+    style.grid(axes)
 
 
 def _places(axes: Axes, colours: ScalarMappable, forced: bool) -> None:
@@ -80,8 +80,7 @@ def _places(axes: Axes, colours: ScalarMappable, forced: bool) -> None:
     shown = [found for found in bodies(COURSES[1]) if found.pore.time % EVERY == 0]
     reach = np.concatenate([found.outline.points[:, 0] for found in shown])
     ends, width = (reach.min() - figure_6.MARGIN, reach.max() + figure_6.MARGIN), shown[0].grid.width
-    style.channel(axes, ends, width, 2.5)
-    style.fluid(axes, ends, width)
+    style.pore(axes, ends, width, 2.5)
     axes.set_anchor("W")
     for found in shown:
         style.aggregate(axes, _rim(found), filled=False, edgecolor=colours.to_rgba(found.pore.time), linewidth=0.7)
@@ -96,19 +95,18 @@ def _rim(found: Body) -> np.ndarray:
 def caption() -> str:
     """What is seen: size and place at the end of both runs, and how far the fluid's forces go."""
     with at_level(LEVEL):
-        ends = [course(run, False)[-1] for run in COURSES]
+        ends = [(bodies(run)[-1].pore.time, peak(bodies(run)[-1])) for run in COURSES]
         forced = course(COURSES[1], True)
         without = course(COURSES[1], False)[len(forced) - 1]
         modulus, last = PASCAL * scene(*COURSES[0]).growth.shear_modulus, bodies(COURSES[1])[-1].pore.time
-    told = "; ".join(f"{name} {size:.3g} Pa at ({x:.0f}, {y:.0f}) µm and {hours:g} h"
-                     for name, (size, x, y, hours) in zip(NAMES, ends))
+    told = "; ".join(f"{name} {modulus * most.value:.3g} Pa at ({most.x:.0f}, {most.y:.0f}) µm and {hours:g} h"
+                     for name, (hours, most) in zip(NAMES, ends))
     size, x, y, hours = forced[-1]
     until = ("" if hours == last else " Later the head that drives the constant velocity through the plug bends it so "
-                                      "far "
-             "that shape and flow do not agree.")
-    return (f"(a) Largest principal stress in the aggregate, of a modulus of {modulus:g} Pa: {told}. (b) Where it is "
-            "in "
-            f"Wide, between outlines every {EVERY:g} h: in the middle first, then near the lower wall. "
-            f"(c) The same aggregates at rest under the fluid's forces: {size:.3g} Pa instead of {without[0]:.3g} Pa "
-            "at "
-            f"{hours:g} h, at ({x:.0f}, {y:.0f}) µm instead of ({without[1]:.0f}, {without[2]:.0f}) µm.{until}")
+                                      "far that shape and flow do not agree.")
+    return (f"(a) Largest principal stress of a triangle of the aggregate, of a modulus of {modulus:g} Pa. In the mean "
+            f"over a tenth of the pore's width, on this mesh: {told}; C40 tells how far the place hangs on the mesh. "
+            f"(b) Where it is in Wide, between outlines every {EVERY:g} h: in the middle first, then near the lower "
+            f"wall. (c) The same aggregates at rest under the fluid's forces: {size:.3g} Pa instead of "
+            f"{without[0]:.3g} Pa at {hours:g} h, at ({x:.0f}, {y:.0f}) µm instead of ({without[1]:.0f}, "
+            f"{without[2]:.0f}) µm.{until}")

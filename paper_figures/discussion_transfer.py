@@ -10,7 +10,7 @@ from paper_figures import style
 from verification.claims.base_run import upstream_means
 from verification.claims.discussed import RADIUS, in_one_shape, sherwood, textbooks
 from verification.claims.levels import CONVERGED, PAIRED, Level, at_level, cached
-from verification.claims.runs import BASE, Body, bodies
+from verification.claims.runs import BASE, UPDATE, Body, bodies, grown_anew
 
 TITLE = "Addition. Mass transfer to the growing aggregate"
 RUNS = ()
@@ -45,7 +45,7 @@ def draw() -> Figure:
         _panel(panels["supply"], SUPPLIES, supplied, "supply (K$_s$)", True)
         _panel(panels["shape"], RADII, [in_one_shape(radius=float(each)) for each in RADII], "radius (µm)", False)
     for name, axes in panels.items():
-        axes.grid(alpha=0.25, linewidth=0.4)
+        style.grid(axes)
         if name in ("velocity", "supply", "shape"):
             axes.set(ylim=(0, None), title=f"half-disc at rest, by {name if name != 'shape' else 'radius'}")
     panels["velocity"].set_ylabel("Sherwood number")
@@ -80,13 +80,15 @@ def _pairs(axes: Axes, x, numbers: list[tuple[float, float]], given: list[tuple[
 
 
 def _pull(axes: Axes) -> None:
-    found = early()[-1]
-    means = np.array([upstream_means(found.pore, found.solved, float(distance)) for distance in UPSTREAM])
+    """Of the state that the paper tells of: the shape of UNTIL with what has grown in it since [E12]."""
+    last = early()[-1].pore.time
+    state = grown_anew(RUN, last)
+    means = np.array([upstream_means(*state, float(distance)) for distance in UPSTREAM])
     for name, colour, values in zip(NAMES, COLOURS, means.T):
         axes.plot(UPSTREAM, values, color=colour, label=name)
     axes.axvline(60, color=style.FAINT, linewidth=0.8, linestyle=":")
     axes.plot(60, 7, "o", color=style.BLACK, markersize=4, label="paper: ~7 K$_s$ at 60 µm", linestyle="none")
-    axes.set(title=f"the pull upstream at {found.pore.time:g} h", xlabel="distance from the aggregate (µm)",
+    axes.set(title=f"the pull upstream at {last + UPDATE:g} h", xlabel="distance from the aggregate (µm)",
              ylabel="flow-weighted mean (K$_s$)", ylim=(0, 10.3), xlim=(0, UPSTREAM[-1]))
 
 
@@ -97,14 +99,13 @@ def caption() -> str:
         given, hours = textbooks(early()[-1]), early()[-1].pore.time
         slow, fast = (sherwood(in_one_shape(head=float(head))) for head in (HEADS[0], HEADS[-1]))
         poor, rich = (sherwood(in_one_shape(supply=float(each))) for each in (SUPPLIES[0], SUPPLIES[-1]))
-    return (f"Sherwood numbers: uptake over interface and drop from the supply, times thickness over diffusivity "
-            "(full), "
-            f"and those of a flat patch as long as the aggregate in the same shear flow (dashed; Lévêque). (a) Base "
-            "from "
-            f"0 to {hours:g} h: acceptor {first[0]:.3g} to {last[0]:.3g}, donor {first[1]:.3g} to {last[1]:.3g}, where "
-            f"the textbook says {given[0]:.2g} and {given[1]:.2g}. (b) Concentrations upstream of the aggregate, where "
-            f"its uptake has steepened them. (c)-(e) A half-disc at rest, of {RADIUS:g} µm in (c) and (d): from "
-            f"{slow[0]:.2g} to {fast[0]:.2g} (acceptor) with velocity, but {poor[0]:.3g} to {rich[0]:.3g} from a "
-            "supply "
-            f"of {SUPPLIES[0]:.1g} to one of {SUPPLIES[-1]:.0f} K_s: the number follows shape and flow, and hardly the "
-            "sink, while the aggregate is penetrated.")
+    return ("Sherwood numbers: uptake over interface and drop from the supply, times thickness over diffusivity "
+            "(full), and those of a flat patch as long as the aggregate in the same shear flow (dashed; Lévêque). (a) "
+            f"Base from 0 to {hours:g} h: acceptor {first[0]:.3g} to {last[0]:.3g}, donor {first[1]:.3g} to "
+            f"{last[1]:.3g}, where the textbook says {given[0]:.2g} and {given[1]:.2g}. (b) Concentrations upstream of "
+            f"the aggregate, where its uptake has steepened them, in the shape of {hours:g} h with what has grown by "
+            f"{hours + UPDATE:g} h, the state that the paper tells of (E12). (c)-(e) A half-disc at rest, of "
+            f"{RADIUS:g} µm in (c) "
+            f"and (d): from {slow[0]:.2g} to {fast[0]:.2g} (acceptor) with velocity, but {poor[0]:.3g} to "
+            f"{rich[0]:.3g} from a supply of {SUPPLIES[0]:.1g} to one of {SUPPLIES[-1]:.0f} K_s: the number follows "
+            "shape and flow, and hardly the sink, while the aggregate is penetrated.")

@@ -38,8 +38,7 @@ def draw() -> Figure:
 def _pore(axes: Axes, scene: Scene, outline: Outline) -> None:
     """The whole pore."""
     width, end = scene.pore.width, scene.pore.length / 2
-    style.channel(axes, (-end, end), width, 4)
-    style.fluid(axes, (-end, end), width)
+    style.pore(axes, (-end, end), width, 4)
     style.aggregate(axes, outline.points)
     axes.set(title="the pore to scale", ylim=(-4, 2 * width), xlim=(-1.1 * end, 1.1 * end))
     axes.set_axis_off()
@@ -55,15 +54,13 @@ def inflow(axes: Axes, ends: tuple[float, float], width: float, length: float) -
     """Arrows of the parabolic velocity at the inlet, the longest one `length` um."""
     for y in np.linspace(0, width, 7)[1:-1]:
         tip = ends[0] + 4 * length * y * (width - y) / width**2
-        axes.annotate("", (tip, y), (ends[0], y), arrowprops={"arrowstyle": "-|>", "color": style.BLUE, "shrinkA": 0,
-                                                              "shrinkB": 0, "mutation_scale": 5, "linewidth": 0.7})
+        style.arrow(axes, (ends[0], y), (tip, y))
 
 
 def _domains(axes: Axes, scene: Scene, outline: Outline) -> None:
     """Domains and boundaries around the aggregate, with the point that stays in place."""
     width, reach = scene.pore.width, 1.5 * outline.thickness
-    style.channel(axes, (-reach, reach), width, 2)
-    style.fluid(axes, (-reach, reach), width)
+    style.pore(axes, (-reach, reach), width, 2)
     style.aggregate(axes, outline.points)
     axes.plot(*outline.points[outline.wall == BOTTOM].T, color=style.RED, linewidth=2.4, clip_on=False)
     axes.plot(*outline.points[outline.fixed].T, "o", color=style.BLACK, markersize=4, clip_on=False, zorder=5)
@@ -78,7 +75,8 @@ def _domains(axes: Axes, scene: Scene, outline: Outline) -> None:
 
 def _closing(axes: Axes, scene: Scene) -> None:
     """An aggregate on the opposite wall: the nodes that `closing_nodes` joins to it, and the least gap allowed."""
-    width, film, angle = scene.pore.width, scene.growth.minimum_film, scene.growth.minimum_contact_angle
+    width = scene.pore.width
+    film, angle = scene.growth.minimum_film, scene.growth.minimum_contact_angle
     outline = flattened(width)
     joins = closing_nodes(outline, width, film, angle) == TOP
     line = outline.points[outline.wall == TOP, 0].max()

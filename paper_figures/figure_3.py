@@ -50,8 +50,7 @@ def _whole(axes: Axes, scene: Scene, outline: Outline, ends: Ends) -> None:
 def _part(axes: Axes, scene: Scene, outline: Outline, ends: Ends) -> None:
     """The meshed part with the conditions on its boundaries."""
     width = scene.pore.width
-    style.channel(axes, ends, width, 2)
-    style.fluid(axes, ends, width)
+    style.pore(axes, ends, width, 2)
     style.aggregate(axes, outline.points)
     axes.plot(*outline.points[outline.wall == BOTTOM].T, color=style.RED, linewidth=2.4, clip_on=False)
     inflow(axes, ends, width, 0.12 * ends[1])

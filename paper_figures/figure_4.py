@@ -15,21 +15,20 @@ CLAIMS = ("C07", "C19")
 
 
 @style.styled
-def draw(folder: Path | None = None) -> Figure:
+def draw(folder: Path) -> Figure:
     """Fluid and aggregate with every triangle."""
-    state = states.first(folder or runs.initial_mesh_run())
+    state = states.first(folder)
     made = style.figure(3.5)
     axes = made.subplots()
-    style.channel(axes, state.ends, state.width, 0.8)
-    style.fluid(axes, state.ends, state.width)
+    style.pore(axes, state.ends, state.width, 0.8)
     style.aggregate(axes, state.rim, linewidth=1.0, zorder=3, alpha=0.8)
     axes.triplot(state.whole, color=style.BLACK, linewidth=0.35, zorder=4)
     return made
 
 
-def caption(folder: Path | None = None) -> str:
+def caption(folder: Path) -> str:
     """What is seen, with the mesh's own numbers."""
-    state = states.first(folder or runs.initial_mesh_run())
+    state = states.first(folder)
     across = state.rim[:, 0].max() - state.rim[:, 0].min()
     return (f"The part of the pore that is meshed at t = 0: {np.ptp(state.ends):.0f} µm of it around a seed "
             f"{across:.0f} µm across (amber), between the two walls. The mesh has {len(state.points)} nodes and "

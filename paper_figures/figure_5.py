@@ -20,9 +20,9 @@ SPACING = 5.0
 
 
 @style.styled
-def draw(folder: Path | None = None) -> Figure:
+def draw(folder: Path) -> Figure:
     """Speed in colour, velocity as arrows."""
-    state = states.last(folder or runs.base_run(), "before_expansion")
+    state = states.last(folder, "before_expansion")
     made = style.figure(2.65)
     axes = made.subplots()
     style.channel(axes, state.ends, state.width, 1.2)
@@ -33,8 +33,7 @@ def draw(folder: Path | None = None) -> Figure:
     where = _grid(state)
     axes.quiver(*where.T, *state.at("velocity_m_per_d", where).T, color=style.BLACK, angles="xy", scale_units="xy",
                 scale=speed.max() / (1.25 * SPACING), width=0.0013, headwidth=4, headlength=5)
-    made.colorbar(colours, ax=axes, location="bottom", label="speed (m/d)", aspect=50, shrink=0.8,
-                  ticks=np.arange(0, speed.max(), 0.5))
+    style.colour_bar(colours, axes, "speed (m/d)", ticks=np.arange(0, speed.max(), 0.5))
     return made
 
 
@@ -55,9 +54,8 @@ def share_through(state: State) -> float:
     return float(u[inside].sum() / u.sum())
 
 
-def caption(folder: Path | None = None) -> str:
+def caption(folder: Path) -> str:
     """What is seen, with the velocities of the run."""
-    folder = folder or runs.base_run()
     shaped, end = states.last_step(folder)
     begin, seen, later = (states.row(folder, t)["mean_velocity_m_per_d"] for t in (0.0, shaped, end))
     through = share_through(states.last(folder, "before_expansion"))

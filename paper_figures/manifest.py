@@ -165,20 +165,17 @@ def _broken(run: str, mine: dict[str, float], other: dict[str, float]) -> list[s
 
 def present() -> dict:
     """Data of what is there, hashed anew. Raises FileNotFoundError where `make figures` has not been run."""
-    modules = {name: import_module(f"paper_figures.{name}") for name in FIGURES}
-    found = {request: run_folder(request.load(), runs.CACHE) for module in modules.values() for request in module.RUNS}
-    for folder in found.values():
-        if not (folder / "run.json").exists():
-            raise FileNotFoundError(f"{folder}: no such run of the present source; `make figures` computes it")
-    return {"environment": environment(),
-            "runs": {request.name: of_run(request, folder) for request, folder in found.items()},
-            "figures": {name: _present_figure(name, module, [found[request] for request in module.RUNS])
-                        for name, module in modules.items()}}
-
-
-def _present_figure(name: str, module, folders: list[Path]) -> dict:
-    data = figure_hash(module.draw(*folders), module.caption(*folders))
-    return of_figure(module, data, 0.0, OUT.glob(f"{name}.*"))
+    told: dict[str, dict] = {"environment": environment(), "runs": {}, "figures": {}}
+    for name in FIGURES:
+        module = import_module(f"paper_figures.{name}")
+        folders = [run_folder(request.load(), runs.CACHE) for request in module.RUNS]
+        for request, folder in zip(module.RUNS, folders):
+            if not (folder / "run.json").exists():
+                raise FileNotFoundError(f"{folder}: no such run of the present source; `make figures` computes it")
+            told["runs"][request.name] = told["runs"].get(request.name) or of_run(request, folder)
+        data = figure_hash(module.draw(*folders), module.caption(*folders))
+        told["figures"][name] = of_figure(module, data, 0.0, OUT.glob(f"{name}.*"))
+    return told
 
 
 def check(now: dict, written: dict, committed: dict) -> tuple[list[str], list[str]]:

@@ -16,14 +16,15 @@ from matplotlib.image import imsave
 from paper_figures import figure_6, runs, states, style
 from paper_figures.states import State
 
+CLAIMS = ("C35", *figure_6.CLAIMS)
 TARGET = Path(__file__).parent / "overview.png"
-PIXELS_WIDE, STREAMLINES, SHADES = 1600, 10, 31
+PIXELS_WIDE, SHADES = 1600, 31
+STREAMLINES = 10
 
 
 @style.styled
-def draw(base: Path | None = None, wide: Path | None = None) -> Figure:
+def draw(base: Path, wide: Path) -> Figure:
     """Substrate and streamlines around the aggregate of Base, and how the aggregate of Wide fills its pore."""
-    base, wide = base or runs.base_run(), wide or runs.wide_run()
     made = style.figure(5.5)
     above, below = made.subplots(2, 1, height_ratios=[1, 1.08])
     state, (shaped, _) = states.last(base, "before_expansion"), states.last_step(base)
@@ -40,7 +41,7 @@ def _substrate(axes: Axes, state: State) -> None:
     colours = axes.tricontourf(state.whole, state.nodes["acceptor_mg_per_L"], levels=20, cmap=style.MAP)
     axes.contour(*stream(state), levels=np.linspace(0, 1, STREAMLINES + 1)[1:-1], colors="white", linewidths=0.7)
     style.aggregate(axes, state.rim)
-    axes.figure.colorbar(colours, ax=axes, location="bottom", label="electron acceptor (mg/L)", aspect=50, shrink=0.8)
+    style.colour_bar(colours, axes, "electron acceptor (mg/L)")
 
 
 def stream(state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -55,7 +56,7 @@ def stream(state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 @style.styled
 def main() -> None:
     """Draw and write it, its colours rounded: that halves the file."""
-    made = draw()
+    made = draw(*runs.folders([runs.BASE, *figure_6.RUNS]))
     made.set_dpi(PIXELS_WIDE / style.PAGE)
     style.lay_out(made)
     made.canvas.draw()

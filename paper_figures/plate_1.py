@@ -20,9 +20,8 @@ CONTOURS = 20
 
 
 @style.styled
-def draw(folder: Path | None = None) -> Figure:
+def draw(folder: Path) -> Figure:
     """C_A and C_D in the meshed part, X_A and X_I over what there was 12 min before; a colour scale each."""
-    folder = folder or runs.base_run()
     state = states.last(folder, "before_expansion")
     grown = {name: since(folder, f"{name}_biomass") for name in ("active", "inert")}
     made = style.figure(4.35)
@@ -66,12 +65,12 @@ def _shade(axes: Axes, triangulation: Triangulation, values: np.ndarray, label: 
     bar.update_ticks()
 
 
-def caption(folder: Path | None = None) -> str:
+def caption(folder: Path) -> str:
     """What is seen, with the extremes and what enters and leaves."""
-    folder = folder or runs.base_run()
     shaped, end = states.last_step(folder)
     state = states.last(folder, "before_expansion")
-    acceptor, donor = ([state.carried(f"{name}_mg_per_L", side) for side in (0, 1)] for name in ("acceptor", "donor"))
+    acceptor = [state.carried("acceptor_mg_per_L", side) for side in (0, 1)]
+    donor = [state.carried("donor_mg_per_L", side) for side in (0, 1)]
     active, inert = (since(folder, f"{name}_biomass")[state.body] for name in ("active", "inert"))
     return (f"Base at t = {end:g} h before the aggregate expands: the shape is that of {shaped:g} h and carries what "
             "has grown since. (a, b) The substrates in the meshed part, flow from left to right; flow-weighted, the "

@@ -22,9 +22,8 @@ LENGTHENED = 5
 
 
 @style.styled
-def draw(folder: Path | None = None) -> Figure:
+def draw(folder: Path) -> Figure:
     """The whole meshed part, then the aggregate closer."""
-    folder = folder or runs.base_run()
     before, after = states.last(folder, "before_expansion"), states.last(folder)
     made = style.figure(5.1)
     whole, near = made.subplots(2, 1, height_ratios=[1, 1.75])
@@ -76,9 +75,8 @@ def displaced(before: State, after: State) -> tuple[np.ndarray, np.ndarray]:
     return before.body, interpolate(material, after.triangles[after.biomass], after.points, sought)
 
 
-def caption(folder: Path | None = None) -> str:
+def caption(folder: Path) -> str:
     """What is seen, with the extremes of theta and of the displacement."""
-    folder = folder or runs.base_run()
     before, after = states.last(folder, "before_expansion"), states.last(folder)
     shaped, end = states.last_step(folder)
     nodes, moved = displaced(before, after)

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
-from paper_figures import FIGURES, manifest
+from paper_figures import FIGURES, manifest, overview
 from paper_figures.claims import STATEMENTS
 from repro.results import write_text
 from verification import sensitivity, speed
@@ -36,13 +36,17 @@ from verification.claims import (
 )
 from verification.claims import report as claims_record
 from verification.kernel.writing import markdown_row
-from verification.sensitivity.wide import verdicts
+from verification.sensitivity.wide import LEFT_OUT, verdicts
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
 NOTE, TEMPLATE = (HERE / name for name in ("replication.md", "replication_template.md"))
 REPORT = ROOT / "verification" / "report"
 FIELD = re.compile(r"\{\{(.+?)\}\}")
+#: What verdicts are called in the template; and what is told of a claim that has one.
+NAMES = dict(zip(VERDICTS, ("reproduced", "rounding", "changed", "contradicted", "undecided")))
+WHY = {WITHIN_ROUNDING: (("As printed", "reason"), ("Inputs", "rounding")), CHANGED: (("Changed", "change"),),
+       CONTRADICTED: (("Why not", "reason"),), UNDECIDED: (("Why", "reason"),)}
 WIDTH = 120
 
 
@@ -56,15 +60,13 @@ def fields(known: dict) -> dict[str, Callable[[], str]]:
     """What each name of the template without a claim stands for."""
     claims = known["claims"]
     return {**_about(), **_verdicts(claims), **_bench(), **_errata(),
-            "verify": _verified, "audit.defaults": _of_defaults,
-            "list.reproduced": lambda: "\n".join(map(_reproduced, _with(claims, REPRODUCED))),
-            "list.rounding": lambda: "\n".join(map(_within_rounding, _with(claims, WITHIN_ROUNDING))) or "None.",
-            "list.changed": lambda: "\n".join(map(_changed, _with(claims, CHANGED))) or "None.",
-            "list.contradicted": lambda: "\n".join(map(_contradicted, _with(claims, CONTRADICTED))) or "None.",
-            **_supplies(), "list.flips": lambda: _flips(claims), "after.contact": lambda: _after_contact(claims),
-            "list.undecided": lambda: "\n".join(map(_undecided, _with(claims, UNDECIDED))) or "None.",
+            "verify": _verified, "audit.defaults": _of_defaults, **_supplies(),
+            "list.flips": lambda: _flips(claims), "after.contact": lambda: _after_contact(claims),
+            "base.bars": lambda: _bars_of_base(claims),
             "inputs.share": lambda: f"{100 * sensitivity.record()['one_set']['share_of_the_rounding']:.0f}",
             "table.values": lambda: "\n".join(map(_value, _printed(claims))),
+            "overview.claims": lambda: "; ".join(f"{claim['id']} {claim['verdict']}" for claim in claims
+                                                 if claim["id"] in overview.CLAIMS),
             "table.figures": lambda: "\n".join(map(_figure, FIGURES)),
             "environment": lambda: _environment(known["environment"])}
 
@@ -78,6 +80,7 @@ def _supplies() -> dict[str, Callable[[], str]]:
             "supplies.contact": lambda: f"{max(times):.0f} to {min(times):.0f}",
             "supplies.total": lambda: str(len(every + some + none)), "supplies.all": lambda: str(len(every)),
             "supplies.some": lambda: str(len(some)), "supplies.none": lambda: str(len(none)),
+            "supplies.left_out": lambda: "; ".join(f"{id}, which {why}" for id, why in LEFT_OUT.items()),
             "list.supplies": lambda: _which(every, some, none)}
 
 
@@ -106,6 +109,14 @@ def _after_contact(claims: list[dict]) -> str:
             f"{listed}.")
 
 
+def _bars_of_base(claims: list[dict]) -> str:
+    """Which numbers of base are known less well than its velocities and effluents, and why."""
+    kinds = "; ".join(f"{why} ({', '.join(dict.fromkeys(each.id for each in those))})"
+                      for why, those in after_contact.wide_bars_of_base(claims).items())
+    return (f"Velocities, effluents, uptake and concentrations of Base are known to {after_contact.BASE_BAR:g} % or "
+            f"better. Wider are the bars of numbers of other kinds: {kinds}.")
+
+
 def _about() -> dict[str, Callable[[], str]]:
     citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8").partition("references:")[0]
 
@@ -122,10 +133,11 @@ def _with(claims: list[dict], verdict: str) -> list[dict]:
 
 def _verdicts(claims: list[dict]) -> dict[str, Callable[[], str]]:
     outcomes = [check["outcome"] for _, check in _predicted(claims)]
-    names = dict(zip(VERDICTS, ("reproduced", "rounding", "changed", "contradicted", "undecided")))
     counts = {f"claims.{name}": lambda verdict=verdict: str(len(_with(claims, verdict)))
-              for verdict, name in names.items()}
-    return {**counts, "claims.total": lambda: str(len(claims)), "paper.total": lambda: str(len(outcomes)),
+              for verdict, name in NAMES.items()}
+    lists = {f"list.{name}": lambda verdict=verdict: "\n".join(map(_entry, _with(claims, verdict))) or "None."
+             for verdict, name in NAMES.items()}
+    return {**counts, **lists, "claims.total": lambda: str(len(claims)), "paper.total": lambda: str(len(outcomes)),
             "paper.within": lambda: str(outcomes.count(HOLDS)), "paper.outside": lambda: str(outcomes.count(FAILS)),
             "paper.open": lambda: str(outcomes.count(REACHES_OVER))}
 
@@ -154,26 +166,12 @@ def _span(low: float | None, high: float | None) -> str:
     return "-" if low is None or high is None else f"{low:.4g} to {high:.4g}"
 
 
-def _within_rounding(claim: dict) -> str:
-    return (f"- **{claim['id']}** ({claim['where']}): {claim['claim']}. *As printed:* {claim['reason'].rstrip('.')}. "
-            f"*Inputs:* {claim['rounding'].rstrip('.')}.")
-
-
-def _undecided(claim: dict) -> str:
-    return f"- **{claim['id']}** ({claim['where']}): {claim['claim']}. *Why:* {claim['reason'].rstrip('.')}."
-
-
-def _reproduced(claim: dict) -> str:
+def _entry(claim: dict) -> str:
+    """A claim in the list of its verdict, with what is told of that."""
     check = claim["checks"][0]
-    return f"- **{claim['id']}** ({claim['where']}): {claim['claim']}. Here: {check['quantity']}, {check['value']:.4g}."
-
-
-def _changed(claim: dict) -> str:
-    return f"- **{claim['id']}** ({claim['where']}): {claim['claim']}. *Changed:* {claim['change'].rstrip('.')}."
-
-
-def _contradicted(claim: dict) -> str:
-    return f"- **{claim['id']}** ({claim['where']}): {claim['claim']}. *Why not:* {claim['reason'].rstrip('.')}."
+    words = ([f"Here: {check['quantity']}, {check['value']:.4g}"] if claim["verdict"] == REPRODUCED else
+             [f"*{word}:* {claim[key].rstrip('.')}" for word, key in WHY[claim["verdict"]]])
+    return ". ".join((f"- **{claim['id']}** ({claim['where']}): {claim['claim']}", *words)) + "."
 
 
 def _figure(name: str) -> str:

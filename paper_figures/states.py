@@ -136,6 +136,13 @@ def row(folder: Path, time: float) -> dict[str, float]:
     return {name: float(column[found[0]]) for name, column in table.items()}
 
 
+def contact(folder: Path) -> float:
+    """Time (h) of the first row in contact with the opposite wall; infinite where there is none."""
+    table = series(folder)
+    touching = table["time_h"][table["contact"] > 0]
+    return float(touching[0]) if len(touching) else float("inf")
+
+
 def last_step(folder: Path) -> tuple[float, float]:
     """Start and end of the last shape update: the geometry before it was shaped at the start."""
     table = read_table(folder / "ledger.csv")

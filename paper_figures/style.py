@@ -10,6 +10,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon, Rectangle
 
@@ -19,8 +20,11 @@ RESOLUTION = 250
 LAYOUT_PASSES = 2
 
 #: Okabe and Ito's colours by what they stand for.
-BLUE, RED, SKY, BLACK = "#0072B2", "#D55E00", "#56B4E9", "#000000"
-FLUID, BIOMASS, RIM, WALL, FAINT = "#E6F1F9", "#F3D08B", "#7A4A00", "#555555", "#9A9A9A"
+BLUE, RED = "#0072B2", "#D55E00"
+SKY, BLACK = "#56B4E9", "#000000"
+FLUID, WALL = "#E6F1F9", "#555555"
+BIOMASS, RIM = "#F3D08B", "#7A4A00"
+FAINT = "#9A9A9A"
 MAP = "viridis"
 
 X_LABEL, Y_LABEL = "x (µm)", "y (µm)"
@@ -77,6 +81,12 @@ def channel(axes: Axes, ends: tuple[float, float], width: float, margin: float) 
         axes.add_patch(Rectangle((ends[0], low), ends[1] - ends[0], margin, facecolor=WALL, linewidth=0))
 
 
+def pore(axes: Axes, ends: tuple[float, float], width: float, margin: float) -> None:
+    """A channel with fluid in it."""
+    channel(axes, ends, width, margin)
+    fluid(axes, ends, width)
+
+
 def fluid(axes: Axes, ends: tuple[float, float], width: float) -> None:
     """Fluid from wall to wall."""
     axes.add_patch(Rectangle((ends[0], 0), ends[1] - ends[0], width, facecolor=FLUID, linewidth=0, zorder=0))
@@ -88,6 +98,23 @@ def aggregate(axes: Axes, points: np.ndarray, filled: bool = True, **look) -> No
     axes.add_patch(Polygon(points, closed=True, **chosen))
 
 
+def grid(axes: Axes) -> None:
+    """Faint lines behind curves."""
+    axes.grid(alpha=0.25, linewidth=0.4)
+
+
+def colour_bar(colours: ScalarMappable, axes: Axes, label: str, **more) -> None:
+    """What colours mean, below."""
+    axes.figure.colorbar(colours, ax=axes, location="bottom", label=label, aspect=50, shrink=0.8, **more)
+
+
+def arrow(axes: Axes, start: tuple[float, float], end: tuple[float, float], head: float = 5, width: float = 0.7,
+          look: str = "-|>", color: str = BLUE) -> None:
+    """A straight arrow, as long as its ends are apart."""
+    axes.annotate("", end, start, arrowprops={"arrowstyle": look, "color": color, "shrinkA": 0, "shrinkB": 0,
+                                              "mutation_scale": head, "linewidth": width})
+
+
 def number_panels(*panels: Axes) -> None:
     """(a), (b), ... before the titles."""
     for letter, axes in zip("abcdefgh", panels):
@@ -96,8 +123,7 @@ def number_panels(*panels: Axes) -> None:
 
 def dimension(axes: Axes, start: tuple[float, float], end: tuple[float, float], text: str) -> None:
     """A double arrow with its length said: above a horizontal one, to the right of a vertical one."""
-    axes.annotate("", end, start, arrowprops={"arrowstyle": "<|-|>", "color": BLACK, "shrinkA": 0, "shrinkB": 0,
-                                              "mutation_scale": 6, "linewidth": 0.7})
+    arrow(axes, start, end, 6, look="<|-|>", color=BLACK)
     upright = start[0] == end[0]
     middle = (0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1]))
     axes.annotate(text, middle, (3, 0) if upright else (0, 2), textcoords="offset points",

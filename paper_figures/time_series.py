@@ -24,9 +24,9 @@ CURVES = (("conductivity_m_per_d", "hydraulic conductivity of the pore", "m/d", 
 
 
 @style.styled
-def draw(base: Path | None = None, wide: Path | None = None) -> Figure:
+def draw(base: Path, wide: Path) -> Figure:
     """Four panels over one axis of time, a colour a run."""
-    tables = [states.series(folder) for folder in (base or runs.base_run(), wide or runs.wide_run())]
+    tables = [states.series(folder) for folder in (base, wide)]
     made = style.figure(4.6)
     panels = made.subplots(2, 2, sharex=True).ravel()
     for axes, (column, title, unit, log) in zip(panels, CURVES):
@@ -37,9 +37,9 @@ def draw(base: Path | None = None, wide: Path | None = None) -> Figure:
         axes.set(title=title, ylabel=unit, yscale="log" if log else "linear")
         if not log:
             axes.set_ylim(0)
-        for time in _contact_times(tables):
+        for time in _contact_times(base, wide):
             axes.axvline(time, color=style.FAINT, linewidth=0.8, linestyle=":")
-        axes.grid(alpha=0.25, linewidth=0.4)
+        style.grid(axes)
     for axes in panels[2:]:
         axes.set(xlabel="time (h)", xlim=(0, None))
     panels[0].legend(handles=[Line2D([], [], color=c, label=n) for n, c in zip(NAMES, COLOURS)], loc="lower left")
@@ -49,16 +49,16 @@ def draw(base: Path | None = None, wide: Path | None = None) -> Figure:
     return made
 
 
-def _contact_times(tables: list[dict[str, np.ndarray]]) -> list[float]:
+def _contact_times(*folders: Path) -> list[float]:
     """When each run touches the opposite wall, of those that do."""
-    return [float(t["time_h"][np.argmax(t["contact"] > 0)]) for t in tables if (t["contact"] > 0).any()]
+    return [time for time in map(states.contact, folders) if np.isfinite(time)]
 
 
-def caption(base: Path | None = None, wide: Path | None = None) -> str:
+def caption(base: Path, wide: Path) -> str:
     """What is seen, with first and last values."""
-    tables = [states.series(folder) for folder in (base or runs.base_run(), wide or runs.wide_run())]
+    tables = [states.series(folder) for folder in (base, wide)]
     falls = [t["conductivity_m_per_d"][0] / t["conductivity_m_per_d"][-1] for t in tables]
-    contact = " and ".join(f"{time:g} h" for time in _contact_times(tables))
+    contact = " and ".join(f"{time:g} h" for time in _contact_times(base, wide))
     dotted = f" The dotted line marks contact with the opposite wall in Wide, at {contact}." if contact else ""
     return (f"Base (blue, constant head, to {tables[0]['time_h'][-1]:g} h) and Wide (red, constant mean velocity, to "
             f"{tables[1]['time_h'][-1]:g} h). (a) Hydraulic conductivity of the whole pore, which falls by a factor of "

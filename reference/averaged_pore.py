@@ -33,9 +33,9 @@ from scipy.optimize import root
 from scipy.sparse.linalg import spsolve
 
 from reference import layered_channel
-from reference.channel_bvp import uptake
+from reference.monod import derivatives, slopes, uptake
 
-RESTS, MOST, NUDGE = 1e-13, 50, 1e-6
+RESTS, MOST = 1e-13, 50
 #: Parts of a step of Newton's method that are tried; the whole one where none lowers the defect: it is round-off then.
 PARTS = 0.5 ** np.arange(10)
 
@@ -112,8 +112,8 @@ class Section:
             defect, size = self._defect(weight, fields)
             if (np.abs(defect) <= RESTS * size).all():
                 return fields
-            blocks = [[sp.diags_array(weight * slope) for slope in row] for row in _slopes(fields, self.pore.rates)]
-            step = spsolve(sp.csc_array(self.transport + sp.block_array(blocks)), defect).reshape(2, -1)
+            derivative = self.transport + slopes(fields, weight, self.pore.rates)
+            step = spsolve(sp.csc_array(derivative), defect).reshape(2, -1)
             fields = fields + step * next((part for part in PARTS if self._falls(weight, fields, part * step)), 1.0)
         raise RuntimeError(f"the finite volumes do not come to rest: {(np.abs(defect) / size).max():.2g} are left")
 
@@ -143,20 +143,18 @@ def _unit_flux(cells):
     return _matrix(CentralDifferenceConvectionTerm(coeff=(1.0,)), Grid1D(nx=cells, dx=1.0))
 
 
-def _slopes(fields, rates):
-    """(2, 2, ...) derivatives of (q_A, q_D), the rows, by (C_A, C_D), fields (2, ...), by central differences."""
-    shifts = NUDGE * np.eye(2).reshape(2, 2, *[1] * (fields.ndim - 1))
-    columns = [np.stack(uptake(*(fields + d), rates)) - np.stack(uptake(*(fields - d), rates)) for d in shifts]
-    return np.stack(columns, axis=1) / (2 * NUDGE)
-
-
 class Averaged:
     """The run of a seed, cells ``lengths`` and ``heights`` (n,); fluid: cells on each side of it; keeps_shape: is it no
     strip?"""
 
     def __init__(self, pore, lengths, heights, fluid, keeps_shape):
-        self.pore, self.lengths, self.heights, self.fluid = pore, lengths, heights, fluid
-        self.areas, self.keeps_shape, self.fields = lengths * heights, keeps_shape, None
+        self.pore = pore
+        self.lengths = lengths
+        self.heights = heights
+        self.fluid = fluid
+        self.areas = lengths * heights
+        self.keeps_shape = keeps_shape
+        self.fields = None
         self.supply = lambda _: pore.supply
 
     def seed(self):
@@ -169,11 +167,13 @@ class Averaged:
                           rtol=accuracy, atol=accuracy)
         return [self._moment(time, state) for time, state in zip(found.t, found.y.T)]
 
-    def run_through(self, pieces, times, accuracy=1e-6):
+    def run_through(self, pieces, times, accuracy):
         """The moments at ``times``, ascending, while the supply changes: pieces (end, supply at the piece's start and
         at its end), ascending, evenly in between; the last ends with the last time. A moment at a piece's end is one
         of the next piece's start."""
-        state, begin, found = self._start(), 0.0, []
+        state = self._start()
+        begin = 0.0
+        found = []
         for number, (end, first, last) in enumerate(pieces, 1):
             self.fields = None
             self.supply = partial(_evenly, begin, end, np.array(first), np.array(last))
@@ -244,5 +244,5 @@ def excess(pore, radius, velocity):
     carried = velocity * pore.width
     mixed = root(lambda c: carried * (supply - c) - uptaken * np.array(uptake(*c, pore.rates)), supply, tol=1e-13).x
     lack = constriction(radius, pore.width) * pore.density * np.array(uptake(*mixed, pore.rates)) / pore.diffusivity
-    slopes = uptaken * _slopes(mixed, pore.rates)
-    return np.linalg.solve(carried * np.eye(2) + slopes, slopes @ lack)
+    rises = uptaken * derivatives(mixed, pore.rates)
+    return np.linalg.solve(carried * np.eye(2) + rises, rises @ lack)

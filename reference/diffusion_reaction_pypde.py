@@ -56,7 +56,7 @@ class Box:
         index = np.arange(len(colour)).reshape(self.grid.shape)
         pairs = [(index, index), (index[1:], index[:-1]), (index[:-1], index[1:]), (index[:, 1:], index[:, :-1]),
                  (index[:, :-1], index[:, 1:])]
-        rows, columns = (np.concatenate([pair[k].ravel() for pair in pairs]) for k in (0, 1))
+        rows, columns = (np.concatenate([*map(np.ravel, side)]) for side in zip(*pairs))
         return sp.csc_array((answers[colour[columns], rows], (rows, columns)), shape=(len(colour),) * 2)
 
     def steady(self, diffusivity, supply, density, rates):

@@ -16,6 +16,7 @@ D, and what bends A, are small as 1 / nu, so that stresses are of order one. The
 phase lacks, f = -div(nu grad u) + grad p or -div(nu (grad u + grad u^T)) + grad p, worked out by sympy.
 """
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 import sympy as sp
@@ -49,7 +50,9 @@ def phases(ratio, interface):
 def _phase(viscosity, ratio, interface, slope):
     """One side; ``slope`` is the part of dp/ds that is its own."""
     t = sp.Symbol("t")
-    A, shear, D = t + t**2 / 2 + sp.sin(3 * t) / (9 * ratio), sp.cos(2 * t), sp.sin(2 * t + 1) / viscosity
+    A = t + t**2 / 2 + sp.sin(3 * t) / (9 * ratio)
+    shear = sp.cos(2 * t)
+    D = sp.sin(2 * t + 1) / viscosity
     C = -shear / (2 * viscosity) if interface == "laplacian" else (sp.diff(A, t, 2) - shear / viscosity) / 2
     psi = (A + S / 2 + C * S**2 + D * S**3).subs(t, T)
     velocity, pressure = sp.Matrix([sp.diff(psi, Y), -sp.diff(psi, X)]), sp.cos(2 * S + T) + slope * S
@@ -61,7 +64,7 @@ def _phase(viscosity, ratio, interface, slope):
 def evaluated(ratio, interface):
     """(velocity, pressure, force), functions of places (x, y): arrays (..., 2), (...) and (..., 2)."""
     pair = phases(ratio, interface)
-    velocity, force = (_at([getattr(phase, what) for phase in pair]) for what in ("velocity", "force"))
+    velocity, force = (_at([*map(attrgetter(what), pair)]) for what in ("velocity", "force"))
     pressure = _at([sp.Matrix([phase.pressure]) for phase in pair])
     return velocity, lambda x, y: pressure(x, y)[..., 0], force
 

@@ -7,6 +7,7 @@ Below zero, where only an iterate can be, C / (C + K_s) goes on as C / K_s, and 
 import numpy as np
 import scipy.sparse as sp
 
+#: mg/L, of the differences.
 NUDGE = 1e-6
 
 
@@ -22,9 +23,14 @@ def sink(fields, load, rates):
     return (load * np.stack(uptake(*fields.reshape(2, -1), rates))).ravel()
 
 
+def derivatives(fields, rates):
+    """(2, 2, ...) derivatives of (q_A, q_D), the rows, by (C_A, C_D), fields (2, ...), by central differences."""
+    shifts = NUDGE * np.eye(2).reshape(2, 2, *[1] * (fields.ndim - 1))
+    columns = [np.stack(uptake(*(fields + d), rates)) - np.stack(uptake(*(fields - d), rates)) for d in shifts]
+    return np.stack(columns, axis=1) / (2 * NUDGE)
+
+
 def slopes(fields, load, rates):
-    """(2n, 2n) derivative of :func:`sink`, place by place, by central differences of NUDGE mg/L."""
-    both = fields.reshape(2, -1)
-    columns = [load * (np.stack(uptake(*(both + d), rates)) - np.stack(uptake(*(both - d), rates))) / (2 * NUDGE)
-               for d in NUDGE * np.eye(2)[:, :, None]]
-    return sp.block_array([[sp.diags_array(columns[s][k]) for s in (0, 1)] for k in (0, 1)], format="csc")
+    """(2n, 2n) derivative of :func:`sink`, place by place."""
+    rows = load * derivatives(fields.reshape(2, -1), rates)
+    return sp.block_array([[*map(sp.diags_array, row)] for row in rows], format="csc")

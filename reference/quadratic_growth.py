@@ -39,9 +39,10 @@ from skfem import (
 )
 from skfem.helpers import ddot, det, grad
 
-#: Newton stops at a step this small against the size of the body, and is given up after that many, or after that many
-#: halvings of one.
-SMALL, MOST, HALVINGS = 1e-10, 30, 10
+#: Newton stops at a step this small against the size of the body, and is given up after that many,
+SMALL, MOST = 1e-10, 30
+#: or after that many halvings of one.
+HALVINGS = 10
 #: kappa over mu theta^(-5/3); theta is raised by this factor at a time.
 STIFFENING, FACTOR = 3.0, 1.6
 #: Newton's steps for a point's local coordinates; a bent edge is nearly straight, so that they converge at once.
@@ -119,7 +120,7 @@ def _rings(radius, rings):
     height = np.where(turn % 1 == 0, 0.0, np.sin(np.pi * turn))
     points = radius * r * np.array([np.cos(np.pi * turn), height])
     triangles = Delaunay(points.T).simplices.T
-    a, b, c = points[:, triangles[0]], points[:, triangles[1]], points[:, triangles[2]]
+    a, b, c = points[:, triangles].swapaxes(0, 1)
     area = np.abs((b - a)[0] * (c - a)[1] - (b - a)[1] * (c - a)[0])
     return MeshTri(points, triangles[:, area > 1e-9 * (radius / rings) ** 2].copy())
 
@@ -185,15 +186,20 @@ def _newton(basis, lower, theta, mu, held, value, place, pressure):
     for _ in range(MOST):
         lag = np.zeros(basis.N + lower.N)
         lag[held] = (value - place)[held]
-        state = _state(basis, lower, theta, mu, place, pressure)
-        K, B = asm(_stiffness, basis, **state), asm(_coupling, basis, lower, **state)
-        right = -np.concatenate([asm(_force, basis, **state), asm(_gap, lower, **state)])
-        step = solve(*condense(bmat([[K, B.T], [B, None]], "csc"), right, x=lag, D=held))
+        step = newton_step(basis, lower, theta, mu, place, pressure, x=lag, D=held)
         step = step * _length(basis, place, step[: basis.N])
         place, pressure = place + step[: basis.N], pressure + step[basis.N:]
         if np.abs(step[: basis.N]).max() < SMALL * np.ptp(place):
             return place, pressure
     raise RuntimeError(f"Newton's method still steps by {np.abs(step[: basis.N]).max():.2g} after {MOST} iterations")
+
+
+def newton_step(basis, lower, theta, mu, place, pressure, **held):
+    """(N + M,) Newton's step of places and pressures; held: what :func:`skfem.condense` takes out."""
+    state = _state(basis, lower, theta, mu, place, pressure)
+    K, B = asm(_stiffness, basis, **state), asm(_coupling, basis, lower, **state)
+    right = -np.concatenate([asm(_force, basis, **state), asm(_gap, lower, **state)])
+    return solve(*condense(bmat([[K, B.T], [B, None]], "csc"), right, **held))
 
 
 def _length(basis, place, move):
@@ -224,7 +230,9 @@ def _force(v, w):
 
 @BilinearForm
 def _stiffness(u, v, w):
-    G, J, third = grad(u), w["J"], w["trace"] / (3 * w["J"])
+    G = grad(u)
+    J = w["J"]
+    third = w["trace"] / (3 * J)
     j, turned = ddot(w["c"], G), _cofactor(G)
     ds = G - 2 / 3 * j / J * w["F"] + (5 / 3 * j / J * third - 2 / 3 * ddot(w["F"], G) / J) * w["c"] - third * turned
     return ddot(w["A"] * ds + w["p"] * turned + w["kappa"] * j * w["c"], grad(v))

@@ -83,7 +83,9 @@ def _placed(t, s, radius, angle, width, end):
 
 def _boundary(basis, radius, angle, width, end, motion):
     """Numbers of the prescribed unknowns, and all values (zero elsewhere)."""
-    (x, y), component, near = basis.doflocs, np.arange(basis.N) * 0, 1e-9 * width
+    x, y = basis.doflocs
+    component = np.zeros(basis.N, int)
+    near = 1e-9 * width
     component[np.concatenate([basis.nodal_dofs[1], basis.facet_dofs[1]])] = 1
     arc = np.abs(np.hypot(x, y + radius * np.cos(angle)) - radius) < near
     wall, ends = (y < near) | (y > width - near), np.abs(x) > end - near

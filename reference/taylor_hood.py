@@ -86,16 +86,6 @@ def half_disc(width, ends, radius, refinements, corner=6):
     return Channel(_curved(mesh, radius), _inside(mesh, radius), width, ends)
 
 
-def plug(width, ends, half_length, parts):
-    """Biomass over the full width for |x| < half_length; ``parts`` elements across."""
-    lines = [ends[0], -half_length, half_length, ends[1]]
-    pieces = [np.linspace(a, b, round((b - a) / width * parts) + 1) for a, b in zip(lines, lines[1:])]
-    x = np.unique(np.concatenate(pieces))
-    mesh = MeshTri.init_tensor(x, np.linspace(0.0, width, parts + 1))
-    middle = mesh.p[0, mesh.t].mean(axis=0)
-    return Channel(MeshTri2.from_mesh(mesh), np.abs(middle) < half_length, width, ends)
-
-
 def _rings(width, radius):
     """Rings around the origin, closer than the wall where it can be."""
     radii = radius * np.array([0.4, 0.7, 1.0, 1.35, 1.8, 2.5, 3.5, 5.0, 7.0])

@@ -24,7 +24,9 @@ def _strength(ratio, interface):
 
 def outside(x, y, radius, ratio, interface, angle):
     """(velocity (..., 2), pressure) of the fluid's solution at points on the circle or beyond it."""
-    z, E, A = np.asarray(x) + 1j * np.asarray(y), np.exp(2j * angle), _strength(ratio, interface)
+    z = np.asarray(x) + 1j * np.asarray(y)
+    E = np.exp(2j * angle)
+    A = _strength(ratio, interface)
     phi, slope = -2 * A * E * radius**2 / z, 2 * A * E * radius**2 / z**2
     psi = -2 * np.conj(E) * z - 2 * A * E * radius**4 / z**3
     return _pair((phi - z * np.conj(slope) - np.conj(psi)) / 2), -2 * slope.real
@@ -32,7 +34,9 @@ def outside(x, y, radius, ratio, interface, angle):
 
 def inside(x, y, ratio, interface, angle):
     """(velocity (..., 2), pressure) of the inclusion: uniform strain, no pressure."""
-    z, E, A = np.asarray(x) + 1j * np.asarray(y), np.exp(2j * angle), _strength(ratio, interface)
+    z = np.asarray(x) + 1j * np.asarray(y)
+    E = np.exp(2j * angle)
+    A = _strength(ratio, interface)
     return _pair((1 - A) * E * np.conj(z)), np.zeros(z.shape)
 
 

@@ -146,7 +146,7 @@ class Run:
 
 def _ends(pore, outline):
     """Ends (um) of the meshed part (3.1)."""
-    (right, _), (left, _), thickness = outline(0.0), outline(np.pi), outline(np.pi / 2)[1]
+    (right, _), (left, _), (_, thickness) = map(outline, (0.0, np.pi, np.pi / 2))
     reach = min(10 * thickness, 1.5 * pore.width)
     return left - reach, right + reach
 

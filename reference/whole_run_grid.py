@@ -41,7 +41,9 @@ class Grid:
     def around(self, places, width, ends):
         """``places`` (2, K) um of the aggregate's nodes, and with them those of the fluid's in a channel of that width
         (um) between two ends (um)."""
-        (r, a), line, thickness = self.polar, self.outline(places), places[1, self.rim].max()
+        r, a = self.polar
+        line = self.outline(places)
+        thickness = places[1, self.rim].max()
         beyond = (width + thickness) / 2
         right, left = line(0.0)[0] + beyond, line(np.pi)[0] - beyond
         stretch = np.log1p(width / (2 * thickness))
@@ -93,7 +95,8 @@ def _layers(rings):
     number = np.arange(points.shape[1]).reshape(2 * rings + 1, -1)
     j, i = np.indices((2 * rings, 4 * rings)).reshape(2, -1)
     j, i = np.array([j, i])[:, (j < rings) | (i < rings) | (i >= 3 * rings)]
-    a, b, c, d = number[j, i], number[j + 1, i], number[j + 1, i + 1], number[j, i + 1]
+    a, b = number[j, i], number[j + 1, i]
+    c, d = number[j + 1, i + 1], number[j, i + 1]
     right = i < 2 * rings  # the two halves are mirror images
     found = np.hstack([np.where(right, [a, b, c], [a, b, d]), np.where(right, [a, c, d], [b, c, d])])
     kept, triangles = np.unique(found, return_inverse=True)

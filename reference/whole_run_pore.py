@@ -32,7 +32,7 @@ from skfem import (
 )
 from skfem.helpers import dot, grad
 
-from reference.monod import NUDGE, uptake
+from reference.monod import derivatives, uptake
 
 #: Newton stops at this change of C over the supply, and is given up after that many steps.
 SMALL, MOST = 1e-10, 30
@@ -134,16 +134,18 @@ def _inside(body, fields):
 
 def _step(body, operators, active, rates, fields, free):
     """Newton's step (2, free) of both substrates; slopes of the uptake by central differences."""
-    here, nudges = _inside(body, fields), NUDGE * np.eye(2)[:, :, None, None]
+    here = _inside(body, fields)
     residual = [(matrix @ field - source + asm(_load, body, value=active * rate))[free]
                 for (matrix, source), field, rate in zip(operators, fields, uptake(*here, rates))]
-    columns = [(np.array(uptake(*(here + d), rates)) - np.array(uptake(*(here - d), rates))) / (2 * NUDGE)
-               for d in nudges]
-    blocks = [[asm(_mass, body, value=active * column[k]) for column in columns] for k in (0, 1)]
-    for k, (matrix, _) in enumerate(operators):
-        blocks[k][k] = blocks[k][k] + matrix
-    blocks = [[block.tocsr()[free][:, free] for block in row] for row in blocks]
-    return -splu(sp.block_array(blocks, format="csc")).solve(np.concatenate(residual)).reshape(2, -1)
+    slopes = active * derivatives(here, rates)
+
+    def block(k, s):
+        added = asm(_mass, body, value=slopes[k, s])
+        whole = operators[k][0] + added if k == s else added
+        return whole.tocsr()[free][:, free]
+
+    matrix = sp.block_array([[block(k, 0), block(k, 1)] for k in (0, 1)], format="csc")
+    return -splu(matrix).solve(np.concatenate(residual)).reshape(2, -1)
 
 
 def _divergence(basis):

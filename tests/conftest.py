@@ -17,22 +17,17 @@ signal.signal(signal.SIGINT, signal.default_int_handler)  # in the background it
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 
 
-@pytest.fixture(scope="module")
-def fast(tmp_path_factory):
-    """The folder of a run of base in preset fast, for pages."""
-    return pages.run(tmp_path_factory.mktemp("fast"), "base", pages.FAST, 'growth.end="3 h"')
+def run_of(name, *given):
+    """A fixture: the folder of a run, for pages; whoever changes it copies it."""
+    @pytest.fixture(scope="session", name=name)
+    def made(tmp_path_factory):
+        return pages.run(tmp_path_factory.mktemp(name), *given)
+    return made
 
 
-@pytest.fixture(scope="module")
-def paper(tmp_path_factory):
-    """The same of the paper's scheme."""
-    return pages.run(tmp_path_factory.mktemp("paper"), "base", 'growth.end="1 h"')
-
-
-@pytest.fixture(scope="module")
-def flow_only(tmp_path_factory):
-    """The same of flow without an aggregate's growth."""
-    return pages.run(tmp_path_factory.mktemp("flow"), "flow_only")
+fast = run_of("fast", "base", pages.FAST, 'growth.end="3 h"')
+paper = run_of("paper", "base", 'growth.end="1 h"')
+flow_only = run_of("flow_only", "flow_only")
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -13,11 +13,6 @@ def area(corners):
     return 0.5 * ((bx - ax) * (cy - ay) - (by - ay) * (cx - ax))
 
 
-def slopes(corners):
-    """(3, 2) gradients of the three nodal functions: rows of the inverse of [1 x y] at the corners."""
-    return np.linalg.inv(np.column_stack([np.ones(3), corners]))[1:].T
-
-
 def diameter(corners):
     """Of the circumscribed circle: a / sin(alpha), with the angle opposite to the first side."""
     a, b, c = (math.dist(corners[i], corners[j]) for i, j in ((1, 2), (2, 0), (0, 1)))
@@ -56,11 +51,3 @@ def extent(places, width, length):
     reach = 10 * thickness if 10 * thickness < 1.5 * width else 1.5 * width
     left, right = min(x for x, _ in places) - reach, max(x for x, _ in places) + reach
     return (left if left > -length / 2 else -length / 2), (right if right < length / 2 else length / 2)
-
-
-def energy(F, P, theta):
-    """(17) with (21): 1/2 (J^(-2/3) tr C - 3) + P (J - theta), mu_L = 1, of the whole deformation with F33 = 1."""
-    whole = np.zeros((3, 3))
-    whole[:2, :2], whole[2, 2] = F, 1.0
-    J, trace = np.linalg.det(whole), np.trace(whole.T @ whole)
-    return (J ** (-2 / 3) * trace - 3) / 2 + P * (J - theta)

@@ -46,6 +46,11 @@ LEDGERS = {f"Ledger: {name}": {label: f"{name}_{part}_pg_per_m" for label, part 
                                 "stored": "stored"}.items()} for name in ("acceptor", "donor")}
 
 
+#: Columns and arrays without a unit.
+PURE = """inert_fraction biomass_density_min biomass_density_max acceptor_balance donor_balance biomass_balance
+oxygen_demand_balance nodes remeshed contact region theta J active_biomass inert_biomass""".split()
+
+
 #: Whole runs of scenes that several tests ask for.
 WHOLE = TemporaryDirectory(prefix="whole-")
 

@@ -68,19 +68,27 @@ def flags(*entries) -> list[str]:
     return [part for entry in entries for part in ("--set", entry)]
 
 
-def state(folder: Path) -> dict[Path, tuple[int, bytes]]:
-    """Every file of a folder, with the time at which it was written and its content; nothing of a folder that is not
-    there."""
-    return {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in folder.rglob("*") if path.is_file()}
+def state(folder: Path) -> dict[Path, object]:
+    """A folder, if it is there, and all that is in it; of each file the time at which it was written and its content.
+    """
+    there = [folder, *folder.rglob("*")] if folder.exists() else []
+    return {path: path.is_file() and (path.stat().st_mtime_ns, path.read_bytes()) for path in there}
 
 
-def refused(folder: Path, capsys, *arguments: str) -> str:
-    """What is said of `repro run ARGUMENTS` that is refused, with status 2 and one line, and changes nothing there."""
+def refused(folder: Path, capsys, *arguments) -> str:
+    """What is said of `repro ARGUMENTS` that is refused, with status 2 and one line, and changes nothing in a folder.
+    """
     before = state(folder)
-    assert main(["run", *arguments]) == 2
-    message = capsys.readouterr().err
-    assert message.count("\n") == 1 and state(folder) == before
+    capsys.readouterr()
+    assert main([*map(str, arguments)]) == 2
+    out, message = capsys.readouterr()
+    assert (out, message.count("\n")) == ("", 1) and state(folder) == before
     return message
+
+
+def resumed(folder: Path, *options: str) -> int:
+    """The exit status of `repro run --resume FOLDER --quiet`."""
+    return main(["run", "--resume", str(folder), "--quiet", *options])
 
 
 def every(count: int):

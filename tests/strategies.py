@@ -6,7 +6,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 
 from repro.fem import mesher, sizing
-from repro.fem.mesh import Mesh, curved, triangle_areas
+from repro.fem.mesh import curved
 from repro.fem.outline import BOTTOM, FREE, TOP, Outline
 from repro.fem.outline import half_disc as half_disc_outline
 from repro.fem.sizing import Sizing
@@ -21,9 +21,6 @@ widths = st.floats(10.0, 200.0)
 standard = st.just(50.0)  # the width of section 4
 lengths = st.floats(300.0, 1000.0)
 refinements = st.floats(0.4, 2.0)
-angles = st.floats(-math.pi, math.pi)
-
-
 #: Orders of velocity and concentrations, and what scenes call them.
 ORDERS = {1: "linear", 2: "quadratic", 3: "cubic"}
 
@@ -84,31 +81,6 @@ def meshes(draw, width=standard, finest=0.6, clean=True):
     kinds = [attached_aggregates(width), outlines(width)] + [st.tuples(st.none(), width)] * clean
     outline, width = draw(st.one_of(kinds))
     return meshed(outline, width, draw(st.floats(0.35, finest)), film=0.1 * width)[0]
-
-
-@st.composite
-def remesh_chains(draw, longest=4, finest=0.9):
-    """[(points, triangles)] of one aggregate: unrelated meshes, each around the outline that the last one left."""
-    outline, width = draw(attached_aggregates(thinnest=0.2) | outlines())
-    chain = []
-    for refinement in draw(st.lists(st.floats(0.35, finest), min_size=2, max_size=longest)):
-        grid, outline = meshed(outline, width, refinement)
-        chain.append((grid.points[grid.body], grid.topology.body_cells))
-    return chain
-
-
-def rotation(angle):
-    """(2, 2) turn by an angle."""
-    return np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
-
-
-@st.composite
-def admissible_F(draw):
-    """(2, 2) deformation with det F > 0: turned, stretched by up to 3 one way and as much less the other, turned again,
-    and grown in area by a factor from 1/4 to 3600."""
-    stretch = draw(st.floats(1.0, 3.0))
-    plane = rotation(draw(angles)) @ np.diag([stretch, 1 / stretch]) @ rotation(draw(angles))
-    return draw(between(0.5, 60.0)) * plane
 
 
 @st.composite
@@ -227,32 +199,11 @@ def bent_inside(grid, by=0.2):
     return grid.moved(points).checked()
 
 
-def relabelled(grid, biomass):
-    """The same triangles with others of them as biomass: a mesh of its own, with nothing remembered of the first."""
-    return Mesh.of(grid.points, grid.cells, biomass, np.empty(0, int), grid.width, grid.ends)
-
-
-def turned(cells):
-    """Triangles (T, 3 or 6) with their corners the other way round, each middle still on its edge."""
-    return cells[:, [0, 2, 1] if cells.shape[1] == 3 else [0, 2, 1, 5, 4, 3]]
-
-
-def reversed_loop(grid):
-    """A loop the other way round, corners first where there are middles."""
-    back = grid.loop[::-1]
-    return back if grid.geometry == 1 else np.roll(back, -1)
-
-
-def reversed_mesh(grid):
-    """The image of a mesh in x -> -x."""
-    return Mesh.of(grid.points * [-1, 1], turned(grid.cells), grid.biomass, reversed_loop(grid), grid.width,
-                   (-grid.ends[1], -grid.ends[0]))
-
-
-def upside_down(grid):
-    """The image of a mesh in y -> W - y."""
-    return Mesh.of(grid.points * [1, -1] + [0, grid.width], turned(grid.cells), grid.biomass, reversed_loop(grid),
-                   grid.width, grid.ends)
+def on_the_boundary(triangles):
+    """Of each triangle, how many of its edges no other one has, sorted."""
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2))
+    _, which, count = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    return sorted((count[which] == 1).reshape(-1, 3).sum(axis=1))
 
 
 def body_of(grid, around, order=None):
@@ -267,11 +218,6 @@ def half_disc(radius, refinement=1.0, width=50.0, geometry=1):
     """(growth.Body, held, its rim, outline) of a half-disc on the lower wall."""
     grid, around = meshed(seed(radius, refinement, geometry), width, refinement)
     return *body_of(grid, around), around
-
-
-def lumped(points, triangles):
-    """(N,) sum of |tau| / 3 over the triangles at each node."""
-    return np.bincount(triangles.ravel(), np.repeat(triangle_areas(points, triangles) / 3, 3), len(points))
 
 
 def fitted_order(sizes, errors):

@@ -10,6 +10,7 @@ from repro.cli import main
 from repro.report import charts, comparison, quantities
 from repro.report.reading import read
 from tests.pages import Page, check_drawn
+from tests.shell import refused
 
 
 @pytest.fixture
@@ -62,22 +63,15 @@ def test_runs_of_the_same_folder_name_are_told_by_their_paths(fast, paper):
     assert comparison.short([fast, fast.parent]) == ["run", fast.parent.name]
 
 
-def refused(capsys, *arguments):
-    assert main(["compare", *map(str, arguments)]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    return line
-
-
 def test_what_cannot_be_compared_is_refused(fast, tmp_path, capsys):
     """In one line that says which folder and why, and nothing is written."""
-    out = tmp_path / "out.html"
-    assert f"{tmp_path}: it holds no run: run.json is missing" in refused(capsys, fast, tmp_path, "--out", out)
-    assert "run.json is missing" in refused(capsys, fast, tmp_path / "none", "--out", out)
-    assert "two runs or more" in refused(capsys, fast, "--out", out)
-    assert "ends in .html" in refused(capsys, fast, fast, "--out", tmp_path / "out.csv")
-    assert "is the folder of a run" in refused(capsys, fast, fast, "--out", fast / "other.html")
-    assert "No such file" in refused(capsys, fast, fast, "--out", tmp_path / "none" / "out.html")
-    assert list(tmp_path.iterdir()) == []
+    out, none = tmp_path / "out.html", tmp_path / "none"
+    for folders, target, said in (((fast, tmp_path), out, f"{tmp_path}: it holds no run: run.json is missing"),
+                                  ((fast, none), out, "run.json is missing"), ((fast,), out, "two runs or more"),
+                                  ((fast, fast), tmp_path / "out.csv", "ends in .html"),
+                                  ((fast, fast), fast / "other.html", "is the folder of a run"),
+                                  ((fast, fast), none / "out.html", "No such file")):
+        assert said in refused(target.parent, capsys, "compare", *folders, "--out", target)
 
 
 @pytest.mark.parametrize("name, content", [
@@ -88,5 +82,5 @@ def test_what_cannot_be_compared_is_refused(fast, tmp_path, capsys):
 def test_a_broken_run_is_refused_by_the_name_of_its_file(fast, tmp_path, capsys, name, content):
     copy = shutil.copytree(fast, tmp_path / "run")
     (copy / name).write_bytes(content if isinstance(content, bytes) else content.encode())
-    line = refused(capsys, fast, copy, "--out", tmp_path / "out.html")
-    assert str(copy) in line and name in line and not (tmp_path / "out.html").exists()
+    line = refused(tmp_path, capsys, "compare", fast, copy, "--out", tmp_path / "out.html")
+    assert str(copy) in line and name in line

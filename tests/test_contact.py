@@ -69,26 +69,30 @@ def test_a_half_disc_with_a_film_closes_nothing(radius):
 
 @given(attached_aggregates(thickest=1.02))
 def test_closing_is_the_same_in_a_mirror(drawn):
+    """Nothing that is on a wall joins again; under the upper wall all that is nearer than the film does."""
     outline, width = drawn
-    found = contact.closing_nodes(outline, width, FILM, ANGLE)
-    assert contact.closing_nodes(mirrored(outline), width, FILM, ANGLE).tolist() == found[::-1].tolist()
-    assert contact.closing(outline, width, FILM, ANGLE).tolist() == found.tolist()
-    assert ((found == FREE) | (outline.wall == FREE)).all()
+    found = closed_alike(outline, width)
+    assert contact.closing_nodes(outline, width, FILM, ANGLE).tolist() == found.tolist()
     over = (outline.wall == FREE) & (width - outline.points[:, 1] < FILM)
     assert (found[over] == TOP).all() and not (found[~over] == TOP).any()
 
 
 @given(attached_aggregates(thickest=1.02, geometry=2))
 def test_closing_of_arcs_is_the_same_in_a_mirror(drawn):
-    """Nothing that is on a wall joins again, and middles join with both corners of their arc on one wall."""
+    """Middles join with both corners of their arc on one wall."""
     outline, width = drawn
-    found = contact.closing(outline, width, FILM, ANGLE)
-    image = contact.closing(mirrored(outline), width, FILM, ANGLE)
-    assert image.tolist() == np.roll(found[::-1], -1).tolist()
-    assert ((found == FREE) | (outline.wall == FREE)).all()
+    found = closed_alike(outline, width)
     wall = np.where(found == FREE, outline.wall, found)
     middles = np.flatnonzero(wall[1::2] != FREE) * 2 + 1
     assert (wall[middles - 1] == wall[middles]).all() and (wall[(middles + 1) % len(wall)] == wall[middles]).all()
+
+
+def closed_alike(outline, width):
+    """What closes, the same in a mirror."""
+    found, image = (contact.closing(each, width, FILM, ANGLE) for each in (outline, mirrored(outline)))
+    assert image.tolist() == np.roll(found[::-1], 1 - outline.geometry).tolist()
+    assert ((found == FREE) | (outline.wall == FREE)).all()
+    return found
 
 
 def flat_top(heights, width=20.0):

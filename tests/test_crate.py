@@ -8,6 +8,7 @@ import pytest
 
 from paper_figures import FIGURES, crate, manifest
 from tests.test_architecture import faults
+from verification.claims import EXPECTED, VERDICTS
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +77,17 @@ def test_the_run_is_that_of_the_figures(made):
     assert {Path(name).name for name in used} == {"base.toml", "wide.toml", "initial_mesh.toml", "pyproject.toml",
                                                   "requirements.lock"}
     assert {Path(name).stem for name in drawn} == {*FIGURES, "manifest"} and len(drawn) == 2 * len(FIGURES) + 1
-    assert {Path(name).name for name in refers(found["#claims"], "result")} >= {"replication.json", "claims.json"}
+    judged = refers(found["#claims"], "result")
+    assert {Path(name).name for name in judged} == {"replication.md", "claims.json"}
+    told = json.loads((made / "verification/claims/claims.json").read_text(encoding="utf-8"))
+    assert [each["id"] for each in told] == list(EXPECTED) and {each["verdict"] for each in told} <= set(VERDICTS)
+
+
+def test_no_other_record_of_the_claims_is_packed(made):
+    """One list of verdicts: a copy that nothing writes comes to tell others."""
+    others = [path for path in made.rglob("*.json") if path.name not in ("claims.json", crate.METADATA)
+              and '"verdict"' in path.read_text(encoding="utf-8") and '"C01"' in path.read_text(encoding="utf-8")]
+    assert others == []
 
 
 @pytest.mark.parametrize("source, why", [(None, "there are no figures; `make figures` makes them"),

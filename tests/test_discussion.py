@@ -57,10 +57,66 @@ def test_little_biomass_takes_up_as_much_as_the_supply_lets_it():
     assert discussed.layers_share(said, 0.2) > 0.9 > discussed.layers_share(said, 0.2, 10 * flow)
 
 
-def test_a_layer_in_the_model_takes_up_what_the_reference_says():
-    """To what the layer's own gradients leave out."""
-    part = 0.03
-    assert discussed.in_the_model(part) == pytest.approx(discussed.layers_share(scene("wide"), part), rel=0.03)
+def test_layers_in_the_model_have_the_biomass_and_the_walls():
+    said, part = scene("wide"), 0.15
+    for walls in (1, 2):
+        grid = discussed.layered(said, part, walls)
+        areas = triangle_areas(grid.points, grid.triangles)
+        assert areas.min() > 0 and areas.sum() == pytest.approx(100 * 600, rel=1e-12)
+        assert areas[grid.biomass].sum() == pytest.approx(part * 100 * 600, rel=1e-12)
+        covered = grid.points[grid.cells[grid.biomass, :3], 1]
+        assert (covered.min(), covered.max() == 100) == (0, walls == 2)
+
+
+def test_layers_in_the_model_take_up_what_the_reference_says():
+    """But for what they see of the drop across the pore: half the distance on either wall is a quarter of it."""
+    part = 0.066
+    left = [1 - discussed.in_the_model(part, walls) / discussed.layers_share(scene("wide"), part) for walls in (1, 2)]
+    assert 0 < 3 * left[1] < left[0] < 0.03
+
+
+def test_nothing_left_at_the_surface_is_the_limit_of_ever_faster_uptake():
+    """Whatever the supply is; the uptake of Table 1 times a hundred is a good way from it."""
+    with at_level(Level(CONVERGED, 2.0)):
+        rates = [discussed.sherwood(discussed.in_one_shape(supply=1.0, faster=more))[0] for more in (1.0, 100.0, 1e3)]
+        poor, rich = (discussed.at_the_surface(discussed.in_one_shape(supply=supply)) for supply in (1.0, 100.0))
+    assert discussed.sherwood(poor) == pytest.approx(discussed.sherwood(rich), rel=1e-9)
+    limit, surface = discussed.sherwood(poor)[0], poor.grid.loop[poor.outline.interface_edges()]
+    assert rates[0] > rates[1] > 1.01 * limit and abs(rates[2] / limit - 1) < 0.5 * (rates[1] / limit - 1)
+    assert np.abs(poor.node("acceptor_mg_per_L")[surface]).max() == 0
+
+
+def test_what_could_be_is_judged_by_the_state_in_which_it_is_the_most(monkeypatch):
+    """Of C42 and C46 alike: one of three is enough."""
+    monkeypatch.setattr(fluid_and_aggregate, "body", lambda run, hour: hour)
+    monkeypatch.setattr(fluid_and_aggregate, "pressed", lambda found: found)
+    for changes, link, hangs in (((1.0, 2.0, -40.0), True, True), ((1.0, 2.0, -3.0), False, True),
+                                 ((-8.0, 9.0, -40.0), True, False)):
+        by_hour = dict(zip((hour for _, hour in fluid_and_aggregate.STATES), changes))
+        monkeypatch.setattr(fluid_and_aggregate, "changed", lambda pair, given=by_hour: given[pair[0]])
+        assert [check.holds for check in fluid_and_aggregate.torn_by_the_fluid().checks] == [link]
+        usual = {"aggregate": 1.0, "film": 1.0, "plug": 1.0, "contact": 1.0}
+        other = {name: 1 + change / 100 for name, change in zip(usual, changes)} | {"contact": 1.0}
+        both = iter((usual, other))
+        monkeypatch.setattr(rheology, "conductivities", lambda *pair, both=both: next(both))
+        assert [check.holds for check in rheology.drag_or_viscosity().checks] == [link, hangs]
+
+
+def test_the_places_of_the_largest_stress_on_other_sizes_are_told(monkeypatch):
+    """As a range, with that of the present level."""
+    places = {COARSE: 9.0} | {Level(CONVERGED, size): x for size, x in zip(levels.PAIRED, (-8.0, 5.0, -2.0))}
+    monkeypatch.setattr(fluid_and_aggregate, "body", lambda run, hour: levels.current())
+    monkeypatch.setattr(fluid_and_aggregate, "peak", lambda found: fluid_and_aggregate.Peak(1.0, places[found], 0.0))
+    told = fluid_and_aggregate._on_other_sizes({("wide",): 45.0})
+    assert "at x = -8 to 9 um in wide" in told and "size 2.25" in told
+
+
+def test_the_pressure_of_forces_is_that_of_the_aggregate_alone():
+    """There is none in the water."""
+    found = bodies(HOUR)[-1]
+    pressure = found.node("pressure_MPa")
+    assert np.isnan(pressure).any()
+    assert fluid_and_aggregate.forces(found).pressure == 1e6 * np.abs(pressure[found.grid.body]).max() > 0
 
 
 def test_decay_over_synthesis_at_rest():

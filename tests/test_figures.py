@@ -15,6 +15,9 @@ from paper_figures import claims, overview, page, runs, states, style
 from repro import cli, load_scene, run
 from repro.fem.outline import TOP, polygon_area
 from repro.scene import scene_hash
+from verification.claims.base_run import upstream_means
+from verification.claims.levels import at_level, converged
+from verification.claims.runs import grown_anew
 
 MODULES = {name: import_module(f"paper_figures.{name}") for name in paper_figures.FIGURES}
 SHORT = {"base": ['growth.end="0.6 h"', 'output.times=["0.4 h", "0.6 h"]'], "wide": ['growth.end="0.4 h"'],
@@ -70,7 +73,6 @@ def test_a_figure_says_what_it_is(name):
     kind, _, number = name.partition("_")
     assert module.TITLE.startswith(f"{kind.title()} {number}. " if kind in ("figure", "plate") else "Addition. ")
     assert module.CLAIMS and set(module.CLAIMS) <= set(claims.STATEMENTS)
-    assert callable(module.draw) and callable(module.caption)
 
 
 def test_every_figure_of_the_folder_is_drawn():
@@ -205,6 +207,47 @@ def test_outlines_are_smooth_between_the_walls_and_keep_their_nodes():
     assert contact > 5 and (line[(np.abs(line[:, 0]) < contact) & (line[:, 1] > 25), 1] == 50).all()
     free = line[(line[:, 1] > 1) & (line[:, 1] < 45)]
     assert np.abs(np.hypot(*free.T) / 51.0 - 1).max() < 1e-3
+
+
+def test_the_outlines_of_figure_6_are_those_of_the_converged_solution(short, monkeypatch):
+    """In the elements and steps by which the claims are judged, which the caption says; a row every tenth of an hour
+    around contact."""
+    (asked,) = figure_6.RUNS
+    said = asked.load()
+    assert said.numerics == load_scene("wide", converged(1.0)).numerics and said.numerics.order == 2
+    assert set(np.arange(5.0, 46.0, 5.0)) <= set(said.output.times) and said.growth.end == 45.0
+    around = [time for time in said.output.times if 34 <= time <= 35]
+    assert np.diff(around) == pytest.approx(0.1)
+    monkeypatch.setattr(figure_6, "EVERY", 0.2)
+    assert "the converged solution by which the claims are judged" in figure_6.caption(short["wide"])
+
+
+def test_the_first_outline_in_contact_is_drawn(short, monkeypatch):
+    """Dashed, over those of equal times."""
+    head = MODULES["discussion_head"]
+    monkeypatch.setattr(head, "EVERY", 0.2)
+    plain = head.draw(short["base"], short["wide"]).axes[0]
+    monkeypatch.setattr(head, "contact", lambda folder: 0.4)
+    axes = head.draw(short["base"], short["wide"]).axes[0]
+    assert plain.get_legend() is None and len(axes.patches) == len(plain.patches) + 1
+    (dashed,) = (patch for patch in axes.patches if patch.get_linestyle() == "--")
+    rim = states.near(short["base"], 0.4).rim
+    assert np.ptp(dashed.get_xy()[:, 0]) == pytest.approx(np.ptp(rim[:, 0]), rel=1e-9)
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["in contact, 0.4 h"]
+
+
+def test_the_pull_is_that_of_the_state_which_the_paper_tells_of(brief):
+    """The shape with what has grown in 12 min, whose uptake is larger: less is left upstream than without it."""
+    transfer = MODULES["discussion_transfer"]
+    made = transfer.draw()
+    (panel,) = (axes for axes in made.axes if "the pull upstream" in axes.get_title(loc="left"))
+    assert panel.get_title(loc="left") == "(b) the pull upstream at 0.6 h"
+    with at_level(transfer.LEVEL):
+        last = transfer.early()[-1]
+        ours, theirs = (upstream_means(*state, 60.0)[0] for state in
+                        (grown_anew(transfer.RUN, 0.4), (last.pore, last.solved)))
+    drawn = np.interp(60.0, *panel.lines[0].get_data())
+    assert drawn == pytest.approx(ours, rel=1e-6) and drawn < theirs - 1e-4
 
 
 def test_page_and_captions_tell_the_recorded_verdicts(monkeypatch):

@@ -19,9 +19,8 @@ from repro.run.checkpoint import LAST, NEWEST, PREVIOUS
 from repro.run.folder import LOCK, SUMS, held, prepare
 from repro.run.running import Watch, resume, run
 from repro.scene import load_scene, parse_scene, scene_tables
-from tests import shell
 from tests.pages import whole_of
-from tests.shell import as_whole, files, started, told, wait_for
+from tests.shell import as_whole, files, refused, resumed, started, told, wait_for
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="for Linux alone")
 FAST = ('numerics.preset="fast"', 'growth.end="3 h"')
@@ -48,8 +47,8 @@ def test_a_killed_run_leaves_no_lock_that_counts(tmp_path, capsys):
     out = tmp_path / "run"
     process = started("base", "--out", out, "--checkpoint", "0")
     wait_for((out / NEWEST).exists, process)
-    assert main(["run", "--resume", str(out)]) == 2 and main(["run", "flow_only", "--out", str(out)]) == 2
-    assert capsys.readouterr().err.count("another run is writing there") == 2
+    for asked in (["--resume", out], ["flow_only", "--out", out]):
+        assert "another run is writing there" in refused(tmp_path / "none", capsys, "run", *asked)
     process.kill()
     process.communicate()
     assert process.returncode == -signal.SIGKILL and (out / LOCK).exists()
@@ -100,11 +99,6 @@ def test_a_runs_files_are_listed(short):
     assert sums == {name: sha256(content).hexdigest() for name, content in files(out).items() if "vtu" in name}
 
 
-def refused(folder, out, capsys):
-    """What is said of a resume that is refused and changes nothing in a folder."""
-    return shell.refused(folder, capsys, "--resume", str(out), "--quiet")
-
-
 def test_nothing_is_removed_that_no_run_wrote(out, short, capsys):
     """A resume without a good checkpoint starts again, beside what others have put there, names of fields and tables
     among them."""
@@ -114,7 +108,7 @@ def test_nothing_is_removed_that_no_run_wrote(out, short, capsys):
                           "fields/notes/a.txt", "before_expansion.pvd"], b"years of work")
     for name, content in mine.items():
         (out / name).write_bytes(content)
-    assert main(["run", "--resume", str(out), "--quiet"]) == 0
+    assert resumed(out) == 0
     assert "starts again from t = 0" in capsys.readouterr().err
     assert files(out) == files(whole_of(short)) | mine
     assert not mine.keys() & {*told(out)["files"]}
@@ -125,12 +119,10 @@ def test_nothing_is_replaced_that_no_run_wrote(out, capsys):
     count = len(list((out / "fields").iterdir()))
     mine = out / "fields" / f"fields_{count:04d}.vtu"
     mine.write_text("years of work")
-    assert main(["run", "--resume", str(out), "--quiet"]) == 2
-    message = capsys.readouterr().err
-    assert f"{mine}: it is there, and this run has not written it" in message and message.count("\n") == 1
-    assert mine.read_text() == "years of work"
+    said = refused(mine, capsys, "run", "--resume", out, "--quiet")
+    assert f"{mine}: it is there, and this run has not written it" in said
     mine.unlink()
-    assert main(["run", "--resume", str(out), "--quiet"]) == 0
+    assert resumed(out) == 0
 
 
 @pytest.mark.parametrize("name", ["fields", "timeseries.csv", NEWEST, PREVIOUS, "report.html",
@@ -141,7 +133,7 @@ def test_links_are_refused(out, tmp_path, capsys, name):
     (out / "report.html").touch()
     (out / name).rename(tmp_path / "elsewhere")
     (out / name).symlink_to(tmp_path / "elsewhere")
-    message = refused(tmp_path, out, capsys)
+    message = refused(tmp_path, capsys, "run", "--resume", out)
     assert str(out / name) in message and "link" in message
 
 
@@ -150,7 +142,8 @@ def test_a_checkpoint_that_is_no_file_is_refused(out, capsys, make):
     """A pipe, a folder, a device: no hang."""
     (out / NEWEST).unlink()
     make(out / NEWEST)
-    assert f"{out / NEWEST}: it is a link, or no regular file" in refused(out / "fields", out, capsys)
+    assert f"{out / NEWEST}: it is a link, or no regular file" in refused(
+        out / "fields", capsys, "run", "--resume", out)
 
 
 @pytest.mark.parametrize("content", [None, b"", b"<VTKFile", b'<VTKFile type="UnstructuredGrid"/>', b"\xff" * 5000])
@@ -159,7 +152,7 @@ def test_altered_fields_are_told_and_made_again(out, short, capsys, content):
     """
     path = out / "fields" / "fields_0000.vtu"
     path.unlink() if content is None else path.write_bytes(content)
-    assert main(["run", "--resume", str(out), "--quiet"]) == 0
+    assert resumed(out) == 0
     *refusals, last = capsys.readouterr().err.splitlines()
     assert ["fields_0000.vtu is not as it was written" in line for line in refusals] == [True, True]
     assert "starts again from t = 0" in last and as_whole(short, out)
@@ -170,9 +163,8 @@ def test_a_page_that_cannot_be_made_is_told(tmp_path, capsys):
     run(load_scene("flow_only"), tmp_path)
     (tmp_path / NEWEST).write_bytes(b"left")
     (tmp_path / "fields" / "fields_0000.vtu").write_text("<VTKFile")
-    assert main(["run", "--resume", str(tmp_path), "--quiet"]) == 2
-    message = capsys.readouterr().err
-    assert "report.html: it cannot be made" in message and message.count("\n") == 1
+    said = refused(tmp_path / "fields", capsys, "run", "--resume", tmp_path, "--quiet")
+    assert "report.html: it cannot be made" in said
 
 
 def test_what_a_killed_run_was_writing_is_removed(out, short):
@@ -210,16 +202,15 @@ def test_a_lock_that_is_somebody_elses_is_left_alone(tmp_path, capsys, make):
     """A link, a file with content, a pipe, a folder."""
     make(tmp_path / LOCK, tmp_path / "elsewhere")
     before = (tmp_path / LOCK).lstat()
-    assert main(["run", "flow_only", "--out", str(tmp_path)]) == 2
-    assert (message := capsys.readouterr().err).startswith("repro: --out") and message.count("\n") == 1
-    assert (tmp_path / LOCK).lstat() == before and not (tmp_path / "elsewhere").exists()
+    assert refused(tmp_path, capsys, "run", "flow_only", "--out", tmp_path).startswith("repro: --out")
+    assert (tmp_path / LOCK).lstat() == before
 
 
 @LINUX
 def test_a_folder_that_cannot_be_made_is_refused(capsys):
     """Not even root may make one there."""
-    assert main(["run", "flow_only", "--out", "/proc/1/nowhere"]) == 2
-    assert "/proc/1/nowhere" in (message := capsys.readouterr().err) and message.count("\n") == 1
+    there = Path("/proc/1/nowhere")
+    assert str(there) in refused(there, capsys, "run", "flow_only", "--out", there)
 
 
 def full(*_):

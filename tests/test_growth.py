@@ -12,40 +12,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reference import neo_hookean
 from repro.errors import GrowthError
 from repro.model import growth
-from repro.model.growth import Strained
-from tests import oracles
-from tests.strategies import admissible_F, between, body_of, half_disc, meshed, outlines, share, turned, with_arcs
+from tests.strategies import body_of, half_disc, meshed, outlines, share, with_arcs
 
 GEOMETRIES = pytest.mark.parametrize("geometry", [1, 2])
-pressures = st.floats(-2.0, 2.0)
-
-
-@given(admissible_F(), pressures)
-def test_energy_and_stress_are_those_of_the_paper(F, P):
-    """(17), and S = d/dF [1/2 (J^(-2/3) tr C - 3) + P (J - theta)], (21), by differences (1e-11 of the terms: that of
-    J^(-2/3) F, of its volume part, and of P J F^-T); no deformation has less energy than rest."""
-    assert growth.energy(F) == pytest.approx(oracles.energy(F, 0.0, 1.0), rel=1e-12, abs=1e-12)
-    assert growth.energy(F) >= -1e-13
-    step, J, inverse = 1e-3 * np.linalg.svd(F)[1].min(), np.linalg.det(F), np.abs(np.linalg.inv(F)).max()
-    scale = J ** (-2 / 3) * (np.abs(F).max() + (np.sum(F**2) + 1) * inverse) + abs(P) * J * inverse
-    exact = oracles.derivative(lambda G: oracles.energy(G, P, 1.0), F, step)
-    assert Strained(F).piola(np.array(P)) == pytest.approx(exact, abs=1e-9 * scale)
-
-
-@given(admissible_F(), pressures)
-def test_the_true_stress_is_the_closed_form(F, P):
-    """Cauchy stress, derived in `reference` in another way, and its largest principal value, the one across the plane
-    among them."""
-    exact = neo_hookean.cauchy(F, P)
-    found = growth.cauchy(F[None], np.array([P]))[0]
-    size = np.linalg.det(F) ** (-5 / 3) * (np.sum(F**2) + 1) + abs(P)
-    assert found == pytest.approx([exact[0, 0], exact[1, 1], exact[2, 2], exact[0, 1]], abs=1e-12 * size)
-    assert growth.largest_principal(found) == pytest.approx(np.linalg.eigvalsh(exact).max(), abs=1e-12 * size)
-
-
 def constant(body, theta):
     """(t, q) of one expansion, or of one for each triangle (t,)."""
     return np.broadcast_to(np.reshape(theta, (-1, 1)), body.at.dx.shape).astype(float)
@@ -64,12 +35,10 @@ def area(body, position):
 
 @GEOMETRIES
 @share(0.4)
-@given(outlines(), st.floats(0.35, 0.6), st.floats(0.8, 1.2), st.floats(0.0, 0.3), between(1e-2, 1e2),
-       st.integers(0, 2**32 - 1))
-def test_any_body_comes_to_rest(geometry, drawn, refinement, least, more, unit, seed):
+@given(outlines(), st.floats(0.35, 0.6), st.floats(0.8, 1.2), st.floats(0.0, 0.3), st.integers(0, 2**32 - 1))
+def test_any_body_comes_to_rest(geometry, drawn, refinement, least, more, seed):
     """Grown unevenly or shrunk, on one wall or between two: no force is left on a free coordinate; nothing is turned
-    over, no constrained coordinate moves, the area is the sum of theta |tau| (24); and neither the unit of length nor a
-    mirror changes anything."""
+    over, no constrained coordinate moves, and the area is the sum of theta |tau| (24)."""
     outline, width = drawn
     body, held, _ = body_of(*meshed(outline if geometry == 1 else with_arcs(outline), width, refinement))
     theta = constant(body, least + more * np.random.default_rng(seed).uniform(0.0, 1.0, len(body.shape.cells)))
@@ -79,11 +48,6 @@ def test_any_body_comes_to_rest(geometry, drawn, refinement, least, more, unit, 
     assert (found.position[held] == body.reference[held]).all()
     largest = np.sqrt(body.at.dx.sum(axis=1).max())
     assert np.abs(forces(body, held, theta, found)[~held.T.ravel()]).max() < 1e-9 * largest
-    for change, cells in ((unit, body.shape.cells), ([-1.0, 1.0], turned(body.shape.cells))):
-        shape = growth.Shape(cells, body.shape.corners, body.shape.degree)
-        other = at_rest(growth.Body(shape, body.reference * change), held, theta)
-        assert other.position / change == pytest.approx(found.position, abs=1e-9 * width)
-        assert other.pressure == pytest.approx(found.pressure, abs=1e-9)
 
 
 def forces(body, held, theta, found):

@@ -10,7 +10,7 @@ import pytest
 from repro.errors import SimulationError, TransportError
 from repro.scene import load_scene
 from verification import hard_cases
-from verification.hard import common, runs
+from verification.hard import common
 from verification.hard.common import PRESETS, REFUSED, RIGHT, WRONG, HardCase
 from verification.kernel import case
 from verification.kernel.case import Check, Outcome, Result, at_least, at_most, between, outcome
@@ -137,10 +137,3 @@ def test_a_wrong_run_is_seen():
 def test_a_cheap_cell_is_what_it_must_be(number, preset):
     cell = common.run_cell(KNOWN[number], preset)
     assert not cell.unaccepted, cell.message
-
-
-def test_units_scale():
-    made = load_scene("base", ("numerics.preset=fast",))
-    there = runs.scaled(runs.scaled(made, 2.0**10, 2.0**-3), 2.0**-10, 2.0**3)
-    assert there == made and runs.scaled(made, 2.0, 1.0).pore.width == 100.0
-    assert runs.scaled(made, 1.0, 2.0).kinetics.decay_coefficient == made.kinetics.decay_coefficient / 2

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from repro.errors import LinearError
 from repro.fem import linear
-from repro.fem.assembly import ElementSystem, saddle_blocks
+from repro.fem.assembly import ElementSystem
 from repro.fem.linear import DEFAULT, Method
 from tests import faults
 from tests.strategies import meshed
@@ -57,18 +57,6 @@ def test_a_missing_kind_is_refused():
     system = ElementSystem(KINDS, np.arange(10.0), np.zeros(10, bool))
     with pytest.raises(ValueError):
         system.product(ELEMENTS[:1], np.ones(10))
-
-
-def test_saddle_blocks_with_and_without_coupled_components():
-    """The same from one component's matrix, told once for both, as from the pair; zero is the default below."""
-    random = np.random.default_rng(4)
-    one, divergence, lower = (random.standard_normal((4, *shape)) for shape in ((3, 3), (2, 6), (2, 2)))
-    pair = np.zeros((4, 6, 6))
-    pair[:, :3, :3] = pair[:, 3:, 3:] = one
-    found = saddle_blocks(one, divergence, lower)
-    assert np.array_equal(found, saddle_blocks(pair, divergence, lower))
-    assert np.array_equal(found[:, 6:, 6:], -lower) and np.array_equal(found[:, 6:, :6], -divergence)
-    assert not saddle_blocks(one, divergence)[:, 6:, 6:].any()
 
 
 METIS, PARDISO = Method("superlu", "metis"), Method("pardiso", "degree")

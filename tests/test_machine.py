@@ -1,7 +1,9 @@
-"""What a run needs of the machine that it is on: packages, memory."""
+"""What a run needs of the machine that it is on: packages, memory; and what a command imports, told by the names of
+modules and never by the clock."""
 
 import json
 import re
+import subprocess
 import sys
 
 import pytest
@@ -12,7 +14,8 @@ from repro.run import machine, memory, running
 from repro.run.running import resume
 from repro.scene import SceneError, load_scene
 from tests import faults
-from tests.shell import SHORT, files, shell, stopped
+from tests.pages import run
+from tests.shell import SHORT, files, refused, shell, stopped
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="for Linux alone")
 CHOICES = [("numerics.solver=pardiso", "pypardiso"), ("numerics.ordering=metis", "pymetis")]
@@ -24,11 +27,9 @@ def test_a_package_that_is_not_there_is_told_before_anything_is_written(tmp_path
                                                                         package):
     """One line, status 2, no folder."""
     faults.absent_package(monkeypatch, package)
-    assert main([*command, "--set", entry, "--out", str(tmp_path / "out")]) == 2
-    out, err = capsys.readouterr()
     key, _, choice = entry.partition("=")
-    assert f'base: {key} = "{choice}": the package {package} is not installed; pip install {package}' in err
-    assert err.count("\n") == 1 and out == "" and list(tmp_path.iterdir()) == []
+    said = f'base: {key} = "{choice}": the package {package} is not installed; pip install {package}'
+    assert said in refused(tmp_path, capsys, *command, "--set", entry, "--out", tmp_path / "out")
 
 
 def test_a_package_that_went_is_told_at_a_resume(tmp_path, monkeypatch):
@@ -70,7 +71,7 @@ def test_a_run_that_may_take_more_than_half_of_the_memory_is_warned_of(tmp_path,
     needed = memory.expected_bytes(load_scene("flow_only"))
     for factor, warned in ((2.1, False), (1.9, True)):
         monkeypatch.setattr(memory, "free_bytes", lambda factor=factor: factor * needed)
-        assert main(["run", "flow_only", "--out", str(tmp_path / str(factor)), "--json"]) == 0
+        run(tmp_path / str(factor), "flow_only", options=["--json"])
         out, err = capsys.readouterr()
         events = [json.loads(line) for line in out.splitlines()]
         assert (err.startswith("repro: warning: flow_only: about ")) == warned == (events[0]["event"] == "warning")
@@ -140,6 +141,45 @@ def test_want_of_memory_outside_of_the_steps_is_told_in_one_line(tmp_path, capsy
         raise MemoryError("Unable to allocate 1 GiB")
 
     monkeypatch.setattr(running, "run", lambda *_, **__: none_left())
-    assert main(["run", "flow_only", "--out", str(tmp_path / "run")]) == 1
+    run(tmp_path, "flow_only", status=1)
     assert capsys.readouterr().err == ("repro: out of memory (Unable to allocate 1 GiB); try a smaller "
                                        "numerics.refinement\n")
+
+
+#: What no command and no run needs, whatever is installed; each takes from a twentieth to half a second.
+NEVER = {"matplotlib", "pandas", "xarray", "h5py", "scipy.interpolate", "scipy.optimize", "scipy.special",
+         "scipy.spatial", "scipy.integrate", "scipy.stats", "pint", "meshio", "rich", "skfem.visuals", "sympy",
+         "distributed"}
+#: What those that run nothing do not need either.
+SOLVER = {"numpy", "scipy", "skfem", "meshio", "mmgpy", "shapely", "tqdm", "concurrent.futures"}
+CODE = """
+import sys
+{code}
+print(*sys.modules, file=sys.stderr)
+"""
+COMMAND = "from repro.cli import main\ntry:\n    main({!r})\nexcept SystemExit:\n    pass"
+
+
+def loaded(code: str) -> set[str]:
+    """Modules that are loaded when a program has run."""
+    done = subprocess.run([sys.executable, "-c", CODE.format(code=code)], capture_output=True, text=True, check=True)
+    return set(done.stderr.split())
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["run", "--help"], ["sweep", "--help"], ["scene"],
+                                       ["scene", "base"], ["run", "base", "--out", "x", "--set", "pore.width=3"],
+                                       ["run", "nowhere", "--out", "x"]])
+def test_a_command_that_runs_nothing_imports_no_solver(arguments):
+    assert loaded(COMMAND.format(arguments)) & (NEVER | SOLVER) == set()
+
+
+def test_importing_the_package_imports_none_of_its_modules():
+    """Nor does telling its public names."""
+    assert {name for name in loaded("import repro\ndir(repro)") if name.startswith("repro.")} == set()
+
+
+def test_a_run_imports_what_it_needs_alone(tmp_path):
+    """With remeshes, fields and its page."""
+    found = loaded(COMMAND.format(["run", *SHORT, "--set", 'growth.end="3 h"', "--out", str(tmp_path / "run")]))
+    assert (tmp_path / "run" / "report.html").exists() and found >= {"numpy", "skfem", "mmgpy", "shapely"}
+    assert found & NEVER == set()

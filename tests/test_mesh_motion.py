@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from repro.fem.mesh import Mesh, curved, triangle_areas
+from repro.fem.mesh import curved, triangle_areas
 from repro.model import mesh_motion
-from tests.strategies import between, meshed, meshes, reversed_mesh, seed, share, upside_down
+from tests.strategies import meshed, meshes, seed
 
 GAMMA, C = 1.0, 100.0
 #: Straight triangles, or curved ones with middles half way.
@@ -59,20 +59,3 @@ def grown(grid, growth):
     middle = places[:, 0].mean()
     rise = 1.0 if (places[:, 1] == grid.width).any() else growth[1]
     return (places - [middle, 0.0]) * [growth[0], rise] + [middle, 0.0]
-
-
-@share(0.4)
-@given(with_aggregate, growths, between(1e-2, 1e2))
-def test_the_motion_is_the_same_in_mirrors_and_in_any_unit(grid, growth, unit):
-    """The same triangles upside down, from behind, and in another unit of length move alike; and twice the motion of
-    the aggregate is twice the fluid's."""
-    body = grown(grid, growth)
-    points = move(grid, body)
-    over = move(upside_down(grid), body * [1, -1] + [0, grid.width])
-    assert (over - [0, grid.width]) * [1, -1] == pytest.approx(points, abs=1e-10)
-    assert move(reversed_mesh(grid), body * [-1, 1]) * [-1, 1] == pytest.approx(points, abs=1e-10)
-    other = Mesh.of(unit * grid.points, grid.cells, grid.biomass, grid.loop, unit * grid.width,
-                    tuple(unit * end for end in grid.ends))
-    assert move(other, unit * body) / unit == pytest.approx(points, abs=1e-9)
-    twice = move(grid, 2 * body - grid.points[grid.body])
-    assert twice - grid.points == pytest.approx(2 * (points - grid.points), abs=1e-10)

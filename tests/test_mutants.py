@@ -120,13 +120,6 @@ def test_a_survivor_or_a_case_that_passes_with_its_mutant_is_a_failure(caught_by
     assert mutants.judge([found]) is fine and not mutants.judge([])
 
 
-def test_named_cases_come_first_and_quick_ones_before_slow_ones():
-    named, others = mutants.plan(KNOWN["saddle-sign"])
-    assert OTHER in named and sorted(named + others) == sorted(case.CASES)
-    slow = [case.CASES[id].slow for id in others]
-    assert slow == sorted(slow)
-
-
 def test_the_record_is_of_this_code_or_says_that_it_is_not(tmp_path, monkeypatch):
     """Of what cases catch and of what tests catch, each when all of it was hunted; some alone change nothing."""
     def hunted(ids, name):

@@ -9,6 +9,7 @@ from repro import results
 from repro.results import netcdf
 from repro.scene import load_scene, rules, scene_hash, scene_tables
 from tests.pages import run
+from tests.shell import flags, refused
 
 SETS = ['numerics.preset="fast"', 'growth.end="1 h"', 'growth.time_step="1 min"', 'output.timeseries="netcdf"']
 UNITS = {"m d-1", "mg L-1", "um2", "um", "cm", "h", "1"}
@@ -73,8 +74,6 @@ def test_it_is_whole_or_not_there(tmp_path, monkeypatch):
 
 def test_without_xarray_it_is_refused_before_the_run(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(rules, "find_spec", lambda name: None)
-    run(tmp_path, "base", *SETS, status=2)
-    (line,) = capsys.readouterr().err.splitlines()
+    line = refused(tmp_path, capsys, "run", "base", *flags(*SETS), "--out", tmp_path / "run")
     assert 'output.timeseries = "netcdf"' in line and "pip install xarray" in line
-    assert list(tmp_path.iterdir()) == []
     assert not (run(tmp_path, "flow_only") / "timeseries.nc").exists()

@@ -124,13 +124,6 @@ def test_a_pore_without_width_is_refused(width):
         repro.added_resistance(2500.0, [100.0, width], False)
 
 
-def test_the_ends_of_the_range_are_in_it():
-    for spanned in (False, True):
-        for share in known(spanned):
-            for ratio in (RATIOS[0], RATIOS[-1]):
-                assert repro.added_resistance(share, 1.0, spanned, ratio).length > 0
-
-
 def test_the_mean_of_runs_leaves_one_out_and_what_a_run_does_not_reach():
     """Of r = c (A / W^2)^2: the geometric mean of c over the runs that are there."""
     found = [Sample(run, True, share, (LAMBDA,), (factor * share**2,))

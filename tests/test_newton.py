@@ -79,37 +79,6 @@ def test_constraints_come_first():
     assert (last.number, steps, done) == (2, 2, True)
 
 
-def test_a_root_is_found_quadratically_and_by_the_modified_method_in_more_steps():
-    """x^3 = 2, with its derivative and with that of an earlier iterate."""
-    @dataclass(frozen=True)
-    class At:
-        x: float
-
-        @property
-        def defect(self):
-            return abs(self.x**3 - 2) / 2
-
-        complete = True
-
-    class Cube:
-        made = 0
-
-        def factored(self, iterate):
-            self.made += 1
-            return 3 * iterate.x**2
-
-        def advanced(self, iterate, factors, fresh):
-            return At(iterate.x - (iterate.x**3 - 2) / factors)
-
-    counts = {}
-    for reused in (False, True):
-        system = Cube()
-        last, steps, done = Newton(1e-14, 1e-13, 30, reused).solve(system, At(1.3))
-        assert done and last.x == pytest.approx(2 ** (1 / 3), rel=1e-14)
-        counts[reused] = steps, system.made
-    assert counts[False][0] == counts[False][1] < counts[True][0] and counts[True][1] < counts[False][1]
-
-
 def test_a_residual_counts_against_the_size_of_its_row():
     assert relative(np.array([1.0, -4.0, 0.0]), np.array([10.0, 8.0, 0.0])) == 0.5
     assert relative(np.empty(0), np.empty(0)) == 0.0

@@ -16,6 +16,7 @@ from repro.scene.rules import HIGHER_ORDER
 from repro.scene.units import SceneError
 from tests.strategies import ORDERS, scene
 from tests.test_scene import EVERYTHING
+from verification.problems.aggregates import places
 
 
 def elements(order):
@@ -60,14 +61,6 @@ def test_elements_beside_contact_lines_are_as_small_as_asked(across):
     assert (sizes <= sizing.SPLIT * 1.35 * (film / 8 + sizing.GRADATION * sizes)).all() == (across == 8)
 
 
-def places_of(space):
-    """(x, y), each (r, q) um, of the points of the reaction."""
-    points = space.mesh.points
-    if space.order == 1:
-        return np.moveaxis(points[space.reaction.cells], 2, 0)
-    return np.moveaxis(points[space.mesh.cells[space.mesh.biomass]].transpose(0, 2, 1) @ space.table.shape.T, 1, 0)
-
-
 def carried_back(order, straight):
     """Largest errors of rates that are linear in the place, and one everywhere, carried back from a new mesh to the
     material's points; straight: of triangles whose edges are."""
@@ -76,7 +69,7 @@ def carried_back(order, straight):
     points = now.mesh.with_middles(now.mesh.points[: now.mesh.corners]) if straight else now.mesh.points
     half = now.moved(points * [1.1, 1.1])
     there, _ = remeshing.remesh(made, now, half, 0.0)
-    (x, y), (u, v) = places_of(there.space), places_of(half.space)
+    (x, y), (u, v) = places(there.space), places(half.space)
     back = midpoint._carried_back(there, half, Rates(2 * x + y, 3 - y))
     ones = midpoint._carried_back(there, half, Rates(0 * x + 1, 0 * x + 2))
     linear = max(np.abs(back.growth - 2 * u - v).max(), np.abs(back.remains - 3 + v).max())

@@ -19,15 +19,16 @@ from repro.cli import main
 from repro.model import growth
 from repro.run import progress
 from repro.run.interrupts import noted
-from tests.shell import started, told
+from tests.pages import run
+from tests.shell import flags, started, told
 
-CONTACT = ["base", "--set", 'numerics.preset="fast"', "--set", 'aggregate.radius="17.98 um"', "--set",
-           'pore.width="20 um"', "--set", 'growth.end="0.6 h"', "--set", "numerics.tolerance=0.0001"]
+CONTACT = ('numerics.preset="fast"', 'aggregate.radius="17.98 um"', 'pore.width="20 um"', 'growth.end="0.6 h"',
+           "numerics.tolerance=0.0001")
 
 
 def test_json_is_an_object_a_line_and_nothing_else(tmp_path, capsys):
     """Start, every step, remeshes, contact, checkpoints, end."""
-    assert main(["run", *CONTACT, "--out", str(tmp_path / "run"), "--json", "--checkpoint", "0"]) == 0
+    folder = run(tmp_path, "base", *CONTACT, options=["--json", "--checkpoint", "0"])
     out, err = capsys.readouterr()
     events = [json.loads(line) for line in out.splitlines()]
     names = [event["event"] for event in events]
@@ -37,35 +38,35 @@ def test_json_is_an_object_a_line_and_nothing_else(tmp_path, capsys):
     assert {event["key"] for event in warnings} == {"growth.end"}
     steps = [event for event in events if event["event"] == "step"]
     assert [event["step"] for event in steps] == list(range(len(steps))) and steps[-1]["time_h"] == 0.6
-    assert names.count("remesh") == steps[-1]["remeshes"] == told(tmp_path / "run")["remeshes"] > 0
-    assert names.count("checkpoint") == events[-1]["rows"] == told(tmp_path / "run")["rows"] > len(steps)
+    assert names.count("remesh") == steps[-1]["remeshes"] == told(folder)["remeshes"] > 0
+    assert names.count("checkpoint") == events[-1]["rows"] == told(folder)["rows"] > len(steps)
     assert steps[-1]["contact"] and not steps[0]["contact"]
-    assert events[-1]["status"] == "completed" and events[-1]["folder"] == str(tmp_path / "run")
+    assert events[-1]["status"] == "completed" and events[-1]["folder"] == str(folder)
 
 
-@pytest.mark.parametrize("arguments, status", [(["base", "--set", "pore.width=5 s"], 2), (["base"], 1)])
-def test_errors_are_objects_too(tmp_path, capsys, monkeypatch, arguments, status):
+@pytest.mark.parametrize("sets, status", [(["pore.width=5 s"], 2), ([], 1)])
+def test_errors_are_objects_too(tmp_path, capsys, monkeypatch, sets, status):
     """With the exit status and the message that people get."""
     monkeypatch.setattr(growth, "MOST_ITERATIONS", 1)
-    assert main(["run", *arguments, "--out", str(tmp_path / "run"), "--json"]) == status
+    run(tmp_path, "base", *sets, status=status, options=["--json"])
     out, err = capsys.readouterr()
     last = json.loads(out.splitlines()[-1])
     assert last["event"] == "error" and last["exit_status"] == status and err == f"repro: {last['message']}\n"
 
 
 def test_quiet_says_nothing_but_errors(tmp_path, capsys):
-    assert main(["run", "flow_only", "--out", str(tmp_path / "run"), "--quiet"]) == 0
+    run(tmp_path, "flow_only", options=["--quiet"])
     assert capsys.readouterr() == ("", "")
-    assert main(["run", "nowhere", "--out", str(tmp_path / "run"), "--quiet"]) == 2
+    run(tmp_path, "nowhere", status=2, options=["--quiet"])
     assert "nowhere" in capsys.readouterr().err
 
 
 def test_without_a_terminal_a_line_each_tenth(tmp_path, capsys):
     """And the end on standard output."""
-    assert main(["run", "base", "--out", str(tmp_path / "run"), "--set", 'growth.end="0.6 h"']) == 0
+    folder = run(tmp_path, "base", 'growth.end="0.6 h"')
     out, err = capsys.readouterr()
     assert err.splitlines() == [f"{time} of 0.6 h simulated" for time in ("0.2", "0.4", "0.6")]
-    assert out == f"base: completed; results in {tmp_path / 'run'}\n"
+    assert out == f"base: completed; results in {folder}\n"
 
 
 STEP = {"event": "step", "time_h": 3.5, "end_h": 45.0, "step": 17, "remeshes": 2, "contact": True}
@@ -116,7 +117,7 @@ def terminal(tmp_path, columns):
     """What a run shows on a terminal, state by state, up to the last with all steps."""
     here, there = pty.openpty()
     fcntl.ioctl(there, termios.TIOCSWINSZ, struct.pack("HHHH", 40, columns, 0, 0))
-    process = started(*CONTACT, "--out", tmp_path / "run", stdout=there, stderr=there, text=False)
+    process = started("base", *flags(*CONTACT), "--out", tmp_path / "run", stdout=there, stderr=there, text=False)
     os.close(there)
     seen = b""
     try:

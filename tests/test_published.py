@@ -1,4 +1,5 @@
-"""What a publication needs is there, agrees with itself, and the replication note says what was computed."""
+"""What a publication needs is there, agrees with itself and works as it stands: the replication note says what was
+computed, what README and tutorial show is executed, and texts speak of nothing that the repository does not hold."""
 import copy
 import re
 import subprocess
@@ -6,15 +7,20 @@ import sys
 import tarfile
 import tomllib
 import zipfile
+from functools import cache
 from pathlib import Path
+from pkgutil import resolve_name
 
+import matplotlib.pyplot as plt
 import pytest
 
 import paper_figures
-from paper_figures import replication
+from paper_figures import overview, replication
+from repro.scene import load_scene, parse_scene
+from tests.blocks import ROOT, blocks, execute, is_repro, is_target, told
+from tests.test_architecture import own
 from verification.claims import EXPECTED
 
-ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 
 
@@ -23,17 +29,17 @@ def text(name):
 
 
 @pytest.fixture(scope="module")
-def told():
+def record():
     return replication.told()
 
 
-def test_the_note_tells_what_was_computed(told):
+def test_the_note_tells_what_was_computed(record):
     template = replication.TEMPLATE.read_text(encoding="utf-8")
-    assert replication.filled(template, told) == replication.NOTE.read_text(encoding="utf-8")
+    assert replication.filled(template, record) == replication.NOTE.read_text(encoding="utf-8")
 
 
-def test_a_number_of_the_record_is_a_number_of_the_note(told):
-    changed = copy.deepcopy(told)
+def test_a_number_of_the_record_is_a_number_of_the_note(record):
+    changed = copy.deepcopy(record)
     check = next(c for claim in changed["claims"] for c in claim["checks"] if c["paper"] == "2.9")
     check["value"] = 2.9 * 1.0987
     assert replication.filled("{{C01 | mean velocity at t = 0 (m/d) | .4f}}", changed) == "3.1862"
@@ -50,41 +56,48 @@ def test_the_template_has_no_number_that_a_run_computes():
 
 @pytest.mark.parametrize("field", ["{{C99 | contradicted}}", "{{C01 | contradicted}}", "{{C01 | no such | .2f}}",
                                    "{{no.such}}"])
-def test_what_there_is_not_is_refused(told, field):
+def test_what_there_is_not_is_refused(record, field):
     with pytest.raises(LookupError):
-        replication.filled(field, told)
+        replication.filled(field, record)
 
 
-def test_every_claim_has_its_verdict_in_the_note(told):
+def test_every_claim_has_its_verdict_in_the_note(record):
     """Each once, in the list of its verdict; a contradiction, or what is undecided, with its reason."""
     kinds = ("reproduced", "rounding", "changed", "contradicted", "undecided")
     lists = [f"{{{{list.{kind}}}}}" for kind in kinds]
-    named = [re.findall(r"^- \*\*(C\d\d)\*\*", replication.filled(one, told), re.M) for one in lists]
+    named = [re.findall(r"^- \*\*(C\d\d)\*\*", replication.filled(one, record), re.M) for one in lists]
     assert sorted(sum(named, [])) == list(EXPECTED)
-    assert all(claim["reason"] for claim in told["claims"] if claim["id"] in named[3] + named[4])
-    counts = replication.filled(" ".join(f"{{{{claims.{kind}}}}}" for kind in kinds), told)
+    assert all(claim["reason"] for claim in record["claims"] if claim["id"] in named[3] + named[4])
+    counts = replication.filled(" ".join(f"{{{{claims.{kind}}}}}" for kind in kinds), record)
     assert counts.split() == [str(len(found)) for found in named]
 
 
-def test_what_needs_no_solution_is_not_counted_as_a_value_reproduced(told):
-    printed, predicted = replication._printed(told["claims"]), replication._predicted(told["claims"])
+def test_the_picture_of_the_note_has_verdicts_in_its_caption(record):
+    caption = replication.filled("{{overview.claims}}", record)
+    verdicts = {each["id"]: each["verdict"] for each in record["claims"]}
+    assert caption.replace("\n", " ") == "; ".join(f"{id} {verdicts[id]}" for id in sorted(overview.CLAIMS))
+    assert caption.splitlines()[-1] in text("paper_figures/replication.md")
+
+
+def test_what_needs_no_solution_is_not_counted_as_a_value_reproduced(record):
+    printed, predicted = replication._printed(record["claims"]), replication._predicted(record["claims"])
     assert len(predicted) < len(printed)
     assert {check["rests_on"] for _, check in predicted} == {"a solution"}
-    total = sum(int(replication.filled(f"{{{{paper.{name}}}}}", told)) for name in ("within", "outside", "open"))
-    assert replication.filled("{{paper.total}}", told) == str(len(predicted)) == str(total)
+    total = sum(int(replication.filled(f"{{{{paper.{name}}}}}", record)) for name in ("within", "outside", "open"))
+    assert replication.filled("{{paper.total}}", record) == str(len(predicted)) == str(total)
 
 
-def test_readme_and_documents_count_no_claims_otherwise(told):
+def test_readme_and_documents_count_no_claims_otherwise(record):
     """A count of verdicts anywhere is the record's."""
     for name in ("README.md", "paper_figures/replication.md", "docs/scope.md", "codecheck.author.yml"):
         counts = re.findall(r"\b(\d+) (?:claims )?(?:are )?(reproduced|contradicted|undecided)\b", text(name))
         for count, kind in counts:
-            assert count == replication.filled(f"{{{{claims.{kind}}}}}", told), (name, count, kind)
+            assert count == replication.filled(f"{{{{claims.{kind}}}}}", record), (name, count, kind)
 
 
-def test_every_erratum_is_in_the_note(told):
+def test_every_erratum_is_in_the_note(record):
     ids = re.findall(r"^## (E\d+)\.", text("reference/ERRATA.md"), re.M)
-    listed = re.findall(r"^- \*\*(E\d+)\*\*", replication.filled("{{list.errata}}", told), re.M)
+    listed = re.findall(r"^- \*\*(E\d+)\*\*", replication.filled("{{list.errata}}", record), re.M)
     assert listed == ids and len(ids) >= 20
 
 
@@ -104,15 +117,11 @@ def test_the_codecheck_lists_what_make_figures_makes():
     assert f'title: "{title}"' in content and "\n---\nversion: https://codecheck.org.uk/spec/config/" in content
 
 
-def test_what_contributing_names_is_there():
-    content = text("CONTRIBUTING.md")
-    targets = set(re.findall(r"(?:`|^    )make ([a-z-]+)", content, re.M))
-    assert {"lint", "test", "verify", "mutants", "check-manifest"} <= targets
-    assert all(re.search(rf"^{target}:", text("Makefile"), re.M) for target in targets)
-    folders = r"(?:repro|verification|paper_figures|tests)/[\w/.]+"
-    files = set(re.findall(rf"`({folders}|[A-Z]+\.md|[a-z.]+\.(?:yml|toml))`", content))
-    there = {name for name in files if not re.search("STAGE|NAME|_N|/out/|/live/", name)}
-    assert len(there) > 10 and [name for name in there if not (ROOT / name).exists()] == []
+@pytest.mark.parametrize("page, wanted", [("README.md", {"figures", "test", "claims", "verify", "bench"}),
+                                          ("CONTRIBUTING.md", {"lint", "test", "verify", "mutants", "check-manifest"})])
+def test_the_commands_are_targets_of_the_makefile(page, wanted):
+    commands = set(re.findall(r"(?:`|^    )make ([a-z-]+)", text(page), re.M))
+    assert wanted <= commands and all(is_target(["make", command]) for command in commands)
 
 
 def test_the_pythons_that_are_named_are_those_that_are_allowed():
@@ -138,3 +147,173 @@ def test_wheel_and_source_distribution_hold_what_they_should(tmp_path):
         packed = {name.partition("/")[2] for name in archive.getnames()}
     wanted = {name for name in listed if name.endswith((".py", ".md", ".toml", ".json", ".lock", ".yml", ".cff"))}
     assert wanted - packed == set()
+
+
+# What the README and the tutorial show.
+PAGE = ROOT / "README.md"
+TUTORIAL = ROOT / "docs" / "tutorial.md"
+BLOCKS = blocks(PAGE)
+
+
+def of(language: str) -> list[str]:
+    return [block.text for block in BLOCKS if block.language == language]
+
+
+def test_every_block_is_of_a_kind_that_is_executed():
+    assert {block.language for block in BLOCKS} <= {"", "console", "sh", "python", "toml"}
+    assert all(is_repro(words) or is_target(words) for block in BLOCKS for words in block.commands)
+
+
+def test_the_commands_run(tmp_path, capsys, monkeypatch):
+    """In the order of the page, in one folder."""
+    monkeypatch.chdir(tmp_path)
+    commands = [words for block in BLOCKS for words in block.commands if is_repro(words)]
+    assert {"run", "scene", "check"} <= {words[1] for words in commands}
+    for words in commands:
+        assert execute(words, capsys)[0] == 0, words
+    assert {path.name for path in (tmp_path / "runs").iterdir()} >= {"base", "mine"}
+
+
+def test_the_python_examples_run(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    printed = []
+    for text in of("python"):
+        exec(compile(text, str(PAGE), "exec"), {})
+        printed.append(capsys.readouterr().out.splitlines())
+    (arrays,) = printed
+    assert arrays[0].split()[1] == "m/d" and 160 < float(arrays[0].split()[0]) < 175 and arrays[1] == "(783,)"
+
+
+def test_the_page_is_short_and_the_others_show_nothing_that_is_not_executed():
+    """Two commands, a picture and a pore of one's own come first."""
+    text = PAGE.read_text(encoding="utf-8")
+    assert len(text.encode()) < 12_000 and text.index("overview.png") < text.index("make env") < 2_500
+    others = [page for page in sorted((ROOT / "docs").glob("*.md")) if page != TUTORIAL]
+    assert len(others) >= 3 and [page.name for page in others if "```" in page.read_text(encoding="utf-8")] == []
+
+
+def test_the_scene_example_is_base():
+    (text,) = of("toml")
+    assert parse_scene(tomllib.loads(text), "base", "README.md") == load_scene("base")
+
+
+def test_the_tutorial_works_from_its_first_line_to_its_last(tmp_path, capsys, monkeypatch):
+    """Its commands, its scene and its Python, one after the other in one folder."""
+    monkeypatch.chdir(tmp_path)
+    printed, statuses = [], []
+    names: dict = {}
+    for block in blocks(TUTORIAL):
+        if block.language == "toml":
+            Path(re.match(r"# (\S+)\n", block.text)[1]).write_text(block.text)
+        elif block.language == "python":
+            exec(compile(block.text, str(TUTORIAL), "exec"), names)
+        for words in block.commands:
+            assert is_repro(words), words
+            status, out, err = execute(words, capsys)
+            printed.append(out)
+            statuses.append(status)
+            assert [err.strip()] == told(block) if status else told(block) == [], err
+    plt.close("all")
+    assert statuses == [0, 0, 0, 0, 0, 0, 2, 0, 0, 0, 0]
+    assert load_scene("mine.toml").pore == load_scene("base").pore
+    assert (tmp_path / "runs" / "narrow" / "timeseries.csv").exists()
+    assert (tmp_path / "oxygen.png").stat().st_size > 1000
+    assert "WARNING" not in printed[3] and "WARNING growth.end" in printed[4]
+
+
+# Texts speak of what there is: files, modules, statements, errata, no other places.
+FOLDERS = ("repro", "reference", "verification", "tests", "docs", "paper_figures")
+PAGES = ("README.md", "CONTRIBUTING.md", "Makefile", "codecheck.author.yml", "CITATION.cff", "MANIFEST.in")
+KINDS = (".py", ".md", ".toml")
+#: What commands make; names in tests of what is not there, and words that stand for any name of their kind.
+MADE = {"claims.md", "codecheck.yml", "paper_figures/out/manifest.json"}
+EXAMPLES = {"repro/a.py", "repro.utils", "C38", "C99", "repro/m.py", "tests/__init__.py", "tests/test_m.py",
+            "tests/test_gone.py"}
+PLACEHOLDER = re.compile(r"(?<![A-Za-z])(NAME|STAGE|N|ID)(?![A-Za-z])")
+ENDINGS = r"(?:py|md|toml|json|yml|yaml|cff|lock|css|js|svg)"
+#: A file by its place in the repository, or any page of text by its name.
+FILE = re.compile(rf"(?<![\w./-])((?:{'|'.join(FOLDERS)})/[\w./-]+\.{ENDINGS}|(?:\w[\w./-]*/)?[\w-]+\.md)\b")
+MODULE = re.compile(r"(?<![\w./])(?:repro|verification|paper_figures|tests)(?:\.[A-Za-z]\w*)+")
+STATEMENT = re.compile(r"(?<![\w-])C\d\d(?!\w)")
+ERRATUM = re.compile(r"\[(E\d+)\]")
+#: Numbered lists that are kept elsewhere, and places on somebody's machine.
+ELSEWHERE = re.compile(r"\b(?:traps?|issues?|tickets?|themes?|lessons?)\b[ #]*\d+"
+                       r"|(?<![\w.])/(?:work|home|root|Users)/\w+", re.I)
+
+
+@cache
+def held():
+    """Paths of all files."""
+    found = {str(path.relative_to(ROOT)) for folder in FOLDERS for path in own(folder, "*")}
+    return found | {path.name for path in ROOT.iterdir() if path.is_file()}
+
+
+@cache
+def pages():
+    """{path in the repository: text} of what people read, but for this file's own examples."""
+    inside = [path for path in sorted(held()) if path.startswith(FOLDERS) and path.endswith(KINDS)]
+    own = str(Path(__file__).relative_to(ROOT))
+    return {path: (ROOT / path).read_text(encoding="utf-8") for path in (*inside, *PAGES) if path != own}
+
+
+def is_file(name):
+    """Is a file there, by its place or by the end of it?"""
+    name = name.removeprefix("../")
+    return name in held() or any(path.endswith(f"/{name}") for path in held())
+
+
+@cache
+def is_module(name):
+    """Is a module there, or what is asked of it?"""
+    try:
+        resolve_name(name)
+    except (ImportError, AttributeError):
+        return False
+    return True
+
+
+@cache
+def statements():
+    """Numbers of the paper's statements that are judged."""
+    sources = [path.read_text(encoding="utf-8") for path in (ROOT / "verification" / "claims").glob("*.py")]
+    return set(re.findall(r'@claim\("(C\d\d)"', "\n".join(sources)))
+
+
+@cache
+def errata():
+    """Numbers of the errata."""
+    page = (ROOT / "reference" / "ERRATA.md").read_text(encoding="utf-8")
+    return set(re.findall(r"^## (E\d+)\.", page, re.M))
+
+
+def unheld(text):
+    """What a text speaks of that is not there."""
+    files = {name for name in FILE.findall(text) if not (name in MADE | EXAMPLES or PLACEHOLDER.search(name))}
+    found = {name for name in files if not is_file(name)}
+    modules = {name for name in MODULE.findall(text) if not re.search(rf"\.{ENDINGS}$", name)}
+    found |= {name for name in modules - EXAMPLES if not is_module(name)}
+    found |= set(STATEMENT.findall(text)) - statements() - EXAMPLES
+    found |= set(ERRATUM.findall(text)) - errata()
+    return sorted(found | set(ELSEWHERE.findall(text)))
+
+
+def test_nothing_is_spoken_of_that_is_not_there():
+    """In texts, statements and errata that there are."""
+    assert len(pages()) > 200 and len(statements()) > 30 and len(errata()) > 15
+    assert {path: found for path, text in pages().items() if (found := unheld(text))} == {}
+
+
+@pytest.mark.parametrize("text", [
+    "as `numer" + "ics.md` has it",
+    "(tr" + "ap 3)",
+    "Iss" + "ue #12: round-off",
+    "see `docs/no" + "where.md`",
+    "`repro/cur" + "ved/flow.py` is",
+    ":mod:`repro.cur" + "ved.flow`",
+    "repro.fem.mesh.No" + "Mesh",
+    "by claim C" + "97",
+    "as said in [E" + "99]",
+    "in /wo" + "rk/notes",
+])
+def test_the_check_sees_one(text):
+    assert len(unheld(text)) == 1

@@ -17,7 +17,20 @@ from repro.report import fields, page, quantities
 from repro.report.reading import read
 from repro.results import names, vtu
 from repro.results.vtu import Cells, Grid
-from tests.pages import FAST, HOSTILE, Page, check_alone, check_drawn, first, hostile, numbers, run, stored, text_of
+from tests.pages import (
+    FAST,
+    HOSTILE,
+    PURE,
+    Page,
+    check_alone,
+    check_drawn,
+    first,
+    hostile,
+    numbers,
+    run,
+    stored,
+    text_of,
+)
 
 
 def test_every_run_has_a_page_that_needs_nothing_else(fast, paper, flow_only):
@@ -157,12 +170,6 @@ def test_data_cannot_end_its_block():
     assert text.count("<") == 2 and json.loads(Page(text).scripts[0][2]) == {"a": "</script><!--<script>"}
 
 
-def test_the_same_run_makes_the_same_page(fast):
-    before = text_of(fast)
-    report.write(fast)
-    assert text_of(fast) == before
-
-
 def test_storage_is_drawn_where_there_is_some(paper):
     assert "acceptor_stored_ug_per_m_per_h" not in quantities.series(read(paper))
 
@@ -189,10 +196,6 @@ def test_a_run_that_stops_has_its_page(tmp_path, monkeypatch, capsys):
     text = text_of(run(tmp_path, "base", status=1))
     assert "Failed: stopped in the step from t = 0 h, in &lt;growth&gt;: no" in text
     Page(text)
-
-
-PURE = """inert_fraction biomass_density_min biomass_density_max acceptor_balance donor_balance biomass_balance
-oxygen_demand_balance nodes remeshed contact region theta J active_biomass inert_biomass""".split()
 
 
 def test_every_name_has_its_unit_or_is_a_pure_number(fast, paper):

@@ -31,6 +31,7 @@ from tests.shell import (
     flags,
     lasting,
     refused,
+    resumed,
     shell,
     started,
     stopped,
@@ -139,7 +140,7 @@ def test_the_end_of_the_pore_is_an_end_after_a_resume_too(tmp_path):
 RECORD = '{"scene": "x", "hash": "x", "tables": {}, "files": ["thesis.tex"], "status": '
 
 
-@pytest.mark.parametrize("arguments", [["--resume"], ["base", *flags(*SHORT), "--force", "--out"]],
+@pytest.mark.parametrize("arguments", [["run", "--resume"], ["run", "base", *flags(*SHORT), "--force", "--out"]],
                          ids=["go on", "anew"])
 @pytest.mark.parametrize("content, why", [
     (None, "there is no run.json|it holds 'thesis.tex', which is not of a run; a new or empty folder"),
@@ -152,16 +153,16 @@ def test_a_folder_without_a_run_is_refused(tmp_path, capsys, content, why, argum
     (tmp_path / "thesis.tex").write_text("years of work")
     if content is not None:
         (tmp_path / "run.json").write_text(content)
-    message = refused(tmp_path, capsys, *arguments, str(tmp_path))
+    message = refused(tmp_path, capsys, *arguments, tmp_path)
     assert re.search(why, message)
-    assert content is None or arguments[0] == "--resume" or "move the folder away, or name another" in message
+    assert content is None or "--resume" in arguments or "move the folder away, or name another" in message
 
 
 @pytest.mark.parametrize("record", ['"running", "tables": {"pore": 3}}', '"running"}'])
 def test_a_record_of_no_scene_or_of_another_is_refused(tmp_path, capsys, record):
     """What a section or a hash cannot be."""
     (tmp_path / "run.json").write_text(RECORD + record)
-    assert "run.json: " in refused(tmp_path, capsys, "--resume", str(tmp_path))
+    assert "run.json: " in refused(tmp_path, capsys, "run", "--resume", tmp_path)
 
 
 @pytest.mark.parametrize("status", ["", "Completed", "completed ", "failed", "runningly", "interrupted?"])
@@ -169,7 +170,7 @@ def test_a_status_that_no_run_writes_is_none(tmp_path, capsys, status):
     """Neither finished nor to be gone on with."""
     run(load_scene("flow_only"), tmp_path)
     results.write_json(tmp_path / "run.json", told(tmp_path) | {"status": status})
-    message = refused(tmp_path, capsys, "--resume", str(tmp_path))
+    message = refused(tmp_path, capsys, "run", "--resume", tmp_path)
     assert f"its status {status!r} is none that a run writes" in message and not task.finished(tmp_path)
 
 
@@ -179,7 +180,7 @@ def test_an_altered_checkpoint_is_refused_and_the_one_before_is_used(tmp_path, c
     stopped(SCENE, out)
     good = (out / NEWEST).read_bytes()
     (out / NEWEST).write_bytes(good[:-1] + bytes([good[-1] ^ 1]))
-    assert main(["run", "--resume", str(out), "--quiet"]) == 0
+    assert resumed(out) == 0
     message = capsys.readouterr().err
     assert f"{NEWEST}: refused: its checksum is wrong" in message and "t = 0" not in message
     assert as_whole(SCENE, out) and told(out)["resumes"][0]["time_h"] > 0
@@ -252,13 +253,14 @@ def test_results_reach_the_disk_while_a_run_goes_on(tmp_path):
     assert seen == [("running", count, count) for count in range(1, len(seen) + 1)] and len(seen) > 4
 
 
-def test_sigterm_ends_a_run_that_goes_on_later(tmp_path):
-    """Status 143, one line, results so far; then to the end with the bits of the whole run."""
+@pytest.mark.parametrize("number, status", [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_ends_a_run_that_goes_on_later(tmp_path, number, status):
+    """One line, results so far; then to the end with the bits of the whole run."""
     process = started("base", "--set", "growth.end=1.6 h", "--out", tmp_path)
     wait_for((tmp_path / "fields" / "fields_0002.vtu").exists, process)
-    process.send_signal(signal.SIGTERM)
+    process.send_signal(number)
     message = process.communicate(timeout=60)[1]
-    assert process.returncode == 143 and message.endswith("goes on from there\n")
+    assert process.returncode == status and message.endswith("goes on from there\n")
     assert "Traceback" not in message and told(tmp_path)["status"] == "interrupted"
     assert len((tmp_path / "timeseries.csv").read_text().splitlines()) > 3
     assert resume(tmp_path) == "completed" and as_whole(load_scene("base", ["growth.end=1.6 h"]), tmp_path)

@@ -7,9 +7,9 @@ from repro.cli import main
 from repro.run import machine, running
 from repro.run.running import run
 from repro.scene import load_scene
-from tests import faults
+from tests import faults, pages
 from tests.pages import whole_of
-from tests.shell import as_whole, files, flags, lasting, refused, state, stopped, told
+from tests.shell import as_whole, files, flags, lasting, refused, resumed, state, stopped, told
 
 FAST = ('numerics.preset="fast"', 'growth.end="3 h"')
 SETS, SCENE = flags(*FAST), load_scene("base", FAST)
@@ -29,7 +29,7 @@ def test_a_run_that_is_done_is_left_alone(tmp_path, capsys):
 def test_a_run_that_was_interrupted_is_gone_on_with(tmp_path, capsys):
     """From its state, to the bits of the whole run."""
     stopped(SCENE, tmp_path / "run")
-    assert main(["run", "base", *SETS, "--out", str(tmp_path / "run")]) == 0
+    pages.run(tmp_path, "base", *FAST)
     assert "goes on from t = " in capsys.readouterr().err
     assert as_whole(SCENE, tmp_path / "run")
     assert told(tmp_path / "run")["resumes"][0]["time_h"] > 0
@@ -39,9 +39,9 @@ def test_another_scene_is_refused_with_what_differs(tmp_path, capsys):
     """By key, with both values."""
     out = tmp_path / "run"
     stopped(SCENE, out)
-    message = refused(tmp_path, capsys, "base", *flags(FAST[0], "growth.end=4 h"), "--out", str(out))
+    message = refused(tmp_path, capsys, "run", "base", *flags(FAST[0], "growth.end=4 h"), "--out", out)
     assert "growth.end (3.0 h there, now 4.0 h)" in message and "--force" in message
-    message = refused(tmp_path, capsys, "flow_only", "--out", str(out))
+    message = refused(tmp_path, capsys, "run", "flow_only", "--out", out)
     assert "flow.mean_velocity (not set there" in message and "growth (a section there, now not set)" in message
 
 
@@ -56,7 +56,7 @@ def test_other_versions_are_refused_with_what_differs(tmp_path, capsys, monkeypa
         faults.another_version(monkeypatch, "scipy")
     for name in ("run", "done"):
         assert f"the run there is another one: {key} (" in refused(
-            tmp_path, capsys, "base", *SETS, "--out", str(tmp_path / name))
+            tmp_path, capsys, "run", "base", *SETS, "--out", tmp_path / name)
 
 
 def test_a_forced_run_removes_what_is_listed_and_nothing_else(tmp_path):
@@ -71,7 +71,7 @@ def test_a_forced_run_removes_what_is_listed_and_nothing_else(tmp_path):
         (out / name).write_bytes(content)
     record = told(out)
     results.write_json(out / "run.json", record | {"files": [*record["files"], "../victim", "link.txt", "notes.txt"]})
-    assert main(["run", "base", *SETS, "--out", str(out), "--force"]) == 0
+    pages.run(tmp_path, "base", *FAST, options=["--force"])
     assert (out / "link.txt").is_symlink() and {name: (out / name).read_bytes() for name in mine} == mine
     assert {name: content for name, content in files(out).items() if name not in mine} == files(whole)
     assert lasting(out) | {"origin": None} == lasting(whole) | {"origin": None} and told(out)["resumes"] == []
@@ -82,25 +82,24 @@ def test_a_forced_run_is_refused_where_others_have_files_of_its_names(tmp_path, 
     run(SCENE, tmp_path)
     (tmp_path / name).write_text("years of work")
     assert f"{name}: no run has written it" in refused(
-        tmp_path, capsys, "base", *SETS, "--force", "--out", str(tmp_path))
+        tmp_path, capsys, "run", "base", *SETS, "--force", "--out", tmp_path)
 
 
-def test_a_scene_file_that_was_changed_is_told_on_resume(tmp_path, capsys):
-    """With what differs; the run goes on with its own."""
+def test_a_scene_file_that_was_changed_is_told_on_resume(tmp_path, capsys, monkeypatch):
+    """With what differs, from wherever that is asked for; the run goes on with its own."""
     scene = tmp_path / "mine.toml"
+    monkeypatch.chdir(tmp_path)
     scene.write_text('[pore]\nwidth = "50 um"\n[flow]\nhead = "1e-3 cm"\n')
-    assert main(["run", str(scene), "--set", "pore.length=500 um", "--out", str(tmp_path / "run")]) == 0
-    assert main(["run", "--resume", str(tmp_path / "run")]) == 0
-    assert capsys.readouterr().err == ""
-    scene.write_text(scene.read_text().replace("50 um", "60 um"))
-    assert main(["run", "--resume", str(tmp_path / "run")]) == 0
-    message = capsys.readouterr().err
-    assert f"{scene}: it is not the scene of the run any more: pore.width (50.0 um there, now 60.0 um)" in message
-    assert message.count("\n") == 1 and told(tmp_path / "run")["tables"]["pore"]["width"] == "50.0 um"
-    for content in ("not toml", None):
+    out = pages.run(tmp_path, "mine.toml", "pore.length=500 um")
+    monkeypatch.chdir(out)
+    text = scene.read_text()
+    differs = f"{scene}: it is not the scene of the run any more: pore.width (50.0 um there, now 60.0 um)"
+    for content, said in ((text, ""), (text.replace("50 um", "60 um"), differs), ("not toml", ""), (None, "")):
         scene.unlink() if content is None else scene.write_text(content)
-        assert main(["run", "--resume", str(tmp_path / "run")]) == 0
-        assert capsys.readouterr().err == ""
+        assert resumed(out) == 0
+        message = capsys.readouterr().err
+        assert said in message and message.count("\n") == bool(said)
+    assert told(out)["tables"]["pore"]["width"] == "50.0 um"
 
 
 @pytest.mark.parametrize("origin", [{"file": 3, "set": []}, {"file": "base", "set": [3]}, {"file": "base", "set": None},

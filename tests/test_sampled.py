@@ -69,11 +69,6 @@ def drawn(texts, count=12, **how):
     return drawing.sample(texts, count, **how)
 
 
-def test_a_module_gives_as_many_as_its_size_and_one_at_least():
-    assert drawing.shared({"a": 100, "b": 50, "c": 1}, {"a": 99, "b": 99, "c": 9}, 31) == {"a": 20, "b": 10, "c": 1}
-    assert drawing.shared({"a": 100, "b": 1}, {"a": 3, "b": 9}, 8) == {"a": 3, "b": 5}
-
-
 def test_a_sample_follows_from_its_seed_and_from_the_lines_around_alone():
     texts = {"a.py": CODE, "b.py": CODE.replace("LIMIT", "MOST")}
     first = drawn(texts)

@@ -295,17 +295,10 @@ def test_cornered_triangles_are_freed_in_either_region_whichever_node_is_their_f
     corner = np.array([0, 1, 3, 4])[:, None]
     triangles = np.roll(np.vstack([corner + [0, 1, 4], corner + [0, 4, 3]]), first, axis=1)
     grid = Mesh.of(points, triangles, np.full(8, biomass), np.empty(0, int), 2.0, (0.0, 2.0))
-    assert on_the_boundary(grid.triangles) == [0, 0, 1, 1, 1, 1, 2, 2]
+    assert strategies.on_the_boundary(grid.triangles) == [0, 0, 1, 1, 1, 1, 2, 2]
     freed = unlocked(grid)
-    assert on_the_boundary(freed.triangles) == [1] * 8
+    assert strategies.on_the_boundary(freed.triangles) == [1] * 8
     assert triangle_areas(points, freed.triangles) == pytest.approx(np.full(8, 0.5))
-
-
-def on_the_boundary(triangles):
-    """Of each triangle, how many of its edges no other one has, sorted."""
-    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2))
-    _, which, count = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
-    return sorted((count[which] == 1).reshape(-1, 3).sum(axis=1))
 
 
 def test_elements_are_small_beside_the_upper_wall_s_contact_lines_alone():

@@ -10,14 +10,14 @@ from hypothesis import strategies as st
 
 from repro.check.checked import check
 from repro.check.numbers import judged
-from repro.cli import main
 from repro.march.simulation import simulate
 from repro.model import pore
 from repro.results import read_table
 from repro.scene import load_scene, parse_scene, scene_hash, scene_tables
 from repro.scene.course import Course
 from repro.scene.text import scene_text
-from tests.shell import flags
+from tests.pages import run
+from tests.shell import resumed
 from tests.strategies import scene
 from tests.test_scene import refusal
 
@@ -42,8 +42,6 @@ def test_the_hash_tells_tables_and_their_interpolation_apart():
     hashes = [scene_hash(load_scene("base", changes)) for changes in (
         [], [table], [table, "substrates.donor.interpolation=linear"], [f'{DONOR}=[["0 h", "10 mg/L"]]'])]
     assert len(set(hashes)) == 4
-    plain = scene_tables(load_scene("base"))
-    assert plain["substrates"]["donor"]["interpolation"] == plain["flow"]["interpolation"] == "steps"
 
 
 @pytest.mark.parametrize("table, told", [
@@ -149,7 +147,6 @@ def test_what_is_judged_is_the_extreme():
 
 def test_commands_take_tables(tmp_path):
     """A run with its page, and a longer one; another process of a sweep is in tests/test_sweep.py."""
-    assert main(["run", "base", *flags(*SHORT, RISING), "--out", str(tmp_path)]) == 0
-    assert main(["run", "--resume", str(tmp_path), "--set", 'growth.end="1.2 h"']) == 0
-    assert (tmp_path / "report.html").exists()
-    assert read_table(tmp_path / "timeseries.csv")["time_h"][-1] == 1.2
+    out = run(tmp_path, "base", *SHORT, RISING)
+    assert resumed(out, "--set", 'growth.end="1.2 h"') == 0
+    assert (out / "report.html").exists() and read_table(out / "timeseries.csv")["time_h"][-1] == 1.2

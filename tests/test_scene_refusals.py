@@ -7,11 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from repro.scene import SceneError, Substrates, files, load_scene, load_tables, parse_scene, scene_tables
+from repro.scene import SceneError, files, load_scene, load_tables, parse_scene, scene_tables
 from repro.scene.reading import NOT_MODELLED, SCOPE
 from tests.blocks import ROOT
 from tests.test_scene import refusal, written
-from tests.test_scene_aggregate import BUMP
 
 LENGTH = 'a length is needed, such as "100 um" (greater than zero)'
 
@@ -70,6 +69,16 @@ REFUSED = {
     "greater than zero, at most 20": ["numerics.refinement=20.1", "numerics.refinement=1e9"],
     "1e-06 h or more is needed": ["growth.time_step=9e-7 h"],
     "between 0 and 90 deg": ["growth.minimum_contact_angle=0 deg", "growth.minimum_contact_angle=90 deg"],
+    # shares, and F by the oxygen demand
+    'a diffusivity or kinematic viscosity is needed, such as "1.85 cm^2/day" (greater than zero), or a share of '
+    'diffusivity up to "100 %"': [
+        f'substrates.acceptor.diffusivity_in_aggregate="{value}"' for value in (
+            "0 %", "-5 %", "100.1 %", "%", "nan %", "1e999999999 %", "1e-999999999 %", "80 %%", "80 % um^2/h", "0.8",
+            "eighty %", "9" * 100 + " %")],
+    "kinetics.donor_oxygen_demand = 0.8: more than Y d_c (0.8662) is needed: F is the rest": [
+        "kinetics.donor_oxygen_demand=0.8"],
+    "a plain number is needed, such as 2.38 (greater than zero)": [
+        f"kinetics.donor_oxygen_demand={value}" for value in ("0", "2 mg/mg", "nan")],
     # words
     'numerics.preset = "best": "fast" or "accurate" or "exact" or "paper" is needed': ["numerics.preset=best"],
     '"quasi_steady" or "gear" is needed': ["numerics.transport=bdf"],
@@ -93,9 +102,6 @@ REFUSED = {
     "a plain number is needed, such as 0 (zero or more, less than 1)": ["aggregate.inert_fraction=1"],
     "zero or more, less than 1": ["aggregate.inert_fraction=-0.1", "aggregate.inert_fraction=nan"],
     "(did you mean 0.3?)": ['aggregate.inert_fraction="0.3"'],
-    "one of them is accepted, not both": [f"aggregate.outline={json.dumps(BUMP)}"],
-    'aggregate.position = "2 um": 0 um is needed with aggregate.outline': [
-        f"aggregate={{outline={json.dumps(BUMP)}, position=\"2 um\"}}"],
     # several keys, see PAIRS; here with the value as it was written
     'aggregate.radius = "80 um": less than pore.width (50 um)': ['aggregate.radius="80 um"'],
     "aggregate.radius": ["aggregate.radius=50 um"],
@@ -116,8 +122,6 @@ def test_refused(override, said):
 
 @pytest.mark.parametrize("source, overrides, said", [
     ("wide", ["flow.mean_velocity=-1 m/day"], "a velocity is needed"),
-    ("wide", ["flow.head=1 cm"], 'flow.head = "1 cm": flow.mean_velocity (2.9 m/day) is given too; one of them is '
-     "accepted, not both (--unset flow.mean_velocity leaves that out)"),
     ("initial_mesh", ["flow.viscosity_ratio=5"], "flow.head is missing: it or flow.mean_velocity is needed"),
     ("base", ["flow.permeability=1e-15 m^2"], 'flow.biomass = "brinkman" is needed with it'),
     ("base", ["flow.biomass=brinkman"], 'flow.permeability is needed with "brinkman", such as "1e-15 m^2"'),
@@ -127,6 +131,10 @@ def test_refused(override, said):
      'flow.biomass = "brinkman": numerics.elements = "quadratic" or "cubic" is needed'),
     ("base", ["numerics.preset=fast", "flow.biomass=brinkman", "flow.permeability=1e-15 m^2",
               "growth.fluid_forces=included"], '"neglected" is needed with flow.biomass = "brinkman"'),
+    ("base", ["kinetics.donor_oxygen_demand=0.8", "kinetics.acceptor_to_donor_ratio=1.52"],
+     "more than Y d_c (0.8662) is needed"),
+    ("base", ["substrates.acceptor.diffusivity_in_aggregate=1e-200 %", "substrates.acceptor.diffusivity=1e-200 um^2/h"],
+     'diffusivity_in_aggregate = "1e-200 %": greater than zero is needed'),
     ("base", ["flow.permeability=0 m^2"], "a permeability"),
     ("flow_only", ["growth.end=1 h"], "growth = "),
     ("flow_only", ["substrates={}", "growth.time_step=1 h"], 'growth.end is missing: a time is needed'),
@@ -400,10 +408,6 @@ def test_one_substrate_alone_is_refused(tmp_path, given, absent, with_aggregate)
     assert "not to limit is supplied at many times its half_saturation" in message
     for other in (f"substrates.{absent}={{}}", f"substrates.{absent}.supply=1000 mg/L"):
         assert load_scene(path, [other]).substrates is not None
-
-
-def test_both_substrates_unsaid_are_table_1():
-    assert load_scene("initial_mesh", ["substrates={}"]).substrates == Substrates()
 
 
 def test_not_utf_8_is_refused(tmp_path):

@@ -4,7 +4,6 @@ Malformed scenes are refused in a printable line, and nothing is written: 2000 o
 quarter of it a kind.
 """
 import dataclasses
-import io
 import json
 import math
 import os
@@ -12,22 +11,21 @@ import string
 import subprocess
 import sys
 import tomllib
-from contextlib import redirect_stderr, redirect_stdout
 from decimal import Decimal, localcontext
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from repro.cli import main
 from repro.scene import KEYS, PRESETS, SceneError, load_scene, packaged_scenes, parse_scene, scene_hash, scene_tables
 from repro.scene.text import scene_text
 from tests.blocks import ROOT
+from tests.shell import refused as refused_by_command
 from tests.strategies import scenes
 from tests.test_scene import EVERYTHING
 
 #: How many of another unit an internal unit is, an exact decimal, worked out by hand; units one by one are in
-#: tests/test_scene_units.py.
+#: tests/test_scene.py.
 OTHER_UNITS = {"um": "1e-4 cm", "h": "3600 s", "um/h": "24e-6 m/day", "um^2/h": "24e-6 mm**2 / day",
                "um/h^2": "576e-6 m/day^2", "1/h": "24 day^-1", "mg/L": "1e-3 kg/m^3", "MPa": "1e3 kPa",
                "rad": "1 radian"}
@@ -261,18 +259,15 @@ def shown(value: object) -> str:
 
 @FUZZ
 @given(garbled(), st.sampled_from(["run", "scene", "check"]))
-def test_the_command_line_refuses_in_one_line_and_writes_nothing(folder, content, command):
-    """Exit status 2 and a line, where the file is no scene."""
-    file, out, err = folder / "line.toml", io.StringIO(), io.StringIO()
+def test_the_command_line_refuses_in_one_line_and_writes_nothing(capsys, folder, content, command):
+    """Where the file is no scene."""
+    file = folder / "line.toml"
     file.write_bytes(content)
     try:
         load_scene(file)
     except SceneError as error:
-        before = sorted(folder.iterdir())
-        with redirect_stdout(out), redirect_stderr(err):
-            assert main([command, str(file), *(["--out", str(folder / "out")] if command == "run" else [])]) == 2
-        assert (out.getvalue(), err.getvalue()) == ("", f"repro: {error}\n") and err.getvalue().count("\n") == 1
-        assert sorted(folder.iterdir()) == before
+        target = ["--out", folder / "out"] if command == "run" else []
+        assert refused_by_command(folder, capsys, command, file, *target) == f"repro: {error}\n"
 
 
 def test_a_process_of_its_own_says_the_same(tmp_path):

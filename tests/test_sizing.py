@@ -9,19 +9,14 @@ from hypothesis import strategies as st
 from repro.fem import sizing as of
 from repro.fem.outline import BOTTOM, FREE, TOP
 from repro.fem.sizing import Sizing
-from repro.march.simulation import simulate
-from repro.model import remeshing
 from repro.scene import Numerics
 from tests import oracles
 from tests.strategies import (
-    ORDERS,
     attached_aggregates,
     lengths,
     outlines,
     plug,
     refinements,
-    scenes,
-    share,
     widths,
 )
 
@@ -107,21 +102,6 @@ def test_the_mesh_is_extended_once_the_aggregate_is_too_close_to_its_end(drawn, 
     if abs(part - 1) > 1e-9:
         assert of.extent_too_short(outline, tuple(ends), width, length) == (part < 1 and more)
     assert not of.extent_too_short(outline, (-length / 2, length / 2), width, length)
-
-
-@share(0.4)
-@given(scenes(elements=list(ORDERS.values())))
-def test_the_mesh_of_a_run_has_the_extent_of_section_3_1(made):
-    """Whenever a mesh is made; and later, however it has moved, never under min(7 R, 1.3 W) where there is pore left.
-    """
-    width, length = made.pore.width, made.pore.length
-    for instant in simulate(made):
-        now, reach = instant.pore, min(7 * instant.pore.outline.thickness, 1.3 * width)
-        assert now.outline.upstream - now.mesh.ends[0] >= reach or now.mesh.ends[0] == -length / 2
-        assert now.mesh.ends[1] - now.outline.downstream >= reach or now.mesh.ends[1] == length / 2
-        again = remeshing.remesh(made, now, now, 0.0)[0].mesh
-        assert again.ends == pytest.approx(oracles.extent(now.outline.points, width, length), rel=1e-12)
-        assert (again.points[:, 0].min(), again.points[:, 0].max()) == again.ends
 
 
 @given(attached_aggregates(width=widths), refinements)

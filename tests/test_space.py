@@ -1,6 +1,6 @@
-"""Functions of order 1, 2 and 3 on straight and on curved triangles: nodes of the boundary, rules, the reaction.
+"""Functions of order 1, 2 and 3 on straight and on curved triangles: nodes of the boundary, rules.
 
-Values, gradients, masses and loads are held to scikit-fem's in `test_weak_forms.py`.
+Values, gradients, masses, loads and the reaction are held to scikit-fem's in `test_weak_forms.py`.
 """
 import numpy as np
 import pytest
@@ -96,24 +96,6 @@ def test_tables_and_points_are_worked_out_once(meshes):
             assert space.gradients_at is space.at
     assert Space(meshes["straight"], 1).gradients_at.dx.shape[1] == 1
     assert Space(meshes["bent"], 1).gradients_at.dx.shape[1] > 1
-
-
-@orders
-def test_the_reaction_is_taken_in_the_biomass_alone(meshes, order):
-    """At the nodes of the aggregate, lumped, with linear functions; at the quadrature points of its triangles else."""
-    mesh = meshes["straight" if order == 1 else "made"]
-    space = Space(mesh, order)
-    pieces = space.reaction
-    assert pieces.dx.sum() == pytest.approx(mesh.area(), rel=1e-12)
-    if order == 1:
-        assert np.array_equal(pieces.cells[:, 0], mesh.body) and pieces.values.tolist() == [[1.0]]
-        thirds = np.bincount(mesh.triangles[mesh.biomass].ravel(), np.repeat(mesh.areas[mesh.biomass] / 3, 3))
-        assert pieces.dx[:, 0] == pytest.approx(thirds[thirds > 0], rel=1e-13)
-        assert np.array_equal(space.lumped(mesh.biomass)[mesh.body], pieces.dx[:, 0])
-    else:
-        assert np.array_equal(pieces.cells, space.cells[mesh.biomass])
-        assert np.array_equal(pieces.values, space.table.values)
-        assert np.array_equal(pieces.dx, space.at.dx[mesh.biomass])
 
 
 def test_degrees_that_are_integrated():

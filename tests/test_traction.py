@@ -69,18 +69,6 @@ def test_a_run_with_them_is_pushed_downstream_and_counts_its_rounds(order):
 
 
 @EVERY_ORDER
-def test_a_plug_is_pushed_through_contact_and_remeshes(order):
-    """Shape and flow agree in every step although new meshes must be made for the flow within the rounds."""
-    radius = () if order == 1 else ('aggregate.radius="17 um"',)
-    said = load_scene("wide", ['numerics.preset="paper"', f"numerics.elements={ORDERS[order]}",
-                               f"numerics.refinement={0.5 if order == 1 else 0.25}", 'growth.time_step="24 min"',
-                               'pore.width="20 um"', f'growth.end="{16.4 if order == 1 else 2.4} h"',
-                               'growth.fluid_forces="included"', *radius])
-    instants = list(simulate(said))
-    assert instants[-1].pore.contact and sum(i.remeshes for i in instants) > 2
-
-
-@EVERY_ORDER
 def test_a_shape_with_its_own_mesh_needs_no_other(order):
     said = base(order=order)
     now = pore.seeded(said)

@@ -3,7 +3,6 @@
 (34), and the projection against a dense code, are in the cases of the stage reprojection.
 """
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -19,8 +18,7 @@ from repro.march.simulation import simulate
 from repro.model import biomass, pore, remeshing
 from repro.model.transport import OVERSHOOT, UNRESOLVED
 from repro.scene import load_scene
-from tests import oracles
-from tests.strategies import ORDERS, remesh_chains, scene, scenes, share
+from tests.strategies import ORDERS, scene, scenes, share
 from tests.test_outline import wavy
 from verification.problems import pairs
 
@@ -54,13 +52,13 @@ def test_a_place_is_found_in_its_triangle(around, kind):
     """By Newton's method on the curved map, to 1e-9 of the size."""
     mesh = around[kind]
     random, nodes = np.random.default_rng(8), mesh.points[mesh.cells]
-    local = random.dirichlet([1, 1, 1], len(nodes))[:, 1:]
+    shares = random.dirichlet([1, 1, 1], len(nodes))
+    local = shares[:, 1:]
     where = np.einsum("ka,kai->ki", elements.values(mesh.geometry, local), nodes)
     at = transfer.located(mesh.points, mesh.cells, where)
     back = np.einsum("ka,kai->ki", elements.values(mesh.geometry, at.local), nodes[at.triangle])
     assert np.allclose(back, where, atol=1e-9)
-    inner = local.min(axis=1) + np.minimum(1 - local.sum(axis=1), 0) > 0.02
-    inner &= 1 - local.sum(axis=1) > 0.02
+    inner = shares.min(axis=1) > 0.02
     assert np.array_equal(at.triangle[inner], np.arange(len(nodes))[inner])
 
 
@@ -171,25 +169,6 @@ def test_a_run_that_remeshes_by_a_bounded_transfer_keeps_its_biomass():
     assert leaks["bounded"] < 1e-12 and leaks["conserving"] < 1e-12 < leaks["linear"]
     assert lasts["bounded"].inert.min() >= 0
     assert lasts["bounded"].outline.area != lasts["conserving"].outline.area
-
-
-@share(0.4)
-@given(remesh_chains(), st.integers(0, 2**32 - 1))
-def test_a_chain_of_meshes_keeps_mass_and_linear_fields(chain, seed):
-    """On any aggregate, to 1e-11: linear fields by either transfer, the mass of a rough one by projection (measured:
-    2e-15)."""
-    def smooth(points):
-        return np.column_stack([np.ones(len(points)), 2.0 + 0.3 * points[:, 0] - 0.7 * points[:, 1]])
-
-    rough = np.random.default_rng(seed).uniform(0.0, 1.0, (len(chain[0][0]), 1))
-    first = oracles.mass(*chain[0], rough[:, 0])
-    sampled, field = smooth(chain[0][0]), np.hstack([rough, smooth(chain[0][0])])
-    for old, new in pairwise(chain):
-        field = transfer.project(*old, field, *new)
-        sampled, exact = transfer.interpolate(*old, sampled, new[0]), smooth(new[0])
-        assert oracles.mass(*new, field[:, 0]) == pytest.approx(first, rel=1e-11)
-        for found in (field[:, 1:], sampled):
-            assert np.abs(found - exact).max() < 1e-11 * np.abs(exact).max()
 
 
 @share(0.4)

@@ -112,28 +112,10 @@ def test_couplings_that_are_exactly_zero_keep_their_place(order):
     assert found.acceptor == pytest.approx(10.0, rel=1e-12)
 
 
-def thick(velocity, order=2, refinement=None, **more):
+def thick(velocity, order=2, refinement=None):
     """A half-disc of 60 um in a pore of 100 um."""
     numerics = {"elements": ORDERS[order], "refinement": refinement or FINE[order]}
-    return scene("60 um", "100 um", velocity=velocity, numerics=numerics, **more)
-
-
-@EVERY_ORDER
-def test_equal_diffusivities_keep_the_difference(order):
-    """Without decay and with one diffusivity, C_A - F C_D is carried and diffused but not taken up: it is, at every
-    node, what the same equations say of a substrate that nothing takes up. That is the supply, but for what the water's
-    div u of higher orders, zero against linear functions only, makes of it: under 3e-4 of it here."""
-    made = thick("0.29 m/day", order)
-    both = replace(made.substrates.acceptor, half_saturation=1e-3 * made.substrates.acceptor.supply)
-    made = replace(made, substrates=replace(made.substrates, acceptor=both, donor=both),
-                   kinetics=replace(made.kinetics, decay_coefficient=0.0))
-    now, found = at_start(made)
-    free = transport.steady(transport.problem(now.space, found.flow, made.substrates, None), None).donor
-    both, ratio = found.concentrations, made.kinetics.acceptor_to_donor_ratio
-    assert np.ptp(both.acceptor) > 1.5
-    assert np.allclose(both.acceptor - ratio * both.donor, (1 - ratio) * free, rtol=0, atol=1e-8)
-    most, least = (1e-9, 0.0) if order == 1 else (3e-3, 1e-6 if order == 2 else 1e-9)
-    assert least <= np.abs(free - 10).max() < most
+    return scene("60 um", "100 um", velocity=velocity, numerics=numerics)
 
 
 @EVERY_ORDER
@@ -145,24 +127,15 @@ def test_too_slow_a_flow_is_refused(order):
         assert np.isfinite(at_start(thick("1e-9 m/day", order))[1].fluxes[0].effluent)
 
 
+SAID = r"the (acceptor|donor) is -?[\d.]+ mg/L at x = \S+, y = \S+ um, outside of 0 to 10 mg/L; the mesh is too coarse"
+
+
 @pytest.mark.parametrize("order", [2, 3])
 def test_too_coarse_a_mesh_is_refused(monkeypatch, order):
     """Without elements for the boundary layer the concentration oscillates upstream: more than 2 % over the supply."""
     monkeypatch.setattr(pore, "BOUNDARY_LAYER", 0.0)
-    with pytest.raises(Unresolved, match="outside of 0 to 10 mg/L; the mesh is too coarse there"):
+    with pytest.raises(Unresolved, match=SAID):
         at_start(thick("290 m/day", order, 0.2))
-
-
-@EVERY_ORDER
-def test_negative_concentrations_are_refused(order):
-    """A state below zero by more than 1e-3 of the supply is no solution."""
-    now, found = at_start(thick("2.9 m/day", order))
-    state = np.concatenate([found.concentrations.acceptor, found.concentrations.donor])
-    state[3] = -0.009
-    transport._checked(found.problem, state, 1)
-    state[3] = -0.011
-    with pytest.raises(Unresolved, match="the acceptor is -0.011 mg/L"):
-        transport._checked(found.problem, state, 1)
 
 
 @EVERY_ORDER

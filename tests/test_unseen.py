@@ -10,22 +10,29 @@ from xml.etree import ElementTree
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+import tqdm
 from scipy.spatial import Delaunay
+from tqdm import tqdm as Bar
 
 import repro
 from repro import results, timing
-from repro.check import cost, modelled, numbers
+from repro.check import cost, modelled, numbers, simplifications
 from repro.errors import BalanceError, TransportError, Unresolved
+from repro.fem.outline import FREE, half_disc, polygon
+from repro.fem.sizing import Sizing, split
 from repro.march import balance, simulation, stepping, updates
-from repro.march.loop import Instant, Ledger
-from repro.model import contact, gear, mesh_motion, remeshing, traction, transport
+from repro.march.loop import Instant, Ledger, PoreEnd
+from repro.march.pace import EXCESS, Pace, missed
+from repro.model import biomass, contact, gear, mesh_motion, remeshing, traction, transport
 from repro.model.pore import Solved, resolution, seeded, solve
-from repro.report import comparison, quantities
+from repro.report import charts, comparison, fields, quantities, run_page
 from repro.report.reading import Run
 from repro.results import picture
-from repro.run import running
+from repro.results.tables import Results
+from repro.results.vtu import Cells, Grid
+from repro.run import progress, running
 from repro.scene import load_scene
-from repro.sweep import page, table
+from repro.sweep import making, page, table
 from repro.sweep.design import grid, parse, points
 from repro.sweep.state import Sweep
 from tests import oracles
@@ -281,7 +288,10 @@ def test_runs_are_compared_under_their_own_names_with_signs():
         assert [line.label for line in chart.lines] == labels, chart.title
         if chart.title != "Mesh: made anew":
             assert [line.values[-1] / chart.lines[0].values[-1] for line in chart.lines] == pytest.approx([1, 1.5, 0.5])
-    (row,) = re.findall("<tr><td>upstream end of the aggregate.*?</tr>", comparison.build(runs))
+    made = comparison.build(runs)
+    heads = re.findall('<th scope="col" class="value">([^<]*)', made[made.index("Values at the common last time"):])
+    assert heads == ["zeta", "alpha", "difference", "mu", "difference"]
+    (row,) = re.findall("<tr><td>upstream end of the aggregate.*?</tr>", made)
     assert re.findall('class="value">([^<]*)<', row) == ["-8", "-12", "-50 %", "-4", "+50 %"]
 
 
@@ -398,3 +408,238 @@ def test_gears_method_takes_less_than_nothing_by_each_substrates_own_supply(orde
     assert [taken.min(), taken.max()] == pytest.approx([-5e-3, -5e-3], rel=1e-6)
     with pytest.raises(TransportError, match="the acceptor becomes negative"):
         gear.advance(drained, nothing, nothing, start, 10.05e-6)
+
+
+def test_a_smooth_seed_is_a_natural_spline_through_its_points():
+    """Of three points over even knots: S(t) = (3 t - t^3) / 2 from either end, no parabola and nothing else."""
+    rim = polygon(np.array([(-6.0, 0.0), (0.0, 4.0), (6.0, 0.0)]), 50.0, smooth=True).points[3:-1]
+    t = 1 - np.abs(rim[:, 0]) / 6
+    assert len(rim) > 10 and rim[:, 1] == pytest.approx(4 * (3 * t - t**3) / 2, rel=1e-12)
+
+
+def test_contact_of_an_outline_is_held_in_its_middle_however_its_points_lie():
+    uneven_top = [(-21, 0), (-12, 20), (-11, 20), (-10, 20), (-9, 20), (8, 20), (12, 12), (16, 0)]
+    outline = polygon(np.array(uneven_top, float), 20.0)
+    assert outline.points[outline.fixed].tolist() == [[-2.5, 0.0], [-2.0, 20.0]]
+
+
+@pytest.mark.parametrize("seed", [0.0, -30.0])
+def test_a_seed_anywhere_was_round_at_its_start(seed):
+    """New nodes on straight edges remember places on the seed's own arc, to round-off."""
+    outline = half_disc(8.0, 4.0, 1, seed)
+    finer = split(outline, Sizing(50.0, 1.0, 2.0, seed=seed))
+    free = finer.wall == FREE
+    assert free.sum() > 1.5 * (outline.wall == FREE).sum()
+    assert np.hypot(*(finer.origin[free] - [seed, 0]).T) == pytest.approx(8.0, rel=1e-12)
+    assert np.hypot(*(finer.points[free] - [seed, 0]).T).min() < 7.99
+
+
+@EVERY_ORDER
+def test_half_saturations_that_come_down_end_where_they_are(order):
+    """From the supply and by way of larger half saturations the state is the same, one of them over its supply."""
+    scene, now = base(order, 'substrates.acceptor.half_saturation="1e-3 mg/L"',
+                      'substrates.donor.half_saturation="30 mg/L"')
+    made = solve(scene, now).problem
+    sink = biomass.sink(now.active)
+    found, _ = transport._found(transport.Balance(made, sink), made.supply)
+    eased, _ = transport._eased(made, sink, made.supply)
+    assert eased == pytest.approx(found, rel=1e-9)
+
+
+@pytest.mark.parametrize("order", [2, 3])
+def test_a_front_between_the_points_of_a_quadrature_is_refused(order, monkeypatch):
+    """Where two of them differ by more than is accepted, behind a front 4e-2 um thick of an acceptor of 2 mg/L."""
+    front = ['substrates.acceptor.supply="2 mg/L"', 'substrates.acceptor.half_saturation="1e-4 mg/L"',
+             'aggregate.radius="20 um"', "numerics.refinement=0.4", 'flow.mean_velocity="0.5 m/day"']
+    scene, now = base(order, *front, unset=["flow.head"])
+    solved = solve(scene, now)
+    made, sink = solved.problem, biomass.sink(now.active)
+    apart = transport.quadrature_error(made, sink, solved.concentrations)
+    for accepted in (2 * apart, apart / 2):
+        monkeypatch.setattr(transport, "APART", accepted)
+        with nullcontext() if accepted > apart else pytest.raises(Unresolved, match="two quadratures"):
+            transport.steady(made, sink)
+
+
+@pytest.mark.parametrize("order", [2, 3])
+def test_no_biomass_is_less_than_nothing_on_a_new_mesh(order):
+    """Of inert biomass that lies in every other triangle, all of it there."""
+    scene, now, _ = uneven(order)
+    full = scene.kinetics.maximum_density * now.space.reaction.dx
+    inert = full * (np.arange(len(full)) % 2)[:, None]
+    finer = replace(scene, numerics=replace(scene.numerics, refinement=0.47))
+    after, (carried,) = remeshing.remesh(finer, now, replace(now, active=full - inert, inert=inert), 0.0, (inert,))
+    assert min(after.active.min(), after.inert.min(), carried.min()) >= 0 and after.mass == pytest.approx(full.sum())
+
+
+@pytest.mark.parametrize("step, preset", [("2 h", "paper"), ("3 h", "paper"), ("12 min", "fast")])
+def test_the_pores_end_has_a_row_with_every_step_since_the_last_one(step, preset):
+    """Though no time was asked for there: after a step to within an element of it, and where the next one passes it."""
+    changes = ['pore.length="100 um"', 'pore.width="100 um"', 'aggregate.radius="30 um"', 'growth.end="19 h"',
+               'output.times=["1 h", "19 h"]', f"numerics.preset={preset}", "numerics.transport=quasi_steady",
+               f'growth.time_step="{step}"', "numerics.refinement=0.3"]
+    found = []
+    with pytest.raises(PoreEnd) as told_there:
+        found.extend(simulation.simulate(load_scene("base", changes)))
+    last = found[-1]
+    starts, ends = ([getattr(each, name) for each in last.ledgers] for name in ("start", "end"))
+    assert len(found) == 3 and [0.0, *ends] == [*starts, last.pore.time]
+    assert f"t = {last.pore.time:g} h" in str(told_there.value)
+
+
+def test_no_step_goes_over_a_jump_shortly_before_the_end():
+    scene, _ = base(2, "numerics.preset=fast", 'substrates.donor.supply=[["0 h", "4 mg/L"], ["0.6 h", "9 mg/L"]]',
+                    'growth.end="1 h"')
+    assert 0.6 in [each.end for instant in simulation.simulate(scene) for each in instant.ledgers]
+
+
+def test_a_step_misses_the_tolerance_by_more_than_is_accepted_alone():
+    for part, wanted in ((0.0, False), (1.0, False), (EXCESS, False), (1.01 * EXCESS, True)):
+        assert missed(Pace(1.0, 1.0, 0.3 * part), 0.3) is wanted
+
+
+def test_lines_of_a_chart_are_told_apart_by_words_of_their_own():
+    for kind in quantities.KINDS:
+        drawn = [quantities.KNOWN[name] for name in kind.drawn]
+        assert len({each.label for each in drawn}) == len(drawn), kind.title
+        for each in drawn:
+            assert each.label in (each.words if len(drawn) > 1 else kind.title.casefold()) or "demand" in each.label
+
+
+def test_xarray_has_units_that_udunits_knows():
+    pytest.importorskip("xarray")
+    said = Results("x", [dict.fromkeys(results.COLUMNS, 1.0)], [], "completed").to_xarray()
+    wanted = {"time_h": "h", "mean_velocity_m_per_d": "m d-1", "aggregate_area_um2": "um2", "nodes": "1",
+              "inlet_donor_mg_per_L": "mg L-1", "contact": "1", "head_loss_cm": "cm", "thickness_um": "um"}
+    assert {name: said[name].attrs["units"] for name in wanted} == wanted
+
+
+def test_a_picture_says_which_values_are_dark():
+    places = np.array([(0.0, 0.0), (4.0, 0.0), (0.0, 3.0)])
+    shown = {"places_um": places, "triangles": np.array([[0, 1, 2]]), "region": np.zeros(1)}
+    said = picture.figure(shown | {"acceptor_mg_per_L": np.array([3.0, 1.5, 7.0])}, 2.5)
+    assert said.count("acceptor (mg/L), 1.5 (dark) to 7 (light), at t = 2.5 h") == 2
+
+
+@pytest.mark.parametrize("low, high", [(0.0, 2.1), (0.0, 1.0), (-0.7, 0.9), (99.0, 101.0), (0.0, 0.012), (0.0, 9000.0)])
+@pytest.mark.parametrize("parts", [4, 5])
+def test_a_tick_has_the_number_of_its_place(low, high, parts):
+    scale = charts.Scale(low, high, 0.0, 100.0)
+    places, texts = zip(*charts.ticks(scale, parts))
+    assert [float(text) for text in texts] == pytest.approx(places, rel=1e-12, abs=1e-12 * (high - low))
+    assert len(texts) > 1
+
+
+def test_frames_before_an_expansion_are_not_counted_as_times():
+    grid = Grid(np.zeros((3, 3)), [Cells("triangle", np.array([[0, 1, 2]]))])
+    after, before = ([(float(k), Path(f"{name}{k}")) for k in range(50)] for name in ("after", "before"))
+    chosen = fields._chosen(after, dict(before), grid, 10**9)
+    assert [note for *_, note in chosen] == [fields.BEFORE, ""] * fields.MOST_FRAMES
+    frames = [{"note": note} if note else {} for *_, note in chosen]
+    said = run_page._field_note({"meshes": [{"per": 3}], "nodes": 3, "frames": frames, "of": 50, "fields": []})
+    assert "; 40 of 50 times shown, those grown and not yet expanded besides." in said
+
+
+THIN = {"front": ["numerics.preset=fast", 'substrates.acceptor.half_saturation="1e-3 mg/L"',
+                  'flow.mean_velocity="1 m/day"'],
+        "layer of drag": ["numerics.preset=fast", "flow.biomass=brinkman", 'flow.permeability="2e-14 m^2"',
+                          'flow.mean_velocity="1 m/day"'],
+        "cells": ["numerics.preset=paper", 'flow.mean_velocity="60 m/day"']}
+
+
+@pytest.mark.parametrize("layer", THIN)
+def test_a_refinement_that_is_advised_silences_its_warning_and_a_smaller_one_does_not(layer):
+    def advice(*more):
+        scene = load_scene("base", [*THIN[layer], 'growth.end="2 h"', *more], ["flow.head"])
+        found = simplifications.warnings(scene, numbers.numbers(scene, scene.flow.mean_velocity))
+        return [each.text for each in found if " would " in each.text]
+
+    (told_there,) = advice()
+    wanted = float(re.search("([0-9.]+) would (do|resolve it)", told_there)[1])
+    assert not advice(f"numerics.refinement={1.06 * wanted}") and advice(f"numerics.refinement={0.94 * wanted}")
+
+
+def test_the_worst_of_the_steps_that_miss_the_tolerance_is_told(tmp_path):
+    one = running.Recorder(load_scene("base", ["numerics.tolerance=0.01"]), tmp_path)
+    for estimate in (0.03, 0.5, 0.04, 0.001):
+        one._judge(Pace(1.0, 1.0, estimate))
+    assert one.record.missed == 3 and "errs by 0.5 (estimate)" in one.unmet()[0].text
+
+
+def test_rows_at_times_are_counted_with_that_at_zero():
+    for asked in ('["5 h", "18 h"]', '["0 h", "5 h", "18 h"]'):
+        assert "rows and fields at 3 times" in dict(modelled.modelled(base(2, f"output.times={asked}")[0]))["output"]
+
+
+def test_a_run_without_a_row_says_what_its_folder_does_before_and_after_it_was_made(tmp_path):
+    """Failed before t = 0, say; one without a folder says what the attempt at it said, or that there was none."""
+    swept = sweep_of(tmp_path, "40 um, 50 um, 60 um")
+    point = swept.points[0]
+    (swept.runs / point.name).mkdir(parents=True)
+    running.Recorder(point.scene, swept.runs / point.name).tell("failed: x")
+    said = [[one.status for one in table.tell(swept, ended, 0.1)] for ended in ({}, {1: "failed: y", 2: "failed: z"})]
+    assert said == [["failed: x", "not run", "not run"], ["failed: x", "failed: z", "not run"]]
+
+
+def test_marks_of_the_page_have_the_colour_that_the_key_below_them_names(tmp_path):
+    """Of the other factor, where two are varied by different parts: each figure with its own key."""
+    factors = [parse("pore.width=40 um, 50 um"), parse("flow.viscosity_ratio=100, 400, 1000")]
+    found = points("flow_only", [], factors, grid(factors))
+    course = np.array([1.0, 8.0])
+    clogged = dict.fromkeys(table.COLUMNS) | {"clogging_time_h": 5.0}
+    runs = [table.Told(one, "completed", course, course, course, clogged) for one in found]
+    times = page.page(Sweep(tmp_path, "flow_only", factors, found), runs, 0.1).split("<h2>Clogging time")[1]
+    figures = re.findall("<figure>.*?</figure>", times, re.S)
+    for figure, key in zip(figures, ("flow.viscosity_ratio", "pore.width"), strict=True):
+        named = dict(re.findall(r'class="line level(.)"/></svg>([^<]*)</li>', figure))
+        shown = re.findall(rf'class="dot level(.)"[^>]*><title>run [^<]*?{key} = ([^,:]*)', figure)
+        assert len(shown) == 6 and {named[level] == value for level, value in shown} == {True}
+
+
+def test_a_sweep_that_goes_on_counts_what_was_there(tmp_path):
+    swept = sweep_of(tmp_path, "40 um, 50 um, 60 um")
+    (swept.runs / swept.points[1].name).mkdir(parents=True)
+    running.Recorder(swept.points[1].scene, swept.runs / swept.points[1].name).tell("completed")
+    events = []
+    making._make(swept, lambda missing, folder: ((one, "completed") for one in missing), {}, events.append)
+    assert [(each["done"], each["total"], each.get("run")) for each in events] == [(1, 3, None), (2, 3, 1), (3, 3, 3)]
+
+
+def test_the_time_that_is_left_is_that_of_the_pace_since_a_resume(monkeypatch):
+    """From 18 of 20 h on, 1 h in 10 s leaves 10 s."""
+    monkeypatch.setattr(progress, "_fit", lambda bar, event: None)
+    bars = []
+    monkeypatch.setattr(tqdm, "tqdm", lambda **asked: bars.append(Bar(**asked)) or bars[0])
+    with progress.on_a_terminal() as tell:
+        tell({"event": "start", "scene": "base", "from_h": 18.0, "end_h": 20.0, "step": 90})
+        tell({"event": "step", "time_h": 19.0})
+        assert Bar.format_meter(**bars[0].format_dict | {"elapsed": 10.0, "rate": None}).endswith("[00:10 < 00:10]")
+
+
+@pytest.mark.parametrize("value, said", [(0.00123457, "0.00123457"), (1234.56, "1234.56"), (True, "yes"), (False, "no"),
+                                         (None, "none"), ("1234.56789 um", "1234.57 um"), ("a b", "a b"), (7, "7"),
+                                         ([1.5, "2.0 h"], "1.5, 2 h"), ([], "none"), ("0.1 m/day", "0.1 m/day")])
+def test_a_value_is_shown_with_six_digits_and_its_unit(value, said):
+    assert run_page.page.shown(value) == said
+
+
+def test_gears_steps_are_controlled_by_what_is_there_or_supplied():
+    """After a fall of the acceptor's supply, and under a rise of the donor's."""
+    _, problem = case.__wrapped__()
+    start = transport.supplied_everywhere(problem)
+    start = replace(start, acceptor=3 * start.acceptor, donor=start.donor / 2)
+    nothing = np.zeros_like(problem.space.reaction.dx)
+    scale = gear._started(problem, nothing, nothing, start)[0].scale
+    assert scale.ravel().tolist() == [3 * problem.both[0].supply, problem.both[1].supply]
+
+
+@EVERY_ORDER
+def test_an_update_under_a_table_begins_with_what_gear_has_in_the_pore(order):
+    """By the supply half way, and not with profiles that have come to rest under it."""
+    table_of = 'substrates.acceptor.supply=[["0 h", "9 mg/L"], ["1 h", "29 mg/L"]]'
+    scene, now = base(order, "numerics.transport=gear", table_of, "substrates.acceptor.interpolation=linear")
+    solved = solve(scene, now)
+    there = updates._midway(scene, now, solved, 0.2)
+    assert there.concentrations is solved.concentrations and there.problem.both[0].supply == pytest.approx(11.0)
+    risen = updates.step(scene, now, solved, 0.2).ledger.stored[0] / (scene.pore.width * np.ptp(now.mesh.ends))
+    assert risen == pytest.approx(2.0, rel=0.05)

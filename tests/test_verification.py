@@ -22,7 +22,6 @@ from verification.kernel.case import (
     studies,
     study,
 )
-from verification.problems import meshes
 
 SIZES = 0.5 ** np.arange(4)
 #: A case that nobody registers: what it measures, and of which variants.
@@ -219,20 +218,14 @@ def test_the_report_says_what_fell_short_and_holds_no_time():
     assert "seconds" not in text and "1.0 s" not in text
 
 
-def test_random_meshes_cover_their_rectangle_and_follow_their_lines():
-    grid = meshes.channel((-10.0, 20.0), 8.0, 1.1, lambda x, y: (x > 0) & (y < 3), across=(0.0,), along=(3.0,), seed=3)
-    assert grid.areas.min() > 0 and grid.areas.sum() == pytest.approx(240.0, rel=1e-13)
-    assert grid.areas[grid.biomass].sum() == pytest.approx(60.0, rel=1e-13)
-
-
 def test_what_a_case_keeps_besides_tells_its_page():
     """In the place of its numbers, which are judged all the same."""
     class Kept(case.Note):
         def lines(self, every):
             return [("kept", f"{len(every)}", "why", True)]
 
-    chosen = case.Case("x", "flow", "c", "exact", "n", ("m",), False,
-                       lambda value: (at_most("q", value, 1.5, ""), Kept()), {"one": (1.0,), "two": (2.0,)})
+    chosen = replace(A_CASE, function=lambda value: (at_most("q", value, 1.5, ""), Kept()),
+                     over={"one": (1.0,), "two": (2.0,)})
     found = case.run(chosen)
     assert found.outcome.lines() == [("kept", "2", "why", True)] and len(found.outcome.checks) == 2 and not found.holds
 
@@ -251,3 +244,13 @@ def test_rows_that_were_appended_are_read_but_for_one_that_was_cut(tmp_path):
     with file.open("a", encoding="utf-8") as opened:
         opened.write('{"a": 2')
     assert writing.lines(file) == [{"a": 1}]
+
+
+def test_the_first_page_and_its_text_lead_to_what_is_judged_elsewhere():
+    """Claims, errata, sensitivity and the law for networks, at files that are there."""
+    blocks = report.index([])
+    pages, text = writing.page("Verification", blocks), writing.markdown(blocks, 2)
+    for link in ("../../paper_figures/replication.md", "../../reference/ERRATA.md", "../sensitivity/sensitivity.md",
+                 "../../docs/network.md", "sampled.md"):
+        assert f"<a href='{link}'>" in pages and f"]({link})" in text and (report.FOLDER / link).resolve().is_file()
+    assert "<a href='mutants.html'>" in pages and "](mutants.md)" in text

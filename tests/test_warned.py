@@ -13,18 +13,18 @@ from repro.results import read_table
 from repro.run import running
 from repro.run.running import resume, run
 from repro.scene import load_scene
+from tests import pages
 from tests.pages import Page, text_of, whole_of
 from tests.shell import flags, lasting, stopped, told
 
 SETS = ("numerics.preset=fast", "growth.time_step=0.6 h", "growth.end=1 h", "pore.length=100 um",
         "aggregate.radius=16 um")
-COMMAND = ["wide", *flags(*SETS)]
 
 
 @pytest.fixture
 def checked(capsys):
     """The warnings of `repro check`."""
-    assert main(["check", *COMMAND, "--json"]) == 0
+    assert main(["check", "wide", *flags(*SETS), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)["warnings"]
     assert found, "else nothing is tested"
     return found
@@ -34,11 +34,11 @@ def checked(capsys):
 def test_a_run_warns_of_what_check_warns_of(tmp_path, capsys, checked, options):
     """The same keys and words, once each, however it is told what happens, and the exit status is that of a run
     without."""
-    assert main(["run", *COMMAND, "--out", str(tmp_path / "run"), *options]) == 0
+    folder = pages.run(tmp_path, "wide", *SETS, options=options)
     out, err = capsys.readouterr()
     lines = [line for line in err.splitlines() if "warning" in line]
     assert lines == [f"repro: warning: {one['key']}: {one['text']}" for one in checked]
-    assert told(tmp_path / "run")["warnings"] == checked
+    assert told(folder)["warnings"] == checked
     events = [json.loads(line) for line in out.splitlines()] if options == ["--json"] else []
     assert [one["key"] for one in events if one["event"] == "warning"] == [one["key"] for one in checked if events]
 
@@ -56,8 +56,7 @@ def test_the_page_tells_them_at_its_head(tmp_path, checked, recwarn):
 
 
 def test_a_run_without_any_has_an_empty_list(tmp_path, capsys):
-    assert main(["run", "flow_only", "--out", str(tmp_path / "run")]) == 0
-    assert told(tmp_path / "run")["warnings"] == [] and capsys.readouterr().err == ""
+    assert told(pages.run(tmp_path, "flow_only"))["warnings"] == [] and capsys.readouterr().err == ""
     assert "aria-label=\"warnings\"" not in text_of(tmp_path / "run")
 
 
@@ -93,20 +92,20 @@ def not_met(told):
 @pytest.mark.parametrize("options", [[], ["--json"], ["--quiet"]])
 def test_a_tolerance_that_no_step_can_meet_is_told_with_what_is_reached(tmp_path, capsys, options):
     """Once, aside, in run.json and on the page: in how many of the run's steps, and the largest of their estimates."""
-    assert main(["run", "base", *flags(*MISSED), "--out", str(tmp_path), *options]) == 0
-    found = not_met(told(tmp_path))
+    folder = pages.run(tmp_path, "base", *MISSED, options=options)
+    found = not_met(told(folder))
     assert len(found) == 1
     (text,) = found
     (line,) = [line for line in capsys.readouterr().err.splitlines() if "tolerance" in line]
     assert line == f"repro: warning: numerics.tolerance: {text}"
-    assert html.escape(text) in text_of(tmp_path)
+    assert html.escape(text) in text_of(folder)
     said = re.fullmatch(r"1e-12 was not met in (\d+) of (\d+) steps: the smallest allowed step, growth.time_step / "
                         r"1000, errs by (\S+) \(estimate\)", text)
     made = load_scene("base", MISSED)
     states = [state for state, _ in steps(made)]
     ends = {state.pore.time: state.pace for state in states if 0 < state.pore.time < made.growth.end}
     short = [pace.estimate for pace in ends.values() if pace.duration <= 1e-3 * 1.0001]
-    count = len(read_table(tmp_path / "ledger.csv")["start_h"])
+    count = len(read_table(folder / "ledger.csv")["start_h"])
     assert all(pace.duration >= 1e-3 for pace in ends.values()), "no shorter step is tried"
     assert [int(part) for part in said.groups()[:2]] == [len(short), count] and count > len(short) > 15
     assert float(said[3]) == pytest.approx(max(short), rel=0.06)

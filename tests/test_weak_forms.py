@@ -31,6 +31,7 @@ from repro.model.kinetics import Sink
 from repro.scene import load_scene
 from tests import oracles
 from tests.strategies import ORDERS, bent_inside, constants, meshed, meshes, seed
+from verification.problems import aggregates
 
 TOLERANCE = 1e-12
 THEIRS = {1: ElementTriP1(), 2: ElementTriP2(), 3: ElementTriP3()}
@@ -109,14 +110,21 @@ def counterparts():
             "curved": Counterpart(bent_inside(curved))}
 
 
+@pytest.fixture
+def of(counterparts, shape):
+    """That of a shape."""
+    return counterparts[shape]
+
+
+@pytest.fixture
+def space(of, order):
+    """Our functions of an order on it."""
+    return Space(of.ours, order)
+
+
 def assembled(unknowns, matrices, count):
     """(count, count) sum of element matrices, as every system of `repro` sums them."""
     return ElementSystem(unknowns, np.arange(count), np.zeros(count, bool)).matrix(matrices)
-
-
-def summed(space, loads):
-    """(n,) of loads (T, k)."""
-    return np.bincount(space.cells.ravel(), loads.ravel(), space.count)
 
 
 def places(space, table):
@@ -142,16 +150,14 @@ def weighted_load(v, w):
 
 @orders
 @shapes
-def test_mass_stiffness_and_load(counterparts, shape, order):
+def test_mass_stiffness_and_load(of, space, order):
     """With a coefficient that varies."""
-    of = counterparts[shape]
-    space = Space(of.ours, order)
     nodes, degree = of.nodes(space), degree_of(space)
     basis = of.basis(order, degree)
     x, _ = places(space, space.table)
     ours = assembled(space.cells, space.mass(x * space.at.dx), space.count)
     assert same(ours, weighted_mass.assemble(basis)[nodes][:, nodes])
-    assert same(summed(space, space.load(x * space.at.dx)), weighted_load.assemble(basis)[nodes])
+    assert same(space.summed(space.cells, space.load(x * space.at.dx)), weighted_load.assemble(basis)[nodes])
     assert same(space.at.dx.sum(axis=1), basis.dx.sum(axis=1))
     theirs = stiffness.assemble(of.basis(order, max(2, space.gradient_degree)))
     assert same(assembled(space.cells, space.stiffness, space.count), theirs[nodes][:, nodes])
@@ -224,11 +230,9 @@ def our_stokes(space, interface, mobility):
 @orders
 @shapes
 @interfaces
-def test_stokes(counterparts, shape, order, interface):
+def test_stokes(of, space, order, interface):
     """Velocity and pressure of the order less one (linear both, not stabilised, for order 1): all of the matrix, and
     what is left of it in elimination order where the boundary's velocities are prescribed."""
-    of = counterparts[shape]
-    space = Space(of.ours, order)
     theirs = stokes(of, space, interface)
     blocks, ours = our_stokes(space, interface, None)
     assert same(ours, theirs)
@@ -261,11 +265,10 @@ def test_stabilised_stokes(counterparts, interface):
     ("straight", 1, None), *((shape, order, k) for shape in ("straight", "curved") for order in (2, 3)
                              for k in (None, 3.0))])
 @interfaces
-def test_the_flow_solves_scikit_fems_system(counterparts, shape, order, permeability, interface):
+def test_the_flow_solves_scikit_fems_system(of, space, order, permeability, interface):
     """What `unit_flow` finds, put into it, with a permeable body too; the stabilisation of linear functions is of
     straight triangles."""
-    of = counterparts[shape]
-    space, viscosity = Space(of.ours, order), np.where(of.ours.biomass, RATIO, 1.0)
+    viscosity = np.where(of.ours.biomass, RATIO, 1.0)
     found = flow.unit_flow(space, RATIO, interface=interface, permeability=permeability)
     tau = of.diameters**2 / (100.0 * viscosity) if order == 1 else None
     theirs = stokes(of, space, interface, tau, permeability or np.inf)
@@ -287,6 +290,12 @@ def through(C, v, w):
     return w.u_x * C * v
 
 
+@LinearForm
+def entering(v, w):
+    """u_x v over an end."""
+    return w.u_x * v
+
+
 @BilinearForm
 def carried(C, v, w):
     """(w . grad C, v)."""
@@ -299,40 +308,9 @@ def on_end(of, order, x):
     return FacetBasis(of.mesh, THEIRS[order], facets=facets, intorder=elements.EDGE_DEGREES[order])
 
 
-@orders
-@shapes
-def test_advection_in_the_form_that_conserves(counterparts, shape, order):
-    """Any velocity, also with another speed at the inlet (11)."""
-    of = counterparts[shape]
-    space, random = Space(of.ours, order), np.random.default_rng(order)
-    nodes, velocity = of.nodes(space), random.standard_normal((space.count, 2))
-    enters = random.standard_normal(space.count)
-    given = flow.Flow(1.0, velocity, np.zeros(space.count), None, 0.0, 0.0, 1.0)
-    basis = of.basis(order, degree_of(space))
-    u_x, u_y, other = (of.field(part, nodes) for part in (velocity[:, 0], velocity[:, 1], enters))
-    inside = conserving.assemble(basis, u_x=basis.interpolate(u_x), u_y=basis.interpolate(u_y))
-    inlet, outlet = (on_end(of, order, x) for x in of.ours.ends)
-    theirs = inside + through.assemble(outlet, u_x=outlet.interpolate(u_x))
-    for speed, more in ((velocity[:, 0], 0 * theirs),
-                        (enters, through.assemble(inlet, u_x=inlet.interpolate(other - u_x)))):
-        ours = assembled(space.cells, transport.advection(space, given, speed), space.count)
-        assert same(ours, (theirs + more)[nodes][:, nodes])
-
-
-@orders
-@shapes
-def test_loads_and_masses_of_the_ends(counterparts, shape, order):
-    """Of both ends."""
-    of = counterparts[shape]
-    space, random = Space(of.ours, order), np.random.default_rng(order)
-    nodes, speed = of.nodes(space), random.standard_normal(space.count)
-    for edges, x in zip((space.dofs.inlet, space.dofs.outlet), of.ours.ends):
-        basis = on_end(of, order, x)
-        u_x = basis.interpolate(of.field(speed, nodes))
-        theirs = LinearForm(lambda v, w: w.u_x * v).assemble(basis, u_x=u_x)
-        assert same(space.summed(edges, space.end_loads(edges, speed)), theirs[nodes])
-        ours = assembled(edges, space.end_masses(edges, speed), space.count)
-        assert same(ours, through.assemble(basis, u_x=u_x)[nodes][:, nodes])
+def carrying(velocity, correction=None):
+    """A flow of any velocity (n, 2), of linear elements less a correction (T, 2)."""
+    return flow.Flow(7e5, velocity, np.zeros(len(velocity)), correction, 0.0, 0.0, 1.0)
 
 
 @given(meshes(), st.integers(0, 1000))
@@ -341,12 +319,12 @@ def test_linear_advection_by_the_divergence_free_velocity(grid, seed):
     of, random = Counterpart(grid), np.random.default_rng(seed)
     space = Space(grid, 1)
     velocity, correction = (random.standard_normal((len(part), 2)) for part in (grid.points, grid.triangles))
-    given = flow.Flow(1.0, velocity, np.zeros(len(grid.points)), correction, 0.0, 0.0, 1.0)
+    given = carrying(velocity, correction)
     nodes, basis = of.nodes(space), of.basis(1, 2)
     inlet = on_end(of, 1, grid.ends[0])
     u_x, u_y = (of.field(velocity[:, i], nodes) for i in (0, 1))
     w = [np.asarray(basis.interpolate(u)) - correction[:, i][:, None] for i, u in enumerate((u_x, u_y))]
-    lumped = LinearForm(lambda v, w: w.u_x * v).assemble(inlet, u_x=inlet.interpolate(u_x))
+    lumped = entering.assemble(inlet, u_x=inlet.interpolate(u_x))
     theirs = carried.assemble(basis, u_x=w[0], u_y=w[1]) + sp.diags_array(lumped)
     ours = assembled(space.cells, transport.advection(space, given, velocity[:, 0]), space.count)
     assert same(ours, theirs[nodes][:, nodes])
@@ -383,16 +361,13 @@ def reaction_basis(of, order, degree):
 @orders
 @shapes
 @pytest.mark.parametrize("duration", [0.0, 0.3])
-def test_uptake_and_its_derivative(counterparts, shape, order, duration):
+def test_uptake_and_its_derivative(of, space, order, duration):
     """(q(C) X_A, v) of the biomass as it is, and of its mean over a time in which it grows; linear functions lumped at
     the nodes. The law is the paper's, its derivative that of complex numbers."""
-    of = counterparts[shape]
-    space, random = Space(of.ours, order), np.random.default_rng(order)
+    random = np.random.default_rng(order)
     both, nodes = random.uniform(4.0, 7.0, (2, space.count)), of.nodes(space)
     pieces = space.reaction
-    where = (space.points[pieces.cells].T if order == 1 else
-             [part[of.ours.biomass].T for part in places(space, space.table)])
-    active = density(*(np.asarray(part).reshape(pieces.dx.T.shape).T for part in where)) * pieces.dx
+    active = density(*aggregates.places(space)) * pieces.dx
     basis = reaction_basis(of, order, degree_of(space))
     A, D = (basis.interpolate(of.field(field, nodes)) for field in both)
     X = density(*basis.global_coordinates())
@@ -423,26 +398,28 @@ def check_tangent(of, space, ours, basis, fields, duration, nodes):
 
 @orders
 @shapes
-def test_the_operator_of_both_substrates(counterparts, shape, order):
-    """Diffusion, slower in the aggregate, and what the flow carries, with its supply."""
-    of = counterparts[shape]
-    space, random = Space(of.ours, order), np.random.default_rng(order)
-    velocity = random.standard_normal((space.count, 2))
-    correction = np.zeros((len(of.ours.cells), 2)) if order == 1 and shape == "straight" else None
-    given = flow.Flow(1.0, velocity, np.zeros(space.count), correction, 0.0, 0.0, 1.0)
-    problem = transport.problem(space, given, SCENE.substrates, SCENE.kinetics)
-    nodes, n = of.nodes(space), space.count
-    basis = of.basis(order, max(2, space.gradient_degree))
-    advection = assembled(space.cells, transport.advection(space, given, velocity[:, 0]), n)
+@pytest.mark.parametrize("inlet", ["local", "mean"])
+def test_the_operator_of_both_substrates(of, space, order, inlet):
+    """Diffusion, slower in the aggregate, and what any velocity carries in the form that conserves, with the supply and
+    what flows in and out, with either speed at the inlet (11)."""
+    random = np.random.default_rng(order)
+    nodes, n, given = of.nodes(space), space.count, carrying(1e6 * random.standard_normal((space.count, 2)))
+    problem = transport.problem(space, given, SCENE.substrates, SCENE.kinetics, inlet)
+    u_x, u_y = (of.field(part, nodes) for part in given.velocity.T)
+    first, last = (on_end(of, order, x) for x in of.ours.ends)
+    inflow, outflow = (end.interpolate(u_x) for end in (first, last))
+    speed = inflow if inlet == "local" else 0 * inflow + given.mean_velocity
+    basis, coarser = of.basis(order, degree_of(space)), of.basis(order, max(2, space.gradient_degree))
+    inside = conserving.assemble(basis, u_x=basis.interpolate(u_x), u_y=basis.interpolate(u_y))
+    carried = inside + through.assemble(last, u_x=outflow) + through.assemble(first, u_x=speed - inflow)
+    assert same(problem.inflow, entering.assemble(first, u_x=inflow)[nodes])
+    assert same(problem.outflow, entering.assemble(last, u_x=outflow)[nodes])
     for k, kind in enumerate((SCENE.substrates.acceptor, SCENE.substrates.donor)):
         D = np.where(of.ours.biomass, kind.diffusivity_in_aggregate, kind.diffusivity)
-        spread = BilinearForm(lambda u, v, w: w.D * dot(grad(u), grad(v))).assemble(basis, D=constant(basis, D))
+        spread = BilinearForm(lambda u, v, w: w.D * dot(grad(u), grad(v))).assemble(coarser, D=constant(coarser, D))
         part = slice(k * n, k * n + n)
-        assert same(problem.operator[part, part], spread[nodes][:, nodes] + advection)
-        inlet = on_end(of, order, of.ours.ends[0])
-        u_x = inlet.interpolate(of.field(velocity[:, 0], nodes))
-        supply = LinearForm(lambda v, w, C=kind.supply: C * w.u_x * v).assemble(inlet, u_x=u_x)
-        assert same(problem.source[part], supply[nodes])
+        assert same(problem.operator[part, part], (spread + carried)[nodes][:, nodes])
+        assert same(problem.source[part], kind.supply * entering.assemble(first, u_x=speed)[nodes])
     assert problem.operator[:n, n:].nnz == 0 and problem.operator[n:, :n].nnz == 0
 
 

@@ -15,7 +15,7 @@ the shape of one step more. ``cost_ratio`` is of processor time, the median of r
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from statistics import median
 from time import process_time
@@ -62,7 +62,8 @@ def mesh() -> dict:
 
 
 def _worst(effects: list[dict[str, float]]) -> dict[str, float]:
-    return {name: max((each[name] for each in effects), key=abs) for name in effects[0]}
+    columns = zip(*(each.values() for each in effects))
+    return {name: max(column, key=abs) for name, column in zip(effects[0], columns)}
 
 
 def measured(switch: Switch, ratio: float) -> dict:
@@ -78,8 +79,9 @@ def measured(switch: Switch, ratio: float) -> dict:
 
 
 def cost(run: tuple[str, ...], repeats: int = REPEATS) -> float:
-    """The ratio of the processor times of a run and of base."""
-    return in_turn((lambda: seconds(PLATES), lambda: seconds(run)), repeats)
+    """The ratio of the processor times of a run and of base, medians of runs in turn."""
+    default, other = map(median, zip(*((seconds(PLATES), seconds(run)) for _ in range(repeats))))
+    return other / default
 
 
 def seconds(run: tuple[str, ...]) -> float:
@@ -88,13 +90,6 @@ def seconds(run: tuple[str, ...]) -> float:
     for _ in simulate(said):
         pass
     return process_time() - start
-
-
-def in_turn(both: tuple[Callable[[], float], Callable[[], float]], repeats: int) -> float:
-    """The ratio of the median times of the alternative and of the default."""
-    rows = [[spent() for spent in both] for _ in range(repeats)]
-    default, other = (median(row[k] for row in rows) for k in (0, 1))
-    return other / default
 
 
 def drift() -> dict:
@@ -112,13 +107,12 @@ def symmetry() -> list[dict]:
     plain, rows = switches.columns(BASE), []
     for word, seed in (("upstream", switches.longer_upstream), ("downstream", switches.longer_downstream)):
         other = switches.course(BASE, switches.as_it_is, seed)
-        leans, speeds = ([switches.near(found, name, TIMES) for found in (plain, other.columns)]
-                         for name in ("lean", "velocity"))
-        lean = dict(zip(LABELS, map(float, leans[1] - leans[0])))
+        lean, speed = (switches.near(other.columns, name, TIMES) for name in ("lean", "velocity"))
+        lean = dict(zip(LABELS, map(float, lean - switches.near(plain, "lean", TIMES))))
         told = _marched("symmetry of the seed", "half-disc", f"1 % longer {word}", other,
                         "R (1 + 0.01 cos 3 phi), area as before; the middle between the tips is off by "
                         + ", ".join(f"{100 * value:+.2f} % at {time}" for time, value in lean.items()))
-        apart = dict(zip(LABELS, map(float, speeds[1] / speeds[0] - 1)))
+        apart = dict(zip(LABELS, map(float, speed / switches.near(plain, "velocity", TIMES) - 1)))
         rows.append({**told, "lean_over_time": lean, "velocity_over_time": apart})
     return rows
 

@@ -68,13 +68,13 @@ def blocks(record: dict) -> Iterator[Block]:
                         "balances; refused: an error says which bound was met; wrong: anything else. `make verify` "
                         "runs them all; `python -m verification.hard_cases` shows the numbers.")
     yield table(("", "case", "right is", *presets), (
-        (str(case["number"]), case["title"], case["right_is"], *(_shown(case["cells"].get(name)) for name in presets))
+        (str(case["number"]), case["title"], case["right_is"], *map(_shown, map(case["cells"].get, presets)))
         for case in record["cases"]))
     yield table(("case", "preset", "why it is not right"), (
         (str(case["number"]), preset, cell["message"]) for case, preset, cell in cells if cell.get("message")),
         detail=True)
     yield table(("case", "preset", "part", "quantity", "measured", "expected", "origin"), (
-        (str(case["number"]), preset, *(check[key] for key in CHECK)) for case, preset, cell in cells
+        (str(case["number"]), preset, *map(check.get, CHECK)) for case, preset, cell in cells
         for check in cell.get("checks", ())), detail=True)
 
 

@@ -17,17 +17,15 @@ from scipy.interpolate import CubicSpline
 from repro.errors import StageError
 from repro.fem.outline import Outline, half_disc
 from repro.fem.sizing import ACROSS_AGGREGATE
-from repro.fem.space import Space
 from repro.march import updates
 from repro.model import contact, mesh_motion, pore, remeshing
 from repro.model.pore import Pore, Solved
 from repro.scene import Scene
 from verification.claims import runs
 from verification.claims.levels import CONVERGED, FINE, Level, at_level, cached, forget
-from verification.claims.runs import BASE, LAST, UPDATE
-
-#: The time (h) of the geometry that the paper plots [E12].
-PLOTTED = 19.2
+from verification.claims.runs import BASE, LAST, PLOTTED, UPDATE
+from verification.kernel import case
+from verification.problems import aggregates
 
 
 @dataclass(frozen=True)
@@ -151,7 +149,8 @@ def converged(switch: Switch) -> tuple[dict[str, float], dict[str, float]]:
             found.append(two_meshes(state((*BASE, LAST)), state(switch.run)))
         forget(level)
     finest, *coarser = found
-    return finest, {name: max(abs(other[name] - value) for other in coarser) for name, value in finest.items()}
+    apart = case.columns(coarser)
+    return finest, {name: float(np.abs(apart[name] - value).max()) for name, value in finest.items()}
 
 
 def reshaped(now: Pore, outline: Outline) -> Pore:
@@ -217,7 +216,9 @@ class Course:
 @cached
 def course(run: tuple[str, ...], step: Step, seeded: Callable[[Scene], Pore] = pore.seeded) -> Course:
     """March a run's scene from a seed by ``step(said, now, solved, hours)`` -> pore, in the paper's updates."""
-    said, rows, start = runs.scene(*run), [], process_time()
+    said = runs.scene(*run)
+    rows = []
+    start = process_time()
     try:
         for now, solved in _march(said, step, seeded(said)):
             rows.append(_row(said, now, solved))
@@ -225,8 +226,7 @@ def course(run: tuple[str, ...], step: Step, seeded: Callable[[Scene], Pore] = p
                 plotted = State(said, now, solved)
     except StageError as error:
         raise RuntimeError(f"a run by {step.__name__} fails after {len(rows) - 1} steps") from error
-    found = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-    return Course(process_time() - start, found, plotted)
+    return Course(process_time() - start, case.columns(rows), plotted)
 
 
 def _march(said: Scene, step: Step, now: Pore) -> Iterator[tuple[Pore, Solved]]:
@@ -289,10 +289,5 @@ def uneven(said: Scene, bulge: float) -> Pore:
     numerics = said.numerics
     seed = half_disc(said.aggregate.radius, ACROSS_AGGREGATE * numerics.refinement, numerics.geometry)
     points = seed.points * (1 + bulge * np.cos(3 * np.arctan2(*seed.points.T[::-1])))[:, None]
-    grid, outline = pore.generate(said, replace(seed, points=points, origin=points.copy()))
-    space = Space(grid, numerics.order)
-    body = pore.material(space, grid.points[grid.body])
-    active = said.kinetics.maximum_density * space.reaction.dx
-    return replace(pore.seeded(said), space=space, wall=outline.wall, fixed=outline.fixed, active=active,
-                   inert=np.zeros_like(active), body=body, theta=np.ones_like(body.at.dx),
-                   pressure=np.zeros(grid.corners))
+    made = pore.generate(said, replace(seed, points=points, origin=points.copy()))
+    return aggregates.at_start(*made, numerics.order)

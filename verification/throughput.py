@@ -4,17 +4,15 @@ A single run's rate is that of the same runs, one after the other in one process
 median of several, before and after the sweep); the sweep's is that of 200 short runs on all cores, from an empty folder
 to the page, starting of processes included. Wanted: 0.95 times the number of cores, judged with base in `fast`, less
 than half a second a run; in `accurate`, a second or two a run, a fifth as many runs are made, which is told and not
-judged. Controls: processor time of single runs over that of a run in the sweep, which what others do on the machine
-changes little, and a process a core, each with runs in a loop and nothing between them, which is what this machine, its
-memory and its other users leave to be had. Exit status 1 where the sweep falls short, or a command costs more than it
-may: `repro --help` twice the import of NumPy, and a run of base 1.3 times the import of the packages that it needs and
-the same run in a process that has imported them, each the best of five. Under four minutes on two free cores.
+judged. A control: processor time of single runs over that of a run in the sweep, which what others do on the machine
+changes little. Exit status 1 where the sweep falls short, or a command costs more than it may: `repro --help` twice the
+import of NumPy, and a run of base 1.3 times the import of the packages that it needs and the same run in a process that
+has imported them, each the best of five. Under four minutes on two free cores.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import resource
 import subprocess
 import sys
@@ -45,22 +43,6 @@ def runs(preset: str, count: int, folder: Path) -> list[tuple[float, float]]:
     return found
 
 
-def bare(preset: str, count: int) -> float:
-    """Runs a second of a process a core, each of which has runs of its own in a loop: the sum of their rates."""
-    command = [sys.executable, "-m", "verification.throughput", "--loop", preset, "--runs", str(count)]
-    processes = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(cores())]
-    return sum(json.loads(process.communicate()[0]) for process in processes)
-
-
-def loop(preset: str, count: int) -> None:
-    """Print this process's rate, the mean of all its runs but the first, which loads what is loaded when used."""
-    with TemporaryDirectory() as folder:
-        runs(preset, 1, Path(folder, "first"))
-        start = perf_counter()
-        runs(preset, count, Path(folder, "counted"))
-        print(count / (perf_counter() - start))
-
-
 def processors() -> float:
     """Processor time (s) of this process, and of those that it has waited for."""
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
@@ -84,14 +66,12 @@ def measure(preset: str, count: int) -> float:
         before = runs(preset, SINGLE, Path(folder, "before"))
         rate, spent = swept(preset, count, Path(folder))
         after = runs(preset, SINGLE, Path(folder, "after"))
-        control = bare(preset, max(count // (4 * cores()), 1))
-    wall, processor = (median(times) for times in zip(*before, *after))
+    wall, processor = map(median, zip(*before, *after))
     one = cores() / wall
     print(f"{preset}, {cores()} cores; single {1 / median(wall for wall, _ in before):.3f} and "
-          f"{1 / median(wall for wall, _ in after):.3f} runs/s (before, after); sweep of {count} {rate:.3f}; bare "
-          f"processes {control:.3f}; sweep {rate / one:.3f}, bare {control / one:.3f} times cores times single; sweep "
-          f"over bare {rate / control:.3f}; processor time of single runs {spent * processor:.3f} of that in the sweep",
-          flush=True)
+          f"{1 / median(wall for wall, _ in after):.3f} runs/s (before, after); sweep of {count} {rate:.3f}, "
+          f"{rate / one:.3f} times cores times single; processor time of single runs {spent * processor:.3f} of that "
+          "in the sweep", flush=True)
     return rate / one
 
 
@@ -127,11 +107,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m verification.throughput", description=__doc__.partition(":")[0])
     parser.add_argument("--runs", type=int, default=200)
     parser.add_argument("--repeats", type=int, default=1)
-    parser.add_argument("--loop", help=argparse.SUPPRESS)
     chosen = parser.parse_args(arguments)
-    if chosen.loop:
-        loop(chosen.loop, chosen.runs)
-        return 0
     counts = {JUDGED: chosen.runs, TOLD: max(chosen.runs // 5, 1)}
     found = {preset: median(measure(preset, count) for _ in range(chosen.repeats)) for preset, count in counts.items()}
     holds = found[JUDGED] >= WANTED

@@ -1,9 +1,10 @@
 """The one loop of steps of every scheme, and the state from which it goes on bit for bit.
 
 Steps, to the last bit, depend neither on which rows are asked for nor on when the run ends. A row
-between two steps is made of the step that passes it, and nothing goes on from it. The last step,
-where ``growth.end`` lies within what would have been a step, is cut there and made apart from the
-others: its ledger closes like theirs, and a run to a later end goes on from the state before it.
+between two steps is made of the step that passes it, and nothing goes on from it. Where
+``growth.end`` lies within a step, that one is cut there, rows before the end are still those of the
+whole step, and the ledger closes like the others; a run to a later end goes on from the state
+before it.
 """
 
 from __future__ import annotations

@@ -10,6 +10,7 @@ import numpy as np
 from repro.fem.linear import Method
 from repro.march import loop, stepping, updates
 from repro.march.loop import Instant, Scheme, State
+from repro.march.pace import STRETCH
 from repro.scene import Scene, Source, load_scene, parse_scene, scene_tables
 
 #: Points (x, y), um.
@@ -46,10 +47,10 @@ def shaped(scene: Scene, shape: Shape) -> Scene:
 
 
 def ends_soon(scene: Scene, state: State) -> bool:
-    """May the step after a state be another one where growth.end is later? A step is cut short, or
-    left room for one more, where less than twice its length is left."""
+    """May the step after a state be another one where growth.end is later? One that passes it is
+    cut there; it may be STRETCH times as long as its pace says."""
     end = scene.growth.end if scene.growth else math.inf
-    return 2 * state.pace.length > end - state.pore.time
+    return STRETCH * state.pace.length > end - state.pore.time
 
 
 def same_rows(one: Scene, other: Scene, time: float) -> bool:

@@ -11,7 +11,6 @@ the run's end leave all steps as they are.
 from __future__ import annotations
 
 import math
-from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -48,32 +47,22 @@ def rows(scene: Scene) -> tuple[float, ...]:
 
 
 def _advance(scene: Scene, now: Pore, solved: Solved, asked: Pace) -> tuple[Step, Solved, Pace]:
-    """One step, without the state before it: the next one, or where growth.end lies within that, or
-    it would be nearly the last, one to growth.end."""
-    end = needed(scene.growth, "[growth]").end
-    left = end - now.time
-    if STRETCH * asked.length >= left and end < scene.corner(now.time):
-        most = EXCESS * scene.numerics.tolerance / left
-        with suppress(PoreEnd, StageError, FloatingPointError):
-            if last := _cut(scene, now, solved, left, most):
-                return *last, asked
+    """One step: the next one, whenever the run ends, or where growth.end lies within that, one to
+    growth.end."""
     taken, after, pace = _accepted(scene, now, solved, asked)
-    if taken.pore.time - end > SAME_TIME:
-        taken, after = needed(_cut(scene, now, solved, left, np.inf), "a shorter step")
-        return taken, after, asked
+    if taken.pore.time - needed(scene.growth, "[growth]").end > SAME_TIME:
+        return *_cut(scene, taken), asked
     return replace(taken, before=None), after, pace
 
 
-def _cut(scene: Scene, now: Pore, solved: Solved, left: float,
-         most: float) -> tuple[Step, Solved] | None:
-    """A step over the time that is left (h), and what is solved after it; None where the rates
-    change by more than ``most`` (1/h) or it overshoots contact."""
-    found = midpoint.attempt(scene, now, solved, left, most)
-    if found.step is None or (np.isfinite(most) and _overshoots(found)):
-        return None
+def _cut(scene: Scene, passing: Step) -> tuple[Step, Solved]:
+    """A step to growth.end from where a step begins that passes it, and what is solved after it;
+    within it, times are those of the one that passes."""
     end = needed(scene.growth, "[growth]").end
-    taken, after = _solved(scene, _ending_at(found.step, end))
-    return replace(taken, before=None), after
+    now, solved = needed(passing.before, "the start of a step")
+    found = midpoint.attempt(scene, now, solved, end - now.time)
+    taken, after = _solved(scene, _ending_at(needed(found.step, "a shorter step"), end))
+    return replace(taken, before=None, within=passing.within), after
 
 
 def _accepted(scene: Scene, now: Pore, solved: Solved,

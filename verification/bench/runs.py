@@ -12,6 +12,8 @@ import tracemalloc
 from dataclasses import replace
 from functools import partial
 from itertools import islice
+from math import isnan
+from operator import itemgetter
 from pathlib import Path
 from statistics import median
 from time import perf_counter, process_time
@@ -26,6 +28,7 @@ from repro.results import row
 from repro.scene import load_scene, parse_scene
 from verification.bench import record
 from verification.bench.record import exponent, measured
+from verification.claims.runs import until
 from verification.problems import runs as problems
 
 BASE_REPEATS = 3
@@ -34,7 +37,8 @@ COLUMNS = """mean_velocity_m_per_d conductivity_m_per_d aggregate_area_um2 thick
 effluent_acceptor_mg_per_L effluent_donor_mg_per_L""".split()
 #: Rings and steps of the reference, extrapolated; those of a check, finer in space and with other steps.
 REFERENCE, CHECK = ((8, 12), (8, 16)), ((10, 15), (10, 16))
-FAST, ACCURATE, EXACT = "preset fast", "preset accurate", "preset exact"
+FAST, ACCURATE = "preset fast", "preset accurate"
+EXACT = "preset exact"
 PRESET_PAPER = "preset paper: linear elements, updates"
 #: Refinement and time step (min) of the paper's scheme; those of them at which it is changed in one thing; refinement
 #: and tolerance of the midpoint rule's.
@@ -102,21 +106,21 @@ def jobs(truth: np.ndarray, times, quick: bool) -> dict:
 
 def simulated(truth, times, *overrides: str):
     """Run base; the error of the last rows."""
-    shown = ", ".join(f'"{time} h"' for time in times)
     timing.reset()
-    rows = rows_of(load_scene("base", [*overrides, f'growth.end="{times[-1]} h"', f"output.times=[{shown}]"]))
-    return {"error": error(values(rows), truth), "nodes": rows[-1]["nodes"], "stages": dict(timing.seconds),
-            "errors": [float(e) for e in apart(values(rows), truth).max(axis=0)]}
+    rows = base_rows(times, *overrides)
+    errors = apart(values(rows), truth).max(axis=0).tolist()
+    return {"error": max(errors), "nodes": rows[-1]["nodes"], "stages": dict(timing.seconds), "errors": errors}
 
 
-def rows_of(scene) -> list[dict]:
-    """Rows of the table that a run writes."""
-    return [row(scene, instant) for instant in simulate(scene)][-len(scene.output.times):]
+def base_rows(times, *overrides: str) -> list[dict]:
+    """Rows of the table that a run of base writes, at some times (h), the last of them its end."""
+    scene = load_scene("base", [*overrides, *until(*times)])
+    return [row(scene, instant) for instant in simulate(scene)][-len(times):]
 
 
 def values(rows: list[dict]) -> np.ndarray:
     """(times, 8) of COLUMNS."""
-    return np.array([[line[name] for name in COLUMNS] for line in rows])
+    return np.array([itemgetter(*COLUMNS)(line) for line in rows])
 
 
 def apart(found, truth) -> np.ndarray:
@@ -148,9 +152,8 @@ def reference(times) -> tuple[list, dict]:
 
 
 def _short(times) -> tuple[list, dict]:
-    shown = ", ".join(f'"{time} h"' for time in times)
-    scene = load_scene("base", ["numerics.preset=accurate", f'growth.end="{times[-1]} h"', f"output.times=[{shown}]"])
-    return values(rows_of(scene)).tolist(), {"reference": "preset accurate: a quick look, no reference"}
+    found = values(base_rows(times, "numerics.preset=accurate"))
+    return found.tolist(), {"reference": "preset accurate: a quick look, no reference"}
 
 
 def _skfem(truth, times, rings: int, steps: int):
@@ -225,7 +228,8 @@ def step(preset: str) -> dict:
 
 
 #: Steps, the length of one (h), and the part of them that is not looked at.
-MANY_STEPS, QUICK_STEPS, LENGTH, WARM = 180, 16, 0.001, 0.25
+MANY_STEPS, QUICK_STEPS = 180, 16
+LENGTH, WARM = 0.001, 0.25
 PART = 0.1
 MEMORY_PRESETS = {"paper": 0.4, "accurate": 0.25}
 
@@ -243,11 +247,9 @@ def memory_part(quick: bool) -> dict:
 
 def grown(preset: str, refinement: float, steps: int) -> dict:
     """The slope of a run of so many steps, bytes a step."""
-    times = [round((k + 1) * LENGTH, 9) for k in range(steps)]
-    shown = ", ".join(f'"{time} h"' for time in times)
     scene = load_scene("base", [f"numerics.preset={preset}", f"numerics.refinement={refinement}",
                                 "aggregate.radius=20 um", f"growth.time_step={LENGTH} h",
-                                f'growth.end="{times[-1]} h"', f"output.times=[{shown}]"])
+                                *until(*(LENGTH * np.arange(1, steps + 1)))])
     live, nodes = np.zeros(steps + 1), 0
     tracemalloc.start()
     try:
@@ -277,7 +279,8 @@ METHODS = {"preset paper": "paper fresh", "order 2, midpoint (accurate)": "accur
            "order 2, midpoint, fresh derivatives": "accurate fresh"}
 STAGES = ("flow", "transport", "growth", "mesh motion", "meshing", "transfer")
 FLOOR = "factorise and solve"
-RADIUS, STEP, LIMIT = 20.0, 0.2, 240.0
+RADIUS, STEP = 20.0, 0.2
+LIMIT = 240.0
 #: The first guess of the refinement for so many nodes: c nodes^p, fitted to a few of them.
 FIRST = {"paper": (0.0265, 0.526), "accurate": (0.0109, 0.544)}
 
@@ -302,11 +305,12 @@ def size_part(quick: bool) -> dict:
 
 def exponents(points: list[dict]) -> dict[str, float | None]:
     """Exponents in the number of nodes of the whole, of each stage, and of the memory above that of the start."""
-    sizes = [point["nodes"] for point in points]
-    rows = {"step": [point["seconds"] for point in points], "memory": [point["memory_MB"] for point in points],
-            **{stage: [point["stages"].get(stage, 0.0) for point in points] for stage in (*STAGES, FLOOR)}}
-    found = {name: exponent(sizes, values) for name, values in rows.items()}
-    return {name: None if value != value else value for name, value in found.items()}
+    costs = [{"step": point["seconds"], "memory": point["memory_MB"], **point["stages"]} for point in points]
+    sizes, found = [point["nodes"] for point in points], {}
+    for name in ("step", "memory", *STAGES, FLOOR):
+        power = exponent(sizes, [cost.get(name, 0.0) for cost in costs])
+        found[name] = None if isnan(power) else power
+    return found
 
 
 def in_a_process(kind: str, nodes: int, steps: int) -> dict:

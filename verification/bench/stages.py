@@ -27,7 +27,8 @@ from verification.bench.record import part, series
 from verification.problems import bodies, meshes, pairs
 from verification.problems.bodies import HalfCylinder
 
-WIDTH, LENGTH, RADIUS, RATIO = 50.0, 600.0, 40.0, 2000.0
+WIDTH, LENGTH = 50.0, 600.0
+RADIUS, RATIO = 40.0, 2000.0
 PAPER = "linear elements (paper)"
 ORDER_2, QUADRATIC = "order 2 on curved triangles (fast, accurate)", "scikit-fem: quadratic elements"
 #: Orders of the elements of curved triangles.
@@ -73,7 +74,8 @@ def largest(found, wanted, scale) -> float:
 
 
 #: Runs of a job that count.
-FLOW_REPEATS, TRANSPORT_REPEATS, GROWTH_REPEATS, TRANSFER_REPEATS = (3, 1), (5, 1), (5, 1), (3, 1)
+FLOW_REPEATS = TRANSFER_REPEATS = (3, 1)
+TRANSPORT_REPEATS = GROWTH_REPEATS = (5, 1)
 REFINEMENT, RINGS = "refinement {:g}", "{} rings"
 #: Rings of the reference, the last one being it; refinements of linear and of curved elements; of scikit-fem's; rings.
 #: Here as below: of the part, and of its quick version.
@@ -105,7 +107,6 @@ def flow_part(quick: bool) -> dict:
     return found
 
 
-@cache
 def flow_reference(rings: int) -> float:
     """Head loss at mean velocity one, 1/um: pressures of their own on both sides of the interface."""
     return curved_mesh(rings).flow(RATIO).loss + outside_loss()
@@ -115,29 +116,27 @@ def _flow_linear(refinement: float, truth: float, **element) -> dict:
     scene = half_disc(refinement=refinement, **element)
     mesh = pore.seeded(scene).mesh
     found = pore.solve_flow(scene, Space(mesh, 1))
-    return _flow_judged(truth, found.head_loss / scene.flow.mean_velocity / _nu(scene), mesh)
-
-
-def _nu(scene) -> float:
-    return scene.flow.kinematic_viscosity / scene.flow.gravity
+    nu = scene.flow.kinematic_viscosity / scene.flow.gravity
+    return _flow_judged(truth, found.head_loss / scene.flow.mean_velocity / nu, nodes=len(mesh.points))
 
 
 def _of_order(refinement: float, truth: float, preset: str, order: int) -> dict:
     mesh = pore.seeded(half_disc(preset=preset, refinement=refinement)).mesh
-    return _flow_judged(truth, flow.unit_flow(Space(mesh, order), RATIO).loss + outside_loss(), mesh)
+    loss = flow.unit_flow(Space(mesh, order), RATIO).loss
+    return _flow_judged(truth, loss + outside_loss(), nodes=len(mesh.points))
 
 
 def _taylor_hood(refinements: int, truth: float) -> dict:
     channel = taylor_hood.half_disc(WIDTH, ENDS, RADIUS, refinements, corner=2 + refinements)
-    return {"error": abs((taylor_hood.stokes(channel, RATIO).loss + outside_loss()) / truth - 1)}
+    return _flow_judged(truth, taylor_hood.stokes(channel, RATIO).loss + outside_loss())
 
 
 def _flow_section(rings: int, truth: float) -> dict:
-    return {"error": abs(flow_reference.__wrapped__(rings) / truth - 1)}
+    return _flow_judged(truth, flow_reference(rings))
 
 
-def _flow_judged(truth: float, loss: float, mesh) -> dict:
-    return {"error": abs(loss / truth - 1), "nodes": len(mesh.points)}
+def _flow_judged(truth: float, loss: float, **more) -> dict:
+    return {"error": abs(loss / truth - 1), **more}
 
 
 #: Rings of the reference; refinements; rings.
@@ -152,12 +151,12 @@ def transport_part(quick: bool) -> dict:
     both flow and transport, time of transport alone.
     """
     rings, linear, quadratic, sections = TRANSPORT_SIZES[quick]
-    coarse, truth = map(transport_reference, rings)
+    coarse, truth = (_effluents(*prepared(each)) for each in rings)
     made = [(name, REFINEMENT, linear, partial(_transport_ours, truth, 1, **element))
             for name, element in FLOW_ELEMENTS.items()]
     made += [(name, REFINEMENT, quadratic, partial(_transport_ours, truth, order, preset="accurate"))
              for name, order in CURVED.items()]
-    made.append((QUADRATIC, RINGS, sections, partial(_transport_section, truth)))
+    made.append((QUADRATIC, RINGS, sections, lambda rings: partial(_carried_by, truth, *prepared(rings))))
     jobs = {(name, label.format(size)): make(size) for name, label, sizes, make in made for size in sizes}
     change = largest(coarse, truth, supply())
     return part("Transport: dual Monod uptake around a half-disc of 40 um in a pore of 50 um, 2.9 m/d; assembly and "
@@ -178,23 +177,12 @@ def prepared(rings: int):
     return section, section.flow(RATIO)
 
 
-@cache
-def transport_reference(rings: int) -> np.ndarray:
-    """(2,) effluents, mg/L."""
-    return _effluents(*prepared(rings))
-
-
 def _effluents(section, flow) -> np.ndarray:
     given = constants()
     operators = section.operators(given, SPEED / 24e-6, flow)
     start = np.multiply.outer(given.supply, np.ones(section.whole.N))
     fields = section.steady(operators, np.full(section.body.dx.shape, given.density), given.rates, start)
     return section.effluents(flow, fields)
-
-
-def _transport_section(truth, rings: int):
-    """A job whose section and flow are there."""
-    return partial(_carried_by, truth, *prepared(rings))
 
 
 def _carried_by(truth, section, flow) -> dict:
@@ -285,7 +273,8 @@ def _skfem(rings: int):
 
 
 #: um; the front's place along x and its width.
-TRANSFER_ENDS, TRANSFER_WIDTH, FRONT, STEEP = (0.0, 40.0), 25.0, 20.0, 3.0
+TRANSFER_ENDS, TRANSFER_WIDTH = (0.0, 40.0), 25.0
+FRONT, STEEP = 20.0, 3.0
 #: Remeshes; um.
 TRANSFER_SIZES = (20, (4.0, 2.8, 2.0, 1.4, 1.0), (8.0, 5.6, 4.0, 2.8, 2.0)), (3, (4.0, 2.8), (5.6,))
 

@@ -12,7 +12,7 @@ transport is solved on right triangles that halve the square cells of their grid
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from time import perf_counter, process_time
 
 import numpy as np
@@ -45,11 +45,13 @@ from verification.problems import channels
 DIFFUSIVITY, DENSITY = (8e6, 4e6), 3e4
 #: Newton's method of FiPy stops at this change over the supply; its direct solver refines to this residual (its own
 #: default, 1e-5, leaves an error of 1e-3 on fine grids).
-REST, MOST, EXACT = 1e-8, 40, 1e-14
+REST, EXACT = 1e-8, 1e-14
+MOST = 40
 #: py-pde runs for so many diffusion times L^2 / D of the domain, held at both ends or with an outlet, after which less
 #: than exp(-pi^2 TIMES) or exp(-pi^2 TIMES_OPEN / 4) is left of the start, in steps of this part of h^2 / D and
 #: dimension, of which a half is stable; watched in so many parts.
-TIMES, TIMES_OPEN, STABLE, PARTS = 1.5, 6.0, 0.4, 100
+TIMES, TIMES_OPEN = 1.5, 6.0
+STABLE, PARTS = 0.4, 100
 
 
 @dataclass(frozen=True)
@@ -72,20 +74,22 @@ class Problem:
             return (across,)
         return round((self.ends[1] - self.ends[0]) / self.width * across), across
 
-    def amounts(self, fields, load) -> np.ndarray:
-        """(2,) what is taken up, um2 mg/L/h (um mg/L/h in one dimension), with load = X times the cells' areas."""
+    def judged(self, fields, load) -> np.ndarray:
+        """(2,) C in the last cell, mg/L; at rest what is taken up, um2 mg/L/h, with load = X times the cells' areas."""
+        if self.speed:
+            return fields[:, -1]
         return np.array([np.sum(load * q) for q in uptake(*fields, self.rates)])
 
 
-def fipy(problem: Problem, across: int) -> tuple[np.ndarray, np.ndarray]:
-    """Uptake (2,), and C (2,) in the last cell."""
+def fipy(problem: Problem, across: int) -> np.ndarray:
+    """(2,) what is judged."""
     mesh = _fipy_mesh(problem, across)
     x = mesh.cellCenters.value
     where = problem.inside(*x) if len(x) == 2 else problem.inside(x[0])
     X = CellVariable(mesh=mesh, value=np.where(where, problem.density, 0.0))
     both = [CellVariable(mesh=mesh, value=s) for s in problem.supply]
     constants = [CellVariable(mesh=mesh) for _ in both]
-    slopes = [[CellVariable(mesh=mesh) for _ in both] for _ in both]
+    slopes = [(CellVariable(mesh=mesh), CellVariable(mesh=mesh)) for _ in both]
     equation = None
     for k, field in enumerate(both):
         one = DiffusionTerm(coeff=problem.diffusivity[k], var=field) == X * constants[k]
@@ -100,7 +104,7 @@ def fipy(problem: Problem, across: int) -> tuple[np.ndarray, np.ndarray]:
         if np.abs(np.array([field.value for field in both]) - before).max() < REST * max(problem.supply):
             break
     fields = np.array([field.value for field in both])
-    return problem.amounts(fields, X.value * mesh.cellVolumes), fields[:, -1]
+    return problem.judged(fields, X.value * mesh.cellVolumes)
 
 
 def _fipy_mesh(problem: Problem, across: int):
@@ -134,9 +138,9 @@ def _linearise(problem: Problem, now, constants, slopes) -> None:
             slopes[k][j].setValue(columns[j][k])
 
 
-def py_pde(problem: Problem, across: int) -> tuple[np.ndarray, np.ndarray, dict]:
-    """Uptake (2,), C (2,) in the last cell, and the seconds (wall, processor) before the run's first hundredth is over,
-    less those of another hundredth: numba compiles in them."""
+def py_pde(problem: Problem, across: int) -> tuple[np.ndarray, dict]:
+    """(2,) what is judged, and the seconds (wall, processor) before the run's first hundredth is over, less those of
+    another hundredth: numba compiles in them."""
     grid = _pde_grid(problem, across)
     where = problem.inside(*np.moveaxis(grid.cell_coords, -1, 0))
     X = ScalarField(grid, np.where(where, problem.density, 0.0))
@@ -151,7 +155,7 @@ def py_pde(problem: Problem, across: int) -> tuple[np.ndarray, np.ndarray, dict]
     found = Controller(EulerSolver(equation, backend="numba"), t_range=time, tracker=watch).run(state, dt=dt)
     fields = np.array([part.data.ravel() for part in found])
     load = X.data.ravel() * np.prod(grid.discretization)
-    return problem.amounts(fields, load), fields[:, -1], _compiled(marks)
+    return problem.judged(fields, load), _compiled(marks)
 
 
 def _now() -> tuple[float, float]:
@@ -223,11 +227,28 @@ CELLS = "{} cells"
 OURS = {1: stages.PAPER, 2: "order 2 (fast, accurate)", 3: "order 3"}
 
 
-def _ours(job, linear, quadratic, truth) -> Jobs:
-    """Jobs of this package; ``job(cells, order)``."""
-    found = [series(method, CELLS, linear if order == 1 else quadratic, job, order=order, truth=truth)
-             for order, method in OURS.items()]
-    return {label: job for jobs in found for label, job in jobs.items()}
+def _ours(solve, linear, quadratic) -> dict:
+    """Methods of this package; ``solve(cells, order)``."""
+    return {method: (linear if order == 1 else quadratic, partial(solve, order=order))
+            for order, method in OURS.items()}
+
+
+def _jobs(methods: dict, truth, scale) -> Jobs:
+    """Jobs of methods {name: (sizes, solve)}; ``solve(cells)`` finds what is judged, (2,)."""
+    jobs: dict = {}
+    for method, (sizes, solve) in methods.items():
+        jobs |= series(method, CELLS, sizes, _apart, solve=solve, truth=truth, scale=scale)
+    return jobs
+
+
+def _apart(cells: int, solve, truth, scale) -> dict:
+    return {"error": stages.largest(solve(cells), truth, scale)}
+
+
+def _stepped(cells: int, problem: Problem, truth, scale) -> dict:
+    """By py-pde, compiled."""
+    found, compiled = py_pde(problem, cells)
+    return {"error": stages.largest(found, truth, scale), **compiled}
 
 
 def compile_times(lines: list[dict]) -> list[dict]:
@@ -238,7 +259,8 @@ def compile_times(lines: list[dict]) -> list[dict]:
 
 #: Runs of a job that count.
 REPEATS = 3, 1
-HALF, WIDTH, SIDE = 64.0, 64.0, 32.0
+HALF = WIDTH = 64.0
+SIDE = 32.0
 #: Cells across the box: linear, of higher order, scikit-fem's, those of other codes, of compiled ones, and of the
 #: reference; of the part, and of its quick version.
 BOX_SIZES = ((8, 16, 32, 64, 96), (2, 4, 8, 16, 24), (4, 8, 16), (8, 16, 32, 64), (16,), (32, 64)), (
@@ -251,17 +273,19 @@ def box_part(quick: bool) -> dict:
 
     py-pde's compiled run comes once a grid: numba compiles for longer than it runs.
     """
-    linear, quadratic, skfem, cells, stepped, reference = BOX_SIZES[quick]
-    coarse, truth = map(converged, reference)
-    jobs = {**_ours(_box_ours, linear, quadratic, truth), **series(stages.QUADRATIC, CELLS, skfem, _skfem, truth=truth),
-            **series("fipy", CELLS, cells, _box_fipy, truth=truth),
-            **series("py-pde's Laplacian, Newton by scipy", CELLS, cells, _newton, truth=truth)}
+    linear, curved, skfem, cells, stepped, reference = BOX_SIZES[quick]
+    coarse, truth = map(quadratic, reference)
+    box = box_problem()
+    jobs = _jobs({**_ours(_box_ours, linear, curved), stages.QUADRATIC: (skfem, quadratic),
+                  "fipy": (cells, partial(fipy, box)), "py-pde's Laplacian, Newton by scipy": (cells, _newton)}, truth,
+                 truth)
     change = stages.largest(coarse, truth, truth)
     found = part("Uptake without flow: a block of 64 by 32 um in a box of 128 by 64 um; grid, assembly, solution",
                  "what is taken up of each substrate, relative, the larger error",
                  f"quadratic elements of scikit-fem, {reference[1]} cells across: {truth[0]:.9g} and {truth[1]:.9g} "
                  f"um2 mg/L/h; from {reference[0]} cells on they change by {change:.1e}", jobs, REPEATS[quick],
-                 series(COMPILED, CELLS, stepped, _box_stepped, truth=truth), reference_change=change)
+                 series(COMPILED, CELLS, stepped, _stepped, problem=box, truth=truth, scale=truth),
+                 reference_change=change)
     return {**found, "apart": compile_times(found["lines"])}
 
 
@@ -275,38 +299,15 @@ def _inside(x, y):
     return (np.abs(x) < SIDE) & (y < SIDE)
 
 
-def _judged(truth, found) -> dict:
-    return {"error": stages.largest(found, truth, truth)}
-
-
-def _box_ours(cells: int, order: int, truth) -> dict:
+def _box_ours(cells: int, order: int) -> list[float]:
     grid = straight((-HALF, HALF), WIDTH, (2 * cells, cells), _inside)
-    return _judged(truth, [flux.consumed for flux in solved(ribbon(), grid, order)])
+    return [flux.consumed for flux in solved(ribbon(), grid, order)]
 
 
-def _box_fipy(cells: int, truth) -> dict:
-    return _judged(truth, fipy(box_problem(), cells)[0])
-
-
-def _box_stepped(cells: int, truth) -> dict:
-    found, _, compiled = py_pde(box_problem(), cells)
-    return {**_judged(truth, found), **compiled}
-
-
-def _newton(cells: int, truth) -> dict:
+def _newton(cells: int) -> np.ndarray:
     given, box = box_problem(), pypde.Box(cells, HALF, WIDTH, pypde.block(SIDE, SIDE))
     fields = box.steady(given.diffusivity, given.supply, given.density, given.rates)
-    return _judged(truth, given.amounts(fields, given.density * box.part * (WIDTH / cells) ** 2))
-
-
-def _skfem(cells: int, truth) -> dict:
-    return _judged(truth, quadratic(cells))
-
-
-@cache
-def converged(cells: int) -> np.ndarray:
-    """(2,) what is taken up, by the finest meshes."""
-    return quadratic(cells)
+    return given.judged(fields, given.density * box.part * (WIDTH / cells) ** 2)
 
 
 def quadratic(cells: int) -> np.ndarray:
@@ -324,7 +325,8 @@ def quadratic(cells: int) -> np.ndarray:
 
 
 #: um; um/h.
-ENDS, STRIP, SPEED = (-40.0, 80.0), 40.0, 1e5
+ENDS, STRIP = (-40.0, 80.0), 40.0
+SPEED = 1e5
 #: Cells along the channel, multiples of three: faces lie on both ends of the strip.
 CHANNEL_SIZES = ((15, 30, 60, 120, 240, 480), (6, 12, 24, 48, 96), (30, 60, 120, 240, 480), (60,)), (
     (15, 30), (6, 12), (30,), ())
@@ -336,20 +338,21 @@ def channel_part(quick: bool) -> dict:
     Other codes solve it in one dimension; here it is a ribbon of one cell across, which costs twice the unknowns and
     more.
     """
-    linear, quadratic, cells, stepped = CHANNEL_SIZES[quick]
+    linear, curved, cells, stepped = CHANNEL_SIZES[quick]
     coarse, truth = reference(1e-7), reference(1e-9)
-    jobs = {**_ours(_channel_ours, linear, quadratic, truth),
-            **series("fipy", CELLS, cells, _channel_fipy, truth=truth)}
-    change = stages.largest(coarse, truth, _supply())
+    channel = channel_problem()
+    jobs = _jobs({**_ours(_channel_ours, linear, curved), "fipy": (cells, partial(fipy, channel))}, truth,
+                 channel.supply)
+    change = stages.largest(coarse, truth, channel.supply)
     found = part("Uptake in plug flow through a strip, one-dimensional; grid, assembly and solution",
                  "effluents over the supply, the larger error",
                  f"scipy's solve_bvp, tolerance 1e-9: {truth[0]:.9f} and {truth[1]:.9f} mg/L; from 1e-7 on they change "
                  f"by {change:.1e} of the supply", jobs, REPEATS[quick],
-                 series(COMPILED, CELLS, stepped, _channel_stepped, truth=truth), reference_change=change)
+                 series(COMPILED, CELLS, stepped, _stepped, problem=channel, truth=truth, scale=channel.supply),
+                 reference_change=change)
     return {**found, "apart": compile_times(found["lines"])}
 
 
-@cache
 def reference(tolerance: float) -> np.ndarray:
     """(2,) effluents, mg/L."""
     given = channel_problem()
@@ -365,21 +368,6 @@ def channel_problem() -> Problem:
                    given.rates, SPEED)
 
 
-def _supply() -> np.ndarray:
-    return np.array(stages.constants().supply)
-
-
-def _channel_ours(cells: int, order: int, truth) -> dict:
-    size = (ENDS[1] - ENDS[0]) / cells
-    grid = straight(ENDS, size, (cells, 1), lambda x, y: (x > 0) & (x < STRIP))
-    found = solved(ribbon(), grid, order, SPEED)
-    return {"error": stages.largest([flux.effluent for flux in found], truth, _supply())}
-
-
-def _channel_fipy(cells: int, truth) -> dict:
-    return {"error": stages.largest(fipy(channel_problem(), cells)[1], truth, _supply())}
-
-
-def _channel_stepped(cells: int, truth) -> dict:
-    _, found, compiled = py_pde(channel_problem(), cells)
-    return {"error": stages.largest(found, truth, _supply()), **compiled}
+def _channel_ours(cells: int, order: int) -> list[float]:
+    grid = straight(ENDS, (ENDS[1] - ENDS[0]) / cells, (cells, 1), lambda x, y: (x > 0) & (x < STRIP))
+    return [flux.effluent for flux in solved(ribbon(), grid, order, SPEED)]

@@ -15,6 +15,9 @@ says of **its scheme** with that. A verdict follows from the outcomes of the che
     some fail beyond their bars                                              contradicted; the finding says why
     no check fails, but a bar reaches over a bound                           undecided
 
+What the paper says may or could be holds if it is so in one of the scenes that are tried, the one where it is so most;
+what it says hangs on the conditions holds if besides it is not so in another one.
+
 A number is told apart by what it rests on (`rests_on`): a prediction of a solution, or an input, a rule of construction
 or the arithmetic of Table 1, which no solution is needed for and which is not counted as a number reproduced.
 """
@@ -26,7 +29,19 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import inf, isnan
 
-from verification.claims.levels import BESIDE, CONVERGED, DEFAULT, FINE, SCHEME, SIZES, STEPS, Level
+from verification import sensitivity
+from verification.claims.levels import (
+    BESIDE,
+    CONVERGED,
+    DEFAULT,
+    FINE,
+    SCHEME,
+    SIZES,
+    STEPS,
+    WIDE_FINE,
+    WIDE_PAIRED,
+    Level,
+)
 from verification.kernel.case import Check
 from verification.uncertainty import Bar
 
@@ -50,8 +65,9 @@ CLOSED = "closed forms"
 PREDICTED = "a solution"
 ARITHMETIC = "arithmetic of Table 1"
 CONSTRUCTION = "a rule of construction"
-#: When the ranges of the words were set, and when the printed digits became the ranges of the numbers.
-SET, PRINTED_SET = "2026-11-21", "2026-11-22"
+#: When the ranges of the words were set; and when those of later claims, and the printed digits became the ranges of
+#: the numbers.
+SET, LATER = "2026-11-21", "2026-11-22"
 #: A value that the paper prints: 2.9, or ~60.
 PRINTED = re.compile(r"(~?)(\d+)(?:\.(\d+))?")
 DIGITS = "half a unit of the last digit printed"
@@ -103,7 +119,8 @@ def verdict_of(outcomes: set[str], changed: bool, rounding: bool) -> str:
 class PaperCheck(Check):
     """A check of a number against the paper's, whatever its bar.
 
-    paper: what the paper prints, as text: "2.9"; date: when the accepted range was set; converges: has the number a
+    paper: what the paper prints, as text: "2.9"; date: when the accepted range was set, that of the claim where none is
+    given; converges: has the number a
     limit as mesh and step are refined? rests_on: what it takes to know it; input: its name in the record of the
     sensitivities; bar: where the number lies, None before it is known; held: for a number without a limit, whether it
     holds in the range of each level; scheme: least and largest value with the scheme of 2001, None where that is not
@@ -112,10 +129,11 @@ class PaperCheck(Check):
     """
 
     paper: str
-    date: str = SET
+    date: str = ""
     converges: bool = True
     rests_on: str = PREDICTED
     input: str = ""
+    within: tuple[float, float] | None = None
     bar: Bar | None = None
     held: tuple[bool, ...] = ()
     scheme: tuple[float, float] | None = None
@@ -125,6 +143,11 @@ class PaperCheck(Check):
     def printed(self) -> tuple[float, float] | None:
         """The interval of the value that the paper prints, None where it prints words or a bound."""
         return interval(self.paper)
+
+    @property
+    def inputs(self) -> tuple[float, float] | None:
+        """Where the number goes as the inputs of Table 1 move within their rounding; None where that is not known."""
+        return self.within or sensitivity.interval(self.input, self.value)
 
     @property
     def outcome(self) -> str:
@@ -182,7 +205,7 @@ class Claim:
     """A row of the table: the paper's section, what it says, how to compute it, and the function that does.
 
     about: MODEL, OF_SCHEME or CLOSED; fine: sizes of the converged solution; beside: those of the scheme whose range
-    stands beside it; sizes, steps: of the scheme; fixed: why one of them is not varied.
+    stands beside it; sizes, steps: of the scheme; fixed: why one of them is not varied; date: when its ranges were set.
     """
 
     id: str
@@ -195,6 +218,12 @@ class Claim:
     sizes: tuple[float, ...] = SIZES
     steps: tuple[float, ...] = STEPS
     fixed: str = ""
+    date: str = SET
+
+    @property
+    def of_wide(self) -> bool:
+        """Is it about wide? It is judged on the sizes for that then."""
+        return self.fine in (WIDE_FINE, WIDE_PAIRED)
 
     @property
     def command(self) -> str:
@@ -230,13 +259,12 @@ def claim(id: str, where: str, text: str, **fields):
     return register
 
 
-def printed(quantity: str, paper_text: str, ours: float, why: str = DIGITS, date: str = PRINTED_SET,
-            **more) -> PaperCheck:
+def printed(quantity: str, paper_text: str, ours: float, why: str = DIGITS, **more) -> PaperCheck:
     """A number that the paper prints: it must lie in the interval of its digits. Raises ValueError for words."""
     found = interval(paper_text)
     if found is None:
         raise ValueError(f"{quantity}: {paper_text!r} is no printed number")
-    return between(quantity, paper_text, ours, *found, why, date=date, **more)
+    return between(quantity, paper_text, ours, *found, why, date=LATER, **more)
 
 
 def near(quantity: str, paper_text: str, ours: float, target: float, *, relative: float | None = None,

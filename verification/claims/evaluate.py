@@ -18,12 +18,13 @@ import re
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from types import ModuleType
 
 import numpy as np
 
 import verification.claims as package
 from verification.claims import CLAIMS, CLOSED, MODEL, OF_SCHEME, Claim, ClaimError, Finding, PaperCheck
-from verification.claims.levels import CONVERGED, OF_WIDE, SCHEME, Level, at_level, forget
+from verification.claims.levels import CONVERGED, SCHEME, Level, at_level, forget
 from verification.uncertainty import Bar, Estimate, combined, estimate, spread
 
 MESH_ORDERS, STEP_ORDERS = (1.0, 2.0), (1.0, 1.0)
@@ -40,12 +41,17 @@ def numbers(finding: Finding) -> Numbers:
 def barred(claim: Claim, finding: Finding, others: dict[Level, Numbers]) -> Finding:
     """The finding with a bar on each check. Raises ClaimError where the levels do not speak of the same quantities."""
     found = {claim.judged: numbers(finding), **others}
-    said = {tuple(unnumbered(quantity) for quantity, *_ in row) for row in found.values()}
+    said = {quantities(row) for row in found.values()}
     if len(said) != 1:
         raise ClaimError(f"the levels tell of different quantities: {sorted(said)}")
-    checks = [_judgeable(claim, check, {level: row[k][1:] for level, row in found.items()})
-              for k, check in enumerate(finding.checks)]
-    return replace(finding, checks=tuple(checks))
+    columns = zip(*found.values())
+    return replace(finding, checks=tuple(_judgeable(claim, check, dict(zip(found, column)))
+                                         for check, column in zip(finding.checks, columns)))
+
+
+def quantities(row: Numbers) -> tuple[str, ...]:
+    """What a finding speaks of at one level, whatever the instants are."""
+    return tuple(unnumbered(quantity) for quantity, *_ in row)
 
 
 def unnumbered(quantity: str) -> str:
@@ -53,10 +59,10 @@ def unnumbered(quantity: str) -> str:
     return re.sub(r"\d+(\.\d+)?", "#", quantity)
 
 
-def _judgeable(claim: Claim, check: PaperCheck, found: dict[Level, tuple[float, bool]]) -> PaperCheck:
+def _judgeable(claim: Claim, check: PaperCheck, found: dict[Level, tuple[str, float, bool]]) -> PaperCheck:
     """The check with its bar, from its value and whether it holds at each level; to a width of its own, that of printed
     digits that it is made of or of the mesh around a place, the bar is added."""
-    values = {level: value for level, (value, _) in found.items()}
+    values = {level: value for level, (_, value, _) in found.items()}
     of_kind = [level for level in found if claim.about != MODEL or level.kind == CONVERGED]
     scheme = [values[level] for level in values if level.kind == SCHEME]
     if claim.about == MODEL:
@@ -65,10 +71,10 @@ def _judgeable(claim: Claim, check: PaperCheck, found: dict[Level, tuple[float, 
     if check.converges:
         bar, held = _bar(claim, check.value, values), ()
     else:
-        bar, held = spread([values[level] for level in of_kind]), tuple(found[level][1] for level in of_kind)
+        bar, held = spread([values[level] for level in of_kind]), tuple(found[level][2] for level in of_kind)
     own = check.bar or Bar(check.value, check.value)
     bar = replace(bar, low=bar.low - check.value + own.low, high=bar.high - check.value + own.high)
-    return replace(check, bar=bar, held=held)
+    return replace(check, bar=bar, held=held, date=check.date or claim.date)
 
 
 def _bar(claim: Claim, value: float, values: dict[Level, float]) -> Bar:
@@ -98,6 +104,11 @@ OF_BASE = 0.1
 
 def register_all() -> None:
     """Import every module of this package: each registers its claims."""
+    import_all(package)
+
+
+def import_all(package: ModuleType) -> None:
+    """Import every module of a package but its program."""
     for module in pkgutil.iter_modules(package.__path__):
         if module.name != "__main__":
             importlib.import_module(f"{package.__name__}.{module.name}")
@@ -107,20 +118,25 @@ def everywhere(ids: Iterable[str], besides: dict[Level, Callable] | None = None
                ) -> tuple[dict[str, dict[Level, Found]], dict[Level, object]]:
     """What claims come to at all of their levels, the dearest levels first, and what functions return at theirs."""
     ids, besides = list(ids), besides or {}
-    wanted = {level: [id for id in ids if level in CLAIMS[id].levels]
-              for level in (*besides, *(level for id in ids for level in CLAIMS[id].levels))}
+    wanted: dict[Level, list[str]] = {level: [] for level in besides}
+    for id in ids:
+        for level in CLAIMS[id].levels:
+            wanted.setdefault(level, []).append(id)
     levels = sorted(wanted, key=lambda level: effort(level, wanted[level]), reverse=True)
     found = dict(zip(levels, side_by_side(found_at, levels, [wanted[level] for level in levels],
                                           [besides.get(level) for level in levels])))
-    return ({id: {level: rows[id] for level, (rows, _) in found.items() if id in rows} for id in ids},
-            {level: found[level][1] for level in besides})
+    by_claim: dict[str, dict[Level, Found]] = {id: {} for id in ids}
+    for level, (rows, _) in found.items():
+        for id in rows:
+            by_claim[id][level] = rows[id]
+    return by_claim, {level: found[level][1] for level in besides}
 
 
 def effort(level: Level, ids: Iterable[str]) -> float:
     """About how long claims take at a level, in runs of wide at size 1: a run takes as many elements and steps as go in
     a size, to the power of two and more."""
-    ids = set(ids)
-    runs = OF_BASE + bool(ids & set(OF_WIDE)) + sum(RUNS.get(id, 0) for id in ids)
+    ids = list(ids)
+    runs = OF_BASE + any(CLAIMS[id].of_wide for id in ids) + sum(RUNS.get(id, 0) for id in ids)
     return runs / (level.size**2.5 * level.step)
 
 

@@ -27,16 +27,7 @@ from verification.problems.bodies import Supported
 RADIUS = 5.0
 
 
-class Sliding(Supported):
-    """A body that slides on the wall y = 0 with its middle fixed (2.3.3)."""
-
-    @property
-    def triangles(self) -> np.ndarray:
-        """(t, 3)."""
-        return self.body.shape.triangles
-
-
-def half_disc(refinement: float) -> Sliding:
+def half_disc(refinement: float) -> Supported:
     """A seed alone, in a mesh of the package's own generator: meshes of different refinement share nothing.
 
     Sizes fall everywhere in proportion: their growth from the rim to the middle falls with them. With the generator's
@@ -50,7 +41,7 @@ def half_disc(refinement: float) -> Sliding:
     return sliding(grid.points[grid.body], grid.topology.body_cells)
 
 
-def regular_half_disc(parts: int) -> Sliding:
+def regular_half_disc(parts: int) -> Supported:
     """A seed in a regular grid of 2 n by n squares, each cut in two, mapped onto the half-disc.
 
     parts: n at the default level.
@@ -65,22 +56,22 @@ def regular_half_disc(parts: int) -> Sliding:
     return sliding(points, triangles)
 
 
-def sliding(points: np.ndarray, triangles: np.ndarray) -> Sliding:
-    """Of a mesh: points (n, 2) um, triangles (t, 3)."""
+def sliding(points: np.ndarray, triangles: np.ndarray) -> Supported:
+    """A body that slides on the wall y = 0 with its middle fixed (2.3.3): points (n, 2) um, triangles (t, 3)."""
     on_wall = np.abs(points[:, 1]) < 1e-9 * RADIUS
     middle = on_wall & (np.abs(points[:, 0]) < 1e-9 * RADIUS)
     shape = growth.Shape(triangles, len(points), GRADIENT_DEGREES[1])
-    return Sliding(growth.Body(shape, points), np.column_stack([middle, on_wall]))
+    return Supported(growth.Body(shape, points), np.column_stack([middle, on_wall]))
 
 
-def radial_theta(body: Sliding, inner: float, more: float) -> np.ndarray:
+def radial_theta(body: Supported, inner: float, more: float) -> np.ndarray:
     """(t, 1) theta = inner + more (R / R_0)^2 at the triangles' middles."""
-    return inner + more * np.sum(body.reference[body.triangles].mean(axis=1) ** 2, axis=1)[:, None] / RADIUS**2
+    return inner + more * np.sum(body.reference[body.cells].mean(axis=1) ** 2, axis=1)[:, None] / RADIUS**2
 
 
-def areas(body: Sliding) -> np.ndarray:
+def areas(body: Supported) -> np.ndarray:
     """(t,) areas of a body's triangles at t = 0, um2."""
-    return triangle_areas(body.reference, body.triangles)
+    return triangle_areas(body.reference, body.cells)
 
 
 # C22: theta = INNER + MORE (R / R_0)^2 on meshes of the package's own, by refinement, and on regular ones, by parts.
@@ -130,7 +121,7 @@ def listed(values) -> str:
     return ", ".join(f"{value:.2g}" for value in values)
 
 
-def attempt(body: Sliding, factor: float) -> str:
+def attempt(body: Supported, factor: float) -> str:
     """What growth comes to with the stabilisation times a factor, in words."""
     try:
         return f"the pressure is off by {100 * growth_errors(body, factor)[1]:.2g} %"
@@ -138,13 +129,13 @@ def attempt(body: Sliding, factor: float) -> str:
         return f"Newton's method fails ({str(error).partition(';')[0]})"
 
 
-def order(family: list[Sliding], errors) -> float:
+def order(family: list[Supported], errors) -> float:
     """Slope of log error against log h."""
     h = [np.sqrt(areas(body).sum() / len(body.reference)) for body in family]
     return float(np.polyfit(np.log(h), np.log(errors), 1)[0])
 
 
-def growth_errors(body: Sliding, factor: float) -> tuple[float, float]:
+def growth_errors(body: Supported, factor: float) -> tuple[float, float]:
     """Mean-square errors, relative, of the outline's radius and of the pressure, the stabilisation times a factor."""
     start = growth.Equilibrium(body.reference, np.zeros(len(body.reference)), 0)
     theta = radial_theta(body, INNER, MORE)
@@ -153,31 +144,31 @@ def growth_errors(body: Sliding, factor: float) -> tuple[float, float]:
     rim = R > (1 - 1e-9) * RADIUS
     radius, pressure = (exact(R, INNER, MORE, RADIUS) for exact in (neo_hookean.cylinder_radius,
                                                                     neo_hookean.cylinder_pressure))
-    weight = np.bincount(body.triangles.ravel(), np.repeat(areas(body) / 3, 3))
+    weight = np.bincount(body.cells.ravel(), np.repeat(areas(body) / 3, 3))
     outline = np.hypot(*found.position[rim].T) / radius[rim] - 1
     return (float(np.sqrt(np.mean(outline**2))),
             float(np.sqrt(weight @ (found.pressure - pressure) ** 2 / (weight @ pressure**2))))
 
 
-def stabilities(family: list[Sliding], factor: float) -> list[float]:
+def stabilities(family: list[Supported], factor: float) -> list[float]:
     """The stability numbers of some bodies."""
     return [stability(body, factor) for body in family]
 
 
-def stability(body: Sliding, factor: float) -> float:
+def stability(body: Supported, factor: float) -> float:
     """Least eigenvalue of B K^-1 B^T + factor C against the pressure's mass matrix, at t = 0 (dense)."""
     n, of = len(body.reference), stabilised_by(body, factor)
     whole = dense(of.tangent(body.reference, np.zeros(n)), of.unknowns)
-    M = dense(areas(body)[:, None, None] * (np.ones((3, 3)) + np.eye(3)) / 12, body.triangles)
+    M = dense(areas(body)[:, None, None] * (np.ones((3, 3)) + np.eye(3)) / 12, body.cells)
     free = ~body.held.T.ravel()
     stiffness, divergence = whole[: 2 * n, : 2 * n][free][:, free], whole[2 * n:, : 2 * n][:, free]
     schur = divergence @ np.linalg.solve(stiffness, divergence.T) - whole[2 * n:, 2 * n:]
     return float(eigh(0.5 * (schur + schur.T), M, eigvals_only=True, subset_by_index=[0, 0])[0])
 
 
-def stabilised_by(body: Sliding, factor: float) -> growth.System:
+def stabilised_by(body: Supported, factor: float) -> growth.System:
     """The equations of a body whose stabilisation at t = 0 is multiplied by a factor."""
-    plain = growth.gradient_stabilisation(body.reference, body.triangles, np.ones(len(body.triangles)))
+    plain = growth.gradient_stabilisation(body.reference, body.cells, np.ones(len(body.cells)))
     return growth.System(body.body, body.held, stabilising=factor * plain)
 
 
@@ -258,7 +249,7 @@ def expanded(exponent: float) -> Expanded:
         pressure = found.pressure
         iterations = iterations + found.iterations
     R = np.hypot(*body.reference.T)
-    area = triangle_areas(position, body.triangles).sum() / areas(body).sum()
+    area = triangle_areas(position, body.cells).sum() / areas(body).sum()
     return Expanded(float(np.hypot(*position[R > (1 - 1e-9) * RADIUS].T).mean()), area, float(pressure[np.argmin(R)]),
                     iterations)
 

@@ -10,16 +10,18 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import shapely
 
 from repro.fem.mesh import Mesh
 from repro.fem.outline import BOTTOM, FREE, TOP, Outline
 from repro.model import biomass
 from repro.model.pore import Pore, Solved
-from verification.claims import FEW, FEW_WORDS, Finding, at_least, at_most, between, claim, without_limit
+from verification.claims import FEW, FEW_WORDS, LATER, Finding, at_least, at_most, between, claim, without_limit
 from verification.claims.levels import ABOUT_WIDE, BESIDE_OWN, TOLD, WIDE_PAIRED, at_level
 from verification.claims.runs import (
     BASE,
+    END,
+    PLOTTED,
+    SUBSTRATES,
     WIDE,
     Body,
     around_contact,
@@ -29,16 +31,18 @@ from verification.claims.runs import (
     equivalent,
     grown,
     in_plane,
+    mean_change,
     polygon,
     scene,
     series,
     solved_pore,
     stress,
+    uncovered,
+    until,
+    upstream_part,
 )
 from verification.uncertainty import Bar
 
-PLOTTED = 19.2
-END = 19.4
 LAST_HOURS = 5.0
 
 
@@ -126,7 +130,8 @@ def upgradient_only() -> Finding:
     last, end = bodies(WIDE)[-1], float(bodies(WIDE)[-1].pore.time)
     contact = float(around_contact(*WIDE)["time_h"][1])
     spanned = next(each for each in bodies(WIDE) if each.pore.time >= contact)
-    late, since = (upgradient_share(first, last) for first in (body(WIDE, end - LAST_HOURS), spanned))
+    late, since = (upstream_part(polygon(first.outline), polygon(last.outline))
+                   for first in (body(WIDE, end - LAST_HOURS), spanned))
     up, down = made(last, growth_rates(*solved_pore(WIDE, end)))
     bound = "95 %, set beforehand"
     checks = (at_least("new area upgradient, last 5 h (%)", "only upgradient", 100 * late, 95, bound),
@@ -135,12 +140,6 @@ def upgradient_only() -> Finding:
     note = (f"Contact with the opposite wall comes at {contact:.2f} h; of the area that is new between "
             f"{spanned.pore.time:g} h and {end:g} h, {100 * since:.1f} % lies upgradient.")
     return Finding(checks, note=note)
-
-
-def upgradient_share(first: Body, last: Body) -> float:
-    """Share of the area covered at one time and not at an earlier one that lies at x < 0."""
-    new = shapely.difference(polygon(last.outline), polygon(first.outline))
-    return shapely.area(shapely.clip_by_rect(new, -1e6, -1e6, 0.0, 1e6)) / shapely.area(new)
 
 
 #: Every so many rows are told: 5 h.
@@ -187,9 +186,8 @@ def stays_half_disc() -> Finding:
     base, wide = (100 * np.array([*map(deviation, bodies(run))]) for run in (BASE, WIDE))
     rows, few = series(*WIDE), 100 * FEW
     before = rows["contact"] == 0
-    checks = (at_most("base: largest deviation (% of R)", "half-disc", base.max(), few, "a few percent"),
-              at_most("wide before contact: largest deviation (% of R)", "half-disc", wide[before].max(), few,
-                      "a few percent"),
+    checks = (*(at_most(f"{name}: largest deviation (% of R)", "half-disc", found.max(), few, "a few percent")
+                for name, found in (("base", base), ("wide before contact", wide[before]))),
               at_least("wide at its end: deviation (% of R)", "until squeezed", wide[-1], few,
                        "more than a few percent"))
     half = scene(*WIDE).substrates.acceptor.half_saturation
@@ -211,9 +209,6 @@ def deviation(found: Body) -> float:
     return float(np.abs(np.hypot(*free.T) / np.sqrt(2 * outline.area / np.pi) - 1).max())
 
 
-SUBSTRATES = ("acceptor", "donor")
-
-
 def least(run: tuple[str, ...], name: str) -> np.ndarray:
     """(rows,) smallest concentration of a substrate in the aggregate over K_s."""
     half = getattr(scene(*run).substrates, name).half_saturation
@@ -227,8 +222,7 @@ def oxygen() -> Finding:
     The paper says it of decay, which (9)-(10) let go on in proportion to m_A = C_A / (C_A + K_s). Present is so taken
     as m_A >= 1/2, that is C_A >= K_s: decay then has at least half of the rate that it has with plenty of oxygen.
     """
-    base = least(BASE, "acceptor")
-    wide = least(WIDE, "acceptor")
+    base, wide = (least(run, "acceptor") for run in (BASE, WIDE))
     why = "m_A >= 1/2: decay at half its rate, at least"
     checks = (at_least("base: smallest C_A / K_s", "present", base.min(), 1.0, why),
               at_least("wide: smallest C_A / K_s", "present", wide.min(), 1.0, why),
@@ -252,7 +246,7 @@ def share_under(found: Body, bound: float) -> float:
 
 
 #: Base goes on past the paper's end, to see until when it is fully penetrated.
-LONGER = ("base", 'growth.end="22 h"', "output.times=[" + ", ".join(f'"{hour} h"' for hour in range(1, 23)) + "]")
+LONGER = ("base", *until(*range(1, 23)))
 #: C >> K_s, as the zero order of section 4 needs it: uptake within a tenth of its most.
 ZERO_ORDER = 9.0
 
@@ -269,7 +263,7 @@ def penetrated() -> Finding:
     checks = (at_least("19.2 h: slowest over fastest uptake in the aggregate", "fully penetrated",
                        evenness(body(BASE, PLOTTED)), 0.9, "within a tenth"),
               *(at_least(f"until 19.2 h: smallest concentration of the {name} (K_s)", ">> 1", lowest[name],
-                         ZERO_ORDER, "m within a tenth of one, the zero order of C15", date="2026-11-22")
+                         ZERO_ORDER, "m within a tenth of one, the zero order of C15", date=LATER)
                 for name in SUBSTRATES))
     reason = (f"it is fully penetrated, uptake is even; but at {lowest['acceptor']:.2g} K_s of acceptor uptake has "
               "fallen well below its most, as it must for the effluents printed, and C15 shows what that does")
@@ -336,15 +330,17 @@ def peaks(run: tuple[str, ...]) -> tuple[float, float, float]:
     """Largest in-plane shear and equivalent stress over mu_L, and largest in-plane shear stress over mu_L J^(-2/3), in
     all rows of a run."""
     modulus = scene(*run).growth.shear_modulus
-    triples = [(in_plane(s).max(), equivalent(s).max(), (in_plane(s) * each.cell("J") ** (2 / 3)).max())
-               for each in bodies(run) for s in (stress(each, modulus),)]
-    return tuple(float(value) for value in np.max(triples, axis=0))
+    triples = []
+    for each in bodies(run):
+        found = stress(each, modulus)
+        shear = in_plane(found)
+        triples.append((shear.max(), equivalent(found).max(), (shear * each.cell("J") ** (2 / 3)).max()))
+    return tuple(map(float, np.max(triples, axis=0)))
 
 
 def apart(run: tuple[str, ...], time: float) -> float:
     """Area that only one of the outlines covers, with new biomass stressed and stress-free, in percent of the area."""
-    ours, other = (polygon(body((*run, *more), time).outline) for more in ((), (STRESS_FREE,)))
-    return 100 * float(ours.symmetric_difference(other).area / ours.area)
+    return uncovered(*(polygon(body((*run, *more), time).outline) for more in ((), (STRESS_FREE,))))
 
 
 def after_contact() -> tuple[float, ...]:
@@ -355,6 +351,5 @@ def after_contact() -> tuple[float, ...]:
 
 def conductivity_change(run: tuple[str, ...], times: tuple[float, ...]) -> float:
     """Change (%) of the conductivity when new biomass is born stress-free: geometric mean at some times (h)."""
-    ratios = [at((*run, STRESS_FREE), time)["conductivity_m_per_d"] / at(run, time)["conductivity_m_per_d"]
-              for time in times]
-    return 100 * float(np.exp(np.mean(np.log(ratios))) - 1)
+    ours = [at(run, time)["conductivity_m_per_d"] for time in times]
+    return mean_change(ours, [at((*run, STRESS_FREE), time)["conductivity_m_per_d"] for time in times])

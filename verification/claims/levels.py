@@ -64,8 +64,6 @@ def converged(size: float) -> tuple[str, ...]:
 #: have is not in their difference.
 FINE = (0.5, 2**-0.5, 1.0)
 WIDE_FINE = (2**-0.5, 1.0, 2**0.5)
-#: The claims about wide, which are judged on these, C32 on WIDE_PAIRED.
-OF_WIDE = ("C12", "C16", "C25", "C26", "C29", "C30", "C31", "C32", "C35", "C38", "C40", "C44", "C45", "C46")
 PAIRED = tuple(2.25 * 2 ** (third / 3) for third in (-1, 0, 1))
 #: Those for changes of wide after its contact. A run with the least angle of contact halved hangs on its mesh: at 1.79
 #: it stops in a step after contact, in which a triangle is turned over.

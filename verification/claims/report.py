@@ -4,10 +4,10 @@ The committed record of the claims, `claims.json`: intervals and verdicts that a
 
 A check's `value` lies in `low` to `high` (numerics), the paper's in `paper_low` to `paper_high` (printing, null for
 words), and `input_low` to `input_high` is where the value goes as the inputs of Table 1 move within their rounding
-(from the committed record of the sensitivities, null where that does not tell). `scheme_2001` is the range that the
-paper's scheme gives on one to three meshes, for a claim about the scheme that of all its levels. `on_sizes` are the
-values on the sizes of the converged solution, the judged one first, and `order` is that which is observed on them, or
-on the meshes of the scheme; null where none fits.
+(from the committed record of the sensitivities or a closed form, null where none tells). `scheme_2001` is the range
+that the paper's scheme gives on one to three meshes, for a claim about the scheme that of all its levels. `on_sizes`
+are the values on the sizes of the converged solution, the judged one first, and `order` is that which is observed on
+them, or on the meshes of the scheme; null where none fits.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from itertools import zip_longest
 from math import inf, isfinite
 from pathlib import Path
 
-from verification import sensitivity
 from verification.claims import (
     CHANGED,
     FAILS,
@@ -97,7 +96,7 @@ def spanned(pair) -> str:
 def cells(check: PaperCheck) -> tuple[str, ...]:
     """A check with its widths, in the order of HEAD."""
     return (check.quantity, check.paper, number(check.value), spanned((check.bar.low, check.bar.high)),
-            spanned(sensitivity.interval(check.input, check.value)), spanned(check.scheme),
+            spanned(check.inputs), spanned(check.scheme),
             spanned((check.low, check.high)), check.outcome)
 
 
@@ -210,7 +209,7 @@ def entry(row: Row) -> dict:
 
 
 def _check(check: PaperCheck, about: str) -> dict:
-    paper, inputs = check.printed or (None, None), sensitivity.interval(check.input, check.value)
+    paper, inputs = check.printed or (None, None), check.inputs
     scheme = (check.bar.low, check.bar.high) if about == OF_SCHEME else check.scheme
     return {"quantity": check.quantity, "rests_on": check.rests_on, "paper": check.paper,
             "paper_low": paper[0], "paper_high": paper[1], "value": _finite(check.value),

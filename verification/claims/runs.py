@@ -21,7 +21,7 @@ import shapely
 from repro import results
 from repro.fem import mesher
 from repro.fem.mesh import Mesh
-from repro.fem.outline import Outline, parabola
+from repro.fem.outline import BOTTOM, TOP, Outline, parabola
 from repro.fem.outline import half_disc as seed
 from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.fem.space import Space
@@ -35,16 +35,30 @@ from verification.claims.levels import CONVERGED, cached, converged, current
 
 #: Section 4 and Figure 6.
 BASE, WIDE = ("base",), ("wide",)
-#: Rows of t = 0 and of the last two shapes alone, for runs of which no more is asked.
-LAST = 'output.times=["19.2 h", "19.4 h"]'
-#: Section 4, where only the last two shapes are asked for.
-PLATES = (*BASE, LAST)
+#: The shape that the paper plots and the end of its run (h), and a shape update, whatever the level.
+PLOTTED, END = 19.2, 19.4
+UPDATE = 0.2
+SUBSTRATES = ("acceptor", "donor")
 #: Hours of the rows of a packaged scene.
 ROWS = {"base": (0.2, *map(float, range(1, 20)), 19.2, 19.4), "wide": tuple(map(float, range(1, 121)))}
 #: How long (h) before contact the last shape with a film is looked at: 18 s.
 FILM = 0.005
-#: A shape update (h), whatever the level.
-UPDATE = 0.2
+
+
+def rows_at(*hours: float) -> str:
+    """The change of a scene that asks for rows at some times (h)."""
+    return "output.times=[" + ", ".join(f'"{hour:g} h"' for hour in hours) + "]"
+
+
+def until(*hours: float) -> tuple[str, str]:
+    """The changes that end a run at the last of some times (h), with rows at all of them."""
+    return f'growth.end="{hours[-1]:g} h"', rows_at(*hours)
+
+
+#: Rows of t = 0 and of the last two shapes alone, for runs of which no more is asked.
+LAST = rows_at(PLOTTED, END)
+#: Section 4, where only the last two shapes are asked for.
+PLATES = (*BASE, LAST)
 
 
 def scene(name: str, *changes: str) -> Scene:
@@ -81,7 +95,10 @@ class History:
 @cached
 def history(*run: str) -> History:
     """One run, computed. Raises SimulationError where it fails."""
-    said, instants, ledgers, before, contact = scene(*run), [], [], None, None
+    said = scene(*run)
+    instants: list[Instant] = []
+    ledgers: list[Ledger] = []
+    before = contact = None
     for state, instant in simulation.steps(said):
         if instant:
             instants.append(instant)
@@ -125,16 +142,16 @@ def around_contact(*run: str) -> dict[str, np.ndarray]:
 
 
 def _columns(said: Scene, instants: tuple[Instant, ...]) -> dict[str, np.ndarray]:
-    rows = [results.row(said, instant) for instant in instants]
-    return {name: np.array([np.nan if row[name] is None else row[name] for row in rows]) for name in results.COLUMNS}
+    found = np.array([[*results.row(said, instant).values()] for instant in instants], float)
+    return dict(zip(results.COLUMNS, found.T))
 
 
 @cached
 def ledger(*run: str) -> dict[str, np.ndarray]:
     """Columns of ``ledger.csv``, of all steps."""
     found = history(*run)
-    rows = np.array([results.ledger_row(found.scene, step) for step in found.ledgers])
-    return dict(zip(results.LEDGER_COLUMNS, rows.T))
+    steps = np.array([results.ledger_row(found.scene, step) for step in found.ledgers])
+    return dict(zip(results.LEDGER_COLUMNS, steps.T))
 
 
 def row_number(run: tuple[str, ...], time: float) -> int:
@@ -166,15 +183,19 @@ def nearest(run: tuple[str, ...], time: float) -> float:
 def grown(run: tuple[str, ...], time: float) -> tuple[Pore, Solved]:
     """The shape of a run at a time (h) with what grows in it in the next 12 min, and what is solved then: the state
     "before the aggregate expands" [E12]."""
-    said, start = scene(*run), instant(run, time)
-    made, _, _ = updates.make_biomass(said, start.pore, start.solved, UPDATE)
+    return _grown(scene(*run), *solved_pore(run, time))
+
+
+@cached
+def grown_anew(run: tuple[str, ...], time: float) -> tuple[Pore, Solved]:
+    """The same in a mesh made at that time, whose ends are 1.5 W from the aggregate (3.1) at every level. Those of the
+    run's own mesh hang on when that was last made."""
+    return _grown(scene(*run), *remeshed(scene(*run), *solved_pore(run, time)))
+
+
+def _grown(said: Scene, now: Pore, solved: Solved) -> tuple[Pore, Solved]:
+    made, _, _ = updates.make_biomass(said, now, solved, UPDATE)
     return made, pore.solve(said, made)
-
-
-def fields(run: tuple[str, ...], number: int) -> meshio.Mesh:
-    """Fields of a run's row: ``number`` counts from 0 (-1: the last)."""
-    found = history(*run)
-    return results.fields(found.scene, found.instants[number].pore, found.instants[number].solved)
 
 
 #: Points of an arc of an outline, as a polygon.
@@ -284,18 +305,11 @@ def equivalent(stresses: np.ndarray) -> np.ndarray:
     return np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3 * xy**2)
 
 
-@dataclass(frozen=True, eq=False)
-class Solution:
-    """Flow and substrates in one geometry, with the ledger and the end values of both substrates."""
-
-    flow: flow.Flow
-    problem: transport.Problem
-    concentrations: transport.Concentrations
-    fluxes: tuple[transport.Fluxes, transport.Fluxes]
+Both = tuple[transport.Fluxes, transport.Fluxes]
 
 
-def solution(scene, grid: Mesh, active: np.ndarray, carried_by_u: bool = False) -> Solution:
-    """Flow under the scene's drive, then steady substrates over X_A (N,) mg/L.
+def solution(scene, grid: Mesh, active: np.ndarray, carried_by_u: bool = False) -> tuple[flow.Flow, Both]:
+    """Flow under the scene's drive, then the ledger of both steady substrates over X_A (N,) mg/L.
 
     carried_by_u: advect with u itself, as the paper writes it, and not with the divergence-free w = u - tau grad p.
     """
@@ -305,7 +319,7 @@ def solution(scene, grid: Mesh, active: np.ndarray, carried_by_u: bool = False) 
     problem = transport.problem(space, carrier, scene.substrates, scene.kinetics, scene.numerics.inlet)
     sink = Sink(biomass.at_points(space, active) * space.reaction.dx)
     state = transport.steady(problem, sink)
-    return Solution(found, problem, state, transport.fluxes(problem, sink, state))
+    return found, transport.fluxes(problem, sink, state)
 
 
 def flow_in(scene, grid: Mesh) -> flow.Flow:
@@ -326,3 +340,28 @@ def half_disc(scene, radius: float, reach: float | None) -> Mesh:
     numerics = scene.numerics
     outline = seed(radius, ACROSS_AGGREGATE * numerics.refinement, numerics.geometry)
     return mesher.generate(outline, (-end, end), pore.sized(scene), numerics.geometry)[0]
+
+
+def plug(scene, *x: float) -> Mesh:
+    """Biomass over the whole width from the first to the last of some x (um), each of them a node on both walls, meshed
+    to 1.5 W on both sides."""
+    width = scene.pore.width
+    points = np.array([*((each, 0.0) for each in x), *((each, width) for each in reversed(x))])
+    outline = Outline(points, np.repeat([BOTTOM, TOP], len(x)), np.zeros(len(points), bool), points)
+    return mesher.generate(outline, (x[0] - 1.5 * width, x[-1] + 1.5 * width), pore.sized(scene))[0]
+
+
+def uncovered(ours: shapely.Polygon, other: shapely.Polygon) -> float:
+    """Area that only one of two shapes covers, in percent of ours."""
+    return 100 * float(ours.symmetric_difference(other).area / ours.area)
+
+
+def upstream_part(first: shapely.Polygon, last: shapely.Polygon) -> float:
+    """Share of the area covered at one time and not at an earlier one that lies at x < 0."""
+    new = last.difference(first)
+    return shapely.clip_by_rect(new, -1e6, -1e6, 0.0, 1e6).area / new.area
+
+
+def mean_change(ours: list[float], other: list[float]) -> float:
+    """By how many percent the geometric mean of other numbers differs from that of ours."""
+    return 100 * float(np.exp(np.mean(np.log(other) - np.log(ours))) - 1)

@@ -29,7 +29,6 @@ from repro.fem.space import Space
 from repro.march.simulation import shaped, simulate
 from repro.model import flow, pore
 from repro.scene import Scene
-from verification.coupling import PRESETS, every
 from verification.kernel.case import Profile, at_least, at_most, between, case, refine, studies, study
 from verification.problems import runs
 
@@ -44,9 +43,9 @@ RADII, REACH = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 33.0), 75.0
       claim="Under its head base clogs as its averaged pore (FiPy, solve_ivp) does, up to what lubrication and section "
             "means are worth: a velocity 11 % too high, of which 1 % is left with a half-disc's own loss",
       mutants=("stale-flow", "conductivity-for-velocity"),
-      over=PRESETS, ways="1 2")
+      over=runs.NUMERICS, ways="1 2")
 def base(*changes: str):
-    scene = runs.base("19.4 h", *changes, times=", ".join(f'"{time} h"' for time in TIMES))
+    scene = runs.base("19.4 h", *changes, times=TIMES)
     instants = runs.ours(scene)
     thin, own = _clogged(changes[0])
     flow, rest = (_apart(scene, instants, moments) for moments in (thin, own))
@@ -143,7 +142,7 @@ FASTER = (4.0, 16.0, 64.0, 256.0)
            "fluid and biomass and times 4 to 256",
       claim="What averaging over sections costs in the effluents is, as diffusion becomes fast, the constriction of a "
             "half-disc in a strip, in closed form",
-      mutants=("effluent-at-the-inlet", "inlet-held", "seed-too-thin"), over=every(0.5, 1.5), ways="paper")
+      mutants=("effluent-at-the-inlet", "inlet-held", "seed-too-thin"), over=runs.every(0.5, 1.5), ways="paper")
 def mixing(*changes: str):
     scene = runs.base("0 h", 'aggregate.radius="20 um"', *changes)
     scene = runs.at_velocity(scene, runs.SPEED)
@@ -189,7 +188,7 @@ def whole_run(preset: str):
 
 def _base(preset: str, factor: float):
     finer = ("numerics.tolerance=0.0002",) if preset == "accurate" else ()
-    scene = runs.base("19.4 h", runs.by(preset), *finer, times=", ".join(f'"{time} h"' for time in MIXING_TIMES))
+    scene = runs.base("19.4 h", runs.by(preset), *finer, times=MIXING_TIMES)
     scene = runs.with_diffusivities(scene, lambda water, biomass: (factor * water, factor * biomass))
     return runs.at_velocity(scene, runs.SPEED)
 
@@ -253,7 +252,7 @@ def thin_scene(elements: str, aspect: float) -> Scene:
     """Base for 1 h in a narrow pore, from a seed whose half length is its thickness over ``aspect``."""
     changes = (runs.of(elements), runs.coarser(elements, 0.5), f'aggregate.radius="{THICKNESS} um"',
                f'pore.width="{WIDTH} um"', 'growth.time_step="6 min"', 'growth.minimum_contact_angle="0.01 deg"')
-    found = runs.at_velocity(runs.base("1 h", *changes, times='"0.5 h", "1 h"'), 5 * aspect * runs.SPEED)
+    found = runs.at_velocity(runs.base("1 h", *changes, times=(0.5, 1.0)), 5 * aspect * runs.SPEED)
     return replace(found, kinetics=replace(found.kinetics, maximum_density=DENSITY * aspect**2))
 
 
@@ -386,7 +385,7 @@ ACCURACY = 1e-5
 THIELE = "the square of the transverse Thiele number: 1.2 % of the area of base over 64; and as much for the elements"
 #: Bounds where the supply jumps, and where it changes evenly, by preset; cubic: fast with cubic elements.
 HALF = "half of the {} that the preset may err by"
-SUPPLIED = {"steps": {preset: (4e-4, THIELE) for preset in PRESETS},
+SUPPLIED = {"steps": {preset: (4e-4, THIELE) for preset in runs.NUMERICS},
             "linear": {"paper": (1e-3, "second order in 12 min: a quarter of it with 6 min"),
                        "fast": (5e-3, HALF.format("1 %")), "accurate": (5e-4, HALF.format("0.1 %")),
                        "cubic": (5e-3, HALF.format("1 %"))}}
@@ -400,7 +399,7 @@ SUPPLIED = {"steps": {preset: (4e-4, THIELE) for preset in PRESETS},
             "as its averaged pore (FiPy, solve_ivp) does",
       mutants=("supply-of-the-start", "supply-half-way-of-the-start", "supply-a-step-late", "supply-not-yet",
                "row-of-the-end"), slow=True,
-      over={f"{how}, {preset}": (how, *bound, *PRESETS[preset])
+      over={f"{how}, {preset}": (how, *bound, *runs.NUMERICS[preset])
             for how, bounds in SUPPLIED.items() for preset, bound in bounds.items()}, ways="1 2")
 def supply(how: str, bound: float, origin: str, *changes: str):
     """Checks and a picture of one course of the donor's supply."""
@@ -434,6 +433,6 @@ def supplied(how: str, *changes: str) -> Scene:
         table.append([f"{end} h", f"{first} mg/L"])
     table += [[f"{pieces[-1][0]} h", f"{pieces[-1][2]} mg/L"]]
     made = runs.base("7 h", *changes, 'aggregate.radius="20 um"', f"substrates.donor.supply={json.dumps(table)}",
-                     f"substrates.donor.interpolation={how}", times=", ".join(f'"{time} h"' for time in ROWS))
+                     f"substrates.donor.interpolation={how}", times=ROWS)
     made = runs.with_diffusivities(made, lambda water, biomass: (QUICK * water, QUICK * biomass))
     return runs.at_velocity(made, runs.SPEED)

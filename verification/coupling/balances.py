@@ -21,12 +21,10 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from repro.fem.outline import BOTTOM, FREE, TOP
-from repro.march import midpoint, updates
 from repro.march.loop import Instant, Ledger
 from repro.march.simulation import simulate
 from repro.model import pore, remeshing
-from repro.scene import Kinetics, Scene
-from verification.coupling import every
+from repro.scene import Kinetics, Scene, load_scene
 from verification.kernel.case import Check, Study, at_least, at_most, between, case, study
 from verification.problems import aggregates, runs
 
@@ -71,11 +69,6 @@ def _steps(rows: list[Ledger], why: str) -> list[Check]:
 STEPS = (0.8, 0.4, 0.2, 0.1)
 
 
-def _trapezoid(step: float) -> float:
-    """(r step)^2 / 12 at the supply's rate of growth r."""
-    return (runs.growth_rates(runs.base("1.6 h"))[0] * step) ** 2 / 12
-
-
 REFINEMENTS = (0.7, 1.0, 1.4, 2.0)
 
 
@@ -83,7 +76,7 @@ REFINEMENTS = (0.7, 1.0, 1.4, 2.0)
       norm="a half-disc of 20 um whose density is X_m (1 + 0.1 x / R), remeshed, one step without uptake or decay: L2 "
            "of (X_A + X_I) / X_m - 1 over it; X_m times the area over the biomass, less 1",
       claim="What a density has of error at a remesh is gone after the next update [E7]: the shape takes up X_m again",
-      mutants=("density-not-worked-off", "theta-anew-at-a-remesh"), over=every(0.5), ways="paper")
+      mutants=("density-not-worked-off", "theta-anew-at-a-remesh"), over=runs.every(0.5), ways="paper")
 def density_restored(*changes: str):
     """The order of linear elements; that the others are exact."""
     if runs.base("1 h", *changes).numerics.order > 1:
@@ -99,10 +92,6 @@ def density_restored(*changes: str):
     yield at_most("X_m times the area", area, 1e-11, runs.ROUND_OFF)
 
 
-#: A step of so many hours, by the scheme: an update, or a step of the midpoint rule whatever its estimate.
-STEP = {"updates": updates.step, "midpoint": lambda *given: midpoint.attempt(*given).step}
-
-
 def _restored(*changes: str) -> tuple[float, float]:
     """L2 of the density's error, and X_m times the area over the biomass, less 1."""
     scene = runs.base("1 h", 'kinetics.decay_coefficient="0 1/d"', 'kinetics.maximum_utilization_rate="0 1/d"',
@@ -112,7 +101,7 @@ def _restored(*changes: str) -> tuple[float, float]:
     now = replace(now, active=now.active * (1 + 0.1 * x / scene.aggregate.radius))
     solved = pore.solve(scene, now)
     anew = remeshing.remesh(scene, now, now, solved.flow.mean_velocity)[0]
-    after = STEP[scene.numerics.time](scene, anew, pore.solve(scene, anew), 0.2).pore
+    after = runs.step(scene, anew, pore.solve(scene, anew), 0.2).pore
     weight = after.space.reaction.dx
     density = (after.active + after.inert) / weight / scene.kinetics.maximum_density
     error = np.sqrt(np.vdot(weight, (density - 1) ** 2) / weight.sum())
@@ -141,10 +130,8 @@ def _biomass(step: Ledger) -> float:
 
 
 def _worth(law: Kinetics, step: Ledger) -> float:
-    """Biomass made, against Y times the donor less what decays: the acceptor beyond F times the donor, over d_c."""
-    acceptor, donor = step.consumed
-    grown = law.yield_coefficient * donor
-    decayed = (acceptor - law.acceptor_to_donor_ratio * donor) / law.decay_oxygen_demand
+    """Biomass made, against what is grown less what decays."""
+    grown, decayed = runs.worth(law, step)
     return abs(step.biomass_made - (grown - decayed)) / max(abs(grown), abs(decayed))
 
 
@@ -169,7 +156,8 @@ def _of_base(preset: str):
     yield _closed(scene, ledgers)
     if scene.numerics.time == "updates":
         worst = defects(scene.kinetics, ledgers)[:, 2].max()
-        yield between("made against taken up, over (r step)^2 / 12", worst / _trapezoid(STEPS[2]), 0.95, 1.0,
+        theirs = (runs.growth_rates(scene)[0] * STEPS[2]) ** 2 / 12
+        yield between("made against taken up, over (r step)^2 / 12", worst / theirs, 0.95, 1.0,
                       "r at the supply; that of the seed is 1 % lower, and falls as the pore clogs")
     yield at_least("remeshes", remeshes, 1.0, "else they are not tested")
 
@@ -189,7 +177,7 @@ def _of_updates_of_base(preset: str) -> Study:
 
 def _of_narrow(preset: str):
     """Checks of a pore of 40 um through contact."""
-    scene = runs.every_step("25 h", runs.by(preset), 'pore.width="40 um"')
+    scene = load_scene("base", ('growth.end="25 h"', runs.by(preset), 'pore.width="40 um"'))
     scene = runs.at_velocity(scene, runs.SPEED)
     instants, touched = [], np.inf
     for instant in simulate(scene):
@@ -296,7 +284,7 @@ def _cumulated(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
       mutants=("films-stay-open", "reprojection-left-out"), over=runs.EVERY, ways="paper")
 def contact(*changes: str):
     scene = runs.base("0.6 h", 'pore.width="20 um"', 'aggregate.radius="17.9 um"', *changes,
-                      times='"0.2 h", "0.4 h", "0.6 h"')
+                      times=(0.2, 0.4, 0.6))
     instants = list(simulate(runs.at_velocity(scene, runs.SPEED)))
     rows, last = _ledgers(instants), instants[-1].pore
     return [_steps(rows, "Newton's tolerance"), _area(scene, instants[-1]),
@@ -314,7 +302,7 @@ def _area(scene: Scene, last: Instant) -> Check:
 @case("coupling-wedge", kind="property",
       norm="one step from a disc of 20 um that stands on a chord, the fluid under it at 8 degrees",
       claim="Wedges of fluid beside a contact surface close until they have the least contact angle",
-      mutants=("no-wedge-closes", "films-stay-open"), over=every(0.6), ways="paper")
+      mutants=("no-wedge-closes", "films-stay-open"), over=runs.every(0.6), ways="paper")
 def wedge(*changes: str):
     scene = runs.base("0.2 h", *changes)
     instants = list(simulate(scene, _disc(20.0, 19.8, 60 * scene.numerics.geometry)))

@@ -107,12 +107,12 @@ MUTANTS = (
          "First contact goes downstream of the highest place alone.",
          "np.abs(x - outline.highest) <= film",
          "np.abs(x - outline.highest - film / 2) <= film / 2",
-         ("tests/test_contact.py::test_contact_begins_to_both_sides_of_the_highest_place",)),
+         "tests/test_contact.py::test_contact_begins_to_both_sides_of_the_highest_place"),
         ("strain-since-last-drifts",
          "Where new biomass is born without stress, what J lacks of theta after a step is left as it is.",
          "return present, theta / grown.body.strained(position).J",
          "return present, theta / grown.theta",
-         ("tests/test_balances.py::test_area_and_mass_do_not_drift_apart[stress_free]",))),
+         "tests/test_balances.py::test_area_and_mass_do_not_drift_apart[stress_free]")),
     *changes(
         "repro/model/remeshing.py",
         ("theta-anew-at-a-remesh",
@@ -137,7 +137,7 @@ MUTANTS = (
          "What bounds a step counts each point alike, however small its part of the area.",
          "np.vdot(weight, np.abs(second.total - first.total)) / weight.sum()",
          "np.abs(second.total - first.total).mean()",
-         ("tests/test_pace.py::test_what_bounds_a_step_is_a_mean_over_the_area",))),
+         "tests/test_pace.py::test_what_bounds_a_step_is_a_mean_over_the_area")),
     *changes(
         "repro/fem/sizing.py",
         ("length-scale",

@@ -27,8 +27,7 @@ from repro.march.loop import Instant
 from repro.march.simulation import shaped, simulate
 from repro.model import flow, pore
 from repro.scene import Scene, load_scene
-from verification.coupling import PRESETS, every, kinds
-from verification.kernel.case import at_least, at_most, case, refine, study
+from verification.kernel.case import at_least, at_most, case, each_at_most, refine, study
 from verification.problems import pairs, runs
 from verification.problems.channels import both
 
@@ -76,7 +75,7 @@ PARABOLA = "elements hold the parabola: round-off"
       norm="refinement 1 to 2.8: mean velocity under the head relative to Poiseuille's; largest |C / supply - 1|",
       claim="A scene without an aggregate is a clean channel: Poiseuille's flow under the head, and C the supply "
             "everywhere",
-      mutants=("extent-not-subtracted", "head-on-the-mesh-alone"), over=every(0.3), ways="paper")
+      mutants=("extent-not-subtracted", "head-on-the-mesh-alone"), over=runs.every(0.3), ways="paper")
 def clean_channel(*changes: str):
     """The order of linear elements; what the others hold."""
     if load_scene("base", changes).numerics.order > 1:
@@ -127,11 +126,6 @@ def stiffness(*changes: str):
             at_least("growth of the area", soft.outline.area / seed, 1.1, "else nothing is tested")]
 
 
-def _everywhere(scene):
-    """The scene without flow, diffusion a million times D_A and more."""
-    return runs.with_diffusivities(runs.without_flow(scene), lambda water, biomass: (1e13, 1e13))
-
-
 EVERY_HOUR = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 OF_UPDATES = 1e-8, "J = theta to the stabilisation, and C to 1e-8 of the supply: D is a million times D_A"
 OF_LONG_STEPS = 1e-6, "J = theta, and C to 1e-7 of the supply"
@@ -147,7 +141,7 @@ LONG = {**{kind: (runs.by("fast"), runs.of(kind), runs.coarser(kind, 0.2)) for k
             "through a remesh",
       mutants=("growth-three-percent-low", "euler-biomass", "inert-not-in-the-area", "theta-anew-at-a-remesh",
                "geometry-of-the-step-before"),
-      over={kind: (EVERY_HOUR, *OF_UPDATES, *changes) for kind, changes in every(0.3).items()}, ways="paper")
+      over={kind: (EVERY_HOUR, *OF_UPDATES, *changes) for kind, changes in runs.every(0.3).items()}, ways="paper")
 @case("coupling-curved-uniform-growth", kind="exact",
       norm="relative error of area and mass; largest deviation of the outline from a half-disc",
       claim="Where diffusion holds the supply everywhere the midpoint rule keeps a half-disc of exactly exp-growing "
@@ -157,7 +151,7 @@ LONG = {**{kind: (runs.by("fast"), runs.of(kind), runs.coarser(kind, 0.2)) for k
       because="paper: coupling-uniform-growth")
 def uniform_growth(hours: tuple[float, ...], most: float, why: str, *changes: str):
     """Checks of a run to the last of some hours, with rows at these."""
-    scene = _everywhere(runs.base(f"{hours[-1]} h", *changes, times=", ".join(f'"{hour} h"' for hour in hours)))
+    scene = runs.supplied_everywhere(runs.base(f"{hours[-1]} h", *changes, times=hours))
     seed, instants = pore.seeded(scene).outline, runs.ours(scene)
     expected = seed.area * np.array([runs.mass_after(scene, hour) for hour in hours])
     sizes = {"area": [instant.pore.outline.area for instant in instants],
@@ -183,30 +177,22 @@ def _unround(instant, area: float) -> float:
     return float(np.abs(radius / np.sqrt(2 * area / np.pi) - 1).max())
 
 
+#: Of the length in the unit of each number.
+POWERS = {"area": 2, "upstream tip": 1, "conductivity": 1}
+
+
 @case("coupling-units", kind="property", norm="relative difference at 2 h",
       claim="A pore eight times larger or smaller, with transport to match, grows alike to the last bits: nothing has "
             "a scale of its own",
       mutants=("length-scale",), over=runs.EVERY, ways="paper")
 def units(*changes: str):
-    scene, checks = runs.base("2 h", *changes), []
-    speed = next(simulate(scene)).solved.flow.mean_velocity
-    own = runs.numbers(runs.last(_scaled(scene, 1.0, speed)))
+    scene = runs.base("2 h", *changes)
+    own = runs.numbers(runs.last(scene))
     for factor in (8.0, 0.125):
-        other = runs.numbers(runs.last(_scaled(scene, factor, speed)))
-        for quantity, power in (("area", 2), ("upstream tip", 1), ("conductivity", 2)):
-            checks.append(at_most(f"{quantity}, lengths times {factor:g}",
-                                  abs(other[quantity] / own[quantity] / factor**power - 1), 1e-14,
-                                  "powers of two are exact: even the mesher does the same"))
-    return checks
-
-
-def _scaled(scene, factor: float, speed: float):
-    """The scene with lengths times a factor, diffusivities times its square, times as they are."""
-    scene = runs.with_diffusivities(runs.at_velocity(scene, factor * speed),
-                                    lambda water, biomass: (factor**2 * water, factor**2 * biomass))
-    return replace(scene, pore=replace(scene.pore, width=factor * scene.pore.width, length=factor * scene.pore.length),
-                   aggregate=replace(scene.aggregate, radius=factor * scene.aggregate.radius),
-                   growth=replace(scene.growth, minimum_film=factor * scene.growth.minimum_film))
+        other = runs.numbers(runs.last(runs.scaled(scene, factor, 1.0)))
+        apart = {name: abs(other[name] / value / factor ** POWERS[name] - 1) for name, value in own.items()}
+        yield each_at_most(apart, 1e-14, "powers of two are exact: even the mesher does the same",
+                           f", lengths times {factor:g}")
 
 
 #: Base to 1 h in other units.
@@ -219,7 +205,7 @@ FOREIGN = ('pore.width="0.05 mm"', 'pore.length="0.06 cm"', 'aggregate.radius="5
 
 @case("coupling-foreign-units", kind="property", norm="largest difference of any node's place (um), and of C, at 1 h",
       claim="A scene written in other units is the same scene, bit for bit",
-      mutants=("rounded-twice",), over=PRESETS, ways="1 2")
+      mutants=("rounded-twice",), over=runs.NUMERICS, ways="1 2")
 def foreign_units(*changes: str):
     ours, theirs = (runs.last(runs.base(end, *changes, *units)) for end, units in (("1 h", ()), ("60 min", FOREIGN)))
     pairs = {"places": (ours.pore.mesh.points, theirs.pore.mesh.points),
@@ -230,7 +216,7 @@ def foreign_units(*changes: str):
 @case("coupling-mirror", kind="property",
       norm="difference of the tips' distances from the origin, and of C_A left and right, relative",
       claim="Without flow an aggregate grows alike to both sides",
-      mutants=("one-supply-held", "fixed-beside-the-middle"), over=every(0.5), ways="paper")
+      mutants=("one-supply-held", "fixed-beside-the-middle"), over=runs.every(0.5), ways="paper")
 def mirror(*changes: str):
     last = runs.last(runs.without_flow(runs.base("8 h", *changes)))
     outline, space = last.pore.outline, last.pore.space
@@ -247,7 +233,7 @@ def mirror(*changes: str):
       norm="relative difference between a lopsided aggregate and its mirror image, refinement 2, t = 0",
       claim="Flow from the other side meets the same resistance (Stokes flow is reversible) and, where uptake is of "
             "first order, loses as much of its substrate (reciprocity of (7), (11) and (12))",
-      mutants=("inlet-held",), over=every(0.6, 2.0), ways="paper")
+      mutants=("inlet-held",), over=runs.every(0.6, 2.0), ways="paper")
 def reversed_flow(*changes: str):
     ours, theirs = (_lopsided(sign, *changes) for sign in (1.0, -1.0))
     apart = {name: abs(ours[name] / theirs[name] - 1) for name in ours}
@@ -294,7 +280,7 @@ SLOWER = (16.0, 8.0, 4.0, 2.0)
            "with D, u and X_m over 16 to 2: steady states and growth stay, substrates are 16 to 2 times slower",
       claim="The paper's transient scheme and quasi-steady substrates make the same aggregate, up to the substrates' "
             "lag, which is as their storage",
-      mutants=("rates-two-percent-low",), over=kinds(0.4), ways="paper",
+      mutants=("rates-two-percent-low",), over=runs.kinds(0.4), ways="paper",
       because="fast, accurate: the transient scheme goes with updates")
 def quasi_steady(*changes: str):
     errors = refine(_lag, SLOWER, *changes)
@@ -323,7 +309,7 @@ def _slower(factor: float, transport_scheme: str, *changes: str):
       claim="The central mesh with (6) and (26) beyond it is worth the whole pore",
       mutants=("extent-not-subtracted", "inlet-held", "head-on-the-mesh-alone"),
       over={f"R = {radius}, {label}": (f'aggregate.radius="{radius}"', *changes)
-            for radius, labelled in (("5 um", kinds(0.6, 2.0)), ("25 um", every(0.6, 2.0)))
+            for radius, labelled in (("5 um", runs.kinds(0.6, 2.0)), ("25 um", runs.every(0.6, 2.0)))
             for label, changes in labelled.items()}, ways="paper")
 def extent(*changes: str):
     (central, near), (full, far) = (_solved(f'numerics.extent="{name}"', *changes) for name in ("central", "full"))
@@ -387,7 +373,8 @@ def order_in_time(elements: str):
       claim="With short steps the paper's shape updates and the midpoint rule come to the same, on the same triangles: "
             "the loop of updates is of first order in the step, as the geometry is frozen within it and the rates are "
             "not",
-      mutants=("midpoint-rates-of-the-start", "rates-at-the-start", "stale-flow"), over=kinds(0.3, 0.6), ways="paper",
+      mutants=("midpoint-rates-of-the-start", "rates-at-the-start", "stale-flow"), over=runs.kinds(0.3, 0.6),
+      ways="paper",
       because="fast, accurate: coupling-midpoint-order; their own tolerances would be seen")
 def limit(*changes: str):
     """Remeshes, and the orders."""
@@ -422,10 +409,8 @@ def _apart(ours: np.ndarray, theirs: np.ndarray) -> np.ndarray:
 
 def _listed(preset: str, *changes: str) -> np.ndarray:
     """(2, 8) of base at TIMES, as whole_run.NAMES lists them."""
-    times = ", ".join(f'"{time} h"' for time in TIMES)
-    _, *found = simulate(load_scene("base", (runs.by(preset), f"output.times=[{times}]", *changes)))
     rows = []
-    for instant in found:
+    for instant in runs.ours(runs.base("19.4 h", runs.by(preset), *changes, times=TIMES)):
         flow = instant.solved.flow
         outline = instant.pore.outline
         fluxes = instant.solved.fluxes

@@ -21,16 +21,15 @@ from repro.fem.space import Space
 from repro.march import updates
 from repro.model import contact, flow, growth, mesh_motion, pore, traction
 from repro.model.flow import Flow
-from verification.coupling import every
 from verification.flow import closed_forms
-from verification.kernel.case import at_least, at_most, between, case, refine, studies, study
+from verification.kernel.case import at_least, at_most, between, case, combined, each_at_most, refine, studies, study
 from verification.problems import runs
 
 FORMS = ("laplacian", "traction")
 #: Every kind of elements on the paper's mesh, and the presets on theirs.
-DEFAULT = every(1.0)
+DEFAULT = runs.every(1.0)
 #: A mesh three times finer than a cubic one of the default size takes longer than all others together.
-REMESHED = DEFAULT | {"cubic": every(0.5)["cubic"]}
+REMESHED = DEFAULT | {"cubic": runs.every(0.5)["cubic"]}
 BOTH_ENDS = "the momentum balance of the solver's own equations: round-off"
 REFINEMENTS = (1.0, 1.4, 2.0, 2.8)
 
@@ -66,8 +65,8 @@ def balance(*changes: str):
     free = mesh.loop[now.wall == FREE]
     largest = np.abs(on[free]).max()
     apart = on[free] + _by_biomass(scene, now, found)[free]
-    yield at_most("force within the fluid", np.abs(on[~rim]).max() / largest, 1e-9, BOTH_ENDS)
-    yield at_most("action and reaction", np.abs(apart).max() / largest, 1e-9, BOTH_ENDS)
+    yield each_at_most({"force within the fluid": np.abs(on[~rim]).max() / largest,
+                        "action and reaction": np.abs(apart).max() / largest}, 1e-9, BOTH_ENDS)
     if now.space.order == 1 and scene.numerics.interface == FORMS[0]:
         errors = refine(_drag_error, REFINEMENTS)
         yield study("drag", 1 / np.array(REFINEMENTS), errors["drag"], 1,
@@ -137,7 +136,7 @@ def _wall_shear(grid: Mesh, velocity: np.ndarray) -> float:
            "less 1, root mean square over random meshes of a size",
       claim="The shear that the fluid exerts on a layer of biomass is that of two viscous layers",
       mutants=("traction-pressure-left-out", "traction-transposed-gradient"),
-      over={f"order {order}": (order,) for order in (1, 2, 3)})
+      over=combined(closed_forms.ORDERS))
 def layer(order: int):
     if order > 1:
         return at_most("shear", abs(_shear(Space(closed_forms._long_layer(), order))), 1e-5,
@@ -186,7 +185,7 @@ def _tested(mesh: Mesh, line: np.ndarray, weight: np.ndarray) -> float:
       norm="base at 4, 10 and 16 h, steps of 24 min: largest move of the interface by the fluid in the next step, over "
            "the thickness",
       claim="The fluid's forces are small against those of growth (C26): they move base's interface by less than 1e-4",
-      mutants=("density-squared", "forces-thousandfold"), over=every(0.2, 0.6), ways="paper")
+      mutants=("density-squared", "forces-thousandfold"), over=runs.every(0.2, 0.6), ways="paper")
 def small_in_base(*changes: str):
     moves = [_move_in_base(hours, *changes) for hours in (4, 10, 16)]
     return (at_most("largest move", max(moves), 1e-4, "0.1 Pa of the fluid on a stiffness of 2 to 10 kPa, some times "

@@ -17,7 +17,6 @@ from verification.claims.runs import BASE, at
 from verification.kernel import writing
 from verification.switches import PLOTTED
 
-END = 19.4  # h, of base
 SUPPLY = 10.0
 
 

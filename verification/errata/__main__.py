@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import importlib
-import os
-import pkgutil
 import sys
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
 
 import verification.errata as package
 from repro.results import write_text
+from verification.claims.evaluate import import_all, side_by_side
 from verification.errata import ERRATA, filled
 
 REPORT = Path(__file__).parents[2] / "reference" / "ERRATA.md"
@@ -31,9 +28,7 @@ half a percent (E13): a smaller difference between two runs is of the order of w
 
 def load() -> list[str]:
     """Import every module of this package, which registers its errata; their ids in order."""
-    for module in pkgutil.iter_modules(package.__path__):
-        if module.name != "__main__":
-            importlib.import_module(f"{package.__name__}.{module.name}")
+    import_all(package)
     return sorted(ERRATA, key=lambda id: int(id[1:]))
 
 
@@ -44,12 +39,6 @@ def entry(id: str) -> str:
         return ERRATA[id].markdown()
 
 
-def entries(ids: list[str]) -> list[str]:
-    """Several entries, a process a core; each keeps the runs that it computes."""
-    with ProcessPoolExecutor(max_workers=os.cpu_count()) as pool:
-        return list(pool.map(entry, ids))
-
-
 def main(arguments: list[str]) -> int:
     """Entry point; returns the exit status."""
     known = load()
@@ -57,7 +46,7 @@ def main(arguments: list[str]) -> int:
     if unknown:
         print(f"errata: there is no {', '.join(unknown)}; {', '.join(known)} are accepted", file=sys.stderr)
         return 2
-    text = "\n".join(entries(arguments or known))
+    text = "\n".join(side_by_side(entry, arguments or known))
     if arguments:
         print(text)
     else:

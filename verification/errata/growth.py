@@ -10,16 +10,17 @@ from scipy.optimize import brentq
 from scipy.spatial import Delaunay
 
 from reference import neo_hookean
-from repro.errors import GrowthError
 from repro.fem import assembly, transfer
 from repro.fem.mesh import triangle_areas
 from repro.fem.mesher import generate
 from repro.fem.outline import half_disc as seed
 from repro.fem.sizing import ACROSS_AGGREGATE, Sizing
 from repro.model import growth, mesh_motion
-from verification.claims.growth_mechanics import Sliding, sliding
+from verification.claims.growth_mechanics import sliding
 from verification.claims.runs import BASE, half_disc, ledger, scene
 from verification.errata import erratum, percent, small, table
+from verification.problems import pairs
+from verification.problems.bodies import Supported, grown
 from verification.switches import CHOICES
 
 #: Elements across the radius.
@@ -33,7 +34,7 @@ class Cylinder:
     body; theta (t, 1) at the triangles' middles; position (n, 2), pressure (n,): exact.
     """
 
-    body: Sliding
+    body: Supported
     theta: np.ndarray
     position: np.ndarray
     pressure: np.ndarray
@@ -45,8 +46,8 @@ class Cylinder:
 
     def pressure_error(self, pressure: np.ndarray) -> float:
         """Relative L2 error over the grown body."""
-        weight = assembly.mass(triangle_areas(self.position, self.body.triangles))
-        error, exact = (p[self.body.triangles] for p in (pressure - self.pressure, self.pressure))
+        weight = assembly.mass(triangle_areas(self.position, self.body.cells))
+        error, exact = (p[self.body.cells] for p in (pressure - self.pressure, self.pressure))
         squares = [np.einsum("ta,tab,tb", p, weight, p) for p in (error, exact)]
         return float(np.sqrt(squares[0] / squares[1]))
 
@@ -56,7 +57,7 @@ class Cylinder:
 
 
 @cache
-def half_disc_body(rings: int) -> Sliding:
+def half_disc_body(rings: int) -> Supported:
     """A half-disc of radius 1 on its frictionless wall, its middle fixed: rings of nodes, shaken (seed 2001)."""
     at = [(k / rings, angle) for k in range(rings + 1) for angle in np.linspace(0, np.pi, 3 * k + 1)]
     R, angle = np.array(at).T
@@ -73,7 +74,7 @@ def half_disc_body(rings: int) -> Sliding:
 def cylinder(rings: int, inner: float, more: float) -> Cylinder:
     """The growing half-cylinder."""
     body, law = half_disc_body(rings), (inner, more, 1.0)
-    middle = np.linalg.norm(body.reference[body.triangles].mean(axis=1), axis=1)
+    middle = np.linalg.norm(body.reference[body.cells].mean(axis=1), axis=1)
     R = np.maximum(np.linalg.norm(body.reference, axis=1), 1e-9)
     stretch = neo_hookean.cylinder_radius(R, *law) / R
     return Cylinder(body, inner + more * middle[:, None] ** 2, stretch[:, None] * body.reference,
@@ -112,8 +113,7 @@ def stabilisation_sign() -> dict[str, str]:
 def first_step(case: Cylinder, sign: float) -> list[str]:
     """Pressures, negative eigenvalues, condition, and error of P after one Newton step from the reference."""
     body, count = case.body, len(case.pressure)
-    stabilising = sign * growth.gradient_stabilisation(body.reference, body.triangles, np.ones(len(case.theta)))
-    system = growth.System(body.body, body.held, stabilising=stabilising)
+    system = growth.System(body.body, body.held, stabilising=sign * at_start(case))
     first = system.under(case.theta, body.reference, body.reference, np.zeros(count))
     tangent = system.tangent(first.position, first.pressure)
     values = np.linalg.eigvalsh(system.sparse.matrix(tangent).toarray())
@@ -166,17 +166,17 @@ def nothing(case: Cylinder) -> np.ndarray:
 
 def at_start(case: Cylinder) -> np.ndarray:
     """All of it in the configuration of t = 0."""
-    return growth.gradient_stabilisation(case.body.reference, case.body.triangles, np.ones(len(case.theta)))
+    return growth.gradient_stabilisation(case.body.reference, case.body.cells, np.ones(len(case.theta)))
 
 
 def present(case: Cylinder) -> np.ndarray:
     """The present shape, the modulus of t = 0."""
-    return growth.gradient_stabilisation(case.position, case.body.triangles, np.ones(len(case.theta)))
+    return growth.gradient_stabilisation(case.position, case.body.cells, np.ones(len(case.theta)))
 
 
 def matched(case: Cylinder) -> np.ndarray:
     """The present shape and modulus."""
-    return growth.gradient_stabilisation(case.position, case.body.triangles, case.expansion)
+    return growth.gradient_stabilisation(case.position, case.body.cells, case.expansion)
 
 
 def equilibrium_errors(case: Cylinder, stabilising: np.ndarray) -> tuple[float, float, float]:
@@ -184,16 +184,11 @@ def equilibrium_errors(case: Cylinder, stabilising: np.ndarray) -> tuple[float, 
 
     Raises GrowthError where none is found.
     """
-    system, count = growth.System(case.body.body, case.body.held, stabilising=stabilising), len(case.pressure)
-    position, pressure = case.position, case.pressure
-    for _ in range(20):
-        now = system.under(case.theta, case.position, position, pressure)
-        if now.defect < 1e-10:
-            worst = np.abs(pressure - case.pressure).max() / np.abs(case.pressure).max()
-            return case.pressure_error(pressure), worst, case.place_error(position)
-        step = system.factored(now).solve(-now.residual)
-        position, pressure = position + step[:2 * count].reshape(2, -1).T, pressure + step[2 * count:]
-    raise GrowthError("no equilibrium near the exact one")
+    system = growth.System(case.body.body, case.body.held, stabilising=stabilising)
+    exact = growth.Equilibrium(case.position, case.pressure, 0)
+    found = growth.reach(system, case.theta, case.theta, exact, case.position)
+    worst = np.abs(found.pressure - case.pressure).max() / np.abs(case.pressure).max()
+    return case.pressure_error(found.pressure), worst, case.place_error(found.position)
 
 
 @erratum(
@@ -216,15 +211,12 @@ def equilibrium_errors(case: Cylinder, stabilising: np.ndarray) -> tuple[float, 
 def uniform_growth() -> dict[str, str]:
     """Pressure, out-of-plane stress and radius of a half-disc grown by theta, against the closed form."""
     rows, body = [], half_disc_body(10)
-    position, pressure, reached = body.reference, np.zeros(len(body.reference)), 1.0
     for theta in (2.0, 36.0, 2000.0):
-        for part in np.geomspace(reached, theta, int(np.ceil(np.log(theta / reached) / np.log(1.5))) + 1)[1:]:
-            expansion = np.full((len(body.triangles), 1), part)
-            found = growth.equilibrium(body.body, expansion, position, pressure, body.held, position)
-            position, pressure, reached = found.position, found.pressure, part
+        found = grown(body, body.constant(theta))
         exact = neo_hookean.free_growth_pressure(theta)
         across = neo_hookean.cauchy(np.sqrt(theta) * np.eye(2), exact)[0, 0] + theta ** (-5 / 3) * (1 - theta)
-        errors = np.abs(pressure / exact - 1).max(), np.linalg.norm(position, axis=1).max() / np.sqrt(theta) - 1
+        radius = np.linalg.norm(found.position, axis=1).max()
+        errors = np.abs(found.pressure / exact - 1).max(), radius / np.sqrt(theta) - 1
         rows.append([f"{theta:g}", f"{exact:.5f}", f"{across:.5f}", *map(small, errors)])
     head = ["theta", "P / mu_L", "stress across the plane / mu_L", "largest error of P", "error of the radius"]
     return {"table": table(head, rows), "kilopascal": f"{10 * neo_hookean.free_growth_pressure(2.5):.2f}"}
@@ -305,17 +297,20 @@ TRANSFER = {"linear": transfer.interpolated, "conserving": transfer.project}
 
 def chain(how: str, radius: float = 30.0, decay: float = 6.0, count: int = 40) -> tuple[np.ndarray, float]:
     """Masses (count + 1,) of a steep field through a chain of remeshes of one half-disc, and its largest value."""
-    outline, field, masses, largest, old = seed(radius, ACROSS_AGGREGATE), None, [], 0.0, ()
+    outline = seed(radius, ACROSS_AGGREGATE)
+    masses, largest = [], 0.0
+    old: tuple = ()
     for k in range(count + 1):
         refinement = 1.0 + 0.3 * (0.618 * k % 1)
         grid, _ = generate(outline, (-105.0, 105.0), Sizing(50.0, refinement, 2.0))
         points, triangles = grid.points[grid.body], grid.topology.body_cells
-        if field is None:
+        if k == 0:
             field = np.exp((np.linalg.norm(points, axis=1) - radius) / decay)[:, None]
         else:
             field = TRANSFER[how](*old, field, points, triangles)
-        old, largest = (points, triangles), max(largest, float(field.max()))
-        masses.append(float(triangle_areas(points, triangles) @ field[triangles, 0].mean(axis=1)))
+        old = points, triangles
+        largest = max(largest, float(field.max()))
+        masses.append(pairs.integral(old, field[:, 0]))
     return np.array(masses), largest
 
 

@@ -8,13 +8,11 @@ import numpy as np
 from repro.fem.assembly import saddle_system
 from repro.fem.mesh import Mesh
 from repro.fem.mesher import generate
-from repro.fem.outline import BOTTOM, TOP, Outline
 from repro.fem.space import Space
 from repro.model import flow, pore
 from verification import switches
-from verification.claims.runs import BASE, WIDE, at, grown, half_disc, history, scene, series
+from verification.claims.runs import BASE, END, WIDE, at, grown, half_disc, history, plug, scene, series
 from verification.errata import (
-    END,
     STATE_HEAD,
     consumed_ratio,
     erratum,
@@ -48,16 +46,15 @@ TRACTION = CHOICES["traction"].run
         19.2 h: velocity {velocity} m/d with traction, {deviation} against ours.""")
 def interface_forms() -> dict[str, str]:
     """Both forms around half-discs and through plugs of the pore's whole width."""
-    discs, plugs, width = (0.1, 0.3, 0.5, 0.7, 0.9), (0.25, 0.5, 1.0, 2.0), 50.0
+    width, rows = 50.0, []
     said = [scene("flow_only", f"numerics.refinement={r}") for r in (1, 2)]
-    rows = []
-    for part in discs:
+    for part in (0.1, 0.3, 0.5, 0.7, 0.9):
         grids = [half_disc(s, part * width, min(10 * part, 1.5) * width) for s in said]
         rows.append([f"half-disc, R / W = {part}", *map(interface_difference, grids)])
-    for part in plugs:
-        rows.append([f"plug, length / W = {part}", *(interface_difference(plug(s, part * width)) for s in said)])
-    fine = plug(said[1], width)
-    laplacian, traction = (losses(fine)[form] for form in ("laplacian", "traction"))
+    for part in (0.25, 0.5, 1.0, 2.0):
+        grids = [plug(s, -part * width / 2, part * width / 2) for s in said]
+        rows.append([f"plug, length / W = {part}", *map(interface_difference, grids)])
+    laplacian, traction = losses(plug(said[1], -width / 2, width / 2)).values()
     exact = flow.poiseuille_loss(600 + 1999 * width, width)
     saved = (laplacian - traction) / flow.poiseuille_loss(2000.0, width)
     return {"table": table(["", "default mesh", "twice finer"], rows), "exact": "12 nu u_ave (L + 1999 l) / (g W^2)",
@@ -76,16 +73,6 @@ def interface_difference(grid: Mesh) -> str:
     """Traction against laplacian head loss."""
     found = losses(grid)
     return percent(found["traction"] / found["laplacian"])
-
-
-def plug(said, length: float) -> Mesh:
-    """Biomass over the pore's whole width and a length (um), meshed to 1.5 W on both sides."""
-    half, width = length / 2, said.pore.width
-    points = np.array([[-half, 0.0], [half, 0.0], [half, width], [-half, width]])
-    wall = np.repeat([BOTTOM, TOP], 2)
-    outline = Outline(points, wall, np.zeros(4, bool), points)
-    ends = -half - 1.5 * width, half + 1.5 * width
-    return generate(outline, ends, pore.sized(said))[0]
 
 
 @erratum(
@@ -121,7 +108,8 @@ def outlet() -> dict[str, str]:
 
 def free_outlet(grid: Mesh) -> tuple[np.ndarray, float]:
     """Velocity and loss of unit flow in a clean channel, traction form, nothing prescribed at the outlet."""
-    space, count, topology = Space(grid, 1), len(grid.points), grid.topology
+    space, count = Space(grid, 1), len(grid.points)
+    topology = grid.topology
     held = np.zeros((count, 2), bool)
     held[topology.walls] = held[topology.inlet] = True
     viscosity = np.ones(len(grid.triangles))
@@ -191,7 +179,7 @@ def plotted_state() -> dict[str, str]:
     before = [flux.effluent for flux in grown(BASE, PLOTTED)[1].fluxes]
     rows = [["19.2 h", *state(BASE)], ["19.4 h, before the expansion", state(BASE)[0], *before],
             ["19.4 h, after it", *state(BASE, END)]]
-    told = [[name, *(f"{value:.3f}" for value in (*values, consumed_ratio(*values[1:])))] for name, *values in rows]
+    told = [[name, *map("{:.3f}".format, (*values, consumed_ratio(*values[1:])))] for name, *values in rows]
     return {"table": table([*STATE_HEAD, "acceptor / donor consumed"], told),
             "fall": f"{100 * (1 - state(BASE, END)[0] / state(BASE)[0]):.1f} %"}
 
@@ -236,14 +224,14 @@ def sensitivity() -> dict[str, str]:
 def explicit_increment() -> dict[str, str]:
     """Base with one explicit Euler increment a shape update, against ours with both steps."""
     found = course(BASE, explicit).columns
-    keys, rows = ("mean_velocity_m_per_d", "aggregate_area_um2"), []
+    rows = []
     for time in (PLOTTED, END):
-        ours, half = ([at(run, time)[key] for key in keys] for run in (BASE, HALF_STEP))
-        increment = [near(found, name, time) for name in ("velocity", "area")]
-        rows += [[f"{time:g} h", "integrated, 12 min (ours)", f"{ours[0]:.3f}", f"{ours[1]:.0f}"]]
+        ours, half, increment = ((near(columns, "velocity", time), near(columns, "area", time))
+                                 for columns in (switches.columns(BASE), switches.columns(HALF_STEP), found))
+        rows.append([f"{time:g} h", "integrated, 12 min (ours)", f"{ours[0]:.3f}", f"{ours[1]:.0f}"])
         for name, (u, area) in (("integrated, 6 min", half), ("one explicit increment, 12 min", increment)):
-            deviations = [percent(value / our, 1) for value, our in zip((u, area), ours)]
-            rows += [[f"{time:g} h", name, f"{u:.3f} ({deviations[0]})", f"{area:.0f} ({deviations[1]})"]]
+            rows.append([f"{time:g} h", name, f"{u:.3f} ({percent(u / ours[0], 1)})",
+                         f"{area:.0f} ({percent(area / ours[1], 1)})"])
     return {"table": table(["", "", "mean velocity, m/d", "area, um2"], rows)}
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from repro.model import kinetics
 from verification.claims.base_run import upstream_means
 from verification.claims.levels import CONVERGED, Level, at_level
-from verification.claims.runs import BASE, PLATES, at, grown, scene, series, solved_pore
+from verification.claims.runs import BASE, PLATES, at, grown, grown_anew, scene, series, solved_pore
 from verification.claims.scheme import PAPER_CORRECTION, bookkeeping, exceeding
 from verification.errata import (
     STATE_HEAD,
@@ -146,8 +146,8 @@ def inlet_condition() -> dict[str, str]:
         {table}""")
 def meshed_inlet() -> dict[str, str]:
     """Both substrates at the distances in question."""
-    now, solved = grown(BASE, PLOTTED)
-    rows = [[f"{d} um", *(f"{mean:.2f}" for mean in upstream_means(now, solved, float(d)))] for d in (60, 65, 75)]
+    now, solved = grown_anew(BASE, PLOTTED)
+    rows = [[f"{d} um", *map("{:.2f}".format, upstream_means(now, solved, float(d)))] for d in (60, 65, 75)]
     distance = now.boundary.upstream - now.mesh.ends[0]
     return {"table": table(["distance", "acceptor", "donor"], rows), "distance": f"{distance:.0f}"}
 

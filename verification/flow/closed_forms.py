@@ -33,6 +33,7 @@ where there is none: it stays consistent to second order. On bent triangles the 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from types import ModuleType
 
@@ -45,7 +46,7 @@ from repro.fem.sizing import Sizing
 from repro.fem.space import Space
 from repro.model import flow
 from repro.scene import Flow as Drive
-from verification.kernel.case import around, at_most, case, combined, refine, studies
+from verification.kernel.case import around, at_most, case, combined, each_at_most, refine, studies
 from verification.problems import meshes
 from verification.problems.channels import Box, box_errors
 
@@ -157,7 +158,7 @@ def channels(order: int, given: tuple[float, str]):
               "loss as work": abs(found.meshed_loss / sum(lost[:2]) - 1),
               "loss of the whole pore": abs(found.head_loss / sum(lost) - 1),
               "difference of heads": abs(heads / sum(lost[:2]) - 1)}
-    return [at_most(name, error, 1e-10, ROUND_OFF) for name, error in errors.items()]
+    return each_at_most(errors, 1e-10, ROUND_OFF)
 
 
 @cache
@@ -192,8 +193,7 @@ def layers(order: int, ratio: float, interface: str):
         yield studies(refine(_layer_errors, DRAWS, ratio, interface), STUDIED[interface])
     else:
         space = Space(_long_layer(), order)
-        for name, error in _viscous_layer(space, ratio, interface).items():
-            yield at_most(name, error, LEFT, "what is left of the layer's ends")
+        yield each_at_most(_viscous_layer(space, ratio, interface), LEFT, "what is left of the layer's ends")
 
 
 def _layer_errors(level: int, draw: int, ratio: float, interface: str) -> dict[str, float]:
@@ -222,7 +222,7 @@ def _viscous_layer(space: Space, ratio: float, interface: str) -> dict[str, floa
     return in_the_middle(space, flow.unit_flow(space, ratio, interface=interface), layered_channel, ratio)
 
 
-def middle_of(grid: Mesh, half: float = MIDDLE) -> np.ndarray:
+def middle_of(grid: Mesh, half: float) -> np.ndarray:
     """(T,) triangles with |x| < half (um)."""
     return np.abs(grid.points[grid.triangles, 0].mean(axis=1)) < half
 
@@ -357,11 +357,16 @@ def inclusion(disc: tuple, ratio: float, interface: str):
     order, kind, sizes, soft, stiff, pressure = disc
     problem = _disc_problem(ratio, interface, order)
     rows = (soft, SMEARED) if ratio < RATIO else (stiff, pressure)
-    return studies(refine(_disc_errors, sizes, problem, kind), dict(zip(("velocity", "pressure"), rows)))
+    return studies(refine(_errors, sizes, problem, _disc_grid, kind), dict(zip(("velocity", "pressure"), rows)))
+
+
+def _errors(size: float, draw: int, problem: Box, made: Callable, how) -> dict[str, float]:
+    """On one of the meshes ``made(size, draw, how)``."""
+    return box_errors(made(size, draw, how), problem)
 
 
 @cache
-def _disc_grid(size: float, draw: int, kind=meshes.disc) -> Mesh:
+def _disc_grid(size: float, draw: int, kind: Callable) -> Mesh:
     return kind(DISC_ENDS, WIDTH, size, CENTRE, DISC_RADIUS, seed=int(1000 * size) + draw)
 
 
@@ -370,10 +375,6 @@ def _disc_problem(ratio: float, interface: str, order: int) -> Box:
         return viscous_inclusion.fields(x - CENTRE[0], y - CENTRE[1], DISC_RADIUS, ratio, interface, ANGLE)
 
     return Box(ratio, interface, order, exact)
-
-
-def _disc_errors(size: float, draw: int, problem: Box, kind) -> dict[str, float]:
-    return box_errors(_disc_grid(size, draw, kind), problem)
 
 
 #: Elements of the manufactured flow, and how many meshes of each; how much triangles are bent.
@@ -412,12 +413,8 @@ MADE_BENT = {"order 2": (2, BEND, COARSE_BOX, 3e-5, 1e-3), "order 3": (3, BEND, 
 def manufactured(made: tuple, ratio: float, interface: str):
     order, bend, sizes, velocity, pressure = made
     problem = _made_problem(ratio, interface, order)
-    return studies(refine(_made_errors, sizes, bend, problem),
+    return studies(refine(_errors, sizes, problem, _box_grid, bend),
                    {"velocity": (order + 1, FULL, velocity), "pressure": (*PRESSURE[order], pressure)})
-
-
-def _made_errors(size: float, draw: int, bend: float, problem: Box) -> dict[str, float]:
-    return box_errors(_box_grid(size, draw, bend), problem)
 
 
 @cache

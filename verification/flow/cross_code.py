@@ -36,10 +36,19 @@ from reference import layered_channel, poiseuille, taylor_hood
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
 from repro.model import flow, pore
-from repro.scene import parse_scene
 from verification.flow import closed_forms, properties
 from verification.flow.closed_forms import ENDS_FIRST, FORMS, HIGHER, LAYER, RATIO, SECOND, SIZES, viscous
-from verification.kernel.case import Profile, at_least, at_most, between, case, combined, compared, refine, studies
+from verification.kernel.case import (
+    Profile,
+    at_least,
+    at_most,
+    between,
+    case,
+    combined,
+    each_at_most,
+    refine,
+    studies,
+)
 from verification.problems import meshes
 
 WIDTH = 50.0
@@ -52,6 +61,7 @@ FILM_REFINEMENTS, FILM_DRAWS = (0.9, 1.8, 3.6, 7.2), dict(enumerate((3, 3, 2, 1)
 #: Radius of the half-disc that leaves a film (um), the refinement of its curved mesh, and what is compared there.
 FILM, FILM_CURVED = 41.0, 1.6
 IN_THE_FILM = ("velocity", "pressure in the fluid", "head loss")
+CODES = "0.1 % (cross-code)"
 NORM = ("root mean square over meshes of a size: L2 of the difference over that of Taylor-Hood's field, in the region; "
         "relative difference of the head loss")
 JUMP = "1/2: the pressure jumps at the interface, a continuous one cannot"
@@ -99,13 +109,12 @@ def film(order: int, interface: str):
         space = Space(meshes.half_disc(FILM, FILM_CURVED, ENDS, WIDTH, geometry=2), order)
         found = flow.unit_flow(space, RATIO, interface=interface)
         apart = _apart(space, found, _trusted(FILM, RATIO, interface, [*DRAWS][-1]))
-        return [at_most(name, apart[name], 1e-3, "0.1 % (cross-code)") for name in IN_THE_FILM]
+        return each_at_most({name: apart[name] for name in IN_THE_FILM}, 1e-3, CODES)
     errors = refine(_level, FILM_DRAWS, FILM_REFINEMENTS, FILM, RATIO, interface)
     ratios = {name: (errors[name][1:] / errors[name][:-1]).max() for name in IN_THE_FILM}
-    return ([at_most(f"{name}, finest meshes", errors[name][-1], 1e-3, "0.1 % (cross-code)") for name in IN_THE_FILM],
-            [at_most(f"{name}, largest ratio of neighbours", ratio, 0.6,
-                     "both codes refined twofold: half is of first order, the film's elements are refined later")
-             for name, ratio in ratios.items()])
+    return (each_at_most({name: errors[name][-1] for name in IN_THE_FILM}, 1e-3, CODES, ", finest meshes"),
+            each_at_most(ratios, 0.6, "both codes refined twofold: half is of first order, the film's elements are "
+                         "refined later", ", largest ratio of neighbours"))
 
 
 @cache
@@ -144,8 +153,9 @@ def _above_the_middle(space: Space, found: flow.UnitFlow, theirs: taylor_hood.St
     line = np.abs(theirs.points[:, 0]) < 1e-6
     line = np.flatnonzero(line)[np.argsort(theirs.points[line, 1])]
     ours = meshes.field_at(space, found.velocity, theirs.points[line])
-    return compared("half-disc", "y at x = 0 (um)", "u_x / u_ave", theirs.points[line, 1], ours[:, 0],
-                    theirs.velocity[line, 0], "Taylor-Hood", "reference")
+    y = theirs.points[line, 1]
+    return Profile("half-disc", "y at x = 0 (um)", "u_x / u_ave", (
+        ("ours", "ours", y, ours[:, 0]), ("Taylor-Hood", "reference", y, theirs.velocity[line, 0])))
 
 
 #: Radius of the half-disc (um) on curved triangles, and refinements of its mesh: on coarser ones what is smooth, of
@@ -188,9 +198,8 @@ def round_half_disc(ratio: float, order: int, interface: str):
 @cache
 def _round(refinement: float) -> Mesh:
     """The mesh of a scene."""
-    tables = {"pore": {"width": f"{WIDTH} um"}, "aggregate": {"radius": f"{ROUND} um"}, "flow": {"head": "1e-3 cm"},
-              "numerics": {"preset": "accurate", "refinement": refinement}}
-    return pore.seeded(parse_scene(tables, "half disc", "half_disc.toml")).mesh
+    refined = f"numerics.refinement={refinement}"
+    return pore.seeded(properties.scene_around(ROUND, properties.ACCURATE, refined)).mesh
 
 
 @cache

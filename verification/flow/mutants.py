@@ -121,12 +121,12 @@ MUTANTS = (
          "Products of quadratic functions are integrated by a rule of degree 2.",
          "\nDEGREES = {1: 2, 2: 6, 3: 8}",
          "\nDEGREES = {1: 2, 2: 2, 3: 8}",
-         ("tests/test_space.py::test_products_of_two_functions_are_integrated_exactly[straight-2]",)),
+         "tests/test_space.py::test_products_of_two_functions_are_integrated_exactly[straight-2]"),
         ("quadrature-of-straight-triangles",
          "Products of quadratic functions are integrated beside arcs as on straight triangles.",
          "\nDEGREES = {1: 2, 2: 6, 3: 8}",
          "\nDEGREES = {1: 2, 2: 4, 3: 8}",
-         ("tests/test_space.py::test_products_of_two_functions_are_integrated_exactly[made-2]",))),
+         "tests/test_space.py::test_products_of_two_functions_are_integrated_exactly[made-2]")),
     *changes(
         "repro/fem/space.py",
         ("cubic-lower-degree",
@@ -149,5 +149,5 @@ MUTANTS = (
          "The scene's elements beside contact lines do not reach the mesher.",
          "least / across if across else inf, middle)",
          "inf, middle)",
-         ("tests/test_presets.py::test_elements_beside_contact_lines_are_as_small_as_asked[8.0]",))),
+         "tests/test_presets.py::test_elements_beside_contact_lines_are_as_small_as_asked[8.0]")),
 )

@@ -15,15 +15,15 @@ from repro.fem.assembly import saddle_blocks
 from repro.fem.mesh import Mesh
 from repro.fem.space import Space
 from repro.model import flow, pore
-from repro.scene import parse_scene
+from repro.scene import Scene, load_scene
 from verification.flow.closed_forms import ENDS, FORMS, LENGTH, ORDERS, RATIO, WIDTH, drive
-from verification.kernel.case import at_least, at_most, case, combined
-from verification.problems import meshes
+from verification.kernel.case import at_least, at_most, case, combined, each_at_most
+from verification.problems import meshes, runs
 
 #: Refinement of the meshes of each order.
 REFINED = {1: 1.0, 2: 0.5, 3: 0.4}
 #: What the elements of scenes with a preset are, with the form of [E2] that is theirs.
-PRESETS = {preset: ({"preset": preset}, "laplacian") for preset in ("paper", "fast", "accurate")}
+PRESETS = {preset: (runs.by(preset), "laplacian") for preset in runs.PRESETS}
 #: Every order with both forms, and the presets.
 EVERY = {**combined(ORDERS, FORMS), **PRESETS}
 
@@ -34,25 +34,23 @@ def _half_disc(radius: float, order: int, refinement: float, lean: float = 0.0, 
     return Space(meshes.half_disc(radius, refinement, (-reach, reach), WIDTH, geometry=min(order, 2), lean=lean), order)
 
 
-def _scene(radius: float, numerics: dict):
-    """Of a half-disc under a mean velocity."""
-    tables = {"pore": {"width": f"{WIDTH} um"}, "aggregate": {"radius": f"{radius} um"},
-              "flow": {"mean_velocity": "2.9 m/day"}, "numerics": numerics}
-    return parse_scene(tables, "half disc", "half_disc.toml")
+def scene_around(radius: float, *numerics: str) -> Scene:
+    """Flow alone, around a half-disc."""
+    return load_scene("flow_only", (f'aggregate.radius="{radius} um"', *numerics))
 
 
-def _around(radius: float, made: int | dict) -> Space:
-    """Around a half-disc: functions of an order, or as scenes with some numerics have them."""
+def _around(radius: float, made: int | str) -> Space:
+    """Around a half-disc: functions of an order, or as scenes with a preset have them."""
     if isinstance(made, int):
         return _half_disc(radius, made, REFINED[made])
-    return pore.seeded(_scene(radius, made)).space
+    return pore.seeded(scene_around(radius, made)).space
 
 
-def _leaning(made: int | dict) -> Space:
+def _leaning(made: int | str) -> Space:
     """The same around one that leans."""
     if isinstance(made, int):
         return _half_disc(25.0, made, REFINED[made], 0.6, 150.0)
-    numerics = _scene(25.0, made).numerics
+    numerics = scene_around(25.0, made).numerics
     return _half_disc(25.0, numerics.order, numerics.refinement, 0.6, 150.0)
 
 
@@ -73,7 +71,7 @@ DISCS, DROP = {40.0: 0.012, 46.0: 0.008}, 0.003
             "linear elements and for u itself of quadratic and cubic ones, the outlet included, in both forms",
       mutants=("tau-of-water", "carried-by-u-plus", "inlet-not-scaled", "curved-straight-divergence",
                "inlet-parabola"), over=EVERY)
-def sections(made: int | dict, interface: str):
+def sections(made: int | str, interface: str):
     if isinstance(made, int):
         yield _carried(_plugged(made), interface, "plug", DROP)
     for radius, drop in DISCS.items():
@@ -115,14 +113,14 @@ def flux_error(space: Space, carried: np.ndarray) -> float:
       claim="The work of the inlet is what viscosity and stabilisation dissipate, of order 2 and 3 the head loss times "
             "the flux, and the flow is linear in its drive",
       mutants=("correction-not-scaled", "loss-per-width"), over=EVERY)
-def energy(made: int | dict, interface: str):
+def energy(made: int | str, interface: str):
     space = _around(25.0, made)
     unit = flow.unit_flow(space, RATIO, interface=interface)
     work, dissipated = _power(space, unit, interface)
     driven = [flow.scaled(unit, space.mesh, LENGTH, drive(head=head)) for head in (10.0, 20.0)]
     yield at_most("work less dissipation", abs(work / dissipated - 1), 1e-9, "symmetry of the weak form, round-off")
-    yield at_most("twice the head, twice the flow", _off_twice(*driven), 1e-12, "linearity, round-off")
-    yield at_most("head given, head lost", abs(driven[0].head_loss / 10.0 - 1), 1e-12, "linearity, round-off")
+    yield each_at_most({"twice the head, twice the flow": _off_twice(*driven),
+                        "head given, head lost": abs(driven[0].head_loss / 10.0 - 1)}, 1e-12, "linearity, round-off")
     if space.order > 1:
         yield at_most("loss times flux", abs(unit.loss * WIDTH / dissipated - 1), 1e-9,
                       "the loss is the work of the inlet, round-off")
@@ -157,7 +155,7 @@ def _power(space: Space, unit: flow.UnitFlow, interface: str) -> tuple[float, fl
 @case("flow-reversed", kind="property", norm="L2 of the difference of both velocities, in the middle and everywhere",
       claim="Flow through a leaning aggregate is its mirror image's flow mirrored, since Stokes flow is reversible",
       mutants=("outlet-free",), over=EVERY)
-def reversed_flow(made: int | dict, interface: str):
+def reversed_flow(made: int | str, interface: str):
     space = _leaning(made)
     mirror = Space(_mirrored(space.mesh), space.order)
     there, back = (flow.unit_flow(way, RATIO, interface=interface).velocity for way in (space, mirror))
@@ -188,7 +186,7 @@ RATIOS = np.array([1.0, 2.0, 10.0, 100.0, 2000.0, 1e5])
 @case("flow-obstacle", kind="property", norm="head losses for six lambda, over that of the clean channel",
       claim="Viscous biomass never raises the conductivity: the loss rises with lambda, ever more slowly, and with R",
       mutants=("thin-biomass",), over=EVERY)
-def obstacle(made: int | dict, interface: str):
+def obstacle(made: int | str, interface: str):
     """Losses of four half-discs."""
     spaces = [_around(radius, made) for radius in (5.0, 25.0, 40.0, 46.0)]
     losses = np.array([flow.unit_flow(space, ratio, interface=interface).loss
@@ -202,10 +200,11 @@ def obstacle(made: int | dict, interface: str):
                      (np.diff(losses[:, 4]) / losses[1:, 4]).min(), 0.0, "nested obstacles: " + why)]
 
 
-#: What the mesh is made with, and how far the loss may be from that on sizes which are the same everywhere: half of
-#: what the presets paper and fast are for, and what accurate is for.
-SCHEMES = {"paper": ({"preset": "paper"}, 5e-3), "fast": ({"preset": "fast"}, 5e-3),
-           "accurate": ({"preset": "accurate"}, 1e-3), "cubic": ({"preset": "accurate", "elements": "cubic"}, 1e-3)}
+ACCURATE = runs.by("accurate")
+#: How far the loss may be from that on sizes which are the same everywhere: half of what the presets paper and fast are
+#: for, and what accurate is for; and what the mesh is made with.
+SCHEMES = {"paper": (5e-3, runs.by("paper")), "fast": (5e-3, runs.by("fast")), "accurate": (1e-3, ACCURATE),
+           "cubic": (1e-3, ACCURATE, runs.of("cubic"))}
 
 
 @case("flow-graded", kind="property",
@@ -213,15 +212,15 @@ SCHEMES = {"paper": ({"preset": "paper"}, 5e-3), "fast": ({"preset": "fast"}, 5e
       claim="With one element size everywhere the loss of a half-disc is that of sizes which grow with the distance "
             "from it, for more than twice the nodes, on straight triangles and on curved ones of order 2 and 3",
       mutants=("gradation-ignored", "gradation-not-passed"), over=SCHEMES, ways="1 2")
-def graded(numerics: dict[str, str], bound: float):
-    (loss, nodes), (even, many) = (_graded(numerics, gradation) for gradation in (0.25, 0.0))
+def graded(bound: float, *numerics: str):
+    (loss, nodes), (even, many) = (_graded(*numerics, f"numerics.gradation={value}") for value in (0.25, 0.0))
     return (at_most("loss", abs(loss / even - 1), bound,
                     "errors near the aggregate rule: those of the preset's elements there"),
             at_most("nodes", nodes / many, 0.5, "half"))
 
 
-def _graded(numerics: dict[str, str], gradation: float) -> tuple[float, int]:
+def _graded(*numerics: str) -> tuple[float, int]:
     """Loss of the pore and nodes of its mesh."""
-    scene = _scene(10.0, {**numerics, "gradation": gradation})
+    scene = scene_around(10.0, *numerics)
     now = pore.seeded(scene)
     return pore.solve(scene, now).flow.head_loss, len(now.mesh.points)

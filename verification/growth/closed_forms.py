@@ -22,7 +22,7 @@ import numpy as np
 from reference import neo_hookean
 from repro.fem import elements
 from repro.model import growth
-from verification.kernel.case import Check, at_most, case, refine, studies, study
+from verification.kernel.case import Check, around, at_most, case, each_at_most, refine, studies, study
 from verification.problems import bodies
 from verification.problems.bodies import Supported
 
@@ -38,7 +38,7 @@ def exactly(name: str, held: Supported, found: growth.Equilibrium, F: np.ndarray
     back, largest = found.position @ np.linalg.inv(F).T - held.reference, max(np.abs(exact).max(), abs(pressure))
     sizes = {"place": np.abs(back).max() / bodies.LENGTH,
              "pressure": np.abs(found.pressure - pressure).max() / largest, "stress": gap / largest}
-    return [at_most(f"{what}, {name}", size, 1e-9, HELD) for what, size in sizes.items()]
+    return each_at_most(sizes, 1e-9, HELD, f", {name}")
 
 
 NORM = "largest difference: places, carried back to t = 0, over the length; pressures and stresses over the largest"
@@ -182,10 +182,8 @@ def half_cylinder(top: float):
       because="order 1: growth-half-cylinder")
 def curved_half_cylinder(kind: int):
     found = refine(errors, REFINEMENTS[kind], 36.0, kind)
-    yield study("position, theta to 36", found["size"], found["place"], 3, "quadratic places: third order in L2",
-                ceiling=1e-5, band=0.4)
-    yield study("pressure, theta to 36", found["size"], found["pressure"], 2, "linear pressure: second order in L2",
-                ceiling=2e-3)
+    yield studies(found, {"place": (around(3, 0.4), "quadratic places: third order in L2", 1e-5),
+                          "pressure": (2, "linear pressure: second order in L2", 2e-3)}, ", theta to 36")
     yield at_most("outline, theta to 36", found["outline"][-1], 1e-5, "under that of positions in L2")
     far = errors(REFINEMENTS[kind][-2], 2000.0, kind)
     for name in ("outline", "place", "pressure"):
@@ -225,12 +223,11 @@ def stress():
     ours = np.moveaxis(np.array([[xx, xy, 0 * xx], [xy, yy, 0 * xx], [0 * xx, 0 * xx, zz]]), -1, 0)
     S, Q = growth.piola(F, P), _turns(len(F))
     full = S @ np.swapaxes(F, 1, 2) / np.linalg.det(F)[:, None, None]
-    size, first = np.abs(exact).max(axis=(1, 2)), np.abs(S).max(axis=(1, 2))
-    numbers = {"stress": np.abs(ours - exact).max(axis=(1, 2)) / size,
-               "symmetry": np.abs(full[:, 0, 1] - full[:, 1, 0]) / size,
-               "objectivity": np.abs(growth.piola(Q @ F, P) - Q @ S).max(axis=(1, 2)) / first,
-               "isotropy": np.abs(growth.piola(F @ Q, P) - S @ Q).max(axis=(1, 2)) / first}
-    return [at_most(name, value.max(), 1e-11, ROUND_OFF) for name, value in numbers.items()]
+    size, first = (np.abs(one).max(axis=(1, 2))[:, None, None] for one in (exact, S))
+    apart = {"stress": (ours - exact) / size, "symmetry": (full - np.swapaxes(full, 1, 2)) / size,
+             "objectivity": (growth.piola(Q @ F, P) - Q @ S) / first,
+             "isotropy": (growth.piola(F @ Q, P) - S @ Q) / first}
+    return each_at_most({name: np.abs(gap).max() for name, gap in apart.items()}, 1e-11, ROUND_OFF)
 
 
 def _near_one():
@@ -264,11 +261,17 @@ def _residual(kind: int):
     position = body.reference @ np.array([[1.1, 0.1], [0.2, 1.2]])
     pressure = random.standard_normal(body.corners)
     theta = random.uniform(1.1, 1.4, body.body.at.dx.shape)
-    system = bodies.system(body, position, theta)
-    system.under(theta, position, position, pressure)
-    move, push = 0.3 * random.standard_normal(position.shape), random.standard_normal(body.corners)
-    linear = system.sparse.product(system.tangent(position, pressure), np.concatenate([*move.T, push]))
-    return linear, lambda s: system.residual(position + s * move, pressure + s * push)
+    move = 0.3 * random.standard_normal(position.shape)
+    return _along(body, theta, position, pressure, move, random.standard_normal(body.corners))[1:]
+
+
+def _along(body: Supported, theta, place, pressure, move, push):
+    """Element tangents; the residual's slope along a direction; and itself after a step."""
+    system = bodies.system(body, place, theta)
+    system.under(theta, place, place, pressure)
+    tangents = system.tangent(place, pressure)
+    linear = system.sparse.product(tangents, np.concatenate([*move.T, push]))
+    return tangents, linear, lambda s: system.residual(place + s * move, pressure + s * push)
 
 
 @case("growth-differences", kind="property", norm="largest difference to central differences, by the step",
@@ -295,11 +298,8 @@ def curved_taylor(kind: int):
     here = grid.points @ np.array([[1.2, 0.1], [0.2, 1.1]])
     push, move = random.standard_normal(body.corners), 0.05 * random.standard_normal(here.shape)
     more, steps = random.standard_normal(body.corners), 0.25 * 0.5 ** np.arange(4)
-    system = bodies.system(body, here, theta)
-    system.under(theta, here, here, push)
-    tangents, start = system.tangent(here, push), system.residual(here, push)
-    linear = system.sparse.product(tangents, np.concatenate([*move.T, more]))
-    left = [np.abs(system.residual(here + s * move, push + s * more) - start - s * linear).max() for s in steps]
+    tangents, linear, residual = _along(body, theta, here, push, move, more)
+    left = [np.abs(residual(s) - residual(0.0) - s * linear).max() for s in steps]
     skew = np.abs(tangents - np.swapaxes(tangents, 1, 2)).max() / np.abs(tangents).max()
     return (at_most("symmetry", skew, 1e-13, ROUND_OFF),
             study("residual", steps, left, 2, "Taylor's theorem: second order", band=0.25))
@@ -344,15 +344,14 @@ def rigid(kind: int):
     forces, volume = _forces(body, place, pressure, theta)
     most = np.abs(forces).max()
     moment = np.sum(place[:, 0] * forces[:, 1] - place[:, 1] * forces[:, 0]) / np.abs(place).max()
-    checks = [at_most("resultant", np.abs(forces.sum(axis=0)).max() / most, 1e-11, KEPT_ROUND_OFF),
-              at_most("moment over the largest distance", abs(moment) / most, 1e-11, KEPT_ROUND_OFF)]
+    yield each_at_most({"resultant": np.abs(forces.sum(axis=0)).max() / most,
+                        "moment over the largest distance": abs(moment) / most}, 1e-11, KEPT_ROUND_OFF)
     for angle in (0.4, 1.9, 4.0):
         Q = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
         turned, same = _forces(body, place @ Q.T + [70.0, -30.0], pressure, theta)
-        changed = np.abs(same - volume).max() / np.abs(volume).max()
-        checks += [at_most(f"forces, {angle:g} rad", np.abs(turned - forces @ Q.T).max() / most, 1e-12, ROUND_OFF),
-                   at_most(f"volume, {angle:g} rad", changed, 1e-12, ROUND_OFF)]
-    return checks
+        yield each_at_most({"forces": np.abs(turned - forces @ Q.T).max() / most,
+                            "volume": np.abs(same - volume).max() / np.abs(volume).max()}, 1e-12, ROUND_OFF,
+                           f", {angle:g} rad")
 
 
 def _forces(body: Supported, place, pressure, theta):
@@ -395,14 +394,13 @@ def _area(body: Supported, position: np.ndarray) -> float:
 def units(kind: int):
     changes = {"in metres": 1e-6 * np.eye(2), "upright": np.array([[0.0, -1.0], [1.0, 0.0]]),
                "mirrored": np.diag([-1.0, 1.0])}
-    ours, checks = _changed(np.eye(2), kind), []
+    ours = _changed(np.eye(2), kind)
     for name, change in changes.items():
         found = _changed(change, kind)
         back = found.position @ np.linalg.inv(change).T - ours.position
         gap = np.abs(found.pressure - ours.pressure).max() / np.abs(ours.pressure).max()
-        checks += [at_most(f"place, {name}", np.abs(back).max() / bodies.RADIUS, 1e-9, KEPT_ROUND_OFF),
-                   at_most(f"pressure, {name}", gap, 1e-8, KEPT_ROUND_OFF)]
-    return checks
+        yield at_most(f"place, {name}", np.abs(back).max() / bodies.RADIUS, 1e-9, KEPT_ROUND_OFF)
+        yield at_most(f"pressure, {name}", gap, 1e-8, KEPT_ROUND_OFF)
 
 
 #: Corners and middles of a triangle in the order of its mirror image.

@@ -24,7 +24,7 @@ from reference import manufactured_growth, quadratic_growth
 from reference.quadratic_growth import Contact
 from repro.model import growth
 from verification.growth import closed_forms
-from verification.kernel.case import BAND, Check, Profile, at_most, between, case, refine, studies, study
+from verification.kernel.case import Check, Profile, around, at_most, between, case, refine, studies
 from verification.problems import bodies
 from verification.problems.bodies import Supported
 
@@ -211,8 +211,8 @@ TAYLOR_HOOD = "quadratic places: third order; linear pressure: second"
 ORDERS = {1: {"sloping": (1.5, LAYER), "flat on the rim": (1.75, UNEVEN)},
           2: {"sloping": (2, TAYLOR_HOOD), "flat on the rim": (2, TAYLOR_HOOD)}}
 #: Order of places, why, and the last errors of places and of the pressure, by kind.
-PLACES = {1: (2, "linear elements: second order"), 2: (3, TAYLOR_HOOD)}
-BANDS = {1: BAND, 2: 0.45}  # the coarsest square has five elements a side
+PLACES = {1: (2, "linear elements: second order"),
+          2: (around(3, 0.45), TAYLOR_HOOD)}  # the coarsest square has five elements a side
 CEILINGS = {1: (6e-4, 2e-2), 2: (3e-6, 4e-3)}
 
 
@@ -243,7 +243,6 @@ def manufactured(kind: int):
     geometry = min(kind, 2)
     for name, (order, why) in ORDERS[geometry].items():
         exact = manufactured_growth.growth(name)
-        found, (place, pressure) = refine(_errors, SIZES[geometry], kind, exact), CEILINGS[geometry]
-        yield study(f"place, {name}", found["size"], found["place"], *PLACES[geometry], ceiling=place,
-                    band=BANDS[geometry])
-        yield study(f"pressure, {name}", found["size"], found["pressure"], order, why, ceiling=pressure)
+        place, pressure = CEILINGS[geometry]
+        yield studies(refine(_errors, SIZES[geometry], kind, exact),
+                      {"place": (*PLACES[geometry], place), "pressure": (order, why, pressure)}, f", {name}")

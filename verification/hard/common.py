@@ -30,10 +30,8 @@ from repro.results import row
 from repro.scene import Kinetics, Scene, load_scene
 from repro.scene.units import SceneError
 from verification.kernel.case import Check, Line, Note, at_least, at_most, between, case
+from verification.problems.runs import NUMERICS, worth
 
-#: The presets, and fast with cubic elements: [numerics] of each.
-NUMERICS = {"paper": {"preset": "paper"}, "fast": {"preset": "fast"}, "accurate": {"preset": "accurate"},
-            "cubic": {"preset": "fast", "elements": "cubic"}}
 PRESETS = tuple(NUMERICS)
 #: With the paper's scheme any part may be refused.
 LENIENT = ("paper",)
@@ -70,6 +68,10 @@ class Run:
         """The last row."""
         return self.rows[-1]
 
+    def column(self, name: str) -> np.ndarray:
+        """(rows,) of one name."""
+        return np.array([row[name] for row in self.rows])
+
 
 @dataclass(frozen=True)
 class HardCase:
@@ -100,7 +102,7 @@ class HardCase:
 
 def scene(name: str, preset: str, *changes: str) -> Scene:
     """A packaged scene with a preset and other changes (KEY=VALUE)."""
-    return load_scene(name, (*(f"numerics.{key}={value}" for key, value in NUMERICS[preset].items()), *changes))
+    return load_scene(name, (*NUMERICS[preset], *changes))
 
 
 def ran(made: Scene, way: Callable[[Scene], Iterator[Instant]] = simulate, **how) -> Run:
@@ -191,9 +193,8 @@ def _balances(found: Run) -> list[Check]:
     most, origin = found.balance, "the flux is as much smaller than what diffuses"
     if found.balance == BALANCE:
         most, origin = max(BALANCE, 1e-12 * found.last["nodes"] / _slow(found)), NEWTON
-    missing = {name: max(abs(line[f"{name}_balance"]) for line in found.rows) for name in ("acceptor", "donor")}
-    return [at_most(f"{name} in - out - consumed, over the larger", value, most, origin)
-            for name, value in missing.items()]
+    return [at_most(f"{name} in - out - consumed, over the larger", np.abs(found.column(f"{name}_balance")).max(), most,
+                    origin) for name in ("acceptor", "donor")]
 
 
 def _slow(found: Run) -> float:
@@ -217,17 +218,16 @@ def _bounds(found: Run) -> list[Check]:
 
 
 def _biomass(found: Run) -> list[Check]:
-    low = min(line["biomass_density_min"] for line in found.rows)
-    high = max(line["biomass_density_max"] for line in found.rows)
-    inert = [line["inert_fraction"] for line in found.rows]
-    checks = [between("local density over X_m, least", low, 1 - found.density, 1 + found.density, DENSITY),
-              between("local density over X_m, largest", high, 1 - found.density, 1 + found.density, DENSITY),
-              between("share of X_I", max(inert, key=abs), -1e-12, 1.0, "a share")]
+    densities = {"least": found.column("biomass_density_min").min(),
+                 "largest": found.column("biomass_density_max").max()}
+    checks = [between(f"local density over X_m, {which}", density, 1 - found.density, 1 + found.density, DENSITY)
+              for which, density in densities.items()]
+    checks.append(between("share of X_I", max(found.column("inert_fraction"), key=abs), -1e-12, 1.0, "a share"))
     if found.scene.growth:
         whole = found.scene.kinetics.maximum_density
         apart = max(abs(i.pore.mass / whole / i.pore.outline.area - 1) for i in found.instants)
-        missing = max(abs(line["biomass_balance"]) for line in found.rows)
-        checks += [at_most("biomass after - before - made, over after", missing, BALANCE, MEAN),
+        checks += [at_most("biomass after - before - made, over after", np.abs(found.column("biomass_balance")).max(),
+                           BALANCE, MEAN),
                    at_most("area against biomass over X_m", apart, AREA[found.scene.numerics.elements], MEAN)]
         checks += _oxygen_demand(found) if found.scene.numerics.time == "midpoint" else []
     return checks
@@ -243,9 +243,8 @@ def _oxygen_demand(found: Run) -> list[Check]:
 
 
 def _unaccounted(law: Kinetics, ledger: Ledger) -> float:
-    acceptor, donor = ledger.consumed
-    decayed = (acceptor - law.acceptor_to_donor_ratio * donor) / law.decay_oxygen_demand
-    return abs(ledger.biomass_made - law.yield_coefficient * donor + decayed) / ledger.biomass_after
+    grown, decayed = worth(law, ledger)
+    return abs(ledger.biomass_made - grown + decayed) / ledger.biomass_after
 
 
 MEAN = "J = theta in the mean; Newton's tolerance"
@@ -275,7 +274,9 @@ def solved_in(made: Scene, now: Pore) -> tuple[Pore, Solved]:
 
 #: CPU seconds that a part may take: ten times what the longest does.
 LIMIT = 200.0
-RIGHT, REFUSED, WRONG = "right", "refused", "wrong"
+RIGHT = "right"
+REFUSED = "refused"
+WRONG = "wrong"
 #: A refusal must say one of these: what to try, or which bound was met.
 REASON = re.compile(r"\b(try|leave|needed|under|above|more than|accepted|outside of)\b")
 
@@ -322,15 +323,17 @@ class Cell(Note):
     def lines(self, every: Sequence[Cell]) -> list[Line]:
         """Verdicts of the parts by preset; then what the right parts were judged by, by preset where that differs."""
         presets = ", ".join(cell.preset for cell in every)
-        found = [(f"verdict of {parts[0].name}", ", ".join(part.verdict for part in parts), presets,
-                  not any(part in cell.unaccepted for cell, part in zip(every, parts)))
-                 for parts in zip(*(cell.parts for cell in every))]
+        found = []
+        for parts in zip(*(cell.parts for cell in every)):
+            fine = all(self.case.accepts(part, cell.preset) for cell, part in zip(every, parts))
+            found.append((f"verdict of {parts[0].name}", ", ".join(part.verdict for part in parts), presets, fine))
         bounds: dict[str, list[Check]] = {}
         for part in (part for cell in every for part in cell.parts if part.verdict == RIGHT):
             for check in part.checks:
                 bounds.setdefault(f"{part.name}, {check.quantity}", []).append(check)
-        return found + [(name, _each(check.accepted for check in of), _each(check.origin for check in of), True)
-                        for name, of in bounds.items()]
+        for name, of in bounds.items():
+            found.append((name, _each(check.accepted for check in of), _each(check.origin for check in of), True))
+        return found
 
 
 def _each(words: Iterable[str]) -> str:

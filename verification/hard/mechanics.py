@@ -118,7 +118,10 @@ def _contact_length(found: Run) -> float:
 
 def contact_rests(found: Run) -> list[Check]:
     """What holds at every instant of a run through contact."""
-    width, film, open_nodes, crossed = found.scene.pore.width, found.scene.growth.minimum_film, 0, 0
+    width = found.scene.pore.width
+    film = found.scene.growth.minimum_film
+    open_nodes = 0
+    crossed = 0
     before = [width - i.pore.outline.thickness for i in found.instants if not i.pore.contact]
     for instant in found.instants:
         shape = instant.pore.outline
@@ -144,7 +147,9 @@ LEAST = 16.7
 
 def wedge(angle: float, geometry: int) -> Outline:
     """A plug 20 um high, whose sides leave the upper wall at an angle (degrees) in the fluid."""
-    height, half, side = 20.0, 30.0, np.linspace(0, 1, 13)[1:-1]
+    height = 20.0
+    half = 30.0
+    side = np.linspace(0, 1, 13)[1:-1]
     reach = height / np.tan(np.deg2rad(angle))
     bottom, top = np.linspace(-half - reach, half + reach, 17), np.linspace(half, -half, 9)
     right = np.column_stack([half + reach * (1 - side), height * side])
@@ -225,13 +230,13 @@ def to_the_end(preset: str) -> list:
     changes = ('pore.width="30 um"', 'pore.length="90 um"', 'aggregate.radius="25 um"', 'growth.end="60 h"')
     found = common.run("wide", preset, *changes, density=CLOSING)
     ends = np.array([i.pore.mesh.ends for i in found.instants])
-    tips = np.array([[line["upstream_um"], line["downstream_um"]] for line in found.rows])
-    beyond = max(0.0, (-45 - tips[:, 0]).max(), (tips[:, 1] - 45).max())
+    upstream, downstream = found.column("upstream_um"), found.column("downstream_um")
+    beyond = max(0.0, (-45 - upstream).max(), (downstream - 45).max())
     return [found, at_most("runs that did not say that the pore's end is reached", not found.ended, 0, "PoreEnd"),
             at_most("um of mesh or aggregate beyond the pore", max(beyond, np.abs(ends).max() - 45), 0, "3.1: capped"),
             at_most("um of pore left without mesh", 45 - np.abs(ends[-1]).min(), 0, "1.5 W is past both ends"),
-            at_most("um between the aggregate and the end, at the end", 45 - np.abs(tips[-1]).max(), 30 / 14,
-                    "an element of W / 14")]
+            at_most("um between the aggregate and the end, at the end", 45 - max(-upstream[-1], downstream[-1]),
+                    30 / 14, "an element of W / 14")]
 
 
 END = HardCase(
@@ -266,7 +271,9 @@ UPDATE = {1: 1.25, 2: np.inf}
 def grown(preset: str, theta: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> Grown:
     """A half-disc of 20 um on a wall under theta(X, Y); on straight triangles the mean of their corners."""
     now = pore.seeded(common.scene("wide", preset, f'aggregate.radius="{RADIUS} um"'))
-    rim, shape, body = now.mesh.topology.body_loop, now.outline, now.body
+    rim = now.mesh.topology.body_loop
+    shape = now.outline
+    body = now.body
     held = Supported(body, constrained(len(body.reference), rim, shape.wall, shape.fixed))
     whole = theta(*body.reference.T)[held.cells] @ body.shape.table.values.T
     found = bodies.grown(held, whole, factor=UPDATE[held.geometry])
@@ -350,9 +357,7 @@ def still_water(preset: str, *changes: str) -> Run:
     """A run in which diffusion holds the supply everywhere; what enters is then a small difference of large fluxes, and
     its balance says nothing."""
     made = common.scene("wide", preset, 'aggregate.radius="20 um"', *changes)
-    quick = {name: replace(getattr(made.substrates, name), diffusivity=1e13, diffusivity_in_aggregate=1e13)
-             for name in ("acceptor", "donor")}
-    return common.ran(replace(made, flow=None, substrates=replace(made.substrates, **quick)), balance=None)
+    return common.ran(runs.supplied_everywhere(made), balance=None)
 
 
 def _half_disc(found: Run) -> list[Check]:
@@ -402,7 +407,7 @@ def decay(preset: str) -> list:
         wanted = seed * (0.2 + 0.8 * np.exp(-law.decay_coefficient * m * line["time_h"]))
         checks.append(at_most(f"area over 0.2 + 0.8 exp(-b m_A t) at {line['time_h']:g} h, less one",
                               abs(line["aggregate_area_um2"] / wanted - 1), 1e-6, "C to 1e-7 of the supply"))
-    least = min(line["aggregate_area_um2"] for line in found.rows) / seed
+    least = found.column("aggregate_area_um2").min() / seed
     return [found, *checks, at_least("least area over that of the seed", least, 0.2, "1 - f_d is never degraded")]
 
 
@@ -411,7 +416,7 @@ def starving(preset: str) -> list:
     found = common.run("wide", preset, 'aggregate.radius="20 um"', 'substrates.donor.supply="0 mg/L"',
                        'growth.end="200 h"', 'growth.time_step="20 h"', 'output.times=["100 h", "200 h"]')
     law, K = found.scene.kinetics, found.scene.substrates.acceptor.half_saturation
-    least, supply = min(line["acceptor_min_mg_per_L"] for line in found.rows), found.scene.substrates.acceptor.supply
+    least, supply = found.column("acceptor_min_mg_per_L").min(), found.scene.substrates.acceptor.supply
     low, high = (0.2 + 0.8 * np.exp(-law.decay_coefficient * 200 * c / (c + K)) for c in (supply, least))
     area = found.last["aggregate_area_um2"] / found.rows[0]["aggregate_area_um2"]
     return [found, between("area over that of the seed", area, low * (1 - 1e-6), high * (1 + 1e-6),

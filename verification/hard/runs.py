@@ -5,8 +5,7 @@ Hard cases of runs: tiny and large seeds, huge and tiny units, 1e5 nodes, parame
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import replace
 from functools import cache, partial
 
 import numpy as np
@@ -164,7 +163,9 @@ def poor(preset: str) -> list:
 
 def _spoilt(now: Pore) -> tuple[Pore, int]:
     """The pore with the fluid's inner nodes moved about as far as no triangle turns over, and its poor triangles."""
-    random, topology, straight = np.random.default_rng(9), now.mesh.topology, now.mesh.straight
+    random = np.random.default_rng(9)
+    topology = now.mesh.topology
+    straight = now.mesh.straight
     keep = np.concatenate([straight.body, topology.walls, topology.inlet, topology.outlet])
     inner = np.setdiff1d(np.arange(now.mesh.corners), keep)
     push = random.uniform(-1, 1, (len(inner), 2)) * np.sqrt(Space(straight, 1).lumped()[inner])[:, None]
@@ -194,13 +195,6 @@ POOR_MESH = HardCase(
 MESHES = (REMESHES, COCIRCULAR, POOR_MESH)
 
 
-#: Powers of length and time in the unit of each key that has one.
-POWERS = {
-    "width": (1, 0), "length": (1, 0), "radius": (1, 0), "head": (1, 0), "mean_velocity": (1, -1),
-    "kinematic_viscosity": (2, -1), "gravity": (1, -2), "diffusivity": (2, -1), "diffusivity_in_aggregate": (2, -1),
-    "maximum_utilization_rate": (0, -1), "decay_coefficient": (0, -1), "end": (0, 1), "time_step": (0, 1),
-    "minimum_film": (1, 0),
-}
 #: Powers of the columns that have a unit of length or time.
 COLUMNS = {
     "time_h": (0, 1), "mean_velocity_m_per_d": (1, -1), "head_loss_cm": (1, 0), "conductivity_m_per_d": (1, -1),
@@ -210,26 +204,11 @@ COLUMNS = {
 SAME = ("effluent_acceptor_mg_per_L", "effluent_donor_mg_per_L", "acceptor_min_mg_per_L", "inert_fraction")
 
 
-def scaled(section, length: float, time: float):
-    """A scene, or a section of it, with its unit of length and of time so many times larger."""
-    changes = {}
-    for key in fields(section):
-        value = getattr(section, key.name)
-        if is_dataclass(value):
-            changes[key.name] = scaled(value, length, time)
-        elif key.name == "times" and value:
-            changes[key.name] = tuple(time * t for t in value)
-        elif key.name in POWERS and value is not None:
-            along, during = POWERS[key.name]
-            changes[key.name] = value * length**along * time**during
-    return replace(section, **changes)
-
-
 def units(preset: str, length: float, time: float) -> list:
     """Base from 15 um for 2.4 h, in other units."""
     made = common.scene("base", preset, 'aggregate.radius="15 um"', 'growth.end="2.4 h"', 'growth.time_step="1.2 h"',
                         'output.times=["2.4 h"]')
-    there = parse_scene(scene_tables(scaled(made, length, time)), "scaled", "scaled")
+    there = parse_scene(scene_tables(problems.scaled(made, length, time)), "scaled", "scaled")
     plain, other = common.ran(made), common.ran(there)
     exact = np.log2(length) % 1 == 0
     bound, origin = (1e-9, "dimensions; round-off") if exact else (
@@ -252,9 +231,9 @@ UNITS = HardCase(
     refusable=tuple(SCALES),
     mutants=("length-scale",))
 
-#: What is drawn: key of the scene, its unit, and its physical range; all but the radius by its logarithm.
+#: What is drawn: key of the scene, its unit, and its physical range; that of the radius over the width.
 RANGES = {
-    "pore.width": ("um", 20.0, 200.0), "aggregate.radius": ("of the width", 0.04, 0.8),
+    "pore.width": ("um", 20.0, 200.0), "aggregate.radius": ("um", 0.04, 0.8),
     "flow.mean_velocity": ("m/day", 0.03, 30.0), "flow.viscosity_ratio": ("", 1.0, 1e5),
     "substrates.acceptor.supply": ("mg/L", 0.1, 50.0), "substrates.donor.supply": ("mg/L", 0.1, 50.0),
     "substrates.acceptor.half_saturation": ("mg/L", 0.05, 10.0),
@@ -265,31 +244,14 @@ RANGES = {
 }
 
 
-def drawn(shares: Mapping[str, float], preset: str) -> Scene:
-    """The scene whose values lie so far (0 to 1) between the ends of their ranges, by their logarithms."""
-    tables: dict = {"numerics": dict(common.NUMERICS[preset])}
-    value = {key: low * (high / low) ** shares[key] for key, (_, low, high) in RANGES.items()}
+def at_random(preset: str, seed: int) -> list[Run]:
+    """One draw: values that lie so far between the ends of their ranges, by their logarithms."""
+    random, changes = np.random.default_rng(seed), []
+    value = {key: low * (high / low) ** random.uniform() for key, (_, low, high) in RANGES.items()}
     value["aggregate.radius"] *= value["pore.width"]
     for key, (unit, _, _) in RANGES.items():
-        *path, name = key.split(".")
-        table = tables
-        for part in path:
-            table = table.setdefault(part, {})
-        unit = "um" if key == "aggregate.radius" else unit
-        table[name] = f"{value[key]!r} {unit}" if unit else value[key]
-    tables["output"] = {"times": [f"{value['growth.end']!r} h"]}
-    return parse_scene(tables, "drawn", "drawn")
-
-
-def at_random(preset: str, seed: int) -> list:
-    """One draw."""
-    random = np.random.default_rng(seed)
-    return [run_drawn({key: random.uniform() for key in RANGES}, preset)]
-
-
-def run_drawn(shares: Mapping[str, float], preset: str) -> Run:
-    """Run the scene of :func:`drawn`."""
-    return common.ran(drawn(shares, preset), density=CLOSING)
+        changes.append(f'{key}="{value[key]!r} {unit}"' if unit else f"{key}={value[key]!r}")
+    return [common.run("wide", preset, *changes, f'output.times=["{value["growth.end"]!r} h"]', density=CLOSING)]
 
 
 DRAWS = range(10)

@@ -19,7 +19,7 @@ from repro.results import M_PER_D
 from verification.hard import common
 from verification.hard.common import DRIVE, EFFLUENTS, FIXED, SHAPE, TOLERANCE, HardCase, Run
 from verification.kernel.case import Check, at_least, at_most, between
-from verification.problems import meshes, runs
+from verification.problems import channels, meshes, runs
 
 BOTH = ("acceptor", "donor")
 
@@ -91,8 +91,7 @@ def _stoichiometry(found: Run) -> list[Check]:
     """(7) less F times (8) is what decay takes, d_c f_d b X m_A, whatever the concentrations."""
     law, both = found.scene.kinetics, found.scene.substrates
     acceptor, donor = (flux.consumed for flux in found.instants[-1].solved.fluxes)
-    decay = law.decay_oxygen_demand * law.degradable_fraction * law.decay_coefficient * law.maximum_density
-    decay *= found.last["aggregate_area_um2"]
+    decay = channels.decay_demand(law) * law.maximum_density * found.last["aggregate_area_um2"]
     C = found.instants[-1].solved.concentrations.acceptor
     ends = np.array([max(C.min(), 0.0), C.max()])
     m = ends / (ends + both.acceptor.half_saturation)
@@ -118,7 +117,9 @@ def front(preset: str, radius: float, more: tuple[str, ...] = ()) -> list:
 
 
 #: Half thickness and films of the slab, um; its penetration depth over the half thickness.
-HALF, FILM, DEPTH = 40.0, 20.0, 0.6
+HALF = 40.0
+FILM = 20.0
+DEPTH = 0.6
 
 
 def slab_front(preset: str) -> list:
@@ -170,8 +171,7 @@ def saturated(preset: str) -> list:
 def exponential(found: Run) -> list[Check]:
     """Biomass over that at the start against (9)-(10) at the supply, and at the least concentrations of the run."""
     time = found.last["time_h"]
-    least, _ = runs.growth_rates(found.scene, *(min(line[f"{name}_min_mg_per_L"] for line in found.rows)
-                                                for name in BOTH))
+    least, _ = runs.growth_rates(found.scene, *(found.column(f"{name}_min_mg_per_L").min() for name in BOTH))
     most = runs.mass_after(found.scene, time)
     grown = found.last["aggregate_area_um2"] / found.rows[0]["aggregate_area_um2"]
     return [between("area over that of the seed", grown, np.exp(least * time), most,
@@ -264,7 +264,7 @@ TRICKLES = {"1e-4": 1e-8, "1e-6": 1e-6, "1e-12": 1e-6}
 def _used_up(found: Run) -> list[Check]:
     """With C_A -> 0 and C_D uniform, (7) and (8) are taken up in the ratio F + d_c f_d b / (k m_D), which gives C_D."""
     law, both = found.scene.kinetics, found.scene.substrates
-    decay = law.decay_oxygen_demand * law.degradable_fraction * law.decay_coefficient
+    decay = channels.decay_demand(law)
     K, supply = both.donor.half_saturation, both.donor.supply
 
     def missing(c):
@@ -325,7 +325,9 @@ def _inside(found: Run) -> np.ndarray:
     return np.setdiff1d(grid.body, grid.loop)
 
 
-WIDTH, ENDS, PLUG = 50.0, (-60.0, 70.0), 20.0
+WIDTH = 50.0
+ENDS = (-60.0, 70.0)
+PLUG = 20.0
 SECTIONS = np.array([-55.0, -30.0, -21.0, -19.0, -10.0, 0.0, 7.0, 19.0, 21.0, 40.0, 65.0])
 
 

@@ -117,6 +117,11 @@ def between(quantity: str, value: float, low: float, high: float, origin: str) -
     return Check(quantity, float(value), low, high, origin)
 
 
+def each_at_most(values: Mapping[str, float], bound: float, origin: str, told: str = "") -> list[Check]:
+    """Sizes by name that have one bound; told: what ends their names."""
+    return [at_most(name + told, value, bound, origin) for name, value in values.items()]
+
+
 def rounded(value: float, quantum: float) -> str:
     """The value to the power of ten at or under ``quantum``; a size that vanishes there is told as "under" it."""
     if not isfinite(value) or quantum <= 0:
@@ -226,12 +231,17 @@ def refine(measure: Callable[..., dict[str, float]], sizes: Iterable[float] | Ma
         rows = [{"size": size, **_averaged(measure, size, count, given)} for size, count in sizes.items()]
     else:
         rows = [measure(size, *given) for size in sizes]
-    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    return columns(rows)
+
+
+def columns(rows: Sequence[Mapping[str, float]]) -> dict[str, np.ndarray]:
+    """{name: (k,)} of rows {name: number}, all of the same names."""
+    return dict(zip(rows[0], np.array([[*row.values()] for row in rows]).T))
 
 
 def _averaged(measure: Callable, size: float, count: int, given: tuple) -> dict[str, float]:
     found = [measure(size, number, *given) for number in range(count)]
-    return {name: float(np.sqrt(np.mean([one[name] ** 2 for one in found]))) for name in found[0]}
+    return {name: float(np.sqrt(np.mean(values**2))) for name, values in columns(found).items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,12 +256,6 @@ class Profile:
     def labelled(self, label: str) -> Profile:
         """The same picture of one variant of its case."""
         return replace(self, title=f"{self.title}, {label}")
-
-
-def compared(title: str, x_label: str, y_label: str, x, ours, theirs, name: str = "exact",
-             kind: str = "exact") -> Profile:
-    """A picture of ours and of what it should be, which has a name and a kind."""
-    return Profile(title, x_label, y_label, (("ours", "ours", x, ours), (name, kind, x, theirs)))
 
 
 Line = tuple[str, str, str, bool]
@@ -302,7 +306,11 @@ def outcome(found: Outcome | Iterable) -> Outcome:
     if isinstance(found, Outcome):
         return found
     parts = tuple(_flat(found))
-    return Outcome(*(tuple(part for part in parts if isinstance(part, kind)) for kind in (Check, Study, Profile, Note)))
+    return Outcome(*(_of(kind, parts) for kind in (Check, Study, Profile, Note)))
+
+
+def _of(kind: type, parts: tuple) -> tuple:
+    return tuple(part for part in parts if isinstance(part, kind))
 
 
 def _flat(found) -> Iterator:
@@ -365,7 +373,7 @@ CASES: dict[str, Case] = {}
 
 def combined(*axes: Mapping[str, object]) -> dict[str, tuple]:
     """{label: arguments} of every combination of some axes {label: argument}: what a case may run ``over``."""
-    rows = [list(zip(*chosen)) for chosen in product(*(axis.items() for axis in axes))]
+    rows = [zip(*chosen) for chosen in product(*map(dict.items, axes))]
     return {", ".join(labels): arguments for labels, arguments in rows}
 
 
@@ -395,7 +403,9 @@ def _ways(id: str, variants: Iterable[str], more: str) -> tuple[str, ...]:
 
 def run(chosen: Case) -> Result:
     """Run every variant of a case, whether others stop or not; floating-point errors raise."""
-    start, found, errors = perf_counter(), [], []
+    start = perf_counter()
+    found = []
+    errors = []
     for label, arguments in (chosen.over or {"": ()}).items():
         try:
             with np.errstate(all="raise", under="ignore"):

@@ -13,6 +13,7 @@ import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
+from itertools import product, starmap
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 
@@ -54,7 +55,7 @@ def parts() -> tuple[Part, ...]:
 def _part(name: str, equations: str, names: str) -> Part:
     first, *rest = names.split(", ")
     package = first if _file(first).endswith("/") else first.rpartition(".")[0]
-    files = tuple(_file(module) for module in (first, *(package + module for module in rest)))
+    files = _file(first), *(_file(package + module) for module in rest)
     places = (SECTIONS.match(name) or [""])[0].split(", ")
     sections = tuple(section for place in places for section in _ranged(place) if section)
     return Part(" ".join(name.split()), sections, equations.strip(" ,"), files)
@@ -130,7 +131,7 @@ def cases_of(part: Part) -> list[str]:
 def claims_of(part: Part) -> list[str]:
     """Ids of the claims of its sections; figures, plates and discussion are of the results."""
     return [id for id, sections in sorted(claims().items())
-            if any(_within(section, own) for section in sections for own in part.sections)]
+            if any(starmap(_within, product(sections, part.sections)))]
 
 
 def _within(section: str, own: str) -> bool:
@@ -142,12 +143,12 @@ def claims() -> dict[str, list[str]]:
     """{claim: sections that it is of}."""
     from verification.claims import CLAIMS, evaluate
     evaluate.register_all()
-    return {claim.id: [_section(place.strip()) for place in claim.where.split(",")] for claim in CLAIMS.values()}
+    return {claim.id: [*map(_section, claim.where.split(","))] for claim in CLAIMS.values()}
 
 
 def _section(place: str) -> str:
     """A section's number; 4 for a figure, a plate, the introduction and the discussion."""
-    return place if re.fullmatch(r"[23][\d.]*|Table 1", place) else "4"
+    return place.strip() if re.fullmatch(r"[23][\d.]*|Table 1", place.strip()) else "4"
 
 
 def references_of(case: Case) -> set[str]:

@@ -103,7 +103,7 @@ class Mutant:
 
 def changes(file: str, *rows: tuple) -> tuple[Mutant, ...]:
     """Mutants of one file, a row each: id, what is wrong then, the old text, the new one, and tests that catch it."""
-    return tuple(Mutant(id, file, *rest) for id, *rest in rows)
+    return tuple(Mutant(id, file, says, old, new, tuple(tests)) for id, says, old, new, *tests in rows)
 
 
 class MutantError(RuntimeError):
@@ -132,26 +132,31 @@ class Hunt:
         return tuple(trial.case for trial in self.trials if trial.caught)
 
     @property
+    def told(self) -> dict[str, str]:
+        """How each case or test caught it, or why it did not."""
+        return {trial.case: trial.how for trial in self.trials}
+
+    @property
     def missed_by(self) -> tuple[str, ...]:
         """Ids of the cases that name this mutant and pass with it, and of the tests that it names and that do."""
         return tuple(t.case for t in self.trials
                      if not t.caught and (t.case not in CASES or self.mutant in CASES[t.case].mutants))
 
 
-def load() -> dict[str, dict[str, Mutant]]:
-    """Mutants by id, by stage. Raises MutantError where an id is used twice."""
+def load() -> dict[str, tuple[Mutant, ...]]:
+    """Mutants by stage. Raises MutantError where an id is used twice."""
     modules = {**{stage: f"verification.{stage}.mutants" for stage in STAGES}, RESULTS: "verification.mutants"}
     found = {stage: import_module(module).MUTANTS for stage, module in modules.items()}
     ids = [mutant.id for mutants in found.values() for mutant in mutants]
     twice = {id for id in ids if ids.count(id) > 1}
     if twice:
         raise MutantError(f"used twice: {', '.join(sorted(twice))}")
-    return {stage: {mutant.id: mutant for mutant in mutants} for stage, mutants in found.items()}
+    return found
 
 
 def everything() -> dict[str, Mutant]:
     """Mutants of all stages by id."""
-    return {id: mutant for mutants in load().values() for id, mutant in mutants.items()}
+    return {mutant.id: mutant for mutants in load().values() for mutant in mutants}
 
 
 def of(catchers: str) -> dict[str, Mutant]:
@@ -316,7 +321,7 @@ def record(hunts: list[Hunt]) -> None:
     before = _read()
     new = {id: caught.get(id, before["caught"].get(id, [])) for id in everything()}
     codes = {**before["code"], **{catchers: code(catchers) for catchers in whole}}
-    how = {found.mutant: {trial.case: trial.how for trial in found.trials} for found in hunts}
+    how = {found.mutant: found.told for found in hunts}
     writing.save({"code": codes, "caught": new}, RECORD)
     writing.save(how, RECORD.parent / "live" / RECORD.name)
 
@@ -338,11 +343,11 @@ def code(catchers: str) -> str:
     digest = hashlib.sha256()
     if catchers == "tests":
         named = {ROOT / test.partition("::")[0] for mutant in of("tests").values() for test in mutant.tests}
-        found, known = reached(named), (ROOT / "repro", ROOT / "tests")
+        found, known = reached(named), {ROOT / "repro", ROOT / "tests"}
     else:
         cases = [ROOT / "reference", *(ROOT / "verification" / stage for stage in STAGES)]
-        found, known = reached(_files(cases)), (ROOT / "repro", ROOT / "verification" / "problems", *cases)
-    for path in sorted(path for path in found if any(folder in path.parents for folder in known)):
+        found, known = reached(_files(cases)), {ROOT / "repro", ROOT / "verification" / "problems", *cases}
+    for path in sorted(path for path in found if not known.isdisjoint(path.parents)):
         digest.update(path.relative_to(ROOT).as_posix().encode() + path.read_bytes())
     return digest.hexdigest()[:16]
 

@@ -54,8 +54,8 @@ def terminal(results: list[Result]) -> str:
 
 def summary(results: list[Result]) -> str:
     """How many hold, in one line."""
-    held, numbers = sum(r.holds for r in results), sum(len(r.outcome.measured) for r in results)
-    return f"{held} of {len(results)} cases pass; {numbers} numbers judged."
+    numbers = sum(len(result.outcome.measured) for result in results)
+    return f"{sum(result.holds for result in results)} of {len(results)} cases pass; {numbers} numbers judged."
 
 
 def write(results: list[Result], folder: Path = FOLDER) -> Path:
@@ -72,23 +72,23 @@ def texts(results: list[Result]) -> dict[str, str]:
     found = {"REPORT.md": ("Verification", index(results)), "mutants.md": ("Mutants", mutant_blocks()),
              "matrix.md": (matrix.TITLE, matrix.blocks())}
     for stage, chosen in by_stage(results):
-        parts = [Block("text", summary(chosen)), *(block for result in chosen for block in article(result))]
-        found[f"{stage}.md"] = TITLES[stage], parts
+        found[f"{stage}.md"] = TITLES[stage], [Block("text", summary(chosen)), *articles(chosen)]
     return {name: f"# {title}\n\n{markdown(blocks, 2)}\n" for name, (title, blocks) in found.items()}
 
 
 def by_stage(results: list[Result]) -> list[tuple[str, list[Result]]]:
     """(stage, its results) of the stages that have any."""
-    grouped = [(stage, [r for r in results if CASES[r.id].stage == stage]) for stage in STAGES]
-    return [(stage, chosen) for stage, chosen in grouped if chosen]
+    ordered = sorted(results, key=lambda result: STAGES.index(CASES[result.id].stage))
+    grouped = groupby(ordered, key=lambda result: CASES[result.id].stage)
+    return [(stage, list(chosen)) for stage, chosen in grouped]
 
 
 #: What is judged elsewhere.
-BESIDES = ((Link("The paper's claims", "../../paper_figures/replication"), "`make claims`"),
-           (Link("Ambiguities and misprints of the paper", "../../reference/ERRATA"), "`verification.errata`"),
-           (Link("What the rounding of Table 1 allows", "../sensitivity/sensitivity"), "`make sensitivity`"),
-           (Link("The law for networks", "../../docs/network"), "`python -m verification.network`"),
-           (Link("Mutants made by machine", "sampled"), "`make mutants-sampled`"))
+BESIDES = ((Link("The paper's claims", "../../paper_figures/replication.md"), "`make claims`"),
+           (Link("Ambiguities and misprints of the paper", "../../reference/ERRATA.md"), "`verification.errata`"),
+           (Link("What the rounding of Table 1 allows", "../sensitivity/sensitivity.md"), "`make sensitivity`"),
+           (Link("The law for networks", "../../docs/network.md"), "`python -m verification.network`"),
+           (Link("Mutants made by machine", "sampled.md"), "`make mutants-sampled`"))
 
 
 def index(results: list[Result]) -> list[Block]:
@@ -99,7 +99,7 @@ def index(results: list[Result]) -> list[Block]:
              "elements and presets"))
     return [Block("text", f"{INTRODUCTION} Written by `make verify`."), Block("text", f"**{summary(results)}**"),
             table(("stage", ""), (*stages, *more)),
-            table(("besides", ""), BESIDES, brief=True),
+            table(("besides", ""), BESIDES),
             table(("case", "kind", "runs with", "numbers", "verdict", "must fall short with"),
                   map(_index_row, results)),
             table(("case", "claim", "measured", "expected", "seconds"), map(_live_row, results), detail=True)]
@@ -125,6 +125,11 @@ def headline(result: Result) -> tuple[str, str]:
         return "nothing", "a number"
     more = f" (and {len(parts) - 1} more)" if len(parts) > 1 else ""
     return f"{short[0].quantity}: {short[0].measured}{more}", short[0].expected
+
+
+def articles(results: list[Result]) -> list[Block]:
+    """Cases, one after the other."""
+    return [block for result in results for block in article(result)]
 
 
 def article(result: Result) -> list[Block]:
@@ -251,7 +256,7 @@ def mutant_rows() -> list[tuple[str, str, str, str]]:
     """(mutant, stage, what is wrong with it, cases or tests that caught it in the last whole hunt)."""
     caught, _ = mutants.recorded()
     return [(mutant.id, stage, mutant.says, ", ".join(caught.get(mutant.id, [])) or "not caught")
-            for stage, chosen in mutants.load().items() for mutant in chosen.values()]
+            for stage, chosen in mutants.load().items() for mutant in chosen]
 
 
 def mutant_state() -> str:
@@ -270,9 +275,13 @@ def mutant_blocks() -> list[Block]:
 
 def _write_live(results: list[Result], folder: Path) -> None:
     """Every number with all its digits, and the seconds of this machine."""
-    cases = {result.id: {"verdict": result.verdict, "seconds": round(result.seconds, 2), "measured": {
-        part.quantity: part.measured for part in result.outcome.measured}} for result in results}
+    cases = {result.id: _live(result) for result in results}
     save({"environment": environment(), "cases": cases}, folder / "measured.json")
+
+
+def _live(result: Result) -> dict:
+    measured = {part.quantity: part.measured for part in result.outcome.measured}
+    return {"verdict": result.verdict, "seconds": round(result.seconds, 2), "measured": measured}
 
 
 def _write_pages(results: list[Result], folder: Path) -> Path:
@@ -282,8 +291,7 @@ def _write_pages(results: list[Result], folder: Path) -> Path:
     for result in results:
         draw(result, folder / "pictures")
     about, back = Block("text", environment()), table((Link("All cases", "index"),), ())
-    found = {stage: (TITLES[stage], [back, *(block for result in chosen for block in article(result))])
-             for stage, chosen in by_stage(results)}
+    found = {stage: (TITLES[stage], [back, *articles(chosen)]) for stage, chosen in by_stage(results)}
     speed = table((Link("Speed against error, hard cases, assumptions", "speed"),), ())
     found["index"] = "Verification", [*index(results), speed]
     found["mutants"] = "Mutants", [back, *mutant_blocks()]

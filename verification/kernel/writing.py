@@ -21,7 +21,8 @@ BAD = {"wrong", "does not hold", "FALLS SHORT", "NO", "not caught"}
 
 @dataclass(frozen=True)
 class Link:
-    """A cell that leads to a place on a page: page "flow", place "flow-plug" or ""."""
+    """A cell that leads to a place on a page: page "flow", place "flow-plug" or ""; or to a file that is there in
+    Markdown alone: page "../../docs/network.md"."""
 
     text: str
     page: str
@@ -29,7 +30,8 @@ class Link:
 
     def to(self, ending: str) -> str:
         """The address, with the ending of the pages' files."""
-        return f"{self.page}.{ending}" + (f"#{self.place}" if self.place else "")
+        name = self.page if self.page.endswith(".md") else f"{self.page}.{ending}"
+        return name + (f"#{self.place}" if self.place else "")
 
 
 Cell = str | Link
@@ -89,9 +91,13 @@ def plain(blocks: Iterable[Block]) -> str:
 def _plain(block: Block) -> list[str]:
     if block.kind != "table":
         return [block.text]
-    rows = [[cell.text if isinstance(cell, Link) else cell for cell in row] for row in block.rows]
+    rows = [[*map(_words, row)] for row in block.rows]
     widths = [max(map(len, column)) for column in zip(*rows)]
     return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
+
+
+def _words(cell: Cell) -> str:
+    return cell.text if isinstance(cell, Link) else cell
 
 
 def page(title: str, blocks: Iterable[Block]) -> str:

@@ -61,7 +61,8 @@ def others() -> Iterator[Sample]:
 
 def table_rows(discs: list[Sample], found: list[Sample]) -> list[list]:
     """The table, a row a shape and lambda; `discs` are of the table, `found` all others."""
-    before, after = ([one for one in found if one.spanned == kind] for kind in (False, True))
+    before = [one for one in found if not one.spanned]
+    after = [one for one in found if one.spanned]
     shares, lengths = np.array([one.share for one in discs]), np.array([one.lengths for one in discs])
     plugs = np.array(PLUGS)
     apart = departures(before, lambda one: law(shares, lengths, one.share))
@@ -209,17 +210,19 @@ def _told(spanned: bool) -> str:
     shares = np.array(TOLD[spanned])
     head = (f"A / W^2, {'touching both walls' if spanned else 'before contact'}", "r", "least", "most")
     rows = zip(shares, *added_resistance(shares, 1.0, spanned, RATIO))
-    return markdown([table(head, ([f"{share:g}", *(f"{value:.3g}" for value in values)] for share, *values in rows))])
+    return markdown([table(head, ("{:g} {:.3g} {:.3g} {:.3g}".format(*row).split() for row in rows))])
 
 
 SEED = 20261123
-HALF_DISCS, DRAWN_BODIES, DRAWN_PLUGS = 10, 8, 8
+HALF_DISCS = 10
+DRAWN_BODIES = DRAWN_PLUGS = 8
 #: Of half-discs, over W.
 DRAWN = (THICKNESSES[0], THICKNESSES[-1])
 #: Of plugs, areas over W^2; of half-discs and bodies, widths of the pore (um), on which nothing may depend.
 SHARES, WIDTHS = (2.1, 4.2), (20.0, 300.0)
 #: Runs, and shapes of each: no larger than this area over W^2, each larger than the one before by 5 % at least.
-NEW_RUNS, OF_EACH, LARGEST, FURTHER = 3, 8, 3.0, 1.05
+NEW_RUNS, OF_EACH = 3, 8
+LARGEST, FURTHER = 3.0, 1.05
 #: Hours that a run may take to become so large.
 END = 50
 

@@ -12,6 +12,7 @@ from repro.march.simulation import simulate
 from repro.model import flow, pore
 from repro.model.pore import Pore
 from repro.scene import load_scene
+from verification.claims.runs import until
 
 #: Of the table.
 RATIOS = (100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0, 10000.0)
@@ -26,7 +27,8 @@ QUICK = ('numerics.preset="fast"',)
 #: Ranges of drawn bodies, which are those of what growth makes before contact: thickness over that of the half-disc of
 #: the same area; how far the top leans to either side, over its height. Of drawn plugs: length of the contact surface
 #: with the lower wall less that with the upper one, over W, and the larger share of that on one side.
-THICKER, LEANING, ENDS, UPSTREAM = (0.99, 1.03), 0.05, (1.15, 1.4), 0.6
+THICKER, LEANING = (0.99, 1.03), 0.05
+ENDS, UPSTREAM = (1.15, 1.4), 0.6
 #: Least supply (mg/L) over W^2 (um2): with less growth is limited by diffusion, and bodies are thicker than that.
 LEAST_SUPPLY = 1 / 2500
 #: A quarter of an ellipse that is cut here meets the upper wall at an angle.
@@ -49,13 +51,12 @@ class Growth:
 
     def scene(self):
         """In the preset `fast`, a row an hour."""
-        times = ", ".join(f'"{hour} h"' for hour in range(self.end + 1))
         return load_scene({
             "pore": {"width": f"{self.width} um", "length": f"{LENGTH * self.width} um"},
             "aggregate": {"radius": f"{self.radius} um", "position": f"{self.position} um"},
             "flow": {"mean_velocity": f"{self.velocity} m/d"},
             "substrates": {name: {"supply": f"{self.supply} mg/L"} for name in ("acceptor", "donor")},
-            "growth": {"end": f"{self.end} h"}}, (*QUICK, f"output.times=[{times}]"))
+            "growth": {}}, (*QUICK, *until(*range(self.end + 1))))
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from repro.fem import outline
+from repro.fem.mesh import Mesh
 from repro.fem.outline import Outline
 from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.fem.space import Space
@@ -37,7 +38,11 @@ def half_disc(radius: float, refinement: float = 1.0, order: int = 1) -> Outline
 def placed(around: Outline, refinement: float, density=lambda x, y: DENSITY + 0 * x, ends=(-75.0, 75.0),
            order: int = 1) -> Pore:
     """An aggregate at t = 0 with X_A = density(x, y), on a mesh of its own."""
-    grid, around = meshes.around(around, refinement, ends, WIDTH)
+    return at_start(*meshes.around(around, refinement, ends, WIDTH), order, density)
+
+
+def at_start(grid: Mesh, around: Outline, order: int, density=lambda x, y: DENSITY + 0 * x) -> Pore:
+    """The same on a mesh that is there."""
     space = Space(grid, order)
     active = density(*places(space)) * space.reaction.dx
     body = pore.material(space, grid.points[grid.body])

@@ -183,13 +183,13 @@ def grown(held: Supported, theta: np.ndarray, path: Callable | None = None, fact
     return found
 
 
-def system(held: Supported, position: np.ndarray, theta: np.ndarray, free: bool = True) -> growth.System:
-    """The equations of a body, nothing prescribed by default; on straight triangles stabilised as at a last known shape
+def system(held: Supported, position: np.ndarray, theta: np.ndarray) -> growth.System:
+    """The equations of a body, nothing prescribed; on straight triangles stabilised as at a last known shape
     ``position`` (n, 2) of expansion theta."""
     stabilising = None
     if held.geometry == 1:
         stabilising = growth.gradient_stabilisation(position, held.cells, theta[:, 0])
-    return growth.System(held.body, np.zeros_like(held.held) if free else held.held, stabilising=stabilising)
+    return growth.System(held.body, np.zeros_like(held.held), stabilising=stabilising)
 
 
 def integrated(held: Supported) -> tuple[np.ndarray, np.ndarray, elements.Table]:

@@ -253,7 +253,9 @@ def _rim_held(space: Space) -> ElementSystem:
 def _without_flux(space: Space, velocity: np.ndarray) -> np.ndarray:
     """The rim's velocity (n, 2) less the part c (x, y), in the fluid, of what the interpolated values would pump in: a
     discrete incompressible flow can have none. c is of the order of the interpolation's error."""
-    cells, rim, divergence = space.cells, _rim(space), flow.divergence(space)
+    cells = space.cells
+    rim = _rim(space)
+    divergence = flow.divergence(space)
 
     def flux(field):
         return np.einsum("tbi,ti->", divergence, np.concatenate([field[cells, 0], field[cells, 1]], axis=1))

@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterable
+from dataclasses import fields, is_dataclass, replace
 
 import numpy as np
 
 from reference import averaged_pore
 from repro import results
 from repro.march import midpoint, updates
-from repro.march.loop import Instant, Step
+from repro.march.loop import Instant, Ledger, Step
 from repro.march.simulation import simulate
 from repro.model import pore
 from repro.model.pore import Pore, Solved
-from repro.scene import Scene, load_scene
-from verification.kernel.case import Profile
+from repro.scene import Kinetics, Scene, load_scene
+from verification.kernel.case import Profile, columns
 from verification.problems import channels, pairs
 
 ROUND_OFF = "round-off"
 #: The velocity of base at t = 0, 2.9 m/d, in um/h.
 SPEED = 2.9e6 / 24
-PRESETS = ("paper", "fast", "accurate")
 #: Of a section, at which a mean is taken.
 POINTS = 16
 #: Kinds of elements, by the names that scenes have for them: of order 1, 2 and 3.
@@ -42,18 +42,28 @@ def by(preset: str) -> str:
     return f'numerics.preset="{preset}"'
 
 
-#: Changes of a scene, by label: every kind of elements with the paper's scheme, and the presets.
-EVERY = {**{kind: (of(kind), coarser(kind, 0.4)) for kind in ELEMENTS}, **{kind: (by(kind),) for kind in PRESETS[1:]}}
+PRESETS = ("paper", "fast", "accurate")
+#: Changes of a scene, by label: the presets, and fast with cubic elements.
+NUMERICS = {**{preset: (by(preset),) for preset in PRESETS}, "cubic": (by("fast"), of("cubic"))}
 
 
-def base(end: str, *changes: str, times: str = "") -> Scene:
-    """The paper's scene to a time ("6 h"), reported at its end, or at ``times`` ('"3 h", "6 h"')."""
-    return load_scene("base", (f'growth.end="{end}"', f'output.times=[{times or repr(end)}]', *changes))
+def kinds(refinement: float, linear: float = 1.0) -> dict[str, tuple[str, ...]]:
+    """Changes of a scene, by label: every kind of elements with the paper's scheme, refined so."""
+    return {kind: (of(kind), coarser(kind, refinement, linear)) for kind in ELEMENTS}
 
 
-def every_step(end: str, *changes: str) -> Scene:
-    """The paper's scene to a time, reported after every step."""
-    return load_scene("base", (f'growth.end="{end}"', *changes))
+def every(refinement: float, linear: float = 1.0) -> dict[str, tuple[str, ...]]:
+    """The same, and the presets."""
+    return {**kinds(refinement, linear), **{preset: (by(preset),) for preset in PRESETS[1:]}}
+
+
+EVERY = every(0.4)
+
+
+def base(end: str, *changes: str, times: Iterable[float] = ()) -> Scene:
+    """The paper's scene to a time ("6 h"), reported at its end, or at ``times`` (h)."""
+    rows = [f"{time} h" for time in times] or [end]
+    return load_scene("base", (f'growth.end="{end}"', f"output.times={rows}", *changes))
 
 
 def on_wall(heights: np.ndarray) -> np.ndarray:
@@ -101,6 +111,35 @@ def with_diffusivities(scene: Scene, change) -> Scene:
     return replace(scene, substrates=replace(scene.substrates, **changed))
 
 
+def supplied_everywhere(scene: Scene) -> Scene:
+    """The scene without flow, diffusion a million times D_A and more: the supply everywhere."""
+    return with_diffusivities(without_flow(scene), lambda water, biomass: (1e13, 1e13))
+
+
+#: Powers of length and time in the unit of each key that has one.
+POWERS = {
+    "width": (1, 0), "length": (1, 0), "radius": (1, 0), "head": (1, 0), "mean_velocity": (1, -1),
+    "kinematic_viscosity": (2, -1), "gravity": (1, -2), "diffusivity": (2, -1), "diffusivity_in_aggregate": (2, -1),
+    "maximum_utilization_rate": (0, -1), "decay_coefficient": (0, -1), "end": (0, 1), "time_step": (0, 1),
+    "minimum_film": (1, 0),
+}
+
+
+def scaled(section, length: float, time: float):
+    """A scene, or a section of it, with its unit of length and of time so many times larger."""
+    changes = {}
+    for key in fields(section):
+        value = getattr(section, key.name)
+        if is_dataclass(value):
+            changes[key.name] = scaled(value, length, time)
+        elif key.name == "times" and value:
+            changes[key.name] = tuple(time * t for t in value)
+        elif key.name in POWERS and value is not None:
+            along, during = POWERS[key.name]
+            changes[key.name] = value * length**along * time**during
+    return replace(section, **changes)
+
+
 def density_drift(scene: Scene, instant: Instant) -> float:
     """Largest |(X_A + X_I) / X_m - 1| in the aggregate."""
     now = instant.pore
@@ -129,6 +168,13 @@ def growth_rates(scene: Scene, acceptor: float | None = None, donor: float | Non
             m_a * law.decay_coefficient * (1 - law.degradable_fraction))
 
 
+def worth(law: Kinetics, step: Ledger) -> tuple[float, float]:
+    """What the substrates taken up in a step are worth in biomass: Y times the donor, and what decays, the acceptor
+    beyond F times the donor, over d_c."""
+    acceptor, donor = step.consumed
+    return law.yield_coefficient * donor, (acceptor - law.acceptor_to_donor_ratio * donor) / law.decay_oxygen_demand
+
+
 def mass_after(scene: Scene, time: float) -> float:
     """(X_A + X_I) over that at the start, after hours at the supply: an exponential."""
     rise, left = growth_rates(scene)
@@ -145,7 +191,9 @@ PLACES = 81
 
 def pore_of(scene: Scene, speed=None) -> averaged_pore.Pore:
     """The scene's numbers; speed: (loss, half length) -> u, the scene's mean velocity if none."""
-    law, both, drive = scene.kinetics, scene.substrates, scene.flow
+    law = scene.kinetics
+    both = scene.substrates
+    drive = scene.flow
     rates = {**channels.rates(law, both), "Y": law.yield_coefficient, "b": law.decay_coefficient,
              "remains": law.decay_coefficient * (1 - law.degradable_fraction)}
     both_of = (channels.pair(name, both) for name in ("supply", "diffusivity", "diffusivity_in_aggregate"))
@@ -191,7 +239,7 @@ def profile(instant: Instant) -> tuple[np.ndarray, np.ndarray]:
 
 def worst(rows: list[dict[str, float]]) -> dict[str, float]:
     """The largest size of each number."""
-    return {name: max(abs(row[name]) for row in rows) for name in rows[0]}
+    return {name: float(np.abs(values).max()) for name, values in columns(rows).items()}
 
 
 def profiles(instants: list[Instant], moments) -> tuple[Profile, ...]:

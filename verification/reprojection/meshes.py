@@ -13,10 +13,10 @@ from reference import galerkin_transfer
 from repro.fem import transfer
 from repro.fem.mesh import Mesh, triangle_areas
 from repro.fem.space import Space
-from verification.kernel.case import Profile, at_least, at_most, between, case, refine, study
+from verification.kernel.case import Profile, at_least, at_most, between, case, each_at_most, refine, studies
 from verification.problems import meshes, pairs, runs
 
-SIZES, SEEDS = (5.0, 2.5, 1.25, 0.625), range(3)
+SIZES = dict.fromkeys((5.0, 2.5, 1.25, 0.625), 3)
 REMESHES = 40
 
 
@@ -45,9 +45,9 @@ LOCATED = {1: 4e-3, 2: 1e-4, 3: 2e-6}
 
 
 @case("reprojection-order", kind="manufactured",
-      norm="L2 of a smooth field, interpolated on one mesh and carried to another, mean of three pairs a size; largest "
-           "error of a linear field over nine pairs of meshes, over its range; root mean square error at a thousand "
-           "places of fields of order 1, 2 and 3, mean of three meshes a size",
+      norm="L2 of a smooth field, interpolated on one mesh and carried to another, root mean square over three pairs a "
+           "size; largest error of a linear field over nine pairs of meshes, over its range; root mean square error at "
+           "a thousand places of fields of order 1, 2 and 3, and over three meshes a size",
       claim="No transfer loses the accuracy of linear elements, the limiter leaves linear fields alone, and fields of "
             "each order are found to their order",
       mutants=("corners-for-middles", "nearest-corner", "bounded-lumped", "bounds-of-one-piece"),
@@ -55,11 +55,11 @@ LOCATED = {1: 4e-3, 2: 1e-4, 3: 2e-6}
             **{f"fields of order {k}, order {k}": (k, k + 1, ceiling) for k, ceiling in LOCATED.items()}})
 def order(carrier: str | int, expected: int, ceiling: float):
     if isinstance(carrier, int):
-        yield study("located", SIZES, refine(_located_errors, SIZES, carrier)["located"], expected,
-                    "interpolation: one order more than the elements'", ceiling=ceiling)
+        yield studies(refine(_located_errors, SIZES, carrier),
+                      {"located": (expected, "interpolation: one order more than the elements'", ceiling)})
         return
-    yield study("carried", SIZES, refine(_carried_errors, SIZES, CARRIERS[carrier])["carried"], expected,
-                "linear elements: second order", ceiling=ceiling)
+    yield studies(refine(_carried_errors, SIZES, CARRIERS[carrier]),
+                  {"carried": (expected, "linear elements: second order", ceiling)})
     if carrier == "bounded":
         linear = max(_linear(old, new) for _, old, new in pairs.pairs())
         yield at_most("linear field", linear, 1e-12, "within its bounds at every node: round-off")
@@ -70,27 +70,21 @@ def _linear(old: pairs.Grid, new: pairs.Grid) -> float:
     return float(np.abs(found - _plane(new)).max() / np.ptp(_plane(new)))
 
 
-def _located_errors(size: float, order: int) -> dict[str, float]:
-    """Mean over meshes of the error of the field interpolated by an order."""
+def _located_errors(size: float, seed: int, order: int) -> dict[str, float]:
+    """Error of the field interpolated by an order."""
     where = np.random.default_rng(8).uniform((0.0, 0.0), (pairs.ENDS[1], pairs.WIDTH), (1000, 2))
-    errors = []
-    for seed in SEEDS:
-        points, triangles = pairs.grid(size, seed)
-        mesh = Mesh.of(points, triangles, np.zeros(len(triangles), bool), np.empty(0, int), pairs.WIDTH, pairs.ENDS)
-        space = Space(mesh, order)
-        found = transfer.located(points, triangles, where).field(smooth(*space.points.T), space.cells, order)
-        errors.append(np.sqrt(np.mean((found - smooth(*where.T)) ** 2)))
-    return {"located": float(np.mean(errors))}
+    points, triangles = pairs.grid(size, seed)
+    mesh = Mesh.of(points, triangles, np.zeros(len(triangles), bool), np.empty(0, int), pairs.WIDTH, pairs.ENDS)
+    space = Space(mesh, order)
+    found = transfer.located(points, triangles, where).field(smooth(*space.points.T), space.cells, order)
+    return {"located": np.sqrt(np.mean((found - smooth(*where.T)) ** 2))}
 
 
-def _carried_errors(size: float, carry) -> dict[str, float]:
-    """Mean error of a transfer."""
-    errors = []
-    for seed in SEEDS:
-        old, new = pairs.grid(size, 2 * seed), pairs.grid(0.9 * size, 2 * seed + 1)
-        found = carry(*old, smooth(*old[0].T)[:, None], *new)
-        errors.append(meshes.l2_error(*new, found[:, 0], smooth))
-    return {"carried": float(np.mean(errors))}
+def _carried_errors(size: float, seed: int, carry) -> dict[str, float]:
+    """Error of a transfer."""
+    old, new = pairs.grid(size, 2 * seed), pairs.grid(0.9 * size, 2 * seed + 1)
+    found = carry(*old, smooth(*old[0].T)[:, None], *new)
+    return {"carried": meshes.l2_error(*new, found[:, 0], smooth)}
 
 
 @case("reprojection-chain", kind="property",
@@ -174,12 +168,7 @@ DEGREE = 6
       mutants=("clip-two-sides", "fans-cut-short"),
       ways="1", because=MASSES)
 def supermesh():
-    return _worst([_pieces(old, new) for _, old, new in pairs.pairs()], 1e-12)
-
-
-def _worst(rows: list[dict[str, float]], bound: float) -> list:
-    """The largest of each number over all pairs of meshes."""
-    return [at_most(name, value, bound, ROUND_OFF) for name, value in runs.worst(rows).items()]
+    return each_at_most(runs.worst([_pieces(old, new) for _, old, new in pairs.pairs()]), 1e-12, ROUND_OFF)
 
 
 def _pieces(old: pairs.Grid, new: pairs.Grid) -> dict[str, float]:
@@ -214,7 +203,8 @@ def _polynomials(pieces: pairs.Grid) -> float:
       ways="1", because=MASSES)
 def projection():
     random = np.random.default_rng(6)
-    return _worst([_projected(old, new, random.uniform(0.0, 1.0, len(old[0]))) for _, old, new in pairs.pairs()], 1e-11)
+    rows = [_projected(old, new, random.uniform(0.0, 1.0, len(old[0]))) for _, old, new in pairs.pairs()]
+    return each_at_most(runs.worst(rows), 1e-11, ROUND_OFF)
 
 
 def _projected(old: pairs.Grid, new: pairs.Grid, rough: np.ndarray) -> dict[str, float]:

@@ -175,8 +175,7 @@ def made(text: str, mutant: Mutant) -> Mutant:
         del before[0], after[0]
     while before and after and before[-1] == after[-1]:
         del before[-1], after[-1]
-    old, new = ("\n".join(line.strip() for line in lines) for lines in (before, after))
-    return replace(mutant, old=old, new=new)
+    return replace(mutant, old="\n".join(map(str.strip, before)), new="\n".join(map(str.strip, after)))
 
 
 def mutated(text: str, mutant: Mutant) -> str:

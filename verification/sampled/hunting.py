@@ -13,6 +13,7 @@ import os
 import re
 import time
 import traceback
+from collections import Counter
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -287,7 +288,8 @@ def judged(rows: list[Row]) -> dict[str, list[Row]]:
     """Rows by verdict: caught, timeout, survivor, equivalent."""
     found: dict[str, list[Row]] = {"caught": [], "timeout": [], "survivor": [], "equivalent": []}
     for row in rows:
-        found[_word(row)].append(row)
+        excused = row.verdict != "caught" and key(row) in EQUIVALENT
+        found["equivalent" if excused else row.verdict].append(row)
     return found
 
 
@@ -329,17 +331,31 @@ def record(rows: list[Row], count: int) -> int:
 def text(rows: list[Row], count: int) -> str:
     """The page."""
     found = judged(rows)
-    blocks = [Block("text", INTRODUCTION), Block("text", told(found, count)), *_survivors(found), *_equivalent(found)]
-    by_module = table(("module", "mutants", "caught"), _counts(rows))
-    whole = markdown([*blocks, Block("heading", "By module"), by_module], level=2)
-    return f"# Mutants made by machine\n\n{whole}\n"
+    survivors = [(*_changed(row), *LEFT.get(key(row), ("", "")), f"{row.tried} of {row.reached}")
+                 for row in found["survivor"]]
+    equivalent = [(*_changed(row), EQUIVALENT[key(row)]) for row in found["equivalent"]]
+    blocks = [Block("text", INTRODUCTION), Block("text", told(found, count)),
+              *_section("Survivors", survivors, "effect", "why no test", "tests run"),
+              *_section("Shown equivalent", equivalent, "why"),
+              Block("heading", "By module"), table(("module", "mutants", "caught"), _counts(rows))]
+    return f"# Mutants made by machine\n\n{markdown(blocks, level=2)}\n"
+
+
+def _section(title: str, rows: list[tuple[str, ...]], *more: str) -> list[Block]:
+    """A table of changes and what is told of them besides; nothing where there are none."""
+    return [Block("heading", title), table(("where", "was", "is", *more), rows)] if rows else []
+
+
+def _changed(row: Row) -> tuple[str, str, str]:
+    """Where, from what and to what."""
+    return f"{row.file}:{row.line}", f"`{row.old}`", f"`{row.new}`"
 
 
 def _counts(rows: list[Row]) -> list[tuple[str, str, str]]:
     """How many of each module are drawn, and caught; each is in the record."""
-    files = sorted({row.file for row in rows})
-    verdicts = {file: [row.verdict for row in rows if row.file == file] for file in files}
-    return [(file, str(len(found)), str(found.count("caught"))) for file, found in verdicts.items()]
+    drawn = Counter(row.file for row in rows)
+    caught = Counter(row.file for row in rows if row.verdict == "caught")
+    return [(file, str(drawn[file]), str(caught[file])) for file in sorted(drawn)]
 
 
 INTRODUCTION = (
@@ -348,22 +364,3 @@ INTRODUCTION = (
     "function it is in, the cheapest first; with `--whole`, survivors against all of these. A timeout is a "
     "mutant that makes a test run without end, and is not counted as caught. Each mutant with the test that catches it "
     "is in `sampled.json`.")
-
-
-def _word(row: Row) -> str:
-    return "equivalent" if row.verdict != "caught" and key(row) in EQUIVALENT else row.verdict
-
-
-def _survivors(found: dict[str, list[Row]]) -> list[Block]:
-    if not found["survivor"]:
-        return []
-    rows = [(f"{row.file}:{row.line}", f"`{row.old}`", f"`{row.new}`", *LEFT.get(key(row), ("", "")),
-             f"{row.tried} of {row.reached}") for row in found["survivor"]]
-    heads = ("where", "was", "is", "effect", "why no test", "tests run")
-    return [Block("heading", "Survivors"), table(heads, rows)]
-
-
-def _equivalent(found: dict[str, list[Row]]) -> list[Block]:
-    rows = [(f"{row.file}:{row.line}", f"`{row.old}`", f"`{row.new}`", EQUIVALENT[key(row)])
-            for row in found["equivalent"]]
-    return [Block("heading", "Shown equivalent"), table(("where", "was", "is", "why"), rows)] if rows else []

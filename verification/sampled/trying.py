@@ -231,7 +231,7 @@ def _judged(path: Path, status: int, seconds: float, limit: float) -> Ran:
 LIVE = ROOT / "verification" / "report" / "live"
 MAP = LIVE / "sampled-reach.jsonl"
 #: Tests of what the code's text is, not of what it does: any change of it is one to them.
-OF_TEXT = {"test_mutants.py", "test_architecture.py", "test_mentions.py", "test_published.py", "test_sampled.py"}
+OF_TEXT = {"test_mutants.py", "test_architecture.py", "test_published.py", "test_sampled.py"}
 AT_IMPORT = {"<listcomp>", "<setcomp>", "<dictcomp>", "<genexpr>"}
 #: Seconds of processor time that one file of tests may take, traced.
 LONGEST = 900
@@ -359,8 +359,8 @@ def packed(measured: dict[str, tuple[float, list[Call]]]) -> dict:
     """Tests as they are kept: functions once, and by their number."""
     every = sorted({call for _, calls in measured.values() for call in calls})
     numbers = {call: number for number, call in enumerate(every)}
-    return {"functions": every, "tests": {id: (seconds, [numbers[call] for call in calls])
-                                          for id, (seconds, calls) in measured.items()}}
+    tests = {id: (seconds, list(map(numbers.get, calls))) for id, (seconds, calls) in measured.items()}
+    return {"functions": every, "tests": tests}
 
 
 def _tests(rows: Iterable[dict]) -> Iterator[Measured]:

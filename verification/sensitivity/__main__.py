@@ -15,11 +15,13 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from repro.results import write_json, write_text
 from verification import sensitivity
+from verification.claims import interval
 from verification.kernel.writing import Block, markdown, table
 from verification.sensitivity import rounding, wide
 from verification.sensitivity.rounding import INPUTS, ROUNDED, Runs, scene
@@ -29,15 +31,18 @@ NAMES = {"velocity_0": "mean velocity, t = 0", "velocity": "mean velocity, 19.2 
          "effluent_acceptor": "effluent acceptor, 19.4 h", "effluent_donor": "effluent donor, 19.4 h",
          "contact_time": "time of contact (wide)", "conductivity_after": "conductivity 4 h after contact (wide)"}
 UP, DOWN = "#D55E00", "#0072B2"
+UNMOVED = "no rounding of an input moves it"
 #: Width of wide (um).
 WIDTH = 100.0
 
 
-def reaches(record: dict, number: str) -> list[tuple[str, float]]:
-    """Rounded inputs and what half a unit of their last digit makes of a number (%), the largest first."""
+def reaches(record: dict, number: str) -> list[tuple[str, float, bool]]:
+    """Rounded inputs and what half a unit of their last digit makes of a number (%), the largest first; is it resolved?
+    """
     known = record["elasticities"][number]
-    found = [(each.name, 100 * known[each.name]["elasticity"] * each.rounding) for each in ROUNDED]
-    return sorted(found, key=lambda pair: -abs(pair[1]))
+    found = [(each.name, 100 * known[each.name]["elasticity"] * each.rounding, known[each.name]["resolved"])
+             for each in ROUNDED]
+    return sorted(found, key=lambda row: -abs(row[1]))
 
 
 def write(record: dict, target: Path = TARGET, outlines: Path = OUTLINES) -> None:
@@ -76,19 +81,32 @@ def _places(text: str) -> np.ndarray:
 
 
 def tornado(record: dict, target: Path) -> None:
-    """The diagram: of each number the inputs in their order, an input's printed digit up and down."""
+    """The diagram: of each number the inputs in their order, an input's printed digit up and down; hatched what is not
+    resolved."""
     shown = [name for name in NAMES if name in record["elasticities"]]
     made = Figure(figsize=(9, 2.6 * ((len(shown) + 1) // 2)), layout="constrained")
     FigureCanvasSVG(made)
     for axes, number in zip(made.subplots((len(shown) + 1) // 2, 2, squeeze=False).ravel(), shown):
-        names, values = zip(*reversed(reaches(record, number)[:8]))
-        axes.barh(names, values, color=UP, height=0.7)
-        axes.barh(names, [-value for value in values], color=DOWN, height=0.7)
-        axes.axvline(0, color="black", linewidth=0.8)
+        rows = [row for row in reaches(record, number)[:8] if row[1]]
         axes.set_title(NAMES[number], loc="left", fontsize=10)
+        if not rows:
+            axes.set_axis_off()
+            axes.text(0.0, 0.85, UNMOVED, transform=axes.transAxes, fontsize=10)
+            continue
         axes.set_xlabel("change (%)")
-    made.suptitle("Half a unit of the last printed digit of an input: upwards (orange), downwards (blue)", fontsize=10)
+        axes.axvline(0, color="black", linewidth=0.8)
+        for name, value, resolved in reversed(rows):
+            _bars(axes, name, value, resolved)
+    made.suptitle("Half a unit of the last printed digit of an input: upwards (orange), downwards (blue); hatched: not "
+                  "resolved", fontsize=10)
     _saved(made, target)
+
+
+def _bars(axes: Axes, name: str, value: float, resolved: bool) -> None:
+    """Both bars of an input."""
+    for change, colour in ((value, UP), (-value, DOWN)):
+        look = {"color": colour} if resolved else {"facecolor": "none", "edgecolor": colour, "hatch": "////"}
+        axes.barh(name, change, height=0.7, **look)
 
 
 def page(record: dict) -> str:
@@ -121,10 +139,15 @@ def _cell(known: dict | None) -> str:
 def _set(found: dict) -> Iterator[Block]:
     words = ("One set of inputs within the rounding gives all printed numbers of base at once" if found["reached"] else
              "No set of inputs within the rounding gives all printed numbers of base at once; the nearest")
-    numbers = ", ".join(f"{NAMES.get(name, name)} {value:.4f}" for name, value in found["numbers"].items())
+    sizes = ", ".join(f"{size:.3g}" for size in found["sizes"])
     yield Block("heading", "One set of inputs")
-    yield Block("text", f"{words} (a share of {found['share_of_the_rounding']:.2f} of the rounding is needed). A run "
-                        f"with it: {numbers}.")
+    yield Block("text", f"{words} (a share of {found['share_of_the_rounding']:.2f} of the rounding is needed). It was "
+                        f"run on sizes {sizes} of elements and steps, over those of `accurate`; the bar is from all of "
+                        "them, and a set counts where the whole bar lies in the interval of the printed digits.")
+    yield table(("number", "printed", "a run with the set", "bar", "on these sizes"), (
+        (NAMES.get(name, name), "{:g} to {:g}".format(*interval(rounding.PRINTED[name])), f"{value:.4f}",
+         f"{found['bars'][name]:.1g}", ", ".join(f"{each:.4f}" for each in found["on_sizes"][name]))
+        for name, value in found["numbers"].items()))
     yield table(("input", "value"), ((name, f"{value:.4f}") for name, value in found["inputs"].items()))
 
 

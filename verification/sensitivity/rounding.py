@@ -15,7 +15,9 @@ rounding and e_ni the elasticities, the program is
     minimise t    such that    |x_i| <= t r_i    and    low_n <= f_n (1 + sum_i e_ni x_i) <= high_n
 
 so that t <= 1 is a set within the rounding. A run with it moves f_n by what is not linear, and the program is solved
-again from there. Where t > 1 the misfit that is left at t = 1 is minimised instead.
+again from there. Where t > 1 the misfit that is left at t = 1 is minimised instead. The runs are made on SET_SIZES, and
+low_n and high_n are the ends of the printed interval moved inwards by the numerical bar of f_n from all of them, so
+that a set is reached where f_n lies in the interval with the whole of its bar.
 
 **Sobol indices** of base: how much of the variance of each printed number an input's rounding accounts for. Inputs are
 independent and uniform within their rounding; those whose elasticity moves no printed number by half a percent a
@@ -27,7 +29,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
+from hashlib import sha256
 from math import log
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
@@ -37,12 +42,13 @@ from scipy.stats import sobol_indices, uniform
 from repro.march import simulation, updates
 from repro.model import kinetics, pore
 from repro.results import M_PER_D, write_json
-from repro.run.machine import source_hash
 from repro.scene import Scene, load_scene, needed, scene_hash
 from verification.claims import interval
 from verification.claims.base_run import DISTANCES, END, upstream_means
+from verification.claims.evaluate import MESH_ORDERS
 from verification.claims.levels import converged
 from verification.kernel.writing import load
+from verification.uncertainty import estimate
 
 
 @dataclass(frozen=True)
@@ -167,16 +173,31 @@ def of_wide(said: Scene) -> Numbers:
 OF: dict[str, Callable[[Scene], Numbers]] = {"base": of_base, "wide": of_wide}
 
 
+#: Rooms of `repro` whose source makes these numbers: that of a scene is in its hash.
+ROOMS = ("fem", "model", "march", "results")
+
+
+@cache
+def source() -> str:
+    """8 hexadecimal digits that stand for the source of ROOMS."""
+    digest = sha256()
+    package = Path(simulation.__file__).parents[1]
+    for path in sorted(path for room in ROOMS for path in (package / room).rglob("*.py")):
+        digest.update(path.name.encode() + path.read_bytes())
+    return digest.hexdigest()[:8]
+
+
 class Runs:
     """Runs that have been computed with this source; each new one is kept at once, so that a break loses one run."""
 
     def __init__(self, path: Path = KEPT) -> None:
         self.path = path
-        self.known: dict[str, Numbers] = load(path, {})
+        kept: dict[str, Numbers] = load(path, {})
+        self.known = {key: numbers for key, numbers in kept.items() if key.endswith(source())}
 
     def numbers(self, said: Scene) -> Numbers:
         """What a scene's run comes to."""
-        key = f"{said.name}-{scene_hash(said)}-{source_hash()}"
+        key = f"{said.name}-{scene_hash(said)}-{source()}"
         if key not in self.known:
             with np.errstate(all="raise", under="ignore"):
                 self.known[key] = {name: float(value) for name, value in OF[said.name](said).items()}
@@ -186,7 +207,8 @@ class Runs:
 
 
 #: Relative distances of an input from its printed value; the larger one of an input that is taken as exact.
-NEAR, FAR, LARGE = 0.01, 0.02, 0.1
+NEAR, FAR = 0.01, 0.02
+LARGE = 0.1
 RESOLVED = 0.1
 
 
@@ -203,13 +225,13 @@ def elasticities(runs: Runs, name: str) -> dict[str, dict[str, dict]]:
 
 
 def _of_input(runs: Runs, name: str, each: Input, plain: Numbers) -> dict[str, dict]:
-    pairs = {d: [runs.numbers(scene(name, {each.name: 1 + sign * d})) for sign in (1, -1)]
-             for d in ((NEAR, FAR) if each.half else (NEAR, FAR, LARGE))}
+    distances = (NEAR, FAR) if each.half else (NEAR, FAR, LARGE)
+    pairs = {d: [runs.numbers(scene(name, {each.name: factor})) for factor in (1 + d, 1 - d)] for d in distances}
     return {number: _told(number, value, pairs) for number, value in plain.items()}
 
 
 def _told(number: str, value: float, pairs: dict[float, list[Numbers]]) -> dict:
-    near, far = (difference(*(pair[number] for pair in pairs[d]), value, d) for d in (NEAR, FAR))
+    near, far = (difference(pairs[d][0][number], pairs[d][1][number], value, d) for d in (NEAR, FAR))
     bar = abs(far - near)
     told = {"elasticity": near, "bar": bar, "resolved": bar <= RESOLVED * abs(near)}
     if LARGE in pairs:
@@ -225,57 +247,82 @@ def difference(above: float, below: float, value: float, distance: float) -> flo
 #: What section 4 prints: C01-C04.
 PRINTED = {"velocity_0": "2.9", "velocity": "1.5", "effluent_acceptor": "4.19", "effluent_donor": "6.13",
            "consumed": "~60"}
-#: Of a printed interval the middle part that is aimed at: the rest is for the bars.
-AIMED = 0.4
+#: Sizes of elements and steps of the runs that make the set, the one that counts first: on 0.5, 2**-0.5 and 1 the bar
+#: of the acceptor effluent, 0.005, is as wide as what its digits leave to either side.
+SET_SIZES = (2**-1.5, 0.5, 2**-0.5)
+#: How many bars a number is kept inside its interval, and the part of this around its middle that is aimed at; the rest
+#: is for what is not linear, of which AIMED to ENOUGH is let be.
+KEPT_INSIDE, AIMED, ENOUGH = 1.5, 0.4, 0.5
 ROUNDS = 6
 
 
-def targets() -> dict[str, tuple[float, float]]:
-    """The intervals of the printed numbers."""
-    return {name: interval(text) for name, text in PRINTED.items()}
+def targets() -> tuple[np.ndarray, np.ndarray]:
+    """Middles and half widths of the intervals of the printed numbers."""
+    low, high = np.array([interval(text) for text in PRINTED.values()]).T
+    return 0.5 * (low + high), 0.5 * (high - low)
 
 
-def reached(numbers: Numbers, part: float = 1.0) -> bool:
-    """Do all numbers lie in (the middle part of) their intervals?"""
-    return all(abs(numbers[name] - 0.5 * (low + high)) <= 0.5 * part * (high - low)
-               for name, (low, high) in targets().items())
+def printed_of(numbers: Numbers) -> np.ndarray:
+    """Those that the paper prints."""
+    return np.array([numbers[name] for name in PRINTED])
+
+
+def misfit(numbers: Numbers, bars: Numbers | None = None) -> float:
+    """Largest distance of a printed number, or of an end of its bar, from the middle of its interval, in half
+    intervals."""
+    middle, half = targets()
+    apart = np.abs(printed_of(numbers) - middle) + (printed_of(bars) if bars else 0.0)
+    return float((apart / half).max())
 
 
 def one_set(runs: Runs, elasticities: dict[str, dict[str, dict]]) -> dict:
-    """The set, what a run with it gives, the share t of the rounding that it takes, and whether it is reached."""
-    plain = runs.numbers(scene("base", {}))
-    slopes = np.array([[plain[name] * elasticities[name][each.name]["elasticity"] for each in ROUNDED]
-                       for name in PRINTED])
-    start, x, t = np.array([plain[name] for name in PRINTED]), np.zeros(len(ROUNDED)), 0.0
+    """The set, what runs with it give and how well that is known, the share t of the rounding that it takes, and
+    whether it is reached."""
+    rows = _on_sizes(runs, {})
+    start, bars = printed_of(rows[0]), _bars(rows)
+    slopes = np.array([[elasticities[name][each.name]["elasticity"] for each in ROUNDED] for name in PRINTED])
+    slopes = start[:, None] * slopes
+    kept = printed_of(bars)
     for _ in range(ROUNDS):
-        x, t = program(start, slopes)
-        numbers = runs.numbers(scene("base", {each.name: 1 + value for each, value in zip(ROUNDED, x)}))
-        if reached(numbers, 0.5):
+        x, t = program(start, slopes, kept)
+        factors = {each.name: 1 + value for each, value in zip(ROUNDED, x)}
+        numbers = runs.numbers(scene("base", factors, *converged(SET_SIZES[0])))
+        if misfit(numbers) <= ENOUGH and misfit(numbers, bars) <= 1:
             break
-        start = np.array([numbers[name] for name in PRINTED]) - slopes @ x
-    inside = bool(t <= 1 + 1e-9 and reached(numbers))
-    middle = {name: 0.5 * sum(pair) for name, pair in targets().items()}
-    misfit = max(abs(numbers[name] - middle[name]) / (pair[1] - middle[name]) for name, pair in targets().items())
-    return {"reached": inside, "share_of_the_rounding": t, "misfit_in_half_intervals": misfit,
-            "inputs": {each.name: each.value * (1 + value) for each, value in zip(ROUNDED, x)},
-            "numbers": {name: numbers[name] for name in PRINTED}}
+        start = printed_of(numbers) - slopes @ x
+    rows = _on_sizes(runs, factors)
+    bars = _bars(rows)
+    left = misfit(numbers, bars)
+    return {"reached": bool(t <= 1 + 1e-9 and left <= 1), "share_of_the_rounding": t, "misfit_in_half_intervals": left,
+            "inputs": {name: BY_NAME[name].value * factor for name, factor in factors.items()},
+            "numbers": {name: numbers[name] for name in PRINTED}, "bars": bars, "sizes": list(SET_SIZES),
+            "on_sizes": {name: [row[name] for row in rows] for name in PRINTED}}
 
 
-def program(start: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, float]:
+def _on_sizes(runs: Runs, factors: dict[str, float]) -> list[Numbers]:
+    """Numbers of base on SET_SIZES."""
+    return [runs.numbers(scene("base", factors, *converged(size))) for size in SET_SIZES]
+
+
+def _bars(rows: list[Numbers]) -> Numbers:
+    """Of each printed number."""
+    return {name: estimate(SET_SIZES, [row[name] for row in rows], MESH_ORDERS).bar for name in PRINTED}
+
+
+def program(start: np.ndarray, slopes: np.ndarray, bars: np.ndarray) -> tuple[np.ndarray, float]:
     """Relative changes and the share of the rounding that they take; within it, with the least misfit, where the
-    intervals are out of reach."""
-    middle, half = (np.array([weight @ pair for pair in targets().values()])
-                    for weight in (np.array([0.5, 0.5]), AIMED * np.array([-0.5, 0.5])))
+    intervals, less the bars, are out of reach."""
+    middle, half = targets()
     rounding = np.array([each.rounding for each in ROUNDED])
     A, unit = slopes * rounding, np.eye(len(rounding))
-    none, ones = np.zeros((len(start), 1)), np.ones((len(rounding), 1))
-    tight = np.block([[A, none], [-A, none], [unit, -ones], [-unit, -ones]])
-    inside = np.concatenate([middle + half - start, start - middle + half, np.zeros(2 * len(rounding))])
+    both, aimed = np.vstack([A, -A]), np.minimum(half - KEPT_INSIDE * bars, AIMED * half)
+    none, ones = np.zeros((len(both), 1)), np.ones((len(rounding), 1))
+    tight = np.block([[both, none], [unit, -ones], [-unit, -ones]])
+    inside = np.concatenate([middle + aimed - start, start - middle + aimed, np.zeros(2 * len(rounding))])
     best = _solved(tight, inside, None)
     if best is not None and best[-1] <= 1:
         return best[:-1] * rounding, float(best[-1])
-    reach = half[:, None] / AIMED
-    loose = np.block([[A, -reach], [-A, -reach]])
+    loose = np.column_stack([both, -np.tile(half, 2)])
     least = _solved(loose, np.concatenate([middle - start, start - middle]), 1.0)
     return least[:-1] * rounding, float(best[-1]) if best is not None else float("inf")
 
@@ -287,7 +334,8 @@ def _solved(A: np.ndarray, b: np.ndarray, box: float | None) -> np.ndarray | Non
     return answer.x if answer.success else None
 
 
-LEAST, SEED, CONFIDENCE = 0.005, 2001, 0.95
+LEAST, CONFIDENCE = 0.005, 0.95
+SEED = 2001
 FAST = ('numerics.preset="fast"',)
 
 
@@ -304,16 +352,17 @@ def _moves(each: Input, known: dict[str, dict]) -> bool:
 def sobol(runs: Runs, elasticities: dict[str, dict[str, dict]], samples: int) -> dict:
     """First-order and total indices of each printed number, with their intervals."""
     chosen = moving(elasticities)
+    inputs = [each.name for each in chosen]
     names = [name for name in PRINTED
              if name != "consumed" and any(_moves(each, elasticities[name]) for each in ROUNDED)]
 
     def numbers(x: np.ndarray) -> np.ndarray:
-        rows = [runs.numbers(scene("base", dict(zip([each.name for each in chosen], column)), *FAST)) for column in x.T]
-        return np.array([[row[name] for row in rows] for name in names])
+        rows = [runs.numbers(scene("base", dict(zip(inputs, column)), *FAST)) for column in x.T]
+        return np.array([itemgetter(*names)(row) for row in rows]).T
     spread = [uniform(1 - each.rounding, 2 * each.rounding) for each in chosen]
     found = sobol_indices(func=numbers, n=samples, dists=spread, rng=np.random.default_rng(SEED))
     sure = found.bootstrap(confidence_level=CONFIDENCE, n_resamples=999)
-    return {"samples": samples, "inputs": [each.name for each in chosen], "confidence": CONFIDENCE,
+    return {"samples": samples, "inputs": inputs, "confidence": CONFIDENCE,
             "numbers": {name: {kind: _listed(getattr(found, kind)[row], getattr(sure, kind).confidence_interval, row)
                                for kind in ("first_order", "total_order")} for row, name in enumerate(names)}}
 

@@ -4,7 +4,7 @@
 **After contact**: conductivity, tips, and length of contact. A contact surface grows by whole edges of the outline, so
 that a single row jumps, by an edge or two, with whatever moves the instant at which a node joins. Its mean over the
 whole hours from contact to the end of Figure 6 does not. The bar is that of `verification.uncertainty` from the
-converged solution on four sizes of elements and steps.
+converged solution on six sizes of elements and steps.
 
 **Supplies**: for each, when contact comes, outlines every 5 h until as long after contact as Figure 6 goes on, or until
 the aggregate reaches an end of the pore, and which of the claims about wide hold then. Those are the functions of
@@ -26,12 +26,12 @@ from repro.results import M_PER_D
 from verification.claims import CLAIMS, Finding, evaluate
 from verification.claims.evaluate import MESH_ORDERS, unnumbered
 from verification.claims.growth_pattern import contact_length
-from verification.claims.levels import CONVERGED, OF_WIDE, Level, at_level, converged, forget
+from verification.claims.levels import CONVERGED, Level, at_level, converged, forget
 from verification.claims.runs import WIDE, bodies, polygon, series
 from verification.sensitivity.rounding import OF, Numbers, Runs, scene
 from verification.uncertainty import estimate
 
-SIZES = (0.5, 2**-0.5, 1.0, 2**0.5)
+SIZES = (0.25, 2**-1.5, 0.5, 2**-0.5, 1.0, 2**0.5)
 #: Whole hours (h) after contact, which comes at 34.3 h.
 HOURS = tuple(map(float, range(35, 46)))
 #: What is asked of the bars, in percent of the number.
@@ -81,9 +81,12 @@ def bar_of(quantity: str, values: list[float], asked: float) -> dict:
 SUPPLIES, SIZE = (5.0, 10.0, 20.0, 40.0), 2**0.5
 #: Hours by which all of them have made contact.
 END = 120.0
-#: Claims that are judged anew: those about what Figure 6 shows. C32 compares two ways to be born, C44 a law with its
-#: own runs, C45 shapes with layers, C46 states with and without the fluid's forces.
-JUDGED = tuple(id for id in OF_WIDE if id not in ("C32", "C44", "C45", "C46"))
+#: Claims that read this run and are not judged anew, since they compare it with what is not Figure 6's, and why.
+LEFT_OUT = {"C32": "compares two ways for biomass to be born", "C41": "changes the rheology and the walls",
+            "C42": "puts a permeable body in the place of a viscous one",
+            "C44": "holds a law for networks, made of other shapes, against it",
+            "C45": "compares its shapes with layers",
+            "C46": "compares its stresses with and without the fluid's forces"}
 #: Hours before it reaches an end of the pore at which an aggregate is still clear of it.
 MARGIN = 0.1
 #: Whole hours that wide goes on after contact: 45 h for Figure 6's own 10 K_s.
@@ -130,7 +133,9 @@ def _of_supply(runs: Runs, supply: float) -> dict:
     contact = runs.numbers(replace(scene("wide", factors, *converged(SIZE)), name="contact"))
     level = supplied(supply, contact["end"])
     with at_level(level), np.errstate(all="raise", under="ignore"):
-        found = {**contact, "outlines": _outlines(), "claims": {id: holding(CLAIMS[id].function()) for id in JUDGED}}
+        judged = {id: holding(CLAIMS[id].function()) for id in sorted(CLAIMS)
+                  if CLAIMS[id].of_wide and id not in LEFT_OUT}
+        found = {**contact, "outlines": _outlines(), "claims": judged}
     forget(level)
     return found
 
@@ -153,20 +158,24 @@ def holding(finding: Finding) -> dict[str, bool]:
 
 def _outlines() -> dict[str, str]:
     """Outlines by their hour: places "x,y x,y ..." to FINE (um), without those that lie on a straight line."""
-    return {f"{time:g}": " ".join(f"{x:.1f},{y:.1f}" for x, y in _places(found))
-            for time, found in zip(series(*WIDE)["time_h"], bodies(WIDE)) if time % EVERY == 0}
+    return {f"{time:g}": _places(found) for time, found in zip(series(*WIDE)["time_h"], bodies(WIDE))
+            if time % EVERY == 0}
 
 
-def _places(found) -> np.ndarray:
-    return shapely.get_coordinates(shapely.simplify(polygon(found.outline), FINE))
+def _places(found) -> str:
+    places = shapely.get_coordinates(shapely.simplify(polygon(found.outline), FINE))
+    return " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
 
 
 def verdicts(found: dict[str, dict]) -> tuple[list[str], list[str], list[str]]:
     """Claims that hold with all supplies, with some, and with none."""
-    ids = list(next(iter(found.values()))["claims"])
-    held = {id: [all(known["claims"][id].values()) for known in found.values()] for id in ids}
-    return ([id for id in ids if all(held[id])], [id for id in ids if any(held[id]) and not all(held[id])],
-            [id for id in ids if not any(held[id])])
+    every: list[str] = []
+    some: list[str] = []
+    none: list[str] = []
+    for id in next(iter(found.values()))["claims"]:
+        held = [all(known["claims"][id].values()) for known in found.values()]
+        (every if all(held) else some if any(held) else none).append(id)
+    return every, some, none
 
 
 def moving(found: dict[str, dict]) -> list[tuple[str, str]]:

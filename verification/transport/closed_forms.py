@@ -20,7 +20,7 @@ from repro.fem.space import Space
 from repro.model import flow, transport
 from repro.model.kinetics import Sink
 from verification.kernel.case import BAND, around, at_most, case, refine, studies
-from verification.problems import meshes
+from verification.problems import aggregates, meshes
 from verification.problems.channels import (
     CROSSED,
     EXPECTED,
@@ -329,17 +329,8 @@ def _solved(refinement: float, number: int, order: int, peclet: float, inlet: st
     made = transport.problem(space, _flow(space, mean), SUBSTRATES, SCENE.kinetics, inlet)
     added = [_added(space, mean, pair("supply", SUBSTRATES)[k], _of(sides, k), inlet) for k in (0, 1)]
     made = replace(made, source=made.source + np.concatenate(added))
-    where = _reaction_points(space)
-    active = _density()(where[..., 0], where[..., 1]) * space.reaction.dx
+    active = _density()(*aggregates.places(space)) * space.reaction.dx
     return space, both(transport.steady(made, Sink(active)))
-
-
-def _reaction_points(space: Space) -> np.ndarray:
-    """(r, q, 2) um, where the reaction is taken."""
-    if space.order == 1:
-        return space.points[space.reaction.cells]
-    nodes = space.mesh.points[space.mesh.cells[space.mesh.biomass]]
-    return np.einsum("qg,tgi->tqi", space.table.shape, nodes)
 
 
 @cache

@@ -271,7 +271,7 @@ AGAINST_FIPY = {
 
 
 @cache
-def _assembled(size: float, number: int, peclet: float, order: int = 1) -> transport.Problem:
+def _assembled(size: float, number: int, peclet: float, order: int) -> transport.Problem:
     return problem(spaced(size, number, order), speed_of(peclet), law=LAW)
 
 

@@ -21,8 +21,9 @@ from repro.errors import Unresolved
 from repro.model import biomass, gear, kinetics, pore, remeshing, transport
 from repro.model.kinetics import Sink
 from repro.model.transport import Balance, Concentrations
-from repro.scene import load_scene, parse_scene
-from verification.kernel.case import Check, Study, at_most, case, combined, study
+from repro.scene import Scene, load_scene
+from verification.kernel.case import Check, Study, at_most, case, combined, each_at_most, study
+from verification.problems import runs
 from verification.problems.channels import NAMES, ORDERS, SCENE, both, rates
 from verification.transport.cross_code import box_around
 
@@ -136,10 +137,12 @@ def _spread(now, solved, found) -> float:
 
 
 SUPPLY = SCENE.substrates.acceptor.supply
+PAPER, FAST, ACCURATE = map(runs.by, runs.PRESETS)
 #: What fronts are solved with, and how far its effluents may be from those far away.
-SOLVED = {"fast": (("fast", ("refinement", 0.25)), 1e-2), "accurate": (("fast", ("refinement", 0.45)), 1e-3),
-          "linear": (("paper",), 1e-2)}
-CUBIC = {"cubic": (("fast", ("elements", "cubic"), ("refinement", 0.45)), 1e-3)}
+FINER = "numerics.refinement=0.45"
+SOLVED = {"fast": ((FAST, "numerics.refinement=0.25"), 1e-2), "accurate": ((FAST, FINER), 1e-3),
+          "linear": ((PAPER,), 1e-2)}
+CUBIC = {"cubic": ((FAST, runs.of("cubic"), FINER), 1e-3)}
 #: Half saturations, and the least, at which cubic elements would take minutes.
 HALVES = {f"K_s = {half}": half for half in ("1e-2 mg/L", "1e-3 mg/L")}
 LEAST = {"K_s = 1e-5 mg/L": "1e-5 mg/L"}
@@ -168,18 +171,18 @@ def _in_proportion(found) -> Check:
       mutants=("unpaired",), over=combined(HALVES, {**SOLVED, **CUBIC}) | combined(LEAST, SOLVED), ways="2 paper")
 def front(half: str, solved: tuple[tuple, float]):
     numerics, bound = solved
-    found, far = _front(half, *numerics), _front(half, "fast", ("refinement", 1.3))
+    found, far = _front(half, *numerics), _front(half, FAST, "numerics.refinement=1.3")
     apart = max(abs(a.effluent - b.effluent) for a, b in zip(found, far)) / SUPPLY
     return [_in_proportion(found), at_most("effluents", apart, bound, "what the preset is for")]
 
 
 @cache
-def _front(half: str, *numerics):
+def _front(half: str, *numerics: str):
     """Ledgers of a thick half-disc that the donor, 1 mg/L, does not pass, without decay; on elements that are graded to
     the front, and if these are refused, with the refinement that is then advised."""
-    both = {"acceptor": {"half_saturation": half}, "donor": {"supply": "1 mg/L", "half_saturation": half}}
-    scene = _half_disc(100.0, 60.0, "0.29 m/day", *numerics, substrates=both,
-                       kinetics={"decay_coefficient": "0 1/day"})
+    halves = (f'substrates.{name}.half_saturation="{half}"' for name in NAMES)
+    scene = _half_disc(100.0, 60.0, "0.29 m/day", *numerics, *halves, 'substrates.donor.supply="1 mg/L"',
+                       'kinetics.decay_coefficient="0 1/day"')
     try:
         return remeshing.resolved(scene, pore.seeded(scene))[1].fluxes
     except Unresolved as refusal:
@@ -190,12 +193,10 @@ def _front(half: str, *numerics):
     return remeshing.resolved(scene, pore.seeded(scene))[1].fluxes
 
 
-def _half_disc(width: float, radius: float, speed: str, preset: str, *numerics: tuple[str, object], **sections: dict):
-    """A scene of a half-disc."""
-    tables = {"pore": {"width": f"{width} um"}, "aggregate": {"radius": f"{radius} um"},
-              "flow": {"mean_velocity": speed}, "substrates": {}, **sections,
-              "numerics": {"preset": preset, **dict(numerics)}}
-    return parse_scene(tables, "half disc", "half_disc.toml")
+def _half_disc(width: float, radius: float, speed: str, *changes: str) -> Scene:
+    """Of a pore of another width."""
+    return load_scene("wide", (f'pore.width="{width} um"', f'aggregate.radius="{radius} um"',
+                               f'flow.mean_velocity="{speed}"', *changes))
 
 
 @cache
@@ -209,10 +210,9 @@ WITHIN = "0.1 %, what preset accurate is for"
 TENTH = "a tenth of what preset fast is for"
 #: A half-disc under fast water: its numerics, how far effluents and consumption may be from those of quadratic elements
 #: of refinement 2.5, and why.
-QUICK = ("refinement", 0.45)
-FASTEST = {"quadratic, accurate": (("accurate", ("elements", "quadratic"), QUICK), 1e-3, WITHIN),
-           "cubic": (("accurate", ("elements", "cubic"), QUICK), 1e-3, WITHIN),
-           "fast": (("fast",), 1e-3, TENTH + ": its elements there are accurate's")}
+FASTEST = {"quadratic, accurate": ((ACCURATE, runs.of("quadratic"), FINER), 1e-3, WITHIN),
+           "cubic": ((ACCURATE, runs.of("cubic"), FINER), 1e-3, WITHIN),
+           "fast": ((FAST,), 1e-3, TENTH + ": its elements there are accurate's")}
 
 
 @case("transport-curved-peclet", kind="property", slow=True,
@@ -224,20 +224,20 @@ FASTEST = {"quadratic, accurate": (("accurate", ("elements", "quadratic"), QUICK
       because="order 1 and paper: linear elements are not made for boundary layers")
 def peclet(speed: str, made: tuple):
     numerics, bound, why = made
-    far = _carried(100.0, 60.0, speed, "accurate", ("refinement", 2.5))
+    far = _carried(100.0, 60.0, speed, ACCURATE, "numerics.refinement=2.5")
     for name, ours, trusted in zip(NAMES, _carried(100.0, 60.0, speed, *numerics), far):
-        yield at_most(f"effluent {name}", abs(ours.effluent - trusted.effluent) / SUPPLY, bound, why)
-        yield at_most(f"consumed {name}", abs(ours.consumed / trusted.consumed - 1), bound, why)
+        yield each_at_most({"effluent": abs(ours.effluent - trusted.effluent) / SUPPLY,
+                            "consumed": abs(ours.consumed / trusted.consumed - 1)}, bound, why, f" {name}")
 
 
 #: The balance's round-off, and how far effluents may be from those of quadratic elements twice finer: of numerics.
 CONSERVES = 1e-11, "round-off: the form conserves"
 HALF_DISCS = {
-    "cubic": (("accurate", ("elements", "cubic")), CONSERVES, 1e-5, "a hundredth of what preset accurate is for"),
-    "quadratic": (("accurate", ("refinement", 0.9)), CONSERVES, 0.0, "itself what the others are compared with"),
-    "linear, paper": (("paper",), (1e-9, ROUND_OFF), 1e-2, "1 %, what preset paper is for"),
-    "fast": (("fast",), CONSERVES, 1e-3, TENTH),
-    "accurate": (("accurate",), CONSERVES, 1e-4, "a tenth of what preset accurate is for")}
+    "cubic": ((ACCURATE, runs.of("cubic")), CONSERVES, 1e-5, "a hundredth of what preset accurate is for"),
+    "quadratic": ((ACCURATE, "numerics.refinement=0.9"), CONSERVES, 0.0, "itself what the others are compared with"),
+    "linear, paper": ((PAPER,), (1e-9, ROUND_OFF), 1e-2, "1 %, what preset paper is for"),
+    "fast": ((FAST,), CONSERVES, 1e-3, TENTH),
+    "accurate": ((ACCURATE,), CONSERVES, 1e-4, "a tenth of what preset accurate is for")}
 
 
 @case("transport-cubic-half-disc", kind="property",
@@ -259,7 +259,7 @@ HOURS = (0.2, 2.0, 8.0)
 #: The paper's kinetics and diffusivities, the supply held at both ends: both substrates fall towards the wall.
 OPEN = replace(SCENE.substrates, acceptor=replace(SCENE.substrates.acceptor, supply=1.0))
 #: Elements of each order on a mesh of their own, and those of presets.
-MEAN: dict[str, int | str] = {**ORDERS, "paper": "paper", "fast": "fast", "accurate": "accurate"}
+MEAN: dict[str, int | str] = {**ORDERS, "paper": PAPER, "fast": FAST, "accurate": ACCURATE}
 
 
 @cache
