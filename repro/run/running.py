@@ -274,9 +274,10 @@ def _continued(recorder: Recorder, told: dict, progress: Progress, watch: Watch)
 
 
 def _left_alone(recorder: Recorder, status: str, watch: Watch) -> str:
-    """What is said of a run that is over; where it was killed at its very end, that is made."""
+    """What is said of a run that is over; where its very end is missing, that is made."""
     folder = recorder.folder
-    if any((folder / name).exists() for name in CHECKPOINTS):
+    left = any((folder / name).exists() for name in CHECKPOINTS)
+    if left or not is_file(folder / "report.html"):
         settle(folder, True, recorder.own)
     watch.tell({"event": "end", "scene": recorder.scene.name, "status": status,
                 "folder": str(folder), "changed": False})
