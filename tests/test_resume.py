@@ -171,7 +171,8 @@ def test_a_status_that_no_run_writes_is_none(tmp_path, capsys, status):
     run(load_scene("flow_only"), tmp_path)
     results.write_json(tmp_path / "run.json", told(tmp_path) | {"status": status})
     message = refused(tmp_path, capsys, "run", "--resume", tmp_path)
-    assert f"its status {status!r} is none that a run writes" in message and not task.finished(tmp_path)
+    assert f"its status {status!r} is none that a run writes" in message
+    assert not task.finished(tmp_path, load_scene("flow_only"))
 
 
 def test_an_altered_checkpoint_is_refused_and_the_one_before_is_used(tmp_path, capsys):
