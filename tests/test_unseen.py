@@ -328,9 +328,10 @@ def sweep_of(folder, widths):
 
 def test_what_has_not_come_to_its_end_is_made_again(tmp_path):
     """Of the pore's end the whole sentence is needed, and the row that it tells of."""
-    swept = sweep_of(tmp_path, "40 um, 50 um, 60 um, 70 um, 80 um, 90 um")
+    swept = sweep_of(tmp_path, "40 um, 50 um, 60 um, 70 um, 80 um, 90 um, 95 um")
     end = "the aggregate reaches the pore's downstream end at t = 0 h"
-    statuses = ("completed", "failed: x", "interrupted", end, f"{end}!", end.replace("= 0", "= 1"))
+    statuses = ("completed", "failed: x", "interrupted", end, f"{end}!", end.replace("= 0", "= 1"),
+                end.replace("at t", "in the step from t"))
     for point, status in zip(swept.points, statuses):
         (swept.runs / point.name).mkdir(parents=True)
         one = running.Recorder(point.scene, swept.runs / point.name)
