@@ -65,11 +65,14 @@ def _record(path: Path) -> dict:
 
 
 def _series(path: Path, told: object) -> dict[str, np.ndarray]:
-    """The time series, of as many rows as ``run.json`` tells of, or more: that is written later."""
+    """The time series, with ascending times; of as many rows as ``run.json``, which is written
+    after it, tells of, or more."""
     series = _table(path, ["time_h"])
     count = len(series["time_h"])
     if not isinstance(told, int) or count < told:
         raise ValueError(f"it has {count} rows, and run.json tells of {told}")
+    if (np.diff(series["time_h"]) <= 0).any():
+        raise ValueError("its times do not ascend")
     return series
 
 
