@@ -132,6 +132,8 @@ def test_a_limit_of_file_sizes_ends_a_run_in_one_line(tmp_path, most, which):
     asked = [*SHORT, "--set", 'growth.end="0.4 h"', "--out", str(tmp_path / "run"), "--quiet"]
     status, message = limited("RLIMIT_FSIZE", most, *asked)
     assert status == 2 and f"{which}File too large" in message and message.count("\n") == 1, message
+    assert message.endswith("and go on with --resume\n" if (tmp_path / "run" / "run.json").exists() else
+                            "and give the same command again\n")
     left = files(tmp_path / "run")
     assert not [name for name in left if "writing" in name or "part" in name or "fields" in which and "vtu" in name]
     assert main(["run", *(["--resume", str(tmp_path / "run"), "--quiet"] if which else asked)]) == 0
