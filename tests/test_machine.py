@@ -15,7 +15,7 @@ from repro.run.running import resume
 from repro.scene import SceneError, load_scene
 from tests import faults
 from tests.pages import run
-from tests.shell import SHORT, files, refused, shell, stopped
+from tests.shell import SHORT, files, refused, shell, stopped, told
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="for Linux alone")
 CHOICES = [("numerics.solver=pardiso", "pypardiso"), ("numerics.ordering=metis", "pymetis")]
@@ -124,16 +124,20 @@ MORE = [pytest.param(size, "", marks=pytest.mark.thorough) for size in (0, 8_000
 
 
 @LINUX
-@pytest.mark.parametrize("most, which", [(500, ""), (20_000, "fields_0000.vtu: "), *MORE])
+@pytest.mark.parametrize("most, which", [(500, ""), (20_000, "fields_0000.vtu: "),
+                                         (100_000, "report.html: "), *MORE])
 def test_a_limit_of_file_sizes_ends_a_run_in_one_line(tmp_path, most, which):
-    """Whichever file it is that may not grow, the first to be longer than 20 kB fields; with more room the run goes on,
-    which is asked for in either way."""
+    """Whichever file it is that may not grow, the first to be longer than 20 kB fields, the last the page of a run that
+    is over; with more room the run goes on, which is asked for in either way, until all is there that it lists."""
     asked = [*SHORT, "--set", 'growth.end="0.4 h"', "--out", str(tmp_path / "run"), "--quiet"]
     status, message = limited("RLIMIT_FSIZE", most, *asked)
     assert status == 2 and f"{which}File too large" in message and message.count("\n") == 1, message
+    assert message.endswith("and go on with --resume\n" if (tmp_path / "run" / "run.json").exists() else
+                            "and give the same command again\n")
     left = files(tmp_path / "run")
-    assert not [name for name in left if "writing" in name or "part" in name or which and "vtu" in name]
+    assert not [name for name in left if "writing" in name or "part" in name or "fields" in which and "vtu" in name]
     assert main(["run", *(["--resume", str(tmp_path / "run"), "--quiet"] if which else asked)]) == 0
+    assert all((tmp_path / "run" / name).is_file() for name in told(tmp_path / "run")["files"])
 
 
 def test_want_of_memory_outside_of_the_steps_is_told_in_one_line(tmp_path, capsys, monkeypatch):

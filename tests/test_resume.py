@@ -6,6 +6,8 @@ import re
 import signal
 from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
+from shutil import copytree
 from subprocess import TimeoutExpired
 
 import pytest
@@ -73,6 +75,7 @@ MORE = {
 
 
 SHORT = ('numerics.preset="fast"', 'growth.end="3 h"')
+PORE_END = "the aggregate reaches the pore's upstream end at t = 3 h"
 SCENE = load_scene("base", SHORT)
 
 
@@ -132,7 +135,8 @@ def test_the_end_of_the_pore_is_an_end_after_a_resume_too(tmp_path):
             found.append(state)
     with pytest.raises(PoreEnd):
         next(steps(scene, found[-1]))
-    assert "reaches the pore's" in run(scene, tmp_path / "whole")
+    status = run(scene, tmp_path / "whole")
+    assert "reaches the pore's" in status and resume(tmp_path / "whole") == status
     in_parts(scene, tmp_path / "parts", len(found))
     assert lasting(tmp_path / "parts") == lasting(tmp_path / "whole")
 
@@ -165,13 +169,44 @@ def test_a_record_of_no_scene_or_of_another_is_refused(tmp_path, capsys, record)
     assert "run.json: " in refused(tmp_path, capsys, "run", "--resume", tmp_path)
 
 
-@pytest.mark.parametrize("status", ["", "Completed", "completed ", "failed", "runningly", "interrupted?"])
+@pytest.mark.parametrize("status", ["", "Completed", "completed ", "failed", "runningly", "interrupted?",
+                                    "the aggregate reaches nothing at all", f"{PORE_END}, or so"])
 def test_a_status_that_no_run_writes_is_none(tmp_path, capsys, status):
     """Neither finished nor to be gone on with."""
     run(load_scene("flow_only"), tmp_path)
     results.write_json(tmp_path / "run.json", told(tmp_path) | {"status": status})
     message = refused(tmp_path, capsys, "run", "--resume", tmp_path)
-    assert f"its status {status!r} is none that a run writes" in message and not task.finished(tmp_path)
+    assert f"its status {status!r} is none that a run writes" in message
+    assert not task.finished(tmp_path, load_scene("flow_only"))
+
+
+@pytest.mark.parametrize("status", ["completed", PORE_END, PORE_END.replace("at t", "in the step from t")])
+def test_a_run_said_to_be_over_that_has_not_come_so_far_is_gone_on_with(tmp_path, capsys, status):
+    """Its checkpoints are kept for that, and it is told."""
+    out = tmp_path / "run"
+    stopped(SCENE, out)
+    results.write_json(out / "run.json", told(out) | {"status": status})
+    assert resumed(out) == 0
+    found = capsys.readouterr().err
+    assert f"run.json says {status!r}, but the last row of timeseries.csv is of t = " in found
+    assert "goes on from its checkpoint" in found
+    assert as_whole(SCENE, out) and told(out)["status"] == "completed"
+
+
+@pytest.mark.parametrize("name, content, why", [
+    ("timeseries.csv", b"time_h\n0.0\n", "it has 1 rows"), ("timeseries.csv", None, "timeseries.csv is missing"),
+    ("ledger.csv", b"start_h\n", "ledger.csv cannot be read")])
+def test_a_run_that_is_over_and_damaged_is_neither_whole_nor_begun_anew_unasked(tmp_path, capsys, name, content, why):
+    """Nor gone on with: there is no checkpoint any more. What is left of it stays until --force."""
+    out = Path(copytree(whole_of(SCENE), tmp_path / "run"))
+    (out / name).unlink()
+    if content is not None:
+        (out / name).write_bytes(content)
+    for arguments in (["--resume"], ["base", *flags(*SHORT), "--out"]):
+        message = refused(tmp_path, capsys, "run", *arguments, out)
+        assert f"{out}: " in message and why in message and "--force with its scene makes the run anew" in message
+    assert main(["run", "base", *flags(*SHORT), "--out", str(out), "--force", "--quiet"]) == 0
+    assert as_whole(SCENE, out)
 
 
 def test_an_altered_checkpoint_is_refused_and_the_one_before_is_used(tmp_path, capsys):

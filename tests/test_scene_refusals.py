@@ -3,6 +3,7 @@ import json
 import re
 import time
 import tomllib
+import tracemalloc
 from pathlib import Path
 
 import pytest
@@ -348,17 +349,17 @@ outline = [["-5.0 um", "0.0 um"], {POINTS} ["5.0 um", "0.0 um"]]
     (f"{DEEP} = 1", 1), (f"[pore]\n\n[{DEEP}]", 3), (f"a = {{{DEEP} = 1}}", 1), (f"a = [{{{DEEP} = 1}}]", 1),
     (DEEP.replace(".", " .\t") + " = 1", 1), (DEEP.replace("a", '"a.\\""') + " = 1", 1),
     (DEEP.replace("a", "'a.\"'") + " = 1", 1), ('a = """\n\\" "" x"""\n' + f"{DEEP} = 1", 3),
-    ("a = '''\n\"'' '''\n" + f"{DEEP} = 1", 3), (f"a = '#'\n{DEEP}", 2), (".".join("a" * 21) + " = 1", 1),
+    ("a = '''\n\"'' '''\n" + f"{DEEP} = 1", 3), (f"a = '#'\n{DEEP}", 2), (".".join("a" * 9) + " = 1", 1),
 ])
 def test_keys_of_many_parts_are_refused_before_they_are_parsed(tmp_path, monkeypatch, text, line):
     """They take memory as the square of the parts: 1.5 GB here."""
     monkeypatch.setattr(tomllib, "loads", None)
-    said = f"a key of more than 20 parts (at line {line}); one of a scene has at most 3"
+    said = f"a key of more than 8 parts (at line {line}); one of a scene has at most 3"
     assert said in refusal(written(tmp_path, text))
 
 
 @pytest.mark.parametrize("entry, said", [
-    (f"{DEEP}=1", "a key of at most 20 parts is needed"), (f"pore={{{DEEP}=1}}", "a table [pore] is needed"),
+    (f"{DEEP}=1", "a key of at most 8 parts is needed"), (f"pore={{{DEEP}=1}}", "a table [pore] is needed"),
     (f"pore.width={{{DEEP}=1}}", LENGTH)])
 def test_set_takes_no_key_of_many_parts(monkeypatch, entry, said):
     read = files.read_tables("base")
@@ -369,9 +370,9 @@ def test_set_takes_no_key_of_many_parts(monkeypatch, entry, said):
 
 
 def test_dots_that_are_no_keys_are_read(tmp_path):
-    """Dots of comments, texts and numbers; keys of 20 parts."""
+    """Dots of comments, texts and numbers; keys of 8 parts."""
     assert len(load_scene(written(tmp_path, DOTTED)).aggregate.outline) == 82
-    assert "there is no such key" in refusal(written(tmp_path, ".".join("a" * 20) + " = 1"))
+    assert "there is no such key" in refusal(written(tmp_path, ".".join("a" * 8) + " = 1"))
 
 
 @pytest.mark.parametrize("piece", ["a", '"', '\\"', "'", "a.", "a .", '"a', "#", '"""', "'''", "\\", " ", '"\\'])
@@ -383,13 +384,25 @@ def test_looking_for_deep_keys_takes_no_longer_than_reading(piece):
     assert time.process_time() - start < 10
 
 
+def test_no_file_takes_much_memory(tmp_path):
+    """The worst that is accepted, one header after another, each of as many parts as a key may have: 110 MB."""
+    head = "[{:x}" + ".a" * (files.MOST_PARTS - 1) + "]\n"
+    text = "".join(head.format(k) for k in range(files.LARGEST // 20))[:files.LARGEST].rpartition("[")[0]
+    path = written(tmp_path, text)
+    tracemalloc.start()
+    assert len(files.read_tables(str(path))) > 10_000
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 150e6
+
+
 def test_a_large_file_is_refused_unread(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_bytes(b"[pore]\n#" + b"x" * (files.LARGEST - 8))
     assert load_scene(path).pore.width == 100
     with path.open("ab") as file:
         file.truncate(10**11)
-    assert "mine.toml: more than 1000000 bytes; a scene has a few thousand" in refusal(path)
+    assert "mine.toml: more than 300000 bytes; a scene has a few thousand" in refusal(path)
 
 
 @pytest.mark.parametrize("text", ["", "# nothing\n", "\ufeff\n\n"])

@@ -1,16 +1,19 @@
 """`repro scene`: every key with its default, unit, range and source; what is written is the scene that was read."""
 
+import json
 import re
 import tomllib
 
+import numpy as np
 import pytest
 from hypothesis import given
 
 from repro.cli import main
 from repro.scene import KEYS, OURS, PRESETS, Scene, load_scene, packaged_scenes, parse_scene, scene_tables
+from repro.scene.files import LARGEST
 from repro.scene.reading import entries
 from repro.scene.text import scene_text
-from repro.scene.units import quantity
+from repro.scene.units import MOST_POINTS, quantity
 from tests.strategies import scenes
 
 #: Keys that exclude another one that is set: they stay commented out.
@@ -119,6 +122,29 @@ def test_any_scene_is_written_as_it_is(made):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "load_tables", lambda source, overrides, unset: tables)
         assert parsed(scene_text("drawn"), "drawn") == made
+
+
+def test_the_largest_scene_is_accepted_and_so_is_what_is_printed_of_it(tmp_path):
+    """An outline and tables of as many entries as are accepted, each number with all its digits."""
+    steps = np.linspace(0, np.pi, MOST_POINTS)
+    x, y = -40.1 * np.cos(steps), 40.1 * np.sin(steps)
+    hours, values = steps * 6.1, 10 * np.exp(-steps)
+
+    def written(columns, units):
+        first, second = ([f"{value!r} {unit}" for value in column.tolist()] for column, unit in zip(columns, units))
+        return list(zip(first, second))
+
+    y[[0, -1]] = 0.0
+    supply = written((hours, values), ("h", "mg/L"))
+    said = {"aggregate.outline": written((x, y), ("um", "um")), "growth.end": "19.4 h",
+            "flow.mean_velocity": written((hours, values / 30), ("h", "m/day")),
+            "substrates.donor.supply": supply, "substrates.acceptor.supply": supply,
+            "output.times": [f"{hour!r} h" for hour in hours.tolist()]}
+    path = tmp_path / "mine.toml"
+    path.write_text("".join(f"{key} = {json.dumps(value)}\n" for key, value in said.items()))
+    text = scene_text(str(path))
+    path.write_text(text)
+    assert 200_000 < len(text) < LARGEST and len(load_scene(path).aggregate.outline) == MOST_POINTS
 
 
 def test_alone_it_lists_the_packaged_scenes(capsys):

@@ -103,6 +103,58 @@ def test_the_same_command_makes_what_is_missing_and_nothing_else(copied, capsys)
     assert "run 1, flow.mean_velocity = 2.9 m/day: completed" in err and "run 3, " not in err
 
 
+def cut_short(run):
+    path = run / "timeseries.csv"
+    path.write_bytes(path.read_bytes()[:300])
+
+
+def without_last_row(run):
+    path = run / "timeseries.csv"
+    path.write_text("".join(path.read_text().splitlines(keepends=True)[:-1]))
+
+
+def unfinished(run):
+    """Of a run that goes on."""
+    without_last_row(run)
+    results.write_json(run / "run.json", told(run) | {"rows": told(run)["rows"] - 1})
+
+
+@pytest.mark.parametrize("spoil", [
+    cut_short, without_last_row, unfinished, lambda run: (run / "timeseries.csv").unlink(),
+    lambda run: (run / "timeseries.csv").write_text(""), lambda run: (run / "run.json").unlink(),
+    lambda run: results.write_table(run / "timeseries.csv", ["time_h"], [[0.1 * k] for k in range(99)]),
+    lambda run: results.write_json(run / "run.json", told(run) | {"status": "sunning"})])
+def test_a_run_that_is_not_whole_is_made_again(copied, capsys, spoil):
+    """However its record says that it ended: the tables are those of before."""
+    names = [row["folder"] for row in rows(copied / "runs.csv")]
+    before = [(copied / name).read_bytes() for name in ("table.csv", f"{names[2]}/timeseries.csv")]
+    spoil(copied / names[2])
+    assert sweep(copied, *VARY, *SHORT) == 3
+    assert [(copied / name).read_bytes() for name in ("table.csv", f"{names[2]}/timeseries.csv")] == before
+    out, err = capsys.readouterr()
+    assert "2 of 3 runs done, 1 failed" in out and "run 3, " in err and "run 1, " not in err
+
+
+def linked(place, other):
+    shutil.move(place, place.parent / "mine")
+    place.symlink_to(other)
+
+
+def moved_in(place, other):
+    shutil.rmtree(place)
+    shutil.copytree(other, place)
+
+
+@pytest.mark.parametrize("change, said", [(linked, "it is a link, or no folder, and so not of this sweep"),
+                                          (moved_in, "it holds the run of another scene")])
+def test_what_stands_in_the_place_of_a_run_and_is_another_is_refused(copied, capsys, change, said):
+    """A link to another run, and another run: neither told as this one nor removed."""
+    first, _, last = [copied / row["folder"] for row in rows(copied / "runs.csv")]
+    change(last, first)
+    message = refused(copied, capsys, *VARY, *SHORT)
+    assert f"{last}: {said}; move it away" in message
+
+
 def refused(out, capsys, *arguments):
     return shell.refused(out, capsys, "sweep", "base", "--out", out, *arguments)
 

@@ -337,11 +337,17 @@ def sweep_of(folder, widths):
 
 
 def test_what_has_not_come_to_its_end_is_made_again(tmp_path):
-    swept = sweep_of(tmp_path, "40 um, 50 um, 60 um, 70 um, 80 um")
-    for point, status in zip(swept.points, ("completed", "failed: x", "interrupted", "the aggregate reaches an end")):
+    """Of the pore's end the whole sentence is needed, and the row that it tells of."""
+    swept = sweep_of(tmp_path, "40 um, 50 um, 60 um, 70 um, 80 um, 90 um, 95 um")
+    end = "the aggregate reaches the pore's downstream end at t = 0 h"
+    statuses = ("completed", "failed: x", "interrupted", end, f"{end}!", end.replace("= 0", "= 1"),
+                end.replace("at t", "in the step from t"))
+    for point, status in zip(swept.points, statuses):
         (swept.runs / point.name).mkdir(parents=True)
-        running.Recorder(point.scene, swept.runs / point.name).tell(status)
-    assert [point.index for point in swept.missing()] == [2, 3, 5]
+        one = running.Recorder(point.scene, swept.runs / point.name)
+        one.record.rows = [[0.0] * len(results.COLUMNS)]
+        one.save(status)
+    assert [point.index for point in swept.missing()] == [2, 3, 5, 6]
 
 
 def test_clogged_runs_are_dots_at_their_time_and_others_stand_at_their_end(tmp_path):

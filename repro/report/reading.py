@@ -37,7 +37,7 @@ def read(folder: Path) -> Run:
     Raises NoRun where it holds none, or one whose files cannot be read.
     """
     record = _read(folder, "run.json", _record)
-    series = _read(folder, "timeseries.csv", lambda path: _table(path, ["time_h"]))
+    series = _read(folder, "timeseries.csv", lambda path: _series(path, record.get("rows")))
     ledger = {}
     if (folder / "ledger.csv").exists():
         ledger = _read(folder, "ledger.csv", lambda path: _table(path, LEDGER_COLUMNS))
@@ -62,6 +62,18 @@ def _record(path: Path) -> dict:
     if not isinstance(record, dict):
         raise ValueError("not a JSON object")
     return record
+
+
+def _series(path: Path, told: object) -> dict[str, np.ndarray]:
+    """The time series, with ascending times; of as many rows as ``run.json``, which is written
+    after it, tells of, or more."""
+    series = _table(path, ["time_h"])
+    count = len(series["time_h"])
+    if not isinstance(told, int) or count < told:
+        raise ValueError(f"it has {count} rows, and run.json tells of {told}")
+    if (np.diff(series["time_h"]) <= 0).any():
+        raise ValueError("its times do not ascend")
+    return series
 
 
 def _table(path: Path, needed: list[str]) -> dict[str, np.ndarray]:

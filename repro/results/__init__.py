@@ -15,8 +15,10 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 import os
 import platform
+from contextlib import suppress
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -87,14 +89,32 @@ def _shown(value: object) -> object:
 
 
 def read_table(path: Path) -> dict[str, np.ndarray]:
-    """The columns of a CSV table that a run has written; an empty field is not-a-number."""
-    with path.open(encoding="utf-8", newline="") as lines:
-        reader = csv.DictReader(lines)
-        rows = list(reader)
-    found = {}
-    for name in reader.fieldnames or ():
-        found[name] = np.array([float(row[name] or "nan") for row in rows])
-    return found
+    """The columns of a CSV table that a run has written; an empty field is not-a-number.
+
+    Raises ValueError where it is not whole: a line that is cut short, or what is no finite number.
+    """
+    text = path.read_text(encoding="utf-8")
+    if not text.endswith("\n"):
+        raise ValueError("its last line is cut short" if text else "it is empty")
+    head, *rows = csv.reader(io.StringIO(text))
+    table = [_numbers(row, len(head), line) for line, row in enumerate(rows, 2)]
+    columns = np.array(table, dtype=float).reshape(len(rows), len(head)).T
+    return dict(zip(head, np.ascontiguousarray(columns)))
+
+
+def _numbers(row: list[str], count: int, line: int) -> list[float]:
+    """The numbers of a line of so many fields."""
+    if len(row) != count:
+        raise ValueError(f"line {line} has {len(row)} fields, where {count} are needed")
+    return [_number(field, line) for field in row]
+
+
+def _number(field: str, line: int) -> float:
+    """A number; not-a-number of an empty field, and of that alone."""
+    with suppress(ValueError):
+        if not field or math.isfinite(float(field)):
+            return float(field or "nan")
+    raise ValueError(f"line {line} has {field[:40]!r}, where a finite number is needed")
 
 
 def provenance(scene: Scene) -> dict:

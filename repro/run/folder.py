@@ -134,8 +134,10 @@ def writing(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
+        begun = path.name != PROVENANCE or is_file(path)
+        then = "go on with --resume" if begun else "give the same command again"
         raise OutputError(f"{path}: {error.strerror or error}; what was written before is whole: "
-                          "make room, or give leave to write, and go on with --resume") from error
+                          f"make room, or give leave to write, and {then}") from error
 
 
 def claimed(folder: Path, name: str, own: set[str]) -> Path:

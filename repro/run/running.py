@@ -21,6 +21,7 @@ from repro.check.simplifications import Warned
 from repro.errors import CheckpointError, Interrupted, OutputError, SimulationError
 from repro.march.loop import Instant, PoreEnd, State
 from repro.march.simulation import ends_soon, same_rows, steps
+from repro.report.reading import NoRun
 from repro.results.files import is_file
 from repro.run import INTERVAL, checkpoint
 from repro.run.folder import (
@@ -38,6 +39,7 @@ from repro.run.machine import conditions, differences, require_packages
 from repro.run.memory import require_memory
 from repro.run.recorder import Recorder, interrupted, settle
 from repro.run.status import COMPLETED, FAILED, INTERRUPTED, RUNNING, done, undone
+from repro.run.whole import whole
 from repro.scene import (
     KEYS,
     Scene,
@@ -258,7 +260,7 @@ def _tell_another_file(recorder: Recorder, watch: Watch) -> None:
 
 def _continued(recorder: Recorder, told: dict, progress: Progress, watch: Watch) -> str:
     """Go on with the run that ``run.json`` tells of, unless it is over; how it ended."""
-    if done(told["status"]):
+    if done(told["status"]) and _is_whole(recorder, watch):
         return _left_alone(recorder, told["status"], watch)
     _require(recorder.scene, watch)
     timing.reset()
@@ -273,10 +275,26 @@ def _continued(recorder: Recorder, told: dict, progress: Progress, watch: Watch)
     return _recorded(recorder, steps(recorder.scene, recorder.state), progress, watch)
 
 
+def _is_whole(recorder: Recorder, watch: Watch) -> bool:
+    """Is all there of a run that is said to be over? Raises OutputError where not, and there is no
+    checkpoint to go on from either."""
+    try:
+        whole(recorder.folder, recorder.scene)
+        return True
+    except NoRun as error:
+        names = (checkpoint.NEWEST, checkpoint.PREVIOUS)
+        if not any(is_file(recorder.folder / name) for name in names):
+            raise OutputError(f"{error}; there is no checkpoint to go on from: --force with its "
+                              "scene makes the run anew") from None
+        watch.warn(f"{error}; it goes on from its checkpoint")
+        return False
+
+
 def _left_alone(recorder: Recorder, status: str, watch: Watch) -> str:
-    """What is said of a run that is over; where it was killed at its very end, that is made."""
+    """What is said of a run that is over; where its very end is missing, that is made."""
     folder = recorder.folder
-    if any((folder / name).exists() for name in CHECKPOINTS):
+    left = any((folder / name).exists() for name in CHECKPOINTS)
+    if left or not is_file(folder / "report.html"):
         settle(folder, True, recorder.own)
     watch.tell({"event": "end", "scene": recorder.scene.name, "status": status,
                 "folder": str(folder), "changed": False})

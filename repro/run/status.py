@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
+import math
+import re
+
 COMPLETED = "completed"
 RUNNING = "running"
 INTERRUPTED = "interrupted"
 #: How a status begins that goes on with the reason.
-FAILED, PORE_END = "failed: ", "the aggregate reaches "
+FAILED = "failed: "
+#: The status of a run that ends with its pore, and when: :class:`repro.march.loop.PoreEnd`.
+PORE_END = re.compile(r"the aggregate reaches the pore's (?:up|down)stream end "
+                      r"(?:at|in the step from) t = (\d+(?:\.\d+)?(?:e[+-]\d+)?) h")
 
 
 def done(status: str | None) -> bool:
     """Has the run come to its end, the scene's or the pore's?"""
-    return status is not None and (status == COMPLETED or status.startswith(PORE_END))
+    return status is not None and (status == COMPLETED or pore_end(status) < math.inf)
+
+
+def pore_end(status: str) -> float:
+    """When (h, of six digits) the aggregate has come to an end of the pore; infinite where not."""
+    match = PORE_END.fullmatch(status)
+    return float(match[1]) if match else math.inf
 
 
 def undone(status: str | None) -> bool:

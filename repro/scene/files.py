@@ -9,8 +9,10 @@ from repro.scene.reading import Place, did_you_mean, elsewhere, shown
 from repro.scene.units import SceneError, nearest
 
 LONGEST_LINE = 80  # characters of a line of a file in a message
-LARGEST = 1_000_000  # bytes of a file
-MOST_PARTS = 20  # of a dotted key; tomllib's memory grows with their square
+#: Bytes of a file: those of an outline and of tables, each as long as is accepted, are 245 000;
+#: tomllib takes up to 400 times as much memory.
+LARGEST = 300_000
+MOST_PARTS = 8  # of a dotted key; tomllib's memory grows with their square
 #: A value with a unit, without quotes.
 BARE = re.compile(r"=\s*[-+.\d][-+.\deE]*\s*[A-Za-z\u00b5\u03bc]")
 #: Pieces of TOML, without backtracking: what may be a part of a key, a dot, and all else.
@@ -54,7 +56,8 @@ def _content(file: str) -> bytes:
     except OSError as error:
         raise SceneError(f"{file}: cannot be read ({error.strerror})") from None
     if len(content) > LARGEST:
-        raise SceneError(f"{file}: more than {LARGEST} bytes; a scene has a few thousand")
+        raise SceneError(f"{file}: more than {LARGEST} bytes; a scene has a few thousand, one "
+                         "with long tables up to 250 000")
     return content
 
 

@@ -14,7 +14,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from repro.results import write_json
-from repro.results.files import open_lock, whole
+from repro.results.files import is_folder, open_lock, whole
 from repro.run.running import OutputError
 from repro.sweep import task
 from repro.sweep.design import Factor, Point
@@ -40,7 +40,8 @@ class Sweep:
 
     def missing(self) -> list[Point]:
         """The runs that have not come to their end."""
-        return [point for point in self.points if not task.finished(self.runs / point.name)]
+        return [point for point in self.points
+                if not task.finished(self.runs / point.name, point.scene)]
 
 
 @contextmanager
@@ -52,6 +53,7 @@ def opened(sweep: Sweep):
     """
     with usable(sweep.folder):
         _check(sweep.folder, _as_json(sweep))
+        _refuse_others(sweep)
         sweep.runs.mkdir(parents=True, exist_ok=True)
         lock = os.fdopen(open_lock(sweep.folder / ".lock"), "a")
     with lock:
@@ -112,6 +114,17 @@ def _compare(folder: Path, told: dict, wanted: dict) -> None:
                          "--vary, --samples and --seed, is needed")
 
 
+def _refuse_others(sweep: Sweep) -> None:
+    """Raises SweepError where the place of a run is a link, or no folder, or has another run."""
+    for point in sweep.points:
+        place = sweep.runs / point.name
+        if os.path.lexists(place) and not is_folder(place):
+            raise SweepError(f"{place}: it is a link, or no folder, and so not of this sweep; move "
+                             "it away")
+        if task.ran(place) not in (None, point.hash):
+            raise SweepError(f"{place}: it holds the run of another scene; move it away")
+
+
 def _hold(lock, folder: Path) -> None:
     """Hold the folder against other sweeps, until the file `lock` is closed or this process ends.
     """
@@ -128,6 +141,6 @@ def _hold(lock, folder: Path) -> None:
 def _clean(sweep: Sweep) -> None:
     """Remove what is left of attempts at runs that are there now."""
     for point in sweep.points:
-        if task.finished(sweep.runs / point.name):
+        if task.finished(sweep.runs / point.name, point.scene):
             for left in sweep.runs.glob(f".part-{point.name}*"):
                 shutil.rmtree(left, ignore_errors=True)

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import csv
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,10 +14,11 @@ from pathlib import Path
 import numpy as np
 
 from repro import results
+from repro.report.reading import NoRun
 from repro.results.files import whole
 from repro.results.quantities import Quantity
 from repro.run import status
-from repro.sweep import task
+from repro.run.whole import there
 from repro.sweep.design import Point
 from repro.sweep.state import Sweep
 
@@ -92,31 +92,33 @@ class Told:
 
 
 def tell(sweep: Sweep, ended: dict[int, str], clogged: float) -> list[Told]:
-    """Every run of a sweep; `ended` says how those ended that left no run.json, by number."""
+    """Every run of a sweep; `ended` says how those ended that left none to read, by number."""
     return [_told(point, sweep.runs / point.name, ended.get(point.index, "not run"), clogged)
             for point in sweep.points]
 
 
 def _told(point: Point, folder: Path, otherwise: str, clogged: float) -> Told:
-    ended, found = task.status(folder), _series(folder)
-    if ended is None or found is None:
-        empty = np.zeros(0)
-        return Told(point, ended or otherwise, empty, empty, empty, dict.fromkeys(COLUMNS))
-    pore, times = point.scene.pore, found["time_h"]
+    try:
+        run = there(folder, point.scene)
+    except NoRun:
+        return _empty(point, otherwise)
+    found = run.series
+    pore = point.scene.pore
+    times = run.times
+    ended = run.record["status"]
+    if not len(times):
+        return _empty(point, ended)
     relative = found["conductivity_m_per_d"] / found["conductivity_m_per_d"][0]
     biomass = found["aggregate_area_um2"] / (pore.width * pore.length)
-    wall = json.loads((folder / "run.json").read_text(encoding="utf-8"))["wall_time_s"]
+    wall = run.record["wall_time_s"]
     course = Course(times, relative, biomass, found["contact"] > 0, wall, clogged)
     numbers = {each.name: _or_none(each.reported(course)) for each in NUMBERS}
     return Told(point, ended, times, relative, biomass, numbers)
 
 
-def _series(folder: Path) -> dict[str, np.ndarray] | None:
-    """The time series of a run, None where it has no row."""
-    path = folder / "timeseries.csv"
-    if not path.exists() or path.read_text(encoding="utf-8").count("\n") < 2:
-        return None
-    return results.read_table(path)
+def _empty(point: Point, ended: str) -> Told:
+    none = np.zeros(0)
+    return Told(point, ended, none, none, none, dict.fromkeys(COLUMNS))
 
 
 def _or_none(value: float) -> float | None:

@@ -13,10 +13,11 @@ from importlib.metadata import version
 from pathlib import Path
 
 from repro.errors import SimulationError
+from repro.report.reading import NoRun
 from repro.run.checkpoint import NEWEST, PREVIOUS
 from repro.run.machine import source_hash
 from repro.run.running import OutputError, resume, run
-from repro.run.status import done, undone
+from repro.run.whole import whole
 from repro.scene import Scene, SceneError, scene_hash
 
 
@@ -25,18 +26,21 @@ def code() -> str:
     return f"{version('dupin2001-repro')}-{source_hash()}"
 
 
-def status(folder: Path) -> str | None:
-    """How the run in a folder has ended, None where there is none that a run tells."""
+def finished(folder: Path, scene: Scene) -> bool:
+    """Has the scene's run in a folder come to its end, and is it all there?"""
     try:
-        told = str(json.loads((folder / "run.json").read_text(encoding="utf-8"))["status"])
-    except (OSError, ValueError, KeyError, TypeError):
+        whole(folder, scene)
+    except NoRun:
+        return False
+    return True
+
+
+def ran(folder: Path) -> str | None:
+    """The hash of the scene whose run is in a folder, None where there is none that tells it."""
+    try:
+        return str(json.loads((folder / "run.json").read_text(encoding="utf-8"))["hash"])
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
-    return told if done(told) or undone(told) else None
-
-
-def finished(folder: Path) -> bool:
-    """Has the run in a folder come to its end?"""
-    return done(status(folder))
 
 
 def make(scene: Scene, folder: Path, beside: Path) -> str:
@@ -48,7 +52,7 @@ def make(scene: Scene, folder: Path, beside: Path) -> str:
         shutil.rmtree(beside, ignore_errors=True)
     try:
         ended = _made(scene, beside)
-        _place(beside, folder)
+        _place(scene, beside, folder)
     except OSError as error:
         return f"failed: {folder}: {error.strerror or error}"
     return ended
@@ -56,12 +60,8 @@ def make(scene: Scene, folder: Path, beside: Path) -> str:
 
 def _begun(scene: Scene, beside: Path) -> bool:
     """Is there a state of this scene's run to go on from?"""
-    try:
-        told = json.loads((beside / "run.json").read_text(encoding="utf-8"))
-        kept = any((beside / name).is_file() for name in (NEWEST, PREVIOUS))
-        return kept and told["hash"] == scene_hash(scene)
-    except (OSError, ValueError, KeyError, TypeError):
-        return False
+    kept = any((beside / name).is_file() for name in (NEWEST, PREVIOUS))
+    return kept and ran(beside) == scene_hash(scene)
 
 
 def _made(scene: Scene, beside: Path) -> str:
@@ -74,16 +74,16 @@ def _made(scene: Scene, beside: Path) -> str:
         return f"failed: {type(error).__name__}: {error}"
 
 
-def _place(beside: Path, folder: Path) -> None:
+def _place(scene: Scene, beside: Path, folder: Path) -> None:
     """Move a run to its place, unless another has finished it meanwhile.
 
     One that failed gives way.
     """
-    if not finished(folder):
+    if not finished(folder, scene):
         shutil.rmtree(folder, ignore_errors=True)
     try:
         os.rename(beside, folder)
     except OSError:
-        if not finished(folder):
+        if not finished(folder, scene):
             raise
         shutil.rmtree(beside, ignore_errors=True)
