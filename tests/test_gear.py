@@ -13,6 +13,7 @@ from repro.march.simulation import simulate
 from repro.model import gear, kinetics, pore, transport
 from repro.model.kinetics import Sink
 from repro.model.transport import Balance, Concentrations
+from repro.scene import load_scene
 from tests.strategies import ORDERS, fitted_order, scene
 
 SECOND = 1 / 3600
@@ -241,3 +242,17 @@ def transport_mass(instant):
     """Acceptor and donor in the pore, um2 mg/L."""
     weight, found = storage(instant.solved.problem), instant.solved.concentrations
     return np.array([weight @ found.acceptor, weight @ found.donor])
+
+
+@pytest.mark.parametrize("changes, unset", [
+    (['substrates.acceptor.supply=[["0 h", "10 mg/L"], ["0.4 h", "0 mg/L"]]', 'growth.end="1.4 h"'], ()),
+    (["aggregate.radius=20 um", "substrates.boundary=closed", 'growth.end="9.2 h"'], ["flow"])])
+def test_a_substrate_may_be_used_up_to_nothing(changes, unset):
+    """Supplied no more, or shut in with an aggregate that takes it, the acceptor falls until it underflows, and the run
+    goes on: no biomass is made any more, and the donor is left."""
+    starved = load_scene("base", ["numerics.preset=paper", "numerics.transport=gear", "numerics.refinement=0.4",
+                                  *changes], unset)
+    *_, before, last = simulate(starved)
+    left = last.solved.concentrations
+    assert 0 <= left.acceptor.min() and left.acceptor.max() < np.finfo(float).tiny and left.donor.min() > 1
+    assert last.pore.time == starved.growth.end and last.pore.mass == pytest.approx(before.pore.mass, rel=1e-13)
