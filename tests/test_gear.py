@@ -162,6 +162,25 @@ def test_settled_profiles_are_steady(radius, velocity, order):
 
 
 @EVERY_ORDER
+@pytest.mark.parametrize("before, after", [(10.0, 20.0), (10.0, 5.0), (10.0, 12.0), (10.0, 0.0), (0.0, 10.0)])
+def test_profiles_settle_after_a_jump_of_the_supply_at_constrained_ends(before, after, order):
+    """The acceptor's, small, large, to nothing and from nothing, while the donor's stays: to Newton's profiles, as
+    above."""
+    now, problem = case("20 um", None, order=order)
+    sink, earlier, later = Sink(now.active), *(supplied(problem, supply) for supply in (before, after))
+    found, steady = gear.settle(later, sink, gear.settle(earlier, sink, None)), transport.steady(later, sink)
+    assert found.acceptor == pytest.approx(steady.acceptor, abs=1e-6)
+    assert found.donor == pytest.approx(steady.donor, abs=1e-6)
+
+
+def supplied(problem, acceptor):
+    """The same problem with another supply of the acceptor, mg/L."""
+    both = problem.substrates
+    other = replace(both, acceptor=replace(both.acceptor, supply=acceptor))
+    return transport.problem(problem.space, None, other, problem.kinetics)
+
+
+@EVERY_ORDER
 def test_nothing_settles_where_nothing_enters(order):
     now, problem = case(velocity=None, boundary="closed", order=order)
     guess = Concentrations(np.full(problem.space.count, 3.0), np.full(problem.space.count, 4.0))
