@@ -265,7 +265,8 @@ def transport_mass(instant):
 
 @pytest.mark.parametrize("changes, unset", [
     (['substrates.acceptor.supply=[["0 h", "10 mg/L"], ["0.4 h", "0 mg/L"]]', 'growth.end="1.4 h"'], ()),
-    (["aggregate.radius=20 um", "substrates.boundary=closed", 'growth.end="9.2 h"'], ["flow"])])
+    (["aggregate.radius=20 um", "substrates.boundary=closed", "pore.length=200 um", "numerics.extent=full",
+      'growth.end="9.2 h"'], ["flow"])])
 def test_a_substrate_may_be_used_up_to_nothing(changes, unset):
     """Supplied no more, or shut in with an aggregate that takes it, the acceptor falls until it underflows, and the run
     goes on: no biomass is made any more, and the donor is left."""
