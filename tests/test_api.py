@@ -192,6 +192,23 @@ def test_a_run_is_loaded_as_it_was_solved(found, tmp_path):
         repro.load_run(tmp_path / "fields")
 
 
+def test_fields_that_are_lost_are_told_and_none_is_taken_for_another(found, tmp_path):
+    """Of four times the second file is gone, then the first, then the list: the others stay what they are, units too,
+    and a notebook shows no picture."""
+    repro.run(load_scene("base", SHORT), str(tmp_path))
+    loaded = repro.load_run(tmp_path)
+    for row, left in ((1, (0, 2, 3)), (0, (2, 3))):
+        (tmp_path / f"fields/fields_000{row}.vtu").unlink()
+        for one in (loaded, repro.load_run(tmp_path)):
+            assert all(same_arrays(one.fields(found.time[k]), found.fields(found.time[k])) for k in left)
+            with pytest.raises(OutputError, match=rf"fields_000{row}.vtu: the fields of {found.time[row]} h are miss"):
+                one.fields(found.time[row])
+            assert one.units == found.units and "<img" not in one._repr_html_()
+    (tmp_path / "fields.pvd").unlink()
+    with pytest.raises(OutputError, match=r"fields\.pvd: no fields of 0.6 h are listed"):
+        repro.load_run(tmp_path).fields(0.6)
+
+
 def test_data_frames_and_datasets_have_names_and_units(found):
     frame = pytest.importorskip("pandas") and found.to_pandas()
     assert frame.index.name == "time_h" and list(frame) == list(found)[1:]

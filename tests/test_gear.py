@@ -162,6 +162,25 @@ def test_settled_profiles_are_steady(radius, velocity, order):
 
 
 @EVERY_ORDER
+@pytest.mark.parametrize("before, after", [(10.0, 20.0), (10.0, 5.0), (10.0, 12.0), (10.0, 0.0), (0.0, 10.0)])
+def test_profiles_settle_after_a_jump_of_the_supply_at_constrained_ends(before, after, order):
+    """The acceptor's, small, large, to nothing and from nothing, while the donor's stays: to Newton's profiles, as
+    above."""
+    now, problem = case("20 um", None, order=order)
+    sink, earlier, later = Sink(now.active), *(supplied(problem, supply) for supply in (before, after))
+    found, steady = gear.settle(later, sink, gear.settle(earlier, sink, None)), transport.steady(later, sink)
+    assert found.acceptor == pytest.approx(steady.acceptor, abs=1e-6)
+    assert found.donor == pytest.approx(steady.donor, abs=1e-6)
+
+
+def supplied(problem, acceptor):
+    """The same problem with another supply of the acceptor, mg/L."""
+    both = problem.substrates
+    other = replace(both, acceptor=replace(both.acceptor, supply=acceptor))
+    return transport.problem(problem.space, None, other, problem.kinetics)
+
+
+@EVERY_ORDER
 def test_nothing_settles_where_nothing_enters(order):
     now, problem = case(velocity=None, boundary="closed", order=order)
     guess = Concentrations(np.full(problem.space.count, 3.0), np.full(problem.space.count, 4.0))
@@ -278,3 +297,18 @@ def transport_mass(instant):
     """Acceptor and donor in the pore, um2 mg/L."""
     weight, found = storage(instant.solved.problem), instant.solved.concentrations
     return np.array([weight @ found.acceptor, weight @ found.donor])
+
+
+@pytest.mark.parametrize("changes, unset", [
+    (['substrates.acceptor.supply=[["0 h", "10 mg/L"], ["0.4 h", "0 mg/L"]]', 'growth.end="1.4 h"'], ()),
+    (["aggregate.radius=20 um", "substrates.boundary=closed", "pore.length=200 um", "numerics.extent=full",
+      'growth.end="9.2 h"'], ["flow"])])
+def test_a_substrate_may_be_used_up_to_nothing(changes, unset):
+    """Supplied no more, or shut in with an aggregate that takes it, the acceptor falls until it underflows, and the run
+    goes on: no biomass is made any more, and the donor is left."""
+    starved = load_scene("base", ["numerics.preset=paper", "numerics.transport=gear", "numerics.refinement=0.4",
+                                  *changes], unset)
+    *_, before, last = simulate(starved)
+    left = last.solved.concentrations
+    assert 0 <= left.acceptor.min() and left.acceptor.max() < np.finfo(float).tiny and left.donor.min() > 1
+    assert last.pore.time == starved.growth.end and last.pore.mass == pytest.approx(before.pore.mass, rel=1e-13)

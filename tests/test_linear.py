@@ -113,6 +113,29 @@ def test_a_singular_system_is_refused(matrix):
         solve(sp.csc_array(np.array(matrix)), np.arange(1.0, len(matrix) + 1))
 
 
+#: As large as Gear's matrices for steps of a microsecond, and well conditioned.
+STEEP = 3e7 * sp.diags_array([-1.0, 2.5, -1.0], offsets=[-1, 0, 1], shape=(60, 60), format="csc")
+
+
+def test_a_solution_that_underflows_is_one():
+    """A substrate that is used up: unknowns of 2^-1063 to 2^-1062 have the last ten of their 53 bits left, and each
+    comes out to the eps t that any sum of such numbers errs by, times |A^-1| |A|, which is 9."""
+    exact = np.random.default_rng(5).uniform(1, 2, 60)
+    found = solve(STEEP, np.ldexp(STEEP @ exact, -1063))
+    assert np.abs(found - np.ldexp(exact, -1063)).max() <= 9 * 2.0**-1074
+    assert not solve(STEEP, np.zeros(60)).any()
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-290, 1e-300, 1e-313])
+def test_a_wrong_solution_is_told_however_small_it_is(size):
+    """Of factors that give twice what they should: 1e-313 of unknown is 5e-6 of the smallest with all its digits."""
+    solver, right = linear.factorised(STEEP), np.full(60, 3e7 * size)
+    assert solver.solve(right).max() == pytest.approx(2 * size, rel=1e-8)
+    solver.factor, solver.pivoted = linear.factorised(STEEP / 2).factor, True
+    with pytest.raises(LinearError, match="leaves a residual"):
+        solver.solve(right)
+
+
 def fill(grid, order):
     """Entries of the factor of the mesh's Laplacian, its nodes in this order, which is one of all of them."""
     assert np.sort(order).tolist() == list(range(len(grid.points)))

@@ -16,7 +16,7 @@ from repro.fem.mesh import curved
 from repro.fem.space import Space
 from repro.march.simulation import simulate
 from repro.model import biomass, pore, remeshing
-from repro.model.transport import OVERSHOOT, UNRESOLVED
+from repro.model.transport import OVERSHOOT, UNRESOLVED, Concentrations
 from repro.scene import load_scene
 from tests.strategies import ORDERS, scene, scenes, share
 from tests.test_outline import wavy
@@ -226,3 +226,29 @@ def check_substrates(made, then):
         assert len(field) == then.space.count
         assert field.min() >= -(0.0 if then.space.order == 1 else UNRESOLVED * largest)
         assert field.max() <= substrate.supply * (1 + room)
+
+
+@pytest.mark.parametrize("speed, brought", [(0.0, 7.0), (4e4, 3.0)])
+def test_beyond_the_old_mesh_no_other_time_s_water_appears(speed, brought):
+    """A table of supplies, late, around an aggregate off the middle: still water is that of the start, flowing water
+    that of the time, and never the table's largest; what was in the mesh is still there."""
+    there = {"pore": {"width": "100 um", "length": "160 um"}, "aggregate": {"radius": "20 um", "position": "15 um"},
+             "substrates": {"boundary": "closed", "donor": {"supply": "5 mg/L"}, "acceptor": {
+                 "supply": [["0 h", "7 mg/L"], ["1 h", "20 mg/L"], ["4 h", "3 mg/L"]]}},
+             "growth": {"end": "9 h"}, "numerics": {"preset": "paper", "transport": "gear", "refinement": 0.5}}
+    whole = load_scene({**there, "pore": {"width": "100 um", "length": "400 um"}})
+    old = pore.seeded(load_scene(there))
+    along = old.mesh.points[:, 0]
+    late = replace(old, time=6.0, concentrations=Concentrations(4 + 0.02 * along, 3 - 0.01 * along))
+    new, _ = remeshing.remesh(whole, late, late, speed)
+    x, found = new.mesh.points[:, 0], new.concentrations
+    first, last = old.mesh.ends
+    assert x.min() < first - 20 and x.max() > last + 20
+    within, before, after = (x > first) & (x < last), x < first - 1e-9, x > last + 1e-9
+    both = whole.substrates
+    for field, kind, supply, start, slope in ((found.acceptor, both.acceptor, brought, 4, 0.02),
+                                              (found.donor, both.donor, 5.0, 3, -0.01)):
+        assert field[within] == pytest.approx(start + slope * x[within], rel=1e-9)
+        faded = np.exp(speed * (x[before] - first) / kind.diffusivity) if speed else 0.0
+        assert field[before] == pytest.approx(supply - (supply - start - slope * first) * faded, rel=1e-9)
+        assert field[after] == pytest.approx(start + slope * last if speed else supply, rel=1e-9)

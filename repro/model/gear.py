@@ -207,7 +207,7 @@ def settle(problem: Problem, sink: Sink | None, guess: Concentrations | None) ->
     guess unchanged (None: C_supply everywhere). Raises TransportError where the profiles do not
     come to rest.
     """
-    start = supplied_everywhere(problem) if guess is None else guess
+    start = _nearer(problem, guess)
     if not (problem.inflow.any() or problem.system.held.any()):
         return start
     nothing = np.zeros_like(problem.space.reaction.dx)
@@ -227,6 +227,18 @@ def settle(problem: Problem, sink: Sink | None, guess: Concentrations | None) ->
         last = change
     raise TransportError(f"the profiles still change by {change:.2g} of the supply a step after "
                          f'{MOST_STEPS} steps; try numerics.transport = "quasi_steady"')
+
+
+def _nearer(problem: Problem, guess: Concentrations | None) -> Concentrations:
+    """The guess; C_supply everywhere without one, and where constrained nodes would jump by more
+    than SETTLING: no step from there is short enough, and quadratic and cubic concentrations beside
+    a larger jump fall below zero."""
+    supplied = supplied_everywhere(problem)
+    if guess is None:
+        return supplied
+    change = np.abs(np.concatenate([guess.acceptor, guess.donor]) - problem.supply)
+    jumps = problem.system.held & (change > SETTLING * problem.supply)
+    return supplied if jumps.any() else guess
 
 
 @timed("transport")

@@ -127,7 +127,8 @@ def remesh(scene: Scene, now: Pore, expanded: Pore, speed: float,
     active, inert, *rest = biomass.carried(scene.numerics.transfer, expanded.space, new, at,
                                            (expanded.active, expanded.inert, *others),
                                            needed(scene.kinetics, "[kinetics]").maximum_density)
-    substrates = carried_substrates(scene, now.space, new, expanded.concentrations, speed)
+    filled = scene.at(expanded.time if speed else 0.0)
+    substrates = carried_substrates(filled, now.space, new, expanded.concentrations, speed)
     found = Pore(expanded.time, new, outline.wall, outline.fixed, active, inert, np.empty(0), body,
                  _pressure(mesh, expanded, at), substrates, expanded.front)
     return replace(found, theta=expansion(scene, found)), tuple(rest)
@@ -174,7 +175,11 @@ def spread(space: Space, field: np.ndarray) -> np.ndarray:
 def carried_substrates(scene: Scene, old: Space, new: Space, state: Concentrations | None,
                        speed: float) -> Concentrations | None:
     """C_A and C_D on a new mesh: interpolated; beyond the old ends (26) upstream, constant
-    downstream, and the supply where nothing flows."""
+    downstream, and the supply where nothing flows.
+
+    scene: at the time whose supply is there: t = 0 where nothing flows, since all that was filled
+    in then is still there.
+    """
     if state is None:
         return None
     x = new.points[:, 0]
@@ -182,7 +187,7 @@ def carried_substrates(scene: Scene, old: Space, new: Space, state: Concentratio
     where = np.column_stack([np.clip(x, first, last), new.points[:, 1]])
     at = transfer.located(old.mesh.points, old.mesh.cells, where)
     fields = at.field(np.column_stack([state.acceptor, state.donor]), old.cells, old.order)
-    both = needed(scene.largest.substrates, "[substrates]")
+    both = needed(scene.substrates, "[substrates]")
     acceptor, donor = (_beyond(field, substrate, x, old.mesh.ends, speed)
                        for field, substrate in zip(fields.T, (both.acceptor, both.donor)))
     return Concentrations(acceptor, donor)

@@ -36,14 +36,19 @@ OF_AGGREGATE = {each.name for each in ARRAYS if each.body} | {"active_biomass", 
 
 
 def index(folder: Path, name: str = "fields.pvd") -> list[tuple[float, Path]]:
-    """(time in h, file) of the fields that a run has written; only its own files are looked at.
-    Another name, before_expansion.pvd, is of those before each expansion."""
+    """(time in h, file) of the fields that a run has written and that are there. Another name,
+    before_expansion.pvd, is of those before each expansion."""
+    return [(time, path) for time, path in listed(folder, name) if path.is_file()]
+
+
+def listed(folder: Path, name: str = "fields.pvd") -> list[tuple[float, Path]]:
+    """(time in h, file) of the fields that a run has written, whether they are still there or not;
+    only its own files are told."""
     if not (folder / name).exists():
         return []
     entries = ElementTree.parse(folder / name).getroot().iter("DataSet")
     named = [(float(entry.get("timestep", "nan")), entry.get("file", "")) for entry in entries]
-    return [(time, folder / name) for time, name in named
-            if _FILE.fullmatch(name) and (folder / name).is_file()]
+    return [(time, folder / name) for time, name in named if _FILE.fullmatch(name)]
 
 
 def packed(entries: list[tuple[float, Path]],

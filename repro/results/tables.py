@@ -54,7 +54,7 @@ class Results(Mapping[str, np.ndarray]):
     @property
     def units(self) -> dict[str, str]:
         """The unit of each column and field; "1" for a plain number."""
-        fields = self._fields[0] if len(self._fields) else {}
+        fields = next(iter(self._fields), {})
         return {name: unit(name) for name in (*self.columns, *fields)}
 
     @property

@@ -16,7 +16,8 @@ from repro.results.tables import Results, arrays
 def load_run(folder: str | Path) -> Results:
     """What a run has written in its folder, over or not: rows now, fields when they are asked for.
 
-    Raises OutputError where the folder holds no run that can be read.
+    Raises OutputError where the folder holds no run that can be read, and, when they are asked for,
+    where the file of a time's fields is missing.
     """
     try:
         run = reading.read(Path(folder))
@@ -24,7 +25,7 @@ def load_run(folder: str | Path) -> Results:
         raise OutputError(str(error)) from None
     rows = [dict(zip(run.series, map(_known, values)))
             for values in np.column_stack(list(run.series.values())).tolist()]
-    files = _Files([path for _, path in fields.index(run.folder)])
+    files = _Files(run.folder, run.times, dict(fields.listed(run.folder)))
     return Results(str(run.record.get("scene")), rows, files, str(run.record.get("status")))
 
 
@@ -34,16 +35,25 @@ def _known(value: float) -> float | None:
 
 
 class _Files(Sequence[dict[str, np.ndarray]]):
-    """The arrays of the files of fields, each read when it is asked for."""
+    """The arrays of the fields of each row, read from its file when they are asked for; the file is
+    the one of the row's time. As many as there are; iterated over are those alone."""
 
-    def __init__(self, paths: list[Path]):
-        self.paths = paths
+    def __init__(self, folder: Path, times: np.ndarray, files: dict[float, Path]):
+        self.folder = folder
+        self.times = times
+        self.files = files
 
     def __len__(self) -> int:
-        return len(self.paths)
+        return sum(path.is_file() for path in self.files.values())
 
     def __getitem__(self, row):
-        return arrays(vtu.read(self.paths[row]))
+        time = float(self.times[row])
+        path = self.files.get(time)
+        if path is None:
+            raise OutputError(f"{self.folder / 'fields.pvd'}: no fields of {time} h are listed")
+        if not path.is_file():
+            raise OutputError(f"{path}: the fields of {time} h are missing")
+        return arrays(vtu.read(path))
 
     def __iter__(self) -> Iterator[dict[str, np.ndarray]]:
-        return (self[row] for row in range(len(self)))
+        return (arrays(vtu.read(path)) for path in self.files.values() if path.is_file())
