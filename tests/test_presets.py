@@ -91,8 +91,8 @@ def numerics(**given):
 
 @pytest.mark.parametrize("preset", PRESETS)
 def test_a_preset_changes_the_defaults(preset):
-    """All that it names, nothing else."""
-    assert numerics(preset=preset) == replace(Numerics(), preset=preset, **PRESETS[preset])
+    """All that it names, nothing else; the extent follows from the flow."""
+    assert numerics(preset=preset) == replace(Numerics(), preset=preset, extent="central", **PRESETS[preset])
 
 
 def test_presets_say_what_they_are():

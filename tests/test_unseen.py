@@ -582,7 +582,7 @@ def test_a_run_without_a_row_says_what_its_folder_does_before_and_after_it_was_m
     swept = sweep_of(tmp_path, "40 um, 50 um, 60 um")
     point = swept.points[0]
     (swept.runs / point.name).mkdir(parents=True)
-    running.Recorder(point.scene, swept.runs / point.name).tell("failed: x")
+    running.Recorder(point.scene, swept.runs / point.name).save("failed: x")
     said = [[one.status for one in table.tell(swept, ended, 0.1)] for ended in ({}, {1: "failed: y", 2: "failed: z"})]
     assert said == [["failed: x", "not run", "not run"], ["failed: x", "failed: z", "not run"]]
 
@@ -605,7 +605,9 @@ def test_marks_of_the_page_have_the_colour_that_the_key_below_them_names(tmp_pat
 def test_a_sweep_that_goes_on_counts_what_was_there(tmp_path):
     swept = sweep_of(tmp_path, "40 um, 50 um, 60 um")
     (swept.runs / swept.points[1].name).mkdir(parents=True)
-    running.Recorder(swept.points[1].scene, swept.runs / swept.points[1].name).tell("completed")
+    one = running.Recorder(swept.points[1].scene, swept.runs / swept.points[1].name)
+    one.record.rows = [[0.0] * len(results.COLUMNS)]
+    one.save("completed")
     events = []
     making._make(swept, lambda missing, folder: ((one, "completed") for one in missing), {}, events.append)
     assert [(each["done"], each["total"], each.get("run")) for each in events] == [(1, 3, None), (2, 3, 1), (3, 3, 3)]
