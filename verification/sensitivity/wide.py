@@ -38,6 +38,7 @@ SIZES = (2**-1.5, 0.5, 2**-0.5, 1.0)
 HOURS = tuple(map(float, range(35, 46)))
 #: The whole hour that is 5 h after contact.
 LATER = 39.0
+#: How the numbers are called: means over HOURS, those at LATER, and those at the last of HOURS.
 KINDS = ("mean of", f"{LATER:g} h:", "last")
 #: What is asked of the bars, in percent of the number.
 ASKED = {"conductivity (m/d)": 1.0, "upstream tip (um)": 1.0, "downstream tip (um)": 1.0, "length of contact (um)": 2.0}
@@ -46,15 +47,13 @@ ASKED = {"conductivity (m/d)": 1.0, "upstream tip (um)": 1.0, "downstream tip (u
 def of_after(said) -> Numbers:
     """Means over HOURS (geometric, of magnitudes), values at LATER and at the last of them. Raises LookupError where
     one of the hours is before contact."""
-    rows = [instant for _, instant in simulation.steps(said) if instant and instant.pore.contact]
-    if len(rows) != len(HOURS):
-        raise LookupError(f"{len(rows)} of {len(HOURS)} rows are after contact")
-    table = np.array([_row(each) for each in rows])
+    after = [instant for _, instant in simulation.steps(said) if instant and instant.pore.contact]
+    if len(after) != len(HOURS):
+        raise LookupError(f"{len(after)} of {len(HOURS)} rows are after contact")
+    table = np.array([_row(each) for each in after])
     means = np.exp(np.log(np.abs(table)).mean(axis=0))
-    found = {f"{KINDS[0]} {name}": float(value) for name, value in zip(ASKED, means)}
-    for kind, row in ((KINDS[1], table[HOURS.index(LATER)]), (KINDS[2], table[-1])):
-        found |= {f"{kind} {name}": float(abs(value)) for name, value in zip(ASKED, row)}
-    return found
+    rows = zip(KINDS, (means, table[HOURS.index(LATER)], table[-1]))
+    return {f"{kind} {name}": float(abs(value)) for kind, row in rows for name, value in zip(ASKED, row)}
 
 
 def _row(now: Instant) -> list[float]:
