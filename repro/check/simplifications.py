@@ -143,8 +143,8 @@ def _fronts(scene: Scene) -> Iterator[Warned]:
             kind = "zero-order front" if zero_order else "layer of first-order uptake"
             yield Warned("numerics.refinement", f"the {name} is used up in a {kind} "
                          f"(D K_s / (q X_m))^1/2 = {layer:.2g} um thick, thinner than the "
-                         f"{nodes:.2g} um between nodes in the aggregate; "
-                         + _resolving(resolution(scene) * nodes / layer))
+                         f"{nodes:.2g} um between nodes in the aggregate (a run judges its front "
+                         "by what it solves)" + _resolving(resolution(scene) * nodes / layer))
 
 
 def _interface_size(scene: Scene) -> float:
@@ -164,21 +164,14 @@ def _drag_layer(scene: Scene) -> Iterator[Warned]:
                      f"{layer:.2g} um, thinner than a fifth of the elements at the interface, "
                      f"{size:.2g} um: velocities in the aggregate wiggle within a few elements of "
                      "it, while conductivity, head and flow are those of finer meshes"
-                     + _finer(wanted))
-
-
-def _finer(refinement: float) -> str:
-    """What resolves a thin layer, if any refinement does that is accepted."""
-    known = refinement <= MOST_REFINED
-    return f"; numerics.refinement = {refinement:.2g} would resolve it" if known else ""
+                     + _resolving(wanted))
 
 
 def _resolving(refinement: float) -> str:
-    """What resolves a layer, in words."""
+    """What resolves a thin layer, in words."""
     if refinement <= MOST_REFINED:
-        return f"{refinement:.2g} would resolve it"
-    return (f"no refinement up to {MOST_REFINED:g} resolves it, and a run judges its front by what "
-            "it solves")
+        return f"; numerics.refinement = {refinement:.2g} would resolve it"
+    return f"; no refinement up to {MOST_REFINED:g} resolves it"
 
 
 def _seed_film(scene: Scene) -> Iterator[Warned]:
