@@ -58,7 +58,8 @@ def warnings(scene: Scene, found: list[Number]) -> list[Warned]:
     if scene.kinetics:
         checks += [_fronts(scene), _demand(scene.kinetics)]
     if scene.growth:
-        checks += [_lag(scene, value), _transit(value), _forces(scene, found), _steps(scene), _contact(scene)]
+        checks += [_lag(scene, value), _transit(value), _forces(scene, found), _steps(scene),
+                   _contact(scene)]
     return [warned for check in checks for warned in check]
 
 
