@@ -16,8 +16,10 @@ from reference.whole_run import Pore as Constants
 from reference.whole_run_grid import grid
 from reference.whole_run_pore import Section
 from repro.fem import transfer
+from repro.fem.outline import FREE
 from repro.fem.space import Space
 from repro.model import growth, pore, transport
+from repro.model.contact import constrained
 from repro.model.kinetics import Sink
 from repro.scene import parse_scene
 from verification.bench.record import part, series
@@ -208,8 +210,8 @@ def growth_part(quick: bool) -> dict:
     it.
     """
     linear, quadratic, rings = GROWTH_SIZES[quick]
-    jobs = {**series(PAPER, REFINEMENT, linear, _growth_ours, kind=1),
-            **series(ORDER_2, REFINEMENT, quadratic, _growth_ours, kind=2),
+    jobs = {**series(PAPER, REFINEMENT, linear, _growth_ours, preset="paper"),
+            **series(ORDER_2, REFINEMENT, quadratic, _growth_ours, preset="accurate"),
             **series(QUADRATIC, RINGS, rings, _skfem)}
     return part("Growth: a step of an aggregate with theta from 12 to 36; assembly and solution",
                 "places of the outline over the radius, the largest error",
@@ -224,12 +226,19 @@ def _growth_judged(found: np.ndarray, points: np.ndarray, rim: np.ndarray) -> di
     return {"error": float(error), "nodes": len(points)}
 
 
-def _growth_ours(refinement: float, kind: int):
-    held, rim = bodies.half_disc(refinement, kind)
-    body, points = replace(held.body), held.reference  # nothing is known of it
-    start, push = BEFORE.place(*points.T), BEFORE.pressure(*points[: held.corners].T)
-    found = growth.equilibrium(body, held.field(AFTER.theta), start, push, held.held, start)
-    return partial(_growth_judged, found.position, points, rim)
+@cache
+def _seeded(refinement: float, preset: str):
+    now = pore.seeded(half_disc(preset=preset, refinement=refinement))
+    return now, constrained(len(now.mesh.body), now.mesh.topology.body_loop, now.wall, now.fixed)
+
+
+def _growth_ours(refinement: float, preset: str):
+    now, held = _seeded(refinement, preset)
+    shape, points = now.body.shape, now.body.reference * bodies.RADIUS / RADIUS
+    given = bodies.Supported(growth.Body(shape, points), held)  # nothing is known of it
+    start, push = BEFORE.place(*points.T), BEFORE.pressure(*points[: shape.corners].T)
+    found = growth.equilibrium(given.body, given.field(AFTER.theta), start, push, held, start)
+    return partial(_growth_judged, found.position, points, now.mesh.topology.body_loop[now.wall == FREE])
 
 
 @cache
