@@ -88,7 +88,6 @@ def _faster(part: dict, name: str, error: float | None, least: float) -> tuple[s
     best = _read(_points(part, runs.PRESET_PAPER), wanted)
     ratio, cpu = best.seconds / point["seconds"], best.cpu / point["cpu"]
     told = f"{ratio:.1f} times (processor time {cpu:.1f}): {best.seconds:.2f} s, {best.how}"
-    told += f" with slope {best.slope:.2f}" if best.how == "extrapolated" else ""
     return f"{told}, against {point['seconds']:.2f} s", ratio >= least and point["error"] <= wanted
 
 
