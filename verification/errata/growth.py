@@ -12,14 +12,13 @@ from scipy.spatial import Delaunay
 from reference import neo_hookean
 from repro.fem import assembly, transfer
 from repro.fem.mesh import triangle_areas
-from repro.fem.mesher import generate
 from repro.fem.outline import half_disc as seed
-from repro.fem.sizing import ACROSS_AGGREGATE, Sizing
+from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.model import growth, mesh_motion
 from verification.claims.growth_mechanics import sliding
 from verification.claims.runs import BASE, half_disc, ledger, scene
 from verification.errata import erratum, percent, small, table
-from verification.problems import pairs
+from verification.problems import meshes, pairs
 from verification.problems.bodies import Supported, grown
 from verification.switches import CHOICES
 
@@ -302,7 +301,7 @@ def chain(how: str, radius: float = 30.0, decay: float = 6.0, count: int = 40) -
     old: tuple = ()
     for k in range(count + 1):
         refinement = 1.0 + 0.3 * (0.618 * k % 1)
-        grid, _ = generate(outline, (-105.0, 105.0), Sizing(50.0, refinement, 2.0))
+        grid, _ = meshes.around(outline, refinement, (-105.0, 105.0), 50.0)
         points, triangles = grid.points[grid.body], grid.topology.body_cells
         if k == 0:
             field = np.exp((np.linalg.norm(points, axis=1) - radius) / decay)[:, None]
