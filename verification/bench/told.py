@@ -10,8 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import product
-from math import inf, nan
+from math import inf
+from operator import itemgetter
 from pathlib import Path
+
+import numpy as np
 
 from verification.bench import runs
 from verification.bench.record import Reading, envelope, reading
@@ -259,14 +262,9 @@ def _precision(pyplot, part: dict):
     for k, line in enumerate(part["lines"]):
         points = [p for p in line["points"] if p["error"] > 0]
         label = line["method"] + (f" ({len(line['failed'])} failed)" if line["failed"] else "")
-        if not points:
-            axis.plot([], [], " ", label=label)
-            continue
         color, mark = COLORS[k % len(COLORS)], MARKS[k % len(MARKS)]
-        axis.loglog([p["seconds"] for p in points], [p["error"] for p in points], mark, ms=4, color=color, alpha=0.6)
-        best = envelope(points)
-        axis.loglog([p["seconds"] for p in best], [p["error"] for p in best], f"-{mark}", ms=4, color=color,
-                    label=label)
+        _curve(axis, points, "seconds", "error", mark, color=color, alpha=0.6)
+        _curve(axis, envelope(points), "seconds", "error", f"-{mark}" if points else " ", color=color, label=label)
     labelled(axis, part["title"], "wall time (s)", part["error"] if len(part["error"]) < 60 else "largest error")
     axis.grid(which="major", lw=0.3)
     figure.legend(fontsize=6, loc="outside right upper")
@@ -278,16 +276,20 @@ def _size_picture(pyplot, part: dict):
     lines = [line for line in part["lines"] if line["points"]]
     figure, axes = pyplot.subplots(1, len(lines) + 1, figsize=(3.9 * (len(lines) + 1), 3.4), layout="constrained")
     for axis, line in zip(axes, lines):
-        nodes = [p["nodes"] for p in line["points"]]
-        axis.loglog(nodes, [p["seconds"] for p in line["points"]], "k-o", ms=4, label="step")
+        _curve(axis, line["points"], "nodes", "seconds", "k-o", label="step")
         for name in (*runs.STAGES, runs.FLOOR):
-            values = [p["stages"].get(name, 0.0) for p in line["points"]]
-            if any(values):
-                axis.loglog(nodes, [v or nan for v in values], "--" if name == runs.FLOOR else "-", label=name)
+            costs = [{"nodes": p["nodes"], name: p["stages"][name]} for p in line["points"] if p["stages"].get(name)]
+            if costs:
+                _curve(axis, costs, "nodes", name, "--" if name == runs.FLOOR else "-", label=name)
         more = [p for p in line["points"] if p["memory_MB"] > 0]
-        axes[-1].loglog([p["nodes"] for p in more], [p["memory_MB"] for p in more], "-o", ms=4, label=line["method"])
+        _curve(axes[-1], more, "nodes", "memory_MB", "-o", label=line["method"])
         labelled(axis, line["method"], "nodes", "seconds a growth step")
     labelled(axes[-1], "memory above the start's", "nodes", "MB")
     for axis in axes:
         axis.legend(fontsize=6)
     return figure
+
+
+def _curve(axis, points, across: str, up: str, look: str, **how) -> None:
+    """Two numbers of points on logarithmic axes."""
+    axis.loglog(*(np.array([*map(itemgetter(name), points)]) for name in (across, up)), look, ms=4, **how)

@@ -30,7 +30,7 @@ from skfem import Basis, ElementTriP2, MeshTri, asm
 
 from reference import channel_bvp
 from reference import diffusion_reaction_pypde as pypde
-from reference.monod import NUDGE, uptake
+from reference.monod import derivatives, uptake
 from reference.whole_run_pore import steady, stiffness
 from repro.fem.mesh import Mesh
 from repro.model import transport
@@ -84,8 +84,7 @@ class Problem:
 def fipy(problem: Problem, across: int) -> np.ndarray:
     """(2,) what is judged."""
     mesh = _fipy_mesh(problem, across)
-    x = mesh.cellCenters.value
-    where = problem.inside(*x) if len(x) == 2 else problem.inside(x[0])
+    where = problem.inside(*mesh.cellCenters.value)
     X = CellVariable(mesh=mesh, value=np.where(where, problem.density, 0.0))
     both = [CellVariable(mesh=mesh, value=s) for s in problem.supply]
     constants = [CellVariable(mesh=mesh) for _ in both]
@@ -128,14 +127,13 @@ def _fipy_ends(problem: Problem, mesh, field, k: int):
 
 
 def _linearise(problem: Problem, now, constants, slopes) -> None:
-    """q = constant + sum of slopes times C at the present C; slopes by central differences."""
-    rate = np.array(uptake(*now, problem.rates))
-    columns = [(np.array(uptake(*(now + d), problem.rates)) - np.array(uptake(*(now - d), problem.rates))) / (2 * NUDGE)
-               for d in NUDGE * np.eye(2)[:, :, None]]
+    """q = constant + sum of slopes times C at the present C (2, n); slopes by central differences."""
+    by = derivatives(now, problem.rates)
+    rest = np.array(uptake(*now, problem.rates)) - np.einsum("kjn,jn->kn", by, now)
     for k in (0, 1):
-        constants[k].setValue(rate[k] - sum(column[k] * c for column, c in zip(columns, now)))
+        constants[k].setValue(rest[k])
         for j in (0, 1):
-            slopes[k][j].setValue(columns[j][k])
+            slopes[k][j].setValue(by[k, j])
 
 
 def py_pde(problem: Problem, across: int) -> tuple[np.ndarray, dict]:
