@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from scipy.spatial import Delaunay
 
 from reference import neo_hookean
-from repro.fem import assembly, transfer
+from repro.fem import transfer
 from repro.fem.mesh import triangle_areas
 from repro.fem.outline import half_disc as seed
 from repro.fem.sizing import ACROSS_AGGREGATE
@@ -45,10 +45,8 @@ class Cylinder:
 
     def pressure_error(self, pressure: np.ndarray) -> float:
         """Relative L2 error over the grown body."""
-        weight = assembly.mass(triangle_areas(self.position, self.body.cells))
-        error, exact = (p[self.body.cells] for p in (pressure - self.pressure, self.pressure))
-        squares = [np.einsum("ta,tab,tb", p, weight, p) for p in (error, exact)]
-        return float(np.sqrt(squares[0] / squares[1]))
+        mesh = self.position, self.body.cells
+        return float(np.sqrt(pairs.square(mesh, pressure - self.pressure) / pairs.square(mesh, self.pressure)))
 
     def place_error(self, position: np.ndarray) -> float:
         """Largest error of a place over the radius."""

@@ -110,10 +110,13 @@ EXHAUSTED = HardCase(
     mutants=("hard-decay-unlimited",))
 
 
+#: Half saturations of a millionth of the supply.
+SHARP = tuple(f'substrates.{name}.half_saturation="1e-5 mg/L"' for name in BOTH)
+
+
 def front(preset: str, radius: float, more: tuple[str, ...] = ()) -> list:
-    """Half saturations of a millionth of the supply."""
-    changes = disc(radius, *(f'substrates.{name}.half_saturation="1e-5 mg/L"' for name in BOTH), *more)
-    return common.against("wide", preset, changes, *EFFLUENTS, refinement=0.8)[2]
+    """A half-disc with such fronts."""
+    return common.against("wide", preset, disc(radius, *SHARP, *more), *EFFLUENTS, refinement=0.8)[2]
 
 
 #: Half thickness and films of the slab, um; its penetration depth over the half thickness.
@@ -126,16 +129,14 @@ def slab_front(preset: str) -> list:
     """The stage alone: a slab between films of still water, in which the donor is used up at 0.6 of the way in."""
     size, bound, origin = FRONT[preset]
     end, width = HALF + FILM, 1.5 * size
-    grid = meshes.plug((-end, end), width, HALF, size, seed=1)
-    made = common.scene("wide", preset)
-    donor = replace(made.substrates.donor, half_saturation=1e-6 * made.substrates.donor.supply)
-    acceptor = replace(made.substrates.acceptor, half_saturation=1e-6 * made.substrates.acceptor.supply)
-    depth, ratio = DEPTH * HALF, donor.diffusivity_in_aggregate / donor.diffusivity
+    made = common.scene("wide", preset, *SHARP, 'kinetics.decay_coefficient="0 1/d"',
+                        "kinetics.acceptor_to_donor_ratio=1e-9")
+    space = meshes.space_on(meshes.plug((-end, end), width, HALF, size, seed=1), made.numerics.order)
+    donor, depth = made.substrates.donor, DEPTH * HALF
+    ratio = donor.diffusivity_in_aggregate / donor.diffusivity
     sink = donor.supply * donor.diffusivity_in_aggregate / (depth**2 / 2 + FILM * ratio * depth)
-    law = replace(made.kinetics, decay_coefficient=0.0, acceptor_to_donor_ratio=1e-9)
-    space = meshes.space_on(grid, made.numerics.order)
-    problem = transport.problem(space, None, replace(made.substrates, acceptor=acceptor, donor=donor), law)
-    active = Sink(sink / law.maximum_utilization_rate * space.reaction.dx)
+    problem = transport.problem(space, None, made.substrates, made.kinetics)
+    active = Sink(sink / made.kinetics.maximum_utilization_rate * space.reaction.dx)
     state = transport.steady(problem, active)
     given = (donor.supply, sink, HALF, donor.diffusivity_in_aggregate, FILM, donor.diffusivity)
     exact = slab.zero_order(space.points[:, 0], *given)
