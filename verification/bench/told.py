@@ -8,7 +8,6 @@ beside them.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from functools import partial
 from itertools import product
 from math import inf
 from operator import itemgetter
@@ -40,10 +39,11 @@ def judged(record: dict) -> list[dict]:
             *_scenes(parts.get("scenes", {})), *_memory(parts.get("memory", {}))]
 
 
-def verdict(claim: str, wanted: str, measure: Callable[[], tuple[str, bool]]) -> dict:
-    """One of them: ``measure`` gives what was measured, and whether it holds; LookupError where the record lacks it."""
+def verdict(claim: str, wanted: str, measure: Callable[..., tuple[str, bool]], *given) -> dict:
+    """One of them: ``measure(*given)`` tells what was measured, and whether it holds; LookupError where the record
+    lacks it."""
     try:
-        measured, holds = measure()
+        measured, holds = measure(*given)
     except LookupError:
         return {"claim": claim, "measured": NOT_MEASURED, "wanted": wanted, "holds": None}
     return {"claim": claim, "measured": measured, "wanted": wanted, "holds": bool(holds)}
@@ -69,14 +69,14 @@ def _base(part: dict) -> Iterator[dict]:
     for name, (error, least, aim) in FASTER.items():
         percent = f"{100 * error:g} %"
         yield verdict(f"base: the error of {name} is at most {percent}", f"at most {percent}",
-                      partial(_accurate, part, name, error))
+                      _accurate, part, name, error)
         wanted = f"at least {least:g} times" + (f" (aim {aim:g})" if aim > least else "")
         for words, at in ((percent, error), ("the error that the preset has", None)):
             yield verdict(f"base: {name} is faster than the paper's scheme at its own best speed for {words}", wanted,
-                          partial(_faster, part, name, at, least))
+                          _faster, part, name, at, least)
     yield verdict(f"base: {runs.ACCURATE} takes about {ACCURATE_RUN:g} s", f"at most {ACCURATE_RUN:g} s",
-                  partial(_quick, part))
-    yield verdict("wide in preset fast takes about 10 s", f"at most {WIDE:g} s", partial(_wide, part))
+                  _quick, part)
+    yield verdict("wide in preset fast takes about 10 s", f"at most {WIDE:g} s", _wide, part)
 
 
 def _accurate(part: dict, name: str, error: float) -> tuple[str, bool]:
@@ -113,7 +113,7 @@ def _wide(part: dict) -> tuple[str, bool]:
 def _others(parts: dict) -> Iterator[dict]:
     for name, other in product(("box", "channel"), OTHERS):
         claim = f"transport, {name}: faster than {other.split(',')[0]} at equal error (compilation left out)"
-        yield verdict(claim, f"at least {TIMES_FASTER:g} times", partial(_least_ratio, parts.get(name, {}), other))
+        yield verdict(claim, f"at least {TIMES_FASTER:g} times", _least_ratio, parts.get(name, {}), other)
 
 
 def _least_ratio(part: dict, other: str) -> tuple[str, bool]:
@@ -131,7 +131,7 @@ def _least_ratio(part: dict, other: str) -> tuple[str, bool]:
 def _steps(part: dict) -> Iterator[dict]:
     for method, (told, (bound, low, high)) in product(runs.METHODS, FLOORS.items()):
         yield verdict(f"a growth step over its factorise-and-solve time, {method}, {told}", f"at most {bound:g}",
-                      partial(_floor, part, method, bound, low, high))
+                      _floor, part, method, bound, low, high)
 
 
 def _floor(part: dict, method: str, bound: float, low: float, high: float) -> tuple[str, bool]:
@@ -145,7 +145,7 @@ def _floor(part: dict, method: str, bound: float, low: float, high: float) -> tu
 def _scenes(part: dict) -> Iterator[dict]:
     wanted = f"no other stage runs; at most {100 * EXCESS:g} % of the whole model's first solution above them"
     for name in list(runs.SCENES)[1:]:
-        yield verdict(f"{name}: a scene costs what its own stages cost", wanted, partial(_own, part, name))
+        yield verdict(f"{name}: a scene costs what its own stages cost", wanted, _own, part, name)
 
 
 def _own(part: dict, name: str) -> tuple[str, bool]:
@@ -169,7 +169,7 @@ def excess(row: dict, whole: dict) -> float:
 def _memory(part: dict) -> Iterator[dict]:
     for preset in runs.MEMORY_PRESETS:
         yield verdict(f"preset {preset}: live memory does not grow with the number of steps",
-                      f"under {runs.PART:g} of one nodal field a step", partial(_flat, part, f"preset {preset}"))
+                      f"under {runs.PART:g} of one nodal field a step", _flat, part, f"preset {preset}")
 
 
 def _flat(part: dict, method: str) -> tuple[str, bool]:
