@@ -37,6 +37,7 @@ from datetime import date
 from functools import partial
 from importlib.metadata import version
 from math import exp, isfinite, log
+from operator import itemgetter
 from pathlib import Path
 from statistics import median
 from time import perf_counter, process_time
@@ -214,7 +215,7 @@ def reading(points: Iterable[Mapping], error: float) -> Reading | None:
     kept = envelope(points)
     if not kept:
         return None
-    errors, *times = ([point[key] for point in kept] for key in ("error", "seconds", "cpu"))
+    errors, *times = zip(*map(itemgetter("error", "seconds", "cpu"), kept))
     if error >= errors[0]:
         return Reading(*(each[0] for each in times), "measured")
     if error >= errors[-1]:
