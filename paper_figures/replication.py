@@ -111,10 +111,14 @@ def _after_contact(claims: list[dict]) -> str:
 
 def _bars_of_base(claims: list[dict]) -> str:
     """Which numbers of base are known less well than its velocities and effluents, and why."""
-    kinds = "; ".join(f"{why} ({', '.join(dict.fromkeys(each.id for each in those))})"
-                      for why, those in after_contact.wide_bars_of_base(claims).items())
+    kinds = "; ".join(f"{why} ({_ids(those)})" for why, those in after_contact.wide_bars_of_base(claims).items())
     return (f"Velocities, effluents, uptake and concentrations of Base are known to {after_contact.BASE_BAR:g} % or "
             f"better. Wider are the bars of numbers of other kinds: {kinds}.")
+
+
+def _ids(of: list) -> str:
+    """Those of the claims, each once."""
+    return ", ".join(dict.fromkeys(each.id for each in of))
 
 
 def _about() -> dict[str, Callable[[], str]]:

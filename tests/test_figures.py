@@ -47,6 +47,8 @@ def brief(monkeypatch):
     monkeypatch.setattr(transfer, "RUN", HALF_AN_HOUR[0])
     monkeypatch.setattr(tearing, "COURSES", tuple(HALF_AN_HOUR))
     monkeypatch.setattr(tearing, "EVERY", 0.2)
+    layers = MODULES["discussion_biomass"]
+    monkeypatch.setattr(layers, "TAKEN_UP", layers.TAKEN_UP[[0, -1]])
     for points in ("HEADS", "SUPPLIES", "RADII"):
         monkeypatch.setattr(transfer, points, getattr(transfer, points)[[0, -1]])
 
@@ -104,7 +106,7 @@ def test_everything_is_drawn_and_told(quick, capsys):
     text = " ".join(root.itertext())
     assert all(module.TITLE in text for module in MODULES.values())
     assert all(request.command() in text for module in MODULES.values() for request in module.RUNS)
-    assert all(f"python -m verification.claims {id}" in text for id in ("C39", "C40", "C46"))
+    assert all(f"python -m verification.claims {id}" in text for id in ("C39", "C40", "C45", "C46"))
     assert "Figure 1" in text and "base: completed" in text
     assert all(element.get(key, "").partition(":")[0] not in ("http", "https") for element in root.iter()
                for key in ("src", "href"))

@@ -9,7 +9,7 @@ import pytest
 
 from repro.errors import SimulationError, TransportError
 from repro.scene import load_scene
-from verification import hard_cases
+from verification import hard, hard_cases
 from verification.hard import common
 from verification.hard.common import PRESETS, REFUSED, RIGHT, WRONG, HardCase
 from verification.kernel import case
@@ -17,7 +17,7 @@ from verification.kernel.case import Check, Outcome, Result, at_least, at_most, 
 from verification.kernel.writing import plain
 
 GOOD, BAD = at_most("good", 0.5, 1.0, ""), at_most("bad", 2.0, 1.0, "")
-KNOWN = {case.number: case for case in hard_cases.CASES}
+KNOWN = {case.number: case for case in hard.CASES}
 
 
 def a_case(verdicts, **more):
@@ -107,14 +107,6 @@ def test_the_matrix_is_told_and_written(tmp_path, monkeypatch):
     assert "try another mesh" in measured["paper"]["message"] and measured["fast"]["checks"][0]["quantity"] == "good"
     told = plain(hard_cases.blocks(live))
     assert "refused!" in told and "99    fast      refused 1: try another mesh" in told
-
-
-@pytest.mark.parametrize("verdict, arguments, status", [(RIGHT, ["--preset", "fast"], 0), (WRONG, [], 1)])
-def test_the_exit_status_is_the_verdict(monkeypatch, tmp_path, verdict, arguments, status):
-    """A whole matrix is written."""
-    monkeypatch.setattr(hard_cases, "RECORD", tmp_path / "hard_cases.json")
-    monkeypatch.setattr(hard_cases, "CASES", (a_case([verdict]),))
-    assert hard_cases.main(arguments) == status and hard_cases.RECORD.exists() is not bool(arguments)
 
 
 def test_a_wrong_run_is_seen():

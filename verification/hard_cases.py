@@ -1,23 +1,20 @@
-"""Twenty-two hard cases with every preset: ``python -m verification.hard_cases [--case N ...] [--preset P ...]``.
+"""The matrix of the twenty-two hard cases with every preset, which ``python -m verification`` runs: `... hard` for all
+of them, `... --case hard-04-fast-flow` for one.
 
 "cubic" is the preset fast with cubic elements. Each cell of the matrix, a case with a preset, is right, refused or
 wrong, see :mod:`verification.hard.common`. Refusing is accepted in the parts that a case names, and with ``paper``;
-wrong is never. The matrix is printed; a whole one is written to ``verification/report/hard_cases.json`` too, its
-numbers and seconds to ``live/`` beside it. Exit status 1 if a cell is what it may not be.
+wrong is never. A whole run writes it to ``verification/report/hard_cases.json``, its numbers and seconds to ``live/``
+beside it.
 """
 
 from __future__ import annotations
 
-import argparse
-import sys
 from collections.abc import Iterable, Iterator
-from itertools import product
 from pathlib import Path
 
-from verification.hard import CASES
-from verification.hard.common import PRESETS, Cell, run_cell
+from verification.hard.common import Cell
 from verification.kernel.report import environment
-from verification.kernel.writing import Block, plain, save, table
+from verification.kernel.writing import Block, save, table
 
 RECORD = Path(__file__).parent / "report" / "hard_cases.json"
 
@@ -48,15 +45,11 @@ def _checks(cell: Cell) -> list[dict]:
 
 
 def record(results: Iterable) -> None:
-    """Write the matrix from the results of a whole verification run, which has run every cell already."""
-    write(cell for result in results for cell in result.outcome.notes if isinstance(cell, Cell))
-
-
-def write(cells: Iterable[Cell]) -> None:
-    """Write the verdicts for the report and the README, and, not committed, all that this machine has measured."""
-    found = list(cells)
-    save(as_json(found), RECORD)
-    save(as_json(found, live=True), RECORD.parent / "live" / RECORD.name)
+    """Write the verdicts for the report and the README from the results of a whole verification run, and, not
+    committed, all that this machine has measured."""
+    cells = [cell for result in results for cell in result.outcome.notes if isinstance(cell, Cell)]
+    save(as_json(cells), RECORD)
+    save(as_json(cells, live=True), RECORD.parent / "live" / RECORD.name)
 
 
 def blocks(record: dict) -> Iterator[Block]:
@@ -66,7 +59,8 @@ def blocks(record: dict) -> Iterator[Block]:
     yield Block("heading", "Hard cases")
     yield Block("text", "Right: the exact value, bound or conserved quantity of the case is met, and so are the "
                         "balances; refused: an error says which bound was met; wrong: anything else. `make verify` "
-                        "runs them all; `python -m verification.hard_cases` shows the numbers.")
+                        "runs them all, and leaves every number in `verification/report/speed.html`; "
+                        "`python -m verification hard` runs them alone.")
     yield table(("", "case", "right is", *presets), (
         (str(case["number"]), case["title"], case["right_is"], *map(_shown, map(case["cells"].get, presets)))
         for case in record["cases"]))
@@ -85,25 +79,3 @@ CHECK = ("part", "quantity", "measured", "expected", "origin")
 def _shown(cell: dict | None) -> str:
     """The verdict, with a mark where it is none that it may be."""
     return "" if cell is None else cell["verdict"] + "!" * (not cell.get("accepted", True))
-
-
-def main(arguments: list[str] | None = None) -> int:
-    """Entry point; 1 if a cell has a verdict that it may not have."""
-    parser = argparse.ArgumentParser(prog="python -m verification.hard_cases", description=__doc__.splitlines()[0])
-    parser.add_argument("--case", type=int, action="append", choices=sorted(case.number for case in CASES))
-    parser.add_argument("--preset", action="append", choices=PRESETS)
-    chosen = parser.parse_args(arguments)
-    cells = []
-    for case, preset in product(sorted(CASES, key=lambda case: case.number), chosen.preset or PRESETS):
-        if not chosen.case or case.number in chosen.case:
-            cells.append(run_cell(case, preset))
-            print(f"{case.number:2d} {preset:9} {cells[-1].verdict:8}{cells[-1].seconds:6.1f} s", file=sys.stderr,
-                  flush=True)
-    print(plain(blocks(as_json(cells, live=True))))
-    if not (chosen.case or chosen.preset):
-        write(cells)
-    return 1 if any(cell.unaccepted for cell in cells) else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -18,8 +18,10 @@ from repro.errors import StageError
 from repro.fem.outline import Outline, half_disc
 from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.march import updates
+from repro.march.loop import Instant
 from repro.model import contact, mesh_motion, pore, remeshing
 from repro.model.pore import Pore, Solved
+from repro.results import row
 from repro.scene import Scene
 from verification.claims import runs
 from verification.claims.levels import CONVERGED, FINE, Level, at_level, cached, forget
@@ -185,14 +187,14 @@ def one_state(found: State, changed: Scene) -> dict[str, float]:
 def columns(run: tuple[str, ...]) -> dict[str, np.ndarray]:
     """Of a run's rows: "time" h, "velocity" m/d, "area" um2, "drift", largest |(X_A + X_I) / X_m - 1|, and "lean", the
     middle between the tips over half their distance."""
-    rows = runs.series(*run)
+    return _told(runs.series(*run))
+
+
+def _told(rows: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    upstream, downstream = rows["upstream_um"], rows["downstream_um"]
     return {"time": rows["time_h"], "velocity": rows["mean_velocity_m_per_d"], "area": rows["aggregate_area_um2"],
             "drift": np.maximum(1 - rows["biomass_density_min"], rows["biomass_density_max"] - 1),
-            "lean": _lean(rows["upstream_um"], rows["downstream_um"])}
-
-
-def _lean(upstream, downstream):
-    return (upstream + downstream) / (downstream - upstream)
+            "lean": (upstream + downstream) / (downstream - upstream)}
 
 
 def near(found: dict[str, np.ndarray], name: str, times) -> np.ndarray:
@@ -221,12 +223,12 @@ def course(run: tuple[str, ...], step: Step, seeded: Callable[[Scene], Pore] = p
     start = process_time()
     try:
         for now, solved in _march(said, step, seeded(said)):
-            rows.append(_row(said, now, solved))
+            rows.append(row(said, Instant(now, solved, None, (), 0, {})))
             if now.time < PLOTTED + 1e-6:
                 plotted = State(said, now, solved)
     except StageError as error:
         raise RuntimeError(f"a run by {step.__name__} fails after {len(rows) - 1} steps") from error
-    return Course(process_time() - start, case.columns(rows), plotted)
+    return Course(process_time() - start, _told(case.columns(rows)), plotted)
 
 
 def _march(said: Scene, step: Step, now: Pore) -> Iterator[tuple[Pore, Solved]]:
@@ -237,13 +239,6 @@ def _march(said: Scene, step: Step, now: Pore) -> Iterator[tuple[Pore, Solved]]:
         now = replace(step(said, now, solved, time - now.time), time=time)
         solved = pore.solve(said, now)
         yield now, solved
-
-
-def _row(said: Scene, now: Pore, solved: Solved) -> dict[str, float]:
-    least, most = now.composition(said.kinetics.maximum_density)[1:]
-    tips = now.boundary.upstream, now.boundary.downstream
-    return {"time": now.time, "velocity": 24e-6 * solved.flow.mean_velocity, "area": now.boundary.area,
-            "drift": max(1 - least, most - 1), "lean": _lean(*tips)}
 
 
 def as_it_is(said: Scene, now: Pore, solved: Solved, hours: float) -> Pore:

@@ -109,7 +109,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--repeats", type=int, default=1)
     chosen = parser.parse_args(arguments)
     counts = {JUDGED: chosen.runs, TOLD: max(chosen.runs // 5, 1)}
-    found = {preset: median(measure(preset, count) for _ in range(chosen.repeats)) for preset, count in counts.items()}
+    found = {}
+    for preset, count in counts.items():
+        found[preset] = median(measure(preset, count) for _ in range(chosen.repeats))
     holds = found[JUDGED] >= WANTED
     costs = commands()
     for command, (ratio, most) in costs.items():

@@ -5,6 +5,6 @@ and channel against other codes (:mod:`.users`), base, size, scenes and memory (
 in ``verification/report/bench.json`` (:mod:`.record`), judged and drawn as ``verification/report/bench_*.svg``
 (:mod:`.told`).
 
-Times are of one machine in one run: quote the ratios. Importing the packages is not counted in them, and stated apart;
-neither is what a library compiles before its first solution.
+Times are of one machine in one run: quote the ratios. Importing the packages is not counted in them, nor is what a
+library compiles before its first solution.
 """

@@ -31,13 +31,12 @@ def main(arguments: list[str] | None = None) -> dict:
 def measure(names, quick: bool) -> dict:
     """Run parts one after the other; each is recorded as soon as it is there."""
     found = record.empty() if quick else record.load()
-    imports = None if quick else record.import_seconds()
     print(plain([told.machine(record.machine())]))
     for name in names:
         start = perf_counter()
         part = getattr(import_module(f"verification.bench.{PARTS[name]}"), f"{name}_part")(quick)
         part["took_seconds"] = perf_counter() - start
-        found = record.merged(found, {name: part}, {name: part.get("repeats", 1)}, imports)
+        found = record.merged(found, {name: part}, {name: part.get("repeats", 1)})
         found["verdicts"] = told.judged(found)
         print(plain(told.blocks(name, part)), flush=True)
         if not quick:

@@ -1,7 +1,7 @@
 """``bench.json``: what the last benchmark has measured, for tables, pictures and pages.
 
     {"machine": {"platform", "processor", "cores", "python", "versions": {package: version}, "repeats": {part: number},
-                 "import_seconds": {package: s}, "date"},
+                 "date"},
      "parts": {name: {"title": what is measured, in words,
                       "error": what the error is,
                       "reference": where the reference comes from, and how converged it is,
@@ -31,14 +31,13 @@ from __future__ import annotations
 import gc
 import os
 import platform
-import subprocess
-import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import date
 from functools import partial
 from importlib.metadata import version
 from math import exp, isfinite, log
+from operator import itemgetter
 from pathlib import Path
 from statistics import median
 from time import perf_counter, process_time
@@ -50,9 +49,6 @@ from verification.kernel import writing
 FOLDER = Path(__file__).parents[1] / "report"
 FILE = FOLDER / "bench.json"
 PACKAGES = ("numpy", "scipy", "scikit-fem", "shapely", "mmgpy", "fipy", "py-pde", "numba")
-#: What a user imports to run a scene here, or a problem there.
-IMPORTED = {"dupin2001-repro": "repro.march.simulation", "fipy": "fipy", "py-pde": "pde", "scikit-fem": "skfem"}
-IMPORTS = 3
 
 
 def empty() -> dict:
@@ -82,27 +78,10 @@ def processor(file: Path = Path("/proc/cpuinfo")) -> str:
     return names[0] if names else platform.processor() or "unknown"
 
 
-def import_seconds() -> dict[str, float]:
-    """Median seconds that a new process takes to import each package, less what it takes to import nothing."""
-    bare = _started("pass")
-    return {name: max(0.0, _started(f"import {module}") - bare) for name, module in IMPORTED.items()}
-
-
-def _started(statement: str) -> float:
-    seconds = []
-    for _ in range(IMPORTS):
-        start = perf_counter()
-        subprocess.run([sys.executable, "-c", statement], check=True, capture_output=True)
-        seconds.append(perf_counter() - start)
-    return median(seconds)
-
-
-def merged(record: dict, parts: dict, repeats: dict, imports: dict | None = None) -> dict:
+def merged(record: dict, parts: dict, repeats: dict) -> dict:
     """The record with new parts in place of those of the same names; verdicts are to be worked out again."""
-    before = record.get("machine", {})
-    about = {**machine(), "repeats": {**before.get("repeats", {}), **repeats},
-             "import_seconds": imports or before.get("import_seconds", {})}
-    return {"machine": about, "parts": {**record.get("parts", {}), **parts}, "verdicts": []}
+    about = {**machine(), "repeats": {**record["machine"].get("repeats", {}), **repeats}}
+    return {"machine": about, "parts": {**record["parts"], **parts}, "verdicts": []}
 
 
 def line(part: dict, method: str) -> dict | None:
@@ -200,12 +179,11 @@ def _lines(times: Mapping[tuple[str, str], Timed]) -> list[dict]:
 @dataclass(frozen=True)
 class Reading:
     """Seconds and processor seconds that a method needs for an error; how: "measured", "between points" or
-    "extrapolated"; slope: of log time by log error there, 0 where a point is taken as it is."""
+    "extrapolated with slope p", of log time by log error."""
 
     seconds: float
     cpu: float
     how: str
-    slope: float
 
 
 def envelope(points: Iterable[Mapping]) -> list[Mapping]:
@@ -216,12 +194,6 @@ def envelope(points: Iterable[Mapping]) -> list[Mapping]:
             kept.append(point)
             best = point["error"]
     return kept
-
-
-def slope(points: Iterable[Mapping], key: str = "seconds") -> float:
-    """Least-squares slope of log time by log error over an envelope."""
-    points = list(points)
-    return exponent([p["error"] for p in points], [p[key] for p in points])
 
 
 def exponent(sizes, values) -> float:
@@ -243,21 +215,14 @@ def reading(points: Iterable[Mapping], error: float) -> Reading | None:
     kept = envelope(points)
     if not kept:
         return None
-    if error >= kept[0]["error"]:
-        return Reading(kept[0]["seconds"], kept[0]["cpu"], "measured", 0.0)
-    for coarse, fine in zip(kept, kept[1:]):
-        if fine["error"] <= error:
-            return _between(coarse, fine, error)
-    slopes = [slope(kept, key) for key in ("seconds", "cpu")]
+    errors, *times = zip(*map(itemgetter("error", "seconds", "cpu"), kept))
+    if error >= errors[0]:
+        return Reading(*(each[0] for each in times), "measured")
+    if error >= errors[-1]:
+        logs = (np.interp(-log(error), -np.log(errors), np.log(each)) for each in times)
+        return Reading(*map(exp, logs), "between points")
+    slopes = [exponent(errors, each) for each in times]
     if not all(s < 0 for s in slopes):
         return None
-    last, ratio = kept[-1], log(error / kept[-1]["error"])
-    return Reading(*(last[key] * exp(s * ratio) for key, s in zip(("seconds", "cpu"), slopes)), "extrapolated",
-                   slopes[0])
-
-
-def _between(coarse: Mapping, fine: Mapping, error: float) -> Reading:
-    width = log(fine["error"] / coarse["error"])
-    part = log(error / coarse["error"]) / width
-    values = [exp((1 - part) * log(coarse[key]) + part * log(fine[key])) for key in ("seconds", "cpu")]
-    return Reading(*values, "between points", log(fine["seconds"] / coarse["seconds"]) / width)
+    found = (each[-1] * (error / errors[-1]) ** s for each, s in zip(times, slopes))
+    return Reading(*found, f"extrapolated with slope {slopes[0]:.2f}")

@@ -29,6 +29,7 @@ from repro.scene import load_scene, parse_scene
 from verification.bench import record
 from verification.bench.record import exponent, measured
 from verification.claims.runs import until
+from verification.kernel.case import columns
 from verification.problems import runs as problems
 
 BASE_REPEATS = 3
@@ -140,15 +141,13 @@ def reference(times) -> tuple[list, dict]:
     kept = record.load()["parts"].get("base", {})
     if kept.get("reference_times") == list(times):
         return kept["reference_values"], {key: value for key, value in kept.items() if key.startswith("reference")}
-    start = process_time()
     found, check = (whole_run.converged(whole_run.Pore(), times, *size).values for size in (REFERENCE, CHECK))
     change = error(found, check)
     return check.tolist(), {
         "reference": f"scikit-fem's quadratic elements in moving coordinates, Runge-Kutta in time, extrapolated from "
                      f"{CHECK[0]} rings and {CHECK[1]} steps; from {REFERENCE[0]} and {REFERENCE[1]} they differ by "
                      f"{change:.1e}",
-        "reference_change": change, "reference_times": list(times), "reference_values": check.tolist(),
-        "reference_seconds": process_time() - start}
+        "reference_change": change, "reference_times": list(times), "reference_values": check.tolist()}
 
 
 def _short(times) -> tuple[list, dict]:
@@ -349,7 +348,7 @@ def sized(kind: str, nodes: int):
 
 def measure(kind: str, nodes: int, steps: int) -> dict:
     """Seconds of a step and of its stages, their floor, and memory."""
-    before = _resident()
+    before = _peak()
     given, now = sized(kind, nodes)
     solved = pore.solve(given, now)
     now = replace(now, concentrations=solved.concentrations)
@@ -361,14 +360,14 @@ def measure(kind: str, nodes: int, steps: int) -> dict:
         after = replace(taken.pore, time=now.time + STEP)
         solved = pore.solve(given, after)
         now = replace(after, concentrations=solved.concentrations)
-        rows.append((perf_counter() - wall, process_time() - spent, dict(timing.seconds), taken.remeshed))
+        rows.append({"seconds": perf_counter() - wall, "cpu": process_time() - spent, "remeshed": taken.remeshed,
+                     **{name: timing.seconds.get(name, 0.0) for name in (*STAGES, FLOOR)}})
     rows = rows[1:] or rows
-    usual = [row for row in rows if not row[3]] or rows
-    stages = {name: median(row[2].get(name, 0.0) for row in usual) for name in (*STAGES, FLOOR)}
-    seconds = median(row[0] for row in usual)
-    return {"seconds": seconds, "cpu": median(row[1] for row in usual), "nodes": len(now.mesh.points),
-            "stages": stages, "ratio": seconds / stages[FLOOR], "memory_MB": _peak() - before, "peak_MB": _peak(),
-            "repeats": len(usual), "remeshed": sum(row[3] for row in rows)}
+    usual = columns([row for row in rows if not row["remeshed"]] or rows)
+    middle = {name: float(np.median(column)) for name, column in usual.items()}
+    return {"seconds": middle["seconds"], "cpu": middle["cpu"], "nodes": len(now.mesh.points),
+            "stages": {name: middle[name] for name in (*STAGES, FLOOR)}, "ratio": middle["seconds"] / middle[FLOOR],
+            "memory_MB": _peak() - before, "repeats": len(usual["cpu"])}
 
 
 def _peak() -> float:
@@ -379,14 +378,6 @@ def _peak() -> float:
         return int(next(line for line in lines if line.startswith("VmHWM")).split()[1]) / 1024
     except (OSError, StopIteration):
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-
-
-def _resident() -> float:
-    """Resident memory now, MB, as Linux tells it; else its peak so far."""
-    try:
-        return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1]) * resource.getpagesize() / 2**20
-    except OSError:
-        return _peak()
 
 
 if __name__ == "__main__":

@@ -16,24 +16,23 @@ from reference.whole_run import Pore as Constants
 from reference.whole_run_grid import grid
 from reference.whole_run_pore import Section
 from repro.fem import transfer
-from repro.fem.mesh import curved
 from repro.fem.outline import FREE
 from repro.fem.space import Space
-from repro.model import flow, growth, pore, transport
+from repro.model import growth, pore, transport
 from repro.model.contact import constrained
 from repro.model.kinetics import Sink
 from repro.scene import parse_scene
 from verification.bench.record import part, series
-from verification.problems import bodies, meshes, pairs
+from verification.problems import bodies, meshes
 from verification.problems.bodies import HalfCylinder
 
 WIDTH, LENGTH = 50.0, 600.0
 RADIUS, RATIO = 40.0, 2000.0
 PAPER = "linear elements (paper)"
 ORDER_2, QUADRATIC = "order 2 on curved triangles (fast, accurate)", "scikit-fem: quadratic elements"
-#: Orders of the elements of curved triangles.
-CURVED = {ORDER_2: 2, "order 3 on curved triangles": 3}
-FLOW_ELEMENTS = {PAPER: {"preset": "paper"}, "linear with a bubble": {"preset": "paper", "flow_element": "bubble"}}
+#: Methods of this package by the order of their elements, and what a scene says of them.
+OURS = {PAPER: (1, {"preset": "paper"}), "linear with a bubble": (1, {"preset": "paper", "flow_element": "bubble"}),
+        ORDER_2: (2, {"preset": "accurate"}), "order 3 on curved triangles": (3, {"preset": "accurate"})}
 #: The meshed part ends 1.5 W from the aggregate (3.1), for all methods; m/d.
 ENDS, SPEED = (-RADIUS - 1.5 * WIDTH, RADIUS + 1.5 * WIDTH), 2.9
 
@@ -87,13 +86,11 @@ def flow_part(quick: bool) -> dict:
     """Flow around a half-disc of 40 um in a pore of 50 um, lambda = 2000: error of the head loss of the whole pore."""
     rings, linear, quadratic, skfem, sections = FLOW_SIZES[quick]
     coarse, truth = map(flow_reference, rings)
-    jobs = {}
-    for name, element in FLOW_ELEMENTS.items():
-        jobs |= series(name, REFINEMENT, linear, _flow_linear, truth=truth, **element)
-    jobs |= series("order 2 on straight triangles", REFINEMENT, linear[:-2], _of_order, truth=truth, preset="paper",
-                   order=2)
-    for name, order in CURVED.items():
-        jobs |= series(name, REFINEMENT, quadratic, _of_order, truth=truth, preset="accurate", order=order)
+    jobs = series("order 2 on straight triangles", REFINEMENT, linear[:-2], _flow_ours, truth=truth, order=2,
+                  preset="paper")
+    for name, (order, numerics) in OURS.items():
+        jobs |= series(name, REFINEMENT, linear if order == 1 else quadratic, _flow_ours, truth=truth, order=order,
+                       **numerics)
     jobs |= series("scikit-fem: Taylor-Hood, two pressures", "{} refinements", skfem, _taylor_hood, truth=truth)
     jobs |= series("scikit-fem: Taylor-Hood, rings", RINGS, sections, _flow_section, truth=truth)
     change = abs(coarse / truth - 1)
@@ -112,18 +109,12 @@ def flow_reference(rings: int) -> float:
     return curved_mesh(rings).flow(RATIO).loss + outside_loss()
 
 
-def _flow_linear(refinement: float, truth: float, **element) -> dict:
-    scene = half_disc(refinement=refinement, **element)
+def _flow_ours(refinement: float, truth: float, order: int, **numerics) -> dict:
+    scene = half_disc(refinement=refinement, **numerics)
     mesh = pore.seeded(scene).mesh
-    found = pore.solve_flow(scene, Space(mesh, 1))
+    found = pore.solve_flow(scene, Space(mesh, order))
     nu = scene.flow.kinematic_viscosity / scene.flow.gravity
     return _flow_judged(truth, found.head_loss / scene.flow.mean_velocity / nu, nodes=len(mesh.points))
-
-
-def _of_order(refinement: float, truth: float, preset: str, order: int) -> dict:
-    mesh = pore.seeded(half_disc(preset=preset, refinement=refinement)).mesh
-    loss = flow.unit_flow(Space(mesh, order), RATIO).loss
-    return _flow_judged(truth, loss + outside_loss(), nodes=len(mesh.points))
 
 
 def _taylor_hood(refinements: int, truth: float) -> dict:
@@ -152,12 +143,12 @@ def transport_part(quick: bool) -> dict:
     """
     rings, linear, quadratic, sections = TRANSPORT_SIZES[quick]
     coarse, truth = (_effluents(*prepared(each)) for each in rings)
-    made = [(name, REFINEMENT, linear, partial(_transport_ours, truth, 1, **element))
-            for name, element in FLOW_ELEMENTS.items()]
-    made += [(name, REFINEMENT, quadratic, partial(_transport_ours, truth, order, preset="accurate"))
-             for name, order in CURVED.items()]
-    made.append((QUADRATIC, RINGS, sections, lambda rings: partial(_carried_by, truth, *prepared(rings))))
-    jobs = {(name, label.format(size)): make(size) for name, label, sizes, make in made for size in sizes}
+    jobs = {}
+    for name, (order, numerics) in OURS.items():
+        for size in linear if order == 1 else quadratic:
+            jobs[name, REFINEMENT.format(size)] = _transport_ours(truth, order, refinement=size, **numerics)
+    for each in sections:
+        jobs[QUADRATIC, RINGS.format(each)] = partial(_carried_by, truth, *prepared(each))
     change = largest(coarse, truth, supply())
     return part("Transport: dual Monod uptake around a half-disc of 40 um in a pore of 50 um, 2.9 m/d; assembly and "
                 "solution", "effluents over the supply, the larger error",
@@ -189,9 +180,9 @@ def _carried_by(truth, section, flow) -> dict:
     return {"error": largest(_effluents(section, flow), truth, supply())}
 
 
-def _transport_ours(truth, order: int, refinement: float, **numerics):
+def _transport_ours(truth, order: int, **numerics):
     """A job whose mesh and flow are there."""
-    scene = half_disc(refinement=refinement, **numerics)
+    scene = half_disc(**numerics)
     now = pore.seeded(scene)
     space = Space(now.mesh, order)
     return partial(_solved, truth, scene, space, pore.solve_flow(scene, space))
@@ -227,10 +218,12 @@ def growth_part(quick: bool) -> dict:
                 "closed form of the growing half-cylinder", jobs, GROWTH_REPEATS[quick])
 
 
-def _growth_apart(found: np.ndarray, rim: np.ndarray) -> float:
-    """Largest distance of the outline (m, 2) from where its nodes (m, 2) of t = 0 should be, over the radius."""
-    wanted = AFTER.place(*rim.T)
-    return float(np.hypot(*(found - wanted).T).max() / np.hypot(*wanted.T).max())
+def _growth_judged(found: np.ndarray, points: np.ndarray, rim: np.ndarray) -> dict:
+    """Largest distance of the outline's nodes from where they should be, over the radius; places (n, 2) now and at
+    t = 0."""
+    wanted = AFTER.place(*points[rim].T)
+    error = np.hypot(*(found[rim] - wanted).T).max() / np.hypot(*wanted.T).max()
+    return {"error": float(error), "nodes": len(points)}
 
 
 @cache
@@ -241,18 +234,11 @@ def _seeded(refinement: float, preset: str):
 
 def _growth_ours(refinement: float, preset: str):
     now, held = _seeded(refinement, preset)
-    points = now.mesh.points[now.mesh.body] * bodies.RADIUS / RADIUS
-    body = growth.Body(now.body.shape, points)
-    whole = AFTER.theta(*(body.shape.table.values @ points[body.shape.cells]).transpose(2, 0, 1))
-    start, push = BEFORE.place(*points.T), BEFORE.pressure(*points[: body.shape.corners].T)
-    found = growth.equilibrium(body, whole, start, push, held, start)
-    return partial(_growth_judged, now, points, found.position)
-
-
-def _growth_judged(now, points, found) -> dict:
-    rim = now.mesh.topology.body_loop
-    rim = rim[now.wall == FREE]
-    return {"error": _growth_apart(found[rim], points[rim]), "nodes": len(points)}
+    shape, points = now.body.shape, now.body.reference * bodies.RADIUS / RADIUS
+    given = bodies.Supported(growth.Body(shape, points), held)  # nothing is known of it
+    start, push = BEFORE.place(*points.T), BEFORE.pressure(*points[: shape.corners].T)
+    found = growth.equilibrium(given.body, given.field(AFTER.theta), start, push, held, start)
+    return partial(_growth_judged, found.position, points, now.mesh.topology.body_loop[now.wall == FREE])
 
 
 @cache
@@ -269,7 +255,7 @@ def _skfem(rings: int):
     found = quadratic_growth.grow(mesh, AFTER.theta, AFTER.outer, start=START)
     points = mesh.doflocs.T
     rim = np.isclose(np.hypot(*points.T), bodies.RADIUS, rtol=1e-9)
-    return lambda: {"error": _growth_apart(found.place.T[rim], points[rim]), "nodes": len(points)}
+    return partial(_growth_judged, found.place.T, points, rim)
 
 
 #: um; the front's place along x and its width.
@@ -285,12 +271,12 @@ def transfer_part(quick: bool) -> dict:
     Meshes and what is worked out once for them are made beforehand; a time is of all twenty transfers.
     """
     count, sizes, quadratic = TRANSFER_SIZES[quick]
-    ways = {"conserving projection": transfer.project,
-            "bounded conserving projection": transfer.project_bounded,
+    jobs = series("quadratic interpolation (fast, accurate)", SIZE, quadratic, _carried, count=count, order=2,
+                  carry=transfer.interpolated)
+    ways = {"conserving projection": transfer.project, "bounded conserving projection": transfer.project_bounded,
             f"linear interpolation, {PAPER}": transfer.interpolated}
-    jobs = series("quadratic interpolation (fast, accurate)", SIZE, quadratic, _quadratic, count=count)
     for name, way in ways.items():
-        jobs |= series(name, SIZE, sizes, _linear, count=count, project=way)
+        jobs |= series(name, SIZE, sizes, _carried, count=count, order=1, carry=way)
     return part(f"Transfer: a front through {count} remeshes",
                 "L2 of the field in the end, relative; drift: of its total, relative", "the field itself", jobs,
                 TRANSFER_REPEATS[quick])
@@ -305,60 +291,25 @@ def transfer_exact(x, y):
 
 
 @cache
-def _transfer_meshed(size: float, which: int):
-    return meshes.rectangle(TRANSFER_ENDS, TRANSFER_WIDTH, size, seed=which)
-
-
-@cache
-def _curved(size: float, which: int):
+def _transfer_meshed(size: float, which: int, order: int) -> Space:
     straight = meshes.channel(TRANSFER_ENDS, TRANSFER_WIDTH, size, lambda x, y: x < np.inf, seed=which)
-    return Space(curved(straight, None), 2)
+    return meshes.space_on(straight, order)
 
 
-@cache
-def _total() -> float:
-    """Integral of the field, by Gauss's quadrature."""
-    node, weight = np.polynomial.legendre.leggauss(60)
-    x, y = 0.5 * TRANSFER_ENDS[1] * (1 + node), 0.5 * TRANSFER_WIDTH * (1 + node)
-    return float(weight @ transfer_exact(x[:, None], y) @ weight) * 0.25 * TRANSFER_ENDS[1] * TRANSFER_WIDTH
-
-
-def _linear(size: float, count: int, project):
-    return _carried(count, partial(_transfer_meshed, size), lambda mesh: mesh[0],
-                    lambda old, field, new: project(*old, field, *new),
-                    lambda mesh, field: pairs.integral(mesh, field[:, 0]),
-                    lambda mesh, field: meshes.l2_error(*mesh, field[:, 0], transfer_exact))
-
-
-def _quadratic(size: float, count: int):
-    return _carried(count, partial(_curved, size), lambda space: space.points, _interpolated, _weighed, _transfer_apart)
-
-
-def _interpolated(old: Space, field: np.ndarray, new: Space) -> np.ndarray:
-    return transfer.interpolate(old.mesh.points, old.mesh.cells, field, new.points)
-
-
-def _carried(count: int, meshed, points, carry, weighed, error):
-    """The field through ``meshed(which)``, by ``carry(old, field, new)``; ``weighed`` and ``error`` of a mesh and the
-    field on it."""
-    old = meshed(0)
-    field = transfer_exact(*points(old).T)[:, None]
-    start = weighed(old, field)
+def _carried(size: float, count: int, order: int, carry):
+    """The field through so many meshes, by ``carry(points, triangles, field, new points, new triangles)``."""
+    old = _transfer_meshed(size, 0, order)
+    field = transfer_exact(*old.points.T)[:, None]
+    start = _weighed(old, field)
     for which in range(1, count + 1):
-        new = meshed(which)
-        field = carry(old, field, new)
+        new = _transfer_meshed(size, which, order)
+        field = carry(old.points, old.cells, field, new.points, new.cells)
         old = new
-    return lambda: {"error": error(old, field), "nodes": len(points(old)),
-                    "drift": abs(weighed(old, field) - start) / _total(),
+    return lambda: {"error": meshes.field_error(old, field[:, 0], transfer_exact), "nodes": len(old.points),
+                    "drift": abs(_weighed(old, field) / start - 1),
                     "beyond": float(max(1.0 - field.min(), field.max() - 2.0, 0.0))}
 
 
-def _weighed(space, field) -> float:
+def _weighed(space: Space, field: np.ndarray) -> float:
+    """Integral of a field."""
     return float(np.sum(space.at.dx * space.at_points(field[:, 0])))
-
-
-def _transfer_apart(space, field) -> float:
-    """L2 of a quadratic field less the exact one, relative."""
-    truth = transfer_exact(*space.at_points(space.points.T))
-    gap = space.at_points(field[:, 0]) - truth
-    return float(np.sqrt(np.sum(space.at.dx * gap**2) / np.sum(space.at.dx * truth**2)))

@@ -8,10 +8,12 @@ beside them.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from functools import partial
 from itertools import product
-from math import inf, nan
+from math import inf
+from operator import itemgetter
 from pathlib import Path
+
+import numpy as np
 
 from verification.bench import runs
 from verification.bench.record import Reading, envelope, reading
@@ -37,10 +39,11 @@ def judged(record: dict) -> list[dict]:
             *_scenes(parts.get("scenes", {})), *_memory(parts.get("memory", {}))]
 
 
-def verdict(claim: str, wanted: str, measure: Callable[[], tuple[str, bool]]) -> dict:
-    """One of them: ``measure`` gives what was measured, and whether it holds; LookupError where the record lacks it."""
+def verdict(claim: str, wanted: str, measure: Callable[..., tuple[str, bool]], *given) -> dict:
+    """One of them: ``measure(*given)`` tells what was measured, and whether it holds; LookupError where the record
+    lacks it."""
     try:
-        measured, holds = measure()
+        measured, holds = measure(*given)
     except LookupError:
         return {"claim": claim, "measured": NOT_MEASURED, "wanted": wanted, "holds": None}
     return {"claim": claim, "measured": measured, "wanted": wanted, "holds": bool(holds)}
@@ -66,14 +69,14 @@ def _base(part: dict) -> Iterator[dict]:
     for name, (error, least, aim) in FASTER.items():
         percent = f"{100 * error:g} %"
         yield verdict(f"base: the error of {name} is at most {percent}", f"at most {percent}",
-                      partial(_accurate, part, name, error))
+                      _accurate, part, name, error)
         wanted = f"at least {least:g} times" + (f" (aim {aim:g})" if aim > least else "")
         for words, at in ((percent, error), ("the error that the preset has", None)):
             yield verdict(f"base: {name} is faster than the paper's scheme at its own best speed for {words}", wanted,
-                          partial(_faster, part, name, at, least))
+                          _faster, part, name, at, least)
     yield verdict(f"base: {runs.ACCURATE} takes about {ACCURATE_RUN:g} s", f"at most {ACCURATE_RUN:g} s",
-                  partial(_quick, part))
-    yield verdict("wide in preset fast takes about 10 s", f"at most {WIDE:g} s", partial(_wide, part))
+                  _quick, part)
+    yield verdict("wide in preset fast takes about 10 s", f"at most {WIDE:g} s", _wide, part)
 
 
 def _accurate(part: dict, name: str, error: float) -> tuple[str, bool]:
@@ -88,7 +91,6 @@ def _faster(part: dict, name: str, error: float | None, least: float) -> tuple[s
     best = _read(_points(part, runs.PRESET_PAPER), wanted)
     ratio, cpu = best.seconds / point["seconds"], best.cpu / point["cpu"]
     told = f"{ratio:.1f} times (processor time {cpu:.1f}): {best.seconds:.2f} s, {best.how}"
-    told += f" with slope {best.slope:.2f}" if best.how == "extrapolated" else ""
     return f"{told}, against {point['seconds']:.2f} s", ratio >= least and point["error"] <= wanted
 
 
@@ -111,7 +113,7 @@ def _wide(part: dict) -> tuple[str, bool]:
 def _others(parts: dict) -> Iterator[dict]:
     for name, other in product(("box", "channel"), OTHERS):
         claim = f"transport, {name}: faster than {other.split(',')[0]} at equal error (compilation left out)"
-        yield verdict(claim, f"at least {TIMES_FASTER:g} times", partial(_least_ratio, parts.get(name, {}), other))
+        yield verdict(claim, f"at least {TIMES_FASTER:g} times", _least_ratio, parts.get(name, {}), other)
 
 
 def _least_ratio(part: dict, other: str) -> tuple[str, bool]:
@@ -129,7 +131,7 @@ def _least_ratio(part: dict, other: str) -> tuple[str, bool]:
 def _steps(part: dict) -> Iterator[dict]:
     for method, (told, (bound, low, high)) in product(runs.METHODS, FLOORS.items()):
         yield verdict(f"a growth step over its factorise-and-solve time, {method}, {told}", f"at most {bound:g}",
-                      partial(_floor, part, method, bound, low, high))
+                      _floor, part, method, bound, low, high)
 
 
 def _floor(part: dict, method: str, bound: float, low: float, high: float) -> tuple[str, bool]:
@@ -143,7 +145,7 @@ def _floor(part: dict, method: str, bound: float, low: float, high: float) -> tu
 def _scenes(part: dict) -> Iterator[dict]:
     wanted = f"no other stage runs; at most {100 * EXCESS:g} % of the whole model's first solution above them"
     for name in list(runs.SCENES)[1:]:
-        yield verdict(f"{name}: a scene costs what its own stages cost", wanted, partial(_own, part, name))
+        yield verdict(f"{name}: a scene costs what its own stages cost", wanted, _own, part, name)
 
 
 def _own(part: dict, name: str) -> tuple[str, bool]:
@@ -167,7 +169,7 @@ def excess(row: dict, whole: dict) -> float:
 def _memory(part: dict) -> Iterator[dict]:
     for preset in runs.MEMORY_PRESETS:
         yield verdict(f"preset {preset}: live memory does not grow with the number of steps",
-                      f"under {runs.PART:g} of one nodal field a step", partial(_flat, part, f"preset {preset}"))
+                      f"under {runs.PART:g} of one nodal field a step", _flat, part, f"preset {preset}")
 
 
 def _flat(part: dict, method: str) -> tuple[str, bool]:
@@ -260,14 +262,9 @@ def _precision(pyplot, part: dict):
     for k, line in enumerate(part["lines"]):
         points = [p for p in line["points"] if p["error"] > 0]
         label = line["method"] + (f" ({len(line['failed'])} failed)" if line["failed"] else "")
-        if not points:
-            axis.plot([], [], " ", label=label)
-            continue
         color, mark = COLORS[k % len(COLORS)], MARKS[k % len(MARKS)]
-        axis.loglog([p["seconds"] for p in points], [p["error"] for p in points], mark, ms=4, color=color, alpha=0.6)
-        best = envelope(points)
-        axis.loglog([p["seconds"] for p in best], [p["error"] for p in best], f"-{mark}", ms=4, color=color,
-                    label=label)
+        _curve(axis, points, "seconds", "error", mark, color=color, alpha=0.6)
+        _curve(axis, envelope(points), "seconds", "error", f"-{mark}" if points else " ", color=color, label=label)
     labelled(axis, part["title"], "wall time (s)", part["error"] if len(part["error"]) < 60 else "largest error")
     axis.grid(which="major", lw=0.3)
     figure.legend(fontsize=6, loc="outside right upper")
@@ -279,16 +276,20 @@ def _size_picture(pyplot, part: dict):
     lines = [line for line in part["lines"] if line["points"]]
     figure, axes = pyplot.subplots(1, len(lines) + 1, figsize=(3.9 * (len(lines) + 1), 3.4), layout="constrained")
     for axis, line in zip(axes, lines):
-        nodes = [p["nodes"] for p in line["points"]]
-        axis.loglog(nodes, [p["seconds"] for p in line["points"]], "k-o", ms=4, label="step")
+        _curve(axis, line["points"], "nodes", "seconds", "k-o", label="step")
         for name in (*runs.STAGES, runs.FLOOR):
-            values = [p["stages"].get(name, 0.0) for p in line["points"]]
-            if any(values):
-                axis.loglog(nodes, [v or nan for v in values], "--" if name == runs.FLOOR else "-", label=name)
+            costs = [{"nodes": p["nodes"], name: p["stages"][name]} for p in line["points"] if p["stages"].get(name)]
+            if costs:
+                _curve(axis, costs, "nodes", name, "--" if name == runs.FLOOR else "-", label=name)
         more = [p for p in line["points"] if p["memory_MB"] > 0]
-        axes[-1].loglog([p["nodes"] for p in more], [p["memory_MB"] for p in more], "-o", ms=4, label=line["method"])
+        _curve(axes[-1], more, "nodes", "memory_MB", "-o", label=line["method"])
         labelled(axis, line["method"], "nodes", "seconds a growth step")
     labelled(axes[-1], "memory above the start's", "nodes", "MB")
     for axis in axes:
         axis.legend(fontsize=6)
     return figure
+
+
+def _curve(axis, points, across: str, up: str, look: str, **how) -> None:
+    """Two numbers of points on logarithmic axes."""
+    axis.loglog(*(np.array([*map(itemgetter(name), points)]) for name in (across, up)), look, ms=4, **how)

@@ -30,16 +30,16 @@ from skfem import Basis, ElementTriP2, MeshTri, asm
 
 from reference import channel_bvp
 from reference import diffusion_reaction_pypde as pypde
-from reference.monod import NUDGE, uptake
+from reference.monod import derivatives, uptake
 from reference.whole_run_pore import steady, stiffness
-from repro.fem.mesh import Mesh, curved
-from repro.fem.space import Space
+from repro.fem.mesh import Mesh
 from repro.model import transport
 from repro.model.kinetics import Sink
 from repro.scene import parse_scene
 from verification.bench import stages
-from verification.bench.record import Jobs, part, series
-from verification.problems import channels
+from verification.bench.record import part, series
+from verification.problems import channels, meshes
+from verification.problems.pairs import upright
 
 #: um2/h of acceptor and donor, in fluid and biomass alike; mg/L.
 DIFFUSIVITY, DENSITY = (8e6, 4e6), 3e4
@@ -84,8 +84,7 @@ class Problem:
 def fipy(problem: Problem, across: int) -> np.ndarray:
     """(2,) what is judged."""
     mesh = _fipy_mesh(problem, across)
-    x = mesh.cellCenters.value
-    where = problem.inside(*x) if len(x) == 2 else problem.inside(x[0])
+    where = problem.inside(*mesh.cellCenters.value)
     X = CellVariable(mesh=mesh, value=np.where(where, problem.density, 0.0))
     both = [CellVariable(mesh=mesh, value=s) for s in problem.supply]
     constants = [CellVariable(mesh=mesh) for _ in both]
@@ -128,14 +127,13 @@ def _fipy_ends(problem: Problem, mesh, field, k: int):
 
 
 def _linearise(problem: Problem, now, constants, slopes) -> None:
-    """q = constant + sum of slopes times C at the present C; slopes by central differences."""
-    rate = np.array(uptake(*now, problem.rates))
-    columns = [(np.array(uptake(*(now + d), problem.rates)) - np.array(uptake(*(now - d), problem.rates))) / (2 * NUDGE)
-               for d in NUDGE * np.eye(2)[:, :, None]]
+    """q = constant + sum of slopes times C at the present C (2, n); slopes by central differences."""
+    by = derivatives(now, problem.rates)
+    rest = np.array(uptake(*now, problem.rates)) - np.einsum("kjn,jn->kn", by, now)
     for k in (0, 1):
-        constants[k].setValue(rate[k] - sum(column[k] * c for column, c in zip(columns, now)))
+        constants[k].setValue(rest[k])
         for j in (0, 1):
-            slopes[k][j].setValue(columns[j][k])
+            slopes[k][j].setValue(by[k, j])
 
 
 def py_pde(problem: Problem, across: int) -> tuple[np.ndarray, dict]:
@@ -204,18 +202,14 @@ def ribbon():
 
 def straight(ends, width: float, cells: tuple[int, int], inside) -> Mesh:
     """cells (along, across) halved; ``inside(x, y)`` of the triangles' middles is biomass."""
-    x, y = np.meshgrid(np.linspace(*ends, cells[0] + 1), np.linspace(0.0, width, cells[1] + 1), indexing="ij")
-    number = np.arange(x.size).reshape(x.shape)
-    a, b, c, d = (part.ravel() for part in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
-    triangles = np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
-    points = np.column_stack([x.ravel(), y.ravel()])
-    biomass = inside(*points[triangles].mean(axis=1).T)
-    return Mesh.of(points, triangles, biomass, np.empty(0, int), width, ends)
+    halved = MeshTri.init_tensor(np.linspace(*ends, cells[0] + 1), np.linspace(0.0, width, cells[1] + 1))
+    points, triangles = upright(halved.p.T, halved.t.T)
+    return Mesh.of(points, triangles, inside(*points[triangles].mean(axis=1).T), np.empty(0, int), width, ends)
 
 
-def solved(given, grid: Mesh, order: int, speed: float = 0.0):
+def solved(grid: Mesh, order: int, speed: float = 0.0):
     """(acceptor's, donor's) fluxes by linear (order 1), quadratic or cubic elements, in plug flow (um/h) or at rest."""
-    space = Space(grid if order == 1 else curved(grid, None), order)
+    given, space = ribbon(), meshes.space_on(grid, order)
     problem = channels.problem(space, speed or None, given.substrates, given.kinetics)
     sink = Sink(DENSITY * space.reaction.dx)
     return transport.fluxes(problem, sink, transport.steady(problem, sink))
@@ -233,12 +227,19 @@ def _ours(solve, linear, quadratic) -> dict:
             for order, method in OURS.items()}
 
 
-def _jobs(methods: dict, truth, scale) -> Jobs:
-    """Jobs of methods {name: (sizes, solve)}; ``solve(cells)`` finds what is judged, (2,)."""
+def _compared(title: str, judged: str, reference: str, problem: Problem, methods: dict, stepped, truths, scale,
+              repeats: int) -> dict:
+    """A part of methods {name: (sizes, solve)}, where ``solve(cells)`` finds what is judged, (2,), and of py-pde's
+    compiled runs; truths: the reference's, coarser first; reference: told with the finer one and what they differ by.
+    """
+    coarse, truth = truths
+    change = stages.largest(coarse, truth, scale)
     jobs: dict = {}
     for method, (sizes, solve) in methods.items():
         jobs |= series(method, CELLS, sizes, _apart, solve=solve, truth=truth, scale=scale)
-    return jobs
+    once = series(COMPILED, CELLS, stepped, _stepped, problem=problem, truth=truth, scale=scale)
+    found = part(title, judged, reference.format(*truth, change), jobs, repeats, once, reference_change=change)
+    return {**found, "apart": compile_times(found["lines"])}
 
 
 def _apart(cells: int, solve, truth, scale) -> dict:
@@ -274,19 +275,14 @@ def box_part(quick: bool) -> dict:
     py-pde's compiled run comes once a grid: numba compiles for longer than it runs.
     """
     linear, curved, skfem, cells, stepped, reference = BOX_SIZES[quick]
-    coarse, truth = map(quadratic, reference)
-    box = box_problem()
-    jobs = _jobs({**_ours(_box_ours, linear, curved), stages.QUADRATIC: (skfem, quadratic),
-                  "fipy": (cells, partial(fipy, box)), "py-pde's Laplacian, Newton by scipy": (cells, _newton)}, truth,
-                 truth)
-    change = stages.largest(coarse, truth, truth)
-    found = part("Uptake without flow: a block of 64 by 32 um in a box of 128 by 64 um; grid, assembly, solution",
-                 "what is taken up of each substrate, relative, the larger error",
-                 f"quadratic elements of scikit-fem, {reference[1]} cells across: {truth[0]:.9g} and {truth[1]:.9g} "
-                 f"um2 mg/L/h; from {reference[0]} cells on they change by {change:.1e}", jobs, REPEATS[quick],
-                 series(COMPILED, CELLS, stepped, _stepped, problem=box, truth=truth, scale=truth),
-                 reference_change=change)
-    return {**found, "apart": compile_times(found["lines"])}
+    box, truths = box_problem(), [quadratic(each) for each in reference]
+    methods = {**_ours(_box_ours, linear, curved), stages.QUADRATIC: (skfem, quadratic),
+               "fipy": (cells, partial(fipy, box)), "py-pde's Laplacian, Newton by scipy": (cells, _newton)}
+    told = (f"quadratic elements of scikit-fem, {reference[1]} cells across: {{:.9g}} and {{:.9g}} um2 mg/L/h; from "
+            f"{reference[0]} cells on they change by {{:.1e}}")
+    return _compared("Uptake without flow: a block of 64 by 32 um in a box of 128 by 64 um; grid, assembly, solution",
+                     "what is taken up of each substrate, relative, the larger error", told, box, methods, stepped,
+                     truths, truths[1], REPEATS[quick])
 
 
 def box_problem() -> Problem:
@@ -301,7 +297,7 @@ def _inside(x, y):
 
 def _box_ours(cells: int, order: int) -> list[float]:
     grid = straight((-HALF, HALF), WIDTH, (2 * cells, cells), _inside)
-    return [flux.consumed for flux in solved(ribbon(), grid, order)]
+    return [flux.consumed for flux in solved(grid, order)]
 
 
 def _newton(cells: int) -> np.ndarray:
@@ -339,18 +335,13 @@ def channel_part(quick: bool) -> dict:
     more.
     """
     linear, curved, cells, stepped = CHANNEL_SIZES[quick]
-    coarse, truth = reference(1e-7), reference(1e-9)
     channel = channel_problem()
-    jobs = _jobs({**_ours(_channel_ours, linear, curved), "fipy": (cells, partial(fipy, channel))}, truth,
-                 channel.supply)
-    change = stages.largest(coarse, truth, channel.supply)
-    found = part("Uptake in plug flow through a strip, one-dimensional; grid, assembly and solution",
-                 "effluents over the supply, the larger error",
-                 f"scipy's solve_bvp, tolerance 1e-9: {truth[0]:.9f} and {truth[1]:.9f} mg/L; from 1e-7 on they change "
-                 f"by {change:.1e} of the supply", jobs, REPEATS[quick],
-                 series(COMPILED, CELLS, stepped, _stepped, problem=channel, truth=truth, scale=channel.supply),
-                 reference_change=change)
-    return {**found, "apart": compile_times(found["lines"])}
+    methods = {**_ours(_channel_ours, linear, curved), "fipy": (cells, partial(fipy, channel))}
+    told = ("scipy's solve_bvp, tolerance 1e-9: {:.9f} and {:.9f} mg/L; from 1e-7 on they change by {:.1e} of the "
+            "supply")
+    return _compared("Uptake in plug flow through a strip, one-dimensional; grid, assembly and solution",
+                     "effluents over the supply, the larger error", told, channel, methods, stepped,
+                     [reference(1e-7), reference(1e-9)], channel.supply, REPEATS[quick])
 
 
 def reference(tolerance: float) -> np.ndarray:
@@ -370,4 +361,4 @@ def channel_problem() -> Problem:
 
 def _channel_ours(cells: int, order: int) -> list[float]:
     grid = straight(ENDS, (ENDS[1] - ENDS[0]) / cells, (cells, 1), lambda x, y: (x > 0) & (x < STRIP))
-    return [flux.effluent for flux in solved(ribbon(), grid, order, SPEED)]
+    return [flux.effluent for flux in solved(grid, order, SPEED)]

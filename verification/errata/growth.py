@@ -10,16 +10,15 @@ from scipy.optimize import brentq
 from scipy.spatial import Delaunay
 
 from reference import neo_hookean
-from repro.fem import assembly, transfer
+from repro.fem import transfer
 from repro.fem.mesh import triangle_areas
-from repro.fem.mesher import generate
 from repro.fem.outline import half_disc as seed
-from repro.fem.sizing import ACROSS_AGGREGATE, Sizing
+from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.model import growth, mesh_motion
 from verification.claims.growth_mechanics import sliding
 from verification.claims.runs import BASE, half_disc, ledger, scene
 from verification.errata import erratum, percent, small, table
-from verification.problems import pairs
+from verification.problems import meshes, pairs
 from verification.problems.bodies import Supported, grown
 from verification.switches import CHOICES
 
@@ -46,10 +45,8 @@ class Cylinder:
 
     def pressure_error(self, pressure: np.ndarray) -> float:
         """Relative L2 error over the grown body."""
-        weight = assembly.mass(triangle_areas(self.position, self.body.cells))
-        error, exact = (p[self.body.cells] for p in (pressure - self.pressure, self.pressure))
-        squares = [np.einsum("ta,tab,tb", p, weight, p) for p in (error, exact)]
-        return float(np.sqrt(squares[0] / squares[1]))
+        mesh = self.position, self.body.cells
+        return float(np.sqrt(pairs.square(mesh, pressure - self.pressure) / pairs.square(mesh, self.pressure)))
 
     def place_error(self, position: np.ndarray) -> float:
         """Largest error of a place over the radius."""
@@ -302,7 +299,7 @@ def chain(how: str, radius: float = 30.0, decay: float = 6.0, count: int = 40) -
     old: tuple = ()
     for k in range(count + 1):
         refinement = 1.0 + 0.3 * (0.618 * k % 1)
-        grid, _ = generate(outline, (-105.0, 105.0), Sizing(50.0, refinement, 2.0))
+        grid, _ = meshes.around(outline, refinement, (-105.0, 105.0), 50.0)
         points, triangles = grid.points[grid.body], grid.topology.body_cells
         if k == 0:
             field = np.exp((np.linalg.norm(points, axis=1) - radius) / decay)[:, None]

@@ -193,8 +193,10 @@ def balance_formula() -> dict[str, str]:
     after = np.array([columns[f"effluent_{name}_mg_per_L"][1:] for name in ("acceptor", "donor")])
     kinds = {"before the expansion": book.effluent, "after it": after}
     ratios = np.vstack([book.volume * (book.supply - effluent) / book.consumed for effluent in kinds.values()])
-    steps = [(time, int(np.argmin(np.abs(book.end - time)))) for time in (0.2, 5.0, 10.0, 15.0, 19.4)]
-    rows = [[f"{time:g} h", *(percent(ratio, 1) for ratio in ratios[:, step])] for time, step in steps]
+    rows = []
+    for time in (0.2, 5.0, 10.0, 15.0, 19.4):
+        step = np.argmin(np.abs(book.end - time))
+        rows.append([f"{time:g} h", *(percent(ratio, 1) for ratio in ratios[:, step])])
     head = ["step ending at", *(f"{name}, effluent {kind}" for kind in kinds for name in ("acceptor", "donor"))]
     return {"table": table(head, rows), "width": f"{scene(*BASE).pore.width:g}", "until": f"{exceeding(book):.1f}"}
 

@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from reference import neo_hookean, poiseuille
-from repro.fem.outline import BOTTOM, FREE, TOP, Outline
+from repro.fem.outline import FREE, TOP, Outline, polygon
 from repro.fem.sizing import ACROSS_FILM
 from repro.fem.space import Space
 from repro.march import midpoint, simulation, stepping
@@ -148,16 +148,9 @@ LEAST = 16.7
 def wedge(angle: float, geometry: int) -> Outline:
     """A plug 20 um high, whose sides leave the upper wall at an angle (degrees) in the fluid."""
     height = 20.0
-    half = 30.0
-    side = np.linspace(0, 1, 13)[1:-1]
-    reach = height / np.tan(np.deg2rad(angle))
-    bottom, top = np.linspace(-half - reach, half + reach, 17), np.linspace(half, -half, 9)
-    right = np.column_stack([half + reach * (1 - side), height * side])
-    points = np.vstack([np.column_stack([bottom, 0 * bottom]), right, np.column_stack([top, 0 * top + height]),
-                        right[::-1] * [-1, 1]])
-    wall = np.repeat([BOTTOM, FREE, TOP, FREE], [len(bottom), len(side), len(top), len(side)])
-    fixed = np.isin(np.arange(len(points)), [8, len(bottom) + len(side) + 4])
-    return Outline(points, wall, fixed, points.copy(), geometry)
+    side = np.linspace(0, 1, 12 // geometry + 1)[:, None]
+    left = [-30.0, 0.0] + np.hstack([(side - 1) / np.tan(np.deg2rad(angle)), side]) * height
+    return polygon(np.vstack([left, left[::-1] * [-1, 1]]), height, geometry)
 
 
 def least_angle(preset: str) -> list:

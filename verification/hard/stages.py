@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from reference import layered_channel, poiseuille, slab
-from repro.fem.transfer import located
+from repro.fem.space import Space
 from repro.model import flow, transport
 from repro.model.kinetics import Sink
 from repro.results import M_PER_D
@@ -110,10 +110,13 @@ EXHAUSTED = HardCase(
     mutants=("hard-decay-unlimited",))
 
 
+#: Half saturations of a millionth of the supply.
+SHARP = tuple(f'substrates.{name}.half_saturation="1e-5 mg/L"' for name in BOTH)
+
+
 def front(preset: str, radius: float, more: tuple[str, ...] = ()) -> list:
-    """Half saturations of a millionth of the supply."""
-    changes = disc(radius, *(f'substrates.{name}.half_saturation="1e-5 mg/L"' for name in BOTH), *more)
-    return common.against("wide", preset, changes, *EFFLUENTS, refinement=0.8)[2]
+    """A half-disc with such fronts."""
+    return common.against("wide", preset, disc(radius, *SHARP, *more), *EFFLUENTS, refinement=0.8)[2]
 
 
 #: Half thickness and films of the slab, um; its penetration depth over the half thickness.
@@ -126,16 +129,14 @@ def slab_front(preset: str) -> list:
     """The stage alone: a slab between films of still water, in which the donor is used up at 0.6 of the way in."""
     size, bound, origin = FRONT[preset]
     end, width = HALF + FILM, 1.5 * size
-    grid = meshes.plug((-end, end), width, HALF, size, seed=1)
-    made = common.scene("wide", preset)
-    donor = replace(made.substrates.donor, half_saturation=1e-6 * made.substrates.donor.supply)
-    acceptor = replace(made.substrates.acceptor, half_saturation=1e-6 * made.substrates.acceptor.supply)
-    depth, ratio = DEPTH * HALF, donor.diffusivity_in_aggregate / donor.diffusivity
+    made = common.scene("wide", preset, *SHARP, 'kinetics.decay_coefficient="0 1/d"',
+                        "kinetics.acceptor_to_donor_ratio=1e-9")
+    space = meshes.space_on(meshes.plug((-end, end), width, HALF, size, seed=1), made.numerics.order)
+    donor, depth = made.substrates.donor, DEPTH * HALF
+    ratio = donor.diffusivity_in_aggregate / donor.diffusivity
     sink = donor.supply * donor.diffusivity_in_aggregate / (depth**2 / 2 + FILM * ratio * depth)
-    law = replace(made.kinetics, decay_coefficient=0.0, acceptor_to_donor_ratio=1e-9)
-    space = meshes.space_on(grid, made.numerics.order)
-    problem = transport.problem(space, None, replace(made.substrates, acceptor=acceptor, donor=donor), law)
-    active = Sink(sink / law.maximum_utilization_rate * space.reaction.dx)
+    problem = transport.problem(space, None, made.substrates, made.kinetics)
+    active = Sink(sink / made.kinetics.maximum_utilization_rate * space.reaction.dx)
     state = transport.steady(problem, active)
     given = (donor.supply, sink, HALF, donor.diffusivity_in_aggregate, FILM, donor.diffusivity)
     exact = slab.zero_order(space.points[:, 0], *given)
@@ -337,8 +338,7 @@ def plugged(preset: str, size: float) -> list:
     exact = 12 / WIDTH**2 * (ENDS[1] - ENDS[0] + 1999 * 2 * PLUG)
     space = meshes.space_on(grid, common.scene("wide", preset).numerics.order)
     found = flow.unit_flow(space, 2000.0)
-    flux = _fluxes(lambda where: located(space.mesh.points, space.mesh.cells, where).field(
-        found.velocity, space.cells, space.order))
+    flux = _fluxes(space, found.velocity)
     leak, lost, origin = LEAK[size] if space.order == 1 else HELD
     checks = []
     if found.correction is not None:
@@ -357,12 +357,12 @@ COARSE = "3.3 and 12.3 % with elements of W / 4, second order"
 LEAK = {12.5: (0.033, 0.123, COARSE), 7.0: (0.033 * 0.56**2, 0.123 * 0.56**2, COARSE)}
 
 
-def _fluxes(velocity_at) -> np.ndarray:
+def _fluxes(space: Space, velocity: np.ndarray) -> np.ndarray:
     """Mean of u_x over each of SECTIONS."""
     place, weight = np.polynomial.legendre.leggauss(64)
-    y = 0.5 * WIDTH * (1 + place)
-    where = np.column_stack([np.repeat(SECTIONS, len(y)), np.tile(y, len(SECTIONS))])
-    return velocity_at(where)[:, 0].reshape(len(SECTIONS), -1) @ weight / 2
+    x, y = np.meshgrid(SECTIONS, 0.5 * WIDTH * (1 + place), indexing="ij")
+    across = meshes.field_at(space, velocity[:, 0], np.column_stack([x.ravel(), y.ravel()]))
+    return across.reshape(x.shape) @ weight / 2
 
 
 def _sources(grid, found) -> float:
