@@ -36,6 +36,7 @@ from verification.claims.runs import (
     history,
     in_plane,
     polygon,
+    rows_at,
     scene,
     stress,
 )
@@ -294,7 +295,7 @@ def _on_other_sizes(hours: dict[tuple[str, ...], float]) -> str:
     for size in PAIRED:
         with at_level(Level(CONVERGED, size)):
             for run, hour in hours.items():
-                places[run].append(peak(body(run, hour)).x)
+                places[run].append(peak(body((*run, rows_at(hour)), hour)).x)
     told = ", ".join(f"at x = {min(x):.0f} to {max(x):.0f} um in {run[0]}" for run, x in places.items())
     return ("The place is not known as well as the size: here and with elements "
             + ", ".join(f"{size:.3g}" for size in PAIRED) + f" times those of the preset it is {told}. Its figure is "
