@@ -103,13 +103,13 @@ def test_what_could_be_is_judged_by_the_state_in_which_it_is_the_most(monkeypatc
         assert [check.holds for check in rheology.drag_or_viscosity().checks] == [link, hangs]
 
 
-def test_the_places_of_the_largest_stress_on_other_sizes_are_told(monkeypatch):
-    """As a range, with that of the present level."""
-    places = {COARSE: 9.0} | {Level(CONVERGED, size): x for size, x in zip(levels.PAIRED, (-8.0, 5.0, -2.0))}
+def test_the_place_of_the_largest_stress_on_the_size_of_its_figure_is_told(monkeypatch):
+    """Beside that of the present level."""
+    places = {COARSE: 9.0, Level(CONVERGED, levels.PAIRED[1]): -8.0}
     monkeypatch.setattr(fluid_and_aggregate, "body", lambda run, hour: levels.current())
     monkeypatch.setattr(fluid_and_aggregate, "peak", lambda found: fluid_and_aggregate.Peak(1.0, places[found], 0.0))
-    told = fluid_and_aggregate._on_other_sizes({("wide",): 45.0})
-    assert "at x = -8 to 9 um in wide" in told and "size 2.25" in told
+    told = fluid_and_aggregate._on_another_size({("wide",): 45.0})
+    assert "at x = 9 and -8 um in wide" in told and "2.25 times" in told
 
 
 def test_the_pressure_of_forces_is_that_of_the_aggregate_alone():
