@@ -193,20 +193,20 @@ def test_the_conductivity_after_contact_is_a_geometric_mean(monkeypatch):
     monkeypatch.setattr(rheology, "at", lambda run, hour: {"conductivity_m_per_d": found[run, hour]})
     assert rheology.conductivity_change(HOUR, (35.0, 45.0)) == pytest.approx(200.0)
     said = scene(*rheology.WHOLE)
-    assert {*range(1, 35), *rheology.AFTER, rheology.END} == set(said.output.times)
+    assert {5, 10, 15, 20, 25, 30, 31, 32, 33, 34, *rheology.AFTER, rheology.END} == set(said.output.times)
     assert (rheology.AFTER[0], rheology.AFTER[-1]) == (wide.HOURS[0], wide.HOURS[-1]) == (35.0, said.growth.end)
 
 
 def test_film_and_angle_do_nothing_until_the_opposite_wall_is_near():
     """A run with them goes on from one without them, bit for bit as one of its own; another change begins at t = 0."""
-    plain = ("wide", *until(31))
+    plain = ("wide", *until(33))
     begun = history(*plain).far
-    assert 0.6 < begun.pore.boundary.thickness / 100 <= NEAR
+    assert 0.7 < begun.pore.boundary.thickness / 100 <= NEAR
     for name in ("film doubled", "angle doubled"):
         changed = (*plain, rheology.VARIANTS[name])
         *_, (own, _) = steps(scene(*changed))
         (end,) = history(*changed).instants
-        assert np.array_equal(end.pore.mesh.points, own.pore.mesh.points) and end.pore.time == 31
+        assert np.array_equal(end.pore.mesh.points, own.pore.mesh.points) and end.pore.time == 33
         assert end.pore.mass == own.pore.mass
     late = [name for name, change in rheology.VARIANTS.items() if change.startswith(LATE)]
     assert late == ["film halved", "film doubled", "angle halved", "angle doubled"]

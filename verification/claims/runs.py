@@ -46,7 +46,7 @@ ROWS = {"base": (0.2, *map(float, range(1, 20)), 19.2, 19.4), "wide": tuple(map(
 AFTER = tuple(round(35 + 2 * UPDATE * number, 1) for number in range(26))
 #: Changes that do nothing until the aggregate is near the opposite wall, by the first letters of their keys, and the
 #: part of the pore's width up to which it is not.
-LATE, NEAR = ("growth.minimum_film", "growth.minimum_contact_angle"), 0.7
+LATE, NEAR = ("growth.minimum_film", "growth.minimum_contact_angle"), 0.9
 #: How long (h) before contact the last shape with a film is looked at: 18 s.
 FILM = 0.005
 
@@ -65,8 +65,8 @@ def until(*hours: float) -> tuple[str, str]:
 LAST = rows_at(PLOTTED, END)
 #: Section 4, where only the last two shapes are asked for.
 PLATES = (*BASE, LAST)
-#: Wide where it is compared with runs that are changed: every hour to its contact, and AFTER, with the hour between.
-WHOLE = ("wide", rows_at(*range(1, 35), *sorted({*AFTER, 40})))
+#: Wide where it is compared with runs that are changed: every 5 h, the hours before its contact, and AFTER.
+WHOLE = ("wide", rows_at(*range(5, 31, 5), *range(31, 35), *sorted({*AFTER, 40})))
 
 
 def scene(name: str, *changes: str) -> Scene:
