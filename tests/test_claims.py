@@ -489,6 +489,7 @@ def test_no_correction_is_needed_where_the_printed_effluents_give_the_ratio():
     least, greatest = scheme.printed_ratios(1.0)
     for ratio in (0.5 * (least + greatest), greatest * 1.009, least / 1.009):
         assert sure(scheme.of_printed_effluents(ratio)[1]).outcome == FAILS
+    assert scheme.of_printed_effluents(0.5 * (least + greatest))[1].value == 0
 
 
 def test_what_does_not_move_with_the_velocity_is_arithmetic(monkeypatch):
