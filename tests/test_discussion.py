@@ -11,10 +11,11 @@ from paper_figures import runs, states
 from repro import load_scene, run
 from repro.fem.mesh import triangle_areas
 from repro.fem.outline import polygon_area
+from repro.march.simulation import steps
 from repro.model.growth import largest_principal
-from verification.claims import discussed, fluid_and_aggregate, levels, permeability, rheology
+from verification.claims import discussed, fluid_and_aggregate, growth_pattern, levels, permeability, rheology
 from verification.claims.levels import CONVERGED, Level, at_level
-from verification.claims.runs import bodies, scene
+from verification.claims.runs import LATE, NEAR, bodies, history, scene, until
 from verification.claims.runs import stress as restored_stress
 from verification.sensitivity import wide
 
@@ -102,13 +103,13 @@ def test_what_could_be_is_judged_by_the_state_in_which_it_is_the_most(monkeypatc
         assert [check.holds for check in rheology.drag_or_viscosity().checks] == [link, hangs]
 
 
-def test_the_places_of_the_largest_stress_on_other_sizes_are_told(monkeypatch):
-    """As a range, with that of the present level."""
-    places = {COARSE: 9.0} | {Level(CONVERGED, size): x for size, x in zip(levels.PAIRED, (-8.0, 5.0, -2.0))}
+def test_the_place_of_the_largest_stress_on_the_size_of_its_figure_is_told(monkeypatch):
+    """Beside that of the present level."""
+    places = {COARSE: 9.0, Level(CONVERGED, levels.PAIRED[1]): -8.0}
     monkeypatch.setattr(fluid_and_aggregate, "body", lambda run, hour: levels.current())
     monkeypatch.setattr(fluid_and_aggregate, "peak", lambda found: fluid_and_aggregate.Peak(1.0, places[found], 0.0))
-    told = fluid_and_aggregate._on_other_sizes({("wide",): 45.0})
-    assert "at x = -8 to 9 um in wide" in told and "size 2.25" in told
+    told = fluid_and_aggregate._on_another_size({("wide",): 45.0})
+    assert "at x = 9 and -8 um in wide" in told and "2.25 times" in told
 
 
 def test_the_pressure_of_forces_is_that_of_the_aggregate_alone():
@@ -192,8 +193,33 @@ def test_the_conductivity_after_contact_is_a_geometric_mean(monkeypatch):
     monkeypatch.setattr(rheology, "at", lambda run, hour: {"conductivity_m_per_d": found[run, hour]})
     assert rheology.conductivity_change(HOUR, (35.0, 45.0)) == pytest.approx(200.0)
     said = scene(*rheology.WHOLE)
-    assert {*rheology.AFTER, rheology.END} == set(said.output.times)
+    assert {5, 10, 15, 20, 25, 30, 31, 32, 33, 34, *rheology.AFTER, rheology.END} == set(said.output.times)
     assert (rheology.AFTER[0], rheology.AFTER[-1]) == (wide.HOURS[0], wide.HOURS[-1]) == (35.0, said.growth.end)
+
+
+def test_film_and_angle_do_nothing_until_the_opposite_wall_is_near():
+    """A run with them goes on from one without them, bit for bit as one of its own; another change begins at t = 0."""
+    plain = ("wide", *until(33))
+    begun = history(*plain).far
+    assert 0.7 < begun.pore.boundary.thickness / 100 <= NEAR
+    for name in ("film doubled", "angle doubled"):
+        changed = (*plain, rheology.VARIANTS[name])
+        *_, (own, _) = steps(scene(*changed))
+        (end,) = history(*changed).instants
+        assert np.array_equal(end.pore.mesh.points, own.pore.mesh.points) and end.pore.time == 33
+        assert end.pore.mass == own.pore.mass
+    late = [name for name, change in rheology.VARIANTS.items() if change.startswith(LATE)]
+    assert late == ["film halved", "film doubled", "angle halved", "angle doubled"]
+    assert history(*HOUR, 'numerics.fixed_point="rechosen"').instants[0].pore.time == 0
+
+
+def test_the_least_of_a_field_is_sought_between_its_nodes():
+    """Of the distance from a place in the middle of a triangle; a node is 0.2 of the thickness from it, or more."""
+    found = bodies(HOUR)[-1]
+    corners = found.grid.points[found.triangles[:, :3]]
+    place = corners[np.ptp(corners[..., 1], axis=1).argmax()].mean(axis=0)
+    apart = ((found.pore.space.points - place) ** 2).sum(axis=1)
+    assert abs(growth_pattern.least_of(found, apart)) < 0.02 * apart[found.grid.body].min()
 
 
 def test_every_variant_changes_one_key_of_the_scene():

@@ -190,7 +190,7 @@ WIDE = claims.replace(SPEED, bar=Bar(2.81, 3.11))
     (SPEED, of_size, {"about": claims.MODEL}, 0.00625, 0.00625),
     (WIDE, of_size, {"steps": ALONE}, 0.1 + 0.0125, 0.2 + 0.0125),
 ])
-def test_a_bar_is_that_of_elements_and_steps_and_of_printed_digits(check, value, fields, below, above):
+def test_a_bar_is_that_of_elements_and_steps_and_of_the_mesh_around_a_place(check, value, fields, below, above):
     """1.25 times the errors; of the converged solution on its own sizes; what is not varied gives none."""
     found = judged(check, value, **fields)
     assert (2.91 - found.bar.low, found.bar.high - 2.91) == pytest.approx((below, above))

@@ -39,7 +39,6 @@ from verification.claims.levels import (
     SIZES,
     STEPS,
     WIDE_FINE,
-    WIDE_PAIRED,
     Level,
 )
 from verification.kernel.case import Check
@@ -223,7 +222,7 @@ class Claim:
     @property
     def of_wide(self) -> bool:
         """Is it about wide? It is judged on the sizes for that then."""
-        return self.fine in (WIDE_FINE, WIDE_PAIRED)
+        return self.fine == WIDE_FINE
 
     @property
     def command(self) -> str:

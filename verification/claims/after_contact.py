@@ -39,7 +39,6 @@ NOT_OF_BASE = ("C19", "C41")
 #: Why a bar of base exceeds BASE_BAR, by the kind of number: what its claim or its name begins with.
 KINDS = {
     "a place, known to the element in which it is": r"C10",
-    "the least of all nodes, whose differences from size to size, under 0.1 %, follow no order": r"C30",
     "a small difference of two halves, or of two runs or solutions, which takes the errors of both in parts of itself":
         r"C11|C36|C42|.*(born stress-free|deviation|law's r|changed by the fluid)",
     "a Sherwood number, over the drop from the supply to the interface, small against the supply, and ratios less one":
@@ -74,7 +73,8 @@ class Known:
 def known(entries: list[dict]) -> list[Known]:
     """The numbers after contact of a record, the one with the widest bar first."""
     evaluate.register_all()
-    return _known(entries, lambda entry, quantity: CLAIMS[entry["id"]].of_wide and not OTHER.search(quantity))
+    return _known(entries, lambda entry, quantity: (CLAIMS[entry["id"]].of_wide or quantity.startswith("wide"))
+                  and not OTHER.search(quantity))
 
 
 def of_base(entries: list[dict]) -> list[Known]:

@@ -36,6 +36,7 @@ from verification.claims.runs import (
     history,
     in_plane,
     polygon,
+    rows_at,
     scene,
     stress,
 )
@@ -285,20 +286,17 @@ def tearing() -> Finding:
             f"{max(courses['wide'])[3]:g} h: there it would tear first. "
             + " ".join(f"Over time, of triangles in {name}: {_listed(peaks[4::5], modulus)}."
                        for name, peaks in courses.items()))
-    return Finding(tuple(checks), reason="nothing is under tension", note=lambda: f"{note} {_on_other_sizes(hours)}")
+    return Finding(tuple(checks), reason="nothing is under tension", note=lambda: f"{note} {_on_another_size(hours)}")
 
 
-def _on_other_sizes(hours: dict[tuple[str, ...], float]) -> str:
-    """Where the stress of runs at an hour is the largest, here and on the sizes of PAIRED, in words."""
-    places = {run: [peak(body(run, hour)).x] for run, hour in hours.items()}
-    for size in PAIRED:
-        with at_level(Level(CONVERGED, size)):
-            for run, hour in hours.items():
-                places[run].append(peak(body(run, hour)).x)
-    told = ", ".join(f"at x = {min(x):.0f} to {max(x):.0f} um in {run[0]}" for run, x in places.items())
-    return ("The place is not known as well as the size: here and with elements "
-            + ", ".join(f"{size:.3g}" for size in PAIRED) + f" times those of the preset it is {told}. Its figure is "
-            f"drawn on size {PAIRED[1]:g}.")
+def _on_another_size(hours: dict[tuple[str, ...], float]) -> str:
+    """Where the stress of runs at an hour is the largest, here and on the size of its figure, in words."""
+    here = [peak(body(run, hour)).x for run, hour in hours.items()]
+    with at_level(Level(CONVERGED, PAIRED[1])):
+        there = [peak(body((*run, rows_at(hour)), hour)).x for run, hour in hours.items()]
+    told = ", ".join(f"at x = {x:.0f} and {other:.0f} um in {run[0]}" for run, x, other in zip(hours, here, there))
+    return ("The place is not known as well as the size: here and with the elements of its figure, "
+            f"{PAIRED[1]:g} times those of the preset, it is {told}.")
 
 
 def course(run: tuple[str, ...]) -> list[tuple[float, float, float, float]]:

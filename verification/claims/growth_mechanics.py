@@ -20,7 +20,7 @@ from repro.fem.outline import half_disc as seed
 from repro.fem.sizing import ACROSS_AGGREGATE, GRADATION, Sizing
 from repro.model import growth
 from verification.claims import CLOSED, OF_SCHEME, Finding, at_least, at_most, between, claim, near, without_limit
-from verification.claims.levels import ABOUT_WIDE, ALONE, cached, current
+from verification.claims.levels import ABOUT_WIDE, ALONE, BESIDE, cached, current
 from verification.claims.runs import WIDE, bodies, series
 from verification.problems.bodies import Supported
 
@@ -80,7 +80,7 @@ OWN, REGULAR = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8), (4, 8, 12)
 
 
 @claim("C22", "3.4", "P1-P1 with the stabilisation is stable and convergent; without it, it is not",
-       about=OF_SCHEME, steps=ALONE, fixed="there is no time in it")
+       about=OF_SCHEME, sizes=BESIDE, steps=ALONE, fixed="there is no time in it")
 def stabilised() -> Finding:
     """Growth of a half-disc by theta(R) against the closed form: orders of outline and pressure; stability numbers.
 

@@ -65,11 +65,9 @@ def converged(size: float) -> tuple[str, ...]:
 FINE = (0.5, 2**-0.5, 1.0)
 WIDE_FINE = (2**-0.5, 1.0, 2**0.5)
 PAIRED = tuple(2.25 * 2 ** (third / 3) for third in (-1, 0, 1))
-#: Those for changes of wide after its contact. A run with the least angle of contact halved hangs on its mesh: at 1.79
-#: it stops in a step after contact, in which a triangle is turned over.
+#: Those for changes of wide. A run with the least angle of contact halved hangs on its mesh: at 1.79 it stops in a step
+#: after contact, in which a triangle is turned over.
 COMPARED = tuple(1.25 * 2 ** (half / 2) for half in (1, 2, 3))
-#: Those for claims about wide that compare it with another run to its end.
-WIDE_PAIRED = (1.0, 2**0.5, 2.0)
 #: Size of the scheme beside claims that compare runs of their own, which are dear.
 BESIDE_OWN = (2**0.5,)
 #: Sizes and steps of the scheme, the default first.

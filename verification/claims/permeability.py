@@ -31,6 +31,7 @@ from verification.claims.runs import (
     rows_at,
     scene,
     series,
+    until,
 )
 
 #: Thicknesses over the pore's width: the last leaves a film of 2 um in a pore of 50 um.
@@ -124,6 +125,8 @@ END = 76
 #: Base carried on through contact, with rows to END; its run ends later, so that its last rows are of one step.
 CLOSING = ("base", f'growth.end="{END + 2} h"', rows_at(*range(2, 72), *np.arange(72.0, END, 0.5), END))
 ORDER = "an order of magnitude"
+#: Wide around its contact, where its conductivity declines the fastest.
+AROUND = ("wide", *until(*range(30, 37)))
 
 
 @claim("C43", "1, 4", "as biomass grows, permeability falls, which restricts flow and supply; once the pore is "
@@ -205,7 +208,7 @@ def _reason(rows: dict[str, np.ndarray], upgradient: float) -> str:
 
 def _told(rows: dict[str, np.ndarray]) -> str:
     _, closed, touched = contact()
-    before, free = rows["time_h"] < touched, series(*WIDE)
+    before, free = rows["time_h"] < touched, series(*AROUND)
     rate, when = fastest({name: column[before] for name, column in rows.items()})
     wide_rate, wide_when = fastest(free)
     hundredth = 100 * closed / rows["mean_velocity_m_per_d"][0]

@@ -27,16 +27,17 @@ from shapely.affinity import translate
 
 from repro.scene import SceneError
 from verification.claims import FEW, FEW_WORDS, LATER, Finding, PaperCheck, at_least, at_most, claim
+from verification.claims.growth_pattern import STRESS_FREE
 from verification.claims.levels import BESIDE_OWN, COMPARED, DEFAULT, at_level
 from verification.claims.runs import (
+    AFTER,
     PLOTTED,
-    UPDATE,
+    WHOLE,
     around_contact,
     at,
     body,
     mean_change,
     polygon,
-    rows_at,
     scene,
     uncovered,
     until,
@@ -44,15 +45,11 @@ from verification.claims.runs import (
 
 #: Hours at which outlines are compared: in all variants the opposite wall has then been touched for 5 h.
 END = 40
-#: Hours after contact of which conductivities are means: those of `verification.sensitivity.wide`, to the end of Figure
-#: 6, every second shape update of the paper.
-AFTER = tuple(round(35 + 2 * UPDATE * number, 1) for number in range(26))
 FIRST_HOURS = AFTER[:13]
-WHOLE = ("wide", rows_at(*sorted({*AFTER, END})))
 RECHOSEN = "middles rechosen"
 #: One choice each, in words and as changes of the scene.
 VARIANTS = {
-    "born stress-free": 'growth.new_biomass="stress_free"',
+    "born stress-free": STRESS_FREE,
     RECHOSEN: 'numerics.fixed_point="rechosen"',
     "film halved": 'growth.minimum_film="1 um"',
     "film doubled": 'growth.minimum_film="4 um"',
@@ -146,7 +143,7 @@ def drag_or_viscosity() -> Finding:
     """Conductivity with Brinkman's drag of a permeability of 1e-15 m2 over that with lambda = 2000: base at 19.2 h, an
     aggregate; wide just before contact, a film; and 5 h after it, a plug; and the times of contact. It may lead to
     differences if it does in one of these, and hangs on the conditions if in another it does not."""
-    ours, other = conductivities(AGGREGATE, PLUG), conductivities(permeable(AGGREGATE), permeable(PLUG))
+    ours, other = conductivities(AGGREGATE, WHOLE), conductivities(permeable(AGGREGATE), permeable(PLUG))
     changes = {name: 100 * abs(other[name] / ours[name] - 1) for name in ours if name != "contact"}
     checks = (at_least("conductivity of aggregate, film or plug: changes by, the most of them (%)",
                        "may lead to differences", max(changes.values()), 100 * FEW, f"more than {FEW_WORDS}"),

@@ -41,6 +41,12 @@ UPDATE = 0.2
 SUBSTRATES = ("acceptor", "donor")
 #: Hours of the rows of a packaged scene.
 ROWS = {"base": (0.2, *map(float, range(1, 20)), 19.2, 19.4), "wide": tuple(map(float, range(1, 121)))}
+#: Hours after wide's contact of which conductivities are means: those of `verification.sensitivity.wide`, to the end of
+#: Figure 6, every second shape update of the paper.
+AFTER = tuple(round(35 + 2 * UPDATE * number, 1) for number in range(26))
+#: Changes that do nothing until the aggregate is near the opposite wall, by the first letters of their keys, and the
+#: part of the pore's width up to which it is not.
+LATE, NEAR = ("growth.minimum_film", "growth.minimum_contact_angle"), 0.9
 #: How long (h) before contact the last shape with a film is looked at: 18 s.
 FILM = 0.005
 
@@ -59,6 +65,8 @@ def until(*hours: float) -> tuple[str, str]:
 LAST = rows_at(PLOTTED, END)
 #: Section 4, where only the last two shapes are asked for.
 PLATES = (*BASE, LAST)
+#: Wide where it is compared with runs that are changed: every 5 h, the hours before its contact, and AFTER.
+WHOLE = ("wide", rows_at(*range(5, 31, 5), *range(31, 35), *sorted({*AFTER, 40})))
 
 
 def scene(name: str, *changes: str) -> Scene:
@@ -84,29 +92,34 @@ def _with_rows(said: Scene, always: bool) -> Scene:
 @dataclass(frozen=True, eq=False)
 class History:
     """A run. instants: those of its rows; ledgers: of all its steps; contact: the last instant before it touches the
-    opposite wall and the first after, None where it does not."""
+    opposite wall and the first after, None where it does not; far: the last state that is not NEAR that wall."""
 
     scene: Scene
     instants: tuple[Instant, ...]
     ledgers: tuple[Ledger, ...]
     contact: tuple[Instant, Instant] | None
+    far: State | None = None
 
 
 @cached
 def history(*run: str) -> History:
-    """One run, computed. Raises SimulationError where it fails."""
+    """One run, computed. With a change that is LATE its rows begin where it can differ from the run without it. Raises
+    SimulationError where it fails."""
     said = scene(*run)
+    plain = tuple(change for change in run if not change.startswith(LATE))
     instants: list[Instant] = []
     ledgers: list[Ledger] = []
-    before = contact = None
-    for state, instant in simulation.steps(said):
+    contact = None
+    begun = before = far = None if plain == run else history(*plain).far
+    for state, instant in simulation.steps(said, begun):
         if instant:
             instants.append(instant)
             ledgers += instant.ledgers
         if contact is None and before is not None and state.pore.contact:
             contact = tuple(_solved(said, each) for each in (_with_a_film(said, before, state), state))
         before = state
-    return History(said, tuple(instants), tuple(ledgers), contact)
+        far = state if state.pore.boundary.thickness <= NEAR * said.pore.width else far
+    return History(said, tuple(instants), tuple(ledgers), contact, far)
 
 
 def _with_a_film(said: Scene, before: State, contact: State) -> State:
