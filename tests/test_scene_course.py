@@ -1,8 +1,8 @@
 """Supplies, head and mean velocity as tables over time: how they are read, written, and what runs make of them."""
 import json
 from dataclasses import replace
-from operator import attrgetter
 from math import inf
+from operator import attrgetter
 
 import numpy as np
 import pytest

@@ -83,3 +83,27 @@ def test_a_shape_with_its_own_mesh_needs_no_other(order):
     pascal = 9.81 * 1e-3 * drive.density * 1e-6  # of a head of 1 um; 1 mg/L is 1e-3 kg/m3
     wanted = on[now.mesh.body] * pascal * 1e-6 / said.growth.shear_modulus
     assert one == pytest.approx(wanted, rel=1e-3, abs=1e-3 * np.abs(wanted).max())
+
+
+@EVERY_ORDER
+def test_forces_of_the_traction_form_turn_nothing(order):
+    """Its stress is symmetric: besides their sum the moment of all nodal forces is zero, to round-off."""
+    said = base("numerics.interface=traction", order=order)
+    now = pore.seeded(said)
+    viscosity = said.flow.kinematic_viscosity / said.flow.gravity
+    on = traction.nodal(now.space, pore.solve_flow(said, now.space), viscosity, "traction")
+    turning = now.mesh.points * on[:, ::-1] * [1, -1]
+    assert np.abs(on.sum(axis=0)).max() < 1e-12 * np.abs(on).sum()
+    assert abs(turning.sum()) < 1e-12 * np.abs(turning).sum()
+
+
+@EVERY_ORDER
+def test_shape_and_forces_agree(monkeypatch, order):
+    """In water so heavy that the shape gives way by a hundredth of a um, to a millionth of that."""
+    said = base('flow.density="1e6 mg/cm^3"', order=order)
+    now = pore.seeded(said)
+    found, still = (contact.expand(one, now, 1.1 * now.theta)[0].mesh.points for one in (
+        said, replace(said, growth=replace(said.growth, fluid_forces="neglected"))))
+    monkeypatch.setattr(contact, "FORCE_REST", 1e-12)
+    exact = contact.expand(said, now, 1.1 * now.theta)[0].mesh.points
+    assert np.abs(exact - still).max() > 0.01 and np.abs(found - exact).max() < 1e-8
