@@ -294,7 +294,7 @@ def test_a_film_too_thin_from_the_start_closes(order):
 @EVERY_ORDER
 @pytest.mark.parametrize("anew", [False, True])
 def test_half_way_tables_say_what_holds_in_the_middle_of_a_step(monkeypatch, order, anew):
-    """Both supplies and the drive, each changing evenly at a rate of its own, on the mesh that has moved and a new one."""
+    """Both supplies and the drive, changing evenly at rates of their own, on the mesh that has moved and a new one."""
     tables = {"flow.head": ("10 um", "30 um"), "substrates.acceptor.supply": ("8 mg/L", "4 mg/L"),
               "substrates.donor.supply": ("2 mg/L", "7 mg/L")}
     said = [f"{key}={json.dumps([['0 h', first], ['2 h', last]])}" for key, (first, last) in tables.items()]
