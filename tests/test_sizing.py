@@ -142,11 +142,3 @@ def test_sizes_of_a_scene_are_the_meshers():
     for seed, middle in (('position="3 um"', 3.0), (f"outline={outline}", None)):
         found = pore.sized(load_scene("base", [*said, f"aggregate={{{seed}}}"]), 2.0)
         assert found == Sizing(80.0, 0.7, 0.5, 0.2, 2.0, 0.125, middle)
-
-
-def test_after_contact_no_film_is_resolved():
-    """However near to the upper wall a free node is."""
-    shape = plug(50.0, -8.0, 8.0)
-    sizes = of.interface_sizes(replace(shape, points=np.insert(shape.points, 3, [[9.0, 49.0], [9.5, 25.0]], axis=0),
-                                       wall=np.insert(shape.wall, 3, [FREE, FREE])), Sizing(50.0, 1.0, FILM))
-    assert sizes == pytest.approx(50 / 14, rel=1e-14)
