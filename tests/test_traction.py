@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from repro.errors import GrowthError, StageError
-from repro.fem.space import Space
 from repro.march.simulation import simulate
 from repro.model import contact, pore, traction
 from repro.results import row
@@ -86,18 +85,6 @@ def test_a_shape_with_its_own_mesh_needs_no_other(order):
     assert one == pytest.approx(wanted, rel=1e-3, abs=1e-3 * np.abs(wanted).max())
 
 
-@EVERY_ORDER
-def test_forces_of_the_traction_form_turn_nothing(order):
-    """Its stress is symmetric: besides their sum the moment of all nodal forces is zero, to round-off."""
-    said = base("numerics.interface=traction", order=order)
-    now = pore.seeded(said)
-    viscosity = said.flow.kinematic_viscosity / said.flow.gravity
-    on = traction.nodal(now.space, pore.solve_flow(said, now.space), viscosity, "traction")
-    turning = now.mesh.points * on[:, ::-1] * [1, -1]
-    assert np.abs(on.sum(axis=0)).max() < 1e-12 * np.abs(on).sum()
-    assert abs(turning.sum()) < 1e-12 * np.abs(turning).sum()
-
-
 @pytest.mark.parametrize("order", [1, 2])
 def test_shape_and_forces_agree(monkeypatch, order):
     """In water so heavy that the shape gives way by a hundredth of a um, to a millionth of that."""
@@ -108,21 +95,3 @@ def test_shape_and_forces_agree(monkeypatch, order):
     monkeypatch.setattr(contact, "FORCE_REST", 1e-12)
     exact = contact.expand(said, now, 1.1 * now.theta)[0].mesh.points
     assert np.abs(exact - still).max() > 0.01 and np.abs(found - exact).max() < 1e-8
-
-
-@EVERY_ORDER
-def test_forces_on_a_new_mesh_push_the_aggregates_own_nodes_as_much(monkeypatch, order):
-    """The same sum and moment as on the nodes of the new mesh, which lie elsewhere, to round-off."""
-    monkeypatch.setattr(traction.remeshing, "followed", lambda *_: None)
-    said = base("numerics.refinement=0.9", order=order)
-    now = pore.seeded(base(order=order))
-    around = traction.surroundings(said, now, replace(now))
-    mesh, space, drive = around.mesh, Space(around.mesh, order), said.flow
-    on = traction.nodal(space, pore.solve_flow(said, space), drive.kinematic_viscosity / drive.gravity, "laplacian")
-    on = on[mesh.body] * traction.MPA_PER_UM * drive.density * drive.gravity / said.growth.shear_modulus
-    found = traction.forces(said, around, now)
-    assert len(mesh.body) > 1.5 * len(found)
-    assert found.sum(axis=0) == pytest.approx(on.sum(axis=0), rel=1e-9)
-    moments = [np.sum(places[:, 0] * push[:, 1] - places[:, 1] * push[:, 0]) for places, push in (
-        (now.mesh.points[now.mesh.body], found), (mesh.points[mesh.body], on))]
-    assert moments[0] == pytest.approx(moments[1], rel=1e-9)

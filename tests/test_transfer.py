@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from repro.errors import TransferError
 from repro.fem import elements, transfer
 from repro.fem.mesh import curved
-from repro.fem.outline import FREE
 from repro.fem.space import Space
 from repro.march.simulation import simulate
 from repro.model import biomass, pore, remeshing
@@ -253,14 +252,3 @@ def test_beyond_the_old_mesh_no_other_time_s_water_appears(speed, brought):
         faded = np.exp(speed * (x[before] - first) / kind.diffusivity) if speed else 0.0
         assert field[before] == pytest.approx(supply - (supply - start - slope * first) * faded, rel=1e-9)
         assert field[after] == pytest.approx(start + slope * last if speed else supply, rel=1e-9)
-
-
-@pytest.mark.parametrize("seed", [0.0, -30.0])
-def test_the_surface_of_a_seed_that_is_meshed_anew_was_round(seed):
-    """Nodes between those before, on straight edges, were on the seed's arc: interpolated they were on its chords."""
-    coarse, fine = (load_scene("base", ["numerics.preset=paper", f"aggregate.position={seed} um",
-                                        f"numerics.refinement={refinement}"]) for refinement in (0.5, 2))
-    now = pore.seeded(coarse)
-    then, _ = remeshing.remesh(fine, now, now.moved((now.mesh.points - [seed, 0]) * [1.1, 1.2] + [seed, 0]), 0.0)
-    radius = np.hypot(*(then.boundary.origin[then.wall == FREE] - [seed, 0]).T)
-    assert len(radius) > 2 * (now.wall == FREE).sum() and radius == pytest.approx(5.0, rel=1e-12)
