@@ -125,3 +125,12 @@ def test_a_middle_never_joins_alone():
     assert np.array_equal(np.flatnonzero(joins == TOP), top[2:5]), "both corners, and the middle with them"
     shape, _ = flat_top([12.0, 16.0, 17.0, 17.5, 17.0, 16.0, 12.0])
     assert not contact.closing(shape, 20.0, 2.0, 0.0).any()
+
+
+@pytest.mark.parametrize("last, chosen", [(4, 2), (6, 4), (8, 4)])
+def test_of_arcs_a_corner_is_fixed(last, chosen):
+    """New meshes keep no middle: the corner before it, where that is in the middle of a contact surface."""
+    shape, top = flat_top([20.0] * 11)
+    wall = np.where(np.isin(np.arange(len(shape.wall)), top[2: last + 1]), TOP, shape.wall)
+    touching = Outline(shape.points, wall, shape.fixed, shape.points, 2)
+    assert np.flatnonzero(contact.middle_of(touching, TOP)).tolist() == [top[chosen]]

@@ -135,3 +135,15 @@ def test_a_run_with_bubbles_balances_and_stays_near_the_stabilised_one():
     assert abs(rows["bubble"]["donor_balance"]) < 1e-10
     speeds = [rows[name]["mean_velocity_m_per_d"] for name in rows]
     assert 0 < abs(speeds[1] / speeds[0] - 1) < 1e-4
+
+
+@pytest.mark.parametrize("interface", ["laplacian", "traction"])
+@pytest.mark.parametrize("element, said", [
+    (flow.Stabilised(12.0), ["numerics.flow_stabilisation=12"]), (flow.Bubble(), ["numerics.flow_element=bubble"])])
+def test_what_a_scene_says_of_its_elements_reaches_the_flow(element, said, interface):
+    made = load_scene("base", ["numerics.preset=paper", "numerics.refinement=0.4", f"numerics.interface={interface}",
+                               *said])
+    space = pore.seeded(made).space
+    unit = flow.unit_flow(space, made.flow.viscosity_ratio, interface=interface, element=element)
+    wanted = flow.scaled(unit, space.mesh, made.pore.length, made.flow)
+    assert np.array_equal(pore.solve_flow(made, space).head, wanted.head)

@@ -6,7 +6,7 @@ import pytest
 
 from repro.cli import main
 from repro.errors import Interrupted
-from repro.march.simulation import ends_soon, steps
+from repro.march.simulation import ends_soon, same_rows, steps
 from repro.run.checkpoint import LAST, NEWEST, PREVIOUS
 from repro.run.running import Watch, resume, run
 from repro.scene import SceneError, load_scene
@@ -131,3 +131,8 @@ def test_the_command(tmp_path, capsys):
     assert main(["run", "flow_only", "--out", str(tmp_path / "still")]) == 0
     assert main(["run", "--resume", str(tmp_path / "still"), "--set", "growth.end=5 h"]) == 2
     assert "its scene has no [growth]" in capsys.readouterr().err
+
+
+def test_rows_are_the_same_up_to_a_time_and_at_it():
+    one, other = (load_scene("base", [f'output.times=["1 h", "{last} h", "3 h"]']) for last in (2, 2.5))
+    assert [same_rows(one, other, time) for time in (0.9, 1.0, 1.9, 2.0, 4.0)] == [True, True, True, False, False]

@@ -105,3 +105,27 @@ def test_slopes_of_arcs_are_those_of_their_parabolas():
     first, second = of.slopes(nodes)
     for t in (0.3, 0.5, 1.0):
         assert nodes[:, 0] + t * first + 0.5 * t**2 * second == pytest.approx(of.parabola(t) @ nodes, abs=1e-12)
+
+
+@pytest.mark.parametrize("contact", [False, True])
+def test_a_smooth_seed_is_a_natural_spline_through_its_points(contact):
+    """Over knots apart as the roots of the chords: cubic between two points, with two derivatives that go on at a point
+    and the second zero at either end; straight where both points are on the upper wall, and nowhere else."""
+    top = [(-3.0, 20.0), (2.0, 20.0)] if contact else [(-3.0, 17.0), (2.0, 12.0)]
+    given = np.array([(-16.0, 0.0), (-14.0, 9.0), *top, (4.0, 11.0), (11.0, 0.0)])
+    loop = of.polygon(given, 20.0, smooth=True).points
+    rim = np.vstack([loop[2:], loop[:1]])[::-1]
+    at = np.array([np.flatnonzero((rim == point).all(axis=1)) for point in given]).ravel()
+    pieces = [(rim[a: b + 1], np.sqrt(np.linalg.norm(rim[b] - rim[a]))) for a, b in zip(at, at[1:])]
+    ends = []
+    for piece, apart in pieces:
+        if contact and (piece[:, 1] == 20).all():
+            ends.append(None)
+            continue
+        t = np.linspace(0.0, apart, len(piece))
+        fit = [np.polynomial.Polynomial.fit(t, x, 3) for x in piece.T]
+        assert len(t) == 9 and np.abs([f(t) for f in fit] - piece.T).max() < 1e-12
+        ends.append([[[f.deriv(k)(place) for f in fit] for k in (1, 2)] for place in (0.0, apart)])
+    assert np.abs([ends[0][0][1], ends[-1][1][1]]).max() < 1e-10
+    joined = [(one[1], other[0]) for one, other in zip(ends, ends[1:]) if one and other]
+    assert len(joined) == 2 + 2 * (not contact) and all(np.allclose(*both, rtol=0, atol=1e-9) for both in joined)

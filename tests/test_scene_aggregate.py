@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from repro.march.simulation import shaped
 from repro.scene import Aggregate, load_scene, packaged_scenes, parse_scene, scene_hash, scene_tables
 from repro.scene.text import scene_text
 from tests.test_scene import refusal, written
@@ -80,6 +81,15 @@ def test_an_outline_is_read_back_from_what_it_writes(points, tmp_path):
     moved = load_scene(tmp_path / "mine.toml", [f"aggregate.outline={json.dumps([['-30 um', '0 um'], *points[1:]])}"])
     assert len({scene_hash(one) for one in (scene, smooth, moved)}) == 3
     assert parse_scene(scene_tables(smooth), "mine", "again") == smooth
+
+
+@pytest.mark.parametrize("aggregate", [{"radius": "4 um", "position": "3 um"}, {"outline": PLUG, "smooth": True}])
+def test_a_shape_takes_the_place_of_the_outline_alone(aggregate):
+    """All else that a scene says stands, of its seed as of the rest."""
+    scene = parse_scene({**tables(inert_fraction=0.3, **aggregate), "substrates": {}}, "mine", "mine.toml")
+    kept = dataclasses.asdict(scene.aggregate) | {"radius": None, "position": 0.0, "outline": ((-5, 0), (1, 4), (6, 0))}
+    found = shaped(scene, [(-5, 0), (1, 4), (6, 0)])
+    assert found == dataclasses.replace(scene, aggregate=Aggregate(**kept))
 
 
 @given(st.lists(st.tuples(st.floats(1.1, 49.9), st.integers(4, 58)), min_size=1, max_size=9,

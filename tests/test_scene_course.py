@@ -2,6 +2,7 @@
 import json
 from dataclasses import replace
 from math import inf
+from operator import attrgetter
 
 import numpy as np
 import pytest
@@ -10,20 +11,24 @@ from hypothesis import strategies as st
 
 from repro.check.checked import check
 from repro.check.numbers import judged
+from repro.march import updates
 from repro.march.simulation import simulate
 from repro.model import pore
 from repro.results import read_table
-from repro.scene import load_scene, parse_scene, scene_hash, scene_tables
+from repro.scene import Scene, load_scene, parse_scene, scene_hash, scene_tables
 from repro.scene.course import Course
 from repro.scene.text import scene_text
+from repro.scene.units import Timed
 from tests.pages import run
 from tests.shell import resumed
 from tests.strategies import scene
 from tests.test_scene import refusal
+from tests.test_scene_text import fields
 
 DONOR = "substrates.donor.supply"
 STARVED = [["0 h", "10 mg/L"], ["0.3 h", "0 mg/L"], ["0.5 h", "20 mg/L"]]
 RISING = 'flow.head=[["0 h", "1e-3 cm"], ["0.4 h", "3e-3 cm"]]'
+TIMED = {key: kind for key, entry in fields(Scene) if isinstance(kind := entry.metadata.get("kind"), Timed)}
 SHORT = ('growth.end="0.8 h"', 'numerics.preset="fast"', f"{DONOR}={json.dumps(STARVED)}")
 
 
@@ -42,6 +47,17 @@ def test_the_hash_tells_tables_and_their_interpolation_apart():
     hashes = [scene_hash(load_scene("base", changes)) for changes in (
         [], [table], [table, "substrates.donor.interpolation=linear"], [f'{DONOR}=[["0 h", "10 mg/L"]]'])]
     assert len(set(hashes)) == 4
+
+
+@pytest.mark.parametrize("key", TIMED)
+def test_every_key_that_takes_a_table_follows_its_sections_interpolation(key):
+    section, _, name = key.rpartition(".")
+    table = json.dumps([[time, TIMED[key].write(value)] for time, value in (("0 h", 2.0), ("1 h", 6.0), ("4 h", 3.0))])
+    without = ["flow.head"] if name == "mean_velocity" else []
+    for word, wanted in (("steps", [2, 2, 6, 6, 3]), ("linear", [2, 4, 6, 5, 3])):
+        made = load_scene("base", [f"{key}={table}", f"{section}.interpolation={word}"], without)
+        assert [attrgetter(key)(made.at(time)) for time in (0, 0.5, 1, 2, 9)] == pytest.approx(wanted, rel=1e-15)
+        assert attrgetter(key)(made.largest) == 6 and [made.corner(time) for time in (0, 1, 4)] == [1, 4, inf]
 
 
 @pytest.mark.parametrize("table, told", [
@@ -109,6 +125,14 @@ def test_steps_end_at_jumps_and_rows_there_show_what_holds_from_then_on(changes)
     assert rise[2] == pytest.approx(rise[3], rel=1e-3) and rise[2] < 0 < min(rise[0], rise[4])
     law = made.kinetics
     assert rise[2] == pytest.approx(-law.decay_coefficient * law.degradable_fraction * 10 / 11, rel=2e-2)
+
+
+def test_updates_end_at_every_multiple_and_at_all_times_of_all_tables():
+    """Shortly before and after the multiples of 0.2 h, and between them; none of them is left out."""
+    made = scene(acceptor=[["0 h", "1 mg/L"], ["0.07 h", "2 mg/L"], ["0.38 h", "1 mg/L"]],
+                 donor=[["0 h", "1 mg/L"], ["0.13 h", "2 mg/L"], ["0.55 h", "1 mg/L"]],
+                 growth={"end": "0.71 h", "time_step": "0.2 h"})
+    assert updates.schedule(made)[0] == [0, 0.07, 0.13, 0.2, 0.38, 0.4, 0.55, 0.6, 0.71]
 
 
 def test_an_even_change_is_of_second_order():

@@ -1,4 +1,5 @@
 """How large elements are, how far the mesh reaches (3.1), and where an outline's nodes go for a new mesh."""
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,8 @@ from hypothesis import strategies as st
 from repro.fem import sizing as of
 from repro.fem.outline import BOTTOM, FREE, TOP
 from repro.fem.sizing import Sizing
-from repro.scene import Numerics
+from repro.model import pore
+from repro.scene import Numerics, load_scene
 from tests import oracles
 from tests.strategies import (
     attached_aggregates,
@@ -131,5 +133,12 @@ def test_a_graded_line_spaces_its_nodes_as_asked(near, far, length):
         assert (step <= 1.35 * wanted).all() and (step >= 0.6 * np.minimum(far, near)).all()
 
 
-def test_the_gradation_of_a_scene_is_the_meshers():
+def test_sizes_of_a_scene_are_the_meshers():
+    """Those that it says; an outline is no half-disc, whose new nodes would lie on its arc."""
     assert Numerics().gradation == of.GRADATION
+    said = ["numerics.preset=paper", "pore.width=80 um", "numerics.refinement=0.7", "growth.minimum_film=0.5 um",
+            "numerics.gradation=0.2", "numerics.contact_elements=4"]
+    outline = json.dumps([["-5 um", "0 um"], ["0 um", "4 um"], ["5 um", "0 um"]])
+    for seed, middle in (('position="3 um"', 3.0), (f"outline={outline}", None)):
+        found = pore.sized(load_scene("base", [*said, f"aggregate={{{seed}}}"]), 2.0)
+        assert found == Sizing(80.0, 0.7, 0.5, 0.2, 2.0, 0.125, middle)

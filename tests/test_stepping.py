@@ -15,7 +15,8 @@ from repro.fem.sizing import ACROSS_PORE
 from repro.march import midpoint, pace, simulation, stepping
 from repro.march.loop import PoreEnd
 from repro.march.midpoint import Attempt
-from repro.model import pore
+from repro.march.updates import rates_of
+from repro.model import pore, remeshing
 from repro.scene import load_scene
 from tests.strategies import ORDERS, scene
 from tests.test_state import alike
@@ -288,3 +289,21 @@ def test_a_film_too_thin_from_the_start_closes(order):
     """Though nothing grows: without a supply the aggregate neither grows nor decays."""
     found = run(narrow(order, "18.5 um", "0.1 h", acceptor="0 mg/L", donor="0 mg/L"))
     assert found[-1].pore.contact and found[-1].pore.mass == pytest.approx(found[0].pore.mass, rel=1e-9)
+
+
+@EVERY_ORDER
+@pytest.mark.parametrize("anew", [False, True])
+def test_half_way_tables_say_what_holds_in_the_middle_of_a_step(monkeypatch, order, anew):
+    """Both supplies and the drive, changing evenly at rates of their own, on the mesh that has moved and a new one."""
+    tables = {"flow.head": ("10 um", "30 um"), "substrates.acceptor.supply": ("8 mg/L", "4 mg/L"),
+              "substrates.donor.supply": ("2 mg/L", "7 mg/L")}
+    said = [f"{key}={json.dumps([['0 h', first], ['2 h', last]])}" for key, (first, last) in tables.items()]
+    made = load_scene("base", [FAST, *sets(order), *said, *(f"{key.rpartition('.')[0]}.interpolation=linear"
+                                                            for key in tables)])
+    now = replace(pore.seeded(made), time=1.0)
+    solved = pore.solve(made, now)
+    if anew:
+        monkeypatch.setattr(remeshing, "followed", lambda *_: None)
+    half = midpoint.halfway(made, now, solved, rates_of(made, now, solved.concentrations), 0.4)
+    supplies = [kind.supply for kind in half.solved.problem.both]
+    assert [half.solved.flow.head_loss, *supplies] == pytest.approx([22, 5.6, 5], rel=1e-9)

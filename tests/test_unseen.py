@@ -416,13 +416,6 @@ def test_gears_method_takes_less_than_nothing_by_each_substrates_own_supply(orde
         gear.advance(drained, nothing, nothing, start, 10.05e-6)
 
 
-def test_a_smooth_seed_is_a_natural_spline_through_its_points():
-    """Of three points over even knots: S(t) = (3 t - t^3) / 2 from either end, no parabola and nothing else."""
-    rim = polygon(np.array([(-6.0, 0.0), (0.0, 4.0), (6.0, 0.0)]), 50.0, smooth=True).points[3:-1]
-    t = 1 - np.abs(rim[:, 0]) / 6
-    assert len(rim) > 10 and rim[:, 1] == pytest.approx(4 * (3 * t - t**3) / 2, rel=1e-12)
-
-
 def test_contact_of_an_outline_is_held_in_its_middle_however_its_points_lie():
     uneven_top = [(-21, 0), (-12, 20), (-11, 20), (-10, 20), (-9, 20), (8, 20), (12, 12), (16, 0)]
     outline = polygon(np.array(uneven_top, float), 20.0)
