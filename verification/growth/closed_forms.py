@@ -314,10 +314,10 @@ def stabilisation():
     grid, _ = bodies.rectangle(1.3, 6)
     points, triangles = grid.points, grid.triangles
     theta, g = np.random.default_rng(7).uniform(1, 2000, len(triangles)), np.array([0.3, -0.7])
-    a, b, c = (points[triangles[:, i]] for i in range(3))
-    edges = np.stack([b - a, c - a], axis=1)
-    centre = np.linalg.solve(2 * edges, np.sum(edges**2, axis=2)[..., None])[..., 0]
-    exact = np.linalg.det(edges) / 2 * 4 * np.sum(centre**2, axis=1) * theta ** (2 / 3) / 12 * (g @ g)
+    corner = points[triangles]
+    area = np.linalg.det(corner[:, 1:] - corner[:, :1]) / 2
+    h = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).prod(axis=1) / (2 * area)
+    exact = area * h**2 * theta ** (2 / 3) / 12 * (g @ g)
     pressure = (points @ g)[triangles]
     found = np.einsum("ta,tab,tb->t", pressure, growth.gradient_stabilisation(points, triangles, theta), pressure)
     return at_most("stabilisation", np.abs(found / exact - 1).max(), 1e-11, ROUND_OFF)
