@@ -107,7 +107,7 @@ def exact(peclet: float, density: float, tolerance: float = 1e-8):
 
 #: Random meshes of each size (um), and solve_bvp's tolerance, which takes no less at Peclet 5: cubic elements are
 #: judged at Peclet 1, on coarser meshes, as solve_bvp is good to 1e-11 or so; the last error.
-FINER = {2: ({4.0: 12, 2.0: 6, 1.0: 3, 0.5: 1}, 1e-10, 1e-7), 3: ({6.4: 12, 3.2: 8, 1.6: 4, 0.8: 2}, 1e-12, 1e-9)}
+FINER = {2: ({3.2: 12, 1.6: 6, 0.8: 3, 0.4: 1}, 1e-10, 1e-7), 3: ({6.4: 12, 3.2: 8, 1.6: 4, 0.8: 2}, 1e-12, 1e-9)}
 
 
 @case("transport-monod-collocation", kind="cross-code",
