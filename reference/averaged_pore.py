@@ -27,12 +27,13 @@ from functools import cache, partial
 
 import numpy as np
 import scipy.sparse as sp
-from fipy import CellVariable, CentralDifferenceConvectionTerm, DiffusionTerm, Grid1D
+from fipy import CentralDifferenceConvectionTerm, Grid1D
 from scipy.integrate import solve_ivp
 from scipy.optimize import root
 from scipy.sparse.linalg import spsolve
 
 from reference import layered_channel
+from reference.channel_fipy import diffusion, matrix
 from reference.monod import derivatives, slopes, uptake
 
 RESTS, MOST = 1e-13, 50
@@ -100,8 +101,7 @@ class Section:
     def _spread(self, water, biomass):
         """FiPy's matrix of diffusion."""
         section = water * (self.pore.width - self.heights) + biomass * self.heights
-        coefficient = CellVariable(mesh=self.mesh, value=section).harmonicFaceValue
-        return _matrix(-DiffusionTerm(coeff=coefficient), self.mesh)
+        return matrix(-diffusion(self.mesh, section), self.mesh)
 
     def steady(self, active, start=None):
         """(2, n) concentrations at rest; active: X_A of the aggregate's cells (K,); start: a first iterate."""
@@ -128,19 +128,10 @@ class Section:
         return (self.source - sinks).ravel() - self.transport @ fields.ravel(), size
 
 
-def _matrix(term, mesh):
-    """FiPy's matrix of a term, the gradient at the outlet being zero."""
-    field = CellVariable(mesh=mesh, value=1.0)
-    field.faceGrad.constrain([0.0], where=mesh.facesRight)
-    term.cacheMatrix()
-    term.justResidualVector(var=field)
-    return sp.csr_matrix(term.matrix.matrix)
-
-
 @cache
 def _unit_flux(cells):
     """FiPy's matrix of advection by a flux of one; central differences know nothing of the cells' lengths."""
-    return _matrix(CentralDifferenceConvectionTerm(coeff=(1.0,)), Grid1D(nx=cells, dx=1.0))
+    return matrix(CentralDifferenceConvectionTerm(coeff=(1.0,)), Grid1D(nx=cells, dx=1.0))
 
 
 class Averaged:

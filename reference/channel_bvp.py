@@ -12,11 +12,6 @@ from scipy.integrate import solve_bvp
 from reference.monod import uptake
 
 
-def strip(x, velocity, supply, diffusivity, in_strip, density, rates, length, tolerance=1e-8):
-    """(C_A, C_D) at x (n,): see :func:`solution`."""
-    return solution(velocity, supply, diffusivity, in_strip, density, rates, length, tolerance)(x)
-
-
 def solution(velocity, supply, diffusivity, in_strip, density, rates, length, tolerance=1e-8):
     """The function x (...,) -> (C_A, C_D) (2, ...). supply, diffusivity, in_strip: pairs, acceptor first; density: X;
     tolerance: relative, of the residual of the collocation. Raises RuntimeError where scipy does not converge."""

@@ -12,13 +12,27 @@ of their own, by scipy, and by backward Euler, which is FiPy's TransientTerm and
 """
 import numpy as np
 import scipy.sparse as sp
-from fipy import CellVariable, CentralDifferenceConvectionTerm, DiffusionTerm, Grid1D, LinearLUSolver
+from fipy import CellVariable, CentralDifferenceConvectionTerm, DiffusionTerm, Grid1D
 from scipy.integrate import solve_ivp
 from scipy.sparse.linalg import spsolve
 
-from reference.monod import sink, slopes
+from reference.monod import at_rest, sink, slopes
 
-RESTS, MOST = 1e-10, 100
+RESTS = 1e-10
+
+
+def matrix(term, mesh):
+    """FiPy's matrix of a term, the gradient at the outlet being zero."""
+    field = CellVariable(mesh=mesh, value=1.0)
+    field.faceGrad.constrain([0.0], where=mesh.facesRight)
+    term.cacheMatrix()
+    term.justResidualVector(var=field)
+    return sp.csr_matrix(term.matrix.matrix)
+
+
+def diffusion(mesh, spread):
+    """FiPy's term, of a diffusivity in each cell."""
+    return DiffusionTerm(coeff=CellVariable(mesh=mesh, value=spread).harmonicFaceValue)
 
 
 class Channel:
@@ -42,16 +56,10 @@ class Channel:
 
     def _transport(self, velocity, supply, spread):
         """(M, b) of one substrate, the first cell's inflow taken out of FiPy's hands."""
-        field = CellVariable(mesh=self.mesh, value=float(supply))
-        field.faceGrad.constrain([0.0], where=self.mesh.facesRight)
-        coefficient = CellVariable(mesh=self.mesh, value=spread).harmonicFaceValue
-        terms = CentralDifferenceConvectionTerm(coeff=(float(velocity),)) - DiffusionTerm(coeff=coefficient)
-        terms.cacheMatrix()
-        terms.solve(var=field, solver=LinearLUSolver())
-        matrix = sp.csr_matrix(terms.matrix.matrix)
         source = np.zeros(len(self.x))
         source[0] = velocity * supply
-        return matrix, source
+        carried = CentralDifferenceConvectionTerm(coeff=(float(velocity),))
+        return matrix(carried - diffusion(self.mesh, spread), self.mesh), source
 
     def _rise(self, fields):
         """V dC/dt (2n,) of all C_A and then all C_D."""
@@ -66,16 +74,8 @@ class Channel:
         return self._solved(self._rise, self._slopes, np.repeat(self.supply, len(self.x))).reshape(2, -1)
 
     def _solved(self, defect, derivative, fields):
-        """The zero of ``defect``, by Newton's method with halved steps."""
-        for _ in range(MOST):
-            rise = defect(fields)
-            if np.abs(rise).max() < RESTS * self.sources[0][0]:
-                return fields
-            step, length = spsolve(derivative(fields), -rise), 1.0
-            while np.linalg.norm(defect(fields + length * step)) > np.linalg.norm(rise) and length > 1e-3:
-                length /= 2
-            fields = fields + length * step
-        raise RuntimeError(f"the finite volumes do not come to rest: {np.abs(rise).max():.2g}")
+        """The zero of ``defect``."""
+        return at_rest(defect, derivative, fields, RESTS * self.sources[0][0], spsolve)
 
     def transient(self, times):
         """(times, 2, n): C_A and C_D at each of the times, from the supply everywhere; exact in time to 1e-8."""

@@ -15,9 +15,9 @@ import scipy.sparse as sp
 from pde import CartesianGrid, ScalarField
 from scipy.sparse.linalg import splu
 
-from reference.monod import sink, slopes
+from reference.monod import at_rest, sink, slopes
 
-RESTS, MOST = 1e-11, 60
+RESTS = 1e-11
 #: How SuperLU factors: the diagonal dominates, and pivots would spoil the ordering.
 NO_PIVOTS = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
 #: No two of the five cells of the stencil have the same x + 2 y modulo five.
@@ -71,20 +71,8 @@ class Box:
             return matrix @ fields + constant - sink(fields, load, rates)
 
         start = np.repeat(np.array(supply, float), len(self.points))
-        return _newton(rise, lambda fields: matrix - slopes(fields, load, rates), start, np.abs(constant).max())
-
-
-def _newton(rise, derivative, fields, scale):
-    """The zero of ``rise``, with halved steps; ``scale`` is the size of its terms."""
-    for _ in range(MOST):
-        now = rise(fields)
-        if np.abs(now).max() < RESTS * scale:
-            return fields.reshape(2, -1)
-        step, length = splu(derivative(fields), **NO_PIVOTS).solve(-now), 1.0
-        while np.linalg.norm(rise(fields + length * step)) > np.linalg.norm(now) and length > 1e-3:
-            length /= 2
-        fields = fields + length * step
-    raise RuntimeError(f"the finite differences do not come to rest: {np.abs(now).max():.2g}")
+        return at_rest(rise, lambda fields: matrix - slopes(fields, load, rates), start, RESTS * np.abs(constant).max(),
+                       lambda system, right: splu(system, **NO_PIVOTS).solve(right)).reshape(2, -1)
 
 
 def half_disc(radius, parts=16):

@@ -9,6 +9,8 @@ import scipy.sparse as sp
 
 #: mg/L, of the differences.
 NUDGE = 1e-6
+#: Newton's method is given up after so many steps.
+MOST = 100
 
 
 def uptake(acceptor, donor, rates):
@@ -34,3 +36,17 @@ def slopes(fields, load, rates):
     """(2n, 2n) derivative of :func:`sink`, place by place."""
     rows = load * derivatives(fields.reshape(2, -1), rates)
     return sp.block_array([[*map(sp.diags_array, row)] for row in rows], format="csc")
+
+
+def at_rest(rise, derivative, fields, small, solved):
+    """The zero (n,) of ``rise``, smaller than ``small``, by Newton's method with halved steps from ``fields`` (n,);
+    solved(matrix, right): its linear solver. Raises RuntimeError where it does not converge."""
+    for _ in range(MOST):
+        now = rise(fields)
+        if np.abs(now).max() < small:
+            return fields
+        step, length = solved(derivative(fields), -now), 1.0
+        while np.linalg.norm(rise(fields + length * step)) > np.linalg.norm(now) and length > 1e-3:
+            length /= 2
+        fields = fields + length * step
+    raise RuntimeError(f"the concentrations do not come to rest: {np.abs(now).max():.2g}")

@@ -39,6 +39,8 @@ from skfem import (
 )
 from skfem.helpers import ddot, det, grad
 
+from reference.arcs import arc, curved, refined
+
 #: Newton stops at a step this small against the size of the body, and is given up after that many,
 SMALL, MOST = 1e-10, 30
 #: or after that many halvings of one.
@@ -77,12 +79,12 @@ class Grown:
 
     def _cells(self, where):
         """(n,) triangles that hold points (2, n): those of the straight mesh or, beyond a chord, the one on it."""
-        corners, arc = self.mesh.p[:, : self.mesh.t.max() + 1], _arc(self.mesh)
-        start = np.arctan2(*corners[::-1, self.mesh.facets[:, arc]]).min(axis=0)
+        corners, rim = self.mesh.p[:, : self.mesh.t.max() + 1], arc(self.mesh)
+        start = np.arctan2(*corners[::-1, self.mesh.facets[:, rim]]).min(axis=0)
         ranked = np.argsort(start)
         chord = np.searchsorted(start[ranked[1:]], np.arctan2(where[1], where[0]))
         inside = Triangulation(*corners, self.mesh.t.T).get_trifinder()(*where)
-        return np.where(inside < 0, self.mesh.f2t[0, arc[ranked[chord]]], inside)
+        return np.where(inside < 0, self.mesh.f2t[0, rim[ranked[chord]]], inside)
 
 
 def _local(mapping, where, cell):
@@ -103,14 +105,8 @@ def _value(basis, nodal, local, cell):
 def half_disc(radius, rings, towards=(), times=0):
     """MeshTri2 of ``rings`` rings, 4k edges on the k-th: every multiple of 45 degrees has a node on the arc. Refined
     ``times`` times more at the angles ``towards`` of the arc."""
-    mesh = _rings(radius, rings)
-    for _ in range(times):
-        tips = [np.hypot(*(mesh.p - radius * np.array([[np.cos(a)], [np.sin(a)]]))) < 1e-9 * radius for a in towards]
-        mesh = _rounded(mesh.refined(np.flatnonzero(np.any(tips, axis=0)[mesh.t].any(axis=0))), radius)
-    basis = Basis(mesh, ElementTriP2())
-    places, middles = basis.doflocs.copy(), basis.facet_dofs[0, _arc(mesh)]
-    places[:, middles] *= radius / np.hypot(*places[:, middles])
-    return MeshTri2(places, mesh.t)
+    tips = radius * np.column_stack([np.cos(towards), np.sin(towards)])
+    return curved(refined(_rings(radius, rings), radius, tips, times), radius)
 
 
 def _rings(radius, rings):
@@ -123,19 +119,6 @@ def _rings(radius, rings):
     a, b, c = points[:, triangles].swapaxes(0, 1)
     area = np.abs((b - a)[0] * (c - a)[1] - (b - a)[1] * (c - a)[0])
     return MeshTri(points, triangles[:, area > 1e-9 * (radius / rings) ** 2].copy())
-
-
-def _arc(mesh):
-    """Boundary facets that are not on the flat side."""
-    facets = mesh.boundary_facets()
-    return facets[mesh.p[1, mesh.facets[:, facets]].max(axis=0) > 0]
-
-
-def _rounded(mesh, radius):
-    """The nodes of the arc put onto it."""
-    points, nodes = mesh.p.copy(), np.unique(mesh.facets[:, _arc(mesh)])
-    points[:, nodes] *= radius / np.hypot(*points[:, nodes])
-    return MeshTri(points, mesh.t)
 
 
 def grow(mesh, theta, top, mu=1.0, contact=None, start=None):

@@ -29,14 +29,9 @@ def _through(x, half, film, supply, surface, inside):
     return np.where(beyond < 0, inside, surface + slope * np.maximum(beyond, 0.0))
 
 
-def modulus(half, uptake, in_slab):
-    """phi, with uptake kappa (1/h)."""
-    return half * np.sqrt(uptake / in_slab)
-
-
 def first_order(x, supply, uptake, half, in_slab, film=0.0, diffusivity=1.0):
-    """(C(x), effectiveness): uptake is kappa; half is l, film is a, diffusivity is D."""
-    phi = modulus(half, uptake, in_slab)
+    """(C(x), effectiveness): uptake is kappa (1/h); half is l, film is a, diffusivity is D."""
+    phi = half * np.sqrt(uptake / in_slab)
     surface = supply / (1 + film * in_slab / (half * diffusivity) * phi * np.tanh(phi))
     inside = surface * np.cosh(phi * np.clip(x / half, -1, 1)) / np.cosh(phi)
     return _through(x, half, film, supply, surface, inside), surface / supply * np.tanh(phi) / phi

@@ -31,6 +31,8 @@ from skfem import (
 )
 from skfem.helpers import ddot, div, grad, sym_grad
 
+from reference.arcs import curved, inside, refined, rounded
+
 #: Thickest aggregate, over the width, around which the rings fit; a mesh for a thicker one is stretched.
 THICKEST = 0.8
 
@@ -76,14 +78,11 @@ def half_disc(width, ends, radius, refinements, corner=6):
     mesh = MeshTri(points.T.copy(), Delaunay(points).simplices.T.copy())
     if radius > sketched:
         mesh = MeshTri(_stretched(points, width, ends, sketched, radius).T.copy(), mesh.t)
-        mesh = _snapped(mesh.refined(_film(mesh, radius)), radius)
+        mesh = rounded(mesh.refined(_film(mesh, radius)), radius)
     for _ in range(refinements):
-        mesh = _snapped(mesh.refined(), radius)
-    for _ in range(corner):
-        near = [np.flatnonzero((mesh.p[:, mesh.t] == np.array([[[x]], [[0.0]]])).all(axis=0).any(axis=0))
-                for x in (-radius, radius)]
-        mesh = _snapped(mesh.refined(np.concatenate(near)), radius)
-    return Channel(_curved(mesh, radius), _inside(mesh, radius), width, ends)
+        mesh = rounded(mesh.refined(), radius)
+    mesh = refined(mesh, radius, [(-radius, 0.0), (radius, 0.0)], corner)
+    return Channel(curved(mesh, radius), inside(mesh, radius), width, ends)
 
 
 def _rings(width, radius):
@@ -120,35 +119,6 @@ def _film(mesh, radius):
     return np.flatnonzero((np.abs(x) < 0.75 * radius) & (np.hypot(x, y) > 0.8 * radius))
 
 
-def _interface(mesh, radius):
-    """Facets between biomass and fluid."""
-    inner = np.flatnonzero(mesh.f2t[1] >= 0)
-    inside = _inside(mesh, radius)
-    return inner[inside[mesh.f2t[0, inner]] != inside[mesh.f2t[1, inner]]]
-
-
-def _inside(mesh, radius):
-    return np.hypot(*mesh.p[:, mesh.t].mean(axis=1)) < radius
-
-
-def _snapped(mesh, radius):
-    """The nodes of the interface put on the arc."""
-    p, nodes = mesh.p.copy(), np.unique(mesh.facets[:, _interface(mesh, radius)])
-    on_wall = p[1] == 0
-    p[:, nodes] *= radius / np.hypot(*p[:, nodes])
-    p[1, on_wall] = 0.0
-    return MeshTri(p, mesh.t)
-
-
-def _curved(mesh, radius):
-    """Quadratic triangles, the middles of the interface's edges on the arc."""
-    basis = Basis(mesh, ElementTriP2())
-    middles = basis.facet_dofs[0, _interface(mesh, radius)]
-    where = basis.doflocs.copy()
-    where[:, middles] *= radius / np.hypot(*where[:, middles])
-    return MeshTri2(where, mesh.t)
-
-
 def stokes(channel, ratio, interface="laplacian"):
     """Solve; returns :class:`Stokes`. The pressure of each region is its own: it jumps at the interface."""
     basis = Basis(channel.mesh, ElementVector(ElementTriP2()), intorder=5)
@@ -170,10 +140,10 @@ def _pressure(channel, region, values):
     """:class:`Pressure` of a region from its unknowns."""
     velocity, lower, used = region
     pressure, weights = np.zeros(lower.N), _weights(channel, velocity)
-    pressure[used], inside = values, weights > 0
-    middles = pressure[channel.mesh.facets[:, inside]].mean(axis=0)
-    return Pressure(bool(channel.biomass[velocity.tind[0]]), velocity.doflocs[:, velocity.facet_dofs[0, inside]].T,
-                    middles, weights[inside])
+    pressure[used], there = values, weights > 0
+    middles = pressure[channel.mesh.facets[:, there]].mean(axis=0)
+    return Pressure(bool(channel.biomass[velocity.tind[0]]), velocity.doflocs[:, velocity.facet_dofs[0, there]].T,
+                    middles, weights[there])
 
 
 def _loss(channel, lower, used, values):

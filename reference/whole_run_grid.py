@@ -13,7 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from skfem import Basis, ElementTriP2, MeshTri, MeshTri2
+from skfem import MeshTri, MeshTri2
+
+from reference import arcs
 
 CORNER, NEAR = 2, 1e-9
 
@@ -65,10 +67,7 @@ def grid(rings):
     (nodes, body), (outer, fluid) = _disc(rings), _layers(rings)
     shared = 4 * rings + 1
     mesh = MeshTri(np.hstack([nodes, outer[:, shared:]]), np.hstack([body, fluid + nodes.shape[1] - shared]))
-    for _ in range(CORNER):
-        tips = (np.abs(mesh.p[1]) < NEAR) & (np.abs(np.abs(mesh.p[0]) - 1) < NEAR)
-        mesh = _snapped(mesh.refined(np.flatnonzero(tips[mesh.t].any(axis=0))))
-    return _quadratic(mesh)
+    return _quadratic(arcs.refined(mesh, 1.0, [(1.0, 0.0), (-1.0, 0.0)], CORNER))
 
 
 def _disc(rings):
@@ -103,30 +102,11 @@ def _layers(rings):
     return points[:, kept], triangles.reshape(3, -1)
 
 
-def _snapped(mesh):
-    """The mesh with the nodes of the outline put on it."""
-    points, rim = mesh.p.copy(), np.unique(mesh.facets[:, _rim(mesh)])
-    points[:, rim] /= np.hypot(*points[:, rim])
-    return MeshTri(points, mesh.t)
-
-
-def _inside(mesh):
-    """(T,) is the triangle in the aggregate?"""
-    return np.hypot(*mesh.p[:, mesh.t].mean(axis=1)) < 1
-
-
-def _rim(mesh):
-    """Facets between aggregate and fluid."""
-    inner, inside = np.flatnonzero(mesh.f2t[1] >= 0), _inside(mesh)
-    return inner[inside[mesh.f2t[0, inner]] != inside[mesh.f2t[1, inner]]]
-
-
 def _quadratic(mesh):
     """:class:`Grid` of straight triangles."""
-    basis, rim = Basis(mesh, ElementTriP2()), _rim(mesh)
+    rim = arcs.arc(mesh, 1.0)
     corners = np.array([np.hypot(*mesh.p), np.arctan2(mesh.p[1], mesh.p[0])])
     polar = np.hstack([corners, corners[:, mesh.facets].mean(axis=1)])
     nodes = np.concatenate([np.unique(mesh.facets[:, rim]), mesh.nvertices + rim])
-    seed = basis.doflocs.copy()
-    seed[:, nodes] /= np.hypot(*seed[:, nodes])
-    return Grid(mesh.t, _inside(mesh), polar, seed, nodes[np.argsort(polar[1, nodes])])
+    seed = arcs.curved(mesh, 1.0).doflocs
+    return Grid(mesh.t, arcs.inside(mesh, 1.0), polar, seed, nodes[np.argsort(polar[1, nodes])])

@@ -205,9 +205,9 @@ def admissible(count: int = 200) -> tuple[np.ndarray, np.ndarray]:
     return scale[:, None, None] * F @ shear, random.standard_normal(count)
 
 
-def _turns(count: int) -> np.ndarray:
-    """Rotations (count, 2, 2)."""
-    c, s = np.cos(np.linspace(0, 6, count)), np.sin(np.linspace(0, 6, count))
+def _turns(angles: np.ndarray) -> np.ndarray:
+    """Rotations (k, 2, 2)."""
+    c, s = np.cos(angles), np.sin(angles)
     return np.moveaxis(np.array([[c, -s], [s, c]]), -1, 0)
 
 
@@ -221,7 +221,7 @@ def stress():
     exact = np.array([neo_hookean.cauchy(f, p) for f, p in zip(F, P)])
     xx, yy, zz, xy = growth.cauchy(F, P).T
     ours = np.moveaxis(np.array([[xx, xy, 0 * xx], [xy, yy, 0 * xx], [0 * xx, 0 * xx, zz]]), -1, 0)
-    S, Q = growth.piola(F, P), _turns(len(F))
+    S, Q = growth.piola(F, P), _turns(np.linspace(0, 6, len(F)))
     full = S @ np.swapaxes(F, 1, 2) / np.linalg.det(F)[:, None, None]
     size, first = (np.abs(one).max(axis=(1, 2))[:, None, None] for one in (exact, S))
     apart = {"stress": (ours - exact) / size, "symmetry": (full - np.swapaxes(full, 1, 2)) / size,
@@ -314,10 +314,10 @@ def stabilisation():
     grid, _ = bodies.rectangle(1.3, 6)
     points, triangles = grid.points, grid.triangles
     theta, g = np.random.default_rng(7).uniform(1, 2000, len(triangles)), np.array([0.3, -0.7])
-    a, b, c = (points[triangles[:, i]] for i in range(3))
-    edges = np.stack([b - a, c - a], axis=1)
-    centre = np.linalg.solve(2 * edges, np.sum(edges**2, axis=2)[..., None])[..., 0]
-    exact = np.linalg.det(edges) / 2 * 4 * np.sum(centre**2, axis=1) * theta ** (2 / 3) / 12 * (g @ g)
+    corner = points[triangles]
+    area = np.linalg.det(corner[:, 1:] - corner[:, :1]) / 2
+    h = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).prod(axis=1) / (2 * area)
+    exact = area * h**2 * theta ** (2 / 3) / 12 * (g @ g)
     pressure = (points @ g)[triangles]
     found = np.einsum("ta,tab,tb->t", pressure, growth.gradient_stabilisation(points, triangles, theta), pressure)
     return at_most("stabilisation", np.abs(found / exact - 1).max(), 1e-11, ROUND_OFF)
@@ -329,6 +329,10 @@ KEPT_ROUND_OFF = "round-off; Newton's method stops at 1e-11"
 def _theta(x, y):
     """From 1.2 to 4, uneven along x and y."""
     return 2.6 + 0.9 * x / bodies.RADIUS + 0.5 * np.sin(3 * y / bodies.RADIUS)
+
+
+#: rad.
+ANGLES = np.array([0.4, 1.9, 4.0])
 
 
 @case("growth-rigid", kind="property", norm="largest sum, over the largest nodal force; largest difference, over the "
@@ -346,8 +350,7 @@ def rigid(kind: int):
     moment = np.sum(place[:, 0] * forces[:, 1] - place[:, 1] * forces[:, 0]) / np.abs(place).max()
     yield each_at_most({"resultant": np.abs(forces.sum(axis=0)).max() / most,
                         "moment over the largest distance": abs(moment) / most}, 1e-11, KEPT_ROUND_OFF)
-    for angle in (0.4, 1.9, 4.0):
-        Q = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    for angle, Q in zip(ANGLES, _turns(ANGLES)):
         turned, same = _forces(body, place @ Q.T + [70.0, -30.0], pressure, theta)
         yield each_at_most({"forces": np.abs(turned - forces @ Q.T).max() / most,
                             "volume": np.abs(same - volume).max() / np.abs(volume).max()}, 1e-12, ROUND_OFF,
@@ -392,8 +395,7 @@ def _area(body: Supported, position: np.ndarray) -> float:
             "with the same pressure over mu_L",
       mutants=("h-not-squared",), over=bodies.EVERY)
 def units(kind: int):
-    changes = {"in metres": 1e-6 * np.eye(2), "upright": np.array([[0.0, -1.0], [1.0, 0.0]]),
-               "mirrored": np.diag([-1.0, 1.0])}
+    changes = {"in metres": 1e-6 * np.eye(2), "upright": TURN, "mirrored": np.diag([-1.0, 1.0])}
     ours = _changed(np.eye(2), kind)
     for name, change in changes.items():
         found = _changed(change, kind)

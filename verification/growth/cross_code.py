@@ -116,7 +116,7 @@ def _settled(name: str, difference: float) -> Check:
     where, weight = _points()
     before, last = (trusted(name, level).at(*where)[0] for level in (len(RINGS) - 2, len(RINGS) - 1))
     return at_most("last change of the reference's places, over the last difference to ours",
-                   bodies.relative(before, last, weight[..., None]) / difference, 0.3,
+                   bodies.relative(before, last, weight) / difference, 0.3,
                    "the reference must be the finer one; it changes by less with every level")
 
 
@@ -180,7 +180,7 @@ def _own(level: int) -> dict[str, float]:
     place, pressure = trusted("half-cylinder", level).at(*where)
     known = closed_forms.exact(2000.0)
     exact, level_of = known.place(*where), known.pressure(*where)
-    return {"size": bodies.RADIUS / RINGS[level], "places": bodies.relative(place, exact, weight[..., None]),
+    return {"size": bodies.RADIUS / RINGS[level], "places": bodies.relative(place, exact, weight),
             "pressure": bodies.relative(pressure / MODULUS, level_of, weight)}
 
 

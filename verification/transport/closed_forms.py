@@ -359,8 +359,8 @@ def _added(space: Space, mean: float, supply: float, chosen, inlet: str) -> np.n
     where, weight, values = in_points(space)
     forcing = weight * _by_side(space.mesh.biomass, chosen, "forcing", where[..., 0], where[..., 1])
     found = np.bincount(space.cells.ravel(), (forcing @ values).ravel(), space.count)
-    for nodes, owner, ends in _edges(space):
-        found += _through(space, nodes, owner, ends, mean, supply, chosen, inlet)
+    for nodes in _sides(space):
+        found += _through(space, nodes, mean, supply, chosen, inlet)
     return found
 
 
@@ -369,29 +369,24 @@ def _by_side(biomass, chosen, name: str, x, y) -> np.ndarray:
     return np.where(biomass[:, None], *(getattr(chosen[side], name)(x, y) for side in ("biomass", "fluid")))
 
 
-def _edges(space: Space):
-    """The mesh's rim: nodes (E, e), triangles (E,) and ends (E, 2) um of the edges 01, 12 and 20 that have one
-    triangle alone; nodes from the first end to the second."""
-    topology, order = space.mesh.topology, space.order
-    alone = np.bincount(topology.cell_edges.ravel(), minlength=len(topology.edges)) == 1
-    parameters = np.linspace(0, 1, order + 1)
-    for k in range(3):
-        owner = np.flatnonzero(alone[topology.cell_edges[:, k]])
-        corners = np.array([[0, 0], [1, 0], [0, 1]])[[k, (k + 1) % 3]]
-        places = corners[0] + parameters[:, None] * (corners[1] - corners[0])
-        local = [int(np.argmin(np.abs(elements.nodes(order) - place).sum(axis=1))) for place in places]
-        ends = space.mesh.points[space.mesh.triangles[owner][:, [k, (k + 1) % 3]]]
-        yield space.cells[owner][:, local], owner, ends
+def _sides(space: Space):
+    """Of each side of the pore the nodes (E, e) of its edges, from end to end, counterclockwise."""
+    for axis, side, turn in ((0, ENDS[0], -1), (1, 0.0, 1), (0, ENDS[1], 1), (1, WIDTH, -1)):
+        line = np.flatnonzero(np.isclose(space.points[:, axis], side))
+        line = line[np.argsort(turn * space.points[line, 1 - axis])]
+        first = np.arange(0, len(line) - 1, space.order)
+        yield line[first[:, None] + np.arange(space.order + 1)]
 
 
-def _through(space: Space, nodes, owner, ends, mean: float, supply: float, chosen, inlet: str) -> np.ndarray:
+def _through(space: Space, nodes, mean: float, supply: float, chosen, inlet: str) -> np.ndarray:
     """(n,) of what enters through edges: D dC/dn; and at the inlet, where the code has it leave, u_x (C - C_s), or with
     the printed condition u_ave (C - C_s) [E4]."""
     points, weights = np.polynomial.legendre.leggauss(6)
     along = (points + 1) / 2
-    start, along_edge = ends[:, 0], ends[:, 1] - ends[:, 0]
+    start, end = np.moveaxis(space.points[nodes[:, [0, -1]]], 1, 0)
+    along_edge = end - start
     x, y = np.moveaxis(start[:, None] + along[:, None] * along_edge[:, None], 2, 0)
-    biomass, length = space.mesh.biomass[owner], np.hypot(*along_edge.T)[:, None]
+    biomass, length = np.hypot(*(start + end).T / 2) < RADIUS, np.hypot(*along_edge.T)[:, None]
     flux = _by_side(biomass, chosen, "flux", x, y)
     passed = flux[0] * along_edge[:, 1, None] - flux[1] * along_edge[:, 0, None]
     enters = _velocity(mean)[0](x, y) if inlet == "local" else mean

@@ -205,9 +205,9 @@ def finite_differences(shape: str, order: int, density: float, *ceilings: float)
         yield studies(refine(_as_long, samples, density, shape), rows)
     elif shape == "block":
         rows = {name: (2, "py-pde's second order", ceiling) for name, ceiling in zip(names, ceilings)}
-        yield studies(refine(_at_rest, BLOCK, density, shape, order), rows, ", of py-pde less ours")
+        yield studies(refine(_at_rest, tuple(BLOCK), density, shape, order), rows, ", of py-pde less ours")
     else:
-        errors = _at_rest(min(DISC), 0, density, shape, order)
+        errors = _at_rest(min(DISC), density, shape, order)
         for name, ceiling in zip(names, ceilings):
             yield at_most(f"{name}, of py-pde less ours", errors[name], ceiling, "py-pde's error")
 
@@ -236,10 +236,16 @@ def _as_long(cell: float, number: int, density: float, shape: str) -> dict[str, 
     return _less(made.space, transport.steady(made, sink_), cell, density, shape)
 
 
-def _at_rest(cell: float, number: int, density: float, shape: str, order: int) -> dict[str, float]:
-    """Differences of elements of another order and size, by the transient scheme, where it comes to rest."""
+def _at_rest(cell: float, density: float, shape: str, order: int) -> dict[str, float]:
+    """Differences of elements of another order and size."""
+    return {"size": cell, **_less(*_settled(density, shape, order), cell, density, shape)}
+
+
+@cache
+def _settled(density: float, shape: str, order: int) -> tuple[Space, transport.Concentrations]:
+    """The transient scheme at rest."""
     made, sink_ = _diffusing(_spaced(FINE_AROUND[shape][order], 0, shape, order), density)
-    return _less(made.space, gear.settle(made, sink_, None), cell, density, shape)
+    return made.space, gear.settle(made, sink_, None)
 
 
 def _diffusing(space: Space, density: float) -> tuple[transport.Problem, Sink]:

@@ -184,12 +184,15 @@ def _front(half: str, *numerics: str):
     scene = _half_disc(100.0, 60.0, "0.29 m/day", *numerics, *halves, 'substrates.donor.supply="1 mg/L"',
                        'kinetics.decay_coefficient="0 1/day"')
     try:
-        return remeshing.resolved(scene, pore.seeded(scene))[1].fluxes
+        return _resolved(scene)
     except Unresolved as refusal:
         advised = re.search(r"numerics\.refinement = ([\d.]+) resolves this state", str(refusal))
         if advised is None:
             raise
-    scene = replace(scene, numerics=replace(scene.numerics, refinement=float(advised[1])))
+    return _resolved(replace(scene, numerics=replace(scene.numerics, refinement=float(advised[1]))))
+
+
+def _resolved(scene: Scene):
     return remeshing.resolved(scene, pore.seeded(scene))[1].fluxes
 
 
