@@ -44,15 +44,18 @@ from tests.shell import (
 CONTACT = ('aggregate.radius="17.98 um"', 'pore.width="20 um"', 'growth.end="0.6 h"')
 SCENES = {
     "paper, unreported steps": ('growth.end="1 h"', 'output.times=["0.3 h", "1 h"]'),
-    "fast": ('numerics.preset="fast"', "numerics.tolerance=0.0005", 'aggregate.radius="25 um"', 'growth.end="3 h"'),
+    "fast": ('numerics.preset="fast"', "numerics.tolerance=0.0005", 'aggregate.radius="25 um"', 'growth.end="3 h"',
+             'output.times=["0.1 h", "0.7 h", "0.8 h", "2 h"]'),
     "fast, rows within steps": ('numerics.preset="fast"', 'growth.end="9.7 h"'),
     "fast, jumps": ('numerics.preset="fast"', 'growth.end="0.8 h"', 'substrates.donor.supply='
-                    '[["0 h", "10 mg/L"], ["0.3 h", "0 mg/L"], ["0.5 h", "20 mg/L"]]'),
+                    '[["0 h", "10 mg/L"], ["0.3 h", "0 mg/L"], ["0.5 h", "20 mg/L"]]',
+                    'output.times=["0.1 h", "0.3 h", "0.4 h", "0.7 h"]'),
     "paper, rows within steps": ('growth.end="0.7 h"', 'output.times=["0.05 h", "0.1 h", "0.4 h", "0.47 h"]'),
     "fast, unreported steps, contact": ('numerics.preset="fast"', "numerics.tolerance=0.0001", *CONTACT,
                                         'output.times=["0.6 h"]'),
     "gear": ('numerics.transport="gear"', 'growth.end="0.4 h"'),
-    "cubic, contact": ('numerics.preset="fast"', 'numerics.elements="cubic"', "numerics.tolerance=0.0005", *CONTACT),
+    "cubic, contact": ('numerics.preset="fast"', 'numerics.elements="cubic"', "numerics.tolerance=0.0005", *CONTACT,
+                       'output.times=["0.05 h", "0.3 h", "0.6 h"]'),
 }
 MORE = {
     "paper": ('growth.end="6 h"',),
@@ -74,7 +77,7 @@ MORE = {
 }
 
 
-SHORT = ('numerics.preset="fast"', 'growth.end="3 h"')
+SHORT = ('numerics.preset="fast"', 'growth.end="3 h"', 'output.times=["0 h", "0.5 h", "1 h", "2 h", "3 h"]')
 PORE_END = "the aggregate reaches the pore's upstream end at t = 3 h"
 SCENE = load_scene("base", SHORT)
 
@@ -283,8 +286,7 @@ def test_results_reach_the_disk_while_a_run_goes_on(tmp_path):
             rows = (tmp_path / "run" / "timeseries.csv").read_text().count("\n") - 1
             seen.append((told(tmp_path / "run")["status"], rows, len(list((tmp_path / "run" / "fields").iterdir()))))
 
-    scene = load_scene("base", SCENES["fast"])
-    run(scene, tmp_path / "run", watch=Watch(tell=look, interval=0.0))
+    run(load_scene("base", ["growth.end=1 h"]), tmp_path / "run", watch=Watch(tell=look, interval=0.0))
     assert seen == [("running", count, count) for count in range(1, len(seen) + 1)] and len(seen) > 4
 
 

@@ -17,7 +17,7 @@ import pytest
 import repro
 from repro import load_scene, results
 from repro.cli import main
-from repro.sweep import page, pool, server, table
+from repro.sweep import page, pool, server, table, task
 from repro.sweep.design import grid, parse, points
 from repro.sweep.server import Server, ask
 from repro.sweep.state import Sweep
@@ -103,6 +103,16 @@ def test_the_same_command_makes_what_is_missing_and_nothing_else(copied, capsys)
     assert "run 1, flow.mean_velocity = 2.9 m/day: completed" in err and "run 3, " not in err
 
 
+@contextmanager
+def in_this_process(workers):
+    """What makes runs, one after the other and without a server."""
+    def each(points, folder):
+        for point in points:
+            yield point, task.make(point.scene, folder / point.name, folder / f".part-{point.name}")
+
+    yield each
+
+
 def cut_short(run):
     path = run / "timeseries.csv"
     path.write_bytes(path.read_bytes()[:300])
@@ -124,8 +134,9 @@ def unfinished(run):
     lambda run: (run / "timeseries.csv").write_text(""), lambda run: (run / "run.json").unlink(),
     lambda run: results.write_table(run / "timeseries.csv", ["time_h"], [[0.1 * k] for k in range(99)]),
     lambda run: results.write_json(run / "run.json", told(run) | {"status": "sunning"})])
-def test_a_run_that_is_not_whole_is_made_again(copied, capsys, spoil):
+def test_a_run_that_is_not_whole_is_made_again(copied, capsys, monkeypatch, spoil):
     """However its record says that it ended: the tables are those of before."""
+    monkeypatch.setattr(pool, "ready", in_this_process)
     names = [row["folder"] for row in rows(copied / "runs.csv")]
     before = [(copied / name).read_bytes() for name in ("table.csv", f"{names[2]}/timeseries.csv")]
     spoil(copied / names[2])
