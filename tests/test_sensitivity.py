@@ -183,7 +183,7 @@ def test_a_number_of_samples_is_a_power_of_two(samples, capsys):
 
 def test_claims_with_other_supplies_are_told_apart():
     def holding(supply, values):
-        rows = [claims.at_most(f"wide, {supply} h: {number}", "", value, 1.0, "") for number, value in enumerate(values)]
+        rows = [claims.at_most(f"wide, {supply} h: {k}", "", value, 1.0, "") for k, value in enumerate(values)]
         return wide.holding(claims.Finding((claims.at_most("base, 19.2 h", "", 9.0, 1.0, ""), *rows)))
 
     found = {}
