@@ -140,7 +140,7 @@ def lost_at_the_inlet(instant):
 def through_contact(order, *changes):
     """From before contact with the opposite wall to after it: the scene and its run."""
     made = load_scene("base", [*sets(order), 'aggregate.radius="17.9 um"', 'pore.width="20 um"', *changes,
-                               'growth.end="0.6 h"', "flow.head=1e-2 cm"])
+                               'growth.end="0.4 h"', "flow.head=1e-2 cm"])
     return made, run(made)
 
 
