@@ -11,6 +11,7 @@ import ctypes
 import json
 import sys
 from dataclasses import replace
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,8 @@ from verification.claims.levels import CONVERGED, Level, at_level
 #: Claims whose numbers are there in seconds, and the level that judges them.
 QUICK, JUDGED = ("C01", "C02", "C03", "C04", "C05", "C06", "C09", "C15", "C34"), Level(CONVERGED, 0.5)
 
+#: What is told of a number.
+NUMBER = attrgetter("quantity", "value", "holds")
 Numbers = dict[str, list[tuple[str, float, bool]]]
 
 
@@ -31,8 +34,7 @@ def computed(ids: tuple[str, ...] = QUICK, factor: float = 1.0) -> Numbers:
     plain, runs.load_scene = runs.load_scene, lambda name, changes=(): moved(name, changes, factor)
     try:
         with at_level(JUDGED), np.errstate(all="raise", under="ignore"):
-            return {id: [(check.quantity, check.value, check.holds) for check in CLAIMS[id].function().checks]
-                    for id in ids}
+            return {id: [*map(NUMBER, CLAIMS[id].function().checks)] for id in ids}
     finally:
         runs.load_scene = plain
         levels.forget(JUDGED)

@@ -30,7 +30,8 @@ class Browser:
         self.process = subprocess.Popen([*command, "about:blank"], pass_fds=(theirs, ours), stderr=subprocess.DEVNULL)
         os.close(theirs)
         os.close(ours)
-        self.pending, self.count, self.session, self.requests = b"", 0, None, []
+        self.pending, self.requests = b"", []
+        self.count, self.session = 0, None
         target = self.call("Target.createTarget", url="about:blank")["targetId"]
         self.session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         for domain in ("Page", "Network", "Runtime"):

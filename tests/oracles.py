@@ -21,7 +21,7 @@ def diameter(corners):
 
 def mass(points, triangles, field):
     """Integral of a linear field: the area of each triangle times the mean of its three values."""
-    return math.fsum(area(points[t]) * sum(field[t]) / 3 for t in triangles)
+    return math.fsum(area(points[t]) * math.fsum(field[t]) / 3 for t in triangles)
 
 
 def derivative(function, place, step):

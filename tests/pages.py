@@ -41,9 +41,9 @@ CHARTS = {
 AXES = {"Conductivity": "(m/day)", "Mean velocity": "(m/day)", "Head loss": "(cm)", "Effluents": "(mg/L)",
          "Inlet of the meshed part": "(mg/L)", "Least concentrations": "(mg/L)", "Area of the aggregate": "(um²)",
          "Extent of the aggregate": "(um)"}
-LEDGERS = {f"Ledger: {name}": {label: f"{name}_{part}_pg_per_m" for label, part in
-                               {"supplied": "supplied", "leaving": "out", "taken up": "consumed",
-                                "stored": "stored"}.items()} for name in ("acceptor", "donor")}
+LEDGERS = {f"Ledger: {name}": {"supplied": f"{name}_supplied_pg_per_m", "leaving": f"{name}_out_pg_per_m",
+                               "taken up": f"{name}_consumed_pg_per_m", "stored": f"{name}_stored_pg_per_m"}
+           for name in ("acceptor", "donor")}
 
 
 #: Columns and arrays without a unit.
@@ -69,7 +69,8 @@ class Page(HTMLParser):
     def __init__(self, text):
         super().__init__()
         self.open: list[str] = []
-        self.outside, self.tags, self.texts, self.scripts = [], [], [], []
+        self.outside, self.tags = [], []
+        self.texts, self.scripts = [], []
         self.feed(text)
         self.close()
         assert self.open == []

@@ -21,6 +21,9 @@ from tests.pages import whole_of
 #: A scene of a second or so, with remeshes, and one of several seconds.
 SHORT = ("base", "--set", 'numerics.preset="fast"')
 LONG = ("base", "--set", 'growth.end="4 h"')
+#: What makes base a run of two steps with six rows, most of them within steps.
+BRIEF = ('numerics.preset="fast"', 'growth.end="3 h"',
+         'output.times=["0 h", "0.25 h", "0.5 h", "1 h", "2 h", "3 h"]')
 
 
 def started(*arguments, threads="1", **options) -> subprocess.Popen:

@@ -95,7 +95,8 @@ def scenes(draw, drives=("none", "head", "mean_velocity"), peclet=3.0, thiele=30
     """
     width, step = draw(between(10.0, 150.0)), draw(st.floats(3.0, 20.0))
     length, radius = width * draw(st.floats(4.0, 12.0)), width * draw(st.floats(0.05, 0.95))
-    slowest, rate, decay = draw(between(0.1, 1.0)), draw(between(0.5, 15.0)), draw(between(0.01, 1.0))
+    slowest = draw(between(0.1, 1.0))
+    rate, decay = draw(between(0.5, 15.0)), draw(between(0.01, 1.0))
     both = draw(substrates(slowest)), draw(substrates(slowest))
     slower = min(number(one["diffusivity_in_aggregate"]) * number(one["half_saturation"]) / fastest
                  for one, fastest in zip(both, (1.52 * rate + 1.42 * decay, rate)))

@@ -14,7 +14,7 @@ ROUNDED = 0.11  # of a difference of two places, each rounded to 0.1
 def drawn(chart):
     """Points (n, 2) of the first polyline, in the drawing's units."""
     text = first('<polyline class="line0" points="([^"]*)"', charts.svg(chart).split("</figcaption>")[1])
-    return np.array([[float(one) for one in pair.split(",")] for pair in text.split()])
+    return np.array([pair.split(",") for pair in text.split()], float)
 
 
 def chart(values, times=None, **more):

@@ -44,9 +44,11 @@ def test_the_mesh_is_that_of_the_run(name, overrides):
 def test_the_numbers_of_base_are_those_of_table_1():
     """In SI units, by hand."""
     found, _ = looked_at("base")
-    day, R, W = 86400.0, 5e-6, 50e-6
-    u, D_A, D_D = CLEAN / 3600e6, 2.32e-4 / day, 1.01e-4 / day
-    q_D, X, K = 9.3 / day, 30.0, 1e-3
+    R, W = 5e-6, 50e-6
+    day, u = 86400.0, CLEAN / 3600e6
+    D_A, D_D = 2.32e-4 / day, 1.01e-4 / day
+    X, K = 30.0, 1e-3
+    q_D = 9.3 / day
     q_A = q_D * 1.52 + 1.42 * 0.8 * 0.12 / day
     supplied = u * W * 10 * K
     by_hand = {

@@ -165,6 +165,7 @@ WHOLE = {"f": [lambda a, k=k: k * a for k in (0.0, -1.0, 1e-300, 1.3, 3.0, 100.0
 ONE = {"f": (0.0, 1.0, 1e-300), "b": (False, True), "i": (0, 1, 2)}
 
 
+@pytest.mark.parametrize("kept", ["paper", "fast", pytest.param("cubic", marks=pytest.mark.thorough)], indirect=True)
 def test_what_is_not_refused_is_harmless(kept, tmp_path):
     """Each array spoilt in turn: refused, or the run ends as the untouched one, to 1e-3 (measured: 7e-4, where a mass
     is off by less than the bounds)."""

@@ -56,8 +56,8 @@ def test_what_was_before_the_expansion(order):
     assert grown.space.mesh is last.pore.mesh
     assert grown.time == pytest.approx(instant.pore.time)
     assert grown.mass == pytest.approx(instant.ledgers[-1].biomass_after, rel=1e-12)
-    nodes, now, then = grown.space.reaction.cells, solution.concentrations, last.solved.concentrations
-    assert (now.acceptor[nodes] < then.acceptor[nodes]).all()
+    now, then = (each.concentrations.acceptor[grown.space.reaction.cells] for each in (solution, last.solved))
+    assert (now < then).all()
 
 
 @EVERY_ORDER
@@ -140,7 +140,7 @@ def lost_at_the_inlet(instant):
 def through_contact(order, *changes):
     """From before contact with the opposite wall to after it: the scene and its run."""
     made = load_scene("base", [*sets(order), 'aggregate.radius="17.9 um"', 'pore.width="20 um"', *changes,
-                               'growth.end="0.6 h"', "flow.head=1e-2 cm"])
+                               'growth.end="0.4 h"', "flow.head=1e-2 cm"])
     return made, run(made)
 
 

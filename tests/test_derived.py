@@ -138,8 +138,9 @@ def taken_up(scene, now, state):
 
 
 def derived_row(scene, at):
-    """{column: value} of an instant, and how far from it the row may be."""
-    now, flow, state = at.pore, at.solved.flow, at.solved.concentrations
+    """{column: value} of an instant."""
+    now, flow = at.pore, at.solved.flow
+    state = at.solved.concentrations
     W, L = scene.pore.width, scene.pore.length
     (first, last), u_x = now.mesh.ends, flow.velocity[:, 0]
     flux = over_end(now.space, last, u_x)
@@ -203,8 +204,10 @@ def test_every_column_is_what_its_name_says(order):
 
 def derived_arrays(scene, at):
     """{array: values} of an instant."""
-    now, flow, state = at.pore, at.solved.flow, at.solved.concentrations
-    mesh, body, own = now.mesh, now.body, now.mesh.cells[now.mesh.biomass]
+    now, flow = at.pore, at.solved.flow
+    state = at.solved.concentrations
+    mesh, body = now.mesh, now.body
+    own = mesh.cells[mesh.biomass]
     inside = sorted(set(own.ravel().tolist()))
     def at_nodes(field, order=now.space.order, cells=now.space.cells):
         values, of = np.empty((len(mesh.points), *field.shape[1:])), functions(order, NODES[mesh.geometry])[0]

@@ -154,7 +154,8 @@ def test_one_state_tells_two_scenes_apart_on_one_mesh():
 
 def test_reshaping_to_its_own_outline_changes_nothing_and_to_a_finer_one_hardly_anything():
     """The mesh stays the default's; the flow is that of the other shape: a larger aggregate of the same shape."""
-    default, finer, wide = short(), short("numerics.refinement=0.52"), short('aggregate.radius="15.15 um"')
+    default, finer = short(), short("numerics.refinement=0.52")
+    wide = short('aggregate.radius="15.15 um"')
     own = switches.reshaped(default.pore, default.pore.outline)
     assert np.array_equal(own.mesh.points, default.pore.mesh.points)
     one, two = (each(default, finer) for each in (switches.whole_run, switches.two_meshes))

@@ -22,10 +22,9 @@ from repro.run.folder import LOCK, SUMS, held, prepare
 from repro.run.running import Watch, resume, run
 from repro.scene import load_scene, parse_scene, scene_tables
 from tests.pages import whole_of
-from tests.shell import as_whole, files, refused, resumed, started, told, wait_for
+from tests.shell import BRIEF, as_whole, files, refused, resumed, started, told, wait_for
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="for Linux alone")
-FAST = ('numerics.preset="fast"', 'growth.end="3 h"')
 
 
 def test_two_runs_in_one_folder(tmp_path):
@@ -75,7 +74,8 @@ def spoil(folder):
 
 @pytest.fixture(scope="module")
 def short():
-    return load_scene("base", FAST)
+    """With fields of one kind alone: of its files before_expansion.pvd is none."""
+    return load_scene("base", BRIEF[:2])
 
 
 @pytest.fixture(scope="module")
@@ -193,7 +193,7 @@ def test_no_link_is_written_through(tmp_path):
             with suppress(FileExistsError):
                 (tmp_path / "run" / "fields" / f".part-fields_{k:04d}.vtu").symlink_to(victim)
 
-    assert run(load_scene("base", FAST), tmp_path / "run", watch=Watch(tell=plant, interval=0.0)) == "completed"
+    assert run(load_scene("base", BRIEF), tmp_path / "run", watch=Watch(tell=plant, interval=0.0)) == "completed"
     assert victim.read_text() == "years of work"
     assert not (tmp_path / "run" / "timeseries.csv").is_symlink()
 

@@ -110,9 +110,9 @@ def smooth_transient():
 
 def relative(problem, found, expected):
     """Largest error of C_A, C_D, X_A and X_I, each over its largest value; biomass over its points' weights."""
-    parts = [[*part[:2], *(mass / problem.space.reaction.dx for mass in part[2:])]
-             for part in (parts_of(problem, found), parts_of(problem, expected))]
-    return np.array([np.abs(one - other).max() / np.abs(other).max() for one, other in zip(*parts)])
+    sizes = (1, 1, problem.space.reaction.dx, problem.space.reaction.dx)
+    both = zip(parts_of(problem, found), parts_of(problem, expected), sizes, strict=True)
+    return np.array([np.abs((one - other) / size).max() / np.abs(other / size).max() for one, other, size in both])
 
 
 def defects(done, mass):

@@ -16,8 +16,8 @@ from tests.strategies import meshed
 LINE = np.column_stack([np.arange(9), np.arange(1, 10)])
 #: Of the first kind all pieces of a line, of the second one piece with another far away.
 KINDS = LINE, np.column_stack([LINE[:4], LINE[5:]])
-ELEMENTS = tuple(part @ np.swapaxes(part, 1, 2) + np.eye(part.shape[1]) for part in (
-    np.random.default_rng(3).standard_normal((len(k), k.shape[1], k.shape[1])) for k in KINDS))
+_ROUGH = [np.random.default_rng(3).standard_normal((*kind.shape, kind.shape[1])) for kind in KINDS]
+ELEMENTS = tuple(part @ np.swapaxes(part, 1, 2) + np.eye(part.shape[1]) for part in _ROUGH)
 
 
 def dense():
@@ -34,7 +34,8 @@ def test_kinds_of_elements_make_one_system(held):
     its solutions, of one factorisation, are those of the dense matrix; the same of a system made for other prescribed
     unknowns, which is left as it was."""
     rank, prescribed = np.random.default_rng(len(held)).permutation(10).astype(float), np.isin(np.arange(10), held)
-    fresh, first, K = ElementSystem(KINDS, rank, prescribed), ElementSystem(KINDS, rank, np.arange(10) == 2), dense()
+    fresh, first = (ElementSystem(KINDS, rank, some) for some in (prescribed, np.arange(10) == 2))
+    K = dense()
     before = first.matrix(ELEMENTS).toarray()
     order = [i for i in np.argsort(rank) if i not in held]
     for system in (fresh, first.holding(prescribed)):
@@ -173,7 +174,8 @@ def test_what_a_package_does_is_used_as_it_is_meant(method, package, installed, 
     """It is called, orders are permutations from new to old, and the solution is the same: with a stand-in that does
     what the package says, and with the package where it is installed."""
     made = pytest.importorskip(package) if installed else faults.stand_in_package(monkeypatch, package)
-    matrix, right, grid = saddle(40, 3), np.ones(60), meshed(None, 50.0, 0.6)[0]
+    matrix, right = saddle(40, 3), np.ones(60)
+    grid, _ = meshed(None, 50.0, 0.6)
     assert method.checked() is method
     assert solve(matrix, right, method) == pytest.approx(solve(matrix, right), rel=1e-9, abs=1e-9)
     ours, order = (linear.node_order(len(grid.points), grid.triangles, each) for each in (DEFAULT, method))

@@ -53,8 +53,8 @@ def test_numbers_are_those_of_the_first_and_the_last_row(request, name):
     """As the page's table has them, to four digits."""
     out = request.getfixturevalue(name)
     panel = first("<h2>Numbers</h2>(.*?)</table>", text_of(out))
-    told = {html.unescape(label): values for label, *values in
-            (re.findall("<td.*?>(.*?)</td>", row) for row in re.findall("<tr>(.*?)</tr>", panel)[1:])}
+    lines = [re.findall("<td.*?>(.*?)</td>", row) for row in re.findall("<tr>(.*?)</tr>", panel)[1:]]
+    told = {html.unescape(label): shown for label, *shown in lines}
     series = results.read_table(out / "timeseries.csv")
     times = series.pop("time_h")
     assert re.findall("t = ([^ ]*) h", panel) == [f"{times[k]:.6g}" for k in (0, -1)] and len(times) > 2

@@ -26,6 +26,7 @@ from repro.scene import load_scene
 from tests import faults
 from tests.pages import whole_of
 from tests.shell import (
+    BRIEF,
     LONG,
     as_whole,
     every,
@@ -44,15 +45,18 @@ from tests.shell import (
 CONTACT = ('aggregate.radius="17.98 um"', 'pore.width="20 um"', 'growth.end="0.6 h"')
 SCENES = {
     "paper, unreported steps": ('growth.end="1 h"', 'output.times=["0.3 h", "1 h"]'),
-    "fast": ('numerics.preset="fast"', "numerics.tolerance=0.0005", 'aggregate.radius="25 um"', 'growth.end="3 h"'),
+    "fast": ('numerics.preset="fast"', "numerics.tolerance=0.0005", 'aggregate.radius="25 um"', 'growth.end="3 h"',
+             'output.times=["0.1 h", "0.7 h", "0.8 h", "2 h"]'),
     "fast, rows within steps": ('numerics.preset="fast"', 'growth.end="9.7 h"'),
     "fast, jumps": ('numerics.preset="fast"', 'growth.end="0.8 h"', 'substrates.donor.supply='
-                    '[["0 h", "10 mg/L"], ["0.3 h", "0 mg/L"], ["0.5 h", "20 mg/L"]]'),
+                    '[["0 h", "10 mg/L"], ["0.3 h", "0 mg/L"], ["0.5 h", "20 mg/L"]]',
+                    'output.times=["0.1 h", "0.3 h", "0.4 h", "0.7 h"]'),
     "paper, rows within steps": ('growth.end="0.7 h"', 'output.times=["0.05 h", "0.1 h", "0.4 h", "0.47 h"]'),
     "fast, unreported steps, contact": ('numerics.preset="fast"', "numerics.tolerance=0.0001", *CONTACT,
                                         'output.times=["0.6 h"]'),
     "gear": ('numerics.transport="gear"', 'growth.end="0.4 h"'),
-    "cubic, contact": ('numerics.preset="fast"', 'numerics.elements="cubic"', "numerics.tolerance=0.0005", *CONTACT),
+    "cubic, contact": ('numerics.preset="fast"', 'numerics.elements="cubic"', "numerics.tolerance=0.0005", *CONTACT,
+                       'output.times=["0.05 h", "0.3 h", "0.6 h"]'),
 }
 MORE = {
     "paper": ('growth.end="6 h"',),
@@ -74,9 +78,8 @@ MORE = {
 }
 
 
-SHORT = ('numerics.preset="fast"', 'growth.end="3 h"')
 PORE_END = "the aggregate reaches the pore's upstream end at t = 3 h"
-SCENE = load_scene("base", SHORT)
+SCENE = load_scene("base", BRIEF)
 
 
 def in_parts(scene, folder, count):
@@ -144,7 +147,7 @@ def test_the_end_of_the_pore_is_an_end_after_a_resume_too(tmp_path):
 RECORD = '{"scene": "x", "hash": "x", "tables": {}, "files": ["thesis.tex"], "status": '
 
 
-@pytest.mark.parametrize("arguments", [["run", "--resume"], ["run", "base", *flags(*SHORT), "--force", "--out"]],
+@pytest.mark.parametrize("arguments", [["run", "--resume"], ["run", "base", *flags(*BRIEF), "--force", "--out"]],
                          ids=["go on", "anew"])
 @pytest.mark.parametrize("content, why", [
     (None, "there is no run.json|it holds 'thesis.tex', which is not of a run; a new or empty folder"),
@@ -202,10 +205,10 @@ def test_a_run_that_is_over_and_damaged_is_neither_whole_nor_begun_anew_unasked(
     (out / name).unlink()
     if content is not None:
         (out / name).write_bytes(content)
-    for arguments in (["--resume"], ["base", *flags(*SHORT), "--out"]):
+    for arguments in (["--resume"], ["base", *flags(*BRIEF), "--out"]):
         message = refused(tmp_path, capsys, "run", *arguments, out)
         assert f"{out}: " in message and why in message and "--force with its scene makes the run anew" in message
-    assert main(["run", "base", *flags(*SHORT), "--out", str(out), "--force", "--quiet"]) == 0
+    assert main(["run", "base", *flags(*BRIEF), "--out", str(out), "--force", "--quiet"]) == 0
     assert as_whole(SCENE, out)
 
 
@@ -221,7 +224,7 @@ def test_an_altered_checkpoint_is_refused_and_the_one_before_is_used(tmp_path, c
     assert as_whole(SCENE, out) and told(out)["resumes"][0]["time_h"] > 0
 
 
-@pytest.mark.parametrize("arguments", [["--resume"], ["base", *flags(*SHORT), "--out"]], ids=["resume", "again"])
+@pytest.mark.parametrize("arguments", [["--resume"], ["base", *flags(*BRIEF), "--out"]], ids=["resume", "again"])
 @pytest.mark.parametrize("spoil, times", [(lambda path: path.write_bytes(path.read_bytes()[:1000]), 2), (os.unlink, 0)])
 def test_without_a_good_checkpoint_a_run_starts_again_and_says_so(tmp_path, capsys, spoil, times, arguments):
     """Where both were cut short, and where there is none yet."""
@@ -283,8 +286,7 @@ def test_results_reach_the_disk_while_a_run_goes_on(tmp_path):
             rows = (tmp_path / "run" / "timeseries.csv").read_text().count("\n") - 1
             seen.append((told(tmp_path / "run")["status"], rows, len(list((tmp_path / "run" / "fields").iterdir()))))
 
-    scene = load_scene("base", SCENES["fast"])
-    run(scene, tmp_path / "run", watch=Watch(tell=look, interval=0.0))
+    run(load_scene("base", ["growth.end=1 h"]), tmp_path / "run", watch=Watch(tell=look, interval=0.0))
     assert seen == [("running", count, count) for count in range(1, len(seen) + 1)] and len(seen) > 4
 
 
@@ -344,7 +346,7 @@ def test_killed_again_and_again(tmp_path, seed):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("scene", [["base", *flags(*SHORT)], LONG])
+@pytest.mark.parametrize("scene", [["base", *flags(*BRIEF)], LONG])
 def test_one_thread_or_two(tmp_path, scene):
     """The same bits."""
     for threads in ("1", "2"):

@@ -9,10 +9,9 @@ from repro.run.running import run
 from repro.scene import load_scene
 from tests import faults, pages
 from tests.pages import whole_of
-from tests.shell import as_whole, files, flags, lasting, refused, resumed, state, stopped, told
+from tests.shell import BRIEF, as_whole, files, flags, lasting, refused, resumed, state, stopped, told
 
-FAST = ('numerics.preset="fast"', 'growth.end="3 h"')
-SETS, SCENE = flags(*FAST), load_scene("base", FAST)
+SETS, SCENE = flags(*BRIEF), load_scene("base", BRIEF)
 
 
 def test_a_run_that_is_done_is_left_alone(tmp_path, capsys):
@@ -29,7 +28,7 @@ def test_a_run_that_is_done_is_left_alone(tmp_path, capsys):
 def test_a_run_that_was_interrupted_is_gone_on_with(tmp_path, capsys):
     """From its state, to the bits of the whole run."""
     stopped(SCENE, tmp_path / "run")
-    pages.run(tmp_path, "base", *FAST)
+    pages.run(tmp_path, "base", *BRIEF)
     assert "goes on from t = " in capsys.readouterr().err
     assert as_whole(SCENE, tmp_path / "run")
     assert told(tmp_path / "run")["resumes"][0]["time_h"] > 0
@@ -39,7 +38,7 @@ def test_another_scene_is_refused_with_what_differs(tmp_path, capsys):
     """By key, with both values."""
     out = tmp_path / "run"
     stopped(SCENE, out)
-    message = refused(tmp_path, capsys, "run", "base", *flags(FAST[0], "growth.end=4 h"), "--out", out)
+    message = refused(tmp_path, capsys, "run", "base", *flags(*BRIEF, "growth.end=4 h"), "--out", out)
     assert "growth.end (3.0 h there, now 4.0 h)" in message and "--force" in message
     message = refused(tmp_path, capsys, "run", "flow_only", "--out", out)
     assert "flow.mean_velocity (not set there" in message and "growth (a section there, now not set)" in message
@@ -71,7 +70,7 @@ def test_a_forced_run_removes_what_is_listed_and_nothing_else(tmp_path):
         (out / name).write_bytes(content)
     record = told(out)
     results.write_json(out / "run.json", record | {"files": [*record["files"], "../victim", "link.txt", "notes.txt"]})
-    pages.run(tmp_path, "base", *FAST, options=["--force"])
+    pages.run(tmp_path, "base", *BRIEF, options=["--force"])
     assert (out / "link.txt").is_symlink() and {name: (out / name).read_bytes() for name in mine} == mine
     assert {name: content for name, content in files(out).items() if name not in mine} == files(whole)
     assert lasting(out) | {"origin": None} == lasting(whole) | {"origin": None} and told(out)["resumes"] == []

@@ -115,7 +115,9 @@ def test_mutants_are_caught_survive_or_do_not_end_and_calls_are_seen(tmp_path):
     calls = found.pop("reach")
     assert found == {"sound": ["", ""], "caught": ["tests/test_m.py::test_small", ""], "survivor": ["", ""],
                      "endless": ["", "tests/test_m.py::test_waits"]}
-    names = {id.rpartition("::")[2]: {name for _, name in made} for id, made in calls.items()}
+    names = {}
+    for id, made in calls.items():
+        names[id.rpartition("::")[2]] = {name for _, name in made}
     assert names.keys() == {"test_small", "test_box", "test_waits"}
     assert "small" in names["test_small"] and "Box.twice" not in names["test_small"]
     assert {"Box.twice", "Box.twice.<locals>.<listcomp>"} <= names["test_box"] and "small" not in names["test_box"]

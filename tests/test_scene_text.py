@@ -131,8 +131,7 @@ def test_the_largest_scene_is_accepted_and_so_is_what_is_printed_of_it(tmp_path)
     hours, values = steps * 6.1, 10 * np.exp(-steps)
 
     def written(columns, units):
-        first, second = ([f"{value!r} {unit}" for value in column.tolist()] for column, unit in zip(columns, units))
-        return list(zip(first, second))
+        return [(f"{one!r} {units[0]}", f"{other!r} {units[1]}") for one, other in np.transpose(columns).tolist()]
 
     y[[0, -1]] = 0.0
     supply = written((hours, values), ("h", "mg/L"))

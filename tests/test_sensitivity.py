@@ -164,8 +164,11 @@ def test_a_run_of_another_source_is_computed_anew(tmp_path, monkeypatch):
 def test_sobol_indices_of_a_linear_law():
     """Shares of the variance, e r squared over their sum."""
     slopes = {"velocity": {"k": 3.0, "Y": 3.0, "K_sD": 0.02}, "effluent_acceptor": {"k": 8.0, "Y": 1.0, "K_sD": 0.3}}
-    law = Law(lambda x: {name: 1 + sum(e * (x[key] - 1) for key, e in slopes.get(name, {}).items())
-                         for name in rounding.PRINTED})
+
+    def linear(x, of):
+        return 1 + sum(e * (x[key] - 1) for key, e in of.items())
+
+    law = Law(lambda x: {name: linear(x, slopes.get(name, {})) for name in rounding.PRINTED})
     found = rounding.sobol(law, rounding.elasticities(law, "base"), 64)
     assert set(found["inputs"]) == {"k", "Y", "K_sD"} and set(found["numbers"]) == set(slopes)
     total = dict(zip(found["inputs"], [value for value, *_ in found["numbers"]["velocity"]["total_order"]]))
@@ -179,13 +182,14 @@ def test_a_number_of_samples_is_a_power_of_two(samples, capsys):
 
 
 def test_claims_with_other_supplies_are_told_apart():
+    def holding(supply, values):
+        rows = [claims.at_most(f"wide, {supply} h: {k}", "", value, 1.0, "") for k, value in enumerate(values)]
+        return wide.holding(claims.Finding((claims.at_most("base, 19.2 h", "", 9.0, 1.0, ""), *rows)))
+
     found = {}
     for supply, by_id in (("5", {"C12": [0.0], "C16": [2.0, 0.0], "C25": [2.0]}),
                           ("10", {"C12": [0.5], "C16": [0.0, 0.0], "C25": [3.0]})):
-        checks = {id: [claims.at_most(f"wide, {supply} h: {number}", "", value, 1.0, "")
-                       for number, value in enumerate(values)] for id, values in by_id.items()}
-        others = claims.at_most("base, 19.2 h", "", 9.0, 1.0, "")
-        found[supply] = {"claims": {id: wide.holding(claims.Finding((others, *rows))) for id, rows in checks.items()}}
+        found[supply] = {"claims": {id: holding(supply, values) for id, values in by_id.items()}}
     assert wide.verdicts(found) == (["C12"], ["C16"], ["C25"])
     assert wide.moving(found) == [("C16", "wide, # h: #")]
 

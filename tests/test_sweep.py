@@ -18,7 +18,7 @@ import repro
 from repro import load_scene, results
 from repro.cli import main
 from repro.run import whole
-from repro.sweep import page, pool, server, table
+from repro.sweep import page, pool, server, table, task
 from repro.sweep.design import grid, parse, points
 from repro.sweep.server import Server, ask
 from repro.sweep.state import Sweep
@@ -116,6 +116,16 @@ def test_a_run_that_is_there_is_read_once_to_see_it_and_once_to_tell_it(copied, 
     assert counts == [2, 3, 2], "the second fails again, and is looked for before what is left of it goes"
 
 
+@contextmanager
+def in_this_process(workers):
+    """What makes runs, one after the other and without a server."""
+    def each(points, folder):
+        for point in points:
+            yield point, task.make(point.scene, folder / point.name, folder / f".part-{point.name}")
+
+    yield each
+
+
 def cut_short(run):
     path = run / "timeseries.csv"
     path.write_bytes(path.read_bytes()[:300])
@@ -137,8 +147,9 @@ def unfinished(run):
     lambda run: (run / "timeseries.csv").write_text(""), lambda run: (run / "run.json").unlink(),
     lambda run: results.write_table(run / "timeseries.csv", ["time_h"], [[0.1 * k] for k in range(99)]),
     lambda run: results.write_json(run / "run.json", told(run) | {"status": "sunning"})])
-def test_a_run_that_is_not_whole_is_made_again(copied, capsys, spoil):
+def test_a_run_that_is_not_whole_is_made_again(copied, capsys, monkeypatch, spoil):
     """However its record says that it ended: the tables are those of before."""
+    monkeypatch.setattr(pool, "ready", in_this_process)
     names = [row["folder"] for row in rows(copied / "runs.csv")]
     before = [(copied / name).read_bytes() for name in ("table.csv", f"{names[2]}/timeseries.csv")]
     spoil(copied / names[2])

@@ -244,7 +244,8 @@ def test_beyond_the_old_mesh_no_other_time_s_water_appears(speed, brought):
     x, found = new.mesh.points[:, 0], new.concentrations
     first, last = old.mesh.ends
     assert x.min() < first - 20 and x.max() > last + 20
-    within, before, after = (x > first) & (x < last), x < first - 1e-9, x > last + 1e-9
+    within = (x > first) & (x < last)
+    before, after = x < first - 1e-9, x > last + 1e-9
     both = whole.substrates
     for field, kind, supply, start, slope in ((found.acceptor, both.acceptor, brought, 4, 0.02),
                                               (found.donor, both.donor, 5.0, 3, -0.01)):

@@ -481,8 +481,8 @@ def test_the_pores_end_has_a_row_with_every_step_since_the_last_one(step, preset
     with pytest.raises(PoreEnd) as told_there:
         found.extend(simulation.simulate(load_scene("base", changes)))
     last = found[-1]
-    starts, ends = ([getattr(each, name) for each in last.ledgers] for name in ("start", "end"))
-    assert len(found) == 3 and [0.0, *ends] == [*starts, last.pore.time]
+    starts = [each.start for each in last.ledgers]
+    assert len(found) == 3 and [0.0, *(each.end for each in last.ledgers)] == [*starts, last.pore.time]
     assert f"t = {last.pore.time:g} h" in str(told_there.value)
 
 
@@ -531,8 +531,8 @@ def test_a_tick_has_the_number_of_its_place(low, high, parts):
 
 def test_frames_before_an_expansion_are_not_counted_as_times():
     grid = Grid(np.zeros((3, 3)), [Cells("triangle", np.array([[0, 1, 2]]))])
-    after, before = ([(float(k), Path(f"{name}{k}")) for k in range(50)] for name in ("after", "before"))
-    chosen = fields._chosen(after, dict(before), grid, 10**9)
+    after = [(float(k), Path(f"after{k}")) for k in range(50)]
+    chosen = fields._chosen(after, {time: Path("before") for time, _ in after}, grid, 10**9)
     assert [note for *_, note in chosen] == [fields.BEFORE, ""] * fields.MOST_FRAMES
     frames = [{"note": note} if note else {} for *_, note in chosen]
     said = run_page._field_note({"meshes": [{"per": 3}], "nodes": 3, "frames": frames, "of": 50, "fields": []})
@@ -576,8 +576,8 @@ def test_a_run_without_a_row_says_what_its_folder_does_before_and_after_it_was_m
     point = swept.points[0]
     (swept.runs / point.name).mkdir(parents=True)
     running.Recorder(point.scene, swept.runs / point.name).save("failed: x")
-    said = [[one.status for one in table.tell(swept, ended, 0.1)] for ended in ({}, {1: "failed: y", 2: "failed: z"})]
-    assert said == [["failed: x", "not run", "not run"], ["failed: x", "failed: z", "not run"]]
+    for ended, second in (({}, "not run"), ({1: "failed: y", 2: "failed: z"}, "failed: z")):
+        assert [one.status for one in table.tell(swept, ended, 0.1)] == ["failed: x", second, "not run"]
 
 
 def test_marks_of_the_page_have_the_colour_that_the_key_below_them_names(tmp_path):

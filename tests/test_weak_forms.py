@@ -403,7 +403,8 @@ def test_the_operator_of_both_substrates(of, space, order, inlet):
     """Diffusion, slower in the aggregate, and what any velocity carries in the form that conserves, with the supply and
     what flows in and out, with either speed at the inlet (11)."""
     random = np.random.default_rng(order)
-    nodes, n, given = of.nodes(space), space.count, carrying(1e6 * random.standard_normal((space.count, 2)))
+    nodes, n = of.nodes(space), space.count
+    given = carrying(1e6 * random.standard_normal((n, 2)))
     problem = transport.problem(space, given, SCENE.substrates, SCENE.kinetics, inlet)
     u_x, u_y = (of.field(part, nodes) for part in given.velocity.T)
     first, last = (on_end(of, order, x) for x in of.ours.ends)
