@@ -152,6 +152,15 @@ def test_warnings_are_exactly_where_a_simplification_fails(key, common, inside, 
     assert key not in without and told - without == {key}
 
 
+@pytest.mark.parametrize("position", [-90.0, 60.0])
+def test_a_seed_off_the_middle_reaches_as_much_farther(position):
+    """At the start and at the end: pore.length is warned of by both."""
+    middle, aside = (load_scene("base", [f"aggregate.position={x} um"]) for x in (0.0, position))
+    for sizes in (numbers.at_start, numbers.at_end):
+        assert sizes(aside).reach == pytest.approx(sizes(middle).reach + abs(position), rel=1e-12)
+        assert sizes(aside).area == pytest.approx(sizes(middle).area, rel=1e-12)
+
+
 @pytest.mark.parametrize("preset, least, most", [("paper", 1.0, 1.0), ("fast", 0.5, 2.0)])
 def test_the_steps_that_are_expected(preset, least, most):
     scene = load_scene("base", [f"numerics.preset={preset}", *(['growth.end="2 h"'] if preset == "paper" else [])])

@@ -8,6 +8,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from matplotlib.collections import QuadMesh
+from matplotlib.patches import Polygon
 
 import paper_figures
 from paper_figures import __main__ as figures
@@ -162,6 +164,71 @@ def test_the_captions_read_the_run(short, tmp_path):
     assert "9.87 m/d" in figure_5.caption(folder) and "9.87 m/d" not in figure_5.caption(short["base"])
     with pytest.raises(LookupError, match="0.5 h"):
         states.row(folder, 0.5)
+
+
+@pytest.mark.parametrize("name", ["figure_5", "plate_1"])
+def test_the_shape_that_is_drawn_is_that_before_the_expansion(short, name):
+    """As the caption says, in every panel."""
+    wanted, made = states.last(short["base"], "before_expansion").rim, MODULES[name].draw(short["base"])
+    panels = [axes for axes in made.axes if axes.get_title(loc="left") or name == "figure_5" and axes is made.axes[0]]
+    shapes = [[patch.get_xy()[:-1] for patch in axes.patches if isinstance(patch, Polygon)] for axes in panels]
+    assert len(panels) == (1 if name == "figure_5" else 4)
+    for (drawn,) in shapes:
+        assert np.array_equal(drawn, wanted)
+
+
+def test_the_colours_of_plate_1_are_in_the_units_of_their_labels(short):
+    """From the least to the largest value of what is drawn."""
+    plate_1, state = MODULES["plate_1"], states.last(short["base"], "before_expansion")
+    made = plate_1.draw(short["base"])
+    bars = {axes.get_xlabel(): axes.get_xlim() for axes in made.axes if axes.get_xlabel() != style.X_LABEL}
+    inert, active = (plate_1.since(short["base"], f"{kind}_biomass")[state.body] for kind in ("inert", "active"))
+    wanted = {"$C_A$ (mg/L)": state.nodes["acceptor_mg_per_L"], "$C_D$ (mg/L)": state.nodes["donor_mg_per_L"],
+              "$X_A / X_m$ (–)": active, "$X_I / X_m$ (10$^{-3}$)": 1000 * inert}
+    assert bars.keys() == wanted.keys()
+    for label, values in wanted.items():
+        assert bars[label] == pytest.approx((values.min(), values.max()), rel=1e-9), label
+
+
+def test_a_curve_is_what_the_legends_call_it(short):
+    """By the colour of its run and the line of its substrate."""
+    module, folders = MODULES["time_series"], {"Base": short["base"], "Wide": short["wide"]}
+    panels = module.draw(*folders.values()).axes
+    runs_, names = ([(line, text.get_text()) for line, text in zip(panels[k].get_legend().get_lines(),
+                                                                   panels[k].get_legend().get_texts())] for k in (0, 2))
+    tables = {line.get_color(): states.series(folders[text]) for line, text in runs_}
+    kinds = {line.get_linestyle(): text for line, text in names}
+    assert kinds.keys() == {"-", "--"} and len(tables) == 2
+    for axes, (column, *_) in zip(panels, module.CURVES, strict=True):
+        assert len(axes.lines) == (4 if "{}" in column else 2)
+        for line in axes.lines:
+            table = tables[line.get_color()]
+            assert np.array_equal(line.get_xdata(), table["time_h"])
+            assert np.array_equal(line.get_ydata(), table[column.format(kinds[line.get_linestyle()])])
+
+
+def test_rates_are_drawn_between_the_rows_that_they_are_of(short):
+    """And flow and uptake at the rows."""
+    head, table = MODULES["discussion_head"], states.series(short["base"])
+    panels = head.draw(short["base"], short["wide"]).axes
+    (panel,) = (axes for axes in panels if "over the largest" in axes.get_title("left"))
+    hours = {line.get_label(): line.get_xdata() for line in panel.lines}
+    assert hours["growth rate of the area"] == pytest.approx((table["time_h"][1:] + table["time_h"][:-1]) / 2)
+    for name in ("velocity", "acceptor taken up"):
+        assert np.array_equal(hours[name], table["time_h"])
+
+
+def test_the_colours_of_outlines_are_those_beside_their_times(short):
+    """Each in the middle of its part of the scale."""
+    made = style.figure(2.75)
+    figure_6.outlines(made.subplots(), short["wide"], 0.2)
+    axes, bar = made.axes
+    shapes = [patch for patch in axes.patches if isinstance(patch, Polygon)]
+    (scale,) = (part for part in bar.collections if isinstance(part, QuadMesh))
+    edges = np.linspace(*bar.get_xlim(), len(shapes) + 1)
+    assert bar.get_xticks() == pytest.approx((edges[1:] + edges[:-1]) / 2)
+    beside = scale.to_rgba(scale.get_array().ravel())
+    assert np.array([patch.get_facecolor() for patch in reversed(shapes)]) == pytest.approx(beside)
 
 
 def test_most_of_the_flow_goes_around_the_aggregate(short):

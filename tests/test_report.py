@@ -283,6 +283,19 @@ def test_a_page_of_a_fine_mesh_is_small_and_true(tmp_path, monkeypatch, kind, co
     assert ((numbers(mesh["body"], "<u1") == 1) == (away < 20))[np.abs(away - 20) > 1].all()
 
 
+def test_each_frame_has_the_aggregate_of_its_own_time(tmp_path):
+    """Though all have the same triangles, as on the page's own grid."""
+    points = np.array([[0, 0, 0], [3, 0, 0], [0, 2, 0], [3, 2, 0]], float)
+    regions, entries = [[1, 0], [1, 1], [0, 1], [1, 0]], []
+    for k, region in enumerate(regions):
+        entries.append((float(k), tmp_path / f"{k}.vtu"))
+        vtu.write(entries[-1][1], Grid(points, [Cells("triangle", np.array([[0, 1, 2], [1, 3, 2]]))],
+                                       cell_data={"region": [np.array(region, float)]}))
+    packed = fields.packed(entries)
+    bodies = [numbers(packed["meshes"][frame["mesh"]]["body"], "<u1").tolist() for frame in packed["frames"]]
+    assert bodies == regions and len(packed["meshes"]) == 3
+
+
 def test_a_page_of_many_rows_and_frames_is_small(fast, tmp_path, monkeypatch):
     """A thousand rows and steps of forty meshes that are shown as they are: 3 MB at most with its charts, which
     take a third."""

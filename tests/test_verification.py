@@ -51,7 +51,8 @@ def test_a_case_passes_only_if_it_measures_something_and_all_of_it_holds():
 @pytest.mark.parametrize("errors, ceiling, holds", [
     (SIZES**2.2, 1, True), (SIZES**1.8, 1, True), (SIZES**1.6, 1, False), (SIZES**2.4, 1, False),
     (SIZES**2 * [1, 1, 4, 1], 1, False), (SIZES**2, 0.02, True), (SIZES**2, 0.01, False),
-    ([1, 0.25, 0.0625, math.nan], 1, False), ([1, 0.25, 0.0625, 0.0], 1, False)])
+    *((np.where(np.arange(4) == k, wrong, SIZES**2), 1, False)
+      for k in range(4) for wrong in (math.nan, math.inf, 0.0, -1.0))])
 def test_a_wrong_order_is_caught_on_both_sides(errors, ceiling, holds):
     """One bad pair is enough, and a last error that is too large."""
     assert study("error", SIZES, errors, 2, "", ceiling=ceiling).holds is holds
