@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from matplotlib.collections import QuadMesh
 from matplotlib.patches import Polygon
+from matplotlib.quiver import Quiver
 
 import paper_figures
 from paper_figures import __main__ as figures
 from paper_figures import claims, overview, page, runs, states, style
-from repro import cli, load_scene, run
+from repro import cli, load_scene, results, run
 from repro.fem.outline import TOP, polygon_area
 from repro.scene import scene_hash
 from verification.claims.base_run import upstream_means
@@ -205,6 +206,79 @@ def test_a_curve_is_what_the_legends_call_it(short):
             table = tables[line.get_color()]
             assert np.array_equal(line.get_xdata(), table["time_h"])
             assert np.array_equal(line.get_ydata(), table[column.format(kinds[line.get_linestyle()])])
+
+
+@pytest.fixture
+def unlike(monkeypatch):
+    """Tables of runs that differ in every number, the first of which touch the opposite wall in their second row."""
+    tables = {}
+    for k in range(7):
+        hours = np.linspace(0.0, 50.0 + k, 5 + k)
+        columns = {name: (2.0 + k + j) * np.exp(-hours / (20.0 + 3 * k + j)) for j, name in enumerate(results.COLUMNS)}
+        tables[Path(f"run {k}")] = columns | {"time_h": hours, "contact": 1.0 * (np.arange(len(hours)) > 0) * (k < 2)}
+    monkeypatch.setattr(states, "series", tables.__getitem__)
+    return tables
+
+
+def test_each_run_has_its_own_curve_in_every_discussion(unlike):
+    """In its colour and by its name: conductivities of runs that are laid over each other."""
+    permeable, rheology, head = (MODULES[f"discussion_{name}"] for name in ("permeable", "rheology", "head"))
+    folders, made = list(unlike), style.figure(3).subplots(2)
+    alone, ratios = permeable.draw(*folders[:3]).axes
+    rheology._conductivity(made[0], folders)
+    for panel, module in ((alone, permeable), (made[0], rheology)):
+        lines = panel.lines[:len(module.LABELS)]
+        assert [line.get_label() for line in lines] == list(module.LABELS)
+        assert len({line.get_color() for line in lines}) == len(lines)
+        for line, folder in zip(lines, folders):
+            wanted = [unlike[folder][name] for name in ("time_h", "conductivity_m_per_d")]
+            assert np.array_equal(line.get_xydata().T, wanted)
+    looks = [(line.get_color(), line.get_linestyle()) for line in alone.lines[:3]]
+    assert looks == [(style.BLACK, "-"), (style.RED, "-"), (style.BLUE, "--")]  # as the caption says
+    first = unlike[folders[0]]
+    for line, folder in zip(ratios.lines, folders[:3]):
+        now = unlike[folder]
+        told = np.interp(now["time_h"], first["time_h"], np.log(first["conductivity_m_per_d"]))
+        assert np.log(line.get_ydata()) == pytest.approx(np.log(now["conductivity_m_per_d"]) - told)
+    head._fall(made[1], *folders[:2])
+    curves, marks = made[1].lines[::2], made[1].lines[1::2]
+    for curve, mark, folder, name in zip(curves, marks, folders, ("Base (head)", "Wide (velocity)")):
+        now = unlike[folder]
+        assert curve.get_label() == name and curve.get_color() == mark.get_color()
+        assert curve.get_ydata() == pytest.approx(now["conductivity_m_per_d"] / now["conductivity_m_per_d"][0])
+        assert np.array_equal(curve.get_xdata(), now["time_h"]) and mark.get_xdata()[0] == now["time_h"][1]
+
+
+def test_captions_tell_each_run_of_its_own(unlike):
+    """Falls, last values, and times of contact."""
+    folders = list(unlike)
+    last = [unlike[folder]["conductivity_m_per_d"][-1] for folder in folders]
+    falls = [unlike[folder]["conductivity_m_per_d"][0] / end for folder, end in zip(folders, last)]
+    touch = [unlike[folder]["time_h"][1] for folder in folders]
+    said = MODULES["time_series"].caption(*folders[:2])
+    assert f"factor of {falls[0]:.3g} in Base and {falls[1]:.3g} in Wide" in said
+    assert "to 50 h) and Wide" in said and "to 51 h)" in said and f"{touch[0]:g} h and {touch[1]:g} h." in said
+    rheology = MODULES["discussion_rheology"]
+    for label, folder, end, hours in zip(rheology.LABELS, folders, last, touch):
+        hours = hours if unlike[folder]["contact"].any() else np.inf
+        assert f"{label}: {hours:g} h and {end:.3g} m/d" in rheology.caption(*folders)
+    permeable, table = MODULES["discussion_permeable"], unlike[folders[2]]
+    for hours in permeable.MOMENTS:
+        told = np.exp(np.interp(hours, table["time_h"], np.log(table["conductivity_m_per_d"])))
+        assert f", {told:.3g} m/d at {hours:g} h" in permeable.caption(*folders[:3])
+
+
+def test_plate_2_goes_from_the_dashed_shape_to_the_full_one_by_its_arrows(short):
+    """LENGTHENED times as long as what the nodes move by, in both panels."""
+    before, after = states.last(short["base"], "before_expansion"), states.last(short["base"])
+    for axes in plate_2.draw(short["base"]).axes[:2]:
+        rims = [patch for patch in axes.patches if isinstance(patch, Polygon)]
+        shapes = {patch.get_linestyle() == "--": patch.get_xy()[:-1] for patch in rims}
+        assert np.array_equal(shapes[True], before.rim) and np.array_equal(shapes[False], after.rim)
+        (arrows,) = (part for part in axes.collections if isinstance(part, Quiver))
+        assert np.array_equal(arrows.get_offsets(), before.points) and arrows.scale == 1 and arrows.scale_units == "xy"
+        moved = plate_2.LENGTHENED * (after.points - before.points)
+        assert np.column_stack([arrows.U, arrows.V]) == pytest.approx(moved)
 
 
 def test_rates_are_drawn_between_the_rows_that_they_are_of(short):
