@@ -202,9 +202,12 @@ def test_every_quick_case_passes():
     assert "report:" not in done.stdout and " cases pass; " in done.stdout
 
 
+GOOD, BAD = (result(at_most("q", value, 1.0, "")) for value in (0.5, 2.0))
+
+
 @pytest.mark.parametrize("results, status, told", [
-    ([result(at_most("q", 0.5, 1.0, ""))], 0, "1 of 1"), ([result(at_most("q", 2.0, 1.0, ""))], 1, "0 of 1"),
-    ([], 1, "0 of 0")])
+    ([GOOD], 0, "1 of 1"), ([BAD], 1, "0 of 1"), ([], 1, "0 of 0"), ([GOOD, BAD], 1, "1 of 2"),
+    ([BAD, GOOD], 1, "1 of 2"), ([GOOD, GOOD], 0, "2 of 2")])
 def test_the_exit_status_is_the_verdict(monkeypatch, capsys, results, status, told):
     monkeypatch.setattr(driver, "run_all", lambda ids, jobs: results)
     assert driver.main(["flow"]) == status and f"{told} cases pass" in capsys.readouterr().out
