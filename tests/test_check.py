@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from repro.check import cost, numbers, simplifications
+from repro.check import checked, cost, numbers, simplifications
 from repro.check.checked import check
 from repro.check.modelled import modelled
 from repro.cli import main
@@ -233,6 +233,24 @@ def test_what_is_modelled_follows_the_sections():
     assert "as a whole" in bare["pore"] and "(9)-(10)" in bare["kinetics"]
     gear = dict(modelled(load_scene("base", ["numerics.transport=gear", "growth.new_biomass=stress_free"])))
     assert "Gear" in gear["substrates"] and "without stress" in gear["growth"]
+
+
+def test_what_is_modelled_has_the_numbers_of_the_scene():
+    """In the units that they are told in."""
+    words = dict(modelled(load_scene("base", ["pore.width=44 um", "aggregate.radius=7 um", "aggregate.position=-40 um",
+                                              "aggregate.inert_fraction=0.3", "growth.time_step=0.35 h"])))
+    assert words["pore"].startswith("a channel 44 um wide and 600 um long")
+    assert "radius 7 um on the lower wall at x = -40 um; 30 % of it inert at t = 0" in words["aggregate"]
+    assert "a shape update every 21 min" in words["numerics"]
+    for smooth, how in (("true", "a spline through"), ("false", "straight lines between")):
+        outline = f'aggregate={{outline=[["-5 um", "0 um"], ["1 um", "9 um"], ["6 um", "0 um"]], smooth={smooth}}}'
+        assert dict(modelled(load_scene("base", [outline])))["aggregate"].startswith(f"biomass inside {how} 3 points")
+
+
+@pytest.mark.parametrize("seconds, said", [(0.123, "0.12 s"), (45.3, "45 s"), (130.0, "2 min"), (7100.0, "118 min"),
+                                           (7300.0, "2 h"), (90000.0, "25 h")])
+def test_what_a_run_takes_is_told_in_a_unit_that_suits(seconds, said):
+    assert checked._seconds(seconds) == said
 
 
 def test_the_report_and_its_exit_status(capsys):

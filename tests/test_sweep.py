@@ -10,6 +10,7 @@ import subprocess
 import sys
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -259,6 +260,14 @@ def test_a_line_of_the_page_is_the_course_of_its_run(tmp_path):
         places = np.array([pair.split(",") for pair in drawn.split()], float)
         assert x * places[:, 0] + x0 == pytest.approx(one.biomass, abs=0.002)
         assert y * (places[:, 1] + 4) + y0 == pytest.approx(one.relative, abs=0.005)
+
+
+def test_a_key_of_many_values_has_a_value_of_each_colour():
+    """The first and the last among them."""
+    factor = parse("pore.width=" + ", ".join(f"{width} um" for width in range(40, 71)))
+    told = [SimpleNamespace(point=SimpleNamespace(values=(width,))) for width in reversed(factor.values)]
+    entries = re.findall(r'class="line level(.)"/></svg>([^<]*)</li>', page._key(factor, told, 0))
+    assert entries == [(str(level), f"{40 + 5 * level} um") for level in range(7)]
 
 
 def test_lines_of_clogging_times_join_runs_that_differ_in_one_key_alone(tmp_path):
