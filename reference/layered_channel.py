@@ -12,19 +12,19 @@ Equal at h: s (h/lambda + W - h) = G (h^2/lambda + W^2 - h^2) / 2. The mean velo
 import numpy as np
 
 
-def _stress(width, layer, ratio):
+def stress(width, layer, ratio):
     """s / G, the stress on the lower wall."""
     return 0.5 * (layer**2 / ratio + width**2 - layer**2) / (layer / ratio + width - layer)
 
 
 def _unit_velocity(y, width, layer, ratio):
-    s = _stress(width, layer, ratio)
+    s = stress(width, layer, ratio)
     return np.where(y < layer, (s * y - y**2 / 2) / ratio, (width**2 - y**2) / 2 - s * (width - y))
 
 
 def gradient(width, layer, ratio):
     """G = -dphi/dx (times g/nu) for a mean velocity of one."""
-    s, gap = _stress(width, layer, ratio), width - layer
+    s, gap = stress(width, layer, ratio), width - layer
     lower = (s * layer**2 / 2 - layer**3 / 6) / ratio
     upper = (width**2 * gap - (width**3 - layer**3) / 3) / 2 - s * gap**2 / 2
     return width / (lower + upper)

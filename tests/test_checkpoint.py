@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from repro import results
 from repro.errors import CheckpointError
-from repro.march.loop import State
+from repro.march.loop import SAME_TIME, State
 from repro.march.simulation import steps
 from repro.run import checkpoint, stored
 from repro.run.checkpoint import NEWEST, PREVIOUS, decoded, encoded
@@ -412,3 +412,13 @@ def test_states_of_clean_channels_are_kept():
         ((state, _),) = steps(scene)
         plain, arrays = stored.packed(scene, state)
         assert stored.packed(scene, stored.unpacked(scene, plain, arrays))[0] == plain
+
+
+def test_a_state_that_is_the_runs_end_to_round_off_is_kept():
+    """A step that ends less than SAME_TIME after growth.end is not cut there."""
+    long = load_scene("base", ["numerics.preset=fast", "growth.end=5 h"])
+    time = next(state.pore.time for state, _ in steps(long) if state.pore.time > 0)
+    short = load_scene("base", ["numerics.preset=fast", f"growth.end={time - 0.5 * SAME_TIME!r} h"])
+    *_, (last, _) = steps(short)
+    assert 0 < last.pore.time - short.growth.end < SAME_TIME
+    assert stored.unpacked(short, *stored.packed(short, last)).pore.time == last.pore.time

@@ -14,6 +14,8 @@ import pytest
 from repro import results
 from repro.cli import main
 from repro.errors import OutputError
+from repro.results import files as written
+from repro.results import vtu
 from repro.run import checkpoint
 from repro.run.checkpoint import LAST, NEWEST, PREVIOUS
 from repro.run.folder import LOCK, SUMS, held, prepare
@@ -169,8 +171,8 @@ def test_a_page_that_cannot_be_made_is_told(tmp_path, capsys):
 
 def test_what_a_killed_run_was_writing_is_removed(out, short):
     """What is in such a folder and no run's stays."""
-    for part in (f".writing-abcdefgh/{NEWEST}", ".writing-01234567/.timeseries.csv.part",
-                 "fields/.writing-_1234567/.part-fields_0001.vtu", ".writing-thesis00/thesis.tex"):
+    for part in (f".writing-abcdefgh/{NEWEST}", ".writing-01234567/timeseries.csv",
+                 "fields/.writing-_1234567/fields_0001.vtu", ".writing-thesis00/thesis.tex"):
         (out / part).parent.mkdir()
         (out / part).write_text("half")
     assert resume(out) == "completed"
@@ -217,9 +219,9 @@ def full(*_):
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
-@pytest.mark.parametrize("module, name, file", [(results, "write_fields", r"fields/fields_\d{4}\.vtu"),
+@pytest.mark.parametrize("module, name, file", [(vtu, "write", r"fields/fields_\d{4}\.vtu"),
                                                 (results, "write_table", "timeseries.csv"),
-                                                (results.os, "replace", r"fields/fields_\d{4}\.vtu"),
+                                                (written.os, "replace", r"fields/fields_\d{4}\.vtu"),
                                                 (checkpoint.os, "fsync", r"fields/fields_\d{4}\.vtu"),
                                                 (checkpoint, "write", NEWEST)])
 def test_no_space_is_told_with_the_file_and_nothing_is_lost(short, tmp_path, monkeypatch, module, name, file):

@@ -7,6 +7,7 @@ import xarray
 
 from repro import results
 from repro.results import netcdf
+from repro.results.files import whole
 from repro.scene import load_scene, rules, scene_hash, scene_tables
 from tests.pages import run
 from tests.shell import flags, refused
@@ -69,8 +70,8 @@ def test_it_is_whole_or_not_there(tmp_path, monkeypatch):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(xarray.Dataset, "to_netcdf", full)
-    with pytest.raises(OSError, match="No space"):
-        netcdf.write(target, load_scene("base"), [])
+    with pytest.raises(OSError, match="No space"), whole(target) as beside:
+        netcdf.write(beside, load_scene("base"), [])
     assert target.read_text() == "earlier" and list(tmp_path.iterdir()) == [target]
 
 

@@ -22,8 +22,8 @@ from repro.model import growth
 from repro.run import running
 from repro.run.checkpoint import NEWEST, PREVIOUS
 from repro.run.running import Watch, resume, run
+from repro.run.whole import lacking
 from repro.scene import load_scene
-from repro.sweep import task
 from tests import faults
 from tests.pages import whole_of
 from tests.shell import (
@@ -178,7 +178,7 @@ def test_a_status_that_no_run_writes_is_none(tmp_path, capsys, status):
     results.write_json(tmp_path / "run.json", told(tmp_path) | {"status": status})
     message = refused(tmp_path, capsys, "run", "--resume", tmp_path)
     assert f"its status {status!r} is none that a run writes" in message
-    assert not task.finished(tmp_path, load_scene("flow_only"))
+    assert "run.json tells of a run of another scene, or has no status" in lacking(tmp_path, load_scene("flow_only"))
 
 
 @pytest.mark.parametrize("status", ["completed", PORE_END, PORE_END.replace("at t", "in the step from t")])

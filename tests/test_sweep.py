@@ -18,6 +18,7 @@ import pytest
 import repro
 from repro import load_scene, results
 from repro.cli import main
+from repro.run import whole
 from repro.run.machine import THREADS
 from repro.sweep import page, pool, server, table
 from repro.sweep.design import grid, parse, points
@@ -103,6 +104,18 @@ def test_the_same_command_makes_what_is_missing_and_nothing_else(copied, capsys)
     out, err = capsys.readouterr()
     assert "2 of 3 runs done, 1 failed" in out and "run 2 (flow.mean_velocity = 1e-12 m/day): failed" in err
     assert "run 1, flow.mean_velocity = 2.9 m/day: completed" in err and "run 3, " not in err
+
+
+def test_a_run_that_is_there_is_read_once_to_see_it_and_once_to_tell_it(copied, monkeypatch):
+    """Whatever attempts at another one have left behind."""
+    folders = []
+    read = whole.read
+    monkeypatch.setattr(whole, "read", lambda folder: folders.append(folder) or read(folder))
+    second = rows(copied / "runs.csv")[1]["folder"]
+    (copied / "runs" / f".part-{Path(second).name}-attempt").mkdir()
+    assert sweep(copied, *VARY, *SHORT) == 3
+    counts = [folders.count(copied / row["folder"]) for row in rows(copied / "runs.csv")]
+    assert counts == [2, 3, 2], "the second fails again, and is looked for before what is left of it goes"
 
 
 def cut_short(run):

@@ -27,7 +27,7 @@ from repro.model import biomass, contact, gear, mesh_motion, remeshing, traction
 from repro.model.pore import Solved, resolution, seeded, solve
 from repro.report import charts, comparison, fields, quantities, run_page
 from repro.report.reading import Run
-from repro.results import picture
+from repro.results import picture, vtu
 from repro.results.tables import Results
 from repro.results.vtu import Cells, Grid
 from repro.run import progress, running
@@ -113,7 +113,7 @@ def test_times_of_fields_keep_every_digit(tmp_path):
     results.write_index(tmp_path / "fields.pvd", [(100 / 3, "b.vtu")])
     (entry,) = ElementTree.parse(tmp_path / "fields.pvd").iter("DataSet")
     scene, now = base(1)
-    results.write_fields(tmp_path / "b.vtu", results.fields(scene, replace(now, time=100 / 3), NOTHING))
+    vtu.write(tmp_path / "b.vtu", results.fields(scene, replace(now, time=100 / 3), NOTHING))
     (told_there,) = ElementTree.parse(tmp_path / "b.vtu").findall(".//FieldData/DataArray")
     assert float(entry.get("timestep")) == float(told_there.text) == 100 / 3
 

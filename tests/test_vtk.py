@@ -25,7 +25,7 @@ def written(order, tmp_path):
     """A late pore with elements of an order, its fields, and the file that they were written to."""
     scene, at = late(order)
     content = results.fields(scene, at.pore, at.solved)
-    results.write_fields(tmp_path / "fields.vtu", content)
+    vtu.write(tmp_path / "fields.vtu", content)
     return at.pore, content, tmp_path / "fields.vtu"
 
 

@@ -179,6 +179,10 @@ def _grown(scene: Scene, speed: float | None) -> Iterator[Number]:
     yield Number("transport over growth time",
                  fastest_growth(scene) * across**2 / slowest(scene), None,
                  f"(l^2 / D) F3 / X_A, {length}")
+    if speed:
+        passed = scene.pore.length / speed
+        yield Number("transit over growth time", fastest_growth(scene) * passed, None,
+                     "(L / u) F3 / X_A")
     if speed is not None:
         yield Number("fluid stress over modulus", *stresses(scene, speed),
                      "shear 6 rho nu u / W at t = 0; at the end the pressure drop over the "

@@ -112,7 +112,8 @@ def followed(scene: Scene, now: Pore, expanded: Pore) -> Mesh | None:
 def remesh(scene: Scene, now: Pore, expanded: Pore, speed: float,
            others: Amounts = ()) -> tuple[Pore, Amounts]:
     """The pore on a new mesh around the aggregate, with the extent of 3.1; fields, places at t = 0
-    and other amounts (r, q) of the same material are carried over.
+    and other amounts (r, q) of the same material are carried over. speed: mean velocity (um/h),
+    zero where nothing flows, and the whole pore is meshed, or substrates are a guess alone.
 
     theta restarts as J times the density over X_m: the expansion that brings each density back to
     X_m, so that the error of the constraint is worked off at the next update and does not

@@ -6,7 +6,7 @@
     names         words and units of all of them, by name
     tables, netcdf   from Python; the time series as NetCDF
 
-Every file appears whole or not at all: it is written beside its place and moved there. What a scene
+Who writes one has it appear whole or not at all by :func:`repro.results.files.whole`. What a scene
 does not model is an empty field.
 """
 
@@ -16,7 +16,6 @@ import csv
 import io
 import json
 import math
-import os
 import platform
 from contextlib import suppress
 from functools import cache
@@ -26,11 +25,9 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from repro.results import vtu
 from repro.results.arrays import fields
 from repro.results.columns import COLUMNS, LEDGER_COLUMNS, ledger_row, row
 from repro.results.quantities import UNITS
-from repro.results.vtu import Grid
 from repro.scene import Scene, scene_hash, scene_tables
 
 __all__ = ["COLUMNS", "LEDGER_COLUMNS", "fields", "ledger_row", "row"]
@@ -41,23 +38,8 @@ PACKAGES = ("numpy", "scipy", "scikit-fem", "meshio", "mmgpy", "shapely", "pint"
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a file whole or not at all."""
-    beside = path.with_name(f".{path.name}.part")
-    try:
-        beside.write_text(text, encoding="utf-8", newline="")
-        os.replace(beside, path)
-    finally:
-        beside.unlink(missing_ok=True)
-
-
-def write_fields(path: Path, content: Grid) -> None:
-    """Write a ``.vtu`` file, with its time, whole or not at all."""
-    beside = path.with_name(f".part-{path.name}")
-    try:
-        vtu.write(beside, content)
-        os.replace(beside, path)
-    finally:
-        beside.unlink(missing_ok=True)
+    """Write a file, its lines as they are."""
+    path.write_text(text, encoding="utf-8", newline="")
 
 
 def write_index(path: Path, entries: list[tuple[float, str]]) -> None:

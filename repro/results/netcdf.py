@@ -7,7 +7,6 @@ without the "since ..." of a CF time axis, which would have to invent one.
 from __future__ import annotations
 
 import json
-import os
 from importlib import import_module
 from pathlib import Path
 
@@ -23,7 +22,7 @@ TIME = "time_h"
 
 
 def write(path: Path, scene: Scene, rows: list[list]) -> None:
-    """Write ``rows`` of ``results.COLUMNS``, whole or not at all; what is not modelled is NaN."""
+    """Write ``rows`` of ``results.COLUMNS``; what is not modelled is NaN."""
     xarray = import_module(PACKAGE)
     table = np.array(rows, dtype=float)  # None becomes NaN
     columns = dict(zip(results.COLUMNS, table.reshape(len(rows), len(results.COLUMNS)).T))
@@ -31,12 +30,7 @@ def write(path: Path, scene: Scene, rows: list[list]) -> None:
     times = {TIME: variables.pop(TIME)}
     content = xarray.Dataset(variables, times, _provenance(scene))
     encoding = {name: {"_FillValue": None if name == TIME else np.nan} for name in columns}
-    beside = path.with_name(f".{path.name}.part")
-    try:
-        content.to_netcdf(beside, engine="scipy", format="NETCDF3_64BIT", encoding=encoding)
-        os.replace(beside, path)
-    finally:
-        beside.unlink(missing_ok=True)
+    content.to_netcdf(path, engine="scipy", format="NETCDF3_64BIT", encoding=encoding)
 
 
 def _attributes(name: str) -> dict[str, str]:

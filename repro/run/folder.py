@@ -30,8 +30,7 @@ FIELDS = re.compile(r"fields/(?:fields|before_expansion)_\d{4,}\.vtu")
 SUM = re.compile(rf"[0-9a-f]{{64}}  ({FIELDS.pattern})")
 #: A folder in which a run was writing a file when it was killed, and what that may hold.
 ROOM = re.compile(re.escape(WRITING) + r"\w{8}")
-_NAMES = "|".join([FIELDS.pattern.removeprefix("fields/"), *map(re.escape, OWN)])
-PART = re.compile(rf"\.?(?:part-)?(?:{_NAMES})(?:\.part)?")
+PART = re.compile("|".join([FIELDS.pattern.removeprefix("fields/"), *map(re.escape, OWN)]))
 
 
 def listed(folder: Path, told: dict) -> set[str]:

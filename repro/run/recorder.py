@@ -14,7 +14,7 @@ from repro.check.simplifications import Warned, unmet
 from repro.errors import CheckpointError, Interrupted, OutputError, StageError
 from repro.march.loop import Instant, State, added
 from repro.march.pace import Pace, missed
-from repro.results import netcdf
+from repro.results import netcdf, vtu
 from repro.results.files import is_file, whole
 from repro.run import checkpoint, record, stored
 from repro.run.checkpoint import Arrays
@@ -113,7 +113,7 @@ class Recorder:
         name = record.fields_name(kind, len(index))
         path = claimed(self.folder, name, self.own)
         with writing(path), whole(path) as beside:
-            results.write_fields(beside, results.fields(self.scene, pore, solved))
+            vtu.write(beside, results.fields(self.scene, pore, solved))
             self.record.marks[name] = record.mark(beside)
             self._list_fields(name)
         index.append((pore.time, name))

@@ -21,7 +21,6 @@ from repro.check.simplifications import Warned
 from repro.errors import CheckpointError, Interrupted, OutputError, SimulationError
 from repro.march.loop import Instant, PoreEnd, State
 from repro.march.simulation import ends_soon, same_rows, steps
-from repro.report.reading import NoRun
 from repro.results.files import is_file
 from repro.run import INTERVAL, checkpoint
 from repro.run.folder import (
@@ -39,7 +38,7 @@ from repro.run.machine import conditions, differences, require_packages
 from repro.run.memory import require_memory
 from repro.run.recorder import Recorder, interrupted, settle
 from repro.run.status import COMPLETED, FAILED, INTERRUPTED, RUNNING, done, undone
-from repro.run.whole import whole
+from repro.run.whole import lacking
 from repro.scene import (
     KEYS,
     Scene,
@@ -278,16 +277,14 @@ def _continued(recorder: Recorder, told: dict, progress: Progress, watch: Watch)
 def _is_whole(recorder: Recorder, watch: Watch) -> bool:
     """Is all there of a run that is said to be over? Raises OutputError where not, and there is no
     checkpoint to go on from either."""
-    try:
-        whole(recorder.folder, recorder.scene)
-        return True
-    except NoRun as error:
-        names = (checkpoint.NEWEST, checkpoint.PREVIOUS)
-        if not any(is_file(recorder.folder / name) for name in names):
-            raise OutputError(f"{error}; there is no checkpoint to go on from: --force with its "
-                              "scene makes the run anew") from None
-        watch.warn(f"{error}; it goes on from its checkpoint")
-        return False
+    lack = lacking(recorder.folder, recorder.scene)
+    names = (checkpoint.NEWEST, checkpoint.PREVIOUS)
+    if lack and not any(is_file(recorder.folder / name) for name in names):
+        raise OutputError(f"{lack}; there is no checkpoint to go on from: --force with its scene "
+                          "makes the run anew")
+    if lack:
+        watch.warn(f"{lack}; it goes on from its checkpoint")
+    return not lack
 
 
 def _left_alone(recorder: Recorder, status: str, watch: Watch) -> str:

@@ -12,7 +12,7 @@ from repro.fem.linear import Method
 from repro.fem.mesh import Mesh, triangle_areas
 from repro.fem.outline import BOTTOM, FREE, TOP
 from repro.fem.space import Space
-from repro.march.loop import Ledger, State
+from repro.march.loop import SAME_TIME, Ledger, State
 from repro.march.pace import FASTER, Pace
 from repro.march.stepping import FIRST, SHORTEST
 from repro.model.pore import Pore, material
@@ -71,7 +71,7 @@ def unpacked(scene: Scene, plain: dict, arrays: dict[str, np.ndarray]) -> State:
     or no state."""
     if set(plain) != PLAIN or plain["scene"] != scene_hash(scene):
         raise CheckpointError("it is of another scene")
-    end = scene.growth.end if scene.growth else 0.0
+    end = scene.growth.end + SAME_TIME if scene.growth else 0.0
     _refuse(not all(in_range(plain[key], 0.0, end) for key in ("time_h", "row_h")), "its time")
     _refuse(not (counted(plain["remeshes"]) and counts(plain["iterations"])), "its counts")
     _refuse(plain["guess"] is not None and not counted(plain["guess"]), "its counts")
@@ -109,7 +109,7 @@ def _pace(scene: Scene, told) -> Pace:
     _refuse(not right or not all(in_range(value, 0.0, LARGEST) for value in told), "its step")
     if scene.growth:
         step = scene.growth.time_step
-        longest = max(FIRST * step, FASTER * scene.growth.end)
+        longest = max(FIRST * step, FASTER * (scene.growth.end + SAME_TIME))
         _refuse(not SHORTEST * step <= told[0] <= longest, "its step")
     return Pace(*told)
 

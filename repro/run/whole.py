@@ -24,17 +24,20 @@ def there(folder: Path, scene: Scene) -> Run:
     return run
 
 
-def whole(folder: Path, scene: Scene) -> Run:
-    """The run of a scene in a folder, which is over and all there. Raises NoRun where it is not."""
-    run = there(folder, scene)
+def lacking(folder: Path, scene: Scene) -> str:
+    """What a folder lacks of a scene's run that is over and all there; empty where nothing."""
+    try:
+        run = there(folder, scene)
+    except NoRun as error:
+        return str(error)
     status = run.record["status"]
     if not done(status):
-        raise NoRun(f"{folder}: the run is not over: {status}")
+        return f"{folder}: the run is not over: {status}"
     last = run.times[-1] if len(run.times) else math.nan
     if not _is_end(last, status, scene):
-        raise NoRun(f"{folder}: run.json says {status!r}, but the last row of timeseries.csv is of "
-                    f"t = {last:g} h")
-    return run
+        return (f"{folder}: run.json says {status!r}, but the last row of timeseries.csv is of "
+                f"t = {last:g} h")
+    return ""
 
 
 def _is_end(time: float, status: str, scene: Scene) -> bool:

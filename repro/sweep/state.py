@@ -16,6 +16,7 @@ from pathlib import Path
 from repro.results import write_json
 from repro.results.files import is_folder, open_lock, whole
 from repro.run.running import OutputError
+from repro.run.whole import lacking
 from repro.sweep import task
 from repro.sweep.design import Factor, Point
 
@@ -41,7 +42,7 @@ class Sweep:
     def missing(self) -> list[Point]:
         """The runs that have not come to their end."""
         return [point for point in self.points
-                if not task.finished(self.runs / point.name, point.scene)]
+                if lacking(self.runs / point.name, point.scene)]
 
 
 @contextmanager
@@ -140,7 +141,9 @@ def _hold(lock, folder: Path) -> None:
 
 def _clean(sweep: Sweep) -> None:
     """Remove what is left of attempts at runs that are there now."""
+    parts = list(sweep.runs.glob(".part-*"))
     for point in sweep.points:
-        if task.finished(sweep.runs / point.name, point.scene):
-            for left in sweep.runs.glob(f".part-{point.name}*"):
-                shutil.rmtree(left, ignore_errors=True)
+        left = [part for part in parts if part.name.startswith(f".part-{point.name}")]
+        if left and not lacking(sweep.runs / point.name, point.scene):
+            for part in left:
+                shutil.rmtree(part, ignore_errors=True)

@@ -13,26 +13,16 @@ from importlib.metadata import version
 from pathlib import Path
 
 from repro.errors import SimulationError
-from repro.report.reading import NoRun
 from repro.run.checkpoint import NEWEST, PREVIOUS
 from repro.run.machine import source_hash
 from repro.run.running import OutputError, resume, run
-from repro.run.whole import whole
+from repro.run.whole import lacking
 from repro.scene import Scene, SceneError, scene_hash
 
 
 def code() -> str:
     """What the numbers of a run come from: this package's version and source."""
     return f"{version('dupin2001-repro')}-{source_hash()}"
-
-
-def finished(folder: Path, scene: Scene) -> bool:
-    """Has the scene's run in a folder come to its end, and is it all there?"""
-    try:
-        whole(folder, scene)
-    except NoRun:
-        return False
-    return True
 
 
 def ran(folder: Path) -> str | None:
@@ -79,11 +69,11 @@ def _place(scene: Scene, beside: Path, folder: Path) -> None:
 
     One that failed gives way.
     """
-    if not finished(folder, scene):
+    if lacking(folder, scene):
         shutil.rmtree(folder, ignore_errors=True)
     try:
         os.rename(beside, folder)
     except OSError:
-        if not finished(folder, scene):
+        if lacking(folder, scene):
             raise
         shutil.rmtree(beside, ignore_errors=True)

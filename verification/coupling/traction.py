@@ -139,7 +139,7 @@ def _wall_shear(grid: Mesh, velocity: np.ndarray) -> float:
       over=combined(closed_forms.ORDERS))
 def layer(order: int):
     if order > 1:
-        return at_most("shear", abs(_shear(Space(closed_forms._long_layer(), order))), 1e-5,
+        return at_most("shear", abs(_shear(Space(closed_forms.long_layer(), order))), 1e-5,
                        "both parabolas are held; what is left of the layer's ends")
     return studies(refine(_shear_error, LAYER_DRAWS), {
         "shear": (2, "forces as residuals of linear elements: second order, as the flux", 1e-3)})
@@ -150,7 +150,7 @@ LAYER_DRAWS = dict(enumerate((16, 12, 6, 2)))
 
 
 def _shear_error(level: int, draw: int) -> dict[str, float]:
-    return {"size": closed_forms.SIZES[level], "shear": _shear(Space(closed_forms._grid(level, draw), 1))}
+    return {"size": closed_forms.SIZES[level], "shear": _shear(Space(closed_forms.layer_grid(level, draw), 1))}
 
 
 def _shear(space: Space) -> float:
@@ -167,7 +167,7 @@ def _shear(space: Space) -> float:
     weight = np.clip((half + 10 - np.abs(x)) / 10, 0, 1)  # level, then ramps: the sum is a tested integral
     length = _tested(mesh, line, weight)
     gradient = layered_channel.gradient(closed_forms.WIDTH, closed_forms.LAYER, ratio)
-    exact = gradient * (layered_channel._stress(closed_forms.WIDTH, closed_forms.LAYER, ratio) - closed_forms.LAYER)
+    exact = gradient * (layered_channel.stress(closed_forms.WIDTH, closed_forms.LAYER, ratio) - closed_forms.LAYER)
     return float(weight @ shear / length / exact - 1)
 
 

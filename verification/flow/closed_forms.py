@@ -192,22 +192,23 @@ def layers(order: int, ratio: float, interface: str):
     if order == 1:
         yield studies(refine(_layer_errors, DRAWS, ratio, interface), STUDIED[interface])
     else:
-        space = Space(_long_layer(), order)
+        space = Space(long_layer(), order)
         yield each_at_most(_viscous_layer(space, ratio, interface), LEFT, "what is left of the layer's ends")
 
 
 def _layer_errors(level: int, draw: int, ratio: float, interface: str) -> dict[str, float]:
-    return {"size": SIZES[level], **_viscous_layer(Space(_grid(level, draw), 1), ratio, interface)}
+    return {"size": SIZES[level], **_viscous_layer(Space(layer_grid(level, draw), 1), ratio, interface)}
 
 
 @cache
-def _grid(level: int, draw: int) -> Mesh:
+def layer_grid(level: int, draw: int) -> Mesh:
+    """Of straight triangles, one of the random meshes of a level of SIZES."""
     return _layered(LAYER_END, SIZES[level], draw)
 
 
 @cache
-def _long_layer() -> Mesh:
-    """Of six-node triangles."""
+def long_layer() -> Mesh:
+    """A coarse mesh of six-node triangles of a longer layer."""
     return curved(_layered(LONG, SIZES[0], 0), None)
 
 

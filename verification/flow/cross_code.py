@@ -309,7 +309,7 @@ def _on_long_triangles(element: flow.Stabilised | flow.Bubble) -> float:
 
 
 def _layer_errors(level: int, draw: int, element: flow.Stabilised | flow.Bubble) -> dict[str, float]:
-    return {"size": SIZES[level], **_layered(closed_forms._grid(level, draw), element, closed_forms.MIDDLE)}
+    return {"size": SIZES[level], **_layered(closed_forms.layer_grid(level, draw), element, closed_forms.MIDDLE)}
 
 
 def _layered(grid: Mesh, element: flow.Stabilised | flow.Bubble, half: float) -> dict[str, float]:

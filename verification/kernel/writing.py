@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from repro.results import write_text
+from repro.results.files import whole
 
 STYLE = """body {font: 15px/1.5 sans-serif; max-width: 1200px; margin: 2em auto; padding: 0 1em; color: #222}
 table {border-collapse: collapse; font-size: 13px; margin: 1em 0} .no {background: #fbe3e0} img {max-width: 100%}
@@ -143,7 +144,8 @@ def save(record: Any, file: Path) -> None:
     """Write a record whole or not at all; ValueError where it holds not-a-number."""
     text = json.dumps(record, indent=1, allow_nan=False)
     file.parent.mkdir(parents=True, exist_ok=True)
-    write_text(file, text + "\n")
+    with whole(file) as beside:
+        write_text(beside, text + "\n")
 
 
 def lines(file: Path) -> list[dict]:

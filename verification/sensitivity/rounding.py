@@ -42,6 +42,7 @@ from scipy.stats import sobol_indices, uniform
 from repro.march import simulation, updates
 from repro.model import kinetics, pore
 from repro.results import M_PER_D, write_json
+from repro.results.files import whole
 from repro.scene import Scene, load_scene, needed, scene_hash
 from verification.claims import interval
 from verification.claims.base_run import DISTANCES, END, upstream_means
@@ -202,7 +203,8 @@ class Runs:
             with np.errstate(all="raise", under="ignore"):
                 self.known[key] = {name: float(value) for name, value in OF[said.name](said).items()}
             self.path.parent.mkdir(exist_ok=True)
-            write_json(self.path, self.known)
+            with whole(self.path) as beside:
+                write_json(beside, self.known)
         return self.known[key]
 
 
