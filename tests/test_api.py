@@ -67,6 +67,14 @@ def test_another_time_is_refused_by_the_nearest(found):
         found.fields(0.55)
 
 
+def test_a_time_that_is_off_by_round_off_is_that_of_its_row():
+    """On either side of every row, as 0.1 + 0.2 is."""
+    rows = [dict.fromkeys(results.COLUMNS) | {"time_h": time} for time in (0.0, 0.3, 0.7)]
+    said = Results("x", rows, [{"row": k} for k in range(3)], "completed")
+    for row, time in enumerate(said.time):
+        assert [said.fields(time + off)["row"] for off in (-1e-12, 0.0, 1e-12)] == [row] * 3
+
+
 def test_a_run_to_the_pores_end_says_so():
     scene = load_scene("wide", ["aggregate.radius=40 um", "pore.length=90 um", "growth.time_step=2 h", "growth.end=4 h",
                                 "numerics.refinement=0.5"])

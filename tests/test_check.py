@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from repro.check import cost, numbers, simplifications
+from repro.check import checked, cost, numbers, simplifications
 from repro.check.checked import check
 from repro.check.modelled import modelled
 from repro.cli import main
@@ -161,6 +161,15 @@ def test_warnings_are_exactly_where_a_simplification_fails(key, common, inside, 
     assert key not in without and told - without == {key}
 
 
+@pytest.mark.parametrize("position", [-90.0, 60.0])
+def test_a_seed_off_the_middle_reaches_as_much_farther(position):
+    """At the start and at the end: pore.length is warned of by both."""
+    middle, aside = (load_scene("base", [f"aggregate.position={x} um"]) for x in (0.0, position))
+    for sizes in (numbers.at_start, numbers.at_end):
+        assert sizes(aside).reach == pytest.approx(sizes(middle).reach + abs(position), rel=1e-12)
+        assert sizes(aside).area == pytest.approx(sizes(middle).area, rel=1e-12)
+
+
 @pytest.mark.parametrize("velocity, share, least, most", [("0.055 m/day", 0.05, 0.03, 0.05),
                                                           ("0.01 m/day", 0.275, 0.15, 0.275)])
 def test_what_steady_profiles_lose_of_a_slow_flow_is_its_transit_over_growth_time(velocity, share, least, most):
@@ -255,6 +264,24 @@ def test_what_is_modelled_follows_the_sections():
     assert "as a whole" in bare["pore"] and "(9)-(10)" in bare["kinetics"]
     gear = dict(modelled(load_scene("base", ["numerics.transport=gear", "growth.new_biomass=stress_free"])))
     assert "Gear" in gear["substrates"] and "without stress" in gear["growth"]
+
+
+def test_what_is_modelled_has_the_numbers_of_the_scene():
+    """In the units that they are told in."""
+    words = dict(modelled(load_scene("base", ["pore.width=44 um", "aggregate.radius=7 um", "aggregate.position=-40 um",
+                                              "aggregate.inert_fraction=0.3", "growth.time_step=0.35 h"])))
+    assert words["pore"].startswith("a channel 44 um wide and 600 um long")
+    assert "radius 7 um on the lower wall at x = -40 um; 30 % of it inert at t = 0" in words["aggregate"]
+    assert "a shape update every 21 min" in words["numerics"]
+    for smooth, how in (("true", "a spline through"), ("false", "straight lines between")):
+        outline = f'aggregate={{outline=[["-5 um", "0 um"], ["1 um", "9 um"], ["6 um", "0 um"]], smooth={smooth}}}'
+        assert dict(modelled(load_scene("base", [outline])))["aggregate"].startswith(f"biomass inside {how} 3 points")
+
+
+@pytest.mark.parametrize("seconds, said", [(0.123, "0.12 s"), (45.3, "45 s"), (130.0, "2 min"), (7100.0, "118 min"),
+                                           (7300.0, "2 h"), (90000.0, "25 h")])
+def test_what_a_run_takes_is_told_in_a_unit_that_suits(seconds, said):
+    assert checked._seconds(seconds) == said
 
 
 def test_the_report_and_its_exit_status(capsys):

@@ -8,11 +8,14 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from matplotlib.collections import QuadMesh
+from matplotlib.patches import Polygon
+from matplotlib.quiver import Quiver
 
 import paper_figures
 from paper_figures import __main__ as figures
 from paper_figures import claims, overview, page, runs, states, style
-from repro import cli, load_scene, run
+from repro import cli, load_scene, results, run
 from repro.fem.outline import TOP, polygon_area
 from repro.scene import scene_hash
 from verification.claims.base_run import upstream_means
@@ -164,6 +167,144 @@ def test_the_captions_read_the_run(short, tmp_path):
     assert "9.87 m/d" in figure_5.caption(folder) and "9.87 m/d" not in figure_5.caption(short["base"])
     with pytest.raises(LookupError, match="0.5 h"):
         states.row(folder, 0.5)
+
+
+@pytest.mark.parametrize("name", ["figure_5", "plate_1"])
+def test_the_shape_that_is_drawn_is_that_before_the_expansion(short, name):
+    """As the caption says, in every panel."""
+    wanted, made = states.last(short["base"], "before_expansion").rim, MODULES[name].draw(short["base"])
+    panels = [axes for axes in made.axes if axes.get_title(loc="left") or name == "figure_5" and axes is made.axes[0]]
+    shapes = [[patch.get_xy()[:-1] for patch in axes.patches if isinstance(patch, Polygon)] for axes in panels]
+    assert len(panels) == (1 if name == "figure_5" else 4)
+    for (drawn,) in shapes:
+        assert np.array_equal(drawn, wanted)
+
+
+def test_the_colours_of_plate_1_are_in_the_units_of_their_labels(short):
+    """From the least to the largest value of what is drawn."""
+    plate_1, state = MODULES["plate_1"], states.last(short["base"], "before_expansion")
+    made = plate_1.draw(short["base"])
+    bars = {axes.get_xlabel(): axes.get_xlim() for axes in made.axes if axes.get_xlabel() != style.X_LABEL}
+    inert, active = (plate_1.since(short["base"], f"{kind}_biomass")[state.body] for kind in ("inert", "active"))
+    wanted = {"$C_A$ (mg/L)": state.nodes["acceptor_mg_per_L"], "$C_D$ (mg/L)": state.nodes["donor_mg_per_L"],
+              "$X_A / X_m$ (–)": active, "$X_I / X_m$ (10$^{-3}$)": 1000 * inert}
+    assert bars.keys() == wanted.keys()
+    for label, values in wanted.items():
+        assert bars[label] == pytest.approx((values.min(), values.max()), rel=1e-9), label
+
+
+def test_a_curve_is_what_the_legends_call_it(short):
+    """By the colour of its run and the line of its substrate."""
+    module, folders = MODULES["time_series"], {"Base": short["base"], "Wide": short["wide"]}
+    panels = module.draw(*folders.values()).axes
+    runs_, names = ([(line, text.get_text()) for line, text in zip(panels[k].get_legend().get_lines(),
+                                                                   panels[k].get_legend().get_texts())] for k in (0, 2))
+    tables = {line.get_color(): states.series(folders[text]) for line, text in runs_}
+    kinds = {line.get_linestyle(): text for line, text in names}
+    assert kinds.keys() == {"-", "--"} and len(tables) == 2
+    for axes, (column, *_) in zip(panels, module.CURVES, strict=True):
+        assert len(axes.lines) == (4 if "{}" in column else 2)
+        for line in axes.lines:
+            table = tables[line.get_color()]
+            assert np.array_equal(line.get_xdata(), table["time_h"])
+            assert np.array_equal(line.get_ydata(), table[column.format(kinds[line.get_linestyle()])])
+
+
+@pytest.fixture
+def unlike(monkeypatch):
+    """Tables of runs that differ in every number, the first of which touch the opposite wall in their second row."""
+    tables = {}
+    for k in range(7):
+        hours = np.linspace(0.0, 50.0 + k, 5 + k)
+        columns = {name: (2.0 + k + j) * np.exp(-hours / (20.0 + 3 * k + j)) for j, name in enumerate(results.COLUMNS)}
+        tables[Path(f"run {k}")] = columns | {"time_h": hours, "contact": 1.0 * (np.arange(len(hours)) > 0) * (k < 2)}
+    monkeypatch.setattr(states, "series", tables.__getitem__)
+    return tables
+
+
+def test_each_run_has_its_own_curve_in_every_discussion(unlike):
+    """In its colour and by its name: conductivities of runs that are laid over each other."""
+    permeable, rheology, head = (MODULES[f"discussion_{name}"] for name in ("permeable", "rheology", "head"))
+    folders, made = list(unlike), style.figure(3).subplots(2)
+    alone, ratios = permeable.draw(*folders[:3]).axes
+    rheology._conductivity(made[0], folders)
+    for panel, module in ((alone, permeable), (made[0], rheology)):
+        lines = panel.lines[:len(module.LABELS)]
+        assert [line.get_label() for line in lines] == list(module.LABELS)
+        assert len({line.get_color() for line in lines}) == len(lines)
+        for line, folder in zip(lines, folders):
+            wanted = [unlike[folder][name] for name in ("time_h", "conductivity_m_per_d")]
+            assert np.array_equal(line.get_xydata().T, wanted)
+    looks = [(line.get_color(), line.get_linestyle()) for line in alone.lines[:3]]
+    assert looks == [(style.BLACK, "-"), (style.RED, "-"), (style.BLUE, "--")]  # as the caption says
+    first = unlike[folders[0]]
+    for line, folder in zip(ratios.lines, folders[:3]):
+        now = unlike[folder]
+        told = np.interp(now["time_h"], first["time_h"], np.log(first["conductivity_m_per_d"]))
+        assert np.log(line.get_ydata()) == pytest.approx(np.log(now["conductivity_m_per_d"]) - told)
+    head._fall(made[1], *folders[:2])
+    curves, marks = made[1].lines[::2], made[1].lines[1::2]
+    for curve, mark, folder, name in zip(curves, marks, folders, ("Base (head)", "Wide (velocity)")):
+        now = unlike[folder]
+        assert curve.get_label() == name and curve.get_color() == mark.get_color()
+        assert curve.get_ydata() == pytest.approx(now["conductivity_m_per_d"] / now["conductivity_m_per_d"][0])
+        assert np.array_equal(curve.get_xdata(), now["time_h"]) and mark.get_xdata()[0] == now["time_h"][1]
+
+
+def test_captions_tell_each_run_of_its_own(unlike):
+    """Falls, last values, and times of contact."""
+    folders = list(unlike)
+    last = [unlike[folder]["conductivity_m_per_d"][-1] for folder in folders]
+    falls = [unlike[folder]["conductivity_m_per_d"][0] / end for folder, end in zip(folders, last)]
+    touch = [unlike[folder]["time_h"][1] for folder in folders]
+    said = MODULES["time_series"].caption(*folders[:2])
+    assert f"factor of {falls[0]:.3g} in Base and {falls[1]:.3g} in Wide" in said
+    assert "to 50 h) and Wide" in said and "to 51 h)" in said and f"{touch[0]:g} h and {touch[1]:g} h." in said
+    rheology = MODULES["discussion_rheology"]
+    for label, folder, end, hours in zip(rheology.LABELS, folders, last, touch):
+        hours = hours if unlike[folder]["contact"].any() else np.inf
+        assert f"{label}: {hours:g} h and {end:.3g} m/d" in rheology.caption(*folders)
+    permeable, table = MODULES["discussion_permeable"], unlike[folders[2]]
+    for hours in permeable.MOMENTS:
+        told = np.exp(np.interp(hours, table["time_h"], np.log(table["conductivity_m_per_d"])))
+        assert f", {told:.3g} m/d at {hours:g} h" in permeable.caption(*folders[:3])
+
+
+def test_plate_2_goes_from_the_dashed_shape_to_the_full_one_by_its_arrows(short):
+    """LENGTHENED times as long as what the nodes move by, in both panels."""
+    before, after = states.last(short["base"], "before_expansion"), states.last(short["base"])
+    for axes in plate_2.draw(short["base"]).axes[:2]:
+        rims = [patch for patch in axes.patches if isinstance(patch, Polygon)]
+        shapes = {patch.get_linestyle() == "--": patch.get_xy()[:-1] for patch in rims}
+        assert np.array_equal(shapes[True], before.rim) and np.array_equal(shapes[False], after.rim)
+        (arrows,) = (part for part in axes.collections if isinstance(part, Quiver))
+        assert np.array_equal(arrows.get_offsets(), before.points) and arrows.scale == 1 and arrows.scale_units == "xy"
+        moved = plate_2.LENGTHENED * (after.points - before.points)
+        assert np.column_stack([arrows.U, arrows.V]) == pytest.approx(moved)
+
+
+def test_rates_are_drawn_between_the_rows_that_they_are_of(short):
+    """And flow and uptake at the rows."""
+    head, table = MODULES["discussion_head"], states.series(short["base"])
+    panels = head.draw(short["base"], short["wide"]).axes
+    (panel,) = (axes for axes in panels if "over the largest" in axes.get_title("left"))
+    hours = {line.get_label(): line.get_xdata() for line in panel.lines}
+    assert hours["growth rate of the area"] == pytest.approx((table["time_h"][1:] + table["time_h"][:-1]) / 2)
+    for name in ("velocity", "acceptor taken up"):
+        assert np.array_equal(hours[name], table["time_h"])
+
+
+def test_the_colours_of_outlines_are_those_beside_their_times(short):
+    """Each in the middle of its part of the scale."""
+    made = style.figure(2.75)
+    figure_6.outlines(made.subplots(), short["wide"], 0.2)
+    axes, bar = made.axes
+    shapes = [patch for patch in axes.patches if isinstance(patch, Polygon)]
+    (scale,) = (part for part in bar.collections if isinstance(part, QuadMesh))
+    edges = np.linspace(*bar.get_xlim(), len(shapes) + 1)
+    assert bar.get_xticks() == pytest.approx((edges[1:] + edges[:-1]) / 2)
+    beside = scale.to_rgba(scale.get_array().ravel())
+    assert np.array([patch.get_facecolor() for patch in reversed(shapes)]) == pytest.approx(beside)
 
 
 def test_most_of_the_flow_goes_around_the_aggregate(short):

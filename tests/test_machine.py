@@ -103,6 +103,31 @@ def test_what_is_free_is_the_least_that_anything_leaves(tmp_path):
     assert memory.free_bytes(tmp_path) == 0
 
 
+@LINUX
+def test_a_limit_of_address_space_leaves_what_is_not_taken_of_it(tmp_path, monkeypatch):
+    """Of the whole address space, the first number, and not of what is resident."""
+    resource = pytest.importorskip("resource")
+    (tmp_path / "proc/self").mkdir(parents=True)
+    (tmp_path / "proc/self/statm").write_text("5000 300 200 1 0 700 0\n")
+    most = 10_000 * resource.getpagesize()
+    monkeypatch.setattr(resource, "getrlimit", lambda kind: (most, resource.RLIM_INFINITY))
+    assert memory.free_bytes(tmp_path) == most / 2
+
+
+def test_the_source_is_every_module_of_every_room(tmp_path, monkeypatch):
+    """What runs of other code are told apart by."""
+    monkeypatch.setattr(machine, "__file__", str(tmp_path / "run" / "machine.py"))
+    modules = [tmp_path / name for name in ("timing.py", "run/machine.py", "model/flow.py", "model/more/deep.py")]
+    for module in modules:
+        module.parent.mkdir(parents=True, exist_ok=True)
+        module.write_text("before")
+    found = [machine.source_hash.__wrapped__()]
+    for module in modules:
+        module.write_text("after")
+        found.append(machine.source_hash.__wrapped__())
+    assert len(set(found)) == 1 + len(modules)
+
+
 def limited(kind, most, *arguments):
     """Exit status and standard error of `repro run ARGUMENTS` where the system allows so much."""
     resource = pytest.importorskip("resource", reason="a system with limits is needed")

@@ -78,6 +78,15 @@ def test_it_grows_with_area_and_lambda_and_lies_within_its_bounds():
         assert all((after.length > before.length).all() for before, after in zip(laws, laws[1:]))
 
 
+def test_between_the_ratios_of_the_table_a_plug_adds_in_proportion_to_lambda_less_one():
+    """Nearly: at the geometric mean of neighbours, to 0.3 %, where 0.1 % is measured."""
+    share = np.geomspace(*known(True), 20)
+    for low, high in zip(RATIOS, RATIOS[1:]):
+        one, other, mean = (repro.added_resistance(share, 1.0, True, ratio).length / (ratio - 1)
+                            for ratio in (low, high, np.sqrt(low * high)))
+        assert mean == pytest.approx(np.sqrt(one * other), rel=3e-3)
+
+
 def test_a_plug_resists_as_one_with_straight_ends_less_what_its_ends_let_pass():
     """(lambda - 1) A / W^2 exactly with straight ends; ends of W or so let pass what 0.3 to 0.65 W would resist."""
     points = np.array([[-0.5, 0.0], [-0.5, 1.0], [0.5, 1.0], [0.5, 0.0]])

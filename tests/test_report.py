@@ -13,7 +13,7 @@ import pytest
 
 from repro import report, results
 from repro.fem.mesh import Mesh, curved
-from repro.report import fields, page, quantities
+from repro.report import fields, page, quantities, run_page
 from repro.report.reading import read
 from repro.results import names, vtu
 from repro.results.vtu import Cells, Grid
@@ -281,6 +281,27 @@ def test_a_page_of_a_fine_mesh_is_small_and_true(tmp_path, monkeypatch, kind, co
     shown = there[numbers(mesh["cells"], "<u4").reshape(-1, 3)].mean(axis=1)
     away = np.hypot(shown[:, 0] - 50, shown[:, 1])
     assert ((numbers(mesh["body"], "<u1") == 1) == (away < 20))[np.abs(away - 20) > 1].all()
+
+
+def test_stages_are_parts_of_the_whole_time_the_longest_first():
+    """Of which those that took none are left out."""
+    made = run_page._bars({"flow": 1.0, "none": 0.0, "growth": 3.0}, 6.0)
+    assert re.findall('<text x="0"[^>]*>([^<]*)<', made) == ["growth", "flow"]
+    assert re.findall('<rect [^>]*width="([^"]*)"', made) == ["75.0", "25.0"]
+    assert re.findall(">([0-9.]+) s<", made) == ["3", "1"]
+
+
+def test_each_frame_has_the_aggregate_of_its_own_time(tmp_path):
+    """Though all have the same triangles, as on the page's own grid."""
+    points = np.array([[0, 0, 0], [3, 0, 0], [0, 2, 0], [3, 2, 0]], float)
+    regions, entries = [[1, 0], [1, 1], [0, 1], [1, 0]], []
+    for k, region in enumerate(regions):
+        entries.append((float(k), tmp_path / f"{k}.vtu"))
+        vtu.write(entries[-1][1], Grid(points, [Cells("triangle", np.array([[0, 1, 2], [1, 3, 2]]))],
+                                       cell_data={"region": [np.array(region, float)]}))
+    packed = fields.packed(entries)
+    bodies = [numbers(packed["meshes"][frame["mesh"]]["body"], "<u1").tolist() for frame in packed["frames"]]
+    assert bodies == regions and len(packed["meshes"]) == 3
 
 
 def test_a_page_of_many_rows_and_frames_is_small(fast, tmp_path, monkeypatch):

@@ -19,6 +19,7 @@ from repro.march import loop
 from repro.march.loop import PoreEnd
 from repro.march.simulation import steps
 from repro.model import growth
+from repro.run import running
 from repro.run.checkpoint import NEWEST, PREVIOUS
 from repro.run.running import Watch, resume, run
 from repro.run.whole import lacking
@@ -255,6 +256,25 @@ def test_the_machine_is_recorded_and_threads_are_no_change(tmp_path, monkeypatch
     monkeypatch.setenv("OMP_NUM_THREADS", "7")
     resume(tmp_path / "run")
     assert told(tmp_path / "run")["conditions"]["threads"]["OMP_NUM_THREADS"] == "7" and not recwarn.list
+
+
+class InSteps:
+    """A recorder of steps without anything in them."""
+
+    kept, contact, state, time, end, remeshes, steps = True, False, None, 0.0, 0.0, 0, 0
+
+    def add(self, state, instant):
+        self.steps += 1
+
+
+def test_checkpoints_are_as_far_apart_as_is_asked(monkeypatch):
+    """Steps of 7 s, a checkpoint a minute: after the 9th, the 18th and the 27th; a checkpoint a step where zero is."""
+    for interval, wanted in ((60.0, [9, 18, 27]), (0.0, list(range(1, 31)))):
+        one, written = InSteps(), []
+        monkeypatch.setattr(running, "perf_counter", lambda one=one: 7.0 * one.steps)
+        monkeypatch.setattr(running, "_checkpoint", lambda one, watch, written=written: written.append(one.steps))
+        running._record_steps(one, [(None, None)] * 30, running.unwatched, Watch(interval=interval))
+        assert written == wanted
 
 
 def test_a_failure_says_where_the_last_good_state_is(tmp_path, monkeypatch):

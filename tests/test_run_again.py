@@ -88,8 +88,8 @@ def test_a_scene_file_that_was_changed_is_told_on_resume(tmp_path, capsys, monke
     """With what differs, from wherever that is asked for; the run goes on with its own."""
     scene = tmp_path / "mine.toml"
     monkeypatch.chdir(tmp_path)
-    scene.write_text('[pore]\nwidth = "50 um"\n[flow]\nhead = "1e-3 cm"\n')
-    out = pages.run(tmp_path, "mine.toml", "pore.length=500 um")
+    scene.write_text('[pore]\nwidth = "50 um"\n[flow]\nhead = "1e-3 cm"\n[substrates]\n')
+    out = pages.run(tmp_path, "mine.toml", "pore.length=500 um", options=["--unset", "substrates"])
     monkeypatch.chdir(out)
     text = scene.read_text()
     differs = f"{scene}: it is not the scene of the run any more: pore.width (50.0 um there, now 60.0 um)"

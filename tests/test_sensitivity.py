@@ -1,10 +1,13 @@
 """What the rounding of Table 1 allows: inputs are those of the scenes, differences right on power laws, runs kept."""
 import json
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
 from paper_figures import replication
+from repro.march.loop import PoreEnd
 from repro.scene import load_scene
 from verification import claims, sensitivity
 from verification.claims import evaluate, report, runs
@@ -66,9 +69,10 @@ def test_elasticities_of_a_power_law():
     assert found["Y"]["elasticity"] == 0 and "head" in found and "u_ave" not in found
 
 
-def test_what_differs_by_noise_is_not_resolved():
+@pytest.mark.parametrize("sign", [1, -1])
+def test_what_differs_by_noise_is_not_resolved(sign):
     noise = {0.99: 1e-3, 1.01: -1e-3, 0.98: -1e-3, 1.02: 1e-3}
-    found = rounding.elasticities(Law(lambda x: {"n": 1 + noise.get(round(x["k"], 3), 0.0)}), "base")["n"]["k"]
+    found = rounding.elasticities(Law(lambda x: {"n": 1 + sign * noise.get(round(x["k"], 3), 0.0)}), "base")["n"]["k"]
     assert not found["resolved"] and found["bar"] > abs(found["elasticity"])
 
 
@@ -207,6 +211,41 @@ def test_a_number_after_contact_is_kept_where_its_bar_is_what_is_asked():
     told = wide.bar_of("mean of x", values, 1.0)
     assert 0.125 < told["bar_percent"] < 1.0 and told["kept"] and told["values"] == values
     assert not wide.bar_of("mean of x", values, 0.1)["kept"]
+
+
+def in_contact(time):
+    outline = SimpleNamespace(upstream=-2.0 * time, downstream=time)
+    pore = SimpleNamespace(time=time, contact=time > 34.0, boundary=outline,
+                           concentrations=SimpleNamespace(acceptor=np.array([3.0, time])))
+    return SimpleNamespace(pore=pore)
+
+
+def test_numbers_after_contact_are_geometric_means_the_hour_asked_for_and_the_last(monkeypatch):
+    """Of rows in contact alone, of which none may be missing."""
+    monkeypatch.setattr(wide, "_row", lambda now: [2.0**now.pore.time, -now.pore.time, 1.0, now.pore.time**2])
+    rows = [(None, in_contact(time)) for time in (0.0, 33.0, *wide.HOURS)]
+    monkeypatch.setattr(wide.simulation, "steps", lambda said: iter([*rows, (None, None)]))
+    found = wide.of_after(None)
+    speed, tip, _, length = wide.ASKED
+    assert found[f"mean of {speed}"] == pytest.approx(2.0**40) and found[f"39 h: {tip}"] == 39.0
+    assert found[f"mean of {tip}"] == pytest.approx(np.prod(np.array(wide.HOURS) / 40) ** (1 / 11) * 40)
+    assert found[f"last {length}"] == 45.0**2 and len(found) == 12
+    del rows[5]
+    with pytest.raises(LookupError, match="10 of 11"):
+        wide.of_after(None)
+
+
+@pytest.mark.parametrize("ends, hour", [(np.inf, 45.0), (40.05, 39.0), (40.15, 40.0)])
+def test_wide_goes_on_for_eleven_hours_after_the_hour_of_contact_or_to_the_pores_end(monkeypatch, ends, hour):
+    """Less the margin, in whole hours."""
+    def steps(said, state=None):
+        yield from ((in_contact(time), None) for time in (33.9, 34.7, min(ends, said.growth.end)))
+        if ends < said.growth.end:
+            raise PoreEnd("")
+
+    monkeypatch.setattr(wide.simulation, "steps", steps)
+    found = wide.of_contact(scene("wide", {"K_sA": 2.0}))
+    assert found == {"contact_time": 34.7, "upstream": -69.4, "downstream": 34.7, "acceptor_min": 1.5, "end": hour}
 
 
 @pytest.fixture(scope="module")

@@ -10,6 +10,7 @@ import subprocess
 import sys
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ import repro
 from repro import load_scene, results
 from repro.cli import main
 from repro.run import whole
+from repro.run.machine import THREADS
 from repro.sweep import page, pool, server, table, task
 from repro.sweep.design import grid, parse, points
 from repro.sweep.server import Server, ask
@@ -284,6 +286,34 @@ def test_a_line_of_the_page_is_the_course_of_its_run(tmp_path):
         assert y * (places[:, 1] + 4) + y0 == pytest.approx(one.relative, abs=0.005)
 
 
+def test_a_key_of_many_values_has_a_value_of_each_colour():
+    """The first and the last among them."""
+    factor = parse("pore.width=" + ", ".join(f"{width} um" for width in range(40, 71)))
+    told = [SimpleNamespace(point=SimpleNamespace(values=(width,))) for width in reversed(factor.values)]
+    entries = re.findall(r'class="line level(.)"/></svg>([^<]*)</li>', page._key(factor, told, 0))
+    assert entries == [(str(level), f"{40 + 5 * level} um") for level in range(7)]
+
+
+def test_lines_of_clogging_times_join_runs_that_differ_in_one_key_alone(tmp_path):
+    """In its order, of three keys: a line for each pair of values of the other two."""
+    factors = [parse("pore.width=60 um, 40 um, 50 um"), parse("flow.viscosity_ratio=100, 400"),
+               parse("flow.mean_velocity=1 m/day, 2 m/day")]
+    found = points("flow_only", [], factors, grid(factors))
+    course, numbers = np.array([1.0, 2.0]), dict.fromkeys(table.COLUMNS)
+    runs = [table.Told(one, "completed", course, course, course, numbers | {"clogging_time_h": 7.0 + one.index**2})
+            for one in found]
+    times = page.page(Sweep(tmp_path, "flow_only", factors, found), runs, 0.1).split("<h2>Clogging time")[1]
+    for which, figure in enumerate(re.findall("<figure>.*?</figure>", times, re.S)):
+        dots = re.findall(r'<circle [^>]*cx="([^"]*)" cy="([^"]*)"[^>]*><title>run (\d+)', figure)
+        run_at = {f"{x},{y}": found[int(index) - 1].values for x, y, index in dots}
+        drawn = re.findall('<polyline [^>]*points="([^"]*)"', figure)
+        lines = [[run_at[place] for place in line.split()] for line in drawn]
+        assert len(run_at) == 12 and sum(map(len, lines)) == 12 and len(lines) == (4, 6, 6)[which]
+        for line in lines:
+            assert [len({*values}) for values in zip(*line)] == [len(line) if k == which else 1 for k in range(3)]
+            assert [values[which] for values in line] == sorted(values[which] for values in line)
+
+
 @pytest.mark.parametrize("part", [0.5, 0.1, 0.013])
 def test_clogging_time_of_an_exponential_fall_is_exact(part):
     """K / K_0 = exp(-t / 3), with biomass t / 10: whatever the rows, t = -3 ln part."""
@@ -335,6 +365,15 @@ def test_a_scene_comes_to_the_other_process_bit_by_bit():
     scene = load_scene("wide", ['output.times=["1 h", "3 h"]', 'substrates.donor.supply=[["0 h", "3 mg/L"]]',
                                 'aggregate={outline=[["-5 um", "0 um"], ["0 um", "4 um"], ["6 um", "0 um"]]}'])
     assert server._asked(ask(scene, Path("a"), Path("b"))) == (scene, Path("a"), Path("b"))
+
+
+def test_each_run_has_one_thread_whatever_else_is_set(monkeypatch):
+    asked = {}
+    for name in (*THREADS, "ELSE"):
+        monkeypatch.setenv(name, "8")
+    monkeypatch.setattr(server.subprocess, "Popen", lambda command, **options: asked.update(options))
+    Server()
+    assert {name: asked["env"][name] for name in (*THREADS, "ELSE")} == dict.fromkeys(THREADS, "1") | {"ELSE": "8"}
 
 
 def test_a_server_that_has_died_is_started_again(tmp_path):

@@ -56,6 +56,13 @@ def test_a_value_between_the_ends_reads_well():
     assert levels(parse("flow.mean_velocity=0.3:30 m/day:log:3")) == [0.3, 3.0, 30.0]
 
 
+def test_a_run_is_made_with_every_digit_that_is_told_of_it():
+    factors = [parse("flow.mean_velocity=0.3:30 m/day:log:6"), parse("pore.length=601:702 um:linear:4")]
+    for point in points("flow_only", [], factors, grid(factors)):
+        made = (point.scene.flow.mean_velocity * 24e-6, point.scene.pore.length)
+        assert made == pytest.approx(point.values, rel=1e-14)
+
+
 def test_a_grid_is_every_combination():
     factors = [parse("pore.width=50 um, 60 um"), parse("flow.mean_velocity=1:3 m/day:linear:3")]
     assert grid(factors) == [(w, u) for w in (50.0, 60.0) for u in (1.0, 2.0, 3.0)]

@@ -203,6 +203,9 @@ def test_the_scheme_stands_beside_the_converged_solution_whose_bar_has_nothing_o
     assert found.scheme == pytest.approx((3.9 + 0.01 * 2**-0.5, 3.9 + 0.01 * 2**0.5))
     alone = judged(SPEED, of_size, about=claims.MODEL, beside=())
     assert alone.scheme is None and alone.outcome == claims.HOLDS and len(alone.on_sizes) == 3
+    counted = judged(claims.without_limit(SPEED), lambda level: of_size(level) + (level.kind == SCHEME),
+                     about=claims.MODEL)
+    assert (counted.bar.low, counted.bar.high) == pytest.approx((2.905, 2.91)) and len(counted.held) == 3
 
 
 @pytest.mark.parametrize("large, outcome", [((), claims.HOLDS), ((0.5,), claims.REACHES_OVER),

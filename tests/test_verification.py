@@ -51,7 +51,8 @@ def test_a_case_passes_only_if_it_measures_something_and_all_of_it_holds():
 @pytest.mark.parametrize("errors, ceiling, holds", [
     (SIZES**2.2, 1, True), (SIZES**1.8, 1, True), (SIZES**1.6, 1, False), (SIZES**2.4, 1, False),
     (SIZES**2 * [1, 1, 4, 1], 1, False), (SIZES**2, 0.02, True), (SIZES**2, 0.01, False),
-    ([1, 0.25, 0.0625, math.nan], 1, False), ([1, 0.25, 0.0625, 0.0], 1, False)])
+    *((np.where(np.arange(4) == k, wrong, SIZES**2), 1, False)
+      for k in range(4) for wrong in (math.nan, math.inf, 0.0, -1.0))])
 def test_a_wrong_order_is_caught_on_both_sides(errors, ceiling, holds):
     """One bad pair is enough, and a last error that is too large."""
     assert study("error", SIZES, errors, 2, "", ceiling=ceiling).holds is holds
@@ -201,9 +202,12 @@ def test_every_quick_case_passes():
     assert "report:" not in done.stdout and " cases pass; " in done.stdout
 
 
+GOOD, BAD = (result(at_most("q", value, 1.0, "")) for value in (0.5, 2.0))
+
+
 @pytest.mark.parametrize("results, status, told", [
-    ([result(at_most("q", 0.5, 1.0, ""))], 0, "1 of 1"), ([result(at_most("q", 2.0, 1.0, ""))], 1, "0 of 1"),
-    ([], 1, "0 of 0")])
+    ([GOOD], 0, "1 of 1"), ([BAD], 1, "0 of 1"), ([], 1, "0 of 0"), ([GOOD, BAD], 1, "1 of 2"),
+    ([BAD, GOOD], 1, "1 of 2"), ([GOOD, GOOD], 0, "2 of 2")])
 def test_the_exit_status_is_the_verdict(monkeypatch, capsys, results, status, told):
     monkeypatch.setattr(driver, "run_all", lambda ids, jobs: results)
     assert driver.main(["flow"]) == status and f"{told} cases pass" in capsys.readouterr().out
