@@ -13,6 +13,7 @@ import re
 import textwrap
 from collections.abc import Callable
 from importlib import import_module
+from operator import attrgetter
 from pathlib import Path
 
 from paper_figures import FIGURES, manifest, overview
@@ -111,7 +112,7 @@ def _after_contact(claims: list[dict]) -> str:
 
 def _bars_of_base(claims: list[dict]) -> str:
     """Which numbers of base are known less well than its velocities and effluents, and why."""
-    kinds = "; ".join(f"{why} ({', '.join(dict.fromkeys(each.id for each in those))})"
+    kinds = "; ".join(f"{why} ({', '.join(dict.fromkeys(map(attrgetter('id'), those)))})"
                       for why, those in after_contact.wide_bars_of_base(claims).items())
     return (f"Velocities, effluents, uptake and concentrations of Base are known to {after_contact.BASE_BAR:g} % or "
             f"better. Wider are the bars of numbers of other kinds: {kinds}.")

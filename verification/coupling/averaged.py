@@ -43,7 +43,8 @@ RADII, REACH = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 33.0), 75.0
       claim="Under its head base clogs as its averaged pore (FiPy, solve_ivp) does, up to what lubrication and section "
             "means are worth: a velocity 11 % too high, of which 1 % is left with a half-disc's own loss",
       mutants=("stale-flow", "conductivity-for-velocity"),
-      over=runs.NUMERICS, ways="1 2", because="exact: what is judged is the averaged pore, 1 % off, ten times what accurate may err by")
+      over=runs.NUMERICS, ways="1 2",
+      because="exact: what is judged is the averaged pore, 1 % off, ten times what accurate may err by")
 def base(*changes: str):
     scene = runs.base("19.4 h", *changes, times=TIMES)
     instants = runs.ours(scene)
@@ -176,8 +177,9 @@ MIXING_TIMES = (5.0, 10.0, 15.0, 19.4)
       claim="The whole base run is that of the averaged pore (FiPy, solve_ivp) up to the square of the transverse "
             "Thiele number, and base itself is where that square puts it",
       mutants=("rates-two-percent-low",), over=("paper", "accurate"),
-      ways="1 2", because="fast: its own error in time would be seen; exact: accurate runs here with a smaller tolerance than it has; "
-              "order 3: coupling-averaged-refined")
+      ways="1 2",
+      because="fast: its own error in time would be seen; exact: accurate has a smaller tolerance here; order 3: "
+              "coupling-averaged-refined")
 def whole_run(preset: str):
     """Checks and studies of one preset."""
     errors, base = refine(_whole, SLOWER, preset), _whole(1.0, preset)

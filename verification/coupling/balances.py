@@ -251,7 +251,8 @@ IN_A_STEP = 3.0
 @case("coupling-amounts", kind="property", slow=True,
       norm="amounts of both substrates consumed over base, and in its worst step, over those of a run with a hundredth "
            "of the tolerance, less 1; of that run, of ten times as many steps, the cumulated amounts are interpolated "
-           "at the ends of the steps by a cubic spline; exact: 4 h from a seed of 25 um, on elements of the size of fast",
+           "at the ends of the steps by a cubic spline; exact: 4 h from a seed of 25 um, with elements as large as in "
+           "fast",
       claim="The amounts in the ledgers are those of ten times shorter steps: to 1 % by preset fast, 0.1 % by accurate "
             "and 0.01 % by exact in all, to three times that in every step",
       mutants=("flows-of-the-start", "curved-rates-of-the-start"),

@@ -358,7 +358,7 @@ def _equal_steps(scene, steps: int) -> np.ndarray:
       norm="relative difference between a run and that with half the step; base from a seed of 25 um, 2 h, no remesh",
       claim="The midpoint rule is of second order in time, with every kind of elements",
       mutants=("curved-rates-of-the-start", "midpoint-rates-of-the-start"), over=runs.ELEMENTS, ways="fast",
-      because="paper: coupling-midpoint-limit; accurate, exact: equal steps know no tolerance, and so are those of fast")
+      because="paper: coupling-midpoint-limit; accurate, exact: equal steps know no tolerance: those of fast")
 def order_in_time(elements: str):
     scene = load_scene("base", (runs.by("fast"), runs.of(elements), "numerics.refinement=0.5",
                                 'aggregate.radius="25 um"'))

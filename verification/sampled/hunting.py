@@ -170,9 +170,11 @@ def _short(how: str) -> str:
 
 def alike(test: str, file: str) -> int:
     """How many words the names of a test's file and of a module have in common."""
-    names = (Path(test.partition("::")[0]).stem, Path(file).with_suffix("").as_posix())
-    one, other = ({word.rstrip("s") for word in re.split(r"[/_]", name)} for name in names)
-    return len(one & other)
+    return len(_words(Path(test.partition("::")[0]).stem) & _words(Path(file).with_suffix("").as_posix()))
+
+
+def _words(name: str) -> set[str]:
+    return {word.rstrip("s") for word in re.split(r"[/_]", name)}
 
 
 def nearest(tests: list[Measured]) -> list[Measured]:
