@@ -422,28 +422,17 @@ def _listed(preset: str, *changes: str) -> np.ndarray:
 @case("coupling-presets", kind="cross-code", slow=True,
       norm="largest difference at 19.2 and 19.4 h to an independent solver, extrapolated in space and time: relative, "
            "of effluents over the supply",
-      claim="Each of the eight numbers of base is within 1 % with preset fast, and within 0.1 % with preset accurate, "
-            "with quadratic and with cubic velocities and concentrations",
-      mutants=("curved-rates-of-the-start", "fluid-diffusivity", "uptake-without-decay", "cubic-shown-less"),
+      claim="Each of the eight numbers of base is within 1 % with preset fast, within 0.1 % with accurate, with "
+            "quadratic and with cubic velocities and concentrations, and within 0.01 % with exact",
+      mutants=("curved-rates-of-the-start", "fluid-diffusivity", "uptake-without-decay", "cubic-shown-less",
+               "exact-steps-of-accurate"),
       over={"fast": (1e-2, "fast"), "accurate": (1e-3, "accurate"),
-            "accurate, cubic": (1e-3, "accurate", runs.of("cubic"))}, ways="2",
-      because="paper, order 1: its error is that of linear elements, see bench; exact: coupling-exact")
+            "accurate, cubic": (1e-3, "accurate", runs.of("cubic")), "exact": (1e-4, "exact")}, ways="2",
+      because="paper, order 1: its error is that of linear elements, see bench")
 def presets(bound: float, *numerics: str):
-    return _within(bound, 2e-4, "a fifth of what is asked of accurate", *numerics)
-
-
-@case("coupling-exact", kind="cross-code", slow=True, norm="as coupling-presets",
-      claim="Each of the eight numbers of base is within 0.01 % with preset exact",
-      mutants=("exact-steps-of-accurate",), ways="2 exact",
-      because="orders 1 and 3, paper, fast, accurate: coupling-presets")
-def exact():
-    return _within(1e-4, 5e-5, "half of what is asked", "exact")
-
-
-def _within(bound: float, allowed: float, why: str, *numerics: str):
     """Checks of the eight numbers, and of the reference."""
     theirs, error = _reference()
-    yield at_most("the reference itself", error, allowed, why)
+    yield at_most("the reference itself", error, 5e-5, "half of what is asked of exact")
     for name, apart in zip(whole_run.NAMES, _apart(_listed(*numerics), theirs)):
         yield at_most(name, apart, bound, "what the preset is for")
 
