@@ -26,7 +26,9 @@ class Brought(BaseAdapter):
     def send(self, request, **_):
         content = files("rocrate").joinpath("data/ro-crate.jsonld").read_bytes()
         found = Response()
-        found.status_code, found.url, found.request = 200, request.url, request
+        found.status_code = 200
+        found.url = request.url
+        found.request = request
         found.headers["Content-Type"] = "application/ld+json"
         found.raw = HTTPResponse(io.BytesIO(content), found.headers, 200, preload_content=False)
         return found

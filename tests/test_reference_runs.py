@@ -1,7 +1,7 @@
 """The references of whole runs, against what is known without them: the averaged pore, and the independent
 solver of base.
 
-Their flow and transport are judged by the cases that compare them with ours, to 1e-4 in coupling-exact.
+Their flow and transport are judged by the cases that compare them with ours, to 1e-4 in coupling-presets.
 """
 import numpy as np
 import pytest

@@ -10,6 +10,7 @@ import pytest
 
 from repro.errors import LinearError
 from repro.fem.space import Space
+from repro.scene.keys import PRESETS
 from verification.kernel import case, driver, matrix, mutants, report, writing
 from verification.kernel.case import (
     Outcome,
@@ -42,7 +43,9 @@ def test_a_number_holds_in_its_range_alone(made, bounds, inside, outside):
 
 
 def test_a_case_passes_only_if_it_measures_something_and_all_of_it_holds():
-    good, bad, steep = at_most("good", 0.5, 1.0, ""), at_most("bad", 2.0, 1.0, ""), study("e", SIZES, SIZES**3, 2, "")
+    good = at_most("good", 0.5, 1.0, "")
+    bad = at_most("bad", 2.0, 1.0, "")
+    steep = study("e", SIZES, SIZES**3, 2, "")
     assert result(good).verdict == case.PASSES
     for short in (result(good, bad), result(), result(good, error="ValueError"), result(good, studies=(steep,))):
         assert short.verdict == case.FALLS_SHORT
@@ -162,6 +165,26 @@ def test_an_orphan_is_told(monkeypatch):
     lost = replace(case.CASES["flow-plug"], mutants=("none",), ways=("1",), because="")
     monkeypatch.setitem(case.CASES, "flow-plug", lost)
     assert matrix.orphans() == ["case flow-plug"] and matrix.unexplained() == ["flow-plug"]
+
+
+@pytest.mark.parametrize("ways, because, told, explained", [
+    (case.WAYS, "", "", True), (case.WAYS[:-1], "", "", False), (case.WAYS[:-1], "exact: why", "exact: why", True),
+    (case.WAYS[:3], "", matrix.ALONE, True), (case.WAYS[:4], "", matrix.ONE_BY_ONE, True),
+    (case.WAYS[1:], "", "", False), (case.WAYS[1:], "order 1: why", "order 1: why", True)])
+def test_a_case_says_why_it_does_not_run_with_a_preset(monkeypatch, ways, because, told, explained):
+    """Above all with exact, where it runs with accurate."""
+    driver.load()
+    one = replace(case.CASES["coupling-units"], ways=ways, because=because)
+    monkeypatch.setitem(case.CASES, one.id, one)
+    assert matrix.reasons(one) == told and matrix.unexplained() == [one.id] * (not explained)
+
+
+def test_exact_has_the_elements_and_the_order_of_accurate():
+    """What is said of stages that run with accurate alone: what else differs are sizes and steps."""
+    apart = {key for key, value in PRESETS["exact"].items() if value != PRESETS["accurate"].get(key)}
+    assert PRESETS["accurate"].keys() <= PRESETS["exact"].keys()
+    assert apart == {"refinement", "tolerance", "contact_elements"}
+    assert {matrix.EXACT[stage] for stage in ("flow", "transport")} == {matrix.SAME}
 
 
 def test_what_is_round_off_or_another_machines_is_not_committed():

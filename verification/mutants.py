@@ -19,6 +19,8 @@ NETWORK = "tests/test_network.py::test_"
 STEPPING = "tests/test_stepping.py::test_"
 NOT_MET = "tests/test_warned.py::test_a_tolerance_that_no_step_can_meet_is_told_with_what_is_reached"
 UNSEEN = "tests/test_unseen.py::test_"
+BEFORE_END = f"{STEPPING}steps_and_rows_before_the_end_do_not_depend_on_it[fast-0.55]"
+GEAR = "tests/test_gear.py::test_"
 READERS = "tests/test_vtk.py::test_every_reader_reads_what_was_computed"
 
 MUTANTS = (
@@ -270,6 +272,27 @@ MUTANTS = (
          "(folder / NEWEST).unlink()",
          "tests/test_checkpoint.py::test_the_one_before_is_kept")),
     *changes(
+        "repro/run/stored.py",
+        ("biomass-of-another-area",
+         "A checkpoint is gone on from whose mass, area and expansion are not of one aggregate.",
+         "BALANCED[now.space.order] * other",
+         "APART * other",
+         "tests/test_checkpoint.py::test_arrays_that_no_run_comes_to_are_refused[fast-active-<lambda>0]")),
+    *changes(
+        "repro/run/whole.py",
+        ("over-before-its-end",
+         "A run that says it is completed is, wherever its rows end.",
+         "return abs(time - end) <=",
+         "return time - end <=",
+         "tests/test_resume.py::test_a_run_said_to_be_over_that_has_not_come_so_far_is_gone_on_with[completed]")),
+    *changes(
+        "repro/run/status.py",
+        ("over-by-its-first-words",
+         "A status that begins like that of a run at the end of its pore is one.",
+         "PORE_END.fullmatch(status)",
+         "PORE_END.match(status)",
+         f"{UNSEEN}what_has_not_come_to_its_end_is_made_again")),
+    *changes(
         "repro/run/record.py",
         ("rows-of-another-time",
          "A checkpoint whose rows do not end where its state is is gone on from.",
@@ -324,7 +347,12 @@ MUTANTS = (
          "A run that goes on with other libraries does not say so.",
          'key.startswith("conditions.threads")',
          'key.startswith("conditions.")',
-         f"{UNSEEN}a_resume_elsewhere_is_told[blas]")),
+         f"{UNSEEN}a_resume_elsewhere_is_told[blas]"),
+        ("page-never-made-again",
+         "A run that is over and has no page is left without one.",
+         'if left or not is_file(folder / "report.html"):',
+         "if left:",
+         "tests/test_machine.py::test_a_limit_of_file_sizes_ends_a_run_in_one_line[100000-report.html: ]")),
     *changes(
         "repro/run/recorder.py",
         ("origin-forgotten",
@@ -408,6 +436,13 @@ MUTANTS = (
          "return self.values[0]",
          "tests/test_scene_course.py::test_what_is_judged_is_the_extreme")),
     *changes(
+        "repro/scene/keys.py",
+        ("without-flow-in-part",
+         "A pore without flow is meshed in part.",
+         '"full" if self.stagnant else "central"',
+         '"central"',
+         f"{GEAR}without_flow_the_ends_of_the_pore_hold_the_supply[quasi_steady-fast]")),
+    *changes(
         "repro/scene/files.py",
         ("unset-takes-nothing",
          "--unset of a key takes nothing out.",
@@ -421,6 +456,16 @@ MUTANTS = (
          "growth.time_step * 2.0**power",
          "growth.time_step * 2.0**max(0, power)",
          f"{STEPPING}without_times_there_are_25_rows_at_round_times_in_a_run_of_any_length[1.0-0.025]"),
+        ("rows-of-the-step-that-is-cut",
+         "Rows within the step that passes the end are those of the shorter one that ends there.",
+         "within=passing.within",
+         "within=taken.within",
+         BEFORE_END),
+        ("steps-fitted-to-the-end",
+         "The last steps are made to fit the time that is left until the end.",
+         "left = corner - now.time",
+         'left = min(corner, needed(scene.growth, "[growth]").end) - now.time',
+         BEFORE_END),
         ("shorter-than-the-shortest",
          "Steps get shorter than the shortest, for a tolerance that it does not meet.",
          "length=max(pace.length, shortest)",
@@ -480,7 +525,12 @@ MUTANTS = (
          "Without flow a mesh that grows downstream does not find the supply there.",
          "(before < 0) | (x > ends[1])",
          "before < 0",
-         f"{UNSEEN}beyond_the_old_mesh_there_is_what_flows_or_diffuses_there[0.0-2]")),
+         f"{UNSEEN}beyond_the_old_mesh_there_is_what_flows_or_diffuses_there[0.0-2]"),
+        ("largest-supply-beyond-the-ends",
+         "Beyond the ends of the old mesh there is the largest supply of a table, whatever the time.",
+         "filled = scene.at(expanded.time if speed else 0.0)",
+         "filled = scene.largest",
+         "tests/test_transfer.py::test_beyond_the_old_mesh_no_other_time_s_water_appears[0.0-7.0]")),
     *changes(
         "repro/model/pore.py",
         ("meshes-for-the-first-velocity",
@@ -494,7 +544,20 @@ MUTANTS = (
          "Gear's method accepts less than nothing of a substrate by the larger of both supplies.",
          "np.array([[-part * s.supply] for s in problem.both])",
          "np.array([[-part * max(s.supply for s in problem.both)]] * 2)",
-         f"{UNSEEN}gears_method_takes_less_than_nothing_by_each_substrates_own_supply[2]")),
+         f"{UNSEEN}gears_method_takes_less_than_nothing_by_each_substrates_own_supply[2]"),
+        ("settled-from-before-the-jump",
+         "After a jump of the supply profiles settle from those before it, however large it is.",
+         "return supplied if jumps.any() else guess",
+         "return guess",
+         f"{GEAR}profiles_settle_after_a_jump_of_the_supply_at_constrained_ends[10.0-20.0-2]")),
+    *changes(
+        "repro/fem/linear.py",
+        ("underflow-is-no-solution",
+         "A row's residual is taken against its unknowns however small they are.",
+         "(np.abs(solution) + UNDERFLOW)",
+         "np.abs(solution)",
+         "tests/test_linear.py::test_a_solution_that_underflows_is_one",
+         f"{GEAR}a_substrate_may_be_used_up_to_nothing")),
 )
 
 if __name__ == "__main__":

@@ -131,7 +131,7 @@ OF_UPDATES = 1e-8, "J = theta to the stabilisation, and C to 1e-8 of the supply:
 OF_LONG_STEPS = 1e-6, "J = theta, and C to 1e-7 of the supply"
 #: Changes of a scene, by label, whose steps are those of a preset.
 LONG = {**{kind: (runs.by("fast"), runs.of(kind), runs.coarser(kind, 0.2)) for kind in runs.ELEMENTS},
-        "accurate": (runs.by("accurate"),)}
+        **{preset: (runs.by(preset),) for preset in runs.QUADRATIC[1:]}}
 
 
 @case("coupling-uniform-growth", kind="exact",
@@ -205,7 +205,7 @@ FOREIGN = ('pore.width="0.05 mm"', 'pore.length="0.06 cm"', 'aggregate.radius="5
 
 @case("coupling-foreign-units", kind="property", norm="largest difference of any node's place (um), and of C, at 1 h",
       claim="A scene written in other units is the same scene, bit for bit",
-      mutants=("rounded-twice",), over=runs.NUMERICS, ways="1 2")
+      mutants=("rounded-twice",), over=runs.WITH_EXACT, ways="1 2")
 def foreign_units(*changes: str):
     ours, theirs = (runs.last(runs.base(end, *changes, *units)) for end, units in (("1 h", ()), ("60 min", FOREIGN)))
     pairs = {"places": (ours.pore.mesh.points, theirs.pore.mesh.points),
@@ -281,7 +281,7 @@ SLOWER = (16.0, 8.0, 4.0, 2.0)
       claim="The paper's transient scheme and quasi-steady substrates make the same aggregate, up to the substrates' "
             "lag, which is as their storage",
       mutants=("rates-two-percent-low",), over=runs.kinds(0.4), ways="paper",
-      because="fast, accurate: the transient scheme goes with updates")
+      because="fast, accurate, exact: the transient scheme goes with updates")
 def quasi_steady(*changes: str):
     errors = refine(_lag, SLOWER, *changes)
     return [study(name, SLOWER, values, 1, "lag: first order in storage over reaction, 2e-4 for base", ceiling=3e-6,
@@ -358,7 +358,7 @@ def _equal_steps(scene, steps: int) -> np.ndarray:
       norm="relative difference between a run and that with half the step; base from a seed of 25 um, 2 h, no remesh",
       claim="The midpoint rule is of second order in time, with every kind of elements",
       mutants=("curved-rates-of-the-start", "midpoint-rates-of-the-start"), over=runs.ELEMENTS, ways="fast",
-      because="paper: coupling-midpoint-limit; accurate: equal steps know no tolerance, and so are those of fast")
+      because="paper: coupling-midpoint-limit; accurate, exact: equal steps know no tolerance: those of fast")
 def order_in_time(elements: str):
     scene = load_scene("base", (runs.by("fast"), runs.of(elements), "numerics.refinement=0.5",
                                 'aggregate.radius="25 um"'))
@@ -375,7 +375,7 @@ def order_in_time(elements: str):
             "not",
       mutants=("midpoint-rates-of-the-start", "rates-at-the-start", "stale-flow"), over=runs.kinds(0.3, 0.6),
       ways="paper",
-      because="fast, accurate: coupling-midpoint-order; their own tolerances would be seen")
+      because="fast, accurate, exact: coupling-midpoint-order; their own tolerances would be seen")
 def limit(*changes: str):
     """Remeshes, and the orders."""
     short = ('numerics.time="midpoint"', "numerics.tolerance=0.00003")
@@ -422,28 +422,17 @@ def _listed(preset: str, *changes: str) -> np.ndarray:
 @case("coupling-presets", kind="cross-code", slow=True,
       norm="largest difference at 19.2 and 19.4 h to an independent solver, extrapolated in space and time: relative, "
            "of effluents over the supply",
-      claim="Each of the eight numbers of base is within 1 % with preset fast, and within 0.1 % with preset accurate, "
-            "with quadratic and with cubic velocities and concentrations",
-      mutants=("curved-rates-of-the-start", "fluid-diffusivity", "uptake-without-decay", "cubic-shown-less"),
+      claim="Each of the eight numbers of base is within 1 % with preset fast, within 0.1 % with accurate, with "
+            "quadratic and with cubic velocities and concentrations, and within 0.01 % with exact",
+      mutants=("curved-rates-of-the-start", "fluid-diffusivity", "uptake-without-decay", "cubic-shown-less",
+               "exact-steps-of-accurate"),
       over={"fast": (1e-2, "fast"), "accurate": (1e-3, "accurate"),
-            "accurate, cubic": (1e-3, "accurate", runs.of("cubic"))}, ways="2",
+            "accurate, cubic": (1e-3, "accurate", runs.of("cubic")), "exact": (1e-4, "exact")}, ways="2",
       because="paper, order 1: its error is that of linear elements, see bench")
 def presets(bound: float, *numerics: str):
-    return _within(bound, 2e-4, "a fifth of what is asked of accurate", *numerics)
-
-
-@case("coupling-exact", kind="cross-code", slow=True, norm="as coupling-presets",
-      claim="Each of the eight numbers of base is within 0.01 % with preset exact",
-      mutants=("exact-steps-of-accurate",), ways="2",
-      because="orders 1 and 3 and the other presets: coupling-presets")
-def exact():
-    return _within(1e-4, 5e-5, "half of what is asked", "exact")
-
-
-def _within(bound: float, allowed: float, why: str, *numerics: str):
     """Checks of the eight numbers, and of the reference."""
     theirs, error = _reference()
-    yield at_most("the reference itself", error, allowed, why)
+    yield at_most("the reference itself", error, 5e-5, "half of what is asked of exact")
     for name, apart in zip(whole_run.NAMES, _apart(_listed(*numerics), theirs)):
         yield at_most(name, apart, bound, "what the preset is for")
 
@@ -455,7 +444,8 @@ def _within(bound: float, allowed: float, why: str, *numerics: str):
       mutants=("newton-never-reused",),
       over={**{f"{kind}, fast": (runs.by("fast"), runs.of(kind)) for kind in runs.ELEMENTS},
             **{f"{kind}, {preset}": (runs.by(preset),) for kind, preset in (("linear", "paper"),
-                                                                            ("quadratic", "accurate"))}})
+                                                                            ("quadratic", "accurate"),
+                                                                            ("quadratic", "exact"))}})
 def reused(*changes: str):
     (fresh, made), (again, fewer) = (_factorisations(kind, *changes) for kind in ("fresh", "reused"))
     return (at_most("difference", np.abs(again / fresh - 1).max(), 1e-8,

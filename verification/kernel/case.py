@@ -24,7 +24,7 @@ KINDS = ("exact", "manufactured", "cross-code", "property")
 STAGES = ("flow", "transport", "growth", "reprojection", "mesh_motion", "coupling", "hard")
 PASSES, FALLS_SHORT = "passes", "FALLS SHORT"
 #: What a case may run with: elements of order 1, 2 and 3, and the presets of whole scenes.
-WAYS = ("1", "2", "3", "paper", "fast", "accurate")
+WAYS = ("1", "2", "3", "paper", "fast", "accurate", "exact")
 #: The way that a word of a label stands for, where it is not one itself.
 OF_LABELS = {"linear": "1", "quadratic": "2", "cubic": "3", "order 1": "1", "order 2": "2", "order 3": "3",
              "straight": "1", "curved": "2", "of cubic scenes": "3"}

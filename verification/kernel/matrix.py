@@ -29,6 +29,11 @@ ORDERS, PRESETS = WAYS[:3], WAYS[3:]
 #: Why a case does not run with presets, and with all of them.
 ALONE = "presets: the stage alone, with the elements that they choose"
 ONE_BY_ONE = "other presets: their elements, by themselves"
+#: Why cases of a stage that run with accurate do not run with exact, where the case does not say it.
+SAME = "exact: the elements and the order of accurate"
+EXACT = {"flow": SAME, "transport": SAME,
+         "hard": "exact: the scheme of accurate, and some times slower; its contact and remeshes: coupling-contact, "
+                 "coupling-ledger"}
 #: A line of the table: sections and words, equations, modules, and a remark.
 LINE = re.compile(r"^ {4,}(\S.*?)\s{3,}((?:\(\d+\)[-, ]*)+)?\s*(repro\.[\w.]+(?:, \.\w+)*)(?:[: ].*)?$")
 #: The sections at the start of its first part: "3.1, 3.5", "2.1-2.3".
@@ -98,14 +103,30 @@ def row(case: Case) -> tuple[str, ...]:
 
 def reasons(case: Case) -> str:
     """Why it does not run with the others; "" where it runs with all."""
-    missing = {*WAYS} - {*case.ways}
-    default = ALONE if {*PRESETS} <= missing else ONE_BY_ONE
-    return "; ".join(filter(None, (case.because, default if {*PRESETS} & missing else "")))
+    untold = _untold(case)
+    default = ONE_BY_ONE if untold else ""
+    if untold == PRESETS:
+        default = ALONE
+    elif _exact_alone(case):
+        default = EXACT.get(case.stage, "")
+    return "; ".join(filter(None, (case.because, default)))
+
+
+def _untold(case: Case) -> tuple[str, ...]:
+    """The presets that it neither runs with nor tells of."""
+    return tuple(preset for preset in PRESETS if preset not in case.ways and preset not in case.because)
+
+
+def _exact_alone(case: Case) -> bool:
+    """Does it tell of all presets but exact, and run with accurate?"""
+    return "accurate" in case.ways and _untold(case) == ("exact",)
 
 
 def unexplained() -> list[str]:
-    """Cases that do not run with an order of elements, or with nothing at all, and do not say why."""
-    return [case.id for case in ordered() if not case.ways or ({*ORDERS} - {*case.ways} and not case.because)]
+    """Cases that do not run with an order of elements, with nothing at all, or with accurate and not with exact, and do
+    not say why."""
+    return [case.id for case in ordered() if not case.ways or ({*ORDERS} - {*case.ways} and not case.because)
+            or (_exact_alone(case) and case.stage not in EXACT)]
 
 
 def line(part: Part) -> tuple[str, ...]:

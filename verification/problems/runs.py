@@ -43,8 +43,11 @@ def by(preset: str) -> str:
 
 
 PRESETS = ("paper", "fast", "accurate")
+#: Those of quadratic elements and the midpoint rule.
+QUADRATIC = ("fast", "accurate", "exact")
 #: Changes of a scene, by label: the presets, and fast with cubic elements.
 NUMERICS = {**{preset: (by(preset),) for preset in PRESETS}, "cubic": (by("fast"), of("cubic"))}
+WITH_EXACT = {**NUMERICS, "exact": (by("exact"),)}
 
 
 def kinds(refinement: float, linear: float = 1.0) -> dict[str, tuple[str, ...]]:
@@ -54,7 +57,7 @@ def kinds(refinement: float, linear: float = 1.0) -> dict[str, tuple[str, ...]]:
 
 def every(refinement: float, linear: float = 1.0) -> dict[str, tuple[str, ...]]:
     """The same, and the presets."""
-    return {**kinds(refinement, linear), **{preset: (by(preset),) for preset in PRESETS[1:]}}
+    return {**kinds(refinement, linear), **{preset: (by(preset),) for preset in QUADRATIC}}
 
 
 EVERY = every(0.4)

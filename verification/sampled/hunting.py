@@ -170,9 +170,11 @@ def _short(how: str) -> str:
 
 def alike(test: str, file: str) -> int:
     """How many words the names of a test's file and of a module have in common."""
-    names = (Path(test.partition("::")[0]).stem, Path(file).with_suffix("").as_posix())
-    one, other = ({word.rstrip("s") for word in re.split(r"[/_]", name)} for name in names)
-    return len(one & other)
+    return len(_words(Path(test.partition("::")[0]).stem) & _words(Path(file).with_suffix("").as_posix()))
+
+
+def _words(name: str) -> set[str]:
+    return {word.rstrip("s") for word in re.split(r"[/_]", name)}
 
 
 def nearest(tests: list[Measured]) -> list[Measured]:
@@ -222,10 +224,6 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
      "return np.where(lost[:, None], 100.0, local)"):
         "Either is outside of every triangle, places found are from -2 to 3, and is brought back to the same place of "
         "its edge.",
-    ("march/updates.py", "update = min(round(count * growth.time_step, 9), scene.corner(time))",
-     "update = min(round(count * growth.time_step, 10), scene.corner(time))"):
-        "The same times for every update of base in the three presets, and so the same outputs: a time step needs more "
-        "than nine decimals to differ, by less than the 1e-9 h to which times are told apart.",
     ("model/flow.py", "@dataclass(frozen=True, eq=False)", "@dataclass(frozen=True, eq=True)"):
         "Bubble has no fields and is not compared, nor a key of anything: it is called.",
     ("model/flow.py", "@dataclass(frozen=True, eq=False) class Bubble:", "class Bubble:"):

@@ -384,8 +384,10 @@ def _measure(there: Path, name: str) -> dict[str, tuple[float, list[Call]]]:
     shared = {id: names for row in rows for id, names in row.get("collected", {}).items()}
     reports = [row for row in rows if "outcome" in row]
     bad = {row["test"] for row in reports if row["outcome"] != "passed"}
-    setups = {name: max((row["seconds"] for row in reports if name in shared.get(row["test"], ())), default=0.0)
-              for names in shared.values() for name in names}
+    setups: dict[str, float] = {}
+    for row in reports:
+        for name in shared.get(row["test"], ()):
+            setups[name] = max(setups.get(name, 0.0), row["seconds"])
     found = {}
     for id in shared:
         own = sum(row["seconds"] for row in reports if row["test"] == id)

@@ -47,7 +47,8 @@ def reach(quantity: str) -> float | None:
 def in_closed_form(form: Callable[..., float], *inputs: tuple[float, float]) -> tuple[float, float]:
     """Least and largest value of a form that is monotone in each input, as these move within their rounding: over the
     corners. inputs: (value, half a unit of its last digit) of each."""
-    values = [form(*ends) for ends in product(*((value - half, value + half) for value, half in inputs))]
+    ends = [(value - half, value + half) for value, half in inputs]
+    values = [form(*corner) for corner in product(*ends)]
     return min(values), max(values)
 
 

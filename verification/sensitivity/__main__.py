@@ -24,7 +24,7 @@ from verification import sensitivity
 from verification.claims import interval
 from verification.kernel.writing import Block, markdown, table
 from verification.sensitivity import rounding, wide
-from verification.sensitivity.rounding import INPUTS, ROUNDED, Runs, scene
+from verification.sensitivity.rounding import INPUTS, ROUNDED, Input, Runs, scene
 
 TARGET, OUTLINES = (Path(__file__).parent / name for name in ("tornado.svg", "supplies.svg"))
 NAMES = {"velocity_0": "mean velocity, t = 0", "velocity": "mean velocity, 19.2 h",
@@ -77,7 +77,7 @@ def of_supplies(found: dict[str, dict], target: Path) -> None:
 
 def _places(text: str) -> np.ndarray:
     """(M, 2) um."""
-    return np.array([[float(value) for value in pair.split(",")] for pair in text.split()])
+    return np.array([pair.split(",") for pair in text.split()], float)
 
 
 def tornado(record: dict, target: Path) -> None:
@@ -122,9 +122,12 @@ def page(record: dict) -> str:
 def _table(record: dict) -> Block:
     numbers = list(record["elasticities"])
     head = ("input", "rounding (%)", *(NAMES.get(name, name.replace("_", " ")) for name in numbers))
-    return table(head, ((each.name, f"{100 * each.rounding:.2g}" if each.half else "exact",
-                         *(_cell(record["elasticities"][name].get(each.name)) for name in numbers))
-                        for each in INPUTS))
+    return table(head, (_row(each, record["elasticities"]) for each in INPUTS))
+
+
+def _row(each: Input, elasticities: dict[str, dict]) -> tuple[str, ...]:
+    rounding = f"{100 * each.rounding:.2g}" if each.half else "exact"
+    return (each.name, rounding, *(_cell(known.get(each.name)) for known in elasticities.values()))
 
 
 def _cell(known: dict | None) -> str:
@@ -139,16 +142,20 @@ def _cell(known: dict | None) -> str:
 def _set(found: dict) -> Iterator[Block]:
     words = ("One set of inputs within the rounding gives all printed numbers of base at once" if found["reached"] else
              "No set of inputs within the rounding gives all printed numbers of base at once; the nearest")
-    sizes = ", ".join(f"{size:.3g}" for size in found["sizes"])
+    sizes = _listed(found["sizes"], ".3g")
     yield Block("heading", "One set of inputs")
     yield Block("text", f"{words} (a share of {found['share_of_the_rounding']:.2f} of the rounding is needed). It was "
                         f"run on sizes {sizes} of elements and steps, over those of `accurate`; the bar is from all of "
                         "them, and a set counts where the whole bar lies in the interval of the printed digits.")
     yield table(("number", "printed", "a run with the set", "bar", "on these sizes"), (
         (NAMES.get(name, name), "{:g} to {:g}".format(*interval(rounding.PRINTED[name])), f"{value:.4f}",
-         f"{found['bars'][name]:.1g}", ", ".join(f"{each:.4f}" for each in found["on_sizes"][name]))
+         f"{found['bars'][name]:.1g}", _listed(found["on_sizes"][name], ".4f"))
         for name, value in found["numbers"].items()))
     yield table(("input", "value"), ((name, f"{value:.4f}") for name, value in found["inputs"].items()))
+
+
+def _listed(values: list[float], how: str) -> str:
+    return ", ".join(format(value, how) for value in values)
 
 
 def _supplies(found: dict) -> Iterator[Block]:
@@ -166,11 +173,14 @@ def _held(found: dict[str, dict]) -> Iterator[Block]:
     yield Block("text", "Of the claims about this run, each judged anew with the converged solution at one size, to "
                 f"{wide.AFTER} h after contact or until the aggregate reaches an end of the pore, these hold with "
                 f"all supplies: {every}; with some: {some}; with none: {none}.")
-    rows = [(f"{id}, {quantity}", *("yes" if known["claims"][id].get(quantity) else "no" for known in found.values()))
-            for id, quantity in wide.moving(found)]
+    rows = [(f"{id}, {quantity}", *_holding(found, id, quantity)) for id, quantity in wide.moving(found)]
     if rows:
         yield Block("text", "Numbers that hold with some supplies and not with all:")
         yield table(("claim", *(f"{supply} K_s" for supply in found)), rows)
+
+
+def _holding(found: dict[str, dict], id: str, quantity: str) -> list[str]:
+    return ["yes" if known["claims"][id].get(quantity) else "no" for known in found.values()]
 
 
 def _after_contact(found: list[dict]) -> Iterator[Block]:
@@ -178,7 +188,7 @@ def _after_contact(found: list[dict]) -> Iterator[Block]:
     yield Block("text", "Values from the finest size to the coarsest; means are over whole hours from contact to 45 h. "
                 "A single row jumps as one more edge of the outline comes to rest on the wall.")
     yield table(("number", "values", "bar (%)", "asked (%)", "kept"), (
-        (known["quantity"], ", ".join(f"{value:.4g}" for value in known["values"]), f"{known['bar_percent']:.2g}",
+        (known["quantity"], _listed(known["values"], ".4g"), f"{known['bar_percent']:.2g}",
          f"{known['asked_percent']:g}", "yes" if known["kept"] else "no") for known in found))
 
 
@@ -190,8 +200,11 @@ def _sobol(found: dict) -> Iterator[Block]:
                 f"with an input. The widest of the intervals is {widest:.2f} to either side; more samples "
                 "(`--sobol N`) narrow them as the root of their number.")
     yield table(("number", *found["inputs"]), (
-        (NAMES.get(name, name), *(f"{value:.2f} ({low:.2f} to {high:.2f})" for value, low, high in
-                                  known["total_order"])) for name, known in found["numbers"].items()))
+        (NAMES.get(name, name), *map(_index, known["total_order"])) for name, known in found["numbers"].items()))
+
+
+def _index(known: list[float]) -> str:
+    return "{:.2f} ({:.2f} to {:.2f})".format(*known)
 
 
 #: What is told of the parts of the record that are there, in this order.

@@ -228,8 +228,13 @@ def elasticities(runs: Runs, name: str) -> dict[str, dict[str, dict]]:
 
 def _of_input(runs: Runs, name: str, each: Input, plain: Numbers) -> dict[str, dict]:
     distances = (NEAR, FAR) if each.half else (NEAR, FAR, LARGE)
-    pairs = {d: [runs.numbers(scene(name, {each.name: factor})) for factor in (1 + d, 1 - d)] for d in distances}
+    pairs = {distance: _pair(runs, name, each, distance) for distance in distances}
     return {number: _told(number, value, pairs) for number, value in plain.items()}
+
+
+def _pair(runs: Runs, name: str, each: Input, distance: float) -> list[Numbers]:
+    """Numbers with an input above its value and below it."""
+    return [runs.numbers(scene(name, {each.name: factor})) for factor in (1 + distance, 1 - distance)]
 
 
 def _told(number: str, value: float, pairs: dict[float, list[Numbers]]) -> dict:
@@ -252,9 +257,11 @@ PRINTED = {"velocity_0": "2.9", "velocity": "1.5", "effluent_acceptor": "4.19", 
 #: Sizes of elements and steps of the runs that make the set, the one that counts first: on 0.5, 2**-0.5 and 1 the bar
 #: of the acceptor effluent, 0.005, is as wide as what its digits leave to either side.
 SET_SIZES = (2**-1.5, 0.5, 2**-0.5)
-#: How many bars a number is kept inside its interval, and the part of this around its middle that is aimed at; the rest
-#: is for what is not linear, of which AIMED to ENOUGH is let be.
-KEPT_INSIDE, AIMED, ENOUGH = 1.5, 0.4, 0.5
+#: How many bars a number is kept inside its interval.
+KEPT_INSIDE = 1.5
+#: The part of the interval around its middle that is aimed at; the rest is for what is not linear, of which AIMED to
+#: ENOUGH is let be.
+AIMED, ENOUGH = 0.4, 0.5
 ROUNDS = 6
 
 
@@ -282,8 +289,7 @@ def one_set(runs: Runs, elasticities: dict[str, dict[str, dict]]) -> dict:
     whether it is reached."""
     rows = _on_sizes(runs, {})
     start, bars = printed_of(rows[0]), _bars(rows)
-    slopes = np.array([[elasticities[name][each.name]["elasticity"] for each in ROUNDED] for name in PRINTED])
-    slopes = start[:, None] * slopes
+    slopes = start[:, None] * _table(elasticities)
     kept = printed_of(bars)
     for _ in range(ROUNDS):
         x, t = program(start, slopes, kept)
@@ -298,7 +304,22 @@ def one_set(runs: Runs, elasticities: dict[str, dict[str, dict]]) -> dict:
     return {"reached": bool(t <= 1 + 1e-9 and left <= 1), "share_of_the_rounding": t, "misfit_in_half_intervals": left,
             "inputs": {name: BY_NAME[name].value * factor for name, factor in factors.items()},
             "numbers": {name: numbers[name] for name in PRINTED}, "bars": bars, "sizes": list(SET_SIZES),
-            "on_sizes": {name: [row[name] for row in rows] for name in PRINTED}}
+            "on_sizes": {name: column(rows, name) for name in PRINTED}}
+
+
+def _table(elasticities: dict[str, dict[str, dict]]) -> np.ndarray:
+    """(printed numbers, rounded inputs) their elasticities."""
+    return np.array([_in_order(elasticities[name]) for name in PRINTED])
+
+
+def _in_order(known: dict[str, dict]) -> list[float]:
+    """Elasticities of one number."""
+    return [known[each.name]["elasticity"] for each in ROUNDED]
+
+
+def column(rows: list[Numbers], name: str) -> list[float]:
+    """A number of some runs."""
+    return [row[name] for row in rows]
 
 
 def _on_sizes(runs: Runs, factors: dict[str, float]) -> list[Numbers]:
@@ -308,7 +329,7 @@ def _on_sizes(runs: Runs, factors: dict[str, float]) -> list[Numbers]:
 
 def _bars(rows: list[Numbers]) -> Numbers:
     """Of each printed number."""
-    return {name: estimate(SET_SIZES, [row[name] for row in rows], MESH_ORDERS).bar for name in PRINTED}
+    return {name: estimate(SET_SIZES, column(rows, name), MESH_ORDERS).bar for name in PRINTED}
 
 
 def program(start: np.ndarray, slopes: np.ndarray, bars: np.ndarray) -> tuple[np.ndarray, float]:
@@ -343,20 +364,16 @@ FAST = ('numerics.preset="fast"',)
 
 def moving(elasticities: dict[str, dict[str, dict]]) -> list[Input]:
     """Rounded inputs with an elasticity above LEAST of any printed number."""
-    return [each for each in ROUNDED if any(_moves(each, elasticities[name]) for name in PRINTED)]
-
-
-def _moves(each: Input, known: dict[str, dict]) -> bool:
-    """Does an input move a number?"""
-    return abs(known[each.name]["elasticity"]) > LEAST
+    most = np.abs(_table(elasticities)).max(axis=0)
+    return [each for each, largest in zip(ROUNDED, most) if largest > LEAST]
 
 
 def sobol(runs: Runs, elasticities: dict[str, dict[str, dict]], samples: int) -> dict:
     """First-order and total indices of each printed number, with their intervals."""
     chosen = moving(elasticities)
     inputs = [each.name for each in chosen]
-    names = [name for name in PRINTED
-             if name != "consumed" and any(_moves(each, elasticities[name]) for each in ROUNDED)]
+    moved = np.abs(_table(elasticities)).max(axis=1) > LEAST
+    names = [name for name, moves in zip(PRINTED, moved) if moves and name != "consumed"]
 
     def numbers(x: np.ndarray) -> np.ndarray:
         rows = [runs.numbers(scene("base", dict(zip(inputs, column)), *FAST)) for column in x.T]
@@ -365,11 +382,12 @@ def sobol(runs: Runs, elasticities: dict[str, dict[str, dict]], samples: int) ->
     found = sobol_indices(func=numbers, n=samples, dists=spread, rng=np.random.default_rng(SEED))
     sure = found.bootstrap(confidence_level=CONFIDENCE, n_resamples=999)
     return {"samples": samples, "inputs": inputs, "confidence": CONFIDENCE,
-            "numbers": {name: {kind: _listed(getattr(found, kind)[row], getattr(sure, kind).confidence_interval, row)
-                               for kind in ("first_order", "total_order")} for row, name in enumerate(names)}}
+            "numbers": {name: {"first_order": _listed(found.first_order, sure.first_order, row),
+                               "total_order": _listed(found.total_order, sure.total_order, row)}
+                        for row, name in enumerate(names)}}
 
 
-def _listed(values: np.ndarray, interval, row: int) -> list[list[float]]:
+def _listed(values: np.ndarray, sure, row: int) -> list[list[float]]:
     """[index, low, high] of each input."""
-    return [[float(value), float(low), float(high)]
-            for value, low, high in zip(values, interval.low[row], interval.high[row])]
+    interval = sure.confidence_interval
+    return np.column_stack([values[row], interval.low[row], interval.high[row]]).tolist()

@@ -30,7 +30,7 @@ from verification.claims.evaluate import MESH_ORDERS, unnumbered
 from verification.claims.growth_pattern import contact_length
 from verification.claims.levels import CONVERGED, Level, at_level, converged, forget
 from verification.claims.runs import WIDE, bodies, polygon, series
-from verification.sensitivity.rounding import OF, Numbers, Runs, scene
+from verification.sensitivity.rounding import OF, Numbers, Runs, column, scene
 from verification.uncertainty import estimate
 
 SIZES = (2**-1.5, 0.5, 2**-0.5, 1.0)
@@ -68,8 +68,8 @@ OF["after contact"] = of_after
 def after_contact(runs: Runs) -> list[dict]:
     """Each number on all sizes, its bar (%), and whether that is what is asked."""
     sizes = [runs.numbers(_on_size(size)) for size in SIZES]
-    return [bar_of(f"{kind} {name}", [row[f"{kind} {name}"] for row in sizes], asked)
-            for kind in KINDS for name, asked in ASKED.items()]
+    wanted = {f"{kind} {name}": asked for kind in KINDS for name, asked in ASKED.items()}
+    return [bar_of(quantity, column(sizes, quantity), asked) for quantity, asked in wanted.items()]
 
 
 def _on_size(size: float):
@@ -187,5 +187,9 @@ def verdicts(found: dict[str, dict]) -> tuple[list[str], list[str], list[str]]:
 def moving(found: dict[str, dict]) -> list[tuple[str, str]]:
     """(claim, quantity) of the checks that hold with some supplies and not with all."""
     first = next(iter(found.values()))["claims"]
-    return [(id, name) for id, held in first.items() for name in held
-            if len({known["claims"][id][name] for known in found.values()}) > 1]
+    return [(id, name) for id, held in first.items() for name in held if _differs(found, id, name)]
+
+
+def _differs(found: dict[str, dict], id: str, name: str) -> bool:
+    """Does a check hold with some supplies alone?"""
+    return len({known["claims"][id][name] for known in found.values()}) > 1
