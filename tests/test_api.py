@@ -73,6 +73,17 @@ def test_a_time_that_is_off_by_round_off_is_that_of_its_row():
     said = Results("x", rows, [{"row": k} for k in range(3)], "completed")
     for row, time in enumerate(said.time):
         assert [said.fields(time + off)["row"] for off in (-1e-12, 0.0, 1e-12)] == [row] * 3
+    with pytest.raises(KeyError, match="nan h: not a reported time"):
+        said.fields(np.nan)
+
+
+def test_a_run_without_rows_can_be_shown():
+    """It failed before its first row was there."""
+    none = Results("x", [], [], "failed")
+    assert repr(none) == "<Results of x: 0 rows, 1 columns, failed>" and "<img" not in none._repr_html_()
+    assert len(none.to_pandas()) == 0 and none.to_xarray().sizes["time_h"] == 0
+    with pytest.raises(KeyError, match="0.0 h: not a reported time; none is"):
+        none.fields(0.0)
 
 
 def test_a_run_to_the_pores_end_says_so():
@@ -212,9 +223,25 @@ def test_fields_that_are_lost_are_told_and_none_is_taken_for_another(found, tmp_
             with pytest.raises(OutputError, match=rf"fields_000{row}.vtu: the fields of {found.time[row]} h are miss"):
                 one.fields(found.time[row])
             assert one.units == found.units and "<img" not in one._repr_html_()
+    whole = (tmp_path / "fields/fields_0003.vtu").read_text()
+    for damaged in (whole[:len(whole) // 2], whole.replace("UnstructuredGrid", "Grid"), whole.replace("Float64", "F")):
+        (tmp_path / "fields/fields_0003.vtu").write_text(damaged)
+        with pytest.raises(OutputError, match="fields_0003.vtu: the fields cannot be read"):
+            loaded.fields(0.6)
     (tmp_path / "fields.pvd").unlink()
     with pytest.raises(OutputError, match=r"fields\.pvd: no fields of 0.6 h are listed"):
         repro.load_run(tmp_path).fields(0.6)
+    (tmp_path / "fields.pvd").write_text("<VTKFile>")
+    with pytest.raises(OutputError, match=r"fields\.pvd: it cannot be read"):
+        repro.load_run(tmp_path)
+
+
+def test_a_table_that_lacks_a_column_is_refused_by_its_name(found, tmp_path):
+    repro.run(load_scene("base", SHORT), str(tmp_path))
+    table = tmp_path / "timeseries.csv"
+    table.write_text(table.read_text().replace("contact", "touched", 1))
+    with pytest.raises(OutputError, match="timeseries.csv has no column contact"):
+        repro.load_run(tmp_path)
 
 
 def test_data_frames_and_datasets_have_names_and_units(found):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from repro.report import charts
+from repro.sweep.picture import Axis
 from tests.pages import first
 
 ROUNDED = 0.11  # of a difference of two places, each rounded to 0.1
@@ -40,6 +41,17 @@ def test_a_line_is_where_its_numbers_and_the_ticks_say(values, log):
     assert np.allclose((across - across[0]) / (across[-1] - across[0]), times / 10, atol=1e-3)
     hours = [(float(x), float(time)) for x, time in re.findall('<text class="x" x="([^"]*)" y="[^"]*">([^<]*)<', text)]
     assert np.allclose(across, np.interp(times, *np.array(hours).T[::-1]), atol=ROUNDED) and len(hours) >= 3
+
+
+@pytest.mark.parametrize("low, high", [(123400, 123460), (99950, 100050), (2.0001e-4, 2.0004e-4), (0, 3e6), (-7, 0),
+                                       (1000.2, 1000.9), (0, 2e-9)])
+def test_labels_of_ticks_are_the_ticks(low, high):
+    """To round-off, far from zero and from one; on the axes of a sweep's page too."""
+    told = charts.ticks(charts.Scale(low, high, 0, 100), 4)
+    values, texts = zip(*told)
+    assert len(told) >= 3 and [float(text) for text in texts] == pytest.approx(values, rel=1e-12)
+    axis = Axis("", low, high)
+    assert [float(axis.said(value)) for value in axis.ticks()] == pytest.approx(axis.ticks(), rel=1e-12, abs=1e-20)
 
 
 def test_a_legend_names_each_line_by_its_colour():

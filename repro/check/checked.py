@@ -93,9 +93,9 @@ def _cost(expected: Cost) -> Iterator[str]:
 
 
 def _seconds(value: float) -> str:
-    """Two digits."""
+    """Two digits, and three of a hundred seconds."""
     if value < 120:
-        return f"{value:.2g} s"
+        return f"{value:.2g} s" if value < 99.5 else f"{value:.0f} s"
     return f"{value / 60:.0f} min" if value < 7200 else f"{value / 3600:.0f} h"
 
 

@@ -138,18 +138,20 @@ def ticks(scale: Scale, parts: int = 5) -> list[tuple[float, str]]:
         return [(10.0**k, number(10.0**k)) for k in range(first, last + 1, every)]
     step = _step(scale.high - scale.low, parts)
     steps = range(math.ceil(scale.low / step - 1e-6), math.floor(scale.high / step + 1e-6) + 1)
-    digits = max(0, -math.floor(math.log10(step) + 1e-9))
+    digits = -math.floor(math.log10(step) + 1e-9)
     return [(k * step, number(k * step, digits)) for k in steps]
 
 
 def number(value: float, digits: int | None = None) -> str:
-    """A number as a reader likes it: `digits` decimals, or six significant ones."""
+    """A number as a reader likes it: as many decimals as `digits`, which may be negative, or six
+    significant ones; far from one with a power of ten and the same decimals, or four digits."""
     if value == 0:
         return "0"
     if not 1e-3 <= abs(value) < 1e5:
-        mantissa, _, power = f"{value:.4g}".partition("e")
+        known = 4 if digits is None else math.floor(math.log10(abs(value)) + 1e-9) + digits + 1
+        mantissa, _, power = f"{value:.{max(1, known)}g}".partition("e")
         return f"{mantissa}e{int(power)}" if power else mantissa
-    return f"{value:.{digits}f}" if digits is not None else f"{value:.6g}"
+    return f"{value:.{max(0, digits)}f}" if digits is not None else f"{value:.6g}"
 
 
 def _grid(x: Scale, y: Scale) -> str:

@@ -43,10 +43,13 @@ def index(folder: Path, name: str = "fields.pvd") -> list[tuple[float, Path]]:
 
 def listed(folder: Path, name: str = "fields.pvd") -> list[tuple[float, Path]]:
     """(time in h, file) of the fields that a run has written, whether they are still there or not;
-    only its own files are told."""
+    only its own files are told. Raises ValueError where the list cannot be read."""
     if not (folder / name).exists():
         return []
-    entries = ElementTree.parse(folder / name).getroot().iter("DataSet")
+    try:
+        entries = ElementTree.parse(folder / name).getroot().iter("DataSet")
+    except ElementTree.ParseError as error:
+        raise ValueError(f"{folder / name}: it cannot be read: {error}") from error
     named = [(float(entry.get("timestep", "nan")), entry.get("file", "")) for entry in entries]
     return [(time, folder / name) for time, name in named if _FILE.fullmatch(name)]
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import html
-import zlib
-from xml.etree.ElementTree import ParseError
 
 import numpy as np
 
@@ -69,7 +67,7 @@ def _packed(run: Run, spent: int) -> dict:
         own = "before_expansion.pvd" in _list(run.record.get("files"))
         before = fields.index(run.folder, "before_expansion.pvd") if own else []
         return fields.packed(fields.index(run.folder), before, spent)
-    except (ParseError, ValueError, LookupError, TypeError, zlib.error) as error:
+    except (ValueError, LookupError, TypeError) as error:
         raise ValueError(f"{run.folder}: the fields cannot be read: {error!r}") from error
 
 

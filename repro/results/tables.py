@@ -17,6 +17,8 @@ from repro.results.quantities import plain as unit
 from repro.results.vtu import Grid
 from repro.scene import Source, load_scene
 
+#: The column that a run has whatever it models, and without a row.
+TIME = "time_h"
 #: Times of a notebook's table at either end.
 SHOWN = 5
 
@@ -31,7 +33,7 @@ class Results(Mapping[str, np.ndarray]):
         self.columns: dict[str, np.ndarray] = {}
         for key in results.COLUMNS:
             values = [row[key] for row in rows]
-            if values.count(None) < len(values):
+            if key == TIME or values.count(None) < len(values):
                 self.columns[key] = np.array([np.nan if value is None else value
                                               for value in values])
         self.name = name
@@ -60,21 +62,22 @@ class Results(Mapping[str, np.ndarray]):
     @property
     def time(self) -> np.ndarray:
         """Reported times, h."""
-        return self.columns["time_h"]
+        return self.columns[TIME]
 
     def fields(self, time: float) -> Mapping[str, np.ndarray]:
         """What is known all over the pore at a reported time (h): places_um (N, 2), triangles
         (T, 3), or (T, 6) of quadratic ones, and values (N,), (N, 3) for vectors, or (T,) by name.
         Raises KeyError for any other time."""
-        row = int(np.argmin(np.abs(self.time - time)))
-        if abs(self.time[row] - time) > SAME_TIME:
-            raise KeyError(f"{time} h: not a reported time; the nearest is {self.time[row]} h")
-        return self._fields[row]
+        apart = np.abs(self.time - time)
+        if not (apart <= SAME_TIME).any():
+            near = f"the nearest is {self.time[apart.argmin()]} h" if len(apart) else "none is"
+            raise KeyError(f"{time} h: not a reported time; {near}")
+        return self._fields[int(apart.argmin())]
 
     def to_pandas(self):
         """A ``pandas.DataFrame`` of the columns by ``time_h``; ``attrs["units"]`` has their units.
         Raises ImportError where pandas is not installed."""
-        frame = _package("pandas").DataFrame(self.columns).set_index("time_h")
+        frame = _package("pandas").DataFrame(self.columns).set_index(TIME)
         frame.attrs.update(scene=self.name, status=self.status,
                            units={name: unit(name) for name in self.columns})
         return frame
@@ -84,8 +87,8 @@ class Results(Mapping[str, np.ndarray]):
         ``long_name``. Raises ImportError where xarray is not installed."""
         told = {name: {"units": names.udunits(name), "long_name": names.words(name)}
                 for name in self.columns}
-        columns = {name: ("time_h", values, told[name]) for name, values in self.columns.items()}
-        times = {"time_h": columns.pop("time_h")}
+        columns = {name: (TIME, values, told[name]) for name, values in self.columns.items()}
+        times = {TIME: columns.pop(TIME)}
         about = {"scene": self.name, "status": self.status}
         return _package("xarray").Dataset(columns, times, about)
 
@@ -106,7 +109,7 @@ class Results(Mapping[str, np.ndarray]):
 
     def _shown(self) -> str:
         """Key figures and the picture of the last state; nothing of a run without rows."""
-        if not self.columns:
+        if not len(self.time):
             return ""
         known = len(self._fields) == len(self.time)
         shown = picture.figure(self._fields[-1], self.time[-1]) if known else ""

@@ -90,12 +90,19 @@ def _encoded(data: bytes) -> str:
 def read(path: Path) -> Grid:
     """The grid in a file that :func:`write` or meshio has written.
 
-    Raises OSError where it cannot be read, and ValueError, LookupError, ParseError or zlib.error
-    where it is none.
+    Raises OSError where it cannot be read, and ValueError where it is none.
     """
-    piece = ElementTree.parse(path).getroot().find("UnstructuredGrid/Piece")
+    try:
+        return _grid(ElementTree.parse(path).getroot())
+    except (ElementTree.ParseError, LookupError, TypeError, zlib.error) as error:
+        raise ValueError(f"{path}: no unstructured grid: {error}") from error
+
+
+def _grid(root: ElementTree.Element) -> Grid:
+    """The grid in a file's elements."""
+    piece = root.find("UnstructuredGrid/Piece")
     if piece is None:
-        raise ValueError(f"{path}: no unstructured grid")
+        raise ValueError("no unstructured grid")
     parts = {name: _arrays(piece.find(name))
              for name in ("Points", "Cells", "PointData", "CellData")}
     points = parts["Points"].popitem()[1]

@@ -9,7 +9,7 @@ import numpy as np
 
 from repro.errors import OutputError
 from repro.report import fields, reading
-from repro.results import vtu
+from repro.results import COLUMNS, vtu
 from repro.results.tables import Results, arrays
 
 
@@ -17,15 +17,19 @@ def load_run(folder: str | Path) -> Results:
     """What a run has written in its folder, over or not: rows now, fields when they are asked for.
 
     Raises OutputError where the folder holds no run that can be read, and, when they are asked for,
-    where the file of a time's fields is missing.
+    where the file of a time's fields is missing or cannot be read.
     """
     try:
         run = reading.read(Path(folder))
-    except reading.NoRun as error:
+        listed = dict(fields.listed(run.folder))
+    except ValueError as error:
         raise OutputError(str(error)) from None
+    if absent := set(COLUMNS) - run.series.keys():
+        raise OutputError(f"{folder}: timeseries.csv has no column {min(absent)}; a run of this "
+                          "version is needed")
     rows = [dict(zip(run.series, map(_known, values)))
             for values in np.column_stack(list(run.series.values())).tolist()]
-    files = _Files(run.folder, run.times, dict(fields.listed(run.folder)))
+    files = _Files(run.folder, run.times, listed)
     return Results(str(run.record.get("scene")), rows, files, str(run.record.get("status")))
 
 
@@ -53,7 +57,15 @@ class _Files(Sequence[dict[str, np.ndarray]]):
             raise OutputError(f"{self.folder / 'fields.pvd'}: no fields of {time} h are listed")
         if not path.is_file():
             raise OutputError(f"{path}: the fields of {time} h are missing")
-        return arrays(vtu.read(path))
+        return _read(path)
 
     def __iter__(self) -> Iterator[dict[str, np.ndarray]]:
-        return (arrays(vtu.read(path)) for path in self.files.values() if path.is_file())
+        return (_read(path) for path in self.files.values() if path.is_file())
+
+
+def _read(path: Path) -> dict[str, np.ndarray]:
+    """The arrays of a file."""
+    try:
+        return arrays(vtu.read(path))
+    except (OSError, ValueError) as error:
+        raise OutputError(f"{path}: the fields cannot be read: {error}") from error

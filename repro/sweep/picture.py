@@ -42,9 +42,14 @@ class Axis:
             return [float(place) for place in range(len(self.words))]
         if self.log:
             return self._decades()
-        step = _round_step((self.high - self.low) / 5)
-        first = math.ceil(self.low / step - 1e-9)
-        return [k * step for k in range(first, math.floor(self.high / step + 1e-9) + 1)]
+        first = math.ceil(self.low / self._step - 1e-9)
+        last = math.floor(self.high / self._step + 1e-9)
+        return [k * self._step for k in range(first, last + 1)]
+
+    @property
+    def _step(self) -> float:
+        """From one tick to the next."""
+        return _round_step((self.high - self.low) / 5)
 
     def _decades(self) -> list[float]:
         """Powers of ten between the ends, with 2 and 5 times these where there are few."""
@@ -55,8 +60,11 @@ class Axis:
         return found if len(found) > 1 else [self.low, self.high]
 
     def said(self, value: float) -> str:
-        """What stands at a tick."""
-        return escape(self.words[int(value)]) if self.words else f"{value:.4g}"
+        """What stands at a tick: four digits, or as many as tell it from the next one."""
+        if self.words:
+            return escape(self.words[int(value)])
+        over = 1.0 if self.log else max(abs(self.low), abs(self.high)) / self._step
+        return f"{value:.{max(4, 1 + math.ceil(math.log10(over)))}g}"
 
 
 def _round_step(least: float) -> float:
