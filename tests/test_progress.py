@@ -35,7 +35,7 @@ def test_json_is_an_object_a_line_and_nothing_else(tmp_path, capsys):
     assert names[0] == "start" and names[-1] == "end" and names.count("contact") == 1
     warnings = [event for event in events if event["event"] == "warning"]
     assert err == "".join(f"repro: warning: {event['message']}\n" for event in warnings)
-    assert {event["key"] for event in warnings} == {"growth.end"}
+    assert {event["key"] for event in warnings} == {"growth.end", "flow"}
     steps = [event for event in events if event["event"] == "step"]
     assert [event["step"] for event in steps] == list(range(len(steps))) and steps[-1]["time_h"] == 0.6
     assert names.count("remesh") == steps[-1]["remeshes"] == told(folder)["remeshes"] > 0

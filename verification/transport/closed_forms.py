@@ -359,7 +359,7 @@ def _added(space: Space, mean: float, supply: float, chosen, inlet: str) -> np.n
     where, weight, values = in_points(space)
     forcing = weight * _by_side(space.mesh.biomass, chosen, "forcing", where[..., 0], where[..., 1])
     found = np.bincount(space.cells.ravel(), (forcing @ values).ravel(), space.count)
-    for nodes in _sides(space):
+    for nodes in _of_triangles_sides(space):
         found += _through(space, nodes, mean, supply, chosen, inlet)
     return found
 
@@ -369,7 +369,7 @@ def _by_side(biomass, chosen, name: str, x, y) -> np.ndarray:
     return np.where(biomass[:, None], *(getattr(chosen[side], name)(x, y) for side in ("biomass", "fluid")))
 
 
-def _sides(space: Space):
+def _of_triangles_sides(space: Space):
     """Of each side of the pore the nodes (E, e) of its edges, from end to end, counterclockwise."""
     for axis, side, turn in ((0, ENDS[0], -1), (1, 0.0, 1), (0, ENDS[1], 1), (1, WIDTH, -1)):
         line = np.flatnonzero(np.isclose(space.points[:, axis], side))
