@@ -296,7 +296,7 @@ LENGTH = 600.0
 SLENDER = (0.25, 0.177, 0.125, 0.0884)
 
 
-@case("coupling-averaged-flow", kind="cross-code",
+@case("coupling-averaged-flow", kind="cross-code", slow=True,
       norm="head loss of the whole pore less that of lubrication, over what the latter has more than a clean channel; "
            "refinement 2.5 over the order of the elements; a bump 8 (1 - s^2)^2 um high in 20 um",
       claim="The head loss of a long aggregate is that of developed flow in each section, and the next term is that of "

@@ -303,7 +303,7 @@ def _area(scene: Scene, last: Instant) -> Check:
                    "J = theta to the stabilisation")
 
 
-@case("coupling-wedge", kind="property",
+@case("coupling-wedge", kind="property", slow=True,
       norm="one step from a disc of 20 um that stands on a chord, the fluid under it at 8 degrees",
       claim="Wedges of fluid beside a contact surface close until they have the least contact angle",
       mutants=("no-wedge-closes", "films-stay-open"), over=runs.every(0.6), ways="paper")

@@ -303,7 +303,7 @@ def _slower(factor: float, transport_scheme: str, *changes: str):
     return runs.at_velocity(replace(scene, kinetics=law), runs.SPEED / factor)
 
 
-@case("coupling-extent", kind="property",
+@case("coupling-extent", kind="property", slow=True,
       norm="t = 0, refinement 2 (linear) and 0.6: conductivity and effluents relative; section means of C along the "
            "central mesh, over the supply",
       claim="The central mesh with (6) and (26) beyond it is worth the whole pore",

@@ -278,7 +278,7 @@ def _moved(factor: float, *changes: str) -> tuple[pore.Pore, pore.Pore, np.ndarr
     return now, contact.expand(said, now, theta)[0], theta
 
 
-@case("coupling-traction-fixed-point", kind="property",
+@case("coupling-traction-fixed-point", kind="property", slow=True,
       norm="nodes' move by the fluid, over the force's factor and R, against that of the factor below; defect of the "
            "equilibrium under the forces of the flow around its own shape, and around the shape before",
       claim="The move is proportional to the force as the force falls, and shape and flow agree in the end",

@@ -184,7 +184,7 @@ def _own(level: int) -> dict[str, float]:
             "pressure": bodies.relative(pressure / MODULUS, level_of, weight)}
 
 
-@case("growth-uneven", kind="cross-code", norm=NORM,
+@case("growth-uneven", kind="cross-code", slow=True, norm=NORM,
       claim="A half-disc that grows ten times as much at the front as at the rear, and more above than on the wall, "
             "agrees with quadratic elements, whatever mu_L is, on straight and on curved triangles",
       mutants=("theta-power", "third-power", "stabilisation-sign"), over=bodies.EVERY)
@@ -232,7 +232,8 @@ def _errors(size: float, seed: int, kind: int, exact) -> dict[str, float]:
             "pressure": bodies.pressure_error(body, found.pressure, exact.pressure)}
 
 
-@case("growth-manufactured", kind="manufactured", norm="L2 of places and pressure over the body at t = 0, relative, "
+@case("growth-manufactured", kind="manufactured", slow=True,
+      norm="L2 of places and pressure over the body at t = 0, relative, "
       "root mean square over three or four random meshes a size",
       claim="A made-up growth with theta from 1 to 6.5, shears to one and an uneven pressure, held by body force and "
             "traction, is found at its order, whether the pressure has a slope on the rim or not, on straight and on "

@@ -358,7 +358,7 @@ IN_TIME = {f"Pe = {peclet:g}, X = {density:g} mg/L, {word}": (ORDERS[word], pecl
                ("quadratic", CELLS[0], 5.0, 3e5, 1e-5), ("cubic", 5.0, 1.0, 3e4, 3e-6), ("cubic", 5.0, 5.0, 3e5, 1e-5))}
 
 
-@case("transport-gear-in-time", kind="cross-code",
+@case("transport-gear-in-time", kind="cross-code", slow=True,
       norm="largest over three times of the root mean square over the nodes, over the supply",
       claim="On a given mesh the modified Gear scheme's concentrations, linear, quadratic and cubic, are those of "
             "scipy's integrator with scikit-fem's mass matrix, with an error of second order in the step",
