@@ -278,8 +278,8 @@ def test_what_is_modelled_has_the_numbers_of_the_scene():
         assert dict(modelled(load_scene("base", [outline])))["aggregate"].startswith(f"biomass inside {how} 3 points")
 
 
-@pytest.mark.parametrize("seconds, said", [(0.123, "0.12 s"), (45.3, "45 s"), (119.0, "119 s"), (130.0, "2 min"), (7100.0, "118 min"),
-                                           (7300.0, "2 h"), (90000.0, "25 h")])
+@pytest.mark.parametrize("seconds, said", [(0.123, "0.12 s"), (45.3, "45 s"), (119.0, "119 s"), (130.0, "2 min"),
+                                           (7100.0, "118 min"), (7300.0, "2 h"), (90000.0, "25 h")])
 def test_what_a_run_takes_is_told_in_a_unit_that_suits(seconds, said):
     assert checked._seconds(seconds) == said
 
@@ -295,7 +295,9 @@ def test_the_report_and_its_exit_status(capsys):
 
 def test_for_machines(capsys):
     assert main(["check", "flow_only", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
+    text = capsys.readouterr().out
+    told = json.loads(text)
+    assert text == json.dumps(told, indent=2) + "\n"
     assert set(told) == {"scene", "modelled", "nodes", "triangles", "numbers", "warnings", "cost"}
     assert told["nodes"] == 783 and told["cost"]["steps"] == 0 and told["warnings"] == []
     assert told["numbers"][0]["name"] == "Reynolds" and "growth" in told["modelled"]

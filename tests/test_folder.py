@@ -1,6 +1,7 @@
 """The folder of a run: one run at a time, nothing half-written, nothing outside it."""
 
 import errno
+import json
 import os
 import shutil
 import signal
@@ -97,6 +98,7 @@ def test_a_runs_files_are_listed(short):
     """All that there is in the end, and nothing else, by name in run.json; the fields' sums are right."""
     out = whole_of(short)
     assert sorted({*files(out), "run.json", "report.html", LAST}) == told(out)["files"]
+    assert (out / "run.json").read_text() == json.dumps(told(out), indent=2) + "\n"
     sums = dict(line.split("  ")[::-1] for line in (out / SUMS).read_text().splitlines())
     assert sums == {name: sha256(content).hexdigest() for name, content in files(out).items() if "vtu" in name}
 

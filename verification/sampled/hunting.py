@@ -211,9 +211,6 @@ def put(path: Path, text: str) -> None:
 #: Survivors that no test can tell from the code, each with the reason, by (file of repro/, line or lines as they are,
 #: as they become).
 EQUIVALENT: dict[tuple[str, str, str], str] = {
-    ("cli/check.py", "say(json.dumps(found.tables(), indent=2) if chosen.json else report(found))",
-     "say(json.dumps(found.tables(), indent= 3) if chosen.json else report(found))"):
-        "The same JSON to every reader; there is a blank more at the start of lines.",
     ("fem/elements.py", "EDGE_DEGREES = {1: 2, 2: 6, 3: 9}", "EDGE_DEGREES = {1: 3, 2: 6, 3: 9}"):
         "The same rule: Gauss' two points, which scikit-fem gives for degree 2, are exact to degree 3.",
     ("fem/linear.py", "dominant = np.tile((np.ones((k, k)) + k * np.eye(k)).ravel(), len(elements))",
@@ -239,9 +236,6 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
     ("report/quantities.py", 'made = run.series.get("remeshed", run.times * np.nan) == 1',
      'made = run.series.get("remeshed", run.times * np.nan) >= 1'):
         "The column is 0 or 1, and NaN is neither.",
-    ("results/__init__.py", 'write_text(path, json.dumps(content, indent=2, allow_nan=False) + "\\n")',
-     'write_text(path, json.dumps(content, indent= 1, allow_nan=False) + "\\n")'):
-        "The same JSON to every reader; there is a blank less at the start of lines.",
     ("results/arrays.py", 'kind = "triangle" if pore.mesh.geometry == 1 else "triangle6"',
      'kind = "triangle" if pore.mesh.geometry <= 1 else "triangle6"'):
         "A mesh has geometry 1 or 2.",
@@ -264,10 +258,6 @@ LEFT: dict[tuple[str, str, str], tuple[str, str]] = {
      "woken = (iterate.fractions <= 0) & (predicted != 0) & (there > 0)"):
         ("Newton's method goes on from another fraction where one was zero and another is predicted; what it ends at "
          "is the same to its tolerance.", "It takes more or fewer iterations in starved pores, which nothing bounds."),
-    ("report/charts.py", "digits = max(0, -math.floor(math.log10(step) + 1e-9))",
-     "digits = max(0, -math.floor(math.log10(step) // 1e-9))"):
-        ("Ticks get as many digits as there is memory for.",
-         "The first test that draws a chart never ends, which is told as a timeout."),
     ("model/traction.py", "@dataclass(frozen=True, eq=False)", "@dataclass(frozen=True, eq=True)"):
         ("Meshes around a body could be compared by their arrays, which have no one truth.",
          "test_states_are_made_and_not_changed fails with it, but reads the class and calls nothing of the module."),
