@@ -252,13 +252,6 @@ def labelled(axis, title: str, x_label: str, y_label: str) -> None:
     axis.tick_params(labelsize=7, which="both")
 
 
-def mutant_rows() -> list[tuple[str, str, str, str]]:
-    """(mutant, stage, what is wrong with it, cases or tests that caught it in the last whole hunt)."""
-    caught, _ = mutants.recorded()
-    return [(mutant.id, stage, mutant.says, ", ".join(caught.get(mutant.id, [])) or "not caught")
-            for stage, chosen in mutants.load().items() for mutant in chosen]
-
-
 def mutant_state() -> str:
     """Is the record of mutants that of the present code?"""
     caught, fresh = mutants.recorded()
@@ -268,9 +261,13 @@ def mutant_state() -> str:
 
 
 def mutant_blocks() -> list[Block]:
-    """All mutants."""
-    head = ("mutant", "stage", "what is wrong with it", "caught by")
-    return [Block("text", mutant_state()), table(head, mutant_rows())]
+    """All mutants, a table a stage, with the cases or tests that caught them in the last whole hunt."""
+    caught, _ = mutants.recorded()
+    blocks = [Block("text", mutant_state())]
+    for stage, chosen in mutants.load().items():
+        rows = [(mutant.id, mutant.says, ", ".join(caught.get(mutant.id, [])) or "not caught") for mutant in chosen]
+        blocks += [Block("heading", stage), table(("mutant", "what is wrong with it", "caught by"), rows)]
+    return blocks
 
 
 def _write_live(results: list[Result], folder: Path) -> None:
