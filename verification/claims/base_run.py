@@ -218,9 +218,10 @@ def change(run: tuple[str, ...], acceptor: float, donor: float) -> float:
                for key, factor in factors.items())
 
 
-#: COD of phenol as printed (it is in no scene), half a last digit of what Table 1 prints, the unit of its diffusivities
-#: (1e-4 m2/d, in um2/h), atomic weights.
-COD, HALF_DIGIT, DIFFUSIVITY = 2.38, 0.005, 1e8 / 24
+#: COD of phenol as printed (it is in no scene), and half a last digit of what Table 1 prints.
+COD, HALF_DIGIT = 2.38, 0.005
+#: The unit of its diffusivities (1e-4 m2/d, in um2/h), and atomic weights.
+DIFFUSIVITY = 1e8 / 24
 WEIGHT = {"C": 12.011, "H": 1.008, "O": 15.999, "N": 14.007}
 #: F from the entries of Table 1, and base with it: the run of E1.
 F_COMPUTED, F_OTHER = COD - 0.61 * 1.42, CHOICES["exact F"].run

@@ -141,9 +141,10 @@ def differing(numbers: np.ndarray) -> np.ndarray:
     return 100 * (numbers.max(axis=0) / numbers.min(axis=0) - 1)
 
 
-#: Supplies of both (K_s) of two sinks, nearly of first and of zero order; the half-disc's radius (um); and the rate
-#: over that of Table 1 that was taken for a sink at the surface.
-SINKS, RADIUS, FASTER = (1.0, 100.0), 25.0, 100.0
+#: Supplies of both (K_s) of two sinks, nearly of first and of zero order; and the half-disc's radius (um).
+SINKS, RADIUS = (1.0, 100.0), 25.0
+#: The rate over that of Table 1 that was taken for a sink at the surface.
+FASTER = 100.0
 
 
 def at_the_surface(found: Body) -> Body:
@@ -199,7 +200,8 @@ def not_crucial() -> Finding:
     """Acceptor taken up by the aggregate of wide over that of a layer on one wall and of two on both with its biomass,
     at the same mean velocity and supply, when it has reduced the conductivity to given parts."""
     said, rows = scene(*WIDE), series(*WIDE)
-    checks, told, apart = [], [], []
+    checks, told = [], []
+    apart = []
     for reduced in REDUCED:
         part = filled_at(reduced)
         ours, layers = aggregates_share(part), [in_the_model(part, walls) for walls in (1, 2)]
@@ -250,7 +252,8 @@ def in_the_model(part: float, walls: int) -> float:
 def layered(said: Scene, part: float, walls: int) -> Mesh:
     """A mesh of the whole pore, of which layers of equal thickness on one or both walls fill a part; they end MARGIN
     from its ends, to let in the flow."""
-    width, end, size = said.pore.width, 0.5 * said.pore.length, sized(said).largest
+    width, end = said.pore.width, 0.5 * said.pore.length
+    size = sized(said).largest
     height = part * width / walls * end / (end - MARGIN)
     y = evenly((0.0, height, width) if walls == 1 else (0.0, height, width - height, width), size)
     x = evenly((-end, MARGIN - end, end - MARGIN, end), size)

@@ -225,8 +225,9 @@ def _of_conductivity(size: float) -> list[str]:
     with at_level(Level(size=size)):
         said = scene(*BASE)
         meshes = [nested(said, radius, reached(said, radius)) for radius in RADII]
-        values = [[flow_in(said, each[number]).conductivity for number in (REACHES.index(1.0), -1)] for each in meshes]
-    return [f"{100 * abs(short / whole - 1):.2g}" for short, whole in values]
+        ours, whole = ([flow_in(said, each[number]).conductivity for each in meshes]
+                       for number in (REACHES.index(1.0), -1))
+        return [f"{100 * abs(one / other - 1):.2g}" for one, other in zip(ours, whole)]
 
 
 def nested(said, radius: float, reaches: list[float]) -> list[Mesh]:
