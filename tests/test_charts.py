@@ -52,6 +52,7 @@ def test_labels_of_ticks_are_the_ticks(low, high):
     assert len(told) >= 3 and [float(text) for text in texts] == pytest.approx(values, rel=1e-12)
     axis = Axis("", low, high)
     assert [float(axis.said(value)) for value in axis.ticks()] == pytest.approx(axis.ticks(), rel=1e-12, abs=1e-20)
+    assert Axis("", 0, 1).said(1 / 3) == "0.3333"
 
 
 def test_a_legend_names_each_line_by_its_colour():

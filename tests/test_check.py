@@ -279,7 +279,7 @@ def test_what_is_modelled_has_the_numbers_of_the_scene():
 
 
 @pytest.mark.parametrize("seconds, said", [(0.123, "0.12 s"), (45.3, "45 s"), (119.0, "119 s"), (130.0, "2 min"),
-                                           (7100.0, "118 min"), (7300.0, "2 h"), (90000.0, "25 h")])
+                                           (7100.0, "118 min"), (7300.0, "2 h"), (9000.0, "2 h"), (90000.0, "25 h")])
 def test_what_a_run_takes_is_told_in_a_unit_that_suits(seconds, said):
     assert checked._seconds(seconds) == said
 

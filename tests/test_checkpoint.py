@@ -223,7 +223,8 @@ def test_numbers_that_are_none_and_indices_that_are_no_nodes_are_refused(kept, t
 
 
 @pytest.mark.parametrize("path, value", [
-    ("state time_h", 1e9), ("state time_h", -1.0), ("state time_h", 0), ("state front", 0.5), ("state front", 1e9),
+    ("state time_h", 1e9), ("state time_h", -1.0), ("state time_h", -0.5), ("state time_h", 0), ("state front", 0.5),
+    ("state front", 1e9), ("state row_h", -0.5),
     ("state front", None), ("state front", 1), ("state pace", "1"), ("state pace", [1.0, 1.0]),
     ("state pace", [-0.1, 0.0, 0.0]), ("state remeshes", -1), ("state ends_um", [1.0, -1.0]),
     ("state ends_um", [-1e9, 1e9]), ("state guess", 1.5), ("state iterations", {"a": 0.5}),

@@ -6,6 +6,7 @@ from repro import results
 from repro.cli import main
 from repro.run import machine, running
 from repro.run.running import run
+from repro.run.whole import lacking
 from repro.scene import load_scene
 from tests import faults, pages
 from tests.pages import whole_of
@@ -23,6 +24,18 @@ def test_a_run_that_is_done_is_left_alone(tmp_path, capsys):
         capsys.readouterr()
         assert main(again) == 0
         assert "completed, before this: nothing to do" in capsys.readouterr().out and state(tmp_path / "run") == before
+
+
+def test_what_a_run_lacks_of_being_over_is_told(tmp_path):
+    """In a folder that is made with those above it: nothing; the scene, or a status that there is."""
+    scene, folder = load_scene("flow_only"), tmp_path / "new" / "run"
+    run(scene, folder)
+    assert lacking(folder, scene) == ""
+    wrong = "run.json tells of a run of another scene, or has no status"
+    assert wrong in lacking(folder, load_scene("flow_only", ["flow.viscosity_ratio=5"]))
+    for status in ("sunning", None):
+        results.write_json(folder / "run.json", told(folder) | {"status": status})
+        assert wrong in lacking(folder, scene)
 
 
 def test_a_run_that_was_interrupted_is_gone_on_with(tmp_path, capsys):
