@@ -56,8 +56,10 @@ def run(tests, old="", new="", limit=30.0):
     found = trying.run(there, ["tests/test_m.py::" + name for name in tests], limit)
     return [found.failed, found.stopped]
 small, waits = ["test_small"], ["test_waits"]
+gone = ["test_gone[3]"]
 told = {"sound": run(["test_waits", "test_box", "test_small"]), "caught": run(small, "< LIMIT", "> LIMIT"),
-        "survivor": run(small, "least < given", "least <= given"), "endless": run(waits, "< LIMIT", "<= LIMIT", 2.0)}
+        "survivor": run(small, "least < given", "least <= given"), "endless": run(waits, "< LIMIT", "<= LIMIT", 2.0),
+        "gone": run(gone), "left": run(gone + small, "< LIMIT", "> LIMIT")}
 hunting.put(module, code)
 told["reach"] = {id: calls for id, (_, calls) in trying._measure(there, "test_m.py").items()}
 print(json.dumps(told))
@@ -103,7 +105,8 @@ def test_tests_are_those_that_call_the_function_the_cheapest_first(monkeypatch):
 
 
 def test_mutants_are_caught_survive_or_do_not_end_and_calls_are_seen(tmp_path):
-    """In processes of their own, and in those which tests start."""
+    """In processes of their own, and in those which tests start. A test that is gone, as one may be that is named after
+    a value which a mutant changes, catches nothing, and the others do."""
     project = tmp_path / "project"
     for name, text in {"repro/__init__.py": "", "repro/m.py": CODE, "tests/__init__.py": "", "tests/test_m.py": TESTS,
                        "pytest.ini": "[pytest]\n"}.items():
@@ -114,7 +117,8 @@ def test_mutants_are_caught_survive_or_do_not_end_and_calls_are_seen(tmp_path):
     found = json.loads(done.stdout.splitlines()[-1])
     calls = found.pop("reach")
     assert found == {"sound": ["", ""], "caught": ["tests/test_m.py::test_small", ""], "survivor": ["", ""],
-                     "endless": ["", "tests/test_m.py::test_waits"]}
+                     "endless": ["", "tests/test_m.py::test_waits"],
+                     "gone": ["", ""], "left": ["tests/test_m.py::test_small", ""]}
     names = {}
     for id, made in calls.items():
         names[id.rpartition("::")[2]] = {name for _, name in made}

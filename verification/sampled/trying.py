@@ -40,6 +40,9 @@ NOT_COPIED = (".git", ".venv", "__pycache__", "live", "out", "cache", "dist", "b
 #: What most tests import; what is absent is left to them.
 HEAVY = ("pytest", "numpy", "scipy.sparse.linalg", "scipy.spatial", "scipy.optimize", "skfem", "matplotlib.pyplot",
          "shapely", "mmgpy", "meshio", "pint", "tqdm", "xarray", "sympy")
+#: What pytest ends with where no test that it collected fails: all pass, those that failed are told by themselves, or
+#: there is none to run.
+NOTHING_WRONG = (0, 1, 4, 5)
 #: Seconds on the clock a second of processor time may take, on a machine that others use too.
 PATIENCE = 4
 
@@ -120,11 +123,30 @@ def _enter(there: Path, reach: Path | None) -> None:
 
 
 def _tested(tests: list[str], teller: _Teller, reach: bool, every: bool) -> int:
-    plugins: list[object] = [teller]
+    plugins: list[object] = [teller, _Chooser(tests)]
     if reach:
         plugins.append(_Marker(runpy.run_path(str(TRACER / "sitecustomize.py"))["note"].__globals__))
     stop = [] if every else ["-x"]
-    return int(pytest.main([*stop, "-q", "-n0", "-p", "no:cacheprovider", "--tb=line", *tests], plugins))
+    return int(pytest.main([*stop, "-q", "-n0", "-p", "no:cacheprovider", "--tb=line", *_files(tests)], plugins))
+
+
+def _files(tests: list[str]) -> list[str]:
+    """The files of some tests, in their order."""
+    return list(dict.fromkeys(test.partition("::")[0] for test in tests))
+
+
+class _Chooser:
+    """Keeps the tests that are asked for by their ids, in that order. One that is there no more, such as one that is
+    named after a value which a mutant changes, is left out: pytest would refuse to run any with it."""
+
+    def __init__(self, tests: list[str]) -> None:
+        self._places = {test: place for place, test in enumerate(tests) if "::" in test}
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_collection_modifyitems(self, items: list) -> None:
+        if self._places:
+            chosen = [item for item in items if item.nodeid in self._places]
+            items[:] = sorted(chosen, key=lambda item: self._places[item.nodeid])
 
 
 class _Teller:
@@ -217,7 +239,7 @@ def _judged(path: Path, status: int, seconds: float, limit: float) -> Ran:
     if failed:
         return Ran(failed[0]["test"], failed[0]["how"], seconds=seconds)
     if rows and "ends" in rows[-1]:
-        if rows[-1]["ends"] in (0, 1):
+        if rows[-1]["ends"] in NOTHING_WRONG:
             return Ran(seconds=seconds)
         return Ran("pytest", f"exit status {rows[-1]['ends']}", seconds=seconds)
     started = [row for row in rows if "starts" in row]
