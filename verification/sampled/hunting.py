@@ -245,6 +245,9 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
      """components = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else \"\"""",
      """components = f' NumberOfComponents="{values.shape[1]}"' if values.ndim >= 2 else \"\""""):
         "Arrays of a file have one or two axes.",
+    ("run/folder.py", '(folder / "fields").mkdir(parents=True, exist_ok=True)',
+     '(folder / "fields").mkdir(parents=False, exist_ok=True)'):
+        "The folder is there already: it is made with those above it for its lock.",
     ("run/stored.py", '_refuse(not all(in_range(plain[key], 0.0, end) for key in ("time_h", "row_h")), "its time")',
      '_refuse(not all(in_range(plain[key], -1.0, end) for key in ("time_h", "row_h")), "its time")'):
         "A time below zero is refused all the same, by the steps and rows that stand beside it: -0.001 and -0.5 h of "
@@ -262,12 +265,6 @@ LEFT: dict[tuple[str, str, str], tuple[str, str]] = {
      "woken = (iterate.fractions <= 0) & (predicted != 0) & (there > 0)"):
         ("Newton's method goes on from another fraction where one was zero and another is predicted; what it ends at "
          "is the same to its tolerance.", "It takes more or fewer iterations in starved pores, which nothing bounds."),
-    ("model/traction.py", "@dataclass(frozen=True, eq=False)", "@dataclass(frozen=True, eq=True)"):
-        ("Meshes around a body could be compared by their arrays, which have no one truth.",
-         "test_states_are_made_and_not_changed fails with it, but reads the class and calls nothing of the module."),
-    ("scene/units.py", "@dataclass(frozen=True)", "@dataclass(frozen=False)"):
-        ("What a key accepts could be changed after it was made.",
-         "test_what_a_key_accepts_cannot_be_changed fails with it, but cheaper tests take the 60 s before its turn."),
 }
 
 
