@@ -174,9 +174,9 @@ def test_the_shape_that_is_drawn_is_that_before_the_expansion(short, name):
     """As the caption says, in every panel."""
     wanted, made = states.last(short["base"], "before_expansion").rim, MODULES[name].draw(short["base"])
     panels = [axes for axes in made.axes if axes.get_title(loc="left") or name == "figure_5" and axes is made.axes[0]]
-    shapes = [[patch.get_xy()[:-1] for patch in axes.patches if isinstance(patch, Polygon)] for axes in panels]
     assert len(panels) == (1 if name == "figure_5" else 4)
-    for (drawn,) in shapes:
+    for axes in panels:
+        (drawn,) = (patch.get_xy()[:-1] for patch in axes.patches if isinstance(patch, Polygon))
         assert np.array_equal(drawn, wanted)
 
 
@@ -197,10 +197,10 @@ def test_a_curve_is_what_the_legends_call_it(short):
     """By the colour of its run and the line of its substrate."""
     module, folders = MODULES["time_series"], {"Base": short["base"], "Wide": short["wide"]}
     panels = module.draw(*folders.values()).axes
-    runs_, names = ([(line, text.get_text()) for line, text in zip(panels[k].get_legend().get_lines(),
-                                                                   panels[k].get_legend().get_texts())] for k in (0, 2))
-    tables = {line.get_color(): states.series(folders[text]) for line, text in runs_}
-    kinds = {line.get_linestyle(): text for line, text in names}
+    runs_, names = (panels[k].get_legend() for k in (0, 2))
+    tables = {line.get_color(): states.series(folders[text.get_text()])
+              for line, text in zip(runs_.get_lines(), runs_.get_texts())}
+    kinds = {line.get_linestyle(): text.get_text() for line, text in zip(names.get_lines(), names.get_texts())}
     assert kinds.keys() == {"-", "--"} and len(tables) == 2
     for axes, (column, *_) in zip(panels, module.CURVES, strict=True):
         assert len(axes.lines) == (4 if "{}" in column else 2)

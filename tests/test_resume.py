@@ -261,7 +261,11 @@ def test_the_machine_is_recorded_and_threads_are_no_change(tmp_path, monkeypatch
 class InSteps:
     """A recorder of steps without anything in them."""
 
-    kept, contact, state, time, end, remeshes, steps = True, False, None, 0.0, 0.0, 0, 0
+    kept = True
+    contact = False
+    state = None
+    time = end = 0.0
+    remeshes = steps = 0
 
     def add(self, state, instant):
         self.steps += 1

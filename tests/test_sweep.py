@@ -307,7 +307,7 @@ def test_lines_of_clogging_times_join_runs_that_differ_in_one_key_alone(tmp_path
         dots = re.findall(r'<circle [^>]*cx="([^"]*)" cy="([^"]*)"[^>]*><title>run (\d+)', figure)
         run_at = {f"{x},{y}": found[int(index) - 1].values for x, y, index in dots}
         drawn = re.findall('<polyline [^>]*points="([^"]*)"', figure)
-        lines = [[run_at[place] for place in line.split()] for line in drawn]
+        lines = [list(map(run_at.__getitem__, line.split())) for line in drawn]
         assert len(run_at) == 12 and sum(map(len, lines)) == 12 and len(lines) == (4, 6, 6)[which]
         for line in lines:
             assert [len({*values}) for values in zip(*line)] == [len(line) if k == which else 1 for k in range(3)]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from repro.results import LEDGER_COLUMNS, read_table
+from repro.results import COLUMNS, LEDGER_COLUMNS, read_table
 
 
 class NoRun(ValueError):
@@ -42,6 +42,13 @@ def read(folder: Path) -> Run:
     if (folder / "ledger.csv").exists():
         ledger = _read(folder, "ledger.csv", lambda path: _table(path, LEDGER_COLUMNS))
     return Run(folder, record, series, ledger)
+
+
+def require_columns(run: Run) -> None:
+    """Raise NoRun where the time series lacks a column that this version writes."""
+    if absent := set(COLUMNS) - run.series.keys():
+        raise NoRun(f"{run.folder}: timeseries.csv has no column {min(absent)}; a run of this "
+                    "version is needed")
 
 
 def _read(folder: Path, name: str, how):

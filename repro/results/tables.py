@@ -13,12 +13,11 @@ from repro import results
 from repro.march.loop import SAME_TIME, PoreEnd
 from repro.march.simulation import simulate
 from repro.results import names, picture
+from repro.results.netcdf import TIME
 from repro.results.quantities import plain as unit
 from repro.results.vtu import Grid
 from repro.scene import Source, load_scene
 
-#: The column that a run has whatever it models, and without a row.
-TIME = "time_h"
 #: Times of a notebook's table at either end.
 SHOWN = 5
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from repro.errors import OutputError
 from repro.report import fields, reading
-from repro.results import COLUMNS, vtu
+from repro.results import vtu
 from repro.results.tables import Results, arrays
 
 
@@ -21,12 +21,10 @@ def load_run(folder: str | Path) -> Results:
     """
     try:
         run = reading.read(Path(folder))
+        reading.require_columns(run)
         listed = dict(fields.listed(run.folder))
     except ValueError as error:
         raise OutputError(str(error)) from None
-    if absent := set(COLUMNS) - run.series.keys():
-        raise OutputError(f"{folder}: timeseries.csv has no column {min(absent)}; a run of this "
-                          "version is needed")
     rows = [dict(zip(run.series, map(_known, values)))
             for values in np.column_stack(list(run.series.values())).tolist()]
     files = _Files(run.folder, run.times, listed)

@@ -6,8 +6,7 @@ import math
 from pathlib import Path
 
 from repro.march.loop import SAME_TIME
-from repro.report.reading import NoRun, Run, read
-from repro.results import COLUMNS
+from repro.report.reading import NoRun, Run, read, require_columns
 from repro.run.status import COMPLETED, done, pore_end, undone
 from repro.scene import Scene, scene_hash
 
@@ -19,8 +18,7 @@ def there(folder: Path, scene: Scene) -> Run:
     status = str(run.record.get("status"))
     if run.record.get("hash") != scene_hash(scene) or not (done(status) or undone(status)):
         raise NoRun(f"{folder}: run.json tells of a run of another scene, or has no status")
-    if absent := set(COLUMNS) - run.series.keys():
-        raise NoRun(f"{folder}: timeseries.csv has no column {min(absent)}")
+    require_columns(run)
     return run
 
 

@@ -225,9 +225,9 @@ def _of_conductivity(size: float) -> list[str]:
     with at_level(Level(size=size)):
         said = scene(*BASE)
         meshes = [nested(said, radius, reached(said, radius)) for radius in RADII]
-        ours, whole = ([flow_in(said, each[number]).conductivity for each in meshes]
-                       for number in (REACHES.index(1.0), -1))
-        return [f"{100 * abs(one / other - 1):.2g}" for one, other in zip(ours, whole)]
+        ours = [flow_in(said, each[REACHES.index(1.0)]).conductivity for each in meshes]
+        whole = [flow_in(said, each[-1]).conductivity for each in meshes]
+    return [f"{100 * abs(one / other - 1):.2g}" for one, other in zip(ours, whole)]
 
 
 def nested(said, radius: float, reaches: list[float]) -> list[Mesh]:
