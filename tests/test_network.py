@@ -31,7 +31,8 @@ def test_velocity_head_width_and_place_drop_out():
     """To rounding but for the place, where the mesh is another."""
     one = added(scene(100.0))
     assert one == pytest.approx(12.2, rel=0.01)
-    for other in (scene(100.0, drive=("mean_velocity", "30 m/d")), scene(100.0, drive=("head", "1e-3 cm")), scene(50.0)):
+    for other in (scene(100.0, drive=("mean_velocity", "30 m/d")), scene(100.0, drive=("head", "1e-3 cm")),
+                  scene(50.0)):
         assert added(other) == pytest.approx(one, rel=1e-9)
     assert added(scene(100.0, position=1.7)) == pytest.approx(one, rel=law.NUMERICS)
     now = shapes.half_disc(0.6, elements=shapes.QUICK)
