@@ -11,7 +11,7 @@ from verification import claims
 from verification.claims import Claim, ClaimError, Finding, evaluate, levels, runs
 from verification.claims.levels import ALONE, CONVERGED, DEFAULT, SCHEME, WIDE_FINE, Level, at_level
 from verification.sensitivity.wide import supplied
-from verification.uncertainty import FORMAL, OBSERVED, Bar, Estimate, combined, estimate, observed_order
+from verification.uncertainty import FORMAL, OBSERVED, Bar, estimate, observed_order
 
 BOTH = (1.0, 2.0)
 SIZES = np.array([1.0, 2**0.5, 2**-0.5, 0.5])
@@ -76,11 +76,6 @@ def test_units_and_the_order_of_the_other_sizes_do_not_matter(scale, shift, unit
 def test_fewer_than_three_sizes_and_no_numbers_are_refused(sizes, values):
     with pytest.raises(ValueError, match="3 or more"):
         estimate(sizes, values, BOTH)
-
-
-def test_the_bars_of_mesh_and_step_add_up():
-    both = combined(5.0, Estimate(0.3, 2.0, OBSERVED), Estimate(0.4, 1.0, OBSERVED))
-    assert (both.low, both.high) == pytest.approx((4.3, 5.7))
 
 
 # Levels.
