@@ -12,7 +12,7 @@ from repro import load_scene, run
 from repro.fem.mesh import triangle_areas
 from repro.fem.outline import polygon_area
 from repro.march.simulation import steps
-from verification.claims import discussed, fluid_and_aggregate, levels, permeability, rheology
+from verification.claims import discussed, fluid_and_aggregate, levels, rheology
 from verification.claims.levels import CONVERGED, Level, at_level
 from verification.claims.runs import LATE, NEAR, bodies, history, scene, until
 
@@ -55,21 +55,6 @@ def test_nothing_left_at_the_surface_is_the_limit_of_ever_faster_uptake():
         rates = [discussed.sherwood(discussed.in_one_shape(supply=1.0, faster=more))[0] for more in (1.0, 100.0, 1e3)]
         limit = discussed.sherwood(discussed.at_the_surface(discussed.in_one_shape(supply=1.0)))[0]
     assert rates[0] > rates[1] > 1.01 * limit and abs(rates[2] / limit - 1) < 0.5 * (rates[1] / limit - 1)
-
-
-def test_decay_over_synthesis_at_rest():
-    """b / (k Y m_D), with m_D between those of the aggregate's extremes."""
-    found = bodies(HOUR)[0]
-    law, donor = found.scene.kinetics, found.node("donor_mg_per_L")[found.grid.body]
-    most, least = (law.decay_coefficient / (law.maximum_utilization_rate * law.yield_coefficient * d / (d + 1.0))
-                   for d in (donor.min(), donor.max()))
-    assert least * (1 - 1e-9) <= permeability.decay_share(found) <= most * (1 + 1e-9)
-
-
-def test_a_permeable_run_has_the_drag_and_nothing_of_the_viscosity():
-    flow = scene(*rheology.permeable(rheology.AGGREGATE, 0.25)).flow
-    assert (flow.biomass, flow.viscosity_ratio, flow.permeability) == ("brinkman", None, pytest.approx(0.25, rel=1e-6))
-    assert rheology.equivalent(rheology.AGGREGATE) == pytest.approx(50.0**2 / 12 / 2000)
 
 
 def test_an_outline_that_has_slid_is_moved_back(monkeypatch):
