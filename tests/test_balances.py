@@ -24,7 +24,6 @@ from tests.test_derived import over_end, taken_up
 from verification.problems.runs import scaled
 
 ANY_ORDER = tuple(ORDERS.values())
-EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
 
 
 def instants(made):
@@ -187,11 +186,6 @@ def test_area_and_mass_do_not_drift_apart(born):
     assert len(apart) > 8 and np.abs(apart).max() < 1e-9
 
 
-def test_without_consumption_there_is_nothing_to_tell():
-    still = Ledger(0.0, 1.0, *4 * [(0.0, 0.0)], 3.0, 0.0, 3.0)
-    assert oxygen_demand(load_scene("base").kinetics, still) == 0.0
-
-
 LEAKS = {"acceptor": lambda ledger: {"supplied": (1.01 * ledger.supplied[0], ledger.supplied[1])},
          "donor": lambda ledger: {"out": (ledger.out[0], ledger.out[1] - 0.01 * ledger.supplied[1])},
          "biomass": lambda ledger: {"biomass_after": 1.01 * ledger.biomass_after},
@@ -259,14 +253,3 @@ def test_updates_are_at_multiples_of_the_time_step_and_at_the_end(step, count, p
     assert reported == ({0.0, *wanted} if wanted else set(times))
 
 
-@share(0.4)
-@given(scenes(steps=1, elements=ANY_ORDER), between(1e-3, 1e3))
-def test_the_unit_of_time_does_not_matter(made, unit):
-    """All rates times a factor and all times over it: the same shapes, substrates and biomass."""
-    for one, other in zip(instants(made), instants(scaled(made, 1.0, 1 / unit)), strict=True):
-        assert other.pore.time * unit == pytest.approx(one.pore.time, rel=1e-12)
-        assert other.pore.outline.points == pytest.approx(one.pore.outline.points, abs=1e-7 * made.pore.width)
-        for name, size in (("acceptor", made.substrates.acceptor.supply), ("donor", made.substrates.donor.supply)):
-            fields = [getattr(instant.solved.concentrations, name) for instant in (one, other)]
-            assert fields[1] == pytest.approx(fields[0], abs=1e-7 * size)
-        assert other.pore.active == pytest.approx(one.pore.active, rel=1e-7)

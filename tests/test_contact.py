@@ -43,12 +43,6 @@ def test_what_closes_beside_a_contact_surface(name, outline, wanted):
     assert joins(mirrored(outline)) == wanted[::-1]
 
 
-@pytest.mark.parametrize("gap, closes", [(2.01, False), (1.99, True), (0.0, True), (-0.5, True)])
-def test_a_film_under_2_um_to_the_opposite_wall_closes(gap, closes):
-    outline = beside_contact(5.0, 30.0, (0.0, 100.0 - gap))
-    assert joins(outline) == ([0, 0, 0, 0, TOP, 0] if closes else NONE)
-
-
 def test_a_wedge_beside_the_upper_contact_closes():
     """With contact on top the film alone no longer closes, the wedge rule does."""
     outline = plug(100.0, -10.0, 10.0)
@@ -59,12 +53,6 @@ def test_a_wedge_beside_the_upper_contact_closes():
     assert joins(mirrored(near)) == joins(near)[::-1]
     far = Outline(points - [0, 1.0] * (wall == FREE)[:, None], wall, fixed, points)
     assert joins(far) == [FREE] * 7
-
-
-@given(st.floats(5.0, 97.9))
-def test_a_half_disc_with_a_film_closes_nothing(radius):
-    """It meets the wall at 90 degrees."""
-    assert not contact.closing_nodes(seed(radius), 100.0, FILM, ANGLE).any()
 
 
 @given(attached_aggregates(thickest=1.02))
@@ -127,10 +115,3 @@ def test_a_middle_never_joins_alone():
     assert not contact.closing(shape, 20.0, 2.0, 0.0).any()
 
 
-@pytest.mark.parametrize("last, chosen", [(4, 2), (6, 4), (8, 4)])
-def test_of_arcs_a_corner_is_fixed(last, chosen):
-    """New meshes keep no middle: the corner before it, where that is in the middle of a contact surface."""
-    shape, top = flat_top([20.0] * 11)
-    wall = np.where(np.isin(np.arange(len(shape.wall)), top[2: last + 1]), TOP, shape.wall)
-    touching = Outline(shape.points, wall, shape.fixed, shape.points, 2)
-    assert np.flatnonzero(contact.middle_of(touching, TOP)).tolist() == [top[chosen]]

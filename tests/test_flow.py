@@ -40,34 +40,6 @@ def test_every_section_carries_the_flux_of_the_inlet(grid, ratio, interface, see
     assert -grid.areas @ np.sum(w * slopes, axis=1) == pytest.approx(grid.width, rel=1e-11)
 
 
-@share(0.4)
-@given(scenes(drives=("head", "mean_velocity"), elements=tuple(ORDERS.values())), between(1e-3, 1e3))
-def test_the_head_that_a_velocity_needs_gives_it_back(made, speed):
-    """All of the flow, whose loss is that of the mesh and of the clean pore around it; the conductivity is told of it.
-    That the flow is linear in its drive is the case flow-energy."""
-    now = pore.seeded(made)
-
-    def driven(**drive):
-        changed = replace(made.flow, **{"head": None, "mean_velocity": None, **drive})
-        return pore.solve_flow(replace(made, flow=changed), now.space)
-
-    first = driven(mean_velocity=speed)
-    again = driven(head=first.head_loss)
-    carrying = ("correction",) if made.numerics.order == 1 else ()
-    for name in ("velocity", "head", *carrying, "meshed_loss", "head_loss", "mean_velocity"):
-        one, two = (getattr(flow, name) for flow in (first, again))
-        assert two == pytest.approx(one, abs=1e-11 * np.abs(one).max())
-    rest = made.pore.length - np.ptp(now.mesh.ends)
-    viscosity = made.flow.kinematic_viscosity / made.flow.gravity
-    assert first.head_loss == pytest.approx(first.meshed_loss + 12 * viscosity * speed * rest / made.pore.width**2)
-    ends = (now.mesh.topology.inlet, now.mesh.topology.outlet)
-    at = [np.trapezoid(first.head[nodes], now.mesh.points[nodes, 1]) / now.mesh.width for nodes in ends]
-    assert at[1] == pytest.approx(0.0, abs=1e-11 * first.meshed_loss)
-    if made.numerics.order == 1:  # the others' is the work of the inlet
-        assert at[0] == pytest.approx(first.meshed_loss, rel=1e-11)
-    assert again.conductivity == pytest.approx(speed * made.pore.length / first.head_loss, rel=1e-11)
-
-
 @pytest.mark.parametrize("left", [-1 / 3 * 100, -47.123456789012345, -0.1 * 487])
 @pytest.mark.parametrize("order", ORDERS)
 def test_nothing_slips_and_the_inlet_is_the_scaled_parabola(order, left):

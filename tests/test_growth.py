@@ -50,31 +50,12 @@ def test_any_body_comes_to_rest(geometry, drawn, refinement, least, more, seed):
     assert np.abs(forces(body, held, theta, found)[~held.T.ravel()]).max() < 1e-9 * largest
 
 
-def forces(body, held, theta, found):
-    """(2n,) nodal forces of an equilibrium, x of all nodes, then y."""
-    triangles, stabilising = body.shape.triangles, None
-    if body.shape.geometry == 1:
-        stabilising = growth.gradient_stabilisation(body.reference, triangles, np.ones(len(triangles)))
-    system = growth.System(body, held, stabilising=stabilising)
-    return system.under(theta, found.position, found.position, found.pressure).residual[: held.size]
-
-
 @GEOMETRIES
 def test_one_step_of_growth_takes_few_iterations(geometry):
     """Newton's method converges quadratically with its tangent: 4 % growth in at most 5 (measured 4)."""
     body, held, _, _ = half_disc(20.0, 1 / geometry, geometry=geometry)
     x = body.reference[body.shape.triangles].mean(axis=1)[:, 0]
     assert at_rest(body, held, constant(body, 1.04 + 0.001 * x)).iterations <= 5
-
-
-def test_without_the_grad_div_term_there_is_no_equilibrium(monkeypatch):
-    """What the linear pressure leaves free of J grows from nothing: Newton's method does not converge."""
-    monkeypatch.setattr(growth, "GAMMA", 0.0)
-    monkeypatch.setattr(growth, "CONTINUATION", (1,))
-    body, held, _, _ = half_disc(20.0, 0.6, geometry=2)
-    theta = 12 * (1 + 2 * np.sum(body.reference[body.shape.cells].mean(axis=1) ** 2, axis=-1) / 20.0**2)
-    with pytest.raises(GrowthError, match="try a shorter growth.time_step or a larger numerics.refinement"):
-        at_rest(body, held, constant(body, theta))
 
 
 @GEOMETRIES

@@ -54,12 +54,6 @@ def test_kinds_of_elements_make_one_system(held):
     assert np.array_equal(first.matrix(ELEMENTS).toarray(), before)
 
 
-def test_a_missing_kind_is_refused():
-    system = ElementSystem(KINDS, np.arange(10.0), np.zeros(10, bool))
-    with pytest.raises(ValueError):
-        system.product(ELEMENTS[:1], np.ones(10))
-
-
 METIS, PARDISO = Method("superlu", "metis"), Method("pardiso", "degree")
 OPTIONAL = pytest.mark.parametrize("method, package", [(PARDISO, "pypardiso"), (METIS, "pymetis")])
 
@@ -75,18 +69,6 @@ def saddle(size, seed):
     a = sp.random_array((size, size), density=0.2, rng=rng)
     b = sp.random_array((size // 2, size), density=0.3, rng=rng)
     return sp.block_array([[a @ a.T + sp.eye_array(size), b.T], [b, -0.01 * sp.eye_array(size // 2)]], format="csc")
-
-
-@given(st.integers(4, 40), st.integers(0, 1000))
-def test_a_saddle_point_system_is_solved(size, seed):
-    """Against the dense solution; one factorisation serves many right-hand sides."""
-    matrix, rng = saddle(size, seed), np.random.default_rng(seed)
-    solver, dense = linear.factorised(matrix, DEFAULT), matrix.toarray()
-    for _ in range(2):
-        right = rng.normal(size=len(dense))
-        exact = np.linalg.solve(dense, right)
-        bound = 1e-13 * np.linalg.cond(dense) * max(1.0, np.abs(exact).max())
-        assert solver.solve(right) == pytest.approx(exact, rel=1e-9, abs=bound)
 
 
 def test_a_zero_pivot_is_got_round():
@@ -135,37 +117,6 @@ def test_a_wrong_solution_is_told_however_small_it_is(size):
     solver.factor, solver.pivoted = linear.factorised(STEEP / 2).factor, True
     with pytest.raises(LinearError, match="leaves a residual"):
         solver.solve(right)
-
-
-def fill(grid, order):
-    """Entries of the factor of the mesh's Laplacian, its nodes in this order, which is one of all of them."""
-    assert np.sort(order).tolist() == list(range(len(grid.points)))
-    places = tuple(part.ravel() for part in linear.pairs(grid.triangles))
-    graph = sp.csc_array((np.ones(len(places[0])), places))
-    matrix = (graph + sp.diags_array(graph.sum(axis=0) + 1.0))[order][:, order]
-    return sp.linalg.splu(sp.csc_matrix(matrix), permc_spec="NATURAL", diag_pivot_thresh=0.0,
-                          options={"SymmetricMode": True}).nnz
-
-
-def test_a_node_order_saves_fill():
-    """The factor of a Laplacian has under half of the entries that the mesher's order, or the inverse, gives."""
-    grid, _ = meshed(None)
-    order = linear.node_order(len(grid.points), grid.triangles)
-    ours, *others = (fill(grid, each) for each in (order, np.argsort(order), np.arange(len(order))))
-    assert ours < 0.5 * min(others)
-
-
-@OPTIONAL
-def test_an_absent_package_is_named_wherever_it_is_asked_for(method, package, monkeypatch):
-    """Whether it is installed here or not; the default asks for none."""
-    for name in ("pypardiso", "pymetis"):
-        faults.absent_package(monkeypatch, name)
-    asked = {"pypardiso": lambda: linear.factorised(sp.eye_array(2, format="csc"), method),
-             "pymetis": lambda: linear.node_order(3, np.array([[0, 1, 2]]), method)}
-    for ask in (method.checked, asked[package]):
-        with pytest.raises(LinearError, match=f"package {package} is not installed; pip install {package}"):
-            ask()
-    assert DEFAULT.checked() is DEFAULT and solve(saddle(4, 1), np.ones(6)).shape == (6,)
 
 
 @OPTIONAL

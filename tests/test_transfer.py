@@ -47,54 +47,6 @@ def around():
     return {"arcs": arcs, "flat": flat, "straight": arcs.straight}
 
 
-@pytest.mark.parametrize("kind", ["arcs", "flat", "straight"])
-def test_a_place_is_found_in_its_triangle(around, kind):
-    """By Newton's method on the curved map, to 1e-9 of the size."""
-    mesh = around[kind]
-    random, nodes = np.random.default_rng(8), mesh.points[mesh.cells]
-    shares = random.dirichlet([1, 1, 1], len(nodes))
-    local = shares[:, 1:]
-    where = np.einsum("ka,kai->ki", elements.values(mesh.geometry, local), nodes)
-    at = transfer.located(mesh.points, mesh.cells, where)
-    back = np.einsum("ka,kai->ki", elements.values(mesh.geometry, at.local), nodes[at.triangle])
-    assert np.allclose(back, where, atol=1e-9)
-    inner = shares.min(axis=1) > 0.02
-    assert np.array_equal(at.triangle[inner], np.arange(len(nodes))[inner])
-
-
-def drawn_places():
-    random = np.random.default_rng(9)
-    return np.column_stack([random.uniform(-14, 14, 200), random.uniform(0.5, 10, 200)])
-
-
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("kind", ["flat", "straight"])
-def test_polynomials_of_the_order_are_carried_exactly(around, order, kind):
-    """On straight edges, whatever carries the map."""
-    mesh, where = around[kind], drawn_places()
-    space = Space(mesh, order)
-
-    def fields(points):
-        x, y = points.T
-        return np.column_stack([(x - 2 * y) ** order + 3, (y / 2 + x) ** order + 2 * x - 1])
-
-    at = transfer.located(mesh.points, mesh.cells[mesh.biomass], where)
-    found = at.field(fields(space.points), space.cells[mesh.biomass], order)
-    assert np.allclose(found, fields(where), rtol=1e-10, atol=1e-8)
-    linear = at.field((2 * mesh.points[:, 0] - mesh.points[:, 1])[: mesh.corners], mesh.triangles[mesh.biomass], 1)
-    assert np.allclose(linear, 2 * where[:, 0] - where[:, 1], atol=1e-9)
-
-
-def test_a_place_a_little_outside_is_moved_to_the_edge(around):
-    """A chord cuts an arc: what is between them is outside of the chord's triangle."""
-    for mesh in around.values():
-        places = np.column_stack([[-5.0, 5.0], np.full(2, -1e-3)])
-        at = transfer.located(mesh.points, mesh.cells, places)
-        assert at.local.min() >= 0 and at.local.sum(axis=1).max() <= 1
-        found = at.field(mesh.points, mesh.cells, mesh.geometry)
-        assert np.allclose(found, places * [1, 0], rtol=0, atol=2e-3)
-
-
 @pytest.mark.parametrize("kind", ["arcs", "straight"])
 def test_a_place_far_outside_is_refused(around, kind):
     mesh = around[kind]
@@ -143,16 +95,6 @@ def test_a_bounded_transfer_keeps_mass_and_bounds(seed, share, scale, level):
 def test_projection_refuses_meshes_of_different_shapes():
     with pytest.raises(TransferError, match="common pieces"):
         transfer.project(*OLD, OLD[0], OLD[0] * [1.0, 1.001], OLD[1])
-
-
-def test_what_is_far_away_plays_no_part_in_a_bounded_transfer():
-    """A spike is carried to nodes near it alone, where the projection rings in the whole domain."""
-    before = np.zeros(len(OLD[0]))
-    peak = np.argmin(np.hypot(*(OLD[0] - [20.0, 12.0]).T))
-    before[peak] = 1.0
-    free, bounded = (carry(*OLD, before[:, None], *NEW)[:, 0] for carry in (transfer.project, transfer.project_bounded))
-    far = np.hypot(*(NEW[0] - OLD[0][peak]).T) > 14.0
-    assert np.abs(free[far]).max() > 1e-4 and (bounded[far] == 0).all() and bounded.min() == 0
 
 
 def test_a_run_that_remeshes_by_a_bounded_transfer_keeps_its_biomass():

@@ -68,30 +68,6 @@ def test_newton_does_not_fall_into_a_negative_root(order):
     assert again.acceptor.min() > 0
 
 
-def answer(made):
-    """Concentrations of a scene at t = 0, None where its mesh is too coarse for it."""
-    try:
-        return pore.solve(made, pore.seeded(made)).concentrations
-    except Unresolved:
-        return None
-
-
-@share(0.4)
-@given(scenes(steps=1, elements=tuple(ORDERS.values())), between(1e-3, 1e3))
-def test_only_the_ratios_to_half_saturation_matter(made, factor):
-    """C27: supply, K_s and X_m of both scaled together scale every concentration."""
-    s, k = made.substrates, made.kinetics
-    both = [replace(one, supply=factor * one.supply, half_saturation=factor * one.half_saturation)
-            for one in (s.acceptor, s.donor)]
-    other = replace(made, substrates=replace(s, acceptor=both[0], donor=both[1]),
-                    kinetics=replace(k, maximum_density=factor * k.maximum_density))
-    one, two = (answer(each) for each in (made, other))
-    assert (one is None) == (two is None)
-    if one:
-        assert two.acceptor / factor == pytest.approx(one.acceptor, rel=1e-7, abs=1e-11 * s.acceptor.supply)
-        assert two.donor / factor == pytest.approx(one.donor, rel=1e-7, abs=1e-11 * s.donor.supply)
-
-
 def right_triangles():
     """A structured mesh of 40 x 20 um, biomass from x = 10 to 20 um."""
     fem = MeshTri.init_tensor(np.linspace(0.0, 40.0, 9), np.linspace(0.0, 20.0, 5))
@@ -138,25 +114,3 @@ def test_too_coarse_a_mesh_is_refused(monkeypatch, order):
         at_start(thick("290 m/day", order, 0.2))
 
 
-@EVERY_ORDER
-def test_the_sizes_of_the_terms_bound_the_balance(order):
-    """They do not cancel: no residual is larger, of either sign of the concentrations, and without biomass they are
-    those of the linear parts."""
-    now, found = at_start(thick("2.9 m/day", order))
-    balance, random = Balance(found.problem, Sink(100 * now.active)), np.random.default_rng(2)
-    state = random.uniform(-1, 1, 2 * now.space.count)
-    assert (np.abs(balance.residual(state)) <= balance.sizes(state) * (1 + 1e-12)).all()
-    alone, problem = Balance(found.problem, None), found.problem
-    assert np.allclose(alone.sizes(state), abs(problem.operator) @ abs(state) + problem.source)
-
-
-@EVERY_ORDER
-def test_substrates_are_coupled_in_the_biomass_alone(order):
-    """Acceptor and donor of a node of the water have no entry in common."""
-    now, found = at_start(thick("2.9 m/day", order))
-    system, count = found.problem.system, now.space.count
-    tangent = Balance(found.problem, Sink(now.active)).tangent(np.ones(2 * count))
-    rows, columns = system.matrix(tangent).nonzero()
-    rows, columns = system.order[rows], system.order[columns]
-    pairs = (rows < count) != (columns < count)
-    assert pairs.any() and np.isin(rows[pairs] % count, now.space.reaction.cells).all()
