@@ -1,25 +1,23 @@
-"""The paper's transient scheme (3.3): against SciPy's Radau method on the same system in space, its balances, where it
-rests, and what it refuses. Higher orders in time, and a well-mixed pore, are cases of the stage transport.
-"""
+"""The paper's transient scheme (3.3): its order in the step, where it rests, pores without flow, and what it refuses.
+Its values and its balances are cases of the stage transport."""
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from repro.errors import TransportError
 from repro.march.simulation import simulate
-from repro.model import gear, kinetics, pore, remeshing, transport
+from repro.model import gear, pore, transport
 from repro.model.kinetics import Sink
-from repro.model.transport import Balance, Concentrations
+from repro.model.transport import Concentrations
 from repro.scene import load_scene
 from tests.strategies import ORDERS, fitted_order, scene
 
 SECOND = 1 / 3600
 #: A thousand times faster metabolism in a thousand times less biomass: the same uptake, and growth within seconds.
 HASTY = {"maximum_utilization_rate": "9300 1/day", "decay_coefficient": "120 1/day", "maximum_density": "30 mg/L"}
-
 
 EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
 
@@ -40,11 +38,6 @@ def case(radius="20 um", velocity="2.9 m/day", boundary="open", order=1, **secti
     return now, transport.problem(now.space, carried, made.substrates, made.kinetics)
 
 
-def hasty(**more):
-    """The case without a cache: sections are not hashable."""
-    return case.__wrapped__(kinetics=HASTY, **more)
-
-
 def storage(problem):
     """(n,) um2 that add up to what is stored: the lumped mass, or the integrals of higher orders' functions."""
     space = problem.space
@@ -53,77 +46,20 @@ def storage(problem):
     return np.bincount(space.cells.ravel(), space.load(space.at.dx).ravel(), space.count)
 
 
-def rates(problem, y):
-    """(7)-(10) in space discretised with linear elements: C_A and C_D of all nodes, then X_A and X_I (um2 mg/L) of the
-    biomass's nodes, in one vector, and so their rates. The steady balance is held to scikit-fem's in
-    `test_weak_forms.py`."""
-    c_a, c_d, active, _ = parts_of(problem, y)
-    space, (s, k) = problem.space, (problem.substrates, problem.kinetics)
-    lacking = Balance(problem, Sink(active)).residual(np.concatenate([c_a, c_d]))
-    a, d = (field[space.reaction.cells] for field in (c_a, c_d))
-    growth, remains = kinetics.growth_rate(a, d, s, k), kinetics.inert_rate(a, s, k)
-    return state_of(*np.split(-lacking / np.tile(space.lumped(), 2), 2), growth * active, remains * active)
-
-
-def exact(problem, start, duration):
-    """The state by Radau's method at 1e-9, thirty times under the smallest error that is measured with it."""
-    found = solve_ivp(lambda _, y: rates(problem, y), (0.0, duration), start, "Radau", rtol=1e-9, atol=1e-9)
-    assert found.success
-    return found.y[:, -1]
-
-
-def parts_of(problem, y):
-    """(C_A, C_D, X_A, X_I) of a state in one vector; biomass in the points of the reaction."""
-    space = problem.space
-    count, shape = space.count, space.reaction.dx.shape
-    c_a, c_d, x_a, x_i = np.split(y, [count, 2 * count, 2 * count + space.reaction.dx.size])
-    return c_a, c_d, x_a.reshape(shape), x_i.reshape(shape)
-
-
-def state_of(acceptor, donor, active, inert):
-    """The state in one vector."""
-    return np.concatenate([acceptor, donor, active.ravel(), inert.ravel()])
-
-
-def advanced(problem, start, duration, **control):
-    """(Advance, its state)."""
-    c_a, c_d, x_a, x_i = parts_of(problem, start)
-    done = gear.advance(problem, x_a, x_i, Concentrations(c_a, c_d), duration, **control)
-    return done, state_of(done.concentrations.acceptor, done.concentrations.donor, done.active, done.inert)
-
-
-def filled(now, problem):
-    """The state at t = 0: C_supply everywhere."""
-    supplied = transport.supplied_everywhere(problem)
-    return state_of(supplied.acceptor, supplied.donor, now.active, now.inert)
-
-
-@cache
-def smooth_transient():
-    """(problem, start, duration, exact end): two seconds after the start from C_supply the fastest modes have died
-    out.
-    """
-    now, problem = hasty()
-    start = exact(problem, filled(now, problem), 2 * SECOND)
-    return problem, start, 4 * SECOND, exact(problem, start, 4 * SECOND)
-
-
-def relative(problem, found, expected):
-    """Largest error of C_A, C_D, X_A and X_I, each over its largest value; biomass over its points' weights."""
-    sizes = (1, 1, problem.space.reaction.dx, problem.space.reaction.dx)
-    both = zip(parts_of(problem, found), parts_of(problem, expected), sizes, strict=True)
-    return np.array([np.abs((one - other) / size).max() / np.abs(other / size).max() for one, other, size in both])
-
-
 @pytest.mark.parametrize("simultaneous", [False, True])
 def test_second_order_in_the_step(simultaneous):
-    """Concentrations, X_A and X_I converge with order 2 in fixed steps (measured 2.00 to 2.05)."""
-    problem, start, duration, expected = smooth_transient()
-    steps = duration / np.array([16, 32, 64])
-    ends = [advanced(problem, start, duration, fixed_step=h, simultaneous=simultaneous)[1] for h in steps]
-    errors = [relative(problem, end, expected) for end in ends]
-    for row in np.array(errors).T:
-        assert 1.9 < fitted_order(steps, row) < 2.2
+    """What halving a fixed step changes of C_A, C_D, X_A and X_I, two seconds after the start from C_supply, when the
+    fastest modes have died out. What they come to is in the cases transport-gear-in-time and transport-well-mixed."""
+    now, problem = case.__wrapped__(kinetics=HASTY)
+    start = gear.advance(problem, now.active, now.inert, transport.supplied_everywhere(problem), 2 * SECOND)
+    ends, counts = [], (16, 32, 64, 128)
+    for count in counts:
+        done = gear.advance(problem, start.active, start.inert, start.concentrations, 4 * SECOND,
+                            fixed_step=4 * SECOND / count, simultaneous=simultaneous)
+        ends.append((done.concentrations.acceptor, done.concentrations.donor, done.active, done.inert))
+    for values in zip(*ends):
+        changes = [np.abs(one - other).max() for one, other in pairwise(values)]
+        assert 1.9 < fitted_order(1 / np.array(counts[:-1]), changes) < 2.2
 
 
 @EVERY_ORDER
@@ -174,7 +110,8 @@ def test_a_starved_pore_stays_positive(fixed_step):
     (there BDF2 goes negative).
     """
     now, problem = case.__wrapped__("40 um", "0.1 m/day", substrates={"acceptor": {"half_saturation": "1e-3 mg/L"}})
-    done, _ = advanced(problem, filled(now, problem), 0.2, fixed_step=fixed_step)
+    done = gear.advance(problem, now.active, now.inert, transport.supplied_everywhere(problem), 0.2,
+                        fixed_step=fixed_step)
     assert 0 <= done.concentrations.acceptor.min() < 1e-6 and done.concentrations.donor.min() > 0
 
 
@@ -213,24 +150,27 @@ def test_substrate_without_flow_falls_by_what_is_consumed(order):
     than 1e-4 of what was consumed (measured 1e-6 to 1e-5)."""
     still = scene(velocity="0 m/day", growth={"end": "0.6 h"}, numerics=coarse(order))
     instants = list(simulate(still))
-    mass = [transport_mass(instant) for instant in instants]
-    for before, after, instant in zip(mass, mass[1:], instants[1:]):
-        ledger = instant.ledgers[0]
+    for before, after in pairwise(instants):
+        (ledger,) = after.ledgers
         assert ledger.supplied == ledger.out == (0.0, 0.0)
         assert ledger.stored == pytest.approx(-np.array(ledger.consumed), rel=1e-9)
-        assert after - before == pytest.approx(-np.array(ledger.consumed), rel=1e-4)
+        change = contents(after) - contents(before)
+        assert change == pytest.approx(-np.array(ledger.consumed), rel=1e-4)
 
 
-PRESETS = pytest.mark.parametrize("preset", ["fast", "accurate", "paper"])
-STILL = ('aggregate.radius="20 um"', "numerics.time=updates", 'growth.end="0.2 h"')
+def contents(instant):
+    """Acceptor and donor in the pore, um2 mg/L."""
+    weight, found = storage(instant.solved.problem), instant.solved.concentrations
+    return np.array([weight @ found.acceptor, weight @ found.donor])
 
 
-@PRESETS
+@pytest.mark.parametrize("preset", ["fast", "accurate", "paper"])
 @pytest.mark.parametrize("method", ["quasi_steady", "gear"])
 def test_without_flow_the_ends_of_the_pore_hold_the_supply(preset, method):
     """Beside the aggregate diffusion is one-dimensional: C falls evenly from the end of the pore, 300 um away, where
     half of what is taken up comes in. 1.5 W away the profile across has faded to exp(-1.5 pi) of a drop of 1 mg/L."""
-    said = load_scene("base", [*STILL, f"numerics.preset={preset}", f"numerics.transport={method}"], ["flow"])
+    said = load_scene("base", ["aggregate.radius=20 um", "growth.end=0.2 h", f"numerics.preset={preset}",
+                               "numerics.time=updates", f"numerics.transport={method}"], ["flow"])
     first = next(simulate(said))
     state, space = first.solved.concentrations, first.pore.space
     x = np.abs(space.points[:, 0])
@@ -240,12 +180,6 @@ def test_without_flow_the_ends_of_the_pore_hold_the_supply(preset, method):
         fall = flux.consumed / 2 / (kind.diffusivity * said.pore.width)
         assert field[far] == pytest.approx(kind.supply - fall * (300 - x[far]), abs=np.exp(-1.5 * np.pi))
         assert fall * 200 > 1
-
-
-def transport_mass(instant):
-    """Acceptor and donor in the pore, um2 mg/L."""
-    weight, found = storage(instant.solved.problem), instant.solved.concentrations
-    return np.array([weight @ found.acceptor, weight @ found.donor])
 
 
 @pytest.mark.parametrize("changes, unset", [

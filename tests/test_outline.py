@@ -1,22 +1,11 @@
 """The aggregate's boundary, of straight edges or of parabolic arcs; its measures are in `test_unseen.py`, its splits in
 `test_sizing.py`."""
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from repro.fem import outline as of
 from repro.fem.outline import FREE
 from tests.strategies import plug, seed
-
-
-def wavy(radius=20.0, refinement=0.5, bend=0.03):
-    """A seed with its free nodes pushed about, so that its arcs are bent unevenly; places at t = 0 as the half-disc."""
-    start = seed(radius, refinement, 2)
-    random = np.random.default_rng(7)
-    free = (start.wall == FREE)[:, None]
-    points = start.points + free * random.uniform(-bend, bend, start.points.shape) * radius
-    return replace(start, points=points)
 
 
 def test_the_interface_is_what_borders_the_fluid():

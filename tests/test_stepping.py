@@ -1,7 +1,7 @@
 """Steps of the midpoint rule: where they end, which are taken, and what depends on rows and ends.
 
-That they are of second order is the case coupling-midpoint-order; that their ledgers close is in `test_balances.py`, how
-long they are in `test_pace.py`, and that contact ends one the case hard-07-contact.
+That they are of second order is the case coupling-midpoint-order; that their ledgers close is in `test_balances.py`,
+how long they are in `test_pace.py`, and that contact ends one the case hard-07-contact.
 """
 import json
 from dataclasses import replace
