@@ -1,10 +1,8 @@
 """Stokes flow (1)-(6): the flux that every section of any mesh carries, conditions, and biomass that water passes.
 
-The weak form is held to scikit-fem's in `test_weak_forms.py`; closed forms, other codes, energy, obstacles and mirrors
-are cases of the stage flow, units of length the cases coupling-units and hard-17-units.
+Closed forms, other codes, energy, obstacles and mirrors are cases of the stage flow, units of length the cases
+coupling-units and hard-17-units; what is told of the whole pore is in `test_derived.py`.
 """
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -19,7 +17,7 @@ from repro.model import flow, pore
 from repro.results import row
 from repro.run.running import warned
 from repro.scene import load_scene
-from tests.strategies import ORDERS, between, meshes, scenes, seed, share, space_of
+from tests.strategies import ORDERS, between, meshes, seed, share, space_of
 
 
 @share(0.4)
@@ -109,13 +107,11 @@ def test_a_run_with_bubbles_balances_and_stays_near_the_stabilised_one():
     assert 0 < abs(speeds[1] / speeds[0] - 1) < 1e-4
 
 
-@pytest.mark.parametrize("interface", ["laplacian", "traction"])
 @pytest.mark.parametrize("element, said", [
-    (flow.Stabilised(12.0), ["numerics.flow_stabilisation=12"]), (flow.Bubble(), ["numerics.flow_element=bubble"])])
-def test_what_a_scene_says_of_its_elements_reaches_the_flow(element, said, interface):
-    made = load_scene("base", ["numerics.preset=paper", "numerics.refinement=0.4", f"numerics.interface={interface}",
-                               *said])
+    (flow.Stabilised(12.0), "numerics.flow_stabilisation=12"), (flow.Bubble(), "numerics.flow_element=bubble")])
+def test_what_a_scene_says_of_its_elements_reaches_the_flow(element, said):
+    made = load_scene("base", ["numerics.preset=paper", "numerics.refinement=0.4", said])
     space = pore.seeded(made).space
-    unit = flow.unit_flow(space, made.flow.viscosity_ratio, interface=interface, element=element)
+    unit = flow.unit_flow(space, made.flow.viscosity_ratio, element=element)
     wanted = flow.scaled(unit, space.mesh, made.pore.length, made.flow)
     assert np.array_equal(pore.solve_flow(made, space).head, wanted.head)

@@ -94,12 +94,15 @@ def numbers(instant):
             solved.concentrations.acceptor, solved.concentrations.donor, solved.flow.velocity, solved.flow.head_loss)
 
 
+OTHER_PACKAGES = 'numerics.ordering="metis"', 'numerics.solver="pardiso"'
+
+
 @pytest.mark.parametrize("which", [0, 1], ids=["paper", "fast"])
 def test_runs_in_turns_do_not_see_each_other(which, monkeypatch):
-    """Two runs of one scene but for the ordering of its linear systems, step by step in turns in one process: each is
-    what it is alone, to the last bit, and the two differ in the last bits."""
-    made = faults.stand_in_package(monkeypatch, "pymetis")
-    pair = scenes()[which], scenes('numerics.ordering="metis"')[which]
+    """Two runs of one scene but for the packages that order and solve its linear systems, step by step in turns in one
+    process: each is what it is alone, to the last bit, and the two differ in the last bits."""
+    made, _ = (faults.stand_in_package(monkeypatch, package) for package in ("pymetis", "pypardiso"))
+    pair = scenes()[which], scenes(*OTHER_PACKAGES)[which]
     alone = [tuple(map(numbers, simulate(scene))) for scene in pair]
     called = len(made.calls)
     turns = list(zip(*map(simulate, pair), strict=True))
@@ -116,7 +119,7 @@ def test_the_method_of_a_scene_reaches_every_system(which, monkeypatch):
     """Of flow, substrates, mesh motion and growth, at t = 0 and on a new mesh."""
     for package in ("pymetis", "pypardiso"):
         faults.stand_in_package(monkeypatch, package)
-    scene = scenes('numerics.ordering="metis"', 'numerics.solver="pardiso"')[which]
+    scene = scenes(*OTHER_PACKAGES)[which]
     wanted = Method("pardiso", "metis")
     now = pore.seeded(scene)
     expanded = contact.expand(scene, now, 1.05 * now.theta)[0]
