@@ -1,7 +1,6 @@
 """Newton's method: when its derivative is factorised anew, and when it stops."""
 from dataclasses import dataclass
 
-import numpy as np
 import pytest
 
 from repro.fem.newton import ENOUGH, STALLED, Newton
@@ -71,5 +70,3 @@ def test_when_it_stops(defects, count, converged):
     assert STALLED == 0.1
     last, steps, done = run(Script(defects), most=4 if converged else 3)
     assert (last.number, steps, done) == (count, count, converged)
-
-
