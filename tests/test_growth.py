@@ -38,8 +38,8 @@ def area(body, position):
 @share(0.4)
 @given(outlines(), st.floats(0.35, 0.6), st.floats(0.8, 1.2), st.floats(0.0, 0.3), st.integers(0, 2**32 - 1))
 def test_any_body_comes_to_rest(geometry, drawn, refinement, least, more, seed):
-    """Grown unevenly or shrunk, on one wall or between two: nothing is turned over, no constrained coordinate moves, and
-    the area is the sum of theta |tau| (24)."""
+    """Grown unevenly or shrunk, on one wall or between two: nothing is turned over, no constrained coordinate moves,
+    and the area is the sum of theta |tau| (24)."""
     outline, width = drawn
     body, held, _ = body_of(*meshed(outline if geometry == 1 else with_arcs(outline), width, refinement))
     theta = constant(body, least + more * np.random.default_rng(seed).uniform(0.0, 1.0, len(body.shape.cells)))
