@@ -4,7 +4,6 @@ Ledgers, symmetry, growth in closed form and orders in time are cases of the sta
 """
 from dataclasses import replace
 from functools import cache
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -67,9 +66,8 @@ def test_decay_alone_follows_its_exponential(order):
 
 
 def test_contact_closes_the_film_and_the_run_goes_on(touching):
-    """Nodes of contact lie on the walls to the last bit, middles with their corners, what has touched a wall stays
-    there, and one node is fixed at the top; flow is forced through the plug. That ledgers close and the fluid splits is
-    the case coupling-contact."""
+    """Nodes of contact lie on the walls to the last bit, middles with their corners; one of them is fixed at the top;
+    flow is forced through the plug. That ledgers close and the fluid splits is the case coupling-contact."""
     made, found = touching
     states = [instant.pore.contact for instant in found]
     assert states == sorted(states) and not states[0] and sum(states) >= 2
@@ -88,11 +86,6 @@ def test_contact_closes_the_film_and_the_run_goes_on(touching):
             assert not outline.fixed[1::2].any()
             assert (top[middles - 1] & top[(middles + 1) % len(top)]).all()
     assert found[states.index(True)].remeshes >= 1
-    for before, after in pairwise(instant.pore.outline for instant in found):
-        for wall in (BOTTOM, TOP):
-            first, then = (shape.origin[shape.wall == wall, 0] for shape in (before, after))
-            assert then.min(initial=np.inf) <= first.min(initial=np.inf) + 1e-12
-            assert then.max(initial=-np.inf) >= first.max(initial=-np.inf) - 1e-12
 
 
 OPTIONS = {
