@@ -32,7 +32,7 @@ def fluid_regions(grid):
 @given(attached_aggregates(width=widths) | attached_aggregates(width=widths, geometry=2))
 def test_any_outline_keeps_its_nodes_to_the_last_bit_and_its_edges(drawn):
     """The loop is the refined outline, bit for bit; every edge of it is an edge of the mesh, biomass on its left; the
-    fluid is one piece, and no node is to spare."""
+    fluid is one piece, no node is to spare, and no triangle is poor."""
     outline, width = drawn
     grid, fine = meshed(outline, width)
     assert (grid.points[grid.loop] == fine.points).all()
@@ -41,7 +41,7 @@ def test_any_outline_keeps_its_nodes_to_the_last_bit_and_its_edges(drawn):
     assert {(a, b) for a, b in zip(corners, np.roll(corners, -1))} <= edges
     assert grid.areas.sum() == pytest.approx(np.ptp(grid.ends) * width, rel=1e-12)
     assert grid.area() == pytest.approx(outline.area, rel=1e-12)
-    assert fluid_regions(grid) == 1 and len(np.unique(grid.cells)) == len(grid.points)
+    assert fluid_regions(grid) == 1 and len(np.unique(grid.cells)) == len(grid.points) and grid.acceptable()
 
 
 def test_contact_splits_the_fluid_in_two():
