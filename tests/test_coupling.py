@@ -1,4 +1,4 @@
-"""Coupled runs with elements of every order: what an instant tells, decay, contact, options.
+"""Coupled runs with elements of every order: decay, contact, options.
 
 Ledgers, symmetry, growth in closed form and orders in time are cases of the stage coupling.
 """
@@ -49,18 +49,6 @@ def touching(request):
 
 
 @EVERY_ORDER
-def test_what_was_before_the_expansion(order):
-    """Plate 1's state [E12]: the shape of the last instant, with the biomass and substrates of this one."""
-    last, instant = run(load_scene("base", [*sets(order), 'growth.end="0.2 h"']))
-    grown, solution = instant.before
-    assert grown.space.mesh is last.pore.mesh
-    assert grown.time == pytest.approx(instant.pore.time)
-    assert grown.mass == pytest.approx(instant.ledgers[-1].biomass_after, rel=1e-12)
-    now, then = (each.concentrations.acceptor[grown.space.reaction.cells] for each in (solution, last.solved))
-    assert (now < then).all()
-
-
-@EVERY_ORDER
 def test_decay_alone_follows_its_exponential(order):
     """No donor: X_A + X_I = X_m (0.2 + 0.8 exp(-b m_A t)), m_A between its least and largest value (1e-5 apart), and
     the aggregate shrinks with it."""
@@ -98,21 +86,6 @@ def test_contact_closes_the_film_and_the_run_goes_on(touching):
             assert not outline.fixed[1::2].any()
             assert (top[middles - 1] & top[(middles + 1) % len(top)]).all()
     assert found[states.index(True)].remeshes >= 1
-
-
-def test_contact_surfaces_grow_and_never_detach(touching):
-    """From contact on both surfaces widen, no material leaves them, and their fixed points keep their x."""
-    made, found = touching
-    for wall in (BOTTOM, TOP):
-        there = [instant.pore.outline for instant in found if (instant.pore.wall == wall).any()]
-        for places, since in (("origin", 0), ("points", -3)):
-            spans = np.array([np.sort(getattr(o, places)[o.wall == wall, 0])[[0, -1]] for o in there])[since:]
-            assert (np.diff(spans[:, 0]) <= 1e-12).all() and (np.diff(spans[:, 1]) >= -1e-12).all()
-        fixed = [o.points[o.fixed & (o.wall == wall), 0] for o in there]
-        assert all(x.tolist() == fixed[0].tolist() for x in fixed)
-        left, right = np.sort(there[0].points[there[0].wall == wall, 0])[[0, -1]]
-        assert abs(fixed[0][0] - 0.5 * (left + right)) <= 0.2 * (right - left)
-    assert made.numerics.time == "updates" or np.ptp(spans[-1]) > 5
 
 
 OPTIONS = {

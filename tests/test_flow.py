@@ -1,10 +1,8 @@
 """Stokes flow (1)-(6): the flux that every section of any mesh carries, conditions, and biomass that water passes.
 
-The weak form is held to scikit-fem's in `test_weak_forms.py`; closed forms, other codes, energy, obstacles and mirrors
-are cases of the stage flow, units of length the cases coupling-units and hard-17-units.
+Closed forms, other codes, energy, obstacles and mirrors are cases of the stage flow, units of length the cases
+coupling-units and hard-17-units; what is told of the whole pore is in `test_derived.py`.
 """
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -19,7 +17,7 @@ from repro.model import flow, pore
 from repro.results import row
 from repro.run.running import warned
 from repro.scene import load_scene
-from tests.strategies import ORDERS, between, meshes, scenes, seed, share, space_of
+from tests.strategies import ORDERS, between, meshes, seed, share, space_of
 
 
 @share(0.4)
@@ -38,34 +36,6 @@ def test_every_section_carries_the_flux_of_the_inlet(grid, ratio, interface, see
         w = w - unit.correction
     slopes = np.einsum("tai,ta->ti", grid.gradients, section[grid.triangles])
     assert -grid.areas @ np.sum(w * slopes, axis=1) == pytest.approx(grid.width, rel=1e-11)
-
-
-@share(0.4)
-@given(scenes(drives=("head", "mean_velocity"), elements=tuple(ORDERS.values())), between(1e-3, 1e3))
-def test_the_head_that_a_velocity_needs_gives_it_back(made, speed):
-    """All of the flow, whose loss is that of the mesh and of the clean pore around it; the conductivity is told of it.
-    That the flow is linear in its drive is the case flow-energy."""
-    now = pore.seeded(made)
-
-    def driven(**drive):
-        changed = replace(made.flow, **{"head": None, "mean_velocity": None, **drive})
-        return pore.solve_flow(replace(made, flow=changed), now.space)
-
-    first = driven(mean_velocity=speed)
-    again = driven(head=first.head_loss)
-    carrying = ("correction",) if made.numerics.order == 1 else ()
-    for name in ("velocity", "head", *carrying, "meshed_loss", "head_loss", "mean_velocity"):
-        one, two = (getattr(flow, name) for flow in (first, again))
-        assert two == pytest.approx(one, abs=1e-11 * np.abs(one).max())
-    rest = made.pore.length - np.ptp(now.mesh.ends)
-    viscosity = made.flow.kinematic_viscosity / made.flow.gravity
-    assert first.head_loss == pytest.approx(first.meshed_loss + 12 * viscosity * speed * rest / made.pore.width**2)
-    ends = (now.mesh.topology.inlet, now.mesh.topology.outlet)
-    at = [np.trapezoid(first.head[nodes], now.mesh.points[nodes, 1]) / now.mesh.width for nodes in ends]
-    assert at[1] == pytest.approx(0.0, abs=1e-11 * first.meshed_loss)
-    if made.numerics.order == 1:  # the others' is the work of the inlet
-        assert at[0] == pytest.approx(first.meshed_loss, rel=1e-11)
-    assert again.conductivity == pytest.approx(speed * made.pore.length / first.head_loss, rel=1e-11)
 
 
 @pytest.mark.parametrize("left", [-1 / 3 * 100, -47.123456789012345, -0.1 * 487])
@@ -137,13 +107,11 @@ def test_a_run_with_bubbles_balances_and_stays_near_the_stabilised_one():
     assert 0 < abs(speeds[1] / speeds[0] - 1) < 1e-4
 
 
-@pytest.mark.parametrize("interface", ["laplacian", "traction"])
 @pytest.mark.parametrize("element, said", [
-    (flow.Stabilised(12.0), ["numerics.flow_stabilisation=12"]), (flow.Bubble(), ["numerics.flow_element=bubble"])])
-def test_what_a_scene_says_of_its_elements_reaches_the_flow(element, said, interface):
-    made = load_scene("base", ["numerics.preset=paper", "numerics.refinement=0.4", f"numerics.interface={interface}",
-                               *said])
+    (flow.Stabilised(12.0), "numerics.flow_stabilisation=12"), (flow.Bubble(), "numerics.flow_element=bubble")])
+def test_what_a_scene_says_of_its_elements_reaches_the_flow(element, said):
+    made = load_scene("base", ["numerics.preset=paper", "numerics.refinement=0.4", said])
     space = pore.seeded(made).space
-    unit = flow.unit_flow(space, made.flow.viscosity_ratio, interface=interface, element=element)
+    unit = flow.unit_flow(space, made.flow.viscosity_ratio, element=element)
     wanted = flow.scaled(unit, space.mesh, made.pore.length, made.flow)
     assert np.array_equal(pore.solve_flow(made, space).head, wanted.head)

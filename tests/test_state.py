@@ -63,22 +63,6 @@ def again(mesh, **changes):
     return Mesh.of(**parts)
 
 
-@pytest.mark.parametrize("kind", ORDERS.values())
-def test_what_is_replaced_remembers_nothing(kind):
-    """Of each object that works things out once: its fields alone go to the other, and nothing that it has kept."""
-    scene = load_scene("base", ["numerics.preset=fast", f"numerics.elements={kind}", "numerics.refinement=0.5"])
-    now = pore.seeded(scene)
-    pore.solve(scene, now)
-    contact.expand(scene, now, 1.02 * now.theta)
-    kept = (now, now.space, now.mesh, now.mesh.topology, now.mesh.topology.straight, now.body, now.body.shape)
-    for thing in map(touched, kept):
-        names = {field.name for field in fields(thing)}
-        assert names < vars(thing).keys(), "else nothing is tested"
-        other = replace(thing)
-        assert vars(other).keys() == names, type(thing)
-        assert all(value == {} for value in vars(other).values() if isinstance(value, dict)), type(thing)
-
-
 @geometries
 def test_a_mesh_with_other_points_forgets(geometry):
     """All that depends on places is worked out anew; what depends on the connections alone stays."""
@@ -110,12 +94,15 @@ def numbers(instant):
             solved.concentrations.acceptor, solved.concentrations.donor, solved.flow.velocity, solved.flow.head_loss)
 
 
+OTHER_PACKAGES = 'numerics.ordering="metis"', 'numerics.solver="pardiso"'
+
+
 @pytest.mark.parametrize("which", [0, 1], ids=["paper", "fast"])
 def test_runs_in_turns_do_not_see_each_other(which, monkeypatch):
-    """Two runs of one scene but for the ordering of its linear systems, step by step in turns in one process: each is
-    what it is alone, to the last bit, and the two differ in the last bits."""
-    made = faults.stand_in_package(monkeypatch, "pymetis")
-    pair = scenes()[which], scenes('numerics.ordering="metis"')[which]
+    """Two runs of one scene but for the packages that order and solve its linear systems, step by step in turns in one
+    process: each is what it is alone, to the last bit, and the two differ in the last bits."""
+    made, _ = (faults.stand_in_package(monkeypatch, package) for package in ("pymetis", "pypardiso"))
+    pair = scenes()[which], scenes(*OTHER_PACKAGES)[which]
     alone = [tuple(map(numbers, simulate(scene))) for scene in pair]
     called = len(made.calls)
     turns = list(zip(*map(simulate, pair), strict=True))
@@ -132,7 +119,7 @@ def test_the_method_of_a_scene_reaches_every_system(which, monkeypatch):
     """Of flow, substrates, mesh motion and growth, at t = 0 and on a new mesh."""
     for package in ("pymetis", "pypardiso"):
         faults.stand_in_package(monkeypatch, package)
-    scene = scenes('numerics.ordering="metis"', 'numerics.solver="pardiso"')[which]
+    scene = scenes(*OTHER_PACKAGES)[which]
     wanted = Method("pardiso", "metis")
     now = pore.seeded(scene)
     expanded = contact.expand(scene, now, 1.05 * now.theta)[0]

@@ -1,7 +1,5 @@
-"""The transfer of fields to a new mesh (3.5, [E8]): where places are, what is bounded, what remeshes keep.
-
-(34), and the projection against a dense code, are in the cases of the stage reprojection.
-"""
+"""The transfer of fields to a new mesh (3.5, [E8]): what it refuses, what is bounded, what remeshes keep. (34), the
+orders of what is carried, and the projection against a dense code, are in the cases of the stage reprojection."""
 from dataclasses import replace
 
 import numpy as np
@@ -11,15 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from repro.errors import TransferError
-from repro.fem import elements, transfer
-from repro.fem.mesh import curved
-from repro.fem.space import Space
+from repro.fem import transfer
 from repro.march.simulation import simulate
 from repro.model import biomass, pore, remeshing
 from repro.model.transport import OVERSHOOT, UNRESOLVED, Concentrations
 from repro.scene import load_scene
 from tests.strategies import ORDERS, scene, scenes, share
-from tests.test_outline import wavy
 from verification.problems import pairs
 
 
@@ -38,87 +33,33 @@ def test_a_corner_on_a_side_of_the_window_loses_no_piece():
 
 
 @pytest.fixture(scope="module")
-def around():
-    """Meshes around a wavy outline: of arcs, of the same with edges between corners that are straight, and of three
-    nodes a triangle."""
-    made = scene("20 um", numerics={"preset": "fast", "refinement": 0.5})
-    arcs = pore.generate(made, wavy())[0]
-    flat = curved(arcs.straight, None)
-    return {"arcs": arcs, "flat": flat, "straight": arcs.straight}
+def arcs():
+    """A mesh around a half-disc, of arcs."""
+    return pore.seeded(scene("20 um", numerics={"preset": "fast", "refinement": 0.5})).mesh
 
 
-@pytest.mark.parametrize("kind", ["arcs", "flat", "straight"])
-def test_a_place_is_found_in_its_triangle(around, kind):
-    """By Newton's method on the curved map, to 1e-9 of the size."""
-    mesh = around[kind]
-    random, nodes = np.random.default_rng(8), mesh.points[mesh.cells]
-    shares = random.dirichlet([1, 1, 1], len(nodes))
-    local = shares[:, 1:]
-    where = np.einsum("ka,kai->ki", elements.values(mesh.geometry, local), nodes)
-    at = transfer.located(mesh.points, mesh.cells, where)
-    back = np.einsum("ka,kai->ki", elements.values(mesh.geometry, at.local), nodes[at.triangle])
-    assert np.allclose(back, where, atol=1e-9)
-    inner = shares.min(axis=1) > 0.02
-    assert np.array_equal(at.triangle[inner], np.arange(len(nodes))[inner])
+def test_a_place_far_outside_is_refused(arcs):
+    for mesh in (arcs, arcs.straight):
+        with pytest.raises(TransferError, match="of the new mesh is not in the old one"):
+            transfer.located(mesh.points, mesh.cells, np.array([[0.0, 5.0], [500.0, 5.0]]))
 
 
-def drawn_places():
-    random = np.random.default_rng(9)
-    return np.column_stack([random.uniform(-14, 14, 200), random.uniform(0.5, 10, 200)])
-
-
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("kind", ["flat", "straight"])
-def test_polynomials_of_the_order_are_carried_exactly(around, order, kind):
-    """On straight edges, whatever carries the map."""
-    mesh, where = around[kind], drawn_places()
-    space = Space(mesh, order)
-
-    def fields(points):
-        x, y = points.T
-        return np.column_stack([(x - 2 * y) ** order + 3, (y / 2 + x) ** order + 2 * x - 1])
-
-    at = transfer.located(mesh.points, mesh.cells[mesh.biomass], where)
-    found = at.field(fields(space.points), space.cells[mesh.biomass], order)
-    assert np.allclose(found, fields(where), rtol=1e-10, atol=1e-8)
-    linear = at.field((2 * mesh.points[:, 0] - mesh.points[:, 1])[: mesh.corners], mesh.triangles[mesh.biomass], 1)
-    assert np.allclose(linear, 2 * where[:, 0] - where[:, 1], atol=1e-9)
-
-
-def test_a_place_a_little_outside_is_moved_to_the_edge(around):
-    """A chord cuts an arc: what is between them is outside of the chord's triangle."""
-    for mesh in around.values():
-        places = np.column_stack([[-5.0, 5.0], np.full(2, -1e-3)])
-        at = transfer.located(mesh.points, mesh.cells, places)
-        assert at.local.min() >= 0 and at.local.sum(axis=1).max() <= 1
-        found = at.field(mesh.points, mesh.cells, mesh.geometry)
-        assert np.allclose(found, places * [1, 0], rtol=0, atol=2e-3)
-
-
-@pytest.mark.parametrize("kind", ["arcs", "straight"])
-def test_a_place_far_outside_is_refused(around, kind):
-    mesh = around[kind]
-    with pytest.raises(TransferError, match="of the new mesh is not in the old one"):
-        transfer.located(mesh.points, mesh.cells, np.array([[0.0, 5.0], [500.0, 5.0]]))
-
-
-def test_places_at_the_start_are_unfolded(around):
+def test_places_at_the_start_are_unfolded(arcs):
     """A middle whose place at t = 0 turns its triangle over goes half way between its corners; others stay. Corners
     that fold are refused, of straight triangles too."""
-    mesh = around["arcs"]
-    assert transfer.unfolded(mesh, mesh.points) is mesh.points
-    body, origin = mesh.cells[mesh.biomass], mesh.points.copy()
-    cell = body[np.argmin(np.isin(body[:, 3:], mesh.loop).sum(axis=1))]
+    assert transfer.unfolded(arcs, arcs.points) is arcs.points
+    body, origin = arcs.cells[arcs.biomass], arcs.points.copy()
+    cell = body[np.argmin(np.isin(body[:, 3:], arcs.loop).sum(axis=1))]
     origin[cell[3]] = origin[cell[2]]
-    found = transfer.unfolded(mesh, origin)
+    found = transfer.unfolded(arcs, origin)
     assert np.allclose(found[cell[3]], 0.5 * (origin[cell[0]] + origin[cell[1]]))
-    assert np.array_equal(found[:mesh.corners], origin[:mesh.corners])
-    assert not mesh.moved(found).turned_over(np.flatnonzero(mesh.biomass)).any()
+    assert np.array_equal(found[:arcs.corners], origin[:arcs.corners])
+    assert not arcs.moved(found).turned_over(np.flatnonzero(arcs.biomass)).any()
     origin[cell[0]] = 2 * origin[cell[1]] - origin[cell[0]] + 3 * (origin[cell[2]] - origin[cell[1]])
-    for grid, places in ((mesh, origin), (mesh.straight, origin[: mesh.corners])):
+    for grid, places in ((arcs, origin), (arcs.straight, origin[: arcs.corners])):
         with pytest.raises(TransferError, match="the places at t = 0 fold"):
             transfer.unfolded(grid, places)
-    assert transfer.unfolded(mesh.straight, mesh.straight.points) is mesh.straight.points
+    assert transfer.unfolded(arcs.straight, arcs.straight.points) is arcs.straight.points
 
 
 OLD, NEW = pairs.grid(6.0, 1), pairs.grid(5.0, 2)
@@ -143,16 +84,6 @@ def test_a_bounded_transfer_keeps_mass_and_bounds(seed, share, scale, level):
 def test_projection_refuses_meshes_of_different_shapes():
     with pytest.raises(TransferError, match="common pieces"):
         transfer.project(*OLD, OLD[0], OLD[0] * [1.0, 1.001], OLD[1])
-
-
-def test_what_is_far_away_plays_no_part_in_a_bounded_transfer():
-    """A spike is carried to nodes near it alone, where the projection rings in the whole domain."""
-    before = np.zeros(len(OLD[0]))
-    peak = np.argmin(np.hypot(*(OLD[0] - [20.0, 12.0]).T))
-    before[peak] = 1.0
-    free, bounded = (carry(*OLD, before[:, None], *NEW)[:, 0] for carry in (transfer.project, transfer.project_bounded))
-    far = np.hypot(*(NEW[0] - OLD[0][peak]).T) > 14.0
-    assert np.abs(free[far]).max() > 1e-4 and (bounded[far] == 0).all() and bounded.min() == 0
 
 
 def test_a_run_that_remeshes_by_a_bounded_transfer_keeps_its_biomass():
@@ -228,10 +159,11 @@ def check_substrates(made, then):
         assert field.max() <= substrate.supply * (1 + room)
 
 
-@pytest.mark.parametrize("speed, brought", [(0.0, 7.0), (4e4, 3.0)])
+@pytest.mark.parametrize("speed, brought", [(0.0, 7.0), (4e6, 3.0)])
 def test_beyond_the_old_mesh_no_other_time_s_water_appears(speed, brought):
     """A table of supplies, late, around an aggregate off the middle: still water is that of the start, flowing water
-    that of the time, and never the table's largest; what was in the mesh is still there."""
+    that of the time, and never the table's largest; what was in the mesh is still there. How it falls off towards the
+    mesh is in `test_unseen.py`."""
     there = {"pore": {"width": "100 um", "length": "160 um"}, "aggregate": {"radius": "20 um", "position": "15 um"},
              "substrates": {"boundary": "closed", "donor": {"supply": "5 mg/L"}, "acceptor": {
                  "supply": [["0 h", "7 mg/L"], ["1 h", "20 mg/L"], ["4 h", "3 mg/L"]]}},
@@ -241,15 +173,11 @@ def test_beyond_the_old_mesh_no_other_time_s_water_appears(speed, brought):
     along = old.mesh.points[:, 0]
     late = replace(old, time=6.0, concentrations=Concentrations(4 + 0.02 * along, 3 - 0.01 * along))
     new, _ = remeshing.remesh(whole, late, late, speed)
-    x, found = new.mesh.points[:, 0], new.concentrations
-    first, last = old.mesh.ends
-    assert x.min() < first - 20 and x.max() > last + 20
-    within = (x > first) & (x < last)
-    before, after = x < first - 1e-9, x > last + 1e-9
-    both = whole.substrates
-    for field, kind, supply, start, slope in ((found.acceptor, both.acceptor, brought, 4, 0.02),
-                                              (found.donor, both.donor, 5.0, 3, -0.01)):
+    x, (first, last) = new.mesh.points[:, 0], old.mesh.ends
+    within, far = (x > first) & (x < last), x < first - 50
+    for field, supply, start, slope in ((new.concentrations.acceptor, brought, 4, 0.02),
+                                        (new.concentrations.donor, 5.0, 3, -0.01)):
         assert field[within] == pytest.approx(start + slope * x[within], rel=1e-9)
-        faded = np.exp(speed * (x[before] - first) / kind.diffusivity) if speed else 0.0
-        assert field[before] == pytest.approx(supply - (supply - start - slope * first) * faded, rel=1e-9)
-        assert field[after] == pytest.approx(start + slope * last if speed else supply, rel=1e-9)
+        assert far.any() and field[far] == pytest.approx(np.full(far.sum(), supply), rel=1e-9)
+        leaves = start + slope * last if speed else supply
+        assert field[x > last + 20] == pytest.approx(np.full((x > last + 20).sum(), leaves), rel=1e-9)
