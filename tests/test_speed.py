@@ -10,7 +10,6 @@ import pytest
 from verification import speed, throughput
 from verification.bench import __main__ as bench
 from verification.bench import record, runs, told
-from verification.bench.record import reading
 
 
 def point(seconds, error, **more):
@@ -27,12 +26,6 @@ def lines(points):
     """A part of methods {name: points}."""
     return {"title": "t", "error": "largest", "reference": "another code", "lines": [
         {"method": method, "points": of, "failed": []} for method, of in points.items()]}
-
-
-def test_a_reading_is_never_from_too_little():
-    """An error above all takes the fastest point."""
-    assert reading([], 0.1) is None and reading(law([0.1]), 0.01) is None
-    assert reading(law([0.1, 0.01]), 0.5).how == "measured"
 
 
 def test_methods_take_turns_the_first_run_only_warms_up_and_what_fails_is_listed_and_not_run_again():

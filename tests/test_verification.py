@@ -139,11 +139,3 @@ def test_rows_that_were_appended_are_read_but_for_one_that_was_cut(tmp_path):
     with file.open("a", encoding="utf-8") as opened:
         opened.write('{"a": 2')
     assert writing.lines(file) == [{"a": 1}]
-
-
-def test_the_first_page_leads_to_what_is_judged_elsewhere():
-    """Claims, errata, sensitivity and the law for networks, at files that are there."""
-    text = (report.FOLDER / "REPORT.md").read_text(encoding="utf-8")
-    for link in ("../../paper_figures/replication.md", "../../reference/ERRATA.md", "../sensitivity/sensitivity.md",
-                 "../../docs/network.md", "sampled.md", "mutants.md"):
-        assert f"]({link})" in text and (report.FOLDER / link).resolve().is_file()
