@@ -4,7 +4,6 @@ import pathlib
 import re
 import sys
 import tomllib
-from graphlib import TopologicalSorter
 from importlib.metadata import packages_distributions
 
 import pytest
@@ -107,17 +106,6 @@ def test_nobody_imports_what_the_rules_forbid():
 ])
 def test_the_rules_see_a_trespass(module, source):
     assert [name for name, _ in trespasses({module: source})] == [module]
-
-
-def test_no_module_imports_itself_by_way_of_others():
-    """What is imported for whoever checks types alone does not count."""
-    sources = {name: source for name, source in modules().items() if re.match(r"repro\.(?!__)", name)}
-    known, links = {name.removesuffix(".__init__") for name in sources}, {}
-    for name, source in sources.items():
-        running = re.sub(r"^if TYPE_CHECKING:\n(?:(?:    .*)?\n)+", "", source, flags=re.M)
-        wanted = {other if other in known else other.rpartition(".")[0] for other in asked(running, name)}
-        links[name.removesuffix(".__init__")] = wanted & known
-    TopologicalSorter(links).prepare()
 
 
 @pytest.mark.parametrize("folder", FOLDERS)

@@ -6,13 +6,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from matplotlib.collections import QuadMesh
 from matplotlib.patches import Polygon
-from matplotlib.quiver import Quiver
 
 import paper_figures
 from paper_figures import __main__ as figures
-from paper_figures import figure_4, figure_6, plate_2, runs, states, style
+from paper_figures import figure_4, figure_6, runs, states, style
 from repro import cli, load_scene, results, run
 from repro.fem.outline import polygon_area
 from repro.scene import scene_hash
@@ -56,11 +54,6 @@ def _coarse(made, folder, name):
     made.savefig(folder / f"{name}.png", dpi=40)
 
 
-def outlines(axes):
-    """Aggregates that are drawn, in their order."""
-    return [patch for patch in axes.patches if isinstance(patch, Polygon)]
-
-
 @pytest.mark.parametrize("request_", REQUESTS, ids=lambda request: request.name)
 def test_the_command_told_is_the_run_that_is_drawn(request_):
     chosen = cli._parser().parse_args(shlex.split(request_.command())[1:])
@@ -102,7 +95,8 @@ def test_a_state_agrees_with_the_time_series(short):
 def test_the_shape_that_is_drawn_is_that_before_the_expansion(short, name, panels):
     """As the caption says, in every panel."""
     wanted = states.last(short["base"], "before_expansion").rim
-    drawn = [shape.get_xy()[:-1] for axes in MODULES[name].draw(short["base"]).axes for shape in outlines(axes)]
+    patches = [patch for axes in MODULES[name].draw(short["base"]).axes for patch in axes.patches]
+    drawn = [patch.get_xy()[:-1] for patch in patches if isinstance(patch, Polygon)]
     assert sum(np.array_equal(one, wanted) for one in drawn) == panels
 
 
@@ -136,9 +130,10 @@ def test_a_curve_is_what_the_legends_call_it(unlike):
     """By the colour of its run and the line of its substrate."""
     module, folders = MODULES["time_series"], dict(zip(("Base", "Wide"), unlike))
     panels = module.draw(*folders.values()).axes
-    runs_, names = (zip(legend.get_lines(), legend.get_texts()) for legend in (panels[k].get_legend() for k in (0, 2)))
-    tables = {line.get_color(): unlike[folders[text.get_text()]] for line, text in runs_}
-    kinds = {line.get_linestyle(): text.get_text() for line, text in names}
+    told = [(line, text.get_text()) for k in (0, 2) for legend in [panels[k].get_legend()]
+            for line, text in zip(legend.get_lines(), legend.get_texts())]
+    tables = {line.get_color(): unlike[folders[name]] for line, name in told[:2]}
+    kinds = {line.get_linestyle(): name for line, name in told[2:]}
     for axes, (column, *_) in zip(panels, module.CURVES, strict=True):
         lines = [line for line in axes.lines if line.get_linestyle() != ":"]
         assert len(lines) == (4 if "{}" in column else 2)
@@ -160,31 +155,6 @@ def test_each_run_has_its_own_curve_in_every_discussion(unlike):
         for label, folder in zip(labels, folders):
             now = unlike[folder]["conductivity_m_per_d"]
             assert drawn[label] == pytest.approx(np.array([unlike[folder]["time_h"], now / now[0] ** over]))
-
-
-def test_plate_2_goes_from_the_dashed_shape_to_the_full_one_by_its_arrows(short):
-    """LENGTHENED times as long as what the nodes move by, in both panels."""
-    before, after = states.last(short["base"], "before_expansion"), states.last(short["base"])
-    for axes in plate_2.draw(short["base"]).axes[:2]:
-        shapes = {shape.get_linestyle(): shape.get_xy()[:-1] for shape in outlines(axes)}
-        assert np.array_equal(shapes["--"], before.rim) and np.array_equal(shapes["solid"], after.rim)
-        (arrows,) = (part for part in axes.collections if isinstance(part, Quiver))
-        assert np.array_equal(arrows.get_offsets(), before.points) and arrows.scale == 1 and arrows.scale_units == "xy"
-        moved = plate_2.LENGTHENED * (after.points - before.points)
-        assert np.column_stack([arrows.U, arrows.V]) == pytest.approx(moved)
-
-
-def test_the_colours_of_outlines_are_those_beside_their_times(short):
-    """Each in the middle of its part of the scale."""
-    made = style.figure(2.75)
-    figure_6.outlines(made.subplots(), short["wide"], 0.2)
-    axes, bar = made.axes
-    shapes = outlines(axes)
-    (scale,) = (part for part in bar.collections if isinstance(part, QuadMesh))
-    edges = np.linspace(*bar.get_xlim(), len(shapes) + 1)
-    assert bar.get_xticks() == pytest.approx((edges[1:] + edges[:-1]) / 2)
-    beside = scale.to_rgba(scale.get_array().ravel())
-    assert np.array([shape.get_facecolor() for shape in reversed(shapes)]) == pytest.approx(beside)
 
 
 def test_the_outlines_of_figure_6_are_those_of_the_converged_solution(short, monkeypatch):

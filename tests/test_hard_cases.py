@@ -77,9 +77,8 @@ def test_the_matrix_is_written_with_verdicts_apart_from_what_this_machine_has_me
     kept, live = (json.loads((hard_cases.RECORD.parent / folder / hard_cases.RECORD.name).read_text())
                   for folder in (".", "live"))
     verdicts, measured = (found["cases"][0]["cells"] for found in (kept, live))
-    assert set(verdicts) == set(PRESETS) and verdicts["fast"] == {"verdict": REFUSED, "accepted": False}
-    assert verdicts["paper"]["accepted"] and "machine" in live.keys() - kept.keys()
-    assert "try another" in measured["paper"]["message"] and measured["fast"]["checks"][0]["quantity"] == "good"
+    assert verdicts == {name: {"verdict": REFUSED, "accepted": name == "paper"} for name in PRESETS}
+    assert "machine" in live.keys() - kept.keys() and "try another" in measured["paper"]["message"]
 
 
 def test_a_wrong_run_is_seen():

@@ -4,7 +4,6 @@ import json
 from importlib import import_module
 
 import meshio
-import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
@@ -40,17 +39,14 @@ def test_a_run_again_has_the_same_hashes(folder, told, tmp_path):
     assert found == told["runs"][NAME]["files"] and {*found} == files - {*manifest.NOT_DATA}
 
 
-@pytest.mark.parametrize("packed, change, same", [
-    (None, lambda content: None, True),
-    ("zlib", lambda content: np.multiply(content.points, 1.0 + 1e-15, out=content.points), False),
-    ("zlib", lambda content: np.add.at(content.cell_data["region"][0], 0, 1e-12), False)])
-def test_fields_are_hashed_as_arrays(folder, tmp_path, packed, change, same):
-    """Unpacked it is the same data; with the last bits of places, or one value of a cell, changed it is not."""
-    original = folder / "fields" / "fields_0000.vtu"
+@pytest.mark.parametrize("packed, more", [(None, 0.0), ("zlib", 1e-12)])
+def test_fields_are_hashed_as_arrays(folder, tmp_path, packed, more):
+    """Unpacked it is the same data; with one value of a cell changed it is not."""
+    original, copied = folder / "fields" / "fields_0000.vtu", tmp_path / "copy.vtu"
     content = meshio.read(original)
-    change(content)
-    content.write(tmp_path / "copy.vtu", file_format="vtu", compression=packed)
-    assert (manifest.file_hash(tmp_path / "copy.vtu") == manifest.file_hash(original)) is same
+    content.cell_data["region"][0][0] += more
+    content.write(copied, file_format="vtu", compression=packed)
+    assert (manifest.file_hash(copied) == manifest.file_hash(original)) is (more == 0)
 
 
 def test_a_figure_is_hashed_by_what_it_draws_and_says():

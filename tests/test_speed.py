@@ -84,11 +84,6 @@ def test_each_verdict_follows_from_what_was_measured(parts, claim, holds, measur
     assert found["holds"] is holds and measured in found["measured"]
 
 
-def test_memory_that_grows_is_seen():
-    assert runs.slope([100 + 7 * k for k in range(50)]) == pytest.approx(7)
-    assert runs.slope([100 + (4000 if k == 30 else 0) for k in range(50)]) == 0
-
-
 def test_errors_are_relative_but_effluents_over_the_supply():
     truth = np.array([[2.0, 80.0, 1000.0, 30.0, -30.0, 30.0, 4.0, 6.0]])
     found = truth + np.array([[0.02, 0, 0, 0, -0.6, 0, 0.5, 0]])

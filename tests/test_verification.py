@@ -26,8 +26,8 @@ GOOD, BAD = (result(at_most("quantity A", value, 1.0, "theory")) for value in (0
 
 
 @pytest.mark.parametrize("made, bounds, inside, outside", [
-    (at_most, (1.0,), (0.0, 1.0), (1.1, -0.1, math.inf, math.nan)), (at_least, (1.0,), (1.0, 2.0), (0.5, math.nan)),
-    (between, (1.0, 2.0), (1.0, 2.0), (0.9, 2.5, math.nan))])
+    (at_most, [1.0], [0.0, 1.0], [1.1, -0.1, math.inf, math.nan]), (at_least, [1.0], [1.0], [0.5, math.nan]),
+    (between, [1.0, 2.0], [1.0, 2.0], [0.9, 2.5, math.nan])])
 def test_a_number_holds_in_its_range_alone(made, bounds, inside, outside):
     assert all(made("x", value, *bounds, "").holds for value in inside)
     assert not any(made("x", value, *bounds, "").holds for value in outside)
