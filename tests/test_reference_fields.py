@@ -18,7 +18,7 @@ from reference import (
     sliding_waves,
     viscous_inclusion,
 )
-from reference.monod import sink, slopes, uptake
+from reference.monod import sink, uptake
 
 FORMS = pytest.mark.parametrize("interface", ("traction", "laplacian"))
 GAMMAS = pytest.mark.parametrize("gamma", [0.1, 1.0, 10.0])
@@ -147,13 +147,11 @@ WATER, BIOMASS = 9e6, 7e6
 HALF, SUPPLY = 40.0, 10.0
 
 
-def test_uptake_is_dual_monod_and_its_slopes_are_its_derivative():
-    """(7)-(8) written out."""
-    assert uptake(3.0, 6.0, RATES) == pytest.approx((0.75 * (0.4 * 1.5 * 0.75 + 0.006), 0.4 * 0.75 * 0.75))
-    fields, load = np.array([3.0, 0.5, 6.0, 0.1]), np.array([2.0, 5.0])
-    change = 1e-5 * np.array([1.0, -2.0, 3.0, 1.0])
-    rise = sink(fields + change, load, RATES) - sink(fields - change, load, RATES)
-    assert slopes(fields, load, RATES) @ (2 * change) == pytest.approx(rise, rel=1e-6)
+def test_uptake_is_dual_monod():
+    """(7)-(8) written out; of what is sunk, the acceptor comes first."""
+    q = 0.75 * (0.4 * 1.5 * 0.75 + 0.006), 0.4 * 0.75 * 0.75
+    assert uptake(3.0, 6.0, RATES) == pytest.approx(q)
+    assert sink(np.array([3.0, 6.0]), np.array([2.0]), RATES) == pytest.approx(2.0 * np.array(q))
 
 
 def test_the_robin_channel_obeys_its_equation_and_its_conditions():
