@@ -110,6 +110,7 @@ def test_the_colours_of_plate_1_are_in_the_units_of_their_labels(short):
               "$X_A / X_m$ (–)": active, "$X_I / X_m$ (10$^{-3}$)": 1000 * inert}
     for label, values in wanted.items():
         assert bars[label] == pytest.approx((values.min(), values.max()), rel=1e-9), label
+    assert np.ptp(np.log(state.nodes["active_biomass"][state.body])) > np.ptp(np.log(active))
     rates = np.log(active + inert) / 0.2
     assert 0.18 < rates.min() and rates.max() < 0.195 and np.ptp(rates) < 1e-3
 
