@@ -57,8 +57,8 @@ print(json.dumps(told))
 
 
 def test_mutants_are_caught_survive_or_do_not_end_and_calls_are_seen(tmp_path):
-    """In processes of their own, and in those which tests start, by the tests asked for. One that is gone, as one may be
-    that is named after a value which a mutant changes, catches nothing, and the others do."""
+    """In processes of their own, and in those which tests start, by the tests asked for. One that is gone, as one may
+    be that is named after a value which a mutant changes, catches nothing, and the others do."""
     project = tmp_path / "project"
     for name, text in {"repro/__init__.py": "", "repro/m.py": CODE, "tests/__init__.py": "", "tests/test_m.py": TESTS,
                        "pytest.ini": "[pytest]\n"}.items():
