@@ -53,6 +53,7 @@ test-thorough: $(STAMP) ## the same with many more random examples, and what tak
 
 lint: $(STAMP) ## style and types: ruff and mypy
 	@$(BIN) -m ruff check .
+	@$(BIN) -m ruff check --select E501 --config line-length=100 repro
 	@$(BIN) -m mypy
 
 bench: $(STAMP) ## time against error, cost against size, and what each assumption costs and changes
