@@ -85,18 +85,10 @@ def square(mesh: Grid, field: np.ndarray) -> float:
 
 
 def curved_weights(nodes: np.ndarray, barycentric: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """(t, q) um2, weights of a quadrature on triangles with nodes (t, 6, 2): corners, then middles of 01, 12 and 20.
-
-    x = sum of x_i L_i (2 L_i - 1) + 4 x_ij L_i L_j, differentiated by L; barycentric: (q, 3) the points.
-    """
-    by = np.zeros((len(weights), 6, 3))
-    for i in range(3):
-        j = (i + 1) % 3
-        by[:, i, i] = 4 * barycentric[:, i] - 1
-        by[:, 3 + i, i] = 4 * barycentric[:, j]
-        by[:, 3 + i, j] = 4 * barycentric[:, i]
-    along = by @ np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
-    return np.linalg.det(np.einsum("tai,qak->tqik", nodes, along)) * weights
+    """(t, q) um2, weights of a quadrature on triangles with nodes (t, 6, 2): corners, then middles of 01, 12 and 20, as
+    scikit-fem has them; barycentric: (q, 3) the points."""
+    by = [ELEMENTS[2].lbasis(barycentric[:, 1:].T, k)[1] for k in range(6)]
+    return np.linalg.det(np.einsum("tai,akq->tqik", nodes, by)) * weights
 
 
 def sample(space: Space, values: np.ndarray, where: np.ndarray) -> np.ndarray:

@@ -43,7 +43,7 @@ from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.fem.space import Space
 from repro.model import gear, kinetics, transport
 from repro.model.kinetics import Sink
-from verification.kernel.case import Profile, at_most, case, combined, refine, studies
+from verification.kernel.case import at_most, case, combined, refine, studies
 from verification.problems import meshes, runs
 from verification.problems.channels import (
     CROSSED,
@@ -424,7 +424,6 @@ def finite_volumes(timed: bool, order: int, peclet: float, density: float):
         errors = refine(_from_backward_euler, STEPS, peclet, density)
         yield studies(errors, each(1, "the lower of the two: FiPy's TransientTerm is backward Euler", 3e-4),
                       " less FiPy's in as many steps")
-    yield _course(min(samples), peclet, density, timed)
 
 
 def _from_fipy(size: float, number: int, peclet: float, density: float, timed: bool) -> dict[str, float]:
@@ -447,16 +446,6 @@ def _from_backward_euler(steps: int, peclet: float, density: float) -> dict[str,
     channel = _channel(size, peclet, density)
     ours = _at_cells(channel.x, size, 0, 1, peclet, density, steps)
     return {"size": TIMES[0] / steps, **_largest(ours - channel.backward_euler(TIMES, steps)[:, :, None])}
-
-
-def _course(size: float, peclet: float, density: float, timed: bool) -> Profile:
-    """Along the channel, at each time."""
-    x, curves = _channel(size, peclet, density).x, []
-    ours = _at_cells(x, size, 0, 1, peclet, density, timed * STEPS[-1])[:, :, 2]
-    for one, theirs in zip(ours, _fipy(size, peclet, density, timed)):
-        for k, name in enumerate(NAMES):
-            curves += [(name, "ours", x, one[k]), (f"{name}, FiPy", "reference", x, theirs[k])]
-    return Profile("along the channel", "x (um)", "C (mg/L)", tuple(curves))
 
 
 WELL_MIXED, RADIUS = 24.0, 8.0
