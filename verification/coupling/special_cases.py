@@ -29,7 +29,7 @@ from repro.march.simulation import shaped, simulate
 from repro.model import flow, pore
 from repro.scene import Scene, load_scene
 from verification.kernel.case import at_least, at_most, case, each_at_most, refine, study
-from verification.problems import pairs, runs
+from verification.problems import meshes, runs
 from verification.problems.channels import both
 
 
@@ -223,7 +223,7 @@ def mirror(*changes: str):
     outline, space = last.pore.outline, last.pore.space
     tips = abs(outline.downstream + outline.upstream) / outline.downstream
     x = np.linspace(1.0, 70.0, 70)
-    sides = [pairs.sample(space, last.solved.concentrations.acceptor, np.column_stack([s * x, 0.3 + 0 * x]))
+    sides = [meshes.field_at(space, last.solved.concentrations.acceptor, np.column_stack([s * x, 0.3 + 0 * x]))
              for s in (-1, 1)]
     return [at_most("tips", tips, 3e-6, "unsymmetric mesh: the error of C_A, of which growth feels a tenth"),
             at_most("C_A", np.abs(np.subtract(*sides)).max() / 10.0, 1e-4, "unsymmetric mesh: error in space"),

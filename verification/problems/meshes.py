@@ -14,7 +14,7 @@ Norms of the error of fields of order 1, 2 or 3 on triangles, and what they are 
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import Delaunay
+from scipy.spatial import Delaunay, cKDTree
 
 from repro.fem import elements, mesher, outline, sizing, transfer
 from repro.fem.mesh import Mesh, curved, triangle_areas
@@ -201,8 +201,32 @@ def field_error(space: Space, values: np.ndarray, exact, chosen=slice(None)) -> 
 
 
 def field_at(space: Space, values: np.ndarray, where: np.ndarray) -> np.ndarray:
-    """Values (count,) or (count, m) of a space at points (K, 2); those that round-off puts outside are moved in."""
-    return transfer.located(space.mesh.points, space.mesh.cells, where).field(values, space.cells, space.order)
+    """(K, ...) values (count, ...) of a space at points (K, 2), in the triangles that the package finds. That a point
+    lies there is seen by the triangle's map, and which nodes a triangle has by where they are."""
+    mesh = space.mesh
+    at = transfer.located(mesh.points, mesh.cells, where)
+    nodes = mesh.points[mesh.cells[at.triangle]]
+    there = np.einsum("ka,kai->ki", elements.values(mesh.geometry, at.local), nodes)
+    if np.abs(there - where).max() > 1e-6:
+        raise ValueError("a place does not lie in the triangle that was found")
+    own = np.einsum("da,kai->kdi", elements.values(mesh.geometry, elements.nodes(space.order)), nodes)
+    numbers = cKDTree(space.points).query(own)[1]
+    return np.einsum("kd,kd...->k...", elements.values(space.order, at.local), values[numbers])
+
+
+def section_means(space: Space, values: np.ndarray, x: np.ndarray, count: int = 16) -> np.ndarray:
+    """(K, ...) means of values (count, ...) of a space over the sections x (K,) of its mesh, by Gauss's rule."""
+    place, weight = np.polynomial.legendre.leggauss(count)
+    y = 0.5 * space.mesh.width * (1 + place)
+    found = field_at(space, values, np.column_stack([np.repeat(x, count), np.tile(y, len(x))]))
+    return np.einsum("kp...,p->k...", found.reshape(len(x), count, *found.shape[1:]), 0.5 * weight)
+
+
+def along_edges(order: int, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Gauss's rule on edges from 0 to 1: places (q,), weights (q,), and functions of an edge's nodes (q, order + 1)."""
+    points, weights = np.polynomial.legendre.leggauss(count)
+    along = (points + 1) / 2
+    return along, weights / 2, elements.values(order, np.column_stack([along, 0 * along]))[:, elements.ON_EDGE[order]]
 
 
 def mean_size(mesh: Mesh) -> float:

@@ -16,13 +16,11 @@ from repro.model import pore
 from repro.model.pore import Pore, Solved
 from repro.scene import Kinetics, Scene, load_scene
 from verification.kernel.case import columns
-from verification.problems import channels, pairs
+from verification.problems import channels, meshes
 
 ROUND_OFF = "round-off"
 #: The velocity of base at t = 0, 2.9 m/d, in um/h.
 SPEED = 2.9e6 / 24
-#: Of a section, at which a mean is taken.
-POINTS = 16
 #: Kinds of elements, by the names that scenes have for them: of order 1, 2 and 3.
 ELEMENTS = ("linear", "quadratic", "cubic")
 
@@ -158,12 +156,7 @@ def density_drift(scene: Scene, instant: Instant) -> float:
 
 def section_means(now: Pore, solved: Solved, x: np.ndarray) -> np.ndarray:
     """(2, K) means of C_A and C_D over the sections x (K,) of the mesh."""
-    found = solved.concentrations
-    place, weight = np.polynomial.legendre.leggauss(POINTS)
-    y = 0.5 * now.mesh.width * (1 + place)
-    where = np.column_stack([np.repeat(x, POINTS), np.tile(y, len(x))])
-    values = pairs.sample(now.space, np.column_stack([found.acceptor, found.donor]), where)
-    return np.einsum("kpm,p->mk", values.reshape(len(x), POINTS, 2), 0.5 * weight)
+    return meshes.section_means(now.space, channels.both(solved.concentrations).T, x).T
 
 
 def growth_rates(scene: Scene, acceptor: float | None = None, donor: float | None = None) -> tuple[float, float]:
