@@ -177,9 +177,9 @@ def worth(law: Kinetics, step: Ledger) -> tuple[float, float]:
     return law.yield_coefficient * donor, (acceptor - law.acceptor_to_donor_ratio * donor) / law.decay_oxygen_demand
 
 
-def mass_after(scene: Scene, time: float) -> float:
-    """(X_A + X_I) over that at the start, after hours at the supply: an exponential."""
-    rise, left = growth_rates(scene)
+def mass_after(scene: Scene, time: float, acceptor: float | None = None) -> float:
+    """(X_A + X_I) over that at the start, after hours at the supply, or at another acceptor: an exponential."""
+    rise, left = growth_rates(scene, acceptor)
     return float(np.exp(rise * time) + left / rise * np.expm1(rise * time))
 
 
