@@ -247,7 +247,7 @@ def slope(space: Space, pressure: np.ndarray, chosen: np.ndarray) -> float:
     where, weight, shape = meshes.fine(space, chosen)
     x, p = where[..., 0], pressure[space.cells[chosen]] @ shape.T
     x = x - np.sum(weight * x) / weight.sum()
-    return float(-np.sum(weight * p * x) / np.sum(weight * x**2))
+    return -np.sum(weight * p * x) / np.sum(weight * x**2)
 
 
 #: Half length (um) of the permeable layer, elements (um) and how many meshes of each.

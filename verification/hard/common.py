@@ -178,7 +178,7 @@ def sound(found: Run) -> list[Check]:
 def unreal(found: Run) -> int:
     """How many numbers of rows and fields are infinite or not a number."""
     count = sum(not np.isfinite(value) for line in found.rows for value in line.values() if value is not None)
-    return count + sum(int(np.count_nonzero(~np.isfinite(values))) for i in found.instants for values in _fields(i))
+    return count + sum(np.count_nonzero(~np.isfinite(values)) for i in found.instants for values in _fields(i))
 
 
 def _fields(instant: Instant):

@@ -110,7 +110,7 @@ def _edge_wide(found: Run, fine: Run, preset: str) -> list[Check]:
 
 def _contact_length(shape: Outline) -> float:
     """Of the surface on the upper wall, um."""
-    return float(np.ptp(shape.points[shape.wall == TOP, 0])) if (shape.wall == TOP).any() else 0.0
+    return np.ptp(shape.points[shape.wall == TOP, 0]) if (shape.wall == TOP).any() else 0.0
 
 
 def contact_rests(found: Run) -> list[Check]:
@@ -123,8 +123,8 @@ def contact_rests(found: Run) -> list[Check]:
     for instant in found.instants:
         shape = instant.pore.outline
         joins = contact.closing(shape, width, film, found.scene.growth.minimum_contact_angle)
-        open_nodes += int(np.count_nonzero(joins))
-        crossed += int(shape.points[:, 1].max() > width or shape.points[:, 1].min() < 0)
+        open_nodes += np.count_nonzero(joins)
+        crossed += shape.points[:, 1].max() > width or shape.points[:, 1].min() < 0
     return [at_most("nodes whose film or wedge should have closed", open_nodes, 0, "contact rests (2.3.3)"),
             at_most("instants with nodes beyond a wall", crossed, 0, "the walls hold"),
             at_least("instants in contact", sum(i.pore.contact for i in found.instants), 1, "else less is tested"),
@@ -311,7 +311,7 @@ def _errors(found: Grown, exact: HalfCylinder) -> tuple[float, float]:
     where, weight, of = bodies.integrated(found.held)
     true = exact.place(*np.moveaxis(where, 2, 0))
     gaps = (of.values @ field[found.held.cells] - true for field in (found.position, exact.place(*found.start.T)))
-    return tuple(float(np.sqrt(np.sum(weight[..., None] * gap**2) / weight.sum())) for gap in gaps)
+    return tuple(np.sqrt(np.sum(weight[..., None] * gap**2) / weight.sum()) for gap in gaps)
 
 
 def pushed(preset: str, inner: float, outer: float) -> list[Check]:

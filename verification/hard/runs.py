@@ -173,7 +173,7 @@ def _spoilt(now: Pore) -> tuple[Pore, int]:
         corners[inner] += part * push
         moved = now.moved(_with_corners(now.mesh, corners))
         if moved.mesh.areas.min() > 0.02 * straight.areas.min() and not moved.mesh.turned_over().any():
-            return moved, int(np.count_nonzero(moved.mesh.quality < POOR))
+            return moved, np.count_nonzero(moved.mesh.quality < POOR)
     raise RuntimeError("no such mesh")
 
 

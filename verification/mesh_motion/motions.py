@@ -28,8 +28,7 @@ from verification.problems import meshes
 GAMMA, STABILISATION = 1.0, 100.0
 GAMMAS = (0.1, GAMMA, 10.0)
 #: Straight triangles, as linear elements have them, and curved ones, as those of order 2 and 3.
-GEOMETRIES = {1: "straight", 2: "curved"}
-EITHER = {kind: (geometry,) for geometry, kind in GEOMETRIES.items()}
+EITHER = {"straight": (1,), "curved": (2,)}
 
 
 def moved(grid: Mesh, points: np.ndarray, gamma: float = GAMMA) -> np.ndarray:
@@ -278,7 +277,7 @@ def _kept(name: str, first: Mesh, last: Mesh) -> list:
 
 def _area(grid: Mesh) -> float:
     """Of all triangles, bent edges included, um2."""
-    return float(meshes.fine(Space(grid, grid.geometry))[1].sum())
+    return meshes.fine(Space(grid, grid.geometry))[1].sum()
 
 
 STRIDES = (0.08, 0.04, 0.02, 0.01)
@@ -329,7 +328,7 @@ def criterion():
                 "one edge bent by 0.51": (_bowed(0.51), False, HALF_BENT)}
     yield at_most("quality", off, 1e-12, "closed form: round-off")
     for name, (mesh, fine, why) in verdicts.items():
-        yield at_most(f"wrong verdicts: {name}", float(mesh.acceptable() != fine), 0.0, why)
+        yield at_most(f"wrong verdicts: {name}", mesh.acceptable() != fine, 0.0, why)
 
 
 def _stretched(count: int, by: float) -> Mesh:

@@ -92,7 +92,7 @@ def _robin_errors(size: float, number: int, order: int, peclet: float, ends) -> 
     made, state = _robin_found(space, peclet)
     gap, truth = apart(space, state.donor[None], lambda x, y: exact(x)[None])
     leaving = transport.fluxes(made, Sink(filled(space, UPTAKE)), state)[1].effluent
-    return {"size": length(space, size), "C": float(gap[0] / (truth[0] if order == 1 else DONOR.supply)),
+    return {"size": length(space, size), "C": gap[0] / (truth[0] if order == 1 else DONOR.supply),
             "leaving": abs(leaving - float(exact(SLAB))) / DONOR.supply}
 
 
@@ -177,14 +177,20 @@ def _kappa(modulus: float) -> float:
 
 def _first_order_errors(size: float, number: int, modulus: float, film: float, order: int) -> dict[str, float]:
     kappa = _kappa(modulus)
-    space, field, flux = _at_rest(size, number, kappa * LARGE, LARGE, film, order)
 
     def exact(x):
-        return slab.first_order(x, ACCEPTOR.supply, kappa, **_sides(film))
+        profile, effectiveness = slab.first_order(x, ACCEPTOR.supply, kappa, **_sides(film))
+        return profile, effectiveness * ACCEPTOR.supply * SLAB / LARGE
 
-    taken = flux.consumed / (kappa * ACCEPTOR.supply * 2 * SLAB * CHANNEL)
+    return _slab_errors(size, number, order, film, kappa * LARGE, LARGE, exact, "taken up")
+
+
+def _slab_errors(size: float, number: int, order: int, film: float, sink: float, half_saturation: float, exact,
+                 taken: str) -> dict[str, float]:
+    """Size of the elements, and relative errors of C and of what enters a side over ``sink``; exact(x): both."""
+    space, field, flux = _at_rest(size, number, sink, half_saturation, film, order)
     return {"size": length(space, size), "C": relative(space, field, lambda x: exact(x)[0]),
-            "taken up": abs(taken / exact(0.0)[1] - 1)}
+            taken: abs(_depth(flux, sink) / exact(0.0)[1] - 1)}
 
 
 DEPTH = 20.0
@@ -209,13 +215,10 @@ def _monod(order: int, half_saturation: float, film: float, samples: dict, ceili
 
 
 def _monod_errors(size: float, number: int, half_saturation: float, film: float, order: int) -> dict[str, float]:
-    space, field, flux = _at_rest(size, number, _sink(film), half_saturation, film, order)
-
     def exact(x):
         return slab.monod(x, ACCEPTOR.supply, _sink(film), half_saturation, **_sides(film))
 
-    return {"size": length(space, size), "C": relative(space, field, lambda x: exact(x)[0]),
-            "depth": abs(_depth(flux, _sink(film)) / exact(0.0)[1] - 1)}
+    return _slab_errors(size, number, order, film, _sink(film), half_saturation, exact, "depth")
 
 
 def _sink(film: float) -> float:
