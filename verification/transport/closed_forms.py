@@ -132,21 +132,19 @@ def _sides(film: float) -> dict[str, float]:
             "diffusivity": ACCEPTOR.diffusivity}
 
 
-def _filmed(told: str, film: float) -> str:
-    return told + (f", films of {film:g} um" if film else "")
-
-
 #: Thiele's modulus, film (um), and the last errors of C and of what is taken up, for each order.
 THIELE = {1: ((0.1, 0.0, 3e-7, 3e-7), (1.0, 0.0, 4e-5, 4e-5), (10.0, 0.0, 4e-3, 4e-3), (1.0, FILM, 3e-5, 3e-5)),
           2: ((0.1, 0.0, 1e-12, 3e-12), (1.0, 0.0, 1e-8, 1e-11), (10.0, 0.0, 2e-5, 3e-7), (1.0, FILM, 7e-9, 1e-11)),
           3: ((1.0, 0.0, 2e-11, 3e-12), (10.0, 0.0, 2e-7, 1e-10), (1.0, FILM, 2e-11, 3e-12))}
+#: What tells of films.
+FILMED = {0.0: "", FILM: f", films of {FILM:g} um"}
 #: Elements (um), and how many meshes of each.
 THIELE_MESHES = {1: SAMPLES, 2: {4.0: 8, 2.0: 4, 1.0: 2, 0.5: 1}, 3: SAMPLES}
 NORM = "L2 of C over the mesh, relative; what is taken up, relative; several meshes a size"
 
 
 def _thiele(*orders: int) -> dict[str, tuple]:
-    return {f"{_filmed(f'phi = {row[0]:g}', row[1])}, {WORDS[order]}": (order, *row)
+    return {f"phi = {row[0]:g}{FILMED[row[1]]}, {WORDS[order]}": (order, *row)
             for order in orders for row in THIELE[order]}
 
 
