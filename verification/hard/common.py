@@ -21,12 +21,12 @@ from functools import cache
 import numpy as np
 
 from repro.errors import SimulationError, StageError
-from repro.march.loop import Instant, Ledger, PoreEnd
+from repro.march.loop import Instant, PoreEnd
 from repro.march.simulation import simulate
-from repro.model import biomass, pore, transport
+from repro.model import pore
 from repro.model.pore import Pore, Solved, peclet
 from repro.results import row
-from repro.scene import Kinetics, Scene, load_scene
+from repro.scene import Scene, load_scene
 from repro.scene.units import SceneError
 from verification.kernel.case import Check, Line, Note, at_least, at_most, between, case
 from verification.problems.runs import NUMERICS, worth
@@ -141,7 +141,9 @@ def close(found: Run, trusted: Run, preset: str, *columns: str, allowed: float =
     checks = []
     for column in columns:
         ours, theirs = found.last[column], trusted.last[column]
-        size = _supply(found.scene, column) if "mg_per_L" in column else abs(theirs)
+        size = abs(theirs)
+        if column in EFFLUENTS:
+            size = getattr(found.scene.substrates, column.split("_")[1]).supply
         checks.append(at_most(f"{column} against a finer run", abs(ours - theirs) / size, bound, origin))
     return checks
 
@@ -154,10 +156,6 @@ def alike(told: str, names: Sequence[str], ours: Sequence[float], theirs: Sequen
 def promised(quantity: str, value: float, preset: str) -> Check:
     """A relative error that the preset stands for."""
     return at_most(quantity, value, TOLERANCE[preset], PROMISED[preset])
-
-
-def _supply(made: Scene, column: str) -> float:
-    return (made.substrates.acceptor if "acceptor" in column else made.substrates.donor).supply
 
 
 EFFLUENTS = ("effluent_acceptor_mg_per_L", "effluent_donor_mg_per_L")
@@ -239,15 +237,11 @@ def _biomass(found: Run) -> list[Check]:
 def _oxygen_demand(found: Run) -> list[Check]:
     """Of the midpoint rule alone: the updates take up substrates at the concentrations of a step's ends, and grow with
     rates of both."""
-    missing = max((_unaccounted(found.scene.kinetics, ledger) for i in found.instants for ledger in i.ledgers),
-                  default=0.0)
-    return [at_most("biomass made less what donor makes and acceptor decays, over the biomass", missing, 1e-12,
-                    "one integral, in the same points; round-off")]
-
-
-def _unaccounted(law: Kinetics, ledger: Ledger) -> float:
-    grown, decayed = worth(law, ledger)
-    return abs(ledger.biomass_made - grown + decayed) / ledger.biomass_after
+    law = found.scene.kinetics
+    missing = [abs(ledger.biomass_made - np.subtract(*worth(law, ledger))) / ledger.biomass_after
+               for instant in found.instants for ledger in instant.ledgers]
+    return [at_most("biomass made less what donor makes and acceptor decays, over the biomass",
+                    max(missing, default=0.0), 1e-12, "one integral, in the same points; round-off")]
 
 
 MEAN = "J = theta in the mean; Newton's tolerance"
@@ -255,13 +249,6 @@ DENSITY = "J = theta holds in the mean over elements: a local density is off by 
 #: Exact on curved triangles, where biomass is kept by its mass; with (34) on straight ones a remesh leaves an error
 #: that is worked off at the next update [E7].
 AREA = {"linear": 1e-4, "quadratic": 1e-8, "cubic": 1e-8}
-
-
-def steady(found: Run, acceptor: float, donor: float) -> transport.Concentrations:
-    """The substrates of a run's last instant, solved anew from other uniform values (mg/L)."""
-    now, problem = found.instants[-1].pore, found.instants[-1].solved.problem
-    ones = np.ones(now.space.count)
-    return transport.steady(problem, biomass.sink(now.active), transport.Concentrations(acceptor * ones, donor * ones))
 
 
 def seeded(made: Scene) -> tuple[Pore, Solved]:

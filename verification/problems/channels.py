@@ -84,14 +84,10 @@ def carrying(space: Space, velocity: np.ndarray, mean: float) -> flow.Flow:
     return flow.Flow(mean, velocity, np.zeros(space.mesh.corners), correction, 0.0, 0.0, 1.0)
 
 
-def plug_flow(space: Space, speed: float) -> flow.Flow:
-    """The same velocity everywhere."""
-    return carrying(space, np.column_stack([np.full(space.count, speed), np.zeros(space.count)]), speed)
-
-
 def problem(space: Space, speed: float | None, substrates=SCENE.substrates, law=SCENE.kinetics) -> transport.Problem:
-    """Both substrates under plug flow, None: without flow."""
-    return transport.problem(space, None if speed is None else plug_flow(space, speed), substrates, law)
+    """Both substrates under plug flow, the same velocity everywhere; None: without flow."""
+    carried = None if speed is None else carrying(space, np.tile([speed, 0.0], (space.count, 1)), speed)
+    return transport.problem(space, carried, substrates, law)
 
 
 def filled(space: Space, density: float) -> np.ndarray:
