@@ -34,8 +34,8 @@ BOTH_ENDS = "the momentum balance of the solver's own equations: round-off"
 REFINEMENTS = (1.0, 1.4, 2.0, 2.8)
 
 
-def loaded_scene(*changes: str, radius: float = 25.0):
-    return runs.base("1 h", f'aggregate.radius="{radius} um"', 'growth.fluid_forces="included"', *changes)
+def loaded_scene(*changes: str):
+    return runs.base("1 h", 'aggregate.radius="25 um"', 'growth.fluid_forces="included"', *changes)
 
 
 def nodal(scene, space: Space) -> tuple[np.ndarray, Flow]:

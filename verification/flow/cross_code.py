@@ -36,12 +36,10 @@ from repro.fem.mesh import Mesh
 from repro.fem.space import Space
 from repro.model import flow, pore
 from verification.flow import closed_forms, properties
-from verification.flow.closed_forms import ENDS_FIRST, FORMS, HIGHER, LAYER, RATIO, SECOND, SIZES
+from verification.flow.closed_forms import ENDS, ENDS_FIRST, FORMS, HIGHER, LAYER, RATIO, SECOND, SIZES, WIDTH
 from verification.kernel.case import at_least, at_most, between, case, combined, each_at_most, refine, studies
 from verification.problems import meshes
 
-WIDTH = 50.0
-ENDS = (-75.0, 75.0)
 CORNER = 4
 #: Refinement of our mesh on each level, where Taylor-Hood's is halved again, and how many meshes are drawn (see
 #: meshes.SPREAD).

@@ -54,11 +54,6 @@ def _leaning(made: int | str) -> Space:
     return _half_disc(25.0, numerics.order, numerics.refinement, 0.6, 150.0)
 
 
-@cache
-def _plugged(order: int) -> Space:
-    return meshes.space_on(meshes.plug(ENDS, WIDTH, 30.0, 3.1 if order == 1 else 6.0, meshes.cut), order)
-
-
 #: Weights of the nodes of an edge, exact for polynomials of the order.
 SIMPSON = {2: np.array([1, 4, 1]) / 6, 3: np.array([1, 3, 3, 1]) / 8}
 #: Radii of the half-discs (um), with the defect of u of linear elements on a coarse mesh, with margin; that of a plug.
@@ -73,7 +68,8 @@ DISCS, DROP = {40.0: 0.012, 46.0: 0.008}, 0.003
                "inlet-parabola"), over=EVERY)
 def sections(made: int | str, interface: str):
     if isinstance(made, int):
-        yield _carried(_plugged(made), interface, "plug", DROP)
+        plug = meshes.plug(ENDS, WIDTH, 30.0, 3.1 if made == 1 else 6.0, meshes.cut)
+        yield _carried(meshes.space_on(plug, made), interface, "plug", DROP)
     for radius, drop in DISCS.items():
         yield _carried(_around(radius, made), interface, f"half-disc of {radius:g} um", drop)
 

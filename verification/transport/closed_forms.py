@@ -168,13 +168,8 @@ def first_order(order: int, modulus: float, film: float, ceiling: float, taken: 
         yield at_most("taken up", errors["taken up"][-1], taken, why)
 
 
-def _kappa(modulus: float) -> float:
-    """Uptake (1/h) of a Thiele modulus."""
-    return ACCEPTOR.diffusivity_in_aggregate * (modulus / SLAB) ** 2
-
-
 def _first_order_errors(size: float, number: int, modulus: float, film: float, order: int) -> dict[str, float]:
-    kappa = _kappa(modulus)
+    kappa = ACCEPTOR.diffusivity_in_aggregate * (modulus / SLAB) ** 2
 
     def exact(x):
         profile, effectiveness = slab.first_order(x, ACCEPTOR.supply, kappa, **_sides(film))
