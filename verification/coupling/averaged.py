@@ -331,11 +331,12 @@ def uptake(elements: str):
 def _around(aspect: float, elements: str) -> dict[str, float]:
     """The largest difference for each Peclet number and density on one mesh, and the least acceptor left."""
     now = pore.seeded(shaped(thin_scene(elements, aspect), half_ellipse(elements, aspect)))
-    found = {f"Pe = {peclet:g}, X = {density:g} mg/L": _compared(thin_scene(elements, aspect), aspect, now, peclet,
-                                                                  density)
-             for peclet, density in product(PECLETS, DENSITIES)}
-    return {"size": aspect, **{name: gap for name, (gap, _) in found.items()},
-            "left": min(left for _, left in found.values())}
+    scene, left, found = thin_scene(elements, aspect), [], {"size": aspect}
+    for peclet, density in product(PECLETS, DENSITIES):
+        gap, rest = _compared(scene, aspect, now, peclet, density)
+        found[f"Pe = {peclet:g}, X = {density:g} mg/L"] = gap
+        left.append(rest)
+    return {**found, "left": min(left)}
 
 
 def _compared(scene: Scene, aspect: float, now: pore.Pore, peclet: float, density: float) -> tuple[float, float]:

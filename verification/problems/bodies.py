@@ -77,18 +77,14 @@ class Supported:
         """How many nodes are corners."""
         return self.body.shape.corners
 
-    @property
-    def points(self) -> np.ndarray:
-        """(t, q, 2) um, where growth is taken, at t = 0."""
-        return meshes.places(self.reference[self.cells], self.body.shape.table)[0]
-
     def field(self, function: Callable) -> np.ndarray:
-        """(t, q) of a function of X and Y there."""
-        return np.broadcast_to(function(*np.moveaxis(self.points, 2, 0)), self.body.at.dx.shape).astype(float)
+        """(t, q) of a function of X and Y at t = 0 where growth is taken."""
+        where, _ = meshes.places(self.reference[self.cells], self.body.shape.table)
+        return np.broadcast_to(function(*np.moveaxis(where, 2, 0)), self.body.at.dx.shape).astype(float)
 
     def constant(self, value: float) -> np.ndarray:
         """(t, q) of one value."""
-        return np.full(self.body.at.dx.shape, float(value))
+        return self.field(lambda x, y: value)
 
     @property
     def resting(self) -> np.ndarray:
