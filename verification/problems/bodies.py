@@ -21,6 +21,7 @@ from repro.fem.outline import half_disc as half_disc_outline
 from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.fem.space import Space
 from repro.model import growth, pore
+from repro.model.contact import constrained
 from verification.problems import meshes
 
 #: Radius of the half-discs (um), and the factor by which theta is raised at a time.
@@ -104,11 +105,9 @@ def half_disc(refinement: float, kind: int = 1) -> tuple[Supported, np.ndarray]:
     geometry = min(kind, 2)
     seed = half_disc_outline(RADIUS, ACROSS_AGGREGATE * refinement, geometry)
     grid, outline = meshes.around(seed, refinement, (-ENDS[kind], ENDS[kind]), 50.0)
-    rim, free = grid.topology.body_loop, outline.wall == FREE
-    held = np.zeros((len(grid.body), 2), bool)
-    held[rim[outline.fixed], 0] = True
-    held[rim[~free], 1] = True
-    return on_mesh(grid, kind, grid.points[grid.body], held), rim[free]
+    rim = grid.topology.body_loop
+    held = constrained(len(grid.body), rim, outline.wall, outline.fixed)
+    return on_mesh(grid, kind, grid.points[grid.body], held), rim[outline.wall == FREE]
 
 
 @cache

@@ -33,15 +33,19 @@ def rectangle(ends, width: float, size: float, *, across=(), along=(), seed: int
     rim = [np.column_stack([xs, np.full(len(xs), y)]) for y in y_lines]
     rim += [np.column_stack([np.full(len(ys), x), ys]) for x in x_lines]
     points = np.vstack([np.unique(np.vstack(rim), axis=0), _inside(x_lines, y_lines, size, random)])
-    return points, _triangles(points, size)
+    return _delaunays(points, size)
 
 
-def _triangles(points: np.ndarray, size: float) -> np.ndarray:
-    """Delaunay's, counterclockwise, without those that round-off makes flat along the rim."""
-    triangles = Delaunay(points).simplices
-    areas = triangle_areas(points, triangles)
-    triangles[areas < 0] = triangles[areas < 0][:, ::-1]
-    return triangles[np.abs(areas) > 1e-9 * size**2]
+def upright(points: np.ndarray, triangles: np.ndarray, least: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """The same triangles, counterclockwise; those of no more area than ``least`` left out."""
+    area = triangle_areas(points, triangles)
+    turned = np.where(area[:, None] < 0, triangles[:, ::-1], triangles)
+    return points, turned[np.abs(area) > least]
+
+
+def _delaunays(points: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
+    """Delaunay's triangles, without those that round-off makes flat along the rim."""
+    return upright(points, Delaunay(points).simplices, 1e-9 * size**2)
 
 
 def _stations(lines: np.ndarray, size: float) -> np.ndarray:
@@ -142,7 +146,7 @@ def round_disc(ends, width: float, size: float, centre, radius: float, seed: int
 def _delaunay(points, beside, size: float, is_biomass, ends, width: float, loop=()) -> Mesh:
     """A mesh of Delaunay's triangles; ``beside(points)`` (N, k) are distances from the curves, of one sign on each
     side. Raises ValueError where a triangle lies across."""
-    triangles = _triangles(points, size)
+    _, triangles = _delaunays(points, size)
     sides = beside(points)[triangles]
     if ((sides.min(axis=1) < -1e-9 * size) & (sides.max(axis=1) > 1e-9 * size)).any():
         raise ValueError("a triangle lies across the curve between fluid and biomass")

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.spatial import Delaunay
 from skfem import ElementTriP2, MeshTri
 
-from repro.fem.mesh import triangle_areas
 from verification.problems import meshes
+from verification.problems.meshes import upright
 
 ENDS, WIDTH = (0.0, 40.0), 25.0
 AREA = (ENDS[1] - ENDS[0]) * WIDTH
@@ -34,13 +34,6 @@ def pairs() -> Iterator[tuple[str, Grid, Grid]]:
     for distance in ASIDE:
         yield f"nodes {distance:g} um aside", first, aside(first, distance)
     yield "slivers on slivers", slivers(3), slivers(4)
-
-
-def upright(points: np.ndarray, triangles: np.ndarray) -> Grid:
-    """The same triangles, counterclockwise; those without area left out."""
-    area = triangle_areas(points, triangles)
-    turned = np.where(area[:, None] < 0, triangles[:, ::-1], triangles)
-    return points, turned[area != 0]
 
 
 def cut_in_four(coarse: Grid) -> Grid:
