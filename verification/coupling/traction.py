@@ -10,10 +10,8 @@ from functools import cache
 
 import numpy as np
 from scipy.integrate import simpson
-from skfem.quadrature import get_quadrature_tri
 
 from reference import layered_channel
-from repro.fem.elements import derivatives, values
 from repro.fem.mesh import Mesh
 from repro.fem.newton import relative
 from repro.fem.outline import FREE, Outline
@@ -36,8 +34,8 @@ BOTH_ENDS = "the momentum balance of the solver's own equations: round-off"
 REFINEMENTS = (1.0, 1.4, 2.0, 2.8)
 
 
-def loaded_scene(*changes: str, radius: float = 25.0):
-    return runs.base("1 h", f'aggregate.radius="{radius} um"', 'growth.fluid_forces="included"', *changes)
+def loaded_scene(*changes: str):
+    return runs.base("1 h", 'aggregate.radius="25 um"', 'growth.fluid_forces="included"', *changes)
 
 
 def nodal(scene, space: Space) -> tuple[np.ndarray, Flow]:
@@ -70,55 +68,28 @@ def balance(*changes: str):
     yield each_at_most({"force within the fluid": np.abs(on[~rim]).max() / largest,
                         "action and reaction": np.abs(apart).max() / largest}, 1e-9, BOTH_ENDS)
     if now.space.order == 1 and scene.numerics.interface == FORMS[0]:
-        errors = refine(_drag_error, REFINEMENTS)
-        yield study("drag", 1 / np.array(REFINEMENTS), errors["drag"], 1,
+        yield study("drag", 1 / np.array(REFINEMENTS), [*map(_drag_error, REFINEMENTS)], 1,
                     "shear from the slopes of linear triangles: first order")
 
 
 def _by_biomass(scene, now: pore.Pore, found: Flow) -> np.ndarray:
-    """(N, 2) um2 of head: forces of the biomass' triangles, lambda times as viscous, triangle by triangle."""
-    viscosity = scene.flow.viscosity_ratio * scene.flow.kinematic_viscosity / scene.flow.gravity
+    """(N, 2) um2 of head: forces of the biomass' triangles, lambda times as viscous, as of a mesh on which biomass and
+    fluid are exchanged."""
     mesh = now.mesh
-    space = now.space
-    pressure = flow.pressure_space(now.space)
-    total = np.zeros_like(mesh.points)
-    for cell in np.flatnonzero(mesh.biomass):
-        nodes = mesh.cells[cell]
-        for weight, place in RULES[space.order]:
-            J = mesh.points[nodes].T @ _derivatives(mesh.geometry, place)
-            grad = found.velocity[space.cells[cell]].T @ _derivatives(space.order, place) @ np.linalg.inv(J)
-            if scene.numerics.interface == "traction":
-                grad = grad + grad.T
-            head = float(values(pressure.order, place[None])[0] @ found.head[pressure.cells[cell]])
-            slope = _derivatives(mesh.geometry, place) @ np.linalg.inv(J)
-            total[nodes] += weight * np.linalg.det(J) * slope @ (head * np.eye(2) - viscosity * grad).T
-    return total
+    other = Mesh.of(mesh.points, mesh.cells, ~mesh.biomass, mesh.loop, mesh.width, mesh.ends)
+    viscosity = scene.flow.viscosity_ratio * scene.flow.kinematic_viscosity / scene.flow.gravity
+    return traction.nodal(Space(other, now.space.order), found, viscosity, scene.numerics.interface)
 
 
-def _rule(degree: int) -> list[tuple[float, np.ndarray]]:
-    """(weight, place) of scikit-fem's quadrature of a degree on the unit triangle."""
-    places, weights = get_quadrature_tri(degree)
-    return list(zip(weights, places.T))
-
-
-#: Quadratures by the order of the elements: those of the package, without which the balance is no identity of its own
-#: equations; on linear triangles a middle point is exact.
-RULES = {1: _rule(1), 2: _rule(6), 3: _rule(8)}
-
-
-def _derivatives(order: int, place: np.ndarray) -> np.ndarray:
-    """(k, 2) of the functions of an order at a place on the unit triangle."""
-    return derivatives(order, place[None])[0]
-
-
-def _drag_error(refinement: float) -> dict[str, float]:
-    """The drag on a half-disc against head loss times W less the shear on the walls, from the slopes beside them."""
+def _drag_error(refinement: float) -> float:
+    """Relative error of the drag on a half-disc against head loss times W less the shear on the walls, from the slopes
+    beside them."""
     scene = loaded_scene(f"numerics.refinement={refinement}")
     now = pore.seeded(scene)
     on, found = nodal(scene, now.space)
     viscosity = scene.flow.kinematic_viscosity / scene.flow.gravity
     left = found.meshed_loss * now.mesh.width - viscosity * _wall_shear(now.mesh, found.velocity)
-    return {"drag": abs(on[now.mesh.loop, 0].sum() / left - 1)}
+    return abs(on[now.mesh.loop, 0].sum() / left - 1)
 
 
 def _wall_shear(grid: Mesh, velocity: np.ndarray) -> float:
@@ -170,7 +141,7 @@ def _shear(space: Space) -> float:
     length = _tested(mesh, line, weight)
     gradient = layered_channel.gradient(closed_forms.WIDTH, closed_forms.LAYER, ratio)
     exact = gradient * (layered_channel.stress(closed_forms.WIDTH, closed_forms.LAYER, ratio) - closed_forms.LAYER)
-    return float(weight @ shear / length / exact - 1)
+    return weight @ shear / length / exact - 1
 
 
 def _tested(mesh: Mesh, line: np.ndarray, weight: np.ndarray) -> float:
@@ -179,8 +150,8 @@ def _tested(mesh: Mesh, line: np.ndarray, weight: np.ndarray) -> float:
     order = np.argsort(mesh.points[line, 0])
     x, values = mesh.points[line[order], 0], weight[order]
     if mesh.geometry == 1:
-        return float(np.trapezoid(values, x))
-    return float(simpson(values, x=x))
+        return np.trapezoid(values, x)
+    return simpson(values, x=x)
 
 
 @case("coupling-traction-base", kind="property",
@@ -203,7 +174,7 @@ def _next_move(found: Instant, *changes: str) -> float:
         scene = runs.base("16 h", *changes, f'growth.fluid_forces="{word}"')
         grown, _, _ = updates.make_biomass(scene, found.pore, found.solved, 0.4)
         shapes.append(contact.expand(scene, grown, updates.enlarged(scene, found.pore, grown))[0])
-    return float(np.abs(shapes[1].mesh.points - shapes[0].mesh.points).max() / shapes[0].outline.thickness)
+    return np.abs(shapes[1].mesh.points - shapes[0].mesh.points).max() / shapes[0].outline.thickness
 
 
 @case("coupling-traction-even", kind="exact",
@@ -243,19 +214,14 @@ def _uneven(now: pore.Pore, mean: float, slope: float) -> np.ndarray:
     return now.theta * (mean + slope * places)
 
 
-#: Integrals of each function of an edge's nodes times the slope of each, straight and parabolic.
-ALONG = {1: np.array([[-1, 1], [-1, 1]]) / 2, 2: np.array([[-3, 4, -1], [-4, 0, 4], [1, -4, 3]]) / 6}
-
-
 def _normals(outline: Outline) -> np.ndarray:
-    """(M, 2) outward normals times length of the interface's edges, shared between their nodes: along a parabola by the
-    integral of its tangent times the nodes' functions."""
-    step, total = outline.geometry, np.zeros_like(outline.points)
-    wet = np.flatnonzero(outline.interface_edges()[::step])
-    nodes = (step * wet[:, None] + np.arange(step + 1)) % len(total)
-    tangent = ALONG[step] @ outline.points[nodes]
-    np.add.at(total, nodes, np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1))
-    return total
+    """(M, 2) outward normals times length of the edges, shared between their nodes: by how much the area grows as a
+    node moves by one, of which it is a quadratic function."""
+    def area(move):
+        return replace(outline, points=outline.points + move.reshape(-1, 2)).area
+
+    moves = np.eye(outline.points.size)
+    return np.array([area(move) - area(-move) for move in moves]).reshape(-1, 2) / 2
 
 
 FACTORS = (800.0, 400.0, 200.0, 100.0)
@@ -303,7 +269,7 @@ def _tips(move: np.ndarray, *changes: str) -> float:
     mesh = _moved(0.0, *changes)[0].mesh
     x = mesh.points[mesh.loop, 0]
     ends = mesh.loop[[np.argmax(x), np.argmin(x)]]
-    return float(move[ends[0], 0] / move[ends[1], 0])
+    return move[ends[0], 0] / move[ends[1], 0]
 
 
 def _defects(factor: float, *changes: str) -> tuple[float, float]:

@@ -39,11 +39,13 @@ def remeshes(preset: str) -> list:
     for which in range(FIFTY):
         finer = replace(made.numerics, refinement=made.numerics.refinement * (0.85, 1.0, 1.15)[which % 3])
         now, _ = remeshing.remesh(replace(made, numerics=finer), now, now, speed)
-    return [found, *_kept(first, now), *_step_after(preset, made, first, now)]
+    without, after = (_numbers(made, _step(made, start).pore) for start in (first, now))
+    return [found, *_kept(first, now),
+            *common.alike("after a step more, with and without them", NAMES, after, without, preset)]
 
 
 def _kept(first: Pore, now: Pore) -> list[Check]:
-    share = [_shares(one) for one in (first, now)]
+    share = [biomass.at_nodes(one.space, one.inert / (one.active + one.inert))[one.mesh.body] for one in (first, now)]
     beyond = max(share[0].min() - share[1].min(), share[1].max() - share[0].max(), 0.0) / np.ptp(share[0])
     return [at_most("area, relative change", abs(now.outline.area / first.outline.area - 1), 1e-10,
                     "outlines are split on themselves"),
@@ -51,17 +53,6 @@ def _kept(first: Pore, now: Pore) -> list[Check]:
             at_most("X_I, relative change", abs(now.inert.sum() / first.inert.sum() - 1), 1e-8, "as above"),
             at_most("share of X_I beyond where it was, over its range", beyond, 0.05,
                     "projection overshoots by a part of a jump that there is not")]
-
-
-def _shares(now: Pore) -> np.ndarray:
-    """X_I over X_A + X_I at the aggregate's nodes."""
-    return biomass.at_nodes(now.space, now.inert / (now.active + now.inert))[now.mesh.body]
-
-
-def _step_after(preset: str, made: Scene, first: Pore, now: Pore) -> list[Check]:
-    """A step of 12 min from before and from after the remeshes."""
-    without, found = (_numbers(made, _step(made, start).pore) for start in (first, now))
-    return common.alike("after a step more, with and without them", NAMES, found, without, preset)
 
 
 def _step(made: Scene, now: Pore):
@@ -96,8 +87,7 @@ def cocircular(preset: str) -> list:
         covered = corners.areas.sum() / (corners.width * (corners.ends[1] - corners.ends[0]))
         checks += [at_most(f"area covered, noise {size:g}", abs(covered - 1), 1e-12, "round-off"),
                    at_least(f"least quality, noise {size:g}", corners.quality.min(), 0.2, "a third of what is poor"),
-                   at_most(f"head loss against no noise, noise {size:g}", abs(loss / plain[1] - 1), TOLERANCE[preset],
-                           common.PROMISED[preset])]
+                   common.promised(f"head loss against no noise, noise {size:g}", abs(loss / plain[1] - 1), preset)]
     return checks
 
 
@@ -162,7 +152,8 @@ def poor(preset: str) -> list:
 
 
 def _spoilt(now: Pore) -> tuple[Pore, int]:
-    """The pore with the fluid's inner nodes moved about as far as no triangle turns over, and its poor triangles."""
+    """The pore with the fluid's inner nodes moved about as far as no triangle turns over, its edges straight, and its
+    poor triangles."""
     random = np.random.default_rng(9)
     topology = now.mesh.topology
     straight = now.mesh.straight
@@ -172,17 +163,12 @@ def _spoilt(now: Pore) -> tuple[Pore, int]:
     for part in 0.9 ** np.arange(60):
         corners = straight.points.copy()
         corners[inner] += part * push
-        moved = now.moved(_with_corners(now.mesh, corners))
+        points = now.mesh.with_middles(corners)
+        points[now.mesh.body] = now.mesh.points[now.mesh.body]
+        moved = now.moved(points)
         if moved.mesh.areas.min() > 0.02 * straight.areas.min() and not moved.mesh.turned_over().any():
-            return moved, int(np.count_nonzero(moved.mesh.quality < POOR))
+            return moved, np.count_nonzero(moved.mesh.quality < POOR)
     raise RuntimeError("no such mesh")
-
-
-def _with_corners(grid: Mesh, corners: np.ndarray) -> np.ndarray:
-    """(N, 2) um, nodes with the corners elsewhere, the fluid's edges straight."""
-    points = grid.with_middles(corners)
-    points[grid.body] = grid.points[grid.body]
-    return points
 
 
 POOR_MESH = HardCase(
@@ -200,8 +186,8 @@ COLUMNS = {
     "time_h": (0, 1), "mean_velocity_m_per_d": (1, -1), "head_loss_cm": (1, 0), "conductivity_m_per_d": (1, -1),
     "aggregate_area_um2": (2, 0), "thickness_um": (1, 0), "upstream_um": (1, 0), "downstream_um": (1, 0),
     "meshed_length_um": (1, 0),
+    **dict.fromkeys((*EFFLUENTS, "acceptor_min_mg_per_L", "inert_fraction"), (0, 0)),
 }
-SAME = ("effluent_acceptor_mg_per_L", "effluent_donor_mg_per_L", "acceptor_min_mg_per_L", "inert_fraction")
 
 
 def units(preset: str, length: float, time: float) -> list:
@@ -214,7 +200,7 @@ def units(preset: str, length: float, time: float) -> list:
     bound, origin = (1e-9, "dimensions; round-off") if exact else (
         TOLERANCE[preset], "round-off makes another mesh; " + common.PROMISED[preset])
     checks = []
-    for column, (along, during) in (*COLUMNS.items(), *((name, (0, 0)) for name in SAME)):
+    for column, (along, during) in COLUMNS.items():
         unit = length**along * time**during
         checks.append(at_most(f"{column}, relative difference", abs(other.last[column] / unit / plain.last[column] - 1),
                               bound, origin))
@@ -284,12 +270,6 @@ HUGE = {1: ("paper", 11.4), 2: ("accurate", 5.7), 3: ("cubic", 3.8)}
 
 
 @cache
-def _huge(order: int) -> tuple[Run, Step]:
-    """Base from 15 um with 1e5 nodes, by :func:`_first_step`."""
-    preset, refinement = HUGE[order]
-    return _first_step(preset, f"numerics.refinement={refinement}")
-
-
 def _first_step(preset: str, *changes: str) -> tuple[Run, Step]:
     """What is solved in the seed of 15 um as a Run, and one step of 6 min from it."""
     made = common.scene("base", preset, 'aggregate.radius="15 um"', *changes)
@@ -302,7 +282,8 @@ def _first_step(preset: str, *changes: str) -> tuple[Run, Step]:
 def huge(preset: str) -> list:
     """One step of 6 min with 1e5 nodes, against the preset's own mesh."""
     own, near = _first_step(preset)
-    fine, far = _huge(own.scene.numerics.order)
+    which, refinement = HUGE[own.scene.numerics.order]
+    fine, far = _first_step(which, f"numerics.refinement={refinement}")
     missing = far.ledger.biomass_after - far.ledger.biomass_before - far.ledger.biomass_made
     taken = [abs(1 - (far.ledger.out[k] + far.ledger.consumed[k]) / far.ledger.supplied[k]) for k in (0, 1)]
     shapes = [(step.pore.outline.area, step.pore.outline.thickness, step.pore.outline.upstream) for step in (near, far)]

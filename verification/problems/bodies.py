@@ -21,8 +21,8 @@ from repro.fem.outline import half_disc as half_disc_outline
 from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.fem.space import Space
 from repro.model import growth, pore
+from repro.model.contact import constrained
 from verification.problems import meshes
-from verification.problems.meshes import relative
 
 #: Radius of the half-discs (um), and the factor by which theta is raised at a time.
 RADIUS, FACTOR = 20.0, 1.5
@@ -78,18 +78,14 @@ class Supported:
         """How many nodes are corners."""
         return self.body.shape.corners
 
-    @property
-    def points(self) -> np.ndarray:
-        """(t, q, 2) um, where growth is taken, at t = 0."""
-        return np.einsum("qg,tgi->tqi", self.body.shape.table.shape, self.reference[self.cells])
-
     def field(self, function: Callable) -> np.ndarray:
-        """(t, q) of a function of X and Y there."""
-        return np.broadcast_to(function(*np.moveaxis(self.points, 2, 0)), self.body.at.dx.shape).astype(float)
+        """(t, q) of a function of X and Y at t = 0 where growth is taken."""
+        where, _ = meshes.places(self.reference[self.cells], self.body.shape.table)
+        return np.broadcast_to(function(*np.moveaxis(where, 2, 0)), self.body.at.dx.shape).astype(float)
 
     def constant(self, value: float) -> np.ndarray:
         """(t, q) of one value."""
-        return np.full(self.body.at.dx.shape, float(value))
+        return self.field(lambda x, y: value)
 
     @property
     def resting(self) -> np.ndarray:
@@ -109,11 +105,9 @@ def half_disc(refinement: float, kind: int = 1) -> tuple[Supported, np.ndarray]:
     geometry = min(kind, 2)
     seed = half_disc_outline(RADIUS, ACROSS_AGGREGATE * refinement, geometry)
     grid, outline = meshes.around(seed, refinement, (-ENDS[kind], ENDS[kind]), 50.0)
-    rim, free = grid.topology.body_loop, outline.wall == FREE
-    held = np.zeros((len(grid.body), 2), bool)
-    held[rim[outline.fixed], 0] = True
-    held[rim[~free], 1] = True
-    return on_mesh(grid, kind, grid.points[grid.body], held), rim[free]
+    rim = grid.topology.body_loop
+    held = constrained(len(grid.body), rim, outline.wall, outline.fixed)
+    return on_mesh(grid, kind, grid.points[grid.body], held), rim[outline.wall == FREE]
 
 
 @cache
@@ -167,7 +161,7 @@ class HalfCylinder:
 
 def size(held: Supported) -> float:
     """Side of the square of mean triangle area twice over, um."""
-    return float(np.sqrt(2 * held.body.at.dx.sum() / len(held.cells)))
+    return np.sqrt(2 * held.body.at.dx.sum() / len(held.cells))
 
 
 def grown(held: Supported, theta: np.ndarray, path: Callable | None = None, factor: float = FACTOR
@@ -193,25 +187,21 @@ def system(held: Supported, position: np.ndarray, theta: np.ndarray) -> growth.S
 
 
 def integrated(held: Supported) -> tuple[np.ndarray, np.ndarray, elements.Table]:
-    """Where norms are taken: X, Y (2, t, q), weights (t, q) um2 and the table."""
+    """Where norms are taken: X, Y (t, q, 2), weights (t, q) um2 and the table."""
     of = elements.table(held.geometry, held.geometry, DEGREE)
-    nodes = held.reference[held.cells]
-    where = np.einsum("qg,tgi->itq", of.shape, nodes)
-    return where, elements.weights(nodes, of), of
+    return *meshes.places(held.reference[held.cells], of), of
 
 
 def place_error(held: Supported, position: np.ndarray, exact: Callable) -> float:
     """L2 over the body at t = 0 of places (n, 2) less exact(X, Y) (..., 2), over that of exact."""
     where, weight, of = integrated(held)
-    truth = exact(*where)
-    return relative(np.einsum("qa,tai->tqi", of.values, position[held.cells]), truth, weight)
+    return meshes.distance((where, weight, of.values), position[held.cells], exact)
 
 
 def pressure_error(held: Supported, pressure: np.ndarray, exact: Callable, chosen=slice(None)) -> float:
     """L2 over the body at t = 0, or over its triangles ``chosen``, of pressures (corners,) less exact(X, Y)."""
     where, weight, of = integrated(held)
-    found = pressure[held.cells[:, :3]] @ of.linear.T
-    return relative(found[chosen], exact(*where[:, chosen]), weight[chosen])
+    return meshes.distance((where[chosen], weight[chosen], of.linear), pressure[held.cells[chosen, :3]], exact)
 
 
 def equilibrium(held: Supported, theta: np.ndarray, forces: np.ndarray, start: np.ndarray) -> growth.Equilibrium:
@@ -223,7 +213,7 @@ def equilibrium(held: Supported, theta: np.ndarray, forces: np.ndarray, start: n
 def body_force(held: Supported, density) -> np.ndarray:
     """(n, 2) nodal forces of a force density(X, Y) (..., 2) per area of t = 0."""
     where, weight, of = integrated(held)
-    local = np.einsum("tq,qa,tqi->tai", weight, of.values, density(*where))
+    local = np.einsum("tq,qa,tqi->tai", weight, of.values, density(*np.moveaxis(where, 2, 0)))
     return _summed(held.cells, local, len(held.reference))
 
 
@@ -232,13 +222,11 @@ def traction(held: Supported, grid: Mesh, stress) -> np.ndarray:
     rectangle ``grid`` that is the whole body."""
     order = held.geometry
     edges = grid.topology.dofs(order).outlet
-    points, weights = np.polynomial.legendre.leggauss(5)
-    along = (points + 1) / 2
-    shape = elements.values(order, np.column_stack([along, 0 * along]))[:, elements.ON_EDGE[order]]
+    _, weights, shape = meshes.along_edges(order, 5)
     where = np.einsum("qa,eai->eqi", shape, held.reference[edges])
     length = held.reference[edges[:, -1], 1] - held.reference[edges[:, 0], 1]
     pull = stress(where[..., 0], where[..., 1])[..., 0]
-    return _summed(edges, np.einsum("e,q,qa,eqi->eai", length / 2, weights, shape, pull), len(held.reference))
+    return _summed(edges, np.einsum("e,q,qa,eqi->eai", length, weights, shape, pull), len(held.reference))
 
 
 def _summed(nodes: np.ndarray, local: np.ndarray, count: int) -> np.ndarray:

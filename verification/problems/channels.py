@@ -84,14 +84,10 @@ def carrying(space: Space, velocity: np.ndarray, mean: float) -> flow.Flow:
     return flow.Flow(mean, velocity, np.zeros(space.mesh.corners), correction, 0.0, 0.0, 1.0)
 
 
-def plug_flow(space: Space, speed: float) -> flow.Flow:
-    """The same velocity everywhere."""
-    return carrying(space, np.column_stack([np.full(space.count, speed), np.zeros(space.count)]), speed)
-
-
 def problem(space: Space, speed: float | None, substrates=SCENE.substrates, law=SCENE.kinetics) -> transport.Problem:
-    """Both substrates under plug flow, None: without flow."""
-    return transport.problem(space, None if speed is None else plug_flow(space, speed), substrates, law)
+    """Both substrates under plug flow, the same velocity everywhere; None: without flow."""
+    carried = None if speed is None else carrying(space, np.tile([speed, 0.0], (space.count, 1)), speed)
+    return transport.problem(space, carried, substrates, law)
 
 
 def filled(space: Space, density: float) -> np.ndarray:
@@ -164,13 +160,7 @@ def apart(space: Space, fields: np.ndarray, exact) -> tuple[np.ndarray, np.ndarr
 
 def relative(space: Space, field: np.ndarray, exact) -> float:
     """L2 over the mesh of one field (n,) less exact(x) over that of exact."""
-    return float(distance(space, field[None], lambda x: exact(x)[None])[0])
-
-
-def distance(space: Space, fields: np.ndarray, exact) -> np.ndarray:
-    """(m,) L2 over the mesh of fields (m, n) less exact(x) (m, ...) over that of exact."""
-    gap, size = apart(space, fields, lambda x, y: exact(x))
-    return gap / size
+    return meshes.distance(in_points(space), field[space.cells], lambda x, y: exact(x))
 
 
 def sample(space: Space, fields: np.ndarray, where: np.ndarray) -> np.ndarray:
@@ -203,11 +193,9 @@ def box_errors(grid: Mesh, problem: Box) -> dict[str, float]:
     space = Space(grid, problem.order)
     pressures = flow.pressure_space(space)
     where, weight, shape = meshes.fine(space)
-    x, y = np.moveaxis(where, -1, 0)
-    truth, level = problem.exact(x, y)
-    found = np.einsum("qa,tai->tqi", shape, u[space.cells])
+    truth, level = problem.exact(*np.moveaxis(where, 2, 0))
     heads = p[pressures.cells] @ meshes.fine(pressures)[2].T
-    return {"velocity": meshes.relative(found, truth, weight),
+    return {"velocity": meshes.relative(np.einsum("qa,tai->tqi", shape, u[space.cells]), truth, weight),
             "pressure": meshes.relative(_centred(heads, weight), _centred(level, weight), weight)}
 
 

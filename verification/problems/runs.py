@@ -14,15 +14,13 @@ from repro.march.loop import Instant, Ledger, Step
 from repro.march.simulation import simulate
 from repro.model import pore
 from repro.model.pore import Pore, Solved
-from repro.scene import Kinetics, Scene, load_scene
-from verification.kernel.case import Profile, columns
-from verification.problems import channels, pairs
+from repro.scene import Kinetics, Scene, Substrates, load_scene
+from verification.kernel.case import columns
+from verification.problems import channels, meshes
 
 ROUND_OFF = "round-off"
 #: The velocity of base at t = 0, 2.9 m/d, in um/h.
 SPEED = 2.9e6 / 24
-#: Of a section, at which a mean is taken.
-POINTS = 16
 #: Kinds of elements, by the names that scenes have for them: of order 1, 2 and 3.
 ELEMENTS = ("linear", "quadratic", "cubic")
 
@@ -107,11 +105,17 @@ def at_velocity(scene: Scene, speed: float) -> Scene:
 def with_diffusivities(scene: Scene, change) -> Scene:
     """The scene with ``change`` (D, D_B) -> (D, D_B) made to both substrates."""
     changed = {}
-    for name in ("acceptor", "donor"):
+    for name in channels.NAMES:
         one = getattr(scene.substrates, name)
         water, biomass = change(one.diffusivity, one.diffusivity_in_aggregate)
         changed[name] = replace(one, diffusivity=water, diffusivity_in_aggregate=biomass)
     return replace(scene, substrates=replace(scene.substrates, **changed))
+
+
+def faster(scene: Scene, factor: float) -> Scene:
+    """The scene at base's velocity with diffusivities so many times its own."""
+    spread = with_diffusivities(scene, lambda water, biomass: (factor * water, factor * biomass))
+    return at_velocity(spread, SPEED)
 
 
 def supplied_everywhere(scene: Scene) -> Scene:
@@ -147,23 +151,18 @@ def density_drift(scene: Scene, instant: Instant) -> float:
     """Largest |(X_A + X_I) / X_m - 1| in the aggregate."""
     now = instant.pore
     density = (now.active + now.inert) / now.space.reaction.dx
-    return float(np.abs(density / scene.kinetics.maximum_density - 1).max())
+    return np.abs(density / scene.kinetics.maximum_density - 1).max()
 
 
 def section_means(now: Pore, solved: Solved, x: np.ndarray) -> np.ndarray:
     """(2, K) means of C_A and C_D over the sections x (K,) of the mesh."""
-    found = solved.concentrations
-    place, weight = np.polynomial.legendre.leggauss(POINTS)
-    y = 0.5 * now.mesh.width * (1 + place)
-    where = np.column_stack([np.repeat(x, POINTS), np.tile(y, len(x))])
-    values = pairs.sample(now.space, np.column_stack([found.acceptor, found.donor]), where)
-    return np.einsum("kpm,p->mk", values.reshape(len(x), POINTS, 2), 0.5 * weight)
+    return meshes.section_means(now.space, channels.both(solved.concentrations).T, x).T
 
 
-def growth_rates(scene: Scene, acceptor: float | None = None, donor: float | None = None) -> tuple[float, float]:
+def growth_rates(law: Kinetics, both: Substrates, acceptor: float | None = None, donor: float | None = None
+                 ) -> tuple[float, float]:
     """Rates (1/h) at which X_A grows and leaves X_I, (9)-(10), at concentrations (mg/L), those of the supply by
     default: written down anew."""
-    law, both = scene.kinetics, scene.substrates
     given = ((both.acceptor.supply if acceptor is None else acceptor, both.acceptor.half_saturation),
              (both.donor.supply if donor is None else donor, both.donor.half_saturation))
     m_a, m_d = (value / (value + half) for value, half in given)
@@ -178,10 +177,10 @@ def worth(law: Kinetics, step: Ledger) -> tuple[float, float]:
     return law.yield_coefficient * donor, (acceptor - law.acceptor_to_donor_ratio * donor) / law.decay_oxygen_demand
 
 
-def mass_after(scene: Scene, time: float) -> float:
-    """(X_A + X_I) over that at the start, after hours at the supply: an exponential."""
-    rise, left = growth_rates(scene)
-    return float(np.exp(rise * time) + left / rise * np.expm1(rise * time))
+def mass_after(scene: Scene, time: float, acceptor: float | None = None) -> float:
+    """(X_A + X_I) over that at the start, after hours at the supply, or at another acceptor: an exponential."""
+    rise, left = growth_rates(scene.kinetics, scene.substrates, acceptor)
+    return np.exp(rise * time) + left / rise * np.expm1(rise * time)
 
 
 #: um/h in m/d.
@@ -206,7 +205,7 @@ def pore_of(scene: Scene, speed=None) -> averaged_pore.Pore:
 
 def half_disc_radius(area: float) -> float:
     """Of the half-disc of an area: the meshed one is a polygon."""
-    return float(np.sqrt(2 * area / np.pi))
+    return np.sqrt(2 * area / np.pi)
 
 
 def half_disc(scene: Scene, speed=None, cells: int = CELLS, fluid: int = FLUID) -> averaged_pore.Averaged:
@@ -221,39 +220,23 @@ def ours(scene: Scene) -> list[Instant]:
     return list(simulate(scene))[1:]
 
 
-def apart(scene: Scene, instant: Instant, moment: averaged_pore.Moment) -> dict[str, float]:
-    """Ours less the averaged pore's: area and velocity relative to the latter's, effluents (the further of both) and
-    section means of C (the largest difference along the mesh) over the supply."""
+def apart(scene: Scene, instants: list[Instant], moments) -> dict[str, float]:
+    """The largest differences from the averaged pore at the reported times: of area and velocity relative to the
+    latter's, of effluents (the further of both) and of section means of C (along the mesh) over the supply."""
+    return worst([_less(scene, *pair) for pair in zip(instants, moments)])
+
+
+def _less(scene: Scene, instant: Instant, moment: averaged_pore.Moment) -> dict[str, float]:
     row, supply = results.row(scene, instant), scene.substrates.acceptor.supply
-    effluents = np.array([row[f"effluent_{name}_mg_per_L"] for name in ("acceptor", "donor")])
-    x, means = profile(instant)
+    effluents = np.array([row[f"effluent_{name}_mg_per_L"] for name in channels.NAMES])
+    x = np.linspace(*instant.pore.mesh.ends, PLACES)
     between = [np.interp(x, moment.x, field) for field in moment.fields]
     return {"area": row["aggregate_area_um2"] / moment.area - 1,
             "velocity": row["mean_velocity_m_per_d"] / M_PER_D / moment.velocity - 1,
-            "effluents": float(np.abs(effluents - moment.fields[:, -1]).max()) / supply,
-            "C along the pore": float(np.abs(means - between).max()) / supply}
-
-
-def profile(instant: Instant) -> tuple[np.ndarray, np.ndarray]:
-    """(x, section means (2, K)) over the mesh."""
-    x = np.linspace(*instant.pore.mesh.ends, PLACES)
-    return x, section_means(instant.pore, instant.solved, x)
+            "effluents": np.abs(effluents - moment.fields[:, -1]).max() / supply,
+            "C along the pore": np.abs(section_means(instant.pore, instant.solved, x) - between).max() / supply}
 
 
 def worst(rows: list[dict[str, float]]) -> dict[str, float]:
     """The largest size of each number."""
-    return {name: float(np.abs(values).max()) for name, values in columns(rows).items()}
-
-
-def profiles(instants: list[Instant], moments) -> tuple[Profile, ...]:
-    """Section means along the mesh, a picture a substrate: ours, and the averaged pore's."""
-    pictures = []
-    for k, name in enumerate(("C_A", "C_D")):
-        curves = []
-        for instant, moment in zip(instants, moments):
-            x, means = profile(instant)
-            within = (moment.x > x[0]) & (moment.x < x[-1])
-            curves += [(f"{instant.pore.time:g} h", "ours", x, means[k]),
-                       (f"averaged, {instant.pore.time:g} h", "reference", moment.x[within], moment.fields[k, within])]
-        pictures.append(Profile(f"section means of {name}", "x (um)", f"{name} (mg/L)", tuple(curves)))
-    return tuple(pictures)
+    return {name: np.abs(values).max() for name, values in columns(rows).items()}

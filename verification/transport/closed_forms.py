@@ -14,7 +14,6 @@ from functools import cache
 import numpy as np
 
 from reference import manufactured_transport, robin_channel, slab
-from repro.fem import elements
 from repro.fem.sizing import ACROSS_PORE
 from repro.fem.space import Space
 from repro.model import flow, transport
@@ -93,7 +92,7 @@ def _robin_errors(size: float, number: int, order: int, peclet: float, ends) -> 
     made, state = _robin_found(space, peclet)
     gap, truth = apart(space, state.donor[None], lambda x, y: exact(x)[None])
     leaving = transport.fluxes(made, Sink(filled(space, UPTAKE)), state)[1].effluent
-    return {"size": length(space, size), "C": float(gap[0] / (truth[0] if order == 1 else DONOR.supply)),
+    return {"size": length(space, size), "C": gap[0] / (truth[0] if order == 1 else DONOR.supply),
             "leaving": abs(leaving - float(exact(SLAB))) / DONOR.supply}
 
 
@@ -133,21 +132,19 @@ def _sides(film: float) -> dict[str, float]:
             "diffusivity": ACCEPTOR.diffusivity}
 
 
-def _filmed(told: str, film: float) -> str:
-    return told + (f", films of {film:g} um" if film else "")
-
-
 #: Thiele's modulus, film (um), and the last errors of C and of what is taken up, for each order.
 THIELE = {1: ((0.1, 0.0, 3e-7, 3e-7), (1.0, 0.0, 4e-5, 4e-5), (10.0, 0.0, 4e-3, 4e-3), (1.0, FILM, 3e-5, 3e-5)),
           2: ((0.1, 0.0, 1e-12, 3e-12), (1.0, 0.0, 1e-8, 1e-11), (10.0, 0.0, 2e-5, 3e-7), (1.0, FILM, 7e-9, 1e-11)),
           3: ((1.0, 0.0, 2e-11, 3e-12), (10.0, 0.0, 2e-7, 1e-10), (1.0, FILM, 2e-11, 3e-12))}
+#: What tells of films.
+FILMED = {0.0: "", FILM: f", films of {FILM:g} um"}
 #: Elements (um), and how many meshes of each.
 THIELE_MESHES = {1: SAMPLES, 2: {4.0: 8, 2.0: 4, 1.0: 2, 0.5: 1}, 3: SAMPLES}
 NORM = "L2 of C over the mesh, relative; what is taken up, relative; several meshes a size"
 
 
 def _thiele(*orders: int) -> dict[str, tuple]:
-    return {f"{_filmed(f'phi = {row[0]:g}', row[1])}, {WORDS[order]}": (order, *row)
+    return {f"phi = {row[0]:g}{FILMED[row[1]]}, {WORDS[order]}": (order, *row)
             for order in orders for row in THIELE[order]}
 
 
@@ -171,21 +168,22 @@ def first_order(order: int, modulus: float, film: float, ceiling: float, taken: 
         yield at_most("taken up", errors["taken up"][-1], taken, why)
 
 
-def _kappa(modulus: float) -> float:
-    """Uptake (1/h) of a Thiele modulus."""
-    return ACCEPTOR.diffusivity_in_aggregate * (modulus / SLAB) ** 2
-
-
 def _first_order_errors(size: float, number: int, modulus: float, film: float, order: int) -> dict[str, float]:
-    kappa = _kappa(modulus)
-    space, field, flux = _at_rest(size, number, kappa * LARGE, LARGE, film, order)
+    kappa = ACCEPTOR.diffusivity_in_aggregate * (modulus / SLAB) ** 2
 
     def exact(x):
-        return slab.first_order(x, ACCEPTOR.supply, kappa, **_sides(film))
+        profile, effectiveness = slab.first_order(x, ACCEPTOR.supply, kappa, **_sides(film))
+        return profile, effectiveness * ACCEPTOR.supply * SLAB / LARGE
 
-    taken = flux.consumed / (kappa * ACCEPTOR.supply * 2 * SLAB * CHANNEL)
+    return _slab_errors(size, number, order, film, kappa * LARGE, LARGE, exact, "taken up")
+
+
+def _slab_errors(size: float, number: int, order: int, film: float, sink: float, half_saturation: float, exact,
+                 taken: str) -> dict[str, float]:
+    """Size of the elements, and relative errors of C and of what enters a side over ``sink``; exact(x): both."""
+    space, field, flux = _at_rest(size, number, sink, half_saturation, film, order)
     return {"size": length(space, size), "C": relative(space, field, lambda x: exact(x)[0]),
-            "taken up": abs(taken / exact(0.0)[1] - 1)}
+            taken: abs(_depth(flux, sink) / exact(0.0)[1] - 1)}
 
 
 DEPTH = 20.0
@@ -210,13 +208,10 @@ def _monod(order: int, half_saturation: float, film: float, samples: dict, ceili
 
 
 def _monod_errors(size: float, number: int, half_saturation: float, film: float, order: int) -> dict[str, float]:
-    space, field, flux = _at_rest(size, number, _sink(film), half_saturation, film, order)
-
     def exact(x):
         return slab.monod(x, ACCEPTOR.supply, _sink(film), half_saturation, **_sides(film))
 
-    return {"size": length(space, size), "C": relative(space, field, lambda x: exact(x)[0]),
-            "depth": abs(_depth(flux, _sink(film)) / exact(0.0)[1] - 1)}
+    return _slab_errors(size, number, order, film, _sink(film), half_saturation, exact, "depth")
 
 
 def _sink(film: float) -> float:
@@ -381,8 +376,7 @@ def _of_triangles_sides(space: Space):
 def _through(space: Space, nodes, mean: float, supply: float, chosen, inlet: str) -> np.ndarray:
     """(n,) of what enters through edges: D dC/dn; and at the inlet, where the code has it leave, u_x (C - C_s), or with
     the printed condition u_ave (C - C_s) [E4]."""
-    points, weights = np.polynomial.legendre.leggauss(6)
-    along = (points + 1) / 2
+    along, weights, values = meshes.along_edges(space.order, 6)
     start, end = np.moveaxis(space.points[nodes[:, [0, -1]]], 1, 0)
     along_edge = end - start
     x, y = np.moveaxis(start[:, None] + along[:, None] * along_edge[:, None], 2, 0)
@@ -392,8 +386,7 @@ def _through(space: Space, nodes, mean: float, supply: float, chosen, inlet: str
     enters = _velocity(mean)[0](x, y) if inlet == "local" else mean
     over = enters * (_by_side(biomass, chosen, "value", x, y) - supply) * length
     passed = passed + np.where(np.isclose(x, ENDS[0]), over, 0.0)
-    values = elements.values(space.order, np.column_stack([along, 0 * along]))[:, elements.ON_EDGE[space.order]]
-    return np.bincount(nodes.ravel(), ((passed * weights / 2) @ values).ravel(), space.count)
+    return np.bincount(nodes.ravel(), ((passed * weights) @ values).ravel(), space.count)
 
 
 @case("transport-manufactured", kind="manufactured", norm="L2 of each substrate over the mesh, relative",

@@ -30,20 +30,21 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-import scipy.sparse as sp
 from scipy.integrate import solve_ivp
 from scipy.spatial import cKDTree
-from skfem import Basis, BilinearForm, MeshTri
+from skfem import Basis, MeshTri
+from skfem.models import poisson
 
 from reference import channel_bvp, channel_fipy
 from reference import diffusion_reaction_pypde as pypde
 from reference.monod import sink, slopes, uptake
 from repro.fem import outline
+from repro.fem.elements import ELEMENTS
 from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.fem.space import Space
 from repro.model import gear, kinetics, transport
 from repro.model.kinetics import Sink
-from verification.kernel.case import Profile, at_most, case, combined, refine, studies
+from verification.kernel.case import at_most, case, combined, refine, studies
 from verification.problems import meshes, runs
 from verification.problems.channels import (
     CROSSED,
@@ -57,7 +58,6 @@ from verification.problems.channels import (
     apart,
     at_heights,
     both,
-    distance,
     filled,
     following,
     length,
@@ -69,7 +69,6 @@ from verification.problems.channels import (
     speed_of,
     steady,
 )
-from verification.problems.pairs import ELEMENTS
 
 LINEAR = {"linear": 1}
 HIGHER = {word: order for word, order in ORDERS.items() if order > 1}
@@ -141,7 +140,8 @@ def _distances(size: float, number: int, peclet: float, density: float) -> dict[
     ours, pieces = found(size, number, peclet, density), space.reaction
     nodes = pieces.cells[:, 0]
     ratio = ours[0, nodes] / truth(space.points[nodes, 0])[0]
-    return {**dict(zip(NAMES, distance(space, ours, truth))),
+    gap, whole = apart(space, ours, lambda x, y: truth(x))
+    return {**dict(zip(NAMES, gap / whole)),
             ITSELF_STARVED: np.sqrt(np.average((ratio - 1) ** 2, weights=pieces.dx[:, 0]))}
 
 
@@ -149,7 +149,7 @@ def _root_mean_square(size: float, number: int, order: int, peclet: float, densi
     """Of both substrates over the larger supply."""
     space, truth = spaced(size, number, order, WIDE), exact(peclet, density, FINER[order][1])
     gaps, _ = apart(space, found(size, number, peclet, density, order, WIDE), lambda x, y: truth(x))
-    return {"size": length(space, size), "C": float(np.hypot(*gaps)) / pair("supply")[0]}
+    return {"size": length(space, size), "C": np.hypot(*gaps) / pair("supply")[0]}
 
 
 def _over_the_supply(gap: np.ndarray) -> dict[str, float]:
@@ -202,12 +202,13 @@ def finite_differences(shape: str, order: int, density: float, *ceilings: float)
     if order == 1:
         samples, why = (BLOCK, "both of second order") if shape == "block" else (dict.fromkeys(DISC, 1), CUT)
         rows = {name: (2, why, ceiling) for name, ceiling in zip(names, ceilings)}
-        yield studies(refine(_as_long, samples, density, shape), rows)
+        yield studies(refine(_less, samples, density, shape, order), rows)
     elif shape == "block":
         rows = {name: (2, "py-pde's second order", ceiling) for name, ceiling in zip(names, ceilings)}
-        yield studies(refine(_at_rest, tuple(BLOCK), density, shape, order), rows, ", of py-pde less ours")
+        errors = refine(_less, dict.fromkeys(BLOCK, 1), density, shape, order)
+        yield studies(errors, rows, ", of py-pde less ours")
     else:
-        errors = _at_rest(min(DISC), density, shape, order)
+        errors = _less(min(DISC), 0, density, shape, order)
         for name, ceiling in zip(names, ceilings):
             yield at_most(f"{name}, of py-pde less ours", errors[name], ceiling, "py-pde's error")
 
@@ -230,32 +231,20 @@ def _spaced(cell: float, number: int, shape: str, order: int = 1) -> Space:
     return meshes.half_disc_space(SIDE, DISC[cell], (-BOX, BOX), BOX, order)
 
 
-def _as_long(cell: float, number: int, density: float, shape: str) -> dict[str, float]:
-    """Differences of linear elements as long as py-pde's cells."""
-    made, sink_ = _diffusing(_spaced(cell, number, shape), density)
-    return _less(made.space, transport.steady(made, sink_), cell, density, shape)
-
-
-def _at_rest(cell: float, density: float, shape: str, order: int) -> dict[str, float]:
-    """Differences of elements of another order and size."""
-    return {"size": cell, **_less(*_settled(density, shape, order), cell, density, shape)}
-
-
 @cache
-def _settled(density: float, shape: str, order: int) -> tuple[Space, transport.Concentrations]:
-    """The transient scheme at rest."""
-    made, sink_ = _diffusing(_spaced(FINE_AROUND[shape][order], 0, shape, order), density)
-    return made.space, gear.settle(made, sink_, None)
+def _settled(cell: float, number: int, density: float, shape: str, order: int) -> tuple[Space, np.ndarray]:
+    """C (2, n) of linear elements as long as py-pde's cells; of others, finer ones, as the transient scheme comes to
+    rest."""
+    space = _spaced(cell, number, shape, order)
+    given = transport.problem(space, None, SUBSTRATES, SCENE.kinetics), Sink(filled(space, density))
+    return space, both(transport.steady(*given) if order == 1 else gear.settle(*given, None))
 
 
-def _diffusing(space: Space, density: float) -> tuple[transport.Problem, Sink]:
-    return transport.problem(space, None, SUBSTRATES, SCENE.kinetics), Sink(filled(space, density))
-
-
-def _less(space: Space, state: transport.Concentrations, cell: float, density: float, shape: str) -> dict[str, float]:
+def _less(cell: float, number: int, density: float, shape: str, order: int) -> dict[str, float]:
     """Differences of both substrates over their supply, and of the donor in the biomass, the scarcer, over itself."""
     points, theirs, part = _pypde(cell, density, shape)
-    ours = sample(space, both(state), points)
+    elements = cell if order == 1 else FINE_AROUND[shape][order]
+    ours = sample(*_settled(elements, number, density, shape, order), points)
     ratio = (ours / theirs)[1, part == 1] - 1
     return {**_over_the_supply(ours - theirs), ITSELF: np.sqrt(np.mean(ratio**2))}
 
@@ -286,20 +275,12 @@ def _ours(size: float, number: int, peclet: float, density: float, steps: int, o
     """(times, 2, n): each interval in equal steps, started anew from the end of the last."""
     made = _assembled(size, number, peclet, order)
     states = []
-    last = 0.0
     active = filled(made.space, density)
     now = transport.supplied_everywhere(made)
-    for time in TIMES:
-        interval, last = time - last, time
+    for interval in np.diff([0.0, *TIMES]):
         now = gear.advance(made, active, 0 * active, now, interval, fixed_step=interval / steps).concentrations
         states.append(both(now))
     return np.array(states)
-
-
-@BilinearForm
-def product(u, v, w):
-    """(u, v)."""
-    return u * v
 
 
 def mass(space: Space) -> np.ndarray:
@@ -312,33 +293,30 @@ def mass(space: Space) -> np.ndarray:
     apart, same = cKDTree(basis.doflocs.T).query(space.points)
     if apart.max() > 1e-9:
         raise ValueError("scikit-fem has its nodes elsewhere")
-    return product.assemble(basis).toarray()[np.ix_(same, same)]
+    return poisson.mass.assemble(basis).toarray()[np.ix_(same, same)]
 
 
-def _reading(space: Space) -> sp.csr_array:
+def _reading(space: Space) -> np.ndarray:
     """(points, n) concentrations in the points of the reaction from those at the nodes."""
     pieces = space.reaction
-    count, k = pieces.dx.shape[1], pieces.cells.shape[1]
-    rows = np.repeat(np.arange(pieces.dx.size), k)
-    columns = np.repeat(pieces.cells, count, axis=0)
-    values = np.tile(pieces.values, (len(pieces.cells), 1))
-    return sp.csr_array((values.ravel(), (rows, columns.ravel())), shape=(pieces.dx.size, space.count))
+    nodes = np.eye(space.count)[pieces.cells]
+    return np.einsum("qk,tkn->tqn", pieces.values, nodes).reshape(pieces.dx.size, -1)
 
 
 @cache
-def _exact_in_time(size: float, number: int, peclet: float, density: float, order: int) -> np.ndarray:
+def _exact_in_time(size: float, peclet: float, density: float, order: int) -> np.ndarray:
     """(times, 2, n): the same equations in space, M dC/dt = b - L C - X q in the points of the reaction, by scipy's
     integrator to 1e-8."""
-    made, law = _assembled(size, number, peclet, order), rates(LAW)
+    made, law = _assembled(size, 0, peclet, order), rates(LAW)
     back = np.kron(np.eye(2), np.linalg.inv(mass(made.space)))
-    read = sp.block_diag([_reading(made.space)] * 2, "csr")
+    read = np.kron(np.eye(2), _reading(made.space))
     load = filled(made.space, density).ravel()
 
     def rise(_, y):
         return back @ (made.source - made.operator @ y - read.T @ sink(read @ y, load, law))
 
     def slope(_, y):
-        return back @ -(made.operator + read.T @ slopes(read @ y, load, law) @ read).toarray()
+        return back @ -(made.operator.toarray() + read.T @ slopes(read @ y, load, law) @ read)
 
     start = np.repeat(pair("supply"), made.space.count)
     found = solve_ivp(rise, (0.0, TIMES[-1]), start, jac=slope, method="BDF", t_eval=TIMES, rtol=1e-8, atol=1e-8)
@@ -364,7 +342,7 @@ IN_TIME = {f"Pe = {peclet:g}, X = {density:g} mg/L, {word}": (ORDERS[word], pecl
             "scipy's integrator with scikit-fem's mass matrix, with an error of second order in the step",
       mutants=("carry-of-bdf2", "backward-euler", "storage-of-the-biomass-alone", "storage-diagonal"), over=IN_TIME)
 def in_time(order: int, peclet: float, density: float, size: float, ceiling: float):
-    trusted = _exact_in_time(size, 0, peclet, density, order)
+    trusted = _exact_in_time(size, peclet, density, order)
     errors = refine(lambda steps: {"size": TIMES[0] / steps, **_largest(
         _ours(size, 0, peclet, density, steps, order) - trusted)}, STEPS)
     return studies(errors, each(2, "BDF2 after a first step of backward Euler", ceiling))
@@ -413,10 +391,10 @@ def _rows(timed: bool) -> dict[str, tuple]:
 def finite_volumes(timed: bool, order: int, peclet: float, density: float):
     samples, why, ceilings, closest = AGAINST_FIPY[timed]
     if order > 1:
-        errors = refine(_to_fipy, CELLS, order, peclet, density, timed)
+        errors = refine(_from_fipy, dict.fromkeys(CELLS, 1), order, peclet, density, timed)
         yield studies(errors, each(2, "FiPy's second order", closest), " of FiPy less ours")
         return
-    errors = refine(_from_fipy, samples, peclet, density, timed)
+    errors = refine(_from_fipy, samples, order, peclet, density, timed)
     yield studies(errors, each(2, why, ceilings[density]))
     if not timed and (peclet, density) == STARVED:
         yield studies(errors, {ITSELF_STARVED: (2, why, 6e-4)})
@@ -424,22 +402,17 @@ def finite_volumes(timed: bool, order: int, peclet: float, density: float):
         errors = refine(_from_backward_euler, STEPS, peclet, density)
         yield studies(errors, each(1, "the lower of the two: FiPy's TransientTerm is backward Euler", 3e-4),
                       " less FiPy's in as many steps")
-    yield _course(min(samples), peclet, density, timed)
 
 
-def _from_fipy(size: float, number: int, peclet: float, density: float, timed: bool) -> dict[str, float]:
-    """Both codes refined together; in the starved slab C_A over itself."""
+def _from_fipy(size: float, number: int, order: int, peclet: float, density: float, timed: bool) -> dict[str, float]:
+    """Both codes refined together, or FiPy's cells against one mesh of quadratic or cubic elements; in the starved slab
+    C_A over itself."""
     x, theirs = _channel(size, peclet, density).x, _fipy(size, peclet, density, timed)
-    ours, inside = _at_cells(x, size, number, 1, peclet, density, timed * STEPS[-1] / size), (x > 0) & (x < SLAB)
+    elements, steps = (size, STEPS[-1] / size) if order == 1 else (FINE[order], STEPS[-1])
+    ours = _at_cells(x, elements, number, order, peclet, density, timed * steps)
+    inside = (x > 0) & (x < SLAB)
     ratio = ours[-1, 0][:, inside] / theirs[-1, 0, inside]
     return {**_largest(ours - theirs[:, :, None]), ITSELF_STARVED: np.sqrt(np.mean((ratio - 1) ** 2))}
-
-
-def _to_fipy(cells: float, order: int, peclet: float, density: float, timed: bool) -> dict[str, float]:
-    """FiPy's cells against one mesh of quadratic or cubic elements."""
-    x, theirs = _channel(cells, peclet, density).x, _fipy(cells, peclet, density, timed)
-    ours = _at_cells(x, FINE[order], 0, order, peclet, density, timed * STEPS[-1])
-    return {"size": cells, **_largest(ours - theirs[:, :, None])}
 
 
 def _from_backward_euler(steps: int, peclet: float, density: float) -> dict[str, float]:
@@ -447,16 +420,6 @@ def _from_backward_euler(steps: int, peclet: float, density: float) -> dict[str,
     channel = _channel(size, peclet, density)
     ours = _at_cells(channel.x, size, 0, 1, peclet, density, steps)
     return {"size": TIMES[0] / steps, **_largest(ours - channel.backward_euler(TIMES, steps)[:, :, None])}
-
-
-def _course(size: float, peclet: float, density: float, timed: bool) -> Profile:
-    """Along the channel, at each time."""
-    x, curves = _channel(size, peclet, density).x, []
-    ours = _at_cells(x, size, 0, 1, peclet, density, timed * STEPS[-1])[:, :, 2]
-    for one, theirs in zip(ours, _fipy(size, peclet, density, timed)):
-        for k, name in enumerate(NAMES):
-            curves += [(name, "ours", x, one[k]), (f"{name}, FiPy", "reference", x, theirs[k])]
-    return Profile("along the channel", "x (um)", "C (mg/L)", tuple(curves))
 
 
 WELL_MIXED, RADIUS = 24.0, 8.0
@@ -476,12 +439,8 @@ MIXED_NORM = "largest relative difference, twice a day for five days"
 
 
 def growing(acceptor, donor, active):
-    """dX_A/dt and dX_I/dt, (9)-(10), written down anew."""
-    m_a = acceptor / (acceptor + CLOSED.acceptor.half_saturation)
-    m_d = donor / (donor + CLOSED.donor.half_saturation)
-    b, f_d = SLOW_LAW.decay_coefficient, SLOW_LAW.degradable_fraction
-    growth = SLOW_LAW.maximum_utilization_rate * SLOW_LAW.yield_coefficient * m_d - b
-    return active * m_a * growth, active * m_a * b * (1 - f_d)
+    """(2,) dX_A/dt and dX_I/dt, (9)-(10)."""
+    return active * np.array(runs.growth_rates(SLOW_LAW, CLOSED, acceptor, donor))
 
 
 @cache
@@ -544,7 +503,7 @@ def followed(order: int):
     yield studies(errors, {name: (2, "BDF2, started anew ten times", ceiling) for name, ceiling in MIXED.items()})
     if order == 1:
         yield at_most("X at constant C, 12 min steps", _constant_supply(), 1e-9,
-                      "(9)-(10) are integrated exactly: round-off of 600 steps, and scipy's 1e-11")
+                      "(9)-(10) are integrated exactly: round-off of 600 steps")
 
 
 def _constant_supply() -> float:
@@ -555,6 +514,7 @@ def _constant_supply() -> float:
     active, inert = 3e4, 0.0
     for _ in range(600):
         active, inert = kinetics.grow(active, inert, growth, remains, 0.2)
-    found = solve_ivp(lambda t, y: growing(acceptor, donor, y[0]), (0, HALF_DAYS[-1]), [3e4, 0.0], rtol=1e-12,
-                      atol=1e-8, method="DOP853").y[:, -1]
-    return float(np.abs(np.array([active, inert]) / found - 1).max())
+    rise, left = runs.growth_rates(SLOW_LAW, CLOSED, acceptor, donor)
+    risen = rise * HALF_DAYS[-1]
+    exact = 3e4 * np.array([np.exp(risen), left / rise * np.expm1(risen)])
+    return np.abs(np.array([active, inert]) / exact - 1).max()
