@@ -4,6 +4,7 @@ import pathlib
 import re
 import sys
 import tomllib
+from graphlib import CycleError, TopologicalSorter
 from importlib.metadata import packages_distributions
 
 import pytest
@@ -24,6 +25,8 @@ RUNTIME = PROJECT["project"]["dependencies"]
 EXTRAS = PROJECT["project"]["optional-dependencies"]
 LOCKS = [(ROOT / name).read_text(encoding="utf-8")
          for name in ("requirements.lock", "verification/sampled/requirements.lock", ".ci/crate.lock")]
+#: What is imported for the checker of types alone.
+TYPES = re.compile(r"^if TYPE_CHECKING:\n(?:(?: .*)?\n)+", re.M)
 PIN = re.compile(r"^([a-z0-9-]+)==(\d+(?:\.\d+)*)", re.M)
 ADDRESS = re.compile(r"//|file:|index|--find-links|(^|\s)/\w", re.M)
 
@@ -80,6 +83,23 @@ def trespasses(sources):
             if not may_import(module, other)]
 
 
+def circle(sources):
+    """Modules of `repro` of which each imports the one before it, the first the last, if there are such; what is for
+    the checker of types alone counts not."""
+    links = {name: inside(asked(TYPES.sub("", source), name), sources) - {name} for name, source in sources.items()}
+    try:
+        TopologicalSorter({name: found for name, found in links.items() if name != "repro.__init__"}).prepare()
+    except CycleError as found:
+        return found.args[1]
+    return []
+
+
+def inside(names, sources):
+    """Modules of `repro` among what is asked for: a.b where that is a module, else a."""
+    tried = [(name, f"{name}.__init__", name.rpartition(".")[0]) for name in names if name.startswith("repro.")]
+    return {next((each for each in places if each in sources), "repro.__init__") for places in tried}
+
+
 def normal(name):
     return re.sub(r"[-_.]+", "-", re.match(r"[A-Za-z0-9._-]+", name)[0]).lower()
 
@@ -91,6 +111,13 @@ def version(text):
 def test_nobody_imports_what_the_rules_forbid():
     """Of other folders, and of the rooms of `repro` any that is not before one's own."""
     assert trespasses(modules()) == []
+
+
+def test_no_module_imports_itself_by_way_of_others():
+    sources = {name: source for name, source in modules().items() if name.startswith("repro.")}
+    assert circle(sources) == []
+    again = sources["repro.fem.elements"] + "\ndef f():\n    from repro.fem.transfer import located"
+    assert "repro.fem.elements" in circle(sources | {"repro.fem.elements": again})
 
 
 @pytest.mark.parametrize("module, source", [
