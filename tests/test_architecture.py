@@ -25,8 +25,6 @@ RUNTIME = PROJECT["project"]["dependencies"]
 EXTRAS = PROJECT["project"]["optional-dependencies"]
 LOCKS = [(ROOT / name).read_text(encoding="utf-8")
          for name in ("requirements.lock", "verification/sampled/requirements.lock", ".ci/crate.lock")]
-#: What is imported for the checker of types alone.
-TYPES = re.compile(r"^if TYPE_CHECKING:\n(?:(?: .*)?\n)+", re.M)
 PIN = re.compile(r"^([a-z0-9-]+)==(\d+(?:\.\d+)*)", re.M)
 ADDRESS = re.compile(r"//|file:|index|--find-links|(^|\s)/\w", re.M)
 
@@ -83,10 +81,19 @@ def trespasses(sources):
             if not may_import(module, other)]
 
 
+def at_run_time(source):
+    """A source without what is imported for the checker of types alone."""
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            node.body = [ast.Pass()]
+    return ast.unparse(tree)
+
+
 def circle(sources):
     """Modules of `repro` of which each imports the one before it, the first the last, if there are such; what is for
     the checker of types alone counts not."""
-    links = {name: inside(asked(TYPES.sub("", source), name), sources) - {name} for name, source in sources.items()}
+    links = {name: inside(asked(at_run_time(source), name), sources) - {name} for name, source in sources.items()}
     try:
         TopologicalSorter({name: found for name, found in links.items() if name != "repro.__init__"}).prepare()
     except CycleError as found:
