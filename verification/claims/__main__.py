@@ -1,7 +1,7 @@
 """`python -m verification.claims [--record] [C07 C09 ...]`: judge the paper's claims, all of them by default.
 
-They are compared with the committed `claims.json`: where every number lies in its recorded interval and every verdict is
-the same, that file stays as it is. `--record` writes it anew, or of it the claims that are named.
+They are compared with the committed `claims.json`: where every number lies in its recorded interval and every verdict
+is the same, that file stays as it is. `--record` writes it anew, or of it the claims that are named.
 The exit status is 0 when every claim has a verdict, whatever it is, and agrees with the record; 1 when not; 2 for an
 unknown claim.
 """

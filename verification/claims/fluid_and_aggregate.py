@@ -145,11 +145,9 @@ def interface(found: Body) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     beyond it."""
     loop, chosen = found.grid.straight.loop, found.outline.corners.interface_edges()
     first, last = loop[chosen], np.roll(loop, -1)[chosen]
-    beyond = {}
-    for triangle in found.grid.triangles[~found.grid.biomass]:
-        a, b, c = map(int, triangle)
-        beyond |= {(a, b): triangle, (b, c): triangle, (c, a): triangle}
-    return first, last, np.array([beyond[int(b), int(a)] for a, b in zip(first, last)])
+    fluid = found.grid.triangles[~found.grid.biomass]
+    sides = sp.csr_array((np.arange(fluid.size), (fluid.ravel(), np.roll(fluid, -1, axis=1).ravel())))
+    return first, last, fluid[sides[last, first] // 3]
 
 
 @claim("C35", "Fig 5", "the fluid flows around the aggregate, through it once it spans the pore", **ABOUT_WIDE)

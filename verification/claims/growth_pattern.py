@@ -18,6 +18,7 @@ from repro.model import biomass
 from repro.model.pore import Pore, Solved
 from verification.claims import FEW, FEW_WORDS, LATER, Finding, at_least, at_most, between, claim, without_limit
 from verification.claims.levels import ABOUT_WIDE, BESIDE_OWN, COMPARED, TOLD, at_level
+from verification.claims.rheology import STRESS_FREE, conductivity_change
 from verification.claims.runs import (
     BASE,
     END,
@@ -33,7 +34,6 @@ from verification.claims.runs import (
     equivalent,
     grown,
     in_plane,
-    mean_change,
     polygon,
     scene,
     series,
@@ -306,10 +306,6 @@ def evenness(found: Body) -> float:
     return float(rate.min() / rate.max())
 
 
-#: New biomass born without stress.
-STRESS_FREE = 'growth.new_biomass="stress_free"'
-
-
 @claim("C32", "5", "minor deformation stresses, so that how new biomass is born hardly matters", fine=COMPARED,
        beside=BESIDE_OWN)
 def stresses() -> Finding:
@@ -329,8 +325,8 @@ def stresses() -> Finding:
         label = f"{run[0]}, {when}, born stress-free"
         checks += [at_most(f"{label}: outlines apart (% of the area)", "not affected",
                            float(np.mean([apart(run, time) for time in times])), 100 * FEW, FEW_WORDS),
-                   between(f"{label}: change of the conductivity (%)", "not affected", conductivity_change(run, times),
-                           -100 * FEW, 100 * FEW, FEW_WORDS)]
+                   between(f"{label}: change of the conductivity (%)", "not affected",
+                           conductivity_change((*run, STRESS_FREE), times, run), -100 * FEW, 100 * FEW, FEW_WORDS)]
     uniform = 2.5 ** (-5 / 3) * (2.5 - 1)
     reason = ("it hangs on the modulus: in the plane the stress is minor against mu_L, that of t = 0, and in base also "
               f"against that of the grown material, mu_L theta^(-2/3); in wide it reaches {found['wide'][2]:.2g} of "
@@ -362,9 +358,3 @@ def after_contact() -> tuple[float, ...]:
     """Times (h) of the rows of wide in which the aggregate touches the opposite wall, however new biomass is born."""
     rows, free = series(*WHOLE), series(*WHOLE, STRESS_FREE)
     return tuple(map(float, rows["time_h"][(rows["contact"] == 1) & (free["contact"] == 1)]))
-
-
-def conductivity_change(run: tuple[str, ...], times: tuple[float, ...]) -> float:
-    """Change (%) of the conductivity when new biomass is born stress-free: geometric mean at some times (h)."""
-    ours = [at(run, time)["conductivity_m_per_d"] for time in times]
-    return mean_change(ours, [at((*run, STRESS_FREE), time)["conductivity_m_per_d"] for time in times])

@@ -364,6 +364,14 @@ def plug(scene, *x: float) -> Mesh:
     return mesher.generate(outline, (x[0] - 1.5 * width, x[-1] + 1.5 * width), pore.sized(scene))[0]
 
 
+def halved(lattice: np.ndarray, falling=False) -> np.ndarray:
+    """(2 (m - 1) (n - 1), 3) triangles of a lattice of nodes (m, n), along x and y: squares halved by the diagonal that
+    rises with x, or falls where it is to."""
+    near, far = lattice[:-1], lattice[1:]
+    a, b, c, d = (corner.ravel() for corner in (near[:, :-1], far[:, :-1], far[:, 1:], near[:, 1:]))
+    return np.hstack([np.where(falling, [a, b, d], [a, b, c]), np.where(falling, [b, c, d], [a, c, d])]).T
+
+
 def uncovered(ours: shapely.Polygon, other: shapely.Polygon) -> float:
     """Area that only one of two shapes covers, in percent of ours."""
     return 100 * float(ours.symmetric_difference(other).area / ours.area)
@@ -373,8 +381,3 @@ def upstream_part(first: shapely.Polygon, last: shapely.Polygon) -> float:
     """Share of the area covered at one time and not at an earlier one that lies at x < 0."""
     new = last.difference(first)
     return shapely.clip_by_rect(new, -1e6, -1e6, 0.0, 1e6).area / new.area
-
-
-def mean_change(ours: list[float], other: list[float]) -> float:
-    """By how many percent the geometric mean of other numbers differs from that of ours."""
-    return 100 * float(np.exp(np.mean(np.log(other) - np.log(ours))) - 1)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from math import atan, cbrt, degrees, exp, log, log10
 
 import numpy as np
+from scipy.optimize import brentq
 
 from repro.model import kinetics
 from verification.claims.base_run import upstream_means
@@ -289,12 +290,9 @@ def oxygen_saturation(celsius: float) -> float:
         Water under air of 1 atm holds {saturation} mg/L at 20 C and 10 mg/L at {temperature} C or less.""",
     quick=True)
 def oxygen_supplied() -> dict[str, str]:
-    """Saturation at 20 C, and the temperature of 10 mg/L by bisection."""
-    low, high = 0.0, 20.0
-    while high - low > 1e-6:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if oxygen_saturation(middle) > 10 else (low, middle)
-    return {"saturation": f"{oxygen_saturation(20.0):.2f}", "temperature": f"{low:.1f}"}
+    """Saturation at 20 C, and the temperature of 10 mg/L."""
+    temperature = brentq(lambda celsius: oxygen_saturation(celsius) - 10, 0.0, 20.0)
+    return {"saturation": f"{oxygen_saturation(20.0):.2f}", "temperature": f"{temperature:.1f}"}
 
 
 @erratum(

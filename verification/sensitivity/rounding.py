@@ -41,14 +41,13 @@ from scipy.stats import sobol_indices, uniform
 
 from repro.march import simulation, updates
 from repro.model import kinetics, pore
-from repro.results import M_PER_D, write_json
-from repro.results.files import whole
+from repro.results import M_PER_D
 from repro.scene import Scene, load_scene, needed, scene_hash
 from verification.claims import interval
 from verification.claims.base_run import DISTANCES, END, upstream_means
 from verification.claims.evaluate import MESH_ORDERS
 from verification.claims.levels import converged
-from verification.kernel.writing import load
+from verification.kernel.writing import load, save
 from verification.uncertainty import estimate
 
 
@@ -202,9 +201,7 @@ class Runs:
         if key not in self.known:
             with np.errstate(all="raise", under="ignore"):
                 self.known[key] = {name: float(value) for name, value in OF[said.name](said).items()}
-            self.path.parent.mkdir(exist_ok=True)
-            with whole(self.path) as beside:
-                write_json(beside, self.known)
+            save(self.known, self.path)
         return self.known[key]
 
 
