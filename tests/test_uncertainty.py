@@ -91,11 +91,10 @@ def test_fewer_than_three_sizes_and_no_numbers_are_refused(sizes, values):
         estimate(sizes, values, BOTH)
 
 
-def test_the_bars_of_mesh_and_step_add_up_and_a_value_on_the_edge_is_inside_to_round_off():
+def test_the_bars_of_mesh_and_step_add_up():
     mesh, step = Estimate(0.3, 2.0, OBSERVED), Estimate(0.4, 1.0, OBSERVED)
     both, one = combined(5.0, mesh, step), combined(5.0, mesh, None)
     assert (both.low, both.high, one.high) == pytest.approx((4.3, 5.7, 5.3))
-    assert 5.3 * (1 + 1e-15) in one and 5.3001 not in one
 
 
 def test_a_scene_is_that_of_the_level():

@@ -32,6 +32,7 @@ from repro.model.kinetics import Sink
 from repro.model.pore import Pore, Solved, solve
 from repro.scene import Scene, load_scene
 from verification.claims.levels import CONVERGED, cached, converged, current
+from verification.kernel.case import columns
 
 #: Section 4 and Figure 6.
 BASE, WIDE = ("base",), ("wide",)
@@ -142,7 +143,8 @@ def _solved(said: Scene, state: State) -> Instant:
 @cached
 def series(*run: str) -> dict[str, np.ndarray]:
     """Columns of a run's rows, as in ``timeseries.csv``."""
-    return _columns(history(*run).scene, history(*run).instants)
+    found = history(*run)
+    return columns([results.row(found.scene, each) for each in found.instants])
 
 
 @cached
@@ -151,12 +153,7 @@ def around_contact(*run: str) -> dict[str, np.ndarray]:
     found = history(*run)
     if found.contact is None:
         raise LookupError(f"{run} does not touch the opposite wall")
-    return _columns(found.scene, found.contact)
-
-
-def _columns(said: Scene, instants: tuple[Instant, ...]) -> dict[str, np.ndarray]:
-    found = np.array([[*results.row(said, instant).values()] for instant in instants], float)
-    return dict(zip(results.COLUMNS, found.T))
+    return columns([results.row(found.scene, each) for each in found.contact])
 
 
 @cached
@@ -167,23 +164,24 @@ def ledger(*run: str) -> dict[str, np.ndarray]:
     return dict(zip(results.LEDGER_COLUMNS, steps.T))
 
 
-def row_number(run: tuple[str, ...], time: float) -> int:
-    """Number of a run's row at a time (h). Raises KeyError where there is none."""
-    found = np.flatnonzero(np.abs(series(*run)["time_h"] - time) < 1e-6)
-    if len(found) != 1:
-        raise KeyError(f"{run}: {len(found)} rows at t = {time} h")
-    return int(found[0])
+def biomass_defects(run: tuple[str, ...]) -> np.ndarray:
+    """Relative defect of the biomass in each step of a run."""
+    steps = ledger(*run)
+    before, made, after = (steps[f"biomass_{part}_pg_per_m"] for part in ("before", "made", "after"))
+    return (after - before - made) / after
 
 
 def instant(run: tuple[str, ...], time: float) -> Instant:
-    """The instant of a run's row at a time (h)."""
-    return history(*run).instants[row_number(run, time)]
+    """The instant of a run's row at a time (h). Raises KeyError where there is none."""
+    found = [each for each in history(*run).instants if abs(each.pore.time - time) < 1e-6]
+    if len(found) != 1:
+        raise KeyError(f"{run}: {len(found)} rows at t = {time} h")
+    return found[0]
 
 
 def at(run: tuple[str, ...], time: float) -> dict[str, float]:
     """The row of a run at a time (h). Raises KeyError where there is none."""
-    number = row_number(run, time)
-    return {name: float(column[number]) for name, column in series(*run).items()}
+    return results.row(history(*run).scene, instant(run, time))
 
 
 def nearest(run: tuple[str, ...], time: float) -> float:

@@ -15,7 +15,7 @@ from repro.fem.outline import half_disc as seed
 from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.model import growth, mesh_motion
 from verification.claims.growth_mechanics import sliding, stabilised_by
-from verification.claims.runs import BASE, half_disc, ledger, scene
+from verification.claims.runs import BASE, biomass_defects, half_disc, scene
 from verification.errata import erratum, percent, small, table
 from verification.problems import meshes, pairs
 from verification.problems.bodies import Supported, grown
@@ -259,13 +259,6 @@ def transfers() -> dict[str, str]:
                      percent(whole, 0) if name == "linear" else small(whole - 1)])
     head = ["transfer", "base: worst step", "base: whole run", "chain: worst remesh", "chain: 40 remeshes"]
     return {"table": table(head, rows), "overshoot": f"{100 * (chains['conserving'][1] - 1):.1f} %"}
-
-
-def biomass_defects(run) -> np.ndarray:
-    """Relative defect of the biomass in each step of a run."""
-    steps = ledger(*run)
-    before, made, after = (steps[f"biomass_{part}_pg_per_m"] for part in ("before", "made", "after"))
-    return (after - before - made) / after
 
 
 #: How the field of :func:`chain` goes to the next mesh.
