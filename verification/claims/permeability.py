@@ -9,8 +9,6 @@ not the velocity.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from repro.fem.mesh import Mesh
@@ -53,9 +51,8 @@ def spanning() -> Finding:
     time, share = rows["time_h"], rows["conductivity_m_per_d"] / whole
     contact = float(touching["time_h"][1])
     film, closed = (float(value) / whole for value in touching["conductivity_m_per_d"])
-    course = Course(time, share, contact, film, closed)
     sharp, twice = "falls sharply", "sharper: twice as sharp at least"
-    earlier, through, later = (course.fall(since) for since in (-10, -5, 0))
+    earlier, through, later = (falls(time, share, (film, closed, contact), since) for since in (-10, -5, 0))
     checks = (at_most("K / K_clean at contact", sharp, closed, 0.01, "orders of magnitude: two at least"),
               at_least("fall in the 5 h up to contact (times)", sharp, through, 10, "an order of magnitude"),
               at_least("the same over the fall in the 5 h before", sharp, through / earlier, 2, twice),
@@ -67,30 +64,16 @@ def spanning() -> Finding:
     return Finding(checks, change=change, reason="the fall is not as sharp on every mesh", note=_half_discs)
 
 
-@dataclass(frozen=True, eq=False)
-class Course:
-    """K / K_clean, or what goes with it, (n,) at times (h), and just before and after contact."""
-
-    time: np.ndarray
-    share: np.ndarray
-    contact: float
-    film: float
-    closed: float
-
-    def fall(self, since: float) -> float:
-        """The factor by which it falls in 5 h, from so long after contact (h; before it negative)."""
-        return self._at(since) / self._at(since + 5)
-
-    def _at(self, since: float) -> float:
-        """Geometric between rows, on either side of contact."""
-        if since == 0:
-            return self.closed
-        early = self.time < self.contact
-        chosen, end = (early, self.film) if since < 0 else (~early, self.closed)
-        time = np.append(self.time[chosen], self.contact) - self.contact
-        share = np.append(self.share[chosen], end)
-        order = np.argsort(time)
-        return float(np.exp(np.interp(since, time[order], np.log(share[order]))))
+def falls(time: np.ndarray, share: np.ndarray, touching: tuple[float, float, float], since: float) -> float:
+    """The factor by which K / K_clean, or what goes with it, (n,) at times (h), falls in 5 h, from so long after contact
+    (h; before it negative). touching: it with the last film and at contact, and when that is. Geometric between rows;
+    at contact itself the second of both counts, as NumPy has it of two values in one place."""
+    film, closed, contact = touching
+    early = time < contact
+    hours = np.concatenate([time[early], [contact, contact], time[~early]]) - contact
+    values = np.log(np.concatenate([share[early], [film, closed], share[~early]]))
+    first, last = np.exp(np.interp([since, since + 5], hours, values))
+    return float(first / last)
 
 
 def _half_discs() -> str:
@@ -182,8 +165,8 @@ def decay_share(found: Body) -> float:
 
 def fall() -> float:
     """How many times the conductivity, under constant head the velocity, falls in the 5 h up to contact."""
-    rows, (film, closed, touched) = series(*CLOSING), contact()
-    return Course(rows["time_h"], rows["mean_velocity_m_per_d"], touched, film, closed).fall(-5)
+    rows = series(*CLOSING)
+    return falls(rows["time_h"], rows["mean_velocity_m_per_d"], contact(), -5)
 
 
 def fastest(rows: dict[str, np.ndarray]) -> tuple[float, float]:

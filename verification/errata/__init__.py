@@ -27,11 +27,11 @@ class Erratum:
 
     id: str
     title: str
-    printed: str
-    reading: str
-    consequence: str
     function: Callable[[], dict[str, str]]
-    quick: bool
+    consequence: str
+    printed: str = ""
+    reading: str = ""
+    quick: bool = False
 
     def markdown(self) -> str:
         """The entry, its numbers computed now."""
@@ -44,11 +44,11 @@ class Erratum:
 ERRATA: dict[str, Erratum] = {}
 
 
-def erratum(id: str, title: str, *, consequence: str, printed: str = "", reading: str = "",
-            quick: bool = False):
-    """Register the decorated function () -> {name: number as text} as the measurement of an erratum."""
+def erratum(id: str, title: str, **parts):
+    """Register the decorated function () -> {name: number as text} as the measurement of an erratum; parts: further
+    fields of `Erratum`."""
     def register(function: Callable[[], dict[str, str]]) -> Callable[[], dict[str, str]]:
-        ERRATA[id] = Erratum(id, title, printed, reading, consequence, function, quick)
+        ERRATA[id] = Erratum(id, title, function, **parts)
         return function
     return register
 
