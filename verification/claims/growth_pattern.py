@@ -89,10 +89,11 @@ def asymmetry() -> Finding:
     row, after = at(BASE, END), body(BASE, END)
     before = Body(scene(*BASE), *grown(BASE, PLOTTED))
     rate = growth_rates(before.pore, before.solved)
+    area, grown_area = (found.areas[found.grid.biomass] for found in (before, after))
     theta = (after.pore.theta * after.pore.body.at.dx).sum(axis=1) / after.pore.body.at.dx.sum(axis=1)
     compared = {"extent": (-row["upstream_um"], row["downstream_um"]),
-                "growth rate": mean_rates(before, rate),
-                "expansion since t = 0": [expansion(after, half) for half in sides(after)]}
+                "growth rate": made(before, rate) / halves(before, area),
+                "expansion since t = 0": halves(after, grown_area) / halves(after, after.pore.body.at.dx.sum(axis=1))}
     checks = tuple(at_most(f"{name}, upstream over downstream half (%)", "a few", 100 * abs(up / down - 1), 100 * FEW,
                            FEW_WORDS) for name, (up, down) in compared.items())
     fastest, slowest = (f(rate[before.grid.body]) for f in (max, min))
@@ -102,27 +103,16 @@ def asymmetry() -> Finding:
     return Finding(checks, note=note)
 
 
-def sides(found: Body) -> tuple[np.ndarray, np.ndarray]:
-    """(t,) biomass triangles upstream and downstream of the centre of the seed."""
+def halves(found: Body, values: np.ndarray) -> np.ndarray:
+    """(2,) sums of values (t,) of biomass triangles upstream and downstream of the centre of the seed."""
     x = found.grid.points[found.grid.triangles[found.grid.biomass]].mean(axis=1)[:, 0]
-    return x < 0, x > 0
+    return np.array([values[side].sum() for side in (x < 0, x > 0)])
 
 
-def made(found: Body, rate: np.ndarray) -> list[float]:
-    """Integrals of a rate (N,) over both sides, um2/h."""
-    mean, area = rate[found.grid.triangles[found.grid.biomass]].mean(axis=1), found.areas[found.grid.biomass]
-    return [float(area[half] @ mean[half]) for half in sides(found)]
-
-
-def mean_rates(found: Body, rate: np.ndarray) -> list[float]:
-    """Means of a rate (N,) over both sides."""
-    area = found.areas[found.grid.biomass]
-    return [total / float(area[half].sum()) for total, half in zip(made(found, rate), sides(found))]
-
-
-def expansion(found: Body, half: np.ndarray) -> float:
-    """Area of a side over the area that its material had at t = 0."""
-    return float(found.areas[found.grid.biomass][half].sum() / found.pore.body.at.dx[half].sum())
+def made(found: Body, rate: np.ndarray) -> np.ndarray:
+    """(2,) integrals of a rate (N,) over both sides, um2/h."""
+    grid = found.grid
+    return halves(found, (found.areas * rate[grid.triangles].mean(axis=1))[grid.biomass])
 
 
 @claim("C12", "4, Fig 6", "after the pore is spanned, growth is strongly asymmetric, on the upgradient side only",

@@ -65,9 +65,9 @@ def spanning() -> Finding:
 
 
 def falls(time: np.ndarray, share: np.ndarray, touching: tuple[float, float, float], since: float) -> float:
-    """The factor by which K / K_clean, or what goes with it, (n,) at times (h), falls in 5 h, from so long after contact
-    (h; before it negative). touching: it with the last film and at contact, and when that is. Geometric between rows;
-    at contact itself the second of both counts, as NumPy has it of two values in one place."""
+    """The factor by which K / K_clean, or what goes with it, (n,) at times (h), falls in 5 h, from so long after
+    contact (h; before it negative). touching: it with the last film and at contact, and when that is. Geometric between
+    rows; at contact itself the second of both counts, as NumPy has it of two values in one place."""
     film, closed, contact = touching
     early = time < contact
     hours = np.concatenate([time[early], [contact, contact], time[~early]]) - contact

@@ -82,6 +82,11 @@ def scene(name: str, *changes: str) -> Scene:
     return _with_rows(replace(said, numerics=numerics, growth=growth), always=False)
 
 
+def ending(said: Scene, *times: float) -> Scene:
+    """The scene with rows at some times (h), the last of which is its end."""
+    return replace(said, growth=replace(said.growth, end=times[-1]), output=replace(said.output, times=times))
+
+
 def _with_rows(said: Scene, always: bool) -> Scene:
     """The scene with its rows, where it names none and cannot have one a step."""
     if said.growth is None or said.output.times or not (always or said.name == "wide"):
@@ -128,8 +133,7 @@ def _with_a_film(said: Scene, before: State, contact: State) -> State:
     end = contact.pore.time - FILM
     if current().kind != CONVERGED or end <= before.pore.time:
         return before
-    shorter = replace(said, growth=replace(said.growth, end=end), output=replace(said.output, times=(end,)))
-    *_, (state, _) = simulation.steps(shorter, before)
+    *_, (state, _) = simulation.steps(ending(said, end), before)
     return before if state.pore.contact else state
 
 
