@@ -30,6 +30,7 @@ from verification.claims.runs import (
     UPDATE,
     WIDE,
     Body,
+    Run,
     bodies,
     body,
     body_of,
@@ -287,7 +288,7 @@ def tearing() -> Finding:
     return Finding(tuple(checks), reason="nothing is under tension", note=lambda: f"{note} {_on_another_size(hours)}")
 
 
-def _on_another_size(hours: dict[tuple[str, ...], float]) -> str:
+def _on_another_size(hours: dict[Run, float]) -> str:
     """Where the stress of runs at an hour is the largest, here and on the size of its figure, in words."""
     here = [peak(body(run, hour)).x for run, hour in hours.items()]
     with at_level(Level(CONVERGED, PAIRED[1])):
@@ -297,7 +298,7 @@ def _on_another_size(hours: dict[tuple[str, ...], float]) -> str:
             f"{PAIRED[1]:g} times those of the preset, it is {told}.")
 
 
-def course(run: tuple[str, ...]) -> list[tuple[float, float, float, float]]:
+def course(run: Run) -> list[tuple[float, float, float, float]]:
     """Largest principal stress (MPa), its place (um) and time (h) of every row but that of t = 0."""
     return [tension(found) for found in bodies(run)[1:]]
 

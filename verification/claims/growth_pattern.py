@@ -27,6 +27,7 @@ from verification.claims.runs import (
     WHOLE,
     WIDE,
     Body,
+    Run,
     around_contact,
     at,
     bodies,
@@ -205,7 +206,7 @@ def deviation(found: Body) -> float:
 PARTS = 16
 
 
-def least(run: tuple[str, ...], name: str) -> np.ndarray:
+def least(run: Run, name: str) -> np.ndarray:
     """(rows,) smallest concentration of a substrate in the aggregate over K_s, between nodes too: which node is the
     nearest to the place of the least hangs on the mesh."""
     half = getattr(scene(*run).substrates, name).half_saturation
@@ -327,7 +328,7 @@ def stresses() -> Finding:
     return Finding(tuple(checks), reason=reason)
 
 
-def peaks(run: tuple[str, ...]) -> tuple[float, float, float]:
+def peaks(run: Run) -> tuple[float, float, float]:
     """Largest in-plane shear and equivalent stress over mu_L, and largest in-plane shear stress over mu_L J^(-2/3), in
     all rows of a run."""
     modulus = scene(*run).growth.shear_modulus
@@ -339,7 +340,7 @@ def peaks(run: tuple[str, ...]) -> tuple[float, float, float]:
     return tuple(map(float, np.max(triples, axis=0)))
 
 
-def apart(run: tuple[str, ...], time: float) -> float:
+def apart(run: Run, time: float) -> float:
     """Area that only one of the outlines covers, with new biomass stressed and stress-free, in percent of the area."""
     return uncovered(*(polygon(body((*run, *more), time).outline) for more in ((), (STRESS_FREE,))))
 

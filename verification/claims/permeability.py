@@ -21,6 +21,7 @@ from verification.claims.levels import ABOUT_WIDE, BESIDE_OWN, DEFAULT, PAIRED, 
 from verification.claims.runs import (
     WIDE,
     Body,
+    Columns,
     around_contact,
     bodies,
     flow_in,
@@ -144,12 +145,12 @@ def contact() -> tuple[float, float, float]:
     return float(before), float(after), float(found["time_h"][1])
 
 
-def consumed(rows: dict[str, np.ndarray], supply: float = 10.0) -> np.ndarray:
+def consumed(rows: Columns, supply: float = 10.0) -> np.ndarray:
     """(n,) acceptor taken up per time and width of the pore, m/d mg/L: u_ave (C_supply - C_effluent)."""
     return rows["mean_velocity_m_per_d"] * (supply - rows["effluent_acceptor_mg_per_L"])
 
 
-def specific_growth(rows: dict[str, np.ndarray]) -> np.ndarray:
+def specific_growth(rows: Columns) -> np.ndarray:
     """(n - 1,) mean growth rate (1/h) of the aggregate's area between rows."""
     return np.diff(np.log(rows["aggregate_area_um2"])) / np.diff(rows["time_h"])
 
@@ -169,7 +170,7 @@ def fall() -> float:
     return falls(rows["time_h"], rows["mean_velocity_m_per_d"], contact(), -5)
 
 
-def fastest(rows: dict[str, np.ndarray]) -> tuple[float, float]:
+def fastest(rows: Columns) -> tuple[float, float]:
     """Largest rate of decline of the conductivity (1/h) between rows, and the middle of that time (h)."""
     time, share = rows["time_h"], np.log(rows["conductivity_m_per_d"])
     rates = -np.diff(share) / np.diff(time)
@@ -177,7 +178,7 @@ def fastest(rows: dict[str, np.ndarray]) -> tuple[float, float]:
     return float(rates[worst]), float(0.5 * (time[worst] + time[worst + 1]))
 
 
-def _reason(rows: dict[str, np.ndarray], upgradient: float) -> str:
+def _reason(rows: Columns, upgradient: float) -> str:
     film, closed, touched = contact()
     share = rows["mean_velocity_m_per_d"] / rows["mean_velocity_m_per_d"][0]
     tenth = float(np.interp(-0.1, -share, rows["time_h"]))
@@ -189,7 +190,7 @@ def _reason(rows: dict[str, np.ndarray], upgradient: float) -> str:
             "it, since (9) lets it go on in proportion to m_A as growth does: where the acceptor is used up both stop")
 
 
-def _told(rows: dict[str, np.ndarray]) -> str:
+def _told(rows: Columns) -> str:
     _, closed, touched = contact()
     before, free = rows["time_h"] < touched, series(*AROUND)
     rate, when = fastest({name: column[before] for name, column in rows.items()})

@@ -34,6 +34,9 @@ from repro.scene import Scene, load_scene
 from verification.claims.levels import CONVERGED, cached, converged, current
 from verification.kernel.case import columns
 
+#: A packaged scene and its changes, KEY=VALUE; and columns of rows, by name.
+Run = tuple[str, ...]
+Columns = dict[str, np.ndarray]
 #: Section 4 and Figure 6.
 BASE, WIDE = ("base",), ("wide",)
 #: The shape that the paper plots and the end of its run (h), and a shape update, whatever the level.
@@ -145,14 +148,14 @@ def _solved(said: Scene, state: State) -> Instant:
 
 
 @cached
-def series(*run: str) -> dict[str, np.ndarray]:
+def series(*run: str) -> Columns:
     """Columns of a run's rows, as in ``timeseries.csv``."""
     found = history(*run)
     return columns([results.row(found.scene, each) for each in found.instants])
 
 
 @cached
-def around_contact(*run: str) -> dict[str, np.ndarray]:
+def around_contact(*run: str) -> Columns:
     """The same for the last state before contact and the first after. Raises LookupError where there is none."""
     found = history(*run)
     if found.contact is None:
@@ -161,21 +164,21 @@ def around_contact(*run: str) -> dict[str, np.ndarray]:
 
 
 @cached
-def ledger(*run: str) -> dict[str, np.ndarray]:
+def ledger(*run: str) -> Columns:
     """Columns of ``ledger.csv``, of all steps."""
     found = history(*run)
     steps = np.array([results.ledger_row(found.scene, step) for step in found.ledgers])
     return dict(zip(results.LEDGER_COLUMNS, steps.T))
 
 
-def biomass_defects(run: tuple[str, ...]) -> np.ndarray:
+def biomass_defects(run: Run) -> np.ndarray:
     """Relative defect of the biomass in each step of a run."""
     steps = ledger(*run)
     before, made, after = (steps[f"biomass_{part}_pg_per_m"] for part in ("before", "made", "after"))
     return (after - before - made) / after
 
 
-def instant(run: tuple[str, ...], time: float) -> Instant:
+def instant(run: Run, time: float) -> Instant:
     """The instant of a run's row at a time (h). Raises KeyError where there is none."""
     found = [each for each in history(*run).instants if abs(each.pore.time - time) < 1e-6]
     if len(found) != 1:
@@ -183,26 +186,26 @@ def instant(run: tuple[str, ...], time: float) -> Instant:
     return found[0]
 
 
-def at(run: tuple[str, ...], time: float) -> dict[str, float]:
+def at(run: Run, time: float) -> dict[str, float]:
     """The row of a run at a time (h). Raises KeyError where there is none."""
     return results.row(history(*run).scene, instant(run, time))
 
 
-def nearest(run: tuple[str, ...], time: float) -> float:
+def nearest(run: Run, time: float) -> float:
     """The time (h) of a run's row that is the nearest to a time (h): longer steps need not land on it."""
     hours = series(*run)["time_h"]
     return float(hours[np.abs(hours - time).argmin()])
 
 
 @cached
-def grown(run: tuple[str, ...], time: float) -> tuple[Pore, Solved]:
+def grown(run: Run, time: float) -> tuple[Pore, Solved]:
     """The shape of a run at a time (h) with what grows in it in the next 12 min, and what is solved then: the state
     "before the aggregate expands" [E12]."""
     return _grown(scene(*run), *solved_pore(run, time))
 
 
 @cached
-def grown_anew(run: tuple[str, ...], time: float) -> tuple[Pore, Solved]:
+def grown_anew(run: Run, time: float) -> tuple[Pore, Solved]:
     """The same in a mesh made at that time, whose ends are 1.5 W from the aggregate (3.1) at every level. Those of the
     run's own mesh hang on when that was last made."""
     return _grown(scene(*run), *remeshed(scene(*run), *solved_pore(run, time)))
@@ -265,13 +268,13 @@ def body_of(said: Scene, found: Instant) -> Body:
 
 
 @cached
-def body(run: tuple[str, ...], time: float) -> Body:
+def body(run: Run, time: float) -> Body:
     """The aggregate of a run in its row at a time (h). Raises KeyError where there is none."""
     return body_of(scene(*run), instant(run, time))
 
 
 @cached
-def bodies(run: tuple[str, ...]) -> tuple[Body, ...]:
+def bodies(run: Run) -> tuple[Body, ...]:
     """The aggregate in every row of a run."""
     found = history(*run)
     return tuple(body_of(found.scene, each) for each in found.instants)
@@ -291,7 +294,7 @@ def interface_length(found: Body) -> float:
     return float(outline.edge_lengths()[outline.interface_edges()].sum())
 
 
-def solved_pore(run: tuple[str, ...], time: float) -> tuple[Pore, Solved]:
+def solved_pore(run: Run, time: float) -> tuple[Pore, Solved]:
     """The pore of a run at a time (h) and what is solved in it."""
     found = instant(run, time)
     return found.pore, found.solved

@@ -18,6 +18,8 @@ from verification.kernel import writing
 from verification.switches import PLOTTED
 
 SUPPLY = 10.0
+#: Those of an entry, as they are printed, by name.
+Numbers = dict[str, str]
 
 
 @dataclass(frozen=True)
@@ -27,7 +29,7 @@ class Erratum:
 
     id: str
     title: str
-    function: Callable[[], dict[str, str]]
+    function: Callable[[], Numbers]
     consequence: str
     printed: str = ""
     reading: str = ""
@@ -47,7 +49,7 @@ ERRATA: dict[str, Erratum] = {}
 def erratum(id: str, title: str, **parts):
     """Register the decorated function () -> {name: number as text} as the measurement of an erratum; parts: further
     fields of `Erratum`."""
-    def register(function: Callable[[], dict[str, str]]) -> Callable[[], dict[str, str]]:
+    def register(function: Callable[[], Numbers]) -> Callable[[], Numbers]:
         ERRATA[id] = Erratum(id, title, function, **parts)
         return function
     return register

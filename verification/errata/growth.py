@@ -16,7 +16,7 @@ from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.model import growth, mesh_motion
 from verification.claims.growth_mechanics import sliding, stabilised_by
 from verification.claims.runs import BASE, biomass_defects, half_disc, scene
-from verification.errata import erratum, percent, small, table
+from verification.errata import Numbers, erratum, percent, small, table
 from verification.problems import meshes, pairs
 from verification.problems.bodies import Supported, grown
 from verification.switches import CHOICES
@@ -91,7 +91,7 @@ def cylinder(rings: int, inner: float, more: float) -> Cylinder:
         no term at all the pressure of this smooth case comes out too, if less well, from a matrix whose
         condition is hundreds of times worse.""",
     quick=True)
-def stabilisation_sign() -> dict[str, str]:
+def stabilisation_sign() -> Numbers:
     """Inertia, condition and error with the stabilisation subtracted, left out, and added."""
     rows = [[name, *first_step(cylinder(rings, 1 + 0.75e-4, 0.5e-4), sign)]
             for name, sign in (("subtracted (ours)", 1.0), ("none", 0.0), ("added (printed)", -1.0))
@@ -131,7 +131,7 @@ def first_step(case: Cylinder, sign: float) -> list[str]:
         2000 is the pressure without stabilisation. Ours has the same error at both. Places are right to
         {places} of the radius on all meshes in all cases: the choice matters for stresses alone.""",
     quick=True)
-def stabilisation_scale() -> dict[str, str]:
+def stabilisation_scale() -> Numbers:
     """Errors of pressure and places at theta = 36 and 2000 for four stabilisations."""
     rows, places = [], 0.0
     for mean in (36, 2000):
@@ -185,7 +185,7 @@ def equilibrium_errors(case: Cylinder, stabilising: np.ndarray) -> tuple[float, 
         are read. It is largest at theta = 2.5, {kilopascal} kPa with Table 1's mu_L = 0.01 MPa, and fades as
         the body grows.""",
     quick=True)
-def uniform_growth() -> dict[str, str]:
+def uniform_growth() -> Numbers:
     """Pressure, out-of-plane stress and radius of a half-disc grown by theta, against the closed form."""
     rows, body = [], half_disc_body(10)
     for theta in (2.0, 36.0, 2000.0):
@@ -213,7 +213,7 @@ def uniform_growth() -> dict[str, str]:
         For large kappa it is -mu_L theta^(1/3) / (3 kappa): the error grows although the pressure falls (E11),
         and where kappa is small the body does not grow at all (no J between theta / 2 and theta).""",
     quick=True)
-def penalty() -> dict[str, str]:
+def penalty() -> Numbers:
     """Volume error of uniform free growth under (19), from dPsi/dJ = 0."""
     rows = []
     for ratio in (10.0, 100.0, 1e4):
@@ -248,7 +248,7 @@ LINEAR = CHOICES["linear transfer"].run
         l), l = 6 um, in a half-disc of R = 30 um through 40 unrelated meshes of the default size: interpolation
         on chords always errs upwards in a convex field. The projection keeps the mass, but is not bounded by
         the old values: it overshoots the largest by {overshoot} at its worst.""")
-def transfers() -> dict[str, str]:
+def transfers() -> Numbers:
     """Mass defects in base and in a chain of remeshes."""
     chains = {"linear": chain("linear"), "conserving": chain("conserving")}
     rows = []
@@ -302,7 +302,7 @@ def chain(how: str, radius: float = 30.0, decay: float = 6.0, count: int = 40) -
 
         Most values of gamma get by with the printed sign; near a resonance it throws the mesh about.""",
     quick=True)
-def compressibility_sign() -> dict[str, str]:
+def compressibility_sign() -> Numbers:
     """Mesh motion with both signs of gamma."""
     grid = half_disc(scene("initial_mesh"), 10.0, 75.0)
     body, rows = 1.1 * grid.points[grid.body], []
