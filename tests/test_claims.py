@@ -139,19 +139,21 @@ def test_an_unknown_id_is_refused(registry, capsys):
     assert driver.main(["C99"]) == 2 and "there is no C99; C01 to" in capsys.readouterr().err
 
 
-def test_the_record_stays_where_numbers_agree_and_is_written_where_asked(registry, monkeypatch, tmp_path, capsys):
+def test_the_record_stays_where_numbers_agree_and_is_written_where_asked(registry, monkeypatch, capsys):
     """A number out of its recorded interval and another verdict are told, and the exit status is 1."""
     for id in EXPECTED:
         registered(id, lambda: Finding((GOOD, claims.at_least("a", "|b|", 2, 1, ""))))
     monkeypatch.setattr(base_run, "LEVELS", ())
     monkeypatch.setattr(base_run, "independence", lambda found: ())
-    monkeypatch.setattr(driver, "OUT", tmp_path / "out")
     assert driver.main([]) == 1 and "C01: not in the record" in capsys.readouterr().out
     assert driver.main(["--record"]) == 0
     kept = report.COMMITTED.read_bytes()
     assert driver.main([]) == 0 and report.COMMITTED.read_bytes() == kept
-    content = json.loads((tmp_path / "out" / "claims.json").read_text(encoding="utf-8"))
-    assert content == json.loads(kept) and [row["id"] for row in content] == list(EXPECTED)
+    told = capsys.readouterr().out
+    assert f"{len(EXPECTED)} claims as recorded in claims.json" in told
+    assert f"{GOOD.quantity}: paper {GOOD.paper}; ours 2.91; numerics 2.91; " in told and f"{HOLDS}\n" in told
+    content = json.loads(kept)
+    assert [row["id"] for row in content] == list(EXPECTED)
     near, bound = content[0]["checks"]
     assert bound["tolerance"]["high"] is None and bound["paper_low"] is None and near["paper_low"] == 2.85
     assert near["low"] == near["high"] == 2.91 and near["scheme_2001"] == [2.91, 2.91]

@@ -25,7 +25,7 @@ from repro.results import row
 from repro.scene import Scene
 from verification.claims import runs
 from verification.claims.levels import CONVERGED, FINE, Level, at_level, cached, forget
-from verification.claims.runs import BASE, LAST, PLOTTED, UPDATE
+from verification.claims.runs import BASE, LAST, PLOTTED, UPDATE, Columns, Run
 from verification.kernel import case
 from verification.problems import aggregates
 
@@ -44,7 +44,7 @@ class Switch:
     meshes: bool = True
 
     @property
-    def run(self) -> tuple[str, ...]:
+    def run(self) -> Run:
         """Base with the change, of which the rows of t = 0 and of the last two shapes are kept."""
         return (*BASE, self.change, LAST)
 
@@ -106,7 +106,7 @@ class State:
         return {**_flow_quantities(self.solved), **_shape(self.pore.outline)}
 
 
-def state(run: tuple[str, ...], time: float = PLOTTED) -> State:
+def state(run: Run, time: float = PLOTTED) -> State:
     """That of a run's row at a time (h)."""
     instant = runs.instant(run, time)
     return State(runs.history(*run).scene, instant.pore, instant.solved)
@@ -184,20 +184,20 @@ def one_state(found: State, changed: Scene) -> dict[str, float]:
     return effect(found.scene, *rows)
 
 
-def columns(run: tuple[str, ...]) -> dict[str, np.ndarray]:
+def columns(run: Run) -> Columns:
     """Of a run's rows: "time" h, "velocity" m/d, "area" um2, "drift", largest |(X_A + X_I) / X_m - 1|, and "lean", the
     middle between the tips over half their distance."""
     return _told(runs.series(*run))
 
 
-def _told(rows: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+def _told(rows: Columns) -> Columns:
     upstream, downstream = rows["upstream_um"], rows["downstream_um"]
     return {"time": rows["time_h"], "velocity": rows["mean_velocity_m_per_d"], "area": rows["aggregate_area_um2"],
             "drift": np.maximum(1 - rows["biomass_density_min"], rows["biomass_density_max"] - 1),
             "lean": (upstream + downstream) / (downstream - upstream)}
 
 
-def near(found: dict[str, np.ndarray], name: str, times) -> np.ndarray:
+def near(found: Columns, name: str, times) -> np.ndarray:
     """A column at times (h)."""
     return found[name][np.abs(found["time"] - np.asarray(times)[..., None]).argmin(axis=-1)]
 
@@ -211,12 +211,12 @@ class Course:
     each update; plotted: the state at 19.2 h, or the last before."""
 
     seconds: float
-    columns: dict[str, np.ndarray]
+    columns: Columns
     plotted: State
 
 
 @cached
-def course(run: tuple[str, ...], step: Step, seeded: Callable[[Scene], Pore] = pore.seeded) -> Course:
+def course(run: Run, step: Step, seeded: Callable[[Scene], Pore] = pore.seeded) -> Course:
     """March a run's scene from a seed by ``step(said, now, solved, hours)`` -> pore, in the paper's updates."""
     said = runs.scene(*run)
     rows = []

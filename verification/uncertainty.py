@@ -65,11 +65,6 @@ class Bar:
     mesh: Estimate | None = None
     step: Estimate | None = None
 
-    def __contains__(self, value: float) -> bool:
-        """Is a value in the bar, to round-off?"""
-        near = SAME * max(abs(self.low), abs(self.high))
-        return self.low - near <= value <= self.high + near
-
 
 def estimate(sizes, values, formal: tuple[float, float]) -> Estimate:
     """The bar of the first of the values (k,) on sizes (k,), in any unit; formal: lowest and highest formal order.

@@ -31,9 +31,9 @@ from math import inf, isnan
 
 from verification import sensitivity
 from verification.claims.levels import (
+    ALONE,
     BESIDE,
     CONVERGED,
-    DEFAULT,
     FINE,
     SCHEME,
     SIZES,
@@ -230,19 +230,30 @@ class Claim:
         return f"python -m verification.claims {self.id}"
 
     @property
-    def judged(self) -> Level:
-        """The level whose number is the claim's."""
-        return Level(CONVERGED, self.fine[0]) if self.about == MODEL else DEFAULT
+    def meshes(self) -> dict[float, Level]:
+        """By size of their elements the levels that its bars come from."""
+        sizes = {MODEL: self.fine, OF_SCHEME: self.sizes, CLOSED: ALONE}[self.about]
+        return {size: Level(CONVERGED if self.about == MODEL else SCHEME, size) for size in sizes}
+
+    @property
+    def stepped(self) -> dict[float, Level]:
+        """The same by steps, of a claim about the scheme."""
+        return {step: Level(step=step) for step in self.steps if self.about == OF_SCHEME}
+
+    @property
+    def own(self) -> tuple[Level, ...]:
+        """Both, the one whose number is the claim's first."""
+        return tuple(dict.fromkeys((*self.meshes.values(), *self.stepped.values())))
 
     @property
     def levels(self) -> tuple[Level, ...]:
-        """All levels, the judged one first."""
-        if self.about == CLOSED:
-            return (DEFAULT,)
-        if self.about == OF_SCHEME:
-            more = [Level(SCHEME, size) for size in self.sizes] + [Level(SCHEME, step=step) for step in self.steps]
-            return tuple(dict.fromkeys((DEFAULT, *more)))
-        return (*(Level(CONVERGED, size) for size in self.fine), *(Level(SCHEME, size) for size in self.beside))
+        """All levels: beside a claim about the model are those of the scheme."""
+        return (*self.own, *(Level(size=size) for size in self.beside if self.about == MODEL))
+
+    @property
+    def judged(self) -> Level:
+        """The level whose number is the claim's."""
+        return self.own[0]
 
 
 CLAIMS: dict[str, Claim] = {}

@@ -1,8 +1,7 @@
 """`python -m verification.claims [--record] [C07 C09 ...]`: judge the paper's claims, all of them by default.
 
-All of them are also written to `verification/claims/out/`, and compared with the committed `claims.json`: where every
-number lies in its recorded interval and every verdict is the same, that file stays as it is. `--record` writes it anew,
-or of it the claims that are named.
+They are compared with the committed `claims.json`: where every number lies in its recorded interval and every verdict
+is the same, that file stays as it is. `--record` writes it anew, or of it the claims that are named.
 The exit status is 0 when every claim has a verdict, whatever it is, and agrees with the record; 1 when not; 2 for an
 unknown claim.
 """
@@ -11,15 +10,13 @@ from __future__ import annotations
 
 import argparse
 import sys
-from pathlib import Path
 
-from repro.results import write_json, write_text
+from repro.results import write_json
 from verification.claims import CLAIMS, EXPECTED, ClaimError, base_run, evaluate, report
 from verification.claims.evaluate import Found, barred
 from verification.claims.levels import Level
 from verification.claims.report import Row
 
-OUT = Path(__file__).parent / "out"
 NO_VERDICT = "no verdict"
 
 
@@ -36,33 +33,19 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"claims: there is no {', '.join(unknown)}; {known}", file=sys.stderr)
         return 2
     rows, independence = judged(tuple(chosen.ids) or EXPECTED)
-    print(report.legend())
-    print("\n".join(map(report.terminal, rows)))
+    print("\n".join([report.LEGEND, *map(report.terminal, rows)]))
     settled = all(row.verdict != NO_VERDICT for row in rows)
     if not chosen.ids:
-        settled = written(rows, independence) and settled
+        checks = base_run.independence(independence)
+        print(report.terminal_independence(checks))
+        settled = settled and all(check.holds for check in checks)
     print(report.summary(rows))
     return 0 if recorded(rows, chosen.record) and settled else 1
 
 
-def written(rows: list[Row], found: dict[Level, list[float]]) -> bool:
-    """Write all claims, with the independence of base in the paper's scheme; is that independent?"""
-    checks = base_run.independence(found)
-    print(report.terminal_independence(checks))
-    OUT.mkdir(exist_ok=True)
-    write_text(OUT / "claims.md", report.markdown(rows, checks))
-    write_json(OUT / "claims.json", entries(rows))
-    return all(check.holds for check in checks)
-
-
-def entries(rows: list[Row]) -> list[dict]:
-    """The rows with a verdict as plain values."""
-    return [report.entry(row) for row in rows if row.verdict != NO_VERDICT]
-
-
 def recorded(rows: list[Row], anew: bool) -> bool:
     """Do the rows agree with the committed record? Differences are told."""
-    ours = entries(rows)
+    ours = [report.entry(row) for row in rows if row.verdict != NO_VERDICT]
     if anew:
         write_json(report.COMMITTED, report.replaced(ours))
         print(f"{report.COMMITTED.name}: written")

@@ -1,19 +1,18 @@
 """How well the claims' numbers of base, and those after contact, are known:
 `python -m verification.claims.after_contact`.
 
-Lists every number of the committed record about wide after its contact with the opposite wall, with half the width of
-its bar over its value, its values on the three sizes and the observed order, the widest bar first. Asked are 1 % of
-conductivities and tips and 2 % of lengths of contact, which `verification.sensitivity.wide` measures. Known
-less well are the conductivity of the very first shape in contact, which closes by whole edges of the outline, and what
-is made of it, and ratios of peaks: a peak sits beside the ends of the contact surface, where stresses have no limit. A
-change of nearly nothing has a bar larger than itself.
+Of every number of the committed record about wide after its contact with the opposite wall, half the width of its bar
+over its value, the widest bar first. Asked are 1 % of conductivities and tips and 2 % of lengths of contact, which
+`verification.sensitivity.wide` measures. Known less well are the conductivity of the very first shape in contact, which
+closes by whole edges of the outline, and what is made of it, and ratios of peaks: a peak sits beside the ends of the
+contact surface, where stresses have no limit. A change of nearly nothing has a bar larger than itself.
 
 So it is with the numbers of base whose bars exceed the 0.2 % that are asked of its velocities, effluents, uptake and
-concentrations, which keep them: they are listed too, with the reason of their kind.
+concentrations, which keep them. The replication note tells both lists, the second with the reason of their kind.
 
-Then wide is run with the preset `exact`: how far it is from the finest of the recorded sizes, of which the bars are
-told with the values of all, and whether conductivities and tips are shown to be within 0.5 % in 60 s of processor time:
-distance and bar together.
+The program runs wide with the preset `exact`: how far it is from the finest of the recorded sizes, of which the bars
+are told with the values of all, and whether conductivities and tips are shown to be within 0.5 % in 60 s of processor
+time: distance and bar together.
 """
 
 from __future__ import annotations
@@ -21,11 +20,12 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import inf
 
 from verification import sensitivity
-from verification.claims import CLAIMS, MODEL, evaluate, report
+from verification.claims import CLAIMS, MODEL, evaluate
+from verification.claims.runs import ending
 from verification.sensitivity import wide
 from verification.sensitivity.rounding import scene
 
@@ -53,21 +53,11 @@ EXACT, SECONDS = 0.5, 60.0
 
 @dataclass(frozen=True)
 class Known:
-    """id: of the claim; quantity: of the check; percent: half the width of its bar over its value; on_sizes: its
-    values, the judged one first; order: observed on them, None where none fits."""
+    """id: of the claim; quantity: of the check; percent: half the width of its bar over its value."""
 
     id: str
     quantity: str
     percent: float
-    on_sizes: tuple[float, ...] = ()
-    order: float | None = None
-
-    @property
-    def told(self) -> str:
-        """In words."""
-        values = ", ".join(f"{each:.4g}" for each in self.on_sizes)
-        observed = "no order" if self.order is None else f"order {self.order:.1f}"
-        return f"{self.percent:8.2g} %  {self.id}  {self.quantity}" + (f": {values}, {observed}" if values else "")
 
 
 def known(entries: list[dict]) -> list[Known]:
@@ -85,7 +75,7 @@ def of_base(entries: list[dict]) -> list[Known]:
 
 
 def _known(entries: list[dict], chosen: Callable[[dict, str], bool]) -> list[Known]:
-    found = [Known(entry["id"], check["quantity"], percent(check), tuple(check.get("on_sizes", ())), check.get("order"))
+    found = [Known(entry["id"], check["quantity"], percent(check))
              for entry in entries for check in entry["checks"] if chosen(entry, check["quantity"])]
     return sorted(found, key=lambda each: -each.percent)
 
@@ -111,9 +101,9 @@ def percent(check: dict) -> float:
 
 def exact() -> tuple[dict[str, float], float]:
     """What `verification.sensitivity.wide` measures, with the preset `exact`, and seconds that it takes."""
-    said = scene("wide", {}, 'numerics.preset="exact"')
+    said = ending(scene("wide", {}, 'numerics.preset="exact"'), *wide.HOURS)
     before = time.process_time()
-    found = wide.of_after(replace(said, output=replace(said.output, times=wide.HOURS)))
+    found = wide.of_after(said)
     return found, time.process_time() - before
 
 
@@ -127,14 +117,7 @@ def distance(row: dict, value: float) -> str:
 
 
 def main() -> None:
-    """Print the list, and the distance of `exact`."""
-    found = known(report.read())
-    for each in found:
-        print(each.told)
-    over = sum(each.percent > WIDE_BAR for each in found)
-    print(f"{over} of {len(found)} bars exceed {WIDE_BAR:g} %")
-    for why, those in wide_bars_of_base(report.read()).items():
-        print(f"of base over {BASE_BAR:g} %, {why}:", *(each.told for each in those), sep="\n")
+    """Print the distance of `exact`."""
     sizes = ", ".join(f"{size:.3g}" for size in wide.SIZES)
     print(f"wide at {wide.HOURS[0]:g} to {wide.HOURS[-1]:g} h on sizes {sizes}:")
     ours, seconds = exact()

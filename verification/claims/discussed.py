@@ -41,6 +41,7 @@ from verification.claims.runs import (
     Body,
     bodies,
     full_biomass,
+    halved,
     interface_length,
     scene,
     series,
@@ -258,9 +259,7 @@ def layered(said: Scene, part: float, walls: int) -> Mesh:
     y = evenly((0.0, height, width) if walls == 1 else (0.0, height, width - height, width), size)
     x = evenly((-end, MARGIN - end, end - MARGIN, end), size)
     points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
-    number = np.arange(len(points)).reshape(len(x), len(y))
-    a, b, c, d = (corner.ravel() for corner in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
-    cells = np.hstack([[a, b, c], [a, c, d]]).T
+    cells = halved(np.arange(len(points)).reshape(len(x), len(y)))
     middle_x, middle_y = points[cells].mean(axis=1).T
     biomass = (np.abs(middle_x) < end - MARGIN) & ((middle_y < height) | (middle_y > width - (walls - 1) * height))
     grid = unlocked(Mesh.of(points, cells, biomass, np.empty(0, int), width, (-end, end)))

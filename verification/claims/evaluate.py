@@ -23,8 +23,8 @@ from types import ModuleType
 import numpy as np
 
 import verification.claims as package
-from verification.claims import CLAIMS, CLOSED, MODEL, OF_SCHEME, Claim, ClaimError, Finding, PaperCheck
-from verification.claims.levels import CONVERGED, SCHEME, Level, at_level, forget
+from verification.claims import CLAIMS, MODEL, Claim, ClaimError, Finding, PaperCheck
+from verification.claims.levels import Level, at_level, forget
 from verification.uncertainty import Bar, Estimate, combined, estimate, spread
 
 MESH_ORDERS, STEP_ORDERS = (1.0, 2.0), (1.0, 1.0)
@@ -63,34 +63,25 @@ def _judgeable(claim: Claim, check: PaperCheck, found: dict[Level, tuple[str, fl
     """The check with its bar, from its value and whether it holds at each level, which is added to a width of its own,
     that of the mesh around a place."""
     values = {level: value for level, (_, value, _) in found.items()}
-    of_kind = [level for level in found if claim.about != MODEL or level.kind == CONVERGED]
-    scheme = [values[level] for level in values if level.kind == SCHEME]
-    if claim.about == MODEL:
-        check = replace(check, scheme=(min(scheme), max(scheme)) if scheme else None,
-                        on_sizes=tuple(values[level] for level in of_kind))
+    own = [values[level] for level in claim.own]
+    beside = [value for level, value in values.items() if level not in claim.own]
+    held: tuple[bool, ...] = ()
     if check.converges:
-        bar, held = _bar(claim, check.value, values), ()
+        bar = combined(check.value, _estimate(claim.meshes, values, MESH_ORDERS),
+                       _estimate(claim.stepped, values, STEP_ORDERS))
     else:
-        bar, held = spread([values[level] for level in of_kind]), tuple(found[level][2] for level in of_kind)
-    own = check.bar or Bar(check.value, check.value)
-    bar = replace(bar, low=bar.low - check.value + own.low, high=bar.high - check.value + own.high)
-    return replace(check, bar=bar, held=held, date=check.date or claim.date)
+        bar = spread(own)
+        held = tuple(found[level][-1] for level in claim.own)
+    width = check.bar or Bar(check.value, check.value)
+    bar = replace(bar, low=bar.low - check.value + width.low, high=bar.high - check.value + width.high)
+    return replace(check, bar=bar, held=held, date=check.date or claim.date,
+                   scheme=(min(beside), max(beside)) if beside else None,
+                   on_sizes=tuple(own) if claim.about == MODEL else ())
 
 
-def _bar(claim: Claim, value: float, values: dict[Level, float]) -> Bar:
-    if claim.about == CLOSED:
-        return Bar(value, value, Estimate(0.0, float("nan"), 0.0), None)
-    if claim.about == OF_SCHEME:
-        mesh = _estimate(claim.sizes, [values[Level(SCHEME, size)] for size in claim.sizes], MESH_ORDERS)
-        step = _estimate(claim.steps, [values[Level(SCHEME, step=step)] for step in claim.steps], STEP_ORDERS)
-        return combined(value, mesh, step)
-    return combined(value, _estimate(claim.fine, [values[Level(CONVERGED, size)] for size in claim.fine], MESH_ORDERS),
-                    None)
-
-
-def _estimate(sizes: tuple[float, ...], values: list[float], formal: tuple[float, float]) -> Estimate | None:
-    """None where the size is not varied."""
-    return estimate(sizes, values, formal) if len(sizes) > 1 else None
+def _estimate(varied: dict[float, Level], values: dict[Level, float], formal: tuple[float, float]) -> Estimate | None:
+    """From the levels of some sizes; None where the size is not varied."""
+    return estimate([*varied], [values[level] for level in varied.values()], formal) if len(varied) > 1 else None
 
 
 #: Of a claim at one level: its numbers, with its finding where the level is the judged one, or the error in words.

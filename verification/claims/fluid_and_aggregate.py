@@ -30,6 +30,7 @@ from verification.claims.runs import (
     UPDATE,
     WIDE,
     Body,
+    Run,
     bodies,
     body,
     body_of,
@@ -145,11 +146,9 @@ def interface(found: Body) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     beyond it."""
     loop, chosen = found.grid.straight.loop, found.outline.corners.interface_edges()
     first, last = loop[chosen], np.roll(loop, -1)[chosen]
-    beyond = {}
-    for triangle in found.grid.triangles[~found.grid.biomass]:
-        a, b, c = map(int, triangle)
-        beyond |= {(a, b): triangle, (b, c): triangle, (c, a): triangle}
-    return first, last, np.array([beyond[int(b), int(a)] for a, b in zip(first, last)])
+    fluid = found.grid.triangles[~found.grid.biomass]
+    sides = sp.csr_array((np.arange(fluid.size), (fluid.ravel(), np.roll(fluid, -1, axis=1).ravel())))
+    return first, last, fluid[sides[last, first] // 3]
 
 
 @claim("C35", "Fig 5", "the fluid flows around the aggregate, through it once it spans the pore", **ABOUT_WIDE)
@@ -289,7 +288,7 @@ def tearing() -> Finding:
     return Finding(tuple(checks), reason="nothing is under tension", note=lambda: f"{note} {_on_another_size(hours)}")
 
 
-def _on_another_size(hours: dict[tuple[str, ...], float]) -> str:
+def _on_another_size(hours: dict[Run, float]) -> str:
     """Where the stress of runs at an hour is the largest, here and on the size of its figure, in words."""
     here = [peak(body(run, hour)).x for run, hour in hours.items()]
     with at_level(Level(CONVERGED, PAIRED[1])):
@@ -299,7 +298,7 @@ def _on_another_size(hours: dict[tuple[str, ...], float]) -> str:
             f"{PAIRED[1]:g} times those of the preset, it is {told}.")
 
 
-def course(run: tuple[str, ...]) -> list[tuple[float, float, float, float]]:
+def course(run: Run) -> list[tuple[float, float, float, float]]:
     """Largest principal stress (MPa), its place (um) and time (h) of every row but that of t = 0."""
     return [tension(found) for found in bodies(run)[1:]]
 

@@ -23,6 +23,7 @@ from verification.claims import CLOSED, OF_SCHEME, Finding, at_least, at_most, b
 from verification.claims.levels import ABOUT_WIDE, ALONE, BESIDE, cached, current
 from verification.claims.runs import WIDE, bodies, series
 from verification.problems.bodies import Supported
+from verification.problems.pairs import upright
 
 RADIUS = 5.0
 
@@ -50,10 +51,7 @@ def regular_half_disc(parts: int) -> Supported:
     grid = MeshTri.init_tensor(np.linspace(-1, 1, 2 * parts + 1), np.linspace(0, 1, parts + 1))
     x, y = grid.p
     points = RADIUS * np.column_stack([x * np.sqrt(1 - y**2 / 2), y * np.sqrt(1 - x**2 / 2)])
-    triangles = grid.t.T.copy()
-    turned = triangle_areas(points, triangles) < 0
-    triangles[turned] = triangles[turned][:, ::-1]
-    return sliding(points, triangles)
+    return sliding(*upright(points, grid.t.T))
 
 
 def sliding(points: np.ndarray, triangles: np.ndarray) -> Supported:

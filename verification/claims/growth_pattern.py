@@ -18,6 +18,7 @@ from repro.model import biomass
 from repro.model.pore import Pore, Solved
 from verification.claims import FEW, FEW_WORDS, LATER, Finding, at_least, at_most, between, claim, without_limit
 from verification.claims.levels import ABOUT_WIDE, BESIDE_OWN, COMPARED, TOLD, at_level
+from verification.claims.rheology import STRESS_FREE, conductivity_change
 from verification.claims.runs import (
     BASE,
     END,
@@ -26,6 +27,7 @@ from verification.claims.runs import (
     WHOLE,
     WIDE,
     Body,
+    Run,
     around_contact,
     at,
     bodies,
@@ -33,7 +35,6 @@ from verification.claims.runs import (
     equivalent,
     grown,
     in_plane,
-    mean_change,
     polygon,
     scene,
     series,
@@ -89,10 +90,11 @@ def asymmetry() -> Finding:
     row, after = at(BASE, END), body(BASE, END)
     before = Body(scene(*BASE), *grown(BASE, PLOTTED))
     rate = growth_rates(before.pore, before.solved)
+    area, grown_area = (found.areas[found.grid.biomass] for found in (before, after))
     theta = (after.pore.theta * after.pore.body.at.dx).sum(axis=1) / after.pore.body.at.dx.sum(axis=1)
     compared = {"extent": (-row["upstream_um"], row["downstream_um"]),
-                "growth rate": mean_rates(before, rate),
-                "expansion since t = 0": [expansion(after, half) for half in sides(after)]}
+                "growth rate": made(before, rate) / halves(before, area),
+                "expansion since t = 0": halves(after, grown_area) / halves(after, after.pore.body.at.dx.sum(axis=1))}
     checks = tuple(at_most(f"{name}, upstream over downstream half (%)", "a few", 100 * abs(up / down - 1), 100 * FEW,
                            FEW_WORDS) for name, (up, down) in compared.items())
     fastest, slowest = (f(rate[before.grid.body]) for f in (max, min))
@@ -102,27 +104,16 @@ def asymmetry() -> Finding:
     return Finding(checks, note=note)
 
 
-def sides(found: Body) -> tuple[np.ndarray, np.ndarray]:
-    """(t,) biomass triangles upstream and downstream of the centre of the seed."""
+def halves(found: Body, values: np.ndarray) -> np.ndarray:
+    """(2,) sums of values (t,) of biomass triangles upstream and downstream of the centre of the seed."""
     x = found.grid.points[found.grid.triangles[found.grid.biomass]].mean(axis=1)[:, 0]
-    return x < 0, x > 0
+    return np.array([values[side].sum() for side in (x < 0, x > 0)])
 
 
-def made(found: Body, rate: np.ndarray) -> list[float]:
-    """Integrals of a rate (N,) over both sides, um2/h."""
-    mean, area = rate[found.grid.triangles[found.grid.biomass]].mean(axis=1), found.areas[found.grid.biomass]
-    return [float(area[half] @ mean[half]) for half in sides(found)]
-
-
-def mean_rates(found: Body, rate: np.ndarray) -> list[float]:
-    """Means of a rate (N,) over both sides."""
-    area = found.areas[found.grid.biomass]
-    return [total / float(area[half].sum()) for total, half in zip(made(found, rate), sides(found))]
-
-
-def expansion(found: Body, half: np.ndarray) -> float:
-    """Area of a side over the area that its material had at t = 0."""
-    return float(found.areas[found.grid.biomass][half].sum() / found.pore.body.at.dx[half].sum())
+def made(found: Body, rate: np.ndarray) -> np.ndarray:
+    """(2,) integrals of a rate (N,) over both sides, um2/h."""
+    grid = found.grid
+    return halves(found, (found.areas * rate[grid.triangles].mean(axis=1))[grid.biomass])
 
 
 @claim("C12", "4, Fig 6", "after the pore is spanned, growth is strongly asymmetric, on the upgradient side only",
@@ -215,7 +206,7 @@ def deviation(found: Body) -> float:
 PARTS = 16
 
 
-def least(run: tuple[str, ...], name: str) -> np.ndarray:
+def least(run: Run, name: str) -> np.ndarray:
     """(rows,) smallest concentration of a substrate in the aggregate over K_s, between nodes too: which node is the
     nearest to the place of the least hangs on the mesh."""
     half = getattr(scene(*run).substrates, name).half_saturation
@@ -306,10 +297,6 @@ def evenness(found: Body) -> float:
     return float(rate.min() / rate.max())
 
 
-#: New biomass born without stress.
-STRESS_FREE = 'growth.new_biomass="stress_free"'
-
-
 @claim("C32", "5", "minor deformation stresses, so that how new biomass is born hardly matters", fine=COMPARED,
        beside=BESIDE_OWN)
 def stresses() -> Finding:
@@ -329,8 +316,8 @@ def stresses() -> Finding:
         label = f"{run[0]}, {when}, born stress-free"
         checks += [at_most(f"{label}: outlines apart (% of the area)", "not affected",
                            float(np.mean([apart(run, time) for time in times])), 100 * FEW, FEW_WORDS),
-                   between(f"{label}: change of the conductivity (%)", "not affected", conductivity_change(run, times),
-                           -100 * FEW, 100 * FEW, FEW_WORDS)]
+                   between(f"{label}: change of the conductivity (%)", "not affected",
+                           conductivity_change((*run, STRESS_FREE), times, run), -100 * FEW, 100 * FEW, FEW_WORDS)]
     uniform = 2.5 ** (-5 / 3) * (2.5 - 1)
     reason = ("it hangs on the modulus: in the plane the stress is minor against mu_L, that of t = 0, and in base also "
               f"against that of the grown material, mu_L theta^(-2/3); in wide it reaches {found['wide'][2]:.2g} of "
@@ -341,7 +328,7 @@ def stresses() -> Finding:
     return Finding(tuple(checks), reason=reason)
 
 
-def peaks(run: tuple[str, ...]) -> tuple[float, float, float]:
+def peaks(run: Run) -> tuple[float, float, float]:
     """Largest in-plane shear and equivalent stress over mu_L, and largest in-plane shear stress over mu_L J^(-2/3), in
     all rows of a run."""
     modulus = scene(*run).growth.shear_modulus
@@ -353,7 +340,7 @@ def peaks(run: tuple[str, ...]) -> tuple[float, float, float]:
     return tuple(map(float, np.max(triples, axis=0)))
 
 
-def apart(run: tuple[str, ...], time: float) -> float:
+def apart(run: Run, time: float) -> float:
     """Area that only one of the outlines covers, with new biomass stressed and stress-free, in percent of the area."""
     return uncovered(*(polygon(body((*run, *more), time).outline) for more in ((), (STRESS_FREE,))))
 
@@ -362,9 +349,3 @@ def after_contact() -> tuple[float, ...]:
     """Times (h) of the rows of wide in which the aggregate touches the opposite wall, however new biomass is born."""
     rows, free = series(*WHOLE), series(*WHOLE, STRESS_FREE)
     return tuple(map(float, rows["time_h"][(rows["contact"] == 1) & (free["contact"] == 1)]))
-
-
-def conductivity_change(run: tuple[str, ...], times: tuple[float, ...]) -> float:
-    """Change (%) of the conductivity when new biomass is born stress-free: geometric mean at some times (h)."""
-    ours = [at(run, time)["conductivity_m_per_d"] for time in times]
-    return mean_change(ours, [at((*run, STRESS_FREE), time)["conductivity_m_per_d"] for time in times])

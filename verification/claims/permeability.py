@@ -9,8 +9,6 @@ not the velocity.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from repro.fem.mesh import Mesh
@@ -23,6 +21,7 @@ from verification.claims.levels import ABOUT_WIDE, BESIDE_OWN, DEFAULT, PAIRED, 
 from verification.claims.runs import (
     WIDE,
     Body,
+    Columns,
     around_contact,
     bodies,
     flow_in,
@@ -53,9 +52,8 @@ def spanning() -> Finding:
     time, share = rows["time_h"], rows["conductivity_m_per_d"] / whole
     contact = float(touching["time_h"][1])
     film, closed = (float(value) / whole for value in touching["conductivity_m_per_d"])
-    course = Course(time, share, contact, film, closed)
     sharp, twice = "falls sharply", "sharper: twice as sharp at least"
-    earlier, through, later = (course.fall(since) for since in (-10, -5, 0))
+    earlier, through, later = (falls(time, share, (film, closed, contact), since) for since in (-10, -5, 0))
     checks = (at_most("K / K_clean at contact", sharp, closed, 0.01, "orders of magnitude: two at least"),
               at_least("fall in the 5 h up to contact (times)", sharp, through, 10, "an order of magnitude"),
               at_least("the same over the fall in the 5 h before", sharp, through / earlier, 2, twice),
@@ -67,30 +65,16 @@ def spanning() -> Finding:
     return Finding(checks, change=change, reason="the fall is not as sharp on every mesh", note=_half_discs)
 
 
-@dataclass(frozen=True, eq=False)
-class Course:
-    """K / K_clean, or what goes with it, (n,) at times (h), and just before and after contact."""
-
-    time: np.ndarray
-    share: np.ndarray
-    contact: float
-    film: float
-    closed: float
-
-    def fall(self, since: float) -> float:
-        """The factor by which it falls in 5 h, from so long after contact (h; before it negative)."""
-        return self._at(since) / self._at(since + 5)
-
-    def _at(self, since: float) -> float:
-        """Geometric between rows, on either side of contact."""
-        if since == 0:
-            return self.closed
-        early = self.time < self.contact
-        chosen, end = (early, self.film) if since < 0 else (~early, self.closed)
-        time = np.append(self.time[chosen], self.contact) - self.contact
-        share = np.append(self.share[chosen], end)
-        order = np.argsort(time)
-        return float(np.exp(np.interp(since, time[order], np.log(share[order]))))
+def falls(time: np.ndarray, share: np.ndarray, touching: tuple[float, float, float], since: float) -> float:
+    """The factor by which K / K_clean, or what goes with it, (n,) at times (h), falls in 5 h, from so long after
+    contact (h; before it negative). touching: it with the last film and at contact, and when that is. Geometric between
+    rows; at contact itself the second of both counts, as NumPy has it of two values in one place."""
+    film, closed, contact = touching
+    early = time < contact
+    hours = np.concatenate([time[early], [contact, contact], time[~early]]) - contact
+    values = np.log(np.concatenate([share[early], [film, closed], share[~early]]))
+    first, last = np.exp(np.interp([since, since + 5], hours, values))
+    return float(first / last)
 
 
 def _half_discs() -> str:
@@ -161,12 +145,12 @@ def contact() -> tuple[float, float, float]:
     return float(before), float(after), float(found["time_h"][1])
 
 
-def consumed(rows: dict[str, np.ndarray], supply: float = 10.0) -> np.ndarray:
+def consumed(rows: Columns, supply: float = 10.0) -> np.ndarray:
     """(n,) acceptor taken up per time and width of the pore, m/d mg/L: u_ave (C_supply - C_effluent)."""
     return rows["mean_velocity_m_per_d"] * (supply - rows["effluent_acceptor_mg_per_L"])
 
 
-def specific_growth(rows: dict[str, np.ndarray]) -> np.ndarray:
+def specific_growth(rows: Columns) -> np.ndarray:
     """(n - 1,) mean growth rate (1/h) of the aggregate's area between rows."""
     return np.diff(np.log(rows["aggregate_area_um2"])) / np.diff(rows["time_h"])
 
@@ -182,11 +166,11 @@ def decay_share(found: Body) -> float:
 
 def fall() -> float:
     """How many times the conductivity, under constant head the velocity, falls in the 5 h up to contact."""
-    rows, (film, closed, touched) = series(*CLOSING), contact()
-    return Course(rows["time_h"], rows["mean_velocity_m_per_d"], touched, film, closed).fall(-5)
+    rows = series(*CLOSING)
+    return falls(rows["time_h"], rows["mean_velocity_m_per_d"], contact(), -5)
 
 
-def fastest(rows: dict[str, np.ndarray]) -> tuple[float, float]:
+def fastest(rows: Columns) -> tuple[float, float]:
     """Largest rate of decline of the conductivity (1/h) between rows, and the middle of that time (h)."""
     time, share = rows["time_h"], np.log(rows["conductivity_m_per_d"])
     rates = -np.diff(share) / np.diff(time)
@@ -194,7 +178,7 @@ def fastest(rows: dict[str, np.ndarray]) -> tuple[float, float]:
     return float(rates[worst]), float(0.5 * (time[worst] + time[worst + 1]))
 
 
-def _reason(rows: dict[str, np.ndarray], upgradient: float) -> str:
+def _reason(rows: Columns, upgradient: float) -> str:
     film, closed, touched = contact()
     share = rows["mean_velocity_m_per_d"] / rows["mean_velocity_m_per_d"][0]
     tenth = float(np.interp(-0.1, -share, rows["time_h"]))
@@ -206,7 +190,7 @@ def _reason(rows: dict[str, np.ndarray], upgradient: float) -> str:
             "it, since (9) lets it go on in proportion to m_A as growth does: where the acceptor is used up both stop")
 
 
-def _told(rows: dict[str, np.ndarray]) -> str:
+def _told(rows: Columns) -> str:
     _, closed, touched = contact()
     before, free = rows["time_h"] < touched, series(*AROUND)
     rate, when = fastest({name: column[before] for name, column in rows.items()})

@@ -35,6 +35,7 @@ from verification.claims.runs import (
     SUBSTRATES,
     flow_in,
     full_biomass,
+    halved,
     remeshed,
     scene,
     solution,
@@ -257,12 +258,7 @@ def _with_columns(mesh: Mesh, line: np.ndarray, places: np.ndarray) -> Mesh:
     y = mesh.points[line, 1]
     new = np.column_stack([np.repeat(places, len(line)), np.tile(y, len(places))])
     numbers = len(mesh.points) + np.arange(len(new)).reshape(len(places), len(line))
-    columns = np.vstack([line, numbers])
-    near, far = columns[:-1], columns[1:]
-    a, d = near[:, :-1].ravel(), near[:, 1:].ravel()
-    b, c = far[:, :-1].ravel(), far[:, 1:].ravel()
-    low = np.tile(y[:-1] + y[1:] < mesh.width, len(places))
-    cells = np.hstack([np.where(low, [a, b, d], [a, b, c]), np.where(low, [b, c, d], [a, c, d])]).T
+    cells = halved(np.vstack([line, numbers]), np.tile(y[:-1] + y[1:] < mesh.width, len(places)))
     if places[0] < mesh.points[line[0], 0]:
         cells = cells[:, ::-1]
     topology = replace(mesh.topology, cells=np.vstack([mesh.cells, cells]),

@@ -1,4 +1,4 @@
-"""The report of the claims on the terminal and as Markdown, and what it counts.
+"""The report of the claims on the terminal, and what it counts.
 
 The committed record of the claims, `claims.json`: intervals and verdicts that a run on any machine must agree with.
 
@@ -12,11 +12,10 @@ them, or on the meshes of the scheme; null where none fits.
 
 from __future__ import annotations
 
-import json
 import textwrap
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import zip_longest
 from math import inf, isfinite
 from pathlib import Path
 
@@ -36,18 +35,12 @@ from verification.claims import (
     verdict_of,
 )
 from verification.claims.evaluate import unnumbered
-from verification.kernel import writing
-from verification.kernel.writing import Block, table
+from verification.kernel.writing import load
 
-WIDTH, INDENT = 120, " " * 5
-HEAD = ("quantity", "paper", "ours", "numerics", "inputs", "scheme of 2001", "accepted", "outcome")
-COLUMNS = (24, 11, 10, 15, 15, 15, 14, 11)
 LEGEND = ("paper: as printed. ours: the converged solution, or the scheme where the claim is about that. numerics: the "
           "error bar; inputs: where the number goes as the inputs of Table 1 move within their rounding; scheme of "
           "2001: its range on one to three meshes. accepted: the interval of the printed digits, or what the words are "
-          "taken for. An outcome is that of the whole bar.")
-
-
+          "taken for. An outcome is that of the whole bar.\n")
 INDEPENDENCE = "Mesh and time-step independence of base in the paper's scheme"
 
 
@@ -74,68 +67,45 @@ class Row:
 
 def terminal_independence(checks: tuple[PaperCheck, ...]) -> str:
     """The bounds as lines."""
-    lines = [INDENT + f"{c.quantity}: {number(c.value)}, bound {c.paper}" for c in checks]
+    lines = (f"     {c.quantity}: {c.value:.4g}, bound {c.paper}" for c in checks)
     return "\n".join([INDEPENDENCE, *lines]) + "\n"
 
 
-def number(value: float) -> str:
-    """Four digits."""
-    return f"{value:.4g}"
-
-
-def spanned(pair) -> str:
+def spanned(pair: tuple[float, float] | None) -> str:
     """An interval in words; empty where there is none."""
     if pair is None:
         return ""
     low, high = pair
     if isfinite(low) and isfinite(high):
-        return number(low) if low == high else f"{number(low)} to {number(high)}"
-    return f"at least {number(low)}" if isfinite(low) else f"at most {number(high)}"
+        return f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
+    return f"at least {low:.4g}" if isfinite(low) else f"at most {high:.4g}"
 
 
-def cells(check: PaperCheck) -> tuple[str, ...]:
-    """A check with its widths, in the order of HEAD."""
-    return (check.quantity, check.paper, number(check.value), spanned((check.bar.low, check.bar.high)),
-            spanned(check.inputs), spanned(check.scheme),
-            spanned((check.low, check.high)), check.outcome)
+def told(check: PaperCheck) -> str:
+    """A check with its widths."""
+    widths = {"numerics": (check.bar.low, check.bar.high), "inputs": check.inputs, "scheme of 2001": check.scheme,
+              "accepted": (check.low, check.high)}
+    words = (f"{name} {spanned(pair)}" for name, pair in widths.items() if pair)
+    return "; ".join([f"{check.quantity}: paper {check.paper}; ours {check.value:.4g}", *words, check.outcome])
 
 
-def _line(texts, widths: tuple[int, ...]) -> str:
-    """Cells side by side, each wrapped in its column."""
-    wrapped = [textwrap.wrap(text, width - 1) or [""] for text, width in zip(texts, widths)]
-    form = INDENT + "".join(f"{{:<{width}}}" for width in widths)
-    return "\n".join(form.format(*row).rstrip() for row in zip_longest(*wrapped, fillvalue=""))
-
-
-def _paragraph(label: str, text: str) -> str:
-    return textwrap.fill(f"{label}{text}", WIDTH, initial_indent=INDENT, subsequent_indent=INDENT + "  ")
-
-
-def legend() -> str:
-    """What the columns say."""
-    return _paragraph("", LEGEND) + "\n"
+def _paragraph(text: str, indent: str = "     ") -> str:
+    return textwrap.fill(text, 120, initial_indent=indent, subsequent_indent="       ")
 
 
 def terminal(row: Row) -> str:
-    """A claim with its checks."""
+    """A claim with its checks: what was changed, why it does not hold if it does not, what is not varied, and what else
+    is worth telling."""
     if row.claim is None:
         return f"{row.id}  {row.verdict.upper()}: {row.error}\n"
-    head = textwrap.fill(f"{row.id}  {row.verdict.upper()}: {row.claim.text} (paper: {row.claim.where})", WIDTH,
-                         subsequent_indent=INDENT)
-    parts = [head]
+    remarks = {"error": row.error, "command": row.claim.command}
     if row.checks:
-        parts += [_line(HEAD, COLUMNS), *(_line(cells(check), COLUMNS) for check in row.checks)]
-        parts += [_paragraph(label, text) for label, text in remarks(row) if text]
-    if row.error:
-        parts.append(_paragraph("error: ", row.error))
-    return "\n".join([*parts, _paragraph("command: ", row.claim.command)]) + "\n"
-
-
-def remarks(row: Row) -> tuple[tuple[str, str], ...]:
-    """What was changed, why it does not hold if it does not, what is not varied, and what else is worth telling."""
-    finding = row.finding
-    return (("about: ", row.claim.about), ("changed: ", finding.change), ("because: ", row.reason),
-            ("inputs: ", finding.rounding), ("steps are not varied: ", row.claim.fixed), ("", finding.note))
+        finding = row.finding
+        remarks = {"about": row.claim.about, "changed": finding.change, "because": row.reason,
+                   "inputs": finding.rounding, "steps are not varied": row.claim.fixed, "note": finding.note, **remarks}
+    lines = [*map(told, row.checks), *(f"{name}: {text}" for name, text in remarks.items() if text)]
+    head = _paragraph(f"{row.id}  {row.verdict.upper()}: {row.claim.text} (paper: {row.claim.where})", "")
+    return "\n".join([head, *map(_paragraph, lines)]) + "\n"
 
 
 def predicted(checks) -> list[PaperCheck]:
@@ -159,31 +129,6 @@ def summary(rows: list[Row]) -> str:
         "Table 1 are not among them."))
 
 
-def markdown(rows: list[Row], checks: tuple[PaperCheck, ...]) -> str:
-    """The whole report; checks: of what does not come from the paper, that base does not hang on mesh and step."""
-    independence = ((c.quantity, c.paper, number(c.value) + ("" if c.holds else " FAILS")) for c in checks)
-    blocks = [Block("text", summary(rows).replace("\n", "\n\n")), Block("text", LEGEND),
-              table(("id", "claim", *HEAD[1:], "verdict"), map(_row, rows)), Block("heading", "Remarks"),
-              Block("text", "\n".join(_remarks(row) for row in rows if row.finding)),
-              Block("heading", INDEPENDENCE), table(("what", "bound", "ours"), independence)]
-    return f"# What the paper claims, judged by computed numbers\n\n{writing.markdown(blocks, 2)}\n"
-
-
-def _row(row: Row) -> tuple[str, ...]:
-    text = row.claim.text if row.claim else ""
-    if not row.checks:
-        return row.id, text, *[""] * (len(HEAD) - 1), f"**{row.verdict}**: {row.error}"
-    quantity, paper, *columns = zip(*map(cells, row.checks))
-    paper = [f"{name}: {said}" for name, said in zip(quantity, paper)]
-    return row.id, text, *("<br>".join(column) for column in (paper, *columns)), f"**{row.verdict}**"
-
-
-def _remarks(row: Row) -> str:
-    origin = "; ".join(dict.fromkeys(f"{check.origin} ({check.date})" for check in row.checks))
-    parts = [f"{label}{text.rstrip('.')}." for label, text in remarks(row) if text]
-    return f"- **{row.id}** (paper: {row.claim.where}). Tolerances: {origin}. " + " ".join(parts)
-
-
 COMMITTED = Path(__file__).parent / "claims.json"
 #: Numbers this small are the round-off of exact ones, which differs between machines; so do last digits.
 ROUND_OFF, LAST_DIGITS = 1e-9, 1e-9
@@ -191,7 +136,7 @@ ROUND_OFF, LAST_DIGITS = 1e-9, 1e-9
 
 def read() -> list[dict]:
     """The committed record; empty where there is none yet."""
-    return json.loads(COMMITTED.read_text(encoding="utf-8")) if COMMITTED.exists() else []
+    return load(COMMITTED, [])
 
 
 def replaced(ours: list[dict]) -> list[dict]:
@@ -209,15 +154,14 @@ def entry(row: Row) -> dict:
 
 
 def _check(check: PaperCheck, about: str) -> dict:
-    paper, inputs = check.printed or (None, None), check.inputs
-    scheme = (check.bar.low, check.bar.high) if about == OF_SCHEME else check.scheme
+    paper, inputs = check.printed or (None, None), check.inputs or (None, None)
+    bar = check.bar
+    scheme = (bar.low, bar.high) if about == OF_SCHEME else check.scheme
     return {"quantity": check.quantity, "rests_on": check.rests_on, "paper": check.paper,
             "paper_low": paper[0], "paper_high": paper[1], "value": _finite(check.value),
-            "low": _finite(check.bar.low), "high": _finite(check.bar.high),
-            "input_low": inputs and inputs[0], "input_high": inputs and inputs[1],
-            "scheme_2001": scheme and [_finite(value) for value in scheme],
-            "on_sizes": [_finite(value) for value in check.on_sizes],
-            "order": _finite(check.bar.mesh.order) if check.bar.mesh else None,
+            "low": _finite(bar.low), "high": _finite(bar.high), "input_low": inputs[0], "input_high": inputs[1],
+            "scheme_2001": scheme and [*map(_finite, scheme)], "on_sizes": [*map(_finite, check.on_sizes)],
+            "order": _finite(bar.mesh.order) if bar.mesh else None,
             "tolerance": {"low": _finite(check.low), "high": _finite(check.high), "origin": check.origin,
                           "date": check.date}, "outcome": check.outcome}
 
@@ -230,31 +174,27 @@ def differences(ours: list[dict], committed: list[dict]) -> list[str]:
     """Where claims do not agree with the record, a line each: another verdict or outcome, a number out of its interval.
     """
     known = {each["id"]: each for each in committed}
-    return [line for each in ours for line in _of_claim(each, known.get(each["id"]))]
+    return [f"{each['id']}: {line}" for each in ours for line in _of_claim(each, known.get(each["id"]))]
 
 
-def _of_claim(ours: dict, known: dict | None) -> list[str]:
-    id = ours["id"]
+def _of_claim(ours: dict, known: dict | None) -> Iterator[str]:
     if known is None:
-        return [f"{id}: not in the record"]
-    told = [f"{id}: {ours['verdict']}, recorded as {known['verdict']}"] if ours["verdict"] != known["verdict"] else []
+        yield "not in the record"
+        return
+    if ours["verdict"] != known["verdict"]:
+        yield f"{ours['verdict']}, recorded as {known['verdict']}"
     if _quantities(ours) != _quantities(known):
-        return [*told, f"{id}: other quantities than recorded"]
-    return told + [line for pair in zip(ours["checks"], known["checks"]) for line in _of_check(id, *pair)]
+        yield "other quantities than recorded"
+        return
+    for one, there in zip(ours["checks"], known["checks"]):
+        if not inside(one["value"], there["low"], there["high"]):
+            yield f"{one['quantity']} is {one['value']:.6g}, recorded as {there['low']:.6g} to {there['high']:.6g}"
+        if one["outcome"] != there["outcome"]:
+            yield f"{one['quantity']} {one['outcome']}, recorded: {there['outcome']}"
 
 
 def _quantities(entry: dict) -> list[str]:
     return [unnumbered(check["quantity"]) for check in entry["checks"]]
-
-
-def _of_check(id: str, ours: dict, known: dict) -> list[str]:
-    told = []
-    if not inside(ours["value"], known["low"], known["high"]):
-        told.append(f"{id}: {ours['quantity']} is {ours['value']:.6g}, recorded as {known['low']:.6g} to "
-                    f"{known['high']:.6g}")
-    if ours["outcome"] != known["outcome"]:
-        told.append(f"{id}: {ours['quantity']} {ours['outcome']}, recorded: {known['outcome']}")
-    return told
 
 
 def inside(value: float | None, low: float | None, high: float | None) -> bool:
@@ -287,17 +227,19 @@ def flips(entry: dict) -> list[Flip]:
 
 def _moved(check: dict) -> list[tuple[float, float]]:
     """The bounds of a check, one of them moved by the bar; none where that has no end."""
-    if check["low"] is None or check["high"] is None:
-        return []
-    low, high = (-inf if check["tolerance"]["low"] is None else check["tolerance"]["low"],
-                 inf if check["tolerance"]["high"] is None else check["tolerance"]["high"])
-    half = 0.5 * (check["high"] - check["low"])
-    return [(low - half, high), (low + half, high), (low, high - half), (low, high + half)]
+    low, high = _ends(check["tolerance"])
+    first, last = _ends(check)
+    half = 0.5 * (last - first)
+    return [(low - half, high), (low + half, high), (low, high - half), (low, high + half)] if isfinite(half) else []
+
+
+def _ends(told: dict) -> tuple[float, float]:
+    """Of a recorded interval, in which an open end is null."""
+    return -inf if told["low"] is None else told["low"], inf if told["high"] is None else told["high"]
 
 
 def _verdict_with(entry: dict, number: int, bounds: tuple[float, float]) -> str:
     """The verdict with other bounds of one check."""
     outcomes = [check["outcome"] for check in entry["checks"]]
-    moved = entry["checks"][number]
-    outcomes[number] = outcome_of((moved["low"], moved["high"]), bounds)
+    outcomes[number] = outcome_of(_ends(entry["checks"][number]), bounds)
     return verdict_of(set(outcomes), bool(entry["change"]), bool(entry["rounding"]))

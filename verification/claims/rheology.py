@@ -23,20 +23,20 @@ is filled over its length conducts K_clean / lambda with the one and K_clean 12 
 
 from __future__ import annotations
 
+import numpy as np
 from shapely.affinity import translate
 
 from repro.scene import SceneError
 from verification.claims import FEW, FEW_WORDS, LATER, Finding, PaperCheck, at_least, at_most, claim
-from verification.claims.growth_pattern import STRESS_FREE
 from verification.claims.levels import BESIDE_OWN, COMPARED, DEFAULT, at_level
 from verification.claims.runs import (
     AFTER,
     PLOTTED,
     WHOLE,
+    Run,
     around_contact,
     at,
     body,
-    mean_change,
     polygon,
     scene,
     uncovered,
@@ -46,6 +46,8 @@ from verification.claims.runs import (
 #: Hours at which outlines are compared: in all variants the opposite wall has then been touched for 5 h.
 END = 40
 FIRST_HOURS = AFTER[:13]
+#: New biomass born without stress.
+STRESS_FREE = 'growth.new_biomass="stress_free"'
 RECHOSEN = "middles rechosen"
 #: One choice each, in words and as changes of the scene.
 VARIANTS = {
@@ -76,7 +78,7 @@ def other_rheology() -> Finding:
                    reason=f"what changes by more than a few percent: {worst or 'nothing, but a bar reaches over'}")
 
 
-def _changes(name: str, run: tuple[str, ...]) -> tuple[PaperCheck, ...]:
+def _changes(name: str, run: Run) -> tuple[PaperCheck, ...]:
     """What a variant of WHOLE changes."""
     changes = {f"outlines apart at {END} h, one moved onto the other (% of the area)": slid(run)[2],
                "time of contact (%)": 100 * (contact(run) / contact(WHOLE) - 1),
@@ -85,7 +87,7 @@ def _changes(name: str, run: tuple[str, ...]) -> tuple[PaperCheck, ...]:
                  for what, change in changes.items())
 
 
-def slid(run: tuple[str, ...]) -> tuple[float, float, float]:
+def slid(run: Run) -> tuple[float, float, float]:
     """How far downstream (um) of that of WHOLE the middle of a run's outline lies at END, and the area that only one of
     both covers, in percent: where they lie, and with the run's moved back by that."""
     ours, other = (polygon(body(chosen, END).outline) for chosen in (WHOLE, run))
@@ -93,15 +95,15 @@ def slid(run: tuple[str, ...]) -> tuple[float, float, float]:
     return moved, uncovered(ours, other), uncovered(ours, translate(other, -moved))
 
 
-def contact(run: tuple[str, ...]) -> float:
+def contact(run: Run) -> float:
     """When (h) a run touches the opposite wall."""
     return float(around_contact(*run)["time_h"][1])
 
 
-def conductivity_change(run: tuple[str, ...], hours: tuple[float, ...] = AFTER) -> float:
-    """Geometric mean of the conductivity in rows at some hours, against that of WHOLE, in percent."""
-    ours = [at(WHOLE, hour)["conductivity_m_per_d"] for hour in hours]
-    return mean_change(ours, [at(run, hour)["conductivity_m_per_d"] for hour in hours])
+def conductivity_change(run: Run, hours: tuple[float, ...] = AFTER, plain: Run = ()) -> float:
+    """Geometric mean of the conductivity in rows at some hours, against that of a plain run or of WHOLE, in percent."""
+    ours, other = ([at(chosen, hour)["conductivity_m_per_d"] for hour in hours] for chosen in (plain or WHOLE, run))
+    return 100 * float(np.exp(np.mean(np.log(other) - np.log(ours))) - 1)
 
 
 def _of_angles(hours: tuple[float, ...]) -> str:
@@ -126,12 +128,12 @@ PERMEABILITY = 1e-3
 AGGREGATE, PLUG = ("base", *until(PLOTTED)), ("wide", *until(END))
 
 
-def permeable(run: tuple[str, ...], permeability: float = PERMEABILITY) -> tuple[str, ...]:
+def permeable(run: Run, permeability: float = PERMEABILITY) -> Run:
     """A run with Brinkman's drag of a permeability (um2) and without the pseudoviscosity."""
     return (*run, 'flow.biomass="brinkman"', f'flow.permeability="{1e-12 * permeability:.6g} m^2"')
 
 
-def equivalent(run: tuple[str, ...]) -> float:
+def equivalent(run: Run) -> float:
     """W^2 / (12 lambda), um2: the permeability of which a body that fills the pore conducts as with lambda."""
     said = scene(*run)
     return said.pore.width**2 / 12 / said.flow.viscosity_ratio
@@ -155,7 +157,7 @@ def drag_or_viscosity() -> Finding:
                    "the same.")
 
 
-def conductivities(aggregate: tuple[str, ...], plug: tuple[str, ...]) -> dict[str, float]:
+def conductivities(aggregate: Run, plug: Run) -> dict[str, float]:
     """Conductivities (m/d) of an aggregate, a film and a plug, and the time of contact (h) of the last two."""
     touching = around_contact(*plug)
     return {"aggregate": at(aggregate, PLOTTED)["conductivity_m_per_d"],

@@ -32,7 +32,11 @@ from repro.model.kinetics import Sink
 from repro.model.pore import Pore, Solved, solve
 from repro.scene import Scene, load_scene
 from verification.claims.levels import CONVERGED, cached, converged, current
+from verification.kernel.case import columns
 
+#: A packaged scene and its changes, KEY=VALUE; and columns of rows, by name.
+Run = tuple[str, ...]
+Columns = dict[str, np.ndarray]
 #: Section 4 and Figure 6.
 BASE, WIDE = ("base",), ("wide",)
 #: The shape that the paper plots and the end of its run (h), and a shape update, whatever the level.
@@ -81,6 +85,11 @@ def scene(name: str, *changes: str) -> Scene:
     return _with_rows(replace(said, numerics=numerics, growth=growth), always=False)
 
 
+def ending(said: Scene, *times: float) -> Scene:
+    """The scene with rows at some times (h), the last of which is its end."""
+    return replace(said, growth=replace(said.growth, end=times[-1]), output=replace(said.output, times=times))
+
+
 def _with_rows(said: Scene, always: bool) -> Scene:
     """The scene with its rows, where it names none and cannot have one a step."""
     if said.growth is None or said.output.times or not (always or said.name == "wide"):
@@ -127,8 +136,7 @@ def _with_a_film(said: Scene, before: State, contact: State) -> State:
     end = contact.pore.time - FILM
     if current().kind != CONVERGED or end <= before.pore.time:
         return before
-    shorter = replace(said, growth=replace(said.growth, end=end), output=replace(said.output, times=(end,)))
-    *_, (state, _) = simulation.steps(shorter, before)
+    *_, (state, _) = simulation.steps(ending(said, end), before)
     return before if state.pore.contact else state
 
 
@@ -140,67 +148,64 @@ def _solved(said: Scene, state: State) -> Instant:
 
 
 @cached
-def series(*run: str) -> dict[str, np.ndarray]:
+def series(*run: str) -> Columns:
     """Columns of a run's rows, as in ``timeseries.csv``."""
-    return _columns(history(*run).scene, history(*run).instants)
+    found = history(*run)
+    return columns([results.row(found.scene, each) for each in found.instants])
 
 
 @cached
-def around_contact(*run: str) -> dict[str, np.ndarray]:
+def around_contact(*run: str) -> Columns:
     """The same for the last state before contact and the first after. Raises LookupError where there is none."""
     found = history(*run)
     if found.contact is None:
         raise LookupError(f"{run} does not touch the opposite wall")
-    return _columns(found.scene, found.contact)
-
-
-def _columns(said: Scene, instants: tuple[Instant, ...]) -> dict[str, np.ndarray]:
-    found = np.array([[*results.row(said, instant).values()] for instant in instants], float)
-    return dict(zip(results.COLUMNS, found.T))
+    return columns([results.row(found.scene, each) for each in found.contact])
 
 
 @cached
-def ledger(*run: str) -> dict[str, np.ndarray]:
+def ledger(*run: str) -> Columns:
     """Columns of ``ledger.csv``, of all steps."""
     found = history(*run)
     steps = np.array([results.ledger_row(found.scene, step) for step in found.ledgers])
     return dict(zip(results.LEDGER_COLUMNS, steps.T))
 
 
-def row_number(run: tuple[str, ...], time: float) -> int:
-    """Number of a run's row at a time (h). Raises KeyError where there is none."""
-    found = np.flatnonzero(np.abs(series(*run)["time_h"] - time) < 1e-6)
+def biomass_defects(run: Run) -> np.ndarray:
+    """Relative defect of the biomass in each step of a run."""
+    steps = ledger(*run)
+    before, made, after = (steps[f"biomass_{part}_pg_per_m"] for part in ("before", "made", "after"))
+    return (after - before - made) / after
+
+
+def instant(run: Run, time: float) -> Instant:
+    """The instant of a run's row at a time (h). Raises KeyError where there is none."""
+    found = [each for each in history(*run).instants if abs(each.pore.time - time) < 1e-6]
     if len(found) != 1:
         raise KeyError(f"{run}: {len(found)} rows at t = {time} h")
-    return int(found[0])
+    return found[0]
 
 
-def instant(run: tuple[str, ...], time: float) -> Instant:
-    """The instant of a run's row at a time (h)."""
-    return history(*run).instants[row_number(run, time)]
-
-
-def at(run: tuple[str, ...], time: float) -> dict[str, float]:
+def at(run: Run, time: float) -> dict[str, float]:
     """The row of a run at a time (h). Raises KeyError where there is none."""
-    number = row_number(run, time)
-    return {name: float(column[number]) for name, column in series(*run).items()}
+    return results.row(history(*run).scene, instant(run, time))
 
 
-def nearest(run: tuple[str, ...], time: float) -> float:
+def nearest(run: Run, time: float) -> float:
     """The time (h) of a run's row that is the nearest to a time (h): longer steps need not land on it."""
     hours = series(*run)["time_h"]
     return float(hours[np.abs(hours - time).argmin()])
 
 
 @cached
-def grown(run: tuple[str, ...], time: float) -> tuple[Pore, Solved]:
+def grown(run: Run, time: float) -> tuple[Pore, Solved]:
     """The shape of a run at a time (h) with what grows in it in the next 12 min, and what is solved then: the state
     "before the aggregate expands" [E12]."""
     return _grown(scene(*run), *solved_pore(run, time))
 
 
 @cached
-def grown_anew(run: tuple[str, ...], time: float) -> tuple[Pore, Solved]:
+def grown_anew(run: Run, time: float) -> tuple[Pore, Solved]:
     """The same in a mesh made at that time, whose ends are 1.5 W from the aggregate (3.1) at every level. Those of the
     run's own mesh hang on when that was last made."""
     return _grown(scene(*run), *remeshed(scene(*run), *solved_pore(run, time)))
@@ -263,13 +268,13 @@ def body_of(said: Scene, found: Instant) -> Body:
 
 
 @cached
-def body(run: tuple[str, ...], time: float) -> Body:
+def body(run: Run, time: float) -> Body:
     """The aggregate of a run in its row at a time (h). Raises KeyError where there is none."""
     return body_of(scene(*run), instant(run, time))
 
 
 @cached
-def bodies(run: tuple[str, ...]) -> tuple[Body, ...]:
+def bodies(run: Run) -> tuple[Body, ...]:
     """The aggregate in every row of a run."""
     found = history(*run)
     return tuple(body_of(found.scene, each) for each in found.instants)
@@ -289,7 +294,7 @@ def interface_length(found: Body) -> float:
     return float(outline.edge_lengths()[outline.interface_edges()].sum())
 
 
-def solved_pore(run: tuple[str, ...], time: float) -> tuple[Pore, Solved]:
+def solved_pore(run: Run, time: float) -> tuple[Pore, Solved]:
     """The pore of a run at a time (h) and what is solved in it."""
     found = instant(run, time)
     return found.pore, found.solved
@@ -364,6 +369,14 @@ def plug(scene, *x: float) -> Mesh:
     return mesher.generate(outline, (x[0] - 1.5 * width, x[-1] + 1.5 * width), pore.sized(scene))[0]
 
 
+def halved(lattice: np.ndarray, falling=False) -> np.ndarray:
+    """(2 (m - 1) (n - 1), 3) triangles of a lattice of nodes (m, n), along x and y: squares halved by the diagonal that
+    rises with x, or falls where it is to."""
+    near, far = lattice[:-1], lattice[1:]
+    a, b, c, d = (corner.ravel() for corner in (near[:, :-1], far[:, :-1], far[:, 1:], near[:, 1:]))
+    return np.hstack([np.where(falling, [a, b, d], [a, b, c]), np.where(falling, [b, c, d], [a, c, d])]).T
+
+
 def uncovered(ours: shapely.Polygon, other: shapely.Polygon) -> float:
     """Area that only one of two shapes covers, in percent of ours."""
     return 100 * float(ours.symmetric_difference(other).area / ours.area)
@@ -373,8 +386,3 @@ def upstream_part(first: shapely.Polygon, last: shapely.Polygon) -> float:
     """Share of the area covered at one time and not at an earlier one that lies at x < 0."""
     new = last.difference(first)
     return shapely.clip_by_rect(new, -1e6, -1e6, 0.0, 1e6).area / new.area
-
-
-def mean_change(ours: list[float], other: list[float]) -> float:
-    """By how many percent the geometric mean of other numbers differs from that of ours."""
-    return 100 * float(np.exp(np.mean(np.log(other) - np.log(ours))) - 1)

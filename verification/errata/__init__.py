@@ -18,6 +18,8 @@ from verification.kernel import writing
 from verification.switches import PLOTTED
 
 SUPPLY = 10.0
+#: Those of an entry, as they are printed, by name.
+Numbers = dict[str, str]
 
 
 @dataclass(frozen=True)
@@ -27,11 +29,11 @@ class Erratum:
 
     id: str
     title: str
-    printed: str
-    reading: str
+    function: Callable[[], Numbers]
     consequence: str
-    function: Callable[[], dict[str, str]]
-    quick: bool
+    printed: str = ""
+    reading: str = ""
+    quick: bool = False
 
     def markdown(self) -> str:
         """The entry, its numbers computed now."""
@@ -44,11 +46,11 @@ class Erratum:
 ERRATA: dict[str, Erratum] = {}
 
 
-def erratum(id: str, title: str, *, consequence: str, printed: str = "", reading: str = "",
-            quick: bool = False):
-    """Register the decorated function () -> {name: number as text} as the measurement of an erratum."""
-    def register(function: Callable[[], dict[str, str]]) -> Callable[[], dict[str, str]]:
-        ERRATA[id] = Erratum(id, title, printed, reading, consequence, function, quick)
+def erratum(id: str, title: str, **parts):
+    """Register the decorated function () -> {name: number as text} as the measurement of an erratum; parts: further
+    fields of `Erratum`."""
+    def register(function: Callable[[], Numbers]) -> Callable[[], Numbers]:
+        ERRATA[id] = Erratum(id, title, function, **parts)
         return function
     return register
 

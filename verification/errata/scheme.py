@@ -14,6 +14,7 @@ from verification import switches
 from verification.claims.runs import BASE, END, WIDE, at, grown, half_disc, history, plug, scene, series
 from verification.errata import (
     STATE_HEAD,
+    Numbers,
     consumed_ratio,
     erratum,
     percent,
@@ -44,7 +45,7 @@ TRACTION = CHOICES["traction"].run
         {mesh_error} %); in the traction form the profile changes near both faces, where the water exerts next to
         no shear on the biomass, and every plug loses about the same head less, that of {saved} of plug. Base at
         19.2 h: velocity {velocity} m/d with traction, {deviation} against ours.""")
-def interface_forms() -> dict[str, str]:
+def interface_forms() -> Numbers:
     """Both forms around half-discs and through plugs of the pore's whole width."""
     width, rows = 50.0, []
     said = [scene("flow_only", f"numerics.refinement={r}") for r in (1, 2)]
@@ -90,7 +91,7 @@ def interface_difference(grid: Mesh) -> str:
 
         Without u_y = 0 the flow fans out at the outlet, as a jet does that leaves the channel there.""",
     quick=True)
-def outlet() -> dict[str, str]:
+def outlet() -> Numbers:
     """Poiseuille flow in three forms on two meshes."""
     rows = []
     for refinement in (1.0, 2.0):
@@ -138,7 +139,7 @@ HALF_STEP = CHOICES["half step"].run
 
         After contact the worst nodes are at the contact lines, where biomass, water and wall meet and films close: at
         {time} h, when it is worst, the root mean square over the aggregate is {rms}.""")
-def density_drift() -> dict[str, str]:
+def density_drift() -> Numbers:
     """Base and wide, theta restarting as J X / X_m or as J, apart before and after contact with the opposite wall."""
     rows = []
     for run in (BASE, WIDE):
@@ -174,7 +175,7 @@ def density_rms(said, now) -> float:
         {table}
 
         Within that one update the velocity falls by {fall}.""")
-def plotted_state() -> dict[str, str]:
+def plotted_state() -> Numbers:
     """Base at 19.2 h, and at 19.4 h before and after the expansion."""
     before = [flux.effluent for flux in grown(BASE, PLOTTED)[1].fluxes]
     rows = [["19.2 h", *state(BASE)], ["19.4 h, before the expansion", state(BASE)[0], *before],
@@ -197,7 +198,7 @@ def plotted_state() -> dict[str, str]:
         {table}
 
         What the paper says to lie 60 um away from the aggregate is tabulated under E9.""")
-def sensitivity() -> dict[str, str]:
+def sensitivity() -> Numbers:
     """Base with other stabilisation, mesh compressibility and refinement."""
     rows = [state_row("c = 100, gamma = 1, refinement = 1 (ours)", BASE)]
     rows += [state_row(f"{number.choice} = {number.alternative}", number.run) for number in NUMBERS]
@@ -221,7 +222,7 @@ def sensitivity() -> dict[str, str]:
         The explicit increment hits the printed 1.5 m/d at 19.4 h, after the expansion, which is not the state
         that the paper prints (E12), and misses it where it should. With shorter steps the integrated model
         stays where it is.""")
-def explicit_increment() -> dict[str, str]:
+def explicit_increment() -> Numbers:
     """Base with one explicit Euler increment a shape update, against ours with both steps."""
     found = course(BASE, explicit).columns
     rows = []
@@ -248,7 +249,7 @@ COLUMNS = {"mean_velocity_m_per_d": "mean velocity, m/d", "conductivity_m_per_d"
     reading="""The material point in the middle when the surface first forms (the origin, on the lower wall), for good.
         `numerics.fixed_point = "rechosen"` takes the node nearest to the present middle at every update.""",
     consequence="Rechosen against kept, where growth is nearly symmetric and where it is not:\n\n{table}")
-def fixed_point() -> dict[str, str]:
+def fixed_point() -> Numbers:
     """Base at 19.2 h and wide at 45 h with both choices."""
     rows = []
     for run, time in ((BASE, PLOTTED), (WIDE, 45.0)):

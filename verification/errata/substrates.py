@@ -7,6 +7,7 @@ from dataclasses import replace
 from math import atan, cbrt, degrees, exp, log, log10
 
 import numpy as np
+from scipy.optimize import brentq
 
 from repro.model import kinetics
 from verification.claims.base_run import upstream_means
@@ -15,6 +16,7 @@ from verification.claims.runs import BASE, PLATES, at, grown, grown_anew, scene,
 from verification.claims.scheme import PAPER_CORRECTION, bookkeeping, exceeding
 from verification.errata import (
     STATE_HEAD,
+    Numbers,
     consumed_ratio,
     erratum,
     percent,
@@ -38,7 +40,7 @@ COD = 2.38  # of phenol, Table 1; it enters through F alone
         difference of meshes is in it); acceptor over donor consumed would be {ratio} instead of {ours}.
 
         {table}""")
-def ratio_of_substrates() -> dict[str, str]:
+def ratio_of_substrates() -> Numbers:
     """Base with F as defined."""
     said = scene(*BASE).kinetics
     with at_level(Level(CONVERGED)):
@@ -64,7 +66,7 @@ def ratio_of_substrates() -> dict[str, str]:
 
         Base at 19.2 h with f_d b for d_c f_d b: velocity {velocity}, acceptor effluent {acceptor}, donor
         effluent {donor} against ours.""")
-def decay_demand() -> dict[str, str]:
+def decay_demand() -> Numbers:
     """Size of the term, electron balance of the readings, and base with d_c left out."""
     said = scene(*BASE)
     law = said.kinetics
@@ -119,7 +121,7 @@ def electron_defect(law, demand: float | None = None) -> float:
         Base; the balance defect is (supplied - out - consumed) / supplied, with the flow-weighted effluent:
 
         {table}""")
-def inlet_condition() -> dict[str, str]:
+def inlet_condition() -> Numbers:
     """Base with both forms of (11)."""
     columns, rows = [f"{end}_{name}_mg_per_L" for end in ("inlet", "effluent") for name in ("acceptor", "donor")], []
     for time in (0.0, PLOTTED):
@@ -144,7 +146,7 @@ def inlet_condition() -> dict[str, str]:
         meshed inlet is {distance} um from it):
 
         {table}""")
-def meshed_inlet() -> dict[str, str]:
+def meshed_inlet() -> Numbers:
     """Both substrates at the distances in question."""
     now, solved = grown_anew(BASE, PLOTTED)
     rows = [[f"{d} um", *map("{:.2f}".format, upstream_means(now, solved, float(d)))] for d in (60, 65, 75)]
@@ -163,7 +165,7 @@ def meshed_inlet() -> dict[str, str]:
         impossible where both K_s are equal; {corrected} with the paper's 1.6 % on both, within 1 % of {ours}, F and
         the decay, in base at 19.4 h before the expansion. To an acceptor effluent of 4.19 belongs a donor effluent
         of {donor}: {apart} of the printed one.""")
-def printed_effluents() -> dict[str, str]:
+def printed_effluents() -> Numbers:
     """Stoichiometry of the printed numbers and of ours."""
     ours = consumed_ratio(*(flux.effluent for flux in grown(BASE, PLOTTED)[1].fluxes))
     donor = 10 - (10 - 4.19) / ours
@@ -187,7 +189,7 @@ def printed_effluents() -> dict[str, str]:
         percent that the paper corrects. Its correction, "throughout the whole numerical simulation", cannot have been
         one of all effluents: raised by 1.6 %, one of them (the donor's, the longer) exceeds its supply until
         {until} h.""")
-def balance_formula() -> dict[str, str]:
+def balance_formula() -> Numbers:
     """The paper's dM_C over the integrals of F1 and F2, in some steps of base."""
     book, columns = bookkeeping(BASE), series(*BASE)
     after = np.array([columns[f"effluent_{name}_mg_per_L"][1:] for name in ("acceptor", "donor")])
@@ -208,7 +210,7 @@ def balance_formula() -> dict[str, str]:
 
         {table}""",
     quick=True)
-def smaller_points() -> dict[str, str]:
+def smaller_points() -> Numbers:
     """Numbers of Table 1 and of the text that can be checked against each other."""
     said = scene("base")
     crossing = said.pore.length / (2.9 / 24e-6) * 3600
@@ -268,7 +270,7 @@ def temperature_of(diffusivity: float, volume: float) -> float:
         Both are those of one and the same warmer water. What the printed digits leave open of them moves the
         effluents of base by less than their last digits (`verification/sensitivity`).""",
     quick=True)
-def diffusivities() -> dict[str, str]:
+def diffusivities() -> Numbers:
     """Both diffusivities by the method that the paper names."""
     rows = [[name, PRINTED[name], f"{hayduk_laudie(20.0, volume):.2f}",
              f"{temperature_of(PRINTED[name], volume):.0f} C"] for name, volume in MOLAR_VOLUME.items()]
@@ -288,13 +290,10 @@ def oxygen_saturation(celsius: float) -> float:
     consequence="""
         Water under air of 1 atm holds {saturation} mg/L at 20 C and 10 mg/L at {temperature} C or less.""",
     quick=True)
-def oxygen_supplied() -> dict[str, str]:
-    """Saturation at 20 C, and the temperature of 10 mg/L by bisection."""
-    low, high = 0.0, 20.0
-    while high - low > 1e-6:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if oxygen_saturation(middle) > 10 else (low, middle)
-    return {"saturation": f"{oxygen_saturation(20.0):.2f}", "temperature": f"{low:.1f}"}
+def oxygen_supplied() -> Numbers:
+    """Saturation at 20 C, and the temperature of 10 mg/L."""
+    temperature = brentq(lambda celsius: oxygen_saturation(celsius) - 10, 0.0, 20.0)
+    return {"saturation": f"{oxygen_saturation(20.0):.2f}", "temperature": f"{temperature:.1f}"}
 
 
 @erratum(
@@ -305,7 +304,7 @@ def oxygen_supplied() -> dict[str, str]:
         ln 2 over the net growth rate k Y m_A m_D - b m_A: {saturated} h at saturation, {supplied} h at 10 K_s of both,
         the most that anything in base sees.""",
     quick=True)
-def doubling_time() -> dict[str, str]:
+def doubling_time() -> Numbers:
     """At saturation and at the supply."""
     said = scene("base")
     rates = [float(kinetics.growth_rate(value, value, said.substrates, said.kinetics)) for value in (1e12, 10.0)]

@@ -16,7 +16,6 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from repro.results import write_json, write_text
@@ -61,7 +60,6 @@ def _saved(made: Figure, target: Path) -> None:
 def of_supplies(found: dict[str, dict], target: Path) -> None:
     """Outlines of wide every 5 h, a supply a row, the latest at the back."""
     made = Figure(figsize=(9, 1.7 * len(found)), layout="constrained")
-    FigureCanvasSVG(made)
     for axes, (supply, known) in zip(made.subplots(len(found), 1, sharex=True, squeeze=False).ravel(), found.items()):
         shown = [(float(time), _places(text)) for time, text in known["outlines"].items()]
         last = max(time for time, _ in shown)
@@ -85,7 +83,6 @@ def tornado(record: dict, target: Path) -> None:
     resolved."""
     shown = [name for name in NAMES if name in record["elasticities"]]
     made = Figure(figsize=(9, 2.6 * ((len(shown) + 1) // 2)), layout="constrained")
-    FigureCanvasSVG(made)
     for axes, number in zip(made.subplots((len(shown) + 1) // 2, 2, squeeze=False).ravel(), shown):
         rows = [row for row in reaches(record, number)[:8] if row[1]]
         axes.set_title(NAMES[number], loc="left", fontsize=10)

@@ -41,14 +41,14 @@ from scipy.stats import sobol_indices, uniform
 
 from repro.march import simulation, updates
 from repro.model import kinetics, pore
-from repro.results import M_PER_D, write_json
-from repro.results.files import whole
+from repro.results import M_PER_D
 from repro.scene import Scene, load_scene, needed, scene_hash
 from verification.claims import interval
 from verification.claims.base_run import DISTANCES, END, upstream_means
 from verification.claims.evaluate import MESH_ORDERS
 from verification.claims.levels import converged
-from verification.kernel.writing import load
+from verification.claims.runs import ending
+from verification.kernel.writing import load, save
 from verification.uncertainty import estimate
 
 
@@ -142,8 +142,7 @@ def of_base(said: Scene) -> Numbers:
     """What section 4 prints, concentrations in K_s; "before the aggregate expands" is the shape a time step before
     19.4 h with what grows in it [E12]."""
     plotted = END - said.growth.time_step
-    said = replace(said, growth=replace(said.growth, end=END), output=replace(said.output, times=(plotted, END)))
-    first, shaped, last = simulation.simulate(said)
+    first, shaped, last = simulation.simulate(ending(said, plotted, END))
     grown, _, _ = updates.make_biomass(said, shaped.pore, shaped.solved, said.growth.time_step)
     found = pore.solve(said, grown)
     halves = [each.half_saturation for each in found.problem.both]
@@ -163,11 +162,9 @@ def of_base(said: Scene) -> Numbers:
 
 def of_wide(said: Scene) -> Numbers:
     """Contact with the opposite wall (h), and the conductivity (m/d) some hours after it."""
-    said = replace(said, output=replace(said.output, times=(said.growth.end,)))
+    said = ending(said, said.growth.end)
     touching = next(state for state, _ in simulation.steps(said) if state.pore.contact)
-    end = touching.pore.time + AFTER
-    later = replace(said, growth=replace(said.growth, end=end), output=replace(said.output, times=(end,)))
-    *_, (_, last) = simulation.steps(later, touching)
+    *_, (_, last) = simulation.steps(ending(said, touching.pore.time + AFTER), touching)
     return {"contact_time": touching.pore.time, "conductivity_after": M_PER_D * last.solved.flow.conductivity}
 
 
@@ -202,9 +199,7 @@ class Runs:
         if key not in self.known:
             with np.errstate(all="raise", under="ignore"):
                 self.known[key] = {name: float(value) for name, value in OF[said.name](said).items()}
-            self.path.parent.mkdir(exist_ok=True)
-            with whole(self.path) as beside:
-                write_json(beside, self.known)
+            save(self.known, self.path)
         return self.known[key]
 
 

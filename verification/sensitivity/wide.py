@@ -29,7 +29,7 @@ from verification.claims import CLAIMS, Finding, evaluate
 from verification.claims.evaluate import MESH_ORDERS, unnumbered
 from verification.claims.growth_pattern import contact_length
 from verification.claims.levels import CONVERGED, Level, at_level, converged, forget
-from verification.claims.runs import WIDE, bodies, polygon, series
+from verification.claims.runs import WIDE, bodies, ending, polygon, series
 from verification.sensitivity.rounding import OF, Numbers, Runs, column, scene
 from verification.uncertainty import estimate
 
@@ -73,8 +73,7 @@ def after_contact(runs: Runs) -> list[dict]:
 
 
 def _on_size(size: float):
-    said = scene("wide", {}, *converged(size))
-    return replace(said, name="after contact", output=replace(said.output, times=HOURS))
+    return replace(ending(scene("wide", {}, *converged(size)), *HOURS), name="after contact")
 
 
 def bar_of(quantity: str, values: list[float], asked: float) -> dict:
@@ -104,20 +103,20 @@ EVERY, FINE = 5, 0.1
 def of_contact(said) -> dict[str, float]:
     """Time of contact (h), the state's ends (um), the smallest acceptor in it (K_s), and the whole hour, AFTER contact
     at the latest, that a run comes to before the aggregate reaches an end of the pore."""
-    said = replace(said, output=replace(said.output, times=(END,)), growth=replace(said.growth, end=END))
+    said = ending(said, END)
     state = next(state for state, _ in simulation.steps(said) if state.pore.contact)
     last = float(floor(state.pore.time) + AFTER)
     outline, acceptor = state.pore.boundary, state.pore.concentrations.acceptor
     return {"contact_time": state.pore.time, "upstream": outline.upstream, "downstream": outline.downstream,
             "acceptor_min": float(acceptor.min()) / said.substrates.acceptor.half_saturation,
-            "end": float(floor(reached(replace(said, growth=replace(said.growth, end=last)), state)))}
+            "end": float(floor(reached(ending(said, last), state)))}
 
 
 def reached(said, state: State) -> float:
     """The time (h) to which a run goes on from a state: its end, or MARGIN before the aggregate reaches the pore's."""
     time = state.pore.time
     try:
-        for now, _ in simulation.steps(replace(said, output=replace(said.output, times=(said.growth.end,))), state):
+        for now, _ in simulation.steps(said, state):
             time = now.pore.time
     except PoreEnd:
         return time - MARGIN
