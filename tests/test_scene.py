@@ -167,12 +167,11 @@ def test_the_ratio_follows_from_the_oxygen_demand(rest, product, part):
     """F = COD - Y d_c, by (7); both are kept, also where F is given too, and read back from what is written."""
     overrides = [f"{COD}={rest + product * part!r}", f"kinetics.yield_coefficient={part!r}",
                  f"kinetics.decay_oxygen_demand={product!r}"]
-    implied, given = load_scene("base", overrides), load_scene("base", [
-        *overrides, "kinetics.acceptor_to_donor_ratio=1.6"])
-    assert implied.kinetics.acceptor_to_donor_ratio == pytest.approx(rest, rel=1e-12)
-    assert implied.kinetics.implied_ratio == given.kinetics.implied_ratio == implied.kinetics.acceptor_to_donor_ratio
-    assert given.kinetics.acceptor_to_donor_ratio == 1.6 and load_scene("base").kinetics.implied_ratio is None
-    assert parse_scene(scene_tables(implied), "base", "again") == parsed(scene_text("base", overrides), "base") == implied
+    made = load_scene("base", overrides)
+    law, given = made.kinetics, load_scene("base", [*overrides, "kinetics.acceptor_to_donor_ratio=1.6"]).kinetics
+    assert law.acceptor_to_donor_ratio == law.implied_ratio == given.implied_ratio == pytest.approx(rest, rel=1e-12)
+    assert given.acceptor_to_donor_ratio == 1.6 and load_scene("base").kinetics.implied_ratio is None
+    assert parse_scene(scene_tables(made), "base", "again") == parsed(scene_text("base", overrides), "base") == made
 
 
 @pytest.mark.parametrize("text, share", [("80 %", Fraction(4, 5)), ("100.0%", 1), ("1e-3 %", Fraction(1, 100_000))])

@@ -100,8 +100,8 @@ def test_presets_tell_their_defaults():
 def test_the_largest_scene_is_accepted_and_so_is_what_is_printed_of_it(tmp_path):
     """Tables of as many entries as are accepted and an outline of as many points, each number with all its digits."""
     steps = [k / 3 for k in range(MOST_POINTS)]
-    outline = [["-349.123456789012345 um", "0.0 um"], *([f"{x - 345!r} um", "40.123456789012345 um"] for x in steps[:-2]),
-               ["9.0 um", "0.0 um"]]
+    arc = [[f"{x - 345!r} um", "40.123456789012345 um"] for x in steps[2:]]
+    outline = [["-345.0 um", "0.0 um"], *arc, ["9.0 um", "0.0 um"]]
     supply = [[f"{hour!r} h", "10.123456789012345 mg/L"] for hour in steps]
     said = {"pore.length": "800 um", "aggregate.outline": outline, "growth.end": "400 h",
             "flow.mean_velocity": [[f"{hour!r} h", "1.1234567890123456 m/day"] for hour in steps],
