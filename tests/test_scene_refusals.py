@@ -70,6 +70,7 @@ REFUSED = {
     "greater than 0, at most 1": ["kinetics.yield_coefficient=0", "kinetics.yield_coefficient=1.01"],
     "from 0 to 1": ["kinetics.degradable_fraction=-0.1", "kinetics.degradable_fraction=1.1"],
     "greater than zero, at most 20": ["numerics.refinement=20.1", "numerics.refinement=1e9"],
+    "greater than zero, at most 1": [f"numerics.tolerance={value}" for value in (0, -0.5, 1.1)],
     "1e-06 h or more is needed": ["growth.time_step=9e-7 h"],
     "between 0 and 90 deg": ["growth.minimum_contact_angle=0 deg", "growth.minimum_contact_angle=90 deg"],
     # shares, and F by the oxygen demand
@@ -202,7 +203,7 @@ def test_a_file_is_refused_by_its_own_key(tmp_path, text, said):
     ("base", ["substrates.acceptor.supply=0 mg/L", "substrates.donor.supply=-0 mg/L"]),
     ("base", ["kinetics.decay_coefficient=0 1/day", "kinetics.maximum_utilization_rate=0 1/day"]),
     ("base", ["kinetics.degradable_fraction=0", "kinetics.yield_coefficient=1"]),
-    ("base", ["aggregate.radius=49.9 um"]),
+    ("base", ["aggregate.radius=49.9 um", "numerics.tolerance=1"]),
     ("wide", ["flow.mean_velocity=0 m/day", "numerics.transport=gear"]),
     ("flow_only", ["flow.mean_velocity=0 m/day"]),
     ("initial_mesh", ["substrates.boundary=closed", "numerics.transport=gear"]),
