@@ -265,15 +265,16 @@ def test_elements_are_small_beside_the_upper_wall_s_contact_lines_alone():
 
 @pytest.mark.parametrize("count", [1, 7])
 def test_rows_within_steps_are_counted_as_parts_of_steps(count):
-    """What a run is expected to take grows with its rows as it does with its steps."""
+    """What a run is expected to take grows with its rows as it does with its steps, and with the mesh."""
     times = [round(0.31 * k, 2) for k in range(count + 1)]
     scene = load_scene("base", ["numerics.preset=fast", "growth.end=3 h",
                                 "output.times=[" + ", ".join(f'"{time} h"' for time in times) + "]"])
     assert rows_within(scene) == {*times[1:]}
     free, touching = cost.steps(scene)
     parts = cost.REMESHING * (free + cost.IN_CONTACT * touching + cost.ROW * count)
-    found = cost.expected(scene, cost.Trial(None, 5.0, 2.0, 100, None), 100)
-    assert found.seconds == pytest.approx(5.0 + 2.0 * parts, rel=1e-12)
+    found = cost.expected(scene, cost.Trial(None, 5.0, 2.0, 1000, (100.0, 180.0)), 4000)
+    assert found.seconds == pytest.approx((5.0 + 2.0 * parts) * 4**1.2, rel=1e-12)
+    assert found.memory == pytest.approx(100 + 4 * 80 * cost.REMESHING, rel=1e-12)
 
 
 def test_of_what_differs_the_first_four_are_told():

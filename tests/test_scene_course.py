@@ -22,7 +22,6 @@ from repro.scene.units import Timed
 from tests.pages import run
 from tests.shell import resumed
 from tests.strategies import scene
-from tests.test_scene import refusal
 from tests.test_scene_text import fields
 
 DONOR = "substrates.donor.supply"
@@ -50,32 +49,6 @@ def test_every_key_that_takes_a_table_follows_its_sections_interpolation(key):
         made = load_scene("base", [f"{key}={table}", f"{section}.interpolation={word}"], without)
         assert [attrgetter(key)(made.at(time)) for time in (0, 0.5, 1, 2, 9)] == pytest.approx(wanted, rel=1e-15)
         assert attrgetter(key)(made.largest) == 6 and [made.corner(time) for time in (0, 1, 4)] == [1, 4, inf]
-
-
-@pytest.mark.parametrize("table, told", [
-    ("[]", "a table of 1 to 1000 entries is needed"),
-    ('[["1 h", "1 mg/L"]]', 'the time of the first entry of a table must be "0 h"'),
-    ('[["0 h", "1 mg/L"], ["2 h", "1 mg/L"], ["2 h", "0 mg/L"]]', "2 h of entry 3 is not after 2 h"),
-    ('[["0 h", "1 mg/L"], ["2 h", "1 um"]]', "entry 2 of a table must be a time of zero or more and a concentration"),
-    ('[["0 h", "1 mg/L"], ["2 h", "-1 mg/L"]]', "entry 2 of a table must be"),
-    ('[["0 mg/L", "1 h"]]', "entry 1 of a table must be"), ('[["0 h"]]', "entry 1 of a table must be a time and a"),
-    ('["0 h", "1 mg/L"]', "entry 1 of a table must be a time and a value"),
-    ("3", 'or a table such as [["0 h", "10 mg/L"], ["5 h", "10 mg/L"]] (did you mean "3 mg/L"?)')])
-def test_what_is_no_table_is_refused_in_one_line(table, told):
-    message = refusal("base", f"{DONOR}={table}")
-    assert message.startswith(f"base: {DONOR} = ") and told in message
-
-
-@pytest.mark.parametrize("entry, told", [
-    ('flow.mean_velocity=[["0 h", "1 m/day"], ["2 h", "0 m/day"]]', "greater than zero is needed"),
-    ('flow.head=[["0 h", "1 cm"], ["2 h", "0 cm"]]', "greater than zero"),
-    ('flow.mean_velocity=[["0 h", "1 m/day"]]', "flow.head (10 um) is given too"),
-    ("flow.interpolation=linear", '"steps" is needed where no table'),
-    ("substrates.acceptor.interpolation=linear", '"steps" is needed where no table')])
-def test_what_no_run_can_do_is_refused(entry, told):
-    unset = ["flow.head"] if "0 m/day" in entry else []
-    message = refusal("base", entry, unset=unset)
-    assert message.startswith(f"base: {entry.partition('=')[0]} = ") and told in message
 
 
 @given(st.lists(st.floats(0.01, 10.0), min_size=1, max_size=5), st.lists(st.floats(0.0, 9.0), min_size=6, max_size=6),

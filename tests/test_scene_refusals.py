@@ -14,6 +14,7 @@ from tests.test_scene_text import fields
 LENGTH = 'a length is needed, such as "100 um" (greater than zero)'
 DEEP = ".".join("a" * 20_000)
 SCOPED = "is not modelled, see docs/scope.md"
+DONOR = "substrates.donor.supply"
 MOLES = "; moles need a molar mass, which is not known here: give milligrams"
 
 
@@ -64,7 +65,8 @@ REFUSED = {
         "substrates.donor.diffusivity_in_aggregate=-1 cm^2/day", "kinetics.decay_oxygen_demand=0",
         "kinetics.acceptor_to_donor_ratio=0", "kinetics.maximum_density=0 mg/L", "growth.time_step=0 h",
         "growth.shear_modulus=0 MPa", "growth.minimum_film=0 um", "numerics.refinement=0",
-        "numerics.flow_stabilisation=0", "numerics.mesh_compressibility=-1"],
+        "numerics.flow_stabilisation=0", "numerics.mesh_compressibility=-1",
+        'flow.head=[["0 h", "1 cm"], ["2 h", "0 cm"]]'],
     "zero or more": ["substrates.acceptor.supply=-1 mg/L", "kinetics.maximum_utilization_rate=-1 1/day",
                      "kinetics.decay_coefficient=-1 1/day", "growth.end=-1 h"],
     "greater than 0, at most 1": ["kinetics.yield_coefficient=0", "kinetics.yield_coefficient=1.01"],
@@ -125,6 +127,17 @@ REFUSED = {
     'aggregate.radius = "80 um": less than pore.width (50 um)': ['aggregate.radius="80 um"'],
     "aggregate.radius": ["aggregate.radius=50 um"],
     "growth.minimum_film": ["growth.minimum_film=50 um"],
+    # tables over time
+    "a table of 1 to 1000 entries is needed": [f"{DONOR}=[]"],
+    'the time of the first entry of a table must be "0 h"': [f'{DONOR}=[["1 h", "1 mg/L"]]'],
+    "2 h of entry 3 is not after 2 h": [f'{DONOR}=[["0 h", "1 mg/L"], ["2 h", "1 mg/L"], ["2 h", "0 mg/L"]]'],
+    "entry 2 of a table must be a time of zero or more and a concentration": [
+        f'{DONOR}=[["0 h", "1 mg/L"], ["2 h", "{value}"]]' for value in ("1 um", "-1 mg/L")],
+    "entry 1 of a table must be a time": [
+        f"{DONOR}={value}" for value in ('[["0 mg/L", "1 h"]]', '[["0 h"]]', '["0 h", "1 mg/L"]')],
+    'or a table such as [["0 h", "10 mg/L"], ["5 h", "10 mg/L"]] (did you mean "3 mg/L"?)': [f"{DONOR}=3"],
+    "flow.head (10 um) is given too": ['flow.mean_velocity=[["0 h", "1 m/day"]]'],
+    '"steps" is needed where no table': ["flow.interpolation=linear", "substrates.acceptor.interpolation=linear"],
     # times
     "a list of times is needed": ["output.times=5 h", "output.times=[]", "output.times=[5 h, 6 h]", "output.times=[5]",
                                   'output.times=["5 um"]', 'output.times=["-1 h", "1 h"]', 'output.times=[["1 h"]]'],
@@ -151,6 +164,7 @@ def test_every_key_is_refused_what_it_does_not_take():
 
 @pytest.mark.parametrize("source, overrides, said", [
     ("wide", ["flow.mean_velocity=-1 m/day"], "a velocity is needed"),
+    ("wide", ['flow.mean_velocity=[["0 h", "1 m/day"], ["2 h", "0 m/day"]]'], "greater than zero is needed"),
     ("initial_mesh", ["flow.viscosity_ratio=5"], "flow.head is missing: it or flow.mean_velocity is needed"),
     ("base", ["flow.permeability=1e-15 m^2"], 'flow.biomass = "brinkman" is needed with it'),
     ("base", ["flow.biomass=brinkman"], 'flow.permeability is needed with "brinkman", such as "1e-15 m^2"'),
