@@ -3,7 +3,7 @@ in: at a late, uneven pore that the aggregate has plugged, where no two quantiti
 import math
 from collections import Counter
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 
 import numpy as np
 import pytest
@@ -207,6 +207,7 @@ def derived_arrays(scene, at):
     mesh, body = now.mesh, now.body
     own = mesh.cells[mesh.biomass]
     inside = sorted(set(own.ravel().tolist()))
+
     def at_nodes(field, order=now.space.order, cells=now.space.cells):
         values, of = np.empty((len(mesh.points), *field.shape[1:])), functions(order, NODES[mesh.geometry])[0]
         values[mesh.cells] = np.einsum("ak,tk...->ta...", of, field[cells])
@@ -217,9 +218,6 @@ def derived_arrays(scene, at):
         found[where] = values
         return found
 
-    nodal, by_triangle = partial(only, where=inside, count=len(mesh.points)), partial(
-        only, where=mesh.biomass, count=len(mesh.cells))
-
     def plane(vectors):
         return np.column_stack([vectors, np.where(np.isnan(vectors[:, 0]), np.nan, 0.0)])
 
@@ -227,8 +225,9 @@ def derived_arrays(scene, at):
     found = {"velocity_m_per_d": plane(at_nodes(flow.velocity)) * 24 / 1e6,
              "head_cm": at_nodes(flow.head, head_order, mesh.cells[:, : len(NODES[head_order])]) / 1e4,
              "acceptor_mg_per_L": at_nodes(state.acceptor), "donor_mg_per_L": at_nodes(state.donor),
-             "displacement_um": plane(nodal(mesh.points[inside] - body.reference)),
-             "position_t0_um": plane(nodal(body.reference)), "region": mesh.biomass.astype(float)}
+             "displacement_um": plane(only(mesh.points[inside] - body.reference, inside, len(mesh.points))),
+             "position_t0_um": plane(only(body.reference, inside, len(mesh.points))),
+             "region": mesh.biomass.astype(float)}
     for name in ("active", "inert"):
         found[f"{name}_biomass"] = density_at_nodes(now, getattr(now, name)) / scene.kinetics.maximum_density
     places, weights = rule_with(now.theta.shape[1])
@@ -238,16 +237,16 @@ def derived_arrays(scene, at):
     F = np.zeros((*whole.shape, 3, 3))
     F[..., :2, :2], F[..., 2, 2] = after @ np.linalg.inv(before), 1.0
     P = now.pressure[own[:, :3]] @ functions(1, places)[0].T
-    found["pressure_MPa"] = nodal(
-        scene.growth.shear_modulus * at_nodes(now.pressure, 1, mesh.cells[:, :3])[inside])
-    found["theta"] = by_triangle((now.theta * whole).sum(1) / whole.sum(1))
-    found["J"] = by_triangle((np.linalg.det(after) @ weights) / whole.sum(1))
-    sigma = scene.growth.shear_modulus * cauchy(F, P)
-    mean = (sigma * whole[..., None, None]).sum(1) / whole.sum(1)[:, None, None]
+    modulus = scene.growth.shear_modulus
+    pressure = modulus * at_nodes(now.pressure, 1, mesh.cells[:, :3])
+    found["pressure_MPa"] = only(pressure[inside], inside, len(mesh.points))
+    sigma = modulus * cauchy(F, P)
+    means = {"theta": now.theta, "J": np.linalg.det(F),
+             "largest_principal_stress_MPa": np.linalg.eigvalsh(sigma)[..., -1]}
     for name, (i, j) in {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1)}.items():
-        found[f"stress_{name}_MPa"] = by_triangle(mean[:, i, j])
-    largest = np.linalg.eigvalsh(sigma)[..., -1]
-    found["largest_principal_stress_MPa"] = by_triangle((largest * whole).sum(1) / whole.sum(1))
+        means[f"stress_{name}_MPa"] = sigma[..., i, j]
+    for name, values in means.items():
+        found[name] = only((values * whole).sum(1) / whole.sum(1), mesh.biomass, len(mesh.cells))
     return found
 
 
@@ -309,9 +308,9 @@ def leaky(column, leak):
                    biomass_before=70.0, biomass_made=grown - decayed, biomass_after=70.0 + grown - decayed)
     more = leak * max(abs(grown), abs(decayed))  # over the larger of what grows and what decays
     # Of a defect over what is supplied: x = (s - s0) / s, so s = s0 / (1 - x).
-    changes = {"supplied": (5.0 / (1 - leak), 3.0)}, {"supplied": (5.0, 3.0 / (1 - leak))}, {
-        "biomass_after": even.biomass_after / (1 - leak)}, {
-        "biomass_made": even.biomass_made + more, "biomass_after": even.biomass_after + more}
+    changes = [{"supplied": (5.0 / (1 - leak), 3.0)}, {"supplied": (5.0, 3.0 / (1 - leak))},
+               {"biomass_after": even.biomass_after / (1 - leak)},
+               {"biomass_made": even.biomass_made + more, "biomass_after": even.biomass_after + more}]
     middle = replace(even, **changes[BALANCES.index(column)])
     return scene, replace(at, ledgers=(even, middle, even))
 

