@@ -119,9 +119,10 @@ def arcs(now):
     loop = now.mesh.loop
     if now.mesh.geometry == 1:
         return now.mesh.points[loop]
-    a, m, b = (now.mesh.points[np.roll(loop, -k)[::2]][:, None] for k in range(3))
-    t = np.linspace(0, 1, 2001)[None, :, None]
-    return (a * (1 - t) * (1 - 2 * t) + 4 * m * t * (1 - t) + b * t * (2 * t - 1)).reshape(-1, 2)
+    t = np.linspace(0, 1, 2001)
+    along = np.column_stack([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)])
+    ends_and_middles = np.column_stack([loop[::2], loop[1::2], np.roll(loop[::2], -1)])
+    return (along @ now.mesh.points[ends_and_middles]).reshape(-1, 2)
 
 
 def taken_up(scene, now, state):

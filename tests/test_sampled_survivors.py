@@ -26,7 +26,7 @@ from repro.fem.mesher import unlocked
 from repro.fem.outline import BOTTOM, TOP
 from repro.march.simulation import rows_within, simulate, steps
 from repro.model import remeshing
-from repro.model.contact import contact_lines, middle_of
+from repro.model.contact import contact_lines
 from repro.model.pore import initial_outline, seeded, solve
 from repro.report import charts, fields, run_page
 from repro.results import names, netcdf, vtu
@@ -102,13 +102,6 @@ def test_the_name_of_what_is_drawn_stands_in_the_middle_of_its_axis():
     top, bottom = map(float, re.search(r'class="now" x1="0" x2="0" y1="([0-9.]+)" y2="([0-9.]+)"', drawn).groups())
     named = float(re.search(r'class="name" transform="translate\(10 ([0-9.]+)\)', drawn)[1])
     assert named == (top + bottom) / 2
-
-
-def test_the_middle_of_a_contact_surface_is_that_of_a_seed_anywhere():
-    outline = initial_outline(load_scene("base", ["aggregate.position=40 um"]))
-    (chosen,) = outline.points[middle_of(outline, BOTTOM), 0]
-    on = outline.points[outline.wall == BOTTOM, 0]
-    assert abs(chosen - 40) == np.abs(on - 40).min() < 0.1 * np.ptp(on)
 
 
 def test_contact_lines_are_where_they_are_whatever_node_is_the_first():

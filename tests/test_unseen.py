@@ -29,7 +29,6 @@ from repro.report import charts, comparison, fields, quantities, run_page
 from repro.report.reading import Run
 from repro.results import picture, vtu
 from repro.results.tables import Results
-from repro.results.vtu import Cells, Grid
 from repro.run import progress, running
 from repro.scene import load_scene
 from repro.sweep import making, page, table
@@ -226,18 +225,16 @@ def test_beyond_the_old_mesh_there_is_what_flows_or_diffuses_there(speed, order)
     """Upstream (26) with each substrate's own diffusivity, downstream what leaves; without flow the supply."""
     scene, now = base(order)
     new = base(order, "numerics.extent=full")[1].space
-    x = places_of(now.space)[:, 0]
-    state = transport.Concentrations(3 + 0.01 * x, 2 - 0.02 * x)
+    before, x = (places_of(space)[:, 0] for space in (now.space, new))
+    state = transport.Concentrations(3 + 0.01 * before, 2 - 0.02 * before)
     found = remeshing.carried_substrates(scene, now.space, new, state, speed)
-    x = places_of(new)[:, 0]
     first, last = now.mesh.ends
+    apart = np.abs([x - first, x - last]).min(axis=0) > 1e-9
     for name, slope, start in (("acceptor", 0.01, 3), ("donor", -0.02, 2)):
         kind = getattr(scene.substrates, name)
-        wanted = start + slope * np.clip(x, first, last)
         faded = np.exp(speed * np.minimum(x - first, 0) / kind.diffusivity)
         faded[(x < first) | (x > last)] *= speed > 0
-        wanted = kind.supply - (kind.supply - wanted) * faded
-        apart = np.abs([x - first, x - last]).min(axis=0) > 1e-9
+        wanted = kind.supply - (kind.supply - start - slope * np.clip(x, first, last)) * faded
         assert getattr(found, name)[apart] == pytest.approx(wanted[apart], rel=1e-9) and apart.sum() > 0.9 * len(x)
 
 
@@ -464,14 +461,6 @@ def test_a_step_misses_the_tolerance_by_more_than_is_accepted_alone():
         assert missed(Pace(1.0, 1.0, 0.3 * part), 0.3) is wanted
 
 
-def test_lines_of_a_chart_are_told_apart_by_words_of_their_own():
-    for kind in quantities.KINDS:
-        drawn = [quantities.KNOWN[name] for name in kind.drawn]
-        assert len({each.label for each in drawn}) == len(drawn), kind.title
-        for each in drawn:
-            assert each.label in (each.words if len(drawn) > 1 else kind.title.casefold()) or "demand" in each.label
-
-
 def test_xarray_has_units_that_udunits_knows():
     pytest.importorskip("xarray")
     said = Results("x", [dict.fromkeys(results.COLUMNS, 1.0)], [], "completed").to_xarray()
@@ -494,11 +483,7 @@ def test_a_tick_has_the_number_of_its_place(low, high):
 
 
 def test_frames_before_an_expansion_are_not_counted_as_times():
-    grid = Grid(np.zeros((3, 3)), [Cells("triangle", np.array([[0, 1, 2]]))])
-    after = [(float(k), Path(f"after{k}")) for k in range(50)]
-    chosen = fields._chosen(after, {time: Path("before") for time, _ in after}, grid, 10**9)
-    assert [note for *_, note in chosen] == [fields.BEFORE, ""] * fields.MOST_FRAMES
-    frames = [{"note": note} if note else {} for *_, note in chosen]
+    frames = [{"note": fields.BEFORE}, {}] * 40
     said = run_page._field_note({"meshes": [{"per": 3}], "nodes": 3, "frames": frames, "of": 50, "fields": []})
     assert "; 40 of 50 times shown, those grown and not yet expanded besides." in said
 
