@@ -74,9 +74,8 @@ LIST = "a list of 3 to 1000 points [x, y], each a pair of lengths, is needed, su
 
 @pytest.mark.parametrize("points, said", [
     *((points, LIST) for points in (
-        [], BUMP[:2], [["0 um", "0 um"]] * 1001, "-5 um, 0 um", 5, {}, [["-5 um", "0 um", "0 um"], *BUMP[1:]],
-        [["-5 um"], *BUMP[1:]], [[-5, 0], [0, 4], [5, 0]], [["-5 h", "0 um"], *BUMP[1:]], ["-5 um", "0 um", "5 um"],
-        [["nan um", "0 um"], *BUMP[1:]])),
+        [], BUMP[:2], [["0 um", "0 um"]] * 1001, "-5 um, 0 um", [["-5 um", "0 um", "0 um"], *BUMP[1:]],
+        [[-5, 0], [0, 4], [5, 0]], [["-5 h", "0 um"], *BUMP[1:]], [["nan um", "0 um"], *BUMP[1:]])),
     # no outline
     ([["-5 um", "1 um"], *BUMP[1:]], "y = 0 um at the first and the last point is needed"),
     ([*BUMP[:-1], ["5 um", "-1 um"]], "y = 0 um at the first and the last point is needed"),
@@ -84,9 +83,7 @@ LIST = "a list of 3 to 1000 points [x, y], each a pair of lengths, is needed, su
     ([BUMP[0], BUMP[1], BUMP[0]], "the upstream end first"),
     ([BUMP[0], ["0 um", "0 um"], BUMP[3]], "0 < y <= pore.width (50 um) at point 2 (0 um, 0 um) is needed"),
     ([*BUMP[:3], ["6 um", "-4 um"], BUMP[3]], "0 < y <= pore.width (50 um) at point 4 (6 um, -4 um)"),
-    ([BUMP[0], ["0 um", "50.1 um"], BUMP[3]], "0 < y <= pore.width (50 um) at point 2 (0 um, 50.1 um)"),
     ([["-300 um", "0 um"], *BUMP[1:]], "|x| < half of pore.length (600 um) at point 1 (-300 um, 0 um) is needed"),
-    ([*BUMP[:2], ["1 m", "3 um"], BUMP[3]], "at point 3 (1e+06 um, 3 um)"),
     ([BUMP[0], BUMP[1], BUMP[1], BUMP[3]], "(50 um) or more is needed from point 2 to the next"),
     ([["-5 um", "0 um"], ["5 um", "4 um"], ["-5 um", "4 um"], ["5 um", "0 um"]], "neither crosses nor touches itself"),
     ([["-5 um", "0 um"], ["0 um", "9 um"], ["0 um", "2 um"], ["0 um", "8 um"], ["5 um", "0 um"]], "nor touches"),

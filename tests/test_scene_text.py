@@ -36,23 +36,20 @@ def uncommented(text, but=()):
     return "\n".join(map(active, text.splitlines()))
 
 
-@pytest.mark.parametrize("name", packaged_scenes())
-def test_what_is_printed_is_the_scene_and_nothing_else(name, capsys):
-    assert main(["scene", name]) == 0
-    printed = capsys.readouterr()
-    assert parsed(printed.out, name) == load_scene(name) and printed.err == "" and printed.out.isascii()
-
-
 @pytest.mark.parametrize("preset", PRESETS)
 @pytest.mark.parametrize("name", packaged_scenes())
-def test_defaults_that_are_made_active_change_nothing(name, preset):
-    """All at once, those of the sections that the scene has."""
+def test_what_is_printed_is_the_scene_and_nothing_else(name, preset, capsys):
+    """And so it is with all defaults made active at once, those of the sections that the scene has."""
+    change = f"numerics.preset={preset}"
+    assert main(["scene", name, "--set", change]) == 0
+    text, errors = capsys.readouterr()
     lines, inside = [], True
-    for line in scene_text(name, [f"numerics.preset={preset}"]).splitlines():
+    for line in text.splitlines():
         inside = line.startswith("[") if re.match(r"#?\[", line) else inside
         lines.append(line if inside else "")
-    made = parsed(uncommented("\n".join(lines), but={*OTHER_DRIVE, *EXAMPLES}), name)
-    assert made == load_scene(name, [f"numerics.preset={preset}"])
+    active = uncommented("\n".join(lines), but={*OTHER_DRIVE, *EXAMPLES})
+    assert parsed(text, name) == parsed(active, name) == load_scene(name, [change])
+    assert errors == "" and text.isascii()
 
 
 @pytest.mark.parametrize("name", packaged_scenes())
