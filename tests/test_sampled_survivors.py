@@ -29,7 +29,7 @@ from repro.model import remeshing
 from repro.model.contact import contact_lines
 from repro.model.pore import initial_outline, seeded, solve
 from repro.report import charts, fields, run_page
-from repro.results import names, netcdf, vtu
+from repro.results import netcdf, vtu
 from repro.run import checkpoint, running, stored
 from repro.scene import load_scene
 from repro.sweep import page, table
@@ -175,11 +175,6 @@ def test_a_second_signal_ends_the_process_with_the_signal_s_status():
             "with noted():\n    for _ in range(2):\n        os.kill(os.getpid(), signal.SIGTERM)\n"
             "        time.sleep(SAME + 0.2)")
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 128 + signal.SIGTERM
-
-
-def test_a_label_has_the_unit_where_there_is_one():
-    assert names.with_unit("mean_velocity_m_per_d") == "mean velocity (m/day)"
-    assert names.with_unit("nodes") == names.words("nodes") and "(" not in names.with_unit("nodes")
 
 
 def test_what_is_modelled_is_told():
