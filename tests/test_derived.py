@@ -89,12 +89,10 @@ def over_end(space, x, *fields):
     nodes = np.flatnonzero(np.abs(place[:, 0] - x) < 1e-9)
     nodes = nodes[np.argsort(place[nodes, 1])]
     at, weights = np.polynomial.legendre.leggauss(6)
-    knots = np.linspace(-1, 1, space.order + 1)
-    along = np.vander(at, space.order + 1) @ np.linalg.inv(np.vander(knots, space.order + 1))
-    total = 0.0
+    knots, total = np.linspace(-1, 1, space.order + 1), 0.0
     for k in range(0, len(nodes) - 1, space.order):
         edge = nodes[k: k + space.order + 1]
-        product = math.prod(along @ field[edge] for field in fields)
+        product = math.prod(np.polyval(np.polyfit(knots, field[edge], space.order), at) for field in fields)
         total += (place[edge[-1], 1] - place[edge[0], 1]) / 2 * weights @ product
     return total
 
@@ -121,9 +119,10 @@ def arcs(now):
     loop = now.mesh.loop
     if now.mesh.geometry == 1:
         return now.mesh.points[loop]
-    a, m, b = (now.mesh.points[np.roll(loop, -k)[::2]][:, None] for k in range(3))
-    t = np.linspace(0, 1, 2001)[None, :, None]
-    return (a * (1 - t) * (1 - 2 * t) + 4 * m * t * (1 - t) + b * t * (2 * t - 1)).reshape(-1, 2)
+    t = np.linspace(0, 1, 2001)
+    along = np.column_stack([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)])
+    ends_and_middles = np.column_stack([loop[::2], loop[1::2], np.roll(loop[::2], -1)])
+    return (along @ now.mesh.points[ends_and_middles]).reshape(-1, 2)
 
 
 def taken_up(scene, now, state):
@@ -209,19 +208,15 @@ def derived_arrays(scene, at):
     mesh, body = now.mesh, now.body
     own = mesh.cells[mesh.biomass]
     inside = sorted(set(own.ravel().tolist()))
+
     def at_nodes(field, order=now.space.order, cells=now.space.cells):
         values, of = np.empty((len(mesh.points), *field.shape[1:])), functions(order, NODES[mesh.geometry])[0]
         values[mesh.cells] = np.einsum("ak,tk...->ta...", of, field[cells])
         return values
 
-    def nodal(values):
-        found = np.full((len(mesh.points), *values.shape[1:]), np.nan)
-        found[inside] = values
-        return found
-
-    def by_triangle(values):
-        found = np.full(len(mesh.cells), np.nan)
-        found[mesh.biomass] = values
+    def only(values, where, count):
+        found = np.full((count, *values.shape[1:]), np.nan)
+        found[where] = values
         return found
 
     def plane(vectors):
@@ -231,8 +226,9 @@ def derived_arrays(scene, at):
     found = {"velocity_m_per_d": plane(at_nodes(flow.velocity)) * 24 / 1e6,
              "head_cm": at_nodes(flow.head, head_order, mesh.cells[:, : len(NODES[head_order])]) / 1e4,
              "acceptor_mg_per_L": at_nodes(state.acceptor), "donor_mg_per_L": at_nodes(state.donor),
-             "displacement_um": plane(nodal(mesh.points[inside] - body.reference)),
-             "position_t0_um": plane(nodal(body.reference)), "region": mesh.biomass.astype(float)}
+             "displacement_um": plane(only(mesh.points[inside] - body.reference, inside, len(mesh.points))),
+             "position_t0_um": plane(only(body.reference, inside, len(mesh.points))),
+             "region": mesh.biomass.astype(float)}
     for name in ("active", "inert"):
         found[f"{name}_biomass"] = density_at_nodes(now, getattr(now, name)) / scene.kinetics.maximum_density
     places, weights = rule_with(now.theta.shape[1])
@@ -242,16 +238,16 @@ def derived_arrays(scene, at):
     F = np.zeros((*whole.shape, 3, 3))
     F[..., :2, :2], F[..., 2, 2] = after @ np.linalg.inv(before), 1.0
     P = now.pressure[own[:, :3]] @ functions(1, places)[0].T
-    found["pressure_MPa"] = nodal(
-        scene.growth.shear_modulus * at_nodes(now.pressure, 1, mesh.cells[:, :3])[inside])
-    found["theta"] = by_triangle((now.theta * whole).sum(1) / whole.sum(1))
-    found["J"] = by_triangle((np.linalg.det(after) @ weights) / whole.sum(1))
-    sigma = scene.growth.shear_modulus * cauchy(F, P)
-    mean = (sigma * whole[..., None, None]).sum(1) / whole.sum(1)[:, None, None]
+    modulus = scene.growth.shear_modulus
+    pressure = modulus * at_nodes(now.pressure, 1, mesh.cells[:, :3])
+    found["pressure_MPa"] = only(pressure[inside], inside, len(mesh.points))
+    sigma = modulus * cauchy(F, P)
+    means = {"theta": now.theta, "J": np.linalg.det(F),
+             "largest_principal_stress_MPa": np.linalg.eigvalsh(sigma)[..., -1]}
     for name, (i, j) in {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1)}.items():
-        found[f"stress_{name}_MPa"] = by_triangle(mean[:, i, j])
-    largest = np.linalg.eigvalsh(sigma)[..., -1]
-    found["largest_principal_stress_MPa"] = by_triangle((largest * whole).sum(1) / whole.sum(1))
+        means[f"stress_{name}_MPa"] = sigma[..., i, j]
+    for name, values in means.items():
+        found[name] = only((values * whole).sum(1) / whole.sum(1), mesh.biomass, len(mesh.cells))
     return found
 
 
@@ -301,9 +297,7 @@ def test_a_density_over_the_largest_reads_as_it_is():
     assert shown.max() == pytest.approx(1.2, rel=1e-12)
 
 
-#: What a leak changes, and of which substrate.
-LEAKS = {"acceptor_balance": ("supplied", 0), "donor_balance": ("supplied", 1), "biomass_balance": ("biomass_after", 0),
-         "oxygen_demand_balance": ("biomass_made", 0)}
+BALANCES = [f"{name}_balance" for name in ("acceptor", "donor", "biomass", "oxygen_demand")]
 
 
 def leaky(column, leak):
@@ -313,28 +307,23 @@ def leaky(column, leak):
     grown, decayed = 2 * k.yield_coefficient, (4 - 2 * k.acceptor_to_donor_ratio) / k.decay_oxygen_demand
     even = replace(at.ledgers[0], supplied=(5.0, 3.0), out=(1.0, 1.0), consumed=(4.0, 2.0), stored=(0.0, 0.0),
                    biomass_before=70.0, biomass_made=grown - decayed, biomass_after=70.0 + grown - decayed)
-    name, which = LEAKS[column]
-    if name == "supplied":
-        # Of a defect over what is supplied: x = (s - s0) / s, so s = s0 / (1 - x).
-        supplied = [5.0, 3.0]
-        supplied[which] /= 1 - leak
-        middle = replace(even, supplied=tuple(supplied))
-    elif name == "biomass_after":
-        middle = replace(even, biomass_after=even.biomass_after / (1 - leak))
-    else:  # over the larger of what grows and what decays
-        more = leak * max(abs(grown), abs(decayed))
-        middle = replace(even, biomass_made=even.biomass_made + more, biomass_after=even.biomass_after + more)
+    more = leak * max(abs(grown), abs(decayed))  # over the larger of what grows and what decays
+    # Of a defect over what is supplied: x = (s - s0) / s, so s = s0 / (1 - x).
+    changes = [{"supplied": (5.0 / (1 - leak), 3.0)}, {"supplied": (5.0, 3.0 / (1 - leak))},
+               {"biomass_after": even.biomass_after / (1 - leak)},
+               {"biomass_made": even.biomass_made + more, "biomass_after": even.biomass_after + more}]
+    middle = replace(even, **changes[BALANCES.index(column)])
     return scene, replace(at, ledgers=(even, middle, even))
 
 
 @pytest.mark.parametrize("leak", [0.01, -0.01])
-@pytest.mark.parametrize("column", LEAKS)
+@pytest.mark.parametrize("column", BALANCES)
 def test_a_leak_in_the_middle_of_three_steps_is_read_with_its_sign(column, leak):
     """In timeseries.csv and on the page, and of the oxygen demand in ledger.csv."""
     scene, at = leaky(column, leak)
     row = results.row(scene, at)
     assert row[column] == pytest.approx(leak, rel=1e-9)
-    assert max(abs(row[name]) for name in LEAKS if name != column) < 1e-6
+    assert max(abs(row[name]) for name in BALANCES if name != column) < 1e-6
     steps = [dict(zip(results.LEDGER_COLUMNS, results.ledger_row(scene, ledger))) for ledger in at.ledgers]
     wanted = [0.0, leak if column == "oxygen_demand_balance" else 0.0, 0.0]
     assert [step["oxygen_demand_balance"] for step in steps] == pytest.approx(wanted, rel=1e-9, abs=1e-12)
@@ -345,19 +334,14 @@ def test_a_leak_in_the_middle_of_three_steps_is_read_with_its_sign(column, leak)
     assert line.values[-1] == pytest.approx(leak, rel=1e-9) and "relative defect" in chart.axis
 
 
-def lossy(time):
-    """Instants of linear elements whose masses are interpolated on new meshes [E8]."""
-    scene = load_scene("base", ["numerics.refinement=0.5", "numerics.transfer=linear", f"numerics.time={time}",
-                                'pore.width="20 um"', 'growth.end="0.4 h"', "flow.head=1e-2 cm"])
-    return scene, list(simulate(scene, SHAPE))
-
-
 @pytest.mark.parametrize("time", ["updates", "midpoint"])
 def test_what_a_new_mesh_loses_is_not_taken_for_made(time):
-    """What an interpolation loses is a defect of the biomass, and nothing that was made: the oxygen demand says so."""
-    scene, found = lossy(time)
-    steps = [ledger for instant in found for ledger in instant.ledgers]
-    rows = [dict(zip(results.LEDGER_COLUMNS, results.ledger_row(scene, ledger))) for ledger in steps]
+    """What an interpolation loses is a defect of the biomass, and nothing that was made: the oxygen demand says so.
+
+    Of linear elements, whose masses are interpolated [E8]."""
+    scene = load_scene("base", ["numerics.refinement=0.5", "numerics.transfer=linear", f"numerics.time={time}",
+                                'pore.width="20 um"', 'growth.end="0.4 h"', "flow.head=1e-2 cm"])
+    found = list(simulate(scene, SHAPE))
     assert any(instant.remeshes for instant in found)
     for instant in found:
         if instant.remeshes:
@@ -366,11 +350,10 @@ def test_what_a_new_mesh_loses_is_not_taken_for_made(time):
             assert abs(lost) > 1e-6 * ledger.biomass_after
             assert results.row(scene, instant)["biomass_balance"] == lost / ledger.biomass_after
     k = scene.kinetics
-    for row in rows:
-        acceptor, donor = row["acceptor_consumed_pg_per_m"], row["donor_consumed_pg_per_m"]
+    for ledger in (ledger for instant in found for ledger in instant.ledgers):
+        acceptor, donor = ledger.consumed
         grown, spent = k.yield_coefficient * donor, acceptor - k.acceptor_to_donor_ratio * donor
-        left = row["biomass_made_pg_per_m"] - grown + spent / k.decay_oxygen_demand
-        assert abs(left) <= 2e-4 * grown
+        assert abs(ledger.biomass_made - grown + spent / k.decay_oxygen_demand) <= 2e-4 * grown
 
 
 def test_every_column_of_the_ledger_is_its_own():
@@ -380,10 +363,9 @@ def test_every_column_of_the_ledger_is_its_own():
                    stored=(9.0, 10.0), biomass_before=11.0, biomass_made=12.0, biomass_after=13.0)
     row = dict(zip(results.LEDGER_COLUMNS, results.ledger_row(scene, step)))
     row.pop("oxygen_demand_balance")  # tests/test_balances.py
-    assert row == {"start_h": 1, "end_h": 2, "acceptor_supplied_pg_per_m": 3, "donor_supplied_pg_per_m": 4,
-                   "acceptor_out_pg_per_m": 5, "donor_out_pg_per_m": 6, "acceptor_consumed_pg_per_m": 7,
-                   "donor_consumed_pg_per_m": 8, "acceptor_stored_pg_per_m": 9, "donor_stored_pg_per_m": 10,
-                   "biomass_before_pg_per_m": 11, "biomass_made_pg_per_m": 12, "biomass_after_pg_per_m": 13}
+    names = [f"{name}_{part}" for part in ("supplied", "out", "consumed", "stored") for name in ("acceptor", "donor")]
+    names += ["biomass_before", "biomass_made", "biomass_after"]
+    assert row == {"start_h": 1, "end_h": 2} | {f"{name}_pg_per_m": k for k, name in enumerate(names, 3)}
 
 
 def apart():
@@ -399,20 +381,15 @@ def test_every_line_of_every_chart_is_the_column_that_it_names():
     run = apart()
     found = {chart.title: chart for chart in quantities.charts_of(run)}
     assert found.keys() == {*CHARTS, *LEDGERS, "Ledger: biomass"}
-    for title, columns in CHARTS.items():
-        assert found[title].axis.endswith(AXES.get(title, "")) and [line.label for line in found[title].lines] == [
-            *columns], title
-        for line, column in zip(found[title].lines, columns.values()):
-            wanted = run.series[column]
-            if column == "remeshed":
-                wanted = np.where(wanted == 1, run.series["nodes"], np.nan)
-            assert np.array_equal(line.values, wanted, equal_nan=True) and (line.times == run.times).all(), title
-    for title, columns in LEDGERS.items():
-        assert found[title].axis.endswith("(ug/m/h)")
-        for line, column in zip(found[title].lines, columns.values()):
-            assert line.times.tolist() == [0.5, 2.0]
-            assert line.values == pytest.approx(1e-6 * run.ledger[column] / [1, 2], rel=1e-12), title
-        assert [line.label for line in found[title].lines] == [*columns]
+    made_anew = {"remeshed": np.where(run.series["remeshed"] == 1, run.series["nodes"], np.nan)}
+    known = {name: 1e-6 * values / [1, 2] for name, values in run.ledger.items()} | run.series | made_anew
+    for title, columns in (CHARTS | LEDGERS).items():
+        chart, of_steps = found[title], title in LEDGERS
+        assert chart.axis.endswith("(ug/m/h)" if of_steps else AXES.get(title, "")), title
+        assert [line.label for line in chart.lines] == [*columns], title
+        for line, column in zip(chart.lines, columns.values()):
+            assert line.times.tolist() == ([0.5, 2.0] if of_steps else run.times.tolist())
+            assert line.values == pytest.approx(known[column], rel=1e-12, nan_ok=True), title
     held, made = found["Ledger: biomass"].lines
     assert (held.label, made.label) == ("held", "made since t = 0") and held.times.tolist() == [1.0, 3.0]
     assert held.values == pytest.approx(1e-6 * run.ledger["biomass_after_pg_per_m"], rel=1e-12)
