@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import os
 import select
@@ -19,7 +18,7 @@ PATIENCE = 60.0  # s for an answer
 
 
 class Browser:
-    """One page: ``show`` a file, ``run`` scripts in it, press keys, take pictures; ``requests``: what it asked for."""
+    """One page: ``show`` a file, ``run`` scripts in it, press keys; ``requests``: what it asked for."""
 
     def __enter__(self):
         self.home = tempfile.mkdtemp()
@@ -91,7 +90,7 @@ class Browser:
 
     def press(self, key: str) -> None:
         """A key, pressed and released, as ArrowLeft."""
-        codes = {"ArrowLeft": 37, "Home": 36, "End": 35, "Tab": 9}
+        codes = {"ArrowLeft": 37, "Home": 36, "Tab": 9}
         for kind in ("rawKeyDown", "keyUp"):
             self.call("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=codes[key])
 
@@ -113,11 +112,6 @@ class Browser:
             self.call("Input.dispatchMouseEvent", type=kind, x=box["x"] + part * box["width"], y=y, button="left",
                       buttons=int(kind != "mouseReleased"), clickCount=1)
 
-    def point(self, x: float, y: float, kind: str = "mouseMoved") -> None:
+    def point(self, x: float, y: float) -> None:
         """The pointer at a place of the window (CSS pixels)."""
-        self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="none")
-
-    def picture(self, path: Path) -> None:
-        """A PNG of the whole page."""
-        content = self.call("Page.captureScreenshot", captureBeyondViewport=True)["data"]
-        path.write_bytes(base64.b64decode(content))
+        self.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y, button="none")
