@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from repro.march.pace import EXCESS, FASTER, SAFETY, SLOWER, STRETCH, Pace, allowed, fitted, following
+from repro.march.pace import EXCESS, FASTER, SAFETY, SLOWER, STRETCH, Pace, fitted, following
 from repro.model.biomass import Rates, change
 
 LENGTHS = st.floats(1e-3, 1e3)
@@ -23,13 +23,6 @@ def test_a_step_leaves_no_crumb(length, left, stretch):
     step = fitted(length, left, stretch)
     assert 0 < step <= left and step <= stretch * length * (1 + 2e-9)
     assert step == left or left - step >= step * (1 - 1e-9)
-
-
-@given(LENGTHS, st.floats(1e-9, 10.0))
-def test_a_step_that_is_refused_is_shorter_the_next_time(left, excess):
-    """So that the search ends."""
-    estimate = 0.01 * EXCESS * (1 + excess)
-    assert fitted(allowed(estimate, 0.01) * left, left) < 0.9 * left
 
 
 @given(st.floats(1e-6, 1e-3), st.floats(0.3, 3.0), st.floats(1.0, 3.0))

@@ -24,7 +24,6 @@ from tests.pages import (
     PURE,
     Page,
     check_alone,
-    check_drawn,
     first,
     hostile,
     numbers,
@@ -38,15 +37,6 @@ def test_every_run_has_a_page_that_needs_nothing_else(fast, paper, flow_only):
     for out in (fast, paper, flow_only):
         found = check_alone(text_of(out))
         assert found.outside == [] and {kind for kind, _, _ in found.scripts} == {"style", "script"}
-
-
-def test_charts_of_a_whole_run_are_its_columns(fast):
-    """That the lines of charts are the columns that they name is in `test_derived.py`."""
-    text, charts = text_of(fast), quantities.charts_of(read(fast))
-    assert [chart.title for chart in charts] == [kind.title for kind in quantities.KINDS]
-    check_drawn(text, {chart.title: chart.lines for chart in charts})
-    for word in ("factorise and solve", "Newton iterations, transport", "scene hash", "numpy", "kinematic_viscosity"):
-        assert word in text
 
 
 @pytest.mark.parametrize("name", ["fast", "paper"])

@@ -136,20 +136,3 @@ def test_no_run_is_lost_or_there_twice_where_a_worker_is_killed(workers, tmp_pat
     assert (out / "table.csv").read_bytes() == (here / "table.csv").read_bytes()
     with (out / "runs.csv").open() as lines:
         assert [row["status"] for row in csv.DictReader(lines)] == ["completed"] * 6
-
-
-@pytest.mark.thorough
-def test_a_sweep_that_lost_its_cluster_is_gone_on_with_here(workers, tmp_path):
-    """Interrupted while a run is at work; the same command without a scheduler makes the rest."""
-    address, start = workers
-    out = tmp_path / "sweep"
-    start("one")
-    process = on_cluster(address, out)
-    until(lambda: list(out.glob("runs/0*")) and list(out.glob("runs/.part-*")))
-    process.send_signal(signal.SIGINT)
-    said = process.communicate(timeout=60)[1]
-    assert process.returncode == 130 and "Traceback" not in said, said
-    kept = {path: (path / "run.json").stat().st_mtime_ns for path in out.glob("runs/0*")}
-    assert main(command(out, "--quiet")) == 0
-    assert len(list(out.glob("runs/0*"))) == 6
-    assert kept and kept == {path: (path / "run.json").stat().st_mtime_ns for path in kept}
