@@ -134,21 +134,6 @@ def test_the_keyboard_alone_is_enough(window, runs):
     assert picture(window)["frame"] == "0" and "t = 0 h" in window.run("document.getElementById('now').textContent")
 
 
-@pytest.mark.parametrize("width", [1200, 390])
-def test_a_sweep_has_its_page(window, tmp_path, width):
-    """Nothing is cut off or asked for, and the run's number stays in sight."""
-    out = tmp_path / "sweep"
-    assert main(["sweep", "base", "--vary", "pore.width=30 um,50 um", "--vary", "aggregate.radius=4 um,5 um",
-                 "--set", FAST, "--set", "growth.end=1 h", "--out", str(out), "--quiet"]) == 0
-    page = out / "summary.html"
-    window.show(page, width=width)
-    assert window.requests == [page.resolve().as_uri()]
-    assert window.run("document.documentElement.scrollWidth") <= width
-    assert window.run("document.querySelectorAll('figure > svg').length") == 4
-    window.run("document.querySelector('.wide').scrollLeft = 1e4")
-    assert window.run("document.querySelector('tbody td').getBoundingClientRect().left") >= 0
-
-
 def test_hostile_names_run_nothing(window, tmp_path):
     """Neither from a scene and its status, nor through the policy."""
     out = hostile(run(tmp_path, "base", FAST, 'growth.end="1 h"'))

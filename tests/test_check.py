@@ -3,7 +3,6 @@
 import json
 import math
 import time
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +11,7 @@ from repro.check import checked, cost, numbers, simplifications
 from repro.check.checked import check
 from repro.check.modelled import modelled
 from repro.cli import main
-from repro.march.simulation import rows_within, simulate
+from repro.march.simulation import simulate
 from repro.scene import load_scene, packaged_scenes
 from tests import faults
 from tests.shell import refused
@@ -66,13 +65,6 @@ def test_the_numbers_of_base_are_those_of_table_1():
     for name, value in by_hand.items():
         assert found[name].start == pytest.approx(value, rel=1e-12), name
     assert found["fluid stress over modulus"].end == pytest.approx(998 * 9.81 * 1e-5 / 1e4, rel=1e-12)
-
-
-def test_only_what_is_modelled_has_numbers():
-    assert set(looked_at("flow_only")[0]) == {"Reynolds"} and looked_at("initial_mesh")[0] == {}
-    assert "Damkoehler, donor" not in looked_at("base", "substrates.donor.supply=0 mg/L")[0]
-    still = looked_at("initial_mesh", "substrates={}", "growth.end=1 h")[0]
-    assert set(still) == {"Thiele, acceptor", "Thiele, donor", "transport over growth time"}
 
 
 def test_the_bounds_hold_in_base():
@@ -183,13 +175,11 @@ def test_the_first_steps_double_until_they_are_the_longest(first, longest, durat
 def test_steps_in_contact_and_none():
     assert cost.steps(load_scene("wide")) == (156, 69)
     assert cost.steps(load_scene("flow_only")) == cost.steps(load_scene("base", ["growth.end=0 h"])) == (0, 0)
-    fast, strict = (load_scene("base", ["numerics.preset=fast", f"numerics.tolerance={tolerance}"])
-                    for tolerance in (0.0075, 1e-4))
-    assert sum(cost.steps(strict)) > 4 * sum(cost.steps(fast))  # a hundredth of the tolerance: a tenth of the step
+    few, many = (sum(cost.steps(load_scene("base", ["numerics.preset=fast", f"numerics.tolerance={tolerance}"])))
+                 for tolerance in (0.01, 1e-4))
+    assert many > 4 * few  # a hundredth of the tolerance: a tenth of the step
     beyond = load_scene("base", ["numerics.preset=fast", "numerics.tolerance=1e-300", "growth.end=1 h"])
     assert sum(cost.steps(beyond)) == 5000  # steps are a thousandth of growth.time_step at least
-    assert [len(rows_within(one)) for one in (fast, load_scene("base"))] == [25, 0]
-    assert rows_within(load_scene("base", ['output.times=["0 h", "0.4 h", "0.5 h"]'])) == {0.5}
 
 
 def test_a_trial_takes_few_steps_however_short_they_are(monkeypatch):
@@ -198,15 +188,6 @@ def test_a_trial_takes_few_steps_however_short_they_are(monkeypatch):
     monkeypatch.setattr(cost, "steps_of", lambda scene: (made.append(one) or one for one in steps(scene)))
     trial = cost.tried(load_scene("base", ["numerics.preset=fast", "numerics.tolerance=1e-7"]), 458)
     assert len(made) == 1 + cost.MOST_STEPS and 0 < trial.step < np.inf
-
-
-def test_a_large_mesh_is_not_tried_but_a_coarser_one(monkeypatch):
-    """From which the expected time goes up with a power of the nodes."""
-    monkeypatch.setattr(cost, "MOST_NODES", 400)
-    scene = load_scene("base", ["growth.end=0.2 h"])
-    trial = cost.tried(scene, 783)
-    alike = cost.expected(scene, replace(trial, nodes=783), 783).seconds
-    assert trial.nodes < 500 and cost.expected(scene, trial, 783).seconds > 1.5 * alike
 
 
 @pytest.mark.thorough

@@ -47,12 +47,6 @@ def test_it_says_what_it_is(made):
     assert fills.pop("time_h") is None and np.isnan(list(fills.values())).all()  # CF: a coordinate has none
 
 
-def test_what_is_not_modelled_is_not_a_number(tmp_path):
-    run(tmp_path, "flow_only", SETS[-1])
-    found = content(tmp_path / "run")
-    assert np.isnan(found.effluent_acceptor_mg_per_L).all() and found.mean_velocity_m_per_d[0] == pytest.approx(2.9)
-
-
 def test_without_xarray_it_is_refused_before_the_run(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(rules, "find_spec", lambda name: None)
     line = refused(tmp_path, capsys, "run", "base", *flags(*SETS), "--out", tmp_path / "run")

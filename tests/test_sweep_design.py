@@ -110,12 +110,6 @@ def test_varying_one_of_the_pair_replaces_the_other_and_keeps_the_rest():
     assert point.scene.flow.mean_velocity is None and point.scene.flow.head == 1
 
 
-def test_a_varied_preset_brings_its_defaults():
-    fast, paper = made("numerics.preset=fast, paper")
-    assert (fast.scene.numerics.elements, paper.scene.numerics.elements) == ("quadratic", "linear")
-    assert fast.name[:5] == "0001-" and paper.name[:5] == "0002-" and len({fast.name[5:], paper.name[5:]}) == 2
-
-
 @pytest.mark.parametrize("varied, sets, said", [
     (["pore.width=50 um, 4 um"], [], "run 2 .pore.width = 4 um.: base: aggregate.radius"),
     (["pore.widht=50 um"], [], "did you mean width"),
