@@ -54,7 +54,8 @@ class Browser:
         """The next message; requests are noted."""
         end = time.monotonic() + PATIENCE
         while b"\0" not in self.pending:
-            assert select.select([self.process.stdout], [], [], max(0.0, end - time.monotonic()))[0], "the browser is silent"
+            ready = select.select([self.process.stdout], [], [], max(0.0, end - time.monotonic()))[0]
+            assert ready, "the browser is silent"
             self.pending += self.process.stdout.read(1 << 20)
         text, _, self.pending = self.pending.partition(b"\0")
         found = json.loads(text)

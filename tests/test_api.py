@@ -124,14 +124,6 @@ def test_a_scene_prints_as_its_toml(tmp_path):
     assert repr(load_scene("flow_only")).startswith("<Scene flow_only: pore, aggregate, flow, numerics, output; hash ")
 
 
-def test_representations_are_short(found):
-    """Of ten lines at most."""
-    (instant,) = repro.simulate(load_scene("base", ["growth.end=0 h"]))
-    pore = instant.pore
-    told = [load_scene("base"), found, repro.check("flow_only"), instant, pore, instant.solved, pore.mesh, pore.outline]
-    assert [type(one).__name__ for one in told if len(repr(one)) > 1000 or repr(one).count("\n") > 9] == []
-
-
 def test_check_tells_what_repro_check_does(capsys):
     assert main(["check", "wide"]) == 0
     told = capsys.readouterr().out.partition("Cost")[0]  # which is of a trial
@@ -158,19 +150,17 @@ def test_fields_that_are_lost_are_told_and_none_is_taken_for_another(found, tmp_
     """Of four times two files are gone, then one is damaged, then the list: the others stay what they are, units too,
     and a notebook shows no picture."""
     repro.run(load_scene("base", SHORT), str(tmp_path))
-    loaded = repro.load_run(tmp_path)
     for row in (0, 1):
         (tmp_path / f"fields/fields_000{row}.vtu").unlink()
-    for one in (loaded, repro.load_run(tmp_path)):
-        assert all(same_arrays(one.fields(time), found.fields(time)) for time in (0.4, 0.6))
-        with pytest.raises(OutputError, match=r"fields_0001.vtu: the fields of 0.2 h are miss"):
-            one.fields(0.2)
-        assert one.units == found.units
-    last = tmp_path / "fields/fields_0003.vtu"
-    last.write_text(last.read_text()[:1000])
-    with pytest.raises(OutputError, match="fields_0003.vtu: the fields cannot be read"):
-        loaded.fields(0.6)
+    loaded = repro.load_run(tmp_path)
+    assert all(same_arrays(loaded.fields(time), found.fields(time)) for time in (0.4, 0.6))
+    assert loaded.units == found.units
+    (tmp_path / "fields/fields_0003.vtu").write_text("<VTKFile")
     assert "<img" not in loaded._repr_html_()
+    for time, said in ((0.2, "fields_0001.vtu: the fields of 0.2 h are missing"),
+                       (0.6, "fields_0003.vtu: the fields cannot be read")):
+        with pytest.raises(OutputError, match=said):
+            loaded.fields(time)
     (tmp_path / "fields.pvd").unlink()
     with pytest.raises(OutputError, match=r"fields\.pvd: no fields of 0.6 h are listed"):
         repro.load_run(tmp_path).fields(0.6)

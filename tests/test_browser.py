@@ -112,6 +112,7 @@ def test_the_mouse_moves_every_control(window, runs):
     while picture(window)["frame"] == start:
         assert time.monotonic() < deadline, "nothing plays"
         time.sleep(0.05)
+    window.click("#play")
     window.drag("figure > svg", 0.168, 0.168)
     assert picture(window)["frame"] == "0"
 

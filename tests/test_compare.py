@@ -1,6 +1,5 @@
 """Runs laid over each other: what is drawn, what is told to differ, and what is refused."""
 
-import json
 import re
 import shutil
 
@@ -12,7 +11,7 @@ from repro.cli import main
 from repro.report import charts, comparison, quantities
 from repro.report.reading import read
 from tests.pages import Page, check_drawn
-from tests.shell import refused
+from tests.shell import refused, told
 
 
 @pytest.fixture
@@ -109,6 +108,5 @@ def test_a_time_series_has_the_rows_of_its_run_in_their_order(fast, tmp_path, ca
 def test_a_run_at_work_may_have_more_rows_than_its_record_tells_of(fast, tmp_path):
     """That is written after the table."""
     copy = shutil.copytree(fast, tmp_path / "run")
-    record = json.loads((copy / "run.json").read_text())
-    (copy / "run.json").write_text(json.dumps(record | {"rows": record["rows"] - 1, "status": "running"}))
-    assert len(read(copy).times) == record["rows"]
+    results.write_json(copy / "run.json", told(copy) | {"rows": told(copy)["rows"] - 1, "status": "running"})
+    assert len(read(copy).times) == told(fast)["rows"]

@@ -2,7 +2,6 @@
 
 import errno
 import os
-import shutil
 import signal
 import sys
 from contextlib import suppress
@@ -18,11 +17,11 @@ from repro.results import files as written
 from repro.results import vtu
 from repro.run import checkpoint
 from repro.run.checkpoint import LAST, NEWEST, PREVIOUS
-from repro.run.folder import LOCK, SUMS, held
+from repro.run.folder import LOCK, SUMS
 from repro.run.running import Watch, resume, run
 from repro.scene import load_scene, parse_scene, scene_tables
 from tests.pages import whole_of
-from tests.shell import BRIEF, as_whole, files, refused, resumed, started, told, wait_for
+from tests.shell import BRIEF, as_whole, files, refused, resumed, started, stopped, told, wait_for
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="for Linux alone")
 
@@ -42,15 +41,6 @@ def test_a_killed_run_leaves_no_lock_that_counts(tmp_path, capsys):
     assert told(out)["scene"] == "flow_only" and not (out / NEWEST).exists() and not (out / LOCK).exists()
 
 
-def test_a_lock_that_was_removed_is_none(tmp_path):
-    """Who locks a file that is no longer the folder's tries again."""
-    with held(tmp_path):
-        os.unlink(tmp_path / LOCK)
-        with held(tmp_path):
-            with pytest.raises(OutputError), held(tmp_path):
-                pass
-
-
 def spoil(folder):
     """Cut the checkpoints of a run short."""
     for name in (NEWEST, PREVIOUS):
@@ -63,19 +53,11 @@ def short():
     return load_scene("base", BRIEF[:2])
 
 
-@pytest.fixture(scope="module")
-def cut(short, tmp_path_factory):
-    """A run with two checkpoints that was cut off: whoever changes it copies it."""
-    folder = tmp_path_factory.mktemp("cut") / "run"
-    with pytest.raises(ZeroDivisionError):
-        run(short, folder, lambda time: 1 / (time < 0.5), watch=Watch(interval=0.0))
-    return folder
-
-
 @pytest.fixture
-def out(cut, tmp_path):
-    """A copy of it."""
-    return Path(shutil.copytree(cut, tmp_path / "run"))
+def out(short, tmp_path):
+    """A run with two checkpoints that was cut off."""
+    stopped(short, tmp_path / "run")
+    return tmp_path / "run"
 
 
 def test_a_runs_files_are_listed(short):
@@ -185,11 +167,11 @@ def test_no_link_is_written_through(tmp_path):
     assert victim.read_text() == "years of work" and not (out / "timeseries.csv").is_symlink()
 
 
-@pytest.mark.parametrize("make", [lambda lock, to: lock.symlink_to(to), lambda lock, to: lock.write_text("mine"),
-                                  lambda lock, to: os.mkfifo(lock), lambda lock, to: lock.mkdir()])
+@pytest.mark.parametrize("make", [lambda lock: lock.symlink_to("elsewhere"), lambda lock: lock.write_text("mine"),
+                                  os.mkfifo, os.mkdir])
 def test_a_lock_that_is_somebody_elses_is_left_alone(tmp_path, capsys, make):
     """A link, a file with content, a pipe, a folder."""
-    make(tmp_path / LOCK, tmp_path / "elsewhere")
+    make(tmp_path / LOCK)
     before = (tmp_path / LOCK).lstat()
     assert refused(tmp_path, capsys, "run", "flow_only", "--out", tmp_path).startswith("repro: --out")
     assert (tmp_path / LOCK).lstat() == before

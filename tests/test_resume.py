@@ -17,7 +17,6 @@ from repro import results
 from repro.cli import main
 from repro.errors import Interrupted, SimulationError
 from repro.march import loop
-from repro.march.loop import PoreEnd
 from repro.march.simulation import steps
 from repro.model import growth
 from repro.run import running
@@ -57,6 +56,8 @@ SCENES = {
     "fast, unreported steps, contact": ('numerics.preset="fast"', "numerics.tolerance=0.0001", *CONTACT,
                                         'output.times=["0.6 h"]'),
     "gear": ('numerics.transport="gear"', 'growth.end="0.4 h"'),
+    "to the pore's end": ("aggregate.radius=40 um", "pore.length=90 um", "growth.time_step=1 h", "growth.end=9 h",
+                          "numerics.refinement=0.5"),
     "cubic, contact": ('numerics.preset="fast"', 'numerics.elements="cubic"', "numerics.tolerance=0.0005", *CONTACT,
                        'output.times=["0.05 h", "0.3 h", "0.6 h"]'),
 }
@@ -115,21 +116,6 @@ def test_strided_arrays_are_copied():
                                   concentrations=strided(now.concentrations, "donor")))
     for place in map(attrgetter, ("active", "mesh.points", "body.reference", "concentrations.donor")):
         assert place(found).flags.c_contiguous and (place(found) == place(now)).all()
-
-
-def test_the_end_of_the_pore_is_an_end_after_a_resume_too(tmp_path):
-    """A run stopped just when it was over does not grow on."""
-    scene = load_scene("wide", ('numerics.preset="fast"', 'aggregate.radius="40 um"', 'pore.length="100 um"',
-                                'growth.end="9 h"'))
-    found = []
-    with pytest.raises(PoreEnd):
-        found.extend(steps(scene))  # what it has had stays in it
-    with pytest.raises(PoreEnd):
-        next(steps(scene, found[-1][0]))
-    status = run(scene, tmp_path / "whole")
-    assert "reaches the pore's" in status and resume(tmp_path / "whole") == status
-    in_parts(scene, tmp_path / "parts", len(found))
-    assert lasting(tmp_path / "parts") == lasting(tmp_path / "whole")
 
 
 RECORD = '{"scene": "x", "hash": "x", "tables": {}, "files": ["thesis.tex"], "status": '
@@ -200,15 +186,12 @@ def test_an_altered_checkpoint_is_refused_and_the_one_before_is_used(tmp_path, c
 
 
 def test_a_change_of_versions_is_told_and_recorded(tmp_path, monkeypatch):
-    """And no number of threads is one."""
-    stopped(SCENE, tmp_path / "run")
+    stopped(SCENE, tmp_path)
     faults.another_version(monkeypatch, "scipy")
-    monkeypatch.setenv("OMP_NUM_THREADS", "7")
     with pytest.warns(UserWarning, match="versions.scipy .* now 0.0.; .* to the last bit"):
-        resume(tmp_path / "run")
-    (once,) = told(tmp_path / "run")["resumes"]
+        resume(tmp_path)
+    (once,) = told(tmp_path)["resumes"]
     assert once["changed"]["versions.scipy"][1] == "0.0" and len(once["changed"]) == 1
-    assert told(tmp_path / "run")["conditions"]["threads"]["OMP_NUM_THREADS"] == "7"
 
 
 def test_checkpoints_are_as_far_apart_as_is_asked(monkeypatch):
