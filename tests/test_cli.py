@@ -1,6 +1,5 @@
 """The command line: what it writes, and what it refuses."""
 
-import csv
 import os
 import subprocess
 import sys
@@ -12,15 +11,11 @@ import pytest
 from repro import results
 from repro.cli import main
 from tests.pages import run
-from tests.shell import refused, told
-
-
-def rows(out):
-    return list(csv.DictReader((out / "timeseries.csv").read_text().splitlines()))
+from tests.shell import refused, rows, told
 
 
 def test_flow_only_is_one_row_without_substrates(tmp_path):
-    (row,) = rows(run(tmp_path, "flow_only"))
+    (row,) = rows(run(tmp_path, "flow_only") / "timeseries.csv")
     assert list(row) == results.COLUMNS
     empty = {name for name in results.COLUMNS if "acceptor" in name or "donor" in name}
     assert {name for name, value in row.items() if value == ""} == empty | {
@@ -112,7 +107,7 @@ def test_closed_ends_with_gears_method_are_a_table_of_numbers(tmp_path):
     """Every field is a number of Python's or empty."""
     out = run(tmp_path, "base", "substrates.boundary=closed", "numerics.transport=gear", "growth.end=0.4 h",
               "numerics.refinement=0.5", options=["--unset", "flow"])
-    assert len([float(value) for row in rows(out) for value in row.values() if value]) > 50
+    assert len([float(value) for row in rows(out / "timeseries.csv") for value in row.values() if value]) > 50
     assert (results.read_table(out / "ledger.csv")["donor_stored_pg_per_m"] < 0).all()
     results.write_table(tmp_path / "t.csv", ["a"], [[np.float64(0.1)], [0.1], [np.int64(3)], [None]])
     assert (tmp_path / "t.csv").read_text() == "a\n0.1\n0.1\n3\n\"\"\n"

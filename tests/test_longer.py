@@ -18,7 +18,6 @@ SCENES = {
     "paper": ((0.1, 1.4, 2.1), ["growth.end=2.2 h"]),
     "paper, an end within a step": ((1.0,), ["growth.end=2.2 h", "growth.time_step=21 min"]),
     "fast": ((0.3, 5.0, 8.9), ["numerics.preset=fast", "numerics.tolerance=0.001", "growth.end=9 h"]),
-    "fast, long steps": ((5.0,), ["numerics.preset=fast", "growth.end=9 h"]),
     "fast, rows at times": ((4.0,), ["numerics.preset=fast", "growth.end=9 h", 'output.times=["0 h", "2 h", "3 h"]']),
     "fast, contact": ((0.5,), ["numerics.preset=fast", "growth.end=0.6 h", "aggregate.radius=17.8 um",
                                "pore.width=20 um", "flow.head=1 mm", "numerics.tolerance=0.001",

@@ -9,6 +9,7 @@ import signal
 import struct
 import termios
 import time
+from contextlib import suppress
 
 import pytest
 
@@ -84,27 +85,18 @@ def test_a_long_step_is_not_silent(capsys, monkeypatch):
 ])
 def test_on_a_terminal_a_bar(tmp_path, columns, pattern):
     """Simulated time, steps, remeshes, contact and the time that is left; sixty columns are enough."""
-    last = terminal(tmp_path, columns)[-1]
-    assert re.fullmatch(pattern, last) and (columns > 60 or len(last) <= 60)
-
-
-def terminal(tmp_path, columns):
-    """What a run shows on a terminal, state by state, up to the last with all steps."""
     here, there = pty.openpty()
     fcntl.ioctl(there, termios.TIOCSWINSZ, struct.pack("HHHH", 40, columns, 0, 0))
     process = started("base", *flags(*CONTACT), "--out", tmp_path / "run", stdout=there, stderr=there, text=False)
     os.close(there)
     seen = b""
-    try:
+    with suppress(OSError):  # the other end is closed
         while some := os.read(here, 4096):
             seen += some
-    except OSError:  # the other end is closed
-        pass
     os.close(here)
     process.wait()
-    assert "simulated" not in seen.decode() and seen.decode().count("completed") == 1
-    bars = [bar.rstrip("\n") for bar in re.split(r"\r", seen.decode())]
-    return [bar for bar in bars if " h " in bar and "contact" in bar and "simulated" not in bar]
+    last = [bar for bar in re.split(r"[\r\n]+", seen.decode()) if " h " in bar and "contact" in bar][-1]
+    assert re.fullmatch(pattern, last) and len(last) <= columns and b"simulated" not in seen
 
 
 @pytest.mark.parametrize("arguments", [[], ["base"], ["--out", "x"], ["base", "--resume", "x"], ["--checkpoint", "-1"],

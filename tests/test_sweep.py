@@ -1,6 +1,5 @@
 """A sweep as its user has it: runs, tables, page, what is refused, what is gone on with, what kills a run."""
 
-import csv
 import html
 import json
 import math
@@ -24,7 +23,7 @@ from repro.sweep.server import Server, ask
 from repro.sweep.state import Sweep
 from tests import shell
 from tests.pages import HOSTILE, check_alone
-from tests.shell import told
+from tests.shell import rows, told
 from tests.strategies import number
 from tests.test_sweep_cluster import until
 
@@ -35,11 +34,6 @@ VARY = ["--vary", "flow.mean_velocity=2.9 m/day, 1e-12 m/day, 5.8 m/day"]
 
 def sweep(out, *arguments, scene="base"):
     return main(["sweep", scene, "--out", str(out), *arguments])
-
-
-def rows(path):
-    with path.open(newline="") as lines:
-        return list(csv.DictReader(lines))
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,6 @@
 """A sweep on a Dask cluster: a real scheduler and workers, in processes of their own on the loopback; where it is what
 they answer that matters, a stand-in for them."""
 
-import csv
 import json
 import os
 import signal
@@ -15,6 +14,7 @@ import pytest
 
 from repro.cli import main
 from repro.sweep import cluster, task
+from tests.shell import rows
 
 VARY = ["--vary", "pore.width=48:52 um:linear:6", "--set", "numerics.preset=fast"]
 
@@ -134,5 +134,4 @@ def test_no_run_is_lost_or_there_twice_where_a_worker_is_killed(workers, tmp_pat
     assert sorted(os.listdir(out / "runs")) == sorted(point["folder"].removeprefix("runs/") for point in told)
     assert main(command(here, "--quiet")) == 0
     assert (out / "table.csv").read_bytes() == (here / "table.csv").read_bytes()
-    with (out / "runs.csv").open() as lines:
-        assert [row["status"] for row in csv.DictReader(lines)] == ["completed"] * 6
+    assert [row["status"] for row in rows(out / "runs.csv")] == ["completed"] * 6
