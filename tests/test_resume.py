@@ -258,12 +258,13 @@ def test_killed_again_and_again(tmp_path, seed):
     time until it is done: the bits of the whole run."""
     whole, out = whole_of(load_scene("base", ["growth.end=4 h"])), tmp_path / "run"
     arguments, draw = [*LONG, "--out", out], random.Random(seed)
-    status = None
+    status, patience = None, 0.0
     while status is None:
+        patience += 0.5 * told(whole)["wall_time_s"]
         process = started(*arguments, "--checkpoint", "0.1")
         wait_for((out / "run.json").exists, process)
         with suppress(TimeoutExpired):
-            status = process.wait(draw.uniform(0, 1.0 + told(whole)["wall_time_s"]))  # with a start-up of a second
+            status = process.wait(draw.uniform(0, patience))  # which a start-up may take most of
         process.kill()
         process.communicate()
         arguments = ["--resume", out]
