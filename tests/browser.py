@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import base64
 import json
-import os
 import select
 import shutil
 import subprocess
@@ -19,17 +17,14 @@ PATIENCE = 60.0  # s for an answer
 
 
 class Browser:
-    """One page: ``show`` a file, ``run`` scripts in it, press keys, take pictures; ``requests``: what it asked for."""
+    """One page: ``show`` a file, ``run`` scripts in it, press keys; ``requests``: what it asked for."""
 
     def __enter__(self):
         self.home = tempfile.mkdtemp()
-        theirs, self.out = os.pipe()
-        self.back, ours = os.pipe()
-        wired = 'exec 3<&"$0" 4>&"$1"; shift; exec "$@"'  # the browser reads from 3 and writes to 4
-        command = ["bash", "-c", wired, str(theirs), str(ours), str(CHROMIUM), *OPTIONS, f"--user-data-dir={self.home}"]
-        self.process = subprocess.Popen([*command, "about:blank"], pass_fds=(theirs, ours), stderr=subprocess.DEVNULL)
-        os.close(theirs)
-        os.close(ours)
+        wired = 'exec "$0" "$@" 3<&0 4>&1 > /dev/null'  # the browser reads from 3 and writes to 4
+        command = ["bash", "-c", wired, str(CHROMIUM), *OPTIONS, f"--user-data-dir={self.home}", "about:blank"]
+        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0,
+                                        stderr=subprocess.DEVNULL)
         self.pending, self.requests = b"", []
         self.count, self.session = 0, None
         target = self.call("Target.createTarget", url="about:blank")["targetId"]
@@ -40,9 +35,7 @@ class Browser:
 
     def __exit__(self, *error):
         self.process.terminate()
-        self.process.wait(PATIENCE)
-        os.close(self.out)
-        os.close(self.back)
+        self.process.communicate(timeout=PATIENCE)
         shutil.rmtree(self.home, ignore_errors=True)
 
     def call(self, method: str, **parameters) -> dict:
@@ -50,7 +43,7 @@ class Browser:
         self.count += 1
         message = {"id": self.count, "method": method, "params": parameters}
         message |= {"sessionId": self.session} if self.session else {}
-        os.write(self.out, json.dumps(message).encode() + b"\0")
+        self.process.stdin.write(json.dumps(message).encode() + b"\0")
         while True:
             found = self._next()
             if found.get("id") == self.count:
@@ -61,8 +54,9 @@ class Browser:
         """The next message; requests are noted."""
         end = time.monotonic() + PATIENCE
         while b"\0" not in self.pending:
-            assert select.select([self.back], [], [], max(0.0, end - time.monotonic()))[0], "the browser is silent"
-            self.pending += os.read(self.back, 1 << 20)
+            ready = select.select([self.process.stdout], [], [], max(0.0, end - time.monotonic()))[0]
+            assert ready, "the browser is silent"
+            self.pending += self.process.stdout.read(1 << 20)
         text, _, self.pending = self.pending.partition(b"\0")
         found = json.loads(text)
         if found.get("method") == "Network.requestWillBeSent":
@@ -91,7 +85,7 @@ class Browser:
 
     def press(self, key: str) -> None:
         """A key, pressed and released, as ArrowLeft."""
-        codes = {"ArrowLeft": 37, "Home": 36, "End": 35, "Tab": 9}
+        codes = {"ArrowLeft": 37, "Home": 36, "Tab": 9}
         for kind in ("rawKeyDown", "keyUp"):
             self.call("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=codes[key])
 
@@ -113,11 +107,6 @@ class Browser:
             self.call("Input.dispatchMouseEvent", type=kind, x=box["x"] + part * box["width"], y=y, button="left",
                       buttons=int(kind != "mouseReleased"), clickCount=1)
 
-    def point(self, x: float, y: float, kind: str = "mouseMoved") -> None:
+    def point(self, x: float, y: float) -> None:
         """The pointer at a place of the window (CSS pixels)."""
-        self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="none")
-
-    def picture(self, path: Path) -> None:
-        """A PNG of the whole page."""
-        content = self.call("Page.captureScreenshot", captureBeyondViewport=True)["data"]
-        path.write_bytes(base64.b64decode(content))
+        self.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y, button="none")

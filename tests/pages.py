@@ -2,7 +2,6 @@
 
 import base64
 import hashlib
-import html
 import json
 import re
 from html.parser import HTMLParser
@@ -10,7 +9,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-import pytest
 
 from repro import results
 from repro.cli import main
@@ -133,18 +131,6 @@ def first(pattern, text):
 def stored(out):
     """What the page gives its script."""
     return json.loads(first('<script type="application/json" id="fields">(.*?)</script>', text_of(out)))
-
-
-def check_drawn(text, wanted):
-    """Are the charts of a page those of {title: lines (label, times, values)}, to the six digits that a pointer is
-    told?"""
-    told = [json.loads(html.unescape(one))["lines"] for one in re.findall('data-chart="([^"]*)"', text)]
-    assert re.findall("<figcaption>(.*?)<", text) == list(wanted)
-    for drawn, lines in zip(told, wanted.values(), strict=True):
-        for one, line in zip(drawn, lines, strict=True):
-            known = np.isfinite(line.values)
-            assert one["label"] == line.label and one["t"] == pytest.approx(line.times[known].tolist(), rel=1e-5)
-            assert one["y"] == pytest.approx(line.values[known].tolist(), rel=1e-5), line.label
 
 
 def numbers(text, kind):

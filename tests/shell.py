@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 import signal
@@ -59,6 +60,11 @@ def files(folder: Path) -> dict[str, bytes]:
 def told(folder: Path) -> dict:
     """What run.json says."""
     return json.loads((folder / "run.json").read_text(encoding="utf-8"))
+
+
+def rows(table: Path) -> list[dict[str, str]]:
+    """The rows of a table as they are written."""
+    return list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
 
 
 def lasting(folder: Path) -> dict:

@@ -5,8 +5,6 @@ import copy
 import importlib.resources
 import io
 import re
-import subprocess
-import sys
 import tomllib
 from dataclasses import replace
 from importlib.metadata import version
@@ -44,16 +42,6 @@ def test_fields_are_those_of_the_files_of_a_run(elements, corners):
     assert same_arrays(fields, written) and fields["triangles"].shape[1] == corners
 
 
-def test_units_are_what_the_names_end_with(found):
-    """Of columns and fields; "1" for pure numbers."""
-    assert set(found.units) == {*found, *found.fields(0.0)}
-    wanted = {"conductivity_m_per_d": "m/d", "aggregate_area_um2": "um2", "head_loss_cm": "cm", "time_h": "h",
-              "inlet_donor_mg_per_L": "mg/L", "upstream_um": "um", "head_cm": "cm", "stress_xx_MPa": "MPa",
-              "theta": "1"}
-    assert {name: found.units[name] for name in wanted} == wanted
-    assert {name for name, unit in found.units.items() if unit == "1"} == {*PURE, "triangles"}
-
-
 def test_what_is_not_modelled_is_not_there():
     (flow,) = [solve(load_scene("flow_only"))]
     assert flow["mean_velocity_m_per_d"] == pytest.approx(2.9) and "donor_balance" not in flow
@@ -80,8 +68,7 @@ def test_a_time_that_is_off_by_round_off_is_that_of_its_row():
 def test_a_run_without_rows_can_be_shown():
     """It failed before its first row was there."""
     none = Results("x", [], [], "failed")
-    assert repr(none) == "<Results of x: 0 rows, 1 columns, failed>" and "<img" not in none._repr_html_()
-    assert len(none.to_pandas()) == 0 and none.to_xarray().sizes["time_h"] == 0
+    assert "0 rows" in repr(none) and "<img" not in none._repr_html_() and len(none.to_pandas()) == 0
     with pytest.raises(KeyError, match="0.0 h: not a reported time; none is"):
         none.fields(0.0)
 
@@ -102,49 +89,10 @@ def test_the_table_of_a_notebook_escapes_and_is_short(found):
     assert repr(found) == f"<Results of base: {len(found.time)} rows, 25 columns, completed>"
 
 
-def test_public_names():
-    for name in repro.__all__:
-        assert getattr(repro, name).__module__.startswith("repro."), name
-        assert name in dir(repro)
-    assert not hasattr(repro, "nothing")
-
-
 def test_what_the_package_ships():
     project = (importlib.resources.files("repro") / ".." / "pyproject.toml").read_text(encoding="utf-8")
     for name in ("py.typed", "results/network.csv"):
         assert (importlib.resources.files("repro") / name).is_file() and f'"{name}"' in project
-
-
-PROGRAM = """
-from repro import Scene, load_scene, simulate, solve
-
-scene: Scene = load_scene("base", ['growth.end="1 h"'])
-found = solve(scene)
-reveal_type(found)
-reveal_type(found["conductivity_m_per_d"])
-reveal_type(found.units)
-reveal_type(found.fields(1.0))
-for instant in simulate(scene):
-    reveal_type(instant.remeshes)
-load_scene(3)
-found.nothing
-from repro import nothing
-"""
-
-
-@pytest.mark.thorough
-def test_users_of_mypy_see_types(tmp_path):
-    pytest.importorskip("mypy")
-    (tmp_path / "user.py").write_text(PROGRAM)
-    arguments = ["--strict", "--follow-imports=silent", "--no-incremental", "--ignore-missing-imports", "user.py"]
-    where = str(importlib.resources.files("repro") / "..")
-    done = subprocess.run([sys.executable, "-m", "mypy", *arguments], cwd=tmp_path, capture_output=True, text=True,
-                          check=False, env={"MYPYPATH": where, "PATH": ""})
-    revealed = re.findall(r'Revealed type is "(.*)"', done.stdout)
-    assert [re.sub(r"builtins\.|_typeshed\.", "", one).split("[")[0] for one in revealed] == [
-        "repro.results.tables.Results", "numpy.ndarray", "dict", "dict", "int"], done.stdout
-    errors = re.findall(r"error: .*\[([a-z-]+)\]$", done.stdout, re.M)
-    assert sorted(errors) == ["arg-type", "attr-defined", "attr-defined"], done.stdout
 
 
 NARROW = {"pore": {"width": "30 um"}, "aggregate": {"radius": "8 um"}, "flow": {"mean_velocity": "1.5 m/day"},
@@ -176,23 +124,10 @@ def test_a_scene_prints_as_its_toml(tmp_path):
     assert repr(load_scene("flow_only")).startswith("<Scene flow_only: pore, aggregate, flow, numerics, output; hash ")
 
 
-def test_representations_are_short(found, tmp_path):
-    """Of ten lines at most."""
-    scene = load_scene("base", SHORT)
-    told = [scene, found, repro.check(scene), *repro.simulate(scene)]
-    told += [part for instant in told[3:] for part in (instant.pore, instant.solved, instant.pore.mesh,
-                                                       instant.pore.outline, instant.solved.flow)]
-    assert [type(one).__name__ for one in told if len(repr(one)) > 1000 or repr(one).count("\n") > 9] == []
-
-
 def test_check_tells_what_repro_check_does(capsys):
-    checked = repro.check("wide")
     assert main(["check", "wide"]) == 0
-    lines = [line for line in str(checked).splitlines() if not line.startswith("Cost")]  # of a trial
-    head = [line for line in lines if " s " not in line and "MB" not in line]
-    assert set(head) <= set(capsys.readouterr().out.splitlines()) and checked.nodes > 100
-    with pytest.raises(SceneError, match="nowhere"):
-        repro.check("nowhere")
+    told = capsys.readouterr().out.partition("Cost")[0]  # which is of a trial
+    assert "Mesh at t = 0" in told and str(repro.check("wide")).startswith(told)
 
 
 def test_a_run_is_loaded_as_it_was_solved(found, tmp_path):
@@ -212,22 +147,20 @@ def test_a_run_is_loaded_as_it_was_solved(found, tmp_path):
 
 
 def test_fields_that_are_lost_are_told_and_none_is_taken_for_another(found, tmp_path):
-    """Of four times the second file is gone, then the first, then the list: the others stay what they are, units too,
+    """Of four times two files are gone, then one is damaged, then the list: the others stay what they are, units too,
     and a notebook shows no picture."""
     repro.run(load_scene("base", SHORT), str(tmp_path))
-    loaded = repro.load_run(tmp_path)
-    for row, left in ((1, (0, 2, 3)), (0, (2, 3))):
+    for row in (0, 1):
         (tmp_path / f"fields/fields_000{row}.vtu").unlink()
-        for one in (loaded, repro.load_run(tmp_path)):
-            assert all(same_arrays(one.fields(found.time[k]), found.fields(found.time[k])) for k in left)
-            with pytest.raises(OutputError, match=rf"fields_000{row}.vtu: the fields of {found.time[row]} h are miss"):
-                one.fields(found.time[row])
-            assert one.units == found.units and "<img" not in one._repr_html_()
-    whole = (tmp_path / "fields/fields_0003.vtu").read_text()
-    for damaged in (whole[:len(whole) // 2], whole.replace("UnstructuredGrid", "Grid"), whole.replace("Float64", "F")):
-        (tmp_path / "fields/fields_0003.vtu").write_text(damaged)
-        with pytest.raises(OutputError, match="fields_0003.vtu: the fields cannot be read"):
-            loaded.fields(0.6)
+    loaded = repro.load_run(tmp_path)
+    assert all(same_arrays(loaded.fields(time), found.fields(time)) for time in (0.4, 0.6))
+    assert loaded.units == found.units
+    (tmp_path / "fields/fields_0003.vtu").write_text("<VTKFile")
+    assert "<img" not in loaded._repr_html_()
+    for time, said in ((0.2, "fields_0001.vtu: the fields of 0.2 h are missing"),
+                       (0.6, "fields_0003.vtu: the fields cannot be read")):
+        with pytest.raises(OutputError, match=said):
+            loaded.fields(time)
     (tmp_path / "fields.pvd").unlink()
     with pytest.raises(OutputError, match=r"fields\.pvd: no fields of 0.6 h are listed"):
         repro.load_run(tmp_path).fields(0.6)
@@ -236,19 +169,14 @@ def test_fields_that_are_lost_are_told_and_none_is_taken_for_another(found, tmp_
         repro.load_run(tmp_path)
 
 
-def test_a_table_that_lacks_a_column_is_refused_by_its_name(found, tmp_path):
-    repro.run(load_scene("base", SHORT), str(tmp_path))
-    table = tmp_path / "timeseries.csv"
-    table.write_text(table.read_text().replace("contact", "touched", 1))
-    with pytest.raises(OutputError, match="timeseries.csv has no column contact"):
-        repro.load_run(tmp_path)
-
-
 def test_data_frames_and_datasets_have_names_and_units(found):
-    frame = pytest.importorskip("pandas") and found.to_pandas()
+    """Units are what the names end with, "1" for pure numbers."""
+    assert set(found.units) == {*found, *found.fields(0.0)}
+    assert {name for name, unit in found.units.items() if unit == "1"} == {*PURE, "triangles"}
+    frame = found.to_pandas()
     assert frame.index.name == "time_h" and list(frame) == list(found)[1:]
     assert frame.attrs["units"]["conductivity_m_per_d"] == "m/d" and (frame["nodes"] == found["nodes"]).all()
-    dataset = pytest.importorskip("xarray") and found.to_xarray()
+    dataset = found.to_xarray()
     assert dataset["head_loss_cm"].attrs["units"] == "cm" and dataset.attrs["status"] == "completed"
     assert np.array_equal(dataset["time_h"], found.time)
 
@@ -276,20 +204,17 @@ def test_a_sweep_from_python(tmp_path):
 
 
 def test_a_notebook_shows_key_figures_and_a_picture(found):
-    """The picture is a PNG of the whole meshed part, with the aggregate's boundary."""
+    """The picture is a PNG of the whole meshed part; white is the aggregate's boundary, up to its top."""
     html = found._repr_html_()
     told = "conductivity of the pore 174.1 → 173.8 m/day; thickness of the aggregate 5 → 5.295 um"
-    assert told in html and "at t = 0.6 h" in html
+    assert told in html and "at t = 0.6 h" in html and len(html) < 100_000
     data = base64.b64decode(re.search(r'src="data:image/png;base64,([^"]+)"', html)[1])
     pixels = plt.imread(io.BytesIO(data))
     height, width = pixels.shape[:2]
-    places = found.fields(0.6)["places_um"]
-    assert width == 480 and height == pytest.approx(480 * np.ptp(places[:, 1]) / np.ptp(places[:, 0]), abs=1)
-    white = np.argwhere((pixels[..., :3] == 1).all(axis=2))
-    size = np.ptp(places[:, 0]) / width
-    assert (height - white[:, 0].min()) * size == pytest.approx(found["thickness_um"][-1], abs=2 * size)
-    assert white[:, 0].max() == height - 1 and np.ptp(white[:, 1]) * size == pytest.approx(10.5, abs=3 * size)
-    assert len(html) < 100_000
+    along, across = np.ptp(found.fields(0.6)["places_um"], axis=0)
+    assert width == 480 and height == pytest.approx(480 * across / along, abs=1)
+    top = np.argwhere((pixels[..., :3] == 1).all(axis=2))[:, 0].min()
+    assert (height - top) * along / width == pytest.approx(found["thickness_um"][-1], abs=2 * along / width)
 
 
 def test_help_begins_with_use_and_the_version_is_told(capsys):

@@ -6,19 +6,18 @@ import pytest
 
 from repro.cli import main
 from repro.errors import Interrupted
-from repro.march.simulation import ends_soon, same_rows, steps
+from repro.march.simulation import ends_soon, steps
 from repro.run.checkpoint import LAST, NEWEST, PREVIOUS
-from repro.run.running import Watch, resume, run
+from repro.run.running import Watch, resume
 from repro.scene import SceneError, load_scene
 from tests.pages import whole_of
-from tests.shell import files, lasting, state, told
+from tests.shell import every, files, lasting, state, stopped, told
 
 #: Ends of shorter runs (h): within the longer one's first step, within a later one, and near its own last; and scenes.
 SCENES = {
     "paper": ((0.1, 1.4, 2.1), ["growth.end=2.2 h"]),
     "paper, an end within a step": ((1.0,), ["growth.end=2.2 h", "growth.time_step=21 min"]),
     "fast": ((0.3, 5.0, 8.9), ["numerics.preset=fast", "numerics.tolerance=0.001", "growth.end=9 h"]),
-    "fast, long steps": ((5.0,), ["numerics.preset=fast", "growth.end=9 h"]),
     "fast, rows at times": ((4.0,), ["numerics.preset=fast", "growth.end=9 h", 'output.times=["0 h", "2 h", "3 h"]']),
     "fast, contact": ((0.5,), ["numerics.preset=fast", "growth.end=0.6 h", "aggregate.radius=17.8 um",
                                "pore.width=20 um", "flow.head=1 mm", "numerics.tolerance=0.001",
@@ -55,47 +54,28 @@ def test_a_longer_run_is_as_if_that_had_been_asked_for_at_first(tmp_path, name, 
     assert [one["changed"]["growth.end"][0] for one in resumes] == [f"{time:g} h" for time in before]
 
 
-def test_a_run_that_is_not_over_is_made_longer(tmp_path):
-    """Stopped before and after its end was near."""
-    whole, short = scene("paper, an end within a step"), scene("paper, an end within a step", 1.2)
-    near = [ends_soon(short, state) for state, _ in steps(short)]
-    assert not near[1] and near[-2]
-    for stop in (1, len(near) - 1):
-        left = iter([0] * stop + [15])
-        with pytest.raises(Interrupted):
-            run(short, tmp_path / str(stop), watch=Watch(stop=lambda left=left: next(left)))
-        resume(tmp_path / str(stop), overrides=["growth.end=2.2 h"])
-        assert same(tmp_path / str(stop), whole_of(whole))
-
-
-@pytest.fixture
-def shorter(tmp_path):
-    """A run of "fast" to 5 h."""
-    return copytree(whole_of(scene("fast", 5.0)), tmp_path / "parts")
-
-
-def test_a_longer_run_that_was_stopped_goes_on(shorter):
-    left = iter([0, 15])
+@pytest.mark.parametrize("after", [1, 3])
+def test_a_run_that_is_not_over_is_made_longer(tmp_path, after):
+    """Stopped before its end was near and when it was; and a longer one that is stopped goes on."""
+    whole, short = (scene("paper, an end within a step", end) for end in (None, 1.2))
+    assert [ends_soon(short, state) for state, _ in steps(short)][1:4:2] == [False, True]
+    stopped(short, tmp_path, after)
     with pytest.raises(Interrupted):
-        resume(shorter, overrides=["growth.end=9 h"], watch=Watch(stop=lambda: next(left)))
-    assert told(shorter)["tables"]["growth"]["end"] == "9.0 h"
-    assert resume(shorter) == "completed" and same(shorter, whole_of(scene("fast")))
+        resume(tmp_path, overrides=["growth.end=2.2 h"], watch=Watch(stop=every(1)))
+    assert told(tmp_path)["tables"]["growth"]["end"] == "2.2 h"
+    assert resume(tmp_path) == "completed" and same(tmp_path, whole_of(whole))
 
 
-def test_without_the_state_it_starts_again(shorter):
-    """And says so."""
-    (shorter / LAST).unlink()
-    with pytest.warns(UserWarning, match="no checkpoint to go on from; it starts again from t = 0"):
-        resume(shorter, overrides=["growth.end=9 h"])
-    assert same(shorter, whole_of(scene("fast")))
-
-
-def test_a_run_that_is_over_keeps_one_checkpoint():
-    """And lists it."""
-    grown, still = whole_of(scene("fast", 5.0)), whole_of(load_scene("flow_only"))
+def test_a_run_that_is_over_keeps_one_checkpoint(tmp_path):
+    """And lists it. Without it a longer one starts again, and says so."""
+    grown, still = copytree(whole_of(scene("fast", 5.0)), tmp_path / "run"), whole_of(load_scene("flow_only"))
     assert (grown / LAST).exists() and LAST in told(grown)["files"]
     assert not any((grown / name).exists() for name in (NEWEST, PREVIOUS))
     assert not (still / LAST).exists() and LAST not in told(still)["files"]
+    (grown / LAST).unlink()
+    with pytest.warns(UserWarning, match="no checkpoint to go on from; it starts again from t = 0"):
+        resume(grown, overrides=["growth.end=9 h"])
+    assert same(grown, whole_of(scene("fast")))
 
 
 @pytest.mark.parametrize("entry, wanted", [
@@ -104,8 +84,9 @@ def test_a_run_that_is_over_keeps_one_checkpoint():
     ("growth.end=1e9 h", "growth.end = \"1e9 h\": at most 100000 times growth.time_step"),
     ("pore.width=3 um", "growth.end alone can be changed of a run that has begun"),
 ])
-def test_what_is_no_later_end_is_refused(shorter, entry, wanted):
+def test_what_is_no_later_end_is_refused(entry, wanted):
     """And nothing is changed."""
+    shorter = whole_of(scene("fast", 5.0))
     before = state(shorter)
     with pytest.raises(SceneError) as refused:
         resume(shorter, overrides=[entry])
@@ -130,8 +111,3 @@ def test_the_command(tmp_path, capsys):
     assert main(["run", "flow_only", "--out", str(tmp_path / "still")]) == 0
     assert main(["run", "--resume", str(tmp_path / "still"), "--set", "growth.end=5 h"]) == 2
     assert "its scene has no [growth]" in capsys.readouterr().err
-
-
-def test_rows_are_the_same_up_to_a_time_and_at_it():
-    one, other = (load_scene("base", [f'output.times=["1 h", "{last} h", "3 h"]']) for last in (2, 2.5))
-    assert [same_rows(one, other, time) for time in (0.9, 1.0, 1.9, 2.0, 4.0)] == [True, True, True, False, False]

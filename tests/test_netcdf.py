@@ -6,8 +6,6 @@ import pytest
 import xarray
 
 from repro import results
-from repro.results import netcdf
-from repro.results.files import whole
 from repro.scene import load_scene, rules, scene_hash, scene_tables
 from tests.pages import run
 from tests.shell import flags, refused
@@ -45,34 +43,6 @@ def test_it_says_what_it_is(made):
     assert all(variable.attrs["long_name"] for variable in found.variables.values())
     assert found.mean_velocity_m_per_d.attrs == {"long_name": "mean velocity", "units": "m d-1"}
     assert found.time_h.attrs["units"] == "h" and "time_h" in found.coords
-    fills = {name: variable.encoding.get("_FillValue") for name, variable in found.variables.items()}
-    assert fills.pop("time_h") is None and np.isnan(list(fills.values())).all()  # CF: a coordinate has none
-
-
-def test_what_is_not_modelled_is_not_a_number(tmp_path):
-    run(tmp_path, "flow_only", SETS[-1])
-    found = content(tmp_path / "run")
-    assert np.isnan(found.effluent_acceptor_mg_per_L).all() and found.mean_velocity_m_per_d[0] == pytest.approx(2.9)
-
-
-def test_a_run_without_rows_has_an_empty_table(tmp_path):
-    netcdf.write(tmp_path / "timeseries.nc", load_scene("base"), [])
-    assert content(tmp_path).sizes["time_h"] == 0
-
-
-def test_it_is_whole_or_not_there(tmp_path, monkeypatch):
-    """The earlier file stays, nothing else does."""
-    target = tmp_path / "timeseries.nc"
-    target.write_text("earlier")
-
-    def full(self, path, **options):
-        path.write_bytes(b"CDF")
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(xarray.Dataset, "to_netcdf", full)
-    with pytest.raises(OSError, match="No space"), whole(target) as beside:
-        netcdf.write(beside, load_scene("base"), [])
-    assert target.read_text() == "earlier" and list(tmp_path.iterdir()) == [target]
 
 
 def test_without_xarray_it_is_refused_before_the_run(tmp_path, monkeypatch, capsys):

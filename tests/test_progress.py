@@ -8,11 +8,9 @@ import re
 import signal
 import struct
 import termios
-import threading
 import time
-from contextlib import nullcontext
+from contextlib import suppress
 
-import numpy as np
 import pytest
 
 from repro.cli import main
@@ -27,15 +25,11 @@ CONTACT = ('numerics.preset="fast"', 'aggregate.radius="17.98 um"', 'pore.width=
 
 
 def test_json_is_an_object_a_line_and_nothing_else(tmp_path, capsys):
-    """Start, every step, remeshes, contact, checkpoints, end."""
+    """Start, every step, remeshes, contact, checkpoints, end; warnings are in tests/test_warned.py."""
     folder = run(tmp_path, "base", *CONTACT, options=["--json", "--checkpoint", "0"])
-    out, err = capsys.readouterr()
-    events = [json.loads(line) for line in out.splitlines()]
+    events = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     names = [event["event"] for event in events]
     assert names[0] == "start" and names[-1] == "end" and names.count("contact") == 1
-    warnings = [event for event in events if event["event"] == "warning"]
-    assert err == "".join(f"repro: warning: {event['message']}\n" for event in warnings)
-    assert {event["key"] for event in warnings} == {"growth.end", "flow"}
     steps = [event for event in events if event["event"] == "step"]
     assert [event["step"] for event in steps] == list(range(len(steps))) and steps[-1]["time_h"] == 0.6
     assert names.count("remesh") == steps[-1]["remeshes"] == told(folder)["remeshes"] > 0
@@ -54,28 +48,25 @@ def test_errors_are_objects_too(tmp_path, capsys, monkeypatch, sets, status):
     assert last["event"] == "error" and last["exit_status"] == status and err == f"repro: {last['message']}\n"
 
 
-def test_quiet_says_nothing_but_errors(tmp_path, capsys):
-    run(tmp_path, "flow_only", options=["--quiet"])
+def test_without_a_terminal_a_line_each_tenth_and_quiet_says_nothing_but_errors(tmp_path, capsys):
+    """The end on standard output."""
+    folder = run(tmp_path, "base", 'growth.end="0.6 h"')
+    said = "".join(f"{time} of 0.6 h simulated\n" for time in ("0.2", "0.4", "0.6"))
+    assert capsys.readouterr() == (f"base: completed; results in {folder}\n", said)
+    run(tmp_path / "quiet", "flow_only", options=["--quiet"])
     assert capsys.readouterr() == ("", "")
     run(tmp_path, "nowhere", status=2, options=["--quiet"])
     assert "nowhere" in capsys.readouterr().err
-
-
-def test_without_a_terminal_a_line_each_tenth(tmp_path, capsys):
-    """And the end on standard output."""
-    folder = run(tmp_path, "base", 'growth.end="0.6 h"')
-    out, err = capsys.readouterr()
-    assert err.splitlines() == [f"{time} of 0.6 h simulated" for time in ("0.2", "0.4", "0.6")]
-    assert out == f"base: completed; results in {folder}\n"
 
 
 STEP = {"event": "step", "time_h": 3.5, "end_h": 45.0, "step": 17, "remeshes": 2, "contact": True}
 
 
 def test_a_long_step_is_not_silent(capsys, monkeypatch):
-    """Without a terminal lines go on coming while a step takes its time."""
+    """Without a terminal lines go on coming while a step takes its time, never two seconds apart."""
+    assert progress.LONGEST + progress.TICK <= 2.0
     monkeypatch.setattr(progress, "TICK", 0.01)
-    monkeypatch.setattr(progress, "SILENCE", 0.02)
+    monkeypatch.setattr(progress, "LONGEST", 0.02)
     with progress.in_lines() as tell:
         tell(STEP)
         lines, deadline = "", time.monotonic() + 20
@@ -88,48 +79,24 @@ def test_a_long_step_is_not_silent(capsys, monkeypatch):
     assert capsys.readouterr() == ("", "")
 
 
-def test_after_hours_no_step_is_silent_for_longer_than_two_seconds(capsys, monkeypatch):
-    """With the tick that looks for it."""
-    assert progress.LONGEST + progress.TICK <= 2.0
-    now, ticks = [0.0], []
-    monkeypatch.setattr(progress, "monotonic", lambda: now[0])
-    monkeypatch.setattr(progress, "_ticking", lambda tick: nullcontext(ticks.append(tick)))
-    with progress.in_lines() as tell:
-        tell(STEP)
-        said = []
-        for now[0] in 3600.0 + 0.02 * np.arange(400):
-            ticks[0]()
-            said += [now[0]] * capsys.readouterr().err.count("\n")
-    assert len(said) > 3 and np.diff(said).max() <= progress.LONGEST + 0.1
-
-
 @pytest.mark.parametrize("columns, pattern", [
     (60, r"base 0\.6/0\.6 h \d\d:\d\d<\d\d:\d\d, step \d+, mesh \d, contact *"),
     (120, r".*base 100%\|.*\| 0\.6 of 0\.6 h \[\d\d:\d\d < \d\d:\d\d, step \d+, remeshes \d, contact\].*"),
 ])
 def test_on_a_terminal_a_bar(tmp_path, columns, pattern):
     """Simulated time, steps, remeshes, contact and the time that is left; sixty columns are enough."""
-    last = terminal(tmp_path, columns)[-1]
-    assert re.fullmatch(pattern, last) and (columns > 60 or len(last) <= 60)
-
-
-def terminal(tmp_path, columns):
-    """What a run shows on a terminal, state by state, up to the last with all steps."""
     here, there = pty.openpty()
     fcntl.ioctl(there, termios.TIOCSWINSZ, struct.pack("HHHH", 40, columns, 0, 0))
     process = started("base", *flags(*CONTACT), "--out", tmp_path / "run", stdout=there, stderr=there, text=False)
     os.close(there)
     seen = b""
-    try:
+    with suppress(OSError):  # the other end is closed
         while some := os.read(here, 4096):
             seen += some
-    except OSError:  # the other end is closed
-        pass
     os.close(here)
     process.wait()
-    assert "simulated" not in seen.decode() and seen.decode().count("completed") == 1
-    bars = [bar.rstrip("\n") for bar in re.split(r"\r", seen.decode())]
-    return [bar for bar in bars if " h " in bar and "contact" in bar and "simulated" not in bar]
+    last = [bar for bar in re.split(r"[\r\n]+", seen.decode()) if " h " in bar and "contact" in bar][-1]
+    assert re.fullmatch(pattern, last) and len(last) <= columns and b"simulated" not in seen
 
 
 @pytest.mark.parametrize("arguments", [[], ["base"], ["--out", "x"], ["base", "--resume", "x"], ["--checkpoint", "-1"],
@@ -154,37 +121,21 @@ def test_an_empty_path_is_not_the_present_folder(tmp_path, monkeypatch, capsys, 
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_exit_statuses_are_told(capsys):
-    with pytest.raises(SystemExit):
-        main(["run", "--help"])
-    assert re.findall(r"^  (\d+) ", capsys.readouterr().out, re.M) == ["0", "1", "2", "130"]
-
-
 def test_signals_are_noted_and_everything_is_as_before():
-    """Handlers, mask and threads."""
-    before = signal.getsignal(signal.SIGTERM), signal.pthread_sigmask(signal.SIG_BLOCK, ()), threading.active_count()
+    """One that is ignored, as under nohup, stays so."""
+    kept, before = signal.signal(signal.SIGINT, signal.SIG_IGN), signal.getsignal(signal.SIGTERM)
     with noted() as came:
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.05)
         assert came() == 0
-        for number in (signal.SIGTERM, signal.SIGINT):  # the second one at once: the same request
-            os.kill(os.getpid(), number)
+        for _ in range(2):  # the second one at once: the same request
+            os.kill(os.getpid(), signal.SIGTERM)
             deadline = time.monotonic() + 10
             while not came() and time.monotonic() < deadline:
                 time.sleep(0.001)
         assert came() == signal.SIGTERM
-    assert before == (signal.getsignal(signal.SIGTERM), signal.pthread_sigmask(signal.SIG_BLOCK, ()),
-                      threading.active_count())
-
-
-def test_ignored_signals_stay_ignored():
-    """As under nohup."""
-    kept = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        with noted() as came:
-            os.kill(os.getpid(), signal.SIGINT)
-            time.sleep(0.05)
-            assert came() == 0
-    finally:
-        signal.signal(signal.SIGINT, kept)
+    assert (signal.signal(signal.SIGINT, kept), signal.getsignal(signal.SIGTERM)) == (signal.SIG_IGN, before)
+    assert not signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
 
 @pytest.mark.parametrize("deaf, options", [("stdout", ["--json"]), ("stdout", []), ("stderr", [])])

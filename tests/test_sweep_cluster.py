@@ -1,23 +1,20 @@
 """A sweep on a Dask cluster: a real scheduler and workers, in processes of their own on the loopback; where it is what
 they answer that matters, a stand-in for them."""
 
-import contextlib
-import csv
 import json
 import os
-import shutil
 import signal
 import socket
 import subprocess
 import sys
-import threading
 import time
-from types import SimpleNamespace
+from unittest.mock import MagicMock, Mock
 
 import pytest
 
 from repro.cli import main
 from repro.sweep import cluster, task
+from tests.shell import rows
 
 VARY = ["--vary", "pore.width=48:52 um:linear:6", "--set", "numerics.preset=fast"]
 
@@ -54,18 +51,6 @@ def test_a_bad_address_is_refused_within_five_seconds_and_nothing_is_written(tmp
         assert time.monotonic() - start < 5 and list(tmp_path.iterdir()) == []
 
 
-def test_what_greets_otherwise_is_no_scheduler():
-    def greet():
-        with server.accept()[0] as connection:
-            connection.sendall(b"SSH-2.0-OpenSSH_9.9\r\n")
-
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        thread = threading.Thread(target=greet)
-        thread.start()
-        assert not cluster._is_open(f"tcp://127.0.0.1:{server.getsockname()[1]}")
-        thread.join()
-
-
 @pytest.mark.parametrize("trouble, answer, said", [
     (TimeoutError(), None, "it has no workers"),
     (None, ImportError("no module repro"), "a worker lacks this package (no module repro)"),
@@ -74,19 +59,15 @@ def test_what_greets_otherwise_is_no_scheduler():
 ])
 def test_workers_that_cannot_be_used_are_told(tmp_path, capsys, monkeypatch, trouble, answer, said):
     """By the scheduler's name: none in time, no package, another version, another file system."""
-    def wait_for_workers(count, timeout):
-        if trouble:
-            raise trouble
-
     def run(function, path):
         if isinstance(answer, ImportError):
             raise answer
         version, shared = answer
         return {"tcp://a:1": function(path), "tcp://b:1": (version or task.code(), shared)}
 
-    client = contextlib.ExitStack()
-    client.wait_for_workers, client.run = wait_for_workers, run
-    monkeypatch.setattr(cluster, "_package", lambda address: SimpleNamespace(Client=lambda *at, **options: client))
+    client = MagicMock(wait_for_workers=Mock(side_effect=trouble), run=run)
+    client.__enter__.return_value = client
+    monkeypatch.setattr(cluster, "_package", lambda address: Mock(Client=lambda *at, **options: client))
     monkeypatch.setattr(cluster, "_is_open", lambda address: True)
     assert said in refused(tmp_path / "sweep", "tcp://host:8786", capsys)
 
@@ -153,26 +134,4 @@ def test_no_run_is_lost_or_there_twice_where_a_worker_is_killed(workers, tmp_pat
     assert sorted(os.listdir(out / "runs")) == sorted(point["folder"].removeprefix("runs/") for point in told)
     assert main(command(here, "--quiet")) == 0
     assert (out / "table.csv").read_bytes() == (here / "table.csv").read_bytes()
-    with (out / "runs.csv").open() as lines:
-        assert [row["status"] for row in csv.DictReader(lines)] == ["completed"] * 6
-
-
-@pytest.mark.thorough
-def test_a_sweep_that_lost_its_cluster_is_gone_on_with_here(workers, tmp_path, capsys, monkeypatch):
-    """Refused while there is no worker; interrupted while a run is at work; the same command without a scheduler makes
-    the rest."""
-    address, start = workers
-    out = tmp_path / "sweep"
-    monkeypatch.setattr(cluster, "PATIENCE", 2)
-    assert "has no workers" in refused(out, address, capsys)
-    shutil.rmtree(out)
-    start("one")
-    process = on_cluster(address, out)
-    until(lambda: list(out.glob("runs/0*")) and list(out.glob("runs/.part-*")))
-    process.send_signal(signal.SIGINT)
-    said = process.communicate(timeout=60)[1]
-    assert process.returncode == 130 and "Traceback" not in said, said
-    kept = {path: (path / "run.json").stat().st_mtime_ns for path in out.glob("runs/0*")}
-    assert main(command(out, "--quiet")) == 0
-    assert len(list(out.glob("runs/0*"))) == 6
-    assert kept and kept == {path: (path / "run.json").stat().st_mtime_ns for path in kept}
+    assert [row["status"] for row in rows(out / "runs.csv")] == ["completed"] * 6
