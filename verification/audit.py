@@ -33,7 +33,6 @@ RECORD = Path(__file__).parent / "report" / "audit.json"
 REPEATS = 3
 #: Times (h) at which the lean of an uneven seed is told.
 TIMES = (0.4, 4.8, 9.6, 14.4, PLOTTED)
-LABELS = [f"{time:g} h" for time in TIMES]
 METHOD = (f"base, preset paper, at {PLOTTED:g} h in steps of {60 * UPDATE:g} min; "
           "effect: difference of two whole runs, relative, effluents over the supply, flow and substrates of both last "
           "shapes on the default's mesh (extent: of the converged solution, as they are); one_state: both choices in "
@@ -107,13 +106,10 @@ def symmetry() -> list[dict]:
     plain, rows = switches.columns(BASE), []
     for word, seed in (("upstream", switches.longer_upstream), ("downstream", switches.longer_downstream)):
         other = switches.course(BASE, switches.as_it_is, seed)
-        lean, speed = (switches.near(other.columns, name, TIMES) for name in ("lean", "velocity"))
-        lean = dict(zip(LABELS, map(float, lean - switches.near(plain, "lean", TIMES))))
-        told = _marched("symmetry of the seed", "half-disc", f"1 % longer {word}", other,
-                        "R (1 + 0.01 cos 3 phi), area as before; the middle between the tips is off by "
-                        + ", ".join(f"{100 * value:+.2f} % at {time}" for time, value in lean.items()))
-        apart = dict(zip(LABELS, map(float, speed / switches.near(plain, "velocity", TIMES) - 1)))
-        rows.append({**told, "lean_over_time": lean, "velocity_over_time": apart})
+        lean = switches.near(other.columns, "lean", TIMES) - switches.near(plain, "lean", TIMES)
+        rows.append(_marched("symmetry of the seed", "half-disc", f"1 % longer {word}", other,
+                             "R (1 + 0.01 cos 3 phi), area as before; the middle between the tips is off by "
+                             + ", ".join(f"{100 * off:+.2f} % at {time:g} h" for off, time in zip(lean, TIMES))))
     return rows
 
 
@@ -125,7 +121,7 @@ def _marched(choice: str, default: str, alternative: str, other: Course, note: s
 def row(choice: str, default: str, alternative: str, ratio: float, effects: dict[str, float], note: str) -> dict:
     """A row of the record."""
     return {"choice": choice, "default": default, "alternative": alternative, "cost_ratio": ratio, "effect": effects,
-            "one_state": {}, "largest": largest(effects), "note": note}
+            "one_state": {}, "note": note}
 
 
 def largest(effects: dict[str, float]) -> str:

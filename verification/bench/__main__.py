@@ -13,8 +13,7 @@ from verification.bench import record, told
 from verification.kernel.writing import plain, save
 
 #: Modules of the parts; that of other codes is imported for its own alone.
-PARTS = {"flow": "stages", "transport": "stages", "box": "users", "channel": "users", "growth": "stages",
-         "transfer": "stages", "base": "runs", "size": "runs", "scenes": "runs", "memory": "runs"}
+PARTS = {"box": "users", "channel": "users", "base": "runs", "size": "runs", "scenes": "runs", "memory": "runs"}
 
 
 def main(arguments: list[str] | None = None) -> dict:

@@ -9,17 +9,14 @@
                                  "points": [{"label": sizes and steps, "seconds": median wall time, "cpu": median
                                              processor time, "error": relative, "repeats": number, ...}],
                                  "failed": [{"label": ..., "reason": ...}]}],
-                      "apart": [{"what": ..., "seconds": ...}],        times that no point includes
                       ...}},                                           what is a part's own
      "verdicts": [{"claim": ..., "measured": ..., "wanted": ..., "holds": true, false or null (not measured)}]}
 
-What a part has of its own: points of flow, transport, growth and transfer "nodes", those of transfer "drift" (of the
-total) and "beyond" (the field's bounds), those of base "nodes", "errors" (of the eight numbers, the larger of both
-times) and "stages" {stage: s}; base "wide" [{"preset", "seconds", "cpu", "steps", "end"}] and, kept from one benchmark
-to the next, "reference_values" [time][number]; size, whose points have no error, "stages", "ratio" (to the floor) and
-"memory_MB" of each, and "fits" {method: {stage: exponent}}; scenes "rows" [{"scene", "method", "seconds", "cpu",
-"stages": {stage: s}, ...}] and "steps" [{"method", "seconds", "hours"}]; memory "rows" [{"method", "steps", "slope",
-"bound", ...}]. A part that was not run again keeps what it had. Not-a-number is never written.
+What a part has of its own: points of base "errors" (of the eight numbers, the larger of both times); base "wide"
+[{"preset", "seconds", "cpu", "steps", "end"}] and, kept from one benchmark to the next, "reference_values"
+[time][number]; size, whose points have no error, "nodes", "stages" {stage: s} and "ratio" (to the floor); scenes "rows"
+[{"scene", "method", "seconds", "cpu", "stages", "took", "unneeded"}]; memory "rows" [{"method", "steps", "slope",
+"bound"}]. A part that was not run again keeps what it had. Not-a-number is never written.
 
 How it is measured: jobs are timed side by side, each round runs all of them once, so that whatever else the machine
 does hits all alike. How it is read: the best speed of a method is the lower envelope of its points, between and beyond
@@ -34,7 +31,6 @@ import platform
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import date
-from functools import partial
 from importlib.metadata import version
 from math import exp, isfinite, log
 from operator import itemgetter
@@ -143,15 +139,10 @@ def measured(jobs: Jobs, repeats: int) -> list[dict]:
     return _lines(times)
 
 
-def series(method: str, label: str, sizes: Iterable, job: Callable, **how) -> Jobs:
-    """Jobs ``job(size, **how)`` of a method, one a size."""
-    return {(method, label.format(size)): partial(job, size, **how) for size in sizes}
-
-
-def part(title: str, error: str, reference: str, jobs: Jobs, repeats: int, once: Jobs | None = None, **more) -> dict:
-    """A part, measured; once: jobs that are run once; more: what else is told of it."""
-    lines = measured(jobs, repeats) + measured(once or {}, 1)
-    return {"title": title, "error": error, "reference": reference, "repeats": repeats, "lines": lines, **more}
+def part(title: str, error: str, reference: str, jobs: Jobs, repeats: int, once: Jobs) -> dict:
+    """A part, measured; once: jobs that are run once."""
+    lines = measured(jobs, repeats) + measured(once, 1)
+    return {"title": title, "error": error, "reference": reference, "repeats": repeats, "lines": lines}
 
 
 def _often(timed: Timed, repeats: int) -> int:
@@ -196,15 +187,6 @@ def envelope(points: Iterable[Mapping]) -> list[Mapping]:
     return kept
 
 
-def exponent(sizes, values) -> float:
-    """Least-squares p of values = c sizes^p; values that are zero are left out, not-a-number where under two remain."""
-    pairs = [(log(s), log(v)) for s, v in zip(sizes, values) if s > 0 and v > 0]
-    if len({x for x, _ in pairs}) < 2:
-        return float("nan")
-    x, y = np.array(pairs).T
-    return float(np.polyfit(x, y, 1)[0])
-
-
 def reading(points: Iterable[Mapping], error: float) -> Reading | None:
     """The least time for an error, by the envelope; None where nothing can be said.
 
@@ -221,8 +203,10 @@ def reading(points: Iterable[Mapping], error: float) -> Reading | None:
     if error >= errors[-1]:
         logs = (np.interp(-log(error), -np.log(errors), np.log(each)) for each in times)
         return Reading(*map(exp, logs), "between points")
-    slopes = [exponent(errors, each) for each in times]
-    if not all(s < 0 for s in slopes):
+    if len(kept) < 2:
+        return None
+    slopes = [float(np.polyfit(np.log(errors), np.log(each), 1)[0]) for each in times]
+    if max(slopes) >= 0:
         return None
     found = (each[-1] * (error / errors[-1]) ** s for each, s in zip(times, slopes))
     return Reading(*found, f"extrapolated with slope {slopes[0]:.2f}")
