@@ -10,16 +10,14 @@ What is committed of a hunt: ``report/sampled.json``, the rows, and ``report/sam
 from __future__ import annotations
 
 import os
-import re
 import time
-import traceback
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from verification.kernel import writing
 from verification.kernel.writing import Block, append, lines, markdown, table
-from verification.sampled import trying
 from verification.sampled.drawing import SEED, Mutant, digest, mutated, sources
 from verification.sampled.trying import LIVE, ROOT, Measured, Ran, Reach, copied, run
 
@@ -83,26 +81,16 @@ def _names(tests: list[Measured]) -> str:
 
 def hunt(mutants: list[Mutant], reach: Reach, jobs: int, whole: bool, ends: float) -> None:
     """Try mutants, several side by side, and write a row for each; none is begun after the time ``ends``."""
-    trying.prepare()
     before = {name: row.test for name, row in kept().items() if row.verdict == "caught"}
-    workers = [pid for number in range(jobs) if (pid := _forked(mutants[number::jobs], reach, whole, ends, before))]
-    for worker in workers:
-        os.waitpid(worker, 0)
 
+    def shift(number: int) -> None:
+        with copied() as there:
+            for mutant in mutants[number::jobs]:
+                if time.time() < ends:
+                    _write(tried(mutant, there, reach, whole, before.get(mutant.name, "")))
 
-def _forked(mutants: list[Mutant], reach: Reach, whole: bool, ends: float, before: dict[str, str]) -> int:
-    worker = os.fork()
-    if not worker:
-        try:
-            with copied() as there:
-                for mutant in mutants:
-                    if time.time() < ends:
-                        _write(tried(mutant, there, reach, whole, before.get(mutant.name, "")))
-        except BaseException:
-            traceback.print_exc()
-        finally:
-            os._exit(0)
-    return worker
+    with ThreadPoolExecutor(jobs) as pool:
+        list(pool.map(shift, range(jobs)))
 
 
 def _write(row: Row) -> None:
@@ -113,12 +101,11 @@ def _write(row: Row) -> None:
 
 def tried(mutant: Mutant, there: Path, reach: Reach, whole: bool = False, before: str = "") -> Row:
     """Run a mutant in the copy ``there`` against the tests that reach it: the one that caught it ``before`` first, then
-    as many of the cheapest as take no more than LIMIT; or all, for WHOLE, those that are named as its module is at
-    first."""
+    as many of the cheapest as take no more than LIMIT; or all, for WHOLE."""
     limit = WHOLE if whole else LIMIT
     path, text = there / "repro" / mutant.file, (ROOT / "repro" / mutant.file).read_text(encoding="utf-8")
     tests = reach.of(mutant.file, text, mutant.line, whole)
-    chosen = sorted(tests, key=lambda test: -alike(test.id, mutant.file)) if whole else within(tests, limit)
+    chosen = tests if whole else within(tests, limit)
     put(path, mutated(text, mutant))
     found = run(there, [before], limit) if before in {test.id for test in tests} else Ran()
     if not found.failed:
@@ -166,15 +153,6 @@ def _short(how: str) -> str:
     """The last line of a failure that tells something."""
     told = [line.strip() for line in how.splitlines() if line.strip()]
     return (told or [""])[-1].removeprefix("E ").strip()[-160:]
-
-
-def alike(test: str, file: str) -> int:
-    """How many words the names of a test's file and of a module have in common."""
-    return len(_words(Path(test.partition("::")[0]).stem) & _words(Path(file).with_suffix("").as_posix()))
-
-
-def _words(name: str) -> set[str]:
-    return {word.rstrip("s") for word in re.split(r"[/_]", name)}
 
 
 def nearest(tests: list[Measured]) -> list[Measured]:
