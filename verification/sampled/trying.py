@@ -33,6 +33,10 @@ NOT_COPIED = (".git", ".venv", "__pycache__", "live", "out", "cache", "dist", "b
 #: What pytest ends with where no test that it collected fails: all pass, those that failed are told by themselves, or
 #: there is none to run.
 NOTHING_WRONG = (0, 1, 4, 5)
+#: What Linux tells of a process's largest memory begins with that of the process which started it: a small one.
+SHELL = ("sh", "-c", '"$0" "$@"; exit $?')
+#: How one ends that is ended at the limit: by itself, as the shell tells it, or with the shell.
+ENDED = (128 + signal.SIGXCPU, 128 + signal.SIGKILL, -signal.SIGKILL)
 #: Seconds on the clock a second of processor time may take, on a machine that others use too.
 PATIENCE = 4
 
@@ -75,7 +79,7 @@ def run(there: Path, tests: list[str], limit: float, reach: Path | None = None, 
     began = time.monotonic()
     with (there.parent / "printed").open("w") as printed:
         child = subprocess.Popen(
-            [sys.executable, "-m", "pytest", *stop, "-q", "-n0", "-p", "no:cacheprovider", "-p", "telling",
+            [*SHELL, sys.executable, "-m", "pytest", *stop, "-q", "-n0", "-p", "no:cacheprovider", "-p", "telling",
              "--tb=line", *files], cwd=there, env={**given, **paths, **traced}, stdin=subprocess.DEVNULL,
             stdout=printed, stderr=subprocess.STDOUT, start_new_session=True)
         status = _waited(child, limit * PATIENCE)
@@ -101,7 +105,7 @@ def _judged(rows: list[dict], status: int, seconds: float, limit: float) -> Ran:
         return Ran("pytest", f"exit status {rows[-1]['ends']}", seconds=seconds)
     begun = [row for row in rows if "starts" in row] or [{"starts": "collection", "spent": 0.0}]
     where, after = begun[-1]["starts"], max(limit - begun[-1]["spent"], 0.0)
-    if status in (-signal.SIGXCPU, -signal.SIGKILL):
+    if status in ENDED:
         return Ran(stopped=where, after=after, seconds=seconds)
     return Ran(where, f"the process ended with status {status}", seconds=seconds)
 
