@@ -15,7 +15,7 @@ from verification import audit, hard_cases
 from verification.bench import runs, told
 from verification.bench.record import line
 from verification.kernel import writing
-from verification.kernel.writing import Block, Link, load, markdown, table
+from verification.kernel.writing import Block, load, markdown, table
 
 FOLDER = Path(__file__).parent / "report"
 ROOT = Path(__file__).parents[1]
@@ -76,8 +76,7 @@ def _presets(part: dict) -> Iterator[tuple[str, ...]]:
 
 def page(found: list[Block]) -> str:
     """The page of the report."""
-    back = table((Link("All cases", "index"),), ())
-    return writing.page("Speed against error, hard cases, assumptions", [back, *found])
+    return writing.page("Speed against error, hard cases, assumptions", found)
 
 
 def pages_of(found: dict[str, dict]) -> dict[Path, str]:

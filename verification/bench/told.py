@@ -18,7 +18,6 @@ import numpy as np
 from verification.bench import runs
 from verification.bench.record import Reading, envelope, reading
 from verification.bench.record import line as line_of
-from verification.kernel.report import labelled
 from verification.kernel.writing import Block, table
 
 #: (error, least ratio, aim) of the paper's scheme at its own best speed over a preset.
@@ -227,6 +226,8 @@ COLORS = (*(f"C{k}" for k in range(10)), "black", "navy", "darkgreen", "darkred"
 
 def draw(parts: dict, folder: Path) -> list[Path]:
     """Draw the errors that the parts have; the files."""
+    import matplotlib
+    matplotlib.use("Agg")
     from matplotlib import pyplot
     folder.mkdir(parents=True, exist_ok=True)
     made = []
@@ -248,7 +249,10 @@ def _precision(pyplot, part: dict):
         color, mark = COLORS[k % len(COLORS)], MARKS[k % len(MARKS)]
         _curve(axis, points, mark, color=color, alpha=0.6)
         _curve(axis, envelope(points), f"-{mark}" if points else " ", color=color, label=label)
-    labelled(axis, part["title"], "wall time (s)", part["error"] if len(part["error"]) < 60 else "largest error")
+    axis.set_title(part["title"], fontsize=9)
+    axis.set_xlabel("wall time (s)", fontsize=8)
+    axis.set_ylabel(part["error"] if len(part["error"]) < 60 else "largest error", fontsize=8)
+    axis.tick_params(labelsize=7, which="both")
     axis.grid(which="major", lw=0.3)
     figure.legend(fontsize=6, loc="outside right upper")
     return figure
