@@ -12,10 +12,9 @@ Supplies that change over time: starvation and recovery of an aggregate.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -29,8 +28,9 @@ from repro.fem.space import Space
 from repro.march.simulation import shaped, simulate
 from repro.model import flow, pore
 from repro.scene import Scene
-from verification.kernel.case import Profile, at_least, at_most, between, case, refine, studies, study
+from verification.kernel.case import at_least, at_most, between, case, refine, studies, study
 from verification.problems import runs
+from verification.problems.channels import NAMES
 
 TIMES = (2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0, 19.4)
 #: Radii (um) at which Taylor-Hood elements give a half-disc's loss, and the reach of their meshes beyond it.
@@ -49,7 +49,7 @@ def base(*changes: str):
     scene = runs.base("19.4 h", *changes, times=TIMES)
     instants = runs.ours(scene)
     thin, own = _clogged(changes[0])
-    flow, rest = (_apart(scene, instants, moments) for moments in (thin, own))
+    flow, rest = (runs.apart(scene, instants, moments) for moments in (thin, own))
     checks = [between("velocity, lubrication", flow["velocity"], 0.09, 0.12,
                       "lubrication loses 11.3 % of the loss around a half-disc of 30 um, by Taylor-Hood; less what its "
                       "aggregate, 2 % larger, gains"),
@@ -60,16 +60,11 @@ def base(*changes: str):
                               "linear elements: 0.3 % at the ends of the mesh, 0.5 % around the aggregate"))
     checks += [at_most(f"{name}, a half-disc's loss", rest[name], bound, SQUARE_LAW)
                for name, bound in (("area", 0.013), ("effluents", 0.02), ("C along the pore", 0.02))]
-    return checks, _histories(scene, instants, thin, own), runs.profiles(instants[5::2], own[5::2])
+    return checks
 
 
 #: What is compared of a run and its averaged pore.
 APART = ("area", "effluents", "C along the pore")
-
-
-def _apart(scene, instants, moments) -> dict[str, float]:
-    """The largest of each difference at the reported times."""
-    return runs.worst([runs.apart(scene, *pair) for pair in zip(instants, moments)])
 
 
 @cache
@@ -111,28 +106,15 @@ def half_disc_loss(width: float, length: float, ratio: float) -> CubicSpline:
     return CubicSpline([0.0, *RADII], found)
 
 
-def _histories(scene, instants, thin, own) -> Iterator[Profile]:
-    """Velocity, acceptor leaving and area against time."""
-    rows, times = [results.row(scene, instant) for instant in instants], np.array(TIMES)
-    quantities = (("velocity (m/d)", "mean_velocity_m_per_d", lambda m: runs.M_PER_D * m.velocity),
-                  ("acceptor leaving (mg/L)", "effluent_acceptor_mg_per_L", lambda m: m.fields[0, -1]),
-                  ("area (um2)", "aggregate_area_um2", lambda m: m.area))
-    for label, column, pick in quantities:
-        yield Profile(label, "time (h)", label, (
-            ("ours", "ours", times, np.array([row[column] for row in rows])),
-            ("averaged, lubrication", "exact", times, np.array([*map(pick, thin)])),
-            ("averaged, a half-disc's loss", "reference", times, np.array([*map(pick, own)]))))
-
-
 SQUARE = "regular perturbation in 1 / D: the square of the transverse Thiele number"
 
 
-def thiele(scene, factor: float) -> float:
-    """Transverse Thiele number of the donor over a thickness of half the pore's width, diffusivities times ``factor``:
+def thiele(scene: Scene) -> float:
+    """Transverse Thiele number of the donor over a thickness of half the pore's width:
     W/2 sqrt(X_m k / (D_B (C_s + K)))."""
     law, donor = scene.kinetics, scene.substrates.donor
     rate = law.maximum_density * law.maximum_utilization_rate / (donor.supply + donor.half_saturation)
-    return scene.pore.width / 2 * float(np.sqrt(rate / (factor * donor.diffusivity_in_aggregate)))
+    return scene.pore.width / 2 * float(np.sqrt(rate / donor.diffusivity_in_aggregate))
 
 
 FASTER = (4.0, 16.0, 64.0, 256.0)
@@ -145,25 +127,27 @@ FASTER = (4.0, 16.0, 64.0, 256.0)
             "half-disc in a strip, in closed form",
       mutants=("effluent-at-the-inlet", "inlet-held", "seed-too-thin"), over=runs.every(0.5, 1.5), ways="paper")
 def mixing(*changes: str):
-    scene = runs.base("0 h", 'aggregate.radius="20 um"', *changes)
-    scene = runs.at_velocity(scene, runs.SPEED)
-    gaps, theory = np.array([_leaving(scene, factor) for factor in FASTER]).transpose(1, 2, 0)
-    for name, gap, first in zip(("acceptor", "donor"), gaps, theory):
-        yield study(f"effluent {name} (mg/L)", [thiele(scene, factor) for factor in FASTER], np.abs(gap), 2, SQUARE,
-                    ceiling=2.5e-5)
-        yield between(f"{name}: disagreement over first-order theory", gap[-1] / first[-1], 0.995, 1.005,
+    found = refine(_leaving, FASTER, runs.base("0 h", 'aggregate.radius="20 um"', *changes))
+    for name in NAMES:
+        yield study(f"effluent {name} (mg/L)", found["size"], np.abs(found[name]), 2, SQUARE, ceiling=2.5e-5)
+        yield between(f"{name}: disagreement over first-order theory", found[name][-1] / found[f"first {name}"][-1],
+                      0.995, 1.005,
                       "the next order: 0.2 %, a quarter of that at D times 64; mesh: 0.7 % at refinement 1 of linear "
                       "elements, less than half of that here")
 
 
-def _leaving(scene, factor: float):
-    """(2, 2) mg/L: effluents, ours less the averaged pore's, and what they are to first order."""
+def _leaving(factor: float, scene: Scene) -> dict[str, float]:
+    """Thiele number; mg/L: effluents, ours less the averaged pore's, and what they are to first order."""
     scene = runs.with_diffusivities(scene, lambda water, _: (factor * water, factor * water))
+    scene = runs.at_velocity(scene, runs.SPEED)
     row = results.row(scene, next(simulate(scene)))
-    ours = [row["effluent_acceptor_mg_per_L"], row["effluent_donor_mg_per_L"]]
+    theirs = runs.half_disc(scene).seed().fields[:, -1]
     radius = runs.half_disc_radius(row["aggregate_area_um2"])
-    return ours - runs.half_disc(scene).seed().fields[:, -1], averaged_pore.excess(runs.pore_of(scene), radius,
-                                                                                  runs.SPEED)
+    first = averaged_pore.excess(runs.pore_of(scene), radius, runs.SPEED)
+    found = {"size": thiele(scene)}
+    for name, trusted, more in zip(NAMES, theirs, first):
+        found |= {name: row[f"effluent_{name}_mg_per_L"] - trusted, f"first {name}": more}
+    return found
 
 
 SLOWER = (8.0, 16.0, 32.0, 64.0)
@@ -189,18 +173,12 @@ def whole_run(preset: str):
                       base[name] / (SLOWER[0] * errors[name][0]), 1.0, 2.0, "terms of fourth order")
 
 
-def _base(preset: str, factor: float):
-    finer = ("numerics.tolerance=0.0002",) if preset == "accurate" else ()
-    scene = runs.base("19.4 h", runs.by(preset), *finer, times=MIXING_TIMES)
-    scene = runs.with_diffusivities(scene, lambda water, biomass: (factor * water, factor * biomass))
-    return runs.at_velocity(scene, runs.SPEED)
-
-
 def _whole(factor: float, preset: str) -> dict[str, float]:
     """Thiele number and largest differences of one run."""
-    scene = _base(preset, factor)
+    finer = ("numerics.tolerance=0.0002",) if preset == "accurate" else ()
+    scene = runs.faster(runs.base("19.4 h", runs.by(preset), *finer, times=MIXING_TIMES), factor)
     moments = runs.half_disc(scene).run(MIXING_TIMES, accuracy=1e-6)
-    return {"size": thiele(_base(preset, 1.0), factor), **_apart(scene, runs.ours(scene), moments)}
+    return {"size": thiele(scene), **runs.apart(scene, runs.ours(scene), moments)}
 
 
 #: Refinement of our mesh, our time step (min), and cells of the averaged pore: as in the whole run, and twice as fine.
@@ -225,7 +203,7 @@ def _piece(elements: str, refinement: float, minutes: float, finer: int) -> dict
                       f'growth.time_step="{minutes} min"')
     scene = runs.at_velocity(scene, runs.SPEED)
     moments = runs.half_disc(scene, cells=finer * runs.CELLS, fluid=finer * runs.FLUID).run((2.0,))
-    return runs.apart(scene, runs.last(scene), moments[-1])
+    return runs.apart(scene, runs.ours(scene), moments)
 
 
 WIDTH, THICKNESS = 20.0, 5.0
@@ -267,7 +245,7 @@ def _strip(aspect: float, elements: str) -> dict[str, float]:
     moments = strip_of(given, area, 2 * runs.CELLS).run(given.output.times)
     ends = np.array([(instants[-1].pore.outline.upstream, instants[-1].pore.outline.downstream), moments[-1].ends])
     ours, theirs = -ends[:, 0] / ends[:, 1] - 1
-    return {"size": aspect, **_apart(given, instants, moments), "ends": np.abs(ends[0] / ends[1] - 1).max(),
+    return {"size": aspect, **runs.apart(given, instants, moments), "ends": np.abs(ends[0] / ends[1] - 1).max(),
             "lean": ours / theirs}
 
 
@@ -375,9 +353,9 @@ def _compared(scene: Scene, aspect: float, now: pore.Pore, peclet: float, densit
 
 #: Diffusivities are so many times those of the paper: the averaged pore's own error falls as their inverse.
 QUICK = 64.0
-#: (end (h), supply of the donor (mg/L) at the start of the piece, and at its end), as steps and as slopes.
-COURSES = {"steps": ((2.0, 10.0, 10.0), (4.5, 0.0, 0.0), (7.0, 10.0, 10.0)),
-           "linear": ((2.0, 10.0, 10.0), (4.5, 10.0, 0.0), (7.0, 0.0, 10.0))}
+#: (time (h), supply of the donor (mg/L) from then on) as steps, and as the ends of slopes.
+COURSES = {"steps": ((0.0, 10.0), (2.0, 0.0), (4.5, 10.0), (7.0, 10.0)),
+           "linear": ((0.0, 10.0), (2.0, 10.0), (4.5, 0.0), (7.0, 10.0))}
 #: Rows: while it is fed, at the jump or the bend, starved, at the next one, fed again.
 ROWS = (1.0, 2.0, 3.3, 4.5, 5.7, 7.0)
 ACCEPTOR = 10.0
@@ -405,37 +383,27 @@ SUPPLIED = {"steps": {preset: (4e-4, THIELE) for preset in runs.WITH_EXACT},
       over={f"{how}, {preset}": (how, *bound, *runs.WITH_EXACT[preset])
             for how, bounds in SUPPLIED.items() for preset, bound in bounds.items()}, ways="1 2")
 def supply(how: str, bound: float, origin: str, *changes: str):
-    """Checks and a picture of one course of the donor's supply."""
-    made = supplied(how, *changes)
-    instants = runs.ours(made)
-    moments = _fed(how, changes[0])
-    worst = _apart(made, instants, moments)
+    """Checks of one course of the donor's supply."""
+    made, moments = supplied(how, *changes), _fed(how, changes[0])
+    worst = runs.apart(made, runs.ours(made), moments)
     yield [at_most(name, worst[name], bound, origin) for name in APART]
-    areas = [moment.area for moment in moments]
     if how == "steps":
-        yield at_least("area at 2 h over that at 4.5 h", areas[1] / areas[3], 1.005,
+        yield at_least("area at 2 h over that at 4.5 h", moments[1].area / moments[3].area, 1.005,
                        "decay over 2.5 h: else nothing is starved")
-    ours = np.array([instant.pore.outline.area for instant in instants])
-    yield Profile("supply", "time (h)", "area (um2)", (("ours", "ours", np.array(ROWS), ours),
-                                                       ("averaged", "reference", np.array(ROWS), np.array(areas))))
 
 
 @cache
 def _fed(how: str, preset: str) -> list:
     """The averaged pore's moments, from the seed of a preset."""
-    both = [(end, (ACCEPTOR, first), (ACCEPTOR, last)) for end, first, last in COURSES[how]]
+    both = [(end, (ACCEPTOR, first), (ACCEPTOR, first if how == "steps" else last))
+            for (_, first), (end, last) in pairwise(COURSES[how])]
     made = supplied(how, preset).at(0.0)
     return runs.half_disc(made, cells=CELLS, fluid=FLUID).run_through(both, ROWS, ACCURACY)
 
 
 def supplied(how: str, *changes: str) -> Scene:
     """Base with a donor whose supply changes."""
-    pieces = COURSES[how]
-    table = [["0 h", f"{pieces[0][1]} mg/L"]]
-    for (end, _, _), (_, first, _) in zip(pieces, pieces[1:]):
-        table.append([f"{end} h", f"{first} mg/L"])
-    table += [[f"{pieces[-1][0]} h", f"{pieces[-1][2]} mg/L"]]
+    table = [[f"{time} h", f"{given} mg/L"] for time, given in COURSES[how]]
     made = runs.base("7 h", *changes, 'aggregate.radius="20 um"', f"substrates.donor.supply={json.dumps(table)}",
                      f"substrates.donor.interpolation={how}", times=ROWS)
-    made = runs.with_diffusivities(made, lambda water, biomass: (QUICK * water, QUICK * biomass))
-    return runs.at_velocity(made, runs.SPEED)
+    return runs.faster(made, QUICK)

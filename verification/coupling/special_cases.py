@@ -18,6 +18,7 @@ from unittest import mock
 import numpy as np
 
 from reference import poiseuille, whole_run
+from repro import results
 from repro.fem import linear
 from repro.fem.mesh import Mesh
 from repro.fem.outline import FREE
@@ -28,7 +29,7 @@ from repro.march.simulation import shaped, simulate
 from repro.model import flow, pore
 from repro.scene import Scene, load_scene
 from verification.kernel.case import at_least, at_most, case, each_at_most, refine, study
-from verification.problems import pairs, runs
+from verification.problems import meshes, runs
 from verification.problems.channels import both
 
 
@@ -222,7 +223,7 @@ def mirror(*changes: str):
     outline, space = last.pore.outline, last.pore.space
     tips = abs(outline.downstream + outline.upstream) / outline.downstream
     x = np.linspace(1.0, 70.0, 70)
-    sides = [pairs.sample(space, last.solved.concentrations.acceptor, np.column_stack([s * x, 0.3 + 0 * x]))
+    sides = [meshes.field_at(space, last.solved.concentrations.acceptor, np.column_stack([s * x, 0.3 + 0 * x]))
              for s in (-1, 1)]
     return [at_most("tips", tips, 3e-6, "unsymmetric mesh: the error of C_A, of which growth feels a tenth"),
             at_most("C_A", np.abs(np.subtract(*sides)).max() / 10.0, 1e-4, "unsymmetric mesh: error in space"),
@@ -407,16 +408,16 @@ def _apart(ours: np.ndarray, theirs: np.ndarray) -> np.ndarray:
     return (np.abs(ours - theirs) / scale).max(axis=0)
 
 
+#: Of a row, as whole_run.NAMES lists them.
+LISTED = ("mean_velocity_m_per_d", "conductivity_m_per_d", "aggregate_area_um2", "thickness_um", "upstream_um",
+          "downstream_um", "effluent_acceptor_mg_per_L", "effluent_donor_mg_per_L")
+
+
 def _listed(preset: str, *changes: str) -> np.ndarray:
-    """(2, 8) of base at TIMES, as whole_run.NAMES lists them."""
-    rows = []
-    for instant in runs.ours(runs.base("19.4 h", runs.by(preset), *changes, times=TIMES)):
-        flow = instant.solved.flow
-        outline = instant.pore.outline
-        fluxes = instant.solved.fluxes
-        rows.append([whole_run.M_PER_D * flow.mean_velocity, whole_run.M_PER_D * flow.conductivity, outline.area,
-                     outline.thickness, outline.upstream, outline.downstream, *(flux.effluent for flux in fluxes)])
-    return np.array(rows)
+    """(2, 8) of base at TIMES."""
+    scene = runs.base("19.4 h", runs.by(preset), *changes, times=TIMES)
+    rows = [results.row(scene, instant) for instant in runs.ours(scene)]
+    return np.array([[row[name] for name in LISTED] for row in rows])
 
 
 @case("coupling-presets", kind="cross-code", slow=True,

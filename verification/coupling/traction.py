@@ -10,10 +10,8 @@ from functools import cache
 
 import numpy as np
 from scipy.integrate import simpson
-from skfem.quadrature import get_quadrature_tri
 
 from reference import layered_channel
-from repro.fem.elements import derivatives, values
 from repro.fem.mesh import Mesh
 from repro.fem.newton import relative
 from repro.fem.outline import FREE, Outline
@@ -76,39 +74,12 @@ def balance(*changes: str):
 
 
 def _by_biomass(scene, now: pore.Pore, found: Flow) -> np.ndarray:
-    """(N, 2) um2 of head: forces of the biomass' triangles, lambda times as viscous, triangle by triangle."""
-    viscosity = scene.flow.viscosity_ratio * scene.flow.kinematic_viscosity / scene.flow.gravity
+    """(N, 2) um2 of head: forces of the biomass' triangles, lambda times as viscous, as of a mesh on which biomass and
+    fluid are exchanged."""
     mesh = now.mesh
-    space = now.space
-    pressure = flow.pressure_space(now.space)
-    total = np.zeros_like(mesh.points)
-    for cell in np.flatnonzero(mesh.biomass):
-        nodes = mesh.cells[cell]
-        for weight, place in RULES[space.order]:
-            J = mesh.points[nodes].T @ _derivatives(mesh.geometry, place)
-            grad = found.velocity[space.cells[cell]].T @ _derivatives(space.order, place) @ np.linalg.inv(J)
-            if scene.numerics.interface == "traction":
-                grad = grad + grad.T
-            head = float(values(pressure.order, place[None])[0] @ found.head[pressure.cells[cell]])
-            slope = _derivatives(mesh.geometry, place) @ np.linalg.inv(J)
-            total[nodes] += weight * np.linalg.det(J) * slope @ (head * np.eye(2) - viscosity * grad).T
-    return total
-
-
-def _rule(degree: int) -> list[tuple[float, np.ndarray]]:
-    """(weight, place) of scikit-fem's quadrature of a degree on the unit triangle."""
-    places, weights = get_quadrature_tri(degree)
-    return list(zip(weights, places.T))
-
-
-#: Quadratures by the order of the elements: those of the package, without which the balance is no identity of its own
-#: equations; on linear triangles a middle point is exact.
-RULES = {1: _rule(1), 2: _rule(6), 3: _rule(8)}
-
-
-def _derivatives(order: int, place: np.ndarray) -> np.ndarray:
-    """(k, 2) of the functions of an order at a place on the unit triangle."""
-    return derivatives(order, place[None])[0]
+    other = Mesh.of(mesh.points, mesh.cells, ~mesh.biomass, mesh.loop, mesh.width, mesh.ends)
+    viscosity = scene.flow.viscosity_ratio * scene.flow.kinematic_viscosity / scene.flow.gravity
+    return traction.nodal(Space(other, now.space.order), found, viscosity, scene.numerics.interface)
 
 
 def _drag_error(refinement: float) -> dict[str, float]:
@@ -243,19 +214,14 @@ def _uneven(now: pore.Pore, mean: float, slope: float) -> np.ndarray:
     return now.theta * (mean + slope * places)
 
 
-#: Integrals of each function of an edge's nodes times the slope of each, straight and parabolic.
-ALONG = {1: np.array([[-1, 1], [-1, 1]]) / 2, 2: np.array([[-3, 4, -1], [-4, 0, 4], [1, -4, 3]]) / 6}
-
-
 def _normals(outline: Outline) -> np.ndarray:
-    """(M, 2) outward normals times length of the interface's edges, shared between their nodes: along a parabola by the
-    integral of its tangent times the nodes' functions."""
-    step, total = outline.geometry, np.zeros_like(outline.points)
-    wet = np.flatnonzero(outline.interface_edges()[::step])
-    nodes = (step * wet[:, None] + np.arange(step + 1)) % len(total)
-    tangent = ALONG[step] @ outline.points[nodes]
-    np.add.at(total, nodes, np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1))
-    return total
+    """(M, 2) outward normals times length of the edges, shared between their nodes: by how much the area grows as a
+    node moves by one, of which it is a quadratic function."""
+    def area(move):
+        return replace(outline, points=outline.points + move.reshape(-1, 2)).area
+
+    moves = np.eye(outline.points.size)
+    return np.array([area(move) - area(-move) for move in moves]).reshape(-1, 2) / 2
 
 
 FACTORS = (800.0, 400.0, 200.0, 100.0)

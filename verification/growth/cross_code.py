@@ -24,8 +24,8 @@ from reference import manufactured_growth, quadratic_growth
 from reference.quadratic_growth import Contact
 from repro.model import growth
 from verification.growth import closed_forms
-from verification.kernel.case import Check, Profile, around, at_most, between, case, refine, studies
-from verification.problems import bodies
+from verification.kernel.case import Check, around, at_most, between, case, refine, studies
+from verification.problems import bodies, meshes
 from verification.problems.bodies import Supported
 
 #: Ours, by refinement; the reference on each level, by rings. 90 and 135 degrees have a node on all of them. Curved
@@ -116,7 +116,7 @@ def _settled(name: str, difference: float) -> Check:
     where, weight = _points()
     before, last = (trusted(name, level).at(*where)[0] for level in (len(RINGS) - 2, len(RINGS) - 1))
     return at_most("last change of the reference's places, over the last difference to ours",
-                   bodies.relative(before, last, weight) / difference, 0.3,
+                   meshes.relative(before, last, weight) / difference, 0.3,
                    "the reference must be the finer one; it changes by less with every level")
 
 
@@ -124,7 +124,7 @@ def _points():
     """X, Y (2, t, q) at the points of quadrature of a mesh of ours, and their weights (t, q)."""
     body, _ = bodies.half_disc(REFINEMENTS[1][2])
     where, weight, _ = bodies.integrated(body)
-    return where, weight
+    return np.moveaxis(where, 2, 0), weight
 
 
 def _curved(found: dict, problem: str, pressure: str, ceilings: tuple[float, float]):
@@ -136,15 +136,6 @@ def _curved(found: dict, problem: str, pressure: str, ceilings: tuple[float, flo
             yield between(f"order of the {field}", slope, order - 0.5, order + 0.5,
                           "quadratic places, linear pressure: third and second order")
         yield at_most(field, found[field][-1], ceiling, "the reference's elements are finer")
-
-
-def _outline(name: str) -> Profile:
-    """Of ours on the third level and of the reference on the last."""
-    (body, rim, found), exact = ours(name, 2), trusted(name, len(RINGS) - 1)
-    rim, turn = rim[np.argsort(body.reference[rim, 0])], np.linspace(0, np.pi, 200)
-    place, _ = exact.at(bodies.RADIUS * np.cos(turn), bodies.RADIUS * np.sin(turn))
-    return Profile(f"outline, {name}", "x (um)", "y (um)", (("ours", "ours", *found.position[rim].T),
-                                                            ("quadratic elements", "reference", *place.T)))
 
 
 NORM = "L2 over the body at t = 0 of the difference to the reference on the same level, relative: places; pressure"
@@ -160,7 +151,6 @@ def compared(kind: int, problem: str, ceilings: dict[int, tuple[float, float]], 
     place, last = ceilings[1]
     yield studies(found, {"place": (2, PLACE, place), pressure: (1.75, PRESSURE, last)})
     yield _settled(problem, found["place"][-1])
-    yield _outline(problem)
 
 
 @case("growth-quadratic-cylinder", kind="cross-code", norm=f"{NORM}; the same of the reference to the closed form",
@@ -180,8 +170,8 @@ def _own(level: int) -> dict[str, float]:
     place, pressure = trusted("half-cylinder", level).at(*where)
     known = closed_forms.exact(2000.0)
     exact, level_of = known.place(*where), known.pressure(*where)
-    return {"size": bodies.RADIUS / RINGS[level], "places": bodies.relative(place, exact, weight),
-            "pressure": bodies.relative(pressure / MODULUS, level_of, weight)}
+    return {"size": bodies.RADIUS / RINGS[level], "places": meshes.relative(place, exact, weight),
+            "pressure": meshes.relative(pressure / MODULUS, level_of, weight)}
 
 
 @case("growth-uneven", kind="cross-code", slow=True, norm=NORM,

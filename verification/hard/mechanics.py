@@ -311,7 +311,7 @@ def _places(found: Grown, exact: HalfCylinder) -> list[Check]:
 def _errors(found: Grown, exact: HalfCylinder) -> tuple[float, float]:
     """Root mean squares (um) over t = 0 of the places' error, and of the closed form's own interpolation."""
     where, weight, of = bodies.integrated(found.held)
-    true = exact.place(*where)
+    true = exact.place(*np.moveaxis(where, 2, 0))
     gaps = (of.values @ field[found.held.cells] - true for field in (found.position, exact.place(*found.start.T)))
     return tuple(float(np.sqrt(np.sum(weight[..., None] * gap**2) / weight.sum())) for gap in gaps)
 

@@ -12,7 +12,6 @@ import numpy as np
 from scipy.optimize import brentq
 
 from reference import layered_channel, poiseuille, slab
-from repro.fem.space import Space
 from repro.model import flow, transport
 from repro.model.kinetics import Sink
 from repro.results import M_PER_D
@@ -338,7 +337,7 @@ def plugged(preset: str, size: float) -> list:
     exact = 12 / WIDTH**2 * (ENDS[1] - ENDS[0] + 1999 * 2 * PLUG)
     space = meshes.space_on(grid, common.scene("wide", preset).numerics.order)
     found = flow.unit_flow(space, 2000.0)
-    flux = _fluxes(space, found.velocity)
+    flux = meshes.section_means(space, found.velocity[:, 0], SECTIONS, 64)
     leak, lost, origin = LEAK[size] if space.order == 1 else HELD
     checks = []
     if found.correction is not None:
@@ -355,14 +354,6 @@ HELD = (1e-10, 1e-10, "round-off: the elements hold a parabola")
 #: as was measured, and of second order.
 COARSE = "3.3 and 12.3 % with elements of W / 4, second order"
 LEAK = {12.5: (0.033, 0.123, COARSE), 7.0: (0.033 * 0.56**2, 0.123 * 0.56**2, COARSE)}
-
-
-def _fluxes(space: Space, velocity: np.ndarray) -> np.ndarray:
-    """Mean of u_x over each of SECTIONS."""
-    place, weight = np.polynomial.legendre.leggauss(64)
-    x, y = np.meshgrid(SECTIONS, 0.5 * WIDTH * (1 + place), indexing="ij")
-    across = meshes.field_at(space, velocity[:, 0], np.column_stack([x.ravel(), y.ravel()]))
-    return across.reshape(x.shape) @ weight / 2
 
 
 def _sources(grid, found) -> float:

@@ -21,7 +21,7 @@ from repro.fem.mesh import Mesh, curved
 from repro.fem.sizing import ACROSS_AGGREGATE, Sizing
 from repro.fem.space import Space
 from repro.model import mesh_motion
-from verification.kernel.case import Profile, at_least, at_most, case, refine, studies, study
+from verification.kernel.case import at_least, at_most, case, refine, studies, study
 from verification.problems import meshes
 
 #: gamma of (35) and c of the stabilisation as scenes have them, and the gammas that cases compare (E13).
@@ -174,8 +174,6 @@ def half_disc(geometry: int):
     for name, gamma in product(SEGMENT_MOTIONS, GAMMAS):
         yield _compared(geometry, np.pi / 2, LEVELS, name, gamma, 2,
                         "linear elements: second order, no singular corner (mirror images)", f"{name}, ")
-    if geometry == 1:
-        yield [_beside(_segment(np.pi / 2, LEVELS[1][0], 1), name) for name in SEGMENT_MOTIONS]
 
 
 def _compared(geometry: int, contact: float, levels, motion: str, gamma: float, order: float, why: str, name: str = ""):
@@ -230,17 +228,6 @@ def _apart(grid, contact: float, parts: int, gamma: float, name: str) -> float:
     """Relative difference of both codes."""
     theirs = _followed(contact, parts, gamma, name)
     return meshes.relative(_displaced(grid, gamma, name, theirs.points), theirs.displacement, theirs.weights)
-
-
-def _beside(grid, name: str) -> Profile:
-    """d_x from the aggregate to the upper right corner of the mesh, for three gamma."""
-    curves = []
-    for gamma in GAMMAS:
-        theirs = _followed(np.pi / 2, 12, gamma, name)
-        x, ours = theirs.line[:, 0], _displaced(grid, gamma, name, theirs.line)
-        curves += [(f"gamma = {gamma:g}", "ours", x, ours[:, 0] / RADIUS),
-                   ("quadratic", "reference", x, theirs.on_line[:, 0] / RADIUS)]
-    return Profile(f"beside a half-disc that {name}", "x (um)", "d_x / R", tuple(curves))
 
 
 PORE, REACH = 50.0, (-75.0, 75.0)

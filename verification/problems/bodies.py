@@ -22,7 +22,6 @@ from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.fem.space import Space
 from repro.model import growth, pore
 from verification.problems import meshes
-from verification.problems.meshes import relative
 
 #: Radius of the half-discs (um), and the factor by which theta is raised at a time.
 RADIUS, FACTOR = 20.0, 1.5
@@ -81,7 +80,7 @@ class Supported:
     @property
     def points(self) -> np.ndarray:
         """(t, q, 2) um, where growth is taken, at t = 0."""
-        return np.einsum("qg,tgi->tqi", self.body.shape.table.shape, self.reference[self.cells])
+        return meshes.places(self.reference[self.cells], self.body.shape.table)[0]
 
     def field(self, function: Callable) -> np.ndarray:
         """(t, q) of a function of X and Y there."""
@@ -193,25 +192,21 @@ def system(held: Supported, position: np.ndarray, theta: np.ndarray) -> growth.S
 
 
 def integrated(held: Supported) -> tuple[np.ndarray, np.ndarray, elements.Table]:
-    """Where norms are taken: X, Y (2, t, q), weights (t, q) um2 and the table."""
+    """Where norms are taken: X, Y (t, q, 2), weights (t, q) um2 and the table."""
     of = elements.table(held.geometry, held.geometry, DEGREE)
-    nodes = held.reference[held.cells]
-    where = np.einsum("qg,tgi->itq", of.shape, nodes)
-    return where, elements.weights(nodes, of), of
+    return *meshes.places(held.reference[held.cells], of), of
 
 
 def place_error(held: Supported, position: np.ndarray, exact: Callable) -> float:
     """L2 over the body at t = 0 of places (n, 2) less exact(X, Y) (..., 2), over that of exact."""
     where, weight, of = integrated(held)
-    truth = exact(*where)
-    return relative(np.einsum("qa,tai->tqi", of.values, position[held.cells]), truth, weight)
+    return meshes.distance((where, weight, of.values), position[held.cells], exact)
 
 
 def pressure_error(held: Supported, pressure: np.ndarray, exact: Callable, chosen=slice(None)) -> float:
     """L2 over the body at t = 0, or over its triangles ``chosen``, of pressures (corners,) less exact(X, Y)."""
     where, weight, of = integrated(held)
-    found = pressure[held.cells[:, :3]] @ of.linear.T
-    return relative(found[chosen], exact(*where[:, chosen]), weight[chosen])
+    return meshes.distance((where[chosen], weight[chosen], of.linear), pressure[held.cells[chosen, :3]], exact)
 
 
 def equilibrium(held: Supported, theta: np.ndarray, forces: np.ndarray, start: np.ndarray) -> growth.Equilibrium:
@@ -223,7 +218,7 @@ def equilibrium(held: Supported, theta: np.ndarray, forces: np.ndarray, start: n
 def body_force(held: Supported, density) -> np.ndarray:
     """(n, 2) nodal forces of a force density(X, Y) (..., 2) per area of t = 0."""
     where, weight, of = integrated(held)
-    local = np.einsum("tq,qa,tqi->tai", weight, of.values, density(*where))
+    local = np.einsum("tq,qa,tqi->tai", weight, of.values, density(*np.moveaxis(where, 2, 0)))
     return _summed(held.cells, local, len(held.reference))
 
 
@@ -232,13 +227,11 @@ def traction(held: Supported, grid: Mesh, stress) -> np.ndarray:
     rectangle ``grid`` that is the whole body."""
     order = held.geometry
     edges = grid.topology.dofs(order).outlet
-    points, weights = np.polynomial.legendre.leggauss(5)
-    along = (points + 1) / 2
-    shape = elements.values(order, np.column_stack([along, 0 * along]))[:, elements.ON_EDGE[order]]
+    _, weights, shape = meshes.along_edges(order, 5)
     where = np.einsum("qa,eai->eqi", shape, held.reference[edges])
     length = held.reference[edges[:, -1], 1] - held.reference[edges[:, 0], 1]
     pull = stress(where[..., 0], where[..., 1])[..., 0]
-    return _summed(edges, np.einsum("e,q,qa,eqi->eai", length / 2, weights, shape, pull), len(held.reference))
+    return _summed(edges, np.einsum("e,q,qa,eqi->eai", length, weights, shape, pull), len(held.reference))
 
 
 def _summed(nodes: np.ndarray, local: np.ndarray, count: int) -> np.ndarray:

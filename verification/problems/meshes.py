@@ -14,8 +14,7 @@ Norms of the error of fields of order 1, 2 or 3 on triangles, and what they are 
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import Delaunay
-from skfem.quadrature import get_quadrature_tri
+from scipy.spatial import Delaunay, cKDTree
 
 from repro.fem import elements, mesher, outline, sizing, transfer
 from repro.fem.mesh import Mesh, curved, triangle_areas
@@ -155,19 +154,27 @@ def _meshed(points, triangles, is_biomass, ends, width: float, loop=()) -> Mesh:
     return Mesh.of(points, triangles, biomass, np.array(loop, int), width, tuple(map(float, ends)))
 
 
-WEIGHTS = get_quadrature_tri(6)
-#: Degree of the rule for fields of any order: products of two cubic ones, and places on curved triangles.
-FINE = 10
+#: Degree of the rule for fields of any order, products of two cubic ones and places on curved triangles; and of that
+#: for fields of order 1.
+FINE, LINEAR = 10, 6
+
+
+def places(nodes: np.ndarray, of: elements.Table) -> tuple[np.ndarray, np.ndarray]:
+    """Points (t, q, 2) um and weights (t, q) um2 of a table on triangles with nodes (t, g, 2), whichever way round."""
+    return np.einsum("qa,tai->tqi", of.shape, nodes), np.abs(elements.weights(nodes, of))
 
 
 def quadrature(points: np.ndarray, triangles: np.ndarray):
-    """Points (t, q, 2), weights (t, q) and nodal functions (q, 3) of a rule of degree six."""
-    (s, t), weight = WEIGHTS
-    shape = np.column_stack([1 - s - t, s, t])
-    corner = points[triangles]
-    a, b = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
-    double = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
-    return np.einsum("qa,tai->tqi", shape, corner), double[:, None] * weight, shape
+    """Points (t, q, 2), weights (t, q) and nodal functions (q, 3) of a rule on straight triangles."""
+    of = elements.table(1, 1, LINEAR)
+    return *places(points[triangles], of), of.values
+
+
+def fine(space: Space, chosen=slice(None), degree: int = FINE):
+    """Points (t, q, 2) um, weights (t, q) um2 and functions (q, k) of a space, of a rule of a degree on the triangles
+    ``chosen``, straight or curved."""
+    mesh, of = space.mesh, elements.table(space.order, space.mesh.geometry, degree)
+    return *places(mesh.points[mesh.cells[chosen]], of), of.values
 
 
 def relative(found: np.ndarray, exact: np.ndarray, weight: np.ndarray) -> float:
@@ -176,31 +183,50 @@ def relative(found: np.ndarray, exact: np.ndarray, weight: np.ndarray) -> float:
     return float(np.sqrt(np.sum(weight * (found - exact) ** 2) / np.sum(weight * exact**2)))
 
 
+def distance(at, values: np.ndarray, exact) -> float:
+    """:func:`relative` of a field with values (t, k) or (t, k, m) at the nodes of triangles; at: points, weights and
+    functions (q, k)."""
+    where, weight, shape = at
+    return relative(np.einsum("qa,ta...->tq...", shape, values), exact(*np.moveaxis(where, 2, 0)), weight)
+
+
 def l2_error(points, triangles, values, exact) -> float:
     """L2 norm of a nodal field (N,) or (N, m) less exact(x, y), over that of exact(x, y)."""
-    where, weight, shape = quadrature(points, triangles)
-    found = np.einsum("qa,ta...->tq...", shape, np.asarray(values)[triangles])
-    return relative(found, exact(where[..., 0], where[..., 1]), weight)
-
-
-def fine(space: Space, chosen=slice(None), degree: int = FINE):
-    """Points (t, q, 2) um, weights (t, q) um2 and functions (q, k) of a space, of a rule of a degree on the triangles
-    ``chosen``, straight or curved."""
-    mesh, of = space.mesh, elements.table(space.order, space.mesh.geometry, degree)
-    nodes = mesh.points[mesh.cells[chosen]]
-    return np.einsum("qa,tai->tqi", of.shape, nodes), elements.weights(nodes, of), of.values
+    return distance(quadrature(points, triangles), values[triangles], exact)
 
 
 def field_error(space: Space, values: np.ndarray, exact, chosen=slice(None)) -> float:
-    """As :func:`l2_error` of values (count,) or (count, m) at the nodes of a space, over the triangles ``chosen``."""
-    where, weight, shape = fine(space, chosen)
-    found = np.einsum("qa,ta...->tq...", shape, values[space.cells[chosen]])
-    return relative(found, exact(where[..., 0], where[..., 1]), weight)
+    """The same of values (count,) or (count, m) at the nodes of a space, over the triangles ``chosen``."""
+    return distance(fine(space, chosen), values[space.cells[chosen]], exact)
 
 
 def field_at(space: Space, values: np.ndarray, where: np.ndarray) -> np.ndarray:
-    """Values (count,) or (count, m) of a space at points (K, 2); those that round-off puts outside are moved in."""
-    return transfer.located(space.mesh.points, space.mesh.cells, where).field(values, space.cells, space.order)
+    """(K, ...) values (count, ...) of a space at points (K, 2), in the triangles that the package finds. That a point
+    lies there is seen by the triangle's map, and which nodes a triangle has by where they are."""
+    mesh = space.mesh
+    at = transfer.located(mesh.points, mesh.cells, where)
+    nodes = mesh.points[mesh.cells[at.triangle]]
+    there = np.einsum("ka,kai->ki", elements.values(mesh.geometry, at.local), nodes)
+    if np.abs(there - where).max() > 1e-6:
+        raise ValueError("a place does not lie in the triangle that was found")
+    own = np.einsum("da,kai->kdi", elements.values(mesh.geometry, elements.nodes(space.order)), nodes)
+    numbers = cKDTree(space.points).query(own)[1]
+    return np.einsum("kd,kd...->k...", elements.values(space.order, at.local), values[numbers])
+
+
+def section_means(space: Space, values: np.ndarray, x: np.ndarray, count: int = 16) -> np.ndarray:
+    """(K, ...) means of values (count, ...) of a space over the sections x (K,) of its mesh, by Gauss's rule."""
+    place, weight = np.polynomial.legendre.leggauss(count)
+    y = 0.5 * space.mesh.width * (1 + place)
+    found = field_at(space, values, np.column_stack([np.repeat(x, count), np.tile(y, len(x))]))
+    return np.einsum("kp...,p->k...", found.reshape(len(x), count, *found.shape[1:]), 0.5 * weight)
+
+
+def along_edges(order: int, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Gauss's rule on edges from 0 to 1: places (q,), weights (q,), and functions of an edge's nodes (q, order + 1)."""
+    points, weights = np.polynomial.legendre.leggauss(count)
+    along = (points + 1) / 2
+    return along, weights / 2, elements.values(order, np.column_stack([along, 0 * along]))[:, elements.ON_EDGE[order]]
 
 
 def mean_size(mesh: Mesh) -> float:

@@ -6,11 +6,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.spatial import Delaunay, cKDTree
-from skfem import ElementTriP1, ElementTriP2, ElementTriP3, MeshTri, MeshTri2
+from scipy.spatial import Delaunay
+from skfem import ElementTriP2, MeshTri
 
-from repro.fem.mesh import Mesh, triangle_areas
-from repro.fem.space import Space
+from repro.fem.mesh import triangle_areas
 from verification.problems import meshes
 
 ENDS, WIDTH = (0.0, 40.0), 25.0
@@ -18,9 +17,6 @@ AREA = (ENDS[1] - ENDS[0]) * WIDTH
 #: Distances (um) by which nodes are set aside, and at which others lie from the rim: slivers of that width.
 ASIDE, SLIVER = (1e-14, 1e-9, 1e-4), 1e-6
 Grid = tuple[np.ndarray, np.ndarray]
-#: Triangles in which a place is looked for.
-NEAR = 16
-ELEMENTS = {1: ElementTriP1(), 2: ElementTriP2(), 3: ElementTriP3()}
 
 
 def grid(size: float, seed: int) -> Grid:
@@ -85,55 +81,7 @@ def square(mesh: Grid, field: np.ndarray) -> float:
 
 
 def curved_weights(nodes: np.ndarray, barycentric: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """(t, q) um2, weights of a quadrature on triangles with nodes (t, 6, 2): corners, then middles of 01, 12 and 20.
-
-    x = sum of x_i L_i (2 L_i - 1) + 4 x_ij L_i L_j, differentiated by L; barycentric: (q, 3) the points.
-    """
-    by = np.zeros((len(weights), 6, 3))
-    for i in range(3):
-        j = (i + 1) % 3
-        by[:, i, i] = 4 * barycentric[:, i] - 1
-        by[:, 3 + i, i] = 4 * barycentric[:, j]
-        by[:, 3 + i, j] = 4 * barycentric[:, i]
-    along = by @ np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
-    return np.linalg.det(np.einsum("tai,qak->tqik", nodes, along)) * weights
-
-
-def sample(space: Space, values: np.ndarray, where: np.ndarray) -> np.ndarray:
-    """A field (count, ...) at places (K, 2) by scikit-fem's mesh and maps; each place is tried in the NEAR triangles
-    with the nearest middles. The field's nodes are known by where they are."""
-    mapping, element = _fem(space.mesh).mapping(), ELEMENTS[space.order]
-    middles = mapping.F(np.full((2, 1), 1 / 3))[:, :, 0].T
-    cells = cKDTree(middles).query(where, k=NEAR)[1]
-    local = np.stack([_local(mapping, where, cell) for cell in cells.T], axis=1)
-    depth = np.minimum(local.min(axis=2), 1 - local.sum(axis=2))
-    best = depth.argmax(axis=1)[:, None]
-    if np.take_along_axis(depth, best, axis=1).min() < -1e-6:
-        raise ValueError("a place lies in none of the triangles near it")
-    cell = np.take_along_axis(cells, best, axis=1)[:, 0]
-    place = np.take_along_axis(local, best[..., None], axis=1)[:, 0]
-    nodes = mapping.F(np.asarray(element.doflocs).T, tind=cell)
-    numbers = cKDTree(space.points).query(np.moveaxis(nodes, 0, 2))[1]
-    shape = [element.lbasis(place.T, k)[0] for k in range(numbers.shape[1])]
-    return np.einsum("ka,ka...->k...", np.column_stack(np.broadcast_arrays(*shape)), values[numbers])
-
-
-def _local(mapping, where: np.ndarray, cell: np.ndarray) -> np.ndarray:
-    """(K, 2) on the unit triangle, by Newton's method on scikit-fem's map; far outside where that fails."""
-    local = np.full((len(where), 2), 1 / 3)
-    for _ in range(20):
-        apart = mapping.F(local.T[:, :, None], tind=cell)[:, :, 0].T - where
-        inverse = mapping.invDF(local.T[:, :, None], tind=cell)[..., 0]
-        local = np.clip(local - np.einsum("ijk,kj->ki", inverse, apart), -2.0, 3.0)
-    return np.where(np.abs(apart).max(axis=1, keepdims=True) < 1e-9, local, -9.0)
-
-
-def _fem(mesh: Mesh) -> MeshTri:
-    """The mesh of scikit-fem, whose middles have numbers of their own."""
-    corners = mesh.points[: mesh.corners]
-    found = MeshTri(corners.T.copy(), mesh.triangles.T.copy(), sort_t=False)
-    if mesh.geometry == 1:
-        return found
-    found = MeshTri2.from_mesh(found)
-    ours = cKDTree(mesh.with_middles(corners)).query(found.doflocs.T)[1]
-    return MeshTri2(mesh.points[ours].T.copy(), found.t)
+    """(t, q) um2, weights of a quadrature on triangles with nodes (t, 6, 2): corners, then middles of 01, 12 and 20, as
+    scikit-fem has them; barycentric: (q, 3) the points."""
+    by = [ElementTriP2().lbasis(barycentric[:, 1:].T, k)[1] for k in range(6)]
+    return np.linalg.det(np.einsum("tai,akq->tqik", nodes, by)) * weights

@@ -15,14 +15,12 @@ from repro.march.simulation import simulate
 from repro.model import pore
 from repro.model.pore import Pore, Solved
 from repro.scene import Kinetics, Scene, load_scene
-from verification.kernel.case import Profile, columns
-from verification.problems import channels, pairs
+from verification.kernel.case import columns
+from verification.problems import channels, meshes
 
 ROUND_OFF = "round-off"
 #: The velocity of base at t = 0, 2.9 m/d, in um/h.
 SPEED = 2.9e6 / 24
-#: Of a section, at which a mean is taken.
-POINTS = 16
 #: Kinds of elements, by the names that scenes have for them: of order 1, 2 and 3.
 ELEMENTS = ("linear", "quadratic", "cubic")
 
@@ -107,11 +105,17 @@ def at_velocity(scene: Scene, speed: float) -> Scene:
 def with_diffusivities(scene: Scene, change) -> Scene:
     """The scene with ``change`` (D, D_B) -> (D, D_B) made to both substrates."""
     changed = {}
-    for name in ("acceptor", "donor"):
+    for name in channels.NAMES:
         one = getattr(scene.substrates, name)
         water, biomass = change(one.diffusivity, one.diffusivity_in_aggregate)
         changed[name] = replace(one, diffusivity=water, diffusivity_in_aggregate=biomass)
     return replace(scene, substrates=replace(scene.substrates, **changed))
+
+
+def faster(scene: Scene, factor: float) -> Scene:
+    """The scene at base's velocity with diffusivities so many times its own."""
+    spread = with_diffusivities(scene, lambda water, biomass: (factor * water, factor * biomass))
+    return at_velocity(spread, SPEED)
 
 
 def supplied_everywhere(scene: Scene) -> Scene:
@@ -152,12 +156,7 @@ def density_drift(scene: Scene, instant: Instant) -> float:
 
 def section_means(now: Pore, solved: Solved, x: np.ndarray) -> np.ndarray:
     """(2, K) means of C_A and C_D over the sections x (K,) of the mesh."""
-    found = solved.concentrations
-    place, weight = np.polynomial.legendre.leggauss(POINTS)
-    y = 0.5 * now.mesh.width * (1 + place)
-    where = np.column_stack([np.repeat(x, POINTS), np.tile(y, len(x))])
-    values = pairs.sample(now.space, np.column_stack([found.acceptor, found.donor]), where)
-    return np.einsum("kpm,p->mk", values.reshape(len(x), POINTS, 2), 0.5 * weight)
+    return meshes.section_means(now.space, channels.both(solved.concentrations).T, x).T
 
 
 def growth_rates(scene: Scene, acceptor: float | None = None, donor: float | None = None) -> tuple[float, float]:
@@ -221,39 +220,23 @@ def ours(scene: Scene) -> list[Instant]:
     return list(simulate(scene))[1:]
 
 
-def apart(scene: Scene, instant: Instant, moment: averaged_pore.Moment) -> dict[str, float]:
-    """Ours less the averaged pore's: area and velocity relative to the latter's, effluents (the further of both) and
-    section means of C (the largest difference along the mesh) over the supply."""
+def apart(scene: Scene, instants: list[Instant], moments) -> dict[str, float]:
+    """The largest differences from the averaged pore at the reported times: of area and velocity relative to the
+    latter's, of effluents (the further of both) and of section means of C (along the mesh) over the supply."""
+    return worst([_less(scene, *pair) for pair in zip(instants, moments)])
+
+
+def _less(scene: Scene, instant: Instant, moment: averaged_pore.Moment) -> dict[str, float]:
     row, supply = results.row(scene, instant), scene.substrates.acceptor.supply
-    effluents = np.array([row[f"effluent_{name}_mg_per_L"] for name in ("acceptor", "donor")])
-    x, means = profile(instant)
+    effluents = np.array([row[f"effluent_{name}_mg_per_L"] for name in channels.NAMES])
+    x = np.linspace(*instant.pore.mesh.ends, PLACES)
     between = [np.interp(x, moment.x, field) for field in moment.fields]
     return {"area": row["aggregate_area_um2"] / moment.area - 1,
             "velocity": row["mean_velocity_m_per_d"] / M_PER_D / moment.velocity - 1,
             "effluents": float(np.abs(effluents - moment.fields[:, -1]).max()) / supply,
-            "C along the pore": float(np.abs(means - between).max()) / supply}
-
-
-def profile(instant: Instant) -> tuple[np.ndarray, np.ndarray]:
-    """(x, section means (2, K)) over the mesh."""
-    x = np.linspace(*instant.pore.mesh.ends, PLACES)
-    return x, section_means(instant.pore, instant.solved, x)
+            "C along the pore": float(np.abs(section_means(instant.pore, instant.solved, x) - between).max()) / supply}
 
 
 def worst(rows: list[dict[str, float]]) -> dict[str, float]:
     """The largest size of each number."""
     return {name: float(np.abs(values).max()) for name, values in columns(rows).items()}
-
-
-def profiles(instants: list[Instant], moments) -> tuple[Profile, ...]:
-    """Section means along the mesh, a picture a substrate: ours, and the averaged pore's."""
-    pictures = []
-    for k, name in enumerate(("C_A", "C_D")):
-        curves = []
-        for instant, moment in zip(instants, moments):
-            x, means = profile(instant)
-            within = (moment.x > x[0]) & (moment.x < x[-1])
-            curves += [(f"{instant.pore.time:g} h", "ours", x, means[k]),
-                       (f"averaged, {instant.pore.time:g} h", "reference", moment.x[within], moment.fields[k, within])]
-        pictures.append(Profile(f"section means of {name}", "x (um)", f"{name} (mg/L)", tuple(curves)))
-    return tuple(pictures)

@@ -367,7 +367,7 @@ def beyond_the_ends(order: int):
     outside = (x < ENDS[0]) | (x > ENDS[1])
     fields = [both(new.concentrations) for new in (flowing, still)]
     for name, substrate, before, exact, found, resting in zip(NAMES, _substrates(), old, _exact(x), *fields):
-        between = pairs.sample(now.space, before, flowing.space.points[~outside])
+        between = meshes.field_at(now.space, before, flowing.space.points[~outside])
         gaps = {"beyond the ends": (found - exact)[outside], "between": found[~outside] - between,
                 "beyond the ends, no flow": resting[outside] - substrate.supply,
                 "between, no flow": resting[~outside] - between}

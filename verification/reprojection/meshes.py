@@ -13,7 +13,7 @@ from reference import galerkin_transfer
 from repro.fem import transfer
 from repro.fem.mesh import Mesh, triangle_areas
 from repro.fem.space import Space
-from verification.kernel.case import Profile, at_least, at_most, between, case, each_at_most, refine, studies
+from verification.kernel.case import at_least, at_most, between, case, each_at_most, refine, studies
 from verification.problems import meshes, pairs, runs
 
 SIZES = dict.fromkeys((5.0, 2.5, 1.25, 0.625), 3)
@@ -103,14 +103,6 @@ def chain():
     yield at_least("least value by interpolation", paper["least"].min(), paper["least"][0], "weights between 0 and 1")
     yield at_least("integral by interpolation, change", abs(paper["integral"][-1] - 1), 0.02,
                    "not conserving: the case would see it")
-    yield _over_remeshes("integral of a hill", "over that at the start", 1.0,
-                         {"projection": kept["integral"], "interpolation": paper["integral"]})
-
-
-def _over_remeshes(title: str, label: str, exact: float, ours: dict[str, np.ndarray]) -> Profile:
-    count = np.arange(REMESHES + 1)
-    return Profile(title, "remeshes", label, (*((name, "ours", count, values) for name, values in ours.items()),
-                                              ("exact", "exact", count, np.full(len(count), exact))))
 
 
 def _remeshed(carry, field) -> dict[str, np.ndarray]:
@@ -151,8 +143,6 @@ def bounded_chain(field):
     yield between("error over the projection's", ours["error"][-1] / free["error"][-1], 0.9, 1.15,
                   "limited at few nodes; the lumped projection alone: over 2")
     yield at_least("outside the range by projection", free["outside"].max(), 0.02, "else there is nothing to limit")
-    yield _over_remeshes("values outside their range", "over the range", 0.0,
-                         {"bounded": ours["outside"], "projection": free["outside"]})
 
 
 ROUND_OFF = "round-off; over eight pairs of meshes"

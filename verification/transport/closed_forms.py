@@ -14,7 +14,6 @@ from functools import cache
 import numpy as np
 
 from reference import manufactured_transport, robin_channel, slab
-from repro.fem import elements
 from repro.fem.sizing import ACROSS_PORE
 from repro.fem.space import Space
 from repro.model import flow, transport
@@ -381,8 +380,7 @@ def _of_triangles_sides(space: Space):
 def _through(space: Space, nodes, mean: float, supply: float, chosen, inlet: str) -> np.ndarray:
     """(n,) of what enters through edges: D dC/dn; and at the inlet, where the code has it leave, u_x (C - C_s), or with
     the printed condition u_ave (C - C_s) [E4]."""
-    points, weights = np.polynomial.legendre.leggauss(6)
-    along = (points + 1) / 2
+    along, weights, values = meshes.along_edges(space.order, 6)
     start, end = np.moveaxis(space.points[nodes[:, [0, -1]]], 1, 0)
     along_edge = end - start
     x, y = np.moveaxis(start[:, None] + along[:, None] * along_edge[:, None], 2, 0)
@@ -392,8 +390,7 @@ def _through(space: Space, nodes, mean: float, supply: float, chosen, inlet: str
     enters = _velocity(mean)[0](x, y) if inlet == "local" else mean
     over = enters * (_by_side(biomass, chosen, "value", x, y) - supply) * length
     passed = passed + np.where(np.isclose(x, ENDS[0]), over, 0.0)
-    values = elements.values(space.order, np.column_stack([along, 0 * along]))[:, elements.ON_EDGE[space.order]]
-    return np.bincount(nodes.ravel(), ((passed * weights / 2) @ values).ravel(), space.count)
+    return np.bincount(nodes.ravel(), ((passed * weights) @ values).ravel(), space.count)
 
 
 @case("transport-manufactured", kind="manufactured", norm="L2 of each substrate over the mesh, relative",

@@ -30,7 +30,6 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-import scipy.sparse as sp
 from scipy.integrate import solve_ivp
 from scipy.spatial import cKDTree
 from skfem import Basis, BilinearForm, MeshTri
@@ -39,11 +38,12 @@ from reference import channel_bvp, channel_fipy
 from reference import diffusion_reaction_pypde as pypde
 from reference.monod import sink, slopes, uptake
 from repro.fem import outline
+from repro.fem.elements import ELEMENTS
 from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.fem.space import Space
 from repro.model import gear, kinetics, transport
 from repro.model.kinetics import Sink
-from verification.kernel.case import Profile, at_most, case, combined, refine, studies
+from verification.kernel.case import at_most, case, combined, refine, studies
 from verification.problems import meshes, runs
 from verification.problems.channels import (
     CROSSED,
@@ -69,7 +69,6 @@ from verification.problems.channels import (
     speed_of,
     steady,
 )
-from verification.problems.pairs import ELEMENTS
 
 LINEAR = {"linear": 1}
 HIGHER = {word: order for word, order in ORDERS.items() if order > 1}
@@ -315,14 +314,11 @@ def mass(space: Space) -> np.ndarray:
     return product.assemble(basis).toarray()[np.ix_(same, same)]
 
 
-def _reading(space: Space) -> sp.csr_array:
+def _reading(space: Space) -> np.ndarray:
     """(points, n) concentrations in the points of the reaction from those at the nodes."""
     pieces = space.reaction
-    count, k = pieces.dx.shape[1], pieces.cells.shape[1]
-    rows = np.repeat(np.arange(pieces.dx.size), k)
-    columns = np.repeat(pieces.cells, count, axis=0)
-    values = np.tile(pieces.values, (len(pieces.cells), 1))
-    return sp.csr_array((values.ravel(), (rows, columns.ravel())), shape=(pieces.dx.size, space.count))
+    nodes = np.eye(space.count)[pieces.cells]
+    return np.einsum("qk,tkn->tqn", pieces.values, nodes).reshape(pieces.dx.size, -1)
 
 
 @cache
@@ -331,14 +327,14 @@ def _exact_in_time(size: float, number: int, peclet: float, density: float, orde
     integrator to 1e-8."""
     made, law = _assembled(size, number, peclet, order), rates(LAW)
     back = np.kron(np.eye(2), np.linalg.inv(mass(made.space)))
-    read = sp.block_diag([_reading(made.space)] * 2, "csr")
+    read = np.kron(np.eye(2), _reading(made.space))
     load = filled(made.space, density).ravel()
 
     def rise(_, y):
         return back @ (made.source - made.operator @ y - read.T @ sink(read @ y, load, law))
 
     def slope(_, y):
-        return back @ -(made.operator + read.T @ slopes(read @ y, load, law) @ read).toarray()
+        return back @ -(made.operator.toarray() + read.T @ slopes(read @ y, load, law) @ read)
 
     start = np.repeat(pair("supply"), made.space.count)
     found = solve_ivp(rise, (0.0, TIMES[-1]), start, jac=slope, method="BDF", t_eval=TIMES, rtol=1e-8, atol=1e-8)
@@ -424,7 +420,6 @@ def finite_volumes(timed: bool, order: int, peclet: float, density: float):
         errors = refine(_from_backward_euler, STEPS, peclet, density)
         yield studies(errors, each(1, "the lower of the two: FiPy's TransientTerm is backward Euler", 3e-4),
                       " less FiPy's in as many steps")
-    yield _course(min(samples), peclet, density, timed)
 
 
 def _from_fipy(size: float, number: int, peclet: float, density: float, timed: bool) -> dict[str, float]:
@@ -447,16 +442,6 @@ def _from_backward_euler(steps: int, peclet: float, density: float) -> dict[str,
     channel = _channel(size, peclet, density)
     ours = _at_cells(channel.x, size, 0, 1, peclet, density, steps)
     return {"size": TIMES[0] / steps, **_largest(ours - channel.backward_euler(TIMES, steps)[:, :, None])}
-
-
-def _course(size: float, peclet: float, density: float, timed: bool) -> Profile:
-    """Along the channel, at each time."""
-    x, curves = _channel(size, peclet, density).x, []
-    ours = _at_cells(x, size, 0, 1, peclet, density, timed * STEPS[-1])[:, :, 2]
-    for one, theirs in zip(ours, _fipy(size, peclet, density, timed)):
-        for k, name in enumerate(NAMES):
-            curves += [(name, "ours", x, one[k]), (f"{name}, FiPy", "reference", x, theirs[k])]
-    return Profile("along the channel", "x (um)", "C (mg/L)", tuple(curves))
 
 
 WELL_MIXED, RADIUS = 24.0, 8.0
