@@ -29,7 +29,7 @@ import gc
 import os
 import platform
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import date
 from importlib.metadata import version
 from math import exp, isfinite, log
@@ -90,81 +90,58 @@ def line(part: dict, method: str) -> dict | None:
 SHORT, LONG = 0.3, 4.0
 
 
-@dataclass
-class Timed:
-    """What a job took, run by run, and what it returned last: a dictionary with its "error" and whatever else; took:
-    the wall time of its last run, whatever is left out of it."""
-
-    seconds: list[float] = field(default_factory=list)
-    cpu: list[float] = field(default_factory=list)
-    found: dict = field(default_factory=dict)
-    reason: str = ""
-    took: float = 0.0
-
-    def run(self, job: Callable[[], dict]) -> None:
-        """Once more; a job that fails says why, and is not run again."""
-        gc.collect()
-        wall, spent = perf_counter(), process_time()
-        try:
-            found = job()
-        except Exception as error:
-            self.reason = f"{type(error).__name__}: {error}"
-            return
-        wall, spent = perf_counter() - wall, process_time() - spent
-        self.took = wall
-        self.found = found() if callable(found) else found
-        self.seconds.append(wall - self.found.get("apart_seconds", 0.0))
-        self.cpu.append(spent - self.found.get("apart_cpu", 0.0))
-        if not isfinite(self.found.get("error", 0.0)):
-            self.reason = "its error is not a number"
-
-
 Jobs = Mapping[tuple[str, str], Callable[[], dict]]
 
 
 def measured(jobs: Jobs, repeats: int) -> list[dict]:
     """Lines of a part from jobs {(method, label): job}, in the order in which methods first come.
 
-    A job returns {"error": ..., ...}, or a function that returns it and is not timed; "apart_seconds" and
-    "apart_cpu" of it are taken off.
+    A job returns {"error": ..., ...}, of which "apart_seconds" and "apart_cpu" are taken off its times. One that fails
+    says why, and is not run again.
     """
-    times = {key: Timed() for key in jobs}
-    for key, job in jobs.items():
-        times[key].run(job)
-    wanted = {key: _often(timed, repeats) for key, timed in times.items()}
-    for _ in range(repeats):
+    samples: dict[tuple[str, str], list] = {key: [] for key in jobs}
+    wanted = dict.fromkeys(jobs, repeats)
+    failed = {}
+    for turn in range(repeats + 1):
         for key, job in jobs.items():
-            if not times[key].reason and len(times[key].seconds) < wanted[key]:
-                times[key].run(job)
-    return _lines(times)
+            if key in failed or len(samples[key]) >= wanted[key]:
+                continue
+            try:
+                took, sample = _timed(job)
+            except Exception as error:
+                failed[key] = f"{type(error).__name__}: {error}"
+                continue
+            if took >= LONG:
+                wanted[key] = -(-repeats // 3)
+            if turn or took >= SHORT:
+                samples[key].append(sample)
+    lines: dict[str, dict] = {}
+    for method, label in jobs:
+        line = lines.setdefault(method, {"method": method, "points": [], "failed": []})
+        if (method, label) in failed:
+            line["failed"].append({"label": label, "reason": failed[method, label]})
+        else:
+            seconds, cpu, found = zip(*samples[method, label])
+            line["points"].append({"label": label, "seconds": median(seconds), "cpu": median(cpu),
+                                   "repeats": len(cpu), **found[-1]})
+    return list(lines.values())
+
+
+def _timed(job: Callable[[], dict]) -> tuple[float, tuple[float, float, dict]]:
+    """The wall time of a run; wall and processor time without what is apart, and what the job returns."""
+    gc.collect()
+    wall, spent = perf_counter(), process_time()
+    found = job()
+    wall, spent = perf_counter() - wall, process_time() - spent
+    if not isfinite(found.get("error", 0.0)):
+        raise ValueError("its error is not a number")
+    return wall, (wall - found.get("apart_seconds", 0.0), spent - found.get("apart_cpu", 0.0), found)
 
 
 def part(title: str, error: str, reference: str, jobs: Jobs, repeats: int, once: Jobs) -> dict:
     """A part, measured; once: jobs that are run once."""
     lines = measured(jobs, repeats) + measured(once, 1)
     return {"title": title, "error": error, "reference": reference, "repeats": repeats, "lines": lines}
-
-
-def _often(timed: Timed, repeats: int) -> int:
-    """How many runs are to be counted; that of a short job is forgotten."""
-    if timed.reason:
-        return 0
-    if timed.took < SHORT:
-        timed.seconds.clear()
-        timed.cpu.clear()
-    return repeats if timed.took < LONG else -(-repeats // 3)
-
-
-def _lines(times: Mapping[tuple[str, str], Timed]) -> list[dict]:
-    lines: dict[str, dict] = {}
-    for (method, label), timed in times.items():
-        line = lines.setdefault(method, {"method": method, "points": [], "failed": []})
-        if timed.reason:
-            line["failed"].append({"label": label, "reason": timed.reason})
-        else:
-            line["points"].append({"label": label, "seconds": median(timed.seconds), "cpu": median(timed.cpu),
-                                   "repeats": len(timed.seconds), **timed.found})
-    return list(lines.values())
 
 
 @dataclass(frozen=True)

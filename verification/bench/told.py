@@ -14,6 +14,7 @@ from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from verification.bench import runs
 from verification.bench.record import Reading, envelope, reading
@@ -226,23 +227,18 @@ COLORS = (*(f"C{k}" for k in range(10)), "black", "navy", "darkgreen", "darkred"
 
 def draw(parts: dict, folder: Path) -> list[Path]:
     """Draw the errors that the parts have; the files."""
-    import matplotlib
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-    folder.mkdir(parents=True, exist_ok=True)
     made = []
     for name, part in parts.items():
         if "error" in part:
             made.append(folder / f"bench_{name}.svg")
-            figure = _precision(pyplot, part)
-            figure.savefig(made[-1], metadata={"Date": None})
-            pyplot.close(figure)
+            _precision(part).savefig(made[-1], metadata={"Date": None})
     return made
 
 
-def _precision(pyplot, part: dict):
+def _precision(part: dict) -> Figure:
     """Each method's points and its envelope; methods that failed throughout are named in the legend."""
-    figure, axis = pyplot.subplots(figsize=(7.8, 4.6), layout="constrained")
+    figure = Figure(figsize=(7.8, 4.6), layout="constrained")
+    axis = figure.subplots()
     for k, line in enumerate(part["lines"]):
         points = [p for p in line["points"] if p["error"] > 0]
         label = line["method"] + (f" ({len(line['failed'])} failed)" if line["failed"] else "")

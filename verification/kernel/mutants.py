@@ -132,11 +132,6 @@ class Hunt:
         return tuple(trial.case for trial in self.trials if trial.caught)
 
     @property
-    def told(self) -> dict[str, str]:
-        """How each case or test caught it, or why it did not."""
-        return {trial.case: trial.how for trial in self.trials}
-
-    @property
     def missed_by(self) -> tuple[str, ...]:
         """Ids of the cases that name this mutant and pass with it, and of the tests that it names and that do."""
         return tuple(t.case for t in self.trials
@@ -185,16 +180,19 @@ def plan(mutant: Mutant) -> tuple[list[str], list[str]]:
 
 def hunt(mutant: Mutant, every: bool = False) -> Hunt:
     """Run the mutant against the cases that name it, then against all others, to the first catch; ``every``: against
-    all that name it."""
+    all that name it. Tests are always run all."""
     named, others = plan(mutant)
-    trials = []
+    trials: list[Trial] = []
     with TemporaryDirectory(prefix="mutant-") as folder:
         copy(mutant, Path(folder))
         for case in named + others:
             caught = any(trial.caught for trial in trials)
             if caught and not ((every or mutant.tests) and case in named):
                 break
-            trials.append((tested if mutant.tests else trial)(Path(folder), case))
+            try:
+                trials.append((tested if mutant.tests else trial)(Path(folder), case))
+            except subprocess.TimeoutExpired:
+                trials.append(Trial(case, False, f"not done after {LONGEST:g} s"))
     return Hunt(mutant.id, tuple(trials))
 
 
@@ -205,15 +203,13 @@ def copy(mutant: Mutant, folder: Path) -> None:
         if (ROOT / name).is_file():
             copy2(ROOT / name, folder)
         else:
-            copytree(ROOT / name, folder / name, ignore=ignore_patterns("__pycache__", "out", "live", "pictures"))
+            copytree(ROOT / name, folder / name, ignore=ignore_patterns("__pycache__", "out", "live"))
     (folder / mutant.file).write_text(text, encoding="utf-8")
 
 
 def trial(folder: Path, case: str) -> Trial:
     """Run one case in the copy, in a process of its own."""
     done = _run(folder, "-c", f"from verification.kernel import mutants; mutants.examine({case!r})")
-    if isinstance(done, str):
-        return Trial(case, False, done)
     if done.returncode:
         return Trial(case, False, "broken: " + (done.stderr.strip().splitlines() or ["no message"])[-1])
     return Trial(case, *json.loads(done.stdout.splitlines()[-1]))
@@ -222,21 +218,18 @@ def trial(folder: Path, case: str) -> Trial:
 def tested(folder: Path, test: str) -> Trial:
     """Run one test in the copy, in a process of its own."""
     done = _run(folder, "-m", "pytest", "-x", "-p", "no:cacheprovider", "-rfE", test)
-    if isinstance(done, str) or done.returncode == 0:
-        return Trial(test, False, done if isinstance(done, str) else "passes")
+    if done.returncode == 0:
+        return Trial(test, False, "passes")
     found = FAILED.search(done.stdout)
     why = found[1] if found else (done.stdout + done.stderr).strip().splitlines()[-1]
     caught = done.returncode == 1 and why.startswith(CATCH)
     return Trial(test, caught, why if caught else f"broken: {why}")
 
 
-def _run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str] | str:
-    """Python in the copy; that it was not done in time."""
-    try:
-        return subprocess.run([sys.executable, *arguments], cwd=folder, capture_output=True, text=True,
-                              timeout=LONGEST, env={**os.environ, "PYTHONPATH": str(folder), "COLUMNS": "500"})
-    except subprocess.TimeoutExpired:
-        return f"not done after {LONGEST:g} s"
+def _run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Python in the copy."""
+    return subprocess.run([sys.executable, *arguments], cwd=folder, capture_output=True, text=True, timeout=LONGEST,
+                          env={**os.environ, "PYTHONPATH": str(folder), "COLUMNS": "500"})
 
 
 def examine(id: str) -> None:
@@ -265,24 +258,17 @@ def main(arguments: list[str] | None = None) -> int:
     """Entry point; 0 if every mutant is caught, and no case that was run passes with a mutant that it names."""
     from verification.kernel.driver import load as load_cases
     load_cases()
-    chosen = _parser().parse_args(arguments)
-    unknown = sorted(set(chosen.ids) - set(everything()))
-    if unknown:
-        print(f"mutants: there is no {', '.join(unknown)}; there are {', '.join(everything())}", file=sys.stderr)
-        return 2
-    ids = chosen.ids or (of("tests") if chosen.tests else everything())
-    hunts = hunt_all(ids, chosen.jobs, chosen.every)
-    record(hunts)
-    return 0 if judge(hunts) else 1
-
-
-def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m verification.mutants", description=__doc__.splitlines()[0])
     parser.add_argument("ids", nargs="*", metavar="MUTANT", help="all by default")
     parser.add_argument("--every", action="store_true", help="against every case that names it, not to the first catch")
     parser.add_argument("--tests", action="store_true", help="those alone that tests catch, not cases")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes; one a core by default")
-    return parser
+    chosen = parser.parse_args(arguments)
+    if unknown := sorted(set(chosen.ids) - set(everything())):
+        parser.error(f"there is no {', '.join(unknown)}; there are {', '.join(everything())}")
+    hunts = hunt_all(chosen.ids or (of("tests") if chosen.tests else everything()), chosen.jobs, chosen.every)
+    record(hunts)
+    return 0 if judge(hunts) else 1
 
 
 def hunt_all(ids: Iterable[str], jobs: int, every: bool = False) -> list[Hunt]:
@@ -312,8 +298,7 @@ def judge(hunts: list[Hunt]) -> bool:
 
 
 def record(hunts: list[Hunt]) -> None:
-    """Write what caught which mutant, for the report, where all that cases or all that tests catch were hunted; and
-    how, which is another machine's to tell, beside it."""
+    """Write what caught which mutant, for the report, where all that cases or all that tests catch were hunted."""
     caught = {found.mutant: list(found.caught_by) for found in hunts}
     whole = [catchers for catchers in CATCHERS if of(catchers).keys() <= caught.keys()]
     if not whole:
@@ -321,9 +306,7 @@ def record(hunts: list[Hunt]) -> None:
     before = _read()
     new = {id: caught.get(id, before["caught"].get(id, [])) for id in everything()}
     codes = {**before["code"], **{catchers: code(catchers) for catchers in whole}}
-    how = {found.mutant: found.told for found in hunts}
     writing.save({"code": codes, "caught": new}, RECORD)
-    writing.save(how, RECORD.parent / "live" / RECORD.name)
 
 
 def _read() -> dict[str, dict]:
