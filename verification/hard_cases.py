@@ -3,8 +3,8 @@ of them, `... --case hard-04-fast-flow` for one.
 
 "cubic" is the preset fast with cubic elements. Each cell of the matrix, a case with a preset, is right, refused or
 wrong, see :mod:`verification.hard.common`. Refusing is accepted in the parts that a case names, and with ``paper``;
-wrong is never. A whole run writes it to ``verification/report/hard_cases.json``, its numbers and seconds to ``live/``
-beside it.
+wrong is never. A whole run writes it to ``verification/report/hard_cases.json``, with messages to ``live/`` beside it;
+every number is on the page of the stage.
 """
 
 from __future__ import annotations
@@ -13,15 +13,14 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from verification.hard.common import Cell
-from verification.kernel.report import environment
 from verification.kernel.writing import Block, save, table
 
 RECORD = Path(__file__).parent / "report" / "hard_cases.json"
 
 
 def as_json(cells: Iterable[Cell], live: bool = False) -> dict:
-    """What the report and docs/performance.md draw the matrix from: verdicts; live: with messages, numbers and
-    seconds, which are this machine's."""
+    """What the report and docs/performance.md draw the matrix from: verdicts; live: with messages, which have this
+    machine's numbers."""
     rows: dict[int, dict] = {}
     for cell in cells:
         case = cell.case
@@ -30,36 +29,26 @@ def as_json(cells: Iterable[Cell], live: bool = False) -> dict:
                                             "failure_is": case.failure_is, "may_refuse": list(case.refusable),
                                             "cells": {}})
         row["cells"][cell.preset] = {"verdict": cell.verdict, "accepted": not cell.unaccepted,
-                                     **(_digits(cell) if live else {})}
-    return {"cases": [rows[number] for number in sorted(rows)], **({"machine": environment()} if live else {})}
-
-
-def _digits(cell: Cell) -> dict:
-    return {"message": cell.message, "checks": _checks(cell), "seconds": round(cell.seconds, 2)}
-
-
-def _checks(cell: Cell) -> list[dict]:
-    return [{"part": part.name, "quantity": check.quantity, "measured": check.measured, "expected": check.expected,
-             "origin": check.origin, "holds": check.holds}
-            for part in cell.parts for check in (*part.checks, *part.always)]
+                                     **({"message": cell.message} if live else {})}
+    return {"cases": [rows[number] for number in sorted(rows)]}
 
 
 def record(results: Iterable) -> None:
     """Write the verdicts for the report and the README from the results of a whole verification run, and, not
-    committed, all that this machine has measured."""
+    committed, why cells are not right."""
     cells = [cell for result in results for cell in result.outcome.notes if isinstance(cell, Cell)]
     save(as_json(cells), RECORD)
     save(as_json(cells, live=True), RECORD.parent / "live" / RECORD.name)
 
 
 def blocks(record: dict) -> Iterator[Block]:
-    """The matrix; why cells are not right, and every number."""
+    """The matrix, and why cells are not right."""
     cells = [(case, preset, cell) for case in record["cases"] for preset, cell in case["cells"].items()]
     presets = tuple(record["cases"][0]["cells"])
     yield Block("heading", "Hard cases")
     yield Block("text", "Right: the exact value, bound or conserved quantity of the case is met, and so are the "
                         "balances; refused: an error says which bound was met; wrong: anything else. `make verify` "
-                        "runs them all, and leaves every number in `verification/report/speed.html`; "
+                        "runs them all, and leaves every number in `verification/report/hard.html`; "
                         "`python -m verification hard` runs them alone.")
     yield table(("", "case", "right is", *presets), (
         (str(case["number"]), case["title"], case["right_is"], *map(_shown, map(case["cells"].get, presets)))
@@ -67,13 +56,6 @@ def blocks(record: dict) -> Iterator[Block]:
     yield table(("case", "preset", "why it is not right"), (
         (str(case["number"]), preset, cell["message"]) for case, preset, cell in cells if cell.get("message")),
         detail=True)
-    yield table(("case", "preset", "part", "quantity", "measured", "expected", "origin"), (
-        (str(case["number"]), preset, *map(check.get, CHECK)) for case, preset, cell in cells
-        for check in cell.get("checks", ())), detail=True)
-
-
-#: Of a check in the record.
-CHECK = ("part", "quantity", "measured", "expected", "origin")
 
 
 def _shown(cell: dict | None) -> str:

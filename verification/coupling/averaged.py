@@ -114,7 +114,7 @@ def thiele(scene: Scene) -> float:
     W/2 sqrt(X_m k / (D_B (C_s + K)))."""
     law, donor = scene.kinetics, scene.substrates.donor
     rate = law.maximum_density * law.maximum_utilization_rate / (donor.supply + donor.half_saturation)
-    return scene.pore.width / 2 * float(np.sqrt(rate / donor.diffusivity_in_aggregate))
+    return scene.pore.width / 2 * np.sqrt(rate / donor.diffusivity_in_aggregate)
 
 
 FASTER = (4.0, 16.0, 64.0, 256.0)
@@ -307,7 +307,7 @@ def _losses(order: int, aspect: float) -> tuple[float, float, float]:
     height, slope = LOW * (1 - s**2) ** 2, -4 * aspect * s * (1 - s**2)
     thin = half * weight @ layered_channel.gradient(WIDTH, height, RATIO)
     more = half * weight @ (12 * WIDTH * 4 / 5 * slope**2 / (WIDTH - height) ** 3)
-    return whole.head_loss, float(thin) + poiseuille.head_loss(LENGTH - 2 * half, WIDTH, 1.0, 1.0), float(more)
+    return whole.head_loss, thin + poiseuille.head_loss(LENGTH - 2 * half, WIDTH, 1.0, 1.0), more
 
 
 UPTAKE_ASPECTS = (0.2, 0.1, 0.05, 0.025)
@@ -348,7 +348,7 @@ def _compared(scene: Scene, aspect: float, now: pore.Pore, peclet: float, densit
     ours = runs.section_means(now, pore.solve(scene, now), x)
     moment = strip_of(scene, now.outline.area, round(16 / aspect)).seed()
     theirs = np.stack([np.interp(x, moment.x, field) for field in moment.fields])
-    return float(np.abs(ours - theirs).max()) / 10.0, float(ours[0, -1]) / 10.0
+    return np.abs(ours - theirs).max() / 10.0, ours[0, -1] / 10.0
 
 
 #: Diffusivities are so many times those of the paper: the averaged pore's own error falls as their inverse.

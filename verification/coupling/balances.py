@@ -106,7 +106,7 @@ def _restored(*changes: str) -> tuple[float, float]:
     weight = after.space.reaction.dx
     density = (after.active + after.inert) / weight / scene.kinetics.maximum_density
     error = np.sqrt(np.vdot(weight, (density - 1) ** 2) / weight.sum())
-    return float(error), abs(float(np.vdot(weight, density)) / after.outline.area - 1)
+    return error, abs(np.vdot(weight, density) / after.outline.area - 1)
 
 
 #: Round-off and Newton's tolerance, 1e-13 of the largest term of each row, over all rows and with room to spare.
@@ -123,7 +123,7 @@ def defects(law: Kinetics, ledgers: Iterable[Ledger]) -> np.ndarray:
 def _substrates(step: Ledger) -> float:
     """The worse of both substrates."""
     left = np.array(step.supplied) - step.out - step.consumed - step.stored
-    return float(np.max(np.abs(left) / step.supplied))
+    return np.max(np.abs(left) / step.supplied)
 
 
 def _biomass(step: Ledger) -> float:
@@ -157,7 +157,7 @@ def _of_base(preset: str):
     yield _closed(scene, ledgers)
     if scene.numerics.time == "updates":
         worst = defects(scene.kinetics, ledgers)[:, 2].max()
-        theirs = (runs.growth_rates(scene)[0] * STEPS[2]) ** 2 / 12
+        theirs = (runs.growth_rates(scene.kinetics, scene.substrates)[0] * STEPS[2]) ** 2 / 12
         yield between("made against taken up, over (r step)^2 / 12", worst / theirs, 0.95, 1.0,
                       "r at the supply; that of the seed is 1 % lower, and falls as the pore clogs")
     yield at_least("remeshes", remeshes, 1.0, "else they are not tested")
@@ -213,7 +213,7 @@ def _of_updates(elements: str) -> Study:
 
 def _order(found: Iterable[tuple[Scene, list[Ledger]]]) -> Study:
     """Made against taken up in the worst step of runs with steps of STEPS."""
-    errors = [float(defects(scene.kinetics, ledgers)[:, 2].max()) for scene, ledgers in found]
+    errors = [defects(scene.kinetics, ledgers)[:, 2].max() for scene, ledgers in found]
     return study("made against taken up", STEPS, errors, 2, HEUN, ceiling=4e-5, band=0.15)
 
 
@@ -333,7 +333,7 @@ def _narrowest(scene: Scene, now, wall: int) -> float:
     along = np.maximum(on.min() - free[:, 0], free[:, 0] - on.max())
     gap = free[:, 1] if wall == BOTTOM else scene.pore.width - free[:, 1]
     allowed = np.minimum(growth.minimum_film, np.tan(growth.minimum_contact_angle) * along)
-    return float((gap[along > 0] / allowed[along > 0]).min())
+    return (gap[along > 0] / allowed[along > 0]).min()
 
 
 def _parts(mesh) -> int:

@@ -51,7 +51,7 @@ def no_growth(*changes: str):
 
 def _lack(instant: Instant) -> float:
     """Largest |C / supply - 1|."""
-    return float(np.abs(both(instant.solved.concentrations) / 10.0 - 1).max())
+    return np.abs(both(instant.solved.concentrations) / 10.0 - 1).max()
 
 
 def _poiseuille(scene: Scene) -> float:
@@ -175,7 +175,7 @@ def _unround(instant, area: float) -> float:
     """Largest deviation of the interface's nodes from the half-disc of an area, over its radius."""
     outline = instant.pore.outline
     radius = np.hypot(*outline.points[outline.wall == FREE].T)
-    return float(np.abs(radius / np.sqrt(2 * area / np.pi) - 1).max())
+    return np.abs(radius / np.sqrt(2 * area / np.pi) - 1).max()
 
 
 #: Of the length in the unit of each number.
@@ -294,7 +294,7 @@ def _lag(factor: float, *changes: str) -> dict[str, float]:
     ours, theirs = (runs.last(_slower(factor, name, *changes)) for name in ("quasi_steady", "gear"))
     one, other = runs.numbers(ours), runs.numbers(theirs)
     apart = ours.solved.concentrations.acceptor - theirs.solved.concentrations.acceptor
-    return {**{name: abs(one[name] / other[name] - 1) for name in one}, "C_A": float(np.abs(apart).max()) / 10.0}
+    return {**{name: abs(one[name] / other[name] - 1) for name in one}, "C_A": np.abs(apart).max() / 10.0}
 
 
 def _slower(factor: float, transport_scheme: str, *changes: str):

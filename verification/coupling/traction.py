@@ -141,7 +141,7 @@ def _shear(space: Space) -> float:
     length = _tested(mesh, line, weight)
     gradient = layered_channel.gradient(closed_forms.WIDTH, closed_forms.LAYER, ratio)
     exact = gradient * (layered_channel.stress(closed_forms.WIDTH, closed_forms.LAYER, ratio) - closed_forms.LAYER)
-    return float(weight @ shear / length / exact - 1)
+    return weight @ shear / length / exact - 1
 
 
 def _tested(mesh: Mesh, line: np.ndarray, weight: np.ndarray) -> float:
@@ -150,8 +150,8 @@ def _tested(mesh: Mesh, line: np.ndarray, weight: np.ndarray) -> float:
     order = np.argsort(mesh.points[line, 0])
     x, values = mesh.points[line[order], 0], weight[order]
     if mesh.geometry == 1:
-        return float(np.trapezoid(values, x))
-    return float(simpson(values, x=x))
+        return np.trapezoid(values, x)
+    return simpson(values, x=x)
 
 
 @case("coupling-traction-base", kind="property",
@@ -174,7 +174,7 @@ def _next_move(found: Instant, *changes: str) -> float:
         scene = runs.base("16 h", *changes, f'growth.fluid_forces="{word}"')
         grown, _, _ = updates.make_biomass(scene, found.pore, found.solved, 0.4)
         shapes.append(contact.expand(scene, grown, updates.enlarged(scene, found.pore, grown))[0])
-    return float(np.abs(shapes[1].mesh.points - shapes[0].mesh.points).max() / shapes[0].outline.thickness)
+    return np.abs(shapes[1].mesh.points - shapes[0].mesh.points).max() / shapes[0].outline.thickness
 
 
 @case("coupling-traction-even", kind="exact",
@@ -269,7 +269,7 @@ def _tips(move: np.ndarray, *changes: str) -> float:
     mesh = _moved(0.0, *changes)[0].mesh
     x = mesh.points[mesh.loop, 0]
     ends = mesh.loop[[np.argmax(x), np.argmin(x)]]
-    return float(move[ends[0], 0] / move[ends[1], 0])
+    return move[ends[0], 0] / move[ends[1], 0]
 
 
 def _defects(factor: float, *changes: str) -> tuple[float, float]:

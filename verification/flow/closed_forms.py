@@ -85,13 +85,8 @@ def poiseuille_channel(interface: str):
                    "conductivity": (1, ENDS_FIRST, 1.5e-3)})
 
 
-@cache
-def _clean_mesh(refinement: float) -> Mesh:
-    return mesher.generate(None, ENDS, Sizing(WIDTH, refinement, 2.0))[0]
-
-
 def _clean(refinement: float, interface: str) -> dict[str, float]:
-    grid = _clean_mesh(refinement)
+    grid, _ = mesher.generate(None, ENDS, Sizing(WIDTH, refinement, 2.0))
     space = Space(grid, 1)
     unit = flow.unit_flow(space, 1.0, interface=interface)
     found = flow.scaled(unit, grid, LENGTH, drive(mean_velocity=2.0))
@@ -146,7 +141,8 @@ PARABOLAS = {f"lambda = {ratio:g}, {form}": (ratio, form)
 def channels(order: int, given: tuple[float, str]):
     """On six-node triangles with biomass from wall to wall."""
     ratio, interface = given
-    space, driven = Space(_curved_plug(), order), drive(mean_velocity=2.0, viscosity_ratio=ratio)
+    space = meshes.space_on(meshes.plug(CURVED_ENDS, WIDTH, HALF, 8.0, seed=3), order)
+    driven = drive(mean_velocity=2.0, viscosity_ratio=ratio)
     found = flow.solve(space, driven, LENGTH, interface=interface)
     dofs, part = space.mesh.topology, CURVED_ENDS[1] - CURVED_ENDS[0]
     u = poiseuille.velocity(space.points[:, 1], WIDTH, driven.mean_velocity)
@@ -159,11 +155,6 @@ def channels(order: int, given: tuple[float, str]):
               "loss of the whole pore": abs(found.head_loss / sum(lost) - 1),
               "difference of heads": abs(heads / sum(lost[:2]) - 1)}
     return each_at_most(errors, 1e-10, ROUND_OFF)
-
-
-@cache
-def _curved_plug() -> Mesh:
-    return curved(meshes.plug(CURVED_ENDS, WIDTH, HALF, 8.0, seed=3), None)
 
 
 #: Height and half length of the layer, clean water beyond its ends, and what is compared: |x| < MIDDLE; um.
@@ -247,7 +238,7 @@ def slope(space: Space, pressure: np.ndarray, chosen: np.ndarray) -> float:
     where, weight, shape = meshes.fine(space, chosen)
     x, p = where[..., 0], pressure[space.cells[chosen]] @ shape.T
     x = x - np.sum(weight * x) / weight.sum()
-    return float(-np.sum(weight * p * x) / np.sum(weight * x**2))
+    return -np.sum(weight * p * x) / np.sum(weight * x**2)
 
 
 #: Half length (um) of the permeable layer, elements (um) and how many meshes of each.
@@ -307,14 +298,9 @@ def first_rise(order: int, interface: str):
                     "the parabola is held but for the bow of the triangles beside the arc")]
 
 
-@cache
-def _rise_grid(refinement: float, geometry: int) -> Mesh:
-    return meshes.half_disc(RADIUS, refinement, ENDS, WIDTH, geometry=geometry)
-
-
 def _rise_error(refinement: float, draw: int, interface: str, order: int) -> dict[str, float]:
-    grid = _rise_grid(refinement * meshes.SPREAD[draw], min(order, 2))
-    space = Space(grid, order)
+    space = meshes.half_disc_space(RADIUS, refinement * meshes.SPREAD[draw], ENDS, WIDTH, order)
+    grid = space.mesh
     below, above = (flow.unit_flow(space, 1 + step, interface=interface).loss for step in (-STEP, STEP))
     where, weight, _ = meshes.fine(space, grid.biomass)
     exact = np.sum(weight * poiseuille.dissipation(where[..., 1], WIDTH)) / WIDTH

@@ -144,12 +144,12 @@ def _power(space: Space, unit: flow.UnitFlow, interface: str) -> tuple[float, fl
     upper = np.einsum("tab,ta,tb->", blocks[:, : 2 * count, : 2 * count], moving, moving)
     force = np.bincount(cells.ravel(), np.einsum("tij,tj->ti", blocks, local)[:, :count].ravel(), space.count)
     inlet = space.end_nodes(space.dofs.inlet)
-    work = float(force[inlet] @ unit.velocity[inlet, 0])
+    work = force[inlet] @ unit.velocity[inlet, 0]
     if space.order > 1:
-        return work, float(upper)
+        return work, upper
     tau = grid.circumdiameter**2 / (100.0 * viscosity)
     slope = np.einsum("tai,ta->ti", grid.gradients, unit.pressure[grid.triangles])
-    return work, float(upper + np.sum(tau * grid.areas * np.sum(slope**2, axis=1)))
+    return work, upper + np.sum(tau * grid.areas * np.sum(slope**2, axis=1))
 
 
 @case("flow-reversed", kind="property", norm="L2 of the difference of both velocities, in the middle and everywhere",
@@ -177,7 +177,7 @@ def _size(space: Space, field: np.ndarray, chosen: np.ndarray) -> float:
     """L2 norm of a field (n, 2) over the triangles ``chosen``."""
     _, weight, shape = meshes.fine(space, chosen)
     at = np.einsum("qa,tai->tqi", shape, field[space.cells[chosen]])
-    return float(np.sqrt(np.sum(weight[..., None] * at**2)))
+    return np.sqrt(np.sum(weight[..., None] * at**2))
 
 
 RATIOS = np.array([1.0, 2.0, 10.0, 100.0, 2000.0, 1e5])

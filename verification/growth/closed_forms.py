@@ -379,14 +379,14 @@ def area(kind: int):
         random = np.random.default_rng(12).uniform(0.7, 1.4, (len(body.cells), 1))
         theta = factor * (random if kind == 1 else 1.0) * body.field(_theta)
         found = bodies.grown(body, theta)
-        asked, got = float(np.vdot(body.body.at.dx, theta)), _area(body, found.position)
+        asked, got = np.vdot(body.body.at.dx, theta), _area(body, found.position)
         yield at_most(f"area, theta to {theta.max():.0f}", abs(got / asked - 1), 1e-11, KEPT_ROUND_OFF)
 
 
 def _area(body: Supported, position: np.ndarray) -> float:
     """Of the present shape, um2."""
     of = elements.table(body.geometry, body.geometry, bodies.DEGREE)
-    return float(elements.weights(position[body.cells], of).sum())
+    return elements.weights(position[body.cells], of).sum()
 
 
 @case("growth-units", kind="property", norm="largest difference: of places, carried back, over the radius; of "

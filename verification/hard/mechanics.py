@@ -65,16 +65,14 @@ def landings(found: Run) -> list[tuple[float, float, float]]:
     return [step.gaps for step in steps]
 
 
-#: Ways to run a scene.
-WAYS = {False: simulation.simulate, True: remeshing_always}
 #: What is known of contact from a step to the next: a midpoint step ends where the film is first too thin, an update
 #: comes up to 12 min late.
 LATE = {"midpoint": (0.0, ""), "updates": (1.0, ", and 12 min between updates")}
 
 
-def film_closes(preset: str, forced: bool) -> list:
-    """From a film of 2.4 um through contact; forced: every step remeshes, also those just before and after it."""
-    found = common.ran(common.scene("wide", preset, *FILM), way=WAYS[forced], density=CLOSING)
+def film_closes(preset: str, way: Callable) -> list:
+    """From a film of 2.4 um through contact; way: how the scene is run."""
+    found = common.ran(common.scene("wide", preset, *FILM), way, density=CLOSING)
     fine = common.reference("wide", *FILM, 'output.times=["1 h"]')
     checks = [found, *contact_rests(found), *common.close(found, fine, preset, "aggregate_area_um2", *EFFLUENTS),
               *_edge_wide(found, fine, preset)]
@@ -98,7 +96,7 @@ def _edge_wide(found: Run, fine: Run, preset: str) -> list[Check]:
     drive = found.scene.flow
     clean = poiseuille.conductivity(width, drive.kinematic_viscosity / drive.gravity) * M_PER_D
     loss = found.scene.pore.length * clean / fine.last[DRIVE[0]]
-    ours, theirs = (_contact_length(run) for run in (found, fine))
+    ours, theirs = (_contact_length(run.instants[-1].pore.outline) for run in (found, fine))
     fall = -np.diff([width - line["thickness_um"] for line in found.rows if not line["contact"]]).min(initial=0.0)
     share, late = LATE[found.scene.numerics.time]
     known = 2 * edge + share * np.sqrt(8 * width * fall)
@@ -110,10 +108,9 @@ def _edge_wide(found: Run, fine: Run, preset: str) -> list[Check]:
                 found, fine, preset, name, allowed=TOLERANCE[preset] + more))]
 
 
-def _contact_length(found: Run) -> float:
-    """Of the last instant's surface on the upper wall, um."""
-    shape = found.instants[-1].pore.outline
-    return float(np.ptp(shape.points[shape.wall == TOP, 0])) if (shape.wall == TOP).any() else 0.0
+def _contact_length(shape: Outline) -> float:
+    """Of the surface on the upper wall, um."""
+    return np.ptp(shape.points[shape.wall == TOP, 0]) if (shape.wall == TOP).any() else 0.0
 
 
 def contact_rests(found: Run) -> list[Check]:
@@ -126,8 +123,8 @@ def contact_rests(found: Run) -> list[Check]:
     for instant in found.instants:
         shape = instant.pore.outline
         joins = contact.closing(shape, width, film, found.scene.growth.minimum_contact_angle)
-        open_nodes += int(np.count_nonzero(joins))
-        crossed += int(shape.points[:, 1].max() > width or shape.points[:, 1].min() < 0)
+        open_nodes += np.count_nonzero(joins)
+        crossed += shape.points[:, 1].max() > width or shape.points[:, 1].min() < 0
     return [at_most("nodes whose film or wedge should have closed", open_nodes, 0, "contact rests (2.3.3)"),
             at_most("instants with nodes beyond a wall", crossed, 0, "the walls hold"),
             at_least("instants in contact", sum(i.pore.contact for i in found.instants), 1, "else less is tested"),
@@ -138,7 +135,8 @@ CONTACT = HardCase(
     7, "contact", "Film of 2 um and contact, with remeshing forced just before and after",
     "The same shape and flow with and without forced remeshes, no film under 2 um left, the area that of the biomass",
     "A film that is passed over in one step, overlaps the wall, or a remesh that moves the contact",
-    {"as it comes": partial(film_closes, forced=False), "remeshed at every step": partial(film_closes, forced=True)},
+    {"as it comes": partial(film_closes, way=simulation.simulate),
+     "remeshed at every step": partial(film_closes, way=remeshing_always)},
     mutants=("hard-contact-passed-over",))
 
 
@@ -182,7 +180,7 @@ def wedges_close(preset: str) -> list:
     """From contact on until wedges beside it close one after the other."""
     found = common.run("wide", preset, 'pore.width="20 um"', 'aggregate.radius="17.9 um"', 'growth.end="4 h"',
                        density=CLOSING)
-    lengths = [np.ptp(i.pore.outline.points[i.pore.wall == TOP, 0]) for i in found.instants if i.pore.contact]
+    lengths = [_contact_length(i.pore.outline) for i in found.instants if i.pore.contact]
     return [found, *contact_rests(found),
             at_least("length of the contact surface at the end, over that at first", lengths[-1] / lengths[0], 1.5,
                      "nodes never leave; else less is tested"),
@@ -313,7 +311,7 @@ def _errors(found: Grown, exact: HalfCylinder) -> tuple[float, float]:
     where, weight, of = bodies.integrated(found.held)
     true = exact.place(*np.moveaxis(where, 2, 0))
     gaps = (of.values @ field[found.held.cells] - true for field in (found.position, exact.place(*found.start.T)))
-    return tuple(float(np.sqrt(np.sum(weight[..., None] * gap**2) / weight.sum())) for gap in gaps)
+    return tuple(np.sqrt(np.sum(weight[..., None] * gap**2) / weight.sum()) for gap in gaps)
 
 
 def pushed(preset: str, inner: float, outer: float) -> list[Check]:
@@ -393,11 +391,9 @@ def decay(preset: str) -> list:
     """Without donor, 2000 h: 0.2 + 0.8 exp(-b m_A t)."""
     found = still_water(preset, 'substrates.donor.supply="0 mg/L"', 'growth.end="2000 h"', 'growth.time_step="50 h"',
                         'output.times=["200 h", "1000 h", "2000 h"]')
-    law, acceptor = found.scene.kinetics, found.scene.substrates.acceptor
-    m = acceptor.supply / (acceptor.supply + acceptor.half_saturation)
     checks, seed = [], found.rows[0]["aggregate_area_um2"]
     for line in found.rows[1:]:
-        wanted = seed * (0.2 + 0.8 * np.exp(-law.decay_coefficient * m * line["time_h"]))
+        wanted = seed * runs.mass_after(found.scene, line["time_h"])
         checks.append(at_most(f"area over 0.2 + 0.8 exp(-b m_A t) at {line['time_h']:g} h, less one",
                               abs(line["aggregate_area_um2"] / wanted - 1), 1e-6, "C to 1e-7 of the supply"))
     least = found.column("aggregate_area_um2").min() / seed
@@ -408,9 +404,8 @@ def starving(preset: str) -> list:
     """Without donor in the wide pore, with the paper's diffusivities: between decay at the least C_A and the supply."""
     found = common.run("wide", preset, 'aggregate.radius="20 um"', 'substrates.donor.supply="0 mg/L"',
                        'growth.end="200 h"', 'growth.time_step="20 h"', 'output.times=["100 h", "200 h"]')
-    law, K = found.scene.kinetics, found.scene.substrates.acceptor.half_saturation
-    least, supply = found.column("acceptor_min_mg_per_L").min(), found.scene.substrates.acceptor.supply
-    low, high = (0.2 + 0.8 * np.exp(-law.decay_coefficient * 200 * c / (c + K)) for c in (supply, least))
+    least = found.column("acceptor_min_mg_per_L").min()
+    low, high = (runs.mass_after(found.scene, 200, acceptor) for acceptor in (None, least))
     area = found.last["aggregate_area_um2"] / found.rows[0]["aggregate_area_um2"]
     return [found, between("area over that of the seed", area, low * (1 - 1e-6), high * (1 + 1e-6),
                            "decay at the supply and at the least C_A")]

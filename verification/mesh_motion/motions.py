@@ -28,8 +28,7 @@ from verification.problems import meshes
 GAMMA, STABILISATION = 1.0, 100.0
 GAMMAS = (0.1, GAMMA, 10.0)
 #: Straight triangles, as linear elements have them, and curved ones, as those of order 2 and 3.
-GEOMETRIES = {1: "straight", 2: "curved"}
-EITHER = {kind: (geometry,) for geometry, kind in GEOMETRIES.items()}
+EITHER = {"straight": (1,), "curved": (2,)}
 
 
 def moved(grid: Mesh, points: np.ndarray, gamma: float = GAMMA) -> np.ndarray:
@@ -120,10 +119,6 @@ def waves(geometry: int):
                       {told: (2, "linear elements: second order", ceiling)})
 
 
-def _bent(size: float, seed: int, geometry: int) -> Mesh:
-    return _nodes(meshes.plug((-END, END), NARROW, FACE, size, seed=seed), geometry)
-
-
 def _wave(x, y, gamma: float) -> np.ndarray:
     """(..., 2) closed form on both sides, a mirror image of each other; within the plug that of its faces."""
     far = np.minimum(END - np.abs(x), END - FACE)
@@ -132,14 +127,9 @@ def _wave(x, y, gamma: float) -> np.ndarray:
 
 
 def _wave_error(size: float, seed: int, gamma: float, geometry: int, told: str) -> dict[str, float]:
-    grid = _bent(size, 10 * seed + round(size), geometry)
-    return {told: meshes.field_error(Space(grid, geometry), _waved(grid, gamma), lambda x, y: _wave(x, y, gamma),
-                                     ~grid.biomass)}
-
-
-def _waved(grid: Mesh, gamma: float) -> np.ndarray:
-    """(N, 2) displacement of the nodes."""
-    return moved(grid, grid.points + _wave(*grid.points.T, gamma), gamma) - grid.points
+    grid = _nodes(meshes.plug((-END, END), NARROW, FACE, size, seed=10 * seed + round(size)), geometry)
+    found = moved(grid, grid.points + _wave(*grid.points.T, gamma), gamma) - grid.points
+    return {told: meshes.field_error(Space(grid, geometry), found, lambda x, y: _wave(x, y, gamma), ~grid.biomass)}
 
 
 RADIUS = 25.0
@@ -154,15 +144,7 @@ CONTACT = np.radians(60)
 BOTH = "0.1 % between codes"
 
 
-def _grows(x, y):
-    return np.array([x, y])
-
-
-def _slides(x, y):
-    return np.array([RADIUS + 0 * x, 0 * y])
-
-
-SEGMENT_MOTIONS = {"grows": _grows, "slides": _slides}
+SEGMENT_MOTIONS = {"grows": lambda x, y: np.array([x, y]), "slides": lambda x, y: np.array([RADIUS + 0 * x, 0 * y])}
 
 
 @case("mesh_motion-half-disc", kind="cross-code",
@@ -212,22 +194,18 @@ def _segment(contact: float, refinement: float, geometry: int) -> Mesh:
     return mesher.generate(segment, (-SEGMENT_END, SEGMENT_END), Sizing(SEGMENT_WIDTH, refinement, FILM), geometry)[0]
 
 
-def _displaced(grid: Mesh, gamma: float, name: str, where: np.ndarray) -> np.ndarray:
-    """(K, 2) of our mesh at points (K, 2); it is linear in the motion, which may be as large as the aggregate."""
-    found = moved(grid, grid.points + SEGMENT_MOTIONS[name](*grid.points.T).T, gamma) - grid.points
-    return meshes.field_at(Space(grid, grid.geometry), found, where)
-
-
 @cache
 def _followed(contact: float, parts: int, gamma: float, name: str) -> quadratic_mesh_motion.Motion:
     motion = SEGMENT_MOTIONS[name]
     return quadratic_mesh_motion.follow(RADIUS, contact, SEGMENT_WIDTH, SEGMENT_END, parts, gamma, motion)
 
 
-def _apart(grid, contact: float, parts: int, gamma: float, name: str) -> float:
-    """Relative difference of both codes."""
+def _apart(grid: Mesh, contact: float, parts: int, gamma: float, name: str) -> float:
+    """Relative difference of both codes; ours is linear in the motion, which may be as large as the aggregate."""
     theirs = _followed(contact, parts, gamma, name)
-    return meshes.relative(_displaced(grid, gamma, name, theirs.points), theirs.displacement, theirs.weights)
+    found = moved(grid, grid.points + SEGMENT_MOTIONS[name](*grid.points.T).T, gamma) - grid.points
+    there = meshes.field_at(Space(grid, grid.geometry), found, theirs.points)
+    return meshes.relative(there, theirs.displacement, theirs.weights)
 
 
 PORE, REACH = 50.0, (-75.0, 75.0)
@@ -278,7 +256,7 @@ def _kept(name: str, first: Mesh, last: Mesh) -> list:
 
 def _area(grid: Mesh) -> float:
     """Of all triangles, bent edges included, um2."""
-    return float(meshes.fine(Space(grid, grid.geometry))[1].sum())
+    return meshes.fine(Space(grid, grid.geometry))[1].sum()
 
 
 STRIDES = (0.08, 0.04, 0.02, 0.01)
@@ -329,7 +307,7 @@ def criterion():
                 "one edge bent by 0.51": (_bowed(0.51), False, HALF_BENT)}
     yield at_most("quality", off, 1e-12, "closed form: round-off")
     for name, (mesh, fine, why) in verdicts.items():
-        yield at_most(f"wrong verdicts: {name}", float(mesh.acceptable() != fine), 0.0, why)
+        yield at_most(f"wrong verdicts: {name}", mesh.acceptable() != fine, 0.0, why)
 
 
 def _stretched(count: int, by: float) -> Mesh:

@@ -166,7 +166,7 @@ class HalfCylinder:
 
 def size(held: Supported) -> float:
     """Side of the square of mean triangle area twice over, um."""
-    return float(np.sqrt(2 * held.body.at.dx.sum() / len(held.cells)))
+    return np.sqrt(2 * held.body.at.dx.sum() / len(held.cells))
 
 
 def grown(held: Supported, theta: np.ndarray, path: Callable | None = None, factor: float = FACTOR

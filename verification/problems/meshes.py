@@ -180,7 +180,7 @@ def fine(space: Space, chosen=slice(None), degree: int = FINE):
 def relative(found: np.ndarray, exact: np.ndarray, weight: np.ndarray) -> float:
     """L2 of values less exact (t, q) or (t, q, m), with weights (t, q), over that of exact."""
     weight = weight.reshape(weight.shape + (1,) * (exact.ndim - weight.ndim))
-    return float(np.sqrt(np.sum(weight * (found - exact) ** 2) / np.sum(weight * exact**2)))
+    return np.sqrt(np.sum(weight * (found - exact) ** 2) / np.sum(weight * exact**2))
 
 
 def distance(at, values: np.ndarray, exact) -> float:
@@ -231,4 +231,4 @@ def along_edges(order: int, count: int) -> tuple[np.ndarray, np.ndarray, np.ndar
 
 def mean_size(mesh: Mesh) -> float:
     """Side of the square of mean triangle area twice over: the spacing of a lattice of as many nodes, um."""
-    return float(np.sqrt(2 * mesh.areas.mean()))
+    return np.sqrt(2 * mesh.areas.mean())

@@ -14,7 +14,7 @@ from repro.march.loop import Instant, Ledger, Step
 from repro.march.simulation import simulate
 from repro.model import pore
 from repro.model.pore import Pore, Solved
-from repro.scene import Kinetics, Scene, load_scene
+from repro.scene import Kinetics, Scene, Substrates, load_scene
 from verification.kernel.case import columns
 from verification.problems import channels, meshes
 
@@ -151,7 +151,7 @@ def density_drift(scene: Scene, instant: Instant) -> float:
     """Largest |(X_A + X_I) / X_m - 1| in the aggregate."""
     now = instant.pore
     density = (now.active + now.inert) / now.space.reaction.dx
-    return float(np.abs(density / scene.kinetics.maximum_density - 1).max())
+    return np.abs(density / scene.kinetics.maximum_density - 1).max()
 
 
 def section_means(now: Pore, solved: Solved, x: np.ndarray) -> np.ndarray:
@@ -159,10 +159,10 @@ def section_means(now: Pore, solved: Solved, x: np.ndarray) -> np.ndarray:
     return meshes.section_means(now.space, channels.both(solved.concentrations).T, x).T
 
 
-def growth_rates(scene: Scene, acceptor: float | None = None, donor: float | None = None) -> tuple[float, float]:
+def growth_rates(law: Kinetics, both: Substrates, acceptor: float | None = None, donor: float | None = None
+                 ) -> tuple[float, float]:
     """Rates (1/h) at which X_A grows and leaves X_I, (9)-(10), at concentrations (mg/L), those of the supply by
     default: written down anew."""
-    law, both = scene.kinetics, scene.substrates
     given = ((both.acceptor.supply if acceptor is None else acceptor, both.acceptor.half_saturation),
              (both.donor.supply if donor is None else donor, both.donor.half_saturation))
     m_a, m_d = (value / (value + half) for value, half in given)
@@ -177,10 +177,10 @@ def worth(law: Kinetics, step: Ledger) -> tuple[float, float]:
     return law.yield_coefficient * donor, (acceptor - law.acceptor_to_donor_ratio * donor) / law.decay_oxygen_demand
 
 
-def mass_after(scene: Scene, time: float) -> float:
-    """(X_A + X_I) over that at the start, after hours at the supply: an exponential."""
-    rise, left = growth_rates(scene)
-    return float(np.exp(rise * time) + left / rise * np.expm1(rise * time))
+def mass_after(scene: Scene, time: float, acceptor: float | None = None) -> float:
+    """(X_A + X_I) over that at the start, after hours at the supply, or at another acceptor: an exponential."""
+    rise, left = growth_rates(scene.kinetics, scene.substrates, acceptor)
+    return np.exp(rise * time) + left / rise * np.expm1(rise * time)
 
 
 #: um/h in m/d.
@@ -205,7 +205,7 @@ def pore_of(scene: Scene, speed=None) -> averaged_pore.Pore:
 
 def half_disc_radius(area: float) -> float:
     """Of the half-disc of an area: the meshed one is a polygon."""
-    return float(np.sqrt(2 * area / np.pi))
+    return np.sqrt(2 * area / np.pi)
 
 
 def half_disc(scene: Scene, speed=None, cells: int = CELLS, fluid: int = FLUID) -> averaged_pore.Averaged:
@@ -233,10 +233,10 @@ def _less(scene: Scene, instant: Instant, moment: averaged_pore.Moment) -> dict[
     between = [np.interp(x, moment.x, field) for field in moment.fields]
     return {"area": row["aggregate_area_um2"] / moment.area - 1,
             "velocity": row["mean_velocity_m_per_d"] / M_PER_D / moment.velocity - 1,
-            "effluents": float(np.abs(effluents - moment.fields[:, -1]).max()) / supply,
-            "C along the pore": float(np.abs(section_means(instant.pore, instant.solved, x) - between).max()) / supply}
+            "effluents": np.abs(effluents - moment.fields[:, -1]).max() / supply,
+            "C along the pore": np.abs(section_means(instant.pore, instant.solved, x) - between).max() / supply}
 
 
 def worst(rows: list[dict[str, float]]) -> dict[str, float]:
     """The largest size of each number."""
-    return {name: float(np.abs(values).max()) for name, values in columns(rows).items()}
+    return {name: np.abs(values).max() for name, values in columns(rows).items()}

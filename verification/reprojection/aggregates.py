@@ -125,7 +125,7 @@ def _growing_grown(transfer: str, order: int) -> dict[str, np.ndarray]:
     wanted = now.mass
     for _ in range(GROWING_UPDATES):
         made = _faster_in_front(now)
-        wanted += float((now.active * made).sum())
+        wanted += (now.active * made).sum()
         now, anew = aggregates.updated(given, now, made)
         rows.append((now.mass / wanted - 1, _restart(now) if anew else 0.0, _poor(now), _missing(now), anew))
     return dict(zip(("drift", "restart", "poor", "missing", "anew"), np.array(rows).T))
@@ -146,11 +146,11 @@ def _restart(now) -> float:
     if now.space.order == 1:
         J = triangle_areas(mesh.points, cells) / triangle_areas(now.origin, cells)
         mean = density[np.searchsorted(mesh.body, cells), 0].mean(axis=1)
-        return float(np.abs(now.theta[:, 0] / (J * mean) - 1).max())
+        return np.abs(now.theta[:, 0] / (J * mean) - 1).max()
     table = now.space.table
     present, first = (pairs.curved_weights(where[cells], table.linear, table.weights)
                       for where in (mesh.points, now.origin))
-    return float(np.abs(now.theta / (present / first * density) - 1).max())
+    return np.abs(now.theta / (present / first * density) - 1).max()
 
 
 def _poor(now) -> int:
@@ -159,7 +159,7 @@ def _poor(now) -> int:
     sides = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2)
     half = sides.sum(axis=1) / 2
     area = np.sqrt(half * np.prod(half[:, None] - sides, axis=1))
-    return int(np.count_nonzero(4 * np.sqrt(3) * area / np.sum(sides**2, axis=1) < POOR))
+    return np.count_nonzero(4 * np.sqrt(3) * area / np.sum(sides**2, axis=1) < POOR)
 
 
 def _missing(now) -> float:
@@ -347,7 +347,7 @@ def arc():
 
 def _unround(now) -> float:
     """Spread of the distances of the interface's nodes from the origin, um."""
-    return float(np.ptp(np.hypot(*now.outline.points[now.wall == FREE].T)))
+    return np.ptp(np.hypot(*now.outline.points[now.wall == FREE].T))
 
 
 #: um/h, of the order of the base scene's; ends of the old mesh, um.

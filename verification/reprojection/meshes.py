@@ -67,7 +67,7 @@ def order(carrier: str | int, expected: int, ceiling: float):
 
 def _linear(old: pairs.Grid, new: pairs.Grid) -> float:
     found = transfer.project_bounded(*old, _plane(old)[:, None], *new)[:, 0]
-    return float(np.abs(found - _plane(new)).max() / np.ptp(_plane(new)))
+    return np.abs(found - _plane(new)).max() / np.ptp(_plane(new))
 
 
 def _located_errors(size: float, seed: int, order: int) -> dict[str, float]:

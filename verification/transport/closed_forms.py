@@ -92,7 +92,7 @@ def _robin_errors(size: float, number: int, order: int, peclet: float, ends) -> 
     made, state = _robin_found(space, peclet)
     gap, truth = apart(space, state.donor[None], lambda x, y: exact(x)[None])
     leaving = transport.fluxes(made, Sink(filled(space, UPTAKE)), state)[1].effluent
-    return {"size": length(space, size), "C": float(gap[0] / (truth[0] if order == 1 else DONOR.supply)),
+    return {"size": length(space, size), "C": gap[0] / (truth[0] if order == 1 else DONOR.supply),
             "leaving": abs(leaving - float(exact(SLAB))) / DONOR.supply}
 
 
@@ -132,21 +132,19 @@ def _sides(film: float) -> dict[str, float]:
             "diffusivity": ACCEPTOR.diffusivity}
 
 
-def _filmed(told: str, film: float) -> str:
-    return told + (f", films of {film:g} um" if film else "")
-
-
 #: Thiele's modulus, film (um), and the last errors of C and of what is taken up, for each order.
 THIELE = {1: ((0.1, 0.0, 3e-7, 3e-7), (1.0, 0.0, 4e-5, 4e-5), (10.0, 0.0, 4e-3, 4e-3), (1.0, FILM, 3e-5, 3e-5)),
           2: ((0.1, 0.0, 1e-12, 3e-12), (1.0, 0.0, 1e-8, 1e-11), (10.0, 0.0, 2e-5, 3e-7), (1.0, FILM, 7e-9, 1e-11)),
           3: ((1.0, 0.0, 2e-11, 3e-12), (10.0, 0.0, 2e-7, 1e-10), (1.0, FILM, 2e-11, 3e-12))}
+#: What tells of films.
+FILMED = {0.0: "", FILM: f", films of {FILM:g} um"}
 #: Elements (um), and how many meshes of each.
 THIELE_MESHES = {1: SAMPLES, 2: {4.0: 8, 2.0: 4, 1.0: 2, 0.5: 1}, 3: SAMPLES}
 NORM = "L2 of C over the mesh, relative; what is taken up, relative; several meshes a size"
 
 
 def _thiele(*orders: int) -> dict[str, tuple]:
-    return {f"{_filmed(f'phi = {row[0]:g}', row[1])}, {WORDS[order]}": (order, *row)
+    return {f"phi = {row[0]:g}{FILMED[row[1]]}, {WORDS[order]}": (order, *row)
             for order in orders for row in THIELE[order]}
 
 
@@ -177,14 +175,20 @@ def _kappa(modulus: float) -> float:
 
 def _first_order_errors(size: float, number: int, modulus: float, film: float, order: int) -> dict[str, float]:
     kappa = _kappa(modulus)
-    space, field, flux = _at_rest(size, number, kappa * LARGE, LARGE, film, order)
 
     def exact(x):
-        return slab.first_order(x, ACCEPTOR.supply, kappa, **_sides(film))
+        profile, effectiveness = slab.first_order(x, ACCEPTOR.supply, kappa, **_sides(film))
+        return profile, effectiveness * ACCEPTOR.supply * SLAB / LARGE
 
-    taken = flux.consumed / (kappa * ACCEPTOR.supply * 2 * SLAB * CHANNEL)
+    return _slab_errors(size, number, order, film, kappa * LARGE, LARGE, exact, "taken up")
+
+
+def _slab_errors(size: float, number: int, order: int, film: float, sink: float, half_saturation: float, exact,
+                 taken: str) -> dict[str, float]:
+    """Size of the elements, and relative errors of C and of what enters a side over ``sink``; exact(x): both."""
+    space, field, flux = _at_rest(size, number, sink, half_saturation, film, order)
     return {"size": length(space, size), "C": relative(space, field, lambda x: exact(x)[0]),
-            "taken up": abs(taken / exact(0.0)[1] - 1)}
+            taken: abs(_depth(flux, sink) / exact(0.0)[1] - 1)}
 
 
 DEPTH = 20.0
@@ -209,13 +213,10 @@ def _monod(order: int, half_saturation: float, film: float, samples: dict, ceili
 
 
 def _monod_errors(size: float, number: int, half_saturation: float, film: float, order: int) -> dict[str, float]:
-    space, field, flux = _at_rest(size, number, _sink(film), half_saturation, film, order)
-
     def exact(x):
         return slab.monod(x, ACCEPTOR.supply, _sink(film), half_saturation, **_sides(film))
 
-    return {"size": length(space, size), "C": relative(space, field, lambda x: exact(x)[0]),
-            "depth": abs(_depth(flux, _sink(film)) / exact(0.0)[1] - 1)}
+    return _slab_errors(size, number, order, film, _sink(film), half_saturation, exact, "depth")
 
 
 def _sink(film: float) -> float:
