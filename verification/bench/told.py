@@ -195,11 +195,9 @@ def verdicts(found: list[dict]) -> Block:
 
 
 def blocks(name: str, part: dict) -> list[Block]:
-    """A part with all its points, and its picture: on pages alone, and for a terminal."""
+    """A part with all its points, for a terminal."""
     told = "; ".join(f"{key}: {part[key]}" for key in ("error", "reference", "repeats") if key in part)
-    picture = [Block("picture", f"bench_{name}.svg: {part['title']}", detail=True)] if "error" in part else []
-    return [Block("heading", part["title"], detail=True), Block("text", told, detail=True), *picture,
-            table(HEAD, _rows(part), detail=True)]
+    return [Block("heading", f"{name}: {part['title']}"), Block("text", told), table(HEAD, _rows(part))]
 
 
 def _rows(part: dict) -> Iterator[tuple[str, ...]]:

@@ -1,8 +1,7 @@
-"""One writer: blocks of text, pictures and tables, as Markdown, as a page and for a terminal; and records in JSON."""
+"""One writer: blocks of text, pictures and tables, as Markdown and for a terminal; and records in JSON."""
 
 from __future__ import annotations
 
-import html
 import json
 from collections.abc import Iterable
 from contextlib import suppress
@@ -12,13 +11,6 @@ from typing import Any
 
 from repro.results import write_text
 from repro.results.files import whole
-
-STYLE = """body {font: 15px/1.5 sans-serif; max-width: 1200px; margin: 2em auto; padding: 0 1em; color: #222}
-table {border-collapse: collapse; font-size: 13px; margin: 1em 0} .no {background: #fbe3e0} img {max-width: 100%}
-td, th {border-bottom: 1px solid #ddd; padding: 3px 8px; text-align: left; vertical-align: top}"""
-#: Cells that make a row of a page red.
-BAD = {"wrong", "does not hold"}
-
 
 Row = tuple[str, ...]
 
@@ -32,23 +24,21 @@ def link(text: str, page: str, place: str = "") -> str:
 
 @dataclass(frozen=True)
 class Block:
-    """A piece of a text: a heading, a paragraph, a picture (file and what it shows), or a table (head and rows);
-    ``detail``: not in Markdown."""
+    """A piece of a text: a heading, a paragraph, a picture (file and what it shows), or a table (head and rows)."""
 
     kind: str
     text: str = ""
     rows: tuple[Row, ...] = ()
-    detail: bool = False
 
 
-def table(head: Iterable[str], rows: Iterable[Iterable[str]], detail: bool = False) -> Block:
+def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> Block:
     """A table of a head and rows."""
-    return Block("table", rows=(tuple(head), *map(tuple, rows)), detail=detail)
+    return Block("table", rows=(tuple(head), *map(tuple, rows)))
 
 
 def markdown(blocks: Iterable[Block], level: int = 3, pictures: str = "verification/report") -> str:
-    """What is no detail; headings of a level; pictures: where they are from there."""
-    return "\n\n".join(_markdown(block, level, pictures) for block in blocks if not block.detail)
+    """Headings of a level; pictures: where they are from there."""
+    return "\n\n".join(_markdown(block, level, pictures) for block in blocks)
 
 
 def _markdown(block: Block, level: int, pictures: str) -> str:
@@ -78,30 +68,6 @@ def _plain(block: Block) -> list[str]:
         return [block.text]
     widths = [max(map(len, column)) for column in zip(*block.rows)]
     return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in block.rows]
-
-
-def page(title: str, blocks: Iterable[Block]) -> str:
-    """A whole page."""
-    head, body = html.escape(title), "".join(map(_html, blocks))
-    return (f"<!doctype html><html lang='en'><meta charset='utf-8'><title>{head}</title><style>{STYLE}</style>"
-            f"<body><h1>{head}</h1>{body}</body></html>\n")
-
-
-def _html(block: Block) -> str:
-    text = html.escape(block.text)
-    if block.kind == "picture":
-        name, _, shown = text.partition(": ")
-        return f"<img src='{name}' alt='{shown or name}'>"
-    if block.kind == "table":
-        head, *rows = block.rows
-        return f"<table>{_row('th', head)}{''.join(_row('td', row) for row in rows)}</table>"
-    return f"<h2>{text}</h2>" if block.kind == "heading" else f"<p>{text}"
-
-
-def _row(kind: str, row: Row) -> str:
-    """A row of a table; red where something does not hold."""
-    cells = "".join(f"<{kind}>{html.escape(cell)}" for cell in row)
-    return f"<tr class='{'no' if BAD & {*row} else 'yes'}'>{cells}"
 
 
 def load(file: Path, empty: Any = None) -> Any:
