@@ -4,9 +4,6 @@ steps, and cost against size."""
 from __future__ import annotations
 
 import gc
-import json
-import subprocess
-import sys
 import tracemalloc
 from dataclasses import replace
 from functools import partial
@@ -249,65 +246,37 @@ METHODS = {"preset paper": "paper fresh", "order 2, midpoint (accurate)": "accur
 STAGES = ("flow", "transport", "growth", "mesh motion", "meshing", "transfer")
 FLOOR = "factorise and solve"
 RADIUS, STEP = 20.0, 0.2
-LIMIT = 240.0
-#: The first guess of the refinement for so many nodes: c nodes^p, fitted to a few of them.
-FIRST = {"paper": (0.0265, 0.526), "accurate": (0.0109, 0.544)}
+#: The refinement for so many nodes: c nodes^p, fitted to a few of them.
+REFINED = {"paper": (0.0265, 0.526), "accurate": (0.0109, 0.544)}
 
 
 def size_part(quick: bool) -> dict:
     """Cost against size: one growth step of 12 min of an aggregate of 20 um, by stage.
 
-    Each size runs in a process of its own, with a limit of time; the first step, which orders the nodes, is left out
-    unless it is the only one. The floor of a step is what factorising and solving its linear systems takes.
+    The first step, which orders the nodes, is left out unless it is the only one. The floor of a step is what
+    factorising and solving its linear systems takes.
     """
+    sizes = QUICK if quick else SIZES
     lines = []
     for method, kind in METHODS.items():
-        points, failed = [], []
-        for nodes, steps in (QUICK if quick else SIZES).items():
-            found = in_a_process(kind, nodes, steps)
-            (failed if "reason" in found else points).append(found)
-        lines.append({"method": method, "points": points, "failed": failed})
+        points = [measure(kind, nodes, steps) for nodes, steps in sizes.items()]
+        lines.append({"method": method, "points": points, "failed": []})
     return {"title": f"Cost of a growth step of 12 min, aggregate of {RADIUS:g} um in a pore of 50 um", "lines": lines,
             "repeats": "median of 5 steps (600 nodes) to 1; 160 000 nodes: the first step"}
 
 
-def in_a_process(kind: str, nodes: int, steps: int) -> dict:
-    """:func:`measure` in a process of its own."""
-    label = f"{nodes} nodes"
-    try:
-        done = subprocess.run([sys.executable, "-m", __name__, kind, str(nodes), str(steps)], capture_output=True,
-                              text=True, timeout=LIMIT)
-    except subprocess.TimeoutExpired:
-        return {"label": label, "reason": f"more than {LIMIT:g} s"}
-    if done.returncode:
-        return {"label": label, "reason": (done.stderr.strip().splitlines() or ["no message"])[-1]}
-    return {"label": label, **json.loads(done.stdout)}
-
-
-def larger_seed(kind: str, refinement: float):
-    """Base with a larger seed."""
+def larger_seed(kind: str, nodes: int):
+    """Base with a larger seed, and a refinement that makes about so many nodes."""
     preset, jacobian = kind.split()
-    return load_scene("base", [f"numerics.preset={preset}", f"numerics.refinement={refinement}",
+    factor, power = REFINED[preset]
+    return load_scene("base", [f"numerics.preset={preset}", f"numerics.refinement={factor * nodes**power}",
                                f"numerics.jacobian={jacobian}", f"aggregate.radius={RADIUS} um"])
-
-
-def sized(kind: str, nodes: int):
-    """(scene, pore) of about so many nodes."""
-    factor, power = FIRST[kind.split()[0]]
-    refinement = factor * nodes**power
-    for _ in range(3):
-        given = larger_seed(kind, refinement)
-        now = pore.seeded(given)
-        count = len(now.mesh.points)
-        if abs(count / nodes - 1) < 0.1:
-            break
-        refinement *= (nodes / count) ** 0.5
-    return given, now
 
 
 def measure(kind: str, nodes: int, steps: int) -> dict:
     """Seconds of a step and of its stages, and their floor."""
-    given, now = sized(kind, nodes)
+    given = larger_seed(kind, nodes)
+    now = pore.seeded(given)
     solved = pore.solve(given, now)
     now = replace(now, concentrations=solved.concentrations)
     rows = []
@@ -323,10 +292,6 @@ def measure(kind: str, nodes: int, steps: int) -> dict:
     rows = rows[1:] or rows
     usual = columns([row for row in rows if not row["remeshed"]] or rows)
     middle = {name: float(np.median(column)) for name, column in usual.items()}
-    return {"seconds": middle["seconds"], "cpu": middle["cpu"], "nodes": len(now.mesh.points),
-            "stages": {name: middle[name] for name in (*STAGES, FLOOR)}, "ratio": middle["seconds"] / middle[FLOOR],
-            "repeats": len(usual["cpu"])}
-
-
-if __name__ == "__main__":
-    print(json.dumps(measure(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]))))
+    return {"label": f"{nodes} nodes", "seconds": middle["seconds"], "cpu": middle["cpu"],
+            "nodes": len(now.mesh.points), "stages": {name: middle[name] for name in (*STAGES, FLOOR)},
+            "ratio": middle["seconds"] / middle[FLOOR], "repeats": len(usual["cpu"])}

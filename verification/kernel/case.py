@@ -67,8 +67,12 @@ class Check(Quantity):
         return rounded(self.value, self._tolerance / 2) if self._tolerance >= ROUND_OFF else ""
 
     @property
+    def _two_sided(self) -> bool:
+        return isfinite(self.low) and isfinite(self.high) and self.low != 0
+
+    @property
     def _tolerance(self) -> float:
-        if isfinite(self.low) and isfinite(self.high) and self.low != 0:
+        if self._two_sided:
             return (self.high - self.low) / 2
         return abs(self.high if isfinite(self.high) else self.low)
 
@@ -77,7 +81,7 @@ class Check(Quantity):
         """How much of its tolerance it uses: 0 to 1 where it holds, more than anything where it does not."""
         if not self.holds:
             return inf
-        if isfinite(self.low) and isfinite(self.high) and self.low != 0:
+        if self._two_sided:
             return abs(self.value - self.low - self._tolerance) / self._tolerance
         if isfinite(self.high):
             return self.value / self.high if self.high else 0.0
@@ -96,7 +100,7 @@ class Check(Quantity):
         return self._range(3)
 
     def _range(self, digits: int) -> str:
-        if isfinite(self.low) and isfinite(self.high) and self.low != 0:
+        if self._two_sided:
             return f"{self.low:.{digits}g} to {self.high:.{digits}g}"
         return f"at most {self.high:.3g}" if isfinite(self.high) else f"at least {self.low:.3g}"
 

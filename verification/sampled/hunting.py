@@ -27,8 +27,6 @@ RECORD = ROOT / "verification" / "report" / "sampled.json"
 LIMIT, WHOLE = 60.0, 1800.0
 #: A test that takes so much longer than it did, in multiples of that and seconds besides, does not end.
 LONGER, BESIDES = 5.0, 10.0
-#: Files of the tests that a mutant is first tried with.
-FILES = 4
 
 
 @dataclass(frozen=True)
@@ -109,21 +107,12 @@ def tried(mutant: Mutant, there: Path, reach: Reach, whole: bool = False, before
     put(path, mutated(text, mutant))
     found = run(there, [before], limit) if before in {test.id for test in tests} else Ran()
     if not found.failed:
-        found = _met(there, chosen, limit)
+        found = run(there, [test.id for test in chosen], limit)
     put(path, text)
     row = Row(mutant.name, mutant.file, mutant.line, mutant.operator, mutant.old, mutant.new, digest(text), "survivor",
               reached=len(tests), tests=_names(reach.of(mutant.file, text, mutant.line)), tried=len(chosen),
               seconds=round(found.seconds, 1))
     return _verdict(row, found, {test.id: test.seconds for test in tests}, there)
-
-
-def _met(there: Path, chosen: list[Measured], limit: float) -> Ran:
-    """What comes of some tests, the nearest first."""
-    first = nearest(chosen)
-    found = run(there, [test.id for test in first], limit / 3)
-    if found == Ran(seconds=found.seconds) and len(chosen) > len(first):
-        found = run(there, [test.id for test in chosen[len(first):]], 2 * limit / 3)
-    return found
 
 
 def _verdict(row: Row, found: Ran, usual: dict[str, float], there: Path) -> Row:
@@ -153,16 +142,6 @@ def _short(how: str) -> str:
     """The last line of a failure that tells something."""
     told = [line.strip() for line in how.splitlines() if line.strip()]
     return (told or [""])[-1].removeprefix("E ").strip()[-160:]
-
-
-def nearest(tests: list[Measured]) -> list[Measured]:
-    """The first of some tests, up to the fifth file: what is not imported costs nothing, and they catch most."""
-    files: set[str] = set()
-    for number, test in enumerate(tests):
-        files.add(test.id.partition("::")[0])
-        if len(files) > FILES:
-            return tests[:number]
-    return tests
 
 
 def within(tests: list[Measured], limit: float) -> list[Measured]:
