@@ -59,18 +59,16 @@ STABLE, PARTS = 0.4, 100
 
 @dataclass(frozen=True)
 class Problem:
-    """Biomass where ``inside(x, y)``; speed: u (um/h); ends, width: um, width None in one dimension."""
+    """Biomass where ``inside(x, y)``; box: ends (um) along, and across in two dimensions; speed: u (um/h)."""
 
-    ends: tuple[float, float]
-    width: float | None
+    box: tuple[tuple[float, float], ...]
     inside: Callable[..., np.ndarray]
     speed: float = 0.0
 
-    def cells(self, across: int) -> tuple[int, ...]:
+    def cells(self, across: int) -> list[int]:
         """Cells along (and across) with ``across`` to the width, or to the length in one dimension."""
-        if self.width is None:
-            return (across,)
-        return round((self.ends[1] - self.ends[0]) / self.width * across), across
+        low, high = self.box[-1]
+        return [round((last - first) / (high - low) * across) for first, last in self.box]
 
     def judged(self, fields, load) -> np.ndarray:
         """(2,) C in the last cell, mg/L; at rest what is taken up, um2 mg/L/h, with load = X times the cells' areas."""
@@ -105,11 +103,10 @@ def fipy(problem: Problem, across: int) -> np.ndarray:
 
 
 def _fipy_mesh(problem: Problem, across: int):
-    count, length = problem.cells(across), problem.ends[1] - problem.ends[0]
-    if problem.width is None:
-        return Grid1D(nx=count[0], dx=length / count[0]) + (problem.ends[0],)
-    return Grid2D(nx=count[0], ny=count[1], dx=length / count[0], dy=problem.width / count[1]) + (
-        (problem.ends[0],), (0.0,))
+    counts = problem.cells(across)
+    steps = [(last - first) / count for (first, last), count in zip(problem.box, counts)]
+    kind = Grid1D if len(counts) == 1 else Grid2D
+    return kind(*steps, *counts) + [(first,) for first, _ in problem.box]
 
 
 def _fipy_ends(problem: Problem, mesh, field, k: int):
@@ -137,14 +134,14 @@ def _linearise(now, constants, slopes) -> None:
 def py_pde(problem: Problem, across: int) -> tuple[np.ndarray, dict]:
     """(2,) what is judged, and the seconds (wall, processor) before the run's first hundredth is over, less those of
     another hundredth: numba compiles in them."""
-    grid = _pde_grid(problem, across)
+    grid = CartesianGrid([list(ends) for ends in problem.box], problem.cells(across))
     where = problem.inside(*np.moveaxis(grid.cell_coords, -1, 0))
     X = ScalarField(grid, np.where(where, DENSITY, 0.0))
     ends = {f"{name}:*": _pde_ends(problem, k) for k, name in enumerate("AD")}
     equation = PDE(_pde_rules(problem), consts={"X": X}, bc_ops=ends)
     state = FieldCollection([ScalarField(grid, s, label=name) for s, name in zip(SUPPLY, "AD")])
     times = TIMES_OPEN if problem.speed else TIMES
-    time = times * (problem.ends[1] - problem.ends[0]) ** 2 / min(DIFFUSIVITY)
+    time = times * np.ptp(problem.box[0]) ** 2 / min(DIFFUSIVITY)
     dt = STABLE * min(grid.discretization) ** 2 / max(DIFFUSIVITY) / grid.num_axes
     marks = [_now()]
     watch = CallbackTracker(lambda state, t: marks.append(_now()), interrupts=time / PARTS)
@@ -165,11 +162,6 @@ def _compiled(marks: list[tuple[float, float]]) -> dict[str, float]:
     return dict(zip(("apart_seconds", "apart_cpu"), map(float, found)))
 
 
-def _pde_grid(problem: Problem, across: int) -> CartesianGrid:
-    box = [list(problem.ends)] if problem.width is None else [list(problem.ends), [0.0, problem.width]]
-    return CartesianGrid(box, list(problem.cells(across)))
-
-
 def _pde_rules(problem: Problem) -> dict[str, str]:
     """The equations as py-pde reads them."""
     r = RATES
@@ -187,7 +179,7 @@ def _pde_ends(problem: Problem, k: int) -> dict:
     else:
         share = problem.speed / spread
         ends = {"x-": {"type": "mixed", "value": share, "const": share * supply}, "x+": {"derivative": 0.0}}
-    return ends if problem.width is None else {**ends, "y": {"derivative": 0.0}}
+    return ends if len(problem.box) == 1 else {**ends, "y": {"derivative": 0.0}}
 
 
 @cache
@@ -257,7 +249,7 @@ def _inside(x, y):
     return (np.abs(x) < SIDE) & (y < SIDE)
 
 
-BOX = Problem((-HALF, HALF), WIDTH, _inside)
+BOX = Problem(((-HALF, HALF), (0.0, WIDTH)), _inside)
 #: Of the box's reference, cells across.
 COARSE, FINE = 32, 64
 
@@ -302,7 +294,7 @@ def quadratic(cells: int) -> np.ndarray:
 #: um; um/h.
 ENDS, STRIP = (-40.0, 80.0), 40.0
 SPEED = 1e5
-CHANNEL = Problem(ENDS, None, lambda x, *y: (x > 0) & (x < STRIP), SPEED)
+CHANNEL = Problem((ENDS,), lambda x, *y: (x > 0) & (x < STRIP), SPEED)
 #: Cells across the box, and along the channel (multiples of three: faces lie on both ends of the strip): linear, of
 #: higher order, and of py-pde's compiled run.
 SIZES = {BOX: ((8, 16, 32, 64, 96), (2, 4, 8, 16, 24), 16),
@@ -330,5 +322,5 @@ def reference(tolerance: float) -> np.ndarray:
 
 
 def _channel_ours(cells: int, order: int) -> list[float]:
-    grid = straight(ENDS, (ENDS[1] - ENDS[0]) / cells, (cells, 1), CHANNEL.inside)
+    grid = straight(ENDS, np.ptp(ENDS) / cells, (cells, 1), CHANNEL.inside)
     return [flux.effluent for flux in solved(grid, order, SPEED)]

@@ -1,9 +1,8 @@
 """Can the verification fail? Small wrong changes to ``repro/``, each of which a case must catch: ``make mutants``.
 
 A mutant is a change of exact text; it is applied to a copy of the code, never to the code itself. Every case names
-mutants, and must fall short with each of them. A mutant is run against the cases that name it and then against all
-others, the quick ones first, until one catches it: a mutant that survives is a missing test. With ``--every`` it is run
-against all cases that name it, whichever catches it first.
+mutants, and must fall short with each of them. A mutant is run against the cases that name it, the quick ones first,
+until one catches it; with ``--every`` against all of them, whichever catches it first.
 
 A case catches by a number out of its range, or by an error of ``repro.errors`` (a guard of the code that stops it).
 Whatever else stops a case, an ``AttributeError`` for instance, shows a broken mutant and catches nothing. No case knows
@@ -133,9 +132,8 @@ class Hunt:
 
     @property
     def missed_by(self) -> tuple[str, ...]:
-        """Ids of the cases that name this mutant and pass with it, and of the tests that it names and that do."""
-        return tuple(t.case for t in self.trials
-                     if not t.caught and (t.case not in CASES or self.mutant in CASES[t.case].mutants))
+        """Ids of the cases, or tests, that it was run against and that pass with it."""
+        return tuple(trial.case for trial in self.trials if not trial.caught)
 
 
 def load() -> dict[str, tuple[Mutant, ...]]:
@@ -169,30 +167,21 @@ def mutated(mutant: Mutant, root: Path = ROOT) -> str:
     return text.replace(mutant.old, mutant.new)
 
 
-def plan(mutant: Mutant) -> tuple[list[str], list[str]]:
-    """(cases that name the mutant, all others), the quick ones first; of one that tests catch these, and no others."""
-    if mutant.tests:
-        return list(mutant.tests), []
-    quick_first = sorted(CASES.values(), key=lambda case: case.slow)
-    named = [case.id for case in quick_first if mutant.id in case.mutants]
-    return named, [case.id for case in quick_first if case.id not in named]
-
-
 def hunt(mutant: Mutant, every: bool = False) -> Hunt:
-    """Run the mutant against the cases that name it, then against all others, to the first catch; ``every``: against
-    all that name it. Tests are always run all."""
-    named, others = plan(mutant)
+    """Run the mutant against the cases that name it, the quick ones first, to the first catch, or ``every`` one; or
+    against every test that it names."""
+    quick_first = sorted(CASES.values(), key=lambda case: case.slow)
+    catchers = mutant.tests or [case.id for case in quick_first if mutant.id in case.mutants]
     trials: list[Trial] = []
     with TemporaryDirectory(prefix="mutant-") as folder:
         copy(mutant, Path(folder))
-        for case in named + others:
-            caught = any(trial.caught for trial in trials)
-            if caught and not ((every or mutant.tests) and case in named):
-                break
+        for each in catchers:
             try:
-                trials.append((tested if mutant.tests else trial)(Path(folder), case))
+                trials.append((tested if mutant.tests else trial)(Path(folder), each))
             except subprocess.TimeoutExpired:
-                trials.append(Trial(case, False, f"not done after {LONGEST:g} s"))
+                trials.append(Trial(each, False, f"not done after {LONGEST:g} s"))
+            if trials[-1].caught and not (every or mutant.tests):
+                break
     return Hunt(mutant.id, tuple(trials))
 
 
@@ -283,9 +272,7 @@ def hunt_all(ids: Iterable[str], jobs: int, every: bool = False) -> list[Hunt]:
 
 def _lines(found: Hunt) -> list[str]:
     verdict = "caught" if found.caught_by else "SURVIVES"
-    return [f"{verdict:9} {found.mutant}"] + [
-        f"{'':10}{trial.case}: {trial.how}" for trial in found.trials
-        if trial.caught or trial.case in found.missed_by or trial.how != "passes"]
+    return [f"{verdict:9} {found.mutant}", *(f"{'':10}{trial.case}: {trial.how}" for trial in found.trials)]
 
 
 def judge(hunts: list[Hunt]) -> bool:
