@@ -1,7 +1,6 @@
 """``bench.json``: what the last benchmark has measured, for tables, pictures and pages.
 
-    {"machine": {"platform", "processor", "cores", "python", "versions": {package: version}, "repeats": {part: number},
-                 "date"},
+    {"machine": {"platform", "processor", "cores", "python", "versions": {package: version}, "threads", "date"},
      "parts": {name: {"title": what is measured, in words,
                       "error": what the error is,
                       "reference": where the reference comes from, and how converged it is,
@@ -58,7 +57,7 @@ def load(file: Path = FILE) -> dict:
 
 
 def machine() -> dict:
-    """What the times are of; the rest is filled in by the parts."""
+    """What the times are of."""
     return {"platform": platform.platform(), "processor": processor(), "cores": os.cpu_count(),
             "python": platform.python_version(), "versions": {name: version(name) for name in PACKAGES},
             "threads": os.environ.get("OMP_NUM_THREADS", "not set"), "date": date.today().isoformat()}
@@ -74,10 +73,9 @@ def processor(file: Path = Path("/proc/cpuinfo")) -> str:
     return names[0] if names else platform.processor() or "unknown"
 
 
-def merged(record: dict, parts: dict, repeats: dict) -> dict:
+def merged(record: dict, parts: dict) -> dict:
     """The record with new parts in place of those of the same names; verdicts are to be worked out again."""
-    about = {**machine(), "repeats": {**record["machine"].get("repeats", {}), **repeats}}
-    return {"machine": about, "parts": {**record["parts"], **parts}, "verdicts": []}
+    return {"machine": machine(), "parts": {**record["parts"], **parts}, "verdicts": []}
 
 
 def line(part: dict, method: str) -> dict | None:

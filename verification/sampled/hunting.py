@@ -14,7 +14,10 @@ import time
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
+from itertools import count
 from pathlib import Path
+
+import numpy as np
 
 from verification.kernel import writing
 from verification.kernel.writing import Block, append, lines, markdown, table
@@ -146,23 +149,18 @@ def _short(how: str) -> str:
 
 def within(tests: list[Measured], limit: float) -> list[Measured]:
     """The cheapest tests that together take no longer than a limit; one at least."""
-    total, chosen = 0.0, []
-    for test in tests:
-        total += test.seconds
-        if total > limit and chosen:
-            break
-        chosen.append(test)
-    return chosen
+    costs = np.cumsum([test.seconds for test in tests])
+    return tests[:max(1, int(np.searchsorted(costs, limit, "right")))]
 
 
-_PUT = [0]
+_STAMPS = count(10**9)
 
 
 def put(path: Path, text: str) -> None:
     """Write a module with a time of change that no compiled form of it has."""
-    _PUT[0] += 1
+    stamp = next(_STAMPS)
     path.write_text(text, encoding="utf-8")
-    os.utime(path, (10**9 + _PUT[0], 10**9 + _PUT[0]))
+    os.utime(path, (stamp, stamp))
 
 
 #: Survivors that no test can tell from the code, each with the reason, by (file of repro/, line or lines as they are,
@@ -252,35 +250,35 @@ def holds(found: dict[str, list[Row]]) -> bool:
     return bool(counted) and len(found["caught"]) >= CAUGHT * counted and len(found["equivalent"]) <= EXCUSED * total
 
 
-def told(found: dict[str, list[Row]], count: int) -> str:
+def told(found: dict[str, list[Row]], wanted: int) -> str:
     """The numbers in one sentence or two."""
     total = sum(map(len, found.values()))
     counted = total - len(found["equivalent"])
     share = 100 * len(found["caught"]) / counted if counted else 0.0
-    return (f"{total} of {count} mutants tried, seed {SEED}: {len(found['caught'])} caught, {len(found['timeout'])} "
+    return (f"{total} of {wanted} mutants tried, seed {SEED}: {len(found['caught'])} caught, {len(found['timeout'])} "
             f"without end (timeouts), {len(found['survivor'])} survive, {len(found['equivalent'])} shown equivalent. "
             f"Caught of those not shown equivalent: {share:.1f} % (at least {100 * CAUGHT:g} %).")
 
 
-def record(rows: list[Row], count: int) -> int:
+def record(rows: list[Row], wanted: int) -> int:
     """Write both files; 0 if the mutants are caught as they are to be."""
     found = judged(rows)
-    print(told(found, count))
+    print(told(found, wanted))
     for row in [*found["survivor"], *found["timeout"]]:
         print(f"{row.verdict}: {row.file}:{row.line}: {row.old!r} -> {row.new!r} {row.how}")
-    if len(rows) == count:
+    if len(rows) == wanted:
         writing.save({"seed": SEED, "mutants": [asdict(row) for row in rows]}, RECORD)
-        PAGE.write_text(text(rows, count), encoding="utf-8")
-    return 0 if holds(found) and len(rows) == count else 1
+        PAGE.write_text(text(rows, wanted), encoding="utf-8")
+    return 0 if holds(found) and len(rows) == wanted else 1
 
 
-def text(rows: list[Row], count: int) -> str:
+def text(rows: list[Row], wanted: int) -> str:
     """The page."""
     found = judged(rows)
     survivors = [(*_changed(row), *LEFT.get(key(row), ("", "")), f"{row.tried} of {row.reached}")
                  for row in found["survivor"]]
     equivalent = [(*_changed(row), EQUIVALENT[key(row)]) for row in found["equivalent"]]
-    blocks = [Block("text", INTRODUCTION), Block("text", told(found, count)),
+    blocks = [Block("text", INTRODUCTION), Block("text", told(found, wanted)),
               *_section("Survivors", survivors, "effect", "why no test", "tests run"),
               *_section("Shown equivalent", equivalent, "why"),
               Block("heading", "By module"), table(("module", "mutants", "caught"), _counts(rows))]
