@@ -47,7 +47,7 @@ def blocks(record: dict) -> Iterator[Block]:
     yield Block("heading", "Hard cases")
     yield Block("text", "Right: the exact value, bound or conserved quantity of the case is met, and so are the "
                         "balances; refused: an error says which bound was met; wrong: anything else. `make verify` "
-                        "runs them all, and leaves every number in `verification/report/live/measured.json`; "
+                        "runs them all, and leaves every number in `verification/report/live`; "
                         "`python -m verification hard` runs them alone.")
     yield table(("", "case", "right is", *presets), (
         (str(case["number"]), case["title"], case["right_is"], *map(_shown, map(case["cells"].get, presets)))
