@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.sparse import coo_array
@@ -103,3 +104,21 @@ def test_walls_inlet_and_outlet_keep_their_lines_and_the_body_its_place(grid, al
     after = triangle_areas(points, grid.triangles)
     assert after.min() > 0 and after.sum() == pytest.approx(grid.areas.sum(), rel=1e-12)
     assert not grid.moved(points).turned_over().any()
+
+
+@pytest.mark.parametrize("film", [25.0, 10.0, 5.0, 2.0])
+def test_at_least_six_elements_lie_across_the_film(film):
+    """Lines across the film cross 11 to 16 triangles (measured), about two in each layer of nodes; none spans a
+    fourth of it."""
+    grid, _ = meshed(seed(50.0 - film))
+    for x in (-0.11, -0.05, 0.0137, 0.07, 0.13):
+        pieces = chords(grid, x)
+        assert pieces.sum() == pytest.approx(film, rel=1e-2)
+        assert len(pieces) >= 10 and pieces.max() <= film / 4
+
+
+def chords(grid, x):
+    """Lengths of the pieces that the triangles of the fluid hold of the vertical line at x."""
+    fluid = shapely.polygons(grid.points[grid.triangles[~grid.biomass]])
+    pieces = shapely.length(shapely.intersection(fluid, shapely.LineString([(x, 0.0), (x, grid.width)])))
+    return pieces[pieces > 0]

@@ -33,7 +33,6 @@ RECORD = Path(__file__).parent / "report" / "audit.json"
 REPEATS = 3
 #: Times (h) at which the lean of an uneven seed is told.
 TIMES = (0.4, 4.8, 9.6, 14.4, PLOTTED)
-LABELS = [f"{time:g} h" for time in TIMES]
 METHOD = (f"base, preset paper, at {PLOTTED:g} h in steps of {60 * UPDATE:g} min; "
           "effect: difference of two whole runs, relative, effluents over the supply, flow and substrates of both last "
           "shapes on the default's mesh (extent: of the converged solution, as they are); one_state: both choices in "
@@ -57,8 +56,9 @@ def main() -> int:
 def mesh() -> dict:
     """What runs differ by on meshes of the same fineness to 2.5 %: the largest of each quantity."""
     found = _worst([switches.whole_run(state(BASE), state(switch.run)) for switch in switches.FINENESS])
-    return row("mesh", "refinement 1", "refinement 0.975 to 0.995", cost(switches.FINENESS[-1].run, 1), found,
-               "no choice: what runs on meshes of the same fineness differ by; less than twice that is not resolved")
+    told = Switch("mesh", "refinement 1", "refinement 0.975 to 0.995", "", note="no choice: what runs on meshes of the "
+                  "same fineness differ by; less than twice that is not resolved")
+    return row(told, cost(switches.FINENESS[-1].run, 1), found)
 
 
 def _worst(effects: list[dict[str, float]]) -> dict[str, float]:
@@ -71,10 +71,9 @@ def measured(switch: Switch, ratio: float) -> dict:
     print(f"{switch.choice}: {switch.alternative}", file=sys.stderr, flush=True)
     if not switch.meshes:
         effects, noise = switches.converged(switch)
-        return {**row(switch.choice, switch.default, switch.alternative, ratio, effects, switch.note), "noise": noise}
+        return {**row(switch, ratio, effects), "noise": noise}
     default, other = state(BASE), state(switch.run)
-    told = row(switch.choice, switch.default, switch.alternative, ratio, switches.whole_run(default, other),
-               switch.note)
+    told = row(switch, ratio, switches.whole_run(default, other))
     return {**told, "one_state": switches.one_state(default, other.scene) if switch.state else {}}
 
 
@@ -97,8 +96,8 @@ def drift() -> dict:
     other = switches.course(BASE, switches.restarting_as_j)
     drifts = {name: float(found["drift"].max()) for name, found in
               (("default", switches.columns(BASE)), ("alternative", other.columns))}
-    told = _marched("theta after a remesh (28)", "J X / X_m", "J", other, "drift, max |X / X_m - 1| over the "
-                    f"run: {drifts['default']:.2g} against {drifts['alternative']:.2g} [E7]")
+    note = f"drift, max |X / X_m - 1| over the run: {drifts['default']:.2g} against {drifts['alternative']:.2g} [E7]"
+    told = _marched(other, Switch("theta after a remesh (28)", "J X / X_m", "J", "", note=note))
     return {**told, "drift": drifts}
 
 
@@ -107,25 +106,22 @@ def symmetry() -> list[dict]:
     plain, rows = switches.columns(BASE), []
     for word, seed in (("upstream", switches.longer_upstream), ("downstream", switches.longer_downstream)):
         other = switches.course(BASE, switches.as_it_is, seed)
-        lean, speed = (switches.near(other.columns, name, TIMES) for name in ("lean", "velocity"))
-        lean = dict(zip(LABELS, map(float, lean - switches.near(plain, "lean", TIMES))))
-        told = _marched("symmetry of the seed", "half-disc", f"1 % longer {word}", other,
-                        "R (1 + 0.01 cos 3 phi), area as before; the middle between the tips is off by "
-                        + ", ".join(f"{100 * value:+.2f} % at {time}" for time, value in lean.items()))
-        apart = dict(zip(LABELS, map(float, speed / switches.near(plain, "velocity", TIMES) - 1)))
-        rows.append({**told, "lean_over_time": lean, "velocity_over_time": apart})
+        lean = switches.near(other.columns, "lean", TIMES) - switches.near(plain, "lean", TIMES)
+        off = ", ".join(f"{100 * value:+.2f} % at {time:g} h" for value, time in zip(lean, TIMES))
+        rows.append(_marched(other, Switch(
+            "symmetry of the seed", "half-disc", f"1 % longer {word}", "",
+            note=f"R (1 + 0.01 cos 3 phi), area as before; the middle between the tips is off by {off}")))
     return rows
 
 
-def _marched(choice: str, default: str, alternative: str, other: Course, note: str) -> dict:
-    return row(choice, default, alternative, other.seconds / seconds(PLATES),
-               switches.whole_run(state(BASE), other.plotted), note)
+def _marched(other: Course, switch: Switch) -> dict:
+    return row(switch, other.seconds / seconds(PLATES), switches.whole_run(state(BASE), other.plotted))
 
 
-def row(choice: str, default: str, alternative: str, ratio: float, effects: dict[str, float], note: str) -> dict:
+def row(switch: Switch, ratio: float, effects: dict[str, float]) -> dict:
     """A row of the record."""
-    return {"choice": choice, "default": default, "alternative": alternative, "cost_ratio": ratio, "effect": effects,
-            "one_state": {}, "largest": largest(effects), "note": note}
+    return {"choice": switch.choice, "default": switch.default, "alternative": switch.alternative, "cost_ratio": ratio,
+            "effect": effects, "one_state": {}, "note": switch.note}
 
 
 def largest(effects: dict[str, float]) -> str:

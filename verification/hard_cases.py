@@ -42,20 +42,16 @@ def record(results: Iterable) -> None:
 
 
 def blocks(record: dict) -> Iterator[Block]:
-    """The matrix, and why cells are not right."""
-    cells = [(case, preset, cell) for case in record["cases"] for preset, cell in case["cells"].items()]
+    """The matrix."""
     presets = tuple(record["cases"][0]["cells"])
     yield Block("heading", "Hard cases")
     yield Block("text", "Right: the exact value, bound or conserved quantity of the case is met, and so are the "
                         "balances; refused: an error says which bound was met; wrong: anything else. `make verify` "
-                        "runs them all, and leaves every number in `verification/report/hard.html`; "
+                        "runs them all, and leaves every number in `verification/report/live`; "
                         "`python -m verification hard` runs them alone.")
     yield table(("", "case", "right is", *presets), (
         (str(case["number"]), case["title"], case["right_is"], *map(_shown, map(case["cells"].get, presets)))
         for case in record["cases"]))
-    yield table(("case", "preset", "why it is not right"), (
-        (str(case["number"]), preset, cell["message"]) for case, preset, cell in cells if cell.get("message")),
-        detail=True)
 
 
 def _shown(cell: dict | None) -> str:

@@ -1,5 +1,5 @@
-"""Speed against error, told in ``docs/performance.md``, in the README, which has the presets alone, and on a page of
-the report, all from what was measured.
+"""Speed against error, told in ``docs/performance.md`` and in the README, which has the presets alone, from what was
+measured.
 
 ``python -m verification.speed`` writes them from ``bench.json`` (`make bench`), ``audit.json`` (`make bench`) and
 ``hard_cases.json`` (`make verify`) in ``verification/report``. A section in Markdown stands between two marks and is
@@ -14,8 +14,7 @@ from pathlib import Path
 from verification import audit, hard_cases
 from verification.bench import runs, told
 from verification.bench.record import line
-from verification.kernel import writing
-from verification.kernel.writing import Block, Link, load, markdown, table
+from verification.kernel.writing import Block, load, markdown, table
 
 FOLDER = Path(__file__).parent / "report"
 ROOT = Path(__file__).parents[1]
@@ -25,16 +24,13 @@ QUANTITIES = ("velocity", "conductivity", "area", "thickness", "upstream", "down
 PAPER_AS_IT_IS = "refinement 1, 12 min"
 
 
-def records(live: bool = False) -> dict[str, dict]:
-    """What was measured, by name; empty where nothing was; live: the hard cases' numbers too, where this machine has
-    run them."""
-    names = {name: f"{name}.json" for name in ("bench", "audit", "hard_cases")}
-    found = {name: load(FOLDER / file, {}) for name, file in names.items()}
-    return {name: load(FOLDER / "live" / file, found[name]) for name, file in names.items()} if live else found
+def records() -> dict[str, dict]:
+    """What was measured, by name; empty where nothing was."""
+    return {name: load(FOLDER / f"{name}.json", {}) for name in ("bench", "audit", "hard_cases")}
 
 
 def blocks(found: dict[str, dict]) -> Iterator[Block]:
-    """All that is told; ``detail``: on the page alone."""
+    """All that is told."""
     for name, tell in {"bench": _bench, "hard_cases": hard_cases.blocks, "audit": audit.blocks}.items():
         if found[name]:
             yield from tell(found[name])
@@ -61,8 +57,6 @@ def _bench(record: dict) -> Iterator[Block]:
         yield Block("text", f"The presets on base. Error: {part['error']}. Reference: {part['reference']}.")
         yield table((*PRESETS, *QUANTITIES), _presets(part))
     yield told.verdicts(record["verdicts"])
-    for name, other in record["parts"].items():
-        yield from told.blocks(name, other)
 
 
 def _presets(part: dict) -> Iterator[tuple[str, ...]]:
@@ -72,12 +66,6 @@ def _presets(part: dict) -> Iterator[tuple[str, ...]]:
     for name, point in {"paper": slow, **measured}.items():
         errors = (f"{100 * error:.2g} %" for error in (point["error"], *point["errors"]))
         yield (name, f"{point['seconds']:.2f}", f"{slow['seconds'] / point['seconds']:.1f} times", *errors)
-
-
-def page(found: list[Block]) -> str:
-    """The page of the report."""
-    back = table((Link("All cases", "index"),), ())
-    return writing.page("Speed against error, hard cases, assumptions", [back, *found])
 
 
 def pages_of(found: dict[str, dict]) -> dict[Path, str]:
@@ -95,14 +83,8 @@ def within(text: str, section: str) -> str:
 
 def main() -> None:
     """Write all of them."""
-    write_page()
     for file, section in pages_of(records()).items():
         file.write_text(within(file.read_text(encoding="utf-8"), section), encoding="utf-8")
-
-
-def write_page(*_: object) -> None:
-    """Write the page, also after a whole verification run, whose hard cases it tells."""
-    (FOLDER / "speed.html").write_text(page(list(blocks(records(live=True)))), encoding="utf-8")
 
 
 if __name__ == "__main__":

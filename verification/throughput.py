@@ -1,62 +1,55 @@
-"""Rate of a sweep against that of single runs: ``python -m verification.throughput [--runs N] [--repeats N]``.
+"""Rate of a sweep against that of single runs: ``python -m verification.throughput [--repeats N]``.
 
 A single run's rate is that of the same runs, one after the other in one process that has imported everything (the
 median of several, before and after the sweep); the sweep's is that of 200 short runs on all cores, from an empty folder
 to the page, starting of processes included. Wanted: 0.95 times the number of cores, judged with base in `fast`, less
-than half a second a run; in `accurate`, a second or two a run, a fifth as many runs are made, which is told and not
-judged. A control: processor time of single runs over that of a run in the sweep, which what others do on the machine
-changes little. Exit status 1 where the sweep falls short, or a command costs more than it may: `repro --help` twice the
-import of NumPy, and a run of base 1.3 times the import of the packages that it needs and the same run in a process that
-has imported them, each the best of five. Under four minutes on two free cores.
+than half a second a run. Exit status 1 where the sweep falls short, or a command costs more than it may: `repro --help`
+twice the import of NumPy, and a run of base 1.3 times the import of the packages that it needs and the same run in a
+process that has imported them, each the best of five. Under four minutes on two free cores.
 """
 
 from __future__ import annotations
 
 import argparse
-import resource
 import subprocess
 import sys
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
-from time import perf_counter, process_time
+from time import perf_counter
 
 from repro import load_scene, run
 from repro.cli import main as repro
 from repro.sweep.pool import cores
 
 WANTED = 0.95
+#: Presets: of the sweep, and of the commands.
 JUDGED, TOLD = "fast", "accurate"
+RUNS = 200  # of the sweep
 SINGLE = 10  # runs before the sweep, and after it
 PACKAGES = "numpy, scipy.sparse.linalg, skfem, mmgpy, shapely"  # that a run needs
 WIDTHS = "48:52 um"  # nearly the same run each time
 
 
-def runs(preset: str, count: int, folder: Path) -> list[tuple[float, float]]:
-    """(seconds, processor time) of every run in this process, one after the other, into a folder that is not there."""
+def runs(preset: str, count: int, folder: Path) -> list[float]:
+    """Seconds of every run in this process, one after the other, into a folder that is not there."""
     found = []
     for k in range(count):
         scene = load_scene("base", [f"numerics.preset={preset}", f"pore.width={48 + 4 * k / max(count - 1, 1)!r} um"])
-        start, spent = perf_counter(), process_time()
+        start = perf_counter()
         run(scene, folder / f"{k}")
-        found.append((perf_counter() - start, process_time() - spent))
+        found.append(perf_counter() - start)
     return found
 
 
-def processors() -> float:
-    """Processor time (s) of this process, and of those that it has waited for."""
-    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    return sum(each.ru_utime + each.ru_stime for each in used)
-
-
-def swept(preset: str, count: int, folder: Path) -> tuple[float, float]:
-    """Runs a second of a sweep, and runs a second of processor time."""
-    start, spent = perf_counter(), processors()
+def swept(preset: str, count: int, folder: Path) -> float:
+    """Runs a second of a sweep."""
+    start = perf_counter()
     status = repro(["sweep", "base", "--vary", f"pore.width={WIDTHS}:linear:{count}", "--quiet",
                     "--set", f"numerics.preset={preset}", "--out", str(folder / "sweep")])
     if status:
         raise RuntimeError(f"the sweep ended with status {status}")
-    return count / (perf_counter() - start), count / (processors() - spent)
+    return count / (perf_counter() - start)
 
 
 def measure(preset: str, count: int) -> float:
@@ -64,15 +57,10 @@ def measure(preset: str, count: int) -> float:
     with TemporaryDirectory() as folder:
         runs(preset, 1, Path(folder, "first"))
         before = runs(preset, SINGLE, Path(folder, "before"))
-        rate, spent = swept(preset, count, Path(folder))
-        after = runs(preset, SINGLE, Path(folder, "after"))
-    wall, processor = map(median, zip(*before, *after))
-    one = cores() / wall
-    print(f"{preset}, {cores()} cores; single {1 / median(wall for wall, _ in before):.3f} and "
-          f"{1 / median(wall for wall, _ in after):.3f} runs/s (before, after); sweep of {count} {rate:.3f}, "
-          f"{rate / one:.3f} times cores times single; processor time of single runs {spent * processor:.3f} of that "
-          "in the sweep", flush=True)
-    return rate / one
+        rate = swept(preset, count, Path(folder))
+        single = 1 / median(before + runs(preset, SINGLE, Path(folder, "after")))
+    print(f"{preset}, {cores()} cores: single {single:.3f} runs/s, sweep of {count} {rate:.3f}", flush=True)
+    return rate / single / cores()
 
 
 def fresh(*arguments: str) -> float:
@@ -87,7 +75,7 @@ def fresh(*arguments: str) -> float:
 
 def warm(preset: str, folder: Path) -> float:
     """Seconds of a run of base in this process, files and page included: the best of five."""
-    return min(runs(preset, 1, folder / f"{k}")[0][0] for k in range(5))
+    return min(runs(preset, 1, folder / f"{k}")[0] for k in range(5))
 
 
 def commands() -> dict[str, tuple[float, float]]:
@@ -105,20 +93,16 @@ def commands() -> dict[str, tuple[float, float]]:
 def main(arguments: list[str] | None = None) -> int:
     """Measure and judge the median of the repeats."""
     parser = argparse.ArgumentParser(prog="python -m verification.throughput", description=__doc__.partition(":")[0])
-    parser.add_argument("--runs", type=int, default=200)
     parser.add_argument("--repeats", type=int, default=1)
     chosen = parser.parse_args(arguments)
-    counts = {JUDGED: chosen.runs, TOLD: max(chosen.runs // 5, 1)}
-    found = {}
-    for preset, count in counts.items():
-        found[preset] = median(measure(preset, count) for _ in range(chosen.repeats))
-    holds = found[JUDGED] >= WANTED
+    found = median(measure(JUDGED, RUNS) for _ in range(chosen.repeats))
+    holds = found >= WANTED
     costs = commands()
     for command, (ratio, most) in costs.items():
         print(f"{command}: {ratio:.2f} times what it cannot do without, {most} accepted: "
               f"{'holds' if ratio <= most else 'does not hold'}")
-    print(f"throughput of the sweep over cores times a single run's rate: {found[JUDGED]:.3f} in {JUDGED}, "
-          f"{WANTED} wanted: {'holds' if holds else 'does not hold'}; {found[TOLD]:.3f} in {TOLD}")
+    print(f"throughput of the sweep over cores times a single run's rate: {found:.3f} in {JUDGED}, {WANTED} wanted: "
+          f"{'holds' if holds else 'does not hold'}")
     return 0 if holds and all(ratio <= most for ratio, most in costs.values()) else 1
 
 

@@ -7,24 +7,21 @@ from __future__ import annotations
 
 import argparse
 from importlib import import_module
-from time import perf_counter
 
 from verification.bench import record, told
 from verification.kernel.writing import plain, save
 
 #: Modules of the parts; that of other codes is imported for its own alone.
-PARTS = {"flow": "stages", "transport": "stages", "box": "users", "channel": "users", "growth": "stages",
-         "transfer": "stages", "base": "runs", "size": "runs", "scenes": "runs", "memory": "runs"}
+PARTS = {"box": "users", "channel": "users", "base": "runs", "size": "runs", "scenes": "runs", "memory": "runs"}
 
 
 def main(arguments: list[str] | None = None) -> dict:
     """Run the parts; the record as it is then."""
     parser = argparse.ArgumentParser(prog="python -m verification.bench", description=__doc__.split("\n\n")[0])
-    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}; all by default")
+    parser.add_argument("parts", nargs="*", metavar="PART", choices=[*PARTS, []], default=[],
+                        help=f"of {', '.join(PARTS)}; all by default")
     parser.add_argument("--quick", action="store_true", help="small versions, nothing is written")
     given = parser.parse_args(arguments)
-    if strange := set(given.parts) - set(PARTS):
-        parser.error(f"{', '.join(sorted(strange))}: parts are {', '.join(PARTS)}")
     return measure(given.parts or PARTS, given.quick)
 
 
@@ -33,10 +30,8 @@ def measure(names, quick: bool) -> dict:
     found = record.empty() if quick else record.load()
     print(plain([told.machine(record.machine())]))
     for name in names:
-        start = perf_counter()
         part = getattr(import_module(f"verification.bench.{PARTS[name]}"), f"{name}_part")(quick)
-        part["took_seconds"] = perf_counter() - start
-        found = record.merged(found, {name: part}, {name: part.get("repeats", 1)})
+        found = record.merged(found, {name: part})
         found["verdicts"] = told.judged(found)
         print(plain(told.blocks(name, part)), flush=True)
         if not quick:

@@ -1,7 +1,6 @@
 """``bench.json``: what the last benchmark has measured, for tables, pictures and pages.
 
-    {"machine": {"platform", "processor", "cores", "python", "versions": {package: version}, "repeats": {part: number},
-                 "date"},
+    {"machine": {"platform", "processor", "cores", "python", "versions": {package: version}, "threads", "date"},
      "parts": {name: {"title": what is measured, in words,
                       "error": what the error is,
                       "reference": where the reference comes from, and how converged it is,
@@ -9,17 +8,14 @@
                                  "points": [{"label": sizes and steps, "seconds": median wall time, "cpu": median
                                              processor time, "error": relative, "repeats": number, ...}],
                                  "failed": [{"label": ..., "reason": ...}]}],
-                      "apart": [{"what": ..., "seconds": ...}],        times that no point includes
                       ...}},                                           what is a part's own
      "verdicts": [{"claim": ..., "measured": ..., "wanted": ..., "holds": true, false or null (not measured)}]}
 
-What a part has of its own: points of flow, transport, growth and transfer "nodes", those of transfer "drift" (of the
-total) and "beyond" (the field's bounds), those of base "nodes", "errors" (of the eight numbers, the larger of both
-times) and "stages" {stage: s}; base "wide" [{"preset", "seconds", "cpu", "steps", "end"}] and, kept from one benchmark
-to the next, "reference_values" [time][number]; size, whose points have no error, "stages", "ratio" (to the floor) and
-"memory_MB" of each, and "fits" {method: {stage: exponent}}; scenes "rows" [{"scene", "method", "seconds", "cpu",
-"stages": {stage: s}, ...}] and "steps" [{"method", "seconds", "hours"}]; memory "rows" [{"method", "steps", "slope",
-"bound", ...}]. A part that was not run again keeps what it had. Not-a-number is never written.
+What a part has of its own: points of base "errors" (of the eight numbers, the larger of both times); base "wide"
+[{"preset", "seconds", "cpu", "steps", "end"}] and, kept from one benchmark to the next, "reference_values"
+[time][number]; size, whose points have no error, "nodes", "stages" {stage: s} and "ratio" (to the floor); scenes "rows"
+[{"scene", "method", "seconds", "cpu", "stages", "took", "unneeded"}]; memory "rows" [{"method", "steps", "slope",
+"bound"}]. A part that was not run again keeps what it had. Not-a-number is never written.
 
 How it is measured: jobs are timed side by side, each round runs all of them once, so that whatever else the machine
 does hits all alike. How it is read: the best speed of a method is the lower envelope of its points, between and beyond
@@ -32,9 +28,8 @@ import gc
 import os
 import platform
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import date
-from functools import partial
 from importlib.metadata import version
 from math import exp, isfinite, log
 from operator import itemgetter
@@ -62,7 +57,7 @@ def load(file: Path = FILE) -> dict:
 
 
 def machine() -> dict:
-    """What the times are of; the rest is filled in by the parts."""
+    """What the times are of."""
     return {"platform": platform.platform(), "processor": processor(), "cores": os.cpu_count(),
             "python": platform.python_version(), "versions": {name: version(name) for name in PACKAGES},
             "threads": os.environ.get("OMP_NUM_THREADS", "not set"), "date": date.today().isoformat()}
@@ -78,10 +73,9 @@ def processor(file: Path = Path("/proc/cpuinfo")) -> str:
     return names[0] if names else platform.processor() or "unknown"
 
 
-def merged(record: dict, parts: dict, repeats: dict) -> dict:
+def merged(record: dict, parts: dict) -> dict:
     """The record with new parts in place of those of the same names; verdicts are to be worked out again."""
-    about = {**machine(), "repeats": {**record["machine"].get("repeats", {}), **repeats}}
-    return {"machine": about, "parts": {**record["parts"], **parts}, "verdicts": []}
+    return {"machine": machine(), "parts": {**record["parts"], **parts}, "verdicts": []}
 
 
 def line(part: dict, method: str) -> dict | None:
@@ -94,86 +88,58 @@ def line(part: dict, method: str) -> dict | None:
 SHORT, LONG = 0.3, 4.0
 
 
-@dataclass
-class Timed:
-    """What a job took, run by run, and what it returned last: a dictionary with its "error" and whatever else; took:
-    the wall time of its last run, whatever is left out of it."""
-
-    seconds: list[float] = field(default_factory=list)
-    cpu: list[float] = field(default_factory=list)
-    found: dict = field(default_factory=dict)
-    reason: str = ""
-    took: float = 0.0
-
-    def run(self, job: Callable[[], dict]) -> None:
-        """Once more; a job that fails says why, and is not run again."""
-        gc.collect()
-        wall, spent = perf_counter(), process_time()
-        try:
-            found = job()
-        except Exception as error:
-            self.reason = f"{type(error).__name__}: {error}"
-            return
-        wall, spent = perf_counter() - wall, process_time() - spent
-        self.took = wall
-        self.found = found() if callable(found) else found
-        self.seconds.append(wall - self.found.get("apart_seconds", 0.0))
-        self.cpu.append(spent - self.found.get("apart_cpu", 0.0))
-        if not isfinite(self.found.get("error", 0.0)):
-            self.reason = "its error is not a number"
-
-
 Jobs = Mapping[tuple[str, str], Callable[[], dict]]
 
 
 def measured(jobs: Jobs, repeats: int) -> list[dict]:
     """Lines of a part from jobs {(method, label): job}, in the order in which methods first come.
 
-    A job returns {"error": ..., ...}, or a function that returns it and is not timed; "apart_seconds" and
-    "apart_cpu" of it are taken off.
+    A job returns {"error": ..., ...}, of which "apart_seconds" and "apart_cpu" are taken off its times. One that fails
+    says why, and is not run again.
     """
-    times = {key: Timed() for key in jobs}
-    for key, job in jobs.items():
-        times[key].run(job)
-    wanted = {key: _often(timed, repeats) for key, timed in times.items()}
-    for _ in range(repeats):
+    samples: dict[tuple[str, str], list] = {key: [] for key in jobs}
+    wanted = dict.fromkeys(jobs, repeats)
+    failed = {}
+    for turn in range(repeats + 1):
         for key, job in jobs.items():
-            if not times[key].reason and len(times[key].seconds) < wanted[key]:
-                times[key].run(job)
-    return _lines(times)
-
-
-def series(method: str, label: str, sizes: Iterable, job: Callable, **how) -> Jobs:
-    """Jobs ``job(size, **how)`` of a method, one a size."""
-    return {(method, label.format(size)): partial(job, size, **how) for size in sizes}
-
-
-def part(title: str, error: str, reference: str, jobs: Jobs, repeats: int, once: Jobs | None = None, **more) -> dict:
-    """A part, measured; once: jobs that are run once; more: what else is told of it."""
-    lines = measured(jobs, repeats) + measured(once or {}, 1)
-    return {"title": title, "error": error, "reference": reference, "repeats": repeats, "lines": lines, **more}
-
-
-def _often(timed: Timed, repeats: int) -> int:
-    """How many runs are to be counted; that of a short job is forgotten."""
-    if timed.reason:
-        return 0
-    if timed.took < SHORT:
-        timed.seconds.clear()
-        timed.cpu.clear()
-    return repeats if timed.took < LONG else -(-repeats // 3)
-
-
-def _lines(times: Mapping[tuple[str, str], Timed]) -> list[dict]:
+            if key in failed or len(samples[key]) >= wanted[key]:
+                continue
+            try:
+                took, sample = _timed(job)
+            except Exception as error:
+                failed[key] = f"{type(error).__name__}: {error}"
+                continue
+            if took >= LONG:
+                wanted[key] = -(-repeats // 3)
+            if turn or took >= SHORT:
+                samples[key].append(sample)
     lines: dict[str, dict] = {}
-    for (method, label), timed in times.items():
+    for method, label in jobs:
         line = lines.setdefault(method, {"method": method, "points": [], "failed": []})
-        if timed.reason:
-            line["failed"].append({"label": label, "reason": timed.reason})
+        if (method, label) in failed:
+            line["failed"].append({"label": label, "reason": failed[method, label]})
         else:
-            line["points"].append({"label": label, "seconds": median(timed.seconds), "cpu": median(timed.cpu),
-                                   "repeats": len(timed.seconds), **timed.found})
+            seconds, cpu, found = zip(*samples[method, label])
+            line["points"].append({"label": label, "seconds": median(seconds), "cpu": median(cpu),
+                                   "repeats": len(cpu), **found[-1]})
     return list(lines.values())
+
+
+def _timed(job: Callable[[], dict]) -> tuple[float, tuple[float, float, dict]]:
+    """The wall time of a run; wall and processor time without what is apart, and what the job returns."""
+    gc.collect()
+    wall, spent = perf_counter(), process_time()
+    found = job()
+    wall, spent = perf_counter() - wall, process_time() - spent
+    if not isfinite(found.get("error", 0.0)):
+        raise ValueError("its error is not a number")
+    return wall, (wall - found.get("apart_seconds", 0.0), spent - found.get("apart_cpu", 0.0), found)
+
+
+def part(title: str, error: str, reference: str, jobs: Jobs, repeats: int, once: Jobs) -> dict:
+    """A part, measured; once: jobs that are run once."""
+    lines = measured(jobs, repeats) + measured(once, 1)
+    return {"title": title, "error": error, "reference": reference, "repeats": repeats, "lines": lines}
 
 
 @dataclass(frozen=True)
@@ -196,15 +162,6 @@ def envelope(points: Iterable[Mapping]) -> list[Mapping]:
     return kept
 
 
-def exponent(sizes, values) -> float:
-    """Least-squares p of values = c sizes^p; values that are zero are left out, not-a-number where under two remain."""
-    pairs = [(log(s), log(v)) for s, v in zip(sizes, values) if s > 0 and v > 0]
-    if len({x for x, _ in pairs}) < 2:
-        return float("nan")
-    x, y = np.array(pairs).T
-    return float(np.polyfit(x, y, 1)[0])
-
-
 def reading(points: Iterable[Mapping], error: float) -> Reading | None:
     """The least time for an error, by the envelope; None where nothing can be said.
 
@@ -221,8 +178,10 @@ def reading(points: Iterable[Mapping], error: float) -> Reading | None:
     if error >= errors[-1]:
         logs = (np.interp(-log(error), -np.log(errors), np.log(each)) for each in times)
         return Reading(*map(exp, logs), "between points")
-    slopes = [exponent(errors, each) for each in times]
-    if not all(s < 0 for s in slopes):
+    if len(kept) < 2:
+        return None
+    slopes = [float(np.polyfit(np.log(errors), np.log(each), 1)[0]) for each in times]
+    if max(slopes) >= 0:
         return None
     found = (each[-1] * (error / errors[-1]) ** s for each, s in zip(times, slopes))
     return Reading(*found, f"extrapolated with slope {slopes[0]:.2f}")

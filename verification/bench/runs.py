@@ -4,21 +4,14 @@ steps, and cost against size."""
 from __future__ import annotations
 
 import gc
-import json
-import resource
-import subprocess
-import sys
 import tracemalloc
 from dataclasses import replace
 from functools import partial
-from itertools import islice
-from math import isnan
 from operator import itemgetter
-from pathlib import Path
-from statistics import median
 from time import perf_counter, process_time
 
 import numpy as np
+from scipy.stats import theilslopes
 
 from reference import whole_run
 from repro import timing
@@ -27,7 +20,7 @@ from repro.model import pore
 from repro.results import row
 from repro.scene import load_scene, parse_scene
 from verification.bench import record
-from verification.bench.record import exponent, measured
+from verification.bench.record import measured
 from verification.claims.runs import until
 from verification.kernel.case import columns
 from verification.problems import runs as problems
@@ -107,21 +100,15 @@ def jobs(truth: np.ndarray, times, quick: bool) -> dict:
 
 def simulated(truth, times, *overrides: str):
     """Run base; the error of the last rows."""
-    timing.reset()
-    rows = base_rows(times, *overrides)
-    errors = apart(values(rows), truth).max(axis=0).tolist()
-    return {"error": max(errors), "nodes": rows[-1]["nodes"], "stages": dict(timing.seconds), "errors": errors}
+    errors = apart(values(times, *overrides), truth).max(axis=0).tolist()
+    return {"error": max(errors), "errors": errors}
 
 
-def base_rows(times, *overrides: str) -> list[dict]:
-    """Rows of the table that a run of base writes, at some times (h), the last of them its end."""
+def values(times, *overrides: str) -> np.ndarray:
+    """(times, 8) of COLUMNS of the table that a run of base writes, at some times (h), the last of them its end."""
     scene = load_scene("base", [*overrides, *until(*times)])
-    return [row(scene, instant) for instant in simulate(scene)][-len(times):]
-
-
-def values(rows: list[dict]) -> np.ndarray:
-    """(times, 8) of COLUMNS."""
-    return np.array([itemgetter(*COLUMNS)(line) for line in rows])
+    rows = [row(scene, instant) for instant in simulate(scene)]
+    return np.array([itemgetter(*COLUMNS)(each) for each in rows[-len(times):]])
 
 
 def apart(found, truth) -> np.ndarray:
@@ -147,11 +134,11 @@ def reference(times) -> tuple[list, dict]:
         "reference": f"scikit-fem's quadratic elements in moving coordinates, Runge-Kutta in time, extrapolated from "
                      f"{CHECK[0]} rings and {CHECK[1]} steps; from {REFERENCE[0]} and {REFERENCE[1]} they differ by "
                      f"{change:.1e}",
-        "reference_change": change, "reference_times": list(times), "reference_values": check.tolist()}
+        "reference_times": list(times), "reference_values": check.tolist()}
 
 
 def _short(times) -> tuple[list, dict]:
-    found = values(base_rows(times, "numerics.preset=accurate"))
+    found = values(times, "numerics.preset=accurate")
     return found.tolist(), {"reference": "preset accurate: a quick look, no reference"}
 
 
@@ -162,13 +149,9 @@ def _skfem(truth, times, rings: int, steps: int):
 def wide() -> list[dict]:
     """Seconds of wide in preset fast, to 45 h, one run."""
     wall, spent = perf_counter(), process_time()
-    try:
-        instants = [(instant.pore.time, len(instant.pore.mesh.points)) for instant in simulate(
-            load_scene("wide", ["numerics.preset=fast"]))]
-    except Exception as failure:
-        return [{"preset": "fast", "failed": f"{type(failure).__name__}: {failure}"}]
+    times = [instant.pore.time for instant in simulate(load_scene("wide", ["numerics.preset=fast"]))]
     return [{"preset": "fast", "seconds": perf_counter() - wall, "cpu": process_time() - spent,
-             "steps": len(instants) - 1, "end": instants[-1][0], "nodes": instants[-1][1]}]
+             "steps": len(times) - 1, "end": times[-1]}]
 
 
 SCENES_REPEATS = 31
@@ -180,22 +163,20 @@ SCENES = {"whole": ({**FLOW, **SUBSTRATES, **GROWTH}, {"flow", "transport"}),
           "frozen shape": ({**FLOW, **SUBSTRATES}, {"flow", "transport"}),
           "flow only": (FLOW, {"flow"}), "transport only": (SUBSTRATES, {"transport"})}
 SCENE_PRESETS = ("paper", "fast", "accurate")
-FEW_STEPS = 3
 
 
 def scenes_part(quick: bool) -> dict:
     """What a scene does not need costs nothing: its own stages, and no more, take time.
 
     Base with a seed of 20 um as it is, and without growth (its shape is frozen), without flow, and without substrates:
-    the time of a first solution, mesh included, of each, and of a step of the whole.
+    the time of a first solution, mesh included, of each.
     """
     repeats = 3 if quick else SCENES_REPEATS
     jobs = {(preset, name): partial(first, preset, name) for preset in SCENE_PRESETS for name in SCENES}
     rows = [{"scene": point["label"], "method": f"preset {line['method']}", **point}
             for line in measured(jobs, repeats) for point in line["points"]]
-    steps = [step(preset) for preset in SCENE_PRESETS]
-    return {"title": "What a scene does not need: seconds of a first solution, mesh included, and of a growth step",
-            "rows": rows, "steps": steps, "repeats": repeats}
+    return {"title": "What a scene does not need: seconds of a first solution, mesh included", "rows": rows,
+            "repeats": repeats}
 
 
 def scene_of(preset: str, name: str):
@@ -208,22 +189,10 @@ def first(preset: str, name: str) -> dict:
     """The first instant of a run: mesh and solution."""
     timing.reset()
     start = perf_counter()
-    instant = next(iter(simulate(scene_of(preset, name))))
+    next(iter(simulate(scene_of(preset, name))))
     took = perf_counter() - start
     stages = {stage: timing.seconds[stage] for stage in STAGES if timing.seconds.get(stage, 0.0) > 0}
-    return {"stages": stages, "took": took, "nodes": len(instant.pore.mesh.points),
-            "unneeded": sorted(set(stages) - SCENES[name][1] - {"meshing"})}
-
-
-def step(preset: str) -> dict:
-    """Median seconds of a step of the whole, as long as the preset makes it."""
-    marks, times = [], []
-    for instant in islice(simulate(scene_of(preset, "whole")), FEW_STEPS + 1):
-        marks.append(perf_counter())
-        times.append(instant.pore.time)
-    lengths = [b - a for a, b in zip(times, times[1:])]
-    return {"method": f"preset {preset}", "seconds": median(b - a for a, b in zip(marks, marks[1:])),
-            "hours": median(lengths)}
+    return {"stages": stages, "took": took, "unneeded": sorted(set(stages) - SCENES[name][1] - {"meshing"})}
 
 
 #: Steps, the length of one (h), and the part of them that is not looked at.
@@ -259,97 +228,55 @@ def grown(preset: str, refinement: float, steps: int) -> dict:
             live[count] = tracemalloc.get_traced_memory()[0]
     finally:
         tracemalloc.stop()
-    return {"method": f"preset {preset}", "steps": count, "nodes": nodes, "live_MB": float(live[-1]) / 2**20,
-            "slope": slope(live[round(WARM * steps):]), "bound": PART * 8 * nodes}
+    return {"method": f"preset {preset}", "steps": count, "slope": slope(live[round(WARM * steps):]),
+            "bound": PART * 8 * nodes}
 
 
 def slope(live) -> float:
     """Bytes a step: the median of the slopes between all pairs (Theil and Sen), which single jumps do not move."""
-    k, values = np.arange(len(live)), np.asarray(live, float)
-    i, j = np.triu_indices(len(live), 1)
-    return float(np.median((values[j] - values[i]) / (k[j] - k[i])))
+    return float(theilslopes(live).slope)
 
 
 #: Nodes wanted, and how many steps are timed after the first; none: the first is, with its orderings.
 SIZES = {600: 5, 2500: 3, 10_000: 2, 40_000: 1, 160_000: 0}
-QUICK = {300: 1, 600: 1}
+QUICK = {300: 1}
 #: Preset, and derivatives of Newton's methods: those used again make the floor lower, and the step.
 METHODS = {"preset paper": "paper fresh", "order 2, midpoint (accurate)": "accurate reused",
            "order 2, midpoint, fresh derivatives": "accurate fresh"}
 STAGES = ("flow", "transport", "growth", "mesh motion", "meshing", "transfer")
 FLOOR = "factorise and solve"
 RADIUS, STEP = 20.0, 0.2
-LIMIT = 240.0
-#: The first guess of the refinement for so many nodes: c nodes^p, fitted to a few of them.
-FIRST = {"paper": (0.0265, 0.526), "accurate": (0.0109, 0.544)}
+#: The refinement for so many nodes: c nodes^p, fitted to a few of them.
+REFINED = {"paper": (0.0265, 0.526), "accurate": (0.0109, 0.544)}
 
 
 def size_part(quick: bool) -> dict:
-    """Cost against size: one growth step of 12 min of an aggregate of 20 um, by stage, and the memory that it takes.
+    """Cost against size: one growth step of 12 min of an aggregate of 20 um, by stage.
 
-    Each size runs in a process of its own, with a limit of time; the first step, which orders the nodes, is left out
-    unless it is the only one. The floor of a step is what factorising and solving its linear systems takes.
+    The first step, which orders the nodes, is left out unless it is the only one. The floor of a step is what
+    factorising and solving its linear systems takes.
     """
-    lines, fits = [], {}
+    sizes = QUICK if quick else SIZES
+    lines = []
     for method, kind in METHODS.items():
-        points, failed = [], []
-        for nodes, steps in (QUICK if quick else SIZES).items():
-            found = in_a_process(kind, nodes, steps)
-            (failed if "reason" in found else points).append(found)
-        lines.append({"method": method, "points": points, "failed": failed})
-        fits[method] = exponents(points)
+        points = [measure(kind, nodes, steps) for nodes, steps in sizes.items()]
+        lines.append({"method": method, "points": points, "failed": []})
     return {"title": f"Cost of a growth step of 12 min, aggregate of {RADIUS:g} um in a pore of 50 um", "lines": lines,
-            "fits": fits, "repeats": "median of 5 steps (600 nodes) to 1; 160 000 nodes: the first step"}
+            "repeats": "median of 5 steps (600 nodes) to 1; 160 000 nodes: the first step"}
 
 
-def exponents(points: list[dict]) -> dict[str, float | None]:
-    """Exponents in the number of nodes of the whole, of each stage, and of the memory above that of the start."""
-    costs = [{"step": point["seconds"], "memory": point["memory_MB"], **point["stages"]} for point in points]
-    sizes, found = [point["nodes"] for point in points], {}
-    for name in ("step", "memory", *STAGES, FLOOR):
-        power = exponent(sizes, [cost.get(name, 0.0) for cost in costs])
-        found[name] = None if isnan(power) else power
-    return found
-
-
-def in_a_process(kind: str, nodes: int, steps: int) -> dict:
-    """:func:`measure` in a process of its own."""
-    label = f"{nodes} nodes"
-    try:
-        done = subprocess.run([sys.executable, "-m", __name__, kind, str(nodes), str(steps)], capture_output=True,
-                              text=True, timeout=LIMIT)
-    except subprocess.TimeoutExpired:
-        return {"label": label, "reason": f"more than {LIMIT:g} s"}
-    if done.returncode:
-        return {"label": label, "reason": (done.stderr.strip().splitlines() or ["no message"])[-1]}
-    return {"label": label, **json.loads(done.stdout)}
-
-
-def larger_seed(kind: str, refinement: float):
-    """Base with a larger seed."""
+def larger_seed(kind: str, nodes: int):
+    """Base with a larger seed, and a refinement that makes about so many nodes."""
     preset, jacobian = kind.split()
-    return load_scene("base", [f"numerics.preset={preset}", f"numerics.refinement={refinement}",
+    factor, power = REFINED[preset]
+    return load_scene("base", [f"numerics.preset={preset}", f"numerics.refinement={factor * nodes**power}",
                                f"numerics.jacobian={jacobian}", f"aggregate.radius={RADIUS} um"])
 
 
-def sized(kind: str, nodes: int):
-    """(scene, pore) of about so many nodes."""
-    factor, power = FIRST[kind.split()[0]]
-    refinement = factor * nodes**power
-    for _ in range(3):
-        given = larger_seed(kind, refinement)
-        now = pore.seeded(given)
-        count = len(now.mesh.points)
-        if abs(count / nodes - 1) < 0.1:
-            break
-        refinement *= (nodes / count) ** 0.5
-    return given, now
-
-
 def measure(kind: str, nodes: int, steps: int) -> dict:
-    """Seconds of a step and of its stages, their floor, and memory."""
-    before = _peak()
-    given, now = sized(kind, nodes)
+    """Seconds of a step and of its stages, and their floor."""
+    given = larger_seed(kind, nodes)
+    now = pore.seeded(given)
     solved = pore.solve(given, now)
     now = replace(now, concentrations=solved.concentrations)
     rows = []
@@ -365,20 +292,6 @@ def measure(kind: str, nodes: int, steps: int) -> dict:
     rows = rows[1:] or rows
     usual = columns([row for row in rows if not row["remeshed"]] or rows)
     middle = {name: float(np.median(column)) for name, column in usual.items()}
-    return {"seconds": middle["seconds"], "cpu": middle["cpu"], "nodes": len(now.mesh.points),
-            "stages": {name: middle[name] for name in (*STAGES, FLOOR)}, "ratio": middle["seconds"] / middle[FLOOR],
-            "memory_MB": _peak() - before, "repeats": len(usual["cpu"])}
-
-
-def _peak() -> float:
-    """Peak of the resident memory of this process so far, MB, as Linux tells it; elsewhere as getrusage does, which
-    on Linux counts what the process was forked from."""
-    try:
-        lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
-        return int(next(line for line in lines if line.startswith("VmHWM")).split()[1]) / 1024
-    except (OSError, StopIteration):
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-
-
-if __name__ == "__main__":
-    print(json.dumps(measure(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]))))
+    return {"label": f"{nodes} nodes", "seconds": middle["seconds"], "cpu": middle["cpu"],
+            "nodes": len(now.mesh.points), "stages": {name: middle[name] for name in (*STAGES, FLOOR)},
+            "ratio": middle["seconds"] / middle[FLOOR], "repeats": len(usual["cpu"])}

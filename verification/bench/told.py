@@ -14,11 +14,11 @@ from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from verification.bench import runs
 from verification.bench.record import Reading, envelope, reading
 from verification.bench.record import line as line_of
-from verification.kernel.report import labelled
 from verification.kernel.writing import Block, table
 
 #: (error, least ratio, aim) of the paper's scheme at its own best speed over a preset.
@@ -105,8 +105,6 @@ def _seconds(point: dict) -> str:
 
 def _wide(part: dict) -> tuple[str, bool]:
     run = part["wide"][0]
-    if "failed" in run:
-        return run["failed"], False
     return f"{_seconds(run)} to {run['end']:g} h, {run['steps']} steps", run["seconds"] <= WIDE
 
 
@@ -197,44 +195,28 @@ def verdicts(found: list[dict]) -> Block:
 
 
 def blocks(name: str, part: dict) -> list[Block]:
-    """A part with all its points, and its picture: on pages alone, and for a terminal."""
+    """A part with all its points, for a terminal."""
     told = "; ".join(f"{key}: {part[key]}" for key in ("error", "reference", "repeats") if key in part)
-    picture = [Block("picture", f"bench_{name}.svg: {part['title']}", detail=True)] if part.get("lines") else []
-    return [Block("heading", part["title"], detail=True), Block("text", told, detail=True), *picture,
-            table(HEAD, _rows(part), detail=True)]
+    return [Block("heading", f"{name}: {part['title']}"), Block("text", told), table(HEAD, _rows(part))]
 
 
 def _rows(part: dict) -> Iterator[tuple[str, ...]]:
     for of in part.get("lines", ()):
-        for point in of["points"]:
-            yield of["method"], point["label"], *_times(point), _cost(point)
-        for failed in of["failed"]:
-            yield of["method"], failed["label"], "failed", "", failed["reason"]
-    for method, fits in part.get("fits", {}).items():
-        found = ", ".join(f"{name} {value:.2f}" for name, value in fits.items() if value is not None)
-        yield method, "exponents", "", "", found
-    for row in (*part.get("rows", ()), *part.get("steps", ())):
-        yield row["method"], row.get("scene", "a step" if "hours" in row else ""), *_times(row), _cost(row)
-    for row in part.get("apart", ()):
-        yield row["what"], "apart", *_times(row), ""
-    for run in part.get("wide", ()):
-        yield f"wide, preset {run['preset']}", "", *_times(run), run.get("failed") or _cost(run)
-
-
-def _times(point: dict) -> tuple[str, ...]:
-    return tuple(f"{point[key]:.3g}" if key in point else "" for key in ("seconds", "cpu"))
+        yield from ((of["method"], point["label"], *_costs(point)) for point in of["points"])
+        yield from ((of["method"], failed["label"], "failed", "", failed["reason"]) for failed in of["failed"])
+    yield from ((row["method"], row.get("scene", ""), *_costs(row)) for row in part.get("rows", ()))
 
 
 #: What a point may have besides its times.
-COSTS = {"error": "{:.1e}", "drift": "drift {:.1e}", "beyond": "beyond the bounds {:.1e}",
-         "ratio": "{:.2f} times its linear systems", "memory_MB": "{:.0f} MB", "steps": "{} steps",
-         "hours": "of {:g} h", "slope": "{:.0f} bytes a step", "bound": "{:.0f} allowed", "live_MB": "{:.1f} MB live"}
+COSTS = {"error": "{:.1e}", "ratio": "{:.2f} times its linear systems", "slope": "{:.0f} bytes a step"}
 
 
-def _cost(point: dict) -> str:
-    told = [words.format(point[key]) for key, words in COSTS.items() if key in point]
+def _costs(point: dict) -> tuple[str, ...]:
+    """Wall time, processor time, and what else there is."""
+    times = (f"{point[key]:.3g}" if key in point else "" for key in ("seconds", "cpu"))
     stages = {} if "error" in point else point.get("stages", {})
-    return ", ".join([*told, *(f"{name} {1e3 * seconds:.1f} ms" for name, seconds in stages.items())])
+    told = [words.format(point[key]) for key, words in COSTS.items() if key in point]
+    return *times, ", ".join([*told, *(f"{name} {1e3 * seconds:.1f} ms" for name, seconds in stages.items())])
 
 
 MARKS = "os^vDP*X<>hd"
@@ -242,54 +224,34 @@ COLORS = (*(f"C{k}" for k in range(10)), "black", "navy", "darkgreen", "darkred"
 
 
 def draw(parts: dict, folder: Path) -> list[Path]:
-    """Draw what the parts have; the files."""
-    from matplotlib import pyplot
-    folder.mkdir(parents=True, exist_ok=True)
+    """Draw the errors that the parts have; the files."""
     made = []
     for name, part in parts.items():
-        if not part.get("lines"):
-            continue
-        figure = _size_picture(pyplot, part) if name == "size" else _precision(pyplot, part)
-        made.append(folder / f"bench_{name}.svg")
-        figure.savefig(made[-1], metadata={"Date": None})
-        pyplot.close(figure)
+        if "error" in part:
+            made.append(folder / f"bench_{name}.svg")
+            _precision(part).savefig(made[-1], metadata={"Date": None})
     return made
 
 
-def _precision(pyplot, part: dict):
+def _precision(part: dict) -> Figure:
     """Each method's points and its envelope; methods that failed throughout are named in the legend."""
-    figure, axis = pyplot.subplots(figsize=(7.8, 4.6), layout="constrained")
+    figure = Figure(figsize=(7.8, 4.6), layout="constrained")
+    axis = figure.subplots()
     for k, line in enumerate(part["lines"]):
         points = [p for p in line["points"] if p["error"] > 0]
         label = line["method"] + (f" ({len(line['failed'])} failed)" if line["failed"] else "")
         color, mark = COLORS[k % len(COLORS)], MARKS[k % len(MARKS)]
-        _curve(axis, points, "seconds", "error", mark, color=color, alpha=0.6)
-        _curve(axis, envelope(points), "seconds", "error", f"-{mark}" if points else " ", color=color, label=label)
-    labelled(axis, part["title"], "wall time (s)", part["error"] if len(part["error"]) < 60 else "largest error")
+        _curve(axis, points, mark, color=color, alpha=0.6)
+        _curve(axis, envelope(points), f"-{mark}" if points else " ", color=color, label=label)
+    axis.set_title(part["title"], fontsize=9)
+    axis.set_xlabel("wall time (s)", fontsize=8)
+    axis.set_ylabel(part["error"] if len(part["error"]) < 60 else "largest error", fontsize=8)
+    axis.tick_params(labelsize=7, which="both")
     axis.grid(which="major", lw=0.3)
     figure.legend(fontsize=6, loc="outside right upper")
     return figure
 
 
-def _size_picture(pyplot, part: dict):
-    """Seconds by stage against nodes, and memory."""
-    lines = [line for line in part["lines"] if line["points"]]
-    figure, axes = pyplot.subplots(1, len(lines) + 1, figsize=(3.9 * (len(lines) + 1), 3.4), layout="constrained")
-    for axis, line in zip(axes, lines):
-        _curve(axis, line["points"], "nodes", "seconds", "k-o", label="step")
-        for name in (*runs.STAGES, runs.FLOOR):
-            costs = [{"nodes": p["nodes"], name: p["stages"][name]} for p in line["points"] if p["stages"].get(name)]
-            if costs:
-                _curve(axis, costs, "nodes", name, "--" if name == runs.FLOOR else "-", label=name)
-        more = [p for p in line["points"] if p["memory_MB"] > 0]
-        _curve(axes[-1], more, "nodes", "memory_MB", "-o", label=line["method"])
-        labelled(axis, line["method"], "nodes", "seconds a growth step")
-    labelled(axes[-1], "memory above the start's", "nodes", "MB")
-    for axis in axes:
-        axis.legend(fontsize=6)
-    return figure
-
-
-def _curve(axis, points, across: str, up: str, look: str, **how) -> None:
-    """Two numbers of points on logarithmic axes."""
-    axis.loglog(*(np.array([*map(itemgetter(name), points)]) for name in (across, up)), look, ms=4, **how)
+def _curve(axis, points, look: str, **how) -> None:
+    """Error against time."""
+    axis.loglog(*(np.array([*map(itemgetter(name), points)]) for name in ("seconds", "error")), look, ms=4, **how)

@@ -11,6 +11,7 @@ transport is solved on right triangles that halve the square cells of their grid
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
 from time import perf_counter, process_time
@@ -31,18 +32,20 @@ from skfem import Basis, ElementTriP2, MeshTri, asm
 from reference import channel_bvp
 from reference import diffusion_reaction_pypde as pypde
 from reference.monod import derivatives, uptake
+from reference.whole_run import Pore
 from reference.whole_run_pore import steady, stiffness
 from repro.fem.mesh import Mesh
 from repro.model import transport
 from repro.model.kinetics import Sink
 from repro.scene import parse_scene
-from verification.bench import stages
-from verification.bench.record import part, series
+from verification.bench.record import part
 from verification.problems import channels, meshes
 from verification.problems.pairs import upright
 
-#: um2/h of acceptor and donor, in fluid and biomass alike; mg/L.
+#: um2/h of acceptor and donor, in fluid and biomass alike; mg/L, of biomass and of the supply; as
+#: :mod:`reference.monod` takes them.
 DIFFUSIVITY, DENSITY = (8e6, 4e6), 3e4
+SUPPLY, RATES = Pore().supply, Pore().rates
 #: Newton's method of FiPy stops at this change over the supply; its direct solver refines to this residual (its own
 #: default, 1e-5, leaves an error of 1e-3 on fine grids).
 REST, EXACT = 1e-8, 1e-14
@@ -56,80 +59,72 @@ STABLE, PARTS = 0.4, 100
 
 @dataclass(frozen=True)
 class Problem:
-    """Biomass of density X (mg/L) where ``inside(x, y)``; supply, diffusivity: pairs; speed: u (um/h); rates: as
-    :mod:`reference.monod` takes them; ends, width: um, width None in one dimension."""
+    """Biomass where ``inside(x, y)``; box: ends (um) along, and across in two dimensions; speed: u (um/h)."""
 
-    ends: tuple[float, float]
-    width: float | None
-    inside: object
-    density: float
-    supply: tuple[float, float]
-    diffusivity: tuple[float, float]
-    rates: dict
+    box: tuple[tuple[float, float], ...]
+    inside: Callable[..., np.ndarray]
     speed: float = 0.0
 
-    def cells(self, across: int) -> tuple[int, ...]:
+    def cells(self, across: int) -> list[int]:
         """Cells along (and across) with ``across`` to the width, or to the length in one dimension."""
-        if self.width is None:
-            return (across,)
-        return round((self.ends[1] - self.ends[0]) / self.width * across), across
+        low, high = self.box[-1]
+        return [round((last - first) / (high - low) * across) for first, last in self.box]
 
     def judged(self, fields, load) -> np.ndarray:
         """(2,) C in the last cell, mg/L; at rest what is taken up, um2 mg/L/h, with load = X times the cells' areas."""
         if self.speed:
             return fields[:, -1]
-        return np.array([np.sum(load * q) for q in uptake(*fields, self.rates)])
+        return np.array([np.sum(load * q) for q in uptake(*fields, RATES)])
 
 
 def fipy(problem: Problem, across: int) -> np.ndarray:
     """(2,) what is judged."""
     mesh = _fipy_mesh(problem, across)
     where = problem.inside(*mesh.cellCenters.value)
-    X = CellVariable(mesh=mesh, value=np.where(where, problem.density, 0.0))
-    both = [CellVariable(mesh=mesh, value=s) for s in problem.supply]
+    X = CellVariable(mesh=mesh, value=np.where(where, DENSITY, 0.0))
+    both = [CellVariable(mesh=mesh, value=s) for s in SUPPLY]
     constants = [CellVariable(mesh=mesh) for _ in both]
     slopes = [(CellVariable(mesh=mesh), CellVariable(mesh=mesh)) for _ in both]
     equation = None
     for k, field in enumerate(both):
-        one = DiffusionTerm(coeff=problem.diffusivity[k], var=field) == X * constants[k]
+        one = DiffusionTerm(coeff=DIFFUSIVITY[k], var=field) == X * constants[k]
         for other, slope in zip(both, slopes[k]):
             one = one + ImplicitSourceTerm(coeff=-X * slope, var=other)
         one = one + _fipy_ends(problem, mesh, field, k)
         equation = one if equation is None else equation & one
     for _ in range(MOST):
         before = np.array([field.value for field in both])
-        _linearise(problem, before, constants, slopes)
+        _linearise(before, constants, slopes)
         equation.sweep(solver=LinearLUSolver(tolerance=EXACT))
-        if np.abs(np.array([field.value for field in both]) - before).max() < REST * max(problem.supply):
+        if np.abs(np.array([field.value for field in both]) - before).max() < REST * max(SUPPLY):
             break
     fields = np.array([field.value for field in both])
     return problem.judged(fields, X.value * mesh.cellVolumes)
 
 
 def _fipy_mesh(problem: Problem, across: int):
-    count, length = problem.cells(across), problem.ends[1] - problem.ends[0]
-    if problem.width is None:
-        return Grid1D(nx=count[0], dx=length / count[0]) + (problem.ends[0],)
-    return Grid2D(nx=count[0], ny=count[1], dx=length / count[0], dy=problem.width / count[1]) + (
-        (problem.ends[0],), (0.0,))
+    counts = problem.cells(across)
+    steps = [(last - first) / count for (first, last), count in zip(problem.box, counts)]
+    kind = Grid1D if len(counts) == 1 else Grid2D
+    return kind(*steps, *counts) + [(first,) for first, _ in problem.box]
 
 
 def _fipy_ends(problem: Problem, mesh, field, k: int):
     """The supply at both ends; or advection, its inflow u (C_supply - C) a source in the first cell, and no gradient at
     the outlet, without which FiPy's outlet passes nothing."""
     if not problem.speed:
-        field.constrain(problem.supply[k], mesh.facesLeft | mesh.facesRight)
+        field.constrain(SUPPLY[k], mesh.facesLeft | mesh.facesRight)
         return 0.0
     field.faceGrad.constrain([0.0], where=mesh.facesRight)
     first = CellVariable(mesh=mesh, value=0.0)
     first[0] = problem.speed / mesh.dx
-    return first * problem.supply[k] - CentralDifferenceConvectionTerm(coeff=(problem.speed,), var=field)
+    return first * SUPPLY[k] - CentralDifferenceConvectionTerm(coeff=(problem.speed,), var=field)
 
 
-def _linearise(problem: Problem, now, constants, slopes) -> None:
+def _linearise(now, constants, slopes) -> None:
     """q = constant + sum of slopes times C at the present C (2, n); slopes by central differences."""
-    by = derivatives(now, problem.rates)
-    rest = np.array(uptake(*now, problem.rates)) - np.einsum("kjn,jn->kn", by, now)
+    by = derivatives(now, RATES)
+    rest = np.array(uptake(*now, RATES)) - np.einsum("kjn,jn->kn", by, now)
     for k in (0, 1):
         constants[k].setValue(rest[k])
         for j in (0, 1):
@@ -139,15 +134,15 @@ def _linearise(problem: Problem, now, constants, slopes) -> None:
 def py_pde(problem: Problem, across: int) -> tuple[np.ndarray, dict]:
     """(2,) what is judged, and the seconds (wall, processor) before the run's first hundredth is over, less those of
     another hundredth: numba compiles in them."""
-    grid = _pde_grid(problem, across)
+    grid = CartesianGrid([list(ends) for ends in problem.box], problem.cells(across))
     where = problem.inside(*np.moveaxis(grid.cell_coords, -1, 0))
-    X = ScalarField(grid, np.where(where, problem.density, 0.0))
+    X = ScalarField(grid, np.where(where, DENSITY, 0.0))
     ends = {f"{name}:*": _pde_ends(problem, k) for k, name in enumerate("AD")}
     equation = PDE(_pde_rules(problem), consts={"X": X}, bc_ops=ends)
-    state = FieldCollection([ScalarField(grid, s, label=name) for s, name in zip(problem.supply, "AD")])
+    state = FieldCollection([ScalarField(grid, s, label=name) for s, name in zip(SUPPLY, "AD")])
     times = TIMES_OPEN if problem.speed else TIMES
-    time = times * (problem.ends[1] - problem.ends[0]) ** 2 / min(problem.diffusivity)
-    dt = STABLE * min(grid.discretization) ** 2 / max(problem.diffusivity) / grid.num_axes
+    time = times * np.ptp(problem.box[0]) ** 2 / min(DIFFUSIVITY)
+    dt = STABLE * min(grid.discretization) ** 2 / max(DIFFUSIVITY) / grid.num_axes
     marks = [_now()]
     watch = CallbackTracker(lambda state, t: marks.append(_now()), interrupts=time / PARTS)
     found = Controller(EulerSolver(equation, backend="numba"), t_range=time, tracker=watch).run(state, dt=dt)
@@ -167,29 +162,24 @@ def _compiled(marks: list[tuple[float, float]]) -> dict[str, float]:
     return dict(zip(("apart_seconds", "apart_cpu"), map(float, found)))
 
 
-def _pde_grid(problem: Problem, across: int) -> CartesianGrid:
-    box = [list(problem.ends)] if problem.width is None else [list(problem.ends), [0.0, problem.width]]
-    return CartesianGrid(box, list(problem.cells(across)))
-
-
 def _pde_rules(problem: Problem) -> dict[str, str]:
     """The equations as py-pde reads them."""
-    r = problem.rates
+    r = RATES
     m_a, m_d = f"A / (A + {r['K_A']})", f"D / (D + {r['K_D']})"
     sinks = (f"X * {m_a} * ({r['k'] * r['F']} * {m_d} + {r['decay']})", f"X * {r['k']} * {m_a} * {m_d}")
     carried = [f" - {problem.speed} * d_dx({name})" if problem.speed else "" for name in "AD"]
     return {name: f"{d} * laplace({name}){carry} - {sink}"
-            for name, d, carry, sink in zip("AD", problem.diffusivity, carried, sinks)}
+            for name, d, carry, sink in zip("AD", DIFFUSIVITY, carried, sinks)}
 
 
 def _pde_ends(problem: Problem, k: int) -> dict:
-    supply, spread = problem.supply[k], problem.diffusivity[k]
+    supply, spread = SUPPLY[k], DIFFUSIVITY[k]
     if not problem.speed:
         ends = {"x": {"value": supply}}
     else:
         share = problem.speed / spread
         ends = {"x-": {"type": "mixed", "value": share, "const": share * supply}, "x+": {"derivative": 0.0}}
-    return ends if problem.width is None else {**ends, "y": {"derivative": 0.0}}
+    return ends if len(problem.box) == 1 else {**ends, "y": {"derivative": 0.0}}
 
 
 @cache
@@ -217,82 +207,65 @@ def solved(grid: Mesh, order: int, speed: float = 0.0):
 
 #: Methods of this package, by the order of their elements.
 COMPILED = "py-pde, compiled"
-CELLS = "{} cells"
-OURS = {1: stages.PAPER, 2: "order 2 (fast, accurate)", 3: "order 3"}
+OURS = {1: "linear elements (paper)", 2: "order 2 (fast, accurate)", 3: "order 3"}
+QUADRATIC = "scikit-fem: quadratic elements"
 
 
-def _ours(solve, linear, quadratic) -> dict:
-    """Methods of this package; ``solve(cells, order)``."""
-    return {method: (linear if order == 1 else quadratic, partial(solve, order=order))
-            for order, method in OURS.items()}
-
-
-def _compared(title: str, judged: str, reference: str, problem: Problem, methods: dict, stepped, truths, scale,
-              repeats: int) -> dict:
-    """A part of methods {name: (sizes, solve)}, where ``solve(cells)`` finds what is judged, (2,), and of py-pde's
-    compiled runs; truths: the reference's, coarser first; reference: told with the finer one and what they differ by.
+def _compared(about: tuple[str, str, str], problem: Problem, ours: Callable, others: dict, truths, scale,
+              quick: bool) -> dict:
+    """A part about (title, error, reference, told with the finer of both truths and what they differ by); ``ours(cells,
+    order=order)`` and ``solve(cells)`` of the others {name: (sizes, solve)} find what is judged, (2,); truths: the
+    reference's, coarser first. py-pde's compiled run comes once, on one grid: numba compiles for longer than it runs.
     """
     coarse, truth = truths
-    change = stages.largest(coarse, truth, scale)
-    jobs: dict = {}
-    for method, (sizes, solve) in methods.items():
-        jobs |= series(method, CELLS, sizes, _apart, solve=solve, truth=truth, scale=scale)
-    once = series(COMPILED, CELLS, stepped, _stepped, problem=problem, truth=truth, scale=scale)
-    found = part(title, judged, reference.format(*truth, change), jobs, repeats, once, reference_change=change)
-    return {**found, "apart": compile_times(found["lines"])}
+    linear, curved, stepped = SIZES[problem]
 
+    def error(found) -> float:
+        return float(np.max(np.abs(np.asarray(found) - truth) / scale))
 
-def _apart(cells: int, solve, truth, scale) -> dict:
-    return {"error": stages.largest(solve(cells), truth, scale)}
+    def solved_apart(solve, cells: int) -> dict:
+        return {"error": error(solve(cells))}
 
+    def stepped_apart(cells: int) -> dict:
+        found, compiled = py_pde(problem, cells)
+        return {"error": error(found), **compiled}
 
-def _stepped(cells: int, problem: Problem, truth, scale) -> dict:
-    """By py-pde, compiled."""
-    found, compiled = py_pde(problem, cells)
-    return {"error": stages.largest(found, truth, scale), **compiled}
-
-
-def compile_times(lines: list[dict]) -> list[dict]:
-    """What numba took, which no point includes."""
-    return [{"what": f"{line['method']}, {point['label']}: compilation", "seconds": point["apart_seconds"]}
-            for line in lines for point in line["points"] if point.get("apart_seconds")]
+    methods = {method: (linear if order == 1 else curved, partial(ours, order=order))
+               for order, method in OURS.items()} | others
+    jobs = {(method, f"{cells} cells"): partial(solved_apart, solve, cells)
+            for method, (sizes, solve) in methods.items() for cells in (sizes[:1] if quick else sizes)}
+    once = {} if quick else {(COMPILED, f"{stepped} cells"): partial(stepped_apart, stepped)}
+    title, judged, reference = about
+    return part(title, judged, reference.format(*truth, error(coarse)), jobs, 1 if quick else REPEATS, once)
 
 
 #: Runs of a job that count.
-REPEATS = 3, 1
+REPEATS = 3
 HALF = WIDTH = 64.0
 SIDE = 32.0
-#: Cells across the box: linear, of higher order, scikit-fem's, those of other codes, of compiled ones, and of the
-#: reference; of the part, and of its quick version.
-BOX_SIZES = ((8, 16, 32, 64, 96), (2, 4, 8, 16, 24), (4, 8, 16), (8, 16, 32, 64), (16,), (32, 64)), (
-    (8, 16), (2, 4), (4,), (8,), (), (8, 16))
-
-
-def box_part(quick: bool) -> dict:
-    """Diffusion and dual Monod uptake in a box with a block of biomass, whose sides follow the cells: what FiPy and
-    py-pde can do as well; error of what is taken up.
-
-    py-pde's compiled run comes once a grid: numba compiles for longer than it runs.
-    """
-    linear, curved, skfem, cells, stepped, reference = BOX_SIZES[quick]
-    box, truths = box_problem(), [quadratic(each) for each in reference]
-    methods = {**_ours(_box_ours, linear, curved), stages.QUADRATIC: (skfem, quadratic),
-               "fipy": (cells, partial(fipy, box)), "py-pde's Laplacian, Newton by scipy": (cells, _newton)}
-    told = (f"quadratic elements of scikit-fem, {reference[1]} cells across: {{:.9g}} and {{:.9g}} um2 mg/L/h; from "
-            f"{reference[0]} cells on they change by {{:.1e}}")
-    return _compared("Uptake without flow: a block of 64 by 32 um in a box of 128 by 64 um; grid, assembly, solution",
-                     "what is taken up of each substrate, relative, the larger error", told, box, methods, stepped,
-                     truths, truths[1], REPEATS[quick])
-
-
-def box_problem() -> Problem:
-    """The same, as other codes take it."""
-    given = stages.constants()
-    return Problem((-HALF, HALF), WIDTH, _inside, DENSITY, given.supply, DIFFUSIVITY, given.rates)
 
 
 def _inside(x, y):
     return (np.abs(x) < SIDE) & (y < SIDE)
+
+
+BOX = Problem(((-HALF, HALF), (0.0, WIDTH)), _inside)
+#: Of the box's reference, cells across.
+COARSE, FINE = 32, 64
+
+
+def box_part(quick: bool) -> dict:
+    """Diffusion and dual Monod uptake in a box with a block of biomass, whose sides follow the cells: what FiPy and
+    py-pde can do as well; error of what is taken up."""
+    truths = [quadratic(cells) for cells in (COARSE, FINE)]
+    cells = (8, 16, 32, 64)
+    others = {QUADRATIC: ((4, 8, 16), quadratic), "fipy": (cells, partial(fipy, BOX)),
+              "py-pde's Laplacian, Newton by scipy": (cells, _newton)}
+    about = ("Uptake without flow: a block of 64 by 32 um in a box of 128 by 64 um; grid, assembly, solution",
+             "what is taken up of each substrate, relative, the larger error",
+             f"quadratic elements of scikit-fem, {FINE} cells across: {{:.9g}} and {{:.9g}} um2 mg/L/h; from {COARSE} "
+             "cells on they change by {:.1e}")
+    return _compared(about, BOX, _box_ours, others, truths, truths[1], quick)
 
 
 def _box_ours(cells: int, order: int) -> list[float]:
@@ -301,31 +274,31 @@ def _box_ours(cells: int, order: int) -> list[float]:
 
 
 def _newton(cells: int) -> np.ndarray:
-    given, box = box_problem(), pypde.Box(cells, HALF, WIDTH, pypde.block(SIDE, SIDE))
-    fields = box.steady(given.diffusivity, given.supply, given.density, given.rates)
-    return given.judged(fields, given.density * box.part * (WIDTH / cells) ** 2)
+    box = pypde.Box(cells, HALF, WIDTH, pypde.block(SIDE, SIDE))
+    fields = box.steady(DIFFUSIVITY, SUPPLY, DENSITY, RATES)
+    return BOX.judged(fields, DENSITY * box.part * (WIDTH / cells) ** 2)
 
 
 def quadratic(cells: int) -> np.ndarray:
     """(2,) what is taken up, by scikit-fem's quadratic elements and Newton's method."""
-    given = box_problem()
     mesh = MeshTri.init_tensor(np.linspace(-HALF, HALF, 2 * cells + 1), np.linspace(0.0, WIDTH, cells + 1))
     whole = Basis(mesh, ElementTriP2(), intorder=6)
     body = Basis(mesh, ElementTriP2(), intorder=6, elements=np.flatnonzero(_inside(*mesh.p[:, mesh.t].mean(axis=1))))
     laplace = asm(stiffness, whole)
     inner = np.flatnonzero(np.abs(whole.doflocs[0]) < HALF * (1 - 1e-9))
-    fields = steady(body, [(d * laplace, 0.0) for d in given.diffusivity], given.density, given.rates,
-                    np.outer(given.supply, np.ones(whole.N)), inner)
-    here = [body.interpolate(field) for field in fields]
-    return np.array([np.sum(given.density * q * body.dx) for q in uptake(*here, given.rates)])
+    fields = steady(body, [(d * laplace, 0.0) for d in DIFFUSIVITY], DENSITY, RATES,
+                    np.outer(SUPPLY, np.ones(whole.N)), inner)
+    return BOX.judged([body.interpolate(field) for field in fields], DENSITY * body.dx)
 
 
 #: um; um/h.
 ENDS, STRIP = (-40.0, 80.0), 40.0
 SPEED = 1e5
-#: Cells along the channel, multiples of three: faces lie on both ends of the strip.
-CHANNEL_SIZES = ((15, 30, 60, 120, 240, 480), (6, 12, 24, 48, 96), (30, 60, 120, 240, 480), (60,)), (
-    (15, 30), (6, 12), (30,), ())
+CHANNEL = Problem((ENDS,), lambda x, *y: (x > 0) & (x < STRIP), SPEED)
+#: Cells across the box, and along the channel (multiples of three: faces lie on both ends of the strip): linear, of
+#: higher order, and of py-pde's compiled run.
+SIZES = {BOX: ((8, 16, 32, 64, 96), (2, 4, 8, 16, 24), 16),
+         CHANNEL: ((15, 30, 60, 120, 240, 480), (6, 12, 24, 48, 96), 60)}
 
 
 def channel_part(quick: bool) -> dict:
@@ -334,31 +307,20 @@ def channel_part(quick: bool) -> dict:
     Other codes solve it in one dimension; here it is a ribbon of one cell across, which costs twice the unknowns and
     more.
     """
-    linear, curved, cells, stepped = CHANNEL_SIZES[quick]
-    channel = channel_problem()
-    methods = {**_ours(_channel_ours, linear, curved), "fipy": (cells, partial(fipy, channel))}
-    told = ("scipy's solve_bvp, tolerance 1e-9: {:.9f} and {:.9f} mg/L; from 1e-7 on they change by {:.1e} of the "
-            "supply")
-    return _compared("Uptake in plug flow through a strip, one-dimensional; grid, assembly and solution",
-                     "effluents over the supply, the larger error", told, channel, methods, stepped,
-                     [reference(1e-7), reference(1e-9)], channel.supply, REPEATS[quick])
+    others = {"fipy": ((30, 60, 120, 240, 480), partial(fipy, CHANNEL))}
+    about = ("Uptake in plug flow through a strip, one-dimensional; grid, assembly and solution",
+             "effluents over the supply, the larger error",
+             "scipy's solve_bvp, tolerance 1e-9: {:.9f} and {:.9f} mg/L; from 1e-7 on they change by {:.1e} of the "
+             "supply")
+    return _compared(about, CHANNEL, _channel_ours, others, [reference(1e-7), reference(1e-9)], SUPPLY, quick)
 
 
 def reference(tolerance: float) -> np.ndarray:
     """(2,) effluents, mg/L."""
-    given = channel_problem()
-    found = channel_bvp.solution(SPEED, given.supply, given.diffusivity, given.diffusivity, given.density, given.rates,
-                                 STRIP, tolerance)
+    found = channel_bvp.solution(SPEED, SUPPLY, DIFFUSIVITY, DIFFUSIVITY, DENSITY, RATES, STRIP, tolerance)
     return found(np.array([STRIP]))[:, 0]
 
 
-def channel_problem() -> Problem:
-    """The channel, as other codes take it."""
-    given = stages.constants()
-    return Problem(ENDS, None, lambda x: (x > 0) & (x < STRIP), DENSITY, given.supply, DIFFUSIVITY,
-                   given.rates, SPEED)
-
-
 def _channel_ours(cells: int, order: int) -> list[float]:
-    grid = straight(ENDS, (ENDS[1] - ENDS[0]) / cells, (cells, 1), lambda x, y: (x > 0) & (x < STRIP))
+    grid = straight(ENDS, np.ptp(ENDS) / cells, (cells, 1), CHANNEL.inside)
     return [flux.effluent for flux in solved(grid, order, SPEED)]

@@ -1,11 +1,10 @@
 """What a verification case is, and when it passes: the verdict is computed from its numbers and written down nowhere.
 
-A case is a function that gives checks (a number in an accepted range), studies (errors on at least four unrelated
+A case is a function that gives checks (a number in an accepted range) and studies (errors on at least four unrelated
 meshes or steps; orders between neighbours, judged two-sidedly: one above its band fails like one below it, as a
-surprise has to be explained before it is expected) and profiles, which are drawn. It is called once for each of the
-variants (orders of elements, presets, rows of its table) that it says it runs ``over``, and one that stops hides no
-other. It passes if it measures something and all of it holds; an exception, a not-a-number or an empty outcome is a
-failure.
+surprise has to be explained before it is expected). It is called once for each of the variants (orders of elements,
+presets, rows of its table) that it says it runs ``over``, and one that stops hides no other. It passes if it measures
+something and all of it holds; an exception, a not-a-number or an empty outcome is a failure.
 """
 
 from __future__ import annotations
@@ -40,7 +39,7 @@ class Quantity:
 
     def labelled(self, label: str) -> Self:
         """The same of one variant of its case."""
-        return replace(self, quantity=f"{self.quantity}, {label}")
+        return replace(self, quantity=f"{self.quantity}, {label}") if label else self
 
 
 @dataclass(frozen=True)
@@ -68,8 +67,12 @@ class Check(Quantity):
         return rounded(self.value, self._tolerance / 2) if self._tolerance >= ROUND_OFF else ""
 
     @property
+    def _two_sided(self) -> bool:
+        return isfinite(self.low) and isfinite(self.high) and self.low != 0
+
+    @property
     def _tolerance(self) -> float:
-        if isfinite(self.low) and isfinite(self.high) and self.low != 0:
+        if self._two_sided:
             return (self.high - self.low) / 2
         return abs(self.high if isfinite(self.high) else self.low)
 
@@ -78,7 +81,7 @@ class Check(Quantity):
         """How much of its tolerance it uses: 0 to 1 where it holds, more than anything where it does not."""
         if not self.holds:
             return inf
-        if isfinite(self.low) and isfinite(self.high) and self.low != 0:
+        if self._two_sided:
             return abs(self.value - self.low - self._tolerance) / self._tolerance
         if isfinite(self.high):
             return self.value / self.high if self.high else 0.0
@@ -97,7 +100,7 @@ class Check(Quantity):
         return self._range(3)
 
     def _range(self, digits: int) -> str:
-        if isfinite(self.low) and isfinite(self.high) and self.low != 0:
+        if self._two_sided:
             return f"{self.low:.{digits}g} to {self.high:.{digits}g}"
         return f"at most {self.high:.3g}" if isfinite(self.high) else f"at least {self.low:.3g}"
 
@@ -244,20 +247,6 @@ def _averaged(measure: Callable, size: float, count: int, given: tuple) -> dict[
     return {name: float(np.sqrt(np.mean(values**2))) for name, values in columns(found).items()}
 
 
-@dataclass(frozen=True, eq=False)
-class Profile:
-    """Curves over one axis, for a picture: each (name, kind, x, y), kind "ours", "reference" or "exact"."""
-
-    title: str
-    x_label: str
-    y_label: str
-    curves: tuple[tuple[str, str, np.ndarray, np.ndarray], ...]
-
-    def labelled(self, label: str) -> Profile:
-        """The same picture of one variant of its case."""
-        return replace(self, title=f"{self.title}, {label}")
-
-
 Line = tuple[str, str, str, bool]
 
 
@@ -279,13 +268,7 @@ class Outcome:
 
     checks: tuple = ()
     studies: tuple = ()
-    profiles: tuple[Profile, ...] = ()
     notes: tuple[Note, ...] = ()
-
-    @property
-    def parts(self) -> tuple:
-        """All of it."""
-        return (*self.measured, *self.profiles, *self.notes)
 
     @property
     def measured(self) -> tuple:
@@ -300,32 +283,30 @@ class Outcome:
                 for part in self.measured]
 
 
-def outcome(found: Outcome | Iterable) -> Outcome:
-    """What a function of a case gives, as an Outcome: checks, studies, profiles and notes in any order, or lists of
-    them."""
-    if isinstance(found, Outcome):
-        return found
-    parts = tuple(_flat(found))
-    return Outcome(*(_of(kind, parts) for kind in (Check, Study, Profile, Note)))
+def outcome(found: Iterable) -> Outcome:
+    """What a function of a case gives, as an Outcome: checks, studies and notes in any order, or lists of them."""
+    parts = tuple(flat(found))
+    return Outcome(*(_of(kind, parts) for kind in (Check, Study, Note)))
 
 
 def _of(kind: type, parts: tuple) -> tuple:
     return tuple(part for part in parts if isinstance(part, kind))
 
 
-def _flat(found) -> Iterator:
-    if isinstance(found, Check | Study | Profile | Note):
+def flat(found) -> Iterator:
+    """All of it, one by one."""
+    if isinstance(found, Quantity | Note):
         yield found
     else:
         for part in found:
-            yield from _flat(part)
+            yield from flat(part)
 
 
 @dataclass(frozen=True)
 class Case:
     """id: "flow-poiseuille"; claim: one sentence; norm: what is measured and how; mutants: ids of changes of code (see
     :mod:`verification.kernel.mutants`), each of which must make the case fall short; slow: left out by ``make
-    verify-fast``; function: gives an Outcome, or an iterable of its parts; over: {label: arguments} of the variants
+    verify-fast``; function: gives what is to be an Outcome; over: {label: arguments} of the variants
     that it is called for, none: once without arguments; ways: which of WAYS it runs with; because: why not others."""
 
     id: str
@@ -339,13 +320,6 @@ class Case:
     over: Mapping[str, tuple] = field(default_factory=dict)
     ways: tuple[str, ...] = ()
     because: str = ""
-
-    def measure(self, label: str = "", *arguments) -> Outcome:
-        """What the function gives for a variant, whose label ends the names of what it has measured."""
-        found = outcome(self.function(*arguments))
-        if not label:
-            return found
-        return outcome(part.labelled(label) for part in found.parts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -404,13 +378,12 @@ def _ways(id: str, variants: Iterable[str], more: str) -> tuple[str, ...]:
 def run(chosen: Case) -> Result:
     """Run every variant of a case, whether others stop or not; floating-point errors raise."""
     start = perf_counter()
-    found = []
-    errors = []
+    found: list = []
+    errors = ""
     for label, arguments in (chosen.over or {"": ()}).items():
         try:
             with np.errstate(all="raise", under="ignore"):
-                found.append(chosen.measure(label, *arguments))
+                found += [part.labelled(label) for part in flat(chosen.function(*arguments))]
         except Exception:
-            errors.append(f"{label}{': ' * bool(label)}{traceback.format_exc(limit=-3)}")
-    whole = found[0] if len(found) == 1 else outcome(one.parts for one in found)
-    return Result(chosen.id, whole, "".join(errors), perf_counter() - start)
+            errors += f"{label}{': ' * bool(label)}{traceback.format_exc(limit=-3)}"
+    return Result(chosen.id, outcome(found), errors, perf_counter() - start)

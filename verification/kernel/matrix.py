@@ -24,7 +24,6 @@ from verification.kernel.writing import Block, markdown, table
 
 ROOT = Path(__file__).parents[2]
 FILE = ROOT / "verification" / "report" / "matrix.md"
-TITLE = "What is verified by what, with which elements and presets"
 ORDERS, PRESETS = WAYS[:3], WAYS[3:]
 #: Why a case does not run with presets, and with all of them.
 ALONE = "presets: the stage alone, with the elements that they choose"
@@ -79,15 +78,6 @@ def _file(module: str) -> str:
     """A module's file; a package's folder."""
     path = module.replace(".", "/")
     return f"{path}/" if (ROOT / path).is_dir() else f"{path}.py"
-
-
-def blocks() -> list[Block]:
-    """Both tables."""
-    head = ("section", "equations", "modules", "cases", "references", "mutants", "claims")
-    return [Block("heading", "Elements and presets"),
-            Block("text", "run: with every `make verify-fast`; slow: with `make verify`; n/a: not applicable."),
-            table(("case", *WAYS, "not applicable because"), map(row, ordered())),
-            Block("heading", "Equation, module, case, reference, mutant, claim"), table(head, map(line, parts()))]
 
 
 def ordered() -> list[Case]:
@@ -246,8 +236,13 @@ def orphans() -> list[str]:
 
 
 def text() -> str:
-    """The page."""
-    return f"# {TITLE}\n\n{markdown(blocks(), 2)}\n"
+    """The page: both tables."""
+    head = ("section", "equations", "modules", "cases", "references", "mutants", "claims")
+    blocks = [Block("heading", "Elements and presets"),
+              Block("text", "run: with every `make verify-fast`; slow: with `make verify`; n/a: not applicable."),
+              table(("case", *WAYS, "not applicable because"), map(row, ordered())),
+              Block("heading", "Equation, module, case, reference, mutant, claim"), table(head, map(line, parts()))]
+    return f"# What is verified by what, with which elements and presets\n\n{markdown(blocks, 2)}\n"
 
 
 def main() -> int:

@@ -1,9 +1,8 @@
 """Can the verification fail? Small wrong changes to ``repro/``, each of which a case must catch: ``make mutants``.
 
 A mutant is a change of exact text; it is applied to a copy of the code, never to the code itself. Every case names
-mutants, and must fall short with each of them. A mutant is run against the cases that name it and then against all
-others, the quick ones first, until one catches it: a mutant that survives is a missing test. With ``--every`` it is run
-against all cases that name it, whichever catches it first.
+mutants, and must fall short with each of them. A mutant is run against the cases that name it, the quick ones first,
+until one catches it; with ``--every`` against all of them, whichever catches it first.
 
 A case catches by a number out of its range, or by an error of ``repro.errors`` (a guard of the code that stops it).
 Whatever else stops a case, an ``AttributeError`` for instance, shows a broken mutant and catches nothing. No case knows
@@ -132,15 +131,9 @@ class Hunt:
         return tuple(trial.case for trial in self.trials if trial.caught)
 
     @property
-    def told(self) -> dict[str, str]:
-        """How each case or test caught it, or why it did not."""
-        return {trial.case: trial.how for trial in self.trials}
-
-    @property
     def missed_by(self) -> tuple[str, ...]:
-        """Ids of the cases that name this mutant and pass with it, and of the tests that it names and that do."""
-        return tuple(t.case for t in self.trials
-                     if not t.caught and (t.case not in CASES or self.mutant in CASES[t.case].mutants))
+        """Ids of the cases, or tests, that it was run against and that pass with it."""
+        return tuple(trial.case for trial in self.trials if not trial.caught)
 
 
 def load() -> dict[str, tuple[Mutant, ...]]:
@@ -174,27 +167,21 @@ def mutated(mutant: Mutant, root: Path = ROOT) -> str:
     return text.replace(mutant.old, mutant.new)
 
 
-def plan(mutant: Mutant) -> tuple[list[str], list[str]]:
-    """(cases that name the mutant, all others), the quick ones first; of one that tests catch these, and no others."""
-    if mutant.tests:
-        return list(mutant.tests), []
-    quick_first = sorted(CASES.values(), key=lambda case: case.slow)
-    named = [case.id for case in quick_first if mutant.id in case.mutants]
-    return named, [case.id for case in quick_first if case.id not in named]
-
-
 def hunt(mutant: Mutant, every: bool = False) -> Hunt:
-    """Run the mutant against the cases that name it, then against all others, to the first catch; ``every``: against
-    all that name it."""
-    named, others = plan(mutant)
-    trials = []
+    """Run the mutant against the cases that name it, the quick ones first, to the first catch, or ``every`` one; or
+    against every test that it names."""
+    quick_first = sorted(CASES.values(), key=lambda case: case.slow)
+    catchers = mutant.tests or [case.id for case in quick_first if mutant.id in case.mutants]
+    trials: list[Trial] = []
     with TemporaryDirectory(prefix="mutant-") as folder:
         copy(mutant, Path(folder))
-        for case in named + others:
-            caught = any(trial.caught for trial in trials)
-            if caught and not ((every or mutant.tests) and case in named):
+        for each in catchers:
+            try:
+                trials.append((tested if mutant.tests else trial)(Path(folder), each))
+            except subprocess.TimeoutExpired:
+                trials.append(Trial(each, False, f"not done after {LONGEST:g} s"))
+            if trials[-1].caught and not (every or mutant.tests):
                 break
-            trials.append((tested if mutant.tests else trial)(Path(folder), case))
     return Hunt(mutant.id, tuple(trials))
 
 
@@ -205,15 +192,13 @@ def copy(mutant: Mutant, folder: Path) -> None:
         if (ROOT / name).is_file():
             copy2(ROOT / name, folder)
         else:
-            copytree(ROOT / name, folder / name, ignore=ignore_patterns("__pycache__", "out", "live", "pictures"))
+            copytree(ROOT / name, folder / name, ignore=ignore_patterns("__pycache__", "out", "live"))
     (folder / mutant.file).write_text(text, encoding="utf-8")
 
 
 def trial(folder: Path, case: str) -> Trial:
     """Run one case in the copy, in a process of its own."""
     done = _run(folder, "-c", f"from verification.kernel import mutants; mutants.examine({case!r})")
-    if isinstance(done, str):
-        return Trial(case, False, done)
     if done.returncode:
         return Trial(case, False, "broken: " + (done.stderr.strip().splitlines() or ["no message"])[-1])
     return Trial(case, *json.loads(done.stdout.splitlines()[-1]))
@@ -222,21 +207,18 @@ def trial(folder: Path, case: str) -> Trial:
 def tested(folder: Path, test: str) -> Trial:
     """Run one test in the copy, in a process of its own."""
     done = _run(folder, "-m", "pytest", "-x", "-p", "no:cacheprovider", "-rfE", test)
-    if isinstance(done, str) or done.returncode == 0:
-        return Trial(test, False, done if isinstance(done, str) else "passes")
+    if done.returncode == 0:
+        return Trial(test, False, "passes")
     found = FAILED.search(done.stdout)
     why = found[1] if found else (done.stdout + done.stderr).strip().splitlines()[-1]
     caught = done.returncode == 1 and why.startswith(CATCH)
     return Trial(test, caught, why if caught else f"broken: {why}")
 
 
-def _run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str] | str:
-    """Python in the copy; that it was not done in time."""
-    try:
-        return subprocess.run([sys.executable, *arguments], cwd=folder, capture_output=True, text=True,
-                              timeout=LONGEST, env={**os.environ, "PYTHONPATH": str(folder), "COLUMNS": "500"})
-    except subprocess.TimeoutExpired:
-        return f"not done after {LONGEST:g} s"
+def _run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Python in the copy."""
+    return subprocess.run([sys.executable, *arguments], cwd=folder, capture_output=True, text=True, timeout=LONGEST,
+                          env={**os.environ, "PYTHONPATH": str(folder), "COLUMNS": "500"})
 
 
 def examine(id: str) -> None:
@@ -265,24 +247,17 @@ def main(arguments: list[str] | None = None) -> int:
     """Entry point; 0 if every mutant is caught, and no case that was run passes with a mutant that it names."""
     from verification.kernel.driver import load as load_cases
     load_cases()
-    chosen = _parser().parse_args(arguments)
-    unknown = sorted(set(chosen.ids) - set(everything()))
-    if unknown:
-        print(f"mutants: there is no {', '.join(unknown)}; there are {', '.join(everything())}", file=sys.stderr)
-        return 2
-    ids = chosen.ids or (of("tests") if chosen.tests else everything())
-    hunts = hunt_all(ids, chosen.jobs, chosen.every)
-    record(hunts)
-    return 0 if judge(hunts) else 1
-
-
-def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m verification.mutants", description=__doc__.splitlines()[0])
     parser.add_argument("ids", nargs="*", metavar="MUTANT", help="all by default")
     parser.add_argument("--every", action="store_true", help="against every case that names it, not to the first catch")
     parser.add_argument("--tests", action="store_true", help="those alone that tests catch, not cases")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes; one a core by default")
-    return parser
+    chosen = parser.parse_args(arguments)
+    if unknown := sorted(set(chosen.ids) - set(everything())):
+        parser.error(f"there is no {', '.join(unknown)}; there are {', '.join(everything())}")
+    hunts = hunt_all(chosen.ids or (of("tests") if chosen.tests else everything()), chosen.jobs, chosen.every)
+    record(hunts)
+    return 0 if judge(hunts) else 1
 
 
 def hunt_all(ids: Iterable[str], jobs: int, every: bool = False) -> list[Hunt]:
@@ -297,9 +272,7 @@ def hunt_all(ids: Iterable[str], jobs: int, every: bool = False) -> list[Hunt]:
 
 def _lines(found: Hunt) -> list[str]:
     verdict = "caught" if found.caught_by else "SURVIVES"
-    return [f"{verdict:9} {found.mutant}"] + [
-        f"{'':10}{trial.case}: {trial.how}" for trial in found.trials
-        if trial.caught or trial.case in found.missed_by or trial.how != "passes"]
+    return [f"{verdict:9} {found.mutant}", *(f"{'':10}{trial.case}: {trial.how}" for trial in found.trials)]
 
 
 def judge(hunts: list[Hunt]) -> bool:
@@ -312,8 +285,7 @@ def judge(hunts: list[Hunt]) -> bool:
 
 
 def record(hunts: list[Hunt]) -> None:
-    """Write what caught which mutant, for the report, where all that cases or all that tests catch were hunted; and
-    how, which is another machine's to tell, beside it."""
+    """Write what caught which mutant, for the report, where all that cases or all that tests catch were hunted."""
     caught = {found.mutant: list(found.caught_by) for found in hunts}
     whole = [catchers for catchers in CATCHERS if of(catchers).keys() <= caught.keys()]
     if not whole:
@@ -321,9 +293,7 @@ def record(hunts: list[Hunt]) -> None:
     before = _read()
     new = {id: caught.get(id, before["caught"].get(id, [])) for id in everything()}
     codes = {**before["code"], **{catchers: code(catchers) for catchers in whole}}
-    how = {found.mutant: found.told for found in hunts}
     writing.save({"code": codes, "caught": new}, RECORD)
-    writing.save(how, RECORD.parent / "live" / RECORD.name)
 
 
 def _read() -> dict[str, dict]:

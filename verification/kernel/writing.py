@@ -1,8 +1,7 @@
-"""One writer: blocks of text, pictures and tables, as Markdown, as pages and for a terminal; and records in JSON."""
+"""One writer: blocks of text, pictures and tables, as Markdown and for a terminal; and records in JSON."""
 
 from __future__ import annotations
 
-import html
 import json
 from collections.abc import Iterable
 from contextlib import suppress
@@ -13,52 +12,33 @@ from typing import Any
 from repro.results import write_text
 from repro.results.files import whole
 
-STYLE = """body {font: 15px/1.5 sans-serif; max-width: 1200px; margin: 2em auto; padding: 0 1em; color: #222}
-table {border-collapse: collapse; font-size: 13px; margin: 1em 0} .no {background: #fbe3e0} img {max-width: 100%}
-td, th {border-bottom: 1px solid #ddd; padding: 3px 8px; text-align: left; vertical-align: top} pre {color: #a00}"""
-#: Cells that make a row of a page red.
-BAD = {"wrong", "does not hold", "FALLS SHORT", "NO", "not caught"}
+Row = tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class Link:
-    """A cell that leads to a place on a page: page "flow", place "flow-plug" or ""; or to a file that is there in
-    Markdown alone: page "../../docs/network.md"."""
-
-    text: str
-    page: str
-    place: str = ""
-
-    def to(self, ending: str) -> str:
-        """The address, with the ending of the pages' files."""
-        name = self.page if self.page.endswith(".md") else f"{self.page}.{ending}"
-        return name + (f"#{self.place}" if self.place else "")
-
-
-Cell = str | Link
-Row = tuple[Cell, ...]
+def link(text: str, page: str, place: str = "") -> str:
+    """A cell of Markdown that leads to a place on a page of the report: page "flow", place "flow-plug"; or to another
+    file: page "../../docs/network.md"."""
+    file = page if page.endswith(".md") else f"{page}.md"
+    return f"[{text}]({file}{'#' * bool(place)}{place})"
 
 
 @dataclass(frozen=True)
 class Block:
-    """A piece of a text: a heading, a paragraph, a picture (file and what it shows), an error, or a table (head and
-    rows); ``detail``: on pages alone; ``brief``: in Markdown alone."""
+    """A piece of a text: a heading, a paragraph, a picture (file and what it shows), or a table (head and rows)."""
 
     kind: str
     text: str = ""
     rows: tuple[Row, ...] = ()
-    detail: bool = False
-    brief: bool = False
 
 
-def table(head: Iterable[Cell], rows: Iterable[Iterable[Cell]], **where: bool) -> Block:
-    """A table of a head and rows; where: detail or brief, as of a Block."""
-    return Block("table", rows=(tuple(head), *map(tuple, rows)), **where)
+def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> Block:
+    """A table of a head and rows."""
+    return Block("table", rows=(tuple(head), *map(tuple, rows)))
 
 
 def markdown(blocks: Iterable[Block], level: int = 3, pictures: str = "verification/report") -> str:
-    """What is no detail; headings of a level; pictures: where they are from there."""
-    return "\n\n".join(_markdown(block, level, pictures) for block in blocks if not block.detail)
+    """Headings of a level; pictures: where they are from there."""
+    return "\n\n".join(_markdown(block, level, pictures) for block in blocks)
 
 
 def _markdown(block: Block, level: int, pictures: str) -> str:
@@ -75,64 +55,19 @@ def _markdown(block: Block, level: int, pictures: str) -> str:
 
 def markdown_row(row: Row) -> str:
     """A row of a table."""
-    return "| " + " | ".join(map(_markdown_cell, row)) + " |"
-
-
-def _markdown_cell(cell: Cell) -> str:
-    if isinstance(cell, Link):
-        return f"[{cell.text}]({cell.to('md')})"
-    return cell.replace("|", "\\|")
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |"
 
 
 def plain(blocks: Iterable[Block]) -> str:
     """For a terminal: tables in columns."""
-    return "\n".join(line for block in blocks if not block.brief for line in _plain(block))
+    return "\n".join(line for block in blocks for line in _plain(block))
 
 
 def _plain(block: Block) -> list[str]:
     if block.kind != "table":
         return [block.text]
-    rows = [[*map(_words, row)] for row in block.rows]
-    widths = [max(map(len, column)) for column in zip(*rows)]
-    return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
-
-
-def _words(cell: Cell) -> str:
-    return cell.text if isinstance(cell, Link) else cell
-
-
-def page(title: str, blocks: Iterable[Block]) -> str:
-    """A whole page."""
-    body = "".join(_html(block) for block in blocks if not block.brief)
-    return (f"<!doctype html><html lang='en'><meta charset='utf-8'><title>{_safe(title)}</title><style>{STYLE}</style>"
-            f"<body><h1>{_safe(title)}</h1>{body}</body></html>\n")
-
-
-def _html(block: Block) -> str:
-    text = _safe(block.text)
-    if block.kind == "picture":
-        name, _, shown = text.partition(": ")
-        return f"<img src='{name}' alt='{shown or name}'>"
-    if block.kind == "table":
-        head, *rows = block.rows
-        return f"<table>{_row('th', head)}{''.join(_row('td', row) for row in rows)}</table>"
-    return {"heading": f"<h2 id='{text}'>{text}</h2>", "error": f"<pre>{text}</pre>"}.get(block.kind, f"<p>{text}")
-
-
-def _row(kind: str, row: Row) -> str:
-    """A row of a table; red where something does not hold."""
-    cells = "".join(f"<{kind}>{_html_cell(cell)}" for cell in row)
-    return f"<tr class='{'no' if BAD & {*row} else 'yes'}'>{cells}"
-
-
-def _html_cell(cell: Cell) -> str:
-    if isinstance(cell, Link):
-        return f"<a href='{_safe(cell.to('html'))}'>{_safe(cell.text)}</a>"
-    return _safe(cell)
-
-
-def _safe(text: str) -> str:
-    return html.escape(text)
+    widths = [max(map(len, column)) for column in zip(*block.rows)]
+    return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in block.rows]
 
 
 def load(file: Path, empty: Any = None) -> Any:

@@ -22,7 +22,7 @@ def main(arguments: list[str] | None = None) -> int:
         return 2
     began = time.time()
     sample = drawing.sample(drawing.sources())
-    known = trying.measured(chosen.reach)
+    known = trying.measured()
     hunting.hunt(hunting.due(sample, hunting.kept(), known, False), known, chosen.jobs, False, began + 3600 * HOURS)
     if chosen.whole:
         left = hunting.due(sample, hunting.kept(), known, True)
@@ -41,7 +41,6 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m verification.sampled", description=about)
     parser.add_argument("--whole", action="store_true",
                         help=f"survivors against all tests that reach them too, for {HOURS:g} h at most")
-    parser.add_argument("--reach", action="store_true", help="measure anew which tests reach what")
     parser.add_argument("--jobs", type=int, default=1, help="processes; one by default")
     return parser
 

@@ -10,16 +10,17 @@ What is committed of a hunt: ``report/sampled.json``, the rows, and ``report/sam
 from __future__ import annotations
 
 import os
-import re
 import time
-import traceback
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
+from itertools import count
 from pathlib import Path
+
+import numpy as np
 
 from verification.kernel import writing
 from verification.kernel.writing import Block, append, lines, markdown, table
-from verification.sampled import trying
 from verification.sampled.drawing import SEED, Mutant, digest, mutated, sources
 from verification.sampled.trying import LIVE, ROOT, Measured, Ran, Reach, copied, run
 
@@ -29,8 +30,6 @@ RECORD = ROOT / "verification" / "report" / "sampled.json"
 LIMIT, WHOLE = 60.0, 1800.0
 #: A test that takes so much longer than it did, in multiples of that and seconds besides, does not end.
 LONGER, BESIDES = 5.0, 10.0
-#: Files of the tests that a mutant is first tried with.
-FILES = 4
 
 
 @dataclass(frozen=True)
@@ -83,26 +82,16 @@ def _names(tests: list[Measured]) -> str:
 
 def hunt(mutants: list[Mutant], reach: Reach, jobs: int, whole: bool, ends: float) -> None:
     """Try mutants, several side by side, and write a row for each; none is begun after the time ``ends``."""
-    trying.prepare()
     before = {name: row.test for name, row in kept().items() if row.verdict == "caught"}
-    workers = [pid for number in range(jobs) if (pid := _forked(mutants[number::jobs], reach, whole, ends, before))]
-    for worker in workers:
-        os.waitpid(worker, 0)
 
+    def shift(number: int) -> None:
+        with copied() as there:
+            for mutant in mutants[number::jobs]:
+                if time.time() < ends:
+                    _write(tried(mutant, there, reach, whole, before.get(mutant.name, "")))
 
-def _forked(mutants: list[Mutant], reach: Reach, whole: bool, ends: float, before: dict[str, str]) -> int:
-    worker = os.fork()
-    if not worker:
-        try:
-            with copied() as there:
-                for mutant in mutants:
-                    if time.time() < ends:
-                        _write(tried(mutant, there, reach, whole, before.get(mutant.name, "")))
-        except BaseException:
-            traceback.print_exc()
-        finally:
-            os._exit(0)
-    return worker
+    with ThreadPoolExecutor(jobs) as pool:
+        list(pool.map(shift, range(jobs)))
 
 
 def _write(row: Row) -> None:
@@ -113,30 +102,20 @@ def _write(row: Row) -> None:
 
 def tried(mutant: Mutant, there: Path, reach: Reach, whole: bool = False, before: str = "") -> Row:
     """Run a mutant in the copy ``there`` against the tests that reach it: the one that caught it ``before`` first, then
-    as many of the cheapest as take no more than LIMIT; or all, for WHOLE, those that are named as its module is at
-    first."""
+    as many of the cheapest as take no more than LIMIT; or all, for WHOLE."""
     limit = WHOLE if whole else LIMIT
     path, text = there / "repro" / mutant.file, (ROOT / "repro" / mutant.file).read_text(encoding="utf-8")
     tests = reach.of(mutant.file, text, mutant.line, whole)
-    chosen = sorted(tests, key=lambda test: -alike(test.id, mutant.file)) if whole else within(tests, limit)
+    chosen = tests if whole else within(tests, limit)
     put(path, mutated(text, mutant))
     found = run(there, [before], limit) if before in {test.id for test in tests} else Ran()
     if not found.failed:
-        found = _met(there, chosen, limit)
+        found = run(there, [test.id for test in chosen], limit)
     put(path, text)
     row = Row(mutant.name, mutant.file, mutant.line, mutant.operator, mutant.old, mutant.new, digest(text), "survivor",
               reached=len(tests), tests=_names(reach.of(mutant.file, text, mutant.line)), tried=len(chosen),
               seconds=round(found.seconds, 1))
     return _verdict(row, found, {test.id: test.seconds for test in tests}, there)
-
-
-def _met(there: Path, chosen: list[Measured], limit: float) -> Ran:
-    """What comes of some tests, the nearest first."""
-    first = nearest(chosen)
-    found = run(there, [test.id for test in first], limit / 3)
-    if found == Ran(seconds=found.seconds) and len(chosen) > len(first):
-        found = run(there, [test.id for test in chosen[len(first):]], 2 * limit / 3)
-    return found
 
 
 def _verdict(row: Row, found: Ran, usual: dict[str, float], there: Path) -> Row:
@@ -168,44 +147,20 @@ def _short(how: str) -> str:
     return (told or [""])[-1].removeprefix("E ").strip()[-160:]
 
 
-def alike(test: str, file: str) -> int:
-    """How many words the names of a test's file and of a module have in common."""
-    return len(_words(Path(test.partition("::")[0]).stem) & _words(Path(file).with_suffix("").as_posix()))
-
-
-def _words(name: str) -> set[str]:
-    return {word.rstrip("s") for word in re.split(r"[/_]", name)}
-
-
-def nearest(tests: list[Measured]) -> list[Measured]:
-    """The first of some tests, up to the fifth file: what is not imported costs nothing, and they catch most."""
-    files: set[str] = set()
-    for number, test in enumerate(tests):
-        files.add(test.id.partition("::")[0])
-        if len(files) > FILES:
-            return tests[:number]
-    return tests
-
-
 def within(tests: list[Measured], limit: float) -> list[Measured]:
     """The cheapest tests that together take no longer than a limit; one at least."""
-    total, chosen = 0.0, []
-    for test in tests:
-        total += test.seconds
-        if total > limit and chosen:
-            break
-        chosen.append(test)
-    return chosen
+    costs = np.cumsum([test.seconds for test in tests])
+    return tests[:max(1, int(np.searchsorted(costs, limit, "right")))]
 
 
-_PUT = [0]
+_STAMPS = count(10**9)
 
 
 def put(path: Path, text: str) -> None:
     """Write a module with a time of change that no compiled form of it has."""
-    _PUT[0] += 1
+    stamp = next(_STAMPS)
     path.write_text(text, encoding="utf-8")
-    os.utime(path, (10**9 + _PUT[0], 10**9 + _PUT[0]))
+    os.utime(path, (stamp, stamp))
 
 
 #: Survivors that no test can tell from the code, each with the reason, by (file of repro/, line or lines as they are,
@@ -295,35 +250,35 @@ def holds(found: dict[str, list[Row]]) -> bool:
     return bool(counted) and len(found["caught"]) >= CAUGHT * counted and len(found["equivalent"]) <= EXCUSED * total
 
 
-def told(found: dict[str, list[Row]], count: int) -> str:
+def told(found: dict[str, list[Row]], wanted: int) -> str:
     """The numbers in one sentence or two."""
     total = sum(map(len, found.values()))
     counted = total - len(found["equivalent"])
     share = 100 * len(found["caught"]) / counted if counted else 0.0
-    return (f"{total} of {count} mutants tried, seed {SEED}: {len(found['caught'])} caught, {len(found['timeout'])} "
+    return (f"{total} of {wanted} mutants tried, seed {SEED}: {len(found['caught'])} caught, {len(found['timeout'])} "
             f"without end (timeouts), {len(found['survivor'])} survive, {len(found['equivalent'])} shown equivalent. "
             f"Caught of those not shown equivalent: {share:.1f} % (at least {100 * CAUGHT:g} %).")
 
 
-def record(rows: list[Row], count: int) -> int:
+def record(rows: list[Row], wanted: int) -> int:
     """Write both files; 0 if the mutants are caught as they are to be."""
     found = judged(rows)
-    print(told(found, count))
+    print(told(found, wanted))
     for row in [*found["survivor"], *found["timeout"]]:
         print(f"{row.verdict}: {row.file}:{row.line}: {row.old!r} -> {row.new!r} {row.how}")
-    if len(rows) == count:
+    if len(rows) == wanted:
         writing.save({"seed": SEED, "mutants": [asdict(row) for row in rows]}, RECORD)
-        PAGE.write_text(text(rows, count), encoding="utf-8")
-    return 0 if holds(found) and len(rows) == count else 1
+        PAGE.write_text(text(rows, wanted), encoding="utf-8")
+    return 0 if holds(found) and len(rows) == wanted else 1
 
 
-def text(rows: list[Row], count: int) -> str:
+def text(rows: list[Row], wanted: int) -> str:
     """The page."""
     found = judged(rows)
     survivors = [(*_changed(row), *LEFT.get(key(row), ("", "")), f"{row.tried} of {row.reached}")
                  for row in found["survivor"]]
     equivalent = [(*_changed(row), EQUIVALENT[key(row)]) for row in found["equivalent"]]
-    blocks = [Block("text", INTRODUCTION), Block("text", told(found, count)),
+    blocks = [Block("text", INTRODUCTION), Block("text", told(found, wanted)),
               *_section("Survivors", survivors, "effect", "why no test", "tests run"),
               *_section("Shown equivalent", equivalent, "why"),
               Block("heading", "By module"), table(("module", "mutants", "caught"), _counts(rows))]
