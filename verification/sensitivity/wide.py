@@ -67,6 +67,7 @@ OF["after contact"] = of_after
 
 def after_contact(runs: Runs) -> list[dict]:
     """Each number on all sizes, its bar (%), and whether that is what is asked."""
+    runs.ahead(map(_on_size, SIZES))
     sizes = [runs.numbers(_on_size(size)) for size in SIZES]
     wanted = {f"{kind} {name}": asked for kind in KINDS for name, asked in ASKED.items()}
     return [bar_of(quantity, column(sizes, quantity), asked) for quantity, asked in wanted.items()]
