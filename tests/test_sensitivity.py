@@ -52,6 +52,9 @@ class Law:
         return self.law({each.name: value_of(said, each.paths[0]) / value_of(plain, each.paths[0])
                          for each in ROUNDED + EXACT if each.only in ("", said.name)})
 
+    def ahead(self, scenes):
+        """A law takes no time."""
+
 
 def test_elasticities_of_a_power_law():
     """x^3 at 1 %: 3 and a bar that holds the rest."""
@@ -97,16 +100,40 @@ def test_the_interval_of_a_value_is_the_sum_of_all_roundings(monkeypatch):
     assert sensitivity.interval("other", 10.0) is None and sensitivity.verified_set() == ""
 
 
+MADE = []
+
+
+def counted(said):
+    MADE.append(said)
+    return {"n": len(MADE)}
+
+
 def test_a_run_is_computed_once_kept_at_once_and_computed_anew_by_another_source(tmp_path, monkeypatch):
-    """A second call, or one after a break, goes on from the file."""
-    made, kept = [], tmp_path / "out" / "runs.json"
-    monkeypatch.setitem(OF, "base", lambda said: made.append(said) or {"n": len(made)})
+    """A second call, or one after a break that cuts a line, goes on from the file."""
+    kept = tmp_path / "out" / "runs.jsonl"
+    monkeypatch.setitem(OF, "base", counted)
     plain, other = scene("base", {}), scene("base", {"k": 1.01})
     for said, number in ((plain, 1), (plain, 1), (other, 2), (other, 2)):
         assert Runs(kept).numbers(said) == {"n": number}
+    kept.write_text(kept.read_text()[:-1])
+    assert Runs(kept).numbers(plain) == {"n": 1} and Runs(kept).numbers(other) == {"n": 3}
+    assert len(Runs(kept).known) == 2
     monkeypatch.setattr(rounding, "source", lambda: "another!")
-    assert Runs(kept).known == {} and Runs(kept).numbers(plain) == {"n": 3}
+    assert Runs(kept).known == {} and Runs(kept).numbers(plain) == {"n": 4}
     assert {"fem", "model", "march"} <= set(rounding.ROOMS)
+
+
+def its_input(said):
+    return {"k": said.kinetics.maximum_utilization_rate}
+
+
+def test_runs_on_all_cores_are_kept_under_their_own_scenes(tmp_path, monkeypatch):
+    monkeypatch.setitem(OF, "base", its_input)
+    scenes = [scene("base", {"k": factor}) for factor in (0.9, 1.0, 1.1)]
+    Runs(tmp_path / "runs.jsonl").ahead(scenes)
+    monkeypatch.delitem(OF, "base")
+    for said in scenes:
+        assert Runs(tmp_path / "runs.jsonl").numbers(said) == its_input(said)
 
 
 def test_sobol_indices_of_a_linear_law():
@@ -118,11 +145,6 @@ def test_sobol_indices_of_a_linear_law():
     for order in ("first_order", "total_order"):
         values = [value for value, *_ in found["numbers"]["velocity"][order]]
         assert values == pytest.approx([share, 1 - share], abs=0.05)
-
-
-@pytest.mark.parametrize("samples", ["-2", "100"])
-def test_a_number_of_samples_is_a_power_of_two(samples, capsys):
-    assert driver.main(["--sobol", samples]) == 2 and "a power of two" in capsys.readouterr().err
 
 
 def test_claims_with_other_supplies_are_told_apart():

@@ -1,10 +1,9 @@
-"""`python -m verification.sensitivity [--only PART] [--sobol N]`: what the inputs allow, with pictures and a page.
+"""`python -m verification.sensitivity [--only PART]`: what the inputs allow, with pictures and a page.
 
 Its parts are base and wide, their elasticities and the one set of inputs; after_contact, how well wide is known after
-contact; and supplies, which of the claims about wide hold with other supplies.
+contact; supplies, which of the claims about wide hold with other supplies; and sobol, indices of base.
 
-Every run is kept in `out/runs.json` as it is computed, and a second call goes on from there. `--sobol N` computes Sobol
-indices of base too, N a power of two."""
+Every run is kept in `out/runs.jsonl` as it is computed, and a second call goes on from there."""
 
 from __future__ import annotations
 
@@ -194,8 +193,7 @@ def _sobol(found: dict) -> Iterator[Block]:
     yield Block("heading", "Sobol indices of base")
     yield Block("text", f"Total indices of {found['samples']} samples in `fast`, with intervals of "
                 f"{100 * found['confidence']:.0f} %: the share of a number's variance within the rounding that goes "
-                f"with an input. The widest of the intervals is {widest:.2f} to either side; more samples "
-                "(`--sobol N`) narrow them as the root of their number.")
+                f"with an input. The widest of the intervals is {widest:.2f} to either side.")
     yield table(("number", *found["inputs"]), (
         (NAMES.get(name, name), *map(_index, known["total_order"])) for name, known in found["numbers"].items()))
 
@@ -212,13 +210,8 @@ SECTIONS: dict[str, Callable[..., Iterator[Block]]] = {
 def main(arguments: list[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     parser = argparse.ArgumentParser(prog="python -m verification.sensitivity", description=__doc__.split("\n")[0])
-    parser.add_argument("--sobol", type=int, metavar="N", default=0, help="samples of the indices, a power of two")
     parser.add_argument("--only", choices=tuple(PARTS), help="one part alone; the record of the others stays")
-    chosen = parser.parse_args(arguments)
-    if chosen.sobol < 0 or chosen.sobol & (chosen.sobol - 1):
-        print(f"sensitivity: --sobol {chosen.sobol}: a power of two is accepted, or 0 for none", file=sys.stderr)
-        return 2
-    made = computed(Runs(), chosen.only, chosen.sobol)
+    made = computed(Runs(), parser.parse_args(arguments).only)
     write_json(sensitivity.RECORD, made)
     sensitivity.record.cache_clear()
     write(made)
@@ -227,18 +220,14 @@ def main(arguments: list[str] | None = None) -> int:
     return 0
 
 
-def computed(runs: Runs, only: str | None, samples: int) -> dict:
+def computed(runs: Runs, only: str | None) -> dict:
     """The record, what is not asked for as it is when that is there."""
-    asked = PARTS if only is None else (only,)
-    new = [PARTS[part](runs) for part in asked]
-    sensitivity.record.cache_clear()
     made = {"values": {}, "elasticities": {}, **sensitivity.record()}
     made["rounding"] = {each.name: each.rounding for each in ROUNDED}
-    for part in new:
+    for name in PARTS if only is None else (only,):
+        part = PARTS[name](runs, made["elasticities"])
         joined = {key: made[key] | part[key] for key in ("values", "elasticities") if key in part}
         made |= {**part, **joined}
-    if samples:
-        made["sobol"] = rounding.sobol(runs, made["elasticities"], samples)
     return made
 
 
@@ -246,15 +235,18 @@ def _of_scene(runs: Runs, name: str) -> dict:
     return {"values": runs.numbers(scene(name, {})), "elasticities": rounding.elasticities(runs, name)}
 
 
-def _of_base(runs: Runs) -> dict:
+def _of_base(runs: Runs, _) -> dict:
     found = _of_scene(runs, "base")
     return {**found, "one_set": rounding.one_set(runs, found["elasticities"])}
 
 
-PARTS: dict[str, Callable[[Runs], dict]] = {
-    "base": _of_base, "wide": lambda runs: _of_scene(runs, "wide"),
-    "after_contact": lambda runs: {"after_contact": wide.after_contact(runs)},
-    "supplies": lambda runs: {"supplies": wide.contacts(runs)}}
+#: Of each part what makes it, of the runs and the elasticities that are known by then.
+PARTS: dict[str, Callable[[Runs, dict], dict]] = {
+    "base": _of_base,
+    "wide": lambda runs, _: _of_scene(runs, "wide"),
+    "after_contact": lambda runs, _: {"after_contact": wide.after_contact(runs)},
+    "supplies": lambda runs, _: {"supplies": wide.contacts(runs)},
+    "sobol": lambda runs, known: {"sobol": rounding.sobol(runs, known)}}
 
 
 if __name__ == "__main__":

@@ -27,7 +27,10 @@ and its bootstrap's intervals.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
+import os
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from functools import cache
 from hashlib import sha256
@@ -48,7 +51,6 @@ from verification.claims.base_run import DISTANCES, END, upstream_means
 from verification.claims.evaluate import MESH_ORDERS
 from verification.claims.levels import converged
 from verification.claims.runs import ending
-from verification.kernel.writing import load, save
 from verification.uncertainty import estimate
 
 
@@ -126,7 +128,7 @@ def factors_of(values: dict[str, float]) -> dict[str, float]:
     return {name: value / BY_NAME[name].value for name, value in values.items()}
 
 
-KEPT = Path(__file__).parent / "out" / "runs.json"
+KEPT = Path(__file__).parent / "out" / "runs.jsonl"
 #: Conductivity is asked for so long after contact, h.
 AFTER = 4.0
 
@@ -186,21 +188,61 @@ def source() -> str:
 
 
 class Runs:
-    """Runs that have been computed with this source; each new one is kept at once, so that a break loses one run."""
+    """Runs that have been computed with this source; each new one is a line of the file at once, so that a break loses
+    no more than those under way."""
 
     def __init__(self, path: Path = KEPT) -> None:
         self.path = path
-        kept: dict[str, Numbers] = load(path, {})
-        self.known = {key: numbers for key, numbers in kept.items() if key.endswith(source())}
+        self.known: dict[str, Numbers] = dict(_kept(path))
 
     def numbers(self, said: Scene) -> Numbers:
         """What a scene's run comes to."""
-        key = f"{said.name}-{scene_hash(said)}-{source()}"
+        key = _key(said)
         if key not in self.known:
-            with np.errstate(all="raise", under="ignore"):
-                self.known[key] = {name: float(value) for name, value in OF[said.name](said).items()}
-            save(self.known, self.path)
+            self._keep(key, computed(OF[said.name], said))
         return self.known[key]
+
+    def ahead(self, scenes: Iterable[Scene]) -> None:
+        """Runs of scenes that are not known yet, on all cores."""
+        missing = {_key(said): said for said in scenes}
+        for key in self.known.keys() & missing.keys():
+            del missing[key]
+        if not missing:
+            return
+        print(f"{len(missing)} runs", flush=True)
+        with ProcessPoolExecutor(max_workers=os.cpu_count()) as pool:
+            waiting = {pool.submit(computed, OF[said.name], said): key for key, said in missing.items()}
+            for done in as_completed(waiting):
+                self._keep(waiting[done], done.result())
+
+    def _keep(self, key: str, numbers: Numbers) -> None:
+        """A line begins with its break, so that one that was cut spoils no other."""
+        self.known[key] = numbers
+        self.path.parent.mkdir(exist_ok=True)
+        with self.path.open("a", encoding="utf-8") as lines:
+            lines.write("\n" + json.dumps({"run": key, "numbers": numbers}))
+
+
+def computed(function: Callable[[Scene], Numbers], said: Scene) -> Numbers:
+    """What a run comes to, with no operation that fails silently."""
+    with np.errstate(all="raise", under="ignore"):
+        return {name: float(value) for name, value in function(said).items()}
+
+
+def _key(said: Scene) -> str:
+    return f"{said.name}-{scene_hash(said)}-{source()}"
+
+
+def _kept(path: Path) -> Iterator[tuple[str, Numbers]]:
+    """Runs of this source in a file, without lines that were cut."""
+    lines = path.read_text("utf-8").splitlines() if path.exists() else []
+    for line in lines:
+        try:
+            known = json.loads(line)
+        except ValueError:
+            continue
+        if known["run"].endswith(source()):
+            yield known["run"], known["numbers"]
 
 
 #: Relative distances of an input from its printed value; the larger one of an input that is taken as exact.
@@ -211,19 +253,27 @@ RESOLVED = 0.1
 
 def elasticities(runs: Runs, name: str) -> dict[str, dict[str, dict]]:
     """{number: {input: elasticity, bar, resolved, and the changes (%) that +-10 % of an exact input make}}."""
+    inputs = [each for each in INPUTS if each.only in ("", name)]
+    runs.ahead(scene(name, {each.name: factor}) for each in inputs for factor in _factors(each))
     plain, found = runs.numbers(scene(name, {})), {}
-    for each in INPUTS:
-        if each.only not in ("", name):
-            continue
-        print(f"{name}: {each.name}", flush=True)
+    for each in inputs:
         for number, value in _of_input(runs, name, each, plain).items():
             found.setdefault(number, {})[each.name] = value
     return found
 
 
+def _distances(each: Input) -> tuple[float, ...]:
+    """At which its differences are taken."""
+    return (NEAR, FAR) if each.half else (NEAR, FAR, LARGE)
+
+
+def _factors(each: Input) -> list[float]:
+    """On an input, above and below its value, of all of its runs."""
+    return [1 + sign * distance for distance in _distances(each) for sign in (1, -1)]
+
+
 def _of_input(runs: Runs, name: str, each: Input, plain: Numbers) -> dict[str, dict]:
-    distances = (NEAR, FAR) if each.half else (NEAR, FAR, LARGE)
-    pairs = {distance: _pair(runs, name, each, distance) for distance in distances}
+    pairs = {distance: _pair(runs, name, each, distance) for distance in _distances(each)}
     return {number: _told(number, value, pairs) for number, value in plain.items()}
 
 
@@ -353,6 +403,8 @@ def _solved(A: np.ndarray, b: np.ndarray, box: float | None) -> np.ndarray | Non
 
 
 LEAST, CONFIDENCE = 0.005, 0.95
+#: Samples, with which no interval of an index is wider than 0.05 to either side.
+SAMPLES = 1024
 SEED = 2001
 FAST = ('numerics.preset="fast"',)
 
@@ -363,7 +415,7 @@ def moving(elasticities: dict[str, dict[str, dict]]) -> list[Input]:
     return [each for each, largest in zip(ROUNDED, most) if largest > LEAST]
 
 
-def sobol(runs: Runs, elasticities: dict[str, dict[str, dict]], samples: int) -> dict:
+def sobol(runs: Runs, elasticities: dict[str, dict[str, dict]], samples: int = SAMPLES) -> dict:
     """First-order and total indices of each printed number, with their intervals."""
     chosen = moving(elasticities)
     inputs = [each.name for each in chosen]
@@ -371,7 +423,9 @@ def sobol(runs: Runs, elasticities: dict[str, dict[str, dict]], samples: int) ->
     names = [name for name, moves in zip(PRINTED, moved) if moves and name != "consumed"]
 
     def numbers(x: np.ndarray) -> np.ndarray:
-        rows = [runs.numbers(scene("base", dict(zip(inputs, column)), *FAST)) for column in x.T]
+        scenes = [scene("base", dict(zip(inputs, column)), *FAST) for column in x.T]
+        runs.ahead(scenes)
+        rows = [runs.numbers(said) for said in scenes]
         return np.array([itemgetter(*names)(row) for row in rows]).T
     spread = [uniform(1 - each.rounding, 2 * each.rounding) for each in chosen]
     found = sobol_indices(func=numbers, n=samples, dists=spread, rng=np.random.default_rng(SEED))

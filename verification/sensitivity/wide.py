@@ -33,7 +33,7 @@ from verification.claims.runs import WIDE, bodies, ending, polygon, series
 from verification.sensitivity.rounding import OF, Numbers, Runs, column, scene
 from verification.uncertainty import estimate
 
-SIZES = (2**-1.5, 0.5, 2**-0.5, 1.0)
+SIZES = (0.25, 2**-1.5, 0.5, 2**-0.5)
 #: Whole hours (h) after contact, which comes at 34.3 h.
 HOURS = tuple(map(float, range(35, 46)))
 #: The whole hour that is 5 h after contact.
@@ -67,6 +67,7 @@ OF["after contact"] = of_after
 
 def after_contact(runs: Runs) -> list[dict]:
     """Each number on all sizes, its bar (%), and whether that is what is asked."""
+    runs.ahead(map(_on_size, SIZES))
     sizes = [runs.numbers(_on_size(size)) for size in SIZES]
     wanted = {f"{kind} {name}": asked for kind in KINDS for name, asked in ASKED.items()}
     return [bar_of(quantity, column(sizes, quantity), asked) for quantity, asked in wanted.items()]
