@@ -127,7 +127,8 @@ def refused(out, capsys, *arguments):
     ({}, ["--vary", "pore.width=50 um, 60 um"], "another sweep (base, 3 runs)"),
     ({}, [*VARY, "--set", "flow.viscosity_ratio=5"], "another sweep"),
     ({"code": "0.0.1-abc"}, VARY, "begun with version 0.0.1-abc"), ('{"points": 1}', VARY, "sweep.json cannot be read"),
-    ("{", VARY, "sweep.json cannot be read"), ("null", VARY, "sweep.json cannot be read")])
+    ("{", VARY, "sweep.json cannot be read"), ("null", VARY, "sweep.json cannot be read"),
+    ({"points": 3}, VARY, "sweep.json cannot be read"), ("[" * 100_000, VARY, "sweep.json cannot be read")])
 def test_a_folder_of_another_sweep_is_refused(copied, capsys, change, arguments, said):
     """Of other runs, of other code, or with a record that is broken."""
     record = copied / "sweep.json"
