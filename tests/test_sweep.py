@@ -10,10 +10,12 @@ import subprocess
 import sys
 from contextlib import contextmanager
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
+import repro
 from repro import load_scene, results
 from repro.cli import main
 from repro.run.machine import THREADS
@@ -106,6 +108,14 @@ def test_a_run_that_is_not_whole_is_made_again(copied, capsys, monkeypatch):
     out, err = capsys.readouterr()
     assert "2 of 3 runs done, 1 failed" in out and "run 2 (flow.mean_velocity = 1e-12 m/day): failed" in err
     assert "run 3, flow.mean_velocity = 5.8 m/day: completed" in err and "run 1, " not in err
+
+
+@pytest.mark.parametrize("asked, started", [(None, 2), (400, 2), (1, 1)])
+def test_there_are_no_more_processes_than_runs(tmp_path, monkeypatch, asked, started):
+    monkeypatch.setattr(pool, "ready", Mock(wraps=in_this_process))
+    monkeypatch.setattr(pool, "cores", lambda: 64)
+    repro.sweep("flow_only", ["pore.width=48 um, 50 um"], tmp_path / "sweep", workers=asked)
+    pool.ready.assert_called_once_with(started)
 
 
 def test_another_run_in_the_place_of_one_is_refused(copied, capsys):
