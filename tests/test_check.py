@@ -244,3 +244,8 @@ def test_for_machines(capsys):
 def test_what_cannot_be_run_is_refused(tmp_path, override, said, capsys, monkeypatch):
     faults.absent_package(monkeypatch, "pypardiso")
     assert said in refused(tmp_path, capsys, "check", "base", "--set", override)
+
+
+def test_memory_and_time_are_expected_to_grow_with_the_mesh():
+    found = cost.expected(load_scene("flow_only"), cost.Trial(None, 2.0, 0.5, 1000, (100.0, 180.0)), 4000)
+    assert [found.memory, found.seconds] == pytest.approx([100 + 4 * 80 * cost.REMESHING, 2 * 4**1.2], rel=1e-12)

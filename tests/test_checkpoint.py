@@ -135,13 +135,19 @@ def with_number(array, place, value):
     return array
 
 
-def test_numbers_that_are_none_and_indices_that_are_no_nodes_are_refused(kept, tmp_path):
+#: A row too few, a row twice, and one column too many.
+RESIZED = (lambda a: a[:-1], lambda a: np.concatenate([a, a[-1:]]), lambda a: np.column_stack([a, a]))
+
+
+def test_numbers_that_are_none_indices_that_are_no_nodes_and_other_sizes_are_refused(kept, tmp_path):
     """In every array."""
     arrays = decoded(kept[2])[1]
     for name, array in arrays.items():
         wrong = {"f": NEVER, "i": (-1, len(arrays["points"]), 2**40)}.get(array.dtype.kind, ())
         for value in wrong if array.size else ():
             assert refused_with(kept, tmp_path / "x", **{name: partial(with_number, place=-1, value=value)})
+        for change in RESIZED if array.size else ():
+            assert refused_with(kept, tmp_path / "x", **{name: change}), name
 
 
 @pytest.mark.parametrize("section, name, value", [
@@ -166,7 +172,8 @@ def column(name, value):
 @pytest.mark.parametrize("name, change", [
     ("theta", lambda a: a * 0 + 1), ("theta", lambda a: 1.3 * a), ("theta", lambda a: with_number(a, 0, 1e-300)),
     ("active", lambda a: 1.5 * a), ("active", lambda a: with_number(a, 0, 0.0)),
-    ("active", lambda a: with_number(a, 1, -1e-9)), ("inert", lambda a: 300 * a), ("acceptor", lambda a: a + 1e300),
+    ("active", lambda a: with_number(a, 1, -1e-9)), ("inert", lambda a: with_number(a, 1, -1e-9)),
+    ("inert", lambda a: 300 * a), ("acceptor", lambda a: a + 1e300),
     ("reference", lambda a: 0 * a), ("fixed", lambda a: a & False), ("fixed", lambda a: np.roll(a, len(a) // 2)),
     ("wall", lambda a: with_number(a, 0, 2)), ("cells", lambda a: a * 0), ("record.ledgers", lambda a: a * 0 + 1e300),
     ("record.rows", column("aggregate_area_um2", 1e300)), ("record.rows", column("mean_velocity_m_per_d", -3.0)),

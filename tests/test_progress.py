@@ -149,3 +149,11 @@ def test_nobody_listens(tmp_path, deaf, options):
     assert process.wait(60) == 0 and "Traceback" not in message and "BrokenPipe" not in message
     assert deaf == "stdout" or "completed" in message
     assert told(tmp_path / "run")["status"] == "completed"
+
+
+def test_the_exit_statuses_are_told(capsys):
+    for command, statuses in (("run", ["0", "1", "2", "130", "143"]), ("sweep", ["0", "3", "2", "130", "143"])):
+        with pytest.raises(SystemExit):
+            main([command, "--help"])
+        said = capsys.readouterr().out.casefold().partition("exit status:")[2]
+        assert re.findall(r"\b\d+\b", said) == statuses

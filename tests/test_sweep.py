@@ -10,10 +10,12 @@ import subprocess
 import sys
 from contextlib import contextmanager
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
+import repro
 from repro import load_scene, results
 from repro.cli import main
 from repro.run.machine import THREADS
@@ -108,6 +110,14 @@ def test_a_run_that_is_not_whole_is_made_again(copied, capsys, monkeypatch):
     assert "run 3, flow.mean_velocity = 5.8 m/day: completed" in err and "run 1, " not in err
 
 
+@pytest.mark.parametrize("asked, started", [(None, 2), (400, 2), (1, 1)])
+def test_there_are_no_more_processes_than_runs(tmp_path, monkeypatch, asked, started):
+    monkeypatch.setattr(pool, "ready", Mock(wraps=in_this_process))
+    monkeypatch.setattr(pool, "cores", lambda: 64)
+    repro.sweep("flow_only", ["pore.width=48 um, 50 um"], tmp_path / "sweep", workers=asked)
+    pool.ready.assert_called_once_with(started)
+
+
 def test_another_run_in_the_place_of_one_is_refused(copied, capsys):
     """And a link to one: neither told as this one nor removed."""
     first, _, last = [copied / row["folder"] for row in rows(copied / "runs.csv")]
@@ -127,7 +137,8 @@ def refused(out, capsys, *arguments):
     ({}, ["--vary", "pore.width=50 um, 60 um"], "another sweep (base, 3 runs)"),
     ({}, [*VARY, "--set", "flow.viscosity_ratio=5"], "another sweep"),
     ({"code": "0.0.1-abc"}, VARY, "begun with version 0.0.1-abc"), ('{"points": 1}', VARY, "sweep.json cannot be read"),
-    ("{", VARY, "sweep.json cannot be read"), ("null", VARY, "sweep.json cannot be read")])
+    ("{", VARY, "sweep.json cannot be read"), ("null", VARY, "sweep.json cannot be read"),
+    ({"points": 3}, VARY, "sweep.json cannot be read"), ("[" * 100_000, VARY, "sweep.json cannot be read")])
 def test_a_folder_of_another_sweep_is_refused(copied, capsys, change, arguments, said):
     """Of other runs, of other code, or with a record that is broken."""
     record = copied / "sweep.json"

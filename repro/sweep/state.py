@@ -99,8 +99,9 @@ def _check(folder: Path, wanted: dict) -> None:
 def _read(folder: Path) -> dict:
     try:
         told = json.loads((folder / "sweep.json").read_text(encoding="utf-8"))
+        len(told["points"])  # raises TypeError where it is no list
         return {name: told[name] for name in ("scene", "code", "varied", "points")}
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, RecursionError):
         raise SweepError(f"--out {folder}: its sweep.json cannot be read; a new folder is "
                          "needed") from None
 
