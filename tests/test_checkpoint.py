@@ -174,6 +174,7 @@ def column(name, value):
     ("active", lambda a: 1.5 * a), ("active", lambda a: with_number(a, 0, 0.0)),
     ("active", lambda a: with_number(a, 1, -1e-9)), ("inert", lambda a: with_number(a, 1, -1e-9)),
     ("inert", lambda a: 300 * a), ("acceptor", lambda a: a + 1e300),
+    ("points", lambda a: with_number(a, a.size // 2, 1e6)), ("reference", lambda a: with_number(a, a.size // 2, -1e6)),
     ("reference", lambda a: 0 * a), ("fixed", lambda a: a & False), ("fixed", lambda a: np.roll(a, len(a) // 2)),
     ("wall", lambda a: with_number(a, 0, 2)), ("cells", lambda a: a * 0), ("record.ledgers", lambda a: a * 0 + 1e300),
     ("record.rows", column("aggregate_area_um2", 1e300)), ("record.rows", column("mean_velocity_m_per_d", -3.0)),

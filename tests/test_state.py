@@ -63,6 +63,22 @@ def again(mesh, **changes):
     return Mesh.of(**parts)
 
 
+@pytest.mark.parametrize("kind", ORDERS.values())
+def test_what_is_replaced_remembers_nothing(kind):
+    """Of each object that works things out once: its fields alone go to the other, and nothing that it has kept."""
+    scene = load_scene("base", ["numerics.preset=fast", f"numerics.elements={kind}", "numerics.refinement=0.5"])
+    now = pore.seeded(scene)
+    pore.solve(scene, now)
+    contact.expand(scene, now, 1.02 * now.theta)
+    kept = (now, now.space, now.mesh, now.mesh.topology, now.mesh.topology.straight, now.body, now.body.shape)
+    for thing in map(touched, kept):
+        names = {field.name for field in fields(thing)}
+        assert names < vars(thing).keys(), "else nothing is tested"
+        other = replace(thing)
+        assert vars(other).keys() == names, type(thing)
+        assert all(value == {} for value in vars(other).values() if isinstance(value, dict)), type(thing)
+
+
 @geometries
 def test_a_mesh_with_other_points_forgets(geometry):
     """All that depends on places is worked out anew; what depends on the connections alone stays."""

@@ -178,3 +178,11 @@ def test_a_film_too_thin_from_the_start_closes(order):
     first, *_, last = simulation.simulate(scene("18.5 um", "20 um", "0 mg/L", "0 mg/L", velocity="2.9 m/day",
                                                 growth={"end": "0.1 h"}, numerics=numerics))
     assert last.pore.contact and last.pore.mass == pytest.approx(first.pore.mass, rel=1e-9)
+
+
+@pytest.mark.parametrize("end, step", [("0 h", "12 min"), ("1e-9 h", "12 min"), ("1e-8 h", "100 h"), ("1 h", "1000 h"),
+                                       ("3e-7 h", "1e-6 h")])
+def test_rows_of_runs_shorter_than_times_are_told_apart_do_not_coincide(end, step):
+    made = base(f'growth.end="{end}"', f'growth.time_step="{step}"')
+    rows = stepping.rows(made)
+    assert bool(rows) == (made.growth.end > 1e-9) and all(np.diff((0.0, *rows)) >= 0.99e-9)
