@@ -80,12 +80,11 @@ def test_mutants_are_caught_survive_or_do_not_end_and_calls_are_seen(tmp_path):
 
 
 TIMED = Measured("q", 1.0, frozenset({("timing.py", "timed")}))
-ROW = Row("n", "timing.py", 1, "o", "x = 1", "x = 2", drawing.digest(drawing.sources()["timing.py"]), "caught",
-          "tests/test_sampled.py::test")
+ROW = Row("n", "timing.py", 1, "o", "x = 1", "x = 2", drawing.digest(drawing.sources()["timing.py"]), "caught", TIMED.id)
 
 
 @pytest.mark.parametrize("changes, stands", [
-    ({}, True), ({"module": "another"}, False), ({"test": "tests/test_gone.py::test"}, False),
+    ({}, True), ({"module": "another"}, False), ({"test": "tests/test_sampled.py::test_gone"}, False),
     ({"verdict": "survivor", "tests": "others"}, False)])
 def test_a_row_stands_as_long_as_what_it_rests_on(changes, stands):
     mutant = Mutant("timing.py", 33, 0, "o", 0, "x = 1", "x = 2")

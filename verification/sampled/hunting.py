@@ -1,8 +1,9 @@
 """The hunt for mutants that no test sees, and what is kept of it.
 
 A mutant's row is written when it is done, and kept as long as its module, its line and the tests that reach it are the
-same: a hunt that was interrupted goes on, and after a change of the tests survivors alone are tried again. A mutant of
-a changed module meets the test that caught it before, alone, and all others only if that one lets it pass.
+same: a hunt that was interrupted goes on, and after a change of the tests survivors are tried again, and mutants whose
+catcher is gone. A mutant of a changed module meets the test that caught it before, alone, and all others only if that
+one lets it pass.
 
 What is committed of a hunt: ``report/sampled.json``, the rows, and ``report/sampled.md``, told to a reader.
 """
@@ -71,7 +72,7 @@ def _stands(row: Row | None, mutant: Mutant, text: str, reach: Reach, whole: boo
     if row is None or row.module != digest(text):
         return False
     if row.verdict == "caught":
-        return (ROOT / row.test.partition("::")[0]).exists()
+        return row.test in reach.ids
     tests = reach.of(mutant.file, text, mutant.line)
     return row.tests == _names(tests) and not (whole and row.tried < row.reached)
 

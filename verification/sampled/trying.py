@@ -138,6 +138,11 @@ class Reach:
     tests: tuple[Measured, ...]
 
     @cached_property
+    def ids(self) -> frozenset[str]:
+        """Names of all of them."""
+        return frozenset(test.id for test in self.tests)
+
+    @cached_property
     def by_function(self) -> dict[Call, list[Measured]]:
         """Tests by the (file, function) that they call."""
         found: dict[Call, list[Measured]] = {}
