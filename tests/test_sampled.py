@@ -80,7 +80,8 @@ def test_mutants_are_caught_survive_or_do_not_end_and_calls_are_seen(tmp_path):
 
 
 TIMED = Measured("q", 1.0, frozenset({("timing.py", "timed")}))
-ROW = Row("n", "timing.py", 1, "o", "x = 1", "x = 2", drawing.digest(drawing.sources()["timing.py"]), "caught", TIMED.id)
+ROW = Row("n", "timing.py", 1, "o", "x = 1", "x = 2", drawing.digest(drawing.sources()["timing.py"]), "caught",
+          TIMED.id)
 
 
 @pytest.mark.parametrize("changes, stands", [
