@@ -8,7 +8,7 @@ rounding that comes nearest to all printed numbers of base at once. The claims r
 Runs are made in this process and not by `repro sweep`: a number needs a state that no row of a run holds (grown and not
 yet expanded [E12]) or another run from contact on, and elasticities and the set choose the next run by the last. They
 write no fields, no rows and no folders: what stays of a run are its numbers, 0.4 kB in `out/runs.jsonl`, of which the
-whole study makes 4 MB. A run is not made again while it stands there under its scene and the source that made it.
+whole study makes 2 MB. A run is not made again while it stands there under its scene and the source that made it.
 """
 
 from __future__ import annotations
