@@ -103,8 +103,11 @@ def circle(sources):
 
 def inside(names, sources):
     """Modules of `repro` among what is asked for: a.b where that is a module, else a."""
-    tried = [(name, f"{name}.__init__", name.rpartition(".")[0]) for name in names if name.startswith("repro.")]
-    return {next((each for each in places if each in sources), "repro.__init__") for places in tried}
+    found = set()
+    for name in (name for name in names if name.startswith("repro.")):
+        places = (name, f"{name}.__init__", name.rpartition(".")[0])
+        found.add(next((place for place in places if place in sources), "repro.__init__"))
+    return found
 
 
 def normal(name):

@@ -258,7 +258,8 @@ def test_one_set_of_inputs_gives_all_printed_numbers_of_base():
     factors, rounding = factors_of(found["inputs"]), sensitivity.record()["rounding"]
     assert all(abs(factor - 1) <= rounding[name] + 1e-12 for name, factor in factors.items())
     for name, printed in PRINTED.items():
-        number, bar, (low, high) = found["numbers"][name], found["bars"][name], claims.interval(printed)
+        number, bar = found["numbers"][name], found["bars"][name]
+        low, high = claims.interval(printed)
         assert low <= number - bar and number + bar <= high, name
     assert misfit(of_base(scene_of("base", factors))) <= 1
 

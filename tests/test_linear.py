@@ -104,7 +104,8 @@ def test_other_packages_order_and_solve(installed, monkeypatch):
     """Stand-ins that do what the packages say, and the packages where they are installed."""
     for package in ("pypardiso", "pymetis"):
         pytest.importorskip(package) if installed else faults.stand_in_package(monkeypatch, package)
-    method, right, (grid, _) = Method("pardiso", "metis"), np.arange(60.0), meshed(None)
+    method, right = Method("pardiso", "metis"), np.arange(60.0)
+    grid, _ = meshed(None)
     assert method.checked() is method
     assert solve(STEEP, right, method) == pytest.approx(solve(STEEP, right), rel=1e-12)
     order = linear.node_order(len(grid.points), grid.triangles, method)

@@ -229,9 +229,10 @@ def test_lines_of_the_page_are_courses_of_runs_or_join_runs_that_differ_in_one_k
     for which, figure in enumerate((first, second)):
         dots = re.findall(r'<circle [^>]*cx="([^"]*)" cy="([^"]*)"[^>]*><title>run (.)', figure)
         run_at = {f"{x},{y}": found[int(index) - 1].values for x, y, index in dots}
-        lines = [[run_at[place] for place in line.split()] for line in re.findall('<polyline.*?points="(.*?)"', figure)]
+        lines = [line.split() for line in re.findall('<polyline.*?points="(.*?)"', figure)]
         assert len(run_at) == 6 and [len(line) for line in lines] == ([3, 3], [2, 2, 2])[which]
-        for line in lines:
+        for places in lines:
+            line = [run_at[place] for place in places]
             assert len({values[1 - which] for values in line}) == 1 and line == sorted(line)
 
 

@@ -102,8 +102,13 @@ def contact(run: Run) -> float:
 
 def conductivity_change(run: Run, hours: tuple[float, ...] = AFTER, plain: Run = ()) -> float:
     """Geometric mean of the conductivity in rows at some hours, against that of a plain run or of WHOLE, in percent."""
-    ours, other = ([at(chosen, hour)["conductivity_m_per_d"] for hour in hours] for chosen in (plain or WHOLE, run))
-    return 100 * float(np.exp(np.mean(np.log(other) - np.log(ours))) - 1)
+    before, after = (_conductivities(chosen, hours) for chosen in (plain or WHOLE, run))
+    return 100 * float(np.exp(np.mean(np.log(after) - np.log(before))) - 1)
+
+
+def _conductivities(run: Run, hours: tuple[float, ...]) -> list[float]:
+    """m/d, in rows at some hours."""
+    return [at(run, hour)["conductivity_m_per_d"] for hour in hours]
 
 
 def _of_angles(hours: tuple[float, ...]) -> str:
