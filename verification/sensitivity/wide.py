@@ -6,7 +6,8 @@ surface grows by whole edges of the outline, so that a single row jumps, by an e
 instant at which a node joins. Its mean over the whole hours from contact to the end of Figure 6 does not. The bar is
 that of `verification.uncertainty` from the converged solution on four sizes of elements and steps. These were 0.5 to
 sqrt(2) once; twice a size was added at the fine end and the coarsest left out: that of sqrt(2), whose conductivity at
-45 h is 0.4 % off where the next four differ by 0.15 %, and that of 1, 0.5 % off at 39 h where the others differ by 0.11 %.
+45 h is 0.4 % off where the next four differ by 0.15 %, and that of 1, 0.5 % off at 39 h where the others differ by
+0.11 %.
 
 **Supplies**: for each, when contact comes, outlines every 5 h until as long after contact as Figure 6 goes on, or until
 the aggregate reaches an end of the pore, and which of the claims about wide hold then. Those are the functions of
