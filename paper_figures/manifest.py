@@ -37,15 +37,17 @@ COMMITTED = Path(__file__).parent / "manifest.json"
 NAME = "manifest.json"
 #: How far, relative, a number of the last row may lie from the committed one: three times and more what a relative
 #: change of 1e-12 in the seed's radius makes of base and wide in the paper's scheme (largest of both: meshed length
-#: 2.3 %, nodes 4 %, densities 2.6 %, inlet concentrations 0.6 %, velocity, conductivity, effluents and least
-#: concentrations 0.3 %, ends 0.06 %, area 0.004 %).
-PROMISED = {"meshed_length_um": 0.08, "nodes": 0.15, "inlet_acceptor_mg_per_L": 0.03, "inlet_donor_mg_per_L": 0.03,
+#: 2.3 %, densities 2.6 %, inlet concentrations 0.6 %, velocity, conductivity, effluents and least concentrations 0.3 %,
+#: ends 0.06 %, area 0.004 %).
+PROMISED = {"meshed_length_um": 0.08, "inlet_acceptor_mg_per_L": 0.03, "inlet_donor_mg_per_L": 0.03,
             "aggregate_area_um2": 0.002, "thickness_um": 0.002, "upstream_um": 0.005, "downstream_um": 0.005,
             "inert_fraction": 0.002, "time_h": 1e-9, "contact": 0.0, "head_loss_cm": 0.02,
             "acceptor_min_mg_per_L": 0.1, "biomass_density_min": 0.1, "biomass_density_max": 0.1}
 OTHERS_PROMISED = 0.02
-#: Numbers of the last row that are round-off, or tell of the last step alone.
-NOT_PROMISED = ("_balance", "remeshed")
+#: Numbers of the last row that are round-off, or tell of the last step or the last mesh alone: with half the least
+#: angle the last mesh of wide has 707 nodes with one kernel of OpenBLAS and 927 with another, where no other number
+#: differs by more than is promised.
+NOT_PROMISED = ("_balance", "remeshed", "nodes")
 #: Of a run's files, those without data: they hold times of day, or tell of the others.
 NOT_DATA = ("run.json", "report.html", "checkpoint.last", "fields.sha256")
 
@@ -55,7 +57,8 @@ def environment() -> dict[str, str]:
     blas = np.show_config(mode="dicts")["Build Dependencies"]["blas"]
     return {"source": source_hash(), "python": platform.python_version(),
             **{name: version(name) for name in (*PACKAGES, "matplotlib")},
-            "blas": f"{blas['name']} {blas['version']}", "threads": os.environ.get("OMP_NUM_THREADS", "not set"),
+            "blas": f"{blas['name']} {blas['version']}", "kernel": os.environ.get("OPENBLAS_CORETYPE", "its own"),
+            "threads": os.environ.get("OMP_NUM_THREADS", "not set"),
             "system": f"{platform.system()} {platform.machine()}", "processor": processor()}
 
 
