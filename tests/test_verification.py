@@ -137,5 +137,7 @@ def test_rows_that_were_appended_are_read_but_for_one_that_was_cut(tmp_path):
     assert writing.lines(file) == []
     writing.append({"a": 1}, file)
     with file.open("a", encoding="utf-8") as opened:
-        opened.write('{"a": 2')
+        opened.write('\n{"a": 2')
     assert writing.lines(file) == [{"a": 1}]
+    writing.append({"a": 3}, file)
+    assert writing.lines(file) == [{"a": 1}, {"a": 3}]

@@ -84,7 +84,7 @@ def save(record: Any, file: Path) -> None:
 
 
 def lines(file: Path) -> list[dict]:
-    """Rows that were appended to a file; the last one may be cut."""
+    """Rows that were appended to a file, without those that were cut."""
     rows = []
     for line in file.read_text(encoding="utf-8").splitlines() if file.exists() else []:
         with suppress(json.JSONDecodeError):
@@ -93,7 +93,8 @@ def lines(file: Path) -> list[dict]:
 
 
 def append(row: dict, file: Path) -> None:
-    """Add a row to a file, so that a break loses one at most."""
+    """Add a row to a file, so that a break loses one at most: a row begins with its break, and one that was cut spoils
+    no other."""
     file.parent.mkdir(parents=True, exist_ok=True)
     with file.open("a", encoding="utf-8") as opened:
-        opened.write(json.dumps(row) + "\n")
+        opened.write("\n" + json.dumps(row))

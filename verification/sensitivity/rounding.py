@@ -27,9 +27,8 @@ and its bootstrap's intervals.
 
 from __future__ import annotations
 
-import json
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from functools import cache
@@ -51,6 +50,7 @@ from verification.claims.base_run import DISTANCES, END, upstream_means
 from verification.claims.evaluate import MESH_ORDERS
 from verification.claims.levels import converged
 from verification.claims.runs import ending
+from verification.kernel.writing import append, lines
 from verification.uncertainty import estimate
 
 
@@ -193,7 +193,8 @@ class Runs:
 
     def __init__(self, path: Path = KEPT) -> None:
         self.path = path
-        self.known: dict[str, Numbers] = dict(_kept(path))
+        self.known: dict[str, Numbers] = {row["run"]: row["numbers"] for row in lines(path)
+                                          if row["run"].endswith(source())}
 
     def numbers(self, said: Scene) -> Numbers:
         """What a scene's run comes to."""
@@ -204,9 +205,8 @@ class Runs:
 
     def ahead(self, scenes: Iterable[Scene]) -> None:
         """Runs of scenes that are not known yet, on all cores."""
-        missing = {_key(said): said for said in scenes}
-        for key in self.known.keys() & missing.keys():
-            del missing[key]
+        asked = {_key(said): said for said in scenes}
+        missing = {key: said for key, said in asked.items() if key not in self.known}
         if not missing:
             return
         print(f"{len(missing)} runs", flush=True)
@@ -216,11 +216,8 @@ class Runs:
                 self._keep(waiting[done], done.result())
 
     def _keep(self, key: str, numbers: Numbers) -> None:
-        """A line begins with its break, so that one that was cut spoils no other."""
         self.known[key] = numbers
-        self.path.parent.mkdir(exist_ok=True)
-        with self.path.open("a", encoding="utf-8") as lines:
-            lines.write("\n" + json.dumps({"run": key, "numbers": numbers}))
+        append({"run": key, "numbers": numbers}, self.path)
 
 
 def computed(function: Callable[[Scene], Numbers], said: Scene) -> Numbers:
@@ -231,18 +228,6 @@ def computed(function: Callable[[Scene], Numbers], said: Scene) -> Numbers:
 
 def _key(said: Scene) -> str:
     return f"{said.name}-{scene_hash(said)}-{source()}"
-
-
-def _kept(path: Path) -> Iterator[tuple[str, Numbers]]:
-    """Runs of this source in a file, without lines that were cut."""
-    lines = path.read_text("utf-8").splitlines() if path.exists() else []
-    for line in lines:
-        try:
-            known = json.loads(line)
-        except ValueError:
-            continue
-        if known["run"].endswith(source()):
-            yield known["run"], known["numbers"]
 
 
 #: Relative distances of an input from its printed value; the larger one of an input that is taken as exact.
