@@ -115,7 +115,7 @@ def test_a_limit_of_address_space_leaves_what_is_not_taken_of_it(tmp_path, monke
 
 
 def test_the_source_is_every_module_of_every_room(tmp_path, monkeypatch):
-    """What runs of other code are told apart by."""
+    """What runs of other code are told apart by; a module of another room is another."""
     found = set()
     for name in ("run/machine.py", "timing.py", "model/flow.py", "model/more/deep.py"):
         module = tmp_path / name
@@ -124,7 +124,9 @@ def test_the_source_is_every_module_of_every_room(tmp_path, monkeypatch):
             module.write_text(text)
             monkeypatch.setattr(machine, "__file__", str(tmp_path / "run" / "machine.py"))
             found.add(machine.source_hash.__wrapped__())
-    assert len(found) == 8
+    (tmp_path / "model").rename(tmp_path / "motel")
+    found.add(machine.source_hash.__wrapped__())
+    assert len(found) == 9
 
 
 def limited(kind, most, *arguments):

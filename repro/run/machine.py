@@ -33,8 +33,9 @@ def require_packages(scene: Scene) -> None:
 def source_hash() -> str:
     """8 hexadecimal digits that stand for the package's source."""
     digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parents[1].rglob("*.py")):
-        digest.update(path.name.encode() + path.read_bytes())
+    package = Path(__file__).parents[1]
+    for path in sorted(package.rglob("*.py")):
+        digest.update(path.relative_to(package).as_posix().encode() + path.read_bytes())
     return digest.hexdigest()[:8]
 
 
