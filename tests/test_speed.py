@@ -62,8 +62,25 @@ def scenes(seconds, *unneeded):
                                  "unneeded": list(more)} for name, took, stages, more in rows]}}
 
 
+def sized(ratio, nodes):
+    """A growth step of one method, over its floor."""
+    return {"size": lines({next(iter(runs.METHODS)): [point(1.0, 0.0, ratio=ratio, nodes=nodes)]})}
+
+
+def taking(slope):
+    """Live bytes a step, of which 100 are allowed."""
+    return {"memory": {"rows": [{"method": "preset paper", "slope": slope, "bound": 100.0, "steps": 9}]}}
+
+
+def wide(seconds):
+    """The last run of base's part."""
+    run = {"seconds": seconds, "cpu": 1.0, "end": 45.0, "steps": 7}
+    return {"base": {**base()["base"], "wide": [run]}}
+
+
 OWN = "the paper's scheme at its own best speed for "
 FASTER = f"base: preset fast is faster than {OWN}"
+STEP = f"a growth step over its factorise-and-solve time, {next(iter(runs.METHODS))}, "
 
 
 @pytest.mark.parametrize("parts, claim, holds, measured", [
@@ -77,6 +94,13 @@ FASTER = f"base: preset fast is faster than {OWN}"
     (box(9.5), "box: faster than fipy", False, "9.5 times"), (box(10.5), "box: faster than fipy", True, "10.5 times"),
     (scenes(0.45), "flow only", True, "5 % at most"), (scenes(0.55), "flow only", False, "15 % at most"),
     (scenes(0.4, "growth"), "flow only", False, "other stages: growth"),
+    (sized(1.4, 2600), f"{STEP}from 2500 nodes on", True, "1.40 at 2600"),
+    (sized(1.6, 2600), f"{STEP}from 2500 nodes on", False, "1.60 at 2600"),
+    (sized(1.9, 600), f"{STEP}at 600 nodes", True, "1.90 at 600"),
+    (sized(2.1, 600), f"{STEP}at 600 nodes", False, "2.10 at 600"),
+    (taking(99.0), "preset paper: live memory", True, "99 bytes a step over 9 steps; 100 allowed"),
+    (taking(101.0), "preset paper: live memory", False, "101 bytes"),
+    (wide(11.9), "wide in preset fast", True, "11.90 s"), (wide(12.1), "wide in preset fast", False, "12.10 s"),
     ({}, "the error of preset fast", None, told.NOT_MEASURED)])
 def test_each_verdict_follows_from_what_was_measured(parts, claim, holds, measured):
     (found,) = [one for one in told.judged({"parts": parts}) if claim in one["claim"]]
