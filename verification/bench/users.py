@@ -86,18 +86,19 @@ def fipy(problem: Problem, across: int) -> np.ndarray:
     where = problem.inside(*mesh.cellCenters.value)
     X = CellVariable(mesh=mesh, value=np.where(where, DENSITY, 0.0))
     both = [CellVariable(mesh=mesh, value=s) for s in SUPPLY]
-    constants = [CellVariable(mesh=mesh) for _ in both]
-    slopes = [(CellVariable(mesh=mesh), CellVariable(mesh=mesh)) for _ in both]
+    linear = [CellVariable(mesh=mesh) for _ in range(6)]
     equations = []
     for k, field in enumerate(both):
-        one = DiffusionTerm(coeff=DIFFUSIVITY[k], var=field) == X * constants[k]
-        for other, slope in zip(both, slopes[k]):
+        *slopes, constant = linear[3 * k: 3 * k + 3]
+        one = DiffusionTerm(coeff=DIFFUSIVITY[k], var=field) == X * constant
+        for other, slope in zip(both, slopes):
             one = one + ImplicitSourceTerm(coeff=-X * slope, var=other)
         equations.append(one + _fipy_ends(problem, mesh, field, k))
     equation = equations[0] & equations[1]
     for _ in range(MOST):
         before = np.array([field.value for field in both])
-        _linearise(before, constants, slopes)
+        for variable, values in zip(linear, _linear(before)):
+            variable.setValue(values)
         equation.sweep(solver=LinearLUSolver(tolerance=EXACT))
         fields = np.array([field.value for field in both])
         if np.abs(fields - before).max() < REST * max(SUPPLY):
@@ -124,14 +125,12 @@ def _fipy_ends(problem: Problem, mesh, field, k: int):
     return first * SUPPLY[k] - CentralDifferenceConvectionTerm(coeff=(problem.speed,), var=field)
 
 
-def _linearise(now, constants, slopes) -> None:
-    """q = constant + sum of slopes times C at the present C (2, n); slopes by central differences."""
+def _linear(now: np.ndarray) -> np.ndarray:
+    """(6, n) q at the present C (2, n) made linear: of the acceptor and then of the donor its slopes by C_A and C_D, by
+    central differences, and the constant beside them."""
     by = derivatives(now, RATES)
     rest = np.array(uptake(*now, RATES)) - np.einsum("kjn,jn->kn", by, now)
-    for k in (0, 1):
-        constants[k].setValue(rest[k])
-        for j in (0, 1):
-            slopes[k][j].setValue(by[k, j])
+    return np.concatenate([by, rest[:, None]], axis=1).reshape(6, -1)
 
 
 def py_pde(problem: Problem, across: int) -> tuple[np.ndarray, dict]:

@@ -59,10 +59,10 @@ def of_supplies(found: dict[str, dict], target: Path) -> None:
     """Outlines of wide every 5 h, a supply a row, the latest at the back."""
     made = Figure(figsize=(9, 1.7 * len(found)), layout="constrained")
     for axes, (supply, known) in zip(made.subplots(len(found), sharex=True), found.items()):
-        shown = [(float(time), _places(text)) for time, text in known["outlines"].items()]
-        last = max(time for time, _ in shown)
-        for time, places in reversed(shown):
-            axes.fill(*places.T, facecolor=matplotlib.colormaps["viridis_r"](time / last), edgecolor="white")
+        *_, last = map(float, known["outlines"])
+        for time, places in reversed(known["outlines"].items()):
+            colour = matplotlib.colormaps["viridis_r"](float(time) / last)
+            axes.fill(*_places(places).T, facecolor=colour, edgecolor="white")
         axes.set_ylim(0, WIDTH)
         axes.set_aspect("equal")
         axes.set_title(f"{supply} K_s: every 5 h to {last:g} h; contact at {known['contact_time']:.1f} h", loc="left",
@@ -207,7 +207,6 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--only", choices=tuple(PARTS), help="one part alone; the record of the others stays")
     made = computed(Runs(), parser.parse_args(arguments).only)
     write_json(sensitivity.RECORD, made)
-    sensitivity.record.cache_clear()
     write(made)
     write_text(sensitivity.RECORD.with_suffix(".md"), page(made))
     print(f"{sensitivity.RECORD.name}, its page, tornado.svg and supplies.svg: written")
