@@ -115,7 +115,7 @@ def plug(share: float, ends: float, upstream: float) -> np.ndarray:
     angle = np.linspace(0.0, STEEPEST, 25)
     x, y = (1 - np.cos(angle)) / (1 - np.cos(STEEPEST)), np.sin(angle) / np.sin(STEEPEST)
     y[-1] = 1.0
-    beside = ends * float(np.sum(0.5 * (x[1:] + x[:-1]) * np.diff(y)))
+    beside = ends * float(np.trapezoid(x, y))
     base = share + beside
     left = np.column_stack([-base / 2 + upstream * ends * x, y])
     right = np.column_stack([base / 2 - (1 - upstream) * ends * x, y])

@@ -251,6 +251,9 @@ def _told(value: float, moved: list[float]) -> dict:
 #: What section 4 prints: C01-C04.
 PRINTED = {"velocity_0": "2.9", "velocity": "1.5", "effluent_acceptor": "4.19", "effluent_donor": "6.13",
            "consumed": "~60"}
+#: The intervals of the printed numbers, their middles and half widths.
+INTERVALS = np.array([interval(text) for text in PRINTED.values()])
+MIDDLE, HALF = INTERVALS.mean(axis=1), np.ptp(INTERVALS, axis=1) / 2
 #: Sizes of elements and steps of the runs that make the set, the one that counts first: on 0.5, 2**-0.5 and 1 the bar
 #: of the acceptor effluent, 0.005, is as wide as what its digits leave to either side.
 SET_SIZES = (2**-1.5, 0.5, 2**-0.5)
@@ -262,12 +265,6 @@ AIMED, ENOUGH = 0.4, 0.5
 ROUNDS = 6
 
 
-def targets() -> tuple[np.ndarray, np.ndarray]:
-    """Middles and half widths of the intervals of the printed numbers."""
-    low, high = np.array([interval(text) for text in PRINTED.values()]).T
-    return 0.5 * (low + high), 0.5 * (high - low)
-
-
 def printed_of(numbers: Numbers) -> np.ndarray:
     """Those that the paper prints."""
     return np.array([numbers[name] for name in PRINTED])
@@ -276,8 +273,7 @@ def printed_of(numbers: Numbers) -> np.ndarray:
 def misfit(numbers: Numbers, bars: ArrayLike = 0.0) -> float:
     """Largest distance of a printed number, or of an end of its bar, from the middle of its interval, in half
     intervals."""
-    middle, half = targets()
-    return float(((np.abs(printed_of(numbers) - middle) + bars) / half).max())
+    return float(((np.abs(printed_of(numbers) - MIDDLE) + bars) / HALF).max())
 
 
 def one_set(runs: Runs, elasticities: dict[str, dict[str, dict]]) -> dict:
@@ -326,14 +322,13 @@ def _bars(rows: np.ndarray) -> np.ndarray:
 def program(start: np.ndarray, slopes: np.ndarray, bars: np.ndarray) -> tuple[np.ndarray, float]:
     """Relative changes and the share of the rounding that they take; within it, with the least misfit, where the
     intervals, less the bars, are out of reach."""
-    middle, half = targets()
     rounding = np.array([each.rounding for each in ROUNDED])
-    aimed = np.minimum(half - KEPT_INSIDE * bars, AIMED * half)
-    given, none, ones = (slopes * rounding, middle - start), np.zeros(len(half)), np.ones(len(rounding))
+    aimed = np.minimum(HALF - KEPT_INSIDE * bars, AIMED * HALF)
+    given, none, ones = (slopes * rounding, MIDDLE - start), 0 * HALF, np.ones(len(rounding))
     best = _solved(*given, aimed, none, 0 * ones, ones)
     share = best[-1] if best is not None else np.inf
     if share > 1:
-        best = _solved(*given, none, half, ones, 0 * ones)
+        best = _solved(*given, none, HALF, ones, 0 * ones)
     return best[:-1] * rounding, float(share)
 
 
@@ -368,13 +363,12 @@ def sobol(runs: Runs, elasticities: dict[str, dict[str, dict]], samples: int = S
     spread = [uniform(1 - each.rounding, 2 * each.rounding) for each in chosen]
     found = sobol_indices(func=numbers, n=samples, dists=spread, rng=np.random.default_rng(SEED))
     sure = found.bootstrap(confidence_level=CONFIDENCE, n_resamples=999)
+    orders = zip(names, _listed(found.first_order, sure.first_order), _listed(found.total_order, sure.total_order))
     return {"samples": samples, "inputs": inputs, "confidence": CONFIDENCE,
-            "numbers": {name: {"first_order": _listed(found.first_order, sure.first_order, row),
-                               "total_order": _listed(found.total_order, sure.total_order, row)}
-                        for row, name in enumerate(names)}}
+            "numbers": {name: {"first_order": first, "total_order": total} for name, first, total in orders}}
 
 
-def _listed(values: np.ndarray, sure, row: int) -> list[list[float]]:
-    """[index, low, high] of each input."""
+def _listed(values: np.ndarray, sure) -> list[list[list[float]]]:
+    """[index, low, high] of each number and input."""
     interval = sure.confidence_interval
-    return np.column_stack([values[row], interval.low[row], interval.high[row]]).tolist()
+    return np.stack([values, interval.low, interval.high], axis=-1).tolist()
