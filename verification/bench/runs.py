@@ -74,7 +74,7 @@ def base_part(quick: bool) -> dict:
     ``quick``: to 2 h, against the finest of its own runs.
     """
     times = (1.8, 2.0) if quick else TIMES
-    about = _short(times) if quick else reference()
+    about = {"reference_values": values(times, *OF_ACCURATE).tolist()} if quick else reference()
     repeats = 1 if quick else BASE_REPEATS
     lines = measured(jobs(np.array(about["reference_values"]), times, quick), repeats)
     found = {"title": f"Base to {times[1]:g} h, nothing written", "repeats": repeats, "lines": lines,
@@ -129,11 +129,6 @@ def reference() -> dict:
                      f"{CHECK[0]} rings and {CHECK[1]} steps; from {REFERENCE[0]} and {REFERENCE[1]} they differ by "
                      f"{apart(found, check).max():.1e}",
         "reference_times": list(TIMES), "reference_values": check.tolist()}
-
-
-def _short(times) -> dict:
-    return {"reference": "preset accurate: a quick look, no reference",
-            "reference_values": values(times, *OF_ACCURATE).tolist()}
 
 
 def wide() -> list[dict]:

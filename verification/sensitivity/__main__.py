@@ -115,9 +115,12 @@ def page(record: dict) -> str:
 
 
 def _table(record: dict) -> Block:
-    numbers = list(record["elasticities"])
-    head = ("input", "rounding (%)", *(NAMES.get(name, name.replace("_", " ")) for name in numbers))
-    return table(head, (_row(each, record["elasticities"]) for each in INPUTS))
+    known = record["elasticities"]
+    return table(("input", "rounding (%)", *map(_called, known)), (_row(each, known) for each in INPUTS))
+
+
+def _called(number: str) -> str:
+    return NAMES.get(number, number.replace("_", " "))
 
 
 def _row(each: Input, elasticities: dict[str, dict]) -> tuple[str, ...]:
@@ -143,7 +146,7 @@ def _set(found: dict) -> Iterator[Block]:
                         f"run on sizes {sizes} of elements and steps, over those of `accurate`; the bar is from all of "
                         "them, and a set counts where the whole bar lies in the interval of the printed digits.")
     yield table(("number", "printed", "a run with the set", "bar", "on these sizes"), (
-        (NAMES.get(name, name), "{:g} to {:g}".format(*interval(rounding.PRINTED[name])), f"{value:.4f}",
+        (_called(name), "{:g} to {:g}".format(*interval(rounding.PRINTED[name])), f"{value:.4f}",
          f"{found['bars'][name]:.1g}", _listed(found["on_sizes"][name], ".4f"))
         for name, value in found["numbers"].items()))
     yield table(("input", "value"), ((name, f"{value:.4f}") for name, value in found["inputs"].items()))
@@ -189,7 +192,7 @@ def _sobol(found: dict) -> Iterator[Block]:
                 f"{100 * found['confidence']:.0f} %: the share of a number's variance within the rounding that goes "
                 f"with an input. The widest of the intervals is {widest:.2f} to either side.")
     yield table(("number", *found["inputs"]), (
-        (NAMES.get(name, name), *map(_index, known["total_order"])) for name, known in found["numbers"].items()))
+        (_called(name), *map(_index, known["total_order"])) for name, known in found["numbers"].items()))
 
 
 def _index(known: list[float]) -> str:

@@ -57,12 +57,12 @@ from verification.uncertainty import estimate
 
 @dataclass(frozen=True)
 class Input:
-    """name: as the paper has it; paths: keys of the scene that go with it, in proportion; value: as printed; half: half
-    a unit of its last digit, zero where it is taken as exact; only: the scene it belongs to, where not to both."""
+    """name: as the paper has it; paths: keys of the scene that go with it, in proportion; value: as printed, and half:
+    half a unit of its last digit, zero where it is taken as exact; only: the scene it belongs to, where not to both."""
 
     name: str
     paths: tuple[str, ...]
-    value: float
+    value: float = 0.0
     half: float = 0.0
     only: str = ""
 
@@ -92,19 +92,19 @@ ROUNDED = (
     Input("D_fd", _of("donor", "diffusivity_in_aggregate"), 0.81, 0.005),
 )
 EXACT = (
-    Input("X_m", ("kinetics.maximum_density",), 30000.0),
-    Input("R_0", ("aggregate.radius",), 5.0),
-    Input("W_pore", ("pore.width",), 50.0),
-    Input("L_pore", ("pore.length",), 600.0),
-    Input("head", ("flow.head",), 1e-3, only="base"),
-    Input("u_ave", ("flow.mean_velocity",), 2.9, only="wide"),
-    Input("supply of acceptor", _of("acceptor", "supply"), 10.0),
-    Input("supply of donor", _of("donor", "supply"), 10.0),
-    Input("lambda", ("flow.viscosity_ratio",), 2000.0),
-    Input("mu_L", ("growth.shear_modulus",), 0.01),
-    Input("film", ("growth.minimum_film",), 2.0),
-    Input("contact angle", ("growth.minimum_contact_angle",), 16.7),
-    Input("time step", ("growth.time_step",), 12.0),
+    Input("X_m", ("kinetics.maximum_density",)),
+    Input("R_0", ("aggregate.radius",)),
+    Input("W_pore", ("pore.width",)),
+    Input("L_pore", ("pore.length",)),
+    Input("head", ("flow.head",), only="base"),
+    Input("u_ave", ("flow.mean_velocity",), only="wide"),
+    Input("supply of acceptor", _of("acceptor", "supply")),
+    Input("supply of donor", _of("donor", "supply")),
+    Input("lambda", ("flow.viscosity_ratio",)),
+    Input("mu_L", ("growth.shear_modulus",)),
+    Input("film", ("growth.minimum_film",)),
+    Input("contact angle", ("growth.minimum_contact_angle",)),
+    Input("time step", ("growth.time_step",)),
 )
 INPUTS = ROUNDED + EXACT
 BY_NAME = {each.name: each for each in INPUTS}

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
 from math import floor
 
 import numpy as np
@@ -71,12 +72,12 @@ def after_contact(runs: Runs) -> list[dict]:
     """Each number on all sizes, its bar (%), and whether that is what is asked."""
     plain = (ending(scene("wide", {}, *converged(size)), *HOURS) for size in SIZES)
     rows = runs.rows(replace(said, name="after contact") for said in plain)
-    wanted = {f"{kind} {name}": asked for kind in KINDS for name, asked in ASKED.items()}
-    return [_bar_of(quantity, column(rows, quantity), asked) for quantity, asked in wanted.items()]
+    return [_bar_of(rows, f"{kind} {name}", asked) for kind, (name, asked) in product(KINDS, ASKED.items())]
 
 
-def _bar_of(quantity: str, values: list[float], asked: float) -> dict:
-    """A number from its values on SIZES."""
+def _bar_of(rows: list[Numbers], quantity: str, asked: float) -> dict:
+    """A number from what runs on SIZES come to."""
+    values = column(rows, quantity)
     bar = 100 * estimate(SIZES, values, MESH_ORDERS).bar / abs(values[0])
     return {"quantity": quantity, "values": values, "bar_percent": bar, "asked_percent": asked, "kept": bar <= asked}
 
