@@ -20,7 +20,7 @@ from paper_figures.claims import STATEMENTS
 from repro.results import write_text
 from verification import sensitivity, speed
 from verification.bench import runs
-from verification.bench.record import line
+from verification.bench.record import points
 from verification.claims import (
     CHANGED,
     CONTRADICTED,
@@ -209,8 +209,7 @@ def _bench() -> dict[str, Callable[[], str]]:
     bench = _kept("bench.json")
     failed = [one for one in bench["verdicts"] if one["holds"] is not True]
     part = bench["parts"]["base"]
-    fast = line(part, runs.FAST)["points"][0]
-    slow = next(point for point in line(part, runs.PRESET_PAPER)["points"] if point["label"] == speed.PAPER_AS_IT_IS)
+    fast, slow = points(part, runs.FAST)[0], speed.as_it_is(part)
     return {"bench.processor": lambda: f"one core ({bench['machine']['processor']})",
             "bench.paper": lambda: f"{slow['seconds']:.1f}", "bench.fast": lambda: f"{fast['seconds']:.1f}",
             "bench.error": lambda: f"{100 * fast['error']:.1f}", "bench.total": lambda: str(len(bench["verdicts"])),

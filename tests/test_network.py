@@ -56,7 +56,7 @@ def test_the_table_has_half_discs_of_the_present_code(thickness):
 def test_fifty_shapes_that_the_fit_has_not_seen_are_within_the_bounds():
     """Half-discs, drawn bodies and plugs, and what three runs make, each at a lambda of its own."""
     found = list(law.new_shapes())
-    rows = [law.shape_row(one, 0, 1) for one in found]
+    rows = [law.shape_row(one, 1) for one in found]
     columns = {name: np.array(values, float) for name, values in zip(law.COLUMNS, zip(*rows))}
     judged = law.judged(columns)
     outside = [(one, float(beyond)) for one, beyond in zip(found, judged.beyond) if beyond > 1]

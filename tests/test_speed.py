@@ -154,9 +154,9 @@ def test_a_made_up_record_is_told_with_ratios_and_what_does_not_hold():
     ((0.99, 0.2, 0.96), 1.0, 0), ((0.94, 0.99, 0.85), 1.0, 1), ((0.99, 0.2, 0.96), 1.35, 1)])
 def test_the_median_of_sweeps_is_judged_and_a_command_that_costs_too_much(monkeypatch, capsys, ratios, slow, status):
     """By its time over that of the imports and of a warm run."""
-    found = {throughput.JUDGED: iter(ratios), throughput.TOLD: iter([0.1] * 3)}
+    rates = iter(ratios)
     taken = {"--help": 0.1, "run": 0.6 * slow, "import numpy": 0.08}
-    monkeypatch.setattr(throughput, "measure", lambda preset, count: next(found[preset]))
+    monkeypatch.setattr(throughput, "measure", lambda: next(rates))
     monkeypatch.setattr(throughput, "warm", lambda preset, folder: 0.3)
     monkeypatch.setattr(throughput, "fresh", lambda kind, asked, *rest: (
         taken[rest[0]] if kind == "-m" else taken.get(asked, 0.3)))

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from verification import audit, hard_cases
 from verification.bench import runs, told
-from verification.bench.record import line
+from verification.bench.record import points
 from verification.kernel.writing import Block, load, markdown, table
 
 FOLDER = Path(__file__).parent / "report"
@@ -38,11 +38,9 @@ def blocks(found: dict[str, dict]) -> Iterator[Block]:
 
 def summary(found: dict[str, dict]) -> Iterator[Block]:
     """What the README tells: the presets on base, and the diagram of all methods."""
-    part = found["bench"].get("parts", {}).get("base")
-    if part:
-        yield told.machine(found["bench"]["machine"])
-        yield table(PRESETS, (row[:4] for row in _presets(part)))
-        yield PICTURE
+    yield told.machine(found["bench"]["machine"])
+    yield table(PRESETS, (row[:4] for row in _presets(found["bench"]["parts"]["base"])))
+    yield PICTURE
 
 
 PRESETS = ("preset", "time (s)", "faster than paper", "largest error")
@@ -51,19 +49,22 @@ PICTURE = Block("picture", "bench_base.svg: error against time of the whole base
 
 def _bench(record: dict) -> Iterator[Block]:
     yield told.machine(record["machine"])
-    part = record["parts"].get("base")
-    if part:
-        yield PICTURE
-        yield Block("text", f"The presets on base. Error: {part['error']}. Reference: {part['reference']}.")
-        yield table((*PRESETS, *QUANTITIES), _presets(part))
+    part = record["parts"]["base"]
+    yield PICTURE
+    yield Block("text", f"The presets on base. Error: {part['error']}. Reference: {part['reference']}.")
+    yield table((*PRESETS, *QUANTITIES), _presets(part))
     yield told.verdicts(record["verdicts"])
 
 
+def as_it_is(part: dict) -> dict:
+    """The point of base of the paper's scheme with its own elements and steps."""
+    return next(point for point in points(part, runs.PRESET_PAPER) if point["label"] == PAPER_AS_IT_IS)
+
+
 def _presets(part: dict) -> Iterator[tuple[str, ...]]:
-    slow = next(p for p in line(part, runs.PRESET_PAPER)["points"] if p["label"] == PAPER_AS_IT_IS)
-    found = {name: line(part, name) for name in (runs.FAST, runs.ACCURATE, runs.EXACT)}
-    measured = {name.split()[1]: one["points"][0] for name, one in found.items() if one}
-    for name, point in {"paper": slow, **measured}.items():
+    slow = as_it_is(part)
+    others = {line["method"].split()[1]: line["points"][0] for line in part["lines"] if line["method"] in runs.PRESETS}
+    for name, point in {"paper": slow, **others}.items():
         errors = (f"{100 * error:.2g} %" for error in (point["error"], *point["errors"]))
         yield (name, f"{point['seconds']:.2f}", f"{slow['seconds'] / point['seconds']:.1f} times", *errors)
 

@@ -17,9 +17,9 @@ from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 from time import perf_counter
+from timeit import repeat
 
-from repro import load_scene, run
-from repro.cli import main as repro
+from repro import load_scene, run, sweep
 from repro.sweep.pool import cores
 
 WANTED = 0.95
@@ -35,47 +35,42 @@ def runs(preset: str, count: int, folder: Path) -> list[float]:
     """Seconds of every run in this process, one after the other, into a folder that is not there."""
     found = []
     for k in range(count):
-        scene = load_scene("base", [f"numerics.preset={preset}", f"pore.width={48 + 4 * k / max(count - 1, 1)!r} um"])
+        scene = load_scene("base", [f"numerics.preset={preset}", f"pore.width={48 + 4 * k / count!r} um"])
         start = perf_counter()
         run(scene, folder / f"{k}")
         found.append(perf_counter() - start)
     return found
 
 
-def swept(preset: str, count: int, folder: Path) -> float:
+def swept(folder: Path) -> float:
     """Runs a second of a sweep."""
     start = perf_counter()
-    status = repro(["sweep", "base", "--vary", f"pore.width={WIDTHS}:linear:{count}", "--quiet",
-                    "--set", f"numerics.preset={preset}", "--out", str(folder / "sweep")])
-    if status:
-        raise RuntimeError(f"the sweep ended with status {status}")
-    return count / (perf_counter() - start)
+    made = sweep("base", [f"pore.width={WIDTHS}:linear:{RUNS}"], folder / "sweep", [f"numerics.preset={JUDGED}"])
+    if made.failed:
+        raise RuntimeError(f"{len(made.failed)} runs of the sweep failed")
+    return RUNS / (perf_counter() - start)
 
 
-def measure(preset: str, count: int) -> float:
+def measure() -> float:
     """The sweep's rate over cores times a single run's rate."""
     with TemporaryDirectory() as folder:
-        runs(preset, 1, Path(folder, "first"))
-        before = runs(preset, SINGLE, Path(folder, "before"))
-        rate = swept(preset, count, Path(folder))
-        single = 1 / median(before + runs(preset, SINGLE, Path(folder, "after")))
-    print(f"{preset}, {cores()} cores: single {single:.3f} runs/s, sweep of {count} {rate:.3f}", flush=True)
+        runs(JUDGED, 1, Path(folder, "first"))
+        before = runs(JUDGED, SINGLE, Path(folder, "before"))
+        rate = swept(Path(folder))
+        single = 1 / median(before + runs(JUDGED, SINGLE, Path(folder, "after")))
+    print(f"{JUDGED}, {cores()} cores: single {single:.3f} runs/s, sweep of {RUNS} {rate:.3f}", flush=True)
     return rate / single / cores()
 
 
 def fresh(*arguments: str) -> float:
     """Seconds that Python takes with these arguments in a process of its own: the best of five."""
-    seconds = []
-    for _ in range(5):
-        start = perf_counter()
-        subprocess.run([sys.executable, *arguments], stdout=subprocess.DEVNULL, check=True)
-        seconds.append(perf_counter() - start)
-    return min(seconds)
+    return min(repeat(lambda: subprocess.run([sys.executable, *arguments], stdout=subprocess.DEVNULL, check=True),
+                      number=1))
 
 
 def warm(preset: str, folder: Path) -> float:
     """Seconds of a run of base in this process, files and page included: the best of five."""
-    return min(runs(preset, 1, folder / f"{k}")[0] for k in range(5))
+    return min(runs(preset, 5, folder))
 
 
 def commands() -> dict[str, tuple[float, float]]:
@@ -95,15 +90,14 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m verification.throughput", description=__doc__.partition(":")[0])
     parser.add_argument("--repeats", type=int, default=1)
     chosen = parser.parse_args(arguments)
-    found = median(measure(JUDGED, RUNS) for _ in range(chosen.repeats))
-    holds = found >= WANTED
-    costs = commands()
-    for command, (ratio, most) in costs.items():
-        print(f"{command}: {ratio:.2f} times what it cannot do without, {most} accepted: "
-              f"{'holds' if ratio <= most else 'does not hold'}")
-    print(f"throughput of the sweep over cores times a single run's rate: {found:.3f} in {JUDGED}, {WANTED} wanted: "
-          f"{'holds' if holds else 'does not hold'}")
-    return 0 if holds and all(ratio <= most for ratio, most in costs.values()) else 1
+    rate = median(measure() for _ in range(chosen.repeats))
+    told = {f"throughput of the sweep over cores times a single run's rate: {rate:.3f} in {JUDGED}, {WANTED} wanted":
+            rate >= WANTED}
+    for command, (ratio, most) in commands().items():
+        told[f"{command}: {ratio:.2f} times what it cannot do without, {most} accepted"] = ratio <= most
+    for words, holds in told.items():
+        print(f"{words}: {'holds' if holds else 'does not hold'}")
+    return int(not all(told.values()))
 
 
 if __name__ == "__main__":

@@ -27,11 +27,11 @@ def main(arguments: list[str] | None = None) -> dict:
 
 def measure(names, quick: bool) -> dict:
     """Run parts one after the other; each is recorded as soon as it is there."""
-    found = record.empty() if quick else record.load()
-    print(plain([told.machine(record.machine())]))
+    found = {"machine": record.machine(), "parts": {} if quick else record.load()["parts"]}
+    print(plain([told.machine(found["machine"])]))
     for name in names:
         part = getattr(import_module(f"verification.bench.{PARTS[name]}"), f"{name}_part")(quick)
-        found = record.merged(found, {name: part})
+        found["parts"][name] = part
         found["verdicts"] = told.judged(found)
         print(plain(told.blocks(name, part)), flush=True)
         if not quick:

@@ -27,14 +27,14 @@ from __future__ import annotations
 import gc
 import os
 import platform
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from datetime import date
 from importlib.metadata import version
-from math import exp, isfinite, log
+from math import isfinite
 from operator import itemgetter
 from pathlib import Path
-from statistics import median
 from time import perf_counter, process_time
 
 import numpy as np
@@ -43,17 +43,13 @@ from verification.kernel import writing
 
 FOLDER = Path(__file__).parents[1] / "report"
 FILE = FOLDER / "bench.json"
+CPUS = Path("/proc/cpuinfo")
 PACKAGES = ("numpy", "scipy", "scikit-fem", "shapely", "mmgpy", "fipy", "py-pde", "numba")
 
 
-def empty() -> dict:
-    """A record of nothing."""
-    return {"machine": {}, "parts": {}, "verdicts": []}
-
-
-def load(file: Path = FILE) -> dict:
-    """The record of the last benchmark, an empty one where there is none."""
-    return writing.load(file, empty())
+def load() -> dict:
+    """The record of the last benchmark, one without parts where there is none."""
+    return writing.load(FILE, {"parts": {}})
 
 
 def machine() -> dict:
@@ -63,24 +59,16 @@ def machine() -> dict:
             "threads": os.environ.get("OMP_NUM_THREADS", "not set"), "date": date.today().isoformat()}
 
 
-def processor(file: Path = Path("/proc/cpuinfo")) -> str:
+def processor() -> str:
     """The processor's model, as Linux names it or else as Python does."""
-    try:
-        lines = file.read_text(encoding="utf-8").splitlines()
-    except OSError:
-        return platform.processor() or "unknown"
-    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.processor() or "unknown"
+    text = CPUS.read_text(encoding="utf-8") if CPUS.exists() else ""
+    found = re.search("^model name\\s*: (.*)", text, re.MULTILINE)
+    return found[1].strip() if found else platform.processor() or "unknown"
 
 
-def merged(record: dict, parts: dict) -> dict:
-    """The record with new parts in place of those of the same names; verdicts are to be worked out again."""
-    return {"machine": machine(), "parts": {**record["parts"], **parts}, "verdicts": []}
-
-
-def line(part: dict, method: str) -> dict | None:
-    """The line of a method in a part, None where it has none."""
-    return next((found for found in part.get("lines", ()) if found["method"] == method), None)
+def points(part: dict, method: str) -> list[dict]:
+    """The points of a method in a part. Raises LookupError where there is no such line."""
+    return {line["method"]: line["points"] for line in part["lines"]}[method]
 
 
 #: The first run of a job only warms up where it takes less than this (s); a job that takes longer than that is run a
@@ -105,7 +93,7 @@ def measured(jobs: Jobs, repeats: int) -> list[dict]:
             if key in failed or len(samples[key]) >= wanted[key]:
                 continue
             try:
-                took, sample = _timed(job)
+                took, *sample = timed(job)
             except Exception as error:
                 failed[key] = f"{type(error).__name__}: {error}"
                 continue
@@ -114,32 +102,32 @@ def measured(jobs: Jobs, repeats: int) -> list[dict]:
             if turn or took >= SHORT:
                 samples[key].append(sample)
     lines: dict[str, dict] = {}
-    for method, label in jobs:
+    for key in jobs:
+        method, label = key
         line = lines.setdefault(method, {"method": method, "points": [], "failed": []})
-        if (method, label) in failed:
-            line["failed"].append({"label": label, "reason": failed[method, label]})
+        if key in failed:
+            line["failed"].append({"label": label, "reason": failed[key]})
         else:
-            seconds, cpu, found = zip(*samples[method, label])
-            line["points"].append({"label": label, "seconds": median(seconds), "cpu": median(cpu),
-                                   "repeats": len(cpu), **found[-1]})
+            times, found = zip(*samples[key])
+            seconds, cpu = np.median(times, axis=0)
+            line["points"].append({"label": label, "seconds": seconds, "cpu": cpu, "repeats": len(times), **found[-1]})
     return list(lines.values())
 
 
-def _timed(job: Callable[[], dict]) -> tuple[float, tuple[float, float, dict]]:
-    """The wall time of a run; wall and processor time without what is apart, and what the job returns."""
+def clock() -> np.ndarray:
+    """Wall and processor time, s."""
+    return np.array([perf_counter(), process_time()])
+
+
+def timed(job: Callable[[], dict]) -> tuple[float, np.ndarray, dict]:
+    """The wall time of a run; wall and processor time without what is apart; and what the job returns."""
     gc.collect()
-    wall, spent = perf_counter(), process_time()
+    start = clock()
     found = job()
-    wall, spent = perf_counter() - wall, process_time() - spent
+    took = clock() - start
     if not isfinite(found.get("error", 0.0)):
         raise ValueError("its error is not a number")
-    return wall, (wall - found.get("apart_seconds", 0.0), spent - found.get("apart_cpu", 0.0), found)
-
-
-def part(title: str, error: str, reference: str, jobs: Jobs, repeats: int, once: Jobs) -> dict:
-    """A part, measured; once: jobs that are run once."""
-    lines = measured(jobs, repeats) + measured(once, 1)
-    return {"title": title, "error": error, "reference": reference, "repeats": repeats, "lines": lines}
+    return took[0], took - [found.get("apart_seconds", 0.0), found.get("apart_cpu", 0.0)], found
 
 
 @dataclass(frozen=True)
@@ -162,26 +150,23 @@ def envelope(points: Iterable[Mapping]) -> list[Mapping]:
     return kept
 
 
-def reading(points: Iterable[Mapping], error: float) -> Reading | None:
-    """The least time for an error, by the envelope; None where nothing can be said.
+def reading(points: Iterable[Mapping], error: float) -> Reading:
+    """The least time for an error, by the envelope. Raises LookupError where nothing can be said.
 
     Between two points of the envelope: on the straight line between their logarithms. An error above the largest
     takes the fastest point. Below the least error: on from the last point with the fitted slope of the envelope, which
     needs two points and must fall. Where overheads make its coarse end flatter, that is too little time, not too much.
     """
-    kept = envelope(points)
-    if not kept:
-        return None
-    errors, *times = zip(*map(itemgetter("error", "seconds", "cpu"), kept))
+    kept = np.array([itemgetter("error", "seconds", "cpu")(point) for point in envelope(points)])
+    if not (len(kept) and error > 0):
+        raise LookupError(error)
+    errors, times = kept[:, 0], kept[:, 1:]
     if error >= errors[0]:
-        return Reading(*(each[0] for each in times), "measured")
+        return Reading(*times[0], "measured")
     if error >= errors[-1]:
-        logs = (np.interp(-log(error), -np.log(errors), np.log(each)) for each in times)
-        return Reading(*map(exp, logs), "between points")
-    if len(kept) < 2:
-        return None
-    slopes = [float(np.polyfit(np.log(errors), np.log(each), 1)[0]) for each in times]
-    if max(slopes) >= 0:
-        return None
-    found = (each[-1] * (error / errors[-1]) ** s for each, s in zip(times, slopes))
-    return Reading(*found, f"extrapolated with slope {slopes[0]:.2f}")
+        logs = [np.interp(-np.log(error), -np.log(errors), each) for each in np.log(times.T)]
+        return Reading(*np.exp(logs), "between points")
+    slopes = np.polyfit(np.log(errors), np.log(times), 1)[0] if len(kept) > 1 else np.zeros(2)
+    if slopes.max() >= 0:
+        raise LookupError(error)
+    return Reading(*times[-1] * (error / errors[-1]) ** slopes, f"extrapolated with slope {slopes[0]:.2f}")

@@ -8,7 +8,7 @@ import tracemalloc
 from dataclasses import replace
 from functools import partial
 from operator import itemgetter
-from time import perf_counter, process_time
+from time import perf_counter
 
 import numpy as np
 from scipy.stats import theilslopes
@@ -18,11 +18,10 @@ from repro import timing
 from repro.march.simulation import simulate
 from repro.model import pore
 from repro.results import row
-from repro.scene import load_scene, parse_scene
+from repro.scene import Scene, load_scene
 from verification.bench import record
-from verification.bench.record import measured
+from verification.bench.record import clock, measured
 from verification.claims.runs import until
-from verification.kernel.case import columns
 from verification.problems import runs as problems
 
 BASE_REPEATS = 3
@@ -33,6 +32,7 @@ effluent_acceptor_mg_per_L effluent_donor_mg_per_L""".split()
 REFERENCE, CHECK = ((8, 12), (8, 16)), ((10, 15), (10, 16))
 FAST, ACCURATE = "preset fast", "preset accurate"
 EXACT = "preset exact"
+PRESETS = (FAST, ACCURATE, EXACT)
 PRESET_PAPER = "preset paper: linear elements, updates"
 #: Refinement and time step (min) of the paper's scheme; those of them at which it is changed in one thing; refinement
 #: and tolerance of the midpoint rule's.
@@ -74,9 +74,9 @@ def base_part(quick: bool) -> dict:
     ``quick``: to 2 h, against the finest of its own runs.
     """
     times = (1.8, 2.0) if quick else TIMES
-    truth, about = _short(times) if quick else reference(times)
+    about = {"reference_values": values(times, *OF_ACCURATE).tolist()} if quick else reference()
     repeats = 1 if quick else BASE_REPEATS
-    lines = measured(jobs(np.array(truth), times, quick), repeats)
+    lines = measured(jobs(np.array(about["reference_values"]), times, quick), repeats)
     found = {"title": f"Base to {times[1]:g} h, nothing written", "repeats": repeats, "lines": lines,
              "error": f"largest of eight numbers at {times[0]:g} and {times[1]:g} h: velocity, conductivity, area, "
                       "thickness, upstream, downstream relative, effluents over the supply", **about}
@@ -85,22 +85,22 @@ def base_part(quick: bool) -> dict:
 
 def jobs(truth: np.ndarray, times, quick: bool) -> dict:
     """{(method, label): job}."""
-    cut, found = 2 if quick else None, {}
+    found = {}
     for method, (label, *keys), sizes, changes in METHODS_OF_BASE:
-        for size in sizes[:cut]:
-            sized_as = (key.format(value) for key, value in zip(keys, size))
-            found[method, label.format(*size)] = partial(simulated, truth, times, *changes, *sized_as)
-    for name in (FAST, ACCURATE, EXACT):
-        found[name, "as it is"] = partial(simulated, truth, times, f"numerics.preset={name.split()[1]}")
-    if not quick:
-        found |= {("scikit-fem: quadratic elements, Runge-Kutta", f"{n} rings, {s} steps"): partial(
-            _skfem, truth, times, n, s) for n, s in SKFEM}
+        for size in sizes[:2] if quick else sizes:
+            sized = map(str.format, keys, size)
+            found[method, label.format(*size)] = partial(_judged, truth, values, times, *changes, *sized)
+    for preset in PRESETS:
+        found[preset, "as it is"] = partial(_judged, truth, values, times, f"numerics.preset={preset.split()[1]}")
+    for rings, steps in () if quick else SKFEM:
+        found["scikit-fem: quadratic elements, Runge-Kutta", f"{rings} rings, {steps} steps"] = partial(
+            _judged, truth, whole_run.numbers, whole_run.Pore(), rings, steps, times)
     return found
 
 
-def simulated(truth, times, *overrides: str):
-    """Run base; the error of the last rows."""
-    errors = apart(values(times, *overrides), truth).max(axis=0).tolist()
+def _judged(truth: np.ndarray, function, *given) -> dict:
+    """The errors of the rows that ``function(*given)`` finds: the largest, and those of each number."""
+    errors = apart(function(*given), truth).max(axis=0).tolist()
     return {"error": max(errors), "errors": errors}
 
 
@@ -118,51 +118,33 @@ def apart(found, truth) -> np.ndarray:
     return np.abs(found - truth) / scale
 
 
-def error(found, truth) -> float:
-    """The largest."""
-    return float(apart(found, truth).max())
-
-
-def reference(times) -> tuple[list, dict]:
-    """Values of the independent run and what is told of it; worked out once and kept in the record."""
+def reference() -> dict:
+    """Values of the independent run at TIMES and what is told of it; worked out once and kept in the record."""
     kept = record.load()["parts"].get("base", {})
-    if kept.get("reference_times") == list(times):
-        return kept["reference_values"], {key: value for key, value in kept.items() if key.startswith("reference")}
-    found, check = (whole_run.converged(whole_run.Pore(), times, *size).values for size in (REFERENCE, CHECK))
-    change = error(found, check)
-    return check.tolist(), {
+    if kept.get("reference_times") == list(TIMES):
+        return {key: value for key, value in kept.items() if key.startswith("reference")}
+    found, check = (whole_run.converged(whole_run.Pore(), TIMES, *size).values for size in (REFERENCE, CHECK))
+    return {
         "reference": f"scikit-fem's quadratic elements in moving coordinates, Runge-Kutta in time, extrapolated from "
                      f"{CHECK[0]} rings and {CHECK[1]} steps; from {REFERENCE[0]} and {REFERENCE[1]} they differ by "
-                     f"{change:.1e}",
-        "reference_times": list(times), "reference_values": check.tolist()}
-
-
-def _short(times) -> tuple[list, dict]:
-    found = values(times, "numerics.preset=accurate")
-    return found.tolist(), {"reference": "preset accurate: a quick look, no reference"}
-
-
-def _skfem(truth, times, rings: int, steps: int):
-    return {"error": error(whole_run.numbers(whole_run.Pore(), rings, steps, times), truth)}
+                     f"{apart(found, check).max():.1e}",
+        "reference_times": list(TIMES), "reference_values": check.tolist()}
 
 
 def wide() -> list[dict]:
     """Seconds of wide in preset fast, to 45 h, one run."""
-    wall, spent = perf_counter(), process_time()
+    start = clock()
     times = [instant.pore.time for instant in simulate(load_scene("wide", ["numerics.preset=fast"]))]
-    return [{"preset": "fast", "seconds": perf_counter() - wall, "cpu": process_time() - spent,
-             "steps": len(times) - 1, "end": times[-1]}]
+    seconds, cpu = clock() - start
+    return [{"preset": "fast", "seconds": seconds, "cpu": cpu, "steps": len(times) - 1, "end": times[-1]}]
 
 
 SCENES_REPEATS = 31
-SUBSTRATES = {"substrates": {}}
-GROWTH = {"growth": {"end": "2.4 h"}}
-FLOW = {"flow": {"head": "1e-3 cm"}}
+FLOW, SUBSTRATES = {"flow": {"head": "1e-3 cm"}}, {"substrates": {}}
 #: Sections of each scene; the stages that it needs, of those that are timed.
-SCENES = {"whole": ({**FLOW, **SUBSTRATES, **GROWTH}, {"flow", "transport"}),
+SCENES = {"whole": ({**FLOW, **SUBSTRATES, "growth": {"end": "2.4 h"}}, {"flow", "transport"}),
           "frozen shape": ({**FLOW, **SUBSTRATES}, {"flow", "transport"}),
           "flow only": (FLOW, {"flow"}), "transport only": (SUBSTRATES, {"transport"})}
-SCENE_PRESETS = ("paper", "fast", "accurate")
 
 
 def scenes_part(quick: bool) -> dict:
@@ -172,27 +154,23 @@ def scenes_part(quick: bool) -> dict:
     the time of a first solution, mesh included, of each.
     """
     repeats = 3 if quick else SCENES_REPEATS
-    jobs = {(preset, name): partial(first, preset, name) for preset in SCENE_PRESETS for name in SCENES}
-    rows = [{"scene": point["label"], "method": f"preset {line['method']}", **point}
+    jobs = {(f"preset {preset}", name): partial(first, preset, name) for preset in problems.PRESETS for name in SCENES}
+    rows = [{"scene": point["label"], "method": line["method"], **point}
             for line in measured(jobs, repeats) for point in line["points"]]
     return {"title": "What a scene does not need: seconds of a first solution, mesh included", "rows": rows,
             "repeats": repeats}
 
 
-def scene_of(preset: str, name: str):
-    """One of SCENES."""
-    tables = {"pore": {"width": "50 um"}, "aggregate": {"radius": "20 um"}, "numerics": {"preset": preset}}
-    return parse_scene({**tables, **SCENES[name][0]}, name, f"{name}.toml")
-
-
 def first(preset: str, name: str) -> dict:
-    """The first instant of a run: mesh and solution."""
+    """The first instant of a run of one of SCENES: mesh and solution."""
+    sections, needed = SCENES[name]
+    tables = {"pore": {"width": "50 um"}, "aggregate": {"radius": "20 um"}, "numerics": {"preset": preset}, **sections}
     timing.reset()
     start = perf_counter()
-    next(iter(simulate(scene_of(preset, name))))
+    next(simulate(tables))
     took = perf_counter() - start
     stages = {stage: timing.seconds[stage] for stage in STAGES if timing.seconds.get(stage, 0.0) > 0}
-    return {"stages": stages, "took": took, "unneeded": sorted(set(stages) - SCENES[name][1] - {"meshing"})}
+    return {"stages": stages, "took": took, "unneeded": sorted(set(stages) - needed - {"meshing"})}
 
 
 #: Steps, the length of one (h), and the part of them that is not looked at.
@@ -206,7 +184,8 @@ def memory_part(quick: bool) -> dict:
     """No allocation that grows with the number of steps: live memory of a long run of an aggregate that hardly grows.
 
     The slope of the memory that Python's allocator knows (tracemalloc, numpy's arrays included) against the step, after
-    the first ones. To keep one nodal field a step would be 8 bytes a node and step: the bound is a tenth of that.
+    the first ones: the median of the slopes between all pairs (Theil and Sen), which single jumps do not move. To keep
+    one nodal field a step would be 8 bytes a node and step: the bound is a tenth of that.
     """
     steps = QUICK_STEPS if quick else MANY_STEPS
     rows = [grown(preset, refinement, steps) for preset, refinement in MEMORY_PRESETS.items()]
@@ -218,7 +197,7 @@ def grown(preset: str, refinement: float, steps: int) -> dict:
     scene = load_scene("base", [f"numerics.preset={preset}", f"numerics.refinement={refinement}",
                                 "aggregate.radius=20 um", f"growth.time_step={LENGTH} h",
                                 *until(*(LENGTH * np.arange(1, steps + 1)))])
-    live, nodes = np.zeros(steps + 1), 0
+    live = np.zeros(steps + 1)
     tracemalloc.start()
     try:
         for count, instant in enumerate(simulate(scene)):
@@ -228,13 +207,8 @@ def grown(preset: str, refinement: float, steps: int) -> dict:
             live[count] = tracemalloc.get_traced_memory()[0]
     finally:
         tracemalloc.stop()
-    return {"method": f"preset {preset}", "steps": count, "slope": slope(live[round(WARM * steps):]),
+    return {"method": f"preset {preset}", "steps": count, "slope": theilslopes(live[round(WARM * steps):]).slope,
             "bound": PART * 8 * nodes}
-
-
-def slope(live) -> float:
-    """Bytes a step: the median of the slopes between all pairs (Theil and Sen), which single jumps do not move."""
-    return float(theilslopes(live).slope)
 
 
 #: Nodes wanted, and how many steps are timed after the first; none: the first is, with its orderings.
@@ -265,33 +239,28 @@ def size_part(quick: bool) -> dict:
             "repeats": "median of 5 steps (600 nodes) to 1; 160 000 nodes: the first step"}
 
 
-def larger_seed(kind: str, nodes: int):
-    """Base with a larger seed, and a refinement that makes about so many nodes."""
+def measure(kind: str, nodes: int, steps: int) -> dict:
+    """Seconds of a step of base with a larger seed in about so many nodes, and of its stages, and their floor."""
     preset, jacobian = kind.split()
     factor, power = REFINED[preset]
-    return load_scene("base", [f"numerics.preset={preset}", f"numerics.refinement={factor * nodes**power}",
-                               f"numerics.jacobian={jacobian}", f"aggregate.radius={RADIUS} um"])
-
-
-def measure(kind: str, nodes: int, steps: int) -> dict:
-    """Seconds of a step and of its stages, and their floor."""
-    given = larger_seed(kind, nodes)
-    now = pore.seeded(given)
-    solved = pore.solve(given, now)
-    now = replace(now, concentrations=solved.concentrations)
+    given = load_scene("base", [f"numerics.preset={preset}", f"numerics.refinement={factor * nodes**power}",
+                                f"numerics.jacobian={jacobian}", f"aggregate.radius={RADIUS} um"])
+    now, solved = _solved(given, pore.seeded(given))
     rows = []
     for _ in range(steps + 1):
         timing.reset()
-        wall, spent = perf_counter(), process_time()
+        start = clock()
         taken = problems.step(given, now, solved, STEP)
-        after = replace(taken.pore, time=now.time + STEP)
-        solved = pore.solve(given, after)
-        now = replace(after, concentrations=solved.concentrations)
-        rows.append({"seconds": perf_counter() - wall, "cpu": process_time() - spent, "remeshed": taken.remeshed,
-                     **{name: timing.seconds.get(name, 0.0) for name in (*STAGES, FLOOR)}})
+        now, solved = _solved(given, replace(taken.pore, time=now.time + STEP))
+        rows.append((taken.remeshed, [*(clock() - start), *map(timing.seconds.__getitem__, (*STAGES, FLOOR))]))
     rows = rows[1:] or rows
-    usual = columns([row for row in rows if not row["remeshed"]] or rows)
-    middle = {name: float(np.median(column)) for name, column in usual.items()}
-    return {"label": f"{nodes} nodes", "seconds": middle["seconds"], "cpu": middle["cpu"],
-            "nodes": len(now.mesh.points), "stages": {name: middle[name] for name in (*STAGES, FLOOR)},
-            "ratio": middle["seconds"] / middle[FLOOR], "repeats": len(usual["cpu"])}
+    usual = [row for remeshed, row in rows if not remeshed] or [row for _, row in rows]
+    seconds, cpu, *stages = np.median(usual, axis=0)
+    return {"label": f"{nodes} nodes", "seconds": seconds, "cpu": cpu, "nodes": len(now.mesh.points),
+            "stages": dict(zip((*STAGES, FLOOR), stages)), "ratio": seconds / stages[-1], "repeats": len(usual)}
+
+
+def _solved(given: Scene, now: pore.Pore) -> tuple[pore.Pore, pore.Solved]:
+    """The pore with its concentrations, and what is solved in it."""
+    found = pore.solve(given, now)
+    return replace(now, concentrations=found.concentrations), found

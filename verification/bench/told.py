@@ -7,18 +7,16 @@ beside them.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterator
-from itertools import product
+from itertools import cycle, product
 from math import inf
-from operator import itemgetter
 from pathlib import Path
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from verification.bench import runs
-from verification.bench.record import Reading, envelope, reading
-from verification.bench.record import line as line_of
+from verification.bench.record import envelope, points, reading
 from verification.kernel.writing import Block, table
 
 #: (error, least ratio, aim) of the paper's scheme at its own best speed over a preset.
@@ -34,35 +32,20 @@ NOT_MEASURED = "not measured"
 
 def judged(record: dict) -> list[dict]:
     """All verdicts of a record; what it has not measured neither holds nor fails."""
-    parts = record["parts"]
-    return [*_base(parts.get("base", {})), *_others(parts), *_steps(parts.get("size", {})),
-            *_scenes(parts.get("scenes", {})), *_memory(parts.get("memory", {}))]
+    parts = defaultdict(dict, record["parts"])
+    return [*_base(parts["base"]), *_others(parts), *_steps(parts["size"]), *_scenes(parts["scenes"]),
+            *_memory(parts["memory"])]
 
 
 def verdict(claim: str, wanted: str, measure: Callable[..., tuple[str, bool]], *given) -> dict:
     """One of them: ``measure(*given)`` tells what was measured, and whether it holds; LookupError where the record
-    lacks it."""
+    lacks it, as no rows have a first or a last."""
     try:
         measured, holds = measure(*given)
+        holds = bool(holds)
     except LookupError:
-        return {"claim": claim, "measured": NOT_MEASURED, "wanted": wanted, "holds": None}
-    return {"claim": claim, "measured": measured, "wanted": wanted, "holds": bool(holds)}
-
-
-def _points(part: dict, method: str) -> list[dict]:
-    """Of a method; LookupError where there are none."""
-    found = line_of(part, method)
-    if not found or not found["points"]:
-        raise LookupError(method)
-    return found["points"]
-
-
-def _read(points: list[dict], error: float) -> Reading:
-    """As :func:`reading`; LookupError where nothing can be said."""
-    found = reading(points, error) if error > 0 else None
-    if not found:
-        raise LookupError(error)
-    return found
+        measured, holds = NOT_MEASURED, None
+    return {"claim": claim, "measured": measured, "wanted": wanted, "holds": holds}
 
 
 def _base(part: dict) -> Iterator[dict]:
@@ -80,22 +63,22 @@ def _base(part: dict) -> Iterator[dict]:
 
 
 def _accurate(part: dict, name: str, error: float) -> tuple[str, bool]:
-    found = _points(part, name)[0]["error"]
+    found = points(part, name)[0]["error"]
     return f"{100 * found:.2g} %", found <= error
 
 
 def _faster(part: dict, name: str, error: float | None, least: float) -> tuple[str, bool]:
     """At an error, None: at its own."""
-    point = _points(part, name)[0]
+    point = points(part, name)[0]
     wanted = point["error"] if error is None else error
-    best = _read(_points(part, runs.PRESET_PAPER), wanted)
+    best = reading(points(part, runs.PRESET_PAPER), wanted)
     ratio, cpu = best.seconds / point["seconds"], best.cpu / point["cpu"]
     told = f"{ratio:.1f} times (processor time {cpu:.1f}): {best.seconds:.2f} s, {best.how}"
     return f"{told}, against {point['seconds']:.2f} s", ratio >= least and point["error"] <= wanted
 
 
 def _quick(part: dict) -> tuple[str, bool]:
-    point = _points(part, runs.ACCURATE)[0]
+    point = points(part, runs.ACCURATE)[0]
     return _seconds(point), point["seconds"] <= ACCURATE_RUN
 
 
@@ -111,17 +94,15 @@ def _wide(part: dict) -> tuple[str, bool]:
 def _others(parts: dict) -> Iterator[dict]:
     for name, other in product(("box", "channel"), OTHERS):
         claim = f"transport, {name}: faster than {other.split(',')[0]} at equal error (compilation left out)"
-        yield verdict(claim, f"at least {TIMES_FASTER:g} times", _least_ratio, parts.get(name, {}), other)
+        yield verdict(claim, f"at least {TIMES_FASTER:g} times", _least_ratio, parts[name], other)
 
 
 def _least_ratio(part: dict, other: str) -> tuple[str, bool]:
     """At each point of another code: its time over that of the order-2 line, read at its error; the least of them."""
-    ours, theirs = _points(part, "order 2 (fast, accurate)"), _points(part, other)
+    ours, theirs = points(part, "order 2 (fast, accurate)"), points(part, other)
     rows = [(point, reading(ours, point["error"])) for point in theirs]
-    ratios = [(p["seconds"] / r.seconds, p["cpu"] / r.cpu, p["error"]) for p, r in rows if r]
-    if not ratios:
-        raise LookupError(other)
-    least, cpu, error = min(ratios)
+    ratios = sorted((p["seconds"] / r.seconds, p["cpu"] / r.cpu, p["error"]) for p, r in rows)
+    least, cpu, error = ratios[0]
     return (f"{least:.1f} times (processor time {cpu:.1f}) at an error of {error:.1e}, the least of {len(ratios)}",
             least >= TIMES_FASTER)
 
@@ -133,11 +114,9 @@ def _steps(part: dict) -> Iterator[dict]:
 
 
 def _floor(part: dict, method: str, bound: float, low: float, high: float) -> tuple[str, bool]:
-    chosen = [point for point in _points(part, method) if low < point["nodes"] <= high]
-    if not chosen:
-        raise LookupError(method)
-    told = ", ".join(f"{point['ratio']:.2f} at {point['nodes']}" for point in chosen)
-    return told, max(point["ratio"] for point in chosen) <= bound
+    ratios = {point["nodes"]: point["ratio"] for point in points(part, method) if low < point["nodes"] <= high}
+    told = ", ".join(f"{ratio:.2f} at {nodes}" for nodes, ratio in ratios.items())
+    return told, sorted(ratios.values())[-1] <= bound
 
 
 def _scenes(part: dict) -> Iterator[dict]:
@@ -149,10 +128,8 @@ def _scenes(part: dict) -> Iterator[dict]:
 def _own(part: dict, name: str) -> tuple[str, bool]:
     rows = [row for row in part["rows"] if row["scene"] == name]
     wholes = {row["method"]: row for row in part["rows"] if row["scene"] == "whole"}
-    if not rows:
-        raise LookupError(name)
     strange = sorted({stage for row in rows for stage in row["unneeded"]})
-    worst = max(excess(row, wholes[row["method"]]) for row in rows)
+    worst = sorted(excess(row, wholes[row["method"]]) for row in rows)[-1]
     return (f"{round(100 * worst)} % at most above them; other stages: {', '.join(strange) or 'none'}",
             not strange and worst <= EXCESS)
 
@@ -176,8 +153,6 @@ def _flat(part: dict, method: str) -> tuple[str, bool]:
     return told, row["slope"] <= row["bound"]
 
 
-#: Of a table of points.
-HEAD = ("method", "", "wall (s)", "processor (s)", "error, or what it costs")
 WORDS = {True: "holds", False: "does not hold", None: NOT_MEASURED}
 
 
@@ -197,26 +172,21 @@ def verdicts(found: list[dict]) -> Block:
 def blocks(name: str, part: dict) -> list[Block]:
     """A part with all its points, for a terminal."""
     told = "; ".join(f"{key}: {part[key]}" for key in ("error", "reference", "repeats") if key in part)
-    return [Block("heading", f"{name}: {part['title']}"), Block("text", told), table(HEAD, _rows(part))]
+    return [Block("heading", f"{name}: {part['title']}"), Block("text", told),
+            table(("method", "", "seconds and errors"), _rows(part))]
 
 
 def _rows(part: dict) -> Iterator[tuple[str, ...]]:
     for of in part.get("lines", ()):
-        yield from ((of["method"], point["label"], *_costs(point)) for point in of["points"])
-        yield from ((of["method"], failed["label"], "failed", "", failed["reason"]) for failed in of["failed"])
-    yield from ((row["method"], row.get("scene", ""), *_costs(row)) for row in part.get("rows", ()))
+        yield from ((of["method"], point["label"], _numbers(point)) for point in of["points"])
+        yield from ((of["method"], failed["label"], f"failed: {failed['reason']}") for failed in of["failed"])
+    yield from ((row["method"], row.get("scene", ""), _numbers(row)) for row in part.get("rows", ()))
 
 
-#: What a point may have besides its times.
-COSTS = {"error": "{:.1e}", "ratio": "{:.2f} times its linear systems", "slope": "{:.0f} bytes a step"}
-
-
-def _costs(point: dict) -> tuple[str, ...]:
-    """Wall time, processor time, and what else there is."""
-    times = (f"{point[key]:.3g}" if key in point else "" for key in ("seconds", "cpu"))
-    stages = {} if "error" in point else point.get("stages", {})
-    told = [words.format(point[key]) for key, words in COSTS.items() if key in point]
-    return *times, ", ".join([*told, *(f"{name} {1e3 * seconds:.1f} ms" for name, seconds in stages.items())])
+def _numbers(point: dict) -> str:
+    """All that was measured at a point, its stages too."""
+    numbers = {**point, **point.get("stages", {})}
+    return ", ".join(f"{name} {value:.3g}" for name, value in numbers.items() if isinstance(value, float))
 
 
 MARKS = "os^vDP*X<>hd"
@@ -237,12 +207,11 @@ def _precision(part: dict) -> Figure:
     """Each method's points and its envelope; methods that failed throughout are named in the legend."""
     figure = Figure(figsize=(7.8, 4.6), layout="constrained")
     axis = figure.subplots()
-    for k, line in enumerate(part["lines"]):
-        points = [p for p in line["points"] if p["error"] > 0]
+    for line, color, mark in zip(part["lines"], cycle(COLORS), cycle(MARKS)):
+        shown = [p for p in line["points"] if p["error"] > 0]
         label = line["method"] + (f" ({len(line['failed'])} failed)" if line["failed"] else "")
-        color, mark = COLORS[k % len(COLORS)], MARKS[k % len(MARKS)]
-        _curve(axis, points, mark, color=color, alpha=0.6)
-        _curve(axis, envelope(points), f"-{mark}" if points else " ", color=color, label=label)
+        _curve(axis, shown, mark, color=color, alpha=0.6)
+        _curve(axis, envelope(shown), f"-{mark}", color=color, label=label)
     axis.set_title(part["title"], fontsize=9)
     axis.set_xlabel("wall time (s)", fontsize=8)
     axis.set_ylabel(part["error"] if len(part["error"]) < 60 else "largest error", fontsize=8)
@@ -252,6 +221,6 @@ def _precision(part: dict) -> Figure:
     return figure
 
 
-def _curve(axis, points, look: str, **how) -> None:
+def _curve(axis, shown, look: str, **how) -> None:
     """Error against time."""
-    axis.loglog(*(np.array([*map(itemgetter(name), points)]) for name in ("seconds", "error")), look, ms=4, **how)
+    axis.loglog([p["seconds"] for p in shown], [p["error"] for p in shown], look, ms=4, **how)

@@ -13,8 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, partial
-from time import perf_counter, process_time
+from functools import partial
 
 import numpy as np
 from fipy import (
@@ -37,8 +36,8 @@ from reference.whole_run_pore import steady, stiffness
 from repro.fem.mesh import Mesh
 from repro.model import transport
 from repro.model.kinetics import Sink
-from repro.scene import parse_scene
-from verification.bench.record import part
+from repro.scene import load_scene
+from verification.bench.record import clock, measured
 from verification.problems import channels, meshes
 from verification.problems.pairs import upright
 
@@ -59,16 +58,20 @@ STABLE, PARTS = 0.4, 100
 
 @dataclass(frozen=True)
 class Problem:
-    """Biomass where ``inside(x, y)``; box: ends (um) along, and across in two dimensions; speed: u (um/h)."""
+    """Biomass where ``inside(x, y)``; box: ends (um) along, and across in two dimensions; linear, curved: cells of this
+    package's elements of order 1 and of more, stepped: of py-pde's compiled run; speed: u (um/h)."""
 
     box: tuple[tuple[float, float], ...]
     inside: Callable[..., np.ndarray]
+    linear: tuple[int, ...]
+    curved: tuple[int, ...]
+    stepped: int
     speed: float = 0.0
 
     def cells(self, across: int) -> list[int]:
         """Cells along (and across) with ``across`` to the width, or to the length in one dimension."""
-        low, high = self.box[-1]
-        return [round((last - first) / (high - low) * across) for first, last in self.box]
+        lengths = np.ptp(self.box, axis=1)
+        return [round(length / lengths[-1] * across) for length in lengths]
 
     def judged(self, fields, load) -> np.ndarray:
         """(2,) C in the last cell, mg/L; at rest what is taken up, um2 mg/L/h, with load = X times the cells' areas."""
@@ -83,22 +86,23 @@ def fipy(problem: Problem, across: int) -> np.ndarray:
     where = problem.inside(*mesh.cellCenters.value)
     X = CellVariable(mesh=mesh, value=np.where(where, DENSITY, 0.0))
     both = [CellVariable(mesh=mesh, value=s) for s in SUPPLY]
-    constants = [CellVariable(mesh=mesh) for _ in both]
-    slopes = [(CellVariable(mesh=mesh), CellVariable(mesh=mesh)) for _ in both]
-    equation = None
+    linear = [CellVariable(mesh=mesh) for _ in range(6)]
+    equations = []
     for k, field in enumerate(both):
-        one = DiffusionTerm(coeff=DIFFUSIVITY[k], var=field) == X * constants[k]
-        for other, slope in zip(both, slopes[k]):
+        *slopes, constant = linear[3 * k: 3 * k + 3]
+        one = DiffusionTerm(coeff=DIFFUSIVITY[k], var=field) == X * constant
+        for other, slope in zip(both, slopes):
             one = one + ImplicitSourceTerm(coeff=-X * slope, var=other)
-        one = one + _fipy_ends(problem, mesh, field, k)
-        equation = one if equation is None else equation & one
+        equations.append(one + _fipy_ends(problem, mesh, field, k))
+    equation = equations[0] & equations[1]
     for _ in range(MOST):
         before = np.array([field.value for field in both])
-        _linearise(before, constants, slopes)
+        for variable, values in zip(linear, _linear(before)):
+            variable.setValue(values)
         equation.sweep(solver=LinearLUSolver(tolerance=EXACT))
-        if np.abs(np.array([field.value for field in both]) - before).max() < REST * max(SUPPLY):
+        fields = np.array([field.value for field in both])
+        if np.abs(fields - before).max() < REST * max(SUPPLY):
             break
-    fields = np.array([field.value for field in both])
     return problem.judged(fields, X.value * mesh.cellVolumes)
 
 
@@ -121,14 +125,12 @@ def _fipy_ends(problem: Problem, mesh, field, k: int):
     return first * SUPPLY[k] - CentralDifferenceConvectionTerm(coeff=(problem.speed,), var=field)
 
 
-def _linearise(now, constants, slopes) -> None:
-    """q = constant + sum of slopes times C at the present C (2, n); slopes by central differences."""
+def _linear(now: np.ndarray) -> np.ndarray:
+    """(6, n) q at the present C (2, n) made linear: of the acceptor and then of the donor its slopes by C_A and C_D, by
+    central differences, and the constant beside them."""
     by = derivatives(now, RATES)
     rest = np.array(uptake(*now, RATES)) - np.einsum("kjn,jn->kn", by, now)
-    for k in (0, 1):
-        constants[k].setValue(rest[k])
-        for j in (0, 1):
-            slopes[k][j].setValue(by[k, j])
+    return np.concatenate([by, rest[:, None]], axis=1).reshape(6, -1)
 
 
 def py_pde(problem: Problem, across: int) -> tuple[np.ndarray, dict]:
@@ -143,23 +145,19 @@ def py_pde(problem: Problem, across: int) -> tuple[np.ndarray, dict]:
     times = TIMES_OPEN if problem.speed else TIMES
     time = times * np.ptp(problem.box[0]) ** 2 / min(DIFFUSIVITY)
     dt = STABLE * min(grid.discretization) ** 2 / max(DIFFUSIVITY) / grid.num_axes
-    marks = [_now()]
-    watch = CallbackTracker(lambda state, t: marks.append(_now()), interrupts=time / PARTS)
+    marks = [clock()]
+    watch = CallbackTracker(lambda state, t: marks.append(clock()), interrupts=time / PARTS)
     found = Controller(EulerSolver(equation, backend="numba"), t_range=time, tracker=watch).run(state, dt=dt)
     fields = np.array([part.data.ravel() for part in found])
     load = X.data.ravel() * np.prod(grid.discretization)
     return problem.judged(fields, load), _compiled(marks)
 
 
-def _now() -> tuple[float, float]:
-    return perf_counter(), process_time()
-
-
-def _compiled(marks: list[tuple[float, float]]) -> dict[str, float]:
+def _compiled(marks: list[np.ndarray]) -> dict[str, float]:
     """To the second mark of a callback (the first is at t = 0), less a mean interval of the others."""
-    first, second, last = (np.array(marks[k]) for k in (0, 2, -1))
-    found = second - first - (last - second) / (len(marks) - 3)
-    return dict(zip(("apart_seconds", "apart_cpu"), map(float, found)))
+    first, _, second, *_, last = marks
+    seconds, cpu = second - first - (last - second) / (len(marks) - 3)
+    return {"apart_seconds": seconds, "apart_cpu": cpu}
 
 
 def _pde_rules(problem: Problem) -> dict[str, str]:
@@ -182,27 +180,25 @@ def _pde_ends(problem: Problem, k: int) -> dict:
     return ends if len(problem.box) == 1 else {**ends, "y": {"derivative": 0.0}}
 
 
-@cache
-def ribbon():
-    """Substrates and kinetics of Table 1, but for the diffusivities."""
-    kinds = {name: {"diffusivity": f"{d} um^2/h", "diffusivity_in_aggregate": f"{d} um^2/h"}
-             for name, d in zip(("acceptor", "donor"), DIFFUSIVITY)}
-    return parse_scene({"substrates": kinds, "aggregate": {}}, "ribbon", "ribbon.toml")
+#: Substrates and kinetics of Table 1, but for the diffusivities.
+GIVEN = load_scene("base", [f"substrates.{name}.{key}={d} um^2/h" for name, d in zip(channels.NAMES, DIFFUSIVITY)
+                            for key in ("diffusivity", "diffusivity_in_aggregate")])
 
 
-def straight(ends, width: float, cells: tuple[int, int], inside) -> Mesh:
-    """cells (along, across) halved; ``inside(x, y)`` of the triangles' middles is biomass."""
-    halved = MeshTri.init_tensor(np.linspace(*ends, cells[0] + 1), np.linspace(0.0, width, cells[1] + 1))
+def ours(problem: Problem, across: int, order: int) -> list[float]:
+    """(2,) what is judged, by linear (order 1), quadratic or cubic elements on halved squares, in one dimension a row
+    of them."""
+    ends, (along, *rows) = problem.box[0], problem.cells(across)
+    rows = rows or [1]
+    width = rows[0] * np.ptp(ends) / along
+    halved = MeshTri.init_tensor(np.linspace(*ends, along + 1), np.linspace(0.0, width, rows[0] + 1))
     points, triangles = upright(halved.p.T, halved.t.T)
-    return Mesh.of(points, triangles, inside(*points[triangles].mean(axis=1).T), np.empty(0, int), width, ends)
-
-
-def solved(grid: Mesh, order: int, speed: float = 0.0):
-    """(acceptor's, donor's) fluxes by linear (order 1), quadratic or cubic elements, in plug flow (um/h) or at rest."""
-    given, space = ribbon(), meshes.space_on(grid, order)
-    problem = channels.problem(space, speed or None, given.substrates, given.kinetics)
+    biomass = problem.inside(*points[triangles].mean(axis=1).T)
+    space = meshes.space_on(Mesh.of(points, triangles, biomass, np.empty(0, int), width, ends), order)
+    solved = channels.problem(space, problem.speed or None, GIVEN.substrates, GIVEN.kinetics)
     sink = Sink(DENSITY * space.reaction.dx)
-    return transport.fluxes(problem, sink, transport.steady(problem, sink))
+    fluxes = transport.fluxes(solved, sink, transport.steady(solved, sink))
+    return [flux.effluent if problem.speed else flux.consumed for flux in fluxes]
 
 
 #: Methods of this package, by the order of their elements.
@@ -211,32 +207,32 @@ OURS = {1: "linear elements (paper)", 2: "order 2 (fast, accurate)", 3: "order 3
 QUADRATIC = "scikit-fem: quadratic elements"
 
 
-def _compared(about: tuple[str, str, str], problem: Problem, ours: Callable, others: dict, truths, scale,
-              quick: bool) -> dict:
-    """A part about (title, error, reference, told with the finer of both truths and what they differ by); ``ours(cells,
-    order=order)`` and ``solve(cells)`` of the others {name: (sizes, solve)} find what is judged, (2,); truths: the
-    reference's, coarser first. py-pde's compiled run comes once, on one grid: numba compiles for longer than it runs.
+def _compared(problem: Problem, about: tuple[str, str, str], others: dict, truths, scale, quick: bool) -> dict:
+    """A part about (title, error, reference, told with the finer of both truths and what they differ by);
+    ``solve(cells)`` of the others {name: (sizes, solve)} finds what is judged, (2,); truths: the reference's, coarser
+    first. py-pde's compiled run comes once, on one grid: numba compiles for longer than it runs.
     """
     coarse, truth = truths
-    linear, curved, stepped = SIZES[problem]
 
     def error(found) -> float:
-        return float(np.max(np.abs(np.asarray(found) - truth) / scale))
+        return float(np.max(np.abs(found - truth) / scale))
 
-    def solved_apart(solve, cells: int) -> dict:
+    def solved(solve, cells: int) -> dict:
         return {"error": error(solve(cells))}
 
-    def stepped_apart(cells: int) -> dict:
-        found, compiled = py_pde(problem, cells)
+    def stepped() -> dict:
+        found, compiled = py_pde(problem, problem.stepped)
         return {"error": error(found), **compiled}
 
-    methods = {method: (linear if order == 1 else curved, partial(ours, order=order))
+    methods = {method: (problem.linear if order == 1 else problem.curved, partial(ours, problem, order=order))
                for order, method in OURS.items()} | others
-    jobs = {(method, f"{cells} cells"): partial(solved_apart, solve, cells)
+    jobs = {(method, f"{cells} cells"): partial(solved, solve, cells)
             for method, (sizes, solve) in methods.items() for cells in (sizes[:1] if quick else sizes)}
-    once = {} if quick else {(COMPILED, f"{stepped} cells"): partial(stepped_apart, stepped)}
+    once = {} if quick else {(COMPILED, f"{problem.stepped} cells"): stepped}
+    repeats = 1 if quick else REPEATS
     title, judged, reference = about
-    return part(title, judged, reference.format(*truth, error(coarse)), jobs, 1 if quick else REPEATS, once)
+    return {"title": title, "error": judged, "reference": reference.format(*truth, error(coarse)), "repeats": repeats,
+            "lines": measured(jobs, repeats) + measured(once, 1)}
 
 
 #: Runs of a job that count.
@@ -249,7 +245,8 @@ def _inside(x, y):
     return (np.abs(x) < SIDE) & (y < SIDE)
 
 
-BOX = Problem(((-HALF, HALF), (0.0, WIDTH)), _inside)
+#: Cells across the width.
+BOX = Problem(((-HALF, HALF), (0.0, WIDTH)), _inside, (8, 16, 32, 64, 96), (2, 4, 8, 16, 24), 16)
 #: Of the box's reference, cells across.
 COARSE, FINE = 32, 64
 
@@ -265,12 +262,7 @@ def box_part(quick: bool) -> dict:
              "what is taken up of each substrate, relative, the larger error",
              f"quadratic elements of scikit-fem, {FINE} cells across: {{:.9g}} and {{:.9g}} um2 mg/L/h; from {COARSE} "
              "cells on they change by {:.1e}")
-    return _compared(about, BOX, _box_ours, others, truths, truths[1], quick)
-
-
-def _box_ours(cells: int, order: int) -> list[float]:
-    grid = straight((-HALF, HALF), WIDTH, (2 * cells, cells), _inside)
-    return [flux.consumed for flux in solved(grid, order)]
+    return _compared(BOX, about, others, truths, truths[1], quick)
 
 
 def _newton(cells: int) -> np.ndarray:
@@ -294,11 +286,9 @@ def quadratic(cells: int) -> np.ndarray:
 #: um; um/h.
 ENDS, STRIP = (-40.0, 80.0), 40.0
 SPEED = 1e5
-CHANNEL = Problem((ENDS,), lambda x, *y: (x > 0) & (x < STRIP), SPEED)
-#: Cells across the box, and along the channel (multiples of three: faces lie on both ends of the strip): linear, of
-#: higher order, and of py-pde's compiled run.
-SIZES = {BOX: ((8, 16, 32, 64, 96), (2, 4, 8, 16, 24), 16),
-         CHANNEL: ((15, 30, 60, 120, 240, 480), (6, 12, 24, 48, 96), 60)}
+#: Cells along, multiples of three: faces lie on both ends of the strip.
+CHANNEL = Problem((ENDS,), lambda x, *y: (x > 0) & (x < STRIP), (15, 30, 60, 120, 240, 480), (6, 12, 24, 48, 96), 60,
+                  SPEED)
 
 
 def channel_part(quick: bool) -> dict:
@@ -312,15 +302,10 @@ def channel_part(quick: bool) -> dict:
              "effluents over the supply, the larger error",
              "scipy's solve_bvp, tolerance 1e-9: {:.9f} and {:.9f} mg/L; from 1e-7 on they change by {:.1e} of the "
              "supply")
-    return _compared(about, CHANNEL, _channel_ours, others, [reference(1e-7), reference(1e-9)], SUPPLY, quick)
+    return _compared(CHANNEL, about, others, [reference(1e-7), reference(1e-9)], SUPPLY, quick)
 
 
 def reference(tolerance: float) -> np.ndarray:
     """(2,) effluents, mg/L."""
     found = channel_bvp.solution(SPEED, SUPPLY, DIFFUSIVITY, DIFFUSIVITY, DENSITY, RATES, STRIP, tolerance)
     return found(np.array([STRIP]))[:, 0]
-
-
-def _channel_ours(cells: int, order: int) -> list[float]:
-    grid = straight(ENDS, np.ptp(ENDS) / cells, (cells, 1), CHANNEL.inside)
-    return [flux.effluent for flux in solved(grid, order, SPEED)]

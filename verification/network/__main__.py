@@ -13,7 +13,6 @@ from pathlib import Path
 from repro.results import write_table, write_text
 from repro.results.network import TABLE
 from verification.network import law
-from verification.network.shapes import RATIOS
 
 PAGE = Path(__file__).parents[2] / "docs" / "network.md"
 
@@ -23,8 +22,8 @@ def main() -> int:
     discs, others = law.half_discs(), list(law.others())
     write_table(TABLE, law.TABLE_COLUMNS, law.table_rows(discs, others))
     print(f"{TABLE.name}: made of {len(discs)} half-discs and {len(others)} other shapes", flush=True)
-    seen = [law.shape_row(one, RATIOS.index(law.RATIO), 0) for one in (*discs, *others)]
-    new = [law.shape_row(one, 0, 1) for one in law.new_shapes()]
+    seen = [law.shape_row(one, 0) for one in discs + others]
+    new = [law.shape_row(one, 1) for one in law.new_shapes()]
     write_table(law.SHAPES, law.COLUMNS, seen + new)
     found = law.judged(law.read(unseen=True))
     write_text(PAGE, law.page(law.read(unseen=False), found))

@@ -73,8 +73,8 @@ def table_rows(discs: list[Sample], found: list[Sample]) -> list[list]:
 
 def _lines(spanned: int, shares: np.ndarray, lengths: np.ndarray, factors: np.ndarray) -> Iterator[list]:
     for k, ratio in enumerate(RATIOS):
-        for share, length, least, most in zip(shares, lengths[:, k], *factors[:, :, k]):
-            yield [spanned, *map(float, (ratio, share, length, least, most))]
+        for row in zip(shares, lengths[:, k], *factors[:, :, k]):
+            yield [spanned, ratio, *map(float, row)]
 
 
 def law(shares: np.ndarray, lengths: np.ndarray, share: float) -> np.ndarray:
@@ -90,25 +90,23 @@ def departures(found: list[Sample], expected: Callable[[Sample], np.ndarray]) ->
 def mean_of_runs(found: list[Sample], but: Growth | None = None) -> np.ndarray:
     """(m, l) geometric mean of r at the areas PLUGS over the runs that reach them, one of them left out."""
     curves = []
-    for run in dict.fromkeys(one.run for one in found if one.run not in (None, but)):
+    for run in {one.run: None for one in found if one.run not in (None, but)}:
         made = [one for one in found if one.run == run]
         place = np.log([one.share for one in made])
-        columns = np.log([one.lengths for one in made]).T
-        curves.append([np.interp(np.log(PLUGS), place, column, np.nan, np.nan) for column in columns])
+        curves.append([np.interp(np.log(PLUGS), place, column, np.nan, np.nan)
+                       for column in np.log([one.lengths for one in made]).T])
     return np.exp(np.nanmean(curves, axis=0)).T
 
 
 def bounds(shares: np.ndarray, found: list[Sample], apart: np.ndarray) -> np.ndarray:
     """(2, m, l) the least and the largest r over the law's of shapes within NEIGHBOURS of each area of the table, with
     what the elements err by."""
-    where, last = np.array([one.share for one in found]), len(shares) - 1
-    least, most = [], []
-    for k in range(len(shares)):
-        low, high = shares[max(k - NEIGHBOURS, 0)], shares[min(k + NEIGHBOURS, last)]
+    where, around = np.array([one.share for one in found]), np.pad(shares, NEIGHBOURS, "edge")
+    rows = []
+    for low, high in zip(around, around[2 * NEIGHBOURS:]):
         near = apart[(where >= low) & (where <= high)]
-        least.append(np.minimum(near.min(axis=0), 0.0) - NUMERICS)
-        most.append(np.maximum(near.max(axis=0), 0.0) + NUMERICS)
-    return 1 + np.array([least, most])
+        rows.append([near.min(axis=0, initial=0.0) - NUMERICS, near.max(axis=0, initial=0.0) + NUMERICS])
+    return 1 + np.swapaxes(rows, 0, 1)
 
 
 SHAPES = Path(__file__).with_name("shapes.csv")
@@ -119,9 +117,11 @@ RATIO = 2000.0
 TOLD = ((0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.3, 1.4, 1.5), (1.6, 1.75, 2.0, 2.5, 3.0, 4.0, 4.5))
 
 
-def shape_row(one: Sample, which: int, new: int) -> list:
-    """A row of SHAPES; which: of the sample's lambdas."""
-    return [new, int(one.run is not None), int(one.spanned), one.ratios[which], one.share, one.lengths[which]]
+def shape_row(one: Sample, new: int) -> list:
+    """A row of SHAPES: a shape of the fit at RATIO, a new one at its own lambda."""
+    ratio = one.ratios[0] if new else RATIO
+    length = one.lengths[one.ratios.index(ratio)]
+    return [new, int(one.run is not None), int(one.spanned), ratio, one.share, length]
 
 
 def read(unseen: bool) -> dict[str, np.ndarray]:
@@ -151,10 +151,9 @@ class Judged:
 
 def judged(columns: dict[str, np.ndarray]) -> Judged:
     """Shapes against the law, each at its lambda. Raises ValueError where one is outside the law's range."""
-    shares, lengths, kinds, ratios = (columns[name] for name in ("area_over_width2", "added_length_over_width",
-                                                                 "spanned", "viscosity_ratio"))
-    laws = np.array([added_resistance(share, 1.0, kind, ratio) for share, kind, ratio in zip(shares, kinds, ratios)])
-    law, least, most = np.log(laws.T)
+    _, _, kinds, ratios, shares, lengths = (columns[name] for name in COLUMNS)
+    laws = np.log([added_resistance(share, 1.0, kind, ratio) for share, kind, ratio in zip(shares, kinds, ratios)])
+    law, least, most = laws.T
     apart = np.log(lengths) - law
     return Judged(apart, apart / np.where(apart < 0, least - law, most - law))
 
@@ -240,8 +239,7 @@ def _drawn(random: np.random.Generator) -> Iterator[Sample]:
     for _ in range(HALF_DISCS):
         width, ratio = _log(random, *WIDTHS), _ratio(random)
         thickness, position = random.uniform(*DRAWN), random.uniform(-1, 1) * width
-        now = shapes.half_disc(thickness, width, position, shapes.QUICK)
-        yield shapes.sample(now, (ratio,))
+        yield shapes.sample(shapes.half_disc(thickness, width, position, shapes.QUICK), (ratio,))
     for _ in range(DRAWN_BODIES):
         thicker, leaning = random.uniform(*shapes.THICKER), random.uniform(-1, 1) * shapes.LEANING
         radius = random.uniform(DRAWN[0], DRAWN[1] / max(thicker, 1))
@@ -252,8 +250,7 @@ def _drawn(random: np.random.Generator) -> Iterator[Sample]:
 
 
 def _outlined(points: np.ndarray, random: np.random.Generator) -> Sample:
-    now, ratio = shapes.drawn(points, _log(random, *WIDTHS)), _ratio(random)
-    return shapes.sample(now, (ratio,))
+    return shapes.sample(shapes.drawn(points, _log(random, *WIDTHS)), (_ratio(random),))
 
 
 def _grown(random: np.random.Generator) -> Iterator[Sample]:
@@ -261,11 +258,10 @@ def _grown(random: np.random.Generator) -> Iterator[Sample]:
     width, velocity = random.uniform(40, 150), _log(random, 0.5, 6)
     supply = _log(random, max(shapes.LEAST_SUPPLY * width**2, 4), 20)
     run = Growth(width, velocity, supply, random.uniform(0.05, 0.15) * width, random.uniform(-0.5, 0.5) * width, END)
-    ratio = _ratio(random)
-    found = [one for one in shapes.grown(run, LARGEST, FURTHER, (ratio,)) if _known(one)]
+    found = [one for one in shapes.grown(run, LARGEST, FURTHER, (_ratio(random),)) if _known(one)]
     shares = np.array([one.share for one in found])
     for share in np.linspace(shares[0], shares[-1], OF_EACH):
-        yield found[int(np.abs(shares - share).argmin())]
+        yield found[np.abs(shares - share).argmin()]
 
 
 def _known(one: Sample) -> bool:

@@ -12,7 +12,7 @@ from repro.march.simulation import simulate
 from repro.model import flow, pore
 from repro.model.pore import Pore
 from repro.scene import load_scene
-from verification.claims.runs import until
+from verification.claims.runs import SUBSTRATES, until
 
 #: Of the table.
 RATIOS = (100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0, 10000.0)
@@ -51,12 +51,16 @@ class Growth:
 
     def scene(self):
         """In the preset `fast`, a row an hour."""
-        return load_scene({
-            "pore": {"width": f"{self.width} um", "length": f"{LENGTH * self.width} um"},
-            "aggregate": {"radius": f"{self.radius} um", "position": f"{self.position} um"},
-            "flow": {"mean_velocity": f"{self.velocity} m/d"},
-            "substrates": {name: {"supply": f"{self.supply} mg/L"} for name in ("acceptor", "donor")},
-            "growth": {}}, (*QUICK, *until(*range(self.end + 1))))
+        aggregate = {"radius": f"{self.radius} um", "position": f"{self.position} um"}
+        supplies = {name: {"supply": f"{self.supply} mg/L"} for name in SUBSTRATES}
+        return load_scene({**tables(self.width, aggregate, self.velocity), "substrates": supplies, "growth": {}},
+                          (*QUICK, *until(*range(self.end + 1))))
+
+
+def tables(width: float, aggregate: dict, velocity: float = 1.0) -> dict:
+    """A scene's pore (um), aggregate and flow (m/d)."""
+    return {"pore": {"width": f"{width} um", "length": f"{LENGTH * width} um"}, "aggregate": aggregate,
+            "flow": {"mean_velocity": f"{velocity} m/d"}}
 
 
 @dataclass(frozen=True)
@@ -86,19 +90,14 @@ def added_length(space: Space, ratio: float) -> float:
 
 def half_disc(thickness: float, width: float = WIDTH, position: float = 0.0, elements=FINE) -> Pore:
     """On one wall; thickness: over W; position: of its middle (um)."""
-    return _seeded({"radius": f"{thickness * width} um", "position": f"{position} um"}, width, elements)
+    aggregate = {"radius": f"{thickness * width} um", "position": f"{position} um"}
+    return pore.seeded(load_scene(tables(width, aggregate), elements))
 
 
-def drawn(points: np.ndarray, width: float = WIDTH, elements=QUICK) -> Pore:
+def drawn(points: np.ndarray, width: float = WIDTH) -> Pore:
     """A body with an outline (K, 2), in widths of the pore."""
     text = [[f"{x!r} um", f"{y!r} um"] for x, y in (width * points).tolist()]
-    return _seeded({"outline": text}, width, elements)
-
-
-def _seeded(aggregate: dict, width: float, elements) -> Pore:
-    tables = {"pore": {"width": f"{width} um", "length": f"{LENGTH * width} um"}, "aggregate": aggregate,
-              "flow": {"mean_velocity": "1 m/d"}}
-    return pore.seeded(load_scene(tables, elements))
+    return pore.seeded(load_scene(tables(width, {"outline": text}), QUICK))
 
 
 def body(share: float, thicker: float, leaning: float) -> np.ndarray:
@@ -116,7 +115,7 @@ def plug(share: float, ends: float, upstream: float) -> np.ndarray:
     angle = np.linspace(0.0, STEEPEST, 25)
     x, y = (1 - np.cos(angle)) / (1 - np.cos(STEEPEST)), np.sin(angle) / np.sin(STEEPEST)
     y[-1] = 1.0
-    beside = ends * float(np.sum(0.5 * (x[1:] + x[:-1]) * np.diff(y)))
+    beside = ends * float(np.trapezoid(x, y))
     base = share + beside
     left = np.column_stack([-base / 2 + upstream * ends * x, y])
     right = np.column_stack([base / 2 - (1 - upstream) * ends * x, y])

@@ -44,10 +44,9 @@ def reaches(record: dict, number: str) -> list[tuple[str, float, bool]]:
 
 
 def write(record: dict, target: Path = TARGET, outlines: Path = OUTLINES) -> None:
-    """Both pictures, the second where the record tells of supplies."""
+    """Both pictures."""
     tornado(record, target)
-    if record.get("supplies"):
-        of_supplies(record["supplies"], outlines)
+    of_supplies(record["supplies"], outlines)
 
 
 def _saved(made: Figure, target: Path) -> None:
@@ -59,11 +58,11 @@ def _saved(made: Figure, target: Path) -> None:
 def of_supplies(found: dict[str, dict], target: Path) -> None:
     """Outlines of wide every 5 h, a supply a row, the latest at the back."""
     made = Figure(figsize=(9, 1.7 * len(found)), layout="constrained")
-    for axes, (supply, known) in zip(made.subplots(len(found), 1, sharex=True, squeeze=False).ravel(), found.items()):
-        shown = [(float(time), _places(text)) for time, text in known["outlines"].items()]
-        last = max(time for time, _ in shown)
-        for time, places in reversed(shown):
-            axes.fill(*places.T, facecolor=matplotlib.colormaps["viridis_r"](time / last), edgecolor="white")
+    for axes, (supply, known) in zip(made.subplots(len(found), sharex=True), found.items()):
+        *_, last = map(float, known["outlines"])
+        for time, places in reversed(known["outlines"].items()):
+            colour = matplotlib.colormaps["viridis_r"](float(time) / last)
+            axes.fill(*_places(places).T, facecolor=colour, edgecolor="white")
         axes.set_ylim(0, WIDTH)
         axes.set_aspect("equal")
         axes.set_title(f"{supply} K_s: every 5 h to {last:g} h; contact at {known['contact_time']:.1f} h", loc="left",
@@ -80,9 +79,9 @@ def _places(text: str) -> np.ndarray:
 def tornado(record: dict, target: Path) -> None:
     """The diagram: of each number the inputs in their order, an input's printed digit up and down; hatched what is not
     resolved."""
-    shown = [name for name in NAMES if name in record["elasticities"]]
-    made = Figure(figsize=(9, 2.6 * ((len(shown) + 1) // 2)), layout="constrained")
-    for axes, number in zip(made.subplots((len(shown) + 1) // 2, 2, squeeze=False).ravel(), shown):
+    lines = len(NAMES) // 2
+    made = Figure(figsize=(9, 2.6 * lines), layout="constrained")
+    for axes, number in zip(made.subplots(lines, 2).ravel(), NAMES):
         rows = [row for row in reaches(record, number)[:8] if row[1]]
         axes.set_title(NAMES[number], loc="left", fontsize=10)
         if not rows:
@@ -111,14 +110,17 @@ def page(record: dict) -> str:
              "bar, and one that exceeds a tenth of the value is *not resolved*. `make sensitivity` writes this page.")
     blocks = [Block("text", words), Block("text", f"![Tornado diagram]({TARGET.name})"), _table(record)]
     for part, section in SECTIONS.items():
-        blocks += section(record[part]) if record.get(part) else ()
+        blocks += section(record[part])
     return f"# What the inputs of Table 1 allow\n\n{markdown(blocks, 2)}\n\n"
 
 
 def _table(record: dict) -> Block:
-    numbers = list(record["elasticities"])
-    head = ("input", "rounding (%)", *(NAMES.get(name, name.replace("_", " ")) for name in numbers))
-    return table(head, (_row(each, record["elasticities"]) for each in INPUTS))
+    known = record["elasticities"]
+    return table(("input", "rounding (%)", *map(_called, known)), (_row(each, known) for each in INPUTS))
+
+
+def _called(number: str) -> str:
+    return NAMES.get(number, number.replace("_", " "))
 
 
 def _row(each: Input, elasticities: dict[str, dict]) -> tuple[str, ...]:
@@ -144,7 +146,7 @@ def _set(found: dict) -> Iterator[Block]:
                         f"run on sizes {sizes} of elements and steps, over those of `accurate`; the bar is from all of "
                         "them, and a set counts where the whole bar lies in the interval of the printed digits.")
     yield table(("number", "printed", "a run with the set", "bar", "on these sizes"), (
-        (NAMES.get(name, name), "{:g} to {:g}".format(*interval(rounding.PRINTED[name])), f"{value:.4f}",
+        (_called(name), "{:g} to {:g}".format(*interval(rounding.PRINTED[name])), f"{value:.4f}",
          f"{found['bars'][name]:.1g}", _listed(found["on_sizes"][name], ".4f"))
         for name, value in found["numbers"].items()))
     yield table(("input", "value"), ((name, f"{value:.4f}") for name, value in found["inputs"].items()))
@@ -169,14 +171,9 @@ def _held(found: dict[str, dict]) -> Iterator[Block]:
     yield Block("text", "Of the claims about this run, each judged anew with the converged solution at one size, to "
                 f"{wide.AFTER} h after contact or until the aggregate reaches an end of the pore, these hold with "
                 f"all supplies: {every}; with some: {some}; with none: {none}.")
-    rows = [(f"{id}, {quantity}", *_holding(found, id, quantity)) for id, quantity in wide.moving(found)]
-    if rows:
-        yield Block("text", "Numbers that hold with some supplies and not with all:")
-        yield table(("claim", *(f"{supply} K_s" for supply in found)), rows)
-
-
-def _holding(found: dict[str, dict], id: str, quantity: str) -> list[str]:
-    return ["yes" if known["claims"][id].get(quantity) else "no" for known in found.values()]
+    yield Block("text", "Numbers that hold with some supplies and not with all:")
+    yield table(("claim", *(f"{supply} K_s" for supply in found)), (
+        (name, *map({True: "yes", False: "no"}.get, held)) for name, held in wide.moving(found)))
 
 
 def _after_contact(found: list[dict]) -> Iterator[Block]:
@@ -195,14 +192,14 @@ def _sobol(found: dict) -> Iterator[Block]:
                 f"{100 * found['confidence']:.0f} %: the share of a number's variance within the rounding that goes "
                 f"with an input. The widest of the intervals is {widest:.2f} to either side.")
     yield table(("number", *found["inputs"]), (
-        (NAMES.get(name, name), *map(_index, known["total_order"])) for name, known in found["numbers"].items()))
+        (_called(name), *map(_index, known["total_order"])) for name, known in found["numbers"].items()))
 
 
 def _index(known: list[float]) -> str:
     return "{:.2f} ({:.2f} to {:.2f})".format(*known)
 
 
-#: What is told of the parts of the record that are there, in this order.
+#: What is told of the parts of the record, in this order.
 SECTIONS: dict[str, Callable[..., Iterator[Block]]] = {
     "one_set": _set, "after_contact": _after_contact, "supplies": _supplies, "sobol": _sobol}
 
@@ -213,7 +210,6 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--only", choices=tuple(PARTS), help="one part alone; the record of the others stays")
     made = computed(Runs(), parser.parse_args(arguments).only)
     write_json(sensitivity.RECORD, made)
-    sensitivity.record.cache_clear()
     write(made)
     write_text(sensitivity.RECORD.with_suffix(".md"), page(made))
     print(f"{sensitivity.RECORD.name}, its page, tornado.svg and supplies.svg: written")
@@ -221,32 +217,31 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def computed(runs: Runs, only: str | None) -> dict:
-    """The record, what is not asked for as it is when that is there."""
+    """The record, what is not asked for as it is."""
     made = {"values": {}, "elasticities": {}, **sensitivity.record()}
     made["rounding"] = {each.name: each.rounding for each in ROUNDED}
     for name in PARTS if only is None else (only,):
-        part = PARTS[name](runs, made["elasticities"])
-        joined = {key: made[key] | part[key] for key in ("values", "elasticities") if key in part}
-        made |= {**part, **joined}
+        PARTS[name](runs, made)
     return made
 
 
-def _of_scene(runs: Runs, name: str) -> dict:
-    return {"values": runs.numbers(scene(name, {})), "elasticities": rounding.elasticities(runs, name)}
+def _of_scene(runs: Runs, made: dict, name: str = "wide") -> None:
+    made["values"] |= runs.numbers(scene(name, {}))
+    made["elasticities"] |= rounding.elasticities(runs, name)
 
 
-def _of_base(runs: Runs, _) -> dict:
-    found = _of_scene(runs, "base")
-    return {**found, "one_set": rounding.one_set(runs, found["elasticities"])}
+def _of_base(runs: Runs, made: dict) -> None:
+    _of_scene(runs, made, "base")
+    made["one_set"] = rounding.one_set(runs, made["elasticities"])
 
 
-#: Of each part what makes it, of the runs and the elasticities that are known by then.
-PARTS: dict[str, Callable[[Runs, dict], dict]] = {
+#: What adds each part to the record.
+PARTS: dict[str, Callable[[Runs, dict], None]] = {
     "base": _of_base,
-    "wide": lambda runs, _: _of_scene(runs, "wide"),
-    "after_contact": lambda runs, _: {"after_contact": wide.after_contact(runs)},
-    "supplies": lambda runs, _: {"supplies": wide.contacts(runs)},
-    "sobol": lambda runs, known: {"sobol": rounding.sobol(runs, known)}}
+    "wide": _of_scene,
+    "after_contact": lambda runs, made: made.update(after_contact=wide.after_contact(runs)),
+    "supplies": lambda runs, made: made.update(supplies=wide.contacts(runs)),
+    "sobol": lambda runs, made: made.update(sobol=rounding.sobol(runs, made["elasticities"]))}
 
 
 if __name__ == "__main__":

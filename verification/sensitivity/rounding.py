@@ -29,21 +29,22 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
-from functools import cache
-from hashlib import sha256
+from itertools import product, repeat
 from math import log
-from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.optimize import linprog
 from scipy.stats import sobol_indices, uniform
 
 from repro.march import simulation, updates
+from repro.march.loop import State
 from repro.model import kinetics, pore
 from repro.results import M_PER_D
+from repro.run.machine import source_hash
 from repro.scene import Scene, load_scene, needed, scene_hash
 from verification.claims import interval
 from verification.claims.base_run import DISTANCES, END, upstream_means
@@ -56,12 +57,12 @@ from verification.uncertainty import estimate
 
 @dataclass(frozen=True)
 class Input:
-    """name: as the paper has it; paths: keys of the scene that go with it, in proportion; value: as printed; half: half
-    a unit of its last digit, zero where it is taken as exact; only: the scene it belongs to, where not to both."""
+    """name: as the paper has it; paths: keys of the scene that go with it, in proportion; value: as printed, and half:
+    half a unit of its last digit, zero where it is taken as exact; only: the scene it belongs to, where not to both."""
 
     name: str
     paths: tuple[str, ...]
-    value: float
+    value: float = 0.0
     half: float = 0.0
     only: str = ""
 
@@ -91,19 +92,19 @@ ROUNDED = (
     Input("D_fd", _of("donor", "diffusivity_in_aggregate"), 0.81, 0.005),
 )
 EXACT = (
-    Input("X_m", ("kinetics.maximum_density",), 30000.0),
-    Input("R_0", ("aggregate.radius",), 5.0),
-    Input("W_pore", ("pore.width",), 50.0),
-    Input("L_pore", ("pore.length",), 600.0),
-    Input("head", ("flow.head",), 1e-3, only="base"),
-    Input("u_ave", ("flow.mean_velocity",), 2.9, only="wide"),
-    Input("supply of acceptor", _of("acceptor", "supply"), 10.0),
-    Input("supply of donor", _of("donor", "supply"), 10.0),
-    Input("lambda", ("flow.viscosity_ratio",), 2000.0),
-    Input("mu_L", ("growth.shear_modulus",), 0.01),
-    Input("film", ("growth.minimum_film",), 2.0),
-    Input("contact angle", ("growth.minimum_contact_angle",), 16.7),
-    Input("time step", ("growth.time_step",), 12.0),
+    Input("X_m", ("kinetics.maximum_density",)),
+    Input("R_0", ("aggregate.radius",)),
+    Input("W_pore", ("pore.width",)),
+    Input("L_pore", ("pore.length",)),
+    Input("head", ("flow.head",), only="base"),
+    Input("u_ave", ("flow.mean_velocity",), only="wide"),
+    Input("supply of acceptor", _of("acceptor", "supply")),
+    Input("supply of donor", _of("donor", "supply")),
+    Input("lambda", ("flow.viscosity_ratio",)),
+    Input("mu_L", ("growth.shear_modulus",)),
+    Input("film", ("growth.minimum_film",)),
+    Input("contact angle", ("growth.minimum_contact_angle",)),
+    Input("time step", ("growth.time_step",)),
 )
 INPUTS = ROUNDED + EXACT
 BY_NAME = {each.name: each for each in INPUTS}
@@ -121,11 +122,6 @@ def _scaled(node, keys: list[str], factor: float):
     first, *rest = keys
     part = needed(getattr(node, first), ".".join(keys))
     return replace(node, **{first: _scaled(part, rest, factor) if rest else factor * part})
-
-
-def factors_of(values: dict[str, float]) -> dict[str, float]:
-    """Values of inputs, in the paper's units, over those printed."""
-    return {name: value / BY_NAME[name].value for name, value in values.items()}
 
 
 KEPT = Path(__file__).parent / "out" / "runs.jsonl"
@@ -164,70 +160,56 @@ def of_base(said: Scene) -> Numbers:
 
 def of_wide(said: Scene) -> Numbers:
     """Contact with the opposite wall (h), and the conductivity (m/d) some hours after it."""
-    said = ending(said, said.growth.end)
-    touching = next(state for state, _ in simulation.steps(said) if state.pore.contact)
-    *_, (_, last) = simulation.steps(ending(said, touching.pore.time + AFTER), touching)
-    return {"contact_time": touching.pore.time, "conductivity_after": M_PER_D * last.solved.flow.conductivity}
+    state = touching(ending(said, said.growth.end))
+    time = state.pore.time
+    *_, (_, last) = simulation.steps(ending(said, time + AFTER), state)
+    return {"contact_time": time, "conductivity_after": M_PER_D * last.solved.flow.conductivity}
+
+
+def touching(said: Scene) -> State:
+    """The first state of a run in which the aggregate touches the opposite wall."""
+    return next(state for state, _ in simulation.steps(said) if state.pore.contact)
 
 
 OF: dict[str, Callable[[Scene], Numbers]] = {"base": of_base, "wide": of_wide}
 
 
-#: Rooms of `repro` whose source makes these numbers: that of a scene is in its hash.
-ROOMS = ("fem", "model", "march", "results")
-
-
-@cache
-def source() -> str:
-    """8 hexadecimal digits that stand for the source of ROOMS."""
-    digest = sha256()
-    package = Path(simulation.__file__).parents[1]
-    for path in sorted(path for room in ROOMS for path in (package / room).rglob("*.py")):
-        digest.update(path.name.encode() + path.read_bytes())
-    return digest.hexdigest()[:8]
-
-
 class Runs:
-    """Runs that have been computed with this source; each new one is a line of the file at once, so that a break loses
-    no more than those under way."""
+    """Runs that have been computed with the present source of `repro`."""
 
     def __init__(self, path: Path = KEPT) -> None:
         self.path = path
         self.known: dict[str, Numbers] = {row["run"]: row["numbers"] for row in lines(path)
-                                          if row["run"].endswith(source())}
+                                          if row["run"].endswith(source_hash())}
 
     def numbers(self, said: Scene) -> Numbers:
         """What a scene's run comes to."""
         key = _key(said)
         if key not in self.known:
-            self._keep(key, computed(OF[said.name], said))
+            self.known[key] = computed(said, self.path)
         return self.known[key]
 
-    def ahead(self, scenes: Iterable[Scene]) -> None:
-        """Runs of scenes that are not known yet, on all cores."""
-        asked = {_key(said): said for said in scenes}
-        missing = {key: said for key, said in asked.items() if key not in self.known}
-        if not missing:
-            return
+    def rows(self, scenes: Iterable[Scene]) -> list[Numbers]:
+        """What the runs of scenes come to, those that are not known yet on all cores."""
+        scenes = list(scenes)
+        missing = {_key(said): said for said in scenes if _key(said) not in self.known}
         print(f"{len(missing)} runs", flush=True)
         with ProcessPoolExecutor(max_workers=os.cpu_count()) as pool:
-            waiting = {pool.submit(computed, OF[said.name], said): key for key, said in missing.items()}
-            for done in as_completed(waiting):
-                self._keep(waiting[done], done.result())
-
-    def _keep(self, key: str, numbers: Numbers) -> None:
-        self.known[key] = numbers
-        append({"run": key, "numbers": numbers}, self.path)
+            self.known |= zip(missing, pool.map(computed, missing.values(), repeat(self.path)))
+        return [*map(self.numbers, scenes)]
 
 
-def computed(function: Callable[[Scene], Numbers], said: Scene) -> Numbers:
-    """What a run comes to, with no operation that fails silently."""
+def computed(said: Scene, path: Path) -> Numbers:
+    """What a run comes to, with no operation that fails silently; a line of the file at once, so that a break loses no
+    more than those under way."""
     with np.errstate(all="raise", under="ignore"):
-        return {name: float(value) for name, value in function(said).items()}
+        numbers = {name: float(value) for name, value in OF[said.name](said).items()}
+    append({"run": _key(said), "numbers": numbers}, path)
+    return numbers
 
 
 def _key(said: Scene) -> str:
-    return f"{said.name}-{scene_hash(said)}-{source()}"
+    return f"{said.name}-{scene_hash(said)}-{source_hash()}"
 
 
 #: Relative distances of an input from its printed value; the larger one of an input that is taken as exact.
@@ -239,51 +221,39 @@ RESOLVED = 0.1
 def elasticities(runs: Runs, name: str) -> dict[str, dict[str, dict]]:
     """{number: {input: elasticity, bar, resolved, and the changes (%) that +-10 % of an exact input make}}."""
     inputs = [each for each in INPUTS if each.only in ("", name)]
-    runs.ahead(scene(name, {each.name: factor}) for each in inputs for factor in _factors(each))
-    plain, found = runs.numbers(scene(name, {})), {}
+    runs.rows(said for each in inputs for said in _moved(name, each))
+    plain = runs.numbers(scene(name, {}))
+    found: dict[str, dict[str, dict]] = {number: {} for number in plain}
     for each in inputs:
-        for number, value in _of_input(runs, name, each, plain).items():
-            found.setdefault(number, {})[each.name] = value
+        rows = [*map(runs.numbers, _moved(name, each))]
+        for number, value in plain.items():
+            found[number][each.name] = _told(value, column(rows, number))
     return found
 
 
-def _distances(each: Input) -> tuple[float, ...]:
-    """At which its differences are taken."""
-    return (NEAR, FAR) if each.half else (NEAR, FAR, LARGE)
+def _moved(name: str, each: Input) -> list[Scene]:
+    """Scenes with an input above and below its value, at all distances at which differences are taken."""
+    distances = (NEAR, FAR) if each.half else (NEAR, FAR, LARGE)
+    return [scene(name, {each.name: 1 + sign * distance}) for distance in distances for sign in (1, -1)]
 
 
-def _factors(each: Input) -> list[float]:
-    """On an input, above and below its value, of all of its runs."""
-    return [1 + sign * distance for distance in _distances(each) for sign in (1, -1)]
-
-
-def _of_input(runs: Runs, name: str, each: Input, plain: Numbers) -> dict[str, dict]:
-    pairs = {distance: _pair(runs, name, each, distance) for distance in _distances(each)}
-    return {number: _told(number, value, pairs) for number, value in plain.items()}
-
-
-def _pair(runs: Runs, name: str, each: Input, distance: float) -> list[Numbers]:
-    """Numbers with an input above its value and below it."""
-    return [runs.numbers(scene(name, {each.name: factor})) for factor in (1 + distance, 1 - distance)]
-
-
-def _told(number: str, value: float, pairs: dict[float, list[Numbers]]) -> dict:
-    near, far = (difference(pairs[d][0][number], pairs[d][1][number], value, d) for d in (NEAR, FAR))
+def _told(value: float, moved: list[float]) -> dict:
+    """Of one number and one input: central differences of ln f over ln x."""
+    near = (moved[0] - moved[1]) / (2 * NEAR * value)
+    far = (moved[2] - moved[3]) / (2 * FAR * value)
     bar = abs(far - near)
     told = {"elasticity": near, "bar": bar, "resolved": bar <= RESOLVED * abs(near)}
-    if LARGE in pairs:
-        told["by_10_percent"] = [100 * (found[number] / value - 1) for found in pairs[LARGE]]
+    if moved[4:]:
+        told["by_10_percent"] = [100 * (each / value - 1) for each in moved[4:]]
     return told
-
-
-def difference(above: float, below: float, value: float, distance: float) -> float:
-    """The central difference of ln f over ln x."""
-    return (above - below) / (2 * distance * value)
 
 
 #: What section 4 prints: C01-C04.
 PRINTED = {"velocity_0": "2.9", "velocity": "1.5", "effluent_acceptor": "4.19", "effluent_donor": "6.13",
            "consumed": "~60"}
+#: The intervals of the printed numbers, their middles and half widths.
+INTERVALS = np.array([interval(text) for text in PRINTED.values()])
+MIDDLE, HALF = INTERVALS.mean(axis=1), np.ptp(INTERVALS, axis=1) / 2
 #: Sizes of elements and steps of the runs that make the set, the one that counts first: on 0.5, 2**-0.5 and 1 the bar
 #: of the acceptor effluent, 0.005, is as wide as what its digits leave to either side.
 SET_SIZES = (2**-1.5, 0.5, 2**-0.5)
@@ -295,56 +265,42 @@ AIMED, ENOUGH = 0.4, 0.5
 ROUNDS = 6
 
 
-def targets() -> tuple[np.ndarray, np.ndarray]:
-    """Middles and half widths of the intervals of the printed numbers."""
-    low, high = np.array([interval(text) for text in PRINTED.values()]).T
-    return 0.5 * (low + high), 0.5 * (high - low)
-
-
 def printed_of(numbers: Numbers) -> np.ndarray:
     """Those that the paper prints."""
     return np.array([numbers[name] for name in PRINTED])
 
 
-def misfit(numbers: Numbers, bars: Numbers | None = None) -> float:
+def misfit(numbers: Numbers, bars: ArrayLike = 0.0) -> float:
     """Largest distance of a printed number, or of an end of its bar, from the middle of its interval, in half
     intervals."""
-    middle, half = targets()
-    apart = np.abs(printed_of(numbers) - middle) + (printed_of(bars) if bars else 0.0)
-    return float((apart / half).max())
+    return float(((np.abs(printed_of(numbers) - MIDDLE) + bars) / HALF).max())
 
 
 def one_set(runs: Runs, elasticities: dict[str, dict[str, dict]]) -> dict:
     """The set, what runs with it give and how well that is known, the share t of the rounding that it takes, and
     whether it is reached."""
     rows = _on_sizes(runs, {})
-    start, bars = printed_of(rows[0]), _bars(rows)
+    start, bars = rows[0], _bars(rows)
     slopes = start[:, None] * _table(elasticities)
-    kept = printed_of(bars)
     for _ in range(ROUNDS):
-        x, t = program(start, slopes, kept)
+        x, t = program(start, slopes, bars)
         factors = {each.name: 1 + value for each, value in zip(ROUNDED, x)}
         numbers = runs.numbers(scene("base", factors, *converged(SET_SIZES[0])))
         if misfit(numbers) <= ENOUGH and misfit(numbers, bars) <= 1:
             break
         start = printed_of(numbers) - slopes @ x
     rows = _on_sizes(runs, factors)
-    bars = _bars(rows)
-    left = misfit(numbers, bars)
+    left = misfit(numbers, _bars(rows))
     return {"reached": bool(t <= 1 + 1e-9 and left <= 1), "share_of_the_rounding": t, "misfit_in_half_intervals": left,
             "inputs": {name: BY_NAME[name].value * factor for name, factor in factors.items()},
-            "numbers": {name: numbers[name] for name in PRINTED}, "bars": bars, "sizes": list(SET_SIZES),
-            "on_sizes": {name: column(rows, name) for name in PRINTED}}
+            "numbers": {name: numbers[name] for name in PRINTED}, "bars": dict(zip(PRINTED, _bars(rows).tolist())),
+            "sizes": list(SET_SIZES), "on_sizes": dict(zip(PRINTED, rows.T.tolist()))}
 
 
 def _table(elasticities: dict[str, dict[str, dict]]) -> np.ndarray:
     """(printed numbers, rounded inputs) their elasticities."""
-    return np.array([_in_order(elasticities[name]) for name in PRINTED])
-
-
-def _in_order(known: dict[str, dict]) -> list[float]:
-    """Elasticities of one number."""
-    return [known[each.name]["elasticity"] for each in ROUNDED]
+    found = [elasticities[name][each.name]["elasticity"] for name, each in product(PRINTED, ROUNDED)]
+    return np.reshape(found, (len(PRINTED), -1))
 
 
 def column(rows: list[Numbers], name: str) -> list[float]:
@@ -352,38 +308,38 @@ def column(rows: list[Numbers], name: str) -> list[float]:
     return [row[name] for row in rows]
 
 
-def _on_sizes(runs: Runs, factors: dict[str, float]) -> list[Numbers]:
-    """Numbers of base on SET_SIZES."""
-    return [runs.numbers(scene("base", factors, *converged(size))) for size in SET_SIZES]
+def _on_sizes(runs: Runs, factors: dict[str, float]) -> np.ndarray:
+    """(sizes, printed numbers) of base on SET_SIZES."""
+    rows = runs.rows(scene("base", factors, *converged(size)) for size in SET_SIZES)
+    return np.array([*map(printed_of, rows)])
 
 
-def _bars(rows: list[Numbers]) -> Numbers:
+def _bars(rows: np.ndarray) -> np.ndarray:
     """Of each printed number."""
-    return {name: estimate(SET_SIZES, column(rows, name), MESH_ORDERS).bar for name in PRINTED}
+    return np.array([estimate(SET_SIZES, values, MESH_ORDERS).bar for values in rows.T])
 
 
 def program(start: np.ndarray, slopes: np.ndarray, bars: np.ndarray) -> tuple[np.ndarray, float]:
     """Relative changes and the share of the rounding that they take; within it, with the least misfit, where the
     intervals, less the bars, are out of reach."""
-    middle, half = targets()
     rounding = np.array([each.rounding for each in ROUNDED])
-    A, unit = slopes * rounding, np.eye(len(rounding))
-    both, aimed = np.vstack([A, -A]), np.minimum(half - KEPT_INSIDE * bars, AIMED * half)
-    none, ones = np.zeros((len(both), 1)), np.ones((len(rounding), 1))
-    tight = np.block([[both, none], [unit, -ones], [-unit, -ones]])
-    inside = np.concatenate([middle + aimed - start, start - middle + aimed, np.zeros(2 * len(rounding))])
-    best = _solved(tight, inside, None)
-    if best is not None and best[-1] <= 1:
-        return best[:-1] * rounding, float(best[-1])
-    loose = np.column_stack([both, -np.tile(half, 2)])
-    least = _solved(loose, np.concatenate([middle - start, start - middle]), 1.0)
-    return least[:-1] * rounding, float(best[-1]) if best is not None else float("inf")
+    aimed = np.minimum(HALF - KEPT_INSIDE * bars, AIMED * HALF)
+    given, none, ones = (slopes * rounding, MIDDLE - start), 0 * HALF, np.ones(len(rounding))
+    best = _solved(*given, aimed, none, 0 * ones, ones)
+    share = best[-1] if best is not None else np.inf
+    if share > 1:
+        best = _solved(*given, none, HALF, ones, 0 * ones)
+    return best[:-1] * rounding, float(share)
 
 
-def _solved(A: np.ndarray, b: np.ndarray, box: float | None) -> np.ndarray | None:
-    """Minimise the last unknown; the others within +-box."""
-    bounds = [(None if box is None else -box, box)] * (A.shape[1] - 1) + [(0, None)]
-    answer = linprog(np.append(np.zeros(A.shape[1] - 1), 1.0), A, b, bounds=bounds)
+def _solved(A: np.ndarray, b: np.ndarray, *within: np.ndarray) -> np.ndarray | None:
+    """The y and, last, the least t with |A y - b| <= c + t d and |y| <= e + t f; None where there is none. within: c,
+    d, e and f."""
+    c, d, e, f = within
+    unit = np.eye(len(f))
+    rows = np.vstack([A, -A, unit, -unit])
+    answer = linprog([*0 * f, 1.0], np.column_stack([rows, -np.concatenate([d, d, f, f])]),
+                     np.concatenate([c + b, c - b, e, e]), bounds=[(None, None)] * len(f) + [(0, None)])
     return answer.x if answer.success else None
 
 
@@ -394,34 +350,25 @@ SEED = 2001
 FAST = ('numerics.preset="fast"',)
 
 
-def moving(elasticities: dict[str, dict[str, dict]]) -> list[Input]:
-    """Rounded inputs with an elasticity above LEAST of any printed number."""
-    most = np.abs(_table(elasticities)).max(axis=0)
-    return [each for each, largest in zip(ROUNDED, most) if largest > LEAST]
-
-
 def sobol(runs: Runs, elasticities: dict[str, dict[str, dict]], samples: int = SAMPLES) -> dict:
     """First-order and total indices of each printed number, with their intervals."""
-    chosen = moving(elasticities)
+    moves = np.abs(_table(elasticities)) > LEAST
+    chosen = [each for each, moving in zip(ROUNDED, moves.any(axis=0)) if moving]
     inputs = [each.name for each in chosen]
-    moved = np.abs(_table(elasticities)).max(axis=1) > LEAST
-    names = [name for name, moves in zip(PRINTED, moved) if moves and name != "consumed"]
+    names = [name for name, moved in zip(PRINTED, moves.any(axis=1)) if moved and name != "consumed"]
 
-    def numbers(x: np.ndarray) -> np.ndarray:
-        scenes = [scene("base", dict(zip(inputs, column)), *FAST) for column in x.T]
-        runs.ahead(scenes)
-        rows = [runs.numbers(said) for said in scenes]
-        return np.array([itemgetter(*names)(row) for row in rows]).T
+    def numbers(x: np.ndarray) -> list[list[float]]:
+        rows = runs.rows(scene("base", dict(zip(inputs, factors)), *FAST) for factors in x.T)
+        return [column(rows, name) for name in names]
     spread = [uniform(1 - each.rounding, 2 * each.rounding) for each in chosen]
     found = sobol_indices(func=numbers, n=samples, dists=spread, rng=np.random.default_rng(SEED))
     sure = found.bootstrap(confidence_level=CONFIDENCE, n_resamples=999)
+    orders = zip(names, _listed(found.first_order, sure.first_order), _listed(found.total_order, sure.total_order))
     return {"samples": samples, "inputs": inputs, "confidence": CONFIDENCE,
-            "numbers": {name: {"first_order": _listed(found.first_order, sure.first_order, row),
-                               "total_order": _listed(found.total_order, sure.total_order, row)}
-                        for row, name in enumerate(names)}}
+            "numbers": {name: {"first_order": first, "total_order": total} for name, first, total in orders}}
 
 
-def _listed(values: np.ndarray, sure, row: int) -> list[list[float]]:
-    """[index, low, high] of each input."""
+def _listed(values: np.ndarray, sure) -> list[list[list[float]]]:
+    """[index, low, high] of each number and input."""
     interval = sure.confidence_interval
-    return np.column_stack([values[row], interval.low[row], interval.high[row]]).tolist()
+    return np.stack([values, interval.low, interval.high], axis=-1).tolist()

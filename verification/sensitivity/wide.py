@@ -16,7 +16,9 @@ holds where all of its checks about wide do."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
 from math import floor
 
 import numpy as np
@@ -31,7 +33,7 @@ from verification.claims.evaluate import MESH_ORDERS, unnumbered
 from verification.claims.growth_pattern import contact_length
 from verification.claims.levels import CONVERGED, Level, at_level, converged, forget
 from verification.claims.runs import WIDE, bodies, ending, polygon, series
-from verification.sensitivity.rounding import OF, Numbers, Runs, column, scene
+from verification.sensitivity.rounding import OF, Numbers, Runs, column, scene, touching
 from verification.uncertainty import estimate
 
 SIZES = (0.25, 2**-1.5, 0.5, 2**-0.5)
@@ -68,18 +70,14 @@ OF["after contact"] = of_after
 
 def after_contact(runs: Runs) -> list[dict]:
     """Each number on all sizes, its bar (%), and whether that is what is asked."""
-    runs.ahead(map(_on_size, SIZES))
-    sizes = [runs.numbers(_on_size(size)) for size in SIZES]
-    wanted = {f"{kind} {name}": asked for kind in KINDS for name, asked in ASKED.items()}
-    return [bar_of(quantity, column(sizes, quantity), asked) for quantity, asked in wanted.items()]
+    plain = (ending(scene("wide", {}, *converged(size)), *HOURS) for size in SIZES)
+    rows = runs.rows(replace(said, name="after contact") for said in plain)
+    return [_bar_of(rows, f"{kind} {name}", asked) for kind, (name, asked) in product(KINDS, ASKED.items())]
 
 
-def _on_size(size: float):
-    return replace(ending(scene("wide", {}, *converged(size)), *HOURS), name="after contact")
-
-
-def bar_of(quantity: str, values: list[float], asked: float) -> dict:
-    """A number from its values on SIZES."""
+def _bar_of(rows: list[Numbers], quantity: str, asked: float) -> dict:
+    """A number from what runs on SIZES come to."""
+    values = column(rows, quantity)
     bar = 100 * estimate(SIZES, values, MESH_ORDERS).bar / abs(values[0])
     return {"quantity": quantity, "values": values, "bar_percent": bar, "asked_percent": asked, "kept": bar <= asked}
 
@@ -106,7 +104,7 @@ def of_contact(said) -> dict[str, float]:
     """Time of contact (h), the state's ends (um), the smallest acceptor in it (K_s), and the whole hour, AFTER contact
     at the latest, that a run comes to before the aggregate reaches an end of the pore."""
     said = ending(said, END)
-    state = next(state for state, _ in simulation.steps(said) if state.pore.contact)
+    state = touching(said)
     last = float(floor(state.pore.time) + AFTER)
     outline, acceptor = state.pore.boundary, state.pore.concentrations.acceptor
     return {"contact_time": state.pore.time, "upstream": outline.upstream, "downstream": outline.downstream,
@@ -185,12 +183,11 @@ def verdicts(found: dict[str, dict]) -> tuple[list[str], list[str], list[str]]:
     return every, some, none
 
 
-def moving(found: dict[str, dict]) -> list[tuple[str, str]]:
-    """(claim, quantity) of the checks that hold with some supplies and not with all."""
-    first = next(iter(found.values()))["claims"]
-    return [(id, name) for id, held in first.items() for name in held if _differs(found, id, name)]
-
-
-def _differs(found: dict[str, dict], id: str, name: str) -> bool:
-    """Does a check hold with some supplies alone?"""
-    return len({known["claims"][id][name] for known in found.values()}) > 1
+def moving(found: dict[str, dict]) -> Iterator[tuple[str, list[bool]]]:
+    """Checks, by claim and quantity, that hold with some supplies and not with all: whether they do with each."""
+    claims = [known["claims"] for known in found.values()]
+    for id in claims[0]:
+        for quantity in claims[0][id]:
+            held = [judged[id][quantity] for judged in claims]
+            if any(held) and not all(held):
+                yield f"{id}, {quantity}", held
