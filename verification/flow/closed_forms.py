@@ -340,14 +340,14 @@ ROUND = {"round, order 2": (2, meshes.round_disc, {6.0: 6, 3.0: 4, 1.5: 2, 0.75:
       because="order 1: flow-inclusion")
 def inclusion(disc: tuple, ratio: float, interface: str):
     order, kind, sizes, soft, stiff, pressure = disc
-    rows = (soft, SMEARED) if ratio < RATIO else (stiff, pressure)
+    velocity, jump = (soft, SMEARED) if ratio < RATIO else (stiff, pressure)
 
     def exact(x, y):
         u, p = viscous_inclusion.fields(x - CENTRE[0], y - CENTRE[1], DISC_RADIUS, ratio, interface, ANGLE)
         return u, p, 0 * u
 
     errors = refine(_errors, sizes, _disc_grid, kind, order, ratio, interface, exact)
-    return studies(errors, dict(zip(("velocity", "pressure"), rows)))
+    return studies(errors, {"velocity": velocity, "pressure": jump})
 
 
 def _errors(size: float, draw: int, made: Callable, how, *given) -> dict[str, float]:

@@ -118,7 +118,7 @@ def _power(space: Space, unit: flow.UnitFlow, interface: str) -> tuple[float, fl
     grid, cells = space.mesh, space.cells
     viscosity, count = np.where(grid.biomass, RATIO, 1.0), cells.shape[1]
     blocks = flow.stokes(space, viscosity, interface, None)
-    moving, pressure = np.hstack(unit.velocity.T[:, cells]), unit.pressure[flow.pressure_space(space).cells]
+    moving, pressure = np.hstack([*unit.velocity.T[:, cells]]), unit.pressure[flow.pressure_space(space).cells]
     upper = np.einsum("tab,ta,tb->", blocks[:, : 2 * count, : 2 * count], moving, moving)
     forces = np.einsum("tij,tj->ti", blocks, np.hstack([moving, pressure]))
     force = np.bincount(cells.ravel(), forces[:, :count].ravel(), space.count)

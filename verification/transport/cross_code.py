@@ -277,7 +277,6 @@ def mass(space: Space) -> np.ndarray:
     return poisson.mass.assemble(basis).toarray()[np.ix_(same, same)]
 
 
-@cache
 def _exact_in_time(size: float, peclet: float, density: float, order: int) -> np.ndarray:
     """(times, 2, n): the same equations in space, M dC/dt = b - L C - X q in the points of the reaction, by scipy's
     integrator to 1e-8."""
