@@ -124,8 +124,8 @@ def stokes(channel, ratio, interface="laplacian"):
     basis = Basis(channel.mesh, ElementVector(ElementTriP2()), intorder=5)
     regions = [_region(channel, where) for where in (channel.biomass, ~channel.biomass) if where.any()]
     viscosity = np.where(channel.biomass, float(ratio), 1.0)[:, None] * np.ones(basis.dx.shape[1])
-    A = asm(_viscous(interface), basis, nu=viscosity)
-    B = sp.vstack([asm(_divergence, velocity, lower)[used] for velocity, lower, used in regions])
+    A = asm(viscous(interface), basis, nu=viscosity)
+    B = sp.vstack([asm(divergence, velocity, lower)[used] for velocity, lower, used in regions])
     value, held = _boundary(basis, channel, interface)
     x = np.concatenate([value, np.zeros(B.shape[0])])
     solution = solve(*condense(bmat([[A, -B.T], [-B, None]], "csr"), np.zeros(len(x)), x=x, D=held))
@@ -174,14 +174,16 @@ def _component(basis):
     return component
 
 
-def _viscous(interface):
+def viscous(interface):
+    """The bilinear form a(u, v) above, of a viscosity ``nu``."""
     if interface == "laplacian":
         return BilinearForm(lambda u, v, w: w["nu"] * ddot(grad(u), grad(v)))
     return BilinearForm(lambda u, v, w: 2 * w["nu"] * ddot(sym_grad(u), sym_grad(v)))
 
 
 @BilinearForm
-def _divergence(u, q, w):
+def divergence(u, q, w):
+    """(q, div u)."""
     return div(u) * q
 
 

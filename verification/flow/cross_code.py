@@ -24,12 +24,12 @@ where the circumscribed circle says little, it errs far less.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 from scipy.sparse import bmat
-from skfem import Basis, BilinearForm, ElementTriMini, ElementTriP1, ElementVector, condense, solve
-from skfem.helpers import ddot, div, grad, transpose
+from skfem import Basis, ElementTriMini, ElementTriP1, ElementVector, condense, solve
 
 from reference import layered_channel, poiseuille, taylor_hood
 from repro.fem.mesh import Mesh
@@ -79,7 +79,7 @@ AROUND_TRACTION = {
       claim="With continuous traction too the flow around a half-disc of 25 um is Taylor-Hood's, lambda = 10 and 2000",
       mutants=("traction-transposed",), over=AROUND_TRACTION, ways="1", because="orders 2, 3: flow-curved-half-disc")
 def half_disc(radius: float, ratio: float, interface: str, orders: dict, bounds: dict):
-    errors = refine(_with_excess, DRAWS, radius, ratio, interface)
+    errors = refine(_level, DRAWS, REFINEMENTS, radius, ratio, interface)
     yield studies(errors, orders)
     for name, (bound, why) in bounds.items():
         yield at_most(name, errors[name][-1], bound, why)
@@ -93,7 +93,7 @@ def film(order: int, interface: str):
     """No order: elements grow from the walls of the film to its middle, whatever the refinement, so that no one size
     tells how fine a mesh is there."""
     if order > 1:
-        space = Space(meshes.half_disc(FILM, FILM_CURVED, ENDS, WIDTH, geometry=2), order)
+        space = meshes.half_disc_space(FILM, FILM_CURVED, ENDS, WIDTH, order)
         found = flow.unit_flow(space, RATIO, interface=interface)
         apart = _apart(space, found, _trusted(FILM, RATIO, interface, [*DRAWS][-1]))
         return each_at_most({name: apart[name] for name in IN_THE_FILM}, 1e-3, CODES)
@@ -105,42 +105,32 @@ def film(order: int, interface: str):
 
 
 @cache
-def _trusted(radius: float, ratio: float, interface: str, level: int) -> taylor_hood.Stokes:
-    return taylor_hood.stokes(taylor_hood.half_disc(WIDTH, ENDS, radius, level, CORNER), ratio, interface)
+def _trusted(radius: float, ratio: float, interface: str, level: int, ends=ENDS, corner: int = CORNER
+             ) -> taylor_hood.Stokes:
+    return taylor_hood.stokes(taylor_hood.half_disc(WIDTH, ends, radius, level, corner), ratio, interface)
 
 
 @cache
-def _grid(radius: float, refinement: float) -> Mesh:
-    return meshes.half_disc(radius, refinement, ENDS, WIDTH)
+def _space(radius: float, refinement: float) -> Space:
+    return meshes.half_disc_space(radius, refinement, ENDS, WIDTH, 1)
 
 
 def _level(level: int, draw: int, refinements, radius: float, ratio: float, interface: str) -> dict[str, float]:
-    """Differences of linear elements, both codes refined together; and our head loss over theirs."""
-    space = Space(_grid(radius, refinements[level] * meshes.SPREAD[draw]), 1)
+    """Differences of linear elements, both codes refined together; of the head loss also without what the ends add to
+    that of the clean channel, as to that around any aggregate on the same mesh."""
+    space = _space(radius, refinements[level] * meshes.SPREAD[draw])
     theirs = _trusted(radius, ratio, interface, level)
-    found = flow.unit_flow(space, ratio, interface=interface)
-    return {"size": meshes.mean_size(space.mesh), "losses": found.loss / theirs.loss, **_apart(space, found, theirs)}
-
-
-def _with_excess(level: int, draw: int, radius: float, ratio: float, interface: str) -> dict[str, float]:
-    """Of the head loss without what the ends spoil too."""
-    row = _level(level, draw, REFINEMENTS, radius, ratio, interface)
-    ends = _spoilt(_grid(radius, REFINEMENTS[level] * meshes.SPREAD[draw]), interface)
-    excess = row["losses"] - ends / _trusted(radius, ratio, interface, level).loss
-    return {**row, "excess of the head loss": abs(excess - 1)}
-
-
-@cache
-def _spoilt(grid: Mesh, interface: str) -> float:
-    """What the ends add to the head loss of the clean channel, as to that around any aggregate on the same mesh."""
-    clean = flow.unit_flow(Space(grid, 1), 1.0, interface=interface)
-    return clean.loss - poiseuille.head_loss(ENDS[1] - ENDS[0], WIDTH, 1.0, 1.0)
+    found, clean = (flow.unit_flow(space, each, interface=interface) for each in (ratio, 1.0))
+    spoilt = clean.loss - poiseuille.head_loss(np.ptp(ENDS), WIDTH, 1.0, 1.0)
+    return {**_apart(space, found, theirs), "excess of the head loss": abs((found.loss - spoilt) / theirs.loss - 1)}
 
 
 def _apart(space: Space, found: flow.UnitFlow, theirs: taylor_hood.Stokes) -> dict[str, float]:
-    """Differences of our flow from Taylor-Hood's at the middles of its edges, weighed by their areas."""
+    """Size of our elements; differences of our flow from Taylor-Hood's at the middles of its edges, weighed by their
+    areas."""
     pressures = flow.pressure_space(space)
-    apart = {"head loss": abs(found.loss / theirs.loss - 1),
+    apart = {"size": meshes.mean_size(space.mesh),
+             "head loss": abs(found.loss / theirs.loss - 1),
              "velocity": meshes.relative(meshes.field_at(space, found.velocity, theirs.points), theirs.velocity,
                                          theirs.areas)}
     for part in theirs.pressures:
@@ -191,16 +181,10 @@ def _round(refinement: float) -> Mesh:
     return pore.seeded(properties.scene_around(ROUND, properties.ACCURATE, refined)).mesh
 
 
-@cache
-def _round_trusted(ratio: float, interface: str) -> taylor_hood.Stokes:
-    return taylor_hood.stokes(taylor_hood.half_disc(WIDTH, _round(1.0).ends, ROUND, 2), ratio, interface)
-
-
 def _round_errors(refinement: float, draw: int, ratio: float, order: int, interface: str) -> dict[str, float]:
-    """Over the whole field, weighted by areas, and of the loss."""
     space = Space(_round(refinement * meshes.SPREAD[draw]), order)
     found = flow.unit_flow(space, ratio, interface=interface)
-    return {"size": 1 / np.sqrt(len(space.cells)), **_apart(space, found, _round_trusted(ratio, interface))}
+    return _apart(space, found, _trusted(ROUND, ratio, interface, 2, space.mesh.ends, 6))
 
 
 #: How many meshes of each level of the layer.
@@ -208,40 +192,26 @@ BUBBLE_DRAWS = dict(enumerate((8, 6, 3, 1)))
 STABILISED, BUBBLE = flow.Stabilised(), flow.Bubble()
 
 
-@BilinearForm
-def viscous(u, v, w):
-    """(k (grad u + t grad u^T), grad v); t: 0 in the Laplacian form of [E2], 1 in the traction form."""
-    return w["k"] * ddot(grad(u) + w["t"] * transpose(grad(u)), grad(v))
-
-
-@BilinearForm
-def continuity(u, q, w):
-    """(q, div u)."""
-    return q * div(u)
-
-
-def uncondensed(grid: Mesh, ratio: float, interface: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def uncondensed(grid: Mesh, ratio: float, interface: str) -> dict[str, np.ndarray]:
     """Velocity (N, 2) at the nodes, mean velocity (T, 2), bubble included, and pressure (N,) of scikit-fem's MINI
     element, bubbles kept as unknowns, under the conditions (3)-(5)."""
     basis = Basis(grid.fem, ElementVector(ElementTriMini()), intorder=4)
-    basis_p = basis.with_element(ElementTriP1())
     k = np.where(grid.biomass, ratio, 1.0)[:, None] * np.ones(basis.dx.shape)
-    free = interface == "laplacian"
-    B = -continuity.assemble(basis, basis_p)
-    system = bmat([[viscous.assemble(basis, k=k, t=1.0 - free), B.T], [B, None]]).tocsc()
-    value, held = np.zeros(system.shape[0]), np.zeros(system.shape[0], bool)
+    B = -taylor_hood.divergence.assemble(basis, basis.with_element(ElementTriP1()))
+    system = bmat([[taylor_hood.viscous(interface).assemble(basis, nu=k), B.T], [B, None]]).tocsc()
+    value = np.zeros(system.shape[0])
     x, y = grid.points.T
-    nodes = basis.nodal_dofs
+    u_x, u_y = nodes = basis.nodal_dofs
     rim = (y == 0) | (y == grid.width) | (x == grid.ends[0])
-    held[nodes[:, rim].ravel()] = True
-    held[nodes[1, (x == grid.ends[1]) & (not free)]] = True
+    outlet = (x == grid.ends[1]) & (interface == "traction")
     inlet = grid.topology.inlet
     profile = y[inlet] * (grid.width - y[inlet])
-    value[nodes[0, inlet]] = profile * grid.width / np.trapezoid(profile, y[inlet])
-    value = solve(*condense(system, 0 * value, value, D=np.flatnonzero(held)))
+    value[u_x[inlet]] = profile * grid.width / np.trapezoid(profile, y[inlet])
+    held = np.concatenate([u_x[rim], u_y[rim | outlet]])
+    value = solve(*condense(system, 0 * value, value, D=held))
     velocity, bubbles = value[nodes].T, value[basis.interior_dofs].T
     mean = velocity[grid.triangles].mean(axis=1) + 9 / 20 * bubbles
-    return velocity, mean, value[basis.N:]
+    return {"velocity": velocity, "pressure": value[basis.N:], "mean velocity": mean}
 
 
 @case("flow-bubble", kind="cross-code",
@@ -254,14 +224,12 @@ def uncondensed(grid: Mesh, ratio: float, interface: str) -> tuple[np.ndarray, n
 def condensed(interface: str):
     grid = meshes.cut(properties.ENDS, 50.0, 6.0, lambda x, y: (np.abs(x) < 20) & (y < 25), across=(-20.0, 20.0),
                       along=(25.0,), seed=5)
-    velocity, mean, pressure = uncondensed(grid, RATIO, interface)
     space = Space(grid, 1)
     ours = flow.unit_flow(space, RATIO, interface=interface, element=BUBBLE)
     carried = ours.velocity[grid.triangles].mean(axis=1) - ours.correction
-    pairs = {"velocity": (ours.velocity, velocity), "pressure": (ours.pressure, pressure),
-             "mean velocity": (carried, mean)}
-    for name, (found, other) in pairs.items():
-        yield at_most(name, np.abs(found - other).max() / np.abs(other).max(), 1e-9,
+    found = {"velocity": ours.velocity, "pressure": ours.pressure, "mean velocity": carried}
+    for name, other in uncondensed(grid, RATIO, interface).items():
+        yield at_most(name, np.abs(found[name] - other).max() / np.abs(other).max(), 1e-9,
                       "the same equations: round-off of a system whose viscosities differ by 2000")
     yield at_most("flux of the mean velocity", properties.flux_error(space, carried[:, None]), 1e-9,
                   "(2) tested with linear ramps, round-off")
@@ -289,7 +257,7 @@ def along_a_layer():
 
 def _on_long_triangles(element: flow.Stabilised | flow.Bubble) -> float:
     """Mean error of the velocity on three meshes."""
-    return np.mean([_layered(_long_triangles(1, draw), element, 60.0)["velocity"] for draw in range(3)])
+    return np.mean([_layered(_long_triangles(draw), element, 60.0)["velocity"] for draw in range(3)])
 
 
 def _layer_errors(level: int, draw: int, element: flow.Stabilised | flow.Bubble) -> dict[str, float]:
@@ -311,18 +279,19 @@ def _slope_error(grid: Mesh, speed: np.ndarray, chosen: np.ndarray) -> float:
     y, step = where[..., 1], 1e-4
     above, below = (layered_channel.velocity(y + apart, WIDTH, LAYER, RATIO) for apart in (step, -step))
     exact = np.stack([0 * y, (above - below) / (2 * step)], axis=-1)
-    return meshes.relative(np.broadcast_to(ours[:, None], exact.shape), exact, weight)
+    return meshes.relative(ours[:, None], exact, weight)
 
 
 STRETCH = 8.0
 
 
 @cache
-def _long_triangles(level: int, draw: int) -> Mesh:
+def _long_triangles(draw: int) -> Mesh:
     """A mesh of a layer whose triangles are STRETCH times longer than high."""
+    size = SIZES[1]
     end = closed_forms.LAYER_END / STRETCH
-    rim = end + SIZES[level]
-    short = meshes.cut((-rim, rim), WIDTH, SIZES[level], lambda x, y: (y < LAYER) & (np.abs(x) < end),
-                       across=(-end, end), along=(LAYER,), seed=7 * level + draw)
-    return Mesh.of(short.points * [STRETCH, 1.0], short.cells, short.biomass, short.loop, short.width,
-                   (-STRETCH * rim, STRETCH * rim))
+    rim = end + size
+    short = meshes.cut((-rim, rim), WIDTH, size, lambda x, y: (y < LAYER) & (np.abs(x) < end),
+                       across=(-end, end), along=(LAYER,), seed=7 + draw)
+    ends = (-STRETCH * rim, STRETCH * rim)
+    return replace(short.moved(short.points * [STRETCH, 1.0]), ends=ends)

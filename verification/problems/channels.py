@@ -15,7 +15,7 @@ place of the constant that the velocity leaves open, and the mean of the pressur
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -52,14 +52,6 @@ FUNCTIONAL = {1: (2, SECOND), 2: (4, "twice the order of the gradient: fourth"),
 DEGREES = {1: 6, 2: 6, 3: 8}
 
 
-@cache
-def meshed(size: float, sample: int, ends=CROSSED, slab=(0.0, SLAB)) -> Mesh:
-    """One of the straight meshes of a size."""
-    sides = tuple(side for side in slab if side not in ends)
-    return following(WIDTH * (slab[1] - slab[0]), size, sample, ends, WIDTH,
-                     lambda x, y: (x > slab[0]) & (x < slab[1]), across=sides)
-
-
 def following(area: float, size: float, sample: int, ends, width: float, is_biomass, **lines) -> Mesh:
     """A mesh of the first random lattice whose triangulation follows all lines, so that the biomass has its area.
 
@@ -75,7 +67,10 @@ def following(area: float, size: float, sample: int, ends, width: float, is_biom
 @cache
 def spaced(size: float, sample: int, order: int = 1, ends=CROSSED, slab=(0.0, SLAB)) -> Space:
     """Functions of an order on one of the meshes of a size."""
-    return meshes.space_on(meshed(size, sample, ends, slab), order)
+    sides = tuple(side for side in slab if side not in ends)
+    straight = following(WIDTH * (slab[1] - slab[0]), size, sample, ends, WIDTH,
+                         lambda x, y: (x > slab[0]) & (x < slab[1]), across=sides)
+    return meshes.space_on(straight, order)
 
 
 def carrying(space: Space, velocity: np.ndarray, mean: float) -> flow.Flow:
@@ -103,10 +98,9 @@ def steady(made: transport.Problem, density: float) -> transport.Concentrations:
     found = transport.steady(made, sink)
     if made.space.order == 1:
         return found
-    balance, state = transport.Balance(made, sink), np.concatenate([found.acceptor, found.donor])
+    balance, state = transport.Balance(made, sink), both(found).ravel()
     state = state + made.system.solve(balance.tangent(state), -balance.residual(state))
-    acceptor, donor = state.reshape(2, -1)
-    return transport.Concentrations(acceptor, donor, found.iterations + 1)
+    return transport.Concentrations(*state.reshape(2, -1))
 
 
 def decay_demand(law) -> float:
@@ -125,9 +119,10 @@ def pair(name: str, substrates=SCENE.substrates) -> tuple[float, float]:
     return getattr(substrates.acceptor, name), getattr(substrates.donor, name)
 
 
-def changed(which: str, **values):
-    """The paper's substrates with other values for one of them."""
-    return replace(SCENE.substrates, **{which: replace(getattr(SCENE.substrates, which), **values)})
+def changed(**changes: dict[str, float]):
+    """The paper's substrates with other values, by substrate and name."""
+    return replace(SCENE.substrates, **{which: replace(getattr(SCENE.substrates, which), **values)
+                                        for which, values in changes.items()})
 
 
 def speed_of(peclet: float) -> float:
@@ -153,111 +148,79 @@ def in_points(space: Space) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def apart(space: Space, fields: np.ndarray, exact) -> tuple[np.ndarray, np.ndarray]:
     """Root mean squares (m,) over the mesh of fields (m, n) less exact(x, y) (m, T, q), and of exact(x, y)."""
     where, weight, values = in_points(space)
-    truth = np.asarray(exact(where[..., 0], where[..., 1]))
+    truth = np.asarray(exact(*np.moveaxis(where, 2, 0)))
     gap = fields[:, space.cells] @ values.T - truth
     return tuple(np.sqrt(np.sum(weight * part**2, axis=(1, 2)) / weight.sum()) for part in (gap, truth))
 
 
-def relative(space: Space, field: np.ndarray, exact) -> float:
-    """L2 over the mesh of one field (n,) less exact(x) over that of exact."""
-    return meshes.distance(in_points(space), field[space.cells], lambda x, y: exact(x))
-
-
-def sample(space: Space, fields: np.ndarray, where: np.ndarray) -> np.ndarray:
-    """(m, K) fields (m, n) at places (K, 2)."""
-    return meshes.field_at(space, fields.T, where).T
-
-
 def at_heights(space: Space, fields: np.ndarray, x) -> np.ndarray:
-    """(2, HEIGHTS, n) fields (2, n) at x (n,), at so many heights."""
+    """(..., HEIGHTS, n) fields (..., count) at x (n,), at so many heights."""
     y = WIDTH * (np.arange(HEIGHTS) + 0.5) / HEIGHTS
-    where = np.column_stack([np.tile(x, HEIGHTS), np.repeat(y, len(x))])
-    return sample(space, fields, where).reshape(2, HEIGHTS, -1)
+    where = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    return meshes.field_at(space, fields.T, where).T.reshape(*fields.shape[:-1], HEIGHTS, -1)
 
 
-@dataclass(frozen=True, eq=False)
-class Box:
-    """Viscosity ratio, form of the interface and order of the velocity; exact(x, y) gives (velocity (..., 2), pressure
-    (...)), force(x, y) (..., 2), all without unit."""
-
-    ratio: float
-    interface: str
-    order: int
-    exact: Callable
-    force: Callable | None = None
-
-
-def box_errors(grid: Mesh, problem: Box) -> dict[str, float]:
-    """Relative L2 errors of the velocity and, without its mean, of the pressure."""
-    u, p = box_flow(grid, problem)
-    space = Space(grid, problem.order)
+def box_errors(grid: Mesh, order: int, ratio: float, interface: str, exact: Callable) -> dict[str, float]:
+    """Relative L2 errors of the velocity and, without its mean, of the pressure. order: of the velocity; ratio: of the
+    viscosities; exact(x, y) gives velocity (..., 2), pressure (...) and force (..., 2), all without unit."""
+    space = Space(grid, order)
     pressures = flow.pressure_space(space)
+    u, p = _box_flow(space, pressures, ratio, interface, exact)
     where, weight, shape = meshes.fine(space)
-    truth, level = problem.exact(*np.moveaxis(where, 2, 0))
+    truth, level, _ = exact(*np.moveaxis(where, 2, 0))
     heads = p[pressures.cells] @ meshes.fine(pressures)[2].T
-    return {"velocity": meshes.relative(np.einsum("qa,tai->tqi", shape, u[space.cells]), truth, weight),
-            "pressure": meshes.relative(_centred(heads, weight), _centred(level, weight), weight)}
+    found, known = (field - np.average(field, weights=weight) for field in (heads, level))
+    return {"velocity": meshes.relative(shape @ u[space.cells], truth, weight),
+            "pressure": meshes.relative(found, known, weight)}
 
 
-def _centred(values, weight):
-    return values - np.sum(weight * values) / np.sum(weight)
-
-
-def box_flow(grid: Mesh, problem: Box) -> tuple[np.ndarray, np.ndarray]:
+def _box_flow(space: Space, pressures: Space, ratio: float, interface: str, exact: Callable
+              ) -> tuple[np.ndarray, np.ndarray]:
     """Velocity (n, 2) and pressure (m,), both at the nodes of their orders."""
-    space = Space(grid, problem.order)
-    viscosity = np.where(grid.biomass, problem.ratio, 1.0)
-    stabilised = problem.order == 1
-    mobility = flow.Stabilised().mobility(grid, viscosity, problem.interface) if stabilised else None
-    blocks = flow.stokes(space, viscosity, problem.interface, mobility)
-    system = grid.topology.system(("box", problem.order), lambda: _rim_held(space))
-    right, value = np.zeros(len(system.held)), np.zeros(len(system.held))
-    n = space.count
-    velocity, _ = problem.exact(*space.points.T)
-    value[: 2 * n] = _without_flux(space, velocity).T.ravel()
-    if problem.force is not None:
-        right[: 2 * n] = _load(space, problem.force).T.ravel()
+    grid = space.mesh
+    viscosity = np.where(grid.biomass, ratio, 1.0)
+    mobility = flow.Stabilised().mobility(grid, viscosity, interface) if space.order == 1 else None
+    blocks = flow.stokes(space, viscosity, interface, mobility)
+    system = grid.topology.system(("box", space.order), lambda: _rim_held(space, pressures))
+    fields = _load(space, exact), _without_flux(space, exact(*space.points.T)[0])
+    right, value = (np.append(field.T, np.zeros(pressures.count)) for field in fields)
     solution = system.solve(blocks, right, value)
-    return solution[: 2 * n].reshape(2, n).T, solution[2 * n:]
+    velocity, pressure = np.split(solution, [2 * space.count])
+    return velocity.reshape(2, -1).T, pressure
 
 
 def _rim(space: Space) -> np.ndarray:
-    """(n,) True at the velocity's nodes on the boundary."""
-    dofs, on = space.dofs, np.zeros(space.count, bool)
-    for nodes in (dofs.walls, dofs.inlet, dofs.outlet):
-        on[nodes] = True
+    """(n, 2) True of both components of the velocity at its nodes on the boundary."""
+    dofs = space.dofs
+    on = np.zeros((space.count, 2), bool)
+    on[np.concatenate([dofs.walls, dofs.inlet.ravel(), dofs.outlet.ravel()])] = True
     return on
 
 
-def _rim_held(space: Space) -> ElementSystem:
+def _rim_held(space: Space, pressures: Space) -> ElementSystem:
     """All velocities of the rim and the first pressure prescribed."""
-    rim = _rim(space)
-    system = saddle_system(space.cells, flow.pressure_space(space).cells, np.column_stack([rim, rim]))
+    system = saddle_system(space.cells, pressures.cells, _rim(space))
     held = system.held.copy()
-    held[2 * len(rim)] = True
+    held[2 * space.count] = True
     return system.holding(held)
 
 
 def _without_flux(space: Space, velocity: np.ndarray) -> np.ndarray:
     """The rim's velocity (n, 2) less the part c (x, y), in the fluid, of what the interpolated values would pump in: a
     discrete incompressible flow can have none. c is of the order of the interpolation's error."""
-    cells = space.cells
     rim = _rim(space)
-    divergence = flow.divergence(space)
-
-    def flux(field):
-        return np.einsum("tbi,ti->", divergence, np.concatenate([field[cells, 0], field[cells, 1]], axis=1))
-
-    values = np.where(rim[:, None], velocity, 0.0)
-    rim[cells[space.mesh.biomass]] = False
-    outwards = np.where(rim[:, None], space.points, 0.0)
-    return values - flux(values) / flux(outwards) * outwards
+    values = np.where(rim, velocity, 0.0)
+    rim[space.cells[space.mesh.biomass]] = False
+    outwards = np.where(rim, space.points, 0.0)
+    divergence = flow.divergence(space).sum(axis=1).reshape(len(space.cells), 2, -1)
+    flux, unit = (np.einsum("tia,tai->", divergence, field[space.cells]) for field in (values, outwards))
+    return values - flux / unit * outwards
 
 
-def _load(space: Space, force: Callable) -> np.ndarray:
+def _load(space: Space, exact: Callable) -> np.ndarray:
     """(n, 2) integrals of the force times each nodal function."""
     where, weight, shape = meshes.fine(space)
-    at = force(*np.moveaxis(where, -1, 0))
+    *_, force = exact(*np.moveaxis(where, -1, 0))
     load = np.zeros((space.count, 2))
-    np.add.at(load, space.cells, np.einsum("tq,tqi,qa->tai", weight, at, shape))
+    np.add.at(load, space.cells, np.einsum("tq,tqi,qa->tai", weight, force, shape))
     return load

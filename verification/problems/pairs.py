@@ -63,14 +63,13 @@ def slivers(seed: int) -> Grid:
 def integral(mesh: Grid, field: np.ndarray, weight=lambda x, y: 1 + 0 * x) -> float:
     """Integral of a nodal field (N,) times weight(x, y), exact where the weight is a polynomial of degree five."""
     where, area, shape = meshes.quadrature(*mesh)
-    values = np.einsum("qa,ta->tq", shape, field[mesh[1]])
-    return np.sum(area * values * weight(where[..., 0], where[..., 1]))
+    return np.sum(area * (field[mesh[1]] @ shape.T) * weight(*np.moveaxis(where, 2, 0)))
 
 
 def square(mesh: Grid, field: np.ndarray) -> float:
     """Integral of the square of a nodal field (N,)."""
     _, area, shape = meshes.quadrature(*mesh)
-    return np.sum(area * np.einsum("qa,ta->tq", shape, field[mesh[1]]) ** 2)
+    return np.sum(area * (field[mesh[1]] @ shape.T) ** 2)
 
 
 def curved_weights(nodes: np.ndarray, barycentric: np.ndarray, weights: np.ndarray) -> np.ndarray:

@@ -12,11 +12,12 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from reference import manufactured_transport, robin_channel, slab
 from repro.fem.sizing import ACROSS_PORE
 from repro.fem.space import Space
-from repro.model import flow, transport
+from repro.model import transport
 from repro.model.kinetics import Sink
 from verification.kernel.case import BAND, around, at_most, case, refine, studies
 from verification.problems import aggregates, meshes
@@ -43,7 +44,6 @@ from verification.problems.channels import (
     pair,
     problem,
     rates,
-    relative,
     spaced,
     steady,
 )
@@ -53,6 +53,10 @@ LARGE = 1e13
 ACCEPTOR, DONOR = SCENE.substrates.acceptor, SCENE.substrates.donor
 #: No growth: the acceptor is taken up by decay alone, d_c f_d b X m_A, whatever the donor.
 DECAY_ALONE = replace(SCENE.kinetics, maximum_utilization_rate=0.0)
+#: First-order uptake of the donor, its half saturation far above the supply: q_D = C_D k / K_D; the acceptor
+#: never falls.
+FIRST_ORDER = changed(acceptor={"half_saturation": 1 / LARGE}, donor={"half_saturation": LARGE})
+NO_DECAY = replace(SCENE.kinetics, maximum_utilization_rate=LARGE, decay_coefficient=0.0, acceptor_to_donor_ratio=1e-12)
 UPTAKE = 2e4
 #: Random meshes of each size over which errors are averaged: those of few triangles differ by a third.
 SIZED = {1: SAMPLES, 2: {3.2: 12, 1.6: 6, 0.8: 3, 0.4: 1}, 3: {3.2: 12, 1.6: 8, 0.8: 4, 0.4: 1}}
@@ -88,39 +92,27 @@ def robin(order: int, peclet: float, ends, ceiling: float):
 def _robin_errors(size: float, number: int, order: int, peclet: float, ends) -> dict[str, float]:
     """Size of the elements; root mean square of C, over that of the exact one with linear elements, else over the
     supply; C leaving over the supply."""
-    space, exact = spaced(size, number, order, ends), _robin_exact(peclet)
-    made, state = _robin_found(space, peclet)
+    space, speed = spaced(size, number, order, ends), peclet * DONOR.diffusivity / SLAB
+    made = problem(space, speed, FIRST_ORDER, NO_DECAY)
+    state = steady(made, UPTAKE)
+
+    def exact(x):
+        return robin_channel.strip(x, speed, DONOR.supply, DONOR.diffusivity, DONOR.diffusivity_in_aggregate, UPTAKE,
+                                   SLAB)
+
     gap, truth = apart(space, state.donor[None], lambda x, y: exact(x)[None])
     leaving = transport.fluxes(made, Sink(filled(space, UPTAKE)), state)[1].effluent
     return {"size": length(space, size), "C": gap[0] / (truth[0] if order == 1 else DONOR.supply),
             "leaving": abs(leaving - float(exact(SLAB))) / DONOR.supply}
 
 
-def _robin_found(space: Space, peclet: float):
-    """The donor, its half saturation far above the supply: q_D = C_D k / K_D; the acceptor never falls."""
-    substrates = replace(changed("donor", half_saturation=LARGE), acceptor=replace(ACCEPTOR, half_saturation=1 / LARGE))
-    law = replace(SCENE.kinetics, maximum_utilization_rate=LARGE, decay_coefficient=0.0, acceptor_to_donor_ratio=1e-12)
-    made = problem(space, _robin_speed(peclet), substrates, law)
-    return made, steady(made, UPTAKE)
-
-
-def _robin_speed(peclet: float) -> float:
-    return peclet * DONOR.diffusivity / SLAB
-
-
-def _robin_exact(peclet: float):
-    return lambda x: robin_channel.strip(x, _robin_speed(peclet), DONOR.supply, DONOR.diffusivity,
-                                         DONOR.diffusivity_in_aggregate, UPTAKE, SLAB)
-
-
-@cache
 def _at_rest(size: float, number: int, sink: float, half_saturation: float, film: float, order: int = 1):
     """Space, C_A and its fluxes in a slab without flow, the supply held at both ends.
 
     sink: largest uptake, d_c f_d b X (mg/L/h); half_saturation: K (mg/L).
     """
     space = spaced(size, number, order, (-SLAB - film, SLAB + film), (-SLAB, SLAB))
-    given = problem(space, None, changed("acceptor", half_saturation=half_saturation), DECAY_ALONE)
+    given = problem(space, None, changed(acceptor={"half_saturation": half_saturation}), DECAY_ALONE)
     density = sink / decay_demand(DECAY_ALONE)
     state = steady(given, density)
     return space, state.acceptor, transport.fluxes(given, Sink(filled(space, density)), state)[0]
@@ -159,7 +151,13 @@ def _thiele(*orders: int) -> dict[str, tuple]:
       mutants=("reaction-evenly-weighted", "one-supply-held", "fluid-diffusivity"), over=_thiele(2, 3),
       because="order 1: transport-first-order-slab")
 def first_order(order: int, modulus: float, film: float, ceiling: float, taken: float):
-    errors = refine(_first_order_errors, THIELE_MESHES[order], modulus, film, order)
+    kappa = ACCEPTOR.diffusivity_in_aggregate * (modulus / SLAB) ** 2
+
+    def exact(x):
+        profile, effectiveness = slab.first_order(x, ACCEPTOR.supply, kappa, **_sides(film))
+        return profile, effectiveness * ACCEPTOR.supply * SLAB / LARGE
+
+    errors = refine(_slab_errors, THIELE_MESHES[order], order, film, kappa * LARGE, LARGE, exact, "taken up")
     yield studies(errors, {"C": (*EXPECTED[order], ceiling)})
     expected, why = FUNCTIONAL[order]
     if order == 1 or (order == 2 and modulus > 1):
@@ -168,22 +166,13 @@ def first_order(order: int, modulus: float, film: float, ceiling: float, taken: 
         yield at_most("taken up", errors["taken up"][-1], taken, why)
 
 
-def _first_order_errors(size: float, number: int, modulus: float, film: float, order: int) -> dict[str, float]:
-    kappa = ACCEPTOR.diffusivity_in_aggregate * (modulus / SLAB) ** 2
-
-    def exact(x):
-        profile, effectiveness = slab.first_order(x, ACCEPTOR.supply, kappa, **_sides(film))
-        return profile, effectiveness * ACCEPTOR.supply * SLAB / LARGE
-
-    return _slab_errors(size, number, order, film, kappa * LARGE, LARGE, exact, "taken up")
-
-
 def _slab_errors(size: float, number: int, order: int, film: float, sink: float, half_saturation: float, exact,
                  taken: str) -> dict[str, float]:
     """Size of the elements, and relative errors of C and of what enters a side over ``sink``; exact(x): both."""
     space, field, flux = _at_rest(size, number, sink, half_saturation, film, order)
-    return {"size": length(space, size), "C": relative(space, field, lambda x: exact(x)[0]),
-            taken: abs(_depth(flux, sink) / exact(0.0)[1] - 1)}
+    gap = meshes.distance(in_points(space), field[space.cells], lambda x, y: exact(x)[0])
+    return {"size": length(space, size), "C": gap,
+            taken: abs(flux.consumed / (2 * CHANNEL * sink) / exact(0.0)[1] - 1)}
 
 
 DEPTH = 20.0
@@ -199,7 +188,9 @@ MONOD = {"K = 0.1 mg/L, linear": (1, 0.1, 0.0, SAMPLES, 3e-4, 4e-5),
 
 
 def _monod(order: int, half_saturation: float, film: float, samples: dict, ceiling: float, depth: float):
-    errors, rows = refine(_monod_errors, samples, half_saturation, film, order), {"C": (*EXPECTED[order], ceiling)}
+    sink, rows = _sink(film), {"C": (*EXPECTED[order], ceiling)}
+    errors = refine(_slab_errors, samples, order, film, sink, half_saturation, lambda x: slab.monod(
+        x, ACCEPTOR.supply, sink, half_saturation, **_sides(film)), "depth")
     if order == 1:
         rows["depth"] = (*FUNCTIONAL[order], depth)
     else:
@@ -207,21 +198,10 @@ def _monod(order: int, half_saturation: float, film: float, samples: dict, ceili
     yield studies(errors, rows)
 
 
-def _monod_errors(size: float, number: int, half_saturation: float, film: float, order: int) -> dict[str, float]:
-    def exact(x):
-        return slab.monod(x, ACCEPTOR.supply, _sink(film), half_saturation, **_sides(film))
-
-    return _slab_errors(size, number, order, film, _sink(film), half_saturation, exact, "depth")
-
-
 def _sink(film: float) -> float:
     """s (mg/L/h) that zero order brings DEPTH deep."""
     b = film * ACCEPTOR.diffusivity_in_aggregate / ACCEPTOR.diffusivity
     return 2 * ACCEPTOR.diffusivity_in_aggregate * ACCEPTOR.supply / ((DEPTH + b) ** 2 - b**2)
-
-
-def _depth(flux, sink: float) -> float:
-    return flux.consumed / (2 * CHANNEL * sink)
 
 
 def _limit():
@@ -234,10 +214,10 @@ def _limit():
 
 def _from_zero_order(half_saturation: float) -> dict[str, float]:
     sink = _sink(0.0)
-    space, field, flux = _at_rest(FINEST, 0, sink, half_saturation, 0.0)
     depth = slab.penetration(ACCEPTOR.supply, sink, ACCEPTOR.diffusivity_in_aggregate)
-    gap = relative(space, field, lambda x: slab.zero_order(x, ACCEPTOR.supply, sink, **_sides(0.0)))
-    return {"size": half_saturation, "C": gap, "depth": abs(_depth(flux, sink) / depth - 1)}
+    errors = _slab_errors(FINEST, 0, 1, 0.0, sink, half_saturation, lambda x: (
+        slab.zero_order(x, ACCEPTOR.supply, sink, **_sides(0.0)), depth), "depth")
+    return {**errors, "size": half_saturation}
 
 
 def _exhausted(film: float):
@@ -268,7 +248,9 @@ WIDTH = 50.0
 RADIUS = 20.0
 ENDS = (-65.0, 65.0)
 LARGEST = 3e5
-SUBSTRATES = replace(SCENE.substrates, donor=replace(SCENE.substrates.donor, half_saturation=3.0))
+#: X as a function of x and y.
+DENSITY = manufactured_transport.function(manufactured_transport.density(RADIUS, LARGEST))
+SUBSTRATES = changed(donor={"half_saturation": 3.0})
 #: Refinements of each order, and how many unrelated meshes about each: the refinement is NEAR times the last one's, up
 #: and down.
 REFINEMENTS = {1: {0.4: 5, 0.8: 3, 1.6: 2, 3.2: 1}, 2: {0.4: 5, 0.8: 3, 1.6: 2, 2.4: 1},
@@ -310,83 +292,63 @@ def _spaced(refinement: float, number: int, order: int) -> Space:
 
 @cache
 def _chosen(peclet: float):
-    """The mean velocity (um/h), and the chosen fields by side."""
+    """The mean velocity (um/h), u_x and u_y as functions of x and y, and the chosen fields by side."""
     spreads = (pair("diffusivity", SUBSTRATES), pair("diffusivity_in_aggregate", SUBSTRATES))
     mean = peclet * spreads[0][0] / WIDTH
+    velocity = [manufactured_transport.function(part) for part in manufactured_transport.velocity(WIDTH, mean)]
     law = rates(SCENE.kinetics, SUBSTRATES)
-    return mean, manufactured_transport.fields(WIDTH, RADIUS, mean, *spreads, LARGEST, law)
+    return mean, velocity, manufactured_transport.fields(WIDTH, RADIUS, mean, *spreads, LARGEST, law)
 
 
-@cache
-def _solved(refinement: float, number: int, order: int, peclet: float, inlet: str):
-    """(space, C (2, n))."""
-    space, (mean, sides) = _spaced(refinement, number, order), _chosen(peclet)
-    made = transport.problem(space, _flow(space, mean), SUBSTRATES, SCENE.kinetics, inlet)
-    added = [_added(space, mean, pair("supply", SUBSTRATES)[k], _of(sides, k), inlet) for k in (0, 1)]
-    made = replace(made, source=made.source + np.concatenate(added))
-    active = _density()(*aggregates.places(space)) * space.reaction.dx
-    return space, both(transport.steady(made, Sink(active)))
+def _solved(space: Space, peclet: float, inlet: str) -> np.ndarray:
+    """(2, n) C, by the code."""
+    mean, velocity, _ = _chosen(peclet)
+    carried = carrying(space, np.column_stack([part(*space.points.T) for part in velocity]), mean)
+    made = transport.problem(space, carried, SUBSTRATES, SCENE.kinetics, inlet)
+    made = replace(made, source=made.source + _added(space, peclet, inlet).ravel())
+    return both(transport.steady(made, Sink(DENSITY(*aggregates.places(space)) * space.reaction.dx)))
 
 
-@cache
-def _density():
-    """X as a function of x and y."""
-    return manufactured_transport.function(manufactured_transport.density(RADIUS, LARGEST))
-
-
-def _of(sides, k: int):
-    """The field of one substrate by side."""
-    return {side: found[k] for side, found in sides.items()}
-
-
-@cache
-def _velocity(mean: float):
-    """u_x and u_y as functions of x and y."""
-    return [manufactured_transport.function(part) for part in manufactured_transport.velocity(WIDTH, mean)]
-
-
-def _flow(space: Space, mean: float) -> flow.Flow:
-    return carrying(space, np.column_stack([part(*space.points.T) for part in _velocity(mean)]), mean)
-
-
-def _added(space: Space, mean: float, supply: float, chosen, inlet: str) -> np.ndarray:
-    """(n,) the forcing and what enters through the sides; chosen: the field by side."""
+def _added(space: Space, peclet: float, inlet: str) -> np.ndarray:
+    """(2, n) the forcing and what enters through the sides."""
     where, weight, values = in_points(space)
-    forcing = weight * _by_side(space.mesh.biomass, chosen, "forcing", where[..., 0], where[..., 1])
-    found = np.bincount(space.cells.ravel(), (forcing @ values).ravel(), space.count)
-    for nodes in _of_triangles_sides(space):
-        found += _through(space, nodes, mean, supply, chosen, inlet)
+    forcing = weight * _by_side(peclet, "forcing", space.mesh.biomass, *np.moveaxis(where, 2, 0))
+    found, edges = np.zeros((2, space.count)), _edges(space)
+    np.add.at(found, (slice(None), space.cells), forcing @ values)
+    np.add.at(found, (slice(None), edges), _through(space, edges, peclet, inlet))
     return found
 
 
-def _by_side(biomass, chosen, name: str, x, y) -> np.ndarray:
-    """A function of the chosen field on the side of each element (K,), at x and y (K, q)."""
-    return np.where(biomass[:, None], *(getattr(chosen[side], name)(x, y) for side in ("biomass", "fluid")))
+def _by_side(peclet: float, name: str, biomass: np.ndarray, x, y) -> np.ndarray:
+    """(2, ..., K, q) a function of both chosen fields on the side of each element (K,), at x and y (K, q)."""
+    *_, sides = _chosen(peclet)
+    inside, outside = ([getattr(field, name)(x, y) for field in sides[side]] for side in ("biomass", "fluid"))
+    return np.where(biomass[:, None], inside, outside)
 
 
-def _of_triangles_sides(space: Space):
-    """Of each side of the pore the nodes (E, e) of its edges, from end to end, counterclockwise."""
+def _edges(space: Space) -> np.ndarray:
+    """(E, e) nodes of the edges of all four sides of the pore, from end to end, counterclockwise."""
+    edges = []
     for axis, side, turn in ((0, ENDS[0], -1), (1, 0.0, 1), (0, ENDS[1], 1), (1, WIDTH, -1)):
         line = np.flatnonzero(np.isclose(space.points[:, axis], side))
         line = line[np.argsort(turn * space.points[line, 1 - axis])]
-        first = np.arange(0, len(line) - 1, space.order)
-        yield line[first[:, None] + np.arange(space.order + 1)]
+        edges.append(sliding_window_view(line, space.order + 1)[:: space.order])
+    return np.concatenate(edges)
 
 
-def _through(space: Space, nodes, mean: float, supply: float, chosen, inlet: str) -> np.ndarray:
-    """(n,) of what enters through edges: D dC/dn; and at the inlet, where the code has it leave, u_x (C - C_s), or with
-    the printed condition u_ave (C - C_s) [E4]."""
-    along, weights, values = meshes.along_edges(space.order, 6)
-    start, end = np.moveaxis(space.points[nodes[:, [0, -1]]], 1, 0)
-    along_edge = end - start
-    x, y = np.moveaxis(start[:, None] + along[:, None] * along_edge[:, None], 2, 0)
-    biomass, length = np.hypot(*(start + end).T / 2) < RADIUS, np.hypot(*along_edge.T)[:, None]
-    flux = _by_side(biomass, chosen, "flux", x, y)
-    passed = flux[0] * along_edge[:, 1, None] - flux[1] * along_edge[:, 0, None]
-    enters = _velocity(mean)[0](x, y) if inlet == "local" else mean
-    over = enters * (_by_side(biomass, chosen, "value", x, y) - supply) * length
-    passed = passed + np.where(np.isclose(x, ENDS[0]), over, 0.0)
-    return np.bincount(nodes.ravel(), ((passed * weights) @ values).ravel(), space.count)
+def _through(space: Space, edges: np.ndarray, peclet: float, inlet: str) -> np.ndarray:
+    """(2, E, e) of what enters through edges: D dC/dn; and at the inlet, where the code has it leave, u_x (C - C_s), or
+    with the printed condition u_ave (C - C_s) [E4]."""
+    _, weights, values = meshes.along_edges(space.order, 6)
+    nodes = space.points[edges]
+    x, y = np.moveaxis(values @ nodes, 2, 0)
+    dx, dy = (nodes[:, -1] - nodes[:, 0]).T[..., None]
+    mean, velocity, _ = _chosen(peclet)
+    field, flux = (_by_side(peclet, name, np.hypot(x, y).mean(axis=1) < RADIUS, x, y) for name in ("value", "flux"))
+    enters = velocity[0](x, y) if inlet == "local" else mean
+    over = enters * (field - np.reshape(pair("supply", SUBSTRATES), (2, 1, 1)))
+    along = flux[:, 0] - np.where(np.isclose(x, ENDS[0]), over, 0.0)
+    return ((along * dy - flux[:, 1] * dx) * weights) @ values
 
 
 @case("transport-manufactured", kind="manufactured", norm="L2 of each substrate over the mesh, relative",
@@ -410,10 +372,7 @@ def chosen_concentrations(order: int, peclet: float, inlet: str, ceilings: tuple
 def _chosen_errors(refinement: float, number: int, order: int, peclet: float, inlet: str) -> dict[str, float]:
     """Size of the elements, nominal for linear ones; L2 of both substrates, on each element less the chosen field of
     its side."""
-    (space, found), (_, sides) = _solved(refinement, number, order, peclet, inlet), _chosen(peclet)
-
-    def truth(x, y):
-        return [_by_side(space.mesh.biomass, _of(sides, k), "value", x, y) for k in (0, 1)]
-
-    gap, size = apart(space, found, truth)
+    space = _spaced(refinement, number, order)
+    gap, size = apart(space, _solved(space, peclet, inlet), lambda *at: _by_side(
+        peclet, "value", space.mesh.biomass, *at))
     return {"size": length(space, WIDTH / ACROSS_PORE / refinement), **dict(zip(NAMES, gap / size))}

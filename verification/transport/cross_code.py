@@ -58,13 +58,13 @@ from verification.problems.channels import (
     apart,
     at_heights,
     both,
+    changed,
     filled,
     following,
     length,
     pair,
     problem,
     rates,
-    sample,
     spaced,
     speed_of,
     steady,
@@ -77,8 +77,12 @@ DENSITIES = {f"X = {density:g} mg/L": density for density in (3e3, 3e4, 3e5)}
 #: Peclet number and density of the starved slab, and of the one that FiPy's cells and elements of order 2 and 3 share.
 STARVED, SHARED = (0.1, 3e5), (1.0, 3e4)
 ITSELF_STARVED = "C_A in the starved slab over itself"
-#: Last errors of linear elements, of a density X.
+LAW = replace(SCENE.kinetics, yield_coefficient=1e-12)
+#: h: 0.07, 0.2 and 0.7 s. Water diffuses across the slab in 0.6 s, and crosses it in 0.1 to 6 s.
+TIMES = (2e-5, 6e-5, 2e-4)
+#: Last errors of linear elements, of a density X, and of others, of their order.
 CEILINGS = {3e3: 1e-6, 3e4: 3e-5, 3e5: 4e-4}
+HIGHER_CEILINGS = {2: 1e-7, 3: 1e-9}
 
 
 def given(peclet: float, density: float):
@@ -87,26 +91,37 @@ def given(peclet: float, density: float):
             rates(SCENE.kinetics), SLAB)
 
 
-def each(expected: int, why: str, ceiling: float, names=NAMES) -> dict[str, tuple]:
-    """The same row for several fields."""
-    return dict.fromkeys(names, (expected, why, ceiling))
+def each(expected: int, why: str, ceiling: float) -> dict[str, tuple]:
+    """The same row for both substrates."""
+    return dict.fromkeys(NAMES, (expected, why, ceiling))
 
 
 @cache
-def found(size: float, number: int, peclet: float, density: float, order: int = 1, ends=CROSSED) -> np.ndarray:
-    """(2, n) C_A and C_D on one of the meshes of a size."""
-    return both(steady(problem(spaced(size, number, order, ends), speed_of(peclet)), density))
+def _ours(size: float, number: int, order: int, peclet: float, density: float, steps: int = 0, ends=CROSSED
+          ) -> np.ndarray:
+    """(times, 2, n): each interval in equal steps, started anew from the end of the last; at rest if there are none."""
+    made = problem(spaced(size, number, order, ends), speed_of(peclet), law=LAW)
+    if not steps:
+        return both(steady(made, density))[None]
+    states = []
+    active = filled(made.space, density)
+    now = transport.supplied_everywhere(made)
+    for interval in np.diff([0.0, *TIMES]):
+        now = gear.advance(made, active, 0 * active, now, interval, fixed_step=interval / steps).concentrations
+        states.append(both(now))
+    return np.array(states)
 
 
 @cache
-def exact(peclet: float, density: float, tolerance: float = 1e-8):
+def exact(peclet: float, density: float, tolerance: float):
     """x -> (C_A, C_D), by solve_bvp."""
     return channel_bvp.solution(*given(peclet, density), tolerance=tolerance)
 
 
-#: Random meshes of each size (um), and solve_bvp's tolerance, which takes no less at Peclet 5: cubic elements are
-#: judged at Peclet 1, on coarser meshes, as solve_bvp is good to 1e-11 or so; the last error.
-FINER = {2: ({3.2: 12, 1.6: 6, 0.8: 3, 0.4: 1}, 1e-10, 1e-7), 3: ({6.4: 12, 3.2: 8, 1.6: 4, 0.8: 2}, 1e-12, 1e-9)}
+#: Random meshes of each size (um), their ends, and solve_bvp's tolerance, which takes no less at Peclet 5: cubic
+#: elements are judged at Peclet 1, on coarser meshes, as solve_bvp is good to 1e-11 or so.
+COLLOCATED = {1: (SAMPLES, CROSSED, 1e-8), 2: ({3.2: 12, 1.6: 6, 0.8: 3, 0.4: 1}, WIDE, 1e-10),
+              3: ({6.4: 12, 3.2: 8, 1.6: 4, 0.8: 2}, WIDE, 1e-12)}
 
 
 @case("transport-monod-collocation", kind="cross-code",
@@ -125,42 +140,39 @@ FINER = {2: ({3.2: 12, 1.6: 6, 0.8: 3, 0.4: 1}, 1e-10, 1e-7), 3: ({6.4: 12, 3.2:
       over={**combined({"quadratic": 2}, {"Pe = 0.5": 0.5, "Pe = 1": 1.0, "Pe = 5": 5.0}, DENSITIES),
             **combined({"cubic": 3}, {"Pe = 1": 1.0}, DENSITIES)}, because="order 1: transport-monod-collocation")
 def collocation(order: int, peclet: float, density: float):
-    if order == 1:
-        errors = refine(_distances, SAMPLES, peclet, density)
-        yield studies(errors, each(*EXPECTED[1], CEILINGS[density]))
-        if (peclet, density) == STARVED:
-            yield studies(errors, {ITSELF_STARVED: (*EXPECTED[1], 6e-4)})
-    else:
-        samples, _, ceiling = FINER[order]
-        yield studies(refine(_root_mean_square, samples, order, peclet, density), {"C": (*EXPECTED[order], ceiling)})
+    samples, ends, tolerance = COLLOCATED[order]
+    errors = refine(_distances, samples, order, peclet, density, ends, tolerance)
+    if order > 1:
+        yield studies(errors, {"C": (*EXPECTED[order], HIGHER_CEILINGS[order])})
+        return
+    yield studies(errors, each(*EXPECTED[1], CEILINGS[density]))
+    if (peclet, density) == STARVED:
+        yield studies(errors, {ITSELF_STARVED: (*EXPECTED[1], 6e-4)})
 
 
-def _distances(size: float, number: int, peclet: float, density: float) -> dict[str, float]:
-    space, truth = spaced(size, number), exact(peclet, density)
-    ours, pieces = found(size, number, peclet, density), space.reaction
+def _distances(size: float, number: int, order: int, peclet: float, density: float, ends, tolerance: float
+               ) -> dict[str, float]:
+    """Size; of each substrate, over itself, of both, over the larger supply, and of the acceptor at the nodes of the
+    slab, place by place over itself."""
+    space, truth = spaced(size, number, order, ends), exact(peclet, density, tolerance)
+    ours, pieces = _ours(size, number, order, peclet, density, ends=ends)[0], space.reaction
     nodes = pieces.cells[:, 0]
     ratio = ours[0, nodes] / truth(space.points[nodes, 0])[0]
     gap, whole = apart(space, ours, lambda x, y: truth(x))
-    return {**dict(zip(NAMES, gap / whole)),
+    return {"size": length(space, size), **dict(zip(NAMES, gap / whole)), "C": np.hypot(*gap) / pair("supply")[0],
             ITSELF_STARVED: np.sqrt(np.average((ratio - 1) ** 2, weights=pieces.dx[:, 0]))}
 
 
-def _root_mean_square(size: float, number: int, order: int, peclet: float, density: float) -> dict[str, float]:
-    """Of both substrates over the larger supply."""
-    space, truth = spaced(size, number, order, WIDE), exact(peclet, density, FINER[order][1])
-    gaps, _ = apart(space, found(size, number, peclet, density, order, WIDE), lambda x, y: truth(x))
-    return {"size": length(space, size), "C": np.hypot(*gaps) / pair("supply")[0]}
-
-
 def _over_the_supply(gap: np.ndarray) -> dict[str, float]:
-    """Of each substrate the root mean square over the places (2, ...), over its supply."""
-    return dict(zip(NAMES, np.sqrt(np.mean(gap**2, axis=tuple(range(1, gap.ndim)))) / pair("supply")))
+    """Of each substrate the largest over the times of root mean squares over the places, gap (times, 2, ...), over its
+    supply."""
+    squares = np.mean(gap**2, axis=tuple(range(2, gap.ndim)))
+    return dict(zip(NAMES, np.sqrt(squares).max(axis=0) / pair("supply")))
 
 
 BOX, SIDE = 16.0, 8.0
-SUBSTRATES = replace(SCENE.substrates, **{
-    name: replace(getattr(SCENE.substrates, name), diffusivity=spread, diffusivity_in_aggregate=spread)
-    for name, spread in zip(NAMES, (8e6, 4e6))})
+SUBSTRATES = changed(acceptor={"diffusivity": 8e6, "diffusivity_in_aggregate": 8e6},
+                     donor={"diffusivity": 4e6, "diffusivity_in_aggregate": 4e6})
 ITSELF = "donor in the biomass, over itself"
 #: Cells (um), and how many meshes of elements as long around the block.
 BLOCK = {2.0: 6, 1.0: 4, 0.5: 2, 0.25: 1}
@@ -198,19 +210,15 @@ HALF_DISCS = {"X = 1e+05 mg/L, linear": ("half-disc", 1, 1e5, 2e-5, 2e-5, 3e-5),
 def finite_differences(shape: str, order: int, density: float, *ceilings: float):
     """Around the half-disc py-pde's finest cells alone are compared with elements of order 2 and 3: one after the other
     they are off to one side or to the other, by no steady order."""
-    names = (*NAMES, ITSELF)
-    if order == 1:
-        samples, why = (BLOCK, "both of second order") if shape == "block" else (dict.fromkeys(DISC, 1), CUT)
-        rows = {name: (2, why, ceiling) for name, ceiling in zip(names, ceilings)}
-        yield studies(refine(_less, samples, density, shape, order), rows)
-    elif shape == "block":
-        rows = {name: (2, "py-pde's second order", ceiling) for name, ceiling in zip(names, ceilings)}
-        errors = refine(_less, dict.fromkeys(BLOCK, 1), density, shape, order)
-        yield studies(errors, rows, ", of py-pde less ours")
-    else:
+    names, told = (*NAMES, ITSELF), ", of py-pde less ours"
+    if order > 1 and shape == "half-disc":
         errors = _less(min(DISC), 0, density, shape, order)
-        for name, ceiling in zip(names, ceilings):
-            yield at_most(f"{name}, of py-pde less ours", errors[name], ceiling, "py-pde's error")
+        return [at_most(name + told, errors[name], ceiling, "py-pde's error") for name, ceiling in zip(names, ceilings)]
+    samples, why = (BLOCK, "both of second order") if shape == "block" else (dict.fromkeys(DISC, 1), CUT)
+    if order > 1:
+        samples, why = dict.fromkeys(BLOCK, 1), "py-pde's second order"
+    rows = {name: (2, why, ceiling) for name, ceiling in zip(names, ceilings)}
+    return studies(refine(_less, samples, density, shape, order), rows, told if order > 1 else "")
 
 
 @cache
@@ -223,19 +231,15 @@ def _pypde(cell: float, density: float, shape: str):
 
 
 @cache
-def _spaced(cell: float, number: int, shape: str, order: int = 1) -> Space:
-    if shape == "block":
-        return meshes.space_on(following(2 * SIDE**2, cell, number, (-BOX, BOX), BOX,
-                                         lambda x, y: (np.abs(x) < SIDE) & (y < SIDE), across=(-SIDE, SIDE),
-                                         along=(SIDE,)), order)
-    return meshes.half_disc_space(SIDE, DISC[cell], (-BOX, BOX), BOX, order)
-
-
-@cache
 def _settled(cell: float, number: int, density: float, shape: str, order: int) -> tuple[Space, np.ndarray]:
     """C (2, n) of linear elements as long as py-pde's cells; of others, finer ones, as the transient scheme comes to
     rest."""
-    space = _spaced(cell, number, shape, order)
+    if shape == "block":
+        straight = following(2 * SIDE**2, cell, number, (-BOX, BOX), BOX, lambda x, y: (np.abs(x) < SIDE) & (y < SIDE),
+                             across=(-SIDE, SIDE), along=(SIDE,))
+        space = meshes.space_on(straight, order)
+    else:
+        space = meshes.half_disc_space(SIDE, DISC[cell], (-BOX, BOX), BOX, order)
     given = transport.problem(space, None, SUBSTRATES, SCENE.kinetics), Sink(filled(space, density))
     return space, both(transport.steady(*given) if order == 1 else gear.settle(*given, None))
 
@@ -244,14 +248,12 @@ def _less(cell: float, number: int, density: float, shape: str, order: int) -> d
     """Differences of both substrates over their supply, and of the donor in the biomass, the scarcer, over itself."""
     points, theirs, part = _pypde(cell, density, shape)
     elements = cell if order == 1 else FINE_AROUND[shape][order]
-    ours = sample(*_settled(elements, number, density, shape, order), points)
+    space, fields = _settled(elements, number, density, shape, order)
+    ours = meshes.field_at(space, fields.T, points).T
     ratio = (ours / theirs)[1, part == 1] - 1
-    return {**_over_the_supply(ours - theirs), ITSELF: np.sqrt(np.mean(ratio**2))}
+    return {**_over_the_supply((ours - theirs)[None]), ITSELF: np.sqrt(np.mean(ratio**2))}
 
 
-LAW = replace(SCENE.kinetics, yield_coefficient=1e-12)
-#: h: 0.07, 0.2 and 0.7 s. Water diffuses across the slab in 0.6 s, and crosses it in 0.1 to 6 s.
-TIMES = (2e-5, 6e-5, 2e-4)
 #: Steps of each of the three intervals.
 STEPS = (16, 32, 64, 128)
 #: FiPy's cells (um), half as long as these, and the elements of order 2 and 3 that they are compared with, whose error
@@ -265,52 +267,24 @@ AGAINST_FIPY = {
            {3e3: 3e-6, 3e4: 3e-5, 3e5: 3e-4}, 1e-5)}
 
 
-@cache
-def _assembled(size: float, number: int, peclet: float, order: int) -> transport.Problem:
-    return problem(spaced(size, number, order), speed_of(peclet), law=LAW)
-
-
-@cache
-def _ours(size: float, number: int, peclet: float, density: float, steps: int, order: int = 1) -> np.ndarray:
-    """(times, 2, n): each interval in equal steps, started anew from the end of the last."""
-    made = _assembled(size, number, peclet, order)
-    states = []
-    active = filled(made.space, density)
-    now = transport.supplied_everywhere(made)
-    for interval in np.diff([0.0, *TIMES]):
-        now = gear.advance(made, active, 0 * active, now, interval, fixed_step=interval / steps).concentrations
-        states.append(both(now))
-    return np.array(states)
-
-
 def mass(space: Space) -> np.ndarray:
     """(n, n) um2, the mass matrix on a straight mesh by scikit-fem; of linear functions lumped."""
     if space.order == 1:
         return np.diag(space.lumped())
-    straight = space.mesh.straight
-    grid = MeshTri(straight.points.T.copy(), straight.triangles.T.copy())  # sorted, as edges of order 3 must be
-    basis = Basis(grid, ELEMENTS[space.order], intorder=8)
-    apart, same = cKDTree(basis.doflocs.T).query(space.points)
-    if apart.max() > 1e-9:
-        raise ValueError("scikit-fem has its nodes elsewhere")
+    grid = space.mesh.fem
+    basis = Basis(MeshTri(grid.p, grid.t), ELEMENTS[space.order], intorder=8)  # sorted, as edges of order 3 must be
+    _, same = cKDTree(basis.doflocs.T).query(space.points)
     return poisson.mass.assemble(basis).toarray()[np.ix_(same, same)]
 
 
-def _reading(space: Space) -> np.ndarray:
-    """(points, n) concentrations in the points of the reaction from those at the nodes."""
-    pieces = space.reaction
-    nodes = np.eye(space.count)[pieces.cells]
-    return np.einsum("qk,tkn->tqn", pieces.values, nodes).reshape(pieces.dx.size, -1)
-
-
-@cache
 def _exact_in_time(size: float, peclet: float, density: float, order: int) -> np.ndarray:
     """(times, 2, n): the same equations in space, M dC/dt = b - L C - X q in the points of the reaction, by scipy's
     integrator to 1e-8."""
-    made, law = _assembled(size, 0, peclet, order), rates(LAW)
-    back = np.kron(np.eye(2), np.linalg.inv(mass(made.space)))
-    read = np.kron(np.eye(2), _reading(made.space))
-    load = filled(made.space, density).ravel()
+    space, law = spaced(size, 0, order), rates(LAW)
+    made, pieces = problem(space, speed_of(peclet), law=LAW), space.reaction
+    points = (pieces.values @ np.eye(space.count)[pieces.cells]).reshape(-1, space.count)
+    back, read = (np.kron(np.eye(2), part) for part in (np.linalg.inv(mass(space)), points))
+    load = filled(space, density).ravel()
 
     def rise(_, y):
         return back @ (made.source - made.operator @ y - read.T @ sink(read @ y, load, law))
@@ -318,14 +292,8 @@ def _exact_in_time(size: float, peclet: float, density: float, order: int) -> np
     def slope(_, y):
         return back @ -(made.operator.toarray() + read.T @ slopes(read @ y, load, law) @ read)
 
-    start = np.repeat(pair("supply"), made.space.count)
-    found = solve_ivp(rise, (0.0, TIMES[-1]), start, jac=slope, method="BDF", t_eval=TIMES, rtol=1e-8, atol=1e-8)
+    found = solve_ivp(rise, (0.0, TIMES[-1]), made.supply, jac=slope, method="BDF", t_eval=TIMES, rtol=1e-8, atol=1e-8)
     return found.y.T.reshape(len(TIMES), 2, -1)
-
-
-def _largest(gap: np.ndarray) -> dict[str, float]:
-    """The largest over the times of differences (times, 2, ...)."""
-    return runs.worst([_over_the_supply(part) for part in gap])
 
 
 #: Order, Peclet number and density of what is studied in time, elements (um), and the last error.
@@ -343,30 +311,26 @@ IN_TIME = {f"Pe = {peclet:g}, X = {density:g} mg/L, {word}": (ORDERS[word], pecl
       mutants=("carry-of-bdf2", "backward-euler", "storage-of-the-biomass-alone", "storage-diagonal"), over=IN_TIME)
 def in_time(order: int, peclet: float, density: float, size: float, ceiling: float):
     trusted = _exact_in_time(size, peclet, density, order)
-    errors = refine(lambda steps: {"size": TIMES[0] / steps, **_largest(
-        _ours(size, 0, peclet, density, steps, order) - trusted)}, STEPS)
+    errors = refine(lambda steps: {"size": TIMES[0] / steps, **_over_the_supply(
+        _ours(size, 0, order, peclet, density, steps) - trusted)}, STEPS)
     return studies(errors, each(2, "BDF2 after a first step of backward Euler", ceiling))
 
-@cache
+
 def _channel(size: float, peclet: float, density: float) -> channel_fipy.Channel:
     """FiPy's, its cells half as long as our edges."""
     return channel_fipy.Channel(round(2 * (CROSSED[1] - CROSSED[0]) / size), CROSSED, *given(peclet, density))
 
 
 @cache
-def _fipy(size: float, peclet: float, density: float, timed: bool) -> np.ndarray:
-    """(times, 2, n) at the centres of its cells."""
+def _fipy(size: float, peclet: float, density: float, timed: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Centres of its cells (n,), and (times, 2, n) there."""
     channel = _channel(size, peclet, density)
-    return channel.transient(TIMES) if timed else channel.steady()[None]
+    return channel.x, channel.transient(TIMES) if timed else channel.steady()[None]
 
 
-def _at_cells(x, size: float, number: int, order: int, peclet: float, density: float, steps: float) -> np.ndarray:
-    """(times, 2, 5, n) ours at x, at five heights, in so many steps; steady where there are none."""
-    if steps:
-        states = _ours(size, number, peclet, density, round(steps), order)
-    else:
-        states = found(size, number, peclet, density, order)[None]
-    return np.stack([at_heights(spaced(size, number, order), state, x) for state in states])
+def _at_cells(x, size: float, number: int, order: int, *given) -> np.ndarray:
+    """(times, 2, 5, n) ours at x, at five heights."""
+    return at_heights(spaced(size, number, order), _ours(size, number, order, *given), x)
 
 
 def _rows(timed: bool) -> dict[str, tuple]:
@@ -407,19 +371,19 @@ def finite_volumes(timed: bool, order: int, peclet: float, density: float):
 def _from_fipy(size: float, number: int, order: int, peclet: float, density: float, timed: bool) -> dict[str, float]:
     """Both codes refined together, or FiPy's cells against one mesh of quadratic or cubic elements; in the starved slab
     C_A over itself."""
-    x, theirs = _channel(size, peclet, density).x, _fipy(size, peclet, density, timed)
+    x, theirs = _fipy(size, peclet, density, timed)
     elements, steps = (size, STEPS[-1] / size) if order == 1 else (FINE[order], STEPS[-1])
-    ours = _at_cells(x, elements, number, order, peclet, density, timed * steps)
+    ours = _at_cells(x, elements, number, order, peclet, density, round(timed * steps))
     inside = (x > 0) & (x < SLAB)
     ratio = ours[-1, 0][:, inside] / theirs[-1, 0, inside]
-    return {**_largest(ours - theirs[:, :, None]), ITSELF_STARVED: np.sqrt(np.mean((ratio - 1) ** 2))}
+    return {**_over_the_supply(ours - theirs[:, :, None]), ITSELF_STARVED: np.sqrt(np.mean((ratio - 1) ** 2))}
 
 
 def _from_backward_euler(steps: int, peclet: float, density: float) -> dict[str, float]:
     size = CELLS[-1]
     channel = _channel(size, peclet, density)
     ours = _at_cells(channel.x, size, 0, 1, peclet, density, steps)
-    return {"size": TIMES[0] / steps, **_largest(ours - channel.backward_euler(TIMES, steps)[:, :, None])}
+    return {"size": TIMES[0] / steps, **_over_the_supply(ours - channel.backward_euler(TIMES, steps)[:, :, None])}
 
 
 WELL_MIXED, RADIUS = 24.0, 8.0
@@ -432,15 +396,9 @@ MIXED = {"C_A": 4e-5, "C_D": 1.5e-5, "X_A": 6e-5, "X_I": 1e-4}
 #: Kinetics five times slower than the paper's, and half saturations of the supply's size: C falls for days.
 SLOW_LAW = replace(SCENE.kinetics, maximum_utilization_rate=SCENE.kinetics.maximum_utilization_rate / 5)
 EVEN = {"diffusivity": 1e8, "diffusivity_in_aggregate": 1e8, "supply": SUPPLY}
-CLOSED = replace(SCENE.substrates, boundary="closed",
-                 acceptor=replace(SCENE.substrates.acceptor, half_saturation=300.0, **EVEN),
-                 donor=replace(SCENE.substrates.donor, half_saturation=600.0, **EVEN))
+CLOSED = replace(changed(acceptor={"half_saturation": 300.0, **EVEN}, donor={"half_saturation": 600.0, **EVEN}),
+                 boundary="closed")
 MIXED_NORM = "largest relative difference, twice a day for five days"
-
-
-def growing(acceptor, donor, active):
-    """(2,) dX_A/dt and dX_I/dt, (9)-(10)."""
-    return active * np.array(runs.growth_rates(SLOW_LAW, CLOSED, acceptor, donor))
 
 
 @cache
@@ -470,16 +428,16 @@ def _mixed_ours(step: float, order: int) -> np.ndarray:
     return np.array(rows)
 
 
-def _theirs(times, order: int) -> np.ndarray:
+def _theirs(order: int) -> np.ndarray:
     """(times, 4) by scipy."""
     space, law = box_around(order), rates(SLOW_LAW, CLOSED)
     share = space.reaction.dx.sum() / space.at.dx.sum()
 
     def right(_, y):
-        sinks = uptake(y[0], y[1], law)
-        return [-share * y[2] * sinks[0], -share * y[2] * sinks[1], *growing(*y[:3])]
+        taken = share * np.array(uptake(y[0], y[1], law))
+        return y[2] * np.append(-taken, runs.growth_rates(SLOW_LAW, CLOSED, y[0], y[1]))
 
-    return solve_ivp(right, (0, times[-1]), [SUPPLY, SUPPLY, SEEDED, 0.0], t_eval=times, rtol=1e-11, atol=1e-10,
+    return solve_ivp(right, (0, HALF_DAYS[-1]), [SUPPLY, SUPPLY, SEEDED, 0.0], t_eval=HALF_DAYS, rtol=1e-11, atol=1e-10,
                      method="DOP853").y.T
 
 
@@ -495,7 +453,7 @@ def _theirs(times, order: int) -> np.ndarray:
       because="order 1: transport-well-mixed")
 def followed(order: int):
     """How even the box is, and studies of the four."""
-    trusted = _theirs(HALF_DAYS, order)
+    trusted = _theirs(order)
     uneven = (_mixed_ours(MIXED_STEPS[-1], order)[:, :, 1] / trusted).max()
     yield at_most("unevenness in the box", uneven, 1e-6, "L^2 / D over the time in which the supply lasts")
     errors = refine(lambda step: {"size": step, **dict(zip(
