@@ -84,7 +84,8 @@ def test_profiles_settle_after_a_jump_of_the_supply_at_constrained_ends(before, 
     above."""
     now, problem = case("20 um", None, order=order)
     sink, earlier, later = Sink(now.active), *(supplied(problem, supply) for supply in (before, after))
-    found, steady = gear.settle(later, sink, gear.settle(earlier, sink, None)), transport.steady(later, sink)
+    start = gear.settle(earlier, sink, None)
+    found, steady = gear.settle(later, sink, start), transport.steady(later, sink, start)
     assert found.acceptor == pytest.approx(steady.acceptor, abs=1e-6)
     assert found.donor == pytest.approx(steady.donor, abs=1e-6)
 
@@ -113,6 +114,27 @@ def test_a_starved_pore_stays_positive(fixed_step):
     done = gear.advance(problem, now.active, now.inert, transport.supplied_everywhere(problem), 0.2,
                         fixed_step=fixed_step)
     assert 0 <= done.concentrations.acceptor.min() < 1e-6 and done.concentrations.donor.min() > 0
+
+
+@pytest.mark.parametrize("acceptor, donor", [("1000 mg/L", "1 mg/L"), ("1 mg/L", "1000 mg/L")])
+def test_each_substrate_is_followed_to_a_thousandth_of_its_own_supply(acceptor, donor):
+    """However much there is of the other: against steps controlled ten times as well."""
+    now, problem = case.__wrapped__(velocity=None, boundary="closed", substrates={
+        "acceptor": {"supply": acceptor}, "donor": {"supply": donor}})
+    start = transport.supplied_everywhere(problem)
+    found, wanted = (gear.advance(problem, now.active, now.inert, start, 0.005, tolerance=part * gear.TOLERANCE)
+                     .concentrations for part in (1.0, 0.1))
+    for name in ("acceptor", "donor"):
+        supply = getattr(problem.substrates, name).supply
+        assert getattr(found, name) == pytest.approx(getattr(wanted, name), abs=1e-3 * supply)
+
+
+def test_a_row_within_an_update_is_what_an_update_to_there_ends_with():
+    """Of still water, whose substrates go on from what is there."""
+    still = scene(velocity="0 m/day", growth={"end": "0.3 h"}, numerics=coarse(1), output={"times": ["0.3 h"]})
+    within, end = ([*simulate(replace(still, growth=replace(still.growth, end=last)))][1].solved.concentrations
+                   for last in (0.4, 0.3))
+    assert np.array_equal([within.acceptor, within.donor], [end.acceptor, end.donor])
 
 
 def test_what_cannot_be_followed_is_said_with_its_place():

@@ -112,6 +112,25 @@ def test_an_even_change_is_of_second_order():
     assert (np.abs(np.log2(apart[:-1] / apart[1:]) - 2) < 0.3).all()
 
 
+@pytest.mark.parametrize("preset", ["fast", "paper"])
+def test_a_row_within_a_step_has_the_supply_of_its_time(preset):
+    """Of which a small seed takes up less than a hundredth."""
+    table = [["0 h", "10 mg/L"], ["1 h", "2 mg/L"]]
+    made = load_scene("base", [f"{DONOR}={json.dumps(table)}", "substrates.donor.interpolation=linear",
+                               f"numerics.preset={preset}", 'growth.end="0.5 h"', 'output.times=["0.3 h", "0.5 h"]'])
+    _, row, _ = simulate(made)
+    assert row.solved.fluxes[1].effluent == pytest.approx(7.6, rel=1e-2)
+
+
+@pytest.mark.parametrize("way", ["preset=fast", "preset=paper", "transport=gear"])
+def test_what_an_evenly_rising_velocity_brings_is_its_integral(way):
+    """2 m/day in the mean, in steps of any length, to round-off."""
+    made = load_scene("base", ['flow.mean_velocity=[["0 h", "1 m/day"], ["0.5 h", "3 m/day"]]', 'growth.end="0.5 h"',
+                               "flow.interpolation=linear", f"numerics.{way}"], ["flow.head"])
+    brought = np.sum([step.supplied for instant in simulate(made) for step in instant.ledgers], axis=0)
+    assert brought == pytest.approx(np.full(2, 2e6 / 24 * 0.5 * 50 * 10), rel=1e-9)
+
+
 def test_what_is_judged_is_the_extreme():
     """Numbers and growth of the largest supply and the fastest flow."""
     made = load_scene("base", [*SHORT, RISING])

@@ -141,6 +141,13 @@ def test_a_step_that_fails_is_halved_until_it_is_done(monkeypatch):
     assert taken.pore.time == 0.0125 and after.length == pytest.approx(pace.FASTER * 0.0125)
 
 
+def test_contact_is_met_within_half_a_percent_of_the_film():
+    """2 um: a step that leaves less than 1.99 um is too long, and an even thinning from 4 to 1 um is met in between."""
+    for gap, wanted in ((1.98, True), (1.989, True), (1.991, False)):
+        assert stepping._overshoots(Attempt(None, 0.0, (4.0, gap, 2.0))) is wanted
+    assert 1.99 < 4 - 3 * stepping._to_contact((4.0, 1.0, 2.0)) < 2
+
+
 @pytest.mark.parametrize("error, told", [(GrowthError("no way"), "in growth: no way"),
                                          (FloatingPointError("overflow"), "floating-point error .overflow.")])
 def test_what_fails_at_the_shortest_step_stops_the_run(monkeypatch, error, told):
