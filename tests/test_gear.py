@@ -144,6 +144,12 @@ def test_what_cannot_be_followed_is_said_with_its_place():
         gear.advance(problem, now.active, now.inert, transport.supplied_everywhere(problem), 0.2, tolerance=1e-30)
 
 
+def test_a_time_shorter_than_the_shortest_step_is_one_step():
+    now, problem = case()
+    settled = gear.settle(problem, Sink(now.active), None)
+    assert len(gear.advance(problem, now.active, now.inert, settled, 0.1 * gear.SHORTEST).steps) == 1
+
+
 def test_what_becomes_negative_is_said():
     """A drain that takes the acceptor whatever is left of it: 3e-4 of the supply too much, less than TOLERANCE, is
     refused.

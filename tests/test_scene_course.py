@@ -98,6 +98,14 @@ def test_updates_end_at_every_multiple_and_at_all_times_of_all_tables():
     assert updates.schedule(made)[0] == [0, 0.07, 0.13, 0.2, 0.38, 0.4, 0.55, 0.6, 0.71]
 
 
+@pytest.mark.parametrize("step", ["400 s", "20 min", "200 s"])
+def test_a_time_of_a_table_at_a_multiple_of_the_time_step_ends_one_update(step):
+    """Where the multiple is none of nine digits: no crumb of a step remains between both, and there is one row."""
+    made = scene(acceptor=[["0 h", "1 mg/L"], [step, "2 mg/L"]], growth={"end": "40 min", "time_step": step})
+    first, second = updates.schedule(made)[0][1:3]
+    assert first == made.substrates.acceptor.supply.times[1] and second == pytest.approx(2 * first)
+
+
 def test_an_even_change_is_of_second_order():
     """Biomass of base with a supply that falls evenly to a tenth, in steps of 12 to 3 min of the paper's: the mean
     of the supply counts."""

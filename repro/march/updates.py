@@ -51,10 +51,14 @@ def schedule(scene: Scene) -> tuple[list[float], set[float]]:
 
 def next_time(scene: Scene, time: float) -> float:
     """The time (h) at which a step ends: the next multiple of growth.time_step, rounded, or of a
-    table's times; or growth.end, where that comes first or is as good as there."""
+    table's times, where that comes first or is the same time; or growth.end, where that comes first
+    or is as good as there."""
     growth = needed(scene.growth, "[growth]")
     count = math.floor(time / growth.time_step + ON_GRID) + 1
-    update = min(round(count * growth.time_step, 9), scene.corner(time))
+    update = round(count * growth.time_step, 9)
+    corner = scene.corner(time)
+    if corner - update < SAME_TIME:
+        update = corner
     if update < growth.end - max(SAME_TIME, SAME_TIME * growth.time_step):
         return update
     return growth.end

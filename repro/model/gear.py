@@ -295,7 +295,8 @@ def _accepted(system: System, now: Level, step: float, tolerance: float, when: s
     from its prediction, and that difference over the scale; each try is shorter than the last by a
     factor of 1/2 to ``least``."""
     floor = _lowest(system.problem)
-    while step >= SHORTEST:
+    shortest = min(SHORTEST, step)
+    while step >= shortest:
         new, difference = _tried(system, now, step, floor)
         size = float(np.max(difference[:, system.watched], initial=0.0))
         if (new.fields >= floor).all() and size <= tolerance:
