@@ -31,13 +31,11 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from shutil import copy2, copytree, ignore_patterns
-from tempfile import TemporaryDirectory
 
 from verification.kernel import writing
 from verification.kernel.case import CASES, STAGES, Result
+from verification.kernel.trying import ENDED, ROOT, copied, run
 
-ROOT = Path(__file__).parents[2]
 #: The names that it exports come from modules that cases import by themselves.
 API = ROOT / "repro" / "__init__.py"
 
@@ -71,20 +69,17 @@ def imported(path: Path) -> Iterator[Path]:
 
 
 RECORD = ROOT / "verification" / "report" / "mutants.json"
-COPIED = ("repro", "reference", "verification")
 #: Mutants of what users read, which tests catch.
 RESULTS = "results"
-#: What tests need besides.
-TESTED = ("tests", "pyproject.toml")
 #: What of the mutants catches them.
 CATCHERS = ("cases", "tests")
-#: A line of the summary of pytest, and how it begins where it is a catch: an assertion, `pytest.raises`, a guard.
-FAILED = re.compile(r"^(?:FAILED|ERROR) .*? - (.*)$", re.M)
+#: How the error of a test begins that is a catch: an assertion, `pytest.raises`, a guard.
 CATCH = ("assert", "AssertionError", "Failed: ", "repro.")
 #: The guard that stops a variant of a case, the last of them or one before another's traceback.
 GUARD = re.compile(r"^repro\.errors\.(\w+: .*)$(?=\n?\Z|\n.*Traceback )", re.M)
 #: No case takes a tenth of this; a mutant may make one run for ever.
 LONGEST = 600.0
+NOT_DONE = f"not done after {LONGEST:g} s"
 
 
 @dataclass(frozen=True)
@@ -173,52 +168,37 @@ def hunt(mutant: Mutant, every: bool = False) -> Hunt:
     quick_first = sorted(CASES.values(), key=lambda case: case.slow)
     catchers = mutant.tests or [case.id for case in quick_first if mutant.id in case.mutants]
     trials: list[Trial] = []
-    with TemporaryDirectory(prefix="mutant-") as folder:
-        copy(mutant, Path(folder))
+    with copied() as there:
+        (there / mutant.file).write_text(mutated(mutant), encoding="utf-8")
         for each in catchers:
-            try:
-                trials.append((tested if mutant.tests else trial)(Path(folder), each))
-            except subprocess.TimeoutExpired:
-                trials.append(Trial(each, False, f"not done after {LONGEST:g} s"))
+            trials.append((tested if mutant.tests else trial)(there, each))
             if trials[-1].caught and not (every or mutant.tests):
                 break
     return Hunt(mutant.id, tuple(trials))
 
 
-def copy(mutant: Mutant, folder: Path) -> None:
-    """The code with the mutant in it."""
-    text = mutated(mutant)
-    for name in COPIED + (TESTED if mutant.tests else ()):
-        if (ROOT / name).is_file():
-            copy2(ROOT / name, folder)
-        else:
-            copytree(ROOT / name, folder / name, ignore=ignore_patterns("__pycache__", "out", "live"))
-    (folder / mutant.file).write_text(text, encoding="utf-8")
-
-
-def trial(folder: Path, case: str) -> Trial:
+def trial(there: Path, case: str) -> Trial:
     """Run one case in the copy, in a process of its own."""
-    done = _run(folder, "-c", f"from verification.kernel import mutants; mutants.examine({case!r})")
+    command = f"from verification.kernel import mutants; mutants.examine({case!r})"
+    try:
+        done = subprocess.run([sys.executable, "-c", command], cwd=there, env={**os.environ, "PYTHONPATH": str(there)},
+                              capture_output=True, text=True, timeout=LONGEST)
+    except subprocess.TimeoutExpired:
+        return Trial(case, False, NOT_DONE)
     if done.returncode:
         return Trial(case, False, "broken: " + (done.stderr.strip().splitlines() or ["no message"])[-1])
     return Trial(case, *json.loads(done.stdout.splitlines()[-1]))
 
 
-def tested(folder: Path, test: str) -> Trial:
+def tested(there: Path, test: str) -> Trial:
     """Run one test in the copy, in a process of its own."""
-    done = _run(folder, "-m", "pytest", "-x", "-p", "no:cacheprovider", "-rfE", test)
-    if done.returncode == 0:
-        return Trial(test, False, "passes")
-    found = FAILED.search(done.stdout)
-    why = found[1] if found else (done.stdout + done.stderr).strip().splitlines()[-1]
-    caught = done.returncode == 1 and why.startswith(CATCH)
-    return Trial(test, caught, why if caught else f"broken: {why}")
-
-
-def _run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Python in the copy."""
-    return subprocess.run([sys.executable, *arguments], cwd=folder, capture_output=True, text=True, timeout=LONGEST,
-                          env={**os.environ, "PYTHONPATH": str(folder), "COLUMNS": "500"})
+    found = run(there, [test], LONGEST)
+    for _, how in found.failures[:1]:
+        caught = how.startswith(CATCH)
+        return Trial(test, caught, how if caught else f"broken: {how}")
+    if found.status in ENDED:
+        return Trial(test, False, NOT_DONE)
+    return Trial(test, False, "passes" if found.reports else "broken: there is no such test")
 
 
 def examine(id: str) -> None:
