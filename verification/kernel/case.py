@@ -78,16 +78,12 @@ class Check(Quantity):
 
     @property
     def used(self) -> float:
-        """How much of its tolerance it uses: 0 to 1 where it holds, more than anything where it does not."""
-        if not self.holds:
-            return inf
+        """How much of its tolerance it uses, 0 to 1, if it holds: of a size, or of a number that should not be below
+        zero, the share of its bound."""
         if self._two_sided:
             return abs(self.value - self.low - self._tolerance) / self._tolerance
-        if isfinite(self.high):
-            return self.value / self.high if self.high else 0.0
-        if self.low < 0:
-            return max(0.0, self.value / self.low)
-        return self.low / self.value if self.value else 0.0
+        bound = self.high if isfinite(self.high) else self.low
+        return max(0.0, self.value / bound) if bound else 0.0
 
     @property
     def expected(self) -> str:
@@ -163,12 +159,10 @@ class Study(Quantity):
 
     @property
     def orders(self) -> np.ndarray:
-        """(k - 1,) log of the ratio of errors over log of the ratio of sizes; not-a-number where an error is not
-        positive and finite."""
-        good = np.isfinite(self.errors) & (np.asarray(self.errors) > 0)
-        logs = np.log(np.where(good, self.errors, 1.0))
-        slopes = np.diff(logs) / np.diff(np.log(self.sizes))
-        return np.where(good[1:] & good[:-1], slopes, np.nan)
+        """(k - 1,) log of the ratio of errors over log of the ratio of sizes; infinite or not-a-number where an error
+        is not positive and finite."""
+        with np.errstate(all="ignore"):
+            return np.diff(np.log(self.errors)) / np.diff(np.log(self.sizes))
 
     @property
     def holds(self) -> bool:

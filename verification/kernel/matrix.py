@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from itertools import product, starmap
@@ -37,6 +37,8 @@ EXACT = {"flow": SAME, "transport": SAME,
 LINE = re.compile(r"^ {4,}(\S.*?)\s{3,}((?:\(\d+\)[-, ]*)+)?\s*(repro\.[\w.]+(?:, \.\w+)*)(?:[: ].*)?$")
 #: The sections at the start of its first part: "3.1, 3.5", "2.1-2.3".
 SECTIONS = re.compile(r"(?:Table 1|[\d.]+(?:-[\d.]+)?|, )*")
+#: Modules whose functions are followed to the references that they use.
+OURS = re.compile(r"verification\.(?!kernel)")
 
 
 @dataclass(frozen=True)
@@ -164,48 +166,43 @@ def _section(place: str) -> str:
 
 def references_of(case: Case) -> set[str]:
     """Modules of ``reference`` that a case's function uses, or that those import."""
-    found: set[str] = set()
-    for module in _used(case.function):
-        found |= {module, *_imported(module)}
-    return {name.removeprefix("reference.") for name in found if name != "reference"}
+    used = {*_used(case.function, set())}
+    found = used.union(*(map(_module, vars(sys.modules[name]).values()) for name in used))
+    return {name.removeprefix("reference.") for name in found if name.startswith("reference.")}
 
 
-def _used(function: FunctionType) -> set[str]:
+def _used(thing, seen: set[int]) -> Iterator[str]:
     """Names of the modules of ``reference`` that a function, or one that it uses of ``verification``, names."""
-    found: set[str] = set()
-    seen: set[int] = set()
-    waiting: list = [function]
-    while waiting:
-        thing = waiting.pop()
-        thing = getattr(thing, "func", thing)
-        name = thing.__name__ if isinstance(thing, ModuleType) else getattr(thing, "__module__", None) or ""
-        if id(thing) in seen:
-            continue
-        seen.add(id(thing))
-        if name.startswith("reference"):
-            found.add(name)
-        elif isinstance(thing, Mapping | tuple | list):
-            waiting += thing.values() if isinstance(thing, Mapping) else thing
-        elif name.startswith("verification") and not name.startswith("verification.kernel"):
-            waiting += _named(thing)
-    return found
-
-
-def _named(thing) -> Iterator:
-    """What a function uses of its own module, and of the modules of ``verification`` there; what an object is made of.
-    """
-    thing = getattr(thing, "__wrapped__", thing)
-    if not isinstance(thing, FunctionType):
-        yield from () if isinstance(thing, type | ModuleType) else vars(thing).values()
+    thing = getattr(thing, "func", thing)
+    if id(thing) in seen:
         return
+    seen.add(id(thing))
+    if _module(thing).startswith("reference"):
+        yield _module(thing)
+    for part in _parts(getattr(thing, "__wrapped__", thing)):
+        yield from _used(part, seen)
+
+
+def _module(thing) -> str:
+    """The name of a module, or of that which something is defined in; "" where it has none."""
+    return thing.__name__ if isinstance(thing, ModuleType) else getattr(thing, "__module__", None) or ""
+
+
+def _parts(thing) -> Iterable:
+    """What a container or an object of ``verification`` is made of; what a function of it names, of its module and of
+    the modules that it names, and closes over."""
+    if isinstance(thing, Mapping):
+        return thing.values()
+    if isinstance(thing, tuple | list):
+        return thing
+    if isinstance(thing, type | ModuleType) or not OURS.match(_module(thing)):
+        return ()
+    if not isinstance(thing, FunctionType):
+        return vars(thing).values()
     names = {*_names(thing.__code__)}
-    for value in (thing.__globals__[name] for name in names & {*thing.__globals__}):
-        if isinstance(value, ModuleType) and value.__name__.startswith("verification"):
-            yield from (vars(value)[name] for name in names & {*vars(value)})
-        else:
-            yield value
-    for cell in thing.__closure__ or ():
-        yield cell.cell_contents
+    named = [thing.__globals__.get(name) for name in names]
+    theirs = [vars(module).get(name) for module in named if isinstance(module, ModuleType) for name in names]
+    return [*named, *theirs, *(cell.cell_contents for cell in thing.__closure__ or ())]
 
 
 def _names(code: CodeType) -> Iterator[str]:
@@ -213,13 +210,6 @@ def _names(code: CodeType) -> Iterator[str]:
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
             yield from _names(constant)
-
-
-def _imported(module: str) -> set[str]:
-    """Modules of ``reference`` that one of them uses."""
-    found = {value.__name__ if isinstance(value, ModuleType) else getattr(value, "__module__", "") or ""
-             for value in vars(sys.modules[module]).values()}
-    return {name for name in found if name.startswith("reference.")}
 
 
 def orphans() -> list[str]:
