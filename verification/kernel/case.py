@@ -11,9 +11,11 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from importlib import import_module
 from itertools import product
 from math import floor, inf, isfinite, log10
+from pkgutil import iter_modules
 from time import perf_counter
 from typing import Self
 
@@ -173,19 +175,14 @@ class Study(Quantity):
     @property
     def measured(self) -> str:
         """Orders to a tenth, and the last error to one digit."""
-        return f"{self.told}; last error {self._last}"
+        last = float(self.errors[-1])
+        known = isfinite(self.ceiling)
+        return f"{self.told}; last error {rounded(last, self.ceiling / 20) if known else f'{last:.0e}'}"
 
     @property
     def told(self) -> str:
         """Orders to a tenth: what another machine finds too."""
         return f"order {', '.join(f'{order:.1f}' for order in self.orders)}"
-
-    @property
-    def _last(self) -> str:
-        error = float(self.errors[-1])
-        if np.isfinite(self.ceiling):
-            return rounded(error, self.ceiling / 20)
-        return f"{error:.0e}"
 
     @property
     def expected(self) -> str:
@@ -258,16 +255,20 @@ class Note:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What a case has measured."""
+    """What a case has measured: checks, studies and notes."""
 
-    checks: tuple = ()
-    studies: tuple = ()
-    notes: tuple[Note, ...] = ()
+    parts: tuple
 
     @property
     def measured(self) -> tuple:
         """All that must hold: studies first."""
-        return (*self.studies, *self.checks)
+        judged = (part for part in self.parts if isinstance(part, Quantity))
+        return tuple(sorted(judged, key=lambda part: isinstance(part, Check)))
+
+    @property
+    def notes(self) -> tuple[Note, ...]:
+        """What is kept besides."""
+        return tuple(part for part in self.parts if isinstance(part, Note))
 
     def lines(self) -> list[Line]:
         """(quantity and what it is, expected, origin, holds) of each, as another machine finds them too."""
@@ -277,18 +278,8 @@ class Outcome:
                 for part in self.measured]
 
 
-def outcome(found: Iterable) -> Outcome:
-    """What a function of a case gives, as an Outcome: checks, studies and notes in any order, or lists of them."""
-    parts = tuple(flat(found))
-    return Outcome(*(_of(kind, parts) for kind in (Check, Study, Note)))
-
-
-def _of(kind: type, parts: tuple) -> tuple:
-    return tuple(part for part in parts if isinstance(part, kind))
-
-
 def flat(found) -> Iterator:
-    """All of it, one by one."""
+    """What a function of a case gives, one by one: checks, studies and notes in any order, or lists of them."""
     if isinstance(found, Quantity | Note):
         yield found
     else:
@@ -311,9 +302,9 @@ class Case:
     mutants: tuple[str, ...]
     slow: bool
     function: Callable
-    over: Mapping[str, tuple] = field(default_factory=dict)
-    ways: tuple[str, ...] = ()
-    because: str = ""
+    over: Mapping[str, tuple]
+    ways: tuple[str, ...]
+    because: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -337,6 +328,14 @@ class Result:
 
 
 CASES: dict[str, Case] = {}
+
+
+def load() -> None:
+    """Register the cases of every stage."""
+    for stage in STAGES:
+        package = import_module(f"verification.{stage}")
+        for module in iter_modules(package.__path__):
+            import_module(f"{package.__name__}.{module.name}")
 
 
 def combined(*axes: Mapping[str, object]) -> dict[str, tuple]:
@@ -380,4 +379,4 @@ def run(chosen: Case) -> Result:
                 found += [part.labelled(label) for part in flat(chosen.function(*arguments))]
         except Exception:
             errors += f"{label}{': ' * bool(label)}{traceback.format_exc(limit=-3)}"
-    return Result(chosen.id, outcome(found), errors, perf_counter() - start)
+    return Result(chosen.id, Outcome(tuple(found)), errors, perf_counter() - start)

@@ -10,10 +10,9 @@ import os
 import sys
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from importlib import import_module
-from pkgutil import iter_modules
 
 from verification.kernel import case, report
+from verification.kernel.case import load
 
 
 def main(arguments: list[str] | None = None, writers: Iterable[Callable] = ()) -> int:
@@ -47,14 +46,6 @@ def selected(stages, ids, fast: bool = False) -> list[str]:
     wanted = stages or (case.STAGES if not ids else ())
     ordered = sorted(case.CASES.values(), key=lambda c: case.STAGES.index(c.stage))
     return [c.id for c in ordered if (c.stage in wanted and not (fast and c.slow)) or c.id in ids]
-
-
-def load() -> None:
-    """Register the cases of every stage."""
-    for stage in case.STAGES:
-        package = import_module(f"verification.{stage}")
-        for module in iter_modules(package.__path__):
-            import_module(f"{package.__name__}.{module.name}")
 
 
 def run_all(ids: list[str], jobs: int) -> list[case.Result]:

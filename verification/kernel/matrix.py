@@ -19,7 +19,7 @@ from types import CodeType, FunctionType, ModuleType
 
 import repro
 from verification.kernel import mutants
-from verification.kernel.case import CASES, STAGES, WAYS, Case
+from verification.kernel.case import CASES, STAGES, WAYS, Case, load
 from verification.kernel.writing import Block, markdown, table
 
 ROOT = Path(__file__).parents[2]
@@ -62,7 +62,7 @@ def _part(name: str, equations: str, names: str) -> Part:
     first, *rest = names.split(", ")
     package = first if _file(first).endswith("/") else first.rpartition(".")[0]
     files = _file(first), *(_file(package + module) for module in rest)
-    places = (SECTIONS.match(name) or [""])[0].split(", ")
+    places = SECTIONS.match(name)[0].split(", ")
     sections = tuple(section for place in places for section in _ranged(place) if section)
     return Part(" ".join(name.split()), sections, equations.strip(" ,"), files)
 
@@ -123,10 +123,8 @@ def unexplained() -> list[str]:
 
 def line(part: Part) -> tuple[str, ...]:
     """A line of the second table."""
-    cases = cases_of(part)
-    references = sorted({name for id in cases for name in references_of(CASES[id])})
     modules = [file.removeprefix("repro/") for file in part.files]
-    columns = (modules, cases, references, mutants_of(part), claims_of(part))
+    columns = (modules, cases_of(part), references_at(part), mutants_of(part), claims_of(part))
     return (part.name, part.equations, *(", ".join(column) or "-" for column in columns))
 
 
@@ -139,6 +137,11 @@ def cases_of(part: Part) -> list[str]:
     """Ids of the cases that name one of them."""
     wrong = {*mutants_of(part)}
     return [case.id for case in ordered() if wrong & {*case.mutants}]
+
+
+def references_at(part: Part) -> list[str]:
+    """Modules of ``reference`` that these use."""
+    return sorted({name for id in cases_of(part) for name in references_of(CASES[id])})
 
 
 def claims_of(part: Part) -> list[str]:
@@ -214,15 +217,13 @@ def _names(code: CodeType) -> Iterator[str]:
 
 def orphans() -> list[str]:
     """What stands in no line of the second table (of mutants those that cases catch), and lines without a case."""
-    lines = parts()
-    shown = {"case": {id for part in lines for id in cases_of(part)},
-             "mutant": {id for part in lines for id in mutants_of(part)},
-             "claim": {id for part in lines for id in claims_of(part)}}
-    shown["reference"] = {name for id in shown["case"] for name in references_of(CASES[id])}
-    every = {"case": {*CASES}, "mutant": {*mutants.of("cases")}, "claim": {*claims()},
-             "reference": {path.stem for path in (ROOT / "reference").glob("*.py")} - {"__init__"}}
-    bare = [f"line {part.name}" for part in lines if not cases_of(part)]
-    return [*bare, *(f"{kind} {id}" for kind in every for id in sorted(every[kind] - shown[kind]))]
+    missing = [f"line {part.name}" for part in parts() if not cases_of(part)]
+    references = {path.stem for path in (ROOT / "reference").glob("*.py")} - {"__init__"}
+    kinds = {"case": (CASES, cases_of), "mutant": (mutants.of("cases"), mutants_of), "claim": (claims(), claims_of),
+             "reference": (references, references_at)}
+    for kind, (every, shown) in kinds.items():
+        missing += [f"{kind} {id}" for id in sorted({*every}.difference(*map(shown, parts())))]
+    return missing
 
 
 def text() -> str:
@@ -237,7 +238,6 @@ def text() -> str:
 
 def main() -> int:
     """Write the page; 1 where something is missing in a column, which is told."""
-    from verification.kernel.driver import load
     load()
     FILE.write_text(text(), encoding="utf-8")
     missing = [*orphans(), *(f"case {id}: not with every order, and no reason why" for id in unexplained())]

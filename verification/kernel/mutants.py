@@ -34,14 +34,12 @@ from pathlib import Path
 
 from verification.kernel import writing
 from verification.kernel.case import CASES, STAGES, Result
+from verification.kernel.case import load as load_cases
+from verification.kernel.case import run as run_case
 from verification.kernel.trying import ENDED, ROOT, copied, run
 
 #: The names that it exports come from modules that cases import by themselves.
 API = ROOT / "repro" / "__init__.py"
-
-
-def _files(folders: Iterable[Path]) -> list[Path]:
-    return [path for folder in folders for path in folder.rglob("*.py")]
 
 
 def reached(files: Iterable[Path]) -> set[Path]:
@@ -60,17 +58,13 @@ def reached(files: Iterable[Path]) -> set[Path]:
 def imported(path: Path) -> Iterator[Path]:
     """Files of this project that a file imports, inside functions too."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        names = [alias.name for alias in node.names] if isinstance(node, ast.Import | ast.ImportFrom) else []
-        if isinstance(node, ast.ImportFrom):
-            names = [node.module or "", *(f"{node.module}.{name}" for name in names)]
-        for name in names:
-            module = ROOT.joinpath(*name.split("."))
-            yield from (file for file in (module.with_suffix(".py"), module / "__init__.py") if file.is_file())
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            package = ROOT.joinpath(*(getattr(node, "module", None) or "").split("."))
+            for module in (package, *(package.joinpath(*alias.name.split(".")) for alias in node.names)):
+                yield from filter(Path.is_file, (module.with_suffix(".py"), module / "__init__.py"))
 
 
 RECORD = ROOT / "verification" / "report" / "mutants.json"
-#: Mutants of what users read, which tests catch.
-RESULTS = "results"
 #: What of the mutants catches them.
 CATCHERS = ("cases", "tests")
 #: How the error of a test begins that is a catch: an assertion, `pytest.raises`, a guard.
@@ -132,12 +126,11 @@ class Hunt:
 
 
 def load() -> dict[str, tuple[Mutant, ...]]:
-    """Mutants by stage. Raises MutantError where an id is used twice."""
-    modules = {**{stage: f"verification.{stage}.mutants" for stage in STAGES}, RESULTS: "verification.mutants"}
-    found = {stage: import_module(module).MUTANTS for stage, module in modules.items()}
+    """Mutants by stage, and those of "results", what users read. Raises MutantError where an id is used twice."""
+    found = {stage: import_module(f"verification.{stage}.mutants").MUTANTS for stage in STAGES}
+    found["results"] = import_module("verification.mutants").MUTANTS
     ids = [mutant.id for mutants in found.values() for mutant in mutants]
-    twice = {id for id in ids if ids.count(id) > 1}
-    if twice:
+    if twice := {id for id in ids if ids.count(id) > 1}:
         raise MutantError(f"used twice: {', '.join(sorted(twice))}")
     return found
 
@@ -193,7 +186,8 @@ def trial(there: Path, case: str) -> Trial:
 def tested(there: Path, test: str) -> Trial:
     """Run one test in the copy, in a process of its own."""
     found = run(there, [test], LONGEST)
-    for _, how in found.failures[:1]:
+    if found.failures:
+        _, how = found.failures[0]
         caught = how.startswith(CATCH)
         return Trial(test, caught, how if caught else f"broken: {how}")
     if found.status in ENDED:
@@ -204,12 +198,10 @@ def tested(there: Path, test: str) -> Trial:
 def examine(id: str) -> None:
     """Run a case with the code of the present folder and print, as JSON, whether it is caught and how."""
     import repro
-    from verification.kernel.case import run
-    from verification.kernel.driver import load as load_cases
     if Path(repro.__file__).parents[1] != Path.cwd():
         raise MutantError(f"repro is imported from {repro.__file__}, not from the copy with the mutant")
     load_cases()
-    print(json.dumps(judged(run(CASES[id]))))
+    print(json.dumps(judged(run_case(CASES[id]))))
 
 
 def judged(result: Result) -> tuple[bool, str]:
@@ -225,7 +217,6 @@ def judged(result: Result) -> tuple[bool, str]:
 
 def main(arguments: list[str] | None = None) -> int:
     """Entry point; 0 if every mutant is caught, and no case that was run passes with a mutant that it names."""
-    from verification.kernel.driver import load as load_cases
     load_cases()
     parser = argparse.ArgumentParser(prog="python -m verification.mutants", description=__doc__.splitlines()[0])
     parser.add_argument("ids", nargs="*", metavar="MUTANT", help="all by default")
@@ -257,11 +248,11 @@ def _lines(found: Hunt) -> list[str]:
 
 def judge(hunts: list[Hunt]) -> bool:
     """Print what is wrong, if anything; is every mutant caught, and by every case that names it?"""
-    survivors = [found.mutant for found in hunts if not found.caught_by]
-    missed = [f"{case} passes with {found.mutant}, which it names" for found in hunts for case in found.missed_by]
-    print("\n".join([f"survives: {id}" for id in survivors] + missed
-                    + [f"{len(hunts) - len(survivors)} of {len(hunts)} mutants caught."]))
-    return bool(hunts) and not survivors and not missed
+    wrong = [f"survives: {found.mutant}" for found in hunts if not found.caught_by]
+    count = f"{len(hunts) - len(wrong)} of {len(hunts)} mutants caught."
+    wrong += [f"{case} passes with {found.mutant}, which it names" for found in hunts for case in found.missed_by]
+    print("\n".join([*wrong, count]))
+    return bool(hunts) and not wrong
 
 
 def record(hunts: list[Hunt]) -> None:
@@ -271,9 +262,9 @@ def record(hunts: list[Hunt]) -> None:
     if not whole:
         return
     before = _read()
-    new = {id: caught.get(id, before["caught"].get(id, [])) for id in everything()}
+    known = {**before["caught"], **caught}
     codes = {**before["code"], **{catchers: code(catchers) for catchers in whole}}
-    writing.save({"code": codes, "caught": new}, RECORD)
+    writing.save({"code": codes, "caught": {id: known.get(id, []) for id in everything()}}, RECORD)
 
 
 def _read() -> dict[str, dict]:
@@ -292,12 +283,14 @@ def code(catchers: str) -> str:
     name, and for what they reach of the code."""
     digest = hashlib.sha256()
     if catchers == "tests":
-        named = {ROOT / test.partition("::")[0] for mutant in of("tests").values() for test in mutant.tests}
-        found, known = reached(named), {ROOT / "repro", ROOT / "tests"}
+        files = {ROOT / test.partition("::")[0] for mutant in of("tests").values() for test in mutant.tests}
+        folders = {ROOT / "repro", ROOT / "tests"}
     else:
-        cases = [ROOT / "reference", *(ROOT / "verification" / stage for stage in STAGES)]
-        found, known = reached(_files(cases)), {ROOT / "repro", ROOT / "verification" / "problems", *cases}
-    for path in sorted(path for path in found if not known.isdisjoint(path.parents)):
-        digest.update(path.relative_to(ROOT).as_posix().encode() + path.read_bytes())
+        cases = {ROOT / "reference", *(ROOT / "verification" / stage for stage in STAGES)}
+        files = {path for folder in cases for path in folder.rglob("*.py")}
+        folders = {ROOT / "repro", ROOT / "verification" / "problems", *cases}
+    for path in sorted(reached(files)):
+        if not folders.isdisjoint(path.parents):
+            digest.update(path.relative_to(ROOT).as_posix().encode() + path.read_bytes())
     return digest.hexdigest()[:16]
 

@@ -14,9 +14,12 @@ from __future__ import annotations
 
 import ast
 import re
+from collections import Counter
 from dataclasses import dataclass, replace
 from functools import cache
+from heapq import nlargest
 from itertools import islice
+from operator import itemgetter
 from typing import Any
 
 from verification.kernel.trying import ROOT
@@ -73,17 +76,15 @@ def sample() -> list[Mutant]:
 
 def statements(text: str) -> int:
     """Statements of a module, docstrings not counted."""
-    nodes = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.stmt)]
-    return sum(not (isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)) for node in nodes)
+    return sum(isinstance(node, ast.stmt) and not (isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant))
+               for node in ast.walk(ast.parse(text)))
 
 
 def shared(sizes: dict[str, int], most: dict[str, int]) -> dict[str, int]:
     """COUNT in proportion to sizes, one at least and no more than there are, by largest remainders."""
-    shares = dict.fromkeys(sizes, 1)
-    for _ in range(COUNT - len(shares)):
-        free = [name for name in shares if shares[name] < most[name]]
-        shares[max(free, key=lambda name: sizes[name] / (shares[name] + 0.5))] += 1
-    return shares
+    seats = [(name, sizes[name] / (taken + 0.5)) for name in most for taken in range(1, most[name])]
+    more = nlargest(COUNT - len(most), seats, key=itemgetter(1))
+    return Counter([*most, *(name for name, _ in more)])
 
 
 def _places(file: str, text: str) -> dict[tuple[int, int], list[Mutant]]:

@@ -10,15 +10,13 @@ What is committed of a hunt: ``report/sampled.json``, the rows, and ``report/sam
 
 from __future__ import annotations
 
-import os
 import time
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
-from itertools import count
+from importlib.util import cache_from_source
+from itertools import accumulate, chain
 from pathlib import Path
-
-import numpy as np
 
 from verification.kernel import writing
 from verification.kernel.trying import ENDED, ROOT, Ran, copied, run
@@ -133,7 +131,8 @@ def tried(mutant: Mutant, there: Path, reach: Reach, whole: bool, before: str) -
 
 
 def _verdict(row: Row, found: Ran, usual: dict[str, float], limit: float) -> Row:
-    for test, how in found.failures[:1]:
+    if found.failures:
+        test, how = found.failures[0]
         return replace(row, verdict="caught", test=test, how=how.strip().splitlines()[-1].strip()[-160:])
     if found.status in ENDED:
         test = found.last["starts"]
@@ -156,18 +155,14 @@ def confirm(rows: list[Row]) -> None:
 
 def within(tests: list[Measured], limit: float) -> list[Measured]:
     """The cheapest tests that together take no longer than a limit; one at least."""
-    costs = np.cumsum([test.seconds for test in tests])
-    return tests[:max(1, int(np.searchsorted(costs, limit, "right")))]
-
-
-_STAMPS = count(10**9)
+    costs = accumulate(test.seconds for test in tests)
+    return [test for test, cost in zip(tests, costs) if cost <= limit] or tests[:1]
 
 
 def put(path: Path, text: str) -> None:
-    """Write a module with a time of change that no compiled form of it has."""
-    stamp = next(_STAMPS)
+    """Write a module, and remove what was compiled of it before."""
     path.write_text(text, encoding="utf-8")
-    os.utime(path, (stamp, stamp))
+    Path(cache_from_source(path)).unlink(missing_ok=True)
 
 
 #: Survivors that no test can tell from the code, each with the reason, by (file of repro/, line or lines as they are,
@@ -252,19 +247,22 @@ def key(row: Row) -> tuple[str, str, str]:
 def holds(found: dict[str, list[Row]]) -> bool:
     """Are 95 % of those not shown equivalent caught, and at most 10 % of all shown equivalent? What does not end is not
     counted as caught."""
-    total = sum(map(len, found.values()))
-    counted = total - len(found["equivalent"])
-    return bool(counted) and len(found["caught"]) >= CAUGHT * counted and len(found["equivalent"]) <= EXCUSED * total
+    caught, equivalent = shares(found)
+    return caught >= CAUGHT and equivalent <= EXCUSED
+
+
+def shares(found: dict[str, list[Row]]) -> tuple[float, float]:
+    """The share that is caught of those not shown equivalent, and that of these of all."""
+    total, equivalent = sum(map(len, found.values())), len(found["equivalent"])
+    return len(found["caught"]) / max(total - equivalent, 1), equivalent / max(total, 1)
 
 
 def told(found: dict[str, list[Row]], wanted: int) -> str:
     """The numbers in one sentence or two."""
     total = sum(map(len, found.values()))
-    counted = total - len(found["equivalent"])
-    share = 100 * len(found["caught"]) / counted if counted else 0.0
     return (f"{total} of {wanted} mutants tried, seed {SEED}: {len(found['caught'])} caught, {len(found['timeout'])} "
             f"without end (timeouts), {len(found['survivor'])} survive, {len(found['equivalent'])} shown equivalent. "
-            f"Caught of those not shown equivalent: {share:.1f} % (at least {100 * CAUGHT:g} %).")
+            f"Caught of those not shown equivalent: {100 * shares(found)[0]:.1f} % (at least {100 * CAUGHT:g} %).")
 
 
 def record(rows: list[Row], wanted: int) -> int:
@@ -275,20 +273,22 @@ def record(rows: list[Row], wanted: int) -> int:
         print(f"{row.verdict}: {row.file}:{row.line}: {row.old!r} -> {row.new!r} {row.how}")
     if len(rows) == wanted:
         writing.save({"seed": SEED, "mutants": [asdict(row) for row in rows]}, RECORD)
-        PAGE.write_text(text(rows, wanted), encoding="utf-8")
+        PAGE.write_text(text(found), encoding="utf-8")
     return 0 if holds(found) and len(rows) == wanted else 1
 
 
-def text(rows: list[Row], wanted: int) -> str:
-    """The page."""
-    found = judged(rows)
+def text(found: dict[str, list[Row]]) -> str:
+    """The page, of a sample that was tried whole."""
+    drawn = Counter(row.file for row in chain(*found.values()))
+    caught = Counter(row.file for row in found["caught"])
     survivors = [(*_changed(row), *LEFT.get(key(row), ("", "")), f"{row.tried} of {row.reached}")
                  for row in found["survivor"]]
     equivalent = [(*_changed(row), EQUIVALENT[key(row)]) for row in found["equivalent"]]
-    blocks = [Block("text", INTRODUCTION), Block("text", told(found, wanted)),
+    counts = [(file, str(drawn[file]), str(caught[file])) for file in sorted(drawn)]
+    blocks = [Block("text", INTRODUCTION), Block("text", told(found, drawn.total())),
               *_section("Survivors", survivors, "effect", "why no test", "tests run"),
               *_section("Shown equivalent", equivalent, "why"),
-              Block("heading", "By module"), table(("module", "mutants", "caught"), _counts(rows))]
+              Block("heading", "By module"), table(("module", "mutants", "caught"), counts)]
     return f"# Mutants made by machine\n\n{markdown(blocks, level=2)}\n"
 
 
@@ -300,13 +300,6 @@ def _section(title: str, rows: list[tuple[str, ...]], *more: str) -> list[Block]
 def _changed(row: Row) -> tuple[str, str, str]:
     """Where, from what and to what."""
     return f"{row.file}:{row.line}", f"`{row.old}`", f"`{row.new}`"
-
-
-def _counts(rows: list[Row]) -> list[tuple[str, str, str]]:
-    """How many of each module are drawn, and caught; each is in the record."""
-    drawn = Counter(row.file for row in rows)
-    caught = Counter(row.file for row in rows if row.verdict == "caught")
-    return [(file, str(drawn[file]), str(caught[file])) for file in sorted(drawn)]
 
 
 INTRODUCTION = (
