@@ -14,16 +14,14 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from itertools import product, starmap
-from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 
 import repro
 from verification.kernel import mutants
 from verification.kernel.case import CASES, STAGES, WAYS, Case, load
-from verification.kernel.writing import Block, markdown, table
+from verification.kernel.writing import REPORT, ROOT, Block, markdown, table
 
-ROOT = Path(__file__).parents[2]
-FILE = ROOT / "verification" / "report" / "matrix.md"
+FILE = REPORT / "matrix.md"
 ORDERS, PRESETS = WAYS[:3], WAYS[3:]
 #: Why a case does not run with presets, and with all of them.
 ALONE = "presets: the stage alone, with the elements that they choose"

@@ -36,7 +36,8 @@ from verification.kernel import writing
 from verification.kernel.case import CASES, STAGES, Result
 from verification.kernel.case import load as load_cases
 from verification.kernel.case import run as run_case
-from verification.kernel.trying import ENDED, ROOT, copied, run
+from verification.kernel.trying import ENDED, copied, run
+from verification.kernel.writing import REPORT, ROOT
 
 #: The names that it exports come from modules that cases import by themselves.
 API = ROOT / "repro" / "__init__.py"
@@ -64,7 +65,7 @@ def imported(path: Path) -> Iterator[Path]:
                 yield from filter(Path.is_file, (module.with_suffix(".py"), module / "__init__.py"))
 
 
-RECORD = ROOT / "verification" / "report" / "mutants.json"
+RECORD = REPORT / "mutants.json"
 #: What of the mutants catches them.
 CATCHERS = ("cases", "tests")
 #: How the error of a test begins that is a catch: an assertion, `pytest.raises`, a guard.
@@ -145,9 +146,9 @@ def of(catchers: str) -> dict[str, Mutant]:
     return {id: mutant for id, mutant in everything().items() if bool(mutant.tests) == (catchers == "tests")}
 
 
-def mutated(mutant: Mutant, root: Path = ROOT) -> str:
+def mutated(mutant: Mutant) -> str:
     """The changed text of the file. Raises MutantError unless the text to change occurs exactly once."""
-    text = (root / mutant.file).read_text(encoding="utf-8")
+    text = (ROOT / mutant.file).read_text(encoding="utf-8")
     count = text.count(mutant.old)
     if count != 1 or mutant.old == mutant.new:
         raise MutantError(f"{mutant.id}: the text to change occurs {count} times in {mutant.file}, not once, or it "
@@ -187,7 +188,7 @@ def tested(there: Path, test: str) -> Trial:
     """Run one test in the copy, in a process of its own."""
     found = run(there, [test], LONGEST)
     if found.failures:
-        _, how = found.failures[0]
+        how = found.failures[0][1].partition("\n")[0]
         caught = how.startswith(CATCH)
         return Trial(test, caught, how if caught else f"broken: {how}")
     if found.status in ENDED:
@@ -219,13 +220,12 @@ def main(arguments: list[str] | None = None) -> int:
     """Entry point; 0 if every mutant is caught, and no case that was run passes with a mutant that it names."""
     load_cases()
     parser = argparse.ArgumentParser(prog="python -m verification.mutants", description=__doc__.splitlines()[0])
-    parser.add_argument("ids", nargs="*", metavar="MUTANT", help="all by default")
+    parser.add_argument("ids", nargs="*", metavar="MUTANT", choices=[*everything(), []], default=[],
+                        help="all by default")
     parser.add_argument("--every", action="store_true", help="against every case that names it, not to the first catch")
     parser.add_argument("--tests", action="store_true", help="those alone that tests catch, not cases")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes; one a core by default")
     chosen = parser.parse_args(arguments)
-    if unknown := sorted(set(chosen.ids) - set(everything())):
-        parser.error(f"there is no {', '.join(unknown)}; there are {', '.join(everything())}")
     hunts = hunt_all(chosen.ids or (of("tests") if chosen.tests else everything()), chosen.jobs, chosen.every)
     record(hunts)
     return 0 if judge(hunts) else 1
@@ -237,13 +237,10 @@ def hunt_all(ids: Iterable[str], jobs: int, every: bool = False) -> list[Hunt]:
     with ThreadPoolExecutor(jobs) as pool:
         for found in pool.map(lambda id: hunt(known[id], every), ids):
             hunts.append(found)
-            print("\n".join(_lines(found)), flush=True)
+            print(f"{'caught' if found.caught_by else 'SURVIVES':9} {found.mutant}")
+            for trial in found.trials:
+                print(f"{'':10}{trial.case}: {trial.how}", flush=True)
     return hunts
-
-
-def _lines(found: Hunt) -> list[str]:
-    verdict = "caught" if found.caught_by else "SURVIVES"
-    return [f"{verdict:9} {found.mutant}", *(f"{'':10}{trial.case}: {trial.how}" for trial in found.trials)]
 
 
 def judge(hunts: list[Hunt]) -> bool:

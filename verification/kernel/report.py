@@ -15,9 +15,8 @@ from pathlib import Path
 
 from verification.kernel import matrix, mutants
 from verification.kernel.case import CASES, WAYS, Outcome, Result
-from verification.kernel.writing import Block, link, markdown, save, table
+from verification.kernel.writing import REPORT, Block, link, markdown, save, table
 
-FOLDER = Path(__file__).parents[1] / "report"
 TITLES = {"flow": "Flow (2.1, 3.2)", "transport": "Substrates (2.2, 3.3)", "growth": "Growth mechanics (2.3, 3.4)",
           "reprojection": "Reprojection and transfer (3.4, 3.5)", "mesh_motion": "Mesh motion (3.5)",
           "coupling": "Coupling", "hard": "Hard cases"}
@@ -46,14 +45,13 @@ def summary(results: list[Result]) -> str:
     return f"{sum(result.holds for result in results)} of {len(results)} cases pass; {numbers} numbers judged."
 
 
-def write(results: list[Result], folder: Path = FOLDER) -> Path:
+def write(results: list[Result]) -> Path:
     """Write the report of a whole run; returns the path of its first page."""
-    folder.mkdir(exist_ok=True)
     for name, text in texts(results).items():
-        (folder / name).write_text(text, encoding="utf-8")
+        (REPORT / name).write_text(text, encoding="utf-8")
     cases = {result.id: _live(result) for result in results}
-    save({"environment": environment(), "cases": cases}, folder / "live" / "measured.json")
-    return folder / "REPORT.md"
+    save({"environment": environment(), "cases": cases}, REPORT / "live" / "measured.json")
+    return REPORT / "REPORT.md"
 
 
 def texts(results: list[Result]) -> dict[str, str]:

@@ -18,9 +18,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from verification.kernel.writing import lines
+from verification.kernel.writing import ROOT, lines
 
-ROOT = Path(__file__).parents[2]
 TRACER = Path(__file__).parent / "tracer"
 NOT_COPIED = (".git", ".venv", "__pycache__", "live", "out", "cache", "dist", "build", "*.egg-info", ".*_cache")
 #: What pytest ends with where no test that it collected fails: all pass, or there is none to run.
@@ -82,8 +81,8 @@ def run(there: Path, tests: Iterable[str], limit: float, every: bool = False, tr
     reach = {"REACH_FILE": str(beside / "calls"), "REACH_ROOT": str(there / "repro")} if traced else {}
     began = time.monotonic()
     child = subprocess.Popen(
-        [*SHELL, sys.executable, "-m", "pytest", *(() if every else ("-x",)), "-q", "-n0", "-p", "no:cacheprovider",
-         "-p", "telling", "--tb=line", *files], cwd=there, env={**os.environ, **paths, **reach},
+        [*SHELL, sys.executable, "-m", "pytest", *(() if every else ("-x",)), "-n0", "-p", "no:cacheprovider", "-p",
+         "telling", "--tb=line", *files], cwd=there, env={**os.environ, **paths, **reach},
         stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
     status = _waited(child, limit * PATIENCE)
     return Ran(lines(beside / "told"), status, time.monotonic() - began)

@@ -11,11 +11,15 @@ from verification.sampled import drawing, hunting, reach
 
 def main(arguments: list[str] | None = None) -> int:
     """Entry point; 0 if as many mutants are caught as are to be, of those not shown equivalent."""
-    chosen = _parser().parse_args(arguments)
+    about = "Mutants made by machine, a sample of them from all of repro/, against the tests that reach them."
+    parser = argparse.ArgumentParser(prog="python -m verification.sampled", description=about)
+    parser.add_argument("--whole", action="store_true",
+                        help=f"survivors against all tests that reach them too, for {hunting.HOURS:g} h at most")
+    parser.add_argument("--jobs", type=int, default=1, help="processes; one by default")
+    chosen = parser.parse_args(arguments)
     if not importlib.util.find_spec("cosmic_ray"):
-        print("sampled: cosmic-ray is needed, which `make mutants-sampled` installs from "
-              "verification/sampled/requirements.lock", file=sys.stderr)
-        return 2
+        parser.error("cosmic-ray is needed, which `make mutants-sampled` installs from "
+                     "verification/sampled/requirements.lock")
     sample = drawing.sample()
     known = reach.measured()
     hunting.hunt(sample, known, chosen.jobs)
@@ -23,15 +27,6 @@ def main(arguments: list[str] | None = None) -> int:
         hunting.hunt(sample, known, chosen.jobs, whole=True)
     hunting.confirm(hunting.rows_of(sample))
     return hunting.record(hunting.rows_of(sample), len(sample))
-
-
-def _parser() -> argparse.ArgumentParser:
-    about = "Mutants made by machine, a sample of them from all of repro/, against the tests that reach them."
-    parser = argparse.ArgumentParser(prog="python -m verification.sampled", description=about)
-    parser.add_argument("--whole", action="store_true",
-                        help=f"survivors against all tests that reach them too, for {hunting.HOURS:g} h at most")
-    parser.add_argument("--jobs", type=int, default=1, help="processes; one by default")
-    return parser
 
 
 if __name__ == "__main__":

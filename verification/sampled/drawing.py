@@ -13,7 +13,6 @@ texts of messages are strings, which no operator changes.
 from __future__ import annotations
 
 import ast
-import re
 from collections import Counter
 from dataclasses import dataclass, replace
 from functools import cache
@@ -22,22 +21,20 @@ from itertools import islice
 from operator import itemgetter
 from typing import Any
 
-from verification.kernel.trying import ROOT
+from verification.kernel.writing import ROOT
 from verification.sampled.reach import digest
 
 SEED = 2001
 COUNT = 210
-_ARITHMETIC = {"Add", "Sub", "Mul", "Div", "FloorDiv", "Mod", "Pow"}
-_ORDER = {"Eq", "NotEq", "Lt", "LtE", "Gt", "GtE"}
-_SETS = {"BitOr", "BitAnd", "BitXor"}
-#: Replacements that are made, of "X" by "Y"; by cosmic-ray's names.
-_ALIKE = (_ARITHMETIC, _ORDER, _SETS, {"Is", "IsNot"})
+#: Replacements that are made, of "X" by "Y", where both are arithmetic, of order, of sets or of identity; by
+#: cosmic-ray's names.
+_ALIKE = ({"Add", "Sub", "Mul", "Div", "FloorDiv", "Mod", "Pow"}, {"Eq", "NotEq", "Lt", "LtE", "Gt", "GtE"},
+          {"BitOr", "BitAnd", "BitXor"}, {"Is", "IsNot"})
 _ALONE = {"AddNot", "ReplaceTrueWithFalse", "ReplaceFalseWithTrue", "ReplaceAndWithOr", "ReplaceOrWithAnd",
           "ReplaceBreakWithContinue", "ReplaceContinueWithBreak", "ExceptionReplacer", "NumberReplacer",
           "RemoveDecorator", "ZeroIterationForLoop", "ReplaceUnaryOperator_Delete_USub",
           "ReplaceUnaryOperator_Delete_Not", "ReplaceUnaryOperator_Delete_Invert",
           "ReplaceBinaryOperator_MatMult_Mul"}
-_PAIR = re.compile(r"Replace(?:Binary|Comparison)Operator_([A-Za-z]+)_([A-Za-z]+)")
 
 
 @dataclass(frozen=True)
@@ -110,8 +107,8 @@ def _operators() -> dict[str, Any]:
 
 
 def _alike(name: str) -> bool:
-    pair = _PAIR.fullmatch(name)
-    return bool(pair) and any({*pair.groups()} <= alike for alike in _ALIKE)
+    pair = {*name.split("_")[1:]}
+    return bool(pair) and any(map(pair.issubset, _ALIKE))
 
 
 def _hidden(text: str) -> list[tuple[tuple[int, int], tuple[int, int]]]:

@@ -19,13 +19,13 @@ from itertools import accumulate, chain
 from pathlib import Path
 
 from verification.kernel import writing
-from verification.kernel.trying import ENDED, ROOT, Ran, copied, run
-from verification.kernel.writing import Block, append, lines, markdown, table
+from verification.kernel.trying import ENDED, Ran, copied, run
+from verification.kernel.writing import REPORT, Block, append, lines, markdown, table
 from verification.sampled.drawing import SEED, Mutant, mutated, sources
 from verification.sampled.reach import LIVE, Measured, Reach, digest
 
 KEPT = LIVE / "sampled.jsonl"
-RECORD = ROOT / "verification" / "report" / "sampled.json"
+RECORD = REPORT / "sampled.json"
 #: Hours that a round of trials may take, at a release.
 HOURS = 4.0
 #: Seconds of processor time of a mutant's first trial, and of a survivor's second one.
@@ -117,7 +117,7 @@ def tried(mutant: Mutant, there: Path, reach: Reach, whole: bool, before: str) -
     limit = WHOLE if whole else LIMIT
     path, text = there / "repro" / mutant.file, sources()[mutant.file]
     tests = reach.of(mutant.file, text, mutant.line, whole)
-    chosen = [test.id for test in (tests if whole else within(tests, limit))]
+    chosen = [test.id for test in (tests if whole else within(tests))]
     alone = before in {test.id for test in tests}
     put(path, mutated(text, mutant))
     found = run(there, [before] if alone else chosen, limit)
@@ -153,10 +153,10 @@ def confirm(rows: list[Row]) -> None:
             _write(replace(row, verdict="survivor", how=how) if row.test in failed else replace(row, sure=True))
 
 
-def within(tests: list[Measured], limit: float) -> list[Measured]:
-    """The cheapest tests that together take no longer than a limit; one at least."""
+def within(tests: list[Measured]) -> list[Measured]:
+    """The cheapest tests that together take no longer than LIMIT; one at least."""
     costs = accumulate(test.seconds for test in tests)
-    return [test for test, cost in zip(tests, costs) if cost <= limit] or tests[:1]
+    return [test for test, cost in zip(tests, costs) if cost <= LIMIT] or tests[:1]
 
 
 def put(path: Path, text: str) -> None:

@@ -14,16 +14,15 @@ from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
 
-from verification.kernel.trying import ROOT, copied, run
-from verification.kernel.writing import append, lines
+from verification.kernel.trying import copied, run
+from verification.kernel.writing import REPORT, ROOT, append, lines
 
-LIVE = ROOT / "verification" / "report" / "live"
+LIVE = REPORT / "live"
 MAP = LIVE / "sampled-reach.jsonl"
 #: Tests of what the code's text is, not of what it does: any change of it is one to them.
 OF_TEXT = {"test_mutants.py", "test_architecture.py", "test_published.py", "test_sampled.py"}
 #: Seconds of processor time that one file of tests may take, traced.
 LONGEST = 900
-
 
 #: A function: the file in repro/ and its qualified name.
 Call = tuple[str, str]
