@@ -75,13 +75,13 @@ def test_mutants_are_caught_survive_or_do_not_end_and_calls_are_seen(tmp_path):
                      "left": [["tests/test_m.py::test_small"], ""]}
     names = {}
     for id, made in calls.items():
-        names[id.rpartition("::")[2]] = {name for _, name in made}
+        names[id.rpartition("::")[2]] = {call.partition("\t")[2] for call in made}
     assert names.keys() == {"test_small", "test_box", "test_waits"}
     assert "small" in names["test_small"] and "Box.twice" not in names["test_small"]
     assert {"Box.twice", "Box.twice.<locals>.<listcomp>"} <= names["test_box"] and "small" not in names["test_box"]
 
 
-TIMED = Measured("q", 1.0, frozenset({("timing.py", "timed")}))
+TIMED = Measured("q", 1.0, frozenset({"timing.py\ttimed"}))
 ROW = Row("n", "timing.py", 1, "o", "x = 1", "x = 2", drawing.digest(drawing.sources()["timing.py"]), "caught",
           TIMED.id)
 

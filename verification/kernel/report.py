@@ -122,9 +122,8 @@ def shared(names: list[str]) -> str:
         begins.setdefault(name.partition(", ")[0], []).append(name)
     lists: dict[str, list[str]] = {}
     for first, alike in begins.items():
-        single = len(alike) == 1
-        rest = "" if single else listed([name[len(first) + 2:] for name in alike])
-        lists.setdefault(rest, []).append(alike[0] if single else first)
+        rest = listed([name[len(first) + 2:] for name in alike]) if len(alike) > 1 else ""
+        lists.setdefault(rest, []).append(first if rest else alike[0])
     return " / ".join(f"{', '.join(firsts)}: {rest}" if rest else " / ".join(firsts) for rest, firsts in lists.items())
 
 

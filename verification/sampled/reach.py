@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
 
-from verification.kernel.trying import copied, run
+from verification.kernel.trying import Ran, copied, run
 from verification.kernel.writing import REPORT, ROOT, append, lines
 
 LIVE = REPORT / "live"
@@ -24,17 +24,15 @@ OF_TEXT = {"test_mutants.py", "test_architecture.py", "test_published.py", "test
 #: Seconds of processor time that one file of tests may take, traced.
 LONGEST = 900
 
-#: A function: the file in repro/ and its qualified name.
-Call = tuple[str, str]
-
 
 @dataclass(frozen=True)
 class Measured:
-    """A test: its file and name, seconds with the fixtures that it shares, (file, function) that it calls."""
+    """A test: its file and name, seconds with the fixtures that it shares, and the functions that it calls: of each the
+    file in repro/ and the qualified name, a tab between them."""
 
     id: str
     seconds: float
-    calls: frozenset[Call] = field(repr=False)
+    calls: frozenset[str] = field(repr=False)
 
 
 @dataclass(frozen=True)
@@ -44,7 +42,7 @@ class Reach:
     tests: tuple[Measured, ...]
 
     @cached_property
-    def calls(self) -> frozenset[Call]:
+    def calls(self) -> frozenset[str]:
         """All functions that they call."""
         return frozenset().union(*(test.calls for test in self.tests))
 
@@ -55,12 +53,13 @@ class Reach:
         inside = functions(source, line)
         if whole and not inside:
             return list(self.tests)
-        calls = {(file, inside[-1])} if inside else self._naming(file, defined(source, line))
+        calls = {f"{file}\t{inside[-1]}"} if inside else self._naming(file, defined(source, line))
         return [test for test in self.tests if test.calls & calls] or list(self.tests)
 
-    def _naming(self, file: str, names: set[str]) -> set[Call]:
+    def _naming(self, file: str, names: set[str]) -> set[str]:
         """Functions of the code defined in, or naming, one of some names of a file."""
-        return {(other, name) for other, name in self.calls
+        split = (call.split("\t") for call in self.calls)
+        return {f"{other}\t{name}" for other, name in split
                 if (other == file and name.split(".")[0] in names) or names & mentioned(other).get(name, set())}
 
 
@@ -111,35 +110,42 @@ def measured() -> Reach:
     paths = [path for path in sorted((ROOT / "tests").glob("test_*.py")) if path.name not in OF_TEXT]
     wanted = {digest(path.name, path.read_text(encoding="utf-8")): path for path in paths}
     with copied() as there:
-        for of in wanted.keys() - kept:
-            kept[of] = measure(there, wanted[of].name)
-            append({"digest": of, "tests": kept[of]}, MAP)
-            print(f"reach: {wanted[of].name}: {len(kept[of])} tests", flush=True)
-    tests = [_read(id, *row) for of in wanted for id, row in kept[of].items()]
+        for of, path in wanted.items():
+            if of not in kept:
+                kept[of] = measure(there, path.name)
+                append({"digest": of, "tests": kept[of]}, MAP)
+                print(f"reach: {path.name}: {len(kept[of])} tests", flush=True)
+    tests = [Measured(id, seconds, frozenset(calls)) for of in wanted for id, (seconds, calls) in kept[of].items()]
     return Reach(tuple(sorted(tests, key=lambda test: test.seconds)))
 
 
-def _read(id: str, seconds: float, calls: list[list[str]]) -> Measured:
-    return Measured(id, seconds, frozenset(map(tuple, calls)))
-
-
-def measure(there: Path, name: str) -> dict[str, tuple[float, list[Call]]]:
-    """{test: (seconds, [(file, function), ...])} of the tests of a file that pass, by a run of it; the seconds of the
+def measure(there: Path, name: str) -> dict[str, tuple[float, list[str]]]:
+    """{test: (seconds, functions that it calls)} of the tests of a file that pass, by a run of it; the seconds of the
     dearest test that has a fixture with it, as any of them may be the one to make it."""
     ran = run(there, [f"tests/{name}"], LONGEST, every=True, traced=True)
     shared = {id: (id, *names) for row in ran.rows for id, names in row.get("collected", {}).items()}
-    own: Counter = Counter()
-    passed: Counter = Counter()
+    passed = Counter(row["test"] for row in ran.reports if row["outcome"] == "passed")
+    seconds = _seconds(ran, shared)
+    calls = _calls(there.parent / "calls")
+    return {id: (round(max(map(seconds.get, names)), 3), sorted(set().union(*map(calls.__getitem__, names))))
+            for id, names in shared.items() if passed[id] == 3}  # made ready, run, cleared away
+
+
+def _seconds(ran: Ran, shared: dict[str, tuple[str, ...]]) -> dict[str, float]:
+    """Seconds of each test, and of the dearest test with each fixture."""
+    found: Counter = Counter()
     for row in ran.reports:
-        own[row["test"]] += row["seconds"]
-        passed[row["test"]] += row["outcome"] == "passed"
-    dearest: dict[str, float] = defaultdict(float)
+        found[row["test"]] += row["seconds"]
     for id, names in shared.items():
         for name in names:
-            dearest[name] = max(dearest[name], own[id])
-    calls: dict[str, set[Call]] = defaultdict(set)
-    for line in (there.parent / "calls").read_text(encoding="utf-8").splitlines():
-        maker, file, function = line.split("\t")
-        calls[maker].add((file, function))
-    return {id: (round(max(map(dearest.__getitem__, names)), 3), sorted(set().union(*map(calls.__getitem__, names))))
-            for id, names in shared.items() if passed[id] == 3}  # made ready, run, cleared away
+            found[name] = max(found[name], found[id])
+    return found
+
+
+def _calls(file: Path) -> dict[str, set[str]]:
+    """Functions that each test, and each fixture, calls."""
+    found: dict[str, set[str]] = defaultdict(set)
+    for line in file.read_text(encoding="utf-8").splitlines():
+        maker, call = line.split("\t", 1)
+        found[maker].add(call)
+    return found
