@@ -12,7 +12,7 @@ from verification import hard, hard_cases, speed
 from verification.hard import common
 from verification.hard.common import PRESETS, REFUSED, RIGHT, WRONG, HardCase
 from verification.kernel import case
-from verification.kernel.case import Outcome, Result, at_most, outcome
+from verification.kernel.case import Outcome, Result, at_most
 
 GOOD, BAD = at_most("good", 0.5, 1.0, ""), at_most("bad", 2.0, 1.0, "")
 KNOWN = {case.number: case for case in hard.CASES}
@@ -57,7 +57,7 @@ def test_what_is_accepted(verdict, preset, refusable, fine):
     cells = {name: common.run_cell(chosen, name) for name in PRESETS}
     accepted = {name: not cell.unaccepted for name, cell in cells.items()}
     assert cells[preset].verdict == verdict and accepted[preset] is fine
-    found = outcome(common.measured(cell) for cell in cells.values())
+    found = Outcome(tuple(case.flat(common.measured(cell) for cell in cells.values())))
     assert Result("hard-99", found, "", 0.0).holds is all(accepted.values())
 
 
@@ -73,7 +73,7 @@ def test_there_are_twenty_two_verification_cases_and_only_some_may_refuse():
 def test_the_matrix_is_written_with_verdicts_apart_from_what_this_machine_has_measured(tmp_path, monkeypatch):
     cells = tuple(common.run_cell(a_case(RIGHT, REFUSED), preset) for preset in PRESETS)
     monkeypatch.setattr(hard_cases, "RECORD", tmp_path / "report" / "hard_cases.json")
-    hard_cases.record([Result("hard-99", Outcome(notes=cells), "", 0.0), Result("other", Outcome(), "", 0.0)])
+    hard_cases.record([Result("hard-99", Outcome(cells), "", 0.0), Result("other", Outcome(()), "", 0.0)])
     kept, live = (json.loads((hard_cases.RECORD.parent / folder / hard_cases.RECORD.name).read_text())
                   for folder in (".", "live"))
     verdicts, measured = (found["cases"][0]["cells"] for found in (kept, live))

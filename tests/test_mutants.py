@@ -4,7 +4,7 @@ import ast
 
 import pytest
 
-from verification.kernel import case, driver, mutants, report
+from verification.kernel import case, driver, mutants, report, trying
 from verification.kernel.case import Outcome, Result, at_most
 from verification.kernel.mutants import Hunt, Trial
 
@@ -55,8 +55,10 @@ def test_a_number_or_a_guard_catches_and_a_broken_mutant_does_not(value, error, 
     ("assert 1 == 2", True, "assert 1 == 2"), ("raise MeshError('no')", True, "repro.errors.MeshError: no"),
     ("wrong", False, "broken: NameError"), ("pass", False, "passes"), ("pass\ndel test_b", False, "broken")])
 def test_an_assertion_or_a_guard_catches_and_a_broken_or_absent_test_does_not(tmp_path, body, caught, how):
-    (tmp_path / "test_a.py").write_text(f"from repro.errors import MeshError\ndef test_b():\n    {body}\n")
-    found = mutants.tested(tmp_path, "test_a.py::test_b")
+    there = tmp_path / "project"
+    there.mkdir()
+    (there / "test_a.py").write_text(f"from repro.errors import MeshError\ndef test_b():\n    {body}\n")
+    found = mutants.tested(there, "test_a.py::test_b")
     assert found.caught is caught and found.how.startswith(how)
 
 
@@ -87,8 +89,7 @@ def test_a_mutant_is_caught_by_every_case_that_names_it(id):
     assert found.caught_by and not found.missed_by, found
 
 
-def test_the_code_itself_is_not_caught(monkeypatch, tmp_path):
+def test_the_code_itself_is_not_caught():
     """What catches is the mutant, and not what the copy lacks."""
-    monkeypatch.setattr(mutants, "mutated", lambda mutant: (mutants.ROOT / mutant.file).read_text(encoding="utf-8"))
-    mutants.copy(KNOWN["third-power"], tmp_path)
-    assert mutants.trial(tmp_path, "growth-stress").how == "passes"
+    with trying.copied() as there:
+        assert mutants.trial(there, "growth-stress").how == "passes"

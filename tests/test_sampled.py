@@ -9,7 +9,7 @@ import pytest
 from verification.sampled import drawing, hunting
 from verification.sampled.drawing import Mutant
 from verification.sampled.hunting import Row
-from verification.sampled.trying import Measured, Reach
+from verification.sampled.reach import Measured, Reach
 
 CODE = '''
 LIMIT = 3
@@ -37,7 +37,8 @@ def test_waits():
 #: A project of its own, tried as it is and with two mutants: what is caught, what is not, what does not end.
 TRIED = '''
 import json, pathlib, sys
-from verification.sampled import hunting, trying
+from verification.kernel import trying
+from verification.sampled import hunting, reach
 there = pathlib.Path(sys.argv[1]).resolve()
 module = there / "repro" / "m.py"
 code = module.read_text()
@@ -45,13 +46,14 @@ import repro  # of the checkout, where there is no m
 def run(tests, old="", new="", limit=30.0):
     hunting.put(module, code.replace(old, new))
     found = trying.run(there, ["tests/test_m.py::" + name for name in tests], limit)
-    return [found.failed, found.stopped]
+    ended = found.status in trying.ENDED
+    return [[test for test, _ in found.failures], found.last["starts"] if ended else ""]
 small, waits = ["test_small"], ["test_waits"]
 told = {"others": run(["test_waits", "test_box"], "< LIMIT", "> LIMIT"), "caught": run(small, "< LIMIT", "> LIMIT"),
         "survivor": run(small, "least < value", "least <= value"), "endless": run(waits, "< LIMIT", "<= LIMIT", 2.0),
         "left": run(["test_gone[3]"] + small, "< LIMIT", "> LIMIT")}
 hunting.put(module, code)
-told["reach"] = {id: calls for id, (_, calls) in trying._measure(there, "test_m.py").items()}
+told["reach"] = {id: calls for id, (_, calls) in reach.measure(there, "test_m.py").items()}
 print(json.dumps(told))
 '''
 
@@ -68,18 +70,18 @@ def test_mutants_are_caught_survive_or_do_not_end_and_calls_are_seen(tmp_path):
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout.splitlines()[-1])
     calls = found.pop("reach")
-    assert found == {"others": ["", ""], "caught": ["tests/test_m.py::test_small", ""], "survivor": ["", ""],
-                     "endless": ["", "tests/test_m.py::test_waits"],
-                     "left": ["tests/test_m.py::test_small", ""]}
+    assert found == {"others": [[], ""], "caught": [["tests/test_m.py::test_small"], ""], "survivor": [[], ""],
+                     "endless": [[], "tests/test_m.py::test_waits"],
+                     "left": [["tests/test_m.py::test_small"], ""]}
     names = {}
     for id, made in calls.items():
-        names[id.rpartition("::")[2]] = {name for _, name in made}
+        names[id.rpartition("::")[2]] = {call.partition("\t")[2] for call in made}
     assert names.keys() == {"test_small", "test_box", "test_waits"}
     assert "small" in names["test_small"] and "Box.twice" not in names["test_small"]
     assert {"Box.twice", "Box.twice.<locals>.<listcomp>"} <= names["test_box"] and "small" not in names["test_box"]
 
 
-TIMED = Measured("q", 1.0, frozenset({("timing.py", "timed")}))
+TIMED = Measured("q", 1.0, frozenset({"timing.py\ttimed"}))
 ROW = Row("n", "timing.py", 1, "o", "x = 1", "x = 2", drawing.digest(drawing.sources()["timing.py"]), "caught",
           TIMED.id)
 

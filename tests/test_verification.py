@@ -15,11 +15,11 @@ from verification.kernel.case import Outcome, Result, at_least, at_most, between
 
 SIZES = 0.5 ** np.arange(4)
 #: A case that nobody registers: what it measures, and of which variants.
-A_CASE = case.Case("x", "flow", "c", "exact", "n", ("m",), False, list)
+A_CASE = case.Case("x", "flow", "c", "exact", "n", ("m",), False, list, {}, (), "")
 
 
 def result(*checks, studies=(), error=""):
-    return Result("flow-plug", Outcome(checks, studies), error, 1.0)
+    return Result("flow-plug", Outcome((*checks, *studies)), error, 1.0)
 
 
 GOOD, BAD = (result(at_most("quantity A", value, 1.0, "theory")) for value in (0.5, 2.0))
@@ -34,7 +34,7 @@ def test_a_number_holds_in_its_range_alone(made, bounds, inside, outside):
 
 
 def test_a_case_passes_only_if_it_measures_something_and_all_of_it_holds():
-    good, bad = (one.outcome.checks[0] for one in (GOOD, BAD))
+    good, bad = (one.outcome.measured[0] for one in (GOOD, BAD))
     steep = study("e", SIZES, SIZES**3, 2, "")
     assert GOOD.holds
     for short in (result(good, bad), result(), result(good, error="ValueError"), result(good, studies=(steep,))):
@@ -58,7 +58,7 @@ def test_a_variant_that_stops_hides_no_other_and_is_named():
     chosen = replace(A_CASE, function=lambda value: [at_most("q", np.ones(1)[0] / value, 1.0, "")],
                      over={"none": (np.zeros(1)[0],), "two": (2,), "half": (0.5,), "also none": (0,)})
     found = case.run(chosen)
-    assert [(part.quantity, part.holds) for part in found.outcome.checks] == [("q, two", True), ("q, half", False)]
+    assert [(part.quantity, part.holds) for part in found.outcome.measured] == [("q, two", True), ("q, half", False)]
     assert found.error.startswith("none: Traceback") and "FloatingPointError" in found.error
     assert "\nalso none: Traceback" in found.error and not found.holds
 
@@ -112,7 +112,7 @@ def test_what_is_round_off_or_another_machines_is_not_committed():
     text = writing.markdown(report.article(BAD), 2)
     assert "FALLS SHORT" in text and "| quantity A (2) | at most 1 | theory | NO |" in text
     assert "seconds" not in text and "1.0 s" not in text
-    sizes = {path.name: path.stat().st_size for path in report.FOLDER.glob("*.md")}
+    sizes = {path.name: path.stat().st_size for path in writing.REPORT.glob("*.md")}
     assert {*sizes} == {"REPORT.md", "mutants.md", "matrix.md", "sampled.md", *(f"{s}.md" for s in case.STAGES)}
     assert sizes.pop("REPORT.md") <= 60_000 and max(sizes.values()) <= 40_000
 

@@ -11,9 +11,11 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from importlib import import_module
 from itertools import product
 from math import floor, inf, isfinite, log10
+from pkgutil import iter_modules
 from time import perf_counter
 from typing import Self
 
@@ -78,16 +80,12 @@ class Check(Quantity):
 
     @property
     def used(self) -> float:
-        """How much of its tolerance it uses: 0 to 1 where it holds, more than anything where it does not."""
-        if not self.holds:
-            return inf
+        """How much of its tolerance it uses, 0 to 1, if it holds: of a size, or of a number that should not be below
+        zero, the share of its bound."""
         if self._two_sided:
             return abs(self.value - self.low - self._tolerance) / self._tolerance
-        if isfinite(self.high):
-            return self.value / self.high if self.high else 0.0
-        if self.low < 0:
-            return max(0.0, self.value / self.low)
-        return self.low / self.value if self.value else 0.0
+        bound = self.high if isfinite(self.high) else self.low
+        return max(0.0, self.value / bound) if bound else 0.0
 
     @property
     def expected(self) -> str:
@@ -163,12 +161,10 @@ class Study(Quantity):
 
     @property
     def orders(self) -> np.ndarray:
-        """(k - 1,) log of the ratio of errors over log of the ratio of sizes; not-a-number where an error is not
-        positive and finite."""
-        good = np.isfinite(self.errors) & (np.asarray(self.errors) > 0)
-        logs = np.log(np.where(good, self.errors, 1.0))
-        slopes = np.diff(logs) / np.diff(np.log(self.sizes))
-        return np.where(good[1:] & good[:-1], slopes, np.nan)
+        """(k - 1,) log of the ratio of errors over log of the ratio of sizes; infinite or not-a-number where an error
+        is not positive and finite."""
+        with np.errstate(all="ignore"):
+            return np.diff(np.log(self.errors)) / np.diff(np.log(self.sizes))
 
     @property
     def holds(self) -> bool:
@@ -179,19 +175,14 @@ class Study(Quantity):
     @property
     def measured(self) -> str:
         """Orders to a tenth, and the last error to one digit."""
-        return f"{self.told}; last error {self._last}"
+        last = float(self.errors[-1])
+        known = isfinite(self.ceiling)
+        return f"{self.told}; last error {rounded(last, self.ceiling / 20) if known else f'{last:.0e}'}"
 
     @property
     def told(self) -> str:
         """Orders to a tenth: what another machine finds too."""
         return f"order {', '.join(f'{order:.1f}' for order in self.orders)}"
-
-    @property
-    def _last(self) -> str:
-        error = float(self.errors[-1])
-        if np.isfinite(self.ceiling):
-            return rounded(error, self.ceiling / 20)
-        return f"{error:.0e}"
 
     @property
     def expected(self) -> str:
@@ -264,16 +255,20 @@ class Note:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What a case has measured."""
+    """What a case has measured: checks, studies and notes."""
 
-    checks: tuple = ()
-    studies: tuple = ()
-    notes: tuple[Note, ...] = ()
+    parts: tuple
 
     @property
     def measured(self) -> tuple:
         """All that must hold: studies first."""
-        return (*self.studies, *self.checks)
+        judged = (part for part in self.parts if isinstance(part, Quantity))
+        return tuple(sorted(judged, key=lambda part: isinstance(part, Check)))
+
+    @property
+    def notes(self) -> tuple[Note, ...]:
+        """What is kept besides."""
+        return tuple(part for part in self.parts if isinstance(part, Note))
 
     def lines(self) -> list[Line]:
         """(quantity and what it is, expected, origin, holds) of each, as another machine finds them too."""
@@ -283,18 +278,8 @@ class Outcome:
                 for part in self.measured]
 
 
-def outcome(found: Iterable) -> Outcome:
-    """What a function of a case gives, as an Outcome: checks, studies and notes in any order, or lists of them."""
-    parts = tuple(flat(found))
-    return Outcome(*(_of(kind, parts) for kind in (Check, Study, Note)))
-
-
-def _of(kind: type, parts: tuple) -> tuple:
-    return tuple(part for part in parts if isinstance(part, kind))
-
-
 def flat(found) -> Iterator:
-    """All of it, one by one."""
+    """What a function of a case gives, one by one: checks, studies and notes in any order, or lists of them."""
     if isinstance(found, Quantity | Note):
         yield found
     else:
@@ -317,9 +302,9 @@ class Case:
     mutants: tuple[str, ...]
     slow: bool
     function: Callable
-    over: Mapping[str, tuple] = field(default_factory=dict)
-    ways: tuple[str, ...] = ()
-    because: str = ""
+    over: Mapping[str, tuple]
+    ways: tuple[str, ...]
+    because: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -343,6 +328,14 @@ class Result:
 
 
 CASES: dict[str, Case] = {}
+
+
+def load() -> None:
+    """Register the cases of every stage."""
+    for stage in STAGES:
+        package = import_module(f"verification.{stage}")
+        for module in iter_modules(package.__path__):
+            import_module(f"{package.__name__}.{module.name}")
 
 
 def combined(*axes: Mapping[str, object]) -> dict[str, tuple]:
@@ -386,4 +379,4 @@ def run(chosen: Case) -> Result:
                 found += [part.labelled(label) for part in flat(chosen.function(*arguments))]
         except Exception:
             errors += f"{label}{': ' * bool(label)}{traceback.format_exc(limit=-3)}"
-    return Result(chosen.id, outcome(found), errors, perf_counter() - start)
+    return Result(chosen.id, Outcome(tuple(found)), errors, perf_counter() - start)

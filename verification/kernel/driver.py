@@ -10,14 +10,14 @@ import os
 import sys
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from importlib import import_module
-from pkgutil import iter_modules
 
 from verification.kernel import case, report
+from verification.kernel.case import load
 
 
 def main(arguments: list[str] | None = None, writers: Iterable[Callable] = ()) -> int:
     """Entry point; returns the exit status. writers: what else writes of the results of a whole run, in turn."""
+    load()
     chosen = _parser().parse_args(arguments)
     results = run_all(selected(chosen.stages, chosen.case, chosen.fast), chosen.jobs)
     print(report.terminal(results))
@@ -32,7 +32,8 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m verification", description=__doc__.splitlines()[0])
     parser.add_argument("stages", nargs="*", metavar="STAGE", choices=[*case.STAGES, []], default=[],
                         help=f"{', '.join(case.STAGES)}; all by default")
-    parser.add_argument("--case", action="append", default=[], metavar="ID", help="this case alone; may be repeated")
+    parser.add_argument("--case", action="append", default=[], metavar="ID", choices=case.CASES,
+                        help="this case alone; may be repeated")
     parser.add_argument("--fast", action="store_true", help="without the cases that are marked as slow")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes; one a core by default")
     return parser
@@ -40,21 +41,9 @@ def _parser() -> argparse.ArgumentParser:
 
 def selected(stages, ids, fast: bool = False) -> list[str]:
     """Ids of the cases of some stages, or of some ids, in the order of the stages; all where both are empty."""
-    load()
-    unknown = [i for i in ids if i not in case.CASES]
-    if unknown:
-        sys.exit(f"no case {unknown[0]!r}; there are {', '.join(case.CASES)}")
     wanted = stages or (case.STAGES if not ids else ())
     ordered = sorted(case.CASES.values(), key=lambda c: case.STAGES.index(c.stage))
     return [c.id for c in ordered if (c.stage in wanted and not (fast and c.slow)) or c.id in ids]
-
-
-def load() -> None:
-    """Register the cases of every stage."""
-    for stage in case.STAGES:
-        package = import_module(f"verification.{stage}")
-        for module in iter_modules(package.__path__):
-            import_module(f"{package.__name__}.{module.name}")
 
 
 def run_all(ids: list[str], jobs: int) -> list[case.Result]:

@@ -10,20 +10,18 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from itertools import product, starmap
-from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 
 import repro
 from verification.kernel import mutants
-from verification.kernel.case import CASES, STAGES, WAYS, Case
-from verification.kernel.writing import Block, markdown, table
+from verification.kernel.case import CASES, STAGES, WAYS, Case, load
+from verification.kernel.writing import REPORT, ROOT, Block, markdown, table
 
-ROOT = Path(__file__).parents[2]
-FILE = ROOT / "verification" / "report" / "matrix.md"
+FILE = REPORT / "matrix.md"
 ORDERS, PRESETS = WAYS[:3], WAYS[3:]
 #: Why a case does not run with presets, and with all of them.
 ALONE = "presets: the stage alone, with the elements that they choose"
@@ -37,6 +35,8 @@ EXACT = {"flow": SAME, "transport": SAME,
 LINE = re.compile(r"^ {4,}(\S.*?)\s{3,}((?:\(\d+\)[-, ]*)+)?\s*(repro\.[\w.]+(?:, \.\w+)*)(?:[: ].*)?$")
 #: The sections at the start of its first part: "3.1, 3.5", "2.1-2.3".
 SECTIONS = re.compile(r"(?:Table 1|[\d.]+(?:-[\d.]+)?|, )*")
+#: Modules whose functions are followed to the references that they use.
+OURS = re.compile(r"verification\.(?!kernel)")
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def _part(name: str, equations: str, names: str) -> Part:
     first, *rest = names.split(", ")
     package = first if _file(first).endswith("/") else first.rpartition(".")[0]
     files = _file(first), *(_file(package + module) for module in rest)
-    places = (SECTIONS.match(name) or [""])[0].split(", ")
+    places = SECTIONS.match(name)[0].split(", ")
     sections = tuple(section for place in places for section in _ranged(place) if section)
     return Part(" ".join(name.split()), sections, equations.strip(" ,"), files)
 
@@ -121,10 +121,8 @@ def unexplained() -> list[str]:
 
 def line(part: Part) -> tuple[str, ...]:
     """A line of the second table."""
-    cases = cases_of(part)
-    references = sorted({name for id in cases for name in references_of(CASES[id])})
     modules = [file.removeprefix("repro/") for file in part.files]
-    columns = (modules, cases, references, mutants_of(part), claims_of(part))
+    columns = (modules, cases_of(part), references_at(part), mutants_of(part), claims_of(part))
     return (part.name, part.equations, *(", ".join(column) or "-" for column in columns))
 
 
@@ -137,6 +135,11 @@ def cases_of(part: Part) -> list[str]:
     """Ids of the cases that name one of them."""
     wrong = {*mutants_of(part)}
     return [case.id for case in ordered() if wrong & {*case.mutants}]
+
+
+def references_at(part: Part) -> list[str]:
+    """Modules of ``reference`` that these use."""
+    return sorted({name for id in cases_of(part) for name in references_of(CASES[id])})
 
 
 def claims_of(part: Part) -> list[str]:
@@ -164,48 +167,43 @@ def _section(place: str) -> str:
 
 def references_of(case: Case) -> set[str]:
     """Modules of ``reference`` that a case's function uses, or that those import."""
-    found: set[str] = set()
-    for module in _used(case.function):
-        found |= {module, *_imported(module)}
-    return {name.removeprefix("reference.") for name in found if name != "reference"}
+    used = {*_used(case.function, set())}
+    found = used.union(*(map(_module, vars(sys.modules[name]).values()) for name in used))
+    return {name.removeprefix("reference.") for name in found if name.startswith("reference.")}
 
 
-def _used(function: FunctionType) -> set[str]:
+def _used(thing, seen: set[int]) -> Iterator[str]:
     """Names of the modules of ``reference`` that a function, or one that it uses of ``verification``, names."""
-    found: set[str] = set()
-    seen: set[int] = set()
-    waiting: list = [function]
-    while waiting:
-        thing = waiting.pop()
-        thing = getattr(thing, "func", thing)
-        name = thing.__name__ if isinstance(thing, ModuleType) else getattr(thing, "__module__", None) or ""
-        if id(thing) in seen:
-            continue
-        seen.add(id(thing))
-        if name.startswith("reference"):
-            found.add(name)
-        elif isinstance(thing, Mapping | tuple | list):
-            waiting += thing.values() if isinstance(thing, Mapping) else thing
-        elif name.startswith("verification") and not name.startswith("verification.kernel"):
-            waiting += _named(thing)
-    return found
-
-
-def _named(thing) -> Iterator:
-    """What a function uses of its own module, and of the modules of ``verification`` there; what an object is made of.
-    """
-    thing = getattr(thing, "__wrapped__", thing)
-    if not isinstance(thing, FunctionType):
-        yield from () if isinstance(thing, type | ModuleType) else vars(thing).values()
+    thing = getattr(thing, "func", thing)
+    if id(thing) in seen:
         return
+    seen.add(id(thing))
+    if _module(thing).startswith("reference"):
+        yield _module(thing)
+    for part in _parts(getattr(thing, "__wrapped__", thing)):
+        yield from _used(part, seen)
+
+
+def _module(thing) -> str:
+    """The name of a module, or of that which something is defined in; "" where it has none."""
+    return thing.__name__ if isinstance(thing, ModuleType) else getattr(thing, "__module__", None) or ""
+
+
+def _parts(thing) -> Iterable:
+    """What a container or an object of ``verification`` is made of; what a function of it names, of its module and of
+    the modules that it names, and closes over."""
+    if isinstance(thing, Mapping):
+        return thing.values()
+    if isinstance(thing, tuple | list):
+        return thing
+    if isinstance(thing, type | ModuleType) or not OURS.match(_module(thing)):
+        return ()
+    if not isinstance(thing, FunctionType):
+        return vars(thing).values()
     names = {*_names(thing.__code__)}
-    for value in (thing.__globals__[name] for name in names & {*thing.__globals__}):
-        if isinstance(value, ModuleType) and value.__name__.startswith("verification"):
-            yield from (vars(value)[name] for name in names & {*vars(value)})
-        else:
-            yield value
-    for cell in thing.__closure__ or ():
-        yield cell.cell_contents
+    named = [thing.__globals__.get(name) for name in names]
+    theirs = [vars(module).get(name) for module in named if isinstance(module, ModuleType) for name in names]
+    return [*named, *theirs, *(cell.cell_contents for cell in thing.__closure__ or ())]
 
 
 def _names(code: CodeType) -> Iterator[str]:
@@ -215,24 +213,15 @@ def _names(code: CodeType) -> Iterator[str]:
             yield from _names(constant)
 
 
-def _imported(module: str) -> set[str]:
-    """Modules of ``reference`` that one of them uses."""
-    found = {value.__name__ if isinstance(value, ModuleType) else getattr(value, "__module__", "") or ""
-             for value in vars(sys.modules[module]).values()}
-    return {name for name in found if name.startswith("reference.")}
-
-
 def orphans() -> list[str]:
     """What stands in no line of the second table (of mutants those that cases catch), and lines without a case."""
-    lines = parts()
-    shown = {"case": {id for part in lines for id in cases_of(part)},
-             "mutant": {id for part in lines for id in mutants_of(part)},
-             "claim": {id for part in lines for id in claims_of(part)}}
-    shown["reference"] = {name for id in shown["case"] for name in references_of(CASES[id])}
-    every = {"case": {*CASES}, "mutant": {*mutants.of("cases")}, "claim": {*claims()},
-             "reference": {path.stem for path in (ROOT / "reference").glob("*.py")} - {"__init__"}}
-    bare = [f"line {part.name}" for part in lines if not cases_of(part)]
-    return [*bare, *(f"{kind} {id}" for kind in every for id in sorted(every[kind] - shown[kind]))]
+    missing = [f"line {part.name}" for part in parts() if not cases_of(part)]
+    references = {path.stem for path in (ROOT / "reference").glob("*.py")} - {"__init__"}
+    kinds = {"case": (CASES, cases_of), "mutant": (mutants.of("cases"), mutants_of), "claim": (claims(), claims_of),
+             "reference": (references, references_at)}
+    for kind, (every, shown) in kinds.items():
+        missing += [f"{kind} {id}" for id in sorted({*every}.difference(*map(shown, parts())))]
+    return missing
 
 
 def text() -> str:
@@ -247,7 +236,6 @@ def text() -> str:
 
 def main() -> int:
     """Write the page; 1 where something is missing in a column, which is told."""
-    from verification.kernel.driver import load
     load()
     FILE.write_text(text(), encoding="utf-8")
     missing = [*orphans(), *(f"case {id}: not with every order, and no reason why" for id in unexplained())]

@@ -31,19 +31,16 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from shutil import copy2, copytree, ignore_patterns
-from tempfile import TemporaryDirectory
 
 from verification.kernel import writing
 from verification.kernel.case import CASES, STAGES, Result
+from verification.kernel.case import load as load_cases
+from verification.kernel.case import run as run_case
+from verification.kernel.trying import ENDED, copied, run
+from verification.kernel.writing import REPORT, ROOT
 
-ROOT = Path(__file__).parents[2]
 #: The names that it exports come from modules that cases import by themselves.
 API = ROOT / "repro" / "__init__.py"
-
-
-def _files(folders: Iterable[Path]) -> list[Path]:
-    return [path for folder in folders for path in folder.rglob("*.py")]
 
 
 def reached(files: Iterable[Path]) -> set[Path]:
@@ -62,29 +59,22 @@ def reached(files: Iterable[Path]) -> set[Path]:
 def imported(path: Path) -> Iterator[Path]:
     """Files of this project that a file imports, inside functions too."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        names = [alias.name for alias in node.names] if isinstance(node, ast.Import | ast.ImportFrom) else []
-        if isinstance(node, ast.ImportFrom):
-            names = [node.module or "", *(f"{node.module}.{name}" for name in names)]
-        for name in names:
-            module = ROOT.joinpath(*name.split("."))
-            yield from (file for file in (module.with_suffix(".py"), module / "__init__.py") if file.is_file())
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            package = ROOT.joinpath(*(getattr(node, "module", None) or "").split("."))
+            for module in (package, *(package.joinpath(*alias.name.split(".")) for alias in node.names)):
+                yield from filter(Path.is_file, (module.with_suffix(".py"), module / "__init__.py"))
 
 
-RECORD = ROOT / "verification" / "report" / "mutants.json"
-COPIED = ("repro", "reference", "verification")
-#: Mutants of what users read, which tests catch.
-RESULTS = "results"
-#: What tests need besides.
-TESTED = ("tests", "pyproject.toml")
+RECORD = REPORT / "mutants.json"
 #: What of the mutants catches them.
 CATCHERS = ("cases", "tests")
-#: A line of the summary of pytest, and how it begins where it is a catch: an assertion, `pytest.raises`, a guard.
-FAILED = re.compile(r"^(?:FAILED|ERROR) .*? - (.*)$", re.M)
+#: How the error of a test begins that is a catch: an assertion, `pytest.raises`, a guard.
 CATCH = ("assert", "AssertionError", "Failed: ", "repro.")
 #: The guard that stops a variant of a case, the last of them or one before another's traceback.
 GUARD = re.compile(r"^repro\.errors\.(\w+: .*)$(?=\n?\Z|\n.*Traceback )", re.M)
 #: No case takes a tenth of this; a mutant may make one run for ever.
 LONGEST = 600.0
+NOT_DONE = f"not done after {LONGEST:g} s"
 
 
 @dataclass(frozen=True)
@@ -137,12 +127,11 @@ class Hunt:
 
 
 def load() -> dict[str, tuple[Mutant, ...]]:
-    """Mutants by stage. Raises MutantError where an id is used twice."""
-    modules = {**{stage: f"verification.{stage}.mutants" for stage in STAGES}, RESULTS: "verification.mutants"}
-    found = {stage: import_module(module).MUTANTS for stage, module in modules.items()}
+    """Mutants by stage, and those of "results", what users read. Raises MutantError where an id is used twice."""
+    found = {stage: import_module(f"verification.{stage}.mutants").MUTANTS for stage in STAGES}
+    found["results"] = import_module("verification.mutants").MUTANTS
     ids = [mutant.id for mutants in found.values() for mutant in mutants]
-    twice = {id for id in ids if ids.count(id) > 1}
-    if twice:
+    if twice := {id for id in ids if ids.count(id) > 1}:
         raise MutantError(f"used twice: {', '.join(sorted(twice))}")
     return found
 
@@ -157,9 +146,9 @@ def of(catchers: str) -> dict[str, Mutant]:
     return {id: mutant for id, mutant in everything().items() if bool(mutant.tests) == (catchers == "tests")}
 
 
-def mutated(mutant: Mutant, root: Path = ROOT) -> str:
+def mutated(mutant: Mutant) -> str:
     """The changed text of the file. Raises MutantError unless the text to change occurs exactly once."""
-    text = (root / mutant.file).read_text(encoding="utf-8")
+    text = (ROOT / mutant.file).read_text(encoding="utf-8")
     count = text.count(mutant.old)
     if count != 1 or mutant.old == mutant.new:
         raise MutantError(f"{mutant.id}: the text to change occurs {count} times in {mutant.file}, not once, or it "
@@ -173,63 +162,47 @@ def hunt(mutant: Mutant, every: bool = False) -> Hunt:
     quick_first = sorted(CASES.values(), key=lambda case: case.slow)
     catchers = mutant.tests or [case.id for case in quick_first if mutant.id in case.mutants]
     trials: list[Trial] = []
-    with TemporaryDirectory(prefix="mutant-") as folder:
-        copy(mutant, Path(folder))
+    with copied() as there:
+        (there / mutant.file).write_text(mutated(mutant), encoding="utf-8")
         for each in catchers:
-            try:
-                trials.append((tested if mutant.tests else trial)(Path(folder), each))
-            except subprocess.TimeoutExpired:
-                trials.append(Trial(each, False, f"not done after {LONGEST:g} s"))
+            trials.append((tested if mutant.tests else trial)(there, each))
             if trials[-1].caught and not (every or mutant.tests):
                 break
     return Hunt(mutant.id, tuple(trials))
 
 
-def copy(mutant: Mutant, folder: Path) -> None:
-    """The code with the mutant in it."""
-    text = mutated(mutant)
-    for name in COPIED + (TESTED if mutant.tests else ()):
-        if (ROOT / name).is_file():
-            copy2(ROOT / name, folder)
-        else:
-            copytree(ROOT / name, folder / name, ignore=ignore_patterns("__pycache__", "out", "live"))
-    (folder / mutant.file).write_text(text, encoding="utf-8")
-
-
-def trial(folder: Path, case: str) -> Trial:
+def trial(there: Path, case: str) -> Trial:
     """Run one case in the copy, in a process of its own."""
-    done = _run(folder, "-c", f"from verification.kernel import mutants; mutants.examine({case!r})")
+    command = f"from verification.kernel import mutants; mutants.examine({case!r})"
+    try:
+        done = subprocess.run([sys.executable, "-c", command], cwd=there, env={**os.environ, "PYTHONPATH": str(there)},
+                              capture_output=True, text=True, timeout=LONGEST)
+    except subprocess.TimeoutExpired:
+        return Trial(case, False, NOT_DONE)
     if done.returncode:
         return Trial(case, False, "broken: " + (done.stderr.strip().splitlines() or ["no message"])[-1])
     return Trial(case, *json.loads(done.stdout.splitlines()[-1]))
 
 
-def tested(folder: Path, test: str) -> Trial:
+def tested(there: Path, test: str) -> Trial:
     """Run one test in the copy, in a process of its own."""
-    done = _run(folder, "-m", "pytest", "-x", "-p", "no:cacheprovider", "-rfE", test)
-    if done.returncode == 0:
-        return Trial(test, False, "passes")
-    found = FAILED.search(done.stdout)
-    why = found[1] if found else (done.stdout + done.stderr).strip().splitlines()[-1]
-    caught = done.returncode == 1 and why.startswith(CATCH)
-    return Trial(test, caught, why if caught else f"broken: {why}")
-
-
-def _run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Python in the copy."""
-    return subprocess.run([sys.executable, *arguments], cwd=folder, capture_output=True, text=True, timeout=LONGEST,
-                          env={**os.environ, "PYTHONPATH": str(folder), "COLUMNS": "500"})
+    found = run(there, [test], LONGEST)
+    if found.failures:
+        how = found.failures[0][1].partition("\n")[0]
+        caught = how.startswith(CATCH)
+        return Trial(test, caught, how if caught else f"broken: {how}")
+    if found.status in ENDED:
+        return Trial(test, False, NOT_DONE)
+    return Trial(test, False, "passes" if found.reports else "broken: there is no such test")
 
 
 def examine(id: str) -> None:
     """Run a case with the code of the present folder and print, as JSON, whether it is caught and how."""
     import repro
-    from verification.kernel.case import run
-    from verification.kernel.driver import load as load_cases
     if Path(repro.__file__).parents[1] != Path.cwd():
         raise MutantError(f"repro is imported from {repro.__file__}, not from the copy with the mutant")
     load_cases()
-    print(json.dumps(judged(run(CASES[id]))))
+    print(json.dumps(judged(run_case(CASES[id]))))
 
 
 def judged(result: Result) -> tuple[bool, str]:
@@ -245,16 +218,14 @@ def judged(result: Result) -> tuple[bool, str]:
 
 def main(arguments: list[str] | None = None) -> int:
     """Entry point; 0 if every mutant is caught, and no case that was run passes with a mutant that it names."""
-    from verification.kernel.driver import load as load_cases
     load_cases()
     parser = argparse.ArgumentParser(prog="python -m verification.mutants", description=__doc__.splitlines()[0])
-    parser.add_argument("ids", nargs="*", metavar="MUTANT", help="all by default")
+    parser.add_argument("ids", nargs="*", metavar="MUTANT", choices=[*everything(), []], default=[],
+                        help="all by default")
     parser.add_argument("--every", action="store_true", help="against every case that names it, not to the first catch")
     parser.add_argument("--tests", action="store_true", help="those alone that tests catch, not cases")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes; one a core by default")
     chosen = parser.parse_args(arguments)
-    if unknown := sorted(set(chosen.ids) - set(everything())):
-        parser.error(f"there is no {', '.join(unknown)}; there are {', '.join(everything())}")
     hunts = hunt_all(chosen.ids or (of("tests") if chosen.tests else everything()), chosen.jobs, chosen.every)
     record(hunts)
     return 0 if judge(hunts) else 1
@@ -266,22 +237,19 @@ def hunt_all(ids: Iterable[str], jobs: int, every: bool = False) -> list[Hunt]:
     with ThreadPoolExecutor(jobs) as pool:
         for found in pool.map(lambda id: hunt(known[id], every), ids):
             hunts.append(found)
-            print("\n".join(_lines(found)), flush=True)
+            print(f"{'caught' if found.caught_by else 'SURVIVES':9} {found.mutant}")
+            for trial in found.trials:
+                print(f"{'':10}{trial.case}: {trial.how}", flush=True)
     return hunts
-
-
-def _lines(found: Hunt) -> list[str]:
-    verdict = "caught" if found.caught_by else "SURVIVES"
-    return [f"{verdict:9} {found.mutant}", *(f"{'':10}{trial.case}: {trial.how}" for trial in found.trials)]
 
 
 def judge(hunts: list[Hunt]) -> bool:
     """Print what is wrong, if anything; is every mutant caught, and by every case that names it?"""
-    survivors = [found.mutant for found in hunts if not found.caught_by]
-    missed = [f"{case} passes with {found.mutant}, which it names" for found in hunts for case in found.missed_by]
-    print("\n".join([f"survives: {id}" for id in survivors] + missed
-                    + [f"{len(hunts) - len(survivors)} of {len(hunts)} mutants caught."]))
-    return bool(hunts) and not survivors and not missed
+    wrong = [f"survives: {found.mutant}" for found in hunts if not found.caught_by]
+    count = f"{len(hunts) - len(wrong)} of {len(hunts)} mutants caught."
+    wrong += [f"{case} passes with {found.mutant}, which it names" for found in hunts for case in found.missed_by]
+    print("\n".join([*wrong, count]))
+    return bool(hunts) and not wrong
 
 
 def record(hunts: list[Hunt]) -> None:
@@ -291,9 +259,9 @@ def record(hunts: list[Hunt]) -> None:
     if not whole:
         return
     before = _read()
-    new = {id: caught.get(id, before["caught"].get(id, [])) for id in everything()}
+    known = {**before["caught"], **caught}
     codes = {**before["code"], **{catchers: code(catchers) for catchers in whole}}
-    writing.save({"code": codes, "caught": new}, RECORD)
+    writing.save({"code": codes, "caught": {id: known.get(id, []) for id in everything()}}, RECORD)
 
 
 def _read() -> dict[str, dict]:
@@ -312,12 +280,14 @@ def code(catchers: str) -> str:
     name, and for what they reach of the code."""
     digest = hashlib.sha256()
     if catchers == "tests":
-        named = {ROOT / test.partition("::")[0] for mutant in of("tests").values() for test in mutant.tests}
-        found, known = reached(named), {ROOT / "repro", ROOT / "tests"}
+        files = {ROOT / test.partition("::")[0] for mutant in of("tests").values() for test in mutant.tests}
+        folders = {ROOT / "repro", ROOT / "tests"}
     else:
-        cases = [ROOT / "reference", *(ROOT / "verification" / stage for stage in STAGES)]
-        found, known = reached(_files(cases)), {ROOT / "repro", ROOT / "verification" / "problems", *cases}
-    for path in sorted(path for path in found if not known.isdisjoint(path.parents)):
-        digest.update(path.relative_to(ROOT).as_posix().encode() + path.read_bytes())
+        cases = {ROOT / "reference", *(ROOT / "verification" / stage for stage in STAGES)}
+        files = {path for folder in cases for path in folder.rglob("*.py")}
+        folders = {ROOT / "repro", ROOT / "verification" / "problems", *cases}
+    for path in sorted(reached(files)):
+        if not folders.isdisjoint(path.parents):
+            digest.update(path.relative_to(ROOT).as_posix().encode() + path.read_bytes())
     return digest.hexdigest()[:16]
 

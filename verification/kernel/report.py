@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import platform
 from importlib.metadata import version
-from itertools import groupby
+from itertools import chain, groupby
+from os.path import commonprefix
 from pathlib import Path
 
 from verification.kernel import matrix, mutants
-from verification.kernel.case import CASES, STAGES, WAYS, Outcome, Result
-from verification.kernel.writing import Block, link, markdown, save, table
+from verification.kernel.case import CASES, WAYS, Outcome, Result
+from verification.kernel.writing import REPORT, Block, link, markdown, save, table
 
-FOLDER = Path(__file__).parents[1] / "report"
 TITLES = {"flow": "Flow (2.1, 3.2)", "transport": "Substrates (2.2, 3.3)", "growth": "Growth mechanics (2.3, 3.4)",
           "reprojection": "Reprojection and transfer (3.4, 3.5)", "mesh_motion": "Mesh motion (3.5)",
           "coupling": "Coupling", "hard": "Hard cases"}
@@ -45,30 +45,28 @@ def summary(results: list[Result]) -> str:
     return f"{sum(result.holds for result in results)} of {len(results)} cases pass; {numbers} numbers judged."
 
 
-def write(results: list[Result], folder: Path = FOLDER) -> Path:
+def write(results: list[Result]) -> Path:
     """Write the report of a whole run; returns the path of its first page."""
-    folder.mkdir(exist_ok=True)
     for name, text in texts(results).items():
-        (folder / name).write_text(text, encoding="utf-8")
+        (REPORT / name).write_text(text, encoding="utf-8")
     cases = {result.id: _live(result) for result in results}
-    save({"environment": environment(), "cases": cases}, folder / "live" / "measured.json")
-    return folder / "REPORT.md"
+    save({"environment": environment(), "cases": cases}, REPORT / "live" / "measured.json")
+    return REPORT / "REPORT.md"
 
 
 def texts(results: list[Result]) -> dict[str, str]:
     """What is committed: {file: Markdown}."""
     found = {"REPORT.md": ("Verification", index(results)), "mutants.md": ("Mutants", mutant_blocks())}
-    for stage, chosen in by_stage(results):
-        found[f"{stage}.md"] = TITLES[stage], [Block("text", summary(chosen)), *articles(chosen)]
+    for stage, title in TITLES.items():
+        chosen = of_stage(stage, results)
+        found[f"{stage}.md"] = title, [Block("text", summary(chosen)), *chain.from_iterable(map(article, chosen))]
     pages = {name: f"# {title}\n\n{markdown(blocks, 2)}\n" for name, (title, blocks) in found.items()}
     return {**pages, "matrix.md": matrix.text()}
 
 
-def by_stage(results: list[Result]) -> list[tuple[str, list[Result]]]:
-    """(stage, its results) of the stages that have any."""
-    ordered = sorted(results, key=lambda result: STAGES.index(CASES[result.id].stage))
-    grouped = groupby(ordered, key=lambda result: CASES[result.id].stage)
-    return [(stage, list(chosen)) for stage, chosen in grouped]
+def of_stage(stage: str, results: list[Result]) -> list[Result]:
+    """Those of a stage's cases."""
+    return [result for result in results if CASES[result.id].stage == stage]
 
 
 #: What is judged elsewhere.
@@ -81,7 +79,7 @@ BESIDES = ((link("The paper's claims", "../../paper_figures/replication.md"), "`
 
 def index(results: list[Result]) -> list[Block]:
     """The first page: stages, and a line a case."""
-    stages = [(link(TITLES[stage], stage), summary(chosen)) for stage, chosen in by_stage(results)]
+    stages = [(link(title, stage), summary(of_stage(stage, results))) for stage, title in TITLES.items()]
     more = ((link("Mutants", "mutants"), mutant_state()),
             (link("Equation, module, case, reference, mutant, claim", "matrix"), "what is verified by what, with which "
              "elements and presets"))
@@ -97,11 +95,6 @@ def _index_row(result: Result) -> tuple:
     ways = " ".join(case.ways) if case.ways != WAYS else "all"
     return (link(case.id, case.stage, case.id), case.kind, ways, str(len(result.outcome.measured)), result.verdict,
             ", ".join(case.mutants))
-
-
-def articles(results: list[Result]) -> list[Block]:
-    """Cases, one after the other."""
-    return [block for result in results for block in article(result)]
 
 
 def article(result: Result) -> list[Block]:
@@ -129,9 +122,8 @@ def shared(names: list[str]) -> str:
         begins.setdefault(name.partition(", ")[0], []).append(name)
     lists: dict[str, list[str]] = {}
     for first, alike in begins.items():
-        single = len(alike) == 1
-        rest = "" if single else listed([name[len(first) + 2:] for name in alike])
-        lists.setdefault(rest, []).append(alike[0] if single else first)
+        rest = listed([name[len(first) + 2:] for name in alike]) if len(alike) > 1 else ""
+        lists.setdefault(rest, []).append(first if rest else alike[0])
     return " / ".join(f"{', '.join(firsts)}: {rest}" if rest else " / ".join(firsts) for rest, firsts in lists.items())
 
 
@@ -151,11 +143,9 @@ def _ended_alike(names: list[str]) -> str:
     for _, group in groupby(names, key=lambda name: name.rpartition(", ")[2]):
         alike = [name.split(", ") for name in group]
         most = min(map(len, alike)) - 1 if len(alike) > 2 else 0
-        count = 0
-        while count < most and len({tuple(parts[-count - 1:]) for parts in alike}) == 1:
-            count += 1
-        heads = [", ".join(parts[:len(parts) - count]) for parts in alike]
-        rows.append("; ".join(heads) + (f", each {', '.join(alike[0][-count:])}" if count else ""))
+        ends = commonprefix([parts[::-1] for parts in alike])[:most]
+        heads = [", ".join(parts[:len(parts) - len(ends)]) for parts in alike]
+        rows.append("; ".join(heads) + (f", each {', '.join(ends[::-1])}" if ends else ""))
     return "; ".join(rows)
 
 

@@ -12,6 +12,8 @@ from typing import Any
 from repro.results import write_text
 from repro.results.files import whole
 
+ROOT = Path(__file__).parents[2]
+REPORT = ROOT / "verification" / "report"
 Row = tuple[str, ...]
 
 

@@ -2,7 +2,7 @@
 
 The mutants of :mod:`verification.kernel.mutants` are chosen by people who know where it hurts; these are not chosen.
 The operators are cosmic-ray's, the sample follows from a seed (:mod:`.drawing`), and each mutant is run against the
-tests that call the function it is in (:mod:`.trying`), the cheapest first, for at most 60 s (:mod:`.hunting`).
+tests that call the function it is in (:mod:`.reach`), the cheapest first, for at most 60 s (:mod:`.hunting`).
 
 Measured, of the two libraries that are kept up (cosmic-ray 8.7.0, mutmut 3.8.1): cosmic-ray's operators are classes
 over the nodes of parso that can be used alone; with three packages (cosmic-ray, parso, attrs) those taken here make

@@ -13,27 +13,28 @@ texts of messages are strings, which no operator changes.
 from __future__ import annotations
 
 import ast
-import hashlib
-import re
+from collections import Counter
 from dataclasses import dataclass, replace
 from functools import cache
-from pathlib import Path
+from heapq import nlargest
+from itertools import islice
+from operator import itemgetter
+from typing import Any
 
-from verification.sampled.trying import ROOT
+from verification.kernel.writing import ROOT
+from verification.sampled.reach import digest
 
 SEED = 2001
 COUNT = 210
-_ARITHMETIC = {"Add", "Sub", "Mul", "Div", "FloorDiv", "Mod", "Pow"}
-_ORDER = {"Eq", "NotEq", "Lt", "LtE", "Gt", "GtE"}
-_SETS = {"BitOr", "BitAnd", "BitXor"}
-#: Replacements that are made, of "X" by "Y"; by cosmic-ray's names.
-_ALIKE = (_ARITHMETIC, _ORDER, _SETS, {"Is", "IsNot"})
+#: Replacements that are made, of "X" by "Y", where both are arithmetic, of order, of sets or of identity; by
+#: cosmic-ray's names.
+_ALIKE = ({"Add", "Sub", "Mul", "Div", "FloorDiv", "Mod", "Pow"}, {"Eq", "NotEq", "Lt", "LtE", "Gt", "GtE"},
+          {"BitOr", "BitAnd", "BitXor"}, {"Is", "IsNot"})
 _ALONE = {"AddNot", "ReplaceTrueWithFalse", "ReplaceFalseWithTrue", "ReplaceAndWithOr", "ReplaceOrWithAnd",
           "ReplaceBreakWithContinue", "ReplaceContinueWithBreak", "ExceptionReplacer", "NumberReplacer",
           "RemoveDecorator", "ZeroIterationForLoop", "ReplaceUnaryOperator_Delete_USub",
           "ReplaceUnaryOperator_Delete_Not", "ReplaceUnaryOperator_Delete_Invert",
           "ReplaceBinaryOperator_MatMult_Mul"}
-_PAIR = re.compile(r"Replace(?:Binary|Comparison)Operator_([A-Za-z]+)_([A-Za-z]+)")
 
 
 @dataclass(frozen=True)
@@ -54,106 +55,86 @@ class Mutant:
         return digest(self.file, self.old, self.new, self.column, self.operator)
 
 
-def digest(*parts: object) -> str:
-    """16 hexadecimal digits that stand for some parts."""
-    return hashlib.sha256("|".join(map(str, parts)).encode()).hexdigest()[:16]
-
-
-def sources(root: Path = ROOT) -> dict[str, str]:
+def sources() -> dict[str, str]:
     """Texts of the modules of repro/ by file."""
-    return {path.relative_to(root / "repro").as_posix(): path.read_text(encoding="utf-8")
-            for path in sorted((root / "repro").rglob("*.py"))}
+    folder = ROOT / "repro"
+    return {path.relative_to(folder).as_posix(): path.read_text(encoding="utf-8")
+            for path in sorted(folder.rglob("*.py"))}
 
 
-def sample(texts: dict[str, str], count: int = COUNT, seed: int = SEED) -> list[Mutant]:
-    """``count`` mutants of the modules."""
-    places = {file: _places(file, text) for file, text in texts.items() if text.strip()}
-    places = {file: found for file, found in places.items() if found}
-    sizes = {file: min(statements(texts[file]), len(places[file])) for file in places}
-    shares = shared(sizes, {file: len(found) for file, found in places.items()}, count)
-    return [mutant for file, share in shares.items() for mutant in _drawn(places[file], texts[file], share, seed)]
+def sample() -> list[Mutant]:
+    """COUNT mutants of the modules."""
+    texts = sources()
+    places = {file: _places(file, text) for file, text in texts.items()}
+    most = {file: len(found) for file, found in places.items() if found}
+    shares = shared({file: min(statements(texts[file]), most[file]) for file in most}, most)
+    return [mutant for file, share in shares.items() for mutant in _drawn(places[file], texts[file], share)]
 
 
 def statements(text: str) -> int:
     """Statements of a module, docstrings not counted."""
-    nodes = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.stmt)]
-    return sum(not (isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)) for node in nodes)
+    return sum(isinstance(node, ast.stmt) and not (isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant))
+               for node in ast.walk(ast.parse(text)))
 
 
-def shared(sizes: dict[str, int], most: dict[str, int], count: int) -> dict[str, int]:
-    """``count`` in proportion to sizes, one at least and no more than there are, by largest remainders."""
-    shares = dict.fromkeys(sizes, 1)
-    for _ in range(count - len(shares)):
-        free = [name for name in shares if shares[name] < most[name]]
-        if not free:
-            break
-        shares[max(free, key=lambda name: sizes[name] / (shares[name] + 0.5))] += 1
-    return shares
+def shared(sizes: dict[str, int], most: dict[str, int]) -> dict[str, int]:
+    """COUNT in proportion to sizes, one at least and no more than there are, by largest remainders."""
+    seats = [(name, sizes[name] / (taken + 0.5)) for name in most for taken in range(1, most[name])]
+    more = nlargest(COUNT - len(most), seats, key=itemgetter(1))
+    return Counter([*most, *(name for name, _ in more)])
 
 
 def _places(file: str, text: str) -> dict[tuple[int, int], list[Mutant]]:
     """Changes of a module by the (line, column) that they are made at."""
+    from cosmic_ray.ast import ast_nodes, get_ast
     hidden = _hidden(text)
+    nodes = list(ast_nodes(get_ast(text)))
     found: dict[tuple[int, int], list[Mutant]] = {}
-    for name in _operators():
-        for occurrence, (line, column) in enumerate(_positions(text, name)):
-            if not any(first <= (line, column) < last for first, last in hidden):
-                found.setdefault((line, column), []).append(Mutant(file, line, column, name, occurrence))
+    for name, operator in _operators().items():
+        starts = [start for node in nodes for start, _ in operator.mutation_positions(node)]
+        for occurrence, place in enumerate(starts):
+            if not any(first <= place < last for first, last in hidden):
+                found.setdefault(place, []).append(Mutant(file, *place, name, occurrence))
     return found
 
 
-def _operators() -> list[str]:
+@cache
+def _operators() -> dict[str, Any]:
+    """Those of cosmic-ray that are taken, by name."""
     from cosmic_ray.operators.provider import OperatorProvider
-    return sorted(name for name in OperatorProvider() if name in _ALONE or _alike(name))
+    known = OperatorProvider()
+    return {name: known[name]() for name in sorted(known) if name in _ALONE or _alike(name)}
 
 
 def _alike(name: str) -> bool:
-    pair = _PAIR.fullmatch(name)
-    return bool(pair) and any({*pair.groups()} <= alike for alike in _ALIKE)
+    pair = {*name.split("_")[1:]}
+    return bool(pair) and any(map(pair.issubset, _ALIKE))
 
 
 def _hidden(text: str) -> list[tuple[tuple[int, int], tuple[int, int]]]:
     """From where to where annotations and blocks of imports for types go."""
-    hidden: list[ast.AST] = []
+    hidden: list[Any] = []
     for node in ast.walk(ast.parse(text)):
-        hidden += [part for part in (getattr(node, "annotation", None), getattr(node, "returns", None)) if part]
+        hidden += [getattr(node, "annotation", None), getattr(node, "returns", None)]
         if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
             hidden.append(node)
-    return [((part.lineno, part.col_offset), (part.end_lineno, part.end_col_offset)) for part in hidden]
+    return [((part.lineno, part.col_offset), (part.end_lineno, part.end_col_offset)) for part in hidden if part]
 
 
-@cache
-def _parsed(text: str):
-    from cosmic_ray.ast import ast_nodes, get_ast
-    return list(ast_nodes(get_ast(text)))
-
-
-def _operator(name: str):
-    from cosmic_ray.operators.provider import OperatorProvider
-    return OperatorProvider()[name]()
-
-
-def _positions(text: str, name: str) -> list[tuple[int, int]]:
-    operator = _operator(name)
-    return [start for node in _parsed(text) for start, _ in operator.mutation_positions(node)]
-
-
-def _drawn(places: dict[tuple[int, int], list[Mutant]], text: str, share: int, seed: int) -> list[Mutant]:
+def _drawn(places: dict[tuple[int, int], list[Mutant]], text: str, share: int) -> list[Mutant]:
     """``share`` mutants of a module, at as many places, in the order of the text."""
     lines = text.splitlines()
 
     def rank(mutant: Mutant, *more: object) -> str:
         near = [line.strip() for line in lines[max(mutant.line - 2, 0):mutant.line + 1]]
-        return digest(seed, mutant.file, *near, *more)
+        return digest(SEED, mutant.file, *near, *more)
 
-    drawn: list[Mutant] = []
-    for place in sorted(places, key=lambda place: (rank(places[place][0], place[1]), place)):
-        least = min(places[place], key=lambda mutant: rank(mutant, mutant.operator, place[1], mutant.occurrence % 2))
-        if len(drawn) == share:
-            break
-        if _is_python(mutated(text, least)):
-            drawn.append(made(text, least))
-    return sorted(drawn, key=lambda mutant: (mutant.line, mutant.column))
+    def least(place: tuple[int, int]) -> Mutant:
+        return min(places[place], key=lambda mutant: rank(mutant, mutant.operator, place[1], mutant.occurrence % 2))
+
+    ranked = sorted(places, key=lambda place: (rank(places[place][0], place[1]), place))
+    drawn = islice((mutant for mutant in map(least, ranked) if _is_python(mutated(text, mutant))), share)
+    return [made(text, mutant) for mutant in sorted(drawn, key=lambda mutant: (mutant.line, mutant.column))]
 
 
 def _is_python(text: str) -> bool:
@@ -186,7 +167,7 @@ def mutated(text: str, mutant: Mutant) -> str:
         """Changes the one node that has the occurrence."""
 
         left = mutant.occurrence
-        operator = _operator(mutant.operator)
+        operator = _operators()[mutant.operator]
 
         def visit(self, node):
             """The node, changed if its turn has come."""

@@ -10,23 +10,24 @@ What is committed of a hunt: ``report/sampled.json``, the rows, and ``report/sam
 
 from __future__ import annotations
 
-import os
 import time
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
-from itertools import count
+from importlib.util import cache_from_source
+from itertools import accumulate, chain
 from pathlib import Path
 
-import numpy as np
-
 from verification.kernel import writing
-from verification.kernel.writing import Block, append, lines, markdown, table
-from verification.sampled.drawing import SEED, Mutant, digest, mutated, sources
-from verification.sampled.trying import LIVE, ROOT, Measured, Ran, Reach, copied, run
+from verification.kernel.trying import ENDED, Ran, copied, run
+from verification.kernel.writing import REPORT, Block, append, lines, markdown, table
+from verification.sampled.drawing import SEED, Mutant, mutated, sources
+from verification.sampled.reach import LIVE, Measured, Reach, digest
 
 KEPT = LIVE / "sampled.jsonl"
-RECORD = ROOT / "verification" / "report" / "sampled.json"
+RECORD = REPORT / "sampled.json"
+#: Hours that a round of trials may take, at a release.
+HOURS = 4.0
 #: Seconds of processor time of a mutant's first trial, and of a survivor's second one.
 LIMIT, WHOLE = 60.0, 1800.0
 #: A test that takes so much longer than it did, in multiples of that and seconds besides, does not end.
@@ -62,6 +63,12 @@ def kept() -> dict[str, Row]:
     return {row["name"]: Row(**row) for row in [*record, *lines(KEPT)]}
 
 
+def rows_of(sample: list[Mutant]) -> list[Row]:
+    """Those of a sample that have any, in its order."""
+    rows = kept()
+    return [rows[mutant.name] for mutant in sample if mutant.name in rows]
+
+
 def due(sample: list[Mutant], rows: dict[str, Row], reach: Reach, whole: bool) -> list[Mutant]:
     """Mutants without a row, or with one that no longer stands; ``whole``: survivors that tests were left for too."""
     texts = sources()
@@ -72,7 +79,7 @@ def _stands(row: Row | None, mutant: Mutant, text: str, reach: Reach, whole: boo
     if row is None or row.module != digest(text):
         return False
     if row.verdict == "caught":
-        return row.test in reach.ids
+        return row.test in {test.id for test in reach.tests}
     tests = reach.of(mutant.file, text, mutant.line)
     return row.tests == _names(tests) and not (whole and row.tried < row.reached)
 
@@ -81,15 +88,18 @@ def _names(tests: list[Measured]) -> str:
     return digest(*sorted(test.id for test in tests))
 
 
-def hunt(mutants: list[Mutant], reach: Reach, jobs: int, whole: bool, ends: float) -> None:
-    """Try mutants, several side by side, and write a row for each; none is begun after the time ``ends``."""
-    before = {name: row.test for name, row in kept().items() if row.verdict == "caught"}
+def hunt(sample: list[Mutant], reach: Reach, jobs: int, whole: bool = False) -> None:
+    """Try those of the mutants that are due, several side by side, and write a row for each; none is begun after
+    HOURS."""
+    rows, ends = kept(), time.time() + 3600 * HOURS
+    caught = {name: row.test for name, row in rows.items() if row.verdict == "caught"}
+    mutants = due(sample, rows, reach, whole)
 
     def shift(number: int) -> None:
         with copied() as there:
             for mutant in mutants[number::jobs]:
                 if time.time() < ends:
-                    _write(tried(mutant, there, reach, whole, before.get(mutant.name, "")))
+                    _write(tried(mutant, there, reach, whole, caught.get(mutant.name, "")))
 
     with ThreadPoolExecutor(jobs) as pool:
         list(pool.map(shift, range(jobs)))
@@ -101,67 +111,58 @@ def _write(row: Row) -> None:
     print(f"{row.verdict:9} {row.file}:{row.line} {row.new!r} {row.test} ({counted})", flush=True)
 
 
-def tried(mutant: Mutant, there: Path, reach: Reach, whole: bool = False, before: str = "") -> Row:
+def tried(mutant: Mutant, there: Path, reach: Reach, whole: bool, before: str) -> Row:
     """Run a mutant in the copy ``there`` against the tests that reach it: the one that caught it ``before`` first, then
     as many of the cheapest as take no more than LIMIT; or all, for WHOLE."""
     limit = WHOLE if whole else LIMIT
-    path, text = there / "repro" / mutant.file, (ROOT / "repro" / mutant.file).read_text(encoding="utf-8")
+    path, text = there / "repro" / mutant.file, sources()[mutant.file]
     tests = reach.of(mutant.file, text, mutant.line, whole)
-    chosen = tests if whole else within(tests, limit)
+    chosen = [test.id for test in (tests if whole else within(tests))]
+    alone = before in {test.id for test in tests}
     put(path, mutated(text, mutant))
-    found = run(there, [before], limit) if before in {test.id for test in tests} else Ran()
-    if not found.failed:
-        found = run(there, [test.id for test in chosen], limit)
+    found = run(there, [before] if alone else chosen, limit)
+    if alone and not found.failures:
+        found = run(there, chosen, limit)
     put(path, text)
     row = Row(mutant.name, mutant.file, mutant.line, mutant.operator, mutant.old, mutant.new, digest(text), "survivor",
               reached=len(tests), tests=_names(reach.of(mutant.file, text, mutant.line)), tried=len(chosen),
               seconds=round(found.seconds, 1))
-    return _verdict(row, found, {test.id: test.seconds for test in tests}, there)
+    return _verdict(row, found, {test.id: test.seconds for test in tests}, limit)
 
 
-def _verdict(row: Row, found: Ran, usual: dict[str, float], there: Path) -> Row:
-    if found.failed:
-        return replace(row, verdict="caught", test=found.failed, how=_short(found.how))
-    if found.stopped:
-        long = LONGER * usual.get(found.stopped, 0.0) + BESIDES
-        return replace(row, verdict="timeout" if found.after > long else "survivor", test=found.stopped,
-                       tried=len({one["test"] for one in lines(there.parent / "told") if one.get("outcome")}))
+def _verdict(row: Row, found: Ran, usual: dict[str, float], limit: float) -> Row:
+    if found.failures:
+        test, how = found.failures[0]
+        return replace(row, verdict="caught", test=test, how=how.strip().splitlines()[-1].strip()[-160:])
+    if found.status in ENDED:
+        test = found.last["starts"]
+        long = limit - found.last["spent"] > LONGER * usual.get(test, 0.0) + BESIDES
+        return replace(row, verdict="timeout" if long else "survivor", test=test,
+                       tried=len({report["test"] for report in found.reports}))
     return row
 
 
 def confirm(rows: list[Row]) -> None:
     """Run the tests that caught mutants once more without any: one that fails now has caught nothing."""
-    unsure = [row for row in rows if row.verdict == "caught" and not row.sure]
-    tests = sorted({row.test for row in unsure if "::" in row.test})
-    if tests:
+    unsure = [row for row in rows if row.verdict == "caught" and not row.sure and "::" in row.test]
+    if unsure:
         with copied() as there:
-            run(there, tests, WHOLE, every=True)
-            failed = {row["test"] for row in lines(there.parent / "told") if row.get("outcome") == "failed"}
+            failed = dict(run(there, {row.test for row in unsure}, WHOLE, every=True).failures)
         for row in unsure:
             how = f"{row.test} fails without the mutant too"
             _write(replace(row, verdict="survivor", how=how) if row.test in failed else replace(row, sure=True))
 
 
-def _short(how: str) -> str:
-    """The last line of a failure that tells something."""
-    told = [line.strip() for line in how.splitlines() if line.strip()]
-    return (told or [""])[-1].removeprefix("E ").strip()[-160:]
-
-
-def within(tests: list[Measured], limit: float) -> list[Measured]:
-    """The cheapest tests that together take no longer than a limit; one at least."""
-    costs = np.cumsum([test.seconds for test in tests])
-    return tests[:max(1, int(np.searchsorted(costs, limit, "right")))]
-
-
-_STAMPS = count(10**9)
+def within(tests: list[Measured]) -> list[Measured]:
+    """The cheapest tests that together take no longer than LIMIT; one at least."""
+    costs = accumulate(test.seconds for test in tests)
+    return [test for test, cost in zip(tests, costs) if cost <= LIMIT] or tests[:1]
 
 
 def put(path: Path, text: str) -> None:
-    """Write a module with a time of change that no compiled form of it has."""
-    stamp = next(_STAMPS)
+    """Write a module, and remove what was compiled of it before."""
     path.write_text(text, encoding="utf-8")
-    os.utime(path, (stamp, stamp))
+    Path(cache_from_source(path)).unlink(missing_ok=True)
 
 
 #: Survivors that no test can tell from the code, each with the reason, by (file of repro/, line or lines as they are,
@@ -246,19 +247,22 @@ def key(row: Row) -> tuple[str, str, str]:
 def holds(found: dict[str, list[Row]]) -> bool:
     """Are 95 % of those not shown equivalent caught, and at most 10 % of all shown equivalent? What does not end is not
     counted as caught."""
-    total = sum(map(len, found.values()))
-    counted = total - len(found["equivalent"])
-    return bool(counted) and len(found["caught"]) >= CAUGHT * counted and len(found["equivalent"]) <= EXCUSED * total
+    caught, equivalent = shares(found)
+    return caught >= CAUGHT and equivalent <= EXCUSED
+
+
+def shares(found: dict[str, list[Row]]) -> tuple[float, float]:
+    """The share that is caught of those not shown equivalent, and that of these of all."""
+    total, equivalent = sum(map(len, found.values())), len(found["equivalent"])
+    return len(found["caught"]) / max(total - equivalent, 1), equivalent / max(total, 1)
 
 
 def told(found: dict[str, list[Row]], wanted: int) -> str:
     """The numbers in one sentence or two."""
     total = sum(map(len, found.values()))
-    counted = total - len(found["equivalent"])
-    share = 100 * len(found["caught"]) / counted if counted else 0.0
     return (f"{total} of {wanted} mutants tried, seed {SEED}: {len(found['caught'])} caught, {len(found['timeout'])} "
             f"without end (timeouts), {len(found['survivor'])} survive, {len(found['equivalent'])} shown equivalent. "
-            f"Caught of those not shown equivalent: {share:.1f} % (at least {100 * CAUGHT:g} %).")
+            f"Caught of those not shown equivalent: {100 * shares(found)[0]:.1f} % (at least {100 * CAUGHT:g} %).")
 
 
 def record(rows: list[Row], wanted: int) -> int:
@@ -269,20 +273,22 @@ def record(rows: list[Row], wanted: int) -> int:
         print(f"{row.verdict}: {row.file}:{row.line}: {row.old!r} -> {row.new!r} {row.how}")
     if len(rows) == wanted:
         writing.save({"seed": SEED, "mutants": [asdict(row) for row in rows]}, RECORD)
-        PAGE.write_text(text(rows, wanted), encoding="utf-8")
+        PAGE.write_text(text(found), encoding="utf-8")
     return 0 if holds(found) and len(rows) == wanted else 1
 
 
-def text(rows: list[Row], wanted: int) -> str:
-    """The page."""
-    found = judged(rows)
+def text(found: dict[str, list[Row]]) -> str:
+    """The page, of a sample that was tried whole."""
+    drawn = Counter(row.file for row in chain(*found.values()))
+    caught = Counter(row.file for row in found["caught"])
     survivors = [(*_changed(row), *LEFT.get(key(row), ("", "")), f"{row.tried} of {row.reached}")
                  for row in found["survivor"]]
     equivalent = [(*_changed(row), EQUIVALENT[key(row)]) for row in found["equivalent"]]
-    blocks = [Block("text", INTRODUCTION), Block("text", told(found, wanted)),
+    counts = [(file, str(drawn[file]), str(caught[file])) for file in sorted(drawn)]
+    blocks = [Block("text", INTRODUCTION), Block("text", told(found, drawn.total())),
               *_section("Survivors", survivors, "effect", "why no test", "tests run"),
               *_section("Shown equivalent", equivalent, "why"),
-              Block("heading", "By module"), table(("module", "mutants", "caught"), _counts(rows))]
+              Block("heading", "By module"), table(("module", "mutants", "caught"), counts)]
     return f"# Mutants made by machine\n\n{markdown(blocks, level=2)}\n"
 
 
@@ -294,13 +300,6 @@ def _section(title: str, rows: list[tuple[str, ...]], *more: str) -> list[Block]
 def _changed(row: Row) -> tuple[str, str, str]:
     """Where, from what and to what."""
     return f"{row.file}:{row.line}", f"`{row.old}`", f"`{row.new}`"
-
-
-def _counts(rows: list[Row]) -> list[tuple[str, str, str]]:
-    """How many of each module are drawn, and caught; each is in the record."""
-    drawn = Counter(row.file for row in rows)
-    caught = Counter(row.file for row in rows if row.verdict == "caught")
-    return [(file, str(drawn[file]), str(caught[file])) for file in sorted(drawn)]
 
 
 INTRODUCTION = (

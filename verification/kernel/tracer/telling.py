@@ -1,9 +1,10 @@
 """What a run of tests does, for those who wait for it: a plugin of pytest, in the process of the tests.
 
-It writes a line of JSON each to the file TOLD: the tests that are collected, with the fixtures that they share, each
-test as it starts, with the processor time so far, each of its reports, and the exit status. Of the tests it keeps those
-in the file ASKED, in that order; one that is there no more, such as one that is named after a value which a mutant
-changes, is left out: pytest would refuse to run any with it. The process ends after LIMIT seconds of processor time.
+It writes a line of JSON each to the file "told" of the folder TRIED: the tests that are collected, with the fixtures
+that they share, each test as it starts, with the processor time so far, and each of its reports. Of the tests it keeps
+those of the file "asked", in that order: single ones, all of a function or all of a file. One that is there no more,
+such as one that is named after a value which a mutant changes, is left out: pytest would refuse to run any with it. The
+process ends after LIMIT seconds of processor time.
 """
 
 import json
@@ -14,8 +15,9 @@ from pathlib import Path
 
 import pytest
 
-_file = Path(os.environ["TOLD"]).open("w", encoding="utf-8")
-_asked = Path(os.environ["ASKED"]).read_text(encoding="utf-8").splitlines()
+_folder = Path(os.environ["TRIED"])
+_file = (_folder / "told").open("w", encoding="utf-8")
+_asked = (_folder / "asked").read_text(encoding="utf-8").splitlines()
 _limit = int(os.environ["LIMIT"])
 resource.setrlimit(resource.RLIMIT_CPU, (_limit, _limit + 5))
 _spent = [0.0]
@@ -41,23 +43,26 @@ def _mark(name: str) -> str:
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list) -> None:
     """Keep the tests that are asked for."""
-    places = {test: place for place, test in enumerate(_asked) if "::" in test}
-    if places:
-        items[:] = sorted((item for item in items if item.nodeid in places), key=lambda item: places[item.nodeid])
+    places = {test: place for place, test in enumerate(_asked)}
+
+    def place(item) -> int:
+        names = item.nodeid, item.nodeid.partition("[")[0], item.nodeid.partition("::")[0]
+        return next((places[name] for name in names if name in places), -1)
+
+    items[:] = sorted((item for item in items if place(item) >= 0), key=place)
     _tell(collected={item.nodeid: _wide(item) for item in items})
 
 
 def _wide(item) -> list[str]:
-    """Names of the fixtures of a test that are made once for several tests."""
-    found = getattr(item, "_fixtureinfo", None)
-    definitions = found.name2fixturedefs.items() if found else ()
-    return [name for name, defined in definitions if defined[-1].scope != "function"]
+    """What makes a test's calls besides it: the fixtures that are made once for several tests."""
+    definitions = item._fixtureinfo.name2fixturedefs.items()
+    return [f"fixture {name}" for name, defined in definitions if defined[-1].scope != "function"]
 
 
 def pytest_collectreport(report) -> None:
     """A file that cannot be imported fails."""
     if report.failed:
-        _tell(test=report.nodeid, outcome="failed", seconds=0.0, how=str(report.longreprtext)[-400:])
+        pytest_runtest_logreport(report)
 
 
 def pytest_runtest_logstart(nodeid: str) -> None:
@@ -77,9 +82,11 @@ def pytest_fixture_setup(fixturedef):
 
 
 def pytest_runtest_logreport(report) -> None:
-    """A test is made ready, run or cleared away."""
+    """A test is made ready, run or cleared away; the message of its error where it has one."""
     before, _spent[0] = _spent[0], _processor()
-    _tell(test=report.nodeid, outcome=report.outcome, seconds=_spent[0] - before, how=str(report.longreprtext)[-400:])
+    crash = getattr(report.longrepr, "reprcrash", None)
+    _tell(test=report.nodeid, outcome=report.outcome, seconds=_spent[0] - before,
+          how=crash.message if crash else report.longreprtext)
 
 
 def pytest_runtest_logfinish() -> None:
@@ -87,6 +94,4 @@ def pytest_runtest_logfinish() -> None:
     _mark("")
 
 
-def pytest_sessionfinish(exitstatus: int) -> None:
-    """All is done."""
-    _tell(ends=int(exitstatus))
+_tell(starts="collection", spent=0.0)
