@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import brentq
@@ -63,10 +64,9 @@ def half_disc_body(rings: int) -> Supported:
 def cylinder(rings: int, inner: float, more: float) -> Cylinder:
     """The growing half-cylinder."""
     body, law = half_disc_body(rings), (inner, more, 1.0)
-    middle = np.linalg.norm(body.reference[body.cells].mean(axis=1), axis=1)
     R = np.maximum(np.linalg.norm(body.reference, axis=1), 1e-9)
     stretch = neo_hookean.cylinder_radius(R, *law) / R
-    return Cylinder(body, inner + more * middle[:, None] ** 2, stretch[:, None] * body.reference,
+    return Cylinder(body, body.field(lambda x, y: inner + more * (x**2 + y**2)), stretch[:, None] * body.reference,
                     neo_hookean.cylinder_pressure(R, *law))
 
 
@@ -265,23 +265,17 @@ def transfers() -> Numbers:
 TRANSFER = {"linear": transfer.interpolated, "conserving": transfer.project}
 
 
-def chain(how: str, radius: float = 30.0, decay: float = 6.0, count: int = 40) -> tuple[np.ndarray, float]:
-    """Masses (count + 1,) of a steep field through a chain of remeshes of one half-disc, and its largest value."""
-    outline = seed(radius, ACROSS_AGGREGATE)
-    masses, largest = [], 0.0
-    old: tuple = ()
-    for k in range(count + 1):
-        refinement = 1.0 + 0.3 * (0.618 * k % 1)
-        grid, _ = meshes.around(outline, refinement, (-105.0, 105.0), 50.0)
-        points, triangles = grid.points[grid.body], grid.topology.body_cells
-        if k == 0:
-            field = np.exp((np.linalg.norm(points, axis=1) - radius) / decay)[:, None]
-        else:
-            field = TRANSFER[how](*old, field, points, triangles)
-        old = points, triangles
-        largest = max(largest, float(field.max()))
-        masses.append(pairs.integral(old, field[:, 0]))
-    return np.array(masses), largest
+def chain(how: str) -> tuple[np.ndarray, float]:
+    """Masses (41,) of a steep field through a chain of remeshes of one half-disc, and its largest value."""
+    outline = seed(30.0, ACROSS_AGGREGATE)
+    refinements = 1 + 0.3 * (0.618 * np.arange(41) % 1)
+    grids = [meshes.around(outline, refinement, (-105.0, 105.0), 50.0)[0] for refinement in refinements]
+    bodies = [(grid.points[grid.body], grid.topology.body_cells) for grid in grids]
+    fields = [np.exp((np.linalg.norm(bodies[0][0], axis=1) - 30.0) / 6.0)[:, None]]
+    for old, new in pairwise(bodies):
+        fields.append(TRANSFER[how](*old, fields[-1], *new))
+    masses = [pairs.integral(body, field[:, 0]) for body, field in zip(bodies, fields)]
+    return np.array(masses), max(float(field.max()) for field in fields)
 
 
 @erratum(

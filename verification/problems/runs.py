@@ -12,7 +12,7 @@ from repro import results
 from repro.march import midpoint, updates
 from repro.march.loop import Instant, Ledger, Step
 from repro.march.simulation import simulate
-from repro.model import pore
+from repro.model import contact, pore
 from repro.model.pore import Pore, Solved
 from repro.scene import Kinetics, Scene, Substrates, load_scene
 from verification.kernel.case import columns
@@ -77,6 +77,17 @@ def step(scene: Scene, now: Pore, solved: Solved, hours: float) -> Step:
     if scene.numerics.time == "updates":
         return updates.step(scene, now, solved, hours)
     return midpoint.attempt(scene, now, solved, hours).step
+
+
+def shape_of(scene: Scene, now: Pore, grown: Pore) -> Pore:
+    """The shape that biomass takes when it has grown, (28)-(34), on the mesh as it was."""
+    return contact.expand(scene, grown, updates.enlarged(scene, now, grown))[0]
+
+
+def next_shape(scene: Scene, now: Pore, solved: Solved, hours: float) -> Pore:
+    """That after an update of so many hours."""
+    grown, _, _ = updates.make_biomass(scene, now, solved, hours)
+    return shape_of(scene, now, grown)
 
 
 def last(scene: Scene) -> Instant:
