@@ -229,7 +229,7 @@ def restarting_as_j(said: Scene, now: Pore, solved: Solved, hours: float) -> Por
 def explicit(said: Scene, now: Pore, solved: Solved, hours: float) -> Pore:
     """The pore after one step with dX_A = dt F_3 and dX_I = dt F_4 at the rates of its beginning, (28)-(29) [E16]."""
     rates = updates.rates_of(said, now, solved.concentrations)
-    grown = replace(now, active=now.active * (1 + hours * rates.growth),
+    grown = replace(now, active=now.active + now.active * hours * rates.growth,
                     inert=now.inert + now.active * hours * rates.remains)
     return remeshing.new_mesh(said, now, shape_of(said, now, grown), solved.flow.mean_velocity)[0]
 

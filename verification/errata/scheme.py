@@ -22,6 +22,7 @@ from verification.errata import (
     state_row,
     table,
 )
+from verification.problems.runs import density
 from verification.switches import CHOICES, NUMBERS, PLOTTED, course, explicit, near, restarting_as_j
 
 TRACTION = CHOICES["traction"].run
@@ -163,9 +164,7 @@ def density_drift() -> Numbers:
 
 def density_rms(said, now) -> float:
     """Root of the mean square of X / X_m - 1 over the aggregate."""
-    weights = now.space.reaction.dx
-    density = (now.active + now.inert) / weights / said.kinetics.maximum_density
-    return float(np.sqrt(np.average((density - 1) ** 2, weights=weights)))
+    return float(np.sqrt(np.average((density(said, now) - 1) ** 2, weights=now.space.reaction.dx)))
 
 
 @erratum(

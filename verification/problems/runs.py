@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import fields, is_dataclass, replace
+from operator import itemgetter
 
 import numpy as np
 
-from reference import averaged_pore
+from reference import averaged_pore, whole_run
 from repro import results
 from repro.march import midpoint, updates
 from repro.march.loop import Instant, Ledger, Step
@@ -67,9 +68,9 @@ def base(end: str, *changes: str, times: Iterable[float] = ()) -> Scene:
     return load_scene("base", (f'growth.end="{end}"', f"output.times={rows}", *changes))
 
 
-def on_wall(heights: np.ndarray) -> np.ndarray:
-    """Heights (n,) of a shape's points with the first and the last on the lower wall to the last bit."""
-    return np.concatenate([[0.0], heights[1:-1], [0.0]])
+def standing(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """(n, 2) um, a shape's points with the first and the last on the lower wall to the last bit."""
+    return np.column_stack([x, np.concatenate([[0.0], y[1:-1], [0.0]])])
 
 
 def step(scene: Scene, now: Pore, solved: Solved, hours: float) -> Step:
@@ -98,9 +99,9 @@ def last(scene: Scene) -> Instant:
 
 def numbers(instant: Instant) -> dict[str, float]:
     """What a run comes to: area (um2), upstream tip (um), conductivity (um/h)."""
-    outline, found = instant.pore.outline, instant.solved.flow
-    shape = {"area": outline.area, "upstream tip": outline.upstream}
-    return shape if found is None else {**shape, "conductivity": found.conductivity}
+    outline = instant.pore.outline
+    return {"area": outline.area, "upstream tip": outline.upstream,
+            "conductivity": instant.solved.flow.conductivity}
 
 
 def without_flow(scene: Scene) -> Scene:
@@ -158,11 +159,14 @@ def scaled(section, length: float, time: float):
     return replace(section, **changes)
 
 
+def density(scene: Scene, now: Pore) -> np.ndarray:
+    """(r, q) (X_A + X_I) / X_m in the points of the reaction."""
+    return (now.active + now.inert) / now.space.reaction.dx / scene.kinetics.maximum_density
+
+
 def density_drift(scene: Scene, instant: Instant) -> float:
-    """Largest |(X_A + X_I) / X_m - 1| in the aggregate."""
-    now = instant.pore
-    density = (now.active + now.inert) / now.space.reaction.dx
-    return np.abs(density / scene.kinetics.maximum_density - 1).max()
+    """Its largest distance from one."""
+    return np.abs(density(scene, instant.pore) - 1).max()
 
 
 def section_means(now: Pore, solved: Solved, x: np.ndarray) -> np.ndarray:
@@ -179,6 +183,18 @@ def growth_rates(law: Kinetics, both: Substrates, acceptor: float | None = None,
     m_a, m_d = (value / (value + half) for value, half in given)
     return (m_a * (law.maximum_utilization_rate * law.yield_coefficient * m_d - law.decay_coefficient),
             m_a * law.decay_coefficient * (1 - law.degradable_fraction))
+
+
+def substrate_defect(steps: Sequence[Ledger]) -> float:
+    """What the balances of both substrates miss at most in some steps, over what is supplied."""
+    return np.max([np.abs(np.array(step.supplied) - step.out - step.consumed - step.stored) / step.supplied
+                   for step in steps])
+
+
+def biomass_defect(steps: Sequence[Ledger]) -> float:
+    """The same of biomass, over that after a step."""
+    return np.max([abs(step.biomass_after - step.biomass_before - step.biomass_made) / step.biomass_after
+                   for step in steps])
 
 
 def worth(law: Kinetics, step: Ledger) -> tuple[float, float]:
@@ -231,6 +247,24 @@ def ours(scene: Scene) -> list[Instant]:
     return list(simulate(scene))[1:]
 
 
+#: The numbers of base as :mod:`reference.whole_run` lists them.
+EIGHT = ("mean_velocity_m_per_d", "conductivity_m_per_d", "aggregate_area_um2", "thickness_um", "upstream_um",
+         "downstream_um", "effluent_acceptor_mg_per_L", "effluent_donor_mg_per_L")
+
+
+def values(times: Sequence[float], *changes: str) -> np.ndarray:
+    """(times, 8) of EIGHT of the table that a run of base writes, at some times (h), the last of them its end."""
+    scene = base(f"{times[-1]} h", *changes, times=times)
+    return np.array([itemgetter(*EIGHT)(results.row(scene, instant)) for instant in ours(scene)])
+
+
+def errors(found: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    """(times, 8) differences of EIGHT: relative, of effluents over the supply."""
+    scale = np.abs(truth)
+    scale[:, 6:] = whole_run.Pore().supply
+    return np.abs(found - truth) / scale
+
+
 def apart(scene: Scene, instants: list[Instant], moments) -> dict[str, float]:
     """The largest differences from the averaged pore at the reported times: of area and velocity relative to the
     latter's, of effluents (the further of both) and of section means of C (along the mesh) over the supply."""
@@ -240,12 +274,17 @@ def apart(scene: Scene, instants: list[Instant], moments) -> dict[str, float]:
 def _less(scene: Scene, instant: Instant, moment: averaged_pore.Moment) -> dict[str, float]:
     row, supply = results.row(scene, instant), scene.substrates.acceptor.supply
     effluents = np.array([row[f"effluent_{name}_mg_per_L"] for name in channels.NAMES])
-    x = np.linspace(*instant.pore.mesh.ends, PLACES)
-    between = [np.interp(x, moment.x, field) for field in moment.fields]
+    here, there = along(instant.pore, instant.solved, moment)
     return {"area": row["aggregate_area_um2"] / moment.area - 1,
             "velocity": row["mean_velocity_m_per_d"] / M_PER_D / moment.velocity - 1,
             "effluents": np.abs(effluents - moment.fields[:, -1]).max() / supply,
-            "C along the pore": np.abs(section_means(instant.pore, instant.solved, x) - between).max() / supply}
+            "C along the pore": np.abs(here - there).max() / supply}
+
+
+def along(now: Pore, solved: Solved, moment: averaged_pore.Moment) -> tuple[np.ndarray, np.ndarray]:
+    """(2, PLACES) section means of C_A and C_D along the mesh, and those of the averaged pore."""
+    x = np.linspace(*now.mesh.ends, PLACES)
+    return section_means(now, solved, x), np.array([np.interp(x, moment.x, field) for field in moment.fields])
 
 
 def worst(rows: list[dict[str, float]]) -> dict[str, float]:
