@@ -84,10 +84,10 @@ SQUARE_LAW = "the square of the transverse Thiele number, as measured in couplin
 def speeds(scene):
     """Two functions (loss, half length) -> u under the scene's head: by lubrication, and by Taylor-Hood's loss around a
     half-disc."""
-    viscosity, head = scene.flow.kinematic_viscosity / scene.flow.gravity, scene.flow.head
-    loss = half_disc_loss(scene.pore.width, scene.pore.length, scene.flow.viscosity_ratio)
-    return (lambda lubrication, _: head / (viscosity * lubrication),
-            lambda _, radius: head / (viscosity * float(loss(radius))))
+    drive = scene.flow
+    push = drive.head * drive.gravity / drive.kinematic_viscosity
+    loss = half_disc_loss(scene.pore.width, scene.pore.length, drive.viscosity_ratio)
+    return lambda lubrication, _: push / lubrication, lambda _, radius: push / float(loss(radius))
 
 
 @cache

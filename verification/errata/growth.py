@@ -19,7 +19,7 @@ from verification.claims.growth_mechanics import sliding, stabilised_by
 from verification.claims.runs import BASE, biomass_defects, half_disc, scene
 from verification.errata import Numbers, erratum, percent, small, table
 from verification.problems import meshes, pairs
-from verification.problems.bodies import Supported, grown
+from verification.problems.bodies import RADIUS, HalfCylinder, Supported, grown
 from verification.switches import CHOICES
 
 #: Elements across the radius; stabilisations of E6.
@@ -63,11 +63,10 @@ def half_disc_body(rings: int) -> Supported:
 
 def cylinder(rings: int, inner: float, more: float) -> Cylinder:
     """The growing half-cylinder."""
-    body, law = half_disc_body(rings), (inner, more, 1.0)
-    R = np.maximum(np.linalg.norm(body.reference, axis=1), 1e-9)
-    stretch = neo_hookean.cylinder_radius(R, *law) / R
-    return Cylinder(body, body.field(lambda x, y: inner + more * (x**2 + y**2)), stretch[:, None] * body.reference,
-                    neo_hookean.cylinder_pressure(R, *law))
+    body, exact = half_disc_body(rings), HalfCylinder(inner, inner + more)
+    places = RADIUS * body.reference.T
+    return Cylinder(body, body.field(lambda x, y: inner + more * (x**2 + y**2)), exact.place(*places) / RADIUS,
+                    exact.pressure(*places))
 
 
 @erratum(

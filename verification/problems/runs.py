@@ -135,26 +135,21 @@ def supplied_everywhere(scene: Scene) -> Scene:
     return with_diffusivities(without_flow(scene), lambda water, biomass: (1e13, 1e13))
 
 
-#: Powers of length and time in the unit of each key that has one.
-POWERS = {
-    "width": (1, 0), "length": (1, 0), "radius": (1, 0), "head": (1, 0), "mean_velocity": (1, -1),
-    "kinematic_viscosity": (2, -1), "gravity": (1, -2), "diffusivity": (2, -1), "diffusivity_in_aggregate": (2, -1),
-    "maximum_utilization_rate": (0, -1), "decay_coefficient": (0, -1), "end": (0, 1), "time_step": (0, 1),
-    "minimum_film": (1, 0),
-}
+#: Powers of length and time in the units of keys.
+UNITS = {"um": (1, 0), "um/h": (1, -1), "um/h^2": (1, -2), "um^2/h": (2, -1), "1/h": (0, -1), "h": (0, 1)}
 
 
 def scaled(section, length: float, time: float):
     """A scene, or a section of it, with its unit of length and of time so many times larger."""
     changes = {}
     for key in fields(section):
-        value = getattr(section, key.name)
+        value, kind = getattr(section, key.name), key.metadata.get("kind")
+        along, during = UNITS.get(getattr(getattr(kind, "whole", kind), "unit", ""), (0, 0))
         if is_dataclass(value):
             changes[key.name] = scaled(value, length, time)
         elif key.name == "times" and value:
             changes[key.name] = tuple(time * t for t in value)
-        elif key.name in POWERS and value is not None:
-            along, during = POWERS[key.name]
+        elif (along or during) and value is not None:
             changes[key.name] = value * length**along * time**during
     return replace(section, **changes)
 
