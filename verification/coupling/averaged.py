@@ -234,8 +234,8 @@ def _strip(aspect: float, elements: str) -> dict[str, float]:
     """Aspect ratio; largest differences; of the ends, relative; (upstream over downstream length - 1) over the averaged
     one's."""
     given = shaped(thin_scene(elements, aspect), half_ellipse(elements, aspect))
-    area, instants = pore.seeded(given).outline.area, runs.ours(given)
-    moments = strip_of(given, area, 2 * runs.CELLS).run(given.output.times)
+    seed, *instants = simulate(given)
+    moments = strip_of(given, seed.pore.outline.area, 2 * runs.CELLS).run(given.output.times)
     ends = np.array([(instants[-1].pore.outline.upstream, instants[-1].pore.outline.downstream), moments[-1].ends])
     ours, theirs = -ends[:, 0] / ends[:, 1] - 1
     return {"size": aspect, **runs.apart(given, instants, moments), "ends": np.abs(ends[0] / ends[1] - 1).max(),

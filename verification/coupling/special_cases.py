@@ -19,7 +19,6 @@ import numpy as np
 
 from reference import poiseuille, whole_run
 from repro.fem import linear
-from repro.fem.mesh import Mesh
 from repro.fem.outline import FREE
 from repro.fem.space import Space
 from repro.march import midpoint
@@ -104,7 +103,7 @@ def equal_viscosities(*changes: str):
     scene = runs.base("1 h", 'aggregate.radius="25 um"', "flow.viscosity_ratio=1.0", *changes)
     first, last = list(simulate(scene))
     grid, found = last.pore.mesh, last.solved.flow
-    bare = Mesh.of(grid.points, grid.cells, np.zeros_like(grid.biomass), np.empty(0, int), grid.width, grid.ends)
+    bare = replace(grid, topology=replace(grid.topology, biomass=np.zeros_like(grid.biomass)))
     empty = flow.unit_flow(Space(bare, last.pore.space.order), 7.0)
     return [at_most("u", np.abs(found.velocity / found.mean_velocity - empty.velocity).max(), 1e-13,
                     runs.ROUND_OFF),

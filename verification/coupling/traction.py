@@ -75,7 +75,7 @@ def _by_biomass(scene, now: pore.Pore, found: Flow) -> np.ndarray:
     """(N, 2) um2 of head: forces of the biomass' triangles, lambda times as viscous, as of a mesh on which biomass and
     fluid are exchanged."""
     mesh = now.mesh
-    other = Mesh.of(mesh.points, mesh.cells, ~mesh.biomass, mesh.loop, mesh.width, mesh.ends)
+    other = replace(mesh, topology=replace(mesh.topology, biomass=~mesh.biomass))
     viscosity = scene.flow.viscosity_ratio * scene.flow.kinematic_viscosity / scene.flow.gravity
     return traction.nodal(Space(other, now.space.order), found, viscosity, scene.numerics.interface)
 
