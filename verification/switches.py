@@ -7,10 +7,8 @@ from, an explicit increment, a seed that leans) is a step or a seed of its own, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import pairwise
-from math import inf
 from time import process_time
 
 import numpy as np
@@ -179,9 +177,6 @@ def near(found: Columns, name: str, times) -> np.ndarray:
     return found[name][np.abs(found["time"] - np.asarray(times)[..., None]).argmin(axis=-1)]
 
 
-Step = Callable[[Scene, Pore, Solved, float], Pore]
-
-
 @dataclass(frozen=True, eq=False)
 class Course:
     """A run of steps or a seed of its own. seconds: of processor time; columns: those of :func:`told`, of t = 0 and
@@ -193,23 +188,21 @@ class Course:
 
 
 @cached
-def course(run: Run, step: Step, bulge: float = 0.0) -> Course:
+def course(run: Run, step: Callable[[Scene, Pore, Solved, float], Pore], bulge: float = 0.0) -> Course:
     """March a run's scene from a seed with a bulge by ``step(said, now, solved, hours)`` -> pore, in the paper's
     updates."""
     said, start = runs.scene(*run), process_time()
-    found = [*_march(said, step, uneven(said, bulge))]
+    now = uneven(said, bulge)
+    found: list[Instant] = []
+    for time in updates.schedule(said)[0]:
+        if found:
+            now = replace(step(said, now, found[-1].solved, time - now.time), time=time)
+        solved = pore.solve(said, now)
+        now = replace(now, concentrations=solved.concentrations)
+        found.append(Instant(now, solved, None, (), 0, {}))
     rows = columns([row(said, each) for each in found])
     plotted = [each for each in found if each.pore.time < PLOTTED + 1e-6][-1]
     return Course(process_time() - start, _told(rows), runs.body_of(said, plotted))
-
-
-def _march(said: Scene, step: Step, now: Pore) -> Iterator[Instant]:
-    for start, end in pairwise([*updates.schedule(said)[0], inf]):
-        solved = pore.solve(said, now)
-        now = replace(now, concentrations=solved.concentrations)
-        yield Instant(now, solved, None, (), 0, {})
-        if end < inf:
-            now = replace(step(said, now, solved, end - start), time=end)
 
 
 def as_it_is(said: Scene, now: Pore, solved: Solved, hours: float) -> Pore:

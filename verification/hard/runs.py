@@ -44,8 +44,9 @@ def remeshes(preset: str) -> list:
 
 
 def _kept(first: Pore, now: Pore) -> list[Check]:
-    share = [biomass.at_nodes(one.space, one.inert / (one.active + one.inert))[one.mesh.body] for one in (first, now)]
-    beyond = max(share[0].min() - share[1].min(), share[1].max() - share[0].max(), 0.0) / np.ptp(share[0])
+    before, after = (biomass.at_nodes(one.space, one.inert / (one.active + one.inert))[one.mesh.body]
+                     for one in (first, now))
+    beyond = max(before.min() - after.min(), after.max() - before.max(), 0.0) / np.ptp(before)
     return [at_most("area, relative change", abs(now.outline.area / first.outline.area - 1), 1e-10,
                     "outlines are split on themselves"),
             at_most("biomass, relative change", abs(now.mass / first.mass - 1), 1e-8, "the transfer conserves it"),
@@ -79,14 +80,14 @@ REMESHES = HardCase(
 def cocircular(preset: str) -> list:
     """Outlines whose nodes are on a circle up to 1e-15, 1e-12, 1e-9, 1e-6 of its radius."""
     made = common.scene("base", preset)
-    checks, plain = [], _meshed(made, 0.0)
+    checks, (_, exact) = [], _meshed(made, 0.0)
     for size in (1e-15, 1e-12, 1e-9, 1e-6):
         grid, loss = _meshed(made, size)
         corners = grid.straight
-        covered = corners.areas.sum() / (corners.width * (corners.ends[1] - corners.ends[0]))
+        covered = corners.areas.sum() / (corners.width * np.ptp(corners.ends))
         checks += [at_most(f"area covered, noise {size:g}", abs(covered - 1), 1e-12, "round-off"),
                    at_least(f"least quality, noise {size:g}", corners.quality.min(), 0.2, "a third of what is poor"),
-                   common.promised(f"head loss against no noise, noise {size:g}", abs(loss / plain[1] - 1), preset)]
+                   common.promised(f"head loss against no noise, noise {size:g}", abs(loss / exact - 1), preset)]
     return checks
 
 
