@@ -196,7 +196,7 @@ def _piece(elements: str, refinement: float, minutes: float, finer: int) -> dict
                       runs.coarser(elements, 0.45 * refinement, refinement),
                       f'growth.time_step="{minutes} min"')
     scene = runs.at_velocity(scene, runs.SPEED)
-    moments = runs.half_disc(scene, cells=finer * runs.CELLS, fluid=finer * runs.FLUID).run((2.0,))
+    moments = runs.half_disc(scene, cells=finer * runs.CELLS).run((2.0,))
     return runs.apart(scene, runs.ours(scene), moments)
 
 
@@ -344,7 +344,6 @@ ROWS = (1.0, 2.0, 3.3, 4.5, 5.7, 7.0)
 ACCEPTOR = 10.0
 #: Cells of the averaged pore, and its accuracy: C is nearly even here. Twice as many cells change the area by 7e-6.
 CELLS = 16
-FLUID = 48
 ACCURACY = 1e-5
 THIELE = "the square of the transverse Thiele number: 1.2 % of the area of base over 64; and as much for the elements"
 #: Bounds where the supply jumps, and where it changes evenly, by preset; cubic: fast with cubic elements.
@@ -381,7 +380,7 @@ def _fed(how: str, preset: str) -> list:
     both = [(end, (ACCEPTOR, first), (ACCEPTOR, first if how == "steps" else last))
             for (_, first), (end, last) in pairwise(COURSES[how])]
     made = supplied(how, preset).at(0.0)
-    return runs.half_disc(made, cells=CELLS, fluid=FLUID).run_through(both, ROWS, ACCURACY)
+    return runs.half_disc(made, cells=CELLS).run_through(both, ROWS, ACCURACY)
 
 
 def supplied(how: str, *changes: str) -> Scene:

@@ -243,7 +243,7 @@ def fixed_point(*changes: str):
     moves = [(_moved(factor, *changes)[1].mesh.points - plain) / factor for factor in (*FACTORS, 1.0)]
     size = np.abs(moves[-1]).max()
     apart = [np.abs(move - moves[-1]).max() / size for move in moves[:-1]]
-    own, before = _defects(FACTORS[-1], *changes)
+    own, before = _defects(*changes)
     yield study("move over force", FACTORS, apart, 1, "quadratic remainder of a smooth map: first order", ceiling=1e-3)
     yield at_most("defect with its own flow", own, 1e-8, "nodes at rest to 1e-8 of R")
     yield at_least("defect with the flow before", before, 1e-5, "else no round is needed")
@@ -259,10 +259,10 @@ def _tips(move: np.ndarray, *changes: str) -> float:
     return along[x.argmax()] / along[x.argmin()]
 
 
-def _defects(factor: float, *changes: str) -> tuple[float, float]:
+def _defects(*changes: str) -> tuple[float, float]:
     """Residual of the equilibrium over the size of its terms under the forces around its own shape, and the last's."""
-    said = _said(factor, *changes)
-    now, found, theta = _moved(factor, *changes)
+    said = _said(FACTORS[-1], *changes)
+    now, found, theta = _moved(FACTORS[-1], *changes)
     nodes, body = now.mesh.body, now.body
     held = contact.constrained(len(nodes), now.mesh.topology.body_loop, now.wall, now.fixed)
     stabilising, defects = None, []

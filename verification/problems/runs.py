@@ -207,8 +207,8 @@ def mass_after(scene: Scene, time: float, acceptor: float | None = None) -> floa
 
 #: um/h in m/d.
 M_PER_D = 24e-6
-#: Cells of the averaged pore: of the aggregate, and on each side of it.
-CELLS, FLUID = 30, 90
+#: Cells of the averaged pore's aggregate.
+CELLS = 30
 #: Sections of a mesh at which means are compared.
 PLACES = 81
 
@@ -230,10 +230,10 @@ def half_disc_radius(area: float) -> float:
     return np.sqrt(2 * area / np.pi)
 
 
-def half_disc(scene: Scene, speed=None, cells: int = CELLS, fluid: int = FLUID) -> averaged_pore.Averaged:
-    """The averaged run of a half-disc of the area that the meshed seed has."""
+def half_disc(scene: Scene, speed=None, cells: int = CELLS) -> averaged_pore.Averaged:
+    """The averaged run of a half-disc of the area that the meshed seed has; three times as many cells on each side."""
     radius = half_disc_radius(pore.seeded(scene).outline.area)
-    return averaged_pore.Averaged(pore_of(scene, speed), *averaged_pore.half_ellipse(radius, radius, cells), fluid,
+    return averaged_pore.Averaged(pore_of(scene, speed), *averaged_pore.half_ellipse(radius, radius, cells), 3 * cells,
                                   keeps_shape=True)
 
 
