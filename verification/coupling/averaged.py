@@ -347,11 +347,10 @@ CELLS = 16
 ACCURACY = 1e-5
 THIELE = "the square of the transverse Thiele number: 1.2 % of the area of base over 64; and as much for the elements"
 #: Bounds where the supply jumps, and where it changes evenly, by preset; cubic: fast with cubic elements.
-HALF = "half of the {} that the preset may err by"
+HALF = 5e-3, "half of the 1 % that the preset may err by"
 SUPPLIED = {"steps": {preset: (4e-4, THIELE) for preset in runs.WITH_EXACT},
-            "linear": {"paper": (1e-3, "second order in 12 min: a quarter of it with 6 min"),
-                       "fast": (5e-3, HALF.format("1 %")), "accurate": (5e-4, HALF.format("0.1 %")),
-                       "cubic": (5e-3, HALF.format("1 %"))}}
+            "linear": {"paper": (1e-3, "second order in 12 min: a quarter of it with 6 min"), "fast": HALF,
+                       "accurate": (5e-4, "half of the 0.1 % that the preset may err by"), "cubic": HALF}}
 
 
 @case("coupling-averaged-supply", kind="cross-code",
