@@ -136,7 +136,8 @@ def supplied_everywhere(scene: Scene) -> Scene:
 
 
 #: Powers of length and time in the units of keys.
-UNITS = {"um": (1, 0), "um/h": (1, -1), "um/h^2": (1, -2), "um^2/h": (2, -1), "1/h": (0, -1), "h": (0, 1)}
+UNITS = {"um": (1, 0), "um^2": (2, 0), "um/h": (1, -1), "um/h^2": (1, -2), "um^2/h": (2, -1), "1/h": (0, -1),
+         "h": (0, 1)}
 
 
 def scaled(section, length: float, time: float):
