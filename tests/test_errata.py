@@ -10,6 +10,8 @@ from verification.claims import runs
 from verification.claims.runs import BASE, PLATES
 from verification.errata import ERRATA
 from verification.errata.__main__ import REPORT, load
+from verification.errata.scheme import HALF_STEP
+from verification.errata.substrates import NO_D_C
 from verification.switches import CHOICES, NUMBERS
 
 IDS = load()
@@ -56,13 +58,14 @@ def test_the_text_of_a_slow_entry_is_the_programs(report):
 
 
 # Switches.
-@pytest.mark.parametrize("switch", [*CHOICES.values(), *NUMBERS], ids=lambda switch: switch.change)
-def test_a_choice_changes_what_it_names_and_nothing_else(switch):
+@pytest.mark.parametrize("run", [*(switch.run for switch in (*CHOICES.values(), *NUMBERS)), HALF_STEP, NO_D_C],
+                         ids=lambda run: run[1])
+def test_a_choice_changes_what_it_names_and_nothing_else(run):
     """Against the paper's preset."""
-    plain, changed = (scene_tables(runs.scene(*run)) for run in (PLATES, switch.run))
+    plain, changed = (scene_tables(runs.scene(*run)) for run in (PLATES, run))
     apart = [f"{name}.{key}" for name, table in plain.items() if isinstance(table, dict) for key in table
              if table[key] != changed[name][key]]
-    assert apart == [switch.change.partition("=")[0]] and plain["numerics"]["preset"] == "paper"
+    assert apart == [run[1].partition("=")[0]] and plain["numerics"]["preset"] == "paper"
 
 
 SHORT = (*BASE, "numerics.refinement=0.5", 'aggregate.radius="15 um"', 'growth.end="0.8 h"', 'growth.time_step="0.4 h"')
@@ -86,7 +89,7 @@ def test_one_state_tells_two_scenes_apart_on_one_mesh():
 def test_the_effect_of_a_whole_run_is_hardly_that_of_its_mesh():
     """Another shape is solved in on the default's mesh, brought to it: a larger aggregate of the same shape too."""
     default, finer = short(), short("numerics.refinement=0.52")
-    one, two = (each(default, finer) for each in (switches.whole_run, switches.two_meshes))
+    one, two = (each(default, finer) for each in (switches.whole_run, switches.effect))
     assert abs(one["velocity"]) < 0.3 * abs(two["velocity"]) and one["area"] == two["area"]
     wide = short('aggregate.radius="15.15 um"')
     before, after = default.pore.outline, switches.reshaped(default.pore, wide.pore.outline).outline
@@ -96,8 +99,8 @@ def test_the_effect_of_a_whole_run_is_hardly_that_of_its_mesh():
 
 def test_marching_is_the_run():
     """Our own loop and the package's make the same steps, and tell the same of them."""
-    found, rows = switches.course(SHORT, switches.as_it_is), switches.columns(SHORT)
+    found, rows = switches.course(SHORT, switches.as_it_is), switches.told(SHORT)
     assert {len(column) for column in found.columns.values()} == {3} and found.columns["drift"].max() < 0.01
-    assert found.plotted.quantities == short().quantities
+    assert switches.quantities(found.plotted) == switches.quantities(short())
     for name, column in found.columns.items():
         assert rows[name] == pytest.approx(column, rel=1e-12, abs=1e-12)

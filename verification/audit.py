@@ -25,8 +25,9 @@ from verification import switches
 from verification.bench.record import machine
 from verification.claims import runs
 from verification.claims.runs import BASE, PLATES, UPDATE
+from verification.kernel.case import columns
 from verification.kernel.writing import Block, plain, save, table
-from verification.switches import CHOICES, NOT_AUDITED, PLOTTED, Course, Switch, state
+from verification.switches import CHOICES, PLOTTED, Course, Switch, state
 
 RECORD = Path(__file__).parent / "report" / "audit.json"
 #: Runs in turn of which the processor times are the medians.
@@ -44,8 +45,7 @@ METHOD = (f"base, preset paper, at {PLOTTED:g} h in steps of {60 * UPDATE:g} min
 def main() -> int:
     """Entry point."""
     noise = mesh()
-    chosen = [switch for name, switch in CHOICES.items() if name not in NOT_AUDITED]
-    rows = [noise, *(measured(switch, cost(switch.run)) for switch in chosen), drift(), *symmetry()]
+    rows = [noise, *(measured(switch, cost(switch.run)) for switch in CHOICES.values()), drift(), *symmetry()]
     rows = [{**row, "resolved": resolved(row["effect"], row.get("noise", noise["effect"]))} for row in rows]
     record = {"machine": machine(), "method": METHOD, "rows": rows}
     save(record, RECORD)
@@ -55,15 +55,11 @@ def main() -> int:
 
 def mesh() -> dict:
     """What runs differ by on meshes of the same fineness to 2.5 %: the largest of each quantity."""
-    found = _worst([switches.whole_run(state(BASE), state(switch.run)) for switch in switches.FINENESS])
+    effects = columns([switches.whole_run(state(BASE), state(switch.run)) for switch in switches.FINENESS])
     told = Switch("mesh", "refinement 1", "refinement 0.975 to 0.995", "", note="no choice: what runs on meshes of the "
                   "same fineness differ by; less than twice that is not resolved")
-    return row(told, cost(switches.FINENESS[-1].run, 1), found)
-
-
-def _worst(effects: list[dict[str, float]]) -> dict[str, float]:
-    columns = zip(*(each.values() for each in effects))
-    return {name: max(column, key=abs) for name, column in zip(effects[0], columns)}
+    return row(told, cost(switches.FINENESS[-1].run, 1),
+               {name: max(column, key=abs) for name, column in effects.items()})
 
 
 def measured(switch: Switch, ratio: float) -> dict:
@@ -95,7 +91,7 @@ def drift() -> dict:
     """theta restarting at a remesh as J X / X_m against J: the drift of (28) [E7]."""
     other = switches.course(BASE, switches.restarting_as_j)
     drifts = {name: float(found["drift"].max()) for name, found in
-              (("default", switches.columns(BASE)), ("alternative", other.columns))}
+              (("default", switches.told(BASE)), ("alternative", other.columns))}
     note = f"drift, max |X / X_m - 1| over the run: {drifts['default']:.2g} against {drifts['alternative']:.2g} [E7]"
     told = _marched(other, Switch("theta after a remesh (28)", "J X / X_m", "J", "", note=note))
     return {**told, "drift": drifts}
@@ -103,11 +99,11 @@ def drift() -> dict:
 
 def symmetry() -> list[dict]:
     """A half-disc against one whose downstream tip, or upstream tip, reaches out by 1 %, the other tip less by that."""
-    plain, rows = switches.columns(BASE), []
-    for word, seed in (("upstream", switches.longer_upstream), ("downstream", switches.longer_downstream)):
-        other = switches.course(BASE, switches.as_it_is, seed)
-        lean = switches.near(other.columns, "lean", TIMES) - switches.near(plain, "lean", TIMES)
-        off = ", ".join(f"{100 * value:+.2f} % at {time:g} h" for value, time in zip(lean, TIMES))
+    rows = []
+    for word, bulge in (("upstream", -switches.BULGE), ("downstream", switches.BULGE)):
+        other = switches.course(BASE, switches.as_it_is, bulge)
+        ours, theirs = (switches.near(found, "lean", TIMES) for found in (other.columns, switches.told(BASE)))
+        off = ", ".join(f"{100 * value:+.2f} % at {time:g} h" for value, time in zip(ours - theirs, TIMES))
         rows.append(_marched(other, Switch(
             "symmetry of the seed", "half-disc", f"1 % longer {word}", "",
             note=f"R (1 + 0.01 cos 3 phi), area as before; the middle between the tips is off by {off}")))
@@ -122,11 +118,6 @@ def row(switch: Switch, ratio: float, effects: dict[str, float]) -> dict:
     """A row of the record."""
     return {"choice": switch.choice, "default": switch.default, "alternative": switch.alternative, "cost_ratio": ratio,
             "effect": effects, "one_state": {}, "note": switch.note}
-
-
-def largest(effects: dict[str, float]) -> str:
-    """The quantity that changes most; an empty word where there is none."""
-    return max(effects, key=lambda name: abs(effects[name]), default="")
 
 
 def resolved(effects: dict[str, float], noise: dict[str, float]) -> list[str]:
@@ -148,13 +139,13 @@ def blocks(record: dict) -> Iterator[Block]:
 
 def _choice(row: dict) -> tuple[str, ...]:
     effect = row["effect"]
-    changes = (_change(effect[name]) if name in effect else "" for name in ("velocity", "area", "acceptor leaving"))
+    changes = (_change(effect[name]) for name in ("velocity", "area", "acceptor leaving"))
     return (row["choice"], row["default"], row["alternative"], f"{row['cost_ratio']:.2f}", *changes, _told(effect),
             _told(row["one_state"]), row["note"])
 
 
 def _told(effects: dict[str, float]) -> str:
-    name = largest(effects)
+    name = max(effects, key=lambda name: abs(effects[name]), default="")
     return f"{_change(effects[name])} ({name})" if name else ""
 
 

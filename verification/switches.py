@@ -7,27 +7,27 @@ from, an explicit increment, a seed that leans) is a step or a seed of its own, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from time import process_time
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from repro.errors import StageError
-from repro.fem.outline import Outline, half_disc
-from repro.fem.sizing import ACROSS_AGGREGATE
+from repro.fem.outline import Outline
 from repro.march import updates
 from repro.march.loop import Instant
-from repro.model import contact, mesh_motion, pore, remeshing
+from repro.model import mesh_motion, pore, remeshing
 from repro.model.pore import Pore, Solved
 from repro.results import row
 from repro.scene import Scene
 from verification.claims import runs
 from verification.claims.levels import CONVERGED, FINE, Level, at_level, cached, forget
-from verification.claims.runs import BASE, LAST, PLOTTED, UPDATE, Columns, Run
-from verification.kernel import case
+from verification.claims.runs import BASE, LAST, PLOTTED, UPDATE, Body, Columns, Run
+from verification.kernel.case import columns
 from verification.problems import aggregates
+from verification.problems.channels import pair
+from verification.problems.runs import next_shape, shape_of
 
 
 @dataclass(frozen=True)
@@ -45,8 +45,13 @@ class Switch:
 
     @property
     def run(self) -> Run:
-        """Base with the change, of which the rows of t = 0 and of the last two shapes are kept."""
-        return (*BASE, self.change, LAST)
+        """Base with the change."""
+        return changed(self.change)
+
+
+def changed(change: str) -> Run:
+    """Base with a change, of which the rows of t = 0 and of the last two shapes are kept."""
+    return (*BASE, change, LAST)
 
 
 F_EXACT = "COD - Y d_c = 2.38 - 0.61 x 1.42; Table 1 prints 1.52 [E1]"
@@ -74,11 +79,7 @@ CHOICES = {
                        note="2.3.3; the same node throughout base, whose contact surface stays even about it"),
     "midpoint": Switch("steps in time", "updates of 12 min", "midpoint, tolerance 0.01", 'numerics.time="midpoint"',
                        False, "first order in the step against second"),
-    "decay": Switch("oxygen demand of decay (7)", "d_c f_d b", "f_d b", "kinetics.decay_oxygen_demand=1.0"),
-    "half step": Switch("steps in time", "updates of 12 min", "updates of 6 min", 'growth.time_step="6 min"', False),
 }
-#: What the errata alone tell.
-NOT_AUDITED = ("decay", "half step")
 #: Numbers that are not printed [E13]: {key: (the paper's symbol or our word, ours, others)}.
 _NUMBERS = {"flow_stabilisation": ("c", 100, (25, 50, 200, 400)), "mesh_compressibility": ("gamma", 1, (0.1, 10)),
             "refinement": ("refinement", 1, (0.7, 1.4))}
@@ -92,53 +93,31 @@ FINENESS = [Switch("mesh", "refinement 1", f"refinement {value}", f"numerics.ref
 EFFLUENTS = ("acceptor leaving", "donor leaving")
 
 
-@dataclass(frozen=True, eq=False)
-class State:
-    """The pore of a scene at a time, and what is solved in it."""
-
-    scene: Scene
-    pore: Pore
-    solved: Solved
-
-    @property
-    def quantities(self) -> dict[str, float]:
-        """What it comes to: um/h, mg/L, um2, um."""
-        return {**_flow_quantities(self.solved), **_shape(self.pore.outline)}
+def state(run: Run, time: float = PLOTTED) -> Body:
+    """The pore of a run in its row at a time (h), and what is solved in it."""
+    return runs.body(run, time)
 
 
-def state(run: Run, time: float = PLOTTED) -> State:
-    """That of a run's row at a time (h)."""
-    instant = runs.instant(run, time)
-    return State(runs.history(*run).scene, instant.pore, instant.solved)
+def quantities(found: Body) -> dict[str, float]:
+    """What is solved around an aggregate, and its shape: um/h, mg/L, um2, um."""
+    flow, shape = found.solved.flow, found.outline
+    return {"velocity": flow.mean_velocity, "conductivity": flow.conductivity,
+            **{name: flux.effluent for name, flux in zip(EFFLUENTS, found.solved.fluxes)}, "area": shape.area,
+            "thickness": shape.thickness, "upstream": shape.upstream, "downstream": shape.downstream}
 
 
-def _flow_quantities(solved: Solved) -> dict[str, float]:
-    return {"velocity": solved.flow.mean_velocity, "conductivity": solved.flow.conductivity,
-            **{name: flux.effluent for name, flux in zip(EFFLUENTS, solved.fluxes)}}
-
-
-def _shape(outline: Outline) -> dict[str, float]:
-    return {"area": outline.area, "thickness": outline.thickness, "upstream": outline.upstream,
-            "downstream": outline.downstream}
-
-
-def effect(said: Scene, default: dict[str, float], other: dict[str, float]) -> dict[str, float]:
+def effect(default: Body, other: Body) -> dict[str, float]:
     """The other over the default, less 1; effluents: their difference over the supply."""
-    supply = dict(zip(EFFLUENTS, (said.substrates.acceptor.supply, said.substrates.donor.supply)))
-    return {name: float((other[name] - value) / supply.get(name, value)) for name, value in default.items()}
+    supply = dict(zip(EFFLUENTS, pair("supply", other.scene.substrates)))
+    ours = quantities(other)
+    return {name: float((ours[name] - value) / supply.get(name, value)) for name, value in quantities(default).items()}
 
 
-def whole_run(default: State, other: State) -> dict[str, float]:
+def whole_run(default: Body, other: Body) -> dict[str, float]:
     """The effect of two whole runs, flow and substrates of the other's shape solved on the default's mesh, so that it
     does not tell how two meshes differ."""
-    there = reshaped(default.pore, other.pore.outline)
-    found = {**other.quantities, **_flow_quantities(pore.solve(other.scene, there))}
-    return effect(other.scene, default.quantities, found)
-
-
-def two_meshes(default: State, other: State) -> dict[str, float]:
-    """The effect of two whole runs as they are, each on its own mesh."""
-    return effect(other.scene, default.quantities, other.quantities)
+    there = reshaped(default.pore, other.outline)
+    return effect(default, replace(other, solved=pore.solve(other.scene, there)))
 
 
 def converged(switch: Switch) -> tuple[dict[str, float], dict[str, float]]:
@@ -148,11 +127,9 @@ def converged(switch: Switch) -> tuple[dict[str, float], dict[str, float]]:
     for size in FINE:
         level = Level(CONVERGED, size)
         with at_level(level):
-            found.append(two_meshes(state((*BASE, LAST)), state(switch.run)))
+            found.append(effect(state((*BASE, LAST)), state(switch.run)))
         forget(level)
-    finest, *coarser = found
-    apart = case.columns(coarser)
-    return finest, {name: float(np.abs(apart[name] - value).max()) for name, value in finest.items()}
+    return found[0], {name: float(np.abs(sizes - sizes[0]).max()) for name, sizes in columns(found).items()}
 
 
 def reshaped(now: Pore, outline: Outline) -> Pore:
@@ -173,18 +150,16 @@ def _radius(outline: Outline) -> CubicSpline:
     return CubicSpline(angle[order], np.hypot(x, y)[order])
 
 
-def one_state(found: State, changed: Scene) -> dict[str, float]:
+def one_state(found: Body, other: Scene) -> dict[str, float]:
     """The effect in one state: flow and substrates solved in it, and the shape of the next step, by either scene."""
-    rows = []
-    for said in (found.scene, changed):
+    bodies = []
+    for said in (found.scene, other):
         solved = pore.solve(said, found.pore)
-        grown, _, _ = updates.make_biomass(said, found.pore, solved, UPDATE)
-        outline = contact.expand(said, grown, updates.enlarged(said, found.pore, grown))[0].outline
-        rows.append({**_flow_quantities(solved), **_shape(outline)})
-    return effect(found.scene, *rows)
+        bodies.append(Body(said, next_shape(said, found.pore, solved, UPDATE), solved))
+    return effect(*bodies)
 
 
-def columns(run: Run) -> Columns:
+def told(run: Run) -> Columns:
     """Of a run's rows: "time" h, "velocity" m/d, "area" um2, "drift", largest |(X_A + X_I) / X_m - 1|, and "lean", the
     middle between the tips over half their distance."""
     return _told(runs.series(*run))
@@ -202,43 +177,32 @@ def near(found: Columns, name: str, times) -> np.ndarray:
     return found[name][np.abs(found["time"] - np.asarray(times)[..., None]).argmin(axis=-1)]
 
 
-Step = Callable[[Scene, Pore, Solved, float], Pore]
-
-
 @dataclass(frozen=True, eq=False)
 class Course:
-    """A run of steps or a seed of its own. seconds: of processor time; columns: those of :func:`columns`, of t = 0 and
+    """A run of steps or a seed of its own. seconds: of processor time; columns: those of :func:`told`, of t = 0 and
     each update; plotted: the state at 19.2 h, or the last before."""
 
     seconds: float
     columns: Columns
-    plotted: State
+    plotted: Body
 
 
 @cached
-def course(run: Run, step: Step, seeded: Callable[[Scene], Pore] = pore.seeded) -> Course:
-    """March a run's scene from a seed by ``step(said, now, solved, hours)`` -> pore, in the paper's updates."""
-    said = runs.scene(*run)
-    rows = []
-    start = process_time()
-    try:
-        for now, solved in _march(said, step, seeded(said)):
-            rows.append(row(said, Instant(now, solved, None, (), 0, {})))
-            if now.time < PLOTTED + 1e-6:
-                plotted = State(said, now, solved)
-    except StageError as error:
-        raise RuntimeError(f"a run by {step.__name__} fails after {len(rows) - 1} steps") from error
-    return Course(process_time() - start, _told(case.columns(rows)), plotted)
-
-
-def _march(said: Scene, step: Step, now: Pore) -> Iterator[tuple[Pore, Solved]]:
-    solved = pore.solve(said, now)
-    yield now, solved
-    for time in updates.schedule(said)[0][1:]:
-        now = replace(now, concentrations=solved.concentrations)
-        now = replace(step(said, now, solved, time - now.time), time=time)
+def course(run: Run, step: Callable[[Scene, Pore, Solved, float], Pore], bulge: float = 0.0) -> Course:
+    """March a run's scene from a seed with a bulge by ``step(said, now, solved, hours)`` -> pore, in the paper's
+    updates."""
+    said, start = runs.scene(*run), process_time()
+    now = uneven(said, bulge)
+    found: list[Instant] = []
+    for time in updates.schedule(said)[0]:
+        if found:
+            now = replace(step(said, now, found[-1].solved, time - now.time), time=time)
         solved = pore.solve(said, now)
-        yield now, solved
+        now = replace(now, concentrations=solved.concentrations)
+        found.append(Instant(now, solved, None, (), 0, {}))
+    rows = columns([row(said, each) for each in found])
+    plotted = [each for each in found if each.pore.time < PLOTTED + 1e-6][-1]
+    return Course(process_time() - start, _told(rows), runs.body_of(said, plotted))
 
 
 def as_it_is(said: Scene, now: Pore, solved: Solved, hours: float) -> Pore:
@@ -249,40 +213,28 @@ def as_it_is(said: Scene, now: Pore, solved: Solved, hours: float) -> Pore:
 def restarting_as_j(said: Scene, now: Pore, solved: Solved, hours: float) -> Pore:
     """The pore after one step; after a remesh theta = J [E7]."""
     done = updates.step(said, now, solved, hours)
-    if not done.remeshed:
-        return done.pore
     after = done.pore
-    return replace(after, theta=after.body.strained(after.mesh.points[after.mesh.body]).J)
+    if done.remeshed:
+        return replace(after, theta=after.body.strained(after.mesh.points[after.mesh.body]).J)
+    return after
 
 
 def explicit(said: Scene, now: Pore, solved: Solved, hours: float) -> Pore:
     """The pore after one step with dX_A = dt F_3 and dX_I = dt F_4 at the rates of its beginning, (28)-(29) [E16]."""
     rates = updates.rates_of(said, now, solved.concentrations)
-    gain, remains = (now.active * hours * rate for rate in (rates.growth, rates.remains))
-    grown = replace(now, active=now.active + gain, inert=now.inert + remains)
-    expanded, *_ = contact.expand(said, grown, updates.enlarged(said, now, grown))
-    return remeshing.new_mesh(said, now, expanded, solved.flow.mean_velocity)[0]
+    grown = replace(now, active=now.active + now.active * hours * rates.growth,
+                    inert=now.inert + now.active * hours * rates.remains)
+    return remeshing.new_mesh(said, now, shape_of(said, now, grown), solved.flow.mean_velocity)[0]
 
 
-#: The seed's radius is R (1 + BULGE cos 3 phi) or R (1 - BULGE cos 3 phi): area as before to second order. With cos phi
-#: it would be a half-disc again, moved.
+#: The seed's radius is R (1 + BULGE cos 3 phi) or R (1 - BULGE cos 3 phi): area as before to second order, one tip
+#: further out by 1 %, the other one less by that. With cos phi it would be a half-disc again, moved.
 BULGE = 0.01
-
-
-def longer_downstream(said: Scene) -> Pore:
-    """At t = 0, the downstream tip further out by 1 % and the upstream tip less by that."""
-    return uneven(said, BULGE)
-
-
-def longer_upstream(said: Scene) -> Pore:
-    """The other way round."""
-    return uneven(said, -BULGE)
 
 
 def uneven(said: Scene, bulge: float) -> Pore:
     """The pore at t = 0 with a seed of radius R (1 + bulge cos 3 phi), phi from downstream."""
-    numerics = said.numerics
-    seed = half_disc(said.aggregate.radius, ACROSS_AGGREGATE * numerics.refinement, numerics.geometry)
+    seed = pore.initial_outline(said)
     points = seed.points * (1 + bulge * np.cos(3 * np.arctan2(*seed.points.T[::-1])))[:, None]
     made = pore.generate(said, replace(seed, points=points, origin=points.copy()))
-    return aggregates.at_start(*made, numerics.order)
+    return aggregates.at_start(*made, said.numerics.order)

@@ -30,7 +30,7 @@ from repro.model import flow, pore
 from repro.scene import Scene
 from verification.kernel.case import at_least, at_most, between, case, refine, studies, study
 from verification.problems import runs
-from verification.problems.channels import NAMES
+from verification.problems.channels import NAMES, SCENE
 
 TIMES = (2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0, 19.4)
 #: Radii (um) at which Taylor-Hood elements give a half-disc's loss, and the reach of their meshes beyond it.
@@ -48,39 +48,34 @@ RADII, REACH = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 33.0), 75.0
 def base(*changes: str):
     scene = runs.base("19.4 h", *changes, times=TIMES)
     instants = runs.ours(scene)
-    thin, own = _clogged(changes[0])
-    flow, rest = (runs.apart(scene, instants, moments) for moments in (thin, own))
-    checks = [between("velocity, lubrication", flow["velocity"], 0.09, 0.12,
-                      "lubrication loses 11.3 % of the loss around a half-disc of 30 um, by Taylor-Hood; less what its "
-                      "aggregate, 2 % larger, gains"),
-              at_most("velocity, the loss of a half-disc of our area", _at_our_area(scene, instants), 0.01,
-                      "linear elements: 0.3 % at the ends of the mesh, 0.5 % around the aggregate")]
+    flow, rest = (runs.apart(scene, instants, moments) for moments in _clogged(changes[0]))
+    yield between("velocity, lubrication", flow["velocity"], 0.09, 0.12,
+                  "lubrication loses 11.3 % of the loss around a half-disc of 30 um, by Taylor-Hood; less what its "
+                  "aggregate, 2 % larger, gains")
+    yield at_most("velocity, the loss of a half-disc of our area", _at_our_area(scene, instants), 0.01, LINEAR)
     if scene.numerics.preset == "paper":  # the others: 1.6 % with the averaged area, without linear elements' error
-        checks.append(at_most("velocity, a half-disc's loss", rest["velocity"], 0.01,
-                              "linear elements: 0.3 % at the ends of the mesh, 0.5 % around the aggregate"))
-    checks += [at_most(f"{name}, a half-disc's loss", rest[name], bound, SQUARE_LAW)
-               for name, bound in (("area", 0.013), ("effluents", 0.02), ("C along the pore", 0.02))]
-    return checks
+        yield at_most("velocity, a half-disc's loss", rest["velocity"], 0.01, LINEAR)
+    for name, bound in zip(APART, (0.013, 0.02, 0.02)):
+        yield at_most(f"{name}, a half-disc's loss", rest[name], bound, SQUARE_LAW)
 
 
+LINEAR = "linear elements: 0.3 % at the ends of the mesh, 0.5 % around the aggregate"
 #: What is compared of a run and its averaged pore.
 APART = ("area", "effluents", "C along the pore")
 
 
 @cache
-def _clogged(preset: str) -> tuple[list, list]:
+def _clogged(preset: str) -> list[list]:
     """The averaged pore's moments at TIMES under both losses, from the seed of a preset."""
     scene = runs.base("19.4 h", preset)
-    thin, own = (runs.half_disc(scene, speed).run(TIMES) for speed in speeds(scene))
-    return thin, own
+    return [runs.half_disc(scene, speed).run(TIMES) for speed in speeds(scene)]
 
 
 def _at_our_area(scene, instants) -> float:
     """Largest relative difference of the velocity from that under the loss of a half-disc of the same area."""
     _, own = speeds(scene)
-    ours = [(instant.solved.flow.mean_velocity, runs.half_disc_radius(instant.pore.outline.area))
-            for instant in instants]
-    return max(abs(speed / own(None, radius) - 1) for speed, radius in ours)
+    return max(abs(found.solved.flow.mean_velocity / own(None, runs.half_disc_radius(found.pore.outline.area)) - 1)
+               for found in instants)
 
 
 SQUARE_LAW = "the square of the transverse Thiele number, as measured in coupling-averaged-run: 1.2 % of the area"
@@ -89,21 +84,21 @@ SQUARE_LAW = "the square of the transverse Thiele number, as measured in couplin
 def speeds(scene):
     """Two functions (loss, half length) -> u under the scene's head: by lubrication, and by Taylor-Hood's loss around a
     half-disc."""
-    viscosity, head = scene.flow.kinematic_viscosity / scene.flow.gravity, scene.flow.head
-    loss = half_disc_loss(scene.pore.width, scene.pore.length, scene.flow.viscosity_ratio)
-    return (lambda lubrication, _: head / (viscosity * lubrication),
-            lambda _, radius: head / (viscosity * float(loss(radius))))
+    drive = scene.flow
+    push = drive.head * drive.gravity / drive.kinematic_viscosity
+    loss = half_disc_loss(scene.pore.width, scene.pore.length, drive.viscosity_ratio)
+    return lambda lubrication, _: push / lubrication, lambda _, radius: push / float(loss(radius))
 
 
 @cache
 def half_disc_loss(width: float, length: float, ratio: float) -> CubicSpline:
     """Loss of the whole pore per mean velocity (without nu/g) as a function of the radius, by Taylor-Hood elements."""
-    found = [poiseuille.head_loss(length, width, 1.0, 1.0)]
+    losses = [poiseuille.head_loss(length, width, 1.0, 1.0)]
     for radius in RADII:
-        ends = (-radius - REACH, radius + REACH)
-        rest = poiseuille.head_loss(length - ends[1] + ends[0], width, 1.0, 1.0)
-        found.append(rest + taylor_hood.stokes(taylor_hood.half_disc(width, ends, radius, 0), ratio).loss)
-    return CubicSpline([0.0, *RADII], found)
+        reach = radius + REACH
+        rest = poiseuille.head_loss(length - 2 * reach, width, 1.0, 1.0)
+        losses.append(rest + taylor_hood.stokes(taylor_hood.half_disc(width, (-reach, reach), radius, 0), ratio).loss)
+    return CubicSpline([0.0, *RADII], losses)
 
 
 SQUARE = "regular perturbation in 1 / D: the square of the transverse Thiele number"
@@ -129,24 +124,23 @@ FASTER = (4.0, 16.0, 64.0, 256.0)
 def mixing(*changes: str):
     found = refine(_leaving, FASTER, runs.base("0 h", 'aggregate.radius="20 um"', *changes))
     for name in NAMES:
-        yield study(f"effluent {name} (mg/L)", found["size"], np.abs(found[name]), 2, SQUARE, ceiling=2.5e-5)
-        yield between(f"{name}: disagreement over first-order theory", found[name][-1] / found[f"first {name}"][-1],
-                      0.995, 1.005,
+        yield study(f"effluent {name} (mg/L)", found["size"], found[name], 2, SQUARE, ceiling=2.5e-5)
+        yield between(f"{name}: disagreement over first-order theory", found[f"{name} over first"][-1], 0.995, 1.005,
                       "the next order: 0.2 %, a quarter of that at D times 64; mesh: 0.7 % at refinement 1 of linear "
                       "elements, less than half of that here")
 
 
 def _leaving(factor: float, scene: Scene) -> dict[str, float]:
-    """Thiele number; mg/L: effluents, ours less the averaged pore's, and what they are to first order."""
+    """Thiele number; mg/L: effluents, ours less the averaged pore's, in size, and over what they are to first order."""
     scene = runs.with_diffusivities(scene, lambda water, _: (factor * water, factor * water))
     scene = runs.at_velocity(scene, runs.SPEED)
     row = results.row(scene, next(simulate(scene)))
-    theirs = runs.half_disc(scene).seed().fields[:, -1]
     radius = runs.half_disc_radius(row["aggregate_area_um2"])
     first = averaged_pore.excess(runs.pore_of(scene), radius, runs.SPEED)
     found = {"size": thiele(scene)}
-    for name, trusted, more in zip(NAMES, theirs, first):
-        found |= {name: row[f"effluent_{name}_mg_per_L"] - trusted, f"first {name}": more}
+    for name, trusted, more in zip(NAMES, runs.half_disc(scene).seed().fields[:, -1], first):
+        gap = row[f"effluent_{name}_mg_per_L"] - trusted
+        found |= {name: abs(gap), f"{name} over first": gap / more}
     return found
 
 
@@ -177,7 +171,7 @@ def _whole(factor: float, preset: str) -> dict[str, float]:
     """Thiele number and largest differences of one run."""
     finer = ("numerics.tolerance=0.0002",) if preset == "accurate" else ()
     scene = runs.faster(runs.base("19.4 h", runs.by(preset), *finer, times=MIXING_TIMES), factor)
-    moments = runs.half_disc(scene).run(MIXING_TIMES, accuracy=1e-6)
+    moments = runs.half_disc(scene).run(MIXING_TIMES)
     return {"size": thiele(scene), **runs.apart(scene, runs.ours(scene), moments)}
 
 
@@ -202,14 +196,12 @@ def _piece(elements: str, refinement: float, minutes: float, finer: int) -> dict
                       runs.coarser(elements, 0.45 * refinement, refinement),
                       f'growth.time_step="{minutes} min"')
     scene = runs.at_velocity(scene, runs.SPEED)
-    moments = runs.half_disc(scene, cells=finer * runs.CELLS, fluid=finer * runs.FLUID).run((2.0,))
+    moments = runs.half_disc(scene, cells=finer * runs.CELLS).run((2.0,))
     return runs.apart(scene, runs.ours(scene), moments)
 
 
 WIDTH, THICKNESS = 20.0, 5.0
 ASPECTS = (0.5, 0.25, 0.125, 0.0625)
-#: X_m (mg/L) over the square of the aspect ratio.
-DENSITY = 3e6
 THIN_SQUARE = "regular perturbation: the square of the aspect ratio"
 
 
@@ -229,20 +221,21 @@ def strip(elements: str):
                     "the same: 0.4 %, and as much for the step in time"))
 
 
-def thin_scene(elements: str, aspect: float) -> Scene:
-    """Base for 1 h in a narrow pore, from a seed whose half length is its thickness over ``aspect``."""
-    changes = (runs.of(elements), runs.coarser(elements, 0.5), f'aggregate.radius="{THICKNESS} um"',
-               f'pore.width="{WIDTH} um"', 'growth.time_step="6 min"', 'growth.minimum_contact_angle="0.01 deg"')
-    found = runs.at_velocity(runs.base("1 h", *changes, times=(0.5, 1.0)), 5 * aspect * runs.SPEED)
-    return replace(found, kinetics=replace(found.kinetics, maximum_density=DENSITY * aspect**2))
+def thin_scene(elements: str, aspect: float, speed: float = 5 * runs.SPEED, density: float = 3e6) -> Scene:
+    """Base for 1 h in a narrow pore, from a seed whose half length is its thickness over ``aspect``; speed: mean
+    velocity (um/h) over the aspect ratio; density: X_m (mg/L) over its square."""
+    found = runs.base("1 h", runs.of(elements), runs.coarser(elements, 0.5), f'aggregate.radius="{THICKNESS} um"',
+                      f'pore.width="{WIDTH} um"', f'kinetics.maximum_density="{density * aspect**2} mg/L"',
+                      'growth.time_step="6 min"', 'growth.minimum_contact_angle="0.01 deg"', times=(0.5, 1.0))
+    return runs.at_velocity(found, speed * aspect)
 
 
 def _strip(aspect: float, elements: str) -> dict[str, float]:
     """Aspect ratio; largest differences; of the ends, relative; (upstream over downstream length - 1) over the averaged
     one's."""
     given = shaped(thin_scene(elements, aspect), half_ellipse(elements, aspect))
-    area, instants = pore.seeded(given).outline.area, runs.ours(given)
-    moments = strip_of(given, area, 2 * runs.CELLS).run(given.output.times)
+    seed, *instants = simulate(given)
+    moments = strip_of(given, seed.pore.outline.area, 2 * runs.CELLS).run(given.output.times)
     ends = np.array([(instants[-1].pore.outline.upstream, instants[-1].pore.outline.downstream), moments[-1].ends])
     ours, theirs = -ends[:, 0] / ends[:, 1] - 1
     return {"size": aspect, **runs.apart(given, instants, moments), "ends": np.abs(ends[0] / ends[1] - 1).max(),
@@ -264,7 +257,7 @@ def half_ellipse(elements: str, aspect: float) -> np.ndarray:
 def bump(half_length: float, shape, edges: int) -> np.ndarray:
     """(edges + 1, 2) um of height shape(x / half_length), from the upstream end."""
     angle = np.linspace(np.pi, 0.0, edges + 1)
-    return np.column_stack([half_length * np.cos(angle), runs.on_wall(shape(np.cos(angle)))])
+    return runs.standing(half_length * np.cos(angle), shape(np.cos(angle)))
 
 
 LOW = 8.0
@@ -300,8 +293,7 @@ def _losses(order: int, aspect: float) -> tuple[float, float, float]:
     half, reach = LOW / aspect, LOW / aspect + LONG
     outline = polygon(bump(half, lambda s: LOW * (1 - s**2) ** 2, round(48 / np.sqrt(aspect))), WIDTH)
     grid, _ = mesher.generate(outline, (-reach, reach), Sizing(WIDTH, 2.5 / order, 2.0))
-    drive = replace(thin_scene("linear", 0.5).flow, viscosity_ratio=RATIO, mean_velocity=1.0, kinematic_viscosity=1.0,
-                    gravity=1.0)
+    drive = replace(thin_scene("linear", 0.5).flow, mean_velocity=1.0, kinematic_viscosity=1.0, gravity=1.0)
     whole = flow.solve(Space(grid, order), drive, LENGTH)
     s, weight = np.polynomial.legendre.leggauss(200)
     height, slope = LOW * (1 - s**2) ** 2, -4 * aspect * s * (1 - s**2)
@@ -330,26 +322,16 @@ def uptake(elements: str):
 
 def _around(aspect: float, elements: str) -> dict[str, float]:
     """The largest difference for each Peclet number and density on one mesh, and the least acceptor left."""
-    now = pore.seeded(shaped(thin_scene(elements, aspect), half_ellipse(elements, aspect)))
-    scene, left, found = thin_scene(elements, aspect), [], {"size": aspect}
+    seed = pore.seeded(shaped(thin_scene(elements, aspect), half_ellipse(elements, aspect)))
+    found = {"size": aspect, "left": 1.0}
     for peclet, density in product(PECLETS, DENSITIES):
-        gap, rest = _compared(scene, aspect, now, peclet, density)
-        found[f"Pe = {peclet:g}, X = {density:g} mg/L"] = gap
-        left.append(rest)
-    return {**found, "left": min(left)}
-
-
-def _compared(scene: Scene, aspect: float, now: pore.Pore, peclet: float, density: float) -> tuple[float, float]:
-    """The largest difference, and the acceptor left at the end of the mesh, over the supply."""
-    speed = peclet * scene.substrates.acceptor.diffusivity * aspect / THICKNESS
-    dense = replace(scene.kinetics, maximum_density=density * aspect**2)
-    scene = runs.at_velocity(replace(scene, kinetics=dense), speed)
-    now = replace(now, active=now.active * density / DENSITY)
-    x = np.linspace(*now.mesh.ends, runs.PLACES)
-    ours = runs.section_means(now, pore.solve(scene, now), x)
-    moment = strip_of(scene, now.outline.area, round(16 / aspect)).seed()
-    theirs = np.stack([np.interp(x, moment.x, field) for field in moment.fields])
-    return np.abs(ours - theirs).max() / 10.0, ours[0, -1] / 10.0
+        scene = thin_scene(elements, aspect, peclet * SCENE.substrates.acceptor.diffusivity / THICKNESS, density)
+        now = replace(seed, active=scene.kinetics.maximum_density * seed.space.reaction.dx)
+        moment = strip_of(scene, now.outline.area, round(16 / aspect)).seed()
+        ours, theirs = runs.along(now, pore.solve(scene, now), moment)
+        found[f"Pe = {peclet:g}, X = {density:g} mg/L"] = np.abs(ours - theirs).max() / 10.0
+        found["left"] = min(found["left"], ours[0, -1] / 10.0)
+    return found
 
 
 #: Diffusivities are so many times those of the paper: the averaged pore's own error falls as their inverse.
@@ -362,15 +344,13 @@ ROWS = (1.0, 2.0, 3.3, 4.5, 5.7, 7.0)
 ACCEPTOR = 10.0
 #: Cells of the averaged pore, and its accuracy: C is nearly even here. Twice as many cells change the area by 7e-6.
 CELLS = 16
-FLUID = 48
 ACCURACY = 1e-5
 THIELE = "the square of the transverse Thiele number: 1.2 % of the area of base over 64; and as much for the elements"
 #: Bounds where the supply jumps, and where it changes evenly, by preset; cubic: fast with cubic elements.
-HALF = "half of the {} that the preset may err by"
+HALF = 5e-3, "half of the 1 % that the preset may err by"
 SUPPLIED = {"steps": {preset: (4e-4, THIELE) for preset in runs.WITH_EXACT},
-            "linear": {"paper": (1e-3, "second order in 12 min: a quarter of it with 6 min"),
-                       "fast": (5e-3, HALF.format("1 %")), "accurate": (5e-4, HALF.format("0.1 %")),
-                       "cubic": (5e-3, HALF.format("1 %"))}}
+            "linear": {"paper": (1e-3, "second order in 12 min: a quarter of it with 6 min"), "fast": HALF,
+                       "accurate": (5e-4, "half of the 0.1 % that the preset may err by"), "cubic": HALF}}
 
 
 @case("coupling-averaged-supply", kind="cross-code",
@@ -399,7 +379,7 @@ def _fed(how: str, preset: str) -> list:
     both = [(end, (ACCEPTOR, first), (ACCEPTOR, first if how == "steps" else last))
             for (_, first), (end, last) in pairwise(COURSES[how])]
     made = supplied(how, preset).at(0.0)
-    return runs.half_disc(made, cells=CELLS, fluid=FLUID).run_through(both, ROWS, ACCURACY)
+    return runs.half_disc(made, cells=CELLS).run_through(both, ROWS, ACCURACY)
 
 
 def supplied(how: str, *changes: str) -> Scene:

@@ -18,9 +18,7 @@ from unittest import mock
 import numpy as np
 
 from reference import poiseuille, whole_run
-from repro import results
 from repro.fem import linear
-from repro.fem.mesh import Mesh
 from repro.fem.outline import FREE
 from repro.fem.space import Space
 from repro.march import midpoint
@@ -30,7 +28,7 @@ from repro.model import flow, pore
 from repro.scene import Scene, load_scene
 from verification.kernel.case import at_least, at_most, case, each_at_most, refine, study
 from verification.problems import meshes, runs
-from verification.problems.channels import both
+from verification.problems.channels import NAMES, both
 
 
 @case("coupling-no-growth", kind="property",
@@ -105,7 +103,7 @@ def equal_viscosities(*changes: str):
     scene = runs.base("1 h", 'aggregate.radius="25 um"', "flow.viscosity_ratio=1.0", *changes)
     first, last = list(simulate(scene))
     grid, found = last.pore.mesh, last.solved.flow
-    bare = Mesh.of(grid.points, grid.cells, np.zeros_like(grid.biomass), np.empty(0, int), grid.width, grid.ends)
+    bare = replace(grid, topology=replace(grid.topology, biomass=np.zeros_like(grid.biomass)))
     empty = flow.unit_flow(Space(bare, last.pore.space.order), 7.0)
     return [at_most("u", np.abs(found.velocity / found.mean_velocity - empty.velocity).max(), 1e-13,
                     runs.ROUND_OFF),
@@ -157,8 +155,7 @@ def uniform_growth(hours: tuple[float, ...], most: float, why: str, *changes: st
     expected = seed.area * np.array([runs.mass_after(scene, hour) for hour in hours])
     sizes = {"area": [instant.pore.outline.area for instant in instants],
              "mass": [instant.pore.mass / scene.kinetics.maximum_density for instant in instants]}
-    for name, size in sizes.items():
-        yield at_most(name, np.abs(size / expected - 1).max(), most, why)
+    yield each_at_most({name: np.abs(size / expected - 1).max() for name, size in sizes.items()}, most, why)
     yield at_most("outline", _unround(instants[-1], expected[-1]), *_roundness(scene, seed))
     yield at_least("remeshes", sum(i.remeshes for i in instants), 1.0, "else that is not tested")
 
@@ -245,20 +242,19 @@ def reversed_flow(*changes: str):
 
 
 ERROR = "error in space: linear elements 9e-4, 2e-4, 6e-5 at refinement 1, 1.4, 2"
-LARGE = 1e9
+
+
+#: Uptake of the donor alone, 0.5/h C_D / (1 mg/L).
+FIRST_ORDER = ('substrates.acceptor.half_saturation="1e-9 mg/L"', 'substrates.donor.half_saturation="1e9 mg/L"',
+               'kinetics.maximum_utilization_rate="5e8 1/h"', 'kinetics.decay_coefficient="0 1/d"',
+               "kinetics.acceptor_to_donor_ratio=1e-12")
 
 
 def _lopsided(sign: float, *changes: str) -> dict[str, float]:
-    """Conductivity, and C at the outlet and the inlet, with q_D = 0.5/h C_D / (1 mg/L) and no other uptake."""
-    scene = load_scene("base", changes)
-    both = replace(scene.substrates, acceptor=replace(scene.substrates.acceptor, half_saturation=1 / LARGE),
-                   donor=replace(scene.substrates.donor, half_saturation=LARGE))
-    law = replace(scene.kinetics, maximum_utilization_rate=0.5 * LARGE, decay_coefficient=0.0,
-                  acceptor_to_donor_ratio=1e-12)
-    scene = replace(scene, substrates=both, kinetics=law)
+    """Conductivity, and C at the outlet and the inlet, with FIRST_ORDER."""
+    scene = load_scene("base", (*changes, *FIRST_ORDER))
     scene = shaped(scene, _outline(sign, 80 * scene.numerics.geometry))
-    now = pore.seeded(scene)
-    solved = pore.solve(scene, now)
+    solved = pore.solve(scene, pore.seeded(scene))
     donor = solved.fluxes[1]
     return {"conductivity": solved.flow.conductivity, "effluent": donor.effluent, "inlet": donor.inlet}
 
@@ -267,7 +263,7 @@ def _outline(sign: float, edges: int) -> np.ndarray:
     """(edges + 1, 2): 24 um (1 + 0.35 cos a - 0.15 cos 2a), or its image in x -> -x for sign = -1."""
     angle = np.linspace(np.pi, 0.0, edges + 1)
     radius = 24.0 * (1 + 0.35 * sign * np.cos(angle) - 0.15 * np.cos(2 * angle))
-    return np.column_stack([radius * np.cos(angle), runs.on_wall(radius * np.sin(angle))])
+    return runs.standing(radius * np.cos(angle), radius * np.sin(angle))
 
 #: Shape updates (h).
 STEPS = (0.8, 0.4, 0.2, 0.1)
@@ -297,11 +293,11 @@ def _lag(factor: float, *changes: str) -> dict[str, float]:
     return {**{name: abs(one[name] / other[name] - 1) for name in one}, "C_A": np.abs(apart).max() / 10.0}
 
 
-def _slower(factor: float, transport_scheme: str, *changes: str):
-    scene = runs.base("0.6 h", 'aggregate.radius="25 um"', f'numerics.transport="{transport_scheme}"', *changes)
+def _slower(factor: float, transport: str, *changes: str):
+    scene = runs.base("0.6 h", 'aggregate.radius="25 um"', f'numerics.transport="{transport}"',
+                      f'kinetics.maximum_density="{30 / factor} g/L"', *changes)
     scene = runs.with_diffusivities(scene, lambda water, biomass: (water / factor, biomass / factor))
-    law = replace(scene.kinetics, maximum_density=scene.kinetics.maximum_density / factor)
-    return runs.at_velocity(replace(scene, kinetics=law), runs.SPEED / factor)
+    return runs.at_velocity(scene, runs.SPEED / factor)
 
 
 @case("coupling-extent", kind="property", slow=True,
@@ -314,8 +310,8 @@ def _slower(factor: float, transport_scheme: str, *changes: str):
             for label, changes in labelled.items()}, ways="paper")
 def extent(*changes: str):
     (central, near), (full, far) = (_solved(f'numerics.extent="{name}"', *changes) for name in ("central", "full"))
-    for name, (bound, origin) in BOUNDS.items():
-        yield at_most(name, abs(central[name] / full[name] - 1), bound, origin)
+    for name, bound in BOUNDS.items():
+        yield at_most(name, abs(central[name] / full[name] - 1), *bound)
     yield at_most("C", np.abs(near - far).max() / 10.0, *APART.get(changes[1:], (4e-4, IN_SPACE)))
 
 
@@ -332,11 +328,10 @@ def _solved(*changes: str):
     scene = load_scene("base", changes)
     now = pore.seeded(scene)
     solved = pore.solve(scene, now)
-    leaving = solved.fluxes
     reach = min(10 * scene.aggregate.radius, 1.5 * scene.pore.width) + scene.aggregate.radius
     x = np.linspace(-reach, reach, runs.PLACES)
-    return ({"conductivity": solved.flow.conductivity, "effluent acceptor": leaving[0].effluent,
-             "effluent donor": leaving[1].effluent}, runs.section_means(now, solved, x))
+    leaving = {f"effluent {name}": flux.effluent for name, flux in zip(NAMES, solved.fluxes)}
+    return {"conductivity": solved.flow.conductivity, **leaving}, runs.section_means(now, solved, x)
 
 
 RULE_STEPS = (1, 2, 4, 8, 16)
@@ -380,12 +375,11 @@ def order_in_time(elements: str):
 def limit(*changes: str):
     """Remeshes, and the orders."""
     short = ('numerics.time="midpoint"', "numerics.tolerance=0.00003")
-    steps = [(f'growth.time_step="{step} h"',) for step in STEPS]
-    middle, *rest = [runs.last(runs.base("3.2 h", 'aggregate.radius="25 um"', *changes, *how))
-                     for how in (short, *steps)]
-    exact, rows = runs.numbers(middle), [runs.numbers(instant) for instant in rest]
-    remeshes = sum(instant.remeshes for instant in (middle, *rest))
-    yield at_most("remeshes, all runs", remeshes, 0.0, "one mesh: the error in space is common")
+    found = [runs.last(runs.base("3.2 h", 'aggregate.radius="25 um"', *changes, *how))
+             for how in (short, *((f'growth.time_step="{step} h"',) for step in STEPS))]
+    yield at_most("remeshes, all runs", sum(instant.remeshes for instant in found), 0.0,
+                  "one mesh: the error in space is common")
+    exact, *rows = map(runs.numbers, found)
     for name, value in exact.items():
         yield study(name, STEPS, [abs(row[name] / value - 1) for row in rows], 1, "frozen geometry: first order",
                     ceiling=2e-3, band=0.15)
@@ -398,26 +392,7 @@ TIMES = (19.2, 19.4)
 def _reference():
     """The independent solver's numbers of base at TIMES, (2, 8), and the largest estimate of their error."""
     found = whole_run.converged(whole_run.Pore(), TIMES, rings=(6, 8), steps=(8, 16))
-    return found.values, _apart(found.values + np.abs(found.space) + np.abs(found.time), found.values).max()
-
-
-def _apart(ours: np.ndarray, theirs: np.ndarray) -> np.ndarray:
-    """(8,) largest differences over the times: relative, of effluents over the supply."""
-    scale = np.abs(theirs).copy()
-    scale[:, 6:] = whole_run.Pore().supply
-    return (np.abs(ours - theirs) / scale).max(axis=0)
-
-
-#: Of a row, as whole_run.NAMES lists them.
-LISTED = ("mean_velocity_m_per_d", "conductivity_m_per_d", "aggregate_area_um2", "thickness_um", "upstream_um",
-          "downstream_um", "effluent_acceptor_mg_per_L", "effluent_donor_mg_per_L")
-
-
-def _listed(preset: str, *changes: str) -> np.ndarray:
-    """(2, 8) of base at TIMES."""
-    scene = runs.base("19.4 h", runs.by(preset), *changes, times=TIMES)
-    rows = [results.row(scene, instant) for instant in runs.ours(scene)]
-    return np.array([[row[name] for name in LISTED] for row in rows])
+    return found.values, runs.errors(found.values + np.abs(found.space) + np.abs(found.time), found.values).max()
 
 
 @case("coupling-presets", kind="cross-code", slow=True,
@@ -430,12 +405,13 @@ def _listed(preset: str, *changes: str) -> np.ndarray:
       over={"fast": (1e-2, "fast"), "accurate": (1e-3, "accurate"),
             "accurate, cubic": (1e-3, "accurate", runs.of("cubic")), "exact": (1e-4, "exact")}, ways="2",
       because="paper, order 1: its error is that of linear elements, see bench")
-def presets(bound: float, *numerics: str):
+def presets(bound: float, preset: str, *changes: str):
     """Checks of the eight numbers, and of the reference."""
     theirs, error = _reference()
     yield at_most("the reference itself", error, 5e-5, "half of what is asked of exact")
-    for name, apart in zip(whole_run.NAMES, _apart(_listed(*numerics), theirs)):
-        yield at_most(name, apart, bound, "what the preset is for")
+    ours = runs.values(TIMES, runs.by(preset), *changes)
+    for name, errors in zip(whole_run.NAMES, runs.errors(ours, theirs).T):
+        yield at_most(name, errors.max(), bound, "what the preset is for")
 
 
 @case("coupling-jacobian-reused", kind="property",

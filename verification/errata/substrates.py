@@ -4,7 +4,7 @@ of the text without computing anything large."""
 from __future__ import annotations
 
 from dataclasses import replace
-from math import atan, cbrt, degrees, exp, log, log10
+from math import atan, cbrt, degrees, exp, log
 
 import numpy as np
 from scipy.optimize import brentq
@@ -25,9 +25,10 @@ from verification.errata import (
     state_row,
     table,
 )
-from verification.switches import CHOICES, PLOTTED
+from verification.switches import CHOICES, PLOTTED, changed
 
-SHORT_F, NO_D_C, MEAN_INLET = (CHOICES[name].run for name in ("exact F", "decay", "mean inlet"))
+SHORT_F, MEAN_INLET = (CHOICES[name].run for name in ("exact F", "mean inlet"))
+NO_D_C = changed("kinetics.decay_oxygen_demand=1.0")
 COD = 2.38  # of phenol, Table 1; it enters through F alone
 
 
@@ -71,13 +72,13 @@ def decay_demand() -> Numbers:
     said = scene(*BASE)
     law = said.kinetics
     defined = replace(law, acceptor_to_donor_ratio=COD - law.yield_coefficient * law.decay_oxygen_demand)
-    readings = {"F = 1.52, d_c f_d b (ours)": electron_defect(law),
-                "F = 1.5138, d_c f_d b": electron_defect(defined),
-                "F = 1.5138, f_d b": electron_defect(defined, 1.0),
-                "F = 1.5138, no term": electron_defect(defined, 0.0)}
-    rows = [[name, percent(1 + part)] for name, part in readings.items()]
+    readings = {"F = 1.52, d_c f_d b (ours)": law, "F = 1.5138, d_c f_d b": defined,
+                "F = 1.5138, f_d b": replace(defined, decay_oxygen_demand=1.0),
+                "F = 1.5138, no term": replace(defined, decay_oxygen_demand=0.0)}
+    rows = [[name, percent(1 + electron_defect(read))] for name, read in readings.items()]
+    share = 1 - taken_up(replace(law, decay_oxygen_demand=0.0))[0] / taken_up(law)[0]
     velocity, acceptor, donor = (percent(a / b) for a, b in zip(state(NO_D_C), state(BASE)))
-    return {"share": f"{100 * decay_share(law):.1f}", "velocity": velocity, "acceptor": acceptor, "donor": donor,
+    return {"share": f"{100 * share:.1f}", "velocity": velocity, "acceptor": acceptor, "donor": donor,
             "table": table(["reading", "oxygen used in excess"], rows)}
 
 
@@ -88,27 +89,21 @@ def plotted_biomass():
     return now.active[:, 0], state.acceptor[nodes], state.donor[nodes]
 
 
-def decay_share(law) -> float:
-    """Share of d_c f_d b in the acceptor's uptake over the aggregate."""
+def taken_up(law) -> np.ndarray:
+    """(2,) oxygen and donor, over the aggregate."""
+    weight, *both = plotted_biomass()
+    return np.array(kinetics.uptake(*both, scene(*BASE).substrates, law)) @ weight
+
+
+def electron_defect(law) -> float:
+    """Oxygen taken up by a reading of (7) + oxygen demand of the biomass made - that of the donor taken up, over the
+    oxygen taken up."""
+    said = scene(*BASE)
     weight, acceptor, donor = plotted_biomass()
-    substrates = scene(*BASE).substrates
-    both, none = (kinetics.uptake(acceptor, donor, substrates, replace(law, decay_oxygen_demand=d))[0]
-                  for d in (law.decay_oxygen_demand, 0.0))
-    return float(1 - weight @ none / (weight @ both))
-
-
-def electron_defect(law, demand: float | None = None) -> float:
-    """Oxygen taken up + oxygen demand of the biomass made - that of the donor taken up, over the oxygen taken up.
-
-    demand: in the place of d_c in (7) alone.
-    """
-    weight, acceptor, donor = plotted_biomass()
-    substrates = scene(*BASE).substrates
-    used = law if demand is None else replace(law, decay_oxygen_demand=demand)
-    q_a, q_d = kinetics.uptake(acceptor, donor, substrates, used)
-    made = kinetics.growth_rate(acceptor, donor, substrates, law) + kinetics.inert_rate(acceptor, substrates, law)
-    spent = float(weight @ q_a)
-    return float(weight @ (q_a + law.decay_oxygen_demand * made - COD * q_d)) / spent
+    rates = (kinetics.growth_rate(acceptor, donor, said.substrates, said.kinetics)
+             + kinetics.inert_rate(acceptor, said.substrates, said.kinetics))
+    oxygen, spent = taken_up(law)
+    return 1 + (said.kinetics.decay_oxygen_demand * weight @ rates - COD * spent) / oxygen
 
 
 @erratum(
@@ -234,9 +229,9 @@ def smaller_points() -> Numbers:
     return {"table": table(["where", "printed", "our reading, consequence"], rows)}
 
 
-#: Molar volumes at the boiling point, cm3/mol, with which the method of Hayduk & Laudie is used (LeBas).
-MOLAR_VOLUME = {"oxygen": 25.6, "phenol": 103.4}
-PRINTED = {"oxygen": 2.32, "phenol": 1.01}
+#: Printed diffusivity in water, cm2/d; molar volume at the boiling point, cm3/mol, with which the method of Hayduk &
+#: Laudie is used (LeBas).
+SUBSTRATES = {"oxygen": (2.32, 25.6), "phenol": (1.01, 103.4)}
 ZERO_C = 273.15
 
 
@@ -252,8 +247,7 @@ def hayduk_laudie(celsius: float, volume: float) -> float:
 
 def temperature_of(diffusivity: float, volume: float) -> float:
     """The temperature (C) at which Hayduk & Laudie give a diffusivity (cm2/d)."""
-    wanted = (86400 * 13.26e-5 * volume**-0.589 / diffusivity) ** (1 / 1.14)
-    return 140 + 247.8 / log10(wanted / 2.414e-2) - ZERO_C
+    return brentq(lambda celsius: hayduk_laudie(celsius, volume) - diffusivity, 0.0, 100.0)
 
 
 @erratum(
@@ -272,8 +266,8 @@ def temperature_of(diffusivity: float, volume: float) -> float:
     quick=True)
 def diffusivities() -> Numbers:
     """Both diffusivities by the method that the paper names."""
-    rows = [[name, PRINTED[name], f"{hayduk_laudie(20.0, volume):.2f}",
-             f"{temperature_of(PRINTED[name], volume):.0f} C"] for name, volume in MOLAR_VOLUME.items()]
+    rows = [[name, printed, f"{hayduk_laudie(20.0, volume):.2f}", f"{temperature_of(printed, volume):.0f} C"]
+            for name, (printed, volume) in SUBSTRATES.items()]
     return {"table": table(["", "printed, cm2/d", "at 20 C, cm2/d", "printed value is that of"], rows)}
 
 

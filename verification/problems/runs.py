@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import fields, is_dataclass, replace
+from operator import itemgetter
 
 import numpy as np
 
-from reference import averaged_pore
+from reference import averaged_pore, whole_run
 from repro import results
 from repro.march import midpoint, updates
 from repro.march.loop import Instant, Ledger, Step
 from repro.march.simulation import simulate
-from repro.model import pore
+from repro.model import contact, pore
 from repro.model.pore import Pore, Solved
 from repro.scene import Kinetics, Scene, Substrates, load_scene
 from verification.kernel.case import columns
@@ -67,9 +68,9 @@ def base(end: str, *changes: str, times: Iterable[float] = ()) -> Scene:
     return load_scene("base", (f'growth.end="{end}"', f"output.times={rows}", *changes))
 
 
-def on_wall(heights: np.ndarray) -> np.ndarray:
-    """Heights (n,) of a shape's points with the first and the last on the lower wall to the last bit."""
-    return np.concatenate([[0.0], heights[1:-1], [0.0]])
+def standing(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """(n, 2) um, a shape's points with the first and the last on the lower wall to the last bit."""
+    return np.column_stack([x, np.concatenate([[0.0], y[1:-1], [0.0]])])
 
 
 def step(scene: Scene, now: Pore, solved: Solved, hours: float) -> Step:
@@ -77,6 +78,17 @@ def step(scene: Scene, now: Pore, solved: Solved, hours: float) -> Step:
     if scene.numerics.time == "updates":
         return updates.step(scene, now, solved, hours)
     return midpoint.attempt(scene, now, solved, hours).step
+
+
+def shape_of(scene: Scene, now: Pore, grown: Pore) -> Pore:
+    """The shape that biomass takes when it has grown, (28)-(34), on the mesh as it was."""
+    return contact.expand(scene, grown, updates.enlarged(scene, now, grown))[0]
+
+
+def next_shape(scene: Scene, now: Pore, solved: Solved, hours: float) -> Pore:
+    """That after an update of so many hours."""
+    grown, _, _ = updates.make_biomass(scene, now, solved, hours)
+    return shape_of(scene, now, grown)
 
 
 def last(scene: Scene) -> Instant:
@@ -87,9 +99,9 @@ def last(scene: Scene) -> Instant:
 
 def numbers(instant: Instant) -> dict[str, float]:
     """What a run comes to: area (um2), upstream tip (um), conductivity (um/h)."""
-    outline, found = instant.pore.outline, instant.solved.flow
-    shape = {"area": outline.area, "upstream tip": outline.upstream}
-    return shape if found is None else {**shape, "conductivity": found.conductivity}
+    outline = instant.pore.outline
+    return {"area": outline.area, "upstream tip": outline.upstream,
+            "conductivity": instant.solved.flow.conductivity}
 
 
 def without_flow(scene: Scene) -> Scene:
@@ -123,35 +135,34 @@ def supplied_everywhere(scene: Scene) -> Scene:
     return with_diffusivities(without_flow(scene), lambda water, biomass: (1e13, 1e13))
 
 
-#: Powers of length and time in the unit of each key that has one.
-POWERS = {
-    "width": (1, 0), "length": (1, 0), "radius": (1, 0), "head": (1, 0), "mean_velocity": (1, -1),
-    "kinematic_viscosity": (2, -1), "gravity": (1, -2), "diffusivity": (2, -1), "diffusivity_in_aggregate": (2, -1),
-    "maximum_utilization_rate": (0, -1), "decay_coefficient": (0, -1), "end": (0, 1), "time_step": (0, 1),
-    "minimum_film": (1, 0),
-}
+#: Powers of length and time in the units of keys.
+UNITS = {"um": (1, 0), "um^2": (2, 0), "um/h": (1, -1), "um/h^2": (1, -2), "um^2/h": (2, -1), "1/h": (0, -1),
+         "h": (0, 1)}
 
 
 def scaled(section, length: float, time: float):
     """A scene, or a section of it, with its unit of length and of time so many times larger."""
     changes = {}
     for key in fields(section):
-        value = getattr(section, key.name)
+        value, kind = getattr(section, key.name), key.metadata.get("kind")
+        along, during = UNITS.get(getattr(getattr(kind, "whole", kind), "unit", ""), (0, 0))
         if is_dataclass(value):
             changes[key.name] = scaled(value, length, time)
         elif key.name == "times" and value:
             changes[key.name] = tuple(time * t for t in value)
-        elif key.name in POWERS and value is not None:
-            along, during = POWERS[key.name]
+        elif (along or during) and value is not None:
             changes[key.name] = value * length**along * time**during
     return replace(section, **changes)
 
 
+def density(scene: Scene, now: Pore) -> np.ndarray:
+    """(r, q) (X_A + X_I) / X_m in the points of the reaction."""
+    return (now.active + now.inert) / now.space.reaction.dx / scene.kinetics.maximum_density
+
+
 def density_drift(scene: Scene, instant: Instant) -> float:
-    """Largest |(X_A + X_I) / X_m - 1| in the aggregate."""
-    now = instant.pore
-    density = (now.active + now.inert) / now.space.reaction.dx
-    return np.abs(density / scene.kinetics.maximum_density - 1).max()
+    """Its largest distance from one."""
+    return np.abs(density(scene, instant.pore) - 1).max()
 
 
 def section_means(now: Pore, solved: Solved, x: np.ndarray) -> np.ndarray:
@@ -170,6 +181,18 @@ def growth_rates(law: Kinetics, both: Substrates, acceptor: float | None = None,
             m_a * law.decay_coefficient * (1 - law.degradable_fraction))
 
 
+def substrate_defect(steps: Sequence[Ledger]) -> float:
+    """What the balances of both substrates miss at most in some steps, over what is supplied."""
+    return np.max([np.abs(np.array(step.supplied) - step.out - step.consumed - step.stored) / step.supplied
+                   for step in steps])
+
+
+def biomass_defect(steps: Sequence[Ledger]) -> float:
+    """The same of biomass, over that after a step."""
+    return np.max([abs(step.biomass_after - step.biomass_before - step.biomass_made) / step.biomass_after
+                   for step in steps])
+
+
 def worth(law: Kinetics, step: Ledger) -> tuple[float, float]:
     """What the substrates taken up in a step are worth in biomass: Y times the donor, and what decays, the acceptor
     beyond F times the donor, over d_c."""
@@ -185,8 +208,8 @@ def mass_after(scene: Scene, time: float, acceptor: float | None = None) -> floa
 
 #: um/h in m/d.
 M_PER_D = 24e-6
-#: Cells of the averaged pore: of the aggregate, and on each side of it.
-CELLS, FLUID = 30, 90
+#: Cells of the averaged pore's aggregate.
+CELLS = 30
 #: Sections of a mesh at which means are compared.
 PLACES = 81
 
@@ -208,16 +231,34 @@ def half_disc_radius(area: float) -> float:
     return np.sqrt(2 * area / np.pi)
 
 
-def half_disc(scene: Scene, speed=None, cells: int = CELLS, fluid: int = FLUID) -> averaged_pore.Averaged:
-    """The averaged run of a half-disc of the area that the meshed seed has."""
+def half_disc(scene: Scene, speed=None, cells: int = CELLS) -> averaged_pore.Averaged:
+    """The averaged run of a half-disc of the area that the meshed seed has; three times as many cells on each side."""
     radius = half_disc_radius(pore.seeded(scene).outline.area)
-    return averaged_pore.Averaged(pore_of(scene, speed), *averaged_pore.half_ellipse(radius, radius, cells), fluid,
+    return averaged_pore.Averaged(pore_of(scene, speed), *averaged_pore.half_ellipse(radius, radius, cells), 3 * cells,
                                   keeps_shape=True)
 
 
 def ours(scene: Scene) -> list[Instant]:
     """The reported instants of a run after t = 0."""
     return list(simulate(scene))[1:]
+
+
+#: The numbers of base as :mod:`reference.whole_run` lists them.
+EIGHT = ("mean_velocity_m_per_d", "conductivity_m_per_d", "aggregate_area_um2", "thickness_um", "upstream_um",
+         "downstream_um", "effluent_acceptor_mg_per_L", "effluent_donor_mg_per_L")
+
+
+def values(times: Sequence[float], *changes: str) -> np.ndarray:
+    """(times, 8) of EIGHT of the table that a run of base writes, at some times (h), the last of them its end."""
+    scene = base(f"{times[-1]} h", *changes, times=times)
+    return np.array([itemgetter(*EIGHT)(results.row(scene, instant)) for instant in ours(scene)])
+
+
+def errors(found: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    """(times, 8) differences of EIGHT: relative, of effluents over the supply."""
+    scale = np.abs(truth)
+    scale[:, 6:] = whole_run.Pore().supply
+    return np.abs(found - truth) / scale
 
 
 def apart(scene: Scene, instants: list[Instant], moments) -> dict[str, float]:
@@ -229,12 +270,17 @@ def apart(scene: Scene, instants: list[Instant], moments) -> dict[str, float]:
 def _less(scene: Scene, instant: Instant, moment: averaged_pore.Moment) -> dict[str, float]:
     row, supply = results.row(scene, instant), scene.substrates.acceptor.supply
     effluents = np.array([row[f"effluent_{name}_mg_per_L"] for name in channels.NAMES])
-    x = np.linspace(*instant.pore.mesh.ends, PLACES)
-    between = [np.interp(x, moment.x, field) for field in moment.fields]
+    here, there = along(instant.pore, instant.solved, moment)
     return {"area": row["aggregate_area_um2"] / moment.area - 1,
             "velocity": row["mean_velocity_m_per_d"] / M_PER_D / moment.velocity - 1,
             "effluents": np.abs(effluents - moment.fields[:, -1]).max() / supply,
-            "C along the pore": np.abs(section_means(instant.pore, instant.solved, x) - between).max() / supply}
+            "C along the pore": np.abs(here - there).max() / supply}
+
+
+def along(now: Pore, solved: Solved, moment: averaged_pore.Moment) -> tuple[np.ndarray, np.ndarray]:
+    """(2, PLACES) section means of C_A and C_D along the mesh, and those of the averaged pore."""
+    x = np.linspace(*now.mesh.ends, PLACES)
+    return section_means(now, solved, x), np.array([np.interp(x, moment.x, field) for field in moment.fields])
 
 
 def worst(rows: list[dict[str, float]]) -> dict[str, float]:
