@@ -1,6 +1,9 @@
 """Line charts: where their lines are, their scales, and their gaps."""
 
+import html
+import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -28,7 +31,7 @@ def chart(values, times=None, **more):
 def test_a_line_is_where_its_numbers_and_the_ticks_say(values, log):
     """Places between two labelled ticks are linear in the value, or in its logarithm where the range is wide."""
     values, times = np.array(values), np.array([0.0, 1.0, 4.0, 10.0])
-    made = chart(values, times)
+    made = replace(chart(values, times), marks=[4.0])
     text, even = charts.svg(made), np.log if log else np.array
     ticks = re.findall('<text class="y" x="[^"]*" y="([^"]*)">([^<]*)<', text)
     heights, told = np.array([float(y) - 3.5 for y, _ in ticks]), np.array([float(text) for _, text in ticks])
@@ -41,6 +44,9 @@ def test_a_line_is_where_its_numbers_and_the_ticks_say(values, log):
     assert np.allclose((across - across[0]) / (across[-1] - across[0]), times / 10, atol=1e-3)
     hours = [(float(x), float(time)) for x, time in re.findall('<text class="x" x="([^"]*)" y="[^"]*">([^<]*)<', text)]
     assert np.allclose(across, np.interp(times, *np.array(hours).T[::-1]), atol=ROUNDED) and len(hours) >= 3
+    axis = json.loads(html.unescape(first('data-chart="([^"]*)"', text)))["axis"]
+    assert np.allclose(across, np.interp(times, axis[:2], axis[2:]), atol=ROUNDED)
+    assert float(first('class="mark" x1="([^"]*)"', text)) == across[2]
 
 
 @pytest.mark.parametrize("low, high", [(123400, 123460), (99950, 100050), (2.0001e-4, 2.0004e-4), (0, 3e6), (-7, 0),
@@ -72,7 +78,7 @@ def test_gaps_constants_and_single_points():
 
 
 def test_many_points_are_thinned_with_both_ends():
-    line = charts.Line("x", np.arange(5000.0), np.arange(5000.0) ** 2)
+    line = charts.Line("x", np.arange(5000.0), np.arange(5000.0) ** 2, dots=True)
     thin = charts.thinned(line)
     assert len(thin.times) == charts.MOST_POINTS and thin.times[[0, -1]].tolist() == [0, 4999]
-    assert (thin.values == thin.times**2).all()
+    assert (thin.values == thin.times**2).all() and thin.dots

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import time
 
 import numpy as np
@@ -148,6 +149,7 @@ def test_a_seed_off_the_middle_reaches_as_much_farther():
     for sizes in (numbers.at_start, numbers.at_end):
         assert sizes(aside).reach == pytest.approx(sizes(middle).reach + 90.0, rel=1e-12)
         assert sizes(aside).area == pytest.approx(sizes(middle).area, rel=1e-12)
+    assert numbers.half_length(middle) == 5 + 10 * 5
 
 
 @pytest.mark.parametrize("preset, least, most", [("paper", 1.0, 1.0), ("fast", 0.5, 2.0)])
@@ -211,18 +213,45 @@ def test_what_is_modelled_follows_the_sections():
     assert gear["aggregate"].startswith("biomass inside a spline through 3 points")
 
 
+def test_what_is_modelled_over_time_is_told():
+    """In the order of the substrates, with the largest value and with the last time."""
+    steps = [["0 h", "3 mg/L"], ["1 h", "9 mg/L"], ["4 h", "5 mg/L"]]
+    words = dict(modelled(load_scene("wide", [f"substrates.donor.supply={json.dumps(steps)}", FAST])))
+    assert "acceptor (10 mg/L) and donor (3 to 9 mg/L, in steps, the last from 4 h)" in words["substrates"]
+    assert "mean velocity of 2.9 m/day" in words["flow"] and words["output"].endswith(", and every 1.6 h")
+    assert words["growth"].startswith("to 45 h: ") and "tolerance 0.0075" in words["numerics"]
+    head = ['flow.head=[["0 h", "1 cm"], ["2 h", "4 cm"]]', "flow.interpolation=linear"]
+    words = dict(modelled(load_scene("base", head)))
+    assert "a head of 1 to 4 cm, linear in time, the last from 2 h over" in words["flow"]
+
+
+@pytest.mark.parametrize("key, name, changes, said", [
+    ("pore.length", "wide", [], "ends by growth.end (reach 298 of 300 um)"),
+    ("pore.length", "flow_only", ["aggregate.radius=40 um", "pore.length=200 um"], "from the start (reach 40 of 100"),
+    ("numerics.refinement", "base", FEW[1:], "= 0.76 um thick, thinner than"),
+    ("growth.end", "wide", [], "is expected from 31.2 h on, long before 45 h"),
+    ("growth.time_step", "base", ["growth.time_step=0.6 h"], "grows by 11 % in a shape update, above 10 %"),
+    ("substrates.donor.diffusivity_in_aggregate", "base", ["substrates.donor.diffusivity=2 cm^2/day"], "40.5 % of")])
+def test_a_warning_tells_the_numbers_that_it_rests_on(key, name, changes, said):
+    scene = load_scene(name, changes)
+    found = simplifications.warnings(scene, numbers.numbers(scene, CLEAN))
+    assert [each.key for each in found if said in each.text] == [key]
+
+
 @pytest.mark.parametrize("seconds, said", [(0.123, "0.12 s"), (45.3, "45 s"), (119.0, "119 s"), (130.0, "2 min"),
                                            (7100.0, "118 min"), (7300.0, "2 h"), (9000.0, "2 h"), (90000.0, "25 h")])
 def test_what_a_run_takes_is_told_in_a_unit_that_suits(seconds, said):
-    assert checked._seconds(seconds) == said
+    first, *_ = checked._cost(cost.Cost(7, seconds, 256.0))
+    assert first == f"Cost, roughly: {said} (7 steps), 256 MB, writing not counted"
 
 
 def test_the_report_and_its_exit_status(capsys):
-    """Warnings do not change it."""
+    """Warnings do not change it. In 1 h the area grows by exp(0.19), the radius by the root of that."""
     assert main(["check", "wide", "--set", "growth.end=1 h", "--set", "growth.time_step=0.6 h"]) == 0
     said = capsys.readouterr()
     assert said.err == "" and "wide: can be run" in said.out and "WARNING growth.time_step: " in said.out
-    assert "Thiele, donor" in said.out and "Mesh at t = 0: 594 nodes, 1104 triangles" in said.out
+    assert re.search(r"Thiele, donor +0\.29 +0\.32\n  Damkoehler, acceptor +0\.0053 +0\.0064\n", said.out)
+    assert "Mesh at t = 0: 594 nodes, 1104 triangles" in said.out
     assert all(len(line) <= 120 for line in said.out.splitlines())
 
 

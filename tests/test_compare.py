@@ -63,7 +63,7 @@ def test_values_at_the_common_last_time(fast, paper, flow_only, two):
     assert found[0] == pytest.approx(a0 + (a1 - a0) * (1 - t0) / (t1 - t0), rel=1e-12)
     assert found[1] == results.read_table(paper / "timeseries.csv")["aggregate_area_um2"][-1]
     mine, other = (float(value or 0) for value in found)
-    assert f"{100 * (other - mine) / mine:+.3g} %" in two
+    assert f"{100 * (other - mine) / mine:+.3g} %" in two and "At t = 1 h, the last time" in two
     assert comparison.values([read(paper), read(flow_only)], 0.0)["donor_min_mg_per_L"][1] is None
 
 

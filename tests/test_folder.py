@@ -18,6 +18,7 @@ from repro.results import vtu
 from repro.run import checkpoint
 from repro.run.checkpoint import LAST, NEWEST, PREVIOUS
 from repro.run.folder import LOCK, SUMS
+from repro.run.loading import load_run
 from repro.run.running import Watch, resume, run
 from repro.scene import load_scene, parse_scene, scene_tables
 from tests.pages import whole_of
@@ -204,6 +205,7 @@ def test_no_space_is_told_with_the_file_and_nothing_is_lost(short, tmp_path, mon
     with pytest.raises(OutputError, match=f"{file}: No space left on device; .* go on with --resume"):
         run(short, out, watch=Watch(tell=fill, interval=0.0))
     assert not [path for path in out.rglob("*") if "part" in path.name] and not (out / LOCK).exists()
+    assert len(load_run(out).time) > 1
     monkeypatch.setattr(module, name, works)
     assert resume(out) == "completed" and told(out)["resumes"][0]["time_h"] > 0.5 and as_whole(short, out)
 

@@ -75,6 +75,7 @@ def test_a_run_that_is_over_keeps_one_checkpoint(tmp_path):
     (grown / LAST).unlink()
     with pytest.warns(UserWarning, match="no checkpoint to go on from; it starts again from t = 0"):
         resume(grown, overrides=["growth.end=9 h"])
+    assert told(grown)["origin"].get("set") == ["growth.end=9 h"]
     assert same(grown, whole_of(scene("fast")))
 
 

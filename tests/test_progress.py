@@ -24,6 +24,14 @@ CONTACT = ('numerics.preset="fast"', 'aggregate.radius="17.98 um"', 'pore.width=
            "numerics.tolerance=0.0001")
 
 
+def test_steps_between_rows_are_told_with_what_they_made(tmp_path, capsys):
+    run(tmp_path, "base", *CONTACT, 'output.times=["0.6 h"]', options=["--json"])
+    events = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    steps = [event["remeshes"] for event in events if event["event"] == "step"]
+    assert [event["remeshes"] for event in events if event["event"] == "remesh"] == [*range(1, steps[-1] + 1)]
+    assert steps[-2] > 0
+
+
 def test_json_is_an_object_a_line_and_nothing_else(tmp_path, capsys):
     """Start, every step, remeshes, contact, checkpoints, end; warnings are in tests/test_warned.py."""
     folder = run(tmp_path, "base", *CONTACT, options=["--json", "--checkpoint", "0"])
@@ -48,8 +56,10 @@ def test_errors_are_objects_too(tmp_path, capsys, monkeypatch, sets, status):
     assert last["event"] == "error" and last["exit_status"] == status and err == f"repro: {last['message']}\n"
 
 
-def test_without_a_terminal_a_line_each_tenth_and_quiet_says_nothing_but_errors(tmp_path, capsys):
-    """The end on standard output."""
+def test_without_a_terminal_a_line_each_tenth_and_quiet_says_nothing_but_errors(tmp_path, capsys, monkeypatch):
+    """The end on standard output; however slow the machine is."""
+    for name in ("SILENCE", "LONGEST"):
+        monkeypatch.setattr(progress, name, 1000.0)
     folder = run(tmp_path, "base", 'growth.end="0.6 h"')
     said = "".join(f"{time} of 0.6 h simulated\n" for time in ("0.2", "0.4", "0.6"))
     assert capsys.readouterr() == (f"base: completed; results in {folder}\n", said)

@@ -16,9 +16,10 @@ from repro import report, results
 from repro.fem.mesh import Mesh, curved
 from repro.model import growth
 from repro.report import fields, quantities, run_page
-from repro.report.reading import read
+from repro.report.reading import Run, read
 from repro.results import names, vtu
 from repro.results.vtu import Cells, Grid
+from repro.scene import load_scene, scene_tables
 from tests.pages import (
     FAST,
     HOSTILE,
@@ -49,6 +50,12 @@ def test_numbers_are_those_of_the_first_and_the_last_row(request, name):
     told = {html.unescape(label): shown for label, *shown in lines}
     series = results.read_table(out / "timeseries.csv")
     times = series.pop("time_h")
+    kind = {"fast": "Quadratic triangles, drawn curved", "paper": "Linear triangles"}[name]
+    record = read(out).record
+    for said in (kind, f"{record['wall_time_s']:.3g} s in all", '<td>width</td><td class="value">50 um<',
+                 f'anew</td><td class="value">{record["remeshes"]}<', f'hash</td><td class="value">{record["hash"]}<',
+                 f"{len(times)} rows, to t = {times[-1]:g} h."):
+        assert said in text_of(out)
     assert re.findall("t = ([^ ]*) h", panel) == [f"{times[k]:.6g}" for k in (0, -1)] and len(times) > 2
     assert told.keys() == set(map(names.with_unit, series)) and (series["conductivity_m_per_d"] > 0).all()
     for column, values in series.items():
@@ -63,13 +70,22 @@ def test_what_is_not_modelled_is_left_out(flow_only, fast):
     """And what is modelled says what it assumes, ahead of fields and charts."""
     text, packed = text_of(flow_only), stored(flow_only)
     assert "Not modelled: substrates, kinetics, growth." in text and "acceptor" not in text.split("<script>")[0]
-    assert [field["name"] for field in packed["fields"]] == ["velocity_m_per_d", "head_cm", "region"]
+    assert [(field["name"], field["unit"]) for field in packed["fields"]] == [
+        ("velocity_m_per_d", "m/day"), ("head_cm", "cm"), ("region", "")]
     assert "<figure" not in text and '<div class="time" hidden>' in text and "Assumed: a pore in the plane" in text
     grown = text_of(fast)
     assert "Not modelled" not in grown and '<div class="time">' in grown
     head = grown[grown.index("Assumed: "): grown.index("Fields and mesh")]
     for words in ("traction on the aggregate neglected", "quasi-steady"):
         assert words in head and words not in text
+
+
+@pytest.mark.parametrize("transport, extent, wanted", [("quasi_steady", "full", [True, False]),
+                                                       ("gear", "central", [False, True])])
+def test_what_is_assumed_is_what_the_scene_has_chosen(transport, extent, wanted):
+    scene = load_scene("base", [f"numerics.transport={transport}", f"numerics.extent={extent}"])
+    said = run_page._assumed(Run(Path(), {"tables": scene_tables(scene)}, {}, {}))
+    assert [words in said for words in ("substrates at rest", "a clean channel outside")] == wanted
 
 
 def test_each_frame_is_drawn_on_its_own_mesh(fast, paper):

@@ -36,6 +36,7 @@ from tests.shell import (
     lasting,
     refused,
     resumed,
+    rows,
     shell,
     started,
     stopped,
@@ -246,6 +247,7 @@ def test_a_signal_ends_a_run_that_goes_on_later(tmp_path, number, status):
     process.send_signal(number)
     message = process.communicate(timeout=60)[1]
     assert process.returncode == status and message.endswith("goes on from there\n")
+    assert f" at t = {float(rows(tmp_path / 'timeseries.csv')[-1]['time_h']):g} h; what" in message
     assert "Traceback" not in message and told(tmp_path)["status"] == "interrupted"
     assert len((tmp_path / "timeseries.csv").read_text().splitlines()) > 3
     assert resume(tmp_path) == "completed" and as_whole(load_scene("base", ["growth.end=1.6 h"]), tmp_path)

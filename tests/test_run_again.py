@@ -29,7 +29,8 @@ def test_what_a_run_lacks_of_being_over_is_told(tmp_path):
     """In a folder that is made with those above it: nothing; the scene, or a status that there is."""
     scene, folder = load_scene("flow_only"), tmp_path / "new" / "run"
     run(scene, folder)
-    assert lacking(folder, scene) == ""
+    early = load_scene("base", ["growth.end=0.2 h", 'output.times=["0.1 h"]', "numerics.refinement=0.3"])
+    assert lacking(folder, scene) == lacking(whole_of(early), early) == ""
     wrong = "run.json tells of a run of another scene, or has no status"
     assert wrong in lacking(folder, load_scene("flow_only", ["flow.viscosity_ratio=5"]))
     results.write_json(folder / "run.json", told(folder) | {"status": None})

@@ -20,7 +20,7 @@ from repro import load_scene, results
 from repro.cli import main
 from repro.run.machine import THREADS
 from repro.sweep import page, pool, server, table, task
-from repro.sweep.design import grid, parse, points
+from repro.sweep.design import grid, latin, parse, points
 from repro.sweep.server import Server, ask
 from repro.sweep.state import Sweep
 from tests import shell
@@ -236,6 +236,21 @@ def test_lines_of_the_page_are_courses_of_runs_or_join_runs_that_differ_in_one_k
             assert len({values[1 - which] for values in line}) == 1 and line == sorted(line)
 
 
+def test_every_option_of_the_command_is_heeded(tmp_path, monkeypatch):
+    """Each width of a hypercube to its last digit, in the tables and in the scenes."""
+    monkeypatch.setattr(pool, "ready", in_this_process)
+    out, varied = tmp_path / "sweep", "pore.width=40:60 um:linear"
+    assert sweep(out, "--vary", varied, "--samples", "2", "--seed", "5", "--unset", "aggregate", "--clogged", "0.4",
+                 "--quiet", scene="flow_only") == 0
+    runs = rows(out / "runs.csv")
+    scenes = [told(out / run["folder"])["tables"] for run in runs]
+    wanted = latin([parse(varied)], 2, 5)
+    assert [(number(scene["pore"]["width"]),) for scene in scenes] == wanted
+    assert [(float(run["pore.width_um"]),) for run in runs] == wanted
+    assert not any("aggregate" in scene for scene in scenes)
+    assert "has fallen to 0.4;" in (out / "summary.html").read_text()
+
+
 @pytest.mark.parametrize("part", [0.5, 0.1, 0.013])
 def test_clogging_time_of_an_exponential_fall_is_exact(part):
     """K / K_0 = exp(-t / 3), with biomass t / 10: whatever the rows, t = -3 ln part; none before it has fallen so far.
@@ -244,6 +259,7 @@ def test_clogging_time_of_an_exponential_fall_is_exact(part):
     course = times, np.exp(-times / 3), times / 10
     assert table.clogging(*course, part) == pytest.approx((-3 * math.log(part), -0.3 * math.log(part)), rel=1e-12)
     assert np.isnan(table.clogging(*course, 1e-3)).all()
+    assert table.clogging(np.arange(4.0), np.array([1, 0.25, 1, 0.25]), np.arange(4.0), 0.5) == (0.5, 0.5)
 
 
 def test_biomass_and_contact_are_read_from_the_rows(finished, tmp_path):
@@ -255,12 +271,13 @@ def test_biomass_and_contact_are_read_from_the_rows(finished, tmp_path):
     place = shutil.copytree(source, made.runs / made.points[0].name)
     lines = rows(place / "timeseries.csv")
     for k, line in enumerate(lines):
-        line.update(contact=int(k >= 1), conductivity_m_per_d=0.05 ** k, aggregate_area_um2=30.0 * (k + 1))
+        line.update(contact=int(k >= 1), conductivity_m_per_d=3 * 0.05 ** k, aggregate_area_um2=30.0 * (k + 1))
     results.write_table(place / "timeseries.csv", results.COLUMNS, [list(line.values()) for line in lines])
     (found,) = table.tell(made, {}, 0.1)
     assert found.biomass.tolist() == [30 * (k + 1) / (50 * 600) for k in range(len(lines))]
     assert found.numbers["contact_time_h"] == float(lines[1]["time_h"]) and found.numbers["contact_biomass"] == 0.002
-    assert found.numbers["contact_relative_conductivity"] == 0.05
+    assert found.numbers["contact_relative_conductivity"] == pytest.approx(0.05)
+    assert found.numbers["end_h"] == float(lines[-1]["time_h"])
     assert 0 < found.numbers["clogging_time_h"] < found.numbers["contact_time_h"]
 
 

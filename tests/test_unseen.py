@@ -35,7 +35,7 @@ from repro.sweep import making, page, table
 from repro.sweep.design import grid, parse, points
 from repro.sweep.state import Sweep
 from tests import oracles
-from tests.shell import told
+from tests.shell import rows, told
 from tests.strategies import ORDERS, constants
 from tests.test_derived import EVERY_ORDER, arcs, over_end, places_of
 from tests.test_gear import case, storage
@@ -284,13 +284,15 @@ def test_runs_are_compared_under_their_own_names_with_signs():
     for name, scale in (("zeta", 1.0), ("alpha", 1.5), ("mu", 0.5)):
         series = {column: scale * (1.0 + k + np.array([0.1, 0.4])) for k, column in enumerate(results.COLUMNS)}
         series |= {"time_h": np.array([0.0, 3.0]), "upstream_um": scale * np.array([-5.0, -8.0])}
-        runs.append(Run(Path("runs") / name, {"scene": name}, series, {}))
+        runs.append(Run(Path("runs") / name, {"scene": name, "tables": {"factor": 1.0 + (scale < 1)}}, series, {}))
     labels = comparison.short([run.folder for run in runs])
     for chart in quantities.overlaid(runs, labels):
         assert [line.label for line in chart.lines] == labels, chart.title
         if chart.title != "Mesh: made anew":
             assert [line.values[-1] / chart.lines[0].values[-1] for line in chart.lines] == pytest.approx([1, 1.5, 0.5])
+    assert comparison.differences(runs) == [("factor", "1", "1", "2")]
     made = comparison.build(runs)
+    assert made.count("status unknown to t = 3 h") == 3
     heads = re.findall('<th scope="col" class="value">([^<]*)', made[made.index("Values at the common last time"):])
     assert heads == ["zeta", "alpha", "difference", "mu", "difference"]
     (row,) = re.findall("<tr><td>upstream end of the aggregate.*?</tr>", made)
@@ -361,10 +363,10 @@ def sweep_of(folder, widths):
 
 
 def ended(swept, point, status, rows=1):
-    """The recorder of a run of a sweep with rows of nothing, which has ended so."""
+    """The recorder of a run of a sweep with rows of t = 0 and ones, which has ended so."""
     (swept.runs / point.name).mkdir(parents=True)
     one = running.Recorder(point.scene, swept.runs / point.name)
-    one.record.rows = [[0.0] * len(results.COLUMNS)] * rows
+    one.record.rows = [[0.0, *[1.0] * (len(results.COLUMNS) - 1)]] * rows
     one.save(status)
     return one
 
@@ -508,7 +510,9 @@ def test_a_step_misses_the_tolerance_by_more_than_is_accepted_alone():
 
 def test_xarray_has_units_that_udunits_knows():
     pytest.importorskip("xarray")
-    said = Results("x", [dict.fromkeys(results.COLUMNS, 1.0)], [], "completed").to_xarray()
+    found = Results("x", [dict.fromkeys(results.COLUMNS, 1.0)], [], "failed: y")
+    said = found.to_xarray()
+    assert said.attrs["status"] == found.to_pandas().attrs["status"] == "failed: y"
     wanted = {"mean_velocity_m_per_d": "m d-1", "aggregate_area_um2": "um2", "nodes": "1",
               "inlet_donor_mg_per_L": "mg L-1"}
     assert {name: said[name].attrs["units"] for name in wanted} == wanted
@@ -519,6 +523,8 @@ def test_a_picture_says_which_values_are_dark():
     shown = {"places_um": places, "triangles": np.array([[0, 1, 2]]), "region": np.zeros(1)}
     said = picture.figure(shown | {"acceptor_mg_per_L": np.array([3.0, 1.5, 7.0])}, 2.5)
     assert said.count("acceptor (mg/L), 1.5 (dark) to 7 (light), at t = 2.5 h") == 2
+    said = picture.figure(shown | {"velocity_m_per_d": np.array([[-3.0, 4, 0], [0, 1, 0], [0, 2, 0]])}, 2.5)
+    assert "velocity (m/day), 1 (dark) to 5 (light)" in said
 
 
 @pytest.mark.parametrize("low, high", [(0.0, 2.1), (0.0, 1.0), (-0.7, 0.9), (0.0, 0.012), (0.0, 9000.0)])
@@ -556,7 +562,7 @@ def test_the_worst_of_the_steps_that_miss_the_tolerance_is_told(tmp_path):
     one = running.Recorder(load_scene("base", ["numerics.tolerance=0.01"]), tmp_path)
     for estimate in (0.03, 0.5, 0.04, 0.001):
         one._judge(Pace(1.0, 1.0, estimate))
-    assert one.record.missed == 3 and "errs by 0.5 (estimate)" in one.unmet()[0].text
+    assert one.record.missed == 3 and not one.contact and "errs by 0.5 (estimate)" in one.unmet()[0].text
 
 
 @pytest.mark.parametrize("asked", ['["5 h", "18 h"]', '["0 h", "5 h", "18 h"]'])
@@ -576,20 +582,29 @@ def test_a_run_without_a_row_says_what_its_folder_does_before_and_after_it_was_m
         assert [one.status for one in table.tell(swept, told_now, 0.1)] == ["failed: x", second, "not run"]
 
 
+def test_rows_of_a_run_that_failed_are_in_the_table(tmp_path):
+    swept = sweep_of(tmp_path, "40 um, 50 um")
+    ended(swept, swept.points[1], "failed: x")
+    table.write(swept, table.tell(swept, {}, 0.1))
+    assert [row["run"] for row in rows(tmp_path / "table.csv")] == ["2"]
+
+
 def test_marks_of_the_page_have_the_colour_that_the_key_below_them_names(tmp_path):
     """Of the other factor, where two are varied by different parts: each figure with its own key; dots where runs have
-    clogged, and what stands at its end where one has not."""
+    clogged, and what stands at its end where one has not, but nothing where one has failed before that."""
     factors = [parse("pore.width=40 um, 50 um"), parse("flow.viscosity_ratio=100, 400, 1000")]
     found, course = points("flow_only", [], factors, grid(factors)), np.array([1.0, 8.0])
-    numbers_of = [dict.fromkeys(table.COLUMNS) | {"clogging_time_h": time} for time in (5.0, 5.0, None, 5.0, 5.0, 5.0)]
+    numbers_of = [dict.fromkeys(table.COLUMNS) | {"clogging_time_h": time} for time in (5.0, 5.0, None, 5.0, 5.0, None)]
     runs = [table.Told(one, "completed", course, course, course, each) for one, each in zip(found, numbers_of)]
-    times = page.page(Sweep(tmp_path, "flow_only", factors, found), runs, 0.1).split("<h2>Clogging time")[1]
+    runs[5] = replace(runs[5], status="failed: x")
+    times = page.page(Sweep(tmp_path, "flow_only", factors, found), runs, 0.3).split("<h2>Clogging time")[1]
     figures = re.findall("<figure>.*?</figure>", times, re.S)
     for figure, key in zip(figures, ("flow.viscosity_ratio", "pore.width"), strict=True):
         named = dict(re.findall(r'class="line level(.)"/></svg>([^<]*)</li>', figure))
         mark = rf'<(\w+) class="\w+ level(.)"[^>]*><title>run (.)[^<]*?{key} = ([^,:]*)[^<]*?: ([^:<]*)</title>'
         marks = re.findall(mark, figure)
-        assert len(marks) == 6 and {named[level] == value for _, level, _, value, _ in marks} == {True}
+        assert len(marks) == 5 and "time to 0.3 of the conductivity (h)" in figure
+        assert {named[level] == value for _, level, _, value, _ in marks} == {True}
         for kind, _, run, _, told_there in marks:
             assert (kind, told_there) == (("polygon", "after 8 h") if run == "3" else ("circle", "5 h"))
 
