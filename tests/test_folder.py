@@ -129,7 +129,8 @@ def test_altered_fields_are_told_and_made_again(out, short, capsys, content):
 
 
 def test_a_run_killed_at_its_very_end_is_tidied(tmp_path, capsys):
-    """Its status told, its page and its checkpoints not seen to; a page that cannot be made is told."""
+    """Its status told, its page and its checkpoints not seen to; a page that cannot be made is told. By the same
+    command, and anew by --force, too."""
     run(load_scene("flow_only"), tmp_path)
     page, fields = tmp_path / "report.html", tmp_path / "fields" / "fields_0000.vtu"
     wanted, right = page.read_bytes(), fields.read_bytes()
@@ -139,6 +140,9 @@ def test_a_run_killed_at_its_very_end_is_tidied(tmp_path, capsys):
     assert "report.html: it cannot be made" in refused(fields, capsys, "run", "--resume", tmp_path, "--quiet")
     fields.write_bytes(right)
     assert resume(tmp_path) == "completed" and page.read_bytes() == wanted and not (tmp_path / PREVIOUS).exists()
+    for force in (False, True):
+        (tmp_path / PREVIOUS).write_bytes(b"left")
+        assert run(load_scene("flow_only"), tmp_path, force=force) == "completed" and not (tmp_path / PREVIOUS).exists()
 
 
 def test_what_a_killed_run_was_writing_is_removed(out, short):

@@ -8,9 +8,11 @@ import sys
 
 import pytest
 
+from repro.check import memory
+from repro.check.checked import check
 from repro.cli import main
 from repro.march.simulation import simulate
-from repro.run import machine, memory, running
+from repro.run import machine, running
 from repro.run.running import resume
 from repro.scene import SceneError, load_scene
 from tests import faults
@@ -75,6 +77,15 @@ def test_a_run_that_may_take_more_than_half_of_the_memory_is_warned_of(tmp_path,
         out, err = capsys.readouterr()
         events = [json.loads(line) for line in out.splitlines()]
         assert (err.startswith("repro: warning: flow_only: about ")) == warned == (events[0]["event"] == "warning")
+        assert [one.key for one in check("flow_only").warnings] == ["numerics.refinement"] * warned
+
+
+@pytest.mark.parametrize("command", ["check", "run"])
+def test_what_takes_more_memory_than_there_is_is_refused_by_check_as_by_run(tmp_path, capsys, monkeypatch, command):
+    monkeypatch.setattr(memory, "free_bytes", lambda: 0.9 * memory.expected_bytes(load_scene("flow_only")))
+    out = ["--out", tmp_path / "run"] if command == "run" else []
+    assert " MB are free; a smaller numerics.refinement is needed" in refused(
+        tmp_path, capsys, command, "flow_only", *out)
 
 
 def group(root, path, **content):

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 
 from repro.check import cost
 from repro.check.cost import Cost
+from repro.check.memory import require_memory
 from repro.check.modelled import modelled
 from repro.check.numbers import Number, judged
 from repro.check.simplifications import Warned, unmet, warnings
@@ -48,9 +49,12 @@ class Checked:
 
 def check(scene: Source, file: str = "") -> Checked:
     """What is to be told of a scene before it is run; ``print`` shows it. Raises SceneError, naming
-    ``file`` or the scene, where it is not accepted, or its first state or step fails."""
+    ``file`` or the scene, where it is not accepted, its first state or step fails, or a run of it
+    is refused for want of memory."""
     file = file or label(scene)
     scene = load_scene(scene)
+    scarce: list[str] = []
+    require_memory(scene, scarce.append)
     try:
         with stopping(0.0):
             Method(scene.numerics.solver, scene.numerics.ordering).checked()
@@ -58,7 +62,8 @@ def check(scene: Source, file: str = "") -> Checked:
         trial = cost.tried(scene, len(mesh.points))
         flow = trial.first.solved.flow
         most, found = judged(scene, flow.mean_velocity if flow else None)
-        told = [*warnings(most, found), *unmet(scene, trial.worst, " in the first steps")]
+        told = [*warnings(most, found), *unmet(scene, trial.worst, " in the first steps"),
+                *(Warned("numerics.refinement", text) for text in scarce)]
         return Checked(scene.name, modelled(scene), len(mesh.points), len(mesh.biomass), found,
                        told, cost.expected(scene, trial, len(mesh.points)))
     except (SimulationError, ArithmeticError) as error:

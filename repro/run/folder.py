@@ -1,7 +1,8 @@
 """The folder of a run: what is a run's in it, who may write there, how trouble with it is told.
 
 A run removes and replaces nothing but regular files that it has written itself: those that its
-``run.json`` lists, and the fields that its ``fields.sha256`` lists, each before it is there.
+``run.json`` lists, the fields that its ``fields.sha256`` lists, each before it is there, and its
+checkpoints.
 """
 
 from __future__ import annotations
@@ -34,7 +35,8 @@ PART = re.compile("|".join([FIELDS.pattern.removeprefix("fields/"), *map(re.esca
 
 
 def listed(folder: Path, told: dict) -> set[str]:
-    """The files that a run has written, by its ``run.json`` (``told``) and its SUMS."""
+    """The files that a run has written, by its ``run.json`` (``told``) and its SUMS; checkpoints
+    too, which one that was killed at its very end has left and does not list."""
     names = told.get("files")
     names = names if isinstance(names, list) else []
     found = {name for name in names if isinstance(name, str)}
@@ -42,7 +44,7 @@ def listed(folder: Path, told: dict) -> set[str]:
     if SUMS in found and is_file(folder / SUMS):
         lines = (folder / SUMS).read_text(encoding="utf-8", errors="replace").splitlines()
         found |= {match[1] for match in map(SUM.fullmatch, lines) if match}
-    return found | {PROVENANCE}
+    return found | {PROVENANCE, *CHECKPOINTS}
 
 
 def prepare(folder: Path, own: Collection[str] = ()) -> None:

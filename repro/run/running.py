@@ -16,6 +16,7 @@ from time import perf_counter
 
 from repro import results, timing
 from repro.check import simplifications
+from repro.check.memory import require_memory
 from repro.check.numbers import judged
 from repro.check.simplifications import Warned
 from repro.errors import CheckpointError, Interrupted, OutputError, SimulationError
@@ -35,7 +36,6 @@ from repro.run.folder import (
     usable,
 )
 from repro.run.machine import conditions, differences, require_packages
-from repro.run.memory import require_memory
 from repro.run.recorder import Recorder, interrupted, settle
 from repro.run.status import COMPLETED, FAILED, INTERRUPTED, RUNNING, done, undone
 from repro.run.whole import lacking
