@@ -13,6 +13,8 @@ Norms of the error of fields of order 1, 2 or 3 on triangles, and what they are 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.spatial import Delaunay, cKDTree
 
@@ -86,9 +88,14 @@ def space_on(straight: Mesh, order: int) -> Space:
 def half_disc(radius: float, refinement: float, ends, width: float, *, geometry: int = 1, lean: float = 0.0) -> Mesh:
     """The package's mesh around a half-disc on the lower wall, straight (geometry 1) or curved (2), sheared by
     ``lean``; a film of 2 um is the thinnest that is resolved."""
-    seed = outline.half_disc(radius, sizing.ACROSS_AGGREGATE * refinement, geometry)
-    points = seed.points + lean * seed.points[:, [1]] * [1.0, 0.0]
-    return around(outline.Outline(points, seed.wall, seed.fixed, points, geometry), refinement, ends, width)[0]
+    upright = seed(radius, refinement, geometry)
+    points = upright.points + lean * upright.points[:, [1]] * [1.0, 0.0]
+    return around(replace(upright, points=points, origin=points), refinement, ends, width)[0]
+
+
+def seed(radius: float, refinement: float, order: int = 1) -> outline.Outline:
+    """A half-disc for elements of an order: of straight edges or, from order 2 on, of arcs."""
+    return outline.half_disc(radius, sizing.ACROSS_AGGREGATE * refinement, min(order, 2))
 
 
 def around(seed: outline.Outline, refinement: float, ends, width: float) -> tuple[Mesh, outline.Outline]:
