@@ -40,7 +40,8 @@ def exactly(name: str, held: Supported, found: growth.Equilibrium, F: np.ndarray
     stress = growth.cauchy(held.strained(found.position).F, P)
     most = max(largest(exact), abs(pressure))
     sizes = {"place": largest(found.position @ np.linalg.inv(F).T - held.reference) / bodies.LENGTH,
-             "pressure": largest(found.pressure - pressure) / most, "stress": largest(stress - exact[COMPONENTS]) / most}
+             "pressure": largest(found.pressure - pressure) / most,
+             "stress": largest(stress - exact[COMPONENTS]) / most}
     return each_at_most(sizes, 1e-9, HELD, f", {name}")
 
 

@@ -86,7 +86,7 @@ def space_on(straight: Mesh, order: int) -> Space:
 
 
 def half_disc(radius: float, refinement: float, ends, width: float, *, geometry: int = 1, lean: float = 0.0) -> Mesh:
-    """The package's mesh around a half-disc on the lower wall, straight (geometry 1) or curved (2), sheared by
+    """The package's mesh around a half-disc on the lower wall, straight (geometry 1) or curved (2 and 3), sheared by
     ``lean``; a film of 2 um is the thinnest that is resolved."""
     upright = seed(radius, refinement, geometry)
     points = upright.points + lean * upright.points[:, [1]] * [1.0, 0.0]
@@ -105,7 +105,7 @@ def around(seed: outline.Outline, refinement: float, ends, width: float) -> tupl
 
 def half_disc_space(radius: float, refinement: float, ends, width: float, order: int) -> Space:
     """Functions of an order on the package's mesh around a half-disc."""
-    return Space(half_disc(radius, refinement, ends, width, geometry=min(order, 2)), order)
+    return Space(half_disc(radius, refinement, ends, width, geometry=order), order)
 
 
 #: The least distance of a node from the curve, over the element size: over a half, as edges on the curve are not quite

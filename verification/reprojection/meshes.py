@@ -209,8 +209,8 @@ def _projected(old: pairs.Grid, new: pairs.Grid, rough: np.ndarray) -> dict[str,
     drifts = {name: abs(pairs.integral(new, found[:, 0], weight) / pairs.integral(old, rough, weight) - 1)
               for name, weight in (("integral", lambda x, y: 1 + 0 * x), ("centre, x", lambda x, y: x),
                                    ("centre, y", lambda x, y: y))}
-    return {"against the dense code": largest(found[:, 0] - expected), "linear field": _bent(found[:, 1], new), **drifts,
-            "square": _pythagoras(old, rough, new, found[:, 0])}
+    return {"against the dense code": largest(found[:, 0] - expected), "linear field": _bent(found[:, 1], new),
+            **drifts, "square": _pythagoras(old, rough, new, found[:, 0])}
 
 
 def _plane(mesh: pairs.Grid) -> np.ndarray:
