@@ -54,7 +54,7 @@ def _supported(size: float, kind: int):
     """(name, body, F and P of theta) of a body that is free, and of a confined one."""
     grid, side = bodies.rectangle(size, 4, kind)
     for name, held, exact in (("free", side["left"], _free), ("confined", side["left"] | side["right"], _confined)):
-        yield name, bodies.on_mesh(grid, kind, grid.points, np.column_stack([held, side["bottom"]])), exact
+        yield name, bodies.on_mesh(grid, kind, held, side["bottom"]), exact
 
 
 @case("growth-homogeneous", kind="exact", norm=NORM,
@@ -100,12 +100,16 @@ def patch(kind: int):
     return [_sheared(kind, np.linalg.matrix_power(TURN, turns), *shear) for turns, shear in enumerate(SHEARS)]
 
 
+def _turned(body: Supported, change: np.ndarray) -> Supported:
+    """The body with its places, and which of them are held, changed by a matrix (2, 2) with one number in a row."""
+    return replace(body, reference=body.reference @ change.T, held=np.abs(body.held @ change.T) > 0)
+
+
 def _sheared(kind: int, Q: np.ndarray, a: float, b: float, d: float) -> list[Check]:
     """A body turned by Q, a multiple of a right angle, with its end that was the upper one free along its normal."""
     grid, side = bodies.rectangle(SIZES[kind], 5, kind)
     rim = side["left"] | side["right"] | side["bottom"]
-    held = np.abs(np.column_stack([rim | side["top"], rim]) @ Q.T) > 0
-    body = bodies.on_mesh(grid, kind, grid.points @ Q.T, held)
+    body = _turned(bodies.on_mesh(grid, kind, rim | side["top"], rim), Q)
 
     def F(part):
         return Q @ np.array([[a**part, part * b], [0.0, d**part]]) @ Q.T
@@ -135,8 +139,8 @@ def _pulled(kind: int, F: np.ndarray, P: float) -> list[Check]:
     shake = np.random.default_rng(9).uniform(-1, 1, grid.points.shape) * inside[:, None] * SHAKEN[kind]
     J, held = np.linalg.det(F), side["left"] | side["bottom"] | side["top"]
     S = J * neo_hookean.cauchy(F, P)[:2, :2] @ np.linalg.inv(F).T
-    body = bodies.on_mesh(grid, kind, grid.points, np.column_stack([held, held]))
-    forces = bodies.traction(body, grid, lambda x, y: np.broadcast_to(S, (*x.shape, 2, 2)))
+    body = bodies.on_mesh(grid, kind, held, held)
+    forces = bodies.traction(body, grid, lambda x, y: S)
     found = bodies.equilibrium(body, body.constant(J), (grid.points + shake) @ F.T, forces)
     return exactly(f"F = {F.tolist()}, P = {P:g}", body, found, F, P)
 
@@ -301,7 +305,7 @@ def differences(differentiated, *kind: int):
       over=bodies.EVERY)
 def curved_taylor(kind: int):
     grid, side = bodies.rectangle(1.6, 4, kind)
-    body = bodies.on_mesh(grid, kind, grid.points, np.column_stack([side["left"], side["bottom"]]))
+    body = bodies.on_mesh(grid, kind, side["left"], side["bottom"])
     random, theta = np.random.default_rng(6), body.constant(1.4)
     here = grid.points @ np.array([[1.2, 0.1], [0.2, 1.1]])
     push, move = random.standard_normal(body.corners), 0.05 * random.standard_normal(here.shape)
@@ -415,5 +419,4 @@ def _changed(change: np.ndarray, kind: int) -> growth.Equilibrium:
     if np.linalg.det(change) < 0:
         cells = cells[:, MIRRORED[: cells.shape[1]]]
     same = replace(body, shape=growth.Shape(cells, body.corners, body.shape.degree))
-    other = replace(same, reference=body.reference @ change.T, held=np.abs(body.held @ change.T) > 0)
-    return bodies.grown(other, same.field(_theta))
+    return bodies.grown(_turned(same, change), same.field(_theta))

@@ -193,7 +193,7 @@ def _errors(size: float, seed: int, kind: int, exact) -> dict[str, float]:
     nodes and no pressure."""
     grid, side = bodies.rectangle(size, round(1 / size) + seed, kind, 1.0, 1.0, bent=0.0)
     held = side["left"] | side["bottom"] | side["top"]
-    body = bodies.on_mesh(grid, kind, grid.points, np.column_stack([held, held]))
+    body = bodies.on_mesh(grid, kind, held, held)
     forces = bodies.body_force(body, exact.force) + bodies.traction(body, grid, exact.stress)
     found = bodies.equilibrium(body, body.field(exact.theta), exact.place(*grid.points.T), forces)
     return bodies.errors(body, found, lambda x, y: (exact.place(x, y), exact.pressure(x, y)))

@@ -212,10 +212,10 @@ def to_the_end(preset: str) -> list:
     changes = ('pore.width="30 um"', 'pore.length="90 um"', 'aggregate.radius="25 um"', 'growth.end="60 h"')
     found = common.run("wide", preset, *changes, density=CLOSING)
     ends = np.array([i.pore.mesh.ends for i in found.instants])
-    upstream, downstream = found.column("upstream_um"), found.column("downstream_um")
-    beyond = max(0.0, (-45 - upstream).max(), (downstream - 45).max())
+    upstream, downstream = (found.column(name) for name in SHAPE[2:])
+    beyond = max(0.0, largest([upstream, downstream, *ends.T]) - 45)
     return [found, at_most("runs that did not say that the pore's end is reached", not found.ended, 0, "PoreEnd"),
-            at_most("um of mesh or aggregate beyond the pore", max(beyond, largest(ends) - 45), 0, "3.1: capped"),
+            at_most("um of mesh or aggregate beyond the pore", beyond, 0, "3.1: capped"),
             at_most("um of pore left without mesh", 45 - np.abs(ends[-1]).min(), 0, "1.5 W is past both ends"),
             at_most("um between the aggregate and the end, at the end", 45 - max(-upstream[-1], downstream[-1]),
                     30 / 14, "an element of W / 14")]
@@ -259,10 +259,10 @@ CEA = {1: 4, 2: 2}
 
 
 def uneven(preset: str, inner: float, outer: float, pressed: bool = False) -> Iterator[Check]:
-    """theta = a + c (R / R_0)^2, the closed forms of a half-cylinder: places and area; Cea's lemma: the error is that of
-    interpolation times the root of the ratio of moduli, which go as theta^(-2/3), and two for the pressure; the paper's
-    stabilisation errs as much again, in the same order. pressed: the pressure too, outside of the middle quarter, where
-    linear functions of R meet."""
+    """theta = a + c (R / R_0)^2, the closed forms of a half-cylinder: places and area; Cea's lemma: the error is that
+    of interpolation times the root of the ratio of moduli, which go as theta^(-2/3), and two for the pressure; the
+    paper's stabilisation errs as much again, in the same order. pressed: the pressure too, outside of the middle
+    quarter, where linear functions of R meet."""
     held, rim = seed(preset)
     exact = HalfCylinder(inner, outer)
     theta = exact.theta(*held.reference.T)

@@ -6,7 +6,6 @@ Hard cases of the flow: high and vanishing speed, viscosity ratios to 1e9, a plu
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -36,18 +35,17 @@ def disc(radius: float, *changes: str) -> tuple[str, ...]:
 SLOW = 'flow.mean_velocity="0.35 m/day"'
 
 
-def same_root(found: Run) -> list[Check]:
+def same_root(found: Run) -> Check:
     """Newton's method must come to one solution from above, from zero and from far below zero, where the law of Monod
     has its spurious roots."""
     last = found.instants[-1]
     problem, state = last.solved.problem, channels.both(last.solved.concentrations)
-    supplies, apart = problem.supply.reshape(2, -1), 0.0
-    for part in (0.0, 1.0, -7.6):
-        start = transport.Concentrations(*(part * supplies))
-        other = channels.both(transport.steady(problem, biomass.sink(last.pore.active), start))
-        apart = max(apart, largest((other - state) / supplies))
-    return [at_most("largest difference of C over the supply, from four starts", apart, 1e-6,
-                    "uptake is monotone: one solution; Newton's tolerance, times the system's condition")]
+    supplies = problem.supply.reshape(2, -1)
+    starts = (transport.Concentrations(*(part * supplies)) for part in (0.0, 1.0, -7.6))
+    others = [channels.both(transport.steady(problem, biomass.sink(last.pore.active), start)) for start in starts]
+    return at_most("largest difference of C over the supply, from four starts",
+                   largest((np.array(others) - state) / supplies), 1e-6,
+                   "uptake is monotone: one solution; Newton's tolerance, times the system's condition")
 
 
 def starved(preset: str, changes: tuple[str, ...]) -> list:
@@ -90,13 +88,14 @@ def _stoichiometry(found: Run) -> list[Check]:
     """(7) less F times (8) is what decay takes, d_c f_d b X m_A, whatever the concentrations."""
     law, both = found.scene.kinetics, found.scene.substrates
     acceptor, donor = (flux.consumed for flux in found.instants[-1].solved.fluxes)
+    demand = law.acceptor_to_donor_ratio * donor
     decay = channels.decay_demand(law) * law.maximum_density * found.last["aggregate_area_um2"]
     C = found.instants[-1].solved.concentrations.acceptor
     ends = np.array([max(C.min(), 0.0), C.max()])
     m = ends / (ends + both.acceptor.half_saturation)
-    low, high = (acceptor - decay * m[::-1]) / (law.acceptor_to_donor_ratio * donor)
-    return [between("acceptor taken up for decay, over what m_A = 1 would take",
-                    (acceptor - law.acceptor_to_donor_ratio * donor) / decay, m[0] * (1 - 1e-9), m[1] * (1 + 1e-9),
+    low, high = (acceptor - decay * m[::-1]) / demand
+    return [between("acceptor taken up for decay, over what m_A = 1 would take", (acceptor - demand) / decay,
+                    m[0] * (1 - 1e-9), m[1] * (1 + 1e-9),
                     "its mean m_A lies between those of the least and the largest C_A"),
             between("F times donor, over acceptor less decay's share", 1.0, low, high, "as above")]
 
@@ -243,11 +242,9 @@ def no_flow(preset: str) -> list:
 
 def still(preset: str) -> list:
     """Without [flow] the supply is held at both ends: what diffuses in is what is taken up."""
-    changes = (*FIXED, 'aggregate.radius="60 um"')
-    runs = []
-    for which, size in ((preset, ()), ("accurate", ("numerics.refinement=1",))):
-        runs.append(common.ran(replace(common.scene("wide", which, *changes, *size), flow=None)))
-    return [runs[0], common.close(*runs, preset, *EFFLUENTS)]
+    own, fine = (common.ran(runs.without_flow(common.scene("wide", which, *disc(60, *size))))
+                 for which, size in ((preset, ()), ("accurate", ("numerics.refinement=1",))))
+    return [own, common.close(own, fine, preset, *EFFLUENTS)]
 
 
 def trickle(preset: str, velocity: str, balance: float) -> list:

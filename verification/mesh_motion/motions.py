@@ -158,11 +158,8 @@ def half_disc(geometry: int):
 
 def _compared(geometry: int, contact: float, levels, motion: str, gamma: float, order: float, why: str, name: str = ""):
     """The study of one motion."""
-    grids = [_segment(contact, refinement, geometry) for refinement, _ in levels]
-    errors = [_apart(grid, contact, parts, gamma, motion) for grid, (_, parts) in zip(grids, levels)]
-    sizes = [meshes.mean_size(grid) for grid in grids]
-    return study(f"{name}gamma = {gamma:g}", sizes, errors, order, f"{why}; {BOTH}",
-                 ceiling=1e-3)
+    found = refine(_apart, levels, contact, geometry, gamma, motion)
+    return study(f"{name}gamma = {gamma:g}", found["size"], found["apart"], order, f"{why}; {BOTH}", ceiling=1e-3)
 
 
 @case("mesh_motion-corner", kind="cross-code", slow=True,
@@ -196,13 +193,15 @@ def _segment(contact: float, refinement: float, geometry: int) -> Mesh:
 _followed = cache(quadratic_mesh_motion.follow)
 
 
-def _apart(grid: Mesh, contact: float, parts: int, gamma: float, name: str) -> float:
-    """Relative difference of both codes; ours is linear in the motion, which may be as large as the aggregate."""
-    motion = SEGMENT_MOTIONS[name]
+def _apart(level: tuple[float, int], contact: float, geometry: int, gamma: float, name: str) -> dict[str, float]:
+    """Size of our elements, and the relative difference of both codes on a level; ours is linear in the motion, which
+    may be as large as the aggregate."""
+    refinement, parts = level
+    grid, motion = _segment(contact, refinement, geometry), SEGMENT_MOTIONS[name]
     theirs = _followed(RADIUS, contact, PORE, SEGMENT_END, parts, gamma, motion)
     found = moved(grid, grid.points + motion(*grid.points.T).T, gamma) - grid.points
     there = meshes.field_at(Space(grid, grid.geometry), found, theirs.points)
-    return meshes.relative(there, theirs.displacement, theirs.weights)
+    return {"size": meshes.mean_size(grid), "apart": meshes.relative(there, theirs.displacement, theirs.weights)}
 
 
 REACH = -75.0, 75.0

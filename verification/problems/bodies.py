@@ -72,9 +72,10 @@ class Supported(growth.Body):
         return np.zeros(self.corners)
 
 
-def on_mesh(grid: Mesh, kind: int, reference: np.ndarray, held: np.ndarray) -> Supported:
-    """The aggregate of a mesh, as scenes have it, with its nodes' places at t = 0 and what is held (n, 2)."""
-    return Supported(pore.material(Space(grid, kind), reference).shape, reference, held)
+def on_mesh(grid: Mesh, kind: int, *held: np.ndarray) -> Supported:
+    """The aggregate of a mesh at t = 0, as scenes have it; held: (n,) its nodes whose x is, and whose y is."""
+    whole = pore.material(Space(grid, kind), grid.points[grid.body])
+    return Supported(whole.shape, whole.reference, np.column_stack(held))
 
 
 def on_wall(grid: Mesh, kind: int, outline: Outline) -> tuple[Supported, np.ndarray]:
@@ -82,7 +83,7 @@ def on_wall(grid: Mesh, kind: int, outline: Outline) -> tuple[Supported, np.ndar
     walls, its fixed points held."""
     rim = grid.topology.body_loop
     held = constrained(len(grid.body), rim, outline.wall, outline.fixed)
-    return on_mesh(grid, kind, grid.points[grid.body], held), rim[outline.wall == FREE]
+    return on_mesh(grid, kind, *held.T), rim[outline.wall == FREE]
 
 
 @cache
@@ -200,14 +201,14 @@ def body_force(held: Supported, density) -> np.ndarray:
 
 
 def traction(held: Supported, grid: Mesh, stress) -> np.ndarray:
-    """(n, 2) nodal forces of S N per length of t = 0, stress(X, Y) (..., 2, 2), on the straight right end of the
-    rectangle ``grid`` that is the whole body."""
+    """(n, 2) nodal forces of S N per length of t = 0, stress(X, Y) (..., 2, 2) or (2, 2), on the straight right end of
+    the rectangle ``grid`` that is the whole body."""
     order = held.geometry
     edges = grid.topology.dofs(order).outlet
     _, weights, shape = meshes.along_edges(order, 5)
     where = np.einsum("qa,eai->eqi", shape, held.reference[edges])
     length = np.ptp(held.reference[edges, 1], axis=1)
-    pull = stress(*np.moveaxis(where, 2, 0))[..., 0]
+    pull = np.broadcast_to(stress(*np.moveaxis(where, 2, 0))[..., 0], where.shape)
     return _summed(held, edges, np.einsum("e,q,qa,eqi->eai", length, weights, shape, pull))
 
 

@@ -14,6 +14,7 @@ Norms of the error of fields of order 1, 2 or 3 on triangles, and what they are 
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise, product
 
 import numpy as np
 from scipy.spatial import Delaunay, cKDTree
@@ -31,11 +32,8 @@ def rectangle(ends, width: float, size: float, *, across=(), along=(), seed: int
     y in ``along``. Boundary nodes are on their line to the last bit."""
     random = np.random.default_rng(seed)
     x_lines, y_lines = np.array([ends[0], *across, ends[1]]), np.array([0.0, *along, width])
-    xs, ys = _stations(x_lines, size), _stations(y_lines, size)
-    rim = [np.column_stack([xs, np.full(len(xs), y)]) for y in y_lines]
-    rim += [np.column_stack([np.full(len(ys), x), ys]) for x in x_lines]
-    points = np.vstack([np.unique(np.vstack(rim), axis=0), _inside(x_lines, y_lines, size, random)])
-    return _delaunays(points, size)
+    on_lines = [*product(_stations(x_lines, size), y_lines), *product(x_lines, _stations(y_lines, size))]
+    return _delaunays(np.vstack([np.unique(on_lines, axis=0), _inside(x_lines, y_lines, size, random)]), size)
 
 
 def upright(points: np.ndarray, triangles: np.ndarray, least: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
@@ -52,8 +50,12 @@ def _delaunays(points: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]
 
 def _stations(lines: np.ndarray, size: float) -> np.ndarray:
     """Equal parts of about ``size`` between consecutive lines."""
-    pieces = [np.linspace(a, b, max(1, round((b - a) / size)) + 1)[:-1] for a, b in zip(lines, lines[1:])]
-    return np.append(np.concatenate(pieces), lines[-1])
+    return np.unique(np.hstack([np.linspace(a, b, max(1, round((b - a) / size)) + 1) for a, b in pairwise(lines)]))
+
+
+def _beside(points: np.ndarray, across, along) -> np.ndarray:
+    """(N, k) distances of points from the lines x in ``across`` and y in ``along``, with their signs."""
+    return np.hstack([points[:, [0]] - np.array(across), points[:, [1]] - np.array(along)])
 
 
 def _inside(x_lines, y_lines, size: float, random) -> np.ndarray:
@@ -64,9 +66,8 @@ def _inside(x_lines, y_lines, size: float, random) -> np.ndarray:
     x = x + 0.5 * size * (np.arange(len(rows)) % 2)[:, None]
     points = np.column_stack([x.ravel(), y.ravel()]) + size * random.uniform(0, 1, 2)
     points += size * random.uniform(-JITTER, JITTER, points.shape)
-    gaps = [np.abs(points[:, [axis]] - lines).min(axis=1) for axis, lines in ((0, x_lines), (1, y_lines))]
     within = (points < [x_lines[-1], y_lines[-1]]).all(axis=1)
-    return points[within & (np.minimum(*gaps) > CLEARANCE * size)]
+    return points[within & (np.abs(_beside(points, x_lines, y_lines)).min(axis=1) > CLEARANCE * size)]
 
 
 def channel(ends, width: float, size: float, is_biomass, *, across=(), along=(), seed: int = 0) -> Mesh:
@@ -120,7 +121,7 @@ def cut(ends, width: float, size: float, is_biomass, *, across=(), along=(), see
     points, _ = rectangle(ends, width, size, across=across, along=along, seed=seed)
 
     def beside(where):
-        return np.hstack([where[:, [axis]] - np.array(lines) for axis, lines in ((0, across), (1, along))])
+        return _beside(where, across, along)
 
     apart = np.abs(beside(points)).min(axis=1)
     return _delaunay(points[(apart == 0) | (apart > CURVE_CLEARANCE * size)], beside, size, is_biomass, ends, width)
@@ -240,6 +241,7 @@ def along_edges(order: int, count: int) -> tuple[np.ndarray, np.ndarray, np.ndar
     return along, weights / 2, elements.values(order, np.column_stack([along, 0 * along]))[:, elements.ON_EDGE[order]]
 
 
-def mean_size(mesh: Mesh) -> float:
-    """Side of the square of mean triangle area twice over: the spacing of a lattice of as many nodes, um."""
-    return np.sqrt(2 * mesh.areas.mean())
+def mean_size(mesh: Mesh, chosen=slice(None)) -> float:
+    """Side of the square of mean area twice over, of the triangles ``chosen``: the spacing of a lattice of as many
+    nodes, um."""
+    return np.sqrt(2 * mesh.areas[chosen].mean())

@@ -274,7 +274,7 @@ def _share_errors(refinement: float, which: int, order: int) -> dict[str, float]
 
 def _size(now) -> float:
     """Of the elements of the aggregate, um."""
-    return np.sqrt(2 * now.mesh.areas[now.mesh.biomass].mean())
+    return meshes.mean_size(now.mesh, now.mesh.biomass)
 
 
 def _hump(x, y):
