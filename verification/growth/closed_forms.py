@@ -206,8 +206,7 @@ def admissible(count: int = 200) -> tuple[np.ndarray, np.ndarray]:
     random = np.random.default_rng(1)
     F = np.eye(2) + 0.3 * random.standard_normal((count, 2, 2))
     F[np.linalg.det(F) < 0.2] = np.eye(2)
-    shear = np.tile(np.eye(2), (count, 1, 1))
-    shear[:, 0, 1] = random.uniform(-3, 3, count)
+    shear = np.eye(2) + random.uniform(-3, 3, (count, 1, 1)) * [[0, 1], [0, 0]]
     scale = np.sqrt(10 ** random.uniform(-0.3, 3.3, count) / np.linalg.det(F))
     return scale[:, None, None] * F @ shear, random.standard_normal(count)
 

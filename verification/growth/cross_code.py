@@ -113,10 +113,10 @@ def _points():
 def _curved(found: dict, pressure: str, ceilings: tuple[float, float]):
     """Curved triangles of ours against the last level of the reference: the last differences, and, without a contact's
     ends, the orders over all refinements, as between two meshes of few triangles they scatter."""
+    fallen = {name: np.log(values[0] / values[-1]) for name, values in found.items()}
     for field, order, ceiling in zip(("place", pressure), (3, 2), ceilings):
-        slope = np.log(found[field][0] / found[field][-1]) / np.log(found["size"][0] / found["size"][-1])
         if pressure == "pressure":
-            yield between(f"order of the {field}", slope, order - 0.5, order + 0.5,
+            yield between(f"order of the {field}", fallen[field] / fallen["size"], *around(order, 0.5),
                           "quadratic places, linear pressure: third and second order")
         yield at_most(field, found[field][-1], ceiling, "the reference's elements are finer")
 

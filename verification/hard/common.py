@@ -65,8 +65,13 @@ class Run(Note):
     density: float = 0.05
 
     @property
+    def end(self) -> Instant:
+        """The last instant."""
+        return self.instants[-1]
+
+    @property
     def last(self) -> dict:
-        """The last row."""
+        """Its row."""
         return self.rows[-1]
 
     def column(self, name: str) -> np.ndarray:

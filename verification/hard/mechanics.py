@@ -33,16 +33,13 @@ FILM = ('pore.width="20 um"', 'aggregate.radius="17.6 um"', 'growth.end="1 h"')
 
 def remeshing_always(made: Scene) -> Iterator[Instant]:
     """A run each of whose steps ends with a new mesh, from which the next one goes on."""
-    state, instant = next(simulation.steps(made))
-    while True:
+    pair = next(simulation.steps(made))
+    while pair:
+        state, instant = pair
         yield instant
-        later = (pair for pair in simulation.steps(made, state) if pair[1] and pair[1].ledgers)
-        try:
-            state, instant = next(later)
-        except StopIteration:
-            return
-        if instant.remeshes == 0:
-            state, instant = _on_a_new_mesh(made, state, instant)
+        pair = next((later for later in simulation.steps(made, state) if later[1] and later[1].ledgers), None)
+        if pair and pair[1].remeshes == 0:
+            pair = _on_a_new_mesh(made, *pair)
 
 
 def _on_a_new_mesh(made: Scene, state, instant: Instant):
@@ -91,7 +88,7 @@ def _edge_wide(found: Run, fine: Run, preset: str) -> Iterator:
     film = found.scene.growth.minimum_film
     edge = film / ACROSS_FILM / found.scene.numerics.refinement
     loss = found.scene.pore.length * common.clean_conductivity(found.scene) / fine.last[DRIVE[0]]
-    ours, theirs = (_contact_length(run.instants[-1].pore.outline) for run in (found, fine))
+    ours, theirs = (_contact_length(run.end.pore.outline) for run in (found, fine))
     fall = -np.diff([width - line["thickness_um"] for line in found.rows if not line["contact"]]).min(initial=0.0)
     share, late = LATE[found.scene.numerics.time]
     known = 2 * edge + share * np.sqrt(8 * width * fall)

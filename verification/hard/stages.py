@@ -38,11 +38,11 @@ SLOW = 'flow.mean_velocity="0.35 m/day"'
 def same_root(found: Run) -> Check:
     """Newton's method must come to one solution from above, from zero and from far below zero, where the law of Monod
     has its spurious roots."""
-    last = found.instants[-1]
-    problem, state = last.solved.problem, channels.both(last.solved.concentrations)
+    solved = found.end.solved
+    problem, state = solved.problem, channels.both(solved.concentrations)
     supplies = problem.supply.reshape(2, -1)
     starts = (transport.Concentrations(*(part * supplies)) for part in (0.0, 1.0, -7.6))
-    others = [channels.both(transport.steady(problem, biomass.sink(last.pore.active), start)) for start in starts]
+    others = [channels.both(transport.steady(problem, biomass.sink(found.end.pore.active), start)) for start in starts]
     return at_most("largest difference of C over the supply, from four starts",
                    largest((np.array(others) - state) / supplies), 1e-6,
                    "uptake is monotone: one solution; Newton's tolerance, times the system's condition")
@@ -87,10 +87,10 @@ def exhausted(preset: str, scarce: str) -> list:
 def _stoichiometry(found: Run) -> list[Check]:
     """(7) less F times (8) is what decay takes, d_c f_d b X m_A, whatever the concentrations."""
     law, both = found.scene.kinetics, found.scene.substrates
-    acceptor, donor = (flux.consumed for flux in found.instants[-1].solved.fluxes)
+    acceptor, donor = (flux.consumed for flux in found.end.solved.fluxes)
     demand = law.acceptor_to_donor_ratio * donor
     decay = channels.decay_demand(law) * law.maximum_density * found.last["aggregate_area_um2"]
-    C = found.instants[-1].solved.concentrations.acceptor
+    C = found.end.solved.concentrations.acceptor
     ends = np.array([max(C.min(), 0.0), C.max()])
     m = ends / (ends + both.acceptor.half_saturation)
     low, high = (acceptor - decay * m[::-1]) / demand
@@ -124,8 +124,11 @@ DEPTH = 0.6
 
 
 def slab_front(preset: str) -> list:
-    """The stage alone: a slab between films of still water, in which the donor is used up at 0.6 of the way in."""
-    size, bound, origin = FRONT[preset]
+    """The stage alone: a slab between films of still water, in which the donor is used up at 0.6 of the way in.
+
+    Behind the front C'' jumps from s / D to zero, so that whatever the order an element is off by s h^2 / (8 D) at the
+    most."""
+    size = SIZES[preset]
     end, width = HALF + FILM, 1.5 * size
     made = common.scene("wide", preset, *SHARP, 'kinetics.decay_coefficient="0 1/d"',
                         "kinetics.acceptor_to_donor_ratio=1e-9")
@@ -133,6 +136,7 @@ def slab_front(preset: str) -> list:
     donor, depth = made.substrates.donor, DEPTH * HALF
     ratio = donor.diffusivity_in_aggregate / donor.diffusivity
     sink = donor.supply * donor.diffusivity_in_aggregate / (depth**2 / 2 + FILM * ratio * depth)
+    bound, origin = size**2 / 8 / (depth**2 / 2 + FILM * depth * 0.8), FRONT
     problem = transport.problem(space, None, made.substrates, made.kinetics)
     active = Sink(sink / made.kinetics.maximum_utilization_rate * space.reaction.dx)
     state = transport.steady(problem, active)
@@ -145,11 +149,9 @@ def slab_front(preset: str) -> list:
             at_least("least C_D over the supply", state.donor.min() / donor.supply, common.LOWEST, "UNRESOLVED")]
 
 
-#: Size of the elements, um; bound; its origin. Behind the front C'' jumps from s / D to zero, so that whatever the
-#: order an element is off by s h^2 / (8 D) at the most.
-FRONT = {preset: (size, size**2 / 8 / (DEPTH**2 * HALF**2 / 2 + FILM * DEPTH * HALF * 0.8),
-                  "the jump of C'' at the front: s h^2 / (8 D_B)")
-         for preset, size in (("paper", 6.0), ("fast", 12.0), ("accurate", 5.0), ("cubic", 12.0))}
+FRONT = "the jump of C'' at the front: s h^2 / (8 D_B)"
+#: Of the elements, um.
+SIZES = {"paper": 6.0, "fast": 12.0, "accurate": 5.0, "cubic": 12.0}
 ZERO_ORDER = HardCase(
     3, "zero-order", "Half saturations of a millionth of the supply: fronts of zero order",
     "The closed form of zero-order uptake in a slab, and the effluents of a finer run around half-discs",
@@ -198,7 +200,7 @@ def fast_flow(preset: str, factor: float) -> list:
     slower = common.run("wide", preset, *disc(60, speed(factor / 10)))
     found, fine, checks = common.against("wide", preset, disc(60, speed(factor)), *EFFLUENTS, *DRIVE,
                                          refinement=FINER[factor])
-    ours, theirs = (run.instants[-1].solved.fluxes[0].consumed for run in (found, fine))
+    ours, theirs = (run.end.solved.fluxes[0].consumed for run in (found, fine))
     return [checks, _more_than(found, slower, preset),
             at_most("acceptor taken up, against a finer run", abs(ours / theirs - 1), 2 * TOLERANCE[preset],
                     "that of concentrations at the aggregate, area and rate: twice the preset's")]
@@ -213,7 +215,7 @@ def _more_than(found: Run, slower: Run, preset: str) -> list[Check]:
     law, both = found.scene.kinetics, found.scene.substrates
     m_a, m_d = (s.supply / (s.supply + s.half_saturation) for s in (both.acceptor, both.donor))
     most = law.maximum_utilization_rate * m_a * m_d * law.maximum_density * found.last["aggregate_area_um2"]
-    taken, before = (run.instants[-1].solved.fluxes[1].consumed for run in (found, slower))
+    taken, before = (run.end.solved.fluxes[1].consumed for run in (found, slower))
     return [between("donor taken up over what it would be at the supply everywhere", taken / most,
                     before / most * (1 - TOLERANCE[preset]), 1.0, "the faster, the more: at least that at a tenth")]
 
@@ -294,8 +296,8 @@ def rigid(preset: str) -> list:
     """lambda from 1e5 to 1e9: nothing passes the aggregate any more."""
     soft, hard = (common.run("wide", preset, *disc(80, f"flow.viscosity_ratio={ratio}")) for ratio in (1e5, 1e9))
     layers = [layered_channel.gradient(soft.scene.pore.width, 80.0, ratio) for ratio in (1e5, 1e9)]
-    last = hard.instants[-1]
-    grid, speed = last.pore.mesh, np.hypot(*last.pore.space.to_mesh(last.solved.flow.velocity).T)
+    now = hard.end.pore
+    grid, speed = now.mesh, np.hypot(*now.space.to_mesh(hard.end.solved.flow.velocity).T)
     through = speed[np.setdiff1d(grid.body, grid.loop)].max()
     return [soft, hard,
             between("conductivity at 1e9 over that at 1e5", hard.last[DRIVE[0]] / soft.last[DRIVE[0]],

@@ -28,13 +28,17 @@ def scene(*changes: str, order: int = 1):
     return load_scene("base", (runs.of(channels.WORDS[order]), *changes))
 
 
-def placed(around: Outline, refinement: float, density=lambda x, y: DENSITY + 0 * x, ends=(-75.0, 75.0),
-           order: int = 1) -> Pore:
+def uniform(x, y) -> np.ndarray:
+    """X_m everywhere."""
+    return DENSITY + 0 * x
+
+
+def placed(around: Outline, refinement: float, density=uniform, ends=(-75.0, 75.0), order: int = 1) -> Pore:
     """An aggregate at t = 0 with X_A = density(x, y), on a mesh of its own."""
     return at_start(*meshes.around(around, refinement, ends, WIDTH), order, density)
 
 
-def at_start(grid: Mesh, around: Outline, order: int, density=lambda x, y: DENSITY + 0 * x) -> Pore:
+def at_start(grid: Mesh, around: Outline, order: int, density=uniform) -> Pore:
     """The same on a mesh that is there."""
     space = Space(grid, order)
     active = density(*places(space)) * space.reaction.dx
