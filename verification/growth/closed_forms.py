@@ -185,7 +185,7 @@ def half_cylinder(top: float):
       norm="largest relative error of the outline's radius; L2 of positions and of the pressure over the body at t = 0",
       claim="A curved half-disc that grows by theta(R) becomes the exact half-disc: places to third order, the "
             "pressure to second, and as well at theta = 2000 as at 36; in scenes of quadratic and of cubic elements",
-      mutants=("grad-div-dropped", "theta-power"), over={bodies.WORDS[kind]: (kind,) for kind in (2, 3)},
+      mutants=("grad-div-dropped", "theta-power"), over=bodies.CURVED,
       because="order 1: growth-half-cylinder")
 def curved_half_cylinder(kind: int):
     found = refine(errors, REFINEMENTS[kind], 36.0, kind)

@@ -20,16 +20,15 @@ from repro.fem.outline import FREE, Outline
 from repro.fem.space import Space
 from repro.model import growth, pore
 from repro.model.contact import constrained
-from verification.kernel.case import largest
+from verification.kernel.case import combined, largest
 from verification.problems import meshes
 
 #: Radius of the half-discs (um), and the factor by which theta is raised at a time.
 RADIUS, FACTOR = 20.0, 1.5
 LENGTH, HEIGHT = 10.0, 7.0
-KINDS = (1, 2, 3)
-WORDS = {1: "straight", 2: "curved", 3: "curved, of cubic scenes"}
-#: Every kind, by label.
-EVERY = {WORDS[kind]: (kind,) for kind in KINDS}
+#: Kinds, by label: the curved ones, and every one.
+CURVED = combined({"curved": 2, "curved, of cubic scenes": 3})
+EVERY = combined({"straight": 1}) | CURVED
 #: Ends of the mesh around a half-disc, at either side of it (um).
 ENDS = {1: 60.0, 2: 95.0, 3: 95.0}
 #: Degree of the quadrature of norms, and how far middles of inner edges are moved at random (of the elements' size).

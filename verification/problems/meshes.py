@@ -190,9 +190,9 @@ def fine(space: Space, chosen=slice(None), degree: int = FINE):
 
 
 def relative(found: np.ndarray, exact: np.ndarray, weight: np.ndarray) -> float:
-    """L2 of values less exact (t, q) or (t, q, m), with weights (t, q), over that of exact."""
-    weight = weight.reshape(weight.shape + (1,) * (exact.ndim - weight.ndim))
-    return np.sqrt(np.sum(weight * (found - exact) ** 2) / np.sum(weight * exact**2))
+    """L2 of values less exact (t, q) or (t, q, m), with weights (t, q), over that of exact; transposed, the weights are
+    those of each component."""
+    return np.sqrt(np.sum(weight.T * (found - exact).T ** 2) / np.sum(weight.T * exact.T**2))
 
 
 def distance(at, values: np.ndarray, exact) -> float:
