@@ -31,27 +31,22 @@ TOWARDS_ARC, TOWARDS_WALL = 2.0, 3.0
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Displacement (K, 2) at the quadrature points (K, 2) of the fluid, and their weights (K,); displacement (m, 2) at
-    nodes (m, 2) of the straight line from the arc to the channel's upper right corner."""
+    """Displacement (K, 2) at the quadrature points (K, 2) of the fluid, and their weights (K,)."""
 
     points: np.ndarray
     displacement: np.ndarray
     weights: np.ndarray
-    line: np.ndarray
-    on_line: np.ndarray
 
 
 def follow(radius, angle, width, end, parts, gamma, motion):
     """:class:`Motion` of the fluid of -end < x < end, 0 < y < width around an arc of ``radius`` that meets the lower
     wall at the contact ``angle`` (radians; pi/2: a half-disc), when the arc moves by motion(x, y), (2, n)."""
-    mesh, line = _mesh(radius, angle, width, end, parts)
-    basis = Basis(mesh, ElementVector(ElementTriP2()), intorder=5)
+    basis = Basis(_mesh(radius, angle, width, end, parts), ElementVector(ElementTriP2()), intorder=5)
     A = BilinearForm(lambda u, v, w: ddot(grad(u), grad(v)) + div(u) * div(v) / gamma).assemble(basis)
     held, value = _boundary(basis, radius, angle, width, end, motion)
     found = solve(*condense(A, x=value, D=held))
     points, field = (np.asarray(f).reshape(2, -1).T for f in (basis.global_coordinates(), basis.interpolate(found)))
-    nodes = basis.nodal_dofs[:, line]
-    return Motion(points, field, basis.dx.ravel(), basis.doflocs[:, nodes[0]].T, found[nodes].T)
+    return Motion(points, field, basis.dx.ravel())
 
 
 def exponent(fluid_angle, gamma):
@@ -61,14 +56,12 @@ def exponent(fluid_angle, gamma):
 
 
 def _mesh(radius, angle, width, end, parts):
-    """The strip 0 < t < 3, 0 < s < 1 in graded squares, halved, mapped by :func:`_placed`; middles of edges too.
-
-    And the nodes at t = 1."""
+    """The strip 0 < t < 3, 0 < s < 1 in graded squares, halved, mapped by :func:`_placed`; middles of edges too."""
     side = np.linspace(0, 1, parts + 1)
     along = np.concatenate([side**TOWARDS_WALL, 1 + side[1:-1], 3 - side[::-1] ** TOWARDS_WALL])
     flat = MeshTri.init_tensor(along, side**TOWARDS_ARC)
     where = _placed(*Basis(flat, ElementTriP2()).doflocs, radius, angle, width, end)
-    return MeshTri2(where, flat.t), np.flatnonzero(flat.p[0] == 1)
+    return MeshTri2(where, flat.t)
 
 
 def _placed(t, s, radius, angle, width, end):

@@ -30,7 +30,7 @@ def as_json(cells: Iterable[Cell], live: bool = False) -> dict:
                                             "cells": {}})
         row["cells"][cell.preset] = {"verdict": cell.verdict, "accepted": not cell.unaccepted,
                                      **({"message": cell.message} if live else {})}
-    return {"cases": [rows[number] for number in sorted(rows)]}
+    return {"cases": [*rows.values()]}
 
 
 def record(results: Iterable) -> None:

@@ -59,7 +59,7 @@ def sliding(points: np.ndarray, triangles: np.ndarray) -> Supported:
     on_wall = np.abs(points[:, 1]) < 1e-9 * RADIUS
     middle = on_wall & (np.abs(points[:, 0]) < 1e-9 * RADIUS)
     shape = growth.Shape(triangles, len(points), GRADIENT_DEGREES[1])
-    return Supported(growth.Body(shape, points), np.column_stack([middle, on_wall]))
+    return Supported(shape, points, np.column_stack([middle, on_wall]))
 
 
 def radial_theta(body: Supported, inner: float, more: float) -> np.ndarray:
@@ -167,7 +167,7 @@ def stability(body: Supported, factor: float) -> float:
 def stabilised_by(body: Supported, factor: float) -> growth.System:
     """The equations of a body whose stabilisation at t = 0 is multiplied by a factor."""
     plain = growth.gradient_stabilisation(body.reference, body.cells, np.ones(len(body.cells)))
-    return growth.System(body.body, body.held, stabilising=factor * plain)
+    return growth.System(body, body.held, stabilising=factor * plain)
 
 
 def dense(elements: np.ndarray, unknowns: np.ndarray) -> np.ndarray:
@@ -242,7 +242,7 @@ def expanded(exponent: float) -> Expanded:
     steps = round(STEPS / current().step)
     for t in TOTAL ** (np.arange(1, steps + 1) / steps):
         theta = radial_theta(body, t**exponent, t - t**exponent)
-        found = growth.equilibrium(body.body, theta, position, pressure, body.held, body.reference)
+        found = growth.equilibrium(body, theta, position, pressure, body.held, body.reference)
         position = found.position
         pressure = found.pressure
         iterations = iterations + found.iterations

@@ -149,7 +149,7 @@ def stabilisations(case: Cylinder) -> dict[str, np.ndarray]:
     cells, ones = case.body.cells, np.ones(len(case.theta))
     start = growth.gradient_stabilisation(case.body.reference, cells, ones)
     present = [growth.gradient_stabilisation(case.position, cells, expansion)
-               for expansion in (ones, case.body.body.strained(case.position).J[:, 0])]
+               for expansion in (ones, case.body.strained(case.position).J[:, 0])]
     return dict(zip(KINDS, (0 * start, start, *present)))
 
 
@@ -158,7 +158,7 @@ def equilibrium_errors(case: Cylinder, stabilising: np.ndarray) -> tuple[float, 
 
     Raises GrowthError where none is found.
     """
-    system = growth.System(case.body.body, case.body.held, stabilising=stabilising)
+    system = growth.System(case.body, case.body.held, stabilising=stabilising)
     exact = growth.Equilibrium(case.position, case.pressure, 0)
     found = growth.reach(system, case.theta, case.theta, exact, case.position)
     worst = np.abs(found.pressure - case.pressure).max() / np.abs(case.pressure).max()

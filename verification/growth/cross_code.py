@@ -14,19 +14,16 @@ falls from two towards 3/2.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 
 from reference import manufactured_growth, quadratic_growth
 from reference.quadratic_growth import Contact
-from repro.model import growth
 from verification.growth import closed_forms
 from verification.kernel.case import Check, around, at_most, between, case, refine, studies
 from verification.problems import bodies, meshes
-from verification.problems.bodies import Supported
 
 #: Ours, by refinement; the reference on each level, by rings. 90 and 135 degrees have a node on all of them. Curved
 #: triangles of ours, whose refinements are the second ones, are compared with the last level alone.
@@ -36,19 +33,12 @@ FRONT = 36.0
 CONTRAST = 10.0
 #: The upper wall (um), and how often the reference is refined towards the ends of the contact.
 CONTACT, TOWARDS = Contact(np.pi / 2, 3 * np.pi / 4, 65.0), 3
+#: x + i y of these ends at t = 0, um.
+ENDS = bodies.RADIUS * np.exp([[1j * CONTACT.first], [1j * CONTACT.last]])
 PLACE = "the lower of the two orders: linear elements, second order (quadratic ones: third)"
 PRESSURE = ("the lower of the two orders: between 2, linear elements, and 3/2, a layer at the rim where the "
             "stabilisation wants dP/dn = 0 (the reference: second)")
 SINGULAR = "no order: the stress is singular, if weakly, like r^(-1/2) at the ends of the contact; under 1 %"
-
-
-@dataclass(frozen=True)
-class Problem:
-    """theta(X, Y), its largest value, and the contact with an upper wall, if any."""
-
-    theta: Callable
-    top: float
-    contact: Contact | None
 
 
 def _uneven(x, y):
@@ -57,58 +47,49 @@ def _uneven(x, y):
     return FRONT * along * (1 + 0.5 * (y / bodies.RADIUS) ** 2)
 
 
-PROBLEMS = {"half-cylinder": Problem(closed_forms.exact(2000.0).theta, 2000.0, None),
-            "uneven": Problem(_uneven, FRONT, None),
-            "between walls": Problem(_uneven, FRONT, CONTACT)}
+#: theta(X, Y), its largest value, and the contact with an upper wall, if any.
+PROBLEMS = {"half-cylinder": (closed_forms.exact(2000.0).theta, 2000.0, None), "uneven": (_uneven, FRONT, None),
+            "between walls": (_uneven, FRONT, CONTACT)}
 
 
 @cache
 def trusted(name: str, level: int) -> quadratic_growth.Grown:
     """The reference on one level, from that of the level before."""
-    problem, radius = PROBLEMS[name], bodies.RADIUS
-    ends = (problem.contact.first, problem.contact.last) if problem.contact else ()
-    mesh = quadratic_growth.half_disc(radius, RINGS[level], ends, TOWARDS if ends else 0)
+    theta, top, contact = PROBLEMS[name]
+    ends = (contact.first, contact.last) if contact else ()
+    mesh = quadratic_growth.half_disc(bodies.RADIUS, RINGS[level], ends, TOWARDS if ends else 0)
     start = trusted(name, level - 1) if level else None
-    return quadratic_growth.grow(mesh, problem.theta, problem.top, MODULUS, problem.contact, start)
+    return quadratic_growth.grow(mesh, theta, top, MODULUS, contact, start)
 
 
 @cache
-def ours(name: str, level: int, kind: int = 1):
-    """(body, nodes of the arc, equilibrium) of ours."""
-    problem, (body, rim) = PROBLEMS[name], bodies.half_disc(REFINEMENTS[min(kind, 2)][level], kind)
-    target, held = body.reference.copy(), body.held.copy()
-    if problem.contact:
-        angle = np.arctan2(*body.reference[rim].T[::-1])
-        on = rim[(angle > problem.contact.first - 1e-9) & (angle < problem.contact.last + 1e-9)]
-        held[on, 1], target[on, 1] = True, problem.contact.height
-    body = Supported(body.body, held)
-    found = bodies.grown(body, body.field(problem.theta),
-                         lambda part: body.reference + part * (target - body.reference))
-    return body, rim, found
+def ours(name: str, level: int, kind: int):
+    """(body, equilibrium) of ours."""
+    (theta, _, contact), (body, rim) = PROBLEMS[name], bodies.half_disc(REFINEMENTS[min(kind, 2)][level], kind)
+    move, held = np.zeros_like(body.reference), body.held.copy()
+    if contact:
+        x, y = body.reference[rim].T
+        angle = np.arctan2(y, x)
+        on = rim[(angle > contact.first - 1e-9) & (angle < contact.last + 1e-9)]
+        held[on, 1] = True
+        move[on, 1] = contact.height - body.reference[on, 1]
+    body = replace(body, held=held)
+    return body, bodies.grown(body, body.field(theta), lambda part: body.reference + part * move)
 
 
-def gaps(level: int, name: str, kind: int = 1) -> dict[str, float]:
+def gaps(level: int, name: str, kind: int) -> dict[str, float]:
     """Size of our elements, and the relative L2 difference of the two codes on a level, over the body at t = 0; of the
     pressure also away from the ends of the contact."""
-    (body, _, found), exact = ours(name, level, kind), trusted(name, level if kind == 1 else len(RINGS) - 1)
+    reference = trusted(name, level if kind == 1 else len(RINGS) - 1)
+    body, found = ours(name, level, kind)
 
-    def place(x, y):
-        return exact.at(x, y)[0]
+    def exact(x, y):
+        place, pressure = reference.at(x, y)
+        return place, pressure / MODULUS
 
-    def pressure(x, y):
-        return exact.at(x, y)[1] / MODULUS
-
-    middles = body.reference[body.cells[:, :3]].mean(axis=1)
-    away = np.flatnonzero(_distance(middles) > 0.2 * bodies.RADIUS)
-    return {"size": bodies.size(body), "place": bodies.place_error(body, found.position, place),
-            "pressure": bodies.pressure_error(body, found.pressure, pressure),
-            "pressure away": bodies.pressure_error(body, found.pressure, pressure, away)}
-
-
-def _distance(points: np.ndarray) -> np.ndarray:
-    """From the ends of the contact, at t = 0."""
-    ends = bodies.RADIUS * np.exp(1j * np.array([CONTACT.first, CONTACT.last]))
-    return np.abs(points @ [1, 1j] - ends[:, None]).min(axis=0)
+    middles = body.reference[body.cells[:, :3]].mean(axis=1) @ [1, 1j]
+    away = np.abs(middles - ENDS).min(axis=0) > 0.2 * bodies.RADIUS
+    return {**bodies.errors(body, found, exact), "pressure away": bodies.errors(body, found, exact, away)["pressure"]}
 
 
 def _settled(name: str, difference: float) -> Check:
@@ -127,13 +108,13 @@ def _points():
     return np.moveaxis(where, 2, 0), weight
 
 
-def _curved(found: dict, problem: str, pressure: str, ceilings: tuple[float, float]):
+def _curved(found: dict, pressure: str, ceilings: tuple[float, float]):
     """Curved triangles of ours against the last level of the reference: the last differences, and, without a contact's
     ends, the orders over all refinements, as between two meshes of few triangles they scatter."""
+    fallen = {name: np.log(values[0] / values[-1]) for name, values in found.items()}
     for field, order, ceiling in zip(("place", pressure), (3, 2), ceilings):
-        slope = np.log(found[field][0] / found[field][-1]) / np.log(found["size"][0] / found["size"][-1])
-        if not PROBLEMS[problem].contact:
-            yield between(f"order of the {field}", slope, order - 0.5, order + 0.5,
+        if pressure == "pressure":
+            yield between(f"order of the {field}", fallen[field] / fallen["size"], *around(order, 0.5),
                           "quadratic places, linear pressure: third and second order")
         yield at_most(field, found[field][-1], ceiling, "the reference's elements are finer")
 
@@ -146,11 +127,13 @@ def compared(kind: int, problem: str, ceilings: dict[int, tuple[float, float]], 
     ceilings: by kind, of the last differences of places and of the pressure; pressure: the one that has an order."""
     found = refine(gaps, range(len(RINGS)), problem, kind)
     if kind > 1:
-        yield _curved(found, problem, pressure, ceilings[2])
-        return
-    place, last = ceilings[1]
-    yield studies(found, {"place": (2, PLACE, place), pressure: (1.75, PRESSURE, last)})
-    yield _settled(problem, found["place"][-1])
+        yield _curved(found, pressure, ceilings[2])
+    else:
+        place, last = ceilings[1]
+        yield studies(found, {"place": (2, PLACE, place), pressure: (1.75, PRESSURE, last)})
+        yield _settled(problem, found["place"][-1])
+    if pressure != "pressure":
+        yield at_most("pressure, with the ends of the contact", found["pressure"][-1], 1e-2, SINGULAR)
 
 
 @case("growth-quadratic-cylinder", kind="cross-code", norm=f"{NORM}; the same of the reference to the closed form",
@@ -168,10 +151,9 @@ def _own(level: int) -> dict[str, float]:
     """Size of the reference's elements, and its errors to the closed form."""
     where, weight = _points()
     place, pressure = trusted("half-cylinder", level).at(*where)
-    known = closed_forms.exact(2000.0)
-    exact, level_of = known.place(*where), known.pressure(*where)
+    exact, known = closed_forms.exact(2000.0).at(*where)
     return {"size": bodies.RADIUS / RINGS[level], "places": meshes.relative(place, exact, weight),
-            "pressure": meshes.relative(pressure / MODULUS, level_of, weight)}
+            "pressure": meshes.relative(pressure / MODULUS, known, weight)}
 
 
 @case("growth-uneven", kind="cross-code", slow=True, norm=NORM,
@@ -187,9 +169,7 @@ def uneven(kind: int):
       claim="The same half-disc, its arc held at the upper wall on which it slides, agrees with quadratic elements",
       mutants=("held-short", "theta-power"), slow=True, over=bodies.EVERY)
 def between_walls(kind: int):
-    yield compared(kind, "between walls", {1: (1e-3, 6e-3), 2: (1e-3, 6e-3)}, "pressure away")
-    last = gaps(len(RINGS) - 1, "between walls", kind)["pressure"]
-    yield at_most("pressure, with the ends of the contact", last, 1e-2, SINGULAR)
+    return compared(kind, "between walls", {1: (1e-3, 6e-3), 2: (1e-3, 6e-3)}, "pressure away")
 
 
 #: Elements of straight and of curved triangles, and of how many random meshes of each size errors are averaged.
@@ -206,20 +186,15 @@ PLACES = {1: (2, "linear elements: second order"),
 CEILINGS = {1: (6e-4, 2e-2), 2: (3e-6, 4e-3)}
 
 
-def _solved(size: float, seed: int, kind: int, exact) -> tuple[Supported, growth.Equilibrium]:
-    """The unit square, its side X = 1 pulled, from the exact places of the nodes and no pressure."""
-    grid, side = bodies.rectangle(size, seed, kind, 1.0, 1.0, bent=0.0)
-    held = side["left"] | side["bottom"] | side["top"]
-    body = bodies.on_mesh(grid, kind, grid.points, np.column_stack([held, held]))
-    forces = bodies.body_force(body, exact.force) + bodies.traction(body, grid, exact.stress)
-    return body, bodies.equilibrium(body, body.field(exact.theta), forces, exact.place(*grid.points.T))
-
-
 def _errors(size: float, seed: int, kind: int, exact) -> dict[str, float]:
-    """Relative L2 errors on one random mesh."""
-    body, found = _solved(size, round(1 / size) + seed, kind, exact)
-    return {"size": bodies.size(body), "place": bodies.place_error(body, found.position, exact.place),
-            "pressure": bodies.pressure_error(body, found.pressure, exact.pressure)}
+    """Relative L2 errors on one random mesh of the unit square, its side X = 1 pulled, from the exact places of the
+    nodes and no pressure."""
+    grid, side = bodies.rectangle(size, round(1 / size) + seed, kind, 1.0, 1.0, bent=0.0)
+    held = side["left"] | side["bottom"] | side["top"]
+    body = bodies.on_mesh(grid, kind, held, held)
+    forces = bodies.body_force(body, exact.force) + bodies.traction(body, grid, exact.stress)
+    found = bodies.equilibrium(body, body.field(exact.theta), exact.place(*grid.points.T), forces)
+    return bodies.errors(body, found, lambda x, y: (exact.place(x, y), exact.pressure(x, y)))
 
 
 @case("growth-manufactured", kind="manufactured", slow=True,

@@ -20,20 +20,22 @@ from functools import cache
 
 import numpy as np
 
+from reference import poiseuille
 from repro.errors import SimulationError, StageError
 from repro.march.loop import Instant, PoreEnd
 from repro.march.simulation import simulate
 from repro.model import pore
 from repro.model.pore import Pore, Solved, peclet
-from repro.results import row
+from repro.results import M_PER_D, row
 from repro.scene import Scene, load_scene
 from repro.scene.units import SceneError
-from verification.kernel.case import Check, Line, Note, at_least, at_most, between, case
+from verification.kernel.case import Check, Line, Note, at_least, at_most, between, case, flat, largest
+from verification.problems.channels import NAMES, pair
 from verification.problems.runs import NUMERICS, worth
 
 PRESETS = tuple(NUMERICS)
 #: With the paper's scheme any part may be refused.
-LENIENT = ("paper",)
+LENIENT = "paper"
 #: Relative error that a preset stands for, in velocity, conductivity, area, thickness and tips, and of effluents over
 #: the supply. The paper names none: linear triangles of its sizes were measured 1 to 4 % off in the head loss.
 TOLERANCE = {"paper": 0.04, "fast": 0.01, "accurate": 0.001, "cubic": 0.01}
@@ -48,7 +50,7 @@ FIXED = ('growth.end="0 h"',)
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class Run(Note):
     """A scene that has run: its instants, their rows in ``timeseries.csv``, and the message of PoreEnd or "".
 
     balance: what the substrates' balances may miss, None where they say nothing; density: by how much a local
@@ -63,18 +65,27 @@ class Run:
     density: float = 0.05
 
     @property
+    def end(self) -> Instant:
+        """The last instant."""
+        return self.instants[-1]
+
+    @property
     def last(self) -> dict:
-        """The last row."""
+        """Its row."""
         return self.rows[-1]
 
     def column(self, name: str) -> np.ndarray:
         """(rows,) of one name."""
         return np.array([row[name] for row in self.rows])
 
+    def over_first(self, name: str = "aggregate_area_um2") -> np.ndarray:
+        """(rows,) of one name over the first."""
+        return self.column(name) / self.column(name)[0]
+
 
 @dataclass(frozen=True)
 class HardCase:
-    """One of the twenty-two: ``parts`` name -> function of the preset, which returns Checks and Runs.
+    """One of the twenty-two: ``parts`` name -> function of the preset, which gives Checks and Runs, or lists of them.
 
     refusable: names of the parts that may be refused with ``fast`` and ``accurate``, and with ``paper`` all may;
     mutants: ids of wrong changes that it catches.
@@ -85,7 +96,7 @@ class HardCase:
     title: str
     right_is: str
     failure_is: str
-    parts: dict[str, Callable[[str], list]]
+    parts: dict[str, Callable[[str], Iterable]]
     refusable: tuple[str, ...] = ()
     mutants: tuple[str, ...] = ()
 
@@ -93,10 +104,6 @@ class HardCase:
     def full_id(self) -> str:
         """That of its verification case."""
         return f"hard-{self.number:02d}-{self.id}"
-
-    def accepts(self, part: Part, preset: str) -> bool:
-        """Right always; refused where the case says so, and with the paper's scheme."""
-        return part.verdict == RIGHT or part.verdict == REFUSED and (preset in LENIENT or part.name in self.refusable)
 
 
 def scene(name: str, preset: str, *changes: str) -> Scene:
@@ -133,19 +140,23 @@ def against(name: str, preset: str, changes: Sequence[str], *columns: str, refin
     return found, fine, [found, *close(found, fine, preset, *columns)]
 
 
-def close(found: Run, trusted: Run, preset: str, *columns: str, allowed: float = 0.0) -> list[Check]:
+def close(found: Run, trusted: Run, preset: str, *columns: str, allowed: float = 0.0) -> Iterator[Check]:
     """Columns of the last rows against each other, as the presets promise them: relative, effluents over the supply;
     ``allowed``: where a case has more to allow for."""
     bound = allowed or TOLERANCE[preset]
     origin = f"{PROMISED[preset]}; and what the case allows for" if allowed else PROMISED[preset]
-    checks = []
     for column in columns:
         ours, theirs = found.last[column], trusted.last[column]
         size = abs(theirs)
         if column in EFFLUENTS:
             size = getattr(found.scene.substrates, column.split("_")[1]).supply
-        checks.append(at_most(f"{column} against a finer run", abs(ours - theirs) / size, bound, origin))
-    return checks
+        yield at_most(f"{column} against a finer run", abs(ours - theirs) / size, bound, origin)
+
+
+def clean_conductivity(made: Scene) -> float:
+    """That of the scene's pore without an aggregate, m/d."""
+    drive = made.flow
+    return poiseuille.conductivity(made.pore.width, drive.kinematic_viscosity / drive.gravity) * M_PER_D
 
 
 def alike(told: str, names: Sequence[str], ours: Sequence[float], theirs: Sequence[float], preset: str) -> list[Check]:
@@ -163,14 +174,14 @@ SHAPE = ("aggregate_area_um2", "thickness_um", "upstream_um", "downstream_um")
 DRIVE = ("conductivity_m_per_d",)
 
 
-def sound(found: Run) -> list[Check]:
+def sound(found: Run) -> Iterator[Check]:
     """What holds in every run, whatever it is of: the worst over its instants."""
-    checks = [at_most("numbers that are not finite", unreal(found), 0, "none is")]
+    yield at_most("numbers that are not finite", unreal(found), 0, "none is")
     if found.scene.substrates:
-        checks += [*_balances(found), *_bounds(found)]
+        yield from _balances(found)
+        yield from _bounds(found)
     if found.scene.kinetics:
-        checks += _biomass(found)
-    return checks
+        yield from _biomass(found)
 
 
 def unreal(found: Run) -> int:
@@ -179,23 +190,21 @@ def unreal(found: Run) -> int:
     return count + sum(np.count_nonzero(~np.isfinite(values)) for i in found.instants for values in _fields(i))
 
 
-def _fields(instant: Instant):
+def _fields(instant: Instant) -> Iterator[np.ndarray]:
     now, solved = instant.pore, instant.solved
-    yield from (now.mesh.points, now.active, now.inert, now.theta, now.origin, now.pressure)
-    if solved.flow:
-        yield from (solved.flow.velocity, solved.flow.head)
-    if solved.concentrations:
-        yield from (solved.concentrations.acceptor, solved.concentrations.donor)
+    for part in filter(None, (now, now.mesh, now.body, solved.flow, solved.concentrations)):
+        yield from (values for values in vars(part).values() if isinstance(values, np.ndarray))
 
 
-def _balances(found: Run) -> list[Check]:
+def _balances(found: Run) -> Iterator[Check]:
     if found.balance is None:
-        return []
+        return
     most, origin = found.balance, "the flux is as much smaller than what diffuses"
     if found.balance == BALANCE:
         most, origin = max(BALANCE, 1e-12 * found.last["nodes"] / _slow(found)), NEWTON
-    return [at_most(f"{name} in - out - consumed, over the larger", np.abs(found.column(f"{name}_balance")).max(), most,
-                    origin) for name in ("acceptor", "donor")]
+    for name in NAMES:
+        yield at_most(f"{name} in - out - consumed, over the larger", largest(found.column(f"{name}_balance")), most,
+                      origin)
 
 
 def _slow(found: Run) -> float:
@@ -204,44 +213,41 @@ def _slow(found: Run) -> float:
     return min(1.0, peclet(found.scene, speed)) if speed else 1.0
 
 
-def _bounds(found: Run) -> list[Check]:
-    both, checks = found.scene.substrates, []
-    largest = max(both.acceptor.supply, both.donor.supply)
-    for name in ("acceptor", "donor"):
+def _bounds(found: Run) -> Iterator[Check]:
+    supplies = pair("supply", found.scene.substrates)
+    for name, supply in zip(NAMES, supplies):
         fields = [getattr(i.solved.concentrations, name) for i in found.instants]
-        supply = getattr(both, name).supply
-        checks.append(at_least(f"{name}'s least over the supply", min(f.min() for f in fields) / largest, LOWEST,
-                               "transport.UNRESOLVED"))
+        yield at_least(f"{name}'s least over the supply", min(f.min() for f in fields) / max(supplies), LOWEST,
+                       "transport.UNRESOLVED")
         if supply:
-            checks.append(at_most(f"{name}'s largest over its supply", max(f.max() for f in fields) / supply, HIGHEST,
-                                  "transport.OVERSHOOT"))
-    return checks
+            yield at_most(f"{name}'s largest over its supply", max(f.max() for f in fields) / supply, HIGHEST,
+                          "transport.OVERSHOOT")
 
 
-def _biomass(found: Run) -> list[Check]:
+def _biomass(found: Run) -> Iterator[Check]:
     densities = {"least": found.column("biomass_density_min").min(),
                  "largest": found.column("biomass_density_max").max()}
-    checks = [between(f"local density over X_m, {which}", density, 1 - found.density, 1 + found.density, DENSITY)
-              for which, density in densities.items()]
-    checks.append(between("share of X_I", max(found.column("inert_fraction"), key=abs), -1e-12, 1.0, "a share"))
+    for which, density in densities.items():
+        yield between(f"local density over X_m, {which}", density, 1 - found.density, 1 + found.density, DENSITY)
+    yield between("share of X_I", max(found.column("inert_fraction"), key=abs), -1e-12, 1.0, "a share")
     if found.scene.growth:
         whole = found.scene.kinetics.maximum_density
         apart = max(abs(i.pore.mass / whole / i.pore.outline.area - 1) for i in found.instants)
-        checks += [at_most("biomass after - before - made, over after", np.abs(found.column("biomass_balance")).max(),
-                           BALANCE, MEAN),
-                   at_most("area against biomass over X_m", apart, AREA[found.scene.numerics.elements], MEAN)]
-        checks += _oxygen_demand(found) if found.scene.numerics.time == "midpoint" else []
-    return checks
+        yield at_most("biomass after - before - made, over after", largest(found.column("biomass_balance")), BALANCE,
+                      MEAN)
+        yield at_most("area against biomass over X_m", apart, AREA[found.scene.numerics.elements], MEAN)
+        if found.scene.numerics.time == "midpoint":
+            yield _oxygen_demand(found)
 
 
-def _oxygen_demand(found: Run) -> list[Check]:
+def _oxygen_demand(found: Run) -> Check:
     """Of the midpoint rule alone: the updates take up substrates at the concentrations of a step's ends, and grow with
     rates of both."""
     law = found.scene.kinetics
     missing = [abs(ledger.biomass_made - np.subtract(*worth(law, ledger))) / ledger.biomass_after
                for instant in found.instants for ledger in instant.ledgers]
-    return [at_most("biomass made less what donor makes and acceptor decays, over the biomass",
-                    max(missing, default=0.0), 1e-12, "one integral, in the same points; round-off")]
+    return at_most("biomass made less what donor makes and acceptor decays, over the biomass",
+                   max(missing, default=0.0), 1e-12, "one integral, in the same points; round-off")
 
 
 MEAN = "J = theta in the mean; Newton's tolerance"
@@ -306,15 +312,17 @@ class Cell(Note):
 
     @property
     def unaccepted(self) -> tuple[Part, ...]:
-        """Parts whose verdict is not one that they may have."""
-        return tuple(part for part in self.parts if not self.case.accepts(part, self.preset))
+        """Parts that are neither right nor refused where the case says so, or with the paper's scheme."""
+        refusable = self.case.parts if self.preset == LENIENT else self.case.refusable
+        return tuple(part for part in self.parts if part.verdict == WRONG
+                     or part.verdict == REFUSED and part.name not in refusable)
 
     def lines(self, every: Sequence[Cell]) -> list[Line]:
         """Verdicts of the parts by preset; then what the right parts were judged by, by preset where that differs."""
         presets = ", ".join(cell.preset for cell in every)
         found = []
         for parts in zip(*(cell.parts for cell in every)):
-            fine = all(self.case.accepts(part, cell.preset) for cell, part in zip(every, parts))
+            fine = all(part not in cell.unaccepted for cell, part in zip(every, parts))
             found.append((f"verdict of {parts[0].name}", ", ".join(part.verdict for part in parts), presets, fine))
         bounds: dict[str, list[Check]] = {}
         for part in (part for cell in every for part in cell.parts if part.verdict == RIGHT):
@@ -339,14 +347,12 @@ def run_part(name: str, function, preset: str, limit: float = LIMIT) -> Part:
     """Run one part and judge it."""
     try:
         with np.errstate(all="raise", under="ignore"), _limited(limit):
-            items = function(preset)
+            items = tuple(flat(function(preset)))
             checks = tuple(item for item in items if isinstance(item, Check))
             always = tuple(check for item in items if isinstance(item, Run) for check in sound(item))
     except (SimulationError, StageError, SceneError) as error:
         said = bool(REASON.search(str(error)))
         return Part(name, REFUSED if said else WRONG, f"{error}" if said else f"refused without a reason: {error}")
-    except TooLong:
-        return Part(name, WRONG, f"not done after {limit:g} s")
     except Exception as error:
         return Part(name, WRONG, f"{type(error).__name__}: {error}")
     return judged(name, checks, always)
@@ -354,20 +360,16 @@ def run_part(name: str, function, preset: str, limit: float = LIMIT) -> Part:
 
 def judged(name: str, checks: tuple[Check, ...], always: tuple[Check, ...]) -> Part:
     """Right if there are checks and all of them hold."""
-    short = [check for check in (*checks, *always) if not check.holds]
-    if short:
-        told = "; ".join(f"{c.quantity} {c.measured} (expected {c.expected})" for c in short)
-        return Part(name, WRONG, told, checks, always)
-    if not checks and not always:
-        return Part(name, WRONG, "nothing was measured")
-    return Part(name, RIGHT, "", checks, always)
+    short = (f"{c.quantity} {c.measured} (expected {c.expected})" for c in (*checks, *always) if not c.holds)
+    told = "; ".join(short) if checks or always else "nothing was measured"
+    return Part(name, WRONG if told else RIGHT, told, checks, always)
 
 
 @contextmanager
 def _limited(seconds: float):
     """Raises TooLong inside when the process has spent so many CPU seconds."""
     def stop(*_):
-        raise TooLong
+        raise TooLong(f"not done after {seconds:g} s")
 
     before = signal.signal(signal.SIGPROF, stop)
     signal.setitimer(signal.ITIMER_PROF, seconds)
@@ -378,9 +380,10 @@ def _limited(seconds: float):
         signal.signal(signal.SIGPROF, before)
 
 
-def measured(cell: Cell) -> Iterator[Check | Cell]:
-    """All own checks of the parts that are right; what must hold in every run, folded into one number; how many parts
-    have a verdict that they may not have; and the cell."""
+def measured(one: HardCase, preset: str) -> Iterator[Check | Cell]:
+    """Of a case with a preset: all own checks of the parts that are right; what must hold in every run, folded into one
+    number; how many parts have a verdict that they may not have; and the cell."""
+    cell = run_cell(one, preset)
     right = [part for part in cell.parts if part.verdict == RIGHT]
     for part in right:
         yield from (replace(check, quantity=f"{part.name}, {check.quantity}") for check in part.checks)
@@ -398,12 +401,7 @@ def register(cases: Iterable[HardCase]) -> None:
     for one in cases:
         claim = f"{one.title}: {one.right_is[0].lower()}{one.right_is[1:]}"
         case(one.full_id, kind="property", claim=claim, norm=NORM, mutants=one.mutants, slow=True,
-             over={preset: (one, preset) for preset in PRESETS}, ways="1 2")(judged_cell)
-
-
-def judged_cell(one: HardCase, preset: str) -> Iterator[Check | Cell]:
-    """What a case with a preset has measured."""
-    return measured(run_cell(one, preset))
+             over={preset: (one, preset) for preset in PRESETS}, ways="1 2")(measured)
 
 
 NORM = "numbers of each part with all presets, and with fast on cubic elements; refused parts are left out"

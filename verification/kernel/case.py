@@ -123,6 +123,11 @@ def each_at_most(values: Mapping[str, float], bound: float, origin: str, told: s
     return [at_most(name + told, value, bound, origin) for name, value in values.items()]
 
 
+def largest(values: np.ndarray) -> float:
+    """The largest size of some numbers."""
+    return float(np.abs(values).max())
+
+
 def rounded(value: float, quantum: float) -> str:
     """The value to the power of ten at or under ``quantum``; a size that vanishes there is told as "under" it."""
     if not isfinite(value) or quantum <= 0:

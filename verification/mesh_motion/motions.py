@@ -9,19 +9,18 @@ What every motion of the mesh must keep: triangles upright, nodes on their lines
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
 from itertools import product
 
 import numpy as np
 
 from reference import quadratic_mesh_motion, sliding_waves
-from repro.fem import mesher, outline
+from repro.fem import outline
 from repro.fem.mesh import Mesh, curved
-from repro.fem.sizing import ACROSS_AGGREGATE, Sizing
+from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.fem.space import Space
 from repro.model import mesh_motion
-from verification.kernel.case import at_least, at_most, case, refine, studies, study
+from verification.kernel.case import at_least, at_most, case, largest, refine, studies, study
 from verification.problems import meshes
 
 #: gamma of (35) and c of the stabilisation as scenes have them, and the gammas that cases compare (E13).
@@ -57,7 +56,7 @@ def plug(geometry: int):
                               ("layer", layer, np.column_stack([0 * y, thicker]))):
         for gamma in GAMMAS:
             yield at_most(f"{name}, gamma = {gamma:g}", _error(mesh, exact, gamma), 1e-11, LINEAR)
-    yield at_most("at rest", np.abs(moved(grid, grid.points) - grid.points).max(), 0.0, "nothing moves")
+    yield at_most("at rest", largest(moved(grid, grid.points) - grid.points), 0.0, "nothing moves")
 
 
 def _nodes(straight: Mesh, geometry: int) -> Mesh:
@@ -68,14 +67,14 @@ def _nodes(straight: Mesh, geometry: int) -> Mesh:
 def _error(grid: Mesh, displacement: np.ndarray, gamma: float, nodes=slice(None)) -> float:
     """Largest difference from a displacement (N, 2) over its largest value."""
     found = moved(grid, grid.points + displacement, gamma) - grid.points
-    return np.abs(found - displacement)[nodes].max() / np.abs(displacement).max()
+    return largest((found - displacement)[nodes]) / largest(displacement)
 
 
-MOTIONS = {"slides": ([[0.0, 0.0], [0.0, 0.0]], (3.0, 1.0)),
-           "turns by 30 degrees": ([[np.cos(np.pi / 6) - 1, -0.5], [0.5, np.cos(np.pi / 6) - 1]], (0.0, 0.0)),
-           "is sheared": ([[0.0, 0.4], [0.0, 0.0]], (0.0, 0.0)),
-           "doubles": ([[1.0, 0.0], [0.0, 1.0]], (0.0, 0.0)),
-           "is stretched": ([[0.5, 0.1], [-0.2, -0.3]], (1.0, -2.0))}
+#: Gradients of the places by those before, and what is added to them.
+MOTIONS = {"slides": (np.eye(2), (3.0, 1.0)),
+           "turns by 30 degrees": ([[np.sqrt(0.75), -0.5], [0.5, np.sqrt(0.75)]], 0.0),
+           "is sheared": ([[1.0, 0.4], [0.0, 1.0]], 0.0), "doubles": (2 * np.eye(2), 0.0),
+           "is stretched": ([[1.5, 0.1], [-0.2, 0.7]], (1.0, -2.0))}
 
 
 @case("mesh_motion-pocket", kind="exact",
@@ -89,7 +88,7 @@ def pocket(geometry: int):
     x, y = grid.points.T
     inside = np.flatnonzero((np.abs(x) <= 9.0) & (y >= 8.0) & (y <= 21.0))
     for name, (matrix, shift) in MOTIONS.items():
-        displacement = grid.points @ np.transpose(matrix) + shift
+        displacement = grid.points @ np.transpose(matrix) + shift - grid.points
         error = max(_error(grid, displacement, gamma, inside) for gamma in GAMMAS)
         yield at_most(f"the aggregate {name}", error, 1e-11, LINEAR)
 
@@ -133,9 +132,8 @@ def _wave_error(size: float, seed: int, gamma: float, geometry: int, told: str) 
 
 
 RADIUS = 25.0
-SEGMENT_WIDTH = 50.0
-SEGMENT_END = 50.0
-FILM = 2.0
+#: Width of the pores around aggregates, and ends of that around a segment of a disc (um).
+PORE, SEGMENT_END = 50.0, 50.0
 #: Refinements of our meshes with the parts a side of theirs: both codes are refined.
 LEVELS = ((0.7, 6), (1.1, 8), (1.9, 12), (3.3, 16))
 CORNER_LEVELS = ((0.7, 8), (1.3, 12), (2.4, 16), (4.4, 24))
@@ -160,11 +158,8 @@ def half_disc(geometry: int):
 
 def _compared(geometry: int, contact: float, levels, motion: str, gamma: float, order: float, why: str, name: str = ""):
     """The study of one motion."""
-    grids = [_segment(contact, refinement, geometry) for refinement, _ in levels]
-    errors = [_apart(grid, contact, parts, gamma, motion) for grid, (_, parts) in zip(grids, levels)]
-    sizes = [meshes.mean_size(grid) for grid in grids]
-    return study(f"{name}gamma = {gamma:g}", sizes, errors, order, f"{why}; {BOTH}",
-                 ceiling=1e-3)
+    found = refine(_apart, levels, contact, geometry, gamma, motion)
+    return study(f"{name}gamma = {gamma:g}", found["size"], found["apart"], order, f"{why}; {BOTH}", ceiling=1e-3)
 
 
 @case("mesh_motion-corner", kind="cross-code", slow=True,
@@ -191,24 +186,25 @@ def _segment(contact: float, refinement: float, geometry: int) -> Mesh:
     wall = np.where(np.arange(len(points)) < len(base), outline.BOTTOM, outline.FREE)
     fixed = np.arange(len(points)) == 2 * geometry
     segment = outline.Outline(points, wall, fixed, points, geometry)
-    return mesher.generate(segment, (-SEGMENT_END, SEGMENT_END), Sizing(SEGMENT_WIDTH, refinement, FILM), geometry)[0]
+    return meshes.around(segment, refinement, (-SEGMENT_END, SEGMENT_END), PORE)[0]
 
 
-@cache
-def _followed(contact: float, parts: int, gamma: float, name: str) -> quadratic_mesh_motion.Motion:
-    motion = SEGMENT_MOTIONS[name]
-    return quadratic_mesh_motion.follow(RADIUS, contact, SEGMENT_WIDTH, SEGMENT_END, parts, gamma, motion)
+#: For straight triangles and for curved ones.
+_followed = cache(quadratic_mesh_motion.follow)
 
 
-def _apart(grid: Mesh, contact: float, parts: int, gamma: float, name: str) -> float:
-    """Relative difference of both codes; ours is linear in the motion, which may be as large as the aggregate."""
-    theirs = _followed(contact, parts, gamma, name)
-    found = moved(grid, grid.points + SEGMENT_MOTIONS[name](*grid.points.T).T, gamma) - grid.points
+def _apart(level: tuple[float, int], contact: float, geometry: int, gamma: float, name: str) -> dict[str, float]:
+    """Size of our elements, and the relative difference of both codes on a level; ours is linear in the motion, which
+    may be as large as the aggregate."""
+    refinement, parts = level
+    grid, motion = _segment(contact, refinement, geometry), SEGMENT_MOTIONS[name]
+    theirs = _followed(RADIUS, contact, PORE, SEGMENT_END, parts, gamma, motion)
+    found = moved(grid, grid.points + motion(*grid.points.T).T, gamma) - grid.points
     there = meshes.field_at(Space(grid, grid.geometry), found, theirs.points)
-    return meshes.relative(there, theirs.displacement, theirs.weights)
+    return {"size": meshes.mean_size(grid), "apart": meshes.relative(there, theirs.displacement, theirs.weights)}
 
 
-PORE, REACH = 50.0, (-75.0, 75.0)
+REACH = -75.0, 75.0
 #: Radius of the half-disc (um), by which factor it grows, and how far it slides over its radius.
 JOURNEYS = ((5.0, 2.0, 1.0), (20.0, 2.0, 1.0), (35.0, 1.3, 0.5))
 STEPS = 18
@@ -267,21 +263,19 @@ STRIDES = (0.08, 0.04, 0.02, 0.01)
       mutants=("stale-forms", "stale-fluid"), over=EITHER, ways="3")
 def round_trip(geometry: int):
     grid = _around(20.0, geometry)
-    ways = {"grows": [_there_and_back(grid, 1 + stride, 0.0) for stride in STRIDES],
-            "slides": [_there_and_back(grid, 1.0, 20 * stride) for stride in STRIDES]}
-    for (name, back), ceiling in zip(ways.items(), (4e-5, 4e-6)):
+    for name, growth, shift, ceiling in (("grows", 1.0, 0.0, 4e-5), ("slides", 0.0, 20.0, 4e-6)):
+        back = [_there_and_back(grid, 1 + growth * stride, shift * stride) for stride in STRIDES]
         yield study(f"a half-disc {name}", STRIDES, np.sqrt(np.mean(np.square(back), axis=(1, 2))) / 20.0, 2,
                     "(35) is linear in the motion on a given mesh: second order", ceiling=ceiling, band=0.1)
     plug = _nodes(meshes.plug(ENDS, WIDTH, HALF, 3.0, seed=4), geometry)
-    missed = np.abs(_there_and_back(plug, 1.2, 10.0)).max()
+    missed = largest(_there_and_back(plug, np.array([1.2, 1.0]), 10.0))
     yield at_most("a plug that stretches and slides (um)", missed, 1e-11, "linear on each side: round-off")
 
 
-def _there_and_back(grid: Mesh, stretch: float, shift: float) -> np.ndarray:
-    """(N, 2) um by which nodes miss their first place; in x alone is the aggregate stretched where it is a plug."""
-    by = np.array([stretch, 1.0 if len(grid.loop) == 0 else stretch])
-    there = grid.moved(moved(grid, by * grid.points + [shift, 0.0]))
-    return moved(there, (there.points - [shift, 0.0]) / by) - grid.points
+def _there_and_back(grid: Mesh, stretch: float | np.ndarray, shift: float) -> np.ndarray:
+    """(N, 2) um by which nodes miss their first place."""
+    there = grid.moved(moved(grid, stretch * grid.points + [shift, 0.0]))
+    return moved(there, (there.points - [shift, 0.0]) / stretch) - grid.points
 
 
 HALF_BENT = "the map is one to one while it is bent by less than half the height"
@@ -296,7 +290,7 @@ HALF_BENT = "the map is one to one while it is bent by less than half the height
                "bent-over-accepted"), ways="1 2 3")
 def criterion():
     stretch = np.random.default_rng(5).uniform(0.1, 8.0, 50)
-    off = np.abs(_triangles(stretch).quality - 2 * stretch / (1 + stretch**2)).max()
+    off = largest(_triangles(stretch).quality - 2 * stretch / (1 + stretch**2))
     verdicts = {"six by 3.001": (_stretched(6, 3.001), True, "3.5"),
                 "seven by 2.999": (_stretched(7, 2.999), True, "3.5"),
                 "seven by 3.001": (_stretched(7, 3.001), False, "3.5"),
@@ -318,21 +312,18 @@ def _bowed(bow: float) -> Mesh:
 
     Along that edge the map's determinant is (1 - 2 bow) times that of the straight triangle.
     """
-    flat = _triangles(np.ones(30))
-    topology = replace(flat.topology, biomass=np.ones(30, bool))
-    grid = curved(replace(flat, topology=topology), None)
+    grid = curved(_triangles(np.ones(30), biomass=True), None)
     points = grid.points.copy()
-    a, b, c = grid.triangles[0]
-    points[grid.cells[0, 3]] += bow * (points[c] - 0.5 * (points[a] + points[b]))
+    middle = grid.cells[0, 3]
+    points[middle] += bow * (points[grid.cells[0, 2]] - points[middle])
     return grid.moved(points)
 
 
-def _triangles(stretch: np.ndarray) -> Mesh:
+def _triangles(stretch: np.ndarray, biomass: bool = False) -> Mesh:
     """Equilateral triangles, each stretched along a line of its own, each apart from the others; negative: mirrored."""
-    turn = np.linspace(0.0, 3.0, len(stretch))
-    corner = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, np.sqrt(0.75)]])
-    shapes = corner * np.stack([stretch, np.ones(len(stretch))], axis=1)[:, None]
-    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-    points = np.einsum("ijt,taj->tai", rotation, shapes).reshape(-1, 2)
-    triangles = np.arange(len(points)).reshape(-1, 3)
-    return Mesh.of(points, triangles, np.zeros(len(triangles), bool), np.empty(0, int), PORE, REACH)
+    count = len(stretch)
+    x, y = np.array([0.0, 1.0, 0.5]), np.array([0.0, 0.0, np.sqrt(0.75)])
+    turned = (np.outer(stretch, x) + 1j * y) * np.exp(1j * np.linspace(0.0, 3.0, count))[:, None]
+    points = np.column_stack([turned.real.ravel(), turned.imag.ravel()])
+    triangles = np.arange(3 * count).reshape(-1, 3)
+    return Mesh.of(points, triangles, np.full(count, biomass), np.empty(0, int), PORE, REACH)

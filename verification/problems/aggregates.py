@@ -6,42 +6,39 @@ from dataclasses import replace
 
 import numpy as np
 
-from repro.fem import outline
 from repro.fem.mesh import Mesh
 from repro.fem.outline import Outline
-from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.fem.space import Space
 from repro.march import updates
 from repro.model import contact, pore, remeshing
 from repro.model.pore import Pore
 from repro.scene import load_scene
-from verification.problems import meshes, pairs
+from verification.kernel.case import combined
+from verification.problems import channels, meshes, pairs, runs
 
 WIDTH = 50.0
 #: X_m of Table 1, mg/L.
 DENSITY = 3e4
-#: Orders of the elements, by the names that scenes have for them.
-ORDERS = {1: "linear", 2: "quadratic", 3: "cubic"}
-EVERY = {name: (order,) for order, name in ORDERS.items()}
+#: Every order of the elements, by the names that scenes have for them.
+EVERY = combined(channels.ORDERS)
 
 
 def scene(*changes: str, order: int = 1):
     """The base scene with changes: what (34) and the transfer read of it."""
-    return load_scene("base", (f'numerics.elements="{ORDERS[order]}"', *changes))
+    return load_scene("base", (runs.of(channels.WORDS[order]), *changes))
 
 
-def half_disc(radius: float, refinement: float = 1.0, order: int = 1) -> Outline:
-    """Of a seed."""
-    return outline.half_disc(radius, ACROSS_AGGREGATE * refinement, min(order, 2))
+def uniform(x, y) -> np.ndarray:
+    """X_m everywhere."""
+    return DENSITY + 0 * x
 
 
-def placed(around: Outline, refinement: float, density=lambda x, y: DENSITY + 0 * x, ends=(-75.0, 75.0),
-           order: int = 1) -> Pore:
+def placed(around: Outline, refinement: float, density=uniform, ends=(-75.0, 75.0), order: int = 1) -> Pore:
     """An aggregate at t = 0 with X_A = density(x, y), on a mesh of its own."""
     return at_start(*meshes.around(around, refinement, ends, WIDTH), order, density)
 
 
-def at_start(grid: Mesh, around: Outline, order: int, density=lambda x, y: DENSITY + 0 * x) -> Pore:
+def at_start(grid: Mesh, around: Outline, order: int, density=uniform) -> Pore:
     """The same on a mesh that is there."""
     space = Space(grid, order)
     active = density(*places(space)) * space.reaction.dx
@@ -52,15 +49,13 @@ def at_start(grid: Mesh, around: Outline, order: int, density=lambda x, y: DENSI
 
 def places(space: Space) -> np.ndarray:
     """(2, r, q) um, the points of the reaction."""
-    mesh, pieces = space.mesh, space.reaction
-    if space.order == 1:
-        return np.moveaxis(mesh.points[pieces.cells], 2, 0)
-    return np.moveaxis(np.einsum("qa,tai->tqi", space.table.shape, mesh.points[mesh.cells[mesh.biomass]]), 2, 0)
+    pieces = space.reaction
+    return np.einsum("qk,rki->irq", pieces.values, space.points[pieces.cells])
 
 
-def remeshed(given, now: Pore) -> Pore:
-    """A new mesh around the aggregate."""
-    return remeshing.remesh(given, now, now, 0.0)[0]
+def remeshed(given, now: Pore, speed: float = 0.0) -> Pore:
+    """A new mesh around the aggregate; speed: mean velocity, um/h."""
+    return remeshing.remesh(given, now, now, speed)[0]
 
 
 def expanded(given, now: Pore, made) -> Pore:

@@ -13,6 +13,9 @@ Norms of the error of fields of order 1, 2 or 3 on triangles, and what they are 
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import pairwise, product
+
 import numpy as np
 from scipy.spatial import Delaunay, cKDTree
 
@@ -29,11 +32,8 @@ def rectangle(ends, width: float, size: float, *, across=(), along=(), seed: int
     y in ``along``. Boundary nodes are on their line to the last bit."""
     random = np.random.default_rng(seed)
     x_lines, y_lines = np.array([ends[0], *across, ends[1]]), np.array([0.0, *along, width])
-    xs, ys = _stations(x_lines, size), _stations(y_lines, size)
-    rim = [np.column_stack([xs, np.full(len(xs), y)]) for y in y_lines]
-    rim += [np.column_stack([np.full(len(ys), x), ys]) for x in x_lines]
-    points = np.vstack([np.unique(np.vstack(rim), axis=0), _inside(x_lines, y_lines, size, random)])
-    return _delaunays(points, size)
+    on_lines = [*product(_stations(x_lines, size), y_lines), *product(x_lines, _stations(y_lines, size))]
+    return _delaunays(np.vstack([np.unique(on_lines, axis=0), _inside(x_lines, y_lines, size, random)]), size)
 
 
 def upright(points: np.ndarray, triangles: np.ndarray, least: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
@@ -50,8 +50,12 @@ def _delaunays(points: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]
 
 def _stations(lines: np.ndarray, size: float) -> np.ndarray:
     """Equal parts of about ``size`` between consecutive lines."""
-    pieces = [np.linspace(a, b, max(1, round((b - a) / size)) + 1)[:-1] for a, b in zip(lines, lines[1:])]
-    return np.append(np.concatenate(pieces), lines[-1])
+    return np.unique(np.hstack([np.linspace(a, b, max(1, round((b - a) / size)) + 1) for a, b in pairwise(lines)]))
+
+
+def _beside(points: np.ndarray, across, along) -> np.ndarray:
+    """(N, k) distances of points from the lines x in ``across`` and y in ``along``, with their signs."""
+    return np.hstack([points[:, [0]] - np.array(across), points[:, [1]] - np.array(along)])
 
 
 def _inside(x_lines, y_lines, size: float, random) -> np.ndarray:
@@ -62,9 +66,8 @@ def _inside(x_lines, y_lines, size: float, random) -> np.ndarray:
     x = x + 0.5 * size * (np.arange(len(rows)) % 2)[:, None]
     points = np.column_stack([x.ravel(), y.ravel()]) + size * random.uniform(0, 1, 2)
     points += size * random.uniform(-JITTER, JITTER, points.shape)
-    gaps = [np.abs(points[:, [axis]] - lines).min(axis=1) for axis, lines in ((0, x_lines), (1, y_lines))]
     within = (points < [x_lines[-1], y_lines[-1]]).all(axis=1)
-    return points[within & (np.minimum(*gaps) > CLEARANCE * size)]
+    return points[within & (np.abs(_beside(points, x_lines, y_lines)).min(axis=1) > CLEARANCE * size)]
 
 
 def channel(ends, width: float, size: float, is_biomass, *, across=(), along=(), seed: int = 0) -> Mesh:
@@ -84,11 +87,16 @@ def space_on(straight: Mesh, order: int) -> Space:
 
 
 def half_disc(radius: float, refinement: float, ends, width: float, *, geometry: int = 1, lean: float = 0.0) -> Mesh:
-    """The package's mesh around a half-disc on the lower wall, straight (geometry 1) or curved (2), sheared by
+    """The package's mesh around a half-disc on the lower wall, straight (geometry 1) or curved (2 and 3), sheared by
     ``lean``; a film of 2 um is the thinnest that is resolved."""
-    seed = outline.half_disc(radius, sizing.ACROSS_AGGREGATE * refinement, geometry)
-    points = seed.points + lean * seed.points[:, [1]] * [1.0, 0.0]
-    return around(outline.Outline(points, seed.wall, seed.fixed, points, geometry), refinement, ends, width)[0]
+    upright = seed(radius, refinement, geometry)
+    points = upright.points + lean * upright.points[:, [1]] * [1.0, 0.0]
+    return around(replace(upright, points=points, origin=points), refinement, ends, width)[0]
+
+
+def seed(radius: float, refinement: float, order: int = 1) -> outline.Outline:
+    """A half-disc for elements of an order: of straight edges or, from order 2 on, of arcs."""
+    return outline.half_disc(radius, sizing.ACROSS_AGGREGATE * refinement, min(order, 2))
 
 
 def around(seed: outline.Outline, refinement: float, ends, width: float) -> tuple[Mesh, outline.Outline]:
@@ -98,7 +106,7 @@ def around(seed: outline.Outline, refinement: float, ends, width: float) -> tupl
 
 def half_disc_space(radius: float, refinement: float, ends, width: float, order: int) -> Space:
     """Functions of an order on the package's mesh around a half-disc."""
-    return Space(half_disc(radius, refinement, ends, width, geometry=min(order, 2)), order)
+    return Space(half_disc(radius, refinement, ends, width, geometry=order), order)
 
 
 #: The least distance of a node from the curve, over the element size: over a half, as edges on the curve are not quite
@@ -113,7 +121,7 @@ def cut(ends, width: float, size: float, is_biomass, *, across=(), along=(), see
     points, _ = rectangle(ends, width, size, across=across, along=along, seed=seed)
 
     def beside(where):
-        return np.hstack([where[:, [axis]] - np.array(lines) for axis, lines in ((0, across), (1, along))])
+        return _beside(where, across, along)
 
     apart = np.abs(beside(points)).min(axis=1)
     return _delaunay(points[(apart == 0) | (apart > CURVE_CLEARANCE * size)], beside, size, is_biomass, ends, width)
@@ -182,9 +190,9 @@ def fine(space: Space, chosen=slice(None), degree: int = FINE):
 
 
 def relative(found: np.ndarray, exact: np.ndarray, weight: np.ndarray) -> float:
-    """L2 of values less exact (t, q) or (t, q, m), with weights (t, q), over that of exact."""
-    weight = weight.reshape(weight.shape + (1,) * (exact.ndim - weight.ndim))
-    return np.sqrt(np.sum(weight * (found - exact) ** 2) / np.sum(weight * exact**2))
+    """L2 of values less exact (t, q) or (t, q, m), with weights (t, q), over that of exact; transposed, the weights are
+    those of each component."""
+    return np.sqrt(np.sum(weight.T * (found - exact).T ** 2) / np.sum(weight.T * exact.T**2))
 
 
 def distance(at, values: np.ndarray, exact) -> float:
@@ -233,6 +241,7 @@ def along_edges(order: int, count: int) -> tuple[np.ndarray, np.ndarray, np.ndar
     return along, weights / 2, elements.values(order, np.column_stack([along, 0 * along]))[:, elements.ON_EDGE[order]]
 
 
-def mean_size(mesh: Mesh) -> float:
-    """Side of the square of mean triangle area twice over: the spacing of a lattice of as many nodes, um."""
-    return np.sqrt(2 * mesh.areas.mean())
+def mean_size(mesh: Mesh, chosen=slice(None)) -> float:
+    """Side of the square of mean area twice over, of the triangles ``chosen``: the spacing of a lattice of as many
+    nodes, um."""
+    return np.sqrt(2 * mesh.areas[chosen].mean())
