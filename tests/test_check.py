@@ -242,7 +242,7 @@ def test_a_warning_tells_the_numbers_that_it_rests_on(key, name, changes, said):
                                            (7100.0, "118 min"), (7300.0, "2 h"), (9000.0, "2 h"), (90000.0, "25 h")])
 def test_what_a_run_takes_is_told_in_a_unit_that_suits(seconds, said):
     first, *_ = checked._cost(cost.Cost(7, seconds, 256.0))
-    assert first == f"Cost, roughly: {said} (7 steps), 256 MB, writing not counted"
+    assert first == f"Cost, roughly: {said} (7 steps), writing not counted; 256 MB besides the program"
 
 
 def test_the_report_and_its_exit_status(capsys):
@@ -275,6 +275,6 @@ def test_what_cannot_be_run_is_refused(tmp_path, override, said, capsys, monkeyp
     assert said in refused(tmp_path, capsys, "check", "base", "--set", override)
 
 
-def test_memory_and_time_are_expected_to_grow_with_the_mesh():
-    found = cost.expected(load_scene("flow_only"), cost.Trial(None, 2.0, 0.5, 1000, (100.0, 180.0)), 4000)
-    assert [found.memory, found.seconds] == pytest.approx([100 + 4 * 80 * cost.REMESHING, 2 * 4**1.2], rel=1e-12)
+def test_time_is_expected_to_grow_with_the_mesh():
+    found = cost.expected(load_scene("flow_only"), cost.Trial(None, 2.0, 0.5, 1000), 4000)
+    assert found.seconds == pytest.approx(2 * 4**1.2, rel=1e-12)

@@ -68,6 +68,22 @@ def test_more_memory_is_expected_of_larger_meshes():
     assert linear < quadratic < cubic
 
 
+@LINUX
+def test_the_memory_that_is_told_is_what_a_run_takes():
+    """Over that of a run on a coarse mesh, within a half: the peak of a process of its own (kB)."""
+    code = ("import resource, sys; from repro import load_scene, simulate; "
+            "list(simulate(load_scene('base', sys.argv[1:]))); "
+            "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)")
+    told, taken = [], []
+    for refinement in (1, 4):
+        changes = [f"numerics.refinement={refinement}", "growth.end=12 min"]
+        told.append(check(load_scene("base", changes)).cost.memory)
+        taken.append(int(subprocess.run([sys.executable, "-c", code, *changes], capture_output=True, text=True,
+                                        check=True).stdout) * 1024 / 1e6)
+    more = told[1] - told[0]
+    assert (taken[1] - taken[0]) / 1.5 < more < 1.5 * (taken[1] - taken[0])
+
+
 def test_a_run_that_may_take_more_than_half_of_the_memory_is_warned_of(tmp_path, capsys, monkeypatch):
     """Under --quiet and --json too, and runs."""
     needed = memory.expected_bytes(load_scene("flow_only"))

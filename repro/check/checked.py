@@ -89,8 +89,8 @@ def _item(name: str, words: str) -> list[str]:
 
 def _cost(expected: Cost) -> Iterator[str]:
     steps = f"{expected.steps} steps" if expected.steps else "no step"
-    memory = f", {expected.memory:.0f} MB" if expected.memory else ""
-    yield f"Cost, roughly: {_seconds(expected.seconds)} ({steps}){memory}, writing not counted"
+    yield (f"Cost, roughly: {_seconds(expected.seconds)} ({steps}), writing not counted; "
+           f"{expected.memory:.0f} MB besides the program")
     how = ("The first state and steps were made and timed just now, times the steps expected; one "
            f"in contact with the opposite wall counts {cost.IN_CONTACT:g} times. Right within a "
            "factor of three in the paper's pores.")

@@ -5,13 +5,13 @@
 
 A step of the midpoint rule is at first growth.time_step and doubles up to the length that the
 tolerance allows; rows are those within steps. All four factors are those of the packaged scenes:
-the estimate is meant to be right within a factor of three there.
+the estimate is meant to be right within a factor of three there. Memory is that which a run asks
+for before it begins.
 """
 
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -19,6 +19,7 @@ from time import perf_counter
 from typing import TypeAlias
 
 from repro.check import numbers
+from repro.check.memory import MB, expected_bytes
 from repro.march.loop import Instant, PoreEnd, State
 from repro.march.pace import missed
 from repro.march.simulation import rows_within
@@ -51,25 +52,23 @@ COARSER = 0.9
 @dataclass(frozen=True)
 class Trial:
     """What was made for real: the first state; seconds that it and a step took (0 where there is
-    none); nodes of the mesh that was tried; memory (MB) before and at its peak, None where the
-    system does not tell; the largest estimate of steps that miss the tolerance, 0 where none does.
-    """
+    none); nodes of the mesh that was tried; the largest estimate of steps that miss the tolerance,
+    0 where none does."""
 
     first: Instant
     start: float
     step: float
     nodes: int
-    memory: tuple[float, float] | None
     worst: float = 0.0
 
 
 @dataclass(frozen=True)
 class Cost:
-    """Steps, seconds and memory (MB, None where the system does not tell) of a run, estimated."""
+    """Steps, seconds and memory (MB, besides that of the program) of a run, estimated."""
 
     steps: int
     seconds: float
-    memory: float | None
+    memory: float
 
 
 def tried(scene: Scene, nodes: int) -> Trial:
@@ -84,7 +83,6 @@ def tried(scene: Scene, nodes: int) -> Trial:
         end = min(scene.growth.end, FIRST_STEPS * scene.growth.time_step)
         scene = replace(scene, growth=replace(scene.growth, end=end),
                         output=replace(scene.output, times=(end,)))
-    before = _memory()
     clock = [perf_counter()]
     run = _until_the_end(steps_of(scene))
     first = needed(next(run)[1], "the first row")
@@ -95,10 +93,7 @@ def tried(scene: Scene, nodes: int) -> Trial:
         if missed(state.pace, scene.numerics.tolerance):
             worst = max(worst, state.pace.estimate)
     spent = [b - a for a, b in zip(clock, clock[1:])]
-    peak = _memory()
-    memory = (before, peak) if before is not None and peak is not None else None
-    return Trial(first, spent[0], min(spent[1:], default=0.0), len(first.pore.mesh.points), memory,
-                 worst)
+    return Trial(first, spent[0], min(spent[1:], default=0.0), len(first.pore.mesh.points), worst)
 
 
 def _until_the_end(run: Iterator[Made]) -> Iterator[Made]:
@@ -114,11 +109,8 @@ def expected(scene: Scene, trial: Trial, nodes: int) -> Cost:
     free, touching = steps(scene)
     larger = nodes / trial.nodes
     factor = (free + IN_CONTACT * touching + ROW * len(rows_within(scene))) * REMESHING
-    memory = None
-    if trial.memory:
-        before, peak = trial.memory
-        memory = before + REMESHING * larger * (peak - before)
-    return Cost(free + touching, (trial.start + factor * trial.step) * larger**POWER, memory)
+    seconds = (trial.start + factor * trial.step) * larger**POWER
+    return Cost(free + touching, seconds, expected_bytes(scene) / MB)
 
 
 def steps(scene: Scene) -> tuple[int, int]:
@@ -151,13 +143,3 @@ def _count(first: float, longest: float, duration: float) -> int:
     if covered >= duration:
         return math.ceil(math.log2(duration / first + 1) - 1e-9)
     return ramp + math.ceil((duration - covered) / longest - 1e-9)
-
-
-def _memory() -> float | None:
-    """Peak of the memory of this process so far, MB."""
-    try:
-        import resource
-    except ImportError:  # Windows
-        return None
-    unit = 2**20 if sys.platform == "darwin" else 2**10
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
