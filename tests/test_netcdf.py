@@ -49,6 +49,7 @@ def test_it_says_what_it_is(made):
 
 def test_that_of_a_run_that_was_stopped_is_its_table(tmp_path):
     stopped(load_scene("base", SETS), tmp_path, after=2)
+    assert (tmp_path / "timeseries.nc").exists()
     assert np.array_equal(content(tmp_path).time_h, results.read_table(tmp_path / "timeseries.csv")["time_h"])
 
 
