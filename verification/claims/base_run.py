@@ -12,14 +12,11 @@ Mesh and time-step independence of `base`.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import log
 
 import numpy as np
 
-from repro.fem.transfer import interpolate
-from repro.model import transport
-from repro.model.kinetics import Sink, growth_rate
+from repro.model.kinetics import growth_rate
 from repro.model.pore import Pore, Solved
 from verification import sensitivity
 from verification.claims import (
@@ -37,7 +34,7 @@ from verification.claims import (
     printed,
     without_limit,
 )
-from verification.claims.levels import DEFAULT, TOLD, Level, at_level
+from verification.claims.levels import DEFAULT, Level
 from verification.claims.runs import (
     BASE,
     END,
@@ -48,10 +45,10 @@ from verification.claims.runs import (
     grown_anew,
     scene,
     series,
-    solved_pore,
     until,
 )
-from verification.switches import CHOICES
+from verification.problems.channels import both, pair
+from verification.problems.meshes import field_at
 
 SUPPLY = 10.0
 #: The paper's distances of the meshed inlet from the aggregate (um): its words; the least of 3.1; that of 210 um [E13].
@@ -112,20 +109,15 @@ def at_the_meshed_inlet() -> Finding:
     return Finding(checks, change=change, reason="it is not 7 K_s at every distance that may be meant")
 
 
-def upstream_means(now: Pore, solved: Solved, distance: float) -> tuple[float, float]:
-    """Flow-weighted C_A and C_D at a distance (um) upstream of the aggregate; beyond the mesh by (26)."""
-    grid, problem = now.mesh, solved.problem
-    x = now.boundary.upstream - distance
-    height = np.linspace(0.0, grid.width, 201)
-    where = np.column_stack([np.full_like(height, max(x, grid.ends[0])), height])
-    state = solved.concentrations
-    pair = np.column_stack([now.space.to_mesh(field) for field in (state.acceptor, state.donor)])
-    found = interpolate(grid.points, grid.cells, pair, where)
-    mean = np.trapezoid(6 * height[:, None] * (grid.width - height[:, None]) * found, height, axis=0) / grid.width**3
-    beyond = min(x - grid.ends[0], 0.0)
-    speed = solved.flow.mean_velocity
-    return tuple(float(s.supply - (s.supply - m) * np.exp(speed * beyond / s.diffusivity))
-                 for s, m in zip(problem.both, mean))
+def upstream_means(now: Pore, solved: Solved, distance: float) -> np.ndarray:
+    """(2,) flow-weighted C_A and C_D at a distance (um) upstream of the aggregate; beyond the mesh by (26)."""
+    x, inlet = now.boundary.upstream - distance, now.mesh.ends[0]
+    part = np.linspace(0.0, 1.0, 201)
+    where = np.column_stack([np.full_like(part, max(x, inlet)), part * now.mesh.width])
+    found = field_at(now.space, both(solved.concentrations).T, where)
+    mean = np.trapezoid(6 * part * (1 - part) * found.T, part)
+    supply, diffusivity = (np.array(pair(name, solved.problem.substrates)) for name in ("supply", "diffusivity"))
+    return supply - (supply - mean) * np.exp(solved.flow.mean_velocity * min(x - inlet, 0.0) / diffusivity)
 
 
 @claim("C06", "4", "inert remains under 0.5 % of the aggregate's mass at 19.4 h")
@@ -223,60 +215,40 @@ COD, HALF_DIGIT = 2.38, 0.005
 #: The unit of its diffusivities (1e-4 m2/d, in um2/h), and atomic weights.
 DIFFUSIVITY = 1e8 / 24
 WEIGHT = {"C": 12.011, "H": 1.008, "O": 15.999, "N": 14.007}
-#: F from the entries of Table 1, and base with it: the run of E1.
-F_COMPUTED, F_OTHER = COD - 0.61 * 1.42, CHOICES["exact F"].run
 
 
 @claim("C28", "Table 1", "F = COD - Y d_c; diffusivity in the aggregate 80 % of that in water", about=CLOSED)
 def table_1() -> Finding:
-    """F from Table 1's own entries and from chemical formulas; ratios of diffusivities; what F's error does to base."""
+    """F from Table 1's own entries and from chemical formulas; ratios of diffusivities. E1 tells what F's error does to
+    base."""
     said = scene(*BASE)
     law, paper = said.kinetics, said.kinetics.acceptor_to_donor_ratio
     y, d_c = law.yield_coefficient, law.decay_oxygen_demand
-    value, from_formulas = COD - y * d_c, oxygen_demand(6, 6, 1, 0, 7) - y * oxygen_demand(5, 7, 2, 1, 5)
-    printed_values = ((each, HALF_DIGIT) for each in (COD, y, d_c))
+    value, from_formulas = COD - y * d_c, oxygen_demand(7, C=6, H=6, O=1) - y * oxygen_demand(5, C=5, H=7, O=2, N=1)
+    printed_values = [(each, HALF_DIGIT) for each in (COD, y, d_c)]
     checks = [printed("COD - Y d_c from the printed values (mg/mg)", f"{paper}", value, rests_on=ARITHMETIC,
                       within=sensitivity.in_closed_form(lambda cod, y, d_c: cod - y * d_c, *printed_values))]
     for name in SUBSTRATES:
         substrate = getattr(said.substrates, name)
-        pair = substrate.diffusivity_in_aggregate, substrate.diffusivity
-        checks.append(printed(f"{name}: diffusivity, aggregate over water (%)", "80", 100 * pair[0] / pair[1],
-                              rests_on=ARITHMETIC, within=sensitivity.in_closed_form(
-                                  lambda inner, outer: 100 * inner / outer,
-                                  *((each / DIFFUSIVITY, HALF_DIGIT) for each in pair))))
+        printed_values = [(each / DIFFUSIVITY, HALF_DIGIT) for each in (substrate.diffusivity_in_aggregate,
+                                                                       substrate.diffusivity)]
+        checks.append(printed(f"{name}: diffusivity, aggregate over water (%)", "80",
+                              100 * substrate.diffusivity_in_aggregate / substrate.diffusivity, rests_on=ARITHMETIC,
+                              within=sensitivity.in_closed_form(lambda inner, outer: 100 * inner / outer,
+                                                                *printed_values)))
     near = (COD + HALF_DIGIT, y, d_c - HALF_DIGIT)
     rounding = (f"COD {near[0]:.3f}, Y {near[1]:.3f} and d_c {near[2]:.3f} round to the printed ones and give "
                 f"{near[0] - near[1] * near[2]:.4f}")
     low, high = interval(f"{paper}")
     note = (f"Table 1's entries give {value:.4f} [E1]; with C6H6O + 7 O2 and C5H7O2N + 5 O2 for COD and d_c it is "
-            f"{from_formulas:.4f}. ")
+            f"{from_formulas:.4f}.")
     return Finding(tuple(checks), reason=f"Table 1's own COD, Y and d_c give {value:.4f} [E1]",
-                   rounding=rounding if low <= near[0] - near[1] * near[2] <= high else "",
-                   note=lambda: note + effect_of_f())
+                   rounding=rounding if low <= near[0] - near[1] * near[2] <= high else "", note=note)
 
 
-def oxygen_demand(carbon: int, hydrogen: int, oxygen: int, nitrogen: int, molecules: int) -> float:
+def oxygen_demand(molecules: int, **atoms: int) -> float:
     """mg of O2 that oxidise a mg of a compound, a molecule of which takes so many molecules of O2."""
-    mass = sum(count * WEIGHT[atom] for atom, count in zip("CHON", (carbon, hydrogen, oxygen, nitrogen)))
-    return molecules * 2 * WEIGHT["O"] / mass
-
-
-@at_level(TOLD)
-def effect_of_f() -> str:
-    """Base at 19.2 h with F as computed: a run of its own, and the effluents in one and the same geometry; in the
-    converged solution, as for E1: two runs of the scheme differ by their meshes too."""
-    ours, other = at(BASE, PLOTTED), at(F_OTHER, PLOTTED)
-    columns = {"velocity": "mean_velocity_m_per_d", "area": "aggregate_area_um2",
-               "effluent acceptor": "effluent_acceptor_mg_per_L", "effluent donor": "effluent_donor_mg_per_L"}
-    told = ", ".join(f"{name} {100 * (other[key] / ours[key] - 1):+.2f} %" for name, key in columns.items())
-    now, solved = solved_pore(BASE, PLOTTED)
-    kinetics = replace(scene(*BASE).kinetics, acceptor_to_donor_ratio=F_COMPUTED)
-    problem = replace(solved.problem, kinetics=kinetics)
-    sink = Sink(now.active)
-    state = transport.steady(problem, sink, solved.concentrations)
-    pairs = zip(solved.fluxes, transport.fluxes(problem, sink, state))
-    alone = ", ".join(f"{name} {100 * (b.effluent / a.effluent - 1):+.2f} %" for name, (a, b) in zip(SUBSTRATES, pairs))
-    return f"Base at {PLOTTED} h with {F_COMPUTED:.4f}: {told}; in one and the same geometry the effluents: {alone}."
+    return molecules * 2 * WEIGHT["O"] / sum(count * WEIGHT[atom] for atom, count in atoms.items())
 
 
 SECONDS = 3600.0
@@ -290,7 +262,7 @@ def doubling() -> Finding:
     said, row = scene(*BASE), at(BASE, PLOTTED)
     supply, half = said.substrates.acceptor.supply, log(2) / said.kinetics.decay_coefficient / 24
     mean = row["time_h"] * log(2) / log(row["aggregate_area_um2"] / at(BASE, 0.0)["aggregate_area_um2"])
-    fastest, endless = (_doubling_time(said, value, value) for value in (supply, ENDLESS))
+    fastest, endless = (_doubling_time(said, value) for value in (supply, ENDLESS))
     checks = (printed("doubling time of base's aggregate, mean to 19.2 h (h)", "~3", mean, input="doubling"),
               printed("doubling time at the supply of 10 K_s (h)", "~3", fastest, rests_on=ARITHMETIC,
                       input="doubling_at_supply"),
@@ -301,9 +273,9 @@ def doubling() -> Finding:
     return Finding(checks, reason=reason)
 
 
-def _doubling_time(said, acceptor: float, donor: float) -> float:
-    """ln 2 / (F3 / X_A), h."""
-    return log(2) / float(growth_rate(acceptor, donor, said.substrates, said.kinetics))
+def _doubling_time(said, concentration: float) -> float:
+    """ln 2 / (F3 / X_A), h, with so much of both substrates (mg/L)."""
+    return log(2) / float(growth_rate(concentration, concentration, said.substrates, said.kinetics))
 
 
 @claim("C18", "1", "within a 600 um pore: flow << 1 s, advection a few seconds, diffusion of the order of minutes, "
@@ -311,8 +283,11 @@ def _doubling_time(said, acceptor: float, donor: float) -> float:
 def time_scales() -> Finding:
     """W^2 / nu, L / u_ave, L^2 / D of both substrates, and the doubling time at the supply. Of these a solution gives
     u_ave alone, and the least of the ratios is that of two others."""
-    said = scene(*BASE)
-    viscous, advection, diffusion, growth = _scales(said)
+    said, speed = scene(*BASE), at(BASE, 0.0)["mean_velocity_m_per_d"]
+    length, width = said.pore.length, said.pore.width
+    viscous, advection = SECONDS * width**2 / said.flow.kinematic_viscosity, SECONDS * length / speed * 24e-6
+    diffusion = [60 * length**2 / each for each in pair("diffusivity", said.substrates)]
+    growth = _doubling_time(said, said.substrates.acceptor.supply)
     apart = min(advection / viscous, growth * 60 / max(diffusion))
     tenfold = "of the order: one to ten of the unit"
     checks = (at_most("flow, W^2 / nu (s)", "<< 1", viscous, 0.1, "much less: a tenth",
@@ -324,21 +299,12 @@ def time_scales() -> Finding:
                       rests_on=ARITHMETIC),
               at_least("substrates over flow, growth over substrates (times)", "sequential", apart, 10,
                        "an order of magnitude, of both ratios", rests_on=ARITHMETIC))
-    slow = advection * at(BASE, 0.0)["mean_velocity_m_per_d"] / at(BASE, PLOTTED)["mean_velocity_m_per_d"]
+    slow = advection * speed / at(BASE, PLOTTED)["mean_velocity_m_per_d"]
     reason = (f"over 600 um at the paper's own 2.9 m/d it is {advection:.0f} s, {advection / 1.5:.0f} s on the axis of "
               f"the pore, and {slow:.0f} s at the velocity of 19.2 h; {advection / 6:.0f} s are what it takes over 100 "
               f"um. The order of the scales, which the sequential coupling needs, holds")
-    across = SECONDS * said.pore.width**2 / said.substrates.donor.diffusivity
+    across = SECONDS * width**2 / said.substrates.donor.diffusivity
     return Finding(checks, reason=reason, note=f"Diffusion across the pore, W^2 / D of the donor: {across:.1f} s.")
-
-
-def _scales(said) -> tuple[float, float, tuple[float, float], float]:
-    """Flow (s), advection at t = 0 (s), diffusion of acceptor and donor (min), growth at the supply (h)."""
-    kinds = said.substrates.acceptor, said.substrates.donor
-    speed = at(BASE, 0.0)["mean_velocity_m_per_d"] / 24e-6
-    diffusion = tuple(60 * said.pore.length**2 / s.diffusivity for s in kinds)
-    return (SECONDS * said.pore.width**2 / said.flow.kinematic_viscosity, SECONDS * said.pore.length / speed, diffusion,
-            _doubling_time(said, *(s.supply for s in kinds)))
 
 
 TIMES = (0.0, PLOTTED, END)

@@ -15,9 +15,10 @@ from repro.fem import elements
 from repro.fem.mesh import Mesh
 from repro.fem.outline import BOTTOM, FREE, TOP, Outline
 from repro.model import biomass
+from repro.model.kinetics import fractions
 from repro.model.pore import Pore, Solved
 from verification.claims import FEW, FEW_WORDS, LATER, Finding, at_least, at_most, between, claim, without_limit
-from verification.claims.levels import ABOUT_WIDE, BESIDE_OWN, COMPARED, TOLD, at_level
+from verification.claims.levels import ABOUT_WIDE, BESIDE_OWN, COMPARED
 from verification.claims.rheology import STRESS_FREE, conductivity_change
 from verification.claims.runs import (
     BASE,
@@ -28,10 +29,10 @@ from verification.claims.runs import (
     WIDE,
     Body,
     Run,
-    around_contact,
     at,
     bodies,
     body,
+    contact_time,
     equivalent,
     grown,
     in_plane,
@@ -41,7 +42,6 @@ from verification.claims.runs import (
     solved_pore,
     stress,
     uncovered,
-    until,
     upstream_part,
 )
 from verification.uncertainty import Bar
@@ -90,11 +90,10 @@ def asymmetry() -> Finding:
     row, after = at(BASE, END), body(BASE, END)
     before = Body(scene(*BASE), *grown(BASE, PLOTTED))
     rate = growth_rates(before.pore, before.solved)
-    area, grown_area = (found.areas[found.grid.biomass] for found in (before, after))
-    theta = (after.pore.theta * after.pore.body.at.dx).sum(axis=1) / after.pore.body.at.dx.sum(axis=1)
+    theta = after.mean(after.pore.theta)
     compared = {"extent": (-row["upstream_um"], row["downstream_um"]),
-                "growth rate": made(before, rate) / halves(before, area),
-                "expansion since t = 0": halves(after, grown_area) / halves(after, after.pore.body.at.dx.sum(axis=1))}
+                "growth rate": made(before, rate) / halves(before, before.areas),
+                "expansion since t = 0": halves(after, after.areas) / halves(after, after.pore.body.at.dx.sum(axis=1))}
     checks = tuple(at_most(f"{name}, upstream over downstream half (%)", "a few", 100 * abs(up / down - 1), 100 * FEW,
                            FEW_WORDS) for name, (up, down) in compared.items())
     fastest, slowest = (f(rate[before.grid.body]) for f in (max, min))
@@ -106,14 +105,13 @@ def asymmetry() -> Finding:
 
 def halves(found: Body, values: np.ndarray) -> np.ndarray:
     """(2,) sums of values (t,) of biomass triangles upstream and downstream of the centre of the seed."""
-    x = found.grid.points[found.grid.triangles[found.grid.biomass]].mean(axis=1)[:, 0]
+    x = found.grid.points[found.corners].mean(axis=1)[:, 0]
     return np.array([values[side].sum() for side in (x < 0, x > 0)])
 
 
 def made(found: Body, rate: np.ndarray) -> np.ndarray:
     """(2,) integrals of a rate (N,) over both sides, um2/h."""
-    grid = found.grid
-    return halves(found, (found.areas * rate[grid.triangles].mean(axis=1))[grid.biomass])
+    return halves(found, found.areas * rate[found.corners].mean(axis=1))
 
 
 @claim("C12", "4, Fig 6", "after the pore is spanned, growth is strongly asymmetric, on the upgradient side only",
@@ -121,7 +119,7 @@ def made(found: Body, rate: np.ndarray) -> np.ndarray:
 def upgradient_only() -> Finding:
     """Share of the new area, and of the biomass made, upgradient of the seed's centre, at the end of `wide`."""
     last, end = bodies(WIDE)[-1], float(bodies(WIDE)[-1].pore.time)
-    contact = float(around_contact(*WIDE)["time_h"][1])
+    contact = contact_time(*WIDE)
     spanned = next(each for each in bodies(WIDE) if each.pore.time >= contact)
     late, since = (upstream_part(polygon(first.outline), polygon(last.outline))
                    for first in (body(WIDE, end - LAST_HOURS), spanned))
@@ -251,8 +249,6 @@ def share_under(found: Body, bound: float) -> float:
     return 100 * float(found.pore.active[under].sum() / found.pore.active.sum())
 
 
-#: Base goes on past the paper's end, to see until when it is fully penetrated.
-LONGER = ("base", *until(*range(1, 23)))
 #: C >> K_s, as the zero order of section 4 needs it: uptake within a tenth of its most.
 ZERO_ORDER = 9.0
 
@@ -273,27 +269,13 @@ def penetrated() -> Finding:
                 for name in SUBSTRATES))
     reason = (f"it is fully penetrated, uptake is even; but at {lowest['acceptor']:.2g} K_s of acceptor uptake has "
               "fallen well below its most, as it must for the effluents printed, and C15 shows what that does")
-    return Finding(checks, reason=reason, note=_until_when)
-
-
-def _until_when() -> str:
-    """Penetration of the longer run, in words."""
-    with at_level(TOLD):
-        hours, acceptor = series(*LONGER)["time_h"], least(LONGER, "acceptor")
-        even = hours[[evenness(found) >= 0.9 for found in bodies(LONGER)]][-1]
-    told = ", ".join(f"{bound} K_s until {float(np.interp(-bound, -acceptor, hours)):.1f} h"
-                     for bound in (9, 6, 4, 3, 2, 1) if acceptor[-1] < bound)
-    return (f"Until when, in a run to {hours[-1]:g} h: the acceptor has at least {told}; in whole hours, uptake is "
-            f"even to a tenth until {even:g} h.")
+    return Finding(checks, reason=reason)
 
 
 def evenness(found: Body) -> float:
-    """Smallest over largest m_A m_D in the aggregate, with the K_s of base."""
-    rate = 1.0
-    for name in SUBSTRATES:
-        field = found.node(f"{name}_mg_per_L")[found.grid.body]
-        half = getattr(scene(*BASE).substrates, name).half_saturation
-        rate = rate * field / (field + half)
+    """Smallest over largest m_A m_D in the aggregate."""
+    m_a, m_d = fractions(*map(found.concentration, SUBSTRATES), found.scene.substrates)
+    rate = (m_a * m_d)[found.grid.body]
     return float(rate.min() / rate.max())
 
 
@@ -331,12 +313,12 @@ def stresses() -> Finding:
 def peaks(run: Run) -> tuple[float, float, float]:
     """Largest in-plane shear and equivalent stress over mu_L, and largest in-plane shear stress over mu_L J^(-2/3), in
     all rows of a run."""
-    modulus = scene(*run).growth.shear_modulus
     triples = []
     for each in bodies(run):
-        found = stress(each, modulus)
+        found = stress(each)
         shear = in_plane(found)
-        triples.append((shear.max(), equivalent(found).max(), (shear * each.cell("J") ** (2 / 3)).max()))
+        softened = shear * each.mean(each.strained.J) ** (2 / 3)
+        triples.append((shear.max(), equivalent(found).max(), softened.max()))
     return tuple(map(float, np.max(triples, axis=0)))
 
 

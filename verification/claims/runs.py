@@ -12,9 +12,7 @@ Aggregates of a given shape, and what is solved around them.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
-import meshio
 import numpy as np
 import shapely
 
@@ -30,6 +28,7 @@ from repro.march.loop import Instant, Ledger, State, newton_counts
 from repro.model import biomass, flow, pore, remeshing, transport
 from repro.model.kinetics import Sink
 from repro.model.pore import Pore, Solved, solve
+from repro.results.arrays import State as Reported
 from repro.scene import Scene, load_scene
 from verification.claims.levels import CONVERGED, cached, converged, current
 from verification.kernel.case import columns
@@ -163,6 +162,11 @@ def around_contact(*run: str) -> Columns:
     return columns([results.row(found.scene, each) for each in found.contact])
 
 
+def contact_time(*run: str) -> float:
+    """When (h) a run touches the opposite wall."""
+    return float(around_contact(*run)["time_h"][1])
+
+
 @cached
 def ledger(*run: str) -> Columns:
     """Columns of ``ledger.csv``, of all steps."""
@@ -220,18 +224,8 @@ def _grown(said: Scene, now: Pore, solved: Solved) -> tuple[Pore, Solved]:
 PER_ARC = 8
 
 
-@dataclass(frozen=True, eq=False)
-class Body:
-    """The aggregate of a pore, and the fields that a run would save of it."""
-
-    scene: Scene
-    pore: Pore
-    solved: Solved
-
-    @cached_property
-    def fields(self) -> meshio.Mesh:
-        """As saved."""
-        return results.fields(self.scene, self.pore, self.solved)
+class Body(Reported):
+    """The aggregate of a pore, with its strains and stresses as a run reports them."""
 
     @property
     def grid(self) -> Mesh:
@@ -248,18 +242,19 @@ class Body:
         """(t, 3 or 6) of the biomass."""
         return self.grid.cells[self.grid.biomass]
 
-    @cached_property
+    @property
+    def corners(self) -> np.ndarray:
+        """(t, 3) of the biomass."""
+        return self.grid.triangles[self.grid.biomass]
+
+    @property
     def areas(self) -> np.ndarray:
-        """(T,) um2, of curved triangles too."""
-        return self.pore.space.at.dx.sum(axis=1)
+        """(t,) um2 of the biomass triangles, of curved ones too."""
+        return self.pore.space.at.dx[self.grid.biomass].sum(axis=1)
 
-    def cell(self, name: str) -> np.ndarray:
-        """(t,) values of cell data on the biomass triangles."""
-        return self.fields.cell_data[name][0][self.grid.biomass]
-
-    def node(self, name: str) -> np.ndarray:
-        """(N,) or (N, 3) values of point data."""
-        return self.fields.point_data[name]
+    def concentration(self, name: str) -> np.ndarray:
+        """(N,) mg/L of a substrate."""
+        return self.pore.space.to_mesh(getattr(self.solved.concentrations, name))
 
 
 def body_of(said: Scene, found: Instant) -> Body:
@@ -288,12 +283,6 @@ def polygon(outline: Outline) -> shapely.Polygon:
     return shapely.Polygon(np.einsum("qa,eai->eqi", parabola(t), outline.arcs(outline.points)).reshape(-1, 2))
 
 
-def interface_length(found: Body) -> float:
-    """Length (um) of the line between fluid and aggregate."""
-    outline = found.outline
-    return float(outline.edge_lengths()[outline.interface_edges()].sum())
-
-
 def solved_pore(run: Run, time: float) -> tuple[Pore, Solved]:
     """The pore of a run at a time (h) and what is solved in it."""
     found = instant(run, time)
@@ -306,9 +295,10 @@ def remeshed(chosen: Scene, now: Pore, solved: Solved) -> tuple[Pore, Solved]:
     return new, solve(chosen, new)
 
 
-def stress(found: Body, modulus: float) -> np.ndarray:
-    """(t, 4) Cauchy stress over mu_L (MPa) on the biomass triangles: xx, yy, zz, xy."""
-    return np.stack([found.cell(f"stress_{part}_MPa") for part in ("xx", "yy", "zz", "xy")], axis=1) / modulus
+def stress(found: Body) -> np.ndarray:
+    """(t, 4) Cauchy stress over mu_L, the mean over each triangle: xx, yy, zz, xy."""
+    means = [found.mean(part) for part in np.moveaxis(found.stress, -1, 0)]
+    return np.stack(means, axis=1) / found.scene.growth.shear_modulus
 
 
 def in_plane(stresses: np.ndarray) -> np.ndarray:
@@ -352,9 +342,9 @@ def full_biomass(scene, grid: Mesh) -> np.ndarray:
     return active
 
 
-def half_disc(scene, radius: float, reach: float | None) -> Mesh:
-    """The mesh around a half-disc, to the distance ``reach`` (um) on both sides; None: over the whole pore."""
-    end = scene.pore.length / 2 if reach is None else min(radius + reach, scene.pore.length / 2)
+def half_disc(scene, radius: float, reach: float) -> Mesh:
+    """The mesh around a half-disc, to the distance ``reach`` (um) on both sides, or to the pore's ends."""
+    end = min(radius + reach, scene.pore.length / 2)
     numerics = scene.numerics
     outline = seed(radius, ACROSS_AGGREGATE * numerics.refinement, numerics.geometry)
     return mesher.generate(outline, (-end, end), pore.sized(scene), numerics.geometry)[0]
