@@ -111,8 +111,8 @@ def downgradient_end() -> Finding:
                       apart(uptake(*central), uptake(*full)), 100 * TRANSPORT, TRANSPORT_WORDS),
               at_most("uptake, any value held at the end of 600 um: change (%)", "not affected", effects[0],
                       100 * FEW, FEW_WORDS),
-              near("its decay with the pore's length, over u_ave / D_A", "if long enough", decay, 1.0, relative=0.05,
-                   why="(25): exp(-u x / D) upstream; 5 %, since the donor's part fades sooner"))
+              near("its decay with the pore's length, over u_ave / D_A", "if long enough", decay, 1.0, 0.05,
+                   "(25): exp(-u x / D) upstream; 5 %, since the donor's part fades sooner"))
     told = ", ".join(f"{effect:.2g} % at {length:g} um" for effect, length in zip(effects, LENGTHS))
     return Finding(checks, note=f"Largest change of the uptake with C held at nothing or at the supply at the pore's "
                    f"end: {told}. The flux that enters is u_ave W C_supply whatever happens downstream, by (11).")
