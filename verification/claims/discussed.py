@@ -17,7 +17,6 @@ C44: the pore as a part of a network.
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 from math import gamma
 
 import numpy as np
@@ -206,16 +205,16 @@ def not_crucial() -> Finding:
                            "not crucial: within a tenth") for walls, other in zip((1, 2), layers)]
         told.append(f"{100 * ours:.0f} % against {100 * layers[0]:.0f} and {100 * layers[1]:.0f} % of the supply with "
                     f"{100 * part:.1f} % filled")
-        apart.append("{:.3f} and {:.3f}".format(*(other / layers_share(said, part) for other in layers)))
+        apart.append("{:.3f} and {:.3f}".format(*np.array(layers) / layers_share(said, part)))
     reason = "an aggregate lets more of the supply pass than layers of the same biomass do: " + "; ".join(told)
     return Finding(tuple(checks), reason=reason, note=f"Changed on {LATER} after these values had been seen: layers "
                    "mixed over a section were judged with, of whose uptake the model's have, on one wall and on both, "
                    f"{'; '.join(apart)}; the verdict was the same.")
 
 
-def shares(rows: dict[str, np.ndarray], supply: float = 10.0) -> np.ndarray:
-    """(n,) parts of the acceptor supplied that an aggregate takes up, from the columns of its run."""
-    return 1 - rows["effluent_acceptor_mg_per_L"] / supply
+def shares(rows: dict[str, np.ndarray]) -> np.ndarray:
+    """(n,) parts of the acceptor supplied, 10 mg/L, that an aggregate takes up, from the columns of its run."""
+    return 1 - rows["effluent_acceptor_mg_per_L"] / 10.0
 
 
 def aggregates_share(part: float) -> float:
@@ -224,13 +223,12 @@ def aggregates_share(part: float) -> float:
     return float(np.interp(part, rows["aggregate_area_um2"] / (said.pore.width * said.pore.length), shares(rows)))
 
 
-@cache
-def layers_share(said: Scene, part: float, velocity: float = 2.9e6 / 24) -> float:
-    """Part of the acceptor supplied that layers take up which fill a part of the pore, at a mean velocity (um/h)."""
+def layers_share(said: Scene, part: float) -> float:
+    """Part of the acceptor supplied that layers take up which fill a part of the pore."""
     supply = pair("supply", said.substrates)
     water, inside = (np.array(pair(name, said.substrates)) for name in ("diffusivity", "diffusivity_in_aggregate"))
     mean = (1 - part) * water + part * inside
-    found = channel_bvp.solution(velocity, supply, mean, mean, part * said.kinetics.maximum_density,
+    found = channel_bvp.solution(said.flow.mean_velocity, supply, mean, mean, part * said.kinetics.maximum_density,
                                  rates(said.kinetics, said.substrates), said.pore.length)
     return 1 - float(found(np.array([said.pore.length]))[0, 0]) / supply[0]
 

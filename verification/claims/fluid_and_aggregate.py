@@ -18,7 +18,6 @@ import shapely
 from scipy.spatial import KDTree
 
 from repro.fem.mesh import gradients
-from repro.fem.transfer import interpolate
 from repro.model import contact, growth
 from repro.model.traction import MPA_PER_UM
 from verification.claims import FEW, FEW_WORDS, LATER, Finding, at_least, at_most, claim
@@ -156,8 +155,7 @@ def inside(found: Body) -> float:
     line = shapely.LineString([(0.0, -1.0), (0.0, found.grid.width + 1.0)])
     height = shapely.intersection(polygon(found.outline), line).length
     y = (np.arange(parts) + 0.5) / parts * height
-    speed = interpolate(found.grid.points, found.triangles, found.pore.space.to_mesh(flow.velocity)[:, :1],
-                        np.column_stack([np.zeros(parts), y]))
+    speed = meshes.field_at(found.pore.space, flow.velocity, np.column_stack([0 * y, y]))[:, 0]
     return 100 * float(speed.mean() * height) / (flow.mean_velocity * found.grid.width)
 
 
@@ -189,35 +187,23 @@ class Peak:
         return f"{self.value:.3g} mu_L at ({self.x:.0f}, {self.y:.0f}) um"
 
 
-@dataclass(frozen=True, eq=False)
-class Stress:
-    """Cauchy stress of an aggregate: points (K, 2) um, areas (K,) um2 for which they stand, values (K, 4) over mu_L."""
-
-    points: np.ndarray
-    areas: np.ndarray
-    values: np.ndarray
-
-    def within(self, distance: float, places: np.ndarray) -> np.ndarray:
-        """(p, 4) means over what of the aggregate is within a distance (um) of places (p, 2)."""
-        apart = KDTree(places).sparse_distance_matrix(KDTree(self.points), distance, output_type="coo_matrix")
-        weights = sp.csr_array((self.areas[apart.col], (apart.row, apart.col)), shape=apart.shape)
-        return (weights @ self.values) / (weights @ np.ones(len(self.points)))[:, None]
-
-
-def stress_of(found: Body) -> Stress:
-    """In quadrature points."""
+def averaged(found: Body, distance: float, places: np.ndarray) -> np.ndarray:
+    """(p, 4) Cauchy stress over mu_L, means over what of the aggregate is within a distance (um) of places (p, 2)."""
     kept = found.pore.body
     shape = growth.Shape(kept.shape.cells, kept.shape.corners, DEGREE)
     finer = replace(found, pore=replace(found.pore, body=growth.Body(shape, kept.reference)))
     where, areas = meshes.places(found.grid.points[found.triangles], shape.table)
-    return Stress(where.reshape(-1, 2), areas.ravel(), finer.stress.reshape(-1, 4) / found.scene.growth.shear_modulus)
+    apart = KDTree(places).sparse_distance_matrix(KDTree(where.reshape(-1, 2)), distance, output_type="coo_matrix")
+    weights = sp.csr_array((areas.ravel()[apart.col], (apart.row, apart.col)), shape=apart.shape)
+    means = (weights @ finer.stress.reshape(-1, 4)) / weights.sum(axis=1)[:, None]
+    return means / found.scene.growth.shear_modulus
 
 
 def peak(found: Body, part: float = APART) -> Peak:
     """Largest principal value of the stress in the mean over a part of the pore's width, and where."""
     distance = part * found.grid.width
     places = lattice(found, distance / PLACES)
-    values = growth.largest_principal(stress_of(found).within(distance, places))
+    values = growth.largest_principal(averaged(found, distance, places))
     worst = int(values.argmax())
     return Peak(float(values[worst]), *map(float, places[worst]))
 

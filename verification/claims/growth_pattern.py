@@ -16,7 +16,6 @@ from repro.fem.mesh import Mesh
 from repro.fem.outline import BOTTOM, FREE, TOP, Outline
 from repro.model import biomass
 from repro.model.kinetics import fractions
-from repro.model.pore import Pore, Solved
 from verification.claims import FEW, FEW_WORDS, LATER, Finding, at_least, at_most, between, claim, without_limit
 from verification.claims.levels import ABOUT_WIDE, BESIDE_OWN, COMPARED
 from verification.claims.rheology import STRESS_FREE, conductivity_change
@@ -39,7 +38,6 @@ from verification.claims.runs import (
     polygon,
     scene,
     series,
-    solved_pore,
     stress,
     uncovered,
     upstream_part,
@@ -49,29 +47,27 @@ from verification.uncertainty import Bar
 LAST_HOURS = 5.0
 
 
-def growth_rates(now: Pore, solved: Solved) -> np.ndarray:
+def growth_rates(found: Body) -> np.ndarray:
     """(N,) (F3 + F4) / X_m, 1/h, at the mesh's nodes, zero in the fluid: how fast each place makes biomass."""
-    rates = biomass.rates(now.space, solved.concentrations, solved.problem.substrates, solved.problem.kinetics)
-    density = now.active / now.space.reaction.dx / solved.problem.kinetics.maximum_density
-    return biomass.at_nodes(now.space, density * rates.total)
+    space, problem = found.pore.space, found.solved.problem
+    rates = biomass.rates(space, found.solved.concentrations, problem.substrates, problem.kinetics)
+    density = found.pore.active / space.reaction.dx / problem.kinetics.maximum_density
+    return biomass.at_nodes(space, density * rates.total)
 
 
 @claim("C10", "4, Plate 1", "fastest growth on the upgradient side, slowest on the wall between centre and "
        "downgradient side")
 def extremes() -> Finding:
     """Places of the largest and the smallest growth rate over the aggregate's nodes; x = 0 is the seed's centre."""
-    now, solved = grown(BASE, PLOTTED)
-    rate, grid = growth_rates(now, solved), now.mesh
-    nodes = grid.body
+    found = Body(scene(*BASE), *grown(BASE, PLOTTED))
+    rate, grid = growth_rates(found), found.grid
+    nodes, last = grid.body, found.outline.downstream
     fast, slow = nodes[np.argmax(rate[nodes])], nodes[np.argmin(rate[nodes])]
-    (x_fast, y_fast), (x_slow, y_slow) = grid.points[fast], grid.points[slow]
-    first, last = now.boundary.upstream, now.boundary.downstream
+    (x_fast, _), (x_slow, y_slow) = grid.points[fast], grid.points[slow]
     checks = (at_most("x of the fastest growth (um)", "upgradient side", x_fast, 0.0, "the words"),
               between("x of the slowest growth (um)", "centre to downgradient side", x_slow, 0.0, last, "the words"),
               between("y of the slowest growth (um)", "on the wall", y_slow, 0.0, 0.0, "the words"))
-    note = (f"The aggregate reaches from {first:.1f} to {last:.1f} um; the rate is largest, {rate[fast]:.4f} 1/h, at "
-            f"({x_fast:.1f}, {y_fast:.1f}), and smallest, {rate[slow]:.4f} 1/h, at ({x_slow:.1f}, {y_slow:.1f}). "
-            "The place of an extreme is a node's: its bar is the range over the sizes and the way to the next node.")
+    note = "The place of an extreme is a node's: its bar is the range over the sizes and the way to the next node."
     widths = (nearby(grid, fast), nearby(grid, slow), 0.0)
     checks = tuple(replace(without_limit(check), bar=Bar(check.value - width, check.value + width))
                    for check, width in zip(checks, widths))
@@ -89,10 +85,10 @@ def asymmetry() -> Finding:
     """Upstream against downstream half at 19.4 h: extents, growth rates, and expansion since t = 0, in percent."""
     row, after = at(BASE, END), body(BASE, END)
     before = Body(scene(*BASE), *grown(BASE, PLOTTED))
-    rate = growth_rates(before.pore, before.solved)
+    rate = growth_rates(before)
     theta = after.mean(after.pore.theta)
     compared = {"extent": (-row["upstream_um"], row["downstream_um"]),
-                "growth rate": made(before, rate) / halves(before, before.areas),
+                "growth rate": made(before) / halves(before, before.areas),
                 "expansion since t = 0": halves(after, after.areas) / halves(after, after.pore.body.at.dx.sum(axis=1))}
     checks = tuple(at_most(f"{name}, upstream over downstream half (%)", "a few", 100 * abs(up / down - 1), 100 * FEW,
                            FEW_WORDS) for name, (up, down) in compared.items())
@@ -109,9 +105,9 @@ def halves(found: Body, values: np.ndarray) -> np.ndarray:
     return np.array([values[side].sum() for side in (x < 0, x > 0)])
 
 
-def made(found: Body, rate: np.ndarray) -> np.ndarray:
-    """(2,) integrals of a rate (N,) over both sides, um2/h."""
-    return halves(found, found.areas * rate[found.corners].mean(axis=1))
+def made(found: Body) -> np.ndarray:
+    """(2,) integrals of the growth rate over both sides, um2/h."""
+    return halves(found, found.areas * growth_rates(found)[found.corners].mean(axis=1))
 
 
 @claim("C12", "4, Fig 6", "after the pore is spanned, growth is strongly asymmetric, on the upgradient side only",
@@ -123,7 +119,7 @@ def upgradient_only() -> Finding:
     spanned = next(each for each in bodies(WIDE) if each.pore.time >= contact)
     late, since = (upstream_part(polygon(first.outline), polygon(last.outline))
                    for first in (body(WIDE, end - LAST_HOURS), spanned))
-    up, down = made(last, growth_rates(*solved_pore(WIDE, end)))
+    up, down = made(last)
     bound = "95 %, set beforehand"
     checks = (at_least("new area upgradient, last 5 h (%)", "only upgradient", 100 * late, 95, bound),
               at_least(f"biomass made upgradient, rate at {end:g} h (%)", "only upgradient", 100 * up / (up + down), 95,
@@ -274,7 +270,7 @@ def penetrated() -> Finding:
 
 def evenness(found: Body) -> float:
     """Smallest over largest m_A m_D in the aggregate."""
-    m_a, m_d = fractions(*map(found.concentration, SUBSTRATES), found.scene.substrates)
+    m_a, m_d = fractions(found.concentration("acceptor"), found.concentration("donor"), found.scene.substrates)
     rate = (m_a * m_d)[found.grid.body]
     return float(rate.min() / rate.max())
 

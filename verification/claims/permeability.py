@@ -17,7 +17,7 @@ from repro.fem.mesher import generate
 from repro.model import biomass
 from repro.model.pore import sized
 from verification.claims import CLOSED, LATER, Finding, at_least, at_most, claim, near
-from verification.claims.growth_pattern import growth_rates, made
+from verification.claims.growth_pattern import made
 from verification.claims.levels import ABOUT_WIDE, BESIDE_OWN, PAIRED
 from verification.claims.runs import (
     WIDE,
@@ -103,7 +103,7 @@ def throttled() -> Finding:
     rows, last = series(*CLOSING), bodies(CLOSING)[-1]
     velocity, uptake = rows["mean_velocity_m_per_d"], consumed(rows)
     rate = specific_growth(rows)
-    up, down = made(last, growth_rates(last.pore, last.solved))
+    up, down = made(last)
     words, upgradient = "restricts", "only upgradient"
     checks = (
         at_most("velocity just after contact over that at t = 0", words, contact()[1] / velocity[0], 0.1, ORDER),
@@ -126,9 +126,9 @@ def contact() -> tuple[float, float, float]:
     return float(before), float(after), contact_time(*CLOSING)
 
 
-def consumed(rows: Columns, supply: float = 10.0) -> np.ndarray:
-    """(n,) acceptor taken up per time and width of the pore, m/d mg/L: u_ave (C_supply - C_effluent)."""
-    return rows["mean_velocity_m_per_d"] * (supply - rows["effluent_acceptor_mg_per_L"])
+def consumed(rows: Columns) -> np.ndarray:
+    """(n,) acceptor taken up per time and width of the pore, m/d mg/L: u_ave (10 mg/L - C_effluent)."""
+    return rows["mean_velocity_m_per_d"] * (10.0 - rows["effluent_acceptor_mg_per_L"])
 
 
 def specific_growth(rows: Columns) -> np.ndarray:

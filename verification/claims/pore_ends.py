@@ -68,7 +68,8 @@ def upstream_profile() -> Finding:
     for name in SUBSTRATES:
         substrate, field = getattr(said.substrates, name), getattr(solved.concentrations, name)
         across = 100 * sections(now, field, x) / substrate.supply
-        law = law_26(x, across[0].mean(), solved.flow.mean_velocity / substrate.diffusivity)
+        rate = solved.flow.mean_velocity / substrate.diffusivity
+        law = 100 - (100 - across[0].mean()) * np.exp(rate * (x - x[0]))
         bend = np.ptp(across, axis=1)
         checks += [at_most(f"{name}: error of (26) for the mean of a section (% of the supply)", "describes it",
                            np.abs(across.mean(axis=1) - law).max(), 100 * TRANSPORT, TRANSPORT_WORDS),
@@ -77,11 +78,6 @@ def upstream_profile() -> Finding:
         parts.append(f"{name} {bend[0]:.2g} % 1 W from the aggregate, {bend[-1]:.2g} % at the pore's inlet")
     return Finding(tuple(checks), note="Range within a section: " + "; ".join(parts) + ". There (11) with the local "
                    "u_x bends the isolines [E4].")
-
-
-def law_26(x: np.ndarray, first: float, rate: float) -> np.ndarray:
-    """(26) at x (n,), in percent of the supply, with alpha from its value ``first`` at x[0]; rate: u_ave / D (1/um)."""
-    return 100 - (100 - first) * np.exp(rate * (x - x[0]))
 
 
 def sections(now: Pore, field: np.ndarray, x: np.ndarray) -> np.ndarray:

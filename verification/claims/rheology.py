@@ -99,15 +99,10 @@ def slid(run: Run) -> tuple[float, float, float]:
     return moved, uncovered(ours, other), uncovered(ours, translate(other, -moved))
 
 
-def conductivity_change(run: Run, hours: tuple[float, ...] = AFTER, plain: Run = ()) -> float:
-    """Geometric mean of the conductivity in rows at some hours, against that of a plain run or of WHOLE, in percent."""
-    before, after = (_conductivities(chosen, hours) for chosen in (plain or WHOLE, run))
-    return 100 * float(np.exp(np.mean(np.log(after) - np.log(before))) - 1)
-
-
-def _conductivities(run: Run, hours: tuple[float, ...]) -> list[float]:
-    """m/d, in rows at some hours."""
-    return [at(run, hour)["conductivity_m_per_d"] for hour in hours]
+def conductivity_change(run: Run, hours: tuple[float, ...] = AFTER, plain: Run = WHOLE) -> float:
+    """Geometric mean of the conductivity in rows at some hours, against that of a plain run, in percent."""
+    key = "conductivity_m_per_d"
+    return 100 * float(np.exp(np.mean([np.log(at(run, hour)[key] / at(plain, hour)[key]) for hour in hours])) - 1)
 
 
 #: Of dense biomass, um2.

@@ -23,8 +23,8 @@ from repro.fem.outline import BOTTOM, TOP, Outline, parabola
 from repro.fem.outline import half_disc as seed
 from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.fem.space import Space
-from repro.march import simulation, updates
-from repro.march.loop import Instant, Ledger, State, newton_counts
+from repro.march import loop, simulation, updates
+from repro.march.loop import Instant, State
 from repro.model import biomass, flow, pore, remeshing, transport
 from repro.model.kinetics import Sink
 from repro.model.pore import Pore, Solved, solve
@@ -77,11 +77,12 @@ def scene(name: str, *changes: str) -> Scene:
     level = current()
     changes = (*level.wide, *changes) if name == "wide" else changes
     if level.kind == CONVERGED:
-        return _with_rows(load_scene(name, (*converged(level.size), *changes)), always=True)
+        return _with_rows(load_scene(name, (*converged(level.size), *changes)))
     said = load_scene(name, changes)
     numerics = replace(said.numerics, refinement=said.numerics.refinement / level.size)
     growth = said.growth and replace(said.growth, time_step=round(said.growth.time_step * level.step, 12))
-    return _with_rows(replace(said, numerics=numerics, growth=growth), always=False)
+    said = replace(said, numerics=numerics, growth=growth)
+    return _with_rows(said) if name == "wide" else said
 
 
 def ending(said: Scene, *times: float) -> Scene:
@@ -89,9 +90,9 @@ def ending(said: Scene, *times: float) -> Scene:
     return replace(said, growth=replace(said.growth, end=times[-1]), output=replace(said.output, times=times))
 
 
-def _with_rows(said: Scene, always: bool) -> Scene:
-    """The scene with its rows, where it names none and cannot have one a step."""
-    if said.growth is None or said.output.times or not (always or said.name == "wide"):
+def _with_rows(said: Scene) -> Scene:
+    """The scene with its rows, where it grows and names none."""
+    if said.growth is None or said.output.times:
         return said
     times = tuple(time for time in ROWS[said.name] if time <= said.growth.end + 1e-9)
     return replace(said, output=replace(said.output, times=times))
@@ -99,14 +100,13 @@ def _with_rows(said: Scene, always: bool) -> Scene:
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """A run. instants: those of its rows; ledgers: of all its steps; contact: the last instant before it touches the
-    opposite wall and the first after, None where it does not; far: the last state that is not NEAR that wall."""
+    """A run. instants: those of its rows; contact: the last instant before it touches the opposite wall and the first
+    after, None where it does not; far: the last state that is not NEAR that wall."""
 
     scene: Scene
     instants: tuple[Instant, ...]
-    ledgers: tuple[Ledger, ...]
     contact: tuple[Instant, Instant] | None
-    far: State | None = None
+    far: State | None
 
 
 @cached
@@ -116,18 +116,16 @@ def history(*run: str) -> History:
     said = scene(*run)
     plain = tuple(change for change in run if not change.startswith(LATE))
     instants: list[Instant] = []
-    ledgers: list[Ledger] = []
     contact = None
     begun = before = far = None if plain == run else history(*plain).far
     for state, instant in simulation.steps(said, begun):
         if instant:
             instants.append(instant)
-            ledgers += instant.ledgers
         if contact is None and before is not None and state.pore.contact:
             contact = tuple(_solved(said, each) for each in (_with_a_film(said, before, state), state))
         before = state
         far = state if state.pore.boundary.thickness <= NEAR * said.pore.width else far
-    return History(said, tuple(instants), tuple(ledgers), contact, far)
+    return History(said, tuple(instants), contact, far)
 
 
 def _with_a_film(said: Scene, before: State, contact: State) -> State:
@@ -142,8 +140,7 @@ def _with_a_film(said: Scene, before: State, contact: State) -> State:
 def _solved(said: Scene, state: State) -> Instant:
     """A state as the instant of a row."""
     found = pore.solve(said, state.pore)
-    now = replace(state.pore, concentrations=found.concentrations)
-    return Instant(now, found, None, state.ledgers, state.remeshes, newton_counts(found))
+    return loop.instant(state, replace(state.pore, concentrations=found.concentrations), found, None)
 
 
 @cached
@@ -171,7 +168,7 @@ def contact_time(*run: str) -> float:
 def ledger(*run: str) -> Columns:
     """Columns of ``ledger.csv``, of all steps."""
     found = history(*run)
-    steps = np.array([results.ledger_row(found.scene, step) for step in found.ledgers])
+    steps = np.array([results.ledger_row(found.scene, step) for each in found.instants for step in each.ledgers])
     return dict(zip(results.LEDGER_COLUMNS, steps.T))
 
 
@@ -350,13 +347,12 @@ def half_disc(scene, radius: float, reach: float) -> Mesh:
     return mesher.generate(outline, (-end, end), pore.sized(scene), numerics.geometry)[0]
 
 
-def plug(scene, *x: float) -> Mesh:
-    """Biomass over the whole width from the first to the last of some x (um), each of them a node on both walls, meshed
-    to 1.5 W on both sides."""
+def plug(scene, first: float, last: float) -> Mesh:
+    """Biomass over the whole width between two x (um), meshed to 1.5 W on both sides."""
     width = scene.pore.width
-    points = np.array([*((each, 0.0) for each in x), *((each, width) for each in reversed(x))])
-    outline = Outline(points, np.repeat([BOTTOM, TOP], len(x)), np.zeros(len(points), bool), points)
-    return mesher.generate(outline, (x[0] - 1.5 * width, x[-1] + 1.5 * width), pore.sized(scene))[0]
+    points = np.array([(first, 0.0), (last, 0.0), (last, width), (first, width)])
+    outline = Outline(points, np.repeat([BOTTOM, TOP], 2), np.zeros(4, bool), points)
+    return mesher.generate(outline, (first - 1.5 * width, last + 1.5 * width), pore.sized(scene))[0]
 
 
 def halved(lattice: np.ndarray, falling=False) -> np.ndarray:
