@@ -139,8 +139,8 @@ def last_length() -> Finding:
     row, width = at(BASE, END), scene(*BASE).pore.width
     span = row["downstream_um"] - row["upstream_um"]
     low, high = (span + 2 * factor * width for factor in (1.3, 1.5))
-    part = sensitivity.reach("area")
-    within = [None if part is None else (each - 0.5 * part * span, each + 0.5 * part * span) for each in (low, high)]
+    half = 0.5 * span * sensitivity.reach("area")
+    within = [(each - half, each + half) for each in (low, high)]
     lengths, times = series(*BASE)["meshed_length_um"], series(*BASE)["time_h"]
     last = times[1:][np.diff(lengths) != 0][-1]
     change = (f"our meshed part is {row['meshed_length_um']:.0f} um long at 19.4 h, since it was last regenerated at "
@@ -234,14 +234,15 @@ def table_1() -> Finding:
                               100 * substrate.diffusivity_in_aggregate / substrate.diffusivity, rests_on=ARITHMETIC,
                               within=sensitivity.in_closed_form(lambda inner, outer: 100 * inner / outer,
                                                                 *printed_values)))
-    near = (COD + HALF_DIGIT, y, d_c - HALF_DIGIT)
-    rounding = (f"COD {near[0]:.3f}, Y {near[1]:.3f} and d_c {near[2]:.3f} round to the printed ones and give "
-                f"{near[0] - near[1] * near[2]:.4f}")
+    near_cod, near_d_c = COD + HALF_DIGIT, d_c - HALF_DIGIT
+    nearest = near_cod - y * near_d_c
+    rounding = (f"COD {near_cod:.3f}, Y {y:.3f} and d_c {near_d_c:.3f} round to the printed ones and give "
+                f"{nearest:.4f}")
     low, high = interval(f"{paper}")
     note = (f"Table 1's entries give {value:.4f} [E1]; with C6H6O + 7 O2 and C5H7O2N + 5 O2 for COD and d_c it is "
             f"{from_formulas:.4f}.")
     return Finding(tuple(checks), reason=f"Table 1's own COD, Y and d_c give {value:.4f} [E1]",
-                   rounding=rounding if low <= near[0] - near[1] * near[2] <= high else "", note=note)
+                   rounding=rounding if low <= nearest <= high else "", note=note)
 
 
 def oxygen_demand(molecules: int, **atoms: int) -> float:
