@@ -72,7 +72,7 @@ def _row(id: str, found: dict[Level, Found]) -> Row:
         finding = barred(claim, finding, {level: each[0] for level, each in found.items()})
         return Row(id, claim, finding, finding.verdict)
     except ClaimError as error:
-        return Row(id, claim, finding, NO_VERDICT, f"{type(error).__name__}: {error}")
+        return Row(id, claim, finding, NO_VERDICT, str(error))
 
 
 if __name__ == "__main__":

@@ -24,7 +24,6 @@ import numpy as np
 from reference import channel_bvp, layered_channel
 from repro.fem.mesh import Mesh, curved
 from repro.fem.mesher import unlocked
-from repro.model import transport
 from repro.model.kinetics import Values
 from repro.model.pore import sized
 from repro.results.network import added_resistance, known
@@ -138,9 +137,7 @@ FASTER = 100.0
 
 def at_the_surface(found: Body) -> Body:
     """The same with both concentrations held at nothing in the aggregate: a sink at its surface alone."""
-    solved = holding(found.pore, found.solved, found.grid.body, 0.0)
-    fluxes = transport.fluxes(solved.problem, None, solved.concentrations)
-    return Body(found.scene, found.pore, replace(solved, fluxes=fluxes))
+    return replace(found, solved=holding(found.pore, found.solved, found.grid.body, 0.0))
 
 
 def in_one_shape(radius: float = RADIUS, supply: float = 10.0, head: float = 1e-3, faster: float = 1.0) -> Body:

@@ -102,28 +102,31 @@ def throttled() -> Finding:
     active biomass over its synthesis; and the fall of the conductivity in the 5 h up to contact, as in C16."""
     rows, last = series(*CLOSING), bodies(CLOSING)[-1]
     velocity, uptake = rows["mean_velocity_m_per_d"], consumed(rows)
-    rate = specific_growth(rows)
+    film, closed = around_contact(*CLOSING)["mean_velocity_m_per_d"]
+    touched, rate = contact_time(*CLOSING), specific_growth(rows)
+    fall = falls(rows["time_h"], velocity, (film, closed, touched), -5)
+    tenth = float(np.interp(-0.1, -velocity / velocity[0], rows["time_h"]))
     up, down = made(last)
-    words, upgradient = "restricts", "only upgradient"
+    upgradient, words = 100 * up / (up + down), "restricts"
     checks = (
-        at_most("velocity just after contact over that at t = 0", words, contact()[1] / velocity[0], 0.1, ORDER),
+        at_most("velocity just after contact over that at t = 0", words, closed / velocity[0], 0.1, ORDER),
         at_most(f"acceptor taken up at {END} h over the most ever", words, uptake[-1] / uptake.max(), 0.1, ORDER),
         at_most(f"growth rate of the area, last hours to {END} h over the first 2 h", words, rate[-1] / rate[0], 0.1,
                 ORDER),
         at_most(f"decay over synthesis of active biomass at {END} h", "restricts, and does not end it",
                 decay_share(last), 1.0, "the active biomass still increases"),
-        at_least(f"biomass made upgradient, rate at {END} h (%)", upgradient, 100 * up / (up + down), 95,
-                 "95 %, as in C12"),
-        at_least("fall of the conductivity in the 5 h up to contact (times)", "falls sharply", fall(), 10,
+        at_least(f"biomass made upgradient, rate at {END} h (%)", "only upgradient", upgradient, 95, "95 %, as in C12"),
+        at_least("fall of the conductivity in the 5 h up to contact (times)", "falls sharply", fall, 10,
                  "an order of magnitude, as in C16"))
+    reason = ("flow and supply are restricted long before the pore is spanned: a tenth of the velocity is left at "
+              f"{tenth:.1f} h, and from then on the aggregate starves. The last film closes at {touched:.1f} h only, "
+              f"and the velocity falls in the 5 h before from {closed * fall:.3g} to {closed:.3g} m/d, of which a "
+              f"factor of {film / closed:.2g} is the film that closes at once (2.3.3): the sharp fall of C16 needs the "
+              f"velocity to be kept up. Most of the growth, but not all, is upgradient: {upgradient:.0f} %. Decay "
+              "never balances it, since (9) lets it go on in proportion to m_A as growth does: where the acceptor is "
+              "used up both stop")
     decays = ", ".join(f"{decay_share(found):.2g} at {found.pore.time:g} h" for found in bodies(CLOSING)[::12])
-    return Finding(checks, reason=_reason(rows, 100 * up / (up + down)), note=f"Decay over synthesis is {decays}.")
-
-
-def contact() -> tuple[float, float, float]:
-    """Velocity (m/d) of the last shape with a film and of the first in contact, and when that is (h)."""
-    before, after = around_contact(*CLOSING)["mean_velocity_m_per_d"]
-    return float(before), float(after), contact_time(*CLOSING)
+    return Finding(checks, reason=reason, note=f"Decay over synthesis is {decays}.")
 
 
 def consumed(rows: Columns) -> np.ndarray:
@@ -143,21 +146,3 @@ def decay_share(found: Body) -> float:
     rates = biomass.rates(now.space, solved.concentrations, solved.problem.substrates, kinetics)
     decay = float((now.active * rates.remains).sum()) / (1 - kinetics.degradable_fraction)
     return decay / (float((now.active * rates.growth).sum()) + decay)
-
-
-def fall() -> float:
-    """How many times the conductivity, under constant head the velocity, falls in the 5 h up to contact."""
-    rows = series(*CLOSING)
-    return falls(rows["time_h"], rows["mean_velocity_m_per_d"], contact(), -5)
-
-
-def _reason(rows: Columns, upgradient: float) -> str:
-    film, closed, touched = contact()
-    share = rows["mean_velocity_m_per_d"] / rows["mean_velocity_m_per_d"][0]
-    tenth = float(np.interp(-0.1, -share, rows["time_h"]))
-    return ("flow and supply are restricted long before the pore is spanned: a tenth of the velocity is left at "
-            f"{tenth:.1f} h, and from then on the aggregate starves. The last film closes at {touched:.1f} h only, and "
-            f"the velocity falls in the 5 h before from {closed * fall():.3g} to {closed:.3g} m/d, of which a factor "
-            f"of {film / closed:.2g} is the film that closes at once (2.3.3): the sharp fall of C16 needs the velocity "
-            f"to be kept up. Most of the growth, but not all, is upgradient: {upgradient:.0f} %. Decay never balances "
-            "it, since (9) lets it go on in proportion to m_A as growth does: where the acceptor is used up both stop")

@@ -98,13 +98,13 @@ def downgradient_end() -> Finding:
     At one mean velocity. (12) at the end of the meshed part and of the whole pore; then C held at the pore's end at
     nothing, and at the supply: the least and the most that a next pore can offer; then the same in longer pores.
     """
-    said, *full = whole_pore()
-    central = remeshed(replace(said, numerics=scene(*BASE).numerics), *solved_pore(BASE, PLOTTED))
+    said, _, full = whole_pore()
+    _, central = remeshed(replace(said, numerics=scene(*BASE).numerics), *solved_pore(BASE, PLOTTED))
     effects = np.array([end_effect(f'pore.length="{length} um"') for length in LENGTHS])
     rate = said.flow.mean_velocity / said.substrates.acceptor.diffusivity
     decay = np.log(effects[1] / effects[2]) / (0.5 * (LENGTHS[2] - LENGTHS[1])) / rate
     checks = (at_most("uptake, (12) put at the end of the meshed part: change (%)", "not affected",
-                      apart(uptake(*central), uptake(*full)), 100 * TRANSPORT, TRANSPORT_WORDS),
+                      apart(uptake(central), uptake(full)), 100 * TRANSPORT, TRANSPORT_WORDS),
               at_most("uptake, any value held at the end of 600 um: change (%)", "not affected", effects[0],
                       100 * FEW, FEW_WORDS),
               near("its decay with the pore's length, over u_ave / D_A", "if long enough", decay, 1.0, 0.05,
@@ -114,17 +114,16 @@ def downgradient_end() -> Finding:
                    f"end: {told}. The flux that enters is u_ave W C_supply whatever happens downstream, by (11).")
 
 
-def uptake(now: Pore, solved: Solved) -> np.ndarray:
+def uptake(solved: Solved) -> np.ndarray:
     """(2,) acceptor and donor consumed, um2 mg/L/h."""
-    fluxes = transport.fluxes(solved.problem, Sink(now.active), solved.concentrations)
-    return np.array([flux.consumed for flux in fluxes])
+    return np.array([flux.consumed for flux in solved.fluxes])
 
 
 def end_effect(*changes: str) -> float:
     """Largest change (%) of the uptake with C at the pore's end held at nothing, or at the supply."""
     _, now, solved = whole_pore(*changes)
     outlet = now.space.end_nodes(now.space.dofs.outlet)
-    return max(apart(uptake(now, holding(now, solved, outlet, part)), uptake(now, solved)) for part in (0.0, 1.0))
+    return max(apart(uptake(holding(now, solved, outlet, part)), uptake(solved)) for part in (0.0, 1.0))
 
 
 def holding(now: Pore, solved: Solved, nodes: np.ndarray, part: float) -> Solved:
@@ -135,12 +134,14 @@ def holding(now: Pore, solved: Solved, nodes: np.ndarray, part: float) -> Solved
     problem = replace(problem, system=problem.system.holding(rows))
     guess = 0.5 * np.concatenate([state.acceptor, state.donor])
     guess[rows] = part * problem.supply[rows]
-    balance = transport.Balance(problem, Sink(now.active))
+    sink = Sink(now.active)
+    balance = transport.Balance(problem, sink)
     newton = Newton(transport.NEWTON, transport.ROUND_OFF, transport.MOST_ITERATIONS)
     last, _, converged = newton.solve(balance, balance.begun(guess))
     if not converged:
         raise TransportError(f"Newton's method stands at a defect of {last.defect:.2g}")
-    return replace(solved, problem=problem, concentrations=Concentrations(*last.state.reshape(2, -1)))
+    state = Concentrations(*last.state.reshape(2, -1))
+    return replace(solved, problem=problem, concentrations=state, fluxes=transport.fluxes(problem, sink, state))
 
 
 def apart(ours: np.ndarray, other: np.ndarray) -> float:

@@ -194,8 +194,7 @@ def at(run: Run, time: float) -> dict[str, float]:
 
 def nearest(run: Run, time: float) -> float:
     """The time (h) of a run's row that is the nearest to a time (h): longer steps need not land on it."""
-    hours = series(*run)["time_h"]
-    return float(hours[np.abs(hours - time).argmin()])
+    return float(min(series(*run)["time_h"], key=lambda hour: abs(hour - time)))
 
 
 @cached
