@@ -148,15 +148,13 @@ def in_one_shape(radius: float = RADIUS, supply: float = 10.0, head: float = 1e-
                    f'kinetics.maximum_utilization_rate="{9.3 * faster!r} 1/day"', *supplies))[0]
 
 
-def sherwood(found: Body) -> tuple[float, float]:
-    """Of both substrates."""
-    edges, values = found.outline.interface_edges(), []
-    length = float(found.outline.edge_lengths()[edges].sum())
-    nodes = found.grid.loop[edges]
-    for name, flux, substrate in zip(SUBSTRATES, found.solved.fluxes, found.solved.problem.both):
-        drop = substrate.supply - float(found.concentration(name)[nodes].mean())
-        values.append((flux.supplied - flux.out) / (length * drop) * found.outline.thickness / substrate.diffusivity)
-    return tuple(values)
+def sherwood(found: Body) -> np.ndarray:
+    """(2,) of both substrates."""
+    outline, edges = found.outline, found.outline.interface_edges()
+    supply, diffusivity = (np.array(pair(name, found.scene.substrates)) for name in ("supply", "diffusivity"))
+    drop = supply - [found.concentration(name)[found.grid.loop[edges]].mean() for name in SUBSTRATES]
+    taken = np.array([flux.supplied - flux.out for flux in found.solved.fluxes])
+    return taken / (outline.edge_lengths()[edges].sum() * drop) * outline.thickness / diffusivity
 
 
 def textbooks(found: Body) -> np.ndarray:

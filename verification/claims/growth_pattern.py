@@ -86,7 +86,6 @@ def asymmetry() -> Finding:
     row, after = at(BASE, END), body(BASE, END)
     before = Body(scene(*BASE), *grown(BASE, PLOTTED))
     rate = growth_rates(before)
-    theta = after.mean(after.pore.theta)
     compared = {"extent": (-row["upstream_um"], row["downstream_um"]),
                 "growth rate": made(before) / halves(before, before.areas),
                 "expansion since t = 0": halves(after, after.areas) / halves(after, after.pore.body.at.dx.sum(axis=1))}
@@ -94,8 +93,8 @@ def asymmetry() -> Finding:
                            FEW_WORDS) for name, (up, down) in compared.items())
     fastest, slowest = (f(rate[before.grid.body]) for f in (max, min))
     note = (f"Point by point, growth is {100 * (fastest / slowest - 1):.1f} % faster where it is fastest than where it "
-            f"is slowest; theta at 19.4 h lies between {theta.min():.2f} and {theta.max():.2f}; the smallest "
-            f"concentrations are {row['acceptor_min_mg_per_L']:.2f} K_sA and {row['donor_min_mg_per_L']:.2f} K_sD.")
+            f"is slowest; the smallest concentrations are {row['acceptor_min_mg_per_L']:.2f} K_sA and "
+            f"{row['donor_min_mg_per_L']:.2f} K_sD.")
     return Finding(checks, note=note)
 
 

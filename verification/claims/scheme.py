@@ -18,7 +18,7 @@ import numpy as np
 from repro.fem.mesh import POOR, POOR_ALLOWED
 from repro.march import updates
 from repro.model import biomass, contact, gear, pore
-from repro.model.kinetics import Sink
+from repro.model.kinetics import Sink, fractions
 from repro.model.pore import Pore
 from repro.model.transport import Concentrations
 from verification.claims import (
@@ -235,7 +235,7 @@ def richer_supply() -> Finding:
     checks += [at_most(f"share of the {name} consumed, 20 K_s over 10 K_s", "smaller", less, 1, "the words")
                for name, less in zip(SUBSTRATES, shares)]
     row = at(BASE, PLOTTED)
-    m_a, m_d = (row[f"{name}_min_mg_per_L"] / (1 + row[f"{name}_min_mg_per_L"]) for name in SUBSTRATES)
+    m_a, m_d = fractions(row["acceptor_min_mg_per_L"], row["donor_min_mg_per_L"], said.substrates)
     reason = (f"base is not in the zero-order range at 19.2 h (C33): m_A = {m_a:.2f} and m_D = {m_d:.2f} at its lowest "
               f"concentrations, so that uptake there stands at {100 * m_a * m_d:.0f} % of its most and can rise")
     return Finding(tuple(checks), reason=reason)
