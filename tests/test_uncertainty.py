@@ -144,7 +144,7 @@ def judged(check, value, **fields):
     return evaluate.barred(claim, Finding((check,)), at).checks[0]
 
 
-SPEED = claims.near("speed at 34.4 h (m/d)", "2.9", 2.91, 2.9, relative=0.1, why="")
+SPEED = claims.near("speed at 34.4 h (m/d)", "2.9", 2.91, 2.9, 0.29, "")
 WIDE = claims.replace(SPEED, bar=Bar(2.81, 3.11))
 
 

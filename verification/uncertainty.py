@@ -29,7 +29,7 @@ Roache's, for three and more sizes and for two.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf, nan
+from math import nan
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -117,4 +117,4 @@ def combined(value: float, mesh: Estimate | None, step: Estimate | None) -> Bar:
 
 def spread(values) -> Bar:
     """From the least to the largest of all values: for a count, or a number that has no limit."""
-    return Bar(min(values, default=inf), max(values, default=-inf))
+    return Bar(min(values), max(values))

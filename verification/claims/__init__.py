@@ -27,6 +27,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from decimal import Decimal
 from math import inf, isnan
 
 from verification import sensitivity
@@ -68,7 +69,7 @@ CONSTRUCTION = "a rule of construction"
 #: the numbers.
 SET, LATER = "2026-11-21", "2026-11-22"
 #: A value that the paper prints: 2.9, or ~60.
-PRINTED = re.compile(r"(~?)(\d+)(?:\.(\d+))?")
+PRINTED = re.compile(r"~?\d+(\.\d+)?")
 DIGITS = "half a unit of the last digit printed"
 #: The accuracy that the paper states of its own numbers. Section 4: mass balance "is generally satisfied within a few
 #: percentage points, which was deemed satisfactory considering numerical inaccuracies from time and spatial
@@ -86,16 +87,12 @@ class ClaimError(RuntimeError):
 def interval(text: str) -> tuple[float, float] | None:
     """What a printed number may stand for: 1.5 is 1.45 to 1.55. After a ~ zeros are no digits: ~60 is 55 to 65. None
     for words."""
-    found = PRINTED.fullmatch(text)
-    if not found:
+    if not PRINTED.fullmatch(text):
         return None
-    about = found[1]
-    whole = found[2]
-    parts = found[3] or ""
-    zeros = len(whole) - len(whole.rstrip("0")) if about and not parts else 0
-    half = 0.5 * 10.0 ** (zeros - len(parts))
-    value = float(f"{whole}.{parts or 0}")
-    return value - half, value + half
+    value = Decimal(text.removeprefix("~"))
+    digits = value.normalize() if text.startswith("~") else value
+    half = 0.5 * 10.0 ** int(digits.as_tuple().exponent)
+    return float(value) - half, float(value) + half
 
 
 def outcome_of(bar: tuple[float, float], bounds: tuple[float, float]) -> str:
@@ -160,24 +157,21 @@ class PaperCheck(Check):
         return HOLDS if all(self.held) else FAILS if not any(self.held) else REACHES_OVER
 
 
-Words = str | Callable[[], str]
-
-
 @dataclass(frozen=True)
 class Finding:
     """What a claim came to.
 
     change: what had to be changed against the paper, empty if nothing; reason: used only where a check fails or cannot
     be decided: why; rounding: the set of inputs within the rounding of Table 1 that gives all printed numbers of base
-    at once, empty where none was found; note: further computed numbers worth telling. Words that take runs or time of
-    their own are a function, which is called at the judged level alone.
+    at once, empty where none was found; note: further computed numbers worth telling, a function where they take runs
+    or time of their own, which is called at the judged level alone.
     """
 
     checks: tuple[PaperCheck, ...]
-    change: Words = ""
-    reason: Words = ""
-    rounding: Words = ""
-    note: Words = ""
+    change: str = ""
+    reason: str = ""
+    rounding: str = ""
+    note: str | Callable[[], str] = ""
 
     @property
     def verdict(self) -> str:
@@ -190,9 +184,8 @@ class Finding:
         return verdict_of(outcomes, bool(self.change), bool(self.rounding))
 
     def told(self) -> Finding:
-        """The same, with all words worked out."""
-        words = {name: getattr(self, name) for name in ("change", "reason", "rounding", "note")}
-        return replace(self, **{name: text() if callable(text) else text for name, text in words.items()})
+        """The same, its note worked out."""
+        return replace(self, note=self.note() if callable(self.note) else self.note)
 
     def _failed(self) -> str:
         return "; ".join(f"{c.quantity} is {c.value:.4g}, accepted {c.low:.4g} to {c.high:.4g}"
@@ -223,11 +216,6 @@ class Claim:
     def of_wide(self) -> bool:
         """Is it about wide? It is judged on the sizes for that then."""
         return self.fine == WIDE_FINE
-
-    @property
-    def command(self) -> str:
-        """What to type for it alone."""
-        return f"python -m verification.claims {self.id}"
 
     @property
     def meshes(self) -> dict[float, Level]:
@@ -262,8 +250,6 @@ CLAIMS: dict[str, Claim] = {}
 def claim(id: str, where: str, text: str, **fields):
     """Register the decorated function () -> Finding as the judge of a claim; fields: further fields of `Claim`."""
     def register(function: Callable[[], Finding]) -> Callable[[], Finding]:
-        if id in CLAIMS:
-            raise ValueError(f"{id} is registered twice: {CLAIMS[id].function.__module__}, {function.__module__}")
         CLAIMS[id] = Claim(id, where, text, function, **fields)
         return function
     return register
@@ -277,12 +263,8 @@ def printed(quantity: str, paper_text: str, ours: float, why: str = DIGITS, **mo
     return between(quantity, paper_text, ours, *found, why, date=LATER, **more)
 
 
-def near(quantity: str, paper_text: str, ours: float, target: float, *, relative: float | None = None,
-         absolute: float | None = None, why: str, **more) -> PaperCheck:
-    """A number within a relative or an absolute tolerance of its target."""
-    if (relative is None) == (absolute is None):
-        raise ValueError(f"{quantity}: a relative or an absolute tolerance is needed, one of them")
-    apart = absolute if relative is None else relative * abs(target)
+def near(quantity: str, paper_text: str, ours: float, target: float, apart: float, why: str, **more) -> PaperCheck:
+    """A number that must not be further apart from its target than a tolerance."""
     return between(quantity, paper_text, ours, target - apart, target + apart, why, **more)
 
 

@@ -32,11 +32,11 @@ def main(arguments: list[str] | None = None) -> int:
         known = f"{EXPECTED[0]} to {EXPECTED[-1]} are accepted"
         print(f"claims: there is no {', '.join(unknown)}; {known}", file=sys.stderr)
         return 2
-    rows, independence = judged(tuple(chosen.ids) or EXPECTED)
+    rows = judged(tuple(chosen.ids) or EXPECTED)
     print("\n".join([report.LEGEND, *map(report.terminal, rows)]))
     settled = all(row.verdict != NO_VERDICT for row in rows)
     if not chosen.ids:
-        checks = base_run.independence(independence)
+        checks = base_run.independence()
         print(report.terminal_independence(checks))
         settled = settled and all(check.holds for check in checks)
     print(report.summary(rows))
@@ -55,11 +55,10 @@ def recorded(rows: list[Row], anew: bool) -> bool:
     return not told
 
 
-def judged(ids: tuple[str, ...]) -> tuple[list[Row], dict[Level, list[float]]]:
-    """The rows of claims, whatever goes wrong is in them; and with all of them what base's independence rests on."""
-    besides = dict.fromkeys(base_run.LEVELS, base_run.velocities) if ids == EXPECTED else {}
-    found, independence = evaluate.everywhere([id for id in ids if id in CLAIMS], besides)
-    return [_row(id, found.get(id, {})) for id in ids], independence
+def judged(ids: tuple[str, ...]) -> list[Row]:
+    """The rows of claims, whatever goes wrong is in them."""
+    found = evaluate.everywhere(id for id in ids if id in CLAIMS)
+    return [_row(id, found.get(id, {})) for id in ids]
 
 
 def _row(id: str, found: dict[Level, Found]) -> Row:
@@ -70,10 +69,10 @@ def _row(id: str, found: dict[Level, Found]) -> Row:
         if errors := [each for each in found.values() if isinstance(each, str)]:
             raise ClaimError("; ".join(errors))
         finding = found[claim.judged][1]
-        finding = barred(claim, finding, {level: each[0] for level, each in found.items() if level != claim.judged})
+        finding = barred(claim, finding, {level: each[0] for level, each in found.items()})
         return Row(id, claim, finding, finding.verdict)
     except ClaimError as error:
-        return Row(id, claim, finding, NO_VERDICT, f"{type(error).__name__}: {error}")
+        return Row(id, claim, finding, NO_VERDICT, str(error))
 
 
 if __name__ == "__main__":

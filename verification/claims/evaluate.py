@@ -12,7 +12,6 @@ A number that is itself an error, or a difference of two runs that should be non
 from __future__ import annotations
 
 import importlib
-import os
 import pkgutil
 import re
 from collections.abc import Callable, Iterable
@@ -38,9 +37,9 @@ def numbers(finding: Finding) -> Numbers:
     return tuple((check.quantity, check.value, check.holds) for check in finding.checks)
 
 
-def barred(claim: Claim, finding: Finding, others: dict[Level, Numbers]) -> Finding:
-    """The finding with a bar on each check. Raises ClaimError where the levels do not speak of the same quantities."""
-    found = {claim.judged: numbers(finding), **others}
+def barred(claim: Claim, finding: Finding, found: dict[Level, Numbers]) -> Finding:
+    """The finding with a bar on each check, from its numbers at all levels. Raises ClaimError where these do not speak
+    of the same quantities."""
     said = {quantities(row) for row in found.values()}
     if len(said) != 1:
         raise ClaimError(f"the levels tell of different quantities: {sorted(said)}")
@@ -65,16 +64,11 @@ def _judgeable(claim: Claim, check: PaperCheck, found: dict[Level, tuple[str, fl
     values = {level: value for level, (_, value, _) in found.items()}
     own = [values[level] for level in claim.own]
     beside = [value for level, value in values.items() if level not in claim.own]
-    held: tuple[bool, ...] = ()
-    if check.converges:
-        bar = combined(check.value, _estimate(claim.meshes, values, MESH_ORDERS),
-                       _estimate(claim.stepped, values, STEP_ORDERS))
-    else:
-        bar = spread(own)
-        held = tuple(found[level][-1] for level in claim.own)
+    bar = spread(own) if not check.converges else combined(
+        check.value, _estimate(claim.meshes, values, MESH_ORDERS), _estimate(claim.stepped, values, STEP_ORDERS))
     width = check.bar or Bar(check.value, check.value)
     bar = replace(bar, low=bar.low - check.value + width.low, high=bar.high - check.value + width.high)
-    return replace(check, bar=bar, held=held, date=check.date or claim.date,
+    return replace(check, bar=bar, held=tuple(found[level][-1] for level in claim.own), date=check.date or claim.date,
                    scheme=(min(beside), max(beside)) if beside else None,
                    on_sizes=tuple(own) if claim.about == MODEL else ())
 
@@ -105,45 +99,39 @@ def import_all(package: ModuleType) -> None:
             importlib.import_module(f"{package.__name__}.{module.name}")
 
 
-def everywhere(ids: Iterable[str], besides: dict[Level, Callable] | None = None
-               ) -> tuple[dict[str, dict[Level, Found]], dict[Level, object]]:
-    """What claims come to at all of their levels, the dearest levels first, and what functions return at theirs."""
-    ids, besides = list(ids), besides or {}
-    wanted: dict[Level, list[str]] = {level: [] for level in besides}
+def everywhere(ids: Iterable[str]) -> dict[str, dict[Level, Found]]:
+    """What claims come to at all of their levels, the dearest levels first."""
+    wanted: dict[Level, list[str]] = {}
+    by_claim: dict[str, dict[Level, Found]] = {}
     for id in ids:
+        by_claim[id] = {}
         for level in CLAIMS[id].levels:
             wanted.setdefault(level, []).append(id)
     levels = sorted(wanted, key=lambda level: effort(level, wanted[level]), reverse=True)
-    found = dict(zip(levels, side_by_side(found_at, levels, [wanted[level] for level in levels],
-                                          [besides.get(level) for level in levels])))
-    by_claim: dict[str, dict[Level, Found]] = {id: {} for id in ids}
-    for level, (rows, _) in found.items():
-        for id in rows:
-            by_claim[id][level] = rows[id]
-    return by_claim, {level: found[level][1] for level in besides}
+    for level, found in zip(levels, side_by_side(found_at, levels, [wanted[level] for level in levels])):
+        for id in found:
+            by_claim[id][level] = found[id]
+    return by_claim
 
 
-def effort(level: Level, ids: Iterable[str]) -> float:
+def effort(level: Level, ids: list[str]) -> float:
     """About how long claims take at a level, in runs of wide at size 1: a run takes as long as elements go in a size,
     and something whatever the size is."""
-    ids = list(ids)
     runs = OF_BASE + any(CLAIMS[id].of_wide for id in ids) + sum(RUNS.get(id, 0) for id in ids)
     return runs * (LEAST + level.size**-2) / level.step
 
 
-def side_by_side(function: Callable, *given: list) -> list:
+def side_by_side(function: Callable, *given: Iterable) -> list:
     """map, in a process a core, each call in its turn."""
-    if not given[0]:
-        return []
-    with ProcessPoolExecutor(max_workers=os.cpu_count()) as pool:
+    with ProcessPoolExecutor() as pool:
         return list(pool.map(function, *given))
 
 
-def found_at(level: Level, ids: list[str], beside: Callable | None = None) -> tuple[dict[str, Found], object]:
-    """What some claims come to at one level, and what a function returns; its runs are forgotten afterwards."""
+def found_at(level: Level, ids: list[str]) -> dict[str, Found]:
+    """What some claims come to at one level; its runs are forgotten afterwards."""
     register_all()
     with at_level(level), np.errstate(all="raise", under="ignore"):
-        found = {id: _attempt(id, level) for id in ids}, beside and beside()
+        found = {id: _attempt(id, level) for id in ids}
     forget(level)
     return found
 

@@ -17,10 +17,9 @@ import scipy.sparse as sp
 import shapely
 from scipy.spatial import KDTree
 
-from repro.fem import elements
 from repro.fem.mesh import gradients
-from repro.fem.transfer import interpolate
 from repro.model import contact, growth
+from repro.model.traction import MPA_PER_UM
 from verification.claims import FEW, FEW_WORDS, LATER, Finding, at_least, at_most, claim
 from verification.claims.levels import ABOUT_WIDE, CONVERGED, PAIRED, Level, at_level
 from verification.claims.runs import (
@@ -38,9 +37,9 @@ from verification.claims.runs import (
     in_plane,
     polygon,
     rows_at,
-    scene,
     stress,
 )
+from verification.problems import meshes
 
 PASCAL = 1e6  # in a MPa
 #: "Small against": a tenth.
@@ -58,15 +57,13 @@ class Forces:
     """In one geometry, in Pa.
 
     head: range of the fluid's pressure over the interface; shear: largest viscous stress along it; growth: largest
-    in-plane shear stress in the aggregate; stiffness: least modulus mu_L J^(-2/3) against a further deformation;
-    pressure: largest |P|.
+    in-plane shear stress in the aggregate; stiffness: least modulus mu_L J^(-2/3) against a further deformation.
     """
 
     head: float
     shear: float
     growth: float
     stiffness: float
-    pressure: float
 
     @property
     def against_growth(self) -> float:
@@ -78,12 +75,6 @@ class Forces:
         """About the strain that the fluid would cause."""
         return (self.head + self.shear) / self.stiffness
 
-    @property
-    def told(self) -> str:
-        """In words."""
-        return (f"range of the fluid's pressure {self.head:.2g}, its shear {self.shear:.2g}, growth's shear "
-                f"{self.growth:.3g}, |P| {self.pressure:.3g}, stiffness {self.stiffness:.3g}")
-
 
 @claim("C26", "2.3.3", "fluid forces are small against the forces of growth", **ABOUT_WIDE)
 def fluid_forces() -> Finding:
@@ -94,51 +85,40 @@ def fluid_forces() -> Finding:
     stiffness tells whether the shape would change.
     """
     film, end = touching()[0], bodies(WIDE)[-1]
+    last, early = forces(end), forces(body(BASE, UPDATE))
     chosen = {"base, 19.2 h": forces(body(BASE, PLOTTED)), f"wide, {film.pore.time:.2f} h, a film left": forces(film),
-              f"wide, {end.pore.time:g} h, a plug": forces(end)}
+              f"wide, {end.pore.time:g} h, a plug": last}
     checks = [at_most(f"{name}: {what}", "neglected", value, SMALL, "small: a tenth") for name, found in chosen.items()
               for what, value in (("fluid's over growth's stress", found.against_growth),
                                   ("strain that the fluid would cause", found.strain))]
-    last = list(chosen.values())[-1]
     reason = (f"it holds in base, and in wide while a film of fluid is left; then the constant mean velocity is driven "
               f"through the plug by a head of {last.head:.3g} Pa, where growth's shear stress is {last.growth:.3g} Pa "
               f"and the stiffness has fallen as theta^(-2/3) to {last.stiffness:.3g} Pa")
-    return Finding(tuple(checks), reason=reason, note=lambda: _told(chosen))
-
-
-def _told(chosen: dict[str, Forces]) -> str:
-    early, touched = forces(body(BASE, UPDATE)), touching()[1].pore.time
-    over = next((f"from {each.pore.time:g} h on" for each in bodies(WIDE) if each.pore.time >= touched
-                 and max(forces(each).strain, forces(each).against_growth) > SMALL), "never")
-    return ("In Pa: " + "; ".join(f"{name}: {found.told}" for name, found in chosen.items())
-            + f". All of it is small against mu_L = {PASCAL * scene(*BASE).growth.shear_modulus:g} Pa. In base at "
-            f"{UPDATE} h, when growth has hardly begun, the first ratio is {early.against_growth:.2g}, but the strain "
-            f"{early.strain:.1g}. In wide, in whole hours, one of the two exceeds a tenth {over}.")
+    note = (f"In base at {UPDATE} h, when growth has hardly begun, the first ratio is {early.against_growth:.2g}, but "
+            f"the strain {early.strain:.1g}.")
+    return Finding(tuple(checks), reason=reason, note=note)
 
 
 def forces(found: Body) -> Forces:
     """Of an aggregate."""
-    head, shear = interface_forces(found.scene.flow, found)
-    modulus = found.scene.growth.shear_modulus
-    return Forces(float(np.ptp(head)), float(np.abs(shear).max()),
-                  PASCAL * modulus * float(in_plane(stress(found, modulus)).max()),
-                  PASCAL * modulus * float((found.cell("J") ** (-2 / 3)).min()),
-                  PASCAL * float(np.nanmax(np.abs(found.node("pressure_MPa")))))
+    head, shear = interface_forces(found)
+    drive, modulus = found.scene.flow, PASCAL * found.scene.growth.shear_modulus
+    weight = PASCAL * MPA_PER_UM * drive.density * drive.gravity
+    return Forces(weight * float(np.ptp(head)), weight * float(np.abs(shear).max()),
+                  modulus * float(in_plane(stress(found)).max()),
+                  modulus * float((found.mean(found.strained.J) ** (-2 / 3)).min()))
 
 
-def interface_forces(drive, found: Body) -> tuple[np.ndarray, np.ndarray]:
-    """(e,) fluid pressure rho g phi and viscous shear rho nu n.(grad u + grad u^T).s on each interface edge, Pa."""
-    density, gravity = 1e-3 * drive.density, 1e-6 / 3600**2 * drive.gravity  # kg/m3, m/s2
-    viscosity = density * 1e-12 / 3600 * drive.kinematic_viscosity  # Pa s
+def interface_forces(found: Body) -> tuple[np.ndarray, np.ndarray]:
+    """(e,) head phi and viscous shear nu / g n.(grad u + grad u^T).s on each interface edge, um of water."""
+    drive, flow = found.scene.flow, found.solved.flow
     first, last, beyond = interface(found)
-    pressure = density * gravity * 1e-2 * found.node("head_cm")
-    velocity = found.node("velocity_m_per_d")[:, :2] / 86400
-    slope = np.einsum("tai,tak->tik", velocity[beyond], 1e6 * gradients(found.grid.points, beyond))
+    slope = np.einsum("tai,tak->tik", flow.velocity[beyond], gradients(found.grid.points, beyond))
     edge = found.grid.points[last] - found.grid.points[first]
     s = edge / np.linalg.norm(edge, axis=1)[:, None]
     n = np.column_stack([s[:, 1], -s[:, 0]])
-    shear = viscosity * np.einsum("ei,eik,ek->e", n, slope + np.swapaxes(slope, 1, 2), s)
-    return 0.5 * (pressure[first] + pressure[last]), shear
+    shear = np.einsum("ei,eik,ek->e", n, slope + np.swapaxes(slope, 1, 2), s)
+    return 0.5 * (flow.head[first] + flow.head[last]), drive.kinematic_viscosity / drive.gravity * shear
 
 
 def interface(found: Body) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -171,21 +151,19 @@ def crossing() -> Finding:
 
 def inside(found: Body) -> float:
     """Flux of u_x over the part of x = 0 that is in the aggregate, in percent of u_ave W."""
-    mean, parts = found.solved.flow.mean_velocity * 24e-6, 1000
+    parts, flow = 1000, found.solved.flow
     line = shapely.LineString([(0.0, -1.0), (0.0, found.grid.width + 1.0)])
     height = shapely.intersection(polygon(found.outline), line).length
     y = (np.arange(parts) + 0.5) / parts * height
-    speed = interpolate(found.grid.points, found.triangles, found.node("velocity_m_per_d")[:, :1],
-                        np.column_stack([np.zeros(parts), y]))
-    return 100 * float(speed.mean() * height) / (mean * found.grid.width)
+    speed = meshes.field_at(found.pore.space, flow.velocity, np.column_stack([0 * y, y]))[:, 0]
+    return 100 * float(speed.mean() * height) / (flow.mean_velocity * found.grid.width)
 
 
-#: The distance over which the stress is averaged, over the pore's width; half and twice that.
-APART, OTHER = 0.1, (0.05, 0.2)
+#: The distance over which the stress is averaged, over the pore's width; and what is told besides, half and twice that.
+APART = 0.1
+DISTANCES = (0.5 * APART, APART, 2 * APART)
 #: Places at which the mean is taken, in a distance; degree of the quadrature of the stress.
 PLACES, DEGREE = 4, 8
-#: Ends of the rings, over the pore's width, between which the exponent of the stress is measured.
-RINGS = ((0.08, 0.16), (0.16, 0.32))
 #: What C46 was before.
 BEFORE = ("While a film is left the fluid changes the stress by a few percent at most, the head that drives the "
           f"constant velocity through the plug by more. Changed on {LATER} after these values had been seen: in each "
@@ -209,38 +187,23 @@ class Peak:
         return f"{self.value:.3g} mu_L at ({self.x:.0f}, {self.y:.0f}) um"
 
 
-@dataclass(frozen=True, eq=False)
-class Stress:
-    """Cauchy stress of an aggregate: points (K, 2) um, areas (K,) um2 for which they stand, values (K, 4) over mu_L."""
-
-    points: np.ndarray
-    areas: np.ndarray
-    values: np.ndarray
-
-    def within(self, distance: float, places: np.ndarray) -> np.ndarray:
-        """(p, 4) means over what of the aggregate is within a distance (um) of places (p, 2)."""
-        apart = KDTree(places).sparse_distance_matrix(KDTree(self.points), distance, output_type="coo_matrix")
-        weights = sp.csr_array((self.areas[apart.col], (apart.row, apart.col)), shape=apart.shape)
-        return (weights @ self.values) / (weights @ np.ones(len(self.points)))[:, None]
-
-
-def stress_of(found: Body) -> Stress:
-    """In quadrature points."""
-    mesh, kept = found.grid, found.pore.body
+def averaged(found: Body, distance: float, places: np.ndarray) -> np.ndarray:
+    """(p, 4) Cauchy stress over mu_L, means over what of the aggregate is within a distance (um) of places (p, 2)."""
+    kept = found.pore.body
     shape = growth.Shape(kept.shape.cells, kept.shape.corners, DEGREE)
-    position = mesh.points[mesh.body]
-    nodes = position[shape.cells]
-    pressure = found.pore.pressure[mesh.triangles[mesh.biomass]] @ shape.table.linear.T
-    values = growth.cauchy(growth.Body(shape, kept.reference).strained(position).F, pressure)
-    return Stress(np.einsum("qa,tai->tqi", shape.table.values, nodes).reshape(-1, 2),
-                  elements.weights(nodes, shape.table).ravel(), values.reshape(-1, 4))
+    finer = replace(found, pore=replace(found.pore, body=growth.Body(shape, kept.reference)))
+    where, areas = meshes.places(found.grid.points[found.triangles], shape.table)
+    apart = KDTree(places).sparse_distance_matrix(KDTree(where.reshape(-1, 2)), distance, output_type="coo_matrix")
+    weights = sp.csr_array((areas.ravel()[apart.col], (apart.row, apart.col)), shape=apart.shape)
+    means = (weights @ finer.stress.reshape(-1, 4)) / weights.sum(axis=1)[:, None]
+    return means / found.scene.growth.shear_modulus
 
 
 def peak(found: Body, part: float = APART) -> Peak:
     """Largest principal value of the stress in the mean over a part of the pore's width, and where."""
     distance = part * found.grid.width
     places = lattice(found, distance / PLACES)
-    values = growth.largest_principal(stress_of(found).within(distance, places))
+    values = growth.largest_principal(averaged(found, distance, places))
     worst = int(values.argmax())
     return Peak(float(values[worst]), *map(float, places[worst]))
 
@@ -254,59 +217,30 @@ def lattice(found: Body, spacing: float) -> np.ndarray:
     return places[shapely.intersects_xy(polygon(outline), *places.T)]
 
 
-def exponent(without: Body, forced: Body, place: np.ndarray) -> float:
-    """p of r^p, of what the fluid adds to the in-plane shear stress at the distance r from a place (2,) um."""
-    width = without.grid.width
-    sizes = [added(without, forced, place, (first * width, last * width)) for first, last in RINGS]
-    return float(np.log2(sizes[1] / sizes[0]))
-
-
-def added(without: Body, forced: Body, place: np.ndarray, ring: tuple[float, float]) -> float:
-    """Root of the mean square over a ring (um) of the in-plane shear stress that the fluid adds, over mu_L."""
-    before, after = stress_of(without), stress_of(forced)
-    distance = np.hypot(*(before.points - place).T)
-    within = (ring[0] <= distance) & (distance < ring[1])
-    xx, yy, _, xy = (after.values - before.values)[within].T
-    return float(np.sqrt(np.average(0.25 * (xx - yy) ** 2 + xy**2, weights=before.areas[within])))
-
-
 @claim("C40", "5", "detachment by fracture along the lines of maximum stress could be incorporated", date=LATER,
        **ABOUT_WIDE)
 def tearing() -> Finding:
     """Largest principal stress in the aggregate of base and wide: is there tension, where would it tear first, and
     how do size and place change with time?"""
-    courses = {run[0]: course(run) for run in (BASE, WIDE)}
-    worst = {run[0]: peak(bodies(run)[1 + courses[run[0]].index(max(courses[run[0]]))]) for run in (BASE, WIDE)}
-    checks = [at_least(f"{name}: largest principal stress over mu_L, in the mean over W / 10", "stress is computed",
-                       found.value, 0.0, "tension") for name, found in worst.items()]
-    modulus = scene(*BASE).growth.shear_modulus
-    hours = {run: max(courses[run[0]])[3] for run in (BASE, WIDE)}
-    note = (f"In base it is {worst['base'].told} and {max(courses['base'])[3]:g} h; in wide {worst['wide'].told} and "
-            f"{max(courses['wide'])[3]:g} h: there it would tear first. "
-            + " ".join(f"Over time, of triangles in {name}: {_listed(peaks[4::5], modulus)}."
-                       for name, peaks in courses.items()))
-    return Finding(tuple(checks), reason="nothing is under tension", note=lambda: f"{note} {_on_another_size(hours)}")
+    most = {run: max(bodies(run)[1:], key=tension) for run in (BASE, WIDE)}
+    base, wide = (peak(found) for found in most.values())
+    checks = [at_least(f"{run[0]}: largest principal stress over mu_L, in the mean over W / 10", "stress is computed",
+                       found.value, 0.0, "tension") for run, found in zip(most, (base, wide))]
+    early, late = (found.pore.time for found in most.values())
+    note = (f"In base it is {base.told} and {early:g} h; in wide {wide.told} and {late:g} h: there it would tear "
+            "first.")
+    return Finding(tuple(checks), reason="nothing is under tension", note=lambda: f"{note} {_on_another_size(most)}")
 
 
-def _on_another_size(hours: dict[Run, float]) -> str:
-    """Where the stress of runs at an hour is the largest, here and on the size of its figure, in words."""
-    here = [peak(body(run, hour)).x for run, hour in hours.items()]
+def _on_another_size(most: dict[Run, Body]) -> str:
+    """Where the stress of runs at their worst is the largest, here and on the size of its figure, in words."""
+    here = [peak(found).x for found in most.values()]
+    hours = [found.pore.time for found in most.values()]
     with at_level(Level(CONVERGED, PAIRED[1])):
-        there = [peak(body((*run, rows_at(hour)), hour)).x for run, hour in hours.items()]
-    told = ", ".join(f"at x = {x:.0f} and {other:.0f} um in {run[0]}" for run, x, other in zip(hours, here, there))
+        there = [peak(body((*run, rows_at(hour)), hour)).x for run, hour in zip(most, hours)]
+    told = ", ".join(f"at x = {x:.0f} and {other:.0f} um in {run[0]}" for run, x, other in zip(most, here, there))
     return ("The place is not known as well as the size: here and with the elements of its figure, "
             f"{PAIRED[1]:g} times those of the preset, it is {told}.")
-
-
-def course(run: Run) -> list[tuple[float, float, float, float]]:
-    """Largest principal stress (MPa), its place (um) and time (h) of every row but that of t = 0."""
-    return [tension(found) for found in bodies(run)[1:]]
-
-
-def _listed(peaks: list[tuple[float, float, float, float]], modulus: float) -> str:
-    """In words."""
-    return ", ".join(f"{value / modulus:.2g} mu_L at ({x:.0f}, {y:.0f}) um and {hours:g} h"
-                     for value, x, y, hours in peaks)
 
 
 @claim("C46", "5", "the stress could link fluid flow, growth and detachment: the fluid changes the stress of which the "
@@ -332,22 +266,14 @@ def changed(pair: tuple[Body, Body], part: float = APART) -> float:
 def _told_of_the_fluid(pairs: dict[str, tuple[Body, Body]]) -> str:
     peaks = "; ".join(f"{name} {peak(without).told} and {peak(forced).told}"
                       for name, (without, forced) in pairs.items())
-    others = "; ".join(f"{name} {_changes(pair)}" for name, pair in pairs.items())
-    exponents = "; ".join(f"{name} {_exponents(pair)}" for name, pair in pairs.items())
+    changes = "; ".join(f"{name} {_changes(pair)}" for name, pair in pairs.items())
     return (f"Without and with the fluid's forces: {peaks}. In the mean over W / 20, W / 10 and W / 5 it changes by, "
-            f"in percent: {others}. A largest value in a point does not exist: around a fixed point what the fluid "
-            f"adds goes as a power of the distance of {exponents} (-1 for a force in a point).")
+            f"in percent: {changes}. A largest value in a point does not exist.")
 
 
 def _changes(pair: tuple[Body, Body]) -> str:
-    """By how many percent the fluid changes the stress, in means over half of, over, and over twice the distance."""
-    return ", ".join(f"{changed(pair, part):.2g}" for part in (OTHER[0], APART, OTHER[1]))
-
-
-def _exponents(pair: tuple[Body, Body]) -> str:
-    """Around the fixed points."""
-    outline = pair[0].outline
-    return " and ".join(f"{exponent(*pair, place):.2f}" for place in outline.points[outline.fixed])
+    """By how many percent the fluid changes the stress, in means over all of DISTANCES."""
+    return ", ".join(f"{changed(pair, part):.2g}" for part in DISTANCES)
 
 
 def pressed(found: Body) -> Body:
@@ -360,7 +286,7 @@ def pressed(found: Body) -> Body:
 
 def tension(found: Body) -> tuple[float, float, float, float]:
     """Largest principal stress (MPa) of a triangle, its place (um) and time (h)."""
-    values = found.cell("largest_principal_stress_MPa")
+    values = found.mean(growth.largest_principal(found.stress))
     worst = int(values.argmax())
     x, y = found.grid.points[found.triangles[worst]].mean(axis=0)
     return float(values[worst]), float(x), float(y), round(found.pore.time, 9)

@@ -15,9 +15,9 @@ from repro.fem import elements
 from repro.fem.mesh import Mesh
 from repro.fem.outline import BOTTOM, FREE, TOP, Outline
 from repro.model import biomass
-from repro.model.pore import Pore, Solved
+from repro.model.kinetics import fractions
 from verification.claims import FEW, FEW_WORDS, LATER, Finding, at_least, at_most, between, claim, without_limit
-from verification.claims.levels import ABOUT_WIDE, BESIDE_OWN, COMPARED, TOLD, at_level
+from verification.claims.levels import ABOUT_WIDE, BESIDE_OWN, COMPARED
 from verification.claims.rheology import STRESS_FREE, conductivity_change
 from verification.claims.runs import (
     BASE,
@@ -28,20 +28,18 @@ from verification.claims.runs import (
     WIDE,
     Body,
     Run,
-    around_contact,
     at,
     bodies,
     body,
+    contact_time,
     equivalent,
     grown,
     in_plane,
     polygon,
     scene,
     series,
-    solved_pore,
     stress,
     uncovered,
-    until,
     upstream_part,
 )
 from verification.uncertainty import Bar
@@ -49,29 +47,27 @@ from verification.uncertainty import Bar
 LAST_HOURS = 5.0
 
 
-def growth_rates(now: Pore, solved: Solved) -> np.ndarray:
+def growth_rates(found: Body) -> np.ndarray:
     """(N,) (F3 + F4) / X_m, 1/h, at the mesh's nodes, zero in the fluid: how fast each place makes biomass."""
-    rates = biomass.rates(now.space, solved.concentrations, solved.problem.substrates, solved.problem.kinetics)
-    density = now.active / now.space.reaction.dx / solved.problem.kinetics.maximum_density
-    return biomass.at_nodes(now.space, density * rates.total)
+    space, problem = found.pore.space, found.solved.problem
+    rates = biomass.rates(space, found.solved.concentrations, problem.substrates, problem.kinetics)
+    density = found.pore.active / space.reaction.dx / problem.kinetics.maximum_density
+    return biomass.at_nodes(space, density * rates.total)
 
 
 @claim("C10", "4, Plate 1", "fastest growth on the upgradient side, slowest on the wall between centre and "
        "downgradient side")
 def extremes() -> Finding:
     """Places of the largest and the smallest growth rate over the aggregate's nodes; x = 0 is the seed's centre."""
-    now, solved = grown(BASE, PLOTTED)
-    rate, grid = growth_rates(now, solved), now.mesh
-    nodes = grid.body
+    found = Body(scene(*BASE), *grown(BASE, PLOTTED))
+    rate, grid = growth_rates(found), found.grid
+    nodes, last = grid.body, found.outline.downstream
     fast, slow = nodes[np.argmax(rate[nodes])], nodes[np.argmin(rate[nodes])]
-    (x_fast, y_fast), (x_slow, y_slow) = grid.points[fast], grid.points[slow]
-    first, last = now.boundary.upstream, now.boundary.downstream
+    (x_fast, _), (x_slow, y_slow) = grid.points[fast], grid.points[slow]
     checks = (at_most("x of the fastest growth (um)", "upgradient side", x_fast, 0.0, "the words"),
               between("x of the slowest growth (um)", "centre to downgradient side", x_slow, 0.0, last, "the words"),
               between("y of the slowest growth (um)", "on the wall", y_slow, 0.0, 0.0, "the words"))
-    note = (f"The aggregate reaches from {first:.1f} to {last:.1f} um; the rate is largest, {rate[fast]:.4f} 1/h, at "
-            f"({x_fast:.1f}, {y_fast:.1f}), and smallest, {rate[slow]:.4f} 1/h, at ({x_slow:.1f}, {y_slow:.1f}). "
-            "The place of an extreme is a node's: its bar is the range over the sizes and the way to the next node.")
+    note = "The place of an extreme is a node's: its bar is the range over the sizes and the way to the next node."
     widths = (nearby(grid, fast), nearby(grid, slow), 0.0)
     checks = tuple(replace(without_limit(check), bar=Bar(check.value - width, check.value + width))
                    for check, width in zip(checks, widths))
@@ -89,31 +85,28 @@ def asymmetry() -> Finding:
     """Upstream against downstream half at 19.4 h: extents, growth rates, and expansion since t = 0, in percent."""
     row, after = at(BASE, END), body(BASE, END)
     before = Body(scene(*BASE), *grown(BASE, PLOTTED))
-    rate = growth_rates(before.pore, before.solved)
-    area, grown_area = (found.areas[found.grid.biomass] for found in (before, after))
-    theta = (after.pore.theta * after.pore.body.at.dx).sum(axis=1) / after.pore.body.at.dx.sum(axis=1)
+    rate = growth_rates(before)
     compared = {"extent": (-row["upstream_um"], row["downstream_um"]),
-                "growth rate": made(before, rate) / halves(before, area),
-                "expansion since t = 0": halves(after, grown_area) / halves(after, after.pore.body.at.dx.sum(axis=1))}
+                "growth rate": made(before) / halves(before, before.areas),
+                "expansion since t = 0": halves(after, after.areas) / halves(after, after.pore.body.at.dx.sum(axis=1))}
     checks = tuple(at_most(f"{name}, upstream over downstream half (%)", "a few", 100 * abs(up / down - 1), 100 * FEW,
                            FEW_WORDS) for name, (up, down) in compared.items())
     fastest, slowest = (f(rate[before.grid.body]) for f in (max, min))
     note = (f"Point by point, growth is {100 * (fastest / slowest - 1):.1f} % faster where it is fastest than where it "
-            f"is slowest; theta at 19.4 h lies between {theta.min():.2f} and {theta.max():.2f}; the smallest "
-            f"concentrations are {row['acceptor_min_mg_per_L']:.2f} K_sA and {row['donor_min_mg_per_L']:.2f} K_sD.")
+            f"is slowest; the smallest concentrations are {row['acceptor_min_mg_per_L']:.2f} K_sA and "
+            f"{row['donor_min_mg_per_L']:.2f} K_sD.")
     return Finding(checks, note=note)
 
 
 def halves(found: Body, values: np.ndarray) -> np.ndarray:
     """(2,) sums of values (t,) of biomass triangles upstream and downstream of the centre of the seed."""
-    x = found.grid.points[found.grid.triangles[found.grid.biomass]].mean(axis=1)[:, 0]
+    x = found.grid.points[found.corners].mean(axis=1)[:, 0]
     return np.array([values[side].sum() for side in (x < 0, x > 0)])
 
 
-def made(found: Body, rate: np.ndarray) -> np.ndarray:
-    """(2,) integrals of a rate (N,) over both sides, um2/h."""
-    grid = found.grid
-    return halves(found, (found.areas * rate[grid.triangles].mean(axis=1))[grid.biomass])
+def made(found: Body) -> np.ndarray:
+    """(2,) integrals of the growth rate over both sides, um2/h."""
+    return halves(found, found.areas * growth_rates(found)[found.corners].mean(axis=1))
 
 
 @claim("C12", "4, Fig 6", "after the pore is spanned, growth is strongly asymmetric, on the upgradient side only",
@@ -121,11 +114,11 @@ def made(found: Body, rate: np.ndarray) -> np.ndarray:
 def upgradient_only() -> Finding:
     """Share of the new area, and of the biomass made, upgradient of the seed's centre, at the end of `wide`."""
     last, end = bodies(WIDE)[-1], float(bodies(WIDE)[-1].pore.time)
-    contact = float(around_contact(*WIDE)["time_h"][1])
+    contact = contact_time(*WIDE)
     spanned = next(each for each in bodies(WIDE) if each.pore.time >= contact)
     late, since = (upstream_part(polygon(first.outline), polygon(last.outline))
                    for first in (body(WIDE, end - LAST_HOURS), spanned))
-    up, down = made(last, growth_rates(*solved_pore(WIDE, end)))
+    up, down = made(last)
     bound = "95 %, set beforehand"
     checks = (at_least("new area upgradient, last 5 h (%)", "only upgradient", 100 * late, 95, bound),
               at_least(f"biomass made upgradient, rate at {end:g} h (%)", "only upgradient", 100 * up / (up + down), 95,
@@ -134,9 +127,6 @@ def upgradient_only() -> Finding:
             f"{spanned.pore.time:g} h and {end:g} h, {100 * since:.1f} % lies upgradient.")
     return Finding(checks, note=note)
 
-
-#: Every so many rows are told: 5 h.
-ROWS_TOLD = 5
 
 
 @claim("C29", "Fig 6", "the aggregate is squeezed between the walls as it grows",
@@ -148,7 +138,8 @@ def squeezed() -> Finding:
     """
     rows, width = series(*WIDE), scene(*WIDE).pore.width
     outlines, after = [found.outline for found in bodies(WIDE)], rows["contact"] == 1
-    beyond = max(max(0.0 - o.points[:, 1].min(), o.points[:, 1].max() - width) for o in outlines)
+    heights = np.concatenate([o.points[:, 1] for o in outlines])
+    beyond = max(0.0 - heights.min(), heights.max() - width)
     slender = np.array([(o.downstream - o.upstream) / o.thickness for o in outlines])
     surfaces = np.array([(contact_length(o, BOTTOM), contact_length(o, TOP)) for o in outlines])
     rates = np.diff(surfaces[after], axis=0) / np.diff(rows["time_h"][after])[:, None]
@@ -160,10 +151,7 @@ def squeezed() -> Finding:
                        np.sqrt(2 * outlines[-1].area / np.pi) / width, 1 + FEW, "more than fits, by a few percent"),
               without_limit(at_least("least rate at which a contact surface grows (um/h)", "as it grows", rates.min(),
                                      0.0, "both grow in each update")))
-    told = "; ".join(f"{time:g} h: {ratio:.2f}, {low:.0f} and {high:.0f} um" for time, ratio, (low, high) in
-                     list(zip(rows["time_h"], slender, surfaces))[::ROWS_TOLD])
-    return Finding(checks, note=f"Contact at {rows['time_h'][after][0]:g} h. Length over thickness, contact surfaces: "
-                   f"{told}.", reason="not on every mesh")
+    return Finding(checks, reason="not on every mesh")
 
 
 def contact_length(outline: Outline, wall: int) -> float:
@@ -186,10 +174,8 @@ def stays_half_disc() -> Finding:
     half = scene(*WIDE).substrates.acceptor.half_saturation
     limited = rows["time_h"][rows["acceptor_min_mg_per_L"] < half]
     centre = 0.5 * (rows["upstream_um"] + rows["downstream_um"])
-    told = ", ".join(f"{value:.2g} at {time:g} h" for time, value in list(zip(rows["time_h"], wide))[::ROWS_TOLD])
-    return Finding(checks, note=f"Base (%): {base[0]:.2g} at first, which is the polygon's own, {base[-1]:.2g} at "
-                   f"last. Wide (%): {told}. Somewhere in it C_A falls under K_s at {min(limited, default=np.inf):g} "
-                   f"h: its growth is then limited, but shows as a shift of the whole half-disc, its centre being "
+    return Finding(checks, note=f"Somewhere in wide C_A falls under K_s at {min(limited, default=np.inf):g} h: its "
+                   "growth is then limited, but shows as a shift of the whole half-disc, its centre being "
                    f"{-centre[before][-1]:.1f} um upstream at {rows['time_h'][before][-1]:g} h.",
                    reason="the deviation is not decided by these meshes")
 
@@ -251,8 +237,6 @@ def share_under(found: Body, bound: float) -> float:
     return 100 * float(found.pore.active[under].sum() / found.pore.active.sum())
 
 
-#: Base goes on past the paper's end, to see until when it is fully penetrated.
-LONGER = ("base", *until(*range(1, 23)))
 #: C >> K_s, as the zero order of section 4 needs it: uptake within a tenth of its most.
 ZERO_ORDER = 9.0
 
@@ -273,27 +257,13 @@ def penetrated() -> Finding:
                 for name in SUBSTRATES))
     reason = (f"it is fully penetrated, uptake is even; but at {lowest['acceptor']:.2g} K_s of acceptor uptake has "
               "fallen well below its most, as it must for the effluents printed, and C15 shows what that does")
-    return Finding(checks, reason=reason, note=_until_when)
-
-
-def _until_when() -> str:
-    """Penetration of the longer run, in words."""
-    with at_level(TOLD):
-        hours, acceptor = series(*LONGER)["time_h"], least(LONGER, "acceptor")
-        even = hours[[evenness(found) >= 0.9 for found in bodies(LONGER)]][-1]
-    told = ", ".join(f"{bound} K_s until {float(np.interp(-bound, -acceptor, hours)):.1f} h"
-                     for bound in (9, 6, 4, 3, 2, 1) if acceptor[-1] < bound)
-    return (f"Until when, in a run to {hours[-1]:g} h: the acceptor has at least {told}; in whole hours, uptake is "
-            f"even to a tenth until {even:g} h.")
+    return Finding(checks, reason=reason)
 
 
 def evenness(found: Body) -> float:
-    """Smallest over largest m_A m_D in the aggregate, with the K_s of base."""
-    rate = 1.0
-    for name in SUBSTRATES:
-        field = found.node(f"{name}_mg_per_L")[found.grid.body]
-        half = getattr(scene(*BASE).substrates, name).half_saturation
-        rate = rate * field / (field + half)
+    """Smallest over largest m_A m_D in the aggregate."""
+    m_a, m_d = fractions(found.concentration("acceptor"), found.concentration("donor"), found.scene.substrates)
+    rate = (m_a * m_d)[found.grid.body]
     return float(rate.min() / rate.max())
 
 
@@ -331,12 +301,12 @@ def stresses() -> Finding:
 def peaks(run: Run) -> tuple[float, float, float]:
     """Largest in-plane shear and equivalent stress over mu_L, and largest in-plane shear stress over mu_L J^(-2/3), in
     all rows of a run."""
-    modulus = scene(*run).growth.shear_modulus
     triples = []
     for each in bodies(run):
-        found = stress(each, modulus)
+        found = stress(each)
         shear = in_plane(found)
-        triples.append((shear.max(), equivalent(found).max(), (shear * each.cell("J") ** (2 / 3)).max()))
+        softened = shear * each.mean(each.strained.J) ** (2 / 3)
+        triples.append((shear.max(), equivalent(found).max(), softened.max()))
     return tuple(map(float, np.max(triples, axis=0)))
 
 

@@ -79,8 +79,6 @@ ABOUT_WIDE = {"fine": WIDE_FINE, "beside": SIZES[:2]}
 #: What is not varied.
 ALONE = (1.0,)
 DEFAULT = Level()
-#: The level of runs that are told beside a claim and not judged: base there is known to 0.1 %.
-TOLD = Level(CONVERGED)
 
 _current: ContextVar[Level] = ContextVar("level", default=DEFAULT)
 _kept: dict[Level, dict] = {}

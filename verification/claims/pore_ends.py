@@ -15,19 +15,15 @@ from dataclasses import replace
 import numpy as np
 
 from repro.errors import TransportError
-from repro.fem import mesher
-from repro.fem.mesh import Mesh, curved
+from repro.fem.mesh import Mesh
 from repro.fem.newton import Newton
-from repro.fem.outline import half_disc as seed
-from repro.fem.sizing import ACROSS_AGGREGATE
-from repro.fem.transfer import interpolate
 from repro.model import transport
 from repro.model.kinetics import Sink
 from repro.model.pore import Pore, Solved, sized
 from repro.model.transport import Concentrations
 from repro.scene import Scene
 from verification.claims import FEW, FEW_WORDS, OF_SCHEME, TRANSPORT, TRANSPORT_WORDS, Finding, at_most, claim, near
-from verification.claims.levels import ALONE, BESIDE, Level, at_level, cached
+from verification.claims.levels import ALONE, BESIDE, cached
 from verification.claims.permeability import clean
 from verification.claims.runs import (
     BASE,
@@ -35,12 +31,14 @@ from verification.claims.runs import (
     SUBSTRATES,
     flow_in,
     full_biomass,
+    half_disc,
     halved,
     remeshed,
     scene,
     solution,
     solved_pore,
 )
+from verification.problems.meshes import field_at
 
 PARTS = 64
 
@@ -70,7 +68,8 @@ def upstream_profile() -> Finding:
     for name in SUBSTRATES:
         substrate, field = getattr(said.substrates, name), getattr(solved.concentrations, name)
         across = 100 * sections(now, field, x) / substrate.supply
-        law = law_26(x, across[0].mean(), solved.flow.mean_velocity / substrate.diffusivity)
+        rate = solved.flow.mean_velocity / substrate.diffusivity
+        law = 100 - (100 - across[0].mean()) * np.exp(rate * (x - x[0]))
         bend = np.ptp(across, axis=1)
         checks += [at_most(f"{name}: error of (26) for the mean of a section (% of the supply)", "describes it",
                            np.abs(across.mean(axis=1) - law).max(), 100 * TRANSPORT, TRANSPORT_WORDS),
@@ -81,17 +80,11 @@ def upstream_profile() -> Finding:
                    "u_x bends the isolines [E4].")
 
 
-def law_26(x: np.ndarray, first: float, rate: float) -> np.ndarray:
-    """(26) at x (n,), in percent of the supply, with alpha from its value ``first`` at x[0]; rate: u_ave / D (1/um)."""
-    return 100 - (100 - first) * np.exp(rate * (x - x[0]))
-
-
 def sections(now: Pore, field: np.ndarray, x: np.ndarray) -> np.ndarray:
     """(n, PARTS) values of a nodal field at the middles of equal parts of the sections x (n,)."""
     heights = (np.arange(PARTS) + 0.5) / PARTS * now.mesh.width
     where = np.stack(np.meshgrid(x, heights, indexing="ij"), axis=-1).reshape(-1, 2)
-    nodal = now.space.to_mesh(field)[:, None]
-    return interpolate(now.mesh.points, now.mesh.cells, nodal, where).reshape(len(x), PARTS)
+    return field_at(now.space, field, where).reshape(len(x), PARTS)
 
 
 LENGTHS = (600.0, 900.0, 1200.0)
@@ -105,55 +98,50 @@ def downgradient_end() -> Finding:
     At one mean velocity. (12) at the end of the meshed part and of the whole pore; then C held at the pore's end at
     nothing, and at the supply: the least and the most that a next pore can offer; then the same in longer pores.
     """
-    said, *full = whole_pore()
-    central = remeshed(replace(said, numerics=scene(*BASE).numerics), *solved_pore(BASE, PLOTTED))
+    said, _, full = whole_pore()
+    _, central = remeshed(replace(said, numerics=scene(*BASE).numerics), *solved_pore(BASE, PLOTTED))
     effects = np.array([end_effect(f'pore.length="{length} um"') for length in LENGTHS])
     rate = said.flow.mean_velocity / said.substrates.acceptor.diffusivity
     decay = np.log(effects[1] / effects[2]) / (0.5 * (LENGTHS[2] - LENGTHS[1])) / rate
     checks = (at_most("uptake, (12) put at the end of the meshed part: change (%)", "not affected",
-                      apart(uptake(*central), uptake(*full)), 100 * TRANSPORT, TRANSPORT_WORDS),
+                      apart(uptake(central), uptake(full)), 100 * TRANSPORT, TRANSPORT_WORDS),
               at_most("uptake, any value held at the end of 600 um: change (%)", "not affected", effects[0],
                       100 * FEW, FEW_WORDS),
-              near("its decay with the pore's length, over u_ave / D_A", "if long enough", decay, 1.0, relative=0.05,
-                   why="(25): exp(-u x / D) upstream; 5 %, since the donor's part fades sooner"))
+              near("its decay with the pore's length, over u_ave / D_A", "if long enough", decay, 1.0, 0.05,
+                   "(25): exp(-u x / D) upstream; 5 %, since the donor's part fades sooner"))
     told = ", ".join(f"{effect:.2g} % at {length:g} um" for effect, length in zip(effects, LENGTHS))
     return Finding(checks, note=f"Largest change of the uptake with C held at nothing or at the supply at the pore's "
                    f"end: {told}. The flux that enters is u_ave W C_supply whatever happens downstream, by (11).")
 
 
-def uptake(now: Pore, solved: Solved) -> np.ndarray:
+def uptake(solved: Solved) -> np.ndarray:
     """(2,) acceptor and donor consumed, um2 mg/L/h."""
-    fluxes = transport.fluxes(solved.problem, Sink(now.active), solved.concentrations)
-    return np.array([flux.consumed for flux in fluxes])
+    return np.array([flux.consumed for flux in solved.fluxes])
 
 
 def end_effect(*changes: str) -> float:
     """Largest change (%) of the uptake with C at the pore's end held at nothing, or at the supply."""
     _, now, solved = whole_pore(*changes)
-    return max(apart(uptake(now, held(now, solved, part)), uptake(now, solved)) for part in (0.0, 1.0))
+    outlet = now.space.end_nodes(now.space.dofs.outlet)
+    return max(apart(uptake(holding(now, solved, outlet, part)), uptake(solved)) for part in (0.0, 1.0))
 
 
-def held(now: Pore, solved: Solved, part: float) -> Solved:
-    """Solved again with both concentrations at the outlet held at a part of their supply, instead of (12)."""
-    problem = solved.problem
-    at_the_end = np.zeros(problem.space.count, bool)
-    at_the_end[problem.space.end_nodes(problem.space.dofs.outlet)] = True
-    return holding(now, solved, at_the_end, part)
-
-
-def holding(now: Pore, solved: Solved, where: np.ndarray, part: float) -> Solved:
-    """Solved again with both concentrations held at a part of their supply where a mask (count,) says."""
+def holding(now: Pore, solved: Solved, nodes: np.ndarray, part: float) -> Solved:
+    """Solved again with both concentrations held at a part of their supply at some nodes, at the outlet instead of
+    (12)."""
     problem, state = solved.problem, solved.concentrations
-    rows = np.tile(where, 2)
+    rows = np.tile(np.isin(np.arange(problem.space.count), nodes), 2)
     problem = replace(problem, system=problem.system.holding(rows))
     guess = 0.5 * np.concatenate([state.acceptor, state.donor])
     guess[rows] = part * problem.supply[rows]
-    balance = transport.Balance(problem, Sink(now.active))
+    sink = Sink(now.active)
+    balance = transport.Balance(problem, sink)
     newton = Newton(transport.NEWTON, transport.ROUND_OFF, transport.MOST_ITERATIONS)
     last, _, converged = newton.solve(balance, balance.begun(guess))
     if not converged:
         raise TransportError(f"Newton's method stands at a defect of {last.defect:.2g}")
-    return replace(solved, problem=problem, concentrations=Concentrations(*last.state.reshape(2, -1)))
+    state = Concentrations(*last.state.reshape(2, -1))
+    return replace(solved, problem=problem, concentrations=state, fluxes=transport.fluxes(problem, sink, state))
 
 
 def apart(ours: np.ndarray, other: np.ndarray) -> float:
@@ -178,8 +166,7 @@ def truncation() -> Finding:
     return Finding(checks, reason="what is cut off matters by more than that",
                    note="Errors (%) of conductivity/acceptor effluent/donor effluent at parts of min(5 R, W): "
                    f"{told}. That is without what the elements of the clean part add to the resistance, which is no "
-                   f"truncation; with it the conductivity at min(5 R, W) differs by {_plain()} from that of the whole "
-                   "pore meshed, at the same radii. Changed on 2026-11-22 after these values had been seen: the "
+                   "truncation. Changed on 2026-11-22 after these values had been seen: the "
                    "converged solution judged, where these elements add nothing; the verdict was the same.")
 
 
@@ -190,7 +177,7 @@ def _listed(errors: np.ndarray) -> str:
 
 def _errors(said, radius: float) -> np.ndarray:
     """(parts, 3) errors in percent at each distance."""
-    meshes = nested(said, radius, reached(said, radius))
+    meshes = nested(said, radius, [part * min(5 * radius, said.pore.width) for part in REACHES])
     velocity = flow_in(said, meshes[-1]).mean_velocity
     said = replace(said, flow=replace(said.flow, head=None, mean_velocity=velocity))
     values = np.array([_numbers(said, grid) for grid in meshes])
@@ -205,47 +192,22 @@ def _numbers(said, grid: Mesh) -> list[float]:
     return [1 / (added + 1 / clean(said)), *(flux.effluent for flux in fluxes)]
 
 
-def reached(said, radius: float) -> list[float]:
-    """REACHES in um."""
-    return [part * min(5 * radius, said.pore.width) for part in REACHES]
-
-
 def emptied(grid: Mesh) -> Mesh:
     """The same mesh without biomass."""
     topology = replace(grid.topology, biomass=np.zeros(len(grid.cells), bool), loop=np.empty(0, int))
     return replace(grid, topology=topology)
 
 
-def _plain() -> str:
-    """By how many percent the conductivity itself differs, with elements of the default size and larger ones."""
-    return " and ".join(f"{', '.join(_of_conductivity(size))} % on size {size:.3g}" for size in BESIDE[:2])
-
-
-def _of_conductivity(size: float) -> list[str]:
-    """At each radius."""
-    with at_level(Level(size=size)):
-        said = scene(*BASE)
-        meshes = [nested(said, radius, reached(said, radius)) for radius in RADII]
-        ours = [flow_in(said, each[REACHES.index(1.0)]).conductivity for each in meshes]
-        whole = [flow_in(said, each[-1]).conductivity for each in meshes]
-    return [f"{100 * abs(one / other - 1):.2g}" for one, other in zip(ours, whole)]
-
-
 def nested(said, radius: float, reaches: list[float]) -> list[Mesh]:
     """Meshes around a half-disc to ascending distances (um) from it, and to the pore's ends, each part of the next."""
-    numerics = said.numerics
-    sizes = sized(said)
-    ends = [radius + reach for reach in reaches]
-    first = seed(radius, ACROSS_AGGREGATE * numerics.refinement, numerics.geometry)
-    core, outline = mesher.generate(first, (-ends[0], ends[0]), sizes, numerics.geometry)
-    meshes = [core.straight]
-    for end in (*ends[1:], said.pore.length / 2):
-        meshes.append(lengthened(meshes[-1], end, sizes.largest))
-    return meshes if numerics.geometry == 1 else [curved(each, outline.points[1::2]) for each in meshes]
+    meshes = [half_disc(said, radius, reaches[0])]
+    for end in (*(radius + reach for reach in reaches[1:]), said.pore.length / 2):
+        meshes.append(lengthened(meshes[-1], end, sized(said).largest))
+    return meshes
 
 
 def lengthened(mesh: Mesh, end: float, size: float) -> Mesh:
-    """A straight mesh with columns of triangles of a length (um) at most beyond both ends, to -end and end."""
+    """A mesh with columns of triangles of a length (um) at most beyond both ends, to -end and end."""
     for line, start in zip((mesh.topology.inlet, mesh.topology.outlet), mesh.ends):
         places = np.linspace(start, np.copysign(end, start), 1 + int(np.ceil((end - abs(start)) / size)))
         mesh = _with_columns(mesh, line, places[1:])

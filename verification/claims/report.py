@@ -98,7 +98,7 @@ def terminal(row: Row) -> str:
     is worth telling."""
     if row.claim is None:
         return f"{row.id}  {row.verdict.upper()}: {row.error}\n"
-    remarks = {"error": row.error, "command": row.claim.command}
+    remarks = {"error": row.error, "command": f"python -m verification.claims {row.id}"}
     if row.checks:
         finding = row.finding
         remarks = {"about": row.claim.about, "changed": finding.change, "because": row.reason,

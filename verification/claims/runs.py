@@ -12,9 +12,7 @@ Aggregates of a given shape, and what is solved around them.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
-import meshio
 import numpy as np
 import shapely
 
@@ -25,11 +23,12 @@ from repro.fem.outline import BOTTOM, TOP, Outline, parabola
 from repro.fem.outline import half_disc as seed
 from repro.fem.sizing import ACROSS_AGGREGATE
 from repro.fem.space import Space
-from repro.march import simulation, updates
-from repro.march.loop import Instant, Ledger, State, newton_counts
+from repro.march import loop, simulation, updates
+from repro.march.loop import Instant, State
 from repro.model import biomass, flow, pore, remeshing, transport
 from repro.model.kinetics import Sink
 from repro.model.pore import Pore, Solved, solve
+from repro.results.arrays import State as Reported
 from repro.scene import Scene, load_scene
 from verification.claims.levels import CONVERGED, cached, converged, current
 from verification.kernel.case import columns
@@ -78,11 +77,12 @@ def scene(name: str, *changes: str) -> Scene:
     level = current()
     changes = (*level.wide, *changes) if name == "wide" else changes
     if level.kind == CONVERGED:
-        return _with_rows(load_scene(name, (*converged(level.size), *changes)), always=True)
+        return _with_rows(load_scene(name, (*converged(level.size), *changes)))
     said = load_scene(name, changes)
     numerics = replace(said.numerics, refinement=said.numerics.refinement / level.size)
     growth = said.growth and replace(said.growth, time_step=round(said.growth.time_step * level.step, 12))
-    return _with_rows(replace(said, numerics=numerics, growth=growth), always=False)
+    said = replace(said, numerics=numerics, growth=growth)
+    return _with_rows(said) if name == "wide" else said
 
 
 def ending(said: Scene, *times: float) -> Scene:
@@ -90,9 +90,9 @@ def ending(said: Scene, *times: float) -> Scene:
     return replace(said, growth=replace(said.growth, end=times[-1]), output=replace(said.output, times=times))
 
 
-def _with_rows(said: Scene, always: bool) -> Scene:
-    """The scene with its rows, where it names none and cannot have one a step."""
-    if said.growth is None or said.output.times or not (always or said.name == "wide"):
+def _with_rows(said: Scene) -> Scene:
+    """The scene with its rows, where it grows and names none."""
+    if said.growth is None or said.output.times:
         return said
     times = tuple(time for time in ROWS[said.name] if time <= said.growth.end + 1e-9)
     return replace(said, output=replace(said.output, times=times))
@@ -100,14 +100,13 @@ def _with_rows(said: Scene, always: bool) -> Scene:
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """A run. instants: those of its rows; ledgers: of all its steps; contact: the last instant before it touches the
-    opposite wall and the first after, None where it does not; far: the last state that is not NEAR that wall."""
+    """A run. instants: those of its rows; contact: the last instant before it touches the opposite wall and the first
+    after, None where it does not; far: the last state that is not NEAR that wall."""
 
     scene: Scene
     instants: tuple[Instant, ...]
-    ledgers: tuple[Ledger, ...]
     contact: tuple[Instant, Instant] | None
-    far: State | None = None
+    far: State | None
 
 
 @cached
@@ -117,18 +116,16 @@ def history(*run: str) -> History:
     said = scene(*run)
     plain = tuple(change for change in run if not change.startswith(LATE))
     instants: list[Instant] = []
-    ledgers: list[Ledger] = []
     contact = None
     begun = before = far = None if plain == run else history(*plain).far
     for state, instant in simulation.steps(said, begun):
         if instant:
             instants.append(instant)
-            ledgers += instant.ledgers
         if contact is None and before is not None and state.pore.contact:
             contact = tuple(_solved(said, each) for each in (_with_a_film(said, before, state), state))
         before = state
         far = state if state.pore.boundary.thickness <= NEAR * said.pore.width else far
-    return History(said, tuple(instants), tuple(ledgers), contact, far)
+    return History(said, tuple(instants), contact, far)
 
 
 def _with_a_film(said: Scene, before: State, contact: State) -> State:
@@ -143,8 +140,7 @@ def _with_a_film(said: Scene, before: State, contact: State) -> State:
 def _solved(said: Scene, state: State) -> Instant:
     """A state as the instant of a row."""
     found = pore.solve(said, state.pore)
-    now = replace(state.pore, concentrations=found.concentrations)
-    return Instant(now, found, None, state.ledgers, state.remeshes, newton_counts(found))
+    return loop.instant(state, replace(state.pore, concentrations=found.concentrations), found, None)
 
 
 @cached
@@ -163,11 +159,16 @@ def around_contact(*run: str) -> Columns:
     return columns([results.row(found.scene, each) for each in found.contact])
 
 
+def contact_time(*run: str) -> float:
+    """When (h) a run touches the opposite wall."""
+    return float(around_contact(*run)["time_h"][1])
+
+
 @cached
 def ledger(*run: str) -> Columns:
     """Columns of ``ledger.csv``, of all steps."""
     found = history(*run)
-    steps = np.array([results.ledger_row(found.scene, step) for step in found.ledgers])
+    steps = np.array([results.ledger_row(found.scene, step) for each in found.instants for step in each.ledgers])
     return dict(zip(results.LEDGER_COLUMNS, steps.T))
 
 
@@ -193,8 +194,7 @@ def at(run: Run, time: float) -> dict[str, float]:
 
 def nearest(run: Run, time: float) -> float:
     """The time (h) of a run's row that is the nearest to a time (h): longer steps need not land on it."""
-    hours = series(*run)["time_h"]
-    return float(hours[np.abs(hours - time).argmin()])
+    return float(min(series(*run)["time_h"], key=lambda hour: abs(hour - time)))
 
 
 @cached
@@ -220,18 +220,8 @@ def _grown(said: Scene, now: Pore, solved: Solved) -> tuple[Pore, Solved]:
 PER_ARC = 8
 
 
-@dataclass(frozen=True, eq=False)
-class Body:
-    """The aggregate of a pore, and the fields that a run would save of it."""
-
-    scene: Scene
-    pore: Pore
-    solved: Solved
-
-    @cached_property
-    def fields(self) -> meshio.Mesh:
-        """As saved."""
-        return results.fields(self.scene, self.pore, self.solved)
+class Body(Reported):
+    """The aggregate of a pore, with its strains and stresses as a run reports them."""
 
     @property
     def grid(self) -> Mesh:
@@ -248,18 +238,19 @@ class Body:
         """(t, 3 or 6) of the biomass."""
         return self.grid.cells[self.grid.biomass]
 
-    @cached_property
+    @property
+    def corners(self) -> np.ndarray:
+        """(t, 3) of the biomass."""
+        return self.grid.triangles[self.grid.biomass]
+
+    @property
     def areas(self) -> np.ndarray:
-        """(T,) um2, of curved triangles too."""
-        return self.pore.space.at.dx.sum(axis=1)
+        """(t,) um2 of the biomass triangles, of curved ones too."""
+        return self.pore.space.at.dx[self.grid.biomass].sum(axis=1)
 
-    def cell(self, name: str) -> np.ndarray:
-        """(t,) values of cell data on the biomass triangles."""
-        return self.fields.cell_data[name][0][self.grid.biomass]
-
-    def node(self, name: str) -> np.ndarray:
-        """(N,) or (N, 3) values of point data."""
-        return self.fields.point_data[name]
+    def concentration(self, name: str) -> np.ndarray:
+        """(N,) mg/L of a substrate."""
+        return self.pore.space.to_mesh(getattr(self.solved.concentrations, name))
 
 
 def body_of(said: Scene, found: Instant) -> Body:
@@ -288,12 +279,6 @@ def polygon(outline: Outline) -> shapely.Polygon:
     return shapely.Polygon(np.einsum("qa,eai->eqi", parabola(t), outline.arcs(outline.points)).reshape(-1, 2))
 
 
-def interface_length(found: Body) -> float:
-    """Length (um) of the line between fluid and aggregate."""
-    outline = found.outline
-    return float(outline.edge_lengths()[outline.interface_edges()].sum())
-
-
 def solved_pore(run: Run, time: float) -> tuple[Pore, Solved]:
     """The pore of a run at a time (h) and what is solved in it."""
     found = instant(run, time)
@@ -306,9 +291,10 @@ def remeshed(chosen: Scene, now: Pore, solved: Solved) -> tuple[Pore, Solved]:
     return new, solve(chosen, new)
 
 
-def stress(found: Body, modulus: float) -> np.ndarray:
-    """(t, 4) Cauchy stress over mu_L (MPa) on the biomass triangles: xx, yy, zz, xy."""
-    return np.stack([found.cell(f"stress_{part}_MPa") for part in ("xx", "yy", "zz", "xy")], axis=1) / modulus
+def stress(found: Body) -> np.ndarray:
+    """(t, 4) Cauchy stress over mu_L, the mean over each triangle: xx, yy, zz, xy."""
+    means = [found.mean(part) for part in np.moveaxis(found.stress, -1, 0)]
+    return np.stack(means, axis=1) / found.scene.growth.shear_modulus
 
 
 def in_plane(stresses: np.ndarray) -> np.ndarray:
@@ -352,21 +338,20 @@ def full_biomass(scene, grid: Mesh) -> np.ndarray:
     return active
 
 
-def half_disc(scene, radius: float, reach: float | None) -> Mesh:
-    """The mesh around a half-disc, to the distance ``reach`` (um) on both sides; None: over the whole pore."""
-    end = scene.pore.length / 2 if reach is None else min(radius + reach, scene.pore.length / 2)
+def half_disc(scene, radius: float, reach: float) -> Mesh:
+    """The mesh around a half-disc, to the distance ``reach`` (um) on both sides, or to the pore's ends."""
+    end = min(radius + reach, scene.pore.length / 2)
     numerics = scene.numerics
     outline = seed(radius, ACROSS_AGGREGATE * numerics.refinement, numerics.geometry)
     return mesher.generate(outline, (-end, end), pore.sized(scene), numerics.geometry)[0]
 
 
-def plug(scene, *x: float) -> Mesh:
-    """Biomass over the whole width from the first to the last of some x (um), each of them a node on both walls, meshed
-    to 1.5 W on both sides."""
+def plug(scene, first: float, last: float) -> Mesh:
+    """Biomass over the whole width between two x (um), meshed to 1.5 W on both sides."""
     width = scene.pore.width
-    points = np.array([*((each, 0.0) for each in x), *((each, width) for each in reversed(x))])
-    outline = Outline(points, np.repeat([BOTTOM, TOP], len(x)), np.zeros(len(points), bool), points)
-    return mesher.generate(outline, (x[0] - 1.5 * width, x[-1] + 1.5 * width), pore.sized(scene))[0]
+    points = np.array([(first, 0.0), (last, 0.0), (last, width), (first, width)])
+    outline = Outline(points, np.repeat([BOTTOM, TOP], 2), np.zeros(4, bool), points)
+    return mesher.generate(outline, (first - 1.5 * width, last + 1.5 * width), pore.sized(scene))[0]
 
 
 def halved(lattice: np.ndarray, falling=False) -> np.ndarray:
