@@ -10,6 +10,7 @@ import pytest
 from verification import speed, throughput
 from verification.bench import __main__ as bench
 from verification.bench import record, runs, told
+from verification.problems import runs as problems
 
 
 def point(seconds, error, **more):
@@ -110,7 +111,7 @@ def test_each_verdict_follows_from_what_was_measured(parts, claim, holds, measur
 def test_errors_are_relative_but_effluents_over_the_supply():
     truth = np.array([[2.0, 80.0, 1000.0, 30.0, -30.0, 30.0, 4.0, 6.0]])
     found = truth + np.array([[0.02, 0, 0, 0, -0.6, 0, 0.5, 0]])
-    assert runs.apart(found, truth)[0] == pytest.approx([0.01, 0, 0, 0, 0.02, 0, 0.05, 0])
+    assert problems.errors(found, truth)[0] == pytest.approx([0.01, 0, 0, 0, 0.02, 0, 0.05, 0])
 
 
 @pytest.mark.parametrize("name", bench.PARTS)

@@ -7,7 +7,6 @@ import gc
 import tracemalloc
 from dataclasses import replace
 from functools import partial
-from operator import itemgetter
 from time import perf_counter
 
 import numpy as np
@@ -17,7 +16,6 @@ from reference import whole_run
 from repro import timing
 from repro.march.simulation import simulate
 from repro.model import pore
-from repro.results import row
 from repro.scene import Scene, load_scene
 from verification.bench import record
 from verification.bench.record import clock, measured
@@ -26,8 +24,6 @@ from verification.problems import runs as problems
 
 BASE_REPEATS = 3
 TIMES = (19.2, 19.4)
-COLUMNS = """mean_velocity_m_per_d conductivity_m_per_d aggregate_area_um2 thickness_um upstream_um downstream_um
-effluent_acceptor_mg_per_L effluent_donor_mg_per_L""".split()
 #: Rings and steps of the reference, extrapolated; those of a check, finer in space and with other steps.
 REFERENCE, CHECK = ((8, 12), (8, 16)), ((10, 15), (10, 16))
 FAST, ACCURATE = "preset fast", "preset accurate"
@@ -74,7 +70,7 @@ def base_part(quick: bool) -> dict:
     ``quick``: to 2 h, against the finest of its own runs.
     """
     times = (1.8, 2.0) if quick else TIMES
-    about = {"reference_values": values(times, *OF_ACCURATE).tolist()} if quick else reference()
+    about = {"reference_values": problems.values(times, *OF_ACCURATE).tolist()} if quick else reference()
     repeats = 1 if quick else BASE_REPEATS
     lines = measured(jobs(np.array(about["reference_values"]), times, quick), repeats)
     found = {"title": f"Base to {times[1]:g} h, nothing written", "repeats": repeats, "lines": lines,
@@ -89,9 +85,10 @@ def jobs(truth: np.ndarray, times, quick: bool) -> dict:
     for method, (label, *keys), sizes, changes in METHODS_OF_BASE:
         for size in sizes[:2] if quick else sizes:
             sized = map(str.format, keys, size)
-            found[method, label.format(*size)] = partial(_judged, truth, values, times, *changes, *sized)
+            found[method, label.format(*size)] = partial(_judged, truth, problems.values, times, *changes, *sized)
     for preset in PRESETS:
-        found[preset, "as it is"] = partial(_judged, truth, values, times, f"numerics.preset={preset.split()[1]}")
+        found[preset, "as it is"] = partial(_judged, truth, problems.values, times,
+                                            f"numerics.preset={preset.split()[1]}")
     for rings, steps in () if quick else SKFEM:
         found["scikit-fem: quadratic elements, Runge-Kutta", f"{rings} rings, {steps} steps"] = partial(
             _judged, truth, whole_run.numbers, whole_run.Pore(), rings, steps, times)
@@ -100,22 +97,8 @@ def jobs(truth: np.ndarray, times, quick: bool) -> dict:
 
 def _judged(truth: np.ndarray, function, *given) -> dict:
     """The errors of the rows that ``function(*given)`` finds: the largest, and those of each number."""
-    errors = apart(function(*given), truth).max(axis=0).tolist()
-    return {"error": max(errors), "errors": errors}
-
-
-def values(times, *overrides: str) -> np.ndarray:
-    """(times, 8) of COLUMNS of the table that a run of base writes, at some times (h), the last of them its end."""
-    scene = load_scene("base", [*overrides, *until(*times)])
-    rows = [row(scene, instant) for instant in simulate(scene)]
-    return np.array([itemgetter(*COLUMNS)(each) for each in rows[-len(times):]])
-
-
-def apart(found, truth) -> np.ndarray:
-    """(times, 8) errors: relative, effluents over the supply."""
-    scale = np.abs(truth).copy()
-    scale[:, 6:] = whole_run.Pore().supply
-    return np.abs(found - truth) / scale
+    each = problems.errors(function(*given), truth).max(axis=0).tolist()
+    return {"error": max(each), "errors": each}
 
 
 def reference() -> dict:
@@ -127,7 +110,7 @@ def reference() -> dict:
     return {
         "reference": f"scikit-fem's quadratic elements in moving coordinates, Runge-Kutta in time, extrapolated from "
                      f"{CHECK[0]} rings and {CHECK[1]} steps; from {REFERENCE[0]} and {REFERENCE[1]} they differ by "
-                     f"{apart(found, check).max():.1e}",
+                     f"{problems.errors(found, check).max():.1e}",
         "reference_times": list(TIMES), "reference_values": check.tolist()}
 
 
