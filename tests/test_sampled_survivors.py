@@ -248,7 +248,7 @@ def test_rows_within_steps_are_counted_as_parts_of_steps(count):
                                 "output.times=[" + ", ".join(f'"{time} h"' for time in times) + "]"])
     assert rows_within(scene) == {*times[1:]}
     free, touching = cost.steps(scene)
-    parts = cost.REMESHING * (free + cost.IN_CONTACT * touching + cost.ROW * count)
+    parts = 1.5 * (free + 15 * touching + 0.5 * count)
     found = cost.expected(scene, cost.Trial(None, 5.0, 2.0, 1000), 4000)
     assert found.seconds == pytest.approx((5.0 + 2.0 * parts) * 4**1.2, rel=1e-12)
 
