@@ -113,7 +113,8 @@ def test_what_is_round_off_or_another_machines_is_not_committed():
     assert "FALLS SHORT" in text and "| quantity A (2) | at most 1 | theory | NO |" in text
     assert "seconds" not in text and "1.0 s" not in text
     sizes = {path.name: path.stat().st_size for path in writing.REPORT.glob("*.md")}
-    assert {*sizes} == {"REPORT.md", "mutants.md", "matrix.md", "sampled.md", *(f"{s}.md" for s in case.STAGES)}
+    assert {*sizes} == {"REPORT.md", "mutants.md", "mutants_read.md", "matrix.md", "sampled.md",
+                        *(f"{s}.md" for s in case.STAGES)}
     assert sizes.pop("REPORT.md") <= 60_000 and max(sizes.values()) <= 40_000
 
 

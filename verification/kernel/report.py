@@ -1,13 +1,14 @@
 """The report: a table for the terminal, and Markdown for the diff.
 
-What is committed (``REPORT.md``, a page a stage, ``mutants.md``, ``matrix.md``) holds verdicts, orders and accepted
-ranges, and numbers to half of their tolerance: a run on another machine writes the same files. Digits and times are in
-``live/``, which is not committed.
+What is committed (``REPORT.md``, a page a stage, ``mutants.md``, ``mutants_read.md``, ``matrix.md``) holds verdicts,
+orders and accepted ranges, and numbers to half of their tolerance: a run on another machine writes the same files.
+Digits and times are in ``live/``, which is not committed.
 """
 
 from __future__ import annotations
 
 import platform
+from collections.abc import Iterable, Mapping
 from importlib.metadata import version
 from itertools import chain, groupby
 from os.path import commonprefix
@@ -15,6 +16,7 @@ from pathlib import Path
 
 from verification.kernel import matrix, mutants
 from verification.kernel.case import CASES, WAYS, Outcome, Result
+from verification.kernel.mutants import Mutant
 from verification.kernel.writing import REPORT, Block, link, markdown, save, table
 
 TITLES = {"flow": "Flow (2.1, 3.2)", "transport": "Substrates (2.2, 3.3)", "growth": "Growth mechanics (2.3, 3.4)",
@@ -25,6 +27,7 @@ INTRODUCTION = (
     "or with what must be conserved. Verdicts follow from the numbers; orders are judged two-sidedly, between "
     "neighbours of a series of unrelated meshes. Each case names changes of the code (mutants) with which it must fall "
     "short; `make mutants` runs each of these until a case catches it, and those that tests must catch against these.")
+OF_READERS = "Mutants of what users read"
 PACKAGES = ("numpy", "scipy", "scikit-fem", "shapely", "mmgpy", "fipy", "py-pde", "matplotlib")
 
 
@@ -56,7 +59,10 @@ def write(results: list[Result]) -> Path:
 
 def texts(results: list[Result]) -> dict[str, str]:
     """What is committed: {file: Markdown}."""
-    found = {"REPORT.md": ("Verification", index(results)), "mutants.md": ("Mutants", mutant_blocks())}
+    of_stages = mutants.load()
+    read = {"results": of_stages.pop("results")}
+    found = {"REPORT.md": ("Verification", index(results)), "mutants.md": ("Mutants", mutant_blocks(of_stages)),
+             "mutants_read.md": (OF_READERS, mutant_blocks(read))}
     for stage, title in TITLES.items():
         chosen = of_stage(stage, results)
         found[f"{stage}.md"] = title, [Block("text", summary(chosen)), *chain.from_iterable(map(article, chosen))]
@@ -81,6 +87,7 @@ def index(results: list[Result]) -> list[Block]:
     """The first page: stages, and a line a case."""
     stages = [(link(title, stage), summary(of_stage(stage, results))) for stage, title in TITLES.items()]
     more = ((link("Mutants", "mutants"), mutant_state()),
+            (link(OF_READERS, "mutants_read"), "those of them that tests must catch"),
             (link("Equation, module, case, reference, mutant, claim", "matrix"), "what is verified by what, with which "
              "elements and presets"))
     return [Block("text", f"{INTRODUCTION} Written by `make verify`."), Block("text", f"**{summary(results)}**"),
@@ -157,11 +164,11 @@ def mutant_state() -> str:
     return f"{count} by `make mutants`, {'run on this code' if fresh else 'run BEFORE THE LAST CHANGE of the code'}."
 
 
-def mutant_blocks() -> list[Block]:
-    """All mutants, a table a stage, with the cases or tests that caught them in the last whole hunt."""
+def mutant_blocks(of_stages: Mapping[str, Iterable[Mutant]]) -> list[Block]:
+    """Mutants, a table a stage, with the cases or tests that caught them in the last whole hunt."""
     caught, _ = mutants.recorded()
     blocks = [Block("text", mutant_state())]
-    for stage, chosen in mutants.load().items():
+    for stage, chosen in of_stages.items():
         rows = [(mutant.id, mutant.says, ", ".join(caught.get(mutant.id, [])) or "not caught") for mutant in chosen]
         blocks += [Block("heading", stage), table(("mutant", "what is wrong with it", "caught by"), rows)]
     return blocks
