@@ -90,11 +90,11 @@ def departures(found: list[Sample], expected: Callable[[Sample], np.ndarray]) ->
 def mean_of_runs(found: list[Sample], but: Growth | None = None) -> np.ndarray:
     """(m, l) geometric mean of r at the areas PLUGS over the runs that reach them, one of them left out."""
     curves = []
-    for run in {one.run: None for one in found if one.run not in (None, but)}:
+    for run in dict.fromkeys(one.run for one in found if one.run not in (None, but)):
         made = [one for one in found if one.run == run]
         place = np.log([one.share for one in made])
-        curves.append([np.interp(np.log(PLUGS), place, column, np.nan, np.nan)
-                       for column in np.log([one.lengths for one in made]).T])
+        columns = np.log([one.lengths for one in made]).T
+        curves.append([np.interp(np.log(PLUGS), place, column, np.nan, np.nan) for column in columns])
     return np.exp(np.nanmean(curves, axis=0)).T
 
 

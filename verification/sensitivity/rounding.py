@@ -324,7 +324,9 @@ def program(start: np.ndarray, slopes: np.ndarray, bars: np.ndarray) -> tuple[np
     intervals, less the bars, are out of reach."""
     rounding = np.array([each.rounding for each in ROUNDED])
     aimed = np.minimum(HALF - KEPT_INSIDE * bars, AIMED * HALF)
-    given, none, ones = (slopes * rounding, MIDDLE - start), 0 * HALF, np.ones(len(rounding))
+    given = slopes * rounding, MIDDLE - start
+    none = 0 * HALF
+    ones = np.ones(len(rounding))
     best = _solved(*given, aimed, none, 0 * ones, ones)
     share = best[-1] if best is not None else np.inf
     if share > 1:
