@@ -35,7 +35,7 @@ from verification.claims import (
     after_contact,
 )
 from verification.claims import report as claims_record
-from verification.kernel.writing import markdown_row
+from verification.evidence.writing import markdown_row
 from verification.sensitivity.wide import LEFT_OUT, verdicts
 
 HERE = Path(__file__).parent

@@ -12,7 +12,7 @@ from verification import hard, hard_cases, speed
 from verification.hard import common
 from verification.hard.common import PRESETS, REFUSED, RIGHT, WRONG, HardCase
 from verification.kernel import case
-from verification.kernel.case import Outcome, Result, at_most
+from verification.evidence.checks import Outcome, Result, at_most
 
 GOOD, BAD = at_most("good", 0.5, 1.0, ""), at_most("bad", 2.0, 1.0, "")
 KNOWN = {case.number: case for case in hard.CASES}

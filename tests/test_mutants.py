@@ -5,7 +5,7 @@ import ast
 import pytest
 
 from verification.kernel import case, driver, mutants, report, trying
-from verification.kernel.case import Outcome, Result, at_most
+from verification.evidence.checks import Outcome, Result, at_most
 from verification.kernel.mutants import Hunt, Trial
 
 driver.load()

@@ -11,7 +11,7 @@ import pytest
 from repro.fem.space import Space
 from repro.scene.keys import PRESETS
 from verification.kernel import case, driver, matrix, report, writing
-from verification.kernel.case import Outcome, Result, at_least, at_most, between, refine, study
+from verification.evidence.checks import Outcome, Result, at_least, at_most, between, refine, study
 
 SIZES = 0.5 ** np.arange(4)
 #: A case that nobody registers: what it measures, and of which variants.

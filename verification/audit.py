@@ -25,8 +25,8 @@ from verification import switches
 from verification.bench.record import machine
 from verification.claims import runs
 from verification.claims.runs import BASE, PLATES, UPDATE
-from verification.kernel.case import columns
-from verification.kernel.writing import Block, plain, save, table
+from verification.evidence.checks import columns
+from verification.evidence.writing import Block, plain, save, table
 from verification.switches import CHOICES, PLOTTED, Course, Switch, state
 
 RECORD = Path(__file__).parent / "report" / "audit.json"

@@ -14,7 +14,7 @@ from pathlib import Path
 from verification import audit, hard_cases
 from verification.bench import runs, told
 from verification.bench.record import points
-from verification.kernel.writing import Block, load, markdown, table
+from verification.evidence.writing import Block, load, markdown, table
 
 FOLDER = Path(__file__).parent / "report"
 ROOT = Path(__file__).parents[1]

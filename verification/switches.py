@@ -24,7 +24,7 @@ from repro.scene import Scene
 from verification.claims import runs
 from verification.claims.levels import CONVERGED, FINE, Level, at_level, cached, forget
 from verification.claims.runs import BASE, LAST, PLOTTED, UPDATE, Body, Columns, Run
-from verification.kernel.case import columns
+from verification.evidence.checks import columns
 from verification.problems import aggregates
 from verification.problems.channels import pair
 from verification.problems.runs import next_shape, shape_of

@@ -9,7 +9,7 @@ import argparse
 from importlib import import_module
 
 from verification.bench import record, told
-from verification.kernel.writing import plain, save
+from verification.evidence.writing import plain, save
 
 #: Modules of the parts; that of other codes is imported for its own alone.
 PARTS = {"box": "users", "channel": "users", "base": "runs", "size": "runs", "scenes": "runs", "memory": "runs"}

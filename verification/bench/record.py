@@ -39,7 +39,7 @@ from time import perf_counter, process_time
 
 import numpy as np
 
-from verification.kernel import writing
+from verification.evidence import writing
 
 FOLDER = Path(__file__).parents[1] / "report"
 FILE = FOLDER / "bench.json"

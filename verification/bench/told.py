@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 
 from verification.bench import runs
 from verification.bench.record import envelope, points, reading
-from verification.kernel.writing import Block, table
+from verification.evidence.writing import Block, table
 
 #: (error, least ratio, aim) of the paper's scheme at its own best speed over a preset.
 FASTER = {runs.FAST: (0.01, 5.0, 10.0), runs.ACCURATE: (0.001, 20.0, 20.0)}

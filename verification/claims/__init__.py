@@ -42,7 +42,7 @@ from verification.claims.levels import (
     WIDE_FINE,
     Level,
 )
-from verification.kernel.case import Check
+from verification.evidence.checks import Check
 from verification.uncertainty import Bar
 
 #: The rows that must be judged.

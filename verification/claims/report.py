@@ -35,7 +35,7 @@ from verification.claims import (
     verdict_of,
 )
 from verification.claims.evaluate import unnumbered
-from verification.kernel.writing import load
+from verification.evidence.writing import load
 
 LEGEND = ("paper: as printed. ours: the converged solution, or the scheme where the claim is about that. numerics: the "
           "error bar; inputs: where the number goes as the inputs of Table 1 move within their rounding; scheme of "

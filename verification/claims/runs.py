@@ -31,7 +31,7 @@ from repro.model.pore import Pore, Solved, solve
 from repro.results.arrays import State as Reported
 from repro.scene import Scene, load_scene
 from verification.claims.levels import CONVERGED, cached, converged, current
-from verification.kernel.case import columns
+from verification.evidence.checks import columns
 
 #: A packaged scene and its changes, KEY=VALUE; and columns of rows, by name.
 Run = tuple[str, ...]

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from inspect import cleandoc
 
 from verification.claims.runs import BASE, at
-from verification.kernel import writing
+from verification.evidence import writing
 from verification.switches import PLOTTED
 
 SUPPLY = 10.0

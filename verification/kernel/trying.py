@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from verification.kernel.writing import ROOT, lines
+from verification.evidence.writing import ROOT, lines
 
 TRACER = Path(__file__).parent / "tracer"
 NOT_COPIED = (".git", ".venv", "__pycache__", "live", "out", "cache", "dist", "build", "*.egg-info", ".*_cache")

@@ -17,7 +17,7 @@ from scipy.interpolate import PchipInterpolator
 
 from repro.results import read_table
 from repro.results.network import added_resistance, known
-from verification.kernel.writing import markdown, table
+from verification.evidence.writing import markdown, table
 from verification.network import shapes
 from verification.network.shapes import RATIOS, Growth, Sample
 

@@ -13,7 +13,7 @@ from repro.march import updates
 from repro.model import contact, pore, remeshing
 from repro.model.pore import Pore
 from repro.scene import load_scene
-from verification.kernel.case import combined
+from verification.evidence.cases import combined
 from verification.problems import channels, meshes, pairs, runs
 
 WIDTH = 50.0

@@ -20,7 +20,8 @@ from repro.fem.outline import FREE, Outline
 from repro.fem.space import Space
 from repro.model import growth, pore
 from repro.model.contact import constrained
-from verification.kernel.case import combined, largest
+from verification.evidence.cases import combined
+from verification.evidence.checks import largest
 from verification.problems import meshes
 
 #: Radius of the half-discs (um), and the factor by which theta is raised at a time.

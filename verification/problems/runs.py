@@ -16,7 +16,7 @@ from repro.march.simulation import simulate
 from repro.model import contact, pore
 from repro.model.pore import Pore, Solved
 from repro.scene import Kinetics, Scene, Substrates, load_scene
-from verification.kernel.case import columns
+from verification.evidence.checks import columns
 from verification.problems import channels, meshes
 
 ROUND_OFF = "round-off"

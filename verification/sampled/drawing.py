@@ -21,7 +21,7 @@ from itertools import islice
 from operator import itemgetter
 from typing import Any
 
-from verification.kernel.writing import ROOT
+from verification.evidence.writing import ROOT
 from verification.sampled.reach import digest
 
 SEED = 2001

@@ -18,9 +18,9 @@ from importlib.util import cache_from_source
 from itertools import accumulate, chain
 from pathlib import Path
 
-from verification.kernel import writing
+from verification.evidence import writing
+from verification.evidence.writing import REPORT, Block, append, lines, markdown, table
 from verification.kernel.trying import ENDED, Ran, copied, run
-from verification.kernel.writing import REPORT, Block, append, lines, markdown, table
 from verification.sampled.drawing import SEED, Mutant, mutated, sources
 from verification.sampled.reach import LIVE, Measured, Reach, digest
 

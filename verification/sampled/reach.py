@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
 
+from verification.evidence.writing import REPORT, ROOT, append, lines
 from verification.kernel.trying import Ran, copied, run
-from verification.kernel.writing import REPORT, ROOT, append, lines
 
 LIVE = REPORT / "live"
 MAP = LIVE / "sampled-reach.jsonl"

@@ -18,7 +18,7 @@ from functools import cache
 from itertools import product
 from pathlib import Path
 
-from verification.kernel.writing import load
+from verification.evidence.writing import load
 
 RECORD = Path(__file__).parent / "sensitivity.json"
 

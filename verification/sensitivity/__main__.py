@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from repro.results import write_json, write_text
 from verification import sensitivity
 from verification.claims import interval
-from verification.kernel.writing import Block, markdown, table
+from verification.evidence.writing import Block, markdown, table
 from verification.sensitivity import rounding, wide
 from verification.sensitivity.rounding import INPUTS, ROUNDED, Input, Runs, scene
 

@@ -51,7 +51,7 @@ from verification.claims.base_run import DISTANCES, END, upstream_means
 from verification.claims.evaluate import MESH_ORDERS
 from verification.claims.levels import converged
 from verification.claims.runs import ending
-from verification.kernel.writing import append, lines
+from verification.evidence.writing import append, lines
 from verification.uncertainty import estimate
 
 

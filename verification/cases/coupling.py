@@ -1,0 +1,487 @@
+"""Smaller models that the whole one must become: no growth, no biomass, no viscosity jump, no stiffness.
+
+Growth where nothing is scarce: the area follows (9)-(10), integrated by hand.
+
+What must not matter at all: units, left and right, and, where the theory is reversible, the flow's direction.
+
+What must not matter much: the time step, storage of the substrates, the part of the pore that is meshed.
+
+The midpoint rule and the presets: order in time, the limit of the paper's updates, an independent solver.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from unittest import mock
+
+import numpy as np
+import pytest
+
+from reference import poiseuille, whole_run
+from repro.fem import linear
+from repro.fem.outline import FREE
+from repro.fem.space import Space
+from repro.march import midpoint
+from repro.march.loop import Instant
+from repro.march.simulation import shaped, simulate
+from repro.model import flow, pore
+from repro.scene import Scene, load_scene
+from verification.evidence.cases import parametrize
+from verification.evidence.checks import at_least, at_most, each_at_most, refine, study
+from verification.problems import meshes, runs
+from verification.problems.channels import NAMES, both
+
+
+@pytest.mark.case(
+    "coupling-no-growth", kind="property",
+    claim="Biomass that neither takes up nor decays leaves the pore fixed, and C the supply",
+    norm="t = 0 against 1 h: arrays of geometry, flow and C that differ in any bit; largest |X_A / X_m - 1|",
+    mutants=("increase-not-taken",), runs_with="paper")
+@parametrize("*changes", runs.EVERY)
+def test_no_growth(changes, record):
+    scene = runs.base("1 h", 'kinetics.decay_coefficient="0 1/d"', 'kinetics.maximum_utilization_rate="0 1/d"',
+                      *changes)
+    first, last = list(simulate(scene))
+    pairs = [(one.pore.mesh.points, one.pore.theta, one.pore.inert, one.solved.flow.velocity, one.solved.flow.head,
+              one.solved.concentrations.acceptor, one.solved.concentrations.donor) for one in (first, last)]
+    moved = sum(not np.array_equal(a, b) for a, b in zip(*pairs))
+    record(at_most("arrays moved", moved, 0.0, "nothing acts on them: bit for bit"),
+           at_most("X_A", runs.density_drift(scene, last), 1e-14, "(34) multiplies and divides by the same areas"),
+           at_most("C over the supply, less 1", _lack(last), *(EVEN if scene.numerics.order == 1 else UNEVEN)))
+
+
+def _lack(instant: Instant) -> float:
+    """Largest |C / supply - 1|."""
+    return np.abs(both(instant.solved.concentrations) / 10.0 - 1).max()
+
+
+def _poiseuille(scene: Scene) -> float:
+    """Mean velocity (um/h) of the clean channel under the scene's head."""
+    viscosity = scene.flow.kinematic_viscosity / scene.flow.gravity
+    return scene.flow.head / poiseuille.head_loss(scene.pore.length, scene.pore.width, 1.0, viscosity)
+
+
+#: How far C may be from the supply. w is divergence-free for the very functions that carry C where these are linear;
+#: Taylor-Hood's u is so for functions of one order less, and jumps of viscosity bend it.
+EVEN = 1e-12, runs.ROUND_OFF
+UNEVEN = 1e-4, "div u is zero against functions of one order less than C's: error in space"
+
+
+REFINEMENTS = (1.0, 1.4, 2.0, 2.8)
+#: Of linear elements in a clean channel, and of the others.
+LAYER = "first order: the stabilisation spoils one layer of elements at both ends of the mesh"
+PARABOLA = "elements hold the parabola: round-off"
+
+
+@pytest.mark.case(
+    "coupling-clean-channel", kind="exact",
+    claim="A scene without an aggregate is a clean channel: Poiseuille's flow under the head, and C the supply "
+          "everywhere",
+    norm="refinement 1 to 2.8: mean velocity under the head relative to Poiseuille's; largest |C / supply - 1|",
+    mutants=("extent-not-subtracted", "head-on-the-mesh-alone"), references=("poiseuille",), runs_with="paper")
+@parametrize("*changes", runs.every(0.3))
+def test_clean_channel(changes, record):
+    """The order of linear elements; what the others hold."""
+    if load_scene("base", changes).numerics.order > 1:
+        error, lack = _clean(*changes)
+        record(at_most("mean velocity", error, 1e-9, PARABOLA))
+    else:
+        errors, lacks = zip(*(_clean(*changes, f"numerics.refinement={refinement}") for refinement in REFINEMENTS))
+        lack = max(lacks)
+        record(study("mean velocity", 1 / np.array(REFINEMENTS), errors, 1, LAYER, ceiling=2e-3))
+    record(at_most("C", lack, 1e-12, runs.ROUND_OFF))
+
+
+def _clean(*changes: str) -> tuple[float, float]:
+    """Relative error of the mean velocity; largest |C / supply - 1|."""
+    scene = load_scene("base", changes)
+    now = next(simulate(replace(scene, aggregate=None, kinetics=None, growth=None)))
+    return abs(now.solved.flow.mean_velocity / _poiseuille(scene) - 1), _lack(now)
+
+
+@pytest.mark.case(
+    "coupling-equal-viscosities", kind="property",
+    claim="An aggregate as thin as water, growing, is hydraulically an empty channel",
+    norm="relative difference of the mean velocity from Poiseuille's, and of u from that in an empty channel on the "
+         "same mesh; base from 25 um, 1 h, lambda = 1",
+    mutants=("tau-jumps", "stale-flow", "extent-not-subtracted"), references=("poiseuille",), runs_with="paper")
+@parametrize("*changes", runs.EVERY)
+def test_equal_viscosities(changes, record):
+    scene = runs.base("1 h", 'aggregate.radius="25 um"', "flow.viscosity_ratio=1.0", *changes)
+    first, last = list(simulate(scene))
+    grid, found = last.pore.mesh, last.solved.flow
+    bare = replace(grid, topology=replace(grid.topology, biomass=np.zeros_like(grid.biomass)))
+    empty = flow.unit_flow(Space(bare, last.pore.space.order), 7.0)
+    record(at_most("u", np.abs(found.velocity / found.mean_velocity - empty.velocity).max(), 1e-13,
+                   runs.ROUND_OFF),
+           at_most("mean velocity", abs(found.mean_velocity / _poiseuille(scene) - 1), 5e-3,
+                   "linear elements: first order in the mesh, 0.3 % as in coupling-clean-channel"),
+           at_least("growth of the area", last.pore.outline.area / first.pore.outline.area, 1.1,
+                    "else nothing is tested"))
+
+
+@pytest.mark.case(
+    "coupling-stiffness", kind="property",
+    claim="mu_L does not matter without tractions: 0.001 or 10 MPa make the same aggregate",
+    norm="largest difference of any node's place (um) at 1 h",
+    mutants=("modulus-in-the-shape",), runs_with="paper")
+@parametrize("*changes", runs.EVERY)
+def test_stiffness(changes, record):
+    soft, stiff = (runs.last(runs.base("1 h", f'growth.shear_modulus="{value} MPa"', *changes)).pore
+                   for value in (0.001, 10))
+    seed = pore.seeded(runs.base("1 h", *changes)).outline.area
+    record(at_most("places", np.abs(soft.mesh.points - stiff.mesh.points).max(), 0.0,
+                   "it is nowhere in the equations without tractions"),
+           at_least("growth of the area", soft.outline.area / seed, 1.1, "else nothing is tested"))
+
+
+EVERY_HOUR = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+OF_UPDATES = 1e-8, "J = theta to the stabilisation, and C to 1e-8 of the supply: D is a million times D_A"
+OF_LONG_STEPS = 1e-6, "J = theta, and C to 1e-7 of the supply"
+#: Changes of a scene, by label, whose steps are those of a preset.
+LONG = {**{kind: (runs.by("fast"), runs.of(kind), runs.coarser(kind, 0.2)) for kind in runs.ELEMENTS},
+        **{preset: (runs.by(preset),) for preset in runs.QUADRATIC[1:]}}
+
+
+def uniform_growth(hours: tuple[float, ...], most: float, why: str, *changes: str):
+    """Checks of a run to the last of some hours, with rows at these."""
+    scene = runs.supplied_everywhere(runs.base(f"{hours[-1]} h", *changes, times=hours))
+    seed, instants = pore.seeded(scene).outline, runs.ours(scene)
+    expected = seed.area * np.array([runs.mass_after(scene, hour) for hour in hours])
+    sizes = {"area": [instant.pore.outline.area for instant in instants],
+             "mass": [instant.pore.mass / scene.kinetics.maximum_density for instant in instants]}
+    yield each_at_most({name: np.abs(size / expected - 1).max() for name, size in sizes.items()}, most, why)
+    yield at_most("outline", _unround(instants[-1], expected[-1]), *_roundness(scene, seed))
+    yield at_least("remeshes", sum(i.remeshes for i in instants), 1.0, "else that is not tested")
+
+
+@pytest.mark.case(
+    "coupling-uniform-growth", kind="exact",
+    claim="Where diffusion holds the supply everywhere the aggregate stays a half-disc of exactly exp-growing mass, "
+          "through a remesh",
+    norm="largest relative error of area and mass, every hour to 6 h; largest deviation of the outline from a "
+         "half-disc",
+    mutants=("growth-three-percent-low", "euler-biomass", "inert-not-in-the-area", "theta-anew-at-a-remesh",
+             "geometry-of-the-step-before"),
+    runs_with="paper")
+@parametrize(
+    "hours, most, why, *changes",
+    {kind: (EVERY_HOUR, *OF_UPDATES, *changes) for kind, changes in runs.every(0.3).items()})
+def test_uniform_growth(hours, most, why, changes, record):
+    record(uniform_growth(hours, most, why, *changes))
+
+
+@pytest.mark.case(
+    "coupling-curved-uniform-growth", kind="exact",
+    claim="Where diffusion holds the supply everywhere the midpoint rule keeps a half-disc of exactly exp-growing "
+          "mass through remeshes, in few long steps",
+    norm="relative error of area and mass; largest deviation of the outline from a half-disc",
+    mutants=("theta-power", "curved-mass-lost", "curved-half-of-the-half"), runs_with="fast",
+    omitted="paper: coupling-uniform-growth")
+@parametrize("hours, most, why, *changes", {kind: ((9.0,), *OF_LONG_STEPS, *changes) for kind, changes in LONG.items()})
+def test_curved_uniform_growth(hours, most, why, changes, record):
+    record(uniform_growth(hours, most, why, *changes))
+
+
+def _roundness(scene, seed) -> tuple[float, str]:
+    """How far the outline may be from a half-disc, and why."""
+    if seed.geometry == 2:
+        return 1e-4, "arcs that are parabolas: (edge / R)^4 / 100"
+    chord = 1 - np.sqrt(2 * seed.area / np.pi) / scene.aggregate.radius
+    return 1.5 * chord + 1e-3, "polygon for arc, and linear elements"
+
+
+def _unround(instant, area: float) -> float:
+    """Largest deviation of the interface's nodes from the half-disc of an area, over its radius."""
+    outline = instant.pore.outline
+    radius = np.hypot(*outline.points[outline.wall == FREE].T)
+    return np.abs(radius / np.sqrt(2 * area / np.pi) - 1).max()
+
+
+#: Of the length in the unit of each number.
+POWERS = {"area": 2, "upstream tip": 1, "conductivity": 1}
+
+
+@pytest.mark.case(
+    "coupling-units", kind="property",
+    claim="A pore eight times larger or smaller, with transport to match, grows alike to the last bits: nothing has a "
+          "scale of its own",
+    norm="relative difference at 2 h",
+    mutants=("length-scale",), runs_with="paper")
+@parametrize("*changes", runs.EVERY)
+def test_units(changes, record):
+    scene = runs.base("2 h", *changes)
+    own = runs.numbers(runs.last(scene))
+    for factor in (8.0, 0.125):
+        other = runs.numbers(runs.last(runs.scaled(scene, factor, 1.0)))
+        apart = {name: abs(other[name] / value / factor ** POWERS[name] - 1) for name, value in own.items()}
+        record(each_at_most(apart, 1e-14, "powers of two are exact: even the mesher does the same",
+                            f", lengths times {factor:g}"))
+
+
+#: Base to 1 h in other units.
+FOREIGN = ('pore.width="0.05 mm"', 'pore.length="0.06 cm"', 'aggregate.radius="5e-6 m"', 'flow.head="1e-5 m"',
+           'substrates.acceptor.supply="10 g/m^3"', 'substrates.donor.supply="0.01 g/L"',
+           'substrates.acceptor.diffusivity="232 mm^2/day"', 'flow.gravity="981 cm/s^2"',
+           'flow.kinematic_viscosity="1.003e-6 m^2/s"', 'kinetics.maximum_density="30 g/L"',
+           'growth.time_step="720 s"', 'growth.shear_modulus="10 kPa"')
+
+
+@pytest.mark.case(
+    "coupling-foreign-units", kind="property",
+    claim="A scene written in other units is the same scene, bit for bit",
+    norm="largest difference of any node's place (um), and of C, at 1 h",
+    mutants=("rounded-twice",), runs_with="1 2")
+@parametrize("*changes", runs.WITH_EXACT)
+def test_foreign_units(changes, record):
+    ours, theirs = (runs.last(runs.base(end, *changes, *units)) for end, units in (("1 h", ()), ("60 min", FOREIGN)))
+    pairs = {"places": (ours.pore.mesh.points, theirs.pore.mesh.points),
+             "C_A": (ours.solved.concentrations.acceptor, theirs.solved.concentrations.acceptor)}
+    apart = {name: np.abs(a - b).max() for name, (a, b) in pairs.items()}
+    record(each_at_most(apart, 0.0, "the same numbers after reading"))
+
+
+@pytest.mark.case(
+    "coupling-mirror", kind="property",
+    claim="Without flow an aggregate grows alike to both sides",
+    norm="difference of the tips' distances from the origin, and of C_A left and right, relative",
+    mutants=("one-supply-held", "fixed-beside-the-middle"), runs_with="paper")
+@parametrize("*changes", runs.every(0.5))
+def test_mirror(changes, record):
+    last = runs.last(runs.without_flow(runs.base("8 h", *changes)))
+    outline, space = last.pore.outline, last.pore.space
+    tips = abs(outline.downstream + outline.upstream) / outline.downstream
+    x = np.linspace(1.0, 70.0, 70)
+    sides = [meshes.field_at(space, last.solved.concentrations.acceptor, np.column_stack([s * x, 0.3 + 0 * x]))
+             for s in (-1, 1)]
+    record(at_most("tips", tips, 3e-6, "unsymmetric mesh: the error of C_A, of which growth feels a tenth"),
+           at_most("C_A", np.abs(np.subtract(*sides)).max() / 10.0, 1e-4, "unsymmetric mesh: error in space"),
+           at_least("it has grown (area over the seed's)", outline.area / 39.27, 2.0, "else nothing is tested"))
+
+
+@pytest.mark.case(
+    "coupling-reversed", kind="property",
+    claim="Flow from the other side meets the same resistance (Stokes flow is reversible) and, where uptake is of "
+          "first order, loses as much of its substrate (reciprocity of (7), (11) and (12))",
+    norm="relative difference between a lopsided aggregate and its mirror image, refinement 2, t = 0",
+    mutants=("inlet-held",), runs_with="paper")
+@parametrize("*changes", runs.every(0.6, 2.0))
+def test_reversed(changes, record):
+    ours, theirs = (_lopsided(sign, *changes) for sign in (1.0, -1.0))
+    apart = {name: abs(ours[name] / theirs[name] - 1) for name in ours}
+    record(at_most("conductivity", apart["conductivity"], 3e-4, ERROR),
+           at_most("effluent", apart["effluent"], 3e-4, ERROR),
+           at_least("C at the inlet, which no theorem makes equal", apart["inlet"], 3e-3,
+                    "else the aggregate is not lopsided"))
+
+
+ERROR = "error in space: linear elements 9e-4, 2e-4, 6e-5 at refinement 1, 1.4, 2"
+
+
+#: Uptake of the donor alone, 0.5/h C_D / (1 mg/L).
+FIRST_ORDER = ('substrates.acceptor.half_saturation="1e-9 mg/L"', 'substrates.donor.half_saturation="1e9 mg/L"',
+               'kinetics.maximum_utilization_rate="5e8 1/h"', 'kinetics.decay_coefficient="0 1/d"',
+               "kinetics.acceptor_to_donor_ratio=1e-12")
+
+
+def _lopsided(sign: float, *changes: str) -> dict[str, float]:
+    """Conductivity, and C at the outlet and the inlet, with FIRST_ORDER."""
+    scene = load_scene("base", (*changes, *FIRST_ORDER))
+    scene = shaped(scene, _outline(sign, 80 * scene.numerics.geometry))
+    solved = pore.solve(scene, pore.seeded(scene))
+    donor = solved.fluxes[1]
+    return {"conductivity": solved.flow.conductivity, "effluent": donor.effluent, "inlet": donor.inlet}
+
+
+def _outline(sign: float, edges: int) -> np.ndarray:
+    """(edges + 1, 2): 24 um (1 + 0.35 cos a - 0.15 cos 2a), or its image in x -> -x for sign = -1."""
+    angle = np.linspace(np.pi, 0.0, edges + 1)
+    radius = 24.0 * (1 + 0.35 * sign * np.cos(angle) - 0.15 * np.cos(2 * angle))
+    return runs.standing(radius * np.cos(angle), radius * np.sin(angle))
+
+#: Shape updates (h).
+STEPS = (0.8, 0.4, 0.2, 0.1)
+
+
+SLOWER = (16.0, 8.0, 4.0, 2.0)
+
+
+@pytest.mark.case(
+    "coupling-quasi-steady", kind="property",
+    claim="The paper's transient scheme and quasi-steady substrates make the same aggregate, up to the substrates' "
+          "lag, which is as their storage",
+    norm="relative difference at 0.6 h, and that of C_A at the nodes over the supply; base from 25 um at 2.9 m/d, "
+         "with D, u and X_m over 16 to 2: steady states and growth stay, substrates are 16 to 2 times slower",
+    mutants=("rates-two-percent-low",), runs_with="paper",
+    omitted="fast, accurate, exact: the transient scheme goes with updates")
+@parametrize("*changes", runs.kinds(0.4))
+def test_quasi_steady(changes, record):
+    errors = refine(_lag, SLOWER, *changes)
+    record([study(name, SLOWER, values, 1, "lag: first order in storage over reaction, 2e-4 for base", ceiling=3e-6,
+                  band=0.15) for name, values in errors.items()])
+
+
+def _lag(factor: float, *changes: str) -> dict[str, float]:
+    """How far the quasi-steady run is from the transient one, substrates being ``factor`` times slower than growth."""
+    ours, theirs = (runs.last(_slower(factor, name, *changes)) for name in ("quasi_steady", "gear"))
+    one, other = runs.numbers(ours), runs.numbers(theirs)
+    apart = ours.solved.concentrations.acceptor - theirs.solved.concentrations.acceptor
+    return {**{name: abs(one[name] / other[name] - 1) for name in one}, "C_A": np.abs(apart).max() / 10.0}
+
+
+def _slower(factor: float, transport: str, *changes: str):
+    scene = runs.base("0.6 h", 'aggregate.radius="25 um"', f'numerics.transport="{transport}"',
+                      f'kinetics.maximum_density="{30 / factor} g/L"', *changes)
+    scene = runs.with_diffusivities(scene, lambda water, biomass: (water / factor, biomass / factor))
+    return runs.at_velocity(scene, runs.SPEED / factor)
+
+
+@pytest.mark.slow
+@pytest.mark.case(
+    "coupling-extent", kind="property",
+    claim="The central mesh with (6) and (26) beyond it is worth the whole pore",
+    norm="t = 0, refinement 2 (linear) and 0.6: conductivity and effluents relative; section means of C along the "
+         "central mesh, over the supply",
+    mutants=("extent-not-subtracted", "inlet-held", "head-on-the-mesh-alone"), runs_with="paper")
+@parametrize("*changes", {f"R = {radius}, {label}": (f'aggregate.radius="{radius}"', *changes)
+                          for radius, labelled in (("5 um", runs.kinds(0.6, 2.0)), ("25 um", runs.every(0.6, 2.0)))
+                          for label, changes in labelled.items()})
+def test_extent(changes, record):
+    (central, near), (full, far) = (_solved(f'numerics.extent="{name}"', *changes) for name in ("central", "full"))
+    for name, bound in BOUNDS.items():
+        record(at_most(name, abs(central[name] / full[name] - 1), *bound))
+    record(at_most("C", np.abs(near - far).max() / 10.0, *APART.get(changes[1:], (4e-4, IN_SPACE))))
+
+
+IN_SPACE = "error in space, 0.1 % at refinement 1, a quarter of that here"
+#: How far section means of C may be apart on the coarser mesh of a preset.
+APART = {(runs.by("fast"),): (2.5e-3, "error in space: a quarter of the 1 % that the preset stands for")}
+BOUNDS = {"conductivity": (1e-3, "of first order in the mesh: 0.17 % in a clean channel at this refinement, most of "
+                           "which both meshes have in common"),
+          "effluent acceptor": (4e-4, IN_SPACE), "effluent donor": (4e-4, IN_SPACE)}
+
+
+def _solved(*changes: str):
+    """Conductivity and effluents of base at t = 0, and the section means along its central mesh."""
+    scene = load_scene("base", changes)
+    now = pore.seeded(scene)
+    solved = pore.solve(scene, now)
+    reach = min(10 * scene.aggregate.radius, 1.5 * scene.pore.width) + scene.aggregate.radius
+    x = np.linspace(-reach, reach, runs.PLACES)
+    leaving = {f"effluent {name}": flux.effluent for name, flux in zip(NAMES, solved.fluxes)}
+    return {"conductivity": solved.flow.conductivity, **leaving}, runs.section_means(now, solved, x)
+
+
+RULE_STEPS = (1, 2, 4, 8, 16)
+
+
+def _equal_steps(scene, steps: int) -> np.ndarray:
+    """Area and upstream tip after 2 h in equal steps, on one mesh."""
+    now = pore.seeded(scene)
+    for _ in range(steps):
+        solved = pore.solve(scene, now)
+        now = replace(now, concentrations=solved.concentrations)
+        step = midpoint.attempt(scene, now, solved, 2.0 / steps).step
+        if step.remeshed:
+            raise RuntimeError("a new mesh: the error in space would not be common")
+        now = step.pore
+    return np.array([now.outline.area, now.outline.upstream])
+
+
+@pytest.mark.case(
+    "coupling-midpoint-order", kind="property",
+    claim="The midpoint rule is of second order in time, with every kind of elements",
+    norm="relative difference between a run and that with half the step; base from a seed of 25 um, 2 h, no remesh",
+    mutants=("curved-rates-of-the-start", "midpoint-rates-of-the-start"), runs_with="fast",
+    omitted="paper: coupling-midpoint-limit; accurate, exact: equal steps know no tolerance: those of fast")
+@pytest.mark.parametrize("elements", runs.ELEMENTS)
+def test_midpoint_order(elements, record):
+    scene = load_scene("base", (runs.by("fast"), runs.of(elements), "numerics.refinement=0.5",
+                                'aggregate.radius="25 um"'))
+    values = np.array([_equal_steps(scene, steps) for steps in RULE_STEPS])
+    apart = np.abs(np.diff(values, axis=0) / values[-1])
+    record([study(name, 2 / np.array(RULE_STEPS[:-1]), column, 2, "midpoint rule", ceiling=2e-5, band=0.15)
+            for name, column in zip(("area", "upstream tip"), apart.T)])
+
+
+@pytest.mark.slow
+@pytest.mark.case(
+    "coupling-midpoint-limit", kind="property",
+    claim="With short steps the paper's shape updates and the midpoint rule come to the same, on the same triangles: "
+          "the loop of updates is of first order in the step, as the geometry is frozen within it and the rates are "
+          "not",
+    norm="relative difference at 3.2 h from a seed of 25 um, base, no remesh",
+    mutants=("midpoint-rates-of-the-start", "rates-at-the-start", "stale-flow"), runs_with="paper",
+    omitted="fast, accurate, exact: coupling-midpoint-order; their own tolerances would be seen")
+@parametrize("*changes", runs.kinds(0.3, 0.6))
+def test_midpoint_limit(changes, record):
+    """Remeshes, and the orders."""
+    short = ('numerics.time="midpoint"', "numerics.tolerance=0.00003")
+    found = [runs.last(runs.base("3.2 h", 'aggregate.radius="25 um"', *changes, *how))
+             for how in (short, *((f'growth.time_step="{step} h"',) for step in STEPS))]
+    record(at_most("remeshes, all runs", sum(instant.remeshes for instant in found), 0.0,
+                   "one mesh: the error in space is common"))
+    exact, *rows = map(runs.numbers, found)
+    for name, value in exact.items():
+        record(study(name, STEPS, [abs(row[name] / value - 1) for row in rows], 1, "frozen geometry: first order",
+                     ceiling=2e-3, band=0.15))
+
+
+TIMES = (19.2, 19.4)
+
+
+@cache
+def _reference():
+    """The independent solver's numbers of base at TIMES, (2, 8), and the largest estimate of their error."""
+    found = whole_run.converged(whole_run.Pore(), TIMES, rings=(6, 8), steps=(8, 16))
+    return found.values, runs.errors(found.values + np.abs(found.space) + np.abs(found.time), found.values).max()
+
+
+@pytest.mark.slow
+@pytest.mark.case(
+    "coupling-presets", kind="cross-code",
+    claim="Each of the eight numbers of base is within 1 % with preset fast, within 0.1 % with accurate, with "
+          "quadratic and with cubic velocities and concentrations, and within 0.01 % with exact",
+    norm="largest difference at 19.2 and 19.4 h to an independent solver, extrapolated in space and time: relative, "
+         "of effluents over the supply",
+    mutants=("curved-rates-of-the-start", "fluid-diffusivity", "uptake-without-decay", "cubic-shown-less",
+             "exact-steps-of-accurate"),
+    references=("whole_run",), runs_with="2", omitted="paper, order 1: its error is that of linear elements, see bench")
+@parametrize(
+    "bound, preset, *changes",
+    {"fast": (1e-2, "fast"), "accurate": (1e-3, "accurate"),
+     "accurate, cubic": (1e-3, "accurate", runs.of("cubic")), "exact": (1e-4, "exact")})
+def test_presets(bound, preset, changes, record):
+    """Checks of the eight numbers, and of the reference."""
+    theirs, error = _reference()
+    record(at_most("the reference itself", error, 5e-5, "half of what is asked of exact"))
+    ours = runs.values(TIMES, runs.by(preset), *changes)
+    for name, errors in zip(whole_run.NAMES, runs.errors(ours, theirs).T):
+        record(at_most(name, errors.max(), bound, "what the preset is for"))
+
+
+@pytest.mark.case(
+    "coupling-jacobian-reused", kind="property",
+    claim="Newton's methods that use a derivative again come to the same with fewer factorisations",
+    norm="relative difference of the area, the tips and the conductivity at 2 h; factorisations over those of fresh "
+         "derivatives; base from a seed of 25 um",
+    mutants=("newton-never-reused",))
+@parametrize("*changes", {**{f"{kind}, fast": (runs.by("fast"), runs.of(kind)) for kind in runs.ELEMENTS},
+                          "linear, paper": (runs.by("paper"),), "quadratic, accurate": (runs.by("accurate"),),
+                          "quadratic, exact": (runs.by("exact"),)})
+def test_jacobian_reused(changes, record):
+    (fresh, made), (again, fewer) = (_factorisations(kind, *changes) for kind in ("fresh", "reused"))
+    record(at_most("difference", np.abs(again / fresh - 1).max(), 1e-8,
+                   "Newton's tolerances, 1e-10 and less, times the steps"),
+           at_most("factorisations", fewer / made, 0.8, "one in three of Newton's is saved"))
+
+
+def _factorisations(kind: str, *changes: str) -> tuple[np.ndarray, int]:
+    """Area, tips and conductivity at 2 h, and how many matrices were factorised on the way."""
+    scene = runs.base("2 h", *changes, f'numerics.jacobian="{kind}"', 'aggregate.radius="25 um"',
+                      'growth.time_step="1 h"')
+    with mock.patch.object(linear, "factorised", wraps=linear.factorised) as factorised:
+        last = runs.last(scene)
+    shape, flow = last.pore.outline, last.solved.flow
+    return np.array([shape.area, shape.upstream, shape.downstream, flow.conductivity]), factorised.call_count

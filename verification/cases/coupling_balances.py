@@ -1,0 +1,337 @@
+"""What a whole run conserves: substrates, biomass, the yield that links them, and X_m times the area.
+
+What every single step must balance, all at once, and how right the amounts are that balance.
+
+Two balances may close on wrong amounts, as both do when a step's ledger takes the flows of its start: the third one,
+of what is made against what is taken up, and a run with shorter steps see that.
+
+A short piece of a run through contact with the opposite wall, and a wedge that closes (2.3.3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from repro.fem.outline import BOTTOM, FREE, TOP
+from repro.march.loop import Instant, Ledger
+from repro.march.simulation import simulate
+from repro.model import pore, remeshing
+from repro.scene import Scene, load_scene
+from verification.evidence.cases import parametrize
+from verification.evidence.checks import Check, Study, at_least, at_most, between, study
+from verification.problems import aggregates, runs
+
+#: Steps twice as long as the paper's.
+LONG = 'growth.time_step="24 min"'
+
+
+@pytest.mark.case(
+    "coupling-ledger", kind="property",
+    claim="Over a whole run with its remeshes substrates and biomass are accounted for to round-off, and the area is "
+          "the biomass over X_m",
+    norm="base to 19.4 h in steps of 24 min: worst step of both substrates' balances and of the biomass', relative; "
+         "X_m times the area over the biomass; largest deviation of the density from X_m",
+    mutants=("theta-anew-at-a-remesh", "biomass-interpolated-at-a-remesh", "growth-spread-evenly"), runs_with="paper")
+@parametrize(
+    "area, density, remeshes, *changes",
+    {"linear": (6e-7, 4e-3, 3.0, LONG),
+     **{kind: (1e-10, 1e-3, 2.0, LONG, runs.of(kind), "numerics.refinement=0.2") for kind in runs.ELEMENTS[1:]},
+     **{kind: (1e-10, 1e-3, 2.0, runs.by(kind)) for kind in runs.QUADRATIC}})
+def test_ledger(area, density, remeshes, changes, record):
+    """Checks of a run of base: largest deviations of the area and of the density, and fewest remeshes."""
+    scene = runs.base("19.4 h", *changes)
+    instants = list(simulate(scene))
+    rows, last = _ledgers(instants), instants[-1]
+    made = sum(row.biomass_made for row in rows)
+    record(_steps(rows),
+           at_most("biomass, whole run", abs((rows[0].biomass_before + made) / rows[-1].biomass_after - 1),
+                   1e-10, runs.ROUND_OFF),
+           _area(scene, last, area, "J = theta in the mean: to the stabilisation of linear elements, else to Newton's "
+                 "tolerance"),
+           at_most("density", runs.density_drift(scene, last), density,
+                   "J = theta in the mean around a node only [E7]; worked off at each remesh"),
+           at_least("remeshes", last.remeshes, remeshes, "else they are not tested"))
+
+
+def _steps(rows: list[Ledger]) -> list[Check]:
+    """The worst of both substrates; of the biomass, and of one step's end against the next one's start."""
+    parted = [abs(two.biomass_before / one.biomass_after - 1) for one, two in pairwise(rows)]
+    return [at_most("substrates", runs.substrate_defect(rows), 1e-10,
+                    "Newton's tolerance, 1e-13 of the largest term of each row, over all rows"),
+            at_most("biomass, worst step", np.max([runs.biomass_defect(rows), *parted]), 1e-10, runs.ROUND_OFF)]
+
+
+STEPS = (0.8, 0.4, 0.2, 0.1)
+
+
+REFINEMENTS = (0.7, 1.0, 1.4, 2.0)
+
+
+@pytest.mark.case(
+    "coupling-density-restored", kind="property",
+    claim="What a density has of error at a remesh is gone after the next update [E7]: the shape takes up X_m again",
+    norm="a half-disc of 20 um whose density is X_m (1 + 0.1 x / R), remeshed, one step without uptake or decay: L2 "
+         "of (X_A + X_I) / X_m - 1 over it; X_m times the area over the biomass, less 1",
+    mutants=("density-not-worked-off", "theta-anew-at-a-remesh"), runs_with="paper")
+@parametrize("*changes", runs.every(0.5))
+def test_density_restored(changes, record):
+    """The order of linear elements; that the others are exact."""
+    if runs.base("1 h", *changes).numerics.order > 1:
+        error, area = _restored(*changes)
+        record(at_most("density", error, 1e-10,
+                       "the masses of a new mesh are X_m, and J = theta in each point where it can be"))
+    else:
+        errors, areas = zip(*(_restored(*changes, f"numerics.refinement={refinement}") for refinement in REFINEMENTS))
+        area = max(areas)
+        record(study("density", 1 / np.array(REFINEMENTS), errors, 1.5,
+                     "theta of triangles against X of nodes: second order, but at the rim, where they lie on one side, "
+                     "first; in L2 half an order more", ceiling=1.2e-3))
+    record(at_most("X_m times the area", area, 1e-11, runs.ROUND_OFF))
+
+
+def _restored(*changes: str) -> tuple[float, float]:
+    """L2 of the density's error, and X_m times the area over the biomass, less 1."""
+    scene = runs.base("1 h", 'kinetics.decay_coefficient="0 1/d"', 'kinetics.maximum_utilization_rate="0 1/d"',
+                      'aggregate.radius="20 um"', *changes)
+    now = pore.seeded(scene)
+    x = aggregates.places(now.space)[0]
+    now = replace(now, active=now.active * (1 + 0.1 * x / scene.aggregate.radius))
+    solved = pore.solve(scene, now)
+    anew = remeshing.remesh(scene, now, now, solved.flow.mean_velocity)[0]
+    after = runs.step(scene, anew, pore.solve(scene, anew), 0.2).pore
+    weight, density = after.space.reaction.dx, runs.density(scene, after)
+    error = np.sqrt(np.average((density - 1) ** 2, weights=weight))
+    return error, abs(np.vdot(weight, density) / after.outline.area - 1)
+
+
+#: Round-off and Newton's tolerance, 1e-13 of the largest term of each row, over all rows and with room to spare.
+CLOSED, CLOSES = 1e-9, "identities of the discrete equations: round-off and Newton's tolerance, with room"
+#: How long (h) a run goes on after contact.
+PAST = 2.0
+
+
+def _worth(scene: Scene, ledgers: list[Ledger]) -> float:
+    """Biomass made, against what is grown less what decays, in the worst step."""
+    made = np.array([step.biomass_made for step in ledgers])
+    grown, decayed = np.array([runs.worth(scene.kinetics, step) for step in ledgers]).T
+    return np.max(np.abs(made - (grown - decayed)) / np.maximum(np.abs(grown), np.abs(decayed)))
+
+
+def _closed(scene: Scene, ledgers: list[Ledger]) -> list:
+    """Checks of a run: of the worst step."""
+    bound, why = WORTH.get((scene.numerics.transport, scene.numerics.time), (CLOSED, CLOSES))
+    return [at_most("substrates", runs.substrate_defect(ledgers), CLOSED, CLOSES),
+            at_most("biomass", runs.biomass_defect(ledgers), CLOSED, CLOSES),
+            at_most("made against taken up", _worth(scene, ledgers), bound, why)]
+
+
+TRAPEZOIDAL = "trapezoidal rule on an exponential: (r step)^2 / 12, 1.2e-4 at the supply's rate"
+#: What the paper's schemes may err by in a step of 12 min: updates weigh the rates of both ends alike, and grow by
+#: their mean.
+WORTH = {("quasi_steady", "updates"): (2e-4, TRAPEZOIDAL), ("gear", "updates"): (1e-3, "its own tolerance, 0.1 %")}
+HEUN = "Heun's method, and the trapezoidal rule on what is consumed: second order"
+
+
+def _of_base(preset: str):
+    """Checks of base; in its updates the worst step is judged from both sides, and as steps become shorter."""
+    scene, ledgers, remeshes = _base(preset, STEPS[2])
+    yield _closed(scene, ledgers)
+    if scene.numerics.time == "updates":
+        theirs = (runs.growth_rates(scene.kinetics, scene.substrates)[0] * STEPS[2]) ** 2 / 12
+        yield between("made against taken up, over (r step)^2 / 12", _worth(scene, ledgers) / theirs, 0.95, 1.0,
+                      "r at the supply; that of the seed is 1 % lower, and falls as the pore clogs")
+        yield _order([_base(preset, step)[:2] for step in STEPS])
+    yield at_least("remeshes", remeshes, 1.0, "else they are not tested")
+
+
+@cache
+def _base(preset: str, step: float) -> tuple[Scene, list[Ledger], int]:
+    """Base with updates, or a first step, of so many hours; its ledgers, and how many meshes were remade."""
+    scene = runs.base("19.4 h", runs.by(preset), f'growth.time_step="{60 * step:g} min"')
+    instants = list(simulate(scene))
+    return scene, _ledgers(instants), sum(instant.remeshes for instant in instants)
+
+
+def _of_narrow(preset: str):
+    """Checks of a pore of 40 um through contact."""
+    scene = load_scene("base", ('growth.end="25 h"', runs.by(preset), 'pore.width="40 um"'))
+    scene = runs.at_velocity(scene, runs.SPEED)
+    instants, touched = [], np.inf
+    for instant in simulate(scene):
+        instants.append(instant)
+        touched = min(touched, instant.pore.time if instant.pore.contact else np.inf)
+        if instant.pore.time >= touched + PAST:
+            break
+    yield _closed(scene, _ledgers(instants))
+    yield at_least("hours after contact", instants[-1].pore.time - touched, PAST, "else less is tested")
+
+
+def _ledgers(instants: Iterable[Instant]) -> list[Ledger]:
+    return [step for instant in instants for step in instant.ledgers]
+
+
+def _short(elements: str, *changes: str) -> Scene:
+    """Base from 20 um to 1.6 h, with any kind of elements."""
+    return runs.base("1.6 h", runs.of(elements), 'aggregate.radius="20 um"', *changes, "numerics.refinement=0.5")
+
+
+def _of_short(elements: str, change: str) -> list:
+    """Checks of the midpoint rule, or of the paper's transient scheme."""
+    scene = _short(elements, change)
+    return _closed(scene, _ledgers(simulate(scene)))
+
+
+def _of_updates(elements: str) -> Study:
+    """The worst step of the paper's updates, as steps become shorter."""
+    scenes = [_short(elements, f'growth.time_step="{step} h"') for step in STEPS]
+    return _order([(scene, _ledgers(simulate(scene))) for scene in scenes])
+
+
+def _order(found: Iterable[tuple[Scene, list[Ledger]]]) -> Study:
+    """Made against taken up in the worst step of runs with steps of STEPS."""
+    errors = [_worth(*run) for run in found]
+    return study("made against taken up, worst step", STEPS, errors, 2, HEUN, ceiling=4e-5, band=0.15)
+
+
+#: The runs that are judged: base and a narrow pore by preset, a short run by scheme and elements.
+BALANCED = {**{f"base, {preset}": (_of_base, preset) for preset in ("paper", *runs.QUADRATIC)},
+            **{f"40 um, {preset}": (_of_narrow, preset) for preset in runs.PRESETS},
+            **{f"{told}, {kind}": (judge, kind, *change) for kind in runs.ELEMENTS
+               for told, judge, *change in (("midpoint rule", _of_short, runs.by("fast")),
+                                            ("gear", _of_short, 'numerics.transport="gear"'),
+                                            ("updates", _of_updates))}}
+
+
+@pytest.mark.slow
+@pytest.mark.case(
+    "coupling-one-balance", kind="property",
+    claim="In every step what is supplied leaves, is consumed or stored, what is there is what was and what is made, "
+          "and what is made is what the substrates taken up are worth: to round-off by the midpoint rule, to second "
+          "order by the paper's updates, in whole base to 2e-4 in a step of 12 min",
+    norm="worst ledger step, all at once: |supplied - out - consumed - stored| over supplied, |after - before - made| "
+         "over after, |made - (Y donor - (acceptor - F donor) / d_c)| over the larger of its two terms; base, and a "
+         "pore of 40 um at 2.9 m/d from a seed to 2 h past contact",
+    mutants=("biomass-of-the-start-takes-up", "remesh-half-way-unmatched", "masses-of-the-start-kept",
+             "flows-of-the-start", "euler-biomass", "rates-at-the-start", "rates-two-percent-low", "decay-leaves-all"))
+@parametrize("judge, *given", BALANCED)
+def test_one_balance(judge, given, record):
+    record(judge(*given))
+
+
+#: What the presets are for, in all; three times that in a single step.
+RIGHT = {"fast": 1e-2, "accurate": 1e-3, "exact": 1e-4}
+IN_A_STEP = 3.0
+
+
+@pytest.mark.slow
+@pytest.mark.case(
+    "coupling-amounts", kind="property",
+    claim="The amounts in the ledgers are those of ten times shorter steps: to 1 % by preset fast, 0.1 % by accurate "
+          "and 0.01 % by exact in all, to three times that in every step",
+    norm="amounts of both substrates consumed over base, and in its worst step, over those of a run with a hundredth "
+         "of the tolerance, less 1; of that run, of ten times as many steps, the cumulated amounts are interpolated "
+         "at the ends of the steps by a cubic spline; exact: 4 h from a seed of 25 um, with elements as large as in "
+         "fast",
+    mutants=("flows-of-the-start", "curved-rates-of-the-start"), runs_with="2",
+    omitted="paper has no tolerance of its steps")
+@parametrize(
+    "preset, end, *changes",
+    {"fast": ("fast", "19.4 h"), "accurate": ("accurate", "19.4 h"),
+     "exact": ("exact", "4 h", 'aggregate.radius="25 um"', "numerics.refinement=0.2"),
+     **{f"fast, {kind}": ("fast", "19.4 h", runs.of(kind)) for kind in ("linear", "cubic")}})
+def test_amounts(preset, end, changes, record):
+    """Checks of one preset."""
+    scene = runs.base(end, runs.by(preset), *changes)
+    shorter = runs.base(end, runs.by(preset), *changes, f"numerics.tolerance={scene.numerics.tolerance / 100}")
+    (times, ours), (fine, theirs) = (_cumulated(one) for one in (scene, shorter))
+    there = CubicSpline(fine, theirs)(times)
+    in_all, in_a_step = np.abs(ours[-1] / there[-1] - 1), np.abs(np.diff(ours, axis=0) / np.diff(there, axis=0) - 1)
+    for k, name in enumerate(("acceptor", "donor")):
+        record(at_most(f"{name} in all", in_all[k], RIGHT[preset], "what the preset is for"))
+        record(at_most(f"{name} in a step", in_a_step[:, k].max(), IN_A_STEP * RIGHT[preset],
+                       "three times what the preset is for"))
+    record(at_least("steps, of the other run over these", len(fine) / len(times), 6.0,
+                    "tolerance to the power 1/2, ten; fewer where a step ends with the run"))
+
+
+def _cumulated(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """(ends of steps (n + 1,) h, amounts of acceptor and donor consumed until then (n + 1, 2)), zero first."""
+    ledgers = _ledgers(simulate(scene))
+    return (np.array([0.0, *(step.end for step in ledgers)]),
+            np.cumsum([(0.0, 0.0), *(step.consumed for step in ledgers)], axis=0))
+
+
+@pytest.mark.case(
+    "coupling-contact", kind="property",
+    claim="Through contact the ledgers close, the area stays the biomass over X_m, no film under 2 um is left, and "
+          "the fluid is cut in two",
+    norm="three steps from an aggregate 0.1 um short of closing the pore, 20 um wide",
+    mutants=("films-stay-open", "reprojection-left-out"), runs_with="paper")
+@parametrize("*changes", runs.EVERY | {"exact": (runs.by("exact"), "numerics.refinement=0.3")})
+def test_contact(changes, record):
+    scene = runs.base("0.6 h", 'pore.width="20 um"', 'aggregate.radius="17.9 um"', *changes,
+                      times=(0.2, 0.4, 0.6))
+    instants = list(simulate(runs.at_velocity(scene, runs.SPEED)))
+    rows, last = _ledgers(instants), instants[-1].pore
+    record(_steps(rows), _area(scene, instants[-1]),
+           at_least("narrowest gap over the least allowed", _narrowest(scene, last, TOP), 1 - 1e-9,
+                    "2 um, or 16.7 degrees beside contact"),
+           between("parts of the fluid", _parts(last.mesh), 1.9, 2.1, "a plug"))
+
+
+def _area(scene: Scene, last: Instant, bound: float = 3e-6, origin: str = "J = theta to the stabilisation") -> Check:
+    total = scene.kinetics.maximum_density * last.pore.outline.area
+    return at_most("X_m times the area", abs(total / last.ledgers[-1].biomass_after - 1), bound, origin)
+
+
+@pytest.mark.slow
+@pytest.mark.case(
+    "coupling-wedge", kind="property",
+    claim="Wedges of fluid beside a contact surface close until they have the least contact angle",
+    norm="one step from a disc of 20 um that stands on a chord, the fluid under it at 8 degrees",
+    mutants=("no-wedge-closes", "films-stay-open"), runs_with="paper")
+@parametrize("*changes", runs.every(0.6))
+def test_wedge(changes, record):
+    scene = runs.base("0.2 h", *changes)
+    instants = list(simulate(scene, _disc(20.0, 19.8, 60 * scene.numerics.geometry)))
+    gaps = [_narrowest(scene, instant.pore, BOTTOM) for instant in instants]
+    record(at_most("narrowest gap over the least allowed, seed", gaps[0], 0.9, "8 degrees are under 16.7"),
+           at_least("the same after a step", gaps[1], 1 - 1e-9, "2 um, or 16.7 degrees beside contact"),
+           _area(scene, instants[-1]))
+
+
+def _disc(radius: float, height: float, edges: int) -> np.ndarray:
+    """(edges + 1, 2) um of a disc around (0, height), cut by the lower wall, from its upstream end."""
+    start = np.arcsin(height / radius)
+    angle = np.linspace(np.pi + start, -start, edges + 1)
+    return runs.standing(radius * np.cos(angle), height + radius * np.sin(angle))
+
+
+def _narrowest(scene: Scene, now, wall: int) -> float:
+    """Least gap between a wall and the interface beyond the contact surface, over the smaller of the least film and
+    tan(least angle) times the distance from contact; zero without contact."""
+    outline, growth = now.outline, scene.growth
+    free, on = outline.points[outline.wall == FREE], outline.points[outline.wall == wall, 0]
+    if len(on) == 0:
+        return 0.0
+    along = np.maximum(on.min() - free[:, 0], free[:, 0] - on.max())
+    gap = free[:, 1] if wall == BOTTOM else scene.pore.width - free[:, 1]
+    allowed = np.minimum(growth.minimum_film, np.tan(growth.minimum_contact_angle) * along)
+    return (gap[along > 0] / allowed[along > 0]).min()
+
+
+def _parts(mesh) -> int:
+    """Connected parts of the fluid."""
+    corners = mesh.triangles[~mesh.biomass]
+    links = (np.ones(corners.size), (corners.ravel(), np.roll(corners, 1, axis=1).ravel()))
+    labels = connected_components(coo_array(links, shape=2 * (len(mesh.points),)), directed=False)[1]
+    return len(np.unique(labels[corners]))

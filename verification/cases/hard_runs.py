@@ -1,0 +1,295 @@
+"""Hard cases of meshes: fifty remeshes, nearly cocircular points, a poor mesh to start from, 1e5 nodes in one step.
+
+Hard cases of runs: tiny and large seeds, huge and tiny units, 1e5 nodes, parameters drawn at random.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache, partial
+
+import numpy as np
+
+from repro.fem import sizing, transfer
+from repro.fem.mesh import POOR, POOR_ALLOWED, Mesh
+from repro.fem.outline import FREE, half_disc
+from repro.fem.space import Space
+from repro.march import midpoint
+from repro.march.loop import Step
+from repro.model import biomass, flow, pore, remeshing
+from repro.model.pore import Pore
+from repro.scene import Scene, parse_scene, scene_tables
+from verification.cases.hard_mechanics import CLOSING
+from verification.cases.hard_stages import exponential
+from verification.evidence.checks import Check, at_least, at_most
+from verification.problems import hard
+from verification.problems import runs as problems
+from verification.problems.hard import DRIVE, EFFLUENTS, SHAPE, TOLERANCE, HardCase, Run
+
+FIFTY = 50
+
+
+def remeshes(preset: str) -> list:
+    """Fifty new meshes, of sizes that change by a third, around the aggregate of base at 4 h; then a step."""
+    found = hard.run("base", preset, 'aggregate.radius="20 um"', 'growth.end="4 h"', 'output.times=["4 h"]')
+    made = found.scene
+    first, speed = found.instants[-1].pore, found.instants[-1].solved.flow.mean_velocity
+    now = first
+    for which in range(FIFTY):
+        finer = replace(made.numerics, refinement=made.numerics.refinement * (0.85, 1.0, 1.15)[which % 3])
+        now, _ = remeshing.remesh(replace(made, numerics=finer), now, now, speed)
+    without, after = (_numbers(made, _step(made, start).pore) for start in (first, now))
+    return [found, *_kept(first, now),
+            *hard.alike("after a step more, with and without them", NAMES, after, without, preset)]
+
+
+def _kept(first: Pore, now: Pore) -> list[Check]:
+    before, after = (biomass.at_nodes(one.space, one.inert / (one.active + one.inert))[one.mesh.body]
+                     for one in (first, now))
+    beyond = max(before.min() - after.min(), after.max() - before.max(), 0.0) / np.ptp(before)
+    return [at_most("area, relative change", abs(now.outline.area / first.outline.area - 1), 1e-10,
+                    "outlines are split on themselves"),
+            at_most("biomass, relative change", abs(now.mass / first.mass - 1), 1e-8, "the transfer conserves it"),
+            at_most("X_I, relative change", abs(now.inert.sum() / first.inert.sum() - 1), 1e-8, "as above"),
+            at_most("share of X_I beyond where it was, over its range", beyond, 0.05,
+                    "projection overshoots by a part of a jump that there is not")]
+
+
+def _step(made: Scene, now: Pore):
+    """A step of 12 min."""
+    return midpoint.attempt(made, *hard.solved_in(made, now), 0.2).step
+
+
+NAMES = ("area", "thickness", "upstream tip", "conductivity")
+
+
+def _numbers(made: Scene, now: Pore) -> list[float]:
+    """What NAMES say."""
+    shape = now.outline
+    return [shape.area, shape.thickness, shape.upstream, pore.solve_flow(made, now.space).conductivity]
+
+
+REMESHES = HardCase(
+    13, "remeshes", "Fifty forced remeshes",
+    "Area and biomass as before, X_I and the next step as without them",
+    "Mass that drifts by percents (30 % in 40 remeshes by linear interpolation), or places at t = 0 that fold",
+    {"base at 4 h": remeshes},
+    mutants=("hard-inert-degraded-at-a-remesh", "theta-anew-at-a-remesh"))
+
+
+def cocircular(preset: str) -> list:
+    """Outlines whose nodes are on a circle up to 1e-15, 1e-12, 1e-9, 1e-6 of its radius."""
+    made = hard.scene("base", preset)
+    checks, (_, exact) = [], _meshed(made, 0.0)
+    for size in (1e-15, 1e-12, 1e-9, 1e-6):
+        grid, loss = _meshed(made, size)
+        corners = grid.straight
+        covered = corners.areas.sum() / (corners.width * np.ptp(corners.ends))
+        checks += [at_most(f"area covered, noise {size:g}", abs(covered - 1), 1e-12, "round-off"),
+                   at_least(f"least quality, noise {size:g}", corners.quality.min(), 0.2, "a third of what is poor"),
+                   hard.promised(f"head loss against no noise, noise {size:g}", abs(loss / exact - 1), preset)]
+    return checks
+
+
+def _meshed(made: Scene, noise: float) -> tuple[Mesh, float]:
+    """(mesh, head loss) around a half-disc of 20 um with noise on its nodes."""
+    numerics = made.numerics
+    shape = half_disc(20.0, sizing.ACROSS_AGGREGATE * numerics.refinement, numerics.geometry)
+    free = shape.wall == FREE
+    points = shape.points.copy()
+    points[free] += 20.0 * noise * np.random.default_rng(7).uniform(-1, 1, (free.sum(), 2))
+    grid, _ = pore.generate(made, replace(shape, points=points))
+    return grid, flow.unit_flow(Space(grid, numerics.order), 2000.0).loss
+
+
+#: How fields at the nodes go from mesh to mesh.
+TRANSFER = {1: transfer.project, 2: transfer.interpolated}
+
+
+def nearly_same(preset: str) -> list:
+    """The transfer between meshes whose nodes agree up to 1e-15 and 1e-12: pieces without area, nodes on edges."""
+    made = hard.scene("base", preset, 'aggregate.radius="20 um"')
+    grid = pore.seeded(made).mesh
+    places, cells = grid.points[grid.body], grid.topology.body_cells
+    field = np.sin(places / 7.0)
+    inner = ~np.isin(np.arange(len(places)), grid.topology.body_loop)
+    checks, random = [], np.random.default_rng(8)
+    for noise in (0.0, 1e-14, 1e-11, 1e-8):
+        other = places.copy()
+        other[inner] += noise * random.uniform(-1, 1, (inner.sum(), 2))
+        found = TRANSFER[grid.geometry](places, cells, field, other, cells)
+        checks.append(at_most(f"largest change of a field of size one, noise {noise:g} um", np.abs(found - field).max(),
+                              1e-9 + noise, "the identity, and what the field changes"))
+    return checks
+
+
+COCIRCULAR = HardCase(
+    18, "cocircular", "Nearly cocircular points",
+    "A mesh that covers the pore, the flow of the exact circle, and the identity between nearly equal meshes",
+    "A Delaunay triangulation with slivers or holes, a supermesh that loses pieces",
+    {"outline": cocircular, "transfer": nearly_same},
+    mutants=("hard-shallowest-taken",))
+
+
+def poor(preset: str) -> list:
+    """Base from 20 um whose fluid starts with poor triangles: two steps of 12 min against those from a good mesh."""
+    made = hard.scene("base", preset, 'aggregate.radius="20 um"')
+    good, _ = hard.seeded(made)
+    bad, count = _spoilt(good)
+    ends = []
+    for start in (good, bad):
+        first = _step(made, start)
+        second = _step(made, first.pore)
+        ends.append(_numbers(made, second.pore))
+    return [at_least("poor triangles at the start", count, POOR_ALLOWED + 1, "else less is tested"),
+            at_least("remeshed on the way", first.remeshed or second.remeshed, 1, "3.5"),
+            *hard.alike("after two steps", NAMES, ends[1], ends[0], preset)]
+
+
+def _spoilt(now: Pore) -> tuple[Pore, int]:
+    """The pore with the fluid's inner nodes moved about as far as no triangle turns over, its edges straight, and its
+    poor triangles."""
+    random = np.random.default_rng(9)
+    topology = now.mesh.topology
+    straight = now.mesh.straight
+    keep = np.concatenate([straight.body, topology.walls, topology.inlet, topology.outlet])
+    inner = np.setdiff1d(np.arange(now.mesh.corners), keep)
+    push = np.zeros_like(straight.points)
+    push[inner] = random.uniform(-1, 1, (len(inner), 2)) * np.sqrt(Space(straight, 1).lumped()[inner])[:, None]
+    for part in 0.9 ** np.arange(60):
+        points = now.mesh.with_middles(straight.points + part * push)
+        points[now.mesh.body] = now.mesh.points[now.mesh.body]
+        moved = now.moved(points)
+        if moved.mesh.areas.min() > 0.02 * straight.areas.min() and not moved.mesh.turned_over().any():
+            return moved, np.count_nonzero(moved.mesh.quality < POOR)
+    raise RuntimeError("no such mesh")
+
+
+POOR_MESH = HardCase(
+    19, "poor-mesh", "Poor initial mesh",
+    "A new mesh within two steps, and the shape and flow of a good start",
+    "Triangles turned over that no one notices",
+    {"nodes moved at random": poor}, refusable=("nodes moved at random",),
+    mutants=("hard-poor-mesh-kept",))
+
+
+#: Powers of the columns that have a unit of length or time.
+COLUMNS = {
+    "time_h": (0, 1), "mean_velocity_m_per_d": (1, -1), "head_loss_cm": (1, 0), "conductivity_m_per_d": (1, -1),
+    "aggregate_area_um2": (2, 0), "thickness_um": (1, 0), "upstream_um": (1, 0), "downstream_um": (1, 0),
+    "meshed_length_um": (1, 0),
+    **dict.fromkeys((*EFFLUENTS, "acceptor_min_mg_per_L", "inert_fraction"), (0, 0)),
+}
+
+
+def units(preset: str, length: float, time: float) -> list:
+    """Base from 15 um for 2.4 h, in other units."""
+    made = hard.scene("base", preset, 'aggregate.radius="15 um"', 'growth.end="2.4 h"', 'growth.time_step="1.2 h"',
+                        'output.times=["2.4 h"]')
+    there = parse_scene(scene_tables(problems.scaled(made, length, time)), "scaled", "scaled")
+    plain, other = hard.ran(made), hard.ran(there)
+    exact = np.log2(length) % 1 == 0
+    bound, origin = (1e-9, "dimensions; round-off") if exact else (
+        TOLERANCE[preset], "round-off makes another mesh; " + hard.PROMISED[preset])
+    return [plain, other, *(
+        at_most(f"{column}, relative difference",
+                abs(other.last[column] / (length**along * time**during) / plain.last[column] - 1), bound, origin)
+        for column, (along, during) in COLUMNS.items())]
+
+
+SCALES = {"lengths x 1e6": (1e6, 1.0), "lengths x 2^20": (2.0**20, 1.0), "lengths / 2^10": (2.0**-10, 1.0),
+          "times x 1e-6": (1.0, 1e-6), "times x 1e6": (1.0, 1e6), "times x 1e-9": (1.0, 1e-9)}
+UNITS = HardCase(
+    17, "units", "Extreme units: lengths times 1e6, times times 1e-6",
+    "The same numbers times their unit",
+    "A length or a time that is written into the code: a tolerance, a smallest step, a size",
+    {told: partial(units, length=length, time=time) for told, (length, time) in SCALES.items()},
+    refusable=tuple(SCALES),
+    mutants=("length-scale",))
+
+#: What is drawn: key of the scene, its unit, and its physical range; that of the radius over the width.
+RANGES = {
+    "pore.width": ("um", 20.0, 200.0), "aggregate.radius": ("um", 0.04, 0.8),
+    "flow.mean_velocity": ("m/day", 0.03, 30.0), "flow.viscosity_ratio": ("", 1.0, 1e5),
+    "substrates.acceptor.supply": ("mg/L", 0.1, 50.0), "substrates.donor.supply": ("mg/L", 0.1, 50.0),
+    "substrates.acceptor.half_saturation": ("mg/L", 0.05, 10.0),
+    "substrates.donor.half_saturation": ("mg/L", 0.05, 10.0),
+    "kinetics.maximum_utilization_rate": ("1/day", 0.5, 12.0), "kinetics.decay_coefficient": ("1/day", 0.02, 0.5),
+    "kinetics.maximum_density": ("mg/L", 5e3, 1e5), "growth.minimum_contact_angle": ("deg", 5.0, 45.0),
+    "growth.end": ("h", 0.4, 3.0),
+}
+
+
+def at_random(preset: str, seed: int) -> list[Run]:
+    """One draw: values that lie so far between the ends of their ranges, by their logarithms."""
+    random = np.random.default_rng(seed)
+    value = {key: low * (high / low) ** random.uniform() for key, (_, low, high) in RANGES.items()}
+    value["aggregate.radius"] *= value["pore.width"]
+    changes = [f'{key}="{value[key]!r} {unit}"' if unit else f"{key}={value[key]!r}"
+               for key, (unit, _, _) in RANGES.items()]
+    return [hard.run("wide", preset, *changes, f'output.times=["{value["growth.end"]!r} h"]', density=CLOSING)]
+
+
+DRAWS = range(10)
+RANDOM = HardCase(
+    22, "random", "Parameters drawn at random within physical ranges",
+    "Balances, bounds and area by biomass in every run, or a refusal that says what to change",
+    "A run that ends with a number that is none, or with mass made or lost",
+    {f"draw {seed}": partial(at_random, seed=seed) for seed in DRAWS},
+    refusable=tuple(f"draw {seed}" for seed in DRAWS),
+    mutants=("reprojection-left-out",))
+
+def seeded(preset: str, name: str, radius: float, end: str) -> list:
+    """Growth from a seed between the exponentials at its least concentrations and at the supply."""
+    changes = (f'aggregate.radius="{radius} um"', f'growth.end="{end}"', f'output.times=["{end}"]')
+    found, _, checks = hard.against(name, preset, changes, *SHAPE, *DRIVE)
+    return [*checks, *exponential(found)]
+
+
+SEEDS = HardCase(
+    14, "seeds", "Seeds of 0.5 and 20 um",
+    "Growth between the exponentials at the least concentrations and at the supply, and a finer run's shape",
+    "Elements of a seed that is 1/200 of the pore, or a seed that is starved at once",
+    {"0.5 um in 100 um": partial(seeded, name="wide", radius=0.5, end="8 h"),
+     "20 um in 50 um": partial(seeded, name="base", radius=20.0, end="4 h")},
+    mutants=("curved-half-of-the-half",))
+
+#: Refinement with which base has 1e5 nodes, and a preset of those elements: fast and accurate differ in the step's
+#: tolerance alone.
+HUGE = {1: ("paper", 11.4), 2: ("accurate", 5.7), 3: ("cubic", 3.8)}
+
+
+@cache
+def _first_step(preset: str, *changes: str) -> tuple[Run, Step]:
+    """What is solved in the seed of 15 um as a Run, and one step of 6 min from it."""
+    found = hard.run("base", preset, 'aggregate.radius="15 um"', *hard.FIXED, *changes)
+    seed = found.instants[0]
+    return found, problems.step(found.scene, seed.pore, seed.solved, 0.1)
+
+
+def huge(preset: str) -> list:
+    """One step of 6 min with 1e5 nodes, against the preset's own mesh."""
+    own, near = _first_step(preset)
+    which, refinement = HUGE[own.scene.numerics.order]
+    fine, far = _first_step(which, f"numerics.refinement={refinement}")
+    shapes = [(step.pore.outline.area, step.pore.outline.thickness, step.pore.outline.upstream) for step in (near, far)]
+    return [fine, own, at_least("nodes", fine.instants[0].pore.space.count, 1e5, "else less is tested"),
+            at_most("in - out - consumed over the step, over in", problems.substrate_defect([far.ledger]),
+                    1e-12 * fine.last["nodes"], "Newton's tolerance of 1e-12 a row, times the rows"),
+            at_most("biomass after - before - made, over after", problems.biomass_defect([far.ledger]),
+                    hard.BALANCE, hard.MEAN),
+            *hard.close(own, fine, preset, *DRIVE, *EFFLUENTS),
+            *hard.alike("after the step, own mesh", NAMES, *shapes, preset)]
+
+
+LARGE = HardCase(
+    20, "large", "1e5 nodes in one step",
+    "The shape and flow that the preset's own mesh gives to its tolerance, balances closed",
+    "A system too large to be solved, or solved badly: residuals grow with the condition",
+    {"base, 15 um": huge},
+    mutants=("hard-keys-overflow",))
+
+
+@hard.parametrize(REMESHES, COCIRCULAR, POOR_MESH, SEEDS, UNITS, LARGE, RANDOM)
+def test_runs(case, preset, record, record_property):
+    hard.judge(case, preset, record, record_property)

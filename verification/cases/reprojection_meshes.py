@@ -1,0 +1,233 @@
+"""What a transfer costs in accuracy: one transfer of a smooth field, and forty of a steep one.
+
+The projection limited by flux-corrected transport: conserves like the projection, bounded like interpolation.
+
+The common pieces of two meshes, and the projection that is integrated over them, against shapely's pieces.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from reference import galerkin_transfer
+from repro.fem import transfer
+from repro.fem.mesh import triangle_areas
+from repro.fem.space import Space
+from verification.evidence.cases import parametrize
+from verification.evidence.checks import at_least, at_most, between, columns, each_at_most, largest, refine, studies
+from verification.problems import meshes, pairs, runs
+
+SIZES = dict.fromkeys((5.0, 2.5, 1.25, 0.625), 3)
+REMESHES = 40
+
+
+def smooth(x, y):
+    """About two waves over the rectangle."""
+    return 2 + np.sin(0.3 * x) * np.cos(0.2 * y)
+
+
+def steep(x, y):
+    """A hill twenty times narrower than the domain, from 0 to 1."""
+    return np.exp(-((x - 18) ** 2 + (y - 10) ** 2) / 6)
+
+
+#: Why what is carried as a field of linear elements has no other orders.
+MASSES = "orders 2 and 3 carry masses, not fields: reprojection-growing"
+
+
+def sampled(points, triangles, fields, new_points, new_triangles):
+    """The paper's transfer, with the arguments of the projection."""
+    return transfer.interpolate(points, triangles, fields, new_points)
+
+
+def _located_errors(size: float, seed: int, order: int) -> dict[str, float]:
+    """Error of the field interpolated by an order."""
+    where = np.random.default_rng(8).uniform((0.0, 0.0), (pairs.ENDS[1], pairs.WIDTH), (1000, 2))
+    mesh = meshes.channel(pairs.ENDS, pairs.WIDTH, size, lambda x, y: x < 0, seed=seed)
+    space = Space(mesh, order)
+    found = transfer.located(mesh.points, mesh.cells, where).field(smooth(*space.points.T), space.cells, order)
+    return {"located": np.sqrt(np.mean((found - smooth(*where.T)) ** 2))}
+
+
+def _carried_errors(size: float, seed: int, carry) -> dict[str, float]:
+    """Error of a transfer."""
+    old, new = pairs.grid(size, 2 * seed), pairs.grid(0.9 * size, 2 * seed + 1)
+    found = carry(*old, smooth(*old[0].T)[:, None], *new)
+    return {"carried": meshes.l2_error(*new, found[:, 0], smooth)}
+
+
+#: Transfers, with what errors on the finest mesh may reach; and that of fields, by their order.
+CARRIERS = {"projection": (transfer.project, 2e-3), "interpolation": (sampled, 4e-3),
+            "bounded": (transfer.project_bounded, 2e-3)}
+LOCATED = {1: 4e-3, 2: 1e-4, 3: 2e-6}
+
+
+@pytest.mark.case(
+    "reprojection-order", kind="manufactured",
+    claim="No transfer loses the accuracy of linear elements, the limiter leaves linear fields alone, and fields of "
+          "each order are found to their order",
+    norm="L2 of a smooth field, interpolated on one mesh and carried to another, root mean square over three pairs a "
+         "size; largest error of a linear field over nine pairs of meshes, over its range; root mean square error at "
+         "a thousand places of fields of order 1, 2 and 3, and over three meshes a size",
+    mutants=("corners-for-middles", "nearest-corner", "bounded-lumped", "bounds-of-one-piece"))
+@parametrize(
+    "told, measure, given, *expected",
+    {**{f"{name}, order 1": ("carried", _carried_errors, carry, 2, "linear elements: second order", ceiling)
+        for name, (carry, ceiling) in CARRIERS.items()},
+     **{f"fields of order {k}, order {k}": ("located", _located_errors, k, k + 1,
+                                            "interpolation: one order more than the elements'", ceiling)
+        for k, ceiling in LOCATED.items()}})
+def test_order(told, measure, given, expected, record):
+    record(studies(refine(measure, SIZES, given), {told: expected}))
+    if given is transfer.project_bounded:
+        gaps = [_bent(transfer.project_bounded(*old, _plane(old)[:, None], *new)[:, 0], new)
+                for _, old, new in pairs.pairs()]
+        record(at_most("linear field", max(gaps), 1e-12, "within its bounds at every node: round-off"))
+
+
+@pytest.mark.case(
+    "reprojection-chain", kind="property",
+    claim="Forty remeshes of a steep field keep its integral to round-off and never raise its square by projection; "
+          "by linear interpolation they stay within its bounds and change what it integrates to",
+    norm="change of the integral of a steep field over 40 remeshes, and of its square in each, relative; largest and "
+         "least nodal value",
+    mutants=("linear-transfer",), runs_with="1", omitted=MASSES)
+def test_chain(record):
+    kept, paper = (_remeshed(carry, steep) for carry in (transfer.project, sampled))
+    rise = (kept["square"][1:] / kept["square"][:-1]).max()
+    record(at_most("integral by projection", largest(kept["integral"] - 1), 1e-12, "round-off"))
+    record(at_most("square by projection, after over before", rise, 1.0, "a projection makes nothing longer"))
+    record(at_most("largest value by interpolation", paper["largest"].max(), paper["largest"][0],
+                   "weights between 0 and 1"))
+    record(at_least("least value by interpolation", paper["least"].min(), paper["least"][0], "weights between 0 and 1"))
+    record(at_least("integral by interpolation, change", abs(paper["integral"][-1] - 1), 0.02,
+                    "not conserving: the case would see it"))
+
+
+def _remeshed(carry, field) -> dict[str, np.ndarray]:
+    """Of a field before and after each remesh (k + 1,): its integral over the first, its square, least and largest
+    value, the excess of its first range over that range, and its L2 error."""
+    grids = [pairs.grid(2.0, 1), pairs.grid(2.0, 2), pairs.grid(2.4, 3)]
+    mesh, rows = grids[0], []
+    values = field(*mesh[0].T)[:, None]
+    for k in range(REMESHES + 1):
+        rows.append({"integral": pairs.integral(mesh, values[:, 0]), "square": pairs.square(mesh, values[:, 0]),
+                     "least": values.min(), "largest": values.max(),
+                     "error": meshes.l2_error(*mesh, values[:, 0], field)})
+        new = grids[(k + 1) % 3]
+        mesh, values = new, carry(*mesh, values, *new)
+    found = columns(rows)
+    least, most, integral = found["least"], found["largest"], found["integral"]
+    outside = np.maximum(least[0] - least, most - most[0]) / (most[0] - least[0])
+    return {**found, "integral": integral / integral[0], "outside": outside}
+
+
+def cylinder(x, y):
+    """A jump from 0 to 1."""
+    return 1.0 * (np.hypot(x - 18, y - 10) < 6)
+
+
+FIELDS = {"hill": (steep,), "cylinder": (cylinder,)}
+
+
+@pytest.mark.case(
+    "reprojection-bounded-chain", kind="property",
+    claim="Forty remeshes of a steep field keep its integral to round-off and every value in the range of the first; "
+          "the unlimited projection leaves it, and is hardly more accurate",
+    norm="change of the integral of a hill and of a cylinder (a jump from 0 to 1) over 40 remeshes, relative; by how "
+         "much values leave their range, over it; L2 error over that of the unlimited projection",
+    mutants=("bounded-lumped", "bounded-unlimited", "bounded-one-sided"), runs_with="1", omitted=MASSES)
+@parametrize("field", FIELDS)
+def test_bounded_chain(field, record):
+    ours, free = (_remeshed(carry, field) for carry in (transfer.project_bounded, transfer.project))
+    record(at_most("integral", largest(ours["integral"] - 1), 1e-12, "round-off"))
+    record(at_most("outside the range", ours["outside"].max(), 1e-14, "Zalesak's limiter: round-off"))
+    record(between("error over the projection's", ours["error"][-1] / free["error"][-1], 0.9, 1.15,
+                   "limited at few nodes; the lumped projection alone: over 2"))
+    record(at_least("outside the range by projection", free["outside"].max(), 0.02, "else there is nothing to limit"))
+
+
+ROUND_OFF = "round-off; over eight pairs of meshes"
+#: Degree of the polynomials that the pieces must integrate: that of the rule in :mod:`verification.problems.meshes`.
+DEGREE = 6
+
+
+@pytest.mark.case(
+    "reprojection-supermesh", kind="exact",
+    claim="The common pieces of two meshes are shapely's, cover every triangle of both once, and integrate "
+          "polynomials exactly, for unrelated meshes, shared nodes and edges, equal meshes and slivers",
+    norm="largest difference of the area that two triangles share, and between a triangle and its pieces, over the "
+         "largest area; largest relative error of the integrals of x^a y^b, a + b up to 6",
+    mutants=("clip-two-sides", "fans-cut-short"), references=("galerkin_transfer",), runs_with="1", omitted=MASSES)
+def test_supermesh(record):
+    record(each_at_most(runs.worst([_pieces(old, new) for _, old, new in pairs.pairs()]), 1e-12, ROUND_OFF))
+
+
+def _pieces(old: pairs.Grid, new: pairs.Grid) -> dict[str, float]:
+    """The errors of one pair of meshes."""
+    corners, of_old, of_new = transfer.supermesh(*old, *new)
+    rim = corners.reshape(-1, 2), np.arange(3 * len(corners)).reshape(-1, 3)
+    expected = galerkin_transfer.overlaps(*old, *new)
+    shared = np.zeros_like(expected)
+    np.add.at(shared, (of_old, of_new), np.abs(triangle_areas(*rim)))
+    gaps = [largest(shared.sum(axis=1 - axis) - triangle_areas(*mesh)) for axis, mesh in ((0, old), (1, new))]
+    return {"shared areas": largest(shared - expected) / expected.max(),
+            "triangles less their pieces": max(gaps) / expected.max(), "polynomials": _polynomials(rim)}
+
+
+def _polynomials(pieces: pairs.Grid) -> float:
+    """Largest relative error of the integrals of monomials over the rectangle."""
+    where, weight, _ = meshes.quadrature(*pieces)
+    power = np.arange(DEGREE + 1)
+    along, across = np.moveaxis(where[..., None] ** power, 2, 0)
+    exact = np.outer(*(side ** (power + 1) / (power + 1) for side in (pairs.ENDS[1], pairs.WIDTH)))
+    apart = np.einsum("tq,tqa,tqb->ab", weight, along, across) / exact - 1
+    return largest(apart[np.add.outer(power, power) <= DEGREE])
+
+
+@pytest.mark.case(
+    "reprojection-projection", kind="cross-code",
+    claim="The projection of a random field is that of a dense code on shapely's pieces; it keeps linear fields, the "
+          "field's integral and centre, and what it takes from the square is the square of the difference",
+    norm="largest difference of nodal values over the field's largest; integrals of the field, of the field times x "
+         "and y, and of its square, relative",
+    mutants=("lumped-mass", "corners-for-middles", "contributions-lost"), references=("galerkin_transfer",),
+    runs_with="1", omitted=MASSES)
+def test_projection(record):
+    random = np.random.default_rng(6)
+    rows = [_projected(old, new, random.uniform(0.0, 1.0, len(old[0]))) for _, old, new in pairs.pairs()]
+    record(each_at_most(runs.worst(rows), 1e-11, ROUND_OFF))
+
+
+def _projected(old: pairs.Grid, new: pairs.Grid, rough: np.ndarray) -> dict[str, float]:
+    """The errors of a rough field, and of a linear one, on one pair of meshes."""
+    found = transfer.project(*old, np.column_stack([rough, _plane(old)]), *new)
+    expected = galerkin_transfer.project(*old, rough[:, None], *new)[:, 0]
+    drifts = {name: abs(pairs.integral(new, found[:, 0], weight) / pairs.integral(old, rough, weight) - 1)
+              for name, weight in (("integral", lambda x, y: 1 + 0 * x), ("centre, x", lambda x, y: x),
+                                   ("centre, y", lambda x, y: y))}
+    return {"against the dense code": largest(found[:, 0] - expected), "linear field": _bent(found[:, 1], new),
+            **drifts, "square": _pythagoras(old, rough, new, found[:, 0])}
+
+
+def _plane(mesh: pairs.Grid) -> np.ndarray:
+    return 3 + 2 * mesh[0][:, 0] - mesh[0][:, 1]
+
+
+def _bent(found: np.ndarray, mesh: pairs.Grid) -> float:
+    """Largest error of what should be the plane, over its range."""
+    return largest(found - _plane(mesh)) / np.ptp(_plane(mesh))
+
+
+def _pythagoras(old: pairs.Grid, before: np.ndarray, new: pairs.Grid, after: np.ndarray) -> float:
+    """|X_old|^2 - |X_new|^2 - |X_old - X_new|^2 over the first: zero where the difference is at right angles to X_new.
+    """
+    corners, of_old, of_new = transfer.supermesh(*old, *new)
+    gap = 0.0
+    for (points, triangles), field, owner, sign in ((old, before, of_old, 1), (new, after, of_new, -1)):
+        nodes = triangles[owner][:, None]
+        gap = gap + sign * np.sum(transfer.barycentric(points[nodes], corners) * field[nodes], axis=2)
+    pieces = corners.reshape(-1, 2), np.arange(gap.size).reshape(-1, 3)
+    left = pairs.square(old, before) - pairs.square(new, after) - pairs.square(pieces, gap.ravel())
+    return abs(left) / pairs.square(old, before)

@@ -1,0 +1,542 @@
+"""Substrates against other codes: steady and in time, in slabs, around biomass, and in a box that is well mixed.
+
+Dual Monod uptake in a slab under plug flow, steady: against scipy's collocation, and against FiPy's finite volumes.
+Peclet numbers u l / D_A are 0.1, 1 and 5. Thiele's modulus l sqrt(k F X / (K_A D_A)) is 0.6, 1.9 and 6; the last slab,
+at Peclet number 0.1, is starved: three ten-thousandths of the acceptor's supply leave it.
+
+Diffusion into biomass in two dimensions, without flow, against py-pde's finite differences. A box whose ends hold the
+supply; D is the same in fluid and biomass, as py-pde's Laplacian has it. Both codes are refined together, elements as
+long as cells: around a block whose sides follow the cells, and around the paper's half-disc, which cuts them. Thiele's
+modulus is SIDE sqrt(k F X / (K_A D_A)); at 7 the donor is used up, at 4.3 a few percent of it are left.
+
+The modified Gear scheme (3.3): from the supply everywhere towards the steady profiles of the slab. X_A does not change
+(no yield, and less than 1e-5 of it decays). In time the scheme is compared with an integrator that makes no error of
+its own, on the same mesh; in space with FiPy, whose cells are integrated without an error in time; and in time with
+FiPy's own scheme, which is of first order.
+
+Closed pores in which diffusion evens out every concentration: (7)-(10) are four ordinary equations. A seed in a closed
+box whose diffusivities are so large that C_A and C_D are uniform to 1e-6; X_A and X_I then are too. With ``share`` of
+the box biomass,
+
+    dC_A/dt = -share X_A m_A (k F m_D + d_c f_d b)        dX_A/dt = X_A m_A (k Y m_D - b)
+    dC_D/dt = -share X_A k m_A m_D                        dX_I/dt = X_A m_A b (1 - f_d)
+
+are integrated by scipy to 1e-11. The box is followed for five days, by when half of the acceptor is gone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.spatial import cKDTree
+from skfem import Basis, MeshTri
+from skfem.models import poisson
+
+from reference import channel_bvp, channel_fipy
+from reference import diffusion_reaction_pypde as pypde
+from reference.monod import sink, slopes, uptake
+from repro.fem import outline
+from repro.fem.elements import ELEMENTS
+from repro.fem.sizing import ACROSS_AGGREGATE
+from repro.fem.space import Space
+from repro.model import gear, kinetics, transport
+from repro.model.kinetics import Sink
+from verification.evidence.cases import combined, parametrize
+from verification.evidence.checks import at_most, refine, studies
+from verification.problems import meshes, runs
+from verification.problems.channels import (
+    CROSSED,
+    EXPECTED,
+    NAMES,
+    ORDERS,
+    SAMPLES,
+    SCENE,
+    SLAB,
+    WIDE,
+    apart,
+    at_heights,
+    both,
+    changed,
+    filled,
+    following,
+    length,
+    pair,
+    problem,
+    rates,
+    spaced,
+    speed_of,
+    steady,
+)
+
+LINEAR = {"linear": 1}
+HIGHER = {word: order for word, order in ORDERS.items() if order > 1}
+PECLETS = {f"Pe = {peclet:g}": peclet for peclet in (0.1, 1.0, 5.0)}
+DENSITIES = {f"X = {density:g} mg/L": density for density in (3e3, 3e4, 3e5)}
+#: Peclet number and density of the starved slab, and of the one that FiPy's cells and elements of order 2 and 3 share.
+STARVED, SHARED = (0.1, 3e5), (1.0, 3e4)
+ITSELF_STARVED = "C_A in the starved slab over itself"
+LAW = replace(SCENE.kinetics, yield_coefficient=1e-12)
+#: h: 0.07, 0.2 and 0.7 s. Water diffuses across the slab in 0.6 s, and crosses it in 0.1 to 6 s.
+TIMES = (2e-5, 6e-5, 2e-4)
+#: Last errors of linear elements, of a density X, and of others, of their order.
+CEILINGS = {3e3: 1e-6, 3e4: 3e-5, 3e5: 4e-4}
+HIGHER_CEILINGS = {2: 1e-7, 3: 1e-9}
+
+
+def given(peclet: float, density: float):
+    """What the references take."""
+    return (speed_of(peclet), pair("supply"), pair("diffusivity"), pair("diffusivity_in_aggregate"), density,
+            rates(SCENE.kinetics), SLAB)
+
+
+def each(expected: int, why: str, ceiling: float) -> dict[str, tuple]:
+    """The same row for both substrates."""
+    return dict.fromkeys(NAMES, (expected, why, ceiling))
+
+
+@cache
+def _ours(size: float, number: int, order: int, peclet: float, density: float, steps: int = 0, ends=CROSSED
+          ) -> np.ndarray:
+    """(times, 2, n): each interval in equal steps, started anew from the end of the last; at rest if there are none."""
+    made = problem(spaced(size, number, order, ends), speed_of(peclet), law=LAW)
+    if not steps:
+        return both(steady(made, density))[None]
+    states = []
+    active = filled(made.space, density)
+    now = transport.supplied_everywhere(made)
+    for interval in np.diff([0.0, *TIMES]):
+        now = gear.advance(made, active, 0 * active, now, interval, fixed_step=interval / steps).concentrations
+        states.append(both(now))
+    return np.array(states)
+
+
+@cache
+def exact(peclet: float, density: float, tolerance: float):
+    """x -> (C_A, C_D), by solve_bvp."""
+    return channel_bvp.solution(*given(peclet, density), tolerance=tolerance)
+
+
+#: Random meshes of each size (um), their ends, and solve_bvp's tolerance, which takes no less at Peclet 5: cubic
+#: elements are judged at Peclet 1, on coarser meshes, as solve_bvp is good to 1e-11 or so.
+COLLOCATED = {1: (SAMPLES, CROSSED, 1e-8), 2: ({3.2: 12, 1.6: 6, 0.8: 3, 0.4: 1}, WIDE, 1e-10),
+              3: ({6.4: 12, 3.2: 8, 1.6: 4, 0.8: 2}, WIDE, 1e-12)}
+
+
+def collocation(order: int, peclet: float, density: float):
+    samples, ends, tolerance = COLLOCATED[order]
+    errors = refine(_distances, samples, order, peclet, density, ends, tolerance)
+    if order > 1:
+        yield studies(errors, {"C": (*EXPECTED[order], HIGHER_CEILINGS[order])})
+        return
+    yield studies(errors, each(*EXPECTED[1], CEILINGS[density]))
+    if (peclet, density) == STARVED:
+        yield studies(errors, {ITSELF_STARVED: (*EXPECTED[1], 6e-4)})
+
+
+@pytest.mark.case(
+    "transport-monod-collocation", kind="cross-code",
+    claim="Dual Monod uptake under plug flow is solve_bvp's at Peclet 0.1, 1, 5 times Thiele numbers 0.6, 1.9, 6, "
+          "from barely touched to starved",
+    norm="L2 of each substrate over the mesh, relative; starved: root mean square over the slab of C_A over its own "
+         "value; several meshes a size",
+    mutants=("decay-demand", "no-inlet-flux", "ratio-on-the-donor-only", "reaction-in-the-fluid",
+             "exchanged-substrates"),
+    references=("channel_bvp",), omitted="orders 2, 3: transport-monod-higher")
+@parametrize("order, peclet, density", combined(LINEAR, PECLETS, DENSITIES))
+def test_monod_collocation(order, peclet, density, record):
+    record(collocation(order, peclet, density))
+
+
+@pytest.mark.slow
+@pytest.mark.case(
+    "transport-monod-higher", kind="cross-code",
+    claim="Dual Monod uptake under plug flow on quadratic and cubic triangles is solve_bvp's, to third and fourth "
+          "order, at Peclet 0.5, 1, 5 (cubic: 1) times Thiele numbers 0.6, 1.9, 6, from barely touched to starved",
+    norm="root mean square over the mesh of both substrates less solve_bvp, over the supply",
+    mutants=("uptake-without-decay", "fluid-diffusivity", "reaction-evenly-weighted"), references=("channel_bvp",),
+    omitted="order 1: transport-monod-collocation")
+@parametrize(
+    "order, peclet, density",
+    {**combined({"quadratic": 2}, {"Pe = 0.5": 0.5, "Pe = 1": 1.0, "Pe = 5": 5.0}, DENSITIES),
+     **combined({"cubic": 3}, {"Pe = 1": 1.0}, DENSITIES)})
+def test_monod_higher(order, peclet, density, record):
+    record(collocation(order, peclet, density))
+
+
+def _distances(size: float, number: int, order: int, peclet: float, density: float, ends, tolerance: float
+               ) -> dict[str, float]:
+    """Size; of each substrate, over itself, of both, over the larger supply, and of the acceptor at the nodes of the
+    slab, place by place over itself."""
+    space, truth = spaced(size, number, order, ends), exact(peclet, density, tolerance)
+    ours, pieces = _ours(size, number, order, peclet, density, ends=ends)[0], space.reaction
+    nodes = pieces.cells[:, 0]
+    ratio = ours[0, nodes] / truth(space.points[nodes, 0])[0]
+    gap, whole = apart(space, ours, lambda x, y: truth(x))
+    return {"size": length(space, size), **dict(zip(NAMES, gap / whole)), "C": np.hypot(*gap) / pair("supply")[0],
+            ITSELF_STARVED: np.sqrt(np.average((ratio - 1) ** 2, weights=pieces.dx[:, 0]))}
+
+
+def _over_the_supply(gap: np.ndarray) -> dict[str, float]:
+    """Of each substrate the largest over the times of root mean squares over the places, gap (times, 2, ...), over its
+    supply."""
+    squares = np.mean(gap**2, axis=tuple(range(2, gap.ndim)))
+    return dict(zip(NAMES, np.sqrt(squares).max(axis=0) / pair("supply")))
+
+
+BOX, SIDE = 16.0, 8.0
+SUBSTRATES = changed(acceptor={"diffusivity": 8e6, "diffusivity_in_aggregate": 8e6},
+                     donor={"diffusivity": 4e6, "diffusivity_in_aggregate": 4e6})
+ITSELF = "donor in the biomass, over itself"
+#: Cells (um), and how many meshes of elements as long around the block.
+BLOCK = {2.0: 6, 1.0: 4, 0.5: 2, 0.25: 1}
+#: Elements (um) of order 2 and 3 around either, which err less than a tenth as much as the finest cells.
+FINE_AROUND = {"block": {2: 0.5, 3: 1.0}, "half-disc": {2: 1 / 3, 3: 2 / 3}}
+#: Cells (um), and the refinement that makes elements twice as long on average around the half-disc.
+DISC = {4 / 3: 0.35, 2 / 3: 0.77, 1 / 3: 1.55, 1 / 6: 3.1}
+CUT = ("second order: what the cut cells of py-pde take up is right, its place is off now to one side, now to "
+       "the other (with whole cells in or out it is 0.8 to 1.9)")
+#: Shape, order, density (mg/L), and the last errors of both substrates, and of the donor in the biomass.
+BLOCKS = {"X = 1e+05 mg/L, linear": ("block", 1, 1e5, 2e-5, 2e-5, 3e-5),
+          "X = 1e+06 mg/L, linear": ("block", 1, 1e6, 1e-4, 1e-4, 3e-4),
+          "X = 4e+06 mg/L, linear": ("block", 1, 4e6, 2e-4, 2e-4, 1e-3),
+          "X = 1e+06 mg/L, quadratic": ("block", 2, 1e6, 1e-4, 1e-4, 3e-4),
+          "X = 1e+06 mg/L, cubic": ("block", 3, 1e6, 1e-4, 1e-4, 3e-4)}
+HALF_DISCS = {"X = 1e+05 mg/L, linear": ("half-disc", 1, 1e5, 2e-5, 2e-5, 3e-5),
+              "X = 1e+06 mg/L, linear": ("half-disc", 1, 1e6, 1e-4, 1e-4, 4e-4),
+              "X = 1e+07 mg/L, linear": ("half-disc", 1, 1e7, 3e-4, 3e-4, 1e-2),
+              "X = 1e+06 mg/L, quadratic": ("half-disc", 2, 1e6, 1e-5, 1.5e-5, 4e-5),
+              "X = 1e+06 mg/L, cubic": ("half-disc", 3, 1e6, 1e-5, 1.5e-5, 4e-5)}
+
+
+def finite_differences(shape: str, order: int, density: float, *ceilings: float):
+    """Around the half-disc py-pde's finest cells alone are compared with elements of order 2 and 3: one after the other
+    they are off to one side or to the other, by no steady order."""
+    names, told = (*NAMES, ITSELF), ", of py-pde less ours"
+    if order > 1 and shape == "half-disc":
+        errors = _less(min(DISC), 0, density, shape, order)
+        return [at_most(name + told, errors[name], ceiling, "py-pde's error") for name, ceiling in zip(names, ceilings)]
+    samples, why = (BLOCK, "both of second order") if shape == "block" else (dict.fromkeys(DISC, 1), CUT)
+    if order > 1:
+        samples, why = dict.fromkeys(BLOCK, 1), "py-pde's second order"
+    rows = {name: (2, why, ceiling) for name, ceiling in zip(names, ceilings)}
+    return studies(refine(_less, samples, density, shape, order), rows, told if order > 1 else "")
+
+
+@pytest.mark.slow
+@pytest.mark.case(
+    "transport-block", kind="cross-code",
+    claim="Diffusion into a block of biomass on a wall is py-pde's, both codes refined together, at Thiele numbers "
+          "0.7, 2.2 and 4.3; with quadratic and cubic elements the transient scheme comes to rest in what py-pde's "
+          "cells come to",
+    norm="root mean square over py-pde's cells over the supply; that of C_D in the biomass over itself; several "
+         "meshes a size",
+    mutants=("one-supply-held", "reaction-in-the-fluid"), references=("diffusion_reaction_pypde",))
+@parametrize("shape, order, density, *ceilings", BLOCKS)
+def test_block(shape, order, density, ceilings, record):
+    record(finite_differences(shape, order, density, *ceilings))
+
+
+@pytest.mark.slow
+@pytest.mark.case(
+    "transport-half-disc", kind="cross-code",
+    claim="Diffusion into a half-disc is py-pde's, both codes refined together, at Thiele numbers 0.7, 2.2 and 7; "
+          "with quadratic and cubic elements the transient scheme comes to rest in what py-pde's cells come to",
+    norm="root mean square over py-pde's cells over the supply; that of C_D in the biomass over itself",
+    mutants=("ratio-on-the-donor-only",), references=("diffusion_reaction_pypde",))
+@parametrize("shape, order, density, *ceilings", HALF_DISCS)
+def test_half_disc(shape, order, density, ceilings, record):
+    record(finite_differences(shape, order, density, *ceilings))
+
+
+@cache
+def _pypde(cell: float, density: float, shape: str):
+    """(centres (n, 2), C (2, n), part (n,) of each cell that is biomass)."""
+    part = pypde.block(SIDE, SIDE) if shape == "block" else pypde.half_disc(SIDE)
+    box = pypde.Box(round(BOX / cell), BOX, BOX, part)
+    found = box.steady(pair("diffusivity", SUBSTRATES), pair("supply"), density, rates(SCENE.kinetics))
+    return box.points, found, box.part
+
+
+@cache
+def _settled(cell: float, number: int, density: float, shape: str, order: int) -> tuple[Space, np.ndarray]:
+    """C (2, n) of linear elements as long as py-pde's cells; of others, finer ones, as the transient scheme comes to
+    rest."""
+    if shape == "block":
+        straight = following(2 * SIDE**2, cell, number, (-BOX, BOX), BOX, lambda x, y: (np.abs(x) < SIDE) & (y < SIDE),
+                             across=(-SIDE, SIDE), along=(SIDE,))
+        space = meshes.space_on(straight, order)
+    else:
+        space = meshes.half_disc_space(SIDE, DISC[cell], (-BOX, BOX), BOX, order)
+    given = transport.problem(space, None, SUBSTRATES, SCENE.kinetics), Sink(filled(space, density))
+    return space, both(transport.steady(*given) if order == 1 else gear.settle(*given, None))
+
+
+def _less(cell: float, number: int, density: float, shape: str, order: int) -> dict[str, float]:
+    """Differences of both substrates over their supply, and of the donor in the biomass, the scarcer, over itself."""
+    points, theirs, part = _pypde(cell, density, shape)
+    elements = cell if order == 1 else FINE_AROUND[shape][order]
+    space, fields = _settled(elements, number, density, shape, order)
+    ours = meshes.field_at(space, fields.T, points).T
+    ratio = (ours / theirs)[1, part == 1] - 1
+    return {**_over_the_supply((ours - theirs)[None]), ITSELF: np.sqrt(np.mean(ratio**2))}
+
+
+#: Steps of each of the three intervals.
+STEPS = (16, 32, 64, 128)
+#: FiPy's cells (um), half as long as these, and the elements of order 2 and 3 that they are compared with, whose error
+#: is less than a tenth of theirs.
+CELLS, FINE = (4.0, 2.5, 5 / 3, 1.0), {2: 1.0, 3: 5 / 3}
+#: Steady and in time: elements (um) with how many meshes of each, why orders are of second order, the last error of a
+#: density of linear elements, and that of FiPy's cells less those of order 2 and 3.
+AGAINST_FIPY = {
+    False: (SAMPLES, "both codes are of second order", {3e3: 1e-6, 3e4: 6e-6, 3e5: 5e-5}, 6e-6),
+    True: (dict(zip(CELLS, (4, 3, 2, 1))), "both codes are of second order; the error in time is a tenth",
+           {3e3: 3e-6, 3e4: 3e-5, 3e5: 3e-4}, 1e-5)}
+
+
+def mass(space: Space) -> np.ndarray:
+    """(n, n) um2, the mass matrix on a straight mesh by scikit-fem; of linear functions lumped."""
+    if space.order == 1:
+        return np.diag(space.lumped())
+    grid = space.mesh.fem
+    basis = Basis(MeshTri(grid.p, grid.t), ELEMENTS[space.order], intorder=8)  # sorted, as edges of order 3 must be
+    _, same = cKDTree(basis.doflocs.T).query(space.points)
+    return poisson.mass.assemble(basis).toarray()[np.ix_(same, same)]
+
+
+def _exact_in_time(size: float, peclet: float, density: float, order: int) -> np.ndarray:
+    """(times, 2, n): the same equations in space, M dC/dt = b - L C - X q in the points of the reaction, by scipy's
+    integrator to 1e-8."""
+    space, law = spaced(size, 0, order), rates(LAW)
+    made, pieces = problem(space, speed_of(peclet), law=LAW), space.reaction
+    points = (pieces.values @ np.eye(space.count)[pieces.cells]).reshape(-1, space.count)
+    back, read = (np.kron(np.eye(2), part) for part in (np.linalg.inv(mass(space)), points))
+    load = filled(space, density).ravel()
+
+    def rise(_, y):
+        return back @ (made.source - made.operator @ y - read.T @ sink(read @ y, load, law))
+
+    def slope(_, y):
+        return back @ -(made.operator.toarray() + read.T @ slopes(read @ y, load, law) @ read)
+
+    found = solve_ivp(rise, (0.0, TIMES[-1]), made.supply, jac=slope, method="BDF", t_eval=TIMES, rtol=1e-8, atol=1e-8)
+    return found.y.T.reshape(len(TIMES), 2, -1)
+
+
+#: Order, Peclet number and density of what is studied in time, elements (um), and the last error.
+IN_TIME = {f"Pe = {peclet:g}, X = {density:g} mg/L, {word}": (ORDERS[word], peclet, density, size, ceiling)
+           for word, size, peclet, density, ceiling in (
+               ("linear", CELLS[0], 0.1, 3e5, 2e-5), ("linear", CELLS[0], 1.0, 3e4, 3e-6),
+               ("linear", CELLS[0], 5.0, 3e5, 1e-5), ("quadratic", CELLS[0], 1.0, 3e4, 3e-6),
+               ("quadratic", CELLS[0], 5.0, 3e5, 1e-5), ("cubic", 5.0, 1.0, 3e4, 3e-6), ("cubic", 5.0, 5.0, 3e5, 1e-5))}
+
+
+@pytest.mark.slow
+@pytest.mark.case(
+    "transport-gear-in-time", kind="cross-code",
+    claim="On a given mesh the modified Gear scheme's concentrations, linear, quadratic and cubic, are those of "
+          "scipy's integrator with scikit-fem's mass matrix, with an error of second order in the step",
+    norm="largest over three times of the root mean square over the nodes, over the supply",
+    mutants=("carry-of-bdf2", "backward-euler", "storage-of-the-biomass-alone", "storage-diagonal"),
+    references=("monod",))
+@parametrize("order, peclet, density, size, ceiling", IN_TIME)
+def test_gear_in_time(order, peclet, density, size, ceiling, record):
+    trusted = _exact_in_time(size, peclet, density, order)
+    errors = refine(lambda steps: {"size": TIMES[0] / steps, **_over_the_supply(
+        _ours(size, 0, order, peclet, density, steps) - trusted)}, STEPS)
+    record(studies(errors, each(2, "BDF2 after a first step of backward Euler", ceiling)))
+
+
+def _channel(size: float, peclet: float, density: float) -> channel_fipy.Channel:
+    """FiPy's, its cells half as long as our edges."""
+    return channel_fipy.Channel(round(2 * (CROSSED[1] - CROSSED[0]) / size), CROSSED, *given(peclet, density))
+
+
+@cache
+def _fipy(size: float, peclet: float, density: float, timed: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Centres of its cells (n,), and (times, 2, n) there."""
+    channel = _channel(size, peclet, density)
+    return channel.x, channel.transient(TIMES) if timed else channel.steady()[None]
+
+
+def _at_cells(x, size: float, number: int, order: int, *given) -> np.ndarray:
+    """(times, 2, 5, n) ours at x, at five heights."""
+    return at_heights(spaced(size, number, order), _ours(size, number, order, *given), x)
+
+
+def _rows(timed: bool) -> dict[str, tuple]:
+    rows = {**combined(LINEAR, PECLETS, DENSITIES), **combined(HIGHER, {"Pe = 1": 1.0}, {"X = 30000 mg/L": 3e4})}
+    return {label: (timed, *row) for label, row in rows.items()}
+
+
+def finite_volumes(timed: bool, order: int, peclet: float, density: float):
+    samples, why, ceilings, closest = AGAINST_FIPY[timed]
+    if order > 1:
+        errors = refine(_from_fipy, dict.fromkeys(CELLS, 1), order, peclet, density, timed)
+        yield studies(errors, each(2, "FiPy's second order", closest), " of FiPy less ours")
+        return
+    errors = refine(_from_fipy, samples, order, peclet, density, timed)
+    yield studies(errors, each(2, why, ceilings[density]))
+    if not timed and (peclet, density) == STARVED:
+        yield studies(errors, {ITSELF_STARVED: (2, why, 6e-4)})
+    if timed and (peclet, density) == SHARED:
+        errors = refine(_from_backward_euler, STEPS, peclet, density)
+        yield studies(errors, each(1, "the lower of the two: FiPy's TransientTerm is backward Euler", 3e-4),
+                      " less FiPy's in as many steps")
+
+
+@pytest.mark.slow
+@pytest.mark.case(
+    "transport-monod-fipy", kind="cross-code",
+    claim="Dual Monod uptake under plug flow is FiPy's, both codes refined together, at Peclet 0.1, 1, 5 times Thiele "
+          "numbers 0.6, 1.9, 6, from barely touched to starved; that of quadratic and cubic elements, on one mesh, is "
+          "what FiPy's cells come to",
+    norm="root mean square over FiPy's cells, at five heights, of each substrate over its supply, and in the starved "
+         "slab over its own value; several meshes a size",
+    mutants=("decay-demand", "no-inlet-flux"), references=("channel_fipy",))
+@parametrize("timed, order, peclet, density", _rows(False))
+def test_monod_fipy(timed, order, peclet, density, record):
+    record(finite_volumes(timed, order, peclet, density))
+
+
+@pytest.mark.slow
+@pytest.mark.case(
+    "transport-gear-fipy", kind="cross-code",
+    claim="Transient profiles of both substrates are FiPy's, both codes refined together in space, at Peclet 0.1, 1, "
+          "5 times Thiele numbers 0.6, 1.9, 6; and refined in time, where FiPy's own scheme is of first order; those "
+          "of quadratic and cubic elements, on one mesh, are what FiPy's cells come to",
+    norm="largest over three times of the root mean square over FiPy's cells, at five heights, over the supply; "
+         "several meshes a size",
+    mutants=("storage-of-the-biomass-alone", "storage-diagonal"), references=("channel_fipy",))
+@parametrize("timed, order, peclet, density", _rows(True))
+def test_gear_fipy(timed, order, peclet, density, record):
+    record(finite_volumes(timed, order, peclet, density))
+
+
+def _from_fipy(size: float, number: int, order: int, peclet: float, density: float, timed: bool) -> dict[str, float]:
+    """Both codes refined together, or FiPy's cells against one mesh of quadratic or cubic elements; in the starved slab
+    C_A over itself."""
+    x, theirs = _fipy(size, peclet, density, timed)
+    elements, steps = (size, STEPS[-1] / size) if order == 1 else (FINE[order], STEPS[-1])
+    ours = _at_cells(x, elements, number, order, peclet, density, round(timed * steps))
+    inside = (x > 0) & (x < SLAB)
+    ratio = ours[-1, 0][:, inside] / theirs[-1, 0, inside]
+    return {**_over_the_supply(ours - theirs[:, :, None]), ITSELF_STARVED: np.sqrt(np.mean((ratio - 1) ** 2))}
+
+
+def _from_backward_euler(steps: int, peclet: float, density: float) -> dict[str, float]:
+    size = CELLS[-1]
+    channel = _channel(size, peclet, density)
+    ours = _at_cells(channel.x, size, 0, 1, peclet, density, steps)
+    return {"size": TIMES[0] / steps, **_over_the_supply(ours - channel.backward_euler(TIMES, steps)[:, :, None])}
+
+
+WELL_MIXED, RADIUS = 24.0, 8.0
+SUPPLY, SEEDED = 1000.0, 300.0
+#: Times (h) at which both are compared; the transient scheme starts anew at each.
+HALF_DAYS = 12.0 * np.arange(1, 11)
+MIXED_STEPS = (2.0, 1.0, 0.5, 0.25)
+#: Last errors.
+MIXED = {"C_A": 4e-5, "C_D": 1.5e-5, "X_A": 6e-5, "X_I": 1e-4}
+#: Kinetics five times slower than the paper's, and half saturations of the supply's size: C falls for days.
+SLOW_LAW = replace(SCENE.kinetics, maximum_utilization_rate=SCENE.kinetics.maximum_utilization_rate / 5)
+EVEN = {"diffusivity": 1e8, "diffusivity_in_aggregate": 1e8, "supply": SUPPLY}
+CLOSED = replace(changed(acceptor={"half_saturation": 300.0, **EVEN}, donor={"half_saturation": 600.0, **EVEN}),
+                 boundary="closed")
+MIXED_NORM = "largest relative difference, twice a day for five days"
+
+
+@cache
+def box_around(order: int) -> Space:
+    """A box with a seed on its lower wall."""
+    seed = outline.half_disc(RADIUS, ACROSS_AGGREGATE * 0.5, min(order, 2))
+    return Space(meshes.around(seed, 0.3, (-WELL_MIXED, WELL_MIXED), WELL_MIXED)[0], order)
+
+
+@cache
+def _mixed_ours(step: float, order: int) -> np.ndarray:
+    """(times, 4, 2): mean and range of C_A and C_D over the nodes, of X_A and X_I over the points of the reaction, in
+    steps of so many hours."""
+    made = transport.problem(box_around(order), None, CLOSED, SLOW_LAW)
+    weight = made.space.reaction.dx
+    active = SEEDED * weight
+    inert = 0 * active
+    now = transport.supplied_everywhere(made)
+    rows = []
+    for interval in np.diff([0.0, *HALF_DAYS]):
+        done = gear.advance(made, active, inert, now, interval, fixed_step=step)
+        active = done.active
+        inert = done.inert
+        now = done.concentrations
+        fields = (now.acceptor, now.donor, active / weight, inert / weight)
+        rows.append([(field.mean(), np.ptp(field)) for field in fields])
+    return np.array(rows)
+
+
+def _theirs(order: int) -> np.ndarray:
+    """(times, 4) by scipy."""
+    space, law = box_around(order), rates(SLOW_LAW, CLOSED)
+    share = space.reaction.dx.sum() / space.at.dx.sum()
+
+    def right(_, y):
+        taken = share * np.array(uptake(y[0], y[1], law))
+        return y[2] * np.append(-taken, runs.growth_rates(SLOW_LAW, CLOSED, y[0], y[1]))
+
+    return solve_ivp(right, (0, HALF_DAYS[-1]), [SUPPLY, SUPPLY, SEEDED, 0.0], t_eval=HALF_DAYS, rtol=1e-11, atol=1e-10,
+                     method="DOP853").y.T
+
+
+def followed(order: int):
+    """How even the box is, and studies of the four."""
+    trusted = _theirs(order)
+    uneven = (_mixed_ours(MIXED_STEPS[-1], order)[:, :, 1] / trusted).max()
+    yield at_most("unevenness in the box", uneven, 1e-6, "L^2 / D over the time in which the supply lasts")
+    errors = refine(lambda step: {"size": step, **dict(zip(
+        MIXED, np.abs(_mixed_ours(step, order)[:, :, 0] / trusted - 1).max(axis=0)))}, MIXED_STEPS)
+    yield studies(errors, {name: (2, "BDF2, started anew ten times", ceiling) for name, ceiling in MIXED.items()})
+    if order == 1:
+        yield at_most("X at constant C, 12 min steps", _constant_supply(), 1e-9,
+                      "(9)-(10) are integrated exactly: round-off of 600 steps")
+
+
+@pytest.mark.case(
+    "transport-well-mixed", kind="cross-code",
+    claim="In a closed, well-mixed pore C_A, C_D, X_A and X_I follow the four ordinary equations over days, with an "
+          "error of second order in the step; at constant C the shape updates integrate X_A and X_I exactly",
+    norm=f"{MIXED_NORM}; X at constant C: relative, after five days",
+    mutants=("inert-fraction", "yield-dropped", "remains-of-the-start", "growth-in-one-increment"),
+    references=("monod",), omitted="orders 2, 3: transport-well-mixed-higher")
+@parametrize("order", combined(LINEAR))
+def test_well_mixed(order, record):
+    record(followed(order))
+
+
+@pytest.mark.slow
+@pytest.mark.case(
+    "transport-well-mixed-higher", kind="cross-code",
+    claim="With quadratic and cubic concentrations C_A, C_D, X_A and X_I of the well-mixed pore follow the four "
+          "ordinary equations alike",
+    norm=MIXED_NORM,
+    mutants=("storage-diagonal", "inert-fraction", "remains-of-the-start"), references=("monod",),
+    omitted="order 1: transport-well-mixed")
+@parametrize("order", combined(HIGHER))
+def test_well_mixed_higher(order, record):
+    record(followed(order))
+
+
+def _constant_supply() -> float:
+    """X_A and X_I as the quasi-steady scheme integrates them, over five days of 12 min updates."""
+    acceptor, donor = 400.0, 900.0
+    growth = kinetics.growth_rate(acceptor, donor, CLOSED, SLOW_LAW)
+    remains = kinetics.inert_rate(acceptor, CLOSED, SLOW_LAW)
+    active, inert = 3e4, 0.0
+    for _ in range(600):
+        active, inert = kinetics.grow(active, inert, growth, remains, 0.2)
+    rise, left = runs.growth_rates(SLOW_LAW, CLOSED, acceptor, donor)
+    risen = rise * HALF_DAYS[-1]
+    exact = 3e4 * np.array([np.exp(risen), left / rise * np.expm1(risen)])
+    return np.abs(np.array([active, inert]) / exact - 1).max()

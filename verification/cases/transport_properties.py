@@ -1,0 +1,340 @@
+"""What must hold whatever the solution is: the balance closes, nothing is negative, and there is one steady state.
+
+Substrates around a half-disc as scenes have them, sharp fronts and fast water among them, against finer meshes.
+
+A step of the midpoint rule takes up substrates with the mean biomass of the step, at concentrations at rest: with C_A
+and C_D constant over the step that is what (7)-(10) say, and what is made then balances what is taken up.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from functools import cache
+from itertools import product
+
+import numpy as np
+import pytest
+
+from reference.monod import uptake
+from repro.errors import Unresolved
+from repro.model import biomass, gear, kinetics, pore, remeshing, transport
+from repro.model.kinetics import Sink
+from repro.model.transport import Balance, Concentrations
+from repro.scene import Scene, load_scene
+from verification.cases.transport_codes import box_around
+from verification.evidence.cases import combined, parametrize
+from verification.evidence.checks import Check, Study, at_most, each_at_most, study
+from verification.problems import runs
+from verification.problems.channels import NAMES, ORDERS, SCENE, both, changed, rates
+
+SLOW = 0.35e6 / 24
+#: Radius (um), supplies of acceptor and donor (mg/L): pores under 0.35 m/d whose biomass could take up far more.
+STARVED = [(radius, *supplies) for radius in (27.0, 42.0)
+           for supplies in ((0.15, 0.15), (0.15, 10.0), (10.0, 0.15), (10.0, 10.0))]
+#: Changes of the scene base, which has the preset paper: elements of each order, curved ones coarser; and presets.
+KINDS = {"linear, paper": ('numerics.elements="linear"',),
+         "quadratic": ('numerics.elements="quadratic"', "numerics.refinement=0.5"),
+         "cubic": ('numerics.elements="cubic"', "numerics.refinement=0.4"),
+         "fast": ('numerics.preset="fast"',), "accurate": ('numerics.preset="accurate"',)}
+ROUND_OFF = "the sum of the weak form over its test functions; rows are solved to 1e-13 of terms 1e3 times the supply"
+
+
+@cache
+def _solved(kind: tuple[str, ...], radius: float, acceptor: float = 10.0, donor: float = 10.0,
+            speed: float | None = runs.SPEED, inlet: str = "local"):
+    """(Pore, Solved); speed: um/h, None: no flow."""
+    scene = load_scene("base", [f'aggregate.radius="{radius} um"', f'substrates.acceptor.supply="{acceptor} mg/L"',
+                                f'substrates.donor.supply="{donor} mg/L"', f'numerics.inlet="{inlet}"', *kind])
+    scene = runs.without_flow(scene) if speed is None else runs.at_velocity(scene, speed)
+    now = pore.seeded(scene)
+    return now, pore.solve(scene, now)
+
+
+def _defect(flux) -> float:
+    """(supplied - out - consumed) / supplied of a substrate."""
+    return (flux.supplied - flux.out - flux.consumed) / flux.supplied
+
+
+@pytest.mark.case(
+    "transport-balance", kind="property",
+    claim="Supply in = out + consumed to round-off, with flow and without; with the printed inlet (11) once its "
+          "(u_ave - u_x) C is counted [E4]; and supply in = out + consumed + stored in the transient scheme; with "
+          "linear, quadratic and cubic elements",
+    norm="supplied - out - consumed over supplied; in time, less what is stored",
+    mutants=("carried-by-u", "weights-of-the-ends", "ledger-of-backward-euler", "printed-inlet-forgotten",
+             "outlet-forgotten"))
+@parametrize("kind", combined(KINDS))
+def test_balance(kind, record):
+    pores = {"R = 5 um": _solved(kind, 5.0), "R = 40 um": _solved(kind, 40.0),
+             "R = 20 um, no flow": _solved(kind, 20.0, speed=None),
+             "R = 30 um, printed inlet": _solved(kind, 30.0, speed=SLOW, inlet="mean")}
+    for title, (now, solved) in pores.items():
+        beyond = _by_the_printed_inlet(now, solved) if "printed" in title else (0.0, 0.0)
+        for name, flux, enters in zip(NAMES, solved.fluxes, beyond):
+            record(at_most(f"{name}, {title}", abs(_defect(flux) - enters), 1e-9, ROUND_OFF))
+    timed = [pores["R = 5 um"], pores["R = 20 um, no flow"]]
+    if now.space.order == 1:
+        timed.append(_solved(kind, 42.0, 10.0, 0.15, SLOW))
+    record([_in_time(*found) for found in timed])
+
+
+def _by_the_printed_inlet(now, solved) -> list[float]:
+    """(u_ave - u_x) C of what is at the inlet, over the supply, of both substrates, as the weak form has it: lumped at
+    the nodes with linear elements. What enters is u_ave C_s less that."""
+    space = now.space
+    edges = space.dofs.inlet
+    apart = solved.flow.mean_velocity - solved.flow.velocity[:, 0]
+    weight = space.summed(edges, space.end_loads(edges, apart))
+    return [weight @ field / flux.supplied for field, flux in zip(both(solved.concentrations), solved.fluxes)]
+
+
+def _in_time(now, solved):
+    """From the supply everywhere, over 36 s in controlled steps."""
+    start = transport.supplied_everywhere(solved.problem)
+    done = gear.advance(solved.problem, now.active, now.inert, start, 0.01)
+    told = f"R = {now.outline.thickness:.0f} um, in time" + ("" if solved.flow else ", no flow")
+    return [at_most(f"{name}, {told}", abs(supplied - out - consumed - stored) / supplied, 3e-12,
+                    "fluxes are integrated by the formula of the concentrations: round-off")
+            for name, (supplied, out, consumed, stored) in zip(NAMES, zip(*done.flows))]
+
+
+@pytest.mark.case(
+    "transport-starved", kind="property",
+    claim="Starved pores (0.35 m/d, radius 27 and 42 um, supplies of 0.15 and 10 mg/L) have one steady state, C >= 0, "
+          "that closes the balance to round-off, whatever Newton's method starts from; the transient scheme comes to "
+          "rest in it; with quadratic and cubic elements C is no more below zero than is let pass",
+    norm="least C over the supply; balance as above; largest relative difference between ways to the steady state",
+    mutants=("newton-in-concentrations", "newton-stopped-early"))
+@parametrize(
+    "kind, radius, *supplies",
+    {f"R = {row[0]:g} um, supplies {row[1]:g}, {row[2]:g} mg/L, {label}": (kind, *row)
+     for (label, kind), row in product(KINDS.items(), STARVED)})
+def test_starved(kind, radius, supplies, record):
+    now, solved = _solved(kind, radius, *supplies, SLOW)
+    found, linear = both(solved.concentrations), now.space.order == 1
+    least = max(-(field.min() / supply) for field, supply in zip(found, supplies))
+    bound, why = (0.0, "C >= 0") if linear else (1e-3, "what is let pass as resolved")
+    record(at_most("least C below zero", max(least, 0.0), bound, why))
+    record(at_most("balance", max(abs(_defect(flux)) for flux in solved.fluxes), 1e-9, ROUND_OFF))
+    record(at_most("from other first iterates", _spread(now, solved, found), 1e-8, "one steady state"))
+    if linear and radius == STARVED[0][0]:
+        again = both(gear.settle(solved.problem, Sink(now.active), None))
+        record(at_most("the transient scheme at rest", np.abs(again / found - 1).max(), 1e-7,
+                       "it stops when 1e-9 of the supply is left to come"))
+
+
+def _spread(now, solved, found) -> float:
+    """From rich and from random first iterates, up to 30 mg/L: with linear elements over each concentration itself,
+    else, where they may be zero, over the supply."""
+    random = np.random.default_rng(1)
+    guesses = [np.full_like(found, 30.0), random.uniform(0, 30.0, found.shape), random.uniform(0, 0.1, found.shape)]
+    size = found if now.space.order == 1 else solved.problem.supply.reshape(2, -1)
+    again = [both(transport.steady(solved.problem, Sink(now.active), Concentrations(*guess))) for guess in guesses]
+    return max(np.abs((one - found) / size).max() for one in again)
+
+
+SUPPLY = SCENE.substrates.acceptor.supply
+PAPER, FAST, ACCURATE = map(runs.by, runs.PRESETS)
+#: What fronts are solved with, and how far its effluents may be from those far away.
+FINER = "numerics.refinement=0.45"
+SOLVED = {"fast": ((FAST, "numerics.refinement=0.25"), 1e-2), "accurate": ((FAST, FINER), 1e-3),
+          "linear": ((PAPER,), 1e-2)}
+CUBIC = {"cubic": ((FAST, runs.of("cubic"), FINER), 1e-3)}
+#: Half saturations, and the least, at which cubic elements would take minutes.
+HALVES = {f"K_s = {half}": half for half in ("1e-2 mg/L", "1e-3 mg/L")}
+LEAST = {"K_s = 1e-5 mg/L": "1e-5 mg/L"}
+
+
+@pytest.mark.case(
+    "transport-proportion", kind="property",
+    claim="Behind a front where the donor is used up, at half saturations of a hundredth of its supply, both are "
+          "taken up in their proportion, with linear, quadratic and cubic elements",
+    norm="consumed acceptor over F times consumed donor, less one",
+    mutants=("unpaired",), runs_with="2 paper")
+@parametrize("half, solved", combined({"K_s = 1e-2 mg/L": "1e-2 mg/L"}, {**SOLVED, **CUBIC}))
+def test_proportion(half, solved, record):
+    record(proportion(half, *solved[0]))
+
+
+def proportion(half: str, *numerics: str) -> Check:
+    """Consumed acceptor over consumed donor, over F, less one."""
+    acceptor, donor = _front(half, *numerics)
+    ratio = acceptor.consumed / donor.consumed / SCENE.kinetics.acceptor_to_donor_ratio
+    return at_most("proportion", abs(ratio - 1), 1e-9, "one rate for both: exact but for where Newton's method stops")
+
+
+@pytest.mark.slow
+@pytest.mark.case(
+    "transport-curved-front", kind="property",
+    claim="Behind a front where the donor is used up, to half saturations of a millionth of the supply, both are "
+          "taken up in their proportion, with linear and quadratic elements (cubic: a ten-thousandth), and what "
+          "leaves is within the presets' accuracy; where a mesh is refused, with the refinement that it names",
+    norm="consumed acceptor over F times consumed donor, less one; difference of effluents over the larger supply, to "
+         "a mesh of refinement 1.3",
+    mutants=("unpaired",), runs_with="2 paper")
+@parametrize("half, solved", combined(HALVES, {**SOLVED, **CUBIC}) | combined(LEAST, SOLVED))
+def test_curved_front(half, solved, record):
+    numerics, bound = solved
+    record(proportion(half, *numerics))
+    found, far = _front(half, *numerics), _front(half, FAST, "numerics.refinement=1.3")
+    apart = max(abs(a.effluent - b.effluent) for a, b in zip(found, far)) / SUPPLY
+    record(at_most("effluents", apart, bound, "what the preset is for"))
+
+
+@cache
+def _front(half: str, *numerics: str):
+    """Ledgers of a thick half-disc that the donor, 1 mg/L, does not pass, without decay; on elements that are graded to
+    the front, and if these are refused, with the refinement that is then advised."""
+    halves = (f'substrates.{name}.half_saturation="{half}"' for name in NAMES)
+    scene = _half_disc(100.0, 60.0, "0.29 m/day", *numerics, *halves, 'substrates.donor.supply="1 mg/L"',
+                       'kinetics.decay_coefficient="0 1/day"')
+    try:
+        return _resolved(scene)
+    except Unresolved as refusal:
+        advised = re.search(r"numerics\.refinement = ([\d.]+) resolves this state", str(refusal))
+        if advised is None:
+            raise
+    return _resolved(replace(scene, numerics=replace(scene.numerics, refinement=float(advised[1]))))
+
+
+def _resolved(scene: Scene):
+    return remeshing.resolved(scene, pore.seeded(scene))[1].fluxes
+
+
+def _half_disc(width: float, radius: float, speed: str, *changes: str) -> Scene:
+    """Of a pore of another width."""
+    return load_scene("wide", (f'pore.width="{width} um"', f'aggregate.radius="{radius} um"',
+                               f'flow.mean_velocity="{speed}"', *changes))
+
+
+@cache
+def _carried(*given):
+    """Ledgers of a half-disc at t = 0, on the first mesh that is made."""
+    scene = _half_disc(*given)
+    return pore.solve(scene, pore.seeded(scene)).fluxes
+
+
+WITHIN = "0.1 %, what preset accurate is for"
+TENTH = "a tenth of what preset fast is for"
+#: A half-disc under fast water: its numerics, how far effluents and consumption may be from those of quadratic elements
+#: of refinement 2.5, and why.
+FASTEST = {"quadratic, accurate": ((ACCURATE, runs.of("quadratic"), FINER), 1e-3, WITHIN),
+           "cubic": ((ACCURATE, runs.of("cubic"), FINER), 1e-3, WITHIN),
+           "fast": ((FAST,), 1e-3, TENTH + ": its elements there are accurate's")}
+
+
+@pytest.mark.slow
+@pytest.mark.case(
+    "transport-curved-peclet", kind="property",
+    claim="In fast water (u W / D to 3e4) the boundary layers that the presets make their elements for are resolved "
+          "to 0.1 %, by accurate with quadratic and with cubic elements, and by fast",
+    norm="difference of effluents, over the supply, and of consumption, relative, to a mesh of refinement 2.5",
+    mutants=("layers-ignored",), omitted="order 1 and paper: linear elements are not made for boundary layers")
+@parametrize("speed, made", combined( {speed: speed for speed in ("2.9 m/day", "29 m/day", "290 m/day")}, FASTEST))
+def test_curved_peclet(speed, made, record):
+    numerics, bound, why = made
+    far = _carried(100.0, 60.0, speed, ACCURATE, "numerics.refinement=2.5")
+    for name, ours, trusted in zip(NAMES, _carried(100.0, 60.0, speed, *numerics), far):
+        record(each_at_most({"effluent": abs(ours.effluent - trusted.effluent) / SUPPLY,
+                             "consumed": abs(ours.consumed / trusted.consumed - 1)}, bound, why, f" {name}"))
+
+
+#: The balance's round-off, and how far effluents may be from those of quadratic elements twice finer: of numerics.
+CONSERVES = 1e-11, "round-off: the form conserves"
+HALF_DISCS = {
+    "cubic": ((ACCURATE, runs.of("cubic")), CONSERVES, 1e-5, "a hundredth of what preset accurate is for"),
+    "quadratic": ((ACCURATE, "numerics.refinement=0.9"), CONSERVES, 0.0, "itself what the others are compared with"),
+    "linear, paper": ((PAPER,), (1e-9, ROUND_OFF), 1e-2, "1 %, what preset paper is for"),
+    "fast": ((FAST,), CONSERVES, 1e-3, TENTH),
+    "accurate": ((ACCURATE,), CONSERVES, 1e-4, "a tenth of what preset accurate is for")}
+
+
+@pytest.mark.case(
+    "transport-cubic-half-disc", kind="property",
+    claim="Around a half-disc, under the flow of cubic velocities, each substrate is in balance to round-off, and the "
+          "effluents are those of quadratic elements on a mesh twice finer; so are those of the presets, to what they "
+          "are for",
+    norm="(in - out - consumed) over what comes in; difference over the supply to quadratic concentrations",
+    mutants=("cubic-edge-nodes", "outlet-forgotten"))
+@parametrize("numerics, round_off, bound, why", HALF_DISCS)
+def test_cubic_half_disc(numerics, round_off, bound, why, record):
+    far = _carried(50.0, 40.0, "2.9 m/day", *HALF_DISCS["quadratic"][0])
+    for name, ours, theirs in zip(NAMES, _carried(50.0, 40.0, "2.9 m/day", *numerics), far):
+        record(at_most(f"balance, {name}", abs(_defect(ours)), *round_off))
+        if bound:
+            record(at_most(f"effluent, {name}", abs(ours.effluent - theirs.effluent) / SUPPLY, bound, why))
+
+
+#: Lengths of a step (h); X_A more than doubles in the last.
+HOURS = (0.2, 2.0, 8.0)
+#: The paper's kinetics and diffusivities, the supply held at both ends: both substrates fall towards the wall.
+OPEN = changed(acceptor={"supply": 1.0})
+#: Elements of each order on a mesh of their own, and those of presets.
+MEAN: dict[str, int | str] = {**ORDERS, "paper": PAPER, "fast": FAST, "accurate": ACCURATE}
+
+
+def _open(made: int | str) -> transport.Problem:
+    """Around a half-disc: of an order, or with the elements of a preset."""
+    if isinstance(made, int):
+        space = box_around(made)
+    else:
+        space = pore.seeded(_half_disc(50.0, 20.0, "2.9 m/day", made)).space
+    return transport.problem(space, None, OPEN, SCENE.kinetics)
+
+
+@pytest.mark.case(
+    "transport-mean-biomass", kind="exact",
+    claim="With the mean biomass of a step of hours, biomass made is Y donor - (acceptor - F donor) / d_c of what is "
+          "taken up, to round-off, wherever concentrations are; at constant ones the uptake is the integral of "
+          "(7)-(10) over the step; and the tangent is the uptake's derivative",
+    norm="biomass made less Y donor - (acceptor - F donor) / d_c, over what is made; uptake at constant C, relative; "
+         "remainder of a first-order Taylor expansion",
+    mutants=("biomass-of-the-start", "biomass-half-way", "mean-biomass-constant-in-c"), references=("monod",))
+@parametrize("made", combined(MEAN))
+def test_mean_biomass(made, record):
+    problem = _open(made)
+    for hours in HOURS:
+        record(_balanced(problem, hours))
+        record(_integrated(problem, hours))
+    record(_tangent(problem, HOURS[-1]))
+
+
+def _balanced(problem: transport.Problem, hours: float) -> Check:
+    """Biomass made against uptake, at the steady concentrations of a step."""
+    law = SCENE.kinetics
+    active = law.maximum_density * problem.space.reaction.dx
+    sink = Sink(active, hours)
+    state = transport.steady(problem, sink)
+    acceptor, donor = (hours * flux.consumed for flux in transport.fluxes(problem, sink, state))
+    found = biomass.rates(problem.space, state, OPEN, law)
+    grown = np.sum(kinetics.grow(active, 0 * active, found.growth, found.remains, hours)) - active.sum()
+    F, d_c = law.acceptor_to_donor_ratio, law.decay_oxygen_demand
+    asked = law.yield_coefficient * donor - (acceptor - F * donor) / d_c
+    return at_most(f"biomass made, {hours:g} h", abs(grown - asked) / grown, 1e-12,
+                   "one integral of growth and uptake in each point: round-off")
+
+
+def _integrated(problem: transport.Problem, hours: float) -> Check:
+    """Uptake at constant concentrations against the integral of (7)-(10) over the step, in which X_A grows as an
+    exponential."""
+    given, seeded = np.array([0.7, 4.0]), 300.0
+    everywhere = Concentrations(*np.outer(given, np.ones(problem.space.count)))
+    ours = transport.fluxes(problem, Sink(seeded * problem.space.reaction.dx, hours), everywhere)
+    sinks = uptake(*given, rates(SCENE.kinetics, OPEN))
+    growth, _ = runs.growth_rates(SCENE.kinetics, OPEN, *given)
+    found = seeded * np.array(sinks) * np.expm1(growth * hours) / growth
+    taken = hours * np.array([flux.consumed for flux in ours]) / problem.space.reaction.dx.sum()
+    return at_most(f"uptake at constant C, {hours:g} h", np.abs(taken / found - 1).max(), 1e-10,
+                   "the integral of an exponential: round-off")
+
+
+def _tangent(problem: transport.Problem, hours: float) -> Study:
+    """Remainders of the residual along a direction."""
+    random = np.random.default_rng(13)
+    balance = Balance(problem, Sink(SCENE.kinetics.maximum_density * problem.space.reaction.dx, hours))
+    state, along = random.uniform(0.5, 1.0, (2, 2 * problem.space.count))
+    steps = 0.05 * 0.5 ** np.arange(4)
+    linear, start = problem.system.product(balance.tangent(state), along), balance.residual(state)
+    left = [np.abs(balance.residual(state + s * along) - start - s * linear).max() for s in steps]
+    return study(f"tangent, {hours:g} h", steps, left, 2, "Taylor's theorem: second order")

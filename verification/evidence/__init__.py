@@ -1,0 +1,1 @@
+"""The evidence that cases record: checks and studies, the plugin of pytest that collects them, and the pages."""

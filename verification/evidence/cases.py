@@ -1,0 +1,150 @@
+"""The registry: every verification case, read from the marks of the test functions in ``verification/cases``.
+
+A case is a test function with ``@pytest.mark.case``. Each of its parameter sets is a variant. The fields of the mark
+are those of :class:`Case` up to ``omitted``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from itertools import product
+from pathlib import Path
+from pkgutil import iter_modules
+
+import pytest
+
+from verification.evidence.writing import ROOT
+
+FOLDER = ROOT / "verification" / "cases"
+KINDS = ("exact", "manufactured", "cross-code", "property")
+#: Modules of a stage begin with its name: flow.py, flow_codes.py.
+STAGES = ("flow", "transport", "growth", "reprojection", "mesh_motion", "coupling", "hard")
+#: Numerics that a case may run with: elements of order 1, 2 and 3, and the presets of whole scenes.
+NUMERICS = ("1", "2", "3", "paper", "fast", "accurate", "exact")
+#: The numerics that a word of a label stands for, unless it is one of them itself.
+OF_LABELS = {"linear": "1", "quadratic": "2", "cubic": "3", "order 1": "1", "order 2": "2", "order 3": "3",
+             "straight": "1", "curved": "2", "of cubic scenes": "3"}
+
+
+@dataclass(frozen=True)
+class Case:
+    """A verification case.
+
+    Parameters
+    ----------
+    id : str
+        The stage and the name, "flow-poiseuille".
+    kind : str
+        One of KINDS.
+    claim : str
+        What holds, in one sentence.
+    norm : str
+        What is measured and how.
+    mutants : tuple of str
+        Ids of wrong changes of the code. The case must fail with each of them.
+    references : tuple of str
+        Modules of ``reference`` that it uses.
+    runs_with : str
+        Those of NUMERICS that it runs with, apart from those that the labels of its variants name.
+    omitted : str
+        Why it does not run with the others.
+    slow : bool
+        Whether ``make verify-fast`` leaves it out.
+    file : Path
+        The module that it is defined in.
+    variants : dict
+        {label: test id of pytest}.
+    """
+
+    id: str
+    kind: str
+    claim: str
+    norm: str
+    mutants: tuple[str, ...]
+    references: tuple[str, ...] = ()
+    runs_with: str = ""
+    omitted: str = ""
+    slow: bool = False
+    file: Path = FOLDER
+    variants: Mapping[str, str] = ()
+
+    def __post_init__(self):
+        if self.kind not in KINDS or not all((self.claim, self.norm, self.mutants)):
+            raise ValueError(f"{self.id}: of an unknown kind, or without claim, norm or mutants")
+
+    @property
+    def stage(self) -> str:
+        """The one of STAGES that its module belongs to."""
+        return next(stage for stage in STAGES if self.file.stem.startswith(stage))
+
+    @property
+    def numerics(self) -> tuple[str, ...]:
+        """Those of NUMERICS that it runs with. Raises ValueError if ``runs_with`` names another."""
+        words = {OF_LABELS.get(word, word) for label in self.variants for word in label.split(", ")}
+        added = {*self.runs_with.split()}
+        if not added <= {*NUMERICS}:
+            raise ValueError(f"{self.id}: {', '.join(sorted(added - {*NUMERICS}))} are none of {', '.join(NUMERICS)}")
+        return tuple(name for name in NUMERICS if name in words | added)
+
+
+def parametrize(names: str, variants: Mapping[str, tuple]) -> pytest.MarkDecorator:
+    """``pytest.mark.parametrize`` over variants {label: values}, with the labels as ids.
+
+    A last name with a star, as in "bound, *changes", takes the tuple of the remaining values.
+    """
+    *first, last = names.split(", ")
+    rows = {label: (*row[:len(first)], row[len(first):]) if last[0] == "*" else row for label, row in variants.items()}
+    sets = [pytest.param(*row, id=label) for label, row in rows.items()]
+    return pytest.mark.parametrize([*first, last.lstrip("*")], sets)
+
+
+def combined(*axes: Mapping[str, object]) -> dict[str, tuple]:
+    """{label: values} of every combination of some axes {label: value}."""
+    rows = [zip(*chosen) for chosen in product(*map(dict.items, axes))]
+    return {", ".join(labels): values for labels, values in rows}
+
+
+def label_of(id: str, parameters: str) -> str:
+    """The label of a variant, given the id that pytest makes of its parameters: a table of cases begins it with the
+    id of the case."""
+    return parameters.removeprefix(f"{id}, ")
+
+
+@cache
+def cases() -> dict[str, Case]:
+    """All cases by id, in the order of the stages. Raises ValueError if two have the same id."""
+    modules = [import_module(f"verification.cases.{module.name}") for module in iter_modules([FOLDER])]
+    known: dict[str, Case] = {}
+    for case in (case for module in modules for function in vars(module).values() for case in _cases_of(function)):
+        if case.id in known:
+            raise ValueError(f"{case.id}: two cases have this id")
+        known[case.id] = case
+    return dict(sorted(known.items(), key=lambda item: (STAGES.index(item[1].stage), item[0])))
+
+
+def _cases_of(function) -> Iterator[Case]:
+    """The cases of a test function: one, or one for each group of parameter sets that bears the mark itself."""
+    marks = getattr(function, "pytestmark", ())
+    tests: dict[str, dict[str, str]] = {}
+    found = {}
+    for parameters, own in _parameter_sets(marks):
+        every = [*marks, *own]
+        for mark in (mark for mark in every if mark.name == "case"):
+            id = mark.args[0]
+            slow = any(mark.name == "slow" for mark in every)
+            file = Path(function.__code__.co_filename)
+            test = f"{file.relative_to(ROOT)}::{function.__name__}" + (f"[{parameters}]" if parameters else "")
+            tests.setdefault(id, {})[label_of(id, parameters)] = test
+            found[id] = Case(id, **mark.kwargs, slow=slow, file=file, variants=tests[id])
+    yield from found.values()
+
+
+def _parameter_sets(marks: Iterable) -> Iterator[tuple[str, list]]:
+    """The ids that pytest makes of the parameters of a function, and the marks that a set of them bears itself."""
+    axes = [mark.args[1] for mark in marks if mark.name == "parametrize"]
+    for chosen in product(*axes):
+        ids = [str(getattr(value, "id", value)) for value in chosen]
+        yield "-".join(ids), [mark for value in chosen for mark in getattr(value, "marks", ())]

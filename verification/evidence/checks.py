@@ -1,0 +1,212 @@
+"""What a case records: checks and studies. The verdict follows from the numbers alone.
+
+A check is a number with the interval that it must lie in. A study is a series of errors on at least four unrelated
+meshes or steps. Its orders between neighbours are judged on both sides, because an order above its band is as
+unexpected as one below it. Each states the origin of its interval.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import floor, inf, isfinite, log10
+
+import numpy as np
+
+#: A number whose tolerance is smaller is round-off. It differs between machines, so the pages leave it out.
+ROUND_OFF = 1e-6
+
+
+@dataclass(frozen=True)
+class Check:
+    """One number, the interval that it must lie in, and the origin of that interval."""
+
+    quantity: str
+    value: float
+    low: float
+    high: float
+    origin: str
+
+    @property
+    def holds(self) -> bool:
+        """Whether the number lies in its interval. Not-a-number never does."""
+        return bool(self.low <= self.value <= self.high)
+
+    @property
+    def measured(self) -> str:
+        """The number, rounded to a twentieth of its tolerance: stable from run to run."""
+        return rounded(self.value, self.tolerance / 20)
+
+    @property
+    def reproducible(self) -> str:
+        """The number rounded to half of its tolerance, as any machine finds it; empty if it is round-off."""
+        return rounded(self.value, self.tolerance / 2) if self.tolerance >= ROUND_OFF else ""
+
+    @property
+    def _two_sided(self) -> bool:
+        return isfinite(self.low) and isfinite(self.high) and self.low != 0
+
+    @property
+    def tolerance(self) -> float:
+        """Half the width of a two-sided interval, else the size of its bound."""
+        if self._two_sided:
+            return (self.high - self.low) / 2
+        return abs(self.high if isfinite(self.high) else self.low)
+
+    @property
+    def used(self) -> float:
+        """The share of the tolerance that the number uses, from 0 to 1 if it holds."""
+        if self._two_sided:
+            return abs(self.value - self.low - self.tolerance) / self.tolerance
+        bound = self.high if isfinite(self.high) else self.low
+        return max(0.0, self.value / bound) if bound else 0.0
+
+    def interval(self, digits: int = 6) -> str:
+        """The interval in words. Pages show 3 digits: some bounds are computed, and differ in the last ones."""
+        if self._two_sided:
+            return f"{self.low:.{digits}g} to {self.high:.{digits}g}"
+        return f"at most {self.high:.3g}" if isfinite(self.high) else f"at least {self.low:.3g}"
+
+
+def at_most(quantity: str, value: float, bound: float, origin: str) -> Check:
+    """A size, for instance of an error: from zero to a bound."""
+    return Check(quantity, float(value), 0.0, bound, origin)
+
+
+def at_least(quantity: str, value: float, bound: float, origin: str) -> Check:
+    """A number that must not be under a bound."""
+    return Check(quantity, float(value), bound, inf, origin)
+
+
+def between(quantity: str, value: float, low: float, high: float, origin: str) -> Check:
+    """A number that must lie in a range."""
+    return Check(quantity, float(value), low, high, origin)
+
+
+def each_at_most(values: Mapping[str, float], bound: float, origin: str, suffix: str = "") -> list[Check]:
+    """Sizes by name that have one bound; the suffix ends each name."""
+    return [at_most(name + suffix, value, bound, origin) for name, value in values.items()]
+
+
+def largest(values: np.ndarray) -> float:
+    """The largest size of some numbers."""
+    return float(np.abs(values).max())
+
+
+def rounded(value: float, quantum: float) -> str:
+    """The value to the power of ten at or under ``quantum``; a smaller size reads "under" that power."""
+    if not isfinite(value) or quantum <= 0:
+        return f"{value:.3g}"
+    unit = 10.0 ** floor(log10(quantum))
+    steps = round(value / unit)
+    if steps == 0:
+        return f"under {unit:.0e}"
+    digits = max(0, floor(log10(abs(steps)))) + 1
+    return f"{steps * unit:.{digits}g}"
+
+
+MIN_SIZES = 4
+#: Half width of the band around an expected order. Errors on unrelated meshes scatter by a tenth or two. Between
+#: neighbours whose sizes differ by a factor of 2 that is an order of 0.2 or 0.3.
+BAND = 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """Errors (k,) on falling sizes (k,). The orders between neighbours must lie from low to high.
+
+    The last error must not exceed the ceiling. The origin says why the order is expected.
+    """
+
+    quantity: str
+    sizes: np.ndarray
+    errors: np.ndarray
+    low: float
+    high: float
+    origin: str
+    ceiling: float = inf
+
+    def __post_init__(self):
+        if len(self.sizes) < MIN_SIZES or len(self.sizes) != len(self.errors) or not (np.diff(self.sizes) < 0).all():
+            raise ValueError(f"{self.quantity}: a study takes {MIN_SIZES} or more falling sizes, and an error of each")
+
+    @property
+    def orders(self) -> np.ndarray:
+        """(k - 1,) log of the ratio of errors over log of the ratio of sizes; infinite or not-a-number where an error
+        is not positive and finite."""
+        with np.errstate(all="ignore"):
+            return np.diff(np.log(self.errors)) / np.diff(np.log(self.sizes))
+
+    @property
+    def holds(self) -> bool:
+        """Whether all orders lie in the band and the last error is under its ceiling."""
+        orders = self.orders
+        return bool(((self.low <= orders) & (orders <= self.high)).all() and self.errors[-1] <= self.ceiling)
+
+    @property
+    def measured(self) -> str:
+        """Orders to a tenth, and the last error to one digit."""
+        last = float(self.errors[-1])
+        known = isfinite(self.ceiling)
+        return f"{self.reproducible}; last error {rounded(last, self.ceiling / 20) if known else f'{last:.0e}'}"
+
+    @property
+    def reproducible(self) -> str:
+        """Orders to a tenth, as any machine finds them."""
+        return f"order {', '.join(f'{order:.1f}' for order in self.orders)}"
+
+    def interval(self, digits: int = 3) -> str:
+        """The band, and the ceiling if there is one."""
+        band = f"order {self.low:.{digits}g} to {self.high:.{digits}g}"
+        return band if self.ceiling == inf else f"{band}; at most {self.ceiling:.3g}"
+
+
+def around(order: float, band: float = BAND) -> tuple[float, float]:
+    """The lowest and the highest order of a band around one."""
+    return order - band, order + band
+
+
+def study(quantity: str, sizes, errors, order: float, origin: str, *, ceiling: float = inf,
+          band: float = BAND) -> Study:
+    """A study whose orders are expected within ``band`` of ``order``."""
+    return Study(quantity, np.asarray(sizes, float), np.asarray(errors, float), *around(order, band), origin, ceiling)
+
+
+def studies(errors: Mapping[str, np.ndarray], rows: Mapping[str, tuple], suffix: str = "") -> list[Study]:
+    """Studies of fields from :func:`refine`. rows: {field: (order, or the lowest and the highest order; its origin;
+    ceiling of the last error)}; the suffix ends each name."""
+    bands = {name: row[0] if isinstance(row[0], tuple) else around(row[0]) for name, row in rows.items()}
+    return [Study(name + suffix, errors["size"], errors[name], *bands[name], *row[1:]) for name, row in rows.items()]
+
+
+def refine(measure: Callable[..., dict[str, float]], sizes: Iterable[float] | Mapping[float, int],
+           *arguments) -> dict[str, np.ndarray]:
+    """Errors (k,) of each field on each size: ``measure(size, *arguments)`` gives {field: error}.
+
+    With sizes {size: how many unrelated meshes of it}, root mean squares of ``measure(size, number, *arguments)`` over
+    the meshes of each, and the "size" of each unless that is measured too.
+    """
+    if isinstance(sizes, Mapping):
+        rows = [{"size": size, **_averaged(measure, size, count, arguments)} for size, count in sizes.items()]
+    else:
+        rows = [measure(size, *arguments) for size in sizes]
+    return columns(rows)
+
+
+def columns(rows: Sequence[Mapping[str, float]]) -> dict[str, np.ndarray]:
+    """{name: (k,)} of rows {name: number}, all of the same names."""
+    return dict(zip(rows[0], np.array([[*row.values()] for row in rows]).T))
+
+
+def _averaged(measure: Callable, size: float, count: int, arguments: tuple) -> dict[str, float]:
+    rows = [measure(size, number, *arguments) for number in range(count)]
+    return {name: float(np.sqrt(np.mean(values**2))) for name, values in columns(rows).items()}
+
+
+def flat(evidence: Check | Study | Iterable) -> Iterator[Check | Study]:
+    """Checks and studies one by one, from nested lists or generators of them."""
+    if isinstance(evidence, Iterable):
+        for part in evidence:
+            yield from flat(part)
+    else:
+        yield evidence

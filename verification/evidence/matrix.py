@@ -1,0 +1,203 @@
+"""What verifies what: ``python -m verification.evidence.matrix`` writes ``verification/report/matrix.md``.
+
+The first table has the cases by the elements and presets that they run with. The second has the paper's equations by
+the modules that solve them, the cases that must fail with a wrong change of these, the references of those cases, and
+the claims of the sections. Every column is derived, from the table of modules in ``repro/__init__.py`` and the
+registries, and nothing may be missing in any (:func:`orphans`).
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from dataclasses import dataclass
+from functools import cache
+from itertools import product, starmap
+
+import repro
+from verification.evidence.cases import NUMERICS, Case, cases
+from verification.evidence.writing import REPORT, ROOT, Block, markdown, table
+from verification.mutants import runner
+
+FILE = REPORT / "matrix.md"
+ORDERS, PRESETS = NUMERICS[:3], NUMERICS[3:]
+#: Why a case does not run with presets, or not with all of them.
+ALONE = "presets: the stage alone, with the elements that they choose"
+ONE_BY_ONE = "other presets: their elements, by themselves"
+#: Why cases of a stage that run with accurate do not run with exact, where the case does not say it.
+SAME = "exact: the elements and the order of accurate"
+EXACT = {"flow": SAME, "transport": SAME,
+         "hard": "exact: the scheme of accurate, and some times slower; its contact and remeshes: coupling-contact, "
+                 "coupling-ledger"}
+#: A line of the table: sections and words, equations, modules, and a remark.
+LINE = re.compile(r"^ {4,}(\S.*?)\s{3,}((?:\(\d+\)[-, ]*)+)?\s*(repro\.[\w.]+(?:, \.\w+)*)(?:[: ].*)?$")
+#: The sections at the start of its first part: "3.1, 3.5", "2.1-2.3".
+SECTIONS = re.compile(r"(?:Table 1|[\d.]+(?:-[\d.]+)?|, )*")
+#: An import of a module of ``reference``.
+REFERENCE = re.compile(r"^\s*from reference(?:\.(\w+))? import (.+)$", re.M)
+
+
+@dataclass(frozen=True)
+class Part:
+    """A line of the table of modules: "2.1, 3.2 flow", its sections, "(1)-(6)", and files."""
+
+    name: str
+    sections: tuple[str, ...]
+    equations: str
+    files: tuple[str, ...]
+
+
+@cache
+def parts() -> tuple[Part, ...]:
+    """The table of modules that ``repro/__init__.py`` has."""
+    head = (repro.__doc__ or "").partition("Where data enters")[0]
+    return tuple(_part(*found.groups("")) for found in map(LINE.match, head.splitlines()) if found)
+
+
+def _part(name: str, equations: str, names: str) -> Part:
+    first, *rest = names.split(", ")
+    package = first if _file(first).endswith("/") else first.rpartition(".")[0]
+    files = _file(first), *(_file(package + module) for module in rest)
+    places = SECTIONS.match(name)[0].split(", ")
+    sections = tuple(section for place in places for section in _ranged(place) if section)
+    return Part(" ".join(name.split()), sections, equations.strip(" ,"), files)
+
+
+def _ranged(place: str) -> list[str]:
+    """["2.1", "2.2", "2.3"] of "2.1-2.3"."""
+    first, _, last = place.partition("-")
+    if not last:
+        return [first]
+    chapter, low = first.split(".")
+    return [f"{chapter}.{number}" for number in range(int(low), int(last.split(".")[1]) + 1)]
+
+
+def _file(module: str) -> str:
+    """A module's file; a package's folder."""
+    path = module.replace(".", "/")
+    return f"{path}/" if (ROOT / path).is_dir() else f"{path}.py"
+
+
+def row(case: Case) -> tuple[str, ...]:
+    """A line of the first table."""
+    run = "slow" if case.slow else "run"
+    return (case.id, *(run if name in case.numerics else "n/a" for name in NUMERICS), reasons(case))
+
+
+def reasons(case: Case) -> str:
+    """Why it does not run with the others; "" where it runs with all."""
+    missing = _unexplained_presets(case)
+    default = ONE_BY_ONE if missing else ""
+    if missing == PRESETS:
+        default = ALONE
+    elif _exact_alone(case):
+        default = EXACT.get(case.stage, "")
+    return "; ".join(filter(None, (case.omitted, default)))
+
+
+def _unexplained_presets(case: Case) -> tuple[str, ...]:
+    """The presets that it neither runs with nor tells of."""
+    return tuple(preset for preset in PRESETS if preset not in case.numerics and preset not in case.omitted)
+
+
+def _exact_alone(case: Case) -> bool:
+    """Does it tell of all presets but exact, and run with accurate?"""
+    return "accurate" in case.numerics and _unexplained_presets(case) == ("exact",)
+
+
+def unexplained() -> list[str]:
+    """Cases that do not run with an order of elements, with nothing at all, or with accurate and not with exact, and do
+    not say why."""
+    return [case.id for case in cases().values()
+            if not case.numerics or ({*ORDERS} - {*case.numerics} and not case.omitted)
+            or (_exact_alone(case) and case.stage not in EXACT)]
+
+
+def line(part: Part) -> tuple[str, ...]:
+    """A line of the second table."""
+    modules = [file.removeprefix("repro/") for file in part.files]
+    columns = (modules, cases_of(part), references_at(part), mutants_of(part), claims_of(part))
+    return (part.name, part.equations, *(", ".join(column) or "-" for column in columns))
+
+
+def mutants_of(part: Part) -> list[str]:
+    """Ids of the wrong changes to its files."""
+    return [id for id, mutant in runner.everything().items() if mutant.file.startswith(part.files)]
+
+
+def cases_of(part: Part) -> list[str]:
+    """Ids of the cases that name one of them."""
+    wrong = {*mutants_of(part)}
+    return [case.id for case in cases().values() if wrong & {*case.mutants}]
+
+
+def references_at(part: Part) -> list[str]:
+    """Modules of ``reference`` that these use."""
+    return sorted({name for id in cases_of(part) for name in references_of(cases()[id])})
+
+
+def claims_of(part: Part) -> list[str]:
+    """Ids of the claims of its sections; figures, plates and discussion are of the results."""
+    return [id for id, sections in sorted(claims().items())
+            if any(starmap(_within, product(sections, part.sections)))]
+
+
+def _within(section: str, own: str) -> bool:
+    return section == own or section.startswith(f"{own}.")
+
+
+@cache
+def claims() -> dict[str, list[str]]:
+    """{claim: sections that it is of}."""
+    from verification.claims import CLAIMS, evaluate
+    evaluate.register_all()
+    return {claim.id: [*map(_section, claim.where.split(","))] for claim in CLAIMS.values()}
+
+
+def _section(place: str) -> str:
+    """A section's number; 4 for a figure, a plate, the introduction and the discussion."""
+    return place.strip() if re.fullmatch(r"[23][\d.]*|Table 1", place.strip()) else "4"
+
+
+def references_of(case: Case) -> set[str]:
+    """The modules of ``reference`` that a case names, and those that they import."""
+    return {*case.references}.union(*map(_imported, case.references))
+
+
+def _imported(name: str) -> set[str]:
+    """The modules of ``reference`` that one of them imports."""
+    imports = REFERENCE.findall((ROOT / "reference" / f"{name}.py").read_text(encoding="utf-8"))
+    return {module for package, names in imports for module in ([package] if package else names.split(", "))}
+
+
+def orphans() -> list[str]:
+    """What stands in no line of the second table (of mutants those that cases catch), and lines without a case."""
+    missing = [f"line {part.name}" for part in parts() if not cases_of(part)]
+    references = {path.stem for path in (ROOT / "reference").glob("*.py")} - {"__init__"}
+    kinds = {"case": (cases(), cases_of), "mutant": (runner.caught_by("cases"), mutants_of),
+             "claim": (claims(), claims_of), "reference": (references, references_at)}
+    for kind, (every, shown) in kinds.items():
+        missing += [f"{kind} {id}" for id in sorted({*every}.difference(*map(shown, parts())))]
+    return missing
+
+
+def text() -> str:
+    """The page: both tables."""
+    head = ("section", "equations", "modules", "cases", "references", "mutants", "claims")
+    blocks = [Block("heading", "Elements and presets"),
+              Block("text", "run: with every `make verify-fast`; slow: with `make verify`; n/a: not applicable."),
+              table(("case", *NUMERICS, "not applicable because"), map(row, cases().values())),
+              Block("heading", "Equation, module, case, reference, mutant, claim"), table(head, map(line, parts()))]
+    return f"# What is verified by what, with which elements and presets\n\n{markdown(blocks, 2)}\n"
+
+
+def main() -> int:
+    """Write the page and print what is missing in its columns; 1 if anything is."""
+    FILE.write_text(text(), encoding="utf-8")
+    missing = [*orphans(), *(f"case {id}: not with every order, and no reason why" for id in unexplained())]
+    print("\n".join([*missing, f"{FILE.relative_to(ROOT)}: {len(cases())} cases, {len(missing)} missing"]))
+    return 1 if missing else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

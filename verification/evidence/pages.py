@@ -1,0 +1,190 @@
+"""The pages of the verification: a page a stage, an index, the mutants, and the matrix.
+
+Pages are committed. They hold verdicts, orders, intervals, and numbers rounded to half of their tolerance, so that a
+run on another machine writes the same files. All of them follow from ``evidence.json``, which has an entry a case. A
+run of some cases replaces their entries and leaves the others as recorded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from itertools import chain, groupby
+from os.path import commonprefix
+
+from verification.evidence import hard_cases, matrix
+from verification.evidence.cases import NUMERICS, Case, cases
+from verification.evidence.results import PASSES, Result
+from verification.evidence.writing import REPORT, Block, link, load, markdown, save, table
+from verification.mutants import runner
+from verification.mutants.runner import Mutant
+
+RECORD = REPORT / "evidence.json"
+TITLES = {"flow": "Flow (2.1, 3.2)", "transport": "Substrates (2.2, 3.3)", "growth": "Growth mechanics (2.3, 3.4)",
+          "reprojection": "Reprojection and transfer (3.4, 3.5)", "mesh_motion": "Mesh motion (3.5)",
+          "coupling": "Coupling", "hard": "Hard cases"}
+INTRODUCTION = (
+    "Each case compares the implementation with a closed form, a manufactured solution, an independent code, or a "
+    "conserved quantity. Verdicts follow from the numbers. Orders are judged on both sides, between neighbours of a "
+    "series of unrelated meshes. Each case names wrong changes of the code (mutants) with which it must fail; "
+    "`make mutants` runs each mutant until a case catches it, or against the tests that it names.")
+OF_READERS = "Mutants that tests must catch"
+NOT_RUN = {"verdict": "not run", "numbers": 0, "errors": [], "table": []}
+
+
+def write(results: Iterable[Result]) -> None:
+    """Record the cases of which every variant ran, and write all pages."""
+    known = cases()
+    complete = [result.in_order(known[result.id].variants) for result in results
+                if result.evidence.keys() >= known[result.id].variants.keys()]
+    records = {**load(RECORD, {}), **{result.id: entry(result) for result in complete}}
+    save({id: records[id] for id in known if id in records}, RECORD)
+    hard_cases.record(complete)
+    for name, text in texts(recorded()).items():
+        (REPORT / name).write_text(text, encoding="utf-8")
+
+
+def entry(result: Result) -> dict:
+    """The record of a case: verdict, how many numbers it judged, the errors that stopped variants, and the table."""
+    stopped = [f"{label}: {error}" if label else error for label, error in result.errors.items()]
+    return {"verdict": result.verdict, "numbers": len(result.measured), "errors": stopped,
+            "table": grouped(hard_cases.lines(result.cells.values()) if result.cells else lines(result))}
+
+
+def lines(result: Result) -> list[tuple[str, str, str, bool]]:
+    """(quantity and its reproducible number, interval, origin, whether it holds) of all that a case measured."""
+    return [(part.quantity + (f" ({part.reproducible})" if part.reproducible else ""), part.interval(3), part.origin,
+             part.holds) for part in result.measured]
+
+
+def grouped(rows: Iterable[tuple[str, str, str, bool]]) -> list[list[str]]:
+    """Rows of a table; quantities with the same interval, origin and outcome share one."""
+    alike: dict[tuple[str, str, str], list[str]] = {}
+    for quantity, interval, origin, holds in rows:
+        alike.setdefault((interval, origin, "yes" if holds else "NO"), []).append(quantity)
+    return [[shared(names), *key] for key, names in alike.items()]
+
+
+def recorded() -> dict[str, dict]:
+    """The records of all cases; that of a case which never ran says so."""
+    records = load(RECORD, {})
+    return {id: records.get(id, NOT_RUN) for id in cases()}
+
+
+def summary(records: Iterable[Mapping]) -> str:
+    """How many cases pass, in one line."""
+    verdicts = [record["verdict"] for record in records]
+    numbers = sum(record["numbers"] for record in records)
+    return f"{verdicts.count(PASSES)} of {len(verdicts)} cases pass; {numbers} numbers judged."
+
+
+def texts(records: Mapping[str, Mapping]) -> dict[str, str]:
+    """Every page: {file: Markdown}."""
+    stages = runner.load_mutants()
+    read = {"results": stages.pop("results")}
+    pages = {"REPORT.md": ("Verification", index(records)), "mutants.md": ("Mutants", mutant_blocks(stages)),
+             "mutants_read.md": (OF_READERS, mutant_blocks(read))}
+    for stage, title in TITLES.items():
+        chosen = of_stage(stage, records)
+        articles = [article(cases()[id], record) for id, record in chosen.items()]
+        pages[f"{stage}.md"] = title, [Block("text", summary(chosen.values())), *chain.from_iterable(articles)]
+    written = {name: f"# {title}\n\n{markdown(blocks, 2)}\n" for name, (title, blocks) in pages.items()}
+    return {**written, "matrix.md": matrix.text()}
+
+
+def of_stage(stage: str, records: Mapping[str, Mapping]) -> dict[str, Mapping]:
+    """The records of the cases of a stage."""
+    return {id: record for id, record in records.items() if cases()[id].stage == stage}
+
+
+#: Judgements with pages of their own.
+BESIDES = ((link("The paper's claims", "../../paper_figures/replication.md"), "`make claims`"),
+           (link("Ambiguities and misprints of the paper", "../../reference/ERRATA.md"), "`verification.errata`"),
+           (link("What the rounding of Table 1 allows", "../sensitivity/sensitivity.md"), "`make sensitivity`"),
+           (link("The law for networks", "../../docs/network.md"), "`python -m verification.network`"),
+           (link("Mutants made by machine", "sampled.md"), "`make mutants-sampled`"))
+
+
+def index(records: Mapping[str, Mapping]) -> list[Block]:
+    """The first page: stages, and a line a case."""
+    stages = [(link(title, stage), summary(of_stage(stage, records).values())) for stage, title in TITLES.items()]
+    more = ((link("Mutants", "mutants"), mutant_state()),
+            (link(OF_READERS, "mutants_read"), "files, columns, charts and messages that users read"),
+            (link("Equation, module, case, reference, mutant, claim", "matrix"), "what verifies what, with which "
+             "elements and presets"))
+    return [Block("text", f"{INTRODUCTION} Written by `make verify`."),
+            Block("text", f"**{summary(records.values())}**"),
+            table(("stage", ""), (*stages, *more)),
+            table(("besides", ""), BESIDES),
+            table(("case", "kind", "runs with", "numbers", "verdict", "must fall short with"),
+                  (_index_row(cases()[id], record) for id, record in records.items()))]
+
+
+def _index_row(case: Case, record: Mapping) -> tuple:
+    numerics = " ".join(case.numerics) if case.numerics != NUMERICS else "all"
+    return (link(case.id, case.stage, case.id), case.kind, numerics, str(record["numbers"]), record["verdict"],
+            ", ".join(case.mutants))
+
+
+def article(case: Case, record: Mapping) -> list[Block]:
+    """A case: its claim, verdict and norm, and a table of quantities, intervals and their origins."""
+    about = f"**{record['verdict']}**. {case.claim} ({case.kind}). Norm: {case.norm}."
+    stopped = [Block("text", f"Stopped by an error: {error}") for error in record["errors"]]
+    head = ("quantities", "expected", "origin", "hold")
+    judged = [table(head, record["table"])] if record["table"] else []
+    return [Block("heading", case.id), Block("text", about), *stopped, *judged]
+
+
+def shared(names: list[str]) -> str:
+    """Names as one list. Names that begin alike up to a comma share the beginning, "C: linear; cubic", and beginnings
+    with the same list share the list."""
+    begins: dict[str, list[str]] = {}
+    for name in names:
+        begins.setdefault(name.partition(", ")[0], []).append(name)
+    lists: dict[str, list[str]] = {}
+    for first, alike in begins.items():
+        rest = listed([name[len(first) + 2:] for name in alike]) if len(alike) > 1 else ""
+        lists.setdefault(rest, []).append(first if rest else alike[0])
+    return " / ".join(f"{', '.join(firsts)}: {rest}" if rest else " / ".join(firsts) for rest, firsts in lists.items())
+
+
+def listed(labels: list[str]) -> str:
+    """Labels as one list. Neighbours share a number in brackets at their ends, and three or more share the parts after
+    a comma that they end with."""
+    split = [label.rpartition(" (") if label.endswith(")") else (label, "", "") for label in labels]
+    rows = []
+    for ending, group in groupby(split, key=lambda parts: parts[2]):
+        names = [parts[0] for parts in group]
+        rows.append(_ended_alike(names) + (f" ({'each ' * (len(names) > 1)}{ending}" if ending else ""))
+    return "; ".join(rows)
+
+
+def _ended_alike(names: list[str]) -> str:
+    rows = []
+    for _, group in groupby(names, key=lambda name: name.rpartition(", ")[2]):
+        alike = [name.split(", ") for name in group]
+        most = min(map(len, alike)) - 1 if len(alike) > 2 else 0
+        ends = commonprefix([parts[::-1] for parts in alike])[:most]
+        heads = [", ".join(parts[:len(parts) - len(ends)]) for parts in alike]
+        rows.append("; ".join(heads) + (f", each {', '.join(ends[::-1])}" if ends else ""))
+    return "; ".join(rows)
+
+
+def mutant_state() -> str:
+    """How many mutants are caught, and how many records are of the present code."""
+    records = runner.recorded()
+    caught = sum(bool(record["caught_by"]) for record in records.values())
+    stale = len(records) - len(runner.fresh())
+    count = f"{caught} of {len(records)} mutants caught"
+    state = f"{stale} of them run BEFORE THE LAST CHANGE of the code" if stale else "run on this code"
+    return f"{count} by `make mutants`, {state}."
+
+
+def mutant_blocks(stages: Mapping[str, Iterable[Mutant]]) -> list[Block]:
+    """A table a stage: mutants, and the cases or tests that caught them when they were last run."""
+    records = runner.recorded()
+    blocks = [Block("text", mutant_state())]
+    for stage, chosen in stages.items():
+        rows = [(mutant.id, mutant.says, ", ".join(records[mutant.id]["caught_by"]) or "not caught")
+                for mutant in chosen]
+        blocks += [Block("heading", stage), table(("mutant", "what is wrong with it", "caught by"), rows)]
+    return blocks

@@ -1,0 +1,92 @@
+"""Wrong changes to `repro/` that hard cases must catch, each by the case whose difficulty it brings back."""
+
+from verification.mutants import changes
+
+MUTANTS = (
+    *changes(
+        "repro/model/transport.py",
+        ("hard-newton-too-soon",
+         "Newton's method stops at a defect of a hundredth, wherever that is.",
+         "(NEWTON, ROUND_OFF, MOST_ITERATIONS, balance.problem.reused)",
+         "(1e-2, 1e-2, MOST_ITERATIONS, balance.problem.reused)"),
+        ("hard-front-smoothed",
+         "Half saturations do not come down to what they are, but to a hundredth of the supply.",
+         "half = max(substrate.half_saturation, min(",
+         "half = max(0.01 * substrate.supply, min("),
+        ("hard-newton-unshortened",
+         "At a front Newton's method takes its full steps in the concentrations themselves.",
+         "SWITCH = 0.5",
+         "SWITCH = -1.0")),
+    *changes(
+        "repro/model/kinetics.py",
+        ("hard-decay-unlimited",
+         "Decay takes up acceptor at its full rate whatever there is of it.",
+         "    return m_a * per_acceptor, k * m_a * m_d\n",
+         "    return m_a * (per_acceptor - decay_demand(kinetics)) + decay_demand(kinetics), k * m_a * m_d\n"),
+        ("hard-inert-forgotten",
+         "Decay leaves nothing: X_I is not made.",
+         "inert + active * mean * remains * step",
+         "inert + 0 * active * mean * remains * step")),
+    *changes(
+        "repro/model/flow.py",
+        ("hard-tau-of-water",
+         "The stabilisation has water's viscosity in the biomass too: a plug leaks.",
+         "mesh.circumdiameter**2 / (self.constant * viscosity)",
+         "mesh.circumdiameter**2 / (self.constant + 0 * viscosity)")),
+    *changes(
+        "repro/march/stepping.py",
+        ("hard-contact-passed-over",
+         "Steps do not end where the film is first too thin, but go on.",
+         "return found.gaps is not None and found.gaps[1] < LANDED * found.gaps[2]",
+         "return False"),
+        ("hard-estimate-ignored",
+         "Every step is accepted, however much its estimate is over the tolerance.",
+         "EXCESS * tolerance / duration",
+         "np.inf")),
+    *changes(
+        "repro/model/contact.py",
+        ("hard-half-the-angle",
+         "Wedges close at half of the least contact angle.",
+         "film, np.tan(angle))",
+         "film, np.tan(angle / 2))")),
+    *changes(
+        "repro/model/growth.py",
+        ("hard-theta-clipped",
+         "theta is silently held under 50.",
+         "system.under(start * (theta / start) ** part, ",
+         "system.under(np.minimum(start * (theta / start) ** part, 50.0), ")),
+    *changes(
+        "repro/model/biomass.py",
+        ("hard-inert-degraded-at-a-remesh",
+         "One percent of X_I becomes active again at every remesh.",
+         "_conserved(inside[0], masses, amounts[1].sum())",
+         "_conserved(inside[0], masses, 0.99 * amounts[1].sum())")),
+    *changes(
+        "repro/fem/sizing.py",
+        ("hard-film-without-elements",
+         "The narrowest film is one element across.",
+         "ACROSS_FILM = 10.0",
+         "ACROSS_FILM = 1.0"),
+        ("hard-extent-uncapped",
+         "The mesh goes on past the pore's ends.",
+         "return max(first - reach, -length / 2), min(last + reach, length / 2)",
+         "return first - reach, last + reach")),
+    *changes(
+        "repro/fem/transfer.py",
+        ("hard-shallowest-taken",
+         "Of the triangles whose box holds a place, the one in which it lies the least deep is taken.",
+         "best = np.lexsort((-depth, place))",
+         "best = np.lexsort((depth, place))")),
+    *changes(
+        "repro/fem/mesh.py",
+        ("hard-poor-mesh-kept",
+         "A mesh is kept however poor its triangles are.",
+         "straight = self.areas.min() > 0 and np.count_nonzero(self.quality < POOR) <= POOR_ALLOWED",
+         "straight = self.areas.min() > 0")),
+    *changes(
+        "repro/fem/assembly.py",
+        ("hard-keys-overflow",
+         "Places in the sparse matrix are counted in 32 bits, which end at 46 000 unknowns.",
+         "np.unique(columns * len(rank) + rows, return_inverse=True)",
+         "np.unique(np.minimum(columns * len(rank) + rows, 2**31 - 1), return_inverse=True)")),
+)

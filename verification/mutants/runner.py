@@ -1,0 +1,241 @@
+"""Run mutants in copies of the project, against the cases or the tests that must catch them.
+
+A mutant that cases name is run against these, the quick ones first, until one catches it; with ``--every`` against all
+of them. A mutant that names tests is run against each of these.
+
+A test catches a mutant by an assertion that fails, a check out of its interval among them, or by an error that
+``repro`` defines. Any other error, an ``AttributeError`` for instance, shows a mutant that does not run, and catches
+nothing.
+
+The record of a mutant, in ``report/mutants.json``, has a digest of the mutated file and of the modules that caught it.
+It is stale if one of these files changes, and a change elsewhere leaves it fresh.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import hashlib
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from xml.etree import ElementTree
+
+from verification.evidence.cases import STAGES, cases
+from verification.evidence.writing import REPORT, ROOT, load, save
+from verification.mutants import Mutant
+
+RECORD = REPORT / "mutants.json"
+#: What catches a mutant.
+CATCHERS = ("cases", "tests")
+#: How the message of a failure begins that catches a mutant: an assertion, `pytest.fail` or `pytest.raises`, a guard.
+CATCH = ("assert", "AssertionError", "Failed: ", "repro.")
+#: How the report of a failed fixture begins.
+IN_FIXTURE = re.compile(r'^failed on (setup|teardown) with "')
+NOT_COPIED = (".git", ".venv", "__pycache__", "live", "out", "cache", "dist", "build", "*.egg-info", ".*_cache")
+#: Seconds on the clock. No case takes a tenth of this, but a mutant may run for ever.
+LONGEST = 600.0
+
+
+class MutantError(RuntimeError):
+    """A mutant cannot be applied."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A mutant run against one case or test: how that caught it, or why it did not."""
+
+    catcher: str
+    caught: bool
+    message: str
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """All trials of one mutant."""
+
+    mutant: str
+    trials: tuple[Trial, ...]
+
+    @property
+    def caught_by(self) -> list[str]:
+        """The cases or tests that failed."""
+        return [trial.catcher for trial in self.trials if trial.caught]
+
+    @property
+    def missed_by(self) -> list[str]:
+        """The cases or tests that pass with it although they name it."""
+        return [trial.catcher for trial in self.trials if not trial.caught]
+
+
+def load_mutants() -> dict[str, tuple[Mutant, ...]]:
+    """Mutants by stage, and those of "results", what users read. Raises MutantError if two have the same id."""
+    stages = {name: import_module(f"verification.mutants.{name}").MUTANTS for name in (*STAGES, "results")}
+    ids = [mutant.id for mutants in stages.values() for mutant in mutants]
+    if repeated := {id for id in ids if ids.count(id) > 1}:
+        raise MutantError(f"used twice: {', '.join(sorted(repeated))}")
+    return stages
+
+
+def everything() -> dict[str, Mutant]:
+    """All mutants by id."""
+    return {mutant.id: mutant for mutants in load_mutants().values() for mutant in mutants}
+
+
+def caught_by(catchers: str) -> dict[str, Mutant]:
+    """The mutants that "cases" or "tests" must catch, by id."""
+    return {id: mutant for id, mutant in everything().items() if bool(mutant.tests) == (catchers == "tests")}
+
+
+def mutated(mutant: Mutant) -> str:
+    """The changed text of the file. Raises MutantError unless the text to change occurs exactly once."""
+    text = (ROOT / mutant.file).read_text(encoding="utf-8")
+    count = text.count(mutant.old)
+    if count != 1 or mutant.old == mutant.new:
+        raise MutantError(f"{mutant.id}: the text to change occurs {count} times in {mutant.file}, not once, or it "
+                          "stays the same; adapt the mutant to the code")
+    return text.replace(mutant.old, mutant.new)
+
+
+def tests_of(mutant: Mutant) -> dict[str, list[str]]:
+    """What must catch a mutant, {case or test: test ids of pytest}, quick cases first."""
+    if mutant.tests:
+        return {test: [test] for test in mutant.tests}
+    naming = [case for case in cases().values() if mutant.id in case.mutants]
+    return {case.id: [*case.variants.values()] for case in sorted(naming, key=lambda case: case.slow)}
+
+
+def run(mutant: Mutant, every: bool = False) -> Outcome:
+    """Run a mutant in a copy of the project until a case catches it, or against ``every`` case, or all of its tests."""
+    trials: list[Trial] = []
+    with copied() as folder:
+        (folder / mutant.file).write_text(mutated(mutant), encoding="utf-8")
+        for catcher, tests in tests_of(mutant).items():
+            trials.append(trial(folder, catcher, tests))
+            if trials[-1].caught and not (every or mutant.tests):
+                break
+    return Outcome(mutant.id, tuple(trials))
+
+
+@contextlib.contextmanager
+def copied() -> Iterator[Path]:
+    """A copy of the project in a temporary folder."""
+    with TemporaryDirectory(prefix="mutant-", ignore_cleanup_errors=True) as temporary:
+        folder = Path(temporary).resolve() / "project"
+        shutil.copytree(ROOT, folder, ignore=shutil.ignore_patterns(*NOT_COPIED))
+        yield folder
+
+
+def trial(folder: Path, catcher: str, tests: Iterable[str]) -> Trial:
+    """Run some tests in a copy, and read from the report of pytest whether one catches the mutant."""
+    report = folder.parent / "report.xml"
+    report.unlink(missing_ok=True)
+    status = _run_tests(folder, report, tests)
+    if status is None:
+        return Trial(catcher, False, f"not done after {LONGEST:g} s")
+    if not report.exists():
+        return Trial(catcher, False, f"broken: the process ended with status {status}")
+    tree = ElementTree.parse(report)
+    messages = [_message(failure) for failure in (*tree.iter("failure"), *tree.iter("error"))]
+    catches = [message for message in messages if message.startswith(CATCH)]
+    if catches:
+        return Trial(catcher, True, catches[0])
+    if messages or not tree.findall(".//testcase"):
+        return Trial(catcher, False, f"broken: {(messages or ['there is no such test'])[0]}")
+    return Trial(catcher, False, "passes")
+
+
+def _message(failure: ElementTree.Element) -> str:
+    """The first line of a failure."""
+    return IN_FIXTURE.sub("", failure.get("message", "")).partition("\n")[0]
+
+
+def _run_tests(folder: Path, report: Path, tests: Iterable[str]) -> int | None:
+    """The exit status of pytest, after which nothing that it started runs; None if it was not done in time."""
+    command = [sys.executable, "-m", "pytest", "-n0", "-p", "no:cacheprovider", f"--junitxml={report}", *tests]
+    environment = {**os.environ, "PYTHONPATH": str(folder), "HOME": str(folder.parent), "PYTHONDONTWRITEBYTECODE": ""}
+    child = subprocess.Popen(command, cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                             stderr=subprocess.DEVNULL, start_new_session=True)
+    try:
+        return child.wait(LONGEST)
+    except subprocess.TimeoutExpired:
+        return None
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(child.pid, signal.SIGKILL)
+        child.wait()
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Entry point; 0 if every mutant is caught, and no case or test passes with a mutant that it names."""
+    known = everything()
+    parser = argparse.ArgumentParser(prog="python -m verification.mutants", description="Run wrong changes of repro.")
+    parser.add_argument("ids", nargs="*", metavar="MUTANT", choices=[*known, []], default=[], help="all by default")
+    parser.add_argument("--every", action="store_true", help="against every case that names it, not to the first catch")
+    parser.add_argument("--tests", action="store_true", help="only those that tests catch, not cases")
+    parser.add_argument("--stale", action="store_true", help="only those whose record is not of the present code")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes; one a core by default")
+    chosen = parser.parse_args(arguments)
+    ids = chosen.ids or (caught_by("tests") if chosen.tests else known)
+    skipped = fresh() if chosen.stale else ()
+    outcomes = run_all([id for id in ids if id not in skipped], chosen.jobs, chosen.every)
+    return 0 if judge(outcomes) else 1
+
+
+def run_all(ids: Iterable[str], jobs: int, every: bool = False) -> list[Outcome]:
+    """Outcomes in the order of ``ids``, several mutants side by side. Each is printed and recorded as it ends."""
+    known, outcomes = everything(), []
+    with ThreadPoolExecutor(jobs) as pool:
+        for outcome in pool.map(lambda id: run(known[id], every), ids):
+            outcomes.append(outcome)
+            record(outcome)
+            print(f"{'caught' if outcome.caught_by else 'SURVIVES':9} {outcome.mutant}")
+            for trial in outcome.trials:
+                print(f"{'':10}{trial.catcher}: {trial.message}", flush=True)
+    return outcomes
+
+
+def judge(outcomes: list[Outcome]) -> bool:
+    """Print what is wrong; whether every mutant is caught, and by every case and test that it was run against."""
+    wrong = [f"survives: {outcome.mutant}" for outcome in outcomes if not outcome.caught_by]
+    count = f"{len(outcomes) - len(wrong)} of {len(outcomes)} mutants caught."
+    wrong += [f"{name} passes with {outcome.mutant}, which it names" for outcome in outcomes
+              for name in outcome.missed_by]
+    print("\n".join([*wrong, count]))
+    return bool(outcomes) and not wrong
+
+
+def record(outcome: Outcome) -> None:
+    """Replace the record of a mutant."""
+    entry = {"caught_by": outcome.caught_by, "digest": digest(everything()[outcome.mutant], outcome.caught_by)}
+    save({**recorded(), outcome.mutant: entry}, RECORD)
+
+
+def recorded() -> dict[str, dict]:
+    """{mutant: {"caught_by": [case or test, ...], "digest": digits}} of all mutants."""
+    records = load(RECORD, {})
+    return {id: records.get(id, {"caught_by": [], "digest": ""}) for id in everything()}
+
+
+def fresh() -> set[str]:
+    """The mutants whose record is of the present code."""
+    known = everything()
+    return {id for id, entry in recorded().items() if entry["digest"] == digest(known[id], entry["caught_by"])}
+
+
+def digest(mutant: Mutant, catchers: Iterable[str]) -> str:
+    """16 hexadecimal digits of the mutated file and of the modules of some cases or tests."""
+    files = {cases()[name].file if name in cases() else ROOT / name.partition("::")[0] for name in catchers}
+    hashed = hashlib.sha256(mutated(mutant).encode())
+    for file in sorted(files):
+        hashed.update(file.read_bytes() if file.is_file() else b"")
+    return hashed.hexdigest()[:16]
