@@ -8,14 +8,18 @@ import pytest
 
 from repro.errors import SimulationError, TransportError
 from repro.scene import load_scene
-from verification import hard, hard_cases, speed
-from verification.hard import common
-from verification.hard.common import PRESETS, REFUSED, RIGHT, WRONG, HardCase
-from verification.kernel import case
-from verification.evidence.checks import Outcome, Result, at_most
+from verification import speed
+from verification.cases import hard_mechanics, hard_runs, hard_stages
+from verification.evidence import hard_cases
+from verification.evidence.cases import cases
+from verification.evidence.checks import at_most
+from verification.evidence.results import Result
+from verification.problems import hard
+from verification.problems.hard import PRESETS, REFUSED, RIGHT, WRONG, HardCase
 
 GOOD, BAD = at_most("good", 0.5, 1.0, ""), at_most("bad", 2.0, 1.0, "")
-KNOWN = {case.number: case for case in hard.CASES}
+KNOWN = {case.number: case for module in (hard_mechanics, hard_runs, hard_stages) for case in vars(module).values()
+         if isinstance(case, HardCase)}
 
 
 def stopped(error):
@@ -44,7 +48,7 @@ def a_case(*verdicts, refusable=()):
     (lambda preset: [at_most("q", np.zeros(1) / 0, 1.0, "")], WRONG, "FloatingPointError"),
     (lambda preset: sum(1 for _ in count()), WRONG, "not done after 0.2 s")])
 def test_a_part_is_right_refused_or_wrong(function, verdict, told):
-    found = common.run_part("a part", function, "fast", 0.2)
+    found = hard.run_part("a part", function, "fast", 0.2)
     assert found.verdict == verdict and told in found.message
 
 
@@ -54,49 +58,54 @@ def test_a_part_is_right_refused_or_wrong(function, verdict, told):
 def test_what_is_accepted(verdict, preset, refusable, fine):
     """A cell is as its worst part; a verification case holds if it is so with all presets."""
     chosen = a_case(RIGHT, verdict, refusable=refusable)
-    cells = {name: common.run_cell(chosen, name) for name in PRESETS}
+    cells = {name: hard.run_cell(chosen, name) for name in PRESETS}
     accepted = {name: not cell.unaccepted for name, cell in cells.items()}
     assert cells[preset].verdict == verdict and accepted[preset] is fine
-    found = Outcome(tuple(case.flat(common.measured(chosen, name) for name in PRESETS)))
-    assert Result("hard-99", found, "", 0.0).holds is all(accepted.values())
+    evidence = {name: [*hard.evidence(cell)] for name, cell in cells.items()}
+    assert Result("hard-99", evidence).holds is all(accepted.values())
 
 
 def test_there_are_twenty_two_verification_cases_and_only_some_may_refuse():
     """All of them on record."""
     assert sorted(KNOWN) == [row["number"] for row in speed.records()["hard_cases"]["cases"]] == [*range(1, 23)]
     assert {number for number, one in KNOWN.items() if one.refusable} <= {3, 4, 5, 15, 17, 19, 22}
-    assert {one.full_id for one in KNOWN.values()} == {id for id, c in case.CASES.items() if c.stage == "hard"}
+    assert {one.full_id for one in KNOWN.values()} == {id for id, case in cases().items() if case.stage == "hard"}
     for one in KNOWN.values():
-        assert {*one.refusable} <= {*one.parts} and {*case.CASES[one.full_id].over} == {*PRESETS}
+        assert {*one.refusable} <= {*one.parts} and {*cases()[one.full_id].variants} == {*PRESETS}
 
 
-def test_the_matrix_is_written_with_verdicts_apart_from_what_this_machine_has_measured(tmp_path, monkeypatch):
-    cells = tuple(common.run_cell(a_case(RIGHT, REFUSED), preset) for preset in PRESETS)
+def test_the_matrix_replaces_the_rows_of_the_cases_that_ran(tmp_path, monkeypatch):
+    """Verdicts without the messages, which have numbers of this machine."""
+    cells = {preset: hard.run_cell(a_case(RIGHT, REFUSED), preset) for preset in PRESETS}
+    rows = {preset: json.loads(json.dumps(cell.as_row())) for preset, cell in cells.items()}
     monkeypatch.setattr(hard_cases, "RECORD", tmp_path / "report" / "hard_cases.json")
-    hard_cases.record([Result("hard-99", Outcome(cells), "", 0.0), Result("other", Outcome(()), "", 0.0)])
-    kept, live = (json.loads((hard_cases.RECORD.parent / folder / hard_cases.RECORD.name).read_text())
-                  for folder in (".", "live"))
-    verdicts, measured = (found["cases"][0]["cells"] for found in (kept, live))
-    assert verdicts == {name: {"verdict": REFUSED, "accepted": name == "paper"} for name in PRESETS}
-    assert "try another" in measured["paper"]["message"]
+    other = {"number": 3, "cells": {}}
+    hard_cases.save({"cases": [other, {"number": 99}]}, hard_cases.RECORD)
+    hard_cases.record([Result("hard-99", cells=rows), Result("other")])
+    kept, row = json.loads(hard_cases.RECORD.read_text())["cases"]
+    assert kept == other and row["may_refuse"] == [] and row["number"] == 99
+    assert row["cells"] == {name: {"verdict": REFUSED, "accepted": name == "paper"} for name in PRESETS}
+    assert "try another" in rows["paper"]["message"]
+    verdicts = [line for line in hard_cases.lines(rows.values()) if line[0].startswith("verdict")]
+    assert verdicts[1] == (f"verdict of {REFUSED}", ", ".join([REFUSED] * 4), ", ".join(PRESETS), False)
 
 
 def test_a_wrong_run_is_seen():
     """Numbers that are not finite, balances, concentrations and densities out of bounds."""
     made = load_scene("wide", ("numerics.preset=fast", 'growth.end="0 h"', 'aggregate.radius="40 um"'))
-    found = common.ran(made)
-    assert all(check.holds for check in common.sound(found))
+    found = hard.ran(made)
+    assert all(check.holds for check in hard.sound(found))
     for column, value in (("acceptor_balance", 1e-6), ("biomass_density_min", 0.5), ("inert_fraction", -0.1),
                           ("head_loss_cm", math.nan), ("biomass_balance", 1e-3)):
-        spoilt = common.Run(made, found.instants * 2, [{**found.rows[0], column: value}, found.rows[0]])
-        assert not all(check.holds for check in common.sound(spoilt)), column
+        spoilt = hard.Run(made, found.instants * 2, [{**found.rows[0], column: value}, found.rows[0]])
+        assert not all(check.holds for check in hard.sound(spoilt)), column
     found.instants[0].solved.concentrations.donor[3] = 10.5
-    assert not all(check.holds for check in common.sound(found))
+    assert not all(check.holds for check in hard.sound(found))
 
 
 @pytest.mark.parametrize("number, preset", [
     (1, "fast"), (2, "fast"), (5, "fast"), (6, "fast"), (9, "paper"), (10, "fast"), (12, "accurate"), (18, "paper"),
     (19, "fast")])
 def test_a_cheap_cell_is_what_it_must_be(number, preset):
-    cell = common.run_cell(KNOWN[number], preset)
+    cell = hard.run_cell(KNOWN[number], preset)
     assert not cell.unaccepted, cell.message

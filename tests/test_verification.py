@@ -1,44 +1,43 @@
-"""The verification can fail: verdicts follow from numbers, orders are judged on both sides, and every quick case
-passes."""
+"""The verification can fail: verdicts follow from numbers, orders are judged on both sides, and records and pages come
+together from all workers of a session."""
+import json
 import math
+import os
+import re
 import subprocess
 import sys
 from dataclasses import replace
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
 from repro.fem.space import Space
 from repro.scene.keys import PRESETS
-from verification.kernel import case, driver, matrix, report, writing
-from verification.evidence.checks import Outcome, Result, at_least, at_most, between, refine, study
+from verification.evidence import cases, matrix, pages, results, writing
+from verification.evidence.cases import STAGES, parametrize
+from verification.evidence.checks import at_least, at_most, between, flat, refine, study
+from verification.evidence.results import Result
+from verification.mutants import runner
 
+IMPORT = re.compile(r"^from ((?:verification|reference)[.\w]*) import ([^#\n(]+)", re.M)
 SIZES = 0.5 ** np.arange(4)
-#: A case that nobody registers: what it measures, and of which variants.
-A_CASE = case.Case("x", "flow", "c", "exact", "n", ("m",), False, list, {}, (), "")
+GOOD, BAD = (at_most("quantity A", value, 1.0, "theory") for value in (0.5, 2.0))
 
 
-def result(*checks, studies=(), error=""):
-    return Result("flow-plug", Outcome((*checks, *studies)), error, 1.0)
-
-
-GOOD, BAD = (result(at_most("quantity A", value, 1.0, "theory")) for value in (0.5, 2.0))
-
-
-@pytest.mark.parametrize("made, bounds, inside, outside", [
+@pytest.mark.parametrize("build, bounds, inside, outside", [
     (at_most, [1.0], [0.0, 1.0], [1.1, -0.1, math.inf, math.nan]), (at_least, [1.0], [1.0], [0.5, math.nan]),
     (between, [1.0, 2.0], [1.0, 2.0], [0.9, 2.5, math.nan])])
-def test_a_number_holds_in_its_range_alone(made, bounds, inside, outside):
-    assert all(made("x", value, *bounds, "").holds for value in inside)
-    assert not any(made("x", value, *bounds, "").holds for value in outside)
+def test_a_number_holds_in_its_range_alone(build, bounds, inside, outside):
+    assert all(build("x", value, *bounds, "").holds for value in inside)
+    assert not any(build("x", value, *bounds, "").holds for value in outside)
 
 
 def test_a_case_passes_only_if_it_measures_something_and_all_of_it_holds():
-    good, bad = (one.outcome.measured[0] for one in (GOOD, BAD))
     steep = study("e", SIZES, SIZES**3, 2, "")
-    assert GOOD.holds
-    for short in (result(good, bad), result(), result(good, error="ValueError"), result(good, studies=(steep,))):
-        assert short.verdict == case.FALLS_SHORT
+    assert Result("x", {"": [GOOD]}).holds
+    for evidence, errors in (([GOOD, BAD], {}), ([], {}), ([GOOD], {"": "ValueError"}), ([GOOD, steep], {})):
+        assert Result("x", {"": evidence}, errors).verdict == results.FAILS
 
 
 @pytest.mark.parametrize("errors, ceiling, holds", [
@@ -53,48 +52,67 @@ def test_a_wrong_order_is_caught_on_both_sides(errors, ceiling, holds):
         study("error", SIZES[:3], errors[:3], 2, "")
 
 
-def test_a_variant_that_stops_hides_no_other_and_is_named():
-    """Floating-point warnings stop it."""
-    chosen = replace(A_CASE, function=lambda value: [at_most("q", np.ones(1)[0] / value, 1.0, "")],
-                     over={"none": (np.zeros(1)[0],), "two": (2,), "half": (0.5,), "also none": (0,)})
-    found = case.run(chosen)
-    assert [(part.quantity, part.holds) for part in found.outcome.measured] == [("q, two", True), ("q, half", False)]
-    assert found.error.startswith("none: Traceback") and "FloatingPointError" in found.error
-    assert "\nalso none: Traceback" in found.error and not found.holds
+def test_evidence_is_the_same_after_its_way_through_a_report():
+    """The label of the variant ends its name; nested evidence is recorded one by one."""
+    bound, errors = at_least("x", 2, 1.0, "o"), study("e", SIZES, SIZES**2, 2, "o", ceiling=1.0)
+    rows = json.loads(json.dumps([results.as_row(part) for part in flat([bound, [errors]])]))
+    copies = [results.from_row(row, "fast") for row in rows]
+    assert copies[0] == replace(bound, quantity="x, fast") and copies[1].quantity == "e, fast"
+    assert (copies[1].measured, copies[1].interval()) == (errors.measured, errors.interval())
 
 
 def test_errors_of_unrelated_meshes_are_averaged_and_studied_by_their_own_size():
     """Root mean squares of what every mesh of a size gives."""
-    found = refine(lambda size, mesh: {"size": size + mesh, "error": size * (1 + 6 * mesh)}, {4.0: 1, 1.0: 2})
-    assert found["size"] == pytest.approx([4.0, np.sqrt(2.5)]) and found["error"] == pytest.approx([4.0, 5.0])
+    errors = refine(lambda size, mesh: {"size": size + mesh, "error": size * (1 + 6 * mesh)}, {4.0: 1, 1.0: 2})
+    assert errors["size"] == pytest.approx([4.0, np.sqrt(2.5)]) and errors["error"] == pytest.approx([4.0, 5.0])
 
 
 @pytest.mark.parametrize("id", ["flow-sections", "transport-mean-biomass", "growth-homogeneous"])
 def test_a_case_runs_with_the_orders_that_it_says(id, monkeypatch):
-    driver.load()
-    orders, made = set(), Space.__init__
+    case = cases.cases()[id]
+    orders, initialise = set(), Space.__init__
 
-    def watched(self, *given):
-        made(self, *given)
+    def watched(self, *arguments):
+        initialise(self, *arguments)
         orders.add(str(self.order))
 
     monkeypatch.setattr(Space, "__init__", watched)
     rooms = [module for name, module in sys.modules.items() if name.startswith("verification.")]
-    for kept in [value for room in rooms for value in vars(room).values() if hasattr(value, "cache_clear")]:
-        kept.cache_clear()
-    case.run(case.CASES[id])
-    assert orders == {way for way in case.CASES[id].ways if way in matrix.ORDERS}
+    for cached in [value for room in rooms for value in vars(room).values() if hasattr(value, "cache_clear")]:
+        cached.cache_clear()
+    module = next(module for module in rooms if getattr(module, "__file__", "") == str(case.file))
+    function = getattr(module, next(iter(case.variants.values())).partition("::")[2].partition("[")[0])
+    sets = next(mark for mark in function.pytestmark if mark.name == "parametrize").args[1]
+    for values in sets:
+        function(*values.values, lambda *evidence: [*flat(evidence)])
+    assert orders == {name for name in case.numerics if name in matrix.ORDERS}
 
 
-def test_what_is_verified_by_what_has_no_orphan_and_is_written(monkeypatch):
-    """Every case, mutant, reference and claim stands in a line of the modules, and no line is without cases; one that
-    stands nowhere is told."""
-    driver.load()
+def test_the_matrix_has_no_orphan_and_is_written(monkeypatch):
+    """Every case, mutant, reference and claim stands in a line of the modules, and no line is without cases. One that
+    stands nowhere is reported."""
     assert matrix.orphans() == [] and matrix.unexplained() == []
-    assert matrix.FILE.read_text(encoding="utf-8") == matrix.text()
-    lost = replace(case.CASES["flow-plug"], mutants=("none",), ways=("1",), because="")
-    monkeypatch.setitem(case.CASES, "flow-plug", lost)
+    lost = replace(cases.cases()["flow-plug"], mutants=("none",), runs_with="1", omitted="")
+    monkeypatch.setitem(cases.cases(), "flow-plug", lost)
     assert matrix.orphans() == ["case flow-plug"] and matrix.unexplained() == ["flow-plug"]
+
+
+def test_a_case_names_references_that_its_module_can_reach():
+    for case in cases.cases().values():
+        reached = {path.stem for path in imports(case.file) if path.parent.name == "reference"}
+        assert {*case.references} <= reached, case.id
+
+
+def imports(file, seen=None):
+    """A file of verification or reference, and all of these that it imports."""
+    seen = {file} if seen is None else seen
+    for package, names in IMPORT.findall(file.read_text(encoding="utf-8")):
+        folder = writing.ROOT.joinpath(*package.split("."))
+        for path in (folder.with_suffix(".py"), *(folder / f"{name.split()[0]}.py" for name in names.split(", "))):
+            if path.exists() and path not in seen:
+                seen.add(path)
+                imports(path, seen)
+    return seen
 
 
 def test_exact_has_the_elements_and_the_order_of_accurate():
@@ -103,34 +121,93 @@ def test_exact_has_the_elements_and_the_order_of_accurate():
     assert apart == {"refinement", "tolerance", "contact_elements"}
 
 
-def test_what_is_round_off_or_another_machines_is_not_committed():
-    """Nor times; pages are short enough for a browser to show them whole."""
-    found = at_most("x", 3e-13, 1e-9, ""), at_most("x", 0.012345, 0.1, ""), study("error", SIZES, SIZES**2, 2, "")
-    assert [one.told for one in found] == ["", "0.01", "order 2.0, 2.0, 2.0"]
-    assert between("x", 1.0, 0.123456, 2.0, "").accepted == "0.123 to 2"
-    driver.load()
-    text = writing.markdown(report.article(BAD), 2)
+def test_round_off_and_times_are_not_committed():
+    quantities = at_most("x", 3e-13, 1e-9, ""), at_most("x", 0.012345, 0.1, ""), study("error", SIZES, SIZES**2, 2, "")
+    assert [one.reproducible for one in quantities] == ["", "0.01", "order 2.0, 2.0, 2.0"]
+    assert between("x", 1.0, 0.123456, 2.0, "").interval(3) == "0.123 to 2"
+    short = Result("flow-plug", {"": [BAD]}, seconds=1.0)
+    text = writing.markdown(pages.article(cases.cases()["flow-plug"], pages.entry(short)), 2)
     assert "FALLS SHORT" in text and "| quantity A (2) | at most 1 | theory | NO |" in text
     assert "seconds" not in text and "1.0 s" not in text
+
+
+def test_pages_are_those_of_the_records_and_short_enough_for_a_browser():
+    """The records of mutants become stale with the code, so their pages are not compared."""
+    texts = pages.texts(pages.recorded())
+    for name in (*(f"{stage}.md" for stage in STAGES), "matrix.md"):
+        assert (writing.REPORT / name).read_text(encoding="utf-8") == texts[name], name
+    assert {path.name for path in writing.REPORT.glob("*.md")} == {*texts, "sampled.md"}
     sizes = {path.name: path.stat().st_size for path in writing.REPORT.glob("*.md")}
-    assert {*sizes} == {"REPORT.md", "mutants.md", "mutants_read.md", "matrix.md", "sampled.md",
-                        *(f"{s}.md" for s in case.STAGES)}
     assert sizes.pop("REPORT.md") <= 60_000 and max(sizes.values()) <= 40_000
 
 
-def test_every_quick_case_passes():
-    """Exit status 0, else the message tells what fell short; the report, which is of a whole run, is not written."""
-    done = subprocess.run([sys.executable, "-m", "verification", "--fast"], capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "report:" not in done.stdout and " cases pass; " in done.stdout
+CASES = '''
+import pytest
+from verification.evidence.cases import parametrize
+from verification.evidence.checks import at_most
+
+def mark(id):
+    return pytest.mark.case(id, kind="exact", claim="c", norm="n", mutants=("saddle-sign",), runs_with="1", omitted="o")
+
+@mark("flow-made-good")
+@parametrize("value, *rest", {f"v = {k}": (k, k, k) for k in range(4)})
+def test_made_good(value, rest, record):
+    record([at_most("q", value, 3.0, "theory")], at_most("r", len(rest), 2.0, "theory"))
+
+@mark("flow-made-short")
+@pytest.mark.parametrize("value", ["one", "three"])
+def test_made_short(value, record):
+    record(at_most("q", len(value), 4.0, "theory"))
+
+@mark("flow-made-stopped")
+@pytest.mark.parametrize("value", [0, 2])
+def test_made_stopped(value, record):
+    import numpy
+    record(at_most("q", numpy.ones(1)[0] / value, 1.0, "theory"))
+
+@pytest.mark.slow
+@mark("flow-made-empty")
+def test_made_empty(record):
+    pass
+'''
 
 
-@pytest.mark.parametrize("results, status, told", [
-    ([GOOD], 0, "1 of 1"), ([], 1, "0 of 0"), ([GOOD, BAD], 1, "quantity A: 2; expected at most 1 (theory)")])
-def test_the_exit_status_is_the_verdict(monkeypatch, capsys, results, status, told):
-    driver.load()
-    monkeypatch.setattr(driver, "run_all", lambda ids, jobs: results)
-    assert driver.main(["flow"]) == status and told in capsys.readouterr().out
+def test_a_session_runs_in_parallel_and_records_what_ran():
+    """A copy of the project with four more cases: one passes, one falls short in a variant, one is stopped in a variant
+    by a floating-point error, and one measures nothing. The registry has the variants that pytest runs."""
+    with runner.copied() as folder:
+        (folder / "verification/cases/flow_made.py").write_text(CASES)
+        before = json.loads((folder / "verification/report/evidence.json").read_text())
+        done = subprocess.run([sys.executable, "-m", "pytest", "verification/cases/flow_made.py", "-n2", "-k",
+                               "flow-made", "--pages", "--junitxml=report.xml"], cwd=folder, capture_output=True,
+                              text=True, env={**os.environ, "PYTHONPATH": str(folder)})
+        report = folder / "verification" / "report"
+        records, measured = (writing.load(report / name) for name in ("evidence.json", "live/measured.json"))
+        page, tests = (report / "flow.md").read_text(), ElementTree.parse(folder / "report.xml").findall(".//testcase")
+    assert done.returncode == 1, done.stdout
+    assert "q: 5; expected at most 4 (theory)" in done.stdout and "nothing was measured" in done.stdout
+    assert re.match(r"3 failed, 6 passed(, \d warnings)? in [\d.]+s", done.stdout.strip().splitlines()[-1])
+    assert len(tests) == 9 and sum(bool(test.findall("failure")) for test in tests) == 3
+    made = {id: records.pop(id) for id in [*records] if id.startswith("flow-made")}
+    assert records == before
+    assert {id: record["verdict"] == "passes" for id, record in made.items()} == {
+        "flow-made-good": True, "flow-made-short": False, "flow-made-stopped": False, "flow-made-empty": False}
+    assert made["flow-made-good"]["numbers"] == 8 and made["flow-made-short"]["numbers"] == 2
+    assert made["flow-made-stopped"]["errors"][0].startswith("0: FloatingPointError")
+    assert "| q, three (5) | at most 4 | theory | NO |" in page and "Stopped by an error: 0: FloatingPointError" in page
+    assert measured["cases"]["flow-made-good"]["measured"]["r, v = 3"] == "2"
+
+
+def test_the_registry_has_the_tests_that_pytest_collects():
+    command = [sys.executable, "-m", "pytest", "verification", "--collect-only", "-q", "-o", "addopts="]
+    done = subprocess.run(command, cwd=writing.ROOT, capture_output=True, text=True)
+    collected = {line for line in done.stdout.splitlines() if "::" in line}
+    assert collected == {test for case in cases.cases().values() for test in case.variants.values()}, done.stdout[-500:]
+
+
+def test_a_star_takes_the_remaining_values():
+    mark = parametrize("value, *rest", {"a": (1, 2, 3), "b": (4,)}).mark
+    assert [(one.id, one.values) for one in mark.args[1]] == [("a", (1, (2, 3))), ("b", (4, ()))]
 
 
 def test_rows_that_were_appended_are_read_but_for_one_that_was_cut(tmp_path):

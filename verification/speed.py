@@ -11,9 +11,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from verification import audit, hard_cases
+from verification import audit
 from verification.bench import runs, told
 from verification.bench.record import points
+from verification.evidence import hard_cases
 from verification.evidence.writing import Block, load, markdown, table
 
 FOLDER = Path(__file__).parent / "report"

@@ -282,8 +282,8 @@ def test_bubble_layers(record):
                        "tau is the same to 7 % where triangles are equilateral"))
     stretched = _on_long_triangles(STABILISED) / _on_long_triangles(BUBBLE)
     record(at_least("stabilised over bubble, stretched", stretched, 10.0,
-                    "tau goes as the square of the longest side, the bubble's as that of the shortest: up to the square "
-                    "of the stretch, 64"))
+                    "tau goes as the square of the longest side, the bubble's as that of the shortest: "
+                    "up to the square of the stretch, 64"))
 
 
 def _on_long_triangles(element: flow.Stabilised | flow.Bubble) -> float:

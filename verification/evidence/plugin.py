@@ -18,9 +18,6 @@ from verification.evidence.checks import Check, Study, flat
 from verification.evidence.results import Result
 
 RECORDED = pytest.StashKey[list[Check | Study]]()
-#: What a case may be marked with.
-MARKS = ("case(id, kind, claim, norm, mutants, references, runs_with, omitted): a verification case",
-         "slow: a case of more than seconds, which make verify-fast leaves out")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -29,10 +26,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """The modules of cases are tests, whatever their names; the marks are known."""
-    config.addinivalue_line("python_files", "verification/cases/*.py")
-    for mark in MARKS:
-        config.addinivalue_line("markers", mark)
+    """Records come together in the process that all workers report to."""
     if not hasattr(config, "workerinput"):
         config.pluginmanager.register(Session(config))
 
