@@ -32,11 +32,11 @@ claims: $(STAMP) ## judge every claim of the paper by a computed number, and wri
 sensitivity: $(STAMP) ## what the rounding of Table 1 allows: elasticities, one set of inputs; goes on where it was stopped
 	@$(BIN) -m verification.sensitivity
 
-verify: $(STAMP) ## run the verification cases against references that do not use repro
-	@$(BIN) -m verification
+verify: $(STAMP) ## run the verification cases against references that do not use repro, and write their pages
+	@$(BIN) -m pytest verification -n logical --dist worksteal --pages
 
 verify-fast: $(STAMP) ## the quick ones of these cases, which make test runs too
-	@$(BIN) -m verification --fast
+	@$(BIN) -m pytest verification -n logical --dist worksteal -m "not slow"
 
 mutants: $(STAMP) ## run wrong changes of the code against the cases and tests, each of which must be caught
 	@$(BIN) -m verification.mutants
@@ -45,11 +45,11 @@ mutants-sampled: $(STAMP) ## mutants made by machine, a sample of them from all 
 	@$(PIP) --require-hashes --no-deps --only-binary :all: -r verification/sampled/requirements.lock
 	@$(BIN) -m verification.sampled
 
-test: $(STAMP) ## run the tests, a process a core
-	@$(BIN) -m pytest -n logical --dist worksteal
+test: $(STAMP) ## run the tests and the quick verification cases, a process a core
+	@$(BIN) -m pytest tests verification -n logical --dist worksteal -m "not slow"
 
 test-thorough: $(STAMP) ## the same with many more random examples, and what takes long
-	@HYPOTHESIS_PROFILE=thorough $(BIN) -m pytest -n logical --dist worksteal
+	@HYPOTHESIS_PROFILE=thorough $(BIN) -m pytest tests verification -n logical --dist worksteal -m "not slow"
 
 lint: $(STAMP) ## style and types: ruff and mypy
 	@$(BIN) -m ruff check .

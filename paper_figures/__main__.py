@@ -8,7 +8,7 @@ from time import perf_counter
 
 from paper_figures import FIGURES, manifest, page, runs, style
 from repro.results import write_json
-from repro.run.cache import provenance
+from verification.store import provenance
 
 OUT = Path(__file__).parent / "out"
 

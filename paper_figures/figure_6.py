@@ -14,8 +14,8 @@ from scipy.interpolate import CubicSpline
 from shapely import Polygon
 
 from paper_figures import runs, states, style
-from repro.run.cache import provenance
 from verification.claims.runs import upstream_part
+from verification.store import provenance
 
 TITLE = "Figure 6. Outlines of an aggregate that meets the opposite wall"
 RUNS = (runs.WIDE_CONVERGED,)

@@ -28,9 +28,9 @@ from matplotlib.figure import Figure
 
 from paper_figures import FIGURES, runs, states
 from repro.results import PACKAGES
-from repro.run.cache import provenance, run_folder
 from repro.run.machine import source_hash
 from verification.bench.record import processor
+from verification.store import provenance
 
 OUT = Path(__file__).parent / "out"
 COMMITTED = Path(__file__).parent / "manifest.json"
@@ -171,7 +171,7 @@ def present() -> dict:
     told: dict[str, dict] = {"environment": environment(), "runs": {}, "figures": {}}
     for name in FIGURES:
         module = import_module(f"paper_figures.{name}")
-        folders = [run_folder(request.load(), runs.CACHE) for request in module.RUNS]
+        folders = [runs.STORE.path(request.load()) for request in module.RUNS]
         for request, folder in zip(module.RUNS, folders):
             if not (folder / "run.json").exists():
                 raise FileNotFoundError(f"{folder}: no such run of the present source; `make figures` computes it")

@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from repro import Scene, load_scene
-from repro.run.cache import cached_runs
 from verification.claims import rheology
 from verification.claims.levels import converged
 from verification.claims.runs import rows_at, until
+from verification.store import Folders
 
-CACHE = Path(__file__).parent / "cache"
+STORE = Folders(Path(__file__).parent / "cache")
 
 
 @dataclass(frozen=True)
@@ -69,4 +69,4 @@ PERMEABLE = tuple(Request("wide", (*_UNTIL, 'flow.biomass="brinkman"', f'flow.pe
 
 def folders(requests: Iterable[Request]) -> list[Path]:
     """Results folders of several requests, the missing ones computed side by side."""
-    return cached_runs([request.load() for request in requests], CACHE)
+    return STORE.get_all(request.load() for request in requests)

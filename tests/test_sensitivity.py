@@ -3,7 +3,7 @@ import pytest
 
 from paper_figures import replication
 from repro.scene import load_scene
-from verification import claims, sensitivity
+from verification import claims, sensitivity, store
 from verification.claims import evaluate, report
 from verification.sensitivity import __main__ as driver
 from verification.sensitivity import rounding, wide
@@ -47,13 +47,13 @@ class Law:
     def __init__(self, law):
         self.law = law
 
-    def numbers(self, said):
+    def get(self, said):
         plain = load_scene(said.name)
         return self.law({each.name: value_of(said, each.paths[0]) / value_of(plain, each.paths[0])
                          for each in ROUNDED + EXACT if each.only in ("", said.name)})
 
-    def rows(self, scenes):
-        return [*map(self.numbers, scenes)]
+    def get_all(self, scenes):
+        return [*map(self.get, scenes)]
 
 
 def test_elasticities_of_a_power_law():
@@ -114,12 +114,12 @@ def test_a_run_is_computed_once_kept_at_once_and_computed_anew_by_another_source
     monkeypatch.setitem(OF, "base", counted)
     plain, other = scene("base", {}), scene("base", {"k": 1.01})
     for said, number in ((plain, 1), (plain, 1), (other, 2), (other, 2)):
-        assert Runs(kept).numbers(said) == {"n": number}
+        assert Runs(kept).get(said) == {"n": number}
     kept.write_text(kept.read_text()[:-1])
-    assert Runs(kept).numbers(plain) == {"n": 1} and Runs(kept).numbers(other) == {"n": 3}
+    assert Runs(kept).get(plain) == {"n": 1} and Runs(kept).get(other) == {"n": 3}
     assert len(Runs(kept).known) == 2
-    monkeypatch.setattr(rounding, "source_hash", lambda: "another!")
-    assert Runs(kept).known == {} and Runs(kept).numbers(plain) == {"n": 4}
+    monkeypatch.setattr(store, "source_hash", lambda: "another!")
+    assert Runs(kept).known == {} and Runs(kept).get(plain) == {"n": 4}
 
 
 def its_input(said):
@@ -129,10 +129,10 @@ def its_input(said):
 def test_runs_on_all_cores_are_kept_under_their_own_scenes(tmp_path, monkeypatch):
     monkeypatch.setitem(OF, "base", its_input)
     scenes = [scene("base", {"k": factor}) for factor in (0.9, 1.0, 1.1)]
-    assert Runs(tmp_path / "runs.jsonl").rows(scenes) == [*map(its_input, scenes)]
+    assert Runs(tmp_path / "runs.jsonl").get_all(scenes) == [*map(its_input, scenes)]
     monkeypatch.delitem(OF, "base")
     for said in scenes:
-        assert Runs(tmp_path / "runs.jsonl").numbers(said) == its_input(said)
+        assert Runs(tmp_path / "runs.jsonl").get(said) == its_input(said)
 
 
 def test_sobol_indices_of_a_linear_law():

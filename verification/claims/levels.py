@@ -21,13 +21,13 @@ kept by `cached` is kept for that level.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
-from functools import wraps
 
 from repro.scene.keys import PRESETS
+from verification.store import Memory
 
 CONVERGED, SCHEME = "converged", "scheme"
 #: Of the converged solution at size 1: its preset.
@@ -81,7 +81,6 @@ ALONE = (1.0,)
 DEFAULT = Level()
 
 _current: ContextVar[Level] = ContextVar("level", default=DEFAULT)
-_kept: dict[Level, dict] = {}
 
 
 def current() -> Level:
@@ -99,17 +98,6 @@ def at_level(level: Level) -> Iterator[None]:
         _current.reset(token)
 
 
-def forget(level: Level) -> None:
-    """Drop what is kept of a level."""
-    _kept.pop(level, None)
-
-
-def cached(function: Callable) -> Callable:
-    """Keep what a function returns, by its arguments and by the level."""
-    @wraps(function)
-    def keeping(*given):
-        kept = _kept.setdefault(current(), {})
-        if (function, given) not in kept:
-            kept[function, given] = function(*given)
-        return kept[function, given]
-    return keeping
+_memory = Memory(current)
+#: Keep what a function returns, by its arguments and by the level; drop what is kept of a level.
+cached, forget = _memory.cached, _memory.forget

@@ -226,7 +226,7 @@ def computed(runs: Runs, only: str | None) -> dict:
 
 
 def _of_scene(runs: Runs, made: dict, name: str = "wide") -> None:
-    made["values"] |= runs.numbers(scene(name, {}))
+    made["values"] |= runs.get(scene(name, {}))
     made["elasticities"] |= rounding.elasticities(runs, name)
 
 

@@ -27,11 +27,9 @@ and its bootstrap's intervals.
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterable
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import product, repeat
+from itertools import product
 from math import log
 from pathlib import Path
 
@@ -44,14 +42,13 @@ from repro.march import simulation, updates
 from repro.march.loop import State
 from repro.model import kinetics, pore
 from repro.results import M_PER_D
-from repro.run.machine import source_hash
-from repro.scene import Scene, load_scene, needed, scene_hash
+from repro.scene import Scene, load_scene, needed
 from verification.claims import interval
 from verification.claims.base_run import DISTANCES, END, upstream_means
 from verification.claims.evaluate import MESH_ORDERS
 from verification.claims.levels import converged
 from verification.claims.runs import ending
-from verification.evidence.writing import append, lines
+from verification.store import Numbers
 from verification.uncertainty import estimate
 
 
@@ -128,7 +125,7 @@ KEPT = Path(__file__).parent / "out" / "runs.jsonl"
 #: Conductivity is asked for so long after contact, h.
 AFTER = 4.0
 
-Numbers = dict[str, float]
+Row = dict[str, float]
 
 
 def scene(name: str, factors: dict[str, float], *changes: str) -> Scene:
@@ -136,7 +133,7 @@ def scene(name: str, factors: dict[str, float], *changes: str) -> Scene:
     return changed(load_scene(name, changes or converged(1.0)), factors)
 
 
-def of_base(said: Scene) -> Numbers:
+def of_base(said: Scene) -> Row:
     """What section 4 prints, concentrations in K_s; "before the aggregate expands" is the shape a time step before
     19.4 h with what grows in it [E12]."""
     plotted = END - said.growth.time_step
@@ -158,7 +155,7 @@ def of_base(said: Scene) -> Numbers:
             "doubling_at_supply": log(2) / rate}
 
 
-def of_wide(said: Scene) -> Numbers:
+def of_wide(said: Scene) -> Row:
     """Contact with the opposite wall (h), and the conductivity (m/d) some hours after it."""
     state = touching(ending(said, said.growth.end))
     time = state.pore.time
@@ -171,45 +168,20 @@ def touching(said: Scene) -> State:
     return next(state for state, _ in simulation.steps(said) if state.pore.contact)
 
 
-OF: dict[str, Callable[[Scene], Numbers]] = {"base": of_base, "wide": of_wide}
+OF: dict[str, Callable[[Scene], Row]] = {"base": of_base, "wide": of_wide}
 
 
-class Runs:
-    """Runs that have been computed with the present source of `repro`."""
+class Runs(Numbers):
+    """The numbers of runs, of which the file has a line each."""
 
-    def __init__(self, path: Path = KEPT) -> None:
-        self.path = path
-        self.known: dict[str, Numbers] = {row["run"]: row["numbers"] for row in lines(path)
-                                          if row["run"].endswith(source_hash())}
-
-    def numbers(self, said: Scene) -> Numbers:
-        """What a scene's run comes to."""
-        key = _key(said)
-        if key not in self.known:
-            self.known[key] = computed(said, self.path)
-        return self.known[key]
-
-    def rows(self, scenes: Iterable[Scene]) -> list[Numbers]:
-        """What the runs of scenes come to, those that are not known yet on all cores."""
-        scenes = list(scenes)
-        missing = {_key(said): said for said in scenes if _key(said) not in self.known}
-        print(f"{len(missing)} runs", flush=True)
-        with ProcessPoolExecutor(max_workers=os.cpu_count()) as pool:
-            self.known |= zip(missing, pool.map(computed, missing.values(), repeat(self.path)))
-        return [*map(self.numbers, scenes)]
+    def __init__(self, file: Path = KEPT) -> None:
+        super().__init__(computed, file)
 
 
-def computed(said: Scene, path: Path) -> Numbers:
-    """What a run comes to, with no operation that fails silently; a line of the file at once, so that a break loses no
-    more than those under way."""
+def computed(said: Scene) -> dict[str, float]:
+    """What a run comes to, with no operation that fails silently."""
     with np.errstate(all="raise", under="ignore"):
-        numbers = {name: float(value) for name, value in OF[said.name](said).items()}
-    append({"run": _key(said), "numbers": numbers}, path)
-    return numbers
-
-
-def _key(said: Scene) -> str:
-    return f"{said.name}-{scene_hash(said)}-{source_hash()}"
+        return {name: float(value) for name, value in OF[said.name](said).items()}
 
 
 #: Relative distances of an input from its printed value; the larger one of an input that is taken as exact.
@@ -221,11 +193,11 @@ RESOLVED = 0.1
 def elasticities(runs: Runs, name: str) -> dict[str, dict[str, dict]]:
     """{number: {input: elasticity, bar, resolved, and the changes (%) that +-10 % of an exact input make}}."""
     inputs = [each for each in INPUTS if each.only in ("", name)]
-    runs.rows(said for each in inputs for said in _moved(name, each))
-    plain = runs.numbers(scene(name, {}))
+    runs.get_all(said for each in inputs for said in _moved(name, each))
+    plain = runs.get(scene(name, {}))
     found: dict[str, dict[str, dict]] = {number: {} for number in plain}
     for each in inputs:
-        rows = [*map(runs.numbers, _moved(name, each))]
+        rows = [*map(runs.get, _moved(name, each))]
         for number, value in plain.items():
             found[number][each.name] = _told(value, column(rows, number))
     return found
@@ -270,7 +242,7 @@ def printed_of(numbers: Numbers) -> np.ndarray:
     return np.array([numbers[name] for name in PRINTED])
 
 
-def misfit(numbers: Numbers, bars: ArrayLike = 0.0) -> float:
+def misfit(numbers: Row, bars: ArrayLike = 0.0) -> float:
     """Largest distance of a printed number, or of an end of its bar, from the middle of its interval, in half
     intervals."""
     return float(((np.abs(printed_of(numbers) - MIDDLE) + bars) / HALF).max())
@@ -285,7 +257,7 @@ def one_set(runs: Runs, elasticities: dict[str, dict[str, dict]]) -> dict:
     for _ in range(ROUNDS):
         x, t = program(start, slopes, bars)
         factors = {each.name: 1 + value for each, value in zip(ROUNDED, x)}
-        numbers = runs.numbers(scene("base", factors, *converged(SET_SIZES[0])))
+        numbers = runs.get(scene("base", factors, *converged(SET_SIZES[0])))
         if misfit(numbers) <= ENOUGH and misfit(numbers, bars) <= 1:
             break
         start = printed_of(numbers) - slopes @ x
@@ -303,14 +275,14 @@ def _table(elasticities: dict[str, dict[str, dict]]) -> np.ndarray:
     return np.reshape(found, (len(PRINTED), -1))
 
 
-def column(rows: list[Numbers], name: str) -> list[float]:
+def column(rows: list[Row], name: str) -> list[float]:
     """A number of some runs."""
     return [row[name] for row in rows]
 
 
 def _on_sizes(runs: Runs, factors: dict[str, float]) -> np.ndarray:
     """(sizes, printed numbers) of base on SET_SIZES."""
-    rows = runs.rows(scene("base", factors, *converged(size)) for size in SET_SIZES)
+    rows = runs.get_all(scene("base", factors, *converged(size)) for size in SET_SIZES)
     return np.array([*map(printed_of, rows)])
 
 
@@ -360,7 +332,7 @@ def sobol(runs: Runs, elasticities: dict[str, dict[str, dict]], samples: int = S
     names = [name for name, moved in zip(PRINTED, moves.any(axis=1)) if moved and name != "consumed"]
 
     def numbers(x: np.ndarray) -> list[list[float]]:
-        rows = runs.rows(scene("base", dict(zip(inputs, factors)), *FAST) for factors in x.T)
+        rows = runs.get_all(scene("base", dict(zip(inputs, factors)), *FAST) for factors in x.T)
         return [column(rows, name) for name in names]
     spread = [uniform(1 - each.rounding, 2 * each.rounding) for each in chosen]
     found = sobol_indices(func=numbers, n=samples, dists=spread, rng=np.random.default_rng(SEED))

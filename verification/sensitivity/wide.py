@@ -33,7 +33,7 @@ from verification.claims.evaluate import MESH_ORDERS, unnumbered
 from verification.claims.growth_pattern import contact_length
 from verification.claims.levels import CONVERGED, Level, at_level, converged, forget
 from verification.claims.runs import WIDE, bodies, ending, polygon, series
-from verification.sensitivity.rounding import OF, Numbers, Runs, column, scene, touching
+from verification.sensitivity.rounding import OF, Row, Runs, column, scene, touching
 from verification.uncertainty import estimate
 
 SIZES = (0.25, 2**-1.5, 0.5, 2**-0.5)
@@ -47,7 +47,7 @@ KINDS = ("mean of", f"{LATER:g} h:", "last")
 ASKED = {"conductivity (m/d)": 1.0, "upstream tip (um)": 1.0, "downstream tip (um)": 1.0, "length of contact (um)": 2.0}
 
 
-def of_after(said) -> Numbers:
+def of_after(said) -> Row:
     """Means over HOURS (geometric, of magnitudes), values at LATER and at the last of them. Raises LookupError where
     one of the hours is before contact."""
     after = [instant for _, instant in simulation.steps(said) if instant and instant.pore.contact]
@@ -71,11 +71,11 @@ OF["after contact"] = of_after
 def after_contact(runs: Runs) -> list[dict]:
     """Each number on all sizes, its bar (%), and whether that is what is asked."""
     plain = (ending(scene("wide", {}, *converged(size)), *HOURS) for size in SIZES)
-    rows = runs.rows(replace(said, name="after contact") for said in plain)
+    rows = runs.get_all(replace(said, name="after contact") for said in plain)
     return [_bar_of(rows, f"{kind} {name}", asked) for kind, (name, asked) in product(KINDS, ASKED.items())]
 
 
-def _bar_of(rows: list[Numbers], quantity: str, asked: float) -> dict:
+def _bar_of(rows: list[Row], quantity: str, asked: float) -> dict:
     """A number from what runs on SIZES come to."""
     values = column(rows, quantity)
     bar = 100 * estimate(SIZES, values, MESH_ORDERS).bar / abs(values[0])
@@ -135,7 +135,7 @@ def contacts(runs: Runs) -> dict[str, dict]:
 def _of_supply(runs: Runs, supply: float) -> dict:
     print(f"wide: a supply of {supply:g} K_s", flush=True)
     factors = {"supply of acceptor": supply / 10, "supply of donor": supply / 10}
-    contact = runs.numbers(replace(scene("wide", factors, *converged(SIZE)), name="contact"))
+    contact = runs.get(replace(scene("wide", factors, *converged(SIZE)), name="contact"))
     level = supplied(supply, contact["end"])
     with at_level(level), np.errstate(all="raise", under="ignore"):
         judged = {id: holding(CLAIMS[id].function()) for id in sorted(CLAIMS)

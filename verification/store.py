@@ -1,0 +1,150 @@
+"""One store of results that are computed once for a scene and for the present source of ``repro``.
+
+A result is found by a key that has the hashes of the scene and of the source, so that a change of either computes it
+anew. Missing results are computed side by side. :class:`Folders` keeps whole runs, :class:`Numbers` the few numbers of
+many runs, and :class:`Memory` what functions of claims return, which is lost when the process ends.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Collection, Hashable, Iterable
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial, wraps
+from pathlib import Path
+from tempfile import mkdtemp
+from typing import Any
+
+from repro.run.machine import source_hash
+from repro.run.running import run
+from repro.scene import Scene, scene_hash
+from verification.evidence.writing import append, lines
+
+
+def key_of(scene: Scene) -> str:
+    """The key of a scene's results with the present source."""
+    return f"{scene.name}-{scene_hash(scene)}-{source_hash()}"
+
+
+class Store(ABC):
+    """Results of scenes, each computed once, by a function that processes can share."""
+
+    def __init__(self, compute: Callable[[Scene], Any]):
+        self.compute = compute
+
+    @abstractmethod
+    def find(self, key: str) -> Any:
+        """The result of a key, or None."""
+
+    @abstractmethod
+    def keep(self, key: str, result: Any) -> None:
+        """Take over a result that was computed."""
+
+    def get(self, scene: Scene) -> Any:
+        """The result of a scene."""
+        return self.get_all([scene])[0]
+
+    def get_all(self, scenes: Iterable[Scene]) -> list:
+        """The results of several scenes. If more than one is missing, they are computed side by side, a process a
+        core."""
+        keyed = [(key_of(scene), scene) for scene in scenes]
+        missing = {key: scene for key, scene in keyed if self.find(key) is None}
+        results = map(self.compute, missing.values()) if len(missing) == 1 else self._side_by_side(missing.values())
+        for key, result in zip(missing, results):
+            self.keep(key, result)
+        return [self.find(key) for key, _ in keyed]
+
+    def _side_by_side(self, scenes: Collection[Scene]) -> list:
+        if not scenes:
+            return []
+        with ProcessPoolExecutor(max_workers=os.cpu_count()) as pool:
+            return list(pool.map(self.compute, scenes))
+
+
+class Folders(Store):
+    """Whole runs, a folder each."""
+
+    def __init__(self, folder: Path):
+        super().__init__(partial(_run_into, folder))
+        self.folder = folder
+
+    def path(self, scene: Scene) -> Path:
+        """Where the run of a scene is or will be."""
+        return self.folder / key_of(scene)
+
+    def find(self, key: str) -> Path | None:
+        """The folder of a run, or None."""
+        return self.folder / key if (self.folder / key / "run.json").exists() else None
+
+    def keep(self, key: str, result: Path) -> None:
+        """The run is in its folder already."""
+
+
+def _run_into(folder: Path, scene: Scene) -> Path:
+    """Run a scene into a folder that appears complete. Raises SimulationError if the run fails."""
+    target = folder / key_of(scene)
+    folder.mkdir(parents=True, exist_ok=True)
+    temporary = Path(mkdtemp(prefix=".computing-", dir=folder))
+    try:
+        run(scene, temporary / "run")
+        try:
+            os.replace(temporary / "run", target)
+        except OSError:
+            if not (target / "run.json").exists():  # else another process was faster
+                raise
+    finally:
+        shutil.rmtree(temporary)
+    return target
+
+
+def provenance(folder: Path) -> dict:
+    """The ``run.json`` of a run."""
+    return json.loads((folder / "run.json").read_text(encoding="utf-8"))
+
+
+class Numbers(Store):
+    """Numbers {name: value} of many runs, in the lines of a file."""
+
+    def __init__(self, numbers: Callable[[Scene], dict[str, float]], file: Path):
+        super().__init__(partial(_append_numbers, numbers, file))
+        self.known = {row["run"]: row["numbers"] for row in lines(file) if row["run"].endswith(source_hash())}
+
+    def find(self, key: str) -> dict[str, float] | None:
+        """The numbers of a run, or None."""
+        return self.known.get(key)
+
+    def keep(self, key: str, result: dict[str, float]) -> None:
+        """Know them from now on."""
+        self.known[key] = result
+
+
+def _append_numbers(numbers: Callable[[Scene], dict[str, float]], file: Path, scene: Scene) -> dict[str, float]:
+    """The numbers of a run, written at once: a break loses only those being computed."""
+    row = {"run": key_of(scene), "numbers": numbers(scene)}
+    append(row, file)
+    return row["numbers"]
+
+
+class Memory:
+    """What functions return in this process, by their arguments and by the present value of a context."""
+
+    def __init__(self, context: Callable[[], Hashable]):
+        self._context = context
+        self._results: dict[Hashable, dict] = {}
+
+    def cached(self, function: Callable) -> Callable:
+        """Decorate a function: each call is computed once in each context."""
+        @wraps(function)
+        def remembering(*arguments):
+            results = self._results.setdefault(self._context(), {})
+            if (function, arguments) not in results:
+                results[function, arguments] = function(*arguments)
+            return results[function, arguments]
+        return remembering
+
+    def forget(self, context: Hashable) -> None:
+        """Drop the results of a context."""
+        self._results.pop(context, None)
