@@ -42,8 +42,8 @@ mutants: $(STAMP) ## run wrong changes of the code against the cases and tests, 
 	@$(BIN) -m verification.mutants
 
 mutants-sampled: $(STAMP) ## mutants made by machine, a sample of them from all of repro/, against the tests; goes on where it was stopped
-	@$(PIP) --require-hashes --no-deps --only-binary :all: -r verification/sampled/requirements.lock
-	@$(BIN) -m verification.sampled
+	@$(PIP) --require-hashes --no-deps --only-binary :all: -r verification/mutants/machine/requirements.lock
+	@$(BIN) -m verification.mutants.machine
 
 test: $(STAMP) ## run the tests and the quick verification cases, a process a core
 	@$(BIN) -m pytest tests verification -n logical --dist worksteal -m "not slow"

@@ -24,7 +24,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 RUNTIME = PROJECT["project"]["dependencies"]
 EXTRAS = PROJECT["project"]["optional-dependencies"]
 LOCKS = [(ROOT / name).read_text(encoding="utf-8")
-         for name in ("requirements.lock", "verification/sampled/requirements.lock", ".ci/crate.lock")]
+         for name in ("requirements.lock", "verification/mutants/machine/requirements.lock", ".ci/crate.lock")]
 PIN = re.compile(r"^([a-z0-9-]+)==(\d+(?:\.\d+)*)", re.M)
 ADDRESS = re.compile(r"//|file:|index|--find-links|(^|\s)/\w", re.M)
 

@@ -1,0 +1,16 @@
+"""A plugin of pytest: the context of coverage.py is the test that runs, in its process and in those that it starts."""
+
+import os
+
+import pytest
+from coverage import Coverage
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item):
+    """Name the context, here and in the settings that processes read which the test starts."""
+    os.environ |= {"TEST": item.nodeid, "COVERAGE_PROCESS_START": os.environ["SETTINGS"]}
+    Coverage.current().switch_context(item.nodeid)
+    outcome = yield
+    Coverage.current().switch_context("")
+    return outcome
