@@ -7,7 +7,7 @@ are those of :class:`Case` up to ``omitted``.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
 from itertools import product
@@ -69,7 +69,7 @@ class Case:
     omitted: str = ""
     slow: bool = False
     file: Path = FOLDER
-    variants: Mapping[str, str] = ()
+    variants: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self):
         if self.kind not in KINDS or not all((self.claim, self.norm, self.mutants)):
@@ -126,20 +126,18 @@ def cases() -> dict[str, Case]:
 
 
 def _cases_of(function) -> Iterator[Case]:
-    """The cases of a test function: one, or one for each group of parameter sets that bears the mark itself."""
+    """The cases of a test function: its own, or those of the groups of parameter sets that have a mark themselves."""
     marks = getattr(function, "pytestmark", ())
-    tests: dict[str, dict[str, str]] = {}
-    found = {}
+    groups: dict[str, Case] = {}
     for parameters, own in _parameter_sets(marks):
-        every = [*marks, *own]
-        for mark in (mark for mark in every if mark.name == "case"):
-            id = mark.args[0]
-            slow = any(mark.name == "slow" for mark in every)
+        names = {mark.name: mark for mark in (*marks, *own)}
+        if "case" in names:
+            id = names["case"].args[0]
             file = Path(function.__code__.co_filename)
+            fresh = Case(id, **names["case"].kwargs, slow="slow" in names, file=file)
             test = f"{file.relative_to(ROOT)}::{function.__name__}" + (f"[{parameters}]" if parameters else "")
-            tests.setdefault(id, {})[label_of(id, parameters)] = test
-            found[id] = Case(id, **mark.kwargs, slow=slow, file=file, variants=tests[id])
-    yield from found.values()
+            groups.setdefault(id, fresh).variants[label_of(id, parameters)] = test
+    yield from groups.values()
 
 
 def _parameter_sets(marks: Iterable) -> Iterator[tuple[str, list]]:

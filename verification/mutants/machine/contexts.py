@@ -3,12 +3,13 @@
 import os
 
 import pytest
-from coverage import Coverage
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item):
     """Name the context, here and in the settings that processes read which the test starts."""
+    from coverage import Coverage
+
     os.environ |= {"TEST": item.nodeid, "COVERAGE_PROCESS_START": os.environ["SETTINGS"]}
     Coverage.current().switch_context(item.nodeid)
     outcome = yield

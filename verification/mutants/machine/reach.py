@@ -40,7 +40,7 @@ def measure(folder: Path) -> None:
     """Run all tests under coverage.py in the present folder. Keep the data, and the seconds of the tests that pass."""
     settings = folder / "coveragerc"
     settings.write_text(SETTINGS.format(data=folder / DATA), encoding="utf-8")
-    report = folder / "tests.xml"
+    report = folder / "junit.xml"
     ignored = [f"--ignore=tests/test_{name}.py" for name in OF_TEXT]
     coverage = [sys.executable, "-m", "coverage"]
     subprocess.run([*coverage, "run", f"--rcfile={settings}", "-m", "pytest", "tests", "-p",
