@@ -222,9 +222,9 @@ BALANCED = {**{f"base, {preset}": (_of_base, preset) for preset in ("paper", *ru
          "pore of 40 um at 2.9 m/d from a seed to 2 h past contact",
     mutants=("biomass-of-the-start-takes-up", "remesh-half-way-unmatched", "masses-of-the-start-kept",
              "flows-of-the-start", "euler-biomass", "rates-at-the-start", "rates-two-percent-low", "decay-leaves-all"))
-@parametrize("judge, *given", BALANCED)
-def test_one_balance(judge, given, record):
-    record(judge(*given))
+@parametrize("judge, *arguments", BALANCED)
+def test_one_balance(judge, arguments, record):
+    record(judge(*arguments))
 
 
 #: What the presets are for, in all; three times that in a single step.

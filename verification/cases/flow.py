@@ -143,10 +143,10 @@ PARABOLAS = {f"lambda = {ratio:g}, {form}": (ratio, form)
     mutants=("viscosity-swapped", "loss-per-width", "inlet-parabola", "whole-pore-twice", "outlet-free",
              "cubic-edge-crossed", "quadratic-stabilised"),
     references=("poiseuille",), omitted="order 1: flow-poiseuille, flow-plug")
-@parametrize("order, given", combined(HIGHER, PARABOLAS))
-def test_curved_poiseuille(order, given, record):
+@parametrize("order, problem", combined(HIGHER, PARABOLAS))
+def test_curved_poiseuille(order, problem, record):
     """On six-node triangles with biomass from wall to wall."""
-    ratio, interface = given
+    ratio, interface = problem
     space = meshes.space_on(meshes.plug(CURVED_ENDS, WIDTH, HALF, 8.0, seed=3), order)
     found = flow.solve(space, drive(mean_velocity=MEAN, viscosity_ratio=ratio), LENGTH, interface=interface)
     ends = space.mesh.topology
@@ -411,8 +411,8 @@ MADE_HIGHER = {"order 2": (2, STRAIGHT, BOX, 1e-6, 3e-4), "order 3": (3, STRAIGH
 MADE_BENT = {"order 2": (2, BEND, COARSE_BOX, 3e-5, 1e-3), "order 3": (3, BEND, COARSE_BOX, 1e-6, 1e-4)}
 
 
-def manufactured(made: tuple, ratio: float, interface: str):
-    order, bend, sizes, velocity, pressure = made
+def manufactured(setup: tuple, ratio: float, interface: str):
+    order, bend, sizes, velocity, pressure = setup
     fields = manufactured_flow.evaluated(ratio, interface)
     errors = refine(_errors, sizes, _box_grid, bend, order, ratio, interface, lambda x, y: [f(x, y) for f in fields])
     return studies(errors, {"velocity": (order + 1, FULL, velocity), "pressure": (*PRESSURE[order], pressure)})
@@ -423,9 +423,9 @@ def manufactured(made: tuple, ratio: float, interface: str):
     claim="Where nothing jumps but the viscosity all orders are full, for lambda = 10 and 2000 in both forms",
     norm="root mean square over random meshes of a size, relative L2 of u and p",
     mutants=("saddle-sign",), references=("manufactured_flow",), omitted="orders 2, 3: flow-manufactured-quadratic")
-@parametrize("made, ratio, interface", combined(MADE, SOFT_AND_STIFF, FORMS))
-def test_manufactured(made, ratio, interface, record):
-    record(manufactured(made, ratio, interface))
+@parametrize("setup, ratio, interface", combined(MADE, SOFT_AND_STIFF, FORMS))
+def test_manufactured(setup, ratio, interface, record):
+    record(manufactured(setup, ratio, interface))
 
 
 @pytest.mark.slow
@@ -436,9 +436,9 @@ def test_manufactured(made, ratio, interface, record):
     norm="root mean square over random meshes of a size, relative L2 of u and p",
     mutants=("traction-transposed", "cubic-lower-degree"), references=("manufactured_flow",),
     omitted="order 1: flow-manufactured")
-@parametrize("made, ratio, interface", combined(MADE_HIGHER, SOFT_AND_STIFF, FORMS))
-def test_manufactured_quadratic(made, ratio, interface, record):
-    record(manufactured(made, ratio, interface))
+@parametrize("setup, ratio, interface", combined(MADE_HIGHER, SOFT_AND_STIFF, FORMS))
+def test_manufactured_quadratic(setup, ratio, interface, record):
+    record(manufactured(setup, ratio, interface))
 
 
 @pytest.mark.slow
@@ -450,9 +450,9 @@ def test_manufactured_quadratic(made, ratio, interface, record):
     mutants=("cubic-edge-crossed", "cubic-slope", "cubic-lower-degree", "curved-straight-divergence",
              "traction-transposed"),
     references=("manufactured_flow",), omitted="order 1 has straight triangles: flow-manufactured")
-@parametrize("made, ratio, interface", combined(MADE_BENT, viscous(10.0), FORMS))
-def test_curved_manufactured(made, ratio, interface, record):
-    record(manufactured(made, ratio, interface))
+@parametrize("setup, ratio, interface", combined(MADE_BENT, viscous(10.0), FORMS))
+def test_curved_manufactured(setup, ratio, interface, record):
+    record(manufactured(setup, ratio, interface))
 
 
 @cache

@@ -55,13 +55,13 @@ DISCS, DROP = {40.0: 0.012, 46.0: 0.008}, 0.003
           "linear elements and for u itself of quadratic and cubic ones, the outlet included, in both forms",
     norm="largest relative error of the flux through 25 sections, and through the outlet",
     mutants=("tau-of-water", "carried-by-u-plus", "inlet-not-scaled", "curved-straight-divergence", "inlet-parabola"))
-@parametrize("made, interface", EVERY)
-def test_sections(made, interface, record):
-    if isinstance(made, int):
-        plug = meshes.plug(ENDS, WIDTH, 30.0, 3.1 if made == 1 else 6.0, meshes.cut)
-        record(_carried(meshes.space_on(plug, made), interface, "plug", DROP))
+@parametrize("numerics, interface", EVERY)
+def test_sections(numerics, interface, record):
+    if isinstance(numerics, int):
+        plug = meshes.plug(ENDS, WIDTH, 30.0, 3.1 if numerics == 1 else 6.0, meshes.cut)
+        record(_carried(meshes.space_on(plug, numerics), interface, "plug", DROP))
     for radius, drop in DISCS.items():
-        record(_carried(_around(radius, made), interface, f"half-disc of {radius:g} um", drop))
+        record(_carried(_around(radius, numerics), interface, f"half-disc of {radius:g} um", drop))
 
 
 def _carried(space: Space, interface: str, name: str, drop: float):
@@ -99,9 +99,9 @@ def flux_error(space: Space, carried: np.ndarray) -> float:
           "the flux, and the flow is linear in its drive",
     norm="relative difference",
     mutants=("correction-not-scaled", "loss-per-width"))
-@parametrize("made, interface", EVERY)
-def test_energy(made, interface, record):
-    space = _around(25.0, made)
+@parametrize("numerics, interface", EVERY)
+def test_energy(numerics, interface, record):
+    space = _around(25.0, numerics)
     unit = flow.unit_flow(space, RATIO, interface=interface)
     work, dissipated = _power(space, unit, interface)
     driven = [flow.scaled(unit, space.mesh, LENGTH, drive(head=head)) for head in (10.0, 20.0)]
@@ -142,9 +142,9 @@ def _power(space: Space, unit: flow.UnitFlow, interface: str) -> tuple[float, fl
     claim="Flow through a leaning aggregate is its mirror image's flow mirrored, since Stokes flow is reversible",
     norm="L2 of the difference of both velocities, in the middle and everywhere",
     mutants=("outlet-free",))
-@parametrize("made, interface", EVERY)
-def test_reversed(made, interface, record):
-    space = _around(25.0, made, 0.6, 150.0)
+@parametrize("numerics, interface", EVERY)
+def test_reversed(numerics, interface, record):
+    space = _around(25.0, numerics, 0.6, 150.0)
     mirror = Space(_mirrored(space.mesh), space.order)
     there, back = (flow.unit_flow(way, RATIO, interface=interface).velocity for way in (space, mirror))
     _, weight, shape = meshes.fine(space)
@@ -171,10 +171,10 @@ RATIOS = np.array([1.0, 2.0, 10.0, 100.0, 2000.0, 1e5])
     claim="Viscous biomass never raises the conductivity: the loss rises with lambda, ever more slowly, and with R",
     norm="head losses for six lambda, over that of the clean channel",
     mutants=("thin-biomass",))
-@parametrize("made, interface", EVERY)
-def test_obstacle(made, interface, record):
+@parametrize("numerics, interface", EVERY)
+def test_obstacle(numerics, interface, record):
     """Losses of four half-discs."""
-    spaces = [_around(radius, made) for radius in (5.0, 25.0, 40.0, 46.0)]
+    spaces = [_around(radius, numerics) for radius in (5.0, 25.0, 40.0, 46.0)]
     losses = np.array([flow.unit_flow(space, ratio, interface=interface).loss
                        for space, ratio in product(spaces, RATIOS)]).reshape(len(spaces), -1)
     rises = np.diff(losses, axis=1)

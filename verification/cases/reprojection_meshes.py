@@ -72,15 +72,15 @@ LOCATED = {1: 4e-3, 2: 1e-4, 3: 2e-6}
          "a thousand places of fields of order 1, 2 and 3, and over three meshes a size",
     mutants=("corners-for-middles", "nearest-corner", "bounded-lumped", "bounds-of-one-piece"))
 @parametrize(
-    "told, measure, given, *expected",
+    "field, measure, method, *expected",
     {**{f"{name}, order 1": ("carried", _carried_errors, carry, 2, "linear elements: second order", ceiling)
         for name, (carry, ceiling) in CARRIERS.items()},
      **{f"fields of order {k}, order {k}": ("located", _located_errors, k, k + 1,
                                             "interpolation: one order more than the elements'", ceiling)
         for k, ceiling in LOCATED.items()}})
-def test_order(told, measure, given, expected, record):
-    record(studies(refine(measure, SIZES, given), {told: expected}))
-    if given is transfer.project_bounded:
+def test_order(field, measure, method, expected, record):
+    record(studies(refine(measure, SIZES, method), {field: expected}))
+    if method is transfer.project_bounded:
         gaps = [_bent(transfer.project_bounded(*old, _plane(old)[:, None], *new)[:, 0], new)
                 for _, old, new in pairs.pairs()]
         record(at_most("linear field", max(gaps), 1e-12, "within its bounds at every node: round-off"))

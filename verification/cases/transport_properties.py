@@ -231,13 +231,13 @@ FASTEST = {"quadratic, accurate": ((ACCURATE, runs.of("quadratic"), FINER), 1e-3
           "to 0.1 %, by accurate with quadratic and with cubic elements, and by fast",
     norm="difference of effluents, over the supply, and of consumption, relative, to a mesh of refinement 2.5",
     mutants=("layers-ignored",), omitted="order 1 and paper: linear elements are not made for boundary layers")
-@parametrize("speed, made", combined( {speed: speed for speed in ("2.9 m/day", "29 m/day", "290 m/day")}, FASTEST))
-def test_curved_peclet(speed, made, record):
-    numerics, bound, why = made
+@parametrize("speed, preset", combined({speed: speed for speed in ("2.9 m/day", "29 m/day", "290 m/day")}, FASTEST))
+def test_curved_peclet(speed, preset, record):
+    numerics, bound, why = preset
     far = _carried(100.0, 60.0, speed, ACCURATE, "numerics.refinement=2.5")
-    for name, ours, trusted in zip(NAMES, _carried(100.0, 60.0, speed, *numerics), far):
-        record(each_at_most({"effluent": abs(ours.effluent - trusted.effluent) / SUPPLY,
-                             "consumed": abs(ours.consumed / trusted.consumed - 1)}, bound, why, f" {name}"))
+    for name, flux, trusted in zip(NAMES, _carried(100.0, 60.0, speed, *numerics), far):
+        record(each_at_most({"effluent": abs(flux.effluent - trusted.effluent) / SUPPLY,
+                             "consumed": abs(flux.consumed / trusted.consumed - 1)}, bound, why, f" {name}"))
 
 
 #: The balance's round-off, and how far effluents may be from those of quadratic elements twice finer: of numerics.
@@ -291,9 +291,9 @@ def _open(made: int | str) -> transport.Problem:
     norm="biomass made less Y donor - (acceptor - F donor) / d_c, over what is made; uptake at constant C, relative; "
          "remainder of a first-order Taylor expansion",
     mutants=("biomass-of-the-start", "biomass-half-way", "mean-biomass-constant-in-c"), references=("monod",))
-@parametrize("made", combined(MEAN))
-def test_mean_biomass(made, record):
-    problem = _open(made)
+@parametrize("numerics", combined(MEAN))
+def test_mean_biomass(numerics, record):
+    problem = _open(numerics)
     for hours in HOURS:
         record(_balanced(problem, hours))
         record(_integrated(problem, hours))

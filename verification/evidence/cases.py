@@ -129,8 +129,8 @@ def _cases_of(function) -> Iterator[Case]:
     """The cases of a test function: its own, or those of the groups of parameter sets that have a mark themselves."""
     marks = getattr(function, "pytestmark", ())
     groups: dict[str, Case] = {}
-    for parameters, own in _parameter_sets(marks):
-        names = {mark.name: mark for mark in (*marks, *own)}
+    for parameters, set_marks in _parameter_sets(marks):
+        names = {mark.name: mark for mark in (*marks, *set_marks)}
         if "case" in names:
             id = names["case"].args[0]
             file = Path(function.__code__.co_filename)

@@ -51,7 +51,7 @@ class Part:
 def parts() -> tuple[Part, ...]:
     """The table of modules that ``repro/__init__.py`` has."""
     head = (repro.__doc__ or "").partition("Where data enters")[0]
-    return tuple(_part(*found.groups("")) for found in map(LINE.match, head.splitlines()) if found)
+    return tuple(_part(*match.groups("")) for match in map(LINE.match, head.splitlines()) if match)
 
 
 def _part(name: str, equations: str, names: str) -> Part:
