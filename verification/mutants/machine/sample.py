@@ -38,10 +38,10 @@ def draw(count: int = COUNT) -> list:
     from cosmic_ray.work_db import use_db
 
     modules = sorted(Path("repro").rglob("*.py"))
+    texts = {path: path.read_text(encoding="utf-8") for path in modules}
     with use_db("all.sqlite") as everything:
         init(modules, everything, {})
-        places = _places(everything.work_items)
-    texts = {path: path.read_text(encoding="utf-8") for path in modules}
+        places = _places(everything.work_items, texts)
     available = {path: len(places[path]) for path in modules if places[path]}
     shares = shared({path: min(statements(texts[path]), most) for path, most in available.items()}, available, count)
     return [item for path, share in shares.items() for item in _drawn(places[path], texts[path], share)]
@@ -60,13 +60,16 @@ def shared(sizes: dict, available: dict, count: int) -> dict:
     return Counter([*available, *(name for name, _ in more)])
 
 
-def _places(items) -> dict[Path, dict[tuple[int, int], list]]:
+def _places(items, texts: dict[Path, str]) -> dict[Path, dict[tuple[int, int], list]]:
     """Work items by module and by the (line, column) that they change."""
     places: dict[Path, dict[tuple[int, int], list]] = defaultdict(lambda: defaultdict(list))
+    unseen = {path: hidden(text) for path, text in texts.items()}
     for item in items:
         mutation = item.mutations[0]
-        if is_taken(mutation.operator_name.removeprefix("core/")):
-            places[mutation.module_path][tuple(mutation.start_pos)].append(item)
+        place = tuple(mutation.start_pos)
+        is_hidden = any(start <= place < end for start, end in unseen[mutation.module_path])
+        if is_taken(mutation.operator_name.removeprefix("core/")) and not is_hidden:
+            places[mutation.module_path][place].append(item)
     return places
 
 
@@ -88,7 +91,7 @@ def hidden(text: str) -> list[tuple[tuple[int, int], tuple[int, int]]]:
 
 def _drawn(places: dict[tuple[int, int], list], text: str, share: int) -> list:
     """``share`` work items of a module, at as many places, in the order of the text."""
-    lines, unseen = text.splitlines(), hidden(text)
+    lines = text.splitlines()
 
     def rank(place: tuple[int, int], *more: object) -> str:
         near = [line.strip() for line in lines[max(place[0] - 2, 0):place[0] + 1]]
@@ -97,8 +100,7 @@ def _drawn(places: dict[tuple[int, int], list], text: str, share: int) -> list:
     def first(place: tuple[int, int]):
         return min(places[place], key=lambda item: rank(place, *_identity(item)))
 
-    seen = [place for place in places if not any(start <= place < end for start, end in unseen)]
-    ranked = sorted(seen, key=lambda place: (rank(place), place))
+    ranked = sorted(places, key=lambda place: (rank(place), place))
     drawn = islice((item for item in map(first, ranked) if _is_python(text, item)), share)
     return sorted(drawn, key=lambda item: item.mutations[0].start_pos)
 
