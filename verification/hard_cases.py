@@ -1,4 +1,4 @@
-"""The matrix of the twenty-two hard cases with every preset, which ``python -m verification`` runs: `... hard` for all
+"""The matrix of the twenty-three hard cases with every preset, which ``python -m verification`` runs: `... hard` for all
 of them, `... --case hard-04-fast-flow` for one.
 
 "cubic" is the preset fast with cubic elements. Each cell of the matrix, a case with a preset, is right, refused or
