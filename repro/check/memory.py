@@ -7,8 +7,8 @@ largest L (3.1):
     nodes = A / (sqrt(3)/2 L^2) + 2 l / (sqrt(3)/2) ((1/s - 1/L) / g - (L - s) / (g L^2))
 
 with the area A of the meshed part and the length l of the surface: right within a third. For an
-outline the second term is summed over the pieces of its edges, each with the size that it asks for: right
-within a factor of two.
+outline the second term is summed over the pieces of its edges, each with the size that it asks for:
+right within a factor of two.
 """
 
 from __future__ import annotations
@@ -125,9 +125,9 @@ def require_outline(scene: Scene) -> None:
     except MeshError as error:
         raise SceneError(f"{scene.name}: {error}") from error
     if curve is not None and not curve.is_valid:
-        raise SceneError(f"{scene.name}: the spline through the points of aggregate.outline crosses "
-                         f"itself ({shapely.is_valid_reason(curve)}); give more points, or "
-                         "smooth = false")
+        where = shapely.is_valid_reason(curve)
+        raise SceneError(f"{scene.name}: the spline through the points of aggregate.outline "
+                         f"crosses itself ({where}); give more points, or smooth = false")
 
 
 def require_memory(scene: Scene, warn: Callable[[str], None]) -> None:

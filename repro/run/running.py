@@ -132,8 +132,8 @@ def run(scene: Source, folder: str | Path, progress: Progress = unwatched, watch
 
 
 def _require(scene: Scene, watch: Watch) -> None:
-    """Raises SceneError where the machine lacks a package or the memory that a scene takes, or where
-    its outline is none."""
+    """Raises SceneError where the machine lacks a package or the memory that a scene takes, or
+    where the spline of its outline crosses itself or leaves the pore."""
     require_packages(scene)
     require_outline(scene)
     require_memory(scene, watch.warn)

@@ -119,9 +119,9 @@ def _shape_rules(points: Outlined, pore: "Pore") -> Rules:
     yield from _spacing_rules(points, pore.width)
     wanted = "a line that neither crosses nor touches itself is needed"
     yield _crosses(points, pore.width), {"aggregate.outline": wanted}
-    for first, second in nearest_edges(points, pore.width):
+    for one, other in nearest_edges(points, pore.width):
         yield True, {"aggregate.outline": f"{_least(pore.width)} is needed between the lines after "
-                                          f"points {first} and {second}"}
+                                          f"points {one} and {other}"}
 
 
 def _point_rules(said: str, point: tuple[float, float], end: bool, pore: "Pore") -> Rules:
