@@ -985,8 +985,8 @@ MUTANTS = (
          "Advice on a refinement is added to an error that has it already.",
          "if isinstance(error, Advised):",
          "if isinstance(error, str):",
-         f"{ADVICE}no_refinement_is_named_that_is_not_accepted_or_not_tried[0.2-; numerics.refinement up to 0.6 does not "
-         "resolve it]")),
+         f"{ADVICE}no_refinement_is_named_that_is_not_accepted_or_not_tried[0.2-; numerics.refinement up to 0.6 does "
+         "not resolve it]")),
     *changes(
         "repro/check/simplifications.py",
         ("refinement-beyond-the-largest",
