@@ -260,7 +260,8 @@ def test_for_machines(capsys):
     text = capsys.readouterr().out
     told = json.loads(text)
     assert text == json.dumps(told, indent=2) + "\n"
-    assert set(told) == {"scene", "modelled", "nodes", "triangles", "numbers", "warnings", "cost"}
+    assert set(told) == {"scene", "modelled", "nodes", "triangles", "numbers", "warnings", "cost",
+                         "estimated"}
     assert told["nodes"] == 783 and told["cost"]["steps"] == 0 and told["warnings"] == []
     assert told["numbers"][0]["name"] == "Reynolds" and "growth" in told["modelled"]
 

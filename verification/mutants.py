@@ -19,6 +19,8 @@ NETWORK = "tests/test_network.py::test_"
 STEPPING = "tests/test_stepping.py::test_"
 NOT_MET = "tests/test_warned.py::test_a_tolerance_that_no_step_can_meet_is_told_with_what_is_reached"
 UNSEEN = "tests/test_unseen.py::test_"
+ODD = "tests/test_odd_outlines.py::test_"
+ADVICE = "tests/test_advice.py::test_"
 BEFORE_END = f"{STEPPING}steps_and_rows_before_the_end_do_not_depend_on_it[fast-0.55]"
 GEAR = "tests/test_gear.py::test_"
 COURSE = "tests/test_scene_course.py::test_"
@@ -956,6 +958,42 @@ MUTANTS = (
          "return (last - first) / 2",
          "return last - first",
          "tests/test_check.py::test_a_seed_off_the_middle_reaches_as_much_farther")),
+    *changes(
+        "repro/fem/sizing.py",
+        ("sliver-unbounded",
+         "A thin body asks for elements of a tenth of its thickness, however long it is.",
+         "max(outline.thickness / ACROSS_AGGREGATE, length / ALONG_INTERFACE)",
+         "outline.thickness / ACROSS_AGGREGATE",
+         f"{ODD}a_sliver_asks_for_no_more_elements_than_its_length[fast-6000]")),
+    *changes(
+        "repro/scene/rules.py",
+        ("gap-between-edges-unjudged",
+         "Two edges of an outline may be as near to each other as they like.",
+         "near = first + 1 < second",
+         "near = first > first",
+         f"{ODD}what_no_mesh_resolves_is_refused")),
+    *changes(
+        "repro/check/checked.py",
+        ("check-meshes-all",
+         "check makes the first mesh however large it is.",
+         "estimated = first_nodes(scene) > MOST_MESHED",
+         "estimated = first_nodes(scene) < 0",
+         f"{ODD}check_makes_no_mesh_that_is_much_larger_than_what_it_tries")),
+    *changes(
+        "repro/model/remeshing.py",
+        ("advised-twice",
+         "Advice on a refinement is added to an error that has it already.",
+         "if isinstance(error, Advised):",
+         "if isinstance(error, str):",
+         f"{ADVICE}no_refinement_is_named_that_is_not_accepted_or_not_tried[0.2-; numerics.refinement up to 0.6 does "
+         "not resolve it]")),
+    *changes(
+        "repro/check/simplifications.py",
+        ("refinement-beyond-the-largest",
+         "check advises refinements that no scene accepts.",
+         "if enough <= MOST_REFINED:",
+         "if enough <= 100 * MOST_REFINED:",
+         f"{ADVICE}the_advice_of_check_is_accepted_and_helps")),
 )
 
 if __name__ == "__main__":

@@ -77,7 +77,7 @@ def _cells(scene: Scene, value: dict[str, float]) -> Iterator[Warned]:
         wanted = scene.numerics.refinement * cell / CELL_PECLET
         yield Warned("numerics.refinement", f"the cell Peclet number is {cell:.2g}, above "
                      f"{CELL_PECLET:g}: linear elements may overshoot where concentrations are "
-                     f"steep; {wanted:.2g} would do, and the presets fast and accurate refine by "
+                     f"steep{_resolving(wanted)}; the presets fast and accurate refine by "
                      "themselves")
 
 
@@ -110,7 +110,7 @@ def _lag(scene: Scene, value: dict[str, float]) -> Iterator[Warned]:
     if scene.numerics.transport == "quasi_steady" and lag > LAG:
         yield Warned("numerics.transport", f"transport takes {lag:.2g} of the time of growth, "
                      f"above {LAG:g}: quasi-steady substrates are off by about this share; "
-                     '"gear" (preset paper) follows them in time')
+                     '"gear" with numerics.time = "updates" follows them in time')
 
 
 def _transit(value: dict[str, float]) -> Iterator[Warned]:
@@ -129,7 +129,16 @@ def _forces(scene: Scene, found: list[Number]) -> Iterator[Warned]:
     if scene.growth.fluid_forces == "neglected" and strain > STRAIN:
         yield Warned("growth.fluid_forces", f"the fluid's stress comes to {strain:.2g} of mu_L, "
                      f"above {STRAIN:g}: neglected (2.3.3), it would strain the aggregate by about "
-                     'this much; "included" takes it in (preset paper)')
+                     f"this much; {_included(scene)}")
+
+
+def _included(scene: Scene) -> str:
+    """The setting that takes fluid forces in, in words, where one is accepted."""
+    if scene.flow and scene.flow.biomass == "brinkman":
+        return 'no setting takes it in with flow.biomass = "brinkman"'
+    if scene.growth.new_biomass == "stress_free":
+        return '"included" with growth.new_biomass = "stressed" takes it in'
+    return '"included" takes it in'
 
 
 def _fronts(scene: Scene) -> Iterator[Warned]:
@@ -169,9 +178,11 @@ def _drag_layer(scene: Scene) -> Iterator[Warned]:
 
 
 def _resolving(refinement: float) -> str:
-    """What resolves a thin layer, in words."""
-    if refinement <= MOST_REFINED:
-        return f"; numerics.refinement = {refinement:.2g} would resolve it"
+    """What resolves a thin layer, in words; three digits, rounded up."""
+    unit = 10.0 ** (math.floor(math.log10(refinement)) - 2)
+    enough = unit * math.ceil(refinement / unit)
+    if enough <= MOST_REFINED:
+        return f"; numerics.refinement = {enough:.3g} would resolve it"
     return f"; no refinement up to {MOST_REFINED:g} resolves it"
 
 
