@@ -124,7 +124,8 @@ MUTANTS = (
         ("drag-divergence-free-for-all",
          "Nothing keeps the sources small where water must pass a permeable body.",
          "DIVERGENCE * self.viscosity * where",
-         "0 * self.viscosity * where")),
+         "0 * self.viscosity * where",
+         f"{PERMEABLE}test_water_that_must_pass_a_permeable_body_leaves_concentrations_within_their_bounds[5.67e-17]")),
     *changes(
         "repro/model/pore.py",
         ("drag-contact-lines-coarse",
