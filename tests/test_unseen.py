@@ -541,7 +541,8 @@ def test_frames_before_an_expansion_are_not_counted_as_times():
 
 THIN = {"front": ["numerics.preset=fast", 'substrates.acceptor.half_saturation="1e-3 mg/L"',
                   'flow.mean_velocity="1 m/day"'],
-        "layer of drag": ["numerics.preset=fast", "flow.biomass=brinkman", 'flow.permeability="2e-14 m^2"',
+        "layer of drag": ["numerics.preset=fast", "flow.biomass=brinkman", 'flow.permeability="4e-13 m^2"',
+                          "aggregate.radius=30 um",
                           'flow.mean_velocity="1 m/day"'],
         "cells": ["numerics.preset=paper", 'flow.mean_velocity="60 m/day"']}
 

@@ -484,10 +484,10 @@ MUTANTS = (
     *changes(
         "repro/check/simplifications.py",
         ("thin-drag-layers-untold",
-         "The layer in which a permeable body slows the water is warned of where it is a hundred times thinner.",
-         "size > DRAG_LAYER * layer",
-         "size > 100 * DRAG_LAYER * layer",
-         "tests/test_flow.py::test_thin_layers_of_a_permeable_body_make_its_velocities_wiggle_and_are_warned_of")),
+         "The layer in which a permeable body slows the water is warned of where its film loses ten times as much.",
+         "if loss > FILM_LOSS",
+         "if loss > 10 * FILM_LOSS",
+         "tests/test_check.py::test_warnings_are_exactly_where_a_simplification_fails")),
     *changes(
         "repro/results/network.py",
         ("network-range-unchecked",

@@ -10,6 +10,7 @@ from repro.check import numbers
 from repro.check.numbers import Number
 from repro.fem import sizing
 from repro.march.stepping import SHORTEST
+from repro.model.brinkman import ACROSS
 from repro.model.pore import film, resolution
 from repro.model.remeshing import MOST_REFINED
 from repro.scene import Kinetics, Scene
@@ -36,9 +37,11 @@ AFTER_CONTACT = 1.2
 #: Distances between nodes across a film, under which its flow (the cube of its thickness) is a
 #: matter of the mesh.
 ACROSS_FILM = 4.0
-#: The flow into a permeable body, exp(-y / k^1/2), turns back at nodes of elements more than 6.3
-#: (quadratic) or 5.1 (cubic) times k^1/2 across.
-DRAG_LAYER = 5.0
+#: The narrowest film may let through less by this share, where the layer in which a permeable
+#: aggregate slows the water is thinner than its elements resolve. Water slides on that layer: a
+#: film of thickness h beside a layer l lets through at most 1 + 3 l / h times as much as one beside
+#: a wall.
+FILM_LOSS = 0.01
 
 
 @dataclass(frozen=True)
@@ -166,15 +169,20 @@ def _interface_size(scene: Scene) -> float:
 
 def _drag_layer(scene: Scene) -> Iterator[Warned]:
     permeability = scene.flow.permeability if scene.flow else None
-    layer = math.inf if permeability is None else math.sqrt(permeability)
+    if permeability is None:
+        return
+    root = math.sqrt(permeability)
     size = _interface_size(scene)
-    if size > DRAG_LAYER * layer:
-        wanted = resolution(scene) * size / (DRAG_LAYER * layer)
-        yield Warned("flow.permeability", f"the flow into the aggregate fades over its root, "
-                     f"{layer:.2g} um, thinner than a fifth of the elements at the interface, "
-                     f"{size:.2g} um: velocities in the aggregate wiggle within a few elements of "
-                     "it, while conductivity, head and flow are those of finer meshes"
-                     + _resolving(wanted))
+    thickness = size / ACROSS[scene.numerics.order]
+    gap = max(scene.pore.width - numbers.at_end(scene).thickness, film(scene))
+    loss = 3 * (root - permeability / thickness) / gap
+    if loss > FILM_LOSS:
+        accepted = root / (1 - FILM_LOSS * gap / (3 * root))
+        yield Warned("flow.permeability", f"the flow along the aggregate fades in it over its "
+                     f"root, {root:.2g} um, which elements of {size:.2g} um widen to "
+                     f"{thickness:.2g} um: the narrowest film, {gap:.2g} um, may let through "
+                     f"{100 * loss:.2g} % less" + _resolving(resolution(scene) * thickness
+                                                             / accepted))
 
 
 def _resolving(refinement: float) -> str:

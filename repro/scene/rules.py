@@ -15,6 +15,7 @@ MOST_STEPS = 100_000  # shape updates of a run
 SHORTEST_STEP = 1e-6  # h: times are told apart to 1e-9 h
 FINEST = 1e-3  # of the width: the smallest seed, edge of an outline, and gap between two edges
 NEAREST = 1e-4  # of the width: from a point of an outline to a wall that it does not touch
+TIGHTEST = 1e-11  # of the square of the width: the smallest permeability
 #: What only linear elements have a choice of, and what the others have.
 HIGHER_ORDER = {"transfer": "conserving", "flow_element": "stabilised"}
 
@@ -213,6 +214,13 @@ def _biomass_rules(scene: "Scene", drive: "Flow") -> Rules:
     yield drag and drive.viscosity_ratio is not None, {
         "flow.viscosity_ratio": 'flow.biomass = "viscous" is needed with it',
         "flow.biomass": f'"viscous" is needed with flow.viscosity_ratio = {drive.viscosity_ratio}',
+    }
+    least = TIGHTEST * scene.pore.width**2
+    yield drag and drive.permeability is not None and drive.permeability < 0.999 * least, {
+        "flow.permeability": f'"{1e-12 * least:.4g} m^2" or more is needed in a pore '
+                             f"{scene.pore.width:g} um wide: its flow is lost in round-off else",
+        "pore.width": f"{math.sqrt((drive.permeability or 0.0) / TIGHTEST):.4g} um or less is "
+                      f"needed with flow.permeability = {permeable}",
     }
     alone = scene.aggregate is None
     yield drag and alone, {"flow.biomass": '"viscous" is needed without [aggregate]'}
