@@ -111,7 +111,7 @@ def image(outline):
                          outline.origin[::-1] * [-1, 1])
 
 
-@given(outlines(), st.sampled_from([np.inf, 0.3]), st.floats(0.4, 2.0))
+@given(outlines(), st.sampled_from([np.inf, 0.3]), st.floats(0.05, 2.0))
 def test_sizes_at_an_outline_and_its_mirror_image(drawn, contact, refinement):
     """Node by node, with small elements beside contact lines and without; and at any place of the fluid."""
     outline, width = drawn
@@ -137,6 +137,7 @@ def test_the_interval_of_a_negative_number_is_that_of_its_mirror(value, quantity
 def test_the_interval_of_a_closed_form_is_that_of_its_mirror(a, b, c):
     low, high = sensitivity.in_closed_form(lambda x, y, z: x - y * z, a, b, c)
     assert low <= a[0] - b[0] * c[0] <= high
+    assert sensitivity.in_closed_form(float, a) == (a[0] - a[1], a[0] + a[1])
     negative = sensitivity.in_closed_form(lambda x, y, z: y * z - x, a, b, c)
     assert negative == pytest.approx((-high, -low), rel=1e-12, abs=1e-12)
 
