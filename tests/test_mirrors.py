@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from repro import PoreEnd, load_scene, simulate
 from repro.check import numbers, simplifications
+from repro.errors import MeshError
 from repro.fem import sizing
 from repro.fem.outline import polygon
 from repro.report import comparison
@@ -95,11 +96,21 @@ def test_a_seed_and_its_mirror_image_are_judged_alike(position):
     assert_alike(one, other)
 
 
-@share(0.5)
+def read(points, geometry, smooth):
+    """An outline; None where it is refused."""
+    try:
+        return polygon(points, 50.0, geometry, smooth)
+    except MeshError:
+        return None
+
+
 @given(leaning(), st.sampled_from([1, 2]), st.booleans())
 def test_an_outline_of_a_scene_and_its_mirror_image(points, geometry, smooth):
-    """Extremes exchanged, area and fixed points kept."""
-    one, other = (polygon(each, 100.0, geometry, smooth) for each in (points, points[::-1] * [-1, 1]))
+    """Extremes exchanged, area and fixed points kept; refused alike where a spline leaves the pore."""
+    one, other = (read(each, geometry, smooth) for each in (points, points[::-1] * [-1, 1]))
+    if None in (one, other):
+        assert one is other and smooth
+        return
     assert (one.upstream, one.downstream) == pytest.approx((-other.downstream, -other.upstream), rel=1e-9, abs=1e-9)
     assert (one.area, one.thickness) == pytest.approx((other.area, other.thickness), rel=1e-9)
     assert np.sort(one.points[one.fixed, 0]) == pytest.approx(np.sort(-other.points[other.fixed, 0]), abs=1e-9)
@@ -113,15 +124,14 @@ def image(outline):
 
 @given(outlines(), st.sampled_from([np.inf, 0.3]), st.floats(0.05, 2.0))
 def test_sizes_at_an_outline_and_its_mirror_image(drawn, contact, refinement):
-    """Node by node, with small elements beside contact lines and without; and at any place of the fluid."""
+    """Node by node, with small elements beside contact lines and without; and of the fluid around it."""
     outline, width = drawn
     asked = sizing.Sizing(width, refinement, 2.0, contact=contact)
     one, other = (sizing.interface_sizes(each, asked) for each in (outline, image(outline)))
     assert one == pytest.approx(other[::-1], rel=1e-9)
-    places = np.random.default_rng(1).uniform([-100, 0], [100, width], (20, 2))
-    one, other = (sizing.graded_size(there, *sizing.size_sources(each, asked), asked)
-                  for each, there in ((outline, places), (image(outline), places * [-1, 1])))
-    assert one == pytest.approx(other, rel=1e-9)
+    (places, one), (images, other) = (sizing.size_sources(each, asked) for each in (outline, image(outline)))
+    order, exchanged = (np.lexsort(each.T.round(9)) for each in (places, images * [-1, 1]))
+    assert one[order] == pytest.approx(other[exchanged], rel=1e-9)
     assert sizing.too_coarse(outline, asked) == sizing.too_coarse(image(outline), asked)
 
 
