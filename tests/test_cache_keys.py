@@ -157,7 +157,7 @@ def test_what_claims_keep_is_kept_by_function_arguments_and_level():
 
 def test_bounds_of_one_scene_are_not_those_of_another():
     """In turns, whatever differs."""
-    paths = [("aggregate", "radius"), ("pore", "width"), ("growth", "end")]
+    paths = [("aggregate", "radius"), ("growth", "end"), ("kinetics", "yield_coefficient")]
     short = load_scene("base", ["growth.end=5 h"])
     scenes = [short, *(changed(short, path) for path in paths)]
     alone = [numbers.at_end.__wrapped__(scene) for scene in scenes]
