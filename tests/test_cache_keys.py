@@ -1,8 +1,7 @@
-"""What is kept is kept under all that it depends on: with another input, another key, and never the old value."""
+"""The key of every cache contains every input of the cached value: another input, another key."""
 import shutil
 from dataclasses import fields, is_dataclass, replace
 from functools import partial
-from itertools import combinations, permutations
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,7 @@ from repro.fem.space import Space
 from repro.model import flow, gear, mesh_motion, transport
 from repro.model.kinetics import Sink
 from repro.run import cache, machine
-from repro.scene import load_scene, scene_hash, scene_tables
+from repro.scene import load_scene, scene_hash
 from tests.strategies import meshed, seed
 from verification.claims import levels
 from verification.claims.levels import CONVERGED, Level, at_level
@@ -57,8 +56,8 @@ def changed(node, path):
 
 
 def test_every_value_of_a_scene_counts_in_its_hash():
-    found = [changed(WIDE, path) for path in leaves(WIDE)]
-    scenes = [WIDE, *(scene for scene in found if scene is not None)]
+    others = [changed(WIDE, path) for path in leaves(WIDE)]
+    scenes = [WIDE, *(scene for scene in others if scene is not None)]
     assert len(scenes) > 40 and len({*map(scene_hash, scenes)}) == len(scenes)
 
 
@@ -97,12 +96,12 @@ SOURCES = {
 
 
 def test_every_module_counts_in_the_hash_of_the_source(tmp_path):
-    found = {name: altered(tmp_path / str(k), change) for k, (name, change) in enumerate(SOURCES.items())}
-    assert found["nothing"] == machine.source_hash() and len({*found.values()}) == len(SOURCES)
+    hashes = {name: altered(tmp_path / str(k), change) for k, (name, change) in enumerate(SOURCES.items())}
+    assert hashes["nothing"] == machine.source_hash() and len({*hashes.values()}) == len(SOURCES)
 
 
 def test_a_cached_run_is_that_of_its_scene_and_source_under_its_name(tmp_path, monkeypatch):
-    """Another value, another name or another source: it is computed once more, and each once."""
+    """Another value, name or source is another run; each run is computed once."""
     computed = []
 
     def run(scene, folder):
@@ -114,13 +113,13 @@ def test_a_cached_run_is_that_of_its_scene_and_source_under_its_name(tmp_path, m
     scenes = [BASE, replace(BASE, name="other"), changed(BASE, ("pore", "width")), changed(BASE, ("growth", "end"))]
     for source in ("one", "two", "one"):
         monkeypatch.setattr(cache, "source_hash", lambda text=source: text)
-        told = [cache.provenance(cache.cached_run(scene, tmp_path))["number"] for scene in scenes]
-        assert told == ([1, 2, 3, 4] if source == "one" else [5, 6, 7, 8])
+        numbers_of_runs = [cache.provenance(cache.cached_run(scene, tmp_path))["number"] for scene in scenes]
+        assert numbers_of_runs == ([1, 2, 3, 4] if source == "one" else [5, 6, 7, 8])
     assert len(computed) == 8
 
 
 def test_the_runs_of_the_sensitivities_are_kept_by_scene_name_and_source(tmp_path, monkeypatch):
-    """What is asked of a run goes by its name: two names of one scene are two runs."""
+    """The numbers of a run depend on the scene's name: two names of one scene are two runs."""
     computed = []
 
     def counted(scene):
@@ -132,17 +131,17 @@ def test_the_runs_of_the_sensitivities_are_kept_by_scene_name_and_source(tmp_pat
     scenes = [BASE, replace(BASE, name="wide"), changed(BASE, ("flow", "head")), changed(BASE, ("numerics", "inlet"))]
     for source in ("12345678", "87654321", "12345678"):
         monkeypatch.setattr(rounding, "source_hash", lambda text=source: text)
-        told = [rounding.Runs(tmp_path / "runs.jsonl").numbers(scene)["number"] for scene in scenes]
-        assert told == ([1, 2, 3, 4] if source == "12345678" else [5, 6, 7, 8])
+        numbers_of_runs = [rounding.Runs(tmp_path / "runs.jsonl").numbers(scene)["number"] for scene in scenes]
+        assert numbers_of_runs == ([1, 2, 3, 4] if source == "12345678" else [5, 6, 7, 8])
 
 
 def test_what_claims_keep_is_kept_by_function_arguments_and_level():
     """Every field of a level counts."""
-    def one(*given):
-        return "one", given, levels.current()
+    def one(*arguments):
+        return "one", arguments, levels.current()
 
-    def two(*given):
-        return "two", given, levels.current()
+    def two(*arguments):
+        return "two", arguments, levels.current()
 
     all_levels = [Level(), Level(CONVERGED), Level(size=2.0), Level(step=2.0), Level(wide=("pore.width=90 um",))]
     for _ in range(2):
@@ -150,7 +149,7 @@ def test_what_claims_keep_is_kept_by_function_arguments_and_level():
             with at_level(level):
                 for function in (one, two):
                     kept = levels.cached(function)
-                    assert all(kept(*given) == function(*given) for given in ((), (1,), (1, "a"), ("a", 1)))
+                    assert all(kept(*arguments) == function(*arguments) for arguments in ((), (1,), (1, "a"), ("a", 1)))
     for level in all_levels[1:]:
         levels.forget(level)
 
@@ -183,11 +182,12 @@ def concentrations(order, boundary, flowing, mesh):
     problem = transport.problem(space, carried, substrates, BASE.kinetics)
     sink = Sink(1e-3 * BASE.kinetics.maximum_density * space.reaction.dx)
     if boundary == "closed":
-        found = gear.advance(problem, sink.active, sink.active, transport.supplied_everywhere(problem), 0.01)
-        return np.concatenate([found.concentrations.acceptor, found.concentrations.donor])
-    found = transport.steady(problem, sink)
-    settled = gear.settle(problem, sink, found)
-    return np.concatenate([found.acceptor, found.donor, settled.acceptor])
+        start = transport.supplied_everywhere(problem)
+        end = gear.advance(problem, sink.active, sink.active, start, 0.01).concentrations
+        return np.concatenate([end.acceptor, end.donor])
+    steady = transport.steady(problem, sink)
+    settled = gear.settle(problem, sink, steady)
+    return np.concatenate([steady.acceptor, steady.donor, settled.acceptor])
 
 
 def motion(mesh):
@@ -195,22 +195,22 @@ def motion(mesh):
     return mesh_motion.move(mesh, 1.001 * mesh.points[mesh.body], 1e-3, 100.0)
 
 
-#: What asks a mesh's connections for a sparse system, each of another one.
+#: Computations on one mesh that need different sparse systems.
 SOLVES = {"flow, Laplacian": partial(velocity, 2, "laplacian"), "flow, traction": partial(velocity, 2, "traction"),
           "flow, cubic": partial(velocity, 3, "laplacian"), "held ends": partial(concentrations, 2, "open", False),
-          "flow through": partial(concentrations, 2, "open", True), "closed": partial(concentrations, 2, "closed", False),
-          "cubic": partial(concentrations, 3, "open", True), "motion": motion}
+          "flow through": partial(concentrations, 2, "open", True), "cubic": partial(concentrations, 3, "open", True),
+          "closed": partial(concentrations, 2, "closed", False), "motion": motion}
 
 
 @pytest.fixture(scope="module")
 def alone():
-    """What each of SOLVES gives on a mesh of its own."""
+    """The result of each of SOLVES on a new mesh."""
     return {name: solve(disc()) for name, solve in SOLVES.items()}
 
 
 @pytest.mark.parametrize("names", [[*SOLVES], [*SOLVES][::-1]], ids=["forwards", "backwards"])
 def test_sparse_systems_of_one_mesh_are_kept_apart(names, alone):
-    """One after the other on one mesh: each gives what it gives alone, to the last bit."""
+    """Computations that share a mesh give the same bits as on meshes of their own."""
     mesh = disc()
     wrong = [name for name in names if not np.array_equal(SOLVES[name](mesh), alone[name])]
     assert wrong == []

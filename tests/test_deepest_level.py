@@ -1,4 +1,4 @@
-"""What is refined, halved or tried again until it is fine enough: cases that need the last level, and not one more."""
+"""Elements that are halved for a front: cases that need every level up to the deepest."""
 from dataclasses import replace
 
 import numpy as np
@@ -20,13 +20,13 @@ def fronted(half, *changes):
     return load_scene("base", [*DENSE, *halves, *changes])
 
 
-def at_rim(now):
+def at_rim(graded):
     """um, the longest edge between aggregate and fluid."""
-    outline = now.boundary.corners
+    outline = graded.boundary.corners
     return outline.edge_lengths()[outline.interface_edges()].max()
 
 
-def within_bounds(now, solved):
+def within_bounds(graded, solved):
     """Are concentrations between zero and the supply, as well as is stated?"""
     state = solved.concentrations
     fields = np.stack([state.acceptor, state.donor])
@@ -39,9 +39,9 @@ def test_elements_are_halved_as_often_as_a_front_needs(half, level, time):
     not. Effluents are those of elements that are as small everywhere."""
     scene = fronted(half)
     first = replace(pore.seeded(scene), time=time)
-    now, solved = remeshing.resolved(scene, first)
-    assert round(np.log2(at_rim(first) / at_rim(now))) == np.log2(level)
-    assert within_bounds(now, solved) and now.mass == pytest.approx(first.mass, rel=1e-3)
+    graded, solved = remeshing.resolved(scene, first)
+    assert round(np.log2(at_rim(first) / at_rim(graded))) == np.log2(level)
+    assert within_bounds(graded, solved) and graded.mass == pytest.approx(first.mass, rel=1e-3)
     if level > 1:
         with pytest.raises(Unresolved):
             pore.solve(scene, pore.seeded(scene, level / 2))

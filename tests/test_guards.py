@@ -1,5 +1,5 @@
-"""Guards and counts are shown something bad: a leak just under what is accepted passes, one just above it is refused,
-and counts in run.json are of all that was counted."""
+"""Guards and counts get bad input: a leak just below the tolerance passes, a leak just above it is refused. The counts
+in run.json include every step."""
 from dataclasses import replace
 from functools import cache
 
@@ -12,7 +12,7 @@ from repro.march.loop import Ledger
 from repro.march.simulation import steps
 from repro.model.pore import seeded
 from repro.run.running import Recorder
-from tests.shell import told
+from tests.shell import told as read_record
 
 #: Of a step of 12 min in which very much is supplied, so that what diffuses is nothing beside it, um2 mg/L.
 SUPPLIED, CONSUMED = (5e12, 3e12), (4e12, 2e12)
@@ -35,17 +35,17 @@ def terms(scene, consumed=CONSUMED):
 
 
 def ledger(scene, before=1e12, demand=0.0, biomass=0.0, acceptor=0.0, donor=0.0):
-    """A step that balances but for parts that are made, kept or supplied too much, each over what it is relative to."""
+    """A step that balances, except for relative leaks in some of its balances."""
     grown, decayed = terms(scene)
-    made = grown - decayed + demand * max(abs(grown), abs(decayed))
+    produced = grown - decayed + demand * max(abs(grown), abs(decayed))
     out = tuple(s * (1 - leak) - c for s, c, leak in zip(SUPPLIED, CONSUMED, (acceptor, donor)))
-    after = (before + made) / (1 - biomass)
-    return Ledger(0.0, 0.2, SUPPLIED, out, CONSUMED, (0.0, 0.0), before, made, after)
+    after = (before + produced) / (1 - biomass)
+    return Ledger(0.0, 0.2, SUPPLIED, out, CONSUMED, (0.0, 0.0), before, produced, after)
 
 
 def accepted_demand(scene, way, before=1e12):
-    """As docs and docstrings state it: a millionth and round-off of the mass; with updates (dt (k Y + b))^2 / 12 of
-    what is turned over, with Gear's method a thousandth of what could be."""
+    """The tolerance that the docstrings state: 1e-6 and the round-off of the mass. Updates add (dt (k Y + b))^2 / 12 of
+    the turnover, Gear's method adds 1e-3 of the largest possible turnover."""
     k = scene.kinetics
     grown, decayed = terms(scene)
     scale = max(abs(grown), abs(decayed))
@@ -62,14 +62,14 @@ LEAKS = [(kind, way) for kind in ("acceptor", "donor", "biomass", "demand") for 
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("kind, way", LEAKS)
 def test_a_leak_of_what_is_stated_passes_and_a_larger_one_is_refused(kind, way, sign):
-    """Two percent either side of the tolerance; of each balance alone, made or lost."""
-    scene, now = base(way)
+    """Two percent on either side of the tolerance, for gains and losses of each balance alone."""
+    scene, pore = base(way)
     limit = sign * (accepted_demand(scene, way) if kind == "demand" else 1e-6)
-    balance.refuse(scene, now, ledger(scene))
-    balance.refuse(scene, now, ledger(scene, **{kind: 0.98 * limit}))
+    balance.refuse(scene, pore, ledger(scene))
+    balance.refuse(scene, pore, ledger(scene, **{kind: 0.98 * limit}))
     name = "oxygen demand" if kind == "demand" else kind
     with pytest.raises(BalanceError, match=rf"it lacks -?[\d.e-]+ of the {name}; try") as error:
-        balance.refuse(scene, now, ledger(scene, **{kind: 1.02 * limit}))
+        balance.refuse(scene, pore, ledger(scene, **{kind: 1.02 * limit}))
     assert ("lacks -" in str(error.value)) == (sign < 0)
 
 
@@ -83,35 +83,35 @@ def test_the_demand_of_a_longer_update_may_be_off_by_its_square():
 @pytest.mark.parametrize("changes, kind", [(["numerics.inlet=mean"], "acceptor"), (["numerics.inlet=mean"], "donor"),
                                            (["numerics.transfer=linear"], "biomass")])
 def test_a_stated_defect_lets_no_other_one_pass(changes, kind):
-    """[E4] is of both substrates and [E8] of the biomass, alone."""
-    scene, now = base("updates", *changes)
+    """[E4] excuses the substrates only, [E8] the biomass only."""
+    scene, pore = base("updates", *changes)
     excused = {"acceptor", "donor"} if kind != "biomass" else {"biomass"}
-    balance.refuse(scene, now, ledger(scene, **{kind: 0.03}))
+    balance.refuse(scene, pore, ledger(scene, **{kind: 0.03}))
     for other in {"acceptor", "donor", "biomass", "demand"} - excused:
         with pytest.raises(BalanceError):
-            balance.refuse(scene, now, ledger(scene, **{kind: 0.03, other: 0.03}))
+            balance.refuse(scene, pore, ledger(scene, **{kind: 0.03, other: 0.03}))
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])
 @pytest.mark.parametrize("field", ["biomass_made", "biomass_after"])
 def test_what_is_no_number_is_refused(field, value):
-    scene, now = base("midpoint")
+    scene, pore = base("midpoint")
     with pytest.raises(BalanceError):
-        balance.refuse(scene, now, replace(ledger(scene), **{field: value}))
+        balance.refuse(scene, pore, replace(ledger(scene), **{field: value}))
 
 
 def test_counts_in_the_record_are_of_every_step_whatever_rows_there_are(tmp_path):
-    """New meshes, Newton's iterations and steps of several in a row, and of those after the last row."""
+    """A row may report several new meshes, Newton iterations and steps."""
     scene = load_scene("base", ["numerics.refinement=0.4", "growth.end=0.6 h"])
     recorder = Recorder(scene, tmp_path)
     recorder.clear()
     reports = list(steps(scene))
-    counts = [(0, {"growth": 0, "transport": 2}), (3, {"growth": 5, "transport": 7}), (0, {"growth": 1, "transport": 1}),
-              (4, {"growth": 2, "transport": 3})]
+    counts = [(remeshes, {"growth": growth, "transport": transport})
+              for remeshes, growth, transport in ((0, 0, 2), (3, 5, 7), (0, 1, 1), (4, 2, 3))]
     for (state, instant), (remeshes, iterations) in zip(reports, counts, strict=True):
         recorder.add(state, replace(instant, remeshes=remeshes, iterations=iterations, ledgers=3 * instant.ledgers))
     recorder.finish("completed")
-    record = told(tmp_path)
+    record = read_record(tmp_path)
     assert record["remeshes"] == recorder.remeshes == 7 and record["rows"] == 4
     assert record["newton_iterations"] == {"growth": 8, "transport": 13}
     assert recorder.steps == len((tmp_path / "ledger.csv").read_text().splitlines()) - 1 == 9

@@ -1,7 +1,7 @@
-"""Rules about an end, a reach, a sign or an interval give the mirror image in the mirror.
+"""Mirror symmetry of rules about ends, reaches, signs and intervals.
 
-The mirror of a pore is x -> -x. What a mirror keeps (areas, numbers, warnings) is equal, what it exchanges (ends) is
-exchanged. The mirror of a number is its negative, with the ends of its interval exchanged.
+The mirror of a pore is x -> -x: areas, numbers and warnings stay the same, the two ends change places. The mirror of a
+number is its negative: the ends of its interval change places and signs.
 """
 import html
 import re
@@ -32,8 +32,8 @@ HASTY = ["numerics.refinement=0.5", "pore.length=200 um", "growth.end=6 h", "gro
 @pytest.mark.parametrize("time", ["updates", "midpoint"])
 @pytest.mark.parametrize("from_end, when", [(8.7, "at t = "), (5.3, "in the step from t = 0 h")])
 def test_a_run_ends_at_either_end_of_the_pore_and_names_it(time, from_end, when, sign, side):
-    """A seed of 5 um whose middle is 8.7 um from an end comes within an element of it; one at 5.3 um grows past a tenth
-    of an element in its first step, and every shorter one is past the element that ends a run."""
+    """A seed of 5 um grows towards an end. With its middle 8.7 um from the end, a step ends within an element of the
+    end. With its middle at 5.3 um, the first step itself passes the end."""
     changes = [*HASTY, f"numerics.time={time}", f"aggregate.position={sign * (100 - from_end)} um"]
     with pytest.raises(PoreEnd, match=f"^the aggregate reaches the pore's {side} end {when}"):
         list(simulate(load_scene("base", changes)))
@@ -41,7 +41,7 @@ def test_a_run_ends_at_either_end_of_the_pore_and_names_it(time, from_end, when,
 
 @st.composite
 def leaning(draw, width=50.0):
-    """The points of an aggregate.outline, from the upstream end on, which lean to either side."""
+    """Points of an aggregate.outline that leans to either side, upstream end first."""
     count = draw(st.integers(3, 6))
     angle = np.linspace(np.pi, 0.0, count + 2)
     radius = np.array(draw(st.lists(st.floats(8.0, 30.0), min_size=count + 2, max_size=count + 2)))
@@ -57,10 +57,10 @@ def outlined(name, points, *changes):
 
 
 def judgement(scene, speed):
-    """What `repro check` says of a scene before anything is solved."""
-    found = numbers.numbers(scene, speed)
-    values = {each.name: [each.start, each.end or 0.0] for each in found}
-    return values, {each.key: each.text for each in simplifications.warnings(scene, found)}
+    """The numbers and warnings of `repro check`, without a solution."""
+    judged = numbers.numbers(scene, speed)
+    values = {each.name: [each.start, each.end or 0.0] for each in judged}
+    return values, {each.key: each.text for each in simplifications.warnings(scene, judged)}
 
 
 def assert_alike(one, other):
@@ -83,11 +83,11 @@ def test_an_outline_and_its_mirror_image_are_judged_alike(points, speed):
 
 @SIDES
 def test_how_far_an_outline_reaches_is_told_on_either_side(sign, side):
-    """By the farther of its ends: 100 um of 130 um."""
+    """The farther end counts: 100 um of 130 um."""
     points = np.array([[-20.0, 0.0], [-10.0, 12.0], [60.0, 20.0], [100.0, 0.0]])
     points = points if sign > 0 else points[::-1] * [-1, 1]
     _, warned = judgement(outlined("base", points, "pore.length=260 um", "growth.end=0 h"), 1e5)
-    assert "(reach 100 of 130 um)" in warned["pore.length"]
+    assert "(reach 100 of 130 um)" in warned.get("pore.length", "")
 
 
 @given(st.floats(0.0, 200.0))
@@ -156,10 +156,10 @@ def test_the_interval_of_a_closed_form_is_that_of_its_mirror(a, b, c):
 def test_an_outcome_is_that_of_its_mirror(bar, bounds):
     """Of a bar and the bounds of what is accepted."""
     (low, high), (least, most) = bar, bounds
-    found = claims.outcome_of((low, high), (least, most))
-    assert found == claims.outcome_of((-high, -low), (-most, -least))
-    assert (found == claims.HOLDS) == (least <= low and high <= most)
-    assert (found == claims.FAILS) == (high < least or most < low)
+    judged = claims.outcome_of((low, high), (least, most))
+    assert judged == claims.outcome_of((-high, -low), (-most, -least))
+    assert (judged == claims.HOLDS) == (least <= low and high <= most)
+    assert (judged == claims.FAILS) == (high < least or most < low)
 
 
 @given(st.lists(st.floats(-1e3, 1e3), min_size=3, max_size=5))
@@ -170,23 +170,23 @@ def test_a_bar_of_levels_is_that_of_its_mirror(values):
 
 @pytest.mark.parametrize("side", [0, 1])
 @pytest.mark.parametrize("part, inside", [(0.99, 1), (1.01, 0)])
-@pytest.mark.parametrize("spanned, share", [(0, 0.5), (1, 2.0)])
-def test_a_shape_is_judged_by_the_bound_of_the_law_on_its_side(spanned, share, part, inside, side):
-    """A share of the way, in logarithms, from the law to its lower or upper bound."""
-    length, *bounds = law.added_resistance(share, 1.0, bool(spanned), 2000.0)
+@pytest.mark.parametrize("spanned, area", [(0, 0.5), (1, 2.0)])
+def test_a_shape_is_judged_by_the_bound_of_the_law_on_its_side(spanned, area, part, inside, side):
+    """A shape lies part of the way, in logarithms, from the law to its lower or upper bound."""
+    length, *bounds = law.added_resistance(area, 1.0, bool(spanned), 2000.0)
     shape = length * (bounds[side] / length) ** part
-    row = dict(zip(law.COLUMNS, np.array([[1], [1], [spanned], [2000.0], [share], [shape]], float)))
-    found = law.judged(row)
-    assert found.inside == inside and found.beyond == pytest.approx(part, rel=1e-9)
+    row = dict(zip(law.COLUMNS, np.array([[1], [1], [spanned], [2000.0], [area], [shape]], float)))
+    judged = law.judged(row)
+    assert judged.inside == inside and judged.beyond == pytest.approx(part, rel=1e-9)
 
 
-@pytest.mark.parametrize("first, second, told", [
+@pytest.mark.parametrize("first, second, expected", [
     (2.0, 3.0, "+50 %"), (3.0, 1.5, "-50 %"), (-2.0, -3.0, "-50 %"), (-2.0, -1.0, "+50 %"), (-2.0, 1.0, "+150 %"),
     (2.0, -1.0, "-150 %")])
-def test_a_difference_is_up_or_down_whatever_the_signs(tmp_path, first, second, told):
-    """Of two runs on the page that compares them: upwards is plus."""
-    runs = [Run(tmp_path / str(k), {"scene": "drawn"}, {"time_h": np.array([0.0]), "upstream_um": np.array([value])}, {})
-            for k, value in enumerate((first, second))]
+def test_a_difference_is_up_or_down_whatever_the_signs(tmp_path, first, second, expected):
+    """The page that compares two runs writes + if the second value is larger."""
+    series = [{"time_h": np.array([0.0]), "upstream_um": np.array([value])} for value in (first, second)]
+    runs = [Run(tmp_path / str(k), {"scene": "drawn"}, columns, {}) for k, columns in enumerate(series)]
     row = re.search(r"<tr><t[hd][^>]*>upstream end of the aggregate \(um\)</t[hd]>(.*?)</tr>", comparison.build(runs))
     cells = re.findall(r"<td[^>]*>(.*?)</td>", row[1])
-    assert html.unescape(cells[-1]) == told
+    assert html.unescape(cells[-1]) == expected

@@ -1,7 +1,7 @@
 """Options of the flow in pairs: form of the interface, order of the elements, viscous or permeable body, fluid forces.
 
-Each pair conserves what the flow conserves: power (what the head does is what viscosity and drag dissipate), momentum
-(the fluid between the aggregate and the other boundaries is at rest) and substrates.
+Each pair conserves power (the work of the head is the dissipation by viscosity and drag), momentum (the forces on the
+fluid between the aggregate and the other boundaries are in equilibrium) and substrates.
 """
 from functools import cache
 from itertools import product
@@ -31,8 +31,8 @@ def solved(body, interface, order, *changes):
         f"aggregate.outline={POINTS}", f"numerics.elements={ORDERS[order]}", f"numerics.interface={interface}",
         f"numerics.refinement={0.5 if order == 1 else 0.2}",
         "growth.shear_modulus=1e-3 MPa", *BODIES[body], *changes], ["aggregate.radius"])
-    now = pore.seeded(scene)
-    return scene, now, pore.solve(scene, now)
+    state = pore.seeded(scene)
+    return scene, state, pore.solve(scene, state)
 
 
 def strain(space, velocity, interface):
@@ -43,48 +43,49 @@ def strain(space, velocity, interface):
 
 
 @pytest.mark.parametrize("body, interface, order", [way for way in WAYS if way[2] > 1])
-def test_what_the_head_does_is_what_viscosity_and_drag_dissipate(body, interface, order):
-    """g times head loss times flow, with no stabilisation: to round-off."""
-    scene, now, found = solved(body, interface, order)
-    space, carried = now.space, found.flow
-    both, gradient = strain(space, carried.velocity, interface)
-    ratio = np.where(now.mesh.biomass & (body == "viscous"), 20.0, 1.0)
+def test_viscosity_and_drag_dissipate_the_work_of_the_head(body, interface, order):
+    """g times head loss times flow, to round-off; elements without stabilisation."""
+    scene, state, solution = solved(body, interface, order)
+    space, stream = state.space, solution.flow
+    both, gradient = strain(space, stream.velocity, interface)
+    ratio = np.where(state.mesh.biomass & (body == "viscous"), 20.0, 1.0)
     spent = np.einsum("t,tq,tqik,tqik->", ratio, space.gradients_at.dx, both, gradient)
     if body == "permeable":
-        speed = space.at_points(carried.velocity.T)
-        spent += np.einsum("tq,itq,itq->", space.at.dx[now.mesh.biomass], *2 * [speed[:, now.mesh.biomass]]) / 40.0
-    done = scene.flow.gravity * carried.meshed_loss * carried.mean_velocity * scene.pore.width
+        speed = space.at_points(stream.velocity.T)
+        spent += np.einsum("tq,itq,itq->", space.at.dx[state.mesh.biomass], *2 * [speed[:, state.mesh.biomass]]) / 40.0
+    done = scene.flow.gravity * stream.meshed_loss * stream.mean_velocity * scene.pore.width
     assert done == pytest.approx(scene.flow.kinematic_viscosity * spent, rel=1e-9)
 
 
 @pytest.mark.parametrize("interface, order", [*product(INTERFACES, ORDERS)])
 def test_the_force_on_the_aggregate_comes_through_every_section_of_the_fluid(interface, order):
-    """What pushes the aggregate is the flux of momentum through any section around it, smeared out at random: that of
-    the scene's own form, which is in equilibrium in the fluid to round-off."""
-    scene, now, found = solved("viscous", interface, order)
-    space, carried, mesh = now.space, found.flow, now.mesh
+    """The force on the aggregate is the momentum flux through any section around it, here a random field that is one on
+    the aggregate and zero on the other boundaries: to round-off, if forces and flow use the same form."""
+    scene, state, solution = solved("viscous", interface, order)
+    space, stream, mesh = state.space, solution.flow, state.mesh
     pressure = flow.pressure_space(space)
-    both, _ = strain(space, carried.velocity, interface)
-    head = carried.head[pressure.cells] @ elements.values_on(pressure.order, space.gradient_table).T
+    both, _ = strain(space, stream.velocity, interface)
+    head = stream.head[pressure.cells] @ elements.values_on(pressure.order, space.gradient_table).T
     drive = scene.flow
     stress = drive.kinematic_viscosity / drive.gravity * both - head[..., None, None] * np.eye(2)
     section = np.random.default_rng(1).uniform(-1.0, 2.0, space.count)
-    around = [*space.dofs.walls, *space.dofs.inlet.ravel(), *space.dofs.outlet.ravel(), *space.cells[mesh.biomass].ravel()]
+    dofs = space.dofs
+    around = np.concatenate([dofs.walls, dofs.inlet.ravel(), dofs.outlet.ravel(), space.cells[mesh.biomass].ravel()])
     section[around] = space.of_mesh(np.isin(np.arange(len(mesh.points)), mesh.body).astype(float))[around]
     slope = np.einsum("ta,tqka->tqk", section[space.cells], space.gradients_at.slopes)
     wet = ~mesh.biomass
     pushed = -np.einsum("tq,tqik,tqk->i", space.gradients_at.dx[wet], stress[wet], slope[wet])
     pascals = (drive.density * 1e-3) * (drive.gravity * 1e-6 / 3600**2) * 1e-6
     expected = pascals / (scene.growth.shear_modulus * 1e6) * pushed
-    forces = traction.forces(scene, traction.surroundings(scene, now, now), now).sum(axis=0)
+    forces = traction.forces(scene, traction.surroundings(scene, state, state), state).sum(axis=0)
     assert np.abs(forces).max() > 0 and forces == pytest.approx(expected, rel=1e-8, abs=1e-8 * np.abs(expected).max())
 
 
 @EVERY_WAY
 def test_substrates_are_conserved(body, interface, order):
-    """What is supplied leaves or is taken up, to round-off."""
-    _, _, found = solved(body, interface, order)
-    for each in found.fluxes:
+    """Supplied = leaving + taken up, to round-off."""
+    _, _, solution = solved(body, interface, order)
+    for each in solution.fluxes:
         assert each.consumed > 0 and each.out + each.consumed == pytest.approx(each.supplied, rel=1e-9)
 
 
@@ -96,7 +97,7 @@ def test_a_permeable_body_under_fluid_forces_is_refused():
 @pytest.mark.parametrize("interface, order", [*product(INTERFACES, (2, 3))])
 def test_a_permeable_body_lies_between_open_water_and_a_wall(interface, order):
     """The tighter the body, the less the pore conducts."""
-    found = [solved("permeable", interface, order, f"flow.permeability={permeability} um^2")[2].flow.conductivity
-             for permeability in (1e12, 1e3, 40.0, 1.0)]
+    conductivity = [solved("permeable", interface, order, f"flow.permeability={permeability} um^2")[2].flow.conductivity
+                    for permeability in (1e12, 1e3, 40.0, 1.0)]
     clean = load_scene("base").flow.gravity * 50.0**2 / 12 / load_scene("base").flow.kinematic_viscosity
-    assert found[0] == pytest.approx(clean, rel=1e-6) and (np.diff(found) < -1e-3 * clean).all()
+    assert conductivity[0] == pytest.approx(clean, rel=1e-6) and (np.diff(conductivity) < -1e-3 * clean).all()

@@ -214,8 +214,8 @@ def test_the_long_name_of_a_quantity_says_what_its_name_says(name):
     assert [part for part in parts if part.lower() not in words.lower()] == []
     said = " " + " ".join(parts)
     for contrast in CONTRASTS:
-        found, meant = ({each for each in contrast if re.search(rf"\b{each.strip()}\b", text)} for text in (words, said))
-        assert found == meant, contrast
+        used, meant = ({each for each in contrast if re.search(rf"\b{each.strip()}\b", text)} for text in (words, said))
+        assert used == meant, contrast
 
 
 def test_no_two_columns_have_one_long_name():

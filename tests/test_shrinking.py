@@ -15,7 +15,7 @@ from repro.sweep.state import Sweep
 from tests.shell import rows
 from tests.test_sweep import in_this_process
 
-#: Three days of hunger: without a donor the aggregate of 40 um of a 50 um pore decays.
+#: A day without food: without a donor the aggregate of 40 um of a 50 um pore decays.
 HUNGRY = ["numerics.preset=fast", "aggregate.radius=40 um", "substrates.donor.supply=0 mg/L",
           "growth.end=24 h", 'output.times=["0 h", "8 h", "16 h", "24 h"]']
 VARIED = "kinetics.decay_coefficient=0.5 1/day, 1 1/day"
@@ -61,12 +61,12 @@ def courses(decayed):
 
 def test_conductivity_is_relative_to_that_of_the_start(decayed):
     """One at t = 0 and more after it; nothing clogs and nothing touches."""
-    sweep, told = courses(decayed)
-    for one, folder in zip(told, folders(decayed)):
+    sweep, summaries = courses(decayed)
+    for one, folder in zip(summaries, folders(decayed)):
         series = read_table(folder / "timeseries.csv")
         assert one.relative[0] == 1 and (np.diff(one.relative) > 0).all()
-        wanted = series["conductivity_m_per_d"] / series["conductivity_m_per_d"][0]
-        assert one.relative == pytest.approx(wanted, rel=1e-12)
+        expected = series["conductivity_m_per_d"] / series["conductivity_m_per_d"][0]
+        assert one.relative == pytest.approx(expected, rel=1e-12)
         assert one.biomass == pytest.approx(series["aggregate_area_um2"] / (50 * 600), rel=1e-12)
         assert {name for name, value in one.numbers.items() if value is not None} == {"end_h", "wall_time_s"}
     for row in rows(decayed / "runs.csv"):
@@ -90,15 +90,15 @@ def test_a_comparison_and_the_key_figures_tell_what_is_less(decayed):
     """The faster decay against the slower one: less area, more conductivity, with their signs; first and last values
     in their order."""
     runs = [read(folder) for folder in folders(decayed)]
-    told = html.unescape(comparison.build(runs))
+    page = html.unescape(comparison.build(runs))
     for name, sign in (("area of the aggregate (um²)", "-"), ("hydraulic conductivity of the pore (m/day)", "+")):
-        cells = re.findall("<td[^>]*>(.*?)</td>", re.search(rf"{re.escape(name)}</t[hd]>(.*?)</tr>", told)[1])
+        cells = re.findall("<td[^>]*>(.*?)</td>", re.search(rf"{re.escape(name)}</t[hd]>(.*?)</tr>", page)[1])
         assert re.fullmatch(rf"\{sign}[\d.]+ %", cells[-1]), name
     for run in runs:
         first, last = run.series["thickness_um"][[0, -1]]
         assert f"thickness of the aggregate {first:.4g} → {last:.4g} um" in picture.key_figures(run.series)
-        made = quantities.series(run)["biomass_made_ug_per_m"][1]
-        assert (made < 0).all() and (np.diff(made) < 0).all()
+        produced = quantities.series(run)["biomass_made_ug_per_m"][1]
+        assert (produced < 0).all() and (np.diff(produced) < 0).all()
 
 
 @pytest.mark.parametrize("relative, expected", [
@@ -107,5 +107,5 @@ def test_a_comparison_and_the_key_figures_tell_what_is_less(decayed):
 def test_a_pore_clogs_when_it_first_conducts_so_little_after_a_rise(relative, expected):
     """A half of what it conducts at first, not of the most."""
     times = np.arange(float(len(relative)))
-    found = table.clogging(times, np.array(relative), 10 - times, 0.5)
-    assert found == pytest.approx((expected, 10 - expected), rel=1e-12, nan_ok=True)
+    clogged = table.clogging(times, np.array(relative), 10 - times, 0.5)
+    assert clogged == pytest.approx((expected, 10 - expected), rel=1e-12, nan_ok=True)

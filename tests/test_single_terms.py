@@ -1,4 +1,4 @@
-"""Of each verdict, bar or criterion that is made of several, cases in which exactly one decides."""
+"""Verdicts, bars and criteria with several terms: cases in which exactly one term decides."""
 from dataclasses import replace
 
 import numpy as np
@@ -31,11 +31,11 @@ def parts(sizes, values, order):
 
 @given(st.lists(st.floats(-0.15, 0.15), min_size=4, max_size=4), st.floats(0.6, 2.0), st.sampled_from([1.0, -1.0]))
 def test_a_bar_is_the_sum_of_its_three_terms(noise, order, sign):
-    """Of a law with noise: where the observed order is believed, whatever the noise is."""
+    """A law with any noise, if the observed order is accepted."""
     values = 7.0 + sign * (SIZES**order + noise)
-    found = estimate(SIZES, values, (1.0, 2.0))
-    if found.factor == OBSERVED:
-        assert found.bar == pytest.approx(sum(parts(SIZES, values, min(found.order, 1.0))), rel=1e-6)
+    result = estimate(SIZES, values, (1.0, 2.0))
+    if result.factor == OBSERVED:
+        assert result.bar == pytest.approx(sum(parts(SIZES, values, min(result.order, 1.0))), rel=1e-6)
 
 
 # A set of inputs is reached where it is within the rounding, and the whole bar of each number in its interval.
@@ -45,12 +45,12 @@ class Scattered:
     def __init__(self, law):
         self.law = law
 
-    def numbers(self, said):
-        plain = load_scene(said.name)
-        factors = {each.name: value_of(said, each.paths[0]) / value_of(plain, each.paths[0])
-                   for each in INPUTS if each.only in ("", said.name)}
+    def numbers(self, scene):
+        packaged = load_scene(scene.name)
+        factors = {each.name: value_of(scene, each.paths[0]) / value_of(packaged, each.paths[0])
+                   for each in INPUTS if each.only in ("", scene.name)}
         return self.law(factors, load_scene("base", rounding.converged(1.0)).numerics.refinement
-                        / said.numerics.refinement)
+                        / scene.numerics.refinement)
 
     def rows(self, scenes):
         return [*map(self.numbers, scenes)]
@@ -63,89 +63,90 @@ def numbers(effluent):
 
 
 def curved(x, size):
-    """An effluent that a linear program does not reach within the rounding of k, and a run at its end does."""
+    """The linear program needs more than the rounding of k, but a run at the end of the rounding fits."""
     change = 1 - x["k"]
     return numbers(4.19 * (0.95 + 4 * change + 1e3 * change**2))
 
 
 def scattering(x, size):
-    """An effluent that is reached within the rounding, whose values on several sizes scatter for that set alone."""
+    """The effluent fits within the rounding, but its values on several sizes scatter for that set."""
     change = 1 - x["k"]
     return numbers(4.19 * (0.99 + 8 * change) + (0.02 * size if abs(change) > 1e-4 else 0.0))
 
 
 def straight(x, size):
-    """An effluent that is reached within the rounding, with no bar."""
+    """The effluent fits within the rounding, without a bar."""
     return numbers(4.19 * (0.99 + 8 * (1 - x["k"])))
 
 
-@pytest.mark.parametrize("law, within, fits", [(straight, True, True), (curved, False, True), (scattering, True, False)])
+@pytest.mark.parametrize("law, within, fits", [
+    (straight, True, True), (curved, False, True), (scattering, True, False)])
 def test_a_set_is_reached_where_it_is_within_the_rounding_and_fits_with_its_bars(law, within, fits):
-    """Either condition alone does not do."""
+    """Neither condition alone suffices."""
     slope = -4.0 if law is curved else -8.0
     known = {number: {each.name: {"elasticity": 0.0} for each in INPUTS} for number in rounding.PRINTED}
     known["effluent_acceptor"]["k"] = {"elasticity": slope}
-    found = rounding.one_set(Scattered(law), known)
-    assert (found["share_of_the_rounding"] <= 1, found["misfit_in_half_intervals"] <= 1) == (within, fits)
-    assert found["reached"] is (within and fits)
+    result = rounding.one_set(Scattered(law), known)
+    assert (result["share_of_the_rounding"] <= 1, result["misfit_in_half_intervals"] <= 1) == (within, fits)
+    assert result["reached"] is (within and fits)
 
 
 # A new mesh is due where one of the criteria of 3.1, 3.5 and 2.3.3 asks for it.
 def grown_seed(kind):
-    """(scene, its seed, the same with a shape and a scene of which nothing asks for a new mesh)."""
+    """(scene, its seed)."""
     scene = load_scene("base", ["aggregate.radius=20 um", "numerics.refinement=0.5", f"numerics.elements={kind}"])
     return scene, seeded(scene)
 
 
-def shifted(scene, now):
+def shifted(scene, pore):
     """16 um upstream: too near to the end of the mesh, which is 75 um away at first."""
-    return scene, now.moved(now.mesh.points - [16.0, 0.0])
+    return scene, pore.moved(pore.mesh.points - [16.0, 0.0])
 
 
-def touching(scene, now):
+def touching(scene, pore):
     """A node at the top is on the opposite wall."""
-    wall = now.wall.copy()
-    wall[now.boundary.points[:, 1].argmax()] = TOP
-    return scene, replace(now, wall=wall)
+    wall = pore.wall.copy()
+    wall[pore.boundary.points[:, 1].argmax()] = TOP
+    return scene, replace(pore, wall=wall)
 
 
-def coarse(scene, now):
+def coarse(scene, pore):
     """A mesh of elements a third as large would be made now."""
-    return replace(scene, numerics=replace(scene.numerics, refinement=3 * scene.numerics.refinement)), now
+    return replace(scene, numerics=replace(scene.numerics, refinement=3 * scene.numerics.refinement)), pore
 
 
-def inner(now):
+def inner(pore):
     """Corners of the aggregate's triangles that are not on its boundary."""
-    return np.setdiff1d(now.mesh.topology.body_corners, now.mesh.loop)
+    return np.setdiff1d(pore.mesh.topology.body_corners, pore.mesh.loop)
 
 
-def poor(scene, now):
+def poor(scene, pore):
     """The inside of the aggregate is pushed together: triangles at the boundary are poor, none is turned over."""
-    points = now.mesh.points.copy()
-    points[inner(now)] = [0.0, 8.5] + 0.75 * (points[inner(now)] - [0.0, 8.5])
-    moved = now.mesh.with_middles(points[: now.mesh.corners])
-    return scene, now.moved(moved)
+    points = pore.mesh.points.copy()
+    points[inner(pore)] = [0.0, 8.5] + 0.75 * (points[inner(pore)] - [0.0, 8.5])
+    moved = pore.mesh.with_middles(points[: pore.mesh.corners])
+    return scene, pore.moved(moved)
 
 
-def turned_over(scene, now):
+def turned_over(scene, pore):
     """One inner node has left the triangles around it, which are few."""
-    points = now.mesh.points.copy()
-    points[inner(now)[0]] += [0.0, 14.0] if points[inner(now)[0], 1] < 8 else [0.0, -14.0]
-    return scene, now.moved(now.mesh.with_middles(points[: now.mesh.corners]))
+    points = pore.mesh.points.copy()
+    points[inner(pore)[0]] += [0.0, 14.0] if points[inner(pore)[0], 1] < 8 else [0.0, -14.0]
+    return scene, pore.moved(pore.mesh.with_middles(points[: pore.mesh.corners]))
 
 
-def unchanged(scene, now):
-    return scene, now
+def unchanged(scene, pore):
+    return scene, pore
 
 
-def criteria(scene, now, expanded):
+def criteria(scene, pore, expanded):
     """Which of the criteria ask for a new mesh, by their words: poor are more than six triangles of a quality under
     0.6 (3.5)."""
-    outline, ends, body = expanded.boundary, now.mesh.ends, expanded.mesh
+    outline, ends, body = expanded.boundary, pore.mesh.ends, expanded.mesh
     reach = min(7 * outline.thickness, 1.3 * scene.pore.width)
     asked = sizing.interface_sizes(outline.corners, sized(scene)).max()
     return {"extent": min(outline.upstream - ends[0], ends[1] - outline.downstream) < reach,
-            "contact": bool((expanded.wall != now.wall).any()),
+            "contact": bool((expanded.wall != pore.wall).any()),
             "size": outline.corners.edge_lengths()[outline.corners.interface_edges()].max() > 2.8 * asked,
             "poor": np.count_nonzero(body.quality[body.biomass] < 0.6) > 6,
             "turned": bool((body.areas <= 0).any())}
