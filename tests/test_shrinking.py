@@ -5,6 +5,8 @@ import re
 import numpy as np
 import pytest
 
+from repro import load_scene, simulate
+from repro.check import numbers
 from repro.cli import main
 from repro.report import comparison, quantities
 from repro.report.reading import read
@@ -109,3 +111,12 @@ def test_a_pore_clogs_when_it_first_conducts_so_little_after_a_rise(relative, ex
     times = np.arange(float(len(relative)))
     clogged = table.clogging(times, np.array(relative), 10 - times, 0.5)
     assert clogged == pytest.approx((expected, 10 - expected), rel=1e-12, nan_ok=True)
+
+
+@pytest.mark.parametrize("supply", ["0 mg/L", "0.1 mg/L"])
+def test_the_bound_at_the_end_holds_for_what_decays(supply):
+    """`repro check` says how large the aggregate is at most: a part of what decays stays as inert biomass."""
+    scene = load_scene("base", ["numerics.preset=fast", f"substrates.donor.supply={supply}", "growth.end=48 h",
+                                "kinetics.decay_coefficient=1 1/day", 'output.times=["48 h"]'])
+    first, *_, last = (instant.pore.boundary.area for instant in simulate(scene))
+    assert last < 0.7 * first and numbers.at_end(scene).area >= last

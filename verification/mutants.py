@@ -986,7 +986,12 @@ MUTANTS = (
          "A seed upstream of the middle reaches less far, as one downstream reaches farther.",
          "now.reach + abs(seed.position)",
          "now.reach + seed.position",
-         f"{MIRRORS}a_seed_and_its_mirror_image_are_judged_alike")),
+         f"{MIRRORS}a_seed_and_its_mirror_image_are_judged_alike"),
+        ("bound-of-decay",
+         "The bound on an aggregate that decays leaves out its inert biomass.",
+         "rate = max(0.0, fastest_growth(scene))",
+         "rate = fastest_growth(scene)",
+         f"{SHRINKING}the_bound_at_the_end_holds_for_what_decays")),
     *changes(
         "repro/fem/sizing.py",
         ("one-contact-line",
