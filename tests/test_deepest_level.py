@@ -49,3 +49,20 @@ def test_elements_are_halved_as_often_as_a_front_needs(half, level, time):
         fine = fronted(half, "numerics.refinement=0.8")
         expected = [each.effluent for each in pore.solve(fine, pore.seeded(fine)).fluxes]
         assert [each.effluent for each in solved.fluxes] == pytest.approx(expected, rel=5e-3)
+
+
+@pytest.mark.parametrize("time", [0.0, 0.5])
+@pytest.mark.parametrize("least, advised", [(0.3, "= 0.3 resolves"), (0.31, "= 0.4 resolves"), (0.41, "= 0.6 resolves"),
+                                            (0.61, "no numerics.refinement up to 0.6 was")])
+def test_a_refinement_is_advised_that_resolves_the_state(monkeypatch, least, advised, time):
+    """The first of 1.5, 2 and 3 times that of the scene, 0.2, on which the front is resolved."""
+    def solve(scene, *arguments):
+        if scene.numerics.refinement < least:
+            raise Unresolved("the mesh is too coarse")
+        return exact(scene, *arguments)
+
+    exact = pore.solve
+    monkeypatch.setattr(pore, "solve", solve)
+    scene = load_scene("base", ["numerics.preset=fast", "aggregate.radius=20 um"])
+    error = remeshing.advised(scene, replace(pore.seeded(scene), time=time), Unresolved("too coarse"))
+    assert advised in str(error)
