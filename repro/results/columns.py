@@ -31,6 +31,14 @@ def _least(k: int, scene: Scene, at: Instant) -> float:
     return float(getattr(at.solved.concentrations, SUBSTRATES[k]).min())
 
 
+def _overshoot(k: int, scene: Scene, at: Instant) -> float:
+    """mg/L; with Gear, where water of earlier supplies is in the pore, over the largest supply."""
+    supply = at.solved.problem.both[k].supply
+    if scene.numerics.transport == "gear":
+        supply = getattr(scene.largest.substrates, SUBSTRATES[k]).supply
+    return max(0.0, float(getattr(at.solved.concentrations, SUBSTRATES[k]).max()) - supply)
+
+
 def _worst(defects: list[float]) -> float:
     """The one that is farthest from zero, with its sign; zero of none."""
     return max(defects, key=abs, default=0.0)
@@ -103,6 +111,9 @@ SERIES = (
              "largest (X_A + X_I) / X_m where growth is integrated",
              partial(_composition, 2), "largest", "biomass"),
     *_both("{}_min_mg_per_L", "least {} concentration", "least C at the nodes", _least),
+    *_both("{}_overshoot_mg_per_L", "{} concentration above the supply",
+           "largest C at the nodes - C_supply (with Gear: the largest of the table), at least zero",
+           _overshoot),
     *_both("{}_balance", "relative defect of the {}'s balance", _BALANCE, _substrate_balance),
     Quantity("biomass_balance", "relative defect of the biomass's balance",
              "(after - before - made) / after, the worst of the steps since the last row",
