@@ -42,8 +42,8 @@ def everywhere(now, value):
 @EVERY_ORDER
 @pytest.mark.parametrize("inlet", ["local", "mean"])
 def test_a_constant_supply_stays_constant_without_biomass(inlet, order):
-    """Around an obstacle and for both forms of (11), to round-off: w is divergence-free for every order. Newton's method
-    needs a step, from nothing at all."""
+    """Around an obstacle and for both forms of (11), to round-off: w is free of divergence for every order. Newton's
+    method needs a step, from nothing at all."""
     now, found = solved("30 um", "10 mg/L", "2.9 m/day", order, inlet)
     alone = transport.steady(found.problem, None, everywhere(now, 0.0))
     assert alone.iterations <= 2
