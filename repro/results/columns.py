@@ -121,8 +121,8 @@ SERIES = (
     Quantity("oxygen_demand_balance",
              "biomass made less Y donor - (acceptor - F donor) / d_c, relative",
              "(made - Y donor + (acceptor - F donor) / d_c) / the largest of the two terms, of "
-             "what a step consumes (7)-(10), and 1e-7 of the biomass, of which round-off is 1e-6; the "
-             "worst of the steps since the last row",
+             "what a step consumes (7)-(10), and 1e-7 of the biomass, of which round-off is 1e-6; "
+             "the worst of the steps since the last row",
              lambda scene, at: _of_steps(partial(balance.oxygen_demand, scene.kinetics), at),
              "oxygen demand", "growth"),
     Quantity("nodes", "nodes of the mesh", "corners, and middles of the sides of curved triangles",
