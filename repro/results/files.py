@@ -67,7 +67,7 @@ def read(path: Path, most: int) -> bytes:
             raise OSError(errno.EINVAL, "it is not a regular file")
         if status.st_size > most:
             raise OSError(errno.EFBIG, f"it is longer than {most} bytes")
-        return file.read(most)
+        return file.read(status.st_size)
 
 
 def sha256(content: bytes) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 
 from repro import report, results, timing
 from repro.check.simplifications import Warned, unmet
-from repro.errors import CheckpointError, Interrupted, OutputError, StageError
+from repro.errors import CheckpointError, Interrupted, OutputError
 from repro.march.loop import Instant, State, added
 from repro.march.pace import Pace, missed
 from repro.results import netcdf, vtu
@@ -238,12 +238,12 @@ class Recorder:
             with np.errstate(all="raise", under="ignore"):
                 state = stored.unpacked(self.scene, plain["state"], arrays)
                 before = record.unpacked(plain["record"], arrays)
+                record.require_fields(self.folder, before)
         except CheckpointError:
             raise
-        except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError,
-                StageError) as error:
-            raise CheckpointError(f"it makes no sense ({error})") from error
-        record.require_fields(self.folder, before)
+        except Exception as error:  # whatever a forged file may cause
+            why = " ".join(f"{type(error).__name__}: {error}".split())
+            raise CheckpointError(f"it makes no sense ({why})") from error
         self.state = state
         self.record = before
 

@@ -70,7 +70,8 @@ def _pore(scene: Scene, plain: dict, arrays: Arrays) -> Pore:
     numerics = scene.numerics
     method = Method(numerics.solver, numerics.ordering)
     first, last = plain["ends_um"]
-    mesh = Mesh.of(*(arrays[name] for name in OF_MESH), scene.pore.width, (first, last), method)
+    mesh = Mesh.of(arrays["points"], arrays["cells"], arrays["biomass"], arrays["loop"],
+                   scene.pore.width, (first, last), method)
     space = Space(mesh, numerics.order)
     guess = None
     if plain["guess"] is not None:

@@ -38,13 +38,17 @@ def make(scene: Scene, place: Path, patience: float = 0.0) -> str:
     in one line, whatever the trouble is.
     """
     try:
-        return _made(scene, place, Watch(patience=patience))
+        return _made(scene, place, Watch(tell=_ignore, patience=patience))
     except (SimulationError, OutputError, SceneError, NoRun) as error:
         return f"failed: {error}"
     except Exception as error:  # a bug is the failure of one run
         last = traceback.extract_tb(error.__traceback__)[-1]
         where = f"{Path(last.filename).name}, line {last.lineno}"
         return f"failed: {type(error).__name__}: {' '.join(str(error).split())} ({where})"
+
+
+def _ignore(event: dict) -> None:
+    """Events and warnings of a run are in its ``run.json``."""
 
 
 def _made(scene: Scene, place: Path, watch: Watch) -> str:
