@@ -55,7 +55,7 @@ def source_hash() -> str:
 
 def statements(source: str) -> str:
     """A source without comments and empty lines, with ``...`` for each docstring."""
-    return EMPTY.sub("\n", REMARK.sub(_without_remark, source))
+    return EMPTY.sub("\n", REMARK.sub(_without_remark, source)).strip()
 
 
 def _without_remark(match: re.Match) -> str:
