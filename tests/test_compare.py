@@ -90,7 +90,7 @@ def test_what_cannot_be_compared_is_refused(fast, tmp_path, capsys):
 @pytest.mark.parametrize("spoil, why", [
     (flip, "it is not as it was written|its checksum is wrong|Expecting"), (lambda path: path.unlink(), "is missing"),
     (lambda path: (path.unlink(), os.mkfifo(path)), "it is not a regular file"),
-    (lambda path: os.truncate(path, 3 * 2**30), r"it is longer than \d+ bytes")])
+    (lambda path: os.truncate(path, 3 * 2**30), r"it is longer than \d+ bytes")], ids=["bit", "gone", "pipe", "long"])
 def test_a_damaged_run_is_refused_without_being_read(fast, tmp_path, capsys, name, spoil, why):
     """A bit that is not as it was, a pipe, 3 GB: in one line, at once, and without the memory of its size."""
     copy = shutil.copytree(fast, tmp_path / "run")
