@@ -6,6 +6,7 @@ import math
 import multiprocessing
 import os
 import re
+import runpy
 import shutil
 import signal
 import subprocess
@@ -338,19 +339,17 @@ def test_nothing_is_imported_from_the_working_folder(tmp_path):
     assert list(notes.iterdir()) == [] and len(rows(here / "sweep" / "table.csv")) == 2
 
 
-def test_what_c_code_prints_does_not_reach_the_user(tmp_path, capfd, monkeypatch):
+def test_what_c_code_prints_does_not_reach_the_user(tmp_path, capfd):
     """On neither output of the process of a run, whose own failure is told in one line with its place."""
     (tmp_path / "noisy.py").write_text(
         "import os\nfrom repro.sweep import task\n"
         "def made(scene, place, watch):\n    os.write(1, b'noise')\n    os.write(2, b'noise')\n    return {}['x']\n"
         "task._made = made\n")
-    monkeypatch.syspath_prepend(str(tmp_path))
     one = points("flow_only", [], [parse("pore.width=48 um")], [(48.0,)])
     end, answer = multiprocessing.get_context("fork").Pipe()
     child = os.fork()
     if not child:
-        import noisy
-        assert noisy
+        runpy.run_path(str(tmp_path / "noisy.py"))
         task.answer(answer, one[0].scene, tmp_path / "run", 0.0)
         os._exit(0)
     os.waitpid(child, 0)

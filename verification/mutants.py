@@ -323,13 +323,6 @@ MUTANTS = (
          "pass",
          "tests/test_sweep.py::test_nothing_is_imported_from_the_working_folder")),
     *changes(
-        "repro/sweep/state.py",
-        ("link-to-all-runs",
-         "A link in the place of a sweep's runs is followed.",
-         "for place in (sweep.runs, *(sweep.runs",
-         "for place in ((), *(sweep.runs",
-         "tests/test_sweep.py::test_places_that_are_not_of_a_sweep_are_refused")),
-    *changes(
         "repro/sweep/task.py",
         ("libraries-print",
          "What libraries print in a run of a sweep reaches the user.",
