@@ -1359,7 +1359,7 @@ MUTANTS = (
          "The hash of the source leaves out a room that computes numbers.",
          "for room in ROOMS for path",
          "for room in ROOMS[1:] for path",
-         f"{CACHE_KEYS}every_module_counts_in_the_hash_of_the_source")),
+         "tests/test_machine.py::test_the_source_is_every_statement_of_the_rooms_that_compute_numbers")),
     *changes(
         "repro/scene/keys.py",
         ("hash-without-output",
