@@ -337,7 +337,7 @@ def _rows(run: Run) -> Iterator[Finding]:
     asked = run.scene.section("output").get("times")
     if asked and run.completed:
         yield size("rows that were asked for and are not there, or the reverse",
-                   _unmatched(times, [number(time) for time in asked]), 0, "output.times")
+                   _unmatched(times, {0.0, *map(number, asked)}), 0, "output.times, and the start")
     elif run.completed:
         yield size("time between the last row and the end", times[-1] - run.scene.end, 1e-9, "growth.end")
     if run.scene.end and (run.completed or run.ledger):
@@ -348,7 +348,7 @@ def _rows(run: Run) -> Iterator[Finding]:
 
 def _unmatched(one, other) -> int:
     """How many times of two lists have no partner in the other."""
-    apart = np.abs(np.subtract.outer(np.asarray(one), np.asarray(other))) <= 1e-9
+    apart = np.abs(np.subtract.outer(list(one), list(other))) <= 1e-9
     return np.count_nonzero(~apart.any(axis=1)) + np.count_nonzero(~apart.any(axis=0))
 
 

@@ -64,11 +64,11 @@ def _rows(random: Random, end: float) -> list[str]:
 def _plain(random: Random) -> dict:
     """A seed in a pore with a flow, its numbers within ranges that pores of soils and filters have."""
     width = _spread(random, 15.0, 120.0)
-    end = round(_spread(random, 0.4, 3.0), 3)
+    end = round(_spread(random, 0.4, 6.0), 3)
     return {
         "pore": {"width": _um(width), "length": _um(width * random.uniform(6.0, 12.0))},
         "aggregate": {"radius": _um(width * _spread(random, 0.05, 0.6))},
-        "flow": {"mean_velocity": f"{_spread(random, 0.03, 20.0):.4g} m/day"},
+        "flow": {"mean_velocity": f"{_spread(random, 0.03, 50.0):.4g} m/day"},
         "substrates": {"acceptor": _substrate(random), "donor": _substrate(random)},
         "kinetics": {"maximum_utilization_rate": f"{_spread(random, 0.5, 12.0):.4g} 1/day",
                      "decay_coefficient": f"{_spread(random, 0.02, 0.5):.4g} 1/day",
@@ -84,8 +84,8 @@ def _substrate(random: Random) -> dict:
 
 
 def _updates(tables: dict, transport: str) -> None:
-    """Four steps of the paper's scheme."""
-    step = _hours(tables["growth"]["end"]) / 4
+    """Three steps of the paper's scheme."""
+    step = _hours(tables["growth"]["end"]) / 3
     tables["growth"]["time_step"] = f"{step!r} h"
     tables["numerics"] |= {"time": "updates", "transport": transport}
 
@@ -110,10 +110,12 @@ def jumps(random: Random, tables: dict) -> None:
         drive["head"] = f"{_spread(random, 1.0, 30.0):.4g} um"
         del drive["mean_velocity"]
     key = next(iter(drive))
-    drive[key] = _table(random, end, drive[key], 0.1, 10.0)
+    drive[key] = _table(random, end, drive[key], 0.03, 30.0)
     name = ("acceptor", "donor")[int(random.integers(2))]
     fed = tables["substrates"][name]
-    fed["supply"] = _table(random, end, fed["supply"], 0.05, 20.0)
+    fed["supply"] = _table(random, end, fed["supply"], 0.02, 20.0)
+    if random.uniform() < 0.3:
+        fed["supply"][-1][1] = "0 mg/L"
     if random.uniform() < 0.5:
         fed["interpolation"] = "linear"
     rows = sorted({0.0, *_inner(random, 0.8 * end, 2), _hours(drive[key][-1][0])})
@@ -121,20 +123,25 @@ def jumps(random: Random, tables: dict) -> None:
 
 
 def outlines(random: Random, tables: dict) -> None:
-    """A ragged, leaning or two-headed body, of straight lines or smooth."""
+    """A ragged body that leans over its foot, of straight lines or smooth, at times with its head at the other wall."""
     width = _width(tables)
-    angles = np.linspace(np.pi, 0.0, int(random.integers(4, 12)))
-    radii = width * _spread(random, 0.1, 0.55) * random.uniform(0.5, 1.3, len(angles))
-    lean = random.uniform(-0.8, 0.8)
+    angles = np.linspace(np.pi, 0.0, int(random.integers(4, 9)))
+    radii = random.uniform(0.4, 1.3, len(angles))
+    height = width * (1.0 if random.uniform() < 0.2 else _spread(random, 0.05, 0.98))
     y = radii * np.sin(angles)
-    y *= min(1.0, 0.85 * width / y.max())
-    x = radii * np.cos(angles) + lean * y
+    y *= height / y.max()
+    x = width * _spread(random, 0.05, 0.6) * radii * np.cos(angles) + random.uniform(-1.5, 1.5) * y
     y[[0, -1]] = 0.0
-    tables["aggregate"] = {"outline": [[_um(a), _um(b)] for a, b in zip(x, y)], "smooth": bool(random.integers(2))}
+    points = [(a, b) for a, b in zip(x, y)]
+    if height == width:
+        top = int(y.argmax())
+        points.insert(top + 1, (x[top] + random.uniform(0.05, 0.4) * width, width))
+    tables["aggregate"] = {"outline": [[_um(a), _um(b)] for a, b in points], "smooth": bool(random.integers(2))}
 
 
 def brinkman(random: Random, tables: dict) -> None:
-    """A permeable body, from gravel to clay."""
+    """A permeable body, from gravel to clay, up to most of the width."""
+    tables["aggregate"]["radius"] = _um(_width(tables) * random.uniform(0.1, 0.9))
     tables["flow"] |= {"biomass": "brinkman", "permeability": f"{_spread(random, 1e-17, 1e-10):.3g} m^2"}
 
 
@@ -148,7 +155,8 @@ def gear(random: Random, tables: dict) -> None:
 
 def forces(random: Random, tables: dict) -> None:
     """A soft body under the water's forces."""
-    tables["growth"] |= {"fluid_forces": "included", "shear_modulus": f"{_spread(random, 3e-6, 1e-2):.3g} MPa"}
+    tables["growth"] |= {"fluid_forces": "included", "shear_modulus": f"{_spread(random, 1e-7, 1e-2):.3g} MPa"}
+    tables["aggregate"]["radius"] = _um(_width(tables) * random.uniform(0.1, 0.9))
     tables["flow"]["viscosity_ratio"] = round(_spread(random, 10.0, 1e5), 3)
 
 
@@ -156,6 +164,7 @@ def closed(random: Random, tables: dict) -> None:
     """A pore that nothing enters or leaves: substrates run out."""
     del tables["flow"]
     tables["substrates"]["boundary"] = "closed"
+    tables["growth"]["end"] = f"{round(random.uniform(0.1, 1.0), 3)!r} h"
     _updates(tables, "gear")
 
 
@@ -163,8 +172,8 @@ def starved(random: Random, tables: dict) -> None:
     """A body that takes up all that comes: fronts inside it, or next to nothing to take up."""
     tables["aggregate"]["radius"] = _um(_width(tables) * random.uniform(0.3, 0.85))
     for part in tables["substrates"].values():
-        part["supply"] = f"{_spread(random, 0.01, 3.0):.4g} mg/L"
-        part["half_saturation"] = f"{_spread(random, 0.003, 1.0):.4g} mg/L"
+        supply = _spread(random, 0.01, 3.0)
+        part |= {"supply": f"{supply:.4g} mg/L", "half_saturation": f"{supply * _spread(random, 1e-4, 3.0):.4g} mg/L"}
 
 
 def dense(random: Random, tables: dict) -> None:
@@ -199,3 +208,5 @@ def narrow(random: Random, tables: dict) -> None:
 KINDS: dict[str, Callable[[Random, dict], None]] = {
     "jumps": jumps, "outline": outlines, "brinkman": brinkman, "gear": gear, "forces": forces, "closed": closed,
     "starved": starved, "dense rows": dense, "still": still, "narrow": narrow}
+#: Kinds whose substrates are transient, with many steps of their own.
+TRANSIENT = ("gear", "closed")
