@@ -2,15 +2,19 @@
 starts from, and what is refused. Closed forms, other codes, the balance, starved pores, scaling and the mean biomass of
 a step are cases of the stage transport; that uptake is what the rates make of the concentrations is in
 `test_balances.py`."""
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from skfem import MeshTri
 
-from repro.errors import TransportError, Unresolved
+from repro.errors import SimulationError, TransportError, Unresolved
 from repro.fem.mesh import Mesh, triangle_areas
+from repro.march.simulation import simulate
 from repro.model import pore, transport
 from repro.model.kinetics import Sink
 from repro.model.transport import Concentrations
+from repro.scene import parse_scene, scene_tables
 from tests.strategies import ORDERS, scene, space_of
 
 EVERY_ORDER = pytest.mark.parametrize("order", ORDERS)
@@ -103,3 +107,56 @@ def test_too_coarse_a_mesh_is_refused(monkeypatch, order):
     monkeypatch.setattr(pore, "BOUNDARY_LAYER", 0.0)
     with pytest.raises(Unresolved, match=SAID):
         at_start(thick("290 m/day", order, 0.2))
+
+
+def starved(half, order):
+    """A seed that the acceptor reaches in part only, with a half saturation that no mesh resolves."""
+    made = scene("30 um", "100 um", "1 mg/L", "10 mg/L", "0.5 m/day", numerics={
+        "elements": ORDERS[order], "refinement": 0.4 / order, "transfer": "conserving"})
+    acceptor = replace(made.substrates.acceptor, half_saturation=half)
+    return replace(made, substrates=replace(made.substrates, acceptor=acceptor))
+
+
+@EVERY_ORDER
+@pytest.mark.parametrize("half", [1e-17, 1e-300])
+def test_a_half_saturation_below_round_off_is_solved_or_refused_as_a_front(order, half):
+    """Where C / (C + K) is one to the last bit and the substrate runs out: no floating-point error. What is solved
+    differs from a half saturation of 1e-15 by about that."""
+    with np.errstate(all="raise", under="ignore"):
+        if order == 1 and half == 1e-17:
+            _, found = at_start(starved(half, order))
+            _, other = at_start(starved(1e-15, order))
+            assert found.concentrations.acceptor == pytest.approx(other.concentrations.acceptor, abs=1e-10)
+            assert found.concentrations.acceptor.min() < 1e-10 < found.fluxes[0].consumed
+        else:
+            with pytest.raises(Unresolved, match="the mesh is too coarse for the front in the aggregate"):
+                at_start(starved(half, order))
+
+
+def test_an_update_that_meets_an_unresolved_front_gives_advice_that_was_tried():
+    """After a step, at a jump of the supply, where no refinement helps."""
+    made = scene("30 um", "100 um", "1 mg/L", "10 mg/L", "0.5 m/day", growth={"end": "1 h", "time_step": "0.4 h"})
+    tables = scene_tables(made)
+    tables["substrates"]["acceptor"] |= {"supply": [["0 h", "1e5 mg/L"], ["0.4 h", "1 mg/L"]],
+                                         "half_saturation": "1e-30 mg/L"}
+    tables["numerics"] |= {"refinement": 0.2}
+    with pytest.raises(SimulationError, match="from t = 0 h, in transport: .*no numerics.refinement up to 0.6 was fou"):
+        list(simulate(parse_scene(tables, "test", "test.toml")))
+
+
+def test_an_update_whose_biomass_meets_an_unresolved_front_gives_advice_that_was_tried(monkeypatch):
+    """Within a step, of the biomass at its end."""
+    made = scene("5 um", velocity="1 m/day", growth={"end": "1 h", "time_step": "0.5 h"}, numerics={"refinement": 0.4})
+    plain, calls = transport.steady, []
+
+    def failing(*arguments):
+        calls.append(arguments)
+        if len(calls) == 2:
+            raise Unresolved("a front")
+        return plain(*arguments)
+
+    monkeypatch.setattr(transport, "steady", failing)
+    with pytest.raises(SimulationError, match="in transport: a front; numerics.refinement = 0.6 resolves this state"):
+        list(simulate(made))
+    assert calls[2][1].active.sum() == pytest.approx(calls[1][1].active.sum(), rel=1e-3)
+    assert calls[2][1].active.sum() > 1.005 * calls[0][1].active.sum()

@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from repro.errors import TransportError, Unresolved
+from repro.errors import LinearError, TransportError, Unresolved
 from repro.fem import elements
 from repro.fem.assembly import ElementSystem, Factored, each, mass
 from repro.fem.brief import brief
@@ -43,6 +43,8 @@ ROUND_OFF = 1e-12
 MOST_ITERATIONS = 60
 #: No fraction m is larger than this in an iterate, so that C = K m / (1 - m) is finite.
 SATURATED = 0.9
+#: C = K m / (1 - m) is taken at this fraction where round-off makes m = C / (C + K) one.
+LARGEST_FRACTION = 1 - np.finfo(float).eps
 #: Above this fraction uptake is linearised about the concentration itself.
 SWITCH = 0.5
 #: A concentration below zero by more than this part of its supply is not resolved.
@@ -377,7 +379,7 @@ class Balance:
 
     def _predicted(self, iterate: Iterate, state: np.ndarray) -> np.ndarray:
         """(2, r, q) fractions at other concentrations by the linearisation."""
-        m = iterate.fractions
+        m = np.minimum(iterate.fractions, LARGEST_FRACTION)
         return m + self._slopes(iterate.state, m) * (self.at(state) - self._half * m / (1 - m))
 
     def _followed(self, iterate: Iterate, new: Iterate, there: np.ndarray,
@@ -423,14 +425,20 @@ def steady(problem: Problem, sink: Sink | None,
 def _found(balance: Balance, state: np.ndarray) -> tuple[np.ndarray, int]:
     """(2n,) the solution from a start, and Newton's iterations."""
     newton = Newton(NEWTON, ROUND_OFF, MOST_ITERATIONS, balance.problem.reused)
-    last, count, converged = newton.solve(balance, balance.begun(state))
+    try:
+        last, count, converged = newton.solve(balance, balance.begun(state))
+    except LinearError:
+        if balance.sink is None:
+            raise
+        raise _front("Newton's method for the substrates meets a singular matrix") from None
     if not converged:
-        stands = ("Newton's method for the substrates stands at a defect of "
-                  f"{last.defect:.2g} after {count} iterations")
-        if balance.sink is not None and balance.problem.space.order > 1:
-            raise Unresolved(f"{stands}; the mesh is too coarse for the front in the aggregate")
-        raise TransportError(f"{stands}; try a larger numerics.refinement")
+        raise _front("Newton's method for the substrates stands at a defect of "
+                     f"{last.defect:.2g} after {count} iterations")
     return last.state, count
+
+
+def _front(failure: str) -> Unresolved:
+    return Unresolved(f"{failure}; the mesh is too coarse for the front in the aggregate")
 
 
 def _eased(problem: Problem, sink: Sink | None, state: np.ndarray) -> tuple[np.ndarray, int]:
@@ -467,9 +475,8 @@ def _refuse_unresolved(problem: Problem, sink: Sink, state: Concentrations) -> N
     """Raises Unresolved where two quadratures of the uptake differ by more than APART."""
     apart = quadrature_error(problem, sink, state)
     if apart > APART:
-        raise Unresolved(f"two quadratures of the uptake differ by {100 * apart:.2g} % (up to "
-                         f"{100 * APART:g} % is accepted); the mesh is too coarse for the front in "
-                         "the aggregate")
+        raise _front(f"two quadratures of the uptake differ by {100 * apart:.2g} % (up to "
+                     f"{100 * APART:g} % is accepted)")
 
 
 def quadrature_error(problem: Problem, sink: Sink, state: Concentrations) -> float:
