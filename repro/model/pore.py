@@ -21,6 +21,9 @@ from repro.model.flow import Bubble, Flow, Stabilised
 from repro.model.transport import Concentrations, Fluxes, Problem
 from repro.scene import Scene, needed
 
+#: A permeable aggregate that spans the pore draws the water in at its upper contact lines: elements
+#: beside them are no larger than the least film over this.
+CONTACT_ELEMENTS = 2.0
 #: The thinnest film to resolve where no [growth] says when it closes (Table 1), um.
 MINIMUM_FILM = 2.0
 #: Under this Peclet number u W / D the inlet supplies nothing that could be told from round-off.
@@ -146,6 +149,8 @@ def sized(scene: Scene, front: float = 1.0) -> Sizing:
     middle = seed.position if seed and seed.outline is None else None
     least = film(scene)
     across = scene.numerics.contact_elements
+    if scene.flow and scene.flow.permeability is not None:
+        across = max(across, CONTACT_ELEMENTS)
     return Sizing(scene.pore.width, resolution(scene), least, scene.numerics.gradation, front,
                   least / across if across else inf, middle)
 
