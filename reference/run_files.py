@@ -131,6 +131,12 @@ class Scene:
         return "flow" in self.tables
 
     @property
+    def viscosity_ratio(self) -> float | None:
+        """Of the aggregate; None where it is permeable."""
+        permeable = self.section("flow").get("biomass") == "brinkman"
+        return None if permeable else self.number("flow", "viscosity_ratio")
+
+    @property
     def stores(self) -> bool:
         """Are substrates transient?"""
         return self.section("numerics").get("transport") == "gear"
@@ -381,8 +387,12 @@ def _flow(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
     driven = scene.course("flow", drive).at(row["time_h"]) / UNITS[unit]
     yield size(f"{column} over that of the scene, less one", row[column] / driven - 1, SUM, "the scene's own")
     velocity = fields.at_nodes["velocity_m_per_d"]
-    slip = np.concatenate([velocity[fields.wall(0.0)], velocity[fields.wall(width)]])
-    yield size("velocity at the walls over the mean", slip / speed, SUM, "(5): no slip")
+    walls = np.concatenate([fields.wall(0.0), fields.wall(width)])
+    in_fluid = walls[np.isin(walls, fields.cells[~fields.body])]
+    still = walls if scene.viscosity_ratio else in_fluid
+    yield size("velocity at the walls over the mean", velocity[still] / speed, SUM,
+               "(5): no slip; water may slide under a permeable body whose layers are thin")
+    yield size("velocity through the walls over the mean", velocity[walls, 1] / speed, SUM, "nothing passes")
     for name, outlet, bound in (("inlet", False, SUM), ("outlet", True, SOLVED)):
         through = fields.over_end(outlet, velocity[:, 0]) / (speed * width)
         yield size(f"flow through the {name} over u_ave W, less one", through - 1, bound, "(2): water is kept")
@@ -393,31 +403,26 @@ def _flow(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
     inside = (fields.over_end(False, head) - fields.over_end(True, head)) / width
     yield size("mean head at inlet less outlet and the clean rest, over the head loss, less one",
                (inside + outside) / row["head_loss_cm"] - 1, PROMISED, "(6); the preset's error")
-    spent = viscosity * _dissipation(scene, fields) / (speed * UNITS["m/day"] * width) / UNITS["cm"]
-    yield size("work that the water spends and the clean rest, over the head loss, less one",
-               (spent + outside) / row["head_loss_cm"] - 1, QUADRATURE, "work of the head is spent on viscosity and drag")
+    if scene.viscosity_ratio:
+        spent = viscosity * _dissipation(scene, fields) / (speed * UNITS["m/day"] * width) / UNITS["cm"]
+        yield size("work that the water spends and the clean rest, over the head loss, less one",
+                   (spent + outside) / row["head_loss_cm"] - 1, QUADRATURE, "work of the head is spent on viscosity")
     conductivity = speed * length / (row["head_loss_cm"] * UNITS["cm"])
     yield size("u L / head loss over the conductivity, less one", conductivity / row["conductivity_m_per_d"] - 1,
                SUM, "its definition")
-    if scene.number("flow", "viscosity_ratio") >= 1:
+    if scene.viscosity_ratio is None or scene.viscosity_ratio >= 1:
         yield excess("conductivity over that of the clean pore", row["conductivity_m_per_d"] / clean, 0.0,
                      1 + PROMISED, "Stokes flow has the least dissipation; the preset's error")
 
 
 def _dissipation(scene: Scene, fields: Fields) -> float:
-    """Integral of nu_r grad u : grad u, or with traction nu_r grad u : (grad u + grad u^T), and of drag, um2/h2."""
+    """Integral of nu_r grad u : grad u, or with traction nu_r grad u : (grad u + grad u^T), um2/h2."""
     velocity = fields.at_nodes["velocity_m_per_d"][:, :2] * UNITS["m/day"]
     gradient = fields.gradients(velocity)
     square = np.sum(gradient**2, axis=(2, 3))
     if scene.section("numerics").get("interface") == "traction":
         square += np.einsum("tqij,tqji->tq", gradient, gradient)
-    permeable = scene.section("flow").get("biomass") == "brinkman"
-    ratio = 1.0 if permeable else scene.number("flow", "viscosity_ratio")
-    spent = np.sum(square * fields.dx, axis=1) @ np.where(fields.body, ratio, 1.0)
-    if permeable:
-        inside = (velocity[fields.cells[fields.body]].transpose(0, 2, 1) @ SHAPES.T) ** 2
-        spent += np.sum(inside.sum(axis=1) * fields.dx[fields.body]) / scene.number("flow", "permeability")
-    return float(spent)
+    return float(np.sum(square * fields.dx, axis=1) @ np.where(fields.body, scene.viscosity_ratio, 1.0))
 
 
 def _concentrations(scene: Scene, row: dict, fields: Fields) -> Iterator[Finding]:
