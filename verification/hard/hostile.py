@@ -28,7 +28,7 @@ from verification.problems import hostile
 LIMIT = 30.0
 #: Seeds of ``make test``, and those that ``make verify`` has besides.
 QUICK, REST = range(30), range(30, 150)
-NO_HELP = re.compile(r"no setting helps|no numerics\.refinement")
+NO_HELP = re.compile(r"no setting helps|no numerics\.refinement that is accepted")
 FILE = re.compile(r"\S+/\S+\.(?:state|vtu)|fields/\S+\.vtu")
 #: What a message may advise: a pattern, the key, and values to try, of the present one or of the pattern's number.
 ADVICE = (
@@ -97,7 +97,8 @@ def _checks(outcome: Outcome, tables: dict, room: Path) -> Iterator[Check]:
 def _refusal(message: str, room: Path) -> Iterator[Check]:
     yield at_most("lines of a refusal beyond one", message.count("\n"), 0, "one line")
     named = [Path(name) for name in FILE.findall(message)]
-    missing = [path for path in named if not any(path.exists() or (folder / path).exists() for folder in room.iterdir())]
+    folders = [Path("/"), *room.iterdir()]
+    missing = [path for path in named if not any((folder / path).exists() for folder in folders)]
     yield at_most("files that a refusal names and that are not there", len(missing), 0, "a user looks there")
 
 
@@ -138,11 +139,14 @@ def member(seed: int) -> Check:
 
 CLAIM = ("Hostile scenes drawn by seed: balances, bounds, stoichiometry, area against mass and flow in the files, the "
          "same rows with other rows, fast against accurate, or a refusal with advice that works")
-MUTANTS = ("family-inert-lost",)
+MUTANTS = ("family-jump-late", "family-area-of-corners", "family-effluent-not-weighted", "family-half-saturation",
+           "family-rest-of-the-pore-forgotten", "family-rows-end-steps")
 
 for id, seeds in (("hard-family", QUICK), ("hard-family-rest", REST)):
     case(id, kind="property", claim=CLAIM, norm="checks that fail, of each member", mutants=MUTANTS,
-         slow=seeds is REST, over={f"seed {seed}": (seed,) for seed in seeds}, ways="2 fast accurate")(member)
+         slow=seeds is REST, over={f"seed {seed}": (seed,) for seed in seeds}, ways="2 fast accurate",
+         because="the judge reads curved quadratic triangles; hard-01 to hard-22 run orders 1 and 3, paper and exact")(
+             member)
 
 
 if __name__ == "__main__":
