@@ -21,7 +21,7 @@ from repro.scene import Scene, Substrate, needed
 #: What element sizes at the aggregate are divided by at most, for a front of the substrates.
 MOST_GRADED = 4.0
 #: Factors of the refinement that are tried where that is not enough.
-TRIED = (1.5, 2.0, 3.0, 6.0)
+TRIED = (1.5, 2.0, 3.0)
 #: The largest refinement that scenes accept.
 MOST_REFINED = 20.0
 

@@ -20,7 +20,7 @@ from reference import run_files
 from repro.errors import SimulationError
 from repro.run.running import run
 from repro.scene import SceneError, load_scene
-from verification.hard.common import limited
+from verification.hard.common import TooLong, limited
 from verification.kernel.case import Check, at_most, case
 from verification.problems import hostile
 
@@ -72,12 +72,12 @@ def _judged(tables: dict, seed: int, room: Path) -> Iterator[Check]:
 
 
 def _outcome(tables: dict, folder: Path) -> Outcome:
-    """Run a scene. An exception that the package does not raise on purpose passes."""
+    """Run a scene; one that takes too long counts as refused. Any other exception is left to the caller."""
     refusal = ""
     try:
         with limited(LIMIT):
             run(load_scene(tables), folder)
-    except (SceneError, SimulationError) as error:
+    except (SceneError, SimulationError, TooLong) as error:
         refusal = str(error)
     files = run_files.Run(folder, tables) if (folder / "timeseries.csv").is_file() else None
     return Outcome(files, refusal)
