@@ -152,5 +152,5 @@ else:
     for id, seeds in (("hard-family", QUICK), ("hard-family-rest", REST)):
         case(id, kind="property", claim=CLAIM, norm="checks that fail, of each member", mutants=MUTANTS,
              slow=seeds is REST, over={f"seed {seed}": (seed,) for seed in seeds}, ways="2 fast accurate",
-             because="the judge reads curved quadratic triangles; hard-01 to hard-22 run orders 1 and 3, paper and exact")(
+             because="the judge reads quadratic triangles; hard-01 to hard-22 run orders 1 and 3, paper and exact")(
                  member)
