@@ -22,7 +22,7 @@ Where the paper is in the code, whose modules name the equations that they solve
     3.2-3.4  finite elements                repro.fem.elements, .space, .assembly, .linear, .newton
     3.1  mesh                               repro.fem.outline, .sizing, .mesher, .mesh
     3.5  transfer to a new mesh             repro.fem.transfer
-    2.1, 3.2  flow             (1)-(6)      repro.model.flow
+    2.1, 3.2  flow             (1)-(6)      repro.model.flow, .brinkman
     2.2  kinetics              (7)-(10)     repro.model.kinetics
     2.2  substrates            (7)-(13)     repro.model.transport (at rest in each shape)
     3.3  transient scheme      (7)-(13)     repro.model.gear (predictor-corrector)

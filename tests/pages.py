@@ -12,6 +12,7 @@ import numpy as np
 
 from repro import results
 from repro.cli import main
+from repro.results.files import read_sealed
 from repro.run import running
 from repro.scene import scene_hash
 
@@ -27,6 +28,8 @@ CHARTS = {
     "Effluents": {"acceptor": "effluent_acceptor_mg_per_L", "donor": "effluent_donor_mg_per_L"},
     "Inlet of the meshed part": {"acceptor": "inlet_acceptor_mg_per_L", "donor": "inlet_donor_mg_per_L"},
     "Least concentrations": {"acceptor": "acceptor_min_mg_per_L", "donor": "donor_min_mg_per_L"},
+    "Concentrations above the supply": {"acceptor": "acceptor_overshoot_mg_per_L",
+                                        "donor": "donor_overshoot_mg_per_L"},
     "Area of the aggregate": {"area": "aggregate_area_um2"},
     "Extent of the aggregate": {"thickness": "thickness_um", "upstream end": "upstream_um",
                                 "downstream end": "downstream_um"},
@@ -37,7 +40,8 @@ CHARTS = {
     "Mesh": {"nodes": "nodes", "made anew": "remeshed"},
 }
 AXES = {"Conductivity": "(m/day)", "Mean velocity": "(m/day)", "Head loss": "(cm)", "Effluents": "(mg/L)",
-         "Inlet of the meshed part": "(mg/L)", "Least concentrations": "(mg/L)", "Area of the aggregate": "(um²)",
+         "Inlet of the meshed part": "(mg/L)", "Least concentrations": "(mg/L)",
+         "Concentrations above the supply": "(mg/L)", "Area of the aggregate": "(um²)",
          "Extent of the aggregate": "(um)"}
 LEDGERS = {f"Ledger: {name}": {"supplied": f"{name}_supplied_pg_per_m", "leaving": f"{name}_out_pg_per_m",
                                "taken up": f"{name}_consumed_pg_per_m", "stored": f"{name}_stored_pg_per_m"}
@@ -139,13 +143,13 @@ def numbers(text, kind):
 
 def hostile(out):
     """A run whose files say what nobody should believe."""
-    record = json.loads((out / "run.json").read_text())
+    record = read_sealed(out / "run.json")
     record |= {"scene": HOSTILE, "status": "failed: </script><script>pwned=1</script>", "extra": {HOSTILE: [HOSTILE]}}
     record["tables"][HOSTILE] = {HOSTILE: HOSTILE}
     record["versions"][HOSTILE] = record["warnings"] = HOSTILE
     record["wall_time_by_stage_s"][HOSTILE] = 0.1
     record["newton_iterations"][HOSTILE] = HOSTILE
-    results.write_json(out / "run.json", record)
+    results.write_sealed(out / "run.json", record | {"sha256": {}})
     lines = (out / "timeseries.csv").read_text().splitlines()
     columns = [lines[0] + ',"' + HOSTILE.replace('"', '""') + '"', *(line + ",1" for line in lines[1:])]
     results.write_text(out / "timeseries.csv", "\n".join(columns) + "\n")

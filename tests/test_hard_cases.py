@@ -9,7 +9,7 @@ import pytest
 from repro.errors import SimulationError, TransportError
 from repro.scene import load_scene
 from verification import speed
-from verification.cases import hard_mechanics, hard_runs, hard_stages
+from verification.cases import hard_family, hard_mechanics, hard_runs, hard_stages
 from verification.evidence import hard_cases
 from verification.evidence.cases import cases
 from verification.evidence.checks import at_most
@@ -65,11 +65,13 @@ def test_what_is_accepted(verdict, preset, refusable, fine):
     assert Result("hard-99", evidence).holds is all(accepted.values())
 
 
-def test_there_are_twenty_two_verification_cases_and_only_some_may_refuse():
+def test_there_are_twenty_three_verification_cases_and_only_some_may_refuse():
     """All of them on record."""
-    assert sorted(KNOWN) == [row["number"] for row in speed.records()["hard_cases"]["cases"]] == [*range(1, 23)]
+    assert sorted(KNOWN) == [row["number"] for row in speed.records()["hard_cases"]["cases"]] == [*range(1, 24)]
     assert {number for number, one in KNOWN.items() if one.refusable} <= {3, 4, 5, 15, 17, 19, 22}
-    assert {one.full_id for one in KNOWN.values()} == {id for id, case in cases().items() if case.stage == "hard"}
+    family = {"hard-family", "hard-family-rest"}
+    assert {one.full_id for one in KNOWN.values()} == {
+        id for id, case in cases().items() if case.stage == "hard"} - family
     for one in KNOWN.values():
         assert {*one.refusable} <= {*one.parts} and {*cases()[one.full_id].variants} == {*PRESETS}
 
@@ -88,6 +90,25 @@ def test_the_matrix_replaces_the_rows_of_the_cases_that_ran(tmp_path, monkeypatc
     assert "try another" in rows["paper"]["message"]
     verdicts = [line for line in hard_cases.lines(rows.values()) if line[0].startswith("verdict")]
     assert verdicts[1] == (f"verdict of {REFUSED}", ", ".join([REFUSED] * 4), ", ".join(PRESETS), False)
+
+
+@pytest.mark.parametrize("message, works, wrong", [
+    ("too coarse; numerics.refinement = 0.3 resolves this state", {"refinement": 0.3}, 0),
+    ("too coarse; numerics.refinement = 0.3 resolves this state", {}, 1), ("it stopped", {}, 1),
+    ("a defect; try a shorter growth.time_step", {"time_step": "0.05 h"}, 0),
+    ("a defect; try a shorter growth.time_step", {"time_step": "0.2 h"}, 1),
+    ("too coarse; no setting helps", {}, 0), ("two\nlines; no setting helps", {}, 1),
+    ("no setting helps; fields of t = 0 h: fields/fields_0009.vtu", {}, 1)])
+def test_a_refusal_is_right_where_its_advice_works(message, works, wrong, tmp_path, monkeypatch):
+    """Or where it says that no setting helps; it is one line, and names files that exist."""
+    def runs(tables, folder):
+        values = {**tables["growth"], **tables["numerics"]}
+        return any(values.get(key) == value for key, value in works.items())
+
+    monkeypatch.setattr(hard_family, "_is_right", runs)
+    tables = {"aggregate": {}, "flow": {"head": "1e-3 cm"}, "substrates": {}, "growth": {"end": "1 h"}, "numerics": {}}
+    checks = [*hard_family._checks(hard_family.Outcome(None, message), tables, tmp_path)]
+    assert sum(not check.holds for check in checks) == wrong
 
 
 def test_a_wrong_run_is_seen():

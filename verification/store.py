@@ -7,7 +7,6 @@ many runs, and :class:`Memory` what functions of claims return, which is lost wh
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 from abc import ABC, abstractmethod
@@ -18,6 +17,7 @@ from pathlib import Path
 from tempfile import mkdtemp
 from typing import Any
 
+from repro.results.files import read_sealed
 from repro.run.machine import source_hash
 from repro.run.running import run
 from repro.scene import Scene, scene_hash
@@ -102,7 +102,7 @@ def _run_into(folder: Path, scene: Scene) -> Path:
 
 def provenance(folder: Path) -> dict:
     """The ``run.json`` of a run."""
-    return json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    return read_sealed(folder / "run.json")
 
 
 class Numbers(Store):
