@@ -65,6 +65,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from repro.check.checked import check
     from repro.errors import OutputError, SimulationError
+    from repro.march.folding import Fold
     from repro.march.loop import PoreEnd
     from repro.march.simulation import simulate
     from repro.results.network import added_resistance
@@ -78,7 +79,7 @@ if TYPE_CHECKING:
 else:
     #: The module of each public name, imported when it is first asked for: the solver takes half a
     #: second.
-    _MODULES = {"OutputError": "errors", "PoreEnd": "march.loop", "Results": "results.tables",
+    _MODULES = {"Fold": "march.folding", "OutputError": "errors", "PoreEnd": "march.loop", "Results": "results.tables",
                 "Scene": "scene", "SceneError": "scene", "SimulationError": "errors",
                 "added_resistance": "results.network", "check": "check.checked",
                 "load_run": "run.loading", "load_scene": "scene", "resume": "run.running",
@@ -105,6 +106,6 @@ else:
 
     sys.modules[__name__].__class__ = _Package
 
-__all__ = ["OutputError", "PoreEnd", "Results", "Scene", "SceneError", "SimulationError",
+__all__ = ["Fold", "OutputError", "PoreEnd", "Results", "Scene", "SceneError", "SimulationError",
            "added_resistance", "check", "load_run", "load_scene", "resume", "run", "simulate",
            "solve", "sweep"]

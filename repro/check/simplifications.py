@@ -10,8 +10,9 @@ from repro.check import numbers
 from repro.check.numbers import Number
 from repro.fem import sizing
 from repro.march.stepping import SHORTEST
-from repro.model.pore import film, resolution
+from repro.model.pore import Pore, film, resolution
 from repro.model.remeshing import MOST_REFINED
+from repro.model.surface import CREASE, surface
 from repro.scene import Kinetics, Scene
 from repro.scene.keys import RATIO
 
@@ -39,6 +40,9 @@ ACROSS_FILM = 4.0
 #: The flow into a permeable body, exp(-y / k^1/2), turns back at nodes of elements more than 6.3
 #: (quadratic) or 5.1 (cubic) times k^1/2 across.
 DRAG_LAYER = 5.0
+
+#: The key that a crease is warned of.
+CREASED = "growth.new_biomass"
 
 
 @dataclass(frozen=True)
@@ -213,6 +217,18 @@ def unmet(scene: Scene, worst: float, count: str = "") -> Iterator[Warned]:
         yield Warned("numerics.tolerance", f"{scene.numerics.tolerance:g} was not met{count}: the "
                      f"smallest allowed step, growth.time_step / {1 / SHORTEST:g}, errs by "
                      f"{worst:.2g} (estimate)")
+
+
+def creased(now: Pore) -> Iterator[Warned]:
+    """A surface on which creases have begun to lower the energy."""
+    if now.outline is None or surface(now).least >= CREASE:
+        return
+    found = surface(now)
+    x, y = found.place
+    yield Warned(CREASED, f"from t = {now.time:.4g} h on growth compresses the aggregate's surface "
+                 f"near x = {x:.4g}, y = {y:.4g} um to an elastic stretch of {found.least:.3f}, "
+                 f"below {CREASE:g}: a crease there would lower the energy, and the smooth shape "
+                 'is that of a surface without flaws; "stress_free" does not come to this')
 
 
 def _contact(scene: Scene) -> Iterator[Warned]:

@@ -34,7 +34,7 @@ ARRAYS = {"rows": ("f", "R", len(results.COLUMNS)), "whole": ("b", "R", len(resu
 #: A pore a metre wide and long holds 3e16 pg/m of biomass: no number of a table is as large.
 MOST = 1e18
 #: How columns of places and of defects end, which may be negative.
-SIGNED = ("stream_um", "_balance")
+SIGNED = ("stream_um", "_x_um", "_balance")
 #: Rows of a table, each a list of numbers, None where there is none.
 Table = list[list]
 

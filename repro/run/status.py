@@ -10,20 +10,22 @@ RUNNING = "running"
 INTERRUPTED = "interrupted"
 #: How a status begins that goes on with the reason.
 FAILED = "failed: "
-#: The status of a run that ends with its pore, and when: :class:`repro.march.loop.PoreEnd`.
-PORE_END = re.compile(r"the aggregate reaches the pore's (?:up|down)stream end "
-                      r"(?:at|in the step from) t = (\d+(?:\.\d+)?(?:e[+-]\d+)?) h")
+TIME = r"t = (\d+(?:\.\d+)?(?:e[+-]\d+)?) h"
+#: The statuses of a run that the model itself ends, and when: :class:`repro.errors.RunEnd`.
+RUN_ENDS = (re.compile("the aggregate reaches the pore's (?:up|down)stream end "
+                       f"(?:at|in the step from) {TIME}"),
+            re.compile(f"the aggregate's surface folds in the step from {TIME}: near x = .*"))
 
 
 def done(status: str | None) -> bool:
-    """Has the run come to its end, the scene's or the pore's?"""
-    return status is not None and (status == COMPLETED or pore_end(status) < math.inf)
+    """Has the run come to its end, the scene's or the model's?"""
+    return status is not None and (status == COMPLETED or run_end(status) < math.inf)
 
 
-def pore_end(status: str) -> float:
-    """When (h, of six digits) the aggregate has come to an end of the pore; infinite where not."""
-    match = PORE_END.fullmatch(status)
-    return float(match[1]) if match else math.inf
+def run_end(status: str) -> float:
+    """When (h, of six digits) the model itself has ended the run; infinite where it has not."""
+    matches = filter(None, (end.fullmatch(status) for end in RUN_ENDS))
+    return min((float(match[1]) for match in matches), default=math.inf)
 
 
 def undone(status: str | None) -> bool:

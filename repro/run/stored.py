@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple
+from dataclasses import astuple, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -50,6 +50,8 @@ def packed(scene: Scene, state: State) -> tuple[dict, dict[str, np.ndarray]]:
     parts = {"points": now.mesh.points, "cells": now.mesh.cells, "biomass": now.mesh.biomass,
              "loop": now.mesh.loop, "reference": now.body.reference}
     arrays = {name: parts[name] if name in parts else getattr(now, name) for name in ARRAYS}
+    if now.last is not None:
+        arrays["last"] = now.last
     if guess:
         arrays |= {name: getattr(guess, name) for name in GUESS}
     plain = {"scene": scene_hash(scene), "time_h": now.time, "pace": list(astuple(state.pace)),
@@ -132,6 +134,8 @@ def _check(scene: Scene, plain: dict, arrays: dict[str, np.ndarray]) -> None:
     wanted = ARRAYS
     if plain["guess"] is not None:
         wanted = {**wanted, **GUESS}
+    if scene.growth and scene.growth.new_biomass == "stress_free" and plain["time_h"] > 0:
+        wanted = {**wanted, "last": ARRAYS["reference"]}
     _refuse(arrays.keys() != wanted.keys(), "its list of arrays")
     sizes = {"B": int(np.count_nonzero(arrays["biomass"])), "G": 3 * scene.numerics.geometry}
     for name, (kind, shape) in wanted.items():
@@ -166,7 +170,7 @@ def _check_places(scene: Scene, ends, arrays: dict[str, np.ndarray]) -> None:
     _refuse(not right or not all(in_range(x, -half, half) for x in ends), "its extent")
     x = arrays["points"][:, 0]
     _refuse(ends != [x.min(), x.max()], "its extent")
-    for name in ("points", "reference"):
+    for name in arrays.keys() & {"points", "reference", "last"}:
         x, y = arrays[name].T
         _refuse(bool(np.abs(x).max(initial=0.0) > half + slack), f"array {name!r}")
         _refuse(bool(y.min(initial=0.0) < -slack), f"array {name!r}")
@@ -188,13 +192,16 @@ def _pore(scene: Scene, plain: dict, arrays: dict[str, np.ndarray]) -> Pore:
     space = Space(mesh, numerics.order)
     _check_sizes(space, plain, arrays)
     body = material(space, arrays["reference"])
+    last = arrays.get("last")
     _refuse(arrays["theta"].shape[1] != len(body.shape.table.weights), "array 'theta'")
     if mesh.biomass.any():
         _refuse(not body.at.dx.min() > 0, "a triangle's place at t = 0")
+        before = body if last is None else replace(body, reference=last)
+        _refuse(not before.at.dx.min() > 0, "a triangle's place in the last shape")
     _check_walls(scene, arrays["points"][loop, 1], arrays["wall"], arrays["fixed"])
     own = {name: arrays[name] for name in ("wall", "fixed", "active", "inert", "theta", "pressure")}
     found = Pore(time=plain["time_h"], space=space, body=body, **own,
-                 concentrations=_guess(plain, arrays), front=plain["front"])
+                 concentrations=_guess(plain, arrays), front=plain["front"], last=last)
     if scene.kinetics:
         _check_biomass(found, scene.kinetics.maximum_density)
     return found

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from repro.march.loop import SAME_TIME
 from repro.report.reading import NoRun, Run, read, require_columns
-from repro.run.status import COMPLETED, done, pore_end, undone
+from repro.run.status import COMPLETED, done, run_end, undone
 from repro.scene import Scene, scene_hash
 
 
@@ -41,7 +41,7 @@ def lacking(folder: Path, scene: Scene) -> str:
 def _is_end(time: float, status: str, scene: Scene) -> bool:
     """Is the last row (h) of a run with this status there?"""
     if status != COMPLETED:
-        return math.isclose(time, pore_end(status), rel_tol=1e-5, abs_tol=SAME_TIME)  # six digits
+        return math.isclose(time, run_end(status), rel_tol=1e-5, abs_tol=SAME_TIME)  # six digits
     if scene.growth is None:
         return time == 0.0
     end = scene.growth.end if scene.output.times is None else (0.0, *scene.output.times)[-1]
