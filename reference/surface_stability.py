@@ -16,7 +16,7 @@ import numpy as np
 from scipy.linalg import eigh, null_space
 from scipy.optimize import brentq
 from skfem import Basis, BilinearForm, ElementDG, ElementTriP3, ElementTriP4, ElementVector, MeshTri, asm
-from skfem.helpers import ddot, det, grad
+from skfem.helpers import ddot, grad
 
 from reference.neo_hookean import confined_growth_pressure
 
@@ -45,18 +45,13 @@ def _constraint(u, q, w):
     return (w["theta"] * G[0, 0] + G[1, 1]) * q
 
 
-@BilinearForm
-def _mass(u, v, w):
-    return u[0] * v[0] + u[1] * v[1]
-
-
 def mesh(across, up, length=1.0, height=1.0):
-    """Right-angled triangles, their diagonals alternating so that no inner vertex is singular."""
+    """Right-angled triangles with parallel diagonals: no inner vertex is singular."""
     return MeshTri.init_tensor(np.linspace(0, length, across + 1), np.linspace(0, height, up + 1))
 
 
 def divergence_free(block):
-    """(energy, constraint): functions of theta, dense matrices of the unknowns that are free, of the quartic element."""
+    """(energy, constraint): functions of theta, dense matrices of the free unknowns, of the quartic element."""
     basis = Basis(block, ElementVector(ElementTriP4()), intorder=8)
     lower = basis.with_element(ElementDG(ElementTriP3()))
     x, y = basis.doflocs

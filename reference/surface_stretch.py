@@ -14,8 +14,8 @@ GAUSS, WEIGHTS = np.polynomial.legendre.leggauss(3)
 
 
 def surface_stretch(points, cells, aggregate, before):
-    """(stretch, distance, middles) of the free edges: (e,), (e,) from the nearer end of their free surface along it over
-    its length, and (e, 2).
+    """(stretch, distance, middles) of the free edges: (e,), (e,) from the nearer end of their free surface along it,
+    over its length, and (e, 2).
 
     points: (N, 2); cells: (T, 3 or 6), corners counterclockwise, then the middles of the edges 01, 12 and 20;
     aggregate: (T,) True there; before: (N, 2) places at t = 0.

@@ -79,7 +79,8 @@ if TYPE_CHECKING:
 else:
     #: The module of each public name, imported when it is first asked for: the solver takes half a
     #: second.
-    _MODULES = {"Fold": "march.folding", "OutputError": "errors", "PoreEnd": "march.loop", "Results": "results.tables",
+    _MODULES = {"Fold": "march.folding", "OutputError": "errors",
+                "PoreEnd": "march.loop", "Results": "results.tables",
                 "Scene": "scene", "SceneError": "scene", "SimulationError": "errors",
                 "added_resistance": "results.network", "check": "check.checked",
                 "load_run": "run.loading", "load_scene": "scene", "resume": "run.running",

@@ -290,8 +290,8 @@ MUTANTS = (
         "repro/run/status.py",
         ("over-by-its-first-words",
          "A status that begins like that of a run at the end of its pore is one.",
-         "PORE_END.fullmatch(status)",
-         "PORE_END.match(status)",
+         "end.fullmatch(status)",
+         "end.match(status)",
          f"{UNSEEN}what_has_not_come_to_its_end_is_made_again")),
     *changes(
         "repro/run/record.py",

@@ -45,7 +45,7 @@ def folding(now: Pore, time: float) -> Iterator[None]:
 
 
 def _message(now: Pore, time: float) -> str:
-    """How a run ends that comes as far as ``time`` (h), with the stretch and the place in ``now``."""
+    """How a run ends that comes as far as ``time`` (h); stretch and place are of ``now``."""
     found = surface(now)
     x, y = found.place
     return (f"the aggregate's surface folds in the step from t = {time:g} h: near x = {x:.4g}, "

@@ -130,8 +130,8 @@ def of_ours(gamma: float) -> tuple[Callable, Callable]:
 
 
 @case("growth-surface-stability", kind="cross-code", norm="elastic stretch at which the least eigenvalue is zero",
-      claim="A block that grows between side walls is stable down to Biot's elastic stretch, 0.544: quartic places that "
-            "are exactly divergence-free find it within 1 %; quadratic ones with linear pressures do within 5 %, "
+      claim="A block that grows between side walls is stable down to Biot's elastic stretch, 0.544: quartic places "
+            "that are exactly divergence-free find it within 1 %; quadratic ones with linear pressures do within 5 %, "
             "thanks to their stabilisation",
       mutants=("biot-of-a-layer", "grad-div-dropped"))
 def stability():
@@ -147,8 +147,8 @@ def stability():
 
 @case("growth-fold", kind="exact",
       norm="area at the end over that at the start",
-      claim="A plug that grows alike everywhere between the walls ends as a fold where its area has grown by 3.38; born "
-            "without stress it grows on",
+      claim="A plug that grows alike everywhere between the walls ends as a fold where its area has grown by 3.38; "
+            "born without stress it grows on",
       mutants=("fold-never",), over=("paper", "fast"), slow=True)
 def fold(preset: str) -> Iterator[Check]:
     rate = numbers.fastest_growth(plugged(preset))
