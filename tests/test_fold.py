@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import repro
+from repro.check.numbers import judged
+from repro.check.simplifications import warnings
 from repro.cli import main
 from repro.errors import GrowthError, LinearError, MeshError, SimulationError
 from repro.march import loop
@@ -156,3 +158,19 @@ def test_stretches_count_from_line_to_line(theta):
         y = found.middles[side, 1] / 20.0
         assert found.distance[side] == pytest.approx(np.minimum(y, 1 - y), abs=1e-12)
     assert upstream.any() and (~upstream).any() and found.place[1] in found.middles[:, 1]
+
+
+#: A wide, slow pore that is run past its fold, at 77 h in fast.
+STARVED = ('numerics.preset="fast"', 'pore.length="2.4 mm"', 'aggregate.radius="10 um"',
+           'flow.mean_velocity="0.3 m/day"', 'growth.end="90 h"')
+
+
+@pytest.mark.parametrize("changes, expected", [
+    ((), True), (("growth.new_biomass=stress_free",), False), (('pore.width="79 um"',), False),
+    (('growth.end="20 h"',), False), (('substrates.acceptor.supply="20 mg/L"',
+                                       'substrates.donor.supply="20 mg/L"'), False)])
+def test_check_expects_a_fold_where_the_rule_says_so(changes, expected):
+    """Not in narrow pores, in short runs, nor where the supply reaches through the aggregate."""
+    scene = load_scene("wide", [*STARVED, *changes])
+    told = [each.text for each in warnings(*judged(scene, 12500.0)) if "as a fold" in each.text]
+    assert len(told) == expected and all("76.2 um into" in text for text in told)
