@@ -115,11 +115,11 @@ def test_a_step_that_cannot_be_made_is_a_fold_where_the_surface_creases_alone(er
     assert type(how) is kind and not rows and ("folds in the step from t = 1 h: " in str(how)) == (kind is repro.Fold)
 
 
-def many_times(factor, now, within=None):
-    """A step that makes so many times the biomass in the same shape."""
-    after = replace(now, time=5.0, active=factor * now.active, inert=factor * now.inert)
+def many_times(factor, now, within):
+    """A step to the run's end that makes so many times the biomass in the same shape."""
+    after = replace(now, time=6.0, active=factor * now.active, inert=factor * now.inert)
     none = (0.0, 0.0)
-    ledger = Ledger(1.0, 5.0, none, none, none, none, now.mass, after.mass - now.mass, after.mass)
+    ledger = Ledger(1.0, 6.0, none, none, none, none, now.mass, after.mass - now.mass, after.mass)
     return Step(after, None, ledger, False, 0, within)
 
 
@@ -128,10 +128,10 @@ def many_times(factor, now, within=None):
 def test_no_row_has_a_density_that_is_out_of_bounds(theta, kind, factor):
     """At the end of a step, nor within one."""
     def too_dense(scene, now, solved, pace):
-        return many_times(factor, now), solved, pace
+        return many_times(factor, now, lambda time: Moment(replace(now, time=time), solved)), solved, pace
 
     def too_dense_within(scene, now, solved, pace):
-        there = many_times(factor, now).pore
+        there = many_times(factor, now, None).pore
         return many_times(1.0, now, lambda time: Moment(replace(there, time=time), solved)), solved, pace
 
     for advance in (too_dense, too_dense_within):
