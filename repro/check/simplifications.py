@@ -43,7 +43,7 @@ DRAG_LAYER = 5.0
 
 #: A fold is expected in pores of at least this width (um) whose aggregate is thicker than so many
 #: depths of the supply, and where growth at the supply exceeds that of the area by this factor's
-#: logarithm. Fitted to 23 pores of 25 to 200 um run in `fast` (docs/design.md).
+#: logarithm. Fitted to 22 pores of 25 to 200 um run in `fast` (docs/design.md).
 FOLD_WIDTH = 80.0
 FOLD_DEPTHS = 1.1
 FOLD_EXCESS = 2.0
@@ -238,7 +238,7 @@ def _fold(scene: Scene) -> Iterator[Warned]:
                      f"supply reaches {depth:.3g} um into an aggregate of up to "
                      f"{end.thickness:.3g} um, so that its rim compresses itself until no smooth "
                      "shape is left (docs/scope.md). Of 10 pores judged so, 4 folded and 3 came "
-                     "close; of 13 others none did")
+                     "close; of 12 others none did")
 
 
 def creased(now: Pore) -> Iterator[Warned]:
