@@ -30,11 +30,13 @@ Where the paper is in the code, whose modules name the equations that they solve
     3.4  biomass               (28)-(34)    repro.model.biomass
     2.3.2  fluid forces        (20), (22)   repro.model.traction
     2.3.3  contact                          repro.model.contact
+         limits of the surface              repro.model.surface
     3.5  mesh motion           (35)         repro.model.mesh_motion
     3.1, 3.5  remeshing                     repro.model.remeshing
     2    state of the pore                  repro.model.pore
     2    coupling, 3.3                      repro.march.updates (the paper's shape updates)
          steps by their error               repro.march.midpoint, .stepping, .pace (not the paper's)
+         the end as a fold                  repro.march.folding
          the loop of both                   repro.march.loop, .simulation
     4, 5  results, a law for networks       repro.results, .columns, .arrays, .tables, .network
 
