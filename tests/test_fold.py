@@ -167,7 +167,7 @@ STARVED = ('numerics.preset="fast"', 'pore.length="2.4 mm"', 'aggregate.radius="
 
 @pytest.mark.parametrize("changes, expected", [
     ((), True), (("growth.new_biomass=stress_free",), False), (('pore.width="79 um"',), False),
-    (('growth.end="20 h"',), False), (('substrates.acceptor.supply="20 mg/L"',
+    (('growth.end="32 h"',), False), (('substrates.acceptor.supply="20 mg/L"',
                                        'substrates.donor.supply="20 mg/L"'), False)])
 def test_check_expects_a_fold_where_the_rule_says_so(changes, expected):
     """Not in narrow pores, in short runs, nor where the supply reaches through the aggregate."""

@@ -80,9 +80,9 @@ MUTANTS = (
     *changes(
         "repro/model/surface.py",
         ("stretch-beside-the-line",
-         "The least stretch counts edges at the contact lines too, and none far from them.",
+         "The least stretch counts only edges in the middle of the free surface.",
          "self.distance > BESIDE",
-         "self.distance <= BESIDE + 0.1",
+         "self.distance > 0.4",
          f"{COLUMN}[1]"),
         ("one-surface-from-line-to-line",
          "The length of a free surface is that of all of them.",
