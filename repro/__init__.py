@@ -30,11 +30,13 @@ Where the paper is in the code, whose modules name the equations that they solve
     3.4  biomass               (28)-(34)    repro.model.biomass
     2.3.2  fluid forces        (20), (22)   repro.model.traction
     2.3.3  contact                          repro.model.contact
+         limits of the surface              repro.model.surface
     3.5  mesh motion           (35)         repro.model.mesh_motion
     3.1, 3.5  remeshing                     repro.model.remeshing
     2    state of the pore                  repro.model.pore
     2    coupling, 3.3                      repro.march.updates (the paper's shape updates)
          steps by their error               repro.march.midpoint, .stepping, .pace (not the paper's)
+         the end as a fold                  repro.march.folding
          the loop of both                   repro.march.loop, .simulation
     4, 5  results, a law for networks       repro.results, .columns, .arrays, .tables, .network
 
@@ -65,6 +67,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from repro.check.checked import check
     from repro.errors import OutputError, SimulationError
+    from repro.march.folding import Fold
     from repro.march.loop import PoreEnd
     from repro.march.simulation import simulate
     from repro.results.network import added_resistance
@@ -78,7 +81,8 @@ if TYPE_CHECKING:
 else:
     #: The module of each public name, imported when it is first asked for: the solver takes half a
     #: second.
-    _MODULES = {"OutputError": "errors", "PoreEnd": "march.loop", "Results": "results.tables",
+    _MODULES = {"Fold": "march.folding", "OutputError": "errors",
+                "PoreEnd": "march.loop", "Results": "results.tables",
                 "Scene": "scene", "SceneError": "scene", "SimulationError": "errors",
                 "added_resistance": "results.network", "check": "check.checked",
                 "load_run": "run.loading", "load_scene": "scene", "resume": "run.running",
@@ -105,6 +109,6 @@ else:
 
     sys.modules[__name__].__class__ = _Package
 
-__all__ = ["OutputError", "PoreEnd", "Results", "Scene", "SceneError", "SimulationError",
+__all__ = ["Fold", "OutputError", "PoreEnd", "Results", "Scene", "SceneError", "SimulationError",
            "added_resistance", "check", "load_run", "load_scene", "resume", "run", "simulate",
            "solve", "sweep"]

@@ -51,6 +51,10 @@ class BalanceError(StageError):
     stage = "its balance"
 
 
+class RunEnd(Exception):
+    """The model itself ends before ``growth.end``; nothing has failed."""
+
+
 class SimulationError(RuntimeError):
     """A run has stopped: at what simulated time, in which stage, why, and what to try."""
 

@@ -49,8 +49,9 @@ LEDGERS = {f"Ledger: {name}": {"supplied": f"{name}_supplied_pg_per_m", "leaving
 
 
 #: Columns and arrays without a unit.
-PURE = """inert_fraction biomass_density_min biomass_density_max acceptor_balance donor_balance biomass_balance
-oxygen_demand_balance nodes remeshed contact region theta J active_biomass inert_biomass""".split()
+PURE = """inert_fraction biomass_density_min biomass_density_max surface_stretch_min surface_stretch
+acceptor_balance donor_balance biomass_balance oxygen_demand_balance nodes remeshed contact region theta J
+active_biomass inert_biomass""".split()
 
 
 #: Whole runs of scenes that several tests ask for.

@@ -167,7 +167,51 @@ def derived_row(scene, at):
     found |= {"inert_fraction": now.inert.sum() / (now.active.sum() + now.inert.sum()),
               "biomass_density_min": density.min(), "biomass_density_max": density.max(),
               "biomass_balance": 0.0, "oxygen_demand_balance": 0.0}
+    away = []
+    for part in free_surfaces(now):
+        walked = np.cumsum([0.0, *(chord(now, *edge) for edge in part)])
+        middles = (walked[1:] + walked[:-1]) / 2
+        far = np.minimum(middles, walked[-1] - middles) > 0.05 * walked[-1]
+        away += [along_edge(now, *edge)[:2] for edge, counts in zip(part, far) if counts]
+    stretch, place = zip(*away)
+    x, y = place[int(np.argmin(stretch))]
+    found |= {"surface_stretch_min": min(stretch), "surface_stretch_min_x_um": x, "surface_stretch_min_y_um": y}
     return found
+
+
+def chord(now, a, b):
+    return math.dist(now.mesh.points[a], now.mesh.points[b])
+
+
+def free_surfaces(now):
+    """Lists of edges (corner, corner), each from a contact line to the next; an edge with both ends on one wall and, of
+    arcs, its middle too is contact."""
+    nodes = now.mesh.loop.tolist()
+    step = now.mesh.geometry
+    edges = [[nodes[(k + i) % len(nodes)] for i in range(step + 1)] for k in range(0, len(nodes), step)]
+    held = [any((now.mesh.points[edge, 1] == wall).all() for wall in (0.0, now.mesh.width)) for edge in edges]
+    first = held.index(True)
+    parts = [[]]
+    for edge, on in zip(edges[first:] + edges[:first], held[first:] + held[:first]):
+        if on:
+            parts.append([])
+        else:
+            parts[-1].append((edge[0], edge[-1]))
+    return [part for part in parts if part]
+
+
+def along_edge(now, a, b):
+    """|F T| / J^(1/2) for the tangent T of t = 0 in the middle of the edge from a to b, that place, its triangle."""
+    (which,) = [k for k in np.flatnonzero(now.mesh.biomass) if {a, b} <= set(now.mesh.cells[k, :3].tolist())]
+    nodes = now.mesh.cells[which]
+    ends = [NODES[1][nodes.tolist().index(node)] for node in (a, b)]
+    middle = np.mean(ends, axis=0)[None]
+    inside = np.searchsorted(now.mesh.body, nodes)[None]
+    before = jacobians(now.body.reference, inside, middle)[0, 0]
+    F = jacobians(now.mesh.points, nodes[None], middle)[0, 0] @ np.linalg.inv(before)
+    T = before @ (ends[1] - ends[0])
+    place = (functions(now.mesh.geometry, middle)[0] @ now.mesh.points[nodes])[0]
+    return np.linalg.norm(F @ T) / np.linalg.norm(T) / math.sqrt(np.linalg.det(F)), place, which
 
 
 def areas_at_points(now):
@@ -250,6 +294,10 @@ def derived_arrays(scene, at):
         means[f"stress_{name}_MPa"] = sigma[..., i, j]
     for name, values in means.items():
         found[name] = only((values * whole).sum(1) / whole.sum(1), mesh.biomass, len(mesh.cells))
+    found["surface_stretch"] = np.full(len(mesh.cells), np.nan)
+    for edge in (edge for part in free_surfaces(now) for edge in part):
+        value, _, which = along_edge(now, *edge)
+        found["surface_stretch"][which] = np.fmin(found["surface_stretch"][which], value)
     return found
 
 

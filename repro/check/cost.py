@@ -20,7 +20,8 @@ from typing import TypeAlias
 
 from repro.check import numbers
 from repro.check.memory import MB, expected_bytes
-from repro.march.loop import Instant, PoreEnd, State
+from repro.errors import RunEnd
+from repro.march.loop import Instant, State
 from repro.march.pace import missed
 from repro.march.simulation import rows_within
 from repro.march.simulation import steps as steps_of
@@ -97,10 +98,10 @@ def tried(scene: Scene, nodes: int) -> Trial:
 
 
 def _until_the_end(run: Iterator[Made]) -> Iterator[Made]:
-    """The steps of a run, which may end at the pore's end."""
+    """The steps of a run, which the model itself may end."""
     try:
         yield from run
-    except PoreEnd:
+    except RunEnd:
         return
 
 

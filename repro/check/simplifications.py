@@ -11,8 +11,9 @@ from repro.check.numbers import Number
 from repro.fem import sizing
 from repro.march.stepping import SHORTEST
 from repro.model.brinkman import ACROSS
-from repro.model.pore import film, resolution
+from repro.model.pore import Pore, film, resolution
 from repro.model.remeshing import MOST_REFINED
+from repro.model.surface import CREASE, surface
 from repro.scene import Kinetics, Scene
 from repro.scene.keys import RATIO
 
@@ -43,6 +44,15 @@ ACROSS_FILM = 4.0
 #: a wall.
 FILM_LOSS = 0.01
 
+#: A fold is expected in pores of at least this width (um) whose aggregate is thicker than so many
+#: depths of the supply, and where growth at the supply exceeds that of the area by this factor's
+#: logarithm. Fitted to 22 pores of 25 to 200 um run in `fast` (docs/design.md).
+FOLD_WIDTH = 80.0
+FOLD_DEPTHS = 1.1
+FOLD_EXCESS = 2.0
+#: The key that a crease is warned of.
+CREASED = "growth.new_biomass"
+
 
 @dataclass(frozen=True)
 class Warned:
@@ -62,7 +72,7 @@ def warnings(scene: Scene, found: list[Number]) -> list[Warned]:
         checks += [_fronts(scene), _demand(scene.kinetics)]
     if scene.growth:
         checks += [_lag(scene, value), _transit(value), _forces(scene, found), _steps(scene),
-                   _contact(scene)]
+                   _contact(scene), _fold(scene)]
     return [warned for check in checks for warned in check]
 
 
@@ -232,6 +242,34 @@ def unmet(scene: Scene, worst: float, count: str = "") -> Iterator[Warned]:
         yield Warned("numerics.tolerance", f"{scene.numerics.tolerance:g} was not met{count}: the "
                      f"smallest allowed step, growth.time_step / {1 / SHORTEST:g}, errs by "
                      f"{worst:.2g} (estimate)")
+
+
+def _fold(scene: Scene) -> Iterator[Warned]:
+    """Where a rim that grows on a starved core is expected to compress itself into a fold."""
+    end = numbers.at_end(scene)
+    depth = numbers.depth(scene)
+    increase = math.log(end.area / numbers.at_start(scene).area)
+    excess = numbers.fastest_growth(scene) * scene.growth.end - increase
+    expected = (scene.pore.width >= FOLD_WIDTH and end.thickness > FOLD_DEPTHS * depth
+                and excess > FOLD_EXCESS)
+    if expected and scene.growth.new_biomass == "stressed":
+        yield Warned("growth.end", f"the run may end before {scene.growth.end:g} h, as a fold: the "
+                     f"supply reaches {depth:.3g} um into an aggregate of up to "
+                     f"{end.thickness:.3g} um, so that its rim compresses itself until no smooth "
+                     "shape is left (docs/scope.md). Of 10 pores judged so, 4 folded and 3 came "
+                     "close; of 12 others none did")
+
+
+def creased(now: Pore) -> Iterator[Warned]:
+    """A surface on which creases have begun to lower the energy."""
+    if now.outline is None or surface(now).least >= CREASE:
+        return
+    found = surface(now)
+    x, y = found.place
+    yield Warned(CREASED, f"from t = {now.time:.4g} h on growth compresses the aggregate's surface "
+                 f"near x = {x:.4g}, y = {y:.4g} um to an elastic stretch of {found.least:.3f}, "
+                 f"below {CREASE:g}: a crease there would lower the energy, and the smooth shape "
+                 'is that of a surface without flaws; "stress_free" does not come to this')
 
 
 def _contact(scene: Scene) -> Iterator[Warned]:

@@ -121,6 +121,15 @@ class Topology:
         return np.searchsorted(self.body, self.loop)
 
     @cached_property
+    def beside_loop(self) -> tuple[np.ndarray, np.ndarray]:
+        """(edges,) triangle of each edge of ``loop``, among those of the aggregate, and which of
+        its edges 01, 12 and 20 that is."""
+        corners = self.straight.loop
+        line = np.column_stack([corners, np.roll(corners, -1)])
+        owner, places = _beside(self.cells[self.biomass], line)
+        return owner, places[:, 0]
+
+    @cached_property
     def body_corners(self) -> np.ndarray:
         """Corners of the aggregate."""
         return self.body[self.body < self.corners]

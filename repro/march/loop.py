@@ -17,10 +17,11 @@ from typing import ClassVar, Protocol, TypeVar
 
 import numpy as np
 
-from repro.errors import SimulationError, StageError
+from repro.errors import RunEnd, SimulationError, StageError
 from repro.fem.brief import brief
 from repro.fem.sizing import ACROSS_PORE
 from repro.march import balance
+from repro.march.folding import folding, refuse_density
 from repro.march.pace import Pace
 from repro.model.pore import Pore, Solved, seeded
 from repro.model.remeshing import resolved
@@ -134,16 +135,16 @@ class Scheme:
     ends: Callable[[Scene], Iterable[float]] = lambda _: ()
 
 
-class PoreEnd(Exception):
-    """The aggregate has reached an end of the pore: the run is over."""
+class PoreEnd(RunEnd):
+    """The aggregate has reached an end of the pore."""
 
 
 def steps(scene: Scene, scheme: Scheme,
           state: State | None = None) -> Iterator[tuple[State, Instant | None]]:
     """Every step of a run from t = 0, or after ``state``, with an Instant at reported times.
 
-    Raises SimulationError where a stage fails, and PoreEnd, after a last Instant, where the
-    aggregate reaches an end of the pore.
+    Raises SimulationError where a stage fails, and, after a last Instant, PoreEnd where the
+    aggregate reaches an end of the pore, Fold where its surface folds.
     """
     first = state is None
     with stopping(state.pore.time if state else 0.0):
@@ -162,20 +163,23 @@ def steps(scene: Scene, scheme: Scheme,
     end = scene.growth.end if scene.growth else 0.0
     while end - now.time > SAME_TIME:
         try:
-            with stopping(now.time):
-                taken, solved, pace = scheme.advance(scene, now, solved, state.pace)
+            with stopping(now.time), folding(now, state.time):
+                taken, after, pace = scheme.advance(scene, now, solved, state.pace)
                 balance.refuse(largest, taken.pore, taken.ledger)
-        except PoreEnd:
+                refuse_density(scene, taken.pore)
+            for time in rows:
+                if state.time + SAME_TIME < time < taken.pore.time - SAME_TIME:
+                    with stopping(now.time), folding(now, state.time):
+                        there = needed(taken.within, "a step's interior")(time)
+                        refuse_density(scene, there.pore)
+                    found = instant(state, there.pore, there.solved, there.before)
+                    state = reported(state, time)
+                    yield state, found
+        except RunEnd:
             if state.ledgers:  # steps that are not reported yet
                 yield reported(state, now.time), instant(state, now, solved, None)
             raise
-        for time in rows:
-            if state.time + SAME_TIME < time < taken.pore.time - SAME_TIME:
-                with stopping(now.time):
-                    there = needed(taken.within, "a step's interior")(time)
-                found = instant(state, there.pore, there.solved, there.before)
-                state = reported(state, time)
-                yield state, found
+        solved = after
         state = _after(state, taken, solved, pace)
         now = replace(state.pore, concentrations=solved.concentrations)
         asked = _asked(rows, now.time)

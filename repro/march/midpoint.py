@@ -21,6 +21,7 @@ import numpy as np
 
 from repro.fem import transfer
 from repro.fem.space import Space
+from repro.march.folding import refuse_density, refuse_fold
 from repro.march.loop import Ledger, Moment, PoreEnd, Step, pore_end
 from repro.march.updates import before, enlarged, grown, rates_of
 from repro.model import biomass, contact, pore, remeshing
@@ -76,8 +77,10 @@ def attempt(scene: Scene, now: Pore, solved: Solved, duration: float,
     expanded, iterations, gap = contact.expand(scene, after, theta, _ahead(now, half.shape, 1.0))
     if leaves := pore_end(scene, expanded, 0.1):
         raise PoreEnd(f"{leaves} in the step from t = {now.time:g} h")
+    refuse_fold(now, expanded)
     expanded = replace(expanded, concentrations=_extrapolated(solved, half.solved, 1.0))
     new, remeshed = remeshing.new_mesh(scene, now, expanded, _speed(solved))
+    refuse_density(scene, new)
     ledger = Ledger(now.time, now.time + duration, *_flows(half.solved, duration), now.mass,
                     after.mass - now.mass, new.mass)
     inner = partial(within, scene, now, solved, half)

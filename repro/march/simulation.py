@@ -28,7 +28,8 @@ def simulate(scene: Source, shape: Shape | None = None,
     aggregate's boundary at t = 0, (x, y) um from its upstream to its downstream end on the lower
     wall, in place of the scene's (see ``aggregate.outline``); state: one of :func:`steps`, after
     which to go on. Raises SceneError where scene or shape are not accepted, SimulationError where a
-    stage fails, and PoreEnd, after a last Instant, where the aggregate reaches an end of the pore.
+    stage fails, and, after a last Instant, PoreEnd where the aggregate reaches an end of the pore,
+    Fold where its surface folds.
     """
     scene = load_scene(scene)
     if shape is not None:

@@ -15,9 +15,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from repro.errors import StageError, Unresolved
+from repro.errors import RunEnd, StageError, Unresolved
 from repro.march import midpoint
-from repro.march.loop import SAME_TIME, PoreEnd, Scheme, Step, laid_out
+from repro.march.loop import SAME_TIME, Scheme, Step, laid_out
 from repro.march.pace import EXCESS, STRETCH, Pace, allowed, fitted, following
 from repro.model import remeshing
 from repro.model.pore import Pore, Solved
@@ -108,7 +108,7 @@ def _accepted(scene: Scene, now: Pore, solved: Solved,
                 length = duration / 2
             else:
                 now, solved = finer
-        except (PoreEnd, StageError, FloatingPointError):
+        except (RunEnd, StageError, FloatingPointError):
             if duration <= shortest:
                 raise
             length = duration / 2

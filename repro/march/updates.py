@@ -15,6 +15,7 @@ from functools import partial
 import numpy as np
 
 from repro.errors import Unresolved
+from repro.march.folding import refuse_fold
 from repro.march.loop import (
     SAME_TIME,
     Ledger,
@@ -98,6 +99,7 @@ def step(scene: Scene, now: Pore, solved: Solved, duration: float) -> Step:
     expanded, iterations, _ = contact.expand(scene, grown, enlarged(scene, now, grown))
     if leaves := pore_end(scene, expanded, 0.1):
         raise PoreEnd(f"{leaves} in the step from t = {now.time:g} h")
+    refuse_fold(now, expanded)
     speed = solved.flow.mean_velocity if solved.flow else 0.0
     after, remeshed = remeshing.new_mesh(scene, now, replace(expanded, concentrations=end), speed)
     ledger = Ledger(now.time, now.time + duration, *flows, now.mass, grown.mass - now.mass,

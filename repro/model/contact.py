@@ -64,8 +64,9 @@ def _at_rest(scene: Scene, grown: Pore, theta: np.ndarray, start: Pore,
     nodes = grown.mesh.body
     inside = grown.mesh.topology.body_corners
     body, target_J = _strained_from(keys, grown, theta)
+    last = None if keys.new_biomass == "stressed" else body.reference
     found = replace(grown, space=start.space, pressure=start.pressure, theta=theta,
-                    fixed=_fixed_points(scene, grown))
+                    fixed=_fixed_points(scene, grown), last=last)
     iterations = 0
     gaps: list[float] = []
     for _ in range(CONTACT_ROUNDS):

@@ -44,7 +44,8 @@ class Pore:
     the points of the reaction; theta: (t, q) expansion since t = 0 in the aggregate's triangles;
     body: the aggregate as it was at t = 0; pressure: (corners,) P / mu_L; concentrations: the last
     known ones, None before the first; front: what element sizes at the aggregate are divided by,
-    for a front of the substrates in it.
+    for a front of the substrates in it; last: (n, 2) um, the aggregate's nodes in the shape from
+    which strain counts, None where that is the shape of t = 0.
     """
 
     time: float
@@ -58,6 +59,12 @@ class Pore:
     pressure: np.ndarray
     concentrations: Concentrations | None = None
     front: float = 1.0
+    last: np.ndarray | None = None
+
+    @property
+    def unstrained(self) -> np.ndarray:
+        """(n, 2) um, the aggregate's nodes in the shape from which strain counts."""
+        return self.body.reference if self.last is None else self.last
 
     @property
     def mesh(self) -> Mesh:

@@ -137,8 +137,11 @@ def remesh(scene: Scene, now: Pore, expanded: Pore, speed: float,
                                            needed(scene.kinetics, "[kinetics]").maximum_density)
     filled = scene.at(expanded.time if speed else 0.0)
     substrates = carried_substrates(filled, now.space, new, expanded.concentrations, speed)
+    last = expanded.last
+    if last is not None:
+        last = at.field(last, old.topology.body_cells, old.geometry)
     found = Pore(expanded.time, new, outline.wall, outline.fixed, active, inert, np.empty(0), body,
-                 _pressure(mesh, expanded, at), substrates, expanded.front)
+                 _pressure(mesh, expanded, at), substrates, expanded.front, last)
     return replace(found, theta=expansion(scene, found)), tuple(rest)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from repro.model import biomass, flow, growth
 from repro.model.pore import Pore, Solved
+from repro.model.surface import STRETCH, surface
 from repro.results.quantities import Quantity
 from repro.results.vtu import Cells, Grid
 from repro.scene import Scene
@@ -107,6 +108,13 @@ def _pressure(state: State) -> np.ndarray:
     return state.scene.growth.shear_modulus * mesh.with_middles(state.pore.pressure)[mesh.body]
 
 
+def _stretch(state: State) -> np.ndarray:
+    found = surface(state.pore)
+    stretch = np.full(len(state.pore.theta), np.inf)
+    np.minimum.at(stretch, found.cells, found.stretch)
+    return np.where(np.isinf(stretch), np.nan, stretch)
+
+
 def _stress(k: int, state: State) -> np.ndarray:
     return state.mean(state.stress[..., k])
 
@@ -137,6 +145,9 @@ ARRAYS = (
           lambda state: state.mean(state.pore.theta), needs="growth", cells=True, body=True),
     Array("J", "volume ratio J", "det dx/dX, the mean over the triangle at t = 0",
           lambda state: state.mean(state.strained.J), needs="growth", cells=True, body=True),
+    Array("surface_stretch", "elastic stretch along the free surface",
+          f"{STRETCH}; in the triangles at the free surface, of two edges the lesser", _stretch,
+          needs="growth", cells=True, body=True),
     *(Array(f"stress_{axes}_MPa", f"stress {axes}", f"Cauchy stress {axes}, {_CAUCHY}",
             partial(_stress, k), needs="stress", cells=True, body=True)
       for k, axes in enumerate(("xx", "yy", "zz", "xy"))),

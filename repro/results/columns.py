@@ -7,6 +7,7 @@ from functools import partial
 
 from repro.march import balance
 from repro.march.loop import Instant, Ledger
+from repro.model.surface import BESIDE, BIOT, CREASE, STRETCH, surface
 from repro.results.quantities import Quantity
 from repro.scene import Scene
 
@@ -125,6 +126,14 @@ SERIES = (
              "the worst of the steps since the last row",
              lambda scene, at: _of_steps(partial(balance.oxygen_demand, scene.kinetics), at),
              "oxygen demand", "growth"),
+    Quantity("surface_stretch_min", "least elastic stretch along the aggregate's free surface",
+             f"least of {STRETCH}, on edges farther from a contact line than {100 * BESIDE:g} % of "
+             f"the free surface's length; below {CREASE:g} it creases, below {BIOT:g} it folds",
+             lambda scene, at: surface(at.pore).least, "least stretch", "growth"),
+    *(Quantity(f"surface_stretch_min_{axis}_um", f"place of the least stretch, {axis}",
+               "middle of the edge with the least elastic stretch along the free surface",
+               lambda scene, at, k=k: surface(at.pore).place[k], f"{axis} of least stretch",
+               "growth") for k, axis in enumerate("xy")),
     Quantity("nodes", "nodes of the mesh", "corners, and middles of the sides of curved triangles",
              lambda scene, at: len(at.pore.mesh.points), "nodes"),
     Quantity("remeshed", "mesh made anew", "1 where a step since the last row made a new mesh",

@@ -10,7 +10,8 @@ from importlib import import_module
 import numpy as np
 
 from repro import results
-from repro.march.loop import SAME_TIME, PoreEnd
+from repro.errors import RunEnd
+from repro.march.loop import SAME_TIME
 from repro.march.simulation import simulate
 from repro.results import names, picture
 from repro.results.netcdf import TIME
@@ -144,7 +145,7 @@ def solve(scene: Source, overrides: Sequence[str] = (), unset: Sequence[str] = (
         for instant in simulate(scene):
             rows.append(results.row(scene, instant))
             fields.append(arrays(results.fields(scene, instant.pore, instant.solved)))
-    except PoreEnd as end:
+    except RunEnd as end:
         status = str(end)
     return Results(scene.name, rows, fields, status)
 

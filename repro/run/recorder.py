@@ -10,7 +10,7 @@ from time import perf_counter
 import numpy as np
 
 from repro import report, results, timing
-from repro.check.simplifications import Warned, unmet
+from repro.check.simplifications import CREASED, Warned, creased, unmet
 from repro.errors import CheckpointError, Interrupted, OutputError
 from repro.march.loop import Instant, Ledger, State, added
 from repro.march.pace import Pace, missed
@@ -100,6 +100,14 @@ class Recorder:
 
     def _ledger_rows(self, ledgers: Iterable[Ledger]) -> list[list[float]]:
         return [results.ledger_row(self.scene, ledger) for ledger in ledgers]
+
+    def judge_surface(self) -> list[Warned]:
+        """The warning of a surface that has begun to crease: recorded, and given, once."""
+        if any(warned["key"] == CREASED for warned in self.record.warnings):
+            return []
+        warned = list(creased(self.state.pore))
+        self.record.warnings += map(asdict, warned)
+        return warned
 
     def _judge(self, pace: Pace) -> None:
         """Count the last step if it misses the tolerance."""

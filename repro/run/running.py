@@ -18,8 +18,8 @@ from repro.check import simplifications
 from repro.check.memory import require_memory, require_outline
 from repro.check.numbers import judged
 from repro.check.simplifications import Warned
-from repro.errors import CheckpointError, Interrupted, OutputError, SimulationError
-from repro.march.loop import Instant, PoreEnd, State
+from repro.errors import CheckpointError, Interrupted, OutputError, RunEnd, SimulationError
+from repro.march.loop import Instant, State
 from repro.march.simulation import ends_soon, same_rows, steps
 from repro.results.files import is_file, read_json, read_sealed
 from repro.run import INTERVAL, checkpoint
@@ -410,7 +410,7 @@ def _simulated(recorder: Recorder, made: Made, progress: Progress, watch: Watch)
     """Record every step of a run, from the recorder's state on; how it ended."""
     try:
         _record_steps(recorder, made, progress, watch)
-    except PoreEnd as end:
+    except RunEnd as end:
         if not recorder.kept:
             recorder.keep()
         return str(end)
@@ -430,6 +430,7 @@ def _record_steps(recorder: Recorder, made: Made, progress: Progress, watch: Wat
         recorder.add(state, instant)
         if instant and len(recorder.record.rows) == 1:
             _warn(recorder, recorder.scene, recorder.first_velocity, watch)
+        _tell_warnings(recorder.judge_surface(), watch)
         if not recorder.kept and ends_soon(recorder.scene, state):
             recorder.keep()
         if recorder.steps > steps_before:  # no row within a step

@@ -9,14 +9,18 @@ RUNNING = "running"
 INTERRUPTED = "interrupted"
 #: How a status begins that goes on with the reason.
 FAILED = "failed: "
-#: The status of a run that ends with its pore, and when: :class:`repro.march.loop.PoreEnd`.
-PORE_END = re.compile(r"the aggregate reaches the pore's (?:up|down)stream end "
-                      r"(?:at|in the step from) t = \d+(?:\.\d+)?(?:e[+-]\d+)? h")
+TIME = r"t = \d+(?:\.\d+)?(?:e[+-]\d+)? h"
+#: The statuses of a run that the model itself ends, and when: :class:`repro.errors.RunEnd`.
+RUN_ENDS = (re.compile("the aggregate reaches the pore's (?:up|down)stream end "
+                       f"(?:at|in the step from) {TIME}"),
+            re.compile(f"the aggregate's surface folds in the step from {TIME}: near x = .*"))
 
 
 def done(status: str | None) -> bool:
-    """Has the run come to its end, the scene's or the pore's?"""
-    return status is not None and (status == COMPLETED or bool(PORE_END.fullmatch(status)))
+    """Has the run come to its end, the scene's or the model's?"""
+    if status is None:
+        return False
+    return status == COMPLETED or any(end.fullmatch(status) for end in RUN_ENDS)
 
 
 def undone(status: str | None) -> bool:

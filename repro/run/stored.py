@@ -35,6 +35,8 @@ def packed(scene: Scene, state: State) -> tuple[dict, Arrays]:
     arrays = {name: getattr(pore.mesh, name) for name in OF_MESH}
     arrays |= {name: getattr(pore, name) for name in OF_PORE}
     arrays["reference"] = pore.body.reference
+    if pore.last is not None:
+        arrays["last"] = pore.last
     if guess:
         arrays |= {name: getattr(guess, name) for name in OF_GUESS}
     arrays["pending"] = np.array([_numbers(ledger) for ledger in state.ledgers], dtype=float)
@@ -77,5 +79,5 @@ def _pore(scene: Scene, plain: dict, arrays: Arrays) -> Pore:
     if plain["guess"] is not None:
         guess = Concentrations(arrays["acceptor"], arrays["donor"], plain["guess"])
     return Pore(time=plain["time_h"], space=space, body=material(space, arrays["reference"]),
-                concentrations=guess, front=plain["front"],
+                concentrations=guess, front=plain["front"], last=arrays.get("last"),
                 **{name: arrays[name] for name in OF_PORE})

@@ -26,9 +26,73 @@ SINGLE = "tests/test_single_terms.py::test_"
 SHRINKING = "tests/test_shrinking.py::test_"
 CACHE_KEYS = "tests/test_cache_keys.py::test_"
 DEEPEST = "tests/test_deepest_level.py::test_elements_are_halved_as_often_as_a_front_needs"
+FOLD = "tests/test_fold.py::test_"
+OVER = f"{FOLD}a_run_ends_as_a_fold_and_is_over"
 READERS = "tests/test_vtk.py::test_every_reader_reads_what_was_computed"
 
 MUTANTS = (
+    *changes(
+        "repro/march/folding.py",
+        ("fold-an-error",
+         "A failure on a surface that creases is told as an error.",
+         "if now.outline is None or surface(now).least >= CREASING:",
+         "if True:",
+         f"{FOLD}a_step_that_cannot_be_made_is_a_fold_where_the_surface_creases_alone[GrowthError-3.0-Fold]"),
+        ("every-failure-a-fold",
+         "A failure on any surface is told as a fold.",
+         "if now.outline is None or surface(now).least >= CREASING:",
+         "if now.outline is None:",
+         f"{FOLD}a_step_that_cannot_be_made_is_a_fold_where_the_surface_creases_alone[GrowthError-1.5-SimulationError]"),
+        ("thin-biomass-written",
+         "A density under half of X_m is written.",
+         "if least < low or largest > high:",
+         "if largest > high:",
+         f"{FOLD}no_row_has_a_density_that_is_out_of_bounds[0.4-1.5-SimulationError]")),
+    *changes(
+        "repro/march/loop.py",
+        ("density-unjudged",
+         "A step may end with any density.",
+         "refuse_density(scene, taken.pore)",
+         "pass",
+         f"{FOLD}no_row_has_a_density_that_is_out_of_bounds[2.5-3.0-Fold]"),
+        ("density-unjudged-within",
+         "A row within a step may have any density.",
+         "refuse_density(scene, there.pore)",
+         "pass",
+         f"{FOLD}no_row_has_a_density_that_is_out_of_bounds[2.5-1.5-SimulationError]")),
+    *changes(
+        "repro/run/recorder.py",
+        ("crease-warned-again",
+         "Every step on a creased surface is warned of.",
+         'if any(warned["key"] == CREASED for warned in self.record.warnings):',
+         "if False:",
+         OVER)),
+    *changes(
+        "repro/run/stored.py",
+        ("last-shape-dropped",
+         "A checkpoint holds no last shape.",
+         "if now.last is not None:",
+         "if False:",
+         f"{FOLD}a_run_stopped_after_every_step_is_the_whole_run[stress_free]")),
+    *changes(
+        "repro/check/simplifications.py",
+        ("fold-expected-early",
+         "check expects a fold however little the rim has outgrown the core.",
+         "and excess > FOLD_EXCESS)",
+         "and excess > -1.0)",
+         f"{FOLD}check_expects_a_fold_where_the_rule_says_so[changes3-False]")),
+    *changes(
+        "repro/model/surface.py",
+        ("stretch-beside-the-line",
+         "The least stretch counts only edges in the middle of the free surface.",
+         "self.distance > BESIDE",
+         "self.distance > 0.4",
+         f"{COLUMN}[1]"),
+        ("one-surface-from-line-to-line",
+         "The length of a free surface is that of all of them.",
+         "total = np.bincount(part, lengths)[part]",
+         "total = np.full(len(part), lengths.sum())",
+         f"{FOLD}stretches_count_from_line_to_line[3.0]")),
     *changes(
         "repro/results/columns.py",
         ("upstream-for-downstream",
@@ -337,9 +401,14 @@ MUTANTS = (
         "repro/run/status.py",
         ("over-by-its-first-words",
          "A status that begins like that of a run at the end of its pore is one.",
-         "PORE_END.fullmatch(status)",
-         "PORE_END.match(status)",
-         f"{UNSEEN}what_has_not_come_to_its_end_is_made_again")),
+         "end.fullmatch(status)",
+         "end.match(status)",
+         f"{UNSEEN}what_has_not_come_to_its_end_is_made_again"),
+        ("half-a-fold",
+         "A status that is cut off after the time of a fold is one.",
+         ": near x = .*",
+         ".*",
+         f"{FOLD}the_whole_sentence_is_needed[the aggregate's surface folds in the step from t = 5.24 h-False]")),
     *changes(
         "repro/run/record.py",
         ("fields-that-changed",

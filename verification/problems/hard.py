@@ -22,8 +22,8 @@ import numpy as np
 import pytest
 
 from reference import poiseuille
-from repro.errors import SimulationError, StageError
-from repro.march.loop import Instant, PoreEnd
+from repro.errors import RunEnd, SimulationError, StageError
+from repro.march.loop import Instant
 from repro.march.simulation import simulate
 from repro.model import pore
 from repro.model.pore import Pore, Solved, peclet
@@ -52,7 +52,7 @@ FIXED = ('growth.end="0 h"',)
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A scene that has run: its instants, their rows in ``timeseries.csv``, and the message of PoreEnd or "".
+    """A scene that has run: its instants, their rows in ``timeseries.csv``, and the message of RunEnd or "".
 
     balance: what the substrates' balances may miss, None where they say nothing; density: by how much a local
     (X_A + X_I) / X_m may differ from one, more where a film closes at once under the aggregate.
@@ -120,12 +120,12 @@ def scene(name: str, preset: str, *changes: str) -> Scene:
 
 
 def ran(made: Scene, way: Callable[[Scene], Iterator[Instant]] = simulate, **how) -> Run:
-    """Run a scene to its end, or to the pore's; how: of :class:`Run`."""
+    """Run a scene to its end, the pore's, or a fold; how: of :class:`Run`."""
     instants, ended = [], ""
     try:
         for instant in way(made):
             instants.append(instant)
-    except PoreEnd as end:
+    except RunEnd as end:
         ended = str(end)
     return Run(made, instants, [row(made, instant) for instant in instants], ended, **how)
 

@@ -24,9 +24,10 @@ from math import floor
 import numpy as np
 import shapely
 
+from repro.errors import RunEnd
 from repro.fem.outline import TOP
 from repro.march import simulation
-from repro.march.loop import Instant, PoreEnd, State
+from repro.march.loop import Instant, State
 from repro.results import M_PER_D
 from verification.claims import CLAIMS, Finding, evaluate
 from verification.claims.evaluate import MESH_ORDERS, unnumbered
@@ -118,7 +119,7 @@ def reached(said, state: State) -> float:
     try:
         for now, _ in simulation.steps(said, state):
             time = now.pore.time
-    except PoreEnd:
+    except RunEnd:
         return time - MARGIN
     return said.growth.end
 

@@ -1,0 +1,80 @@
+"""The elastic stretch along an aggregate's free surface, from the fields of a ``.vtu`` file alone.
+
+With the place X(x) of t = 0 as a field on the present triangles, straight or curved, a surface with the unit tangent s
+has been stretched by 1 / |grad X s| and the material by J = 1 / det(grad X), so that the elastic stretch is
+det(grad X)^(1/2) / |grad X s|. It is taken in the three Gauss points of each edge between the aggregate and the fluid,
+and averaged over the edge.
+"""
+import numpy as np
+
+#: Corners of the edges 01, 12 and 20, and the node in their middle.
+EDGES = np.array([[0, 1, 3], [1, 2, 4], [2, 0, 5]])
+CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+GAUSS, WEIGHTS = np.polynomial.legendre.leggauss(3)
+
+
+def surface_stretch(points, cells, aggregate, before):
+    """(stretch, distance, middles) of the free edges: (e,), (e,) from the nearer end of their free surface along it,
+    over its length, and (e, 2).
+
+    points: (N, 2); cells: (T, 3 or 6), corners counterclockwise, then the middles of the edges 01, 12 and 20;
+    aggregate: (T,) True there; before: (N, 2) places at t = 0.
+    """
+    ends = np.sort(cells[:, EDGES[:, :2]], axis=2)
+    dry = {tuple(pair) for pair in ends[~aggregate].reshape(-1, 2).tolist()}
+    free = {}
+    for cell in np.flatnonzero(aggregate):
+        for local in range(3):
+            if tuple(ends[cell, local].tolist()) in dry:
+                free[int(cells[cell, EDGES[local, 0]])] = (cell, local)
+    found = []
+    for start in free.keys() - {int(cells[cell, EDGES[local, 1]]) for cell, local in free.values()}:
+        found += _along(start, free, points, cells, before)
+    stretch, distance, x, y = np.array(found).T
+    return stretch, distance, np.column_stack([x, y])
+
+
+def _along(start, free, points, cells, before):
+    """(stretch, distance, x, y) of each edge from one contact line to the next."""
+    edges = []
+    while start in free:
+        edges.append(free[start])
+        start = int(cells[edges[-1][0], EDGES[edges[-1][1], 1]])
+    values = [_edge(points[cells[cell]], before[cells[cell]], local) for cell, local in edges]
+    length = np.array([value[1] for value in values])
+    along = np.cumsum(length) - length / 2
+    nearer = np.minimum(along, length.sum() - along) / length.sum()
+    return [(value[0], distance, *value[2]) for value, distance in zip(values, nearer)]
+
+
+def _edge(present, before, local):
+    """(mean elastic stretch, length, middle) of an edge of a triangle with nodes (3 or 6, 2) now and at t = 0."""
+    first, last = CORNERS[EDGES[local, :2]]
+    where = first + (GAUSS[:, None] + 1) / 2 * (last - first)
+    slopes = _slopes(len(present), where)
+    now, then = np.einsum("ai,qak->qik", present, slopes), np.einsum("ai,qak->qik", before, slopes)
+    tangent = now @ (last - first)
+    speed = np.linalg.norm(tangent, axis=1)
+    gradient = then @ np.linalg.inv(now)
+    stretched = np.linalg.norm(np.einsum("qij,qj->qi", gradient, tangent / speed[:, None]), axis=1)
+    stretch = np.sqrt(np.linalg.det(gradient)) / stretched
+    weight = WEIGHTS / 2 * speed
+    middle = present[EDGES[local, 2]] if len(present) == 6 else present[EDGES[local, :2]].mean(axis=0)
+    return weight @ stretch / weight.sum(), weight.sum(), middle
+
+
+def _slopes(count, where):
+    """(q, 3 or 6, 2) derivatives of the shape functions at places (q, 2) of the unit triangle."""
+    s, t = where.T
+    linear = np.array([1 - s - t, s, t])
+    of = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
+    if count == 3:
+        return np.broadcast_to(of, (len(where), 3, 2))
+    corners = [(4 * linear[a] - 1)[:, None] * of[a] for a in range(3)]
+    middles = [4 * (linear[a][:, None] * of[b] + linear[b][:, None] * of[a]) for a, b in EDGES[:, :2]]
+    return np.stack([*corners, *middles], axis=1)
+
+
+def least(stretch, distance, beside=0.05):
+    """The least stretch of edges farther from contact lines than ``beside`` of the surface's length."""
+    return stretch[distance > beside].min()

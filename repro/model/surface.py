@@ -1,0 +1,110 @@
+"""The elastic stretch along the aggregate's free surface, and where the model's equilibrium ends.
+
+The stretch of a material line along the surface since the configuration from which strain counts,
+over J^(1/2): what is left of it when the growth, which strains nothing by itself, is taken out. At
+given J the energy (17) is, in the plane, that of an incompressible neo-Hookean solid, whose free
+surface creases where this stretch falls to 0.647 (Hong, Zhao and Suo, Appl. Phys. Lett. 95, 2009;
+Hohlfeld and Mahadevan, Phys. Rev. Lett. 106, 2011) and is unstable to waves of every length at
+0.544 (Biot, Appl. Sci. Res. A 12, 1963). ``docs/scope.md`` derives both for this energy.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from repro.fem import elements
+from repro.fem.brief import brief
+from repro.fem.outline import FREE
+from repro.model.pore import Pore
+
+#: A crease lowers the energy of a surface that is compressed to this stretch, whatever its size.
+CREASE = 0.647
+#: Small waves of every length lower it.
+BIOT = 0.544
+#: Stretches this near to a contact line do not count, in parts of the free surface's length: the
+#: stress at the line is singular.
+BESIDE = 0.05
+#: What the stretch is, in words.
+STRETCH = ("length along the surface over that in the configuration from which strain counts, over "
+           "J^(1/2), in the middle of an edge")
+#: The middles of the edges 01, 12 and 20 of the unit triangle.
+MIDDLES = np.array([[0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])
+
+
+@brief
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """The free edges of an aggregate's boundary.
+
+    stretch: (e,) elastic stretch along each of them, at its middle; middles: (e, 2) um; distance:
+    (e,) from the nearer contact line along the surface, in parts of the length from line to line;
+    cells: (e,) their triangles, among those of the aggregate.
+    """
+
+    stretch: np.ndarray
+    middles: np.ndarray
+    distance: np.ndarray
+    cells: np.ndarray
+
+    @cached_property
+    def _least(self) -> int:
+        return int(np.argmin(np.where(self.distance > BESIDE, self.stretch, np.inf)))
+
+    @property
+    def least(self) -> float:
+        """The least stretch away from contact lines."""
+        return float(self.stretch[self._least])
+
+    @property
+    def place(self) -> tuple[float, float]:
+        """Where that is: x, y (um)."""
+        x, y = self.middles[self._least].tolist()
+        return x, y
+
+
+def surface(now: Pore) -> Surface:
+    """The free surface of a pore's aggregate, strained since the configuration that its rheology
+    counts from."""
+    topology = now.mesh.topology
+    cells, local = topology.beside_loop
+    nodes = topology.body_cells[cells]
+    present = now.mesh.points[now.mesh.body][nodes]
+    before = now.unstrained[nodes]
+    J = _expansion(present, local) / _expansion(before, local)
+    lengths = _lengths(present, local)
+    stretch = lengths / _lengths(before, local) / np.sqrt(J)
+    free = now.boundary.edge_wall == FREE
+    arcs = now.boundary.arcs(now.boundary.points)
+    return Surface(stretch[free], arcs[free, 1], _distances(lengths, free)[free], cells[free])
+
+
+def _expansion(nodes: np.ndarray, local: np.ndarray) -> np.ndarray:
+    """(edges,) area of triangles with nodes (edges, 3 or 6, 2) um over that of the unit triangle,
+    at the middles of their edges ``local`` (edges,)."""
+    bends = elements.derivatives(1 if nodes.shape[1] == 3 else 2, MIDDLES)
+    return elements.determinant(np.einsum("eai,eak->eik", nodes, bends[local]))
+
+
+def _lengths(nodes: np.ndarray, local: np.ndarray) -> np.ndarray:
+    """(edges,) um from end to end, and so, in the middle, along the edge too: a parabola's tangent
+    there is parallel to its chord."""
+    every = np.arange(len(nodes))
+    chords = nodes[every, np.take(elements.NEXT, local)] - nodes[every, local]
+    return np.linalg.norm(chords, axis=1)
+
+
+def _distances(lengths: np.ndarray, free: np.ndarray) -> np.ndarray:
+    """(edges,) from the middle of a free edge to the nearer end of its free surface, along it, over
+    its length."""
+    first = int(np.argmin(free))
+    on = np.roll(free, -first)
+    lengths = np.where(on, np.roll(lengths, -first), 0.0)
+    part = np.cumsum(~on) - 1
+    ends = np.cumsum(lengths)
+    along = ends - 0.5 * lengths - ends[~on][part]
+    total = np.bincount(part, lengths)[part]
+    nearer = np.minimum(along, total - along) / np.where(on, total, 1.0)
+    return np.roll(nearer, first)

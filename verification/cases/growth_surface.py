@@ -1,0 +1,200 @@
+"""The elastic stretch along the free surface, the limits of its stability, and a run that ends as a fold."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+import pytest
+
+from reference import surface_stability, surface_stretch
+from repro.check import numbers
+from repro.errors import RunEnd
+from repro.march.folding import Fold
+from repro.march.loop import Instant
+from repro.march.simulation import simulate
+from repro.march.stepping import SHORTEST
+from repro.model import contact, growth, pore
+from repro.model.surface import BIOT, CREASE, surface
+from repro.scene import Scene, load_scene
+from verification.evidence.checks import around, at_most, between, refine, studies
+from verification.problems import bodies
+from verification.problems.runs import NUMERICS
+
+#: Of orders 1, 2 and 3.
+ELEMENTS = ("linear", "quadratic", "cubic")
+
+
+def imposed(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Places (..., 2) um and their derivatives (..., 2, 2) of a smooth map that keeps the lower wall."""
+    a, b, c = 4e-3, 0.6, 0.03
+    place = np.stack([x + a * x * y, y * (1 + b * np.sin(c * x))], axis=-1)
+    rows = [np.stack([1 + a * y, a * x], axis=-1),
+            np.stack([b * c * y * np.cos(c * x), 1 + b * np.sin(c * x)], axis=-1)]
+    return place, np.stack(rows, axis=-2)
+
+
+def along_the_rim(radius: float, angle: np.ndarray) -> np.ndarray:
+    """The elastic stretch of :func:`imposed` along a half-disc at angles (...)."""
+    F = imposed(radius * np.cos(angle), radius * np.sin(angle))[1]
+    tangent = np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
+    return np.linalg.norm(np.einsum("...ij,...j->...i", F, tangent), axis=-1) / np.sqrt(np.linalg.det(F))
+
+
+def mapped(refinement: float, elements: str) -> dict[str, float]:
+    """Errors of the stretch on a half-disc of 20 um that the map has moved."""
+    scene = load_scene("base", ["numerics.preset=accurate", f"numerics.elements={elements}",
+                                f"numerics.refinement={refinement}", 'aggregate.radius="20 um"'])
+    now = pore.seeded(scene)
+    found = surface(now.moved(imposed(*now.mesh.points.T)[0]))
+    before = surface(now).middles
+    exact = along_the_rim(20.0, np.arctan2(before[:, 1], before[:, 0]))
+    return {"size": 20 * np.pi / len(exact), "stretch": float(np.sqrt(np.mean((found.stretch - exact) ** 2))),
+            "reference": _independent(now)}
+
+
+def _independent(now: pore.Pore) -> float:
+    """The error of the stretch that is computed from the fields of a file."""
+    mesh = now.mesh
+    moved = imposed(*mesh.points.T)[0]
+    found, _, _ = surface_stretch.surface_stretch(moved, mesh.cells, mesh.biomass, mesh.points)
+    _, _, before = surface_stretch.surface_stretch(mesh.points, mesh.cells, mesh.biomass, mesh.points)
+    exact = along_the_rim(20.0, np.arctan2(before[:, 1], before[:, 0]))
+    return float(np.sqrt(np.mean((found - exact) ** 2)))
+
+
+@pytest.mark.case(
+    "growth-surface-stretch", kind="manufactured",
+    claim="The elastic stretch along the free surface converges to that of a smooth map: with order two on curved "
+          "triangles, with order one on straight ones, where J is that of a triangle",
+    norm="root mean square over the free edges, of stretches of size one",
+    mutants=("stretch-of-the-whole", "stretch-of-first-edges"), references=("surface_stretch",))
+@pytest.mark.parametrize("elements", ELEMENTS)
+def test_surface_stretch(elements, record):
+    order = 1.0 if elements == "linear" else 2.0
+    errors = refine(mapped, (1.0, 1.5, 2.2, 3.2), elements)
+    record(studies(errors, {"stretch": (around(order), "a chord over its chord is of second order in its middle, J "
+                                        "of an element's own order", 0.05),
+                            "reference": (around(order), "the same", 0.05)}))
+
+
+#: Theta of a plug, at and between the limits.
+THETAS = (1.5, 1 / CREASE**2, 3.0)
+
+
+@pytest.mark.case(
+    "growth-surface-confined", kind="exact",
+    claim="A plug that grows by theta between the walls has the elastic stretch theta^(-1/2) all along its free "
+          "surfaces, also beyond the limit of creases; where new biomass is born without stress theta counts from "
+          "the last shape",
+    norm="largest difference of stretches",
+    mutants=("stretch-of-the-whole", "stretch-since-the-last-shape", "stress-free-stretch-since-t0"))
+@pytest.mark.parametrize("elements", ELEMENTS)
+def test_surface_confined(elements, record):
+    for rheology in ("stressed", "stress_free"):
+        scene = plugged("fast", f"numerics.elements={elements}", f"growth.new_biomass={rheology}")
+        now = pore.seeded(scene)
+        since = 1.0
+        for theta in THETAS:
+            now, _, _ = contact.expand(scene, now, np.full_like(now.theta, theta))
+            exact = (theta / since) ** -0.5
+            record(at_most(f"{rheology}, theta = {theta:.3g}", np.abs(surface(now).stretch - exact).max(), 1e-9,
+                           "homogeneous; Newton's tolerance"))
+            since = theta if rheology == "stress_free" else 1.0
+
+
+def plugged(preset: str, *changes: str) -> Scene:
+    """A plug of 20 um in a pore of 20 um, with so much supply that it grows at the same rate everywhere."""
+    corners = "[[\"-10 um\", \"0 um\"], [\"-10 um\", \"20 um\"], [\"10 um\", \"20 um\"], [\"10 um\", \"0 um\"]]"
+    supplies = [f'substrates.{name}.supply="1e6 mg/L"' for name in ("acceptor", "donor")]
+    return load_scene("base", [*NUMERICS[preset], 'pore.width="20 um"', f"aggregate.outline={corners}", *supplies,
+                               "numerics.refinement=0.3", *changes], ["aggregate.radius"])
+
+
+class Block(growth.System):
+    """The equations of a body with another factor of its stabilisation."""
+
+    gamma = growth.GAMMA
+
+    def _stiffening(self):
+        return self.gamma * self.theta ** (-5 / 3)
+
+
+@cache
+def of_ours(gamma: float) -> tuple[Callable, Callable]:
+    """(energy, constraint), functions of theta, of quadratic places and linear pressures on a block of 1 x 1."""
+    grid, side = bodies.rectangle(0.25, 4, 2, 1.0, 1.0, 0.0)
+    body = bodies.on_mesh(grid, 2, side["left"] | side["right"], side["bottom"])
+    free = np.flatnonzero(~body.held.T.ravel())
+    last = 2 * len(body.reference)
+
+    def matrix(theta: float) -> np.ndarray:
+        system = Block(body, np.zeros_like(body.held))
+        system.gamma = gamma
+        P = surface_stability.confined_growth_pressure(theta)
+        place = body.reference * [1.0, theta]
+        system.under(body.constant(theta), place, place, body.resting + P)
+        local = system.tangent(place, body.resting + P)
+        whole = np.zeros((last + body.corners,) * 2)
+        rows = system.unknowns
+        np.add.at(whole, (rows[:, :, None], rows[:, None, :]), local)
+        return whole
+
+    return lambda theta: matrix(theta)[np.ix_(free, free)], lambda theta: matrix(theta)[last:, free]
+
+
+@pytest.mark.case(
+    "growth-surface-stability", kind="cross-code",
+    claim="A block that grows between side walls is stable down to Biot's elastic stretch, 0.544: quartic places that "
+          "are exactly divergence-free find it within 1 %; quadratic ones with linear pressures do within 5 %, thanks "
+          "to their stabilisation",
+    norm="elastic stretch at which the least eigenvalue is zero",
+    mutants=("biot-of-a-layer", "grad-div-dropped"), references=("surface_stability",), runs_with="2",
+    omitted="linear elements: their stabilisation is no part of the energy; cubic ones: those of order 2")
+def test_surface_stability(record):
+    exact = surface_stability.biot()
+    found = surface_stability.critical_stretch(*surface_stability.divergence_free(surface_stability.mesh(4, 4)))
+    record(between("divergence-free", found / exact, 0.99, 1.0 + 1e-4, "short waves, on a conforming mesh from below"),
+           between("the limit at which a run ends", BIOT / exact, 0.999, 1.001, "three digits"))
+    ours = [surface_stability.critical_stretch(*of_ours(gamma)) for gamma in (growth.GAMMA, 10.0, 100.0)]
+    record(between("P2/P1, gamma of the package", ours[0] / exact, 0.95, 1.05, "not divergence-free in each point"))
+    for gamma, less, more in zip((10, 100), ours[1:], ours):
+        record(at_most(f"P2/P1, gamma = {gamma}, over that of a tenth", less / more, 1.0,
+                       "the energy grows with gamma"))
+
+
+@pytest.mark.slow
+@pytest.mark.case(
+    "growth-fold", kind="exact",
+    claim="A plug that grows alike everywhere between the walls ends as a fold where its area has grown by 3.38; born "
+          "without stress it grows on",
+    norm="area at the end over that at the start", mutants=("fold-never",),
+    omitted="orders of elements by themselves: growth-surface-confined; accurate, exact: as fast")
+@pytest.mark.parametrize("preset", ["paper", "fast"])
+def test_fold(preset, record):
+    rate = numbers.fastest_growth(plugged(preset))
+    limit = 0.544**-2
+    end = f'growth.end="{1.3 * math.log(limit) / rate:.6g} h"'
+    for rheology, folds in (("stressed", 1), ("stress_free", 0)):
+        scene = plugged(preset, end, f"growth.new_biomass={rheology}", 'growth.time_step="1 h"')
+        last, ended = _to_the_end(scene)
+        record(between(f"{rheology}, runs that end as a fold", isinstance(ended, Fold), folds, folds,
+                       "3.38 is passed"))
+        if folds:
+            step = scene.growth.time_step * (1.0 if preset == "paper" else SHORTEST)
+            ratio = last.pore.boundary.area / 400.0
+            record(between("area over 3.38", ratio / limit, math.exp(-2 * rate * step), 1.0,
+                           "the last state is within a step of it; 0.544^-2 = 3.38"))
+
+
+def _to_the_end(scene: Scene) -> tuple[Instant, RunEnd | None]:
+    """The last instant of a run, and what has ended it early."""
+    last: list[Instant] = []
+    try:
+        for instant in simulate(scene):
+            last = [instant]
+    except RunEnd as end:
+        return last[0], end
+    return last[0], None
