@@ -609,9 +609,9 @@ MUTANTS = (
         "repro/march/stepping.py",
         ("contact-a-fifth-too-thin",
          "Contact is met when the film is a fifth thinner than it may be.",
-         "LANDED = 0.995",
+         "LANDED = 0.999",
          "LANDED = 0.8",
-         f"{STEPPING}contact_is_met_within_half_a_percent_of_the_film")),
+         f"{STEPPING}contact_is_met_within_a_thousandth_of_the_film")),
     *changes(
         "repro/model/transport.py",
         ("ends-of-before-the-jump",
